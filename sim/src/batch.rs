@@ -1,0 +1,39 @@
+//! Many episodes at a time.
+
+use crate::driver::{Decision, Fleet};
+use crate::episode::{Episode, EpisodeReport, Frame};
+use rayon::prelude::*;
+
+/// Drives episodes in lock-step to their ends: one call of the fleet per tick answers for all that still run.
+///
+/// Reports come in the order of the episodes. `on_frame(episode, frame)` is called in that order within a tick.
+pub fn run_lockstep(
+    mut episodes: Vec<Episode>,
+    fleet: &mut dyn Fleet,
+    on_frame: &mut dyn FnMut(usize, &Frame),
+) -> Vec<EpisodeReport> {
+    let mut decisions: Vec<Decision> = Vec::with_capacity(episodes.len());
+    let mut frames: Vec<(usize, Frame)> = Vec::with_capacity(episodes.len());
+    loop {
+        let mut running: Vec<(usize, &mut Episode)> =
+            episodes.iter_mut().enumerate().filter(|(_, episode)| episode.ending().is_none()).collect();
+        if running.is_empty() {
+            break;
+        }
+        running.par_iter_mut().for_each(|(_, episode)| episode.observe());
+        let seats: Vec<_> = running.iter().map(|(index, episode)| episode.seat(*index)).collect();
+        decisions.clear();
+        fleet.decide(&seats, &mut decisions);
+        assert_eq!(decisions.len(), seats.len(), "a fleet answers every seat");
+        drop(seats);
+        running
+            .par_iter_mut()
+            .zip(&decisions)
+            .map(|((index, episode), &decision)| (*index, episode.apply(decision)))
+            .collect_into_vec(&mut frames);
+        for (index, frame) in &frames {
+            on_frame(*index, frame);
+        }
+    }
+    episodes.iter().map(Episode::report).collect()
+}

@@ -1,0 +1,164 @@
+//! From a look-ahead point to a vehicle command: pure pursuit and the speed law (methods.md 2.4, 2.5).
+
+use crate::driver::{Decision, LookAheadPoint, Source};
+use crate::sensing::GridGeometry;
+use crate::vehicle::{VehicleCommand, VehicleParams};
+use serde::{Deserialize, Serialize};
+
+/// Which form of pure pursuit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PursuitLaw {
+    /// δ = atan(2 L sin θ_l / L_f) about the rear axle: the exact circle through the point (paper).
+    #[default]
+    Paper,
+    /// δ = atan(L sin η / (0.75 L_f + 0.3 cos η)) measured from 0.5 m behind the lower image edge (authors' code).
+    AuthorsCode,
+}
+
+/// How fast to drive at a look-ahead point. The paper says v = a_y/2.24 "where final v was half"; methods.md 2.5 lists
+/// the readings. Distances are measured from the front bumper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SpeedLaw {
+    /// A: v = a_y / 2.24.
+    Full,
+    /// B: v = a_y / 4.48, the only reading that gives the paper's derived 1.43 m/s.
+    #[default]
+    Halved,
+    /// C: v = a_y / 2.
+    HalfOfAhead,
+    /// v = 2.2 − 1.7 |δ_sw| / 540° (the paper's law for the model-based planners).
+    FallsWithSteering,
+}
+
+/// Settings of the controller.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ControllerConfig {
+    /// Form of pure pursuit.
+    pub pursuit: PursuitLaw,
+    /// Speed law of the expert and of learned policies.
+    pub speed_law: SpeedLaw,
+    /// Speed law of model-based planners.
+    pub planner_speed_law: SpeedLaw,
+    /// Slowest command, m/s.
+    pub speed_min_mps: f32,
+    /// Fastest command, m/s.
+    pub speed_max_mps: f32,
+}
+
+impl ControllerConfig {
+    /// Experimental Setup: 0.5 to 2.2 m/s.
+    pub fn paper() -> Self {
+        Self {
+            pursuit: PursuitLaw::Paper,
+            speed_law: SpeedLaw::Halved,
+            planner_speed_law: SpeedLaw::FallsWithSteering,
+            speed_min_mps: 0.5,
+            speed_max_mps: 2.2,
+        }
+    }
+}
+
+/// Gap between the front bumper and the lower edge of the patch that the speed law adds, metres (methods.md 2.5).
+const BUMPER_TO_PATCH_M: f32 = 0.5;
+/// Shortest look-ahead distance, metres: below it the circle through the point is meaningless.
+const LOOK_AHEAD_MIN_M: f32 = 1.0;
+
+/// The command that drives at a decision's look-ahead point.
+pub fn pursue(
+    config: &ControllerConfig,
+    params: &VehicleParams,
+    geometry: &GridGeometry,
+    decision: &Decision,
+) -> VehicleCommand {
+    let steering_rad = steering(config.pursuit, params, geometry, decision.look_ahead);
+    let law = if decision.source == Source::Planner { config.planner_speed_law } else { config.speed_law };
+    VehicleCommand { steering_rad, speed_mps: speed(law, config, params, geometry, decision.look_ahead, steering_rad) }
+}
+
+/// Road-wheel angle that steers at a point, radians, within the vehicle's limits.
+pub fn steering(law: PursuitLaw, params: &VehicleParams, geometry: &GridGeometry, target: LookAheadPoint) -> f32 {
+    let LookAheadPoint { ahead_m, left_m } = target;
+    let steering_rad = match law {
+        PursuitLaw::Paper => {
+            if ahead_m <= 0.1 {
+                // Beside or behind the axle: no forward circle reaches it, turn as hard as possible.
+                params.steering_max_rad * left_m.signum()
+            } else {
+                let distance_m = ahead_m.hypot(left_m).max(LOOK_AHEAD_MIN_M); // L_f
+                let bearing_rad = left_m.atan2(ahead_m); // θ_l
+                (2.0 * params.wheelbase_m * bearing_rad.sin() / distance_m).atan()
+            }
+        }
+        PursuitLaw::AuthorsCode => {
+            let ahead_m = ahead_m - geometry.near_edge_ahead_m + BUMPER_TO_PATCH_M;
+            let distance_m = ahead_m.hypot(left_m).max(LOOK_AHEAD_MIN_M);
+            let bearing_rad = left_m.atan2(ahead_m);
+            (params.wheelbase_m * bearing_rad.sin() / (0.75 * distance_m + 0.3 * bearing_rad.cos())).atan()
+        }
+    };
+    steering_rad.clamp(-params.steering_max_rad, params.steering_max_rad)
+}
+
+fn speed(
+    law: SpeedLaw,
+    config: &ControllerConfig,
+    params: &VehicleParams,
+    geometry: &GridGeometry,
+    target: LookAheadPoint,
+    steering_rad: f32,
+) -> f32 {
+    let ahead_m = target.ahead_m - geometry.near_edge_ahead_m + BUMPER_TO_PATCH_M; // a_y, from the bumper
+    let speed_mps = match law {
+        SpeedLaw::Full => ahead_m / 2.24,
+        SpeedLaw::Halved => ahead_m / 4.48,
+        SpeedLaw::HalfOfAhead => ahead_m / 2.0,
+        SpeedLaw::FallsWithSteering => {
+            let share = steering_rad.abs() / params.steering_max_rad; // |δ_sw| / 540°
+            config.speed_max_mps - share * (config.speed_max_mps - config.speed_min_mps)
+        }
+    };
+    speed_mps.clamp(config.speed_min_mps, config.speed_max_mps)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_paper_law_drives_the_circle_through_the_point() {
+        let (params, geometry) = (VehicleParams::hyundai_hg300(), GridGeometry::paper());
+        for (ahead_m, left_m) in [(8.0, 1.0), (5.0, -2.0), (12.0, 4.0), (16.0, 0.0)] {
+            let target = LookAheadPoint { ahead_m, left_m };
+            let curvature = steering(PursuitLaw::Paper, &params, &geometry, target).tan() / params.wheelbase_m;
+            assert!((curvature - target.curvature_per_m()).abs() < 1e-5);
+            // Rolling along that arc arrives at the point.
+            let chord_m = ahead_m.hypot(left_m);
+            let half_turn = left_m.atan2(ahead_m);
+            let travel_m = if half_turn == 0.0 { chord_m } else { chord_m * half_turn / half_turn.sin() };
+            let end = crate::geometry::Pose::default().advanced_along_arc(curvature, travel_m);
+            assert!(end.position().distance(glam::Vec2::new(ahead_m, left_m)) < 1e-3);
+        }
+    }
+
+    #[test]
+    fn speed_laws_match_the_paper() {
+        let (params, geometry, config) =
+            (VehicleParams::hyundai_hg300(), GridGeometry::paper(), ControllerConfig::paper());
+        let at = |law, ahead_m| speed(law, &config, &params, &geometry, LookAheadPoint { ahead_m, left_m: 0.0 }, 0.0);
+        // 0.5 + X_bev = 4.48 m → law B 1.0 m/s, A 2.0 m/s, C capped at 2.2 m/s.
+        let ahead_m = 4.3 - 0.5 + 4.48;
+        assert!((at(SpeedLaw::Halved, ahead_m) - 1.0).abs() < 1e-5);
+        assert!((at(SpeedLaw::Full, ahead_m) - 2.0).abs() < 1e-5);
+        assert_eq!(at(SpeedLaw::HalfOfAhead, ahead_m), 2.2);
+        assert_eq!(at(SpeedLaw::Halved, 4.3), 0.5);
+        let planner = |steering_rad| {
+            let target = LookAheadPoint { ahead_m: 8.0, left_m: 0.0 };
+            speed(SpeedLaw::FallsWithSteering, &config, &params, &geometry, target, steering_rad)
+        };
+        assert_eq!(planner(0.0), 2.2);
+        assert!((planner(params.steering_max_rad) - 0.5).abs() < 1e-5);
+    }
+}

@@ -1,0 +1,148 @@
+//! Who is at the wheel, and what they may see.
+//!
+//! A [`Policy`] receives an [`Observation`] and nothing else; only a [`Driver`] receives [`GroundTruth`]. A policy
+//! that peeks does not compile.
+
+use crate::map::Map;
+use crate::sensing::{GridGeometry, Observation};
+use crate::vehicle::VehicleState;
+use serde::{Deserialize, Serialize};
+
+/// The action of the paper: a point on the ground, in the ego frame (rear axle), metres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct LookAheadPoint {
+    /// Ahead of the rear axle, metres.
+    pub ahead_m: f32,
+    /// Left of the vehicle axis, metres.
+    pub left_m: f32,
+}
+
+impl LookAheadPoint {
+    /// Image fractions `[u, w]` of the bird's-eye view: u 0 = left … 1 = right, w 0 = far … 1 = near
+    /// (methods.md 0; the paper's a_x and a_y). Not clipped.
+    pub fn to_image_fraction(self, geometry: &GridGeometry) -> [f32; 2] {
+        [0.5 - self.left_m / geometry.side_m, 1.0 - (self.ahead_m - geometry.near_edge_ahead_m) / geometry.side_m]
+    }
+
+    /// Inverse of [`Self::to_image_fraction`].
+    pub fn from_image_fraction([u, w]: [f32; 2], geometry: &GridGeometry) -> Self {
+        Self { ahead_m: geometry.near_edge_ahead_m + (1.0 - w) * geometry.side_m, left_m: (0.5 - u) * geometry.side_m }
+    }
+
+    /// Curvature of the circle through the rear axle, tangent to the vehicle axis, and this point: 2Y/(X²+Y²), 1/m.
+    pub fn curvature_per_m(self) -> f32 {
+        2.0 * self.left_m / (self.ahead_m * self.ahead_m + self.left_m * self.left_m).max(1e-6)
+    }
+}
+
+/// One standard deviation of a look-ahead point per axis, metres.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Along the vehicle axis, metres.
+    pub ahead_m: f32,
+    /// Across, metres.
+    pub left_m: f32,
+}
+
+/// Whose answer is being driven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Source {
+    /// The scripted expert.
+    Expert,
+    /// The learned policy.
+    Novice,
+    /// A model-based planner.
+    Planner,
+}
+
+/// What a driver answers at one control tick.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Decision {
+    /// Where to drive.
+    pub look_ahead: LookAheadPoint,
+    /// Who said so.
+    pub source: Source,
+    /// How sure they are, where they say.
+    pub spread: Option<Spread>,
+}
+
+/// Noise-free surroundings: what only the expert, the metrics and the collision check may use.
+#[derive(Debug, Clone, Copy)]
+pub struct GroundTruth<'a> {
+    /// The clean map.
+    pub map: &'a Map,
+    /// The vehicle as it is.
+    pub vehicle: VehicleState,
+    /// Arc length along the reference path of the point nearest to the rear axle, metres. For the "no turning back"
+    /// filter only.
+    pub progress_m: f32,
+}
+
+/// All a driver can be shown at one control tick.
+#[derive(Debug, Clone, Copy)]
+pub struct Situation<'a> {
+    /// The noisy grid.
+    pub observation: &'a Observation,
+    /// The truth.
+    pub truth: GroundTruth<'a>,
+}
+
+/// A driver that could sit in a real car: it sees the noisy grid and nothing else.
+pub trait Policy {
+    /// Answers one observation.
+    fn act(&mut self, observation: &Observation) -> Decision;
+}
+
+/// Whoever is at the wheel of one episode.
+pub trait Driver {
+    /// Answers one situation.
+    fn decide(&mut self, situation: &Situation<'_>) -> Decision;
+
+    /// Forgets the past; called when the car was put back on the path.
+    fn reset(&mut self) {}
+}
+
+/// Seats a [`Policy`] at the wheel and withholds the truth from it.
+#[derive(Debug, Clone)]
+pub struct SensorsOnly<P>(pub P);
+
+impl<P: Policy> Driver for SensorsOnly<P> {
+    fn decide(&mut self, situation: &Situation<'_>) -> Decision {
+        self.0.act(situation.observation)
+    }
+}
+
+/// One running episode of a lock-step batch, as its fleet sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct Seat<'a> {
+    /// Index of the episode within the batch, constant over its life.
+    pub episode: usize,
+    /// The car was put back on the path since the last decision: forget the past.
+    pub was_reset: bool,
+    /// What can be seen from this seat.
+    pub situation: Situation<'a>,
+}
+
+/// Drives many episodes in lock-step, so that a network answers for all of them in one call.
+///
+/// What one seat is answered must not depend on which other seats are in the call.
+pub trait Fleet {
+    /// Pushes exactly one decision per seat, in order.
+    fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>);
+}
+
+/// A fleet with one independent driver per episode, asked one after another.
+pub struct OneDriverEach<D>(pub Vec<D>);
+
+impl<D: Driver> Fleet for OneDriverEach<D> {
+    fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
+        for seat in seats {
+            let driver = &mut self.0[seat.episode];
+            if seat.was_reset {
+                driver.reset();
+            }
+            decisions.push(driver.decide(&seat.situation));
+        }
+    }
+}

@@ -1,0 +1,468 @@
+//! The closed loop. Training data, evaluation and replay all come from this one.
+//!
+//! An [`Episode`] is stepped from outside — [`Episode::observe`], a decision, [`Episode::apply`] — so that one driver
+//! ([`run`]) and a lock-step batch ([`crate::batch::run_lockstep`]) are two thin callers of the same tick.
+//!
+//! Stop–count–resume (paper, collision rate) is the state machine [`Phase`]:
+//!
+//! ```text
+//!            swept body meets something            at rest
+//!  Driving ────────────────────────────▶ Braking ──────────▶ put back on the path ─▶ Driving
+//!     └───────────── no progress (stuck) ───────────────────▶ put back on the path ─▶ Driving
+//! ```
+
+use crate::collision::BodyBox;
+use crate::controller::{self, ControllerConfig};
+use crate::driver::{Decision, Driver, GroundTruth, Seat, Situation};
+use crate::geometry::Pose;
+use crate::map::Map;
+use crate::metrics::{EpisodeMetrics, MetricsConfig, SafeRing, Tally};
+use crate::seed::RootSeed;
+use crate::sensing::noise::NoiseConfig;
+use crate::sensing::{Observation, SensingConfig, Sensor};
+use crate::vehicle::{self, VehicleCommand, VehicleParams, VehicleState};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Everything an episode needs besides a map and a seed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EpisodeConfig {
+    /// The car.
+    pub vehicle: VehicleParams,
+    /// From look-ahead point to command.
+    pub controller: ControllerConfig,
+    /// What is seen.
+    pub sensing: SensingConfig,
+    /// What is seen wrongly.
+    pub noise: NoiseConfig,
+    /// What is measured.
+    pub metrics: MetricsConfig,
+    /// Physics step, milliseconds.
+    pub physics_step_ms: u32,
+    /// Control period, milliseconds; a multiple of the physics step (paper: 50 ms).
+    pub control_period_ms: u32,
+}
+
+impl EpisodeConfig {
+    /// The paper's set-up at noise level `paper`.
+    pub fn paper() -> Self {
+        Self {
+            vehicle: VehicleParams::hyundai_hg300(),
+            controller: ControllerConfig::paper(),
+            sensing: SensingConfig::paper(),
+            noise: NoiseConfig::of(crate::scenario::NoiseLevel::Paper),
+            metrics: MetricsConfig::paper(),
+            physics_step_ms: 10,
+            control_period_ms: 50,
+        }
+    }
+
+    /// Control period, seconds.
+    pub fn control_period_s(&self) -> f32 {
+        self.control_period_ms as f32 * 1e-3
+    }
+
+    fn physics_step_s(&self) -> f32 {
+        self.physics_step_ms as f32 * 1e-3
+    }
+
+    fn physics_steps(&self, seconds: f32) -> u32 {
+        (seconds / self.physics_step_s()).round() as u32
+    }
+}
+
+/// What happened in one tick.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum Event {
+    /// Nothing.
+    Drove,
+    /// The car headed at something within 0.5 m; it was stopped and put back on the path.
+    NearCollision {
+        /// Rear-axle pose when it was counted.
+        at: Pose,
+        /// Progress along the reference path then, metres.
+        progress_m: f32,
+    },
+    /// No progress for ten seconds; the car was put back on the path.
+    Stuck {
+        /// Rear-axle pose when it was counted.
+        at: Pose,
+        /// Progress along the reference path then, metres.
+        progress_m: f32,
+    },
+    /// The finish.
+    ReachedEnd,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ending {
+    /// At the finish.
+    ReachedEnd,
+    /// Given up after too many near-collisions and stuck events.
+    TooManyEvents,
+    /// Given up after too long a time.
+    TimedOut,
+}
+
+/// One control tick as seen from outside.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    /// Index of the decision, from 0.
+    pub tick: u32,
+    /// Simulated time at the end of the tick, seconds.
+    pub time_s: f32,
+    /// The vehicle when it was observed.
+    pub vehicle: VehicleState,
+    /// What was seen.
+    pub observation: Observation,
+    /// What was answered.
+    pub decision: Decision,
+    /// What the controller made of it.
+    pub command: VehicleCommand,
+    /// Progress along the reference path when observed, metres.
+    pub progress_m: f32,
+    /// Drivable share of the safe range when observed, 0…1.
+    pub safe_ratio: f32,
+    /// Distance between body and non-drivable space when observed, metres.
+    pub clearance_m: f32,
+    /// Way driven in this tick, metres.
+    pub driven_m: f32,
+    /// Times the body began to touch something in this tick.
+    pub contacts: u32,
+    /// What happened.
+    pub event: Event,
+}
+
+/// Reads frames; cannot influence or fail an episode.
+pub trait FrameSink {
+    /// Takes one frame.
+    fn frame(&mut self, frame: &Frame);
+}
+
+impl FrameSink for () {
+    fn frame(&mut self, _frame: &Frame) {}
+}
+
+impl<F: FnMut(&Frame)> FrameSink for F {
+    fn frame(&mut self, frame: &Frame) {
+        self(frame);
+    }
+}
+
+/// Result of a finished run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeReport {
+    /// How it ended.
+    pub ending: Ending,
+    /// What was measured.
+    pub metrics: EpisodeMetrics,
+    /// Near-collisions and stuck events in order, with the tick they happened at.
+    pub events: Vec<(u32, Event)>,
+}
+
+/// Where stop–count–resume stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Phase {
+    /// Somebody drives.
+    Driving,
+    /// Counted; emergency braking until the car rests.
+    Braking,
+}
+
+/// One run that can be stepped.
+#[derive(Debug, Clone)]
+pub struct Episode {
+    config: Arc<EpisodeConfig>,
+    map: Arc<Map>,
+    body: Arc<BodyBox>,
+    ring: Arc<SafeRing>,
+    sensor: Sensor,
+    vehicle: VehicleState,
+    phase: Phase,
+    /// Commands on their way to the actuators, with the physics step from which they hold.
+    in_flight: VecDeque<(u32, VehicleCommand)>,
+    command: VehicleCommand,
+    physics_step: u32,
+    tick: u32,
+    progress_m: f32,
+    /// Progress and physics step of the last half metre gained.
+    advance: (f32, u32),
+    /// No near-collision is counted before this physics step.
+    counts_from_step: u32,
+    touches: bool,
+    observation: Observation,
+    was_reset: bool,
+    tally: Tally,
+    events: Vec<(u32, Event)>,
+    ending: Option<Ending>,
+}
+
+impl Episode {
+    /// A car at rest at the start of a map's route; all noise is drawn from `seed`.
+    pub fn new(config: Arc<EpisodeConfig>, map: Arc<Map>, seed: RootSeed) -> Self {
+        assert!(
+            config.physics_step_ms > 0 && config.control_period_ms.is_multiple_of(config.physics_step_ms),
+            "the control period is a multiple of the physics step"
+        );
+        let sensor = Sensor::new(&map, config.sensing.clone(), &config.noise, seed);
+        let pixel_m = config.sensing.geometry.pixel_m();
+        Self {
+            body: Arc::new(BodyBox::new(&config.vehicle)),
+            ring: Arc::new(SafeRing::new(&config.vehicle, &config.metrics, pixel_m)),
+            sensor,
+            vehicle: VehicleState::at_rest(map.start()),
+            phase: Phase::Driving,
+            in_flight: VecDeque::with_capacity(4),
+            command: VehicleCommand::default(),
+            physics_step: 0,
+            tick: 0,
+            progress_m: 0.0,
+            advance: (0.0, 0),
+            counts_from_step: 0,
+            touches: false,
+            observation: Observation::default(),
+            was_reset: true,
+            tally: Tally::new(map.path().length_m()),
+            events: Vec::new(),
+            ending: None,
+            config,
+            map,
+        }
+    }
+
+    /// Looks. Call once before each decision.
+    pub fn observe(&mut self) {
+        self.observation = self.sensor.observe(&self.map, self.vehicle.pose, self.tick);
+    }
+
+    /// What a driver may be shown.
+    pub fn situation(&self) -> Situation<'_> {
+        let truth = GroundTruth { map: &self.map, vehicle: self.vehicle, progress_m: self.progress_m };
+        Situation { observation: &self.observation, truth }
+    }
+
+    /// This episode as a seat of a lock-step batch.
+    pub fn seat(&self, episode: usize) -> Seat<'_> {
+        Seat { episode, was_reset: self.was_reset, situation: self.situation() }
+    }
+
+    /// Whether the car was put back on the path since the last decision.
+    pub fn was_reset(&self) -> bool {
+        self.was_reset
+    }
+
+    /// How the run ended, once it has.
+    pub fn ending(&self) -> Option<Ending> {
+        self.ending
+    }
+
+    /// The map driven on.
+    pub fn map(&self) -> &Arc<Map> {
+        &self.map
+    }
+
+    /// The settings driven with.
+    pub fn config(&self) -> &EpisodeConfig {
+        &self.config
+    }
+
+    /// The vehicle now.
+    pub fn vehicle(&self) -> VehicleState {
+        self.vehicle
+    }
+
+    /// The sensor, for pictures.
+    pub fn sensor(&self) -> &Sensor {
+        &self.sensor
+    }
+
+    /// Number of decisions so far.
+    pub fn tick(&self) -> u32 {
+        self.tick
+    }
+
+    /// Progress along the reference path, metres.
+    pub fn progress_m(&self) -> f32 {
+        self.progress_m
+    }
+
+    /// Drives one control tick; a near-collision is braked to rest and put back on the path within it.
+    ///
+    /// # Panics
+    /// If the episode has ended, or the look-ahead point is not finite.
+    pub fn apply(&mut self, decision: Decision) -> Frame {
+        assert!(self.ending.is_none(), "an ended episode is not driven on");
+        let point = decision.look_ahead;
+        assert!(
+            point.ahead_m.is_finite() && point.left_m.is_finite(),
+            "the look-ahead point is finite, not {point:?} (tick {}, map {:?})",
+            self.tick,
+            self.map.scenario().name
+        );
+        let config = Arc::clone(&self.config);
+        let command = controller::pursue(&config.controller, &config.vehicle, &config.sensing.geometry, &decision);
+        let holds_from = self.physics_step + config.physics_steps(config.vehicle.dead_time_s);
+        self.in_flight.push_back((holds_from, command));
+        self.was_reset = false;
+
+        let distance = self.map.distance_field();
+        let seen_from = self.vehicle;
+        let mut frame = Frame {
+            tick: self.tick,
+            time_s: 0.0,
+            vehicle: seen_from,
+            observation: self.observation,
+            decision,
+            command,
+            progress_m: self.progress_m,
+            safe_ratio: self.ring.safe_ratio(distance, seen_from.pose, config.sensing.geometry.pixel_m()),
+            clearance_m: self.body.clearance_m(distance, seen_from.pose),
+            driven_m: 0.0,
+            contacts: 0,
+            event: Event::Drove,
+        };
+        let steps_per_tick = config.control_period_ms / config.physics_step_ms;
+        let mut steps = 0;
+        while steps < steps_per_tick || self.phase == Phase::Braking {
+            self.step_physics(&mut frame);
+            steps += 1;
+        }
+        self.tick += 1;
+        self.progress_m = self.map.path().project_near(self.vehicle.pose.position(), self.progress_m, 5.0, 5.0);
+        self.judge_progress(&mut frame);
+        frame.time_s = self.physics_step as f32 * config.physics_step_s();
+        self.tally.frame(&frame);
+        if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
+            self.events.push((frame.tick, frame.event));
+        }
+        self.ending = self.judge_ending(&frame);
+        frame
+    }
+
+    /// The result so far; final once [`Self::ending`] is set.
+    pub fn report(&self) -> EpisodeReport {
+        EpisodeReport {
+            ending: self.ending.unwrap_or(Ending::TimedOut),
+            metrics: self.tally.metrics(),
+            events: self.events.clone(),
+        }
+    }
+
+    fn step_physics(&mut self, frame: &mut Frame) {
+        let config = &self.config;
+        let dt_s = config.physics_step_s();
+        let before = self.vehicle;
+        match self.phase {
+            Phase::Driving => {
+                while self.in_flight.front().is_some_and(|&(step, _)| step <= self.physics_step) {
+                    self.command = self.in_flight.pop_front().map_or(self.command, |(_, command)| command);
+                }
+                self.vehicle = vehicle::step(&config.vehicle, before, self.command, dt_s);
+            }
+            Phase::Braking => self.vehicle = vehicle::step_emergency_stop(&config.vehicle, before, dt_s),
+        }
+        self.physics_step += 1;
+        frame.driven_m += 0.5 * (before.speed_mps + self.vehicle.speed_mps) * dt_s;
+
+        let (pose, set) = (self.vehicle.pose, config.metrics.obstacle_set);
+        let curvature = self.vehicle.curvature_per_m(&config.vehicle);
+        let sweeps_into_something = self.body.sweep_hits(
+            self.map.distance_field(),
+            self.map.collision(),
+            set,
+            pose,
+            curvature,
+            config.metrics.near_collision_m,
+        );
+        let touches = sweeps_into_something && self.map.collision().body_hits(&self.body, pose, set);
+        frame.contacts += u32::from(touches && !self.touches);
+        self.touches = touches;
+        let counts = self.physics_step >= self.counts_from_step;
+        match self.phase {
+            Phase::Driving if sweeps_into_something && self.vehicle.speed_mps > 0.05 && counts => {
+                let at_m = self.map.path().project_near(pose.position(), self.progress_m, 5.0, 5.0);
+                frame.event = Event::NearCollision { at: pose, progress_m: at_m };
+                self.phase = Phase::Braking;
+            }
+            Phase::Braking if self.vehicle.speed_mps == 0.0 => self.resume_on_path(),
+            _ => {}
+        }
+    }
+
+    /// Puts the car at rest on the nearest point of the path from which it can drive.
+    fn resume_on_path(&mut self) {
+        let path = self.map.path();
+        let mut s_m = path.project_near(self.vehicle.pose.position(), self.progress_m, 5.0, 5.0);
+        while s_m < path.length_m() && !self.is_free_from(s_m) {
+            s_m += 0.5;
+        }
+        let s_m = s_m.min(path.length_m());
+        self.vehicle = VehicleState::at_rest(path.pose_at(s_m));
+        self.in_flight.clear();
+        self.command = VehicleCommand::default();
+        self.progress_m = s_m;
+        self.advance = (s_m, self.physics_step);
+        self.counts_from_step = self.physics_step + self.config.physics_steps(self.config.metrics.refractory_s);
+        self.touches = false;
+        self.was_reset = true;
+        self.phase = Phase::Driving;
+    }
+
+    /// Whether the body is free when it follows the path for a few metres, and straight on for the near-collision range.
+    fn is_free_from(&self, s_m: f32) -> bool {
+        let (path, metrics) = (self.map.path(), &self.config.metrics);
+        let is_free = |pose: Pose| !self.map.collision().body_hits(&self.body, pose, metrics.obstacle_set);
+        let start = path.pose_at(s_m);
+        let steps = (metrics.resume_free_m / 0.25).ceil() as u32;
+        (0..=steps).all(|i| is_free(path.pose_at(s_m + i as f32 * 0.25)))
+            && is_free(start.advanced_along_arc(0.0, 0.5 * metrics.near_collision_m))
+            && is_free(start.advanced_along_arc(0.0, metrics.near_collision_m))
+    }
+
+    /// Recognises a stuck car and the finish.
+    fn judge_progress(&mut self, frame: &mut Frame) {
+        let (best_m, since_step) = self.advance;
+        let metrics = &self.config.metrics;
+        if self.progress_m >= best_m + metrics.stuck_progress_m {
+            self.advance = (self.progress_m, self.physics_step);
+        } else if self.physics_step - since_step >= self.config.physics_steps(metrics.stuck_after_s) {
+            frame.event = Event::Stuck { at: self.vehicle.pose, progress_m: self.progress_m };
+            self.resume_on_path();
+        }
+        // The projection saturates at the end of the path.
+        if self.progress_m >= self.map.path().length_m() - 1e-3 && frame.event == Event::Drove {
+            frame.event = Event::ReachedEnd;
+        }
+    }
+
+    fn judge_ending(&self, frame: &Frame) -> Option<Ending> {
+        let metrics = &self.config.metrics;
+        if self.progress_m >= self.map.path().length_m() - 1e-3 {
+            Some(Ending::ReachedEnd)
+        } else if self.events.len() >= metrics.events_max as usize {
+            Some(Ending::TooManyEvents)
+        } else if frame.time_s >= metrics.timeout_s {
+            Some(Ending::TimedOut)
+        } else {
+            None
+        }
+    }
+}
+
+/// Drives an episode to its end with one driver.
+pub fn run(mut episode: Episode, driver: &mut dyn Driver, sink: &mut dyn FrameSink) -> EpisodeReport {
+    while episode.ending().is_none() {
+        episode.observe();
+        if episode.was_reset() {
+            driver.reset();
+        }
+        let decision = driver.decide(&episode.situation());
+        sink.frame(&episode.apply(decision));
+    }
+    episode.report()
+}

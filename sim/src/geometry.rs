@@ -1,0 +1,117 @@
+//! Points, poses and frames.
+//!
+//! | frame | definition |
+//! |---|---|
+//! | world | right-handed metres, heading counter-clockwise from +x, radians |
+//! | ego   | origin at the rear-axle centre on the ground; x = ahead, y = left |
+//!
+//! Transforms are named `target_from_source`, so that adjacent names match when they are chained.
+
+pub use glam::Vec2;
+use serde::{Deserialize, Serialize};
+
+/// Position and heading of a body in the world frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pose {
+    /// World x, metres.
+    pub x_m: f32,
+    /// World y, metres.
+    pub y_m: f32,
+    /// Heading, counter-clockwise from the world x axis, in (−π, π].
+    pub heading_rad: f32,
+}
+
+impl Pose {
+    /// A pose at a world point.
+    pub fn new(position: Vec2, heading_rad: f32) -> Self {
+        Self { x_m: position.x, y_m: position.y, heading_rad }
+    }
+
+    /// Position in the world frame, metres.
+    pub fn position(self) -> Vec2 {
+        Vec2::new(self.x_m, self.y_m)
+    }
+
+    /// Unit vector pointing ahead, world frame.
+    pub fn ahead(self) -> Vec2 {
+        Vec2::from_angle(self.heading_rad)
+    }
+
+    /// The transform that takes ego coordinates (ahead, left) to world coordinates.
+    pub fn world_from_ego(self) -> WorldFromEgo {
+        WorldFromEgo { rotation: Vec2::from_angle(self.heading_rad), translation: self.position() }
+    }
+
+    /// The pose after `travel_m` along an arc of curvature `curvature_per_m` (exact; negative travel drives back).
+    ///
+    /// `x += (sin(θ+Δθ) − sin θ)/κ`, `y −= (cos(θ+Δθ) − cos θ)/κ` (methods.md 2.2), written with half angles so
+    /// that it stays accurate as κ → 0.
+    pub fn advanced_along_arc(self, curvature_per_m: f32, travel_m: f32) -> Self {
+        let half_turn = 0.5 * curvature_per_m * travel_m;
+        // chord = travel · sin(Δθ/2)/(Δθ/2), along the mean heading.
+        let chord_m = if half_turn.abs() < 1e-4 { travel_m } else { travel_m * half_turn.sin() / half_turn };
+        let direction = Vec2::from_angle(self.heading_rad + half_turn);
+        Self::new(self.position() + direction * chord_m, wrap_angle(self.heading_rad + 2.0 * half_turn))
+    }
+}
+
+/// Rigid transform from the ego frame to the world frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WorldFromEgo {
+    /// Cosine and sine of the heading.
+    pub rotation: Vec2,
+    /// World position of the rear axle, metres.
+    pub translation: Vec2,
+}
+
+impl WorldFromEgo {
+    /// Maps a point given as (ahead, left) to the world.
+    #[inline]
+    pub fn point(&self, in_ego: Vec2) -> Vec2 {
+        self.translation + self.rotation.rotate(in_ego)
+    }
+
+    /// Maps a world point to (ahead, left).
+    #[inline]
+    pub fn inverse_point(&self, in_world: Vec2) -> Vec2 {
+        Vec2::new(self.rotation.x, -self.rotation.y).rotate(in_world - self.translation)
+    }
+}
+
+/// Wraps an angle to (−π, π].
+pub fn wrap_angle(angle_rad: f32) -> f32 {
+    use std::f32::consts::{PI, TAU};
+    let wrapped = angle_rad.rem_euclid(TAU);
+    if wrapped > PI { wrapped - TAU } else { wrapped }
+}
+
+/// Even-odd test of a point against a closed polygon (the last vertex joins the first).
+pub fn polygon_contains(polygon: &[Vec2], point: Vec2) -> bool {
+    let mut inside = false;
+    for (a, b) in edges(polygon) {
+        if (a.y > point.y) != (b.y > point.y) && point.x < a.x + (point.y - a.y) / (b.y - a.y) * (b.x - a.x) {
+            inside = !inside;
+        }
+    }
+    inside
+}
+
+/// The edges of a closed polygon, the last joining its last vertex to its first.
+pub fn edges(polygon: &[Vec2]) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
+    (0..polygon.len()).map(|i| (polygon[i], polygon[(i + 1) % polygon.len()]))
+}
+
+/// Distance from a point to a segment, metres.
+pub fn distance_to_segment(point: Vec2, a: Vec2, b: Vec2) -> f32 {
+    let ab = b - a;
+    let t = ((point - a).dot(ab) / ab.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (point - a - ab * t).length()
+}
+
+/// The four corners of a rectangle, counter-clockwise from its front left corner.
+pub fn rectangle(centre: Pose, length_m: f32, width_m: f32) -> [Vec2; 4] {
+    let world_from_body = centre.world_from_ego();
+    let (l, w) = (0.5 * length_m, 0.5 * width_m);
+    [Vec2::new(l, w), Vec2::new(-l, w), Vec2::new(-l, -w), Vec2::new(l, -w)].map(|p| world_from_body.point(p))
+}

@@ -1,0 +1,24 @@
+//! Closed-loop parking-lot simulator: vocabulary, motion, sensing, the loop and its metrics.
+//!
+//! A [`scenario::Scenario`] is compiled into a [`map::Map`]; an [`episode::Episode`] on that map shows the driver an
+//! [`sensing::Observation`]; the driver answers with a [`driver::LookAheadPoint`]; the [`controller`] turns it into a
+//! [`vehicle::VehicleCommand`]; the vehicle moves; an [`episode::Frame`] falls out, and metrics, datasets and
+//! recordings only ever read frames. Nothing flows backwards.
+//!
+//! This crate knows no sibling, no burn, no rerun, no clap and no files.
+
+pub mod batch;
+pub mod collision;
+pub mod controller;
+pub mod distance_field;
+pub mod driver;
+pub mod episode;
+pub mod geometry;
+pub mod map;
+pub mod metrics;
+pub mod path;
+pub mod scenario;
+pub mod seed;
+pub mod sensing;
+pub mod validate;
+pub mod vehicle;

@@ -1,0 +1,110 @@
+//! A scenario, validated and indexed: built once, immutable, shared by `Arc`.
+//!
+//! After [`Map::build`] succeeds nothing in this crate returns an error.
+
+use crate::collision::CollisionWorld;
+use crate::distance_field::DistanceField;
+use crate::geometry::{Pose, Vec2};
+use crate::path::Path;
+use crate::scenario::{Scenario, ScenarioError};
+use crate::validate::validate;
+use crate::vehicle::VehicleParams;
+
+/// The clean world: what is drivable, what is solid, and the route.
+#[derive(Debug)]
+pub struct Map {
+    scenario: Scenario,
+    path: Path,
+    distance: DistanceField,
+    collision: CollisionWorld,
+    occluders: Vec<Occluder>,
+}
+
+/// A convex thing that hides the ground behind it from the camera.
+#[derive(Debug, Clone)]
+pub struct Occluder {
+    /// Convex outline in the world, counter-clockwise.
+    pub outline: Vec<Vec2>,
+    /// Centre of a circle around the outline, world.
+    pub centre: Vec2,
+    /// Radius of that circle, metres.
+    pub radius_m: f32,
+    /// Height above ground, metres.
+    pub height_m: f32,
+}
+
+impl Map {
+    /// Validates and indexes a scenario for a vehicle.
+    ///
+    /// # Errors
+    /// The first thing wrong with the scenario, with its place and a remedy.
+    pub fn build(scenario: Scenario, vehicle: &VehicleParams) -> Result<Self, ScenarioError> {
+        validate(&scenario, vehicle)?;
+        let path = Path::new(&scenario.reference_path);
+        let mut distance = DistanceField::of_boundary(&scenario.boundary);
+        for island in &scenario.islands {
+            distance.carve_polygon(&island.polygon);
+        }
+        for obstacle in &scenario.obstacles {
+            let [length_m, width_m, _] = obstacle.size_m();
+            let centre = obstacle.centre().position();
+            let reach_m = 0.5 * length_m.hypot(width_m);
+            // Wholly outside the drivable space: carving it would change nothing a car can reach.
+            if distance.at(centre) < -reach_m {
+                continue;
+            }
+            if obstacle.class.is_round() {
+                distance.carve_disc(centre, 0.5 * length_m);
+            } else {
+                distance.carve_polygon(&obstacle.outline());
+            }
+        }
+        let occluders = scenario
+            .obstacles
+            .iter()
+            .map(|obstacle| {
+                let [length_m, width_m, height_m] = obstacle.size_m();
+                let centre = obstacle.centre().position();
+                Occluder { outline: obstacle.outline(), centre, radius_m: 0.5 * length_m.hypot(width_m), height_m }
+            })
+            .collect();
+        let collision = CollisionWorld::new(&scenario);
+        Ok(Self { scenario, path, distance, collision, occluders })
+    }
+
+    /// What the map was built from.
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// The reference path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where an episode starts.
+    pub fn start(&self) -> Pose {
+        self.path.pose_at(0.0)
+    }
+
+    /// Signed distance to the nearest non-drivable point, metres: positive in drivable space, capped at ±3 m.
+    #[inline]
+    pub fn signed_distance_m(&self, point: Vec2) -> f32 {
+        self.distance.at(point)
+    }
+
+    /// The raster behind [`Self::signed_distance_m`].
+    pub fn distance_field(&self) -> &DistanceField {
+        &self.distance
+    }
+
+    /// Everything that hides ground from the camera.
+    pub fn occluders(&self) -> &[Occluder] {
+        &self.occluders
+    }
+
+    /// Exact intersection queries.
+    pub fn collision(&self) -> &CollisionWorld {
+        &self.collision
+    }
+}

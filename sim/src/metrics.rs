@@ -1,0 +1,295 @@
+//! What is measured on a run (methods.md 8): always on the clean map.
+
+use crate::collision::ObstacleSet;
+use crate::distance_field::{DistanceField, LIPSCHITZ};
+use crate::driver::Source;
+use crate::episode::{Event, Frame};
+use crate::geometry::{Pose, Vec2, distance_to_segment, edges, polygon_contains};
+use crate::vehicle::VehicleParams;
+use serde::{Deserialize, Serialize};
+
+/// Definitions of the metrics and of stop–count–resume.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MetricsConfig {
+    /// A near-collision is something within this travel along the present arc, metres (paper: 0.5 m).
+    pub near_collision_m: f32,
+    /// What counts as something.
+    pub obstacle_set: ObstacleSet,
+    /// Width of the safe-distance range around the bumper, metres (paper: 1.0 m).
+    pub safe_range_m: f32,
+    /// Which part of the range.
+    pub safe_range: SafeRange,
+    /// After a resume no near-collision is counted for this long, seconds.
+    pub refractory_s: f32,
+    /// A run is given up after this many near-collisions and stuck events.
+    pub events_max: u32,
+    /// Less progress than this …, metres
+    pub stuck_progress_m: f32,
+    /// … within this time counts as stuck, seconds.
+    pub stuck_after_s: f32,
+    /// A run is given up after this time, seconds.
+    pub timeout_s: f32,
+    /// A resume needs this much free path ahead, metres.
+    pub resume_free_m: f32,
+}
+
+impl MetricsConfig {
+    /// The paper's definitions where it gives them, methods.md 8 elsewhere.
+    pub fn paper() -> Self {
+        Self {
+            near_collision_m: 0.5,
+            obstacle_set: ObstacleSet::NonDrivable,
+            safe_range_m: 1.0,
+            safe_range: SafeRange::Full,
+            refractory_s: 1.0,
+            events_max: 60,
+            stuck_progress_m: 0.5,
+            stuck_after_s: 10.0,
+            timeout_s: 900.0,
+            resume_free_m: 3.0,
+        }
+    }
+}
+
+/// Where the safe-distance range lies. The paper says "from the end of the bumper" and draws a ring.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SafeRange {
+    /// All around the body.
+    #[default]
+    Full,
+    /// Only what lies ahead of the front bumper.
+    FrontOnly,
+}
+
+/// The pixels within the safe range of the body, in the ego frame: N_ran of the paper.
+#[derive(Debug, Clone)]
+pub struct SafeRing {
+    blocks: Vec<Block>,
+    n_pixels: u32,
+}
+
+/// Up to 4×4 pixels.
+#[derive(Debug, Clone)]
+struct Block {
+    centre: Vec2,
+    pixels: Vec<Vec2>,
+}
+
+/// Pixels per side of a block.
+const BLOCK: i32 = 4;
+
+impl SafeRing {
+    /// The ring (body ⊕ disc) minus body, at a pixel size.
+    pub fn new(params: &VehicleParams, config: &MetricsConfig, pixel_m: f32) -> Self {
+        let body = params.body_in_ego();
+        let is_in_range = |point: Vec2| {
+            let is_ahead = config.safe_range == SafeRange::Full || point.x >= params.front_m();
+            let near = edges(&body).any(|(a, b)| distance_to_segment(point, a, b) <= config.safe_range_m);
+            is_ahead && near && !polygon_contains(&body, point)
+        };
+        let block_m = pixel_m * BLOCK as f32;
+        let reach_m = params.length_m + config.safe_range_m;
+        let n = (reach_m / block_m).ceil() as i32;
+        let mut blocks = Vec::new();
+        for (row, col) in (-n..n).flat_map(|row| (-n..n).map(move |col| (row, col))) {
+            let corner = Vec2::new(row as f32, col as f32) * block_m;
+            let pixels: Vec<Vec2> = (0..BLOCK * BLOCK)
+                .map(|i| corner + (Vec2::new((i / BLOCK) as f32, (i % BLOCK) as f32) + Vec2::splat(0.5)) * pixel_m)
+                .filter(|&point| is_in_range(point))
+                .collect();
+            if !pixels.is_empty() {
+                blocks.push(Block { centre: corner + Vec2::splat(0.5 * block_m), pixels });
+            }
+        }
+        let n_pixels = blocks.iter().map(|block| block.pixels.len() as u32).sum();
+        Self { blocks, n_pixels }
+    }
+
+    /// Number of pixels in the range.
+    pub fn n_pixels(&self) -> u32 {
+        self.n_pixels
+    }
+
+    /// Share of the range that is drivable, 0…1: N_dri / N_ran.
+    pub fn safe_ratio(&self, distance: &DistanceField, pose: Pose, pixel_m: f32) -> f32 {
+        let world_from_ego = pose.world_from_ego();
+        // A block whose centre is farther from a boundary than its half diagonal is decided by one look-up.
+        let sure_m = LIPSCHITZ * std::f32::consts::FRAC_1_SQRT_2 * pixel_m * BLOCK as f32;
+        let mut drivable = 0;
+        for block in &self.blocks {
+            let centre_m = distance.at(world_from_ego.point(block.centre));
+            drivable += if centre_m > sure_m {
+                block.pixels.len()
+            } else if centre_m < -sure_m {
+                0
+            } else {
+                block.pixels.iter().filter(|&&pixel| distance.at(world_from_ego.point(pixel)) > 0.0).count()
+            };
+        }
+        drivable as f32 / self.n_pixels as f32
+    }
+}
+
+/// Everything measured on one run.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct EpisodeMetrics {
+    /// Control ticks with a decision.
+    pub ticks: u32,
+    /// Ticks driven by the learned policy.
+    pub novice_ticks: u32,
+    /// Simulated time, seconds, braking included.
+    pub duration_s: f32,
+    /// Way driven by the rear axle, metres.
+    pub driven_m: f32,
+    /// Length of the reference path, metres: the denominator of the collision rate (paper).
+    pub reference_m: f32,
+    /// Near-collisions counted.
+    pub near_collisions: u32,
+    /// Times the body touched something.
+    pub contacts: u32,
+    /// Times the car got stuck.
+    pub stuck: u32,
+    /// Mean over ticks of the drivable share of the safe range, 0…1.
+    pub safe_ratio: f32,
+    /// Smallest distance between body and non-drivable space, metres, negative on contact.
+    pub clearance_min_m: f32,
+    /// Changes of the steering direction larger than 2° of road-wheel angle.
+    pub steering_reversals: u32,
+    /// Road-wheel angle steered, radians summed over the run.
+    pub steering_effort_rad: f32,
+}
+
+impl EpisodeMetrics {
+    /// Driven way per simulated time, m/s.
+    pub fn mean_speed_mps(&self) -> f32 {
+        self.driven_m / self.duration_s.max(f32::MIN_POSITIVE)
+    }
+}
+
+/// Accumulates frames into metrics.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    metrics: EpisodeMetrics,
+    safe_ratio_sum: f64,
+    driven_m: f64,
+    steering_effort_rad: f64,
+    last_steering_rad: f32,
+    turning: f32,
+    extreme_rad: f32,
+}
+
+/// Hysteresis of steering reversals, radians.
+const REVERSAL_RAD: f32 = 2.0 * std::f32::consts::PI / 180.0;
+
+impl Tally {
+    /// Nothing measured yet on a route of this length.
+    pub fn new(reference_m: f32) -> Self {
+        let metrics = EpisodeMetrics { reference_m, clearance_min_m: f32::INFINITY, ..EpisodeMetrics::default() };
+        Self { metrics, ..Self::default() }
+    }
+
+    /// Takes one frame into account.
+    pub fn frame(&mut self, frame: &Frame) {
+        let metrics = &mut self.metrics;
+        metrics.ticks += 1;
+        metrics.novice_ticks += u32::from(frame.decision.source == Source::Novice);
+        metrics.duration_s = frame.time_s;
+        metrics.clearance_min_m = metrics.clearance_min_m.min(frame.clearance_m);
+        metrics.contacts += frame.contacts;
+        match frame.event {
+            Event::NearCollision { .. } => metrics.near_collisions += 1,
+            Event::Stuck { .. } => metrics.stuck += 1,
+            Event::Drove | Event::ReachedEnd => {}
+        }
+        self.safe_ratio_sum += f64::from(frame.safe_ratio);
+        self.driven_m += f64::from(frame.driven_m);
+        self.steer(frame.vehicle.steering_rad);
+    }
+
+    fn steer(&mut self, steering_rad: f32) {
+        self.steering_effort_rad += f64::from((steering_rad - self.last_steering_rad).abs());
+        self.last_steering_rad = steering_rad;
+        let since_extreme = steering_rad - self.extreme_rad;
+        if self.turning * since_extreme > 0.0 {
+            self.extreme_rad = steering_rad;
+        } else if since_extreme.abs() > REVERSAL_RAD {
+            self.metrics.steering_reversals += u32::from(self.turning != 0.0);
+            self.turning = since_extreme.signum();
+            self.extreme_rad = steering_rad;
+        }
+    }
+
+    /// The metrics so far.
+    pub fn metrics(&self) -> EpisodeMetrics {
+        EpisodeMetrics {
+            safe_ratio: (self.safe_ratio_sum / f64::from(self.metrics.ticks.max(1))) as f32,
+            driven_m: self.driven_m as f32,
+            steering_effort_rad: self.steering_effort_rad as f32,
+            ..self.metrics.clone()
+        }
+    }
+}
+
+/// Near-collisions per 100 m of reference path (paper, collision rate): events and metres pooled over runs.
+pub fn near_collisions_per_100m<'a>(runs: impl IntoIterator<Item = &'a EpisodeMetrics>) -> f64 {
+    let (events, metres) = runs.into_iter().fold((0.0, 0.0), |(events, metres), run| {
+        (events + f64::from(run.near_collisions), metres + f64::from(run.reference_m))
+    });
+    100.0 * events / metres
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ring() -> SafeRing {
+        SafeRing::new(&VehicleParams::hyundai_hg300(), &MetricsConfig::paper(), 0.06)
+    }
+
+    #[test]
+    fn the_ring_has_the_area_of_methods_8_2() {
+        // 2·(4.91 + 1.86)·1 + π·1² = 16.68 m² = 4634 pixels of 0.06 m.
+        let n = ring().n_pixels();
+        assert!((4600..=4670).contains(&n), "{n} pixels");
+    }
+
+    /// A centred car in a straight lane: methods.md 8.2 lists .53, .69, .84, 1.0 for 2.6, 3.0, 3.4, ≥ 4.0 m.
+    #[test]
+    fn straight_lanes_give_the_derived_ratios() {
+        for (width_m, expected) in [(2.6, 0.53), (3.0, 0.69), (3.4, 0.84), (4.2, 1.0)] {
+            let half = 0.5 * width_m;
+            let lane = [Vec2::new(-30.0, -half), Vec2::new(30.0, -half), Vec2::new(30.0, half), Vec2::new(-30.0, half)];
+            let distance = DistanceField::of_boundary(&lane);
+            let ratio = ring().safe_ratio(&distance, Pose::default(), 0.06);
+            assert!((ratio - expected).abs() < 0.02, "{width_m} m: {ratio}, expected {expected}");
+        }
+    }
+
+    #[test]
+    fn skipping_blocks_changes_no_pixel() {
+        let lane = [Vec2::new(-9.0, -1.3), Vec2::new(9.0, -1.6), Vec2::new(8.0, 1.7), Vec2::new(-9.0, 1.4)];
+        let distance = DistanceField::of_boundary(&lane);
+        let ring = ring();
+        for i in 0..40 {
+            let pose = Pose::new(Vec2::new(-4.0 + 0.2 * i as f32, 0.1), 0.02 * i as f32);
+            let world_from_ego = pose.world_from_ego();
+            let pixels = ring.blocks.iter().flat_map(|block| &block.pixels);
+            let brute = pixels.filter(|&&pixel| distance.at(world_from_ego.point(pixel)) > 0.0).count();
+            assert_eq!(ring.safe_ratio(&distance, pose, 0.06), brute as f32 / ring.n_pixels() as f32);
+        }
+    }
+
+    #[test]
+    fn reversals_are_counted_with_hysteresis() {
+        let count = |angles_deg: &[f32]| {
+            let mut tally = Tally::new(1.0);
+            angles_deg.iter().for_each(|angle| tally.steer(angle.to_radians()));
+            tally.metrics.steering_reversals
+        };
+        assert_eq!(count(&[0.0, 5.0, 10.0, 15.0]), 0);
+        assert_eq!(count(&[0.0, 5.0, 4.0, 5.0, 4.0]), 0); // within 2°
+        assert_eq!(count(&[0.0, 5.0, 0.0, 5.0]), 2);
+    }
+}

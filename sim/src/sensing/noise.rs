@@ -1,0 +1,427 @@
+//! Perception errors (methods.md 10): errors belong to places, so every layer is anchored in the world and is a pure
+//! function of (seed, place, tick). A shadow stays where it is while the car drives by, whoever drives.
+//!
+//! The paper names the types (shadows, ragged boundaries, misrecognition); sizes and rates are chosen, and calibrated
+//! so that about 98 % of the pixels are right (`cargo xtask pixel-accuracy`). Where methods.md 10 asks for AR(1)
+//! processes per tick we use value noise in time with the same correlation time: it needs no state, so a frame can be
+//! recomputed alone and every driver meets the same noise.
+
+use crate::geometry::{Pose, Vec2};
+use crate::map::Map;
+use crate::scenario::NoiseLevel;
+use crate::seed::{Rng, RootSeed, Stream};
+use rand::RngExt as _;
+use serde::{Deserialize, Serialize};
+
+/// Strength of each layer, relative to the calibrated level `paper`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseConfig {
+    /// Multiplies every layer: 0 = clean, 1 = `paper`, 2 = `hard`.
+    pub intensity: f32,
+    /// Ragged boundaries: the signed distance is shifted (both signs).
+    pub boundary: f32,
+    /// Parts of shadows taken for obstacles (false occupied).
+    pub shadow: f32,
+    /// Edges of speed bumps taken for curbs (false occupied).
+    pub speed_bump: f32,
+    /// Ground behind a boundary taken for road (false free).
+    pub false_free: f32,
+    /// Misrecognised patches that come and go (mostly false occupied).
+    pub blob: f32,
+    /// Stains and paint (false occupied).
+    pub stain: f32,
+    /// Patches of one or two frames (false occupied).
+    pub flicker: f32,
+    /// Frames in which the last grid is repeated.
+    pub dropout: f32,
+}
+
+impl NoiseConfig {
+    /// All layers at one level.
+    pub fn of(level: NoiseLevel) -> Self {
+        let intensity = match level {
+            NoiseLevel::Clean => 0.0,
+            NoiseLevel::Paper => 1.0,
+            NoiseLevel::Hard => 2.0,
+        };
+        Self {
+            intensity,
+            boundary: 1.0,
+            shadow: 1.0,
+            speed_bump: 1.0,
+            false_free: 1.0,
+            blob: 1.0,
+            stain: 1.0,
+            flicker: 1.0,
+            dropout: 1.0,
+        }
+    }
+}
+
+// Constants of level `paper`, from the table of methods.md 10.
+/// Static boundary wobble: standard deviation and correlation length, metres.
+const WOBBLE_STATIC: (f32, f32) = (0.10, 2.0);
+/// Moving boundary wobble: standard deviation and correlation length, metres.
+const WOBBLE_MOVING: (f32, f32) = (0.05, 1.0);
+/// Correlation time of the moving wobble, ticks: AR(1) with ρ = 0.7 per tick decays to 1/e in 2.8 ticks.
+const WOBBLE_TICKS: f32 = 3.0;
+/// Wobble grows with range as 1 + X_bev / this, metres.
+const WOBBLE_RANGE_M: f32 = 10.0;
+/// Route per shadow, metres.
+const SHADOW_SPACING_M: f32 = 12.0;
+/// Share of a shadow's area taken for an obstacle.
+const SHADOW_SHARE: f32 = 0.4;
+/// Cell of the shadow raster, metres.
+const SHADOW_CELL_M: f32 = 0.12;
+/// Correlation time of a shadow's breathing, ticks (AR(1), ρ = 0.98).
+const SHADOW_TICKS: f32 = 50.0;
+/// Breathing of the shadow threshold, as a share of the shadow area.
+const SHADOW_BREATH: f32 = 0.1;
+/// Probability that a speed bump is misread in a run.
+const BUMP_PROBABILITY: f32 = 0.7;
+/// Route per false-free opening, metres.
+const FALSE_FREE_SPACING_M: f32 = 45.0;
+/// Blobs alive at a time per square metre of lane.
+const BLOB_PER_M2: f32 = 0.01;
+/// A blob lives one part in this many of the time.
+const BLOB_PERIODS: f32 = 4.0;
+/// Route per possible stain, metres, and the probability that it is misread.
+const STAIN: (f32, f32) = (25.0, 0.2);
+/// New flickers per frame.
+const FLICKER_PER_TICK: f32 = 0.3;
+/// Life of a flicker, ticks.
+const FLICKER_TICKS: u32 = 2;
+/// Probability that a frame repeats the last grid.
+const DROPOUT_PER_TICK: f32 = 0.002;
+
+/// A convex patch of ground that is misread while it is alive.
+#[derive(Debug, Clone)]
+pub(super) struct Patch {
+    pub(super) region: Region,
+    pub(super) reads: Reads,
+    period_ticks: u32,
+    phase_ticks: u32,
+    life_ticks: u32,
+}
+
+/// What a misread patch looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Reads {
+    Occupied,
+    Free,
+}
+
+/// A convex polygon in the world with a circle around it.
+#[derive(Debug, Clone)]
+pub(super) struct Region {
+    pub(super) polygon: Vec<Vec2>,
+    pub(super) centre: Vec2,
+    pub(super) radius_m: f32,
+}
+
+impl Region {
+    fn new(polygon: Vec<Vec2>) -> Self {
+        let centre = polygon.iter().sum::<Vec2>() / polygon.len() as f32;
+        let radius_m = polygon.iter().map(|corner| corner.distance(centre)).fold(0.0, f32::max);
+        Self { polygon, centre, radius_m }
+    }
+}
+
+impl Patch {
+    fn lasting(polygon: Vec<Vec2>, reads: Reads) -> Self {
+        Self { region: Region::new(polygon), reads, period_ticks: 1, phase_ticks: 0, life_ticks: 1 }
+    }
+
+    pub(super) fn is_alive(&self, tick: u32) -> bool {
+        (tick + self.phase_ticks) % self.period_ticks < self.life_ticks
+    }
+}
+
+/// A convex shadow; a pixel of it is misread where the rank of the local noise exceeds a breathing threshold.
+#[derive(Debug, Clone)]
+pub(super) struct Shadow {
+    pub(super) region: Region,
+    origin: Vec2,
+    cols: usize,
+    /// Rank of the local noise within the shadow, 0…255: a threshold is then a share of the area.
+    ranks: Vec<u8>,
+}
+
+impl Shadow {
+    fn new(polygon: Vec<Vec2>, seed: u64) -> Self {
+        let (low, high) = crate::distance_field::bounds(&polygon);
+        let size = ((high - low) / SHADOW_CELL_M).ceil();
+        let (cols, rows) = (size.x as usize + 1, size.y as usize + 1);
+        let noise: Vec<f32> = (0..rows * cols)
+            .map(|i| {
+                let point = low + Vec2::new((i % cols) as f32, (i / cols) as f32) * SHADOW_CELL_M;
+                // Two octaves, correlation 1.2 m.
+                value_noise(seed, point / 1.2, 0.0) + 0.5 * value_noise(seed ^ 1, point / 0.6, 0.0)
+            })
+            .collect();
+        let mut sorted = noise.clone();
+        sorted.sort_by(f32::total_cmp);
+        let rank = |value: f32| (sorted.partition_point(|&other| other < value) * 255 / sorted.len()) as u8;
+        let ranks = noise.iter().map(|&value| rank(value)).collect();
+        Self { region: Region::new(polygon), origin: low, cols, ranks }
+    }
+
+    #[inline]
+    pub(super) fn is_misread(&self, point: Vec2, threshold: u8) -> bool {
+        let cell = ((point - self.origin) / SHADOW_CELL_M + Vec2::splat(0.5)).max(Vec2::ZERO);
+        let index = (cell.y as usize * self.cols + cell.x as usize).min(self.ranks.len() - 1);
+        self.ranks[index] >= threshold
+    }
+}
+
+/// The noise of one episode: latents drawn once, then a pure function of place and tick.
+#[derive(Debug, Clone)]
+pub struct NoiseField {
+    seed: u64,
+    wobble: f32,
+    flicker: f32,
+    dropout: f32,
+    pub(super) patches: Vec<Patch>,
+    pub(super) shadows: Vec<Shadow>,
+}
+
+impl NoiseField {
+    /// Draws the latents of an episode on a map.
+    pub fn new(map: &Map, config: &NoiseConfig, seed: RootSeed) -> Self {
+        let amount = |layer: f32| config.intensity * layer;
+        let mut field = Self {
+            seed: seed.child(Stream::Sensor, 0).0,
+            wobble: amount(config.boundary),
+            flicker: amount(config.flicker),
+            dropout: amount(config.dropout),
+            patches: Vec::new(),
+            shadows: Vec::new(),
+        };
+        // One stream per layer: strengthening one layer never moves another.
+        let rng = |layer: u64| seed.rng(Stream::Sensor, 1 + layer);
+        field.cast_shadows(map, amount(config.shadow), &mut rng(0));
+        field.misread_speed_bumps(map, amount(config.speed_bump), &mut rng(1));
+        field.open_boundaries(map, amount(config.false_free), &mut rng(2));
+        field.scatter_blobs(map, amount(config.blob), &mut rng(3));
+        field.spill_stains(map, amount(config.stain), &mut rng(4));
+        field
+    }
+
+    /// Shift of the signed distance at a place, metres; `ahead_of_patch_m` is the distance from its lower edge.
+    #[inline]
+    pub(super) fn boundary_shift_m(&self, place: Vec2, ahead_of_patch_m: f32, tick: u32) -> f32 {
+        if self.wobble == 0.0 {
+            return 0.0;
+        }
+        let (static_m, static_corr_m) = WOBBLE_STATIC;
+        let (moving_m, moving_corr_m) = WOBBLE_MOVING;
+        let shift_m = static_m * value_noise(self.seed, place / static_corr_m, 0.0)
+            + moving_m * value_noise(self.seed ^ 7, place / moving_corr_m, tick as f32 / WOBBLE_TICKS);
+        self.wobble * shift_m * (1.0 + ahead_of_patch_m / WOBBLE_RANGE_M)
+    }
+
+    /// Bound of [`Self::boundary_shift_m`] at a range, metres.
+    #[inline]
+    pub(super) fn boundary_shift_max_m(&self, ahead_of_patch_m: f32) -> f32 {
+        self.wobble * (WOBBLE_STATIC.0 + WOBBLE_MOVING.0) * VALUE_NOISE_MAX * (1.0 + ahead_of_patch_m / WOBBLE_RANGE_M)
+    }
+
+    /// Rank from which a shadow's pixels are misread at a tick.
+    pub(super) fn shadow_threshold(&self, shadow: usize, tick: u32) -> u8 {
+        let breath = value_noise(self.seed ^ (11 + shadow as u64), Vec2::ZERO, tick as f32 / SHADOW_TICKS);
+        (255.0 * (1.0 - SHADOW_SHARE - SHADOW_BREATH * breath)).clamp(0.0, 255.0) as u8
+    }
+
+    /// The flicker visible at a tick, if any: a square in the ego frame as (centre, side). It belongs to the camera,
+    /// not to a place: within its two frames the car moves at most 0.2 m.
+    pub(super) fn flicker(&self, tick: u32, patch_near_m: f32, patch_side_m: f32) -> Option<(Vec2, f32)> {
+        let window = (tick / FLICKER_TICKS) as i32;
+        let draw = |k: i32| unit(hash(self.seed ^ 0xF11C, window, k, 0));
+        if draw(0) >= self.flicker * FLICKER_PER_TICK * FLICKER_TICKS as f32 {
+            return None;
+        }
+        let centre = Vec2::new(patch_near_m + draw(1) * patch_side_m, (draw(2) - 0.5) * patch_side_m);
+        Some((centre, 0.3 + 0.3 * draw(3)))
+    }
+
+    /// Whether this frame repeats the last one.
+    pub(super) fn drops_frame(&self, tick: u32) -> bool {
+        unit(hash(self.seed ^ 0xD30F, tick as i32, 0, 0)) < self.dropout * DROPOUT_PER_TICK
+    }
+
+    /// Shadows of things beside the lane (cars, trees, buildings), 1.5–3 object heights long, along the sun.
+    fn cast_shadows(&mut self, map: &Map, amount: f32, rng: &mut Rng) {
+        let sun_azimuth_rad = rng.random_range(-std::f32::consts::PI..std::f32::consts::PI);
+        let away_from_sun = Vec2::from_angle(sun_azimuth_rad);
+        along_route(map, SHADOW_SPACING_M, amount, rng, |place, rng| {
+            let width_m = rng.random_range(1.5..4.0);
+            let height_m: f32 = rng.random_range(1.4..2.5);
+            let length_m = height_m * rng.random_range(1.5..3.0);
+            // The caster stands beside the lane, on the side from which its shadow falls into the lane.
+            let left = place.pose.ahead().perp();
+            let side = if away_from_sun.dot(left) > 0.0 { -1.0 } else { 1.0 };
+            let foot = place.pose.position() + left * side * (place.half_width_m + rng.random_range(0.0..1.0));
+            let across = away_from_sun.perp() * (0.5 * width_m);
+            let tip = foot + away_from_sun * length_m;
+            let polygon = vec![foot - across, tip - 0.8 * across, tip + 0.8 * across, foot + across];
+            self.shadows.push(Shadow::new(polygon, rng.random()));
+        });
+    }
+
+    /// Two strips across the lane at the edges of each bump, with gaps.
+    fn misread_speed_bumps(&mut self, map: &Map, amount: f32, rng: &mut Rng) {
+        for bump in &map.scenario().speed_bumps {
+            let is_misread = rng.random::<f32>() < BUMP_PROBABILITY * amount;
+            let centre = Pose { x_m: bump.x_m, y_m: bump.y_m, heading_rad: bump.heading_deg.to_radians() };
+            let pieces = (bump.width_m / 0.5).ceil();
+            let piece_m = bump.width_m / pieces;
+            for edge_m in [-0.5 * bump.length_m, 0.5 * bump.length_m] {
+                let thickness_m = rng.random_range(0.15..0.25);
+                for piece in 0..pieces as usize {
+                    let is_gap = rng.random::<f32>() < 0.2;
+                    let middle = Vec2::new(edge_m, -0.5 * bump.width_m + (piece as f32 + 0.5) * piece_m);
+                    let pose = Pose::new(centre.world_from_ego().point(middle), centre.heading_rad);
+                    if is_misread && !is_gap {
+                        let strip = crate::geometry::rectangle(pose, thickness_m, piece_m);
+                        self.patches.push(Patch::lasting(strip.to_vec(), Reads::Occupied));
+                    }
+                }
+            }
+        }
+    }
+
+    /// Sections of the boundary, 3–8 m long, opened to 1–3 m depth including the boundary line.
+    fn open_boundaries(&mut self, map: &Map, amount: f32, rng: &mut Rng) {
+        along_route(map, FALSE_FREE_SPACING_M, amount, rng, |place, rng| {
+            let side = if rng.random::<bool>() { 1.0 } else { -1.0 };
+            let (length_m, depth_m): (f32, f32) = (rng.random_range(3.0..8.0), rng.random_range(1.0..3.0));
+            let across = place.pose.ahead().perp() * side;
+            let point = |along_m: f32, y_m: f32| place.pose.position() + place.pose.ahead() * along_m + across * y_m;
+            let line_m = (0..60).map(|i| 0.1 * i as f32).find(|&y_m| map.signed_distance_m(point(0.0, y_m)) <= 0.0);
+            let Some(line_m) = line_m else { return };
+            // From just inside the line outwards, shorter at its back (rounded ends).
+            let (near_m, far_m) = (line_m - 0.1, line_m + depth_m);
+            let corners = [(-0.5, near_m), (0.5, near_m), (0.35, far_m), (-0.35, far_m)];
+            let polygon = corners.map(|(share, y_m)| point(share * length_m, y_m)).to_vec();
+            // Real things are seen: only empty ground is taken for road.
+            let region = Region::new(polygon);
+            let is_clear = |occluder: &crate::map::Occluder| {
+                occluder.centre.distance(region.centre) > occluder.radius_m + region.radius_m
+            };
+            if map.occluders().iter().all(is_clear) {
+                self.patches.push(Patch::lasting(region.polygon, Reads::Free));
+            }
+        });
+    }
+
+    /// Convex blobs of 0.3–1.0 m (at most 15 % of the lane width at level `paper`) that live 2–4 s and come back later.
+    fn scatter_blobs(&mut self, map: &Map, amount: f32, rng: &mut Rng) {
+        const LANE_M: f32 = 4.0;
+        let spacing_m = 1.0 / (BLOB_PER_M2 * LANE_M * BLOB_PERIODS);
+        along_route(map, spacing_m, amount, rng, |place, rng| {
+            let lateral_m = rng.random_range(-1.0..1.0) * place.half_width_m;
+            let centre = place.pose.world_from_ego().point(Vec2::new(0.0, lateral_m));
+            let size_max_m = (0.15 * 2.0 * place.half_width_m * amount).max(0.3);
+            let size_m = rng.random_range(0.3..1.0_f32).min(size_max_m);
+            let corners = rng.random_range(5..=8);
+            let turn = rng.random::<f32>();
+            let polygon = (0..corners)
+                .map(|k| std::f32::consts::TAU * (k as f32 + turn) / corners as f32)
+                .map(|angle_rad| centre + 0.5 * size_m * Vec2::from_angle(angle_rad))
+                .collect();
+            let reads = if rng.random::<f32>() < 0.8 { Reads::Occupied } else { Reads::Free };
+            let life_ticks = rng.random_range(40..80);
+            let period_ticks = (life_ticks as f32 * BLOB_PERIODS) as u32;
+            let phase_ticks = rng.random_range(0..period_ticks);
+            self.patches.push(Patch { period_ticks, phase_ticks, life_ticks, ..Patch::lasting(polygon, reads) });
+        });
+    }
+
+    /// Thin strokes, 0.1–0.2 m wide.
+    fn spill_stains(&mut self, map: &Map, amount: f32, rng: &mut Rng) {
+        let (spacing_m, probability) = STAIN;
+        along_route(map, spacing_m, probability * amount, rng, |place, rng| {
+            let lateral_m = rng.random_range(-0.8..0.8) * place.half_width_m;
+            let centre = place.pose.world_from_ego().point(Vec2::new(0.0, lateral_m));
+            let heading_rad = place.pose.heading_rad + rng.random_range(-0.6..0.6);
+            let (length_m, width_m) = (rng.random_range(0.8..2.0), rng.random_range(0.1..0.2));
+            let stroke = crate::geometry::rectangle(Pose::new(centre, heading_rad), length_m, width_m);
+            self.patches.push(Patch::lasting(stroke.to_vec(), Reads::Occupied));
+        });
+    }
+}
+
+/// A place on the route and the free half-width there.
+struct Place {
+    pose: Pose,
+    half_width_m: f32,
+}
+
+/// Calls `draw` at random places of the route, on average `amount` per `spacing_m`. The ground beyond start and finish
+/// belongs to it, because it is seen.
+fn along_route(map: &Map, spacing_m: f32, amount: f32, rng: &mut Rng, mut draw: impl FnMut(&Place, &mut Rng)) {
+    const BEYOND_M: f32 = 15.0;
+    let path_m = map.path().length_m();
+    let expected = amount * (path_m + 2.0 * BEYOND_M) / spacing_m;
+    let count = expected.floor() as usize + usize::from(rng.random::<f32>() < expected.fract());
+    for _ in 0..count {
+        let s_m = rng.random_range(-BEYOND_M..path_m + BEYOND_M);
+        let on_path = map.path().pose_at(s_m);
+        let beyond_m = s_m - s_m.clamp(0.0, path_m);
+        let pose = Pose::new(on_path.position() + on_path.ahead() * beyond_m, on_path.heading_rad);
+        let half_width_m = map.signed_distance_m(pose.position()).max(1.0);
+        draw(&Place { pose, half_width_m }, rng);
+    }
+}
+
+/// Scales smoothly interpolated uniform noise to unit variance: 1/3 of a corner's variance times 0.743² kept by the
+/// cubic fade in the plane.
+const VALUE_NOISE_MAX: f32 = 2.33;
+
+/// Smooth noise of about unit variance (averaged over places) on a unit lattice in space and time.
+fn value_noise(seed: u64, place: Vec2, time: f32) -> f32 {
+    let (cell, t0) = (place.floor(), time.floor());
+    let fade = |t: f32| t * t * (3.0 - 2.0 * t);
+    let (fx, fy, ft) = (fade(place.x - cell.x), fade(place.y - cell.y), fade(time - t0));
+    let corner = |dx: i32, dy: i32, dt: i32| unit(hash(seed, cell.x as i32 + dx, cell.y as i32 + dy, t0 as i32 + dt));
+    let plane = |dt: i32| {
+        let near = corner(0, 0, dt) + fx * (corner(1, 0, dt) - corner(0, 0, dt));
+        let far = corner(0, 1, dt) + fx * (corner(1, 1, dt) - corner(0, 1, dt));
+        near + fy * (far - near)
+    };
+    let value = if ft == 0.0 { plane(0) } else { plane(0) * (1.0 - ft) + plane(1) * ft };
+    (2.0 * value - 1.0) * VALUE_NOISE_MAX
+}
+
+/// Uniform in [0, 1).
+fn unit(bits: u32) -> f32 {
+    (bits >> 8) as f32 / (1 << 24) as f32
+}
+
+/// Mixes a lattice point into 32 random bits (the finaliser of `SplitMix64`).
+#[inline]
+fn hash(seed: u64, x: i32, y: i32, t: i32) -> u32 {
+    let key = u64::from(x as u32) | u64::from(y as u32) << 32;
+    let mut z = seed
+        ^ key.wrapping_mul(0x9E37_79B9_7F4A_7C15)
+        ^ u64::from(t as u32).wrapping_add(1).wrapping_mul(0xD6E8_FEB8_6659_FD93);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    (z >> 32) as u32 ^ z as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn value_noise_has_about_unit_variance_and_keeps_its_bound() {
+        let place = |i: usize| Vec2::new((i % 200) as f32, (i / 200) as f32) * 0.237;
+        let samples: Vec<f32> = (0..40_000).map(|i| value_noise(3, place(i), 0.0)).collect();
+        let mean = samples.iter().sum::<f32>() / samples.len() as f32;
+        let variance = samples.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / samples.len() as f32;
+        assert!(mean.abs() < 0.1 && (0.8..1.2).contains(&variance), "mean {mean}, variance {variance}");
+        assert!(samples.iter().all(|v| v.abs() <= VALUE_NOISE_MAX));
+    }
+}

@@ -1,0 +1,273 @@
+//! The sensor of one episode: clean view → smear → noise → grid.
+
+use super::noise::{NoiseConfig, NoiseField, Patch, Reads, Region, Shadow};
+use super::quadtree::PixelLattice;
+use super::smear::{ConvexInEgo, hidden_ground};
+use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
+use crate::distance_field::LIPSCHITZ;
+use crate::geometry::{Pose, Vec2, WorldFromEgo};
+use crate::map::Map;
+use crate::seed::RootSeed;
+use serde::{Deserialize, Serialize};
+
+/// Settings of the sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SensingConfig {
+    /// Where the patch lies.
+    pub geometry: GridGeometry,
+    /// Whether tall things hide the ground behind them (methods.md 1.7).
+    pub smear: bool,
+    /// Camera ahead of the rear axle, metres (methods.md 9.2).
+    pub camera_ahead_m: f32,
+    /// Camera above ground, metres.
+    pub camera_height_m: f32,
+}
+
+impl SensingConfig {
+    /// The paper's camera, smear on.
+    pub fn paper() -> Self {
+        Self { geometry: GridGeometry::paper(), smear: true, camera_ahead_m: 1.59, camera_height_m: 1.55 }
+    }
+}
+
+/// The sensor of one episode.
+#[derive(Debug, Clone)]
+pub struct Sensor {
+    config: SensingConfig,
+    noise: NoiseField,
+    last: Option<Observation>,
+}
+
+impl Sensor {
+    /// A sensor whose noise is drawn from `seed`.
+    pub fn new(map: &Map, config: SensingConfig, noise: &NoiseConfig, seed: RootSeed) -> Self {
+        Self { config, noise: NoiseField::new(map, noise, seed), last: None }
+    }
+
+    /// What the car perceives from a pose at a tick.
+    pub fn observe(&mut self, map: &Map, pose: Pose, tick: u32) -> Observation {
+        let observation = match self.last {
+            Some(last) if self.noise.drops_frame(tick) => last,
+            _ => Observation { grid: self.perceive_grid(map, pose, tick) },
+        };
+        self.last = Some(observation);
+        observation
+    }
+
+    /// The perceived grid, without ever computing all 40 000 pixels.
+    fn perceive_grid(&self, map: &Map, pose: Pose, tick: u32) -> OccupancyGrid {
+        let geometry = &self.config.geometry;
+        let ego = EgoView::new(geometry, pose);
+        let openings = self.openings(&ego, tick);
+        let mut grid = OccupancyGrid::free();
+        for row in 0..GRID_CELLS {
+            let ahead_of_patch_m = geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m;
+            // A cell whose centre is this far from a boundary is decided without looking at the noise.
+            let sure_m = self.noise.boundary_shift_max_m(ahead_of_patch_m)
+                + LIPSCHITZ * geometry.cell_m() * std::f32::consts::FRAC_1_SQRT_2;
+            let mut occupied = 0;
+            for col in 0..GRID_CELLS {
+                let centre = ego.lattice.cell_centre(row, col);
+                let centre_m = map.signed_distance_m(centre);
+                let shift_m = || self.noise.boundary_shift_m(centre, ahead_of_patch_m, tick);
+                let is_occupied = if centre_m > sure_m {
+                    false
+                } else if let Some(opened) = openings.as_ref().filter(|opened| opened.touch_cell(row, col)) {
+                    any_closed_pixel_below(map, &ego, opened, row, col, -shift_m())
+                } else if centre_m < -sure_m {
+                    true
+                } else {
+                    ego.lattice.any_below(map.distance_field(), row, col, -shift_m(), centre_m)
+                };
+                occupied |= u32::from(is_occupied) << col;
+            }
+            grid.occupy_row(row, occupied);
+        }
+        for polygon in self.covers(map, &ego, tick) {
+            polygon.occupy(geometry, &mut grid);
+        }
+        self.for_each_shadow(&ego, tick, |polygon, shadow, threshold| {
+            polygon.for_each_row(geometry, |row, first, last| {
+                for cell_col in first / CELL_PIXELS..=last / CELL_PIXELS {
+                    if grid.is_occupied(row / CELL_PIXELS, cell_col) {
+                        continue;
+                    }
+                    let (cell_first, cell_last) = (cell_col * CELL_PIXELS, (cell_col + 1) * CELL_PIXELS - 1);
+                    let mut cols = first.max(cell_first)..=last.min(cell_last);
+                    if cols.any(|col| shadow.is_misread(ego.lattice.point(row as f32, col as f32), threshold)) {
+                        grid.set_occupied(row / CELL_PIXELS, cell_col);
+                    }
+                }
+            });
+        });
+        grid
+    }
+
+    /// The perceived view in full resolution, by brute force. Its max-pool is the grid of [`Self::observe`], dropped
+    /// frames excepted.
+    pub fn perceived_view(&self, map: &Map, pose: Pose, tick: u32) -> BirdsEyeView {
+        let geometry = &self.config.geometry;
+        let ego = EgoView::new(geometry, pose);
+        let openings = self.openings(&ego, tick).unwrap_or_else(PixelRows::empty);
+        let mut covered = PixelRows::empty();
+        for polygon in self.covers(map, &ego, tick) {
+            polygon.for_each_row(geometry, |row, first, last| covered.set(row, first, last));
+        }
+        self.for_each_shadow(&ego, tick, |polygon, shadow, threshold| {
+            polygon.for_each_row(geometry, |row, first, last| {
+                for col in first..=last {
+                    if shadow.is_misread(ego.lattice.point(row as f32, col as f32), threshold) {
+                        covered.set(row, col, col);
+                    }
+                }
+            });
+        });
+        let shifts_m: Vec<f32> = (0..GRID_CELLS * GRID_CELLS)
+            .map(|cell| {
+                let (row, col) = (cell / GRID_CELLS, cell % GRID_CELLS);
+                let ahead_of_patch_m = geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m;
+                self.noise.boundary_shift_m(ego.lattice.cell_centre(row, col), ahead_of_patch_m, tick)
+            })
+            .collect();
+        BirdsEyeView::from_fn(|row, col| {
+            let shift_m = shifts_m[row / CELL_PIXELS * GRID_CELLS + col / CELL_PIXELS];
+            let is_beyond = map.signed_distance_m(ego.lattice.point(row as f32, col as f32)) <= -shift_m;
+            (is_beyond && !openings.get(row, col)) || covered.get(row, col)
+        })
+    }
+
+    /// The view a faultless segmentation would give: smear is geometry, not an error.
+    pub fn clean_view(&self, map: &Map, pose: Pose) -> BirdsEyeView {
+        let ego = EgoView::new(&self.config.geometry, pose);
+        let mut hidden = PixelRows::empty();
+        for polygon in self.hidden_ground(map, &ego) {
+            polygon.for_each_row(&self.config.geometry, |row, first, last| hidden.set(row, first, last));
+        }
+        BirdsEyeView::from_fn(|row, col| {
+            map.signed_distance_m(ego.lattice.point(row as f32, col as f32)) <= 0.0 || hidden.get(row, col)
+        })
+    }
+
+    /// Everything that is laid over the view as occupied: hidden ground, misread patches, flicker.
+    fn covers<'a>(&'a self, map: &'a Map, ego: &'a EgoView, tick: u32) -> impl Iterator<Item = ConvexInEgo> + 'a {
+        let geometry = &self.config.geometry;
+        let flicker = self.noise.flicker(tick, geometry.near_edge_ahead_m, geometry.side_m).map(|(centre, side_m)| {
+            ConvexInEgo::new(crate::geometry::rectangle(Pose::new(centre, 0.0), side_m, side_m))
+        });
+        self.hidden_ground(map, ego).chain(self.patches(ego, tick, Reads::Occupied)).chain(flicker)
+    }
+
+    fn hidden_ground<'a>(&'a self, map: &'a Map, ego: &'a EgoView) -> impl Iterator<Item = ConvexInEgo> + 'a {
+        let occluders = if self.config.smear { map.occluders() } else { &[] };
+        occluders.iter().filter(|occluder| ego.may_see(occluder.centre, occluder.radius_m)).filter_map(|occluder| {
+            let mut outline = [Vec2::ZERO; 8];
+            for (in_ego, &corner) in outline.iter_mut().zip(&occluder.outline) {
+                *in_ego = ego.world_from_ego.inverse_point(corner);
+            }
+            let outline = &outline[..occluder.outline.len()];
+            hidden_ground(outline, occluder.height_m, self.config.camera_ahead_m, self.config.camera_height_m)
+        })
+    }
+
+    fn patches<'a>(&'a self, ego: &'a EgoView, tick: u32, reads: Reads) -> impl Iterator<Item = ConvexInEgo> + 'a {
+        let is_visible = move |patch: &&Patch| {
+            patch.reads == reads && ego.may_see(patch.region.centre, patch.region.radius_m) && patch.is_alive(tick)
+        };
+        self.noise.patches.iter().filter(is_visible).map(|patch| ego.polygon(&patch.region))
+    }
+
+    /// Ground that is taken for road although it is not; `None` if there is none in sight.
+    fn openings(&self, ego: &EgoView, tick: u32) -> Option<PixelRows> {
+        let mut openings = None;
+        for polygon in self.patches(ego, tick, Reads::Free) {
+            let rows: &mut PixelRows = openings.get_or_insert_with(PixelRows::empty);
+            polygon.for_each_row(&self.config.geometry, |row, first, last| rows.set(row, first, last));
+        }
+        openings
+    }
+
+    fn for_each_shadow(&self, ego: &EgoView, tick: u32, mut visit: impl FnMut(&ConvexInEgo, &Shadow, u8)) {
+        for (index, shadow) in self.noise.shadows.iter().enumerate() {
+            if ego.may_see(shadow.region.centre, shadow.region.radius_m) {
+                visit(&ego.polygon(&shadow.region), shadow, self.noise.shadow_threshold(index, tick));
+            }
+        }
+    }
+}
+
+/// Whether a cell keeps a pixel beyond the boundary although parts of it are opened.
+fn any_closed_pixel_below(
+    map: &Map,
+    ego: &EgoView,
+    opened: &PixelRows,
+    row: usize,
+    col: usize,
+    threshold_m: f32,
+) -> bool {
+    (0..CELL_PIXELS * CELL_PIXELS).any(|i| {
+        let (row, col) = (row * CELL_PIXELS + i / CELL_PIXELS, col * CELL_PIXELS + i % CELL_PIXELS);
+        !opened.get(row, col) && map.signed_distance_m(ego.lattice.point(row as f32, col as f32)) <= threshold_m
+    })
+}
+
+/// One pose, prepared for sensing.
+struct EgoView {
+    world_from_ego: WorldFromEgo,
+    lattice: PixelLattice,
+    patch_centre: Vec2,
+    patch_radius_m: f32,
+}
+
+impl EgoView {
+    fn new(geometry: &GridGeometry, pose: Pose) -> Self {
+        let world_from_ego = pose.world_from_ego();
+        let centre_ahead_m = geometry.near_edge_ahead_m + 0.5 * geometry.side_m;
+        Self {
+            world_from_ego,
+            lattice: PixelLattice::new(geometry, pose),
+            patch_centre: world_from_ego.point(Vec2::new(centre_ahead_m, 0.0)),
+            patch_radius_m: geometry.side_m * std::f32::consts::FRAC_1_SQRT_2,
+        }
+    }
+
+    fn may_see(&self, centre: Vec2, radius_m: f32) -> bool {
+        centre.distance_squared(self.patch_centre) < (self.patch_radius_m + radius_m).powi(2)
+    }
+
+    fn polygon(&self, region: &Region) -> ConvexInEgo {
+        ConvexInEgo::new(region.polygon.iter().map(|&corner| self.world_from_ego.inverse_point(corner)))
+    }
+}
+
+/// One bit per pixel of the view.
+struct PixelRows {
+    bits: Vec<[u64; WORDS]>,
+}
+
+const WORDS: usize = BEV_PIXELS.div_ceil(64);
+const CELLS_PER_WORD: usize = 64 / CELL_PIXELS;
+
+impl PixelRows {
+    fn empty() -> Self {
+        Self { bits: vec![[0; WORDS]; BEV_PIXELS] }
+    }
+
+    fn set(&mut self, row: usize, first: usize, last: usize) {
+        for col in first..=last {
+            self.bits[row][col / 64] |= 1 << (col % 64);
+        }
+    }
+
+    fn get(&self, row: usize, col: usize) -> bool {
+        self.bits[row][col / 64] >> (col % 64) & 1 == 1
+    }
+
+    /// Whether any pixel of a cell is set.
+    fn touch_cell(&self, row: usize, col: usize) -> bool {
+        let mask = 0xFF << (col % CELLS_PER_WORD * CELL_PIXELS);
+        self.bits[row * CELL_PIXELS..(row + 1) * CELL_PIXELS]
+            .iter()
+            .any(|words| words[col / CELLS_PER_WORD] & mask != 0)
+    }
+}
