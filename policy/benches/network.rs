@@ -1,0 +1,76 @@
+//! Samples per second of training and inference. `cargo bench --profile dev -p policy` shares the optimised
+//! development profile (and its artefacts) with everything else.
+
+use divan::{Bencher, counter::ItemsCount};
+use policy::dataset::{Dataset, Round, Sample, ValidationSplit};
+use policy::fit::{FitProgress, FitSettings, KeepWeights, fit};
+use policy::network::{DeviceChoice, LookAheadNetConfig, Predictor, Weights};
+use sim::seed::RootSeed;
+use sim::sensing::{GridGeometry, OccupancyGrid};
+use std::ops::ControlFlow;
+
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+fn main() {
+    divan::main();
+}
+
+const NETS: [&str; 2] = ["compact", "paper"];
+
+fn net(name: &str) -> LookAheadNetConfig {
+    match name {
+        "compact" => LookAheadNetConfig::compact(),
+        _ => LookAheadNetConfig::paper(),
+    }
+}
+
+/// A lane between two rows of parked cars, at varying offsets.
+fn grids(count: usize) -> Vec<OccupancyGrid> {
+    (0..count)
+        .map(|index| {
+            let mut grid = OccupancyGrid::free();
+            let edge = 6 + index % 5;
+            for row in 0..25 {
+                for col in (0..edge).chain(edge + 11..25) {
+                    let is_gap = (row + index) % 9 < 2;
+                    if !is_gap || col % 7 < 3 {
+                        grid.set_occupied(row, col);
+                    }
+                }
+            }
+            grid
+        })
+        .collect()
+}
+
+/// Steps per measurement: enough to make the start of a training negligible.
+const STEPS: u32 = 10;
+
+#[divan::bench(args = [64, 128, 256, 512], consts = [0, 1], sample_count = 5)]
+fn train<const NET: usize>(bencher: Bencher<'_, '_>, batch: usize) {
+    let samples = grids(2048).into_iter().map(|grid| Sample { grid, label: [0.5, 0.4], tau_hat: 0.1 }).collect();
+    let mut dataset = Dataset::default();
+    dataset.push(Round { samples });
+    let settings = FitSettings {
+        batch,
+        validation: ValidationSplit::none(),
+        keep: KeepWeights::Last,
+        ..FitSettings::quick(STEPS)
+    };
+    let start = Weights::init(net(NETS[NET]), RootSeed(1), 0);
+    bencher.counter(ItemsCount::new(batch * STEPS as usize)).bench_local(|| {
+        let mut progress = |_: &FitProgress| ControlFlow::Continue(());
+        let geometry = GridGeometry::paper();
+        fit(start.clone(), &dataset, &settings, &geometry, DeviceChoice::Cpu, RootSeed(1), &mut progress)
+    });
+}
+
+#[divan::bench(args = [1, 16, 64, 512], consts = [0, 1], sample_count = 20)]
+fn infer<const NET: usize>(bencher: Bencher<'_, '_>, batch: usize) {
+    let grids = grids(batch);
+    let grids: Vec<_> = grids.iter().collect();
+    let mut predictor = Predictor::new(Weights::init(net(NETS[NET]), RootSeed(1), 0), DeviceChoice::Cpu);
+    predictor.predict(&grids);
+    bencher.counter(ItemsCount::new(batch)).bench_local(|| predictor.predict(&grids));
+}

@@ -1,0 +1,124 @@
+//! Algorithm 2, the data-sampling function: who drives this tick, and what is written down.
+
+use crate::dataset::{Round, Sample};
+use crate::decision_rule::{DecisionRule, Evidence};
+use crate::drivers::novice_decision;
+use crate::network::Predictor;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use sim::driver::{Decision, Driver, Fleet, Seat};
+use sim::sensing::GridGeometry;
+
+/// Which labelled ticks enter the data set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Keep {
+    /// Those the expert drove (paper).
+    ExpertTicks,
+    /// All, as in the original `DAgger` and `EnsembleDAgger`.
+    EveryTick,
+}
+
+/// Novice and expert at the wheel of every seat of a batch.
+pub struct Arbiter {
+    novice: Option<Predictor>,
+    experts: Vec<Box<dyn Driver + Send>>,
+    rule: DecisionRule,
+    keep: Keep,
+    geometry: GridGeometry,
+    /// `D_i`, by seat.
+    samples: Vec<Vec<Sample>>,
+    n_tot: u64,
+    n_net: u64,
+    tau_hat_sum: f64,
+}
+
+/// What Algorithm 2 returns.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Collected {
+    /// `D_i`: seat by seat, in order of time within a seat.
+    pub round: Round,
+    /// Executed actions.
+    pub n_tot: u64,
+    /// Executed actions of the network.
+    pub n_net: u64,
+    /// Sum of τ̂ over all ticks, stored or not.
+    pub tau_hat_sum: f64,
+}
+
+impl Arbiter {
+    /// One expert per seat. Without a novice the experts drive and every tick is kept: behaviour cloning.
+    pub fn new(
+        novice: Option<Predictor>,
+        experts: Vec<Box<dyn Driver + Send>>,
+        rule: DecisionRule,
+        keep: Keep,
+        geometry: GridGeometry,
+    ) -> Self {
+        let samples = vec![Vec::new(); experts.len()]; // line 2: D_i ← ∅
+        Self { novice, experts, rule, keep, geometry, samples, n_tot: 0, n_net: 0, tau_hat_sum: 0.0 } // line 3
+    }
+
+    /// Line 20. Samples are joined in the order of the seats.
+    pub fn into_collected(self) -> Collected {
+        Collected {
+            round: Round { samples: self.samples.concat() },
+            n_tot: self.n_tot,
+            n_net: self.n_net,
+            tau_hat_sum: self.tau_hat_sum,
+        }
+    }
+
+    /// Line 6, for all seats at once; each expert sees only its own seat.
+    fn ask_experts(&mut self, seats: &[Seat<'_>]) -> Vec<Decision> {
+        let mut waiting = seats.iter().peekable();
+        let mut asked: Vec<_> = self
+            .experts
+            .iter_mut()
+            .enumerate()
+            .filter_map(|(episode, expert)| Some((expert, waiting.next_if(|seat| seat.episode == episode)?)))
+            .collect();
+        assert!(waiting.peek().is_none(), "seats come in the order of their episodes, and each has an expert");
+        asked
+            .par_iter_mut()
+            .map(|(expert, seat)| {
+                if seat.was_reset {
+                    expert.reset();
+                }
+                expert.decide(&seat.situation)
+            })
+            .collect()
+    }
+}
+
+impl Fleet for Arbiter {
+    fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
+        let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
+        let predictions = self.novice.as_mut().map(|novice| novice.predict(&grids)); // line 5
+        let expert_decisions = self.ask_experts(seats); // line 6
+        for (index, (seat, expert)) in seats.iter().zip(expert_decisions).enumerate() {
+            let a_exp = expert.look_ahead.to_image_fraction(&self.geometry).map(|fraction| fraction.clamp(0.0, 1.0));
+            let grid = seat.situation.observation.grid;
+            self.n_tot += 1; // line 17
+            let Some(predicted) = predictions.as_ref().map(|predictions| predictions[index]) else {
+                self.samples[seat.episode].push(Sample { grid, label: a_exp, tau_hat: 0.0 });
+                decisions.push(expert);
+                continue;
+            };
+            let evidence = Evidence::new(&predicted, a_exp); // lines 7 and 8
+            self.tau_hat_sum += f64::from(evidence.discrepancy);
+            let trusts_novice = self.rule.trusts_novice(&evidence); // line 9
+            if trusts_novice {
+                decisions.push(novice_decision(&predicted, &self.geometry)); // line 10
+                self.n_net += 1; // line 11
+            } else {
+                decisions.push(expert); // line 14
+            }
+            if !trusts_novice || self.keep == Keep::EveryTick {
+                // Line 15. τ̂ is a distance within the unit square, up to √2; the weight is meant for 0…1.
+                let tau_hat = evidence.discrepancy.min(1.0);
+                self.samples[seat.episode].push(Sample { grid, label: a_exp, tau_hat });
+            }
+        }
+    }
+}

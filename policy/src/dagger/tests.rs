@@ -1,0 +1,171 @@
+//! Two tiny rounds on a bent lane: what lands on disk, and that an interrupted run continues as if nothing had been.
+
+use super::*;
+use crate::dataset::ValidationSplit;
+use crate::dataset::store::tests::scratch;
+use crate::fit::Budget;
+use crate::network::ConvConfig;
+use sim::driver::{Decision, LookAheadPoint, Situation, Source};
+use sim::episode::EpisodeConfig;
+use sim::geometry::Vec2;
+use sim::map::Map;
+use sim::scenario::{NoiseSettings, ReferencePath, Scenario};
+use std::sync::Arc;
+
+/// Drives to the point of the route ten metres ahead.
+struct RouteFollower;
+
+impl Driver for RouteFollower {
+    fn decide(&mut self, situation: &Situation<'_>) -> Decision {
+        let truth = &situation.truth;
+        let goal = truth.map.path().pose_at(truth.progress_m + 10.0).position();
+        let in_ego = truth.vehicle.pose.world_from_ego().inverse_point(goal);
+        let look_ahead = LookAheadPoint { ahead_m: in_ego.x.clamp(4.4, 16.0), left_m: in_ego.y.clamp(-6.0, 6.0) };
+        Decision { look_ahead, source: Source::Expert, spread: None }
+    }
+}
+
+/// A lane 7 m wide: 25 m straight on, then 30° to the left.
+fn episodes(count: usize) -> Vec<Episode> {
+    let v = Vec2::new;
+    let config = EpisodeConfig::paper();
+    let scenario = Scenario {
+        name: "bent lane".to_string(),
+        boundary: vec![v(-4.0, -3.5), v(26.0, -3.5), v(52.0, 11.5), v(48.5, 17.6), v(24.0, 3.5), v(-4.0, 3.5)],
+        reference_path: ReferencePath { points: vec![v(0.0, 0.0), v(25.0, 0.0), v(42.0, 9.8)], corner_radius_m: 12.0 },
+        noise: NoiseSettings::default(),
+        islands: Vec::new(),
+        obstacles: Vec::new(),
+        speed_bumps: Vec::new(),
+    };
+    let map = Arc::new(Map::build(scenario, &config.vehicle).unwrap());
+    let config = Arc::new(config);
+    (0..count).map(|i| Episode::new(Arc::clone(&config), Arc::clone(&map), RootSeed(40 + i as u64))).collect()
+}
+
+fn config() -> DaggerConfig {
+    let fit = FitSettings {
+        budget: Budget::Steps(25),
+        batch: 32,
+        validation: ValidationSplit { block: 25, every: 5 },
+        validate_every: 25,
+        ..FitSettings::quick(25)
+    };
+    DaggerConfig {
+        eta: 0.999,
+        iterations_max: 2,
+        start: StartFrom::Previous,
+        network: LookAheadNetConfig {
+            conv1: ConvConfig { channels: 16, kernel: 3 },
+            conv2: ConvConfig { channels: 16, kernel: 2 },
+            hidden: 32,
+            dropout_features: 0.0,
+            dropout_hidden: 0.1,
+        },
+        // Loose enough that both novice and expert drive after so little training.
+        rule: DecisionRule::AllBelow { tau: 0.25, chi: 1.0, chi_on: crate::decision_rule::ChiOn::StdPerAxis },
+        fit_cloning: fit.clone(),
+        fit_iteration: fit,
+        ..DaggerConfig::paper()
+    }
+}
+
+fn run_in(
+    folder: &Path,
+    config: &DaggerConfig,
+    progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Outcome, DaggerError> {
+    let store = Store::open(folder).unwrap();
+    let mut hooks = Hooks {
+        episodes: &mut |_| episodes(2),
+        expert: &mut |_, _| Box::new(RouteFollower),
+        on_frame: &mut |_, _, _| {},
+        progress,
+    };
+    run(config, &store, RootSeed(6), &mut hooks)
+}
+
+fn go_on(_: &Progress<'_>) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
+#[test]
+fn a_run_leaves_data_and_policy_of_every_round() {
+    let folder = scratch("dagger");
+    let outcome = run_in(&folder, &config(), &mut go_on).unwrap();
+    assert_eq!(outcome.stop, Stop::IterationCap);
+    assert_eq!(outcome.rows.len(), 3);
+    let store = Store::open(&folder).unwrap();
+    let mut total = 0;
+    for (round, row) in outcome.rows.iter().enumerate() {
+        let (data, about) = store.read_round::<Collection>(round as u32).unwrap();
+        total += data.samples.len();
+        assert_eq!((row.round, row.samples, row.dataset), (round as u32, data.samples.len(), total));
+        let kept = if round == 0 { about.ticks } else { about.ticks - about.novice_ticks };
+        assert_eq!(data.samples.len() as u64, kept, "round {round} keeps the expert's ticks");
+        assert!(Checkpoint::exists(&store.round_folder(round as u32)));
+        assert_eq!(row.eta_hat.is_some(), round > 0);
+    }
+    assert!(store.read_round::<Collection>(0).unwrap().0.samples.iter().all(|sample| sample.tau_hat == 0.0));
+    let last = Checkpoint::load(&store.round_folder(2)).unwrap();
+    assert_eq!(outcome.policy, Some(last));
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn an_interrupted_run_continues_to_the_same_end() {
+    let (whole, parts) = (scratch("whole"), scratch("parts"));
+    let at_once = run_in(&whole, &config(), &mut go_on).unwrap();
+    // Interrupted in the middle of the training of round 1, after its collection.
+    let mut interrupt = |progress: &Progress<'_>| match progress {
+        Progress::Fitting { round: Some(1), fit } if fit.step == 5 => ControlFlow::Break(()),
+        _ => ControlFlow::Continue(()),
+    };
+    let first = run_in(&parts, &config(), &mut interrupt).unwrap();
+    assert_eq!((first.stop, first.rows.len()), (Stop::Interrupted, 1));
+    assert_eq!(first.policy, Some(Checkpoint::load(&parts.join("round-00")).unwrap()));
+    let second = run_in(&parts, &config(), &mut go_on).unwrap();
+    assert_eq!(second.rows, at_once.rows);
+    assert_eq!(second.policy, at_once.policy);
+    std::fs::remove_dir_all(whole).unwrap();
+    std::fs::remove_dir_all(parts).unwrap();
+}
+
+#[test]
+fn a_folder_is_continued_only_with_its_own_settings() {
+    let folder = scratch("claimed");
+    let mut stop = |_: &Progress<'_>| ControlFlow::Break(());
+    let outcome = run_in(&folder, &config(), &mut stop).unwrap();
+    assert_eq!((outcome.stop, outcome.policy), (Stop::Interrupted, None));
+    let other = DaggerConfig { eta: 0.5, ..config() };
+    let error = run_in(&folder, &other, &mut go_on).unwrap_err().to_string();
+    assert!(error.contains("dagger.toml") && error.contains("other settings"), "{error}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn eta_ends_the_iterations_and_a_final_fit_follows() {
+    let folder = scratch("eta");
+    let config = DaggerConfig {
+        // The network always drives: η̂ = 1.
+        rule: DecisionRule::TauOnly { tau: 2.0 },
+        keep: Keep::EveryTick,
+        fit_final: Some(FitSettings { budget: Budget::Steps(3), ..config().fit_iteration }),
+        ..config()
+    };
+    let outcome = run_in(&folder, &config, &mut go_on).unwrap();
+    assert_eq!(outcome.stop, Stop::EtaReached);
+    assert_eq!(outcome.rows.len(), 2, "line 8 still trains on what line 6 collected");
+    assert_eq!(outcome.rows[1].eta_hat, Some(1.0));
+    assert!(outcome.rows[1].samples > 0, "every tick is kept");
+    assert_eq!(outcome.policy, Some(Checkpoint::load(&folder.join("final")).unwrap()));
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn presets_survive_toml() {
+    for config in [DaggerConfig::paper(), DaggerConfig::quick()] {
+        let text = toml::to_string(&config).unwrap();
+        assert_eq!(toml::from_str::<DaggerConfig>(&text).unwrap(), config);
+    }
+}

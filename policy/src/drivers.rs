@@ -1,0 +1,80 @@
+//! The trained network at the wheel: of many cars in lock-step, or of one.
+
+use crate::checkpoint::Checkpoint;
+use crate::network::{DeviceChoice, Prediction, Predictor};
+use sim::driver::{Decision, Fleet, Policy, Seat, Source};
+use sim::sensing::{GridGeometry, Observation};
+
+/// The network alone drives every seat; one call answers all of them.
+#[derive(Debug, Clone)]
+pub struct NetFleet {
+    predictor: Predictor,
+    geometry: GridGeometry,
+}
+
+impl NetFleet {
+    /// Seats a network.
+    pub fn new(checkpoint: Checkpoint, device: DeviceChoice) -> Self {
+        Self { predictor: Predictor::new(checkpoint.weights, device), geometry: checkpoint.geometry }
+    }
+}
+
+impl Fleet for NetFleet {
+    fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
+        let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
+        let predictions = self.predictor.predict(&grids);
+        decisions.extend(predictions.iter().map(|prediction| novice_decision(prediction, &self.geometry)));
+    }
+}
+
+/// The network alone drives one car. Answers the same bits as [`NetFleet`].
+#[derive(Debug, Clone)]
+pub struct NetPolicy(NetFleet);
+
+impl NetPolicy {
+    /// Seats a network.
+    pub fn new(checkpoint: Checkpoint, device: DeviceChoice) -> Self {
+        Self(NetFleet::new(checkpoint, device))
+    }
+}
+
+impl Policy for NetPolicy {
+    fn act(&mut self, observation: &Observation) -> Decision {
+        let prediction = self.0.predictor.predict(&[&observation.grid])[0];
+        novice_decision(&prediction, &self.0.geometry)
+    }
+}
+
+/// What the network's answer means to the controller.
+pub(crate) fn novice_decision(prediction: &Prediction, geometry: &GridGeometry) -> Decision {
+    Decision {
+        look_ahead: prediction.look_ahead(geometry),
+        source: Source::Novice,
+        spread: Some(prediction.spread(geometry)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::fast::tests::lots;
+    use crate::network::{LookAheadNetConfig, Weights};
+    use sim::seed::RootSeed;
+
+    #[test]
+    fn a_policy_answers_what_the_network_says() {
+        let weights = Weights::init(LookAheadNetConfig::compact(), RootSeed(1), 0);
+        let geometry = GridGeometry::paper();
+        let grid = lots(1)[0];
+        let mut policy = NetPolicy::new(Checkpoint { weights: weights.clone(), geometry }, DeviceChoice::Cpu);
+        let decision = policy.act(&Observation { grid });
+        let prediction = Predictor::new(weights, DeviceChoice::Cpu).predict(&[&grid])[0];
+        assert_eq!(decision.source, Source::Novice);
+        assert_eq!(decision.look_ahead.to_image_fraction(&geometry).map(round), prediction.clipped_mean().map(round));
+        assert_eq!(decision.spread.unwrap().ahead_m, prediction.sigma[1] * geometry.side_m);
+    }
+
+    fn round(value: f32) -> i32 {
+        (value * 1e4).round() as i32
+    }
+}

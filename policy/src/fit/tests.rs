@@ -1,0 +1,143 @@
+//! Training learns, repeats, stops, and does not care about threads.
+
+use super::*;
+use crate::dataset::tests::round;
+use crate::network::{ConvConfig, LookAheadNetConfig};
+
+fn tiny() -> LookAheadNetConfig {
+    LookAheadNetConfig {
+        conv1: ConvConfig { channels: 16, kernel: 3 },
+        conv2: ConvConfig { channels: 16, kernel: 2 },
+        hidden: 40,
+        dropout_features: 0.1,
+        dropout_hidden: 0.2,
+    }
+}
+
+fn dataset(samples: usize) -> Dataset {
+    let mut dataset = Dataset::default();
+    dataset.push(round(samples));
+    dataset
+}
+
+fn settings(steps: u32) -> FitSettings {
+    FitSettings {
+        batch: 33, // shards of different sizes
+        validation: ValidationSplit { block: 20, every: 5 },
+        validate_every: 20,
+        ..FitSettings::quick(steps)
+    }
+}
+
+fn train(dataset: &Dataset, settings: &FitSettings, device: DeviceChoice) -> FitOutcome {
+    let start = Weights::init(tiny(), RootSeed(1), 0);
+    let mut progress = |_: &FitProgress| ControlFlow::Continue(());
+    fit(start, dataset, settings, &GridGeometry::paper(), device, RootSeed(2), &mut progress).unwrap()
+}
+
+#[test]
+fn a_readable_rule_is_learned() {
+    let dataset = dataset(1500);
+    let start = Weights::init(tiny(), RootSeed(1), 0);
+    let held_back = dataset.split(settings(1).validation).validation;
+    let before = evaluate(&start, &held_back, &LossSettings::paper(), &GridGeometry::paper(), DeviceChoice::Cpu);
+    let outcome = train(&dataset, &settings(400), DeviceChoice::Cpu);
+    let after = outcome.report.validation.unwrap();
+    assert!(after.rmse_m < 0.4 * before.rmse_m, "{before:?} {:?}", outcome.report);
+    assert!(after.nll < before.nll - 0.5, "{before:?} {:?}", outcome.report);
+    assert_eq!(outcome.report.curve.len(), 20);
+}
+
+#[test]
+fn one_and_two_threads_learn_the_same_bits() {
+    let dataset = dataset(200);
+    let with_threads = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| train(&dataset, &settings(15), DeviceChoice::Cpu).weights)
+    };
+    let one = with_threads(1);
+    assert_eq!(one.values(), with_threads(2).values());
+    assert_ne!(one, Weights::init(tiny(), RootSeed(1), 0));
+}
+
+#[test]
+fn the_number_of_shards_changes_only_roundings() {
+    let dataset = dataset(200);
+    let no_dropout = LookAheadNetConfig { dropout_features: 0.0, dropout_hidden: 0.0, ..tiny() };
+    let with_shards = |shards| {
+        let settings = FitSettings { shards, ..settings(5) };
+        let start = Weights::init(no_dropout, RootSeed(1), 0);
+        let mut progress = |_: &FitProgress| ControlFlow::Continue(());
+        let geometry = GridGeometry::paper();
+        fit(start, &dataset, &settings, &geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress).unwrap()
+    };
+    let (one, three) = (with_shards(1).report, with_shards(3).report);
+    let (one, three) = (one.validation.unwrap(), three.validation.unwrap());
+    assert!((one.nll - three.nll).abs() < 1e-3, "{one:?} {three:?}");
+}
+
+#[test]
+fn burn_and_fast_learn_alike() {
+    let dataset = dataset(200);
+    let fast = train(&dataset, &settings(6), DeviceChoice::Cpu).report;
+    let burn = train(&dataset, &settings(6), DeviceChoice::Flex).report;
+    let (a, b) = (fast.curve[0], burn.curve[0]);
+    assert!((a.training.total - b.training.total).abs() < 1e-3, "{a:?} {b:?}");
+    assert!((a.validation.unwrap().nll - b.validation.unwrap().nll).abs() < 1e-3, "{a:?} {b:?}");
+}
+
+#[test]
+fn a_stop_keeps_what_was_learned() {
+    let dataset = dataset(200);
+    let start = Weights::init(tiny(), RootSeed(1), 0);
+    let mut seen = Vec::new();
+    let mut progress = |now: &FitProgress| {
+        seen.push((now.step, now.samples_done));
+        if now.step == 7 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let geometry = GridGeometry::paper();
+    let outcome =
+        fit(start, &dataset, &settings(50), &geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress).unwrap();
+    assert!(outcome.report.stopped);
+    assert_eq!((outcome.report.steps, outcome.report.kept_step), (7, 7));
+    assert_eq!(seen.last(), Some(&(7, 7 * 33)));
+}
+
+#[test]
+fn the_best_weights_are_those_reported() {
+    let dataset = dataset(400);
+    let settings = settings(120);
+    let outcome = train(&dataset, &settings, DeviceChoice::Cpu);
+    let best = outcome.report.curve.iter().map(|point| point.validation.unwrap().loss).fold(f32::INFINITY, f32::min);
+    let held_back = dataset.split(settings.validation).validation;
+    let again = evaluate(&outcome.weights, &held_back, &settings.loss, &GridGeometry::paper(), DeviceChoice::Cpu);
+    assert_eq!(outcome.report.validation, Some(again));
+    assert_eq!(again.loss, best);
+}
+
+#[test]
+fn nothing_to_learn_from_is_an_error() {
+    let start = Weights::init(tiny(), RootSeed(1), 0);
+    let mut progress = |_: &FitProgress| ControlFlow::Continue(());
+    let geometry = GridGeometry::paper();
+    let empty = Dataset::default();
+    let error = fit(start, &empty, &settings(1), &geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress);
+    assert!(matches!(error, Err(FitError::NoTrainingSamples { samples: 0, .. })));
+}
+
+#[test]
+fn every_sample_is_dealt_once_per_epoch() {
+    let samples = round(50).samples;
+    let mut deck = Deck::new(&samples, Mirror::Off, RootSeed(4));
+    let (mut first, mut second) = (Vec::new(), Vec::new());
+    deck.deal(50, &mut first);
+    deck.deal(50, &mut second);
+    assert_ne!(first, second, "a new order per epoch");
+    let keys = |dealt: &[Sample]| {
+        let mut keys: Vec<_> = dealt.iter().map(|sample| sample.label.map(f32::to_bits)).collect();
+        keys.sort_unstable();
+        keys
+    };
+    assert_eq!(keys(&first), keys(&samples));
+    assert_eq!(keys(&second), keys(&samples));
+}

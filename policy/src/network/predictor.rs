@@ -1,0 +1,230 @@
+//! A trained network that answers grids.
+
+use super::fast::{self, Prepared, Trace};
+use super::{LookAheadNet, OUTPUTS, Weights, grid_tensor, soft_clamp_log_variance};
+use burn::tensor::Device;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use sim::driver::{LookAheadPoint, Spread};
+use sim::sensing::{GridGeometry, OccupancyGrid};
+
+/// Where the network is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DeviceChoice {
+    /// [`fast`], on all threads of the current rayon pool.
+    #[default]
+    Cpu,
+    /// burn's CPU backend: the reference, slower.
+    Flex,
+    /// First CUDA device.
+    #[cfg(feature = "cuda")]
+    Cuda,
+    /// Default device of wgpu with WGSL shaders.
+    #[cfg(feature = "wgpu")]
+    Wgpu,
+    /// Default device of wgpu with SPIR-V shaders.
+    #[cfg(feature = "vulkan")]
+    Vulkan,
+}
+
+impl DeviceChoice {
+    /// The burn device, or `None` for [`fast`].
+    pub(crate) fn burn_device(self) -> Option<Device> {
+        match self {
+            Self::Cpu => None,
+            Self::Flex => Some(Device::flex()),
+            #[cfg(feature = "cuda")]
+            Self::Cuda => Some(Device::cuda(0)),
+            #[cfg(feature = "wgpu")]
+            Self::Wgpu => Some(Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)),
+            #[cfg(feature = "vulkan")]
+            Self::Vulkan => Some(Device::vulkan(burn::tensor::DeviceKind::DefaultDevice)),
+        }
+    }
+}
+
+/// What the network answers to one grid, in image fractions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prediction {
+    /// Mean of (u, w), as it left the network: may lie outside [0, 1].
+    pub mean: [f32; 2],
+    /// Standard deviation of (u, w).
+    pub sigma: [f32; 2],
+}
+
+impl Prediction {
+    /// From raw outputs.
+    ///
+    /// # Panics
+    /// If the network answered with something that is not a number.
+    pub fn from_raw(raw: [f32; OUTPUTS]) -> Self {
+        assert!(raw.iter().all(|value| value.is_finite()), "the network answered {raw:?}");
+        let sigma = |raw| (0.5 * soft_clamp_log_variance(raw)).exp();
+        Self { mean: [raw[0], raw[1]], sigma: [sigma(raw[2]), sigma(raw[3])] }
+    }
+
+    /// The mean inside the image: what is driven to and compared.
+    pub fn clipped_mean(&self) -> [f32; 2] {
+        self.mean.map(|fraction| fraction.clamp(0.0, 1.0))
+    }
+
+    /// The point to drive to.
+    pub fn look_ahead(&self, geometry: &GridGeometry) -> LookAheadPoint {
+        LookAheadPoint::from_image_fraction(self.clipped_mean(), geometry)
+    }
+
+    /// The standard deviation in metres.
+    pub fn spread(&self, geometry: &GridGeometry) -> Spread {
+        Spread { ahead_m: self.sigma[1] * geometry.side_m, left_m: self.sigma[0] * geometry.side_m }
+    }
+}
+
+/// Rows computed together on CPUs. Every group is padded to this size, so that an answer never depends on which other
+/// grids were asked about.
+const GROUP: usize = 16;
+/// The same on a burn device, where a call costs more than its rows.
+const DEVICE_GROUP: usize = 64;
+
+/// A network ready to answer.
+#[derive(Debug, Clone)]
+pub struct Predictor {
+    weights: Weights,
+    engine: Engine,
+}
+
+#[derive(Debug, Clone)]
+enum Engine {
+    Cpu { prepared: Prepared, traces: Vec<Trace> },
+    Burn { net: Box<LookAheadNet>, device: Device },
+}
+
+impl Predictor {
+    /// Makes a network ready on a device.
+    pub fn new(weights: Weights, device: DeviceChoice) -> Self {
+        let engine = match device.burn_device() {
+            None => Engine::Cpu { prepared: Prepared::new(&weights), traces: Vec::new() },
+            Some(device) => Engine::Burn { net: Box::new(LookAheadNet::from_weights(&weights, &device)), device },
+        };
+        Self { weights, engine }
+    }
+
+    /// The weights it answers with.
+    pub fn weights(&self) -> &Weights {
+        &self.weights
+    }
+
+    /// Answers every grid, in order.
+    pub fn predict(&mut self, grids: &[&OccupancyGrid]) -> Vec<Prediction> {
+        self.raw(grids).into_iter().map(Prediction::from_raw).collect()
+    }
+
+    /// Raw outputs per grid: means of u and w, raw log-variances of both.
+    pub fn raw(&mut self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
+        match &mut self.engine {
+            Engine::Cpu { prepared, traces } => raw_on_cpu(&self.weights, prepared, traces, grids),
+            Engine::Burn { net, device } => grids
+                .chunks(DEVICE_GROUP)
+                .flat_map(|group| {
+                    let outputs = net.forward(grid_tensor(group, DEVICE_GROUP, device), None);
+                    let outputs: Vec<f32> = outputs.into_data().try_into_vec().expect("outputs are f32");
+                    outputs.as_chunks::<OUTPUTS>().0[..group.len()].to_vec()
+                })
+                .collect(),
+        }
+    }
+}
+
+fn raw_on_cpu(
+    weights: &Weights,
+    prepared: &Prepared,
+    traces: &mut Vec<Trace>,
+    grids: &[&OccupancyGrid],
+) -> Vec<[f32; OUTPUTS]> {
+    let groups = grids.len().div_ceil(GROUP);
+    if traces.len() < groups.min(TRACES_MAX) {
+        traces.resize_with(groups.min(TRACES_MAX), Trace::default);
+    }
+    let mut outputs = vec![[0.0; OUTPUTS]; grids.len()];
+    // A fixed number of traces, each with its share of the groups: memory stays bounded for large calls.
+    let share = GROUP * groups.div_ceil(TRACES_MAX).max(1);
+    (grids.par_chunks(share), outputs.par_chunks_mut(share), traces.par_iter_mut()).into_par_iter().for_each(
+        |(grids, outputs, trace)| {
+            for (grids, outputs) in grids.chunks(GROUP).zip(outputs.chunks_mut(GROUP)) {
+                let mut padded = [OccupancyGrid::free(); GROUP];
+                for (into, from) in padded.iter_mut().zip(grids) {
+                    *into = **from;
+                }
+                let answers = fast::forward(weights, prepared, &padded, None, trace);
+                outputs.copy_from_slice(&answers[..outputs.len()]);
+            }
+        },
+    );
+    outputs
+}
+
+/// Bound of the memory kept between calls; more than threads on most machines.
+const TRACES_MAX: usize = 64;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::LookAheadNetConfig;
+    use crate::network::fast::tests::lots;
+    use sim::seed::RootSeed;
+
+    /// The property that makes closed-loop results independent of how many cars are still on the road.
+    #[test]
+    fn an_answer_does_not_depend_on_the_other_grids() {
+        let grids = lots(3 * GROUP + 5);
+        for config in [LookAheadNetConfig::paper(), LookAheadNetConfig::compact()] {
+            let mut predictor = Predictor::new(Weights::init(config, RootSeed(1), 0), DeviceChoice::Cpu);
+            let all: Vec<&OccupancyGrid> = grids.iter().collect();
+            let together = predictor.raw(&all);
+            for (index, grid) in grids.iter().enumerate() {
+                assert_eq!(predictor.raw(&[grid])[0], together[index], "grid {index} alone");
+            }
+            // Other neighbours, other positions, other sizes.
+            for start in [1, 7, 18] {
+                assert_eq!(predictor.raw(&all[start..])[..], together[start..], "from {start}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_and_two_threads_answer_the_same_bits() {
+        let grids = lots(100);
+        let grids: Vec<&OccupancyGrid> = grids.iter().collect();
+        let weights = Weights::init(LookAheadNetConfig::compact(), RootSeed(1), 0);
+        let with_threads = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| Predictor::new(weights.clone(), DeviceChoice::Cpu).raw(&grids))
+        };
+        assert_eq!(with_threads(1), with_threads(2));
+    }
+
+    #[test]
+    fn burn_and_fast_answer_alike() {
+        let grids = lots(70);
+        let grids: Vec<&OccupancyGrid> = grids.iter().collect();
+        let weights = Weights::init(LookAheadNetConfig::paper(), RootSeed(1), 0);
+        let fast = Predictor::new(weights.clone(), DeviceChoice::Cpu).predict(&grids);
+        let burn = Predictor::new(weights, DeviceChoice::Flex).predict(&grids);
+        for (a, b) in fast.iter().zip(&burn) {
+            for axis in 0..2 {
+                assert!((a.mean[axis] - b.mean[axis]).abs() < 1e-5, "{a:?} {b:?}");
+                assert!((a.sigma[axis] - b.sigma[axis]).abs() < 1e-5, "{a:?} {b:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_prediction_is_clipped_only_in_use() {
+        let geometry = GridGeometry::paper();
+        let prediction = Prediction::from_raw([0.5, -0.2, -3.8, -3.8]);
+        assert_eq!(prediction.mean, [0.5, -0.2]);
+        let point = prediction.look_ahead(&geometry);
+        assert_eq!(point, LookAheadPoint { ahead_m: geometry.far_edge_ahead_m(), left_m: 0.0 });
+        assert!((prediction.spread(&geometry).left_m - 12.0 * prediction.sigma[0]).abs() < 1e-6);
+    }
+}
