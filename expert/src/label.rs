@@ -1,0 +1,144 @@
+//! From an arc to a look-ahead point: how far along (which decides the speed), and how fast it may move.
+
+use crate::config::ExpertConfig;
+use crate::sight::Sight;
+use sim::driver::{GroundTruth, LookAheadPoint};
+use sim::geometry::{Pose, Vec2};
+use sim::sensing::GridGeometry;
+use sim::vehicle::VehicleParams;
+use std::f32::consts::FRAC_PI_2;
+
+/// Step of the march along a label's arc, metres.
+const MARCH_M: f32 = 0.2;
+
+/// A look-ahead point as pure pursuit drives it: a circle through the rear axle and a place on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Label {
+    /// Curvature of the circle, 1/m, positive to the left.
+    pub(crate) curvature_per_m: f32,
+    /// Arc length from the rear axle, metres.
+    pub(crate) station_m: f32,
+}
+
+impl Label {
+    /// The point in the ego frame.
+    pub(crate) fn point(self) -> LookAheadPoint {
+        let in_ego = on_arc(self.curvature_per_m, self.station_m);
+        LookAheadPoint { ahead_m: in_ego.x, left_m: in_ego.y }
+    }
+
+    /// Curvature index of the label, −1…1, on the scale of the first arcs.
+    pub(crate) fn index(self, config: &ExpertConfig) -> f32 {
+        let share = (self.curvature_per_m / config.curvature_max_per_m).clamp(-1.0, 1.0);
+        share.abs().powf(1.0 / 1.5).copysign(share)
+    }
+
+    /// Moves from the last label towards this one, within the limits of a tick. The speed of the wheels limits the
+    /// car anyway; what is limited here is that labels of neighbouring ticks contradict each other.
+    pub(crate) fn steadied(self, last: Self, config: &ExpertConfig) -> Self {
+        let sideways_per_m = 2.0 * config.label_sideways_step_m / (last.station_m * last.station_m);
+        let step_per_m = config.label_curvature_step_per_m.min(sideways_per_m);
+        let curvature_per_m =
+            self.curvature_per_m.clamp(last.curvature_per_m - step_per_m, last.curvature_per_m + step_per_m);
+        let station_m = self
+            .station_m
+            .clamp(last.station_m - config.label_retreat_step_m, last.station_m + config.label_advance_step_m);
+        Self { curvature_per_m, station_m }
+    }
+}
+
+/// Where a point may lie.
+#[derive(Debug)]
+pub(crate) struct Ground<'a> {
+    pub(crate) config: &'a ExpertConfig,
+    pub(crate) vehicle: &'a VehicleParams,
+    pub(crate) geometry: &'a GridGeometry,
+    pub(crate) truth: &'a GroundTruth<'a>,
+    pub(crate) sight: &'a Sight,
+}
+
+impl Ground<'_> {
+    /// The point of an arc: as far as the way is free (the paper's third rule), and near where it is not, which is
+    /// slow. `first_free_m` and `plan_free_m` are travels of the bumper.
+    pub(crate) fn label_on(&self, curvature_per_m: f32, first_free_m: f32, plan_free_m: f32) -> Label {
+        let point_free_m = self.drivable_station(curvature_per_m) - self.vehicle.front_m();
+        let free_m = first_free_m.max(point_free_m.min(plan_free_m));
+        let station_m = self.vehicle.front_m() + self.config.station_share * free_m;
+        self.kept_drivable(Label { curvature_per_m, station_m })
+    }
+
+    /// The nearest point of an arc: the slowest.
+    pub(crate) fn nearest_label_on(&self, curvature_per_m: f32) -> Label {
+        Label { curvature_per_m, station_m: self.stations(curvature_per_m).0 }
+    }
+
+    /// Rule one: the point lies inside drivable space, and inside the patch.
+    pub(crate) fn kept_drivable(&self, label: Label) -> Label {
+        let (near_m, far_m) = self.stations(label.curvature_per_m);
+        let drivable_m = if label.station_m <= near_m { near_m } else { self.drivable_station(label.curvature_per_m) };
+        Label { station_m: label.station_m.min(drivable_m).clamp(near_m, far_m), ..label }
+    }
+
+    /// How far along an arc every point keeps its clearance, metres from the rear axle, within the patch.
+    fn drivable_station(&self, curvature_per_m: f32) -> f32 {
+        let (near_m, far_m) = self.stations(curvature_per_m);
+        let field = self.truth.map.distance_field();
+        let world_from_ego = self.truth.vehicle.pose.world_from_ego();
+        let mut station_m = near_m;
+        while station_m < far_m {
+            let next_m = (station_m + MARCH_M).min(far_m);
+            let in_world = world_from_ego.point(on_arc(curvature_per_m, next_m));
+            if field.at(in_world) < self.config.point_clearance_m || !self.sight.knows(in_world) {
+                break;
+            }
+            station_m = next_m;
+        }
+        station_m
+    }
+
+    /// Arc lengths at which an arc enters the patch and leaves it. Where it points sideways it ends: from there on
+    /// a farther point would mean a lower speed.
+    fn stations(&self, curvature_per_m: f32) -> (f32, f32) {
+        // X = sin(κs)/κ and |Y| = (1 − cos(κs))/|κ|, kept a millimetre inside.
+        let kappa = curvature_per_m.abs().max(1e-5);
+        let (near_x, far_x) = (self.geometry.near_edge_ahead_m + 1e-3, self.geometry.far_edge_ahead_m() - 1e-3);
+        let half_y = 0.5 * self.geometry.side_m - 1e-3;
+        let station_at_x = |x_m: f32| (kappa * x_m).min(1.0).asin() / kappa;
+        let station_at_y = |y_m: f32| (1.0 - kappa * y_m).max(-1.0).acos() / kappa;
+        let far_m = station_at_x(far_x).min(station_at_y(half_y)).min(FRAC_PI_2 / kappa);
+        (station_at_x(near_x), far_m)
+    }
+}
+
+/// The point at an arc length along a circle through the rear axle, ego frame.
+fn on_arc(curvature_per_m: f32, station_m: f32) -> Vec2 {
+    Pose::default().advanced_along_arc(curvature_per_m, station_m).position()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_move_within_the_limits_of_a_tick() {
+        let config = ExpertConfig::paper();
+        let last = Label { curvature_per_m: 0.0, station_m: 6.0 };
+        let wanted = Label { curvature_per_m: 0.2, station_m: 14.0 };
+        let steadied = wanted.steadied(last, &config);
+        assert_eq!(steadied, Label { curvature_per_m: 0.012, station_m: 6.4 });
+        let back = Label { curvature_per_m: -0.2, station_m: 4.0 }.steadied(wanted, &config);
+        assert!((back.station_m - 13.2).abs() < 1e-6);
+        // 2 · 0.5 / 14² = .0051: half a metre sideways at 14 m.
+        assert!((0.2 - back.curvature_per_m - 0.0051).abs() < 1e-4);
+        assert_eq!(wanted.steadied(wanted, &config), wanted);
+    }
+
+    #[test]
+    fn the_index_undoes_the_spacing_of_the_arcs() {
+        let config = ExpertConfig::paper();
+        for index in [-1.0_f32, -0.3, 0.0, 0.5] {
+            let curvature_per_m = config.curvature_max_per_m * index.abs().powf(1.5).copysign(index);
+            assert!((Label { curvature_per_m, station_m: 5.0 }.index(&config) - index).abs() < 1e-5);
+        }
+    }
+}

@@ -1,0 +1,262 @@
+//! The scripted expert: stands in for the person who labels, with the paper's three rules.
+//!
+//! 1. The look-ahead point lies inside drivable space.
+//! 2. With an obstacle ahead, it is a point from which the obstacle can be avoided, the one with the fewest obstacles
+//!    around the way to it.
+//! 3. Otherwise it lies as far ahead as possible inside drivable space.
+//!
+//! The paper says no more; how the rules were made precise, and what was measured on the way, is in methods.md 3 and
+//! expert-findings.md. The expert decides from the clean scene around the car. The route serves one purpose only: a
+//! plan that turns back is refused. Same situation and memory, same bytes.
+
+mod config;
+mod label;
+mod rollout;
+mod search;
+mod sight;
+mod stats;
+
+pub use config::{ExpertConfig, PlanWeights, Sees};
+pub use search::Candidate;
+pub use stats::{ExpertStats, Rule};
+
+use label::{Ground, Label};
+use rand::Rng as _;
+use rollout::{Footprint, Motion};
+use search::{Arcs, Plan, Search};
+use sight::Sight;
+use sim::driver::{Decision, Driver, GroundTruth, LookAheadPoint, Situation, Source};
+use sim::geometry::Vec2;
+use sim::seed::{Rng, RootSeed, Stream};
+use sim::sensing::GridGeometry;
+use sim::vehicle::VehicleParams;
+use std::collections::VecDeque;
+
+/// Two labels farther apart than this contradict each other, metres.
+const JUMP_M: f32 = 1.0;
+/// Control period, seconds (paper: 20 Hz). Limits of labels are per tick; only the reaction delay is a time.
+const CONTROL_PERIOD_S: f32 = 0.05;
+
+/// The expert at the wheel.
+#[derive(Debug, Clone)]
+pub struct ScriptedExpert {
+    config: ExpertConfig,
+    vehicle: VehicleParams,
+    geometry: GridGeometry,
+    footprint: Footprint,
+    arcs: Arcs,
+    /// What was decided last; all of the expert's memory when delay and jitter are off.
+    last: Option<Label>,
+    /// Points decided but not yet said (reaction delay).
+    unsaid: VecDeque<LookAheadPoint>,
+    jitter: Rng,
+    stats: ExpertStats,
+    inspection: Option<Inspection>,
+}
+
+/// How the last decision came about.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inspection {
+    /// Which rule fired.
+    pub rule: Rule,
+    /// Clearance the plan keeps, metres; `None` for a last resort.
+    pub clearance_m: Option<f32>,
+    /// Every first arc, straight on first and then ever tighter, left before right.
+    pub candidates: Vec<Candidate>,
+    /// Which of them was chosen.
+    pub chosen: usize,
+    /// Way of the rear axle along the chosen plan, world.
+    pub way: Vec<Vec2>,
+    /// The point before it was steadied, ego frame.
+    pub wanted: LookAheadPoint,
+    /// The point decided on, ego frame.
+    pub decided: LookAheadPoint,
+}
+
+/// What the rules ask for, before it is steadied.
+#[derive(Debug, Clone, Copy)]
+struct Wish {
+    label: Label,
+    rule: Rule,
+    has_failed: bool,
+}
+
+impl ScriptedExpert {
+    /// An expert for a vehicle and the patch its points must lie in.
+    pub fn new(config: ExpertConfig, vehicle: &VehicleParams, geometry: GridGeometry) -> Self {
+        Self {
+            footprint: Footprint::new(vehicle, config.nose_margin_m, config.disc_relief_m),
+            arcs: Arcs::new(&config),
+            vehicle: vehicle.clone(),
+            geometry,
+            last: None,
+            unsaid: VecDeque::new(),
+            jitter: RootSeed(0).rng(Stream::Expert, 0),
+            stats: ExpertStats::default(),
+            inspection: None,
+            config,
+        }
+    }
+
+    /// Draws label jitter from a run's seed.
+    #[must_use]
+    pub fn with_jitter_seed(mut self, seed: RootSeed, episode: u64) -> Self {
+        self.jitter = seed.rng(Stream::Expert, episode);
+        self
+    }
+
+    /// Counts since the expert was made.
+    pub fn stats(&self) -> &ExpertStats {
+        &self.stats
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &ExpertConfig {
+        &self.config
+    }
+
+    /// Decides and says how: costs about twice a decision.
+    pub fn inspect(&mut self, situation: &Situation<'_>) -> (Decision, Inspection) {
+        self.inspection = Some(Inspection::empty());
+        let decision = self.decide(situation);
+        let inspection = self.inspection.take().unwrap_or_else(Inspection::empty);
+        (decision, inspection)
+    }
+
+    /// The three rules.
+    fn wish(&self, truth: &GroundTruth<'_>, sight: &Sight, mut inspection: Option<&mut Inspection>) -> Wish {
+        let search = Search {
+            config: &self.config,
+            vehicle: &self.vehicle,
+            footprint: &self.footprint,
+            arcs: &self.arcs,
+            truth,
+            sight,
+            start: self.when_obeyed(truth),
+            last_index: self.last.map(|last| last.index(&self.config)),
+        };
+        let ground = self.ground(truth, sight);
+
+        // Rule two: a point from which avoidance is possible — with the comfortable clearance, or with less.
+        let mut best: Option<(usize, Plan)> = None;
+        for (level, &clearance_m) in self.config.clearances_m.iter().enumerate() {
+            let candidates = inspection.as_mut().map(|inspection| &mut inspection.candidates);
+            let plan = search.best_plan(clearance_m, candidates);
+            if let Some(plan) = plan
+                && best.is_none_or(|(_, best)| plan.free_m > best.free_m)
+            {
+                best = Some((level, plan));
+            }
+            if best.is_some_and(|(_, best)| best.free_m >= self.config.avoidable_m) {
+                break;
+            }
+        }
+
+        let (chosen, clearance_m, wish) = if let Some((level, plan)) = best {
+            // Rule three: on that arc, as far as possible.
+            let curvature_per_m = self.arcs.curvature_per_m(plan.first);
+            let label = ground.label_on(curvature_per_m, plan.first_free_m, plan.free_m);
+            let rule = match level {
+                0 if plan.first_free_m >= self.config.obstacle_ahead_m => Rule::Far,
+                0 => Rule::Avoid,
+                _ => Rule::Relaxed,
+            };
+            if let Some(inspection) = &mut inspection {
+                inspection.way = search.trace(&plan);
+            }
+            (plan.first, Some(self.config.clearances_m[level]), Wish { label, rule, has_failed: false })
+        } else {
+            let (first, gap_m) = search.widest_gap();
+            let label = ground.nearest_label_on(self.arcs.curvature_per_m(first));
+            (first, None, Wish { label, rule: Rule::LastResort, has_failed: gap_m < 0.0 })
+        };
+        if let Some(inspection) = &mut inspection {
+            (inspection.chosen, inspection.clearance_m, inspection.rule) = (chosen, clearance_m, wish.rule);
+            inspection.wanted = wish.label.point();
+        }
+        wish
+    }
+
+    /// The car when it begins to obey: the dead time further on, steering at the last label meanwhile.
+    fn when_obeyed(&self, truth: &GroundTruth<'_>) -> Motion {
+        let state = truth.vehicle;
+        let curvature_per_m = state.curvature_per_m(&self.vehicle);
+        let mut motion = Motion::new(state.pose, curvature_per_m);
+        let dead_time_s = self.vehicle.dead_time_s;
+        let change_per_m = self.vehicle.steering_rate_max_radps / self.vehicle.wheelbase_m * dead_time_s;
+        let pending_per_m = self.last.map_or(curvature_per_m, |last| last.curvature_per_m);
+        motion.step(pending_per_m, change_per_m, state.speed_mps * dead_time_s);
+        motion
+    }
+
+    fn ground<'a>(&'a self, truth: &'a GroundTruth<'a>, sight: &'a Sight) -> Ground<'a> {
+        Ground { config: &self.config, vehicle: &self.vehicle, geometry: &self.geometry, truth, sight }
+    }
+
+    /// Reaction delay and jitter of a human hand; both are off by default.
+    fn said(&mut self, decided: LookAheadPoint) -> LookAheadPoint {
+        let delay_ticks = (self.config.reaction_delay_s / CONTROL_PERIOD_S).round() as usize;
+        self.unsaid.push_back(decided);
+        let point =
+            if self.unsaid.len() > delay_ticks { self.unsaid.pop_front() } else { self.unsaid.front().copied() };
+        let point = point.unwrap_or(decided);
+        if self.config.label_jitter == 0.0 {
+            return point;
+        }
+        let [u, w] = point.to_image_fraction(&self.geometry);
+        let sigma = self.config.label_jitter;
+        let [u, w] = [u, w].map(|fraction| (fraction + sigma * standard_normal(&mut self.jitter)).clamp(0.0, 1.0));
+        LookAheadPoint::from_image_fraction([u, w], &self.geometry)
+    }
+}
+
+impl Driver for ScriptedExpert {
+    fn decide(&mut self, situation: &Situation<'_>) -> Decision {
+        let truth = &situation.truth;
+        let sight = Sight::new(self.config.sees, truth.map, truth.vehicle.pose, &self.geometry);
+        let mut inspection = self.inspection.take();
+        let wish = self.wish(truth, &sight, inspection.as_mut());
+        // Rule one has the last word: the point lies inside drivable space.
+        let steadied = self.last.map_or(wish.label, |last| wish.label.steadied(last, &self.config));
+        let label = self.ground(truth, &sight).kept_drivable(steadied);
+
+        let moved_m = self.last.map_or(0.0, |last| distance_m(last.point(), label.point()));
+        self.stats.count(wish.rule, wish.has_failed, moved_m > JUMP_M);
+        self.last = Some(label);
+        if let Some(inspection) = &mut inspection {
+            inspection.decided = label.point();
+        }
+        self.inspection = inspection;
+        Decision { look_ahead: self.said(label.point()), source: Source::Expert, spread: None }
+    }
+
+    fn reset(&mut self) {
+        self.last = None;
+        self.unsaid.clear();
+    }
+}
+
+impl Inspection {
+    fn empty() -> Self {
+        let nowhere = LookAheadPoint { ahead_m: 0.0, left_m: 0.0 };
+        Self {
+            rule: Rule::Far,
+            clearance_m: None,
+            candidates: Vec::new(),
+            chosen: 0,
+            way: Vec::new(),
+            wanted: nowhere,
+            decided: nowhere,
+        }
+    }
+}
+
+fn distance_m(a: LookAheadPoint, b: LookAheadPoint) -> f32 {
+    (a.ahead_m - b.ahead_m).hypot(a.left_m - b.left_m)
+}
+
+/// Irwin–Hall: twelve uniform draws have variance 1. Its tails end at 6σ, which suits a hand.
+fn standard_normal(rng: &mut Rng) -> f32 {
+    let uniform = |rng: &mut Rng| (rng.next_u32() >> 8) as f32 / (1 << 24) as f32;
+    (0..12).map(|_| uniform(rng)).sum::<f32>() - 6.0
+}

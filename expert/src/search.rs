@@ -1,0 +1,368 @@
+//! Two-stage look-ahead: first arcs a point can steer at, and second arcs that branch off them.
+//!
+//! One constant arc can express neither "out and back" nor "straight on, then turn" (expert-findings.md 4). A first
+//! arc is therefore as good as the best plan that begins with it: this is the paper's "a point from which avoidance
+//! is possible".
+
+use crate::config::ExpertConfig;
+use crate::rollout::{Footprint, Motion};
+use crate::sight::Sight;
+use sim::driver::GroundTruth;
+use sim::vehicle::VehicleParams;
+
+/// First arcs to either side of straight on.
+const FIRST_SIDE: usize = 16;
+/// First arcs.
+pub(crate) const FIRST_ARCS: usize = 2 * FIRST_SIDE + 1;
+/// Second arcs to either side of straight on.
+const SECOND_SIDE: usize = 7;
+const SECOND_ARCS: usize = 2 * SECOND_SIDE + 1;
+/// First arcs are densest where a small change of curvature moves a far point most (methods.md 3.2).
+const FIRST_EXPONENT: f32 = 1.5;
+/// Second arcs (expert-findings.md 5.1).
+const SECOND_EXPONENT: f32 = 1.4;
+/// Travels at which second arcs branch off.
+const BRANCHES: usize = 5;
+/// How much nearer than at the start something may come in a tight start, metres: what interpolation rounds away.
+const START_SLACK_M: f32 = 0.02;
+
+/// Curvatures of both stages, straight on first and then ever tighter, left before right.
+#[derive(Debug, Clone)]
+pub(crate) struct Arcs {
+    first: [Arc; FIRST_ARCS],
+    second: [Arc; SECOND_ARCS],
+}
+
+/// One curvature to steer at.
+#[derive(Debug, Clone, Copy)]
+struct Arc {
+    curvature_per_m: f32,
+    /// Index relative to the tightest arc, −1…1.
+    index: f32,
+}
+
+impl Arcs {
+    pub(crate) fn new(config: &ExpertConfig) -> Self {
+        let arc = |i: usize, n_side: usize, max_per_m: f32, exponent: f32| {
+            let side = if i.is_multiple_of(2) { -1.0 } else { 1.0 };
+            let index = i.div_ceil(2) as f32 / n_side as f32;
+            Arc { curvature_per_m: side * max_per_m * index.powf(exponent), index: side * index }
+        };
+        Self {
+            first: std::array::from_fn(|i| arc(i, FIRST_SIDE, config.curvature_max_per_m, FIRST_EXPONENT)),
+            second: std::array::from_fn(|i| arc(i, SECOND_SIDE, config.second_curvature_max_per_m, SECOND_EXPONENT)),
+        }
+    }
+
+    pub(crate) fn curvature_per_m(&self, first: usize) -> f32 {
+        self.first[first].curvature_per_m
+    }
+}
+
+/// Where plans begin, and what they are measured with.
+#[derive(Debug)]
+pub(crate) struct Search<'a> {
+    pub(crate) config: &'a ExpertConfig,
+    pub(crate) vehicle: &'a VehicleParams,
+    pub(crate) footprint: &'a Footprint,
+    pub(crate) arcs: &'a Arcs,
+    pub(crate) truth: &'a GroundTruth<'a>,
+    pub(crate) sight: &'a Sight,
+    /// The car when it begins to obey this decision.
+    pub(crate) start: Motion,
+    /// Curvature index of the last label, −1…1.
+    pub(crate) last_index: Option<f32>,
+}
+
+/// A first arc and what follows it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Plan {
+    /// Which first arc.
+    pub(crate) first: usize,
+    /// Where the second arc branches off and its curvature; `None` if the first arc is the whole plan.
+    pub(crate) second: Option<(f32, f32)>,
+    /// Free travel of the first arc alone, metres.
+    pub(crate) first_free_m: f32,
+    /// Free travel of the whole plan, metres.
+    pub(crate) free_m: f32,
+    /// Its worth.
+    pub(crate) score: f32,
+}
+
+/// One first arc as the search left it, for pictures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    /// Curvature of the arc, 1/m.
+    pub curvature_per_m: f32,
+    /// Free travel along it, metres.
+    pub free_m: f32,
+    /// Best score of a plan that begins with it; `None` if it could not beat the winner.
+    pub score: Option<f32>,
+}
+
+/// A forecast first arc.
+#[derive(Debug, Clone, Copy)]
+struct FirstArc {
+    free_m: f32,
+    load_m: f32,
+    end: Motion,
+    branches: [Branch; BRANCHES],
+    n_branches: usize,
+    /// What a plan that begins with it scores without travel and load.
+    offset: f32,
+}
+
+/// Where second arcs begin.
+#[derive(Debug, Clone, Copy)]
+struct Branch {
+    motion: Motion,
+    travel_m: f32,
+    load_m: f32,
+}
+
+impl Search<'_> {
+    /// The best plan that keeps a clearance; `None` if not even a step is free.
+    ///
+    /// Branch and bound: a plan that could not win if all the rest of its way were free is not followed.
+    pub(crate) fn best_plan(&self, clearance_m: f32, mut candidates: Option<&mut Vec<Candidate>>) -> Option<Plan> {
+        let thresholds = self.thresholds(clearance_m);
+        let firsts: [FirstArc; FIRST_ARCS] = std::array::from_fn(|i| self.follow_first(i, thresholds));
+        // The most promising first: its plans prune those of the others.
+        let mut order: [(f32, usize); FIRST_ARCS] = std::array::from_fn(|i| (self.bound_of_first(&firsts[i]), i));
+        order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+
+        let mut best: Option<Plan> = None;
+        for (bound, first) in order {
+            if best.is_some_and(|best| bound <= best.score) {
+                break;
+            }
+            self.follow_plans(first, &firsts[first], thresholds, &mut best);
+        }
+        if let Some(candidates) = &mut candidates {
+            candidates.clear();
+            candidates.extend(firsts.iter().enumerate().map(|(i, first)| {
+                let mut own = None;
+                self.follow_plans(i, first, thresholds, &mut own);
+                let curvature_per_m = self.arcs.first[i].curvature_per_m;
+                Candidate { curvature_per_m, free_m: first.free_m, score: own.map(|plan| plan.score) }
+            }));
+        }
+        best
+    }
+
+    /// The first arc with the largest smallest clearance over the next metres, and that clearance.
+    pub(crate) fn widest_gap(&self) -> (usize, f32) {
+        let field = self.truth.map.distance_field();
+        let steps = (self.config.tight_start_m / self.config.first_step_m).ceil() as usize;
+        let change_per_m = self.change_per_step(self.config.first_step_m);
+        let gap_m = |first: usize| {
+            let mut motion = self.start;
+            (0..steps).fold(f32::INFINITY, |gap_m, _| {
+                motion.step(self.arcs.first[first].curvature_per_m, change_per_m, self.config.first_step_m);
+                gap_m.min(self.footprint.clearance_m(field, &motion))
+            })
+        };
+        let mut widest = (0, gap_m(0));
+        for first in 1..FIRST_ARCS {
+            let gap_m = gap_m(first);
+            if gap_m > widest.1 {
+                widest = (first, gap_m);
+            }
+        }
+        widest
+    }
+
+    /// Poses along a plan, for pictures.
+    pub(crate) fn trace(&self, plan: &Plan) -> Vec<sim::geometry::Vec2> {
+        let step_m = self.config.first_step_m;
+        let change_per_m = self.change_per_step(step_m);
+        let mut motion = self.start;
+        let steps = (plan.free_m / step_m) as usize;
+        std::iter::once(motion.position)
+            .chain((0..steps).map(|i| {
+                let target_per_m = match plan.second {
+                    Some((branch_m, curvature_per_m)) if i as f32 * step_m >= branch_m => curvature_per_m,
+                    _ => self.arcs.first[plan.first].curvature_per_m,
+                };
+                motion.step(target_per_m, change_per_m, step_m);
+                motion.position
+            }))
+            .collect()
+    }
+
+    /// How far the curvature can change per step at the present speed. Linear in the travel: it takes the rate of
+    /// straight wheels, at which the curvature changes slowest.
+    fn change_per_step(&self, step_m: f32) -> f32 {
+        let speed_mps = self.truth.vehicle.speed_mps.max(SPEED_MIN_MPS);
+        self.vehicle.steering_rate_max_radps / (self.vehicle.wheelbase_m * speed_mps) * step_m
+    }
+
+    fn thresholds(&self, clearance_m: f32) -> Thresholds {
+        let present_m = self.footprint.clearance_m(self.truth.map.distance_field(), &self.start);
+        Thresholds { near_m: clearance_m.min(present_m - START_SLACK_M), far_m: clearance_m }
+    }
+
+    fn follow_first(&self, first: usize, thresholds: Thresholds) -> FirstArc {
+        let (config, field) = (self.config, self.truth.map.distance_field());
+        let Arc { curvature_per_m, index } = self.arcs.first[first];
+        let weights = &config.weights;
+        let change = self.last_index.map_or(0.0, |last_index| (index - last_index).abs());
+        let mut arc = FirstArc {
+            free_m: 0.0,
+            load_m: 0.0,
+            end: self.start,
+            branches: [Branch { motion: self.start, travel_m: 0.0, load_m: 0.0 }; BRANCHES],
+            n_branches: 0,
+            offset: 0.0,
+        };
+        let step_m = config.first_step_m;
+        let change_per_m = self.change_per_step(step_m);
+        let mut motion = self.start;
+        let mut travel_m = 0.0;
+        while travel_m < config.horizon_m {
+            motion.step(curvature_per_m, change_per_m, step_m);
+            travel_m += step_m;
+            let clearance_m = self.footprint.clearance_m(field, &motion);
+            if clearance_m < thresholds.at(travel_m, config)
+                || !self.sight.knows(motion.on_axis(self.footprint.nose_m()))
+            {
+                break;
+            }
+            arc.free_m = travel_m;
+            arc.load_m += self.load(clearance_m) * step_m;
+            arc.end = motion;
+            // Half a step: travels are sums of steps.
+            if arc.n_branches < BRANCHES && travel_m + 0.5 * step_m > config.branch_travels_m[arc.n_branches] {
+                arc.branches[arc.n_branches] = Branch { motion, travel_m, load_m: arc.load_m };
+                arc.n_branches += 1;
+            }
+        }
+        arc.offset = weights.first_free * arc.free_m.min(config.horizon_m) / weights.unit_m
+            - weights.first_curvature * index.abs()
+            - weights.change * change;
+        arc
+    }
+
+    /// No plan that begins with this arc can score more.
+    fn bound_of_first(&self, first: &FirstArc) -> f32 {
+        let load_m = first.branches[..first.n_branches].first().map_or(0.0, |branch| branch.load_m);
+        first.offset + self.bound(load_m)
+    }
+
+    /// Best of travel and load once `load_m` has been collected: free to the horizon without any more.
+    #[inline]
+    fn bound(&self, load_m: f32) -> f32 {
+        self.worth(self.config.horizon_m, load_m)
+    }
+
+    /// Travel and load of a plan. Grows with the travel at a given load.
+    #[inline]
+    fn worth(&self, travel_m: f32, load_m: f32) -> f32 {
+        travel_m / self.config.weights.unit_m - self.config.weights.load * load_m / travel_m
+    }
+
+    /// Replaces `best` by the best plan that begins with a first arc, if that is better.
+    fn follow_plans(&self, index: usize, first: &FirstArc, thresholds: Thresholds, best: &mut Option<Plan>) {
+        if first.free_m == 0.0 {
+            return;
+        }
+        let horizon_m = self.config.horizon_m;
+        let mut offer = |second, free_m: f32, load_m: f32, penalty: f32, end: &Motion| {
+            let free_m = free_m.min(horizon_m);
+            let score = self.worth(free_m, load_m) + first.offset - penalty;
+            let is_better = best.is_none_or(|best| score > best.score);
+            if is_better && self.makes_progress(end, free_m) {
+                *best = Some(Plan { first: index, second, first_free_m: first.free_m, free_m, score });
+            }
+            best.map_or(f32::NEG_INFINITY, |best| best.score)
+        };
+        let mut to_beat = offer(None, first.free_m, first.load_m, 0.0, &first.end);
+        for branch in first.branches[..first.n_branches].iter().rev() {
+            for second in &self.arcs.second {
+                let penalty = self.config.weights.second_curvature * second.index.abs();
+                let load_max_m = self.load_at_bound(to_beat - first.offset + penalty);
+                if let Some((free_m, load_m, end)) =
+                    self.follow_second(branch, second.curvature_per_m, thresholds, load_max_m)
+                {
+                    to_beat = offer(Some((branch.travel_m, second.curvature_per_m)), free_m, load_m, penalty, &end);
+                }
+            }
+        }
+    }
+
+    /// The load above which [`Self::bound`] falls below a worth.
+    fn load_at_bound(&self, worth: f32) -> f32 {
+        let weights = &self.config.weights;
+        (self.config.horizon_m / weights.unit_m - worth) * self.config.horizon_m / weights.load
+    }
+
+    /// Free travel, load and end of a second arc; `None` once it has collected more than `load_max_m`.
+    fn follow_second(
+        &self,
+        branch: &Branch,
+        curvature_per_m: f32,
+        thresholds: Thresholds,
+        load_max_m: f32,
+    ) -> Option<(f32, f32, Motion)> {
+        let (config, field) = (self.config, self.truth.map.distance_field());
+        let step_m = config.second_step_m;
+        let change_per_m = self.change_per_step(step_m);
+        let Branch { mut motion, mut travel_m, mut load_m } = *branch;
+        while travel_m < config.horizon_m {
+            if load_m > load_max_m {
+                return None;
+            }
+            let before = motion;
+            motion.step(curvature_per_m, change_per_m, step_m);
+            let clearance_m = self.footprint.coarse_clearance_m(field, &motion);
+            if clearance_m < thresholds.at(travel_m + step_m, config)
+                || !self.sight.knows(motion.on_axis(self.footprint.nose_m()))
+            {
+                return Some((travel_m, load_m, before));
+            }
+            travel_m += step_m;
+            load_m += self.load(clearance_m) * step_m;
+        }
+        Some((travel_m, load_m, motion))
+    }
+
+    /// How much something at a clearance weighs, 0…1: "fewest obstacles around the trajectory" (paper), and what
+    /// keeps the car in the middle.
+    #[inline]
+    fn load(&self, clearance_m: f32) -> f32 {
+        let share = (1.0 - clearance_m / self.config.load_band_m).clamp(0.0, 1.0);
+        share * share
+    }
+
+    /// Do not turn back: the bumper gains on the route. A filter only, so that labels remain functions of the scene.
+    fn makes_progress(&self, end: &Motion, travel_m: f32) -> bool {
+        let path = self.truth.map.path();
+        let reach_m = self.config.horizon_m + self.vehicle.front_m();
+        let progress_of = |motion: &Motion| {
+            let bumper = motion.on_axis(self.vehicle.front_m());
+            path.project_near(bumper, self.truth.progress_m, self.vehicle.front_m(), reach_m + 4.0)
+        };
+        let reached_m = progress_of(end);
+        // Behind the finish progress saturates.
+        reached_m > path.length_m() - 0.5
+            || reached_m - progress_of(&self.start) >= self.config.progress_share * travel_m
+    }
+}
+
+/// Slowest speed the controller commands, m/s (paper): standing still, the wheels would turn on the spot.
+const SPEED_MIN_MPS: f32 = 0.5;
+
+/// Clearance a forecast must keep.
+#[derive(Debug, Clone, Copy)]
+struct Thresholds {
+    near_m: f32,
+    far_m: f32,
+}
+
+impl Thresholds {
+    /// A tight start must not end every arc at once.
+    #[inline]
+    fn at(self, travel_m: f32, config: &ExpertConfig) -> f32 {
+        if travel_m < config.tight_start_m { self.near_m } else { self.far_m }
+    }
+}
