@@ -86,7 +86,9 @@ pub fn place(corridor: &Corridor, plan: &ClutterPlan, reserved: &[Intruder], rng
     for leg in 0..corridor.legs.len() {
         close_branches(&mut floor, leg);
     }
-    arms.iter().flat_map(|arm| &arm.cones).for_each(|&cone| floor.stand(ObstacleClass::Cone, Pose::new(cone, 0.0)));
+    for &cone in arms.iter().flat_map(|arm| &arm.cones) {
+        floor.stand(ObstacleClass::Cone, Pose::new(cone, 0.0));
+    }
     place_double_parked(&mut floor, rng);
     for stall in corridor.stalls(&reserved_ground) {
         place_parked(&mut floor, &stall, rng);
@@ -196,13 +198,7 @@ impl Floor<'_> {
         let fit = fit_in_lane(leg, side, &on_axis);
         let outward_m = (fit.protrusion_m - wish.wanted_m).max(wish.gap_m - fit.gap_m);
         let (centre, outline) = outline_at(side.sign() * outward_m);
-        Placed {
-            centre,
-            outline,
-            protrusion_m: fit.protrusion_m - outward_m,
-            from_m: fit.from_m,
-            to_m: fit.to_m,
-        }
+        Placed { centre, outline, protrusion_m: fit.protrusion_m - outward_m, from_m: fit.from_m, to_m: fit.to_m }
     }
 }
 
@@ -229,6 +225,7 @@ struct Placed {
 }
 
 /// How an outline sits in the lane: both extremes are exact, since everything is piecewise linear in `s`.
+#[allow(clippy::struct_field_names, reason = "the postfix is the unit")]
 struct Fit {
     /// Smallest distance across the lane from the outline to the opposite edge, metres.
     gap_m: f32,
@@ -258,9 +255,11 @@ fn fit_in_lane(leg: &Leg, side: Side, outline: &[Vec2]) -> Fit {
 fn inner_extent(outline: &[Vec2], s_m: f32) -> f32 {
     sim::geometry::edges(outline)
         .filter(|(a, b)| a.x.min(b.x) <= s_m && s_m <= a.x.max(b.x))
-        .map(|(a, b)| {
-            if (b.x - a.x).abs() < 1e-6 { a.y.min(b.y) } else { a.y + (s_m - a.x) / (b.x - a.x) * (b.y - a.y) }
-        })
+        .map(
+            |(a, b)| {
+                if (b.x - a.x).abs() < 1e-6 { a.y.min(b.y) } else { a.y + (s_m - a.x) / (b.x - a.x) * (b.y - a.y) }
+            },
+        )
         .fold(f32::INFINITY, f32::min)
 }
 
@@ -476,8 +475,7 @@ fn place_group(floor: &mut Floor<'_>, group: &Group, rng: &mut Rng) {
         let index = rng.random_range(0..floor.corridor.legs.len());
         let side = if rng.random_bool(0.5) { Side::Left } else { Side::Right };
         let intrudes = attempt < TRIES / 2;
-        let (from_m, to_m) =
-            if intrudes { floor.usable(index) } else { (0.0, floor.leg(index).length_m) };
+        let (from_m, to_m) = if intrudes { floor.usable(index) } else { (0.0, floor.leg(index).length_m) };
         let length_m = (group.members - 1) as f32 * group.spacing_m;
         if from_m + length_m + 1.0 > to_m {
             continue;
@@ -504,7 +502,9 @@ fn place_group(floor: &mut Floor<'_>, group: &Group, rng: &mut Rng) {
                 }
         });
         if fits && (!intrudes || floor.may_intrude(index, side, from_m, to_m)) {
-            row.iter().for_each(|placed| floor.stand(group.class, placed.centre));
+            for placed in &row {
+                floor.stand(group.class, placed.centre);
+            }
             if intrudes {
                 floor.intruders.push(Intruder { leg: index, side, from_m, to_m });
             }
@@ -526,7 +526,9 @@ fn close_branches(floor: &mut Floor<'_>, index: usize) {
                 leg.world(s_m, leg.edge_m(branch.side, s_m) + branch.side.sign() * 0.25)
             })
             .collect();
-        centres.into_iter().for_each(|centre| floor.stand(ObstacleClass::Cone, Pose::new(centre, 0.0)));
+        for centre in centres {
+            floor.stand(ObstacleClass::Cone, Pose::new(centre, 0.0));
+        }
         floor.intruders.push(Intruder { leg: index, side: branch.side, from_m, to_m });
     }
 }

@@ -8,7 +8,7 @@ use crate::clutter::{self, ClutterPlan, Furniture};
 use crate::corridor::{Blueprint, Bulge, CornerPlan, Corridor, LegPlan, Side, WidthStep, rounded_length_m};
 use rand::RngExt as _;
 use sim::scenario::{NoiseSettings, Scenario};
-use sim::seed::{RootSeed, Rng, Stream};
+use sim::seed::{Rng, RootSeed, Stream};
 use std::ops::RangeInclusive;
 
 /// Which of the three.

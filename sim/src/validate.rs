@@ -1,12 +1,530 @@
-//! Checks a scenario before it becomes a map.
+//! Checks a scenario before it becomes a map, so that nothing behind [`crate::map::Map::build`] has to.
+//!
+//! The order is from plain numbers to relations between things: later checks rely on earlier ones.
 
-use crate::scenario::{Scenario, ScenarioError};
+use crate::geometry::{Pose, Vec2, distance_to_segment, edges, polygon_contains};
+use crate::path::Path;
+use crate::scenario::{Obstacle, Place, ReferencePath, Scenario, ScenarioError};
 use crate::vehicle::VehicleParams;
+
+/// Largest extent of a lot, metres: its raster of distances then takes 100 MB.
+pub const EXTENT_MAX_M: f32 = 500.0;
+/// Points nearer than this count as one, metres.
+const COINCIDENT_M: f32 = 1e-3;
+/// A route shorter than about one car length measures nothing, metres.
+const PATH_MIN_M: f32 = 5.0;
+/// The route is tested in chords of about this length, metres: a chord of a 5 m corner strays by 6 mm.
+const CHORD_M: f32 = 0.5;
+/// Chords tested together against one bounding box.
+const CHORDS_PER_BLOCK: usize = 16;
 
 /// Refuses a scenario that cannot be driven.
 ///
 /// # Errors
-/// The first problem found.
-pub fn validate(_scenario: &Scenario, _vehicle: &VehicleParams) -> Result<(), ScenarioError> {
+/// The first problem found, with its place and a remedy.
+pub fn validate(scenario: &Scenario, vehicle: &VehicleParams) -> Result<(), ScenarioError> {
+    check_name(&scenario.name)?;
+    check_polygon(&scenario.boundary, Place::Boundary)?;
+    check_extent(&scenario.boundary)?;
+    for (i, island) in scenario.islands.iter().enumerate() {
+        check_polygon(&island.polygon, |_| Place::Island(i))?;
+        check_size(Place::Island(i), "height_m", island.height_m, 5.0)?;
+        check_island_inside(i, &island.polygon, &scenario.boundary)?;
+    }
+    for (i, obstacle) in scenario.obstacles.iter().enumerate() {
+        check_obstacle(Place::Obstacle(i), obstacle)?;
+    }
+    for (i, bump) in scenario.speed_bumps.iter().enumerate() {
+        let place = Place::SpeedBump(i);
+        check_finite(place, &[("x_m", bump.x_m), ("y_m", bump.y_m), ("heading_deg", bump.heading_deg)])?;
+        check_size(place, "length_m", bump.length_m, 30.0)?;
+        check_size(place, "width_m", bump.width_m, 30.0)?;
+    }
+    check_path_points(&scenario.reference_path)?;
+    let path = Path::new(&scenario.reference_path);
+    if path.length_m() < PATH_MIN_M {
+        let problem = format!("the route is {:.2} m long", path.length_m());
+        return fault(Place::ReferencePath(None), problem, format!("make it at least {PATH_MIN_M} m"));
+    }
+    check_start(scenario, vehicle, path.pose_at(0.0))?;
+    check_route(scenario, &Route::new(&path))
+}
+
+fn fault<T>(place: Place, problem: impl Into<String>, remedy: impl Into<String>) -> Result<T, ScenarioError> {
+    Err(ScenarioError { place, problem: problem.into(), remedy: remedy.into() })
+}
+
+fn check_name(name: &str) -> Result<(), ScenarioError> {
+    if name.trim().is_empty() {
+        return fault(Place::Name, "the name is empty", "give the lot a name; tables and files are labelled with it");
+    }
+    if let Some(bad) = name.chars().find(|c| c.is_control() || matches!(c, '/' | '\\')) {
+        let problem = format!("the name {name:?} contains {bad:?}");
+        return fault(Place::Name, problem, "use letters, digits, '-' and '_'; files are named after it");
+    }
     Ok(())
+}
+
+fn check_finite(place: Place, numbers: &[(&str, f32)]) -> Result<(), ScenarioError> {
+    match numbers.iter().find(|(_, value)| !value.is_finite()) {
+        Some((name, value)) => fault(place, format!("{name} is {value}"), "write a finite number"),
+        None => Ok(()),
+    }
+}
+
+fn check_size(place: Place, name: &str, value: f32, max: f32) -> Result<(), ScenarioError> {
+    check_finite(place, &[(name, value)])?;
+    if value <= 0.0 || value > max {
+        let remedy = format!("write a number of metres above 0 and up to {max}");
+        return fault(place, format!("{name} is {value}"), remedy);
+    }
+    Ok(())
+}
+
+fn check_obstacle(place: Place, obstacle: &Obstacle) -> Result<(), ScenarioError> {
+    let numbers = [("x_m", obstacle.x_m), ("y_m", obstacle.y_m), ("heading_deg", obstacle.heading_deg)];
+    check_finite(place, &numbers)?;
+    let [length_m, width_m, height_m] = obstacle.size_m();
+    check_size(place, "length_m", length_m, 30.0)?;
+    check_size(place, "width_m", width_m, 30.0)?;
+    check_size(place, "height_m", height_m, 20.0)
+}
+
+/// A simple polygon with some area.
+fn check_polygon(polygon: &[Vec2], place: impl Fn(Option<usize>) -> Place) -> Result<(), ScenarioError> {
+    for (i, vertex) in polygon.iter().enumerate() {
+        check_finite(place(Some(i)), &[("x", vertex.x), ("y", vertex.y)])?;
+    }
+    if polygon.len() < 3 {
+        let problem = format!("{} vertices enclose no ground", polygon.len());
+        return fault(place(None), problem, "give at least 3 vertices");
+    }
+    for (i, (a, b)) in edges(polygon).enumerate() {
+        if a.distance(b) < COINCIDENT_M {
+            let second = (i + 1) % polygon.len();
+            let problem = format!("vertices {} and {} are the same point, {}", i + 1, second + 1, at(a));
+            let remedy = "delete one of them; the last vertex joins the first by itself";
+            return fault(place(Some(i.max(second))), problem, remedy);
+        }
+    }
+    if let Some((i, j)) = first_crossing(polygon) {
+        let next = |i: usize| (i + 1) % polygon.len() + 1;
+        let problem = format!(
+            "the edge from vertex {} to {} meets the edge from vertex {} to {} near {}",
+            i + 1,
+            next(i),
+            j + 1,
+            next(j),
+            at(meeting_point(polygon, i, j))
+        );
+        return fault(place(Some(i)), problem, "reorder or move the vertices so that no edges cross");
+    }
+    let area_m2 = 0.5 * edges(polygon).map(|(a, b)| a.perp_dot(b)).sum::<f32>().abs();
+    if area_m2 < 0.01 {
+        let problem = format!("the outline encloses {area_m2:.4} m²");
+        return fault(place(None), problem, "spread the vertices out; coordinates are in metres");
+    }
+    Ok(())
+}
+
+fn check_extent(boundary: &[Vec2]) -> Result<(), ScenarioError> {
+    let (low, high) = bounds(boundary);
+    let size = high - low;
+    if size.max_element() > EXTENT_MAX_M {
+        let problem = format!("the lot spans {:.0} m × {:.0} m", size.x, size.y);
+        let remedy = format!("keep it within {EXTENT_MAX_M} m; coordinates are in metres");
+        return fault(Place::Boundary(None), problem, remedy);
+    }
+    // Single precision resolves 1 mm up to here.
+    let far = low.abs().max(high.abs()).max_element();
+    if far > 8192.0 {
+        let problem = format!("a coordinate is {far:.0} m from the origin");
+        return fault(Place::Boundary(None), problem, "move the lot near (0, 0)");
+    }
+    Ok(())
+}
+
+fn check_island_inside(index: usize, island: &[Vec2], boundary: &[Vec2]) -> Result<(), ScenarioError> {
+    let remedy = "move it inside the boundary, or cut the boundary there instead";
+    if let Some(i) = island.iter().position(|&vertex| !polygon_contains(boundary, vertex)) {
+        let problem = format!("its vertex {}, {}, lies outside the boundary", i + 1, at(island[i]));
+        return fault(Place::Island(index), problem, remedy);
+    }
+    for (i, (a, b)) in edges(boundary).enumerate() {
+        if edges(island).any(|(c, d)| segments_meet(a, b, c, d)) {
+            let problem = format!("it crosses the boundary's edge from vertex {}", i + 1);
+            return fault(Place::Island(index), problem, remedy);
+        }
+    }
+    Ok(())
+}
+
+fn check_path_points(path: &ReferencePath) -> Result<(), ScenarioError> {
+    for (i, point) in path.points.iter().enumerate() {
+        check_finite(Place::ReferencePath(Some(i)), &[("x", point.x), ("y", point.y)])?;
+    }
+    let place = Place::ReferencePath(None);
+    if path.points.len() < 2 {
+        let problem = format!("the route has {} points", path.points.len());
+        return fault(place, problem, "give at least a start and a finish");
+    }
+    if let Some(i) = path.points.windows(2).position(|pair| pair[0].distance(pair[1]) < COINCIDENT_M) {
+        let problem = format!("points {} and {} are the same, {}", i + 1, i + 2, at(path.points[i]));
+        return fault(Place::ReferencePath(Some(i + 1)), problem, "delete one of them");
+    }
+    for (i, three) in path.points.windows(3).enumerate() {
+        let turn_deg = (three[1] - three[0]).angle_to(three[2] - three[1]).to_degrees().abs();
+        if turn_deg > 170.0 {
+            let problem = format!("the route turns by {turn_deg:.0}° at {}", at(three[1]));
+            return fault(
+                Place::ReferencePath(Some(i + 1)),
+                problem,
+                "cars here do not reverse; turn by less than 170°",
+            );
+        }
+    }
+    check_finite(place, &[("corner_radius_m", path.corner_radius_m)])?;
+    if !(0.0..=100.0).contains(&path.corner_radius_m) {
+        let problem = format!("corner_radius_m is {}", path.corner_radius_m);
+        return fault(place, problem, "write a number of metres from 0 to 100");
+    }
+    Ok(())
+}
+
+/// The body at the start must stand on free ground.
+fn check_start(scenario: &Scenario, vehicle: &VehicleParams, start: Pose) -> Result<(), ScenarioError> {
+    let place = Place::ReferencePath(Some(0));
+    let world_from_ego = start.world_from_ego();
+    let body = vehicle.body_in_ego().map(|corner| world_from_ego.point(corner));
+    let outlines = std::iter::once(&scenario.boundary).chain(scenario.islands.iter().map(|island| &island.polygon));
+    let (low, high) = bounds(&body);
+    let crosses_line = outlines.flat_map(|outline| edges(outline)).any(|(a, b)| {
+        boxes_meet((a.min(b), a.max(b)), (low, high)) && edges(&body).any(|(c, d)| segments_meet(a, b, c, d))
+    });
+    let stands_outside = body.iter().any(|&corner| {
+        !polygon_contains(&scenario.boundary, corner)
+            || scenario.islands.iter().any(|island| polygon_contains(&island.polygon, corner))
+    });
+    if crosses_line || stands_outside {
+        let (length_m, width_m) = (vehicle.length_m, vehicle.width_m);
+        let problem =
+            format!("the car ({length_m} m × {width_m} m) does not fit at the start, {}", at(start.position()));
+        let remedy = format!(
+            "leave {} m behind, {} m ahead of and {:.2} m beside the first point drivable",
+            vehicle.rear_overhang_m,
+            vehicle.front_m(),
+            0.5 * width_m
+        );
+        return fault(place, problem, remedy);
+    }
+    for (i, obstacle) in scenario.obstacles.iter().enumerate() {
+        if obstacle_overlaps(obstacle, &body) {
+            let problem = format!("the {} stands where the car starts", name_of(obstacle));
+            return fault(Place::Obstacle(i), problem, "move it or the start of the reference path");
+        }
+    }
+    Ok(())
+}
+
+/// The centre line must be drivable ground: a car is put back onto it after a near-collision.
+fn check_route(scenario: &Scenario, route: &Route) -> Result<(), ScenarioError> {
+    for (a, b) in edges(&scenario.boundary) {
+        if let Some(chord) = route.first_chord_near((a.min(b), a.max(b)), |c, d| segments_meet(a, b, c, d)) {
+            let problem = format!("the route leaves the boundary {}", route.place_of(chord));
+            let remedy = "move that point, or the boundary; mind that corner_radius_m rounds corners";
+            return fault(route.vertex_near(chord, &scenario.reference_path), problem, remedy);
+        }
+    }
+    for (i, island) in scenario.islands.iter().enumerate() {
+        let meets_island = |c: Vec2, d: Vec2| {
+            polygon_contains(&island.polygon, d) || edges(&island.polygon).any(|(a, b)| segments_meet(a, b, c, d))
+        };
+        if let Some(chord) = route.first_chord_near(bounds(&island.polygon), meets_island) {
+            let problem = format!("the route runs into island {} {}", i + 1, route.place_of(chord));
+            return fault(route.vertex_near(chord, &scenario.reference_path), problem, "lead it around the island");
+        }
+    }
+    for (i, obstacle) in scenario.obstacles.iter().enumerate() {
+        let [length_m, width_m, _] = obstacle.size_m();
+        let (centre, reach) = (obstacle.centre().position(), Vec2::splat(0.5 * length_m.hypot(width_m)));
+        let meets_obstacle = |c: Vec2, d: Vec2| {
+            if obstacle.class.is_round() {
+                return distance_to_segment(centre, c, d) < 0.5 * length_m;
+            }
+            let outline = obstacle.outline();
+            polygon_contains(&outline, d) || edges(&outline).any(|(a, b)| segments_meet(a, b, c, d))
+        };
+        if let Some(chord) = route.first_chord_near((centre - reach, centre + reach), meets_obstacle) {
+            let problem = format!("the {} stands on the reference path {}", name_of(obstacle), route.place_of(chord));
+            return fault(Place::Obstacle(i), problem, "move it aside, or lead the path around it");
+        }
+    }
+    Ok(())
+}
+
+/// The rounded route in chords, with bounding boxes of runs of them.
+struct Route {
+    points: Vec<Vec2>,
+    spacing_m: f32,
+    blocks: Vec<(Vec2, Vec2)>,
+}
+
+impl Route {
+    fn new(path: &Path) -> Self {
+        let count = (path.length_m() / CHORD_M).ceil() as usize;
+        let spacing_m = path.length_m() / count as f32;
+        let points: Vec<_> = (0..=count).map(|i| path.pose_at(i as f32 * spacing_m).position()).collect();
+        let blocks = (0..count)
+            .step_by(CHORDS_PER_BLOCK)
+            .map(|first| bounds(&points[first..=(first + CHORDS_PER_BLOCK).min(count)]))
+            .collect();
+        Self { points, spacing_m, blocks }
+    }
+
+    /// The first chord that passes `test` among those whose bounding boxes meet `reach`.
+    fn first_chord_near(&self, reach: (Vec2, Vec2), test: impl Fn(Vec2, Vec2) -> bool) -> Option<usize> {
+        let near_blocks = self.blocks.iter().enumerate().filter(|(_, block)| boxes_meet(**block, reach));
+        let chords = self.points.len() - 1;
+        near_blocks.flat_map(|(i, _)| i * CHORDS_PER_BLOCK..((i + 1) * CHORDS_PER_BLOCK).min(chords)).find(|&chord| {
+            let (a, b) = (self.points[chord], self.points[chord + 1]);
+            boxes_meet((a.min(b), a.max(b)), reach) && test(a, b)
+        })
+    }
+
+    fn place_of(&self, chord: usize) -> String {
+        format!("at {}, {:.1} m from the start", at(self.points[chord]), chord as f32 * self.spacing_m)
+    }
+
+    fn vertex_near(&self, chord: usize, path: &ReferencePath) -> Place {
+        let distance = |i: &usize| path.points[*i].distance_squared(self.points[chord]);
+        Place::ReferencePath((0..path.points.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))))
+    }
+}
+
+/// The first two edges of a closed polygon that meet anywhere but at a shared vertex, in order of the first edge.
+fn first_crossing(polygon: &[Vec2]) -> Option<(usize, usize)> {
+    let count = polygon.len();
+    let edge = |i: usize| (polygon[i], polygon[(i + 1) % count]);
+    let span = |i: usize| (edge(i).0.x.min(edge(i).1.x), edge(i).0.x.max(edge(i).1.x));
+    // Edges sorted by their left end: only those that share a range of x are compared.
+    let mut order: Vec<usize> = (0..count).collect();
+    order.sort_by(|&i, &j| span(i).0.total_cmp(&span(j).0));
+    let mut first: Option<(usize, usize)> = None;
+    for (rank, &i) in order.iter().enumerate() {
+        for &j in order[rank + 1..].iter().take_while(|&&j| span(j).0 <= span(i).1) {
+            let (low, high) = (i.min(j), i.max(j));
+            let ((a, b), (c, d)) = (edge(low), edge(high));
+            let meet = if high == low + 1 {
+                folds_back(a, b, d)
+            } else if low == 0 && high == count - 1 {
+                folds_back(c, d, b)
+            } else {
+                segments_meet(a, b, c, d)
+            };
+            if meet && first.is_none_or(|known| (low, high) < known) {
+                first = Some((low, high));
+            }
+        }
+    }
+    first
+}
+
+/// Where two edges that meet do so.
+fn meeting_point(polygon: &[Vec2], i: usize, j: usize) -> Vec2 {
+    let edge = |i: usize| (polygon[i], polygon[(i + 1) % polygon.len()] - polygon[i]);
+    let ((a, ab), (c, cd)) = (edge(i), edge(j));
+    let denominator = ab.perp_dot(cd);
+    // Parallel edges that meet overlap: any common point will do.
+    if denominator == 0.0 { c } else { a + ab * ((c - a).perp_dot(cd) / denominator).clamp(0.0, 1.0) }
+}
+
+/// Whether the edge b→c returns along the edge a→b.
+fn folds_back(a: Vec2, b: Vec2, c: Vec2) -> bool {
+    orientation(a, b, c) == 0.0 && (b - a).dot(c - b) < 0.0
+}
+
+/// Whether two segments share a point; touching counts.
+fn segments_meet(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> bool {
+    if !boxes_meet((a.min(b), a.max(b)), (c.min(d), c.max(d))) {
+        return false;
+    }
+    orientation(a, b, c) * orientation(a, b, d) <= 0.0 && orientation(c, d, a) * orientation(c, d, b) <= 0.0
+}
+
+/// Positive when a, b, c turn left. In double precision, where differences and products of `f32` lose next to nothing.
+fn orientation(a: Vec2, b: Vec2, c: Vec2) -> f64 {
+    (b.as_dvec2() - a.as_dvec2()).perp_dot(c.as_dvec2() - a.as_dvec2())
+}
+
+fn boxes_meet(a: (Vec2, Vec2), b: (Vec2, Vec2)) -> bool {
+    a.0.cmple(b.1).all() && b.0.cmple(a.1).all()
+}
+
+fn bounds(points: &[Vec2]) -> (Vec2, Vec2) {
+    points.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)))
+}
+
+/// Whether an obstacle and a convex counter-clockwise body share ground.
+fn obstacle_overlaps(obstacle: &Obstacle, body: &[Vec2; 4]) -> bool {
+    if obstacle.class.is_round() {
+        let centre = obstacle.centre().position();
+        let radius_m = 0.5 * obstacle.size_m()[0];
+        return polygon_contains(body, centre)
+            || edges(body).any(|(a, b)| distance_to_segment(centre, a, b) < radius_m);
+    }
+    let outline = obstacle.outline();
+    !has_separating_edge(&outline, body) && !has_separating_edge(body, &outline)
+}
+
+/// Whether an edge of a counter-clockwise convex polygon has all of the other one on its outer side.
+fn has_separating_edge(polygon: &[Vec2], other: &[Vec2]) -> bool {
+    edges(polygon).any(|(a, b)| other.iter().all(|&p| orientation(a, b, p) <= 0.0))
+}
+
+fn name_of(obstacle: &Obstacle) -> String {
+    format!("{:?} at {}", obstacle.class, at(obstacle.centre().position())).to_lowercase()
+}
+
+fn at(point: Vec2) -> String {
+    format!("({:.2}, {:.2})", point.x, point.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{Island, NoiseSettings, ObstacleClass, SpeedBump};
+
+    /// A straight lane, 40 m × 6 m, driven from (5, 0) to (30, 0).
+    fn lane() -> Scenario {
+        let corners = [(0.0, -3.0), (40.0, -3.0), (40.0, 3.0), (0.0, 3.0)];
+        Scenario {
+            name: "lane".to_owned(),
+            boundary: corners.map(|(x, y)| Vec2::new(x, y)).to_vec(),
+            reference_path: ReferencePath {
+                points: vec![Vec2::new(5.0, 0.0), Vec2::new(30.0, 0.0)],
+                corner_radius_m: 5.0,
+            },
+            noise: NoiseSettings::default(),
+            islands: Vec::new(),
+            obstacles: vec![obstacle(ObstacleClass::Sedan, 20.0, 2.5)],
+            speed_bumps: vec![SpeedBump { x_m: 12.0, y_m: 0.0, heading_deg: 0.0, length_m: 0.5, width_m: 6.0 }],
+        }
+    }
+
+    fn obstacle(class: ObstacleClass, x_m: f32, y_m: f32) -> Obstacle {
+        Obstacle::new(class, Pose { x_m, y_m, heading_rad: 0.0 })
+    }
+
+    fn island(corners: &[(f32, f32)]) -> Island {
+        Island { polygon: corners.iter().map(|&(x, y)| Vec2::new(x, y)).collect(), height_m: 0.15 }
+    }
+
+    #[test]
+    fn a_sound_lane_is_accepted() {
+        assert_eq!(validate(&lane(), &VehicleParams::hyundai_hg300()), Ok(()));
+    }
+
+    #[test]
+    fn every_fault_is_named_with_its_place_value_and_remedy() {
+        type Break = fn(&mut Scenario);
+        // What breaks it, and what the message must contain.
+        let table: &[(Break, &str)] = &[
+            (|s| s.name.clear(), "name: the name is empty"),
+            (|s| s.name = "a/b".to_owned(), "name: the name \"a/b\" contains '/'"),
+            (|s| s.boundary[2].x = f32::NAN, "boundary, vertex 3: x is NaN"),
+            (|s| s.boundary.truncate(2), "boundary: 2 vertices enclose no ground; give at least 3"),
+            (
+                |s| s.boundary.swap(1, 2),
+                "boundary, vertex 1: the edge from vertex 1 to 2 meets the edge from vertex 3 to 4 near (20.00, 0.00)",
+            ),
+            (|s| s.boundary.push(Vec2::new(0.0, -3.0)), "boundary, vertex 5: vertices 5 and 1 are the same point"),
+            (
+                |s| s.boundary.insert(1, Vec2::new(50.0, -3.0)),
+                "boundary, vertex 1: the edge from vertex 1 to 2 meets the edge from vertex 2 to 3 near (50.00, -3.00)",
+            ),
+            (|s| s.boundary[1].x = 4000.0, "boundary: the lot spans 4000 m"),
+            (|s| s.boundary.iter_mut().for_each(|p| p.y += 9000.0), "boundary: a coordinate is 9003 m from the origin"),
+            (
+                |s| s.boundary.iter_mut().for_each(|p| *p *= 1e-3),
+                "boundary: the outline encloses 0.0002 m²; spread the vertices out",
+            ),
+            (|s| s.islands.push(island(&[(8.0, 1.0), (9.0, 1.0)])), "island 1: 2 vertices"),
+            (
+                |s| s.islands.push(island(&[(8.0, 2.0), (9.0, 2.0), (9.0, 4.0)])),
+                "island 1: its vertex 3, (9.00, 4.00), lies outside",
+            ),
+            (
+                |s| s.islands.push(island(&[(24.0, -1.0), (26.0, -1.0), (26.0, 1.0), (24.0, 1.0)])),
+                "reference_path, point 2: the route runs into island 1 at",
+            ),
+            (
+                |s| s.islands.push(Island { height_m: -0.1, ..island(&[(8.0, 2.0), (9.0, 2.0), (9.0, 2.5)]) }),
+                "island 1: height_m is -0.1; write a number of metres above 0",
+            ),
+            (|s| s.obstacles[0].x_m = f32::INFINITY, "obstacle 1: x_m is inf; write a finite number"),
+            (|s| s.obstacles[0].length_m = Some(0.0), "obstacle 1: length_m is 0; write"),
+            (|s| s.obstacles[0].width_m = Some(185.0), "obstacle 1: width_m is 185; write"),
+            (|s| s.obstacles[0].height_m = Some(f32::NAN), "obstacle 1: height_m is NaN"),
+            (|s| s.speed_bumps[0].length_m = -1.0, "speed_bump 1: length_m is -1"),
+            (|s| s.reference_path.points.truncate(1), "reference_path: the route has 1 points; give at least"),
+            (|s| s.reference_path.points[1].y = f32::NEG_INFINITY, "reference_path, point 2: y is -inf"),
+            (
+                |s| s.reference_path.points.insert(1, Vec2::new(5.0, 0.0)),
+                "reference_path, point 2: points 1 and 2 are the same, (5.00, 0.00); delete",
+            ),
+            (|s| s.reference_path.points[1].x = 8.0, "reference_path: the route is 3.00 m long; make it at least 5 m"),
+            (|s| s.reference_path.points.push(Vec2::new(5.0, 0.1)), "reference_path, point 2: the route turns by 180°"),
+            (|s| s.reference_path.corner_radius_m = -5.0, "reference_path: corner_radius_m is -5"),
+            (
+                |s| s.reference_path.points[1].x = 45.0,
+                "reference_path, point 2: the route leaves the boundary at (39.50, 0.00), 34.5 m from the start",
+            ),
+            (|s| s.reference_path.points[0].x = 1.0, "reference_path, point 1: the car (4.91 m × 1.86 m) does not fit"),
+            (|s| s.reference_path.points[0].y = 2.2, "reference_path, point 1: the car"),
+            (|s| s.reference_path.points[0].x = -9.0, "reference_path, point 1: the car"),
+            (
+                |s| s.obstacles.push(obstacle(ObstacleClass::Cone, 8.9, 0.9)),
+                "obstacle 2: the cone at (8.90, 0.90) stands where the car starts; move it",
+            ),
+            (|s| s.obstacles.push(obstacle(ObstacleClass::Bollard, 6.0, 0.0)), "obstacle 2: the bollard"),
+            (
+                |s| s.obstacles.push(obstacle(ObstacleClass::Van, 20.0, -0.9)),
+                "obstacle 2: the van at (20.00, -0.90) stands on the reference path at (17.00, 0.00), 12.0 m from the start",
+            ),
+            (|s| s.obstacles.push(obstacle(ObstacleClass::Person, 20.0, 0.2)), "obstacle 2: the person at"),
+        ];
+        for (break_it, expected) in table {
+            let mut scenario = lane();
+            break_it(&mut scenario);
+            match validate(&scenario, &VehicleParams::hyundai_hg300()) {
+                Ok(()) => panic!("accepted, expected: {expected}"),
+                Err(error) => {
+                    let message = error.to_string();
+                    assert!(message.starts_with(expected), "got:      {message}\nexpected: {expected}");
+                    assert!(!error.remedy.is_empty());
+                }
+            }
+        }
+    }
+
+    /// A car beside the path or behind the boundary is no fault: that is what lots are full of.
+    #[test]
+    fn neighbours_of_the_route_are_accepted() {
+        let mut scenario = lane();
+        scenario.obstacles.push(obstacle(ObstacleClass::Person, 20.0, -0.3));
+        scenario.obstacles.push(obstacle(ObstacleClass::Cone, 8.9, 1.2));
+        scenario.obstacles.push(obstacle(ObstacleClass::Truck, 20.0, 9.0));
+        assert_eq!(validate(&scenario, &VehicleParams::hyundai_hg300()), Ok(()));
+    }
+
+    /// An island need not contain a vertex of the boundary to cross it: a notch of the boundary can reach into it.
+    #[test]
+    fn an_island_pierced_by_a_notch_of_the_boundary_is_refused() {
+        let mut scenario = lane();
+        let notch = [(32.0, 3.0), (31.9, 1.5), (31.8, 3.0)].map(|(x, y)| Vec2::new(x, y));
+        scenario.boundary.splice(3..3, notch);
+        scenario.islands.push(island(&[(31.0, 1.0), (33.0, 1.0), (33.0, 2.0), (31.0, 2.0)]));
+        let error = validate(&scenario, &VehicleParams::hyundai_hg300()).expect_err("crosses");
+        assert!(error.to_string().starts_with("island 1: it crosses the boundary's edge from vertex 4"), "{error}");
+    }
 }
