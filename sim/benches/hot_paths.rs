@@ -1,0 +1,80 @@
+//! One observation, one control step without a driver, one map. `cargo bench --profile dev -p sim`.
+#![allow(missing_docs, reason = "a benchmark")]
+
+use divan::Bencher;
+use sim::driver::{Decision, LookAheadPoint, Source};
+use sim::episode::{Episode, EpisodeConfig};
+use sim::geometry::{Pose, Vec2};
+use sim::map::Map;
+use sim::scenario::{NoiseLevel, NoiseSettings, Obstacle, ObstacleClass, ReferencePath, Scenario, SpeedBump};
+use sim::seed::RootSeed;
+use sim::sensing::noise::NoiseConfig;
+use sim::sensing::{SensingConfig, Sensor};
+use sim::vehicle::VehicleParams;
+use std::sync::Arc;
+
+fn main() {
+    divan::main();
+}
+
+/// A 200 m lane, 3.2 m wide, with parked cars in stalls on both sides, double-parked noses and bumps.
+fn scenario() -> Scenario {
+    let half = 1.6;
+    let boundary = [(-20.0, -half), (220.0, -half), (220.0, half), (-20.0, half)];
+    let parked = (0..90).flat_map(|i| {
+        [(half + 2.6, 90.0), (-half - 2.6, -90.0)].map(|(y, heading_deg): (f32, f32)| {
+            Obstacle::new(ObstacleClass::Sedan, Pose::new(Vec2::new(2.4 * i as f32, y), heading_deg.to_radians()))
+        })
+    });
+    let noses = (0..10)
+        .map(|i| Obstacle::new(ObstacleClass::Compact, Pose::new(Vec2::new(15.0 + 20.0 * i as f32, half + 0.55), 0.0)));
+    Scenario {
+        name: "bench".into(),
+        boundary: boundary.map(|(x, y)| Vec2::new(x, y)).to_vec(),
+        reference_path: ReferencePath { points: vec![Vec2::ZERO, Vec2::new(200.0, 0.0)], corner_radius_m: 0.0 },
+        noise: NoiseSettings::default(),
+        islands: vec![],
+        obstacles: parked.chain(noses).collect(),
+        speed_bumps: (0..3)
+            .map(|i| SpeedBump { x_m: 60.0 * i as f32, y_m: 0.0, heading_deg: 0.0, length_m: 0.5, width_m: 3.2 })
+            .collect(),
+    }
+}
+
+fn map() -> Arc<Map> {
+    Arc::new(Map::build(scenario(), &VehicleParams::hyundai_hg300()).expect("the lane is sound"))
+}
+
+#[divan::bench(args = [(NoiseLevel::Clean, false), (NoiseLevel::Clean, true), (NoiseLevel::Paper, true), (NoiseLevel::Hard, true)])]
+fn observation(bencher: Bencher<'_, '_>, (level, smear): (NoiseLevel, bool)) {
+    let map = map();
+    let config = SensingConfig { smear, ..SensingConfig::paper() };
+    let mut sensor = Sensor::new(&map, config, &NoiseConfig::of(level), RootSeed(1));
+    let mut tick = 0;
+    bencher.bench_local(|| {
+        tick += 1;
+        let pose = Pose::new(Vec2::new((tick % 1900) as f32 * 0.1, 0.1), 0.05 * (tick as f32 * 0.1).sin());
+        sensor.observe(&map, pose, tick)
+    });
+}
+
+/// Five physics steps with collision checks, the safe ring and the clearance.
+#[divan::bench]
+fn control_step_without_driver(bencher: Bencher<'_, '_>) {
+    let (config, map) = (Arc::new(EpisodeConfig::paper()), map());
+    let start = || Episode::new(Arc::clone(&config), Arc::clone(&map), RootSeed(1));
+    let decision =
+        Decision { look_ahead: LookAheadPoint { ahead_m: 14.0, left_m: 0.0 }, source: Source::Expert, spread: None };
+    let mut episode = start();
+    bencher.bench_local(|| {
+        if episode.ending().is_some() {
+            episode = start();
+        }
+        episode.apply(decision)
+    });
+}
+
+#[divan::bench]
+fn map_build(bencher: Bencher<'_, '_>) {
+    bencher.with_inputs(scenario).bench_local_values(|scenario| Map::build(scenario, &VehicleParams::hyundai_hg300()));
+}

@@ -1,0 +1,204 @@
+//! The vehicle against closed forms, and stop–count–resume against a hand-computed scene.
+#![allow(missing_docs, reason = "tests")]
+
+use sim::driver::{Decision, Driver, LookAheadPoint, Situation, Source};
+use sim::episode::{self, Ending, Episode, EpisodeConfig, Event, Frame};
+use sim::geometry::{Pose, Vec2};
+use sim::map::Map;
+use sim::scenario::{NoiseLevel, NoiseSettings, Obstacle, ObstacleClass, ReferencePath, Scenario};
+use sim::seed::RootSeed;
+use sim::sensing::noise::NoiseConfig;
+use sim::vehicle::{VehicleCommand, VehicleParams, VehicleState, step, step_emergency_stop};
+use std::sync::Arc;
+
+fn drive(mut state: VehicleState, command: VehicleCommand, seconds: f32) -> VehicleState {
+    for _ in 0..(seconds * 100.0).round() as u32 {
+        state = step(&VehicleParams::hyundai_hg300(), state, command, 0.01);
+    }
+    state
+}
+
+#[test]
+fn steady_steering_drives_a_circle_of_radius_l_over_tan_delta() {
+    let params = VehicleParams::hyundai_hg300();
+    for steering_rad in [0.1_f32, -0.3, 0.6] {
+        let start = VehicleState { steering_rad, speed_mps: 1.5, ..VehicleState::at_rest(Pose::default()) };
+        let radius_m = params.wheelbase_m / steering_rad.tan();
+        let mut state = start;
+        for _ in 0..2000 {
+            state = step(&params, state, VehicleCommand { steering_rad, speed_mps: 1.5 }, 0.01);
+            let off_circle_m = state.pose.position().distance(Vec2::new(0.0, radius_m)) - radius_m.abs();
+            assert!(off_circle_m.abs() < 2e-3, "{off_circle_m} m off a circle of {radius_m} m");
+        }
+    }
+}
+
+#[test]
+fn the_wheels_turn_no_faster_than_their_rate() {
+    let command = VehicleCommand { steering_rad: 0.5, speed_mps: 0.0 };
+    let state = drive(VehicleState::at_rest(Pose::default()), command, 1.0);
+    assert!((state.steering_rad - 0.344).abs() < 1e-3);
+    assert!((drive(state, command, 1.0).steering_rad - 0.5).abs() < 1e-6);
+    let beyond = VehicleCommand { steering_rad: 2.0, speed_mps: 0.0 };
+    assert!((drive(state, beyond, 3.0).steering_rad - 35.5_f32.to_radians()).abs() < 1e-6);
+}
+
+#[test]
+fn the_speed_loop_settles_without_exceeding_its_limits() {
+    let mut state = VehicleState::at_rest(Pose::default());
+    let mut fastest_mps = 0.0_f32;
+    for _ in 0..3000 {
+        let before = state;
+        state =
+            step(&VehicleParams::hyundai_hg300(), state, VehicleCommand { steering_rad: 0.0, speed_mps: 2.0 }, 0.01);
+        assert!((-2.0..=1.0).contains(&state.accel_mps2));
+        assert!((state.accel_demand_mps2 - before.accel_demand_mps2).abs() <= 0.02 + 1e-5);
+        fastest_mps = fastest_mps.max(state.speed_mps);
+    }
+    assert!((state.speed_mps - 2.0).abs() < 0.02, "{} m/s", state.speed_mps);
+    assert!(fastest_mps < 2.5, "overshoot to {fastest_mps} m/s");
+}
+
+#[test]
+fn an_emergency_stop_takes_v_squared_over_2a() {
+    let params = VehicleParams::hyundai_hg300();
+    let mut state = VehicleState { speed_mps: 2.2, ..VehicleState::at_rest(Pose::default()) };
+    while state.speed_mps > 0.0 {
+        state = step_emergency_stop(&params, state, 0.01);
+    }
+    assert!((state.pose.x_m - 2.2 * 2.2 / 6.0).abs() < 0.02, "{} m", state.pose.x_m);
+}
+
+/// Drives at a fixed point.
+struct Fixed(LookAheadPoint);
+
+impl Driver for Fixed {
+    fn decide(&mut self, _: &Situation<'_>) -> Decision {
+        Decision { look_ahead: self.0, source: Source::Expert, spread: None }
+    }
+}
+
+fn lane(length_m: f32, obstacles: Vec<Obstacle>) -> Arc<Map> {
+    let end = length_m + 20.0;
+    let boundary = [(-10.0, -4.0), (end, -4.0), (end, 4.0), (-10.0, 4.0)].map(|(x, y)| Vec2::new(x, y)).to_vec();
+    let scenario = Scenario {
+        name: "lane".into(),
+        boundary,
+        reference_path: ReferencePath { points: vec![Vec2::ZERO, Vec2::new(length_m, 0.0)], corner_radius_m: 0.0 },
+        noise: NoiseSettings::default(),
+        islands: vec![],
+        obstacles,
+        speed_bumps: vec![],
+    };
+    Arc::new(Map::build(scenario, &VehicleParams::hyundai_hg300()).unwrap())
+}
+
+fn config() -> Arc<EpisodeConfig> {
+    Arc::new(EpisodeConfig { noise: NoiseConfig::of(NoiseLevel::Clean), ..EpisodeConfig::paper() })
+}
+
+fn run(map: Arc<Map>, point: (f32, f32), config: Arc<EpisodeConfig>) -> (episode::EpisodeReport, Vec<Frame>) {
+    let mut frames = Vec::new();
+    let mut driver = Fixed(LookAheadPoint { ahead_m: point.0, left_m: point.1 });
+    let mut sink = |frame: &Frame| frames.push(*frame);
+    let report = episode::run(Episode::new(config, map, RootSeed(1)), &mut driver, &mut sink);
+    (report, frames)
+}
+
+#[test]
+fn a_free_lane_is_driven_to_its_end() {
+    let (report, frames) = run(lane(50.0, vec![]), (16.3, 0.0), config());
+    assert_eq!(report.ending, Ending::ReachedEnd);
+    assert_eq!((report.metrics.near_collisions, report.metrics.contacts, report.metrics.stuck), (0, 0, 0));
+    assert!((report.metrics.driven_m - 50.0).abs() < 0.3, "{} m", report.metrics.driven_m);
+    // Ahead 16.3 m → a_y 12.5 m → law B saturates at 2.2 m/s.
+    assert!((frames.last().unwrap().vehicle.speed_mps - 2.2).abs() < 0.02);
+    assert_eq!(report.metrics.safe_ratio, 1.0);
+    assert!((report.metrics.clearance_min_m - 3.0).abs() < 0.05); // 4.0 − 0.93, capped at 3
+}
+
+/// A pillar's near face 30 m from the start: the bumper (3.80 m ahead of the axle) is stopped 0.5 m before it, so the
+/// event is counted at x = 30 − 3.8 − 0.5 = 25.7 m, the car brakes for v²/2a, and resumes beyond the pillar.
+#[test]
+fn a_near_collision_is_counted_half_a_metre_before_the_obstacle() {
+    let pillar = Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(30.35, 1.1), 0.0));
+    // Off the centre line, so that the path itself is valid; its inner side (y 0.75) is in the body's way.
+    // At 2.2 m/s the stop takes 2.2²/6 = 0.81 m, more than the 0.5 m left: a contact. At 1.0 m/s it takes 0.17 m.
+    let (fast, _) = run(lane(60.0, vec![pillar.clone()]), (16.3, 0.0), config());
+    assert_eq!((fast.metrics.near_collisions, fast.metrics.contacts), (1, 1), "{fast:?}");
+    let (report, frames) = run(lane(60.0, vec![pillar]), (8.28, 0.0), config());
+    assert_eq!((report.metrics.near_collisions, report.metrics.contacts), (1, 0), "{report:?}");
+    let (tick, Event::NearCollision { at, .. }) = report.events[0] else { panic!("{report:?}") };
+    assert!((at.x_m - 25.7).abs() < 0.03, "counted at {} m", at.x_m);
+    let after = &frames[tick as usize + 1];
+    assert!(after.vehicle.speed_mps == 0.0 && after.vehicle.steering_rad == 0.0, "resumes at rest");
+    // The first reference point from which the body passes: its tail (1.11 m behind the axle) beyond x = 30.7 m.
+    assert!((31.8..32.4).contains(&after.vehicle.pose.x_m), "resumed at {} m", after.vehicle.pose.x_m);
+    assert_eq!(report.ending, Ending::ReachedEnd);
+}
+
+#[test]
+fn a_parked_car_beside_the_path_is_no_near_collision() {
+    // 0.3 m between the body (y −0.93) and the parked car (y −1.23 …): nothing lies on the arc.
+    let parked = Obstacle::new(ObstacleClass::Sedan, Pose::new(Vec2::new(25.0, -1.23 - 0.925), 0.0));
+    let (report, _) = run(lane(60.0, vec![parked]), (16.3, 0.0), config());
+    assert_eq!(report.metrics.near_collisions, 0);
+    assert!((report.metrics.clearance_min_m - 0.3).abs() < 0.03, "{} m", report.metrics.clearance_min_m);
+    assert!(report.metrics.safe_ratio < 1.0);
+}
+
+#[test]
+fn a_car_that_does_not_advance_is_stuck_and_put_back() {
+    // Full lock to the left within an 8 m lane is a circle that would leave the lane; a near-collision is counted, not
+    // a stuck event. In a 60 m wide hall it circles on the spot instead.
+    let mut scenario = lane(40.0, vec![]).scenario().clone();
+    scenario.boundary =
+        [(-30.0, -30.0), (90.0, -30.0), (90.0, 30.0), (-30.0, 30.0)].map(|(x, y)| Vec2::new(x, y)).to_vec();
+    let map = Arc::new(Map::build(scenario, &VehicleParams::hyundai_hg300()).unwrap());
+    let mut short = (*config()).clone();
+    short.metrics.events_max = 3;
+    let (report, _) = run(map, (4.3, 4.3), Arc::new(short));
+    assert_eq!(report.ending, Ending::TooManyEvents);
+    assert_eq!((report.metrics.stuck, report.metrics.near_collisions), (3, 0), "{report:?}");
+}
+
+#[test]
+fn a_run_times_out() {
+    let mut short = (*config()).clone();
+    short.metrics.timeout_s = 2.0;
+    let (report, frames) = run(lane(60.0, vec![]), (16.3, 0.0), Arc::new(short));
+    assert_eq!(report.ending, Ending::TimedOut);
+    assert_eq!(frames.len(), 40);
+}
+
+/// A command takes effect 61 ms after the observation: six physics steps of 10 ms.
+#[test]
+fn commands_reach_the_wheels_after_the_dead_time() {
+    let moved_after_ticks = |dead_time_s| {
+        let mut config = (*config()).clone();
+        config.vehicle.dead_time_s = dead_time_s;
+        let mut episode = Episode::new(Arc::new(config), lane(60.0, vec![]), RootSeed(1));
+        let decision =
+            Decision { look_ahead: LookAheadPoint { ahead_m: 8.0, left_m: 2.0 }, source: Source::Expert, spread: None };
+        (0..10)
+            .find(|_| {
+                episode.observe();
+                episode.apply(decision);
+                episode.vehicle().steering_rad > 0.0
+            })
+            .unwrap()
+    };
+    assert_eq!(moved_after_ticks(0.0), 0);
+    assert_eq!(moved_after_ticks(0.061), 1);
+    assert_eq!(moved_after_ticks(0.110), 2);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_frames() {
+    let noisy = Arc::new(EpisodeConfig::paper());
+    let frames = || {
+        let (_, frames) = run(lane(40.0, vec![]), (16.3, 0.1), Arc::clone(&noisy));
+        frames.iter().map(|frame| (frame.observation, frame.vehicle)).collect::<Vec<_>>()
+    };
+    assert_eq!(frames(), frames());
+}

@@ -1,0 +1,183 @@
+//! The fast grid against brute force, noise anchored in the world, and ASCII art of a known lot.
+#![allow(missing_docs, reason = "tests")]
+
+use sim::geometry::{Pose, Vec2};
+use sim::map::Map;
+use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, ReferencePath, Scenario, SpeedBump};
+use sim::seed::RootSeed;
+use sim::sensing::noise::NoiseConfig;
+use sim::sensing::{CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid, SensingConfig, Sensor};
+use sim::vehicle::VehicleParams;
+
+/// A 5 m lane along x with a parked car on the right, a cone on the left and a speed bump.
+fn lane() -> Map {
+    let boundary = [(-10.0, -2.5), (90.0, -2.5), (90.0, 2.5), (-10.0, 2.5)];
+    let obstacle = |class, x, y| Obstacle::new(class, Pose::new(Vec2::new(x, y), 0.0));
+    let scenario = Scenario {
+        name: "lane".into(),
+        boundary: boundary.map(|(x, y)| Vec2::new(x, y)).to_vec(),
+        reference_path: ReferencePath { points: vec![Vec2::new(0.0, 0.0), Vec2::new(60.0, 0.0)], corner_radius_m: 0.0 },
+        noise: sim::scenario::NoiseSettings::default(),
+        islands: vec![],
+        obstacles: vec![
+            obstacle(ObstacleClass::Sedan, 20.0, -1.9),
+            obstacle(ObstacleClass::Cone, 30.0, 2.0),
+            obstacle(ObstacleClass::Person, 40.0, -2.0),
+        ],
+        speed_bumps: vec![SpeedBump { x_m: 25.0, y_m: 0.0, heading_deg: 0.0, length_m: 0.8, width_m: 5.0 }],
+    };
+    Map::build(scenario, &VehicleParams::hyundai_hg300()).unwrap()
+}
+
+fn sensor(map: &Map, level: NoiseLevel, seed: u64) -> Sensor {
+    let no_dropout = NoiseConfig { dropout: 0.0, ..NoiseConfig::of(level) };
+    Sensor::new(map, SensingConfig::paper(), &no_dropout, RootSeed(seed))
+}
+
+#[test]
+fn the_fast_grid_is_the_max_pool_of_the_brute_force_view() {
+    let map = lane();
+    for (level, seed) in [(NoiseLevel::Clean, 1), (NoiseLevel::Paper, 2), (NoiseLevel::Paper, 3), (NoiseLevel::Hard, 4)]
+    {
+        let mut sensor = sensor(&map, level, seed);
+        for i in 0..120_u32 {
+            let pose = Pose::new(Vec2::new(i as f32 * 0.5, (i as f32 * 0.37).sin()), (i as f32 * 0.21).sin() * 0.9);
+            let tick = 7 * i;
+            let fast = sensor.observe(&map, pose, tick).grid;
+            let brute = sensor.perceived_view(&map, pose, tick).to_grid();
+            assert_eq!(fast, brute, "{level:?}, seed {seed}, tick {tick}\n{fast}\n{brute}");
+        }
+    }
+}
+
+#[test]
+fn a_straight_lane_looks_like_one() {
+    let boundary = [(-10.0, -1.5), (90.0, -1.5), (90.0, 1.5), (-10.0, 1.5)].map(|(x, y)| Vec2::new(x, y)).to_vec();
+    let reference_path = ReferencePath { points: vec![Vec2::ZERO, Vec2::new(60.0, 0.0)], corner_radius_m: 0.0 };
+    let scenario = Scenario {
+        name: "narrow".into(),
+        boundary,
+        reference_path,
+        noise: sim::scenario::NoiseSettings::default(),
+        islands: vec![],
+        obstacles: vec![],
+        speed_bumps: vec![],
+    };
+    let map = Map::build(scenario, &VehicleParams::hyundai_hg300()).unwrap();
+    let grid = sensor(&map, NoiseLevel::Clean, 0).observe(&map, Pose::default(), 0).grid;
+    // Cells are 0.48 m: |y| ≤ 1.5 m holds the five cells of centre |y| ≤ 0.96 whole, and no more.
+    for row in 0..GRID_CELLS {
+        for col in 0..GRID_CELLS {
+            assert_eq!(!grid.is_occupied(row, col), (10..=14).contains(&col), "({row}, {col})\n{grid}");
+        }
+    }
+}
+
+#[test]
+fn a_turned_grid_is_the_view_of_the_turned_car() {
+    // The world mirrored about the vehicle axis gives the mirrored grid.
+    let map = lane();
+    let grid = sensor(&map, NoiseLevel::Clean, 0).observe(&map, Pose::new(Vec2::new(8.0, 0.0), 0.0), 0).grid;
+    // The sedan (x 17.65–22.35, y −2.8…−0.97) lies 8.35 m … beyond the patch ahead, on the right: columns > 12.
+    let geometry = GridGeometry::paper();
+    let row_of = |ahead_m: f32| ((geometry.far_edge_ahead_m() - ahead_m) / geometry.cell_m()) as usize;
+    assert!(grid.is_occupied(row_of(12.0), 14) && !grid.is_occupied(row_of(12.0), 11), "{grid}");
+    assert!(!grid.is_occupied(row_of(9.0), 14), "{grid}");
+    assert_eq!(grid.mirrored().mirrored(), grid);
+    assert!(grid.mirrored().is_occupied(row_of(12.0), 10));
+}
+
+#[test]
+fn things_hide_the_ground_behind_them_only_when_smear_is_on() {
+    let map = lane();
+    let occupied = |smear| {
+        let config = SensingConfig { smear, ..SensingConfig::paper() };
+        let mut sensor = Sensor::new(&map, config, &NoiseConfig::of(NoiseLevel::Clean), RootSeed(0));
+        sensor.observe(&map, Pose::new(Vec2::new(10.0, 0.0), 0.0), 0).grid.count_occupied()
+    };
+    assert!(occupied(true) > occupied(false));
+}
+
+/// Errors belong to places: the misread ground stays where it is while the car drives by.
+#[test]
+fn a_shadow_stays_where_it_is_while_the_car_drives_by() {
+    let map = lane();
+    let only_shadows = NoiseConfig {
+        boundary: 0.0,
+        speed_bump: 0.0,
+        false_free: 0.0,
+        blob: 0.0,
+        stain: 0.0,
+        flicker: 0.0,
+        dropout: 0.0,
+        ..NoiseConfig::of(NoiseLevel::Hard)
+    };
+    let config = SensingConfig { smear: false, ..SensingConfig::paper() };
+    let sensor = Sensor::new(&map, config, &only_shadows, RootSeed(5));
+    let geometry = GridGeometry::paper();
+    let wrong_at = |pose: Pose| {
+        let (noisy, clean) = (sensor.perceived_view(&map, pose, 3), sensor.clean_view(&map, pose));
+        let mut points = Vec::new();
+        for row in 0..sim::sensing::BEV_PIXELS {
+            for col in 0..sim::sensing::BEV_PIXELS {
+                if noisy.is_occupied(row, col) != clean.is_occupied(row, col) {
+                    points.push(pose.world_from_ego().point(geometry.pixel_in_ego(row, col)));
+                }
+            }
+        }
+        points
+    };
+    let mut compared = 0;
+    for x_m in [5.0, 15.0, 25.0, 35.0] {
+        // The same ground seen from two poses, 2.4 m apart (40 whole pixels).
+        let (here, there) =
+            (wrong_at(Pose::new(Vec2::new(x_m, 0.0), 0.0)), wrong_at(Pose::new(Vec2::new(x_m + 2.4, 0.0), 0.0)));
+        let both_see = |p: &&Vec2| p.x > x_m + 2.4 + 4.4 && p.x < x_m + 16.2;
+        let n_here = here.iter().filter(both_see).count();
+        let n_there = there.iter().filter(both_see).count();
+        assert!(n_here.abs_diff(n_there) <= 2 + n_here / 50, "{n_here} and {n_there} pixels at {x_m} m");
+        compared += n_here;
+    }
+    assert!(compared > 200, "the test saw only {compared} misread pixels");
+}
+
+#[test]
+fn noise_does_not_depend_on_who_looked_before() {
+    let map = lane();
+    let pose = Pose::new(Vec2::new(12.0, 0.3), 0.1);
+    let mut fresh = sensor(&map, NoiseLevel::Paper, 9);
+    let mut used = sensor(&map, NoiseLevel::Paper, 9);
+    for tick in 0..50 {
+        used.observe(&map, Pose::new(Vec2::new(tick as f32, 0.0), 0.0), tick);
+    }
+    assert_eq!(fresh.observe(&map, pose, 77), used.observe(&map, pose, 77));
+}
+
+#[test]
+fn clean_level_is_clean_and_hard_is_worse_than_paper() {
+    let map = lane();
+    let accuracy = |level| {
+        let mut sum = 0.0;
+        for seed in 0..20 {
+            let sensor = sensor(&map, level, seed);
+            let pose = Pose::new(Vec2::new(3.0 * seed as f32, 0.0), 0.0);
+            sum += sensor.perceived_view(&map, pose, 100).pixel_accuracy(&sensor.clean_view(&map, pose));
+        }
+        sum / 20.0
+    };
+    assert_eq!(accuracy(NoiseLevel::Clean), 1.0);
+    assert!(accuracy(NoiseLevel::Hard) < accuracy(NoiseLevel::Paper) - 0.002);
+}
+
+#[test]
+fn grids_round_trip_through_cells() {
+    let mut grid = OccupancyGrid::free();
+    grid.set_occupied(0, 24);
+    grid.set_occupied(24, 0);
+    grid.occupy_row(3, 0b101);
+    let cells: Vec<u8> = grid.cells().collect();
+    assert_eq!(cells.len(), GRID_CELLS * GRID_CELLS);
+    assert_eq!(OccupancyGrid::from_cells(&cells), grid);
+    assert_eq!(cells[3 * GRID_CELLS], 1);
+    assert_eq!(GRID_CELLS * CELL_PIXELS, 200);
+}
