@@ -62,7 +62,7 @@ fn train<const NET: usize>(bencher: Bencher<'_, '_>, batch: usize) {
     bencher.counter(ItemsCount::new(batch * STEPS as usize)).bench_local(|| {
         let mut progress = |_: &FitProgress| ControlFlow::Continue(());
         let geometry = GridGeometry::paper();
-        fit(start.clone(), &dataset, &settings, &geometry, DeviceChoice::Cpu, RootSeed(1), &mut progress)
+        fit(start.clone(), &dataset, &settings, geometry, DeviceChoice::Cpu, RootSeed(1), &mut progress)
     });
 }
 

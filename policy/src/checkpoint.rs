@@ -50,6 +50,9 @@ impl Checkpoint {
     }
 
     /// Writes both files into a folder; the numbers last, so that their presence means a finished checkpoint.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
     pub fn save(&self, folder: &Path) -> Result<(), StoreError> {
         fs::create_dir_all(folder)
             .map_err(|error| StoreError::new(folder, error, "check that the parent folder is writable"))?;

@@ -337,7 +337,7 @@ impl Run<'_, '_> {
         let seed = self.seed.child(Stream::Shuffle, index);
         let progress = &mut *self.hooks.progress;
         let mut on_step = |fit: &FitProgress| progress(&Progress::Fitting { round, fit });
-        let (geometry, device) = (&self.config.geometry, self.config.device);
+        let (geometry, device) = (self.config.geometry, self.config.device);
         let FitOutcome { weights, report } = fit::fit(start, d, settings, geometry, device, seed, &mut on_step)
             .map_err(|source| DaggerError::Fit { round: round.unwrap_or(u32::MAX), source })?;
         if report.stopped {

@@ -23,7 +23,7 @@ impl Fleet for NetFleet {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
         let predictions = self.predictor.predict(&grids);
-        decisions.extend(predictions.iter().map(|prediction| novice_decision(prediction, &self.geometry)));
+        decisions.extend(predictions.iter().map(|prediction| novice_decision(prediction, self.geometry)));
     }
 }
 
@@ -41,12 +41,12 @@ impl NetPolicy {
 impl Policy for NetPolicy {
     fn act(&mut self, observation: &Observation) -> Decision {
         let prediction = self.0.predictor.predict(&[&observation.grid])[0];
-        novice_decision(&prediction, &self.0.geometry)
+        novice_decision(&prediction, self.0.geometry)
     }
 }
 
 /// What the network's answer means to the controller.
-pub(crate) fn novice_decision(prediction: &Prediction, geometry: &GridGeometry) -> Decision {
+pub(crate) fn novice_decision(prediction: &Prediction, geometry: GridGeometry) -> Decision {
     Decision {
         look_ahead: prediction.look_ahead(geometry),
         source: Source::Novice,

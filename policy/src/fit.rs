@@ -224,7 +224,7 @@ pub fn fit(
     start: Weights,
     dataset: &Dataset,
     settings: &FitSettings,
-    geometry: &GridGeometry,
+    geometry: GridGeometry,
     device: DeviceChoice,
     seed: RootSeed,
     progress: &mut dyn FnMut(&FitProgress) -> ControlFlow<()>,
@@ -290,7 +290,7 @@ pub fn evaluate(
     weights: &Weights,
     samples: &[Sample],
     loss: &LossSettings,
-    geometry: &GridGeometry,
+    geometry: GridGeometry,
     device: DeviceChoice,
 ) -> Validation {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();

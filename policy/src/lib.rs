@@ -4,8 +4,8 @@
 //! |---|---|
 //! | [`network`] | the driving policy network: two convolutions with pooling, 1000, 4 |
 //! | [`loss`] | equations for the loss: Gaussian log-likelihood with the gain (1 + α τ̂) |
-//! | [`dataset`] | the data set D = D_BC ∪ D_1 ∪ …, in memory and on disk |
-//! | [`fit`] | "train policy π_net on D": behaviour cloning is one call, a `DAgger` iteration another |
+//! | [`dataset`] | the data set D = `D_BC` ∪ `D_1` ∪ …, in memory and on disk |
+//! | [`fit`] | "train policy `π_net` on D": behaviour cloning is one call, a `DAgger` iteration another |
 //! | [`decision_rule`] | Algorithm 2, line 9: may the network drive this tick? |
 //! | [`dagger`] | Algorithms 1 and 2, top to bottom |
 //! | [`drivers`] | the trained network at the wheel |

@@ -103,6 +103,9 @@ impl LookAheadNetConfig {
     }
 
     /// Checks what the arithmetic relies on.
+    ///
+    /// # Errors
+    /// The first value that is impossible.
     pub fn validate(&self) -> Result<(), NetworkError> {
         for (layer, conv) in [("conv1", self.conv1), ("conv2", self.conv2)] {
             if conv.channels == 0 || conv.channels % fast::LANES != 0 {

@@ -109,7 +109,7 @@ impl Fleet for Arbiter {
             self.tau_hat_sum += f64::from(evidence.discrepancy);
             let trusts_novice = self.rule.trusts_novice(&evidence); // line 9
             if trusts_novice {
-                decisions.push(novice_decision(&predicted, &self.geometry)); // line 10
+                decisions.push(novice_decision(&predicted, self.geometry)); // line 10
                 self.n_net += 1; // line 11
             } else {
                 decisions.push(expert); // line 14

@@ -51,6 +51,9 @@ pub struct Store {
 
 impl Store {
     /// Opens or creates the folder.
+    ///
+    /// # Errors
+    /// If it cannot be created.
     pub fn open(folder: &Path) -> Result<Self, StoreError> {
         fs::create_dir_all(folder).map_err(|error| StoreError::new(folder, error, WRITE_REMEDY))?;
         Ok(Self { folder: folder.to_path_buf() })

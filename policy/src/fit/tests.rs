@@ -32,7 +32,7 @@ fn settings(steps: u32) -> FitSettings {
 fn train(dataset: &Dataset, settings: &FitSettings, device: DeviceChoice) -> FitOutcome {
     let start = Weights::init(tiny(), RootSeed(1), 0);
     let mut progress = |_: &FitProgress| ControlFlow::Continue(());
-    fit(start, dataset, settings, &GridGeometry::paper(), device, RootSeed(2), &mut progress).unwrap()
+    fit(start, dataset, settings, GridGeometry::paper(), device, RootSeed(2), &mut progress).unwrap()
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn a_readable_rule_is_learned() {
     let dataset = dataset(1500);
     let start = Weights::init(tiny(), RootSeed(1), 0);
     let held_back = dataset.split(settings(1).validation).validation;
-    let before = evaluate(&start, &held_back, &LossSettings::paper(), &GridGeometry::paper(), DeviceChoice::Cpu);
+    let before = evaluate(&start, &held_back, &LossSettings::paper(), GridGeometry::paper(), DeviceChoice::Cpu);
     let outcome = train(&dataset, &settings(400), DeviceChoice::Cpu);
     let after = outcome.report.validation.unwrap();
     assert!(after.rmse_m < 0.4 * before.rmse_m, "{before:?} {:?}", outcome.report);
@@ -69,7 +69,7 @@ fn the_number_of_shards_changes_only_roundings() {
         let start = Weights::init(no_dropout, RootSeed(1), 0);
         let mut progress = |_: &FitProgress| ControlFlow::Continue(());
         let geometry = GridGeometry::paper();
-        fit(start, &dataset, &settings, &geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress).unwrap()
+        fit(start, &dataset, &settings, geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress).unwrap()
     };
     let (one, three) = (with_shards(1).report, with_shards(3).report);
     let (one, three) = (one.validation.unwrap(), three.validation.unwrap());
@@ -96,8 +96,7 @@ fn a_stop_keeps_what_was_learned() {
         if now.step == 7 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let geometry = GridGeometry::paper();
-    let outcome =
-        fit(start, &dataset, &settings(50), &geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress).unwrap();
+    let outcome = fit(start, &dataset, &settings(50), geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress).unwrap();
     assert!(outcome.report.stopped);
     assert_eq!((outcome.report.steps, outcome.report.kept_step), (7, 7));
     assert_eq!(seen.last(), Some(&(7, 7 * 33)));
@@ -110,7 +109,7 @@ fn the_best_weights_are_those_reported() {
     let outcome = train(&dataset, &settings, DeviceChoice::Cpu);
     let best = outcome.report.curve.iter().map(|point| point.validation.unwrap().loss).fold(f32::INFINITY, f32::min);
     let held_back = dataset.split(settings.validation).validation;
-    let again = evaluate(&outcome.weights, &held_back, &settings.loss, &GridGeometry::paper(), DeviceChoice::Cpu);
+    let again = evaluate(&outcome.weights, &held_back, &settings.loss, GridGeometry::paper(), DeviceChoice::Cpu);
     assert_eq!(outcome.report.validation, Some(again));
     assert_eq!(again.loss, best);
 }
@@ -121,7 +120,7 @@ fn nothing_to_learn_from_is_an_error() {
     let mut progress = |_: &FitProgress| ControlFlow::Continue(());
     let geometry = GridGeometry::paper();
     let empty = Dataset::default();
-    let error = fit(start, &empty, &settings(1), &geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress);
+    let error = fit(start, &empty, &settings(1), geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress);
     assert!(matches!(error, Err(FitError::NoTrainingSamples { samples: 0, .. })));
 }
 

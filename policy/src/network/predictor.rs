@@ -70,12 +70,12 @@ impl Prediction {
     }
 
     /// The point to drive to.
-    pub fn look_ahead(&self, geometry: &GridGeometry) -> LookAheadPoint {
-        LookAheadPoint::from_image_fraction(self.clipped_mean(), geometry)
+    pub fn look_ahead(&self, geometry: GridGeometry) -> LookAheadPoint {
+        LookAheadPoint::from_image_fraction(self.clipped_mean(), &geometry)
     }
 
     /// The standard deviation in metres.
-    pub fn spread(&self, geometry: &GridGeometry) -> Spread {
+    pub fn spread(&self, geometry: GridGeometry) -> Spread {
         Spread { ahead_m: self.sigma[1] * geometry.side_m, left_m: self.sigma[0] * geometry.side_m }
     }
 }
@@ -223,8 +223,8 @@ mod tests {
         let geometry = GridGeometry::paper();
         let prediction = Prediction::from_raw([0.5, -0.2, -3.8, -3.8]);
         assert_eq!(prediction.mean, [0.5, -0.2]);
-        let point = prediction.look_ahead(&geometry);
+        let point = prediction.look_ahead(geometry);
         assert_eq!(point, LookAheadPoint { ahead_m: geometry.far_edge_ahead_m(), left_m: 0.0 });
-        assert!((prediction.spread(&geometry).left_m - 12.0 * prediction.sigma[0]).abs() < 1e-6);
+        assert!((prediction.spread(geometry).left_m - 12.0 * prediction.sigma[0]).abs() < 1e-6);
     }
 }
