@@ -11,6 +11,9 @@ pub const NODE_M: f32 = 0.1;
 pub const CAP_M: f32 = 3.0;
 /// The gradient of a bilinear interpolant of a 1-Lipschitz function is at most √2.
 pub const LIPSCHITZ: f32 = std::f32::consts::SQRT_2;
+/// Largest difference between a look-up at the nearest node and an interpolated one: half a diagonal away, times
+/// [`LIPSCHITZ`].
+pub const NEAREST_NODE_M: f32 = NODE_M;
 
 /// Signed distance to the non-drivable set, metres: positive in drivable space.
 #[derive(Debug, Clone)]
@@ -60,23 +63,24 @@ impl DistanceField {
         let node = (point - self.origin) * (1.0 / NODE_M);
         let x = node.x.clamp(0.0, (self.cols - 2) as f32);
         let y = node.y.clamp(0.0, (self.rows - 2) as f32);
-        let (col, row) = (x as usize, y as usize);
+        // i32 first: a saturating cast to a 64-bit unsigned costs several instructions more.
+        let (col, row) = (x as i32, y as i32);
         let (fx, fy) = ((x - col as f32).min(1.0), (y - row as f32).min(1.0));
-        let base = row * self.cols + col;
-        let near = &self.values_m[base..base + 2];
-        let far = &self.values_m[base + self.cols..base + self.cols + 2];
-        let a = near[0] + fx * (near[1] - near[0]);
-        let b = far[0] + fx * (far[1] - far[0]);
+        let base = row as usize * self.cols + col as usize;
+        let [a, b] = [base, base + self.cols].map(|start| {
+            let &[left, right] = self.values_m[start..].first_chunk::<2>().expect("clamped to the raster");
+            left + fx * (right - left)
+        });
         a + fy * (b - a)
     }
 
-    /// Signed distance at the nearest node, metres: within 0.071 m of [`Self::at`], and twice as fast.
+    /// Signed distance at the nearest node, metres: within [`NEAREST_NODE_M`] of [`Self::at`], and much faster.
     #[inline]
     pub fn at_nearest_node(&self, point: Vec2) -> f32 {
         let node = (point - self.origin) * (1.0 / NODE_M) + Vec2::splat(0.5);
-        let col = (node.x.max(0.0) as usize).min(self.cols - 1);
-        let row = (node.y.max(0.0) as usize).min(self.rows - 1);
-        self.values_m[row * self.cols + col]
+        let col = node.x.clamp(0.0, (self.cols - 1) as f32) as i32;
+        let row = node.y.clamp(0.0, (self.rows - 1) as f32) as i32;
+        self.values_m[row as usize * self.cols + col as usize]
     }
 
     /// Lower-left and upper-right corners of the raster, world metres.

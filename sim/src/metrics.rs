@@ -1,7 +1,7 @@
 //! What is measured on a run (methods.md 8): always on the clean map.
 
 use crate::collision::ObstacleSet;
-use crate::distance_field::{DistanceField, LIPSCHITZ};
+use crate::distance_field::{DistanceField, LIPSCHITZ, NEAREST_NODE_M};
 use crate::driver::Source;
 use crate::episode::{Event, Frame};
 use crate::geometry::{Pose, Vec2, distance_to_segment, edges, polygon_contains};
@@ -116,11 +116,12 @@ impl SafeRing {
     /// Share of the range that is drivable, 0…1: N_dri / N_ran.
     pub fn safe_ratio(&self, distance: &DistanceField, pose: Pose, pixel_m: f32) -> f32 {
         let world_from_ego = pose.world_from_ego();
-        // A block whose centre is farther from a boundary than its half diagonal is decided by one look-up.
-        let sure_m = LIPSCHITZ * std::f32::consts::FRAC_1_SQRT_2 * pixel_m * BLOCK as f32;
+        // A block whose centre is farther from a boundary than its corner pixels are from it is decided by one look-up.
+        let to_corner_m = std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (BLOCK - 1) as f32;
+        let sure_m = LIPSCHITZ * to_corner_m + NEAREST_NODE_M;
         let mut drivable = 0;
         for block in &self.blocks {
-            let centre_m = distance.at(world_from_ego.point(block.centre));
+            let centre_m = distance.at_nearest_node(world_from_ego.point(block.centre));
             drivable += if centre_m > sure_m {
                 block.pixels.len()
             } else if centre_m < -sure_m {

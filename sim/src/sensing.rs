@@ -112,6 +112,12 @@ impl OccupancyGrid {
         self.rows[row] |= mask & Self::ROW_MASK;
     }
 
+    /// The cells of a row, bit = column.
+    #[inline]
+    pub fn row(&self, row: usize) -> u32 {
+        self.rows[row]
+    }
+
     /// The same scene seen in a mirror: left and right swapped.
     #[must_use]
     pub fn mirrored(&self) -> Self {

@@ -208,20 +208,18 @@ impl NoiseField {
         field
     }
 
-    /// Shift of the signed distance at a place, metres; `ahead_of_patch_m` is the distance from its lower edge.
-    #[inline]
-    pub(super) fn boundary_shift_m(&self, place: Vec2, ahead_of_patch_m: f32, tick: u32) -> f32 {
-        if self.wobble == 0.0 {
-            return 0.0;
-        }
+    /// The boundary wobble within a circle of the world at a tick.
+    pub(super) fn boundary_shift(&self, centre: Vec2, radius_m: f32, tick: u32) -> BoundaryShift {
         let (static_m, static_corr_m) = WOBBLE_STATIC;
         let (moving_m, moving_corr_m) = WOBBLE_MOVING;
-        let shift_m = static_m * value_noise(self.seed, place / static_corr_m, 0.0)
-            + moving_m * value_noise(self.seed ^ 7, place / moving_corr_m, tick as f32 / WOBBLE_TICKS);
-        self.wobble * shift_m * (1.0 + ahead_of_patch_m / WOBBLE_RANGE_M)
+        let time = tick as f32 / WOBBLE_TICKS;
+        BoundaryShift {
+            lasting: Lattice::new(self.seed, static_corr_m, self.wobble * static_m, centre, radius_m, 0.0),
+            moving: Lattice::new(self.seed ^ 7, moving_corr_m, self.wobble * moving_m, centre, radius_m, time),
+        }
     }
 
-    /// Bound of [`Self::boundary_shift_m`] at a range, metres.
+    /// Bound of [`BoundaryShift::at`] at a range, metres.
     #[inline]
     pub(super) fn boundary_shift_max_m(&self, ahead_of_patch_m: f32) -> f32 {
         self.wobble * (WOBBLE_STATIC.0 + WOBBLE_MOVING.0) * VALUE_NOISE_MAX * (1.0 + ahead_of_patch_m / WOBBLE_RANGE_M)
@@ -352,6 +350,70 @@ impl NoiseField {
     }
 }
 
+/// The boundary wobble around one view.
+pub(super) struct BoundaryShift {
+    lasting: Lattice,
+    moving: Lattice,
+}
+
+impl BoundaryShift {
+    /// Shift of the signed distance at a place, metres; `ahead_of_patch_m` is the distance from the patch's lower edge.
+    #[inline]
+    pub(super) fn at(&self, place: Vec2, ahead_of_patch_m: f32) -> f32 {
+        (self.lasting.at(place) + self.moving.at(place)) * (1.0 + ahead_of_patch_m / WOBBLE_RANGE_M)
+    }
+}
+
+/// Nodes per side of a [`Lattice`]: the patch's diagonal at 1 m spacing and one more on either side.
+const LATTICE_NODES: usize = 20;
+
+/// Value noise around a place at one instant: the nodes are hashed once, then looked up.
+struct Lattice {
+    origin: Vec2,
+    per_m: f32,
+    nodes: [[f32; LATTICE_NODES]; LATTICE_NODES],
+}
+
+impl Lattice {
+    fn new(seed: u64, spacing_m: f32, amplitude: f32, centre: Vec2, radius_m: f32, time: f32) -> Self {
+        let first = ((centre - Vec2::splat(radius_m)) / spacing_m).floor();
+        let used = ((2.0 * radius_m / spacing_m) as usize + 3).min(LATTICE_NODES);
+        let (tick, phase) = (time as i32, fade(time.fract()));
+        let mut nodes = [[0.0; LATTICE_NODES]; LATTICE_NODES];
+        if amplitude != 0.0 {
+            for (row, values) in nodes.iter_mut().enumerate().take(used) {
+                for (col, value) in values.iter_mut().enumerate().take(used) {
+                    let at =
+                        |dt: i32| unit(hash(seed, first.x as i32 + col as i32, first.y as i32 + row as i32, tick + dt));
+                    let now = if phase == 0.0 { at(0) } else { at(0) * (1.0 - phase) + at(1) * phase };
+                    *value = amplitude * (2.0 * now - 1.0) * VALUE_NOISE_MAX;
+                }
+            }
+        }
+        Self { origin: first * spacing_m, per_m: 1.0 / spacing_m, nodes }
+    }
+
+    #[inline]
+    fn at(&self, place: Vec2) -> f32 {
+        let node = ((place - self.origin) * self.per_m).max(Vec2::ZERO);
+        let last = LATTICE_NODES as i32 - 2;
+        let (col, row) = ((node.x as i32).min(last), (node.y as i32).min(last));
+        let (fx, fy) = (fade(node.x - col as f32), fade(node.y - row as f32));
+        let [near, far] = [row, row + 1].map(|row| {
+            let values = &self.nodes[row as usize];
+            let (left, right) = (values[col as usize], values[col as usize + 1]);
+            left + fx * (right - left)
+        });
+        near + fy * (far - near)
+    }
+}
+
+/// Cubic fade from 0 to 1.
+#[inline]
+fn fade(t: f32) -> f32 {
+    t * t * (3.0 - 2.0 * t)
+}
+
 /// A place on the route and the free half-width there.
 struct Place {
     pose: Pose,
@@ -382,7 +444,6 @@ const VALUE_NOISE_MAX: f32 = 2.33;
 /// Smooth noise of about unit variance (averaged over places) on a unit lattice in space and time.
 fn value_noise(seed: u64, place: Vec2, time: f32) -> f32 {
     let (cell, t0) = (place.floor(), time.floor());
-    let fade = |t: f32| t * t * (3.0 - 2.0 * t);
     let (fx, fy, ft) = (fade(place.x - cell.x), fade(place.y - cell.y), fade(time - t0));
     let corner = |dx: i32, dy: i32, dt: i32| unit(hash(seed, cell.x as i32 + dx, cell.y as i32 + dy, t0 as i32 + dt));
     let plane = |dt: i32| {

@@ -4,7 +4,7 @@ use super::noise::{NoiseConfig, NoiseField, Patch, Reads, Region, Shadow};
 use super::quadtree::PixelLattice;
 use super::smear::{ConvexInEgo, hidden_ground};
 use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
-use crate::distance_field::LIPSCHITZ;
+use crate::distance_field::{LIPSCHITZ, NEAREST_NODE_M};
 use crate::geometry::{Pose, Vec2, WorldFromEgo};
 use crate::map::Map;
 use crate::seed::RootSeed;
@@ -60,17 +60,19 @@ impl Sensor {
         let geometry = &self.config.geometry;
         let ego = EgoView::new(geometry, pose);
         let openings = self.openings(&ego, tick);
+        let shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
         let mut grid = OccupancyGrid::free();
         for row in 0..GRID_CELLS {
             let ahead_of_patch_m = geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m;
             // A cell whose centre is this far from a boundary is decided without looking at the noise.
             let sure_m = self.noise.boundary_shift_max_m(ahead_of_patch_m)
-                + LIPSCHITZ * geometry.cell_m() * std::f32::consts::FRAC_1_SQRT_2;
+                + LIPSCHITZ * geometry.cell_m() * std::f32::consts::FRAC_1_SQRT_2
+                + NEAREST_NODE_M;
             let mut occupied = 0;
             for col in 0..GRID_CELLS {
                 let centre = ego.lattice.cell_centre(row, col);
-                let centre_m = map.signed_distance_m(centre);
-                let shift_m = || self.noise.boundary_shift_m(centre, ahead_of_patch_m, tick);
+                let centre_m = map.distance_field().at_nearest_node(centre);
+                let shift_m = || shift.at(centre, ahead_of_patch_m);
                 let is_occupied = if centre_m > sure_m {
                     false
                 } else if let Some(opened) = openings.as_ref().filter(|opened| opened.touch_cell(row, col)) {
@@ -78,7 +80,7 @@ impl Sensor {
                 } else if centre_m < -sure_m {
                     true
                 } else {
-                    ego.lattice.any_below(map.distance_field(), row, col, -shift_m(), centre_m)
+                    ego.lattice.any_below(map.distance_field(), row, col, -shift_m())
                 };
                 occupied |= u32::from(is_occupied) << col;
             }
@@ -123,11 +125,12 @@ impl Sensor {
                 }
             });
         });
+        let shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
         let shifts_m: Vec<f32> = (0..GRID_CELLS * GRID_CELLS)
             .map(|cell| {
                 let (row, col) = (cell / GRID_CELLS, cell % GRID_CELLS);
                 let ahead_of_patch_m = geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m;
-                self.noise.boundary_shift_m(ego.lattice.cell_centre(row, col), ahead_of_patch_m, tick)
+                shift.at(ego.lattice.cell_centre(row, col), ahead_of_patch_m)
             })
             .collect();
         BirdsEyeView::from_fn(|row, col| {

@@ -35,43 +35,88 @@ impl ConvexInEgo {
     /// Calls `span(row, first_col, last_col)` for every pixel row in which pixel centres lie inside the polygon.
     pub(super) fn for_each_row(&self, geometry: &GridGeometry, mut span: impl FnMut(usize, usize, usize)) {
         let corners = &self.corners[..self.n_corners];
-        let (low, high) = crate::distance_field::bounds(corners);
-        let pixels_per_m = 1.0 / geometry.pixel_m();
+        let Some(box_) = self.pixel_box(geometry) else { return };
+        let (pixel_m, pixels_per_m) = (geometry.pixel_m(), 1.0 / geometry.pixel_m());
         let half_m = 0.5 * geometry.side_m;
-        if low.y > half_m || high.y < -half_m {
-            return;
-        }
-        // Pixel centres: ahead = far edge − (row + ½)·pixel, left = half − (col + ½)·pixel.
-        let row_of = |ahead_m: f32| (geometry.far_edge_ahead_m() - ahead_m) * pixels_per_m - 0.5;
-        let first_row = row_of(high.x).ceil().max(0.0) as usize;
-        let row_end = (row_of(low.x).floor() + 1.0).clamp(0.0, BEV_PIXELS as f32) as usize;
-        for row in first_row..row_end {
-            let ahead_m = geometry.far_edge_ahead_m() - (row as f32 + 0.5) * geometry.pixel_m();
-            let (mut right_m, mut left_m) = (f32::INFINITY, f32::NEG_INFINITY);
-            let mut a = corners[corners.len() - 1];
-            for &b in corners {
-                if (a.x <= ahead_m) != (b.x <= ahead_m) {
-                    let y = a.y + (ahead_m - a.x) / (b.x - a.x) * (b.y - a.y);
-                    right_m = right_m.min(y);
-                    left_m = left_m.max(y);
+        let ahead_of = |row: usize| geometry.far_edge_ahead_m() - (row as f32 + 0.5) * pixel_m;
+        // Walk the edges: each lends its crossing to the rows between its ends.
+        let mut right_m = [f32::INFINITY; BEV_PIXELS];
+        let mut left_m = [f32::NEG_INFINITY; BEV_PIXELS];
+        let mut a = corners[corners.len() - 1];
+        for &b in corners {
+            let (low, high) = if a.x <= b.x { (a, b) } else { (b, a) };
+            // Rows with low.x <= ahead < high.x; one more on either side, then tested exactly.
+            let rows = rows_between(geometry, low.x, high.x);
+            let slope = (high.y - low.y) / (high.x - low.x);
+            for row in rows.start.max(box_.rows.start)..rows.end.min(box_.rows.end) {
+                let ahead_m = ahead_of(row);
+                if low.x <= ahead_m && ahead_m < high.x {
+                    let y = low.y + (ahead_m - low.x) * slope;
+                    right_m[row] = right_m[row].min(y);
+                    left_m[row] = left_m[row].max(y);
                 }
-                a = b;
             }
+            a = b;
+        }
+        for row in box_.rows {
+            if left_m[row] < right_m[row] {
+                continue;
+            }
+            // Pixel centres: left = half − (col + ½)·pixel.
             let col_of = |y: f32| (half_m - y) * pixels_per_m - 0.5;
-            let first = col_of(left_m).ceil().max(0.0);
-            let last = col_of(right_m).floor().min((BEV_PIXELS - 1) as f32);
-            if left_m >= right_m && first <= last {
-                span(row, first as usize, last as usize);
+            let first = ceil(col_of(left_m[row]).clamp(0.0, BEV_PIXELS as f32)) as usize;
+            let last = col_of(right_m[row]).min((BEV_PIXELS - 1) as f32);
+            if last >= first as f32 {
+                span(row, first, last as i32 as usize);
             }
         }
     }
 
+    /// Pixel rows and columns around the part of the polygon that lies in the view.
+    fn pixel_box(&self, geometry: &GridGeometry) -> Option<PixelBox> {
+        let (low, high) = crate::distance_field::bounds(&self.corners[..self.n_corners]);
+        let half_m = 0.5 * geometry.side_m;
+        if low.y > half_m || high.y < -half_m {
+            return None;
+        }
+        let rows = rows_between(geometry, low.x, high.x);
+        let col_of = |y: f32| ((half_m - y) / geometry.pixel_m()).clamp(0.0, (BEV_PIXELS - 1) as f32) as usize;
+        (!rows.is_empty()).then(|| PixelBox { rows, first_col: col_of(high.y), last_col: col_of(low.y) })
+    }
+
     /// Marks every cell that holds a pixel of the polygon.
     pub(super) fn occupy(&self, geometry: &GridGeometry, grid: &mut OccupancyGrid) {
+        // Most hidden ground lies beyond the lane, where everything is occupied already.
+        let Some(box_) = self.pixel_box(geometry) else { return };
+        let mask = bits_between(box_.first_col / CELL_PIXELS, box_.last_col / CELL_PIXELS);
+        if (box_.rows.start / CELL_PIXELS..=(box_.rows.end - 1) / CELL_PIXELS).all(|row| grid.row(row) & mask == mask) {
+            return;
+        }
         self.for_each_row(geometry, |row, first, last| {
             grid.occupy_row(row / CELL_PIXELS, bits_between(first / CELL_PIXELS, last / CELL_PIXELS));
         });
     }
+}
+
+/// Smallest whole number at or above a non-negative value. `f32::ceil` is a library call on baseline x86-64.
+fn ceil(value: f32) -> i32 {
+    let truncated = value as i32;
+    truncated + i32::from(value > truncated as f32)
+}
+
+struct PixelBox {
+    rows: std::ops::Range<usize>,
+    first_col: usize,
+    last_col: usize,
+}
+
+/// Pixel rows whose centres may lie between two distances ahead; up to one row too many at either end.
+fn rows_between(geometry: &GridGeometry, low_m: f32, high_m: f32) -> std::ops::Range<usize> {
+    let row_of =
+        |ahead_m: f32| ((geometry.far_edge_ahead_m() - ahead_m) / geometry.pixel_m()).clamp(-1.0, BEV_PIXELS as f32);
+    let first = (row_of(high_m) - 1.0).max(0.0) as usize;
+    let end = (row_of(low_m) + 1.0).clamp(0.0, BEV_PIXELS as f32) as usize;
+    first..end
 }
 
 /// Bits `first..=last`.
