@@ -181,3 +181,264 @@ fn draw_widths(lane_m: &RangeInclusive<f32>, (from_m, to_m): (f32, f32), rng: &m
     }
     widths
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim::geometry::{Pose, Vec2, edges, polygon_contains};
+    use sim::path::Path;
+    use sim::scenario::{Direction, Obstacle, ObstacleClass};
+    use sim::validate::validate;
+    use sim::vehicle::VehicleParams;
+
+    const SEEDS: std::ops::Range<u64> = 0..50;
+
+    #[test]
+    fn routes_have_the_lengths_of_the_paper() {
+        for (which, expected_m) in [(ReferenceLot::A, 231.0), (ReferenceLot::B, 139.0), (ReferenceLot::C, 149.0)] {
+            let reference = lot(which, RootSeed(1)).reference_path;
+            let measured_m = Path::new(&reference).length_m();
+            assert!((measured_m - expected_m).abs() < 0.1, "{}: {measured_m} m, not {expected_m} m", which.name());
+            assert!(
+                (rounded_length_m(&reference) - measured_m).abs() < 0.02,
+                "the closed form agrees with the samples"
+            );
+        }
+    }
+
+    #[test]
+    fn the_lane_is_as_wide_as_the_sheet_says() {
+        for which in ReferenceLot::ALL {
+            let sheet = which.sheet();
+            let scenario = lot(which, RootSeed(1));
+            let path = Path::new(&scenario.reference_path);
+            let mut narrowest_m = f32::INFINITY;
+            let mut widest_m = 0.0_f32;
+            for (pose, vertex_m) in straight_poses(&scenario, &path) {
+                let [left_m, right_m] = [1.0, -1.0].map(|side| ray_m(pose, side, edges(&scenario.boundary)));
+                let width_m = left_m + right_m;
+                if vertex_m > 11.1 {
+                    narrowest_m = narrowest_m.min(width_m);
+                    widest_m = widest_m.max(width_m);
+                    // The route follows the middle of the lane, also through a bulge.
+                    assert!((left_m - right_m).abs() < 0.06, "{}: off the middle at {pose:?}", which.name());
+                } else if vertex_m < 5.0 {
+                    // A ray beside a corner may run out through the other aisle.
+                    assert!(width_m > 5.99, "{}: {width_m} m beside a corner at {pose:?}", which.name());
+                }
+            }
+            assert!(*sheet.lane_m.start() - 0.01 < narrowest_m && widest_m < *sheet.lane_m.end() + 0.01);
+            assert!(widest_m - narrowest_m > 0.15, "{}: the width changes along the way", which.name());
+        }
+    }
+
+    /// The gap rules, measured on the finished scenario with rays across the route: nothing is asked of the code that
+    /// places things.
+    #[test]
+    fn whatever_narrows_the_lane_obeys_the_gap_rules() {
+        for which in ReferenceLot::ALL {
+            let sheet = which.sheet();
+            let mut double_parked_m = 0.0;
+            for seed in SEEDS {
+                let scenario = lot(which, RootSeed(seed));
+                let path = Path::new(&scenario.reference_path);
+                let solid: Vec<_> = scenario.obstacles.iter().map(Obstacle::outline).collect();
+                let double_parked: Vec<_> = double_parked(&scenario).map(Obstacle::outline).collect();
+                let mut last_narrowed: Option<(Pose, [bool; 2])> = None;
+                for (pose, vertex_m) in straight_poses(&scenario, &path) {
+                    let near = |outline: &&Vec<Vec2>| outline[0].distance(pose.position()) < 9.0;
+                    let reach = |side: f32, things: &[Vec<Vec2>]| {
+                        ray_m(pose, side, things.iter().filter(near).flat_map(|outline| edges(outline)))
+                    };
+                    let lane_m = [1.0, -1.0].map(|side| ray_m(pose, side, edges(&scenario.boundary)));
+                    let free_m = [1.0, -1.0].map(|side| reach(side, &solid)).map(|m| m.min(99.0));
+                    // A car's yaw may leave only a corner of it in the lane; it is beside the lane with all its length.
+                    if [1.0, -1.0].iter().enumerate().any(|(i, &side)| reach(side, &double_parked) < lane_m[i] + 1.0) {
+                        double_parked_m += SPACING_M;
+                    }
+                    let is_narrowed = [0, 1].map(|side| free_m[side] < lane_m[side] - 0.02);
+                    if !is_narrowed.contains(&true) {
+                        continue;
+                    }
+                    let gap_m = lane_m[0].min(free_m[0]) + lane_m[1].min(free_m[1]);
+                    let name = which.name();
+                    assert!(gap_m > sheet.free_gap_m.start() - 0.03, "{name} seed {seed}: {gap_m} m at {pose:?}");
+                    assert!(vertex_m > 11.0, "{name} seed {seed}: narrowed {vertex_m} m from a corner at {pose:?}");
+                    assert!(is_narrowed != [true, true], "{name} seed {seed}: narrowed from both sides at {pose:?}");
+                    if let Some((before, sides)) = last_narrowed
+                        && sides != is_narrowed
+                    {
+                        let apart_m = before.position().distance(pose.position());
+                        assert!(apart_m > 7.8, "{name} seed {seed}: a slalom within {apart_m} m at {pose:?}");
+                    }
+                    last_narrowed = Some((pose, is_narrowed));
+                }
+            }
+            let share = double_parked_m / (SEEDS.end as f32 * sheet.length_m);
+            // Counted without the spaces between the cars of a cluster, which are about an eighth of it.
+            let expected = 0.88 * sheet.double_parked_share;
+            assert!((share - expected).abs() < 0.03, "{}: share {share}, expected {expected}", which.name());
+        }
+    }
+
+    const SPACING_M: f32 = 0.25;
+
+    /// Poses of the route on straight legs, headed along the leg, with the distance to the nearest corner vertex.
+    fn straight_poses(scenario: &Scenario, path: &Path) -> Vec<(Pose, f32)> {
+        let right_angle = std::f32::consts::FRAC_PI_2;
+        let vertices: Vec<_> = scenario
+            .reference_path
+            .points
+            .windows(3)
+            .filter(|three| (three[1] - three[0]).angle_to(three[2] - three[1]).abs() > 1.0)
+            .map(|three| three[1])
+            .collect();
+        let nearest_vertex_m = |point: Vec2| vertices.iter().map(|v| v.distance(point)).fold(f32::INFINITY, f32::min);
+        (0..(path.length_m() / SPACING_M) as usize)
+            .map(|i| path.pose_at(i as f32 * SPACING_M))
+            .map(|pose| {
+                (
+                    Pose { heading_rad: (pose.heading_rad / right_angle).round() * right_angle, ..pose },
+                    nearest_vertex_m(pose.position()),
+                )
+            })
+            // Within 5 m the route is on its arc.
+            .filter(|(pose, vertex_m)| *vertex_m > 4.0 || vertices.iter().all(|v| v.distance(pose.position()) > 4.0))
+            .collect()
+    }
+
+    /// Distance from a pose straight to one side (+1 left) to the nearest edge, metres.
+    fn ray_m(pose: Pose, side: f32, edges: impl Iterator<Item = (Vec2, Vec2)>) -> f32 {
+        let direction = pose.ahead().perp() * side;
+        let origin = pose.position();
+        edges
+            .filter_map(|(a, b)| {
+                let (to_a, ab) = (a - origin, b - a);
+                let denominator = direction.perp_dot(ab);
+                let along_m = to_a.perp_dot(ab) / denominator;
+                let t = to_a.perp_dot(direction) / denominator;
+                (denominator != 0.0 && (0.0..=1.0).contains(&t) && along_m > 0.0).then_some(along_m)
+            })
+            .fold(f32::INFINITY, f32::min)
+    }
+
+    /// Vehicles parallel to the lane that reach into it: stalls are at right angles to it.
+    fn double_parked(scenario: &Scenario) -> impl Iterator<Item = &Obstacle> {
+        scenario.obstacles.iter().filter(|obstacle| {
+            let centre = obstacle.centre();
+            let route = Path::new(&scenario.reference_path);
+            let along = route.pose_at(route.project(centre.position()));
+            obstacle.class.is_vehicle()
+                && centre.ahead().dot(along.ahead()).abs() > 0.8
+                && obstacle.outline().iter().any(|&corner| polygon_contains(&scenario.boundary, corner))
+        })
+    }
+
+    #[test]
+    fn nothing_stands_inside_anything_else() {
+        use geo::{Intersects, LineString, Polygon};
+        for which in ReferenceLot::ALL {
+            let scenario = lot(which, RootSeed(7));
+            let polygons: Vec<Polygon<f32>> = scenario
+                .obstacles
+                .iter()
+                .map(|obstacle| {
+                    let ring: Vec<(f32, f32)> = obstacle.outline().iter().map(|p| (p.x, p.y)).collect();
+                    Polygon::new(LineString::from(ring), Vec::new())
+                })
+                .collect();
+            for (i, a) in polygons.iter().enumerate() {
+                for (j, b) in polygons.iter().enumerate().skip(i + 1) {
+                    assert!(!a.intersects(b), "{}: obstacles {i} and {j} overlap", which.name());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn both_directions_validate_with_every_seed() {
+        let vehicle = VehicleParams::hyundai_hg300();
+        for which in ReferenceLot::ALL {
+            for seed in SEEDS {
+                for direction in Direction::BOTH {
+                    let scenario = direction.of(lot(which, RootSeed(seed)));
+                    validate(&scenario, &vehicle)
+                        .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", which.name()));
+                }
+            }
+        }
+    }
+
+    /// The lane runs on for 17 m and more behind the finish and before the start.
+    #[test]
+    fn nobody_faces_a_wall_at_the_finish() {
+        for which in ReferenceLot::ALL {
+            for direction in Direction::BOTH {
+                let scenario = direction.of(lot(which, RootSeed(1)));
+                let path = Path::new(&scenario.reference_path);
+                let finish = path.pose_at(path.length_m());
+                let onward = Pose { heading_rad: finish.heading_rad - std::f32::consts::FRAC_PI_2, ..finish };
+                assert!(ray_m(onward, 1.0, edges(&scenario.boundary)) > 17.0);
+            }
+        }
+    }
+
+    #[test]
+    fn lots_contain_what_real_lots_contain() {
+        let mut seen = std::collections::BTreeMap::new();
+        for seed in SEEDS {
+            for which in ReferenceLot::ALL {
+                let scenario = lot(which, RootSeed(seed));
+                assert_eq!(scenario.speed_bumps.len(), (which.length_m() / 60.0) as usize);
+                assert!((120..320).contains(&scenario.obstacles.len()), "{} obstacles", scenario.obstacles.len());
+                for obstacle in &scenario.obstacles {
+                    let inside = polygon_contains(&scenario.boundary, obstacle.centre().position())
+                        || obstacle.outline().iter().any(|&p| polygon_contains(&scenario.boundary, p));
+                    let [total, in_lane] = seen.entry(obstacle.class).or_insert([0, 0]);
+                    *total += 1;
+                    *in_lane += usize::from(inside);
+                }
+            }
+        }
+        for class in ObstacleClass::ALL {
+            if matches!(class, ObstacleClass::Curb) {
+                continue;
+            }
+            let [total, in_lane] = seen.get(&class).copied().unwrap_or_default();
+            assert!(total > 100, "{class:?}: {total} in 150 lots");
+            assert!(
+                in_lane > 20 || class == ObstacleClass::WheelStop,
+                "{class:?}: {in_lane} of {total} reach into the lane"
+            );
+        }
+    }
+
+    #[test]
+    fn a_seed_changes_obstacles_and_nothing_else() {
+        let (one, other) = (lot(ReferenceLot::A, RootSeed(1)), lot(ReferenceLot::A, RootSeed(2)));
+        assert_eq!(one, lot(ReferenceLot::A, RootSeed(1)));
+        assert_eq!(
+            (one.boundary, one.reference_path, one.speed_bumps),
+            (other.boundary, other.reference_path, other.speed_bumps)
+        );
+        assert_ne!(one.obstacles, other.obstacles);
+    }
+
+    #[test]
+    fn lots_are_pinned() {
+        let golden = [
+            (ReferenceLot::A, 0xf035_0bed_cd15_1618),
+            (ReferenceLot::B, 0x2d19_409f_5a44_1e6f),
+            (ReferenceLot::C, 0xb901_49b7_471d_27f1),
+        ];
+        for (which, expected) in golden {
+            let hash = crate::fnv1a(&crate::load::to_toml(&lot(which, RootSeed(42))));
+            assert_eq!(
+                hash,
+                expected,
+                "{} changed, and with it every recorded result. Intended? Put {hash:#018x} here and say why in the commit",
+                which.name()
+            );
+        }
+    }
+}

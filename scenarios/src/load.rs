@@ -1,0 +1,347 @@
+//! Lots as TOML files that a person can write by hand; `examples/` has an annotated one.
+//!
+//! Whatever is wrong with a file comes back as one error that names file, line and remedy.
+
+use sim::scenario::{Place, Scenario, ScenarioError};
+use sim::validate::validate;
+use sim::vehicle::VehicleParams;
+use std::path::Path;
+use toml_edit::visit_mut::{self, VisitMut};
+use toml_edit::{Array, Document, Formatted, InlineTable, Item, Value};
+
+/// Why a lot cannot be had.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LoadError {
+    /// The file cannot be read.
+    #[error("{file}: cannot be read: {problem}; check the path")]
+    Unreadable {
+        /// As given.
+        file: String,
+        /// What the operating system says.
+        problem: String,
+    },
+    /// The file is no scenario, or one that cannot be driven.
+    #[error("{file}:{line}: {problem}; {remedy}")]
+    Faulty {
+        /// As given.
+        file: String,
+        /// Counted from 1.
+        line: usize,
+        /// What is wrong there.
+        problem: String,
+        /// What would make it right.
+        remedy: String,
+    },
+    /// No lot of this name.
+    #[error(transparent)]
+    Unknown(#[from] crate::SpecError),
+    /// No solvable lot was drawn: a fault of the generator, not of the caller.
+    #[error("{name}: none of {attempts} drawn lots can be driven in both directions; take another index")]
+    Unsolvable {
+        /// The lot.
+        name: String,
+        /// How many were drawn.
+        attempts: u32,
+    },
+}
+
+/// Reads and checks a scenario file.
+///
+/// # Errors
+/// The first thing wrong with it, with its line.
+pub fn load(path: &Path) -> Result<Scenario, LoadError> {
+    let file = path.display().to_string();
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| LoadError::Unreadable { file: file.clone(), problem: error.to_string() })?;
+    parse(&text, &file)
+}
+
+/// Reads and checks the text of a scenario file; `file` is its name in errors.
+///
+/// # Errors
+/// The first thing wrong with it, with its line.
+pub fn parse(text: &str, file: &str) -> Result<Scenario, LoadError> {
+    let faulty = |offset: usize, problem: String, remedy: String| LoadError::Faulty {
+        file: file.to_owned(),
+        line: 1 + text.get(..offset).unwrap_or(text).matches('\n').count(),
+        problem,
+        remedy,
+    };
+    let document = Document::parse(text).map_err(|error| {
+        let offset = error.span().map_or(0, |span| span.start);
+        faulty(offset, format!("not TOML: {}", error.message().trim()), "fix the syntax there".to_owned())
+    })?;
+    let scenario: Scenario = toml_edit::de::from_str(text).map_err(|error| {
+        let offset = error.span().map_or(0, |span| span.start);
+        let problem = error.message().trim().to_owned();
+        let remedy = remedy_for(&problem).to_owned();
+        faulty(offset, problem, remedy)
+    })?;
+    if let Some((offset, length)) = first_odd_point(&document) {
+        // The deserialiser of points reads two numbers and ignores the rest.
+        return Err(faulty(offset, format!("a point of {length} numbers"), "write points as [x, y]".to_owned()));
+    }
+    validate(&scenario, &VehicleParams::hyundai_hg300()).map_err(|error| {
+        let offset = offset_of(&document, error.place).unwrap_or(0);
+        let ScenarioError { place, problem, remedy } = error;
+        faulty(offset, format!("{place}: {problem}"), remedy)
+    })?;
+    Ok(scenario)
+}
+
+/// The file of a scenario: one vertex or obstacle per line, coordinates as short as they are exact.
+///
+/// Reading it back gives an equal scenario.
+pub fn to_toml(scenario: &Scenario) -> String {
+    // Serialising plain numbers, strings and lists into a tree cannot fail.
+    let mut document = toml_edit::ser::to_document(scenario).expect("a scenario is representable as TOML");
+    for key in ["reference_path", "noise"] {
+        if let Some(item) = document.get_mut(key)
+            && let Ok(mut table) = std::mem::take(item).into_table()
+        {
+            table.decor_mut().set_prefix("\n");
+            *item = Item::Table(table);
+        }
+    }
+    Layout.visit_document_mut(&mut document);
+    document.to_string()
+}
+
+/// What to do about a message of the deserialiser.
+fn remedy_for(problem: &str) -> &'static str {
+    if problem.starts_with("unknown field") {
+        "delete or rename it"
+    } else if problem.starts_with("missing field") {
+        "add it; scenarios/examples shows a whole file"
+    } else if problem.starts_with("unknown variant") {
+        "use one of these"
+    } else if problem.starts_with("invalid length") {
+        "write points as [x, y]"
+    } else if problem.starts_with("invalid type") {
+        "write a value of the expected type"
+    } else {
+        "see scenarios/examples for a whole file"
+    }
+}
+
+/// Where an element starts in the text.
+fn offset_of(document: &Document<&str>, place: Place) -> Option<usize> {
+    let root = document.as_table();
+    let key = |key: &str| root.get(key);
+    let start = match place {
+        Place::Name => key("name")?.span(),
+        Place::Boundary(vertex) => nth_or_whole(key("boundary")?, vertex),
+        Place::Island(i) => nth_or_whole(key("island")?, Some(i)),
+        Place::Obstacle(i) => nth_or_whole(key("obstacle")?, Some(i)),
+        Place::SpeedBump(i) => nth_or_whole(key("speed_bump")?, Some(i)),
+        Place::ReferencePath(None) => key("reference_path")?.span(),
+        Place::ReferencePath(point) => nth_or_whole(key("reference_path")?.get("points")?, point),
+    };
+    start.map(|span| span.start)
+}
+
+/// Offset and length of the first point that has not two numbers.
+fn first_odd_point(document: &Document<&str>) -> Option<(usize, usize)> {
+    let root = document.as_table();
+    let islands: Vec<&Array> = match root.get("island") {
+        Some(Item::ArrayOfTables(tables)) => {
+            tables.iter().filter_map(|table| table.get("polygon")?.as_array()).collect()
+        }
+        Some(Item::Value(Value::Array(tables))) => {
+            tables.iter().filter_map(|table| table.as_inline_table()?.get("polygon")?.as_array()).collect()
+        }
+        _ => Vec::new(),
+    };
+    let boundary = root.get("boundary").and_then(Item::as_array);
+    let route = root.get("reference_path").and_then(|table| table.get("points")?.as_array());
+    boundary
+        .into_iter()
+        .chain(route)
+        .chain(islands)
+        .flat_map(|points| points.iter())
+        .filter_map(|point| Some((point.span()?.start, point.as_array()?.len())))
+        .find(|&(_, length)| length != 2)
+}
+
+/// Span of an element of an array or of an array of tables; of all of it where there is no such element.
+fn nth_or_whole(list: &Item, index: Option<usize>) -> Option<std::ops::Range<usize>> {
+    let element = match (list, index) {
+        (Item::Value(Value::Array(array)), Some(i)) => array.get(i).and_then(Value::span),
+        (Item::ArrayOfTables(tables), Some(i)) => tables.get(i).and_then(toml_edit::Table::span),
+        _ => None,
+    };
+    element.or_else(|| list.span())
+}
+
+/// Numbers without the noise of f32 → f64, lists of points and tables one element per line.
+struct Layout;
+
+impl VisitMut for Layout {
+    fn visit_float_mut(&mut self, node: &mut Formatted<f64>) {
+        let single = *node.value() as f32;
+        // The shortest decimal that reads back as the same f32.
+        if let Ok(shortest) = single.to_string().parse() {
+            *node = Formatted::new(shortest);
+        }
+    }
+
+    fn visit_array_mut(&mut self, node: &mut Array) {
+        visit_mut::visit_array_mut(self, node);
+        let is_list = node.iter().any(|value| value.is_array() || value.is_inline_table());
+        for (i, value) in node.iter_mut().enumerate() {
+            value.decor_mut().set_prefix(match (is_list, i) {
+                (true, _) => "\n    ",
+                (false, 0) => "",
+                (false, _) => " ",
+            });
+        }
+        if is_list {
+            node.set_trailing("\n");
+            node.set_trailing_comma(true);
+        }
+    }
+
+    fn visit_inline_table_mut(&mut self, node: &mut InlineTable) {
+        node.fmt();
+        visit_mut::visit_inline_table_mut(self, node);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::{self, ReferenceLot};
+    use sim::seed::RootSeed;
+
+    const EXAMPLE: &str = include_str!("../examples/slalom.toml");
+
+    fn message(text: &str) -> String {
+        match parse(text, "lot.toml") {
+            Ok(_) => "accepted".to_owned(),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    #[test]
+    fn every_example_loads_and_can_be_driven_both_ways() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+        let mut files: Vec<_> =
+            folder.read_dir().expect("examples").map(|entry| entry.expect("entry").path()).collect();
+        files.sort();
+        assert!(!files.is_empty());
+        for file in files {
+            let scenario = load(&file).unwrap_or_else(|error| panic!("{error}"));
+            let back = scenario.reversed();
+            validate(&back, &VehicleParams::hyundai_hg300())
+                .unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        }
+    }
+
+    #[test]
+    fn writing_and_reading_gives_the_same_lot() {
+        for lot in ReferenceLot::ALL {
+            let scenario = reference::lot(lot, RootSeed(3));
+            assert_eq!(parse(&to_toml(&scenario), "lot.toml"), Ok(scenario));
+        }
+        let example = parse(EXAMPLE, "slalom.toml").expect("the example is sound");
+        assert_eq!(parse(&to_toml(&example), "lot.toml"), Ok(example));
+    }
+
+    #[test]
+    fn a_written_lot_is_short_and_exact() {
+        let text = to_toml(&parse(EXAMPLE, "slalom.toml").expect("the example is sound"));
+        for line in [
+            "    [-6.0, -2.5],",
+            r#"    { class = "cone", x_m = 37.3, y_m = 16.0, heading_deg = 0.0 },"#,
+            "corner_radius_m = 5.0",
+        ] {
+            assert!(text.lines().any(|found| found == line), "no line {line:?} in\n{text}");
+        }
+    }
+
+    /// Replaces one line of the example and expects the error to name that line (or the one given).
+    #[test]
+    fn every_fault_of_a_file_is_named_with_its_line_and_a_remedy() {
+        let line_of = |needle: &str| {
+            1 + EXAMPLE.lines().position(|line| line.contains(needle)).unwrap_or_else(|| panic!("no line {needle:?}"))
+        };
+        // Text replaced, by what, the line the error names (found by its original text), the rest of the message.
+        let table = [
+            ("name = \"slalom\"", "name = slalom", "name =", "not TOML: "),
+            ("name = \"slalom\"", "title = \"slalom\"", "name =", "unknown field `title`, expected one of `name`"),
+            (
+                "name = \"slalom\"",
+                "name = 7",
+                "name =",
+                "invalid type: integer `7`, expected a string; write a value of",
+            ),
+            ("name = \"slalom\"", "name = \"\"", "name =", "name: the name is empty; give the lot a name"),
+            ("[43.0, 46.0],", "[43.0, nan],", "[43.0, 46.0]", "boundary, vertex 3: y is NaN; write a finite number"),
+            ("[43.0, 46.0],", "[43.0, 46.0, 0.0],", "[43.0, 46.0]", "a point of 3 numbers; write points as [x, y]"),
+            (
+                "[43.0, 46.0],",
+                "[43.0, \"46\"],",
+                "[43.0, 46.0]",
+                "invalid type: string \"46\", expected f32; write a value",
+            ),
+            ("[37.0, 6.5], ", "[43.0, 6.5], ", "[43.0, -2.5]", "boundary, vertex 2: the edge from vertex 2 to 3 meets"),
+            (
+                "corner_radius_m = 5.0",
+                "corner_radius = 5.0",
+                "corner_radius_m",
+                "unknown field `corner_radius`, expected `points`",
+            ),
+            (
+                "corner_radius_m = 5.0",
+                "corner_radius_m = inf",
+                "[reference_path]",
+                "reference_path: corner_radius_m is inf",
+            ),
+            (
+                "[40.0, 28.0]]",
+                "[40.0, 48.0]]",
+                "[40.0, 28.0]]",
+                "reference_path, point 3: the route leaves the boundary at",
+            ),
+            ("points = [[0.0, 0.5],", "points = [[-5.5, 0.5],", "points =", "reference_path, point 1: the car (4.91 m"),
+            (
+                "level = \"paper\"",
+                "level = \"loud\"",
+                "level =",
+                "unknown variant `loud`, expected one of `clean`, `paper`, `hard`; use",
+            ),
+            ("height_m = 0.15", "height_m = 15.0", "[[island]]", "island 1: height_m is 15; write a number of metres"),
+            (
+                "class = \"van\"",
+                "class = \"lorry\"",
+                "class = \"van\"",
+                "unknown variant `lorry`, expected one of `sedan`",
+            ),
+            ("x_m = 29.0\n", "", "class = \"van\"", "missing field `x_m`; add it"),
+            ("height_m = 2.1", "height_m = -2.1", "class = \"van\"", "obstacle 2: height_m is -2.1; write a number"),
+            (
+                "x_m = 37.3",
+                "x_m = 40.0",
+                "class = \"cone\"",
+                "obstacle 3: the cone at (40.00, 16.00) stands on the reference path",
+            ),
+            ("length_m = 0.5", "length_m = 0.0", "[[speed_bump]]", "speed_bump 1: length_m is 0; write"),
+            ("[[speed_bump]]", "[[speedbump]]", "[[speed_bump]]", "unknown field `speedbump`, expected one of"),
+        ];
+        for (original, replacement, named_line, expected) in table {
+            assert_eq!(EXAMPLE.matches(original).count(), 1, "{original:?} must occur once");
+            let message = message(&EXAMPLE.replacen(original, replacement, 1));
+            // A table of the file is named by its header, one line above its first key.
+            let line =
+                line_of(named_line) - usize::from(named_line.starts_with("class") && !original.starts_with("class"));
+            let expected = format!("lot.toml:{line}: {expected}");
+            assert!(message.starts_with(&expected), "got:      {message}\nexpected: {expected}");
+        }
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let error = load(Path::new("no/such/lot.toml")).expect_err("there is none");
+        assert!(error.to_string().starts_with("no/such/lot.toml: cannot be read: No such file"), "{error}");
+    }
+}
