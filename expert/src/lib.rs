@@ -133,6 +133,7 @@ impl ScriptedExpert {
             truth,
             sight,
             start: self.when_obeyed(truth),
+            horizon_m: sight.horizon_m(self.config.horizon_m, self.footprint.nose_m()),
             last_index: self.last.map(|last| last.index(&self.config)),
         };
         let ground = self.ground(truth, sight);

@@ -72,6 +72,8 @@ pub(crate) struct Search<'a> {
     pub(crate) start: Motion,
     /// Curvature index of the last label, −1…1.
     pub(crate) last_index: Option<f32>,
+    /// Length of a forecast, metres.
+    pub(crate) horizon_m: f32,
 }
 
 /// A first arc and what follows it.
@@ -219,7 +221,7 @@ impl Search<'_> {
         let change_per_m = self.change_per_step(step_m);
         let mut motion = self.start;
         let mut travel_m = 0.0;
-        while travel_m < config.horizon_m {
+        while travel_m < self.horizon_m {
             motion.step(curvature_per_m, change_per_m, step_m);
             travel_m += step_m;
             let clearance_m = self.footprint.clearance_m(field, &motion);
@@ -237,7 +239,7 @@ impl Search<'_> {
                 arc.n_branches += 1;
             }
         }
-        arc.offset = weights.first_free * arc.free_m.min(config.horizon_m) / weights.unit_m
+        arc.offset = weights.first_free * arc.free_m.min(self.horizon_m) / weights.unit_m
             - weights.first_curvature * index.abs()
             - weights.change * change;
         arc
@@ -252,7 +254,7 @@ impl Search<'_> {
     /// Best of travel and load once `load_m` has been collected: free to the horizon without any more.
     #[inline]
     fn bound(&self, load_m: f32) -> f32 {
-        self.worth(self.config.horizon_m, load_m)
+        self.worth(self.horizon_m, load_m)
     }
 
     /// Travel and load of a plan. Grows with the travel at a given load.
@@ -266,7 +268,7 @@ impl Search<'_> {
         if first.free_m == 0.0 {
             return;
         }
-        let horizon_m = self.config.horizon_m;
+        let horizon_m = self.horizon_m;
         let mut offer = |second, free_m: f32, load_m: f32, penalty: f32, end: &Motion| {
             let free_m = free_m.min(horizon_m);
             let score = self.worth(free_m, load_m) + first.offset - penalty;
@@ -293,7 +295,7 @@ impl Search<'_> {
     /// The load above which [`Self::bound`] falls below a worth.
     fn load_at_bound(&self, worth: f32) -> f32 {
         let weights = &self.config.weights;
-        (self.config.horizon_m / weights.unit_m - worth) * self.config.horizon_m / weights.load
+        (self.horizon_m / weights.unit_m - worth) * self.horizon_m / weights.load
     }
 
     /// Free travel, load and end of a second arc; `None` once it has collected more than `load_max_m`.
@@ -308,7 +310,7 @@ impl Search<'_> {
         let step_m = config.second_step_m;
         let change_per_m = self.change_per_step(step_m);
         let Branch { mut motion, mut travel_m, mut load_m } = *branch;
-        while travel_m < config.horizon_m {
+        while travel_m < self.horizon_m {
             if load_m > load_max_m {
                 return None;
             }
@@ -337,7 +339,7 @@ impl Search<'_> {
     /// Do not turn back: the bumper gains on the route. A filter only, so that labels remain functions of the scene.
     fn makes_progress(&self, end: &Motion, travel_m: f32) -> bool {
         let path = self.truth.map.path();
-        let reach_m = self.config.horizon_m + self.vehicle.front_m();
+        let reach_m = self.horizon_m + self.vehicle.front_m();
         let progress_of = |motion: &Motion| {
             let bumper = motion.on_axis(self.vehicle.front_m());
             path.project_near(bumper, self.truth.progress_m, self.vehicle.front_m(), reach_m + 4.0)

@@ -30,6 +30,15 @@ impl Sight {
         }
     }
 
+    /// How far a forecast can go on known ground when nothing is in the way, metres. `nose_m` is ahead of the axle.
+    pub(crate) fn horizon_m(&self, horizon_m: f32, nose_m: f32) -> f32 {
+        match self {
+            Self::WholeMap => horizon_m,
+            // Within the dead time the car drives on by 0.14 m at most, and so does where forecasts begin.
+            Self::Patch(patch) => horizon_m.min(patch.geometry.far_edge_ahead_m() - nose_m - 0.2),
+        }
+    }
+
     /// Whether a world point is known ground.
     #[inline]
     pub(crate) fn knows(&self, in_world: Vec2) -> bool {
@@ -45,14 +54,17 @@ impl Sight {
 pub(crate) struct PatchSight {
     geometry: GridGeometry,
     world_from_ego: WorldFromEgo,
-    /// Range from the camera at which sight ends, metres, by bearing from right to left.
-    range_m: [f32; BEARINGS],
+    /// Range from the camera at which sight ends, metres, squared, by bearing from right to left.
+    range_squared: [f32; BEARINGS],
 }
 
 impl PatchSight {
     fn new(map: &Map, pose: Pose, geometry: &GridGeometry) -> Self {
-        let mut sight =
-            Self { geometry: *geometry, world_from_ego: pose.world_from_ego(), range_m: [f32::INFINITY; BEARINGS] };
+        let mut sight = Self {
+            geometry: *geometry,
+            world_from_ego: pose.world_from_ego(),
+            range_squared: [f32::INFINITY; BEARINGS],
+        };
         let reach_m = geometry.far_edge_ahead_m().hypot(0.5 * geometry.side_m);
         for occluder in map.occluders() {
             let is_near = occluder.centre.distance(pose.position()) < reach_m + occluder.radius_m;
@@ -63,13 +75,14 @@ impl PatchSight {
         sight
     }
 
+    #[inline]
     fn knows(&self, in_world: Vec2) -> bool {
         let in_ego = self.world_from_ego.inverse_point(in_world);
         if in_ego.x < self.geometry.near_edge_ahead_m {
             return true;
         }
         let from_camera = in_ego - Vec2::new(CAMERA_AHEAD_M, 0.0);
-        self.geometry.contains(in_ego) && from_camera.length() <= self.range_m[bearing_bin(from_camera)]
+        self.geometry.contains(in_ego) && from_camera.length_squared() <= self.range_squared[bearing_bin(from_camera)]
     }
 
     /// Sight ends, by bearing, where a ray from the camera enters the outline.
@@ -83,23 +96,56 @@ impl PatchSight {
             }
             let (a, b) = if bearing_bin(a) <= bearing_bin(b) { (a, b) } else { (b, a) };
             for bin in bearing_bin(a)..=bearing_bin(b) {
-                let ray = Vec2::from_angle(bin_centre_rad(bin));
+                let ray = bin_centre(bin);
                 // ray · t = a + (b − a) · s, with s kept on the edge at its two end bins.
                 let edge = b - a;
                 let s = (-ray.perp_dot(a) / ray.perp_dot(edge)).clamp(0.0, 1.0);
-                let range_m = if s.is_finite() { (a + edge * s).length() } else { a.length().min(b.length()) };
-                self.range_m[bin] = self.range_m[bin].min(range_m);
+                let meets = if s.is_finite() { a + edge * s } else { a };
+                self.range_squared[bin] = self.range_squared[bin].min(meets.length_squared());
             }
         }
     }
 }
 
-/// Bin of a bearing within ±90° of straight ahead.
+/// Bin of a bearing within ±90° of straight ahead. Bins divide y/(x + |y|) evenly instead of the angle: no arctangent.
+#[inline]
 fn bearing_bin(from_camera: Vec2) -> usize {
-    let share = 0.5 + from_camera.y.atan2(from_camera.x) / std::f32::consts::PI;
+    let share = 0.5 + 0.5 * from_camera.y / (from_camera.x + from_camera.y.abs());
     ((share * BEARINGS as f32).max(0.0) as usize).min(BEARINGS - 1)
 }
 
-fn bin_centre_rad(bin: usize) -> f32 {
-    ((bin as f32 + 0.5) / BEARINGS as f32 - 0.5) * std::f32::consts::PI
+/// Direction through the middle of a bin.
+fn bin_centre(bin: usize) -> Vec2 {
+    let y = (2.0 * (bin as f32 + 0.5) / BEARINGS as f32) - 1.0;
+    Vec2::new(1.0 - y.abs(), y).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim::scenario::{Obstacle, ObstacleClass, ReferencePath, Scenario};
+
+    #[test]
+    fn ground_beyond_the_patch_and_behind_a_car_is_unknown() {
+        let scenario = Scenario {
+            name: "yard".to_owned(),
+            boundary: sim::geometry::rectangle(Pose::default(), 80.0, 40.0).to_vec(),
+            reference_path: ReferencePath {
+                points: vec![Vec2::new(-20.0, 0.0), Vec2::new(20.0, 0.0)],
+                corner_radius_m: 0.0,
+            },
+            noise: sim::scenario::NoiseSettings::default(),
+            islands: Vec::new(),
+            obstacles: vec![Obstacle::new(ObstacleClass::Sedan, Pose::new(Vec2::new(10.0, 2.5), 0.0))],
+            speed_bumps: Vec::new(),
+        };
+        let map = Map::build(scenario, &sim::vehicle::VehicleParams::hyundai_hg300()).unwrap();
+        let sight = Sight::new(Sees::PatchOnly, &map, Pose::default(), &GridGeometry::paper());
+        let knows = |x, y| sight.knows(Vec2::new(x, y));
+        assert!(knows(8.0, 0.0) && knows(16.0, 0.0) && knows(7.0, -5.9), "in the patch");
+        assert!(!knows(16.4, 0.0) && !knows(8.0, 6.1), "beyond the patch");
+        assert!(knows(0.0, 9.0) && knows(-9.0, 0.0), "beside and behind the car");
+        // The car's near right corner stands at (7.65, 1.57), seen past it at y/(x − 1.59) = .26.
+        assert!(!knows(14.0, 4.0) && knows(14.0, 2.0), "behind the car and past it");
+    }
 }
