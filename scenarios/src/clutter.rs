@@ -40,6 +40,8 @@ pub struct ClutterPlan {
     pub opposite_clear_m: f32,
     /// Intruders keep this far from start and finish, metres.
     pub end_clear_m: f32,
+    /// Double-parked cars stand up to this far from parallel, degrees.
+    pub double_parked_yaw_deg: f32,
     /// Share of stalls with a car in it.
     pub stall_occupancy: f32,
     /// Share of parked cars whose nose stands 0.3–0.6 m in the lane where the gap allows.
@@ -76,10 +78,21 @@ pub struct Intruder {
     pub from_m: f32,
     /// See [`Self::from_m`].
     pub to_m: f32,
+    /// How far it reaches into the lane, metres.
+    pub protrusion_m: f32,
 }
 
-/// Fills a corridor. `reserved` stretches (islands, branches) are treated as intruders that already stand there.
-pub fn place(corridor: &Corridor, plan: &ClutterPlan, reserved: &[Intruder], rng: &mut Rng) -> Vec<Obstacle> {
+/// What stands in a lot.
+#[derive(Debug, Clone)]
+pub struct Clutter {
+    /// In the lane and outside.
+    pub obstacles: Vec<Obstacle>,
+    /// The stretches they narrow, reserved ones included.
+    pub intruders: Vec<Intruder>,
+}
+
+/// Fills a corridor. `reserved` stretches (islands) are treated as intruders that already stand there.
+pub fn place(corridor: &Corridor, plan: &ClutterPlan, reserved: &[Intruder], rng: &mut Rng) -> Clutter {
     let arms = if plan.closed_arms { closed_arms(corridor) } else { Vec::new() };
     let reserved_ground: Vec<_> = arms.iter().map(|arm| arm.ground).collect();
     let mut floor = Floor { corridor, plan, intruders: reserved.to_vec(), things: Vec::new() };
@@ -94,7 +107,8 @@ pub fn place(corridor: &Corridor, plan: &ClutterPlan, reserved: &[Intruder], rng
         place_parked(&mut floor, &stall, rng);
     }
     place_furniture(&mut floor, rng);
-    floor.things.into_iter().map(|thing| thing.obstacle).collect()
+    let obstacles = floor.things.into_iter().map(|thing| thing.obstacle).collect();
+    Clutter { obstacles, intruders: floor.intruders }
 }
 
 /// One speed bump per `every_m` of route, each in a leg's lane, across its whole width.
@@ -222,6 +236,12 @@ struct Placed {
     protrusion_m: f32,
     from_m: f32,
     to_m: f32,
+}
+
+impl Placed {
+    fn intruder(&self, leg: usize, side: Side) -> Intruder {
+        Intruder { leg, side, from_m: self.from_m, to_m: self.to_m, protrusion_m: self.protrusion_m }
+    }
 }
 
 /// How an outline sits in the lane: both extremes are exact, since everything is piecewise linear in `s`.
@@ -375,7 +395,8 @@ fn place_double_parked_car(
     rng: &mut Rng,
 ) {
     let gap_m = rng.random_range(floor.plan.free_gap_m.clone());
-    let heading_in_leg_rad = yaw(rng, 2.0) + if rng.random_bool(0.8) { 0.0 } else { std::f32::consts::PI };
+    let heading_in_leg_rad =
+        yaw(rng, floor.plan.double_parked_yaw_deg) + if rng.random_bool(0.8) { 0.0 } else { std::f32::consts::PI };
     let body = Body { class, s_m, heading_in_leg_rad };
     // As far into the lane as the gap allows, but no farther from its own edge than people park.
     let wish = Protrusion { wanted_m: class.default_size_m()[1] + KERB_GAP_M, gap_m };
@@ -392,7 +413,7 @@ fn place_double_parked_car(
     });
     if !blocked && floor.is_free(&placed.outline) {
         floor.stand(class, placed.centre);
-        floor.intruders.push(Intruder { leg, side, from_m: placed.from_m, to_m: placed.to_m });
+        floor.intruders.push(placed.intruder(leg, side));
     }
 }
 
@@ -428,7 +449,7 @@ fn place_parked(floor: &mut Floor<'_>, stall: &Stall, rng: &mut Rng) {
         && floor.is_free(&nose.outline);
     if reaches_out {
         floor.stand(class, nose.centre);
-        floor.intruders.push(Intruder { leg: stall.leg, side: stall.side, from_m: nose.from_m, to_m: nose.to_m });
+        floor.intruders.push(nose.intruder(stall.leg, stall.side));
         return;
     }
     let wish = Protrusion { wanted_m: -set_back_m, gap_m: 0.0 };
@@ -506,7 +527,8 @@ fn place_group(floor: &mut Floor<'_>, group: &Group, rng: &mut Rng) {
                 floor.stand(group.class, placed.centre);
             }
             if intrudes {
-                floor.intruders.push(Intruder { leg: index, side, from_m, to_m });
+                let protrusion_m = row.iter().map(|placed| placed.protrusion_m).fold(0.0, f32::max);
+                floor.intruders.push(Intruder { leg: index, side, from_m, to_m, protrusion_m });
             }
             return;
         }
@@ -529,7 +551,7 @@ fn close_branches(floor: &mut Floor<'_>, index: usize) {
         for centre in centres {
             floor.stand(ObstacleClass::Cone, Pose::new(centre, 0.0));
         }
-        floor.intruders.push(Intruder { leg: index, side: branch.side, from_m, to_m });
+        floor.intruders.push(Intruder { leg: index, side: branch.side, from_m, to_m, protrusion_m: 0.0 });
     }
 }
 

@@ -2,8 +2,11 @@
 
 pub mod clutter;
 pub mod corridor;
+pub mod generator;
 pub mod load;
 pub mod reference;
+pub mod solver;
+pub mod split;
 
 /// placeholder
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -35,14 +35,6 @@ pub enum LoadError {
     /// No lot of this name.
     #[error(transparent)]
     Unknown(#[from] crate::SpecError),
-    /// No solvable lot was drawn: a fault of the generator, not of the caller.
-    #[error("{name}: none of {attempts} drawn lots can be driven in both directions; take another index")]
-    Unsolvable {
-        /// The lot.
-        name: String,
-        /// How many were drawn.
-        attempts: u32,
-    },
 }
 
 /// Reads and checks a scenario file.

@@ -108,13 +108,14 @@ pub fn lot(which: ReferenceLot, seed: RootSeed) -> Scenario {
         corner_clear_m: 8.0,
         opposite_clear_m: 8.0,
         end_clear_m: END_CLEAR_M,
+        double_parked_yaw_deg: 2.0,
         stall_occupancy: 0.85,
         nose_share: 0.03,
         furniture_per_100m: Furniture { cones: 2.5, bollards: 1.5, pillars: 2.5, carts: 1.5, people: 3.0 },
         closed_arms: true,
     };
     let mut rng = seed.rng(Stream::Obstacles, which as u64);
-    let obstacles = clutter::place(&corridor, &plan, &[], &mut rng);
+    let clutter = clutter::place(&corridor, &plan, &[], &mut rng);
     let speed_bumps = clutter::speed_bumps(&corridor, SPEED_BUMP_EVERY_M);
     Scenario {
         name: which.name().to_owned(),
@@ -122,7 +123,7 @@ pub fn lot(which: ReferenceLot, seed: RootSeed) -> Scenario {
         reference_path: corridor.reference_path,
         noise: NoiseSettings::default(),
         islands: Vec::new(),
-        obstacles,
+        obstacles: clutter.obstacles,
         speed_bumps,
     }
 }

@@ -1,0 +1,542 @@
+//! Proves that a lot can be driven: a hybrid A* of the kinematic car, forward only.
+//!
+//! Independent of the expert, of the map and of the collision queries it will be judged with: it reads the scenario and
+//! has its own exact footprint test. A waypoint is free when the body, larger by a clearance all round, stands free there,
+//! and the body 0.5 m farther along the present arc too (with a margin): the near-collision rule looks that far ahead.
+
+use sim::geometry::{Pose, Vec2, distance_to_segment, edges};
+use sim::scenario::Scenario;
+use sim::vehicle::VehicleParams;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+/// Clearance that generated lots must leave around the body, metres (methods.md 11).
+pub const CLEARANCE_M: f32 = 0.25;
+/// Look-ahead of the near-collision rule, metres (methods.md 8.1).
+const SWEEP_AHEAD_M: f32 = 0.5;
+/// Share of the clearance that is kept there too.
+const SWEEP_CLEARANCE_SHARE: f32 = 0.4;
+/// Travel between two decisions, metres, driven in two halves: the steering changes in the first.
+const STEP_M: f32 = 1.0;
+/// Steering positions to either side.
+const STEERING_LEVELS: i8 = 4;
+/// Largest change per step. Two of four levels are 0.27 rad: the car's 0.344 rad/s allows that at 1.25 m/s.
+const STEERING_CHANGE_MAX: i8 = 2;
+/// Share of the car's tightest curvature that is used; policies cannot ask for more than 0.215 /m either.
+const CURVATURE_SHARE: f32 = 0.92;
+/// Poses closer than this count as one: metres and radians.
+const SAME_PLACE_M: f32 = 0.3;
+const SAME_HEADING_RAD: f32 = 4.0 * std::f32::consts::PI / 180.0;
+/// Greediness: a path, not the shortest one, is wanted.
+const HEURISTIC_WEIGHT: f32 = 1.8;
+/// Gives up after this many expansions. Solvable lots take a few hundred to a few thousand.
+const EXPANSIONS_MAX: usize = 20_000;
+/// Spacing of the waypoints returned, metres.
+const WAYPOINT_M: f32 = 0.25;
+
+/// A drivable route.
+#[derive(Debug, Clone)]
+pub struct Solution {
+    /// From start to finish, 0.25 m apart.
+    pub waypoints: Vec<Waypoint>,
+    /// Search effort.
+    pub expansions: usize,
+}
+
+/// A pose of the rear axle and the arc driven there.
+#[derive(Debug, Clone, Copy)]
+pub struct Waypoint {
+    /// Rear-axle pose in the world.
+    pub pose: Pose,
+    /// Positive to the left, 1/m.
+    pub curvature_per_m: f32,
+}
+
+/// Searches a drive from the start of the reference path to its finish that keeps `clearance_m` around the body.
+///
+/// `None` when there is none, or none was found within the budget. The scenario must be valid.
+pub fn solve(scenario: &Scenario, vehicle: &VehicleParams, clearance_m: f32) -> Option<Solution> {
+    let scene = Scene::new(scenario);
+    let goal = Goal::new(scenario);
+    let to_go = DistanceToGo::new(&scene, &goal, vehicle);
+    Search::new(&scene, &goal, &to_go, vehicle, clearance_m).run(start_pose(scenario))
+}
+
+fn start_pose(scenario: &Scenario) -> Pose {
+    let points = &scenario.reference_path.points;
+    Pose::new(points[0], (points[1] - points[0]).to_angle())
+}
+
+/// The finish line.
+struct Goal {
+    point: Vec2,
+    direction: Vec2,
+}
+
+impl Goal {
+    /// Half the length of the finish line, metres.
+    const REACH_M: f32 = 4.0;
+
+    fn new(scenario: &Scenario) -> Self {
+        let points = &scenario.reference_path.points;
+        let last = points.len() - 1;
+        Self { point: points[last], direction: (points[last] - points[last - 1]).normalize() }
+    }
+
+    fn is_reached(&self, pose: Pose) -> bool {
+        let from_goal = pose.position() - self.point;
+        let past_m = from_goal.dot(self.direction);
+        (0.0..2.0 * STEP_M).contains(&past_m)
+            && from_goal.perp_dot(self.direction).abs() < Self::REACH_M
+            && pose.ahead().dot(self.direction) > 0.5
+    }
+}
+
+/// One state of the search.
+struct Node {
+    pose: Pose,
+    steering: i8,
+    cost: f32,
+    parent: u32,
+    /// Next node of the same place, for the duplicate test.
+    next_here: u32,
+}
+
+const NONE: u32 = u32::MAX;
+
+/// Queue entry: smallest estimate first, ties in order of creation.
+struct Open {
+    estimate: f32,
+    node: u32,
+}
+
+impl PartialEq for Open {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Open {}
+impl PartialOrd for Open {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Open {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.estimate.total_cmp(&self.estimate).then(other.node.cmp(&self.node))
+    }
+}
+
+struct Search<'a> {
+    scene: &'a Scene,
+    goal: &'a Goal,
+    to_go: &'a DistanceToGo,
+    vehicle: &'a VehicleParams,
+    body: Footprint,
+    swept_body: Footprint,
+    nodes: Vec<Node>,
+    open: BinaryHeap<Open>,
+    places: Raster<u32>,
+}
+
+impl<'a> Search<'a> {
+    fn new(
+        scene: &'a Scene,
+        goal: &'a Goal,
+        to_go: &'a DistanceToGo,
+        vehicle: &'a VehicleParams,
+        clearance_m: f32,
+    ) -> Self {
+        Self {
+            scene,
+            goal,
+            to_go,
+            vehicle,
+            body: Footprint::new(vehicle, clearance_m),
+            swept_body: Footprint::new(vehicle, SWEEP_CLEARANCE_SHARE * clearance_m),
+            nodes: Vec::new(),
+            open: BinaryHeap::new(),
+            places: Raster::covering(scene.low, scene.high, SAME_PLACE_M, NONE),
+        }
+    }
+
+    fn run(mut self, start: Pose) -> Option<Solution> {
+        if !self.is_free(start, 0.0) {
+            return None;
+        }
+        self.push(start, 0, 0.0, NONE);
+        let mut expansions = 0;
+        while let Some(Open { node, .. }) = self.open.pop() {
+            if self.goal.is_reached(self.nodes[node as usize].pose) {
+                return Some(Solution { waypoints: self.trace(node), expansions });
+            }
+            expansions += 1;
+            if expansions > EXPANSIONS_MAX {
+                return None;
+            }
+            self.expand(node);
+        }
+        None
+    }
+
+    fn expand(&mut self, parent: u32) {
+        let Node { pose, steering, cost, .. } = self.nodes[parent as usize];
+        for next in steering - STEERING_CHANGE_MAX..=steering + STEERING_CHANGE_MAX {
+            if next.abs() > STEERING_LEVELS {
+                continue;
+            }
+            let [(middle, first_curvature), (end, curvature)] = self.halves(pose, steering, next);
+            if self.is_free(middle, first_curvature) && self.is_free(end, curvature) {
+                // Small prices: prefer few and gentle movements of the wheel, and the middle of the free space.
+                let effort = 0.02 * f32::from((next - steering).abs()) + 0.01 * f32::from(next.abs());
+                let closeness = 0.2 * (1.8 - self.scene.clearance_m(end.position())).max(0.0);
+                self.push(end, next, cost + STEP_M * (1.0 + effort + closeness), parent);
+            }
+        }
+    }
+
+    /// Poses and curvatures at the middle and end of a step that changes the steering.
+    fn halves(&self, pose: Pose, from: i8, to: i8) -> [(Pose, f32); 2] {
+        let first = self.curvature(0.5 * (f32::from(from) + f32::from(to)));
+        let second = self.curvature(f32::from(to));
+        let middle = pose.advanced_along_arc(first, 0.5 * STEP_M);
+        [(middle, first), (middle.advanced_along_arc(second, 0.5 * STEP_M), second)]
+    }
+
+    /// Levels are equally spaced in the steering angle.
+    fn curvature(&self, level: f32) -> f32 {
+        let wheelbase_m = self.vehicle.wheelbase_m;
+        let largest_rad = (CURVATURE_SHARE * self.vehicle.curvature_max_per_m() * wheelbase_m).atan();
+        (largest_rad * level / f32::from(STEERING_LEVELS)).tan() / wheelbase_m
+    }
+
+    fn is_free(&self, pose: Pose, curvature_per_m: f32) -> bool {
+        self.body.is_free(self.scene, pose)
+            && self.swept_body.is_free(self.scene, pose.advanced_along_arc(curvature_per_m, SWEEP_AHEAD_M))
+    }
+
+    /// Adds a state unless an equal one is known. The first one found is kept: the search is greedy anyway.
+    fn push(&mut self, pose: Pose, steering: i8, cost: f32, parent: u32) {
+        // Measured at the front axle, which leads the car through a corner as its driver would.
+        let front = pose.position() + pose.ahead() * self.vehicle.wheelbase_m;
+        let to_go_m = self.to_go.at(front);
+        if !to_go_m.is_finite() {
+            return;
+        }
+        let heading = |pose: Pose| (pose.heading_rad / SAME_HEADING_RAD).round() as i32;
+        let here = self.places.at_mut(pose.position());
+        let mut known = *here;
+        while known != NONE {
+            let node = &self.nodes[known as usize];
+            if node.steering == steering && heading(node.pose) == heading(pose) {
+                return;
+            }
+            known = node.next_here;
+        }
+        let index = self.nodes.len() as u32;
+        self.nodes.push(Node { pose, steering, cost, parent, next_here: *here });
+        *here = index;
+        self.open.push(Open { estimate: cost + HEURISTIC_WEIGHT * to_go_m, node: index });
+    }
+
+    fn trace(&self, last: u32) -> Vec<Waypoint> {
+        let mut chain = vec![last];
+        while let Some(&node) = chain.last()
+            && self.nodes[node as usize].parent != NONE
+        {
+            chain.push(self.nodes[node as usize].parent);
+        }
+        chain.reverse();
+        let first = &self.nodes[chain[0] as usize];
+        let mut waypoints = vec![Waypoint { pose: first.pose, curvature_per_m: 0.0 }];
+        for pair in chain.windows(2) {
+            let (from, to) = (&self.nodes[pair[0] as usize], &self.nodes[pair[1] as usize]);
+            let mut pose = from.pose;
+            for (_, curvature_per_m) in self.halves(from.pose, from.steering, to.steering) {
+                for _ in 0..(0.5 * STEP_M / WAYPOINT_M) as usize {
+                    pose = pose.advanced_along_arc(curvature_per_m, WAYPOINT_M);
+                    waypoints.push(Waypoint { pose, curvature_per_m });
+                }
+            }
+        }
+        waypoints
+    }
+}
+
+/// A rectangle around the body, tested exactly against every edge of the scene.
+struct Footprint {
+    rear_m: f32,
+    front_m: f32,
+    half_width_m: f32,
+    disc_centres_m: [f32; Self::DISCS],
+    disc_radius_m: f32,
+}
+
+impl Footprint {
+    const DISCS: usize = 5;
+
+    fn new(vehicle: &VehicleParams, inflation_m: f32) -> Self {
+        let (rear_m, front_m) = (-vehicle.rear_overhang_m - inflation_m, vehicle.front_m() + inflation_m);
+        let half_width_m = 0.5 * vehicle.width_m + inflation_m;
+        let piece_m = (front_m - rear_m) / Self::DISCS as f32;
+        Self {
+            rear_m,
+            front_m,
+            half_width_m,
+            disc_centres_m: std::array::from_fn(|i| rear_m + (i as f32 + 0.5) * piece_m),
+            disc_radius_m: (0.5 * piece_m).hypot(half_width_m),
+        }
+    }
+
+    fn is_free(&self, scene: &Scene, pose: Pose) -> bool {
+        let (origin, ahead) = (pose.position(), pose.ahead());
+        let clearance_m = self
+            .disc_centres_m
+            .iter()
+            .map(|&x_m| scene.clearance_m(origin + ahead * x_m))
+            .fold(f32::INFINITY, f32::min);
+        // The raster is within its slack of the truth: most poses are decided without looking at an edge.
+        if clearance_m > self.disc_radius_m + Scene::SLACK_M {
+            return true;
+        }
+        if clearance_m < self.half_width_m - Scene::SLACK_M {
+            return false;
+        }
+        let ego = pose.world_from_ego();
+        !scene.any_edge_near(&self.corners(pose), |a, b| self.meets_segment(ego.inverse_point(a), ego.inverse_point(b)))
+    }
+
+    fn corners(&self, pose: Pose) -> [Vec2; 4] {
+        let world_from_ego = pose.world_from_ego();
+        [(self.front_m, 1.0), (self.rear_m, 1.0), (self.rear_m, -1.0), (self.front_m, -1.0)]
+            .map(|(x_m, side)| world_from_ego.point(Vec2::new(x_m, side * self.half_width_m)))
+    }
+
+    /// Liang–Barsky: whether any part of a segment, given in the ego frame, lies in the rectangle.
+    fn meets_segment(&self, a: Vec2, b: Vec2) -> bool {
+        let ab = b - a;
+        let (mut enter, mut leave) = (0.0_f32, 1.0_f32);
+        for (from, step, low, high) in
+            [(a.x, ab.x, self.rear_m, self.front_m), (a.y, ab.y, -self.half_width_m, self.half_width_m)]
+        {
+            if step == 0.0 {
+                if from < low || from > high {
+                    return false;
+                }
+            } else {
+                let (t, u) = ((low - from) / step, (high - from) / step);
+                enter = enter.max(t.min(u));
+                leave = leave.min(t.max(u));
+            }
+        }
+        enter <= leave
+    }
+}
+
+/// Everything solid as edges, with a coarse raster of distances and buckets of edges.
+struct Scene {
+    low: Vec2,
+    high: Vec2,
+    edges: Vec<(Vec2, Vec2)>,
+    clearance_m: Raster<f32>,
+    buckets: Raster<Vec<u32>>,
+}
+
+impl Scene {
+    const NODE_M: f32 = 0.25;
+    /// A look-up returns the value of the nearest node.
+    const SLACK_M: f32 = Self::NODE_M * std::f32::consts::FRAC_1_SQRT_2;
+    const CAP_M: f32 = 2.2;
+    const BUCKET_M: f32 = 2.0;
+
+    fn new(scenario: &Scenario) -> Self {
+        let (low, high) = crate::corridor::bounds(&scenario.boundary);
+        let margin = Vec2::splat(1.0);
+        let (low, high) = (low - margin, high + margin);
+        let mut scene = Self {
+            low,
+            high,
+            edges: Vec::new(),
+            clearance_m: Raster::covering(low, high, Self::NODE_M, Self::CAP_M),
+            buckets: Raster::covering(low, high, Self::BUCKET_M, Vec::new()),
+        };
+        scene.add_outline(&scenario.boundary);
+        scene.clearance_m.negate_outside(&scenario.boundary);
+        for island in &scenario.islands {
+            scene.add_outline(&island.polygon);
+        }
+        for obstacle in &scenario.obstacles {
+            let [length_m, width_m, _] = obstacle.size_m();
+            // The circumscribed octagon of a round thing reaches 8 % farther than its radius.
+            let reach_m = 0.55 * length_m.hypot(width_m) + Self::SLACK_M;
+            let centre = obstacle.centre().position();
+            let is_within = centre.cmpge(low).all() && centre.cmple(high).all();
+            // Wholly behind the boundary: the boundary's edges come first.
+            if is_within && scene.clearance_m.at(centre) > -reach_m {
+                scene.add_outline(&obstacle.outline());
+            }
+        }
+        scene
+    }
+
+    fn add_outline(&mut self, outline: &[Vec2]) {
+        for (a, b) in edges(outline) {
+            let index = self.edges.len() as u32;
+            self.edges.push((a, b));
+            let (low, high) = (a.min(b), a.max(b));
+            self.clearance_m.for_each_within(low, high, Self::CAP_M, |centre, value| {
+                let distance_m = distance_to_segment(centre, a, b);
+                // What is outside the boundary stays negative.
+                if distance_m < value.abs() {
+                    *value = distance_m.copysign(*value);
+                }
+            });
+            self.buckets.for_each_within(low, high, 0.0, |_, bucket| bucket.push(index));
+        }
+    }
+
+    /// Distance to the nearest edge, metres, negative outside the boundary (insides of obstacles are not marked: the
+    /// car cannot get there without crossing an edge).
+    fn clearance_m(&self, point: Vec2) -> f32 {
+        self.clearance_m.at(point)
+    }
+
+    fn any_edge_near(&self, corners: &[Vec2; 4], test: impl Fn(Vec2, Vec2) -> bool) -> bool {
+        let (low, high) = crate::corridor::bounds(corners);
+        self.buckets.any_within(low, high, |bucket| {
+            bucket.iter().any(|&index| {
+                let (a, b) = self.edges[index as usize];
+                test(a, b)
+            })
+        })
+    }
+}
+
+/// Distance to the finish along free ground, with a price for narrow passages; infinite where there is no way.
+struct DistanceToGo(Raster<f32>);
+
+impl DistanceToGo {
+    fn new(scene: &Scene, goal: &Goal, vehicle: &VehicleParams) -> Self {
+        let half_width_m = 0.5 * vehicle.width_m;
+        let mut to_go = Raster::covering(scene.low, scene.high, Scene::NODE_M, f32::INFINITY);
+        // The front axle is at the source when the rear axle reaches the finish.
+        let beyond = goal.point + goal.direction * vehicle.wheelbase_m;
+        let source = if scene.clearance_m(beyond) > half_width_m { beyond } else { goal.point };
+        let cols = to_go.cols as i32;
+        let mut open = BinaryHeap::new();
+        let first = to_go.index(source);
+        to_go.values[first] = 0.0;
+        open.push(Open { estimate: 0.0, node: first as u32 });
+        while let Some(Open { estimate, node }) = open.pop() {
+            let node = node as usize;
+            if estimate > to_go.values[node] {
+                continue;
+            }
+            for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)] {
+                let (x, y) = (node as i32 % cols + dx, node as i32 / cols + dy);
+                if x < 0 || y < 0 || x >= cols || y >= to_go.rows as i32 {
+                    continue;
+                }
+                let next = (y * cols + x) as usize;
+                let clearance_m = scene.clearance_m.values[next];
+                if clearance_m < half_width_m - Scene::SLACK_M {
+                    continue;
+                }
+                let length_m = Scene::NODE_M * ((dx * dx + dy * dy) as f32).sqrt();
+                let total = estimate + length_m * (1.0 + 0.4 * (1.8 - clearance_m).max(0.0));
+                if total < to_go.values[next] {
+                    to_go.values[next] = total;
+                    open.push(Open { estimate: total, node: next as u32 });
+                }
+            }
+        }
+        Self(to_go)
+    }
+
+    fn at(&self, point: Vec2) -> f32 {
+        self.0.at(point)
+    }
+}
+
+/// Values on square cells.
+struct Raster<T> {
+    low: Vec2,
+    cell_m: f32,
+    cols: usize,
+    rows: usize,
+    values: Vec<T>,
+}
+
+impl<T: Clone> Raster<T> {
+    fn covering(low: Vec2, high: Vec2, cell_m: f32, value: T) -> Self {
+        let size = ((high - low) / cell_m).ceil();
+        let (cols, rows) = (size.x as usize + 1, size.y as usize + 1);
+        Self { low, cell_m, cols, rows, values: vec![value; cols * rows] }
+    }
+
+    /// Cell of a point; points outside count to the nearest border cell.
+    fn cell(&self, point: Vec2) -> (usize, usize) {
+        let cell = (point - self.low) / self.cell_m;
+        ((cell.x.max(0.0) as usize).min(self.cols - 1), (cell.y.max(0.0) as usize).min(self.rows - 1))
+    }
+
+    fn index(&self, point: Vec2) -> usize {
+        let (col, row) = self.cell(point);
+        row * self.cols + col
+    }
+
+    fn at_mut(&mut self, point: Vec2) -> &mut T {
+        let index = self.index(point);
+        &mut self.values[index]
+    }
+
+    fn centre(&self, col: usize, row: usize) -> Vec2 {
+        self.low + (Vec2::new(col as f32, row as f32) + 0.5) * self.cell_m
+    }
+
+    /// Every cell that meets a box widened by a margin.
+    fn for_each_within(&mut self, low: Vec2, high: Vec2, margin_m: f32, mut visit: impl FnMut(Vec2, &mut T)) {
+        let (first, last) = (self.cell(low - margin_m), self.cell(high + margin_m));
+        for row in first.1..=last.1 {
+            for col in first.0..=last.0 {
+                let centre = self.centre(col, row);
+                visit(centre, &mut self.values[row * self.cols + col]);
+            }
+        }
+    }
+
+    fn any_within(&self, low: Vec2, high: Vec2, test: impl Fn(&T) -> bool) -> bool {
+        let (first, last) = (self.cell(low), self.cell(high));
+        (first.1..=last.1)
+            .any(|row| self.values[row * self.cols + first.0..=row * self.cols + last.0].iter().any(&test))
+    }
+}
+
+impl Raster<f32> {
+    fn at(&self, point: Vec2) -> f32 {
+        self.values[self.index(point)]
+    }
+
+    fn negate_outside(&mut self, polygon: &[Vec2]) {
+        for row in 0..self.rows {
+            // One ray per row: where it crosses the polygon, inside and outside change.
+            let y_m = self.centre(0, row).y;
+            let mut crossings: Vec<f32> = edges(polygon)
+                .filter(|(a, b)| (a.y > y_m) != (b.y > y_m))
+                .map(|(a, b)| a.x + (y_m - a.y) / (b.y - a.y) * (b.x - a.x))
+                .collect();
+            crossings.sort_by(f32::total_cmp);
+            let mut next = 0;
+            for col in 0..self.cols {
+                let x_m = self.centre(col, row).x;
+                while next < crossings.len() && crossings[next] <= x_m {
+                    next += 1;
+                }
+                if next % 2 == 0 {
+                    let value = &mut self.values[row * self.cols + col];
+                    *value = -value.abs();
+                }
+            }
+        }
+    }
+}
