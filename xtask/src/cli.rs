@@ -1,0 +1,209 @@
+//! The command line, nothing else.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+/// Learns to drive through parking lots, and measures how well.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", after_help = EXAMPLES)]
+pub struct Cli {
+    /// Threads to compute with [default: all cores]. Changes nothing but the time it takes.
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  cargo xtask train-dagger                       train, print the paper's table, check on three lots
+  cargo xtask train-dagger --preset smoke        the same line end to end in seconds
+  cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1
+  cargo xtask settings --preset paper            every setting there is
+  cargo xtask generate --lots lot-a --out lots   TOML and a picture";
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Behaviour cloning: the expert drives once, a network learns from it.
+    #[command(after_help = TRAIN_EXAMPLES)]
+    TrainBc(TrainArgs),
+    /// Behaviour cloning, then DAgger; ends with the paper's table and a closed-loop check on three lots.
+    #[command(after_help = TRAIN_EXAMPLES)]
+    TrainDagger(TrainArgs),
+    /// Drives drivers over lots and counts near-collisions and the safe ratio.
+    #[command(after_help = EVALUATE_EXAMPLES)]
+    Evaluate(EvaluateArgs),
+    /// Writes lots as TOML plus a top-view PNG.
+    #[command(after_help = GENERATE_EXAMPLES)]
+    Generate(GenerateArgs),
+    /// How many pixels of the perceived bird's-eye view are right.
+    PixelAccuracy(PixelAccuracyArgs),
+    /// Prints the resolved settings as TOML.
+    Settings(SettingsArgs),
+    /// Lists the lots that can be named.
+    Lots,
+    /// Lists the drivers that can be named.
+    Drivers,
+}
+
+/// Where settings come from, lowest priority first: preset, file, `--set`, then the flags of the command.
+#[derive(Debug, Clone, Default, Args)]
+pub struct LayerArgs {
+    /// Named set of settings to start from.
+    #[arg(long, value_name = "NAME", default_value = "default")]
+    pub preset: String,
+    /// TOML file with the settings to change; the rest stays as in the preset.
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Changes one setting, e.g. `dagger.eta=0.8`; may be repeated.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    pub overrides: Vec<String>,
+}
+
+/// Settings and their root seed.
+#[derive(Debug, Clone, Default, Args)]
+pub struct SettingsArgs {
+    /// Layers.
+    #[command(flatten)]
+    pub layers: LayerArgs,
+    /// Root seed of training data, weights and shuffling.
+    #[arg(long)]
+    pub seed: Option<u64>,
+}
+
+const TRAIN_EXAMPLES: &str = "\
+Examples:
+  cargo xtask train-dagger --seed 2
+  cargo xtask train-dagger --set dagger.eta=0.85 --set dagger.fit_iteration.budget.steps=2000
+  cargo xtask train-dagger --set training.lots='[\"lot-a\", \"lot-c\"]' --no-eval
+  cargo xtask train-dagger --resume runs/train-dagger-default-s1";
+
+/// Arguments of the training commands.
+#[derive(Debug, Clone, Default, Args)]
+pub struct TrainArgs {
+    /// Settings.
+    #[command(flatten)]
+    pub settings: SettingsArgs,
+    /// Folder of the run [default: runs/<command>-<preset>-s<seed>, the next free one].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Deletes what an earlier run left in `--out`.
+    #[arg(long, requires = "out")]
+    pub overwrite: bool,
+    /// Continues an interrupted run with its own settings, to the same result.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "config", "overrides", "seed", "out"])]
+    pub resume: Option<PathBuf>,
+    /// Trains only: no closed-loop check at the end.
+    #[arg(long)]
+    pub no_eval: bool,
+}
+
+const EVALUATE_EXAMPLES: &str = "\
+Examples:
+  cargo xtask evaluate --driver expert --lots lot-a --trials 2
+  cargo xtask evaluate --driver run:runs/train-dagger-default-s1/bc --driver run:runs/train-dagger-default-s1
+  cargo xtask evaluate --driver net:runs/train-dagger-default-s1/round-03 --lots lot-b --noise hard --out runs/hard";
+
+/// Arguments of `evaluate`.
+#[derive(Debug, Clone, Args)]
+pub struct EvaluateArgs {
+    /// Who drives; may be repeated. See `cargo xtask drivers`.
+    #[arg(long = "driver", value_name = "SPEC", required = true, num_args = 1..)]
+    pub drivers: Vec<String>,
+    /// Lots to drive; see `cargo xtask lots` [default: the setting evaluation.lots].
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',')]
+    pub lots: Vec<String>,
+    /// Trials per lot and direction; each draws its own obstacles and noise.
+    #[arg(long, value_name = "N")]
+    pub trials: Option<u32>,
+    /// Which ways the lots are driven.
+    #[arg(long)]
+    pub directions: Option<Directions>,
+    /// What is seen wrongly.
+    #[arg(long)]
+    pub noise: Option<NoiseArg>,
+    /// Seed of obstacles and noise of the trials.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Settings.
+    #[command(flatten)]
+    pub layers: LayerArgs,
+    /// Folder of the results [default: runs/evaluate-<preset>-s<seed>, the next free one].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Deletes what an earlier run left in `--out`.
+    #[arg(long, requires = "out")]
+    pub overwrite: bool,
+}
+
+/// Ways a lot can be driven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Directions {
+    /// Forward and reverse.
+    Both,
+    /// From start to finish.
+    Forward,
+    /// From finish to start.
+    Reverse,
+}
+
+/// Levels of sensor noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum NoiseArg {
+    /// None.
+    Clean,
+    /// About 98 % of the pixels right.
+    Paper,
+    /// Twice the errors of `paper`.
+    Hard,
+    /// The level the lot's file asks for.
+    Lot,
+}
+
+const GENERATE_EXAMPLES: &str = "\
+Examples:
+  cargo xtask generate --lots lot-a,lot-b,lot-c --out lots
+  cargo xtask generate --lots lot-a --seed 7 --count 5 --out lots";
+
+/// Arguments of `generate`.
+#[derive(Debug, Clone, Args)]
+pub struct GenerateArgs {
+    /// Lots to write; see `cargo xtask lots`.
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', required = true)]
+    pub lots: Vec<String>,
+    /// Seed of the obstacles.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Drawings of each lot, each with its own obstacles.
+    #[arg(long, default_value_t = 1)]
+    pub count: u32,
+    /// Folder to write into.
+    #[arg(long, value_name = "DIR", default_value = "lots")]
+    pub out: PathBuf,
+    /// Pixels per metre of the pictures [default: as fits 1600 pixels].
+    #[arg(long, value_name = "PIXELS")]
+    pub scale: Option<f32>,
+    /// Replaces files of the same name.
+    #[arg(long)]
+    pub overwrite: bool,
+}
+
+/// Arguments of `pixel-accuracy`.
+#[derive(Debug, Clone, Args)]
+pub struct PixelAccuracyArgs {
+    /// Lots to look at; see `cargo xtask lots`.
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "lot-a,lot-b,lot-c")]
+    pub lots: Vec<String>,
+    /// Noise levels.
+    #[arg(long, num_args = 1.., value_delimiter = ',', default_value = "paper")]
+    pub level: Vec<NoiseArg>,
+    /// Trials per lot and direction.
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    pub trials: u32,
+    /// Settings.
+    #[command(flatten)]
+    pub settings: SettingsArgs,
+}

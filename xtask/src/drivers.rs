@@ -1,0 +1,119 @@
+//! Drivers that can be named on the command line.
+
+use crate::run_dir;
+use crate::settings::Settings;
+use anyhow::{Context as _, bail, ensure};
+use expert::ScriptedExpert;
+use policy::checkpoint::Checkpoint;
+use policy::drivers::NetFleet;
+use rayon::prelude::*;
+use sim::driver::{Decision, Driver, Fleet, Seat};
+use std::path::{Path, PathBuf};
+
+/// Ways to name a driver: how it is written, what it means.
+pub const SPECS: [(&str, &str); 4] = [
+    ("expert", "the scripted teacher; sees the truth"),
+    ("run:DIR", "the final policy of a training run"),
+    ("run:DIR/bc", "its behaviour cloning"),
+    ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
+];
+
+/// A driver by name.
+#[derive(Debug, Clone)]
+pub struct Contestant {
+    /// In tables.
+    pub name: String,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    Expert,
+    Network(Box<Checkpoint>),
+}
+
+impl Contestant {
+    /// The scripted expert.
+    pub fn expert() -> Self {
+        Self { name: "expert".to_owned(), kind: Kind::Expert }
+    }
+
+    /// A trained network.
+    pub fn network(name: &str, checkpoint: Checkpoint) -> Self {
+        Self { name: name.to_owned(), kind: Kind::Network(Box::new(checkpoint)) }
+    }
+
+    /// Reads a spec.
+    ///
+    /// # Errors
+    /// If nothing is named so, or its files are not what they should be.
+    pub fn parse(spec: &str) -> anyhow::Result<Self> {
+        let folder: PathBuf = if spec == "expert" {
+            return Ok(Self::expert());
+        } else if let Some(run) = spec.strip_prefix("run:") {
+            run_dir::policy_folder(Path::new(run)).with_context(|| format!("driver {spec:?}"))?
+        } else if let Some(folder) = spec.strip_prefix("net:") {
+            folder.into()
+        } else {
+            let known: Vec<&str> = SPECS.iter().map(|(spec, _)| *spec).collect();
+            bail!("no driver {spec:?}; there are {}", known.join(", "))
+        };
+        let checkpoint = Checkpoint::load(&folder).with_context(|| format!("driver {spec:?}"))?;
+        Ok(Self::network(spec, checkpoint))
+    }
+
+    /// Whether it can drive with these settings.
+    ///
+    /// # Errors
+    /// If it was trained for another patch of ground.
+    pub fn check(&self, settings: &Settings) -> anyhow::Result<()> {
+        if let Kind::Network(checkpoint) = &self.kind {
+            let shown = settings.episode.sensing.geometry;
+            ensure!(
+                checkpoint.geometry == shown,
+                "driver {:?} was trained on {:?}, but episode.sensing.geometry is {shown:?}; use the settings it was \
+                 trained with (--config RUN/settings.toml)",
+                self.name,
+                checkpoint.geometry
+            );
+        }
+        Ok(())
+    }
+
+    /// Seats it in this many cars, which are driven in lock-step.
+    pub fn fleet(&self, settings: &Settings, cars: usize) -> Box<dyn Fleet> {
+        match &self.kind {
+            Kind::Expert => Box::new(OneEach((0..cars).map(|_| expert(settings)).collect())),
+            Kind::Network(checkpoint) => Box::new(NetFleet::new((**checkpoint).clone(), settings.dagger.device)),
+        }
+    }
+}
+
+/// A fresh expert.
+pub fn expert(settings: &Settings) -> ScriptedExpert {
+    ScriptedExpert::new(settings.expert.clone(), &settings.episode.vehicle, settings.episode.sensing.geometry)
+}
+
+/// A driver per car, asked in parallel: each answers for its own car alone, so the order does not matter.
+struct OneEach<D>(Vec<D>);
+
+impl<D: Driver + Send> Fleet for OneEach<D> {
+    fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
+        let mut waiting = seats.iter().peekable();
+        let mut asked: Vec<_> = self
+            .0
+            .iter_mut()
+            .enumerate()
+            .filter_map(|(episode, driver)| Some((driver, waiting.next_if(|seat| seat.episode == episode)?)))
+            .collect();
+        asked
+            .par_iter_mut()
+            .map(|(driver, seat)| {
+                if seat.was_reset {
+                    driver.reset();
+                }
+                driver.decide(&seat.situation)
+            })
+            .collect_into_vec(decisions);
+    }
+}

@@ -1,0 +1,32 @@
+//! The bench: parse → resolve → call → report. No algorithm lives here.
+//!
+//! | file | what |
+//! |---|---|
+//! | [`cli`] | the command line, nothing else |
+//! | [`settings`] | preset → file → `--set` → flags, into one checked [`settings::Settings`] |
+//! | [`train`], [`evaluate`], [`generate`], [`pixel_accuracy`], [`listing`] | the commands |
+//! | [`lots`], [`drivers`] | what can be named on the command line |
+//! | [`trials`] | which obstacles and which noise a trial has |
+//! | [`table1`], [`summary`], [`report`] | what is printed and written |
+//! | [`run_dir`] | the folder of a run and how it is claimed |
+//! | [`progress`], [`interrupt`] | bars, Ctrl-C |
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what a command does")]
+#![allow(clippy::disallowed_methods, reason = "wall time is shown to people here; nothing computed depends on it")]
+
+pub mod cli;
+pub mod drivers;
+pub mod evaluate;
+pub mod generate;
+pub mod interrupt;
+pub mod listing;
+pub mod lots;
+pub mod pixel_accuracy;
+pub mod progress;
+pub mod render;
+pub mod report;
+pub mod run_dir;
+pub mod settings;
+pub mod summary;
+pub mod table1;
+pub mod train;
+pub mod trials;

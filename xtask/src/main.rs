@@ -1,0 +1,47 @@
+//! `cargo xtask <command>`: see [`xtask::cli`] for the commands.
+
+use clap::Parser as _;
+use std::process::ExitCode;
+use xtask::cli::{Cli, Command};
+use xtask::{evaluate, generate, interrupt, listing, pixel_accuracy, train};
+
+// Training allocates and frees large buffers all the time: a quarter faster than with the system's allocator.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+/// Bad input, or an environment in which the work cannot be done. Our own bugs panic (101).
+const EXIT_REFUSED: u8 = 2;
+/// Ended by Ctrl-C, as shells have it.
+const EXIT_INTERRUPTED: u8 = 130;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match run(cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if error.is::<interrupt::Interrupted>() => {
+            eprintln!("{error}");
+            ExitCode::from(EXIT_INTERRUPTED)
+        }
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(EXIT_REFUSED)
+        }
+    }
+}
+
+fn run(cli: Cli) -> anyhow::Result<()> {
+    interrupt::install()?;
+    if let Some(threads) = cli.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads.get()).build_global()?;
+    }
+    match cli.command {
+        Command::TrainBc(args) => train::bc(&args),
+        Command::TrainDagger(args) => train::dagger(&args),
+        Command::Evaluate(args) => evaluate::run(&args),
+        Command::Generate(args) => generate::run(&args),
+        Command::PixelAccuracy(args) => pixel_accuracy::run(&args),
+        Command::Settings(args) => listing::settings(&args),
+        Command::Lots => listing::lots(),
+        Command::Drivers => listing::drivers(),
+    }
+}

@@ -1,0 +1,224 @@
+//! The folder of a run: claimed before the first step, never written over by accident.
+//!
+//! ```text
+//! runs/train-dagger-default-s1/
+//!   manifest.toml      who made this: revision, compiler, command line, seed
+//!   settings.toml      every setting
+//!   round-00/ …        data, network and loss curve of each round (policy::dataset::store)
+//!   table1.md .json    the paper's table from this run
+//!   evaluation.md .json .csv, episodes.jsonl
+//!   finished.toml      written last
+//! ```
+
+use crate::settings::Settings;
+use anyhow::{Context as _, bail, ensure};
+use policy::checkpoint::Checkpoint;
+use serde::Serialize;
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const MANIFEST: &str = "manifest.toml";
+const SETTINGS: &str = "settings.toml";
+const FINISHED: &str = "finished.toml";
+
+/// A claimed folder.
+#[derive(Debug, Clone)]
+pub struct RunDir {
+    path: PathBuf,
+}
+
+/// What made a run.
+#[derive(Debug, Serialize)]
+struct Manifest {
+    command_line: Vec<String>,
+    preset: String,
+    root_seed: u64,
+    evaluation_seed: u64,
+    git_revision: Option<String>,
+    /// Whether files of the repository differ from that revision.
+    git_dirty: Option<bool>,
+    xtask_version: &'static str,
+    rustc_version: &'static str,
+    threads: usize,
+    target: String,
+}
+
+/// Where a run goes.
+#[derive(Debug, Clone, Copy)]
+pub struct Place<'a> {
+    /// `--out`.
+    pub out: Option<&'a Path>,
+    /// `--overwrite`.
+    pub overwrite: bool,
+    /// Name of the command.
+    pub command: &'a str,
+    /// Name of the preset.
+    pub preset: &'a str,
+    /// Seed that belongs into the name.
+    pub seed: u64,
+}
+
+impl RunDir {
+    /// Claims a folder and writes down what is about to happen.
+    ///
+    /// # Errors
+    /// If the folder is taken or cannot be written.
+    pub fn create(place: &Place<'_>, settings: &Settings) -> anyhow::Result<Self> {
+        let path = match place.out {
+            Some(out) => claim_named(out, place.overwrite)?,
+            None => claim_next_free(&format!("{}-{}-s{}", place.command, place.preset, place.seed))?,
+        };
+        let run = Self { path };
+        run.write(SETTINGS, settings.to_toml().as_bytes())?;
+        let manifest = toml::to_string(&Manifest::new(place.preset, settings)).expect("a manifest is plain values");
+        run.write(MANIFEST, manifest.as_bytes())?;
+        Ok(run)
+    }
+
+    /// Reopens the folder of an interrupted run.
+    ///
+    /// # Errors
+    /// If there is none, or it is finished.
+    pub fn resume(path: &Path) -> anyhow::Result<(Self, Settings)> {
+        ensure!(path.is_dir(), "{}: there is no such run to resume", path.display());
+        ensure!(
+            !path.join(FINISHED).is_file(),
+            "{}: this run is finished; nothing is left to resume",
+            path.display()
+        );
+        let settings = Settings::read(&path.join(SETTINGS))?;
+        Ok((Self { path: path.to_path_buf() }, settings))
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes a file beside and renames it, so that it is never there half.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
+        write_whole(&self.path.join(name), content)
+    }
+
+    /// Marks the run as finished.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn finish(&self, result: &impl Serialize) -> anyhow::Result<()> {
+        self.write(FINISHED, toml::to_string(result)?.as_bytes())
+    }
+}
+
+/// Writes a file beside and renames it.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_whole(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+    let partial = path.with_added_extension("partial");
+    let write = || {
+        let mut file = fs::File::create(&partial)?;
+        file.write_all(content)?;
+        file.sync_all()?;
+        fs::rename(&partial, path)
+    };
+    write().with_context(|| format!("{}: cannot be written; check that the folder is writable and has space", path.display()))
+}
+
+/// The folder with the checkpoint that `run:DIR` or `run:DIR/bc` names.
+///
+/// # Errors
+/// If there is no run, or no network in it yet.
+pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
+    let (run, is_bc) = match (spec.file_name(), spec.parent()) {
+        (Some(name), Some(run)) if name == "bc" && !spec.is_dir() => (run, true),
+        _ => (spec, false),
+    };
+    ensure!(
+        run.join(SETTINGS).is_file(),
+        "{}: this is no run; train one with cargo xtask train-dagger, or list the folders in runs/",
+        run.display()
+    );
+    let last = if is_bc {
+        Some(run.join("round-00"))
+    } else {
+        let mut rounds: Vec<PathBuf> = fs::read_dir(run)
+            .with_context(|| run.display().to_string())?
+            .filter_map(|entry| Some(entry.ok()?.path()))
+            .filter(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("round-")))
+            .filter(|path| Checkpoint::exists(path))
+            .collect();
+        rounds.sort();
+        let last_fit = Some(run.join("final")).filter(|path| Checkpoint::exists(path));
+        last_fit.or_else(|| rounds.pop())
+    };
+    last.filter(|path| Checkpoint::exists(path)).with_context(|| {
+        format!("{}: no network is trained there yet; finish it with --resume {0}", run.display())
+    })
+}
+
+fn claim_named(path: &Path, overwrite: bool) -> anyhow::Result<PathBuf> {
+    if path.exists() && fs::read_dir(path).map_or(true, |mut entries| entries.next().is_some()) {
+        if !overwrite {
+            let way_out = if path.join(FINISHED).is_file() || !path.join(SETTINGS).is_file() {
+                "choose another --out, or delete it with --overwrite".to_owned()
+            } else {
+                format!("continue it with --resume {}, choose another --out, or delete it with --overwrite", path.display())
+            };
+            bail!("{}: this folder is not empty; {way_out}", path.display());
+        }
+        ensure!(
+            path.join(SETTINGS).is_file(),
+            "{}: this folder is not a run, so --overwrite will not delete it; choose another --out",
+            path.display()
+        );
+        fs::remove_dir_all(path).with_context(|| format!("{}: cannot be deleted", path.display()))?;
+    }
+    fs::create_dir_all(path).with_context(|| format!("{}: cannot be created; choose another --out", path.display()))?;
+    Ok(path.to_path_buf())
+}
+
+/// `runs/NAME`, or with the next free number. Creating the folder is the claim: two commands started at once get two.
+fn claim_next_free(name: &str) -> anyhow::Result<PathBuf> {
+    let runs = Path::new("runs");
+    fs::create_dir_all(runs).context("runs: cannot be created here; choose a folder with --out")?;
+    let mut n = 1;
+    loop {
+        let path = runs.join(if n == 1 { name.to_owned() } else { format!("{name}-{n}") });
+        match fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => n += 1,
+            Err(error) => {
+                return Err(error).with_context(|| format!("{}: choose a folder with --out", path.display()));
+            }
+        }
+    }
+}
+
+impl Manifest {
+    fn new(preset: &str, settings: &Settings) -> Self {
+        let status = git(&["status", "--porcelain", "--untracked-files=no"]);
+        Self {
+            command_line: std::env::args().skip(1).collect(),
+            preset: preset.to_owned(),
+            root_seed: settings.seed.0,
+            evaluation_seed: settings.evaluation.seed.0,
+            git_revision: git(&["rev-parse", "HEAD"]),
+            git_dirty: status.map(|changes| !changes.is_empty()),
+            xtask_version: env!("CARGO_PKG_VERSION"),
+            rustc_version: env!("XTASK_RUSTC"),
+            threads: rayon::current_num_threads(),
+            target: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
+        }
+    }
+}
+
+/// What git says about the repository this was built from; `None` without git or repository.
+fn git(args: &[&str]) -> Option<String> {
+    let output = Command::new("git").args(["-C", env!("CARGO_MANIFEST_DIR")]).args(args).output().ok()?;
+    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}

@@ -1,0 +1,101 @@
+//! Named sets of settings, each with its reason.
+
+use super::{EvaluationSettings, NoiseChoice, Settings, TrainingSettings};
+use anyhow::bail;
+use expert::ExpertConfig;
+use policy::dagger::{DaggerConfig, StartFrom};
+use policy::dataset::ValidationSplit;
+use policy::fit::{Budget, FitSettings};
+use policy::network::{ConvConfig, LookAheadNetConfig};
+use sim::episode::EpisodeConfig;
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+
+/// A preset.
+#[derive(Debug, Clone, Copy)]
+pub struct Preset {
+    /// As named on the command line.
+    pub name: &'static str,
+    /// What it is for.
+    pub about: &'static str,
+    make: fn() -> Settings,
+}
+
+/// Every preset.
+pub const PRESETS: [Preset; 3] = [
+    Preset { name: "default", about: "the whole line within minutes on two cores", make: default },
+    Preset { name: "paper", about: "the paper's network and hyper-parameters; many hours", make: paper },
+    Preset { name: "smoke", about: "every step, as short as possible: for tests", make: smoke },
+];
+
+pub(super) fn by_name(name: &str) -> anyhow::Result<Settings> {
+    if let Some(preset) = PRESETS.iter().find(|preset| preset.name == name) {
+        return Ok((preset.make)());
+    }
+    let names: Vec<&str> = PRESETS.iter().map(|preset| preset.name).collect();
+    bail!("no preset {name:?}; there are {}", names.join(", "))
+}
+
+fn default() -> Settings {
+    Settings { dagger: DaggerConfig::quick(), ..paper() }
+}
+
+/// Paper: data from lot a, one round trip per round; evaluation on three lots, both ways, five trials.
+fn paper() -> Settings {
+    let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+    Settings {
+        seed: RootSeed(1),
+        training: TrainingSettings {
+            lots: names(&["lot-a"]),
+            directions: Direction::BOTH.to_vec(),
+            trials: 1,
+            noise: NoiseChoice::Paper,
+        },
+        evaluation: EvaluationSettings {
+            seed: RootSeed(1),
+            lots: names(&["lot-a", "lot-b", "lot-c"]),
+            directions: Direction::BOTH.to_vec(),
+            trials: 5,
+            noise: NoiseChoice::Paper,
+        },
+        dagger: DaggerConfig::paper(),
+        expert: ExpertConfig::paper(),
+        episode: EpisodeConfig::paper(),
+    }
+}
+
+/// One way, one iteration, a network that fits into a cache, a few dozen steps.
+fn smoke() -> Settings {
+    let fit = FitSettings {
+        batch: 64,
+        budget: Budget::Steps(60),
+        validation: ValidationSplit { block: 100, every: 5 },
+        validate_every: 30,
+        ..FitSettings::quick(60)
+    };
+    let base = paper();
+    Settings {
+        training: TrainingSettings { directions: vec![Direction::Forward], ..base.training },
+        evaluation: EvaluationSettings {
+            directions: vec![Direction::Forward],
+            lots: vec!["lot-b".to_owned()],
+            trials: 1,
+            ..base.evaluation
+        },
+        dagger: DaggerConfig {
+            iterations_max: 1,
+            start: StartFrom::Previous,
+            network: LookAheadNetConfig {
+                conv1: ConvConfig { channels: 16, kernel: 3 },
+                conv2: ConvConfig { channels: 16, kernel: 2 },
+                hidden: 64,
+                dropout_features: 0.0,
+                dropout_hidden: 0.1,
+            },
+            fit_cloning: fit.clone(),
+            fit_iteration: fit,
+            ..base.dagger
+        },
+        ..base
+    }
+}
