@@ -1,0 +1,17 @@
+//! Tests across crates, in one binary so that burn is linked once.
+//!
+//! | module | what it holds true |
+//! |---|---|
+//! | [`tidy`] | dependency direction, licence files, what the README names exists |
+//! | [`commands`] | whole commands run from outside: results, exit codes, errors |
+//! | [`determinism`] | same seed, same bytes, for 1 and 2 threads |
+//! | [`expert_drives`] | the expert on the reference lots |
+//! | [`formats`] | data sets open as NPY, weights as safetensors |
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod bench;
+mod commands;
+mod determinism;
+mod expert_drives;
+mod formats;
+mod tidy;

@@ -1,0 +1,84 @@
+//! The shape of the workspace, checked where prose would rot.
+
+use crate::bench::{cargo, root, succeed};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
+/// Normal dependencies (no dev, no build) of every workspace member.
+fn dependencies() -> BTreeMap<String, Vec<String>> {
+    let metadata = succeed(cargo().args(["metadata", "--format-version", "1", "--no-deps", "--offline"]));
+    let metadata: Value = serde_json::from_str(&metadata).unwrap();
+    let text = |value: &Value| value.as_str().unwrap().to_owned();
+    let packages = metadata["packages"].as_array().unwrap();
+    packages
+        .iter()
+        .map(|package| {
+            let dependencies = package["dependencies"].as_array().unwrap();
+            let normal = dependencies.iter().filter(|dependency| dependency["kind"].is_null());
+            (text(&package["name"]), normal.map(|dependency| text(&dependency["name"])).collect())
+        })
+        .collect()
+}
+
+#[test]
+fn dependencies_point_one_way() {
+    let dependencies = dependencies();
+    let siblings = ["scenarios", "expert", "policy"];
+    for sibling in siblings {
+        assert!(dependencies[sibling].contains(&"sim".to_owned()), "{sibling} uses sim");
+        for other in siblings.iter().filter(|&&other| other != sibling) {
+            assert!(!dependencies[sibling].contains(&(*other).to_owned()), "{sibling} must not know {other}");
+        }
+    }
+    let forbidden_in_sim = ["scenarios", "expert", "policy", "xtask", "burn", "rerun", "clap", "image", "toml"];
+    for forbidden in forbidden_in_sim {
+        assert!(!dependencies["sim"].contains(&forbidden.to_owned()), "sim must not know {forbidden}");
+    }
+    for (name, dependencies) in &dependencies {
+        for only_in_xtask in ["clap", "rerun", "indicatif", "anyhow"] {
+            let knows = dependencies.contains(&only_in_xtask.to_owned());
+            assert!(!knows || name == "xtask", "only xtask may know {only_in_xtask}, {name} does");
+        }
+    }
+}
+
+/// `sim` computes; it neither reads nor writes files, nor looks at the clock.
+#[test]
+fn sim_touches_no_files_and_no_clock() {
+    let mut files = vec![root().join("sim/src")];
+    let mut seen = 0;
+    while let Some(path) = files.pop() {
+        if path.is_dir() {
+            files.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
+            continue;
+        }
+        seen += 1;
+        let text = std::fs::read_to_string(&path).unwrap();
+        for word in ["std::fs", "std::time", "std::env", "println!", "rand::rng()"] {
+            assert!(!text.contains(word), "{} uses {word}", path.display());
+        }
+    }
+    assert!(seen > 15, "only {seen} files were looked at");
+}
+
+/// Every path the README names in back-ticks exists.
+#[test]
+fn what_the_readme_names_exists() {
+    let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
+    let crates = ["sim/", "scenarios/", "expert/", "policy/", "xtask/", "tests/"];
+    let mut named = 0;
+    for word in readme.split('`').skip(1).step_by(2) {
+        if crates.iter().any(|folder| word.starts_with(folder)) && !word.contains([' ', '*', '{', '<']) {
+            named += 1;
+            assert!(root().join(word).exists(), "README.md names {word}, which does not exist");
+        }
+    }
+    assert!(named > 10, "the README's code map names only {named} paths");
+}
+
+#[test]
+fn licences_are_there() {
+    for file in ["LICENSE-MIT", "LICENSE-APACHE", "Cargo.lock", "README.md"] {
+        assert!(root().join(file).is_file(), "{file} is missing");
+    }
+}
