@@ -1,4 +1,15 @@
 //! Where to drive: the paper's three lots, generated lots and lots written by hand.
+//!
+//! A [`LotSpec`] names one lot, a [`suite`] several; [`LotSpec::scenario`] gives the scenario of one trial.
+//!
+//! | module | |
+//! |---|---|
+//! | [`corridor`] | lane geometry: legs, corners, widths, bulges → one boundary polygon |
+//! | [`clutter`] | parked cars and everything else that stands about, under gap rules |
+//! | [`reference`] | lots a, b and c of the paper |
+//! | [`generator`] | procedural lots, each verified by the [`solver`] |
+//! | [`split`] | which generated lots may be trained on |
+//! | [`load`] | lots as TOML files |
 
 pub mod clutter;
 pub mod corridor;
@@ -8,13 +19,227 @@ pub mod reference;
 pub mod solver;
 pub mod split;
 
-/// placeholder
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct SpecError(String);
+use load::LoadError;
+use reference::ReferenceLot;
+use sim::scenario::Scenario;
+use sim::seed::RootSeed;
+use split::{Difficulty, Split};
+use std::path::PathBuf;
+
+/// The lots a name stands for; several names are separated by commas.
+///
+/// `lot-a`, `lot-b`, `lot-c` · `reference` (all three) · `train:N`, `validation:N`, `test:N` (the first N generated lots
+/// of a split, medium unless `:easy`, `:medium` or `:hard` follows) · `test-hard-7` (one of them) · a path ending in
+/// `.toml`.
+///
+/// ```
+/// let lots = scenarios::suite("lot-a,test:2:hard")?;
+/// let names: Vec<_> = lots.iter().map(ToString::to_string).collect();
+/// assert_eq!(names, ["lot-a", "test-hard-0", "test-hard-1"]);
+/// # Ok::<(), scenarios::SpecError>(())
+/// ```
+///
+/// # Errors
+/// A name that stands for nothing, with what there is.
+pub fn suite(names: &str) -> Result<Vec<LotSpec>, SpecError> {
+    let mut lots = Vec::new();
+    for name in names.split(',').map(str::trim) {
+        lots.extend(lots_of(name)?);
+    }
+    Ok(lots)
+}
+
+/// One lot, by name.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LotSpec {
+    /// One of the paper's: fixed geometry, obstacles drawn anew for every trial.
+    Reference(ReferenceLot),
+    /// A procedural one: geometry and obstacles are fixed by its name.
+    Generated {
+        /// What it may be used for.
+        split: Split,
+        /// How hard it is.
+        difficulty: Difficulty,
+        /// Its number within both.
+        index: u64,
+    },
+    /// A file: the same in every trial.
+    File(PathBuf),
+}
+
+impl LotSpec {
+    /// The lot as it stands in one trial. Methods that are compared get the same trial seeds, hence the same lots.
+    ///
+    /// # Errors
+    /// Only for files: what is wrong with it.
+    pub fn scenario(&self, trial_seed: RootSeed) -> Result<Scenario, LoadError> {
+        match self {
+            Self::Reference(lot) => Ok(reference::lot(*lot, trial_seed)),
+            Self::Generated { split, difficulty, index } => {
+                Ok(generator::generate(*split, *index, *difficulty).scenario)
+            }
+            Self::File(path) => load::load(path),
+        }
+    }
+}
+
+impl std::fmt::Display for LotSpec {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Reference(lot) => write!(f, "{}", lot.name()),
+            Self::Generated { split, difficulty, index } => write!(f, "{}-{}-{index}", split.name(), difficulty.name()),
+            Self::File(path) => write!(f, "{}", path.display()),
+        }
+    }
+}
+
+impl std::str::FromStr for LotSpec {
+    type Err = SpecError;
+
+    /// The name of a single lot.
+    fn from_str(name: &str) -> Result<Self, SpecError> {
+        let mut lots = suite(name)?;
+        match (lots.pop(), lots.len()) {
+            (Some(lot), 0) => Ok(lot),
+            (_, others) => Err(SpecError::new(name, format!("stands for {} lots where one is wanted", others + 1))),
+        }
+    }
+}
+
+/// A name that stands for no lot.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{name:?} {problem}; there are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N and test:N \
+     (N generated lots; add :easy, :medium or :hard), single ones such as test-hard-7, and paths ending in .toml"
+)]
+pub struct SpecError {
+    name: String,
+    problem: String,
+}
+
+impl SpecError {
+    fn new(name: &str, problem: impl Into<String>) -> Self {
+        Self { name: name.to_owned(), problem: problem.into() }
+    }
+}
+
+fn lots_of(name: &str) -> Result<Vec<LotSpec>, SpecError> {
+    if name == "reference" {
+        return Ok(ReferenceLot::ALL.map(LotSpec::Reference).to_vec());
+    }
+    if let Some(lot) = ReferenceLot::ALL.into_iter().find(|lot| lot.name() == name) {
+        return Ok(vec![LotSpec::Reference(lot)]);
+    }
+    let is_file = std::path::Path::new(name).extension().is_some_and(|extension| extension == "toml");
+    if is_file {
+        return Ok(vec![LotSpec::File(name.into())]);
+    }
+    if let Some(lot) = generated_lot(name) {
+        return Ok(vec![lot]);
+    }
+    generated_suite(name)
+}
+
+/// `test-hard-7`.
+fn generated_lot(name: &str) -> Option<LotSpec> {
+    let [split, difficulty, index] = name.split('-').collect::<Vec<_>>().try_into().ok()?;
+    let split = split_called(split)?;
+    let difficulty = difficulty_called(difficulty)?;
+    Some(LotSpec::Generated { split, difficulty, index: index.parse().ok().filter(|index| *index < 1 << 56)? })
+}
+
+/// `test:100` or `test:100:hard`.
+fn generated_suite(name: &str) -> Result<Vec<LotSpec>, SpecError> {
+    let fault = |problem: String| SpecError::new(name, problem);
+    let mut parts = name.split(':');
+    let split = parts.next().and_then(split_called).ok_or_else(|| fault("is no lot".to_owned()))?;
+    let count = parts.next().ok_or_else(|| fault("does not say how many lots".to_owned()))?;
+    let count: u64 = count
+        .parse()
+        .ok()
+        .filter(|count| (1..=1_000_000).contains(count))
+        .ok_or_else(|| fault(format!("asks for {count:?} lots, not for a number from 1 to 1000000")))?;
+    let difficulty = match parts.next() {
+        None => Difficulty::default(),
+        Some(called) => difficulty_called(called).ok_or_else(|| fault(format!("has no difficulty {called:?}")))?,
+    };
+    if let Some(extra) = parts.next() {
+        return Err(fault(format!("has {extra:?} too much")));
+    }
+    Ok((0..count).map(|index| LotSpec::Generated { split, difficulty, index }).collect())
+}
+
+fn split_called(name: &str) -> Option<Split> {
+    Split::ALL.into_iter().find(|split| split.name() == name)
+}
+
+fn difficulty_called(name: &str) -> Option<Difficulty> {
+    Difficulty::ALL.into_iter().find(|difficulty| difficulty.name() == name)
+}
 
 /// FNV-1a: pins text in tests.
 #[cfg(test)]
 fn fnv1a(text: &str) -> u64 {
     text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(of: &str) -> Result<Vec<String>, SpecError> {
+        Ok(suite(of)?.iter().map(ToString::to_string).collect())
+    }
+
+    #[test]
+    fn names_stand_for_lots() {
+        let table: &[(&str, &[&str])] = &[
+            ("lot-a", &["lot-a"]),
+            ("reference", &["lot-a", "lot-b", "lot-c"]),
+            ("train:2", &["train-medium-0", "train-medium-1"]),
+            ("validation:1:easy, lot-c", &["validation-easy-0", "lot-c"]),
+            ("test:3:hard", &["test-hard-0", "test-hard-1", "test-hard-2"]),
+            ("test-hard-41", &["test-hard-41"]),
+            ("some/where.toml", &["some/where.toml"]),
+        ];
+        for (name, expected) in table {
+            let expected: Vec<String> = expected.iter().map(ToString::to_string).collect();
+            assert_eq!(names(name), Ok(expected), "{name}");
+        }
+    }
+
+    #[test]
+    fn other_names_are_refused_with_what_there_is() {
+        let table = [
+            ("lot-d", "\"lot-d\" is no lot; there are lot-a, lot-b"),
+            ("", "\"\" is no lot; there are"),
+            ("lot-a,", "\"\" is no lot; there are"),
+            ("train", "\"train\" does not say how many lots; there are"),
+            ("train:x", "\"train:x\" asks for \"x\" lots, not for a number from 1 to"),
+            ("test:0", "\"test:0\" asks for \"0\" lots"),
+            ("test:5:brutal", "\"test:5:brutal\" has no difficulty \"brutal\"; there are"),
+            ("test:5:hard:1", "\"test:5:hard:1\" has \"1\" too much"),
+            ("test-hard-x", "\"test-hard-x\" is no lot"),
+            ("test-hard-99999999999999999999", "\"test-hard-99999999999999999999\" is no lot"),
+        ];
+        for (name, expected) in table {
+            let message = names(name).expect_err(name).to_string();
+            assert!(message.starts_with(expected), "got:      {message}\nexpected: {expected}");
+        }
+        let several = "reference".parse::<LotSpec>().expect_err("three lots").to_string();
+        assert!(several.starts_with("\"reference\" stands for 3 lots where one is wanted"), "{several}");
+    }
+
+    /// Reference lots change with the trial, others do not; every lot carries the name it was asked for by.
+    #[test]
+    fn a_trial_seed_re_draws_reference_lots_only() {
+        let draw =
+            |name: &str, seed| name.parse::<LotSpec>().expect("a lot").scenario(RootSeed(seed)).expect("a scenario");
+        assert_ne!(draw("lot-b", 1).obstacles, draw("lot-b", 2).obstacles);
+        assert_eq!(draw("lot-b", 1), draw("lot-b", 1));
+        assert_eq!(draw("test-easy-3", 1), draw("test-easy-3", 2));
+        for name in ["lot-c", "validation-hard-1"] {
+            assert_eq!(draw(name, 1).name, name);
+        }
+    }
 }

@@ -32,9 +32,6 @@ pub enum LoadError {
         /// What would make it right.
         remedy: String,
     },
-    /// No lot of this name.
-    #[error(transparent)]
-    Unknown(#[from] crate::SpecError),
 }
 
 /// Reads and checks a scenario file.

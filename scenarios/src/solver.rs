@@ -540,3 +540,136 @@ impl Raster<f32> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::{self, ReferenceLot};
+    use geo::{Contains, Intersects, LineString, Polygon};
+    use sim::scenario::{Direction, NoiseSettings, Obstacle, ObstacleClass, ReferencePath};
+    use sim::seed::RootSeed;
+
+    fn car() -> VehicleParams {
+        VehicleParams::hyundai_hg300()
+    }
+
+    /// A straight lane of a width, 70 m long, driven from x = 10 to x = 50.
+    fn lane(width_m: f32, obstacles: &[(ObstacleClass, f32, f32)]) -> Scenario {
+        let half_m = 0.5 * width_m;
+        let boundary = [(0.0, -half_m), (70.0, -half_m), (70.0, half_m), (0.0, half_m)];
+        Scenario {
+            name: "lane".to_owned(),
+            boundary: boundary.map(|(x, y)| Vec2::new(x, y)).to_vec(),
+            reference_path: ReferencePath {
+                points: vec![Vec2::new(10.0, 0.0), Vec2::new(50.0, 0.0)],
+                corner_radius_m: 5.0,
+            },
+            noise: NoiseSettings::default(),
+            islands: Vec::new(),
+            obstacles: obstacles
+                .iter()
+                .map(|&(class, x_m, y_m)| Obstacle::new(class, Pose { x_m, y_m, heading_rad: 0.0 }))
+                .collect(),
+            speed_bumps: Vec::new(),
+        }
+    }
+
+    /// An L of two aisles of a width with a sharp inner corner.
+    fn sharp_corner(width_m: f32) -> Scenario {
+        let half_m = 0.5 * width_m;
+        let boundary = [
+            (0.0, -half_m),
+            (40.0 + half_m, -half_m),
+            (40.0 + half_m, 40.0),
+            (40.0 - half_m, 40.0),
+            (40.0 - half_m, half_m),
+            (0.0, half_m),
+        ];
+        let mut scenario = lane(width_m, &[]);
+        scenario.boundary = boundary.map(|(x, y)| Vec2::new(x, y)).to_vec();
+        scenario.reference_path.points = vec![Vec2::new(10.0, 0.0), Vec2::new(40.0, 0.0), Vec2::new(40.0, 20.0)];
+        scenario
+    }
+
+    #[test]
+    fn solvable_and_unsolvable_lots_are_told_apart() {
+        use ObstacleClass::{Cone, Sedan};
+        let row = [(Cone, 25.0, -1.2), (Cone, 25.0, 0.0), (Cone, 25.0, 1.2)];
+        // The car is 1.86 m wide and keeps 0.25 m to either side: 2.36 m.
+        let table = [
+            ("an empty lane", lane(3.0, &[]), true),
+            ("a lane hardly wider than the car with its clearance", lane(2.4, &[]), true),
+            ("a lane narrower than that", lane(2.3, &[]), false),
+            ("a row of cones", lane(5.0, &row), false),
+            ("the same row in a wider lane", lane(9.0, &row), true),
+            ("a double-parked car", lane(5.0, &[(Sedan, 25.0, 1.5)]), true),
+            ("a double-parked car that leaves 2.3 m", lane(5.0, &[(Sedan, 25.0, 0.725)]), false),
+            ("a slalom with 10 m between the cars", lane(5.5, &[(Sedan, 22.65, 1.8), (Sedan, 37.35, -1.8)]), true),
+            ("two cars side by side", lane(5.0, &[(Sedan, 25.0, 1.5), (Sedan, 27.0, -1.5)]), false),
+            // methods.md 11: a sharp right angle needs at least 4.1–4.2 m, 4.6–4.7 m with 0.3 m clearance.
+            ("a sharp corner of two 5 m aisles", sharp_corner(5.0), true),
+            ("a sharp corner of two 4 m aisles", sharp_corner(4.0), false),
+        ];
+        for (what, scenario, is_solvable) in table {
+            for direction in Direction::BOTH {
+                let solution = solve(&direction.of(scenario.clone()), &car(), CLEARANCE_M);
+                assert_eq!(solution.is_some(), is_solvable, "{what}, {direction:?}");
+            }
+        }
+    }
+
+    /// Judged by a polygon library that neither the solver nor the simulator uses.
+    #[test]
+    fn solutions_are_collision_free_by_exact_polygons() {
+        for which in ReferenceLot::ALL {
+            for (seed, direction) in (0..3).flat_map(|seed| Direction::BOTH.map(|direction| (seed, direction))) {
+                let scenario = direction.of(reference::lot(which, RootSeed(seed)));
+                // Lot b has gaps of 2.6 m: 0.37 m to either side at best, and less beside a car that stands askew.
+                let solution = solve(&scenario, &car(), 0.12).unwrap_or_else(|| panic!("{} seed {seed}", which.name()));
+                let ground = polygon(&scenario.boundary);
+                let solid: Vec<_> = scenario.obstacles.iter().map(|obstacle| polygon(&obstacle.outline())).collect();
+                for waypoint in &solution.waypoints {
+                    let world_from_ego = waypoint.pose.world_from_ego();
+                    let body = polygon(&car().body_in_ego().map(|corner| world_from_ego.point(corner)));
+                    let at = waypoint.pose;
+                    assert!(ground.contains(&body), "{} seed {seed}: off the ground at {at:?}", which.name());
+                    assert!(!solid.iter().any(|other| other.intersects(&body)), "{} seed {seed}: {at:?}", which.name());
+                }
+            }
+        }
+    }
+
+    fn polygon(outline: &[Vec2]) -> Polygon<f64> {
+        let ring: Vec<_> = outline.iter().map(|p| (f64::from(p.x), f64::from(p.y))).collect();
+        Polygon::new(LineString::from(ring), Vec::new())
+    }
+
+    /// Waypoints form one drive that the car can steer: arcs within its limits, joined without jumps.
+    #[test]
+    fn solutions_obey_the_kinematics() {
+        let scenario = reference::lot(ReferenceLot::A, RootSeed(5));
+        let solution = solve(&scenario, &car(), 0.2).expect("solvable");
+        let first = &solution.waypoints[0];
+        assert!(first.pose.position().distance(scenario.reference_path.points[0]) < 1e-3);
+        let mut length_m = 0.0;
+        for pair in solution.waypoints.windows(2) {
+            let (from, to) = (&pair[0], &pair[1]);
+            let reached = from.pose.advanced_along_arc(to.curvature_per_m, WAYPOINT_M);
+            assert!(reached.position().distance(to.pose.position()) < 2e-3, "a jump before {:?}", to.pose);
+            assert!(to.curvature_per_m.abs() < car().curvature_max_per_m());
+            length_m += WAYPOINT_M;
+        }
+        // Steering changes at half steps of 0.5 m by at most one level of four.
+        let steering = |waypoint: &Waypoint| (waypoint.curvature_per_m * car().wheelbase_m).atan();
+        let largest =
+            solution.waypoints.windows(2).map(|w| (steering(&w[1]) - steering(&w[0])).abs()).fold(0.0, f32::max);
+        assert!(largest < 0.15, "the wheels turn by {largest} rad within half a metre");
+        // Some metres less than the reference path: the wide corners may be cut.
+        assert!((215.0..240.0).contains(&length_m), "{length_m} m for a lot of 231 m");
+    }
+
+    #[test]
+    fn a_start_that_is_not_free_has_no_solution() {
+        assert!(solve(&lane(5.0, &[(ObstacleClass::Cone, 12.0, 0.5)]), &car(), CLEARANCE_M).is_none());
+    }
+}
