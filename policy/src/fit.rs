@@ -47,6 +47,9 @@ pub struct FitSettings {
     pub validation: ValidationSplit,
     /// Steps between validations; 0 = only at the end.
     pub validate_every: u32,
+    /// Training ends early after this many validations without a new best.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub patience: Option<u32>,
     /// Which weights are returned.
     pub keep: KeepWeights,
 }
@@ -95,12 +98,13 @@ impl FitSettings {
             mirror: Mirror::Off,
             validation: ValidationSplit::paper(),
             validate_every: 500,
+            patience: None,
             keep: KeepWeights::BestByValidation,
         }
     }
 
-    /// The same in a few dozen seconds on two cores: a hundred times the learning rate, falling to a tenth of a
-    /// thousandth, smaller batches, mirror images.
+    /// Seconds instead of hours: Adam falling from 1e-3 to 1e-5 along a cosine, smaller batches, mirror images, and an
+    /// end when the validation loss has not improved six times in a row.
     pub fn quick(steps: u32) -> Self {
         Self {
             budget: Budget::Steps(steps),
@@ -108,6 +112,7 @@ impl FitSettings {
             learning_rate: LearningRate { peak: 1e-3, floor: 1e-5, warm_up_steps: 50, shape: ScheduleShape::Cosine },
             mirror: Mirror::Half,
             validate_every: 100,
+            patience: Some(6),
             ..Self::paper()
         }
     }
@@ -248,7 +253,7 @@ pub fn fit(
     let mut batch = Vec::with_capacity(settings.batch);
     let mut curve = Vec::new();
     let mut since_point = MeanLoss::default();
-    let mut best = Best { weights: weights.clone(), step: 0, validation: None };
+    let mut best = Best::new(&weights);
     let mut latest = None;
     let mut done = 0;
     let mut stopped = false;
@@ -270,7 +275,10 @@ pub fn fit(
         if is_last || settings.validate_every > 0 && done % settings.validate_every == 0 {
             latest = validate(&weights);
             curve.push(CurvePoint { step: done, training: since_point.take(), validation: latest });
-            best.offer(&weights, done, latest, is_last, settings.keep);
+            best.offer(&weights, done, latest, settings.keep);
+            if settings.patience.is_some_and(|patience| best.offers_since >= patience) {
+                break;
+            }
         }
     }
     let report = FitReport {
@@ -352,16 +360,30 @@ struct Best {
     weights: Weights,
     step: u32,
     validation: Option<Validation>,
+    /// Offers since the last validation that was better than all before.
+    offers_since: u32,
+    lowest: f32,
 }
 
 impl Best {
-    fn offer(&mut self, weights: &Weights, step: u32, found: Option<Validation>, is_last: bool, keep: KeepWeights) {
-        let is_better = match (keep, found) {
-            (KeepWeights::Last, _) | (KeepWeights::BestByValidation, None) => is_last,
-            (KeepWeights::BestByValidation, Some(found)) => self.validation.is_none_or(|best| found.loss < best.loss),
+    fn new(weights: &Weights) -> Self {
+        Self { weights: weights.clone(), step: 0, validation: None, offers_since: 0, lowest: f32::INFINITY }
+    }
+
+    fn offer(&mut self, weights: &Weights, step: u32, found: Option<Validation>, keep: KeepWeights) {
+        let is_lowest = found.is_some_and(|found| found.loss < self.lowest);
+        if let Some(found) = found {
+            self.lowest = self.lowest.min(found.loss);
+            self.offers_since = if is_lowest { 0 } else { self.offers_since + 1 };
+        }
+        let is_kept = match (keep, found) {
+            (KeepWeights::Last, _) | (KeepWeights::BestByValidation, None) => true,
+            (KeepWeights::BestByValidation, Some(_)) => is_lowest,
         };
-        if is_better {
-            *self = Self { weights: weights.clone(), step, validation: found };
+        if is_kept {
+            self.weights.values_mut().copy_from_slice(weights.values());
+            self.step = step;
+            self.validation = found;
         }
     }
 }

@@ -140,3 +140,13 @@ fn every_sample_is_dealt_once_per_epoch() {
     assert_eq!(keys(&first), keys(&samples));
     assert_eq!(keys(&second), keys(&samples));
 }
+
+#[test]
+fn patience_ends_a_training_that_no_longer_improves() {
+    let dataset = dataset(400);
+    let hasty = FitSettings { learning_rate: LearningRate::constant(3e-3), patience: Some(2), ..settings(2000) };
+    let report = train(&dataset, &hasty, DeviceChoice::Cpu).report;
+    assert!(!report.stopped && report.steps < 2000, "{} steps", report.steps);
+    // The best, then two validations that are not better.
+    assert_eq!(report.kept_step + 2 * hasty.validate_every, report.steps);
+}
