@@ -30,7 +30,7 @@ pub enum Command {
     /// Behaviour cloning: the expert drives once, a network learns from it.
     #[command(after_help = TRAIN_EXAMPLES)]
     TrainBc(TrainArgs),
-    /// Behaviour cloning, then DAgger; ends with the paper's table and a closed-loop check on three lots.
+    /// Behaviour cloning, then `DAgger`; ends with the paper's table and a closed-loop check on three lots.
     #[command(after_help = TRAIN_EXAMPLES)]
     TrainDagger(TrainArgs),
     /// Drives drivers over lots and counts near-collisions and the safe ratio.

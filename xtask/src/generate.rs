@@ -8,10 +8,14 @@ use crate::render;
 use crate::run_dir::write_whole;
 use crate::trials::{Job, Purpose};
 use anyhow::{Context as _, ensure};
+use rayon::prelude::*;
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleParams;
+
+/// Lots made at a time; between two groups Ctrl-C is looked at.
+const GROUP: usize = 8;
 
 /// The command.
 ///
@@ -21,27 +25,56 @@ pub fn run(args: &GenerateArgs) -> anyhow::Result<()> {
     ensure!(args.scale.is_none_or(|scale| scale > 0.0), "--scale must be positive, in pixels per metre");
     ensure!(args.count > 0, "--count is 0; at least one is needed");
     let lots = Lot::parse_all(&args.lots)?;
+    let fixed = lots.iter().find(|lot| !lot.is_drawn_per_trial());
+    ensure!(
+        args.count == 1 || fixed.is_none(),
+        "--count {}: only the reference lots have other obstacles in every trial, {:?} has not; for several generated \
+         lots write --lots train:{0}",
+        args.count,
+        fixed.map_or("", Lot::name)
+    );
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{}: cannot be created; choose another --out", args.out.display()))?;
-    let vehicle = VehicleParams::hyundai_hg300();
-    let jobs = Job::all(RootSeed(args.seed), Purpose::Pictures, &lots, args.count, &[Direction::Forward]);
-    let total = jobs.clone().count();
+    let jobs: Vec<Job<'_>> =
+        Job::all(RootSeed(args.seed), Purpose::Pictures, &lots, args.count, &[Direction::Forward]).collect();
     let mut work = Work::begin("generating");
-    for (done, job) in jobs.enumerate() {
+    let mut made = Vec::new();
+    for group in jobs.chunks(GROUP) {
         if interrupt::is_requested() {
-            let kept = format!("{done} of {total} lots are in {}", args.out.display());
+            let kept = format!("{} of {} lots are in {}", made.len(), jobs.len(), args.out.display());
             return Err(Interrupted { kept }.into());
         }
-        let counter = if args.count > 1 { format!("-{}", job.trial + 1) } else { String::new() };
-        let name = format!("{}-s{}{counter}", job.lot.name(), args.seed);
-        write(args, &vehicle, &job, &name)?;
-        work.at(done as f64 / total as f64, || name);
+        let written = group.par_iter().map(|job| write(args, job)).collect::<anyhow::Result<Vec<Made>>>()?;
+        for lot in &written {
+            println!("{}", lot.line);
+        }
+        made.extend(written);
+        work.at(made.len() as f64 / jobs.len() as f64, || format!("{} lots", made.len()));
     }
-    work.end(&format!("{total} lots"));
+    work.end(&format!("{} lots", made.len()));
+    let attempts: Vec<u32> = made.iter().filter_map(|made| made.attempts).collect();
+    if !attempts.is_empty() {
+        let drawn: u32 = attempts.iter().sum();
+        let rejected = drawn - attempts.len() as u32;
+        println!(
+            "generator: {rejected} of {drawn} draws rejected ({:.1} %)",
+            100.0 * f64::from(rejected) / f64::from(drawn)
+        );
+    }
     Ok(())
 }
 
-fn write(args: &GenerateArgs, vehicle: &VehicleParams, job: &Job<'_>, name: &str) -> anyhow::Result<()> {
+struct Made {
+    attempts: Option<u32>,
+    line: String,
+}
+
+fn write(args: &GenerateArgs, job: &Job<'_>) -> anyhow::Result<Made> {
+    let name = match (job.lot.is_drawn_per_trial(), args.count) {
+        (false, _) => job.lot.name().to_owned(),
+        (true, 1) => format!("{}-s{}", job.lot.name(), args.seed),
+        (true, _) => format!("{}-s{}-{}", job.lot.name(), args.seed, job.trial + 1),
+    };
     let [toml, png] = ["toml", "png"].map(|extension| args.out.join(format!("{name}.{extension}")));
     for path in [&toml, &png] {
         ensure!(
@@ -50,12 +83,15 @@ fn write(args: &GenerateArgs, vehicle: &VehicleParams, job: &Job<'_>, name: &str
             path.display()
         );
     }
-    let mut scenario = job.lot.scenario(job.seed)?;
+    let mut drawn = job.lot.draw(job.seed);
     // The file is a lot of its own, told apart from its siblings in tables.
-    name.clone_into(&mut scenario.name);
-    write_whole(&toml, scenarios::load::to_toml(&scenario).as_bytes())?;
-    let map = Map::build(scenario, vehicle).with_context(|| name.to_owned())?;
-    write_whole(&png, &render::top_view(&map, vehicle, args.scale)?)?;
-    println!("{} and .png: route {:.1} m, {} obstacles", toml.display(), map.path().length_m(), map.scenario().obstacles.len());
-    Ok(())
+    drawn.scenario.name.clone_from(&name);
+    let vehicle = VehicleParams::hyundai_hg300();
+    let text = scenarios::load::to_toml(&drawn.scenario);
+    let map = Map::build(drawn.scenario, &vehicle).with_context(|| name.clone())?;
+    write_whole(&png, &render::top_view(&map, &vehicle, args.scale)?)?;
+    write_whole(&toml, text.as_bytes())?;
+    let (length_m, obstacles) = (map.path().length_m(), map.scenario().obstacles.len());
+    let line = format!("{} and .png: route {length_m:.1} m, {obstacles} obstacles", toml.display());
+    Ok(Made { attempts: drawn.attempts, line })
 }

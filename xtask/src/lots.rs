@@ -1,65 +1,66 @@
-//! Lots that can be named on the command line.
+//! Lots that can be named on the command line: [`scenarios::suite`], checked before anything is driven.
 
-use anyhow::bail;
-use scenarios::reference::{self, ReferenceLot};
+use anyhow::ensure;
+use scenarios::LotSpec;
+use scenarios::generator;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
-use std::path::Path;
 
 /// A lot, before a trial has drawn its obstacles.
 #[derive(Debug, Clone)]
 pub struct Lot {
     name: String,
-    source: LotSource,
+    spec: LotSpec,
+    /// Of a file: read once, so that its errors come before any work.
+    from_file: Option<Scenario>,
 }
 
+/// A lot as it stands in one trial.
 #[derive(Debug, Clone)]
-enum LotSource {
-    Reference(ReferenceLot),
-    /// Written by hand: the same in every trial.
-    File(Box<Scenario>),
+pub struct Drawn {
+    /// The lot.
+    pub scenario: Scenario,
+    /// Draws the generator needed, this one included; `None` if it was not generated.
+    pub attempts: Option<u32>,
 }
 
-/// Ways to name a lot: how it is written, what it means.
-pub const SPECS: [(&str, &str); 4] = [
-    ("lot-a", "the paper's training lot, 231 m, rebuilt"),
+/// Ways to name lots: how it is written, what it means.
+pub const SPECS: [(&str, &str); 7] = [
+    ("lot-a", "the paper's training lot rebuilt: 231 m; obstacles drawn anew for every trial"),
     ("lot-b", "139 m, the narrowest, never trained on"),
     ("lot-c", "149 m, the widest, never trained on"),
+    ("reference", "all three"),
+    ("test:N", "the first N generated lots of a split: train, validation or test; :easy or :hard may follow"),
+    ("test-hard-7", "one of them"),
     ("PATH.toml", "a lot written by hand (cargo xtask generate writes examples)"),
 ];
 
 impl Lot {
-    /// Reads a spec.
+    /// The lots that specs stand for.
     ///
     /// # Errors
-    /// If nothing is named so, or a file does not describe a lot.
-    pub fn parse(spec: &str) -> anyhow::Result<Self> {
-        if let Some(which) = ReferenceLot::ALL.into_iter().find(|lot| lot.name() == spec) {
-            return Ok(Self { name: spec.to_owned(), source: LotSource::Reference(which) });
-        }
-        let path = Path::new(spec);
-        if path.extension().is_some_and(|extension| extension == "toml") {
-            let scenario = scenarios::load::load(path)?;
-            return Ok(Self { name: scenario.name.clone(), source: LotSource::File(Box::new(scenario)) });
-        }
-        let known: Vec<&str> = SPECS.iter().map(|(spec, _)| *spec).collect();
-        bail!("no lot {spec:?}; there are {}", known.join(", "))
-    }
-
-    /// Reads several, each once.
-    ///
-    /// # Errors
-    /// As [`Self::parse`].
-    pub fn parse_all(specs: &[String]) -> anyhow::Result<Vec<Self>> {
+    /// If nothing is named so, a file does not describe a lot, or two lots have the same name.
+    pub fn parse_all<S: AsRef<str>>(specs: &[S]) -> anyhow::Result<Vec<Self>> {
         let mut lots: Vec<Self> = Vec::new();
         for spec in specs {
-            let lot = Self::parse(spec)?;
-            if lots.iter().any(|known| known.name == lot.name) {
-                bail!("lot {:?} is named twice; results are told apart by name", lot.name);
+            for spec in scenarios::suite(spec.as_ref())? {
+                lots.push(Self::new(spec)?);
             }
-            lots.push(lot);
         }
+        let mut names: Vec<&str> = lots.iter().map(Self::name).collect();
+        names.sort_unstable();
+        let twice = names.windows(2).find(|pair| pair[0] == pair[1]);
+        ensure!(twice.is_none(), "lot {:?} is named twice; results are told apart by name", twice.unwrap_or(&[""])[0]);
         Ok(lots)
+    }
+
+    fn new(spec: LotSpec) -> anyhow::Result<Self> {
+        let from_file = match &spec {
+            LotSpec::File(path) => Some(scenarios::load::load(path)?),
+            LotSpec::Reference(_) | LotSpec::Generated { .. } => None,
+        };
+        let name = from_file.as_ref().map_or_else(|| spec.to_string(), |scenario| scenario.name.clone());
+        Ok(Self { name, spec, from_file })
     }
 
     /// Name in tables.
@@ -67,14 +68,45 @@ impl Lot {
         &self.name
     }
 
+    /// Whether trials draw their own obstacles; other lots are the same in every trial.
+    pub fn is_drawn_per_trial(&self) -> bool {
+        matches!(self.spec, LotSpec::Reference(_))
+    }
+
     /// The lot with the obstacles of a trial.
-    ///
-    /// # Errors
-    /// If it cannot be made.
-    pub fn scenario(&self, trial: RootSeed) -> anyhow::Result<Scenario> {
-        match &self.source {
-            LotSource::Reference(which) => Ok(reference::lot(*which, trial)),
-            LotSource::File(scenario) => Ok((**scenario).clone()),
+    pub fn draw(&self, trial: RootSeed) -> Drawn {
+        match (&self.from_file, &self.spec) {
+            (Some(scenario), _) => Drawn { scenario: scenario.clone(), attempts: None },
+            (None, LotSpec::Generated { split, difficulty, index }) => {
+                let generated = generator::generate(*split, *index, *difficulty);
+                Drawn { scenario: generated.scenario, attempts: Some(generated.attempts) }
+            }
+            (None, spec) => {
+                let scenario = spec.scenario(trial).expect("only files can be wrong, and they are read already");
+                Drawn { scenario, attempts: None }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_lots_and_doubles_are_refused() {
+        let names = |specs: &[&str]| {
+            let lots = Lot::parse_all(specs)?;
+            Ok::<_, anyhow::Error>(lots.iter().map(|lot| lot.name().to_owned()).collect::<Vec<_>>())
+        };
+        assert_eq!(names(&["lot-a", "test:2"]).unwrap(), ["lot-a", "test-medium-0", "test-medium-1"]);
+        for (specs, part) in [
+            (&["lot-d"] as &[&str], "there are lot-a, lot-b"),
+            (&["lot-a", "reference"], "\"lot-a\" is named twice"),
+            (&["no/such.toml"], "no/such.toml"),
+        ] {
+            let error = format!("{:#}", names(specs).unwrap_err());
+            assert!(error.contains(part), "{specs:?}: {part:?} is missing in: {error}");
         }
     }
 }

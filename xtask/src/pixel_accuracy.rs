@@ -38,7 +38,17 @@ pub fn run(args: &PixelAccuracyArgs) -> anyhow::Result<()> {
     ensure!(args.trials > 0, "--trials is 0; at least one is needed");
     let settings = Settings::resolve(&args.settings.layers, args.settings.seed)?;
     let lots = Lot::parse_all(&args.lots)?;
-    let header = ["lot", "level", "poses", "accuracy %", "paper %", "false occupied %", "false free %", "cells wrong %", "occupied %"];
+    let header = [
+        "lot",
+        "level",
+        "poses",
+        "accuracy %",
+        "paper %",
+        "false occupied %",
+        "false free %",
+        "cells wrong %",
+        "occupied %",
+    ];
     let mut table = markdown(header.map(str::to_owned).to_vec());
     let mut work = Work::begin("looking");
     let stretches = (lots.len() * args.level.len()) as f64;
@@ -57,7 +67,10 @@ pub fn run(args: &PixelAccuracyArgs) -> anyhow::Result<()> {
         }
     }
     work.end(&format!("{} lots", lots.len()));
-    println!("{table}\n\nPoses every {SPACING_M} m along the routes, both directions, trials: {}, seed: {}.", args.trials, settings.seed.0);
+    println!(
+        "{table}\n\nPoses every {SPACING_M} m along the routes, both directions, trials: {}, seed: {}.",
+        args.trials, settings.seed.0
+    );
     Ok(())
 }
 
@@ -76,7 +89,8 @@ fn along_route(settings: &Settings, job: &Job<'_>, noise: NoiseChoice) -> anyhow
     let mut pixels = Pixels::default();
     for index in 0..poses {
         let pose = map.path().pose_at(index as f32 * SPACING_M);
-        let (clean, perceived) = (sensor.clean_view(&map, pose), sensor.perceived_view(&map, pose, index * TICKS_PER_POSE));
+        let (clean, perceived) =
+            (sensor.clean_view(&map, pose), sensor.perceived_view(&map, pose, index * TICKS_PER_POSE));
         for (row, col) in (0..BEV_PIXELS).flat_map(|row| (0..BEV_PIXELS).map(move |col| (row, col))) {
             let (is, seems) = (clean.is_occupied(row, col), perceived.is_occupied(row, col));
             pixels.occupied += u64::from(is);

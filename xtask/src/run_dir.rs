@@ -83,11 +83,7 @@ impl RunDir {
     /// If there is none, or it is finished.
     pub fn resume(path: &Path) -> anyhow::Result<(Self, Settings)> {
         ensure!(path.is_dir(), "{}: there is no such run to resume", path.display());
-        ensure!(
-            !path.join(FINISHED).is_file(),
-            "{}: this run is finished; nothing is left to resume",
-            path.display()
-        );
+        ensure!(!path.join(FINISHED).is_file(), "{}: this run is finished; nothing is left to resume", path.display());
         let settings = Settings::read(&path.join(SETTINGS))?;
         Ok((Self { path: path.to_path_buf() }, settings))
     }
@@ -126,7 +122,9 @@ pub fn write_whole(path: &Path, content: &[u8]) -> anyhow::Result<()> {
         file.sync_all()?;
         fs::rename(&partial, path)
     };
-    write().with_context(|| format!("{}: cannot be written; check that the folder is writable and has space", path.display()))
+    write().with_context(|| {
+        format!("{}: cannot be written; check that the folder is writable and has space", path.display())
+    })
 }
 
 /// The folder with the checkpoint that `run:DIR` or `run:DIR/bc` names.
@@ -156,9 +154,8 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
         let last_fit = Some(run.join("final")).filter(|path| Checkpoint::exists(path));
         last_fit.or_else(|| rounds.pop())
     };
-    last.filter(|path| Checkpoint::exists(path)).with_context(|| {
-        format!("{}: no network is trained there yet; finish it with --resume {0}", run.display())
-    })
+    last.filter(|path| Checkpoint::exists(path))
+        .with_context(|| format!("{}: no network is trained there yet; finish it with --resume {0}", run.display()))
 }
 
 fn claim_named(path: &Path, overwrite: bool) -> anyhow::Result<PathBuf> {
@@ -167,7 +164,10 @@ fn claim_named(path: &Path, overwrite: bool) -> anyhow::Result<PathBuf> {
             let way_out = if path.join(FINISHED).is_file() || !path.join(SETTINGS).is_file() {
                 "choose another --out, or delete it with --overwrite".to_owned()
             } else {
-                format!("continue it with --resume {}, choose another --out, or delete it with --overwrite", path.display())
+                format!(
+                    "continue it with --resume {}, choose another --out, or delete it with --overwrite",
+                    path.display()
+                )
             };
             bail!("{}: this folder is not empty; {way_out}", path.display());
         }

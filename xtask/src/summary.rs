@@ -177,7 +177,7 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 mod tests {
     use super::*;
 
-    /// methods.md 8.3: DAgger 0 in 51.8 → [0, .071]; tentacle 71 → [1.07, 1.73]; 13 in 11.55 → [.60, 1.92].
+    /// methods.md 8.3: `DAgger` 0 in 51.8 → [0, .071]; tentacle 71 → [1.07, 1.73]; 13 in 11.55 → [.60, 1.92].
     #[test]
     fn garwood_intervals_of_methods_8_3() {
         for (events, exposure, lower, upper) in

@@ -66,9 +66,8 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
     let table1 = Table1 { rows: &outcome.rows, stop: outcome.stop };
     println!("\nDAgger iterations\n\n{}", table1.to_markdown());
     table1.write(&run)?;
-    let policy = match (outcome.stop, outcome.policy) {
-        (Stop::EtaReached | Stop::IterationCap, Some(policy)) => policy,
-        _ => return Err(cut_short(run.path(), outcome.rows.len())),
+    let (Stop::EtaReached | Stop::IterationCap, Some(policy)) = (outcome.stop, outcome.policy) else {
+        return Err(cut_short(run.path(), outcome.rows.len()));
     };
     if !args.no_eval {
         let contestants = contestants(&run, policy, outcome.rows.len())?;
@@ -89,9 +88,7 @@ struct Finished {
 
 fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
     let path = path.display();
-    let kept = format!(
-        "{rounds} finished rounds are in {path}; go on with: cargo xtask train-dagger --resume {path}"
-    );
+    let kept = format!("{rounds} finished rounds are in {path}; go on with: cargo xtask train-dagger --resume {path}");
     Interrupted { kept }.into()
 }
 

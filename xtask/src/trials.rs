@@ -53,9 +53,9 @@ pub fn trial_seed(root: RootSeed, purpose: Purpose, trial: u32) -> RootSeed {
 /// Seed of one direction of a trial on a lot.
 pub fn episode_seed(trial: RootSeed, lot: &str, direction: Direction) -> RootSeed {
     // FNV-1a, so that a lot's noise depends neither on what else is driven nor on the order.
-    let hash = lot.bytes().fold(0xCBF2_9CE4_8422_2325_u64, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
-    });
+    let hash = lot
+        .bytes()
+        .fold(0xCBF2_9CE4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3));
     let folded = (hash ^ hash >> 47) & ((1 << 47) - 1);
     trial.child(Stream::Episode, folded << 1 | u64::from(direction == Direction::Reverse))
 }
@@ -95,7 +95,7 @@ impl<'a> Job<'a> {
     /// # Errors
     /// If the lot cannot be driven.
     pub fn map(&self, config: &EpisodeConfig) -> anyhow::Result<Map> {
-        let scenario = self.direction.of(self.lot.scenario(self.seed)?);
+        let scenario = self.direction.of(self.lot.draw(self.seed).scenario);
         Map::build(scenario, &config.vehicle).with_context(|| self.lot.name().to_owned())
     }
 

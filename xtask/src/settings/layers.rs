@@ -94,7 +94,9 @@ fn parse_override(text: &str) -> anyhow::Result<(Vec<String>, Value)> {
         Some(value) => Ok((key, value)),
         // A bare word can only be meant as a string.
         None if is_word => Ok((key, Value::String(value.to_owned()))),
-        None => bail!("--set {text}: {value:?} is no TOML value; texts and lists of texts need quotes, as in '[\"lot-a\"]'"),
+        None => {
+            bail!("--set {text}: {value:?} is no TOML value; texts and lists of texts need quotes, as in '[\"lot-a\"]'")
+        }
     }
 }
 

@@ -87,7 +87,10 @@ fn optional_settings_can_be_given() {
 #[test]
 fn errors_name_the_key_and_what_there_is() {
     for (overrides, parts) in [
-        (&["dagger.etta=0.8"] as &[&str], &["--set dagger.etta=0.8", "no key \"etta\"", "did you mean \"eta\"?", "iterations_max"] as &[&str]),
+        (
+            &["dagger.etta=0.8"] as &[&str],
+            &["--set dagger.etta=0.8", "no key \"etta\"", "did you mean \"eta\"?", "iterations_max"] as &[&str],
+        ),
         (&["dager.eta=0.8"], &["no key \"dager\"", "did you mean \"dagger\"?", "evaluation"]),
         (&["training.noise=papr"], &["training.noise", "did you mean \"paper\"?", "hard"]),
         (&["dagger.eta=high"], &["dagger.eta", "f64"]),
