@@ -27,7 +27,7 @@ pub struct Generated {
 /// A lot of a split.
 ///
 /// # Panics
-/// When 1000 draws in a row are rejected; about one in ten is.
+/// When 1000 draws in a row are rejected; of hard ones about one in five is, of others hardly any.
 pub fn generate(split: Split, index: u64, difficulty: Difficulty) -> Generated {
     let seed = split.seed(difficulty, index);
     let vehicle = VehicleParams::hyundai_hg300();
@@ -67,7 +67,8 @@ struct Sheet {
 }
 
 impl Sheet {
-    /// Lane and gap of `Hard` are those of reference lots a and b; the solver's 0.25 m clearance needs gaps of 2.4 m.
+    /// Gaps of `Hard` are those of the narrow reference lots; the solver's 0.25 m clearance needs 2.4 m and more beside
+    /// a car that stands askew, which is what most rejected draws lack.
     fn of(difficulty: Difficulty) -> Self {
         match difficulty {
             Difficulty::Easy => Self {
@@ -95,10 +96,10 @@ impl Sheet {
                 furniture: 1.0,
             },
             Difficulty::Hard => Self {
-                lane_m: 3.0..4.6,
+                lane_m: 2.8..4.2,
                 corner_width_m: 5.5..6.0,
                 inner_radius_m: 2.5..3.5,
-                free_gap_m: 2.7..3.0,
+                free_gap_m: 2.65..2.95,
                 double_parked_share: 0.2..0.32,
                 double_parked_yaw_deg: 6.0,
                 opposite_clear_m: 8.0,
@@ -563,7 +564,7 @@ mod tests {
 
     #[test]
     fn a_lot_is_pinned_by_its_name() {
-        const GOLDEN: u64 = 0x5aac_fb96_9d01_a9a9;
+        const GOLDEN: u64 = 0x3fd6_8fa8_99fe_f9dd;
         let lot = generate(Split::Test, 7, Difficulty::Hard);
         assert_eq!(lot.scenario, generate(Split::Test, 7, Difficulty::Hard).scenario);
         assert_ne!(lot.scenario.boundary, generate(Split::Train, 7, Difficulty::Hard).scenario.boundary);

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | [`corridor`] | lane geometry: legs, corners, widths, bulges → one boundary polygon |
 //! | [`clutter`] | parked cars and everything else that stands about, under gap rules |
-//! | [`reference`] | lots a, b and c of the paper |
+//! | [`mod@reference`] | lots a, b and c of the paper |
 //! | [`generator`] | procedural lots, each verified by the [`solver`] |
 //! | [`split`] | which generated lots may be trained on |
 //! | [`load`] | lots as TOML files |

@@ -240,7 +240,7 @@ mod tests {
     fn a_written_lot_is_short_and_exact() {
         let text = to_toml(&parse(EXAMPLE, "slalom.toml").expect("the example is sound"));
         for line in [
-            "    [-6.0, -2.5],",
+            "    [-18.0, -2.5],",
             r#"    { class = "cone", x_m = 37.3, y_m = 16.0, heading_deg = 0.0 },"#,
             "corner_radius_m = 5.0",
         ] {
@@ -290,9 +290,14 @@ mod tests {
                 "[40.0, 28.0]]",
                 "[40.0, 48.0]]",
                 "[40.0, 28.0]]",
-                "reference_path, point 3: the route leaves the boundary at",
+                "reference_path, point 3: the point (40.00, 48.00) lies outside the lot",
             ),
-            ("points = [[0.0, 0.5],", "points = [[-5.5, 0.5],", "points =", "reference_path, point 1: the car (4.91 m"),
+            (
+                "points = [[0.0, 0.5],",
+                "points = [[-17.5, 0.5],",
+                "points =",
+                "reference_path, point 1: the car (4.91 m",
+            ),
             (
                 "level = \"paper\"",
                 "level = \"loud\"",
@@ -326,6 +331,58 @@ mod tests {
             let expected = format!("lot.toml:{line}: {expected}");
             assert!(message.starts_with(&expected), "got:      {message}\nexpected: {expected}");
         }
+    }
+
+    /// Written lots hold one obstacle per line; errors find it there too.
+    #[test]
+    fn a_fault_in_a_written_lot_is_named_with_its_line() {
+        let mut scenario = reference::lot(ReferenceLot::B, RootSeed(1));
+        scenario.obstacles[17].length_m = Some(-1.0);
+        let text = to_toml(&scenario);
+        let line = 1 + text.lines().position(|line| line.contains("length_m = -1.0")).expect("it is written");
+        let expected = format!("lot.toml:{line}: obstacle 18: length_m is -1; write a number of metres");
+        assert!(message(&text).starts_with(&expected), "got: {}\nexpected: {expected}", message(&text));
+    }
+
+    /// Whatever is in a file: an error with a line of it or a lot that builds, never a panic.
+    #[test]
+    fn damaged_files_never_panic() {
+        use rand::RngExt as _;
+        const WORDS: [&str; 12] =
+            ["nan", "inf", "-1e30", "1e30", "1e-30", "0", "-0.0", "\"x\"", "[]", "{}", "40.0", "[["];
+        let lines: Vec<&str> = EXAMPLE.lines().collect();
+        let mut rng = RootSeed(9).rng(sim::seed::Stream::Suite, 0);
+        let (mut accepted, mut refused) = (0, 0);
+        for _ in 0..4000 {
+            let mut damaged: Vec<String> = lines.iter().map(ToString::to_string).collect();
+            for _ in 0..rng.random_range(1..3) {
+                let i = rng.random_range(0..damaged.len());
+                let mut words: Vec<String> = damaged[i].split(' ').map(str::to_owned).collect();
+                let word = rng.random_range(0..words.len());
+                match rng.random_range(0..4) {
+                    0 => words[word] = WORDS[rng.random_range(0..WORDS.len())].to_owned(),
+                    1 => words[word] = words[word].replace(|c: char| c.is_ascii_digit(), "7"),
+                    2 => drop(words.remove(word)),
+                    _ => words.insert(word, WORDS[rng.random_range(0..WORDS.len())].to_owned()),
+                }
+                damaged[i] = words.join(" ");
+            }
+            match parse(&damaged.join("\n"), "lot.toml") {
+                Ok(scenario) => {
+                    accepted += 1;
+                    if accepted % 20 == 0 {
+                        sim::map::Map::build(scenario, &VehicleParams::hyundai_hg300())
+                            .expect("what loads also builds");
+                    }
+                }
+                Err(LoadError::Faulty { line, .. }) => {
+                    assert!((1..=lines.len()).contains(&line));
+                    refused += 1;
+                }
+                Err(other) => panic!("{other}"),
+            }
+        }
+        assert!(accepted > 200 && refused > 1000, "{accepted} accepted, {refused} refused: too gentle or too rough");
     }
 
     #[test]

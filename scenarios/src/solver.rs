@@ -264,6 +264,7 @@ impl<'a> Search<'a> {
 }
 
 /// A rectangle around the body, tested exactly against every edge of the scene.
+#[allow(clippy::struct_field_names, reason = "the postfix is the unit")]
 struct Footprint {
     rear_m: f32,
     front_m: f32,

@@ -9,6 +9,8 @@ use crate::vehicle::VehicleParams;
 
 /// Largest extent of a lot, metres: its raster of distances then takes 100 MB.
 pub const EXTENT_MAX_M: f32 = 500.0;
+/// Things that stand farther than this from the lot are typing errors, metres.
+const STRAY_M: f32 = 50.0;
 /// Points nearer than this count as one, metres.
 const COINCIDENT_M: f32 = 1e-3;
 /// A route shorter than about one car length measures nothing, metres.
@@ -26,6 +28,7 @@ pub fn validate(scenario: &Scenario, vehicle: &VehicleParams) -> Result<(), Scen
     check_name(&scenario.name)?;
     check_polygon(&scenario.boundary, Place::Boundary)?;
     check_extent(&scenario.boundary)?;
+    let lot = bounds(&scenario.boundary);
     for (i, island) in scenario.islands.iter().enumerate() {
         check_polygon(&island.polygon, |_| Place::Island(i))?;
         check_size(Place::Island(i), "height_m", island.height_m, 5.0)?;
@@ -33,14 +36,16 @@ pub fn validate(scenario: &Scenario, vehicle: &VehicleParams) -> Result<(), Scen
     }
     for (i, obstacle) in scenario.obstacles.iter().enumerate() {
         check_obstacle(Place::Obstacle(i), obstacle)?;
+        check_near(Place::Obstacle(i), obstacle.centre().position(), lot)?;
     }
     for (i, bump) in scenario.speed_bumps.iter().enumerate() {
         let place = Place::SpeedBump(i);
         check_finite(place, &[("x_m", bump.x_m), ("y_m", bump.y_m), ("heading_deg", bump.heading_deg)])?;
+        check_near(place, Vec2::new(bump.x_m, bump.y_m), lot)?;
         check_size(place, "length_m", bump.length_m, 30.0)?;
         check_size(place, "width_m", bump.width_m, 30.0)?;
     }
-    check_path_points(&scenario.reference_path)?;
+    check_path_points(&scenario.reference_path, lot)?;
     let path = Path::new(&scenario.reference_path);
     if path.length_m() < PATH_MIN_M {
         let problem = format!("the route is {:.2} m long", path.length_m());
@@ -79,6 +84,14 @@ fn check_size(place: Place, name: &str, value: f32, max: f32) -> Result<(), Scen
         return fault(place, format!("{name} is {value}"), remedy);
     }
     Ok(())
+}
+
+fn check_near(place: Place, point: Vec2, lot: (Vec2, Vec2)) -> Result<(), ScenarioError> {
+    if boxes_meet((point, point), (lot.0 - STRAY_M, lot.1 + STRAY_M)) {
+        return Ok(());
+    }
+    let problem = format!("it stands at {}, more than {STRAY_M} m from the lot", at(point));
+    fault(place, problem, "move it nearer; coordinates are in metres")
 }
 
 fn check_obstacle(place: Place, obstacle: &Obstacle) -> Result<(), ScenarioError> {
@@ -159,9 +172,14 @@ fn check_island_inside(index: usize, island: &[Vec2], boundary: &[Vec2]) -> Resu
     Ok(())
 }
 
-fn check_path_points(path: &ReferencePath) -> Result<(), ScenarioError> {
+fn check_path_points(path: &ReferencePath, lot: (Vec2, Vec2)) -> Result<(), ScenarioError> {
     for (i, point) in path.points.iter().enumerate() {
-        check_finite(Place::ReferencePath(Some(i)), &[("x", point.x), ("y", point.y)])?;
+        let place = Place::ReferencePath(Some(i));
+        check_finite(place, &[("x", point.x), ("y", point.y)])?;
+        if !boxes_meet((*point, *point), lot) {
+            let problem = format!("the point {} lies outside the lot", at(*point));
+            return fault(place, problem, "move it inside the boundary");
+        }
     }
     let place = Place::ReferencePath(None);
     if path.points.len() < 2 {
@@ -475,13 +493,21 @@ mod tests {
             (|s| s.reference_path.points[1].x = 8.0, "reference_path: the route is 3.00 m long; make it at least 5 m"),
             (|s| s.reference_path.points.push(Vec2::new(5.0, 0.1)), "reference_path, point 2: the route turns by 180°"),
             (|s| s.reference_path.corner_radius_m = -5.0, "reference_path: corner_radius_m is -5"),
+            (|s| s.reference_path.points[1].x = 1e30, "reference_path, point 2: the point (1000000"),
             (
                 |s| s.reference_path.points[1].x = 45.0,
-                "reference_path, point 2: the route leaves the boundary at (39.50, 0.00), 34.5 m from the start",
+                "reference_path, point 2: the point (45.00, 0.00) lies outside the lot",
             ),
+            (
+                // The lane narrows to nothing at its end, beside the route's last metres.
+                |s| s.boundary[1].y = 2.9,
+                "reference_path, point 2: the route leaves the boundary at (20.00, 0.00), 15.0 m from the start",
+            ),
+            (|s| s.obstacles[0].y_m = -60.0, "obstacle 1: it stands at (20.00, -60.00), more than 50 m from the lot"),
+            (|s| s.speed_bumps[0].x_m = 91.0, "speed_bump 1: it stands at (91.00, 0.00), more than 50 m from"),
             (|s| s.reference_path.points[0].x = 1.0, "reference_path, point 1: the car (4.91 m × 1.86 m) does not fit"),
             (|s| s.reference_path.points[0].y = 2.2, "reference_path, point 1: the car"),
-            (|s| s.reference_path.points[0].x = -9.0, "reference_path, point 1: the car"),
+            (|s| s.reference_path.points[0].x = -9.0, "reference_path, point 1: the point (-9.00, 0.00) lies outside"),
             (
                 |s| s.obstacles.push(obstacle(ObstacleClass::Cone, 8.9, 0.9)),
                 "obstacle 2: the cone at (8.90, 0.90) stands where the car starts; move it",
