@@ -32,6 +32,46 @@ pub struct PlanWeights {
     pub change: f32,
 }
 
+/// How the way ahead is smoothed. All chosen: the paper says only that the distance to obstacles is kept large.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BandConfig {
+    /// Rounds of relaxation: a band then hardly remembers which plan it came from.
+    pub iterations: u32,
+    /// Something nearer than this pushes the band away, metres: half of the widest lane with a middle.
+    pub comfort_m: f32,
+    /// Share of the way to the middle taken per round where one metre is missing on one side.
+    pub middle_gain: f32,
+    /// A point is drawn to the middle of the points this far before and behind it: bends are rounded over that, metres.
+    pub stiffness_m: f32,
+    /// Share of the way to straightness taken per round.
+    pub straight_gain: f32,
+    /// Longest move per round, metres.
+    pub step_max_m: f32,
+    /// Clearance of the arc to the point, metres (expert-findings.md 5.2), which fades from the lower …
+    pub open_from_m: f32,
+    /// … to the upper value.
+    pub open_to_m: f32,
+    /// Where the band is open for less than this, the plan's own arc is steered at: pursuing a point 4 m ahead of the
+    /// axle straightens up too early at the end of a corner …
+    pub corner_to_m: f32,
+    /// … and where it is open for more than this, the band's point, metres.
+    pub corner_from_m: f32,
+    /// The point lies this share of the open way ahead of the bumper: the knob for the speed (1.4 m/s on lot a at 1;
+    /// 1.3 gives 1.5).
+    pub reach_share: f32,
+    /// Length of the forecast that checks whether steering at the point is safe, metres.
+    pub forecast_m: f32,
+    /// The point moves nearer where the band bends more than this on the way to it …
+    pub bend_from_rad: f32,
+    /// … and no point lies beyond a bend of this, radians.
+    pub bend_to_rad: f32,
+    /// A nearer point, and at last the plan's own arc, takes over where that forecast keeps less than this …
+    pub trust_to_m: f32,
+    /// … and wholly below this, metres.
+    pub trust_from_m: f32,
+}
+
 /// Settings of [`crate::ScriptedExpert`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -75,6 +115,8 @@ pub struct ExpertConfig {
     pub load_band_m: f32,
     /// What makes a plan good.
     pub weights: PlanWeights,
+    /// How the way ahead is smoothed.
+    pub band: BandConfig,
     /// A plan must gain this share of its travel along the route: no turning back (methods.md 3.2).
     pub progress_share: f32,
 
@@ -123,9 +165,27 @@ impl ExpertConfig {
                 first_free: 0.3,
                 change: 0.1,
             },
+            band: BandConfig {
+                iterations: 60,
+                comfort_m: 2.2,
+                middle_gain: 0.5,
+                stiffness_m: 0.6,
+                straight_gain: 0.5,
+                step_max_m: 0.15,
+                open_from_m: 0.6,
+                open_to_m: 1.4,
+                corner_to_m: 5.0,
+                corner_from_m: 7.0,
+                reach_share: 1.0,
+                forecast_m: 6.0,
+                bend_from_rad: 0.4,
+                bend_to_rad: 1.2,
+                trust_to_m: 0.15,
+                trust_from_m: 0.03,
+            },
             progress_share: 0.3,
             station_share: 0.8,
-            point_clearance_m: 0.4,
+            point_clearance_m: 0.1,
             obstacle_ahead_m: 8.0,
             label_curvature_step_per_m: 0.012,
             label_sideways_step_m: 0.5,

@@ -1,5 +1,6 @@
 //! From an arc to a look-ahead point: how far along (which decides the speed), and how fast it may move.
 
+use crate::band::{self, Band};
 use crate::config::ExpertConfig;
 use crate::sight::Sight;
 use sim::driver::{GroundTruth, LookAheadPoint};
@@ -10,6 +11,10 @@ use std::f32::consts::FRAC_PI_2;
 
 /// Step of the march along a label's arc, metres.
 const MARCH_M: f32 = 0.2;
+/// Bends of a band count from here on, metres: before, it merges with where the car happens to be.
+const BEND_FROM_M: f32 = 2.4;
+/// Step along the arc to a point when its openness is judged, metres.
+const OPEN_STEP_M: f32 = 0.6;
 
 /// A look-ahead point as pure pursuit drives it: a circle through the rear axle and a place on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,6 +26,24 @@ pub(crate) struct Label {
 }
 
 impl Label {
+    /// The label through a point ahead in the ego frame.
+    fn through(in_ego: Vec2) -> Self {
+        let curvature_per_m = LookAheadPoint { ahead_m: in_ego.x, left_m: in_ego.y }.curvature_per_m();
+        let half_turn = in_ego.y.atan2(in_ego.x);
+        let chord_m = in_ego.length();
+        let station_m = if half_turn.abs() < 1e-3 { chord_m } else { chord_m * half_turn / half_turn.sin() };
+        Self { curvature_per_m, station_m }
+    }
+
+    /// This label with a share, the other with the rest.
+    pub(crate) fn mixed(self, share: f32, other: Self) -> Self {
+        let mix = |a: f32, b: f32| share * a + (1.0 - share) * b;
+        Self {
+            curvature_per_m: mix(self.curvature_per_m, other.curvature_per_m),
+            station_m: mix(self.station_m, other.station_m),
+        }
+    }
+
     /// The point in the ego frame.
     pub(crate) fn point(self) -> LookAheadPoint {
         let in_ego = on_arc(self.curvature_per_m, self.station_m);
@@ -67,6 +90,49 @@ impl Ground<'_> {
         self.kept_drivable(Label { curvature_per_m, station_m })
     }
 
+    /// How far along a band a point can be seen and reached over open ground, metres from the rear axle: the paper's
+    /// third rule. Where the arc to a point comes near a boundary, it fades.
+    pub(crate) fn open_way_m(&self, band: &Band) -> f32 {
+        let near_m = self.geometry.near_edge_ahead_m;
+        let mut reach_m = near_m;
+        let mut open = 1.0_f32;
+        let mut travel_m = near_m + band::SPACING_M;
+        let settings = &self.config.band;
+        let (mut low, mut high) = (0.0_f32, 0.0_f32);
+        let reference = band.heading_at(BEND_FROM_M);
+        while travel_m <= band.length_m() && open > 0.0 {
+            let turn_rad = reference.angle_to(band.heading_at(travel_m));
+            (low, high) = (low.min(turn_rad), high.max(turn_rad));
+            let straightness = (settings.bend_to_rad - (high - low)) / (settings.bend_to_rad - settings.bend_from_rad);
+            open = open.min(straightness).min(self.openness(self.label_at(band.at(travel_m)))).max(0.0);
+            reach_m += open * band::SPACING_M;
+            travel_m += band::SPACING_M;
+        }
+        reach_m
+    }
+
+    /// The label through a world point.
+    pub(crate) fn label_at(&self, in_world: Vec2) -> Label {
+        Label::through(self.truth.vehicle.pose.world_from_ego().inverse_point(in_world))
+    }
+
+    /// How open the arc to a point is, 0…1: least of its points.
+    fn openness(&self, label: Label) -> f32 {
+        let band = &self.config.band;
+        let field = self.truth.map.distance_field();
+        let world_from_ego = self.truth.vehicle.pose.world_from_ego();
+        let near_m = self.vehicle.front_m();
+        let steps = ((label.station_m - near_m) / OPEN_STEP_M).ceil().max(1.0) as usize;
+        let nearest_m = (0..=steps)
+            .map(|i| {
+                let station_m = near_m + (label.station_m - near_m) * i as f32 / steps as f32;
+                let in_world = world_from_ego.point(on_arc(label.curvature_per_m, station_m));
+                if self.sight.knows(in_world) { field.at(in_world) } else { -1.0 }
+            })
+            .fold(f32::INFINITY, f32::min);
+        ((nearest_m - band.open_from_m) / (band.open_to_m - band.open_from_m)).clamp(0.0, 1.0)
+    }
+
     /// The nearest point of an arc: the slowest.
     pub(crate) fn nearest_label_on(&self, curvature_per_m: f32) -> Label {
         Label { curvature_per_m, station_m: self.stations(curvature_per_m).0 }
@@ -74,6 +140,8 @@ impl Ground<'_> {
 
     /// Rule one: the point lies inside drivable space, and inside the patch.
     pub(crate) fn kept_drivable(&self, label: Label) -> Label {
+        let max_per_m = self.config.curvature_max_per_m;
+        let label = Label { curvature_per_m: label.curvature_per_m.clamp(-max_per_m, max_per_m), ..label };
         let (near_m, far_m) = self.stations(label.curvature_per_m);
         let drivable_m = if label.station_m <= near_m { near_m } else { self.drivable_station(label.curvature_per_m) };
         Label { station_m: label.station_m.min(drivable_m).clamp(near_m, far_m), ..label }

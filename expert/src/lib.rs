@@ -9,6 +9,7 @@
 //! expert-findings.md. The expert decides from the clean scene around the car. The route serves one purpose only: a
 //! plan that turns back is refused. Same situation and memory, same bytes.
 
+mod band;
 mod config;
 mod label;
 mod rollout;
@@ -20,6 +21,7 @@ pub use config::{ExpertConfig, PlanWeights, Sees};
 pub use search::Candidate;
 pub use stats::{ExpertStats, Rule};
 
+use band::Band;
 use label::{Ground, Label};
 use rand::Rng as _;
 use rollout::{Footprint, Motion};
@@ -34,6 +36,8 @@ use std::collections::VecDeque;
 
 /// Two labels farther apart than this contradict each other, metres.
 const JUMP_M: f32 = 1.0;
+/// Ranges at which steering at the smoothed way is tried, from the open one to the nearest.
+const RANGES: usize = 5;
 /// Control period, seconds (paper: 20 Hz). Limits of labels are per tick; only the reaction delay is a time.
 const CONTROL_PERIOD_S: f32 = 0.05;
 
@@ -155,15 +159,15 @@ impl ScriptedExpert {
 
         let (chosen, clearance_m, wish) = if let Some((level, plan)) = best {
             // Rule three: on that arc, as far as possible.
-            let curvature_per_m = self.arcs.curvature_per_m(plan.first);
-            let label = ground.label_on(curvature_per_m, plan.first_free_m, plan.free_m);
+            let arc = ground.label_on(self.arcs.curvature_per_m(plan.first), plan.first_free_m, plan.free_m);
+            let label = self.smoothed(&search, &ground, &plan, arc);
             let rule = match level {
                 0 if plan.first_free_m >= self.config.obstacle_ahead_m => Rule::Far,
                 0 => Rule::Avoid,
                 _ => Rule::Relaxed,
             };
             if let Some(inspection) = &mut inspection {
-                inspection.way = search.trace(&plan);
+                inspection.way = search.way(&plan, band::SPACING_M).collect();
             }
             (plan.first, Some(self.config.clearances_m[level]), Wish { label, rule, has_failed: false })
         } else {
@@ -176,6 +180,38 @@ impl ScriptedExpert {
             inspection.wanted = wish.label.point();
         }
         wish
+    }
+
+    /// The label on the smoothed way: as far ahead as that is open, steering at the farthest point that it is safe to
+    /// steer at; in corners, and where pursuing the way is never safe, the plan's own arc.
+    ///
+    /// Every share falls to 0 gradually, so that a small change of the scene moves the label a little.
+    fn smoothed(&self, search: &Search<'_>, ground: &Ground<'_>, plan: &Plan, arc: Label) -> Label {
+        let mut band = Band::along(search.way(plan, band::SPACING_M), search.start.ahead);
+        band.relax(search.truth.map.distance_field(), &self.config.band);
+        let open_m = ground.open_way_m(&band);
+        let settings = &self.config.band;
+        let on_straight =
+            ((open_m - settings.corner_to_m) / (settings.corner_from_m - settings.corner_to_m)).clamp(0.0, 1.0);
+        if on_straight == 0.0 {
+            return arc;
+        }
+        // From the farthest range to the nearest, each takes the share it deserves of what is left.
+        let (mut rest, mut curvature_per_m) = (1.0, 0.0);
+        let near_m = self.geometry.near_edge_ahead_m;
+        for i in 0..RANGES {
+            let range_m = open_m + (near_m - open_m) * i as f32 / (RANGES - 1) as f32;
+            let share = rest * search.trust(&band, range_m);
+            curvature_per_m += share * ground.label_at(band.at(range_m)).curvature_per_m;
+            rest -= share;
+            if rest <= 0.0 {
+                break;
+            }
+        }
+        curvature_per_m += rest * arc.curvature_per_m;
+        let front_m = self.vehicle.front_m();
+        let station_m = front_m + settings.reach_share * (open_m - front_m);
+        ground.kept_drivable(Label { curvature_per_m, station_m }.mixed(on_straight, arc))
     }
 
     /// The car when it begins to obey: the dead time further on, steering at the last label meanwhile.

@@ -4,10 +4,12 @@
 //! arc is therefore as good as the best plan that begins with it: this is the paper's "a point from which avoidance
 //! is possible".
 
+use crate::band::Band;
 use crate::config::ExpertConfig;
 use crate::rollout::{Footprint, Motion};
 use crate::sight::Sight;
 use sim::driver::GroundTruth;
+use sim::geometry::Vec2;
 use sim::vehicle::VehicleParams;
 
 /// First arcs to either side of straight on.
@@ -174,22 +176,51 @@ impl Search<'_> {
         widest
     }
 
-    /// Poses along a plan, for pictures.
-    pub(crate) fn trace(&self, plan: &Plan) -> Vec<sim::geometry::Vec2> {
+    /// The rear axle along a plan, every `spacing_m` from the start.
+    pub(crate) fn way(&self, plan: &Plan, spacing_m: f32) -> impl Iterator<Item = Vec2> {
         let step_m = self.config.first_step_m;
         let change_per_m = self.change_per_step(step_m);
-        let mut motion = self.start;
-        let steps = (plan.free_m / step_m) as usize;
-        std::iter::once(motion.position)
-            .chain((0..steps).map(|i| {
-                let target_per_m = match plan.second {
-                    Some((branch_m, curvature_per_m)) if i as f32 * step_m >= branch_m => curvature_per_m,
-                    _ => self.arcs.first[plan.first].curvature_per_m,
+        let steps_per_sample = (spacing_m / step_m).round() as usize;
+        let first_per_m = self.arcs.first[plan.first].curvature_per_m;
+        let (second, mut motion) = (plan.second, self.start);
+        let samples = (plan.free_m / spacing_m) as usize;
+        std::iter::once(self.start.position).chain((0..samples).map(move |sample| {
+            for i in 0..steps_per_sample {
+                let travel_m = (sample * steps_per_sample + i) as f32 * step_m;
+                let target_per_m = match second {
+                    // Half a step: travels are sums of steps.
+                    Some((branch_m, second_per_m)) if travel_m + 0.5 * step_m > branch_m => second_per_m,
+                    _ => first_per_m,
                 };
                 motion.step(target_per_m, change_per_m, step_m);
-                motion.position
-            }))
-            .collect()
+            }
+            motion.position
+        }))
+    }
+
+    /// How safe it is to pursue a band, always steering at the point `ahead_m` along it, 0…1 by the least clearance.
+    pub(crate) fn trust(&self, band: &Band, ahead_m: f32) -> f32 {
+        let (config, field) = (self.config, self.truth.map.distance_field());
+        let step_m = config.second_step_m;
+        let change_per_m = self.change_per_step(step_m);
+        let settings = &config.band;
+        let per_m = 1.0 / (settings.trust_to_m - settings.trust_from_m);
+        let mut motion = self.start;
+        let mut trust = 1.0_f32;
+        for i in 0..(settings.forecast_m / step_m) as usize {
+            let travel_m = i as f32 * step_m;
+            let target = band.at(travel_m + ahead_m) - motion.position;
+            let left_m = motion.ahead.perp_dot(target);
+            let target_per_m =
+                (2.0 * left_m / target.length_squared()).clamp(-config.curvature_max_per_m, config.curvature_max_per_m);
+            motion.step(target_per_m, change_per_m, step_m);
+            let clearance_m = self.footprint.clearance_m(field, &motion);
+            trust = trust.min((clearance_m - settings.trust_from_m) * per_m);
+            if trust <= 0.0 {
+                return 0.0;
+            }
+        }
+        trust
     }
 
     /// How far the curvature can change per step at the present speed. Linear in the travel: it takes the rate of
