@@ -233,6 +233,33 @@ mod tests {
         }
     }
 
+    /// Every leg longer than 40 m bows aside once, 0.56–0.8 m over 14 m; the others run straight.
+    #[test]
+    fn long_legs_have_one_bulge() {
+        for which in ReferenceLot::ALL {
+            let corridor = Corridor::draw(&blueprint(which));
+            let route = Path::new(&corridor.reference_path);
+            for (leg, nominal_m) in corridor.legs.iter().zip(which.sheet().legs_m) {
+                let on_leg = |pose: &&Pose| {
+                    let local = leg.local(pose.position());
+                    (6.0..leg.length_m - 6.0).contains(&local.x) && local.y.abs() < 2.0
+                };
+                let bowed: Vec<Vec2> =
+                    route.poses().iter().filter(on_leg).map(|pose| leg.local(pose.position())).collect();
+                let deepest_m = bowed.iter().map(|p| p.y.abs()).fold(0.0, f32::max);
+                let aside: Vec<f32> = bowed.iter().filter(|p| p.y.abs() > 0.01).map(|p| p.x).collect();
+                if *nominal_m > 40.0 {
+                    assert!((0.55..0.81).contains(&deepest_m), "{}: a bulge of {deepest_m} m", which.name());
+                    let length_m = aside[aside.len() - 1] - aside[0];
+                    // The outermost centimetre of a raised cosine takes half a metre at either end.
+                    assert!((12.0..14.1).contains(&length_m), "{}: a bulge {length_m} m long", which.name());
+                } else {
+                    assert!(aside.is_empty(), "{}: a short leg bows by {deepest_m} m", which.name());
+                }
+            }
+        }
+    }
+
     /// The gap rules, measured on the finished scenario with rays across the route: nothing is asked of the code that
     /// places things.
     #[test]
