@@ -43,11 +43,21 @@ impl Contestant {
         Self { name: name.to_owned(), kind: Kind::Network(Box::new(checkpoint)) }
     }
 
-    /// Reads a spec.
+    /// Reads several specs.
     ///
     /// # Errors
-    /// If nothing is named so, or its files are not what they should be.
-    pub fn parse(spec: &str) -> anyhow::Result<Self> {
+    /// If nothing is named so, its files are not what they should be, or one is named twice.
+    pub fn parse_all(specs: &[String]) -> anyhow::Result<Vec<Self>> {
+        let mut contestants: Vec<Self> = Vec::new();
+        for spec in specs {
+            let is_known = contestants.iter().any(|contestant| contestant.name == *spec);
+            ensure!(!is_known, "driver {spec:?} is named twice; results are told apart by name");
+            contestants.push(Self::parse(spec)?);
+        }
+        Ok(contestants)
+    }
+
+    fn parse(spec: &str) -> anyhow::Result<Self> {
         let folder: PathBuf = if spec == "expert" {
             return Ok(Self::expert());
         } else if let Some(run) = spec.strip_prefix("run:") {
@@ -58,6 +68,11 @@ impl Contestant {
             let known: Vec<&str> = SPECS.iter().map(|(spec, _)| *spec).collect();
             bail!("no driver {spec:?}; there are {}", known.join(", "))
         };
+        ensure!(
+            Checkpoint::exists(&folder),
+            "driver {spec:?}: {} holds no model.safetensors; name the folder of a round, as in net:runs/NAME/round-03",
+            folder.display()
+        );
         let checkpoint = Checkpoint::load(&folder).with_context(|| format!("driver {spec:?}"))?;
         Ok(Self::network(spec, checkpoint))
     }

@@ -9,12 +9,11 @@ use crate::report::{Evaluation, RunLine};
 use crate::run_dir::{Place, RunDir};
 use crate::settings::{NoiseChoice, Settings};
 use crate::summary::Cells;
-use crate::trials::{Job, Purpose};
+use crate::trials::{self, Job, Purpose};
 use anyhow::Context as _;
-use rayon::prelude::*;
 use serde::Serialize;
 use sim::batch::run_lockstep;
-use sim::episode::{Episode, EpisodeReport};
+use sim::episode::EpisodeReport;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::io::Write as _;
@@ -29,7 +28,7 @@ const GROUP: usize = 16;
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let settings = resolve(args)?;
     let lots = Lot::parse_all(&settings.evaluation.lots)?;
-    let contestants = args.drivers.iter().map(|spec| Contestant::parse(spec)).collect::<Result<Vec<_>, _>>()?;
+    let contestants = Contestant::parse_all(&args.drivers)?;
     let run = RunDir::create(
         &Place {
             out: args.out.as_deref(),
@@ -150,10 +149,7 @@ fn drive(
     let (mut done, mut near_collisions) = (0, 0);
     while jobs.peek().is_some() {
         let group: Vec<Job<'_>> = jobs.by_ref().take(GROUP).collect();
-        let episodes = group
-            .par_iter()
-            .map(|job| job.episode(settings, evaluation.noise))
-            .collect::<anyhow::Result<Vec<Episode>>>()?;
+        let episodes = trials::episodes(&group, settings, evaluation.noise)?;
         let lengths_m: Vec<f32> = episodes.iter().map(|episode| episode.map().path().length_m()).collect();
         let mut shares = vec![0.0_f32; group.len()];
         let mut fleet = contestant.fleet(settings, group.len());

@@ -75,6 +75,8 @@ fn write(args: &GenerateArgs, job: &Job<'_>) -> anyhow::Result<Made> {
         (true, 1) => format!("{}-s{}", job.lot.name(), args.seed),
         (true, _) => format!("{}-s{}-{}", job.lot.name(), args.seed, job.trial + 1),
     };
+    // Names of lots are free text; names of files are not.
+    let name = name.replace(|c: char| !c.is_alphanumeric() && !"-_.".contains(c), "-");
     let [toml, png] = ["toml", "png"].map(|extension| args.out.join(format!("{name}.{extension}")));
     for path in [&toml, &png] {
         ensure!(

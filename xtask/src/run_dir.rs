@@ -222,3 +222,70 @@ fn git(args: &[&str]) -> Option<String> {
     let output = Command::new("git").args(["-C", env!("CARGO_MANIFEST_DIR")]).args(args).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use policy::network::Weights;
+    use sim::seed::RootSeed;
+
+    fn scratch(name: &str) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("xtask-test-{}-{name}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        path
+    }
+
+    fn create(out: &Path, overwrite: bool) -> anyhow::Result<RunDir> {
+        let settings = Settings::preset("smoke")?;
+        let place = Place { out: Some(out), overwrite, command: "train-dagger", preset: "smoke", seed: 1 };
+        RunDir::create(&place, &settings)
+    }
+
+    fn message<T: std::fmt::Debug>(result: anyhow::Result<T>) -> String {
+        format!("{:#}", result.unwrap_err())
+    }
+
+    #[test]
+    fn a_run_is_resumed_until_finished_and_overwritten_only_when_told() {
+        let path = scratch("claim");
+        let run = create(&path, false).unwrap();
+        assert!(message(create(&path, false)).contains("--resume"));
+        assert_eq!(RunDir::resume(&path).unwrap().1, Settings::preset("smoke").unwrap());
+        run.finish(&std::collections::BTreeMap::from([("stop", "test")])).unwrap();
+        assert!(message(RunDir::resume(&path)).contains("finished"));
+        assert!(message(create(&path, false)).contains("--overwrite"));
+        create(&path, true).unwrap();
+        assert!(!path.join(FINISHED).exists());
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn a_folder_that_is_no_run_is_never_deleted() {
+        let path = scratch("foreign");
+        fs::create_dir_all(&path).unwrap();
+        fs::write(path.join("thesis.txt"), "years of work").unwrap();
+        assert!(message(create(&path, true)).contains("not a run"));
+        assert!(path.join("thesis.txt").exists());
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn the_policy_of_a_run_is_its_last_network() {
+        let path = scratch("policy");
+        assert!(message(policy_folder(&path)).contains("this is no run"));
+        create(&path, false).unwrap();
+        assert!(message(policy_folder(&path)).contains("no network"));
+        let settings = Settings::preset("smoke").unwrap();
+        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
+        let checkpoint = Checkpoint { weights, geometry: settings.dagger.geometry };
+        for round in ["round-00", "round-01", "round-10"] {
+            checkpoint.save(&path.join(round)).unwrap();
+        }
+        fs::create_dir_all(path.join("round-11")).unwrap(); // collected, not trained yet
+        assert_eq!(policy_folder(&path).unwrap(), path.join("round-10"));
+        assert_eq!(policy_folder(&path.join("bc")).unwrap(), path.join("round-00"));
+        checkpoint.save(&path.join("final")).unwrap();
+        assert_eq!(policy_folder(&path).unwrap(), path.join("final"));
+        fs::remove_dir_all(path).unwrap();
+    }
+}

@@ -9,7 +9,7 @@ use crate::progress::{Stopwatch, Work};
 use crate::run_dir::{Place, RunDir};
 use crate::settings::Settings;
 use crate::table1::Table1;
-use crate::trials::{Job, Purpose};
+use crate::trials::{self, Job, Purpose};
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
 use policy::dagger::{Hooks, Outcome, Progress, Stop};
@@ -105,7 +105,7 @@ fn contestants(run: &RunDir, policy: Checkpoint, rounds: usize) -> anyhow::Resul
 fn print_next_steps(path: &Path) {
     let path = path.display();
     println!("\nPolicy: {path} (the last round; model.safetensors opens in PyTorch)");
-    println!("Next:   cargo xtask evaluate --driver run:{path} --seed 2");
+    println!("Next:   cargo xtask evaluate --config {path}/settings.toml --driver run:{path} --seed 2");
 }
 
 /// Data sampling and training, with bars.
@@ -140,9 +140,9 @@ fn learn(settings: &Settings, run: &RunDir, stopwatch: &mut Stopwatch) -> anyhow
 
 fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<Episode>> {
     let training = &settings.training;
-    Job::all(settings.seed, Purpose::Training { round }, lots, training.trials, &training.directions)
-        .map(|job| job.episode(settings, training.noise))
-        .collect()
+    let purpose = Purpose::Training { round };
+    let jobs: Vec<_> = Job::all(settings.seed, purpose, lots, training.trials, &training.directions).collect();
+    trials::episodes(&jobs, settings, training.noise)
 }
 
 /// Turns what is reported during a training into bars and seconds.

@@ -15,9 +15,10 @@
 use crate::lots::Lot;
 use crate::settings::{NoiseChoice, Settings};
 use anyhow::Context as _;
+use rayon::prelude::*;
 use sim::episode::{Episode, EpisodeConfig};
 use sim::map::Map;
-use sim::scenario::Direction;
+use sim::scenario::{Direction, Scenario};
 use sim::seed::{RootSeed, Stream};
 use sim::sensing::noise::NoiseConfig;
 use std::sync::Arc;
@@ -90,29 +91,53 @@ impl<'a> Job<'a> {
         })
     }
 
-    /// Builds the map.
+    /// Whether another job drives through the same obstacles: they are drawn once for both.
+    fn shares_obstacles_with(&self, other: &Self) -> bool {
+        self.lot.name() == other.lot.name() && (self.trial == other.trial || !self.lot.is_drawn_per_trial())
+    }
+
+    /// Builds the map from its lot as drawn.
+    ///
+    /// # Errors
+    /// If the lot cannot be driven.
+    fn map_of(&self, drawn: Scenario, config: &EpisodeConfig) -> anyhow::Result<Map> {
+        Map::build(self.direction.of(drawn), &config.vehicle).with_context(|| self.lot.name().to_owned())
+    }
+
+    /// Draws the lot and builds the map.
     ///
     /// # Errors
     /// If the lot cannot be driven.
     pub fn map(&self, config: &EpisodeConfig) -> anyhow::Result<Map> {
-        let scenario = self.direction.of(self.lot.draw(self.seed).scenario);
-        Map::build(scenario, &config.vehicle).with_context(|| self.lot.name().to_owned())
+        self.map_of(self.lot.draw(self.seed).scenario, config)
     }
 
     /// Seed of the noise.
     pub fn episode_seed(&self) -> RootSeed {
         episode_seed(self.seed, self.lot.name(), self.direction)
     }
+}
 
-    /// A car at the start.
-    ///
-    /// # Errors
-    /// If the lot cannot be driven.
-    pub fn episode(&self, settings: &Settings, noise: NoiseChoice) -> anyhow::Result<Episode> {
-        let map = self.map(&settings.episode)?;
+/// A car at the start of every job, in order. Neighbours that share obstacles draw them once: a generated lot is found
+/// by a search.
+///
+/// # Errors
+/// If a lot cannot be driven.
+pub fn episodes(jobs: &[Job<'_>], settings: &Settings, noise: NoiseChoice) -> anyhow::Result<Vec<Episode>> {
+    let start = |job: &Job<'_>, drawn: &Scenario| {
+        let map = job.map_of(drawn.clone(), &settings.episode)?;
         let config = episode_config(settings, noise, &map);
-        Ok(Episode::new(Arc::new(config), Arc::new(map), self.episode_seed()))
-    }
+        Ok(Episode::new(Arc::new(config), Arc::new(map), job.episode_seed()))
+    };
+    let neighbours: Vec<&[Job<'_>]> = jobs.chunk_by(Job::shares_obstacles_with).collect();
+    let episodes = neighbours
+        .par_iter()
+        .map(|jobs| {
+            let drawn = jobs[0].lot.draw(jobs[0].seed).scenario;
+            jobs.par_iter().map(|job| start(job, &drawn)).collect()
+        })
+        .collect::<anyhow::Result<Vec<Vec<Episode>>>>()?;
+    Ok(episodes.into_iter().flatten().collect())
 }
 
 /// The settings of an episode on a map. The level multiplies `episode.noise.intensity`.

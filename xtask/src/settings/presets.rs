@@ -64,14 +64,14 @@ fn paper() -> Settings {
     }
 }
 
-/// One way, one iteration, a network that fits into a cache, a few dozen steps.
+/// One way, one iteration, a network that fits into a cache, a few hundred steps.
 fn smoke() -> Settings {
     let fit = FitSettings {
         batch: 64,
-        budget: Budget::Steps(60),
+        budget: Budget::Steps(250),
         validation: ValidationSplit { block: 100, every: 5 },
-        validate_every: 30,
-        ..FitSettings::quick(60)
+        validate_every: 125,
+        ..FitSettings::quick(250)
     };
     let base = paper();
     Settings {
