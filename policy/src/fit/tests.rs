@@ -25,6 +25,7 @@ fn settings(steps: u32) -> FitSettings {
         batch: 33, // shards of different sizes
         validation: ValidationSplit { block: 20, every: 5 },
         validate_every: 20,
+        patience: None,
         ..FitSettings::quick(steps)
     }
 }
