@@ -145,7 +145,7 @@ mod tests {
         assert!(knows(8.0, 0.0) && knows(16.0, 0.0) && knows(7.0, -5.9), "in the patch");
         assert!(!knows(16.4, 0.0) && !knows(8.0, 6.1), "beyond the patch");
         assert!(knows(0.0, 9.0) && knows(-9.0, 0.0), "beside and behind the car");
-        // The car's near right corner stands at (7.65, 1.57), seen past it at y/(x − 1.59) = .26.
-        assert!(!knows(14.0, 4.0) && knows(14.0, 2.0), "behind the car and past it");
+        // Its far right corner stands at (12.35, 1.57): past it one sees what is below y/(x − 1.59) = .146.
+        assert!(!knows(14.0, 4.0) && !knows(14.0, 2.1) && knows(14.0, 1.5), "behind the car and past it");
     }
 }
