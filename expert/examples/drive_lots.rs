@@ -4,6 +4,9 @@
 #![allow(clippy::print_stdout, reason = "a tool that prints")]
 #![allow(clippy::disallowed_methods, reason = "it also times: microseconds per decision")]
 
+#[path = "shared/overrides.rs"]
+mod overrides;
+
 use clap::Parser;
 use comfy_table::{Table, presets};
 use expert::{ExpertConfig, ExpertStats, Rule, ScriptedExpert};
@@ -39,7 +42,7 @@ struct Args {
 
 fn main() {
     let args = Args::parse();
-    let expert = args.overrides.iter().fold(ExpertConfig::paper(), |config, text| overridden(&config, text));
+    let expert = args.overrides.iter().fold(ExpertConfig::paper(), |config, text| overrides::overridden(&config, text));
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header([
         "lot",
@@ -138,7 +141,9 @@ fn rule_between(before: &ExpertStats, after: &ExpertStats) -> Rule {
 
 fn row(which: ReferenceLot, direction: Direction, runs: &[Run]) -> Vec<String> {
     let mut stats = ExpertStats::default();
-    runs.iter().for_each(|run| stats.merge(&run.stats));
+    for run in runs {
+        stats.merge(&run.stats);
+    }
     let sum = |of: fn(&EpisodeReport) -> f64| runs.iter().map(|run| of(&run.report)).sum::<f64>();
     let metres = sum(|report| f64::from(report.metrics.driven_m));
     let duration_s = sum(|report| f64::from(report.metrics.duration_s));
@@ -162,14 +167,4 @@ fn row(which: ReferenceLot, direction: Direction, runs: &[Run]) -> Vec<String> {
         share(stats.label_jumps),
         format!("{micros:.0}"),
     ]
-}
-
-/// A copy with one setting replaced.
-fn overridden(config: &ExpertConfig, text: &str) -> ExpertConfig {
-    let (key, value) = text.split_once('=').expect("--set takes KEY=JSON");
-    let mut tree = serde_json::to_value(config).expect("settings serialise");
-    let pointer = format!("/{}", key.replace('.', "/"));
-    let slot = tree.pointer_mut(&pointer).unwrap_or_else(|| panic!("no setting {key:?}"));
-    *slot = serde_json::from_str(value).unwrap_or_else(|_| value.into());
-    serde_json::from_value(tree).unwrap_or_else(|error| panic!("{text}: {error}"))
 }

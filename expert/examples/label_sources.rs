@@ -4,6 +4,9 @@
 //! `cargo run -p expert --example label_sources -- --seeds 4 --lots a`
 #![allow(clippy::print_stdout, reason = "a tool that prints")]
 
+#[path = "shared/overrides.rs"]
+mod overrides;
+
 use clap::Parser;
 use expert::{ExpertConfig, ScriptedExpert, Sees};
 use rayon::prelude::*;
@@ -27,7 +30,7 @@ struct Args {
     /// Which lots.
     #[arg(long, default_value = "a")]
     lots: String,
-    /// A setting of the expert at the wheel, as JSON; what is not named is as in the paper.
+    /// Overrides a setting of the expert, e.g. `weights.load=0.5`; may be repeated.
     #[arg(long = "set", value_name = "KEY=JSON")]
     overrides: Vec<String>,
 }
@@ -64,7 +67,7 @@ fn shift(asked: &mut Asked, in_ego: Vec2, turn_rad: f32) {
 
 fn main() {
     let args = Args::parse();
-    let expert = args.overrides.iter().fold(ExpertConfig::paper(), |config, text| overridden(&config, text));
+    let expert = args.overrides.iter().fold(ExpertConfig::paper(), |config, text| overrides::overridden(&config, text));
     let lots: Vec<_> = ReferenceLot::ALL.into_iter().filter(|lot| args.lots.contains(&lot.name()[4..])).collect();
     let trials: Vec<_> = lots
         .iter()
@@ -93,7 +96,7 @@ fn drive(expert: &ExpertConfig, which: ReferenceLot, direction: Direction, seed:
     let mut moves = Vec::new();
     while episode.ending().is_none() {
         let decision = driver.decide(&episode.situation());
-        if episode.tick() % EVERY_TICKS == 0 {
+        if episode.tick().is_multiple_of(EVERY_TICKS) {
             let asked = Asked { config: expert.clone(), vehicle: episode.vehicle() };
             let answer = |asked: Asked| fresh_answer(asked, &config, &map, episode.progress_m());
             let base = answer(asked.clone());
@@ -135,14 +138,4 @@ fn print_line(name: &str, moves: &[Vec2]) {
         quantile(0.9),
         100.0 * beyond
     );
-}
-
-/// A copy with one setting replaced.
-fn overridden(config: &ExpertConfig, text: &str) -> ExpertConfig {
-    let (key, value) = text.split_once('=').expect("--set takes KEY=JSON");
-    let mut tree = serde_json::to_value(config).expect("settings serialise");
-    let pointer = format!("/{}", key.replace('.', "/"));
-    let slot = tree.pointer_mut(&pointer).unwrap_or_else(|| panic!("no setting {key:?}"));
-    *slot = serde_json::from_str(value).unwrap_or_else(|_| value.into());
-    serde_json::from_value(tree).unwrap_or_else(|error| panic!("{text}: {error}"))
 }

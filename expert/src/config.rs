@@ -32,7 +32,8 @@ pub struct PlanWeights {
     pub change: f32,
 }
 
-/// How the way ahead is smoothed. All chosen: the paper says only that the distance to obstacles is kept large.
+/// How the way ahead is smoothed. All chosen, and tuned on lot a for labels that move little when the car is moved by
+/// 5 cm (`examples/label_sources`): the paper says only that the distance to obstacles is kept as large as possible.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BandConfig {
@@ -120,8 +121,8 @@ pub struct ExpertConfig {
     /// A plan must gain this share of its travel along the route: no turning back (methods.md 3.2).
     pub progress_share: f32,
 
-    /// The point lies this share of the free travel ahead of the bumper: the knob for the speed
-    /// (expert-findings.md 5.2: .8 gives 1.29 to 1.71 m/s).
+    /// Where a plan's own arc is steered at (in corners): share of the free travel ahead of the bumper at which the
+    /// point lies (expert-findings.md 5.2).
     pub station_share: f32,
     /// Clearance of the point and of the way to it, metres (expert-findings.md 5.2).
     pub point_clearance_m: f32,

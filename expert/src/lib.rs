@@ -5,9 +5,17 @@
 //!    around the way to it.
 //! 3. Otherwise it lies as far ahead as possible inside drivable space.
 //!
-//! The paper says no more; how the rules were made precise, and what was measured on the way, is in methods.md 3 and
-//! expert-findings.md. The expert decides from the clean scene around the car. The route serves one purpose only: a
-//! plan that turns back is refused. Same situation and memory, same bytes.
+//! The paper says no more. Here, a decision takes four steps, each a file:
+//!
+//! - `search`: plans of two arcs each, forecast with the car's body and the speed of its steering (`rollout`); the best
+//!   one says whether, where and with how much clearance what is ahead can be avoided (rule two);
+//! - `band`: its way, pulled into the middle of the free space, which no longer depends on which plan it came from;
+//! - `label`: the point on that way, as far as the way is open (rule three) and drivable (rule one), and steadied from
+//!   tick to tick;
+//! - `stats`: which rule it was.
+//!
+//! How the numbers came about is in methods.md 3 and expert-findings.md. The expert decides from the clean scene around
+//! the car. The route serves one purpose only: a plan that turns back is refused. Same situation and memory, same bytes.
 
 mod band;
 mod config;
@@ -250,7 +258,7 @@ impl ScriptedExpert {
 impl Driver for ScriptedExpert {
     fn decide(&mut self, situation: &Situation<'_>) -> Decision {
         let truth = &situation.truth;
-        let sight = Sight::new(self.config.sees, truth.map, truth.vehicle.pose, &self.geometry);
+        let sight = Sight::new(self.config.sees, truth.map, truth.vehicle.pose, self.geometry);
         let mut inspection = self.inspection.take();
         let wish = self.wish(truth, &sight, inspection.as_mut());
         // Rule one has the last word: the point lies inside drivable space.

@@ -13,39 +13,31 @@ const CAMERA_AHEAD_M: f32 = 1.59;
 /// their range (methods.md 1.7, camera height 1.55 m). Lower things hide little more than themselves.
 const TALL_M: f32 = 1.2;
 
-/// Which ground is known at one decision.
+/// Which ground is known at one decision: all of it, or what the patch shows.
 #[derive(Debug, Clone)]
-pub(crate) enum Sight {
-    /// All of it.
-    WholeMap,
-    /// What the patch shows.
-    Patch(PatchSight),
-}
+pub(crate) struct Sight(Option<PatchSight>);
 
 impl Sight {
-    pub(crate) fn new(sees: Sees, map: &Map, pose: Pose, geometry: &GridGeometry) -> Self {
+    pub(crate) fn new(sees: Sees, map: &Map, pose: Pose, geometry: GridGeometry) -> Self {
         match sees {
-            Sees::WholeMap => Self::WholeMap,
-            Sees::PatchOnly => Self::Patch(PatchSight::new(map, pose, geometry)),
+            Sees::WholeMap => Self(None),
+            Sees::PatchOnly => Self(Some(PatchSight::new(map, pose, geometry))),
         }
     }
 
     /// How far a forecast can go on known ground when nothing is in the way, metres. `nose_m` is ahead of the axle.
     pub(crate) fn horizon_m(&self, horizon_m: f32, nose_m: f32) -> f32 {
-        match self {
-            Self::WholeMap => horizon_m,
+        match &self.0 {
+            None => horizon_m,
             // Within the dead time the car drives on by 0.14 m at most, and so does where forecasts begin.
-            Self::Patch(patch) => horizon_m.min(patch.geometry.far_edge_ahead_m() - nose_m - 0.2),
+            Some(patch) => horizon_m.min(patch.geometry.far_edge_ahead_m() - nose_m - 0.2),
         }
     }
 
     /// Whether a world point is known ground.
     #[inline]
     pub(crate) fn knows(&self, in_world: Vec2) -> bool {
-        match self {
-            Self::WholeMap => true,
-            Self::Patch(patch) => patch.knows(in_world),
-        }
+        self.0.as_ref().is_none_or(|patch| patch.knows(in_world))
     }
 }
 
@@ -59,12 +51,9 @@ pub(crate) struct PatchSight {
 }
 
 impl PatchSight {
-    fn new(map: &Map, pose: Pose, geometry: &GridGeometry) -> Self {
-        let mut sight = Self {
-            geometry: *geometry,
-            world_from_ego: pose.world_from_ego(),
-            range_squared: [f32::INFINITY; BEARINGS],
-        };
+    fn new(map: &Map, pose: Pose, geometry: GridGeometry) -> Self {
+        let mut sight =
+            Self { geometry, world_from_ego: pose.world_from_ego(), range_squared: [f32::INFINITY; BEARINGS] };
         let reach_m = geometry.far_edge_ahead_m().hypot(0.5 * geometry.side_m);
         for occluder in map.occluders() {
             let is_near = occluder.centre.distance(pose.position()) < reach_m + occluder.radius_m;
@@ -140,7 +129,7 @@ mod tests {
             speed_bumps: Vec::new(),
         };
         let map = Map::build(scenario, &sim::vehicle::VehicleParams::hyundai_hg300()).unwrap();
-        let sight = Sight::new(Sees::PatchOnly, &map, Pose::default(), &GridGeometry::paper());
+        let sight = Sight::new(Sees::PatchOnly, &map, Pose::default(), GridGeometry::paper());
         let knows = |x, y| sight.knows(Vec2::new(x, y));
         assert!(knows(8.0, 0.0) && knows(16.0, 0.0) && knows(7.0, -5.9), "in the patch");
         assert!(!knows(16.4, 0.0) && !knows(8.0, 6.1), "beyond the patch");

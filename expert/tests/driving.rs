@@ -44,7 +44,7 @@ fn corner() -> Scenario {
 }
 
 fn map(scenario: Scenario) -> Map {
-    Map::build(scenario, &VehicleParams::hyundai_hg300()).unwrap()
+    Map::build(scenario, &VehicleParams::hyundai_hg300()).expect("the scenes of these tests are valid")
 }
 
 fn expert(sees: Sees) -> ScriptedExpert {
