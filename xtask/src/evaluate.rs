@@ -13,7 +13,7 @@ use crate::trials::{self, Job, Purpose};
 use anyhow::Context as _;
 use serde::Serialize;
 use sim::batch::run_lockstep;
-use sim::episode::EpisodeReport;
+use sim::episode::{EpisodeReport, Event};
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::io::Write as _;
@@ -108,7 +108,7 @@ pub fn measure(
     for contestant in contestants {
         let mut work = Work::begin(format!("driving {}", contestant.name));
         let done = drive(settings, contestant, lots, &mut work, &mut |job, report| {
-            cells.add(&contestant.name, job.lot.name(), job.direction, report);
+            cells.add(&contestant.name, job.lot, job.direction, report);
             let (driver, lot) = (contestant.name.as_str(), job.lot.name());
             let line = RunLine { driver, lot, direction: job.direction, trial: job.trial, report };
             serde_json::to_writer(&mut lines, &line)?;
@@ -117,7 +117,7 @@ pub fn measure(
         });
         lines.flush()?;
         stopwatch.add("evaluation", work.seconds());
-        let totals = cells.pooled(&contestant.name, None, None);
+        let totals = cells.pooled(|cell| cell.driver == contestant.name);
         work.end(&format!("{} runs, {} near-collisions", totals.runs, totals.near_collisions));
         if !done? {
             was_cut_short = true;
@@ -146,7 +146,7 @@ fn drive(
     let jobs = Job::all(evaluation.seed, Purpose::Evaluation, lots, evaluation.trials, &evaluation.directions);
     let count = jobs.clone().count() as f64;
     let mut jobs = jobs.peekable();
-    let (mut done, mut near_collisions) = (0, 0);
+    let (mut done, mut near_collisions) = (0, 0_u32);
     while jobs.peek().is_some() {
         let group: Vec<Job<'_>> = jobs.by_ref().take(GROUP).collect();
         let episodes = trials::episodes(&group, settings, evaluation.noise)?;
@@ -155,6 +155,7 @@ fn drive(
         let mut fleet = contestant.fleet(settings, group.len());
         let reports = run_lockstep(episodes, &mut *fleet, &mut |episode, frame| {
             shares[episode] = frame.progress_m / lengths_m[episode];
+            near_collisions += u32::from(matches!(frame.event, Event::NearCollision { .. }));
             if episode == 0 {
                 let runs = f64::from(done) + f64::from(shares.iter().sum::<f32>());
                 work.at(runs / count, || format!("{near_collisions} near-collisions"));
@@ -162,7 +163,6 @@ fn drive(
         });
         for (job, report) in group.iter().zip(&reports) {
             on_run(job, report)?;
-            near_collisions += report.metrics.near_collisions;
             done += 1;
         }
         if interrupt::is_requested() && jobs.peek().is_some() {

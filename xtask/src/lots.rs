@@ -68,6 +68,14 @@ impl Lot {
         &self.name
     }
 
+    /// What a row of a printed table is about: generated lots of one kind share a row.
+    pub fn family(&self) -> String {
+        match &self.spec {
+            LotSpec::Generated { split, difficulty, .. } => format!("{}-{}", split.name(), difficulty.name()),
+            LotSpec::Reference(_) | LotSpec::File(_) => self.name.clone(),
+        }
+    }
+
     /// Whether trials draw their own obstacles; other lots are the same in every trial.
     pub fn is_drawn_per_trial(&self) -> bool {
         matches!(self.spec, LotSpec::Reference(_))

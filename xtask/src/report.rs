@@ -91,7 +91,7 @@ impl Evaluation<'_> {
         run.write("evaluation.csv", &csv.into_inner()?)
     }
 
-    /// Driver by lot, the paper's rows below.
+    /// Driver by lot (generated lots of one kind together), the paper's rows below.
     pub fn to_markdown(&self) -> String {
         let header = [
             "driver",
@@ -107,28 +107,30 @@ impl Evaluation<'_> {
             "m/s",
         ];
         let mut table = markdown(header.map(str::to_owned).to_vec());
-        let lots = self.cells.lots();
+        let families = self.cells.families();
         for driver in self.cells.drivers() {
-            for lot in lots.iter().copied().map(Some).chain((lots.len() > 1).then_some(None)) {
-                table.add_row(self.markdown_row(driver, lot));
+            for family in families.iter().copied().map(Some).chain((families.len() > 1).then_some(None)) {
+                table.add_row(self.markdown_row(driver, family));
             }
         }
-        for paper in PAPER.iter().filter(|paper| lots.contains(&paper.lot)) {
+        for paper in PAPER.iter().filter(|paper| families.contains(&paper.lot)) {
             table.add_row(paper_row(paper));
         }
         let EvaluationSettings { seed, trials, noise, .. } = self.settings;
         format!("{table}\n\nTrials per lot and direction: {trials}, noise: {}, seed: {}.", noise.name(), seed.0)
     }
 
-    fn markdown_row(&self, driver: &str, lot: Option<&str>) -> Vec<String> {
-        let totals = self.cells.pooled(driver, lot, None);
+    /// A driver on a family of lots, or on all.
+    fn markdown_row(&self, driver: &str, family: Option<&str>) -> Vec<String> {
+        let is_here = |cell: &Cell| cell.driver == driver && family.is_none_or(|family| cell.family == family);
+        let totals = self.cells.pooled(is_here);
         let [forward, reverse] = Direction::BOTH.map(|direction| {
-            let way = self.cells.pooled(driver, lot, Some(direction));
+            let way = self.cells.pooled(|cell| is_here(cell) && cell.direction == direction);
             if way.runs == 0 { "–".to_owned() } else { way.near_collisions.to_string() }
         });
         vec![
             driver.to_owned(),
-            lot.unwrap_or("all").to_owned(),
+            family.map_or_else(|| "all".to_owned(), |family| self.cells.family_label(family)),
             format!("{:.0} m", totals.reference_m),
             format!("{} ({forward}, {reverse})", totals.near_collisions),
             with_interval(&totals.rate()),
@@ -147,13 +149,18 @@ impl Evaluation<'_> {
             .cells
             .0
             .iter()
-            .map(|Cell { driver, lot, direction, totals }| Row::new(driver, lot, name(*direction), totals))
+            .map(|Cell { driver, lot, direction, totals, .. }| Row::new(driver, lot, name(*direction), totals))
             .collect();
         for driver in self.cells.drivers() {
             for lot in self.cells.lots() {
-                rows.push(Row::new(driver, lot, "both", &self.cells.pooled(driver, Some(lot), None)));
+                rows.push(Row::new(
+                    driver,
+                    lot,
+                    "both",
+                    &self.cells.pooled(|cell| cell.driver == driver && cell.lot == lot),
+                ));
             }
-            rows.push(Row::new(driver, "all", "both", &self.cells.pooled(driver, None, None)));
+            rows.push(Row::new(driver, "all", "both", &self.cells.pooled(|cell| cell.driver == driver)));
         }
         rows
     }

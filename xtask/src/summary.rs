@@ -1,5 +1,6 @@
 //! Runs pooled: counts, rates and their intervals (methods.md 8).
 
+use crate::lots::Lot;
 use serde::Serialize;
 use sim::episode::{Ending, EpisodeReport};
 use sim::scenario::Direction;
@@ -118,6 +119,8 @@ pub struct Cell {
     pub driver: String,
     /// Where.
     pub lot: String,
+    /// The row of the printed table the lot belongs to.
+    pub family: String,
     /// Which way.
     pub direction: Direction,
     /// What came of it.
@@ -130,11 +133,16 @@ pub struct Cells(pub Vec<Cell>);
 
 impl Cells {
     /// Takes one run into account.
-    pub fn add(&mut self, driver: &str, lot: &str, direction: Direction, report: &EpisodeReport) {
-        let is_it = |cell: &Cell| cell.driver == driver && cell.lot == lot && cell.direction == direction;
+    pub fn add(&mut self, driver: &str, lot: &Lot, direction: Direction, report: &EpisodeReport) {
+        let is_it = |cell: &Cell| cell.driver == driver && cell.lot == lot.name() && cell.direction == direction;
         let index = self.0.iter().position(is_it).unwrap_or_else(|| {
-            let totals = Totals::default();
-            self.0.push(Cell { driver: driver.to_owned(), lot: lot.to_owned(), direction, totals });
+            self.0.push(Cell {
+                driver: driver.to_owned(),
+                lot: lot.name().to_owned(),
+                family: lot.family(),
+                direction,
+                totals: Totals::default(),
+            });
             self.0.len() - 1
         });
         self.0[index].totals.add(report);
@@ -150,15 +158,24 @@ impl Cells {
         distinct(self.0.iter().map(|cell| cell.lot.as_str()))
     }
 
-    /// Sums of a driver, on one lot or all, in one direction or both.
-    pub fn pooled(&self, driver: &str, lot: Option<&str>, direction: Option<Direction>) -> Totals {
+    /// Families of lots, in order.
+    pub fn families(&self) -> Vec<&str> {
+        distinct(self.0.iter().map(|cell| cell.family.as_str()))
+    }
+
+    /// A family in tables: the name of its only lot, or how many there are.
+    pub fn family_label(&self, family: &str) -> String {
+        let lots = distinct(self.0.iter().filter(|cell| cell.family == family).map(|cell| cell.lot.as_str()));
+        match lots[..] {
+            [lot] => lot.to_owned(),
+            _ => format!("{family} ({} lots)", lots.len()),
+        }
+    }
+
+    /// Sums over the cells that are wanted.
+    pub fn pooled(&self, wanted: impl Fn(&Cell) -> bool) -> Totals {
         let mut totals = Totals::default();
-        let wanted = |cell: &&Cell| {
-            cell.driver == driver
-                && lot.is_none_or(|lot| cell.lot == lot)
-                && direction.is_none_or(|direction| cell.direction == direction)
-        };
-        self.0.iter().filter(wanted).for_each(|cell| totals.merge(&cell.totals));
+        self.0.iter().filter(|cell| wanted(cell)).for_each(|cell| totals.merge(&cell.totals));
         totals
     }
 }
@@ -196,16 +213,21 @@ mod tests {
             metrics: EpisodeMetrics { near_collisions, safe_ratio, reference_m: 50.0, ..EpisodeMetrics::default() },
             events: Vec::new(),
         };
+        let lots = Lot::parse_all(&["lot-a", "lot-b", "test:2"]).unwrap();
         let mut cells = Cells::default();
-        cells.add("x", "a", Direction::Forward, &report(1, 0.5));
-        cells.add("x", "a", Direction::Reverse, &report(2, 0.7));
-        cells.add("x", "b", Direction::Forward, &report(4, 0.9));
-        cells.add("y", "a", Direction::Forward, &report(8, 0.1));
-        assert_eq!((cells.drivers(), cells.lots()), (vec!["x", "y"], vec!["a", "b"]));
-        let on_a = cells.pooled("x", Some("a"), None);
+        cells.add("x", &lots[0], Direction::Forward, &report(1, 0.5));
+        cells.add("x", &lots[0], Direction::Reverse, &report(2, 0.7));
+        cells.add("x", &lots[1], Direction::Forward, &report(4, 0.9));
+        cells.add("y", &lots[2], Direction::Forward, &report(8, 0.1));
+        cells.add("y", &lots[3], Direction::Forward, &report(8, 0.1));
+        assert_eq!(cells.drivers(), ["x", "y"]);
+        assert_eq!(cells.lots(), ["lot-a", "lot-b", "test-medium-0", "test-medium-1"]);
+        let labels: Vec<String> = cells.families().iter().map(|family| cells.family_label(family)).collect();
+        assert_eq!(labels, ["lot-a", "lot-b", "test-medium (2 lots)"]);
+        let on_a = cells.pooled(|cell| cell.driver == "x" && cell.lot == "lot-a");
         assert_eq!((on_a.near_collisions, on_a.runs), (3, 2));
         assert!((on_a.rate().per_unit - 3.0).abs() < 1e-9, "three in one hundred metres");
-        assert!((cells.pooled("x", None, None).safe_ratio() - 0.7).abs() < 1e-6);
-        assert_eq!(cells.pooled("x", None, Some(Direction::Forward)).near_collisions, 5);
+        assert!((cells.pooled(|cell| cell.driver == "x").safe_ratio() - 0.7).abs() < 1e-6);
+        assert_eq!(cells.pooled(|cell| cell.family == "test-medium").near_collisions, 16);
     }
 }
