@@ -155,6 +155,7 @@ fn isometry(pose: Pose) -> Isometry {
 
 #[cfg(test)]
 mod tests {
+    use super::ObstacleSet::{NonDrivable, Solid};
     use super::*;
     use crate::scenario::{Obstacle, ObstacleClass, ReferencePath};
 
@@ -176,7 +177,6 @@ mod tests {
         let world = CollisionWorld::new(&scenario);
         let body = BodyBox::new(&VehicleParams::hyundai_hg300());
         let hits = |x: f32, y: f32, heading: f32, set| world.body_hits(&body, Pose::new(Vec2::new(x, y), heading), set);
-        use ObstacleSet::{NonDrivable, Solid};
         // Front bumper 3.80 m ahead of the axle; the pillar's near face is at x = 30.0.
         assert!(!hits(26.19, 0.0, 0.0, NonDrivable) && hits(26.21, 0.0, 0.0, NonDrivable));
         // Its inner side is at y = 0.75, the body's side at y + 0.93.

@@ -47,6 +47,7 @@ impl Pose {
     ///
     /// `x += (sin(θ+Δθ) − sin θ)/κ`, `y −= (cos(θ+Δθ) − cos θ)/κ` (methods.md 2.2), written with half angles so
     /// that it stays accurate as κ → 0.
+    #[must_use]
     pub fn advanced_along_arc(self, curvature_per_m: f32, travel_m: f32) -> Self {
         let half_turn = 0.5 * curvature_per_m * travel_m;
         // chord = travel · sin(Δθ/2)/(Δθ/2), along the mean heading.

@@ -287,7 +287,9 @@ mod tests {
     fn reversals_are_counted_with_hysteresis() {
         let count = |angles_deg: &[f32]| {
             let mut tally = Tally::new(1.0);
-            angles_deg.iter().for_each(|angle| tally.steer(angle.to_radians()));
+            for angle in angles_deg {
+                tally.steer(angle.to_radians());
+            }
             tally.metrics.steering_reversals
         };
         assert_eq!(count(&[0.0, 5.0, 10.0, 15.0]), 0);

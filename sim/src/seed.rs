@@ -51,6 +51,7 @@ impl RootSeed {
     }
 
     /// A seed for a sub-task, itself a root of independent streams.
+    #[must_use]
     pub fn child(self, stream: Stream, index: u64) -> Self {
         Self(self.rng(stream, index).next_u64())
     }

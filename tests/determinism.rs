@@ -1,0 +1,61 @@
+//! Same seed, same bytes: weights, data sets and tables, for 1 and 2 threads.
+
+use crate::bench::{scratch, succeed, xtask};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Every file of a run by name, but for the manifest (it names the command line).
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in std::fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).unwrap().to_string_lossy().into_owned();
+                if name != "manifest.toml" {
+                    files.insert(name, std::fs::read(&path).unwrap());
+                }
+            }
+        }
+    }
+    files
+}
+
+#[test]
+fn one_and_two_threads_write_the_same_bytes() {
+    let folder = scratch("determinism");
+    let train = |threads: &str, out: &str| {
+        let out = folder.join(out);
+        let printed = succeed(
+            xtask().args(["--threads", threads, "train-dagger", "--preset", "smoke", "--seed", "7", "--out"]).arg(&out),
+        );
+        (files(&out), printed.replace(&*out.to_string_lossy(), "RUN"))
+    };
+    let (one, printed_by_one) = train("1", "one");
+    let (two, printed_by_two) = train("2", "two");
+    for needed in
+        ["settings.toml", "round-00/grids.npy", "round-00/labels.npy", "round-01/model.safetensors", "table1.json"]
+    {
+        assert!(one.contains_key(needed), "{needed} is missing from {:?}", one.keys());
+    }
+    assert!(one.keys().any(|name| name.starts_with("evaluation")), "{:?}", one.keys());
+    assert_eq!(one.keys().collect::<Vec<_>>(), two.keys().collect::<Vec<_>>());
+    for (name, bytes) in &one {
+        assert!(*bytes == two[name], "{name} differs between 1 and 2 threads");
+    }
+    assert_eq!(printed_by_one, printed_by_two, "what is printed differs between 1 and 2 threads");
+}
+
+#[test]
+fn another_seed_gives_other_data() {
+    let folder = scratch("seeds");
+    let labels = |seed: &str| {
+        let out = folder.join(seed);
+        succeed(xtask().args(["train-bc", "--preset", "smoke", "--no-eval", "--seed", seed, "--out"]).arg(&out));
+        std::fs::read(out.join("round-00/labels.npy")).unwrap()
+    };
+    assert_ne!(labels("1"), labels("2"));
+}

@@ -1,0 +1,31 @@
+//! The expert on the reference lots: a few of the hundred seeds of the acceptance run (README, results).
+
+use expert::{ExpertConfig, ScriptedExpert};
+use scenarios::reference::{ReferenceLot, lot};
+use sim::episode::{self, Ending, Episode, EpisodeConfig};
+use sim::map::Map;
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+use std::sync::Arc;
+
+#[test]
+fn the_expert_drives_every_reference_lot_both_ways_without_a_near_collision() {
+    let config = Arc::new(EpisodeConfig::paper());
+    for which in [ReferenceLot::A, ReferenceLot::B, ReferenceLot::C] {
+        for direction in Direction::BOTH {
+            let seed = RootSeed(4);
+            let map = Arc::new(Map::build(direction.of(lot(which, seed)), &config.vehicle).unwrap());
+            let mut expert = ScriptedExpert::new(ExpertConfig::paper(), &config.vehicle, config.sensing.geometry);
+            let report = episode::run(Episode::new(Arc::clone(&config), map, seed), &mut expert, &mut ());
+            let metrics = &report.metrics;
+            assert_eq!(report.ending, Ending::ReachedEnd, "{which:?} {direction:?}");
+            assert_eq!(
+                (metrics.near_collisions, metrics.contacts, metrics.stuck),
+                (0, 0, 0),
+                "{which:?} {direction:?}: {:?}",
+                report.events
+            );
+            assert!((1.0..2.0).contains(&metrics.mean_speed_mps()), "{which:?}: {} m/s", metrics.mean_speed_mps());
+        }
+    }
+}
