@@ -1,5 +1,5 @@
 //! The vehicle against closed forms, and stop–count–resume against a hand-computed scene.
-#![allow(missing_docs, reason = "tests")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
 use sim::driver::{Decision, Driver, LookAheadPoint, Situation, Source};
 use sim::episode::{self, Ending, Episode, EpisodeConfig, Event, Frame};

@@ -1,5 +1,5 @@
 //! The fast grid against brute force, noise anchored in the world, and ASCII art of a known lot.
-#![allow(missing_docs, reason = "tests")]
+#![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
