@@ -87,7 +87,7 @@ pub struct TrainArgs {
     /// Settings.
     #[command(flatten)]
     pub settings: SettingsArgs,
-    /// Folder of the run [default: runs/<command>-<preset>-s<seed>, the next free one].
+    /// Folder of the run [default: runs/COMMAND-PRESET-sSEED, the next free one].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Deletes what an earlier run left in `--out`.
@@ -131,7 +131,7 @@ pub struct EvaluateArgs {
     /// Settings.
     #[command(flatten)]
     pub layers: LayerArgs,
-    /// Folder of the results [default: runs/evaluate-<preset>-s<seed>, the next free one].
+    /// Folder of the results [default: runs/evaluate-PRESET-sSEED, the next free one].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Deletes what an earlier run left in `--out`.
