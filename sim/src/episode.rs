@@ -3,7 +3,7 @@
 //! An [`Episode`] is stepped from outside — [`Episode::observe`], a decision, [`Episode::apply`] — so that one driver
 //! ([`run`]) and a lock-step batch ([`crate::batch::run_lockstep`]) are two thin callers of the same tick.
 //!
-//! Stop–count–resume (paper, collision rate) is the state machine [`Phase`]:
+//! Stop–count–resume (paper, collision rate) is the state machine `Phase`:
 //!
 //! ```text
 //!            swept body meets something            at rest
