@@ -1,12 +1,12 @@
-//! Exact intersection of the car body with the scene. The only file that names rapier2d.
+//! Exact intersection of the car body with the scene. The only file that names rapier2d and parry2d.
 
 use crate::distance_field::DistanceField;
 use crate::geometry::{Pose, Vec2, edges};
 use crate::scenario::Scenario;
 use crate::vehicle::VehicleParams;
+use parry2d::shape::Cuboid;
 use rapier2d::geometry::{ColliderBuilder, Group, InteractionGroups, InteractionTestMode};
 use rapier2d::math::Pose as Isometry;
-use rapier2d::parry::shape::Cuboid;
 use rapier2d::pipeline::{PhysicsWorld, QueryFilter};
 use serde::{Deserialize, Serialize};
 
