@@ -79,6 +79,12 @@ impl Band {
         self.measure();
     }
 
+    /// Its points up to some travel.
+    pub(crate) fn until(&self, travel_m: f32) -> impl Iterator<Item = Vec2> {
+        let n = self.travels_m.partition_point(|&at_m| at_m < travel_m);
+        self.points[..n].iter().copied()
+    }
+
     /// Direction of the band around some travel, unit vector: over 2.4 m, so that no wiggle shows.
     pub(crate) fn heading_at(&self, travel_m: f32) -> Vec2 {
         (self.at(travel_m + 1.2) - self.at(travel_m - 1.2)).normalize_or_zero()

@@ -49,18 +49,23 @@ pub struct BandConfig {
     pub straight_gain: f32,
     /// Longest move per round, metres.
     pub step_max_m: f32,
-    /// Clearance of the arc to the point, metres (expert-findings.md 5.2), which fades from the lower …
-    pub open_from_m: f32,
-    /// … to the upper value.
-    pub open_to_m: f32,
-    /// Where the band is open for less than this, the plan's own arc is steered at: pursuing a point 4 m ahead of the
-    /// axle straightens up too early at the end of a corner …
-    pub corner_to_m: f32,
-    /// … and where it is open for more than this, the band's point, metres.
-    pub corner_from_m: f32,
+    /// The point moves nearer where the arc to it strays from the band by more than this, metres …
+    pub aside_from_m: f32,
+    /// … and no point lies where it strays by this.
+    pub aside_to_m: f32,
+    /// No point lies where the band comes nearer to a boundary than this, metres …
+    pub gap_from_m: f32,
+    /// … and it moves nearer where the band comes nearer than this.
+    pub gap_to_m: f32,
     /// The point lies this share of the open way ahead of the bumper: the knob for the speed (1.4 m/s on lot a at 1;
     /// 1.3 gives 1.5).
     pub reach_share: f32,
+    /// … and at most this far ahead of the bumper, metres.
+    pub reach_max_m: f32,
+    /// The car is steered at the point of the band this far ahead of the axle, metres; nearer where that is not safe.
+    pub steer_m: f32,
+    /// And not nearer than this, metres.
+    pub steer_near_m: f32,
     /// Length of the forecast that checks whether steering at the point is safe, metres.
     pub forecast_m: f32,
     /// The point moves nearer where the band bends more than this on the way to it …
@@ -129,6 +134,9 @@ pub struct ExpertConfig {
     /// Free travel along the first arc below which an obstacle is "ahead", metres (methods.md 3.2.5). For counting.
     pub obstacle_ahead_m: f32,
 
+    /// A label lies at most this far round its circle, radians. Farther round, the point moves by metres when the
+    /// curvature changes a little, and beyond π/2 a farther point would mean a lower speed.
+    pub label_turn_max_rad: f32,
     /// Largest change of a label's curvature per tick, 1/m (expert-findings.md 5.5; the steering manages .006) …
     pub label_curvature_step_per_m: f32,
     /// … and largest sideways move it may cause at the last range, metres (expert-findings.md 5.5).
@@ -173,21 +181,25 @@ impl ExpertConfig {
                 stiffness_m: 0.6,
                 straight_gain: 0.5,
                 step_max_m: 0.15,
-                open_from_m: 0.6,
-                open_to_m: 1.4,
-                corner_to_m: 5.0,
-                corner_from_m: 7.0,
+                aside_from_m: 0.6,
+                aside_to_m: 1.5,
+                gap_from_m: 0.5,
+                gap_to_m: 0.9,
                 reach_share: 1.0,
+                reach_max_m: 9.8,
+                steer_m: 7.0,
+                steer_near_m: 3.0,
                 forecast_m: 6.0,
-                bend_from_rad: 0.4,
-                bend_to_rad: 1.2,
-                trust_to_m: 0.15,
-                trust_from_m: 0.03,
+                bend_from_rad: 0.6,
+                bend_to_rad: 1.3,
+                trust_to_m: 0.25,
+                trust_from_m: -0.03,
             },
             progress_share: 0.3,
             station_share: 0.8,
             point_clearance_m: 0.1,
             obstacle_ahead_m: 8.0,
+            label_turn_max_rad: 0.7,
             label_curvature_step_per_m: 0.012,
             label_sideways_step_m: 0.5,
             label_advance_step_m: 0.4,

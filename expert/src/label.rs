@@ -7,15 +7,9 @@ use sim::driver::{GroundTruth, LookAheadPoint};
 use sim::geometry::{Pose, Vec2};
 use sim::sensing::GridGeometry;
 use sim::vehicle::VehicleParams;
-use std::f32::consts::FRAC_PI_2;
 
 /// Step of the march along a label's arc, metres.
 const MARCH_M: f32 = 0.2;
-/// Bends of a band count from here on, metres: before, it merges with where the car happens to be.
-const BEND_FROM_M: f32 = 2.4;
-/// Step along the arc to a point when its openness is judged, metres.
-const OPEN_STEP_M: f32 = 0.6;
-
 /// A look-ahead point as pure pursuit drives it: a circle through the rear axle and a place on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Label {
@@ -33,15 +27,6 @@ impl Label {
         let chord_m = in_ego.length();
         let station_m = if half_turn.abs() < 1e-3 { chord_m } else { chord_m * half_turn / half_turn.sin() };
         Self { curvature_per_m, station_m }
-    }
-
-    /// This label with a share, the other with the rest.
-    pub(crate) fn mixed(self, share: f32, other: Self) -> Self {
-        let mix = |a: f32, b: f32| share * a + (1.0 - share) * b;
-        Self {
-            curvature_per_m: mix(self.curvature_per_m, other.curvature_per_m),
-            station_m: mix(self.station_m, other.station_m),
-        }
     }
 
     /// The point in the ego frame.
@@ -99,12 +84,12 @@ impl Ground<'_> {
         let mut travel_m = near_m + band::SPACING_M;
         let settings = &self.config.band;
         let (mut low, mut high) = (0.0_f32, 0.0_f32);
-        let reference = band.heading_at(BEND_FROM_M);
+        let reference = self.truth.vehicle.pose.ahead();
         while travel_m <= band.length_m() && open > 0.0 {
             let turn_rad = reference.angle_to(band.heading_at(travel_m));
             (low, high) = (low.min(turn_rad), high.max(turn_rad));
             let straightness = (settings.bend_to_rad - (high - low)) / (settings.bend_to_rad - settings.bend_from_rad);
-            open = open.min(straightness).min(self.openness(self.label_at(band.at(travel_m)))).max(0.0);
+            open = open.min(straightness).min(self.openness(band, travel_m)).max(0.0);
             reach_m += open * band::SPACING_M;
             travel_m += band::SPACING_M;
         }
@@ -116,21 +101,26 @@ impl Ground<'_> {
         Label::through(self.truth.vehicle.pose.world_from_ego().inverse_point(in_world))
     }
 
-    /// How open the arc to a point is, 0…1: least of its points.
-    fn openness(&self, label: Label) -> f32 {
-        let band = &self.config.band;
-        let field = self.truth.map.distance_field();
+    /// Whether the point after some travel lies in the open and the arc to it follows the band, 0…1.
+    ///
+    /// It does not matter how near the arc comes to a boundary: in a lane that would hang on centimetres that no grid
+    /// of half-metre cells shows.
+    fn openness(&self, band: &Band, travel_m: f32) -> f32 {
+        let target = band.at(travel_m);
+        if !self.sight.knows(target) {
+            return 0.0;
+        }
+        let curvature_per_m = self.label_at(target).curvature_per_m;
         let world_from_ego = self.truth.vehicle.pose.world_from_ego();
-        let near_m = self.vehicle.front_m();
-        let steps = ((label.station_m - near_m) / OPEN_STEP_M).ceil().max(1.0) as usize;
-        let nearest_m = (0..=steps)
-            .map(|i| {
-                let station_m = near_m + (label.station_m - near_m) * i as f32 / steps as f32;
-                let in_world = world_from_ego.point(on_arc(label.curvature_per_m, station_m));
-                if self.sight.knows(in_world) { field.at(in_world) } else { -1.0 }
-            })
-            .fold(f32::INFINITY, f32::min);
-        ((nearest_m - band.open_from_m) / (band.open_to_m - band.open_from_m)).clamp(0.0, 1.0)
+        let aside_m = band
+            .until(travel_m)
+            .map(|point| distance_to_arc_m(curvature_per_m, world_from_ego.inverse_point(point)))
+            .fold(0.0, f32::max);
+        let gap_m = self.truth.map.distance_field().at(target);
+        let settings = &self.config.band;
+        let follows = (settings.aside_to_m - aside_m) / (settings.aside_to_m - settings.aside_from_m);
+        let is_open = (gap_m - settings.gap_from_m) / (settings.gap_to_m - settings.gap_from_m);
+        follows.min(is_open).clamp(0.0, 1.0)
     }
 
     /// The nearest point of an arc: the slowest.
@@ -164,8 +154,7 @@ impl Ground<'_> {
         station_m
     }
 
-    /// Arc lengths at which an arc enters the patch and leaves it. Where it points sideways it ends: from there on
-    /// a farther point would mean a lower speed.
+    /// Arc lengths at which an arc enters the patch, and at which it leaves it or has turned as far as a label may.
     fn stations(&self, curvature_per_m: f32) -> (f32, f32) {
         // X = sin(κs)/κ and |Y| = (1 − cos(κs))/|κ|, kept a millimetre inside.
         let kappa = curvature_per_m.abs().max(1e-5);
@@ -173,9 +162,17 @@ impl Ground<'_> {
         let half_y = 0.5 * self.geometry.side_m - 1e-3;
         let station_at_x = |x_m: f32| (kappa * x_m).min(1.0).asin() / kappa;
         let station_at_y = |y_m: f32| (1.0 - kappa * y_m).max(-1.0).acos() / kappa;
-        let far_m = station_at_x(far_x).min(station_at_y(half_y)).min(FRAC_PI_2 / kappa);
-        (station_at_x(near_x), far_m)
+        let near_m = station_at_x(near_x);
+        let far_m = station_at_x(far_x).min(station_at_y(half_y)).min(self.config.label_turn_max_rad / kappa);
+        (near_m, far_m.max(near_m))
     }
+}
+
+/// Distance of a point to the circle of an arc, ego frame, metres.
+fn distance_to_arc_m(curvature_per_m: f32, in_ego: Vec2) -> f32 {
+    // |p − c| − R with c = (0, 1/κ), written so that it holds for κ = 0.
+    let excess = curvature_per_m * in_ego.length_squared() - 2.0 * in_ego.y;
+    (excess / (1.0 + (1.0 + curvature_per_m * excess).max(0.0).sqrt())).abs()
 }
 
 /// The point at an arc length along a circle through the rear axle, ego frame.

@@ -199,16 +199,12 @@ impl ScriptedExpert {
         band.relax(search.truth.map.distance_field(), &self.config.band);
         let open_m = ground.open_way_m(&band);
         let settings = &self.config.band;
-        let on_straight =
-            ((open_m - settings.corner_to_m) / (settings.corner_from_m - settings.corner_to_m)).clamp(0.0, 1.0);
-        if on_straight == 0.0 {
-            return arc;
-        }
-        // From the farthest range to the nearest, each takes the share it deserves of what is left.
+        // From the preferred range to the nearest, each takes the share it deserves of what is left.
+        let near_m = settings.steer_near_m;
+        let steer_m = settings.steer_m.min(open_m);
         let (mut rest, mut curvature_per_m) = (1.0, 0.0);
-        let near_m = self.geometry.near_edge_ahead_m;
         for i in 0..RANGES {
-            let range_m = open_m + (near_m - open_m) * i as f32 / (RANGES - 1) as f32;
+            let range_m = steer_m + (near_m - steer_m) * i as f32 / (RANGES - 1) as f32;
             let share = rest * search.trust(&band, range_m);
             curvature_per_m += share * ground.label_at(band.at(range_m)).curvature_per_m;
             rest -= share;
@@ -218,8 +214,8 @@ impl ScriptedExpert {
         }
         curvature_per_m += rest * arc.curvature_per_m;
         let front_m = self.vehicle.front_m();
-        let station_m = front_m + settings.reach_share * (open_m - front_m);
-        ground.kept_drivable(Label { curvature_per_m, station_m }.mixed(on_straight, arc))
+        let station_m = front_m + (settings.reach_share * (open_m - front_m)).min(settings.reach_max_m);
+        ground.kept_drivable(Label { curvature_per_m, station_m })
     }
 
     /// The car when it begins to obey: the dead time further on, steering at the last label meanwhile.

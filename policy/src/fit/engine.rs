@@ -102,7 +102,7 @@ impl Shard {
     ) {
         self.grids.clear();
         self.grids.extend(samples.iter().map(|sample| sample.grid));
-        let outputs = fast::forward(weights, prepared, &self.grids, Some(draw), &mut self.trace);
+        let outputs = fast::forward(weights, prepared, &self.grids, samples.len(), Some(draw), &mut self.trace);
         self.loss = LossParts::default();
         self.d_outputs.clear();
         for (raw, sample) in outputs.iter().zip(samples) {

@@ -14,6 +14,7 @@
 mod encoder;
 
 use super::{DropoutDraw, LookAheadNetConfig, OUTPUTS, Weights};
+pub use encoder::TILE;
 use encoder::{Encoder, EncoderTrace};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, MatMut, MatRef, Par};
@@ -59,15 +60,21 @@ impl Trace {
 }
 
 /// Computes the raw outputs of a batch into `trace`.
+///
+/// `rows_in_all` ≥ number of grids: the dense layers are computed for this many rows, the surplus with whatever is left there.
+/// A caller that wants the same answer whatever the number of grids passes a constant, and grids in multiples of
+/// [`TILE`].
 pub fn forward<'t>(
     weights: &Weights,
     prepared: &Prepared,
     grids: &[OccupancyGrid],
+    rows_in_all: usize,
     dropout: Option<&DropoutDraw>,
     trace: &'t mut Trace,
 ) -> &'t [[f32; OUTPUTS]] {
+    assert!(grids.len() <= rows_in_all, "{} grids do not fit into {rows_in_all} rows", grids.len());
     let config = weights.config();
-    let (batch, features, hidden) = (grids.len(), config.features(), config.hidden);
+    let (batch, features, hidden) = (rows_in_all, config.features(), config.hidden);
     let parts = weights.parts();
     trace.features.resize(batch * features, 0.0);
     trace.hidden.resize(batch * hidden, 0.0);

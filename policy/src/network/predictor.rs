@@ -80,8 +80,8 @@ impl Prediction {
     }
 }
 
-/// Rows computed together on CPUs. Every group is padded to this size, so that an answer never depends on which other
-/// grids were asked about.
+/// Rows computed together on CPUs. The dense layers are always computed for this many rows (and the convolutions for
+/// whole tiles), so that an answer never depends on which other grids were asked about. A multiple of [`fast::TILE`].
 const GROUP: usize = 16;
 /// The same on a burn device, where a call costs more than its rows.
 const DEVICE_GROUP: usize = 64;
@@ -155,7 +155,8 @@ fn raw_on_cpu(
                 for (into, from) in padded.iter_mut().zip(grids) {
                     *into = **from;
                 }
-                let answers = fast::forward(weights, prepared, &padded, None, trace);
+                let encoded = &padded[..grids.len().next_multiple_of(fast::TILE)];
+                let answers = fast::forward(weights, prepared, encoded, GROUP, None, trace);
                 outputs.copy_from_slice(&answers[..outputs.len()]);
             }
         },

@@ -38,7 +38,7 @@ pub(super) struct EncoderTrace {
 }
 
 /// Samples whose windows are laid out at a time: 4 × 144 rows stay in the second-level cache.
-const TILE: usize = 4;
+pub const TILE: usize = 4;
 /// The winner of a pool whose value is cut off by `ReLU`.
 const SILENT: u8 = 4;
 /// The four cells of a pool, row by row; the first of equals wins.

@@ -64,7 +64,7 @@ fn values_and_gradients_equal_those_of_burn() {
 
         let prepared = Prepared::new(&weights);
         let mut trace = Trace::default();
-        let outputs = forward(&weights, &prepared, &grids, Some(&draw), &mut trace).to_vec();
+        let outputs = forward(&weights, &prepared, &grids, grids.len(), Some(&draw), &mut trace).to_vec();
         let d_outputs: Vec<[f32; OUTPUTS]> = (0..batch)
             .map(|i| loss::of_sample(&settings, outputs[i], labels[i], tau_hats[i]).gradient.map(|g| g / batch as f32))
             .collect();
@@ -115,10 +115,10 @@ fn a_trace_can_be_used_again() {
     let weights = weights_with_biases(config);
     let prepared = Prepared::new(&weights);
     let grids = lots(9);
-    let fresh = forward(&weights, &prepared, &grids, None, &mut Trace::default()).to_vec();
+    let fresh = forward(&weights, &prepared, &grids, grids.len(), None, &mut Trace::default()).to_vec();
     let mut used = Trace::default();
-    forward(&weights, &prepared, &lots(12)[3..], None, &mut used);
+    forward(&weights, &prepared, &lots(12)[3..], 9, None, &mut used);
     let mut gradient = Weights::zeros(config);
     backward(&weights, &prepared, &lots(12)[3..], &[[1.0; OUTPUTS]; 9], None, &mut used, &mut gradient);
-    assert_eq!(forward(&weights, &prepared, &grids, None, &mut used), fresh);
+    assert_eq!(forward(&weights, &prepared, &grids, grids.len(), None, &mut used), fresh);
 }
