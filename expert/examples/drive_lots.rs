@@ -53,6 +53,8 @@ fn main() {
         "stuck",
         "m/s",
         "safe",
+        "closest",
+        "<0.2 m",
         "far",
         "avoid",
         "relaxed",
@@ -80,7 +82,12 @@ struct Run {
     stats: ExpertStats,
     seconds: f64,
     incidents: Vec<String>,
+    /// Ticks with less than [`TIGHT_M`] to the nearest thing.
+    tight_ticks: u32,
 }
+
+/// What the column "<0.2 m" counts: the clearance plans keep where they can.
+const TIGHT_M: f32 = 0.2;
 
 fn drive(expert: &ExpertConfig, which: ReferenceLot, direction: Direction, seed: u64) -> Run {
     let config = Arc::new(EpisodeConfig::paper());
@@ -90,6 +97,7 @@ fn drive(expert: &ExpertConfig, which: ReferenceLot, direction: Direction, seed:
     let mut episode = Episode::new(Arc::clone(&config), map, RootSeed(seed));
     let mut seconds = 0.0;
     let mut incidents = Vec::new();
+    let mut tight_ticks = 0;
     let mut recent: Vec<String> = Vec::new();
     while episode.ending().is_none() {
         // No `observe`: the expert does not look at the grid, and drawing it would take most of the time.
@@ -101,6 +109,7 @@ fn drive(expert: &ExpertConfig, which: ReferenceLot, direction: Direction, seed:
         let decision = driver.decide(&episode.situation());
         seconds += started.elapsed().as_secs_f64();
         let frame = episode.apply(decision);
+        tight_ticks += u32::from(frame.clearance_m < TIGHT_M);
         recent.push(line(&frame, rule_between(&before, driver.stats())));
         if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
             let last = &recent[recent.len().saturating_sub(80)..];
@@ -109,7 +118,7 @@ fn drive(expert: &ExpertConfig, which: ReferenceLot, direction: Direction, seed:
             incidents.push(format!("{name} {direction:?} seed {seed}: {:?}\n{}", frame.event, thinned.join("\n")));
         }
     }
-    Run { report: episode.report(), stats: *driver.stats(), seconds, incidents }
+    Run { report: episode.report(), stats: *driver.stats(), seconds, incidents, tight_ticks }
 }
 
 fn line(frame: &Frame, rule: Rule) -> String {
@@ -148,6 +157,8 @@ fn row(which: ReferenceLot, direction: Direction, runs: &[Run]) -> Vec<String> {
     let metres = sum(|report| f64::from(report.metrics.driven_m));
     let duration_s = sum(|report| f64::from(report.metrics.duration_s));
     let safe_ratio = sum(|report| f64::from(report.metrics.safe_ratio)) / runs.len() as f64;
+    let closest_m = runs.iter().map(|run| run.report.metrics.clearance_min_m).fold(f32::INFINITY, f32::min);
+    let tight = runs.iter().map(|run| f64::from(run.tight_ticks)).sum::<f64>() / stats.decisions as f64;
     let micros = 1e6 * runs.iter().map(|run| run.seconds).sum::<f64>() / stats.decisions as f64;
     let share = |count| format!("{:.4}", stats.share(count));
     vec![
@@ -159,6 +170,8 @@ fn row(which: ReferenceLot, direction: Direction, runs: &[Run]) -> Vec<String> {
         format!("{}", sum(|report| f64::from(report.metrics.stuck))),
         format!("{:.2}", metres / duration_s),
         format!("{safe_ratio:.3}"),
+        format!("{closest_m:.3}"),
+        format!("{tight:.4}"),
         share(stats.far),
         share(stats.avoid),
         share(stats.relaxed),

@@ -64,8 +64,10 @@ pub struct BandConfig {
     pub reach_max_m: f32,
     /// The car is steered at the point of the band this far ahead of the axle, metres; nearer where that is not safe.
     pub steer_m: f32,
-    /// And not nearer than this, metres.
+    /// And not nearer than this, metres …
     pub steer_near_m: f32,
+    /// … which it is where the band turns by this, radians: pursuit of a far point cuts corners.
+    pub steer_bend_rad: f32,
     /// Length of the forecast that checks whether steering at the point is safe, metres.
     pub forecast_m: f32,
     /// The point moves nearer where the band bends more than this on the way to it …
@@ -186,20 +188,21 @@ impl ExpertConfig {
                 gap_from_m: 0.5,
                 gap_to_m: 0.9,
                 reach_share: 1.0,
-                reach_max_m: 9.8,
+                reach_max_m: 9.3,
                 steer_m: 7.0,
-                steer_near_m: 3.0,
+                steer_near_m: 2.7,
+                steer_bend_rad: 0.4,
                 forecast_m: 6.0,
                 bend_from_rad: 0.6,
-                bend_to_rad: 1.3,
-                trust_to_m: 0.25,
-                trust_from_m: -0.03,
+                bend_to_rad: 1.5,
+                trust_to_m: 0.4,
+                trust_from_m: 0.1,
             },
             progress_share: 0.3,
             station_share: 0.8,
             point_clearance_m: 0.1,
             obstacle_ahead_m: 8.0,
-            label_turn_max_rad: 0.7,
+            label_turn_max_rad: 0.8,
             label_curvature_step_per_m: 0.012,
             label_sideways_step_m: 0.5,
             label_advance_step_m: 0.4,

@@ -201,7 +201,9 @@ impl ScriptedExpert {
         let settings = &self.config.band;
         // From the preferred range to the nearest, each takes the share it deserves of what is left.
         let near_m = settings.steer_near_m;
-        let steer_m = settings.steer_m.min(open_m);
+        let turn_rad = search.truth.vehicle.pose.ahead().angle_to(band.heading_at(settings.steer_m)).abs();
+        let bent = (turn_rad / settings.steer_bend_rad).min(1.0);
+        let steer_m = (settings.steer_m + bent * (near_m - settings.steer_m)).min(open_m);
         let (mut rest, mut curvature_per_m) = (1.0, 0.0);
         for i in 0..RANGES {
             let range_m = steer_m + (near_m - steer_m) * i as f32 / (RANGES - 1) as f32;
