@@ -81,13 +81,13 @@ impl DaggerConfig {
         }
     }
 
-    /// The same on a budget of minutes: the compact network, warm starts and a few thousand quick steps in all.
+    /// The same on a budget of minutes: the compact network, warm starts and some ten thousand quick steps in all.
     pub fn quick() -> Self {
         Self {
             start: StartFrom::Previous,
             network: LookAheadNetConfig::compact(),
-            fit_cloning: FitSettings::quick(1500),
-            fit_iteration: FitSettings::quick(1000),
+            fit_cloning: FitSettings::quick(7000),
+            fit_iteration: FitSettings::quick(4000),
             ..Self::paper()
         }
     }

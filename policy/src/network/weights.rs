@@ -174,7 +174,7 @@ mod tests {
     #[test]
     fn the_paper_network_has_2_318_092_parameters() {
         assert_eq!(LookAheadNetConfig::paper().parameter_count(), 2_318_092);
-        assert_eq!(LookAheadNetConfig::compact().parameter_count(), 1_161_804);
+        assert_eq!(LookAheadNetConfig::compact().parameter_count(), 300_996);
     }
 
     #[test]
