@@ -7,6 +7,7 @@
 //! | [`train`], [`evaluate`], [`generate`], [`pixel_accuracy`], [`listing`] | the commands |
 //! | [`lots`], [`drivers`] | what can be named on the command line |
 //! | [`trials`] | which obstacles and which noise a trial has |
+//! | [`statistics`] | intervals and comparisons |
 //! | [`table1`], [`summary`], [`report`] | what is printed and written |
 //! | [`run_dir`] | the folder of a run and how it is claimed |
 //! | [`progress`], [`interrupt`] | bars, Ctrl-C |
@@ -26,6 +27,7 @@ pub mod render;
 pub mod report;
 pub mod run_dir;
 pub mod settings;
+pub mod statistics;
 pub mod summary;
 pub mod table1;
 pub mod train;
