@@ -51,8 +51,7 @@ impl RateRatio {
         let ratio_of = |p: f64| (p < 1.0).then(|| p / (1.0 - p) * exposure_2 / exposure_1);
         let [lower, upper] = clopper_pearson(events_1, both, CONFIDENCE);
         Self {
-            ratio: (events_2 > 0)
-                .then(|| f64::from(events_1) / exposure_1 / (f64::from(events_2) / exposure_2)),
+            ratio: (events_2 > 0).then(|| f64::from(events_1) / exposure_1 / (f64::from(events_2) / exposure_2)),
             lower: if both == 0 { 0.0 } else { ratio_of(lower).unwrap_or(0.0) },
             upper: if both == 0 { None } else { ratio_of(upper) },
             p_value: binomial_test(events_1, both, exposure_1 / (exposure_1 + exposure_2)),

@@ -33,14 +33,19 @@ impl Question {
         let exact = if (a + b) * approximate > EXACT_UP_TO {
             approximate
         } else {
-            let enough = |hundred_metres: f64| power([a * hundred_metres, b * hundred_metres], self.alpha) >= self.power;
+            let enough =
+                |hundred_metres: f64| power([a * hundred_metres, b * hundred_metres], self.alpha) >= self.power;
             let (mut low, mut high) = (0.0, approximate);
             while !enough(high) {
                 (low, high) = (high, 2.0 * high);
             }
             for _ in 0..40 {
                 let middle = 0.5 * (low + high);
-                if enough(middle) { high = middle } else { low = middle }
+                if enough(middle) {
+                    high = middle
+                } else {
+                    low = middle
+                }
                 if high - low < 1e-4 * high {
                     break;
                 }
