@@ -17,7 +17,7 @@ use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::path::Path;
 
-pub use noise::NoiseChoice;
+pub use noise::{NOISE_MAX, NoiseChoice};
 pub use presets::PRESETS;
 
 /// Everything that decides the outcome of a run.
