@@ -220,14 +220,13 @@ Examples:
 
 /// Arguments of `metres`. Rates are near-collisions per 100 m.
 #[derive(Debug, Clone, Args)]
-#[group(required = true, multiple = true)]
 pub struct MetresArgs {
     /// A rate to be shown as not reached, by a run without an event.
-    #[arg(long, value_name = "RATE")]
+    #[arg(long, value_name = "RATE", required_unless_present = "between")]
     pub below: Option<f64>,
     /// Two rates to be told apart.
-    #[arg(long, value_name = "RATE,RATE", value_delimiter = ',', num_args = 2)]
-    pub between: Option<Vec<f64>>,
+    #[arg(long, value_name = "RATE,RATE", value_parser = two_rates)]
+    pub between: Option<[f64; 2]>,
     /// Probability of seeing a difference that is there.
     #[arg(long, default_value_t = 0.8)]
     pub power: f64,
@@ -237,4 +236,9 @@ pub struct MetresArgs {
     /// Variance over mean of the counts, as printed by `evaluate`; 1 = independent events.
     #[arg(long, default_value_t = 1.0)]
     pub dispersion: f64,
+}
+
+fn two_rates(text: &str) -> Result<[f64; 2], String> {
+    let rates = text.split_once(',').and_then(|(a, b)| Some([a.trim().parse().ok()?, b.trim().parse().ok()?]));
+    rates.ok_or_else(|| "two numbers with a comma between them are needed, as in 1.4,0.5".to_owned())
 }

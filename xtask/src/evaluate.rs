@@ -30,7 +30,7 @@ use std::path::Path;
 use std::time::Instant;
 
 /// Runs driven at a time. A constant: neither memory nor results depend on how many runs or threads there are.
-const GROUP: usize = 32;
+const GROUP: usize = 16;
 /// What `--noise sweep` stands for, in multiples of the level `paper`: clean to hard.
 const SWEEP: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
 

@@ -32,8 +32,8 @@ pub const LOOK_BACK_S: f32 = 6.0;
 pub const PASS_M: f32 = 5.0;
 /// In which time beyond the look-back, seconds.
 const PASS_WITHIN_S: f32 = 10.0;
-/// Steering reversals that make an oscillation. Entering and leaving a corner takes two.
-pub const OSCILLATION_REVERSALS: u32 = 3;
+/// Steering reversals that make an oscillation: the expert, on its way round corners and past parked cars, makes two.
+pub const OSCILLATION_REVERSALS: u32 = 5;
 /// In the last seconds.
 pub const OSCILLATION_S: f32 = 5.0;
 /// What is near, metres along the route: the length of the car.

@@ -23,9 +23,8 @@ pub fn run(args: &MetresArgs) -> anyhow::Result<()> {
             to_bound(rate, args.confidence)
         );
     }
-    if let Some(rates) = &args.between {
-        check(rates, "--between")?;
-        let [a, b] = rates[..] else { unreachable!("clap wants two") };
+    if let Some([a, b]) = args.between {
+        check(&[a, b], "--between")?;
         ensure!(a != b, "--between {a},{b}: equal rates cannot be told apart");
         let question = Question { per_100m: [a, b], power: args.power, alpha: 1.0 - args.confidence, dispersion };
         println!(

@@ -46,13 +46,13 @@ fn widths_and_turns_are_those_of_the_drawing() {
 fn the_first_rule_that_holds_is_the_cause() {
     let config = EpisodeConfig::paper();
     // 1.86 m of car and 0.5 m on both sides are 2.86 m.
-    let all = Findings { passes_on_clean_grid: Some(true), reversals_before: 3, free_width_m: 2.8, turn_deg: 30.0 };
+    let all = Findings { passes_on_clean_grid: Some(true), reversals_before: 5, free_width_m: 2.8, turn_deg: 30.0 };
     let cause = |findings: Findings, noisy| findings.cause(noisy, &config);
     assert_eq!(cause(all, true), Cause::NoiseInduced);
     assert_eq!(cause(all, false), Cause::Oscillation, "no noise to blame");
     let clean = Findings { passes_on_clean_grid: Some(false), ..all };
     assert_eq!(cause(clean, true), Cause::Oscillation);
-    let steady = Findings { reversals_before: 2, ..clean };
+    let steady = Findings { reversals_before: 4, ..clean };
     assert_eq!(cause(steady, true), Cause::NarrowPassage);
     let wide = Findings { free_width_m: 2.9, ..steady };
     assert_eq!(cause(wide, true), Cause::Corner);
