@@ -23,6 +23,40 @@ fn bad_input_gets_one_clear_error() {
     refuses(&["evaluate", "--driver", "run:no/such/run"], &["no/such/run"]);
     refuses(&["evaluate", "--driver", "expert", "--lots", "no-such-lot.toml"], &["no-such-lot.toml"]);
     refuses(&["train-dagger", "--config", "no-such.toml"], &["no-such.toml"]);
+    refuses(&["evaluate", "--driver", "expert", "--noise", "loud"], &["loud", "clean, paper, hard"]);
+    refuses(&["evaluate", "--driver", "expert", "--noise", "paper,paper"], &["paper", "twice"]);
+    refuses(&["evaluate", "--driver", "expert", "--compare-with", "nobody"], &["nobody", "--driver"]);
+    refuses(&["evaluate", "--driver", "expert", "--driver", "expert"], &["expert", "twice"]);
+    refuses(&["metres", "--below", "0"], &["--below 0"]);
+    refuses(&["metres", "--between", "1,1"], &["equal rates"]);
+    refuses(&["metres", "--between", "1,2", "--power", "1.5"], &["--power 1.5"]);
+}
+
+#[test]
+fn a_refused_evaluation_writes_nothing() {
+    let folder = scratch("refused");
+    let out = folder.join("out");
+    let lot = folder.join("wall.toml");
+    let text = "name = \"wall\"\nboundary = [[0.0, 0.0], [40.0, 0.0], [40.0, 6.0], [0.0, 6.0]]\n\n[reference_path]\n\
+                points = [[5.0, 3.0], [35.0, 3.0]]\n\n[[obstacle]]\nclass = \"pillar\"\nx_m = 20.0\ny_m = 3.0\n";
+    std::fs::write(&lot, text).unwrap();
+    let (out_name, lot_name) = (out.to_string_lossy().into_owned(), lot.to_string_lossy().into_owned());
+    for (arguments, part) in [
+        (vec!["--driver", "nobody"], "nobody"),
+        (vec!["--driver", "expert", "--lots", &lot_name], "wall"),
+        (vec!["--driver", "expert", "--noise", "-3"], "-3"),
+        (vec!["--driver", "expert", "--trials", "0"], "trials"),
+    ] {
+        let arguments: Vec<&str> = ["evaluate", "--out", &out_name].into_iter().chain(arguments).collect();
+        refuses(&arguments, &[part]);
+        assert!(!out.exists(), "{arguments:?} leaves {}", out.display());
+    }
+}
+
+#[test]
+fn metres_are_calculated() {
+    let printed = succeed(xtask().args(["metres", "--below", "0.1", "--between", "1,0"]));
+    assert!(printed.contains("2996 m") && printed.contains("791 m"), "{printed}");
     refuses(&["train-dagger", "--resume", "no/such/run"], &["no/such/run"]);
 }
 
@@ -67,12 +101,29 @@ fn a_run_can_be_evaluated_later_and_generated_lots_can_be_driven() {
             .args(["--lots", &lot, "--out"])
             .arg(&results),
     );
-    let lines = std::fs::read_to_string(results.join("episodes.jsonl")).unwrap();
+    let read = |name: &str| std::fs::read_to_string(results.join(name)).unwrap();
+    // The run's own settings are used: its car, sensor and metrics, not those of a preset.
+    assert!(read("settings.toml").contains("trials = 1"), "{}", read("settings.toml"));
+    let of = |folder: &std::path::Path| -> toml::Table {
+        std::fs::read_to_string(folder.join("settings.toml")).unwrap().parse().unwrap()
+    };
+    assert_eq!(of(&results)["dagger"], of(&run)["dagger"]);
+    let lines = read("runs.jsonl");
     assert_eq!(lines.lines().count(), 2, "one line per driven run:\n{lines}");
+    let mut near_collisions = 0;
     for line in lines.lines() {
         let run: serde_json::Value = serde_json::from_str(line).unwrap();
-        assert!(run.is_object());
+        for key in ["driver", "lot", "direction", "trial", "noise", "replay", "timed_out", "mean_speed_mps", "ending"] {
+            assert!(!run[key].is_null(), "{key} is missing in {line}");
+        }
+        for key in ["near_collisions", "contacts", "stuck", "driven_m", "reference_m", "safe_ratio", "clearance_min_m"]
+        {
+            assert!(run["metrics"][key].is_number(), "{key} is missing in {line}");
+        }
+        near_collisions += run["metrics"]["near_collisions"].as_u64().unwrap();
     }
+    assert_eq!(read("failures.jsonl").lines().count() as u64, near_collisions);
+    assert_eq!(read("wall_time.jsonl").lines().count(), 2);
 }
 
 #[test]
@@ -88,7 +139,7 @@ fn a_finished_run_is_not_overwritten() {
 
 #[test]
 fn help_has_examples_and_lists_are_printed() {
-    for command in ["train-dagger", "train-bc", "evaluate", "generate"] {
+    for command in ["train-dagger", "train-bc", "evaluate", "generate", "metres"] {
         let help = succeed(xtask().args([command, "--help"]));
         assert!(help.contains("Examples:"), "{command} --help has examples");
     }

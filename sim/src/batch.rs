@@ -3,15 +3,29 @@
 use crate::driver::{Decision, Fleet};
 use crate::episode::{Episode, EpisodeReport, Frame};
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 
 /// Drives episodes in lock-step to their ends: one call of the fleet per tick answers for all that still run.
 ///
 /// Reports come in the order of the episodes. `on_frame(episode, frame)` is called in that order within a tick.
 pub fn run_lockstep(
-    mut episodes: Vec<Episode>,
+    episodes: Vec<Episode>,
     fleet: &mut dyn Fleet,
     on_frame: &mut dyn FnMut(usize, &Frame),
 ) -> Vec<EpisodeReport> {
+    let reports = run_lockstep_until(episodes, fleet, &mut |episode, frame| {
+        on_frame(episode, frame);
+        ControlFlow::Continue(())
+    });
+    reports.into_iter().map(|report| report.expect("nothing stopped them")).collect()
+}
+
+/// As [`run_lockstep`], but all stop after the tick in which `on_frame` breaks: `None` for what had not ended by then.
+pub fn run_lockstep_until(
+    mut episodes: Vec<Episode>,
+    fleet: &mut dyn Fleet,
+    on_frame: &mut dyn FnMut(usize, &Frame) -> ControlFlow<()>,
+) -> Vec<Option<EpisodeReport>> {
     let mut decisions: Vec<Decision> = Vec::with_capacity(episodes.len());
     let mut frames: Vec<(usize, Frame)> = Vec::with_capacity(episodes.len());
     loop {
@@ -31,9 +45,10 @@ pub fn run_lockstep(
             .zip(&decisions)
             .map(|((index, episode), &decision)| (*index, episode.apply(decision)))
             .collect_into_vec(&mut frames);
-        for (index, frame) in &frames {
-            on_frame(*index, frame);
+        // Everybody's frame is seen, also after the first break: a tick is never half.
+        if frames.iter().filter(|(index, frame)| on_frame(*index, frame).is_break()).count() > 0 {
+            break;
         }
     }
-    episodes.iter().map(Episode::report).collect()
+    episodes.iter().map(|episode| episode.ending().map(|_| episode.report())).collect()
 }

@@ -128,7 +128,8 @@ pub struct Frame {
     pub progress_m: f32,
     /// Drivable share of the safe range when observed, 0…1.
     pub safe_ratio: f32,
-    /// Distance between body and non-drivable space when observed, metres.
+    /// Distance between body and non-drivable space when observed, or after an emergency stop in this tick if that is
+    /// less, metres.
     pub clearance_m: f32,
     /// Way driven in this tick, metres.
     pub driven_m: f32,
@@ -233,6 +234,19 @@ impl Episode {
             config,
             map,
         }
+    }
+
+    /// The same, but already under way: for asking what would have happened from a state that was met elsewhere.
+    /// Commands still on their way then are not known; the car holds its wheels and speed until the first new one.
+    pub fn under_way(
+        config: Arc<EpisodeConfig>,
+        map: Arc<Map>,
+        seed: RootSeed,
+        vehicle: VehicleState,
+        progress_m: f32,
+    ) -> Self {
+        let command = VehicleCommand { steering_rad: vehicle.steering_rad, speed_mps: vehicle.speed_mps };
+        Self { vehicle, command, progress_m, advance: (progress_m, 0), ..Self::new(config, map, seed) }
     }
 
     /// Looks. Call once before each decision.
@@ -389,7 +403,10 @@ impl Episode {
                 frame.event = Event::NearCollision { at: pose, progress_m: at_m };
                 self.phase = Phase::Braking;
             }
-            Phase::Braking if self.vehicle.speed_mps == 0.0 => self.resume_on_path(),
+            Phase::Braking if self.vehicle.speed_mps == 0.0 => {
+                frame.clearance_m = frame.clearance_m.min(self.body.clearance_m(self.map.distance_field(), pose));
+                self.resume_on_path();
+            }
             _ => {}
         }
     }

@@ -155,11 +155,13 @@ pub struct EpisodeMetrics {
     pub stuck: u32,
     /// Mean over ticks of the drivable share of the safe range, 0…1.
     pub safe_ratio: f32,
-    /// Smallest distance between body and non-drivable space, metres, negative on contact.
+    /// Smallest distance between body and non-drivable space, metres, negative on contact. Looked at when the car
+    /// observes and where an emergency stop ends.
     pub clearance_min_m: f32,
-    /// Changes of the steering direction larger than 2° of road-wheel angle.
+    /// Changes of the steering direction by more than 2° of road-wheel angle: the steering reversals of SAE J2944, with
+    /// a gap [chosen] that ignores the follow-up of noise. What a resume straightens does not count.
     pub steering_reversals: u32,
-    /// Road-wheel angle steered, radians summed over the run.
+    /// Road-wheel angle steered, radians: the sum of all changes from tick to tick [chosen], resumes left out.
     pub steering_effort_rad: f32,
 }
 
@@ -177,8 +179,16 @@ pub struct Tally {
     safe_ratio_sum: f64,
     driven_m: f64,
     steering_effort_rad: f64,
-    last_steering_rad: f32,
+    steering: Steering,
+}
+
+/// Follows the road-wheel angle from one standstill on the path to the next.
+#[derive(Debug, Clone, Default)]
+struct Steering {
+    last_rad: f32,
+    /// Sign of the direction in which the wheels are being turned, 0 before the first real movement.
     turning: f32,
+    /// The farthest angle in that direction.
     extreme_rad: f32,
 }
 
@@ -208,18 +218,23 @@ impl Tally {
         self.safe_ratio_sum += f64::from(frame.safe_ratio);
         self.driven_m += f64::from(frame.driven_m);
         self.steer(frame.vehicle.steering_rad);
+        if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
+            // The next frame shows straight wheels on the path, which nobody steered.
+            self.steering = Steering::default();
+        }
     }
 
     fn steer(&mut self, steering_rad: f32) {
-        self.steering_effort_rad += f64::from((steering_rad - self.last_steering_rad).abs());
-        self.last_steering_rad = steering_rad;
-        let since_extreme = steering_rad - self.extreme_rad;
-        if self.turning * since_extreme > 0.0 {
-            self.extreme_rad = steering_rad;
+        let steering = &mut self.steering;
+        self.steering_effort_rad += f64::from((steering_rad - steering.last_rad).abs());
+        steering.last_rad = steering_rad;
+        let since_extreme = steering_rad - steering.extreme_rad;
+        if steering.turning * since_extreme > 0.0 {
+            steering.extreme_rad = steering_rad;
         } else if since_extreme.abs() > REVERSAL_RAD {
-            self.metrics.steering_reversals += u32::from(self.turning != 0.0);
-            self.turning = since_extreme.signum();
-            self.extreme_rad = steering_rad;
+            self.metrics.steering_reversals += u32::from(steering.turning != 0.0);
+            steering.turning = since_extreme.signum();
+            steering.extreme_rad = steering_rad;
         }
     }
 
@@ -234,6 +249,18 @@ impl Tally {
     }
 }
 
+/// Steering reversals in a sequence of road-wheel angles (radians, one per tick), counted as in
+/// [`EpisodeMetrics::steering_reversals`].
+pub fn steering_reversals(angles_rad: impl IntoIterator<Item = f32>) -> u32 {
+    let mut angles_rad = angles_rad.into_iter();
+    let mut tally = Tally::default();
+    if let Some(first) = angles_rad.next() {
+        tally.steering = Steering { last_rad: first, turning: 0.0, extreme_rad: first };
+    }
+    angles_rad.for_each(|angle| tally.steer(angle));
+    tally.metrics.steering_reversals
+}
+
 /// Near-collisions per 100 m of reference path (paper, collision rate): events and metres pooled over runs.
 pub fn near_collisions_per_100m<'a>(runs: impl IntoIterator<Item = &'a EpisodeMetrics>) -> f64 {
     let (events, metres) = runs.into_iter().fold((0.0, 0.0), |(events, metres), run| {
@@ -245,6 +272,9 @@ pub fn near_collisions_per_100m<'a>(runs: impl IntoIterator<Item = &'a EpisodeMe
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::driver::{Decision, LookAheadPoint};
+    use crate::sensing::Observation;
+    use crate::vehicle::{VehicleCommand, VehicleState};
 
     fn ring() -> SafeRing {
         SafeRing::new(&VehicleParams::hyundai_hg300(), &MetricsConfig::paper(), 0.06)
@@ -285,15 +315,56 @@ mod tests {
 
     #[test]
     fn reversals_are_counted_with_hysteresis() {
-        let count = |angles_deg: &[f32]| {
-            let mut tally = Tally::new(1.0);
-            for angle in angles_deg {
-                tally.steer(angle.to_radians());
-            }
-            tally.metrics.steering_reversals
-        };
+        let count = |angles_deg: &[f32]| steering_reversals(angles_deg.iter().map(|angle| angle.to_radians()));
         assert_eq!(count(&[0.0, 5.0, 10.0, 15.0]), 0);
         assert_eq!(count(&[0.0, 5.0, 4.0, 5.0, 4.0]), 0); // within 2°
         assert_eq!(count(&[0.0, 5.0, 0.0, 5.0]), 2);
+        assert_eq!(count(&[20.0, 15.0, 10.0]), 0, "the first angle is where it starts");
+    }
+
+    fn frame(tick: u32, steering_deg: f32, event: Event) -> Frame {
+        let vehicle =
+            VehicleState { steering_rad: steering_deg.to_radians(), ..VehicleState::at_rest(Pose::default()) };
+        let decision = Decision {
+            look_ahead: LookAheadPoint { ahead_m: 8.0, left_m: 0.0 },
+            source: if tick == 0 { Source::Novice } else { Source::Expert },
+            spread: None,
+        };
+        Frame {
+            tick,
+            time_s: 0.05 * (tick + 1) as f32,
+            vehicle,
+            observation: Observation::default(),
+            decision,
+            command: VehicleCommand::default(),
+            progress_m: 0.0,
+            safe_ratio: 0.5 + 0.1 * tick as f32,
+            clearance_m: 1.0 - 0.25 * tick as f32,
+            driven_m: 0.1,
+            contacts: u32::from(tick == 2),
+            event,
+        }
+    }
+
+    /// Five frames added up by hand: 10° and back are 20° and one reversal; a near-collision; what the resume
+    /// straightens (3°) is nobody's steering; 4° more after it.
+    #[test]
+    fn a_tally_is_the_sum_of_its_frames() {
+        let near = Event::NearCollision { at: Pose::default(), progress_m: 0.0 };
+        let stuck = Event::Stuck { at: Pose::default(), progress_m: 0.0 };
+        let frames = [(10.0, Event::Drove), (0.0, Event::Drove), (-3.0, near), (0.0, stuck), (4.0, Event::ReachedEnd)];
+        let mut tally = Tally::new(200.0);
+        for (tick, (steering_deg, event)) in frames.into_iter().enumerate() {
+            tally.frame(&frame(tick as u32, steering_deg, event));
+        }
+        let metrics = tally.metrics();
+        assert_eq!((metrics.ticks, metrics.novice_ticks), (5, 1));
+        assert_eq!((metrics.near_collisions, metrics.stuck, metrics.contacts), (1, 1, 1));
+        assert_eq!(metrics.steering_reversals, 1);
+        assert!((metrics.steering_effort_rad.to_degrees() - 27.0).abs() < 1e-3, "{metrics:?}");
+        assert!((metrics.safe_ratio - 0.7).abs() < 1e-6 && metrics.clearance_min_m == 0.0, "{metrics:?}");
+        assert!((metrics.driven_m - 0.5).abs() < 1e-6 && (metrics.duration_s - 0.25).abs() < 1e-6, "{metrics:?}");
+        assert!((metrics.mean_speed_mps() - 2.0).abs() < 1e-5);
+        assert!((near_collisions_per_100m([&metrics, &metrics]) - 0.5).abs() < 1e-9, "two in 400 m");
     }
 }

@@ -1,7 +1,8 @@
 //! The vehicle against closed forms, and stop–count–resume against a hand-computed scene.
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
-use sim::driver::{Decision, Driver, LookAheadPoint, Situation, Source};
+use sim::batch::run_lockstep_until;
+use sim::driver::{Decision, Driver, LookAheadPoint, OneDriverEach, Situation, Source};
 use sim::episode::{self, Ending, Episode, EpisodeConfig, Event, Frame};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
@@ -9,6 +10,7 @@ use sim::scenario::{NoiseLevel, NoiseSettings, Obstacle, ObstacleClass, Referenc
 use sim::seed::RootSeed;
 use sim::sensing::noise::NoiseConfig;
 use sim::vehicle::{VehicleCommand, VehicleParams, VehicleState, step, step_emergency_stop};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 fn drive(mut state: VehicleState, command: VehicleCommand, seconds: f32) -> VehicleState {
@@ -128,6 +130,9 @@ fn a_near_collision_is_counted_half_a_metre_before_the_obstacle() {
     assert_eq!((fast.metrics.near_collisions, fast.metrics.contacts), (1, 1), "{fast:?}");
     let (report, frames) = run(lane(60.0, vec![pillar]), (8.28, 0.0), config());
     assert_eq!((report.metrics.near_collisions, report.metrics.contacts), (1, 0), "{report:?}");
+    // 0.5 m less the stop of 0.17 m and what the car drives in the time of one step; a contact is below zero.
+    assert!((0.28..0.34).contains(&report.metrics.clearance_min_m), "{} m", report.metrics.clearance_min_m);
+    assert!(fast.metrics.clearance_min_m < 0.0, "{} m", fast.metrics.clearance_min_m);
     let (tick, Event::NearCollision { at, .. }) = report.events[0] else { panic!("{report:?}") };
     assert!((at.x_m - 25.7).abs() < 0.03, "counted at {} m", at.x_m);
     let after = &frames[tick as usize + 1];
@@ -201,4 +206,35 @@ fn the_same_seed_gives_the_same_frames() {
         frames.iter().map(|frame| (frame.observation, frame.vehicle)).collect::<Vec<_>>()
     };
     assert_eq!(frames(), frames());
+}
+
+#[test]
+fn a_batch_can_be_stopped_and_keeps_what_has_ended() {
+    let start = |length_m| Episode::new(config(), lane(length_m, vec![]), RootSeed(1));
+    let ahead = || Fixed(LookAheadPoint { ahead_m: 16.3, left_m: 0.0 });
+    let mut fleet = OneDriverEach(vec![ahead(), ahead()]);
+    let mut has_short_one_ended = false;
+    let reports = run_lockstep_until(vec![start(20.0), start(60.0)], &mut fleet, &mut |episode, frame| {
+        has_short_one_ended |= episode == 0 && frame.event == Event::ReachedEnd;
+        if has_short_one_ended { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert!(reports[0].as_ref().is_some_and(|report| report.ending == Ending::ReachedEnd));
+    assert_eq!(reports[1], None);
+}
+
+/// From a state met at 20 m the rest is driven as by the car that was met.
+#[test]
+fn an_episode_under_way_goes_on_from_its_state() {
+    let map = lane(40.0, vec![]);
+    let (_, frames) = run(Arc::clone(&map), (16.3, 0.0), config());
+    let met = frames.iter().find(|frame| frame.progress_m > 20.0).unwrap();
+    let episode = Episode::under_way(config(), map, RootSeed(1), met.vehicle, met.progress_m);
+    let mut driver = Fixed(LookAheadPoint { ahead_m: 16.3, left_m: 0.0 });
+    let mut positions = Vec::new();
+    let report = episode::run(episode, &mut driver, &mut |frame: &Frame| positions.push(frame.vehicle.pose.x_m));
+    assert_eq!(report.ending, Ending::ReachedEnd);
+    for (again, first) in positions.iter().zip(&frames[met.tick as usize..]) {
+        assert!((again - first.vehicle.pose.x_m).abs() < 0.02, "{again} m, {} m", first.vehicle.pose.x_m);
+    }
+    assert_eq!(positions.len(), frames.len() - met.tick as usize);
 }

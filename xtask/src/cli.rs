@@ -1,5 +1,6 @@
 //! The command line, nothing else.
 
+use crate::settings::NoiseChoice;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -41,6 +42,9 @@ pub enum Command {
     Generate(GenerateArgs),
     /// How many pixels of the perceived bird's-eye view are right.
     PixelAccuracy(PixelAccuracyArgs),
+    /// How far must be driven to see a difference in near-collisions, or to bound their rate.
+    #[command(after_help = METRES_EXAMPLES)]
+    Metres(MetresArgs),
     /// Prints the resolved settings as TOML.
     Settings(SettingsArgs),
     /// Lists the lots that can be named.
@@ -52,15 +56,22 @@ pub enum Command {
 /// Where settings come from, lowest priority first: preset, file, `--set`, then the flags of the command.
 #[derive(Debug, Clone, Default, Args)]
 pub struct LayerArgs {
-    /// Named set of settings to start from.
-    #[arg(long, value_name = "NAME", default_value = "default")]
-    pub preset: String,
+    /// Named set of settings to start from [default: default].
+    #[arg(long, value_name = "NAME")]
+    pub preset: Option<String>,
     /// TOML file with the settings to change; the rest stays as in the preset.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// Changes one setting, e.g. `dagger.eta=0.8`; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
+}
+
+impl LayerArgs {
+    /// The preset that is meant where none is named.
+    pub fn preset_name(&self) -> &str {
+        self.preset.as_deref().unwrap_or("default")
+    }
 }
 
 /// Settings and their root seed.
@@ -105,12 +116,14 @@ const EVALUATE_EXAMPLES: &str = "\
 Examples:
   cargo xtask evaluate --driver expert --lots lot-a --trials 2
   cargo xtask evaluate --driver run:runs/train-dagger-default-s1/bc --driver run:runs/train-dagger-default-s1
-  cargo xtask evaluate --driver net:runs/train-dagger-default-s1/round-03 --lots lot-b --noise hard --out runs/hard";
+  cargo xtask evaluate --driver net:runs/train-dagger-default-s1/round-03 --lots lot-b --noise hard --out runs/hard
+  cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1 --noise sweep --lots test:100";
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Clone, Args)]
 pub struct EvaluateArgs {
-    /// Who drives; may be repeated. See `cargo xtask drivers`.
+    /// Who drives; may be repeated. See `cargo xtask drivers`. The settings of the first `run:DIR` are used unless
+    /// `--config` or `--preset` names others.
     #[arg(long = "driver", value_name = "SPEC", required = true, num_args = 1..)]
     pub drivers: Vec<String>,
     /// Lots to drive; see `cargo xtask lots` [default: the setting evaluation.lots].
@@ -122,9 +135,13 @@ pub struct EvaluateArgs {
     /// Which ways the lots are driven.
     #[arg(long)]
     pub directions: Option<Directions>,
-    /// What is seen wrongly.
-    #[arg(long)]
-    pub noise: Option<NoiseArg>,
+    /// What is seen wrongly: clean, paper, hard, lot (as the lot asks for) or multiples of paper; several are compared,
+    /// `sweep` stands for 0,0.5,1,1.5,2.
+    #[arg(long, value_name = "LEVEL", num_args = 1.., value_delimiter = ',')]
+    pub noise: Vec<String>,
+    /// Driver the others are compared with [default: the last network, else the first driver].
+    #[arg(long, value_name = "SPEC")]
+    pub compare_with: Option<String>,
     /// Seed of obstacles and noise of the trials.
     #[arg(long)]
     pub seed: Option<u64>,
@@ -148,19 +165,6 @@ pub enum Directions {
     Forward,
     /// From finish to start.
     Reverse,
-}
-
-/// Levels of sensor noise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum NoiseArg {
-    /// None.
-    Clean,
-    /// About 98 % of the pixels right.
-    Paper,
-    /// Twice the errors of `paper`.
-    Hard,
-    /// The level the lot's file asks for.
-    Lot,
 }
 
 const GENERATE_EXAMPLES: &str = "\
@@ -199,11 +203,42 @@ pub struct PixelAccuracyArgs {
     pub lots: Vec<String>,
     /// Noise levels.
     #[arg(long, num_args = 1.., value_delimiter = ',', default_value = "paper")]
-    pub level: Vec<NoiseArg>,
+    pub level: Vec<NoiseChoice>,
     /// Trials per lot and direction.
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub trials: u32,
     /// Settings.
     #[command(flatten)]
     pub settings: SettingsArgs,
+}
+
+const METRES_EXAMPLES: &str = "\
+Examples:
+  cargo xtask metres --below 0.1                      no event within these metres shows less than 0.1 per 100 m
+  cargo xtask metres --between 1.4,0.5                to tell two drivers apart
+  cargo xtask metres --between 1.4,1.2 --power 0.9 --dispersion 2";
+
+/// Arguments of `metres`. Rates are near-collisions per 100 m.
+#[derive(Debug, Clone, Args)]
+pub struct MetresArgs {
+    /// A rate to be shown as not reached, by a run without an event.
+    #[arg(long, value_name = "RATE", required_unless_present = "between")]
+    pub below: Option<f64>,
+    /// Two rates to be told apart.
+    #[arg(long, value_name = "RATE,RATE", value_parser = two_rates)]
+    pub between: Option<[f64; 2]>,
+    /// Probability of seeing a difference that is there.
+    #[arg(long, default_value_t = 0.8)]
+    pub power: f64,
+    /// Confidence: one-sided for `--below`, two-sided for `--between`.
+    #[arg(long, default_value_t = 0.95)]
+    pub confidence: f64,
+    /// Variance over mean of the counts, as printed by `evaluate`; 1 = independent events.
+    #[arg(long, default_value_t = 1.0)]
+    pub dispersion: f64,
+}
+
+fn two_rates(text: &str) -> Result<[f64; 2], String> {
+    let rates = text.split_once(',').and_then(|(a, b)| Some([a.trim().parse().ok()?, b.trim().parse().ok()?]));
+    rates.ok_or_else(|| "two numbers with a comma between them are needed, as in 1.4,0.5".to_owned())
 }

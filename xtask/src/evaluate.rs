@@ -1,48 +1,104 @@
-//! `evaluate`: driver × lots × trials × directions.
+//! `evaluate`: drivers × lots × directions × trials × noise levels.
+//!
+//! Runs are driven group by group. In a group every driver meets the same maps, obstacles, noise and starts, one driver
+//! after the other at every noise level; then the group is forgotten but for a few numbers per run. So memory does not
+//! depend on how many lots there are, and what an interrupted evaluation leaves is paired.
 
-use crate::cli::{Directions, EvaluateArgs, NoiseArg};
+use crate::cli::{Directions, EvaluateArgs};
 use crate::drivers::Contestant;
+use crate::failures::{Cause, Failure, Findings, Group, Sighting, Watch};
 use crate::interrupt::{self, Interrupted};
 use crate::lots::Lot;
 use crate::progress::{Stopwatch, Work};
-use crate::report::{Evaluation, RunLine};
-use crate::run_dir::{Place, RunDir};
+use crate::replay_key::ReplayKey;
+use crate::report::{RunLine, Summary, WallTimeLine};
+use crate::run_dir::{self, Place, RunDir};
 use crate::settings::{NoiseChoice, Settings};
-use crate::summary::Cells;
+use crate::summary::Ledger;
 use crate::trials::{self, Job, Purpose};
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use serde::Serialize;
-use sim::batch::run_lockstep;
+use sim::batch::run_lockstep_until;
 use sim::episode::{EpisodeReport, Event};
+use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
-use std::io::Write as _;
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Instant;
 
 /// Runs driven at a time. A constant: neither memory nor results depend on how many runs or threads there are.
 const GROUP: usize = 16;
+/// What `--noise sweep` stands for, in multiples of the level `paper`: clean to hard.
+const SWEEP: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
+
+/// A driver that takes part.
+#[derive(Debug, Clone)]
+pub struct Entry {
+    /// Who.
+    pub contestant: Contestant,
+    /// As named on the command line, for replay keys.
+    pub spec: String,
+}
+
+/// What is to be driven.
+#[derive(Debug, Clone, Copy)]
+pub struct Plan<'a> {
+    /// With which settings.
+    pub settings: &'a Settings,
+    /// By whom.
+    pub entries: &'a [Entry],
+    /// Where.
+    pub lots: &'a [Lot],
+    /// The driver the others are compared with, an index of `entries`.
+    pub compare_with: usize,
+}
+
+impl Plan<'_> {
+    /// What can be known to go wrong before the first step.
+    ///
+    /// # Errors
+    /// If a driver was trained for another patch of ground, or a lot written by hand cannot be driven.
+    pub fn check(&self) -> anyhow::Result<()> {
+        self.entries.iter().try_for_each(|entry| entry.contestant.check(self.settings))?;
+        let evaluation = &self.settings.evaluation;
+        for lot in self.lots.iter().filter(|lot| lot.is_from_file()) {
+            let lot = std::slice::from_ref(lot);
+            let jobs = Job::all(evaluation.seed, Purpose::Evaluation, lot, 1, &evaluation.directions);
+            jobs.map(|job| job.map(&self.settings.episode)).collect::<anyhow::Result<Vec<Map>>>()?;
+        }
+        Ok(())
+    }
+}
 
 /// The command.
 ///
 /// # Errors
 /// If something named does not exist or cannot be written, or by Ctrl-C.
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
-    let settings = resolve(args)?;
+    let entries: Vec<Entry> = Contestant::parse_all(&args.drivers)?
+        .into_iter()
+        .map(|contestant| Entry { spec: contestant.name.clone(), contestant })
+        .collect();
+    let compare_with = compare_with(args, &entries)?;
+    let (settings, preset) = resolve(args)?;
     let lots = Lot::parse_all(&settings.evaluation.lots)?;
-    let contestants = Contestant::parse_all(&args.drivers)?;
-    let run = RunDir::create(
-        &Place {
-            out: args.out.as_deref(),
-            overwrite: args.overwrite,
-            command: "evaluate",
-            preset: &args.layers.preset,
-            seed: settings.evaluation.seed.0,
-        },
-        &settings,
-    )?;
+    let plan = Plan { settings: &settings, entries: &entries, lots: &lots, compare_with };
+    plan.check()?;
+    let place = Place {
+        out: args.out.as_deref(),
+        overwrite: args.overwrite,
+        command: "evaluate",
+        preset,
+        seed: settings.evaluation.seed.0,
+    };
+    let run = RunDir::create(&place, &settings)?;
     let mut stopwatch = Stopwatch::default();
-    measure(&settings, &contestants, &lots, &run, &mut stopwatch)?;
+    measure(&plan, &run, &mut stopwatch)?;
     run.finish(&Finished { drivers: &args.drivers })?;
-    eprintln!("written: {}/evaluation.md, .json, .csv and episodes.jsonl", run.path().display());
+    eprintln!("written: {}/summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl", run.path().display());
     stopwatch.report();
     Ok(())
 }
@@ -52,8 +108,37 @@ struct Finished<'a> {
     drivers: &'a [String],
 }
 
-fn resolve(args: &EvaluateArgs) -> anyhow::Result<Settings> {
-    let mut settings = Settings::resolve(&args.layers, None)?;
+/// `--compare-with`, else the last network, else the first driver.
+fn compare_with(args: &EvaluateArgs, entries: &[Entry]) -> anyhow::Result<usize> {
+    let Some(spec) = &args.compare_with else {
+        let is_network = |entry: &Entry| entry.spec.starts_with("run:") || entry.spec.starts_with("net:");
+        return Ok(entries.iter().rposition(is_network).unwrap_or(0));
+    };
+    let found = entries.iter().position(|entry| entry.spec == *spec);
+    found.with_context(|| format!("--compare-with {spec}: name one of the drivers given with --driver"))
+}
+
+/// The settings, and the name of what they start from: `--preset` or `--config` if given, else the first run that is
+/// named as a driver, else the default preset.
+fn resolve(args: &EvaluateArgs) -> anyhow::Result<(Settings, &str)> {
+    let is_named = args.layers.preset.is_some() || args.layers.config.is_some();
+    let mut runs = args.drivers.iter().filter_map(|spec| Some((spec, run_dir_of(spec)?)));
+    let (mut settings, base) = match runs.next().filter(|_| !is_named) {
+        Some((spec, path)) => {
+            let of_run = run_dir::settings_of(path).with_context(|| format!("driver {spec:?}"))?;
+            for (other, path) in runs {
+                let of_other = run_dir::settings_of(path).with_context(|| format!("driver {other:?}"))?;
+                ensure!(
+                    of_other.episode == of_run.episode,
+                    "drivers {spec:?} and {other:?} were trained with different settings of episode (car, sensor, \
+                     metrics), so neither run's settings are fair to both; choose with --config or --preset"
+                );
+            }
+            eprintln!("settings: those of {} (others: --config or --preset)", path.display());
+            (Settings::resolve_over(&of_run, &args.layers, None)?, "run")
+        }
+        None => (Settings::resolve(&args.layers, None)?, args.layers.preset_name()),
+    };
     let evaluation = &mut settings.evaluation;
     if let Some(seed) = args.seed {
         evaluation.seed = RootSeed(seed);
@@ -69,105 +154,240 @@ fn resolve(args: &EvaluateArgs) -> anyhow::Result<Settings> {
             Directions::Reverse => vec![Direction::Reverse],
         };
     }
-    if let Some(noise) = args.noise {
-        evaluation.noise = noise.into();
+    if !args.noise.is_empty() {
+        evaluation.noise = noise_levels(&args.noise)?;
     }
     settings.check()?;
-    Ok(settings)
+    Ok((settings, base))
 }
 
-impl From<NoiseArg> for NoiseChoice {
-    fn from(noise: NoiseArg) -> Self {
-        match noise {
-            NoiseArg::Clean => Self::Clean,
-            NoiseArg::Paper => Self::Paper,
-            NoiseArg::Hard => Self::Hard,
-            NoiseArg::Lot => Self::Lot,
+fn run_dir_of(spec: &str) -> Option<&Path> {
+    spec.strip_prefix("run:").map(Path::new)
+}
+
+fn noise_levels(names: &[String]) -> anyhow::Result<Vec<NoiseChoice>> {
+    let mut levels = Vec::new();
+    for name in names {
+        if name == "sweep" {
+            levels.extend(SWEEP.map(NoiseChoice::Times));
+        } else {
+            levels.push(name.parse().map_err(|error| anyhow::anyhow!("--noise {name}: {error}"))?);
         }
     }
+    Ok(levels)
 }
 
-/// Drives every contestant through the evaluation of the settings, writes one line per run as they come and the tables
-/// at the end, and prints the table.
+/// Drives the plan, writes one line per run and near-collision as they come and the tables at the end, and prints the
+/// tables.
 ///
 /// # Errors
 /// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is written.
-pub fn measure(
-    settings: &Settings,
-    contestants: &[Contestant],
-    lots: &[Lot],
-    run: &RunDir,
-    stopwatch: &mut Stopwatch,
-) -> anyhow::Result<()> {
-    contestants.iter().try_for_each(|contestant| contestant.check(settings))?;
-    let path = run.path().join("episodes.jsonl");
-    let file = std::fs::File::create(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
-    let mut lines = std::io::BufWriter::new(file);
-    let mut cells = Cells::default();
-    let mut was_cut_short = false;
-    for contestant in contestants {
-        let mut work = Work::begin(format!("driving {}", contestant.name));
-        let done = drive(settings, contestant, lots, &mut work, &mut |job, report| {
-            cells.add(&contestant.name, job.lot, job.direction, report);
-            let (driver, lot) = (contestant.name.as_str(), job.lot.name());
-            let line = RunLine { driver, lot, direction: job.direction, trial: job.trial, report };
-            serde_json::to_writer(&mut lines, &line)?;
-            writeln!(lines)?;
-            Ok(())
-        });
-        lines.flush()?;
-        stopwatch.add("evaluation", work.seconds());
-        let totals = cells.pooled(|cell| cell.driver == contestant.name);
-        work.end(&format!("{} runs, {} near-collisions", totals.runs, totals.near_collisions));
-        if !done? {
-            was_cut_short = true;
+pub fn measure(plan: &Plan<'_>, run: &RunDir, stopwatch: &mut Stopwatch) -> anyhow::Result<()> {
+    let evaluation = &plan.settings.evaluation;
+    let mut ledger = Ledger::new(plan);
+    let mut lines = Lines::create(run)?;
+    let mut jobs = Job::all(evaluation.seed, Purpose::Evaluation, plan.lots, evaluation.trials, &evaluation.directions);
+    let count = jobs.clone().count() * plan.entries.len() * evaluation.noise.len();
+    let mut track = Track { work: Work::begin("driving"), runs: count, done: 0, near_collisions: 0 };
+    let mut first_job = 0;
+    let mut is_complete = true;
+    while is_complete {
+        let group: Vec<Job<'_>> = jobs.by_ref().take(GROUP).collect();
+        if group.is_empty() {
             break;
         }
+        let maps = trials::maps(&group, plan.settings)?;
+        'group: for (level, &noise) in evaluation.noise.iter().enumerate() {
+            for (driver, entry) in plan.entries.iter().enumerate() {
+                let contestant = &entry.contestant;
+                let group = Group { settings: plan.settings, contestant, jobs: &group, maps: &maps, noise };
+                let driven = drive(&group, &mut track);
+                let failures = failures(&group, entry, evaluation.seed, &driven);
+                lines.add(&group, entry, evaluation.seed, &driven, &failures)?;
+                for (i, (job, report)) in driven.finished(&group) {
+                    ledger.add(level, driver, first_job + i, job, report);
+                }
+                for (episode, failure) in &failures {
+                    ledger.add_cause(level, driver, group.jobs[*episode].lot, failure.cause);
+                }
+                is_complete = driven.reports.iter().all(Option::is_some);
+                if !is_complete {
+                    break 'group;
+                }
+            }
+        }
+        first_job += group.len();
     }
-    let evaluation = Evaluation { settings: &settings.evaluation, cells: &cells };
-    println!("\nClosed loop\n\n{}", evaluation.to_markdown());
-    evaluation.write(run)?;
-    if was_cut_short {
-        let kept = format!("the runs driven so far are in {}", run.path().display());
-        return Err(Interrupted { kept }.into());
+    lines.finish()?;
+    stopwatch.add("evaluation", track.work.seconds());
+    track.work.end(&format!("{} of {count} runs, {} near-collisions", track.done, track.near_collisions));
+
+    let summary = Summary::new(plan, &ledger);
+    println!("\n{}", summary.to_markdown());
+    summary.write(run)?;
+    if is_complete {
+        return Ok(());
     }
-    Ok(())
+    Err(Interrupted { kept: format!("the runs driven so far are in {}", run.path().display()) }.into())
 }
 
-/// Drives one contestant, group by group; results come in the order of the jobs. `false` if cut short by Ctrl-C.
-fn drive(
-    settings: &Settings,
-    contestant: &Contestant,
-    lots: &[Lot],
-    work: &mut Work,
-    on_run: &mut dyn FnMut(&Job<'_>, &EpisodeReport) -> anyhow::Result<()>,
-) -> anyhow::Result<bool> {
-    let evaluation = &settings.evaluation;
-    let jobs = Job::all(evaluation.seed, Purpose::Evaluation, lots, evaluation.trials, &evaluation.directions);
-    let count = jobs.clone().count() as f64;
-    let mut jobs = jobs.peekable();
-    let (mut done, mut near_collisions) = (0, 0_u32);
-    while jobs.peek().is_some() {
-        let group: Vec<Job<'_>> = jobs.by_ref().take(GROUP).collect();
-        let episodes = trials::episodes(&group, settings, evaluation.noise)?;
-        let lengths_m: Vec<f32> = episodes.iter().map(|episode| episode.map().path().length_m()).collect();
-        let mut shares = vec![0.0_f32; group.len()];
-        let mut fleet = contestant.fleet(settings, group.len());
-        let reports = run_lockstep(episodes, &mut *fleet, &mut |episode, frame| {
-            shares[episode] = frame.progress_m / lengths_m[episode];
-            near_collisions += u32::from(matches!(frame.event, Event::NearCollision { .. }));
-            if episode == 0 {
-                let runs = f64::from(done) + f64::from(shares.iter().sum::<f32>());
-                work.at(runs / count, || format!("{near_collisions} near-collisions"));
-            }
-        });
-        for (job, report) in group.iter().zip(&reports) {
-            on_run(job, report)?;
-            done += 1;
-        }
-        if interrupt::is_requested() && jobs.peek().is_some() {
-            return Ok(false);
-        }
+/// One driver in one group at one noise level.
+struct Driven {
+    /// `None` for runs cut short by Ctrl-C.
+    reports: Vec<Option<EpisodeReport>>,
+    sightings: Vec<Sighting>,
+    wall_s: f64,
+}
+
+impl Driven {
+    fn finished<'a>(
+        &'a self,
+        group: &Group<'a>,
+    ) -> impl Iterator<Item = (usize, (&'a Job<'a>, &'a EpisodeReport))> + use<'a> {
+        let both = group.jobs.iter().zip(&self.reports).enumerate();
+        both.filter_map(|(i, (job, report))| Some((i, (job, report.as_ref()?))))
     }
-    Ok(true)
+}
+
+/// The near-collisions of the finished runs, each with the index of its run within the group.
+fn failures(group: &Group<'_>, entry: &Entry, seed: RootSeed, driven: &Driven) -> Vec<(usize, Failure)> {
+    let is_kept = |sighting: &&Sighting| driven.reports[sighting.episode].is_some();
+    let sightings: Vec<Sighting> = driven.sightings.iter().filter(is_kept).copied().collect();
+    let explained = group.explain(&sightings, !interrupt::is_requested());
+    let failure = |(sighting, (cause, findings)): (&Sighting, (Cause, Findings))| {
+        let job = &group.jobs[sighting.episode];
+        let failure = Failure {
+            driver: entry.contestant.name.clone(),
+            lot: job.lot.name().to_owned(),
+            direction: job.direction,
+            trial: job.trial,
+            noise: group.noise,
+            tick: sighting.tick,
+            route_m: sighting.route_m,
+            x_m: sighting.at.x_m,
+            y_m: sighting.at.y_m,
+            heading_deg: sighting.at.heading_rad.to_degrees(),
+            speed_mps: sighting.speed_mps,
+            cause,
+            findings,
+            replay: replay_key(entry, job, group.noise, seed, sighting.tick).to_string(),
+        };
+        (sighting.episode, failure)
+    };
+    sightings.iter().zip(explained).map(failure).collect()
+}
+
+fn replay_key(entry: &Entry, job: &Job<'_>, noise: NoiseChoice, seed: RootSeed, tick: u32) -> ReplayKey {
+    let (driver, lot) = (entry.spec.clone(), job.lot.spec());
+    ReplayKey { driver, lot, direction: job.direction, trial: job.trial, noise, seed, tick }
+}
+
+fn drive(group: &Group<'_>, track: &mut Track) -> Driven {
+    let started = Instant::now();
+    let episodes = trials::start(group.jobs, group.maps, group.settings, group.noise);
+    let mut fleet = group.contestant.fleet(group.settings, episodes.len());
+    let mut watch = Watch::new(episodes.len(), &group.settings.episode);
+    let mut shares = vec![0.0_f32; episodes.len()];
+    let mut frames = 0_u32;
+    let reports = run_lockstep_until(episodes, &mut *fleet, &mut |episode, frame| {
+        watch.frame(episode, frame);
+        track.near_collisions += u32::from(matches!(frame.event, Event::NearCollision { .. }));
+        shares[episode] = frame.progress_m / group.maps[episode].path().length_m();
+        frames += 1;
+        // Often enough for eyes and Ctrl-C.
+        if frames.is_multiple_of(64) {
+            track.show(shares.iter().sum(), &group.contestant.name);
+            if interrupt::is_requested() {
+                return ControlFlow::Break(());
+            }
+        }
+        ControlFlow::Continue(())
+    });
+    track.done += reports.iter().flatten().count();
+    Driven { reports, sightings: watch.into_sightings(), wall_s: started.elapsed().as_secs_f64() }
+}
+
+/// How far the whole evaluation is.
+struct Track {
+    work: Work,
+    runs: usize,
+    done: usize,
+    near_collisions: u32,
+}
+
+impl Track {
+    fn show(&mut self, under_way: f32, driver: &str) {
+        let Self { runs, done, near_collisions, .. } = *self;
+        self.work.at((done as f64 + f64::from(under_way)) / runs as f64, || {
+            format!("{done} of {runs} runs, {near_collisions} near-collisions, at the wheel: {driver}")
+        });
+    }
+}
+
+/// The files that are written line by line.
+struct Lines {
+    runs: BufWriter<File>,
+    failures: BufWriter<File>,
+    failures_table: BufWriter<File>,
+    wall_time: BufWriter<File>,
+}
+
+impl Lines {
+    fn create(run: &RunDir) -> anyhow::Result<Self> {
+        let create = |name: &str| {
+            let path = run.path().join(name);
+            let file = File::create(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
+            Ok::<_, anyhow::Error>(BufWriter::new(file))
+        };
+        let mut failures_table = create("failures.md")?;
+        failures_table.write_all(Failure::TABLE_HEAD.as_bytes())?;
+        Ok(Self {
+            runs: create("runs.jsonl")?,
+            failures: create("failures.jsonl")?,
+            failures_table,
+            wall_time: create("wall_time.jsonl")?,
+        })
+    }
+
+    fn add(
+        &mut self,
+        group: &Group<'_>,
+        entry: &Entry,
+        seed: RootSeed,
+        driven: &Driven,
+        failures: &[(usize, Failure)],
+    ) -> anyhow::Result<()> {
+        let driver = entry.contestant.name.as_str();
+        let ticks: u32 = driven.finished(group).map(|(_, (_, report))| report.metrics.ticks).sum();
+        for (_, (job, report)) in driven.finished(group) {
+            let (lot, direction, trial, noise) = (job.lot.name(), job.direction, job.trial, group.noise);
+            let replay = replay_key(entry, job, noise, seed, 0).to_string();
+            line(&mut self.runs, &RunLine::new(driver, job, noise, replay, report))?;
+            // Runs of a group are driven at once; each has its share by the number of its decisions.
+            let wall_s = driven.wall_s * f64::from(report.metrics.ticks) / f64::from(ticks.max(1));
+            line(&mut self.wall_time, &WallTimeLine { driver, lot, direction, trial, noise, wall_s })?;
+        }
+        for (_, failure) in failures {
+            line(&mut self.failures, failure)?;
+            writeln!(self.failures_table, "{}", failure.table_row())?;
+        }
+        self.flush()
+    }
+
+    /// What is finished is on disk, also if the process is ended.
+    fn flush(&mut self) -> anyhow::Result<()> {
+        for file in [&mut self.runs, &mut self.failures, &mut self.failures_table, &mut self.wall_time] {
+            file.flush().context("a file of the run cannot be written; is the disk full?")?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> anyhow::Result<()> {
+        self.flush()
+    }
+}
+
+fn line(file: &mut BufWriter<File>, value: &impl Serialize) -> anyhow::Result<()> {
+    serde_json::to_writer(&mut *file, value)?;
+    Ok(writeln!(file)?)
 }

@@ -4,9 +4,11 @@
 //! |---|---|
 //! | [`cli`] | the command line, nothing else |
 //! | [`settings`] | preset → file → `--set` → flags, into one checked [`settings::Settings`] |
-//! | [`train`], [`evaluate`], [`generate`], [`pixel_accuracy`], [`listing`] | the commands |
+//! | [`train`], [`evaluate`], [`generate`], [`pixel_accuracy`], [`metres`], [`listing`] | the commands |
 //! | [`lots`], [`drivers`] | what can be named on the command line |
 //! | [`trials`] | which obstacles and which noise a trial has |
+//! | [`statistics`] | intervals and comparisons |
+//! | [`failures`], [`replay_key`] | near-collisions one by one, and how to see one again |
 //! | [`table1`], [`summary`], [`report`] | what is printed and written |
 //! | [`run_dir`] | the folder of a run and how it is claimed |
 //! | [`progress`], [`interrupt`] | bars, Ctrl-C |
@@ -16,16 +18,20 @@
 pub mod cli;
 pub mod drivers;
 pub mod evaluate;
+pub mod failures;
 pub mod generate;
 pub mod interrupt;
 pub mod listing;
 pub mod lots;
+pub mod metres;
 pub mod pixel_accuracy;
 pub mod progress;
 pub mod render;
+pub mod replay_key;
 pub mod report;
 pub mod run_dir;
 pub mod settings;
+pub mod statistics;
 pub mod summary;
 pub mod table1;
 pub mod train;

@@ -76,6 +76,21 @@ impl Lot {
         }
     }
 
+    /// As named on the command line; stands for this lot alone.
+    pub fn spec(&self) -> String {
+        self.spec.to_string()
+    }
+
+    /// Whether it is one of many drawn from a distribution, so that lots themselves are the sample.
+    pub fn is_generated(&self) -> bool {
+        matches!(self.spec, LotSpec::Generated { .. })
+    }
+
+    /// Whether it may turn out not to be drivable: a lot written by hand.
+    pub fn is_from_file(&self) -> bool {
+        self.from_file.is_some()
+    }
+
     /// Whether trials draw their own obstacles; other lots are the same in every trial.
     pub fn is_drawn_per_trial(&self) -> bool {
         matches!(self.spec, LotSpec::Reference(_))

@@ -3,7 +3,7 @@
 use clap::Parser as _;
 use std::process::ExitCode;
 use xtask::cli::{Cli, Command};
-use xtask::{evaluate, generate, interrupt, listing, pixel_accuracy, train};
+use xtask::{evaluate, generate, interrupt, listing, metres, pixel_accuracy, train};
 
 // Training allocates and frees large buffers all the time: a quarter faster than with the system's allocator.
 #[global_allocator]
@@ -40,6 +40,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Evaluate(args) => evaluate::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::PixelAccuracy(args) => pixel_accuracy::run(&args),
+        Command::Metres(args) => metres::run(&args),
         Command::Settings(args) => listing::settings(&args),
         Command::Lots => listing::lots(),
         Command::Drivers => listing::drivers(),

@@ -54,13 +54,12 @@ pub fn run(args: &PixelAccuracyArgs) -> anyhow::Result<()> {
     let stretches = (lots.len() * args.level.len()) as f64;
     let mut done = 0.0;
     for lot in &lots {
-        for &level in &args.level {
+        for &noise in &args.level {
             if interrupt::is_requested() {
                 println!("{table}");
                 return Err(Interrupted { kept: "the table holds what was measured".to_owned() }.into());
             }
             work.at(done / stretches, || lot.name().to_owned());
-            let noise = NoiseChoice::from(level);
             let pixels = look(&settings, lot, noise, args.trials)?;
             table.add_row(pixels.row(lot.name(), noise));
             done += 1.0;
@@ -122,7 +121,7 @@ impl Pixels {
         let paper = PAPER.iter().find(|(name, _)| *name == lot && noise == NoiseChoice::Paper);
         vec![
             lot.to_owned(),
-            noise.name().to_owned(),
+            noise.name(),
             self.poses.to_string(),
             format!("{:.2}", 100.0 - 100.0 * (self.false_occupied + self.false_free) as f64 / pixels),
             paper.map_or_else(|| "–".to_owned(), |(_, percent)| format!("{percent:.2}")),

@@ -1,17 +1,28 @@
 //! Tables of an evaluation, as Markdown, JSON and CSV.
 
+use crate::evaluate::Plan;
+use crate::failures::Cause;
 use crate::run_dir::RunDir;
-use crate::settings::EvaluationSettings;
-use crate::summary::{Cell, Cells, Rate, Totals};
+use crate::settings::{EvaluationSettings, NoiseChoice};
+use crate::statistics::bootstrap::{DRAWS, Interval};
+use crate::statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
+use crate::summary::{Comparison, Ledger, Scope, Standing, Totals};
+use crate::trials::Job;
 use comfy_table::{Table, presets};
 use serde::Serialize;
+use sim::episode::{Ending, EpisodeReport};
 use sim::scenario::Direction;
+use std::fmt::Write as _;
 
 /// A table that is both readable in a terminal and Markdown.
 pub fn markdown(header: Vec<String>) -> Table {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN).set_header(header);
     table
+}
+
+fn table_of(header: &[&str]) -> Table {
+    markdown(header.iter().map(|&title| title.to_owned()).collect())
 }
 
 /// The paper's results on a lot (methods.md 0): five trials in both directions.
@@ -27,18 +38,34 @@ const PAPER: [PaperRow; 3] = [
     PaperRow { lot: "lot-c", length_m: 149.0, dagger_safe_ratio: 0.91 },
 ];
 
-/// What was driven.
-#[derive(Debug, Clone, Copy)]
-pub struct Evaluation<'a> {
-    /// With which trials.
-    pub settings: &'a EvaluationSettings,
-    /// What came of it.
-    pub cells: &'a Cells,
-}
-
-/// One run, as a line of `episodes.jsonl`.
+/// One run, as a line of `runs.jsonl`.
 #[derive(Debug, Serialize)]
 pub struct RunLine<'a> {
+    driver: &'a str,
+    lot: &'a str,
+    direction: Direction,
+    trial: u32,
+    noise: NoiseChoice,
+    timed_out: bool,
+    mean_speed_mps: f32,
+    replay: String,
+    #[serde(flatten)]
+    report: &'a EpisodeReport,
+}
+
+impl<'a> RunLine<'a> {
+    /// Of a finished run; `replay` is its key ([`crate::replay_key`]).
+    pub fn new(driver: &'a str, job: &Job<'a>, noise: NoiseChoice, replay: String, report: &'a EpisodeReport) -> Self {
+        let timed_out = report.ending == Ending::TimedOut;
+        let mean_speed_mps = report.metrics.mean_speed_mps();
+        let (lot, direction, trial) = (job.lot.name(), job.direction, job.trial);
+        Self { driver, lot, direction, trial, noise, timed_out, mean_speed_mps, replay, report }
+    }
+}
+
+/// What a run took, as a line of `wall_time.jsonl`: apart, because everything else is the same in every repetition.
+#[derive(Debug, Serialize)]
+pub struct WallTimeLine<'a> {
     /// Who drove.
     pub driver: &'a str,
     /// Where.
@@ -47,170 +74,542 @@ pub struct RunLine<'a> {
     pub direction: Direction,
     /// Which trial.
     pub trial: u32,
-    /// What came of it.
-    #[serde(flatten)]
-    pub report: &'a sim::episode::EpisodeReport,
+    /// What was seen wrongly.
+    pub noise: NoiseChoice,
+    /// Seconds: the run's share, by decisions, of what its group took in lock-step.
+    pub wall_s: f64,
 }
 
-/// A row of the JSON and CSV tables.
-#[derive(Debug, Serialize)]
-struct Row<'a> {
-    driver: &'a str,
-    lot: &'a str,
-    direction: &'a str,
+/// A row of `summary.csv`: a driver on some lots at one noise level. Intervals are of 95 %.
+#[derive(Debug, Clone, Serialize)]
+struct Row {
+    driver: String,
+    noise: NoiseChoice,
+    lots: String,
+    direction: &'static str,
     runs: u32,
     reference_m: f64,
+    driven_m: f64,
     near_collisions: u32,
-    near_collisions_per_100m: f64,
-    lower_95: f64,
-    upper_95: f64,
+    per_100m: f64,
+    garwood_lower: f64,
+    garwood_upper: f64,
+    one_sided_upper: f64,
+    bootstrap_lower: Option<f64>,
+    bootstrap_upper: Option<f64>,
+    dispersion: Option<f64>,
+    dispersion_p: Option<f64>,
+    per_100m_unweighted: Option<f64>,
     safe_ratio: f64,
+    safe_ratio_lower: Option<f64>,
+    safe_ratio_upper: Option<f64>,
+    safe_ratio_unweighted: Option<f64>,
     contacts: u32,
     stuck: u32,
     timed_out: u32,
     given_up: u32,
     mean_speed_mps: f64,
     clearance_min_m: Option<f32>,
-    steering_reversals: u32,
+    steering_reversals_per_100m: f64,
+    steering_effort_rad_per_100m: f64,
 }
 
-impl Evaluation<'_> {
-    /// Writes `evaluation.md`, `.json` and `.csv`.
+/// A row of `comparisons.csv`: differences are driver − `compared_with`.
+#[derive(Debug, Clone, Serialize)]
+struct ComparisonRow {
+    driver: String,
+    compared_with: String,
+    noise: NoiseChoice,
+    lots: String,
+    pairs: usize,
+    difference_per_100m: Option<f64>,
+    difference_lower: Option<f64>,
+    difference_upper: Option<f64>,
+    excludes_zero: Option<bool>,
+    ratio: Option<f64>,
+    ratio_lower: f64,
+    ratio_upper: Option<f64>,
+    p_value: f64,
+    p_holm: f64,
+    difference_safe_ratio: Option<f64>,
+    difference_safe_ratio_lower: Option<f64>,
+    difference_safe_ratio_upper: Option<f64>,
+}
+
+/// A row of `noise_sweep.csv`.
+#[derive(Debug, Clone, Serialize)]
+struct SweepRow {
+    driver: String,
+    lots: String,
+    noise: NoiseChoice,
+    times_paper: Option<f64>,
+    reference_m: f64,
+    near_collisions: u32,
+    per_100m: f64,
+    lower: f64,
+    upper: f64,
+    safe_ratio: f64,
+}
+
+/// Near-collisions of a cause.
+#[derive(Debug, Clone, Serialize)]
+struct CauseRow {
+    driver: String,
+    noise: NoiseChoice,
+    lots: String,
+    cause: Cause,
+    near_collisions: u32,
+}
+
+/// One noise level in one scope, judged.
+struct Judged {
+    level: usize,
+    scope: Scope,
+    standings: Vec<Standing>,
+    comparisons: Vec<Comparison>,
+}
+
+/// An evaluation, counted and judged.
+pub struct Summary<'a> {
+    plan: &'a Plan<'a>,
+    ledger: &'a Ledger,
+    /// Level by level, scope by scope.
+    judged: Vec<Judged>,
+}
+
+impl<'a> Summary<'a> {
+    /// Judges what was driven.
+    pub fn new(plan: &'a Plan<'a>, ledger: &'a Ledger) -> Self {
+        let evaluation = &plan.settings.evaluation;
+        let scopes = Scope::all_of(ledger);
+        let both = (0..evaluation.noise.len()).flat_map(|level| scopes.iter().map(move |scope| (level, scope.clone())));
+        let judge = |(level, scope)| {
+            let (standings, comparisons) = ledger.judge(level, &scope, plan.compare_with, evaluation.seed);
+            Judged { level, scope, standings, comparisons }
+        };
+        Self { plan, ledger, judged: both.map(judge).collect() }
+    }
+
+    /// Writes `summary.md`, `.json`, `.csv`, `comparisons.csv`, and `noise_sweep.csv` if there are several levels.
     ///
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, run: &RunDir) -> anyhow::Result<()> {
-        run.write("evaluation.md", format!("{}\n", self.to_markdown()).as_bytes())?;
-        let rows = self.rows();
-        let json = serde_json::json!({ "settings": self.settings, "rows": rows });
-        run.write("evaluation.json", format!("{}\n", serde_json::to_string_pretty(&json)?).as_bytes())?;
-        let mut csv = csv::Writer::from_writer(Vec::new());
-        for row in &rows {
-            csv.serialize(row)?;
+        let (rows, comparisons, sweep) = (self.rows(), self.comparison_rows(), self.sweep_rows());
+        run.write("summary.md", format!("{}\n", self.to_markdown()).as_bytes())?;
+        let json = serde_json::json!({
+            "settings": self.plan.settings.evaluation,
+            "rows": rows,
+            "comparisons": comparisons,
+            "causes": self.cause_rows(),
+            "noise_sweep": sweep,
+        });
+        run.write("summary.json", format!("{}\n", serde_json::to_string_pretty(&json)?).as_bytes())?;
+        run.write("summary.csv", &csv_of(&rows)?)?;
+        if !comparisons.is_empty() {
+            run.write("comparisons.csv", &csv_of(&comparisons)?)?;
         }
-        run.write("evaluation.csv", &csv.into_inner()?)
+        if self.levels().len() > 1 {
+            run.write("noise_sweep.csv", &csv_of(&sweep)?)?;
+        }
+        Ok(())
     }
 
-    /// Driver by lot (generated lots of one kind together), the paper's rows below.
+    /// All tables.
     pub fn to_markdown(&self) -> String {
-        let header = [
+        let mut text = String::new();
+        for (level, noise) in self.levels().iter().enumerate() {
+            let has_paper = *noise == NoiseChoice::Paper;
+            let _ = write!(text, "Near-collisions, noise {noise}\n\n{}\n\n", self.rates_table(level, has_paper));
+            let _ = write!(text, "Safe ratio, noise {noise}\n\n{}\n\n", self.safe_ratio_table(level, has_paper));
+            let _ = write!(text, "How they drove, noise {noise}\n\n{}\n\n", self.driving_table(level));
+            if self.plan.entries.len() > 1 {
+                let with = self.driver(self.plan.compare_with);
+                let table = self.comparison_table(level);
+                let _ = write!(text, "Compared with {with} (others − {with}), noise {noise}\n\n{table}\n\n");
+            }
+            if let Some(table) = self.causes_table(level) {
+                let _ = write!(text, "Causes of near-collisions, noise {noise}\n\n{table}\n\n");
+            }
+        }
+        if self.levels().len() > 1 {
+            let _ = write!(text, "Near-collisions per 100 m against noise\n\n{}\n\n", self.sweep_table());
+        }
+        let EvaluationSettings { seed, trials, .. } = &self.plan.settings.evaluation;
+        let _ = write!(
+            text,
+            "Trials per lot and direction: {trials}, seed: {}. Intervals of 95 %: exact Poisson, or (b) paired bootstrap \
+             ({DRAWS} draws over lot, direction, seed) where the dispersion exceeds {DISPERSION_MAX} and events cannot be \
+             taken for independent; safe ratios and differences: bootstrap; * = excludes zero; p: exact test of equal \
+             rates, and after Holm. Rates are per length of the route: for runs given up early they are too low.",
+            seed.0
+        );
+        text
+    }
+
+    fn levels(&self) -> &[NoiseChoice] {
+        &self.plan.settings.evaluation.noise
+    }
+
+    fn driver(&self, index: usize) -> &str {
+        &self.plan.entries[index].contestant.name
+    }
+
+    fn at_level(&self, level: usize) -> impl Iterator<Item = &Judged> {
+        self.judged.iter().filter(move |judged| judged.level == level)
+    }
+
+    /// Driver by driver, scope by scope, where anything was driven.
+    fn standings(&self, level: usize) -> impl Iterator<Item = (usize, &Judged, Totals)> {
+        (0..self.plan.entries.len()).flat_map(move |driver| {
+            self.at_level(level).filter_map(move |judged| {
+                let totals = self.ledger.totals(level, driver, &judged.scope, None);
+                (totals.runs > 0).then_some((driver, judged, totals))
+            })
+        })
+    }
+
+    /// The paper's rows of the lots that were driven.
+    fn paper_rows(&self) -> impl Iterator<Item = &'static PaperRow> {
+        PAPER.iter().filter(|paper| self.ledger.families().iter().any(|family| family.name == paper.lot))
+    }
+
+    fn rates_table(&self, level: usize, has_paper: bool) -> Table {
+        let mut table = table_of(&[
             "driver",
-            "lot",
+            "lots",
             "route",
             "near-collisions (→, ←)",
             "per 100 m [95 %]",
-            "safe ratio",
+            "unweighted",
+            "dispersion",
+        ]);
+        for (driver, judged, totals) in self.standings(level) {
+            let way = |direction| {
+                let totals = self.ledger.totals(level, driver, &judged.scope, Some(direction));
+                if totals.runs == 0 { "–".to_owned() } else { totals.near_collisions.to_string() }
+            };
+            let [forward, reverse] = Direction::BOTH.map(way);
+            let standing = &judged.standings[driver];
+            table.add_row([
+                self.driver(driver).to_owned(),
+                judged.scope.label.clone(),
+                format!("{:.0} m", totals.reference_m),
+                format!("{} ({forward}, {reverse})", totals.near_collisions),
+                quoted_rate(&totals, standing),
+                self.unweighted(level, driver, &judged.scope, 0, 2),
+                standing.dispersion.map_or_else(|| "–".to_owned(), |dispersion| format!("{:.1}", dispersion.index)),
+            ]);
+        }
+        for paper in self.paper_rows().filter(|_| has_paper) {
+            let metres = 10.0 * paper.length_m;
+            table.add_row([
+                "paper: DAgger".to_owned(),
+                paper.lot.to_owned(),
+                format!("{metres:.0} m"),
+                "0 (0, 0)".to_owned(),
+                exact_rate(0, metres),
+                String::new(),
+                "–".to_owned(),
+            ]);
+        }
+        table
+    }
+
+    fn safe_ratio_table(&self, level: usize, has_paper: bool) -> Table {
+        let mut table = table_of(&["driver", "lots", "runs", "safe ratio [95 %]", "unweighted"]);
+        for (driver, judged, totals) in self.standings(level) {
+            let interval = judged.standings[driver].safe_ratio;
+            let interval = interval.map_or_else(String::new, |i| format!(" [{:.3}, {:.3}]", i.lower, i.upper));
+            table.add_row([
+                self.driver(driver).to_owned(),
+                judged.scope.label.clone(),
+                totals.runs.to_string(),
+                format!("{:.3}{interval}", totals.safe_ratio()),
+                self.unweighted(level, driver, &judged.scope, 1, 3),
+            ]);
+        }
+        for paper in self.paper_rows().filter(|_| has_paper) {
+            let ratio = format!("{:.2}", paper.dagger_safe_ratio);
+            table.add_row(["paper: DAgger".to_owned(), paper.lot.to_owned(), "10".to_owned(), ratio, String::new()]);
+        }
+        table
+    }
+
+    /// The mean over lots and directions with equal weights; empty where there is nothing to weigh.
+    fn unweighted(&self, level: usize, driver: usize, scope: &Scope, which: usize, digits: usize) -> String {
+        if scope.is_pooled() {
+            format!("{:.digits$}", self.ledger.unweighted(level, driver, scope)[which])
+        } else {
+            String::new()
+        }
+    }
+
+    fn driving_table(&self, level: usize) -> Table {
+        let mut table = table_of(&[
+            "driver",
+            "lots",
             "contacts",
             "stuck",
             "timed out",
             "given up",
             "m/s",
-        ];
-        let mut table = markdown(header.map(str::to_owned).to_vec());
-        let families = self.cells.families();
-        for driver in self.cells.drivers() {
-            for family in families.iter().copied().map(Some).chain((families.len() > 1).then_some(None)) {
-                table.add_row(self.markdown_row(driver, family));
-            }
+            "least clearance m",
+            "reversals /100 m",
+            "steering rad/100 m",
+        ]);
+        for (driver, judged, totals) in self.standings(level) {
+            table.add_row([
+                self.driver(driver).to_owned(),
+                judged.scope.label.clone(),
+                totals.contacts.to_string(),
+                totals.stuck.to_string(),
+                totals.timed_out.to_string(),
+                totals.given_up.to_string(),
+                format!("{:.2}", totals.mean_speed_mps()),
+                totals.clearance_min_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2}")),
+                format!("{:.1}", totals.reversals_per_100m()),
+                format!("{:.1}", totals.effort_rad_per_100m()),
+            ]);
         }
-        for paper in PAPER.iter().filter(|paper| families.contains(&paper.lot)) {
-            table.add_row(paper_row(paper));
-        }
-        let EvaluationSettings { seed, trials, noise, .. } = self.settings;
-        format!("{table}\n\nTrials per lot and direction: {trials}, noise: {}, seed: {}.", noise.name(), seed.0)
+        table
     }
 
-    /// A driver on a family of lots, or on all.
-    fn markdown_row(&self, driver: &str, family: Option<&str>) -> Vec<String> {
-        let is_here = |cell: &Cell| cell.driver == driver && family.is_none_or(|family| cell.family == family);
-        let totals = self.cells.pooled(is_here);
-        let [forward, reverse] = Direction::BOTH.map(|direction| {
-            let way = self.cells.pooled(|cell| is_here(cell) && cell.direction == direction);
-            if way.runs == 0 { "–".to_owned() } else { way.near_collisions.to_string() }
-        });
-        vec![
-            driver.to_owned(),
-            family.map_or_else(|| "all".to_owned(), |family| self.cells.family_label(family)),
-            format!("{:.0} m", totals.reference_m),
-            format!("{} ({forward}, {reverse})", totals.near_collisions),
-            with_interval(&totals.rate()),
-            format!("{:.3}", totals.safe_ratio()),
-            totals.contacts.to_string(),
-            totals.stuck.to_string(),
-            totals.timed_out.to_string(),
-            totals.given_up.to_string(),
-            format!("{:.2}", totals.mean_speed_mps()),
-        ]
+    fn comparison_table(&self, level: usize) -> Table {
+        let mut table = table_of(&[
+            "driver",
+            "lots",
+            "Δ per 100 m [95 %]",
+            "rate ratio [95 %]",
+            "p",
+            "p Holm",
+            "Δ safe ratio [95 %]",
+        ]);
+        for driver in 0..self.plan.entries.len() {
+            for judged in self.at_level(level) {
+                for comparison in judged.comparisons.iter().filter(|comparison| comparison.driver == driver) {
+                    let ratio = &comparison.ratio;
+                    let number =
+                        |value: Option<f64>| value.map_or_else(|| "∞".to_owned(), |value| format!("{value:.2}"));
+                    table.add_row([
+                        self.driver(driver).to_owned(),
+                        judged.scope.label.clone(),
+                        difference(comparison.difference_per_100m, 2),
+                        match ratio.ratio {
+                            Some(value) => format!("{value:.2} [{:.2}, {}]", ratio.lower, number(ratio.upper)),
+                            None => format!("– [{:.2}, {}]", ratio.lower, number(ratio.upper)),
+                        },
+                        p_value(ratio.p_value),
+                        p_value(comparison.p_holm),
+                        difference(comparison.difference_safe_ratio, 3),
+                    ]);
+                }
+            }
+        }
+        table
     }
 
-    /// Every cell, then every driver's lots with both directions, then its sum.
-    fn rows(&self) -> Vec<Row<'_>> {
-        let mut rows: Vec<Row<'_>> = self
-            .cells
-            .0
-            .iter()
-            .map(|Cell { driver, lot, direction, totals, .. }| Row::new(driver, lot, name(*direction), totals))
-            .collect();
-        for driver in self.cells.drivers() {
-            for lot in self.cells.lots() {
-                rows.push(Row::new(
-                    driver,
-                    lot,
-                    "both",
-                    &self.cells.pooled(|cell| cell.driver == driver && cell.lot == lot),
-                ));
+    fn causes_table(&self, level: usize) -> Option<Table> {
+        let mut header = vec!["driver", "lots"];
+        header.extend(Cause::ALL.map(Cause::name));
+        let mut table = table_of(&header);
+        for (driver, judged, totals) in self.standings(level).filter(|(.., totals)| totals.near_collisions > 0) {
+            let count = |cause| self.ledger.count_of_cause(level, driver, &judged.scope, cause);
+            let share = |cause| format!("{:.0} %", 100.0 * f64::from(count(cause)) / f64::from(totals.near_collisions));
+            let mut row = vec![self.driver(driver).to_owned(), judged.scope.label.clone()];
+            row.extend(Cause::ALL.map(|cause| format!("{} ({})", count(cause), share(cause))));
+            table.add_row(row);
+        }
+        (table.row_count() > 0).then_some(table)
+    }
+
+    fn sweep_table(&self) -> Table {
+        let mut header = vec!["driver".to_owned(), "lots".to_owned()];
+        header.extend(self.levels().iter().map(|noise| format!("noise {noise}")));
+        let mut table = markdown(header);
+        for driver in 0..self.plan.entries.len() {
+            for scope in Scope::all_of(self.ledger) {
+                let rate = |level| {
+                    let totals = self.ledger.totals(level, driver, &scope, None);
+                    if totals.runs == 0 {
+                        "–".to_owned()
+                    } else {
+                        exact_rate(totals.near_collisions, totals.reference_m)
+                    }
+                };
+                let mut row = vec![self.driver(driver).to_owned(), scope.label.clone()];
+                row.extend((0..self.levels().len()).map(rate));
+                table.add_row(row);
             }
-            rows.push(Row::new(driver, "all", "both", &self.cells.pooled(|cell| cell.driver == driver)));
+        }
+        table
+    }
+
+    fn rows(&self) -> Vec<Row> {
+        let ways = [("both", None), ("forward", Some(Direction::Forward)), ("reverse", Some(Direction::Reverse))];
+        let mut rows = Vec::new();
+        for level in 0..self.levels().len() {
+            for (driver, judged, _) in self.standings(level) {
+                for (name, direction) in ways {
+                    let totals = self.ledger.totals(level, driver, &judged.scope, direction);
+                    if totals.runs > 0 {
+                        rows.push(self.row(driver, judged, name, &totals));
+                    }
+                }
+            }
         }
         rows
     }
-}
 
-impl<'a> Row<'a> {
-    fn new(driver: &'a str, lot: &'a str, direction: &'a str, totals: &Totals) -> Self {
+    fn row(&self, driver: usize, judged: &Judged, direction: &'static str, totals: &Totals) -> Row {
         let rate = totals.rate();
-        Self {
-            driver,
-            lot,
+        // Resampled and weighed is only the whole.
+        let is_whole = direction == "both";
+        let standing = if is_whole { judged.standings[driver].clone() } else { Standing::default() };
+        let unweighted =
+            (is_whole && judged.scope.is_pooled()).then(|| self.ledger.unweighted(judged.level, driver, &judged.scope));
+        Row {
+            driver: self.driver(driver).to_owned(),
+            noise: self.levels()[judged.level],
+            lots: judged.scope.label.clone(),
             direction,
             runs: totals.runs,
             reference_m: totals.reference_m,
+            driven_m: totals.driven_m,
             near_collisions: totals.near_collisions,
-            near_collisions_per_100m: rate.per_unit,
-            lower_95: rate.lower,
-            upper_95: rate.upper,
+            per_100m: rate.per_unit,
+            garwood_lower: rate.lower,
+            garwood_upper: rate.upper,
+            one_sided_upper: bound_per_100m(totals.near_collisions, totals.reference_m),
+            bootstrap_lower: standing.per_100m.map(|interval| interval.lower),
+            bootstrap_upper: standing.per_100m.map(|interval| interval.upper),
+            dispersion: standing.dispersion.map(|dispersion| dispersion.index),
+            dispersion_p: standing.dispersion.map(|dispersion| dispersion.p_value),
+            per_100m_unweighted: unweighted.map(|[rate, _]| rate),
             safe_ratio: totals.safe_ratio(),
+            safe_ratio_lower: standing.safe_ratio.map(|interval| interval.lower),
+            safe_ratio_upper: standing.safe_ratio.map(|interval| interval.upper),
+            safe_ratio_unweighted: unweighted.map(|[_, safe_ratio]| safe_ratio),
             contacts: totals.contacts,
             stuck: totals.stuck,
             timed_out: totals.timed_out,
             given_up: totals.given_up,
             mean_speed_mps: totals.mean_speed_mps(),
             clearance_min_m: totals.clearance_min_m,
-            steering_reversals: totals.steering_reversals,
+            steering_reversals_per_100m: totals.reversals_per_100m(),
+            steering_effort_rad_per_100m: totals.effort_rad_per_100m(),
         }
+    }
+
+    fn comparison_rows(&self) -> Vec<ComparisonRow> {
+        let row = |judged: &Judged, comparison: &Comparison| ComparisonRow {
+            driver: self.driver(comparison.driver).to_owned(),
+            compared_with: self.driver(self.plan.compare_with).to_owned(),
+            noise: self.levels()[judged.level],
+            lots: judged.scope.label.clone(),
+            pairs: comparison.pairs,
+            difference_per_100m: comparison.difference_per_100m.map(|interval| interval.estimate),
+            difference_lower: comparison.difference_per_100m.map(|interval| interval.lower),
+            difference_upper: comparison.difference_per_100m.map(|interval| interval.upper),
+            excludes_zero: comparison.difference_per_100m.map(|interval| interval.excludes_zero()),
+            ratio: comparison.ratio.ratio,
+            ratio_lower: comparison.ratio.lower,
+            ratio_upper: comparison.ratio.upper,
+            p_value: comparison.ratio.p_value,
+            p_holm: comparison.p_holm,
+            difference_safe_ratio: comparison.difference_safe_ratio.map(|interval| interval.estimate),
+            difference_safe_ratio_lower: comparison.difference_safe_ratio.map(|interval| interval.lower),
+            difference_safe_ratio_upper: comparison.difference_safe_ratio.map(|interval| interval.upper),
+        };
+        let rows = self.judged.iter().flat_map(|judged| judged.comparisons.iter().map(move |c| (judged, c)));
+        rows.map(|(judged, comparison)| row(judged, comparison)).collect()
+    }
+
+    fn sweep_rows(&self) -> Vec<SweepRow> {
+        let mut rows = Vec::new();
+        for (level, &noise) in self.levels().iter().enumerate() {
+            for (driver, judged, totals) in self.standings(level) {
+                let rate = totals.rate();
+                rows.push(SweepRow {
+                    driver: self.driver(driver).to_owned(),
+                    lots: judged.scope.label.clone(),
+                    noise,
+                    times_paper: noise.times_paper(),
+                    reference_m: totals.reference_m,
+                    near_collisions: totals.near_collisions,
+                    per_100m: rate.per_unit,
+                    lower: rate.lower,
+                    upper: rate.upper,
+                    safe_ratio: totals.safe_ratio(),
+                });
+            }
+        }
+        rows
+    }
+
+    fn cause_rows(&self) -> Vec<CauseRow> {
+        let mut rows = Vec::new();
+        for (level, &noise) in self.levels().iter().enumerate() {
+            for (driver, judged, _) in self.standings(level) {
+                rows.extend(Cause::ALL.map(|cause| CauseRow {
+                    driver: self.driver(driver).to_owned(),
+                    noise,
+                    lots: judged.scope.label.clone(),
+                    cause,
+                    near_collisions: self.ledger.count_of_cause(level, driver, &judged.scope, cause),
+                }));
+            }
+        }
+        rows
     }
 }
 
-fn paper_row(paper: &PaperRow) -> Vec<String> {
-    let metres = 10.0 * paper.length_m;
-    let unknown = || "–".to_owned();
-    vec![
-        "paper: DAgger".to_owned(),
-        paper.lot.to_owned(),
-        format!("{metres:.0} m"),
-        "0 (0, 0)".to_owned(),
-        with_interval(&Rate::new(0, metres / 100.0)),
-        format!("{:.2}", paper.dagger_safe_ratio),
-        unknown(),
-        unknown(),
-        unknown(),
-        unknown(),
-        unknown(),
-    ]
+fn csv_of(rows: &[impl Serialize]) -> anyhow::Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        csv.serialize(row)?;
+    }
+    Ok(csv.into_inner()?)
 }
 
-fn with_interval(rate: &Rate) -> String {
-    format!("{:.2} [{:.2}, {:.2}]", rate.per_unit, rate.lower, rate.upper)
+/// The rate with the interval that may be quoted (methods.md 8.3).
+fn quoted_rate(totals: &Totals, standing: &Standing) -> String {
+    let is_clustered = standing.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
+    match standing.per_100m.filter(|_| is_clustered) {
+        Some(Interval { lower, upper, .. }) => {
+            format!("{:.2} [{lower:.2}, {upper:.2}] (b)", totals.rate().per_unit)
+        }
+        None => exact_rate(totals.near_collisions, totals.reference_m),
+    }
+}
+
+/// The rate with its exact interval; for a count of zero the bound it really supports.
+fn exact_rate(near_collisions: u32, reference_m: f64) -> String {
+    let rate = Rate::new(near_collisions, reference_m / 100.0);
+    let interval = format!("{:.2} [{:.2}, {:.2}]", rate.per_unit, rate.lower, rate.upper);
+    if near_collisions > 0 {
+        return interval;
+    }
+    format!("{interval}, < {:.3} one-sided", bound_per_100m(0, reference_m))
+}
+
+fn bound_per_100m(near_collisions: u32, reference_m: f64) -> f64 {
+    100.0 * upper_bound(near_collisions, CONFIDENCE) / reference_m
+}
+
+fn difference(interval: Option<Interval>, digits: usize) -> String {
+    interval.map_or_else(
+        || "–".to_owned(),
+        |interval| {
+            let Interval { estimate, lower, upper } = interval;
+            let mark = if interval.excludes_zero() { " *" } else { "" };
+            format!("{estimate:+.digits$} [{lower:+.digits$}, {upper:+.digits$}]{mark}")
+        },
+    )
+}
+
+fn p_value(p: f64) -> String {
+    if p < 1e-4 { "< .0001".to_owned() } else { format!("{p:.4}") }
 }
 
 /// A direction in tables.
@@ -218,5 +617,28 @@ pub fn name(direction: Direction) -> &'static str {
     match direction {
         Direction::Forward => "forward",
         Direction::Reverse => "reverse",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_zero_says_what_it_supports_and_clusters_are_quoted_by_the_bootstrap() {
+        assert_eq!(exact_rate(0, 5180.0), "0.00 [0.00, 0.07], < 0.058 one-sided");
+        assert_eq!(exact_rate(71, 5180.0), "1.37 [1.07, 1.73]");
+        let totals = Totals { near_collisions: 71, reference_m: 5180.0, ..Totals::default() };
+        let interval = Interval { estimate: 1.37, lower: 0.9, upper: 2.0 };
+        let standing = |index| Standing {
+            dispersion: Some(crate::statistics::poisson::Dispersion { index, freedom: 9, p_value: 0.1 }),
+            per_100m: Some(interval),
+            safe_ratio: None,
+        };
+        assert_eq!(quoted_rate(&totals, &standing(1.5)), "1.37 [1.07, 1.73]");
+        assert_eq!(quoted_rate(&totals, &standing(1.6)), "1.37 [0.90, 2.00] (b)");
+        assert_eq!(difference(Some(interval), 1), "+1.4 [+0.9, +2.0] *");
+        let around_zero = Interval { lower: -0.1, ..interval };
+        assert_eq!(difference(Some(around_zero), 1), "+1.4 [-0.1, +2.0]");
     }
 }

@@ -6,7 +6,8 @@
 //!   settings.toml      every setting
 //!   round-00/ …        data, network and loss curve of each round (policy::dataset::store)
 //!   table1.md .json    the paper's table from this run
-//!   evaluation.md .json .csv, episodes.jsonl
+//!   summary.md .json .csv, comparisons.csv, noise_sweep.csv, runs.jsonl, failures.md .jsonl     (evaluate)
+//!   wall_time.jsonl    the only file that differs from one repetition to the next, but for the manifest
 //!   finished.toml      written last
 //! ```
 
@@ -132,15 +133,7 @@ pub fn write_whole(path: &Path, content: &[u8]) -> anyhow::Result<()> {
 /// # Errors
 /// If there is no run, or no network in it yet.
 pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
-    let (run, is_bc) = match (spec.file_name(), spec.parent()) {
-        (Some(name), Some(run)) if name == "bc" && !spec.is_dir() => (run, true),
-        _ => (spec, false),
-    };
-    ensure!(
-        run.join(SETTINGS).is_file(),
-        "{}: this is no run; train one with cargo xtask train-dagger, or list the folders in runs/",
-        run.display()
-    );
+    let (run, is_bc) = run_of(spec)?;
     let last = if is_bc {
         Some(run.join("round-00"))
     } else {
@@ -156,6 +149,28 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
     };
     last.filter(|path| Checkpoint::exists(path))
         .with_context(|| format!("{}: no network is trained there yet; finish it with --resume {0}", run.display()))
+}
+
+/// The settings of the run that `run:DIR` or `run:DIR/bc` names.
+///
+/// # Errors
+/// If there is no run, or its settings are not of this program.
+pub fn settings_of(spec: &Path) -> anyhow::Result<Settings> {
+    Settings::read(&run_of(spec)?.0.join(SETTINGS))
+}
+
+/// The folder of the run, and whether its behaviour cloning is meant.
+fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
+    let (run, is_bc) = match (spec.file_name(), spec.parent()) {
+        (Some(name), Some(run)) if name == "bc" && !spec.is_dir() => (run, true),
+        _ => (spec, false),
+    };
+    ensure!(
+        run.join(SETTINGS).is_file(),
+        "{}: this is no run; train one with cargo xtask train-dagger, or list the folders in runs/",
+        run.display()
+    );
+    Ok((run, is_bc))
 }
 
 fn claim_named(path: &Path, overwrite: bool) -> anyhow::Result<PathBuf> {

@@ -4,6 +4,7 @@
 //! written into the folder of a run before its first step.
 
 mod layers;
+mod noise;
 mod presets;
 
 use crate::cli::LayerArgs;
@@ -12,10 +13,11 @@ use expert::ExpertConfig;
 use policy::dagger::DaggerConfig;
 use serde::{Deserialize, Serialize};
 use sim::episode::EpisodeConfig;
-use sim::scenario::{Direction, NoiseLevel};
+use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::path::Path;
 
+pub use noise::{NOISE_MAX, NoiseChoice};
 pub use presets::PRESETS;
 
 /// Everything that decides the outcome of a run.
@@ -63,44 +65,9 @@ pub struct EvaluationSettings {
     pub directions: Vec<Direction>,
     /// Times every lot is driven in each direction (paper: five).
     pub trials: u32,
-    /// What is seen wrongly.
-    pub noise: NoiseChoice,
-}
-
-/// Sensor noise of an episode.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum NoiseChoice {
-    /// None.
-    Clean,
-    /// About 98 % of the pixels right.
-    Paper,
-    /// Twice the errors of `paper`.
-    Hard,
-    /// The level the lot asks for.
-    Lot,
-}
-
-impl NoiseChoice {
-    /// The level on a lot.
-    pub fn level(self, of_lot: NoiseLevel) -> NoiseLevel {
-        match self {
-            Self::Clean => NoiseLevel::Clean,
-            Self::Paper => NoiseLevel::Paper,
-            Self::Hard => NoiseLevel::Hard,
-            Self::Lot => of_lot,
-        }
-    }
-
-    /// Its name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Clean => "clean",
-            Self::Paper => "paper",
-            Self::Hard => "hard",
-            Self::Lot => "lot",
-        }
-    }
+    /// What is seen wrongly: one level, or several to be compared.
+    #[serde(deserialize_with = "noise::one_or_many")]
+    pub noise: Vec<NoiseChoice>,
 }
 
 impl Settings {
@@ -109,8 +76,15 @@ impl Settings {
     /// # Errors
     /// Naming what is wrong in which layer.
     pub fn resolve(layers: &LayerArgs, seed: Option<u64>) -> anyhow::Result<Self> {
-        let preset = Self::preset(&layers.preset)?;
-        let mut settings = layers::apply(&preset, layers.config.as_deref(), &layers.overrides)?;
+        Self::resolve_over(&Self::preset(layers.preset_name())?, layers, seed)
+    }
+
+    /// The same over other settings than a preset's, e.g. a run's own.
+    ///
+    /// # Errors
+    /// Naming what is wrong in which layer.
+    pub fn resolve_over(base: &Self, layers: &LayerArgs, seed: Option<u64>) -> anyhow::Result<Self> {
+        let mut settings = layers::apply(base, layers.config.as_deref(), &layers.overrides)?;
         if let Some(seed) = seed {
             settings.seed = RootSeed(seed);
         }
@@ -167,6 +141,17 @@ impl Settings {
             ensure!(!lots.is_empty(), "{section}.lots is empty; name at least one lot (cargo xtask lots)");
             ensure!(!directions.is_empty(), "{section}.directions is empty; name \"forward\", \"reverse\" or both");
             ensure!(trials > 0, "{section}.trials is 0; at least one is needed");
+        }
+        let noise = &self.evaluation.noise;
+        ensure!(
+            !noise.is_empty(),
+            "evaluation.noise is empty; name at least one level (clean, paper, hard, lot, 0.5 …)"
+        );
+        for (i, level) in noise.iter().enumerate() {
+            ensure!(
+                !noise[..i].contains(level),
+                "evaluation.noise names {level} twice; results are told apart by level"
+            );
         }
         let (physics, control) = (self.episode.physics_step_ms, self.episode.control_period_ms);
         ensure!(

@@ -1,10 +1,18 @@
-//! Runs pooled: counts, rates and their intervals (methods.md 8).
+//! Runs pooled: counts, rates and what they say about the drivers (methods.md 8).
 
+mod scopes;
+
+pub use scopes::{Comparison, Scope, Standing};
+
+use crate::evaluate::Plan;
+use crate::failures::Cause;
 use crate::lots::Lot;
+use crate::statistics::poisson::Rate;
+use crate::trials::Job;
 use serde::Serialize;
 use sim::episode::{Ending, EpisodeReport};
 use sim::scenario::Direction;
-use statrs::distribution::{ChiSquared, ContinuousCDF as _};
+use std::collections::BTreeMap;
 
 /// Sums over runs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -33,6 +41,8 @@ pub struct Totals {
     pub clearance_min_m: Option<f32>,
     /// Changes of the steering direction.
     pub steering_reversals: u32,
+    /// Road-wheel angle steered, radians.
+    pub steering_effort_rad: f64,
 }
 
 impl Totals {
@@ -51,6 +61,7 @@ impl Totals {
         self.safe_ratio_sum += f64::from(metrics.safe_ratio);
         self.clearance_min_m = smaller(self.clearance_min_m, Some(metrics.clearance_min_m));
         self.steering_reversals += metrics.steering_reversals;
+        self.steering_effort_rad += f64::from(metrics.steering_effort_rad);
     }
 
     /// Adds other sums.
@@ -67,6 +78,7 @@ impl Totals {
         self.safe_ratio_sum += other.safe_ratio_sum;
         self.clearance_min_m = smaller(self.clearance_min_m, other.clearance_min_m);
         self.steering_reversals += other.steering_reversals;
+        self.steering_effort_rad += other.steering_effort_rad;
     }
 
     /// Near-collisions per 100 m of route with their interval.
@@ -79,6 +91,16 @@ impl Totals {
         self.safe_ratio_sum / f64::from(self.runs.max(1))
     }
 
+    /// Steering reversals per 100 m driven: the paper's oscillation as a number.
+    pub fn reversals_per_100m(&self) -> f64 {
+        100.0 * f64::from(self.steering_reversals) / self.driven_m.max(f64::MIN_POSITIVE)
+    }
+
+    /// Road-wheel angle steered per 100 m driven, radians.
+    pub fn effort_rad_per_100m(&self) -> f64 {
+        100.0 * self.steering_effort_rad / self.driven_m.max(f64::MIN_POSITIVE)
+    }
+
     /// Driven way per simulated time, m/s.
     pub fn mean_speed_mps(&self) -> f64 {
         self.driven_m / self.duration_s.max(f64::MIN_POSITIVE)
@@ -89,145 +111,147 @@ fn smaller(a: Option<f32>, b: Option<f32>) -> Option<f32> {
     [a, b].into_iter().flatten().filter(|value| value.is_finite()).min_by(f32::total_cmp)
 }
 
-/// Events per exposure with the exact Poisson 95 % interval of Garwood.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Rate {
-    /// Events per unit of exposure.
-    pub per_unit: f64,
-    /// Lower end of the interval.
-    pub lower: f64,
-    /// Upper end of the interval.
-    pub upper: f64,
+/// Lots that share a row of the tables: a lot by itself, or all generated lots of one kind.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Family {
+    /// As [`Lot::family`].
+    pub name: String,
+    /// Lots in it.
+    pub lots: usize,
+    /// Whether drivers were trained on it.
+    pub is_trained_on: bool,
 }
 
-impl Rate {
-    /// `[½χ²(.025; 2n), ½χ²(.975; 2n + 2)] / exposure`.
-    pub fn new(events: u32, exposure: f64) -> Self {
-        let half_quantile = |probability, freedom: u32| {
-            0.5 * ChiSquared::new(f64::from(freedom)).map_or(0.0, |chi2| chi2.inverse_cdf(probability))
+impl Family {
+    /// Its name in tables.
+    pub fn label(&self) -> String {
+        if self.lots == 1 { self.name.clone() } else { format!("{} ({} lots)", self.name, self.lots) }
+    }
+}
+
+/// One run, as far as it is kept: the bootstrap needs every one of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Unit {
+    job: u32,
+    family: u32,
+    /// Units of one cluster are resampled together.
+    cluster: u32,
+    near_collisions: u32,
+    reference_m: f32,
+    safe_ratio: f32,
+}
+
+/// One driver at one noise level.
+#[derive(Debug, Clone, Default)]
+struct Account {
+    /// In the order of the jobs.
+    units: Vec<Unit>,
+    /// By family and direction.
+    totals: BTreeMap<(u32, Direction), Totals>,
+    /// By family.
+    causes: BTreeMap<(u32, Cause), u32>,
+}
+
+/// Everything that is kept of an evaluation: sums, and 24 bytes per run.
+#[derive(Debug)]
+pub struct Ledger {
+    families: Vec<Family>,
+    /// Family and cluster of a lot by name; no cluster where every run is one.
+    lots: BTreeMap<String, (u32, Option<u32>)>,
+    /// By noise level, then by driver.
+    accounts: Vec<Vec<Account>>,
+}
+
+impl Ledger {
+    /// Nothing driven yet.
+    pub fn new(plan: &Plan<'_>) -> Self {
+        // Specs that no longer stand for anything (a file that moved) were trained on by nobody here.
+        let trained_on: Vec<String> = plan
+            .settings
+            .training
+            .lots
+            .iter()
+            .filter_map(|spec| Lot::parse_all(&[spec]).ok())
+            .flatten()
+            .map(|lot| lot.family())
+            .collect();
+        let mut ledger = Self {
+            families: Vec::new(),
+            lots: BTreeMap::new(),
+            accounts: vec![vec![Account::default(); plan.entries.len()]; plan.settings.evaluation.noise.len()],
         };
-        let lower = if events == 0 { 0.0 } else { half_quantile(0.025, 2 * events) };
-        let upper = half_quantile(0.975, 2 * events + 2);
-        Self { per_unit: f64::from(events) / exposure, lower: lower / exposure, upper: upper / exposure }
-    }
-}
-
-/// One driver on one lot in one direction.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Cell {
-    /// Who drove.
-    pub driver: String,
-    /// Where.
-    pub lot: String,
-    /// The row of the printed table the lot belongs to.
-    pub family: String,
-    /// Which way.
-    pub direction: Direction,
-    /// What came of it.
-    pub totals: Totals,
-}
-
-/// Cells in the order in which they were first met.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Cells(pub Vec<Cell>);
-
-impl Cells {
-    /// Takes one run into account.
-    pub fn add(&mut self, driver: &str, lot: &Lot, direction: Direction, report: &EpisodeReport) {
-        let is_it = |cell: &Cell| cell.driver == driver && cell.lot == lot.name() && cell.direction == direction;
-        let index = self.0.iter().position(is_it).unwrap_or_else(|| {
-            self.0.push(Cell {
-                driver: driver.to_owned(),
-                lot: lot.name().to_owned(),
-                family: lot.family(),
-                direction,
-                totals: Totals::default(),
+        for (index, lot) in plan.lots.iter().enumerate() {
+            let name = lot.family();
+            let family = ledger.families.iter().position(|family| family.name == name).unwrap_or_else(|| {
+                let is_trained_on = trained_on.contains(&name);
+                ledger.families.push(Family { name, lots: 0, is_trained_on });
+                ledger.families.len() - 1
             });
-            self.0.len() - 1
+            ledger.families[family].lots += 1;
+            let cluster = lot.is_generated().then_some(index as u32);
+            ledger.lots.insert(lot.name().to_owned(), (family as u32, cluster));
+        }
+        ledger
+    }
+
+    /// Takes a run into account: which level and driver of the plan, which of its jobs. Jobs come in order.
+    pub fn add(&mut self, level: usize, driver: usize, job_index: usize, job: &Job<'_>, report: &EpisodeReport) {
+        let (family, cluster) = self.lots[job.lot.name()];
+        let account = &mut self.accounts[level][driver];
+        account.totals.entry((family, job.direction)).or_default().add(report);
+        let metrics = &report.metrics;
+        account.units.push(Unit {
+            job: job_index as u32,
+            family,
+            // Behind the lots, of which each can be a cluster.
+            cluster: cluster.unwrap_or(self.lots.len() as u32 + job_index as u32),
+            near_collisions: metrics.near_collisions,
+            reference_m: metrics.reference_m,
+            safe_ratio: metrics.safe_ratio,
         });
-        self.0[index].totals.add(report);
     }
 
-    /// Drivers, in order.
-    pub fn drivers(&self) -> Vec<&str> {
-        distinct(self.0.iter().map(|cell| cell.driver.as_str()))
+    /// Takes the cause of a near-collision into account.
+    pub fn add_cause(&mut self, level: usize, driver: usize, lot: &Lot, cause: Cause) {
+        let (family, _) = self.lots[lot.name()];
+        *self.accounts[level][driver].causes.entry((family, cause)).or_default() += 1;
     }
 
-    /// Lots, in order.
-    pub fn lots(&self) -> Vec<&str> {
-        distinct(self.0.iter().map(|cell| cell.lot.as_str()))
+    /// Families, in the order of the plan.
+    pub fn families(&self) -> &[Family] {
+        &self.families
     }
 
-    /// Families of lots, in order.
-    pub fn families(&self) -> Vec<&str> {
-        distinct(self.0.iter().map(|cell| cell.family.as_str()))
-    }
-
-    /// A family in tables: the name of its only lot, or how many there are.
-    pub fn family_label(&self, family: &str) -> String {
-        let lots = distinct(self.0.iter().filter(|cell| cell.family == family).map(|cell| cell.lot.as_str()));
-        match lots[..] {
-            [lot] => lot.to_owned(),
-            _ => format!("{family} ({} lots)", lots.len()),
+    /// Sums over a scope, in one direction or both.
+    pub fn totals(&self, level: usize, driver: usize, scope: &Scope, direction: Option<Direction>) -> Totals {
+        let mut sum = Totals::default();
+        for (&(family, way), totals) in &self.accounts[level][driver].totals {
+            if scope.contains(family) && direction.is_none_or(|direction| direction == way) {
+                sum.merge(totals);
+            }
         }
+        sum
     }
 
-    /// Sums over the cells that are wanted.
-    pub fn pooled(&self, wanted: impl Fn(&Cell) -> bool) -> Totals {
-        let mut totals = Totals::default();
-        self.0.iter().filter(|cell| wanted(cell)).for_each(|cell| totals.merge(&cell.totals));
-        totals
-    }
-}
-
-fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
-    let mut seen = Vec::new();
-    for name in names {
-        if !seen.contains(&name) {
-            seen.push(name);
+    /// Mean over (lot, direction) of the rate per 100 m and of the safe ratio, all with the same weight whatever their
+    /// length: the paper's "mean".
+    pub fn unweighted(&self, level: usize, driver: usize, scope: &Scope) -> [f64; 2] {
+        let cells = self.accounts[level][driver].totals.iter().filter(|((family, _), _)| scope.contains(*family));
+        let (mut n, mut rate, mut safe_ratio) = (0, 0.0, 0.0);
+        for (_, totals) in cells {
+            n += 1;
+            rate += totals.rate().per_unit;
+            safe_ratio += totals.safe_ratio();
         }
+        [rate, safe_ratio].map(|sum| sum / f64::from(n.max(1)))
     }
-    seen
+
+    /// Near-collisions of a cause within a scope.
+    pub fn count_of_cause(&self, level: usize, driver: usize, scope: &Scope, cause: Cause) -> u32 {
+        let counts = &self.accounts[level][driver].causes;
+        counts.iter().filter(|((family, of), _)| *of == cause && scope.contains(*family)).map(|(_, n)| n).sum()
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// methods.md 8.3: `DAgger` 0 in 51.8 → [0, .071]; tentacle 71 → [1.07, 1.73]; 13 in 11.55 → [.60, 1.92].
-    #[test]
-    fn garwood_intervals_of_methods_8_3() {
-        for (events, exposure, lower, upper) in
-            [(0, 51.8, 0.0, 0.071), (71, 51.8, 1.07, 1.73), (75, 51.8, 1.14, 1.81), (13, 11.55, 0.60, 1.92)]
-        {
-            let rate = Rate::new(events, exposure);
-            assert!((rate.lower - lower).abs() < 0.005 && (rate.upper - upper).abs() < 0.005, "{events}: {rate:?}");
-        }
-    }
-
-    #[test]
-    fn cells_pool_over_lots_and_directions() {
-        use sim::metrics::EpisodeMetrics;
-        let report = |near_collisions, safe_ratio| EpisodeReport {
-            ending: Ending::ReachedEnd,
-            metrics: EpisodeMetrics { near_collisions, safe_ratio, reference_m: 50.0, ..EpisodeMetrics::default() },
-            events: Vec::new(),
-        };
-        let lots = Lot::parse_all(&["lot-a", "lot-b", "test:2"]).unwrap();
-        let mut cells = Cells::default();
-        cells.add("x", &lots[0], Direction::Forward, &report(1, 0.5));
-        cells.add("x", &lots[0], Direction::Reverse, &report(2, 0.7));
-        cells.add("x", &lots[1], Direction::Forward, &report(4, 0.9));
-        cells.add("y", &lots[2], Direction::Forward, &report(8, 0.1));
-        cells.add("y", &lots[3], Direction::Forward, &report(8, 0.1));
-        assert_eq!(cells.drivers(), ["x", "y"]);
-        assert_eq!(cells.lots(), ["lot-a", "lot-b", "test-medium-0", "test-medium-1"]);
-        let labels: Vec<String> = cells.families().iter().map(|family| cells.family_label(family)).collect();
-        assert_eq!(labels, ["lot-a", "lot-b", "test-medium (2 lots)"]);
-        let on_a = cells.pooled(|cell| cell.driver == "x" && cell.lot == "lot-a");
-        assert_eq!((on_a.near_collisions, on_a.runs), (3, 2));
-        assert!((on_a.rate().per_unit - 3.0).abs() < 1e-9, "three in one hundred metres");
-        assert!((cells.pooled(|cell| cell.driver == "x").safe_ratio() - 0.7).abs() < 1e-6);
-        assert_eq!(cells.pooled(|cell| cell.family == "test-medium").near_collisions, 16);
-    }
-}
+mod tests;

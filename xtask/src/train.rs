@@ -2,7 +2,7 @@
 
 use crate::cli::TrainArgs;
 use crate::drivers::{self, Contestant};
-use crate::evaluate;
+use crate::evaluate::{self, Entry, Plan};
 use crate::interrupt::{self, Interrupted};
 use crate::lots::Lot;
 use crate::progress::{Stopwatch, Work};
@@ -54,7 +54,7 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
             out: args.out.as_deref(),
             overwrite: args.overwrite,
             command,
-            preset: &args.settings.layers.preset,
+            preset: args.settings.layers.preset_name(),
             seed: settings.seed.0,
         };
         (RunDir::create(&place, &settings)?, settings)
@@ -70,9 +70,11 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
         return Err(cut_short(run.path(), outcome.rows.len()));
     };
     if !args.no_eval {
-        let contestants = contestants(&run, policy, outcome.rows.len())?;
+        let entries = entries(&run, policy, outcome.rows.len())?;
         let lots = Lot::parse_all(&settings.evaluation.lots)?;
-        evaluate::measure(&settings, &contestants, &lots, &run, &mut stopwatch)?;
+        let plan = Plan { settings: &settings, entries: &entries, lots: &lots, compare_with: entries.len() - 1 };
+        plan.check()?;
+        evaluate::measure(&plan, &run, &mut stopwatch)?;
     }
     run.finish(&Finished { stop: outcome.stop, rounds: outcome.rows.len() })?;
     print_next_steps(run.path());
@@ -93,19 +95,23 @@ fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
 }
 
 /// Expert, behaviour cloning and what became of it.
-fn contestants(run: &RunDir, policy: Checkpoint, rounds: usize) -> anyhow::Result<Vec<Contestant>> {
+fn entries(run: &RunDir, policy: Checkpoint, rounds: usize) -> anyhow::Result<Vec<Entry>> {
+    let folder = run.path().display();
     let cloned = Checkpoint::load(&run.path().join("round-00")).context("behaviour cloning of this run")?;
-    let mut contestants = vec![Contestant::expert(), Contestant::network("BC", cloned)];
+    let mut entries = vec![
+        Entry { contestant: Contestant::expert(), spec: "expert".to_owned() },
+        Entry { contestant: Contestant::network("BC", cloned), spec: format!("run:{folder}/bc") },
+    ];
     if rounds > 1 {
-        contestants.push(Contestant::network("DAgger", policy));
+        entries.push(Entry { contestant: Contestant::network("DAgger", policy), spec: format!("run:{folder}") });
     }
-    Ok(contestants)
+    Ok(entries)
 }
 
 fn print_next_steps(path: &Path) {
     let path = path.display();
     println!("\nPolicy: {path} (the last round; model.safetensors opens in PyTorch)");
-    println!("Next:   cargo xtask evaluate --config {path}/settings.toml --driver run:{path} --seed 2");
+    println!("Next:   cargo xtask evaluate --driver run:{path} --seed 2");
 }
 
 /// Data sampling and training, with bars.

@@ -20,7 +20,6 @@ use sim::episode::{Episode, EpisodeConfig};
 use sim::map::Map;
 use sim::scenario::{Direction, Scenario};
 use sim::seed::{RootSeed, Stream};
-use sim::sensing::noise::NoiseConfig;
 use std::sync::Arc;
 
 /// What a trial is for.
@@ -118,33 +117,43 @@ impl<'a> Job<'a> {
     }
 }
 
-/// A car at the start of every job, in order. Neighbours that share obstacles draw them once: a generated lot is found
-/// by a search.
+/// The map of every job, in order. Neighbours that share obstacles draw them once: a generated lot is found by a search.
+///
+/// # Errors
+/// If a lot cannot be driven.
+pub fn maps(jobs: &[Job<'_>], settings: &Settings) -> anyhow::Result<Vec<Arc<Map>>> {
+    let neighbours: Vec<&[Job<'_>]> = jobs.chunk_by(Job::shares_obstacles_with).collect();
+    let maps = neighbours
+        .par_iter()
+        .map(|jobs| {
+            let drawn = jobs[0].lot.draw(jobs[0].seed).scenario;
+            jobs.par_iter().map(|job| Ok(Arc::new(job.map_of(drawn.clone(), &settings.episode)?))).collect()
+        })
+        .collect::<anyhow::Result<Vec<Vec<Arc<Map>>>>>()?;
+    Ok(maps.into_iter().flatten().collect())
+}
+
+/// A car at the start of every job, in order, on maps that several drivers may share.
+pub fn start(jobs: &[Job<'_>], maps: &[Arc<Map>], settings: &Settings, noise: NoiseChoice) -> Vec<Episode> {
+    let start = |(job, map): (&Job<'_>, &Arc<Map>)| {
+        let config = Arc::new(episode_config(settings, noise, map));
+        Episode::new(config, Arc::clone(map), job.episode_seed())
+    };
+    jobs.par_iter().zip(maps).map(start).collect()
+}
+
+/// A car at the start of every job, in order.
 ///
 /// # Errors
 /// If a lot cannot be driven.
 pub fn episodes(jobs: &[Job<'_>], settings: &Settings, noise: NoiseChoice) -> anyhow::Result<Vec<Episode>> {
-    let start = |job: &Job<'_>, drawn: &Scenario| {
-        let map = job.map_of(drawn.clone(), &settings.episode)?;
-        let config = episode_config(settings, noise, &map);
-        Ok(Episode::new(Arc::new(config), Arc::new(map), job.episode_seed()))
-    };
-    let neighbours: Vec<&[Job<'_>]> = jobs.chunk_by(Job::shares_obstacles_with).collect();
-    let episodes = neighbours
-        .par_iter()
-        .map(|jobs| {
-            let drawn = jobs[0].lot.draw(jobs[0].seed).scenario;
-            jobs.par_iter().map(|job| start(job, &drawn)).collect()
-        })
-        .collect::<anyhow::Result<Vec<Vec<Episode>>>>()?;
-    Ok(episodes.into_iter().flatten().collect())
+    Ok(start(jobs, &maps(jobs, settings)?, settings, noise))
 }
 
-/// The settings of an episode on a map. The level multiplies `episode.noise.intensity`.
+/// The settings of an episode on a map. The choice multiplies `episode.noise.intensity`.
 pub fn episode_config(settings: &Settings, noise: NoiseChoice, map: &Map) -> EpisodeConfig {
     let mut config = settings.episode.clone();
-    let level = noise.level(map.scenario().noise.level);
-    config.noise.intensity *= NoiseConfig::of(level).intensity;
+    config.noise.intensity *= noise.intensity(map.scenario().noise.level);
     config
 }
 

@@ -59,7 +59,7 @@ fn paper() -> Settings {
             lots: names(&["lot-a", "lot-b", "lot-c"]),
             directions: Direction::BOTH.to_vec(),
             trials: 5,
-            noise: NoiseChoice::Paper,
+            noise: vec![NoiseChoice::Paper],
         },
         dagger: DaggerConfig::paper(),
         expert: ExpertConfig::paper(),

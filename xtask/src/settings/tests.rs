@@ -3,7 +3,7 @@
 use super::*;
 
 fn layers(overrides: &[&str]) -> LayerArgs {
-    LayerArgs { preset: "default".into(), config: None, overrides: overrides.iter().map(|&text| text.into()).collect() }
+    LayerArgs { preset: None, config: None, overrides: overrides.iter().map(|&text| text.into()).collect() }
 }
 
 fn error(overrides: &[&str]) -> String {

@@ -1,0 +1,338 @@
+//! Near-collisions one by one: where, why, and how to see them again.
+//!
+//! Four rules, each on the clean map [all chosen]; the first that holds is the cause:
+//!
+//! | cause | rule |
+//! |---|---|
+//! | `noise_induced` | put into the same state up to [`LOOK_BACK_S`] earlier (not before the last resume) and shown the clean grid, the same driver gets [`PASS_M`] beyond the place without an event |
+//! | `oscillation` | [`OSCILLATION_REVERSALS`] or more steering reversals in the [`OSCILLATION_S`] before (not before the last resume) |
+//! | `narrow_passage` | within [`NEAR_M`] along the route the free width across it is less than the body and the near-collision distance on both sides |
+//! | `corner` | the route turns by [`CORNER_DEG`] or more within [`NEAR_M`] of the place |
+//! | `other` | none of these |
+
+use crate::drivers::Contestant;
+use crate::report;
+use crate::settings::{NoiseChoice, Settings};
+use crate::trials::{self, Job};
+use serde::Serialize;
+use sim::batch::run_lockstep_until;
+use sim::episode::{Episode, EpisodeConfig, Event, Frame};
+use sim::geometry::{Pose, wrap_angle};
+use sim::map::Map;
+use sim::metrics::steering_reversals;
+use sim::scenario::Direction;
+use sim::vehicle::VehicleState;
+use std::collections::VecDeque;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// How far back the driver is shown the clean grid, seconds: about the 8 m in which the place came into view.
+pub const LOOK_BACK_S: f32 = 6.0;
+/// How far it must get beyond the place, metres: the length of the car.
+pub const PASS_M: f32 = 5.0;
+/// In which time beyond the look-back, seconds.
+const PASS_WITHIN_S: f32 = 10.0;
+/// Steering reversals that make an oscillation: the expert, on its way round corners and past parked cars, makes two.
+pub const OSCILLATION_REVERSALS: u32 = 5;
+/// In the last seconds.
+pub const OSCILLATION_S: f32 = 5.0;
+/// What is near, metres along the route: the length of the car.
+pub const NEAR_M: f32 = 5.0;
+/// What is a corner, degrees.
+pub const CORNER_DEG: f32 = 30.0;
+/// Free width is looked for up to here on either side, metres.
+const WIDTH_MAX_M: f32 = 5.0;
+
+/// Why.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// On the clean grid the driver would have passed.
+    NoiseInduced,
+    /// It steered to and fro.
+    Oscillation,
+    /// There is hardly room.
+    NarrowPassage,
+    /// The route turns.
+    Corner,
+    /// None of these.
+    Other,
+}
+
+impl Cause {
+    /// Every cause, the strongest first.
+    pub const ALL: [Self; 5] = [Self::NoiseInduced, Self::Oscillation, Self::NarrowPassage, Self::Corner, Self::Other];
+
+    /// Its name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NoiseInduced => "noise-induced",
+            Self::Oscillation => "oscillation",
+            Self::NarrowPassage => "narrow passage",
+            Self::Corner => "corner",
+            Self::Other => "other",
+        }
+    }
+}
+
+/// A near-collision, as a line of `failures.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Failure {
+    /// Who drove.
+    pub driver: String,
+    /// Where.
+    pub lot: String,
+    /// Which way.
+    pub direction: Direction,
+    /// Which trial.
+    pub trial: u32,
+    /// What was seen wrongly.
+    pub noise: NoiseChoice,
+    /// When: the control tick.
+    pub tick: u32,
+    /// Where along the route, metres.
+    pub route_m: f32,
+    /// Rear axle in the world, metres.
+    pub x_m: f32,
+    /// Rear axle in the world, metres.
+    pub y_m: f32,
+    /// Heading in the world, degrees.
+    pub heading_deg: f32,
+    /// Speed at the last observation, m/s.
+    pub speed_mps: f32,
+    /// Why.
+    pub cause: Cause,
+    /// What the rules found.
+    #[serde(flatten)]
+    pub findings: Findings,
+    /// See [`crate::replay_key`].
+    pub replay: String,
+}
+
+impl Failure {
+    /// Top of `failures.md`; rows follow as they come.
+    pub const TABLE_HEAD: &str = "\
+# Near-collisions
+
+One row each. The rules behind the causes are at the top of `xtask/src/failures.rs`; `failures.jsonl` has what they found.
+
+| driver | lot | way | trial | noise | tick | route m | x m | y m | m/s | cause | replay key |
+|---|---|---|---|---|---|---|---|---|---|---|---|
+";
+
+    /// A row of `failures.md`.
+    pub fn table_row(&self) -> String {
+        let Self { driver, lot, trial, noise, tick, route_m, x_m, y_m, speed_mps, replay, .. } = self;
+        let (way, cause) = (report::name(self.direction), self.cause.name());
+        format!(
+            "| {driver} | {lot} | {way} | {trial} | {noise} | {tick} | {route_m:.1} | {x_m:.2} | {y_m:.2} | \
+             {speed_mps:.2} | {cause} | `{replay}` |"
+        )
+    }
+}
+
+/// What the rules found at a near-collision.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Findings {
+    /// Whether the driver would have passed on the clean grid; `None` if that was not tried (cut short by Ctrl-C).
+    pub passes_on_clean_grid: Option<bool>,
+    /// Steering reversals just before.
+    pub reversals_before: u32,
+    /// Smallest free width across the route nearby, metres, up to 10.
+    pub free_width_m: f32,
+    /// Largest change of the route's heading nearby, degrees.
+    pub turn_deg: f32,
+}
+
+impl Findings {
+    /// The first rule that holds. `noisy`: whether there was any noise to blame.
+    fn cause(&self, noisy: bool, config: &EpisodeConfig) -> Cause {
+        let narrow_m = config.vehicle.width_m + 2.0 * config.metrics.near_collision_m;
+        if noisy && self.passes_on_clean_grid == Some(true) {
+            Cause::NoiseInduced
+        } else if self.reversals_before >= OSCILLATION_REVERSALS {
+            Cause::Oscillation
+        } else if self.free_width_m < narrow_m {
+            Cause::NarrowPassage
+        } else if self.turn_deg >= CORNER_DEG {
+            Cause::Corner
+        } else {
+            Cause::Other
+        }
+    }
+}
+
+/// A near-collision when it happened.
+#[derive(Debug, Clone, Copy)]
+pub struct Sighting {
+    /// Index of the episode within its group.
+    pub episode: usize,
+    /// Control tick.
+    pub tick: u32,
+    /// Rear-axle pose when it was counted.
+    pub at: Pose,
+    /// Along the route, metres.
+    pub route_m: f32,
+    /// Speed at the last observation, m/s.
+    pub speed_mps: f32,
+    reversals_before: u32,
+    /// State and progress from which the clean grid is tried, and how long before.
+    earlier: (VehicleState, f32),
+    earlier_s: f32,
+}
+
+/// Remembers the last seconds of every episode of a group; its size does not depend on how long they last.
+#[derive(Debug)]
+pub struct Watch {
+    control_period_s: f32,
+    recent: Vec<VecDeque<(VehicleState, f32)>>,
+    sightings: Vec<Sighting>,
+}
+
+impl Watch {
+    /// Over so many episodes.
+    pub fn new(episodes: usize, config: &EpisodeConfig) -> Self {
+        let control_period_s = config.control_period_s();
+        let ticks = (LOOK_BACK_S / control_period_s) as usize + 1;
+        Self { control_period_s, recent: vec![VecDeque::with_capacity(ticks); episodes], sightings: Vec::new() }
+    }
+
+    /// Takes one frame into account.
+    pub fn frame(&mut self, episode: usize, frame: &Frame) {
+        let recent = &mut self.recent[episode];
+        if recent.len() > (LOOK_BACK_S / self.control_period_s) as usize {
+            recent.pop_front();
+        }
+        recent.push_back((frame.vehicle, frame.progress_m));
+        if let Event::NearCollision { at, progress_m } = frame.event {
+            let ticks = (OSCILLATION_S / self.control_period_s) as usize;
+            let last = recent.iter().skip(recent.len().saturating_sub(ticks));
+            self.sightings.push(Sighting {
+                episode,
+                tick: frame.tick,
+                at,
+                route_m: progress_m,
+                speed_mps: frame.vehicle.speed_mps,
+                reversals_before: steering_reversals(last.map(|(vehicle, _)| vehicle.steering_rad)),
+                earlier: recent[0],
+                earlier_s: recent.len() as f32 * self.control_period_s,
+            });
+        }
+        if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
+            recent.clear();
+        }
+    }
+
+    /// The near-collisions seen, episode by episode.
+    pub fn into_sightings(mut self) -> Vec<Sighting> {
+        self.sightings.sort_by_key(|sighting| (sighting.episode, sighting.tick));
+        self.sightings
+    }
+}
+
+/// A driver in a group of episodes, of which some ended in near-collisions.
+#[derive(Debug, Clone, Copy)]
+pub struct Group<'a> {
+    /// Car, sensor, metrics.
+    pub settings: &'a Settings,
+    /// Who drove.
+    pub contestant: &'a Contestant,
+    /// Where, in the order of the episodes.
+    pub jobs: &'a [Job<'a>],
+    /// Their maps.
+    pub maps: &'a [Arc<Map>],
+    /// What was seen wrongly.
+    pub noise: NoiseChoice,
+}
+
+impl Group<'_> {
+    /// Cause and findings of every sighting. `try_clean`: whether to spend time on the clean grid.
+    pub fn explain(&self, sightings: &[Sighting], try_clean: bool) -> Vec<(Cause, Findings)> {
+        let is_noisy = |sighting: &Sighting| {
+            trials::episode_config(self.settings, self.noise, &self.maps[sighting.episode]).noise.intensity > 0.0
+        };
+        let noisy: Vec<Sighting> = sightings.iter().copied().filter(is_noisy).collect();
+        let mut passes = if try_clean {
+            self.passes_on_clean_grid(&noisy).into_iter().map(Some).collect()
+        } else {
+            vec![None; noisy.len()]
+        }
+        .into_iter();
+        let explain = |sighting: &Sighting| {
+            let noisy = is_noisy(sighting);
+            let (map, config) = (&self.maps[sighting.episode], &self.settings.episode);
+            let findings = Findings {
+                passes_on_clean_grid: if noisy { passes.next().flatten() } else { Some(false) },
+                reversals_before: sighting.reversals_before,
+                free_width_m: free_width_m(map, sighting.route_m),
+                turn_deg: turn_deg(map, sighting.route_m),
+            };
+            (findings.cause(noisy, config), findings)
+        };
+        sightings.iter().map(explain).collect()
+    }
+
+    /// Drives on from the state before each sighting on the clean grid.
+    fn passes_on_clean_grid(&self, sightings: &[Sighting]) -> Vec<bool> {
+        // As many at a time as in the evaluation itself: memory does not depend on how often a driver fails.
+        sightings.chunks(self.jobs.len()).flat_map(|sightings| self.passes_at_once(sightings)).collect()
+    }
+
+    fn passes_at_once(&self, sightings: &[Sighting]) -> Vec<bool> {
+        let start = |sighting: &Sighting| {
+            let (map, job) = (&self.maps[sighting.episode], &self.jobs[sighting.episode]);
+            let mut config = trials::episode_config(self.settings, NoiseChoice::Clean, map);
+            config.metrics.events_max = 1;
+            config.metrics.timeout_s = sighting.earlier_s + PASS_WITHIN_S;
+            let (vehicle, progress_m) = sighting.earlier;
+            Episode::under_way(Arc::new(config), Arc::clone(map), job.episode_seed(), vehicle, progress_m)
+        };
+        let episodes: Vec<Episode> = sightings.iter().map(start).collect();
+        let mut fleet = self.contestant.fleet(self.settings, episodes.len());
+        let mut verdicts: Vec<Option<bool>> = vec![None; episodes.len()];
+        run_lockstep_until(episodes, &mut *fleet, &mut |episode, frame| {
+            let verdict = match frame.event {
+                Event::NearCollision { .. } | Event::Stuck { .. } => Some(false),
+                Event::ReachedEnd => Some(true),
+                Event::Drove => (frame.progress_m > sightings[episode].route_m + PASS_M).then_some(true),
+            };
+            verdicts[episode] = verdicts[episode].or(verdict);
+            if verdicts.iter().all(Option::is_some) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        verdicts.into_iter().map(|verdict| verdict == Some(true)).collect()
+    }
+}
+
+/// Places along the route near a place, metres.
+fn nearby(map: &Map, route_m: f32) -> impl Iterator<Item = f32> {
+    let length_m = map.path().length_m();
+    (-10..=10).map(move |i| (route_m + 0.1 * i as f32 * NEAR_M).clamp(0.0, length_m))
+}
+
+/// Smallest width between what lies left and right of the route.
+fn free_width_m(map: &Map, route_m: f32) -> f32 {
+    let width_m = |s_m: f32| {
+        let pose = map.path().pose_at(s_m);
+        let left = pose.ahead().perp();
+        let free_m = |side: f32| {
+            let steps = 0..(WIDTH_MAX_M / 0.05) as u32;
+            let first = steps
+                .map(|i| 0.05 * i as f32)
+                .find(|&m| map.signed_distance_m(pose.position() + side * m * left) <= 0.0);
+            first.unwrap_or(WIDTH_MAX_M)
+        };
+        free_m(1.0) + free_m(-1.0)
+    };
+    nearby(map, route_m).map(width_m).fold(f32::INFINITY, f32::min)
+}
+
+/// Largest difference between two headings of the route.
+fn turn_deg(map: &Map, route_m: f32) -> f32 {
+    let here_rad = map.path().pose_at(route_m).heading_rad;
+    let turns = nearby(map, route_m).map(|s_m| wrap_angle(map.path().pose_at(s_m).heading_rad - here_rad));
+    let (low, high) = turns.fold((0.0_f32, 0.0_f32), |(low, high), turn| (low.min(turn), high.max(turn)));
+    (high - low).to_degrees()
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,193 @@
+//! What is looked at together, and how drivers stand there.
+
+use super::{Ledger, Unit};
+use crate::statistics::bootstrap::{DRAWS, Interval, Units};
+use crate::statistics::comparison::{RateRatio, holm};
+use crate::statistics::poisson::Dispersion;
+use serde::Serialize;
+use sim::seed::RootSeed;
+
+/// Lots that are looked at together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Scope {
+    /// Its name in tables.
+    pub label: String,
+    families: Vec<u32>,
+}
+
+impl Scope {
+    /// Every family by itself; then, where that is something else, those nobody was trained on, and all.
+    pub fn all_of(ledger: &Ledger) -> Vec<Self> {
+        let families = ledger.families();
+        let of = |label: &str, wanted: &dyn Fn(usize) -> bool| Self {
+            label: label.to_owned(),
+            families: (0..families.len()).filter(|&i| wanted(i)).map(|i| i as u32).collect(),
+        };
+        let mut scopes: Vec<Self> = families.iter().enumerate().map(|(i, f)| of(&f.label(), &|j| i == j)).collect();
+        let unseen = of("unseen", &|i| !families[i].is_trained_on);
+        if (2..families.len()).contains(&unseen.families.len()) {
+            scopes.push(unseen);
+        }
+        if families.len() > 1 {
+            scopes.push(of("all", &|_| true));
+        }
+        scopes
+    }
+
+    /// Whether it holds more than one family.
+    pub fn is_pooled(&self) -> bool {
+        self.families.len() > 1
+    }
+
+    /// Whether a family belongs to it.
+    pub fn contains(&self, family: u32) -> bool {
+        self.families.contains(&family)
+    }
+}
+
+/// A driver in a scope, judged by resampling.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Standing {
+    /// How clustered its near-collisions are; `None` where that cannot be said.
+    pub dispersion: Option<Dispersion>,
+    /// Near-collisions per 100 m; `None` with a single unit per lot.
+    pub per_100m: Option<Interval>,
+    /// Safe ratio, mean over runs.
+    pub safe_ratio: Option<Interval>,
+}
+
+/// A driver against the one all are compared with: differences are driver − other, so that a positive one speaks for
+/// the other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Index of the driver in the plan.
+    #[serde(skip)]
+    pub driver: usize,
+    /// Runs both have driven.
+    pub pairs: usize,
+    /// Near-collisions per 100 m, paired bootstrap; `None` with a single unit per lot.
+    pub difference_per_100m: Option<Interval>,
+    /// Safe ratio, paired bootstrap.
+    pub difference_safe_ratio: Option<Interval>,
+    /// Rates, exact if events are independent.
+    pub ratio: RateRatio,
+    /// Its p-value, adjusted for the number of drivers compared (Holm).
+    pub p_holm: f64,
+}
+
+impl Ledger {
+    /// How the drivers stand in a scope at a noise level, and how they compare with one of them. Resampled are units
+    /// (lot, direction, seed) within each lot (methods.md 8.3); of generated lots, which are a sample themselves, whole
+    /// lots within their kind [chosen]. Only runs that all drivers have driven count.
+    pub fn judge(&self, level: usize, scope: &Scope, with: usize, seed: RootSeed) -> (Vec<Standing>, Vec<Comparison>) {
+        let pairs = self.common_units(level, scope);
+        let drivers = self.accounts[level].len();
+        let mut standings = vec![Standing::default(); drivers];
+        if pairs.is_empty() {
+            return (standings, Vec::new());
+        }
+        for (driver, standing) in standings.iter_mut().enumerate() {
+            standing.dispersion = dispersion(&pairs, driver);
+        }
+        let others: Vec<usize> = (0..drivers).filter(|&driver| driver != with).collect();
+        let intervals = bootstrap(&pairs, &others, with, seed);
+        let interval = |index: usize| intervals.as_ref().map(|intervals| intervals[index]);
+        for (driver, standing) in standings.iter_mut().enumerate() {
+            standing.per_100m = interval(2 * driver);
+            standing.safe_ratio = interval(2 * driver + 1);
+        }
+        let counts = |driver: usize| {
+            let units = pairs.iter().map(|row| row[driver]);
+            let (events, metres) = units.fold((0, 0.0), |(events, metres), unit| {
+                (events + unit.near_collisions, metres + f64::from(unit.reference_m))
+            });
+            (events, metres / 100.0)
+        };
+        let ratios: Vec<RateRatio> = others.iter().map(|&other| RateRatio::new(counts(other), counts(with))).collect();
+        let p_holm = holm(&ratios.iter().map(|ratio| ratio.p_value).collect::<Vec<_>>());
+        let comparisons = others.iter().zip(ratios).zip(p_holm).enumerate().map(|(i, ((&driver, ratio), p_holm))| {
+            let first = 2 * (drivers + i);
+            Comparison {
+                driver,
+                pairs: pairs.len(),
+                difference_per_100m: interval(first),
+                difference_safe_ratio: interval(first + 1),
+                ratio,
+                p_holm,
+            }
+        });
+        (standings, comparisons.collect())
+    }
+
+    /// Per job of the scope that every driver has finished, the units of all drivers.
+    fn common_units(&self, level: usize, scope: &Scope) -> Vec<Vec<Unit>> {
+        let Some((first, rest)) = self.accounts[level].split_first() else { return Vec::new() };
+        let of_job =
+            |units: &[Unit], job: u32| units.binary_search_by_key(&job, |unit| unit.job).ok().map(|index| units[index]);
+        let row = |unit: &Unit| {
+            let rest = rest.iter().map(|account| of_job(&account.units, unit.job));
+            std::iter::once(Some(*unit)).chain(rest).collect()
+        };
+        first.units.iter().filter(|unit| scope.contains(unit.family)).filter_map(row).collect()
+    }
+}
+
+fn dispersion(pairs: &[Vec<Unit>], driver: usize) -> Option<Dispersion> {
+    let strata: Vec<Vec<(u32, f64)>> = strata(pairs)
+        .map(|clusters| {
+            let cluster = |rows: &[Vec<Unit>]| {
+                let units = rows.iter().map(|row| row[driver]);
+                units.fold((0, 0.0), |(n, m), unit| (n + unit.near_collisions, m + f64::from(unit.reference_m)))
+            };
+            clusters.into_iter().map(cluster).collect()
+        })
+        .collect();
+    Dispersion::within(strata.iter().map(Vec::as_slice))
+}
+
+/// Stratum by stratum its clusters. Jobs are ordered lot by lot, so clusters lie together; families need not.
+fn strata(pairs: &[Vec<Unit>]) -> impl Iterator<Item = Vec<&[Vec<Unit>]>> {
+    let mut families: Vec<u32> = pairs.iter().map(|row| row[0].family).collect();
+    families.sort_unstable();
+    families.dedup();
+    families.into_iter().map(|family| {
+        let clusters = pairs.chunk_by(|a, b| a[0].cluster == b[0].cluster);
+        clusters.filter(|rows| rows[0][0].family == family).collect()
+    })
+}
+
+/// Rate and safe ratio of every driver, then their differences of every other driver from `with`. `None` if nothing
+/// varies because every stratum has a single cluster.
+fn bootstrap(pairs: &[Vec<Unit>], others: &[usize], with: usize, seed: RootSeed) -> Option<Vec<Interval>> {
+    let drivers = pairs[0].len();
+    let mut units = Units::new(2 + 2 * drivers);
+    let mut largest = 0;
+    for clusters in strata(pairs) {
+        units.begin_stratum();
+        largest = largest.max(clusters.len());
+        for rows in clusters {
+            let mut sums = vec![0.0; 2 + 2 * drivers];
+            for row in rows {
+                sums[0] += 1.0;
+                sums[1] += f64::from(row[0].reference_m) / 100.0;
+                for (driver, unit) in row.iter().enumerate() {
+                    sums[2 + 2 * driver] += f64::from(unit.near_collisions);
+                    sums[3 + 2 * driver] += f64::from(unit.safe_ratio);
+                }
+            }
+            units.push(&sums);
+        }
+    }
+    let of_sums = |sums: &[f64], out: &mut [f64]| {
+        for driver in 0..drivers {
+            out[2 * driver] = sums[2 + 2 * driver] / sums[1];
+            out[2 * driver + 1] = sums[3 + 2 * driver] / sums[0];
+        }
+        for (i, &other) in others.iter().enumerate() {
+            for which in 0..2 {
+                out[2 * (drivers + i) + which] = out[2 * other + which] - out[2 * with + which];
+            }
+        }
+    };
+    (largest > 1).then(|| units.percentile_intervals(seed, DRAWS, 2 * (drivers + others.len()), of_sums))
+}
