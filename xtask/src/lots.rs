@@ -3,6 +3,7 @@
 use anyhow::ensure;
 use scenarios::LotSpec;
 use scenarios::generator;
+use scenarios::split::Split;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
 
@@ -73,6 +74,15 @@ impl Lot {
         match &self.spec {
             LotSpec::Generated { split, difficulty, .. } => format!("{}-{}", split.name(), difficulty.name()),
             LotSpec::Reference(_) | LotSpec::File(_) => self.name.clone(),
+        }
+    }
+
+    /// Whether drivers may be trained or tuned on it: lot a and the generator's training lots.
+    pub fn is_for_training(&self) -> bool {
+        match &self.spec {
+            LotSpec::Generated { split, .. } => *split == Split::Train,
+            LotSpec::Reference(_) => self.name == "lot-a",
+            LotSpec::File(_) => false,
         }
     }
 
