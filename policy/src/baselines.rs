@@ -278,7 +278,8 @@ impl Sight {
                 let (mut longest, mut end) = (0, self.ahead);
                 for ray in &self.rays {
                     let free = ray.points.iter().take_while(|(_, row, col)| !grid.is_occupied(*row, *col));
-                    if let Some((steps, (point, ..))) = free.enumerate().last().filter(|(steps, _)| steps + 1 > longest) {
+                    if let Some((steps, (point, ..))) = free.enumerate().last().filter(|(steps, _)| steps + 1 > longest)
+                    {
                         (longest, end) = (steps + 1, *point);
                     }
                 }

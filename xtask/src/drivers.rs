@@ -21,7 +21,8 @@ pub fn specs() -> Vec<(&'static str, &'static str)> {
         ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
     ];
     specs.extend(Baseline::all().iter().map(|baseline| (baseline.name(), baseline.about())));
-    specs.push(("NAME:FILE", "one of these planners with the parameters in a TOML file (cargo xtask tune writes them)"));
+    specs
+        .push(("NAME:FILE", "one of these planners with the parameters in a TOML file (cargo xtask tune writes them)"));
     specs
 }
 
@@ -144,8 +145,9 @@ fn baseline(spec: &str) -> anyhow::Result<Option<Baseline>> {
         return Ok(None);
     };
     let Some(path) = file else { return Ok(Some(baseline)) };
-    let text = std::fs::read_to_string(path)
-        .with_context(|| format!("{}: cannot be read; cargo xtask drivers {name} prints such a file", path.display()))?;
+    let text = std::fs::read_to_string(path).with_context(|| {
+        format!("{}: cannot be read; cargo xtask drivers {name} prints such a file", path.display())
+    })?;
     let read = || {
         let file: PlannerFile = toml::from_str(&text)?;
         ensure!(file.planner == name, "these are parameters of {:?}, but {name:?} is asked for", file.planner);

@@ -3,6 +3,7 @@
 use anyhow::ensure;
 use scenarios::LotSpec;
 use scenarios::generator;
+use scenarios::reference::ReferenceLot;
 use scenarios::split::Split;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
@@ -81,7 +82,7 @@ impl Lot {
     pub fn is_for_training(&self) -> bool {
         match &self.spec {
             LotSpec::Generated { split, .. } => *split == Split::Train,
-            LotSpec::Reference(_) => self.name == "lot-a",
+            LotSpec::Reference(lot) => *lot == ReferenceLot::A,
             LotSpec::File(_) => false,
         }
     }

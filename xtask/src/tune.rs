@@ -22,7 +22,7 @@ use policy::baselines::{Baseline, Rig};
 use rayon::prelude::*;
 use serde::Serialize;
 use sim::driver::SensorsOnly;
-use sim::episode::{self, Episode};
+use sim::episode::{self, Episode, EpisodeReport};
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -78,7 +78,10 @@ pub fn run(args: &TuneArgs) -> anyhow::Result<()> {
             let kept = format!("{} of {} planners are tuned in {}", tuned.len(), baselines.len(), run.path().display());
             return Err(Interrupted { kept }.into());
         };
-        work.end(&format!("{:.2} → {:.2} failures per 100 m", found.before.failures_per_100m, found.after.failures_per_100m));
+        work.end(&format!(
+            "{:.2} → {:.2} failures per 100 m",
+            found.before.failures_per_100m, found.after.failures_per_100m
+        ));
         run.write(&format!("{}.toml", baseline.name()), found.to_toml(&settings)?.as_bytes())?;
         tuned.push(found);
     }
@@ -133,14 +136,13 @@ impl Course {
         let reports: Vec<_> = (0..planners.len() * starts.len())
             .into_par_iter()
             .map(|index| {
-                let mut car = starts[index % starts.len()].clone();
                 let mut driver = SensorsOnly(planners[index / starts.len()].clone());
-                let report = episode::run(&mut car, &mut driver, &mut ());
+                let report = episode::run(starts[index % starts.len()].clone(), &mut driver, &mut ());
                 on_run();
                 report
             })
             .collect();
-        let total = |reports: &[episode::EpisodeReport]| {
+        let total = |reports: &[EpisodeReport]| {
             let mut totals = Totals::default();
             reports.iter().for_each(|report| totals.add(report));
             totals
@@ -232,7 +234,9 @@ fn tune(course: &Course, start: &Baseline, budget: usize, seed: RootSeed, work: 
             candidates[0] = start.clone();
         }
         let totals = course.drive(&candidates, &course.search, &on_run);
-        tried.extend(generation.into_iter().zip(candidates).zip(totals).map(|((point, of), totals)| (point, of, totals)));
+        tried.extend(
+            generation.into_iter().zip(candidates).zip(totals).map(|((point, of), totals)| (point, of, totals)),
+        );
     }
     let mut order: Vec<usize> = (1..tried.len()).collect();
     order.sort_by_key(|&index| rank(&tried[index].2));

@@ -5,7 +5,9 @@
 //! an obstacle). The walk from the front bumper follows −∇(U_rep + U_att) to the look-ahead point.
 
 use super::search::{Dimension, Span};
-use super::{DISTANCE_FLOOR_M, Goal, Method, Nearest, Rig, Sight, head_for, khatib_repulsion, walk_along_field, within};
+use super::{
+    DISTANCE_FLOOR_M, Goal, Method, Nearest, Rig, Sight, head_for, khatib_repulsion, walk_along_field, within,
+};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
@@ -45,7 +47,8 @@ impl Params {
 
 impl Method for Params {
     const NAME: &'static str = "apf";
-    const ABOUT: &'static str = "artificial potential field of Ge and Cui with a goal straight ahead; literature parameters";
+    const ABOUT: &'static str =
+        "artificial potential field of Ge and Cui with a goal straight ahead; literature parameters";
     const SEARCH: &'static [Dimension<Self>] = &[
         Dimension {
             name: "range_m",

@@ -46,7 +46,8 @@ pub struct Params {
 
 impl Method for Params {
     const NAME: &'static str = "dwa";
-    const ABOUT: &'static str = "dynamic window approach: heading, distance and speed over reachable arcs; literature parameters";
+    const ABOUT: &'static str =
+        "dynamic window approach: heading, distance and speed over reachable arcs; literature parameters";
     const SEARCH: &'static [Dimension<Self>] = &[
         Dimension {
             name: "heading_weight",
@@ -119,8 +120,8 @@ impl Method for Params {
                 let speed_mps = rig.speed_mps(curvature_per_m);
                 let yaw_rad = (curvature_per_m * speed_mps * self.heading_after_s).abs();
                 let heading = 1.0 - (yaw_rad / std::f32::consts::PI).min(1.0);
-                let score = self.heading_weight * heading
-                    + self.velocity_weight * speed_mps / rig.controller.speed_max_mps;
+                let score =
+                    self.heading_weight * heading + self.velocity_weight * speed_mps / rig.controller.speed_max_mps;
                 let stop_m = 0.5 * speed_mps * speed_mps / self.brake_mps2;
                 Rated { curvature_per_m, score, stop_m }
             })

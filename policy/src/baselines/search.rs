@@ -5,7 +5,7 @@
 //! generation to generation: plain, without settings of its own, and hard to get wrong.
 
 use rand::RngExt as _;
-use sim::seed::{RootSeed, Rng, Stream};
+use sim::seed::{Rng, RootSeed, Stream};
 
 /// Candidates asked for at a time. A constant: results do not depend on the number of threads.
 pub const GENERATION: usize = 8;

@@ -119,7 +119,8 @@ impl Params {
 
 impl Method for Params {
     const NAME: &'static str = "tentacle";
-    const ABOUT: &'static str = "81 clothoid paths, fewest occupied cells around and least curvature; the paper's parameters";
+    const ABOUT: &'static str =
+        "81 clothoid paths, fewest occupied cells around and least curvature; the paper's parameters";
     const SEARCH: &'static [Dimension<Self>] = &[
         Dimension {
             name: "detection_range_m",

@@ -7,9 +7,7 @@
 //! (*chosen*). The look-ahead point is where a walk along V from the front bumper ends.
 
 use super::search::{Dimension, Span};
-use super::{
-    DISTANCE_FLOOR_M, Method, Nearest, Rig, head_for, khatib_repulsion, walk_along_field, within,
-};
+use super::{DISTANCE_FLOOR_M, Method, Nearest, Rig, head_for, khatib_repulsion, walk_along_field, within};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
