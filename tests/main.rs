@@ -7,6 +7,7 @@
 //! | [`determinism`] | same seed, same bytes, for 1 and 2 threads |
 //! | [`expert_drives`] | the expert on the reference lots |
 //! | [`formats`] | data sets open as NPY, weights as safetensors |
+//! | [`planners`] | model-based planners: naming, parameter files, tuning |
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod bench;
@@ -14,4 +15,5 @@ mod commands;
 mod determinism;
 mod expert_drives;
 mod formats;
+mod planners;
 mod tidy;

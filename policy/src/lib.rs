@@ -9,10 +9,12 @@
 //! | [`decision_rule`] | Algorithm 2, line 9: may the network drive this tick? |
 //! | [`dagger`] | Algorithms 1 and 2, top to bottom |
 //! | [`drivers`] | the trained network at the wheel |
+//! | [`baselines`] | the model-based planners it is compared with |
 //! | [`checkpoint`] | a trained network on disk |
 //!
 //! Images: u = column fraction (0 = left, 1 = right), w = row fraction (0 = far, 1 = near), as in methods.md 0.
 
+pub mod baselines;
 pub mod checkpoint;
 pub mod dagger;
 pub mod dataset;

@@ -92,6 +92,9 @@ pub struct Situation<'a> {
 pub trait Policy {
     /// Answers one observation.
     fn act(&mut self, observation: &Observation) -> Decision;
+
+    /// Forgets the past; called when the car was put back on the path.
+    fn reset(&mut self) {}
 }
 
 /// Whoever is at the wheel of one episode.
@@ -110,6 +113,10 @@ pub struct SensorsOnly<P>(pub P);
 impl<P: Policy> Driver for SensorsOnly<P> {
     fn decide(&mut self, situation: &Situation<'_>) -> Decision {
         self.0.act(situation.observation)
+    }
+
+    fn reset(&mut self) {
+        self.0.reset();
     }
 }
 

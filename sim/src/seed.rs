@@ -34,6 +34,8 @@ pub enum Stream {
     Expert = 10,
     /// Suites of lots.
     Suite = 11,
+    /// Candidates of a search for parameters.
+    Search = 12,
 }
 
 /// The one number a run is reproduced from.

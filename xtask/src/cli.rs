@@ -49,8 +49,11 @@ pub enum Command {
     Settings(SettingsArgs),
     /// Lists the lots that can be named.
     Lots,
-    /// Lists the drivers that can be named.
-    Drivers,
+    /// Lists the drivers that can be named, or prints the parameters of one planner as a file.
+    Drivers(DriversArgs),
+    /// Searches parameters of the model-based planners on lot a and training lots, the same way for each.
+    #[command(after_help = TUNE_EXAMPLES)]
+    Tune(TuneArgs),
 }
 
 /// Where settings come from, lowest priority first: preset, file, `--set`, then the flags of the command.
@@ -241,4 +244,50 @@ pub struct MetresArgs {
 fn two_rates(text: &str) -> Result<[f64; 2], String> {
     let rates = text.split_once(',').and_then(|(a, b)| Some([a.trim().parse().ok()?, b.trim().parse().ok()?]));
     rates.ok_or_else(|| "two numbers with a comma between them are needed, as in 1.4,0.5".to_owned())
+}
+
+/// Arguments of `drivers`.
+#[derive(Debug, Clone, Default, Args)]
+pub struct DriversArgs {
+    /// A planner, whose parameters are printed as the file that `NAME:FILE` reads.
+    #[arg(value_name = "PLANNER")]
+    pub planner: Option<String>,
+}
+
+const TUNE_EXAMPLES: &str = "\
+Examples:
+  cargo xtask tune
+  cargo xtask tune --planner vvf --budget 128 --out runs/tune-vvf
+  cargo xtask evaluate --driver vvf --driver vvf:runs/tune-default-s1/vvf.toml";
+
+/// Arguments of `tune`.
+#[derive(Debug, Clone, Args)]
+pub struct TuneArgs {
+    /// Planners to tune [default: all].
+    #[arg(long = "planner", value_name = "NAME", num_args = 1.., value_delimiter = ',')]
+    pub planners: Vec<String>,
+    /// Lots to tune on: lot-a and generated training lots only.
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "lot-a,train:4")]
+    pub lots: Vec<String>,
+    /// Candidates per planner, its own parameters included.
+    #[arg(long, value_name = "N", default_value_t = 48)]
+    pub budget: u32,
+    /// Trials per lot and direction that every candidate drives; the best few drive as many fresh ones again.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub trials: u32,
+    /// Seed of candidates, obstacles and noise.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// What is seen wrongly.
+    #[arg(long, value_name = "LEVEL", default_value = "paper")]
+    pub noise: crate::settings::NoiseChoice,
+    /// Settings of car, sensor and metrics.
+    #[command(flatten)]
+    pub layers: LayerArgs,
+    /// Folder of the results [default: runs/tune-PRESET-sSEED, the next free one].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Deletes what an earlier run left in `--out`.
+    #[arg(long, requires = "out")]
+    pub overwrite: bool,
 }

@@ -4,19 +4,27 @@ use crate::run_dir;
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
 use expert::ScriptedExpert;
+use policy::baselines::{Baseline, Rig};
 use policy::checkpoint::Checkpoint;
 use policy::drivers::NetFleet;
 use rayon::prelude::*;
-use sim::driver::{Decision, Driver, Fleet, Seat};
+use serde::{Deserialize, Serialize};
+use sim::driver::{Decision, Driver, Fleet, Seat, SensorsOnly};
 use std::path::{Path, PathBuf};
 
 /// Ways to name a driver: how it is written, what it means.
-pub const SPECS: [(&str, &str); 4] = [
-    ("expert", "the scripted teacher; sees the truth"),
-    ("run:DIR", "the final policy of a training run"),
-    ("run:DIR/bc", "its behaviour cloning"),
-    ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
-];
+pub fn specs() -> Vec<(&'static str, &'static str)> {
+    let mut specs = vec![
+        ("expert", "the scripted teacher; sees the truth"),
+        ("run:DIR", "the final policy of a training run"),
+        ("run:DIR/bc", "its behaviour cloning"),
+        ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
+    ];
+    specs.extend(Baseline::all().iter().map(|baseline| (baseline.name(), baseline.about())));
+    specs
+        .push(("NAME:FILE", "one of these planners with the parameters in a TOML file (cargo xtask tune writes them)"));
+    specs
+}
 
 /// A driver by name.
 #[derive(Debug, Clone)]
@@ -30,6 +38,7 @@ pub struct Contestant {
 enum Kind {
     Expert,
     Network(Box<Checkpoint>),
+    Baseline(Baseline),
 }
 
 impl Contestant {
@@ -41,6 +50,11 @@ impl Contestant {
     /// A trained network.
     pub fn network(name: &str, checkpoint: Checkpoint) -> Self {
         Self { name: name.to_owned(), kind: Kind::Network(Box::new(checkpoint)) }
+    }
+
+    /// A model-based planner.
+    pub fn baseline(name: &str, baseline: Baseline) -> Self {
+        Self { name: name.to_owned(), kind: Kind::Baseline(baseline) }
     }
 
     /// Reads several specs.
@@ -58,6 +72,9 @@ impl Contestant {
     }
 
     fn parse(spec: &str) -> anyhow::Result<Self> {
+        if let Some(baseline) = baseline(spec)? {
+            return Ok(Self::baseline(spec, baseline));
+        }
         let folder: PathBuf = if spec == "expert" {
             return Ok(Self::expert());
         } else if let Some(run) = spec.strip_prefix("run:") {
@@ -65,7 +82,7 @@ impl Contestant {
         } else if let Some(folder) = spec.strip_prefix("net:") {
             folder.into()
         } else {
-            let known: Vec<&str> = SPECS.iter().map(|(spec, _)| *spec).collect();
+            let known: Vec<&str> = specs().iter().map(|(spec, _)| *spec).collect();
             bail!("no driver {spec:?}; there are {}", known.join(", "))
         };
         ensure!(
@@ -100,8 +117,45 @@ impl Contestant {
         match &self.kind {
             Kind::Expert => Box::new(OneEach((0..cars).map(|_| expert(settings)).collect())),
             Kind::Network(checkpoint) => Box::new(NetFleet::new((**checkpoint).clone(), settings.dagger.device)),
+            Kind::Baseline(baseline) => {
+                let planner = baseline.planner(&Rig::of(&settings.episode));
+                Box::new(OneEach(vec![SensorsOnly(planner); cars]))
+            }
         }
     }
+}
+
+/// Parameters of a planner on disk.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlannerFile {
+    /// Which planner they are for.
+    pub planner: String,
+    /// All of its parameters.
+    pub parameters: toml::Table,
+    /// How they were found; not read.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub search: Option<toml::Table>,
+}
+
+/// The planner that `NAME` or `NAME:FILE` names; `None` if no planner has that name.
+fn baseline(spec: &str) -> anyhow::Result<Option<Baseline>> {
+    let (name, file) = spec.split_once(':').map_or((spec, None), |(name, file)| (name, Some(Path::new(file))));
+    let Some(baseline) = Baseline::all().into_iter().find(|baseline| baseline.name() == name) else {
+        return Ok(None);
+    };
+    let Some(path) = file else { return Ok(Some(baseline)) };
+    let text = std::fs::read_to_string(path).with_context(|| {
+        format!("{}: cannot be read; cargo xtask drivers {name} prints such a file", path.display())
+    })?;
+    let read = || {
+        let file: PlannerFile = toml::from_str(&text)?;
+        ensure!(file.planner == name, "these are parameters of {:?}, but {name:?} is asked for", file.planner);
+        let changed = baseline.with_parameters(file.parameters).context("parameters")?;
+        changed.check().map_err(anyhow::Error::msg).context("parameters")?;
+        Ok(changed)
+    };
+    read().with_context(|| format!("{}: cargo xtask drivers {name} prints a complete file", path.display())).map(Some)
 }
 
 /// A fresh expert.

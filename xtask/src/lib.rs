@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`cli`] | the command line, nothing else |
 //! | [`settings`] | preset → file → `--set` → flags, into one checked [`settings::Settings`] |
-//! | [`train`], [`evaluate`], [`generate`], [`pixel_accuracy`], [`metres`], [`listing`] | the commands |
+//! | [`train`], [`evaluate`], [`generate`], [`pixel_accuracy`], [`metres`], [`tune`], [`listing`] | the commands |
 //! | [`lots`], [`drivers`] | what can be named on the command line |
 //! | [`trials`] | which obstacles and which noise a trial has |
 //! | [`statistics`] | intervals and comparisons |
@@ -36,3 +36,4 @@ pub mod summary;
 pub mod table1;
 pub mod train;
 pub mod trials;
+pub mod tune;

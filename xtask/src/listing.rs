@@ -1,8 +1,11 @@
 //! `settings`, `lots`, `drivers`: what there is.
 
-use crate::cli::SettingsArgs;
+use crate::cli::{DriversArgs, SettingsArgs};
+use crate::drivers::{self, PlannerFile};
+use crate::lots;
 use crate::settings::{PRESETS, Settings};
-use crate::{drivers, lots};
+use anyhow::Context as _;
+use policy::baselines::Baseline;
 
 /// Prints the resolved settings as TOML, which `--config` reads again.
 ///
@@ -26,12 +29,26 @@ pub fn lots() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints how drivers are named.
+/// Prints how drivers are named, or the parameters of one planner as a file.
 ///
 /// # Errors
-/// None so far.
-pub fn drivers() -> anyhow::Result<()> {
-    print_specs(&drivers::SPECS);
+/// If there is no planner of the name.
+pub fn drivers(args: &DriversArgs) -> anyhow::Result<()> {
+    let Some(name) = &args.planner else {
+        print_specs(&drivers::specs());
+        return Ok(());
+    };
+    let baselines = Baseline::all();
+    let baseline = baselines.iter().find(|baseline| baseline.name() == name).with_context(|| {
+        let names: Vec<&str> = baselines.iter().map(Baseline::name).collect();
+        format!("no planner {name:?}; there are {}", names.join(", "))
+    })?;
+    println!("# {}", baseline.about());
+    for (parameter, span) in baseline.search_space() {
+        println!("# cargo xtask tune searches {parameter}: {span}");
+    }
+    let file = PlannerFile { planner: name.clone(), parameters: baseline.parameters(), search: None };
+    print!("\n{}", toml::to_string(&file)?);
     Ok(())
 }
 

@@ -3,6 +3,8 @@
 use anyhow::ensure;
 use scenarios::LotSpec;
 use scenarios::generator;
+use scenarios::reference::ReferenceLot;
+use scenarios::split::Split;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
 
@@ -89,6 +91,15 @@ impl Lot {
     /// Whether it may turn out not to be drivable: a lot written by hand.
     pub fn is_from_file(&self) -> bool {
         self.from_file.is_some()
+    }
+
+    /// Whether drivers may be trained or tuned on it: lot a and the generator's training lots.
+    pub fn is_for_training(&self) -> bool {
+        match &self.spec {
+            LotSpec::Generated { split, .. } => *split == Split::Train,
+            LotSpec::Reference(lot) => *lot == ReferenceLot::A,
+            LotSpec::File(_) => false,
+        }
     }
 
     /// Whether trials draw their own obstacles; other lots are the same in every trial.

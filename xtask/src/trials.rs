@@ -8,6 +8,7 @@
 //! | 1 · 2⁴⁰ + trial | evaluation |
 //! | 2 · 2⁴⁰ + trial | calibration of the noise (`pixel-accuracy`) |
 //! | 3 · 2⁴⁰ + trial | pictures (`generate`) |
+//! | 4 · 2⁴⁰ + trial | search of parameters (`tune`) |
 //!
 //! A trial's seed draws the obstacles of every lot. An episode's seed, which draws the noise, is a child of the trial's
 //! under the lot's name and the direction. Nothing depends on the driver: all drivers meet the same trials.
@@ -36,6 +37,8 @@ pub enum Purpose {
     Calibration,
     /// Pictures and files.
     Pictures,
+    /// Searching parameters of planners.
+    Tuning,
 }
 
 /// Seed of a trial.
@@ -45,6 +48,7 @@ pub fn trial_seed(root: RootSeed, purpose: Purpose, trial: u32) -> RootSeed {
         Purpose::Evaluation => (1, 0),
         Purpose::Calibration => (2, 0),
         Purpose::Pictures => (3, 0),
+        Purpose::Tuning => (4, 0),
     };
     assert!(trial < 1 << 20 && round < 1 << 20, "a round has fewer than 2^20 trials, a run fewer than 2^20 rounds");
     root.child(Stream::Episode, range << 40 | u64::from(round) << 20 | u64::from(trial))
@@ -166,10 +170,10 @@ mod tests {
     fn no_two_trials_share_a_seed_even_under_one_root() {
         let root = RootSeed(1);
         let purposes = (0..9).map(|round| Purpose::Training { round });
-        let purposes = purposes.chain([Purpose::Evaluation, Purpose::Calibration, Purpose::Pictures]);
+        let purposes = purposes.chain([Purpose::Evaluation, Purpose::Calibration, Purpose::Pictures, Purpose::Tuning]);
         let trials: BTreeSet<_> =
             purposes.flat_map(|purpose| (0..100).map(move |trial| trial_seed(root, purpose, trial))).collect();
-        assert_eq!(trials.len(), 1200);
+        assert_eq!(trials.len(), 1300);
         let trial = trial_seed(root, Purpose::Evaluation, 0);
         let episodes: BTreeSet<_> = ["lot-a", "lot-b", "lot-c"]
             .into_iter()

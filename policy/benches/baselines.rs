@@ -1,0 +1,23 @@
+//! One decision of each model-based planner in a lane with a corner.
+
+use divan::{Bencher, black_box};
+use policy::baselines::{Baseline, Rig};
+use sim::driver::Policy as _;
+use sim::episode::EpisodeConfig;
+use sim::sensing::{Observation, OccupancyGrid};
+
+fn main() {
+    divan::main();
+}
+
+#[divan::bench(args = ["tentacle", "vvf", "dwa", "cvm", "apf", "vff"])]
+fn decision(bencher: Bencher<'_, '_>, name: &str) {
+    let mut grid = OccupancyGrid::free();
+    (0..6).for_each(|row| grid.occupy_row(row, u32::MAX));
+    (6..16).for_each(|row| grid.occupy_row(row, 0x1FF_0000));
+    (16..25).for_each(|row| grid.occupy_row(row, 0x1FF_01FF));
+    let baselines = Baseline::all();
+    let baseline = baselines.iter().find(|baseline| baseline.name() == name).expect("a baseline's name");
+    let mut planner = baseline.planner(&Rig::of(&EpisodeConfig::paper()));
+    bencher.bench_local(|| planner.act(black_box(&Observation { grid })));
+}
