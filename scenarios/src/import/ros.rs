@@ -218,8 +218,10 @@ impl Header {
     }
 }
 
+/// A message of the YAML reader on one line, without the place, which is given apart.
 fn first_line(text: &str) -> String {
-    text.lines().next().unwrap_or_default().trim().to_owned()
+    let line = text.lines().next().unwrap_or_default();
+    line.split(" at line ").next().unwrap_or_default().trim().to_owned()
 }
 
 #[cfg(test)]

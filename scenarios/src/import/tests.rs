@@ -49,7 +49,7 @@ fn small_map(name: &str, origin: &str) -> MapLot {
 #[test]
 fn a_small_map_has_the_outline_computed_by_hand() {
     let lot = small_map("outline", "[1.0, 2.0, 0.0]");
-    let ground = lot.ros_ground(Vec2::new(1.2, 2.2)).unwrap();
+    let ground = lot.ros_ground(Vec2::new(1.2, 2.2), None).unwrap();
     let expected = [(3.0, 2.0), (3.0, 3.0), (2.5, 3.0), (2.5, 2.5), (2.0, 2.5), (2.0, 3.5), (1.0, 3.5), (1.0, 2.0)];
     assert_eq!(ground.boundary, vertices(&expected));
     assert!(ground.islands.is_empty());
@@ -59,7 +59,7 @@ fn a_small_map_has_the_outline_computed_by_hand() {
 fn a_turned_origin_turns_the_map_about_its_lower_left_corner() {
     let lot = small_map("turned", &format!("[1.0, 2.0, {FRAC_PI_2}]"));
     // Along the rows is +y now, up the columns −x.
-    let ground = lot.ros_ground(Vec2::new(0.8, 2.2)).unwrap();
+    let ground = lot.ros_ground(Vec2::new(0.8, 2.2), None).unwrap();
     let expected = [(1.0, 4.0), (0.0, 4.0), (0.0, 3.5), (0.5, 3.5), (0.5, 3.0), (-0.5, 3.0), (-0.5, 2.0), (1.0, 2.0)];
     assert_eq!(ground.boundary, vertices(&expected));
 }
@@ -67,7 +67,7 @@ fn a_turned_origin_turns_the_map_about_its_lower_left_corner() {
 #[test]
 fn the_scale_enlarges_everything_about_the_origin_of_the_frame() {
     let lot = MapLot { scale: 20.0, ..small_map("scaled", "[1.0, 2.0, 0.0]") };
-    let ground = lot.ros_ground(Vec2::new(24.0, 44.0)).unwrap();
+    let ground = lot.ros_ground(Vec2::new(24.0, 44.0), None).unwrap();
     let expected = [
         (60.0, 40.0),
         (60.0, 60.0),
@@ -130,7 +130,7 @@ fn a_small_map_is_driven_when_it_is_scaled() {
 #[test]
 fn no_route_is_explained_with_its_place_and_a_remedy() {
     let wall = refusal(&lane("wall", 0));
-    assert!(wall.contains("map.yaml: route: the goal cannot be reached: a wall is in the way near (3"), "{wall}");
+    assert!(wall.contains("map.yaml: route: the goal cannot be reached: a wall is in the way near (29.88, "), "{wall}");
     assert!(wall.contains("; open the map there"), "{wall}");
 
     let narrow = refusal(&lane("narrow", 2));
@@ -145,6 +145,8 @@ fn no_route_is_explained_with_its_place_and_a_remedy() {
     let mut lot = lane("blocked", 5);
     lot.goal = Some([57.0, 3.5, 0.0]);
     assert!(refusal(&lot).contains("goal: the car (4.91 m × 1.86 m, and 0.25 m around it)"), "{}", refusal(&lot));
+    lot.goal = Some([59.5, 3.5, 0.0]);
+    assert!(refusal(&lot).contains("goal: (59.50, 3.50) is not drivable: pixel (59, 3)"), "{}", refusal(&lot));
     lot.start = Some([30.0, 0.5, 0.0]);
     let occupied = refusal(&lot);
     assert!(
@@ -179,11 +181,10 @@ fn a_centre_line_must_have_room_for_the_car() {
     let wall = refusal(&with_line("line-wall", 0, line));
     assert!(wall.contains("centre_line, 24."), "the car's side meets the wall about 1 m before it: {wall}");
     assert!(wall.contains("too narrow at (29."), "{wall}");
-    let skew = refusal(&with_line("line-skew", 5, "5.0,3.5\n45.0,2\n"));
-    assert!(
-        skew.contains("0.9 m to the side") || skew.contains("m to the side, and half of the car is 0.93 m"),
-        "{skew}"
-    );
+    // 0.93 m from the wall at y = 1 is passed at y = 1.93: 87 % of the way down to 1.7.
+    let skew = refusal(&with_line("line-skew", 5, "5.0,3.5\n45.0,1.7\n"));
+    assert!(skew.contains("centre_line, 35.") || skew.contains("centre_line, 34."), "{skew}");
+    assert!(skew.contains("0.93 m to the side, and half of the car is 0.93 m"), "{skew}");
     for (line, expected) in [
         ("5.0,3.5\n45.0;3.5\n", "line.csv:2: \"45.0;3.5\" is no point; write one point per line"),
         ("5.0,3.5\n45.0,nan\n", "line.csv:2: \"45.0,nan\" is no point"),
@@ -202,7 +203,7 @@ fn faults_of_the_files_are_named() {
         ("resolution: 1.0", "resolution: -0.05", "map.yaml:3: resolution: it is -0.05; write"),
         ("resolution: 1.0", "resolution: .nan", "map.yaml:3: resolution: it is NaN; write"),
         ("resolution: 1.0", "resolution: fine", "map.yaml:3: "),
-        ("resolution: 1.0\n", "", "missing field `resolution`; a map needs image, resolution, origin"),
+        ("resolution: 1.0\n", "", ": missing field `resolution`; a map needs image, resolution, origin"),
         ("[0.0, 0.0, 0.0]", "[0.0, 0.0]", "map.yaml:4: "),
         ("[0.0, 0.0, 0.0]", "[0.0, .inf, 0.0]", "map.yaml:4: origin: a number is inf; write [x, y, yaw]"),
         ("mode: trinary", "mode: binary", "map.yaml:2: "),

@@ -11,10 +11,10 @@ use std::collections::{BTreeSet, BinaryHeap};
 
 /// Gives up after this many expansions: ten times what a generated lot may take, a few seconds.
 const EXPANSIONS_MAX: usize = 200_000;
-/// The route ends on the line through the goal, at most this far beside it, metres.
+/// The route ends beside the goal, at most this far, or up to two metres beyond it.
 pub const GOAL_BESIDE_M: f32 = 1.0;
-/// Cosine of the largest angle between the end of the route and the goal: 30°.
-const GOAL_HEADING_COS: f32 = 0.866;
+/// Cosine of the largest angle between the end of the route and the goal: 20°.
+const GOAL_HEADING_COS: f32 = 0.94;
 /// How far behind its start a loop ends, metres: farther than the goal's depth, so that the start is no finish.
 const LOOP_GAP_M: f32 = 2.5;
 /// The gate that makes a loop go round stands this far ahead of the start, metres: between rear and front axle.
@@ -29,7 +29,7 @@ const ROUTE_RADIUS_M: f32 = 5.0;
 /// Where a route ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Finish {
-    /// At a pose of the rear axle, within [`GOAL_BESIDE_M`] and 30°.
+    /// At a pose of the rear axle, within [`GOAL_BESIDE_M`] and 20°.
     At(Pose),
     /// Where it began, after a way round.
     Start,
@@ -100,14 +100,14 @@ pub fn find(
     if let Some(solution) = search.run(start, EXPANSIONS_MAX) {
         return Ok(reference_path(&solution.waypoints, &goal));
     }
-    if !search.body.is_free(&scene, goal_pose) {
-        return Err(NoRoute::GoalBlocked);
-    }
     let front = |pose: Pose| pose.position() + pose.ahead() * vehicle.wheelbase_m;
     let (at, room_m) = bottleneck(&scene, front(start), goal_pose.position(), &gate);
     let width_m = 2.0 * room_m;
     if width_m < WALL_M {
         return Err(NoRoute::Walled { at });
+    }
+    if !search.body.is_free(&scene, goal_pose) {
+        return Err(NoRoute::GoalBlocked);
     }
     if width_m < vehicle.width_m + 2.0 * clearance_m {
         return Err(NoRoute::Narrow { at, width_m });
@@ -150,7 +150,8 @@ fn gate(scene: &Scene, start: Pose, vehicle: &VehicleParams) -> BTreeSet<usize> 
     cells
 }
 
-/// The narrowest place of the widest way between two points, and the distance to the nearest edge there, metres.
+/// The narrowest place of the widest way between two points, and the distance to the nearest edge there, metres. Of a
+/// way through a wall, the place where it meets it.
 fn bottleneck(scene: &Scene, from: Vec2, to: Vec2, closed: &BTreeSet<usize>) -> (Vec2, f32) {
     let room = &scene.clearance_m;
     let (first, last) = (room.index(from), room.index(to));
@@ -185,18 +186,15 @@ fn bottleneck(scene: &Scene, from: Vec2, to: Vec2, closed: &BTreeSet<usize>) -> 
     {
         way.push(parent[cell] as usize);
     }
+    let wall = way.iter().rev().copied().find(|&cell| room.values[cell] < 0.5 * WALL_M);
     let narrowest = way.into_iter().min_by(|&a, &b| room.values[a].total_cmp(&room.values[b])).unwrap_or(first);
-    (room.centre(narrowest % room.cols, narrowest / room.cols), room.values[narrowest].max(0.0))
+    let place = wall.unwrap_or(narrowest);
+    (room.centre(place % room.cols, place / room.cols), room.values[narrowest].max(0.0))
 }
 
-/// The waypoints up to the finish line as few points, whole millimetres.
+/// The waypoints up to the first that has reached the goal as few points, whole millimetres.
 fn reference_path(waypoints: &[Waypoint], goal: &Goal) -> ReferencePath {
-    let is_before = |waypoint: &&Waypoint| {
-        let from_goal = waypoint.pose.position() - goal.point;
-        from_goal.dot(goal.direction) < 0.0 || from_goal.length() > 4.0 * GOAL_BESIDE_M
-    };
-    // The search ends beyond the line: the last points of the drive that lie beyond it are dropped but for the first.
-    let beyond = waypoints.iter().rev().take_while(|waypoint| !is_before(waypoint)).count();
+    let beyond = waypoints.iter().rev().take_while(|waypoint| goal.is_reached(waypoint.pose)).count();
     let kept = waypoints.len() - beyond.saturating_sub(1);
     let drive: LineString<f64> = waypoints[..kept]
         .iter()
