@@ -1,6 +1,7 @@
 //! Whole commands, run from outside: what they leave behind, and how they refuse bad input.
 
 use crate::bench::{scratch, succeed, text, xtask};
+use std::path::Path;
 
 /// Bad input: exit code 2, one error that names what is wrong, and nothing written.
 fn refuses(arguments: &[&str], expected: &[&str]) {
@@ -69,6 +70,71 @@ fn a_broken_lot_is_named_with_file_line_and_remedy() {
     std::fs::write(&path, text).unwrap();
     let path = path.to_string_lossy().into_owned();
     refuses(&["evaluate", "--driver", "expert", "--lots", &path], &["lot.toml:5", "reference_path"]);
+}
+
+/// A lane of 5 m with a wall across it where one is wanted, one pixel a decimetre: a tenth of what a car needs.
+fn small_map(folder: &Path, is_walled: bool) -> String {
+    let mut pixels = String::new();
+    for row in 0..7 {
+        for col in 0..60 {
+            let is_occupied = row == 0 || row == 6 || col == 0 || col == 59 || (is_walled && col == 30);
+            pixels.push_str(if is_occupied { "0 " } else { "254 " });
+        }
+        pixels.push('\n');
+    }
+    std::fs::write(folder.join("lane.pgm"), format!("P2\n60 7\n255\n{pixels}")).unwrap();
+    let yaml = folder.join("lane.yaml");
+    std::fs::write(&yaml, "image: lane.pgm\nresolution: 0.1\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n").unwrap();
+    yaml.to_string_lossy().into_owned()
+}
+
+#[test]
+fn a_map_is_driven_in_two_commands() {
+    let folder = scratch("own-map");
+    let (map, lots, results) = (small_map(&folder, false), folder.join("lots"), folder.join("results"));
+    let poses = ["--scale", "10", "--start", "0.5,0.35,0", "--goal", "4.0,0.35,0"];
+    let line = succeed(xtask().args(["generate", "--lots", &map]).args(poses).arg("--out").arg(&lots));
+    assert!(line.contains("lane.toml and .png: route 35."), "{line}");
+    let lot = lots.join("lane.toml").to_string_lossy().into_owned();
+    succeed(
+        xtask()
+            .args(["evaluate", "--driver", "expert", "--lots", &lot, "--trials", "1", "--directions", "forward"])
+            .arg("--out")
+            .arg(&results),
+    );
+    assert!(results.join("evaluation.md").is_file());
+}
+
+#[test]
+fn a_map_that_cannot_be_driven_is_refused_and_leaves_nothing() {
+    let folder = scratch("bad-map");
+    let map = small_map(&folder, true);
+    let out = folder.join("lots").to_string_lossy().into_owned();
+    let generate = |arguments: &[&str], expected: &[&str]| {
+        let command = [&["generate", "--out", &out, "--lots"], arguments].concat();
+        refuses(&command, expected);
+        assert!(!Path::new(&out).exists(), "{arguments:?} leaves {out}");
+    };
+    let poses = ["--start", "0.5,0.35,0", "--goal", "4.5,0.35,0"];
+    generate(&[&map], &["lane.yaml", "where to drive", "--start"]);
+    generate(
+        &[&[map.as_str(), "--scale", "10"], &poses[..]].concat(),
+        &["lane.yaml: route", "a wall is in the way near"],
+    );
+    generate(&[&[map.as_str(), "--scale", "0"], &poses[..]].concat(), &["scale: it is 0"]);
+    generate(&[&[map.as_str()], &poses[..]].concat(), &["start", "does not stand free", "scale"]);
+    generate(&[&map, "--start", "1,2", "--loop"], &["--start", "x,y,degrees"]);
+    generate(&["lot-a", "--scale", "10"], &["lot-a", ".yaml"]);
+    let yaml = std::fs::read_to_string(&map).unwrap();
+    for (from, to, expected) in [
+        ("resolution: 0.1", "resolution: 0", "lane.yaml:2: resolution"),
+        ("lane.pgm", "none.pgm", "none.pgm: cannot be read"),
+        ("image", "]", "lane.yaml:1"),
+    ] {
+        std::fs::write(&map, yaml.replacen(from, to, 1)).unwrap();
+        generate(&[&[map.as_str()], &poses[..]].concat(), &[expected]);
+    }
+    refuses(&["evaluate", "--driver", "expert", "--lots", "no-such.yaml"], &["no-such.yaml"]);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use sim::episode::{self, Ending, Episode, EpisodeConfig};
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
+use std::path::Path;
 use std::sync::Arc;
 
 #[test]
@@ -26,6 +27,34 @@ fn the_expert_drives_every_reference_lot_both_ways_without_a_near_collision() {
                 report.events
             );
             assert!((1.0..2.0).contains(&metrics.mean_speed_mps()), "{which:?}: {} m/s", metrics.mean_speed_mps());
+        }
+    }
+}
+
+/// ROS maps and TPCAP cases become lots like any other.
+#[test]
+fn the_expert_drives_the_example_maps_without_a_near_collision() {
+    let config = Arc::new(EpisodeConfig::paper());
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/examples");
+    for (file, directions) in [
+        ("car-park.yaml", &Direction::BOTH[..]),
+        ("car-park-loop.lot.toml", &Direction::BOTH),
+        ("car-park-centre.lot.toml", &Direction::BOTH),
+        ("open-lot.csv", &[Direction::Forward]),
+    ] {
+        let scenario = scenarios::load::load(&examples.join(file)).unwrap_or_else(|error| panic!("{error}"));
+        for &direction in directions {
+            let map = Arc::new(Map::build(direction.of(scenario.clone()), &config.vehicle).unwrap());
+            let mut expert = ScriptedExpert::new(ExpertConfig::paper(), &config.vehicle, config.sensing.geometry);
+            let report = episode::run(Episode::new(Arc::clone(&config), map, RootSeed(4)), &mut expert, &mut ());
+            assert_eq!(report.ending, Ending::ReachedEnd, "{file} {direction:?}");
+            let metrics = &report.metrics;
+            assert_eq!(
+                (metrics.near_collisions, metrics.contacts, metrics.stuck),
+                (0, 0, 0),
+                "{file} {direction:?}: {:?}",
+                report.events
+            );
         }
     }
 }

@@ -10,10 +10,12 @@
 //! | [`generator`] | procedural lots, each verified by the [`solver`] |
 //! | [`split`] | which generated lots may be trained on |
 //! | [`load`] | lots as TOML files |
+//! | [`import`] | ROS maps and TPCAP cases as lots |
 
 pub mod clutter;
 pub mod corridor;
 pub mod generator;
+pub mod import;
 pub mod load;
 pub mod reference;
 pub mod solver;
@@ -30,7 +32,7 @@ use std::path::PathBuf;
 ///
 /// `lot-a`, `lot-b`, `lot-c` · `reference` (all three) · `train:N`, `validation:N`, `test:N` (the first N generated lots
 /// of a split, medium unless `:easy`, `:medium` or `:hard` follows) · `test-hard-7` (one of them) · a path ending in
-/// `.toml`.
+/// `.toml`, or in `.yaml` or `.csv` for a map with its route beside it (see [`import`]).
 ///
 /// ```
 /// let lots = scenarios::suite("lot-a,test:2:hard")?;
@@ -110,7 +112,8 @@ impl std::str::FromStr for LotSpec {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{name:?} {problem}; there are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N and test:N \
-     (N generated lots; add :easy, :medium or :hard), single ones such as test-hard-7, and paths ending in .toml"
+     (N generated lots; add :easy, :medium or :hard), single ones such as test-hard-7, and paths ending in .toml, .yaml \
+     (ROS map) or .csv (TPCAP case)"
 )]
 pub struct SpecError {
     name: String,
@@ -130,8 +133,8 @@ fn lots_of(name: &str) -> Result<Vec<LotSpec>, SpecError> {
     if let Some(lot) = ReferenceLot::ALL.into_iter().find(|lot| lot.name() == name) {
         return Ok(vec![LotSpec::Reference(lot)]);
     }
-    let is_file = std::path::Path::new(name).extension().is_some_and(|extension| extension == "toml");
-    if is_file {
+    let path = std::path::Path::new(name);
+    if path.extension().is_some_and(|extension| extension == "toml") || import::is_map(path) {
         return Ok(vec![LotSpec::File(name.into())]);
     }
     if let Some(lot) = generated_lot(name) {

@@ -1,7 +1,9 @@
-//! Lots as TOML files that a person can write by hand; `examples/` has an annotated one.
+//! Lots as files: TOML that a person can write by hand, and maps of other programs ([`crate::import`]); `examples/` has
+//! annotated ones.
 //!
 //! Whatever is wrong with a file comes back as one error that names file, line and remedy.
 
+use crate::import::{self, MapLot};
 use sim::scenario::{Place, Scenario, ScenarioError};
 use sim::validate::validate;
 use sim::vehicle::VehicleParams;
@@ -32,17 +34,46 @@ pub enum LoadError {
         /// What would make it right.
         remedy: String,
     },
+    /// A map of another program from which no lot can be made.
+    #[error("{file}: {place}: {problem}; {remedy}")]
+    Map {
+        /// As given.
+        file: String,
+        /// The key, image or place at fault.
+        place: String,
+        /// What is wrong there.
+        problem: String,
+        /// What would make it right.
+        remedy: String,
+    },
 }
 
-/// Reads and checks a scenario file.
+impl LoadError {
+    pub(crate) fn faulty(file: &str, text: &str, offset: usize, problem: String, remedy: String) -> Self {
+        let line = 1 + text.get(..offset).unwrap_or(text).matches('\n').count();
+        Self::Faulty { file: file.to_owned(), line, problem, remedy }
+    }
+}
+
+/// Reads and checks a lot: a scenario file, a `NAME.lot.toml` that names a map, or a map with such a file beside it.
 ///
 /// # Errors
-/// The first thing wrong with it, with its line.
+/// The first thing wrong with it, with its place.
 pub fn load(path: &Path) -> Result<Scenario, LoadError> {
-    let file = path.display().to_string();
-    let text = std::fs::read_to_string(path)
-        .map_err(|error| LoadError::Unreadable { file: file.clone(), problem: error.to_string() })?;
-    parse(&text, &file)
+    if import::is_map(path) {
+        return MapLot::read(path)?.scenario();
+    }
+    let text = read_text(path)?;
+    if Document::parse(text.as_str()).is_ok_and(|document| document.as_table().contains_key("map")) {
+        return MapLot::read(path)?.scenario();
+    }
+    parse(&text, &path.display().to_string())
+}
+
+/// The text of a file.
+pub(crate) fn read_text(path: &Path) -> Result<String, LoadError> {
+    std::fs::read_to_string(path)
+        .map_err(|error| LoadError::Unreadable { file: path.display().to_string(), problem: error.to_string() })
 }
 
 /// Reads and checks the text of a scenario file; `file` is its name in errors.
@@ -50,12 +81,8 @@ pub fn load(path: &Path) -> Result<Scenario, LoadError> {
 /// # Errors
 /// The first thing wrong with it, with its line.
 pub fn parse(text: &str, file: &str) -> Result<Scenario, LoadError> {
-    let faulty = |offset: usize, problem: String, remedy: String| LoadError::Faulty {
-        file: file.to_owned(),
-        line: 1 + text.get(..offset).unwrap_or(text).matches('\n').count(),
-        problem,
-        remedy,
-    };
+    let faulty =
+        |offset: usize, problem: String, remedy: String| LoadError::faulty(file, text, offset, problem, remedy);
     let document = Document::parse(text).map_err(|error| {
         let offset = error.span().map_or(0, |span| span.start);
         faulty(offset, format!("not TOML: {}", error.message().trim()), "fix the syntax there".to_owned())
@@ -216,8 +243,9 @@ mod tests {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
         let mut files: Vec<_> =
             folder.read_dir().expect("examples").map(|entry| entry.expect("entry").path()).collect();
+        files.retain(|file| file.extension().is_some_and(|extension| extension == "toml" || extension == "yaml"));
         files.sort();
-        assert!(!files.is_empty());
+        assert!(files.len() >= 5, "{files:?}");
         for file in files {
             let scenario = load(&file).unwrap_or_else(|error| panic!("{error}"));
             let back = scenario.reversed();

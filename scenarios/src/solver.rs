@@ -8,7 +8,9 @@ use sim::geometry::{Pose, Vec2, distance_to_segment, edges};
 use sim::scenario::Scenario;
 use sim::vehicle::VehicleParams;
 use std::cmp::Ordering;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeSet, BinaryHeap};
+
+pub mod route;
 
 /// Clearance that generated lots must leave around the body, metres (methods.md 11).
 pub const CLEARANCE_M: f32 = 0.25;
@@ -58,8 +60,8 @@ pub struct Waypoint {
 pub fn solve(scenario: &Scenario, vehicle: &VehicleParams, clearance_m: f32) -> Option<Solution> {
     let scene = Scene::new(scenario);
     let goal = Goal::new(scenario);
-    let to_go = DistanceToGo::new(&scene, &goal, vehicle);
-    Search::new(&scene, &goal, &to_go, vehicle, clearance_m).run(start_pose(scenario))
+    let to_go = DistanceToGo::new(&scene, &goal, vehicle, &BTreeSet::new());
+    Search::new(&scene, &goal, &to_go, vehicle, clearance_m).run(start_pose(scenario), EXPANSIONS_MAX)
 }
 
 fn start_pose(scenario: &Scenario) -> Pose {
@@ -71,24 +73,26 @@ fn start_pose(scenario: &Scenario) -> Pose {
 struct Goal {
     point: Vec2,
     direction: Vec2,
+    /// Half the length of the line, metres.
+    reach_m: f32,
+    /// Cosine of the largest angle between the car and the direction.
+    heading_cos: f32,
 }
 
 impl Goal {
-    /// Half the length of the finish line, metres.
-    const REACH_M: f32 = 4.0;
-
     fn new(scenario: &Scenario) -> Self {
         let points = &scenario.reference_path.points;
         let last = points.len() - 1;
-        Self { point: points[last], direction: (points[last] - points[last - 1]).normalize() }
+        let direction = (points[last] - points[last - 1]).normalize();
+        Self { point: points[last], direction, reach_m: 4.0, heading_cos: 0.5 }
     }
 
     fn is_reached(&self, pose: Pose) -> bool {
         let from_goal = pose.position() - self.point;
         let past_m = from_goal.dot(self.direction);
         (0.0..2.0 * STEP_M).contains(&past_m)
-            && from_goal.perp_dot(self.direction).abs() < Self::REACH_M
-            && pose.ahead().dot(self.direction) > 0.5
+            && from_goal.perp_dot(self.direction).abs() < self.reach_m
+            && pose.ahead().dot(self.direction) > self.heading_cos
     }
 }
 
@@ -160,7 +164,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn run(mut self, start: Pose) -> Option<Solution> {
+    fn run(&mut self, start: Pose, expansions_max: usize) -> Option<Solution> {
         if !self.is_free(start, 0.0) {
             return None;
         }
@@ -171,7 +175,7 @@ impl<'a> Search<'a> {
                 return Some(Solution { waypoints: self.trace(node), expansions });
             }
             expansions += 1;
-            if expansions > EXPANSIONS_MAX {
+            if expansions > expansions_max {
                 return None;
             }
             self.expand(node);
@@ -417,7 +421,8 @@ impl Scene {
 struct DistanceToGo(Raster<f32>);
 
 impl DistanceToGo {
-    fn new(scene: &Scene, goal: &Goal, vehicle: &VehicleParams) -> Self {
+    /// `closed` are cells of the clearance raster that count as solid.
+    fn new(scene: &Scene, goal: &Goal, vehicle: &VehicleParams, closed: &BTreeSet<usize>) -> Self {
         let half_width_m = 0.5 * vehicle.width_m;
         let mut to_go = Raster::covering(scene.low, scene.high, Scene::NODE_M, f32::INFINITY);
         // The front axle is at the source when the rear axle reaches the finish.
@@ -440,7 +445,7 @@ impl DistanceToGo {
                 }
                 let next = (y * cols + x) as usize;
                 let clearance_m = scene.clearance_m.values[next];
-                if clearance_m < half_width_m - Scene::SLACK_M {
+                if clearance_m < half_width_m - Scene::SLACK_M || closed.contains(&next) {
                     continue;
                 }
                 let length_m = Scene::NODE_M * ((dx * dx + dy * dy) as f32).sqrt();

@@ -173,7 +173,9 @@ pub enum Directions {
 const GENERATE_EXAMPLES: &str = "\
 Examples:
   cargo xtask generate --lots lot-a,lot-b,lot-c --out lots
-  cargo xtask generate --lots lot-a --seed 7 --count 5 --out lots";
+  cargo xtask generate --lots lot-a --seed 7 --count 5 --out lots
+  cargo xtask generate --lots my-map.yaml --scale 20 --start 0.4,1.2,90 --goal 3.1,0.5,-90 --out lots
+  cargo xtask generate --lots my-map.yaml --start 4,2,0 --loop --out lots";
 
 /// Arguments of `generate`.
 #[derive(Debug, Clone, Args)]
@@ -192,10 +194,46 @@ pub struct GenerateArgs {
     pub out: PathBuf,
     /// Pixels per metre of the pictures [default: as fits 1600 pixels].
     #[arg(long, value_name = "PIXELS")]
-    pub scale: Option<f32>,
+    pub pixels_per_metre: Option<f32>,
     /// Replaces files of the same name.
     #[arg(long)]
     pub overwrite: bool,
+    /// Where to drive on a map.
+    #[command(flatten)]
+    pub map: MapArgs,
+}
+
+/// Where to drive on a ROS map (`--lots MAP.yaml`) or TPCAP case (`--lots CASE.csv`). Coordinates are those of the map;
+/// `MAP.lot.toml` can hold the same and is read first.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
+#[command(next_help_heading = "Maps")]
+pub struct MapArgs {
+    /// Makes the lot this many times as large as the map.
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
+    pub scale: Option<f32>,
+    /// Where the rear axle starts: metres, metres, degrees counter-clockwise from x.
+    #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
+    pub start: Option<[f32; 3]>,
+    /// Where it is to arrive; the route there is found automatically.
+    #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
+    pub goal: Option<[f32; 3]>,
+    /// Instead of a goal: a route round a loop, back to the start.
+    #[arg(long = "loop", conflicts_with = "goal")]
+    pub is_loop: bool,
+    /// Instead of all three: CSV file with the route of the rear axle, x and y in metres.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["start", "goal", "is_loop"])]
+    pub centre_line: Option<PathBuf>,
+    /// Clearance that a route found automatically keeps around the body, metres in the lot [default: 0.25].
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    pub clearance: Option<f32>,
+}
+
+/// `X,Y,DEG`.
+fn pose(text: &str) -> Result<[f32; 3], String> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    numbers
+        .and_then(|numbers| numbers.try_into().ok())
+        .ok_or_else(|| "write x,y,degrees, e.g. 3.5,-2,90, without spaces".to_owned())
 }
 
 /// Arguments of `pixel-accuracy`.

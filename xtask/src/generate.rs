@@ -1,18 +1,20 @@
 //! `generate`: lots as TOML plus a top-view PNG.
 
-use crate::cli::GenerateArgs;
+use crate::cli::{GenerateArgs, MapArgs};
 use crate::interrupt::{self, Interrupted};
 use crate::lots::Lot;
 use crate::progress::Work;
 use crate::render;
 use crate::run_dir::write_whole;
 use crate::trials::{Job, Purpose};
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use rayon::prelude::*;
+use scenarios::import::{self, MapLot};
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleParams;
+use std::path::Path;
 
 /// Lots made at a time; between two groups Ctrl-C is looked at.
 const GROUP: usize = 8;
@@ -22,9 +24,9 @@ const GROUP: usize = 8;
 /// # Errors
 /// If something named does not exist or a file is there already, or by Ctrl-C.
 pub fn run(args: &GenerateArgs) -> anyhow::Result<()> {
-    ensure!(args.scale.is_none_or(|scale| scale > 0.0), "--scale must be positive, in pixels per metre");
+    ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
     ensure!(args.count > 0, "--count is 0; at least one is needed");
-    let lots = Lot::parse_all(&args.lots)?;
+    let lots = lots(args)?;
     let fixed = lots.iter().find(|lot| !lot.is_drawn_per_trial());
     ensure!(
         args.count == 1 || fixed.is_none(),
@@ -64,6 +66,31 @@ pub fn run(args: &GenerateArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// The lots named; of a map with the route the command line asks for.
+fn lots(args: &GenerateArgs) -> anyhow::Result<Vec<Lot>> {
+    let MapArgs { scale, start, goal, is_loop, centre_line, clearance } = &args.map;
+    if args.map == MapArgs::default() {
+        return Lot::parse_all(&args.lots);
+    }
+    let [path] = args.lots.as_slice() else {
+        bail!("--scale, --start and the like are about one map, and {} lots are named; name one", args.lots.len());
+    };
+    let path = Path::new(path);
+    ensure!(
+        import::is_map(path),
+        "--scale, --start and the like are about maps, and {} is none; name a .yaml (ROS) or .csv (TPCAP) file",
+        path.display()
+    );
+    let mut lot = MapLot::read(path)?;
+    lot.scale = scale.unwrap_or(lot.scale);
+    lot.clearance_m = clearance.unwrap_or(lot.clearance_m);
+    lot.start = start.or(lot.start);
+    if goal.is_some() || *is_loop || centre_line.is_some() {
+        (lot.goal, lot.is_loop, lot.centre_line) = (*goal, *is_loop, centre_line.clone());
+    }
+    Ok(vec![Lot::of_map(path, &lot)?])
+}
+
 struct Made {
     attempts: Option<u32>,
     line: String,
@@ -91,9 +118,13 @@ fn write(args: &GenerateArgs, job: &Job<'_>) -> anyhow::Result<Made> {
     let vehicle = VehicleParams::hyundai_hg300();
     let text = scenarios::load::to_toml(&drawn.scenario);
     let map = Map::build(drawn.scenario, &vehicle).with_context(|| name.clone())?;
-    write_whole(&png, &render::top_view(&map, &vehicle, args.scale)?)?;
+    write_whole(&png, &render::top_view(&map, &vehicle, args.pixels_per_metre)?)?;
     write_whole(&toml, text.as_bytes())?;
     let (length_m, obstacles) = (map.path().length_m(), map.scenario().obstacles.len());
-    let line = format!("{} and .png: route {length_m:.1} m, {obstacles} obstacles", toml.display());
+    // A route found for one way need not leave room at its finish to start back from there.
+    let back = Map::build(map.scenario().clone().reversed(), &vehicle);
+    let ways =
+        back.err().map_or(String::new(), |error| format!("; --directions forward only: on the way back, {error}"));
+    let line = format!("{} and .png: route {length_m:.1} m, {obstacles} obstacles{ways}", toml.display());
     Ok(Made { attempts: drawn.attempts, line })
 }

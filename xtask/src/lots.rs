@@ -3,10 +3,12 @@
 use anyhow::ensure;
 use scenarios::LotSpec;
 use scenarios::generator;
+use scenarios::import::MapLot;
 use scenarios::reference::ReferenceLot;
 use scenarios::split::Split;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
+use std::path::Path;
 
 /// A lot, before a trial has drawn its obstacles.
 #[derive(Debug, Clone)]
@@ -27,14 +29,16 @@ pub struct Drawn {
 }
 
 /// Ways to name lots: how it is written, what it means.
-pub const SPECS: [(&str, &str); 7] = [
+pub const SPECS: [(&str, &str); 9] = [
     ("lot-a", "the paper's training lot rebuilt: 231 m; obstacles drawn anew for every trial"),
     ("lot-b", "139 m, the narrowest, never trained on"),
     ("lot-c", "149 m, the widest, never trained on"),
     ("reference", "all three"),
     ("test:N", "the first N generated lots of a split: train, validation or test; :easy or :hard may follow"),
     ("test-hard-7", "one of them"),
-    ("PATH.toml", "a lot written by hand (cargo xtask generate writes examples)"),
+    ("PATH.toml", "a lot written by hand (cargo xtask generate writes examples), or the route on a map, PATH.lot.toml"),
+    ("PATH.yaml", "a ROS map, driven as PATH.lot.toml beside it says (see scenarios/examples/car-park.lot.toml)"),
+    ("PATH.csv", "a TPCAP case with a drive forwards; PATH.lot.toml may change it"),
 ];
 
 impl Lot {
@@ -63,6 +67,15 @@ impl Lot {
         };
         let name = from_file.as_ref().map_or_else(|| spec.to_string(), |scenario| scenario.name.clone());
         Ok(Self { name, spec, from_file })
+    }
+
+    /// A map with a route that may differ from what is written beside it.
+    ///
+    /// # Errors
+    /// If no lot can be made of it.
+    pub fn of_map(path: &Path, lot: &MapLot) -> anyhow::Result<Self> {
+        let scenario = lot.scenario()?;
+        Ok(Self { name: scenario.name.clone(), spec: LotSpec::File(path.to_owned()), from_file: Some(scenario) })
     }
 
     /// Name in tables.

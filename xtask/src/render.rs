@@ -62,7 +62,9 @@ pub fn top_view(map: &Map, vehicle: &VehicleParams, px_per_m: Option<f32>) -> an
     let height = lot_height + LINE_PX * (legend_rows.len() as f32 + 2.0);
     let pixmap = Pixmap::new(width as u32, height as u32)
         .filter(|pixmap| pixmap.width().max(pixmap.height()) <= 16_384)
-        .ok_or_else(|| anyhow::anyhow!("{width:.0}×{height:.0} pixels are too many; choose a smaller --scale"))?;
+        .ok_or_else(|| {
+            anyhow::anyhow!("{width:.0}×{height:.0} pixels are too many; choose a smaller --pixels-per-metre")
+        })?;
     let mut canvas = Canvas { pixmap, scale, lowest, top_m: highest.y };
     canvas.pixmap.fill(colour(GROUND));
     draw_ground(&mut canvas, map);

@@ -1,0 +1,457 @@
+//! Maps made for other programs as lots: ROS `map_server` maps and TPCAP benchmark cases.
+//!
+//! A map says what is drivable, a [`MapLot`] says where to drive on it. It is a small TOML file, by custom
+//! `NAME.lot.toml`; `examples/` has annotated ones. All of its coordinates are metres in the map's own frame, as RViz
+//! shows them; `scale` then enlarges the whole about (0, 0), so that a map of a small robot's world fits a car.
+
+mod contour;
+mod ros;
+mod tpcap;
+
+use crate::load::LoadError;
+use crate::solver;
+use crate::solver::route::{self, Finish, NoRoute};
+use serde::Deserialize;
+use sim::distance_field::DistanceField;
+use sim::geometry::{Pose, Vec2};
+use sim::scenario::{Island, NoiseSettings, Obstacle, Place, ReferencePath, Scenario, ScenarioError};
+use sim::validate::validate;
+use sim::vehicle::VehicleParams;
+use std::path::{Path, PathBuf};
+
+/// Corners of a centre line are rounded with this radius, metres, as those of the reference lots (methods.md 11).
+const CENTRE_LINE_RADIUS_M: f32 = 5.0;
+/// Points of a centre line nearer than this count as one, metres in the lot.
+const SAME_POINT_M: f32 = 0.01;
+
+/// A map and the route on it: the content of a `NAME.lot.toml`.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MapLot {
+    /// ROS map (`.yaml`) or TPCAP case (`.csv`), relative to this file.
+    pub map: PathBuf,
+    /// Name of the lot; by default that of the file.
+    #[serde(default)]
+    pub name: Option<String>,
+    /// The lot is this many times as large as the map.
+    #[serde(default = "one")]
+    pub scale: f32,
+    /// Where the rear axle starts: x and y in metres, heading in degrees counter-clockwise from x.
+    #[serde(default)]
+    pub start: Option<[f32; 3]>,
+    /// Where it is to arrive.
+    #[serde(default)]
+    pub goal: Option<[f32; 3]>,
+    /// Instead of a goal: round a loop, back to the start.
+    #[serde(default, rename = "loop")]
+    pub is_loop: bool,
+    /// Instead of all three: a CSV file with the route of the rear axle, x and y in metres, relative to this file.
+    #[serde(default)]
+    pub centre_line: Option<PathBuf>,
+    /// Clearance that a route found automatically keeps around the body, metres in the lot.
+    #[serde(default = "clearance_m")]
+    pub clearance_m: f32,
+    /// Sensor noise of the lot.
+    #[serde(default)]
+    pub noise: NoiseSettings,
+    /// What is named in errors.
+    #[serde(skip)]
+    file: PathBuf,
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+fn clearance_m() -> f32 {
+    solver::CLEARANCE_M
+}
+
+/// Whether a path is that of a map this module reads, by its extension.
+pub fn is_map(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| ["yaml", "yml", "csv"].iter().any(|known| extension == *known))
+}
+
+/// What a map gives.
+struct Ground {
+    boundary: Vec<Vec2>,
+    islands: Vec<Vec<Vec2>>,
+    obstacles: Vec<Obstacle>,
+}
+
+impl MapLot {
+    /// Reads a `NAME.lot.toml`; of a map, the `NAME.lot.toml` beside it, if there is one.
+    ///
+    /// # Errors
+    /// If the file cannot be read or says something else.
+    pub fn read(path: &Path) -> Result<Self, LoadError> {
+        if !is_map(path) {
+            return Self::parse(&crate::load::read_text(path)?, path);
+        }
+        let beside = path.with_extension("lot.toml");
+        if !beside.is_file() {
+            return Ok(Self::of_map(path));
+        }
+        let lot = Self::read(&beside)?;
+        if lot.map.file_name() != path.file_name() {
+            let problem = format!("it names the map {}, not {}", lot.map.display(), path.display());
+            return Err(lot.fault("map", problem, "name the file that is meant with --lots"));
+        }
+        Ok(lot)
+    }
+
+    /// A map of which nothing else is said.
+    fn of_map(map: &Path) -> Self {
+        Self {
+            map: map.to_owned(),
+            name: None,
+            scale: one(),
+            start: None,
+            goal: None,
+            is_loop: false,
+            centre_line: None,
+            clearance_m: clearance_m(),
+            noise: NoiseSettings::default(),
+            file: map.to_owned(),
+        }
+    }
+
+    fn parse(text: &str, path: &Path) -> Result<Self, LoadError> {
+        let mut lot: Self = toml_edit::de::from_str(text).map_err(|error| {
+            let offset = error.span().map_or(0, |span| span.start);
+            let problem = error.message().trim().to_owned();
+            let remedy = "scenarios/examples/car-park.lot.toml shows every key".to_owned();
+            LoadError::faulty(&path.display().to_string(), text, offset, problem, remedy)
+        })?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        lot.map = folder.join(&lot.map);
+        lot.centre_line = lot.centre_line.map(|file| folder.join(file));
+        path.clone_into(&mut lot.file);
+        Ok(lot)
+    }
+
+    /// The lot, checked: it can be driven from its start to its finish.
+    ///
+    /// # Errors
+    /// The first thing wrong with it, with file, place and remedy.
+    pub fn scenario(&self) -> Result<Scenario, LoadError> {
+        self.check()?;
+        let is_ros = self.map.extension().is_some_and(|extension| extension != "csv");
+        let case = if is_ros { None } else { Some(tpcap::Case::read(&self.map)?) };
+        let start = self.start.or(case.as_ref().map(|case| case.start));
+        let goal = if self.is_loop { None } else { self.goal.or(case.as_ref().map(|case| case.goal)) };
+        let centre_line = self.centre_line.as_deref().map(|file| self.read_centre_line(file)).transpose()?;
+        let seed = match (&centre_line, start, goal, self.is_loop) {
+            (Some(points), ..) => points[0],
+            (None, Some(start), Some(_), false) | (None, Some(start), None, true) => self.pose_in_lot(start).position(),
+            _ => return Err(self.nothing_to_drive()),
+        };
+        let ground = match &case {
+            Some(case) => case.ground(self.scale),
+            None => self.ros_ground(seed, goal.map(|goal| self.pose_in_lot(goal).position()))?,
+        };
+        let mut scenario = Scenario {
+            name: self.name(),
+            boundary: ground.boundary,
+            reference_path: ReferencePath { points: Vec::new(), corner_radius_m: 0.0 },
+            noise: self.noise.clone(),
+            islands: ground.islands.into_iter().map(kerbed).collect(),
+            obstacles: ground.obstacles,
+            speed_bumps: Vec::new(),
+        };
+        validate_ground(&scenario).map_err(|error| self.in_lot(error))?;
+        scenario.reference_path = match (centre_line, start) {
+            (Some(points), _) => self.checked_centre_line(points, &scenario)?,
+            (None, Some(start)) => {
+                let start = self.pose_in_lot(start);
+                let finish = goal.map_or(Finish::Start, |goal| Finish::At(self.pose_in_lot(goal)));
+                route::find(&scenario, start, finish, &vehicle(), self.clearance_m)
+                    .map_err(|reason| self.no_route(reason, start, finish))?
+            }
+            (None, None) => return Err(self.nothing_to_drive()),
+        };
+        validate(&scenario, &vehicle()).map_err(|error| self.in_lot(error))?;
+        Ok(scenario)
+    }
+
+    fn check(&self) -> Result<(), LoadError> {
+        if !is_map(&self.map) {
+            let problem = format!("{} is neither a ROS map nor a TPCAP case", self.map.display());
+            return Err(self.fault("map", problem, "name a .yaml or a .csv file"));
+        }
+        if !(self.scale.is_finite() && self.scale > 0.0) {
+            let remedy = "write how many times as large as the map the lot is, e.g. 20";
+            return Err(self.fault("scale", format!("it is {}", self.scale), remedy));
+        }
+        if !(0.0..=2.0).contains(&self.clearance_m) {
+            let remedy = "write a number of metres from 0 to 2";
+            return Err(self.fault("clearance_m", format!("it is {}", self.clearance_m), remedy));
+        }
+        for (place, pose) in [("start", self.start), ("goal", self.goal)] {
+            if let Some(value) = pose.into_iter().flatten().find(|value| !value.is_finite()) {
+                return Err(self.fault(place, format!("a number is {value}"), "write x, y in metres and degrees"));
+            }
+        }
+        let also = [("goal", self.goal.is_some()), ("loop", self.is_loop), ("centre_line", self.centre_line.is_some())];
+        let given: Vec<&str> = also.into_iter().filter_map(|(name, is_given)| is_given.then_some(name)).collect();
+        if let [first, second, ..] = given[..] {
+            return Err(self.fault(second, format!("{first} is given too"), "keep one of them"));
+        }
+        Ok(())
+    }
+
+    fn name(&self) -> String {
+        self.name.clone().unwrap_or_else(|| {
+            let stem = self.file.file_stem().unwrap_or_default().to_string_lossy();
+            stem.strip_suffix(".lot").unwrap_or(&stem).to_owned()
+        })
+    }
+
+    /// The outlines of the drivable pixels around the seed, in the lot, as simple as they can be and stay sound.
+    fn ros_ground(&self, seed: Vec2, goal: Option<Vec2>) -> Result<Ground, LoadError> {
+        let map = ros::Map::read(&self.map)?;
+        let place = if self.centre_line.is_some() { "centre_line, point 1" } else { "start" };
+        let mut pixels = Vec::new();
+        for (place, point) in [(place, Some(seed)), ("goal", goal)] {
+            let Some(point) = point else { continue };
+            let pixel = map.pixel_at((point / self.scale).as_dvec2().to_array());
+            if !map.drivable.at(pixel) {
+                let problem = format!("{} is not drivable: {}", self.in_map(point), map.pixel_said(pixel));
+                let remedy = "move it onto free pixels; x and y are metres in the map's frame";
+                return Err(self.fault(place, problem, remedy));
+            }
+            pixels.push(pixel);
+        }
+        let region = map.drivable.region_of(pixels[0]);
+        let rings = region.outlines();
+        let in_lot = |[x, y]: [f64; 2]| {
+            let [x, y] = map.point_at([x, y]).map(|metres| metres * f64::from(self.scale));
+            let point = Vec2::new(x as f32, y as f32);
+            // Whole millimetres keep lot files short; a map finer than that keeps what it has.
+            if map.resolution_m * f64::from(self.scale) > 0.02 { crate::corridor::to_millimetres(point) } else { point }
+        };
+        let (outer, inner): (Vec<_>, Vec<_>) = rings.iter().partition(|ring| contour::signed_area_px2(ring) > 0.0);
+        let Some(outer) = outer.first() else {
+            unreachable!("a region has an outline");
+        };
+        let mut steps = vec![0; 1 + inner.len()];
+        loop {
+            let outline = |ring: &contour::Ring, step: usize| -> Vec<Vec2> {
+                contour::simplified(ring, contour::TOLERANCES_PX[step]).into_iter().map(in_lot).collect()
+            };
+            let ground = Ground {
+                boundary: outline(outer, steps[0]),
+                islands: inner.iter().zip(&steps[1..]).map(|(ring, &step)| outline(ring, step)).collect(),
+                obstacles: Vec::new(),
+            };
+            let Err(error) = validate_ground(&outlines_only(&ground)) else {
+                return Ok(ground);
+            };
+            // The outline at fault is followed more closely; if it is exact already, so is the boundary.
+            let at_fault = match error.place {
+                Place::Island(i) if steps[i + 1] + 1 < contour::TOLERANCES_PX.len() => i + 1,
+                _ => 0,
+            };
+            steps[at_fault] += 1;
+            if steps[at_fault] == contour::TOLERANCES_PX.len() {
+                return Err(self.in_lot(error));
+            }
+        }
+    }
+
+    /// The points of a CSV file, in the lot.
+    fn read_centre_line(&self, file: &Path) -> Result<Vec<Vec2>, LoadError> {
+        let name = file.display().to_string();
+        let text = crate::load::read_text(file)?;
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        let mut points: Vec<Vec2> = Vec::new();
+        for (i, record) in reader.records().enumerate() {
+            let faulty = |line: usize, problem: String| LoadError::Faulty {
+                file: name.clone(),
+                line,
+                problem,
+                remedy: "write one point per line: x,y in metres of the map's frame".to_owned(),
+            };
+            let record = record.map_err(|error| faulty(i + 1, format!("not CSV: {error}")))?;
+            let line = record.position().map_or(i + 1, |position| position.line() as usize);
+            let numbers: Vec<Option<f32>> = record.iter().take(2).map(|cell| cell.parse().ok()).collect();
+            match numbers[..] {
+                [Some(x), Some(y)] if x.is_finite() && y.is_finite() => {
+                    let point = Vec2::new(x, y) * self.scale;
+                    if points.last().is_none_or(|last| last.distance(point) > SAME_POINT_M) {
+                        points.push(point);
+                    }
+                }
+                // A first line of words is a header.
+                [None, ..] if i == 0 => {}
+                _ => {
+                    return Err(faulty(line, format!("{:?} is no point", record.iter().collect::<Vec<_>>().join(","))));
+                }
+            }
+        }
+        if points.len() < 2 {
+            let problem = format!("the line has {} points", points.len());
+            return Err(LoadError::Map {
+                file: name,
+                place: "centre line".to_owned(),
+                problem,
+                remedy: "give at least a start and a finish".to_owned(),
+            });
+        }
+        Ok(points)
+    }
+
+    /// The car must find room along the whole line: half its width to either side.
+    fn checked_centre_line(&self, points: Vec<Vec2>, ground: &Scenario) -> Result<ReferencePath, LoadError> {
+        let mut room = DistanceField::of_boundary(&ground.boundary);
+        for island in &ground.islands {
+            room.carve_polygon(&island.polygon);
+        }
+        for obstacle in &ground.obstacles {
+            room.carve_polygon(&obstacle.outline());
+        }
+        let line = ReferencePath { points, corner_radius_m: CENTRE_LINE_RADIUS_M };
+        let path = sim::path::Path::new(&line);
+        let half_width_m = 0.5 * vehicle().width_m;
+        for (i, pose) in path.poses().iter().enumerate() {
+            let room_m = room.at(pose.position());
+            if room_m >= half_width_m {
+                continue;
+            }
+            let place = format!("centre_line, {:.1} m from its start", i as f32 * path.spacing_m() / self.scale);
+            let at = self.in_map(pose.position());
+            let remedy = "lead the line round it, or enlarge the lot with scale; corners are rounded with 5 m";
+            let problem = if room_m <= 0.0 {
+                format!("it runs through a wall at {at}")
+            } else {
+                format!(
+                    "the passage is too narrow at {at}: {room_m:.2} m to the side, and half of the car is \
+                         {half_width_m:.2} m"
+                )
+            };
+            return Err(self.fault(&place, problem, remedy));
+        }
+        Ok(line)
+    }
+
+    fn pose_in_lot(&self, [x_m, y_m, heading_deg]: [f32; 3]) -> Pose {
+        Pose::new(Vec2::new(x_m, y_m) * self.scale, sim::geometry::wrap_angle(heading_deg.to_radians()))
+    }
+
+    /// A point of the lot as the map's frame has it.
+    fn in_map(&self, point: Vec2) -> String {
+        let point = point / self.scale;
+        format!("({:.2}, {:.2})", point.x, point.y)
+    }
+
+    fn fault(&self, place: &str, problem: String, remedy: &str) -> LoadError {
+        LoadError::Map {
+            file: self.file.display().to_string(),
+            place: place.to_owned(),
+            problem,
+            remedy: remedy.to_owned(),
+        }
+    }
+
+    /// An error of the lot made from the map.
+    fn in_lot(&self, ScenarioError { place, problem, remedy }: ScenarioError) -> LoadError {
+        let frame = if self.scale == 1.0 {
+            String::new()
+        } else {
+            format!(" (coordinates are the map's times {})", self.scale)
+        };
+        self.fault(&place.to_string(), problem + &frame, &remedy)
+    }
+
+    fn nothing_to_drive(&self) -> LoadError {
+        let name = self.map.with_extension("lot.toml");
+        let remedy = format!(
+            "write start and goal, start and loop, or centre_line into {}, or give --start x,y,deg with --goal x,y,deg \
+             or --loop, or --centre-line FILE, to cargo xtask generate",
+            name.display()
+        );
+        self.fault("route", "the map does not say where to drive".to_owned(), &remedy)
+    }
+
+    fn no_route(&self, reason: NoRoute, start: Pose, finish: Finish) -> LoadError {
+        let car = vehicle();
+        let clearance_m = self.clearance_m;
+        let blocked = |place: &str, pose: Pose| {
+            let problem = format!(
+                "the car ({} m × {} m, and {clearance_m} m around it) does not stand free at {}",
+                car.length_m,
+                car.width_m,
+                self.in_map(pose.position())
+            );
+            self.fault(place, problem, "move or turn it away from what is not drivable, or enlarge the lot with scale")
+        };
+        match (reason, finish) {
+            (NoRoute::GoalBlocked, Finish::At(goal)) => blocked("goal", goal),
+            (NoRoute::StartBlocked | NoRoute::GoalBlocked, _) => blocked("start", start),
+            (NoRoute::Walled { at }, Finish::At(_)) => {
+                let problem = format!("the goal cannot be reached: a wall is in the way near {}", self.in_map(at));
+                self.fault("route", problem, "open the map there, or put start and goal on the same side of it")
+            }
+            (NoRoute::Walled { at }, Finish::Start) => {
+                let problem = format!("there is no loop: the way back to the start ends near {}", self.in_map(at));
+                self.fault("route", problem, "open the map there, or give a goal instead of loop")
+            }
+            (NoRoute::Narrow { at, width_m }, _) => {
+                let need_m = car.width_m + 2.0 * clearance_m;
+                let problem = format!(
+                    "the passage near {} is too narrow: about {width_m:.1} m in the lot, and the car needs {need_m:.2} m",
+                    self.in_map(at)
+                );
+                self.fault("route", problem, "widen it, enlarge the lot with scale, or lower clearance_m")
+            }
+            (NoRoute::Tight { reached, to_go_m }, _) => {
+                let problem = format!(
+                    "no drive forwards was found: it got to {}, about {to_go_m:.0} m of the lot before the goal. The car \
+                     does not reverse, and turns with a radius of {:.1} m or more",
+                    self.in_map(reached),
+                    route::radius_min_m(&car)
+                );
+                let remedy = "widen the map there, turn or move start and goal, enlarge the lot with scale, or lower \
+                              clearance_m";
+                self.fault("route", problem, remedy)
+            }
+        }
+    }
+}
+
+fn vehicle() -> VehicleParams {
+    VehicleParams::hyundai_hg300()
+}
+
+fn kerbed(polygon: Vec<Vec2>) -> Island {
+    Island { polygon, height_m: 0.15 }
+}
+
+/// Checks a scenario that has no route yet. Everything else is checked before the route.
+fn validate_ground(scenario: &Scenario) -> Result<(), ScenarioError> {
+    match validate(scenario, &vehicle()) {
+        Err(ScenarioError { place: Place::ReferencePath(_), .. }) => Ok(()),
+        other => other,
+    }
+}
+
+/// A scenario without a route, for the check of its outlines.
+fn outlines_only(ground: &Ground) -> Scenario {
+    Scenario {
+        name: "map".to_owned(),
+        boundary: ground.boundary.clone(),
+        reference_path: ReferencePath { points: Vec::new(), corner_radius_m: 0.0 },
+        noise: NoiseSettings::default(),
+        islands: ground.islands.iter().cloned().map(kerbed).collect(),
+        obstacles: Vec::new(),
+        speed_bumps: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests;

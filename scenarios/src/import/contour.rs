@@ -1,0 +1,230 @@
+//! Outlines of drivable pixels: crack following and Douglas–Peucker simplification.
+//!
+//! Drivable pixels are joined by their sides, others also by their corners, so that every drivable region has one outline
+//! and nothing thinner than a pixel opens a wall. Outlines follow the pixels' sides exactly; where two of them would
+//! touch at a corner, both are cut back a quarter of a pixel.
+//!
+//! Coordinates are pixels: x to the right, y up, (0, 0) the lower left corner of the map.
+
+use geo::{LineString, Polygon, Simplify as _};
+
+/// Steps of simplification, pixels: the first that leaves sound polygons is taken. A staircase of 45° deviates from its
+/// line by 0.71.
+pub(super) const TOLERANCES_PX: [f64; 3] = [0.75, 0.25, 0.0];
+/// Outlines of no more corners than this are kept as they are: single pixels would lose half of their area.
+const SMALL_CORNERS: usize = 8;
+/// Cut where outlines would touch, pixels.
+const CUT_PX: f64 = 0.25;
+/// Directions of travel along the bottom, right, top and left side of a pixel, which then lies to the left.
+const ALONG: [[i32; 2]; 4] = [[1, 0], [0, 1], [-1, 0], [0, -1]];
+
+/// A closed outline; the last point joins the first.
+pub(super) type Ring = Vec<[f64; 2]>;
+
+/// Which pixels are drivable, row by row from the bottom.
+#[derive(Debug, Clone)]
+pub(super) struct Mask {
+    /// Pixels per row.
+    pub(super) cols: usize,
+    /// `true` = drivable; a whole number of rows.
+    pub(super) is_free: Vec<bool>,
+}
+
+impl Mask {
+    /// Whether a pixel is drivable; outside the map nothing is.
+    pub(super) fn at(&self, [col, row]: [i32; 2]) -> bool {
+        self.index([col, row]).is_some_and(|index| self.is_free[index])
+    }
+
+    fn index(&self, [col, row]: [i32; 2]) -> Option<usize> {
+        let (col, row) = (usize::try_from(col).ok()?, usize::try_from(row).ok()?);
+        let index = row * self.cols + col;
+        (col < self.cols && index < self.is_free.len()).then_some(index)
+    }
+
+    /// The drivable pixels that can be reached from one of them by steps over sides.
+    #[must_use]
+    pub(super) fn region_of(&self, seed: [i32; 2]) -> Self {
+        let mut region = Self { cols: self.cols, is_free: vec![false; self.is_free.len()] };
+        let mut open = vec![seed];
+        while let Some(pixel) = open.pop() {
+            let Some(index) = self.index(pixel).filter(|&index| self.is_free[index] && !region.is_free[index]) else {
+                continue;
+            };
+            region.is_free[index] = true;
+            open.extend(ALONG.map(|step| ahead(pixel, step)));
+        }
+        region
+    }
+
+    /// Outlines of a region: counter-clockwise around it, clockwise around what it encloses, exact to the pixel.
+    pub(super) fn outlines(&self) -> Vec<Ring> {
+        let mut is_done = vec![[false; 4]; self.is_free.len()];
+        let mut rings = Vec::new();
+        for first in 0..self.is_free.len() {
+            let pixel = [(first % self.cols) as i32, (first / self.cols) as i32];
+            for side in 0..4 {
+                if self.is_edge(pixel, side) && !is_done[first][side] {
+                    rings.push(self.follow(pixel, side, &mut is_done));
+                }
+            }
+        }
+        rings
+    }
+
+    /// Whether the pixel is drivable and what lies behind its side is not.
+    fn is_edge(&self, pixel: [i32; 2], side: usize) -> bool {
+        self.at(pixel) && !self.at(ahead(pixel, right_of(side)))
+    }
+
+    fn follow(&self, first: [i32; 2], first_side: usize, is_done: &mut [[bool; 4]]) -> Ring {
+        let mut ring = Vec::new();
+        let (mut pixel, mut side) = (first, first_side);
+        loop {
+            if let Some(index) = self.index(pixel) {
+                is_done[index][side] = true;
+            }
+            // The side's end, and the two pixels ahead of it: the left one beside our own.
+            let end = end_of(pixel, side);
+            let left = ahead(pixel, ALONG[side]);
+            let right = ahead(left, right_of(side));
+            match (self.at(left), self.at(right)) {
+                (true, false) => pixel = left,
+                (true, true) => {
+                    ring.push(end);
+                    (pixel, side) = (right, (side + 3) % 4);
+                }
+                (false, touches) => {
+                    let next = (side + 1) % 4;
+                    if touches {
+                        ring.push(shifted(end, ALONG[side], -CUT_PX));
+                        ring.push(shifted(end, ALONG[next], CUT_PX));
+                    } else {
+                        ring.push(end);
+                    }
+                    side = next;
+                }
+            }
+            if (pixel, side) == (first, first_side) {
+                return ring;
+            }
+        }
+    }
+}
+
+fn ahead([col, row]: [i32; 2], [dx, dy]: [i32; 2]) -> [i32; 2] {
+    [col + dx, row + dy]
+}
+
+/// Direction to the right of the travel along a side: away from the pixel.
+fn right_of(side: usize) -> [i32; 2] {
+    ALONG[(side + 3) % 4]
+}
+
+/// Where the travel along a side of a pixel ends.
+fn end_of([col, row]: [i32; 2], side: usize) -> [f64; 2] {
+    let [dx, dy] = [[1, 0], [1, 1], [0, 1], [0, 0]][side];
+    [f64::from(col + dx), f64::from(row + dy)]
+}
+
+fn shifted([x, y]: [f64; 2], [dx, dy]: [i32; 2], by_px: f64) -> [f64; 2] {
+    [x + by_px * f64::from(dx), y + by_px * f64::from(dy)]
+}
+
+/// Area of a ring, square pixels, negative if clockwise.
+pub(super) fn signed_area_px2(ring: &[[f64; 2]]) -> f64 {
+    let next = ring.iter().cycle().skip(1);
+    0.5 * ring.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>()
+}
+
+/// Leaves out corners that lie within a tolerance of the line that replaces them (Douglas & Peucker 1973).
+pub(super) fn simplified(ring: &[[f64; 2]], tolerance_px: f64) -> Ring {
+    if ring.len() <= SMALL_CORNERS || tolerance_px == 0.0 {
+        return ring.to_vec();
+    }
+    // The algorithm keeps the point it starts from: let that be a corner of the convex hull.
+    let lowest = (0..ring.len()).min_by(|&a, &b| ring[a].partial_cmp(&ring[b]).unwrap_or(std::cmp::Ordering::Equal));
+    let mut points = ring.to_vec();
+    points.rotate_left(lowest.unwrap_or(0));
+    let outline = Polygon::new(LineString::from(points), Vec::new()).simplify(tolerance_px);
+    // Without the repetition of the first point.
+    let closed = &outline.exterior().0;
+    closed[..closed.len() - 1].iter().map(|point| [point.x, point.y]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A mask drawn as text, top row first; `.` is drivable.
+    fn mask(rows: &[&str]) -> Mask {
+        let is_free = rows.iter().rev().flat_map(|row| row.bytes().map(|pixel| pixel == b'.')).collect();
+        Mask { cols: rows[0].len(), is_free }
+    }
+
+    #[test]
+    fn a_room_with_a_pillar_has_two_exact_outlines() {
+        let rings = mask(&["#####", "#...#", "#.#.#", "#...#", "#####"]).outlines();
+        assert_eq!(
+            rings,
+            [
+                vec![[4.0, 1.0], [4.0, 4.0], [1.0, 4.0], [1.0, 1.0]],
+                vec![[2.0, 2.0], [2.0, 3.0], [3.0, 3.0], [3.0, 2.0]]
+            ]
+        );
+        assert_eq!(rings.iter().map(|ring| signed_area_px2(ring)).collect::<Vec<_>>(), [9.0, -1.0]);
+    }
+
+    /// The right part of the map is only reached over a corner: it is another region, and the outline is cut there.
+    #[test]
+    fn pixels_that_touch_at_a_corner_are_apart() {
+        let whole = mask(&["##..", "##..", "..##", "..##"]);
+        let region = whole.region_of([0, 0]);
+        assert_eq!(region.is_free.iter().filter(|&&free| free).count(), 4);
+        assert_eq!(region.outlines(), [vec![[2.0, 0.0], [2.0, 2.0], [0.0, 2.0], [0.0, 0.0]]]);
+        let [lower, upper] = whole.outlines().try_into().expect("two outlines");
+        assert_eq!(lower, [[2.0, 0.0], [2.0, 1.75], [1.75, 2.0], [0.0, 2.0], [0.0, 0.0]]);
+        assert_eq!(upper, [[4.0, 2.0], [4.0, 4.0], [2.0, 4.0], [2.0, 2.25], [2.25, 2.0]]);
+    }
+
+    #[test]
+    fn two_pillars_that_touch_at_a_corner_are_one_island() {
+        let rings = mask(&["......", ".##...", "...#..", "......"]).outlines();
+        assert_eq!(rings.len(), 2);
+        assert!((signed_area_px2(&rings[1]) + 3.0).abs() < 0.1, "{:?}", rings[1]);
+    }
+
+    #[test]
+    fn a_staircase_becomes_a_line_and_a_rectangle_stays() {
+        let size = 12;
+        let rows: Vec<String> =
+            (0..size).map(|row| (0..size).map(|col| if col <= row { '.' } else { '#' }).collect()).collect();
+        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+        let rings = mask(&rows).outlines();
+        assert_eq!(rings.len(), 1);
+        assert_eq!(rings[0].len(), 26, "12 steps of two corners, and two more");
+        let line = simplified(&rings[0], TOLERANCES_PX[0]);
+        assert!(line.len() <= 5, "{line:?}");
+        let rectangle = mask(&["...", "..."]).outlines().remove(0);
+        assert_eq!(simplified(&rectangle, TOLERANCES_PX[0]), rectangle);
+    }
+
+    /// Every corner of the exact outline of a disc lies within the tolerance of the simplified one.
+    #[test]
+    fn simplification_moves_nothing_by_a_pixel() {
+        let size = 60;
+        let is_free =
+            (0..size * size).map(|i| (f64::from(i % size) - 29.3).hypot(f64::from(i / size) - 30.1) < 25.0).collect();
+        let ring = Mask { cols: size as usize, is_free }.outlines().remove(0);
+        let short = simplified(&ring, TOLERANCES_PX[0]);
+        assert!(short.len() * 2 < ring.len(), "{} of {} corners are left", short.len(), ring.len());
+        let point = |[x, y]: [f64; 2]| sim::geometry::Vec2::new(x as f32, y as f32);
+        let outline: Vec<_> = short.iter().map(|&corner| point(corner)).collect();
+        for &corner in &ring {
+            let distance_px = sim::geometry::edges(&outline)
+                .map(|(a, b)| sim::geometry::distance_to_segment(point(corner), a, b))
+                .fold(f32::INFINITY, f32::min);
+            assert!(distance_px <= 0.7501, "{corner:?} moved by {distance_px} pixels");
+        }
+    }
+}

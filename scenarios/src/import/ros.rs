@@ -1,0 +1,276 @@
+//! ROS `map_server` maps: a YAML file that names an image (<http://wiki.ros.org/map_server>, sections "Map format" and
+//! "Value Interpretation"; ROS 2's `nav2_map_server` reads the same).
+//!
+//! What is drivable: in mode `trinary` what is free (occupancy below `free_thresh`), in the other two an occupancy below
+//! 50 %. Unknown is not drivable. Transparent pixels are unknown in every mode.
+
+use super::contour::Mask;
+use crate::load::{LoadError, read_text};
+use image::DynamicImage;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// Modes `scale` and `raw`: drivable below this occupancy, per cent.
+const DRIVABLE_BELOW_PERCENT: f64 = 50.0;
+/// Largest map, pixels.
+const PIXELS_MAX: u64 = 64_000_000;
+
+/// The YAML file. Other keys are ignored, as ROS does.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct Header {
+    image: PathBuf,
+    /// Metres per pixel.
+    resolution: f64,
+    /// Pose of the lower left corner of the lower left pixel: x, y in metres, yaw in radians counter-clockwise.
+    origin: [f64; 3],
+    #[serde(default)]
+    negate: Flag,
+    #[serde(default = "occupied_thresh")]
+    occupied_thresh: f64,
+    #[serde(default = "free_thresh")]
+    free_thresh: f64,
+    #[serde(default)]
+    mode: Mode,
+}
+
+// The defaults of nav2_map_server are those of the example in the wiki.
+fn occupied_thresh() -> f64 {
+    0.65
+}
+
+fn free_thresh() -> f64 {
+    0.196
+}
+
+/// ROS 1 writes 0 and 1, ROS 2 also false and true.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(untagged)]
+enum Flag {
+    Word(bool),
+    Number(i64),
+}
+
+impl Default for Flag {
+    fn default() -> Self {
+        Self::Word(false)
+    }
+}
+
+impl Flag {
+    fn is_set(self) -> bool {
+        !matches!(self, Self::Word(false) | Self::Number(0))
+    }
+}
+
+/// How pixels are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Mode {
+    #[default]
+    Trinary,
+    Scale,
+    Raw,
+}
+
+/// A map in its own frame.
+#[derive(Debug, Clone)]
+pub(super) struct Map {
+    /// Its drivable pixels.
+    pub(super) drivable: Mask,
+    /// Metres per pixel.
+    pub(super) resolution_m: f64,
+    origin_m: [f64; 2],
+    /// Cosine and sine.
+    yaw: [f64; 2],
+}
+
+impl Map {
+    /// Reads the YAML file and its image.
+    ///
+    /// # Errors
+    /// What is wrong with either, with file, place and remedy.
+    pub(super) fn read(path: &Path) -> Result<Self, LoadError> {
+        let header = Header::parse(&read_text(path)?, path)?;
+        let file = path.parent().unwrap_or(Path::new("")).join(&header.image);
+        let fault = |problem: String, remedy: &str| LoadError::Map {
+            file: path.display().to_string(),
+            place: format!("image {}", file.display()),
+            problem,
+            remedy: remedy.to_owned(),
+        };
+        let reader =
+            image::ImageReader::open(&file).and_then(image::ImageReader::with_guessed_format).map_err(|error| {
+                fault(format!("cannot be read: {error}"), "check the key image; paths start at the YAML file")
+            })?;
+        let image = reader
+            .decode()
+            .map_err(|error| fault(format!("no readable image: {error}"), "save the map as PGM or PNG"))?;
+        let pixels = u64::from(image.width()) * u64::from(image.height());
+        if pixels > PIXELS_MAX {
+            let problem = format!("{} × {} pixels are too many", image.width(), image.height());
+            return Err(fault(problem, "crop it, or halve its resolution"));
+        }
+        Ok(header.map(&image))
+    }
+
+    /// The pixel at a point of the map's frame, metres, counted from the lower left.
+    pub(super) fn pixel_at(&self, [x_m, y_m]: [f64; 2]) -> [i32; 2] {
+        let (x_m, y_m) = (x_m - self.origin_m[0], y_m - self.origin_m[1]);
+        let [cos, sin] = self.yaw;
+        [x_m * cos + y_m * sin, y_m * cos - x_m * sin].map(|metres| (metres / self.resolution_m).floor() as i32)
+    }
+
+    /// The point of the map's frame at pixel coordinates from its lower left corner, metres.
+    pub(super) fn point_at(&self, pixel: [f64; 2]) -> [f64; 2] {
+        let [along_m, up_m] = pixel.map(|pixels| pixels * self.resolution_m);
+        let [cos, sin] = self.yaw;
+        [self.origin_m[0] + along_m * cos - up_m * sin, self.origin_m[1] + along_m * sin + up_m * cos]
+    }
+
+    /// What is at a pixel that is not drivable, in words.
+    pub(super) fn pixel_said(&self, [col, row]: [i32; 2]) -> String {
+        let (cols, rows) = (self.drivable.cols as i32, (self.drivable.is_free.len() / self.drivable.cols) as i32);
+        if (0..cols).contains(&col) && (0..rows).contains(&row) {
+            return format!(
+                "pixel ({col}, {}) of the image, from its upper left, is occupied or unknown",
+                rows - 1 - row
+            );
+        }
+        let corners = [[0, 0], [cols, 0], [0, rows], [cols, rows]].map(|corner| self.point_at(corner.map(f64::from)));
+        let [x, y] = [0, 1].map(|axis| {
+            let values = corners.map(|corner| corner[axis]);
+            (values.into_iter().fold(f64::INFINITY, f64::min), values.into_iter().fold(f64::NEG_INFINITY, f64::max))
+        });
+        format!("the map spans x {:.2} to {:.2} and y {:.2} to {:.2}", x.0, x.1, y.0, y.1)
+    }
+}
+
+impl Header {
+    fn parse(text: &str, path: &Path) -> Result<Self, LoadError> {
+        let file = path.display().to_string();
+        let header: Self = serde_saphyr::from_str(text).map_err(|error| LoadError::Faulty {
+            file: file.clone(),
+            line: error.location().map_or(1, |location| location.line() as usize),
+            problem: first_line(&error.without_snippet().to_string()),
+            remedy: "a map needs image, resolution, origin: [x, y, yaw] and may have negate, occupied_thresh, \
+                     free_thresh, mode (trinary, scale or raw)"
+                .to_owned(),
+        })?;
+        let fault = |key: &str, problem: String, remedy: &str| {
+            // The key stands at the start of its line; flow style has one line.
+            let line = text.lines().position(|line| line.trim_start().starts_with(key)).unwrap_or(0);
+            LoadError::Faulty {
+                file: file.clone(),
+                line: line + 1,
+                problem: format!("{key}: {problem}"),
+                remedy: remedy.to_owned(),
+            }
+        };
+        let Self { resolution, origin, occupied_thresh, free_thresh, .. } = header;
+        if !(resolution.is_finite() && resolution > 0.0) {
+            return Err(fault("resolution", format!("it is {resolution}"), "write metres per pixel, above 0"));
+        }
+        if let Some(value) = origin.iter().find(|value| !value.is_finite()) {
+            return Err(fault("origin", format!("a number is {value}"), "write [x, y, yaw] in metres and radians"));
+        }
+        for (key, value) in [("occupied_thresh", occupied_thresh), ("free_thresh", free_thresh)] {
+            if !(0.0..=1.0).contains(&value) {
+                return Err(fault(key, format!("it is {value}"), "write an occupancy from 0 to 1"));
+            }
+        }
+        if free_thresh >= occupied_thresh {
+            let problem = format!("it is {free_thresh}, not below occupied_thresh, {occupied_thresh}");
+            return Err(fault("free_thresh", problem, "lower it"));
+        }
+        Ok(header)
+    }
+
+    fn map(&self, image: &DynamicImage) -> Map {
+        let (cols, rows) = (image.width() as usize, image.height() as usize);
+        let pixels = image.to_rgba8();
+        // Row 0 of an image is its top, of a mask its bottom.
+        let is_free = pixels.rows().rev().flatten().map(|pixel| self.is_drivable(pixel.0)).collect::<Vec<_>>();
+        assert_eq!(is_free.len(), cols * rows, "every pixel is read");
+        Map {
+            drivable: Mask { cols, is_free },
+            resolution_m: self.resolution,
+            origin_m: [self.origin[0], self.origin[1]],
+            yaw: [self.origin[2].cos(), self.origin[2].sin()],
+        }
+    }
+
+    /// Red, green, blue, alpha.
+    fn is_drivable(&self, [red, green, blue, alpha]: [u8; 4]) -> bool {
+        if alpha < u8::MAX {
+            return false;
+        }
+        let value = [red, green, blue].into_iter().map(f64::from).sum::<f64>() / 3.0;
+        let occupancy = if self.negate.is_set() { value / 255.0 } else { (255.0 - value) / 255.0 };
+        match self.mode {
+            Mode::Trinary => occupancy < self.free_thresh,
+            Mode::Scale => {
+                let share = (occupancy - self.free_thresh) / (self.occupied_thresh - self.free_thresh);
+                100.0 * share.clamp(0.0, 1.0) < DRIVABLE_BELOW_PERCENT
+            }
+            // The value is the occupancy in per cent, and above 100 unknown; negate does not count.
+            Mode::Raw => value < DRIVABLE_BELOW_PERCENT,
+        }
+    }
+}
+
+/// A message of the YAML reader on one line, without the place, which is given apart.
+fn first_line(text: &str) -> String {
+    let line = text.lines().next().unwrap_or_default();
+    line.split(" at line ").next().unwrap_or_default().trim().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Which of the grey values are drivable.
+    fn drivable(keys: &str, values: &[u8]) -> Vec<bool> {
+        let text = format!("image: x.png\nresolution: 0.1\norigin: [0, 0, 0]\n{keys}");
+        let header = Header::parse(&text, Path::new("map.yaml")).unwrap();
+        values.iter().map(|&value| header.is_drivable([value, value, value, 255])).collect()
+    }
+
+    /// Values beside each threshold, from p = (255 − x)/255 of the wiki.
+    #[test]
+    fn modes_and_negate_decide_what_is_drivable() {
+        // Free below 0.196: x > 205.02. The grey 205 of map_saver is unknown.
+        assert_eq!(drivable("", &[255, 254, 206, 205, 128, 0]), [true, true, true, false, false, false]);
+        // Negated: p = x/255, free for x < 49.98.
+        assert_eq!(drivable("negate: 1", &[0, 49, 50, 205, 255]), [true, true, false, false, false]);
+        assert_eq!(drivable("negate: true", &[0, 255]), drivable("negate: 1", &[0, 255]));
+        assert_eq!(drivable("negate: false", &[0, 255]), [false, true]);
+        // 50 % lies at p = (0.2 + 0.6)/2: x = 153.
+        let scale = "mode: scale\noccupied_thresh: 0.6\nfree_thresh: 0.2";
+        assert_eq!(drivable(scale, &[255, 154, 152, 0]), [true, true, false, false]);
+        // Raw values are per cent.
+        assert_eq!(drivable("mode: raw", &[0, 49, 50, 100, 101, 255]), [true, true, false, false, false, false]);
+    }
+
+    #[test]
+    fn colours_are_averaged_and_transparency_is_unknown() {
+        let header = Header::parse("{image: x.png, resolution: 1, origin: [0, 0, 0]}", Path::new("map.yaml")).unwrap();
+        // 0xeeeeee is free by the wiki's example (0.07); a mean of 206 is just free.
+        assert!(header.is_drivable([0xee, 0xee, 0xee, 255]));
+        assert!(header.is_drivable([255, 255, 108, 255]));
+        assert!(!header.is_drivable([255, 255, 105, 255]));
+        assert!(!header.is_drivable([255, 255, 255, 254]));
+    }
+
+    /// Rows run down in the image and up in the mask; pixels and points are each other's inverse.
+    #[test]
+    fn rows_and_frames_are_the_right_way_up() {
+        let text = "{image: x.png, resolution: 0.5, origin: [-3, 7, 0.6]}";
+        let image = DynamicImage::ImageLuma8(image::ImageBuffer::from_raw(2, 2, vec![255, 0, 0, 0]).unwrap());
+        let map = Header::parse(text, Path::new("map.yaml")).unwrap().map(&image);
+        assert_eq!(map.drivable.is_free, [false, false, true, false], "white is upper left");
+        for pixel in [[0, 0], [5, 1], [-2, 9]] {
+            assert_eq!(map.pixel_at(map.point_at(pixel.map(|k| f64::from(k) + 0.5))), pixel);
+        }
+        assert_eq!(map.point_at([0.0, 0.0]), [-3.0, 7.0]);
+    }
+}

@@ -1,0 +1,321 @@
+//! Maps small enough to know their outlines by heart, and every way in which a map can be wrong.
+
+use super::*;
+use std::f64::consts::FRAC_PI_2;
+
+/// A fresh folder with files in it.
+fn folder(name: &str, files: &[(&str, &str)]) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("parking-import-{}", std::process::id())).join(name);
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    for (file, text) in files {
+        std::fs::write(folder.join(file), text).unwrap();
+    }
+    folder
+}
+
+/// A plain PGM of a drawing, top row first: `.` free, `#` occupied, `?` unknown.
+fn pgm(rows: &[String]) -> String {
+    let pixels: Vec<String> = rows
+        .iter()
+        .flat_map(|row| row.chars())
+        .map(|pixel| match pixel {
+            '.' => "254".to_owned(),
+            '#' => "0".to_owned(),
+            _ => "205".to_owned(),
+        })
+        .collect();
+    format!("P2\n# drawn by a test\n{} {}\n255\n{}\n", rows[0].len(), rows.len(), pixels.join("\n"))
+}
+
+fn yaml(resolution: &str, origin: &str) -> String {
+    format!(
+        "image: map.pgm\nmode: trinary\nresolution: {resolution}\norigin: {origin}\nnegate: 0\n\
+         occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+}
+
+fn vertices(points: &[(f32, f32)]) -> Vec<Vec2> {
+    points.iter().map(|&(x, y)| Vec2::new(x, y)).collect()
+}
+
+/// A U of free pixels around an occupied and an unknown one.
+fn small_map(name: &str, origin: &str) -> MapLot {
+    let rows = ["..#?", "..#.", "...."].map(str::to_owned);
+    let folder = folder(name, &[("map.yaml", &yaml("0.5", origin)), ("map.pgm", &pgm(&rows))]);
+    MapLot::of_map(&folder.join("map.yaml"))
+}
+
+#[test]
+fn a_small_map_has_the_outline_computed_by_hand() {
+    let lot = small_map("outline", "[1.0, 2.0, 0.0]");
+    let ground = lot.ros_ground(Vec2::new(1.2, 2.2), None).unwrap();
+    let expected = [(3.0, 2.0), (3.0, 3.0), (2.5, 3.0), (2.5, 2.5), (2.0, 2.5), (2.0, 3.5), (1.0, 3.5), (1.0, 2.0)];
+    assert_eq!(ground.boundary, vertices(&expected));
+    assert!(ground.islands.is_empty());
+}
+
+#[test]
+fn a_turned_origin_turns_the_map_about_its_lower_left_corner() {
+    let lot = small_map("turned", &format!("[1.0, 2.0, {FRAC_PI_2}]"));
+    // Along the rows is +y now, up the columns −x.
+    let ground = lot.ros_ground(Vec2::new(0.8, 2.2), None).unwrap();
+    let expected = [(1.0, 4.0), (0.0, 4.0), (0.0, 3.5), (0.5, 3.5), (0.5, 3.0), (-0.5, 3.0), (-0.5, 2.0), (1.0, 2.0)];
+    assert_eq!(ground.boundary, vertices(&expected));
+}
+
+#[test]
+fn the_scale_enlarges_everything_about_the_origin_of_the_frame() {
+    let lot = MapLot { scale: 20.0, ..small_map("scaled", "[1.0, 2.0, 0.0]") };
+    let ground = lot.ros_ground(Vec2::new(24.0, 44.0), None).unwrap();
+    let expected = [
+        (60.0, 40.0),
+        (60.0, 60.0),
+        (50.0, 60.0),
+        (50.0, 50.0),
+        (40.0, 50.0),
+        (40.0, 70.0),
+        (20.0, 70.0),
+        (20.0, 40.0),
+    ];
+    assert_eq!(ground.boundary, vertices(&expected));
+}
+
+/// A lane of 5 m along x, 60 m long, with a wall of `gap` free pixels across it at x = 30; one pixel is a metre.
+fn lane(name: &str, gap: usize) -> MapLot {
+    let rows: Vec<String> = (0..7)
+        .map(|row| {
+            let pixel = |col| {
+                let is_wall = row == 0 || row == 6 || col == 0 || col == 59 || (col == 30 && row > gap);
+                if is_wall { '#' } else { '.' }
+            };
+            (0..60).map(pixel).collect()
+        })
+        .collect();
+    let folder = folder(name, &[("map.yaml", &yaml("1.0", "[0.0, 0.0, 0.0]")), ("map.pgm", &pgm(&rows))]);
+    let mut lot = MapLot::of_map(&folder.join("map.yaml"));
+    lot.start = Some([5.0, 3.5, 0.0]);
+    lot.goal = Some([45.0, 3.5, 0.0]);
+    lot
+}
+
+fn refusal(lot: &MapLot) -> String {
+    lot.scenario().expect_err("it cannot be driven").to_string()
+}
+
+#[test]
+fn a_route_is_found_from_start_to_goal() {
+    let scenario = lane("found", 5).scenario().unwrap();
+    assert_eq!(scenario.name, "map");
+    let path = sim::path::Path::new(&scenario.reference_path);
+    assert!(path.pose_at(0.0).position().distance(Vec2::new(5.0, 3.5)) < 1e-3);
+    let end = path.pose_at(path.length_m());
+    assert!((45.0..45.3).contains(&end.x_m) && (end.y_m - 3.5).abs() < 1.0, "{end:?}");
+    assert!((40.0..41.0).contains(&path.length_m()), "a straight lane: {} m", path.length_m());
+}
+
+/// The same lane drawn for a robot a tenth as large.
+#[test]
+fn a_small_map_is_driven_when_it_is_scaled() {
+    let mut lot = lane("scaled-lane", 5);
+    std::fs::write(&lot.map, yaml("0.1", "[0.0, 0.0, 0.0]")).unwrap();
+    lot.start = Some([0.5, 0.35, 0.0]);
+    lot.goal = Some([4.5, 0.35, 0.0]);
+    assert!(refusal(&lot).contains("start: the car (4.91 m × 1.86 m"), "{}", refusal(&lot));
+    lot.scale = 10.0;
+    let route = lot.scenario().unwrap().reference_path;
+    assert_eq!(route, lane("scaled-reference", 5).scenario().unwrap().reference_path);
+}
+
+#[test]
+fn no_route_is_explained_with_its_place_and_a_remedy() {
+    let wall = refusal(&lane("wall", 0));
+    assert!(wall.contains("map.yaml: route: the goal cannot be reached: a wall is in the way near (29.88, "), "{wall}");
+    assert!(wall.contains("; open the map there"), "{wall}");
+
+    let narrow = refusal(&lane("narrow", 2));
+    assert!(narrow.contains("route: the passage near (30."), "{narrow}");
+    assert!(narrow.contains("too narrow: about 1.8 m in the lot, and the car needs 2.36 m; widen it"), "{narrow}");
+
+    let mut lot = lane("turn", 5);
+    lot.goal = Some([40.0, 3.5, 180.0]);
+    let tight = refusal(&lot);
+    assert!(tight.contains("route: no drive forwards was found: it got to ("), "{tight}");
+
+    let mut lot = lane("blocked", 5);
+    lot.goal = Some([57.0, 3.5, 0.0]);
+    assert!(refusal(&lot).contains("goal: the car (4.91 m × 1.86 m, and 0.25 m around it)"), "{}", refusal(&lot));
+    lot.goal = Some([59.5, 3.5, 0.0]);
+    assert!(refusal(&lot).contains("goal: (59.50, 3.50) is not drivable: pixel (59, 3)"), "{}", refusal(&lot));
+    lot.start = Some([30.0, 0.5, 0.0]);
+    let occupied = refusal(&lot);
+    assert!(
+        occupied.contains("start: (30.00, 0.50) is not drivable: pixel (30, 6) of the image, from its upper left, is"),
+        "{occupied}"
+    );
+    lot.start = Some([-8.0, 0.5, 0.0]);
+    assert!(refusal(&lot).contains("the map spans x 0.00 to 60.00 and y 0.00 to 7.00"), "{}", refusal(&lot));
+
+    let mut lot = lane("no-loop", 5);
+    (lot.goal, lot.is_loop) = (None, true);
+    assert!(
+        refusal(&lot).contains("route: there is no loop: the way back to the start ends near"),
+        "{}",
+        refusal(&lot)
+    );
+}
+
+#[test]
+fn a_centre_line_must_have_room_for_the_car() {
+    let with_line = |name: &str, gap: usize, line: &str| {
+        let mut lot = lane(name, gap);
+        let file = lot.map.with_file_name("line.csv");
+        std::fs::write(&file, line).unwrap();
+        (lot.start, lot.goal, lot.centre_line) = (None, None, Some(file));
+        lot
+    };
+    let line = "x_m, y_m, width\n5.0, 3.5, 2\n 5.0, 3.5, 2\n45.0, 3.5, 2\n";
+    let scenario = with_line("line", 5, line).scenario().unwrap();
+    assert_eq!(scenario.reference_path.points, vertices(&[(5.0, 3.5), (45.0, 3.5)]));
+
+    let wall = refusal(&with_line("line-wall", 0, line));
+    assert!(wall.contains("centre_line, 24."), "the car's side meets the wall about 1 m before it: {wall}");
+    assert!(wall.contains("too narrow at (29."), "{wall}");
+    // 0.93 m from the wall at y = 1 is passed at y = 1.93: 87 % of the way down to 1.7.
+    let skew = refusal(&with_line("line-skew", 5, "5.0,3.5\n45.0,1.7\n"));
+    assert!(skew.contains("centre_line, 35.") || skew.contains("centre_line, 34."), "{skew}");
+    assert!(skew.contains("0.93 m to the side, and half of the car is 0.93 m"), "{skew}");
+    for (line, expected) in [
+        ("5.0,3.5\n45.0;3.5\n", "line.csv:2: \"45.0;3.5\" is no point; write one point per line"),
+        ("5.0,3.5\n45.0,nan\n", "line.csv:2: \"45.0,nan\" is no point"),
+        ("x,y\n5.0,3.5\n", "line.csv: centre line: the line has 1 points; give at least"),
+    ] {
+        let message = refusal(&with_line("line-faulty", 5, line));
+        assert!(message.contains(expected), "got:      {message}\nexpected: {expected}");
+    }
+}
+
+#[test]
+fn faults_of_the_files_are_named() {
+    let sound = yaml("1.0", "[0.0, 0.0, 0.0]");
+    let table = [
+        ("resolution: 1.0", "resolution: 0.0", "map.yaml:3: resolution: it is 0; write metres per pixel, above 0"),
+        ("resolution: 1.0", "resolution: -0.05", "map.yaml:3: resolution: it is -0.05; write"),
+        ("resolution: 1.0", "resolution: .nan", "map.yaml:3: resolution: it is NaN; write"),
+        ("resolution: 1.0", "resolution: fine", "map.yaml:3: "),
+        ("resolution: 1.0\n", "", ": missing field `resolution`; a map needs image, resolution, origin"),
+        ("[0.0, 0.0, 0.0]", "[0.0, 0.0]", "map.yaml:4: "),
+        ("[0.0, 0.0, 0.0]", "[0.0, .inf, 0.0]", "map.yaml:4: origin: a number is inf; write [x, y, yaw]"),
+        ("mode: trinary", "mode: binary", "map.yaml:2: "),
+        ("free_thresh: 0.196", "free_thresh: 0.7", "map.yaml:7: free_thresh: it is 0.7, not below occupied_thresh"),
+        ("occupied_thresh: 0.65", "occupied_thresh: 65", "map.yaml:6: occupied_thresh: it is 65; write an occupancy"),
+        ("image: map.pgm", "image: [", "map.yaml:"),
+    ];
+    let lot = lane("faults", 5);
+    for (original, replacement, expected) in table {
+        assert_eq!(sound.matches(original).count(), 1, "{original:?} must occur once");
+        std::fs::write(&lot.map, sound.replacen(original, replacement, 1)).unwrap();
+        let message = refusal(&lot);
+        assert!(message.contains(expected), "{replacement:?}\ngot:      {message}\nexpected: {expected}");
+        assert!(!message.contains('\n'), "one line: {message}");
+    }
+    std::fs::write(&lot.map, sound.replacen("map.pgm", "other.pgm", 1)).unwrap();
+    let message = refusal(&lot);
+    assert!(
+        message.contains("map.yaml: image ") && message.contains("other.pgm: cannot be read: No such file"),
+        "{message}"
+    );
+    std::fs::write(&lot.map, &sound).unwrap();
+    std::fs::write(lot.map.with_file_name("map.pgm"), "P2\n60 7\n255\n1 2 3\n").unwrap();
+    assert!(refusal(&lot).contains("map.pgm: no readable image: "), "{}", refusal(&lot));
+}
+
+#[test]
+fn faults_of_the_lot_file_are_named() {
+    let lot = lane("lot-faults", 5);
+    let file = lot.map.with_file_name("map.lot.toml");
+    let message = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        crate::load::load(&file).map_or_else(|error| error.to_string(), |scenario| scenario.name)
+    };
+    assert_eq!(message("map = 'map.yaml'\nstart = [5, 3.5, 0]\ngoal = [45, 3.5, 0]\n"), "map");
+    assert_eq!(message("map = 'map.yaml'\nname = 'lane'\nstart = [5, 3.5, 0]\ngoal = [45, 3.5, 0]\n"), "lane");
+    assert_eq!(crate::load::load(&lot.map).unwrap().name, "lane", "the file beside the map is found");
+    for (text, expected) in [
+        (
+            "map = 'map.yaml'\nstart = [5, 3.5, 0]\n",
+            "map.lot.toml: route: the map does not say where to drive; write start",
+        ),
+        ("map = 'map.yaml'\nstart = [5, 3.5]\n", "map.lot.toml:2: invalid length 2"),
+        ("map = 'map.yaml'\nstrat = [5, 3.5, 0]\n", "map.lot.toml:2: unknown field `strat`"),
+        ("map = 'map.jpg'\n", "map.lot.toml: map: "),
+        ("map = 'none.yaml'\nstart = [5, 3.5, 0]\ngoal = [45, 3.5, 0]\n", "none.yaml: cannot be read: No such file"),
+        ("map = 'map.yaml'\nscale = 0\n", "map.lot.toml: scale: it is 0; write how many times"),
+        ("map = 'map.yaml'\nscale = -2\n", "map.lot.toml: scale: it is -2; write"),
+        ("map = 'map.yaml'\nclearance_m = 5\n", "map.lot.toml: clearance_m: it is 5; write"),
+        ("map = 'map.yaml'\nstart = [nan, 0, 0]\n", "map.lot.toml: start: a number is NaN"),
+        ("map = 'map.yaml'\ngoal = [1, 0, 0]\nloop = true\n", "map.lot.toml: loop: goal is given too; keep one"),
+    ] {
+        let message = message(text);
+        assert!(message.contains(expected), "{text}\ngot:      {message}\nexpected: {expected}");
+    }
+    std::fs::write(&file, "map = 'other.yaml'\n").unwrap();
+    let message = MapLot::read(&lot.map).expect_err("another map").to_string();
+    assert!(message.contains("map.lot.toml: map: it names the map"), "{message}");
+}
+
+/// One way round the example, in the direction of the start.
+#[test]
+fn a_loop_leads_back_to_its_start() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/car-park-loop.lot.toml");
+    let scenario = crate::load::load(&file).unwrap();
+    let path = sim::path::Path::new(&scenario.reference_path);
+    let (start, end) = (path.pose_at(0.0), path.pose_at(path.length_m()));
+    assert!(start.position().distance(end.position()) < 3.0, "{start:?} {end:?}");
+    assert!(end.ahead().dot(start.ahead()) > 0.86, "{end:?}");
+    // The middle of the aisle is a rectangle of 46 m × 28 m, and corners are cut.
+    assert!((115.0..150.0).contains(&path.length_m()), "{} m", path.length_m());
+    let area_m2 = 0.5 * sim::geometry::edges(&scenario.reference_path.points).map(|(a, b)| a.perp_dot(b)).sum::<f32>();
+    assert!(area_m2 > 900.0, "counter-clockwise round the block: {area_m2} m²");
+}
+
+#[test]
+fn a_case_is_read_in_one_row_or_one_column() {
+    let numbers = "0,0,0,30,0,3.14159265,2,4,3,8,-4,12.6,-4,12.6,-2.2,8,-2.2,10,3,14,3,12,6";
+    let row = folder("tpcap", &[("case.csv", numbers), ("column.csv", &numbers.replace(',', "\n"))]);
+    let case = tpcap::Case::read(&row.join("case.csv")).unwrap();
+    assert_eq!(case, tpcap::Case::read(&row.join("column.csv")).unwrap());
+    assert_eq!(case.start, [0.0, 0.0, 0.0]);
+    assert!((case.goal[2] - 180.0).abs() < 1e-3, "degrees: {:?}", case.goal);
+    let ground = case.ground(1.0);
+    // Everything lies within x 0…30, y −4…6; 20 m are added.
+    assert_eq!(ground.boundary, vertices(&[(-20.0, -24.0), (50.0, -24.0), (50.0, 26.0), (-20.0, 26.0)]));
+    assert_eq!(ground.islands, [vertices(&[(10.0, 3.0), (14.0, 3.0), (12.0, 6.0)])]);
+    let [car] = &ground.obstacles[..] else { panic!("{:?}", ground.obstacles) };
+    let [length_m, width_m, _] = car.size_m();
+    assert!((length_m - 4.6).abs() < 1e-5 && (width_m - 1.8).abs() < 1e-5, "{car:?}");
+    assert!(car.centre().position().distance(Vec2::new(10.3, -3.1)) < 1e-5, "{car:?}");
+
+    for (text, expected) in [
+        ("0,0,0,30,0", "case.csv:1: the file ends after 5 numbers, before the goal (x, y, theta); a TPCAP case is"),
+        ("0,0,0,30,0,0,1,2,0,0", "case.csv:1: number 8, the number of vertices of obstacle 1, is 2; a TPCAP"),
+        ("0,0,0,30,0,0,1.5", "case.csv:1: number 7, the number of obstacles, is 1.5"),
+        ("0,0,0\n30,0,0\n1\n3\n5,5,6,5,6", "case.csv:5: the file ends after 13 numbers, before a vertex of obstacle 1"),
+        ("0,0,0,30,0,0,0\n7", "case.csv:2: 1 numbers are left over after the last obstacle"),
+        ("x,y\n1,2", "case.csv:1: \"x\" is no number; a TPCAP case holds numbers only"),
+        ("", "case.csv:1: the file ends after 0 numbers, before the start"),
+    ] {
+        let folder = folder("tpcap-faulty", &[("case.csv", text)]);
+        let message = tpcap::Case::read(&folder.join("case.csv")).expect_err(text).to_string();
+        assert!(message.contains(expected), "{text}\ngot:      {message}\nexpected: {expected}");
+    }
+}
+
+#[test]
+fn the_example_case_becomes_a_lot() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/open-lot.csv");
+    let scenario = crate::load::load(&file).unwrap();
+    assert_eq!((scenario.name.as_str(), scenario.islands.len(), scenario.obstacles.len()), ("open-lot", 3, 2));
+    let end = *scenario.reference_path.points.last().unwrap();
+    assert!(end.distance(Vec2::new(30.0, 6.0)) < 1.3, "{end}");
+}

@@ -1,0 +1,209 @@
+//! A route for ground that has none: from a pose to a pose, or round a loop.
+//!
+//! The search of [`super::solve`] with a tight goal; where it fails, the reason is looked for and given with its place.
+
+use super::{CURVATURE_SHARE, DistanceToGo, Goal, NONE, Open, Scene, Search, Waypoint};
+use geo::{Coord, LineString, Simplify as _};
+use sim::geometry::{Pose, Vec2};
+use sim::scenario::{ReferencePath, Scenario};
+use sim::vehicle::VehicleParams;
+use std::collections::{BTreeSet, BinaryHeap};
+
+/// Gives up after this many expansions: ten times what a generated lot may take, a few seconds.
+const EXPANSIONS_MAX: usize = 200_000;
+/// The route ends beside the goal, at most this far, or up to two metres beyond it.
+pub const GOAL_BESIDE_M: f32 = 1.0;
+/// Cosine of the largest angle between the end of the route and the goal: 20°.
+const GOAL_HEADING_COS: f32 = 0.94;
+/// How far behind its start a loop ends, metres: farther than the goal's depth, so that the start is no finish.
+const LOOP_GAP_M: f32 = 2.5;
+/// The gate that makes a loop go round stands this far ahead of the start, metres: between rear and front axle.
+const GATE_AHEAD_M: f32 = 1.6;
+/// A passage narrower than this is none, metres: the raster of distances tells no finer things apart.
+const WALL_M: f32 = 0.5;
+/// Waypoints that lie this near the chord of their neighbours are left out of the route, metres.
+const ROUTE_TOLERANCE_M: f64 = 0.02;
+/// Rounds the chords of the route into arcs again, metres: about the tightest the search drives.
+const ROUTE_RADIUS_M: f32 = 5.0;
+
+/// Where a route ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Finish {
+    /// At a pose of the rear axle, within [`GOAL_BESIDE_M`] and 20°.
+    At(Pose),
+    /// Where it began, after a way round.
+    Start,
+}
+
+/// Why there is no route. Places are world metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum NoRoute {
+    /// The car with its clearance does not stand free at the start.
+    StartBlocked,
+    /// Nor at the goal.
+    GoalBlocked,
+    /// No free ground joins start and goal; the way would break through here.
+    Walled {
+        /// Where.
+        at: Vec2,
+    },
+    /// The widest way is too narrow here.
+    Narrow {
+        /// Where.
+        at: Vec2,
+        /// About how wide, metres.
+        width_m: f32,
+    },
+    /// Wide enough everywhere, but no drive forwards was found.
+    Tight {
+        /// The point of the search nearest the goal.
+        reached: Vec2,
+        /// From there to the goal, about, metres.
+        to_go_m: f32,
+    },
+}
+
+/// Searches a drive over the ground of a scenario, whose own reference path is ignored, that keeps `clearance_m` around
+/// the body, and returns it as a reference path of the rear axle.
+///
+/// Everything in the scenario but its reference path must be valid.
+///
+/// # Errors
+/// Why there is none, with the place.
+pub fn find(
+    ground: &Scenario,
+    start: Pose,
+    finish: Finish,
+    vehicle: &VehicleParams,
+    clearance_m: f32,
+) -> Result<ReferencePath, NoRoute> {
+    let scene = Scene::new(ground);
+    let goal_pose = match finish {
+        Finish::At(pose) => pose,
+        Finish::Start => Pose::new(start.position() - LOOP_GAP_M * start.ahead(), start.heading_rad),
+    };
+    let goal = Goal {
+        point: goal_pose.position(),
+        direction: goal_pose.ahead(),
+        reach_m: GOAL_BESIDE_M,
+        heading_cos: GOAL_HEADING_COS,
+    };
+    let gate = match finish {
+        Finish::At(_) => BTreeSet::new(),
+        Finish::Start => gate(&scene, start, vehicle),
+    };
+    let to_go = DistanceToGo::new(&scene, &goal, vehicle, &gate);
+    let mut search = Search::new(&scene, &goal, &to_go, vehicle, clearance_m);
+    if !search.is_free(start, 0.0) {
+        return Err(NoRoute::StartBlocked);
+    }
+    if let Some(solution) = search.run(start, EXPANSIONS_MAX) {
+        return Ok(reference_path(&solution.waypoints, &goal));
+    }
+    let front = |pose: Pose| pose.position() + pose.ahead() * vehicle.wheelbase_m;
+    let (at, room_m) = bottleneck(&scene, front(start), goal_pose.position(), &gate);
+    let width_m = 2.0 * room_m;
+    if width_m < WALL_M {
+        return Err(NoRoute::Walled { at });
+    }
+    if !search.body.is_free(&scene, goal_pose) {
+        return Err(NoRoute::GoalBlocked);
+    }
+    if width_m < vehicle.width_m + 2.0 * clearance_m {
+        return Err(NoRoute::Narrow { at, width_m });
+    }
+    let from_front = |node: &super::Node| (to_go.at(front(node.pose)), front(node.pose));
+    let (to_go_m, reached) = search
+        .nodes
+        .iter()
+        .map(from_front)
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .unwrap_or((front(start).distance(goal.point), front(start)));
+    Err(NoRoute::Tight { reached, to_go_m })
+}
+
+/// Tightest radius of the rear axle that the search drives, metres.
+pub fn radius_min_m(vehicle: &VehicleParams) -> f32 {
+    1.0 / (CURVATURE_SHARE * vehicle.curvature_max_per_m())
+}
+
+/// Cells of the clearance raster across the free ground just ahead of the start.
+fn gate(scene: &Scene, start: Pose, vehicle: &VehicleParams) -> BTreeSet<usize> {
+    let centre = start.position() + GATE_AHEAD_M * start.ahead();
+    let step_m = 0.5 * Scene::NODE_M;
+    let mut cells = BTreeSet::new();
+    for side in [1.0, -1.0] {
+        let across = side * start.ahead().perp();
+        let mut beside_m = 0.0;
+        loop {
+            let point = centre + beside_m * across;
+            if scene.clearance_m(point) < 0.5 * vehicle.width_m - Scene::SLACK_M {
+                break;
+            }
+            // Two cells thick, so that no diagonal step passes.
+            for ahead_m in [-Scene::NODE_M, 0.0, Scene::NODE_M] {
+                cells.insert(scene.clearance_m.index(point + ahead_m * start.ahead()));
+            }
+            beside_m += step_m;
+        }
+    }
+    cells
+}
+
+/// The narrowest place of the widest way between two points, and the distance to the nearest edge there, metres. Of a
+/// way through a wall, the place where it meets it.
+fn bottleneck(scene: &Scene, from: Vec2, to: Vec2, closed: &BTreeSet<usize>) -> (Vec2, f32) {
+    let room = &scene.clearance_m;
+    let (first, last) = (room.index(from), room.index(to));
+    let mut parent = vec![NONE; room.values.len()];
+    // The queue gives the smallest estimate first: the widest way is the one with the smallest negative room.
+    let mut open = BinaryHeap::from([Open { estimate: -room.values[first], node: first as u32 }]);
+    parent[first] = first as u32;
+    let cols = room.cols as i32;
+    while let Some(Open { estimate, node }) = open.pop() {
+        let node = node as usize;
+        if node == last {
+            break;
+        }
+        for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+            let (x, y) = (node as i32 % cols + dx, node as i32 / cols + dy);
+            if x < 0 || y < 0 || x >= cols || y >= room.rows as i32 {
+                continue;
+            }
+            let next = (y * cols + x) as usize;
+            if parent[next] == NONE && !closed.contains(&next) {
+                parent[next] = node as u32;
+                open.push(Open { estimate: estimate.max(-room.values[next]), node: next as u32 });
+            }
+        }
+    }
+    if parent[last] == NONE {
+        return (from, 0.0);
+    }
+    let mut way = vec![last];
+    while let Some(&cell) = way.last()
+        && cell != first
+    {
+        way.push(parent[cell] as usize);
+    }
+    let wall = way.iter().rev().copied().find(|&cell| room.values[cell] < 0.5 * WALL_M);
+    let narrowest = way.into_iter().min_by(|&a, &b| room.values[a].total_cmp(&room.values[b])).unwrap_or(first);
+    let place = wall.unwrap_or(narrowest);
+    (room.centre(place % room.cols, place / room.cols), room.values[narrowest].max(0.0))
+}
+
+/// The waypoints up to the first that has reached the goal as few points, whole millimetres.
+fn reference_path(waypoints: &[Waypoint], goal: &Goal) -> ReferencePath {
+    let beyond = waypoints.iter().rev().take_while(|waypoint| goal.is_reached(waypoint.pose)).count();
+    let kept = waypoints.len() - beyond.saturating_sub(1);
+    let drive: LineString<f64> = waypoints[..kept]
+        .iter()
+        .map(|waypoint| Coord { x: f64::from(waypoint.pose.x_m), y: f64::from(waypoint.pose.y_m) })
+        .collect();
+    let points = drive
+        .simplify(ROUTE_TOLERANCE_M)
+        .coords()
+        .map(|point| crate::corridor::to_millimetres(Vec2::new(point.x as f32, point.y as f32)))
+        .collect();
+    ReferencePath { points, corner_radius_m: ROUTE_RADIUS_M }
+}
