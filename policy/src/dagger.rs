@@ -81,9 +81,12 @@ impl DaggerConfig {
         }
     }
 
-    /// The same on a budget of minutes: the compact network, warm starts and some ten thousand quick steps in all.
+    /// The same on a budget of minutes: the compact network, warm starts, some ten thousand quick steps in all, and
+    /// three iterations: each adds what the expert drove only, so that later ones train ever more on rare, hard ticks
+    /// (lot a, unseen trials of 4620 m: 28 near-collisions before, 4, 4, 7 and 10 after iterations 1, 2, 4 and 6).
     pub fn quick() -> Self {
         Self {
+            iterations_max: 3,
             start: StartFrom::Previous,
             network: LookAheadNetConfig::compact(),
             fit_cloning: FitSettings::quick(7000),
