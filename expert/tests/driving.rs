@@ -96,8 +96,8 @@ fn from_beside_the_middle_the_car_is_steered_back_to_it() {
 #[test]
 fn a_car_on_the_right_shifts_the_point_to_the_left() {
     // The car takes the lane up to y = −0.58; the middle of what is left is y = 0.96.
-    let point = answer(&map(lane(5.0, vec![car(12.0, -1.5, 0.0)])), Pose::default(), 1.0);
-    let beside = Pose::default().advanced_along_arc(point.curvature_per_m(), 8.0).position();
+    let point = answer(&map(lane(5.0, vec![car(9.0, -1.5, 0.0)])), Pose::default(), 1.0);
+    let beside = Pose::default().advanced_along_arc(point.curvature_per_m(), 7.0).position();
     assert!((0.3..1.6).contains(&beside.y), "{point:?} leads through {beside}");
 }
 
