@@ -35,7 +35,8 @@ fn one_and_two_threads_write_the_same_bytes() {
         let path = out.to_string_lossy().into_owned();
         let mut files = files(&out);
         // Replay keys name the run they belong to.
-        for bytes in ["runs.jsonl", "failures.jsonl", "failures.md"].map(|name| files.get_mut(name).unwrap()) {
+        for name in ["runs.jsonl", "failures.jsonl", "failures.md"] {
+            let bytes = files.get_mut(name).unwrap_or_else(|| panic!("{name} is missing"));
             *bytes = String::from_utf8_lossy(bytes).replace(&path, "RUN").into_bytes();
         }
         (files, printed.replace(&path, "RUN"))
