@@ -134,7 +134,7 @@ fn a_map_that_cannot_be_driven_is_refused_and_leaves_nothing() {
         std::fs::write(&map, yaml.replacen(from, to, 1)).unwrap();
         generate(&[&[map.as_str()], &poses[..]].concat(), &[expected]);
     }
-    refuses(&["evaluate", "--driver", "expert", "--lots", "no-such.yaml"], &["no-such.yaml"]);
+    refuses(&["evaluate", "--driver", "expert", "--lots", "no-such.yaml"], &["no-such.yaml: cannot be read"]);
 }
 
 #[test]

@@ -72,6 +72,12 @@ pub fn is_map(path: &Path) -> bool {
     path.extension().is_some_and(|extension| ["yaml", "yml", "csv"].iter().any(|known| extension == *known))
 }
 
+/// A map as read.
+enum Source {
+    Map(ros::Map),
+    Case(tpcap::Case),
+}
+
 /// What a map gives.
 struct Ground {
     boundary: Vec<Vec2>,
@@ -136,19 +142,23 @@ impl MapLot {
     /// The first thing wrong with it, with file, place and remedy.
     pub fn scenario(&self) -> Result<Scenario, LoadError> {
         self.check()?;
-        let is_ros = self.map.extension().is_some_and(|extension| extension != "csv");
-        let case = if is_ros { None } else { Some(tpcap::Case::read(&self.map)?) };
-        let start = self.start.or(case.as_ref().map(|case| case.start));
-        let goal = if self.is_loop { None } else { self.goal.or(case.as_ref().map(|case| case.goal)) };
+        let is_case = self.map.extension().is_some_and(|extension| extension == "csv");
+        let source =
+            if is_case { Source::Case(tpcap::Case::read(&self.map)?) } else { Source::Map(ros::Map::read(&self.map)?) };
+        let (start, goal) = match &source {
+            Source::Case(case) => (self.start.or(Some(case.start)), self.goal.or(Some(case.goal))),
+            Source::Map(_) => (self.start, self.goal),
+        };
+        let goal = goal.filter(|_| !self.is_loop);
         let centre_line = self.centre_line.as_deref().map(|file| self.read_centre_line(file)).transpose()?;
         let seed = match (&centre_line, start, goal, self.is_loop) {
             (Some(points), ..) => points[0],
             (None, Some(start), Some(_), false) | (None, Some(start), None, true) => self.pose_in_lot(start).position(),
             _ => return Err(self.nothing_to_drive()),
         };
-        let ground = match &case {
-            Some(case) => case.ground(self.scale),
-            None => self.ros_ground(seed, goal.map(|goal| self.pose_in_lot(goal).position()))?,
+        let ground = match &source {
+            Source::Case(case) => case.ground(self.scale),
+            Source::Map(map) => self.ros_ground(map, seed, goal.map(|goal| self.pose_in_lot(goal).position()))?,
         };
         let mut scenario = Scenario {
             name: self.name(),
@@ -208,8 +218,7 @@ impl MapLot {
     }
 
     /// The outlines of the drivable pixels around the seed, in the lot, as simple as they can be and stay sound.
-    fn ros_ground(&self, seed: Vec2, goal: Option<Vec2>) -> Result<Ground, LoadError> {
-        let map = ros::Map::read(&self.map)?;
+    fn ros_ground(&self, map: &ros::Map, seed: Vec2, goal: Option<Vec2>) -> Result<Ground, LoadError> {
         let place = if self.centre_line.is_some() { "centre_line, point 1" } else { "start" };
         let mut pixels = Vec::new();
         for (place, point) in [(place, Some(seed)), ("goal", goal)] {

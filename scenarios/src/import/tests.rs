@@ -46,10 +46,14 @@ fn small_map(name: &str, origin: &str) -> MapLot {
     MapLot::of_map(&folder.join("map.yaml"))
 }
 
+fn ground(lot: &MapLot, seed: Vec2) -> Ground {
+    lot.ros_ground(&ros::Map::read(&lot.map).unwrap(), seed, None).unwrap()
+}
+
 #[test]
 fn a_small_map_has_the_outline_computed_by_hand() {
     let lot = small_map("outline", "[1.0, 2.0, 0.0]");
-    let ground = lot.ros_ground(Vec2::new(1.2, 2.2), None).unwrap();
+    let ground = ground(&lot, Vec2::new(1.2, 2.2));
     let expected = [(3.0, 2.0), (3.0, 3.0), (2.5, 3.0), (2.5, 2.5), (2.0, 2.5), (2.0, 3.5), (1.0, 3.5), (1.0, 2.0)];
     assert_eq!(ground.boundary, vertices(&expected));
     assert!(ground.islands.is_empty());
@@ -59,7 +63,7 @@ fn a_small_map_has_the_outline_computed_by_hand() {
 fn a_turned_origin_turns_the_map_about_its_lower_left_corner() {
     let lot = small_map("turned", &format!("[1.0, 2.0, {FRAC_PI_2}]"));
     // Along the rows is +y now, up the columns −x.
-    let ground = lot.ros_ground(Vec2::new(0.8, 2.2), None).unwrap();
+    let ground = ground(&lot, Vec2::new(0.8, 2.2));
     let expected = [(1.0, 4.0), (0.0, 4.0), (0.0, 3.5), (0.5, 3.5), (0.5, 3.0), (-0.5, 3.0), (-0.5, 2.0), (1.0, 2.0)];
     assert_eq!(ground.boundary, vertices(&expected));
 }
@@ -67,7 +71,7 @@ fn a_turned_origin_turns_the_map_about_its_lower_left_corner() {
 #[test]
 fn the_scale_enlarges_everything_about_the_origin_of_the_frame() {
     let lot = MapLot { scale: 20.0, ..small_map("scaled", "[1.0, 2.0, 0.0]") };
-    let ground = lot.ros_ground(Vec2::new(24.0, 44.0), None).unwrap();
+    let ground = ground(&lot, Vec2::new(24.0, 44.0));
     let expected = [
         (60.0, 40.0),
         (60.0, 60.0),
