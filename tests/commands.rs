@@ -102,7 +102,7 @@ fn a_map_is_driven_in_two_commands() {
             .arg("--out")
             .arg(&results),
     );
-    assert!(results.join("evaluation.md").is_file());
+    assert!(results.join("summary.md").is_file());
 }
 
 #[test]

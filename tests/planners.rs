@@ -38,7 +38,7 @@ fn parameters_come_from_a_file_or_are_refused() {
     std::fs::write(&path, complete).unwrap();
     let drive = ["evaluate", "--lots", "lot-b", "--trials", "1", "--directions", "forward", "--driver", "vvf", &driver];
     succeed(xtask().args(drive).arg("--out").arg(&out));
-    let lines = std::fs::read_to_string(out.join("episodes.jsonl")).unwrap();
+    let lines = std::fs::read_to_string(out.join("runs.jsonl")).unwrap();
     let runs: Vec<serde_json::Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(runs.len(), 2);
     assert_ne!(runs[0]["driver"], runs[1]["driver"]);

@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn a_draw_keeps_the_mean_and_repeats() {
-        let config = LookAheadNetConfig::compact();
+        let config = LookAheadNetConfig::paper();
         let draw = |index| DropoutDraw::new(&config, 64, RootSeed(3), index);
         let mut values = vec![1.0; 64 * config.features()];
         draw(0).apply_to_features(&mut values);

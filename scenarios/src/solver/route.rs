@@ -186,7 +186,9 @@ fn bottleneck(scene: &Scene, from: Vec2, to: Vec2, closed: &BTreeSet<usize>) -> 
     {
         way.push(parent[cell] as usize);
     }
-    let wall = way.iter().rev().copied().find(|&cell| room.values[cell] < 0.5 * WALL_M);
+    // From the start: what lies behind the narrowest place need only be as wide as that.
+    way.reverse();
+    let wall = way.iter().copied().find(|&cell| room.values[cell] < 0.5 * WALL_M);
     let narrowest = way.into_iter().min_by(|&a, &b| room.values[a].total_cmp(&room.values[b])).unwrap_or(first);
     let place = wall.unwrap_or(narrowest);
     (room.centre(place % room.cols, place / room.cols), room.values[narrowest].max(0.0))
