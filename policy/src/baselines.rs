@@ -103,18 +103,18 @@ fn head_for(point: Vec2) -> Decision {
 struct WheelEstimate {
     steering_rad: f32,
     command_rad: f32,
-    rate_step_rad: f32,
+    rate_rad_per_tick: f32,
 }
 
 impl WheelEstimate {
     fn new(rig: &Rig) -> Self {
-        let rate_step_rad = rig.vehicle.steering_rate_max_radps * rig.control_period_s;
-        Self { steering_rad: 0.0, command_rad: 0.0, rate_step_rad }
+        let rate_rad_per_tick = rig.vehicle.steering_rate_max_radps * rig.control_period_s;
+        Self { steering_rad: 0.0, command_rad: 0.0, rate_rad_per_tick }
     }
 
     /// The angle one control period after the last command, radians.
     fn advance(&mut self) -> f32 {
-        let (low, high) = (self.steering_rad - self.rate_step_rad, self.steering_rad + self.rate_step_rad);
+        let (low, high) = (self.steering_rad - self.rate_rad_per_tick, self.steering_rad + self.rate_rad_per_tick);
         self.steering_rad = self.command_rad.clamp(low, high);
         self.steering_rad
     }
@@ -153,7 +153,7 @@ fn nearest_occupied(grid: &OccupancyGrid, geometry: &GridGeometry, point: Vec2, 
         let ahead_m = point.x - point.x.clamp(near_edge_m, near_edge_m + cell_m);
         let on_left = cells & up_to_col;
         let on_right = cells & !(up_to_col >> 1);
-        let left_col = (on_left != 0).then(|| 31 - on_left.leading_zeros());
+        let left_col = on_left.checked_ilog2();
         let right_col = (on_right != 0).then(|| on_right.trailing_zeros()).filter(|&right| Some(right) != left_col);
         for col in [left_col, right_col].into_iter().flatten() {
             let left_edge_m = (0.5 * GRID_CELLS as f32 - col as f32) * cell_m;
@@ -327,6 +327,15 @@ pub trait Method: Clone + std::fmt::Debug + PartialEq + Serialize + DeserializeO
     fn planner(&self, rig: &Rig) -> Self::Planner;
 }
 
+/// Writes a number as people would: TOML's floats are f64, and 2.3 as f32 is 2.299999952316284 as f64.
+fn shorten(value: &mut toml::Value) {
+    if let toml::Value::Float(number) = value
+        && let Ok(short) = (*number as f32).to_string().parse()
+    {
+        *number = short;
+    }
+}
+
 /// `Err` unless a parameter lies within its range.
 fn within(name: &str, value: f32, low: f32, high: f32) -> Result<(), String> {
     if (low..=high).contains(&value) { Ok(()) } else { Err(format!("{name} = {value}: choose {low} to {high}")) }
@@ -390,8 +399,10 @@ macro_rules! baselines {
             /// # Panics
             /// Never: parameters are plain values.
             pub fn parameters(&self) -> toml::Table {
-                match self { $(Self::$variant(params) => toml::Table::try_from(params),)* }
-                    .expect("parameters are plain values")
+                let table = match self { $(Self::$variant(params) => toml::Table::try_from(params),)* };
+                let mut table = table.expect("parameters are plain values");
+                table.iter_mut().for_each(|(_, value)| shorten(value));
+                table
             }
 
             /// Names and spans of what the tuner varies.

@@ -144,7 +144,7 @@ impl VirtualForceField {
             let mut cells = grid.row(row) & active;
             // From both ends, so that the sum of a mirrored grid is the mirrored sum, to the bit.
             while cells != 0 {
-                let (left, right) = (31 - cells.leading_zeros(), cells.trailing_zeros());
+                let (left, right) = (cells.ilog2(), cells.trailing_zeros());
                 let push = |col: u32| self.pushes[row * GRID_CELLS + col as usize];
                 force += if left == right { push(left) } else { push(left) + push(right) };
                 cells &= !(1 << left | 1 << right);
