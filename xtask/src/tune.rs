@@ -144,7 +144,9 @@ impl Course {
             .collect();
         let total = |reports: &[EpisodeReport]| {
             let mut totals = Totals::default();
-            reports.iter().for_each(|report| totals.add(report));
+            for report in reports {
+                totals.add(report);
+            }
             totals
         };
         reports.chunks(starts.len()).map(total).collect()

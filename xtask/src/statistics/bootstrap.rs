@@ -89,7 +89,7 @@ impl Units {
             values.sort_by(f64::total_cmp);
             Interval { estimate, lower: quantile(&values, tail), upper: quantile(&values, 1.0 - tail) }
         };
-        estimates.par_iter().enumerate().map(|indexed| interval(indexed)).collect()
+        estimates.par_iter().enumerate().map(interval).collect()
     }
 
     fn resample(&self, seed: RootSeed, draw: u64, sums: &mut [f64]) {
@@ -127,7 +127,9 @@ mod tests {
     fn mean_interval(values: &[f64], draws: u64) -> Interval {
         let mut units = Units::new(2);
         units.begin_stratum();
-        values.iter().for_each(|&value| units.push(&[value, 1.0]));
+        for &value in values {
+            units.push(&[value, 1.0]);
+        }
         units.percentile_intervals(RootSeed(1), draws, 1, |sums, out| out[0] = sums[0] / sums[1])[0]
     }
 

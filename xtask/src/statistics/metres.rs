@@ -42,9 +42,9 @@ impl Question {
             for _ in 0..40 {
                 let middle = 0.5 * (low + high);
                 if enough(middle) {
-                    high = middle
+                    high = middle;
                 } else {
-                    low = middle
+                    low = middle;
                 }
                 if high - low < 1e-4 * high {
                     break;

@@ -123,7 +123,7 @@ mod tests {
     #[test]
     fn the_example_of_r_poisson_test() {
         let rate = Rate::new(137, 24.19893);
-        assert!((rate.per_unit - 5.661407).abs() < 5e-7, "{rate:?}");
+        assert!((rate.per_unit - 5.661_407).abs() < 5e-7, "{rate:?}");
         assert_interval([rate.lower, rate.upper], [4.753_125, 6.692_709], 6);
     }
 
