@@ -401,7 +401,11 @@ impl MapLot {
         };
         match (reason, finish) {
             (NoRoute::GoalBlocked, Finish::At(goal)) => blocked("goal", goal),
-            (NoRoute::StartBlocked | NoRoute::GoalBlocked, _) => blocked("start", start),
+            (NoRoute::GoalBlocked, Finish::Start) => {
+                let end = start.advanced_along_arc(0.0, -route::LOOP_GAP_M);
+                blocked(&format!("end of the loop, {} m behind its start", route::LOOP_GAP_M), end)
+            }
+            (NoRoute::StartBlocked, _) => blocked("start", start),
             (NoRoute::Walled { at }, Finish::At(_)) => {
                 let problem = format!("the goal cannot be reached: a wall is in the way near {}", self.in_map(at));
                 self.fault("route", problem, "open the map there, or put start and goal on the same side of it")

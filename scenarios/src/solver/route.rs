@@ -16,7 +16,7 @@ pub const GOAL_BESIDE_M: f32 = 1.0;
 /// Cosine of the largest angle between the end of the route and the goal: 20°.
 const GOAL_HEADING_COS: f32 = 0.94;
 /// How far behind its start a loop ends, metres: farther than the goal's depth, so that the start is no finish.
-const LOOP_GAP_M: f32 = 2.5;
+pub const LOOP_GAP_M: f32 = 2.5;
 /// The gate that makes a loop go round stands this far ahead of the start, metres: between rear and front axle.
 const GATE_AHEAD_M: f32 = 1.6;
 /// A passage narrower than this is none, metres: the raster of distances tells no finer things apart.
@@ -90,7 +90,7 @@ pub fn find(
     };
     let gate = match finish {
         Finish::At(_) => BTreeSet::new(),
-        Finish::Start => gate(&scene, start, vehicle),
+        Finish::Start => gate(&scene, start),
     };
     let to_go = DistanceToGo::new(&scene, &goal, vehicle, &gate);
     let mut search = Search::new(&scene, &goal, &to_go, vehicle, clearance_m);
@@ -128,7 +128,7 @@ pub fn radius_min_m(vehicle: &VehicleParams) -> f32 {
 }
 
 /// Cells of the clearance raster across the free ground just ahead of the start.
-fn gate(scene: &Scene, start: Pose, vehicle: &VehicleParams) -> BTreeSet<usize> {
+fn gate(scene: &Scene, start: Pose) -> BTreeSet<usize> {
     let centre = start.position() + GATE_AHEAD_M * start.ahead();
     let step_m = 0.5 * Scene::NODE_M;
     let mut cells = BTreeSet::new();
@@ -137,7 +137,8 @@ fn gate(scene: &Scene, start: Pose, vehicle: &VehicleParams) -> BTreeSet<usize> 
         let mut beside_m = 0.0;
         loop {
             let point = centre + beside_m * across;
-            if scene.clearance_m(point) < 0.5 * vehicle.width_m - Scene::SLACK_M {
+            // Up to the edge: a gap beside the gate would be taken for a passage.
+            if scene.clearance_m(point) < Scene::SLACK_M {
                 break;
             }
             // Two cells thick, so that no diagonal step passes.
