@@ -159,9 +159,9 @@ pub struct EpisodeMetrics {
     /// observes and where an emergency stop ends.
     pub clearance_min_m: f32,
     /// Changes of the steering direction by more than 2° of road-wheel angle: the steering reversals of SAE J2944, with
-    /// a gap [chosen] that ignores the follow-up of noise. What a resume straightens does not count.
+    /// a gap (chosen) that ignores the follow-up of noise. What a resume straightens does not count.
     pub steering_reversals: u32,
-    /// Road-wheel angle steered, radians: the sum of all changes from tick to tick [chosen], resumes left out.
+    /// Road-wheel angle steered, radians: the sum of all changes from tick to tick (chosen), resumes left out.
     pub steering_effort_rad: f32,
 }
 

@@ -78,7 +78,7 @@ pub struct Comparison {
 impl Ledger {
     /// How the drivers stand in a scope at a noise level, and how they compare with one of them. Resampled are units
     /// (lot, direction, seed) within each lot (methods.md 8.3); of generated lots, which are a sample themselves, whole
-    /// lots within their kind [chosen]. Only runs that all drivers have driven count.
+    /// lots within their kind (chosen). Only runs that all drivers have driven count.
     pub fn judge(&self, level: usize, scope: &Scope, with: usize, seed: RootSeed) -> (Vec<Standing>, Vec<Comparison>) {
         let pairs = self.common_units(level, scope);
         let drivers = self.accounts[level].len();
