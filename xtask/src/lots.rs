@@ -120,6 +120,18 @@ impl Lot {
         matches!(self.spec, LotSpec::Reference(_))
     }
 
+    /// The lot that takes its place in a round of training: of `count` generated lots of a kind, round after round the
+    /// next `count`. Other lots stay: they draw new obstacles, or are files.
+    #[must_use]
+    pub fn in_round(&self, round: u32, count: u64) -> Self {
+        let mut lot = self.clone();
+        if let LotSpec::Generated { index, .. } = &mut lot.spec {
+            *index += u64::from(round) * count;
+            lot.name = lot.spec.to_string();
+        }
+        lot
+    }
+
     /// The lot with the obstacles of a trial.
     pub fn draw(&self, trial: RootSeed) -> Drawn {
         match (&self.from_file, &self.spec) {
@@ -155,5 +167,16 @@ mod tests {
             let error = format!("{:#}", names(specs).unwrap_err());
             assert!(error.contains(part), "{specs:?}: {part:?} is missing in: {error}");
         }
+    }
+
+    #[test]
+    fn every_round_of_training_has_generated_lots_of_its_own() {
+        let names = |round| -> Vec<String> {
+            let lots = Lot::parse_all(&["lot-a", "train:2", "train:1:hard"]).unwrap();
+            let of_a_kind = |lot: &Lot| lots.iter().filter(|other| other.family() == lot.family()).count() as u64;
+            lots.iter().map(|lot| lot.in_round(round, of_a_kind(lot)).name().to_owned()).collect()
+        };
+        assert_eq!(names(0), ["lot-a", "train-medium-0", "train-medium-1", "train-hard-0"]);
+        assert_eq!(names(1), ["lot-a", "train-medium-2", "train-medium-3", "train-hard-1"]);
     }
 }

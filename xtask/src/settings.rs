@@ -42,11 +42,12 @@ pub struct Settings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainingSettings {
-    /// Lots driven in every round; see `cargo xtask lots`.
+    /// Lots driven in every round; see `cargo xtask lots`. Of generated lots (`train:8`) every round takes the next ones.
     pub lots: Vec<String>,
     /// Ways they are driven.
     pub directions: Vec<Direction>,
-    /// Times every lot is driven in each direction per round (paper: once), each with its own obstacles.
+    /// Times every lot is driven in each direction per round (paper: once), each with its own obstacles. Generated lots
+    /// are driven once: they would look the same again.
     pub trials: u32,
     /// What is seen wrongly.
     pub noise: NoiseChoice,

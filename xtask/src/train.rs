@@ -144,10 +144,15 @@ fn learn(settings: &Settings, run: &RunDir, stopwatch: &mut Stopwatch) -> anyhow
     Ok(outcome)
 }
 
+/// Lots that draw their obstacles are driven `training.trials` times. A generated lot looks the same every time: it is
+/// driven once, and the next round has other ones.
 fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<Episode>> {
     let training = &settings.training;
-    let purpose = Purpose::Training { round };
-    let jobs: Vec<_> = Job::all(settings.seed, purpose, lots, training.trials, &training.directions).collect();
+    let (generated, others): (Vec<Lot>, Vec<Lot>) = lots.iter().cloned().partition(Lot::is_generated);
+    let of_a_kind = |lot: &Lot| generated.iter().filter(|other| other.family() == lot.family()).count() as u64;
+    let generated: Vec<Lot> = generated.iter().map(|lot| lot.in_round(round, of_a_kind(lot))).collect();
+    let jobs = |lots, trials| Job::all(settings.seed, Purpose::Training { round }, lots, trials, &training.directions);
+    let jobs: Vec<_> = jobs(&others, training.trials).chain(jobs(&generated, 1)).collect();
     trials::episodes(&jobs, settings, training.noise)
 }
 
