@@ -51,7 +51,7 @@ const STEPS: u32 = 10;
 fn train<const NET: usize>(bencher: Bencher<'_, '_>, batch: usize) {
     let samples = grids(2048).into_iter().map(|grid| Sample { grid, label: [0.5, 0.4], tau_hat: 0.1 }).collect();
     let mut dataset = Dataset::default();
-    dataset.push(Round { samples });
+    dataset.push(Round { samples, relooks: Vec::new() });
     let settings = FitSettings {
         batch,
         validation: ValidationSplit::none(),

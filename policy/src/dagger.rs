@@ -12,12 +12,13 @@ use crate::dataset::{Dataset, Round};
 use crate::decision_rule::DecisionRule;
 use crate::fit::{self, FitError, FitOutcome, FitProgress, FitReport, FitSettings};
 use crate::network::{DeviceChoice, LookAheadNetConfig, NetworkError, Predictor, Weights};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim::batch::run_lockstep;
 use sim::driver::Driver;
 use sim::episode::{Episode, Frame};
 use sim::seed::{RootSeed, Stream};
-use sim::sensing::GridGeometry;
+use sim::sensing::{GridGeometry, Sensor};
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -33,6 +34,10 @@ pub struct DaggerConfig {
     pub iterations_max: u32,
     /// Which labelled ticks enter the data set.
     pub keep: Keep,
+    /// Further looks at every kept tick, each with noise of its own, trained on with the same label: what is noise and
+    /// what is not is learned sooner than it is from driving more.
+    #[serde(default)]
+    pub relooks: u32,
     /// Where each iteration's training starts.
     pub start: StartFrom,
     /// Where the network is computed.
@@ -70,6 +75,7 @@ impl DaggerConfig {
             iterations_min: 1,
             iterations_max: 8,
             keep: Keep::ExpertTicks,
+            relooks: 0,
             start: StartFrom::Scratch,
             device: DeviceChoice::Cpu,
             geometry: GridGeometry::paper(),
@@ -264,13 +270,25 @@ impl Run<'_, '_> {
         let control_period_s = episodes.first().map_or(0.0, |episode| episode.config().control_period_s());
         let experts = (0..episodes.len()).map(|episode| (self.hooks.expert)(round, episode)).collect();
         let novice = policy.map(|weights| Predictor::new(weights.clone(), self.config.device));
-        let mut arbiter = Arbiter::new(novice, experts, self.config.rule, self.config.keep, self.config.geometry);
+        let mut arbiter = Arbiter::new(novice, experts, self.config.rule, self.config.keep, self.config.geometry)
+            .with_lookers(self.lookers(&episodes, round));
         let on_frame = &mut *self.hooks.on_frame;
         let reports = run_lockstep(episodes, &mut arbiter, &mut |episode, frame| on_frame(round, episode, frame));
         let collected = arbiter.into_collected();
         let collection = Collection::new(round, &collected, control_period_s, &reports);
         self.store.write_round(round, &collected.round, &collection)?;
         Ok((collected.round, collection))
+    }
+
+    /// The sensors of the further looks, for every episode.
+    fn lookers(&self, episodes: &[Episode], round: u32) -> Vec<Vec<Sensor>> {
+        let (seed, looks) = (self.seed, u64::from(self.config.relooks));
+        let lookers = |(index, episode): (usize, &Episode)| {
+            // 2^20 rounds of 2^20 episodes with 2^8 looks.
+            let first = (u64::from(round) << 20 | index as u64) << 8;
+            (0..looks).map(|look| episode.another_sensor(seed.child(Stream::Relook, first + look))).collect()
+        };
+        episodes.par_iter().enumerate().map(lookers).collect()
     }
 
     /// Line 7: D ← D ∪ `D_i`.

@@ -30,6 +30,17 @@ impl Sample {
 pub struct Round {
     /// The samples.
     pub samples: Vec<Sample>,
+    /// Further looks at the scenes of the samples, each with noise of its own: the same number for every sample, those
+    /// of one sample together. Trained on with the sample's label; never validated on.
+    pub relooks: Vec<OccupancyGrid>,
+}
+
+impl Round {
+    /// Further looks at a sample.
+    fn relooks_of(&self, sample: usize) -> &[OccupancyGrid] {
+        let each = self.relooks.len() / self.samples.len().max(1);
+        &self.relooks[sample * each..(sample + 1) * each]
+    }
 }
 
 /// The union of all rounds so far.
@@ -93,11 +104,17 @@ impl Dataset {
     /// Splits by blocks that never cross a round: a further round leaves the split of the earlier ones as it is.
     pub fn split(&self, by: ValidationSplit) -> Split {
         let mut split = Split::default();
-        let blocks = self.rounds.iter().flat_map(|round| round.samples.chunks(by.block.max(1)));
-        for (index, block) in blocks.enumerate() {
-            let is_held_back = by.every > 0 && index % by.every == by.every - 1;
-            let into = if is_held_back { &mut split.validation } else { &mut split.training };
-            into.extend_from_slice(block);
+        let mut blocks = 0;
+        for round in &self.rounds {
+            for (index, &sample) in round.samples.iter().enumerate() {
+                blocks += usize::from(index % by.block.max(1) == 0);
+                if by.every > 0 && blocks % by.every == 0 {
+                    split.validation.push(sample);
+                } else {
+                    split.training.push(sample);
+                    split.training.extend(round.relooks_of(index).iter().map(|&grid| Sample { grid, ..sample }));
+                }
+            }
         }
         split
     }
@@ -121,7 +138,7 @@ pub(crate) mod tests {
                 Sample { grid, label: [0.5 + 0.003 * (left - right), 0.2 + 0.002 * (left + right)], tau_hat }
             })
             .collect();
-        Round { samples }
+        Round { samples, relooks: Vec::new() }
     }
 
     #[test]
@@ -139,6 +156,20 @@ pub(crate) mod tests {
         assert_eq!(after.training[..103], before.training[..]);
         assert_eq!(after.validation[..20], before.validation[..]);
         assert_eq!(after.training.len() + after.validation.len(), dataset.len());
+    }
+
+    #[test]
+    fn further_looks_are_trained_on_beside_their_sample_and_never_validated_on() {
+        let mut round = round(20);
+        round.relooks = round.samples.iter().flat_map(|sample| [sample.grid.mirrored(), sample.grid]).collect();
+        let mut dataset = Dataset::default();
+        dataset.push(round.clone());
+        let split = dataset.split(ValidationSplit { block: 5, every: 2 });
+        assert_eq!(split.validation, [&round.samples[5..10], &round.samples[15..20]].concat());
+        assert_eq!(split.training.len(), 30);
+        let first = round.samples[0];
+        let mirrored = Sample { grid: first.grid.mirrored(), ..first };
+        assert_eq!(split.training[..4], [first, mirrored, first, round.samples[1]]);
     }
 
     #[test]

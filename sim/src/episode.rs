@@ -236,6 +236,11 @@ impl Episode {
         }
     }
 
+    /// A sensor like the one of this episode, with noise of its own.
+    pub fn another_sensor(&self, seed: RootSeed) -> Sensor {
+        Sensor::new(&self.map, self.config.sensing.clone(), &self.config.noise, seed)
+    }
+
     /// The same, but already under way: for asking what would have happened from a state that was met elsewhere.
     /// Commands still on their way then are not known; the car holds its wheels and speed until the first new one.
     pub fn under_way(

@@ -36,6 +36,8 @@ pub enum Stream {
     Suite = 11,
     /// Candidates of a search for parameters.
     Search = 12,
+    /// Sensor noise of further looks at a tick that is learned from.
+    Relook = 13,
 }
 
 /// The one number a run is reproduced from.

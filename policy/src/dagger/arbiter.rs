@@ -6,8 +6,8 @@ use crate::drivers::novice_decision;
 use crate::network::Predictor;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sim::driver::{Decision, Driver, Fleet, Seat};
-use sim::sensing::GridGeometry;
+use sim::driver::{Decision, Driver, Fleet, GroundTruth, Seat};
+use sim::sensing::{GridGeometry, OccupancyGrid, Sensor};
 
 /// Which labelled ticks enter the data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -27,10 +27,31 @@ pub struct Arbiter {
     keep: Keep,
     geometry: GridGeometry,
     /// `D_i`, by seat.
-    samples: Vec<Vec<Sample>>,
+    seats: Vec<SeatRecord>,
     n_tot: u64,
     n_net: u64,
     tau_hat_sum: f64,
+}
+
+/// What is written down at one seat.
+#[derive(Default)]
+struct SeatRecord {
+    samples: Vec<Sample>,
+    /// Look at the scenes of the samples, too.
+    lookers: Vec<Sensor>,
+    relooks: Vec<OccupancyGrid>,
+    /// Decisions so far.
+    ticks: u32,
+}
+
+impl SeatRecord {
+    /// Line 15, and further looks at the same scene.
+    fn keep(&mut self, sample: Sample, truth: &GroundTruth<'_>) {
+        self.samples.push(sample);
+        let looks =
+            self.lookers.iter_mut().map(|sensor| sensor.observe(truth.map, truth.vehicle.pose, self.ticks).grid);
+        self.relooks.extend(looks);
+    }
 }
 
 /// What Algorithm 2 returns.
@@ -55,18 +76,27 @@ impl Arbiter {
         keep: Keep,
         geometry: GridGeometry,
     ) -> Self {
-        let samples = vec![Vec::new(); experts.len()]; // line 2: D_i ← ∅
-        Self { novice, experts, rule, keep, geometry, samples, n_tot: 0, n_net: 0, tau_hat_sum: 0.0 } // line 3
+        let seats = experts.iter().map(|_| SeatRecord::default()).collect(); // line 2: D_i ← ∅
+        Self { novice, experts, rule, keep, geometry, seats, n_tot: 0, n_net: 0, tau_hat_sum: 0.0 } // line 3
+    }
+
+    /// Sensors of every seat that look at the kept ticks, too.
+    #[must_use]
+    pub fn with_lookers(mut self, lookers: Vec<Vec<Sensor>>) -> Self {
+        for (seat, lookers) in self.seats.iter_mut().zip(lookers) {
+            seat.lookers = lookers;
+        }
+        self
     }
 
     /// Line 20. Samples are joined in the order of the seats.
     pub fn into_collected(self) -> Collected {
-        Collected {
-            round: Round { samples: self.samples.concat() },
-            n_tot: self.n_tot,
-            n_net: self.n_net,
-            tau_hat_sum: self.tau_hat_sum,
+        let mut round = Round::default();
+        for seat in self.seats {
+            round.samples.extend(seat.samples);
+            round.relooks.extend(seat.relooks);
         }
+        Collected { round, n_tot: self.n_tot, n_net: self.n_net, tau_hat_sum: self.tau_hat_sum }
     }
 
     /// Line 6, for all seats at once; each expert sees only its own seat.
@@ -91,17 +121,37 @@ impl Arbiter {
     }
 }
 
+impl Arbiter {
+    /// Line 15 for all seats at once, with further looks.
+    fn write_down(&mut self, seats: &[Seat<'_>], kept: &[Option<Sample>]) {
+        let mut waiting = seats.iter().peekable();
+        let mut records: Vec<_> = self
+            .seats
+            .iter_mut()
+            .enumerate()
+            .filter_map(|(episode, record)| Some((record, waiting.next_if(|seat| seat.episode == episode)?)))
+            .collect();
+        records.par_iter_mut().for_each(|(record, seat)| {
+            if let Some(sample) = kept[seat.episode] {
+                record.keep(sample, &seat.situation.truth);
+            }
+            record.ticks += 1;
+        });
+    }
+}
+
 impl Fleet for Arbiter {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
         let predictions = self.novice.as_mut().map(|novice| novice.predict(&grids)); // line 5
         let expert_decisions = self.ask_experts(seats); // line 6
+        let mut kept: Vec<Option<Sample>> = vec![None; self.seats.len()];
         for (index, (seat, expert)) in seats.iter().zip(expert_decisions).enumerate() {
             let a_exp = expert.look_ahead.to_image_fraction(&self.geometry).map(|fraction| fraction.clamp(0.0, 1.0));
             let grid = seat.situation.observation.grid;
             self.n_tot += 1; // line 17
             let Some(predicted) = predictions.as_ref().map(|predictions| predictions[index]) else {
-                self.samples[seat.episode].push(Sample { grid, label: a_exp, tau_hat: 0.0 });
+                kept[seat.episode] = Some(Sample { grid, label: a_exp, tau_hat: 0.0 });
                 decisions.push(expert);
                 continue;
             };
@@ -117,8 +167,9 @@ impl Fleet for Arbiter {
             if !trusts_novice || self.keep == Keep::EveryTick {
                 // Line 15. τ̂ is a distance within the unit square, up to √2; the weight is meant for 0…1.
                 let tau_hat = evidence.discrepancy.min(1.0);
-                self.samples[seat.episode].push(Sample { grid, label: a_exp, tau_hat });
+                kept[seat.episode] = Some(Sample { grid, label: a_exp, tau_hat });
             }
         }
+        self.write_down(seats, &kept);
     }
 }

@@ -54,6 +54,7 @@ fn config() -> DaggerConfig {
     DaggerConfig {
         eta: 0.999,
         iterations_max: 2,
+        relooks: 1,
         start: StartFrom::Previous,
         network: LookAheadNetConfig {
             conv1: ConvConfig { channels: 16, kernel: 3 },
@@ -103,6 +104,9 @@ fn a_run_leaves_data_and_policy_of_every_round() {
         assert_eq!((row.round, row.samples, row.dataset), (round as u32, data.samples.len(), total));
         let kept = if round == 0 { about.ticks } else { about.ticks - about.novice_ticks };
         assert_eq!(data.samples.len() as u64, kept, "round {round} keeps the expert's ticks");
+        assert_eq!(data.relooks.len(), data.samples.len(), "one further look at each");
+        let differ = data.samples.iter().zip(&data.relooks).filter(|(sample, relook)| sample.grid != **relook).count();
+        assert!(2 * differ > data.samples.len(), "{differ} of {} have noise of their own", data.samples.len());
         assert!(Checkpoint::exists(&store.round_folder(round as u32)));
         assert_eq!(row.eta_hat.is_some(), round > 0);
     }

@@ -3,6 +3,7 @@
 //! ```text
 //! round-00/grids.npy        u8  [n, 25, 25]   1 = non-drivable, row 0 = far, column 0 = left
 //!          labels.npy       f32 [n, 3]        u, w, τ̂ (image fractions)
+//!          relooks.npy      u8  [n, k, 25, 25]  the same scenes with other noise, if k > 0
 //!          round.toml       how it was collected
 //!          model.safetensors, model.toml, fit.toml    the network trained after it
 //! round-01/…
@@ -12,7 +13,7 @@
 //! Every file and folder appears under its name only when it is complete: it is written beside, then renamed.
 
 use super::{Round, Sample};
-use ndarray::{Array2, Array3};
+use ndarray::{Array2, Array3, Array4};
 use ndarray_npy::{ReadNpyExt as _, WriteNpyExt as _};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -41,6 +42,7 @@ impl StoreError {
 }
 
 const WRITE_REMEDY: &str = "check that the folder exists, is writable and has space";
+const RELOOKS: &str = "relooks.npy";
 const READ_REMEDY: &str = "delete this round and all later ones to collect them again, or restore the file";
 
 /// The folder of one run.
@@ -107,6 +109,14 @@ impl Store {
         write_atomically(&partial.join("labels.npy"), |file| {
             labels.write_npy(file).map_err(|error| error.to_string())
         })?;
+        if !round.relooks.is_empty() {
+            let cells = round.relooks.iter().flat_map(OccupancyGrid::cells).collect();
+            let shape = [n, round.relooks.len() / n, GRID_CELLS, GRID_CELLS];
+            let relooks = Array4::from_shape_vec(shape, cells).expect("every sample has as many further looks");
+            write_atomically(&partial.join(RELOOKS), |file| {
+                relooks.write_npy(file).map_err(|error| error.to_string())
+            })?;
+        }
         write_toml(&partial.join("round.toml"), about)?;
         fs::rename(&partial, &folder).map_err(|error| StoreError::new(&folder, error, WRITE_REMEDY))
     }
@@ -144,7 +154,20 @@ impl Store {
                 Sample { grid: OccupancyGrid::from_cells(&cells), label: [label[0], label[1]], tau_hat: label[2] }
             })
             .collect();
-        Ok((Round { samples }, about))
+        Ok((Round { samples, relooks: Self::read_relooks(&folder.join(RELOOKS), n)? }, about))
+    }
+
+    fn read_relooks(path: &Path, n: usize) -> Result<Vec<OccupancyGrid>, StoreError> {
+        if !path.exists() {
+            return Ok(Vec::new());
+        }
+        let grids = Array4::<u8>::read_npy(open(path)?).map_err(|error| StoreError::new(path, error, READ_REMEDY))?;
+        if grids.shape()[0] != n || grids.shape()[2..] != [GRID_CELLS, GRID_CELLS] {
+            let problem = format!("shape {:?} instead of [{n}, k, {GRID_CELLS}, {GRID_CELLS}]", grids.shape());
+            return Err(StoreError::new(path, problem, READ_REMEDY));
+        }
+        let cells: Vec<u8> = grids.into_iter().collect();
+        Ok(cells.chunks_exact(GRID_CELLS * GRID_CELLS).map(OccupancyGrid::from_cells).collect())
     }
 }
 
@@ -203,7 +226,8 @@ pub(crate) mod tests {
     fn a_round_reads_back_as_written_and_is_never_overwritten() {
         let folder = scratch("round");
         let store = Store::open(&folder).unwrap();
-        let (round, about) = (round(33), About { collected_by: "expert".to_string() });
+        let (mut round, about) = (round(33), About { collected_by: "expert".to_string() });
+        round.relooks = round.samples.iter().flat_map(|sample| [sample.grid.mirrored(), sample.grid]).collect();
         assert!(!store.has_round(0));
         store.write_round(0, &round, &about).unwrap();
         assert!(store.has_round(0));
