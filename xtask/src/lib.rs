@@ -25,6 +25,7 @@ pub mod listing;
 pub mod lots;
 pub mod metres;
 pub mod pixel_accuracy;
+pub mod plots;
 pub mod progress;
 pub mod render;
 pub mod replay_key;
