@@ -120,7 +120,10 @@ fn compare_with(args: &EvaluateArgs, entries: &[Entry]) -> anyhow::Result<usize>
 
 /// The settings, and the name of what they start from: `--preset` or `--config` if given, else the first run that is
 /// named as a driver, else the default preset.
-fn resolve(args: &EvaluateArgs) -> anyhow::Result<(Settings, &str)> {
+///
+/// # Errors
+/// If something named does not exist, or runs were trained with settings that differ.
+pub fn resolve(args: &EvaluateArgs) -> anyhow::Result<(Settings, &str)> {
     let is_named = args.layers.preset.is_some() || args.layers.config.is_some();
     let mut runs = args.drivers.iter().filter_map(|spec| Some((spec, run_dir_of(spec)?)));
     let (mut settings, base) = match runs.next().filter(|_| !is_named) {

@@ -4,7 +4,8 @@
 //! |---|---|
 //! | [`cli`] | the command line, nothing else |
 //! | [`settings`] | preset → file → `--set` → flags, into one checked [`settings::Settings`] |
-//! | [`train`], [`evaluate`], [`generate`], [`pixel_accuracy`], [`metres`], [`tune`], [`listing`] | the commands |
+//! | [`train`], [`evaluate`], [`generate`], [`pixel_accuracy`], [`metres`], [`tune`], [`listing`], [`render`] | the commands |
+//! | [`plots`] | plots as SVG |
 //! | [`lots`], [`drivers`] | what can be named on the command line |
 //! | [`trials`] | which obstacles and which noise a trial has |
 //! | [`statistics`] | intervals and comparisons |

@@ -146,7 +146,10 @@ fn learn(settings: &Settings, run: &RunDir, stopwatch: &mut Stopwatch) -> anyhow
 
 /// Lots that draw their obstacles are driven `training.trials` times. A generated lot looks the same every time: it is
 /// driven once, and the next round has other ones.
-fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<Episode>> {
+///
+/// # Errors
+/// If a lot cannot be driven.
+pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<Episode>> {
     let training = &settings.training;
     let (generated, others): (Vec<Lot>, Vec<Lot>) = lots.iter().cloned().partition(Lot::is_generated);
     let of_a_kind = |lot: &Lot| generated.iter().filter(|other| other.family() == lot.family()).count() as u64;
