@@ -3,7 +3,8 @@
 mod render;
 
 pub use render::{
-    ColourChoice, RenderArgs, RenderLotArgs, RenderNoiseArgs, RenderWhat, SamplesArgs, TrajectoriesArgs, Way,
+    ColourChoice, RenderArgs, RenderLotArgs, RenderNoiseArgs, RenderReportArgs, RenderWhat, SamplesArgs,
+    TrajectoriesArgs, Way,
 };
 
 use crate::settings::NoiseChoice;

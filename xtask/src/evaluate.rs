@@ -13,6 +13,7 @@ use crate::progress::{Stopwatch, Work};
 use crate::replay_key::ReplayKey;
 use crate::report::{RunLine, Summary, WallTimeLine};
 use crate::run_dir::{self, Place, RunDir};
+use crate::run_report;
 use crate::settings::{NoiseChoice, Settings};
 use crate::summary::Ledger;
 use crate::trials::{self, Job, Purpose};
@@ -97,8 +98,12 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let run = RunDir::create(&place, &settings)?;
     let mut stopwatch = Stopwatch::default();
     measure(&plan, &run, &mut stopwatch)?;
+    run_report::write(run.path(), &mut stopwatch)?;
     run.finish(&Finished { drivers: &args.drivers })?;
-    eprintln!("written: {}/summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl", run.path().display());
+    eprintln!(
+        "written: {}/report.html, summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl",
+        run.path().display()
+    );
     stopwatch.report();
     Ok(())
 }

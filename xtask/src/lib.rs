@@ -6,6 +6,7 @@
 //! | [`settings`] | preset → file → `--set` → flags, into one checked [`settings::Settings`] |
 //! | [`train`], [`evaluate`], [`generate`], [`pixel_accuracy`], [`metres`], [`tune`], [`listing`], [`render`] | the commands |
 //! | [`plots`] | plots as SVG |
+//! | [`run_report`], [`learning`] | `report.html` and `learning.csv` of a run |
 //! | [`lots`], [`drivers`] | what can be named on the command line |
 //! | [`trials`] | which obstacles and which noise a trial has |
 //! | [`statistics`] | intervals and comparisons |
@@ -22,6 +23,7 @@ pub mod evaluate;
 pub mod failures;
 pub mod generate;
 pub mod interrupt;
+pub mod learning;
 pub mod listing;
 pub mod lots;
 pub mod metres;
@@ -33,6 +35,7 @@ pub mod render;
 pub mod replay_key;
 pub mod report;
 pub mod run_dir;
+pub mod run_report;
 pub mod settings;
 pub mod statistics;
 pub mod summary;

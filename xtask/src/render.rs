@@ -23,11 +23,11 @@ use crate::cli::{
 };
 use crate::drivers::{self, Contestant};
 use crate::lots::Lot;
-use crate::progress::Work;
+use crate::progress::{Stopwatch, Work};
 use crate::run_dir::{self, write_whole};
 use crate::settings::{NoiseChoice, Settings};
 use crate::trials::{self, Job, Purpose};
-use crate::{evaluate, report, train};
+use crate::{evaluate, report, run_report, train};
 use anyhow::{Context as _, ensure};
 use drawing::Drawing;
 use policy::checkpoint::Checkpoint;
@@ -59,6 +59,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         RenderWhat::Trajectories(what) => render_trajectories(what, &output),
         RenderWhat::Samples(what) => render_samples(what, &output),
         RenderWhat::Noise(what) => render_noise(what, &output),
+        RenderWhat::Report(what) => render_report(&what.run),
     }
 }
 
@@ -268,6 +269,17 @@ fn inspect(settings: &Settings, job: &Job<'_>, map: &Map, noise: NoiseChoice, at
     let pose = map.path().pose_at(at_m);
     let shown = sensor.observe(map, pose, tick);
     sensor.inspect(map, pose, tick, &shown)
+}
+
+fn render_report(run: &Path) -> anyhow::Result<()> {
+    ensure!(
+        run.join("settings.toml").is_file(),
+        "{}: this is no run; name a folder that train-dagger, train-bc or evaluate made",
+        run.display()
+    );
+    run_report::write(run, &mut Stopwatch::default())?;
+    println!("{}", run.join(run_report::FILE).display());
+    Ok(())
 }
 
 /// Where most layers make cells wrong; among these, where most cells are.

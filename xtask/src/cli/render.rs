@@ -12,7 +12,8 @@ Examples:
   cargo xtask render trajectories --driver expert --lots lot-a --by speed
   cargo xtask render trajectories --run runs/NAME --round 1
   cargo xtask render samples runs/NAME/round-01 --count 8
-  cargo xtask render noise --lots lot-a --noise paper,hard";
+  cargo xtask render noise --lots lot-a --noise paper,hard
+  cargo xtask render report runs/NAME";
 
 /// Arguments of `render`.
 #[derive(Debug, Clone, Args)]
@@ -41,6 +42,16 @@ pub enum RenderWhat {
     Samples(SamplesArgs),
     /// What each noise layer makes wrong in one view, PNG.
     Noise(RenderNoiseArgs),
+    /// The report of a run anew, into its folder.
+    Report(RenderReportArgs),
+}
+
+/// Arguments of `render report`.
+#[derive(Debug, Clone, Args)]
+pub struct RenderReportArgs {
+    /// Folder of a training or an evaluation.
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
 }
 
 /// Arguments of `render lot` and `render contact-sheet`.
