@@ -16,7 +16,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
                 folders.push(path);
             } else {
                 let name = path.strip_prefix(folder).unwrap().to_string_lossy().into_owned();
-                if !["manifest.toml", "report.html", "wall_time.jsonl"].contains(&name.as_str()) {
+                if !["manifest.toml", "report.html", "report.md", "wall_time.jsonl"].contains(&name.as_str()) {
                     files.insert(name, std::fs::read(&path).unwrap());
                 }
             }
@@ -97,6 +97,8 @@ fn an_evaluation_is_the_same_for_one_and_two_threads() {
         "noise_sweep.csv",
         "failures.jsonl",
         "failures.md",
+        "figures/noise.svg",
+        "figures/near-collision-0.png",
     ] {
         assert!(one.get(needed).is_some_and(|bytes| !bytes.is_empty()), "{needed} is missing from {:?}", one.keys());
     }

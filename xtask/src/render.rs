@@ -135,7 +135,11 @@ fn render_trajectories(args: &TrajectoriesArgs, output: &Output<'_>) -> anyhow::
         None if args.run.is_some() => ColourBy::Source,
         None => ColourBy::Driver,
     };
-    output.write(&name, &trajectories::picture(&map, &driven, by, &name, args.pixels_per_metre)?, true)
+    output.write(
+        &format!("drive-{name}"),
+        &trajectories::picture(&map, &driven, by, &name, args.pixels_per_metre)?,
+        true,
+    )
 }
 
 type Drives = (Arc<Map>, Vec<Trajectory>, String);
@@ -234,7 +238,7 @@ fn render_samples(args: &SamplesArgs, output: &Output<'_>) -> anyhow::Result<()>
         .map(|(place, &i)| (i, round.samples[i], answers.as_ref().map(|answers| answers[place])))
         .collect();
     let title = format!("{name}: {count} of {} samples", round.samples.len());
-    output.write(&format!("samples-{name}"), &samples::picture(&title, &samples, &settings.dagger.geometry)?, true)
+    output.write(&format!("samples-{name}"), &samples::picture(&title, &samples, &settings.dagger.geometry)?, false)
 }
 
 fn render_noise(args: &RenderNoiseArgs, output: &Output<'_>) -> anyhow::Result<()> {

@@ -1,4 +1,5 @@
-//! `report.html` of a run: one page that loads nothing, made from what the run left on disk.
+//! `report.html` of a run: one page that loads nothing, made from what the run left on disk. Beside it the same as
+//! `report.md`, and its pictures in `figures/`.
 //!
 //! A file that cannot be read or written is an error. A near-collision that can no longer be driven again (its network
 //! moved away) is not: the page says so in place of the picture.
@@ -10,7 +11,7 @@ use crate::interrupt;
 use crate::page::{Image, Page};
 use crate::plots::{self, AxisCalibration, Distribution, EtaSeries, NoisePoint, NoiseSeries, RateRow};
 use crate::progress::{Stopwatch, Work};
-use crate::run_dir::{self, write_whole};
+use crate::run_dir;
 use crate::settings::{NoiseChoice, Settings};
 use crate::statistics::poisson::DISPERSION_MAX;
 use anyhow::Context as _;
@@ -25,6 +26,7 @@ use std::path::Path;
 
 /// Name of the file.
 pub const FILE: &str = "report.html";
+const STEM: &str = "report";
 /// Near-collisions that are shown.
 const MOMENTS: usize = 6;
 /// Of these at most so many of one driver on one lot.
@@ -38,14 +40,14 @@ const ROWS_MAX: usize = 18;
 /// If what the run left cannot be read, or the report cannot be written.
 pub fn write(folder: &Path, stopwatch: &mut Stopwatch) -> anyhow::Result<()> {
     let mut work = Work::begin("report");
-    let html = html(folder, &mut work).with_context(|| format!("report of {}", folder.display()))?;
-    write_whole(&folder.join(FILE), html.as_bytes())?;
+    let page = page(folder, &mut work).with_context(|| format!("report of {}", folder.display()))?;
+    page.write(folder, STEM)?;
     stopwatch.add("report", work.seconds());
-    work.end(&format!("{} kB", html.len().div_ceil(1000)));
+    work.end(&folder.join(FILE).display().to_string());
     Ok(())
 }
 
-fn html(folder: &Path, work: &mut Work) -> anyhow::Result<String> {
+fn page(folder: &Path, work: &mut Work) -> anyhow::Result<Page> {
     let sources = Sources::read(folder)?;
     let name = folder.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into());
     let mut page = Page::new(name);
@@ -62,7 +64,7 @@ fn html(folder: &Path, work: &mut Work) -> anyhow::Result<String> {
         add_moments(&mut page, folder, &sources.settings, evaluation, work);
     }
     page.section("Configuration", configuration(&sources));
-    Ok(page.to_html())
+    Ok(page)
 }
 
 fn overview(sources: &Sources) -> String {
@@ -315,3 +317,6 @@ fn configuration(sources: &Sources) -> String {
     let _ = write!(text, "\nEvery setting (`settings.toml`):\n\n```toml\n{}\n```", sources.settings_text.trim_end());
     text
 }
+
+#[cfg(test)]
+mod tests;

@@ -38,7 +38,7 @@ pub enum RenderWhat {
     Trajectories(TrajectoriesArgs),
     /// Many lots on one page, PNG and SVG.
     ContactSheet(RenderLotArgs),
-    /// Samples of a round's data set with labels and predictions, PNG and SVG.
+    /// Samples of a round's data set with labels and predictions, PNG.
     Samples(SamplesArgs),
     /// What each noise layer makes wrong in one view, PNG.
     Noise(RenderNoiseArgs),

@@ -8,7 +8,8 @@ use sim::sensing::noise::Layer;
 use sim::sensing::{BEV_PIXELS, GRID_CELLS, Inspection};
 
 const GAP_PX: f32 = 16.0;
-const SCALE: f32 = 1.5;
+/// A whole number: pixels of the view keep sharp edges.
+const SCALE: f32 = 2.0;
 const FONT: Font = Font::Small;
 
 /// A row per noise level: the view, and the grid of it, both with wrong parts in the colour of the layer that made them

@@ -162,5 +162,5 @@ fn noise_is_shown_per_level() {
     assert!(Layer::ALL.iter().all(|&layer| levels[0].1.count_cells(layer) == 0), "clean is clean");
     assert!(Layer::ALL.iter().any(|&layer| levels[1].1.count_cells(layer) > 0));
     let sheet = noise::picture("lot-a", &levels).unwrap();
-    assert_eq!(sheet.size_px().x, 2.0 * 300.0 + 3.0 * 16.0);
+    assert_eq!(sheet.size_px().x, 2.0 * 400.0 + 3.0 * 16.0);
 }

@@ -128,6 +128,8 @@ pub fn picture(
 /// The driven lines, and a cross at every near-collision.
 pub fn draw(drawing: &mut Drawing, view: &View, trajectories: &[Trajectory], by: ColourBy) {
     for (index, trajectory) in trajectories.iter().enumerate() {
+        // Later ones are thinner: where all drive the same line, all are seen.
+        let width_px = 3.0 + 2.5 * (trajectories.len() - 1 - index) as f32;
         let colour = |point: &Point| match by {
             ColourBy::Speed => of_speed(point.speed_mps),
             ColourBy::Driver => rgb(index),
@@ -140,7 +142,7 @@ pub fn draw(drawing: &mut Drawing, view: &View, trajectories: &[Trajectory], by:
                 let same = drive[from..].iter().take_while(|point| colour(point) == rgb).count();
                 // To the first point of the next colour, so that no gap is left.
                 let to = (from + same).min(drive.len() - 1);
-                drawing.line(view.pixels(drive[from..=to].iter().map(|point| point.at)), rgb, 3.0);
+                drawing.line(view.pixels(drive[from..=to].iter().map(|point| point.at)), rgb, width_px);
                 from = to;
             }
         }
