@@ -104,8 +104,8 @@ fn add_training(page: &mut Page, settings: &Settings, training: &Training) {
             Image::Svg(svg),
         );
     }
-    let caption = "Loss over optimiser steps: means of stretches of steps; the triangle is the last validation of a round. \
-                   Losses of different rounds are of different data.";
+    let caption = "Loss over optimiser steps, round after round; training as means of stretches of steps. Training and \
+                   validation loss are different quantities where β > 0, and different rounds have different data.";
     page.figure("learning", caption, Image::Svg(plots::learning(&training.rounds)));
 }
 

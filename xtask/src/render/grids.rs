@@ -1,7 +1,7 @@
 //! Grids and views as the driver sees them: far is up, left is left.
 
 use super::drawing::{Drawing, Font, Rgb};
-use super::lot::INK;
+use super::lot::{Entry, INK};
 use super::trajectories::rgb;
 use sim::driver::{LookAheadPoint, Spread};
 use sim::geometry::Vec2;
@@ -123,18 +123,29 @@ pub fn draw_label(drawing: &mut Drawing, point: LookAheadPoint, geometry: &GridG
 }
 
 /// Swatches with small letters, in rows that fit into a width; returns their height, pixels.
-pub fn draw_small_legend(drawing: &mut Drawing, at: Vec2, width_px: f32, entries: &[(Rgb, String)]) -> f32 {
-    let font = Font::Small;
-    let line = font.height_px() + 6.0;
-    let (mut x, mut y) = (0.0, 0.0);
-    for (rgb, name) in entries {
-        let needed = 22.0 + font.width_px(name) + 18.0;
-        if x > 0.0 && x + needed - 18.0 > width_px {
-            (x, y) = (0.0, y + line);
-        }
-        drawing.rectangle(at + Vec2::new(x, y + 2.0), Vec2::splat(14.0), *rgb);
-        drawing.text(name.clone(), at + Vec2::new(x + 20.0, y), font, INK);
-        x += needed;
+pub fn draw_small_legend(drawing: &mut Drawing, at: Vec2, width_px: f32, entries: &[Entry]) -> f32 {
+    let (places, height_px) = small_legend(width_px, entries);
+    for ((rgb, name), place) in entries.iter().zip(places) {
+        drawing.rectangle(at + place + Vec2::new(0.0, 2.0), Vec2::splat(14.0), *rgb);
+        drawing.text(name.clone(), at + place + Vec2::new(20.0, 0.0), Font::Small, INK);
     }
-    y + line
+    height_px
+}
+
+/// Where the entries of a small legend stand, and its height, pixels.
+pub fn small_legend(width_px: f32, entries: &[Entry]) -> (Vec<Vec2>, f32) {
+    let line = Font::Small.height_px() + 6.0;
+    let mut next = Vec2::ZERO;
+    let place = |(_, name): &Entry| {
+        let needed = 20.0 + Font::Small.width_px(name);
+        if next.x > 0.0 && next.x + needed > width_px {
+            next = Vec2::new(0.0, next.y + line);
+        }
+        let place = next;
+        next.x += needed + 20.0;
+        place
+    };
+    let places: Vec<Vec2> = entries.iter().map(place).collect();
+    let height_px = places.last().map_or(0.0, |last| last.y + line);
+    (places, height_px)
 }

@@ -25,7 +25,8 @@ pub fn picture(title: &str, levels: &[(String, Inspection)]) -> anyhow::Result<D
     let mut legend = vec![(OCCUPIED, "occupied".to_owned()), (FREE, "free".to_owned())];
     legend.extend(Layer::ALL.map(|layer| (of_layer(layer), layer.name().to_owned())));
     let rows = levels.len() + 1;
-    let height = GAP_PX + 5.0 * line + rows as f32 * (side + line + GAP_PX);
+    let (_, legend_px) = grids::small_legend(width - 2.0 * GAP_PX, &legend);
+    let height = GAP_PX + line + legend_px + 6.0 + rows as f32 * (side + line + GAP_PX);
     let mut sheet = Drawing::new(Vec2::new(width, height), [0xFF; 3])?;
     sheet.text(title, Vec2::splat(GAP_PX), FONT, INK);
     let used = grids::draw_small_legend(&mut sheet, Vec2::new(GAP_PX, GAP_PX + line), width - 2.0 * GAP_PX, &legend);

@@ -46,7 +46,8 @@ pub(super) fn picture(key: &str, settings: &Settings) -> anyhow::Result<Vec<u8>>
     let grid_px = CELL_PX * GRID_CELLS as f32;
     let line = FONT.height_px() + 6.0;
     let legend = moment.legend();
-    let height = SIDE_PX + 3.0 * line + grid_px + 3.0 * GAP_PX + 3.0 * line;
+    let (_, legend_px) = grids::small_legend(SIDE_PX, &legend);
+    let height = GAP_PX + SIDE_PX + 6.0 + line + legend_px + 6.0 + line + grid_px + GAP_PX;
     let mut sheet = Drawing::new(Vec2::new(SIDE_PX + 2.0 * GAP_PX, height), [0xFF; 3])?;
     let mut y = GAP_PX;
     sheet.inset(moment.top_view()?, Vec2::new(GAP_PX, y));
