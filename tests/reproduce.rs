@@ -87,6 +87,12 @@ fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
     assert!(printed_again.contains("DAgger has fewer near-collisions"), "{printed_again}");
     let (expected, found) = (contents(&whole), contents(&resumed));
     assert_eq!(expected.keys().collect::<Vec<_>>(), found.keys().collect::<Vec<_>>());
+    for name in ["report.md", "report.html"] {
+        assert!(
+            std::fs::read(whole.join(name)).unwrap() == std::fs::read(resumed.join(name)).unwrap(),
+            "{name} differs"
+        );
+    }
     for (name, bytes) in &expected {
         assert!(*bytes == found[name], "{name} differs after resuming");
     }

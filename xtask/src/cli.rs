@@ -1,5 +1,12 @@
 //! The command line, nothing else.
 
+mod render;
+
+pub use render::{
+    ColourChoice, RenderArgs, RenderLotArgs, RenderNoiseArgs, RenderReportArgs, RenderWhat, SamplesArgs,
+    TrajectoriesArgs, Way,
+};
+
 use crate::settings::NoiseChoice;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
@@ -57,6 +64,9 @@ pub enum Command {
     /// Searches parameters of the model-based planners on lot a and training lots, the same way for each.
     #[command(after_help = TUNE_EXAMPLES)]
     Tune(TuneArgs),
+    /// Draws lots, drives, samples and noise as PNG and SVG.
+    #[command(after_help = render::EXAMPLES)]
+    Render(RenderArgs),
 }
 
 /// Where settings come from, lowest priority first: preset, file, `--set`, then the flags of the command.

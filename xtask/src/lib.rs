@@ -4,7 +4,9 @@
 //! |---|---|
 //! | [`cli`] | the command line, nothing else |
 //! | [`settings`] | preset → file → `--set` → flags, into one checked [`settings::Settings`] |
-//! | [`train`], [`evaluate`], [`reproduce`], [`generate`], [`pixel_accuracy`], [`metres`], [`tune`], [`listing`] | the commands |
+//! | [`train`], [`evaluate`], [`reproduce`], [`generate`], [`pixel_accuracy`], [`metres`], [`tune`], [`listing`], [`render`] | the commands |
+//! | [`plots`] | plots as SVG |
+//! | [`run_report`], [`learning`] | `report.html` and `learning.csv` of a run |
 //! | [`lots`], [`drivers`] | what can be named on the command line |
 //! | [`trials`] | which obstacles and which noise a trial has |
 //! | [`statistics`] | intervals and comparisons |
@@ -21,6 +23,7 @@ pub mod evaluate;
 pub mod failures;
 pub mod generate;
 pub mod interrupt;
+pub mod learning;
 pub mod listing;
 pub mod lots;
 pub mod metres;
@@ -34,6 +37,7 @@ pub mod replay_key;
 pub mod report;
 pub mod reproduce;
 pub mod run_dir;
+pub mod run_report;
 pub mod settings;
 pub mod statistics;
 pub mod summary;

@@ -3,7 +3,7 @@
 use clap::Parser as _;
 use std::process::ExitCode;
 use xtask::cli::{Cli, Command};
-use xtask::{evaluate, generate, interrupt, listing, metres, pixel_accuracy, reproduce, train, tune};
+use xtask::{evaluate, generate, interrupt, listing, metres, pixel_accuracy, render, reproduce, train, tune};
 
 // Training allocates and frees large buffers all the time: a quarter faster than with the system's allocator.
 #[global_allocator]
@@ -46,5 +46,6 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Lots => listing::lots(),
         Command::Drivers(args) => listing::drivers(&args),
         Command::Tune(args) => tune::run(&args),
+        Command::Render(args) => render::run(&args),
     }
 }

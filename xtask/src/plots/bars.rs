@@ -37,7 +37,7 @@ pub fn bars(title: &str, quantity: &str, drivers: &[&str], groups: &[BarGroup]) 
     let high = style::round_up(1.02 * top);
     let names: Vec<String> = groups.iter().map(|group| group.name.clone()).collect();
     let places = groups.iter().map(|group| group.bars.len()).max().unwrap_or(1) as f64 + GAP;
-    let key = |(i, name): (usize, &&str)| Key { name: (*name).to_owned(), colour: colour(i), look: Look::Line };
+    let key = |(i, name): (usize, &&str)| Key { name: (*name).to_owned(), colour: colour(i), look: Look::Marked(2) };
     let figure = Figure {
         title,
         height_px: style::HEIGHT_PX,

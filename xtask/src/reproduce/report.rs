@@ -490,7 +490,7 @@ fn training_seeds(recipe: &Recipe, reference: &Driven<'_>, unseen: &Driven<'_>) 
 
 fn further() -> String {
     "- `drives/*/summary.md`: every table of every evaluation; `failures.md`: each near-collision with its place, its \
-     cause and the key that replays it.\n- `chains/*`: data, networks and Table 1 of each training.\n- \
+     cause and the key that replays it; `cargo xtask render report FOLDER` shows them.\n- `chains/*`: data, networks and Table 1 of each training.\n- \
      `watched/watched.json`, `conclusions.csv`: the figures of this report.\n"
         .to_owned()
 }
