@@ -6,7 +6,7 @@ use std::path::Path;
 
 /// Every file of a run by name, but for the manifest (it names the command line), the report (it shows the manifest) and
 /// the wall time.
-fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+pub(crate) fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
     while let Some(next) = folders.pop() {

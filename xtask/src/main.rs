@@ -3,7 +3,7 @@
 use clap::Parser as _;
 use std::process::ExitCode;
 use xtask::cli::{Cli, Command};
-use xtask::{evaluate, generate, interrupt, listing, metres, pixel_accuracy, render, train, tune};
+use xtask::{evaluate, generate, interrupt, listing, metres, pixel_accuracy, render, reproduce, train, tune};
 
 // Training allocates and frees large buffers all the time: a quarter faster than with the system's allocator.
 #[global_allocator]
@@ -38,6 +38,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::TrainBc(args) => train::bc(&args),
         Command::TrainDagger(args) => train::dagger(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Reproduce(args) => reproduce::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::PixelAccuracy(args) => pixel_accuracy::run(&args),
         Command::Metres(args) => metres::run(&args),

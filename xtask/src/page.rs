@@ -205,7 +205,7 @@ table { border-collapse: collapse; font-size: .875rem; font-variant-numeric: tab
 th, td { padding: .25rem .6rem; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top;
   white-space: nowrap; overflow-wrap: normal; }
 th { border-bottom: 2px solid #888; }
-td:last-child { white-space: normal; min-width: 4rem; }
+td:last-child { white-space: normal; min-width: 9rem; }
 tbody tr:nth-child(even) { background: #f6f6f6; }
 figure { margin: 1.5rem 0; }
 figure svg, figure img { display: block; width: 100%; min-width: 34rem; max-width: 46rem; height: auto; }

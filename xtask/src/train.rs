@@ -64,29 +64,42 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
     eprintln!("run: {}", run.path().display());
 
     let mut stopwatch = Stopwatch::default();
-    let outcome = learn(&settings, &run, &mut stopwatch)?;
-    let table1 = Table1 { rows: &outcome.rows, stop: outcome.stop };
-    println!("\nDAgger iterations\n\n{}", table1.to_markdown());
-    table1.write(&run)?;
-    let (Stop::EtaReached | Stop::IterationCap, Some(policy)) = (outcome.stop, outcome.policy) else {
-        return Err(cut_short(run.path(), outcome.rows.len()));
-    };
+    let (policy, finished) =
+        tabulated(&settings, &run, &mut stopwatch)?.map_err(|rounds| cut_short(run.path(), rounds))?;
     if !args.no_eval {
-        let entries = entries(&run, policy, outcome.rows.len())?;
+        let entries = entries(&run, policy, finished.rounds)?;
         let lots = Lot::parse_all(&settings.evaluation.lots)?;
         let plan = Plan { settings: &settings, entries: &entries, lots: &lots, compare_with: entries.len() - 1 };
         plan.check()?;
         evaluate::measure(&plan, &run, &mut stopwatch)?;
     }
     run_report::write(run.path(), &mut stopwatch)?;
-    run.finish(&Finished { stop: outcome.stop, rounds: outcome.rows.len() })?;
+    run.finish(&finished)?;
     print_next_steps(run.path());
     stopwatch.report();
     Ok(())
 }
 
-#[derive(Serialize)]
-struct Finished {
+/// Trains, prints and writes the paper's table. The inner error of a training cut short is the number of rounds that
+/// were finished.
+pub(crate) fn tabulated(
+    settings: &Settings,
+    run: &RunDir,
+    stopwatch: &mut Stopwatch,
+) -> anyhow::Result<Result<(Checkpoint, Finished), usize>> {
+    let outcome = learn(settings, run, stopwatch)?;
+    let table1 = Table1 { rows: &outcome.rows, stop: outcome.stop };
+    println!("\nDAgger iterations\n\n{}", table1.to_markdown());
+    table1.write(run)?;
+    let (Stop::EtaReached | Stop::IterationCap, Some(policy)) = (outcome.stop, outcome.policy) else {
+        return Ok(Err(outcome.rows.len()));
+    };
+    Ok(Ok((policy, Finished { stop: outcome.stop, rounds: outcome.rows.len() })))
+}
+
+/// How a training ended.
+#[derive(Debug, Serialize)]
+pub(crate) struct Finished {
     stop: Stop,
     rounds: usize,
 }
