@@ -208,7 +208,13 @@ pub fn measure(plan: &Plan<'_>, run: &RunDir, stopwatch: &mut Stopwatch) -> anyh
                     ledger.add(level, driver, first_job + i, job, report);
                 }
                 for (episode, failure) in &failures {
-                    ledger.add_cause(level, driver, group.jobs[*episode].lot, failure.cause);
+                    ledger.add_cause(
+                        level,
+                        driver,
+                        group.jobs[*episode].lot,
+                        failure.cause,
+                        failure.findings.is_again(),
+                    );
                 }
                 is_complete = driven.reports.iter().all(Option::is_some);
                 if !is_complete {
