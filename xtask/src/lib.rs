@@ -9,7 +9,7 @@
 //! | [`trials`] | which obstacles and which noise a trial has |
 //! | [`statistics`] | intervals and comparisons |
 //! | [`failures`], [`replay_key`] | near-collisions one by one, and how to see one again |
-//! | [`table1`], [`summary`], [`report`] | what is printed and written |
+//! | [`table1`], [`summary`], [`report`], [`page`] | what is printed and written |
 //! | [`run_dir`] | the folder of a run and how it is claimed |
 //! | [`progress`], [`interrupt`] | bars, Ctrl-C |
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what a command does")]
@@ -24,7 +24,9 @@ pub mod interrupt;
 pub mod listing;
 pub mod lots;
 pub mod metres;
+pub mod page;
 pub mod pixel_accuracy;
+pub mod plots;
 pub mod progress;
 pub mod render;
 pub mod replay_key;
