@@ -173,9 +173,8 @@ mod tests {
         assert!((answer.ahead_m - 9.8).abs() < 1e-3 && answer.left_m == 0.0, "{answer:?}");
     }
 
-    /// A wall slants across 0.5 m ahead of the bumper, as after a resume in a right-hand
-    /// corner. It pushes back and to the right, where the walk finds room beside the bumper: the answer is a hard turn
-    /// to the right, not "straight on".
+    /// A wall slants across 0.5 m ahead of the bumper, as after a resume in a right-hand corner. It pushes back and to the
+    /// right; the walk slides along it to where it ends: a hard turn to the right, not "straight on".
     #[test]
     fn a_wall_at_the_bumper_is_turned_away_from() {
         let mut planner = Params::paper().planner(&rig());
@@ -185,7 +184,7 @@ mod tests {
             grid.occupy_row(row, u32::MAX >> (31 - (35 - row).min(24)));
         }
         let answer = planner.act(&Observation { grid }).look_ahead;
-        assert!(answer.left_m < -0.3 && (2.3..4.3).contains(&answer.ahead_m), "{answer:?}");
+        assert!(answer.left_m < -2.0, "{answer:?}");
     }
 
     /// In a straight lane the pushes of both sides are equal and opposite: straight on. A cell more on the left side
