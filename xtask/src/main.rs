@@ -4,7 +4,7 @@ use clap::Parser as _;
 use std::num::NonZeroUsize;
 use std::process::ExitCode;
 use xtask::cli::{Cli, Command};
-use xtask::{evaluate, generate, interrupt, listing, metres, pixel_accuracy, train, tune};
+use xtask::{evaluate, generate, interrupt, listing, metres, pixel_accuracy, render, reproduce, train, tune};
 
 // Training allocates and frees large buffers all the time: a quarter faster than with the system's allocator.
 #[global_allocator]
@@ -46,6 +46,7 @@ fn command(command: Command) -> anyhow::Result<()> {
         Command::TrainBc(args) => train::bc(&args),
         Command::TrainDagger(args) => train::dagger(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Reproduce(args) => reproduce::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::PixelAccuracy(args) => pixel_accuracy::run(&args),
         Command::Metres(args) => metres::run(&args),
@@ -53,5 +54,6 @@ fn command(command: Command) -> anyhow::Result<()> {
         Command::Lots => listing::lots(),
         Command::Drivers(args) => listing::drivers(&args),
         Command::Tune(args) => tune::run(&args),
+        Command::Render(args) => render::run(&args),
     }
 }

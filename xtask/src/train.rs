@@ -4,17 +4,19 @@ use crate::cli::TrainArgs;
 use crate::drivers::{self, Contestant};
 use crate::evaluate::{self, Entry, Plan};
 use crate::interrupt::{self, Interrupted};
+use crate::learning::Recorder;
 use crate::lots::Lot;
 use crate::progress::{Stopwatch, Work};
 use crate::run_dir::{Place, RunDir};
 use crate::settings::Settings;
 use crate::table1::Table1;
 use crate::trials::{self, Job, Purpose};
+use crate::{learning, run_report};
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
 use policy::dagger::{Hooks, Outcome, Progress, Stop};
 use policy::dataset::store::Store;
-use policy::fit::FitProgress;
+use policy::fit::{FitProgress, FitReport};
 use serde::Serialize;
 use sim::driver::Source;
 use sim::episode::{Episode, Frame};
@@ -62,28 +64,42 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
     eprintln!("run: {}", run.path().display());
 
     let mut stopwatch = Stopwatch::default();
-    let outcome = learn(&settings, &run, &mut stopwatch)?;
-    let table1 = Table1 { rows: &outcome.rows, stop: outcome.stop };
-    println!("\nDAgger iterations\n\n{}", table1.to_markdown());
-    table1.write(&run)?;
-    let (Stop::EtaReached | Stop::IterationCap, Some(policy)) = (outcome.stop, outcome.policy) else {
-        return Err(cut_short(run.path(), outcome.rows.len()));
-    };
+    let (policy, finished) =
+        tabulated(&settings, &run, &mut stopwatch)?.map_err(|rounds| cut_short(run.path(), rounds))?;
     if !args.no_eval {
-        let entries = entries(&run, policy, outcome.rows.len())?;
+        let entries = entries(&run, policy, finished.rounds)?;
         let lots = Lot::parse_all(&settings.evaluation.lots)?;
         let plan = Plan { settings: &settings, entries: &entries, lots: &lots, compare_with: entries.len() - 1 };
         plan.check()?;
         evaluate::measure(&plan, &run, &mut stopwatch)?;
     }
-    run.finish(&Finished { stop: outcome.stop, rounds: outcome.rows.len() })?;
+    run_report::write(run.path(), &mut stopwatch)?;
+    run.finish(&finished)?;
     print_next_steps(run.path());
     stopwatch.report();
     Ok(())
 }
 
-#[derive(Serialize)]
-struct Finished {
+/// Trains, prints and writes the paper's table. The inner error of a training cut short is the number of rounds that
+/// were finished.
+pub(crate) fn tabulated(
+    settings: &Settings,
+    run: &RunDir,
+    stopwatch: &mut Stopwatch,
+) -> anyhow::Result<Result<(Checkpoint, Finished), usize>> {
+    let outcome = learn(settings, run, stopwatch)?;
+    let table1 = Table1 { rows: &outcome.rows, stop: outcome.stop };
+    println!("\nDAgger iterations\n\n{}", table1.to_markdown());
+    table1.write(run)?;
+    let (Stop::EtaReached | Stop::IterationCap, Some(policy)) = (outcome.stop, outcome.policy) else {
+        return Ok(Err(outcome.rows.len()));
+    };
+    Ok(Ok((policy, Finished { stop: outcome.stop, rounds: outcome.rows.len() })))
+}
+
+/// How a training ended.
+#[derive(Debug, Serialize)]
+pub(crate) struct Finished {
     stop: Stop,
     rounds: usize,
 }
@@ -120,7 +136,14 @@ fn learn(settings: &Settings, run: &RunDir, stopwatch: &mut Stopwatch) -> anyhow
     // A lot that cannot be driven is found here, with its error, not in the middle of a round.
     episodes_of(settings, &lots, 0)?;
     let store = Store::open(run.path())?;
-    let monitor = RefCell::new(Monitor { stopwatch, work: None, ticks: Ticks::default() });
+    let monitor = RefCell::new(Monitor {
+        stopwatch,
+        work: None,
+        ticks: Ticks::default(),
+        store: store.clone(),
+        learning: Recorder::default(),
+        failed: None,
+    });
     let mut hooks = Hooks {
         episodes: &mut |round| {
             let episodes = episodes_of(settings, &lots, round)
@@ -135,18 +158,30 @@ fn learn(settings: &Settings, run: &RunDir, stopwatch: &mut Stopwatch) -> anyhow
         },
         on_frame: &mut |_, episode, frame| monitor.borrow_mut().frame(episode, frame),
         progress: &mut |progress| {
-            monitor.borrow_mut().progress(progress);
-            if interrupt::is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            let mut monitor = monitor.borrow_mut();
+            monitor.progress(progress);
+            if interrupt::is_requested() || monitor.failed.is_some() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         },
     };
     let outcome = policy::dagger::run(&settings.dagger, &store, settings.seed, &mut hooks)?;
-    monitor.into_inner().end_work("stopped");
-    Ok(outcome)
+    let mut monitor = monitor.into_inner();
+    monitor.end_work("stopped");
+    if let (Some(fit), None) = (learning::report(&store.final_folder())?, &monitor.failed) {
+        monitor.keep_curve(&store.final_folder(), &fit);
+    }
+    monitor.failed.map_or(Ok(outcome), Err)
 }
 
 /// Lots that draw their obstacles are driven `training.trials` times. A generated lot looks the same every time: it is
 /// driven once, and the next round has other ones.
-fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<Episode>> {
+///
+/// # Errors
+/// If a lot cannot be driven.
+pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<Episode>> {
     let training = &settings.training;
     let (generated, others): (Vec<Lot>, Vec<Lot>) = lots.iter().cloned().partition(Lot::is_generated);
     let of_a_kind = |lot: &Lot| generated.iter().filter(|other| other.family() == lot.family()).count() as u64;
@@ -161,6 +196,10 @@ struct Monitor<'a> {
     stopwatch: &'a mut Stopwatch,
     work: Option<(Stretch, Work)>,
     ticks: Ticks,
+    store: Store,
+    learning: Recorder,
+    /// A file that could not be written: ends the run at the next safe point.
+    failed: Option<anyhow::Error>,
 }
 
 /// What the present bar is about.
@@ -213,14 +252,20 @@ impl Monitor<'_> {
                 self.end_work(&format!("{} samples, {dataset} in all{eta}", collection.samples));
             }
             Progress::Fitting { round, fit } => self.fitting(round, fit),
-            Progress::Finished { row, .. } => {
+            Progress::Finished { row, fit } => {
+                self.keep_curve(&self.store.round_folder(row.round), fit);
                 let error_m = row.validation_rmse_m.map_or_else(String::new, |error| format!("{error:.3} m off"));
                 self.end_work(&format!("validation {error_m}"));
             }
         }
     }
 
+    fn keep_curve(&mut self, folder: &Path, fit: &FitReport) {
+        self.failed = self.failed.take().or(self.learning.write(folder, fit).err());
+    }
+
     fn fitting(&mut self, round: Option<u32>, fit: &FitProgress) {
+        self.learning.step(fit);
         let (_, work) = self.work.get_or_insert_with(|| {
             let label = round.map_or_else(|| "final training".to_owned(), |round| format!("round {round}: training"));
             (Stretch::Fitting, Work::begin(label))
