@@ -149,12 +149,13 @@ pub struct Findings {
     pub since_resume_m: Option<f32>,
 }
 
-impl Findings {
-    /// Whether it happened where the car had just been put back: one more at the same place.
-    pub fn is_again(&self) -> bool {
-        self.since_resume_m.is_some_and(|since_m| since_m < NEAR_M)
-    }
+/// Whether a near-collision happened where the car had just been put back, so much route before: one more at the same
+/// place.
+pub fn is_again(since_resume_m: Option<f32>) -> bool {
+    since_resume_m.is_some_and(|since_m| since_m < NEAR_M)
+}
 
+impl Findings {
     /// The first rule that holds. `noisy`: whether there was any noise to blame.
     fn cause(&self, noisy: bool, config: &EpisodeConfig) -> Cause {
         let narrow_m = config.vehicle.width_m + 2.0 * config.metrics.near_collision_m;

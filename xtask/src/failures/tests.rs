@@ -63,7 +63,6 @@ fn the_first_rule_that_holds_is_the_cause() {
     let wide = Findings { free_width_m: 2.9, ..steady };
     assert_eq!(cause(wide, true), Cause::Corner);
     assert_eq!(cause(Findings { turn_deg: 29.0, ..wide }, true), Cause::Other);
-    let is_again = |since_resume_m| Findings { since_resume_m, ..all }.is_again();
     assert!(!is_again(None) && is_again(Some(-0.3)) && is_again(Some(4.9)) && !is_again(Some(5.1)));
 }
 
