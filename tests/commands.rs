@@ -229,7 +229,7 @@ fn a_run_can_be_evaluated_later_and_generated_lots_can_be_driven() {
     assert_eq!(read("wall_time.jsonl").lines().count(), 2);
     is_a_report(&read("report.html"), &["Near-collisions, noise paper", "Safe ratio of every run", "Configuration"]);
     let html = std::fs::read_to_string(run.join("report.html")).unwrap();
-    is_a_report(&html, &["Learning curves", "predicted σ", "DAgger iteration", "Configuration"]);
+    is_a_report(&html, &["Training loss", "predicted σ", "Configuration"]);
     assert!(run.join("round-00/learning.csv").is_file());
 }
 
