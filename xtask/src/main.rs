@@ -3,7 +3,7 @@
 use clap::Parser as _;
 use std::process::ExitCode;
 use xtask::cli::{Cli, Command};
-use xtask::{evaluate, generate, interrupt, listing, metres, pixel_accuracy, train, tune};
+use xtask::{evaluate, generate, interrupt, listing, metres, pixel_accuracy, train, tune, visualise};
 
 // Training allocates and frees large buffers all the time: a quarter faster than with the system's allocator.
 #[global_allocator]
@@ -44,6 +44,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Settings(args) => listing::settings(&args),
         Command::Lots => listing::lots(),
         Command::Drivers(args) => listing::drivers(&args),
+        Command::Visualise(args) => visualise::run(&args),
         Command::Tune(args) => tune::run(&args),
     }
 }
