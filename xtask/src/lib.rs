@@ -9,7 +9,7 @@
 //! | [`trials`] | which obstacles and which noise a trial has |
 //! | [`statistics`] | intervals and comparisons |
 //! | [`failures`], [`replay_key`] | near-collisions one by one, and how to see one again |
-//! | [`table1`], [`summary`], [`report`] | what is printed and written |
+//! | [`table1`], [`summary`], [`report`], [`page`] | what is printed and written |
 //! | [`run_dir`] | the folder of a run and how it is claimed |
 //! | [`visualise`], [`recorder`] | recordings for Rerun's viewer |
 //! | [`progress`], [`interrupt`] | bars, Ctrl-C |
@@ -25,6 +25,7 @@ pub mod interrupt;
 pub mod listing;
 pub mod lots;
 pub mod metres;
+pub mod page;
 pub mod pixel_accuracy;
 pub mod progress;
 pub mod recorder;
