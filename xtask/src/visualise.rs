@@ -278,7 +278,8 @@ impl Show<'_> {
         recorder: &mut Recorder,
     ) {
         let [first, last] = window.unwrap_or([0, u32::MAX]);
-        let mut drive = Drive::new(root, self.episode, self.settings, Detail::Everything);
+        let drive = Drive::new(root, self.episode, self.settings, Detail::Everything);
+        let mut drive = drive.with_planner(contestant.planner(self.settings));
         recorder.send(Message::Always { recording, marks: drive.always() });
         let mut work = Work::begin(format!("driving: {}", contestant.name));
         let mut fleet = contestant.fleet(self.settings, 1);

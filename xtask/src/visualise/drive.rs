@@ -9,10 +9,12 @@ use super::sensors::{self, Sensors};
 use crate::drivers;
 use crate::settings::Settings;
 use expert::{Inspection, Rule, ScriptedExpert};
+use policy::baselines::Planner;
+use policy::baselines::explanation::Explanation;
 use policy::decision_rule::{DecisionRule, Evidence};
 use policy::drivers::NetPolicy;
 use policy::network::Prediction;
-use protocol::{Block, Clock, Colour, Dot, Mark, Pose, Shape, Strip};
+use protocol::{Arrow, Block, Clock, Colour, Dot, Mark, Pose, Shape, Strip};
 use sim::driver::{Driver as _, GroundTruth, LookAheadPoint, Policy as _, Situation, Source, Spread};
 use sim::episode::{Episode, EpisodeConfig, Event, Frame};
 use sim::geometry::Vec2;
@@ -46,6 +48,8 @@ pub struct Drive {
     expert: Option<ScriptedExpert>,
     /// A copy of the network that watches while the teacher drives.
     novice: Option<NetPolicy>,
+    /// A copy of the planner that drives.
+    planner: Option<Planner>,
     sensors: Option<Sensors>,
     time_s: f64,
     driver: Option<Source>,
@@ -68,6 +72,7 @@ impl Drive {
             rule: settings.dagger.rule,
             expert: is_full.then(|| drivers::expert(settings)),
             novice: None,
+            planner: None,
             sensors: is_full.then(|| Sensors::new(root, episode)),
             time_s: 0.0,
             driver: None,
@@ -83,6 +88,12 @@ impl Drive {
     #[must_use]
     pub fn with_novice(self, novice: NetPolicy) -> Self {
         Self { novice: Some(novice), ..self }
+    }
+
+    /// Also shows what the planner that drives weighed.
+    #[must_use]
+    pub fn with_planner(self, planner: Option<Planner>) -> Self {
+        Self { planner, ..self }
     }
 
     /// Lets a frame pass that is not shown.
@@ -141,6 +152,9 @@ impl Drive {
         self.compare(frame, expert.as_ref().map(|(point, _)| *point), &mut marks);
         if let Some((_, Some(inspection))) = expert {
             self.candidates(&inspection, &mut marks);
+        }
+        if let Some(explanation) = self.ask_planner(frame, is_picture) {
+            marks.push(self.weighed(&explanation));
         }
         if is_picture {
             match &self.sensors {
@@ -232,6 +246,44 @@ impl Drive {
         } else {
             (expert.decide(&situation).look_ahead, None)
         })
+    }
+
+    /// What the planner weighed. It is asked at every tick, for it estimates its wheels.
+    fn ask_planner(&mut self, frame: &Frame, explain: bool) -> Option<Explanation> {
+        let planner = self.planner.as_mut()?;
+        if self.was_reset {
+            planner.reset();
+        }
+        planner.act(&frame.observation);
+        if explain { planner.explain(&frame.observation) } else { None }
+    }
+
+    /// Candidate paths, the cheaper the brighter, the chosen one white; or the field that was followed.
+    fn weighed(&self, explanation: &Explanation) -> Mark {
+        match explanation {
+            Explanation::Paths(paths) => {
+                let costs = paths.iter().map(|path| path.cost);
+                let (low, high) = costs.fold((f32::MAX, f32::MIN), |(low, high), cost| (low.min(cost), high.max(cost)));
+                let strips = paths.iter().map(|path| {
+                    let share = (high - path.cost) / (high - low).max(f32::MIN_POSITIVE);
+                    let points = path.points.iter().map(|&point| raised(point, 2.0 * LINE_Z_M)).collect();
+                    if path.is_chosen {
+                        strip(points, colours::CAR)
+                    } else {
+                        let colour = colours::faded(colours::PLANNER, 30 + (180.0 * share) as u8);
+                        Strip { radius_pt: 0.5, ..strip(points, colour) }
+                    }
+                });
+                self.mark("car/candidates", Shape::Strips(strips.collect()))
+            }
+            Explanation::Field(samples) => {
+                let arrows = samples.iter().map(|sample| {
+                    let [x, y] = (0.8 * sample.field).clamp_length_max(1.2).to_array();
+                    Arrow { from: raised(sample.at, 2.0 * LINE_Z_M), vector: [x, y, 0.0], colour: colours::PLANNER }
+                });
+                self.mark("car/field", Shape::Arrows(arrows.collect()))
+            }
+        }
     }
 
     /// The answers of learner and expert side by side, how far they are apart (τ̂) and how sure the learner is (χ̂).

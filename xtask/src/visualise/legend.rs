@@ -14,6 +14,8 @@ planner's.
 - **Ellipses**: one and two σ of the network's point.
 - **Blue dot beside it**: what the expert would have said there; τ̂ is the distance between the two.
 - **Fan of blue arcs**: the expert's candidates, the better the brighter; blue line: the plan it chose.
+- **Green fan or arrows**: a tentacle's paths, the cheaper the brighter, the chosen one white; the field that VVF and APF \
+follow.
 - **Trail**: the swept path, in the colour of whoever drove.
 - **Red dot**: a near-collision. The car is stopped there and put back on the grey path.
 

@@ -7,7 +7,7 @@ use anyhow::{Context as _, ensure};
 use policy::dagger::Collection;
 use policy::fit::{FitProgress, FitReport, FitSettings, Validation};
 use policy::loss::LossParts;
-use protocol::{Clock, Layout, Mark, Shape};
+use protocol::{Clock, Mark, Shape};
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
