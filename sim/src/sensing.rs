@@ -5,7 +5,7 @@ mod quadtree;
 mod sensor;
 mod smear;
 
-pub use sensor::{SensingConfig, Sensor};
+pub use sensor::{Inspection, SensingConfig, Sensor};
 
 use crate::geometry::Vec2;
 use serde::{Deserialize, Serialize};

@@ -5,8 +5,8 @@ use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, ReferencePath, Scenario, SpeedBump};
 use sim::seed::RootSeed;
-use sim::sensing::noise::NoiseConfig;
-use sim::sensing::{CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid, SensingConfig, Sensor};
+use sim::sensing::noise::{Layer, NoiseConfig};
+use sim::sensing::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid, SensingConfig, Sensor};
 use sim::vehicle::VehicleParams;
 
 /// A 5 m lane along x with a parked car on the right, a cone on the left and a speed bump.
@@ -180,4 +180,66 @@ fn grids_round_trip_through_cells() {
     assert_eq!(OccupancyGrid::from_cells(&cells), grid);
     assert_eq!(cells[3 * GRID_CELLS], 1);
     assert_eq!(GRID_CELLS * CELL_PIXELS, 200);
+}
+
+fn only(layer: Layer) -> NoiseConfig {
+    let amount = |of: Layer| if of == layer { 1.0 } else { 0.0 };
+    NoiseConfig {
+        intensity: 2.0,
+        boundary: amount(Layer::Boundary),
+        shadow: amount(Layer::Shadow),
+        speed_bump: amount(Layer::SpeedBump),
+        false_free: amount(Layer::FalseFree),
+        blob: amount(Layer::Blob),
+        stain: amount(Layer::Stain),
+        flicker: amount(Layer::Flicker),
+        // Every frame but the first.
+        dropout: 1000.0 * amount(Layer::Dropout),
+    }
+}
+
+#[test]
+fn an_inspection_blames_the_layer_that_is_on_and_nothing_else() {
+    let map = lane();
+    for layer in Layer::ALL {
+        let (mut pixels, mut cells) = (0, 0);
+        for seed in 0..8 {
+            let mut sensor = Sensor::new(&map, SensingConfig::paper(), &only(layer), RootSeed(seed));
+            for i in 0..12_u32 {
+                let (pose, tick) = (Pose::new(Vec2::new(4.0 * i as f32, 0.3), 0.1), 31 * i);
+                let shown = sensor.observe(&map, pose, tick);
+                let inspection = sensor.inspect(&map, pose, tick, &shown);
+                for other in Layer::ALL.into_iter().filter(|&other| other != layer) {
+                    let wrong = (inspection.count_pixels(other), inspection.count_cells(other));
+                    assert_eq!(wrong, (0, 0), "{other:?} is blamed for {layer:?}");
+                }
+                pixels += inspection.count_pixels(layer);
+                cells += inspection.count_cells(layer);
+            }
+        }
+        assert!(cells > 0, "{layer:?} makes no cell wrong");
+        assert_eq!(pixels > 0, layer != Layer::Dropout, "{layer:?}");
+    }
+}
+
+#[test]
+fn an_inspection_explains_every_wrong_pixel_and_cell() {
+    let map = lane();
+    let mut sensor = Sensor::new(&map, SensingConfig::paper(), &NoiseConfig::of(NoiseLevel::Hard), RootSeed(3));
+    for tick in 0..60_u32 {
+        let pose = Pose::new(Vec2::new(0.7 * tick as f32, 0.2), (0.3 * tick as f32).sin() * 0.4);
+        let shown = sensor.observe(&map, pose, tick);
+        let inspection = sensor.inspect(&map, pose, tick, &shown);
+        assert_eq!(inspection.shown_grid, shown.grid);
+        for i in 0..BEV_PIXELS * BEV_PIXELS {
+            let (row, col) = (i / BEV_PIXELS, i % BEV_PIXELS);
+            let is_wrong = inspection.perceived.is_occupied(row, col) != inspection.clean.is_occupied(row, col);
+            assert_eq!(inspection.pixel(row, col).is_some(), is_wrong, "pixel ({row}, {col}), tick {tick}");
+        }
+        for i in 0..GRID_CELLS * GRID_CELLS {
+            let (row, col) = (i / GRID_CELLS, i % GRID_CELLS);
+            let is_wrong = shown.grid.is_occupied(row, col) != inspection.clean_grid.is_occupied(row, col);
+            assert_eq!(inspection.cell(row, col).is_some(), is_wrong, "cell ({row}, {col}), tick {tick}");
+        }
+    }
 }

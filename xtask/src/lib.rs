@@ -27,6 +27,7 @@ pub mod lots;
 pub mod metres;
 pub mod page;
 pub mod pixel_accuracy;
+pub mod plots;
 pub mod progress;
 pub mod recorder;
 pub mod render;

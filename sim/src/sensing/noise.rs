@@ -97,9 +97,60 @@ const FLICKER_TICKS: u32 = 2;
 /// Probability that a frame repeats the last grid.
 const DROPOUT_PER_TICK: f32 = 0.002;
 
+/// What makes a part of the view wrong: the layers of [`NoiseConfig`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Layer {
+    /// Ragged boundaries.
+    Boundary,
+    /// Shadows taken for obstacles.
+    Shadow,
+    /// Edges of speed bumps taken for curbs.
+    SpeedBump,
+    /// Ground behind a boundary taken for road.
+    FalseFree,
+    /// Misrecognised patches that come and go.
+    Blob,
+    /// Stains and paint.
+    Stain,
+    /// Patches of one or two frames.
+    Flicker,
+    /// The last grid repeated.
+    Dropout,
+}
+
+impl Layer {
+    /// Every layer, in the order of [`NoiseConfig`].
+    pub const ALL: [Self; 8] = [
+        Self::Boundary,
+        Self::Shadow,
+        Self::SpeedBump,
+        Self::FalseFree,
+        Self::Blob,
+        Self::Stain,
+        Self::Flicker,
+        Self::Dropout,
+    ];
+
+    /// Its name in legends.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Boundary => "boundary",
+            Self::Shadow => "shadow",
+            Self::SpeedBump => "speed bump",
+            Self::FalseFree => "false free",
+            Self::Blob => "blob",
+            Self::Stain => "stain",
+            Self::Flicker => "flicker",
+            Self::Dropout => "dropout",
+        }
+    }
+}
+
 /// A convex patch of ground that is misread while it is alive.
 #[derive(Debug, Clone)]
 pub(super) struct Patch {
+    pub(super) layer: Layer,
     pub(super) region: Region,
     pub(super) reads: Reads,
     period_ticks: u32,
@@ -131,8 +182,8 @@ impl Region {
 }
 
 impl Patch {
-    fn lasting(polygon: Vec<Vec2>, reads: Reads) -> Self {
-        Self { region: Region::new(polygon), reads, period_ticks: 1, phase_ticks: 0, life_ticks: 1 }
+    fn lasting(layer: Layer, polygon: Vec<Vec2>, reads: Reads) -> Self {
+        Self { layer, region: Region::new(polygon), reads, period_ticks: 1, phase_ticks: 0, life_ticks: 1 }
     }
 
     pub(super) fn is_alive(&self, tick: u32) -> bool {
@@ -284,7 +335,7 @@ impl NoiseField {
                     let pose = Pose::new(centre.world_from_ego().point(middle), centre.heading_rad);
                     if is_misread && !is_gap {
                         let strip = crate::geometry::rectangle(pose, thickness_m, piece_m);
-                        self.patches.push(Patch::lasting(strip.to_vec(), Reads::Occupied));
+                        self.patches.push(Patch::lasting(Layer::SpeedBump, strip.to_vec(), Reads::Occupied));
                     }
                 }
             }
@@ -307,7 +358,7 @@ impl NoiseField {
                 let corners = [(-0.5, near_m), (0.5, near_m), (0.35, far_m), (-0.35, far_m)];
                 let polygon = corners.map(|(along, y_m)| point(along * share * length_m, y_m)).to_vec();
                 if is_empty_ground(map, &polygon) {
-                    self.patches.push(Patch::lasting(polygon, Reads::Free));
+                    self.patches.push(Patch::lasting(Layer::FalseFree, polygon, Reads::Free));
                     return;
                 }
             }
@@ -333,7 +384,8 @@ impl NoiseField {
             let life_ticks = rng.random_range(40..80);
             let period_ticks = (life_ticks as f32 * BLOB_PERIODS) as u32;
             let phase_ticks = rng.random_range(0..period_ticks);
-            self.patches.push(Patch { period_ticks, phase_ticks, life_ticks, ..Patch::lasting(polygon, reads) });
+            let lasting = Patch::lasting(Layer::Blob, polygon, reads);
+            self.patches.push(Patch { period_ticks, phase_ticks, life_ticks, ..lasting });
         });
     }
 
@@ -346,7 +398,7 @@ impl NoiseField {
             let heading_rad = place.pose.heading_rad + rng.random_range(-0.6..0.6);
             let (length_m, width_m) = (rng.random_range(0.8..2.0), rng.random_range(0.1..0.2));
             let stroke = crate::geometry::rectangle(Pose::new(centre, heading_rad), length_m, width_m);
-            self.patches.push(Patch::lasting(stroke.to_vec(), Reads::Occupied));
+            self.patches.push(Patch::lasting(Layer::Stain, stroke.to_vec(), Reads::Occupied));
         });
     }
 }

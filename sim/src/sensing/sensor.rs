@@ -1,5 +1,9 @@
 //! The sensor of one episode: clean view → smear → noise → grid.
 
+mod inspect;
+
+pub use inspect::Inspection;
+
 use super::noise::{NoiseConfig, NoiseField, Patch, Reads, Region, Shadow};
 use super::quadtree::PixelLattice;
 use super::smear::{ConvexInEgo, hidden_ground};
@@ -154,11 +158,13 @@ impl Sensor {
 
     /// Everything that is laid over the view as occupied: hidden ground, misread patches, flicker.
     fn covers<'a>(&'a self, map: &'a Map, ego: &'a EgoView, tick: u32) -> impl Iterator<Item = ConvexInEgo> + 'a {
+        self.hidden_ground(map, ego).chain(self.patches(ego, tick, Reads::Occupied)).chain(self.flicker(tick))
+    }
+
+    fn flicker(&self, tick: u32) -> Option<ConvexInEgo> {
         let geometry = &self.config.geometry;
-        let flicker = self.noise.flicker(tick, geometry.near_edge_ahead_m, geometry.side_m).map(|(centre, side_m)| {
-            ConvexInEgo::new(crate::geometry::rectangle(Pose::new(centre, 0.0), side_m, side_m))
-        });
-        self.hidden_ground(map, ego).chain(self.patches(ego, tick, Reads::Occupied)).chain(flicker)
+        let (centre, side_m) = self.noise.flicker(tick, geometry.near_edge_ahead_m, geometry.side_m)?;
+        Some(ConvexInEgo::new(crate::geometry::rectangle(Pose::new(centre, 0.0), side_m, side_m)))
     }
 
     fn hidden_ground<'a>(&'a self, map: &'a Map, ego: &'a EgoView) -> impl Iterator<Item = ConvexInEgo> + 'a {
@@ -174,10 +180,14 @@ impl Sensor {
     }
 
     fn patches<'a>(&'a self, ego: &'a EgoView, tick: u32, reads: Reads) -> impl Iterator<Item = ConvexInEgo> + 'a {
-        let is_visible = move |patch: &&Patch| {
-            patch.reads == reads && ego.may_see(patch.region.centre, patch.region.radius_m) && patch.is_alive(tick)
-        };
-        self.noise.patches.iter().filter(is_visible).map(|patch| ego.polygon(&patch.region))
+        let visible = self.visible_patches(ego, tick).filter(move |patch| patch.reads == reads);
+        visible.map(|patch| ego.polygon(&patch.region))
+    }
+
+    fn visible_patches<'a>(&'a self, ego: &'a EgoView, tick: u32) -> impl Iterator<Item = &'a Patch> + 'a {
+        let is_visible =
+            move |patch: &&Patch| ego.may_see(patch.region.centre, patch.region.radius_m) && patch.is_alive(tick);
+        self.noise.patches.iter().filter(is_visible)
     }
 
     /// Ground that is taken for road although it is not; `None` if there is none in sight.

@@ -1,0 +1,143 @@
+//! How a training went.
+
+use super::style::{self, Axis, Figure, Key, Labels, Look, colour};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// The learning curve of one fit.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct LearningRound {
+    /// Short: `BC`, `i = 1`.
+    pub name: String,
+    /// Optimiser step (counted from 1 in every round) and training loss.
+    pub training: Vec<(u32, f64)>,
+    /// The same of held-back samples.
+    pub validation: Vec<(u32, f64)>,
+}
+
+impl LearningRound {
+    fn steps(&self) -> u32 {
+        let steps = self.training.iter().chain(&self.validation).map(|&(step, _)| step);
+        steps.max().unwrap_or(0)
+    }
+}
+
+/// Loss over optimiser steps, rounds after each other. Single steps are faint; their means over up to 240 stretches of
+/// equal length are drawn over them.
+pub fn learning(rounds: &[LearningRound]) -> String {
+    let steps: u32 = rounds.iter().map(LearningRound::steps).sum();
+    let stretch = (steps / 240).max(1);
+    let (low, high) = loss_range(rounds, stretch);
+    let figure = Figure {
+        title: "Learning curves",
+        height_px: style::HEIGHT_PX,
+        x: Axis { label: "optimiser step", range: 0.0..f64::from(steps.max(1)), ticks: 6, labels: Labels::Numbers(0) },
+        y: Axis {
+            label: "loss (negative log-likelihood)",
+            range: low..high,
+            ticks: 6,
+            labels: Labels::Numbers(style::decimals(high - low)),
+        },
+        left_px: 62,
+        legend: vec![
+            Key { name: "training".to_owned(), colour: colour(0), look: Look::Line },
+            Key { name: "validation".to_owned(), colour: colour(1), look: Look::Marked(1) },
+        ],
+    };
+    figure.svg(|chart| {
+        let mut first = 0;
+        for (index, round) in rounds.iter().enumerate() {
+            let at = |&(step, loss): &(u32, f64)| (f64::from(first + step), loss.clamp(low, high));
+            let means: Vec<(f64, f64)> = means(&round.training, stretch).iter().map(at).collect();
+            style::line(chart, means, colour(0), 2)?;
+            let validation: Vec<(f64, f64)> = round.validation.iter().map(at).collect();
+            style::line(chart, validation.clone(), colour(1), 2)?;
+            if let Some(&last) = validation.last() {
+                style::marker(chart, 1, last, colour(1))?;
+            }
+            let x = f64::from(first);
+            if index > 0 {
+                style::dashes(chart, (x, low), (x, high), style::FAINT)?;
+            }
+            first += round.steps();
+            if rounds.len() > 1 {
+                // Where a round ends its curve is low.
+                let (at, pos) = ((f64::from(first), high), Pos::new(HPos::Right, VPos::Top));
+                style::label(chart, &format!("{} ", round.name), at, style::INK, pos)?;
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Means of stretches of so many steps, each at its last step.
+fn means(points: &[(u32, f64)], stretch: u32) -> Vec<(u32, f64)> {
+    let same = |a: &(u32, f64), b: &(u32, f64)| a.0.saturating_sub(1) / stretch == b.0.saturating_sub(1) / stretch;
+    let mean = |points: &[(u32, f64)]| {
+        let sum: f64 = points.iter().map(|&(_, loss)| loss).sum();
+        Some((points.last()?.0, sum / points.len() as f64))
+    };
+    points.chunk_by(same).filter_map(mean).collect()
+}
+
+/// From the lowest loss to the 99th percentile: the first few steps are many times higher than all others.
+fn loss_range(rounds: &[LearningRound], stretch: u32) -> (f64, f64) {
+    let training = rounds.iter().flat_map(|round| means(&round.training, stretch));
+    let validation = rounds.iter().flat_map(|round| round.validation.iter().copied());
+    let mut losses: Vec<f64> =
+        training.chain(validation).map(|(_, loss)| loss).filter(|loss| loss.is_finite()).collect();
+    losses.sort_by(f64::total_cmp);
+    let (Some(&low), Some(&high)) = (losses.first(), losses.get((losses.len().max(1) - 1) * 99 / 100)) else {
+        return (0.0, 1.0);
+    };
+    let room = 0.08 * (high - low).max(0.1);
+    // The names of the rounds stand at the top.
+    (low - room, high + 2.0 * room)
+}
+
+/// η̂ of one training.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EtaSeries {
+    /// In the legend.
+    pub name: String,
+    /// Iteration, from 1, and the share of ticks the network drove, 0…1.
+    pub points: Vec<(u32, f64)>,
+}
+
+/// η̂ per iteration of one or more trainings beside the paper's; `threshold` is η, above which iterations end.
+pub fn eta(ours: &[EtaSeries], paper: &[(u32, f64)], threshold: f64) -> String {
+    let points = ours.iter().flat_map(|series| &series.points).chain(paper);
+    let last = points.map(|&(iteration, _)| iteration).max().unwrap_or(1).max(2);
+    let mut legend: Vec<Key> = ours
+        .iter()
+        .enumerate()
+        .map(|(i, series)| Key { name: series.name.clone(), colour: colour(i), look: Look::Marked(i) })
+        .collect();
+    legend.push(Key { name: "paper".to_owned(), colour: style::FAINT, look: Look::Marked(2) });
+    legend.push(Key { name: format!("η = {threshold}: stop"), colour: style::INK, look: Look::Dashes });
+    let figure = Figure {
+        title: "Share of ticks driven by the network",
+        height_px: style::HEIGHT_PX,
+        x: Axis {
+            label: "DAgger iteration",
+            range: 0.7..f64::from(last) + 0.3,
+            ticks: last as usize,
+            labels: Labels::Numbers(0),
+        },
+        y: Axis { label: "η̂ (share of ticks)", range: 0.0..1.05, ticks: 6, labels: Labels::Numbers(1) },
+        left_px: 62,
+        legend,
+    };
+    figure.svg(|chart| {
+        style::dashes(chart, (0.7, threshold), (f64::from(last) + 0.3, threshold), style::INK)?;
+        let paper = std::iter::once((2, style::FAINT, paper));
+        let ours = ours.iter().enumerate().map(|(i, series)| (i, colour(i), series.points.as_slice()));
+        for (shape, colour, points) in paper.chain(ours) {
+            let points: Vec<(f64, f64)> = points.iter().map(|&(i, eta)| (f64::from(i), eta)).collect();
+            style::line(chart, points.clone(), colour, 2)?;
+            for at in points {
+                style::marker(chart, shape, at, colour)?;
+            }
+        }
+        Ok(())
+    })
+}
