@@ -109,3 +109,37 @@ fn target_folder() -> anyhow::Result<PathBuf> {
         program.ancestors().find(|folder| folder.file_name().is_some_and(|name| name == "debug" || name == "release"));
     Ok(folder.and_then(Path::parent).unwrap_or(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../target"))).to_owned())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use protocol::{Clock, Mark, Shape};
+
+    /// More than the queue and the pipe hold: whoever drives would wait for ever if death were not noticed.
+    #[test]
+    fn a_recorder_that_dies_stops_nothing() {
+        let mut recorder = Recorder::start_program(Path::new("false")).unwrap();
+        for tick in 0..10_000 {
+            let marks = vec![Mark::new("a/signal", Shape::Document("x".repeat(200)))];
+            recorder.send(Message::At { recording: 0, clock: Clock::Episode { tick, time_s: 0.0 }, marks });
+        }
+        assert!(recorder.is_lost);
+        assert!(format!("{:#}", recorder.finish().unwrap_err()).contains("not complete"));
+    }
+
+    #[test]
+    fn a_recorder_that_is_not_there_is_named() {
+        let error = Recorder::start_program(Path::new("/no/such/recorder")).unwrap_err();
+        assert!(format!("{error:#}").contains("/no/such/recorder"));
+    }
+
+    #[test]
+    fn the_viewer_that_is_named_is_the_one_that_fits() {
+        let package = include_str!("../recorder/Cargo.toml");
+        assert!(package.contains(&format!("rerun = {{ version = \"={RERUN_VERSION}\"")), "{package}");
+        let readme = include_str!("../../README.md");
+        assert!(readme.contains(&format!("pip install rerun-sdk=={RERUN_VERSION}")));
+        // Whoever only trains does not compile rerun.
+        assert!(!include_str!("../../Cargo.lock").contains("name = \"rerun\""));
+    }
+}

@@ -31,7 +31,7 @@ pub fn of_drives(map: &Map, roots: &[String], detail: Detail) -> Layout {
         states.extend(roots.iter().map(|root| format!("{root}/expert_rule")));
     }
     let states = view("At the wheel, and the expert's rule", ViewKind::States, states);
-    Layout::Rows(vec![(3.4, top), (0.7, states.into()), (1.4, signals(roots))])
+    Layout::Rows(vec![(3.4, top), (0.7, states.into()), (1.4, signals(roots, detail))])
 }
 
 /// Tables of a run: entity and file.
@@ -125,16 +125,19 @@ fn sensors_of(root: &str, detail: Detail, is_one_of_many: bool) -> Layout {
     Layout::Columns(pictures.into_iter().map(|picture| (1.0, picture)).collect())
 }
 
-fn signals(roots: &[String]) -> Layout {
+fn signals(roots: &[String], detail: Detail) -> Layout {
     let plot = |name: &str, signals: &str, range| {
         let contents = roots.iter().map(|root| format!("{root}/signals/{signals}/**")).collect();
         (1.0, Layout::from(view(name, ViewKind::Signals { range }, contents)))
     };
-    Layout::Columns(vec![
+    let mut plots = vec![
         plot("Steering, °", "steering", None),
         plot("Speed, m/s", "speed", Some([0.0, 2.4])),
         plot("Clearance, m; safe ratio", "distance", Some([0.0, 1.5])),
-        plot("τ̂, image fraction", "discrepancy", Some([0.0, 0.4])),
-        plot("χ̂, image fraction", "doubt", Some([0.0, 0.2])),
-    ])
+    ];
+    if detail == Detail::Everything {
+        plots.push(plot("τ̂, image fraction", "discrepancy", Some([0.0, 0.4])));
+    }
+    plots.push(plot("χ̂, image fraction", "doubt", Some([0.0, 0.2])));
+    Layout::Columns(plots)
 }

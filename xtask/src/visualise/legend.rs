@@ -19,8 +19,9 @@ follow.
 - **Trail**: the swept path, in the colour of whoever drove.
 - **Red dot**: a near-collision. The car is stopped there and put back on the grey path.
 
-Views and grid: light = drivable, dark = not; **orange** = drivable but shown as not, **red** = not drivable but shown \
-as free.
+Views and grid: light = drivable, dark = not. Where the sensor is **wrong**, the colour says which layer of noise did it: \
+orange a ragged boundary, light blue a shadow, yellow a speed bump, red ground taken for road, pink a patch, green a \
+stain, violet a flicker, brown a repeated frame.
 
 Obstacles: blue tones are cars, violet vans and trucks, orange cones, yellow bollards, grey curbs, brown pillars, teal \
 carts, pink people.

@@ -3,10 +3,25 @@
 use protocol::{Mark, Picture, Shape};
 use sim::episode::{Episode, Frame};
 use sim::map::Map;
-use sim::sensing::{BEV_PIXELS, BirdsEyeView, GRID_CELLS, OccupancyGrid, Sensor};
+use sim::sensing::noise::Layer;
+use sim::sensing::{BEV_PIXELS, GRID_CELLS, Sensor};
 
-/// Free, occupied, free but shown as occupied, occupied but shown as free.
-const PALETTE: [[u8; 3]; 4] = [[0xC9, 0xCF, 0xD6], [0x2B, 0x2F, 0x36], [0xE6, 0x9F, 0x00], [0xFF, 0x3B, 0x30]];
+/// Drivable and not, as shown rightly; after them a colour per layer of noise, where it is shown wrongly.
+const RIGHT: [[u8; 3]; 2] = [[0xC9, 0xCF, 0xD6], [0x2B, 0x2F, 0x36]];
+
+/// Colour of what a layer of noise made wrong.
+fn of_layer(layer: Layer) -> [u8; 3] {
+    match layer {
+        Layer::Boundary => [0xE6, 0x9F, 0x00],
+        Layer::Shadow => [0x56, 0xB4, 0xE9],
+        Layer::SpeedBump => [0xF0, 0xE4, 0x42],
+        Layer::FalseFree => [0xFF, 0x3B, 0x30],
+        Layer::Blob => [0xCC, 0x79, 0xA7],
+        Layer::Stain => [0x00, 0x9E, 0x73],
+        Layer::Flicker => [0x7B, 0x4F, 0xE0],
+        Layer::Dropout => [0xA6, 0x6A, 0x3A],
+    }
+}
 
 /// A copy of an episode's sensor.
 pub struct Sensors {
@@ -22,14 +37,11 @@ impl Sensors {
 
     /// The views of a tick: as it is, as perceived, and the grid that the driver was shown.
     pub fn look(&self, map: &Map, frame: &Frame) -> Vec<Mark> {
-        let pose = frame.vehicle.pose;
-        let clean = self.sensor.clean_view(map, pose);
-        let noisy = self.sensor.perceived_view(map, pose, frame.tick);
-        vec![
-            self.mark("clean", view(|row, col| [clean.is_occupied(row, col); 2])),
-            self.mark("noisy", view(|row, col| [clean.is_occupied(row, col), noisy.is_occupied(row, col)])),
-            self.mark("grid", grid(&clean, &frame.observation.grid)),
-        ]
+        let seen = self.sensor.inspect(map, frame.vehicle.pose, frame.tick, &frame.observation);
+        let clean = picture(BEV_PIXELS, |row, col| (seen.clean.is_occupied(row, col), None));
+        let noisy = picture(BEV_PIXELS, |row, col| (seen.perceived.is_occupied(row, col), seen.pixel(row, col)));
+        let grid = picture(GRID_CELLS, |row, col| (seen.shown_grid.is_occupied(row, col), seen.cell(row, col)));
+        vec![self.mark("clean", clean), self.mark("noisy", noisy), self.mark("grid", grid)]
     }
 
     fn mark(&self, entity: &str, picture: Picture) -> Mark {
@@ -40,30 +52,17 @@ impl Sensors {
 /// The grid alone, without knowing what is there.
 pub fn shown(root: &str, frame: &Frame) -> Mark {
     let grid = frame.observation.grid;
-    let picture = picture(GRID_CELLS, |row, col| [grid.is_occupied(row, col); 2]);
+    let picture = picture(GRID_CELLS, |row, col| (grid.is_occupied(row, col), None));
     Mark::new(format!("{root}/sensors/grid"), Shape::Picture(picture))
 }
 
-/// Index of a colour from what is there and what is shown.
-fn class([is_occupied, is_shown]: [bool; 2]) -> u8 {
-    match (is_occupied, is_shown) {
-        (false, false) => 0,
-        (true, true) => 1,
-        (false, true) => 2,
-        (true, false) => 3,
-    }
-}
-
-fn view(pixel: impl Fn(usize, usize) -> [bool; 2]) -> Picture {
-    picture(BEV_PIXELS, pixel)
-}
-
-fn grid(clean: &BirdsEyeView, shown: &OccupancyGrid) -> Picture {
-    let clean = clean.to_grid();
-    picture(GRID_CELLS, |row, col| [clean.is_occupied(row, col), shown.is_occupied(row, col)])
-}
-
-fn picture(side: usize, pixel: impl Fn(usize, usize) -> [bool; 2]) -> Picture {
-    let pixels = (0..side * side).map(|i| class(pixel(i / side, i % side))).collect();
-    Picture { width: side as u32, pixels, palette: PALETTE.to_vec() }
+/// A square picture of what is shown as occupied, and which layer of noise is to blame where that is wrong.
+fn picture(side: usize, pixel: impl Fn(usize, usize) -> (bool, Option<Layer>)) -> Picture {
+    let index = |(is_occupied, wrong): (bool, Option<Layer>)| match wrong {
+        None => u8::from(is_occupied),
+        Some(layer) => (RIGHT.len() + layer as usize) as u8,
+    };
+    let pixels = (0..side * side).map(|i| index(pixel(i / side, i % side))).collect();
+    let palette = RIGHT.into_iter().chain(Layer::ALL.map(of_layer)).collect();
+    Picture { width: side as u32, pixels, palette }
 }

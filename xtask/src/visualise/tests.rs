@@ -1,6 +1,7 @@
 use super::drive::{Detail, Drive};
 use super::*;
 use crate::drivers;
+use policy::baselines::explanation::Explanation;
 use protocol::{Clock, Dot, Pose, Strip};
 use sim::driver::Driver;
 use sim::episode::{Event, Frame};
@@ -63,12 +64,14 @@ fn every_frame_is_shown_as_it_was() {
         assert_eq!(value(marks, "distance/clearance"), f64::from(frame.clearance_m));
         let plan = shape(marks, "me/expert_plan");
         assert_eq!(plan.is_some(), frame.tick % 4 == 0, "candidates come with the pictures");
-        let cells = shape(marks, "me/sensors/grid").map(|shape| match shape {
-            Shape::Picture(picture) => picture.pixels.iter().map(|&class| u8::from(class == 1 || class == 2)).collect(),
-            other => panic!("{other:?}"),
-        });
-        assert_eq!(cells.is_some(), frame.tick % 4 == 0, "pictures come five times a second");
-        assert!(cells.is_none_or(|cells: Vec<u8>| cells == frame.observation.grid.cells().collect::<Vec<u8>>()));
+        let grid = shape(marks, "me/sensors/grid");
+        assert_eq!(grid.is_some(), frame.tick % 4 == 0, "pictures come five times a second");
+        if let Some(Shape::Picture(picture)) = grid {
+            let shown = picture.pixels.iter().zip(frame.observation.grid.cells());
+            // Beyond the two right colours come the layers of noise: there the cell is shown wrongly, either way.
+            assert!(shown.clone().all(|(&pixel, cell)| pixel > 1 || pixel == cell), "tick {}", frame.tick);
+            assert!(shown.filter(|(pixel, _)| **pixel > 1).count() < 200, "most of the grid is right");
+        }
     }
 }
 
@@ -160,4 +163,90 @@ fn shapes_are_small_enough_for_a_long_drive() {
         .sum();
     let of_a_long_drive = bytes as f64 / frames.len() as f64 * 230.0 / 1.4 * 20.0;
     assert!(of_a_long_drive < 20e6, "230 m would take {:.1} MB before compression", of_a_long_drive / 1e6);
+}
+
+/// A folder as a training leaves it, two rounds of two points each.
+#[test]
+fn a_training_is_read_from_its_folder() {
+    let run = std::env::temp_dir().join(format!("xtask-test-{}-visualise-run", std::process::id()));
+    let _ = std::fs::remove_dir_all(&run);
+    let settings = Settings::preset("smoke").unwrap();
+    for round in 0..2 {
+        let folder = run.join(format!("round-{round:02}"));
+        std::fs::create_dir_all(&folder).unwrap();
+        let collection = format!(
+            "round = {round}\nsamples = {}\nticks = 1000\nnovice_ticks = {}\ntau_hat_sum = 1.0\ndriven_s = 50.0\n\
+             near_collisions = 1\ndriven_m = 50.0\nepisodes = 2\n",
+            500 - 100 * round,
+            600 * round
+        );
+        std::fs::write(folder.join("round.toml"), collection).unwrap();
+        let point = |step: u32| {
+            format!(
+                "[[curve]]\nstep = {step}\ntraining = {{ misfit = 1.5, log_variance = -2.0, total = -0.5 }}\n\
+                 validation = {{ samples = 9, loss = -1.0, nll = -1.25, rmse_m = 0.75 }}\n"
+            )
+        };
+        let head = "training_samples = 90\nvalidation_samples = 9\nsteps = 100\nkept_step = 100\nstopped = false\n";
+        std::fs::write(folder.join("fit.toml"), format!("{head}{}{}", point(50), point(100))).unwrap();
+    }
+    std::fs::write(run.join("settings.toml"), settings.to_toml()).unwrap();
+    std::fs::write(run.join("table1.md"), "| the table |").unwrap();
+
+    let (always, moments) = training::read(&run).unwrap();
+    std::fs::remove_dir_all(&run).unwrap();
+    assert!(always.contains(&Mark::new("tables/table1", Shape::Document("| the table |".to_owned()))));
+    let clocks: Vec<(i64, i64)> = moments
+        .iter()
+        .map(|(clock, _)| match *clock {
+            Clock::Training { step, round } => (step, round),
+            Clock::Episode { .. } => panic!("a training has steps"),
+        })
+        .collect();
+    assert_eq!(clocks, [(0, 0), (50, 0), (100, 0), (100, 1), (150, 1), (200, 1)]);
+    let value = |moment: usize, entity: &str| shape(&moments[moment].1, entity).cloned();
+    assert_eq!(value(3, "rounds/eta_hat/eta_hat"), Some(Shape::Value(0.6)));
+    assert_eq!(value(0, "rounds/eta_hat/eta_hat"), None, "behaviour cloning has none");
+    assert_eq!(value(3, "rounds/samples/dataset"), Some(Shape::Value(900.0)));
+    assert_eq!(value(0, "rounds/near_collisions"), Some(Shape::Value(2.0)), "per 100 m");
+    assert_eq!(value(1, "training/loss/misfit"), Some(Shape::Value(1.5)));
+    assert_eq!(value(5, "training/validation_error/rmse"), Some(Shape::Value(0.75)));
+    let last = f64::from(settings.dagger.fit_iteration.learning_rate.at(99, 100));
+    assert_eq!(value(5, "training/learning_rate"), Some(Shape::Value(last)));
+    let entities: BTreeSet<&str> =
+        moments.iter().flat_map(|(_, marks)| marks).chain(&always).map(|mark| mark.entity.as_str()).collect();
+    for view in layout::of_training(true).views() {
+        let path = view.contents[0].trim_end_matches("/**");
+        assert!(entities.iter().any(|entity| entity.starts_with(path)), "{:?}", view.name);
+    }
+}
+
+/// The paths drawn are those that were weighed: the chosen one is the cheapest, and leads where the planner steers.
+#[test]
+fn a_planner_shows_what_it_weighed() {
+    let settings = Settings::preset("smoke").unwrap();
+    for name in ["tentacle", "vvf", "apf"] {
+        let contestant = &Contestant::parse_all(&[name.to_owned()]).unwrap()[0];
+        let mut planner = contestant.planner(&settings).unwrap();
+        let mut episode = Episode::new(Arc::new(settings.episode.clone()), Arc::new(map()), RootSeed(2));
+        for _ in 0..10 {
+            episode.observe();
+            let observation = *episode.situation().observation;
+            let decision = sim::driver::Policy::act(&mut planner, &observation);
+            match planner.explain(&observation).unwrap() {
+                Explanation::Paths(paths) => {
+                    let chosen: Vec<_> = paths.iter().filter(|path| path.is_chosen).collect();
+                    assert_eq!((paths.len(), chosen.len()), (81, 1));
+                    assert!(paths.iter().all(|path| path.cost >= chosen[0].cost));
+                    let end = chosen[0].points.last().unwrap();
+                    let turns = decision.look_ahead.left_m.abs() > 0.5;
+                    assert!(!turns || end.y.signum() == decision.look_ahead.left_m.signum(), "{end} {decision:?}");
+                }
+                Explanation::Field(samples) => {
+                    assert!(samples.len() > 20 && samples.iter().all(|sample| sample.field.is_finite()));
+                }
+            }
+            episode.apply(decision);
+        }
+    }
 }
