@@ -108,12 +108,12 @@ impl Writer<'_> {
             None => format!("+ /{entity}"),
         });
         self.blueprint
-            .log(format!("{path}/ViewContents"), &ViewContents::new(query.map(|query| query.as_str().into())))?;
+            .log(format!("{path}/ViewContents"), &ViewContents::new(query))?;
         self.properties(&path, &view.kind)?;
         for entity in &view.trails {
             let entity = EntityPath::parse_forgiving(entity);
             let overrides = ViewContents::blueprint_base_visualizer_path_for_entity(id, &entity);
-            self.blueprint.log(overrides.parent().unwrap_or(overrides), &self.everything_up_to_now())?;
+            self.blueprint.log(overrides, &self.everything_up_to_now())?;
         }
         Ok(path)
     }
@@ -138,7 +138,7 @@ impl Writer<'_> {
 
     fn everything_up_to_now(&self) -> VisibleTimeRanges {
         let range =
-            || TimeRange { start: TimeRangeBoundary::Infinite, end: TimeRangeBoundary::CursorRelative(0.into()) };
+            || TimeRange { start: TimeRangeBoundary::Infinite, end: TimeRangeBoundary::CursorRelative(0_i64.into()) };
         let timelines = ["sim_time", "tick", "step", "round"];
         VisibleTimeRanges::new(timelines.map(|timeline| VisibleTimeRange { timeline: timeline.into(), range: range() }))
     }

@@ -1,7 +1,7 @@
 //! Shapes of the bench as archetypes of Rerun.
 
 use protocol::{Area, Arrow, Block, Colour, Dot, Pose, Shape, Strip};
-use rerun::components::{FillMode, ShowLabels};
+use rerun::components::FillMode;
 use rerun::{
     Arrows3D, Boxes3D, Color, Cylinders3D, EncodedImage, LineStrip3D, LineStrips3D, Mesh3D, Points3D, Quaternion,
     Radius, RecordingStream, RecordingStreamResult, Scalars, SeriesLines, SeriesPoints, StateChange,
@@ -140,7 +140,7 @@ fn mesh(area: &Area) -> Mesh3D {
     });
     let triangles = (0..area.rectangles.len() as u32).flat_map(|i| {
         let first = 4 * i;
-        [TriangleIndices([first, first + 1, first + 2].into()), TriangleIndices([first, first + 2, first + 3].into())]
+        [[first, first + 1, first + 2], [first, first + 2, first + 3]].map(TriangleIndices::from)
     });
     Mesh3D::new(corners).with_triangle_indices(triangles).with_albedo_factor(color(area.colour))
 }

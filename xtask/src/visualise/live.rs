@@ -84,7 +84,8 @@ impl Live {
             self.next += 1;
             let name = format!("{of}, {name}");
             let layout = layout::of_drives(map, &[view.root.to_owned()], view.detail);
-            let header = self.target(&root_of(&name)).header("drive", name, layout, None);
+            let file = root_of(&name.replace(", ", "-").replace(' ', "-"));
+            let header = self.target(&file).header("drive", name, layout, None);
             self.recorder.send(Message::Begin { recording, header });
             let mut marks = lot_marks(map, legend::DRIVE);
             marks.extend(drive.always());
