@@ -335,7 +335,7 @@ impl Target {
     }
 
     fn header(&self, application: &str, name: String, layout: Layout, focus_s: Option<[f64; 2]>) -> Header {
-        let application = format!("parking-lot {application}");
+        let application = format!("parking-lot-{application}");
         let timeline = "sim_time".to_owned();
         Header { application, name, sink: self.sink.clone(), layout, timeline, focus_s }
     }

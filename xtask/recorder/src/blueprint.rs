@@ -17,12 +17,12 @@ use rerun::external::re_sdk_types::blueprint::components::{
 use rerun::external::re_sdk_types::datatypes::{
     AbsoluteTimeRange, Bool, TimeRange, TimeRangeBoundary, VisibleTimeRange,
 };
-use rerun::{AsComponents, Color, EntityPath, RecordingStreamBuilder, RecordingStreamResult};
+use rerun::{ApplicationId, AsComponents, Color, EntityPath, RecordingStreamBuilder, RecordingStreamResult};
 use uuid::Uuid;
 
 /// Sends the layout; it is shown as soon as the recording is opened.
-pub fn send(stream: &RecordingStream, header: &Header) -> RecordingStreamResult<()> {
-    let (blueprint, storage) = RecordingStreamBuilder::new(header.application.as_str()).blueprint().memory()?;
+pub fn send(stream: &RecordingStream, application: ApplicationId, header: &Header) -> RecordingStreamResult<()> {
+    let (blueprint, storage) = RecordingStreamBuilder::new(application).blueprint().memory()?;
     blueprint.set_time_sequence("blueprint", 0);
     let mut writer = Writer { blueprint: &blueprint, header, named: 0 };
     // The root of a window is a container.
@@ -107,8 +107,7 @@ impl Writer<'_> {
             Some(entity) => format!("- /{entity}"),
             None => format!("+ /{entity}"),
         });
-        self.blueprint
-            .log(format!("{path}/ViewContents"), &ViewContents::new(query))?;
+        self.blueprint.log(format!("{path}/ViewContents"), &ViewContents::new(query))?;
         self.properties(&path, &view.kind)?;
         for entity in &view.trails {
             let entity = EntityPath::parse_forgiving(entity);

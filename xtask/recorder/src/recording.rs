@@ -5,7 +5,7 @@ use crate::columns::Column;
 use crate::shapes;
 use anyhow::{Context as _, bail};
 use protocol::{Clock, Header, Mark, Shape, Sink};
-use rerun::{RecordingStream, RecordingStreamBuilder, SpawnOptions};
+use rerun::{ApplicationId, RecordingStream, RecordingStreamBuilder, SpawnOptions};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -28,7 +28,9 @@ pub struct Recording {
 impl Recording {
     /// Begins a recording and sends its layout.
     pub fn begin(header: Header) -> anyhow::Result<Self> {
-        let builder = RecordingStreamBuilder::new(header.application.as_str());
+        // Blanks mean nothing to Rerun there.
+        let application = ApplicationId::try_from(header.application.replace(' ', "-"))?;
+        let builder = RecordingStreamBuilder::new(application.clone());
         let stream = match &header.sink {
             Sink::File(path) => builder.save(Path::new(path)).with_context(|| path.clone())?,
             Sink::Connect(url) => match url {
@@ -37,13 +39,8 @@ impl Recording {
             },
             Sink::Spawn => spawn(builder)?,
         };
-        Self::on(stream, &header)
-    }
-
-    /// The same on a stream that is already open.
-    pub fn on(stream: RecordingStream, header: &Header) -> anyhow::Result<Self> {
         stream.send_recording_name(header.name.as_str())?;
-        blueprint::send(&stream, header)?;
+        blueprint::send(&stream, application, &header)?;
         let is_live = !matches!(header.sink, Sink::File(_));
         Ok(Self { stream, columns: BTreeMap::new(), is_live, sent: Instant::now() })
     }

@@ -142,5 +142,5 @@ fn mesh(area: &Area) -> Mesh3D {
         let first = 4 * i;
         [[first, first + 1, first + 2], [first, first + 2, first + 3]].map(TriangleIndices::from)
     });
-    Mesh3D::new(corners).with_triangle_indices(triangles).with_albedo_factor(color(area.colour))
+    Mesh3D::new(corners).with_triangle_indices(triangles).with_albedo_factor(color(area.colour).0)
 }
