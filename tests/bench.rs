@@ -13,11 +13,14 @@ pub(crate) fn root() -> &'static Path {
 pub(crate) fn xtask() -> Command {
     static BINARY: OnceLock<PathBuf> = OnceLock::new();
     let binary = BINARY.get_or_init(|| {
-        let status = cargo().args(["build", "--quiet", "--package", "xtask", "--bin", "xtask"]).status().unwrap();
+        // This test binary lies in <target>/debug/deps, wherever --target-dir put it.
+        let test = std::env::current_exe().unwrap();
+        let profile = test.ancestors().nth(2).unwrap();
+        let target = profile.parent().unwrap();
+        let build = ["build", "--quiet", "--package", "xtask", "--bin", "xtask", "--target-dir"];
+        let status = cargo().args(build).arg(target).status().unwrap();
         assert!(status.success(), "xtask builds");
-        // This test binary lies in <target>/debug/deps.
-        let target = std::env::current_exe().unwrap().parent().unwrap().parent().unwrap().to_owned();
-        target.join(format!("xtask{}", std::env::consts::EXE_SUFFIX))
+        profile.join(format!("xtask{}", std::env::consts::EXE_SUFFIX))
     });
     let mut command = Command::new(binary);
     command.current_dir(root());
@@ -31,7 +34,7 @@ pub(crate) fn cargo() -> Command {
     command
 }
 
-/// A fresh folder under the target folder.
+/// A fresh folder among the temporary ones.
 pub(crate) fn scratch(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("parking-tests-{}", std::process::id())).join(name);
     let _ = std::fs::remove_dir_all(&folder);

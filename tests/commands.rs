@@ -190,6 +190,46 @@ fn a_run_can_be_evaluated_later_and_generated_lots_can_be_driven() {
     }
     assert_eq!(read("failures.jsonl").lines().count() as u64, near_collisions);
     assert_eq!(read("wall_time.jsonl").lines().count(), 2);
+    is_a_report(&read("report.html"), &["Near-collisions, noise paper", "Safe ratio of every run", "Configuration"]);
+    let html = std::fs::read_to_string(run.join("report.html")).unwrap();
+    is_a_report(&html, &["Learning curves", "predicted σ", "DAgger iteration", "Configuration"]);
+    assert!(run.join("round-00/learning.csv").is_file());
+}
+
+/// One page that says what it should and loads nothing from anywhere.
+fn is_a_report(html: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(html.contains(part), "{part:?} is missing in the report");
+    }
+    for (found, why) in [("<script", "scripts"), ("<link", "files"), ("url(", "files"), ("@import", "styles")] {
+        assert!(!html.contains(found), "the report has no {why}");
+    }
+    let tags = html.split('<').skip(1).filter_map(|tag| tag.split('>').next());
+    for tag in tags.filter(|tag| tag.contains("src=") || tag.contains("href=")) {
+        assert!(tag.contains("src=\"data:image/png;base64,") || tag.contains("href=\"#"), "{tag}");
+    }
+}
+
+#[test]
+fn pictures_are_drawn_and_never_replaced_unasked() {
+    let folder = scratch("render");
+    let out = folder.join("pictures").to_string_lossy().into_owned();
+    succeed(xtask().args(["render", "lot", "--lots", "lot-b", "--out", &out]));
+    succeed(xtask().args(["render", "contact-sheet", "--lots", "test:2:easy", "--out", &out]));
+    succeed(xtask().args(["render", "noise", "--lots", "lot-b", "--at", "30", "--out", &out]));
+    let line =
+        succeed(xtask().args(["render", "trajectories", "--driver", "tentacle", "--lots", "lot-b", "--out", &out]));
+    assert!(line.contains("drive-lot-b-forward-trial-0.png"), "{line}");
+    for name in ["lot-b.png", "lot-b.svg", "contact-sheet.png", "contact-sheet.svg", "noise-lot-b.png"] {
+        assert!(Path::new(&out).join(name).is_file(), "{name} is missing");
+    }
+    refuses(&["render", "lot", "--lots", "lot-b", "--out", &out], &["lot-b.png", "--overwrite"]);
+    refuses(&["render", "noise", "--lots", "lot-b", "--at", "1000", "--out", &out], &["--at 1000", "139"]);
+    refuses(&["render", "noise", "--lots", "test:2", "--out", &out], &["test:2", "2 lots"]);
+    refuses(&["render", "samples", "no/such/round-01", "--out", &out], &["no/such/round-01", "no such round"]);
+    refuses(&["render", "samples", &out, "--out", &out], &["no round", "round-01"]);
+    refuses(&["render", "report", &out], &["this is no run"]);
+    refuses(&["render", "trajectories", "--run", "no/such/run"], &["no/such/run"]);
 }
 
 #[test]
@@ -205,7 +245,7 @@ fn a_finished_run_is_not_overwritten() {
 
 #[test]
 fn help_has_examples_and_lists_are_printed() {
-    for command in ["train-dagger", "train-bc", "evaluate", "generate", "metres"] {
+    for command in ["train-dagger", "train-bc", "evaluate", "generate", "metres", "render"] {
         let help = succeed(xtask().args([command, "--help"]));
         assert!(help.contains("Examples:"), "{command} --help has examples");
     }

@@ -4,8 +4,9 @@ use crate::bench::{scratch, succeed, xtask};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Every file of a run by name, but for the manifest (it names the command line) and the wall time.
-fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+/// Every file of a run by name, but for the manifest (it names the command line), the report (it shows the manifest) and
+/// the wall time.
+pub(crate) fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
     while let Some(next) = folders.pop() {
@@ -15,7 +16,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
                 folders.push(path);
             } else {
                 let name = path.strip_prefix(folder).unwrap().to_string_lossy().into_owned();
-                if name != "manifest.toml" && name != "wall_time.jsonl" {
+                if !["manifest.toml", "report.html", "report.md", "wall_time.jsonl"].contains(&name.as_str()) {
                     files.insert(name, std::fs::read(&path).unwrap());
                 }
             }
@@ -44,7 +45,7 @@ fn one_and_two_threads_write_the_same_bytes() {
     let (one, printed_by_one) = train("1", "one");
     let (two, printed_by_two) = train("2", "two");
     for needed in
-        ["settings.toml", "round-00/grids.npy", "round-00/labels.npy", "round-01/model.safetensors", "table1.json"]
+        ["settings.toml", "round-00/grids.npy", "round-00/learning.csv", "round-01/model.safetensors", "table1.json"]
     {
         assert!(one.contains_key(needed), "{needed} is missing from {:?}", one.keys());
     }
@@ -96,6 +97,8 @@ fn an_evaluation_is_the_same_for_one_and_two_threads() {
         "noise_sweep.csv",
         "failures.jsonl",
         "failures.md",
+        "figures/noise.svg",
+        "figures/near-collision-0.png",
     ] {
         assert!(one.get(needed).is_some_and(|bytes| !bytes.is_empty()), "{needed} is missing from {:?}", one.keys());
     }

@@ -8,6 +8,7 @@
 //! | [`expert_drives`] | the expert on the reference lots |
 //! | [`formats`] | data sets open as NPY, weights as safetensors |
 //! | [`planners`] | model-based planners: naming, parameter files, tuning |
+//! | [`reproduce`] | the paper in a box: its report, resumed to the same bytes |
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod bench;
@@ -16,4 +17,5 @@ mod determinism;
 mod expert_drives;
 mod formats;
 mod planners;
+mod reproduce;
 mod tidy;

@@ -1,5 +1,12 @@
 //! The command line, nothing else.
 
+mod render;
+
+pub use render::{
+    ColourChoice, RenderArgs, RenderLotArgs, RenderNoiseArgs, RenderReportArgs, RenderWhat, SamplesArgs,
+    TrajectoriesArgs, Way,
+};
+
 use crate::settings::NoiseChoice;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
@@ -37,6 +44,9 @@ pub enum Command {
     /// Drives drivers over lots and counts near-collisions and the safe ratio.
     #[command(after_help = EVALUATE_EXAMPLES)]
     Evaluate(EvaluateArgs),
+    /// The paper in a box: trains, drives and writes one report with the paper's tables beside ours.
+    #[command(after_help = REPRODUCE_EXAMPLES)]
+    Reproduce(ReproduceArgs),
     /// Writes lots as TOML plus a top-view PNG.
     #[command(after_help = GENERATE_EXAMPLES)]
     Generate(GenerateArgs),
@@ -57,6 +67,9 @@ pub enum Command {
     /// Searches parameters of the model-based planners on lot a and training lots, the same way for each.
     #[command(after_help = TUNE_EXAMPLES)]
     Tune(TuneArgs),
+    /// Draws lots, drives, samples and noise as PNG and SVG.
+    #[command(after_help = render::EXAMPLES)]
+    Render(RenderArgs),
 }
 
 /// Where settings come from, lowest priority first: preset, file, `--set`, then the flags of the command.
@@ -178,6 +191,43 @@ pub enum Directions {
     Forward,
     /// From finish to start.
     Reverse,
+}
+
+const REPRODUCE_EXAMPLES: &str = "\
+Examples:
+  cargo xtask reproduce                               half an hour on two cores
+  cargo xtask reproduce --preset smoke --out runs/try   every stage within a minute
+  cargo xtask reproduce --full --unseen test:50
+  cargo xtask reproduce --resume runs/reproduce-default-s1";
+
+/// Arguments of `reproduce`.
+#[derive(Debug, Clone, Default, Args)]
+pub struct ReproduceArgs {
+    /// Settings.
+    #[command(flatten)]
+    pub settings: SettingsArgs,
+    /// Five training seeds, twice the trials, more unseen lots, longer ablations.
+    #[arg(long)]
+    pub full: bool,
+    /// Lots that no driver has met; see `cargo xtask lots` [default: test:20; test:100 with --full].
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',')]
+    pub unseen: Vec<String>,
+    /// Folder of `cargo xtask tune`: planners also drive with the parameters found there [default: those in xtask/tuned].
+    #[arg(long, value_name = "DIR")]
+    pub tuned: Option<PathBuf>,
+    /// Folder of the run [default: runs/reproduce-PRESET-sSEED, the next free one].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Deletes what an earlier run left in `--out`.
+    #[arg(long, requires = "out")]
+    pub overwrite: bool,
+    /// Continues an interrupted run with its own settings, to the same result; finished stages are skipped.
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all = ["preset", "config", "overrides", "seed", "out", "full", "unseen", "tuned"]
+    )]
+    pub resume: Option<PathBuf>,
 }
 
 const GENERATE_EXAMPLES: &str = "\

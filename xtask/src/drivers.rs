@@ -57,6 +57,12 @@ impl Contestant {
         Self { name: name.to_owned(), kind: Kind::Baseline(baseline) }
     }
 
+    /// The same with another name in tables.
+    #[must_use]
+    pub fn renamed(self, name: &str) -> Self {
+        Self { name: name.to_owned(), ..self }
+    }
+
     /// Reads several specs.
     ///
     /// # Errors

@@ -13,6 +13,7 @@ use crate::progress::{Stopwatch, Work};
 use crate::replay_key::ReplayKey;
 use crate::report::{self, RunLine, Summary, WallTimeLine};
 use crate::run_dir::{self, Place, RunDir};
+use crate::run_report;
 use crate::settings::{NoiseChoice, Settings};
 use crate::summary::Ledger;
 use crate::trials::{self, Job, Purpose};
@@ -105,8 +106,12 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         live.finish();
     }
     measured?;
+    run_report::write(run.path(), &mut stopwatch)?;
     run.finish(&Finished { drivers: &args.drivers })?;
-    eprintln!("written: {}/summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl", run.path().display());
+    eprintln!(
+        "written: {}/report.html, summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl",
+        run.path().display()
+    );
     stopwatch.report();
     Ok(())
 }
@@ -128,7 +133,10 @@ fn compare_with(args: &EvaluateArgs, entries: &[Entry]) -> anyhow::Result<usize>
 
 /// The settings, and the name of what they start from: `--preset` or `--config` if given, else the first run that is
 /// named as a driver, else the default preset.
-pub(crate) fn resolve(args: &EvaluateArgs) -> anyhow::Result<(Settings, &str)> {
+///
+/// # Errors
+/// If something named does not exist, or runs were trained with settings that differ.
+pub fn resolve(args: &EvaluateArgs) -> anyhow::Result<(Settings, &str)> {
     let is_named = args.layers.preset.is_some() || args.layers.config.is_some();
     let mut runs = args.drivers.iter().filter_map(|spec| Some((spec, run_dir_of(spec)?)));
     let (mut settings, base) = match runs.next().filter(|_| !is_named) {

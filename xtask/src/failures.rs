@@ -14,7 +14,7 @@ use crate::drivers::Contestant;
 use crate::report;
 use crate::settings::{NoiseChoice, Settings};
 use crate::trials::{self, Job};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sim::batch::run_lockstep_until;
 use sim::episode::{Episode, EpisodeConfig, Event, Frame};
 use sim::geometry::{Pose, wrap_angle};
@@ -44,7 +44,7 @@ pub const CORNER_DEG: f32 = 30.0;
 const WIDTH_MAX_M: f32 = 5.0;
 
 /// Why.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
     /// On the clean grid the driver would have passed.

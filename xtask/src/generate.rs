@@ -4,7 +4,7 @@ use crate::cli::{GenerateArgs, MapArgs};
 use crate::interrupt::{self, Interrupted};
 use crate::lots::Lot;
 use crate::progress::Work;
-use crate::render;
+use crate::render::{self, lot};
 use crate::run_dir::write_whole;
 use crate::trials::{Job, Purpose};
 use anyhow::{Context as _, bail, ensure};
@@ -102,8 +102,7 @@ fn write(args: &GenerateArgs, job: &Job<'_>) -> anyhow::Result<Made> {
         (true, 1) => format!("{}-s{}", job.lot.name(), args.seed),
         (true, _) => format!("{}-s{}-{}", job.lot.name(), args.seed, job.trial + 1),
     };
-    // Names of lots are free text; names of files are not.
-    let name = name.replace(|c: char| !c.is_alphanumeric() && !"-_.".contains(c), "-");
+    let name = render::file_name(&name);
     let [toml, png] = ["toml", "png"].map(|extension| args.out.join(format!("{name}.{extension}")));
     for path in [&toml, &png] {
         ensure!(
@@ -118,7 +117,7 @@ fn write(args: &GenerateArgs, job: &Job<'_>) -> anyhow::Result<Made> {
     let vehicle = VehicleParams::hyundai_hg300();
     let text = scenarios::load::to_toml(&drawn.scenario);
     let map = Map::build(drawn.scenario, &vehicle).with_context(|| name.clone())?;
-    write_whole(&png, &render::top_view(&map, &vehicle, args.pixels_per_metre)?)?;
+    write_whole(&png, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?.to_png()?)?;
     write_whole(&toml, text.as_bytes())?;
     let (length_m, obstacles) = (map.path().length_m(), map.scenario().obstacles.len());
     // A route found for one way need not leave room at its finish to start back from there.

@@ -3,7 +3,9 @@
 use clap::Parser as _;
 use std::process::ExitCode;
 use xtask::cli::{Cli, Command};
-use xtask::{evaluate, generate, interrupt, listing, metres, pixel_accuracy, train, tune, visualise};
+use xtask::{
+    evaluate, generate, interrupt, listing, metres, pixel_accuracy, render, reproduce, train, tune, visualise,
+};
 
 // Training allocates and frees large buffers all the time: a quarter faster than with the system's allocator.
 #[global_allocator]
@@ -38,6 +40,7 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::TrainBc(args) => train::bc(&args),
         Command::TrainDagger(args) => train::dagger(&args),
         Command::Evaluate(args) => evaluate::run(&args),
+        Command::Reproduce(args) => reproduce::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::PixelAccuracy(args) => pixel_accuracy::run(&args),
         Command::Metres(args) => metres::run(&args),
@@ -46,5 +49,6 @@ fn run(cli: Cli) -> anyhow::Result<()> {
         Command::Drivers(args) => listing::drivers(&args),
         Command::Visualise(args) => visualise::run(&args),
         Command::Tune(args) => tune::run(&args),
+        Command::Render(args) => render::run(&args),
     }
 }

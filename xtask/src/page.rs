@@ -205,15 +205,16 @@ table { border-collapse: collapse; font-size: .875rem; font-variant-numeric: tab
 th, td { padding: .25rem .6rem; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top;
   white-space: nowrap; overflow-wrap: normal; }
 th { border-bottom: 2px solid #888; }
-td:last-child { white-space: normal; min-width: 4rem; }
+td:last-child { white-space: normal; min-width: 9rem; }
 tbody tr:nth-child(even) { background: #f6f6f6; }
 figure { margin: 1.5rem 0; }
-figure svg, figure img { display: block; width: 100%; min-width: 34rem; max-width: 100%; height: auto; }
+figure svg, figure img { display: block; width: 100%; min-width: 34rem; max-width: 46rem; height: auto; }
 figcaption { font-size: .9rem; color: #444; }
 code { font: .9em ui-monospace, 'Noto Sans Mono', monospace; background: #f2f2f2; padding: .05em .25em; }
 pre { overflow-x: auto; background: #f2f2f2; padding: .6rem; }
 pre code { padding: 0; }
-@media (max-width: 40rem) { body { font-size: 15px; } figure svg, figure img { max-width: none; } }
+@media (max-width: 40rem) { body { font-size: 15px; } figure svg { min-width: 28rem; }
+  figure img { min-width: 0; } }
 @media print { body { max-width: none; padding: 0; font-size: 10pt; } nav { display: none; }
   .scroll { overflow: visible; } table { font-size: 7.5pt; } th, td { white-space: normal; padding: .15rem .3rem; }
   figure svg, figure img { min-width: 0; } figure, tr { break-inside: avoid; } h2, h3 { break-after: avoid; } }

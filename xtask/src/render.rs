@@ -1,315 +1,302 @@
-//! Top views of lots.
+//! `render`: pictures of lots, drives, samples and noise.
+//!
+//! | file | what |
+//! |---|---|
+//! | [`drawing`] | a picture as a list of shapes, which becomes PNG or SVG |
+//! | [`lot`] | lots from above |
+//! | [`trajectories`] | drives over a lot |
+//! | [`contact_sheet`] | many lots on one page |
+//! | [`grids`] | grids and views, predictions and labels |
+//! | [`samples`], [`noise`] | pages of them |
 
-use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
-use sim::geometry::{Pose, Vec2};
+pub mod contact_sheet;
+pub mod drawing;
+pub mod grids;
+pub mod lot;
+pub mod noise;
+pub mod samples;
+pub mod trajectories;
+
+use crate::cli::{
+    ColourChoice, Directions, EvaluateArgs, RenderArgs, RenderLotArgs, RenderNoiseArgs, RenderWhat, SamplesArgs,
+    TrajectoriesArgs, Way,
+};
+use crate::drivers::{self, Contestant};
+use crate::lots::Lot;
+use crate::progress::{Stopwatch, Work};
+use crate::run_dir::{self, write_whole};
+use crate::settings::{NoiseChoice, Settings};
+use crate::trials::{self, Job, Purpose};
+use crate::{evaluate, report, run_report, train};
+use anyhow::{Context as _, ensure};
+use drawing::Drawing;
+use policy::checkpoint::Checkpoint;
+use policy::dagger::{Arbiter, Collection};
+use policy::dataset::store::Store;
+use policy::network::Predictor;
+use rayon::prelude::*;
+use sim::batch::run_lockstep;
+use sim::driver::Fleet;
+use sim::episode::Episode;
 use sim::map::Map;
-use sim::scenario::{Obstacle, ObstacleClass};
-use sim::vehicle::VehicleParams;
-use tiny_skia::{Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Stroke, StrokeDash, Transform};
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+use sim::sensing::noise::Layer;
+use sim::sensing::{Inspection, Sensor};
+use std::path::Path;
+use std::sync::Arc;
+use trajectories::{ColourBy, Point, Trajectory};
 
-/// Around the lot, metres.
-const MARGIN_M: f32 = 3.0;
-/// Longest side of a picture if no scale is asked for, pixels …
-const SIDE_PX: f32 = 1600.0;
-/// … within these pixels per metre: bollards stay visible, small lots do not become posters.
-const SCALE_PX_PER_M: (f32, f32) = (4.0, 24.0);
-/// Small things are drawn at least this wide, pixels.
-const SMALLEST_PX: f32 = 5.0;
-const FONT: RasterHeight = RasterHeight::Size24;
-const LINE_PX: f32 = 34.0;
-
-type Rgb = [u8; 3];
-const GROUND: Rgb = [0xEE, 0xEC, 0xE6];
-const ASPHALT: Rgb = [0xC6, 0xCA, 0xD0];
-const BOUNDARY: Rgb = [0x5B, 0x61, 0x6B];
-const ISLAND: Rgb = [0xA9, 0xC7, 0x9B];
-const SPEED_BUMP: Rgb = [0xF0, 0xC2, 0x3C];
-const ROUTE: Rgb = [0x1B, 0x7F, 0x4B];
-const FINISH: Rgb = [0xC0, 0x2F, 0x2F];
-const INK: Rgb = [0x22, 0x25, 0x2B];
-
-/// Colour of a class and its name in the legend.
-fn look(class: ObstacleClass) -> (Rgb, &'static str) {
-    match class {
-        ObstacleClass::Sedan => ([0x4C, 0x72, 0xB0], "sedan"),
-        ObstacleClass::Suv => ([0x2F, 0x4B, 0x7C], "SUV"),
-        ObstacleClass::Compact => ([0x8F, 0xAE, 0xDB], "compact"),
-        ObstacleClass::Van => ([0x7A, 0x5F, 0xA8], "van"),
-        ObstacleClass::Truck => ([0x8C, 0x56, 0x4B], "truck"),
-        ObstacleClass::Cone => ([0xFF, 0x7F, 0x0E], "cone"),
-        ObstacleClass::Bollard => ([0xD6, 0x27, 0x28], "bollard"),
-        ObstacleClass::Curb => ([0x8D, 0x8D, 0x8D], "curb"),
-        ObstacleClass::WheelStop => ([0xB8, 0xA9, 0x7E], "wheel stop"),
-        ObstacleClass::Pillar => ([0x3A, 0x3A, 0x3A], "pillar"),
-        ObstacleClass::Cart => ([0x17, 0xA2, 0x98], "cart"),
-        ObstacleClass::Person => ([0xE3, 0x3C, 0x96], "person"),
-    }
-}
-
-/// A top view, encoded as PNG.
+/// The command.
 ///
 /// # Errors
-/// If the picture would be too large.
-pub fn top_view(map: &Map, vehicle: &VehicleParams, px_per_m: Option<f32>) -> anyhow::Result<Vec<u8>> {
-    let legend = legend_of(map);
-    let (lowest, highest) = extent(map);
-    let size_m = highest - lowest;
-    let fitting = (SIDE_PX / size_m.max_element()).clamp(SCALE_PX_PER_M.0, SCALE_PX_PER_M.1);
-    let scale = px_per_m.unwrap_or(fitting);
-    let width = (size_m.x * scale).max(400.0);
-    let legend_rows = layout(&legend, width);
-    let lot_height = size_m.y * scale;
-    let height = lot_height + LINE_PX * (legend_rows.len() as f32 + 2.0);
-    let pixmap = Pixmap::new(width as u32, height as u32)
-        .filter(|pixmap| pixmap.width().max(pixmap.height()) <= 16_384)
-        .ok_or_else(|| {
-            anyhow::anyhow!("{width:.0}×{height:.0} pixels are too many; choose a smaller --pixels-per-metre")
-        })?;
-    let mut canvas = Canvas { pixmap, scale, lowest, top_m: highest.y };
-    canvas.pixmap.fill(colour(GROUND));
-    draw_ground(&mut canvas, map);
-    for obstacle in &map.scenario().obstacles {
-        draw_obstacle(&mut canvas, obstacle);
+/// If something named does not exist, or a file is there already or cannot be written.
+pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
+    let output = Output { folder: &args.out, overwrite: args.overwrite };
+    match &args.what {
+        RenderWhat::Lot(what) => render_lots(what, &output),
+        RenderWhat::ContactSheet(what) => contact_sheet(what, &output),
+        RenderWhat::Trajectories(what) => render_trajectories(what, &output),
+        RenderWhat::Samples(what) => render_samples(what, &output),
+        RenderWhat::Noise(what) => render_noise(what, &output),
+        RenderWhat::Report(what) => render_report(&what.run),
     }
-    draw_route(&mut canvas, map, vehicle);
-    draw_caption(&mut canvas, map, lot_height);
-    draw_legend(&mut canvas, &legend, &legend_rows, lot_height + 1.5 * LINE_PX);
-    Ok(canvas.pixmap.encode_png()?)
 }
 
-/// Lowest and highest corner of everything in the picture.
-fn extent(map: &Map) -> (Vec2, Vec2) {
-    let scenario = map.scenario();
-    let outlines = scenario.obstacles.iter().flat_map(Obstacle::outline);
-    let points = scenario.boundary.iter().copied().chain(outlines);
-    let (low, high) = points.fold((Vec2::MAX, Vec2::MIN), |(low, high), point| (low.min(point), high.max(point)));
-    (low - Vec2::splat(MARGIN_M), high + Vec2::splat(MARGIN_M))
+/// Where pictures go.
+struct Output<'a> {
+    folder: &'a Path,
+    overwrite: bool,
 }
 
-/// World metres on one side, pixels on the other.
-struct Canvas {
-    pixmap: Pixmap,
-    scale: f32,
-    lowest: Vec2,
-    top_m: f32,
-}
-
-impl Canvas {
-    fn pixel(&self, world: Vec2) -> Vec2 {
-        Vec2::new(world.x - self.lowest.x, self.top_m - world.y) * self.scale
-    }
-
-    fn path(&self, world: impl IntoIterator<Item = Vec2>, closed: bool) -> Option<Path> {
-        let mut builder = PathBuilder::new();
-        for (index, point) in world.into_iter().enumerate() {
-            let pixel = self.pixel(point);
-            if index == 0 { builder.move_to(pixel.x, pixel.y) } else { builder.line_to(pixel.x, pixel.y) }
+impl Output<'_> {
+    /// Writes a picture as PNG, and as SVG where it is made of lines.
+    fn write(&self, name: &str, drawing: &Drawing, is_vector: bool) -> anyhow::Result<()> {
+        let folder = self.folder;
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("{}: cannot be created; choose another --out", folder.display()))?;
+        let name = file_name(name);
+        let mut files = vec![(folder.join(format!("{name}.png")), drawing.to_png()?)];
+        if is_vector {
+            files.push((folder.join(format!("{name}.svg")), drawing.to_svg().into_bytes()));
         }
-        if closed {
-            builder.close();
+        for (path, content) in files {
+            ensure!(
+                self.overwrite || !path.exists(),
+                "{}: exists already; choose another --out, or replace it with --overwrite",
+                path.display()
+            );
+            write_whole(&path, &content)?;
+            println!("{}: {} kB", path.display(), content.len().div_ceil(1000));
         }
-        builder.finish()
-    }
-
-    fn fill(&mut self, world: &[Vec2], rgb: Rgb) {
-        if let Some(path) = self.path(world.iter().copied(), true) {
-            self.fill_path(&path, rgb);
-        }
-    }
-
-    fn fill_path(&mut self, path: &Path, rgb: Rgb) {
-        self.pixmap.fill_path(path, &paint(rgb), FillRule::Winding, Transform::identity(), None);
-    }
-
-    fn line(&mut self, world: impl IntoIterator<Item = Vec2>, closed: bool, rgb: Rgb, width_px: f32, dash_px: &[f32]) {
-        let stroke = Stroke {
-            width: width_px,
-            line_cap: LineCap::Round,
-            line_join: LineJoin::Round,
-            dash: StrokeDash::new(dash_px.to_vec(), 0.0),
-            ..Stroke::default()
-        };
-        if let Some(path) = self.path(world, closed) {
-            self.pixmap.stroke_path(&path, &paint(rgb), &stroke, Transform::identity(), None);
-        }
-    }
-
-    fn disc_px(&mut self, centre_px: Vec2, radius_px: f32, rgb: Rgb) {
-        if let Some(path) = PathBuilder::from_circle(centre_px.x, centre_px.y, radius_px) {
-            self.fill_path(&path, rgb);
-        }
-    }
-
-    /// Writes ASCII text with its upper left corner at a pixel.
-    fn text(&mut self, text: &str, at_px: Vec2, rgb: Rgb) {
-        let width = self.pixmap.width() as usize;
-        for (index, letter) in text.chars().enumerate() {
-            let Some(raster) = get_raster(letter, FontWeight::Regular, FONT) else { continue };
-            let left = at_px.x as usize + index * raster.width();
-            for (y, row) in raster.rows().enumerate() {
-                for (x, &cover) in row.iter().enumerate().filter(|(x, cover)| **cover > 0 && left + x < width) {
-                    let at = (at_px.y as usize + y) * width + left + x;
-                    let Some(pixel) = self.pixmap.pixels_mut().get_mut(at) else { continue };
-                    let mix = |below: u8, ink: u8| {
-                        ((u16::from(below) * (255 - u16::from(cover)) + u16::from(ink) * u16::from(cover)) / 255) as u8
-                    };
-                    let (r, g, b) = (mix(pixel.red(), rgb[0]), mix(pixel.green(), rgb[1]), mix(pixel.blue(), rgb[2]));
-                    if let Some(mixed) = tiny_skia::PremultipliedColorU8::from_rgba(r, g, b, 255) {
-                        *pixel = mixed;
-                    }
-                }
-            }
-        }
+        Ok(())
     }
 }
 
-fn colour([r, g, b]: Rgb) -> Color {
-    Color::from_rgba8(r, g, b, 255)
+/// Names of lots and drivers are free text; names of files are not.
+pub fn file_name(name: &str) -> String {
+    name.replace(|c: char| !c.is_alphanumeric() && !"-_.".contains(c), "-")
 }
 
-fn paint(rgb: Rgb) -> Paint<'static> {
-    let mut paint = Paint::default();
-    paint.set_color(colour(rgb));
-    paint
+fn maps(args: &RenderLotArgs) -> anyhow::Result<Vec<Map>> {
+    let lots = Lot::parse_all(&args.lots)?;
+    let jobs: Vec<Job<'_>> =
+        Job::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).collect();
+    let config = Settings::preset("default")?.episode;
+    let work = Work::begin("drawing lots");
+    let maps = jobs.par_iter().map(|job| job.map(&config)).collect::<anyhow::Result<Vec<Map>>>()?;
+    work.end(&format!("{} lots", maps.len()));
+    Ok(maps)
 }
 
-fn draw_ground(canvas: &mut Canvas, map: &Map) {
-    let scenario = map.scenario();
-    canvas.fill(&scenario.boundary, ASPHALT);
-    for bump in &scenario.speed_bumps {
-        let centre = Pose { x_m: bump.x_m, y_m: bump.y_m, heading_rad: bump.heading_deg.to_radians() };
-        let outline = sim::geometry::rectangle(centre, bump.length_m, bump.width_m);
-        canvas.fill(&outline, SPEED_BUMP);
+fn render_lots(args: &RenderLotArgs, output: &Output<'_>) -> anyhow::Result<()> {
+    ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
+    let vehicle = Settings::preset("default")?.episode.vehicle;
+    for map in maps(args)? {
+        output.write(&map.scenario().name, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?, true)?;
     }
-    for island in &scenario.islands {
-        canvas.fill(&island.polygon, ISLAND);
-        canvas.line(island.polygon.iter().copied(), true, BOUNDARY, 1.5, &[]);
-    }
-    canvas.line(scenario.boundary.iter().copied(), true, BOUNDARY, 2.0, &[]);
+    Ok(())
 }
 
-fn draw_obstacle(canvas: &mut Canvas, obstacle: &Obstacle) {
-    let (rgb, _) = look(obstacle.class);
-    let [length_m, width_m, _] = obstacle.size_m();
-    let centre = obstacle.centre();
-    let smallest_m = SMALLEST_PX / canvas.scale;
-    if obstacle.class.is_round() {
-        let radius_px = 0.5 * length_m.max(smallest_m) * canvas.scale;
-        canvas.disc_px(canvas.pixel(centre.position()), radius_px, rgb);
-        return;
-    }
-    let (length_m, width_m) = (length_m.max(0.5 * smallest_m), width_m.max(0.5 * smallest_m));
-    canvas.fill(&sim::geometry::rectangle(centre, length_m, width_m), rgb);
-    if obstacle.class.is_vehicle() {
-        // A roof makes it a car and shows which way it stands.
-        let roof = Pose::new(centre.position() - centre.ahead() * 0.06 * length_m, centre.heading_rad);
-        canvas.fill(&sim::geometry::rectangle(roof, 0.5 * length_m, 0.78 * width_m), lighter(rgb));
-    }
+fn contact_sheet(args: &RenderLotArgs, output: &Output<'_>) -> anyhow::Result<()> {
+    output.write("contact-sheet", &contact_sheet::picture(&maps(args)?)?, true)
 }
 
-fn lighter(rgb: Rgb) -> Rgb {
-    rgb.map(|channel| channel + (255 - channel) / 3)
+fn render_trajectories(args: &TrajectoriesArgs, output: &Output<'_>) -> anyhow::Result<()> {
+    ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
+    let (map, driven, name) = match &args.run {
+        Some(run) => driven_in_training(run, args)?,
+        None => driven_anew(args)?,
+    };
+    let by = match args.by {
+        Some(ColourChoice::Speed) => ColourBy::Speed,
+        Some(ColourChoice::Driver) => ColourBy::Driver,
+        Some(ColourChoice::Who) => ColourBy::Source,
+        None if args.run.is_some() => ColourBy::Source,
+        None => ColourBy::Driver,
+    };
+    output.write(
+        &format!("drive-{name}"),
+        &trajectories::picture(&map, &driven, by, &name, args.pixels_per_metre)?,
+        true,
+    )
 }
 
-fn draw_route(canvas: &mut Canvas, map: &Map, vehicle: &VehicleParams) {
-    let path = map.path();
-    canvas.line(path.poses().iter().map(|pose| pose.position()), false, ROUTE, 2.5, &[12.0, 8.0]);
-    let mut at_m = 12.0;
-    while at_m < path.length_m() - 4.0 {
-        let pose = path.pose_at(at_m);
-        let size_m = 9.0 / canvas.scale;
-        let side = pose.ahead().perp();
-        let tip = pose.position() + pose.ahead() * size_m;
-        canvas.fill(&[tip, pose.position() + side * 0.6 * size_m, pose.position() - side * 0.6 * size_m], ROUTE);
-        at_m += 20.0;
+type Drives = (Arc<Map>, Vec<Trajectory>, String);
+
+/// One drive per driver, all on the same obstacles and noise as in an evaluation.
+fn driven_anew(args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
+    let (direction, directions) = match args.direction {
+        Way::Forward => (Direction::Forward, Directions::Forward),
+        Way::Reverse => (Direction::Reverse, Directions::Reverse),
+    };
+    let evaluation = EvaluateArgs {
+        drivers: args.drivers.clone(),
+        lots: vec![args.lot.clone()],
+        trials: Some(args.trial + 1),
+        directions: Some(directions),
+        noise: vec![args.noise.clone()],
+        compare_with: None,
+        seed: args.seed,
+        layers: args.layers.clone(),
+        out: None,
+        overwrite: false,
+    };
+    let contestants = Contestant::parse_all(&args.drivers)?;
+    let (settings, _) = evaluate::resolve(&evaluation)?;
+    contestants.iter().try_for_each(|contestant| contestant.check(&settings))?;
+    let lots = Lot::parse_all(&settings.evaluation.lots)?;
+    ensure!(lots.len() == 1, "{:?} stands for {} lots; name one", args.lot, lots.len());
+    let seed = trials::trial_seed(settings.evaluation.seed, Purpose::Evaluation, args.trial);
+    let job = Job { lot: &lots[0], direction, trial: args.trial, seed };
+    let map = Arc::new(job.map(&settings.episode)?);
+    let noise = settings.evaluation.noise[0];
+    let mut driven = Vec::new();
+    for contestant in &contestants {
+        let episodes = trials::start(&[job], &[Arc::clone(&map)], &settings, noise);
+        let mut fleet = contestant.fleet(&settings, 1);
+        driven.push(drive(&contestant.name, episodes, &mut *fleet));
     }
-    let world_from_ego = map.start().world_from_ego();
-    let car: Vec<Vec2> = vehicle.body_in_ego().iter().map(|&corner| world_from_ego.point(corner)).collect();
-    canvas.line(car, true, ROUTE, 3.0, &[]);
-    canvas.disc_px(canvas.pixel(map.start().position()), 7.0, ROUTE);
-    let finish = path.pose_at(path.length_m());
-    let side = finish.ahead().perp() * 1.3;
-    canvas.line([finish.position() - side, finish.position() + side], false, FINISH, 6.0, &[]);
+    let way = report::name(direction);
+    Ok((map, driven, format!("{} {way} trial {}", job.lot.name(), args.trial)))
 }
 
-/// Name, length, and a scale bar.
-fn draw_caption(canvas: &mut Canvas, map: &Map, top_px: f32) {
-    let y = top_px + 2.0;
-    let text = format!("{}, route {:.0} m", map.scenario().name, map.path().length_m());
-    canvas.text(&text, Vec2::new(16.0, y), INK);
-    let bar_m = if canvas.pixmap.width() as f32 / canvas.scale > 60.0 { 10.0 } else { 5.0 };
-    let label = format!("{bar_m:.0} m");
-    let label_px = (label.len() * get_raster_width(FontWeight::Regular, FONT)) as f32;
-    let right = canvas.pixmap.width() as f32 - 16.0;
-    canvas.text(&label, Vec2::new(right - label_px, y), INK);
-    let (from, to) = (right - label_px - 12.0 - bar_m * canvas.scale, right - label_px - 12.0);
-    let middle = y + 13.0;
-    for (x, y0, y1) in [(from, middle - 7.0, middle + 7.0), (to, middle - 7.0, middle + 7.0)] {
-        stroke_px(canvas, [Vec2::new(x, y0), Vec2::new(x, y1)]);
-    }
-    stroke_px(canvas, [Vec2::new(from, middle), Vec2::new(to, middle)]);
+/// A drive of a training round: the network of the round before and the expert, as in the training itself.
+fn driven_in_training(run: &Path, args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
+    let settings = run_dir::settings_of(run)?;
+    let lots = Lot::parse_all(&settings.training.lots)?;
+    let mut episodes = train::episodes_of(&settings, &lots, args.round)?;
+    let count = episodes.len();
+    ensure!((args.trial as usize) < count, "--trial {}: a round has {count} drives, counted from 0", args.trial);
+    let episode = episodes.swap_remove(args.trial as usize);
+    let map = Arc::clone(episode.map());
+    let novice = args.round.checked_sub(1).map(|before| run.join(format!("round-{before:02}")));
+    let novice = novice.map(|folder| Checkpoint::load(&folder)).transpose()?;
+    let novice = novice.map(|checkpoint| Predictor::new(checkpoint.weights, settings.dagger.device));
+    let jitter = u64::from(args.round) << 20 | u64::from(args.trial);
+    let expert = drivers::expert(&settings).with_jitter_seed(settings.seed, jitter);
+    let dagger = &settings.dagger;
+    let mut arbiter = Arbiter::new(novice, vec![Box::new(expert)], dagger.rule, dagger.keep, dagger.geometry);
+    let name = format!("{} round {} drive {}", map.scenario().name, args.round, args.trial);
+    Ok((map, vec![drive("training", vec![episode], &mut arbiter)], name))
 }
 
-fn stroke_px(canvas: &mut Canvas, [a, b]: [Vec2; 2]) {
-    let mut builder = PathBuilder::new();
-    builder.move_to(a.x, a.y);
-    builder.line_to(b.x, b.y);
-    if let Some(path) = builder.finish() {
-        let stroke = Stroke { width: 3.0, ..Stroke::default() };
-        canvas.pixmap.stroke_path(&path, &paint(INK), &stroke, Transform::identity(), None);
-    }
-}
-
-/// Colours and names of what is in the lot, with counts.
-fn legend_of(map: &Map) -> Vec<(Rgb, String)> {
-    let scenario = map.scenario();
-    let classes = ObstacleClass::ALL.into_iter().filter_map(|class| {
-        let count = scenario.obstacles.iter().filter(|obstacle| obstacle.class == class).count();
-        let (rgb, name) = look(class);
-        (count > 0).then(|| (rgb, format!("{name} {count}")))
+fn drive(name: &str, episodes: Vec<Episode>, fleet: &mut dyn Fleet) -> Trajectory {
+    let length_m = episodes[0].map().path().length_m();
+    let mut work = Work::begin(name);
+    let mut points = Vec::new();
+    let reports = run_lockstep(episodes, fleet, &mut |_, frame| {
+        points.push(Point::of(frame));
+        work.at(f64::from(frame.progress_m / length_m), || format!("{} ticks", points.len()));
     });
-    let ground = [
-        (ASPHALT, "drivable".to_owned(), true),
-        (ISLAND, format!("island {}", scenario.islands.len()), !scenario.islands.is_empty()),
-        (SPEED_BUMP, format!("speed bump {}", scenario.speed_bumps.len()), !scenario.speed_bumps.is_empty()),
-        (ROUTE, "start and route".to_owned(), true),
-        (FINISH, "finish".to_owned(), true),
-    ];
-    let ground = ground.into_iter().filter(|(_, _, is_there)| *is_there).map(|(rgb, name, _)| (rgb, name));
-    ground.chain(classes).collect()
+    work.end(&format!("{} near-collisions in {length_m:.0} m", reports[0].metrics.near_collisions));
+    Trajectory { name: name.to_owned(), points }
 }
 
-const SWATCH_PX: f32 = 20.0;
-
-fn entry_px(name: &str) -> f32 {
-    SWATCH_PX + 10.0 + (name.len() * get_raster_width(FontWeight::Regular, FONT)) as f32 + 26.0
+fn render_samples(args: &SamplesArgs, output: &Output<'_>) -> anyhow::Result<()> {
+    ensure!(args.count > 0, "--count is 0; at least one is needed");
+    let name = args.round.file_name().unwrap_or_default().to_string_lossy();
+    let index = name.strip_prefix("round-").and_then(|index| index.parse().ok());
+    let (Some(index), Some(run)) = (index, args.round.parent()) else {
+        anyhow::bail!("{}: this is no round; name one, as in runs/NAME/round-01", args.round.display());
+    };
+    // Opening a store creates its folder.
+    ensure!(args.round.is_dir(), "{}: there is no such round", args.round.display());
+    let (round, _) = Store::open(run)?.read_round::<Collection>(index)?;
+    let settings = run_dir::settings_of(run)?;
+    let folder = args.net.as_deref().unwrap_or(&args.round);
+    let checkpoint =
+        (args.net.is_some() || Checkpoint::exists(folder)).then(|| Checkpoint::load(folder)).transpose()?;
+    let count = args.count.min(round.samples.len());
+    let chosen: Vec<usize> = (0..count).map(|i| (2 * i + 1) * round.samples.len() / (2 * count)).collect();
+    let grids: Vec<_> = chosen.iter().map(|&i| &round.samples[i].grid).collect();
+    let answers =
+        checkpoint.map(|checkpoint| Predictor::new(checkpoint.weights, settings.dagger.device).predict(&grids));
+    let samples: Vec<_> = chosen
+        .iter()
+        .enumerate()
+        .map(|(place, &i)| (i, round.samples[i], answers.as_ref().map(|answers| answers[place])))
+        .collect();
+    let title = format!("{name}: {count} of {} samples", round.samples.len());
+    output.write(&format!("samples-{name}"), &samples::picture(&title, &samples, &settings.dagger.geometry)?, false)
 }
 
-/// Ranges of entries per row.
-fn layout(legend: &[(Rgb, String)], width_px: f32) -> Vec<std::ops::Range<usize>> {
-    let mut rows = Vec::new();
-    let (mut from, mut used_px) = (0, 16.0);
-    for (index, (_, name)) in legend.iter().enumerate() {
-        if used_px + entry_px(name) > width_px && index > from {
-            rows.push(from..index);
-            (from, used_px) = (index, 16.0);
-        }
-        used_px += entry_px(name);
-    }
-    rows.push(from..legend.len());
-    rows
+fn render_noise(args: &RenderNoiseArgs, output: &Output<'_>) -> anyhow::Result<()> {
+    let lots = Lot::parse_all(std::slice::from_ref(&args.lot))?;
+    let job = Job::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next();
+    let (Some(job), 1, Some(&last)) = (job, lots.len(), args.noise.last()) else {
+        anyhow::bail!("{:?} stands for {} lots; name one", args.lot, lots.len());
+    };
+    let settings = Settings::preset("default")?;
+    let map = job.map(&settings.episode)?;
+    let inspect = |noise: NoiseChoice, at_m: f32| inspect(&settings, &job, &map, noise, at_m);
+    let at_m = match args.at {
+        Some(at_m) => at_m,
+        None => richest_place(map.path().length_m(), |at_m| inspect(last, at_m)),
+    };
+    ensure!(
+        (0.0..=map.path().length_m()).contains(&at_m),
+        "--at {at_m}: the route is {:.1} m long",
+        map.path().length_m()
+    );
+    let levels: Vec<(String, Inspection)> =
+        args.noise.iter().map(|&noise| (noise.name(), inspect(noise, at_m))).collect();
+    let title = format!("{}, {at_m:.1} m along the route, seed {}", job.lot.name(), args.seed);
+    output.write(&format!("noise-{}", job.lot.name()), &noise::picture(&title, &levels)?, false)
 }
 
-fn draw_legend(canvas: &mut Canvas, legend: &[(Rgb, String)], rows: &[std::ops::Range<usize>], top_px: f32) {
-    for (index, row) in rows.iter().enumerate() {
-        let y = top_px + index as f32 * LINE_PX;
-        let mut x = 16.0;
-        for (rgb, name) in &legend[row.clone()] {
-            if let Some(swatch) = tiny_skia::Rect::from_xywh(x, y + 3.0, SWATCH_PX, SWATCH_PX) {
-                canvas.fill_path(&PathBuilder::from_rect(swatch), *rgb);
-            }
-            canvas.text(name, Vec2::new(x + SWATCH_PX + 10.0, y), INK);
-            x += entry_px(name);
-        }
-    }
+/// What is seen on the route at a place, about when a car at 1.4 m/s gets there.
+fn inspect(settings: &Settings, job: &Job<'_>, map: &Map, noise: NoiseChoice, at_m: f32) -> Inspection {
+    let config = trials::episode_config(settings, noise, map);
+    let tick = (at_m / (1.4 * config.control_period_s())) as u32;
+    let mut sensor = Sensor::new(map, config.sensing, &config.noise, job.episode_seed());
+    let pose = map.path().pose_at(at_m);
+    let shown = sensor.observe(map, pose, tick);
+    sensor.inspect(map, pose, tick, &shown)
 }
+
+fn render_report(run: &Path) -> anyhow::Result<()> {
+    ensure!(
+        run.join("settings.toml").is_file(),
+        "{}: this is no run; name a folder that train-dagger, train-bc or evaluate made",
+        run.display()
+    );
+    run_report::write(run, &mut Stopwatch::default())?;
+    println!("{}", run.join(run_report::FILE).display());
+    Ok(())
+}
+
+/// Where most layers make cells wrong; among these, where most cells are.
+fn richest_place(length_m: f32, inspect: impl Fn(f32) -> Inspection + Sync) -> f32 {
+    let places: Vec<f32> = (0..(length_m / 2.0) as u32).map(|i| 2.0 * i as f32).collect();
+    let richness = |inspection: &Inspection| {
+        let cells = Layer::ALL.map(|layer| inspection.count_cells(layer));
+        (cells.iter().filter(|&&n| n > 0).count(), cells.iter().sum::<usize>())
+    };
+    let rich: Vec<_> = places.par_iter().map(|&at_m| richness(&inspect(at_m))).collect();
+    let best = (0..places.len()).rev().max_by_key(|&i| rich[i]).unwrap_or(0);
+    places.get(best).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests;

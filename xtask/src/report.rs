@@ -2,6 +2,7 @@
 
 use crate::evaluate::Plan;
 use crate::failures::Cause;
+use crate::paper::{self, PaperLot, PaperResult};
 use crate::run_dir::RunDir;
 use crate::settings::{EvaluationSettings, NoiseChoice};
 use crate::statistics::bootstrap::{DRAWS, Interval};
@@ -21,22 +22,9 @@ pub fn markdown(header: Vec<String>) -> Table {
     table
 }
 
-fn table_of(header: &[&str]) -> Table {
+pub(crate) fn table_of(header: &[&str]) -> Table {
     markdown(header.iter().map(|&title| title.to_owned()).collect())
 }
-
-/// The paper's results on a lot (methods.md 0): five trials in both directions.
-struct PaperRow {
-    lot: &'static str,
-    length_m: f64,
-    dagger_safe_ratio: f64,
-}
-
-const PAPER: [PaperRow; 3] = [
-    PaperRow { lot: "lot-a", length_m: 231.0, dagger_safe_ratio: 0.83 },
-    PaperRow { lot: "lot-b", length_m: 139.0, dagger_safe_ratio: 0.72 },
-    PaperRow { lot: "lot-c", length_m: 149.0, dagger_safe_ratio: 0.91 },
-];
 
 /// One run, as a line of `runs.jsonl`.
 #[derive(Debug, Serialize)]
@@ -269,9 +257,12 @@ impl<'a> Summary<'a> {
         })
     }
 
-    /// The paper's rows of the lots that were driven.
-    fn paper_rows(&self) -> impl Iterator<Item = &'static PaperRow> {
-        PAPER.iter().filter(|paper| self.ledger.families().iter().any(|family| family.name == paper.lot))
+    /// The paper's rows of the lots that were driven: its own driver's, and those of its planners that took part.
+    fn paper_rows(&self) -> impl Iterator<Item = (&'static str, &'static PaperLot, &'static PaperResult)> {
+        let took_part = |driver: &str| (0..self.plan.entries.len()).any(|index| self.driver(index) == driver);
+        let lots = paper::LOTS.iter().filter(|lot| self.ledger.families().iter().any(|family| family.name == lot.lot));
+        let drivers = (0..).zip(paper::DRIVERS).filter(move |&(index, driver)| index == 0 || took_part(driver));
+        drivers.flat_map(move |(index, driver)| lots.clone().map(move |lot| (driver, lot, &lot.results[index])))
     }
 
     fn rates_table(&self, level: usize, has_paper: bool) -> Table {
@@ -301,14 +292,14 @@ impl<'a> Summary<'a> {
                 standing.dispersion.map_or_else(|| "–".to_owned(), |dispersion| format!("{:.1}", dispersion.index)),
             ]);
         }
-        for paper in self.paper_rows().filter(|_| has_paper) {
-            let metres = 10.0 * paper.length_m;
+        for (driver, lot, paper) in self.paper_rows().filter(|_| has_paper) {
+            let [forward, reverse] = paper.near_collisions;
             table.add_row([
-                "paper: DAgger".to_owned(),
-                paper.lot.to_owned(),
-                format!("{metres:.0} m"),
-                "0 (0, 0)".to_owned(),
-                exact_rate(0, metres),
+                format!("paper: {driver}"),
+                lot.lot.to_owned(),
+                format!("{:.0} m", lot.driven_m()),
+                format!("{} ({forward}, {reverse})", forward + reverse),
+                exact_rate(forward + reverse, lot.driven_m()),
                 String::new(),
                 "–".to_owned(),
             ]);
@@ -329,9 +320,9 @@ impl<'a> Summary<'a> {
                 self.unweighted(level, driver, &judged.scope, 1, 3),
             ]);
         }
-        for paper in self.paper_rows().filter(|_| has_paper) {
-            let ratio = format!("{:.2}", paper.dagger_safe_ratio);
-            table.add_row(["paper: DAgger".to_owned(), paper.lot.to_owned(), "10".to_owned(), ratio, String::new()]);
+        for (driver, lot, paper) in self.paper_rows().filter(|_| has_paper) {
+            let ratio = format!("{:.2}", paper.safe_ratio);
+            table.add_row([format!("paper: {driver}"), lot.lot.to_owned(), "10".to_owned(), ratio, String::new()]);
         }
         table
     }
@@ -564,7 +555,7 @@ impl<'a> Summary<'a> {
     }
 }
 
-fn csv_of(rows: &[impl Serialize]) -> anyhow::Result<Vec<u8>> {
+pub(crate) fn csv_of(rows: &[impl Serialize]) -> anyhow::Result<Vec<u8>> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     for row in rows {
         csv.serialize(row)?;
@@ -573,7 +564,7 @@ fn csv_of(rows: &[impl Serialize]) -> anyhow::Result<Vec<u8>> {
 }
 
 /// The rate with the interval that may be quoted (methods.md 8.3).
-fn quoted_rate(totals: &Totals, standing: &Standing) -> String {
+pub(crate) fn quoted_rate(totals: &Totals, standing: &Standing) -> String {
     let is_clustered = standing.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
     match standing.per_100m.filter(|_| is_clustered) {
         Some(Interval { lower, upper, .. }) => {
@@ -584,7 +575,7 @@ fn quoted_rate(totals: &Totals, standing: &Standing) -> String {
 }
 
 /// The rate with its exact interval; for a count of zero the bound it really supports.
-fn exact_rate(near_collisions: u32, reference_m: f64) -> String {
+pub(crate) fn exact_rate(near_collisions: u32, reference_m: f64) -> String {
     let rate = Rate::new(near_collisions, reference_m / 100.0);
     let interval = format!("{:.2} [{:.2}, {:.2}]", rate.per_unit, rate.lower, rate.upper);
     if near_collisions > 0 {
@@ -597,7 +588,7 @@ fn bound_per_100m(near_collisions: u32, reference_m: f64) -> f64 {
     100.0 * upper_bound(near_collisions, CONFIDENCE) / reference_m
 }
 
-fn difference(interval: Option<Interval>, digits: usize) -> String {
+pub(crate) fn difference(interval: Option<Interval>, digits: usize) -> String {
     interval.map_or_else(
         || "–".to_owned(),
         |interval| {

@@ -89,6 +89,30 @@ impl RunDir {
         Ok((Self { path: path.to_path_buf() }, settings))
     }
 
+    /// Claims the folder of a stage within a run: `None` if it is finished, else as an interrupted one left it or new.
+    /// Its place belongs to the run: what cannot be continued there is made again.
+    ///
+    /// # Errors
+    /// If it was begun with other settings, or cannot be written.
+    pub fn stage(path: &Path, place: &Place<'_>, settings: &Settings) -> anyhow::Result<Option<Self>> {
+        if is_finished(path) {
+            return Ok(None);
+        }
+        if path.join(MANIFEST).is_file() {
+            let (run, found) = Self::resume(path)?;
+            ensure!(
+                found == *settings,
+                "{}: this stage was begun with other settings; delete the folder, or choose another --out",
+                path.display()
+            );
+            return Ok(Some(run));
+        }
+        if path.exists() {
+            fs::remove_dir_all(path).with_context(|| format!("{}: cannot be deleted", path.display()))?;
+        }
+        Self::create(&Place { out: Some(path), ..*place }, settings).map(Some)
+    }
+
     /// The folder.
     pub fn path(&self) -> &Path {
         &self.path
@@ -109,6 +133,11 @@ impl RunDir {
     pub fn finish(&self, result: &impl Serialize) -> anyhow::Result<()> {
         self.write(FINISHED, toml::to_string(result)?.as_bytes())
     }
+}
+
+/// Whether a run has come to its end.
+pub fn is_finished(path: &Path) -> bool {
+    path.join(FINISHED).is_file()
 }
 
 /// Writes a file beside and renames it.

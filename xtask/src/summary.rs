@@ -1,5 +1,6 @@
 //! Runs pooled: counts, rates and what they say about the drivers (methods.md 8).
 
+mod read;
 mod scopes;
 
 pub use scopes::{Comparison, Scope, Standing};
@@ -139,6 +140,8 @@ struct Unit {
     near_collisions: u32,
     reference_m: f32,
     safe_ratio: f32,
+    driven_m: f32,
+    steering_reversals: u32,
 }
 
 /// One driver at one noise level.
@@ -152,7 +155,7 @@ struct Account {
     causes: BTreeMap<(u32, Cause), u32>,
 }
 
-/// Everything that is kept of an evaluation: sums, and 24 bytes per run.
+/// Everything that is kept of an evaluation: sums, and 32 bytes per run.
 #[derive(Debug)]
 pub struct Ledger {
     families: Vec<Family>,
@@ -208,6 +211,8 @@ impl Ledger {
             near_collisions: metrics.near_collisions,
             reference_m: metrics.reference_m,
             safe_ratio: metrics.safe_ratio,
+            driven_m: metrics.driven_m,
+            steering_reversals: metrics.steering_reversals,
         });
     }
 

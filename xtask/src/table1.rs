@@ -1,21 +1,9 @@
 //! The paper's table of `DAgger` iterations, from this run beside the paper's.
 
+use crate::paper::TABLE_1 as PAPER;
 use crate::report::markdown;
 use crate::run_dir::RunDir;
 use policy::dagger::{IterationRow, Stop};
-use serde::Serialize;
-
-/// The paper's rows: behaviour cloning, then i = 1 … 5.
-#[derive(Debug, Serialize)]
-struct Paper {
-    dataset: [usize; 6],
-    eta_hat: [Option<f64>; 6],
-}
-
-const PAPER: Paper = Paper {
-    dataset: [6425, 3258, 2263, 2088, 1505, 731],
-    eta_hat: [None, Some(0.44), Some(0.64), Some(0.65), Some(0.74), Some(0.90)],
-};
 
 /// What a training went through.
 #[derive(Debug, Clone, Copy)]

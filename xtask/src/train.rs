@@ -4,6 +4,7 @@ use crate::cli::TrainArgs;
 use crate::drivers::{self, Contestant};
 use crate::evaluate::{self, Entry, Plan};
 use crate::interrupt::{self, Interrupted};
+use crate::learning::Recorder;
 use crate::lots::Lot;
 use crate::progress::{Stopwatch, Work};
 use crate::run_dir::{Place, RunDir};
@@ -12,12 +13,13 @@ use crate::table1::Table1;
 use crate::trials::{self, Job, Purpose};
 use crate::visualise::drive::Detail;
 use crate::visualise::live::{Live, View};
+use crate::{learning, run_report};
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
 use policy::dagger::{Hooks, Outcome, Progress, Stop};
 use policy::dataset::store::Store;
 use policy::drivers::NetPolicy;
-use policy::fit::FitProgress;
+use policy::fit::{FitProgress, FitReport};
 use serde::Serialize;
 use sim::driver::Source;
 use sim::episode::{Episode, Frame};
@@ -70,8 +72,9 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
     if let Some(live) = live {
         live.finish();
     }
-    let outcome = done?;
-    run.finish(&Finished { stop: outcome.stop, rounds: outcome.rows.len() })?;
+    let finished = done?;
+    run_report::write(run.path(), &mut stopwatch)?;
+    run.finish(&finished)?;
     print_next_steps(run.path());
     stopwatch.report();
     Ok(())
@@ -84,26 +87,40 @@ fn train_and_check(
     no_eval: bool,
     mut live: Option<&mut Live>,
     stopwatch: &mut Stopwatch,
-) -> anyhow::Result<Outcome> {
-    let mut outcome = learn(settings, run, live.as_deref_mut(), stopwatch)?;
-    let table1 = Table1 { rows: &outcome.rows, stop: outcome.stop };
-    println!("\nDAgger iterations\n\n{}", table1.to_markdown());
-    table1.write(run)?;
-    let (Stop::EtaReached | Stop::IterationCap, Some(policy)) = (outcome.stop, outcome.policy.take()) else {
-        return Err(cut_short(run.path(), outcome.rows.len()));
-    };
+) -> anyhow::Result<Finished> {
+    let (policy, finished) =
+        tabulated(settings, run, live.as_deref_mut(), stopwatch)?.map_err(|rounds| cut_short(run.path(), rounds))?;
     if !no_eval {
-        let entries = entries(run, policy, outcome.rows.len())?;
+        let entries = entries(run, policy, finished.rounds)?;
         let lots = Lot::parse_all(&settings.evaluation.lots)?;
         let plan = Plan { settings, entries: &entries, lots: &lots, compare_with: entries.len() - 1 };
         plan.check()?;
         evaluate::measure(&plan, run, live, stopwatch)?;
     }
-    Ok(outcome)
+    Ok(finished)
 }
 
-#[derive(Serialize)]
-struct Finished {
+/// Trains, prints and writes the paper's table. The inner error of a training cut short is the number of rounds that
+/// were finished.
+pub(crate) fn tabulated(
+    settings: &Settings,
+    run: &RunDir,
+    live: Option<&mut Live>,
+    stopwatch: &mut Stopwatch,
+) -> anyhow::Result<Result<(Checkpoint, Finished), usize>> {
+    let outcome = learn(settings, run, live, stopwatch)?;
+    let table1 = Table1 { rows: &outcome.rows, stop: outcome.stop };
+    println!("\nDAgger iterations\n\n{}", table1.to_markdown());
+    table1.write(run)?;
+    let (Stop::EtaReached | Stop::IterationCap, Some(policy)) = (outcome.stop, outcome.policy) else {
+        return Ok(Err(outcome.rows.len()));
+    };
+    Ok(Ok((policy, Finished { stop: outcome.stop, rounds: outcome.rows.len() })))
+}
+
+/// How a training ended.
+#[derive(Debug, Serialize)]
+pub(crate) struct Finished {
     stop: Stop,
     rounds: usize,
 }
@@ -145,7 +162,15 @@ fn learn(
     // A lot that cannot be driven is found here, with its error, not in the middle of a round.
     episodes_of(settings, &lots, 0)?;
     let store = Store::open(run.path())?;
-    let monitor = RefCell::new(Monitor { stopwatch, work: None, ticks: Ticks::default(), live });
+    let monitor = RefCell::new(Monitor {
+        stopwatch,
+        work: None,
+        ticks: Ticks::default(),
+        store: store.clone(),
+        learning: Recorder::default(),
+        failed: None,
+        live,
+    });
     if let Some(live) = &mut monitor.borrow_mut().live {
         live.training();
     }
@@ -166,13 +191,22 @@ fn learn(
         },
         on_frame: &mut |_, episode, frame| monitor.borrow_mut().frame(episode, frame),
         progress: &mut |progress| {
-            monitor.borrow_mut().progress(progress);
-            if interrupt::is_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            let mut monitor = monitor.borrow_mut();
+            monitor.progress(progress);
+            if interrupt::is_requested() || monitor.failed.is_some() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         },
     };
     let outcome = policy::dagger::run(&settings.dagger, &store, settings.seed, &mut hooks)?;
-    monitor.into_inner().end_work("stopped");
-    Ok(outcome)
+    let mut monitor = monitor.into_inner();
+    monitor.end_work("stopped");
+    if let (Some(fit), None) = (learning::report(&store.final_folder())?, &monitor.failed) {
+        monitor.keep_curve(&store.final_folder(), &fit);
+    }
+    monitor.failed.map_or(Ok(outcome), Err)
 }
 
 /// Records the first runs of a round, with what the network that collects would do while the expert drives.
@@ -187,7 +221,10 @@ fn record(settings: &Settings, store: &Store, round: u32, episodes: &[Episode], 
 
 /// Lots that draw their obstacles are driven `training.trials` times. A generated lot looks the same every time: it is
 /// driven once, and the next round has other ones.
-fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<Episode>> {
+///
+/// # Errors
+/// If a lot cannot be driven.
+pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<Episode>> {
     let training = &settings.training;
     let (generated, others): (Vec<Lot>, Vec<Lot>) = lots.iter().cloned().partition(Lot::is_generated);
     let of_a_kind = |lot: &Lot| generated.iter().filter(|other| other.family() == lot.family()).count() as u64;
@@ -203,6 +240,10 @@ struct Monitor<'a> {
     work: Option<(Stretch, Work)>,
     ticks: Ticks,
     live: Option<&'a mut Live>,
+    store: Store,
+    learning: Recorder,
+    /// A file that could not be written: ends the run at the next safe point.
+    failed: Option<anyhow::Error>,
 }
 
 /// What the present bar is about.
@@ -261,14 +302,20 @@ impl Monitor<'_> {
                 self.end_work(&format!("{} samples, {dataset} in all{eta}", collection.samples));
             }
             Progress::Fitting { round, fit } => self.fitting(round, fit),
-            Progress::Finished { row, .. } => {
+            Progress::Finished { row, fit } => {
+                self.keep_curve(&self.store.round_folder(row.round), fit);
                 let error_m = row.validation_rmse_m.map_or_else(String::new, |error| format!("{error:.3} m off"));
                 self.end_work(&format!("validation {error_m}"));
             }
         }
     }
 
+    fn keep_curve(&mut self, folder: &Path, fit: &FitReport) {
+        self.failed = self.failed.take().or(self.learning.write(folder, fit).err());
+    }
+
     fn fitting(&mut self, round: Option<u32>, fit: &FitProgress) {
+        self.learning.step(fit);
         let (_, work) = self.work.get_or_insert_with(|| {
             let label = round.map_or_else(|| "final training".to_owned(), |round| format!("round {round}: training"));
             (Stretch::Fitting, Work::begin(label))

@@ -8,7 +8,7 @@ use protocol::{
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::re_log_types::StoreKind;
 use rerun::log::{Chunk, LogMsg};
-use rerun::{Archetype as _, EncodedImage, LineStrips3D, Points3D, Scalars, StateChange, Transform3D};
+use rerun::{EncodedImage, LineStrips3D, Points3D, Scalars, StateChange, Transform3D};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::PathBuf;
@@ -129,8 +129,11 @@ fn of<'a>(chunks: &'a [Chunk], entity: &str) -> Vec<&'a Chunk> {
 
 /// Ticks and nanoseconds at which an entity is given a shape.
 fn times(chunks: &[&Chunk]) -> (Vec<i64>, Vec<i64>) {
-    let of = |timeline: &str| {
-        chunks.iter().flat_map(|chunk| chunk.timelines()[&timeline.into()].times_raw().to_vec()).collect()
+    let of = |timeline: &'static str| {
+        chunks
+            .iter()
+            .flat_map(|chunk| chunk.timelines()[&rerun::TimelineName::new(timeline)].times_raw().to_vec())
+            .collect()
     };
     (of("tick"), of("sim_time"))
 }

@@ -87,7 +87,6 @@ pub(super) struct Key {
 /// How a series is drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Look {
-    Line,
     Dashes,
     /// A line with the marker of the n-th series.
     Marked(usize),
@@ -107,13 +106,7 @@ pub(super) struct Figure<'a> {
 impl Figure<'_> {
     /// Draws axes and legend, then what `draw` adds.
     pub(super) fn svg(&self, draw: impl FnOnce(&mut Chart<'_, '_>) -> Drawn) -> String {
-        let mut svg = String::new();
-        let written = {
-            let root = SVGBackend::with_string(&mut svg, (WIDTH_PX, self.height_px)).into_drawing_area();
-            self.draw(&root, draw).and_then(|()| root.present())
-        };
-        written.expect("drawing into memory does not fail");
-        accessible(&svg, self.title)
+        picture(self.title, self.height_px, |root| self.draw(root, draw))
     }
 
     /// The same as one part of a larger picture.
@@ -160,13 +153,21 @@ impl Figure<'_> {
     }
 }
 
-/// Several figures side by side as one picture.
-pub(super) fn side_by_side<'f>(title: &str, height_px: u32, draw: impl FnOnce(&[Area<'_>; 2]) -> Drawn + 'f) -> String {
+/// Two figures side by side as one picture.
+pub(super) fn side_by_side(title: &str, height_px: u32, draw: impl FnOnce(&[Area<'_>; 2]) -> Drawn) -> String {
+    picture(title, height_px, |root| draw(&root.split_horizontally(WIDTH_PX / 2).into()))
+}
+
+/// Two figures, one above the other, as one picture.
+pub(super) fn one_above_the_other(title: &str, height_px: u32, draw: impl FnOnce(&[Area<'_>; 2]) -> Drawn) -> String {
+    picture(title, height_px, |root| draw(&root.split_vertically(height_px / 2).into()))
+}
+
+fn picture(title: &str, height_px: u32, draw: impl FnOnce(&Area<'_>) -> Drawn) -> String {
     let mut svg = String::new();
     let written = {
         let root = SVGBackend::with_string(&mut svg, (WIDTH_PX, height_px)).into_drawing_area();
-        let (left, right) = root.split_horizontally(WIDTH_PX / 2);
-        draw(&[left, right]).and_then(|()| root.present())
+        draw(&root).and_then(|()| root.present())
     };
     written.expect("drawing into memory does not fail");
     accessible(&svg, title)
@@ -284,7 +285,6 @@ fn legend_rows(legend: &[Key], width_px: i32) -> Vec<Vec<(i32, &Key)>> {
 fn draw_key(area: &Area<'_>, key: &Key, x: i32, y: i32) -> Drawn {
     let stroke = key.colour.stroke_width(2);
     match key.look {
-        Look::Line => area.draw(&PathElement::new(vec![(x, y), (x + KEY_PX, y)], stroke))?,
         Look::Dashes => {
             for part in 0..3 {
                 let from = x + part * 10;

@@ -66,6 +66,18 @@ fn axes() -> Vec<AxisCalibration> {
         .to_vec()
 }
 
+fn groups() -> Vec<BarGroup> {
+    let group = |(i, name): (usize, &str)| {
+        let bar = |j: usize| {
+            let value = 0.3 * (i + j) as f64;
+            let (driver, is_papers) = (j / 2, j % 2 == 0);
+            Bar { driver, value, interval: (!is_papers).then_some([0.8 * value, 1.3 * value + 0.1]), is_papers }
+        };
+        BarGroup { name: name.to_owned(), bars: (0..6).map(bar).collect() }
+    };
+    ["lot-a", "lot-b", "lot-c"].into_iter().enumerate().map(group).collect()
+}
+
 fn all() -> Vec<(&'static str, String)> {
     let ours = EtaSeries { name: "this run".to_owned(), points: vec![(1, 0.873), (2, 0.839), (3, 0.85)] };
     let paper = [(1, 0.44), (2, 0.64), (3, 0.65), (4, 0.74), (5, 0.9)];
@@ -75,6 +87,7 @@ fn all() -> Vec<(&'static str, String)> {
         ("rates", rates("Near-collisions, noise paper", &rows())),
         ("noise", rates_against_noise("Near-collisions against noise, all lots", &noise())),
         ("safe-ratios", safe_ratios("Safe ratio, noise paper", &ratios())),
+        ("bars", bars("Near-collisions", "per 100 m", &["DAgger", "tentacle", "vvf"], &groups())),
         ("calibration", calibration(&axes())),
     ]
 }
@@ -181,6 +194,7 @@ fn nothing_to_show_is_still_a_picture() {
         rates_against_noise("none", &[]),
         safe_ratios("none", &[]),
         calibration(&[]),
+        bars("none", "nothing", &[], &[]),
         safe_ratios("one & <all>", &[Distribution { name: "a < b & c".to_owned(), values: vec![], group: 0 }]),
     ] {
         Document::parse(&svg).unwrap();

@@ -21,52 +21,68 @@ impl LearningRound {
     }
 }
 
-/// Loss over optimiser steps, rounds after each other. Single steps are faint; their means over up to 240 stretches of
-/// equal length are drawn over them.
+/// Loss over optimiser steps, rounds after each other: of training above, as means over up to 240 stretches of equal
+/// length; of held-back samples below. Each has its own axis, because with β > 0 ([`policy::loss`]) they are different
+/// quantities.
 pub fn learning(rounds: &[LearningRound]) -> String {
     let steps: u32 = rounds.iter().map(LearningRound::steps).sum();
     let stretch = (steps / 240).max(1);
-    let (low, high) = loss_range(rounds, stretch);
-    let figure = Figure {
-        title: "Learning curves",
-        height_px: style::HEIGHT_PX,
-        x: Axis { label: "optimiser step", range: 0.0..f64::from(steps.max(1)), ticks: 6, labels: Labels::Numbers(0) },
+    let training: Vec<Vec<(u32, f64)>> = rounds.iter().map(|round| means(&round.training, stretch)).collect();
+    let validation: Vec<Vec<(u32, f64)>> = rounds.iter().map(|round| round.validation.clone()).collect();
+    let [above, below] = [("training loss", "", &training), ("validation loss", "optimiser step", &validation)]
+        .map(|(label, x_label, curves)| panel(label, x_label, steps, curves));
+    style::one_above_the_other("Learning curves", 2 * PANEL_PX, |[top, bottom]| {
+        above.draw(top, |chart| draw_rounds(chart, rounds, &training, 0))?;
+        below.draw(bottom, |chart| draw_rounds(chart, rounds, &validation, 1))
+    })
+}
+
+/// Height of one of two curves, pixels.
+const PANEL_PX: u32 = 250;
+
+fn panel<'a>(title: &'a str, x_label: &'a str, steps: u32, curves: &[Vec<(u32, f64)>]) -> Figure<'a> {
+    let (low, high) = loss_range(curves);
+    Figure {
+        title,
+        height_px: PANEL_PX,
+        x: Axis { label: x_label, range: 0.0..1.01 * f64::from(steps.max(1)), ticks: 6, labels: Labels::Numbers(0) },
         y: Axis {
-            label: "loss (negative log-likelihood)",
+            label: "nats per sample",
             range: low..high,
-            ticks: 6,
+            ticks: 5,
             labels: Labels::Numbers(style::decimals(high - low)),
         },
-        left_px: 62,
-        legend: vec![
-            Key { name: "training".to_owned(), colour: colour(0), look: Look::Line },
-            Key { name: "validation".to_owned(), colour: colour(1), look: Look::Marked(1) },
-        ],
-    };
-    figure.svg(|chart| {
-        let mut first = 0;
-        for (index, round) in rounds.iter().enumerate() {
-            let at = |&(step, loss): &(u32, f64)| (f64::from(first + step), loss.clamp(low, high));
-            let means: Vec<(f64, f64)> = means(&round.training, stretch).iter().map(at).collect();
-            style::line(chart, means, colour(0), 2)?;
-            let validation: Vec<(f64, f64)> = round.validation.iter().map(at).collect();
-            style::line(chart, validation.clone(), colour(1), 2)?;
-            if let Some(&last) = validation.last() {
-                style::marker(chart, 1, last, colour(1))?;
-            }
-            let x = f64::from(first);
-            if index > 0 {
-                style::dashes(chart, (x, low), (x, high), style::FAINT)?;
-            }
-            first += round.steps();
-            if rounds.len() > 1 {
-                // Where a round ends its curve is low.
-                let (at, pos) = ((f64::from(first), high), Pos::new(HPos::Right, VPos::Top));
-                style::label(chart, &format!("{} ", round.name), at, style::INK, pos)?;
-            }
+        left_px: 66,
+        legend: Vec::new(),
+    }
+}
+
+fn draw_rounds(
+    chart: &mut style::Chart<'_, '_>,
+    rounds: &[LearningRound],
+    curves: &[Vec<(u32, f64)>],
+    series: usize,
+) -> style::Drawn {
+    let (low, high) = loss_range(curves);
+    let mut first = 0;
+    for (index, (round, curve)) in rounds.iter().zip(curves).enumerate() {
+        let at = |&(step, loss): &(u32, f64)| (f64::from(first + step), loss.clamp(low, high));
+        let points: Vec<(f64, f64)> = curve.iter().map(at).collect();
+        if let Some(&last) = points.last() {
+            style::marker(chart, series, last, colour(series))?;
         }
-        Ok(())
-    })
+        style::line(chart, points, colour(series), 2)?;
+        if index > 0 {
+            style::dashes(chart, (f64::from(first), low), (f64::from(first), high), style::FAINT)?;
+        }
+        first += round.steps();
+        if rounds.len() > 1 {
+            // Where a round ends its curve is low.
+            let (at, pos) = ((f64::from(first), high), Pos::new(HPos::Right, VPos::Top));
+            style::label(chart, &format!("{} ", round.name), at, style::INK, pos)?;
+        }
+    }
+    Ok(())
 }
 
 /// Means of stretches of so many steps, each at its last step.
@@ -80,18 +96,15 @@ fn means(points: &[(u32, f64)], stretch: u32) -> Vec<(u32, f64)> {
 }
 
 /// From the lowest loss to the 99th percentile: the first few steps are many times higher than all others.
-fn loss_range(rounds: &[LearningRound], stretch: u32) -> (f64, f64) {
-    let training = rounds.iter().flat_map(|round| means(&round.training, stretch));
-    let validation = rounds.iter().flat_map(|round| round.validation.iter().copied());
-    let mut losses: Vec<f64> =
-        training.chain(validation).map(|(_, loss)| loss).filter(|loss| loss.is_finite()).collect();
+fn loss_range(curves: &[Vec<(u32, f64)>]) -> (f64, f64) {
+    let mut losses: Vec<f64> = curves.iter().flatten().map(|&(_, loss)| loss).filter(|loss| loss.is_finite()).collect();
     losses.sort_by(f64::total_cmp);
     let (Some(&low), Some(&high)) = (losses.first(), losses.get((losses.len().max(1) - 1) * 99 / 100)) else {
         return (0.0, 1.0);
     };
-    let room = 0.08 * (high - low).max(0.1);
+    let room = 0.1 * (high - low).max(0.02);
     // The names of the rounds stand at the top.
-    (low - room, high + 2.0 * room)
+    (low - room, high + 2.5 * room)
 }
 
 /// η̂ of one training.

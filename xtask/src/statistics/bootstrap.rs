@@ -6,14 +6,14 @@
 use super::poisson::CONFIDENCE;
 use rand::RngExt as _;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sim::seed::{RootSeed, Stream};
 
 /// Draws of the bootstrap (methods.md 8.3).
 pub const DRAWS: u64 = 10_000;
 
 /// Percentile interval of a statistic.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// Of the units as they are.
     pub estimate: f64,

@@ -69,6 +69,8 @@ pub struct Comparison {
     pub difference_per_100m: Option<Interval>,
     /// Safe ratio, paired bootstrap.
     pub difference_safe_ratio: Option<Interval>,
+    /// Steering reversals per 100 m driven, paired bootstrap.
+    pub difference_reversals_per_100m: Option<Interval>,
     /// Rates, exact if events are independent.
     pub ratio: RateRatio,
     /// Its p-value, adjusted for the number of drivers compared (Holm).
@@ -93,8 +95,8 @@ impl Ledger {
         let intervals = bootstrap(&pairs, &others, with, seed);
         let interval = |index: usize| intervals.as_ref().map(|intervals| intervals[index]);
         for (driver, standing) in standings.iter_mut().enumerate() {
-            standing.per_100m = interval(2 * driver);
-            standing.safe_ratio = interval(2 * driver + 1);
+            standing.per_100m = interval(STATISTICS * driver);
+            standing.safe_ratio = interval(STATISTICS * driver + 1);
         }
         let counts = |driver: usize| {
             let units = pairs.iter().map(|row| row[driver]);
@@ -106,12 +108,13 @@ impl Ledger {
         let ratios: Vec<RateRatio> = others.iter().map(|&other| RateRatio::new(counts(other), counts(with))).collect();
         let p_holm = holm(&ratios.iter().map(|ratio| ratio.p_value).collect::<Vec<_>>());
         let comparisons = others.iter().zip(ratios).zip(p_holm).enumerate().map(|(i, ((&driver, ratio), p_holm))| {
-            let first = 2 * (drivers + i);
+            let first = STATISTICS * (drivers + i);
             Comparison {
                 driver,
                 pairs: pairs.len(),
                 difference_per_100m: interval(first),
                 difference_safe_ratio: interval(first + 1),
+                difference_reversals_per_100m: interval(first + 2),
                 ratio,
                 p_holm,
             }
@@ -156,38 +159,50 @@ fn strata(pairs: &[Vec<Unit>]) -> impl Iterator<Item = Vec<&[Vec<Unit>]>> {
     })
 }
 
-/// Rate and safe ratio of every driver, then their differences of every other driver from `with`. `None` if nothing
-/// varies because every stratum has a single cluster.
+/// Resampled of every driver: near-collisions per 100 m, safe ratio, steering reversals per 100 m driven.
+const STATISTICS: usize = 3;
+/// Sums per driver that they are made of, behind the runs and the hundreds of metres that all share.
+const COLUMNS: usize = 4;
+const SHARED: usize = 2;
+
+/// The statistics of every driver, then their differences of every other driver from `with`. `None` if nothing varies
+/// because every stratum has a single cluster.
 fn bootstrap(pairs: &[Vec<Unit>], others: &[usize], with: usize, seed: RootSeed) -> Option<Vec<Interval>> {
     let drivers = pairs[0].len();
-    let mut units = Units::new(2 + 2 * drivers);
+    let columns = SHARED + COLUMNS * drivers;
+    let mut units = Units::new(columns);
     let mut largest = 0;
     for clusters in strata(pairs) {
         units.begin_stratum();
         largest = largest.max(clusters.len());
         for rows in clusters {
-            let mut sums = vec![0.0; 2 + 2 * drivers];
+            let mut sums = vec![0.0; columns];
             for row in rows {
                 sums[0] += 1.0;
                 sums[1] += f64::from(row[0].reference_m) / 100.0;
-                for (driver, unit) in row.iter().enumerate() {
-                    sums[2 + 2 * driver] += f64::from(unit.near_collisions);
-                    sums[3 + 2 * driver] += f64::from(unit.safe_ratio);
+                for (sums, unit) in sums[SHARED..].chunks_exact_mut(COLUMNS).zip(row) {
+                    sums[0] += f64::from(unit.near_collisions);
+                    sums[1] += f64::from(unit.safe_ratio);
+                    sums[2] += f64::from(unit.steering_reversals);
+                    sums[3] += f64::from(unit.driven_m) / 100.0;
                 }
             }
             units.push(&sums);
         }
     }
     let of_sums = |sums: &[f64], out: &mut [f64]| {
-        for driver in 0..drivers {
-            out[2 * driver] = sums[2 + 2 * driver] / sums[1];
-            out[2 * driver + 1] = sums[3 + 2 * driver] / sums[0];
+        let of_drivers = sums[SHARED..].chunks_exact(COLUMNS);
+        for (of_driver, out) in of_drivers.zip(out.chunks_exact_mut(STATISTICS)) {
+            out[0] = of_driver[0] / sums[1];
+            out[1] = of_driver[1] / sums[0];
+            out[2] = of_driver[2] / of_driver[3].max(f64::MIN_POSITIVE);
         }
         for (i, &other) in others.iter().enumerate() {
-            for which in 0..2 {
-                out[2 * (drivers + i) + which] = out[2 * other + which] - out[2 * with + which];
+            for which in 0..STATISTICS {
+                let of = |driver: usize| out[STATISTICS * driver + which];
+                out[STATISTICS * (drivers + i) + which] = of(other) - of(with);
             }
         }
     };
-    (largest > 1).then(|| units.percentile_intervals(seed, DRAWS, 2 * (drivers + others.len()), of_sums))
+    (largest > 1).then(|| units.percentile_intervals(seed, DRAWS, STATISTICS * (drivers + others.len()), of_sums))
 }

@@ -1,0 +1,123 @@
+//! The paper in a box, end to end: one report that loads nothing, resumed to the same bytes, and refusals.
+
+use crate::bench::{scratch, succeed, text, xtask};
+use crate::determinism::files;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Stages of a smoke run, in their order.
+const STAGES: [&str; 8] = [
+    "chains/s1-weighted",
+    "chains/s1-unweighted",
+    "chains/s1-any-below",
+    "chains/s1-tau-only",
+    "drives/reference",
+    "drives/unseen",
+    "drives/rules",
+    "watched",
+];
+
+/// Files by name; the folder of the run, which replay keys name, is written as RUN.
+fn contents(run: &Path) -> BTreeMap<String, Vec<u8>> {
+    let path = run.to_string_lossy().into_owned();
+    let normal = |bytes: Vec<u8>| match String::from_utf8(bytes) {
+        Ok(text) => text.replace(&path, "RUN").into_bytes(),
+        Err(binary) => binary.into_bytes(),
+    };
+    let is_kept = |name: &str| !name.ends_with("manifest.toml") && !name.ends_with("wall_time.jsonl");
+    files(run).into_iter().filter(|(name, _)| is_kept(name)).map(|(name, bytes)| (name, normal(bytes))).collect()
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let target = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            copy(&entry.path(), &target);
+        } else {
+            std::fs::copy(entry.path(), target).unwrap();
+        }
+    }
+}
+
+#[test]
+fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
+    let folder = scratch("reproduce");
+    let (whole, resumed) = (folder.join("whole"), folder.join("resumed"));
+    let printed = succeed(xtask().args(["reproduce", "--preset", "smoke", "--out"]).arg(&whole));
+    assert!(printed.contains("Cannot be told") && printed.contains("DAgger has fewer near-collisions"), "{printed}");
+    for stage in STAGES {
+        assert!(whole.join(stage).join("finished.toml").is_file(), "{stage}");
+    }
+    let cloned = |chain: &str| std::fs::read(whole.join(chain).join("round-00/model.safetensors")).unwrap();
+    assert_eq!(cloned(STAGES[0]), cloned(STAGES[3]), "behaviour cloning is shared");
+
+    let report = std::fs::read_to_string(whole.join("report.md")).unwrap();
+    for part in [
+        "## What holds here",
+        "Table 1",
+        "effect of the weight",
+        "paper: tentacle",
+        "### Decision rule",
+        "any below",
+        "### Calibration",
+        "within 1 σ",
+        "](figures/rates-beside-paper.svg)",
+        "](figures/safe-ratios-beside-paper.svg)",
+    ] {
+        assert!(report.contains(part), "{part} is missing from {report}");
+    }
+    let html = std::fs::read_to_string(whole.join("report.html")).unwrap();
+    for foreign in ["<script", "<link", "<iframe", "@import", "src=\"http", "href=\"http", "url(http", "src=\"figures"]
+    {
+        assert!(!html.contains(foreign), "the page loads something: {foreign}");
+    }
+    assert!(html.matches("<svg").count() >= 5, "figures are in the page");
+
+    // As Ctrl-C leaves it: in the middle of the third chain, nothing driven.
+    copy(&whole, &resumed);
+    for lost in ["finished.toml", "report.md", "report.html", "conclusions.csv", "chains/s1-any-below/finished.toml"] {
+        std::fs::remove_file(resumed.join(lost)).unwrap();
+    }
+    for lost in ["figures", "drives", "watched", "chains/s1-tau-only", "chains/s1-any-below/round-01"] {
+        std::fs::remove_dir_all(resumed.join(lost)).unwrap();
+    }
+    let printed_again = succeed(xtask().args(["--threads", "1", "reproduce", "--resume"]).arg(&resumed));
+    assert!(printed_again.contains("DAgger has fewer near-collisions"), "{printed_again}");
+    let (expected, found) = (contents(&whole), contents(&resumed));
+    assert_eq!(expected.keys().collect::<Vec<_>>(), found.keys().collect::<Vec<_>>());
+    for name in ["report.md", "report.html"] {
+        assert!(
+            std::fs::read(whole.join(name)).unwrap() == std::fs::read(resumed.join(name)).unwrap(),
+            "{name} differs"
+        );
+    }
+    for (name, bytes) in &expected {
+        assert!(*bytes == found[name], "{name} differs after resuming");
+    }
+
+    let again = xtask().args(["reproduce", "--resume"]).arg(&resumed).output().unwrap();
+    assert_eq!(again.status.code(), Some(2));
+    assert!(text(&again).1.contains("finished"), "{}", text(&again).1);
+}
+
+#[test]
+fn what_cannot_be_reproduced_is_refused_before_anything_is_written() {
+    let folder = scratch("reproduce-refused");
+    let out = folder.join("out").to_string_lossy().into_owned();
+    for (arguments, part) in [
+        (vec!["--unseen", "lot-q"], "lot-q"),
+        (vec!["--unseen", "train:2"], "trained or tuned on it"),
+        (vec!["--unseen", "lot-a"], "trained or tuned on it"),
+        (vec!["--tuned", "no/such/folder"], "no/such/folder"),
+        (vec!["--preset", "papier"], "papier"),
+        (vec!["--set", "dagger.etta=0.8"], "etta"),
+    ] {
+        let output = xtask().args(["reproduce", "--out", &out]).args(&arguments).output().unwrap();
+        let (stdout, stderr) = text(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}:\n{stdout}\n{stderr}");
+        assert!(stderr.contains(part), "{arguments:?} should mention {part:?}: {stderr}");
+        assert!(!Path::new(&out).exists(), "{arguments:?} leaves {out}");
+    }
+}
