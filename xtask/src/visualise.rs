@@ -262,24 +262,21 @@ impl Show<'_> {
         let header = target.header("drive", self.name.clone(), layout, focus_s);
         recorder.send(Message::Begin { recording, header });
         recorder.send(Message::Always { recording, marks: lot_marks(map, legend::DRIVE) });
-        for (contestant, root) in self.contestants.iter().zip(&roots) {
-            self.drive(contestant, root, recording, window, recorder);
+        for (index, root) in roots.iter().enumerate() {
+            self.drive(index, root, recording, window, recorder);
         }
         recorder.send(Message::End { recording });
         Ok(())
     }
 
-    fn drive(
-        &self,
-        contestant: &Contestant,
-        root: &str,
-        recording: u32,
-        window: Option<[u32; 2]>,
-        recorder: &mut Recorder,
-    ) {
+    fn drive(&self, index: usize, root: &str, recording: u32, window: Option<[u32; 2]>, recorder: &mut Recorder) {
+        let contestant = &self.contestants[index];
         let [first, last] = window.unwrap_or([0, u32::MAX]);
         let drive = Drive::new(root, self.episode, self.settings, Detail::Everything);
         let mut drive = drive.with_planner(contestant.planner(self.settings));
+        if self.contestants.len() > 1 {
+            drive = drive.among_others(index);
+        }
         recorder.send(Message::Always { recording, marks: drive.always() });
         let mut work = Work::begin(format!("driving: {}", contestant.name));
         let mut fleet = contestant.fleet(self.settings, 1);

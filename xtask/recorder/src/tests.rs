@@ -132,7 +132,7 @@ fn times(chunks: &[&Chunk]) -> (Vec<i64>, Vec<i64>) {
     let of = |timeline: &'static str| {
         chunks
             .iter()
-            .flat_map(|chunk| chunk.timelines()[&rerun::TimelineName::new(timeline)].times_raw().to_vec())
+            .flat_map(|chunk| chunk.timelines()[&rerun::TimelineName::from_static_str(timeline)].times_raw().to_vec())
             .collect()
     };
     (of("tick"), of("sim_time"))

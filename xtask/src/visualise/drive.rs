@@ -54,6 +54,9 @@ pub struct Drive {
     time_s: f64,
     driver: Option<Source>,
     expert_rule: Option<Rule>,
+    has_spread: bool,
+    /// Colour of its signals among those of other drivers; `None` if it is alone.
+    colour: Option<Colour>,
     /// Where the last outline of the swept path was drawn, and the way of the rear axle since.
     swept: Option<Vec2>,
     driven: Vec<Vec2>,
@@ -77,6 +80,8 @@ impl Drive {
             time_s: 0.0,
             driver: None,
             expert_rule: None,
+            has_spread: false,
+            colour: None,
             swept: None,
             driven: Vec::new(),
             failures: Vec::new(),
@@ -94,6 +99,12 @@ impl Drive {
     #[must_use]
     pub fn with_planner(self, planner: Option<Planner>) -> Self {
         Self { planner, ..self }
+    }
+
+    /// Tells its signals from those of other drivers in the same plot.
+    #[must_use]
+    pub fn among_others(self, index: usize) -> Self {
+        Self { colour: Some(colours::of_driver(index)), ..self }
     }
 
     /// Lets a frame pass that is not shown.
@@ -130,7 +141,6 @@ impl Drive {
             self.mark("car/wheels/front_right/tyre", Shape::Blocks(vec![wheel(0.0, 0.0)])),
             self.mark("car/safe_ring", Shape::Strips(vec![self.safe_ring()])),
             self.mark("car/seen_patch", Shape::Strips(vec![self.seen_patch()])),
-            self.mark("car/spread", Shape::Strips([1.0, 2.0].map(circle).to_vec())),
             self.mark("driver", Shape::States(driver_states())),
         ];
         marks.extend(self.signals());
@@ -313,9 +323,13 @@ impl Drive {
     }
 
     /// The ellipses around the network's point, and χ̂ as the decision rule compares it.
-    fn doubt(&self, point: LookAheadPoint, spread: Spread, marks: &mut Vec<Mark>) {
+    fn doubt(&mut self, point: LookAheadPoint, spread: Spread, marks: &mut Vec<Mark>) {
         let (at, scale) = ([point.ahead_m, point.left_m, 0.1], [spread.ahead_m, spread.left_m, 1.0]);
         marks.push(self.mark("car/spread", Shape::Pose(Pose { at, yaw_rad: 0.0, scale })));
+        // Not static: without a pose they would lie around the car.
+        if !std::mem::replace(&mut self.has_spread, true) {
+            marks.push(self.mark("car/spread/ellipses", Shape::Strips([1.0, 2.0].map(circle).to_vec())));
+        }
         let side_m = self.config.sensing.geometry.side_m;
         let sigma = [spread.left_m, spread.ahead_m].map(|metres| metres / side_m);
         let (doubt, chi) = match self.rule {
@@ -400,18 +414,22 @@ impl Drive {
 
     /// Names and colours of the signals.
     fn signals(&self) -> Vec<Mark> {
-        let signal = |entity: &str, name: &str, colour| {
-            let shape = Shape::Signal { name: name.to_owned(), colour, dotted: false };
-            self.mark(&format!("signals/{entity}"), shape)
+        let signal = |entity: &str, name: &str, colour: Colour| {
+            let (name, colour) = match self.colour {
+                Some(own) if colour == colours::FAINT => (format!("{name}: {}", self.root), colours::faded(own, 90)),
+                Some(own) if colour != colours::FAILURE => (format!("{name}: {}", self.root), own),
+                _ => (name.to_owned(), colour),
+            };
+            self.mark(&format!("signals/{entity}"), Shape::Signal { name, colour, dotted: false })
         };
         vec![
-            signal("steering/commanded", "commanded, °", colours::FAINT),
-            signal("steering/actual", "road wheels, ° (left +)", colours::RING),
-            signal("speed/commanded", "commanded, m/s", colours::FAINT),
-            signal("speed/actual", "speed, m/s", colours::RING),
-            signal("distance/clearance", "clearance, m", colours::PATCH),
-            signal("distance/safe_ratio", "safe ratio, 0…1", colours::RING),
-            signal("discrepancy/tau_hat", "τ̂: distance to the expert's point, image fraction", colours::NOVICE),
+            signal("steering/commanded", "commanded", colours::FAINT),
+            signal("steering/actual", "road wheels", colours::RING),
+            signal("speed/commanded", "commanded", colours::FAINT),
+            signal("speed/actual", "driven", colours::RING),
+            signal("distance/clearance", "clearance", colours::PATCH),
+            signal("distance/safe_ratio", "safe ratio", colours::RING),
+            signal("discrepancy/tau_hat", "τ̂", colours::NOVICE),
             signal("discrepancy/threshold", "τ", colours::FAILURE),
             signal("doubt/across", "χ̂ across", colours::NOVICE),
             signal("doubt/ahead", "χ̂ ahead", colours::PATCH),

@@ -31,7 +31,8 @@ pub fn of_drives(map: &Map, roots: &[String], detail: Detail) -> Layout {
         states.extend(roots.iter().map(|root| format!("{root}/expert_rule")));
     }
     let states = view("At the wheel, and the expert's rule", ViewKind::States, states);
-    Layout::Rows(vec![(3.4, top), (0.7, states.into()), (1.4, signals(roots, detail))])
+    let states_share = 0.35 + 0.35 * roots.len() as f32;
+    Layout::Rows(vec![(3.4, top), (states_share, states.into()), (1.4, signals(roots, detail))])
 }
 
 /// Tables of a run: entity and file.
@@ -131,13 +132,13 @@ fn signals(roots: &[String], detail: Detail) -> Layout {
         (1.0, Layout::from(view(name, ViewKind::Signals { range }, contents)))
     };
     let mut plots = vec![
-        plot("Steering, °", "steering", None),
+        plot("Steering, ° (left +)", "steering", None),
         plot("Speed, m/s", "speed", Some([0.0, 2.4])),
         plot("Clearance, m; safe ratio", "distance", Some([0.0, 1.5])),
     ];
     if detail == Detail::Everything {
-        plots.push(plot("τ̂, image fraction", "discrepancy", Some([0.0, 0.4])));
+        plots.push(plot("Distance to the expert τ̂, image fraction", "discrepancy", Some([0.0, 0.4])));
     }
-    plots.push(plot("χ̂, image fraction", "doubt", Some([0.0, 0.2])));
+    plots.push(plot("Doubt χ̂, image fraction", "doubt", Some([0.0, 0.2])));
     Layout::Columns(plots)
 }
