@@ -6,7 +6,7 @@
 
 use crate::cli::{Directions, EvaluateArgs};
 use crate::drivers::Contestant;
-use crate::failures::{Cause, Failure, Findings, Group, Sighting, Watch};
+use crate::failures::{Cause, Failure, Findings, Group, Sighting, Watch, is_again};
 use crate::interrupt::{self, Interrupted};
 use crate::lots::Lot;
 use crate::progress::{Stopwatch, Work};
@@ -229,7 +229,13 @@ pub fn measure(
                     ledger.add(level, driver, first_job + i, job, report);
                 }
                 for (episode, failure) in &failures {
-                    ledger.add_cause(level, driver, group.jobs[*episode].lot, failure.cause);
+                    ledger.add_cause(
+                        level,
+                        driver,
+                        group.jobs[*episode].lot,
+                        failure.cause,
+                        is_again(failure.findings.since_resume_m),
+                    );
                 }
                 is_complete = driven.reports.iter().all(Option::is_some);
                 if !is_complete {

@@ -7,7 +7,8 @@
 use super::explanation::{FieldSample, sample};
 use super::search::{Dimension, Span};
 use super::{
-    DISTANCE_FLOOR_M, Goal, Method, Nearest, Rig, Sight, head_for, khatib_repulsion, walk_along_field, within,
+    DISTANCE_FLOOR_M, Goal, Method, Nearest, Rig, Sight, WALK_AHEAD_MIN_M, head_for, khatib_repulsion,
+    walk_along_field, within,
 };
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
@@ -120,7 +121,8 @@ impl Policy for PotentialField {
     fn act(&mut self, observation: &Observation) -> Decision {
         let goal = self.sight.goal(self.params.goal, &observation.grid);
         let field = |point, nearest| self.params.field(nearest, goal - point);
-        head_for(walk_along_field(&observation.grid, &self.rig, self.params.range_m, self.params.walk_m, field))
+        let end = walk_along_field(&observation.grid, &self.rig, self.params.range_m, self.params.walk_m, field);
+        head_for(Vec2::new(end.x.max(WALK_AHEAD_MIN_M), end.y))
     }
 }
 
