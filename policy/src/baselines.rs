@@ -22,6 +22,7 @@
 pub mod apf;
 pub mod cvm;
 pub mod dwa;
+pub mod explanation;
 pub mod search;
 pub mod tentacle;
 pub mod vff;

@@ -4,7 +4,7 @@ use crate::run_dir;
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
 use expert::ScriptedExpert;
-use policy::baselines::{Baseline, Rig};
+use policy::baselines::{Baseline, Planner, Rig};
 use policy::checkpoint::Checkpoint;
 use policy::drivers::NetFleet;
 use rayon::prelude::*;
@@ -128,6 +128,14 @@ impl Contestant {
             );
         }
         Ok(())
+    }
+
+    /// A planner of its own that can be asked what it weighed; `None` for who is no planner.
+    pub fn planner(&self, settings: &Settings) -> Option<Planner> {
+        match &self.kind {
+            Kind::Baseline(baseline) => Some(baseline.planner(&Rig::of(&settings.episode))),
+            Kind::Expert | Kind::Network(_) => None,
+        }
     }
 
     /// Seats it in this many cars, which are driven in lock-step.

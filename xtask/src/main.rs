@@ -4,7 +4,9 @@ use clap::Parser as _;
 use std::num::NonZeroUsize;
 use std::process::ExitCode;
 use xtask::cli::{Cli, Command};
-use xtask::{evaluate, generate, interrupt, listing, metres, pixel_accuracy, render, reproduce, train, tune};
+use xtask::{
+    evaluate, generate, interrupt, listing, metres, pixel_accuracy, render, reproduce, train, tune, visualise,
+};
 
 // Training allocates and frees large buffers all the time: a quarter faster than with the system's allocator.
 #[global_allocator]
@@ -53,6 +55,7 @@ fn command(command: Command) -> anyhow::Result<()> {
         Command::Settings(args) => listing::settings(&args),
         Command::Lots => listing::lots(),
         Command::Drivers(args) => listing::drivers(&args),
+        Command::Visualise(args) => visualise::run(&args),
         Command::Tune(args) => tune::run(&args),
         Command::Render(args) => render::run(&args),
     }

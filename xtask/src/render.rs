@@ -159,6 +159,7 @@ fn driven_anew(args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
         layers: args.layers.clone(),
         out: None,
         overwrite: false,
+        ..EvaluateArgs::default()
     };
     let contestants = Contestant::parse_all(&args.drivers)?;
     let (settings, _) = evaluate::resolve(&evaluation)?;

@@ -6,13 +6,14 @@
 //! ρ < ρ_0 = 2.3 m, 0 elsewhere. F̂ is the repulsion squashed to |F̂| < 1 by F/(1 + |F|), lest 1/ρ³ swamp everything
 //! (*chosen*). The look-ahead point is where a walk along V from the front bumper ends.
 
+use super::explanation::{FieldSample, sample};
 use super::search::{Dimension, Span};
 use super::{DISTANCE_FLOOR_M, Method, Nearest, Rig, WALK_AHEAD_MIN_M};
 use super::{head_for, khatib_repulsion, walk_along_field, within};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
-use sim::sensing::Observation;
+use sim::sensing::{Observation, OccupancyGrid};
 use std::sync::Arc;
 
 /// Parameters of the velocity vector field.
@@ -132,6 +133,13 @@ pub struct VelocityVectorField {
     rig: Arc<Rig>,
 }
 
+impl VelocityVectorField {
+    /// The field over the patch.
+    pub(super) fn sampled(&self, grid: &OccupancyGrid) -> Vec<FieldSample> {
+        sample(grid, &self.rig, self.params.range_m, |_, nearest| self.params.field(nearest))
+    }
+}
+
 impl Policy for VelocityVectorField {
     fn act(&mut self, observation: &Observation) -> Decision {
         let Params { range_m, walk_m, ahead_min_m, .. } = self.params;
@@ -145,7 +153,6 @@ impl Policy for VelocityVectorField {
 mod tests {
     use super::super::tests::{grid_with, rig};
     use super::*;
-    use sim::sensing::OccupancyGrid;
 
     /// At ρ = 1 m to the left: F = (1 − 1/2.3)/1 = .5652, squashed .3611 to the right; forward .5·(1 − .5).
     #[test]
