@@ -54,6 +54,41 @@ fn a_refused_evaluation_writes_nothing() {
     }
 }
 
+/// Settings that do not exist or make no sense, and folders that cannot be made: named with their place, and nothing is
+/// left behind.
+#[test]
+fn settings_and_folders_that_cannot_be_used_leave_nothing() {
+    let folder = scratch("bad-settings");
+    let (out, config, file) = (folder.join("out"), folder.join("mine.toml"), folder.join("file"));
+    std::fs::write(&config, "seed = 2\n\n[episode.metrics]\nnear_colision_m = 0.4\n").unwrap();
+    std::fs::write(&file, "no folder").unwrap();
+    let name = |path: &Path| path.to_string_lossy().into_owned();
+    let (out, config, below_file) = (name(&out), name(&config), name(&file.join("out")));
+    for command in [&["evaluate", "--driver", "expert"] as &[&str], &["train-dagger"], &["tune"]] {
+        for (arguments, expected) in [
+            (
+                &["--out", &out, "--config", &config] as &[&str],
+                &["mine.toml:4", "near_colision_m", "near_collision_m"] as &[&str],
+            ),
+            (&["--out", &out, "--set", "nokey"], &["--set nokey", "key and a value"]),
+            (
+                &["--out", &out, "--set", "episode.metrics.near_collision_m=-1"],
+                &["near_collision_m = -1", "more than 0"],
+            ),
+            (&["--out", &below_file], &["file/out: cannot be created", "--out"]),
+        ] {
+            refuses(&[command, arguments].concat(), expected);
+            assert!(!Path::new(&out).exists(), "{command:?} {arguments:?} leaves {out}");
+        }
+    }
+    refuses(&["tune", "--planner", "nobody", "--out", &out], &["nobody", "tentacle"]);
+    refuses(&["tune", "--budget", "0", "--out", &out], &["--budget is 0"]);
+    refuses(&["evaluate", "--driver", "tuned:nobody", "--out", &out], &["tuned:nobody", "tuned:vvf"]);
+    refuses(&["evaluate", "--driver", "expert", "--lots", "test:0", "--out", &out], &["test:0", "1 to 1000000"]);
+    refuses(&["drivers", "nobody"], &["nobody", "tentacle"]);
+    assert!(!Path::new(&out).exists());
+}
+
 #[test]
 fn metres_are_calculated() {
     let printed = succeed(xtask().args(["metres", "--below", "0.1", "--between", "1,0"]));
@@ -146,7 +181,9 @@ fn a_checkpoint_of_another_architecture_is_refused() {
     let changed = std::fs::read_to_string(&model).unwrap().replacen("hidden = 64", "hidden = 128", 1);
     std::fs::write(&model, changed).unwrap();
     let net = format!("net:{}", run.join("round-00").display());
-    refuses(&["evaluate", "--driver", &net, "--lots", "lot-b"], &["model.safetensors", "fc1"]);
+    let out = folder.join("out").to_string_lossy().into_owned();
+    refuses(&["evaluate", "--driver", &net, "--lots", "lot-b", "--out", &out], &["model.safetensors", "fc1"]);
+    assert!(!Path::new(&out).exists(), "nothing is written");
 }
 
 #[test]
@@ -192,7 +229,7 @@ fn a_run_can_be_evaluated_later_and_generated_lots_can_be_driven() {
     assert_eq!(read("wall_time.jsonl").lines().count(), 2);
     is_a_report(&read("report.html"), &["Near-collisions, noise paper", "Safe ratio of every run", "Configuration"]);
     let html = std::fs::read_to_string(run.join("report.html")).unwrap();
-    is_a_report(&html, &["Learning curves", "predicted σ", "DAgger iteration", "Configuration"]);
+    is_a_report(&html, &["Training loss", "predicted σ", "Configuration"]);
     assert!(run.join("round-00/learning.csv").is_file());
 }
 

@@ -45,6 +45,31 @@ fn parameters_come_from_a_file_or_are_refused() {
     assert_eq!(runs[0]["metrics"], runs[1]["metrics"]);
 }
 
+/// What ships as `tuned:NAME` was found on lot a and training lots only, with the same budget for every planner, and is no
+/// worse there than the planner it started from.
+#[test]
+fn tuned_planners_ship_with_what_found_them() {
+    let listed = succeed(xtask().arg("drivers"));
+    let mut budgets = Vec::new();
+    for name in ["tentacle", "vvf", "dwa", "cvm", "apf", "vff"] {
+        let spec = format!("tuned:{name}");
+        assert!(listed.lines().any(|line| line.starts_with(&spec)), "{spec} is not listed:\n{listed}");
+        let file: toml::Table = succeed(xtask().args(["drivers", &spec])).parse().unwrap();
+        assert_eq!(file["planner"].as_str(), Some(name));
+        let search = &file["search"];
+        let failures = |when: &str| search[when]["failures_per_100m"].as_float().unwrap();
+        assert!(failures("after") <= failures("before"), "{spec}");
+        let lots: Vec<&str> = search["lots"].as_array().unwrap().iter().map(|lot| lot.as_str().unwrap()).collect();
+        assert!(lots.iter().all(|lot| *lot == "lot-a" || lot.starts_with("train:")), "{spec}: {lots:?}");
+        let trials = (search["candidates"].as_integer(), search["trials"].as_integer(), search["seed"].as_integer());
+        budgets.push((lots.len(), trials, search["before"]["reference_m"].as_float()));
+    }
+    assert!(budgets.windows(2).all(|two| two[0] == two[1]), "every planner has the same budget: {budgets:?}");
+    let out = scratch("tuned").join("out");
+    let drive = ["evaluate", "--lots", "lot-a", "--trials", "1", "--directions", "forward", "--noise", "clean"];
+    succeed(xtask().args(drive).args(["--driver", "tuned:tentacle", "--out"]).arg(out));
+}
+
 /// Tuning writes parameters that drive, is no worse than where it started, and is the same for 1 and 2 threads.
 #[test]
 fn tuning_is_repeatable_and_writes_what_can_be_driven() {

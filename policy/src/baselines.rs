@@ -22,6 +22,7 @@
 pub mod apf;
 pub mod cvm;
 pub mod dwa;
+pub mod explanation;
 pub mod search;
 pub mod tentacle;
 pub mod vff;
@@ -185,12 +186,17 @@ const DISTANCE_FLOOR_M: f32 = 0.24;
 const WALK_STEP_M: f32 = 0.10;
 /// A walk ends this far before an occupied cell, metres (methods.md 7.1, *chosen*).
 const WALK_STOPS_M: f32 = 0.2;
+/// The look-ahead point that a walk ends with lies at least this far ahead of the rear axle, metres (methods.md 7.1,
+/// *chosen*).
+const WALK_AHEAD_MIN_M: f32 = 2.3;
 /// A field weaker than this has no direction: the walk goes forward (methods.md 7.1, *chosen*).
 const FIELD_MIN: f32 = 0.05;
 
 /// "The look-ahead point is searched by descending along the gradient of the field's direction from the front of the
 /// vehicle" (paper). Steps along the direction of `field(point, nearest occupied cell within range_m)` for `length_m`
-/// at most; ends before it would leave the patch, fall behind the bumper or come too near to an occupied cell.
+/// at most; ends before it would leave the patch ahead or sideways, fall behind the rear axle or come too near to an
+/// occupied cell. It may fall behind the bumper: a wall just ahead pushes it back and aside, and a walk that ended there
+/// would answer "straight on", into the wall.
 fn walk_along_field(
     grid: &OccupancyGrid,
     rig: &Rig,
@@ -198,14 +204,13 @@ fn walk_along_field(
     length_m: f32,
     field: impl Fn(Vec2, Option<Nearest>) -> Vec2,
 ) -> Vec2 {
-    let start = rig.bumper();
     let half_m = 0.5 * rig.geometry.side_m;
-    let mut point = start;
+    let mut point = rig.bumper();
     for _ in 0..(length_m / WALK_STEP_M).round() as u32 {
         let force = field(point, nearest_occupied(grid, &rig.geometry, point, range_m));
         let direction = if force.length() < FIELD_MIN { Vec2::X } else { force.normalize_or(Vec2::X) };
         let next = point + WALK_STEP_M * direction;
-        let is_outside = next.x < start.x || next.x > rig.geometry.far_edge_ahead_m() || next.y.abs() > half_m;
+        let is_outside = next.x < 0.0 || next.x > rig.geometry.far_edge_ahead_m() || next.y.abs() > half_m;
         if is_outside || nearest_occupied(grid, &rig.geometry, next, WALK_STOPS_M).is_some() {
             break;
         }

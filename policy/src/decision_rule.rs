@@ -89,8 +89,8 @@ impl DecisionRule {
 }
 
 impl ChiOn {
-    /// The two values that are compared.
-    fn of(self, [u, w]: [f32; 2]) -> [f32; 2] {
+    /// The two values that are compared, of σ across and ahead in image fractions.
+    pub fn of(self, [u, w]: [f32; 2]) -> [f32; 2] {
         match self {
             Self::StdPerAxis => [u, w],
             Self::StdNorm => [u.hypot(w); 2],

@@ -287,6 +287,23 @@ mod tests {
         assert!(n.abs_diff(4634) < 4634 / 50, "{n} pixels");
     }
 
+    /// Ahead of the bumper: 1.86·1 + π·1²/2 = 3.43 m² = 953 pixels.
+    #[test]
+    fn the_front_of_the_ring_is_a_rectangle_and_two_quarter_discs() {
+        let config = MetricsConfig { safe_range: SafeRange::FrontOnly, ..MetricsConfig::paper() };
+        let n = SafeRing::new(&VehicleParams::hyundai_hg300(), &config, 0.06).n_pixels();
+        assert!(n.abs_diff(953) < 953 / 30, "{n} pixels");
+    }
+
+    /// 3 in 200 m and 1 in 300 m are 0.8 per 100 m, not the mean of 1.5 and 0.33; 30 m in 20 s are 1.5 m/s.
+    #[test]
+    fn rates_pool_events_and_metres() {
+        let run = |near_collisions, reference_m| EpisodeMetrics { near_collisions, reference_m, ..Default::default() };
+        assert!((near_collisions_per_100m([&run(3, 200.0), &run(1, 300.0)]) - 0.8).abs() < 1e-9);
+        let moved = EpisodeMetrics { driven_m: 30.0, duration_s: 20.0, ..EpisodeMetrics::default() };
+        assert_eq!(moved.mean_speed_mps(), 1.5);
+    }
+
     /// A centred car in a straight lane: methods.md 8.2 lists .53, .69, .84, 1.0 for 2.6, 3.0, 3.4, ≥ 4.0 m.
     #[test]
     fn straight_lanes_give_the_derived_ratios() {

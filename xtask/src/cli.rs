@@ -61,6 +61,9 @@ pub enum Command {
     Lots,
     /// Lists the drivers that can be named, or prints the parameters of one planner as a file.
     Drivers(DriversArgs),
+    /// Records lots, drives and near-collisions, to be looked at in Rerun's viewer.
+    #[command(after_help = VISUALISE_EXAMPLES)]
+    Visualise(VisualiseArgs),
     /// Searches parameters of the model-based planners on lot a and training lots, the same way for each.
     #[command(after_help = TUNE_EXAMPLES)]
     Tune(TuneArgs),
@@ -123,6 +126,10 @@ pub struct TrainArgs {
     /// Continues an interrupted run with its own settings, to the same result.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "config", "overrides", "seed", "out"])]
     pub resume: Option<PathBuf>,
+    /// Records the learning curves, the first N runs of every round and of every driver of the check at the end for
+    /// Rerun's viewer, into the folder of the run.
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1")]
+    pub record: Option<usize>,
     /// Trains only: no closed-loop check at the end.
     #[arg(long)]
     pub no_eval: bool,
@@ -136,7 +143,7 @@ Examples:
   cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1 --noise sweep --lots test:100";
 
 /// Arguments of `evaluate`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub struct EvaluateArgs {
     /// Who drives; may be repeated. See `cargo xtask drivers`. The settings of the first `run:DIR` are used unless
     /// `--config` or `--preset` names others.
@@ -164,6 +171,9 @@ pub struct EvaluateArgs {
     /// Settings.
     #[command(flatten)]
     pub layers: LayerArgs,
+    /// Records the first N runs of every driver for Rerun's viewer, into the folder of the results.
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1")]
+    pub record: Option<usize>,
     /// Folder of the results [default: runs/evaluate-PRESET-sSEED, the next free one].
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -340,6 +350,126 @@ pub struct DriversArgs {
     /// A planner, whose parameters are printed as the file that `NAME:FILE` reads.
     #[arg(value_name = "PLANNER")]
     pub planner: Option<String>,
+}
+
+const VISUALISE_EXAMPLES: &str = "\
+Examples:
+  cargo xtask visualise lot lot-b
+  cargo xtask visualise episode --driver expert --driver run:runs/train-dagger-default-s1 --lot lot-b
+  cargo xtask visualise replay run:runs/train-dagger-default-s1@lot-b@reverse@3@paper@1@842
+  cargo xtask visualise run runs/train-dagger-default-s1
+  cargo xtask visualise failures runs/evaluate-default-s1 --limit 5
+
+The viewer that fits: pip install rerun-sdk==0.36.3, then: rerun recordings/*.rrd
+The first time, the recorder is built (about 8 minutes on two cores).";
+
+/// Arguments of `visualise`.
+#[derive(Debug, Clone, Args)]
+pub struct VisualiseArgs {
+    /// What to look at.
+    #[command(subcommand)]
+    pub what: What,
+    /// Where it goes.
+    #[command(flatten)]
+    pub sink: SinkArgs,
+}
+
+/// Where recordings go.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Recording")]
+pub struct SinkArgs {
+    /// File to write [default: recordings/NAME.rrd].
+    #[arg(long, global = true, value_name = "FILE.rrd", conflicts_with_all = ["spawn", "connect"])]
+    pub out: Option<PathBuf>,
+    /// Shows it in a viewer of this machine instead, started if none runs.
+    #[arg(long, global = true, conflicts_with = "connect")]
+    pub spawn: bool,
+    /// Shows it in a viewer that runs already [default: on this machine].
+    #[arg(long, global = true, value_name = "URL", num_args = 0..=1, default_missing_value = "")]
+    pub connect: Option<String>,
+}
+
+/// What can be looked at.
+#[derive(Debug, Clone, Subcommand)]
+pub enum What {
+    /// A lot.
+    Lot(VisualiseLotArgs),
+    /// An episode of an evaluation, driven by one driver, or by several side by side.
+    Episode(EpisodeArgs),
+    /// The run of a replay key, around its moment.
+    Replay(ReplayArgs),
+    /// A training: loss, validation, learning rate, and what every round brought.
+    Run(RunArgs),
+    /// Near-collisions of an evaluation, a recording each.
+    Failures(FailuresArgs),
+}
+
+/// Arguments of `visualise lot`.
+#[derive(Debug, Clone, Args)]
+pub struct VisualiseLotArgs {
+    /// The lot; see `cargo xtask lots`.
+    #[arg(value_name = "SPEC")]
+    pub lot: String,
+    /// Seed of the obstacles, as in `generate`.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// Arguments of `visualise episode`: obstacles and noise are those of the same trial in `evaluate`.
+#[derive(Debug, Clone, Args)]
+pub struct EpisodeArgs {
+    /// Who drives; may be repeated. See `cargo xtask drivers`.
+    #[arg(long = "driver", value_name = "SPEC", required = true, num_args = 1..)]
+    pub drivers: Vec<String>,
+    /// The lot; see `cargo xtask lots`.
+    #[arg(long, value_name = "SPEC", default_value = "lot-a")]
+    pub lot: String,
+    /// Which trial.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub trial: u32,
+    /// From finish to start.
+    #[arg(long)]
+    pub reverse: bool,
+    /// What is seen wrongly: clean, paper, hard, lot or multiples of paper [default: the first of evaluation.noise].
+    #[arg(long, value_name = "LEVEL")]
+    pub noise: Option<String>,
+    /// Seed of the evaluation.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// Settings.
+    #[command(flatten)]
+    pub layers: LayerArgs,
+}
+
+/// Arguments of `visualise replay`.
+#[derive(Debug, Clone, Args)]
+pub struct ReplayArgs {
+    /// From `failures.md`, `failures.jsonl` or `runs.jsonl`. Unless a `run:` drives, name the settings it was driven
+    /// with: `--config RUN/settings.toml`.
+    #[arg(value_name = "KEY")]
+    pub key: String,
+    /// Settings.
+    #[command(flatten)]
+    pub layers: LayerArgs,
+}
+
+/// Arguments of `visualise run`.
+#[derive(Debug, Clone, Args)]
+pub struct RunArgs {
+    /// Folder of a training.
+    #[arg(value_name = "DIR")]
+    pub run: PathBuf,
+}
+
+/// Arguments of `visualise failures`.
+#[derive(Debug, Clone, Args)]
+pub struct FailuresArgs {
+    /// Folder of an evaluation, or of a training with one.
+    #[arg(value_name = "DIR")]
+    pub run: PathBuf,
+    /// Near-collisions to record, from the top of the list.
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    pub limit: usize,
 }
 
 const TUNE_EXAMPLES: &str = "\

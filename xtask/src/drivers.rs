@@ -4,13 +4,23 @@ use crate::run_dir;
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
 use expert::ScriptedExpert;
-use policy::baselines::{Baseline, Rig};
+use policy::baselines::{Baseline, Planner, Rig};
 use policy::checkpoint::Checkpoint;
 use policy::drivers::NetFleet;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Driver, Fleet, Seat, SensorsOnly};
 use std::path::{Path, PathBuf};
+
+/// The planners with the parameters that `cargo xtask tune` found: how they are named, and the file it wrote.
+const TUNED: [(&str, &str); 6] = [
+    ("tuned:tentacle", include_str!("../tuned/tentacle.toml")),
+    ("tuned:vvf", include_str!("../tuned/vvf.toml")),
+    ("tuned:dwa", include_str!("../tuned/dwa.toml")),
+    ("tuned:cvm", include_str!("../tuned/cvm.toml")),
+    ("tuned:apf", include_str!("../tuned/apf.toml")),
+    ("tuned:vff", include_str!("../tuned/vff.toml")),
+];
 
 /// Ways to name a driver: how it is written, what it means.
 pub fn specs() -> Vec<(&'static str, &'static str)> {
@@ -21,6 +31,8 @@ pub fn specs() -> Vec<(&'static str, &'static str)> {
         ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
     ];
     specs.extend(Baseline::all().iter().map(|baseline| (baseline.name(), baseline.about())));
+    specs
+        .extend(TUNED.map(|(spec, _)| (spec, "the same with the parameters found by cargo xtask tune (xtask/tuned/)")));
     specs
         .push(("NAME:FILE", "one of these planners with the parameters in a TOML file (cargo xtask tune writes them)"));
     specs
@@ -118,6 +130,14 @@ impl Contestant {
         Ok(())
     }
 
+    /// A planner of its own that can be asked what it weighed; `None` for who is no planner.
+    pub fn planner(&self, settings: &Settings) -> Option<Planner> {
+        match &self.kind {
+            Kind::Baseline(baseline) => Some(baseline.planner(&Rig::of(&settings.episode))),
+            Kind::Expert | Kind::Network(_) => None,
+        }
+    }
+
     /// Seats it in this many cars, which are driven in lock-step.
     pub fn fleet(&self, settings: &Settings, cars: usize) -> Box<dyn Fleet> {
         match &self.kind {
@@ -144,8 +164,19 @@ pub struct PlannerFile {
     pub search: Option<toml::Table>,
 }
 
-/// The planner that `NAME` or `NAME:FILE` names; `None` if no planner has that name.
+/// The file of a planner that ships with tuned parameters, by its spec.
+pub fn tuned_file(spec: &str) -> Option<&'static str> {
+    TUNED.iter().find(|(name, _)| *name == spec).map(|(_, text)| *text)
+}
+
+/// The planner that `NAME`, `tuned:NAME` or `NAME:FILE` names; `None` if no planner has that name.
 fn baseline(spec: &str) -> anyhow::Result<Option<Baseline>> {
+    if let Some(text) = tuned_file(spec) {
+        let name = spec.trim_start_matches("tuned:");
+        let baseline = Baseline::all().into_iter().find(|baseline| baseline.name() == name);
+        let baseline = baseline.with_context(|| format!("no planner {name:?}"))?;
+        return with_parameters(&baseline, text).with_context(|| format!("xtask/tuned/{name}.toml")).map(Some);
+    }
     let (name, file) = spec.split_once(':').map_or((spec, None), |(name, file)| (name, Some(Path::new(file))));
     let Some(baseline) = Baseline::all().into_iter().find(|baseline| baseline.name() == name) else {
         return Ok(None);
@@ -154,14 +185,18 @@ fn baseline(spec: &str) -> anyhow::Result<Option<Baseline>> {
     let text = std::fs::read_to_string(path).with_context(|| {
         format!("{}: cannot be read; cargo xtask drivers {name} prints such a file", path.display())
     })?;
-    let read = || {
-        let file: PlannerFile = toml::from_str(&text)?;
-        ensure!(file.planner == name, "these are parameters of {:?}, but {name:?} is asked for", file.planner);
-        let changed = baseline.with_parameters(file.parameters).context("parameters")?;
-        changed.check().map_err(anyhow::Error::msg).context("parameters")?;
-        Ok(changed)
-    };
-    read().with_context(|| format!("{}: cargo xtask drivers {name} prints a complete file", path.display())).map(Some)
+    let read = with_parameters(&baseline, &text);
+    read.with_context(|| format!("{}: cargo xtask drivers {name} prints a complete file", path.display())).map(Some)
+}
+
+/// A planner with the parameters in the text of a [`PlannerFile`].
+fn with_parameters(baseline: &Baseline, text: &str) -> anyhow::Result<Baseline> {
+    let file: PlannerFile = toml::from_str(text)?;
+    let name = baseline.name();
+    ensure!(file.planner == name, "these are parameters of {:?}, but {name:?} is asked for", file.planner);
+    let changed = baseline.with_parameters(file.parameters).context("parameters")?;
+    changed.check().map_err(anyhow::Error::msg).context("parameters")?;
+    Ok(changed)
 }
 
 /// A fresh expert.

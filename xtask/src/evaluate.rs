@@ -6,21 +6,24 @@
 
 use crate::cli::{Directions, EvaluateArgs};
 use crate::drivers::Contestant;
-use crate::failures::{Cause, Failure, Findings, Group, Sighting, Watch};
+use crate::failures::{Cause, Failure, Findings, Group, Sighting, Watch, is_again};
 use crate::interrupt::{self, Interrupted};
 use crate::lots::Lot;
 use crate::progress::{Stopwatch, Work};
 use crate::replay_key::ReplayKey;
-use crate::report::{RunLine, Summary, WallTimeLine};
+use crate::report::{self, RunLine, Summary, WallTimeLine};
 use crate::run_dir::{self, Place, RunDir};
 use crate::run_report;
 use crate::settings::{NoiseChoice, Settings};
 use crate::summary::Ledger;
 use crate::trials::{self, Job, Purpose};
+use crate::visualise;
+use crate::visualise::drive::Detail;
+use crate::visualise::live::{Live, View};
 use anyhow::{Context as _, ensure};
 use serde::Serialize;
 use sim::batch::run_lockstep_until;
-use sim::episode::{EpisodeReport, Event};
+use sim::episode::{Episode, EpisodeReport, Event};
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -97,7 +100,12 @@ pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     };
     let run = RunDir::create(&place, &settings)?;
     let mut stopwatch = Stopwatch::default();
-    measure(&plan, &run, &mut stopwatch)?;
+    let mut live = args.record.map(|runs| Live::start(run.path(), runs)).transpose()?;
+    let measured = measure(&plan, &run, live.as_mut(), &mut stopwatch);
+    if let Some(live) = live {
+        live.finish();
+    }
+    measured?;
     run_report::write(run.path(), &mut stopwatch)?;
     run.finish(&Finished { drivers: &args.drivers })?;
     eprintln!(
@@ -190,7 +198,12 @@ fn noise_levels(names: &[String]) -> anyhow::Result<Vec<NoiseChoice>> {
 ///
 /// # Errors
 /// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is written.
-pub fn measure(plan: &Plan<'_>, run: &RunDir, stopwatch: &mut Stopwatch) -> anyhow::Result<()> {
+pub fn measure(
+    plan: &Plan<'_>,
+    run: &RunDir,
+    mut live: Option<&mut Live>,
+    stopwatch: &mut Stopwatch,
+) -> anyhow::Result<()> {
     let evaluation = &plan.settings.evaluation;
     let mut ledger = Ledger::new(plan);
     let mut lines = Lines::create(run)?;
@@ -209,14 +222,20 @@ pub fn measure(plan: &Plan<'_>, run: &RunDir, stopwatch: &mut Stopwatch) -> anyh
             for (driver, entry) in plan.entries.iter().enumerate() {
                 let contestant = &entry.contestant;
                 let group = Group { settings: plan.settings, contestant, jobs: &group, maps: &maps, noise };
-                let driven = drive(&group, &mut track);
+                let driven = drive(&group, live.as_deref_mut(), &mut track);
                 let failures = failures(&group, entry, evaluation.seed, &driven);
                 lines.add(&group, entry, evaluation.seed, &driven, &failures)?;
                 for (i, (job, report)) in driven.finished(&group) {
                     ledger.add(level, driver, first_job + i, job, report);
                 }
                 for (episode, failure) in &failures {
-                    ledger.add_cause(level, driver, group.jobs[*episode].lot, failure.cause);
+                    ledger.add_cause(
+                        level,
+                        driver,
+                        group.jobs[*episode].lot,
+                        failure.cause,
+                        is_again(failure.findings.since_resume_m),
+                    );
                 }
                 is_complete = driven.reports.iter().all(Option::is_some);
                 if !is_complete {
@@ -290,15 +309,21 @@ fn replay_key(entry: &Entry, job: &Job<'_>, noise: NoiseChoice, seed: RootSeed, 
     ReplayKey { driver, lot, direction: job.direction, trial: job.trial, noise, seed, tick }
 }
 
-fn drive(group: &Group<'_>, track: &mut Track) -> Driven {
+fn drive(group: &Group<'_>, mut live: Option<&mut Live>, track: &mut Track) -> Driven {
     let started = Instant::now();
     let episodes = trials::start(group.jobs, group.maps, group.settings, group.noise);
+    if let Some(live) = &mut live {
+        record(group, &episodes, live);
+    }
     let mut fleet = group.contestant.fleet(group.settings, episodes.len());
     let mut watch = Watch::new(episodes.len(), &group.settings.episode);
     let mut shares = vec![0.0_f32; episodes.len()];
     let mut frames = 0_u32;
     let reports = run_lockstep_until(episodes, &mut *fleet, &mut |episode, frame| {
         watch.frame(episode, frame);
+        if let Some(live) = &mut live {
+            live.frame(episode, frame);
+        }
         track.near_collisions += u32::from(matches!(frame.event, Event::NearCollision { .. }));
         shares[episode] = frame.progress_m / group.maps[episode].path().length_m();
         frames += 1;
@@ -313,6 +338,16 @@ fn drive(group: &Group<'_>, track: &mut Track) -> Driven {
     });
     track.done += reports.iter().flatten().count();
     Driven { reports, sightings: watch.into_sightings(), wall_s: started.elapsed().as_secs_f64() }
+}
+
+/// Records the first runs of this driver at this noise level.
+fn record(group: &Group<'_>, episodes: &[Episode], live: &mut Live) {
+    let Group { settings, contestant, jobs, noise, .. } = group;
+    let name = |job: &Job<'_>| format!("{}, {}, trial {}", job.lot.name(), report::name(job.direction), job.trial);
+    let names: Vec<String> = jobs.iter().map(name).collect();
+    let root = visualise::root_of(&contestant.name);
+    let view = View { root: &root, detail: Detail::Frames, novice: None };
+    live.begin(&format!("{}, {noise}", contestant.name), settings, episodes, &names, &view);
 }
 
 /// How far the whole evaluation is.

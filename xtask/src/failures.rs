@@ -9,6 +9,9 @@
 //! | `narrow_passage` | within [`NEAR_M`] along the route the free width across it is less than the body and the near-collision distance on both sides |
 //! | `corner` | the route turns by [`CORNER_DEG`] or more within [`NEAR_M`] of the place |
 //! | `other` | none of these |
+//!
+//! Apart from its cause, a near-collision within [`NEAR_M`] of route after a resume is marked as one more at the same
+//! place: the car was put back where it had failed, and failed again.
 
 use crate::drivers::Contestant;
 use crate::report;
@@ -142,6 +145,14 @@ pub struct Findings {
     pub free_width_m: f32,
     /// Largest change of the route's heading nearby, degrees.
     pub turn_deg: f32,
+    /// Route since the car was last put back on it, metres; `None` before the first time.
+    pub since_resume_m: Option<f32>,
+}
+
+/// Whether a near-collision happened where the car had just been put back, so much route before: one more at the same
+/// place.
+pub fn is_again(since_resume_m: Option<f32>) -> bool {
+    since_resume_m.is_some_and(|since_m| since_m < NEAR_M)
 }
 
 impl Findings {
@@ -176,6 +187,7 @@ pub struct Sighting {
     /// Speed at the last observation, m/s.
     pub speed_mps: f32,
     reversals_before: u32,
+    since_resume_m: Option<f32>,
     /// State and progress from which the clean grid is tried, and how long before.
     earlier: (VehicleState, f32),
     earlier_s: f32,
@@ -186,6 +198,8 @@ pub struct Sighting {
 pub struct Watch {
     control_period_s: f32,
     recent: Vec<VecDeque<(VehicleState, f32)>>,
+    /// Where along the route the car was last put back, metres.
+    resumed_at_m: Vec<Option<f32>>,
     sightings: Vec<Sighting>,
 }
 
@@ -194,12 +208,20 @@ impl Watch {
     pub fn new(episodes: usize, config: &EpisodeConfig) -> Self {
         let control_period_s = config.control_period_s();
         let ticks = (LOOK_BACK_S / control_period_s) as usize + 1;
-        Self { control_period_s, recent: vec![VecDeque::with_capacity(ticks); episodes], sightings: Vec::new() }
+        Self {
+            control_period_s,
+            recent: vec![VecDeque::with_capacity(ticks); episodes],
+            resumed_at_m: vec![None; episodes],
+            sightings: Vec::new(),
+        }
     }
 
     /// Takes one frame into account.
     pub fn frame(&mut self, episode: usize, frame: &Frame) {
         let recent = &mut self.recent[episode];
+        if recent.is_empty() && frame.tick > 0 {
+            self.resumed_at_m[episode] = Some(frame.progress_m);
+        }
         if recent.len() > (LOOK_BACK_S / self.control_period_s) as usize {
             recent.pop_front();
         }
@@ -214,6 +236,7 @@ impl Watch {
                 route_m: progress_m,
                 speed_mps: frame.vehicle.speed_mps,
                 reversals_before: steering_reversals(last.map(|(vehicle, _)| vehicle.steering_rad)),
+                since_resume_m: self.resumed_at_m[episode].map(|resumed_at_m| progress_m - resumed_at_m),
                 earlier: recent[0],
                 earlier_s: recent.len() as f32 * self.control_period_s,
             });
@@ -266,6 +289,7 @@ impl Group<'_> {
                 reversals_before: sighting.reversals_before,
                 free_width_m: free_width_m(map, sighting.route_m),
                 turn_deg: turn_deg(map, sighting.route_m),
+                since_resume_m: sighting.since_resume_m,
             };
             (findings.cause(noisy, config), findings)
         };

@@ -13,6 +13,7 @@
 //! | [`failures`], [`replay_key`] | near-collisions one by one, and how to see one again |
 //! | [`table1`], [`summary`], [`report`], [`page`], [`paper`] | what is printed and written |
 //! | [`run_dir`] | the folder of a run and how it is claimed |
+//! | [`visualise`], [`recorder`] | recordings for Rerun's viewer |
 //! | [`progress`], [`interrupt`] | bars, Ctrl-C |
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what a command does")]
 #![allow(clippy::disallowed_methods, reason = "wall time is shown to people here; nothing computed depends on it")]
@@ -32,6 +33,7 @@ pub mod paper;
 pub mod pixel_accuracy;
 pub mod plots;
 pub mod progress;
+pub mod recorder;
 pub mod render;
 pub mod replay_key;
 pub mod report;
@@ -45,3 +47,4 @@ pub mod table1;
 pub mod train;
 pub mod trials;
 pub mod tune;
+pub mod visualise;

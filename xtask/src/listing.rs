@@ -38,6 +38,10 @@ pub fn drivers(args: &DriversArgs) -> anyhow::Result<()> {
         print_specs(&drivers::specs());
         return Ok(());
     };
+    if let Some(text) = drivers::tuned_file(name) {
+        print!("{text}");
+        return Ok(());
+    }
     let baselines = Baseline::all();
     let baseline = baselines.iter().find(|baseline| baseline.name() == name).with_context(|| {
         let names: Vec<&str> = baselines.iter().map(Baseline::name).collect();
@@ -54,6 +58,6 @@ pub fn drivers(args: &DriversArgs) -> anyhow::Result<()> {
 
 fn print_specs(specs: &[(&str, &str)]) {
     for (spec, about) in specs {
-        println!("{spec:14} {about}");
+        println!("{spec:15} {about}");
     }
 }

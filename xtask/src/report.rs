@@ -403,12 +403,16 @@ impl<'a> Summary<'a> {
     fn causes_table(&self, level: usize) -> Option<Table> {
         let mut header = vec!["driver", "lots"];
         header.extend(Cause::ALL.map(Cause::name));
+        header.extend(["again at the same place", "places per 100 m"]);
         let mut table = table_of(&header);
         for (driver, judged, totals) in self.standings(level).filter(|(.., totals)| totals.near_collisions > 0) {
             let count = |cause| self.ledger.count_of_cause(level, driver, &judged.scope, cause);
             let share = |cause| format!("{:.0} %", 100.0 * f64::from(count(cause)) / f64::from(totals.near_collisions));
             let mut row = vec![self.driver(driver).to_owned(), judged.scope.label.clone()];
             row.extend(Cause::ALL.map(|cause| format!("{} ({})", count(cause), share(cause))));
+            let again = self.ledger.count_of_again(level, driver, &judged.scope);
+            let places = f64::from(totals.near_collisions.saturating_sub(again));
+            row.extend([again.to_string(), format!("{:.2}", 100.0 * places / totals.reference_m)]);
             table.add_row(row);
         }
         (table.row_count() > 0).then_some(table)

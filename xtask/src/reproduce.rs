@@ -167,14 +167,14 @@ fn perform(stage: &Stage, root: &Path, stopwatch: &mut Stopwatch) -> anyhow::Res
             if let Some(chain) = cloning_of {
                 take_over_cloning(&root.join(chain), &path)?;
             }
-            let Ok((_, finished)) = train::tabulated(settings, &run, stopwatch)? else { return Ok(false) };
+            let Ok((_, finished)) = train::tabulated(settings, &run, None, stopwatch)? else { return Ok(false) };
             run.finish(&finished)?;
         }
         Step::Drive { drivers } => {
             let (entries, lots) = (entries(drivers)?, Lot::parse_all(&settings.evaluation.lots)?);
             let plan = Plan { settings, entries: &entries, lots: &lots, compare_with: compare_with(&entries) };
             plan.check()?;
-            evaluate::measure(&plan, &run, stopwatch)?;
+            evaluate::measure(&plan, &run, None, stopwatch)?;
             let drivers = entries.iter().map(|entry| entry.spec.as_str()).collect();
             run.finish(&Driven { drivers })?;
         }

@@ -6,6 +6,7 @@
 mod layers;
 mod noise;
 mod presets;
+mod ranges;
 
 use crate::cli::LayerArgs;
 use anyhow::{Context as _, ensure};
@@ -159,6 +160,7 @@ impl Settings {
             physics > 0 && control > 0 && control.is_multiple_of(physics),
             "episode.control_period_ms = {control} is not a multiple of episode.physics_step_ms = {physics}"
         );
+        ranges::check(&self.episode)?;
         self.dagger.network.validate().context("dagger.network")?;
         Ok(())
     }

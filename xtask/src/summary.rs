@@ -153,6 +153,8 @@ struct Account {
     totals: BTreeMap<(u32, Direction), Totals>,
     /// By family.
     causes: BTreeMap<(u32, Cause), u32>,
+    /// By family: near-collisions at the place of the one before.
+    again: BTreeMap<u32, u32>,
 }
 
 /// Everything that is kept of an evaluation: sums, and 32 bytes per run.
@@ -216,10 +218,12 @@ impl Ledger {
         });
     }
 
-    /// Takes the cause of a near-collision into account.
-    pub fn add_cause(&mut self, level: usize, driver: usize, lot: &Lot, cause: Cause) {
+    /// Takes the cause of a near-collision into account, and whether it is one more at the same place.
+    pub fn add_cause(&mut self, level: usize, driver: usize, lot: &Lot, cause: Cause, is_again: bool) {
         let (family, _) = self.lots[lot.name()];
-        *self.accounts[level][driver].causes.entry((family, cause)).or_default() += 1;
+        let account = &mut self.accounts[level][driver];
+        *account.causes.entry((family, cause)).or_default() += 1;
+        *account.again.entry(family).or_default() += u32::from(is_again);
     }
 
     /// Families, in the order of the plan.
@@ -255,6 +259,12 @@ impl Ledger {
     pub fn count_of_cause(&self, level: usize, driver: usize, scope: &Scope, cause: Cause) -> u32 {
         let counts = &self.accounts[level][driver].causes;
         counts.iter().filter(|((family, of), _)| *of == cause && scope.contains(*family)).map(|(_, n)| n).sum()
+    }
+
+    /// Near-collisions at the place of the one before within a scope.
+    pub fn count_of_again(&self, level: usize, driver: usize, scope: &Scope) -> u32 {
+        let counts = &self.accounts[level][driver].again;
+        counts.iter().filter(|(family, _)| scope.contains(**family)).map(|(_, n)| n).sum()
     }
 }
 

@@ -11,11 +11,14 @@ use crate::run_dir::{Place, RunDir};
 use crate::settings::Settings;
 use crate::table1::Table1;
 use crate::trials::{self, Job, Purpose};
+use crate::visualise::drive::Detail;
+use crate::visualise::live::{Live, View};
 use crate::{learning, run_report};
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
 use policy::dagger::{Hooks, Outcome, Progress, Stop};
 use policy::dataset::store::Store;
+use policy::drivers::NetPolicy;
 use policy::fit::{FitProgress, FitReport};
 use serde::Serialize;
 use sim::driver::Source;
@@ -64,15 +67,12 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
     eprintln!("run: {}", run.path().display());
 
     let mut stopwatch = Stopwatch::default();
-    let (policy, finished) =
-        tabulated(&settings, &run, &mut stopwatch)?.map_err(|rounds| cut_short(run.path(), rounds))?;
-    if !args.no_eval {
-        let entries = entries(&run, policy, finished.rounds)?;
-        let lots = Lot::parse_all(&settings.evaluation.lots)?;
-        let plan = Plan { settings: &settings, entries: &entries, lots: &lots, compare_with: entries.len() - 1 };
-        plan.check()?;
-        evaluate::measure(&plan, &run, &mut stopwatch)?;
+    let mut live = args.record.map(|runs| Live::start(run.path(), runs)).transpose()?;
+    let done = train_and_check(&settings, &run, args.no_eval, live.as_mut(), &mut stopwatch);
+    if let Some(live) = live {
+        live.finish();
     }
+    let finished = done?;
     run_report::write(run.path(), &mut stopwatch)?;
     run.finish(&finished)?;
     print_next_steps(run.path());
@@ -80,14 +80,35 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
     Ok(())
 }
 
+/// Trains, prints the paper's table and drives the check.
+fn train_and_check(
+    settings: &Settings,
+    run: &RunDir,
+    no_eval: bool,
+    mut live: Option<&mut Live>,
+    stopwatch: &mut Stopwatch,
+) -> anyhow::Result<Finished> {
+    let (policy, finished) =
+        tabulated(settings, run, live.as_deref_mut(), stopwatch)?.map_err(|rounds| cut_short(run.path(), rounds))?;
+    if !no_eval {
+        let entries = entries(run, policy, finished.rounds)?;
+        let lots = Lot::parse_all(&settings.evaluation.lots)?;
+        let plan = Plan { settings, entries: &entries, lots: &lots, compare_with: entries.len() - 1 };
+        plan.check()?;
+        evaluate::measure(&plan, run, live, stopwatch)?;
+    }
+    Ok(finished)
+}
+
 /// Trains, prints and writes the paper's table. The inner error of a training cut short is the number of rounds that
 /// were finished.
 pub(crate) fn tabulated(
     settings: &Settings,
     run: &RunDir,
+    live: Option<&mut Live>,
     stopwatch: &mut Stopwatch,
 ) -> anyhow::Result<Result<(Checkpoint, Finished), usize>> {
-    let outcome = learn(settings, run, stopwatch)?;
+    let outcome = learn(settings, run, live, stopwatch)?;
     let table1 = Table1 { rows: &outcome.rows, stop: outcome.stop };
     println!("\nDAgger iterations\n\n{}", table1.to_markdown());
     table1.write(run)?;
@@ -131,7 +152,12 @@ fn print_next_steps(path: &Path) {
 }
 
 /// Data sampling and training, with bars.
-fn learn(settings: &Settings, run: &RunDir, stopwatch: &mut Stopwatch) -> anyhow::Result<Outcome> {
+fn learn(
+    settings: &Settings,
+    run: &RunDir,
+    live: Option<&mut Live>,
+    stopwatch: &mut Stopwatch,
+) -> anyhow::Result<Outcome> {
     let lots = Lot::parse_all(&settings.training.lots)?;
     // A lot that cannot be driven is found here, with its error, not in the middle of a round.
     episodes_of(settings, &lots, 0)?;
@@ -143,12 +169,19 @@ fn learn(settings: &Settings, run: &RunDir, stopwatch: &mut Stopwatch) -> anyhow
         store: store.clone(),
         learning: Recorder::default(),
         failed: None,
+        live,
     });
+    if let Some(live) = &mut monitor.borrow_mut().live {
+        live.training();
+    }
     let mut hooks = Hooks {
         episodes: &mut |round| {
             let episodes = episodes_of(settings, &lots, round)
                 .unwrap_or_else(|error| panic!("round {round} of seed {:?}: {error:#}", settings.seed));
             monitor.borrow_mut().ticks = Ticks::of(&episodes);
+            if let Some(live) = &mut monitor.borrow_mut().live {
+                record(settings, &store, round, &episodes, live);
+            }
             episodes
         },
         expert: &mut |round, episode| {
@@ -176,6 +209,16 @@ fn learn(settings: &Settings, run: &RunDir, stopwatch: &mut Stopwatch) -> anyhow
     monitor.failed.map_or(Ok(outcome), Err)
 }
 
+/// Records the first runs of a round, with what the network that collects would do while the expert drives.
+fn record(settings: &Settings, store: &Store, round: u32, episodes: &[Episode], live: &mut Live) {
+    let collector = round.checked_sub(1).and_then(|before| Checkpoint::load(&store.round_folder(before)).ok());
+    let novice = collector.map(|checkpoint| NetPolicy::new(checkpoint, settings.dagger.device));
+    let name = |(i, episode): (usize, &Episode)| format!("run {i}, {}", episode.map().scenario().name);
+    let names: Vec<String> = episodes.iter().enumerate().map(name).collect();
+    let view = View { root: "dagger", detail: Detail::Everything, novice: novice.as_ref() };
+    live.begin(&format!("round {round:02}"), settings, episodes, &names, &view);
+}
+
 /// Lots that draw their obstacles are driven `training.trials` times. A generated lot looks the same every time: it is
 /// driven once, and the next round has other ones.
 ///
@@ -196,6 +239,7 @@ struct Monitor<'a> {
     stopwatch: &'a mut Stopwatch,
     work: Option<(Stretch, Work)>,
     ticks: Ticks,
+    live: Option<&'a mut Live>,
     store: Store,
     learning: Recorder,
     /// A file that could not be written: ends the run at the next safe point.
@@ -231,6 +275,9 @@ impl Ticks {
 
 impl Monitor<'_> {
     fn frame(&mut self, episode: usize, frame: &Frame) {
+        if let Some(live) = &mut self.live {
+            live.frame(episode, frame);
+        }
         let ticks = &mut self.ticks;
         ticks.progress_m[episode] = frame.progress_m;
         ticks.all += 1;
@@ -243,6 +290,9 @@ impl Monitor<'_> {
     }
 
     fn progress(&mut self, progress: &Progress<'_>) {
+        if let Some(live) = &mut self.live {
+            live.progress(progress);
+        }
         match *progress {
             Progress::Collecting { round, .. } => {
                 self.work = Some((Stretch::Collecting, Work::begin(format!("round {round}: collecting"))));

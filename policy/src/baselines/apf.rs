@@ -4,14 +4,16 @@
 //! U_rep = ½η(1/ρ − 1/ρ_0)²·ρ_goal^n and U_att = ½ξρ_goal² (Ge and Cui; with n > 0 the goal stays the minimum even beside
 //! an obstacle). The walk from the front bumper follows −∇(U_rep + U_att) to the look-ahead point.
 
+use super::explanation::{FieldSample, sample};
 use super::search::{Dimension, Span};
 use super::{
-    DISTANCE_FLOOR_M, Goal, Method, Nearest, Rig, Sight, head_for, khatib_repulsion, walk_along_field, within,
+    DISTANCE_FLOOR_M, Goal, Method, Nearest, Rig, Sight, WALK_AHEAD_MIN_M, head_for, khatib_repulsion,
+    walk_along_field, within,
 };
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
-use sim::sensing::Observation;
+use sim::sensing::{Observation, OccupancyGrid};
 use std::sync::Arc;
 
 /// Parameters of the artificial potential field.
@@ -107,11 +109,20 @@ pub struct PotentialField {
     sight: Arc<Sight>,
 }
 
+impl PotentialField {
+    /// The field over the patch.
+    pub(super) fn sampled(&self, grid: &OccupancyGrid) -> Vec<FieldSample> {
+        let goal = self.sight.goal(self.params.goal, grid);
+        sample(grid, &self.rig, self.params.range_m, |point, nearest| self.params.field(nearest, goal - point))
+    }
+}
+
 impl Policy for PotentialField {
     fn act(&mut self, observation: &Observation) -> Decision {
         let goal = self.sight.goal(self.params.goal, &observation.grid);
         let field = |point, nearest| self.params.field(nearest, goal - point);
-        head_for(walk_along_field(&observation.grid, &self.rig, self.params.range_m, self.params.walk_m, field))
+        let end = walk_along_field(&observation.grid, &self.rig, self.params.range_m, self.params.walk_m, field);
+        head_for(Vec2::new(end.x.max(WALK_AHEAD_MIN_M), end.y))
     }
 }
 
@@ -119,7 +130,6 @@ impl Policy for PotentialField {
 mod tests {
     use super::super::tests::{grid_with, rig};
     use super::*;
-    use sim::sensing::OccupancyGrid;
 
     /// The field is the slope of the potential, by finite differences around an obstacle at the origin.
     #[test]

@@ -11,6 +11,7 @@
 //! For every steering angle to start from, the cells around each path are tabulated once; a decision is 81 masked
 //! popcounts.
 
+use super::explanation::CandidatePath;
 use super::search::{Dimension, Span};
 use super::{Method, Rig, WheelEstimate, spread_curvatures, steer_along, within};
 use serde::{Deserialize, Serialize};
@@ -26,6 +27,8 @@ const SIDE: usize = 40;
 const STARTS: usize = 40;
 /// Between two samples of a path, metres.
 const SAMPLE_M: f32 = 0.2;
+/// Samples from one point of a path in pictures to the next.
+const SAMPLES_PER_M: usize = 5;
 /// Rows of unseen cells below the patch that a path may touch.
 const UNSEEN_ROWS: usize = 24;
 
@@ -214,6 +217,7 @@ impl Around {
 /// Tentacles at the wheel.
 #[derive(Debug, Clone)]
 pub struct Tentacles {
+    params: Params,
     rig: Arc<Rig>,
     /// Starting angles by candidate paths.
     around: Arc<Vec<Vec<Around>>>,
@@ -240,6 +244,7 @@ impl Tentacles {
         let right = left[1..].iter().rev().map(|paths| paths.iter().rev().map(Around::mirrored).collect());
         let around = right.chain(left.iter().cloned()).collect();
         Self {
+            params: params.clone(),
             rig: Arc::new(rig.clone()),
             around: Arc::new(around),
             candidates: Arc::new(candidates.collect()),
@@ -258,6 +263,21 @@ impl Tentacles {
     fn costs<'a>(&'a self, grid: &'a OccupancyGrid, steering_rad: f32) -> impl Iterator<Item = f32> + 'a {
         let around = &self.around[self.start(steering_rad)];
         around.iter().zip(self.candidates.iter()).map(|(around, (_, forward))| around.share_occupied(grid) + forward)
+    }
+
+    /// The paths of the last answer with their costs.
+    pub(super) fn weighed(&self, grid: &OccupancyGrid) -> Vec<CandidatePath> {
+        let start_rad = self.wheel.steering_rad;
+        let straight = (self.around.len() / 2) as f32;
+        let tabulated_rad = match straight {
+            0.0 => start_rad,
+            _ => (self.start(start_rad) as f32 - straight) / straight * self.rig.vehicle.steering_max_rad,
+        };
+        let weighed = |(k, (path, cost)): (usize, ((f32, f32), f32))| {
+            let points = points(&self.params, &self.rig, tabulated_rad, path).step_by(SAMPLES_PER_M).collect();
+            CandidatePath { points, cost, is_chosen: k == self.previous }
+        };
+        self.params.paths().into_iter().zip(self.costs(grid, start_rad)).enumerate().map(weighed).collect()
     }
 
     /// The cheapest; among equals the straightest, then the one driven last, then the left one.
@@ -288,10 +308,21 @@ impl Policy for Tentacles {
     }
 }
 
-/// The cells around one path. A clothoid turns the wheels from `start_rad` to the final curvature over the travel
+/// The cells around one path.
+fn around_path(params: &Params, rig: &Rig, start_rad: f32, path: (f32, f32)) -> Around {
+    let mut marks = Marks::new(&rig.geometry, params.detection_range_m);
+    points(params, rig, start_rad, path).for_each(|point| marks.mark(point));
+    marks.around()
+}
+
+/// One path in the ego frame. A clothoid turns the wheels from `start_rad` to the final curvature over the travel
 /// s_r = v|δ_k − δ_0|/δ̇, at least 0.3 m.
-fn around_path(params: &Params, rig: &Rig, start_rad: f32, (curvature_per_m, length_m): (f32, f32)) -> Around {
-    let geometry = &rig.geometry;
+fn points(
+    params: &Params,
+    rig: &Rig,
+    start_rad: f32,
+    (curvature_per_m, length_m): (f32, f32),
+) -> impl Iterator<Item = Vec2> {
     let (start_per_m, ramp_m) = match params.set {
         TentacleSet::ClothoidSteer => {
             let turn_rad = (rig.steering_rad(curvature_per_m) - start_rad).abs();
@@ -303,17 +334,16 @@ fn around_path(params: &Params, rig: &Rig, start_rad: f32, (curvature_per_m, len
     let (axle_m, ahead_of_axle_m) = match params.path_origin {
         PathOrigin::FrontBumper => (0.0, rig.vehicle.front_m()),
         PathOrigin::RearAxle => (0.0, 0.0),
-        PathOrigin::BelowPatch => (geometry.near_edge_ahead_m - 1.0, 0.0),
+        PathOrigin::BelowPatch => (rig.geometry.near_edge_ahead_m - 1.0, 0.0),
     };
     let mut pose = Pose::new(Vec2::new(axle_m, 0.0), 0.0);
-    let mut marks = Marks::new(geometry, params.detection_range_m);
     let samples = (length_m / SAMPLE_M).round() as usize;
-    for sample in 0..=samples {
-        marks.mark(pose.position() + ahead_of_axle_m * pose.ahead());
+    (0..=samples).map(move |sample| {
+        let point = pose.position() + ahead_of_axle_m * pose.ahead();
         let travelled = ((sample as f32 + 0.5) * SAMPLE_M / ramp_m).min(1.0);
         pose = pose.advanced_along_arc(start_per_m + (curvature_per_m - start_per_m) * travelled, SAMPLE_M);
-    }
-    marks.around()
+        point
+    })
 }
 
 /// Marks cells near points; rows beyond the grid's are the unseen ones before the patch.

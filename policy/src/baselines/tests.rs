@@ -73,7 +73,7 @@ fn a_walk_ends_before_obstacles_and_at_the_edges() {
     let sideways = walk_along_field(&OccupancyGrid::free(), &rig(), 2.3, 20.0, |_, _| Vec2::Y);
     assert!((sideways.y - 6.0).abs() < 0.1 && sideways.x == rig().bumper().x, "{sideways}");
     let back = walk_along_field(&OccupancyGrid::free(), &rig(), 2.3, 6.0, |_, _| -Vec2::X);
-    assert_eq!(back, rig().bumper());
+    assert!(back.x >= 0.0 && back.x < 0.1 && back.y == 0.0, "not beyond the rear axle: {back}");
     let weak = walk_along_field(&OccupancyGrid::free(), &rig(), 2.3, 1.0, |_, _| 0.04 * Vec2::Y);
     assert!((weak.x - rig().bumper().x - 1.0).abs() < 1e-4 && weak.y == 0.0, "{weak}");
 }

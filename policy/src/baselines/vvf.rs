@@ -6,12 +6,14 @@
 //! ρ < ρ_0 = 2.3 m, 0 elsewhere. F̂ is the repulsion squashed to |F̂| < 1 by F/(1 + |F|), lest 1/ρ³ swamp everything
 //! (*chosen*). The look-ahead point is where a walk along V from the front bumper ends.
 
+use super::explanation::{FieldSample, sample};
 use super::search::{Dimension, Span};
-use super::{DISTANCE_FLOOR_M, Method, Nearest, Rig, head_for, khatib_repulsion, walk_along_field, within};
+use super::{DISTANCE_FLOOR_M, Method, Nearest, Rig, WALK_AHEAD_MIN_M};
+use super::{head_for, khatib_repulsion, walk_along_field, within};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
-use sim::sensing::Observation;
+use sim::sensing::{Observation, OccupancyGrid};
 use std::sync::Arc;
 
 /// Parameters of the velocity vector field.
@@ -107,7 +109,7 @@ impl Method for Params {
             velocity_weight: 0.5,
             mask: 0.5,
             walk_m: 6.0,
-            ahead_min_m: 2.3,
+            ahead_min_m: WALK_AHEAD_MIN_M,
         }
     }
 
@@ -131,6 +133,13 @@ pub struct VelocityVectorField {
     rig: Arc<Rig>,
 }
 
+impl VelocityVectorField {
+    /// The field over the patch.
+    pub(super) fn sampled(&self, grid: &OccupancyGrid) -> Vec<FieldSample> {
+        sample(grid, &self.rig, self.params.range_m, |_, nearest| self.params.field(nearest))
+    }
+}
+
 impl Policy for VelocityVectorField {
     fn act(&mut self, observation: &Observation) -> Decision {
         let Params { range_m, walk_m, ahead_min_m, .. } = self.params;
@@ -144,7 +153,6 @@ impl Policy for VelocityVectorField {
 mod tests {
     use super::super::tests::{grid_with, rig};
     use super::*;
-    use sim::sensing::OccupancyGrid;
 
     /// At ρ = 1 m to the left: F = (1 − 1/2.3)/1 = .5652, squashed .3611 to the right; forward .5·(1 − .5).
     #[test]
@@ -170,6 +178,20 @@ mod tests {
         let mut planner = Params::paper().planner(&rig());
         let answer = planner.act(&Observation { grid: OccupancyGrid::free() }).look_ahead;
         assert!((answer.ahead_m - 9.8).abs() < 1e-3 && answer.left_m == 0.0, "{answer:?}");
+    }
+
+    /// A wall slants across 0.5 m ahead of the bumper, as after a resume in a right-hand corner. It pushes back and to the
+    /// right; the walk slides along it to where it ends: a hard turn to the right, not "straight on".
+    #[test]
+    fn a_wall_at_the_bumper_is_turned_away_from() {
+        let mut planner = Params::paper().planner(&rig());
+        let mut grid = OccupancyGrid::free();
+        for row in 0..25 {
+            // Columns up to 11 in row 24 (X 4.30…4.78), one more to the right per row farther away.
+            grid.occupy_row(row, u32::MAX >> (31 - (35 - row).min(24)));
+        }
+        let answer = planner.act(&Observation { grid }).look_ahead;
+        assert!(answer.left_m < -2.0, "{answer:?}");
     }
 
     /// In a straight lane the pushes of both sides are equal and opposite: straight on. A cell more on the left side

@@ -46,7 +46,13 @@ fn widths_and_turns_are_those_of_the_drawing() {
 fn the_first_rule_that_holds_is_the_cause() {
     let config = EpisodeConfig::paper();
     // 1.86 m of car and 0.5 m on both sides are 2.86 m.
-    let all = Findings { passes_on_clean_grid: Some(true), reversals_before: 5, free_width_m: 2.8, turn_deg: 30.0 };
+    let all = Findings {
+        passes_on_clean_grid: Some(true),
+        reversals_before: 5,
+        free_width_m: 2.8,
+        turn_deg: 30.0,
+        since_resume_m: None,
+    };
     let cause = |findings: Findings, noisy| findings.cause(noisy, &config);
     assert_eq!(cause(all, true), Cause::NoiseInduced);
     assert_eq!(cause(all, false), Cause::Oscillation, "no noise to blame");
@@ -57,6 +63,7 @@ fn the_first_rule_that_holds_is_the_cause() {
     let wide = Findings { free_width_m: 2.9, ..steady };
     assert_eq!(cause(wide, true), Cause::Corner);
     assert_eq!(cause(Findings { turn_deg: 29.0, ..wide }, true), Cause::Other);
+    assert!(!is_again(None) && is_again(Some(-0.3)) && is_again(Some(4.9)) && !is_again(Some(5.1)));
 }
 
 fn frame(tick: u32, steering_deg: f32, event: Event) -> Frame {
@@ -97,6 +104,8 @@ fn the_watch_looks_back_six_seconds_and_not_beyond_a_resume() {
     // The last 100 ticks hold five half-periods; the first change of direction is where the count starts.
     assert_eq!(sightings[0].reversals_before, 3);
     assert_eq!((sightings[1].earlier.1, sightings[1].reversals_before), (20.0, 0));
+    // Put back at 20.0 m of route, the second one happens at 1.0 m (as written above).
+    assert_eq!((sightings[0].since_resume_m, sightings[1].since_resume_m), (None, Some(-19.0)));
 }
 
 /// The expert does not look at the grid, so noise cannot be blamed: put where it was in a run of its own, it passes
@@ -129,6 +138,7 @@ fn a_driver_that_can_pass_passes_on_the_clean_grid() {
         route_m: 30.0,
         speed_mps: 1.0,
         reversals_before: 0,
+        since_resume_m: None,
         earlier: (vehicle, progress_m),
         earlier_s: 6.0,
     };

@@ -29,7 +29,7 @@ pub fn learning(rounds: &[LearningRound]) -> String {
     let stretch = (steps / 240).max(1);
     let training: Vec<Vec<(u32, f64)>> = rounds.iter().map(|round| means(&round.training, stretch)).collect();
     let validation: Vec<Vec<(u32, f64)>> = rounds.iter().map(|round| round.validation.clone()).collect();
-    let [above, below] = [("training loss", "", &training), ("validation loss", "optimiser step", &validation)]
+    let [above, below] = [("Training loss", "", &training), ("Validation loss", "optimiser step", &validation)]
         .map(|(label, x_label, curves)| panel(label, x_label, steps, curves));
     style::one_above_the_other("Learning curves", 2 * PANEL_PX, |[top, bottom]| {
         above.draw(top, |chart| draw_rounds(chart, rounds, &training, 0))?;
@@ -78,8 +78,9 @@ fn draw_rounds(
         first += round.steps();
         if rounds.len() > 1 {
             // Where a round ends its curve is low.
-            let (at, pos) = ((f64::from(first), high), Pos::new(HPos::Right, VPos::Top));
-            style::label(chart, &format!("{} ", round.name), at, style::INK, pos)?;
+            let all: u32 = rounds.iter().map(LearningRound::steps).sum();
+            let at = (f64::from(first) - 0.012 * f64::from(all), high);
+            style::label(chart, &round.name, at, style::INK, Pos::new(HPos::Right, VPos::Top))?;
         }
     }
     Ok(())

@@ -129,13 +129,17 @@ pub fn picture(
 pub fn draw(drawing: &mut Drawing, view: &View, trajectories: &[Trajectory], by: ColourBy) {
     for (index, trajectory) in trajectories.iter().enumerate() {
         // Later ones are thinner: where all drive the same line, all are seen.
-        let width_px = 3.0 + 2.5 * (trajectories.len() - 1 - index) as f32;
+        let width_px = 4.0 + 2.5 * (trajectories.len() - 1 - index) as f32;
         let colour = |point: &Point| match by {
             ColourBy::Speed => of_speed(point.speed_mps),
             ColourBy::Driver => rgb(index),
             ColourBy::Source => of_source(point.source),
         };
         for drive in trajectory.points.split_inclusive(|point| point.is_last) {
+            if by == ColourBy::Speed {
+                // Fast is light: on asphalt it needs an edge.
+                drawing.line(view.pixels(drive.iter().map(|point| point.at)), lot::INK, width_px + 2.5);
+            }
             let mut from = 0;
             while from + 1 < drive.len() {
                 let rgb = colour(&drive[from]);

@@ -2,7 +2,7 @@
 
 use super::Ledger;
 use crate::evaluate::Plan;
-use crate::failures::Cause;
+use crate::failures::{self, Cause};
 use crate::settings::NoiseChoice;
 use crate::trials::{Job, Purpose};
 use anyhow::Context as _;
@@ -32,6 +32,7 @@ struct Failed {
     lot: String,
     noise: NoiseChoice,
     cause: Cause,
+    since_resume_m: Option<f32>,
 }
 
 impl Ledger {
@@ -58,7 +59,8 @@ impl Ledger {
         })?;
         each_line(&folder.join("failures.jsonl"), |failed: Failed| {
             let lot = plan.lots.iter().find(|lot| lot.name() == failed.lot).context("another lot")?;
-            ledger.add_cause(level_of(failed.noise)?, driver_of(&failed.driver)?, lot, failed.cause);
+            let (level, driver) = (level_of(failed.noise)?, driver_of(&failed.driver)?);
+            ledger.add_cause(level, driver, lot, failed.cause, failures::is_again(failed.since_resume_m));
             Ok(())
         })?;
         Ok(ledger)
