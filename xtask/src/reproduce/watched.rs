@@ -94,7 +94,7 @@ struct Trained {
 impl Trained {
     fn open(folder: &Path) -> anyhow::Result<Self> {
         let store = Store::open(folder)?;
-        let rounds = (0..).take_while(|&round| Checkpoint::exists(&store.round_folder(round))).collect();
+        let rounds = (0..u32::MAX).take_while(|&round| Checkpoint::exists(&store.round_folder(round))).collect();
         Ok(Self { store, rounds })
     }
 
