@@ -128,12 +128,10 @@ fn render_trajectories(args: &TrajectoriesArgs, output: &Output<'_>) -> anyhow::
         Some(run) => driven_in_training(run, args)?,
         None => driven_anew(args)?,
     };
-    let by = match args.by {
-        Some(ColourChoice::Speed) => ColourBy::Speed,
-        Some(ColourChoice::Driver) => ColourBy::Driver,
-        Some(ColourChoice::Who) => ColourBy::Source,
-        None if args.run.is_some() => ColourBy::Source,
-        None => ColourBy::Driver,
+    let by = match args.by.unwrap_or(if args.run.is_some() { ColourChoice::Who } else { ColourChoice::Driver }) {
+        ColourChoice::Speed => ColourBy::Speed,
+        ColourChoice::Driver => ColourBy::Driver,
+        ColourChoice::Who => ColourBy::Source,
     };
     output.write(
         &format!("drive-{name}"),

@@ -20,6 +20,8 @@ pub const DAGGER: &str = "DAgger";
 /// No near-collision supports "none" from the metres on that bound the rate here, one-sided, near-collisions per 100 m:
 /// 3 km.
 const NONE_PER_100M: f64 = 0.1;
+/// With fewer paired runs a resampled interval is too narrow to decide by (chosen: a reference lot has ten).
+const PAIRS_MIN: usize = 10;
 /// A rate is "as in the paper" within this factor.
 const AS_IN_THE_PAPER: f64 = 2.0;
 
@@ -155,8 +157,10 @@ impl Against<'_> {
         self.driven.ledger.totals(0, driver, &self.scope, None)
     }
 
+    /// `None` also with too few runs to decide by.
     fn comparison(&self, other: usize) -> Option<&Comparison> {
-        self.comparisons.iter().find(|comparison| comparison.driver == other)
+        let found = self.comparisons.iter().find(|comparison| comparison.driver == other);
+        found.filter(|comparison| comparison.pairs >= PAIRS_MIN)
     }
 
     fn rate(&self, driver: usize) -> String {
