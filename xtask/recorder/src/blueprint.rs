@@ -99,8 +99,12 @@ impl Writer<'_> {
             ViewKind::Log => "TextLog",
             ViewKind::Document => "TextDocument",
         };
-        // A picture is seen from its own entity: views of space have one origin.
-        let origin = if view.kind == ViewKind::Picture { view.contents[0].as_str() } else { "/" };
+        // A picture is seen from its own entity, a scene that follows something from that: so it stays in the middle.
+        let origin = match &view.kind {
+            ViewKind::Picture => view.contents[0].as_str(),
+            ViewKind::Scene(Eye { follows: Some(entity), .. }) => entity.as_str(),
+            _ => "/",
+        };
         let blueprint = ViewBlueprint::new(class).with_display_name(view.name.as_str()).with_space_origin(origin);
         self.blueprint.log(path.as_str(), &blueprint)?;
         let query = view.contents.iter().map(|entity| match entity.strip_prefix('-') {
@@ -164,9 +168,5 @@ impl Writer<'_> {
 }
 
 fn eye_controls(eye: &Eye) -> EyeControls3D {
-    let controls = EyeControls3D::new().with_position(eye.position).with_look_target(eye.target).with_eye_up(eye.up);
-    match &eye.follows {
-        Some(entity) => controls.with_tracking_entity(entity.as_str()),
-        None => controls,
-    }
+    EyeControls3D::new().with_position(eye.position).with_look_target(eye.target).with_eye_up(eye.up)
 }

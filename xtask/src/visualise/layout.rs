@@ -16,7 +16,7 @@ pub fn of_lot(map: &Map) -> Layout {
 
 /// Drives side by side, by the entities they are found under.
 pub fn of_drives(map: &Map, roots: &[String], detail: Detail) -> Layout {
-    let closely: Vec<(f32, Layout)> = roots.iter().map(|root| (1.0, around_the_car(map, root).into())).collect();
+    let closely: Vec<(f32, Layout)> = roots.iter().map(|root| (1.0, around_the_car(root).into())).collect();
     let aspect = if roots.len() == 1 { 1.2 } else { 0.8 };
     let overview = Layout::Tabs(vec![
         whole_lot(map, roots, aspect).into(),
@@ -52,7 +52,7 @@ pub fn of_training(with_tables: bool) -> Layout {
     let mut rounds = vec![
         plot("η̂ per iteration", "rounds/eta_hat", Some([0.0, 1.0])),
         plot("Samples per round", "rounds/samples", None),
-        plot("Near-collisions while collecting, per 100 m", "rounds/near_collisions", None),
+        plot("Near-collisions per 100 m", "rounds/near_collisions", None),
     ];
     if with_tables {
         let tables = TABLES.map(|(entity, file)| document(file, entity)).to_vec();
@@ -70,12 +70,11 @@ fn document(name: &str, entity: &str) -> Layout {
 }
 
 /// The car from above, not far behind, with what was weighed.
-fn around_the_car(map: &Map, root: &str) -> View {
-    let start = map.start();
-    let (x, y) = (start.x_m, start.y_m);
+fn around_the_car(root: &str) -> View {
+    // In the frame of the car: behind it, high up, looking at what lies ahead.
     let eye = Eye {
-        position: [x, y - 9.0, 24.0],
-        target: [x, y, 0.0],
+        position: [-6.0, 0.0, 22.0],
+        target: [4.0, 0.0, 0.0],
         up: [0.0, 0.0, 1.0],
         follows: Some(format!("{root}/car")),
     };
