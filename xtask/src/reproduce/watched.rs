@@ -12,7 +12,7 @@ use crate::statistics::bootstrap::{DRAWS, Interval, Units};
 use crate::trials::{self, Job, Purpose};
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
-use policy::dagger::{Arbiter, Collected, Collection, Keep};
+use policy::dagger::{Arbiter, Collected, Keep};
 use policy::dataset::store::Store;
 use policy::dataset::{Dataset, Sample, Split, ValidationSplit};
 use policy::decision_rule::{DecisionRule, Evidence};
@@ -110,7 +110,7 @@ impl Trained {
             if round == from {
                 skipped = dataset.split(by).validation.len();
             }
-            dataset.push(self.store.read_round::<Collection>(round)?.0);
+            dataset.push(self.store.read_samples(round)?.into());
         }
         let Split { mut validation, .. } = dataset.split(by);
         Ok(validation.split_off(skipped))
