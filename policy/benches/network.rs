@@ -49,9 +49,10 @@ const STEPS: u32 = 10;
 
 #[divan::bench(args = [64, 128, 256, 512], consts = [0, 1], sample_count = 5)]
 fn train<const NET: usize>(bencher: Bencher<'_, '_>, batch: usize) {
-    let samples = grids(2048).into_iter().map(|grid| Sample { grid, label: [0.5, 0.4], tau_hat: 0.1 }).collect();
+    let samples: Vec<_> =
+        grids(2048).into_iter().map(|grid| Sample { grid, label: [0.5, 0.4], tau_hat: 0.1 }).collect();
     let mut dataset = Dataset::default();
-    dataset.push(Round { samples, relooks: Vec::new() });
+    dataset.push(Round::from(samples));
     let settings = FitSettings {
         batch,
         validation: ValidationSplit::none(),

@@ -35,6 +35,13 @@ pub struct Round {
     pub relooks: Vec<OccupancyGrid>,
 }
 
+impl From<Vec<Sample>> for Round {
+    /// Without further looks.
+    fn from(samples: Vec<Sample>) -> Self {
+        Self { samples, relooks: Vec::new() }
+    }
+}
+
 impl Round {
     /// Further looks at a sample.
     fn relooks_of(&self, sample: usize) -> &[OccupancyGrid] {
@@ -127,7 +134,7 @@ pub(crate) mod tests {
 
     /// Samples whose label can be read off the grid: the mass of occupied cells decides.
     pub(crate) fn round(count: usize) -> Round {
-        let samples = lots(count)
+        let samples: Vec<_> = lots(count)
             .into_iter()
             .enumerate()
             .map(|(index, grid)| {
@@ -138,7 +145,7 @@ pub(crate) mod tests {
                 Sample { grid, label: [0.5 + 0.003 * (left - right), 0.2 + 0.002 * (left + right)], tau_hat }
             })
             .collect();
-        Round { samples, relooks: Vec::new() }
+        samples.into()
     }
 
     #[test]

@@ -298,7 +298,7 @@ mod tests {
     /// 3 in 200 m and 1 in 300 m are 0.8 per 100 m, not the mean of 1.5 and 0.33; 30 m in 20 s are 1.5 m/s.
     #[test]
     fn rates_pool_events_and_metres() {
-        let run = |near_collisions, reference_m| EpisodeMetrics { near_collisions, reference_m, ..Default::default() };
+        let run = |near_collisions, reference_m| EpisodeMetrics { reference_m, near_collisions, ..Default::default() };
         assert!((near_collisions_per_100m([&run(3, 200.0), &run(1, 300.0)]) - 0.8).abs() < 1e-9);
         let moved = EpisodeMetrics { driven_m: 30.0, duration_s: 20.0, ..EpisodeMetrics::default() };
         assert_eq!(moved.mean_speed_mps(), 1.5);

@@ -31,7 +31,7 @@ use crate::{evaluate, report, run_report, train};
 use anyhow::{Context as _, ensure};
 use drawing::Drawing;
 use policy::checkpoint::Checkpoint;
-use policy::dagger::{Arbiter, Collection};
+use policy::dagger::Arbiter;
 use policy::dataset::store::Store;
 use policy::network::Predictor;
 use rayon::prelude::*;
@@ -221,22 +221,22 @@ fn render_samples(args: &SamplesArgs, output: &Output<'_>) -> anyhow::Result<()>
     };
     // Opening a store creates its folder.
     ensure!(args.round.is_dir(), "{}: there is no such round", args.round.display());
-    let (round, _) = Store::open(run)?.read_round::<Collection>(index)?;
+    let kept = Store::open(run)?.read_samples(index)?;
     let settings = run_dir::settings_of(run)?;
     let folder = args.net.as_deref().unwrap_or(&args.round);
     let checkpoint =
         (args.net.is_some() || Checkpoint::exists(folder)).then(|| Checkpoint::load(folder)).transpose()?;
-    let count = args.count.min(round.samples.len());
-    let chosen: Vec<usize> = (0..count).map(|i| (2 * i + 1) * round.samples.len() / (2 * count)).collect();
-    let grids: Vec<_> = chosen.iter().map(|&i| &round.samples[i].grid).collect();
+    let count = args.count.min(kept.len());
+    let chosen: Vec<usize> = (0..count).map(|i| (2 * i + 1) * kept.len() / (2 * count)).collect();
+    let grids: Vec<_> = chosen.iter().map(|&i| &kept[i].grid).collect();
     let answers =
         checkpoint.map(|checkpoint| Predictor::new(checkpoint.weights, settings.dagger.device).predict(&grids));
     let samples: Vec<_> = chosen
         .iter()
         .enumerate()
-        .map(|(place, &i)| (i, round.samples[i], answers.as_ref().map(|answers| answers[place])))
+        .map(|(place, &i)| (i, kept[i], answers.as_ref().map(|answers| answers[place])))
         .collect();
-    let title = format!("{name}: {count} of {} samples", round.samples.len());
+    let title = format!("{name}: {count} of {} samples", kept.len());
     output.write(&format!("samples-{name}"), &samples::picture(&title, &samples, &settings.dagger.geometry)?, false)
 }
 

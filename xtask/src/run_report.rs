@@ -16,7 +16,6 @@ use crate::settings::{NoiseChoice, Settings};
 use crate::statistics::poisson::DISPERSION_MAX;
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
-use policy::dagger::Collection;
 use policy::dataset::Dataset;
 use policy::dataset::store::Store;
 use policy::network::Predictor;
@@ -115,7 +114,7 @@ fn calibration(folder: &Path, settings: &Settings) -> anyhow::Result<Option<Vec<
     let store = Store::open(folder)?;
     let mut dataset = Dataset::default();
     for round in (0..).take_while(|&round| store.has_round(round)) {
-        dataset.push(store.read_round::<Collection>(round)?.0);
+        dataset.push(store.read_samples(round)?.into());
     }
     let held_back = dataset.split(settings.dagger.fit_iteration.validation).validation;
     if held_back.is_empty() {

@@ -71,7 +71,7 @@ fn of_lot(args: &VisualiseLotArgs, sink: &SinkArgs) -> anyhow::Result<()> {
     let target = Target::of(sink, &format!("lot-{}-s{}", lot.name(), args.seed))?;
     let header = target.header("lot", name, layout::of_lot(&map), None);
     let mut recorder = Recorder::start()?;
-    recorder.send(Message::Begin { recording: 0, header });
+    recorder.send(Message::Begin { recording: 0, header: Box::new(header) });
     recorder.send(Message::Always { recording: 0, marks: lot_marks(&map, legend::LOT) });
     recorder.finish()?;
     target.report()
@@ -167,7 +167,7 @@ fn of_run(run: &Path, sink: &SinkArgs) -> anyhow::Result<()> {
     let header = target.header("training", name, layout::of_training(true), None);
     let mut recorder = Recorder::start()?;
     let header = Header { timeline: "step".to_owned(), ..header };
-    recorder.send(Message::Begin { recording: 0, header });
+    recorder.send(Message::Begin { recording: 0, header: Box::new(header) });
     recorder.send(Message::Always { recording: 0, marks: always });
     for (clock, marks) in moments {
         recorder.send(Message::At { recording: 0, clock, marks });
@@ -253,7 +253,7 @@ impl Show<'_> {
         });
         let layout = layout::of_drives(map, &roots, Detail::Everything);
         let header = target.header("drive", self.name.clone(), layout, focus_s);
-        recorder.send(Message::Begin { recording, header });
+        recorder.send(Message::Begin { recording, header: Box::new(header) });
         recorder.send(Message::Always { recording, marks: lot_marks(map, legend::DRIVE) });
         for (index, root) in roots.iter().enumerate() {
             self.drive(index, root, recording, recorder);

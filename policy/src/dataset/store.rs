@@ -3,7 +3,7 @@
 //! ```text
 //! round-00/grids.npy        u8  [n, 25, 25]   1 = non-drivable, row 0 = far, column 0 = left
 //!          labels.npy       f32 [n, 3]        u, w, τ̂ (image fractions)
-//!          relooks.npy      u8  [n, k, 25, 25]  the same scenes with other noise, if k > 0
+//!          relooks.npz      u8  [n, k, 25, 25]  array `relooks`: the same scenes with other noise, if k > 0
 //!          round.toml       how it was collected
 //!          model.safetensors, model.toml, fit.toml    the network trained after it
 //! round-01/…
@@ -14,7 +14,7 @@
 
 use super::{Round, Sample};
 use ndarray::{Array2, Array3, Array4};
-use ndarray_npy::{ReadNpyExt as _, WriteNpyExt as _};
+use ndarray_npy::{NpzReader, NpzWriter, ReadNpyExt as _, WriteNpyExt as _};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sim::sensing::{GRID_CELLS, OccupancyGrid};
@@ -42,7 +42,8 @@ impl StoreError {
 }
 
 const WRITE_REMEDY: &str = "check that the folder exists, is writable and has space";
-const RELOOKS: &str = "relooks.npy";
+const RELOOKS: &str = "relooks.npz";
+const RELOOKS_ARRAY: &str = "relooks";
 const READ_REMEDY: &str = "delete this round and all later ones to collect them again, or restore the file";
 
 /// The folder of one run.
@@ -113,8 +114,11 @@ impl Store {
             let cells = round.relooks.iter().flat_map(OccupancyGrid::cells).collect();
             let shape = [n, round.relooks.len() / n, GRID_CELLS, GRID_CELLS];
             let relooks = Array4::from_shape_vec(shape, cells).expect("every sample has as many further looks");
+            // k times as large as the grids: 20 times smaller when compressed.
             write_atomically(&partial.join(RELOOKS), |file| {
-                relooks.write_npy(file).map_err(|error| error.to_string())
+                let mut archive = NpzWriter::new_compressed(file);
+                let written = archive.add_array(RELOOKS_ARRAY, &relooks).and_then(|()| archive.finish());
+                written.map(drop).map_err(|error| error.to_string())
             })?;
         }
         write_toml(&partial.join("round.toml"), about)?;
@@ -128,6 +132,17 @@ impl Store {
     pub fn read_round<About: DeserializeOwned>(&self, index: u32) -> Result<(Round, About), StoreError> {
         let folder = self.round_folder(index);
         let about = read_toml(&folder.join("round.toml"))?;
+        let samples = self.read_samples(index)?;
+        let relooks = Self::read_relooks(&folder.join(RELOOKS), samples.len())?;
+        Ok((Round { samples, relooks }, about))
+    }
+
+    /// Reads the samples of a round without the further looks at them.
+    ///
+    /// # Errors
+    /// If a file is missing or is not what it should be.
+    pub fn read_samples(&self, index: u32) -> Result<Vec<Sample>, StoreError> {
+        let folder = self.round_folder(index);
         let (grids_path, labels_path) = (folder.join("grids.npy"), folder.join("labels.npy"));
         let grids = Array3::<u8>::read_npy(open(&grids_path)?)
             .map_err(|error| StoreError::new(&grids_path, error, READ_REMEDY))?;
@@ -154,14 +169,16 @@ impl Store {
                 Sample { grid: OccupancyGrid::from_cells(&cells), label: [label[0], label[1]], tau_hat: label[2] }
             })
             .collect();
-        Ok((Round { samples, relooks: Self::read_relooks(&folder.join(RELOOKS), n)? }, about))
+        Ok(samples)
     }
 
     fn read_relooks(path: &Path, n: usize) -> Result<Vec<OccupancyGrid>, StoreError> {
         if !path.exists() {
             return Ok(Vec::new());
         }
-        let grids = Array4::<u8>::read_npy(open(path)?).map_err(|error| StoreError::new(path, error, READ_REMEDY))?;
+        let grids: Array4<u8> = NpzReader::new(open(path)?)
+            .and_then(|mut archive| archive.by_name(RELOOKS_ARRAY))
+            .map_err(|error| StoreError::new(path, error, READ_REMEDY))?;
         if grids.shape()[0] != n || grids.shape()[2..] != [GRID_CELLS, GRID_CELLS] {
             let problem = format!("shape {:?} instead of [{n}, k, {GRID_CELLS}, {GRID_CELLS}]", grids.shape());
             return Err(StoreError::new(path, problem, READ_REMEDY));

@@ -19,6 +19,9 @@ pub type Colour = [u8; 4];
 /// x, y, z in metres, in the frame of the entity's parent.
 pub type Point = [f32; 3];
 
+/// What is shown from each of a series of moments on.
+pub type Moments = Vec<(Clock, Vec<Mark>)>;
+
 /// One step of the conversation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Message {
@@ -27,7 +30,7 @@ pub enum Message {
         /// By which later messages name it.
         recording: u32,
         /// What it is.
-        header: Header,
+        header: Box<Header>,
     },
     /// Shapes that hold at all times.
     Always {

@@ -53,7 +53,9 @@ mod tests {
         };
         let messages = [at(0), at(1), Message::End { recording: 3 }];
         let mut pipe = Vec::new();
-        messages.iter().for_each(|message| write(&mut pipe, message).unwrap());
+        for message in &messages {
+            write(&mut pipe, message).unwrap();
+        }
         let mut rest = pipe.as_slice();
         let read_back: Vec<Message> = std::iter::from_fn(|| read(&mut rest).unwrap()).collect();
         assert_eq!(read_back, messages);

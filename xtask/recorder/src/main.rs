@@ -39,7 +39,7 @@ fn record(mut pipe: impl Read) -> anyhow::Result<()> {
         match message {
             Message::Begin { recording, header } => {
                 let name = header.name.clone();
-                open.insert(recording, Recording::begin(header).with_context(|| name)?);
+                open.insert(recording, Recording::begin(*header).with_context(|| name)?);
             }
             Message::Always { recording, marks } => {
                 open.get(&recording).with_context(|| unknown(recording))?.always(marks)?;

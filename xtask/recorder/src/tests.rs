@@ -90,7 +90,7 @@ fn scratch(name: &str) -> PathBuf {
 fn recorded(name: &str, is_ended: bool) -> PathBuf {
     let path = scratch(name);
     let mut messages = vec![
-        Message::Begin { recording: 7, header: header(&path.display().to_string()) },
+        Message::Begin { recording: 7, header: Box::new(header(&path.display().to_string())) },
         Message::Always { recording: 7, marks: always() },
     ];
     messages.extend((0..TICKS).map(|tick| {
@@ -239,6 +239,6 @@ fn what_cannot_be_recorded_is_said() {
     assert!(record(pipe.as_slice()).unwrap_err().to_string().contains("never begun"));
     let mut pipe = Vec::new();
     let header = header("/no/such/folder/x.rrd");
-    protocol::write(&mut pipe, &Message::Begin { recording: 1, header }).unwrap();
+    protocol::write(&mut pipe, &Message::Begin { recording: 1, header: Box::new(header) }).unwrap();
     assert!(format!("{:#}", record(pipe.as_slice()).unwrap_err()).contains("/no/such/folder/x.rrd"));
 }

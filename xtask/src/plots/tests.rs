@@ -70,7 +70,7 @@ fn groups() -> Vec<BarGroup> {
     let group = |(i, name): (usize, &str)| {
         let bar = |j: usize| {
             let value = 0.3 * (i + j) as f64;
-            let (driver, is_papers) = (j / 2, j % 2 == 0);
+            let (driver, is_papers) = (j / 2, j.is_multiple_of(2));
             Bar { driver, value, interval: (!is_papers).then_some([0.8 * value, 1.3 * value + 0.1]), is_papers }
         };
         BarGroup { name: name.to_owned(), bars: (0..6).map(bar).collect() }

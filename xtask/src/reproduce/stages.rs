@@ -241,9 +241,11 @@ impl Stage {
     /// About how long it takes, seconds.
     pub fn estimate_s(&self) -> f64 {
         let Settings { training, evaluation, dagger, .. } = &self.settings;
-        let runs = |lots: &[String], ways: usize, trials: u32| {
-            let lots = Lot::parse_all(lots).map_or(1, |lots| lots.len());
-            lots as f64 * ways as f64 * f64::from(trials)
+        let runs = |lots: &[String], ways: usize, trials: u32, is_training: bool| {
+            // In training, generated lots are driven once.
+            let trials = |lot: &Lot| if is_training && lot.is_generated() { 1.0 } else { f64::from(trials) };
+            let of_each_way: f64 = Lot::parse_all(lots).unwrap_or_default().iter().map(trials).sum();
+            of_each_way * ways as f64
         };
         let rounds = f64::from(dagger.iterations_max);
         match &self.step {
@@ -252,16 +254,17 @@ impl Stage {
                     Some(_) => (0.0, 0.0),
                     None => (samples(&dagger.fit_cloning), 1.0),
                 };
-                let collected = (rounds + clonings) * runs(&training.lots, training.directions.len(), training.trials);
+                let collected =
+                    (rounds + clonings) * runs(&training.lots, training.directions.len(), training.trials, true);
                 let trained = steps + rounds * samples(&dagger.fit_iteration);
                 collected * COLLECTED_RUN_S + trained * multiply_adds(&dagger.network) / TRAINED_PER_S
             }
             Step::Drive { drivers } => {
-                let runs = runs(&evaluation.lots, evaluation.directions.len(), evaluation.trials);
+                let runs = runs(&evaluation.lots, evaluation.directions.len(), evaluation.trials, false);
                 runs * (drivers.len() * evaluation.noise.len()) as f64 * DRIVEN_RUN_S
             }
             Step::Watch => {
-                let runs = runs(&evaluation.lots, evaluation.directions.len(), 1);
+                let runs = runs(&evaluation.lots, evaluation.directions.len(), 1, false);
                 (2.0 * rounds + 1.0) * runs * COLLECTED_RUN_S
             }
         }

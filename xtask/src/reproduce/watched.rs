@@ -12,7 +12,7 @@ use crate::statistics::bootstrap::{DRAWS, Interval, Units};
 use crate::trials::{self, Job, Purpose};
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
-use policy::dagger::{Arbiter, Collected, Collection, Keep};
+use policy::dagger::{Arbiter, Collected, Keep};
 use policy::dataset::store::Store;
 use policy::dataset::{Dataset, Sample, Split, ValidationSplit};
 use policy::decision_rule::{DecisionRule, Evidence};
@@ -94,7 +94,7 @@ struct Trained {
 impl Trained {
     fn open(folder: &Path) -> anyhow::Result<Self> {
         let store = Store::open(folder)?;
-        let rounds = (0..).take_while(|&round| Checkpoint::exists(&store.round_folder(round))).collect();
+        let rounds = (0..u32::MAX).take_while(|&round| Checkpoint::exists(&store.round_folder(round))).collect();
         Ok(Self { store, rounds })
     }
 
@@ -110,7 +110,7 @@ impl Trained {
             if round == from {
                 skipped = dataset.split(by).validation.len();
             }
-            dataset.push(self.store.read_round::<Collection>(round)?.0);
+            dataset.push(self.store.read_samples(round)?.into());
         }
         let Split { mut validation, .. } = dataset.split(by);
         Ok(validation.split_off(skipped))

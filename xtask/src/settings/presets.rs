@@ -89,6 +89,7 @@ fn smoke() -> Settings {
         },
         dagger: DaggerConfig {
             iterations_max: 1,
+            relooks: 1,
             start: StartFrom::Previous,
             network: LookAheadNetConfig {
                 conv1: ConvConfig { channels: 16, kernel: 3 },

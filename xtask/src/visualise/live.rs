@@ -49,7 +49,7 @@ impl Live {
         let header =
             self.target("training").header("training", "training".to_owned(), layout::of_training(false), None);
         let header = protocol::Header { timeline: "step".to_owned(), ..header };
-        self.recorder.send(Message::Begin { recording: TRAINING, header });
+        self.recorder.send(Message::Begin { recording: TRAINING, header: Box::new(header) });
         self.recorder.send(Message::Always { recording: TRAINING, marks: training::always() });
     }
 
@@ -86,7 +86,7 @@ impl Live {
             let layout = layout::of_drives(map, &[view.root.to_owned()], view.detail);
             let file = root_of(&name.replace(", ", "-").replace(' ', "-"));
             let header = self.target(&file).header("drive", name, layout, None);
-            self.recorder.send(Message::Begin { recording, header });
+            self.recorder.send(Message::Begin { recording, header: Box::new(header) });
             let mut marks = lot_marks(map, legend::DRIVE);
             marks.extend(drive.always());
             self.recorder.send(Message::Always { recording, marks });

@@ -2,7 +2,7 @@ use super::drive::{Detail, Drive};
 use super::*;
 use crate::drivers;
 use policy::baselines::explanation::Explanation;
-use protocol::{Clock, Dot, Pose, Strip};
+use protocol::{Clock, Dot, Moments, Pose, Strip};
 use sim::driver::Driver;
 use sim::episode::{Event, Frame};
 use sim::vehicle::VehicleParams;
@@ -15,7 +15,7 @@ pub(super) fn map() -> Map {
 }
 
 /// The first ticks of a drive by whoever answers, with everything that is shown.
-fn drive(ticks: u32, detail: Detail, driver: &mut dyn Driver) -> (Vec<Frame>, Vec<(Clock, Vec<Mark>)>, Vec<Mark>) {
+fn drive(ticks: u32, detail: Detail, driver: &mut dyn Driver) -> (Vec<Frame>, Moments, Vec<Mark>) {
     let settings = Settings::preset("smoke").unwrap();
     let mut episode = Episode::new(Arc::new(settings.episode.clone()), Arc::new(map()), RootSeed(2));
     let mut shown = Drive::new("me", &episode, &settings, detail);

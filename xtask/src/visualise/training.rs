@@ -7,7 +7,7 @@ use anyhow::{Context as _, ensure};
 use policy::dagger::Collection;
 use policy::fit::{FitProgress, FitReport, FitSettings, Validation};
 use policy::loss::LossParts;
-use protocol::{Clock, Mark, Shape};
+use protocol::{Clock, Mark, Moments, Shape};
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
@@ -59,7 +59,7 @@ impl Curve {
     }
 
     /// A finished training, point by point.
-    fn finished(&mut self, fit: &FitReport, settings: &FitSettings) -> Vec<(Clock, Vec<Mark>)> {
+    fn finished(&mut self, fit: &FitReport, settings: &FitSettings) -> Moments {
         let point = |point: &policy::fit::CurvePoint| {
             self.step = i64::from(point.step);
             let mut marks = loss(&point.training);
@@ -114,7 +114,7 @@ pub fn always() -> Vec<Mark> {
 ///
 /// # Errors
 /// If there is no run, or a file of it is not what it should be.
-pub fn read(run: &Path) -> anyhow::Result<(Vec<Mark>, Vec<(Clock, Vec<Mark>)>)> {
+pub fn read(run: &Path) -> anyhow::Result<(Vec<Mark>, Moments)> {
     let settings: Settings = run_dir::settings_of(run)?;
     let mut curve = Curve::default();
     let (mut moments, mut dataset) = (Vec::new(), 0);
