@@ -9,7 +9,7 @@ use policy::checkpoint::Checkpoint;
 use policy::drivers::NetFleet;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sim::driver::{Decision, Driver, Fleet, Seat, SensorsOnly};
+use sim::driver::{Decision, Driver, Fleet, Seat, SensorsOnly, Source};
 use std::path::{Path, PathBuf};
 
 /// The planners with the parameters that `cargo xtask tune` found: how they are named, and the file it wrote.
@@ -67,6 +67,15 @@ impl Contestant {
     /// A model-based planner.
     pub fn baseline(name: &str, baseline: Baseline) -> Self {
         Self { name: name.to_owned(), kind: Kind::Baseline(baseline) }
+    }
+
+    /// Who it is, as decisions say it.
+    pub fn source(&self) -> Source {
+        match &self.kind {
+            Kind::Expert => Source::Expert,
+            Kind::Network(_) => Source::Novice,
+            Kind::Baseline(_) => Source::Planner,
+        }
     }
 
     /// The same with another name in tables.

@@ -5,11 +5,13 @@
 
 use anyhow::{Context as _, bail};
 use protocol::Message;
+use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
+use std::time::SystemTime;
 
 /// The version of rerun that the recorder is built with, and so of the viewer that fits.
 pub const RERUN_VERSION: &str = "0.36.3";
@@ -80,26 +82,42 @@ impl Recorder {
     }
 }
 
-/// Builds the recorder, or makes sure that it is built.
+/// Builds the recorder unless it is there and newer than all it is made of: Cargo would take a second of two cores to
+/// find that out.
 fn build() -> anyhow::Result<PathBuf> {
     let package = Path::new(env!("CARGO_MANIFEST_DIR")).join("recorder");
     let target = target_folder()?.join("recorder");
     let program = target.join("debug").join(format!("recorder{}", std::env::consts::EXE_SUFFIX));
-    if !program.is_file() {
-        eprintln!("building the Rerun recorder (about 8 minutes on two cores, only this once) …");
+    if is_fresh(&program, &package) {
+        return Ok(program);
     }
+    let is_there = program.is_file();
+    let takes = if is_there { "seconds to minutes" } else { "about 8 minutes on two cores, only this once" };
+    eprintln!("building the Rerun recorder ({takes}) …");
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
     command.args(["build", "--locked", "--manifest-path"]).arg(package.join("Cargo.toml"));
     command.arg("--target-dir").arg(&target);
-    if program.is_file() {
+    if is_there {
         command.arg("--quiet");
     }
     let status = command.status().context("cargo, which builds the recorder, cannot be started; install Rust")?;
     if !status.success() {
         bail!("{}: the recorder cannot be built, see above", package.display());
     }
+    // Cargo leaves a program alone that it finds to be right, however old.
+    File::options().append(true).open(&program).and_then(|file| file.set_modified(SystemTime::now())).ok();
     Ok(program)
+}
+
+/// Whether a program is newer than all sources of the recorder. What cannot be read is for Cargo to judge.
+fn is_fresh(program: &Path, package: &Path) -> bool {
+    let changed = |path: &Path| path.metadata().and_then(|metadata| metadata.modified());
+    let folders = ["", "src", "../protocol", "../protocol/src"].map(|folder| package.join(folder));
+    let sources = folders.iter().flat_map(|folder| std::fs::read_dir(folder).into_iter().flatten()).flatten();
+    let mut files = sources.map(|entry| entry.path()).filter(|path| path.is_file()).peekable();
+    let Ok(built) = changed(program) else { return false };
+    files.peek().is_some() && files.all(|file| changed(&file).is_ok_and(|at| at < built))
 }
 
 /// Where this program was built: beside it the recorder is kept.
@@ -131,6 +149,27 @@ mod tests {
     fn a_recorder_that_is_not_there_is_named() {
         let error = Recorder::start_program(Path::new("/no/such/recorder")).unwrap_err();
         assert!(format!("{error:#}").contains("/no/such/recorder"));
+    }
+
+    #[test]
+    fn only_a_recorder_older_than_its_sources_is_built_again() {
+        let root = std::env::temp_dir().join(format!("parking-recorder-{}", std::process::id()));
+        let (package, program) = (root.join("recorder"), root.join("program"));
+        for source in ["recorder/Cargo.lock", "recorder/src/main.rs", "protocol/Cargo.toml", "protocol/src/lib.rs"] {
+            std::fs::create_dir_all(root.join(source).parent().unwrap()).unwrap();
+            std::fs::write(root.join(source), "").unwrap();
+        }
+        assert!(!is_fresh(&program, &package), "there is none");
+        std::fs::write(&program, "").unwrap();
+        let later = |path: &Path, seconds| {
+            let file = File::options().append(true).open(path).unwrap();
+            file.set_modified(SystemTime::now() + std::time::Duration::from_secs(seconds)).unwrap();
+        };
+        later(&program, 60);
+        assert!(is_fresh(&program, &package));
+        later(&root.join("protocol/src/lib.rs"), 120);
+        assert!(!is_fresh(&program, &package));
+        std::fs::remove_dir_all(root).unwrap();
     }
 
     #[test]

@@ -33,6 +33,7 @@ use anyhow::{Context as _, ensure};
 use drive::{Detail, Drive};
 use protocol::{Header, Layout, Mark, Message, Shape, Sink};
 use sim::batch::run_lockstep_until;
+use sim::driver::Source;
 use sim::episode::Episode;
 use sim::map::Map;
 use sim::scenario::Direction;
@@ -43,7 +44,7 @@ use std::sync::Arc;
 
 /// Seconds before and after a moment of interest that are played again and again.
 const FOCUS_S: [f64; 2] = [6.0, 3.0];
-/// Seconds before and after a failure that are recorded.
+/// Seconds before and after a moment of interest that are recorded.
 const AROUND_S: [f64; 2] = [10.0, 5.0];
 
 /// The command.
@@ -201,10 +202,7 @@ fn of_failures(args: &FailuresArgs, sink: &SinkArgs) -> anyhow::Result<()> {
         let file = args.run.join("recordings").join(format!("{name}.rrd"));
         let target = Target::of(&SinkArgs { out: Some(file), ..sink.clone() }, &name)?;
         let show = replay.show(Some(key.tick), format!("{}: {}", failed.cause, failed.replay));
-        let control_period_s = f64::from(settings.episode.control_period_s());
-        let ticks = |seconds: f64| (seconds / control_period_s) as u32;
-        let window = [key.tick.saturating_sub(ticks(AROUND_S[0])), key.tick + ticks(AROUND_S[1])];
-        show.send(&target, recording as u32, Some(window), &mut recorder)?;
+        show.send(&target, recording as u32, &mut recorder)?;
         targets.push(target);
         if interrupt::is_requested() {
             break;
@@ -238,22 +236,17 @@ impl Show<'_> {
     fn record(self, sink: &SinkArgs, file: &str) -> anyhow::Result<()> {
         let target = Target::of(sink, file)?;
         let mut recorder = Recorder::start()?;
-        self.send(&target, 0, None, &mut recorder)?;
+        self.send(&target, 0, &mut recorder)?;
         recorder.finish()?;
         target.report()
     }
 
-    /// Drives, and records the ticks of a window, or all.
-    fn send(
-        &self,
-        target: &Target,
-        recording: u32,
-        window: Option<[u32; 2]>,
-        recorder: &mut Recorder,
-    ) -> anyhow::Result<()> {
+    /// Drives, and records the ticks around the moment of interest, or all.
+    fn send(&self, target: &Target, recording: u32, recorder: &mut Recorder) -> anyhow::Result<()> {
         self.contestants.iter().try_for_each(|contestant| contestant.check(self.settings))?;
         let map = self.episode.map();
-        let roots: Vec<String> = self.contestants.iter().map(|contestant| root_of(&contestant.name)).collect();
+        let names: Vec<&str> = self.contestants.iter().map(|contestant| contestant.name.as_str()).collect();
+        let roots = roots_of(&names);
         let focus_s = self.focus_tick.map(|tick| {
             let at_s = f64::from(tick) * f64::from(self.episode.config().control_period_s());
             [(at_s - FOCUS_S[0]).max(0.0), at_s + FOCUS_S[1]]
@@ -263,19 +256,27 @@ impl Show<'_> {
         recorder.send(Message::Begin { recording, header: Box::new(header) });
         recorder.send(Message::Always { recording, marks: lot_marks(map, legend::DRIVE) });
         for (index, root) in roots.iter().enumerate() {
-            self.drive(index, root, recording, window, recorder);
+            self.drive(index, root, recording, recorder);
         }
         recorder.send(Message::End { recording });
         Ok(())
     }
 
-    fn drive(&self, index: usize, root: &str, recording: u32, window: Option<[u32; 2]>, recorder: &mut Recorder) {
+    /// First and last tick to record. The viewer begins where a recording does: not long before what is to be seen.
+    fn ticks(&self) -> [u32; 2] {
+        let control_period_s = f64::from(self.episode.config().control_period_s());
+        let [before, after] = AROUND_S.map(|seconds| (seconds / control_period_s) as u32);
+        self.focus_tick.map_or([0, u32::MAX], |tick| [tick.saturating_sub(before), tick.saturating_add(after)])
+    }
+
+    fn drive(&self, index: usize, root: &str, recording: u32, recorder: &mut Recorder) {
         let contestant = &self.contestants[index];
-        let [first, last] = window.unwrap_or([0, u32::MAX]);
+        let [first, last] = self.ticks();
         let drive = Drive::new(root, self.episode, self.settings, Detail::Everything);
         let mut drive = drive.with_planner(contestant.planner(self.settings));
         if self.contestants.len() > 1 {
-            drive = drive.among_others(index);
+            let sources: Vec<Source> = self.contestants.iter().map(Contestant::source).collect();
+            drive = drive.among_others(colours::of_drivers(&sources)[index]);
         }
         recorder.send(Message::Always { recording, marks: drive.always() });
         let mut work = Work::begin(format!("driving: {}", contestant.name));
@@ -302,6 +303,17 @@ impl Show<'_> {
         );
         work.end(&result);
     }
+}
+
+/// The entities of several drivers: short names, for they are titles; the folder of a run, if that tells it from the others.
+fn roots_of(names: &[&str]) -> Vec<String> {
+    let short = |name: &str| {
+        let folder = name.strip_prefix("run:").or_else(|| name.strip_prefix("net:"));
+        root_of(folder.and_then(|folder| Path::new(folder).file_name()?.to_str()).unwrap_or(name))
+    };
+    let all: Vec<String> = names.iter().map(|name| short(name)).collect();
+    let is_alone = |root: &String| all.iter().filter(|other| *other == root).count() == 1;
+    names.iter().zip(&all).map(|(name, root)| if is_alone(root) { root.clone() } else { root_of(name) }).collect()
 }
 
 /// The entity under which a driver is found: its name, without what means something in a path.

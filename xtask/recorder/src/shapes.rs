@@ -9,7 +9,7 @@ use rerun::{
 };
 
 /// Width of arrows and frames on the screen, points.
-const LINE_PT: f32 = 1.0;
+const LINE_PT: f32 = 1.5;
 
 /// Items of several rows one after the other, and how many each row has.
 pub struct Batch<T> {

@@ -10,6 +10,8 @@ pub const EXPERT: Colour = [0x56, 0xB4, 0xE9, 0xFF];
 pub const NOVICE: Colour = [0xE6, 0x9F, 0x00, 0xFF];
 /// A planner, and what it said.
 pub const PLANNER: Colour = [0x00, 0x9E, 0x73, 0xFF];
+/// The field that a planner follows: bright, for its arrows are thin.
+pub const FIELD: Colour = [0x5C, 0xF2, 0xC0, 0xFF];
 /// What went wrong.
 pub const FAILURE: Colour = [0xFF, 0x3B, 0x30, 0xFF];
 /// The safe ring.
@@ -40,10 +42,12 @@ pub fn of_source(source: Source) -> Colour {
     }
 }
 
-/// One of several drivers on the same plot.
-pub fn of_driver(index: usize) -> Colour {
-    const COLOURS: [Colour; 6] = [EXPERT, NOVICE, PLANNER, PATCH, RING, EDGE];
-    COLOURS[index % COLOURS.len()]
+/// Several drivers on the same plots: the first of a kind has the colour of its kind, the others take what is left.
+pub fn of_drivers(sources: &[Source]) -> Vec<Colour> {
+    let mut left = [PATCH, RING, EDGE, BUMP, ROUTE].into_iter().cycle();
+    let is_first = |index: usize| !sources[..index].contains(&sources[index]);
+    let colour = |index| if is_first(index) { Some(of_source(sources[index])) } else { left.next() };
+    (0..sources.len()).filter_map(colour).collect()
 }
 
 /// Obstacles, by what they are.

@@ -26,6 +26,8 @@ use std::sync::Arc;
 const SWEPT_EVERY_M: f32 = 0.5;
 /// Ticks from one picture to the next, candidates included: five a second.
 const PICTURE_EVERY: u32 = 4;
+/// Length of the arrow where a field is strongest, metres: the samples are as far apart.
+const FIELD_M: f32 = 0.96;
 /// Diameter and width of a wheel, metres.
 const WHEEL_M: [f32; 2] = [0.66, 0.22];
 
@@ -103,8 +105,8 @@ impl Drive {
 
     /// Tells its signals from those of other drivers in the same plot.
     #[must_use]
-    pub fn among_others(self, index: usize) -> Self {
-        Self { colour: Some(colours::of_driver(index)), ..self }
+    pub fn among_others(self, colour: Colour) -> Self {
+        Self { colour: Some(colour), ..self }
     }
 
     /// Lets a frame pass that is not shown.
@@ -287,9 +289,12 @@ impl Drive {
                 self.mark("car/candidates", Shape::Strips(strips.collect()))
             }
             Explanation::Field(samples) => {
+                let strongest = samples.iter().map(|sample| sample.field.length()).fold(f32::MIN_POSITIVE, f32::max);
                 let arrows = samples.iter().map(|sample| {
-                    let [x, y] = (0.8 * sample.field).clamp_length_max(1.2).to_array();
-                    Arrow { from: raised(sample.at, 2.0 * LINE_Z_M), vector: [x, y, 0.0], colour: colours::PLANNER }
+                    // Walls push many times as hard as the goal pulls: the root keeps both to be seen.
+                    let length_m = FIELD_M * (sample.field.length() / strongest).sqrt();
+                    let [x, y] = (length_m * sample.field.normalize_or_zero()).to_array();
+                    Arrow { from: raised(sample.at, 5.0 * LINE_Z_M), vector: [x, y, 0.0], colour: colours::FIELD }
                 });
                 self.mark("car/field", Shape::Arrows(arrows.collect()))
             }

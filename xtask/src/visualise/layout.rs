@@ -26,12 +26,9 @@ pub fn of_drives(map: &Map, roots: &[String], detail: Detail) -> Layout {
     let sensors = roots.iter().map(|root| (1.0, sensors_of(root, detail, roots.len() > 1)));
     let beside = Layout::Rows(vec![(1.5, overview), (1.0, Layout::Columns(sensors.collect()))]);
     let top = Layout::Columns(vec![(1.6, Layout::Columns(closely)), (1.0, beside)]);
-    let mut states: Vec<String> = roots.iter().map(|root| format!("{root}/driver")).collect();
-    if detail == Detail::Everything {
-        states.extend(roots.iter().map(|root| format!("{root}/expert_rule")));
-    }
-    let states = view("At the wheel, and the expert's rule", ViewKind::States, states);
-    let states_share = 0.35 + 0.35 * roots.len() as f32;
+    let (states, bars) = states_of(roots, detail);
+    // A title, a scale and a bar each, whole in a window of 900 points.
+    let states_share = 0.25 + 0.31 * bars as f32;
     Layout::Rows(vec![(3.4, top), (states_share, states.into()), (1.4, signals(roots, detail))])
 }
 
@@ -61,6 +58,19 @@ pub fn of_training(with_tables: bool) -> Layout {
     Layout::Rows(vec![(1.2, curves), (1.0, Layout::Columns(rounds))])
 }
 
+/// Who drives and which rule the expert follows, and how many bars that takes. Of several drivers everyone drives alone,
+/// as the titles say; what differs is the expert's rule beside them.
+fn states_of(roots: &[String], detail: Detail) -> (View, usize) {
+    let every = |state: &str| roots.iter().map(|root| format!("{root}/{state}")).collect::<Vec<String>>();
+    let (name, states) = match detail {
+        Detail::Frames => ("At the wheel", every("driver")),
+        Detail::Everything if roots.len() > 1 => ("The expert's rule", every("expert_rule")),
+        Detail::Everything => ("At the wheel, and the expert's rule", [every("driver"), every("expert_rule")].concat()),
+    };
+    let bars = states.len();
+    (view(name, ViewKind::States, states), bars)
+}
+
 fn view(name: &str, kind: ViewKind, contents: Vec<String>) -> View {
     View { name: name.to_owned(), kind, contents, trails: Vec::new() }
 }
@@ -80,7 +90,7 @@ fn around_the_car(root: &str) -> View {
     };
     let contents =
         vec!["lot/**".to_owned(), format!("{root}/**"), format!("-{root}/sensors/**"), format!("-{root}/signals/**")];
-    View { trails: trails(root), ..view(&format!("{root}: around the car"), ViewKind::Scene(eye), contents) }
+    View { trails: trails(root), ..view(&format!("{root}, from behind"), ViewKind::Scene(eye), contents) }
 }
 
 /// Everything from above; cars without what they weigh. `aspect`: width of the view over its height.
@@ -112,10 +122,10 @@ fn trails(root: &str) -> Vec<String> {
 
 fn sensors_of(root: &str, detail: Detail, is_one_of_many: bool) -> Layout {
     let picture = |name: &str, entity: &str| -> Layout {
-        let name = if is_one_of_many { format!("{root}: {name}") } else { name.to_owned() };
-        view(&name, ViewKind::Picture, vec![format!("{root}/sensors/{entity}")]).into()
+        view(name, ViewKind::Picture, vec![format!("{root}/sensors/{entity}")]).into()
     };
-    let mut pictures = vec![picture("grid 25×25", "grid")];
+    // Narrow tabs: the first one names the driver.
+    let mut pictures = vec![picture(if is_one_of_many { root } else { "grid 25×25" }, "grid")];
     if detail == Detail::Everything {
         pictures.extend([picture("view, noisy", "noisy"), picture("view, clean", "clean")]);
     }
@@ -127,17 +137,30 @@ fn sensors_of(root: &str, detail: Detail, is_one_of_many: bool) -> Layout {
 
 fn signals(roots: &[String], detail: Detail) -> Layout {
     let plot = |name: &str, signals: &str, range| {
-        let contents = roots.iter().map(|root| format!("{root}/signals/{signals}/**")).collect();
-        (1.0, Layout::from(view(name, ViewKind::Signals { range }, contents)))
+        let contents = roots.iter().map(|root| format!("{root}/signals/{signals}")).collect();
+        Layout::from(view(name, ViewKind::Signals { range }, contents))
     };
-    let mut plots = vec![
-        plot("Steering, ° (left +)", "steering", None),
-        plot("Speed, m/s", "speed", Some([0.0, 2.4])),
-        plot("Clearance, m; safe ratio", "distance", Some([0.0, 1.5])),
-    ];
+    let distances = Some([0.0, 1.5]);
+    // A line per driver, or all that is known of one.
+    let mut plots = if roots.len() > 1 {
+        vec![
+            plot("Steering, ° (left +)", "steering/actual", None),
+            plot("Speed, m/s", "speed/actual", Some([0.0, 2.6])),
+            Layout::Tabs(vec![
+                plot("Clearance, m", "distance/clearance", distances),
+                plot("Safe ratio", "distance/safe_ratio", Some([0.0, 1.1])),
+            ]),
+        ]
+    } else {
+        vec![
+            plot("Steering, ° (left +)", "steering/**", None),
+            plot("Speed, m/s", "speed/**", Some([0.0, 2.6])),
+            plot("Clearance, m; safe ratio", "distance/**", distances),
+        ]
+    };
     if detail == Detail::Everything {
-        plots.push(plot("Distance to the expert τ̂, image fraction", "discrepancy", Some([0.0, 0.4])));
+        plots.push(plot("τ̂, image fraction", "discrepancy/**", Some([0.0, 0.4])));
     }
-    plots.push(plot("Doubt χ̂, image fraction", "doubt", Some([0.0, 0.2])));
-    Layout::Columns(plots)
+    plots.push(plot("χ̂, image fraction", "doubt/**", Some([0.0, 0.2])));
+    Layout::Columns(plots.into_iter().map(|plot| (1.0, plot)).collect())
 }

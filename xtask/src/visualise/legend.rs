@@ -12,10 +12,11 @@ Drag to turn, right-drag to shift, scroll to zoom; space starts and stops.
 - **Dot and arc ahead**: the look-ahead point and the way to it. Blue: the expert's, orange: the network's, green: a \
 planner's.
 - **Ellipses**: one and two σ of the network's point.
-- **Blue dot beside it**: what the expert would have said there; τ̂ is the distance between the two.
+- **Blue dot beside it**: what the expert would have said there; τ̂ is the distance between the two, χ̂ the network's σ, \
+both as fractions of the view; the network drives only below the red lines τ and χ.
 - **Fan of blue arcs**: the expert's candidates, the better the brighter; blue line: the plan it chose.
 - **Green fan or arrows**: a tentacle's paths, the cheaper the brighter, the chosen one white; the field that VVF and APF \
-follow.
+follow, longer where it is stronger.
 - **Trail**: the swept path, in the colour of whoever drove.
 - **Red dot**: a near-collision. The car is stopped there and put back on the grey path.
 

@@ -133,7 +133,9 @@ fn the_first_look_shows_what_is_there() {
     assert!(kinds.values().all(|kinds| kinds.len() == 1), "{kinds:?}");
     let entities: BTreeSet<&str> =
         kinds.keys().copied().chain(lot.iter().chain(&always).map(|mark| mark.entity.as_str())).collect();
-    for view in layout::of_drives(&map, &["me".to_owned()], Detail::Everything).views() {
+    let [alone, beside_others] =
+        [1, 2].map(|drivers| layout::of_drives(&map, &vec!["me".to_owned(); drivers], Detail::Everything));
+    for view in alone.views().into_iter().chain(beside_others.views()) {
         for shown in view.contents.iter().chain(&view.trails) {
             let path = shown.trim_start_matches('-').trim_end_matches("/**");
             let is_there = entities.iter().any(|entity| *entity == path || entity.starts_with(&format!("{path}/")));
@@ -146,6 +148,10 @@ fn the_first_look_shows_what_is_there() {
 fn roots_mean_nothing_in_a_path() {
     assert_eq!(root_of("run:runs/a b/bc"), "run_runs_a_b_bc");
     assert_eq!(root_of("expert"), "expert");
+    assert_eq!(roots_of(&["run:runs/a", "tuned:vvf", "net:runs/a/round-01"]), ["a", "tuned_vvf", "round-01"]);
+    let colours = colours::of_drivers(&[Source::Expert, Source::Planner, Source::Novice, Source::Planner]);
+    assert_eq!(colours, [colours::EXPERT, colours::PLANNER, colours::NOVICE, colours::PATCH]);
+    assert_eq!(roots_of(&["run:runs/a/bc", "run:runs/b/bc"]), ["run_runs_a_bc", "run_runs_b_bc"]);
 }
 
 #[test]
