@@ -230,10 +230,12 @@ fn tuned_name(spec: &str) -> String {
     format!("{name}, tuned")
 }
 
-/// Measured on two quiet cores of an AMD EPYC (Zen 3): seconds per run that is collected from, and per run driven.
-const COLLECTED_RUN_S: f64 = 1.6;
-/// See [`COLLECTED_RUN_S`].
-const DRIVEN_RUN_S: f64 = 0.85;
+/// Measured on two cores of an AMD EPYC (Zen 3): seconds per run that is collected from, with further looks.
+const COLLECTED_RUN_S: f64 = 1.1;
+/// The same per run driven; networks take longer, planners less.
+const DRIVEN_RUN_S: f64 = 0.25;
+/// The same per run watched, with the answers on held-back samples.
+const WATCHED_RUN_S: f64 = 2.5;
 /// Multiply-adds of a network's answer that training gets through per second, both directions counted as one.
 const TRAINED_PER_S: f64 = 1e10;
 
@@ -265,7 +267,7 @@ impl Stage {
             }
             Step::Watch => {
                 let runs = runs(&evaluation.lots, evaluation.directions.len(), 1, false);
-                (2.0 * rounds + 1.0) * runs * COLLECTED_RUN_S
+                (2.0 * rounds + 1.0) * runs * WATCHED_RUN_S
             }
         }
     }
