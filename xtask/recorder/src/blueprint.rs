@@ -8,7 +8,7 @@ use rerun::RecordingStream;
 use rerun::components::Range1D;
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, ScalarAxis,
+    Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend, ScalarAxis, TimeAxis,
     TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint, VisibleTimeRanges,
 };
 use rerun::external::re_sdk_types::blueprint::components::{
@@ -133,6 +133,9 @@ impl Writer<'_> {
                 if let Some([low, high]) = *range {
                     set("ScalarAxis", &ScalarAxis::new().with_range(Range1D::new(low, high)))?;
                 }
+                // All of it, while the cursor runs through: else a plot follows the cursor, and a first look is empty.
+                let whole = TimeRange { start: TimeRangeBoundary::Infinite, end: TimeRangeBoundary::Infinite };
+                set("TimeAxis", &TimeAxis::new().with_view_range(whole))?;
                 set("PlotLegend", &PlotLegend::new().with_corner(Corner2D::LeftTop))
             }
             ViewKind::Picture | ViewKind::States | ViewKind::Log | ViewKind::Document => Ok(()),
