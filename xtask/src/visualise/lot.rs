@@ -10,7 +10,7 @@ use sim::scenario::{Island, Obstacle, ObstacleClass};
 const AREA_STEP_M: f32 = 0.2;
 /// Ground, lines on it and what is drawn over those, metres above ground: enough to keep them apart on the screen.
 const GROUND_Z_M: f32 = -0.02;
-/// See [`GROUND_Z_M`].
+/// Height at which lines are drawn, metres: above the ground, so that it does not hide them.
 pub const LINE_Z_M: f32 = 0.02;
 
 /// Everything that stands still.
