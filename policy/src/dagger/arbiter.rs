@@ -101,15 +101,7 @@ impl Arbiter {
 
     /// Line 6, for all seats at once; each expert sees only its own seat.
     fn ask_experts(&mut self, seats: &[Seat<'_>]) -> Vec<Decision> {
-        let mut waiting = seats.iter().peekable();
-        let mut asked: Vec<_> = self
-            .experts
-            .iter_mut()
-            .enumerate()
-            .filter_map(|(episode, expert)| Some((expert, waiting.next_if(|seat| seat.episode == episode)?)))
-            .collect();
-        assert!(waiting.peek().is_none(), "seats come in the order of their episodes, and each has an expert");
-        asked
+        at_seats(&mut self.experts, seats)
             .par_iter_mut()
             .map(|(expert, seat)| {
                 if seat.was_reset {
@@ -119,20 +111,11 @@ impl Arbiter {
             })
             .collect()
     }
-}
 
-impl Arbiter {
     /// Line 15 for all seats at once, with further looks.
     fn write_down(&mut self, seats: &[Seat<'_>], kept: &[Option<Sample>]) {
-        let mut waiting = seats.iter().peekable();
-        let mut records: Vec<_> = self
-            .seats
-            .iter_mut()
-            .enumerate()
-            .filter_map(|(episode, record)| Some((record, waiting.next_if(|seat| seat.episode == episode)?)))
-            .collect();
-        records.par_iter_mut().for_each(|(record, seat)| {
-            if let Some(sample) = kept[seat.episode] {
+        at_seats(&mut self.seats, seats).par_iter_mut().zip(kept).for_each(|((record, seat), kept)| {
+            if let Some(sample) = *kept {
                 record.keep(sample, &seat.situation.truth);
             }
             record.ticks += 1;
@@ -140,18 +123,30 @@ impl Arbiter {
     }
 }
 
+/// What belongs to the episodes that wait for a decision, of what there is one of for every episode.
+fn at_seats<'a, 's, T>(of_episodes: &'a mut [T], seats: &'a [Seat<'s>]) -> Vec<(&'a mut T, &'a Seat<'s>)> {
+    let mut waiting = seats.iter().peekable();
+    let found = of_episodes
+        .iter_mut()
+        .enumerate()
+        .filter_map(|(episode, item)| Some((item, waiting.next_if(|seat| seat.episode == episode)?)))
+        .collect();
+    assert!(waiting.peek().is_none(), "seats come in the order of their episodes, one at most of each");
+    found
+}
+
 impl Fleet for Arbiter {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
         let predictions = self.novice.as_mut().map(|novice| novice.predict(&grids)); // line 5
         let expert_decisions = self.ask_experts(seats); // line 6
-        let mut kept: Vec<Option<Sample>> = vec![None; self.seats.len()];
+        let mut kept: Vec<Option<Sample>> = Vec::with_capacity(seats.len());
         for (index, (seat, expert)) in seats.iter().zip(expert_decisions).enumerate() {
             let a_exp = expert.look_ahead.to_image_fraction(&self.geometry).map(|fraction| fraction.clamp(0.0, 1.0));
             let grid = seat.situation.observation.grid;
             self.n_tot += 1; // line 17
             let Some(predicted) = predictions.as_ref().map(|predictions| predictions[index]) else {
-                kept[seat.episode] = Some(Sample { grid, label: a_exp, tau_hat: 0.0 });
+                kept.push(Some(Sample { grid, label: a_exp, tau_hat: 0.0 }));
                 decisions.push(expert);
                 continue;
             };
@@ -164,11 +159,10 @@ impl Fleet for Arbiter {
             } else {
                 decisions.push(expert); // line 14
             }
-            if !trusts_novice || self.keep == Keep::EveryTick {
-                // Line 15. τ̂ is a distance within the unit square, up to √2; the weight is meant for 0…1.
-                let tau_hat = evidence.discrepancy.min(1.0);
-                kept[seat.episode] = Some(Sample { grid, label: a_exp, tau_hat });
-            }
+            // Line 15. τ̂ is a distance within the unit square, up to √2; the weight is meant for 0…1.
+            let tau_hat = evidence.discrepancy.min(1.0);
+            let is_kept = !trusts_novice || self.keep == Keep::EveryTick;
+            kept.push(is_kept.then_some(Sample { grid, label: a_exp, tau_hat }));
         }
         self.write_down(seats, &kept);
     }
