@@ -35,9 +35,9 @@ pub struct DaggerConfig {
     /// Which labelled ticks enter the data set.
     pub keep: Keep,
     /// Further looks at every kept tick, each with noise of its own, trained on with the same label: what is noise and
-    /// what is not is learned sooner than it is from driving more.
+    /// what is not is learned sooner than it is from driving more. At most 255: each has a stream of its own.
     #[serde(default)]
-    pub relooks: u32,
+    pub relooks: u8,
     /// Where each iteration's training starts.
     pub start: StartFrom,
     /// Where the network is computed.
