@@ -9,7 +9,6 @@
 //! | [`run_report`], [`learning`] | `report.html` and `learning.csv` of a run |
 //! | [`lots`], [`drivers`] | what can be named on the command line |
 //! | [`trials`] | which obstacles and which noise a trial has |
-//! | [`statistics`] | intervals and comparisons |
 //! | [`failures`], [`replay_key`] | near-collisions one by one, and how to see one again |
 //! | [`table1`], [`summary`], [`report`], [`page`], [`paper`] | what is printed and written |
 //! | [`run_dir`] | the folder of a run and how it is claimed |
@@ -41,7 +40,6 @@ pub mod reproduce;
 pub mod run_dir;
 pub mod run_report;
 pub mod settings;
-pub mod statistics;
 pub mod summary;
 pub mod table1;
 pub mod train;

@@ -1,7 +1,7 @@
 //! `metres`: how far must be driven.
 
 use crate::cli::MetresArgs;
-use crate::statistics::metres::{Question, to_bound};
+use statistics::metres::{Question, to_bound};
 use anyhow::ensure;
 
 /// The command.

@@ -5,8 +5,8 @@ use crate::failures::Cause;
 use crate::paper::{self, PaperLot, PaperResult};
 use crate::run_dir::RunDir;
 use crate::settings::{EvaluationSettings, NoiseChoice};
-use crate::statistics::bootstrap::{DRAWS, Interval};
-use crate::statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
+use statistics::bootstrap::{DRAWS, Interval};
+use statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
 use crate::summary::{Comparison, Ledger, Scope, Standing, Totals};
 use crate::trials::Job;
 use comfy_table::{Table, presets};
@@ -626,7 +626,7 @@ mod tests {
         let totals = Totals { near_collisions: 71, reference_m: 5180.0, ..Totals::default() };
         let interval = Interval { estimate: 1.37, lower: 0.9, upper: 2.0 };
         let standing = |index| Standing {
-            dispersion: Some(crate::statistics::poisson::Dispersion { index, freedom: 9, p_value: 0.1 }),
+            dispersion: Some(statistics::poisson::Dispersion { index, freedom: 9, p_value: 0.1 }),
             per_100m: Some(interval),
             safe_ratio: None,
         };

@@ -13,7 +13,7 @@ use crate::plots::{self, AxisCalibration, Distribution, EtaSeries, NoisePoint, N
 use crate::progress::{Stopwatch, Work};
 use crate::run_dir;
 use crate::settings::{NoiseChoice, Settings};
-use crate::statistics::poisson::DISPERSION_MAX;
+use statistics::poisson::DISPERSION_MAX;
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
 use policy::dataset::Dataset;

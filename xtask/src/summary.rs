@@ -8,7 +8,7 @@ pub use scopes::{Comparison, Scope, Standing};
 use crate::evaluate::Plan;
 use crate::failures::Cause;
 use crate::lots::Lot;
-use crate::statistics::poisson::Rate;
+use statistics::poisson::Rate;
 use crate::trials::Job;
 use serde::Serialize;
 use sim::episode::{Ending, EpisodeReport};

@@ -11,7 +11,7 @@ use crate::paper::{self, PaperLot};
 use crate::plots::{self, AxisCalibration, Bar, BarGroup, EtaSeries, RateRow};
 use crate::report::{csv_of, difference, exact_rate, quoted_rate, table_of};
 use crate::run_dir::RunDir;
-use crate::statistics::poisson::Rate;
+use statistics::poisson::Rate;
 use crate::summary::{Ledger, Scope};
 use anyhow::Context as _;
 use policy::dagger::IterationRow;

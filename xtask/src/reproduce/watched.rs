@@ -8,7 +8,7 @@ use crate::plots::AxisCalibration;
 use crate::progress::Work;
 use crate::run_dir::{self, RunDir};
 use crate::settings::Settings;
-use crate::statistics::bootstrap::{DRAWS, Interval, Units};
+use statistics::bootstrap::{DRAWS, Interval, Units};
 use crate::trials::{self, Job, Purpose};
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
@@ -234,7 +234,7 @@ fn ratio([first, second]: &[Vec<f64>; 2], stretch: usize, seed: RootSeed) -> Opt
         units.push(&[first.iter().sum(), second.iter().sum()]);
     }
     let of_sums = |sums: &[f64], out: &mut [f64]| out[0] = sums[0] / sums[1].max(f64::MIN_POSITIVE);
-    units.percentile_intervals(seed, DRAWS, 1, of_sums).pop()
+    units.percentile_intervals(seed, DRAWS, 1, &of_sums).pop()
 }
 
 /// Both axes of a policy on labelled states.

@@ -1,9 +1,9 @@
 //! What is looked at together, and how drivers stand there.
 
 use super::{Ledger, Unit};
-use crate::statistics::bootstrap::{DRAWS, Interval, Units};
-use crate::statistics::comparison::{RateRatio, holm};
-use crate::statistics::poisson::Dispersion;
+use statistics::bootstrap::{DRAWS, Interval, Units};
+use statistics::comparison::{RateRatio, holm};
+use statistics::poisson::Dispersion;
 use serde::Serialize;
 use sim::seed::RootSeed;
 
@@ -204,5 +204,5 @@ fn bootstrap(pairs: &[Vec<Unit>], others: &[usize], with: usize, seed: RootSeed)
             }
         }
     };
-    (largest > 1).then(|| units.percentile_intervals(seed, DRAWS, STATISTICS * (drivers + others.len()), of_sums))
+    (largest > 1).then(|| units.percentile_intervals(seed, DRAWS, STATISTICS * (drivers + others.len()), &of_sums))
 }

@@ -3,7 +3,7 @@
 //! A unit is a row of sums (events, metres, … of every driver in the same place), so that resampling rows is paired: all
 //! drivers get the same units in every draw. Rows are drawn with replacement within their stratum.
 
-use super::poisson::CONFIDENCE;
+use crate::poisson::CONFIDENCE;
 use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -68,7 +68,7 @@ impl Units {
         seed: RootSeed,
         draws: u64,
         statistics: usize,
-        of_sums: impl Fn(&[f64], &mut [f64]) + Sync,
+        of_sums: &(dyn Fn(&[f64], &mut [f64]) + Sync),
     ) -> Vec<Interval> {
         let mut estimates = vec![0.0; statistics];
         let mut sums = vec![0.0; self.columns];
@@ -130,7 +130,7 @@ mod tests {
         for &value in values {
             units.push(&[value, 1.0]);
         }
-        units.percentile_intervals(RootSeed(1), draws, 1, |sums, out| out[0] = sums[0] / sums[1])[0]
+        units.percentile_intervals(RootSeed(1), draws, 1, &|sums, out| out[0] = sums[0] / sums[1])[0]
     }
 
     #[test]
@@ -163,7 +163,7 @@ mod tests {
                 units.push(&[shared + 1.0, shared, 1.0]);
             }
         }
-        let intervals = units.percentile_intervals(RootSeed(1), 500, 2, |sums, out| {
+        let intervals = units.percentile_intervals(RootSeed(1), 500, 2, &|sums, out| {
             out[0] = (sums[0] - sums[1]) / sums[2];
             out[1] = sums[2];
         });

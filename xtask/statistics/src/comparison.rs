@@ -1,6 +1,6 @@
 //! Two rates compared exactly, as if every event were independent of the others.
 
-use super::poisson::CONFIDENCE;
+use crate::poisson::CONFIDENCE;
 use serde::Serialize;
 use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, Discrete as _};
 

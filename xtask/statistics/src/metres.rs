@@ -1,6 +1,6 @@
 //! How far must be driven: before an evaluation, not after it.
 
-use super::poisson;
+use crate::poisson;
 use statrs::distribution::{Binomial, ContinuousCDF as _, Discrete as _, DiscreteCDF as _, Normal, Poisson};
 
 /// Expected events of both drivers up to which the power is computed exactly; beyond, the square-root approximation is
