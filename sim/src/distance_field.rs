@@ -9,11 +9,20 @@ use crate::geometry::{Vec2, distance_to_segment, edges, polygon_contains};
 pub const NODE_M: f32 = 0.1;
 /// Distances are capped here, metres: nothing asks for more.
 pub const CAP_M: f32 = 3.0;
-/// The gradient of a bilinear interpolant of a 1-Lipschitz function is at most √2.
-pub const LIPSCHITZ: f32 = std::f32::consts::SQRT_2;
-/// Largest difference between a look-up at the nearest node and an interpolated one: half a diagonal away, times
-/// [`LIPSCHITZ`].
-pub const NEAREST_NODE_M: f32 = NODE_M;
+
+/// How much [`DistanceField::at`] may differ, anywhere within `radius_m` of a place, from the value at the node nearest
+/// to that place, metres.
+///
+/// Nodes hold distances, so they differ by no more than they are apart. An interpolated value is a mean of four of
+/// them, whose weights w put the mean at the point p: for any node c, Σ w |n − c| ≤ √(|p − c|² + Σ w |n − p|²), and
+/// the second term, f(1 − f) per axis, is at most half a squared spacing.
+#[must_use]
+pub fn change_max_m(radius_m: f32) -> f32 {
+    /// Rounding of single precision, with a lot to spare.
+    const ROUNDING_M: f32 = 1e-4;
+    let to_node_m = std::f32::consts::FRAC_1_SQRT_2 * NODE_M;
+    (radius_m + to_node_m).hypot(std::f32::consts::FRAC_1_SQRT_2 * NODE_M) + ROUNDING_M
+}
 
 /// Signed distance to the non-drivable set, metres: positive in drivable space.
 #[derive(Debug, Clone)]
@@ -74,7 +83,7 @@ impl DistanceField {
         a + fy * (b - a)
     }
 
-    /// Signed distance at the nearest node, metres: within [`NEAREST_NODE_M`] of [`Self::at`], and much faster.
+    /// Signed distance at the nearest node, metres: within [`change_max_m`] of [`Self::at`] around it, and much faster.
     #[inline]
     pub fn at_nearest_node(&self, point: Vec2) -> f32 {
         let node = (point - self.origin) * (1.0 / NODE_M) + Vec2::splat(0.5);

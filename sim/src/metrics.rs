@@ -1,7 +1,7 @@
 //! What is measured on a run (methods.md 8): always on the clean map.
 
 use crate::collision::ObstacleSet;
-use crate::distance_field::{DistanceField, LIPSCHITZ, NEAREST_NODE_M};
+use crate::distance_field::{DistanceField, change_max_m};
 use crate::driver::Source;
 use crate::episode::{Event, Frame};
 use crate::geometry::{Pose, Vec2, distance_to_segment, edges, polygon_contains};
@@ -118,7 +118,7 @@ impl SafeRing {
         let world_from_ego = pose.world_from_ego();
         // A block whose centre is farther from a boundary than its corner pixels are from it is decided by one look-up.
         let to_corner_m = std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (BLOCK - 1) as f32;
-        let sure_m = LIPSCHITZ * to_corner_m + NEAREST_NODE_M;
+        let sure_m = change_max_m(to_corner_m);
         let mut drivable = 0;
         for block in &self.blocks {
             let centre_m = distance.at_nearest_node(world_from_ego.point(block.centre));

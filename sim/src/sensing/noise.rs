@@ -199,10 +199,13 @@ pub(super) struct Shadow {
     cols: usize,
     /// Rank of the local noise within the shadow, 0…255: a threshold is then a share of the area.
     ranks: Vec<u8>,
+    /// Lowest and highest rank that any pixel of a grid cell centred here can have.
+    ranks_around: Vec<(u8, u8)>,
 }
 
 impl Shadow {
-    fn new(polygon: Vec<Vec2>, seed: u64) -> Self {
+    /// `cell_radius_m`: from the centre of a grid cell to its farthest pixel.
+    fn new(polygon: Vec<Vec2>, seed: u64, cell_radius_m: f32) -> Self {
         let (low, high) = crate::distance_field::bounds(&polygon);
         let size = ((high - low) / SHADOW_CELL_M).ceil();
         let (cols, rows) = (size.x as usize + 1, size.y as usize + 1);
@@ -216,15 +219,38 @@ impl Shadow {
         let mut sorted = noise.clone();
         sorted.sort_by(f32::total_cmp);
         let rank = |value: f32| (sorted.partition_point(|&other| other < value) * 255 / sorted.len()) as u8;
-        let ranks = noise.iter().map(|&value| rank(value)).collect();
-        Self { region: Region::new(polygon), origin: low, cols, ranks }
+        let ranks: Vec<u8> = noise.iter().map(|&value| rank(value)).collect();
+        // Both the centre and the pixel are rounded to a raster cell.
+        let ranks_around = extremes_around(&ranks, cols, (cell_radius_m / SHADOW_CELL_M + 1.0) as usize);
+        Self { region: Region::new(polygon), origin: low, cols, ranks, ranks_around }
     }
 
     #[inline]
     pub(super) fn is_misread(&self, point: Vec2, threshold: u8) -> bool {
-        let cell = ((point - self.origin) / SHADOW_CELL_M + Vec2::splat(0.5)).max(Vec2::ZERO);
-        let index = (cell.y as usize * self.cols + cell.x as usize).min(self.ranks.len() - 1);
-        self.ranks[index] >= threshold
+        self.ranks[self.index(point)] >= threshold
+    }
+
+    /// Whether pixels of the shadow in the grid cell around a point are misread: none of them, all of them, or (`None`)
+    /// one must look.
+    #[inline]
+    pub(super) fn are_misread_around(&self, point: Vec2, threshold: u8) -> Option<bool> {
+        let (low, high) = self.ranks_around[self.index(point)];
+        if high < threshold {
+            Some(false)
+        } else if low >= threshold {
+            Some(true)
+        } else {
+            None
+        }
+    }
+
+    #[inline]
+    fn index(&self, point: Vec2) -> usize {
+        let rows = self.ranks.len() / self.cols;
+        let cell = (point - self.origin) * (1.0 / SHADOW_CELL_M) + Vec2::splat(0.5);
+        let col = (cell.x.max(0.0) as i32 as usize).min(self.cols - 1);
+        let row = (cell.y.max(0.0) as i32 as usize).min(rows - 1);
+        row * self.cols + col
     }
 }
 
@@ -240,8 +266,8 @@ pub struct NoiseField {
 }
 
 impl NoiseField {
-    /// Draws the latents of an episode on a map.
-    pub fn new(map: &Map, config: &NoiseConfig, seed: RootSeed) -> Self {
+    /// Draws the latents of an episode on a map. `cell_radius_m`: from the centre of a grid cell to its farthest pixel.
+    pub(super) fn new(map: &Map, config: &NoiseConfig, seed: RootSeed, cell_radius_m: f32) -> Self {
         let amount = |layer: f32| config.intensity * layer;
         let mut field = Self {
             seed: seed.child(Stream::Sensor, 0).0,
@@ -253,7 +279,7 @@ impl NoiseField {
         };
         // One stream per layer: strengthening one layer never moves another.
         let rng = |layer: u64| seed.rng(Stream::Sensor, 1 + layer);
-        field.cast_shadows(map, amount(config.shadow), &mut rng(0));
+        field.cast_shadows(map, amount(config.shadow), cell_radius_m, &mut rng(0));
         field.misread_speed_bumps(map, amount(config.speed_bump), &mut rng(1));
         field.open_boundaries(map, amount(config.false_free), &mut rng(2));
         field.scatter_blobs(map, amount(config.blob), &mut rng(3));
@@ -302,7 +328,7 @@ impl NoiseField {
     }
 
     /// Shadows of things beside the lane (cars, trees, buildings), 1.5–3 object heights long, along the sun.
-    fn cast_shadows(&mut self, map: &Map, amount: f32, rng: &mut Rng) {
+    fn cast_shadows(&mut self, map: &Map, amount: f32, cell_radius_m: f32, rng: &mut Rng) {
         let sun_azimuth_rad = rng.random_range(-std::f32::consts::PI..std::f32::consts::PI);
         let away_from_sun = Vec2::from_angle(sun_azimuth_rad);
         along_route(map, SHADOW_SPACING_M, amount, rng, |place, rng| {
@@ -316,7 +342,7 @@ impl NoiseField {
             let across = away_from_sun.perp() * (0.5 * width_m);
             let tip = foot + away_from_sun * length_m;
             let polygon = vec![foot - across, tip - 0.8 * across, tip + 0.8 * across, foot + across];
-            self.shadows.push(Shadow::new(polygon, rng.random()));
+            self.shadows.push(Shadow::new(polygon, rng.random(), cell_radius_m));
         });
     }
 
@@ -476,6 +502,25 @@ impl Lattice {
         });
         near + fy * (far - near)
     }
+}
+
+/// Lowest and highest value within `reach` cells along both axes of every cell of a raster.
+fn extremes_around(values: &[u8], cols: usize, reach: usize) -> Vec<(u8, u8)> {
+    let rows = values.len() / cols;
+    let join = |(low, high): (u8, u8), &(l, h): &(u8, u8)| (low.min(l), high.max(h));
+    let pairs: Vec<(u8, u8)> = values.iter().map(|&value| (value, value)).collect();
+    // Along the rows, then along the columns.
+    let along = |pairs: &[(u8, u8)], n: usize, at: &dyn Fn(usize, usize) -> usize| {
+        let others = pairs.len() / n;
+        let mut joined = vec![(u8::MAX, 0); pairs.len()];
+        for (other, i) in (0..others).flat_map(|other| (0..n).map(move |i| (other, i))) {
+            let near = i.saturating_sub(reach)..=(i + reach).min(n - 1);
+            joined[at(other, i)] = near.map(|i| &pairs[at(other, i)]).fold((u8::MAX, 0), join);
+        }
+        joined
+    };
+    let in_rows = along(&pairs, cols, &|row, col| row * cols + col);
+    along(&in_rows, rows, &|col, row| row * cols + col)
 }
 
 /// Cubic fade from 0 to 1.

@@ -1,7 +1,7 @@
 //! Fast max-pooling of a distance field: most cells are decided by one look-up.
 
 use super::{BEV_PIXELS, CELL_PIXELS, GridGeometry};
-use crate::distance_field::{DistanceField, LIPSCHITZ, NEAREST_NODE_M};
+use crate::distance_field::{DistanceField, change_max_m};
 use crate::geometry::{Pose, Vec2};
 
 /// World positions of the pixel centres of one view. The only place where pixels are turned into world points, so
@@ -12,7 +12,16 @@ pub(super) struct PixelLattice {
     origin: Vec2,
     per_row: Vec2,
     per_col: Vec2,
-    pixel_m: f32,
+    /// How much the field may change from the centre of a block of 2ⁱ × 2ⁱ pixels to any of them.
+    all_within_m: [f32; LEVELS],
+}
+
+/// Sizes of blocks: 1, 2, 4 and 8 pixels, a cell.
+const LEVELS: usize = CELL_PIXELS.ilog2() as usize + 1;
+
+/// Distance from the centre of a block of `side` × `side` pixels to the farthest pixel centre.
+pub(super) fn to_corner_m(pixel_m: f32, side: usize) -> f32 {
+    std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (side - 1) as f32
 }
 
 impl PixelLattice {
@@ -24,7 +33,7 @@ impl PixelLattice {
             origin: world_from_ego.point(geometry.pixel_in_ego(0, 0)),
             per_row: -ahead * pixel_m,
             per_col: -ahead.perp() * pixel_m,
-            pixel_m,
+            all_within_m: std::array::from_fn(|level| change_max_m(to_corner_m(pixel_m, 1 << level))),
         }
     }
 
@@ -44,30 +53,29 @@ impl PixelLattice {
 
     /// Whether any pixel of a cell has a signed distance of at most `threshold_m`.
     ///
-    /// The interpolated field changes by at most [`LIPSCHITZ`] per metre, so a block of pixels whose centre is far
-    /// enough from the threshold is decided by one look-up; the others are quartered.
+    /// A block of pixels whose centre is far enough from the threshold is decided by one look-up; the others are
+    /// quartered.
     #[inline]
     pub(super) fn any_below(&self, field: &DistanceField, row: usize, col: usize, threshold_m: f32) -> bool {
         let first = |index: usize| (index * CELL_PIXELS) as f32;
-        self.block_below(field, first(row), first(col), CELL_PIXELS, threshold_m)
+        self.block_below(field, first(row), first(col), LEVELS - 1, threshold_m)
     }
 
-    fn block_below(&self, field: &DistanceField, row: f32, col: f32, size: usize, threshold_m: f32) -> bool {
-        if size == 1 {
+    fn block_below(&self, field: &DistanceField, row: f32, col: f32, level: usize, threshold_m: f32) -> bool {
+        if level == 0 {
             return field.at(self.point(row, col)) <= threshold_m;
         }
-        // √2 of the gradient times √2/2 of the diagonal: the side itself bounds the change towards a corner pixel.
-        let bound_m = |side_pixels: usize| LIPSCHITZ * LIPSCHITZ * 0.5 * self.pixel_m * side_pixels as f32;
-        let to_centre = 0.5 * (size - 1) as f32;
+        let to_centre = 0.5 * ((1 << level) - 1) as f32;
         let centre_m = field.at_nearest_node(self.point(row + to_centre, col + to_centre));
-        if centre_m > threshold_m + bound_m(size - 1) + NEAREST_NODE_M {
+        if centre_m > threshold_m + self.all_within_m[level] {
             return false;
         }
-        if centre_m < threshold_m - bound_m(1) - NEAREST_NODE_M {
+        // The four pixels around the centre.
+        if centre_m < threshold_m - self.all_within_m[1] {
             return true;
         }
-        let half = size / 2;
-        let quarters = [(0, 0), (0, half), (half, 0), (half, half)];
-        quarters.into_iter().any(|(r, c)| self.block_below(field, row + r as f32, col + c as f32, half, threshold_m))
+        let half = (1 << (level - 1)) as f32;
+        let quarters = [(0.0, 0.0), (0.0, half), (half, 0.0), (half, half)];
+        quarters.into_iter().any(|(r, c)| self.block_below(field, row + r, col + c, level - 1, threshold_m))
     }
 }

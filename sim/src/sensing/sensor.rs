@@ -5,10 +5,10 @@ mod inspect;
 pub use inspect::Inspection;
 
 use super::noise::{NoiseConfig, NoiseField, Patch, Reads, Region, Shadow};
-use super::quadtree::PixelLattice;
+use super::quadtree::{PixelLattice, to_corner_m};
 use super::smear::{ConvexInEgo, hidden_ground};
 use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
-use crate::distance_field::{LIPSCHITZ, NEAREST_NODE_M};
+use crate::distance_field::change_max_m;
 use crate::geometry::{Pose, Vec2, WorldFromEgo};
 use crate::map::Map;
 use crate::seed::RootSeed;
@@ -46,7 +46,8 @@ pub struct Sensor {
 impl Sensor {
     /// A sensor whose noise is drawn from `seed`.
     pub fn new(map: &Map, config: SensingConfig, noise: &NoiseConfig, seed: RootSeed) -> Self {
-        Self { config, noise: NoiseField::new(map, noise, seed), last: None }
+        let cell_radius_m = to_corner_m(config.geometry.pixel_m(), CELL_PIXELS);
+        Self { config, noise: NoiseField::new(map, noise, seed, cell_radius_m), last: None }
     }
 
     /// What the car perceives from a pose at a tick.
@@ -65,13 +66,12 @@ impl Sensor {
         let ego = EgoView::new(geometry, pose);
         let openings = self.openings(&ego, tick);
         let shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
+        let within_cell_m = change_max_m(to_corner_m(geometry.pixel_m(), CELL_PIXELS));
         let mut grid = OccupancyGrid::free();
         for row in 0..GRID_CELLS {
             let ahead_of_patch_m = geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m;
             // A cell whose centre is this far from a boundary is decided without looking at the noise.
-            let sure_m = self.noise.boundary_shift_max_m(ahead_of_patch_m)
-                + LIPSCHITZ * geometry.cell_m() * std::f32::consts::FRAC_1_SQRT_2
-                + NEAREST_NODE_M;
+            let sure_m = self.noise.boundary_shift_max_m(ahead_of_patch_m) + within_cell_m;
             let mut occupied = 0;
             for col in 0..GRID_CELLS {
                 let centre = ego.lattice.cell_centre(row, col);
@@ -94,15 +94,26 @@ impl Sensor {
             polygon.occupy(geometry, &mut grid);
         }
         self.for_each_shadow(&ego, tick, |polygon, shadow, threshold| {
+            // Cells of which no pixel can be misread.
+            let mut is_read = OccupancyGrid::free();
             polygon.for_each_row(geometry, |row, first, last| {
+                let cell_row = row / CELL_PIXELS;
                 for cell_col in first / CELL_PIXELS..=last / CELL_PIXELS {
-                    if grid.is_occupied(row / CELL_PIXELS, cell_col) {
+                    if grid.is_occupied(cell_row, cell_col) || is_read.is_occupied(cell_row, cell_col) {
                         continue;
                     }
-                    let (cell_first, cell_last) = (cell_col * CELL_PIXELS, (cell_col + 1) * CELL_PIXELS - 1);
-                    let mut cols = first.max(cell_first)..=last.min(cell_last);
-                    if cols.any(|col| shadow.is_misread(ego.lattice.point(row as f32, col as f32), threshold)) {
-                        grid.set_occupied(row / CELL_PIXELS, cell_col);
+                    match shadow.are_misread_around(ego.lattice.cell_centre(cell_row, cell_col), threshold) {
+                        Some(true) => grid.set_occupied(cell_row, cell_col),
+                        Some(false) => is_read.set_occupied(cell_row, cell_col),
+                        None => {
+                            let (cell_first, cell_last) = (cell_col * CELL_PIXELS, (cell_col + 1) * CELL_PIXELS - 1);
+                            let mut cols = first.max(cell_first)..=last.min(cell_last);
+                            let is_misread =
+                                |col: usize| shadow.is_misread(ego.lattice.point(row as f32, col as f32), threshold);
+                            if cols.any(is_misread) {
+                                grid.set_occupied(cell_row, cell_col);
+                            }
+                        }
                     }
                 }
             });
