@@ -92,6 +92,17 @@ impl DistanceField {
         self.values_m[row as usize * self.cols + col as usize]
     }
 
+    /// A vector that points away from what is near, at the nearest node; of no particular length.
+    #[inline]
+    pub fn away_at_nearest_node(&self, point: Vec2) -> Vec2 {
+        let node = (point - self.origin) * (1.0 / NODE_M) + Vec2::splat(0.5);
+        let col = node.x.clamp(1.0, (self.cols - 2) as f32) as i32;
+        let row = node.y.clamp(1.0, (self.rows - 2) as f32) as i32;
+        let here = row as usize * self.cols + col as usize;
+        let along = |step: usize| self.values_m[here + step] - self.values_m[here - step];
+        Vec2::new(along(1), along(self.cols))
+    }
+
     /// Lower-left and upper-right corners of the raster, world metres.
     pub fn bounds(&self) -> (Vec2, Vec2) {
         (self.origin, self.origin + Vec2::new((self.cols - 1) as f32, (self.rows - 1) as f32) * NODE_M)

@@ -1,8 +1,8 @@
 //! `metres`: how far must be driven.
 
 use crate::cli::MetresArgs;
-use statistics::metres::{Question, to_bound};
 use anyhow::ensure;
+use statistics::metres::{Question, to_bound};
 
 /// The command.
 ///

@@ -5,14 +5,14 @@ use crate::failures::Cause;
 use crate::paper::{self, PaperLot, PaperResult};
 use crate::run_dir::RunDir;
 use crate::settings::{EvaluationSettings, NoiseChoice};
-use statistics::bootstrap::{DRAWS, Interval};
-use statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
 use crate::summary::{Comparison, Ledger, Scope, Standing, Totals};
 use crate::trials::Job;
 use comfy_table::{Table, presets};
 use serde::Serialize;
 use sim::episode::{Ending, EpisodeReport};
 use sim::scenario::Direction;
+use statistics::bootstrap::{DRAWS, Interval};
+use statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
 use std::fmt::Write as _;
 
 /// A table that is both readable in a terminal and Markdown.

@@ -13,13 +13,13 @@ use crate::plots::{self, AxisCalibration, Distribution, EtaSeries, NoisePoint, N
 use crate::progress::{Stopwatch, Work};
 use crate::run_dir;
 use crate::settings::{NoiseChoice, Settings};
-use statistics::poisson::DISPERSION_MAX;
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
 use policy::dataset::Dataset;
 use policy::dataset::store::Store;
 use policy::network::Predictor;
 use sources::{Evaluation, Failure, Row, Sources, Training};
+use statistics::poisson::DISPERSION_MAX;
 use std::fmt::Write as _;
 use std::path::Path;
 

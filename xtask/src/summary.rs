@@ -8,11 +8,11 @@ pub use scopes::{Comparison, Scope, Standing};
 use crate::evaluate::Plan;
 use crate::failures::Cause;
 use crate::lots::Lot;
-use statistics::poisson::Rate;
 use crate::trials::Job;
 use serde::Serialize;
 use sim::episode::{Ending, EpisodeReport};
 use sim::scenario::Direction;
+use statistics::poisson::Rate;
 use std::collections::BTreeMap;
 
 /// Sums over runs.

@@ -53,12 +53,17 @@ impl PixelLattice {
 
     /// Whether any pixel of a cell has a signed distance of at most `threshold_m`.
     ///
-    /// A block of pixels whose centre is far enough from the threshold is decided by one look-up; the others are
-    /// quartered.
+    /// Most cells on a boundary have such a pixel in the corner that is nearest to it. Elsewhere, a block of pixels whose
+    /// centre is far enough from the threshold is decided by one look-up; the others are quartered.
     #[inline]
     pub(super) fn any_below(&self, field: &DistanceField, row: usize, col: usize, threshold_m: f32) -> bool {
-        let first = |index: usize| (index * CELL_PIXELS) as f32;
-        self.block_below(field, first(row), first(col), LEVELS - 1, threshold_m)
+        let [first_row, first_col] = [row, col].map(|index| (index * CELL_PIXELS) as f32);
+        let away = field.away_at_nearest_node(self.cell_centre(row, col));
+        let last = (CELL_PIXELS - 1) as f32;
+        let corner_row = if away.dot(self.per_row) < 0.0 { first_row + last } else { first_row };
+        let corner_col = if away.dot(self.per_col) < 0.0 { first_col + last } else { first_col };
+        field.at(self.point(corner_row, corner_col)) <= threshold_m
+            || self.block_below(field, first_row, first_col, LEVELS - 1, threshold_m)
     }
 
     fn block_below(&self, field: &DistanceField, row: f32, col: f32, level: usize, threshold_m: f32) -> bool {

@@ -7,13 +7,13 @@ use crate::evaluate::Plan;
 use crate::failures::Cause;
 use crate::paper;
 use crate::report::{difference, exact_rate};
+use crate::summary::{Comparison, Ledger, Scope, Totals};
+use policy::dagger::IterationRow;
+use serde::Serialize;
 use statistics::bootstrap::Interval;
 use statistics::comparison::RateRatio;
 use statistics::metres::Question;
 use statistics::poisson::{CONFIDENCE, upper_bound};
-use crate::summary::{Comparison, Ledger, Scope, Totals};
-use policy::dagger::IterationRow;
-use serde::Serialize;
 
 /// The paper's driver.
 pub const DAGGER: &str = "DAgger";

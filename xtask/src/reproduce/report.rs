@@ -11,12 +11,12 @@ use crate::paper::{self, PaperLot};
 use crate::plots::{self, AxisCalibration, Bar, BarGroup, EtaSeries, RateRow};
 use crate::report::{csv_of, difference, exact_rate, quoted_rate, table_of};
 use crate::run_dir::RunDir;
-use statistics::poisson::Rate;
 use crate::summary::{Ledger, Scope};
 use anyhow::Context as _;
 use policy::dagger::IterationRow;
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
+use statistics::poisson::Rate;
 use std::fmt::Write as _;
 use std::path::Path;
 

@@ -8,7 +8,6 @@ use crate::plots::AxisCalibration;
 use crate::progress::Work;
 use crate::run_dir::{self, RunDir};
 use crate::settings::Settings;
-use statistics::bootstrap::{DRAWS, Interval, Units};
 use crate::trials::{self, Job, Purpose};
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
@@ -21,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use sim::batch::run_lockstep;
 use sim::driver::Driver;
 use sim::seed::RootSeed;
+use statistics::bootstrap::{DRAWS, Interval, Units};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

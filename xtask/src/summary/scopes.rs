@@ -1,11 +1,11 @@
 //! What is looked at together, and how drivers stand there.
 
 use super::{Ledger, Unit};
+use serde::Serialize;
+use sim::seed::RootSeed;
 use statistics::bootstrap::{DRAWS, Interval, Units};
 use statistics::comparison::{RateRatio, holm};
 use statistics::poisson::Dispersion;
-use serde::Serialize;
-use sim::seed::RootSeed;
 
 /// Lots that are looked at together.
 #[derive(Debug, Clone, PartialEq, Eq)]
