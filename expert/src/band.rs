@@ -52,31 +52,58 @@ impl Band {
     }
 
     /// Pulls the band into the middle of the free space and straightens it; its first point stays.
+    ///
+    /// Each round goes from the first point to the last, and a point looks `stiff` points back, where this round has
+    /// been, and as many ahead, where only the round before has. So while this round is at one point, the next can be
+    /// `stiff + 1` points behind it, and so on: those are moved side by side.
     pub(crate) fn relax(&mut self, field: &DistanceField, config: &BandConfig) {
-        let stiff = (config.stiffness_m / SPACING_M).round() as usize;
-        for _ in 0..config.iterations {
-            for i in 1..POINTS {
-                let here = self.points[i];
-                let reach = stiff.min(i).min(POINTS - 1 - i);
-                // Middle of its neighbours; at the free end, straight on.
-                let (straight, along) = if reach > 0 {
-                    let (before, after) = (self.points[i - reach], self.points[i + reach]);
-                    (0.5 * (before + after), after - before)
-                } else {
-                    let (before, earlier) = (self.points[i - 1], self.points[i - 2]);
-                    (before + (before - earlier), here - earlier)
-                };
-                let left = along.normalize_or_zero().perp();
-                let push = |side: f32| {
-                    let missing_m = (config.comfort_m - field.at(here + left * (side * PROBE_M))).max(0.0);
-                    missing_m * missing_m
-                };
-                let to_middle = (push(-1.0) - push(1.0)) * (config.middle_gain / (4.0 * PROBE_M));
-                let step = (straight - here) * config.straight_gain + left * to_middle;
-                self.points[i] = here + step.clamp_length_max(config.step_max_m);
+        let stiff = ((config.stiffness_m / SPACING_M).round() as usize).max(1);
+        let (apart, last) = (stiff + 1, POINTS - 1);
+        let rounds = config.iterations as usize;
+        for tick in 1..(last + apart * rounds).saturating_sub(stiff) {
+            // The rounds under way. Point of a round: tick - round * apart.
+            let from = tick.saturating_sub(last).div_ceil(apart);
+            let to = rounds.min((tick - 1) / apart + 1);
+            let (front, n) = (tick - from * apart, to - from);
+            if front == last {
+                self.relax_apart::<1>(last, 1, stiff, field, config);
+                self.relax_apart::<LANES>(last.saturating_sub(apart), n - 1, stiff, field, config);
+            } else {
+                self.relax_apart::<LANES>(front, n, stiff, field, config);
             }
         }
         self.measure();
+    }
+
+    /// Moves `n` points, `stiff + 1` apart, the foremost at `front`.
+    fn relax_apart<const N: usize>(
+        &mut self,
+        front: usize,
+        n: usize,
+        stiff: usize,
+        field: &DistanceField,
+        config: &BandConfig,
+    ) {
+        let mut lanes = Lanes::<N>::new();
+        let at = |lane: usize| front - lane * (stiff + 1);
+        for lane in 0..n {
+            let i = at(lane);
+            let here = self.points[i];
+            let reach = stiff.min(i).min(POINTS - 1 - i);
+            // Middle of its neighbours; at the free end, straight on.
+            let (straight, along) = if reach > 0 {
+                let (before, after) = (self.points[i - reach], self.points[i + reach]);
+                (0.5 * (before + after), after - before)
+            } else {
+                let (before, earlier) = (self.points[i - 1], self.points[i - 2]);
+                (before + (before - earlier), here - earlier)
+            };
+            lanes.set(lane, here, straight, along);
+        }
+        lanes.move_all(field, config);
+        for lane in 0..n {
+            self.points[at(lane)] = Vec2::new(lanes.here.x[lane], lanes.here.y[lane]);
+        }
     }
 
     /// Its points up to some travel.
@@ -97,5 +124,65 @@ impl Band {
         let length_m = (self.travels_m[i + 1] - self.travels_m[i]).max(f32::MIN_POSITIVE);
         let share = ((travel_m - self.travels_m[i]) / length_m).clamp(0.0, 1.0);
         self.points[i].lerp(self.points[i + 1], share)
+    }
+}
+
+/// Points between the ends of a band that can be moved at once: every other one.
+const LANES: usize = POINTS / 2 - 1;
+
+/// Points side by side, by their coordinates.
+#[derive(Debug, Clone, Copy)]
+struct Column<const N: usize> {
+    x: [f32; N],
+    y: [f32; N],
+}
+
+/// Points that are moved at once.
+#[derive(Debug, Clone, Copy)]
+struct Lanes<const N: usize> {
+    here: Column<N>,
+    /// Where the band would be straight.
+    straight: Column<N>,
+    /// Along the band, of any length.
+    along: Column<N>,
+}
+
+impl<const N: usize> Lanes<N> {
+    fn new() -> Self {
+        let column = Column { x: [0.0; N], y: [0.0; N] };
+        Self { here: column, straight: column, along: column }
+    }
+
+    #[inline]
+    fn set(&mut self, lane: usize, here: Vec2, straight: Vec2, along: Vec2) {
+        let columns = [(&mut self.here, here), (&mut self.straight, straight), (&mut self.along, along)];
+        for (column, value) in columns {
+            (column.x[lane], column.y[lane]) = (value.x, value.y);
+        }
+    }
+
+    /// One step of every point towards the middle and straightness.
+    fn move_all(&mut self, field: &DistanceField, config: &BandConfig) {
+        let left: [Vec2; N] = std::array::from_fn(|i| {
+            let along = Vec2::new(self.along.x[i], self.along.y[i]);
+            along.normalize_or_zero().perp()
+        });
+        let push = |side: f32| {
+            let x_m = std::array::from_fn(|i| self.here.x[i] + left[i].x * (side * PROBE_M));
+            let y_m = std::array::from_fn(|i| self.here.y[i] + left[i].y * (side * PROBE_M));
+            field.at_each::<N>(&x_m, &y_m).map(|at_m| {
+                let missing_m = (config.comfort_m - at_m).max(0.0);
+                missing_m * missing_m
+            })
+        };
+        let (push_left, push_right) = (push(-1.0), push(1.0));
+        for i in 0..N {
+            let to_middle = (push_left[i] - push_right[i]) * (config.middle_gain / (4.0 * PROBE_M));
+            let here = Vec2::new(self.here.x[i], self.here.y[i]);
+            let straight = Vec2::new(self.straight.x[i], self.straight.y[i]);
+            let step = (straight - here) * config.straight_gain + left[i] * to_middle;
+            let there = here + step.clamp_length_max(config.step_max_m);
+            (self.here.x[i], self.here.y[i]) = (there.x, there.y);
+        }
     }
 }
