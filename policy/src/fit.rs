@@ -20,6 +20,7 @@ use rand::seq::SliceRandom as _;
 use serde::{Deserialize, Serialize};
 use sim::seed::{RootSeed, Stream};
 use sim::sensing::GridGeometry;
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 
 /// How to train.
@@ -47,6 +48,10 @@ pub struct FitSettings {
     pub validation: ValidationSplit,
     /// Steps between validations; 0 = only at the end.
     pub validate_every: u32,
+    /// Held-back samples looked at while training, spread evenly over all; all of them if not said. The weights that
+    /// are returned are validated on all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validate_on_max: Option<usize>,
     /// Training ends early after this many validations without a new best.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub patience: Option<u32>,
@@ -98,6 +103,7 @@ impl FitSettings {
             mirror: Mirror::Off,
             validation: ValidationSplit::paper(),
             validate_every: 500,
+            validate_on_max: None,
             patience: None,
             keep: KeepWeights::BestByValidation,
         }
@@ -114,6 +120,8 @@ impl FitSettings {
             mirror: Mirror::Half,
             loss: LossSettings { beta: 0.5, ..LossSettings::paper() },
             validate_every: 250,
+            // On all of them, validating would take longer than training.
+            validate_on_max: Some(8000),
             ..Self::paper()
         }
     }
@@ -243,8 +251,9 @@ pub fn fit(
         return Err(FitError::NoTrainingSamples { samples: dataset.len(), every: settings.validation.every });
     }
     let steps = settings.steps(split.training.len());
-    let validate = |weights: &Weights| {
-        (!split.validation.is_empty()).then(|| evaluate(weights, &split.validation, &settings.loss, geometry, device))
+    let watched = thinned(&split.validation, settings.validate_on_max);
+    let validate = |weights: &Weights, samples: &[Sample]| {
+        (!samples.is_empty()).then(|| evaluate(weights, samples, &settings.loss, geometry, device))
     };
 
     let mut weights = start;
@@ -274,7 +283,7 @@ pub fn fit(
         stopped = progress(&now).is_break();
         let is_last = done == steps || stopped;
         if is_last || settings.validate_every > 0 && done % settings.validate_every == 0 {
-            latest = validate(&weights);
+            latest = validate(&weights, &watched);
             curve.push(CurvePoint { step: done, training: since_point.take(), validation: latest });
             best.offer(&weights, done, latest, settings.keep);
             if settings.patience.is_some_and(|patience| best.offers_since >= patience) {
@@ -282,16 +291,28 @@ pub fn fit(
             }
         }
     }
+    let is_validated_on_all = watched.len() == split.validation.len();
+    let validation = if is_validated_on_all { best.validation } else { validate(&best.weights, &split.validation) };
     let report = FitReport {
         training_samples: split.training.len(),
         validation_samples: split.validation.len(),
         steps: done,
         kept_step: best.step,
         stopped,
-        validation: best.validation,
+        validation,
         curve,
     };
     Ok(FitOutcome { weights: best.weights, report })
+}
+
+/// At most so many of the samples, evenly spread.
+fn thinned(samples: &[Sample], at_most: Option<usize>) -> Cow<'_, [Sample]> {
+    match at_most {
+        Some(at_most) if at_most < samples.len() => {
+            Cow::Owned((0..at_most).map(|i| samples[i * samples.len() / at_most]).collect())
+        }
+        _ => Cow::Borrowed(samples),
+    }
 }
 
 /// Answers samples and compares with their labels.

@@ -69,6 +69,10 @@ pub struct LookAheadNetConfig {
     pub dropout_features: f32,
     /// Dropout after the fully connected layer, 0…1; applied in steps of 1/256.
     pub dropout_hidden: f32,
+    /// In use, the answer is the mean of the answer to a grid and of the mirrored answer to its mirror image: left and
+    /// right are then treated alike to the bit, and errors partly cancel. Training sees single grids as always.
+    #[serde(default)]
+    pub symmetric: bool,
 }
 
 impl LookAheadNetConfig {
@@ -80,6 +84,7 @@ impl LookAheadNetConfig {
             hidden: 1000,
             dropout_features: 0.25,
             dropout_hidden: 0.5,
+            symmetric: false,
         }
     }
 
@@ -93,6 +98,7 @@ impl LookAheadNetConfig {
             hidden: 256,
             dropout_features: 0.0,
             dropout_hidden: 0.2,
+            symmetric: true,
         }
     }
 

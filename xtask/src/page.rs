@@ -217,7 +217,8 @@ pre code { padding: 0; }
   figure img { min-width: 0; } }
 @media print { body { max-width: none; padding: 0; font-size: 10pt; } nav { display: none; }
   .scroll { overflow: visible; } table { font-size: 7.5pt; } th, td { white-space: normal; padding: .15rem .3rem; }
-  figure svg, figure img { min-width: 0; } figure, tr { break-inside: avoid; } h2, h3 { break-after: avoid; } }
+  figure svg, figure img { min-width: 0; width: auto; max-width: 100%; max-height: 9cm; } figure img { max-height: 13cm; }
+  pre { font-size: 6.5pt; columns: 2; } figure, tr { break-inside: avoid; } h2, h3 { break-after: avoid; } }
 ";
 
 #[cfg(test)]

@@ -62,6 +62,7 @@ fn config() -> DaggerConfig {
             hidden: 32,
             dropout_features: 0.0,
             dropout_hidden: 0.1,
+            symmetric: false,
         },
         // Loose enough that both novice and expert drive after so little training.
         rule: DecisionRule::AllBelow { tau: 0.25, chi: 1.0, chi_on: crate::decision_rule::ChiOn::StdPerAxis },

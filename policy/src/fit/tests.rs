@@ -11,6 +11,7 @@ fn tiny() -> LookAheadNetConfig {
         hidden: 40,
         dropout_features: 0.1,
         dropout_hidden: 0.2,
+        symmetric: false,
     }
 }
 
@@ -101,6 +102,18 @@ fn a_stop_keeps_what_was_learned() {
     assert!(outcome.report.stopped);
     assert_eq!((outcome.report.steps, outcome.report.kept_step), (7, 7));
     assert_eq!(seen.last(), Some(&(7, 7 * 33)));
+}
+
+/// Watched on a few samples, reported on all of them.
+#[test]
+fn the_weights_returned_are_validated_on_everything_held_back() {
+    let dataset = dataset(400);
+    let settings = FitSettings { validate_on_max: Some(7), ..settings(40) };
+    let outcome = train(&dataset, &settings, DeviceChoice::Cpu);
+    assert!(outcome.report.curve.iter().all(|point| point.validation.unwrap().samples == 7));
+    let held_back = dataset.split(settings.validation).validation;
+    let all = evaluate(&outcome.weights, &held_back, &settings.loss, GridGeometry::paper(), DeviceChoice::Cpu);
+    assert_eq!(outcome.report.validation, Some(all));
 }
 
 #[test]

@@ -121,6 +121,20 @@ impl Predictor {
 
     /// Raw outputs per grid: means of u and w, raw log-variances of both.
     pub fn raw(&mut self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
+        let mut outputs = self.one_sided(grids);
+        if self.weights.config().symmetric {
+            let images: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
+            let of_images = self.one_sided(&images.iter().collect::<Vec<_>>());
+            for (output, [u, w, raw_u, raw_w]) in outputs.iter_mut().zip(of_images) {
+                let image = [1.0 - u, w, raw_u, raw_w];
+                *output = std::array::from_fn(|i| 0.5 * (output[i] + image[i]));
+            }
+        }
+        outputs
+    }
+
+    /// The outputs of the network itself.
+    fn one_sided(&mut self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
         match &mut self.engine {
             Engine::Cpu { prepared, traces } => raw_on_cpu(&self.weights, prepared, traces, grids),
             Engine::Burn { net, device } => grids
@@ -189,6 +203,21 @@ mod tests {
             for start in [1, 7, 18] {
                 assert_eq!(predictor.raw(&all[start..])[..], together[start..], "from {start}");
             }
+        }
+    }
+
+    /// To the bit, but for the rounding of 1 − u.
+    #[test]
+    fn a_symmetric_network_answers_mirror_images_alike() {
+        let grids = lots(20);
+        let mirrored: Vec<OccupancyGrid> = grids.iter().map(OccupancyGrid::mirrored).collect();
+        let weights = Weights::init(LookAheadNetConfig::compact(), RootSeed(1), 0);
+        let mut predictor = Predictor::new(weights, DeviceChoice::Cpu);
+        let answers = predictor.predict(&grids.iter().collect::<Vec<_>>());
+        let images = predictor.predict(&mirrored.iter().collect::<Vec<_>>());
+        for (answer, image) in answers.iter().zip(&images) {
+            assert!((answer.mean[0] - (1.0 - image.mean[0])).abs() < 1e-6, "{answer:?} {image:?}");
+            assert_eq!((answer.mean[1], answer.sigma), (image.mean[1], image.sigma));
         }
     }
 

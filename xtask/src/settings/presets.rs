@@ -97,6 +97,7 @@ fn smoke() -> Settings {
                 hidden: 64,
                 dropout_features: 0.0,
                 dropout_hidden: 0.1,
+                symmetric: true,
             },
             fit_cloning: fit.clone(),
             fit_iteration: fit,
