@@ -186,3 +186,53 @@ impl<const N: usize> Lanes<N> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ExpertConfig;
+
+    /// One point after the other, one round after the other: what moving points side by side must equal to the bit.
+    fn relax_in_order(band: &mut Band, field: &DistanceField, config: &BandConfig) {
+        let stiff = ((config.stiffness_m / SPACING_M).round() as usize).max(1);
+        for _ in 0..config.iterations {
+            for i in 1..POINTS {
+                let here = band.points[i];
+                let reach = stiff.min(i).min(POINTS - 1 - i);
+                let (straight, along) = if reach > 0 {
+                    let (before, after) = (band.points[i - reach], band.points[i + reach]);
+                    (0.5 * (before + after), after - before)
+                } else {
+                    let (before, earlier) = (band.points[i - 1], band.points[i - 2]);
+                    (before + (before - earlier), here - earlier)
+                };
+                let left = along.normalize_or_zero().perp();
+                let push = |side: f32| {
+                    let missing_m = (config.comfort_m - field.at(here + left * (side * PROBE_M))).max(0.0);
+                    missing_m * missing_m
+                };
+                let to_middle = (push(-1.0) - push(1.0)) * (config.middle_gain / (4.0 * PROBE_M));
+                let step = (straight - here) * config.straight_gain + left * to_middle;
+                band.points[i] = here + step.clamp_length_max(config.step_max_m);
+            }
+        }
+        band.measure();
+    }
+
+    #[test]
+    fn points_moved_side_by_side_end_where_they_would_in_order() {
+        let lane = [(-3.0, -1.4), (30.0, -1.9), (30.0, 1.2), (-3.0, 1.6)].map(|(x, y)| Vec2::new(x, y));
+        let mut field = DistanceField::of_boundary(&lane);
+        field.carve_disc(Vec2::new(6.0, 1.1), 0.5);
+        field.carve_disc(Vec2::new(11.0, -1.2), 0.6);
+        for (rounds, stiffness_m) in [(0, 0.6), (1, 0.6), (7, 1.2), (60, 0.6), (60, 3.0), (5, 9.0)] {
+            let config = BandConfig { iterations: rounds, stiffness_m, ..ExpertConfig::paper().band };
+            let way = (0..20).map(|i| Vec2::new(0.6 * i as f32, 0.02 * (i * i % 17) as f32));
+            let (mut band, mut expected) = (Band::along(way.clone(), Vec2::X), Band::along(way, Vec2::X));
+            band.relax(&field, &config);
+            relax_in_order(&mut expected, &field, &config);
+            assert_eq!(band.points, expected.points, "{rounds} rounds, stiffness {stiffness_m} m");
+            assert_eq!(band.travels_m, expected.travels_m);
+        }
+    }
+}

@@ -38,6 +38,8 @@ pub enum Stream {
     Search = 12,
     /// Sensor noise of further looks at a tick that is learned from.
     Relook = 13,
+    /// Nudges of the wheel while collecting.
+    Disturbance = 14,
 }
 
 /// The one number a run is reproduced from.

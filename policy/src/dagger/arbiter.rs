@@ -1,5 +1,6 @@
 //! Algorithm 2, the data-sampling function: who drives this tick, and what is written down.
 
+use super::disturbance::Disturbance;
 use crate::dataset::{Round, Sample};
 use crate::decision_rule::{DecisionRule, Evidence};
 use crate::drivers::novice_decision;
@@ -40,6 +41,8 @@ struct SeatRecord {
     /// Look at the scenes of the samples, too.
     lookers: Vec<Sensor>,
     relooks: Vec<OccupancyGrid>,
+    /// Nudges whoever drives.
+    disturbance: Option<Disturbance>,
     /// Decisions so far.
     ticks: u32,
 }
@@ -85,6 +88,15 @@ impl Arbiter {
     pub fn with_lookers(mut self, lookers: Vec<Vec<Sensor>>) -> Self {
         for (seat, lookers) in self.seats.iter_mut().zip(lookers) {
             seat.lookers = lookers;
+        }
+        self
+    }
+
+    /// Nudges for the wheel of every seat.
+    #[must_use]
+    pub(super) fn with_disturbances(mut self, disturbances: Vec<Disturbance>) -> Self {
+        for (seat, disturbance) in self.seats.iter_mut().zip(disturbances) {
+            seat.disturbance = Some(disturbance);
         }
         self
     }
@@ -137,6 +149,7 @@ fn at_seats<'a, 's, T>(of_episodes: &'a mut [T], seats: &'a [Seat<'s>]) -> Vec<(
 
 impl Fleet for Arbiter {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
+        let first = decisions.len();
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
         let predictions = self.novice.as_mut().map(|novice| novice.predict(&grids)); // line 5
         let expert_decisions = self.ask_experts(seats); // line 6
@@ -165,5 +178,10 @@ impl Fleet for Arbiter {
             kept.push(is_kept.then_some(Sample { grid, label: a_exp, tau_hat }));
         }
         self.write_down(seats, &kept);
+        for (seat, decision) in seats.iter().zip(&mut decisions[first..]) {
+            if let Some(disturbance) = &mut self.seats[seat.episode].disturbance {
+                decision.look_ahead = disturbance.disturb(decision.look_ahead);
+            }
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Numbers of the car, the sensor and the metrics that make no sense: they would not fail, they would measure nonsense.
 
 use anyhow::{Context as _, ensure};
+use policy::dagger::DisturbanceSettings;
 use sim::episode::EpisodeConfig;
 
 /// Lengths, times and gains that may also be zero: switched off. So may every layer of the noise.
@@ -27,6 +28,12 @@ pub(super) fn check(episode: &EpisodeConfig) -> anyhow::Result<()> {
         "episode.controller.speed_min_mps = {low} is more than episode.controller.speed_max_mps = {high}"
     );
     Ok(())
+}
+
+/// What is drawn from is not empty.
+pub(super) fn check_disturbance(disturbance: &DisturbanceSettings) -> anyhow::Result<()> {
+    let table = toml::Table::try_from(disturbance).context("settings are plain values")?;
+    check_table("dagger.disturbance", &table)
 }
 
 fn check_table(path: &str, table: &toml::Table) -> anyhow::Result<()> {

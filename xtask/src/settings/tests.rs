@@ -103,6 +103,10 @@ fn errors_name_the_key_and_what_there_is() {
         (&["episode.control_period_ms=45"], &["45", "multiple"]),
         (&["episode.metrics.near_collision_m=-1"], &["episode.metrics.near_collision_m = -1", "be more than 0"]),
         (&["episode.metrics.safe_range_m=0"], &["episode.metrics.safe_range_m = 0", "be more than 0"]),
+        (
+            &["dagger.disturbance={ pause_ticks = 9, lasts_ticks = 9, curvature_max_per_m = -0.1 }"],
+            &["dagger.disturbance.curvature_max_per_m = -0.1", "be more than 0"],
+        ),
         (&["episode.noise.blob=-0.5"], &["episode.noise.blob = -0.5", "not be negative"]),
         (&["episode.vehicle.wheelbase_m=nan"], &["episode.vehicle.wheelbase_m = NaN"]),
         (&["episode.controller.speed_min_mps=3"], &["speed_min_mps = 3", "speed_max_mps = 2.2"]),
