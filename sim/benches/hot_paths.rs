@@ -1,4 +1,4 @@
-//! One observation, one control step without a driver, one map. `cargo bench --profile dev -p sim`.
+//! One observation, one control step without a driver, one map. `cargo bench --profile dev --workspace --bench hot_paths`.
 #![allow(missing_docs, reason = "a benchmark")]
 
 use divan::Bencher;
