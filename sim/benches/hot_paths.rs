@@ -1,4 +1,4 @@
-//! One observation, one control step without a driver, one map. `cargo bench --profile dev -p sim`.
+//! One observation, one control step without a driver, one map. `cargo bench --profile dev --workspace --bench hot_paths`.
 #![allow(missing_docs, reason = "a benchmark")]
 
 use divan::Bencher;
@@ -13,13 +13,16 @@ use sim::sensing::{SensingConfig, Sensor};
 use sim::vehicle::VehicleParams;
 use std::sync::Arc;
 
+/// Width of the lane, metres.
+const WIDTH_M: f32 = 3.2;
+
 fn main() {
     divan::main();
 }
 
-/// A 200 m lane, 3.2 m wide, with parked cars in stalls on both sides, double-parked noses and bumps.
-fn scenario() -> Scenario {
-    let half = 1.6;
+/// A 200 m lane of some width, with parked cars in stalls on both sides, double-parked noses and bumps.
+fn scenario(width_m: f32) -> Scenario {
+    let half = 0.5 * width_m;
     let boundary = [(-20.0, -half), (220.0, -half), (220.0, half), (-20.0, half)];
     let parked = (0..90).flat_map(|i| {
         [(half + 2.6, 90.0), (-half - 2.6, -90.0)].map(|(y, heading_deg): (f32, f32)| {
@@ -36,18 +39,18 @@ fn scenario() -> Scenario {
         islands: vec![],
         obstacles: parked.chain(noses).collect(),
         speed_bumps: (0..3)
-            .map(|i| SpeedBump { x_m: 60.0 * i as f32, y_m: 0.0, heading_deg: 0.0, length_m: 0.5, width_m: 3.2 })
+            .map(|i| SpeedBump { x_m: 60.0 * i as f32, y_m: 0.0, heading_deg: 0.0, length_m: 0.5, width_m })
             .collect(),
     }
 }
 
-fn map() -> Arc<Map> {
-    Arc::new(Map::build(scenario(), &VehicleParams::hyundai_hg300()).expect("the lane is sound"))
+fn map(width_m: f32) -> Arc<Map> {
+    Arc::new(Map::build(scenario(width_m), &VehicleParams::hyundai_hg300()).expect("the lane is sound"))
 }
 
 #[divan::bench(args = [(NoiseLevel::Clean, false), (NoiseLevel::Clean, true), (NoiseLevel::Paper, true), (NoiseLevel::Hard, true)])]
 fn observation(bencher: Bencher<'_, '_>, (level, smear): (NoiseLevel, bool)) {
-    let map = map();
+    let map = map(WIDTH_M);
     let config = SensingConfig { smear, ..SensingConfig::paper() };
     let mut sensor = Sensor::new(&map, config, &NoiseConfig::of(level), RootSeed(1));
     let mut tick = 0;
@@ -59,9 +62,9 @@ fn observation(bencher: Bencher<'_, '_>, (level, smear): (NoiseLevel, bool)) {
 }
 
 /// Five physics steps with collision checks, the safe ring and the clearance.
-#[divan::bench]
-fn control_step_without_driver(bencher: Bencher<'_, '_>) {
-    let (config, map) = (Arc::new(EpisodeConfig::paper()), map());
+#[divan::bench(args = [WIDTH_M, 2.7])]
+fn control_step_without_driver(bencher: Bencher<'_, '_>, lane_m: f32) {
+    let (config, map) = (Arc::new(EpisodeConfig::paper()), map(lane_m));
     let start = || Episode::new(Arc::clone(&config), Arc::clone(&map), RootSeed(1));
     let decision =
         Decision { look_ahead: LookAheadPoint { ahead_m: 14.0, left_m: 0.0 }, source: Source::Expert, spread: None };
@@ -76,5 +79,7 @@ fn control_step_without_driver(bencher: Bencher<'_, '_>) {
 
 #[divan::bench]
 fn map_build(bencher: Bencher<'_, '_>) {
-    bencher.with_inputs(scenario).bench_local_values(|scenario| Map::build(scenario, &VehicleParams::hyundai_hg300()));
+    bencher
+        .with_inputs(|| scenario(WIDTH_M))
+        .bench_local_values(|scenario| Map::build(scenario, &VehicleParams::hyundai_hg300()));
 }

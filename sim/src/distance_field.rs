@@ -83,33 +83,6 @@ impl DistanceField {
         a + fy * (b - a)
     }
 
-    /// [`Self::at`] of many points, given by their coordinates: the same bits, computed side by side.
-    #[inline]
-    pub fn at_each<const N: usize>(&self, x_m: &[f32; N], y_m: &[f32; N]) -> [f32; N] {
-        let (x_max, y_max) = ((self.cols - 2) as f32, (self.rows - 2) as f32);
-        let x: [f32; N] = std::array::from_fn(|i| ((x_m[i] - self.origin.x) * (1.0 / NODE_M)).clamp(0.0, x_max));
-        let y: [f32; N] = std::array::from_fn(|i| ((y_m[i] - self.origin.y) * (1.0 / NODE_M)).clamp(0.0, y_max));
-        let (cols, rows) = (x.map(whole), y.map(whole));
-        let index: [u32; N] =
-            std::array::from_fn(|i| index_of_whole(rows[i]) * self.cols as u32 + index_of_whole(cols[i]));
-        // Both as long as the shorter, so that one check serves both.
-        let above = &self.values_m[self.cols..];
-        let below = &self.values_m[..above.len()];
-        let mut corners = [[0.0; N]; 4];
-        for i in 0..N {
-            let base = index[i] as usize;
-            let [a, b] = [below, above].map(|row| row[base..].first_chunk::<2>().expect("clamped to the raster"));
-            [corners[0][i], corners[1][i], corners[2][i], corners[3][i]] = [a[0], a[1], b[0], b[1]];
-        }
-        let [a_left, a_right, b_left, b_right] = corners;
-        std::array::from_fn(|i| {
-            let (fx, fy) = (x[i] - cols[i], y[i] - rows[i]);
-            let a = a_left[i] + fx * (a_right[i] - a_left[i]);
-            let b = b_left[i] + fx * (b_right[i] - b_left[i]);
-            a + fy * (b - a)
-        })
-    }
-
     /// Signed distance at the nearest node, metres: within [`change_max_m`] of [`Self::at`] around it, and much faster.
     #[inline]
     pub fn at_nearest_node(&self, point: Vec2) -> f32 {
@@ -117,6 +90,46 @@ impl DistanceField {
         let col = node.x.clamp(0.0, (self.cols - 1) as f32) as i32;
         let row = node.y.clamp(0.0, (self.rows - 1) as f32) as i32;
         self.values_m[row as usize * self.cols + col as usize]
+    }
+
+    /// [`Self::at`] at the points (`xs[i]`, `ys[i]`), to the bit. All but the look-ups is done for several points at once.
+    #[inline]
+    pub fn at_each<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
+        let (last_x, last_y) = ((self.cols - 2) as f32, (self.rows - 2) as f32);
+        let (mut cols, mut rows, mut fxs, mut fys) = ([0; N], [0; N], [0.0; N], [0.0; N]);
+        for i in 0..N {
+            let x = clamp_to_raster((xs[i] - self.origin.x) * (1.0 / NODE_M), last_x);
+            let y = clamp_to_raster((ys[i] - self.origin.y) * (1.0 / NODE_M), last_y);
+            let (floor_x, floor_y) = (floor(x), floor(y));
+            (fxs[i], fys[i]) = (x - floor_x, y - floor_y);
+            (cols[i], rows[i]) = (to_index(floor_x), to_index(floor_y));
+        }
+        // The four nodes around each point, near and far pair; one bounds check for both.
+        let stride = self.cols as u32 as usize;
+        let (mut near, mut far) = ([[0.0; 2]; N], [[0.0; 2]; N]);
+        for i in 0..N {
+            let base = rows[i] as usize * stride + cols[i] as usize;
+            let nodes = &self.values_m[base..base + stride + 2];
+            near[i] = [nodes[0], nodes[1]];
+            far[i] = [nodes[stride], nodes[stride + 1]];
+        }
+        std::array::from_fn(|i| {
+            let [near, far] = [near[i], far[i]].map(|[left, right]| left + fxs[i] * (right - left));
+            near + fys[i] * (far - near)
+        })
+    }
+
+    /// [`Self::at_nearest_node`] at the points (`xs[i]`, `ys[i]`). All but the look-ups is done for several points at once.
+    #[inline]
+    pub fn at_nearest_nodes<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
+        let (last_x, last_y) = ((self.cols - 1) as f32, (self.rows - 1) as f32);
+        let (mut cols, mut rows) = ([0; N], [0; N]);
+        for i in 0..N {
+            let x = clamp_to_raster((xs[i] - self.origin.x) * (1.0 / NODE_M) + 0.5, last_x);
+            let y = clamp_to_raster((ys[i] - self.origin.y) * (1.0 / NODE_M) + 0.5, last_y);
+            (cols[i], rows[i]) = (to_index(floor(x)), to_index(floor(y)));
+        }
+        std::array::from_fn(|i| self.values_m[rows[i] as usize * self.cols + cols[i] as usize])
     }
 
     /// A vector that points away from what is near, at the nearest node; of no particular length.
@@ -176,19 +189,27 @@ impl DistanceField {
     }
 }
 
-/// From here on, neighbouring numbers of single precision are 1 apart.
-const WHOLE_FROM: f32 = 8_388_608.0;
-
-/// The whole part of a number in [0, 2²²]. Unlike a cast, compilers compute it for many numbers at once.
+/// Bounds a coordinate to the raster, like `clamp`; what is not a number becomes 0.
 #[inline]
-fn whole(x: f32) -> f32 {
-    let nearest = (x + WHOLE_FROM) - WHOLE_FROM;
-    nearest - if nearest > x { 1.0 } else { 0.0 }
+fn clamp_to_raster(node: f32, last: f32) -> f32 {
+    let node = if node > 0.0 { node } else { 0.0 };
+    if node < last { node } else { last }
 }
 
-/// A whole number in [0, 2²²] as an integer: then its bits are the last ones.
+/// From here on, single precision holds whole numbers only.
+const WHOLE_FROM: f32 = (1 << 23) as f32;
+
+/// Largest whole number at or below a coordinate of the raster. Unlike casts and `f32::floor`, which is a library call
+/// on baseline x86-64, this compiles to instructions that take four numbers at once.
 #[inline]
-fn index_of_whole(whole: f32) -> u32 {
+fn floor(node: f32) -> f32 {
+    let rounded = (node + WHOLE_FROM) - WHOLE_FROM;
+    rounded - if rounded > node { 1.0 } else { 0.0 }
+}
+
+/// A whole coordinate of the raster as an index.
+#[inline]
+fn to_index(whole: f32) -> u32 {
     (whole + WHOLE_FROM).to_bits() - WHOLE_FROM.to_bits()
 }
 

@@ -4,7 +4,7 @@ use crate::collision::ObstacleSet;
 use crate::distance_field::{DistanceField, change_max_m};
 use crate::driver::Source;
 use crate::episode::{Event, Frame};
-use crate::geometry::{Pose, Vec2, distance_to_segment, edges, polygon_contains};
+use crate::geometry::{Pose, Vec2, WorldFromEgo, distance_to_segment, edges, polygon_contains};
 use crate::vehicle::VehicleParams;
 use serde::{Deserialize, Serialize};
 
@@ -66,19 +66,121 @@ pub enum SafeRange {
 /// The pixels within the safe range of the body, in the ego frame: N_ran of the paper.
 #[derive(Debug, Clone)]
 pub struct SafeRing {
-    blocks: Vec<Block>,
+    batches: Vec<Batch>,
     n_pixels: u32,
 }
 
-/// Up to 4×4 pixels.
+/// Blocks that are looked up together.
 #[derive(Debug, Clone)]
-struct Block {
-    centre: Vec2,
-    pixels: Vec<Vec2>,
+struct Batch {
+    centres: Points<BATCH>,
+    blocks: Vec<Block>,
 }
 
+/// 4×4 pixels, or as many of them as are in the range.
+#[derive(Debug, Clone)]
+struct Block {
+    n_pixels: u32,
+    /// Centres of its quarters.
+    centres: Points<4>,
+    quarters: [Quarter; 4],
+}
+
+/// 2×2 pixels, or as many of them as are in the range.
+#[derive(Debug, Clone)]
+struct Quarter {
+    n_pixels: u32,
+    /// Those in the range first.
+    pixels: Points<4>,
+}
+
+/// Blocks per batch.
+const BATCH: usize = 16;
 /// Pixels per side of a block.
 const BLOCK: i32 = 4;
+/// Pixels per side of a quarter of a block.
+const QUARTER: i32 = BLOCK / 2;
+
+/// Points in the ego frame, arranged so that several are transformed at once.
+#[derive(Debug, Clone)]
+struct Points<const N: usize> {
+    ahead_m: [f32; N],
+    left_m: [f32; N],
+}
+
+impl<const N: usize> Points<N> {
+    /// Up to `N` points; the last is repeated.
+    fn new(points: &[Vec2]) -> Self {
+        let point = |i: usize| points[i.min(points.len() - 1)];
+        Self { ahead_m: std::array::from_fn(|i| point(i).x), left_m: std::array::from_fn(|i| point(i).y) }
+    }
+
+    /// World coordinates x and y.
+    #[inline]
+    fn in_world(&self, world_from_ego: &WorldFromEgo) -> ([f32; N], [f32; N]) {
+        let (mut xs, mut ys) = ([0.0; N], [0.0; N]);
+        for i in 0..N {
+            let point = world_from_ego.point(Vec2::new(self.ahead_m[i], self.left_m[i]));
+            (xs[i], ys[i]) = (point.x, point.y);
+        }
+        (xs, ys)
+    }
+
+    #[inline]
+    fn at_nearest_nodes(&self, distance: &DistanceField, world_from_ego: &WorldFromEgo) -> [f32; N] {
+        let (xs, ys) = self.in_world(world_from_ego);
+        distance.at_nearest_nodes(&xs, &ys)
+    }
+}
+
+impl Block {
+    /// The block with its first pixel at a corner; `None` if no pixel is in the range.
+    fn new(corner: Vec2, pixel_m: f32, is_in_range: impl Fn(Vec2) -> bool) -> Option<Self> {
+        let firsts = [(0, 0), (0, QUARTER), (QUARTER, 0), (QUARTER, QUARTER)];
+        let quarters = firsts.map(|(row, col)| {
+            let pixels: Vec<Vec2> = (0..QUARTER * QUARTER)
+                .map(|i| corner + Vec2::new((row + i / QUARTER) as f32, (col + i % QUARTER) as f32) * pixel_m)
+                .filter(|&pixel| is_in_range(pixel))
+                .collect();
+            let n_pixels = pixels.len() as u32;
+            Quarter { n_pixels, pixels: Points::new(if pixels.is_empty() { &[Vec2::ZERO] } else { &pixels }) }
+        });
+        let n_pixels = quarters.iter().map(|quarter| quarter.n_pixels).sum();
+        let to_centre = 0.5 * (QUARTER - 1) as f32;
+        let centres = firsts.map(|(row, col)| corner + (Vec2::new(row as f32, col as f32) + to_centre) * pixel_m);
+        (n_pixels > 0).then(|| Self { n_pixels, centres: Points::new(&centres), quarters })
+    }
+
+    fn centre(&self) -> Vec2 {
+        let mean = |values: &[f32; 4]| values.iter().sum::<f32>() / 4.0;
+        Vec2::new(mean(&self.centres.ahead_m), mean(&self.centres.left_m))
+    }
+
+    /// Number of its pixels that are drivable; where the centre of a quarter is farther from the boundary than `sure_m`,
+    /// all or none of it is.
+    #[inline]
+    fn count_drivable(&self, distance: &DistanceField, world_from_ego: &WorldFromEgo, sure_m: f32) -> u32 {
+        let centres_m = self.centres.at_nearest_nodes(distance, world_from_ego);
+        let counts = self.quarters.iter().zip(centres_m).map(|(quarter, centre_m)| {
+            if centre_m > sure_m {
+                quarter.n_pixels
+            } else if centre_m < -sure_m {
+                0
+            } else {
+                quarter.count_drivable(distance, world_from_ego)
+            }
+        });
+        counts.sum()
+    }
+}
+
+impl Quarter {
+    fn count_drivable(&self, distance: &DistanceField, world_from_ego: &WorldFromEgo) -> u32 {
+        let (xs, ys) = self.pixels.in_world(world_from_ego);
+        let distances_m = distance.at_each(&xs, &ys);
+        (0..).zip(distances_m).map(|(i, distance_m)| u32::from(distance_m > 0.0) & u32::from(i < self.n_pixels)).sum()
+    }
+}
 
 impl SafeRing {
     /// The ring (body ⊕ disc) minus body, at a pixel size.
@@ -92,20 +194,15 @@ impl SafeRing {
         let block_m = pixel_m * BLOCK as f32;
         let reach_m = params.length_m + config.safe_range_m;
         let n = (reach_m / block_m).ceil() as i32;
-        let mut blocks = Vec::new();
-        for (row, col) in (-n..n).flat_map(|row| (-n..n).map(move |col| (row, col))) {
-            let corner = Vec2::new(row as f32, col as f32) * block_m;
-            let pixels: Vec<Vec2> = (0..BLOCK * BLOCK)
-                // A pixel centre lies on the axle, so that neither the body's sides nor the ring's fall on centres.
-                .map(|i| corner + Vec2::new((i / BLOCK) as f32, (i % BLOCK) as f32) * pixel_m)
-                .filter(|&point| is_in_range(point))
-                .collect();
-            if !pixels.is_empty() {
-                blocks.push(Block { centre: corner + Vec2::splat(0.5 * (block_m - pixel_m)), pixels });
-            }
-        }
-        let n_pixels = blocks.iter().map(|block| block.pixels.len() as u32).sum();
-        Self { blocks, n_pixels }
+        // A pixel centre lies on the axle, so that neither the body's sides nor the ring's fall on centres.
+        let corners = (-n..n).flat_map(|row| (-n..n).map(move |col| Vec2::new(row as f32, col as f32) * block_m));
+        let blocks: Vec<Block> = corners.filter_map(|corner| Block::new(corner, pixel_m, is_in_range)).collect();
+        let n_pixels = blocks.iter().map(|block| block.n_pixels).sum();
+        let batches = blocks.chunks(BATCH).map(|blocks| {
+            let centres: Vec<Vec2> = blocks.iter().map(Block::centre).collect();
+            Batch { centres: Points::new(&centres), blocks: blocks.to_vec() }
+        });
+        Self { batches: batches.collect(), n_pixels }
     }
 
     /// Number of pixels in the range.
@@ -116,19 +213,21 @@ impl SafeRing {
     /// Share of the range that is drivable, 0…1: N_dri / N_ran.
     pub fn safe_ratio(&self, distance: &DistanceField, pose: Pose, pixel_m: f32) -> f32 {
         let world_from_ego = pose.world_from_ego();
-        // A block whose centre is farther from a boundary than its corner pixels are from it is decided by one look-up.
-        let to_corner_m = std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (BLOCK - 1) as f32;
-        let sure_m = change_max_m(to_corner_m);
+        // Where the centre is farther from a boundary than the pixels are from it, one look-up decides.
+        let sure_m = |side: i32| change_max_m(std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (side - 1) as f32);
+        let (block_m, quarter_m) = (sure_m(BLOCK), sure_m(QUARTER));
         let mut drivable = 0;
-        for block in &self.blocks {
-            let centre_m = distance.at_nearest_node(world_from_ego.point(block.centre));
-            drivable += if centre_m > sure_m {
-                block.pixels.len()
-            } else if centre_m < -sure_m {
-                0
-            } else {
-                block.pixels.iter().filter(|&&pixel| distance.at(world_from_ego.point(pixel)) > 0.0).count()
-            };
+        for batch in &self.batches {
+            let centres_m = batch.centres.at_nearest_nodes(distance, &world_from_ego);
+            for (block, centre_m) in batch.blocks.iter().zip(centres_m) {
+                drivable += if centre_m > block_m {
+                    block.n_pixels
+                } else if centre_m < -block_m {
+                    0
+                } else {
+                    block.count_drivable(distance, &world_from_ego, quarter_m)
+                };
+            }
         }
         drivable as f32 / self.n_pixels as f32
     }
@@ -324,8 +423,12 @@ mod tests {
         for i in 0..40 {
             let pose = Pose::new(Vec2::new(-4.0 + 0.2 * i as f32, 0.1), 0.02 * i as f32);
             let world_from_ego = pose.world_from_ego();
-            let pixels = ring.blocks.iter().flat_map(|block| &block.pixels);
-            let brute = pixels.filter(|&&pixel| distance.at(world_from_ego.point(pixel)) > 0.0).count();
+            let quarters = ring.batches.iter().flat_map(|batch| &batch.blocks).flat_map(|block| &block.quarters);
+            let pixels = quarters.flat_map(|quarter| {
+                let Points { ahead_m, left_m } = &quarter.pixels;
+                (0..quarter.n_pixels as usize).map(|i| Vec2::new(ahead_m[i], left_m[i]))
+            });
+            let brute = pixels.filter(|&pixel| distance.at(world_from_ego.point(pixel)) > 0.0).count();
             assert_eq!(ring.safe_ratio(&distance, pose, 0.06), brute as f32 / ring.n_pixels() as f32);
         }
     }

@@ -455,7 +455,7 @@ pub(super) struct BoundaryShift {
 impl BoundaryShift {
     /// Shift of the signed distance at a place, metres; `ahead_of_patch_m` is the distance from the patch's lower edge.
     #[inline]
-    pub(super) fn at(&self, place: Vec2, ahead_of_patch_m: f32) -> f32 {
+    pub(super) fn at(&mut self, place: Vec2, ahead_of_patch_m: f32) -> f32 {
         (self.lasting.at(place) + self.moving.at(place)) * (1.0 + ahead_of_patch_m / WOBBLE_RANGE_M)
     }
 }
@@ -463,44 +463,64 @@ impl BoundaryShift {
 /// Nodes per side of a [`Lattice`]: the patch's diagonal at 1 m spacing and one more on either side.
 const LATTICE_NODES: usize = 20;
 
-/// Value noise around a place at one instant: the nodes are hashed once, then looked up.
+/// Value noise around a place at one instant. A node is hashed when it is first looked at: of the hundreds in sight few
+/// lie beside a boundary.
 struct Lattice {
     origin: Vec2,
     per_m: f32,
+    /// Not a number where nobody has looked yet.
     nodes: [[f32; LATTICE_NODES]; LATTICE_NODES],
+    seed: u64,
+    amplitude: f32,
+    /// Indices of the first node.
+    first: (i32, i32),
+    tick: i32,
+    /// Progress from this tick of the noise to the next, faded, 0…1.
+    phase: f32,
 }
 
 impl Lattice {
     fn new(seed: u64, spacing_m: f32, amplitude: f32, centre: Vec2, radius_m: f32, time: f32) -> Self {
         let first = ((centre - Vec2::splat(radius_m)) / spacing_m).floor();
-        let used = ((2.0 * radius_m / spacing_m) as usize + 3).min(LATTICE_NODES);
-        let (tick, phase) = (time as i32, fade(time.fract()));
-        let mut nodes = [[0.0; LATTICE_NODES]; LATTICE_NODES];
-        if amplitude != 0.0 {
-            for (row, values) in nodes.iter_mut().enumerate().take(used) {
-                for (col, value) in values.iter_mut().enumerate().take(used) {
-                    let at =
-                        |dt: i32| unit(hash(seed, first.x as i32 + col as i32, first.y as i32 + row as i32, tick + dt));
-                    let now = if phase == 0.0 { at(0) } else { at(0) * (1.0 - phase) + at(1) * phase };
-                    *value = amplitude * (2.0 * now - 1.0) * VALUE_NOISE_MAX;
-                }
-            }
+        Self {
+            origin: first * spacing_m,
+            per_m: 1.0 / spacing_m,
+            nodes: [[f32::NAN; LATTICE_NODES]; LATTICE_NODES],
+            seed,
+            amplitude,
+            first: (first.x as i32, first.y as i32),
+            tick: time as i32,
+            phase: fade(time.fract()),
         }
-        Self { origin: first * spacing_m, per_m: 1.0 / spacing_m, nodes }
     }
 
-    #[inline]
-    fn at(&self, place: Vec2) -> f32 {
+    fn at(&mut self, place: Vec2) -> f32 {
+        if self.amplitude == 0.0 {
+            return 0.0;
+        }
         let node = ((place - self.origin) * self.per_m).max(Vec2::ZERO);
         let last = LATTICE_NODES as i32 - 2;
         let (col, row) = ((node.x as i32).min(last), (node.y as i32).min(last));
         let (fx, fy) = (fade(node.x - col as f32), fade(node.y - row as f32));
         let [near, far] = [row, row + 1].map(|row| {
-            let values = &self.nodes[row as usize];
-            let (left, right) = (values[col as usize], values[col as usize + 1]);
+            let [left, right] = [col, col + 1].map(|col| self.node(row as usize, col as usize));
             left + fx * (right - left)
         });
         near + fy * (far - near)
+    }
+
+    #[inline]
+    fn node(&mut self, row: usize, col: usize) -> f32 {
+        if self.nodes[row][col].is_nan() {
+            self.nodes[row][col] = self.draw(row as i32, col as i32);
+        }
+        self.nodes[row][col]
+    }
+
+    fn draw(&self, row: i32, col: i32) -> f32 {
+        let at = |dt: i32| unit(hash(self.seed, self.first.0 + col, self.first.1 + row, self.tick + dt));
+        let now = if self.phase == 0.0 { at(0) } else { at(0) * (1.0 - self.phase) + at(1) * self.phase };
+        self.amplitude * (2.0 * now - 1.0) * VALUE_NOISE_MAX
     }
 }
 

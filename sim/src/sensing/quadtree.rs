@@ -1,6 +1,6 @@
 //! Fast max-pooling of a distance field: most cells are decided by one look-up.
 
-use super::{BEV_PIXELS, CELL_PIXELS, GridGeometry};
+use super::{CELL_PIXELS, GRID_CELLS, GridGeometry};
 use crate::distance_field::{DistanceField, change_max_m};
 use crate::geometry::{Pose, Vec2};
 
@@ -18,6 +18,9 @@ pub(super) struct PixelLattice {
 
 /// Sizes of blocks: 1, 2, 4 and 8 pixels, a cell.
 const LEVELS: usize = CELL_PIXELS.ilog2() as usize + 1;
+
+/// Cells of a row, rounded up to what four at a time come to.
+pub(super) const ROW_LANES: usize = GRID_CELLS.next_multiple_of(4);
 
 /// Distance from the centre of a block of `side` × `side` pixels to the farthest pixel centre.
 pub(super) fn to_corner_m(pixel_m: f32, side: usize) -> f32 {
@@ -40,7 +43,6 @@ impl PixelLattice {
     /// World position at (fractional) pixel indices.
     #[inline]
     pub(super) fn point(&self, row: f32, col: f32) -> Vec2 {
-        debug_assert!(row < BEV_PIXELS as f32 && col < BEV_PIXELS as f32, "pixel indices lie in the view");
         self.origin + self.per_row * row + self.per_col * col
     }
 
@@ -51,36 +53,70 @@ impl PixelLattice {
         self.point(centre(row), centre(col))
     }
 
-    /// Whether any pixel of a cell has a signed distance of at most `threshold_m`.
-    ///
-    /// Most cells on a boundary have such a pixel in the corner that is nearest to it. Elsewhere, a block of pixels whose
-    /// centre is far enough from the threshold is decided by one look-up; the others are quartered.
+    /// Signed distances at the nodes nearest to the centres of a row of cells; a few more than there are cells.
     #[inline]
-    pub(super) fn any_below(&self, field: &DistanceField, row: usize, col: usize, threshold_m: f32) -> bool {
+    pub(super) fn nearest_nodes_of_row(&self, field: &DistanceField, row: usize) -> [f32; ROW_LANES] {
+        let (mut xs, mut ys) = ([0.0; ROW_LANES], [0.0; ROW_LANES]);
+        for col in 0..ROW_LANES {
+            let centre = self.cell_centre(row, col);
+            (xs[col], ys[col]) = (centre.x, centre.y);
+        }
+        field.at_nearest_nodes(&xs, &ys)
+    }
+
+    /// Whether any pixel of a cell has a signed distance of at most `threshold_m`. `centre_m`: at the node nearest to the
+    /// cell's centre.
+    ///
+    /// A cell whose centre is far enough from the threshold is decided by that alone. Most others have such a pixel in
+    /// the corner that is nearest to the boundary; what remains is quartered.
+    #[inline]
+    pub(super) fn any_below(
+        &self,
+        field: &DistanceField,
+        row: usize,
+        col: usize,
+        centre_m: f32,
+        threshold_m: f32,
+    ) -> bool {
+        const LEVEL: usize = LEVELS - 1;
+        if let Some(is_below) = self.is_decided(LEVEL, centre_m, threshold_m) {
+            return is_below;
+        }
         let [first_row, first_col] = [row, col].map(|index| (index * CELL_PIXELS) as f32);
         let away = field.away_at_nearest_node(self.cell_centre(row, col));
         let last = (CELL_PIXELS - 1) as f32;
         let corner_row = if away.dot(self.per_row) < 0.0 { first_row + last } else { first_row };
         let corner_col = if away.dot(self.per_col) < 0.0 { first_col + last } else { first_col };
         field.at(self.point(corner_row, corner_col)) <= threshold_m
-            || self.block_below(field, first_row, first_col, LEVELS - 1, threshold_m)
+            || self.any_quarter_below(field, first_row, first_col, LEVEL, threshold_m)
     }
 
-    fn block_below(&self, field: &DistanceField, row: f32, col: f32, level: usize, threshold_m: f32) -> bool {
-        if level == 0 {
-            return field.at(self.point(row, col)) <= threshold_m;
-        }
-        let to_centre = 0.5 * ((1 << level) - 1) as f32;
-        let centre_m = field.at_nearest_node(self.point(row + to_centre, col + to_centre));
+    /// Whether a block of 2ⁱ × 2ⁱ pixels has a pixel of at most `threshold_m`, if the distance at its centre tells.
+    #[inline]
+    fn is_decided(&self, level: usize, centre_m: f32, threshold_m: f32) -> Option<bool> {
         if centre_m > threshold_m + self.all_within_m[level] {
-            return false;
+            Some(false)
+        } else if centre_m < threshold_m - self.all_within_m[1] {
+            // The four pixels around the centre.
+            Some(true)
+        } else {
+            None
         }
-        // The four pixels around the centre.
-        if centre_m < threshold_m - self.all_within_m[1] {
-            return true;
-        }
+    }
+
+    fn any_quarter_below(&self, field: &DistanceField, row: f32, col: f32, level: usize, threshold_m: f32) -> bool {
         let half = (1 << (level - 1)) as f32;
-        let quarters = [(0.0, 0.0), (0.0, half), (half, 0.0), (half, half)];
-        quarters.into_iter().any(|(r, c)| self.block_below(field, row + r, col + c, level - 1, threshold_m))
+        let to_centre = 0.5 * (half - 1.0);
+        let corners = [(row, col), (row, col + half), (row + half, col), (row + half, col + half)];
+        let points = corners.map(|(row, col)| self.point(row + to_centre, col + to_centre));
+        let (xs, ys) = (points.map(|point| point.x), points.map(|point| point.y));
+        if level == 1 {
+            return field.at_each(&xs, &ys).into_iter().any(|distance_m| distance_m <= threshold_m);
+        }
+        let centres_m = field.at_nearest_nodes(&xs, &ys);
+        corners.into_iter().zip(centres_m).any(|((row, col), centre_m)| {
+            self.is_decided(level - 1, centre_m, threshold_m)
+                .unwrap_or_else(|| self.any_quarter_below(field, row, col, level - 1, threshold_m))
+        })
     }
 }

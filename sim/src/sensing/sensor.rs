@@ -5,7 +5,7 @@ mod inspect;
 pub use inspect::Inspection;
 
 use super::noise::{NoiseConfig, NoiseField, Patch, Reads, Region, Shadow};
-use super::quadtree::{PixelLattice, to_corner_m};
+use super::quadtree::{PixelLattice, ROW_LANES, to_corner_m};
 use super::smear::{ConvexInEgo, hidden_ground};
 use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
 use crate::distance_field::change_max_m;
@@ -65,26 +65,24 @@ impl Sensor {
         let geometry = &self.config.geometry;
         let ego = EgoView::new(geometry, pose);
         let openings = self.openings(&ego, tick);
-        let shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
+        let mut shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
         let within_cell_m = change_max_m(to_corner_m(geometry.pixel_m(), CELL_PIXELS));
         let mut grid = OccupancyGrid::free();
         for row in 0..GRID_CELLS {
             let ahead_of_patch_m = geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m;
+            let centres_m = ego.lattice.nearest_nodes_of_row(map.distance_field(), row);
             // A cell whose centre is this far from a boundary is decided without looking at the noise.
             let sure_m = self.noise.boundary_shift_max_m(ahead_of_patch_m) + within_cell_m;
-            let mut occupied = 0;
-            for col in 0..GRID_CELLS {
-                let centre = ego.lattice.cell_centre(row, col);
-                let centre_m = map.distance_field().at_nearest_node(centre);
-                let shift_m = || shift.at(centre, ahead_of_patch_m);
-                let is_occupied = if centre_m > sure_m {
-                    false
-                } else if let Some(opened) = openings.as_ref().filter(|opened| opened.touch_cell(row, col)) {
-                    any_closed_pixel_below(map, &ego, opened, row, col, -shift_m())
-                } else if centre_m < -sure_m {
-                    true
-                } else {
-                    ego.lattice.any_below(map.distance_field(), row, col, -shift_m())
+            let may_be_occupied = bits_where(&centres_m, |centre_m| centre_m <= sure_m);
+            let opened = openings.as_ref().map_or(0, |opened| opened.touched_cells(row)) & may_be_occupied;
+            let mut occupied = bits_where(&centres_m, |centre_m| centre_m < -sure_m) & !opened;
+            for col in bits(may_be_occupied & !occupied) {
+                let threshold_m = -shift.at(ego.lattice.cell_centre(row, col), ahead_of_patch_m);
+                let is_occupied = match &openings {
+                    Some(openings) if opened >> col & 1 == 1 => {
+                        any_closed_pixel_below(map, &ego, openings, row, col, threshold_m)
+                    }
+                    _ => ego.lattice.any_below(map.distance_field(), row, col, centres_m[col], threshold_m),
                 };
                 occupied |= u32::from(is_occupied) << col;
             }
@@ -140,7 +138,7 @@ impl Sensor {
                 }
             });
         });
-        let shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
+        let mut shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
         let shifts_m: Vec<f32> = (0..GRID_CELLS * GRID_CELLS)
             .map(|cell| {
                 let (row, col) = (cell / GRID_CELLS, cell % GRID_CELLS);
@@ -220,6 +218,22 @@ impl Sensor {
     }
 }
 
+/// The cells of a row of which something holds, bit = column.
+#[inline]
+fn bits_where(values: &[f32; ROW_LANES], is_so: impl Fn(f32) -> bool) -> u32 {
+    let bits = values.iter().enumerate().fold(0, |bits, (col, &value)| bits | u32::from(is_so(value)) << col);
+    bits & OccupancyGrid::ROW_MASK
+}
+
+/// Indices of the set bits, lowest first.
+fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (mask != 0).then(|| mask.trailing_zeros() as usize);
+        mask &= mask.wrapping_sub(1);
+        bit
+    })
+}
+
 /// Whether a cell keeps a pixel beyond the boundary although parts of it are opened.
 fn any_closed_pixel_below(
     map: &Map,
@@ -287,11 +301,15 @@ impl PixelRows {
         self.bits[row][col / 64] >> (col % 64) & 1 == 1
     }
 
-    /// Whether any pixel of a cell is set.
-    fn touch_cell(&self, row: usize, col: usize) -> bool {
-        let mask = 0xFF << (col % CELLS_PER_WORD * CELL_PIXELS);
-        self.bits[row * CELL_PIXELS..(row + 1) * CELL_PIXELS]
-            .iter()
-            .any(|words| words[col / CELLS_PER_WORD] & mask != 0)
+    /// The cells of a row of cells of which any pixel is set, bit = column.
+    fn touched_cells(&self, row: usize) -> u32 {
+        let mut words = [0; WORDS];
+        for pixels in &self.bits[row * CELL_PIXELS..(row + 1) * CELL_PIXELS] {
+            for (word, pixels) in words.iter_mut().zip(pixels) {
+                *word |= pixels;
+            }
+        }
+        let is_touched = |col: usize| words[col / CELLS_PER_WORD] >> (col % CELLS_PER_WORD * CELL_PIXELS) & 0xFF != 0;
+        (0..GRID_CELLS).fold(0, |cells, col| cells | u32::from(is_touched(col)) << col)
     }
 }

@@ -38,8 +38,9 @@ impl ConvexInEgo {
         let Some(box_) = self.pixel_box(geometry) else { return };
         let (pixel_m, pixels_per_m) = (geometry.pixel_m(), 1.0 / geometry.pixel_m());
         let half_m = 0.5 * geometry.side_m;
-        let ahead_of = |row: usize| geometry.far_edge_ahead_m() - (row as f32 + 0.5) * pixel_m;
-        // Walk the edges: each lends its crossing to the rows between its ends.
+        let far_m = geometry.far_edge_ahead_m();
+        // Walk the edges: each lends its crossing to the rows between its ends. Conditions are values here, not branches,
+        // so that four rows are done at once.
         let mut right_m = [f32::INFINITY; BEV_PIXELS];
         let mut left_m = [f32::NEG_INFINITY; BEV_PIXELS];
         let mut a = corners[corners.len() - 1];
@@ -48,13 +49,15 @@ impl ConvexInEgo {
             // Rows with low.x <= ahead < high.x; one more on either side, then tested exactly.
             let rows = rows_between(geometry, low.x, high.x);
             let slope = (high.y - low.y) / (high.x - low.x);
-            for row in rows.start.max(box_.rows.start)..rows.end.min(box_.rows.end) {
-                let ahead_m = ahead_of(row);
-                if low.x <= ahead_m && ahead_m < high.x {
-                    let y = low.y + (ahead_m - low.x) * slope;
-                    right_m[row] = right_m[row].min(y);
-                    left_m[row] = left_m[row].max(y);
-                }
+            let first = rows.start.max(box_.rows.start);
+            let rows = first..rows.end.min(box_.rows.end).max(first);
+            let spans = right_m[rows.clone()].iter_mut().zip(&mut left_m[rows]);
+            for (row, (right_m, left_m)) in (first as i32..).zip(spans) {
+                let ahead_m = far_m - (row as f32 + 0.5) * pixel_m;
+                let is_crossed = (low.x <= ahead_m) & (ahead_m < high.x);
+                let y = low.y + (ahead_m - low.x) * slope;
+                *right_m = if is_crossed & (y < *right_m) { y } else { *right_m };
+                *left_m = if is_crossed & (y > *left_m) { y } else { *left_m };
             }
             a = b;
         }
