@@ -231,13 +231,13 @@ fn tuned_name(spec: &str) -> String {
 }
 
 /// Measured on two cores of an AMD EPYC (Zen 3): seconds per run that is collected from, with further looks.
-const COLLECTED_RUN_S: f64 = 1.1;
+const COLLECTED_RUN_S: f64 = 0.6;
 /// The same per run driven; networks take longer, planners less.
 const DRIVEN_RUN_S: f64 = 0.25;
 /// The same per run watched, with the answers on held-back samples.
 const WATCHED_RUN_S: f64 = 2.5;
 /// Multiply-adds of a network's answer that training gets through per second, both directions counted as one.
-const TRAINED_PER_S: f64 = 1e10;
+const TRAINED_PER_S: f64 = 1.2e10;
 
 impl Stage {
     /// About how long it takes, seconds.
