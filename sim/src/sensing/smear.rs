@@ -33,6 +33,7 @@ impl ConvexInEgo {
     }
 
     /// Calls `span(row, first_col, last_col)` for every pixel row in which pixel centres lie inside the polygon.
+    #[expect(clippy::needless_bitwise_bool, reason = "values instead of branches are computed for four rows at once")]
     pub(super) fn for_each_row(&self, geometry: &GridGeometry, mut span: impl FnMut(usize, usize, usize)) {
         let corners = &self.corners[..self.n_corners];
         let Some(box_) = self.pixel_box(geometry) else { return };
