@@ -117,6 +117,23 @@ fn a_run_leaves_data_and_policy_of_every_round() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
+/// Nudges change where cars go in iterations, and nothing in behaviour cloning.
+#[test]
+fn only_iterations_are_nudged() {
+    let rounds_of = |name, disturbance| {
+        let folder = scratch(name);
+        run_in(&folder, &DaggerConfig { disturbance, iterations_max: 1, ..config() }, &mut go_on).unwrap();
+        let store = Store::open(&folder).unwrap();
+        let rounds = [0, 1].map(|round| store.read_round::<Collection>(round).unwrap().0);
+        std::fs::remove_dir_all(folder).unwrap();
+        rounds
+    };
+    let nudges = super::DisturbanceSettings { pause_ticks: 20, lasts_ticks: 20, curvature_max_per_m: 0.1 };
+    let [plain, nudged] = [rounds_of("plain", None), rounds_of("nudged", Some(nudges))];
+    assert_eq!(plain[0], nudged[0]);
+    assert_ne!(plain[1], nudged[1]);
+}
+
 #[test]
 fn an_interrupted_run_continues_to_the_same_end() {
     let (whole, parts) = (scratch("whole"), scratch("parts"));
