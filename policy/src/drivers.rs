@@ -2,6 +2,7 @@
 
 use crate::checkpoint::Checkpoint;
 use crate::network::{DeviceChoice, Prediction, Predictor};
+use crate::steadying::{Steadying, Steadyings};
 use sim::driver::{Decision, Fleet, Policy, Seat, Source};
 use sim::sensing::{GridGeometry, Observation};
 
@@ -10,38 +11,52 @@ use sim::sensing::{GridGeometry, Observation};
 pub struct NetFleet {
     predictor: Predictor,
     geometry: GridGeometry,
+    steadyings: Steadyings,
 }
 
 impl NetFleet {
     /// Seats a network.
     pub fn new(checkpoint: Checkpoint, device: DeviceChoice) -> Self {
-        Self { predictor: Predictor::new(checkpoint.weights, device), geometry: checkpoint.geometry }
+        let Checkpoint { weights, geometry } = checkpoint;
+        let steadyings = Steadyings::new(&weights.config(), geometry);
+        Self { predictor: Predictor::new(weights, device), geometry, steadyings }
     }
 }
 
 impl Fleet for NetFleet {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
-        let predictions = self.predictor.predict(&grids);
+        let mut predictions = self.predictor.predict(&grids);
+        self.steadyings.steady(seats, &mut predictions);
         decisions.extend(predictions.iter().map(|prediction| novice_decision(prediction, self.geometry)));
     }
 }
 
 /// The network alone drives one car. Answers the same bits as [`NetFleet`].
 #[derive(Debug, Clone)]
-pub struct NetPolicy(NetFleet);
+pub struct NetPolicy {
+    predictor: Predictor,
+    geometry: GridGeometry,
+    steadying: Steadying,
+}
 
 impl NetPolicy {
     /// Seats a network.
     pub fn new(checkpoint: Checkpoint, device: DeviceChoice) -> Self {
-        Self(NetFleet::new(checkpoint, device))
+        let Checkpoint { weights, geometry } = checkpoint;
+        let steadying = Steadying::new(&weights.config(), geometry);
+        Self { predictor: Predictor::new(weights, device), geometry, steadying }
     }
 }
 
 impl Policy for NetPolicy {
     fn act(&mut self, observation: &Observation) -> Decision {
-        let prediction = self.0.predictor.predict(&[&observation.grid])[0];
-        novice_decision(&prediction, self.0.geometry)
+        let prediction = self.predictor.predict(&[&observation.grid])[0];
+        novice_decision(&self.steadying.steadied(prediction), self.geometry)
+    }
+
+    fn reset(&mut self) {
+        self.steadying.reset();
     }
 }
 

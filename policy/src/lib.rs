@@ -23,3 +23,4 @@ pub mod drivers;
 pub mod fit;
 pub mod loss;
 pub mod network;
+mod steadying;

@@ -73,6 +73,10 @@ pub struct LookAheadNetConfig {
     /// right are then treated alike to the bit, and errors partly cancel. Training sees single grids as always.
     #[serde(default)]
     pub symmetric: bool,
+    /// In use, the point that is driven at is an exponential mean of the answers over about so many ticks, in curvature
+    /// and range; 0: the last answer alone.
+    #[serde(default)]
+    pub memory_ticks: f32,
 }
 
 impl LookAheadNetConfig {
@@ -85,6 +89,7 @@ impl LookAheadNetConfig {
             dropout_features: 0.25,
             dropout_hidden: 0.5,
             symmetric: false,
+            memory_ticks: 0.0,
         }
     }
 
@@ -99,6 +104,7 @@ impl LookAheadNetConfig {
             dropout_features: 0.0,
             dropout_hidden: 0.2,
             symmetric: true,
+            memory_ticks: 8.0,
         }
     }
 
@@ -124,6 +130,9 @@ impl LookAheadNetConfig {
             if !(1..=7).contains(&conv.kernel) {
                 return Err(NetworkError::Kernel { layer, kernel: conv.kernel });
             }
+        }
+        if !(self.memory_ticks.is_finite() && self.memory_ticks >= 0.0) {
+            return Err(NetworkError::Memory { ticks: self.memory_ticks });
         }
         if self.hidden == 0 {
             return Err(NetworkError::NoHiddenUnits);
@@ -161,6 +170,12 @@ pub enum NetworkError {
     /// A fully connected layer without units.
     #[error("the fully connected layer needs at least one unit")]
     NoHiddenUnits,
+    /// A memory that is no length of time.
+    #[error("memory_ticks is {ticks}; 0 or more ticks are possible")]
+    Memory {
+        /// As given.
+        ticks: f32,
+    },
     /// A share outside [0, 1).
     #[error("{name} is {share}; a share from 0 to below 1 is possible")]
     Dropout {

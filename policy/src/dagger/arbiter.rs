@@ -4,7 +4,8 @@ use super::disturbance::Disturbance;
 use crate::dataset::{Round, Sample};
 use crate::decision_rule::{DecisionRule, Evidence};
 use crate::drivers::novice_decision;
-use crate::network::Predictor;
+use crate::network::{Prediction, Predictor};
+use crate::steadying::Steadyings;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Driver, Fleet, GroundTruth, Seat};
@@ -22,7 +23,7 @@ pub enum Keep {
 
 /// Novice and expert at the wheel of every seat of a batch.
 pub struct Arbiter {
-    novice: Option<Predictor>,
+    novice: Option<Novice>,
     experts: Vec<Box<dyn Driver + Send>>,
     rule: DecisionRule,
     keep: Keep,
@@ -32,6 +33,20 @@ pub struct Arbiter {
     n_tot: u64,
     n_net: u64,
     tau_hat_sum: f64,
+}
+
+/// The network at the wheel, as it drives alone: with its memory.
+struct Novice {
+    predictor: Predictor,
+    steadyings: Steadyings,
+}
+
+impl Novice {
+    fn answers(&mut self, seats: &[Seat<'_>], grids: &[&OccupancyGrid]) -> Vec<Prediction> {
+        let mut answers = self.predictor.predict(grids);
+        self.steadyings.steady(seats, &mut answers);
+        answers
+    }
 }
 
 /// What is written down at one seat.
@@ -80,6 +95,10 @@ impl Arbiter {
         geometry: GridGeometry,
     ) -> Self {
         let seats = experts.iter().map(|_| SeatRecord::default()).collect(); // line 2: D_i ← ∅
+        let novice = novice.map(|predictor| {
+            let steadyings = Steadyings::new(&predictor.weights().config(), geometry);
+            Novice { predictor, steadyings }
+        });
         Self { novice, experts, rule, keep, geometry, seats, n_tot: 0, n_net: 0, tau_hat_sum: 0.0 } // line 3
     }
 
@@ -151,7 +170,7 @@ impl Fleet for Arbiter {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
         let first = decisions.len();
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
-        let predictions = self.novice.as_mut().map(|novice| novice.predict(&grids)); // line 5
+        let predictions = self.novice.as_mut().map(|novice| novice.answers(seats, &grids)); // line 5
         let expert_decisions = self.ask_experts(seats); // line 6
         let mut kept: Vec<Option<Sample>> = Vec::with_capacity(seats.len());
         for (index, (seat, expert)) in seats.iter().zip(expert_decisions).enumerate() {

@@ -63,6 +63,7 @@ fn config() -> DaggerConfig {
             dropout_features: 0.0,
             dropout_hidden: 0.1,
             symmetric: false,
+            memory_ticks: 0.0,
         },
         // Loose enough that both novice and expert drive after so little training.
         rule: DecisionRule::AllBelow { tau: 0.25, chi: 1.0, chi_on: crate::decision_rule::ChiOn::StdPerAxis },

@@ -12,6 +12,7 @@ fn tiny() -> LookAheadNetConfig {
         dropout_features: 0.1,
         dropout_hidden: 0.2,
         symmetric: false,
+        memory_ticks: 0.0,
     }
 }
 

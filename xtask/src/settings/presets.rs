@@ -100,6 +100,7 @@ fn smoke() -> Settings {
                 dropout_features: 0.0,
                 dropout_hidden: 0.1,
                 symmetric: true,
+                memory_ticks: 4.0,
             },
             fit_cloning: fit.clone(),
             fit_iteration: fit,

@@ -304,8 +304,14 @@ impl Drive {
     /// The answers of learner and expert side by side, how far they are apart (τ̂) and how sure the learner is (χ̂).
     fn compare(&mut self, frame: &Frame, expert: Option<LookAheadPoint>, marks: &mut Vec<Mark>) {
         let driven = frame.decision;
+        // It is asked every tick, also when it drove itself: it remembers.
+        let said = self.novice.as_mut().map(|novice| {
+            if self.was_reset {
+                novice.reset();
+            }
+            novice.act(&frame.observation)
+        });
         let (learner, expert) = if driven.source == Source::Expert {
-            let said = self.novice.as_mut().map(|novice| novice.act(&frame.observation));
             let point = said.map(|said| Shape::Dots(vec![dot(said.look_ahead, 5.0, colours::NOVICE)]));
             marks.extend(point.map(|point| self.mark("car/network_point", point)));
             (said, Some(driven.look_ahead))
