@@ -6,7 +6,8 @@
 //! processes per tick we use value noise in time with the same correlation time: it needs no state, so a frame can be
 //! recomputed alone and every driver meets the same noise.
 
-use crate::geometry::{Pose, Vec2};
+use crate::distance_field::{floor, to_index};
+use crate::geometry::{Circles, Pose, Vec2};
 use crate::map::Map;
 use crate::scenario::NoiseLevel;
 use crate::seed::{Rng, RootSeed, Stream};
@@ -262,6 +263,8 @@ pub struct NoiseField {
     flicker: f32,
     dropout: f32,
     pub(super) patches: Vec<Patch>,
+    /// Circles around the patches, in their order.
+    pub(super) patch_circles: Circles,
     pub(super) shadows: Vec<Shadow>,
 }
 
@@ -275,6 +278,7 @@ impl NoiseField {
             flicker: amount(config.flicker),
             dropout: amount(config.dropout),
             patches: Vec::new(),
+            patch_circles: Circles::default(),
             shadows: Vec::new(),
         };
         // One stream per layer: strengthening one layer never moves another.
@@ -284,6 +288,7 @@ impl NoiseField {
         field.open_boundaries(map, amount(config.false_free), &mut rng(2));
         field.scatter_blobs(map, amount(config.blob), &mut rng(3));
         field.spill_stains(map, amount(config.stain), &mut rng(4));
+        field.patch_circles = field.patches.iter().map(|patch| (patch.region.centre, patch.region.radius_m)).collect();
         field
     }
 
@@ -298,10 +303,10 @@ impl NoiseField {
         }
     }
 
-    /// Bound of [`BoundaryShift::at`] at a range, metres.
+    /// Bound of [`BoundaryShift::at_each`], metres. `growth`: [`wobble_growth`] there.
     #[inline]
-    pub(super) fn boundary_shift_max_m(&self, ahead_of_patch_m: f32) -> f32 {
-        self.wobble * (WOBBLE_STATIC.0 + WOBBLE_MOVING.0) * VALUE_NOISE_MAX * (1.0 + ahead_of_patch_m / WOBBLE_RANGE_M)
+    pub(super) fn boundary_shift_max_m(&self, growth: f32) -> f32 {
+        self.wobble * (WOBBLE_STATIC.0 + WOBBLE_MOVING.0) * VALUE_NOISE_MAX * growth
     }
 
     /// Rank from which a shadow's pixels are misread at a tick.
@@ -453,23 +458,32 @@ pub(super) struct BoundaryShift {
 }
 
 impl BoundaryShift {
-    /// Shift of the signed distance at a place, metres; `ahead_of_patch_m` is the distance from the patch's lower edge.
+    /// Shifts of the signed distance at the places (`xs[i]`, `ys[i]`), metres. `growth`: [`wobble_growth`] there.
     #[inline]
-    pub(super) fn at(&mut self, place: Vec2, ahead_of_patch_m: f32) -> f32 {
-        (self.lasting.at(place) + self.moving.at(place)) * (1.0 + ahead_of_patch_m / WOBBLE_RANGE_M)
+    pub(super) fn at_each<const N: usize>(&mut self, xs: &[f32; N], ys: &[f32; N], growth: &[f32; N]) -> [f32; N] {
+        let (lasting, moving) = (self.lasting.at_each(xs, ys), self.moving.at_each(xs, ys));
+        std::array::from_fn(|i| (lasting[i] + moving[i]) * growth[i])
     }
+}
+
+/// How much larger the wobble is at a distance from the patch's lower edge.
+#[inline]
+pub(super) fn wobble_growth(ahead_of_patch_m: f32) -> f32 {
+    1.0 + ahead_of_patch_m / WOBBLE_RANGE_M
 }
 
 /// Nodes per side of a [`Lattice`]: the patch's diagonal at 1 m spacing and one more on either side.
 const LATTICE_NODES: usize = 20;
 
-/// Value noise around a place at one instant. A node is hashed when it is first looked at: of the hundreds in sight few
+/// Value noise around a place at one instant. A node is hashed when it is first needed: of the hundreds in sight few
 /// lie beside a boundary.
 struct Lattice {
     origin: Vec2,
     per_m: f32,
-    /// Not a number where nobody has looked yet.
-    nodes: [[f32; LATTICE_NODES]; LATTICE_NODES],
+    /// Row by row; of meaning only where it is drawn.
+    nodes: [f32; LATTICE_NODES * LATTICE_NODES],
+    /// Which nodes of a row are drawn, bit = column.
+    drawn: [u32; LATTICE_NODES],
     seed: u64,
     amplitude: f32,
     /// Indices of the first node.
@@ -485,7 +499,8 @@ impl Lattice {
         Self {
             origin: first * spacing_m,
             per_m: 1.0 / spacing_m,
-            nodes: [[f32::NAN; LATTICE_NODES]; LATTICE_NODES],
+            nodes: [0.0; LATTICE_NODES * LATTICE_NODES],
+            drawn: [0; LATTICE_NODES],
             seed,
             amplitude,
             first: (first.x as i32, first.y as i32),
@@ -494,27 +509,45 @@ impl Lattice {
         }
     }
 
-    fn at(&mut self, place: Vec2) -> f32 {
+    /// Values at the places (`xs[i]`, `ys[i]`). All but the look-ups is done for several places at once.
+    #[inline]
+    fn at_each<const N: usize>(&mut self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
         if self.amplitude == 0.0 {
-            return 0.0;
+            return [0.0; N];
         }
-        let node = ((place - self.origin) * self.per_m).max(Vec2::ZERO);
-        let last = LATTICE_NODES as i32 - 2;
-        let (col, row) = ((node.x as i32).min(last), (node.y as i32).min(last));
-        let (fx, fy) = (fade(node.x - col as f32), fade(node.y - row as f32));
-        let [near, far] = [row, row + 1].map(|row| {
-            let [left, right] = [col, col + 1].map(|col| self.node(row as usize, col as usize));
-            left + fx * (right - left)
-        });
-        near + fy * (far - near)
+        let (mut cols, mut rows, mut fxs, mut fys) = ([0; N], [0; N], [0.0; N], [0.0; N]);
+        for i in 0..N {
+            (cols[i], fxs[i]) = lattice_cell((xs[i] - self.origin.x) * self.per_m);
+            (rows[i], fys[i]) = lattice_cell((ys[i] - self.origin.y) * self.per_m);
+        }
+        // The four nodes around each place, near and far pair.
+        let (mut near, mut far) = ([[0.0; 2]; N], [[0.0; 2]; N]);
+        for i in 0..N {
+            let (row, col) = (rows[i] as usize, cols[i] as usize);
+            self.draw_around(row, col);
+            let base = row * LATTICE_NODES + col;
+            let nodes = &self.nodes[base..base + LATTICE_NODES + 2];
+            near[i] = [nodes[0], nodes[1]];
+            far[i] = [nodes[LATTICE_NODES], nodes[LATTICE_NODES + 1]];
+        }
+        std::array::from_fn(|i| {
+            let [near, far] = [near[i], far[i]].map(|[left, right]| left + fxs[i] * (right - left));
+            near + fys[i] * (far - near)
+        })
     }
 
+    /// Draws those of the four nodes around a cell of the lattice that are not drawn yet.
     #[inline]
-    fn node(&mut self, row: usize, col: usize) -> f32 {
-        if self.nodes[row][col].is_nan() {
-            self.nodes[row][col] = self.draw(row as i32, col as i32);
+    fn draw_around(&mut self, row: usize, col: usize) {
+        if (self.drawn[row] & self.drawn[row + 1]) >> col & 0b11 == 0b11 {
+            return;
         }
-        self.nodes[row][col]
+        for (row, col) in [(row, col), (row, col + 1), (row + 1, col), (row + 1, col + 1)] {
+            if self.drawn[row] >> col & 1 == 0 {
+                self.drawn[row] |= 1 << col;
+                self.nodes[row * LATTICE_NODES + col] = self.draw(row as i32, col as i32);
+            }
+        }
     }
 
     fn draw(&self, row: i32, col: i32) -> f32 {
@@ -522,6 +555,16 @@ impl Lattice {
         let now = if self.phase == 0.0 { at(0) } else { at(0) * (1.0 - self.phase) + at(1) * self.phase };
         self.amplitude * (2.0 * now - 1.0) * VALUE_NOISE_MAX
     }
+}
+
+/// The cell of a [`Lattice`] that holds a coordinate, and the faded progress through it, 0…1.
+#[inline]
+fn lattice_cell(node: f32) -> (u32, f32) {
+    const LAST: f32 = (LATTICE_NODES - 2) as f32;
+    let node = if node > 0.0 { node } else { 0.0 };
+    let whole = floor(node);
+    let cell = if whole < LAST { whole } else { LAST };
+    (to_index(cell), fade(node - cell))
 }
 
 /// Lowest and highest value within `reach` cells along both axes of every cell of a raster.

@@ -14,7 +14,12 @@ pub(super) struct PixelLattice {
     per_col: Vec2,
     /// How much the field may change from the centre of a block of 2ⁱ × 2ⁱ pixels to any of them.
     all_within_m: [f32; LEVELS],
+    /// From the centre of a cell to the corner of a world-aligned box around its pixel centres, and a millimetre more.
+    half_cell: Vec2,
 }
+
+/// By how much rounding may change a distance, with a lot to spare, metres.
+const ROUNDING_M: f32 = 1e-4;
 
 /// Sizes of blocks: 1, 2, 4 and 8 pixels, a cell.
 const LEVELS: usize = CELL_PIXELS.ilog2() as usize + 1;
@@ -32,10 +37,12 @@ impl PixelLattice {
         let world_from_ego = pose.world_from_ego();
         let pixel_m = geometry.pixel_m();
         let ahead = world_from_ego.rotation;
+        let (per_row, per_col) = (-ahead * pixel_m, -ahead.perp() * pixel_m);
         Self {
             origin: world_from_ego.point(geometry.pixel_in_ego(0, 0)),
-            per_row: -ahead * pixel_m,
-            per_col: -ahead.perp() * pixel_m,
+            per_row,
+            per_col,
+            half_cell: (per_row.abs() + per_col.abs()) * (0.5 * (CELL_PIXELS - 1) as f32) + Vec2::splat(1e-3),
             all_within_m: std::array::from_fn(|level| change_max_m(to_corner_m(pixel_m, 1 << level))),
         }
     }
@@ -67,8 +74,8 @@ impl PixelLattice {
     /// Whether any pixel of a cell has a signed distance of at most `threshold_m`. `centre_m`: at the node nearest to the
     /// cell's centre.
     ///
-    /// A cell whose centre is far enough from the threshold is decided by that alone. Most others have such a pixel in
-    /// the corner that is nearest to the boundary; what remains is quartered.
+    /// A cell whose centre is far enough from the threshold is decided by that alone. Most others have such a pixel in a
+    /// corner, or no such node around them; what remains is quartered.
     #[inline]
     pub(super) fn any_below(
         &self,
@@ -79,16 +86,28 @@ impl PixelLattice {
         threshold_m: f32,
     ) -> bool {
         const LEVEL: usize = LEVELS - 1;
+        const LAST: f32 = (CELL_PIXELS - 1) as f32;
         if let Some(is_below) = self.is_decided(LEVEL, centre_m, threshold_m) {
             return is_below;
         }
         let [first_row, first_col] = [row, col].map(|index| (index * CELL_PIXELS) as f32);
-        let away = field.away_at_nearest_node(self.cell_centre(row, col));
-        let last = (CELL_PIXELS - 1) as f32;
-        let corner_row = if away.dot(self.per_row) < 0.0 { first_row + last } else { first_row };
-        let corner_col = if away.dot(self.per_col) < 0.0 { first_col + last } else { first_col };
-        field.at(self.point(corner_row, corner_col)) <= threshold_m
-            || self.any_quarter_below(field, first_row, first_col, LEVEL, threshold_m)
+        let (last_row, last_col) = (first_row + LAST, first_col + LAST);
+        let corners = [(first_row, first_col), (first_row, last_col), (last_row, first_col), (last_row, last_col)];
+        if self.any_of_four_below(field, corners, threshold_m) {
+            return true;
+        }
+        let centre = self.cell_centre(row, col);
+        let (low, high) = (centre - self.half_cell, centre + self.half_cell);
+        field.lowest_within(low, high) <= threshold_m + ROUNDING_M
+            && self.any_quarter_below(field, first_row, first_col, LEVEL, threshold_m)
+    }
+
+    /// Whether one of four pixels, given as (row, column), has a signed distance of at most `threshold_m`.
+    #[inline]
+    fn any_of_four_below(&self, field: &DistanceField, pixels: [(f32, f32); 4], threshold_m: f32) -> bool {
+        let points = pixels.map(|(row, col)| self.point(row, col));
+        let distances_m = field.at_each(&points.map(|point| point.x), &points.map(|point| point.y));
+        distances_m.into_iter().fold(false, |any, distance_m| any | (distance_m <= threshold_m))
     }
 
     /// Whether a block of 2ⁱ × 2ⁱ pixels has a pixel of at most `threshold_m`, if the distance at its centre tells.
@@ -108,11 +127,11 @@ impl PixelLattice {
         let half = (1 << (level - 1)) as f32;
         let to_centre = 0.5 * (half - 1.0);
         let corners = [(row, col), (row, col + half), (row + half, col), (row + half, col + half)];
+        if level == 1 {
+            return self.any_of_four_below(field, corners, threshold_m);
+        }
         let points = corners.map(|(row, col)| self.point(row + to_centre, col + to_centre));
         let (xs, ys) = (points.map(|point| point.x), points.map(|point| point.y));
-        if level == 1 {
-            return field.at_each(&xs, &ys).into_iter().any(|distance_m| distance_m <= threshold_m);
-        }
         let centres_m = field.at_nearest_nodes(&xs, &ys);
         corners.into_iter().zip(centres_m).any(|((row, col), centre_m)| {
             self.is_decided(level - 1, centre_m, threshold_m)
