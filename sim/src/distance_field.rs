@@ -96,22 +96,23 @@ impl DistanceField {
     #[inline]
     pub fn at_each<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
         let (last_x, last_y) = ((self.cols - 2) as f32, (self.rows - 2) as f32);
-        let (mut cols, mut rows, mut fxs, mut fys) = ([0; N], [0; N], [0.0; N], [0.0; N]);
+        let stride = self.cols as u32;
+        let (mut nodes, mut fxs, mut fys) = ([0; N], [0.0; N], [0.0; N]);
         for i in 0..N {
             let x = clamp_to_raster((xs[i] - self.origin.x) * (1.0 / NODE_M), last_x);
             let y = clamp_to_raster((ys[i] - self.origin.y) * (1.0 / NODE_M), last_y);
             let (floor_x, floor_y) = (floor(x), floor(y));
             (fxs[i], fys[i]) = (x - floor_x, y - floor_y);
-            (cols[i], rows[i]) = (to_index(floor_x), to_index(floor_y));
+            nodes[i] = to_index(floor_y) * stride + to_index(floor_x);
         }
         // The four nodes around each point, near and far pair; one bounds check for both.
-        let stride = self.cols as u32 as usize;
+        let stride = stride as usize;
         let (mut near, mut far) = ([[0.0; 2]; N], [[0.0; 2]; N]);
         for i in 0..N {
-            let base = rows[i] as usize * stride + cols[i] as usize;
-            let nodes = &self.values_m[base..base + stride + 2];
-            near[i] = [nodes[0], nodes[1]];
-            far[i] = [nodes[stride], nodes[stride + 1]];
+            let base = nodes[i] as usize;
+            let nodes_m = &self.values_m[base..base + stride + 2];
+            near[i] = [nodes_m[0], nodes_m[1]];
+            far[i] = [nodes_m[stride], nodes_m[stride + 1]];
         }
         std::array::from_fn(|i| {
             let [near, far] = [near[i], far[i]].map(|[left, right]| left + fxs[i] * (right - left));
@@ -132,6 +133,23 @@ impl DistanceField {
             nodes[i] = to_nearest_index(y) * stride + to_nearest_index(x);
         }
         std::array::from_fn(|i| self.values_m[nodes[i] as usize])
+    }
+
+    /// [`Self::at_nearest_nodes`] of as many points as there is room for in `values_m`, at most 32.
+    // Not inlined: on its own and of unknown length, the first loop is compiled to instructions that take four points.
+    #[inline(never)]
+    pub fn at_many_nearest_nodes(&self, xs: &[f32], ys: &[f32], values_m: &mut [f32]) {
+        let (last_x, last_y) = ((self.cols - 1) as f32, (self.rows - 1) as f32);
+        let stride = self.cols as u32;
+        let mut nodes = [0; 32];
+        for ((node, &x), &y) in nodes.iter_mut().zip(xs).zip(ys) {
+            let x = clamp_to_raster((x - self.origin.x) * (1.0 / NODE_M), last_x);
+            let y = clamp_to_raster((y - self.origin.y) * (1.0 / NODE_M), last_y);
+            *node = to_nearest_index(y) * stride + to_nearest_index(x);
+        }
+        for (value_m, &node) in values_m.iter_mut().zip(&nodes) {
+            *value_m = self.values_m[node as usize];
+        }
     }
 
     /// A lower bound of [`Self::at`] in a box of at most 0.6 m by 0.6 m: the lowest of the nodes that lend to it. Minus
@@ -207,7 +225,7 @@ impl DistanceField {
 
 /// Bounds a coordinate to the raster, like `clamp`; what is not a number becomes 0.
 #[inline]
-fn clamp_to_raster(node: f32, last: f32) -> f32 {
+pub(crate) fn clamp_to_raster(node: f32, last: f32) -> f32 {
     let node = if node > 0.0 { node } else { 0.0 };
     if node < last { node } else { last }
 }

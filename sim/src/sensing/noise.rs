@@ -6,7 +6,7 @@
 //! processes per tick we use value noise in time with the same correlation time: it needs no state, so a frame can be
 //! recomputed alone and every driver meets the same noise.
 
-use crate::distance_field::{floor, to_index};
+use crate::distance_field::{clamp_to_raster, floor, to_index};
 use crate::geometry::{Circles, Pose, Vec2};
 use crate::map::Map;
 use crate::scenario::NoiseLevel;
@@ -198,6 +198,7 @@ pub(super) struct Shadow {
     pub(super) region: Region,
     origin: Vec2,
     cols: usize,
+    rows: usize,
     /// Rank of the local noise within the shadow, 0…255: a threshold is then a share of the area.
     ranks: Vec<u8>,
     /// Lowest and highest rank that any pixel of a grid cell centred here can have.
@@ -223,12 +224,26 @@ impl Shadow {
         let ranks: Vec<u8> = noise.iter().map(|&value| rank(value)).collect();
         // Both the centre and the pixel are rounded to a raster cell.
         let ranks_around = extremes_around(&ranks, cols, (cell_radius_m / SHADOW_CELL_M + 1.0) as usize);
-        Self { region: Region::new(polygon), origin: low, cols, ranks, ranks_around }
+        Self { region: Region::new(polygon), origin: low, cols, rows, ranks, ranks_around }
     }
 
     #[inline]
     pub(super) fn is_misread(&self, point: Vec2, threshold: u8) -> bool {
         self.ranks[self.index(point)] >= threshold
+    }
+
+    /// [`Self::is_misread`] at the points (`xs[i]`, `ys[i]`), bit = index. All but the look-ups is done for several points
+    /// at once.
+    #[inline]
+    pub(super) fn are_misread<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N], threshold: u8) -> u32 {
+        let (last_col, last_row) = ((self.cols - 1) as f32, (self.rows - 1) as f32);
+        let mut indices = [0; N];
+        for i in 0..N {
+            let col = floor(clamp_to_raster((xs[i] - self.origin.x) * (1.0 / SHADOW_CELL_M) + 0.5, last_col));
+            let row = floor(clamp_to_raster((ys[i] - self.origin.y) * (1.0 / SHADOW_CELL_M) + 0.5, last_row));
+            indices[i] = to_index(row) * self.cols as u32 + to_index(col);
+        }
+        (0..N).fold(0, |bits, i| bits | u32::from(self.ranks[indices[i] as usize] >= threshold) << i)
     }
 
     /// Whether pixels of the shadow in the grid cell around a point are misread: none of them, all of them, or (`None`)
@@ -247,10 +262,9 @@ impl Shadow {
 
     #[inline]
     fn index(&self, point: Vec2) -> usize {
-        let rows = self.ranks.len() / self.cols;
         let cell = (point - self.origin) * (1.0 / SHADOW_CELL_M) + Vec2::splat(0.5);
         let col = (cell.x.max(0.0) as i32 as usize).min(self.cols - 1);
-        let row = (cell.y.max(0.0) as i32 as usize).min(rows - 1);
+        let row = (cell.y.max(0.0) as i32 as usize).min(self.rows - 1);
         row * self.cols + col
     }
 }
@@ -480,15 +494,15 @@ const LATTICE_NODES: usize = 20;
 struct Lattice {
     origin: Vec2,
     per_m: f32,
-    /// Row by row; of meaning only where it is drawn.
+    /// Row by row; not a number where nothing is drawn yet.
     nodes: [f32; LATTICE_NODES * LATTICE_NODES],
-    /// Which nodes of a row are drawn, bit = column.
-    drawn: [u32; LATTICE_NODES],
-    seed: u64,
+    /// Whether a node and the next ones to the right, above and above that are drawn.
+    is_drawn: [bool; LATTICE_NODES * LATTICE_NODES],
     amplitude: f32,
     /// Indices of the first node.
     first: (i32, i32),
-    tick: i32,
+    /// Keys of this tick of the noise and of the next.
+    keys: [u64; 2],
     /// Progress from this tick of the noise to the next, faded, 0…1.
     phase: f32,
 }
@@ -499,12 +513,11 @@ impl Lattice {
         Self {
             origin: first * spacing_m,
             per_m: 1.0 / spacing_m,
-            nodes: [0.0; LATTICE_NODES * LATTICE_NODES],
-            drawn: [0; LATTICE_NODES],
-            seed,
+            nodes: [f32::NAN; LATTICE_NODES * LATTICE_NODES],
+            is_drawn: [false; LATTICE_NODES * LATTICE_NODES],
             amplitude,
             first: (first.x as i32, first.y as i32),
-            tick: time as i32,
+            keys: [time as i32, time as i32 + 1].map(|tick| key(seed, tick)),
             phase: fade(time.fract()),
         }
     }
@@ -515,17 +528,20 @@ impl Lattice {
         if self.amplitude == 0.0 {
             return [0.0; N];
         }
-        let (mut cols, mut rows, mut fxs, mut fys) = ([0; N], [0; N], [0.0; N], [0.0; N]);
+        let (mut cells, mut fxs, mut fys) = ([0; N], [0.0; N], [0.0; N]);
         for i in 0..N {
-            (cols[i], fxs[i]) = lattice_cell((xs[i] - self.origin.x) * self.per_m);
-            (rows[i], fys[i]) = lattice_cell((ys[i] - self.origin.y) * self.per_m);
+            let (col, fx) = lattice_cell((xs[i] - self.origin.x) * self.per_m);
+            let (row, fy) = lattice_cell((ys[i] - self.origin.y) * self.per_m);
+            (fxs[i], fys[i]) = (fx, fy);
+            cells[i] = row * LATTICE_NODES as u32 + col;
         }
         // The four nodes around each place, near and far pair.
         let (mut near, mut far) = ([[0.0; 2]; N], [[0.0; 2]; N]);
         for i in 0..N {
-            let (row, col) = (rows[i] as usize, cols[i] as usize);
-            self.draw_around(row, col);
-            let base = row * LATTICE_NODES + col;
+            let base = cells[i] as usize;
+            if !self.is_drawn[base] {
+                self.draw_around(base);
+            }
             let nodes = &self.nodes[base..base + LATTICE_NODES + 2];
             near[i] = [nodes[0], nodes[1]];
             far[i] = [nodes[LATTICE_NODES], nodes[LATTICE_NODES + 1]];
@@ -536,23 +552,22 @@ impl Lattice {
         })
     }
 
-    /// Draws those of the four nodes around a cell of the lattice that are not drawn yet.
-    #[inline]
-    fn draw_around(&mut self, row: usize, col: usize) {
-        if (self.drawn[row] & self.drawn[row + 1]) >> col & 0b11 == 0b11 {
-            return;
-        }
-        for (row, col) in [(row, col), (row, col + 1), (row + 1, col), (row + 1, col + 1)] {
-            if self.drawn[row] >> col & 1 == 0 {
-                self.drawn[row] |= 1 << col;
-                self.nodes[row * LATTICE_NODES + col] = self.draw(row as i32, col as i32);
+    /// Draws those of the four nodes around a cell of the lattice that are not drawn yet. `base`: index of the first.
+    #[inline(never)]
+    fn draw_around(&mut self, base: usize) {
+        for node in [base, base + 1, base + LATTICE_NODES, base + LATTICE_NODES + 1] {
+            if self.nodes[node].is_nan() {
+                self.nodes[node] = self.draw((node / LATTICE_NODES) as i32, (node % LATTICE_NODES) as i32);
             }
         }
+        self.is_drawn[base] = true;
     }
 
+    #[inline]
     fn draw(&self, row: i32, col: i32) -> f32 {
-        let at = |dt: i32| unit(hash(self.seed, self.first.0 + col, self.first.1 + row, self.tick + dt));
-        let now = if self.phase == 0.0 { at(0) } else { at(0) * (1.0 - self.phase) + at(1) * self.phase };
+        let at = |key: u64| unit(mix(key, self.first.0 + col, self.first.1 + row));
+        let [now, next] = self.keys;
+        let now = if self.phase == 0.0 { at(now) } else { at(now) * (1.0 - self.phase) + at(next) * self.phase };
         self.amplitude * (2.0 * now - 1.0) * VALUE_NOISE_MAX
     }
 }
@@ -641,10 +656,19 @@ fn unit(bits: u32) -> f32 {
 /// Mixes a lattice point into 32 random bits (the finaliser of `SplitMix64`).
 #[inline]
 fn hash(seed: u64, x: i32, y: i32, t: i32) -> u32 {
-    let key = u64::from(x as u32) | u64::from(y as u32) << 32;
-    let mut z = seed
-        ^ key.wrapping_mul(0x9E37_79B9_7F4A_7C15)
-        ^ u64::from(t as u32).wrapping_add(1).wrapping_mul(0xD6E8_FEB8_6659_FD93);
+    mix(key(seed, t), x, y)
+}
+
+/// What [`mix`] needs of a seed and a time.
+#[inline]
+fn key(seed: u64, t: i32) -> u64 {
+    seed ^ u64::from(t as u32).wrapping_add(1).wrapping_mul(0xD6E8_FEB8_6659_FD93)
+}
+
+#[inline]
+fn mix(key: u64, x: i32, y: i32) -> u32 {
+    let place = u64::from(x as u32) | u64::from(y as u32) << 32;
+    let mut z = key ^ place.wrapping_mul(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     (z >> 32) as u32 ^ z as u32

@@ -13,6 +13,7 @@ use crate::geometry::{Pose, Vec2, WorldFromEgo, bits};
 use crate::map::Map;
 use crate::seed::RootSeed;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Settings of the sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -77,34 +78,32 @@ impl Sensor {
         let (geometry, field) = (&self.config.geometry, map.distance_field());
         let openings = self.openings(ego, tick);
         let within_cell_m = change_max_m(to_corner_m(geometry.pixel_m(), CELL_PIXELS));
-        let growth: [f32; GRID_CELLS] = std::array::from_fn(|row| self.wobble_growth(row));
         let mut grid = OccupancyGrid::free();
-        let mut centres_m = [[0.0; ROW_LANES]; GRID_CELLS];
         let mut unsure = UnsureCells::new();
         for row in 0..GRID_CELLS {
-            centres_m[row] = ego.lattice.nearest_nodes_of_row(field, row);
+            let centres_m = ego.lattice.nearest_nodes_of_row(field, row);
             // A cell whose centre is this far from a boundary is decided without looking at the noise.
-            let sure_m = self.noise.boundary_shift_max_m(growth[row]) + within_cell_m;
-            let may_be_occupied = bits_where(&centres_m[row], |centre_m| centre_m <= sure_m);
+            let sure_m = self.noise.boundary_shift_max_m(self.wobble_growth(row)) + within_cell_m;
+            let (is_sure, is_beyond) = sides(&centres_m, sure_m);
             let opened = openings.as_ref().map_or(0, |opened| opened.touched_cells(row));
-            let occupied = bits_where(&centres_m[row], |centre_m| centre_m < -sure_m) & !opened;
-            grid.occupy_row(row, occupied);
-            unsure.push_row(row, may_be_occupied & !occupied);
+            grid.occupy_row(row, is_beyond & !opened);
+            unsure.push_row(row, !is_sure | (is_beyond & opened), &centres_m);
         }
         let mut shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
         for cells in unsure.fours() {
-            let centres = cells.map(|(row, col)| ego.lattice.cell_centre(row, col));
-            let (xs, ys) = (centres.map(|centre| centre.x), centres.map(|centre| centre.y));
-            let shifts_m = shift.at_each(&xs, &ys, &cells.map(|(row, _)| growth[row]));
-            for ((row, col), shift_m) in cells.into_iter().zip(shifts_m) {
-                let (centre_m, threshold_m) = (centres_m[row][col], -shift_m);
+            let (xs, ys) = ego.lattice.cell_centres(&cells.rows, &cells.cols);
+            let growth = cells.rows.map(|row| self.wobble_growth(row as usize));
+            let thresholds_m = shift.at_each(&xs, &ys, &growth).map(|shift_m| -shift_m);
+            let (is_above, is_below) = ego.lattice.are_decided(&cells.centres_m, &thresholds_m);
+            for i in bits(!is_above & 0b1111) {
+                let (row, col) = (cells.rows[i], cells.cols[i]);
                 let is_occupied = match &openings {
-                    Some(openings) if openings.touched_cells(row) >> col & 1 == 1 => {
-                        any_closed_pixel_below(map, ego, openings, row, col, threshold_m)
+                    Some(openings) if openings.touched_cells(row as usize) >> col & 1 == 1 => {
+                        any_closed_pixel_below(map, ego, openings, row as usize, col as usize, thresholds_m[i])
                     }
-                    _ => ego.lattice.any_below(field, row, col, centre_m, threshold_m),
+                    _ => is_below >> i & 1 == 1 || ego.lattice.any_below(field, row, col, thresholds_m[i]),
                 };
-                grid.occupy_row(row, u32::from(is_occupied) << col);
+                grid.occupy_row(row as usize, u32::from(is_occupied) << col);
             }
         }
         grid
@@ -136,13 +135,18 @@ impl Sensor {
         let geometry = &self.config.geometry;
         self.for_each_shadow(ego, tick, |polygon, shadow, threshold| {
             let Some(spans) = polygon.spans_of_free_cells(geometry, grid) else { return };
+            let is_any_misread = |row: usize, cols: Range<usize>| {
+                cols.clone().step_by(4).any(|first| {
+                    let (xs, ys) = ego.lattice.four_pixels(row, first);
+                    let is_pixel = (1 << (cols.end - first).min(4)) - 1;
+                    shadow.are_misread(&xs, &ys, threshold) & is_pixel != 0
+                })
+            };
             for row in spans.cell_rows() {
                 for col in bits(spans.touched_cells(row) & !grid.row(row)) {
                     let is_misread = match shadow.are_misread_around(ego.lattice.cell_centre(row, col), threshold) {
                         Some(are_misread) => are_misread,
-                        None => spans.any_pixel_of_cell(row, col, |row, col| {
-                            shadow.is_misread(ego.lattice.point(row as f32, col as f32), threshold)
-                        }),
+                        None => spans.pixels_of_cell(row, col).any(|(row, cols)| is_any_misread(row, cols)),
                     };
                     grid.occupy_row(row, u32::from(is_misread) << col);
                 }
@@ -251,38 +255,68 @@ impl Sensor {
     }
 }
 
-/// The cells of a row of which something holds, bit = column.
-#[inline]
-fn bits_where(values: &[f32; ROW_LANES], is_so: impl Fn(f32) -> bool) -> u32 {
-    let bits = values.iter().enumerate().fold(0, |bits, (col, &value)| bits | u32::from(is_so(value)) << col);
-    bits & OccupancyGrid::ROW_MASK
+/// Which cells of a row have a distance of more than `sure_m` on either side of the boundary, and which of them are beyond
+/// it; bit = column.
+// Not inlined: on its own and of unknown length, the loop is compiled to instructions that take four cells.
+#[inline(never)]
+fn sides(centres_m: &[f32], sure_m: f32) -> (u32, u32) {
+    const BITS: [u32; ROW_LANES] = {
+        let mut bits = [0; ROW_LANES];
+        let mut col = 0;
+        while col < ROW_LANES {
+            bits[col] = 1 << col;
+            col += 1;
+        }
+        bits
+    };
+    let (mut is_drivable, mut is_beyond) = (0, 0);
+    for (&centre_m, &bit) in centres_m.iter().zip(&BITS) {
+        is_drivable |= if centre_m > sure_m { bit } else { 0 };
+        is_beyond |= if centre_m < -sure_m { bit } else { 0 };
+    }
+    (is_drivable | is_beyond, is_beyond)
 }
 
 /// Cells that take a closer look.
 struct UnsureCells {
-    cells: [(u8, u8); GRID_CELLS * GRID_CELLS],
+    /// Row and column of each.
+    places: [[u8; 2]; UNSURE_MAX],
+    /// Signed distance at the node nearest to the centre of each.
+    centres_m: [f32; UNSURE_MAX],
     n_cells: usize,
+}
+
+/// All cells, and what four at a time may read beyond the last.
+const UNSURE_MAX: usize = GRID_CELLS * GRID_CELLS + 3;
+
+/// Four cells: their rows and columns, and signed distances at the nodes nearest to their centres.
+struct FourCells {
+    rows: [u32; 4],
+    cols: [u32; 4],
+    centres_m: [f32; 4],
 }
 
 impl UnsureCells {
     fn new() -> Self {
-        Self { cells: [(0, 0); GRID_CELLS * GRID_CELLS], n_cells: 0 }
+        Self { places: [[0; 2]; UNSURE_MAX], centres_m: [f32::INFINITY; UNSURE_MAX], n_cells: 0 }
     }
 
-    fn push_row(&mut self, row: usize, cols: u32) {
-        for col in bits(cols) {
-            self.cells[self.n_cells] = (row as u8, col as u8);
+    #[inline]
+    fn push_row(&mut self, row: usize, cols: u32, centres_m: &[f32; ROW_LANES]) {
+        for col in bits(cols & OccupancyGrid::ROW_MASK) {
+            self.places[self.n_cells] = [row as u8, col as u8];
+            self.centres_m[self.n_cells] = centres_m[col];
             self.n_cells += 1;
         }
     }
 
-    /// The cells as (row, column), four at a time; the last is repeated.
-    fn fours(&self) -> impl Iterator<Item = [(usize, usize); 4]> + '_ {
-        self.cells[..self.n_cells].chunks(4).map(|four| {
-            std::array::from_fn(|i| {
-                let (row, col) = four[i.min(four.len() - 1)];
-                (usize::from(row), usize::from(col))
-            })
+    /// The cells, four at a time. What fills up the last four is far from any boundary.
+    fn fours(&self) -> impl Iterator<Item = FourCells> + '_ {
+        let fours = self.places.as_chunks::<4>().0.iter().zip(self.centres_m.as_chunks::<4>().0);
+        fours.take(self.n_cells.div_ceil(4)).map(|(places, centres_m)| FourCells {
+            rows: places.map(|[row, _]| u32::from(row)),
+            cols: places.map(|[_, col]| u32::from(col)),
+            centres_m: *centres_m,
         })
     }
 }

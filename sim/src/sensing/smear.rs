@@ -145,14 +145,12 @@ impl Spans {
         cells.fold(0, |all, cells| all | cells)
     }
 
-    /// Whether something holds for any of the pixels in a cell.
+    /// The pixels in a cell as rows and ranges of columns.
     #[inline]
-    pub(super) fn any_pixel_of_cell(&self, row: usize, col: usize, is_so: impl Fn(usize, usize) -> bool) -> bool {
+    pub(super) fn pixels_of_cell(&self, row: usize, col: usize) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
         let cols = col * CELL_PIXELS..(col + 1) * CELL_PIXELS;
         let rows = row * CELL_PIXELS..(row + 1) * CELL_PIXELS;
-        rows.into_iter().any(|row| {
-            common(&cols, &(self.first[row] as usize..self.end[row] as usize)).into_iter().any(|col| is_so(row, col))
-        })
+        rows.map(move |row| (row, common(&cols, &(self.first[row] as usize..self.end[row] as usize))))
     }
 }
 
