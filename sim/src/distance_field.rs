@@ -96,22 +96,23 @@ impl DistanceField {
     #[inline]
     pub fn at_each<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
         let (last_x, last_y) = ((self.cols - 2) as f32, (self.rows - 2) as f32);
-        let (mut cols, mut rows, mut fxs, mut fys) = ([0; N], [0; N], [0.0; N], [0.0; N]);
+        let stride = self.cols as u32;
+        let (mut nodes, mut fxs, mut fys) = ([0; N], [0.0; N], [0.0; N]);
         for i in 0..N {
             let x = clamp_to_raster((xs[i] - self.origin.x) * (1.0 / NODE_M), last_x);
             let y = clamp_to_raster((ys[i] - self.origin.y) * (1.0 / NODE_M), last_y);
             let (floor_x, floor_y) = (floor(x), floor(y));
             (fxs[i], fys[i]) = (x - floor_x, y - floor_y);
-            (cols[i], rows[i]) = (to_index(floor_x), to_index(floor_y));
+            nodes[i] = to_index(floor_y) * stride + to_index(floor_x);
         }
         // The four nodes around each point, near and far pair; one bounds check for both.
-        let stride = self.cols as u32 as usize;
+        let stride = stride as usize;
         let (mut near, mut far) = ([[0.0; 2]; N], [[0.0; 2]; N]);
         for i in 0..N {
-            let base = rows[i] as usize * stride + cols[i] as usize;
-            let nodes = &self.values_m[base..base + stride + 2];
-            near[i] = [nodes[0], nodes[1]];
-            far[i] = [nodes[stride], nodes[stride + 1]];
+            let base = nodes[i] as usize;
+            let nodes_m = &self.values_m[base..base + stride + 2];
+            near[i] = [nodes_m[0], nodes_m[1]];
+            far[i] = [nodes_m[stride], nodes_m[stride + 1]];
         }
         std::array::from_fn(|i| {
             let [near, far] = [near[i], far[i]].map(|[left, right]| left + fxs[i] * (right - left));
@@ -119,28 +120,61 @@ impl DistanceField {
         })
     }
 
-    /// [`Self::at_nearest_node`] at the points (`xs[i]`, `ys[i]`). All but the look-ups is done for several points at once.
+    /// [`Self::at_nearest_node`] at the points (`xs[i]`, `ys[i]`); half-way between two nodes it may choose the other one.
+    /// All but the look-ups is done for several points at once.
     #[inline]
     pub fn at_nearest_nodes<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
         let (last_x, last_y) = ((self.cols - 1) as f32, (self.rows - 1) as f32);
-        let (mut cols, mut rows) = ([0; N], [0; N]);
+        let stride = self.cols as u32;
+        let mut nodes = [0; N];
         for i in 0..N {
-            let x = clamp_to_raster((xs[i] - self.origin.x) * (1.0 / NODE_M) + 0.5, last_x);
-            let y = clamp_to_raster((ys[i] - self.origin.y) * (1.0 / NODE_M) + 0.5, last_y);
-            (cols[i], rows[i]) = (to_index(floor(x)), to_index(floor(y)));
+            let x = clamp_to_raster((xs[i] - self.origin.x) * (1.0 / NODE_M), last_x);
+            let y = clamp_to_raster((ys[i] - self.origin.y) * (1.0 / NODE_M), last_y);
+            nodes[i] = to_nearest_index(y) * stride + to_nearest_index(x);
         }
-        std::array::from_fn(|i| self.values_m[rows[i] as usize * self.cols + cols[i] as usize])
+        std::array::from_fn(|i| self.values_m[nodes[i] as usize])
     }
 
-    /// A vector that points away from what is near, at the nearest node; of no particular length.
+    /// [`Self::at_nearest_nodes`] of as many points as there is room for in `values_m`, at most 32.
+    // Not inlined: on its own and of unknown length, the first loop is compiled to instructions that take four points.
+    #[inline(never)]
+    pub fn at_many_nearest_nodes(&self, xs: &[f32], ys: &[f32], values_m: &mut [f32]) {
+        let (last_x, last_y) = ((self.cols - 1) as f32, (self.rows - 1) as f32);
+        let stride = self.cols as u32;
+        let mut nodes = [0; 32];
+        for ((node, &x), &y) in nodes.iter_mut().zip(xs).zip(ys) {
+            let x = clamp_to_raster((x - self.origin.x) * (1.0 / NODE_M), last_x);
+            let y = clamp_to_raster((y - self.origin.y) * (1.0 / NODE_M), last_y);
+            *node = to_nearest_index(y) * stride + to_nearest_index(x);
+        }
+        for (value_m, &node) in values_m.iter_mut().zip(&nodes) {
+            *value_m = self.values_m[node as usize];
+        }
+    }
+
+    /// A lower bound of [`Self::at`] in a box of at most 0.6 m by 0.6 m: the lowest of the nodes that lend to it. Minus
+    /// infinity if the box is larger or at the very end of the raster.
     #[inline]
-    pub fn away_at_nearest_node(&self, point: Vec2) -> Vec2 {
-        let node = (point - self.origin) * (1.0 / NODE_M) + Vec2::splat(0.5);
-        let col = node.x.clamp(1.0, (self.cols - 2) as f32) as i32;
-        let row = node.y.clamp(1.0, (self.rows - 2) as f32) as i32;
-        let here = row as usize * self.cols + col as usize;
-        let along = |step: usize| self.values_m[here + step] - self.values_m[here - step];
-        Vec2::new(along(1), along(self.cols))
+    pub fn lowest_within(&self, low: Vec2, high: Vec2) -> f32 {
+        /// Nodes along one side of the largest box.
+        const LANES: usize = 8;
+        let index = |coordinate: f32, last: usize| {
+            to_index(floor(clamp_to_raster(coordinate * (1.0 / NODE_M), (last - 2) as f32))) as usize
+        };
+        let (low, high) = (low - self.origin, high - self.origin);
+        let (first_col, last_col) = (index(low.x, self.cols), index(high.x, self.cols) + 1);
+        let (first_row, last_row) = (index(low.y, self.rows), index(high.y, self.rows) + 1);
+        let mut lowest_m = [f32::INFINITY; LANES];
+        for row in first_row..=last_row {
+            let Some(nodes_m) = self.values_m[row * self.cols + first_col..].first_chunk::<LANES>() else {
+                return f32::NEG_INFINITY;
+            };
+            for (lowest_m, &node_m) in lowest_m.iter_mut().zip(nodes_m) {
+                *lowest_m = if node_m < *lowest_m { node_m } else { *lowest_m };
+            }
+        }
+        let Some(lowest_m) = lowest_m.get(..=last_col - first_col) else { return f32::NEG_INFINITY };
+        lowest_m.iter().fold(f32::INFINITY, |low, &value| if value < low { value } else { low })
     }
 
     /// Lower-left and upper-right corners of the raster, world metres.
@@ -191,7 +225,7 @@ impl DistanceField {
 
 /// Bounds a coordinate to the raster, like `clamp`; what is not a number becomes 0.
 #[inline]
-fn clamp_to_raster(node: f32, last: f32) -> f32 {
+pub(crate) fn clamp_to_raster(node: f32, last: f32) -> f32 {
     let node = if node > 0.0 { node } else { 0.0 };
     if node < last { node } else { last }
 }
@@ -202,15 +236,21 @@ const WHOLE_FROM: f32 = (1 << 23) as f32;
 /// Largest whole number at or below a coordinate of the raster. Unlike casts and `f32::floor`, which is a library call
 /// on baseline x86-64, this compiles to instructions that take four numbers at once.
 #[inline]
-fn floor(node: f32) -> f32 {
+pub(crate) fn floor(node: f32) -> f32 {
     let rounded = (node + WHOLE_FROM) - WHOLE_FROM;
     rounded - if rounded > node { 1.0 } else { 0.0 }
 }
 
 /// A whole coordinate of the raster as an index.
 #[inline]
-fn to_index(whole: f32) -> u32 {
-    (whole + WHOLE_FROM).to_bits() - WHOLE_FROM.to_bits()
+pub(crate) fn to_index(whole: f32) -> u32 {
+    to_nearest_index(whole)
+}
+
+/// The index nearest to a coordinate of the raster, the even one half-way between two: adding rounds.
+#[inline]
+fn to_nearest_index(node: f32) -> u32 {
+    (node + WHOLE_FROM).to_bits() - WHOLE_FROM.to_bits()
 }
 
 /// Smallest axis-aligned box around points.

@@ -80,6 +80,68 @@ impl WorldFromEgo {
     }
 }
 
+/// Many circles, arranged so that several are tested at once.
+#[derive(Debug, Clone, Default)]
+pub struct Circles {
+    blocks: Vec<CircleBlock>,
+}
+
+/// Circles per block.
+const CIRCLES: usize = 8;
+
+#[derive(Debug, Clone)]
+struct CircleBlock {
+    xs: [f32; CIRCLES],
+    ys: [f32; CIRCLES],
+    radii_m: [f32; CIRCLES],
+}
+
+impl Circles {
+    /// Indices of the circles that overlap a circle, lowest first.
+    pub fn overlapping(&self, centre: Vec2, radius_m: f32) -> impl Iterator<Item = usize> + '_ {
+        let overlap = move |block: &CircleBlock| {
+            let mut mask = 0;
+            for i in 0..CIRCLES {
+                let (x, y) = (block.xs[i] - centre.x, block.ys[i] - centre.y);
+                let reach_m = radius_m + block.radii_m[i];
+                mask |= u32::from(x * x + y * y < reach_m * reach_m) << i;
+            }
+            mask
+        };
+        self.blocks
+            .iter()
+            .enumerate()
+            .flat_map(move |(i, block)| bits(overlap(block)).map(move |bit| i * CIRCLES + bit))
+    }
+}
+
+impl FromIterator<(Vec2, f32)> for Circles {
+    /// Circles as (centre, radius in metres).
+    fn from_iter<T: IntoIterator<Item = (Vec2, f32)>>(circles: T) -> Self {
+        let circles: Vec<(Vec2, f32)> = circles.into_iter().collect();
+        // What fills up the last block overlaps nothing.
+        let block = |chunk: &[(Vec2, f32)]| {
+            let circle = |i: usize| *chunk.get(i).unwrap_or(&(Vec2::INFINITY, 0.0));
+            CircleBlock {
+                xs: std::array::from_fn(|i| circle(i).0.x),
+                ys: std::array::from_fn(|i| circle(i).0.y),
+                radii_m: std::array::from_fn(|i| circle(i).1),
+            }
+        };
+        Self { blocks: circles.chunks(CIRCLES).map(block).collect() }
+    }
+}
+
+/// Indices of the set bits, lowest first.
+#[inline]
+pub(crate) fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let bit = (mask != 0).then(|| mask.trailing_zeros() as usize);
+        mask &= mask.wrapping_sub(1);
+        bit
+    })
+}
+
 /// Wraps an angle to (−π, π].
 pub fn wrap_angle(angle_rad: f32) -> f32 {
     use std::f32::consts::{PI, TAU};

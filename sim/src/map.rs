@@ -4,7 +4,7 @@
 
 use crate::collision::CollisionWorld;
 use crate::distance_field::DistanceField;
-use crate::geometry::{Pose, Vec2};
+use crate::geometry::{Circles, Pose, Vec2};
 use crate::path::Path;
 use crate::scenario::{Scenario, ScenarioError};
 use crate::validate::validate;
@@ -18,6 +18,7 @@ pub struct Map {
     distance: DistanceField,
     collision: CollisionWorld,
     occluders: Vec<Occluder>,
+    occluder_circles: Circles,
 }
 
 /// A convex thing that hides the ground behind it from the camera.
@@ -59,7 +60,7 @@ impl Map {
                 distance.carve_polygon(&obstacle.outline());
             }
         }
-        let occluders = scenario
+        let occluders: Vec<Occluder> = scenario
             .obstacles
             .iter()
             .map(|obstacle| {
@@ -68,8 +69,9 @@ impl Map {
                 Occluder { outline: obstacle.outline(), centre, radius_m: 0.5 * length_m.hypot(width_m), height_m }
             })
             .collect();
+        let occluder_circles = occluders.iter().map(|occluder| (occluder.centre, occluder.radius_m)).collect();
         let collision = CollisionWorld::new(&scenario);
-        Ok(Self { scenario, path, distance, collision, occluders })
+        Ok(Self { scenario, path, distance, collision, occluders, occluder_circles })
     }
 
     /// What the map was built from.
@@ -101,6 +103,11 @@ impl Map {
     /// Everything that hides ground from the camera.
     pub fn occluders(&self) -> &[Occluder] {
         &self.occluders
+    }
+
+    /// Those of [`Self::occluders`] whose circle overlaps a circle of the world.
+    pub(crate) fn occluders_near(&self, centre: Vec2, radius_m: f32) -> impl Iterator<Item = &Occluder> {
+        self.occluder_circles.overlapping(centre, radius_m).map(|index| &self.occluders[index])
     }
 
     /// Exact intersection queries.

@@ -6,7 +6,8 @@
 //! processes per tick we use value noise in time with the same correlation time: it needs no state, so a frame can be
 //! recomputed alone and every driver meets the same noise.
 
-use crate::geometry::{Pose, Vec2};
+use crate::distance_field::{clamp_to_raster, floor, to_index};
+use crate::geometry::{Circles, Pose, Vec2};
 use crate::map::Map;
 use crate::scenario::NoiseLevel;
 use crate::seed::{Rng, RootSeed, Stream};
@@ -197,6 +198,7 @@ pub(super) struct Shadow {
     pub(super) region: Region,
     origin: Vec2,
     cols: usize,
+    rows: usize,
     /// Rank of the local noise within the shadow, 0…255: a threshold is then a share of the area.
     ranks: Vec<u8>,
     /// Lowest and highest rank that any pixel of a grid cell centred here can have.
@@ -222,12 +224,26 @@ impl Shadow {
         let ranks: Vec<u8> = noise.iter().map(|&value| rank(value)).collect();
         // Both the centre and the pixel are rounded to a raster cell.
         let ranks_around = extremes_around(&ranks, cols, (cell_radius_m / SHADOW_CELL_M + 1.0) as usize);
-        Self { region: Region::new(polygon), origin: low, cols, ranks, ranks_around }
+        Self { region: Region::new(polygon), origin: low, cols, rows, ranks, ranks_around }
     }
 
     #[inline]
     pub(super) fn is_misread(&self, point: Vec2, threshold: u8) -> bool {
         self.ranks[self.index(point)] >= threshold
+    }
+
+    /// [`Self::is_misread`] at the points (`xs[i]`, `ys[i]`), bit = index. All but the look-ups is done for several points
+    /// at once.
+    #[inline]
+    pub(super) fn are_misread<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N], threshold: u8) -> u32 {
+        let (last_col, last_row) = ((self.cols - 1) as f32, (self.rows - 1) as f32);
+        let mut indices = [0; N];
+        for i in 0..N {
+            let col = floor(clamp_to_raster((xs[i] - self.origin.x) * (1.0 / SHADOW_CELL_M) + 0.5, last_col));
+            let row = floor(clamp_to_raster((ys[i] - self.origin.y) * (1.0 / SHADOW_CELL_M) + 0.5, last_row));
+            indices[i] = to_index(row) * self.cols as u32 + to_index(col);
+        }
+        (0..N).fold(0, |bits, i| bits | u32::from(self.ranks[indices[i] as usize] >= threshold) << i)
     }
 
     /// Whether pixels of the shadow in the grid cell around a point are misread: none of them, all of them, or (`None`)
@@ -246,10 +262,9 @@ impl Shadow {
 
     #[inline]
     fn index(&self, point: Vec2) -> usize {
-        let rows = self.ranks.len() / self.cols;
         let cell = (point - self.origin) * (1.0 / SHADOW_CELL_M) + Vec2::splat(0.5);
         let col = (cell.x.max(0.0) as i32 as usize).min(self.cols - 1);
-        let row = (cell.y.max(0.0) as i32 as usize).min(rows - 1);
+        let row = (cell.y.max(0.0) as i32 as usize).min(self.rows - 1);
         row * self.cols + col
     }
 }
@@ -262,6 +277,8 @@ pub struct NoiseField {
     flicker: f32,
     dropout: f32,
     pub(super) patches: Vec<Patch>,
+    /// Circles around the patches, in their order.
+    pub(super) patch_circles: Circles,
     pub(super) shadows: Vec<Shadow>,
 }
 
@@ -275,6 +292,7 @@ impl NoiseField {
             flicker: amount(config.flicker),
             dropout: amount(config.dropout),
             patches: Vec::new(),
+            patch_circles: Circles::default(),
             shadows: Vec::new(),
         };
         // One stream per layer: strengthening one layer never moves another.
@@ -284,6 +302,7 @@ impl NoiseField {
         field.open_boundaries(map, amount(config.false_free), &mut rng(2));
         field.scatter_blobs(map, amount(config.blob), &mut rng(3));
         field.spill_stains(map, amount(config.stain), &mut rng(4));
+        field.patch_circles = field.patches.iter().map(|patch| (patch.region.centre, patch.region.radius_m)).collect();
         field
     }
 
@@ -298,10 +317,10 @@ impl NoiseField {
         }
     }
 
-    /// Bound of [`BoundaryShift::at`] at a range, metres.
+    /// Bound of [`BoundaryShift::at_each`], metres. `growth`: [`wobble_growth`] there.
     #[inline]
-    pub(super) fn boundary_shift_max_m(&self, ahead_of_patch_m: f32) -> f32 {
-        self.wobble * (WOBBLE_STATIC.0 + WOBBLE_MOVING.0) * VALUE_NOISE_MAX * (1.0 + ahead_of_patch_m / WOBBLE_RANGE_M)
+    pub(super) fn boundary_shift_max_m(&self, growth: f32) -> f32 {
+        self.wobble * (WOBBLE_STATIC.0 + WOBBLE_MOVING.0) * VALUE_NOISE_MAX * growth
     }
 
     /// Rank from which a shadow's pixels are misread at a tick.
@@ -453,28 +472,37 @@ pub(super) struct BoundaryShift {
 }
 
 impl BoundaryShift {
-    /// Shift of the signed distance at a place, metres; `ahead_of_patch_m` is the distance from the patch's lower edge.
+    /// Shifts of the signed distance at the places (`xs[i]`, `ys[i]`), metres. `growth`: [`wobble_growth`] there.
     #[inline]
-    pub(super) fn at(&mut self, place: Vec2, ahead_of_patch_m: f32) -> f32 {
-        (self.lasting.at(place) + self.moving.at(place)) * (1.0 + ahead_of_patch_m / WOBBLE_RANGE_M)
+    pub(super) fn at_each<const N: usize>(&mut self, xs: &[f32; N], ys: &[f32; N], growth: &[f32; N]) -> [f32; N] {
+        let (lasting, moving) = (self.lasting.at_each(xs, ys), self.moving.at_each(xs, ys));
+        std::array::from_fn(|i| (lasting[i] + moving[i]) * growth[i])
     }
+}
+
+/// How much larger the wobble is at a distance from the patch's lower edge.
+#[inline]
+pub(super) fn wobble_growth(ahead_of_patch_m: f32) -> f32 {
+    1.0 + ahead_of_patch_m / WOBBLE_RANGE_M
 }
 
 /// Nodes per side of a [`Lattice`]: the patch's diagonal at 1 m spacing and one more on either side.
 const LATTICE_NODES: usize = 20;
 
-/// Value noise around a place at one instant. A node is hashed when it is first looked at: of the hundreds in sight few
+/// Value noise around a place at one instant. A node is hashed when it is first needed: of the hundreds in sight few
 /// lie beside a boundary.
 struct Lattice {
     origin: Vec2,
     per_m: f32,
-    /// Not a number where nobody has looked yet.
-    nodes: [[f32; LATTICE_NODES]; LATTICE_NODES],
-    seed: u64,
+    /// Row by row; not a number where nothing is drawn yet.
+    nodes: [f32; LATTICE_NODES * LATTICE_NODES],
+    /// Whether a node and the next ones to the right, above and above that are drawn.
+    is_drawn: [bool; LATTICE_NODES * LATTICE_NODES],
     amplitude: f32,
     /// Indices of the first node.
     first: (i32, i32),
-    tick: i32,
+    /// Keys of this tick of the noise and of the next.
+    keys: [u64; 2],
     /// Progress from this tick of the noise to the next, faded, 0…1.
     phase: f32,
 }
@@ -485,43 +513,73 @@ impl Lattice {
         Self {
             origin: first * spacing_m,
             per_m: 1.0 / spacing_m,
-            nodes: [[f32::NAN; LATTICE_NODES]; LATTICE_NODES],
-            seed,
+            nodes: [f32::NAN; LATTICE_NODES * LATTICE_NODES],
+            is_drawn: [false; LATTICE_NODES * LATTICE_NODES],
             amplitude,
             first: (first.x as i32, first.y as i32),
-            tick: time as i32,
+            keys: [time as i32, time as i32 + 1].map(|tick| key(seed, tick)),
             phase: fade(time.fract()),
         }
     }
 
-    fn at(&mut self, place: Vec2) -> f32 {
+    /// Values at the places (`xs[i]`, `ys[i]`). All but the look-ups is done for several places at once.
+    #[inline]
+    fn at_each<const N: usize>(&mut self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
         if self.amplitude == 0.0 {
-            return 0.0;
+            return [0.0; N];
         }
-        let node = ((place - self.origin) * self.per_m).max(Vec2::ZERO);
-        let last = LATTICE_NODES as i32 - 2;
-        let (col, row) = ((node.x as i32).min(last), (node.y as i32).min(last));
-        let (fx, fy) = (fade(node.x - col as f32), fade(node.y - row as f32));
-        let [near, far] = [row, row + 1].map(|row| {
-            let [left, right] = [col, col + 1].map(|col| self.node(row as usize, col as usize));
-            left + fx * (right - left)
-        });
-        near + fy * (far - near)
+        let (mut cells, mut fxs, mut fys) = ([0; N], [0.0; N], [0.0; N]);
+        for i in 0..N {
+            let (col, fx) = lattice_cell((xs[i] - self.origin.x) * self.per_m);
+            let (row, fy) = lattice_cell((ys[i] - self.origin.y) * self.per_m);
+            (fxs[i], fys[i]) = (fx, fy);
+            cells[i] = row * LATTICE_NODES as u32 + col;
+        }
+        // The four nodes around each place, near and far pair.
+        let (mut near, mut far) = ([[0.0; 2]; N], [[0.0; 2]; N]);
+        for i in 0..N {
+            let base = cells[i] as usize;
+            if !self.is_drawn[base] {
+                self.draw_around(base);
+            }
+            let nodes = &self.nodes[base..base + LATTICE_NODES + 2];
+            near[i] = [nodes[0], nodes[1]];
+            far[i] = [nodes[LATTICE_NODES], nodes[LATTICE_NODES + 1]];
+        }
+        std::array::from_fn(|i| {
+            let [near, far] = [near[i], far[i]].map(|[left, right]| left + fxs[i] * (right - left));
+            near + fys[i] * (far - near)
+        })
+    }
+
+    /// Draws those of the four nodes around a cell of the lattice that are not drawn yet. `base`: index of the first.
+    #[inline(never)]
+    fn draw_around(&mut self, base: usize) {
+        for node in [base, base + 1, base + LATTICE_NODES, base + LATTICE_NODES + 1] {
+            if self.nodes[node].is_nan() {
+                self.nodes[node] = self.draw((node / LATTICE_NODES) as i32, (node % LATTICE_NODES) as i32);
+            }
+        }
+        self.is_drawn[base] = true;
     }
 
     #[inline]
-    fn node(&mut self, row: usize, col: usize) -> f32 {
-        if self.nodes[row][col].is_nan() {
-            self.nodes[row][col] = self.draw(row as i32, col as i32);
-        }
-        self.nodes[row][col]
-    }
-
     fn draw(&self, row: i32, col: i32) -> f32 {
-        let at = |dt: i32| unit(hash(self.seed, self.first.0 + col, self.first.1 + row, self.tick + dt));
-        let now = if self.phase == 0.0 { at(0) } else { at(0) * (1.0 - self.phase) + at(1) * self.phase };
+        let at = |key: u64| unit(mix(key, self.first.0 + col, self.first.1 + row));
+        let [now, next] = self.keys;
+        let now = if self.phase == 0.0 { at(now) } else { at(now) * (1.0 - self.phase) + at(next) * self.phase };
         self.amplitude * (2.0 * now - 1.0) * VALUE_NOISE_MAX
     }
+}
+
+/// The cell of a [`Lattice`] that holds a coordinate, and the faded progress through it, 0…1.
+#[inline]
+fn lattice_cell(node: f32) -> (u32, f32) {
+    const LAST: f32 = (LATTICE_NODES - 2) as f32;
+    let node = if node > 0.0 { node } else { 0.0 };
+    let whole = floor(node);
+    let cell = if whole < LAST { whole } else { LAST };
+    (to_index(cell), fade(node - cell))
 }
 
 /// Lowest and highest value within `reach` cells along both axes of every cell of a raster.
@@ -598,10 +656,19 @@ fn unit(bits: u32) -> f32 {
 /// Mixes a lattice point into 32 random bits (the finaliser of `SplitMix64`).
 #[inline]
 fn hash(seed: u64, x: i32, y: i32, t: i32) -> u32 {
-    let key = u64::from(x as u32) | u64::from(y as u32) << 32;
-    let mut z = seed
-        ^ key.wrapping_mul(0x9E37_79B9_7F4A_7C15)
-        ^ u64::from(t as u32).wrapping_add(1).wrapping_mul(0xD6E8_FEB8_6659_FD93);
+    mix(key(seed, t), x, y)
+}
+
+/// What [`mix`] needs of a seed and a time.
+#[inline]
+fn key(seed: u64, t: i32) -> u64 {
+    seed ^ u64::from(t as u32).wrapping_add(1).wrapping_mul(0xD6E8_FEB8_6659_FD93)
+}
+
+#[inline]
+fn mix(key: u64, x: i32, y: i32) -> u32 {
+    let place = u64::from(x as u32) | u64::from(y as u32) << 32;
+    let mut z = key ^ place.wrapping_mul(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     (z >> 32) as u32 ^ z as u32

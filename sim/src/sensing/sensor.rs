@@ -4,15 +4,16 @@ mod inspect;
 
 pub use inspect::Inspection;
 
-use super::noise::{NoiseConfig, NoiseField, Patch, Reads, Region, Shadow};
+use super::noise::{NoiseConfig, NoiseField, Patch, Reads, Region, Shadow, wobble_growth};
 use super::quadtree::{PixelLattice, ROW_LANES, to_corner_m};
-use super::smear::{ConvexInEgo, hidden_ground};
+use super::smear::{Camera, CellBox, ConvexInEgo, TallThing, bits_between};
 use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
 use crate::distance_field::change_max_m;
-use crate::geometry::{Pose, Vec2, WorldFromEgo};
+use crate::geometry::{Pose, Vec2, WorldFromEgo, bits};
 use crate::map::Map;
 use crate::seed::RootSeed;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Settings of the sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -62,61 +63,95 @@ impl Sensor {
 
     /// The perceived grid, without ever computing all 40 000 pixels.
     fn perceive_grid(&self, map: &Map, pose: Pose, tick: u32) -> OccupancyGrid {
-        let geometry = &self.config.geometry;
-        let ego = EgoView::new(geometry, pose);
-        let openings = self.openings(&ego, tick);
-        let mut shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
+        let ego = EgoView::new(&self.config.geometry, pose);
+        let mut grid = self.beyond_boundaries(map, &ego, tick);
+        self.hide_ground(map, &ego, &mut grid);
+        for polygon in self.misread(&ego, tick) {
+            polygon.occupy(&self.config.geometry, &mut grid);
+        }
+        self.darken(&ego, tick, &mut grid);
+        grid
+    }
+
+    /// The cells that hold a pixel beyond a boundary, as shifted and opened by noise.
+    fn beyond_boundaries(&self, map: &Map, ego: &EgoView, tick: u32) -> OccupancyGrid {
+        let (geometry, field) = (&self.config.geometry, map.distance_field());
+        let openings = self.openings(ego, tick);
         let within_cell_m = change_max_m(to_corner_m(geometry.pixel_m(), CELL_PIXELS));
         let mut grid = OccupancyGrid::free();
+        let mut unsure = UnsureCells::new();
         for row in 0..GRID_CELLS {
-            let ahead_of_patch_m = geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m;
-            let centres_m = ego.lattice.nearest_nodes_of_row(map.distance_field(), row);
+            let centres_m = ego.lattice.nearest_nodes_of_row(field, row);
             // A cell whose centre is this far from a boundary is decided without looking at the noise.
-            let sure_m = self.noise.boundary_shift_max_m(ahead_of_patch_m) + within_cell_m;
-            let may_be_occupied = bits_where(&centres_m, |centre_m| centre_m <= sure_m);
-            let opened = openings.as_ref().map_or(0, |opened| opened.touched_cells(row)) & may_be_occupied;
-            let mut occupied = bits_where(&centres_m, |centre_m| centre_m < -sure_m) & !opened;
-            for col in bits(may_be_occupied & !occupied) {
-                let threshold_m = -shift.at(ego.lattice.cell_centre(row, col), ahead_of_patch_m);
+            let sure_m = self.noise.boundary_shift_max_m(self.wobble_growth(row)) + within_cell_m;
+            let (is_sure, is_beyond) = sides(&centres_m, sure_m);
+            let opened = openings.as_ref().map_or(0, |opened| opened.touched_cells(row));
+            grid.occupy_row(row, is_beyond & !opened);
+            unsure.push_row(row, !is_sure | (is_beyond & opened), &centres_m);
+        }
+        let mut shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
+        for cells in unsure.fours() {
+            let (xs, ys) = ego.lattice.cell_centres(&cells.rows, &cells.cols);
+            let growth = cells.rows.map(|row| self.wobble_growth(row as usize));
+            let thresholds_m = shift.at_each(&xs, &ys, &growth).map(|shift_m| -shift_m);
+            let (is_above, is_below) = ego.lattice.are_decided(&cells.centres_m, &thresholds_m);
+            for i in bits(!is_above & 0b1111) {
+                let (row, col) = (cells.rows[i], cells.cols[i]);
                 let is_occupied = match &openings {
-                    Some(openings) if opened >> col & 1 == 1 => {
-                        any_closed_pixel_below(map, &ego, openings, row, col, threshold_m)
+                    Some(openings) if openings.touched_cells(row as usize) >> col & 1 == 1 => {
+                        any_closed_pixel_below(map, ego, openings, row as usize, col as usize, thresholds_m[i])
                     }
-                    _ => ego.lattice.any_below(map.distance_field(), row, col, centres_m[col], threshold_m),
+                    _ => is_below >> i & 1 == 1 || ego.lattice.any_below(field, row, col, thresholds_m[i]),
                 };
-                occupied |= u32::from(is_occupied) << col;
+                grid.occupy_row(row as usize, u32::from(is_occupied) << col);
             }
-            grid.occupy_row(row, occupied);
         }
-        for polygon in self.covers(map, &ego, tick) {
-            polygon.occupy(geometry, &mut grid);
-        }
-        self.for_each_shadow(&ego, tick, |polygon, shadow, threshold| {
-            // Cells of which no pixel can be misread.
-            let mut is_read = OccupancyGrid::free();
-            polygon.for_each_row(geometry, |row, first, last| {
-                let cell_row = row / CELL_PIXELS;
-                for cell_col in first / CELL_PIXELS..=last / CELL_PIXELS {
-                    if grid.is_occupied(cell_row, cell_col) || is_read.is_occupied(cell_row, cell_col) {
-                        continue;
-                    }
-                    match shadow.are_misread_around(ego.lattice.cell_centre(cell_row, cell_col), threshold) {
-                        Some(true) => grid.set_occupied(cell_row, cell_col),
-                        Some(false) => is_read.set_occupied(cell_row, cell_col),
-                        None => {
-                            let (cell_first, cell_last) = (cell_col * CELL_PIXELS, (cell_col + 1) * CELL_PIXELS - 1);
-                            let mut cols = first.max(cell_first)..=last.min(cell_last);
-                            let is_misread =
-                                |col: usize| shadow.is_misread(ego.lattice.point(row as f32, col as f32), threshold);
-                            if cols.any(is_misread) {
-                                grid.set_occupied(cell_row, cell_col);
-                            }
-                        }
-                    }
-                }
-            });
-        });
         grid
+    }
+
+    /// How much larger the boundary wobble is in a row of cells than at the patch's lower edge.
+    fn wobble_growth(&self, row: usize) -> f32 {
+        let geometry = &self.config.geometry;
+        wobble_growth(geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m)
+    }
+
+    /// Marks the cells of which tall things hide a pixel.
+    fn hide_ground(&self, map: &Map, ego: &EgoView, grid: &mut OccupancyGrid) {
+        let geometry = &self.config.geometry;
+        for thing in self.occluders(map, ego) {
+            // Most hidden ground lies beyond the lane, where everything is occupied already.
+            let Some((low, high)) = thing.hidden_box() else { continue };
+            if CellBox::around(geometry, low, high).is_none_or(|cells| cells.is_full(grid)) {
+                continue;
+            }
+            if let Some(polygon) = thing.hidden_ground() {
+                polygon.occupy(geometry, grid);
+            }
+        }
+    }
+
+    /// Marks the cells that hold a misread pixel of a shadow.
+    fn darken(&self, ego: &EgoView, tick: u32, grid: &mut OccupancyGrid) {
+        let geometry = &self.config.geometry;
+        self.for_each_shadow(ego, tick, |polygon, shadow, threshold| {
+            let Some(spans) = polygon.spans_of_free_cells(geometry, grid) else { return };
+            let is_any_misread = |row: usize, cols: Range<usize>| {
+                cols.clone().step_by(4).any(|first| {
+                    let (xs, ys) = ego.lattice.four_pixels(row, first);
+                    let is_pixel = (1 << (cols.end - first).min(4)) - 1;
+                    shadow.are_misread(&xs, &ys, threshold) & is_pixel != 0
+                })
+            };
+            for row in spans.cell_rows() {
+                for col in bits(spans.touched_cells(row) & !grid.row(row)) {
+                    let is_misread = match shadow.are_misread_around(ego.lattice.cell_centre(row, col), threshold) {
+                        Some(are_misread) => are_misread,
+                        None => spans.pixels_of_cell(row, col).any(|(row, cols)| is_any_misread(row, cols)),
+                    };
+                    grid.occupy_row(row, u32::from(is_misread) << col);
+                }
+            }
+        });
     }
 
     /// The perceived view in full resolution, by brute force. Its max-pool is the grid of [`Self::observe`], dropped
@@ -126,7 +161,7 @@ impl Sensor {
         let ego = EgoView::new(geometry, pose);
         let openings = self.openings(&ego, tick).unwrap_or_else(PixelRows::empty);
         let mut covered = PixelRows::empty();
-        for polygon in self.covers(map, &ego, tick) {
+        for polygon in self.hidden_ground(map, &ego).chain(self.misread(&ego, tick)) {
             polygon.for_each_row(geometry, |row, first, last| covered.set(row, first, last));
         }
         self.for_each_shadow(&ego, tick, |polygon, shadow, threshold| {
@@ -142,8 +177,9 @@ impl Sensor {
         let shifts_m: Vec<f32> = (0..GRID_CELLS * GRID_CELLS)
             .map(|cell| {
                 let (row, col) = (cell / GRID_CELLS, cell % GRID_CELLS);
-                let ahead_of_patch_m = geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m;
-                shift.at(ego.lattice.cell_centre(row, col), ahead_of_patch_m)
+                let centre = ego.lattice.cell_centre(row, col);
+                let [shift_m] = shift.at_each(&[centre.x], &[centre.y], &[self.wobble_growth(row)]);
+                shift_m
             })
             .collect();
         BirdsEyeView::from_fn(|row, col| {
@@ -165,9 +201,9 @@ impl Sensor {
         })
     }
 
-    /// Everything that is laid over the view as occupied: hidden ground, misread patches, flicker.
-    fn covers<'a>(&'a self, map: &'a Map, ego: &'a EgoView, tick: u32) -> impl Iterator<Item = ConvexInEgo> + 'a {
-        self.hidden_ground(map, ego).chain(self.patches(ego, tick, Reads::Occupied)).chain(self.flicker(tick))
+    /// What is laid over the view as occupied by mistake: patches and flicker.
+    fn misread<'a>(&'a self, ego: &'a EgoView, tick: u32) -> impl Iterator<Item = ConvexInEgo> + 'a {
+        self.patches(ego, tick, Reads::Occupied).chain(self.flicker(tick))
     }
 
     fn flicker(&self, tick: u32) -> Option<ConvexInEgo> {
@@ -177,14 +213,16 @@ impl Sensor {
     }
 
     fn hidden_ground<'a>(&'a self, map: &'a Map, ego: &'a EgoView) -> impl Iterator<Item = ConvexInEgo> + 'a {
-        let occluders = if self.config.smear { map.occluders() } else { &[] };
-        occluders.iter().filter(|occluder| ego.may_see(occluder.centre, occluder.radius_m)).filter_map(|occluder| {
-            let mut outline = [Vec2::ZERO; 8];
-            for (in_ego, &corner) in outline.iter_mut().zip(&occluder.outline) {
-                *in_ego = ego.world_from_ego.inverse_point(corner);
-            }
-            let outline = &outline[..occluder.outline.len()];
-            hidden_ground(outline, occluder.height_m, self.config.camera_ahead_m, self.config.camera_height_m)
+        self.occluders(map, ego).filter_map(|thing| thing.hidden_ground())
+    }
+
+    /// Tall things around the patch as seen by the camera; none if ground is not hidden.
+    fn occluders<'a>(&'a self, map: &'a Map, ego: &'a EgoView) -> impl Iterator<Item = TallThing> + 'a {
+        let camera = Camera { ahead_m: self.config.camera_ahead_m, height_m: self.config.camera_height_m };
+        let near = self.config.smear.then(|| map.occluders_near(ego.patch_centre, ego.patch_radius_m));
+        near.into_iter().flatten().map(move |occluder| {
+            let outline = occluder.outline.iter().map(|&corner| ego.world_from_ego.inverse_point(corner));
+            TallThing::new(outline, occluder.height_m, camera)
         })
     }
 
@@ -194,9 +232,8 @@ impl Sensor {
     }
 
     fn visible_patches<'a>(&'a self, ego: &'a EgoView, tick: u32) -> impl Iterator<Item = &'a Patch> + 'a {
-        let is_visible =
-            move |patch: &&Patch| ego.may_see(patch.region.centre, patch.region.radius_m) && patch.is_alive(tick);
-        self.noise.patches.iter().filter(is_visible)
+        let near = self.noise.patch_circles.overlapping(ego.patch_centre, ego.patch_radius_m);
+        near.map(|index| &self.noise.patches[index]).filter(move |patch| patch.is_alive(tick))
     }
 
     /// Ground that is taken for road although it is not; `None` if there is none in sight.
@@ -218,20 +255,70 @@ impl Sensor {
     }
 }
 
-/// The cells of a row of which something holds, bit = column.
-#[inline]
-fn bits_where(values: &[f32; ROW_LANES], is_so: impl Fn(f32) -> bool) -> u32 {
-    let bits = values.iter().enumerate().fold(0, |bits, (col, &value)| bits | u32::from(is_so(value)) << col);
-    bits & OccupancyGrid::ROW_MASK
+/// Which cells of a row have a distance of more than `sure_m` on either side of the boundary, and which of them are beyond
+/// it; bit = column.
+// Not inlined: on its own and of unknown length, the loop is compiled to instructions that take four cells.
+#[inline(never)]
+fn sides(centres_m: &[f32], sure_m: f32) -> (u32, u32) {
+    const BITS: [u32; ROW_LANES] = {
+        let mut bits = [0; ROW_LANES];
+        let mut col = 0;
+        while col < ROW_LANES {
+            bits[col] = 1 << col;
+            col += 1;
+        }
+        bits
+    };
+    let (mut is_drivable, mut is_beyond) = (0, 0);
+    for (&centre_m, &bit) in centres_m.iter().zip(&BITS) {
+        is_drivable |= if centre_m > sure_m { bit } else { 0 };
+        is_beyond |= if centre_m < -sure_m { bit } else { 0 };
+    }
+    (is_drivable | is_beyond, is_beyond)
 }
 
-/// Indices of the set bits, lowest first.
-fn bits(mut mask: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let bit = (mask != 0).then(|| mask.trailing_zeros() as usize);
-        mask &= mask.wrapping_sub(1);
-        bit
-    })
+/// Cells that take a closer look.
+struct UnsureCells {
+    /// Row and column of each.
+    places: [[u8; 2]; UNSURE_MAX],
+    /// Signed distance at the node nearest to the centre of each.
+    centres_m: [f32; UNSURE_MAX],
+    n_cells: usize,
+}
+
+/// All cells, and what four at a time may read beyond the last.
+const UNSURE_MAX: usize = GRID_CELLS * GRID_CELLS + 3;
+
+/// Four cells: their rows and columns, and signed distances at the nodes nearest to their centres.
+struct FourCells {
+    rows: [u32; 4],
+    cols: [u32; 4],
+    centres_m: [f32; 4],
+}
+
+impl UnsureCells {
+    fn new() -> Self {
+        Self { places: [[0; 2]; UNSURE_MAX], centres_m: [f32::INFINITY; UNSURE_MAX], n_cells: 0 }
+    }
+
+    #[inline]
+    fn push_row(&mut self, row: usize, cols: u32, centres_m: &[f32; ROW_LANES]) {
+        for col in bits(cols & OccupancyGrid::ROW_MASK) {
+            self.places[self.n_cells] = [row as u8, col as u8];
+            self.centres_m[self.n_cells] = centres_m[col];
+            self.n_cells += 1;
+        }
+    }
+
+    /// The cells, four at a time. What fills up the last four is far from any boundary.
+    fn fours(&self) -> impl Iterator<Item = FourCells> + '_ {
+        let fours = self.places.as_chunks::<4>().0.iter().zip(self.centres_m.as_chunks::<4>().0);
+        fours.take(self.n_cells.div_ceil(4)).map(|(places, centres_m)| FourCells {
+            rows: places.map(|[row, _]| u32::from(row)),
+            cols: places.map(|[_, col]| u32::from(col)),
+            centres_m: *centres_m,
+        })
+    }
 }
 
 /// Whether a cell keeps a pixel beyond the boundary although parts of it are opened.
@@ -243,9 +330,17 @@ fn any_closed_pixel_below(
     col: usize,
     threshold_m: f32,
 ) -> bool {
-    (0..CELL_PIXELS * CELL_PIXELS).any(|i| {
-        let (row, col) = (row * CELL_PIXELS + i / CELL_PIXELS, col * CELL_PIXELS + i % CELL_PIXELS);
-        !opened.get(row, col) && map.signed_distance_m(ego.lattice.point(row as f32, col as f32)) <= threshold_m
+    let cols: [f32; CELL_PIXELS] = std::array::from_fn(|i| (col * CELL_PIXELS + i) as f32);
+    (row * CELL_PIXELS..(row + 1) * CELL_PIXELS).any(|row| {
+        let opened = opened.pixels_of_cell(row, col);
+        if opened == u8::MAX {
+            return false;
+        }
+        let points = cols.map(|col| ego.lattice.point(row as f32, col));
+        let (xs, ys) = (points.map(|point| point.x), points.map(|point| point.y));
+        let distances_m = map.distance_field().at_each(&xs, &ys);
+        let is_below = |i: usize| opened >> i & 1 == 0 && distances_m[i] <= threshold_m;
+        (0..CELL_PIXELS).any(is_below)
     })
 }
 
@@ -281,6 +376,8 @@ impl EgoView {
 /// One bit per pixel of the view.
 struct PixelRows {
     bits: Vec<[u64; WORDS]>,
+    /// The cells of each row of cells of which any pixel is set, bit = column.
+    touched: [u32; GRID_CELLS],
 }
 
 const WORDS: usize = BEV_PIXELS.div_ceil(64);
@@ -288,28 +385,31 @@ const CELLS_PER_WORD: usize = 64 / CELL_PIXELS;
 
 impl PixelRows {
     fn empty() -> Self {
-        Self { bits: vec![[0; WORDS]; BEV_PIXELS] }
+        Self { bits: vec![[0; WORDS]; BEV_PIXELS], touched: [0; GRID_CELLS] }
     }
 
     fn set(&mut self, row: usize, first: usize, last: usize) {
-        for col in first..=last {
-            self.bits[row][col / 64] |= 1 << (col % 64);
+        for (word, bits) in self.bits[row].iter_mut().enumerate() {
+            let start = word * 64;
+            if first < start + 64 && last >= start {
+                let (low, high) = (first.max(start) - start, last.min(start + 63) - start);
+                *bits |= (u64::MAX << low) & (u64::MAX >> (63 - high));
+            }
         }
+        self.touched[row / CELL_PIXELS] |= bits_between(first / CELL_PIXELS, last / CELL_PIXELS);
     }
 
     fn get(&self, row: usize, col: usize) -> bool {
         self.bits[row][col / 64] >> (col % 64) & 1 == 1
     }
 
+    /// The pixels of a row of pixels in a column of cells.
+    fn pixels_of_cell(&self, row: usize, cell_col: usize) -> u8 {
+        (self.bits[row][cell_col / CELLS_PER_WORD] >> (cell_col % CELLS_PER_WORD * CELL_PIXELS)) as u8
+    }
+
     /// The cells of a row of cells of which any pixel is set, bit = column.
     fn touched_cells(&self, row: usize) -> u32 {
-        let mut words = [0; WORDS];
-        for pixels in &self.bits[row * CELL_PIXELS..(row + 1) * CELL_PIXELS] {
-            for (word, pixels) in words.iter_mut().zip(pixels) {
-                *word |= pixels;
-            }
-        }
-        let is_touched = |col: usize| words[col / CELLS_PER_WORD] >> (col % CELLS_PER_WORD * CELL_PIXELS) & 0xFF != 0;
-        (0..GRID_CELLS).fold(0, |cells, col| cells | u32::from(is_touched(col)) << col)
+        self.touched[row]
     }
 }

@@ -3,13 +3,19 @@
 //! The label image was warped by a ground homography (paper), so a thing of height h at ground range r smears away
 //! from the camera to r·H/(H − h), and to infinity for h ≥ H (methods.md 1.7).
 
-use super::{BEV_PIXELS, CELL_PIXELS, GridGeometry, OccupancyGrid};
+use super::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid};
+use crate::distance_field::{floor, to_index};
 use crate::geometry::Vec2;
+use std::ops::Range;
 
 /// Longest smear, as a multiple of the range: from 2 m on it leaves the patch.
 const FACTOR_MAX: f32 = 12.0;
 /// Corners a polygon may have; an octagon's shadow has ten.
 const CORNERS_MAX: usize = 12;
+/// Corners of the outline of a tall thing.
+const OUTLINE_MAX: usize = 8;
+/// Things nearer than this ahead of the camera hide nothing, metres.
+const AHEAD_MIN_M: f32 = 0.05;
 
 /// A convex polygon in the ego frame, without allocation.
 #[derive(Debug, Clone, Copy)]
@@ -33,27 +39,60 @@ impl ConvexInEgo {
     }
 
     /// Calls `span(row, first_col, last_col)` for every pixel row in which pixel centres lie inside the polygon.
-    #[expect(clippy::needless_bitwise_bool, reason = "values instead of branches are computed for four rows at once")]
     pub(super) fn for_each_row(&self, geometry: &GridGeometry, mut span: impl FnMut(usize, usize, usize)) {
-        let corners = &self.corners[..self.n_corners];
-        let Some(box_) = self.pixel_box(geometry) else { return };
-        let (pixel_m, pixels_per_m) = (geometry.pixel_m(), 1.0 / geometry.pixel_m());
+        let Some(spans) = self.spans(geometry, 0..BEV_PIXELS) else { return };
+        for row in spans.rows.clone() {
+            let (first, end) = (spans.first[row] as usize, spans.end[row] as usize);
+            if first < end {
+                span(row, first, end - 1);
+            }
+        }
+    }
+
+    /// Marks every cell that holds a pixel of the polygon.
+    pub(super) fn occupy(&self, geometry: &GridGeometry, grid: &mut OccupancyGrid) {
+        let Some(spans) = self.spans_of_free_cells(geometry, grid) else { return };
+        for row in spans.cell_rows() {
+            grid.occupy_row(row, spans.touched_cells(row));
+        }
+    }
+
+    /// Its pixels, without rows in which a grid is occupied anyway.
+    pub(super) fn spans_of_free_cells(&self, geometry: &GridGeometry, grid: &OccupancyGrid) -> Option<Spans> {
+        let (low, high) = self.bounds();
+        let free = CellBox::around(geometry, low, high)?.without_full_rows(grid);
+        if free.is_empty() { None } else { self.spans(geometry, free.start * CELL_PIXELS..free.end * CELL_PIXELS) }
+    }
+
+    fn bounds(&self) -> (Vec2, Vec2) {
+        crate::distance_field::bounds(&self.corners[..self.n_corners])
+    }
+
+    /// The pixels whose centres lie inside the polygon, in some of the rows; `None` if it is out of view.
+    #[expect(clippy::needless_bitwise_bool, reason = "values instead of branches are computed for four rows at once")]
+    fn spans(&self, geometry: &GridGeometry, rows: Range<usize>) -> Option<Spans> {
+        let (low, high) = self.bounds();
         let half_m = 0.5 * geometry.side_m;
+        let rows = common(&rows_between(geometry, low.x, high.x), &rows);
+        if rows.is_empty() || low.y > half_m || high.y < -half_m {
+            return None;
+        }
+        let (pixel_m, pixels_per_m) = (geometry.pixel_m(), 1.0 / geometry.pixel_m());
         let far_m = geometry.far_edge_ahead_m();
         // Walk the edges: each lends its crossing to the rows between its ends. Conditions are values here, not branches,
         // so that four rows are done at once.
         let mut right_m = [f32::INFINITY; BEV_PIXELS];
         let mut left_m = [f32::NEG_INFINITY; BEV_PIXELS];
+        let corners = &self.corners[..self.n_corners];
         let mut a = corners[corners.len() - 1];
         for &b in corners {
             let (low, high) = if a.x <= b.x { (a, b) } else { (b, a) };
             // Rows with low.x <= ahead < high.x; one more on either side, then tested exactly.
-            let rows = rows_between(geometry, low.x, high.x);
+            let rows = common(&rows_between(geometry, low.x, high.x), &rows);
             let slope = (high.y - low.y) / (high.x - low.x);
-            let first = rows.start.max(box_.rows.start);
-            let rows = first..rows.end.min(box_.rows.end).max(first);
-            let spans = right_m[rows.clone()].iter_mut().zip(&mut left_m[rows]);
-            for (row, (right_m, left_m)) in (first as i32..).zip(spans) {
+            let first = rows.start as i32;
+            let crossings = right_m[rows.clone()].iter_mut().zip(&mut left_m[rows]);
+            for (row, (right_m, left_m)) in (first..).zip(crossings) {
                 let ahead_m = far_m - (row as f32 + 0.5) * pixel_m;
                 let is_crossed = (low.x <= ahead_m) & (ahead_m < high.x);
                 let y = low.y + (ahead_m - low.x) * slope;
@@ -62,103 +101,204 @@ impl ConvexInEgo {
             }
             a = b;
         }
-        for row in box_.rows {
-            if left_m[row] < right_m[row] {
-                continue;
-            }
-            // Pixel centres: left = half − (col + ½)·pixel.
-            let col_of = |y: f32| (half_m - y) * pixels_per_m - 0.5;
-            let first = ceil(col_of(left_m[row]).clamp(0.0, BEV_PIXELS as f32)) as usize;
-            let last = col_of(right_m[row]).min((BEV_PIXELS - 1) as f32);
-            if last >= first as f32 {
-                span(row, first, last as i32 as usize);
-            }
+        // Pixel centres: left = half − (col + ½)·pixel.
+        let col_of = |y: f32| (half_m - y) * pixels_per_m - 0.5;
+        let mut spans = Spans { first: [0; BEV_PIXELS], end: [0; BEV_PIXELS], rows: rows.clone() };
+        let crossings = right_m[rows.clone()].iter().zip(&left_m[rows.clone()]);
+        let columns = spans.first[rows.clone()].iter_mut().zip(&mut spans.end[rows]);
+        for ((&right_m, &left_m), (first, end)) in crossings.zip(columns) {
+            let from = ceil(between(col_of(left_m), 0.0, BEV_PIXELS as f32));
+            let last = col_of(right_m);
+            let last = if last < (BEV_PIXELS - 1) as f32 { last } else { (BEV_PIXELS - 1) as f32 };
+            let is_empty = (left_m < right_m) | (last < from);
+            *first = if is_empty { 0 } else { to_index(from) };
+            *end = if is_empty { 0 } else { to_index(floor(last)) + 1 };
         }
+        Some(spans)
+    }
+}
+
+/// The pixels of a convex polygon, row by row.
+pub(super) struct Spans {
+    /// First column of each row.
+    first: [u32; BEV_PIXELS],
+    /// The column after the last; equal to the first where there is none.
+    end: [u32; BEV_PIXELS],
+    /// The rows that were computed.
+    rows: Range<usize>,
+}
+
+impl Spans {
+    /// Rows of cells that may hold pixels.
+    pub(super) fn cell_rows(&self) -> Range<usize> {
+        self.rows.start / CELL_PIXELS..self.rows.end.div_ceil(CELL_PIXELS)
     }
 
-    /// Pixel rows and columns around the part of the polygon that lies in the view.
-    fn pixel_box(&self, geometry: &GridGeometry) -> Option<PixelBox> {
-        let (low, high) = crate::distance_field::bounds(&self.corners[..self.n_corners]);
+    /// The cells of a row of cells that hold pixels, bit = column.
+    #[inline]
+    pub(super) fn touched_cells(&self, cell_row: usize) -> u32 {
+        const PIXELS: u32 = CELL_PIXELS as u32;
+        let rows = cell_row * CELL_PIXELS..(cell_row + 1) * CELL_PIXELS;
+        let spans = self.first[rows.clone()].iter().zip(&self.end[rows]);
+        // A span without pixels is 0..0, whose bits are none.
+        let cells = spans.map(|(&first, &end)| (1 << end.div_ceil(PIXELS)) - (1 << (first / PIXELS)));
+        cells.fold(0, |all, cells| all | cells)
+    }
+
+    /// The pixels in a cell as rows and ranges of columns.
+    #[inline]
+    pub(super) fn pixels_of_cell(&self, row: usize, col: usize) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
+        let cols = col * CELL_PIXELS..(col + 1) * CELL_PIXELS;
+        let rows = row * CELL_PIXELS..(row + 1) * CELL_PIXELS;
+        rows.map(move |row| (row, common(&cols, &(self.first[row] as usize..self.end[row] as usize))))
+    }
+}
+
+/// A rectangle of cells.
+pub(super) struct CellBox {
+    rows: Range<usize>,
+    /// Bit = column.
+    mask: u32,
+}
+
+impl CellBox {
+    /// The cells that may hold pixels of a box in the ego frame; `None` if it is out of view.
+    pub(super) fn around(geometry: &GridGeometry, low: Vec2, high: Vec2) -> Option<Self> {
         let half_m = 0.5 * geometry.side_m;
-        if low.y > half_m || high.y < -half_m {
+        let rows = rows_between(geometry, low.x, high.x);
+        if rows.is_empty() || low.y > half_m || high.y < -half_m {
             return None;
         }
-        let rows = rows_between(geometry, low.x, high.x);
-        let col_of = |y: f32| ((half_m - y) / geometry.pixel_m()).clamp(0.0, (BEV_PIXELS - 1) as f32) as usize;
-        (!rows.is_empty()).then(|| PixelBox { rows, first_col: col_of(high.y), last_col: col_of(low.y) })
+        let cols_per_m = 1.0 / geometry.cell_m();
+        let col_of = |y: f32| between((half_m - y) * cols_per_m, 0.0, (GRID_CELLS - 1) as f32) as i32 as usize;
+        Some(Self {
+            rows: rows.start / CELL_PIXELS..rows.end.div_ceil(CELL_PIXELS),
+            mask: bits_between(col_of(high.y), col_of(low.y)),
+        })
     }
 
-    /// Marks every cell that holds a pixel of the polygon.
-    pub(super) fn occupy(&self, geometry: &GridGeometry, grid: &mut OccupancyGrid) {
-        // Most hidden ground lies beyond the lane, where everything is occupied already.
-        let Some(box_) = self.pixel_box(geometry) else { return };
-        let mask = bits_between(box_.first_col / CELL_PIXELS, box_.last_col / CELL_PIXELS);
-        if (box_.rows.start / CELL_PIXELS..=(box_.rows.end - 1) / CELL_PIXELS).all(|row| grid.row(row) & mask == mask) {
-            return;
-        }
-        self.for_each_row(geometry, |row, first, last| {
-            grid.occupy_row(row / CELL_PIXELS, bits_between(first / CELL_PIXELS, last / CELL_PIXELS));
-        });
+    /// Whether a grid is occupied in all of it.
+    pub(super) fn is_full(&self, grid: &OccupancyGrid) -> bool {
+        self.rows.clone().all(|row| self.is_full_in(grid, row))
+    }
+
+    /// Its rows from the first to the last that a grid does not occupy.
+    fn without_full_rows(&self, grid: &OccupancyGrid) -> Range<usize> {
+        let is_free = |&row: &usize| !self.is_full_in(grid, row);
+        let first = self.rows.clone().find(is_free);
+        let last = self.rows.clone().rev().find(is_free);
+        first.zip(last).map_or(0..0, |(first, last)| first..last + 1)
+    }
+
+    fn is_full_in(&self, grid: &OccupancyGrid, row: usize) -> bool {
+        grid.row(row) & self.mask == self.mask
     }
 }
 
 /// Smallest whole number at or above a non-negative value. `f32::ceil` is a library call on baseline x86-64.
-fn ceil(value: f32) -> i32 {
-    let truncated = value as i32;
-    truncated + i32::from(value > truncated as f32)
+#[inline]
+fn ceil(value: f32) -> f32 {
+    let whole = floor(value);
+    whole + if value > whole { 1.0 } else { 0.0 }
 }
 
-struct PixelBox {
-    rows: std::ops::Range<usize>,
-    first_col: usize,
-    last_col: usize,
+/// Bounds a value, like `clamp`, by values instead of branches.
+#[inline]
+fn between(value: f32, low: f32, high: f32) -> f32 {
+    let value = if value > low { value } else { low };
+    if value < high { value } else { high }
+}
+
+/// What two ranges have in common; empty, but in the first, if nothing.
+#[inline]
+fn common(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    let start = a.start.max(b.start);
+    start..a.end.min(b.end).max(start)
 }
 
 /// Pixel rows whose centres may lie between two distances ahead; up to one row too many at either end.
-fn rows_between(geometry: &GridGeometry, low_m: f32, high_m: f32) -> std::ops::Range<usize> {
-    let row_of =
-        |ahead_m: f32| ((geometry.far_edge_ahead_m() - ahead_m) / geometry.pixel_m()).clamp(-1.0, BEV_PIXELS as f32);
-    let first = (row_of(high_m) - 1.0).max(0.0) as usize;
-    let end = (row_of(low_m) + 1.0).clamp(0.0, BEV_PIXELS as f32) as usize;
-    first..end
+fn rows_between(geometry: &GridGeometry, low_m: f32, high_m: f32) -> Range<usize> {
+    let row_of = |ahead_m: f32| (geometry.far_edge_ahead_m() - ahead_m) / geometry.pixel_m();
+    let index = |row: f32| between(row, 0.0, BEV_PIXELS as f32) as i32 as usize;
+    index(row_of(high_m) - 1.0)..index(row_of(low_m) + 1.0)
 }
 
 /// Bits `first..=last`.
-fn bits_between(first: usize, last: usize) -> u32 {
+pub(super) fn bits_between(first: usize, last: usize) -> u32 {
     ((1_u32 << (last + 1)) - 1) & !((1_u32 << first) - 1)
 }
 
-/// The ground hidden behind a convex counter-clockwise outline, without the thing itself; `None` if it is beside or
-/// behind the camera, which stands at (`camera_ahead_m`, 0).
-pub(super) fn hidden_ground(
-    outline_in_ego: &[Vec2],
-    height_m: f32,
-    camera_ahead_m: f32,
-    camera_height_m: f32,
-) -> Option<ConvexInEgo> {
-    let camera = Vec2::new(camera_ahead_m, 0.0);
-    let n = outline_in_ego.len();
-    let from_camera = |i: usize| outline_in_ego[i % n] - camera;
-    if (0..n).any(|i| from_camera(i).x <= 0.05) {
-        return None;
+/// Where the camera is: ahead of the rear axle and above ground, metres.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Camera {
+    pub(super) ahead_m: f32,
+    pub(super) height_m: f32,
+}
+
+/// A convex thing of some height, seen from the camera.
+pub(super) struct TallThing {
+    /// Counter-clockwise; relative to the camera, ahead and left.
+    outline: [Vec2; OUTLINE_MAX],
+    n_corners: usize,
+    /// How many times as far as the thing its smear reaches.
+    factor: f32,
+    camera: Vec2,
+}
+
+impl TallThing {
+    /// `outline_in_ego`: convex and counter-clockwise.
+    #[inline]
+    pub(super) fn new(outline_in_ego: impl Iterator<Item = Vec2>, height_m: f32, camera: Camera) -> Self {
+        let factor = if height_m < camera.height_m {
+            (camera.height_m / (camera.height_m - height_m)).min(FACTOR_MAX)
+        } else {
+            FACTOR_MAX
+        };
+        let mut thing =
+            Self { outline: [Vec2::ZERO; OUTLINE_MAX], n_corners: 0, factor, camera: Vec2::new(camera.ahead_m, 0.0) };
+        for corner in outline_in_ego {
+            thing.outline[thing.n_corners] = corner - thing.camera;
+            thing.n_corners += 1;
+        }
+        thing
     }
-    // Edge a→b of a counter-clockwise outline faces the camera if the camera lies to its right.
-    let faces_camera = |i: usize| from_camera(i).perp_dot(from_camera(i + 1)) < 0.0;
-    // The far chain runs from the end of the facing edges to their start.
-    let start = (0..n).find(|&i| faces_camera(i + n - 1) && !faces_camera(i))?;
-    let end = (start + 1..=start + n).find(|&i| faces_camera(i))?;
-    let factor = if height_m < camera_height_m {
-        (camera_height_m / (camera_height_m - height_m)).min(FACTOR_MAX)
-    } else {
-        FACTOR_MAX
-    };
-    let near = [end, start].map(|i| camera + from_camera(i));
-    Some(ConvexInEgo::new(near.into_iter().chain((start..=end).map(|i| camera + from_camera(i) * factor))))
+
+    /// A box in the ego frame around the thing and the ground hidden behind it; `None` if it is beside or behind the
+    /// camera.
+    #[inline]
+    pub(super) fn hidden_box(&self) -> Option<(Vec2, Vec2)> {
+        let (low, high) = crate::distance_field::bounds(&self.outline[..self.n_corners]);
+        let is_ahead = low.x > AHEAD_MIN_M;
+        is_ahead.then(|| (self.camera + low.min(low * self.factor), self.camera + high.max(high * self.factor)))
+    }
+
+    /// The ground hidden behind it, without the thing itself; `None` if it is beside or behind the camera.
+    pub(super) fn hidden_ground(&self) -> Option<ConvexInEgo> {
+        let n = self.n_corners;
+        let from_camera = |i: usize| self.outline[i % n];
+        if self.outline[..n].iter().any(|corner| corner.x <= AHEAD_MIN_M) {
+            return None;
+        }
+        // Edge a→b of a counter-clockwise outline faces the camera if the camera lies to its right.
+        let faces_camera = |i: usize| from_camera(i).perp_dot(from_camera(i + 1)) < 0.0;
+        // The far chain runs from the end of the facing edges to their start.
+        let start = (0..n).find(|&i| faces_camera(i + n - 1) && !faces_camera(i))?;
+        let end = (start + 1..=start + n).find(|&i| faces_camera(i))?;
+        let near = [end, start].map(|i| self.camera + from_camera(i));
+        let far = (start..=end).map(|i| self.camera + from_camera(i) * self.factor);
+        Some(ConvexInEgo::new(near.into_iter().chain(far)))
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const CAMERA: Camera = Camera { ahead_m: 1.59, height_m: 1.55 };
+
+    fn hidden_ground(outline: &[Vec2], height_m: f32, camera: Camera) -> Option<ConvexInEgo> {
+        TallThing::new(outline.iter().copied(), height_m, camera).hidden_ground()
+    }
 
     fn box_ahead() -> [Vec2; 4] {
         crate::geometry::rectangle(crate::geometry::Pose::new(Vec2::new(8.0, 0.0), 0.0), 2.0, 2.0)
@@ -169,7 +309,7 @@ mod tests {
     #[test]
     fn a_box_of_half_the_camera_height_doubles_its_range() {
         let geometry = GridGeometry::paper();
-        let polygon = hidden_ground(&box_ahead(), 0.775, 1.6, 1.55).unwrap();
+        let polygon = hidden_ground(&box_ahead(), 0.775, Camera { ahead_m: 1.6, ..CAMERA }).unwrap();
         let mut rows = vec![None; BEV_PIXELS];
         polygon.for_each_row(&geometry, |row, first, last| rows[row] = Some((first, last)));
         // 12 m ahead: the wedge is 2 · (12 − 1.6)/5.4 = 3.85 m wide → 64 pixels.
@@ -189,7 +329,7 @@ mod tests {
         let geometry = GridGeometry::paper();
         let reach = |height_m| {
             let mut first_row = BEV_PIXELS;
-            let polygon = hidden_ground(&box_ahead(), height_m, 1.59, 1.55).unwrap();
+            let polygon = hidden_ground(&box_ahead(), height_m, CAMERA).unwrap();
             polygon.for_each_row(&geometry, |row, _, _| first_row = first_row.min(row));
             geometry.pixel_in_ego(first_row, 0).x
         };
@@ -201,6 +341,6 @@ mod tests {
     #[test]
     fn things_beside_or_behind_the_camera_hide_nothing() {
         let beside = crate::geometry::rectangle(crate::geometry::Pose::new(Vec2::new(1.0, 3.0), 0.0), 2.0, 2.0);
-        assert!(hidden_ground(&beside, 1.5, 1.59, 1.55).is_none());
+        assert!(hidden_ground(&beside, 1.5, CAMERA).is_none());
     }
 }
