@@ -95,7 +95,7 @@ impl DistanceField {
     /// [`Self::at`] at the points (`xs[i]`, `ys[i]`), to the bit. All but the look-ups is done for several points at once.
     #[inline]
     pub fn at_each<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
-        let (last_x, last_y) = ((self.cols - 2) as f32, (self.rows - 2) as f32);
+        let (last_x, last_y) = (count(self.cols - 2), count(self.rows - 2));
         let stride = self.cols as u32;
         let (mut nodes, mut fxs, mut fys) = ([0; N], [0.0; N], [0.0; N]);
         for i in 0..N {
@@ -124,7 +124,7 @@ impl DistanceField {
     /// All but the look-ups is done for several points at once.
     #[inline]
     pub fn at_nearest_nodes<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
-        let (last_x, last_y) = ((self.cols - 1) as f32, (self.rows - 1) as f32);
+        let (last_x, last_y) = (count(self.cols - 1), count(self.rows - 1));
         let stride = self.cols as u32;
         let mut nodes = [0; N];
         for i in 0..N {
@@ -135,11 +135,11 @@ impl DistanceField {
         std::array::from_fn(|i| self.values_m[nodes[i] as usize])
     }
 
-    /// [`Self::at_nearest_nodes`] of as many points as there is room for in `values_m`, at most 32.
+    /// [`Self::at_nearest_nodes`] of as many points as there is room for in `values_m`, a multiple of 4 up to 32.
     // Not inlined: on its own and of unknown length, the first loop is compiled to instructions that take four points.
     #[inline(never)]
     pub fn at_many_nearest_nodes(&self, xs: &[f32], ys: &[f32], values_m: &mut [f32]) {
-        let (last_x, last_y) = ((self.cols - 1) as f32, (self.rows - 1) as f32);
+        let (last_x, last_y) = (count(self.cols - 1), count(self.rows - 1));
         let stride = self.cols as u32;
         let mut nodes = [0; 32];
         for ((node, &x), &y) in nodes.iter_mut().zip(xs).zip(ys) {
@@ -147,34 +147,51 @@ impl DistanceField {
             let y = clamp_to_raster((y - self.origin.y) * (1.0 / NODE_M), last_y);
             *node = to_nearest_index(y) * stride + to_nearest_index(x);
         }
-        for (value_m, &node) in values_m.iter_mut().zip(&nodes) {
-            *value_m = self.values_m[node as usize];
+        for (four_m, nodes) in values_m.as_chunks_mut::<4>().0.iter_mut().zip(nodes.as_chunks::<4>().0) {
+            *four_m = nodes.map(|node| self.values_m[node as usize]);
         }
     }
 
-    /// A lower bound of [`Self::at`] in a box of at most 0.6 m by 0.6 m: the lowest of the nodes that lend to it. Minus
-    /// infinity if the box is larger or at the very end of the raster.
+    /// A lower bound of [`Self::at`] in a box of at most 0.6 m by 0.6 m, but for rounding. Minus infinity if the box is
+    /// larger or at the very end of the raster.
+    ///
+    /// Between nodes the field is bilinear, so it is lowest on a grid of points: nodes inside the box, and where their
+    /// rows and columns meet its sides.
     #[inline]
     pub fn lowest_within(&self, low: Vec2, high: Vec2) -> f32 {
         /// Nodes along one side of the largest box.
         const LANES: usize = 8;
-        let index = |coordinate: f32, last: usize| {
-            to_index(floor(clamp_to_raster(coordinate * (1.0 / NODE_M), (last - 2) as f32))) as usize
+        let last = Vec2::new(count(self.cols - 2), count(self.rows - 2));
+        let node = |point: Vec2| {
+            let node = (point - self.origin) * (1.0 / NODE_M);
+            Vec2::new(clamp_to_raster(node.x, last.x), clamp_to_raster(node.y, last.y))
         };
-        let (low, high) = (low - self.origin, high - self.origin);
-        let (first_col, last_col) = (index(low.x, self.cols), index(high.x, self.cols) + 1);
-        let (first_row, last_row) = (index(low.y, self.rows), index(high.y, self.rows) + 1);
-        let mut lowest_m = [f32::INFINITY; LANES];
-        for row in first_row..=last_row {
-            let Some(nodes_m) = self.values_m[row * self.cols + first_col..].first_chunk::<LANES>() else {
-                return f32::NEG_INFINITY;
-            };
-            for (lowest_m, &node_m) in lowest_m.iter_mut().zip(nodes_m) {
-                *lowest_m = if node_m < *lowest_m { node_m } else { *lowest_m };
-            }
+        let (low, high) = (node(low), node(high));
+        let [low_cell, high_cell] = [low, high].map(|node| Vec2::new(floor(node.x), floor(node.y)));
+        let (into_low, into_high) = (low - low_cell, high - high_cell);
+        let [(first_col, first_row), (last_col, last_row)] =
+            [low_cell, high_cell].map(|cell| (to_index(cell.x) as usize, to_index(cell.y) as usize));
+        let nodes_m = |row: usize| self.values_m[row * self.cols + first_col..].first_chunk::<LANES>();
+        // Along the lower and the upper side.
+        let side = |row: usize, share: f32| {
+            let (near_m, far_m) = (nodes_m(row)?, nodes_m(row + 1)?);
+            Some(std::array::from_fn::<f32, LANES, _>(|i| near_m[i] + share * (far_m[i] - near_m[i])))
+        };
+        let (Some(mut lowest_m), Some(upper_m)) = (side(first_row, into_low.y), side(last_row, into_high.y)) else {
+            return f32::NEG_INFINITY;
+        };
+        lower_each(&mut lowest_m, &upper_m);
+        for row in first_row + 1..=last_row {
+            let Some(nodes_m) = nodes_m(row) else { return f32::NEG_INFINITY };
+            lower_each(&mut lowest_m, nodes_m);
         }
-        let Some(lowest_m) = lowest_m.get(..=last_col - first_col) else { return f32::NEG_INFINITY };
-        lowest_m.iter().fold(f32::INFINITY, |low, &value| if value < low { value } else { low })
+        // Of these, across: the two sides and what is between them.
+        let n = last_col - first_col;
+        let Some(&[.., left_m, right_m]) = lowest_m.get(..n + 2) else { return f32::NEG_INFINITY };
+        let first_m = lowest_m[0] + into_low.x * (lowest_m[1] - lowest_m[0]);
+        let last_m = left_m + into_high.x * (right_m - left_m);
+        let sides_m = if first_m < last_m { first_m } else { last_m };
+        lowest_m[1..=n].iter().fold(sides_m, |low, &value| if value < low { value } else { low })
     }
 
     /// Lower-left and upper-right corners of the raster, world metres.
@@ -220,6 +237,20 @@ impl DistanceField {
                 }
             }
         }
+    }
+}
+
+/// A number of nodes as a coordinate; from 64 bits it takes several instructions.
+#[inline]
+fn count(nodes: usize) -> f32 {
+    nodes as i32 as f32
+}
+
+/// Lowers each value to the other one.
+#[inline]
+fn lower_each<const N: usize>(values: &mut [f32; N], others: &[f32; N]) {
+    for (value, &other) in values.iter_mut().zip(others) {
+        *value = if other < *value { other } else { *value };
     }
 }
 
@@ -294,5 +325,24 @@ mod tests {
             let tolerance_m = if expected_m.abs() < 0.25 { 0.03 } else { 0.05 };
             assert!((field.at(point) - expected_m).abs() < tolerance_m, "{point}: {} vs {expected_m}", field.at(point));
         }
+    }
+
+    #[test]
+    fn the_lowest_value_in_a_box_is_a_tight_bound() {
+        let mut field = DistanceField::of_boundary(&rectangle());
+        field.carve_disc(Vec2::new(6.0, 4.0), 0.5);
+        let mut gap_max_m = 0.0_f32;
+        for i in 0..600 {
+            let low = Vec2::new(0.6 * (i % 40) as f32 - 2.0, 0.7 * (i / 40) as f32 - 1.0)
+                + Vec2::splat(0.0137 * i as f32 % 0.1);
+            let size = Vec2::new(0.07 + 0.001 * (i % 500) as f32, 0.55 - 0.0008 * i as f32);
+            let bound_m = field.lowest_within(low, low + size);
+            let sample = |k: usize| field.at(low + size * Vec2::new((k % 60) as f32, (k / 60) as f32) / 59.0);
+            let lowest_m = (0..60 * 60).map(sample).fold(f32::INFINITY, f32::min);
+            assert!(bound_m <= lowest_m + 1e-5, "{low} {size}: {bound_m} m, but {lowest_m} m");
+            gap_max_m = gap_max_m.max(lowest_m - bound_m);
+        }
+        assert!(gap_max_m < 0.03, "{gap_max_m} m");
+        assert_eq!(field.lowest_within(Vec2::ZERO, Vec2::splat(1.0)), f32::NEG_INFINITY);
     }
 }

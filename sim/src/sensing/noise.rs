@@ -236,12 +236,13 @@ impl Shadow {
     /// at once.
     #[inline]
     pub(super) fn are_misread<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N], threshold: u8) -> u32 {
-        let (last_col, last_row) = ((self.cols - 1) as f32, (self.rows - 1) as f32);
+        let (cols, last_col, last_row) = (self.cols as f32, (self.cols - 1) as f32, (self.rows - 1) as f32);
         let mut indices = [0; N];
         for i in 0..N {
             let col = floor(clamp_to_raster((xs[i] - self.origin.x) * (1.0 / SHADOW_CELL_M) + 0.5, last_col));
             let row = floor(clamp_to_raster((ys[i] - self.origin.y) * (1.0 / SHADOW_CELL_M) + 0.5, last_row));
-            indices[i] = to_index(row) * self.cols as u32 + to_index(col);
+            // As numbers, because whole ones are not multiplied four at once.
+            indices[i] = to_index(row * cols + col);
         }
         (0..N).fold(0, |bits, i| bits | u32::from(self.ranks[indices[i] as usize] >= threshold) << i)
     }
@@ -533,7 +534,8 @@ impl Lattice {
             let (col, fx) = lattice_cell((xs[i] - self.origin.x) * self.per_m);
             let (row, fy) = lattice_cell((ys[i] - self.origin.y) * self.per_m);
             (fxs[i], fys[i]) = (fx, fy);
-            cells[i] = row * LATTICE_NODES as u32 + col;
+            // As numbers, because whole ones are not multiplied four at once.
+            cells[i] = to_index(row * LATTICE_NODES as f32 + col);
         }
         // The four nodes around each place, near and far pair.
         let (mut near, mut far) = ([[0.0; 2]; N], [[0.0; 2]; N]);
@@ -555,15 +557,21 @@ impl Lattice {
     /// Draws those of the four nodes around a cell of the lattice that are not drawn yet. `base`: index of the first.
     #[inline(never)]
     fn draw_around(&mut self, base: usize) {
-        for node in [base, base + 1, base + LATTICE_NODES, base + LATTICE_NODES + 1] {
-            if self.nodes[node].is_nan() {
-                self.nodes[node] = self.draw((node / LATTICE_NODES) as i32, (node % LATTICE_NODES) as i32);
-            }
-        }
+        self.draw_once(base);
+        self.draw_once(base + 1);
+        self.draw_once(base + LATTICE_NODES);
+        self.draw_once(base + LATTICE_NODES + 1);
         self.is_drawn[base] = true;
     }
 
     #[inline]
+    fn draw_once(&mut self, node: usize) {
+        if self.nodes[node].is_nan() {
+            self.nodes[node] = self.draw(node as i32 / LATTICE_NODES as i32, node as i32 % LATTICE_NODES as i32);
+        }
+    }
+
+    #[inline(never)]
     fn draw(&self, row: i32, col: i32) -> f32 {
         let at = |key: u64| unit(mix(key, self.first.0 + col, self.first.1 + row));
         let [now, next] = self.keys;
@@ -572,14 +580,14 @@ impl Lattice {
     }
 }
 
-/// The cell of a [`Lattice`] that holds a coordinate, and the faded progress through it, 0…1.
+/// The cell of a [`Lattice`] that holds a coordinate, a whole number, and the faded progress through it, 0…1.
 #[inline]
-fn lattice_cell(node: f32) -> (u32, f32) {
+fn lattice_cell(node: f32) -> (f32, f32) {
     const LAST: f32 = (LATTICE_NODES - 2) as f32;
     let node = if node > 0.0 { node } else { 0.0 };
     let whole = floor(node);
     let cell = if whole < LAST { whole } else { LAST };
-    (to_index(cell), fade(node - cell))
+    (cell, fade(node - cell))
 }
 
 /// Lowest and highest value within `reach` cells along both axes of every cell of a raster.

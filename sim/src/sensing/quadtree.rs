@@ -121,8 +121,8 @@ impl PixelLattice {
 
     /// Whether any pixel of a cell has a signed distance of at most `threshold_m`.
     ///
-    /// Most cells of which the centre does not tell ([`Self::are_decided`]) have such a pixel in a corner, or no such node
-    /// around them; what remains is quartered.
+    /// Most cells of which the centre does not tell ([`Self::are_decided`]) have such a pixel in a corner, or the field
+    /// around them is nowhere as low; what remains is quartered.
     #[inline]
     pub(super) fn any_below(&self, field: &DistanceField, row: u32, col: u32, threshold_m: f32) -> bool {
         const LAST: f32 = (CELL_PIXELS - 1) as f32;
@@ -131,7 +131,7 @@ impl PixelLattice {
         let rows = [first_row, first_row, last_row, last_row];
         let cols = [first_col, last_col, first_col, last_col];
         self.any_of_these_below(field, rows, cols, threshold_m)
-            || self.may_be_below(field, first_row, first_col, CELL_PIXELS, threshold_m)
+            || self.may_be_below::<CELL_PIXELS>(field, first_row, first_col, threshold_m)
                 && self.any_quarter_below(field, first_row, first_col, threshold_m)
     }
 
@@ -147,14 +147,14 @@ impl PixelLattice {
         distances_m.into_iter().fold(false, |any, distance_m| any | (distance_m <= threshold_m))
     }
 
-    /// False only if no node around a block of `side` × `side` pixels is low enough for one of at most `threshold_m`.
-    #[inline]
-    fn may_be_below(&self, field: &DistanceField, row: f32, col: f32, side: usize, threshold_m: f32) -> bool {
+    /// False only if no pixel of a block of `SIDE` × `SIDE` pixels can have a signed distance of at most `threshold_m`.
+    #[inline(never)]
+    fn may_be_below<const SIDE: usize>(&self, field: &DistanceField, row: f32, col: f32, threshold_m: f32) -> bool {
         /// Rounding of single precision, with a lot to spare, metres.
         const ROUNDING_M: f32 = 1e-4;
-        let to_centre = 0.5 * (side - 1) as f32;
+        let to_centre = 0.5 * (SIDE - 1) as f32;
         let centre = self.point(row + to_centre, col + to_centre);
-        let half = (self.per_row.abs() + self.per_col.abs()) * to_centre + Vec2::splat(10.0 * ROUNDING_M);
+        let half = (self.per_row.abs() + self.per_col.abs()) * to_centre + Vec2::splat(ROUNDING_M);
         field.lowest_within(centre - half, centre + half) <= threshold_m + ROUNDING_M
     }
 
@@ -175,7 +175,7 @@ impl PixelLattice {
             } else if centres_m[i] < threshold_m - self.four_within_m {
                 true
             } else {
-                self.may_be_below(field, rows[i], cols[i], QUARTER_PIXELS, threshold_m)
+                self.may_be_below::<QUARTER_PIXELS>(field, rows[i], cols[i], threshold_m)
                     && self.any_pixel_of_quarter_below(field, rows[i], cols[i], threshold_m)
             }
         })
