@@ -144,7 +144,7 @@ impl PixelLattice {
             (xs[i], ys[i]) = (point.x, point.y);
         }
         let distances_m = field.at_each(&xs, &ys);
-        distances_m.into_iter().fold(false, |any, distance_m| any | (distance_m <= threshold_m))
+        distances_m.into_iter().fold(f32::INFINITY, f32::min) <= threshold_m
     }
 
     /// False only if no pixel of a block of `SIDE` × `SIDE` pixels can have a signed distance of at most `threshold_m`.
