@@ -40,7 +40,7 @@ impl ConvexInEgo {
 
     /// Calls `span(row, first_col, last_col)` for every pixel row in which pixel centres lie inside the polygon.
     pub(super) fn for_each_row(&self, geometry: &GridGeometry, mut span: impl FnMut(usize, usize, usize)) {
-        let Some(spans) = self.spans(geometry, 0..BEV_PIXELS) else { return };
+        let Some(spans) = self.spans(geometry, &(0..BEV_PIXELS)) else { return };
         for row in spans.rows.clone() {
             let (first, end) = (spans.first[row] as usize, spans.end[row] as usize);
             if first < end {
@@ -61,7 +61,7 @@ impl ConvexInEgo {
     pub(super) fn spans_of_free_cells(&self, geometry: &GridGeometry, grid: &OccupancyGrid) -> Option<Spans> {
         let (low, high) = self.bounds();
         let free = CellBox::around(geometry, low, high)?.without_full_rows(grid);
-        if free.is_empty() { None } else { self.spans(geometry, free.start * CELL_PIXELS..free.end * CELL_PIXELS) }
+        if free.is_empty() { None } else { self.spans(geometry, &(free.start * CELL_PIXELS..free.end * CELL_PIXELS)) }
     }
 
     fn bounds(&self) -> (Vec2, Vec2) {
@@ -70,10 +70,10 @@ impl ConvexInEgo {
 
     /// The pixels whose centres lie inside the polygon, in some of the rows; `None` if it is out of view.
     #[expect(clippy::needless_bitwise_bool, reason = "values instead of branches are computed for four rows at once")]
-    fn spans(&self, geometry: &GridGeometry, rows: Range<usize>) -> Option<Spans> {
+    fn spans(&self, geometry: &GridGeometry, rows: &Range<usize>) -> Option<Spans> {
         let (low, high) = self.bounds();
         let half_m = 0.5 * geometry.side_m;
-        let rows = common(&rows_between(geometry, low.x, high.x), &rows);
+        let rows = common(&rows_between(geometry, low.x, high.x), rows);
         if rows.is_empty() || low.y > half_m || high.y < -half_m {
             return None;
         }
@@ -187,7 +187,10 @@ impl CellBox {
         let is_free = |&row: &usize| !self.is_full_in(grid, row);
         let first = self.rows.clone().find(is_free);
         let last = self.rows.clone().rev().find(is_free);
-        first.zip(last).map_or(0..0, |(first, last)| first..last + 1)
+        first.zip(last).map_or(0..0, |(first, last)| {
+            let end = last + 1;
+            first..end
+        })
     }
 
     fn is_full_in(&self, grid: &OccupancyGrid, row: usize) -> bool {
