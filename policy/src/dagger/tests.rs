@@ -3,9 +3,10 @@
 use super::*;
 use crate::dataset::ValidationSplit;
 use crate::dataset::store::tests::scratch;
+use crate::drivers::{NetFleet, NetPolicy};
 use crate::fit::Budget;
 use crate::network::ConvConfig;
-use sim::driver::{Decision, LookAheadPoint, Situation, Source};
+use sim::driver::{Decision, Fleet, LookAheadPoint, OneDriverEach, SensorsOnly, Situation, Source};
 use sim::episode::EpisodeConfig;
 use sim::geometry::Vec2;
 use sim::map::Map;
@@ -63,7 +64,7 @@ fn config() -> DaggerConfig {
             dropout_features: 0.0,
             dropout_hidden: 0.1,
             symmetric: false,
-            memory_ticks: 0.0,
+            memory_ticks: 2.0,
         },
         // Loose enough that both novice and expert drive after so little training.
         rule: DecisionRule::AllBelow { tau: 0.25, chi: 1.0, chi_on: crate::decision_rule::ChiOn::StdPerAxis },
@@ -191,4 +192,30 @@ fn presets_survive_toml() {
         let text = toml::to_string(&config).unwrap();
         assert_eq!(toml::from_str::<DaggerConfig>(&text).unwrap(), config);
     }
+}
+
+/// In DAgger, in a fleet and alone, with its memory and what it forgets when the car is put back.
+#[test]
+fn the_network_drives_the_same_whoever_seats_it() {
+    let network = LookAheadNetConfig { symmetric: true, memory_ticks: 8.0, ..config().network };
+    let checkpoint = Checkpoint { weights: Weights::init(network, RootSeed(3), 0), geometry: GridGeometry::paper() };
+    let drive = |fleet: &mut dyn Fleet| {
+        let mut driven = Vec::new();
+        let reports = run_lockstep(episodes(2), fleet, &mut |episode, frame| driven.push((episode, frame.decision)));
+        (driven, reports)
+    };
+    let device = DeviceChoice::Cpu;
+    let (in_fleet, reports) = drive(&mut NetFleet::new(checkpoint.clone(), device));
+    let put_back = reports.iter().map(|report| report.metrics.near_collisions).sum::<u32>();
+    assert!(put_back > 0, "nothing was forgotten: {reports:?}");
+    let alone = |_| SensorsOnly(NetPolicy::new(checkpoint.clone(), device));
+    assert_eq!(drive(&mut OneDriverEach((0..2).map(alone).collect())).0, in_fleet);
+    let novice = Predictor::new(checkpoint.weights.clone(), device);
+    let experts: Vec<Box<dyn Driver + Send>> = vec![Box::new(RouteFollower), Box::new(RouteFollower)];
+    let always = DecisionRule::TauOnly { tau: 9.0 };
+    let mut arbiter = Arbiter::new(Some(novice), experts, always, Keep::EveryTick, checkpoint.geometry);
+    assert_eq!(drive(&mut arbiter).0, in_fleet);
+    let forgetful = LookAheadNetConfig { memory_ticks: 0.0, ..network };
+    let weights = Weights::init(forgetful, RootSeed(3), 0);
+    assert_ne!(drive(&mut NetFleet::new(Checkpoint { weights, ..checkpoint }, device)).0, in_fleet, "memory matters");
 }
