@@ -95,7 +95,8 @@ impl LookAheadNetConfig {
 
     /// Half the channels, 3×3 kernels and a quarter of the head: 300 996 parameters, trained twice as fast as with the
     /// paper's head and as well (55 000 samples of lot a: 1.01 against 1.02 m). With that much data dropout costs more
-    /// than it gives (1.00 against 1.02 m).
+    /// than it gives (1.00 against 1.02 m). Near-collisions in 42 km of development lots, the same weights: 33 without
+    /// memory, 26 with 3.5 ticks, 22 with 8; of others, trained with it: 23 with 8, 23 with 12, 34 with 18.
     pub fn compact() -> Self {
         Self {
             conv1: ConvConfig { channels: 16, kernel: 3 },
