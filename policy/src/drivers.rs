@@ -9,26 +9,44 @@ use sim::sensing::{GridGeometry, Observation};
 /// The network alone drives every seat; one call answers all of them.
 #[derive(Debug, Clone)]
 pub struct NetFleet {
-    predictor: Predictor,
+    novice: Novice,
     geometry: GridGeometry,
-    steadyings: Steadyings,
 }
 
 impl NetFleet {
     /// Seats a network.
     pub fn new(checkpoint: Checkpoint, device: DeviceChoice) -> Self {
         let Checkpoint { weights, geometry } = checkpoint;
-        let steadyings = Steadyings::new(&weights.config(), geometry);
-        Self { predictor: Predictor::new(weights, device), geometry, steadyings }
+        Self { novice: Novice::new(Predictor::new(weights, device), geometry), geometry }
     }
 }
 
 impl Fleet for NetFleet {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
+        let answers = self.novice.answers(seats);
+        decisions.extend(answers.iter().map(|prediction| novice_decision(prediction, self.geometry)));
+    }
+}
+
+/// The network as it answers at the wheel of many cars: with what it remembers of each.
+#[derive(Debug, Clone)]
+pub(crate) struct Novice {
+    predictor: Predictor,
+    steadyings: Steadyings,
+}
+
+impl Novice {
+    pub(crate) fn new(predictor: Predictor, geometry: GridGeometry) -> Self {
+        let steadyings = Steadyings::new(&predictor.weights().config(), geometry);
+        Self { predictor, steadyings }
+    }
+
+    /// What it answers at every seat, steadied.
+    pub(crate) fn answers(&mut self, seats: &[Seat<'_>]) -> Vec<Prediction> {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
-        let mut predictions = self.predictor.predict(&grids);
-        self.steadyings.steady(seats, &mut predictions);
-        decisions.extend(predictions.iter().map(|prediction| novice_decision(prediction, self.geometry)));
+        let mut answers = self.predictor.predict(&grids);
+        self.steadyings.steady(seats, &mut answers);
+        answers
     }
 }
 

@@ -3,9 +3,8 @@
 use super::disturbance::Disturbance;
 use crate::dataset::{Round, Sample};
 use crate::decision_rule::{DecisionRule, Evidence};
-use crate::drivers::novice_decision;
-use crate::network::{Prediction, Predictor};
-use crate::steadying::Steadyings;
+use crate::drivers::{Novice, novice_decision};
+use crate::network::Predictor;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Driver, Fleet, GroundTruth, Seat};
@@ -33,20 +32,6 @@ pub struct Arbiter {
     n_tot: u64,
     n_net: u64,
     tau_hat_sum: f64,
-}
-
-/// The network at the wheel, as it drives alone: with its memory.
-struct Novice {
-    predictor: Predictor,
-    steadyings: Steadyings,
-}
-
-impl Novice {
-    fn answers(&mut self, seats: &[Seat<'_>], grids: &[&OccupancyGrid]) -> Vec<Prediction> {
-        let mut answers = self.predictor.predict(grids);
-        self.steadyings.steady(seats, &mut answers);
-        answers
-    }
 }
 
 /// What is written down at one seat.
@@ -95,10 +80,7 @@ impl Arbiter {
         geometry: GridGeometry,
     ) -> Self {
         let seats = experts.iter().map(|_| SeatRecord::default()).collect(); // line 2: D_i ← ∅
-        let novice = novice.map(|predictor| {
-            let steadyings = Steadyings::new(&predictor.weights().config(), geometry);
-            Novice { predictor, steadyings }
-        });
+        let novice = novice.map(|predictor| Novice::new(predictor, geometry));
         Self { novice, experts, rule, keep, geometry, seats, n_tot: 0, n_net: 0, tau_hat_sum: 0.0 } // line 3
     }
 
@@ -169,8 +151,7 @@ fn at_seats<'a, 's, T>(of_episodes: &'a mut [T], seats: &'a [Seat<'s>]) -> Vec<(
 impl Fleet for Arbiter {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
         let first = decisions.len();
-        let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
-        let predictions = self.novice.as_mut().map(|novice| novice.answers(seats, &grids)); // line 5
+        let predictions = self.novice.as_mut().map(|novice| novice.answers(seats)); // line 5
         let expert_decisions = self.ask_experts(seats); // line 6
         let mut kept: Vec<Option<Sample>> = Vec::with_capacity(seats.len());
         for (index, (seat, expert)) in seats.iter().zip(expert_decisions).enumerate() {
