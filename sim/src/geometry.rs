@@ -178,3 +178,24 @@ pub fn rectangle(centre: Pose, length_m: f32, width_m: f32) -> [Vec2; 4] {
     let (l, w) = (0.5 * length_m, 0.5 * width_m);
     [Vec2::new(l, w), Vec2::new(-l, w), Vec2::new(-l, -w), Vec2::new(l, -w)].map(|p| world_from_body.point(p))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Culling is common to the sensor and to its brute-force check, so that only this test would see it go wrong.
+    #[test]
+    fn circles_that_overlap_are_all_found_and_no_others() {
+        let circles: Vec<(Vec2, f32)> = (0..21)
+            .map(|i| (Vec2::new((i * 7 % 13) as f32 - 6.0, (i * 5 % 11) as f32 - 5.0), 0.3 * (i % 4) as f32))
+            .collect();
+        let arranged: Circles = circles.iter().copied().collect();
+        for (x, y, radius_m) in [(0.0, 0.0, 3.1), (-6.0, -5.0, 0.7), (4.5, 2.2, 20.0), (30.0, 0.0, 1.0)] {
+            let place = Vec2::new(x, y);
+            let expected: Vec<usize> =
+                (0..21).filter(|&i| circles[i].0.distance(place) < radius_m + circles[i].1).collect();
+            assert_eq!(arranged.overlapping(place, radius_m).collect::<Vec<_>>(), expected, "{place} {radius_m}");
+        }
+        assert_eq!(Circles::default().overlapping(Vec2::ZERO, 9.0).count(), 0);
+    }
+}
