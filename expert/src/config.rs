@@ -57,8 +57,8 @@ pub struct BandConfig {
     pub gap_from_m: f32,
     /// … and it moves nearer where the band comes nearer than this.
     pub gap_to_m: f32,
-    /// The point lies this share of the open way ahead of the bumper: the knob for the speed (1.4 m/s on lot a at 1;
-    /// 1.3 gives 1.5).
+    /// The point lies this share of the open way ahead of the bumper: the paper's half "for safety reasons", which we
+    /// take from the point instead of the speed (see `SpeedLaw`), and the knob for the speed.
     pub reach_share: f32,
     /// … and at most this far ahead of the bumper, metres.
     pub reach_max_m: f32,
@@ -129,7 +129,7 @@ pub struct ExpertConfig {
     pub progress_share: f32,
 
     /// Where a plan's own arc is steered at (in corners): share of the free travel ahead of the bumper at which the
-    /// point lies (expert-findings.md 5.2).
+    /// point lies: half of the .8 of expert-findings.md 5.2, as `BandConfig::reach_share`.
     pub station_share: f32,
     /// Clearance of the point and of the way to it, metres (expert-findings.md 5.2).
     pub point_clearance_m: f32,
@@ -143,9 +143,9 @@ pub struct ExpertConfig {
     pub label_curvature_step_per_m: f32,
     /// … and largest sideways move it may cause at the last range, metres (expert-findings.md 5.5).
     pub label_sideways_step_m: f32,
-    /// Largest growth of a label's range per tick, metres (expert-findings.md 5.5).
+    /// Largest growth of a label's range per tick, metres: half of expert-findings.md 5.5, as the ranges are.
     pub label_advance_step_m: f32,
-    /// Largest drop of a label's range per tick, metres (expert-findings.md 5.5).
+    /// Largest drop of a label's range per tick, metres: half of expert-findings.md 5.5.
     pub label_retreat_step_m: f32,
 }
 
@@ -187,8 +187,8 @@ impl ExpertConfig {
                 aside_to_m: 1.5,
                 gap_from_m: 0.5,
                 gap_to_m: 0.9,
-                reach_share: 1.0,
-                reach_max_m: 9.3,
+                reach_share: 0.5,
+                reach_max_m: 4.65,
                 steer_m: 7.0,
                 steer_near_m: 2.7,
                 steer_bend_rad: 0.4,
@@ -199,14 +199,14 @@ impl ExpertConfig {
                 trust_from_m: 0.1,
             },
             progress_share: 0.3,
-            station_share: 0.8,
+            station_share: 0.4,
             point_clearance_m: 0.1,
             obstacle_ahead_m: 8.0,
             label_turn_max_rad: 0.8,
             label_curvature_step_per_m: 0.012,
             label_sideways_step_m: 0.5,
-            label_advance_step_m: 0.4,
-            label_retreat_step_m: 0.8,
+            label_advance_step_m: 0.2,
+            label_retreat_step_m: 0.4,
         }
     }
 }

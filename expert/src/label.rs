@@ -190,9 +190,9 @@ mod tests {
         let last = Label { curvature_per_m: 0.0, station_m: 6.0 };
         let wanted = Label { curvature_per_m: 0.2, station_m: 14.0 };
         let steadied = wanted.steadied(last, &config);
-        assert_eq!(steadied, Label { curvature_per_m: 0.012, station_m: 6.4 });
+        assert_eq!(steadied, Label { curvature_per_m: 0.012, station_m: 6.2 });
         let back = Label { curvature_per_m: -0.2, station_m: 4.0 }.steadied(wanted, &config);
-        assert!((back.station_m - 13.2).abs() < 1e-6);
+        assert!((back.station_m - 13.6).abs() < 1e-6);
         // 2 · 0.5 / 14² = .0051: half a metre sideways at 14 m.
         assert!((0.2 - back.curvature_per_m - 0.0051).abs() < 1e-4);
         assert_eq!(wanted.steadied(wanted, &config), wanted);

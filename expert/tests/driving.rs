@@ -108,10 +108,13 @@ fn a_blocked_lane_gives_a_near_point() {
         scenario.reference_path.points[1] = Vec2::new(3.0, 0.0);
         map(scenario)
     };
-    let open = answer(&short_route(Vec::new()), Pose::default(), 0.5);
-    let across = car(9.0, 0.0, std::f32::consts::FRAC_PI_2);
-    let blocked = answer(&short_route(vec![across]), Pose::default(), 0.5);
-    assert!(blocked.ahead_m < 7.5 && blocked.ahead_m < 0.6 * open.ahead_m, "{blocked:?}, open {open:?}");
+    let ahead_of_bumper_m = |obstacles| {
+        let point = answer(&short_route(obstacles), Pose::default(), 0.5);
+        point.ahead_m - VehicleParams::hyundai_hg300().front_m()
+    };
+    let open_m = ahead_of_bumper_m(Vec::new());
+    let blocked_m = ahead_of_bumper_m(vec![car(9.0, 0.0, std::f32::consts::FRAC_PI_2)]);
+    assert!(blocked_m < 2.0 && blocked_m < 0.4 * open_m, "{blocked_m} m, open {open_m} m");
 }
 
 #[test]

@@ -113,7 +113,7 @@ fn a_free_lane_is_driven_to_its_end() {
     assert_eq!(report.ending, Ending::ReachedEnd);
     assert_eq!((report.metrics.near_collisions, report.metrics.contacts, report.metrics.stuck), (0, 0, 0));
     assert!((report.metrics.driven_m - 50.0).abs() < 0.3, "{} m", report.metrics.driven_m);
-    // Ahead 16.3 m → a_y 12.5 m → law B saturates at 2.2 m/s.
+    // Ahead 16.3 m → a_y 12.5 m → law A saturates at 2.2 m/s.
     assert!((frames.last().unwrap().vehicle.speed_mps - 2.2).abs() < 0.02);
     assert_eq!(report.metrics.safe_ratio, 1.0);
     assert!((report.metrics.clearance_min_m - 3.0).abs() < 0.05); // 4.0 − 0.93, capped at 3
@@ -128,7 +128,7 @@ fn a_near_collision_is_counted_half_a_metre_before_the_obstacle() {
     // At 2.2 m/s the stop takes 2.2²/6 = 0.81 m, more than the 0.5 m left: a contact. At 1.0 m/s it takes 0.17 m.
     let (fast, _) = run(lane(60.0, vec![pillar.clone()]), (16.3, 0.0), config());
     assert_eq!((fast.metrics.near_collisions, fast.metrics.contacts), (1, 1), "{fast:?}");
-    let (report, frames) = run(lane(60.0, vec![pillar]), (8.28, 0.0), config());
+    let (report, frames) = run(lane(60.0, vec![pillar]), (6.04, 0.0), config());
     assert_eq!((report.metrics.near_collisions, report.metrics.contacts), (1, 0), "{report:?}");
     // A contact while braking is a clearance below zero.
     assert!(fast.metrics.clearance_min_m < 0.0, "{} m", fast.metrics.clearance_min_m);
