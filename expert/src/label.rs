@@ -66,7 +66,7 @@ pub(crate) struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    /// The point of an arc: as far as the way is free (the paper's third rule), and near where it is not, which is
+    /// The point of an arc: far where the way is free (the paper's third rule), and near where it is not, which is
     /// slow. `first_free_m` and `plan_free_m` are travels of the bumper.
     pub(crate) fn label_on(&self, curvature_per_m: f32, first_free_m: f32, plan_free_m: f32) -> Label {
         let point_free_m = self.drivable_station(curvature_per_m) - self.vehicle.front_m();

@@ -10,8 +10,8 @@
 //! - `search`: plans of two arcs each, forecast with the car's body and the speed of its steering (`rollout`); the best
 //!   one says whether, where and with how much clearance what is ahead can be avoided (rule two);
 //! - `band`: its way, pulled into the middle of the free space, which no longer depends on which plan it came from;
-//! - `label`: the point on that way, as far as the way is open (rule three) and drivable (rule one), and steadied from
-//!   tick to tick;
+//! - `label`: the point on that way, half as far as the way is open (rule three; the paper's half "for safety reasons",
+//!   see [`sim::controller::SpeedLaw`]) and drivable (rule one), and steadied from tick to tick;
 //! - `stats`: which rule it was.
 //!
 //! How the numbers came about is in methods.md 3 and expert-findings.md. The expert decides from the clean scene around
@@ -166,7 +166,7 @@ impl ScriptedExpert {
         }
 
         let (chosen, clearance_m, wish) = if let Some((level, plan)) = best {
-            // Rule three: on that arc, as far as possible.
+            // Rule three: on that arc, half as far as possible.
             let arc = ground.label_on(self.arcs.curvature_per_m(plan.first), plan.first_free_m, plan.free_m);
             let label = self.smoothed(&search, &ground, &plan, arc);
             let rule = match level {
@@ -190,8 +190,8 @@ impl ScriptedExpert {
         wish
     }
 
-    /// The label on the smoothed way: as far ahead as that is open, steering at the farthest point that it is safe to
-    /// steer at; in corners, and where pursuing the way is never safe, the plan's own arc.
+    /// The label on the smoothed way: half as far ahead as that is open, steering at the farthest point that it is safe
+    /// to steer at; in corners, and where pursuing the way is never safe, the plan's own arc.
     ///
     /// Every share falls to 0 gradually, so that a small change of the scene moves the label a little.
     fn smoothed(&self, search: &Search<'_>, ground: &Ground<'_>, plan: &Plan, arc: Label) -> Label {
