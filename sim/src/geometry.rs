@@ -80,17 +80,20 @@ impl WorldFromEgo {
     }
 }
 
-/// Many circles, arranged so that several are tested at once.
+/// Many circles, arranged so that several are tested at once. Neighbours in their order should be neighbours in the plane:
+/// circles that lie together are passed over together.
 #[derive(Debug, Clone, Default)]
 pub struct Circles {
     blocks: Vec<CircleBlock>,
 }
 
-/// Circles per block.
-const CIRCLES: usize = 8;
+/// Circles per block: as many as are tested at once.
+const CIRCLES: usize = 4;
 
 #[derive(Debug, Clone)]
 struct CircleBlock {
+    /// A circle around them all: centre, and radius in metres.
+    around: (Vec2, f32),
     xs: [f32; CIRCLES],
     ys: [f32; CIRCLES],
     radii_m: [f32; CIRCLES],
@@ -99,18 +102,21 @@ struct CircleBlock {
 impl Circles {
     /// Indices of the circles that overlap a circle, lowest first.
     pub fn overlapping(&self, centre: Vec2, radius_m: f32) -> impl Iterator<Item = usize> + '_ {
+        let may_overlap = move |block: &CircleBlock| {
+            let (around, around_m) = block.around;
+            around.distance_squared(centre) < (radius_m + around_m) * (radius_m + around_m)
+        };
         let overlap = move |block: &CircleBlock| {
-            let mut mask = 0;
-            for i in 0..CIRCLES {
+            mask(std::array::from_fn::<_, CIRCLES, _>(|i| {
                 let (x, y) = (block.xs[i] - centre.x, block.ys[i] - centre.y);
                 let reach_m = radius_m + block.radii_m[i];
-                mask |= u32::from(x * x + y * y < reach_m * reach_m) << i;
-            }
-            mask
+                x * x + y * y < reach_m * reach_m
+            }))
         };
         self.blocks
             .iter()
             .enumerate()
+            .filter(move |(_, block)| may_overlap(block))
             .flat_map(move |(i, block)| bits(overlap(block)).map(move |bit| i * CIRCLES + bit))
     }
 }
@@ -123,6 +129,7 @@ impl FromIterator<(Vec2, f32)> for Circles {
         let block = |chunk: &[(Vec2, f32)]| {
             let circle = |i: usize| *chunk.get(i).unwrap_or(&(Vec2::INFINITY, 0.0));
             CircleBlock {
+                around: around(chunk),
                 xs: std::array::from_fn(|i| circle(i).0.x),
                 ys: std::array::from_fn(|i| circle(i).0.y),
                 radii_m: std::array::from_fn(|i| circle(i).1),
@@ -130,6 +137,21 @@ impl FromIterator<(Vec2, f32)> for Circles {
         };
         Self { blocks: circles.chunks(CIRCLES).map(block).collect() }
     }
+}
+
+/// A circle around circles, given and returned as (centre, radius in metres).
+fn around(circles: &[(Vec2, f32)]) -> (Vec2, f32) {
+    /// Rounding of single precision, with a lot to spare, metres.
+    const ROUNDING_M: f32 = 1e-3;
+    let middle = circles.iter().map(|&(centre, _)| centre).sum::<Vec2>() / circles.len() as f32;
+    let reach_m = circles.iter().map(|&(centre, radius_m)| centre.distance(middle) + radius_m).fold(0.0, f32::max);
+    (middle, reach_m + ROUNDING_M)
+}
+
+/// Conditions as bits, bit = index.
+#[inline]
+pub(crate) fn mask<const N: usize>(conditions: [bool; N]) -> u32 {
+    (0..N).fold(0, |mask, i| mask | u32::from(conditions[i]) << i)
 }
 
 /// Indices of the set bits, lowest first.
@@ -197,5 +219,18 @@ mod tests {
             assert_eq!(arranged.overlapping(place, radius_m).collect::<Vec<_>>(), expected, "{place} {radius_m}");
         }
         assert_eq!(Circles::default().overlapping(Vec2::ZERO, 9.0).count(), 0);
+    }
+
+    /// Along a lane most are passed over together.
+    #[test]
+    fn circles_along_a_lane_are_found_from_anywhere_beside_it() {
+        let circle = |i: usize| (Vec2::new(2.4 * i as f32, (i % 2) as f32), 0.2 + 0.3 * (i % 5) as f32);
+        let arranged: Circles = (0..50).map(circle).collect();
+        for i in 0..400 {
+            let (place, radius_m) = (Vec2::new(0.31 * i as f32 - 2.0, (i % 7) as f32 - 3.0), 0.05 * (i % 60) as f32);
+            let expected: Vec<usize> =
+                (0..50).filter(|&i| circle(i).0.distance(place) < radius_m + circle(i).1).collect();
+            assert_eq!(arranged.overlapping(place, radius_m).collect::<Vec<_>>(), expected, "{place} {radius_m}");
+        }
     }
 }
