@@ -78,6 +78,83 @@ impl WorldFromEgo {
     pub fn inverse_point(&self, in_world: Vec2) -> Vec2 {
         Vec2::new(self.rotation.x, -self.rotation.y).rotate(in_world - self.translation)
     }
+
+    /// [`Self::inverse_point`] of every corner.
+    #[inline]
+    pub(crate) fn inverse_outline(&self, in_world: &Outline) -> Outline {
+        let (cos, sin) = (self.rotation.x, self.rotation.y);
+        let from_here = in_world.moved(-self.translation);
+        Outline {
+            xs: std::array::from_fn(|i| cos * from_here.xs[i] + sin * from_here.ys[i]),
+            ys: std::array::from_fn(|i| cos * from_here.ys[i] - sin * from_here.xs[i]),
+            ..from_here
+        }
+    }
+}
+
+/// Corners an [`Outline`] may have.
+const CORNERS: usize = 8;
+
+/// A polygon of 1 to 8 corners, arranged so that several corners are moved at once.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Outline {
+    xs: [f32; CORNERS],
+    ys: [f32; CORNERS],
+    /// Those beyond repeat the last one.
+    n_corners: usize,
+}
+
+impl Outline {
+    /// Number of its corners.
+    pub(crate) fn n_corners(&self) -> usize {
+        self.n_corners
+    }
+
+    /// One of its corners.
+    #[inline]
+    pub(crate) fn corner(&self, index: usize) -> Vec2 {
+        Vec2::new(self.xs[index], self.ys[index])
+    }
+
+    /// Each corner moved by the same vector.
+    #[inline]
+    #[must_use]
+    pub(crate) fn moved(&self, by: Vec2) -> Self {
+        Self { xs: self.xs.map(|x| x + by.x), ys: self.ys.map(|y| y + by.y), ..*self }
+    }
+
+    /// Smallest axis-aligned box around it: lowest and highest coordinates.
+    #[inline]
+    pub(crate) fn bounds(&self) -> (Vec2, Vec2) {
+        let lower = |a: f32, b: f32| if b < a { b } else { a };
+        let higher = |a: f32, b: f32| if b > a { b } else { a };
+        (
+            Vec2::new(reduce(&self.xs, lower), reduce(&self.ys, lower)),
+            Vec2::new(reduce(&self.xs, higher), reduce(&self.ys, higher)),
+        )
+    }
+}
+
+/// Joins eight numbers by halves, four at once first.
+#[inline]
+fn reduce(values: &[f32; CORNERS], join: impl Fn(f32, f32) -> f32) -> f32 {
+    let [a, b, c, d] = std::array::from_fn(|i| join(values[i], values[i + CORNERS / 2]));
+    join(join(a, c), join(b, d))
+}
+
+impl FromIterator<Vec2> for Outline {
+    /// # Panics
+    /// If there are no corners or more than 8.
+    fn from_iter<T: IntoIterator<Item = Vec2>>(corners: T) -> Self {
+        let corners: Vec<Vec2> = corners.into_iter().collect();
+        assert!((1..=CORNERS).contains(&corners.len()), "an outline of {} corners", corners.len());
+        let corner = |i: usize| corners[i.min(corners.len() - 1)];
+        Self {
+            xs: std::array::from_fn(|i| corner(i).x),
+            ys: std::array::from_fn(|i| corner(i).y),
+            n_corners: corners.len(),
+        }
+    }
 }
 
 /// Many circles, arranged so that several are tested at once. Neighbours in their order should be neighbours in the plane:
@@ -232,5 +309,16 @@ mod tests {
                 (0..50).filter(|&i| circle(i).0.distance(place) < radius_m + circle(i).1).collect();
             assert_eq!(arranged.overlapping(place, radius_m).collect::<Vec<_>>(), expected, "{place} {radius_m}");
         }
+    }
+
+    #[test]
+    fn an_outline_moves_like_its_corners() {
+        let corners = rectangle(Pose::new(Vec2::new(3.0, -7.0), 0.4), 4.7, 1.8);
+        let outline: Outline = corners.into_iter().collect();
+        let world_from_ego = Pose::new(Vec2::new(-1.5, 2.0), 2.1).world_from_ego();
+        let in_ego = world_from_ego.inverse_outline(&outline);
+        let expected = corners.map(|corner| world_from_ego.inverse_point(corner));
+        assert_eq!(std::array::from_fn(|i| in_ego.corner(i)), expected);
+        assert_eq!(in_ego.bounds(), crate::distance_field::bounds(&expected));
     }
 }

@@ -4,7 +4,7 @@
 
 use crate::collision::CollisionWorld;
 use crate::distance_field::DistanceField;
-use crate::geometry::{Circles, Pose, Vec2};
+use crate::geometry::{Circles, Outline, Pose, Vec2};
 use crate::path::Path;
 use crate::scenario::{Scenario, ScenarioError};
 use crate::validate::validate;
@@ -26,6 +26,8 @@ pub struct Map {
 pub struct Occluder {
     /// Convex outline in the world, counter-clockwise.
     pub outline: Vec<Vec2>,
+    /// The same, to be moved at once.
+    pub(crate) corners: Outline,
     /// Centre of a circle around the outline, world.
     pub centre: Vec2,
     /// Radius of that circle, metres.
@@ -66,7 +68,9 @@ impl Map {
             .map(|obstacle| {
                 let [length_m, width_m, height_m] = obstacle.size_m();
                 let centre = obstacle.centre().position();
-                Occluder { outline: obstacle.outline(), centre, radius_m: 0.5 * length_m.hypot(width_m), height_m }
+                let outline = obstacle.outline();
+                let corners = outline.iter().copied().collect();
+                Occluder { outline, corners, centre, radius_m: 0.5 * length_m.hypot(width_m), height_m }
             })
             .collect();
         let occluder_circles = occluders.iter().map(|occluder| (occluder.centre, occluder.radius_m)).collect();

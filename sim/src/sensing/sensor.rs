@@ -221,8 +221,7 @@ impl Sensor {
         let camera = Camera { ahead_m: self.config.camera_ahead_m, height_m: self.config.camera_height_m };
         let near = self.config.smear.then(|| map.occluders_near(ego.patch_centre, ego.patch_radius_m));
         near.into_iter().flatten().map(move |occluder| {
-            let outline = occluder.outline.iter().map(|&corner| ego.world_from_ego.inverse_point(corner));
-            TallThing::new(outline, occluder.height_m, camera)
+            TallThing::new(&ego.world_from_ego.inverse_outline(&occluder.corners), occluder.height_m, camera)
         })
     }
 

@@ -5,15 +5,13 @@
 
 use super::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid};
 use crate::distance_field::{floor, to_index};
-use crate::geometry::Vec2;
+use crate::geometry::{Outline, Vec2};
 use std::ops::Range;
 
 /// Longest smear, as a multiple of the range: from 2 m on it leaves the patch.
 const FACTOR_MAX: f32 = 12.0;
 /// Corners a polygon may have; an octagon's shadow has ten.
 const CORNERS_MAX: usize = 12;
-/// Corners of the outline of a tall thing.
-const OUTLINE_MAX: usize = 8;
 /// Things nearer than this ahead of the camera hide nothing, metres.
 const AHEAD_MIN_M: f32 = 0.05;
 
@@ -241,8 +239,7 @@ pub(super) struct Camera {
 /// A convex thing of some height, seen from the camera.
 pub(super) struct TallThing {
     /// Counter-clockwise; relative to the camera, ahead and left.
-    outline: [Vec2; OUTLINE_MAX],
-    n_corners: usize,
+    outline: Outline,
     /// How many times as far as the thing its smear reaches.
     factor: f32,
     camera: Vec2,
@@ -251,35 +248,30 @@ pub(super) struct TallThing {
 impl TallThing {
     /// `outline_in_ego`: convex and counter-clockwise.
     #[inline]
-    pub(super) fn new(outline_in_ego: impl Iterator<Item = Vec2>, height_m: f32, camera: Camera) -> Self {
+    pub(super) fn new(outline_in_ego: &Outline, height_m: f32, camera: Camera) -> Self {
         let factor = if height_m < camera.height_m {
             (camera.height_m / (camera.height_m - height_m)).min(FACTOR_MAX)
         } else {
             FACTOR_MAX
         };
-        let mut thing =
-            Self { outline: [Vec2::ZERO; OUTLINE_MAX], n_corners: 0, factor, camera: Vec2::new(camera.ahead_m, 0.0) };
-        for corner in outline_in_ego {
-            thing.outline[thing.n_corners] = corner - thing.camera;
-            thing.n_corners += 1;
-        }
-        thing
+        let camera = Vec2::new(camera.ahead_m, 0.0);
+        Self { outline: outline_in_ego.moved(-camera), factor, camera }
     }
 
     /// A box in the ego frame around the thing and the ground hidden behind it; `None` if it is beside or behind the
     /// camera.
     #[inline]
     pub(super) fn hidden_box(&self) -> Option<(Vec2, Vec2)> {
-        let (low, high) = crate::distance_field::bounds(&self.outline[..self.n_corners]);
+        let (low, high) = self.outline.bounds();
         let is_ahead = low.x > AHEAD_MIN_M;
         is_ahead.then(|| (self.camera + low.min(low * self.factor), self.camera + high.max(high * self.factor)))
     }
 
     /// The ground hidden behind it, without the thing itself; `None` if it is beside or behind the camera.
     pub(super) fn hidden_ground(&self) -> Option<ConvexInEgo> {
-        let n = self.n_corners;
-        let from_camera = |i: usize| self.outline[i % n];
-        if self.outline[..n].iter().any(|corner| corner.x <= AHEAD_MIN_M) {
+        let n = self.outline.n_corners();
+        let from_camera = |i: usize| self.outline.corner(i % n);
+        if self.outline.bounds().0.x <= AHEAD_MIN_M {
             return None;
         }
         // Edge a→b of a counter-clockwise outline faces the camera if the camera lies to its right.
@@ -300,7 +292,7 @@ mod tests {
     const CAMERA: Camera = Camera { ahead_m: 1.59, height_m: 1.55 };
 
     fn hidden_ground(outline: &[Vec2], height_m: f32, camera: Camera) -> Option<ConvexInEgo> {
-        TallThing::new(outline.iter().copied(), height_m, camera).hidden_ground()
+        TallThing::new(&outline.iter().copied().collect(), height_m, camera).hidden_ground()
     }
 
     fn box_ahead() -> [Vec2; 4] {
