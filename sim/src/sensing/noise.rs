@@ -153,7 +153,6 @@ impl Layer {
 pub(super) struct Patch {
     pub(super) layer: Layer,
     pub(super) region: Region,
-    pub(super) reads: Reads,
     period_ticks: u32,
     phase_ticks: u32,
     life_ticks: u32,
@@ -164,6 +163,27 @@ pub(super) struct Patch {
 pub(super) enum Reads {
     Occupied,
     Free,
+}
+
+/// Patches that look the same.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Patches {
+    patches: Vec<Patch>,
+    /// Circles around them, in their order.
+    circles: Circles,
+}
+
+impl Patches {
+    /// To be called after the last patch is added.
+    fn arrange(&mut self) {
+        self.circles = self.patches.iter().map(|patch| (patch.region.centre, patch.region.radius_m)).collect();
+    }
+
+    /// Those whose circle overlaps a circle of the world and that are alive at a tick.
+    pub(super) fn near(&self, centre: Vec2, radius_m: f32, tick: u32) -> impl Iterator<Item = &Patch> {
+        let near = self.circles.overlapping(centre, radius_m).map(|index| &self.patches[index]);
+        near.filter(move |patch| patch.is_alive(tick))
+    }
 }
 
 /// A convex polygon in the world with a circle around it.
@@ -183,8 +203,8 @@ impl Region {
 }
 
 impl Patch {
-    fn lasting(layer: Layer, polygon: Vec<Vec2>, reads: Reads) -> Self {
-        Self { layer, region: Region::new(polygon), reads, period_ticks: 1, phase_ticks: 0, life_ticks: 1 }
+    fn lasting(layer: Layer, polygon: Vec<Vec2>) -> Self {
+        Self { layer, region: Region::new(polygon), period_ticks: 1, phase_ticks: 0, life_ticks: 1 }
     }
 
     pub(super) fn is_alive(&self, tick: u32) -> bool {
@@ -263,10 +283,17 @@ impl Shadow {
 
     #[inline]
     fn index(&self, point: Vec2) -> usize {
+        let (row, col) = self.cell(point);
+        row * self.cols + col
+    }
+
+    /// Row and column of the raster cell around a point, or of the nearest one.
+    #[inline]
+    fn cell(&self, point: Vec2) -> (usize, usize) {
         let cell = (point - self.origin) * (1.0 / SHADOW_CELL_M) + Vec2::splat(0.5);
         let col = (cell.x.max(0.0) as i32 as usize).min(self.cols - 1);
         let row = (cell.y.max(0.0) as i32 as usize).min(self.rows - 1);
-        row * self.cols + col
+        (row, col)
     }
 }
 
@@ -277,9 +304,8 @@ pub struct NoiseField {
     wobble: f32,
     flicker: f32,
     dropout: f32,
-    pub(super) patches: Vec<Patch>,
-    /// Circles around the patches, in their order.
-    pub(super) patch_circles: Circles,
+    misread_as_occupied: Patches,
+    misread_as_free: Patches,
     pub(super) shadows: Vec<Shadow>,
 }
 
@@ -292,8 +318,8 @@ impl NoiseField {
             wobble: amount(config.boundary),
             flicker: amount(config.flicker),
             dropout: amount(config.dropout),
-            patches: Vec::new(),
-            patch_circles: Circles::default(),
+            misread_as_occupied: Patches::default(),
+            misread_as_free: Patches::default(),
             shadows: Vec::new(),
         };
         // One stream per layer: strengthening one layer never moves another.
@@ -303,18 +329,26 @@ impl NoiseField {
         field.open_boundaries(map, amount(config.false_free), &mut rng(2));
         field.scatter_blobs(map, amount(config.blob), &mut rng(3));
         field.spill_stains(map, amount(config.stain), &mut rng(4));
-        field.patch_circles = field.patches.iter().map(|patch| (patch.region.centre, patch.region.radius_m)).collect();
+        field.misread_as_occupied.arrange();
+        field.misread_as_free.arrange();
         field
     }
 
-    /// The boundary wobble within a circle of the world at a tick.
-    pub(super) fn boundary_shift(&self, centre: Vec2, radius_m: f32, tick: u32) -> BoundaryShift {
+    /// The patches that look like something.
+    pub(super) fn patches(&self, reads: Reads) -> &Patches {
+        match reads {
+            Reads::Occupied => &self.misread_as_occupied,
+            Reads::Free => &self.misread_as_free,
+        }
+    }
+
+    /// The boundary wobble, not yet looked at anywhere.
+    pub(super) fn boundary_shift(&self) -> BoundaryShift {
         let (static_m, static_corr_m) = WOBBLE_STATIC;
         let (moving_m, moving_corr_m) = WOBBLE_MOVING;
-        let time = tick as f32 / WOBBLE_TICKS;
         BoundaryShift {
-            lasting: Lattice::new(self.seed, static_corr_m, self.wobble * static_m, centre, radius_m, 0.0),
-            moving: Lattice::new(self.seed ^ 7, moving_corr_m, self.wobble * moving_m, centre, radius_m, time),
+            lasting: Lattice::new(self.seed, static_corr_m, self.wobble * static_m),
+            moving: Lattice::new(self.seed ^ 7, moving_corr_m, self.wobble * moving_m),
         }
     }
 
@@ -381,7 +415,7 @@ impl NoiseField {
                     let pose = Pose::new(centre.world_from_ego().point(middle), centre.heading_rad);
                     if is_misread && !is_gap {
                         let strip = crate::geometry::rectangle(pose, thickness_m, piece_m);
-                        self.patches.push(Patch::lasting(Layer::SpeedBump, strip.to_vec(), Reads::Occupied));
+                        self.misread_as_occupied.patches.push(Patch::lasting(Layer::SpeedBump, strip.to_vec()));
                     }
                 }
             }
@@ -404,7 +438,7 @@ impl NoiseField {
                 let corners = [(-0.5, near_m), (0.5, near_m), (0.35, far_m), (-0.35, far_m)];
                 let polygon = corners.map(|(along, y_m)| point(along * share * length_m, y_m)).to_vec();
                 if is_empty_ground(map, &polygon) {
-                    self.patches.push(Patch::lasting(Layer::FalseFree, polygon, Reads::Free));
+                    self.misread_as_free.patches.push(Patch::lasting(Layer::FalseFree, polygon));
                     return;
                 }
             }
@@ -426,12 +460,13 @@ impl NoiseField {
                 .map(|k| std::f32::consts::TAU * (k as f32 + turn) / corners as f32)
                 .map(|angle_rad| centre + 0.5 * size_m * Vec2::from_angle(angle_rad))
                 .collect();
-            let reads = if rng.random::<f32>() < 0.8 { Reads::Occupied } else { Reads::Free };
+            let is_occupied = rng.random::<f32>() < 0.8;
             let life_ticks = rng.random_range(40..80);
             let period_ticks = (life_ticks as f32 * BLOB_PERIODS) as u32;
             let phase_ticks = rng.random_range(0..period_ticks);
-            let lasting = Patch::lasting(Layer::Blob, polygon, reads);
-            self.patches.push(Patch { period_ticks, phase_ticks, life_ticks, ..lasting });
+            let patches = if is_occupied { &mut self.misread_as_occupied } else { &mut self.misread_as_free };
+            let lasting = Patch::lasting(Layer::Blob, polygon);
+            patches.patches.push(Patch { period_ticks, phase_ticks, life_ticks, ..lasting });
         });
     }
 
@@ -444,7 +479,7 @@ impl NoiseField {
             let heading_rad = place.pose.heading_rad + rng.random_range(-0.6..0.6);
             let (length_m, width_m) = (rng.random_range(0.8..2.0), rng.random_range(0.1..0.2));
             let stroke = crate::geometry::rectangle(Pose::new(centre, heading_rad), length_m, width_m);
-            self.patches.push(Patch::lasting(Layer::Stain, stroke.to_vec(), Reads::Occupied));
+            self.misread_as_occupied.patches.push(Patch::lasting(Layer::Stain, stroke.to_vec()));
         });
     }
 }
@@ -466,13 +501,20 @@ fn is_empty_ground(map: &Map, polygon: &[Vec2]) -> bool {
     })
 }
 
-/// The boundary wobble around one view.
+/// The boundary wobble around one view. It remembers what it drew, so that the next view near by finds most of it drawn.
+#[derive(Debug, Clone)]
 pub(super) struct BoundaryShift {
     lasting: Lattice,
     moving: Lattice,
 }
 
 impl BoundaryShift {
+    /// Turns to a circle of the world at a tick; [`Self::at_each`] answers inside of it.
+    pub(super) fn look_at(&mut self, centre: Vec2, radius_m: f32, tick: u32) {
+        self.lasting.look_at(centre, radius_m, 0.0);
+        self.moving.look_at(centre, radius_m, tick as f32 / WOBBLE_TICKS);
+    }
+
     /// Shifts of the signed distance at the places (`xs[i]`, `ys[i]`), metres. `growth`: [`wobble_growth`] there.
     #[inline]
     pub(super) fn at_each<const N: usize>(&mut self, xs: &[f32; N], ys: &[f32; N], growth: &[f32; N]) -> [f32; N] {
@@ -490,36 +532,66 @@ pub(super) fn wobble_growth(ahead_of_patch_m: f32) -> f32 {
 /// Nodes per side of a [`Lattice`]: the patch's diagonal at 1 m spacing and one more on either side.
 const LATTICE_NODES: usize = 20;
 
-/// Value noise around a place at one instant. A node is hashed when it is first needed: of the hundreds in sight few
-/// lie beside a boundary.
+/// Cells of a [`Lattice`], each between a node and the next ones to the right and above; row by row.
+const LATTICE_CELLS: usize = LATTICE_NODES * LATTICE_NODES;
+
+/// Value noise around a place at one instant. Of the hundreds of cells in sight few lie beside a boundary, so that a cell is
+/// drawn when it is first needed.
+#[derive(Debug, Clone)]
 struct Lattice {
-    origin: Vec2,
+    seed: u64,
+    spacing_m: f32,
     per_m: f32,
-    /// Row by row; not a number where nothing is drawn yet.
-    nodes: [f32; LATTICE_NODES * LATTICE_NODES],
-    /// Whether a node and the next ones to the right, above and above that are drawn.
-    is_drawn: [bool; LATTICE_NODES * LATTICE_NODES],
     amplitude: f32,
-    /// Indices of the first node.
-    first: (i32, i32),
-    /// Keys of this tick of the noise and of the next.
-    keys: [u64; 2],
-    /// Progress from this tick of the noise to the next, faded, 0…1.
+    view: LatticeView,
+    /// World position of the first node.
+    origin: Vec2,
+    /// Of the even and of the odd ticks of the noise, one of them the last and one the next.
+    draws: [LatticeDraws; 2],
+    /// In each cell the near left node and the step to its right neighbour, then the same of the far nodes.
+    cells: Box<[[f32; 4]; LATTICE_CELLS]>,
+    /// Which of the cells are drawn for this view.
+    is_drawn: [bool; LATTICE_CELLS],
+}
+
+/// What the cells of a [`Lattice`] depend on: where it lies and when.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct LatticeView {
+    /// Indices of the first node, whole numbers.
+    first: Vec2,
+    /// Last tick of the noise.
+    tick: i32,
+    /// Progress from this tick to the next, faded, 0…1.
     phase: f32,
 }
 
 impl Lattice {
-    fn new(seed: u64, spacing_m: f32, amplitude: f32, centre: Vec2, radius_m: f32, time: f32) -> Self {
-        let first = ((centre - Vec2::splat(radius_m)) / spacing_m).floor();
+    fn new(seed: u64, spacing_m: f32, amplitude: f32) -> Self {
         Self {
-            origin: first * spacing_m,
+            seed,
+            spacing_m,
             per_m: 1.0 / spacing_m,
-            nodes: [f32::NAN; LATTICE_NODES * LATTICE_NODES],
-            is_drawn: [false; LATTICE_NODES * LATTICE_NODES],
             amplitude,
-            first: (first.x as i32, first.y as i32),
-            keys: [time as i32, time as i32 + 1].map(|tick| key(seed, tick)),
-            phase: fade(time.fract()),
+            origin: Vec2::NAN,
+            // Equal to none.
+            view: LatticeView { first: Vec2::NAN, tick: 0, phase: 0.0 },
+            draws: std::array::from_fn(|_| LatticeDraws::new()),
+            cells: Box::new([[f32::NAN; 4]; LATTICE_CELLS]),
+            is_drawn: [false; LATTICE_CELLS],
+        }
+    }
+
+    /// Turns to a circle of the world at a time, in ticks of the noise; what is drawn stays if it is the same as before.
+    fn look_at(&mut self, centre: Vec2, radius_m: f32, time: f32) {
+        let first = ((centre - Vec2::splat(radius_m)) / self.spacing_m).floor();
+        let view = LatticeView { first, tick: time as i32, phase: fade(time.fract()) };
+        if view == self.view {
+            return;
+        }
+        (self.view, self.origin) = (view, first * self.spacing_m);
+        self.is_drawn.fill(false);
+        for tick in [view.tick, view.tick + 1] {
+            self.draws[parity(tick)].look_at(first, key(self.seed, tick));
         }
     }
 
@@ -529,54 +601,99 @@ impl Lattice {
         if self.amplitude == 0.0 {
             return [0.0; N];
         }
-        let (mut cells, mut fxs, mut fys) = ([0; N], [0.0; N], [0.0; N]);
+        let (mut indices, mut fxs, mut fys) = ([0; N], [0.0; N], [0.0; N]);
         for i in 0..N {
             let (col, fx) = lattice_cell((xs[i] - self.origin.x) * self.per_m);
             let (row, fy) = lattice_cell((ys[i] - self.origin.y) * self.per_m);
             (fxs[i], fys[i]) = (fx, fy);
             // As numbers, because whole ones are not multiplied four at once.
-            cells[i] = to_index(row * LATTICE_NODES as f32 + col);
+            indices[i] = to_index(row * LATTICE_NODES as f32 + col);
         }
-        // The four nodes around each place, near and far pair.
-        let (mut near, mut far) = ([[0.0; 2]; N], [[0.0; 2]; N]);
-        for i in 0..N {
-            let base = cells[i] as usize;
-            if !self.is_drawn[base] {
-                self.draw_around(base);
-            }
-            let nodes = &self.nodes[base..base + LATTICE_NODES + 2];
-            near[i] = [nodes[0], nodes[1]];
-            far[i] = [nodes[LATTICE_NODES], nodes[LATTICE_NODES + 1]];
+        if !indices.iter().fold(true, |are_drawn, &index| are_drawn & self.is_drawn[index as usize]) {
+            self.draw(&indices);
         }
+        let cells = indices.map(|index| self.cells[index as usize]);
         std::array::from_fn(|i| {
-            let [near, far] = [near[i], far[i]].map(|[left, right]| left + fxs[i] * (right - left));
+            let [near_left, near_step, far_left, far_step] = cells[i];
+            let (near, far) = (near_left + fxs[i] * near_step, far_left + fxs[i] * far_step);
             near + fys[i] * (far - near)
         })
     }
 
-    /// Draws those of the four nodes around a cell of the lattice that are not drawn yet. `base`: index of the first.
+    /// Draws those of some cells that are not drawn yet.
     #[inline(never)]
-    fn draw_around(&mut self, base: usize) {
-        self.draw_once(base);
-        self.draw_once(base + 1);
-        self.draw_once(base + LATTICE_NODES);
-        self.draw_once(base + LATTICE_NODES + 1);
-        self.is_drawn[base] = true;
-    }
-
-    #[inline]
-    fn draw_once(&mut self, node: usize) {
-        if self.nodes[node].is_nan() {
-            self.nodes[node] = self.draw(node as i32 / LATTICE_NODES as i32, node as i32 % LATTICE_NODES as i32);
+    fn draw(&mut self, indices: &[u32]) {
+        for &index in indices {
+            let index = index as usize;
+            if !self.is_drawn[index] {
+                self.cells[index] = self.cell(index);
+                self.is_drawn[index] = true;
+            }
         }
     }
 
+    fn cell(&mut self, index: usize) -> [f32; 4] {
+        let LatticeView { tick, phase, .. } = self.view;
+        let mut nodes = self.draws[parity(tick)].around(index);
+        if phase != 0.0 {
+            let next = self.draws[parity(tick + 1)].around(index);
+            nodes = std::array::from_fn(|i| nodes[i] * (1.0 - phase) + next[i] * phase);
+        }
+        let [near_left, near_right, far_left, far_right] =
+            nodes.map(|node| self.amplitude * (2.0 * node - 1.0) * VALUE_NOISE_MAX);
+        [near_left, near_right - near_left, far_left, far_right - far_left]
+    }
+}
+
+/// 0 for even ticks, 1 for odd ones.
+fn parity(tick: i32) -> usize {
+    (tick & 1) as usize
+}
+
+/// What the cells of a [`Lattice`] draw at one tick of the noise. Several ticks of the simulation make one of the noise.
+#[derive(Debug, Clone)]
+struct LatticeDraws {
+    /// Indices of the first node, whole numbers.
+    first: Vec2,
+    /// Of the seed and the tick.
+    key: u64,
+    /// Uniform numbers in [0, 1) at the four nodes around each cell: near left, near right, far left, far right.
+    nodes: Box<[[f32; 4]; LATTICE_CELLS]>,
+    is_drawn: [bool; LATTICE_CELLS],
+}
+
+impl LatticeDraws {
+    fn new() -> Self {
+        Self {
+            first: Vec2::NAN,
+            key: 0,
+            nodes: Box::new([[f32::NAN; 4]; LATTICE_CELLS]),
+            is_drawn: [false; LATTICE_CELLS],
+        }
+    }
+
+    /// Turns to a place and a tick; what is drawn stays if they are the same as before.
+    fn look_at(&mut self, first: Vec2, key: u64) {
+        if (first, key) != (self.first, self.key) {
+            (self.first, self.key) = (first, key);
+            self.is_drawn.fill(false);
+        }
+    }
+
+    #[inline]
+    fn around(&mut self, cell: usize) -> [f32; 4] {
+        if !self.is_drawn[cell] {
+            self.draw(cell);
+        }
+        self.nodes[cell]
+    }
+
     #[inline(never)]
-    fn draw(&self, row: i32, col: i32) -> f32 {
-        let at = |key: u64| unit(mix(key, self.first.0 + col, self.first.1 + row));
-        let [now, next] = self.keys;
-        let now = if self.phase == 0.0 { at(now) } else { at(now) * (1.0 - self.phase) + at(next) * self.phase };
-        self.amplitude * (2.0 * now - 1.0) * VALUE_NOISE_MAX
+    fn draw(&mut self, cell: usize) {
+        let x = self.first.x as i32 + (cell % LATTICE_NODES) as i32;
+        let y = self.first.y as i32 + (cell / LATTICE_NODES) as i32;
+        self.nodes[cell] = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| unit(mix(self.key, x, y)));
+        self.is_drawn[cell] = true;
     }
 }
 
@@ -657,6 +774,7 @@ fn value_noise(seed: u64, place: Vec2, time: f32) -> f32 {
 }
 
 /// Uniform in [0, 1).
+#[inline]
 fn unit(bits: u32) -> f32 {
     (bits >> 8) as f32 / (1 << 24) as f32
 }

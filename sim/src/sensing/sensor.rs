@@ -4,7 +4,7 @@ mod inspect;
 
 pub use inspect::Inspection;
 
-use super::noise::{NoiseConfig, NoiseField, Patch, Reads, Region, Shadow, wobble_growth};
+use super::noise::{BoundaryShift, NoiseConfig, NoiseField, Patch, Reads, Region, Shadow, wobble_growth};
 use super::quadtree::{PixelLattice, ROW_LANES, to_corner_m};
 use super::smear::{Camera, CellBox, ConvexInEgo, TallThing, bits_between};
 use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
@@ -41,14 +41,21 @@ impl SensingConfig {
 pub struct Sensor {
     config: SensingConfig,
     noise: NoiseField,
+    /// The noise's boundary wobble, with what was drawn of it for the last view.
+    shift: BoundaryShift,
+    /// How much larger the wobble is in each row of cells than at the patch's lower edge.
+    wobble_growth: [f32; GRID_CELLS],
     last: Option<Observation>,
 }
 
 impl Sensor {
     /// A sensor whose noise is drawn from `seed`.
     pub fn new(map: &Map, config: SensingConfig, noise: &NoiseConfig, seed: RootSeed) -> Self {
-        let cell_radius_m = to_corner_m(config.geometry.pixel_m(), CELL_PIXELS);
-        Self { config, noise: NoiseField::new(map, noise, seed, cell_radius_m), last: None }
+        let geometry = &config.geometry;
+        let noise = NoiseField::new(map, noise, seed, to_corner_m(geometry.pixel_m(), CELL_PIXELS));
+        let ahead_of_patch_m = |row: usize| geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m;
+        let wobble_growth = std::array::from_fn(|row| wobble_growth(ahead_of_patch_m(row)));
+        Self { shift: noise.boundary_shift(), wobble_growth, config, noise, last: None }
     }
 
     /// What the car perceives from a pose at a tick.
@@ -62,7 +69,7 @@ impl Sensor {
     }
 
     /// The perceived grid, without ever computing all 40 000 pixels.
-    fn perceive_grid(&self, map: &Map, pose: Pose, tick: u32) -> OccupancyGrid {
+    fn perceive_grid(&mut self, map: &Map, pose: Pose, tick: u32) -> OccupancyGrid {
         let ego = EgoView::new(&self.config.geometry, pose);
         let mut grid = self.beyond_boundaries(map, &ego, tick);
         self.hide_ground(map, &ego, &mut grid);
@@ -74,7 +81,7 @@ impl Sensor {
     }
 
     /// The cells that hold a pixel beyond a boundary, as shifted and opened by noise.
-    fn beyond_boundaries(&self, map: &Map, ego: &EgoView, tick: u32) -> OccupancyGrid {
+    fn beyond_boundaries(&mut self, map: &Map, ego: &EgoView, tick: u32) -> OccupancyGrid {
         let (geometry, field) = (&self.config.geometry, map.distance_field());
         let openings = self.openings(ego, tick);
         let within_cell_m = change_max_m(to_corner_m(geometry.pixel_m(), CELL_PIXELS));
@@ -83,17 +90,17 @@ impl Sensor {
         for row in 0..GRID_CELLS {
             let centres_m = ego.lattice.nearest_nodes_of_row(field, row);
             // A cell whose centre is this far from a boundary is decided without looking at the noise.
-            let sure_m = self.noise.boundary_shift_max_m(self.wobble_growth(row)) + within_cell_m;
+            let sure_m = self.noise.boundary_shift_max_m(self.wobble_growth[row]) + within_cell_m;
             let (is_sure, is_beyond) = sides(&centres_m, sure_m);
             let opened = openings.as_ref().map_or(0, |opened| opened.touched_cells(row));
             grid.occupy_row(row, is_beyond & !opened);
             unsure.push_row(row, !is_sure | (is_beyond & opened), &centres_m);
         }
-        let mut shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
+        self.shift.look_at(ego.patch_centre, ego.patch_radius_m, tick);
         for cells in unsure.fours() {
             let (xs, ys) = ego.lattice.cell_centres(&cells.rows, &cells.cols);
-            let growth = cells.rows.map(|row| self.wobble_growth(row as usize));
-            let thresholds_m = shift.at_each(&xs, &ys, &growth).map(|shift_m| -shift_m);
+            let growth = cells.rows.map(|row| self.wobble_growth[row as usize]);
+            let thresholds_m = self.shift.at_each(&xs, &ys, &growth).map(|shift_m| -shift_m);
             let (is_above, is_below) = ego.lattice.are_decided(&cells.centres_m, &thresholds_m);
             for i in bits(!is_above & 0b1111) {
                 let (row, col) = (cells.rows[i], cells.cols[i]);
@@ -107,12 +114,6 @@ impl Sensor {
             }
         }
         grid
-    }
-
-    /// How much larger the boundary wobble is in a row of cells than at the patch's lower edge.
-    fn wobble_growth(&self, row: usize) -> f32 {
-        let geometry = &self.config.geometry;
-        wobble_growth(geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m)
     }
 
     /// Marks the cells of which tall things hide a pixel.
@@ -173,12 +174,13 @@ impl Sensor {
                 }
             });
         });
-        let mut shift = self.noise.boundary_shift(ego.patch_centre, ego.patch_radius_m, tick);
+        let mut shift = self.noise.boundary_shift();
+        shift.look_at(ego.patch_centre, ego.patch_radius_m, tick);
         let shifts_m: Vec<f32> = (0..GRID_CELLS * GRID_CELLS)
             .map(|cell| {
                 let (row, col) = (cell / GRID_CELLS, cell % GRID_CELLS);
                 let centre = ego.lattice.cell_centre(row, col);
-                let [shift_m] = shift.at_each(&[centre.x], &[centre.y], &[self.wobble_growth(row)]);
+                let [shift_m] = shift.at_each(&[centre.x], &[centre.y], &[self.wobble_growth[row]]);
                 shift_m
             })
             .collect();
@@ -226,13 +228,11 @@ impl Sensor {
     }
 
     fn patches<'a>(&'a self, ego: &'a EgoView, tick: u32, reads: Reads) -> impl Iterator<Item = ConvexInEgo> + 'a {
-        let visible = self.visible_patches(ego, tick).filter(move |patch| patch.reads == reads);
-        visible.map(|patch| ego.polygon(&patch.region))
+        self.visible_patches(ego, tick, reads).map(|patch| ego.polygon(&patch.region))
     }
 
-    fn visible_patches<'a>(&'a self, ego: &'a EgoView, tick: u32) -> impl Iterator<Item = &'a Patch> + 'a {
-        let near = self.noise.patch_circles.overlapping(ego.patch_centre, ego.patch_radius_m);
-        near.map(|index| &self.noise.patches[index]).filter(move |patch| patch.is_alive(tick))
+    fn visible_patches(&self, ego: &EgoView, tick: u32, reads: Reads) -> impl Iterator<Item = &Patch> {
+        self.noise.patches(reads).near(ego.patch_centre, ego.patch_radius_m, tick)
     }
 
     /// Ground that is taken for road although it is not; `None` if there is none in sight.

@@ -96,14 +96,12 @@ impl Sensor {
         let ego = EgoView::new(geometry, pose);
         let mut claims =
             Claims { occupied: vec![None; BEV_PIXELS * BEV_PIXELS], free: vec![None; BEV_PIXELS * BEV_PIXELS] };
-        for patch in self.visible_patches(&ego, tick) {
-            let into = match patch.reads {
-                Reads::Occupied => &mut claims.occupied,
-                Reads::Free => &mut claims.free,
-            };
-            ego.polygon(&patch.region).for_each_row(geometry, |row, first, last| {
-                into[row * BEV_PIXELS + first..=row * BEV_PIXELS + last].fill(Some(patch.layer));
-            });
+        for (reads, into) in [(Reads::Occupied, &mut claims.occupied), (Reads::Free, &mut claims.free)] {
+            for patch in self.visible_patches(&ego, tick, reads) {
+                ego.polygon(&patch.region).for_each_row(geometry, |row, first, last| {
+                    into[row * BEV_PIXELS + first..=row * BEV_PIXELS + last].fill(Some(patch.layer));
+                });
+            }
         }
         if let Some(flicker) = self.flicker(tick) {
             flicker.for_each_row(geometry, |row, first, last| {
