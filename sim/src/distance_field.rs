@@ -135,16 +135,17 @@ impl DistanceField {
         std::array::from_fn(|i| self.values_m[nodes[i] as usize])
     }
 
-    /// [`Self::at_nearest_nodes`] of as many points as there is room for in `values_m`, a multiple of 4 up to 32.
+    /// [`Self::at_nearest_nodes`] at the points `start` + (`xs[i]`, `ys[i]`): as many as there is room for in `values_m`, a
+    /// multiple of 4 up to 32.
     // Not inlined: on its own and of unknown length, the first loop is compiled to instructions that take four points.
     #[inline(never)]
-    pub fn at_many_nearest_nodes(&self, xs: &[f32], ys: &[f32], values_m: &mut [f32]) {
+    pub fn at_many_nearest_nodes(&self, start: Vec2, xs: &[f32], ys: &[f32], values_m: &mut [f32]) {
         let (last_x, last_y) = (count(self.cols - 1), count(self.rows - 1));
         let stride = self.cols as u32;
         let mut nodes = [0; 32];
         for ((node, &x), &y) in nodes.iter_mut().zip(xs).zip(ys) {
-            let x = clamp_to_raster((x - self.origin.x) * (1.0 / NODE_M), last_x);
-            let y = clamp_to_raster((y - self.origin.y) * (1.0 / NODE_M), last_y);
+            let x = clamp_to_raster((start.x + x - self.origin.x) * (1.0 / NODE_M), last_x);
+            let y = clamp_to_raster((start.y + y - self.origin.y) * (1.0 / NODE_M), last_y);
             *node = to_nearest_index(y) * stride + to_nearest_index(x);
         }
         for (four_m, nodes) in values_m.as_chunks_mut::<4>().0.iter_mut().zip(nodes.as_chunks::<4>().0) {
@@ -172,15 +173,12 @@ impl DistanceField {
         let [(first_col, first_row), (last_col, last_row)] =
             [low_cell, high_cell].map(|cell| (to_index(cell.x) as usize, to_index(cell.y) as usize));
         let nodes_m = |row: usize| self.values_m[row * self.cols + first_col..].first_chunk::<LANES>();
-        // Along the lower and the upper side.
-        let side = |row: usize, share: f32| {
-            let (near_m, far_m) = (nodes_m(row)?, nodes_m(row + 1)?);
-            Some(std::array::from_fn::<f32, LANES, _>(|i| near_m[i] + share * (far_m[i] - near_m[i])))
-        };
-        let (Some(mut lowest_m), Some(upper_m)) = (side(first_row, into_low.y), side(last_row, into_high.y)) else {
+        let around_sides = (nodes_m(first_row), nodes_m(first_row + 1), nodes_m(last_row), nodes_m(last_row + 1));
+        let (Some(below_lower), Some(above_lower), Some(below_upper), Some(above_upper)) = around_sides else {
             return f32::NEG_INFINITY;
         };
-        lower_each(&mut lowest_m, &upper_m);
+        let mut lowest_m = mixed(below_lower, above_lower, into_low.y);
+        lower_each(&mut lowest_m, &mixed(below_upper, above_upper, into_high.y));
         for row in first_row + 1..=last_row {
             let Some(nodes_m) = nodes_m(row) else { return f32::NEG_INFINITY };
             lower_each(&mut lowest_m, nodes_m);
@@ -244,6 +242,12 @@ impl DistanceField {
 #[inline]
 fn count(nodes: usize) -> f32 {
     nodes as i32 as f32
+}
+
+/// Each value moved by a share of the way to the other one.
+#[inline]
+fn mixed<const N: usize>(values: &[f32; N], others: &[f32; N], share: f32) -> [f32; N] {
+    std::array::from_fn(|i| values[i] + share * (others[i] - values[i]))
 }
 
 /// Lowers each value to the other one.

@@ -50,6 +50,26 @@ fn the_fast_grid_is_the_max_pool_of_the_brute_force_view() {
     }
 }
 
+/// Cells may be open altogether through several openings that overlap.
+#[test]
+fn the_fast_grid_is_the_max_pool_where_openings_overlap() {
+    let map = lane();
+    let mut n_open_more = 0;
+    for seed in 0..3 {
+        let noise = NoiseConfig { false_free: 8.0, dropout: 0.0, ..NoiseConfig::of(NoiseLevel::Paper) };
+        let mut sensor = Sensor::new(&map, SensingConfig::paper(), &noise, RootSeed(seed));
+        for i in 0..120_u32 {
+            let pose = Pose::new(Vec2::new(i as f32 * 0.5, (i as f32 * 0.37).sin()), (i as f32 * 0.21).sin() * 0.9);
+            let fast = sensor.observe(&map, pose, i).grid;
+            let brute = sensor.perceived_view(&map, pose, i).to_grid();
+            assert_eq!(fast, brute, "seed {seed}, tick {i}\n{fast}\n{brute}");
+            let clean = sensor.clean_view(&map, pose).to_grid();
+            n_open_more += u32::from(fast.count_occupied() + 40 < clean.count_occupied());
+        }
+    }
+    assert!(n_open_more > 50, "only {n_open_more} views are opened widely");
+}
+
 #[test]
 fn a_straight_lane_looks_like_one() {
     let boundary = [(-10.0, -1.5), (90.0, -1.5), (90.0, 1.5), (-10.0, 1.5)].map(|(x, y)| Vec2::new(x, y)).to_vec();

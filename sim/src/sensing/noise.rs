@@ -7,7 +7,7 @@
 //! recomputed alone and every driver meets the same noise.
 
 use crate::distance_field::{clamp_to_raster, floor, to_index};
-use crate::geometry::{Circles, Pose, Vec2};
+use crate::geometry::{Circles, Pose, Vec2, mask};
 use crate::map::Map;
 use crate::scenario::NoiseLevel;
 use crate::seed::{Rng, RootSeed, Stream};
@@ -264,7 +264,7 @@ impl Shadow {
             // As numbers, because whole ones are not multiplied four at once.
             indices[i] = to_index(row * cols + col);
         }
-        (0..N).fold(0, |bits, i| bits | u32::from(self.ranks[indices[i] as usize] >= threshold) << i)
+        mask(indices.map(|index| self.ranks[index as usize] >= threshold))
     }
 
     /// Whether pixels of the shadow in the grid cell around a point are misread: none of them, all of them, or (`None`)
@@ -279,6 +279,16 @@ impl Shadow {
         } else {
             None
         }
+    }
+
+    /// False only if no pixel of the shadow in a box, given by its lowest and highest coordinates, is misread.
+    #[inline]
+    pub(super) fn may_be_misread_within(&self, low: Vec2, high: Vec2, threshold: u8) -> bool {
+        let ((first_row, first_col), (last_row, last_col)) = (self.cell(low), self.cell(high));
+        (first_row..=last_row).any(|row| {
+            let start = row * self.cols;
+            self.ranks[start + first_col..=start + last_col].iter().any(|&rank| rank >= threshold)
+        })
     }
 
     #[inline]

@@ -1,14 +1,17 @@
 //! The sensor of one episode: clean view → smear → noise → grid.
 
 mod inspect;
+mod openings;
 
 pub use inspect::Inspection;
 
+use openings::Openings;
+
 use super::noise::{BoundaryShift, NoiseConfig, NoiseField, Patch, Reads, Region, Shadow, wobble_growth};
-use super::quadtree::{PixelLattice, ROW_LANES, to_corner_m};
-use super::smear::{Camera, CellBox, ConvexInEgo, TallThing, bits_between};
+use super::quadtree::{BLOCK_CELLS, BLOCKS, PixelLattice, ROW_LANES, pixels_of, to_corner_m};
+use super::smear::{Camera, CellBox, ConvexInEgo, TallThing};
 use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
-use crate::distance_field::change_max_m;
+use crate::distance_field::{DistanceField, change_max_m};
 use crate::geometry::{Pose, Vec2, WorldFromEgo, bits};
 use crate::map::Map;
 use crate::seed::RootSeed;
@@ -82,38 +85,90 @@ impl Sensor {
 
     /// The cells that hold a pixel beyond a boundary, as shifted and opened by noise.
     fn beyond_boundaries(&mut self, map: &Map, ego: &EgoView, tick: u32) -> OccupancyGrid {
-        let (geometry, field) = (&self.config.geometry, map.distance_field());
+        let field = map.distance_field();
         let openings = self.openings(ego, tick);
-        let within_cell_m = change_max_m(to_corner_m(geometry.pixel_m(), CELL_PIXELS));
         let mut grid = OccupancyGrid::free();
         let mut unsure = UnsureCells::new();
-        for row in 0..GRID_CELLS {
-            let centres_m = ego.lattice.nearest_nodes_of_row(field, row);
-            // A cell whose centre is this far from a boundary is decided without looking at the noise.
-            let sure_m = self.noise.boundary_shift_max_m(self.wobble_growth[row]) + within_cell_m;
-            let (is_sure, is_beyond) = sides(&centres_m, sure_m);
-            let opened = openings.as_ref().map_or(0, |opened| opened.touched_cells(row));
-            grid.occupy_row(row, is_beyond & !opened);
-            unsure.push_row(row, !is_sure | (is_beyond & opened), &centres_m);
-        }
+        self.occupy_surely_beyond(field, ego, &openings, &mut grid, &mut unsure);
         self.shift.look_at(ego.patch_centre, ego.patch_radius_m, tick);
         for cells in unsure.fours() {
-            let (xs, ys) = ego.lattice.cell_centres(&cells.rows, &cells.cols);
-            let growth = cells.rows.map(|row| self.wobble_growth[row as usize]);
-            let thresholds_m = self.shift.at_each(&xs, &ys, &growth).map(|shift_m| -shift_m);
+            let thresholds_m = self.thresholds_m(ego, &cells.rows, &cells.cols);
             let (is_above, is_below) = ego.lattice.are_decided(&cells.centres_m, &thresholds_m);
             for i in bits(!is_above & 0b1111) {
                 let (row, col) = (cells.rows[i], cells.cols[i]);
-                let is_occupied = match &openings {
-                    Some(openings) if openings.touched_cells(row as usize) >> col & 1 == 1 => {
-                        any_closed_pixel_below(map, ego, openings, row as usize, col as usize, thresholds_m[i])
-                    }
-                    _ => is_below >> i & 1 == 1 || ego.lattice.any_below(field, row, col, thresholds_m[i]),
-                };
+                let is_occupied = is_below >> i & 1 == 1
+                    || ego.lattice.any_below(field, row, col, cells.centres_m[i], thresholds_m[i]);
                 grid.occupy_row(row as usize, u32::from(is_occupied) << col);
             }
         }
+        self.occupy_parted(field, ego, &openings, &mut grid);
         grid
+    }
+
+    /// Marks the cells that are beyond a boundary however noise shifts it; `unsure` gets those that take a look at the
+    /// noise, but for cells that hold open pixels.
+    fn occupy_surely_beyond(
+        &self,
+        field: &DistanceField,
+        ego: &EgoView,
+        openings: &Openings,
+        grid: &mut OccupancyGrid,
+        unsure: &mut UnsureCells,
+    ) {
+        let (above_m, below_m) = ego.lattice.decided_m();
+        let mut centres_m = [0.0; ROW_LANES];
+        for block_row in 0..BLOCKS {
+            let (beyond_blocks, unsure_cols) = self.look_at_blocks(field, ego, block_row);
+            let are_looked_at = (1 << unsure_cols.end) - (1 << unsure_cols.start);
+            for row in block_row * BLOCK_CELLS..((block_row + 1) * BLOCK_CELLS).min(GRID_CELLS) {
+                ego.lattice.nearest_nodes_of_cells(field, row, unsure_cols.clone(), &mut centres_m);
+                let shift_m = self.shift_max_m(row);
+                let (drivable, beyond) = sides(&centres_m[unsure_cols.clone()], shift_m + above_m, -shift_m - below_m);
+                let [drivable, beyond] = [drivable, beyond].map(|cells| cells << unsure_cols.start);
+                // All pixels of a cell in such a block are beyond, of other such cells some pixel is, which may be open.
+                let touched = openings.touched_cells(row);
+                let occupied = beyond_blocks & !openings.whole_cells(row) | beyond & !touched;
+                grid.occupy_row(row, occupied);
+                unsure.push_row(row, are_looked_at & !(drivable | occupied | touched), &centres_m);
+            }
+        }
+    }
+
+    /// The cells of a row of blocks whose blocks are wholly beyond a boundary however noise shifts it, bit = column, and
+    /// columns of cells around all blocks that are not wholly on one side.
+    fn look_at_blocks(&self, field: &DistanceField, ego: &EgoView, block_row: usize) -> (u32, Range<usize>) {
+        let within_m = change_max_m(to_corner_m(self.config.geometry.pixel_m(), BLOCK_CELLS * CELL_PIXELS));
+        // Noise is largest far ahead.
+        let sure_m = self.shift_max_m(block_row * BLOCK_CELLS) + within_m;
+        let (drivable, beyond) = sides(&ego.lattice.nearest_nodes_of_blocks(field, block_row), sure_m, -sure_m);
+        (cells_of_blocks(beyond), cells_from_first_to_last_block(!(drivable | beyond)))
+    }
+
+    /// How far noise may shift a boundary in a row of cells, metres.
+    fn shift_max_m(&self, row: usize) -> f32 {
+        self.noise.boundary_shift_max_m(self.wobble_growth[row])
+    }
+
+    /// Marks the cells that keep a pixel beyond a boundary although noise opens others.
+    fn occupy_parted(&mut self, field: &DistanceField, ego: &EgoView, openings: &Openings, grid: &mut OccupancyGrid) {
+        for (row, parted) in openings.parted_cells() {
+            for col in bits(parted & !grid.row(row)) {
+                let [threshold_m] = self.thresholds_m(ego, &[row as u32], &[col as u32]);
+                let centre_m = field.at_nearest_node(ego.lattice.cell_centre(row, col));
+                let (is_above, _) = ego.lattice.are_decided(&[centre_m], &[threshold_m]);
+                let is_occupied =
+                    is_above == 0 && openings.any_closed_pixel_below(field, &ego.lattice, row, col, threshold_m);
+                grid.occupy_row(row, u32::from(is_occupied) << col);
+            }
+        }
+    }
+
+    /// Signed distances up to which pixels of cells, given as rows and columns, are beyond a boundary, metres.
+    #[inline]
+    fn thresholds_m<const N: usize>(&mut self, ego: &EgoView, rows: &[u32; N], cols: &[u32; N]) -> [f32; N] {
+        let (xs, ys) = ego.lattice.cell_centres(rows, cols);
+        let growth = rows.map(|row| self.wobble_growth[row as usize]);
+        self.shift.at_each(&xs, &ys, &growth).map(|shift_m| -shift_m)
     }
 
     /// Marks the cells of which tall things hide a pixel.
@@ -136,19 +191,23 @@ impl Sensor {
         let geometry = &self.config.geometry;
         self.for_each_shadow(ego, tick, |polygon, shadow, threshold| {
             let Some(spans) = polygon.spans_of_free_cells(geometry, grid) else { return };
-            let is_any_misread = |row: usize, cols: Range<usize>| {
-                cols.clone().step_by(4).any(|first| {
-                    let (xs, ys) = ego.lattice.four_pixels(row, first);
-                    let is_pixel = (1 << (cols.end - first).min(4)) - 1;
-                    shadow.are_misread(&xs, &ys, threshold) & is_pixel != 0
-                })
+            let is_any_of_row_misread = |row: usize, cell_col: usize| {
+                let pixels = spans.pixels_of_cell(row, cell_col);
+                pixels != 0 && {
+                    let (xs, ys) = ego.lattice.pixels_of_cell(row, cell_col);
+                    shadow.are_misread(&xs, &ys, threshold) & u32::from(pixels) != 0
+                }
+            };
+            let is_any_misread = |cell_row: usize, cell_col: usize| {
+                let (low, high) = ego.lattice.box_around_cell(cell_row, cell_col);
+                shadow.may_be_misread_within(low, high, threshold)
+                    && pixels_of(cell_row).any(|row| is_any_of_row_misread(row, cell_col))
             };
             for row in spans.cell_rows() {
                 for col in bits(spans.touched_cells(row) & !grid.row(row)) {
-                    let is_misread = match shadow.are_misread_around(ego.lattice.cell_centre(row, col), threshold) {
-                        Some(are_misread) => are_misread,
-                        None => spans.pixels_of_cell(row, col).any(|(row, cols)| is_any_misread(row, cols)),
-                    };
+                    let is_misread = shadow
+                        .are_misread_around(ego.lattice.cell_centre(row, col), threshold)
+                        .unwrap_or_else(|| is_any_misread(row, col));
                     grid.occupy_row(row, u32::from(is_misread) << col);
                 }
             }
@@ -160,8 +219,10 @@ impl Sensor {
     pub fn perceived_view(&self, map: &Map, pose: Pose, tick: u32) -> BirdsEyeView {
         let geometry = &self.config.geometry;
         let ego = EgoView::new(geometry, pose);
-        let openings = self.openings(&ego, tick).unwrap_or_else(PixelRows::empty);
-        let mut covered = PixelRows::empty();
+        let (mut open, mut covered) = (PixelRows::empty(), PixelRows::empty());
+        for polygon in self.patches(&ego, tick, Reads::Free) {
+            polygon.for_each_row(geometry, |row, first, last| open.set(row, first, last));
+        }
         for polygon in self.hidden_ground(map, &ego).chain(self.misread(&ego, tick)) {
             polygon.for_each_row(geometry, |row, first, last| covered.set(row, first, last));
         }
@@ -187,7 +248,7 @@ impl Sensor {
         BirdsEyeView::from_fn(|row, col| {
             let shift_m = shifts_m[row / CELL_PIXELS * GRID_CELLS + col / CELL_PIXELS];
             let is_beyond = map.signed_distance_m(ego.lattice.point(row as f32, col as f32)) <= -shift_m;
-            (is_beyond && !openings.get(row, col)) || covered.get(row, col)
+            (is_beyond && !open.get(row, col)) || covered.get(row, col)
         })
     }
 
@@ -235,14 +296,9 @@ impl Sensor {
         self.noise.patches(reads).near(ego.patch_centre, ego.patch_radius_m, tick)
     }
 
-    /// Ground that is taken for road although it is not; `None` if there is none in sight.
-    fn openings(&self, ego: &EgoView, tick: u32) -> Option<PixelRows> {
-        let mut openings = None;
-        for polygon in self.patches(ego, tick, Reads::Free) {
-            let rows: &mut PixelRows = openings.get_or_insert_with(PixelRows::empty);
-            polygon.for_each_row(&self.config.geometry, |row, first, last| rows.set(row, first, last));
-        }
-        openings
+    fn openings(&self, ego: &EgoView, tick: u32) -> Openings {
+        let geometry = &self.config.geometry;
+        Openings::new(self.patches(ego, tick, Reads::Free).filter_map(|polygon| polygon.all_spans(geometry)).collect())
     }
 
     fn for_each_shadow(&self, ego: &EgoView, tick: u32, mut visit: impl FnMut(&ConvexInEgo, &Shadow, u8)) {
@@ -254,32 +310,48 @@ impl Sensor {
     }
 }
 
-/// Which cells of a row have a distance of more than `sure_m` on either side of the boundary, and which of them are beyond
-/// it; bit = column.
-// Not inlined: on its own and of unknown length, the loop is compiled to instructions that take four cells.
-#[inline(never)]
-fn sides(centres_m: &[f32], sure_m: f32) -> (u32, u32) {
-    const BITS: [u32; ROW_LANES] = {
-        let mut bits = [0; ROW_LANES];
-        let mut col = 0;
-        while col < ROW_LANES {
-            bits[col] = 1 << col;
-            col += 1;
+/// Which distances, at most a row of them, are above a bound and which are below another one; bit = index.
+fn sides(distances_m: &[f32], above_m: f32, below_m: f32) -> (u32, u32) {
+    const BITS: [[u32; 4]; ROW_LANES / 4] = {
+        let mut bits = [[0; 4]; ROW_LANES / 4];
+        let mut i = 0;
+        while i < ROW_LANES {
+            bits[i / 4][i % 4] = 1 << i;
+            i += 1;
         }
         bits
     };
-    let (mut is_drivable, mut is_beyond) = (0, 0);
-    for (&centre_m, &bit) in centres_m.iter().zip(&BITS) {
-        is_drivable |= if centre_m > sure_m { bit } else { 0 };
-        is_beyond |= if centre_m < -sure_m { bit } else { 0 };
+    // Four distances at once, whose bits are joined at the end.
+    let (mut are_above, mut are_below) = ([0; 4], [0; 4]);
+    for (four_m, bits) in distances_m.as_chunks::<4>().0.iter().zip(&BITS) {
+        for i in 0..4 {
+            are_above[i] |= if four_m[i] > above_m { bits[i] } else { 0 };
+            are_below[i] |= if four_m[i] < below_m { bits[i] } else { 0 };
+        }
     }
-    (is_drivable | is_beyond, is_beyond)
+    let join = |four: [u32; 4]| four.into_iter().fold(0, |all, bits| all | bits);
+    (join(are_above), join(are_below))
+}
+
+/// The cells of blocks in a row of blocks, bit = column.
+fn cells_of_blocks(blocks: u32) -> u32 {
+    const BLOCK: u32 = (1 << BLOCK_CELLS) - 1;
+    bits(blocks).fold(0, |cells, block| cells | BLOCK << (block * BLOCK_CELLS))
+}
+
+/// The columns of cells from the first to the last of some blocks in a row of blocks.
+fn cells_from_first_to_last_block(blocks: u32) -> Range<usize> {
+    const ALL: u32 = (1 << BLOCKS) - 1;
+    match blocks & ALL {
+        0 => 0..0,
+        blocks => blocks.trailing_zeros() as usize * BLOCK_CELLS..(blocks.ilog2() as usize + 1) * BLOCK_CELLS,
+    }
 }
 
 /// Cells that take a closer look.
 struct UnsureCells {
-    /// Row and column of each.
-    places: [[u8; 2]; UNSURE_MAX],
+    rows: [u8; UNSURE_MAX],
+    cols: [u8; UNSURE_MAX],
     /// Signed distance at the node nearest to the centre of each.
     centres_m: [f32; UNSURE_MAX],
     n_cells: usize,
@@ -297,13 +369,13 @@ struct FourCells {
 
 impl UnsureCells {
     fn new() -> Self {
-        Self { places: [[0; 2]; UNSURE_MAX], centres_m: [f32::INFINITY; UNSURE_MAX], n_cells: 0 }
+        Self { rows: [0; UNSURE_MAX], cols: [0; UNSURE_MAX], centres_m: [f32::INFINITY; UNSURE_MAX], n_cells: 0 }
     }
 
     #[inline]
     fn push_row(&mut self, row: usize, cols: u32, centres_m: &[f32; ROW_LANES]) {
         for col in bits(cols & OccupancyGrid::ROW_MASK) {
-            self.places[self.n_cells] = [row as u8, col as u8];
+            (self.rows[self.n_cells], self.cols[self.n_cells]) = (row as u8, col as u8);
             self.centres_m[self.n_cells] = centres_m[col];
             self.n_cells += 1;
         }
@@ -311,36 +383,18 @@ impl UnsureCells {
 
     /// The cells, four at a time. What fills up the last four is far from any boundary.
     fn fours(&self) -> impl Iterator<Item = FourCells> + '_ {
-        let fours = self.places.as_chunks::<4>().0.iter().zip(self.centres_m.as_chunks::<4>().0);
-        fours.take(self.n_cells.div_ceil(4)).map(|(places, centres_m)| FourCells {
-            rows: places.map(|[row, _]| u32::from(row)),
-            cols: places.map(|[_, col]| u32::from(col)),
-            centres_m: *centres_m,
+        (0..self.n_cells).step_by(4).map(|first| FourCells {
+            rows: four(&self.rows, first).map(u32::from),
+            cols: four(&self.cols, first).map(u32::from),
+            centres_m: four(&self.centres_m, first),
         })
     }
 }
 
-/// Whether a cell keeps a pixel beyond the boundary although parts of it are opened.
-fn any_closed_pixel_below(
-    map: &Map,
-    ego: &EgoView,
-    opened: &PixelRows,
-    row: usize,
-    col: usize,
-    threshold_m: f32,
-) -> bool {
-    let cols: [f32; CELL_PIXELS] = std::array::from_fn(|i| (col * CELL_PIXELS + i) as f32);
-    (row * CELL_PIXELS..(row + 1) * CELL_PIXELS).any(|row| {
-        let opened = opened.pixels_of_cell(row, col);
-        if opened == u8::MAX {
-            return false;
-        }
-        let points = cols.map(|col| ego.lattice.point(row as f32, col));
-        let (xs, ys) = (points.map(|point| point.x), points.map(|point| point.y));
-        let distances_m = map.distance_field().at_each(&xs, &ys);
-        let is_below = |i: usize| opened >> i & 1 == 0 && distances_m[i] <= threshold_m;
-        (0..CELL_PIXELS).any(is_below)
-    })
+/// Four neighbours in an array.
+#[inline]
+fn four<T: Copy>(values: &[T; UNSURE_MAX], first: usize) -> [T; 4] {
+    *values[first..].first_chunk().expect("there are three to spare")
 }
 
 /// One pose, prepared for sensing.
@@ -375,40 +429,24 @@ impl EgoView {
 /// One bit per pixel of the view.
 struct PixelRows {
     bits: Vec<[u64; WORDS]>,
-    /// The cells of each row of cells of which any pixel is set, bit = column.
-    touched: [u32; GRID_CELLS],
 }
 
 const WORDS: usize = BEV_PIXELS.div_ceil(64);
-const CELLS_PER_WORD: usize = 64 / CELL_PIXELS;
 
 impl PixelRows {
     fn empty() -> Self {
-        Self { bits: vec![[0; WORDS]; BEV_PIXELS], touched: [0; GRID_CELLS] }
+        Self { bits: vec![[0; WORDS]; BEV_PIXELS] }
     }
 
     fn set(&mut self, row: usize, first: usize, last: usize) {
-        for (word, bits) in self.bits[row].iter_mut().enumerate() {
+        for word in first / 64..=last / 64 {
             let start = word * 64;
-            if first < start + 64 && last >= start {
-                let (low, high) = (first.max(start) - start, last.min(start + 63) - start);
-                *bits |= (u64::MAX << low) & (u64::MAX >> (63 - high));
-            }
+            let (low, high) = (first.max(start) - start, last.min(start + 63) - start);
+            self.bits[row][word] |= (u64::MAX << low) & (u64::MAX >> (63 - high));
         }
-        self.touched[row / CELL_PIXELS] |= bits_between(first / CELL_PIXELS, last / CELL_PIXELS);
     }
 
     fn get(&self, row: usize, col: usize) -> bool {
         self.bits[row][col / 64] >> (col % 64) & 1 == 1
-    }
-
-    /// The pixels of a row of pixels in a column of cells.
-    fn pixels_of_cell(&self, row: usize, cell_col: usize) -> u8 {
-        (self.bits[row][cell_col / CELLS_PER_WORD] >> (cell_col % CELLS_PER_WORD * CELL_PIXELS)) as u8
-    }
-
-    /// The cells of a row of cells of which any pixel is set, bit = column.
-    fn touched_cells(&self, row: usize) -> u32 {
-        self.touched[row]
     }
 }

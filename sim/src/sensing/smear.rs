@@ -3,6 +3,7 @@
 //! The label image was warped by a ground homography (paper), so a thing of height h at ground range r smears away
 //! from the camera to r·H/(H − h), and to infinity for h ≥ H (methods.md 1.7).
 
+use super::quadtree::pixels_of;
 use super::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid};
 use crate::distance_field::{floor, to_index};
 use crate::geometry::{Outline, Vec2};
@@ -38,7 +39,7 @@ impl ConvexInEgo {
 
     /// Calls `span(row, first_col, last_col)` for every pixel row in which pixel centres lie inside the polygon.
     pub(super) fn for_each_row(&self, geometry: &GridGeometry, mut span: impl FnMut(usize, usize, usize)) {
-        let Some(spans) = self.spans(geometry, &(0..BEV_PIXELS)) else { return };
+        let Some(spans) = self.all_spans(geometry) else { return };
         for row in spans.rows.clone() {
             let (first, end) = (spans.first[row] as usize, spans.end[row] as usize);
             if first < end {
@@ -53,6 +54,11 @@ impl ConvexInEgo {
         for row in spans.cell_rows() {
             grid.occupy_row(row, spans.touched_cells(row));
         }
+    }
+
+    /// Its pixels; `None` if it is out of view.
+    pub(super) fn all_spans(&self, geometry: &GridGeometry) -> Option<Spans> {
+        self.spans(geometry, &(0..BEV_PIXELS))
     }
 
     /// Its pixels, without rows in which a grid is occupied anyway.
@@ -71,7 +77,7 @@ impl ConvexInEgo {
     fn spans(&self, geometry: &GridGeometry, rows: &Range<usize>) -> Option<Spans> {
         let (low, high) = self.bounds();
         let half_m = 0.5 * geometry.side_m;
-        let rows = common(&rows_between(geometry, low.x, high.x), rows);
+        let rows = whole_fours(&common(&rows_between(geometry, low.x, high.x), rows));
         if rows.is_empty() || low.y > half_m || high.y < -half_m {
             return None;
         }
@@ -86,7 +92,7 @@ impl ConvexInEgo {
         for &b in corners {
             let (low, high) = if a.x <= b.x { (a, b) } else { (b, a) };
             // Rows with low.x <= ahead < high.x; one more on either side, then tested exactly.
-            let rows = common(&rows_between(geometry, low.x, high.x), &rows);
+            let rows = whole_fours(&common(&rows_between(geometry, low.x, high.x), &rows));
             let slope = (high.y - low.y) / (high.x - low.x);
             let first = rows.start as i32;
             let crossings = right_m[rows.clone()].iter_mut().zip(&mut left_m[rows]);
@@ -109,8 +115,8 @@ impl ConvexInEgo {
             let last = col_of(right_m);
             let last = if last < (BEV_PIXELS - 1) as f32 { last } else { (BEV_PIXELS - 1) as f32 };
             let is_empty = (left_m < right_m) | (last < from);
-            *first = if is_empty { 0 } else { to_index(from) };
-            *end = if is_empty { 0 } else { to_index(floor(last)) + 1 };
+            *first = if is_empty { 0 } else { to_index(from) as u8 };
+            *end = if is_empty { 0 } else { to_index(floor(last)) as u8 + 1 };
         }
         Some(spans)
     }
@@ -119,9 +125,9 @@ impl ConvexInEgo {
 /// The pixels of a convex polygon, row by row.
 pub(super) struct Spans {
     /// First column of each row.
-    first: [u32; BEV_PIXELS],
+    first: [u8; BEV_PIXELS],
     /// The column after the last; equal to the first where there is none.
-    end: [u32; BEV_PIXELS],
+    end: [u8; BEV_PIXELS],
     /// The rows that were computed.
     rows: Range<usize>,
 }
@@ -133,22 +139,26 @@ impl Spans {
     }
 
     /// The cells of a row of cells that hold pixels, bit = column.
+    #[expect(clippy::manual_div_ceil, reason = "`div_ceil` is not done for four rows at once")]
     #[inline]
     pub(super) fn touched_cells(&self, cell_row: usize) -> u32 {
         const PIXELS: u32 = CELL_PIXELS as u32;
-        let rows = cell_row * CELL_PIXELS..(cell_row + 1) * CELL_PIXELS;
+        let rows = pixels_of(cell_row);
         let spans = self.first[rows.clone()].iter().zip(&self.end[rows]);
         // A span without pixels is 0..0, whose bits are none.
-        let cells = spans.map(|(&first, &end)| (1 << end.div_ceil(PIXELS)) - (1 << (first / PIXELS)));
+        let cells = spans.map(|(&first, &end)| {
+            let (first, end) = (u32::from(first) / PIXELS, (u32::from(end) + (PIXELS - 1)) / PIXELS);
+            (1 << end) - (1 << first)
+        });
         cells.fold(0, |all, cells| all | cells)
     }
 
-    /// The pixels in a cell as rows and ranges of columns.
+    /// The pixels of a row of pixels in a column of cells, bit = column within.
     #[inline]
-    pub(super) fn pixels_of_cell(&self, row: usize, col: usize) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
-        let cols = col * CELL_PIXELS..(col + 1) * CELL_PIXELS;
-        let rows = row * CELL_PIXELS..(row + 1) * CELL_PIXELS;
-        rows.map(move |row| (row, common(&cols, &(self.first[row] as usize..self.end[row] as usize))))
+    pub(super) fn pixels_of_cell(&self, row: usize, cell_col: usize) -> u8 {
+        let start = (cell_col * CELL_PIXELS) as u8;
+        let [first, end] = [self.first[row], self.end[row]].map(|col| col.saturating_sub(start).min(CELL_PIXELS as u8));
+        ((1_u32 << end) - (1 << first)) as u8
     }
 }
 
@@ -217,6 +227,12 @@ fn common(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     start..a.end.min(b.end).max(start)
 }
 
+/// A range of pixel rows, extended to what is done for four rows at once.
+#[inline]
+fn whole_fours(rows: &Range<usize>) -> Range<usize> {
+    rows.start & !3..rows.end.next_multiple_of(4)
+}
+
 /// Pixel rows whose centres may lie between two distances ahead; up to one row too many at either end.
 fn rows_between(geometry: &GridGeometry, low_m: f32, high_m: f32) -> Range<usize> {
     let row_of = |ahead_m: f32| (geometry.far_edge_ahead_m() - ahead_m) / geometry.pixel_m();
@@ -225,7 +241,7 @@ fn rows_between(geometry: &GridGeometry, low_m: f32, high_m: f32) -> Range<usize
 }
 
 /// Bits `first..=last`.
-pub(super) fn bits_between(first: usize, last: usize) -> u32 {
+fn bits_between(first: usize, last: usize) -> u32 {
     ((1_u32 << (last + 1)) - 1) & !((1_u32 << first) - 1)
 }
 
