@@ -313,12 +313,14 @@ mod tests {
 
     #[test]
     fn an_outline_moves_like_its_corners() {
-        let corners = rectangle(Pose::new(Vec2::new(3.0, -7.0), 0.4), 4.7, 1.8);
-        let outline: Outline = corners.into_iter().collect();
         let world_from_ego = Pose::new(Vec2::new(-1.5, 2.0), 2.1).world_from_ego();
-        let in_ego = world_from_ego.inverse_outline(&outline);
-        let expected = corners.map(|corner| world_from_ego.inverse_point(corner));
-        assert_eq!(std::array::from_fn(|i| in_ego.corner(i)), expected);
-        assert_eq!(in_ego.bounds(), crate::distance_field::bounds(&expected));
+        for n_corners in 3..=8 {
+            let angle_rad = |i: usize| std::f32::consts::TAU * i as f32 / n_corners as f32;
+            let corners = (0..n_corners).map(|i| Vec2::new(3.0, -7.0) + 2.3 * Vec2::from_angle(angle_rad(i)));
+            let in_ego = world_from_ego.inverse_outline(&corners.clone().collect());
+            let expected: Vec<Vec2> = corners.map(|corner| world_from_ego.inverse_point(corner)).collect();
+            assert_eq!((0..in_ego.n_corners()).map(|i| in_ego.corner(i)).collect::<Vec<_>>(), expected);
+            assert_eq!(in_ego.bounds(), crate::distance_field::bounds(&expected));
+        }
     }
 }

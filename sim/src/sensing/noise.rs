@@ -814,6 +814,25 @@ fn mix(key: u64, x: i32, y: i32) -> u32 {
 mod tests {
     use super::*;
 
+    /// Also of what a lattice keeps from the views before.
+    #[test]
+    fn a_lattice_is_value_noise() {
+        let (spacing_m, amplitude, radius_m) = (1.5, 0.4, 8.0);
+        let mut lattice = Lattice::new(5, spacing_m, amplitude);
+        for view in 0..60_u32 {
+            // Standing still now and then, both in time and in place.
+            let centre = Vec2::new((view / 7) as f32 * 1.1 - 3.0, (view / 11) as f32 * 0.9);
+            let time = (view / 2) as f32 / 3.0;
+            lattice.look_at(centre, radius_m, time);
+            let place = |i: usize| centre + 0.25 * i as f32 * Vec2::from_angle(2.4 * i as f32);
+            let [xs, ys] = [std::array::from_fn(|i| place(i).x), std::array::from_fn(|i| place(i).y)];
+            for (i, value) in lattice.at_each::<32>(&xs, &ys).into_iter().enumerate() {
+                let expected = amplitude * value_noise(5, place(i) / spacing_m, time);
+                assert!((value - expected).abs() < 1e-4, "view {view}, {}: {value}, not {expected}", place(i));
+            }
+        }
+    }
+
     #[test]
     fn value_noise_has_about_unit_variance_and_keeps_its_bound() {
         let place = |i: usize| Vec2::new((i % 200) as f32, (i / 200) as f32) * 0.237;
