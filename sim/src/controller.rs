@@ -20,9 +20,9 @@ pub enum PursuitLaw {
 /// safety reasons"; methods.md 2.5 lists the readings. Distances are measured from the front bumper.
 ///
 /// methods.md prefers B with points as far as the way is open. The car is steered 7 m ahead, so such a point lies far
-/// beyond, on the circle through what is steered at: moving the car by 20 cm moves it by 1.5 m, and η̂ stays at .65.
-/// Law A with points half as far (`BandConfig::reach_share` in `expert`) drives the same circle at the same speed, the
-/// point lies near what is steered at, and η̂ passes .9. Both the formula and the half of the paper are kept.
+/// beyond, on the circle through what is steered at: moving the car by 20 cm moves it by 1.5 m, and η̂ stays below .8.
+/// Law A with points half as far (`BandConfig::reach_share` in `expert`) drives the same circle at about the same speed,
+/// the point lies near what is steered at, and η̂ passes .9. Both the formula and the half of the paper are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SpeedLaw {

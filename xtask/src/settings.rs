@@ -161,6 +161,7 @@ impl Settings {
             "episode.control_period_ms = {control} is not a multiple of episode.physics_step_ms = {physics}"
         );
         ranges::check(&self.episode)?;
+        ranges::check_expert(&self.expert)?;
         self.dagger.disturbance.as_ref().map_or(Ok(()), ranges::check_disturbance)?;
         self.dagger.network.validate().context("dagger.network")?;
         Ok(())

@@ -40,8 +40,8 @@ pub(super) fn by_name(name: &str) -> anyhow::Result<Settings> {
 /// of a person's day. What is learned on lot a alone does not carry over: on generated lots it fails almost three
 /// times as often (16.3 km of validation lots: 65 near-collisions against 23), and on lot a as often (12 against 11 in 4.6 km).
 /// With 16 instead of 8 lots of each level, and more steps, it is safer still (18 against 28 in the 21 km of both).
-/// Most are hard, because what still fails fails there: 11 near-collisions in 42 km, against 12 with 14 of each level and
-/// fits of 11 000 instead of 9000 steps.
+/// Most are hard, because most of what still fails fails there; no worse with fewer of them and shorter fits (11
+/// near-collisions in 42 km) than with 14 of each level and 11 000 instead of 9000 steps (12).
 fn default() -> Settings {
     let lots = ["lot-a", "train:4:easy", "train:12", "train:20:hard"].map(str::to_owned).to_vec();
     let base = paper();

@@ -109,6 +109,10 @@ fn errors_name_the_key_and_what_there_is() {
         ),
         (&["episode.noise.blob=-0.5"], &["episode.noise.blob = -0.5", "not be negative"]),
         (&["episode.vehicle.wheelbase_m=nan"], &["episode.vehicle.wheelbase_m = NaN"]),
+        (&["expert.band.reach_share=-1"], &["expert.band.reach_share = -1", "be more than 0"]),
+        (&["expert.station_share=nan"], &["expert.station_share = NaN"]),
+        (&["expert.weights.load=-0.1"], &["expert.weights.load = -0.1", "not be negative"]),
+        (&["expert.branch_travels_m=[0.8, 2.0, -3.6, 5.4, 7.6]"], &["expert.branch_travels_m = -3.6"]),
         (&["episode.controller.speed_min_mps=3"], &["speed_min_mps = 3", "speed_max_mps = 2.2"]),
     ] {
         let error = error(overrides);
