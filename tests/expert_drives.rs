@@ -1,8 +1,8 @@
 //! The expert on the reference lots: a few of the hundred seeds of the acceptance run (README, results).
 
-use expert::{ExpertConfig, ScriptedExpert};
+use expert::{ExpertSettings, ScriptedExpert};
 use scenarios::reference::{ReferenceLot, lot};
-use sim::episode::{self, Ending, Episode, EpisodeConfig};
+use sim::episode::{self, Ending, Episode, EpisodeSettings};
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -11,13 +11,13 @@ use std::sync::Arc;
 
 #[test]
 fn the_expert_drives_every_reference_lot_both_ways_without_a_near_collision() {
-    let config = Arc::new(EpisodeConfig::paper());
+    let settings = Arc::new(EpisodeSettings::paper());
     for which in [ReferenceLot::A, ReferenceLot::B, ReferenceLot::C] {
         for direction in Direction::BOTH {
             let seed = RootSeed(4);
-            let map = Arc::new(Map::build(direction.of(lot(which, seed)), &config.vehicle).unwrap());
-            let mut expert = ScriptedExpert::new(ExpertConfig::paper(), &config.vehicle, config.sensing.geometry);
-            let report = episode::run(Episode::new(Arc::clone(&config), map, seed), &mut expert, &mut ());
+            let map = Arc::new(Map::build(direction.of(lot(which, seed)), &settings.vehicle).unwrap());
+            let mut expert = ScriptedExpert::new(ExpertSettings::paper(), &settings.vehicle, settings.sensing.geometry);
+            let report = episode::run(Episode::new(Arc::clone(&settings), map, seed), &mut expert, &mut ());
             let metrics = &report.metrics;
             assert_eq!(report.ending, Ending::ReachedEnd, "{which:?} {direction:?}");
             assert_eq!(
@@ -34,7 +34,7 @@ fn the_expert_drives_every_reference_lot_both_ways_without_a_near_collision() {
 /// ROS maps and TPCAP cases become lots like any other.
 #[test]
 fn the_expert_drives_the_example_maps_without_a_near_collision() {
-    let config = Arc::new(EpisodeConfig::paper());
+    let settings = Arc::new(EpisodeSettings::paper());
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/examples");
     for (file, directions) in [
         ("car-park.yaml", &Direction::BOTH[..]),
@@ -44,9 +44,9 @@ fn the_expert_drives_the_example_maps_without_a_near_collision() {
     ] {
         let scenario = scenarios::load::load(&examples.join(file)).unwrap_or_else(|error| panic!("{error}"));
         for &direction in directions {
-            let map = Arc::new(Map::build(direction.of(scenario.clone()), &config.vehicle).unwrap());
-            let mut expert = ScriptedExpert::new(ExpertConfig::paper(), &config.vehicle, config.sensing.geometry);
-            let report = episode::run(Episode::new(Arc::clone(&config), map, RootSeed(4)), &mut expert, &mut ());
+            let map = Arc::new(Map::build(direction.of(scenario.clone()), &settings.vehicle).unwrap());
+            let mut expert = ScriptedExpert::new(ExpertSettings::paper(), &settings.vehicle, settings.sensing.geometry);
+            let report = episode::run(Episode::new(Arc::clone(&settings), map, RootSeed(4)), &mut expert, &mut ());
             assert_eq!(report.ending, Ending::ReachedEnd, "{file} {direction:?}");
             let metrics = &report.metrics;
             assert_eq!(

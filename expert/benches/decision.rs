@@ -4,10 +4,10 @@
 #![allow(missing_docs, reason = "divan's macro writes functions without docs")]
 
 use divan::counter::ItemsCount;
-use expert::{ExpertConfig, ScriptedExpert, Sees};
+use expert::{ExpertSettings, ScriptedExpert, Sees};
 use scenarios::reference::{ReferenceLot, lot};
 use sim::driver::{Driver, GroundTruth, Situation};
-use sim::episode::{Episode, EpisodeConfig};
+use sim::episode::{Episode, EpisodeSettings};
 use sim::map::Map;
 use sim::seed::RootSeed;
 use sim::sensing::Observation;
@@ -36,12 +36,12 @@ fn bench(bencher: divan::Bencher<'_, '_>, name: char, sees: Sees) {
         'b' => ReferenceLot::B,
         _ => ReferenceLot::C,
     };
-    let config = EpisodeConfig::paper();
-    let map = Arc::new(Map::build(lot(which, RootSeed(1)), &config.vehicle).expect("reference lots are valid"));
-    let expert = ExpertConfig { sees, ..ExpertConfig::paper() };
-    let new_driver = || ScriptedExpert::new(expert.clone(), &config.vehicle, config.sensing.geometry);
+    let settings = EpisodeSettings::paper();
+    let map = Arc::new(Map::build(lot(which, RootSeed(1)), &settings.vehicle).expect("reference lots are valid"));
+    let expert = ExpertSettings { sees, ..ExpertSettings::paper() };
+    let new_driver = || ScriptedExpert::new(expert.clone(), &settings.vehicle, settings.sensing.geometry);
 
-    let mut episode = Episode::new(Arc::new(config.clone()), Arc::clone(&map), RootSeed(1));
+    let mut episode = Episode::new(Arc::new(settings.clone()), Arc::clone(&map), RootSeed(1));
     let mut driver = new_driver();
     let mut situations = Vec::new();
     while episode.ending().is_none() {

@@ -9,11 +9,11 @@ mod overrides;
 
 use clap::Parser;
 use comfy_table::{Table, presets};
-use expert::{ExpertConfig, ExpertStats, Rule, ScriptedExpert};
+use expert::{ExpertSettings, ExpertStats, Rule, ScriptedExpert};
 use rayon::prelude::*;
 use scenarios::reference::{ReferenceLot, lot};
 use sim::driver::Driver;
-use sim::episode::{Episode, EpisodeConfig, EpisodeReport, Event, Frame};
+use sim::episode::{Episode, EpisodeReport, EpisodeSettings, Event, Frame};
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -42,7 +42,8 @@ struct Args {
 
 fn main() {
     let args = Args::parse();
-    let expert = args.overrides.iter().fold(ExpertConfig::paper(), |config, text| overrides::overridden(&config, text));
+    let expert =
+        args.overrides.iter().fold(ExpertSettings::paper(), |settings, text| overrides::overridden(&settings, text));
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header([
         "lot",
@@ -89,12 +90,12 @@ struct Run {
 /// What the column "<0.2 m" counts: the clearance plans keep where they can.
 const TIGHT_M: f32 = 0.2;
 
-fn drive(expert: &ExpertConfig, which: ReferenceLot, direction: Direction, seed: u64) -> Run {
-    let config = Arc::new(EpisodeConfig::paper());
+fn drive(expert: &ExpertSettings, which: ReferenceLot, direction: Direction, seed: u64) -> Run {
+    let settings = Arc::new(EpisodeSettings::paper());
     let scenario = direction.of(lot(which, RootSeed(seed)));
-    let map = Arc::new(Map::build(scenario, &config.vehicle).expect("reference lots are valid"));
-    let mut driver = ScriptedExpert::new(expert.clone(), &config.vehicle, config.sensing.geometry);
-    let mut episode = Episode::new(Arc::clone(&config), map, RootSeed(seed));
+    let map = Arc::new(Map::build(scenario, &settings.vehicle).expect("reference lots are valid"));
+    let mut driver = ScriptedExpert::new(expert.clone(), &settings.vehicle, settings.sensing.geometry);
+    let mut episode = Episode::new(Arc::clone(&settings), map, RootSeed(seed));
     let mut seconds = 0.0;
     let mut incidents = Vec::new();
     let mut tight_ticks = 0;

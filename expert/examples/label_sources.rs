@@ -8,11 +8,11 @@
 mod overrides;
 
 use clap::Parser;
-use expert::{ExpertConfig, ScriptedExpert, Sees};
+use expert::{ExpertSettings, ScriptedExpert, Sees};
 use rayon::prelude::*;
 use scenarios::reference::{ReferenceLot, lot};
 use sim::driver::{Driver, GroundTruth, LookAheadPoint, Situation};
-use sim::episode::{Episode, EpisodeConfig};
+use sim::episode::{Episode, EpisodeSettings};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::scenario::Direction;
@@ -46,14 +46,14 @@ type Change = (&'static str, fn(&mut Asked));
 /// What an expert is asked.
 #[derive(Debug, Clone)]
 struct Asked {
-    config: ExpertConfig,
+    settings: ExpertSettings,
     vehicle: VehicleState,
 }
 
 const CHANGES: [Change; 7] = [
     ("wheels straight", |asked| asked.vehicle.steering_rad = 0.0),
     ("speed 1.4 m/s", |asked| asked.vehicle.speed_mps = 1.4),
-    ("ground outside the view unknown", |asked| asked.config.sees = Sees::PatchOnly),
+    ("ground outside the view unknown", |asked| asked.settings.sees = Sees::PatchOnly),
     ("5 cm to the left", |asked| shift(asked, Vec2::new(0.0, 0.05), 0.0)),
     ("20 cm to the left", |asked| shift(asked, Vec2::new(0.0, 0.2), 0.0)),
     ("10 cm ahead", |asked| shift(asked, Vec2::new(0.1, 0.0), 0.0)),
@@ -67,7 +67,8 @@ fn shift(asked: &mut Asked, in_ego: Vec2, turn_rad: f32) {
 
 fn main() {
     let args = Args::parse();
-    let expert = args.overrides.iter().fold(ExpertConfig::paper(), |config, text| overrides::overridden(&config, text));
+    let expert =
+        args.overrides.iter().fold(ExpertSettings::paper(), |settings, text| overrides::overridden(&settings, text));
     let lots: Vec<_> = ReferenceLot::ALL.into_iter().filter(|lot| args.lots.contains(&lot.name()[4..])).collect();
     let trials: Vec<_> = lots
         .iter()
@@ -87,18 +88,18 @@ fn main() {
 /// How far each change moved the label, (ahead, left).
 type Moves = [Vec2; CHANGES.len() + 1];
 
-fn drive(expert: &ExpertConfig, which: ReferenceLot, direction: Direction, seed: u64) -> Vec<Moves> {
-    let config = Arc::new(EpisodeConfig::paper());
+fn drive(expert: &ExpertSettings, which: ReferenceLot, direction: Direction, seed: u64) -> Vec<Moves> {
+    let settings = Arc::new(EpisodeSettings::paper());
     let scenario = direction.of(lot(which, RootSeed(seed)));
-    let map = Arc::new(Map::build(scenario, &config.vehicle).expect("reference lots are valid"));
-    let mut driver = ScriptedExpert::new(expert.clone(), &config.vehicle, config.sensing.geometry);
-    let mut episode = Episode::new(Arc::clone(&config), Arc::clone(&map), RootSeed(seed));
+    let map = Arc::new(Map::build(scenario, &settings.vehicle).expect("reference lots are valid"));
+    let mut driver = ScriptedExpert::new(expert.clone(), &settings.vehicle, settings.sensing.geometry);
+    let mut episode = Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(seed));
     let mut moves = Vec::new();
     while episode.ending().is_none() {
         let decision = driver.decide(&episode.situation());
         if episode.tick().is_multiple_of(EVERY_TICKS) {
-            let asked = Asked { config: expert.clone(), vehicle: episode.vehicle() };
-            let answer = |asked: Asked| fresh_answer(asked, &config, &map, episode.progress_m());
+            let asked = Asked { settings: expert.clone(), vehicle: episode.vehicle() };
+            let answer = |asked: Asked| fresh_answer(asked, &settings, &map, episode.progress_m());
             let base = answer(asked.clone());
             let mut of_tick = [difference(decision.look_ahead, base); CHANGES.len() + 1];
             for (slot, (_, change)) in of_tick[1..].iter_mut().zip(CHANGES) {
@@ -113,8 +114,8 @@ fn drive(expert: &ExpertConfig, which: ReferenceLot, direction: Direction, seed:
     moves
 }
 
-fn fresh_answer(asked: Asked, config: &EpisodeConfig, map: &Map, progress_m: f32) -> LookAheadPoint {
-    let mut driver = ScriptedExpert::new(asked.config, &config.vehicle, config.sensing.geometry);
+fn fresh_answer(asked: Asked, settings: &EpisodeSettings, map: &Map, progress_m: f32) -> LookAheadPoint {
+    let mut driver = ScriptedExpert::new(asked.settings, &settings.vehicle, settings.sensing.geometry);
     let truth = GroundTruth { map, vehicle: asked.vehicle, progress_m };
     driver.decide(&Situation { observation: &Observation::default(), truth }).look_ahead
 }

@@ -1,12 +1,12 @@
 //! From an arc to a look-ahead point: how far along (which decides the speed), and how fast it may move.
 
-use crate::band::{self, Band};
-use crate::config::ExpertConfig;
-use crate::sight::Sight;
+use crate::elastic_band::{self, ElasticBand};
+use crate::line_of_sight::LineOfSight;
+use crate::settings::ExpertSettings;
 use sim::driver::{GroundTruth, LookAheadPoint};
 use sim::geometry::{Pose, Vec2};
 use sim::sensing::GridGeometry;
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 
 /// Step of the march along a label's arc, metres.
 const MARCH_M: f32 = 0.2;
@@ -16,7 +16,7 @@ pub(crate) struct Label {
     /// Curvature of the circle, 1/m, positive to the left.
     pub(crate) curvature_per_m: f32,
     /// Arc length from the rear axle, metres.
-    pub(crate) station_m: f32,
+    pub(crate) arc_length_m: f32,
 }
 
 impl Label {
@@ -25,44 +25,45 @@ impl Label {
         let curvature_per_m = LookAheadPoint { ahead_m: in_ego.x, left_m: in_ego.y }.curvature_per_m();
         let half_turn = in_ego.y.atan2(in_ego.x);
         let chord_m = in_ego.length();
-        let station_m = if half_turn.abs() < 1e-3 { chord_m } else { chord_m * half_turn / half_turn.sin() };
-        Self { curvature_per_m, station_m }
+        let arc_length_m = if half_turn.abs() < 1e-3 { chord_m } else { chord_m * half_turn / half_turn.sin() };
+        Self { curvature_per_m, arc_length_m }
     }
 
     /// The point in the ego frame.
     pub(crate) fn point(self) -> LookAheadPoint {
-        let in_ego = on_arc(self.curvature_per_m, self.station_m);
+        let in_ego = on_arc(self.curvature_per_m, self.arc_length_m);
         LookAheadPoint { ahead_m: in_ego.x, left_m: in_ego.y }
     }
 
     /// Curvature index of the label, −1…1, on the scale of the first arcs.
-    pub(crate) fn index(self, config: &ExpertConfig) -> f32 {
-        let share = (self.curvature_per_m / config.curvature_max_per_m).clamp(-1.0, 1.0);
+    pub(crate) fn index(self, settings: &ExpertSettings) -> f32 {
+        let share = (self.curvature_per_m / settings.curvature_max_per_m).clamp(-1.0, 1.0);
         share.abs().powf(1.0 / 1.5).copysign(share)
     }
 
     /// Moves from the last label towards this one, within the limits of a tick. The speed of the wheels limits the
     /// car anyway; what is limited here is that labels of neighbouring ticks contradict each other.
-    pub(crate) fn steadied(self, last: Self, config: &ExpertConfig) -> Self {
-        let sideways_per_m = 2.0 * config.label_sideways_step_m / (last.station_m * last.station_m);
-        let step_per_m = config.label_curvature_step_per_m.min(sideways_per_m);
+    pub(crate) fn smoothed(self, last: Self, settings: &ExpertSettings) -> Self {
+        let sideways_per_m = 2.0 * settings.label_sideways_step_m / (last.arc_length_m * last.arc_length_m);
+        let step_per_m = settings.label_curvature_step_per_m.min(sideways_per_m);
         let curvature_per_m =
             self.curvature_per_m.clamp(last.curvature_per_m - step_per_m, last.curvature_per_m + step_per_m);
-        let station_m = self
-            .station_m
-            .clamp(last.station_m - config.label_retreat_step_m, last.station_m + config.label_advance_step_m);
-        Self { curvature_per_m, station_m }
+        let arc_length_m = self.arc_length_m.clamp(
+            last.arc_length_m - settings.label_retreat_step_m,
+            last.arc_length_m + settings.label_advance_step_m,
+        );
+        Self { curvature_per_m, arc_length_m }
     }
 }
 
 /// Where a point may lie.
 #[derive(Debug)]
 pub(crate) struct Ground<'a> {
-    pub(crate) config: &'a ExpertConfig,
-    pub(crate) vehicle: &'a VehicleParams,
+    pub(crate) settings: &'a ExpertSettings,
+    pub(crate) vehicle: &'a VehicleSettings,
     pub(crate) geometry: &'a GridGeometry,
     pub(crate) truth: &'a GroundTruth<'a>,
-    pub(crate) sight: &'a Sight,
+    pub(crate) sight: &'a LineOfSight,
 }
 
 impl Ground<'_> {
@@ -71,18 +72,18 @@ impl Ground<'_> {
     pub(crate) fn label_on(&self, curvature_per_m: f32, first_free_m: f32, plan_free_m: f32) -> Label {
         let point_free_m = self.drivable_station(curvature_per_m) - self.vehicle.front_m();
         let free_m = first_free_m.max(point_free_m.min(plan_free_m));
-        let station_m = self.vehicle.front_m() + self.config.station_share * free_m;
-        self.kept_drivable(Label { curvature_per_m, station_m })
+        let arc_length_m = self.vehicle.front_m() + self.settings.station_share * free_m;
+        self.kept_drivable(Label { curvature_per_m, arc_length_m })
     }
 
     /// How far along a band a point can be seen and reached over open ground, metres from the rear axle: the paper's
     /// third rule. Where the arc to a point comes near a boundary, it fades.
-    pub(crate) fn open_way_m(&self, band: &Band) -> f32 {
+    pub(crate) fn open_way_m(&self, band: &ElasticBand) -> f32 {
         let near_m = self.geometry.near_edge_ahead_m;
         let mut reach_m = near_m;
         let mut open = 1.0_f32;
-        let mut travel_m = near_m + band::SPACING_M;
-        let settings = &self.config.band;
+        let mut travel_m = near_m + elastic_band::SPACING_M;
+        let settings = &self.settings.band;
         let (mut low, mut high) = (0.0_f32, 0.0_f32);
         let reference = self.truth.vehicle.pose.ahead();
         while travel_m <= band.length_m() && open > 0.0 {
@@ -90,8 +91,8 @@ impl Ground<'_> {
             (low, high) = (low.min(turn_rad), high.max(turn_rad));
             let straightness = (settings.bend_to_rad - (high - low)) / (settings.bend_to_rad - settings.bend_from_rad);
             open = open.min(straightness).min(self.openness(band, travel_m)).max(0.0);
-            reach_m += open * band::SPACING_M;
-            travel_m += band::SPACING_M;
+            reach_m += open * elastic_band::SPACING_M;
+            travel_m += elastic_band::SPACING_M;
         }
         reach_m
     }
@@ -105,7 +106,7 @@ impl Ground<'_> {
     ///
     /// It does not matter how near the arc comes to a boundary: in a lane that would hang on centimetres that no grid
     /// of half-metre cells shows.
-    fn openness(&self, band: &Band, travel_m: f32) -> f32 {
+    fn openness(&self, band: &ElasticBand, travel_m: f32) -> f32 {
         let target = band.at(travel_m);
         if !self.sight.knows(target) {
             return 0.0;
@@ -117,7 +118,7 @@ impl Ground<'_> {
             .map(|point| distance_to_arc_m(curvature_per_m, world_from_ego.inverse_point(point)))
             .fold(0.0, f32::max);
         let gap_m = self.truth.map.distance_field().at(target);
-        let settings = &self.config.band;
+        let settings = &self.settings.band;
         let follows = (settings.aside_to_m - aside_m) / (settings.aside_to_m - settings.aside_from_m);
         let is_open = (gap_m - settings.gap_from_m) / (settings.gap_to_m - settings.gap_from_m);
         follows.min(is_open).clamp(0.0, 1.0)
@@ -125,16 +126,17 @@ impl Ground<'_> {
 
     /// The nearest point of an arc: the slowest.
     pub(crate) fn nearest_label_on(&self, curvature_per_m: f32) -> Label {
-        Label { curvature_per_m, station_m: self.stations(curvature_per_m).0 }
+        Label { curvature_per_m, arc_length_m: self.stations(curvature_per_m).0 }
     }
 
     /// Rule one: the point lies inside drivable space, and inside the patch.
     pub(crate) fn kept_drivable(&self, label: Label) -> Label {
-        let max_per_m = self.config.curvature_max_per_m;
+        let max_per_m = self.settings.curvature_max_per_m;
         let label = Label { curvature_per_m: label.curvature_per_m.clamp(-max_per_m, max_per_m), ..label };
         let (near_m, far_m) = self.stations(label.curvature_per_m);
-        let drivable_m = if label.station_m <= near_m { near_m } else { self.drivable_station(label.curvature_per_m) };
-        Label { station_m: label.station_m.min(drivable_m).clamp(near_m, far_m), ..label }
+        let drivable_m =
+            if label.arc_length_m <= near_m { near_m } else { self.drivable_station(label.curvature_per_m) };
+        Label { arc_length_m: label.arc_length_m.min(drivable_m).clamp(near_m, far_m), ..label }
     }
 
     /// How far along an arc every point keeps its clearance, metres from the rear axle, within the patch.
@@ -142,16 +144,16 @@ impl Ground<'_> {
         let (near_m, far_m) = self.stations(curvature_per_m);
         let field = self.truth.map.distance_field();
         let world_from_ego = self.truth.vehicle.pose.world_from_ego();
-        let mut station_m = near_m;
-        while station_m < far_m {
-            let next_m = (station_m + MARCH_M).min(far_m);
+        let mut arc_length_m = near_m;
+        while arc_length_m < far_m {
+            let next_m = (arc_length_m + MARCH_M).min(far_m);
             let in_world = world_from_ego.point(on_arc(curvature_per_m, next_m));
-            if field.at(in_world) < self.config.point_clearance_m || !self.sight.knows(in_world) {
+            if field.at(in_world) < self.settings.point_clearance_m || !self.sight.knows(in_world) {
                 break;
             }
-            station_m = next_m;
+            arc_length_m = next_m;
         }
-        station_m
+        arc_length_m
     }
 
     /// Arc lengths at which an arc enters the patch, and at which it leaves it or has turned as far as a label may.
@@ -163,7 +165,7 @@ impl Ground<'_> {
         let station_at_x = |x_m: f32| (kappa * x_m).min(1.0).asin() / kappa;
         let station_at_y = |y_m: f32| (1.0 - kappa * y_m).max(-1.0).acos() / kappa;
         let near_m = station_at_x(near_x);
-        let far_m = station_at_x(far_x).min(station_at_y(half_y)).min(self.config.label_turn_max_rad / kappa);
+        let far_m = station_at_x(far_x).min(station_at_y(half_y)).min(self.settings.label_turn_max_rad / kappa);
         (near_m, far_m.max(near_m))
     }
 }
@@ -176,8 +178,8 @@ fn distance_to_arc_m(curvature_per_m: f32, in_ego: Vec2) -> f32 {
 }
 
 /// The point at an arc length along a circle through the rear axle, ego frame.
-fn on_arc(curvature_per_m: f32, station_m: f32) -> Vec2 {
-    Pose::default().advanced_along_arc(curvature_per_m, station_m).position()
+fn on_arc(curvature_per_m: f32, arc_length_m: f32) -> Vec2 {
+    Pose::default().advanced_along_arc(curvature_per_m, arc_length_m).position()
 }
 
 #[cfg(test)]
@@ -186,24 +188,24 @@ mod tests {
 
     #[test]
     fn labels_move_within_the_limits_of_a_tick() {
-        let config = ExpertConfig::paper();
-        let last = Label { curvature_per_m: 0.0, station_m: 6.0 };
-        let wanted = Label { curvature_per_m: 0.2, station_m: 14.0 };
-        let steadied = wanted.steadied(last, &config);
-        assert_eq!(steadied, Label { curvature_per_m: 0.012, station_m: 6.2 });
-        let back = Label { curvature_per_m: -0.2, station_m: 4.0 }.steadied(wanted, &config);
-        assert!((back.station_m - 13.6).abs() < 1e-6);
+        let settings = ExpertSettings::paper();
+        let last = Label { curvature_per_m: 0.0, arc_length_m: 6.0 };
+        let wanted = Label { curvature_per_m: 0.2, arc_length_m: 14.0 };
+        let smoothed = wanted.smoothed(last, &settings);
+        assert_eq!(smoothed, Label { curvature_per_m: 0.012, arc_length_m: 6.2 });
+        let back = Label { curvature_per_m: -0.2, arc_length_m: 4.0 }.smoothed(wanted, &settings);
+        assert!((back.arc_length_m - 13.6).abs() < 1e-6);
         // 2 · 0.5 / 14² = .0051: half a metre sideways at 14 m.
         assert!((0.2 - back.curvature_per_m - 0.0051).abs() < 1e-4);
-        assert_eq!(wanted.steadied(wanted, &config), wanted);
+        assert_eq!(wanted.smoothed(wanted, &settings), wanted);
     }
 
     #[test]
     fn the_index_undoes_the_spacing_of_the_arcs() {
-        let config = ExpertConfig::paper();
+        let settings = ExpertSettings::paper();
         for index in [-1.0_f32, -0.3, 0.0, 0.5] {
-            let curvature_per_m = config.curvature_max_per_m * index.abs().powf(1.5).copysign(index);
-            assert!((Label { curvature_per_m, station_m: 5.0 }.index(&config) - index).abs() < 1e-5);
+            let curvature_per_m = settings.curvature_max_per_m * index.abs().powf(1.5).copysign(index);
+            assert!((Label { curvature_per_m, arc_length_m: 5.0 }.index(&settings) - index).abs() < 1e-5);
         }
     }
 }

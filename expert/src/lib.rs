@@ -11,35 +11,35 @@
 //!   one says whether, where and with how much clearance what is ahead can be avoided (rule two);
 //! - `band`: its way, pulled into the middle of the free space, which no longer depends on which plan it came from;
 //! - `label`: the point on that way, half as far as the way is open (rule three; the paper's half "for safety reasons",
-//!   see [`sim::controller::SpeedLaw`]) and drivable (rule one), and steadied from tick to tick;
+//!   see [`sim::controller::SpeedLaw`]) and drivable (rule one), and smoothed from tick to tick;
 //! - `stats`: which rule it was.
 //!
 //! How the numbers came about is in methods.md 3 and expert-findings.md. The expert decides from the clean scene around
 //! the car. The route serves one purpose only: a plan that turns back is refused. Same situation and memory, same bytes.
 
-mod band;
-mod config;
+mod elastic_band;
 mod label;
+mod line_of_sight;
 mod rollout;
 mod search;
-mod sight;
+mod settings;
 mod stats;
 
-pub use config::{ExpertConfig, PlanWeights, Sees};
 pub use search::Candidate;
+pub use settings::{ExpertSettings, PlanWeights, Sees};
 pub use stats::{ExpertStats, Rule};
 
-use band::Band;
+use elastic_band::ElasticBand;
 use label::{Ground, Label};
+use line_of_sight::LineOfSight;
 use rand::Rng as _;
 use rollout::{Footprint, Motion};
 use search::{Arcs, Plan, Search};
-use sight::Sight;
 use sim::driver::{Decision, Driver, GroundTruth, LookAheadPoint, Situation, Source};
 use sim::geometry::Vec2;
 use sim::seed::{Rng, RootSeed, Stream};
 use sim::sensing::GridGeometry;
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 use std::collections::VecDeque;
 
 /// Two labels farther apart than this contradict each other, metres.
@@ -52,8 +52,8 @@ const CONTROL_PERIOD_S: f32 = 0.05;
 /// The expert at the wheel.
 #[derive(Debug, Clone)]
 pub struct ScriptedExpert {
-    config: ExpertConfig,
-    vehicle: VehicleParams,
+    settings: ExpertSettings,
+    vehicle: VehicleSettings,
     geometry: GridGeometry,
     footprint: Footprint,
     arcs: Arcs,
@@ -79,13 +79,13 @@ pub struct Inspection {
     pub chosen: usize,
     /// Way of the rear axle along the chosen plan, world.
     pub way: Vec<Vec2>,
-    /// The point before it was steadied, ego frame.
+    /// The point before it was smoothed, ego frame.
     pub wanted: LookAheadPoint,
     /// The point decided on, ego frame.
     pub decided: LookAheadPoint,
 }
 
-/// What the rules ask for, before it is steadied.
+/// What the rules ask for, before it is smoothed.
 #[derive(Debug, Clone, Copy)]
 struct Wish {
     label: Label,
@@ -95,10 +95,10 @@ struct Wish {
 
 impl ScriptedExpert {
     /// An expert for a vehicle and the patch its points must lie in.
-    pub fn new(config: ExpertConfig, vehicle: &VehicleParams, geometry: GridGeometry) -> Self {
+    pub fn new(settings: ExpertSettings, vehicle: &VehicleSettings, geometry: GridGeometry) -> Self {
         Self {
-            footprint: Footprint::new(vehicle, config.nose_margin_m, config.disc_relief_m),
-            arcs: Arcs::new(&config),
+            footprint: Footprint::new(vehicle, settings.nose_margin_m, settings.disc_relief_m),
+            arcs: Arcs::new(&settings),
             vehicle: vehicle.clone(),
             geometry,
             last: None,
@@ -106,7 +106,7 @@ impl ScriptedExpert {
             jitter: RootSeed(0).rng(Stream::Expert, 0),
             stats: ExpertStats::default(),
             inspection: None,
-            config,
+            settings,
         }
     }
 
@@ -123,8 +123,8 @@ impl ScriptedExpert {
     }
 
     /// The settings.
-    pub fn config(&self) -> &ExpertConfig {
-        &self.config
+    pub fn settings(&self) -> &ExpertSettings {
+        &self.settings
     }
 
     /// Decides and says how: costs about twice a decision.
@@ -136,23 +136,23 @@ impl ScriptedExpert {
     }
 
     /// The three rules.
-    fn wish(&self, truth: &GroundTruth<'_>, sight: &Sight, mut inspection: Option<&mut Inspection>) -> Wish {
+    fn wish(&self, truth: &GroundTruth<'_>, sight: &LineOfSight, mut inspection: Option<&mut Inspection>) -> Wish {
         let search = Search {
-            config: &self.config,
+            settings: &self.settings,
             vehicle: &self.vehicle,
             footprint: &self.footprint,
             arcs: &self.arcs,
             truth,
             sight,
             start: self.when_obeyed(truth),
-            horizon_m: sight.horizon_m(self.config.horizon_m, self.footprint.nose_m()),
-            last_index: self.last.map(|last| last.index(&self.config)),
+            horizon_m: sight.horizon_m(self.settings.horizon_m, self.footprint.nose_m()),
+            last_index: self.last.map(|last| last.index(&self.settings)),
         };
         let ground = self.ground(truth, sight);
 
         // Rule two: a point from which avoidance is possible — with the comfortable clearance, or with less.
         let mut best: Option<(usize, Plan)> = None;
-        for (level, &clearance_m) in self.config.clearances_m.iter().enumerate() {
+        for (level, &clearance_m) in self.settings.clearances_m.iter().enumerate() {
             let candidates = inspection.as_mut().map(|inspection| &mut inspection.candidates);
             let plan = search.best_plan(clearance_m, candidates);
             if let Some(plan) = plan
@@ -160,7 +160,7 @@ impl ScriptedExpert {
             {
                 best = Some((level, plan));
             }
-            if best.is_some_and(|(_, best)| best.free_m >= self.config.avoidable_m) {
+            if best.is_some_and(|(_, best)| best.free_m >= self.settings.avoidable_m) {
                 break;
             }
         }
@@ -170,14 +170,14 @@ impl ScriptedExpert {
             let arc = ground.label_on(self.arcs.curvature_per_m(plan.first), plan.first_free_m, plan.free_m);
             let label = self.smoothed(&search, &ground, &plan, arc);
             let rule = match level {
-                0 if plan.first_free_m >= self.config.obstacle_ahead_m => Rule::Far,
+                0 if plan.first_free_m >= self.settings.obstacle_ahead_m => Rule::Far,
                 0 => Rule::Avoid,
                 _ => Rule::Relaxed,
             };
             if let Some(inspection) = &mut inspection {
-                inspection.way = search.way(&plan, band::SPACING_M).collect();
+                inspection.way = search.way(&plan, elastic_band::SPACING_M).collect();
             }
-            (plan.first, Some(self.config.clearances_m[level]), Wish { label, rule, has_failed: false })
+            (plan.first, Some(self.settings.clearances_m[level]), Wish { label, rule, has_failed: false })
         } else {
             let (first, gap_m) = search.widest_gap();
             let label = ground.nearest_label_on(self.arcs.curvature_per_m(first));
@@ -195,10 +195,10 @@ impl ScriptedExpert {
     ///
     /// Every share falls to 0 gradually, so that a small change of the scene moves the label a little.
     fn smoothed(&self, search: &Search<'_>, ground: &Ground<'_>, plan: &Plan, arc: Label) -> Label {
-        let mut band = Band::along(search.way(plan, band::SPACING_M), search.start.ahead);
-        band.relax(search.truth.map.distance_field(), &self.config.band);
+        let mut band = ElasticBand::along(search.way(plan, elastic_band::SPACING_M), search.start.ahead);
+        band.relax(search.truth.map.distance_field(), &self.settings.band);
         let open_m = ground.open_way_m(&band);
-        let settings = &self.config.band;
+        let settings = &self.settings.band;
         // From the preferred range to the nearest, each takes the share it deserves of what is left.
         let near_m = settings.steer_near_m;
         let turn_rad = search.truth.vehicle.pose.ahead().angle_to(band.heading_at(settings.steer_m)).abs();
@@ -216,8 +216,8 @@ impl ScriptedExpert {
         }
         curvature_per_m += rest * arc.curvature_per_m;
         let front_m = self.vehicle.front_m();
-        let station_m = front_m + (settings.reach_share * (open_m - front_m)).min(settings.reach_max_m);
-        ground.kept_drivable(Label { curvature_per_m, station_m })
+        let arc_length_m = front_m + (settings.reach_share * (open_m - front_m)).min(settings.reach_max_m);
+        ground.kept_drivable(Label { curvature_per_m, arc_length_m })
     }
 
     /// The car when it begins to obey: the dead time further on, steering at the last label meanwhile.
@@ -232,22 +232,22 @@ impl ScriptedExpert {
         motion
     }
 
-    fn ground<'a>(&'a self, truth: &'a GroundTruth<'a>, sight: &'a Sight) -> Ground<'a> {
-        Ground { config: &self.config, vehicle: &self.vehicle, geometry: &self.geometry, truth, sight }
+    fn ground<'a>(&'a self, truth: &'a GroundTruth<'a>, sight: &'a LineOfSight) -> Ground<'a> {
+        Ground { settings: &self.settings, vehicle: &self.vehicle, geometry: &self.geometry, truth, sight }
     }
 
     /// Reaction delay and jitter of a human hand; both are off by default.
     fn said(&mut self, decided: LookAheadPoint) -> LookAheadPoint {
-        let delay_ticks = (self.config.reaction_delay_s / CONTROL_PERIOD_S).round() as usize;
+        let delay_ticks = (self.settings.reaction_delay_s / CONTROL_PERIOD_S).round() as usize;
         self.unsaid.push_back(decided);
         let point =
             if self.unsaid.len() > delay_ticks { self.unsaid.pop_front() } else { self.unsaid.front().copied() };
         let point = point.unwrap_or(decided);
-        if self.config.label_jitter == 0.0 {
+        if self.settings.label_jitter == 0.0 {
             return point;
         }
         let [u, w] = point.to_image_fraction(&self.geometry);
-        let sigma = self.config.label_jitter;
+        let sigma = self.settings.label_jitter;
         let [u, w] = [u, w].map(|fraction| (fraction + sigma * standard_normal(&mut self.jitter)).clamp(0.0, 1.0));
         LookAheadPoint::from_image_fraction([u, w], &self.geometry)
     }
@@ -256,12 +256,12 @@ impl ScriptedExpert {
 impl Driver for ScriptedExpert {
     fn decide(&mut self, situation: &Situation<'_>) -> Decision {
         let truth = &situation.truth;
-        let sight = Sight::new(self.config.sees, truth.map, truth.vehicle.pose, self.geometry);
+        let sight = LineOfSight::new(self.settings.sees, truth.map, truth.vehicle.pose, self.geometry);
         let mut inspection = self.inspection.take();
         let wish = self.wish(truth, &sight, inspection.as_mut());
         // Rule one has the last word: the point lies inside drivable space.
-        let steadied = self.last.map_or(wish.label, |last| wish.label.steadied(last, &self.config));
-        let label = self.ground(truth, &sight).kept_drivable(steadied);
+        let smoothed = self.last.map_or(wish.label, |last| wish.label.smoothed(last, &self.settings));
+        let label = self.ground(truth, &sight).kept_drivable(smoothed);
 
         let moved_m = self.last.map_or(0.0, |last| distance_m(last.point(), label.point()));
         self.stats.count(wish.rule, wish.has_failed, moved_m > JUMP_M);

@@ -2,7 +2,7 @@
 
 use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 
 /// Discs that cover the body with its lengthened nose.
 const DISCS: usize = 6;
@@ -54,7 +54,7 @@ pub(crate) struct Footprint {
 }
 
 impl Footprint {
-    pub(crate) fn new(vehicle: &VehicleParams, nose_margin_m: f32, disc_relief_m: f32) -> Self {
+    pub(crate) fn new(vehicle: &VehicleSettings, nose_margin_m: f32, disc_relief_m: f32) -> Self {
         let segment_m = (vehicle.length_m + nose_margin_m) / DISCS as f32;
         let radius_m = (0.5 * segment_m).hypot(0.5 * vehicle.width_m);
         Self {
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn the_footprint_is_that_of_the_findings() {
-        let footprint = Footprint::new(&VehicleParams::hyundai_hg300(), 0.5, 0.047);
+        let footprint = Footprint::new(&VehicleSettings::hyundai_hg300(), 0.5, 0.047);
         assert!((footprint.keep_m - 0.987).abs() < 1e-3);
         assert!((footprint.nose_m() + 0.45 - 4.3).abs() < 0.01);
     }

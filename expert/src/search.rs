@@ -4,13 +4,13 @@
 //! arc is therefore as good as the best plan that begins with it: this is the paper's "a point from which avoidance
 //! is possible".
 
-use crate::band::Band;
-use crate::config::ExpertConfig;
+use crate::elastic_band::ElasticBand;
+use crate::line_of_sight::LineOfSight;
 use crate::rollout::{Footprint, Motion};
-use crate::sight::Sight;
+use crate::settings::ExpertSettings;
 use sim::driver::GroundTruth;
 use sim::geometry::Vec2;
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 
 /// First arcs to either side of straight on.
 const FIRST_SIDE: usize = 16;
@@ -44,15 +44,15 @@ struct Arc {
 }
 
 impl Arcs {
-    pub(crate) fn new(config: &ExpertConfig) -> Self {
+    pub(crate) fn new(settings: &ExpertSettings) -> Self {
         let arc = |i: usize, n_side: usize, max_per_m: f32, exponent: f32| {
             let side = if i.is_multiple_of(2) { -1.0 } else { 1.0 };
             let index = i.div_ceil(2) as f32 / n_side as f32;
             Arc { curvature_per_m: side * max_per_m * index.powf(exponent), index: side * index }
         };
         Self {
-            first: std::array::from_fn(|i| arc(i, FIRST_SIDE, config.curvature_max_per_m, FIRST_EXPONENT)),
-            second: std::array::from_fn(|i| arc(i, SECOND_SIDE, config.second_curvature_max_per_m, SECOND_EXPONENT)),
+            first: std::array::from_fn(|i| arc(i, FIRST_SIDE, settings.curvature_max_per_m, FIRST_EXPONENT)),
+            second: std::array::from_fn(|i| arc(i, SECOND_SIDE, settings.second_curvature_max_per_m, SECOND_EXPONENT)),
         }
     }
 
@@ -64,12 +64,12 @@ impl Arcs {
 /// Where plans begin, and what they are measured with.
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
-    pub(crate) config: &'a ExpertConfig,
-    pub(crate) vehicle: &'a VehicleParams,
+    pub(crate) settings: &'a ExpertSettings,
+    pub(crate) vehicle: &'a VehicleSettings,
     pub(crate) footprint: &'a Footprint,
     pub(crate) arcs: &'a Arcs,
     pub(crate) truth: &'a GroundTruth<'a>,
-    pub(crate) sight: &'a Sight,
+    pub(crate) sight: &'a LineOfSight,
     /// The car when it begins to obey this decision.
     pub(crate) start: Motion,
     /// Curvature index of the last label, −1…1.
@@ -157,12 +157,12 @@ impl Search<'_> {
     /// The first arc with the largest smallest clearance over the next metres, and that clearance.
     pub(crate) fn widest_gap(&self) -> (usize, f32) {
         let field = self.truth.map.distance_field();
-        let steps = (self.config.tight_start_m / self.config.first_step_m).ceil() as usize;
-        let change_per_m = self.change_per_step(self.config.first_step_m);
+        let steps = (self.settings.tight_start_m / self.settings.first_step_m).ceil() as usize;
+        let change_per_m = self.change_per_step(self.settings.first_step_m);
         let gap_m = |first: usize| {
             let mut motion = self.start;
             (0..steps).fold(f32::INFINITY, |gap_m, _| {
-                motion.step(self.arcs.first[first].curvature_per_m, change_per_m, self.config.first_step_m);
+                motion.step(self.arcs.first[first].curvature_per_m, change_per_m, self.settings.first_step_m);
                 gap_m.min(self.footprint.clearance_m(field, &motion))
             })
         };
@@ -178,7 +178,7 @@ impl Search<'_> {
 
     /// The rear axle along a plan, every `spacing_m` from the start.
     pub(crate) fn way(&self, plan: &Plan, spacing_m: f32) -> impl Iterator<Item = Vec2> {
-        let step_m = self.config.first_step_m;
+        let step_m = self.settings.first_step_m;
         let change_per_m = self.change_per_step(step_m);
         let steps_per_sample = (spacing_m / step_m).round() as usize;
         let first_per_m = self.arcs.first[plan.first].curvature_per_m;
@@ -199,23 +199,23 @@ impl Search<'_> {
     }
 
     /// How safe it is to pursue a band, always steering at the point `ahead_m` along it, 0…1 by the least clearance.
-    pub(crate) fn trust(&self, band: &Band, ahead_m: f32) -> f32 {
-        let (config, field) = (self.config, self.truth.map.distance_field());
-        let step_m = config.second_step_m;
+    pub(crate) fn trust(&self, band: &ElasticBand, ahead_m: f32) -> f32 {
+        let (settings, field) = (self.settings, self.truth.map.distance_field());
+        let step_m = settings.second_step_m;
         let change_per_m = self.change_per_step(step_m);
-        let settings = &config.band;
-        let per_m = 1.0 / (settings.trust_to_m - settings.trust_from_m);
+        let of_band = &settings.band;
+        let per_m = 1.0 / (of_band.trust_to_m - of_band.trust_from_m);
         let mut motion = self.start;
         let mut trust = 1.0_f32;
-        for i in 0..(settings.forecast_m / step_m) as usize {
+        for i in 0..(of_band.forecast_m / step_m) as usize {
             let travel_m = i as f32 * step_m;
             let target = band.at(travel_m + ahead_m) - motion.position;
             let left_m = motion.ahead.perp_dot(target);
-            let target_per_m =
-                (2.0 * left_m / target.length_squared()).clamp(-config.curvature_max_per_m, config.curvature_max_per_m);
+            let target_per_m = (2.0 * left_m / target.length_squared())
+                .clamp(-settings.curvature_max_per_m, settings.curvature_max_per_m);
             motion.step(target_per_m, change_per_m, step_m);
             let clearance_m = self.footprint.clearance_m(field, &motion);
-            trust = trust.min((clearance_m - settings.trust_from_m) * per_m);
+            trust = trust.min((clearance_m - of_band.trust_from_m) * per_m);
             if trust <= 0.0 {
                 return 0.0;
             }
@@ -236,9 +236,9 @@ impl Search<'_> {
     }
 
     fn follow_first(&self, first: usize, thresholds: Thresholds) -> FirstArc {
-        let (config, field) = (self.config, self.truth.map.distance_field());
+        let (settings, field) = (self.settings, self.truth.map.distance_field());
         let Arc { curvature_per_m, index } = self.arcs.first[first];
-        let weights = &config.weights;
+        let weights = &settings.weights;
         let change = self.last_index.map_or(0.0, |last_index| (index - last_index).abs());
         let mut arc = FirstArc {
             free_m: 0.0,
@@ -248,7 +248,7 @@ impl Search<'_> {
             n_branches: 0,
             offset: 0.0,
         };
-        let step_m = config.first_step_m;
+        let step_m = settings.first_step_m;
         let change_per_m = self.change_per_step(step_m);
         let mut motion = self.start;
         let mut travel_m = 0.0;
@@ -256,7 +256,7 @@ impl Search<'_> {
             motion.step(curvature_per_m, change_per_m, step_m);
             travel_m += step_m;
             let clearance_m = self.footprint.clearance_m(field, &motion);
-            if clearance_m < thresholds.at(travel_m, config)
+            if clearance_m < thresholds.at(travel_m, settings)
                 || !self.sight.knows(motion.on_axis(self.footprint.nose_m()))
             {
                 break;
@@ -265,7 +265,7 @@ impl Search<'_> {
             arc.load_m += self.load(clearance_m) * step_m;
             arc.end = motion;
             // Half a step: travels are sums of steps.
-            if arc.n_branches < BRANCHES && travel_m + 0.5 * step_m > config.branch_travels_m[arc.n_branches] {
+            if arc.n_branches < BRANCHES && travel_m + 0.5 * step_m > settings.branch_travels_m[arc.n_branches] {
                 arc.branches[arc.n_branches] = Branch { motion, travel_m, load_m: arc.load_m };
                 arc.n_branches += 1;
             }
@@ -291,7 +291,7 @@ impl Search<'_> {
     /// Travel and load of a plan. Grows with the travel at a given load.
     #[inline]
     fn worth(&self, travel_m: f32, load_m: f32) -> f32 {
-        travel_m / self.config.weights.unit_m - self.config.weights.load * load_m / travel_m
+        travel_m / self.settings.weights.unit_m - self.settings.weights.load * load_m / travel_m
     }
 
     /// Replaces `best` by the best plan that begins with a first arc, if that is better.
@@ -312,7 +312,7 @@ impl Search<'_> {
         let mut to_beat = offer(None, first.free_m, first.load_m, 0.0, &first.end);
         for branch in first.branches[..first.n_branches].iter().rev() {
             for second in &self.arcs.second {
-                let penalty = self.config.weights.second_curvature * second.index.abs();
+                let penalty = self.settings.weights.second_curvature * second.index.abs();
                 let load_max_m = self.load_at_bound(to_beat - first.offset + penalty);
                 if let Some((free_m, load_m, end)) =
                     self.follow_second(branch, second.curvature_per_m, thresholds, load_max_m)
@@ -325,7 +325,7 @@ impl Search<'_> {
 
     /// The load above which [`Self::bound`] falls below a worth.
     fn load_at_bound(&self, worth: f32) -> f32 {
-        let weights = &self.config.weights;
+        let weights = &self.settings.weights;
         (self.horizon_m / weights.unit_m - worth) * self.horizon_m / weights.load
     }
 
@@ -337,8 +337,8 @@ impl Search<'_> {
         thresholds: Thresholds,
         load_max_m: f32,
     ) -> Option<(f32, f32, Motion)> {
-        let (config, field) = (self.config, self.truth.map.distance_field());
-        let step_m = config.second_step_m;
+        let (settings, field) = (self.settings, self.truth.map.distance_field());
+        let step_m = settings.second_step_m;
         let change_per_m = self.change_per_step(step_m);
         let Branch { mut motion, mut travel_m, mut load_m } = *branch;
         while travel_m < self.horizon_m {
@@ -348,7 +348,7 @@ impl Search<'_> {
             let before = motion;
             motion.step(curvature_per_m, change_per_m, step_m);
             let clearance_m = self.footprint.coarse_clearance_m(field, &motion);
-            if clearance_m < thresholds.at(travel_m + step_m, config)
+            if clearance_m < thresholds.at(travel_m + step_m, settings)
                 || !self.sight.knows(motion.on_axis(self.footprint.nose_m()))
             {
                 return Some((travel_m, load_m, before));
@@ -363,7 +363,7 @@ impl Search<'_> {
     /// keeps the car in the middle.
     #[inline]
     fn load(&self, clearance_m: f32) -> f32 {
-        let share = (1.0 - clearance_m / self.config.load_band_m).clamp(0.0, 1.0);
+        let share = (1.0 - clearance_m / self.settings.load_band_m).clamp(0.0, 1.0);
         share * share
     }
 
@@ -378,7 +378,7 @@ impl Search<'_> {
         let reached_m = progress_of(end);
         // Behind the finish progress saturates.
         reached_m > path.length_m() - 0.5
-            || reached_m - progress_of(&self.start) >= self.config.progress_share * travel_m
+            || reached_m - progress_of(&self.start) >= self.settings.progress_share * travel_m
     }
 }
 
@@ -395,7 +395,7 @@ struct Thresholds {
 impl Thresholds {
     /// A tight start must not end every arc at once.
     #[inline]
-    fn at(self, travel_m: f32, config: &ExpertConfig) -> f32 {
-        if travel_m < config.tight_start_m { self.near_m } else { self.far_m }
+    fn at(self, travel_m: f32, settings: &ExpertSettings) -> f32 {
+        if travel_m < settings.tight_start_m { self.near_m } else { self.far_m }
     }
 }

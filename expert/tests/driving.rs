@@ -1,15 +1,15 @@
 //! The three rules on small scenes, and what every label must keep.
 
-use expert::{ExpertConfig, ExpertStats, ScriptedExpert, Sees};
+use expert::{ExpertSettings, ExpertStats, ScriptedExpert, Sees};
 use proptest::prelude::*;
 use sim::driver::{Driver, GroundTruth, LookAheadPoint, Situation};
-use sim::episode::{Ending, Episode, EpisodeConfig, EpisodeReport};
+use sim::episode::{Ending, Episode, EpisodeReport, EpisodeSettings};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
-use sim::scenario::{Direction, NoiseSettings, Obstacle, ObstacleClass, ReferencePath, Scenario};
+use sim::scenario::{Direction, LotNoise, Obstacle, ObstacleClass, ReferencePath, Scenario};
 use sim::seed::RootSeed;
 use sim::sensing::{GridGeometry, Observation};
-use sim::vehicle::{VehicleParams, VehicleState};
+use sim::vehicle::{VehicleSettings, VehicleState};
 use std::sync::Arc;
 
 fn scenario(boundary: Vec<Vec2>, route: Vec<Vec2>, obstacles: Vec<Obstacle>) -> Scenario {
@@ -17,7 +17,7 @@ fn scenario(boundary: Vec<Vec2>, route: Vec<Vec2>, obstacles: Vec<Obstacle>) -> 
         name: "scene".to_owned(),
         boundary,
         reference_path: ReferencePath { points: route, corner_radius_m: 5.0 },
-        noise: NoiseSettings::default(),
+        noise: LotNoise::default(),
         islands: Vec::new(),
         obstacles,
         speed_bumps: Vec::new(),
@@ -44,12 +44,12 @@ fn corner() -> Scenario {
 }
 
 fn map(scenario: Scenario) -> Map {
-    Map::build(scenario, &VehicleParams::hyundai_hg300()).expect("the scenes of these tests are valid")
+    Map::build(scenario, &VehicleSettings::hyundai_hg300()).expect("the scenes of these tests are valid")
 }
 
 fn expert(sees: Sees) -> ScriptedExpert {
-    let config = ExpertConfig { sees, ..ExpertConfig::paper() };
-    ScriptedExpert::new(config, &VehicleParams::hyundai_hg300(), GridGeometry::paper())
+    let settings = ExpertSettings { sees, ..ExpertSettings::paper() };
+    ScriptedExpert::new(settings, &VehicleSettings::hyundai_hg300(), GridGeometry::paper())
 }
 
 /// First answer of an expert without a past.
@@ -61,8 +61,8 @@ fn answer(map: &Map, pose: Pose, speed_mps: f32) -> LookAheadPoint {
 }
 
 fn drive(scenario: Scenario, sees: Sees) -> (EpisodeReport, Vec<LookAheadPoint>, ExpertStats) {
-    let config = Arc::new(EpisodeConfig::paper());
-    let mut episode = Episode::new(config, Arc::new(map(scenario)), RootSeed(1));
+    let settings = Arc::new(EpisodeSettings::paper());
+    let mut episode = Episode::new(settings, Arc::new(map(scenario)), RootSeed(1));
     let mut driver = expert(sees);
     let mut points = Vec::new();
     while episode.ending().is_none() {
@@ -75,7 +75,7 @@ fn drive(scenario: Scenario, sees: Sees) -> (EpisodeReport, Vec<LookAheadPoint>,
 
 #[test]
 fn an_open_lane_is_looked_down_in_the_middle() {
-    let far_m = ExpertConfig::paper().band.reach_max_m + VehicleParams::hyundai_hg300().front_m();
+    let far_m = ExpertSettings::paper().band.reach_max_m + VehicleSettings::hyundai_hg300().front_m();
     for width_m in [2.8, 3.4, 5.0] {
         let point = answer(&map(lane(width_m, Vec::new())), Pose::default(), 1.5);
         assert!((point.ahead_m - far_m).abs() < 0.1 && point.left_m.abs() < 0.1, "{width_m} m: {point:?}");
@@ -88,7 +88,7 @@ fn from_beside_the_middle_the_car_is_steered_back_to_it() {
     let pose = Pose::new(Vec2::new(0.0, 0.3), 0.02);
     let map = map(lane(3.4, Vec::new()));
     let point = answer(&map, pose, 1.5);
-    let steer_m = ExpertConfig::paper().band.steer_m;
+    let steer_m = ExpertSettings::paper().band.steer_m;
     let met = pose.advanced_along_arc(point.curvature_per_m(), steer_m).position();
     assert!(met.y.abs() < 0.1, "{point:?} leads through {met}");
 }
@@ -110,7 +110,7 @@ fn a_blocked_lane_gives_a_near_point() {
     };
     let ahead_of_bumper_m = |obstacles| {
         let point = answer(&short_route(obstacles), Pose::default(), 0.5);
-        point.ahead_m - VehicleParams::hyundai_hg300().front_m()
+        point.ahead_m - VehicleSettings::hyundai_hg300().front_m()
     };
     let open_m = ahead_of_bumper_m(Vec::new());
     let blocked_m = ahead_of_bumper_m(vec![car(9.0, 0.0, std::f32::consts::FRAC_PI_2)]);

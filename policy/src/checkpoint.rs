@@ -41,9 +41,9 @@ struct Card {
 const INPUT: &str = "grid [batch, 1, 25, 25]: 1 = non-drivable, 0 = drivable; row 0 = far, column 0 = left";
 const OUTPUT: &str = "[u, w, raw_u, raw_w]: (u, w) look-ahead point in image fractions, u 0 = left 1 = right, w 0 = far \
                       1 = near, clipped to [0, 1] in use; log sigma^2 = mid + half * tanh((raw - mid) / half) between \
-                      log_variance_min and log_variance_max; if network.symmetric, the mean of the output for the grid and \
+                      log_variance_min and log_variance_max; if network.mirror_averaging, the mean of the output for the grid and \
                       the output for grid.flip(-1) with 1 - u in place of u; driven at is the exponential mean over \
-                      network.memory_ticks of the point's curvature 2 Y / (X^2 + Y^2) and range (X^2 + Y^2)^0.5";
+                      network.smoothing_ticks of the point's curvature 2 Y / (X^2 + Y^2) and range (X^2 + Y^2)^0.5";
 
 impl Checkpoint {
     /// Whether a folder holds a finished checkpoint.

@@ -1,11 +1,11 @@
 //! `DAgger` with the paper's data-sampling function: Algorithms 1 and 2, in their order and with their line numbers.
 
-mod arbiter;
 mod disturbance;
+mod gated_collector;
 mod record;
 
-pub use arbiter::{Arbiter, Collected, Keep};
 pub use disturbance::DisturbanceSettings;
+pub use gated_collector::{Collected, GatedCollector, Keep};
 pub use record::{Collection, IterationRow};
 
 use crate::checkpoint::Checkpoint;
@@ -28,7 +28,7 @@ use std::path::Path;
 /// Everything a run is made of, besides its seed, its episodes and its expert.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct DaggerConfig {
+pub struct DaggerSettings {
     /// η: iterations stop when the network drives more than this share of the ticks.
     pub eta: f64,
     /// Iterations made even if η is passed earlier.
@@ -40,7 +40,7 @@ pub struct DaggerConfig {
     /// Further looks at every kept tick, each with noise of its own, trained on with the same label: what is noise and
     /// what is not is learned sooner than it is from driving more. At most 255: each has a stream of its own.
     #[serde(default)]
-    pub relooks: u8,
+    pub noise_augmentations: u8,
     /// Nudges of the wheel in iterations (not in behaviour cloning): what follows a mistake is seen and labelled.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disturbance: Option<DisturbanceSettings>,
@@ -73,7 +73,7 @@ pub enum StartFrom {
     Previous,
 }
 
-impl DaggerConfig {
+impl DaggerSettings {
     /// τ .07, χ .1, η .9, α 1.5, from scratch; eight iterations at most (methods.md 13).
     pub fn paper() -> Self {
         Self {
@@ -81,7 +81,7 @@ impl DaggerConfig {
             iterations_min: 1,
             iterations_max: 8,
             keep: Keep::ExpertTicks,
-            relooks: 0,
+            noise_augmentations: 0,
             disturbance: None,
             start: StartFrom::Scratch,
             device: DeviceChoice::Cpu,
@@ -105,7 +105,7 @@ impl DaggerConfig {
             iterations_min: 2,
             iterations_max: 3,
             keep: Keep::EveryTick,
-            relooks: 2,
+            noise_augmentations: 2,
             start: StartFrom::Previous,
             network: LookAheadNetConfig::compact(),
             fit_cloning: FitSettings::quick(7000),
@@ -210,26 +210,26 @@ pub enum DaggerError {
 /// # Errors
 /// If the store holds another run, or a file cannot be read or written.
 pub fn run(
-    config: &DaggerConfig,
+    settings: &DaggerSettings,
     store: &Store,
     seed: RootSeed,
     hooks: &mut Hooks<'_>,
 ) -> Result<Outcome, DaggerError> {
-    config.network.validate()?;
-    claim(store, config, seed)?;
-    let mut run = Run { config, store, seed, hooks, rows: Vec::new() };
+    settings.network.validate()?;
+    claim(store, settings, seed)?;
+    let mut run = Run { settings, store, seed, hooks, rows: Vec::new() };
     let (policy, stop) = match run.dagger() {
         Ok((policy, stop)) => (Some(policy), stop),
         Err(Halt::Interrupted(policy)) => (policy, Stop::Interrupted),
         Err(Halt::Failed(error)) => return Err(error),
     };
-    let policy = policy.map(|weights| Checkpoint { weights, geometry: config.geometry });
+    let policy = policy.map(|weights| Checkpoint { weights, geometry: settings.geometry });
     Ok(Outcome { policy, rows: run.rows, stop })
 }
 
 /// One run in progress.
 struct Run<'r, 'h> {
-    config: &'r DaggerConfig,
+    settings: &'r DaggerSettings,
     store: &'r Store,
     seed: RootSeed,
     hooks: &'r mut Hooks<'h>,
@@ -259,8 +259,8 @@ impl Run<'_, '_> {
         let mut eta_hat = 0.0; // line 4
         let mut i = 1;
         // Line 5: while η̂ ≤ η. Unrounded: the paper's last row prints 0.90 and stops (methods.md 12, 15).
-        while eta_hat <= self.config.eta || i <= self.config.iterations_min {
-            if i > self.config.iterations_max {
+        while eta_hat <= self.settings.eta || i <= self.settings.iterations_min {
+            if i > self.settings.iterations_max {
                 return Ok((self.finish(policy, &d)?, Stop::IterationCap));
             }
             let (d_i, collected) = self.data_sampling_function(Some(&policy), i)?; // line 6
@@ -280,34 +280,35 @@ impl Run<'_, '_> {
         }
         let episodes = (self.hooks.episodes)(round);
         self.report(&Progress::Collecting { round, episodes: episodes.len() }, policy)?;
-        let control_period_s = episodes.first().map_or(0.0, |episode| episode.config().control_period_s());
+        let control_period_s = episodes.first().map_or(0.0, |episode| episode.settings().control_period_s());
         let experts = (0..episodes.len()).map(|episode| (self.hooks.expert)(round, episode)).collect();
-        let novice = policy.map(|weights| Predictor::new(weights.clone(), self.config.device));
-        let mut arbiter = Arbiter::new(novice, experts, self.config.rule, self.config.keep, self.config.geometry)
-            .with_lookers(self.lookers(&episodes, round))
-            .with_disturbances(self.disturbances(episodes.len(), round));
+        let novice = policy.map(|weights| Predictor::new(weights.clone(), self.settings.device));
+        let mut collector =
+            GatedCollector::new(novice, experts, self.settings.rule, self.settings.keep, self.settings.geometry)
+                .with_augmenting_sensors(self.augmenting_sensors(&episodes, round))
+                .with_disturbances(self.disturbances(episodes.len(), round));
         let on_frame = &mut *self.hooks.on_frame;
-        let reports = run_lockstep(episodes, &mut arbiter, &mut |episode, frame| on_frame(round, episode, frame));
-        let collected = arbiter.into_collected();
+        let reports = run_lockstep(episodes, &mut collector, &mut |episode, frame| on_frame(round, episode, frame));
+        let collected = collector.into_collected();
         let collection = Collection::new(round, &collected, control_period_s, &reports);
         self.store.write_round(round, &collected.round, &collection)?;
         Ok((collected.round, collection))
     }
 
     /// The sensors of the further looks, for every episode.
-    fn lookers(&self, episodes: &[Episode], round: u32) -> Vec<Vec<Sensor>> {
-        let (seed, looks) = (self.seed, u64::from(self.config.relooks));
-        let lookers = |(index, episode): (usize, &Episode)| {
+    fn augmenting_sensors(&self, episodes: &[Episode], round: u32) -> Vec<Vec<Sensor>> {
+        let (seed, looks) = (self.seed, u64::from(self.settings.noise_augmentations));
+        let augmenting_sensors = |(index, episode): (usize, &Episode)| {
             // 2^20 rounds of 2^20 episodes with 2^8 looks.
             let first = (u64::from(round) << 20 | index as u64) << 8;
-            (0..looks).map(|look| episode.another_sensor(seed.child(Stream::Relook, first + look))).collect()
+            (0..looks).map(|look| episode.another_sensor(seed.child(Stream::NoiseAugmentation, first + look))).collect()
         };
-        episodes.par_iter().enumerate().map(lookers).collect()
+        episodes.par_iter().enumerate().map(augmenting_sensors).collect()
     }
 
     /// Nudges for every episode of an iteration; none while cloning.
     fn disturbances(&self, episodes: usize, round: u32) -> Vec<Disturbance> {
-        let Some(settings) = self.config.disturbance.filter(|_| round > 0) else { return Vec::new() };
+        let Some(settings) = self.settings.disturbance.filter(|_| round > 0) else { return Vec::new() };
         let rng = |episode: u64| self.seed.rng(Stream::Disturbance, u64::from(round) << 20 | episode);
         (0..episodes as u64).map(|episode| Disturbance::new(settings, rng(episode))).collect()
     }
@@ -333,14 +334,14 @@ impl Run<'_, '_> {
         round: u32,
         collection: &Collection,
     ) -> Result<Weights, Halt> {
-        let config = self.config;
+        let settings = self.settings;
         let folder = self.store.round_folder(round);
-        let settings = if round == 0 { &config.fit_cloning } else { &config.fit_iteration };
-        let start = match (config.start, &previous) {
+        let fit = if round == 0 { &settings.fit_cloning } else { &settings.fit_iteration };
+        let start = match (settings.start, &previous) {
             (StartFrom::Previous, Some(weights)) => weights.clone(),
-            _ => Weights::init(config.network, self.seed, u64::from(round)),
+            _ => Weights::init(settings.network, self.seed, u64::from(round)),
         };
-        let trained = self.trained_in(&folder, start, d, settings, Some(round))?;
+        let trained = self.trained_in(&folder, start, d, fit, Some(round))?;
         let Some((weights, fit)) = trained else {
             return Err(Halt::Interrupted(previous));
         };
@@ -352,12 +353,12 @@ impl Run<'_, '_> {
 
     /// The optional longer training at the end.
     fn finish(&mut self, policy: Weights, d: &Dataset) -> Result<Weights, Halt> {
-        let Some(settings) = &self.config.fit_final else {
+        let Some(settings) = &self.settings.fit_final else {
             return Ok(policy);
         };
-        let start = match self.config.start {
+        let start = match self.settings.start {
             StartFrom::Previous => policy.clone(),
-            StartFrom::Scratch => Weights::init(self.config.network, self.seed, FINAL),
+            StartFrom::Scratch => Weights::init(self.settings.network, self.seed, FINAL),
         };
         let trained = self.trained_in(&self.store.final_folder(), start, d, settings, None)?;
         trained.map(|(weights, _)| weights).ok_or(Halt::Interrupted(Some(policy)))
@@ -379,7 +380,7 @@ impl Run<'_, '_> {
         let seed = self.seed.child(Stream::Shuffle, index);
         let progress = &mut *self.hooks.progress;
         let mut on_step = |fit: &FitProgress| progress(&Progress::Fitting { round, fit });
-        let (geometry, device) = (self.config.geometry, self.config.device);
+        let (geometry, device) = (self.settings.geometry, self.settings.device);
         let FitOutcome { weights, report } = fit::fit(start, d, settings, geometry, device, seed, &mut on_step)
             .map_err(|source| DaggerError::Fit { round: round.unwrap_or(u32::MAX), source })?;
         if report.stopped {
@@ -388,7 +389,7 @@ impl Run<'_, '_> {
         // The checkpoint comes last: where it is, the training is complete.
         std::fs::create_dir_all(folder).map_err(|error| StoreError::new(folder, error, "check that it is writable"))?;
         write_toml(&folder.join(FIT), &report)?;
-        let checkpoint = Checkpoint { weights, geometry: self.config.geometry };
+        let checkpoint = Checkpoint { weights, geometry: self.settings.geometry };
         checkpoint.save(folder)?;
         Ok(Some((checkpoint.weights, report)))
     }
@@ -411,13 +412,13 @@ const CONFIG: &str = "dagger.toml";
 #[serde(deny_unknown_fields)]
 struct Claim {
     seed: RootSeed,
-    config: DaggerConfig,
+    settings: DaggerSettings,
 }
 
 /// Makes sure that a folder is continued only with what it was begun with.
-fn claim(store: &Store, config: &DaggerConfig, seed: RootSeed) -> Result<(), StoreError> {
+fn claim(store: &Store, settings: &DaggerSettings, seed: RootSeed) -> Result<(), StoreError> {
     let path = store.folder().join(CONFIG);
-    let ours = Claim { seed, config: config.clone() };
+    let ours = Claim { seed, settings: settings.clone() };
     if !path.exists() {
         return write_toml(&path, &ours);
     }

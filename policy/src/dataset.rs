@@ -32,21 +32,21 @@ pub struct Round {
     pub samples: Vec<Sample>,
     /// Further looks at the scenes of the samples, each with noise of its own: the same number for every sample, those
     /// of one sample together. Trained on with the sample's label; never validated on.
-    pub relooks: Vec<OccupancyGrid>,
+    pub noise_augmentations: Vec<OccupancyGrid>,
 }
 
 impl From<Vec<Sample>> for Round {
     /// Without further looks.
     fn from(samples: Vec<Sample>) -> Self {
-        Self { samples, relooks: Vec::new() }
+        Self { samples, noise_augmentations: Vec::new() }
     }
 }
 
 impl Round {
     /// Further looks at a sample.
     fn relooks_of(&self, sample: usize) -> &[OccupancyGrid] {
-        let each = self.relooks.len() / self.samples.len().max(1);
-        &self.relooks[sample * each..(sample + 1) * each]
+        let each = self.noise_augmentations.len() / self.samples.len().max(1);
+        &self.noise_augmentations[sample * each..(sample + 1) * each]
     }
 }
 
@@ -168,7 +168,8 @@ pub(crate) mod tests {
     #[test]
     fn further_looks_are_trained_on_beside_their_sample_and_never_validated_on() {
         let mut round = round(20);
-        round.relooks = round.samples.iter().flat_map(|sample| [sample.grid.mirrored(), sample.grid]).collect();
+        round.noise_augmentations =
+            round.samples.iter().flat_map(|sample| [sample.grid.mirrored(), sample.grid]).collect();
         let mut dataset = Dataset::default();
         dataset.push(round.clone());
         let split = dataset.split(ValidationSplit { block: 5, every: 2 });

@@ -2,7 +2,7 @@
 
 use crate::checkpoint::Checkpoint;
 use crate::network::{DeviceChoice, Prediction, Predictor};
-use crate::steadying::{Steadying, Steadyings};
+use crate::smoothing::{ActionSmoothing, FleetSmoothing};
 use sim::driver::{Decision, Fleet, Policy, Seat, Source};
 use sim::sensing::{GridGeometry, Observation};
 
@@ -32,20 +32,20 @@ impl Fleet for NetFleet {
 #[derive(Debug, Clone)]
 pub(crate) struct Novice {
     predictor: Predictor,
-    steadyings: Steadyings,
+    smoothing: FleetSmoothing,
 }
 
 impl Novice {
     pub(crate) fn new(predictor: Predictor, geometry: GridGeometry) -> Self {
-        let steadyings = Steadyings::new(&predictor.weights().config(), geometry);
-        Self { predictor, steadyings }
+        let smoothing = FleetSmoothing::new(&predictor.weights().config(), geometry);
+        Self { predictor, smoothing }
     }
 
-    /// What it answers at every seat, steadied.
+    /// What it answers at every seat, smoothed.
     pub(crate) fn answers(&mut self, seats: &[Seat<'_>]) -> Vec<Prediction> {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
         let mut answers = self.predictor.predict(&grids);
-        self.steadyings.steady(seats, &mut answers);
+        self.smoothing.steady(seats, &mut answers);
         answers
     }
 }
@@ -55,26 +55,26 @@ impl Novice {
 pub struct NetPolicy {
     predictor: Predictor,
     geometry: GridGeometry,
-    steadying: Steadying,
+    smoothing: ActionSmoothing,
 }
 
 impl NetPolicy {
     /// Seats a network.
     pub fn new(checkpoint: Checkpoint, device: DeviceChoice) -> Self {
         let Checkpoint { weights, geometry } = checkpoint;
-        let steadying = Steadying::new(&weights.config(), geometry);
-        Self { predictor: Predictor::new(weights, device), geometry, steadying }
+        let smoothing = ActionSmoothing::new(&weights.config(), geometry);
+        Self { predictor: Predictor::new(weights, device), geometry, smoothing }
     }
 }
 
 impl Policy for NetPolicy {
     fn act(&mut self, observation: &Observation) -> Decision {
         let prediction = self.predictor.predict(&[&observation.grid])[0];
-        novice_decision(&self.steadying.steadied(prediction), self.geometry)
+        novice_decision(&self.smoothing.smoothed(prediction), self.geometry)
     }
 
     fn reset(&mut self) {
-        self.steadying.reset();
+        self.smoothing.reset();
     }
 }
 

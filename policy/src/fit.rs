@@ -259,7 +259,7 @@ pub fn fit(
     let mut weights = start;
     let mut adam = Adam::new(settings.adam, weights.values().len());
     let mut engine = Engine::new(weights.config(), settings.shards, device);
-    let mut deck = Deck::new(&split.training, settings.mirror, seed);
+    let mut deck = BatchSampler::new(&split.training, settings.mirror, seed);
     let mut batch = Vec::with_capacity(settings.batch);
     let mut curve = Vec::new();
     let mut since_point = MeanLoss::default();
@@ -343,7 +343,7 @@ pub fn evaluate(
 }
 
 /// Deals samples in a new order each time all have been dealt.
-struct Deck<'a> {
+struct BatchSampler<'a> {
     samples: &'a [Sample],
     mirror: Mirror,
     seed: RootSeed,
@@ -353,7 +353,7 @@ struct Deck<'a> {
     rng: sim::seed::Rng,
 }
 
-impl<'a> Deck<'a> {
+impl<'a> BatchSampler<'a> {
     fn new(samples: &'a [Sample], mirror: Mirror, seed: RootSeed) -> Self {
         let order: Vec<u32> = (0..samples.len() as u32).collect();
         Self { samples, mirror, seed, next: order.len(), order, epoch: 0, rng: seed.rng(Stream::Shuffle, 0) }

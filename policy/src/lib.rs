@@ -9,12 +9,10 @@
 //! | [`decision_rule`] | Algorithm 2, line 9: may the network drive this tick? |
 //! | [`dagger`] | Algorithms 1 and 2, top to bottom |
 //! | [`drivers`] | the trained network at the wheel |
-//! | [`baselines`] | the model-based planners it is compared with |
 //! | [`checkpoint`] | a trained network on disk |
 //!
 //! Images: u = column fraction (0 = left, 1 = right), w = row fraction (0 = far, 1 = near), as in methods.md 0.
 
-pub mod baselines;
 pub mod checkpoint;
 pub mod dagger;
 pub mod dataset;
@@ -23,4 +21,4 @@ pub mod drivers;
 pub mod fit;
 pub mod loss;
 pub mod network;
-mod steadying;
+mod smoothing;

@@ -72,11 +72,11 @@ pub struct LookAheadNetConfig {
     /// In use, the answer is the mean of the answer to a grid and of the mirrored answer to its mirror image: left and
     /// right are then treated alike to the bit, and errors partly cancel. Training sees single grids as always.
     #[serde(default)]
-    pub symmetric: bool,
+    pub mirror_averaging: bool,
     /// In use, the point that is driven at is an exponential mean of the answers over about so many ticks, in curvature
     /// and range; 0: the last answer alone.
     #[serde(default)]
-    pub memory_ticks: f32,
+    pub smoothing_ticks: f32,
 }
 
 impl LookAheadNetConfig {
@@ -88,8 +88,8 @@ impl LookAheadNetConfig {
             hidden: 1000,
             dropout_features: 0.25,
             dropout_hidden: 0.5,
-            symmetric: false,
-            memory_ticks: 0.0,
+            mirror_averaging: false,
+            smoothing_ticks: 0.0,
         }
     }
 
@@ -104,8 +104,8 @@ impl LookAheadNetConfig {
             hidden: 256,
             dropout_features: 0.0,
             dropout_hidden: 0.2,
-            symmetric: true,
-            memory_ticks: 8.0,
+            mirror_averaging: true,
+            smoothing_ticks: 8.0,
         }
     }
 
@@ -132,8 +132,8 @@ impl LookAheadNetConfig {
                 return Err(NetworkError::Kernel { layer, kernel: conv.kernel });
             }
         }
-        if !(self.memory_ticks.is_finite() && self.memory_ticks >= 0.0) {
-            return Err(NetworkError::Memory { ticks: self.memory_ticks });
+        if !(self.smoothing_ticks.is_finite() && self.smoothing_ticks >= 0.0) {
+            return Err(NetworkError::Memory { ticks: self.smoothing_ticks });
         }
         if self.hidden == 0 {
             return Err(NetworkError::NoHiddenUnits);
@@ -172,7 +172,7 @@ pub enum NetworkError {
     #[error("the fully connected layer needs at least one unit")]
     NoHiddenUnits,
     /// A memory that is no length of time.
-    #[error("memory_ticks is {ticks}; 0 or more ticks are possible")]
+    #[error("smoothing_ticks is {ticks}; 0 or more ticks are possible")]
     Memory {
         /// As given.
         ticks: f32,

@@ -1,7 +1,7 @@
 //! Parked cars and everything else that stands about, placed under rules that keep a lot drivable.
 //!
 //! Two kinds of things: those outside the lane, which only hide ground and look like a parking lot, and *intruders*,
-//! which narrow the lane. Every intruder leaves a free gap to the opposite edge, keeps away from corners and from
+//! which narrow the lane. Every encroachment leaves a free gap to the opposite edge, keeps away from corners and from
 //! intruders on the other side; `tests` below measures that with a routine of its own.
 
 use crate::corridor::{Corridor, Leg, STALL_DEPTH_M, Side, Stall, overlap, to_millimetres};
@@ -69,7 +69,7 @@ pub struct Furniture {
 
 /// A stretch of lane that is narrowed from one side.
 #[derive(Debug, Clone, Copy)]
-pub struct Intruder {
+pub struct LaneEncroachment {
     /// Index of the leg.
     pub leg: usize,
     /// Side it stands on.
@@ -88,27 +88,27 @@ pub struct Clutter {
     /// In the lane and outside.
     pub obstacles: Vec<Obstacle>,
     /// The stretches they narrow, reserved ones included.
-    pub intruders: Vec<Intruder>,
+    pub intruders: Vec<LaneEncroachment>,
 }
 
 /// Fills a corridor. `reserved` stretches (islands) are treated as intruders that already stand there.
-pub fn place(corridor: &Corridor, plan: &ClutterPlan, reserved: &[Intruder], rng: &mut Rng) -> Clutter {
+pub fn place(corridor: &Corridor, plan: &ClutterPlan, reserved: &[LaneEncroachment], rng: &mut Rng) -> Clutter {
     let arms = if plan.closed_arms { closed_arms(corridor) } else { Vec::new() };
     let reserved_ground: Vec<_> = arms.iter().map(|arm| arm.ground).collect();
-    let mut floor = Floor { corridor, plan, intruders: reserved.to_vec(), things: Vec::new() };
+    let mut placement = Placement { corridor, plan, intruders: reserved.to_vec(), things: Vec::new() };
     for leg in 0..corridor.legs.len() {
-        close_branches(&mut floor, leg);
+        close_branches(&mut placement, leg);
     }
     for &cone in arms.iter().flat_map(|arm| &arm.cones) {
-        floor.stand(ObstacleClass::Cone, Pose::new(cone, 0.0));
+        placement.stand(ObstacleClass::Cone, Pose::new(cone, 0.0));
     }
-    place_double_parked(&mut floor, rng);
+    place_double_parked(&mut placement, rng);
     for stall in corridor.stalls(&reserved_ground) {
-        place_parked(&mut floor, &stall, rng);
+        place_parked(&mut placement, &stall, rng);
     }
-    place_furniture(&mut floor, rng);
-    let obstacles = floor.things.into_iter().map(|thing| thing.obstacle).collect();
-    Clutter { obstacles, intruders: floor.intruders }
+    place_furniture(&mut placement, rng);
+    let obstacles = placement.things.into_iter().map(|thing| thing.obstacle).collect();
+    Clutter { obstacles, intruders: placement.intruders }
 }
 
 /// One speed bump per `every_m` of route, each in a leg's lane, across its whole width.
@@ -140,10 +140,10 @@ pub fn speed_bumps(corridor: &Corridor, every_m: f32) -> Vec<SpeedBump> {
 }
 
 /// What stands where so far.
-struct Floor<'a> {
+struct Placement<'a> {
     corridor: &'a Corridor,
     plan: &'a ClutterPlan,
-    intruders: Vec<Intruder>,
+    intruders: Vec<LaneEncroachment>,
     things: Vec<Thing>,
 }
 
@@ -165,7 +165,7 @@ impl Thing {
     }
 }
 
-impl Floor<'_> {
+impl Placement<'_> {
     fn leg(&self, index: usize) -> &Leg {
         &self.corridor.legs[index]
     }
@@ -192,7 +192,7 @@ impl Floor<'_> {
 
     fn may_intrude(&self, leg: usize, side: Side, from_m: f32, to_m: f32) -> bool {
         let (usable_from_m, usable_to_m) = self.usable(leg);
-        let keeps_apart = |other: &Intruder| {
+        let keeps_apart = |other: &LaneEncroachment| {
             let clear_m = if other.side == side { SAME_SIDE_CLEAR_M } else { self.plan.opposite_clear_m };
             other.leg != leg || other.to_m + clear_m <= from_m || to_m + clear_m <= other.from_m
         };
@@ -239,8 +239,8 @@ struct Placed {
 }
 
 impl Placed {
-    fn intruder(&self, leg: usize, side: Side) -> Intruder {
-        Intruder { leg, side, from_m: self.from_m, to_m: self.to_m, protrusion_m: self.protrusion_m }
+    fn encroachment(&self, leg: usize, side: Side) -> LaneEncroachment {
+        LaneEncroachment { leg, side, from_m: self.from_m, to_m: self.to_m, protrusion_m: self.protrusion_m }
     }
 }
 
@@ -306,28 +306,28 @@ impl Cluster {
 
 /// Clusters of 1–3 cars parallel to the lane until the planned share of the route has one beside it. What does not fit
 /// into one leg is owed by the next.
-fn place_double_parked(floor: &mut Floor<'_>, rng: &mut Rng) {
-    let legs = floor.corridor.legs.len();
-    let usable_m = |floor: &Floor<'_>, leg: usize| {
-        let (from_m, to_m) = floor.usable(leg);
+fn place_double_parked(placement: &mut Placement<'_>, rng: &mut Rng) {
+    let legs = placement.corridor.legs.len();
+    let usable_m = |placement: &Placement<'_>, leg: usize| {
+        let (from_m, to_m) = placement.usable(leg);
         (to_m - from_m).max(0.0)
     };
-    let total_usable_m: f32 = (0..legs).map(|leg| usable_m(floor, leg)).sum();
-    let route_m: f32 = floor.corridor.legs.iter().map(|leg| leg.length_m).sum();
-    let wanted_m = floor.plan.double_parked_share * route_m;
+    let total_usable_m: f32 = (0..legs).map(|leg| usable_m(placement, leg)).sum();
+    let route_m: f32 = placement.corridor.legs.iter().map(|leg| leg.length_m).sum();
+    let wanted_m = placement.plan.double_parked_share * route_m;
     let mut owed_m = 0.0;
     for leg in 0..legs {
-        owed_m += wanted_m * usable_m(floor, leg) / total_usable_m.max(1.0);
-        let clusters = draw_clusters(floor, leg, owed_m, rng);
+        owed_m += wanted_m * usable_m(placement, leg) / total_usable_m.max(1.0);
+        let clusters = draw_clusters(placement, leg, owed_m, rng);
         owed_m -= clusters.iter().map(Cluster::length_m).sum::<f32>();
-        spread_clusters(floor, leg, &clusters, rng);
+        spread_clusters(placement, leg, &clusters, rng);
     }
 }
 
 /// Clusters for one leg: about `wanted_m` in sum, and no more than its usable length holds.
-fn draw_clusters(floor: &Floor<'_>, leg: usize, wanted_m: f32, rng: &mut Rng) -> Vec<Cluster> {
+fn draw_clusters(placement: &Placement<'_>, leg: usize, wanted_m: f32, rng: &mut Rng) -> Vec<Cluster> {
     const TYPICAL_CAR_M: f32 = 4.7;
-    let (from_m, to_m) = floor.usable(leg);
+    let (from_m, to_m) = placement.usable(leg);
     let mut clusters: Vec<Cluster> = Vec::new();
     let (mut missing_m, mut room_m) = (wanted_m, to_m - from_m);
     // Half a car too much is as good as half a car too little.
@@ -336,7 +336,8 @@ fn draw_clusters(floor: &Floor<'_>, leg: usize, wanted_m: f32, rng: &mut Rng) ->
         let side = if rng.random_bool(0.5) { Side::Left } else { Side::Right };
         let mut cluster = Cluster::draw(side, cars, rng);
         let needed_m = |cluster: &Cluster| {
-            let apart_m = clusters.last().map_or(0.0, |last| clearance_between(last.side, cluster.side, floor.plan));
+            let apart_m =
+                clusters.last().map_or(0.0, |last| clearance_between(last.side, cluster.side, placement.plan));
             apart_m + cluster.length_m()
         };
         if needed_m(&cluster) > room_m
@@ -362,11 +363,11 @@ fn clearance_between(a: Side, b: Side, plan: &ClutterPlan) -> f32 {
 }
 
 /// Puts clusters into a leg in their order, the slack shared out at random.
-fn spread_clusters(floor: &mut Floor<'_>, leg: usize, clusters: &[Cluster], rng: &mut Rng) {
-    let (from_m, to_m) = floor.usable(leg);
+fn spread_clusters(placement: &mut Placement<'_>, leg: usize, clusters: &[Cluster], rng: &mut Rng) {
+    let (from_m, to_m) = placement.usable(leg);
     let apart_m = |i: usize| match i {
         0 => 0.0,
-        _ => clearance_between(clusters[i - 1].side, clusters[i].side, floor.plan),
+        _ => clearance_between(clusters[i - 1].side, clusters[i].side, placement.plan),
     };
     let needed_m: f32 = clusters.iter().enumerate().map(|(i, cluster)| apart_m(i) + cluster.length_m()).sum();
     let slack_m = to_m - from_m - needed_m;
@@ -379,7 +380,7 @@ fn spread_clusters(floor: &mut Floor<'_>, leg: usize, clusters: &[Cluster], rng:
         let mut front_m = packed_m + shift_m;
         for (i, &class) in cluster.classes.iter().enumerate() {
             let length_m = class.default_size_m()[0];
-            place_double_parked_car(floor, leg, cluster.side, class, front_m + 0.5 * length_m, rng);
+            place_double_parked_car(placement, leg, cluster.side, class, front_m + 0.5 * length_m, rng);
             front_m += length_m + cluster.spaces_m.get(i).copied().unwrap_or(0.0);
         }
         packed_m += cluster.length_m();
@@ -387,82 +388,82 @@ fn spread_clusters(floor: &mut Floor<'_>, leg: usize, clusters: &[Cluster], rng:
 }
 
 fn place_double_parked_car(
-    floor: &mut Floor<'_>,
+    placement: &mut Placement<'_>,
     leg: usize,
     side: Side,
     class: ObstacleClass,
     s_m: f32,
     rng: &mut Rng,
 ) {
-    let gap_m = rng.random_range(floor.plan.free_gap_m.clone());
+    let gap_m = rng.random_range(placement.plan.free_gap_m.clone());
     let heading_in_leg_rad =
-        yaw(rng, floor.plan.double_parked_yaw_deg) + if rng.random_bool(0.8) { 0.0 } else { std::f32::consts::PI };
+        yaw(rng, placement.plan.double_parked_yaw_deg) + if rng.random_bool(0.8) { 0.0 } else { std::f32::consts::PI };
     let body = Body { class, s_m, heading_in_leg_rad };
     // As far into the lane as the gap allows, but no farther from its own edge than people park.
     let wish = Protrusion { wanted_m: class.default_size_m()[1] + KERB_GAP_M, gap_m };
-    let mut placed = floor.against_edge(leg, side, body, wish);
+    let mut placed = placement.against_edge(leg, side, body, wish);
     if placed.protrusion_m < PROTRUSION_MIN_M {
         // The lane is hardly wider than the drawn gap here: any gap of the range will do.
-        let wish = Protrusion { wanted_m: PROTRUSION_MIN_M, gap_m: *floor.plan.free_gap_m.start() };
-        placed = floor.against_edge(leg, side, body, wish);
+        let wish = Protrusion { wanted_m: PROTRUSION_MIN_M, gap_m: *placement.plan.free_gap_m.start() };
+        placed = placement.against_edge(leg, side, body, wish);
     }
     // Reserved stretches (islands, branches) come first; the car's own cluster does not count.
-    let blocked = floor.intruders.iter().any(|other| {
-        let clear_m = if other.side == side { 0.0 } else { floor.plan.opposite_clear_m };
+    let blocked = placement.intruders.iter().any(|other| {
+        let clear_m = if other.side == side { 0.0 } else { placement.plan.opposite_clear_m };
         other.leg == leg && placed.from_m < other.to_m + clear_m && other.from_m < placed.to_m + clear_m
     });
-    if !blocked && floor.is_free(&placed.outline) {
-        floor.stand(class, placed.centre);
-        floor.intruders.push(placed.intruder(leg, side));
+    if !blocked && placement.is_free(&placed.outline) {
+        placement.stand(class, placed.centre);
+        placement.intruders.push(placed.encroachment(leg, side));
     }
 }
 
 /// A car in a stall, or a wheel stop in an empty one.
-fn place_parked(floor: &mut Floor<'_>, stall: &Stall, rng: &mut Rng) {
+fn place_parked(placement: &mut Placement<'_>, stall: &Stall, rng: &mut Rng) {
     // All draws first: what stands elsewhere must not shift the stream of the next stall.
-    let occupied = rng.random_bool(f64::from(floor.plan.stall_occupancy));
+    let occupied = rng.random_bool(f64::from(placement.plan.stall_occupancy));
     let class = draw_car(rng);
-    let nose_m = if rng.random_bool(f64::from(floor.plan.nose_share)) { rng.random_range(0.3..0.6) } else { 0.0 };
-    let nose_gap_m = rng.random_range(floor.plan.free_gap_m.clone());
+    let nose_m = if rng.random_bool(f64::from(placement.plan.nose_share)) { rng.random_range(0.3..0.6) } else { 0.0 };
+    let nose_gap_m = rng.random_range(placement.plan.free_gap_m.clone());
     let set_back_m = rng.random_range(0.1..0.4);
     let towards_lane_rad = -stall.side.sign() * std::f32::consts::FRAC_PI_2;
     let backed_in = rng.random_bool(0.3);
     let heading_in_leg_rad = yaw(rng, 4.0) + if backed_in { towards_lane_rad } else { -towards_lane_rad };
     let s_m = stall.centre_m + rng.random_range(-0.1..0.1);
     if !occupied {
-        let leg = floor.leg(stall.leg);
+        let leg = placement.leg(stall.leg);
         let d_m = stall.front_m + stall.side.sign() * (STALL_DEPTH_M - 0.8);
         let heading_rad = sim::geometry::wrap_angle(leg.origin.heading_rad + std::f32::consts::FRAC_PI_2);
         // Its length lies across the stall.
         let across = Pose::new(leg.world(stall.centre_m, d_m), heading_rad + std::f32::consts::FRAC_PI_2);
         let stop = Thing::new(ObstacleClass::WheelStop, across);
-        if floor.is_free(&stop.outline) {
-            floor.things.push(stop);
+        if placement.is_free(&stop.outline) {
+            placement.things.push(stop);
         }
         return;
     }
     let body = Body { class, s_m, heading_in_leg_rad };
-    let nose = floor.against_edge(stall.leg, stall.side, body, Protrusion { wanted_m: nose_m, gap_m: nose_gap_m });
+    let nose = placement.against_edge(stall.leg, stall.side, body, Protrusion { wanted_m: nose_m, gap_m: nose_gap_m });
     let reaches_out = nose_m > 0.0
         && nose.protrusion_m >= 0.1
-        && floor.may_intrude(stall.leg, stall.side, nose.from_m, nose.to_m)
-        && floor.is_free(&nose.outline);
+        && placement.may_intrude(stall.leg, stall.side, nose.from_m, nose.to_m)
+        && placement.is_free(&nose.outline);
     if reaches_out {
-        floor.stand(class, nose.centre);
-        floor.intruders.push(nose.intruder(stall.leg, stall.side));
+        placement.stand(class, nose.centre);
+        placement.intruders.push(nose.encroachment(stall.leg, stall.side));
         return;
     }
     let wish = Protrusion { wanted_m: -set_back_m, gap_m: 0.0 };
-    let placed = floor.against_edge(stall.leg, stall.side, body, wish);
-    if floor.is_free(&placed.outline) && !floor.corridor.touches_lane(&placed.outline) {
-        floor.stand(class, placed.centre);
+    let placed = placement.against_edge(stall.leg, stall.side, body, wish);
+    if placement.is_free(&placed.outline) && !placement.corridor.touches_lane(&placed.outline) {
+        placement.stand(class, placed.centre);
     }
 }
 
-fn place_furniture(floor: &mut Floor<'_>, rng: &mut Rng) {
+fn place_furniture(placement: &mut Placement<'_>, rng: &mut Rng) {
     use ObstacleClass::{Bollard, Cart, Cone, Person, Pillar};
-    let route_m: f32 = floor.corridor.legs.iter().map(|leg| leg.length_m).sum();
-    let Furniture { cones, bollards, pillars, carts, people } = floor.plan.furniture_per_100m;
+    let route_m: f32 = placement.corridor.legs.iter().map(|leg| leg.length_m).sum();
+    let Furniture { cones, bollards, pillars, carts, people } = placement.plan.furniture_per_100m;
     // Class, groups per 100 m, members of a group, their spacing, deepest protrusion.
     let kinds = [
         (Pillar, pillars, 1..=1, 0.0, 0.35),
@@ -477,7 +478,7 @@ fn place_furniture(floor: &mut Floor<'_>, rng: &mut Rng) {
         let groups = wanted as usize + usize::from(rng.random_bool(f64::from(wanted.fract())));
         for _ in 0..groups {
             let members = rng.random_range(members.clone());
-            place_group(floor, &Group { class, members, spacing_m, deepest_m }, rng);
+            place_group(placement, &Group { class, members, spacing_m, deepest_m }, rng);
         }
     }
 }
@@ -490,45 +491,45 @@ struct Group {
 }
 
 /// A row at the edge of the lane where the rules allow it, else behind the edge.
-fn place_group(floor: &mut Floor<'_>, group: &Group, rng: &mut Rng) {
+fn place_group(placement: &mut Placement<'_>, group: &Group, rng: &mut Rng) {
     const TRIES: usize = 24;
     for attempt in 0..TRIES {
-        let index = rng.random_range(0..floor.corridor.legs.len());
+        let index = rng.random_range(0..placement.corridor.legs.len());
         let side = if rng.random_bool(0.5) { Side::Left } else { Side::Right };
         let intrudes = attempt < TRIES / 2;
-        let (from_m, to_m) = if intrudes { floor.usable(index) } else { (0.0, floor.leg(index).length_m) };
+        let (from_m, to_m) = if intrudes { placement.usable(index) } else { (0.0, placement.leg(index).length_m) };
         let length_m = (group.members - 1) as f32 * group.spacing_m;
         if from_m + length_m + 1.0 > to_m {
             continue;
         }
         let first_m = rng.random_range(from_m + 0.5..to_m - length_m - 0.5);
         let wanted_m = if intrudes { rng.random_range(0.1..group.deepest_m) } else { -rng.random_range(0.1..0.8) };
-        let gap_m = rng.random_range(floor.plan.free_gap_m.clone());
+        let gap_m = rng.random_range(placement.plan.free_gap_m.clone());
         let turn_rad = if group.class == ObstacleClass::Pillar { 0.0 } else { yaw(rng, 90.0) };
         let row: Vec<Placed> = (0..group.members)
             .map(|k| {
                 let s_m = first_m + k as f32 * group.spacing_m;
                 let body = Body { class: group.class, s_m, heading_in_leg_rad: turn_rad };
-                floor.against_edge(index, side, body, Protrusion { wanted_m, gap_m })
+                placement.against_edge(index, side, body, Protrusion { wanted_m, gap_m })
             })
             .collect();
         let from_m = row.iter().map(|placed| placed.from_m).fold(f32::INFINITY, f32::min);
         let to_m = row.iter().map(|placed| placed.to_m).fold(f32::NEG_INFINITY, f32::max);
         let fits = row.iter().all(|placed| {
-            floor.is_free(&placed.outline)
+            placement.is_free(&placed.outline)
                 && if intrudes {
                     placed.protrusion_m >= PROTRUSION_MIN_M
                 } else {
-                    !floor.corridor.touches_lane(&placed.outline)
+                    !placement.corridor.touches_lane(&placed.outline)
                 }
         });
-        if fits && (!intrudes || floor.may_intrude(index, side, from_m, to_m)) {
+        if fits && (!intrudes || placement.may_intrude(index, side, from_m, to_m)) {
             for placed in &row {
-                floor.stand(group.class, placed.centre);
+                placement.stand(group.class, placed.centre);
             }
             if intrudes {
                 let protrusion_m = row.iter().map(|placed| placed.protrusion_m).fold(0.0, f32::max);
-                floor.intruders.push(Intruder { leg: index, side, from_m, to_m, protrusion_m });
+                placement.intruders.push(LaneEncroachment { leg: index, side, from_m, to_m, protrusion_m });
             }
             return;
         }
@@ -536,9 +537,9 @@ fn place_group(floor: &mut Floor<'_>, group: &Group, rng: &mut Rng) {
 }
 
 /// Cones across the mouths of a leg's side branches, on the line of the lane's edge.
-fn close_branches(floor: &mut Floor<'_>, index: usize) {
-    for branch in floor.leg(index).branches().to_vec() {
-        let leg = floor.leg(index);
+fn close_branches(placement: &mut Placement<'_>, index: usize) {
+    for branch in placement.leg(index).branches().to_vec() {
+        let leg = placement.leg(index);
         let (from_m, to_m) = (branch.centre_m - 0.5 * branch.width_m, branch.centre_m + 0.5 * branch.width_m);
         let cones = (branch.width_m / CLOSING_CONES_M).ceil() as usize;
         // The row stands just behind the line, so that the lane keeps its width.
@@ -549,9 +550,9 @@ fn close_branches(floor: &mut Floor<'_>, index: usize) {
             })
             .collect();
         for centre in centres {
-            floor.stand(ObstacleClass::Cone, Pose::new(centre, 0.0));
+            placement.stand(ObstacleClass::Cone, Pose::new(centre, 0.0));
         }
-        floor.intruders.push(Intruder { leg: index, side: branch.side, from_m, to_m, protrusion_m: 0.0 });
+        placement.intruders.push(LaneEncroachment { leg: index, side: branch.side, from_m, to_m, protrusion_m: 0.0 });
     }
 }
 

@@ -4,15 +4,15 @@
 //! A lot's seed decides all of it. A draw that is invalid or that [`crate::solver`] cannot drive is thrown away and the
 //! next one of the same seed taken; [`Generated::attempts`] says how many it took.
 
-use crate::clutter::{self, ClutterPlan, Furniture, Intruder};
+use crate::clutter::{self, ClutterPlan, Furniture, LaneEncroachment};
 use crate::corridor::{Blueprint, Branch, Bulge, CornerPlan, Corridor, Leg, LegPlan, Side, WidthStep, to_millimetres};
 use crate::solver::{self, CLEARANCE_M};
 use crate::split::{Difficulty, Split};
 use rand::RngExt as _;
-use sim::scenario::{Direction, Island, NoiseSettings, Obstacle, ObstacleClass, ReferencePath, Scenario};
+use sim::scenario::{Direction, Island, LotNoise, Obstacle, ObstacleClass, ReferencePath, Scenario};
 use sim::seed::{Rng, Stream};
 use sim::validate::validate;
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 use std::ops::Range;
 
 /// A lot and what it took.
@@ -30,12 +30,12 @@ pub struct Generated {
 /// When 1000 draws in a row are rejected; of hard ones about one in five is, of others hardly any.
 pub fn generate(split: Split, index: u64, difficulty: Difficulty) -> Generated {
     let seed = split.seed(difficulty, index);
-    let vehicle = VehicleParams::hyundai_hg300();
+    let vehicle = VehicleSettings::hyundai_hg300();
     for attempt in 0..1000 {
         let name = format!("{}-{}-{index}", split.name(), difficulty.name());
         let mut layout_rng = seed.rng(Stream::Layout, attempt);
         let mut obstacle_rng = seed.rng(Stream::Obstacles, attempt);
-        let scenario = draw(name, &Sheet::of(difficulty), &mut layout_rng, &mut obstacle_rng);
+        let scenario = draw(name, &DifficultyParams::of(difficulty), &mut layout_rng, &mut obstacle_rng);
         if is_drivable(&scenario, &vehicle) {
             return Generated { scenario, attempts: attempt as u32 + 1 };
         }
@@ -46,14 +46,14 @@ pub fn generate(split: Split, index: u64, difficulty: Difficulty) -> Generated {
 }
 
 /// Valid and solvable in both directions.
-fn is_drivable(scenario: &Scenario, vehicle: &VehicleParams) -> bool {
+fn is_drivable(scenario: &Scenario, vehicle: &VehicleSettings) -> bool {
     let ways = Direction::BOTH.map(|direction| direction.of(scenario.clone()));
     ways.iter().all(|way| validate(way, vehicle).is_ok())
         && ways.iter().all(|way| solver::solve(way, vehicle, CLEARANCE_M).is_some())
 }
 
 /// What a difficulty means.
-struct Sheet {
+struct DifficultyParams {
     lane_m: Range<f32>,
     corner_width_m: Range<f32>,
     inner_radius_m: Range<f32>,
@@ -66,7 +66,7 @@ struct Sheet {
     furniture: f32,
 }
 
-impl Sheet {
+impl DifficultyParams {
     /// Gaps of `Hard` are those of the narrow reference lots; the solver's 0.25 m clearance needs 2.4 m and more beside
     /// a car that stands askew, which is what most rejected draws lack.
     fn of(difficulty: Difficulty) -> Self {
@@ -146,31 +146,31 @@ struct IslandPlan {
     width_m: f32,
 }
 
-fn draw(name: String, sheet: &Sheet, layout_rng: &mut Rng, obstacle_rng: &mut Rng) -> Scenario {
-    let layout = draw_layout(sheet, layout_rng);
+fn draw(name: String, params: &DifficultyParams, layout_rng: &mut Rng, obstacle_rng: &mut Rng) -> Scenario {
+    let layout = draw_layout(params, layout_rng);
     let corridor = Corridor::draw(&layout.blueprint);
     let plan = ClutterPlan {
-        free_gap_m: sheet.free_gap_m.start..=sheet.free_gap_m.end,
-        double_parked_share: obstacle_rng.random_range(sheet.double_parked_share.clone()),
+        free_gap_m: params.free_gap_m.start..=params.free_gap_m.end,
+        double_parked_share: obstacle_rng.random_range(params.double_parked_share.clone()),
         corner_clear_m: CORNER_CLEAR_M,
-        opposite_clear_m: sheet.opposite_clear_m,
+        opposite_clear_m: params.opposite_clear_m,
         end_clear_m: END_CLEAR_M,
-        double_parked_yaw_deg: sheet.double_parked_yaw_deg,
+        double_parked_yaw_deg: params.double_parked_yaw_deg,
         stall_occupancy: obstacle_rng.random_range(0.6..0.95),
-        nose_share: sheet.nose_share,
+        nose_share: params.nose_share,
         furniture_per_100m: Furniture {
-            cones: 3.0 * sheet.furniture,
-            bollards: 1.5 * sheet.furniture,
-            pillars: 2.5 * sheet.furniture,
-            carts: 2.0 * sheet.furniture,
-            people: 3.0 * sheet.furniture,
+            cones: 3.0 * params.furniture,
+            bollards: 1.5 * params.furniture,
+            pillars: 2.5 * params.furniture,
+            carts: 2.0 * params.furniture,
+            people: 3.0 * params.furniture,
         },
         closed_arms: true,
     };
     let reserved: Vec<_> = layout
         .islands
         .iter()
-        .map(|island| Intruder {
+        .map(|island| LaneEncroachment {
             leg: island.leg,
             side: island.side,
             from_m: island.from_m,
@@ -184,7 +184,7 @@ fn draw(name: String, sheet: &Sheet, layout_rng: &mut Rng, obstacle_rng: &mut Rn
     Scenario {
         name,
         reference_path: route_around(&corridor, &clutter.intruders),
-        noise: NoiseSettings::default(),
+        noise: LotNoise::default(),
         islands: layout.islands.iter().map(|plan| island(&corridor, plan)).collect(),
         obstacles,
         speed_bumps: clutter::speed_bumps(&corridor, SPEED_BUMP_EVERY_M),
@@ -192,21 +192,21 @@ fn draw(name: String, sheet: &Sheet, layout_rng: &mut Rng, obstacle_rng: &mut Rn
     }
 }
 
-fn draw_layout(sheet: &Sheet, rng: &mut Rng) -> Layout {
+fn draw_layout(params: &DifficultyParams, rng: &mut Rng) -> Layout {
     let total_m = rng.random_range(LEGS_M);
     let most_corners = (total_m / LEG_MIN_M) as usize - 1;
     let legs = 1 + rng.random_range(1..=most_corners.min(4));
     // Shares of what is left after every leg has its minimum.
     let shares: Vec<f32> = (0..legs).map(|_| rng.random_range(0.2..1.0)).collect();
     let spare_m = (total_m - legs as f32 * LEG_MIN_M) / shares.iter().sum::<f32>();
-    let corners = draw_corners(sheet, legs - 1, rng);
+    let corners = draw_corners(params, legs - 1, rng);
     let mut islands = Vec::new();
     let legs = shares
         .iter()
         .enumerate()
         .map(|(i, share)| {
             let ends = (i.checked_sub(1).map(|before| &corners[before]), corners.get(i));
-            draw_leg(sheet, i, LEG_MIN_M + share * spare_m, ends, &mut islands, rng)
+            draw_leg(params, i, LEG_MIN_M + share * spare_m, ends, &mut islands, rng)
         })
         .collect();
     let blueprint = Blueprint { legs, corners, path_radius_m: PATH_RADIUS_M, run_out_m: RUN_OUT_M };
@@ -215,7 +215,7 @@ fn draw_layout(sheet: &Sheet, rng: &mut Rng) -> Layout {
 
 /// Right angles mostly, else bends of 30–80°. The route never turns by more than 180° in sum, so that it does not
 /// bite its own tail too often.
-fn draw_corners(sheet: &Sheet, count: usize, rng: &mut Rng) -> Vec<CornerPlan> {
+fn draw_corners(params: &DifficultyParams, count: usize, rng: &mut Rng) -> Vec<CornerPlan> {
     let mut turned_deg = 0.0_f32;
     (0..count)
         .map(|_| {
@@ -226,24 +226,24 @@ fn draw_corners(sheet: &Sheet, count: usize, rng: &mut Rng) -> Vec<CornerPlan> {
             let gentle = bend_deg < 60.0;
             CornerPlan {
                 turn_rad: side.sign() * bend_deg.to_radians(),
-                width_m: rng.random_range(sheet.corner_width_m.clone()) - if gentle { 1.0 } else { 0.0 },
+                width_m: rng.random_range(params.corner_width_m.clone()) - if gentle { 1.0 } else { 0.0 },
                 reach_m: if gentle { 3.5 } else { 5.0 },
                 taper_m: rng.random_range(4.5..5.5),
-                inner_radius_m: rng.random_range(sheet.inner_radius_m.clone()),
+                inner_radius_m: rng.random_range(params.inner_radius_m.clone()),
             }
         })
         .collect()
 }
 
 fn draw_leg(
-    sheet: &Sheet,
+    params: &DifficultyParams,
     index: usize,
     length_m: f32,
     (before, after): (Option<&CornerPlan>, Option<&CornerPlan>),
     islands: &mut Vec<IslandPlan>,
     rng: &mut Rng,
 ) -> LegPlan {
-    let mut widths = draw_widths(sheet, length_m, rng);
+    let mut widths = draw_widths(params, length_m, rng);
     let clear_m = |corner: Option<&CornerPlan>| {
         corner.map_or(END_CLEAR_M, |corner| corner.extent_m().max(0.5 * corner.width_m + CORNER_CLEAR_M))
     };
@@ -261,7 +261,7 @@ fn draw_leg(
         let start_of = |feature_m: f32| slot_from_m + place * (slot_m - feature_m);
         match kind {
             0..=3 if bulge.is_none() && slot_m > BULGE_LENGTH_M => {
-                let offset_m = side.sign() * lerp(&sheet.bulge_m, size);
+                let offset_m = side.sign() * lerp(&params.bulge_m, size);
                 let centre_m = start_of(BULGE_LENGTH_M) + 0.5 * BULGE_LENGTH_M;
                 bulge = Some(Bulge { centre_m, offset_m, length_m: BULGE_LENGTH_M });
             }
@@ -290,11 +290,11 @@ fn draw_leg(
 }
 
 /// A new width every 9–18 m.
-fn draw_widths(sheet: &Sheet, length_m: f32, rng: &mut Rng) -> Vec<WidthStep> {
+fn draw_widths(params: &DifficultyParams, length_m: f32, rng: &mut Rng) -> Vec<WidthStep> {
     let mut widths = Vec::new();
     let mut at_m = -RUN_OUT_M;
     while at_m < length_m + RUN_OUT_M {
-        widths.push(WidthStep { from_m: at_m, width_m: rng.random_range(sheet.lane_m.clone()) });
+        widths.push(WidthStep { from_m: at_m, width_m: rng.random_range(params.lane_m.clone()) });
         at_m += rng.random_range(9.0..18.0);
     }
     widths
@@ -355,7 +355,7 @@ fn tree(corridor: &Corridor, plan: &IslandPlan) -> Obstacle {
 
 /// A smooth line through what intruders leave free: a car put back onto the route stands on free ground, whichever way
 /// it is headed.
-fn route_around(corridor: &Corridor, intruders: &[Intruder]) -> ReferencePath {
+fn route_around(corridor: &Corridor, intruders: &[LaneEncroachment]) -> ReferencePath {
     let mut points = Vec::new();
     for (index, leg) in corridor.legs.iter().enumerate() {
         // A rounded corner takes at most half of the segments beside it.
@@ -382,7 +382,7 @@ fn route_around(corridor: &Corridor, intruders: &[Intruder]) -> ReferencePath {
 const FLAT_M: f32 = 2e-3;
 
 /// Lowest and highest `d` of the rear axle, metres, such that the body stands free in either direction of driving.
-fn room_for_route(leg: &Leg, index: usize, intruders: &[Intruder], s_m: f32) -> (f32, f32) {
+fn room_for_route(leg: &Leg, index: usize, intruders: &[LaneEncroachment], s_m: f32) -> (f32, f32) {
     /// The body reaches 3.8 m ahead of the rear axle, and its corners farther aside the more the route slopes.
     const REACH_M: f32 = 2.5;
     /// Half the car's width and a margin for the slope of the route.
@@ -433,7 +433,7 @@ mod tests {
     /// does not use.
     #[test]
     fn every_lot_validates_and_can_be_driven_both_ways() {
-        let vehicle = VehicleParams::hyundai_hg300();
+        let vehicle = VehicleSettings::hyundai_hg300();
         let body = BodyBox::new(&vehicle);
         let mut attempts = 0;
         let kinds = Split::ALL.into_iter().flat_map(|split| Difficulty::ALL.map(|difficulty| (split, difficulty)));
@@ -466,7 +466,7 @@ mod tests {
     /// After a near-collision the car is put back onto the route: nearly everywhere it must stand free there.
     #[test]
     fn the_route_is_free_ground_for_the_whole_car() {
-        let vehicle = VehicleParams::hyundai_hg300();
+        let vehicle = VehicleSettings::hyundai_hg300();
         let body = BodyBox::new(&vehicle);
         for difficulty in Difficulty::ALL {
             let (mut poses, mut blocked) = (0, 0);
@@ -495,7 +495,7 @@ mod tests {
         for index in 0..LOTS {
             for difficulty in Difficulty::ALL {
                 let seed = Split::Train.seed(difficulty, index);
-                let layout = draw_layout(&Sheet::of(difficulty), &mut seed.rng(Stream::Layout, 0));
+                let layout = draw_layout(&DifficultyParams::of(difficulty), &mut seed.rng(Stream::Layout, 0));
                 for corner in &layout.blueprint.corners {
                     let is_right_angle = corner.turn_rad.abs() > 1.57;
                     right_angles += usize::from(is_right_angle);

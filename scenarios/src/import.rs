@@ -14,9 +14,9 @@ use crate::solver::route::{self, Finish, NoRoute};
 use serde::Deserialize;
 use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
-use sim::scenario::{Island, NoiseSettings, Obstacle, Place, ReferencePath, Scenario, ScenarioError};
+use sim::scenario::{Island, LotNoise, Obstacle, Place, ReferencePath, Scenario, ScenarioError};
 use sim::validate::validate;
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
 
 /// Corners of a centre line are rounded with this radius, metres, as those of the reference lots (methods.md 11).
@@ -53,7 +53,7 @@ pub struct MapLot {
     pub clearance_m: f32,
     /// Sensor noise of the lot.
     #[serde(default)]
-    pub noise: NoiseSettings,
+    pub noise: LotNoise,
     /// What is named in errors.
     #[serde(skip)]
     file: PathBuf,
@@ -117,7 +117,7 @@ impl MapLot {
             is_loop: false,
             centre_line: None,
             clearance_m: clearance_m(),
-            noise: NoiseSettings::default(),
+            noise: LotNoise::default(),
             file: map.to_owned(),
         }
     }
@@ -437,8 +437,8 @@ impl MapLot {
     }
 }
 
-fn vehicle() -> VehicleParams {
-    VehicleParams::hyundai_hg300()
+fn vehicle() -> VehicleSettings {
+    VehicleSettings::hyundai_hg300()
 }
 
 fn kerbed(polygon: Vec<Vec2>) -> Island {
@@ -459,7 +459,7 @@ fn outlines_only(ground: &Ground) -> Scenario {
         name: "map".to_owned(),
         boundary: ground.boundary.clone(),
         reference_path: ReferencePath { points: Vec::new(), corner_radius_m: 0.0 },
-        noise: NoiseSettings::default(),
+        noise: LotNoise::default(),
         islands: ground.islands.iter().cloned().map(kerbed).collect(),
         obstacles: Vec::new(),
         speed_bumps: Vec::new(),

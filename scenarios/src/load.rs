@@ -6,7 +6,7 @@
 use crate::import::{self, MapLot};
 use sim::scenario::{Place, Scenario, ScenarioError};
 use sim::validate::validate;
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 use std::path::Path;
 use toml_edit::visit_mut::{self, VisitMut};
 use toml_edit::{Array, Document, Formatted, InlineTable, Item, Value};
@@ -97,7 +97,7 @@ pub fn parse(text: &str, file: &str) -> Result<Scenario, LoadError> {
         // The deserialiser of points reads two numbers and ignores the rest.
         return Err(faulty(offset, format!("a point of {length} numbers"), "write points as [x, y]".to_owned()));
     }
-    validate(&scenario, &VehicleParams::hyundai_hg300()).map_err(|error| {
+    validate(&scenario, &VehicleSettings::hyundai_hg300()).map_err(|error| {
         let offset = offset_of(&document, error.place).unwrap_or(0);
         let ScenarioError { place, problem, remedy } = error;
         faulty(offset, format!("{place}: {problem}"), remedy)
@@ -249,7 +249,7 @@ mod tests {
         for file in files {
             let scenario = load(&file).unwrap_or_else(|error| panic!("{error}"));
             let back = scenario.reversed();
-            validate(&back, &VehicleParams::hyundai_hg300())
+            validate(&back, &VehicleSettings::hyundai_hg300())
                 .unwrap_or_else(|error| panic!("{}: {error}", file.display()));
         }
     }
@@ -399,7 +399,7 @@ mod tests {
                 Ok(scenario) => {
                     accepted += 1;
                     if accepted % 20 == 0 {
-                        sim::map::Map::build(scenario, &VehicleParams::hyundai_hg300())
+                        sim::map::Map::build(scenario, &VehicleSettings::hyundai_hg300())
                             .expect("what loads also builds");
                     }
                 }

@@ -7,7 +7,7 @@
 use crate::clutter::{self, ClutterPlan, Furniture};
 use crate::corridor::{Blueprint, Bulge, CornerPlan, Corridor, LegPlan, Side, WidthStep, rounded_length_m};
 use rand::RngExt as _;
-use sim::scenario::{NoiseSettings, Scenario};
+use sim::scenario::{LotNoise, Scenario};
 use sim::seed::{Rng, RootSeed, Stream};
 use std::ops::RangeInclusive;
 
@@ -37,13 +37,13 @@ impl ReferenceLot {
 
     /// Length of the reference path, metres (paper; a is derived from its event counts, methods.md 0).
     pub fn length_m(self) -> f32 {
-        self.sheet().length_m
+        self.plan().length_m
     }
 
-    fn sheet(self) -> Sheet {
+    fn plan(self) -> LotPlan {
         use Side::{Left, Right};
         match self {
-            Self::A => Sheet {
+            Self::A => LotPlan {
                 length_m: 231.0,
                 legs_m: &[62.0, 28.0, 58.0, 30.0, 53.0],
                 turns: &[Right, Right, Left, Left],
@@ -51,7 +51,7 @@ impl ReferenceLot {
                 free_gap_m: 2.7..=3.1,
                 double_parked_share: 0.24,
             },
-            Self::B => Sheet {
+            Self::B => LotPlan {
                 length_m: 139.0,
                 legs_m: &[45.0, 34.0, 60.0],
                 turns: &[Left, Right],
@@ -59,7 +59,7 @@ impl ReferenceLot {
                 free_gap_m: 2.6..=2.8,
                 double_parked_share: 0.29,
             },
-            Self::C => Sheet {
+            Self::C => LotPlan {
                 length_m: 149.0,
                 legs_m: &[58.0, 33.0, 58.0],
                 turns: &[Right, Right],
@@ -86,7 +86,7 @@ const BULGE_LENGTH_M: f32 = 14.0;
 const SPEED_BUMP_EVERY_M: f32 = 60.0;
 
 /// A row of the table in expert-findings.md 3.
-struct Sheet {
+struct LotPlan {
     /// Of the rounded route.
     length_m: f32,
     legs_m: &'static [f32],
@@ -100,11 +100,11 @@ struct Sheet {
 
 /// A reference lot with the obstacles of one trial.
 pub fn lot(which: ReferenceLot, seed: RootSeed) -> Scenario {
-    let sheet = which.sheet();
+    let plan = which.plan();
     let corridor = Corridor::draw(&blueprint(which));
     let plan = ClutterPlan {
-        free_gap_m: sheet.free_gap_m,
-        double_parked_share: sheet.double_parked_share,
+        free_gap_m: plan.free_gap_m,
+        double_parked_share: plan.double_parked_share,
         corner_clear_m: 8.0,
         opposite_clear_m: 8.0,
         end_clear_m: END_CLEAR_M,
@@ -121,7 +121,7 @@ pub fn lot(which: ReferenceLot, seed: RootSeed) -> Scenario {
         name: which.name().to_owned(),
         boundary: corridor.boundary,
         reference_path: corridor.reference_path,
-        noise: NoiseSettings::default(),
+        noise: LotNoise::default(),
         islands: Vec::new(),
         obstacles: clutter.obstacles,
         speed_bumps,
@@ -130,17 +130,17 @@ pub fn lot(which: ReferenceLot, seed: RootSeed) -> Scenario {
 
 /// The fixed geometry of a lot.
 pub fn blueprint(which: ReferenceLot) -> Blueprint {
-    let sheet = which.sheet();
-    let corners: Vec<_> = sheet.turns.iter().map(|&side| CornerPlan::right_angle(side)).collect();
+    let plan = which.plan();
+    let corners: Vec<_> = plan.turns.iter().map(|&side| CornerPlan::right_angle(side)).collect();
     // Rounded corners cut the route, bulges lengthen it: the legs make up for both, so that the length is the paper's.
-    let nominal = draw_blueprint(which, &sheet, &corners, 0.0);
-    let missing_m = sheet.length_m - rounded_length_m(&Corridor::draw(&nominal).reference_path);
-    draw_blueprint(which, &sheet, &corners, missing_m / sheet.legs_m.len() as f32)
+    let nominal = draw_blueprint(which, &plan, &corners, 0.0);
+    let missing_m = plan.length_m - rounded_length_m(&Corridor::draw(&nominal).reference_path);
+    draw_blueprint(which, &plan, &corners, missing_m / plan.legs_m.len() as f32)
 }
 
-fn draw_blueprint(which: ReferenceLot, sheet: &Sheet, corners: &[CornerPlan], longer_m: f32) -> Blueprint {
+fn draw_blueprint(which: ReferenceLot, plan: &LotPlan, corners: &[CornerPlan], longer_m: f32) -> Blueprint {
     let corner_extent_m = CornerPlan::right_angle(Side::Left).extent_m();
-    let legs = sheet
+    let legs = plan
         .legs_m
         .iter()
         .enumerate()
@@ -154,7 +154,7 @@ fn draw_blueprint(which: ReferenceLot, sheet: &Sheet, corners: &[CornerPlan], lo
             let to_m = length_m - if has_corner_after { corner_extent_m } else { END_CLEAR_M };
             let bulge = (*nominal_m > BULGE_FROM_LEG_M).then(|| draw_bulge(from_m, to_m, &mut rng));
             let run_out = (if has_corner_before { 0.0 } else { -RUN_OUT_M }, length_m + RUN_OUT_M);
-            let widths = draw_widths(&sheet.lane_m, run_out, &mut rng);
+            let widths = draw_widths(&plan.lane_m, run_out, &mut rng);
             LegPlan { length_m, widths, bulge, branches: Vec::new() }
         })
         .collect();
@@ -190,7 +190,7 @@ mod tests {
     use sim::path::Path;
     use sim::scenario::{Direction, Obstacle, ObstacleClass};
     use sim::validate::validate;
-    use sim::vehicle::VehicleParams;
+    use sim::vehicle::VehicleSettings;
 
     const SEEDS: std::ops::Range<u64> = 0..50;
 
@@ -210,7 +210,7 @@ mod tests {
     #[test]
     fn the_lane_is_as_wide_as_the_sheet_says() {
         for which in ReferenceLot::ALL {
-            let sheet = which.sheet();
+            let plan = which.plan();
             let scenario = lot(which, RootSeed(1));
             let path = Path::new(&scenario.reference_path);
             let mut narrowest_m = f32::INFINITY;
@@ -228,7 +228,7 @@ mod tests {
                     assert!(width_m > 5.99, "{}: {width_m} m beside a corner at {pose:?}", which.name());
                 }
             }
-            assert!(*sheet.lane_m.start() - 0.01 < narrowest_m && widest_m < *sheet.lane_m.end() + 0.01);
+            assert!(*plan.lane_m.start() - 0.01 < narrowest_m && widest_m < *plan.lane_m.end() + 0.01);
             assert!(widest_m - narrowest_m > 0.15, "{}: the width changes along the way", which.name());
         }
     }
@@ -239,7 +239,7 @@ mod tests {
         for which in ReferenceLot::ALL {
             let corridor = Corridor::draw(&blueprint(which));
             let route = Path::new(&corridor.reference_path);
-            for (leg, nominal_m) in corridor.legs.iter().zip(which.sheet().legs_m) {
+            for (leg, nominal_m) in corridor.legs.iter().zip(which.plan().legs_m) {
                 let on_leg = |pose: &&Pose| {
                     let local = leg.local(pose.position());
                     (6.0..leg.length_m - 6.0).contains(&local.x) && local.y.abs() < 2.0
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn whatever_narrows_the_lane_obeys_the_gap_rules() {
         for which in ReferenceLot::ALL {
-            let sheet = which.sheet();
+            let plan = which.plan();
             let mut double_parked_m = 0.0;
             for seed in SEEDS {
                 let scenario = lot(which, RootSeed(seed));
@@ -290,7 +290,7 @@ mod tests {
                     }
                     let gap_m = lane_m[0].min(free_m[0]) + lane_m[1].min(free_m[1]);
                     let name = which.name();
-                    assert!(gap_m > sheet.free_gap_m.start() - 0.03, "{name} seed {seed}: {gap_m} m at {pose:?}");
+                    assert!(gap_m > plan.free_gap_m.start() - 0.03, "{name} seed {seed}: {gap_m} m at {pose:?}");
                     assert!(vertex_m > 11.0, "{name} seed {seed}: narrowed {vertex_m} m from a corner at {pose:?}");
                     assert!(is_narrowed != [true, true], "{name} seed {seed}: narrowed from both sides at {pose:?}");
                     if let Some((before, sides)) = last_narrowed
@@ -302,9 +302,9 @@ mod tests {
                     last_narrowed = Some((pose, is_narrowed));
                 }
             }
-            let share = double_parked_m / (SEEDS.end as f32 * sheet.length_m);
+            let share = double_parked_m / (SEEDS.end as f32 * plan.length_m);
             // Counted without the spaces between the cars of a cluster, which are about an eighth of it.
-            let expected = 0.88 * sheet.double_parked_share;
+            let expected = 0.88 * plan.double_parked_share;
             assert!((share - expected).abs() < 0.03, "{}: share {share}, expected {expected}", which.name());
         }
     }
@@ -385,7 +385,7 @@ mod tests {
 
     #[test]
     fn both_directions_validate_with_every_seed() {
-        let vehicle = VehicleParams::hyundai_hg300();
+        let vehicle = VehicleSettings::hyundai_hg300();
         for which in ReferenceLot::ALL {
             for seed in SEEDS {
                 for direction in Direction::BOTH {

@@ -6,7 +6,7 @@
 
 use sim::geometry::{Pose, Vec2, distance_to_segment, edges};
 use sim::scenario::Scenario;
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 use std::cmp::Ordering;
 use std::collections::{BTreeSet, BinaryHeap};
 
@@ -57,7 +57,7 @@ pub struct Waypoint {
 /// Searches a drive from the start of the reference path to its finish that keeps `clearance_m` around the body.
 ///
 /// `None` when there is none, or none was found within the budget. The scenario must be valid.
-pub fn solve(scenario: &Scenario, vehicle: &VehicleParams, clearance_m: f32) -> Option<Solution> {
+pub fn solve(scenario: &Scenario, vehicle: &VehicleSettings, clearance_m: f32) -> Option<Solution> {
     let scene = Scene::new(scenario);
     let goal = Goal::new(scenario);
     let to_go = DistanceToGo::new(&scene, &goal, vehicle, &BTreeSet::new());
@@ -135,7 +135,7 @@ struct Search<'a> {
     scene: &'a Scene,
     goal: &'a Goal,
     to_go: &'a DistanceToGo,
-    vehicle: &'a VehicleParams,
+    vehicle: &'a VehicleSettings,
     body: Footprint,
     swept_body: Footprint,
     nodes: Vec<Node>,
@@ -148,7 +148,7 @@ impl<'a> Search<'a> {
         scene: &'a Scene,
         goal: &'a Goal,
         to_go: &'a DistanceToGo,
-        vehicle: &'a VehicleParams,
+        vehicle: &'a VehicleSettings,
         clearance_m: f32,
     ) -> Self {
         Self {
@@ -280,7 +280,7 @@ struct Footprint {
 impl Footprint {
     const DISCS: usize = 5;
 
-    fn new(vehicle: &VehicleParams, inflation_m: f32) -> Self {
+    fn new(vehicle: &VehicleSettings, inflation_m: f32) -> Self {
         let (rear_m, front_m) = (-vehicle.rear_overhang_m - inflation_m, vehicle.front_m() + inflation_m);
         let half_width_m = 0.5 * vehicle.width_m + inflation_m;
         let piece_m = (front_m - rear_m) / Self::DISCS as f32;
@@ -422,7 +422,7 @@ struct DistanceToGo(Raster<f32>);
 
 impl DistanceToGo {
     /// `closed` are cells of the clearance raster that count as solid.
-    fn new(scene: &Scene, goal: &Goal, vehicle: &VehicleParams, closed: &BTreeSet<usize>) -> Self {
+    fn new(scene: &Scene, goal: &Goal, vehicle: &VehicleSettings, closed: &BTreeSet<usize>) -> Self {
         let half_width_m = 0.5 * vehicle.width_m;
         let mut to_go = Raster::covering(scene.low, scene.high, Scene::NODE_M, f32::INFINITY);
         // The front axle is at the source when the rear axle reaches the finish.
@@ -552,11 +552,11 @@ mod tests {
     use super::*;
     use crate::reference::{self, ReferenceLot};
     use geo::{Contains, Intersects, LineString, Polygon};
-    use sim::scenario::{Direction, NoiseSettings, Obstacle, ObstacleClass, ReferencePath};
+    use sim::scenario::{Direction, LotNoise, Obstacle, ObstacleClass, ReferencePath};
     use sim::seed::RootSeed;
 
-    fn car() -> VehicleParams {
-        VehicleParams::hyundai_hg300()
+    fn car() -> VehicleSettings {
+        VehicleSettings::hyundai_hg300()
     }
 
     /// A straight lane of a width, 70 m long, driven from x = 10 to x = 50.
@@ -570,7 +570,7 @@ mod tests {
                 points: vec![Vec2::new(10.0, 0.0), Vec2::new(50.0, 0.0)],
                 corner_radius_m: 5.0,
             },
-            noise: NoiseSettings::default(),
+            noise: LotNoise::default(),
             islands: Vec::new(),
             obstacles: obstacles
                 .iter()

@@ -3,14 +3,14 @@
 
 use divan::Bencher;
 use sim::driver::{Decision, LookAheadPoint, Source};
-use sim::episode::{Episode, EpisodeConfig};
+use sim::episode::{Episode, EpisodeSettings};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
-use sim::scenario::{NoiseLevel, NoiseSettings, Obstacle, ObstacleClass, ReferencePath, Scenario, SpeedBump};
+use sim::scenario::{LotNoise, NoiseLevel, Obstacle, ObstacleClass, ReferencePath, Scenario, SpeedBump};
 use sim::seed::RootSeed;
-use sim::sensing::noise::NoiseConfig;
-use sim::sensing::{SensingConfig, Sensor};
-use sim::vehicle::VehicleParams;
+use sim::sensing::noise::NoiseSettings;
+use sim::sensing::{SensingSettings, Sensor};
+use sim::vehicle::VehicleSettings;
 use std::sync::Arc;
 
 /// Width of the lane, metres.
@@ -35,7 +35,7 @@ fn scenario(width_m: f32) -> Scenario {
         name: "bench".into(),
         boundary: boundary.map(|(x, y)| Vec2::new(x, y)).to_vec(),
         reference_path: ReferencePath { points: vec![Vec2::ZERO, Vec2::new(200.0, 0.0)], corner_radius_m: 0.0 },
-        noise: NoiseSettings::default(),
+        noise: LotNoise::default(),
         islands: vec![],
         obstacles: parked.chain(noses).collect(),
         speed_bumps: (0..3)
@@ -45,14 +45,14 @@ fn scenario(width_m: f32) -> Scenario {
 }
 
 fn map(width_m: f32) -> Arc<Map> {
-    Arc::new(Map::build(scenario(width_m), &VehicleParams::hyundai_hg300()).expect("the lane is sound"))
+    Arc::new(Map::build(scenario(width_m), &VehicleSettings::hyundai_hg300()).expect("the lane is sound"))
 }
 
 #[divan::bench(args = [(NoiseLevel::Clean, false), (NoiseLevel::Clean, true), (NoiseLevel::Paper, true), (NoiseLevel::Hard, true)])]
-fn observation(bencher: Bencher<'_, '_>, (level, smear): (NoiseLevel, bool)) {
+fn observation(bencher: Bencher<'_, '_>, (level, occlusion): (NoiseLevel, bool)) {
     let map = map(WIDTH_M);
-    let config = SensingConfig { smear, ..SensingConfig::paper() };
-    let mut sensor = Sensor::new(&map, config, &NoiseConfig::of(level), RootSeed(1));
+    let settings = SensingSettings { occlusion, ..SensingSettings::paper() };
+    let mut sensor = Sensor::new(&map, settings, &NoiseSettings::of(level), RootSeed(1));
     let mut tick = 0;
     bencher.bench_local(|| {
         tick += 1;
@@ -64,8 +64,8 @@ fn observation(bencher: Bencher<'_, '_>, (level, smear): (NoiseLevel, bool)) {
 /// Five physics steps with collision checks, the safe ring and the clearance.
 #[divan::bench(args = [WIDTH_M, 2.7])]
 fn control_step_without_driver(bencher: Bencher<'_, '_>, lane_m: f32) {
-    let (config, map) = (Arc::new(EpisodeConfig::paper()), map(lane_m));
-    let start = || Episode::new(Arc::clone(&config), Arc::clone(&map), RootSeed(1));
+    let (settings, map) = (Arc::new(EpisodeSettings::paper()), map(lane_m));
+    let start = || Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(1));
     let decision =
         Decision { look_ahead: LookAheadPoint { ahead_m: 14.0, left_m: 0.0 }, source: Source::Expert, spread: None };
     let mut episode = start();
@@ -81,5 +81,5 @@ fn control_step_without_driver(bencher: Bencher<'_, '_>, lane_m: f32) {
 fn map_build(bencher: Bencher<'_, '_>) {
     bencher
         .with_inputs(|| scenario(WIDTH_M))
-        .bench_local_values(|scenario| Map::build(scenario, &VehicleParams::hyundai_hg300()));
+        .bench_local_values(|scenario| Map::build(scenario, &VehicleSettings::hyundai_hg300()));
 }

@@ -3,7 +3,7 @@
 use crate::distance_field::DistanceField;
 use crate::geometry::{Pose, Vec2, edges};
 use crate::scenario::Scenario;
-use crate::vehicle::VehicleParams;
+use crate::vehicle::VehicleSettings;
 use parry2d::shape::Cuboid;
 use rapier2d::geometry::{ColliderBuilder, Group, InteractionGroups, InteractionTestMode};
 use rapier2d::math::Pose as Isometry;
@@ -91,7 +91,7 @@ pub struct BodyBox {
 
 impl BodyBox {
     /// The body of a vehicle.
-    pub fn new(params: &VehicleParams) -> Self {
+    pub fn new(params: &VehicleSettings) -> Self {
         let cuboid = Cuboid::new(Vec2::new(0.5 * params.length_m, 0.5 * params.width_m));
         let segment_m = params.length_m / BODY_DISCS as f32;
         let disc_centres_m = std::array::from_fn(|i| (i as f32 + 0.5) * segment_m - params.rear_overhang_m);
@@ -166,7 +166,7 @@ mod tests {
             name: "lane".into(),
             boundary,
             reference_path: ReferencePath { points: vec![Vec2::ZERO, Vec2::new(40.0, 0.0)], corner_radius_m: 0.0 },
-            noise: crate::scenario::NoiseSettings::default(),
+            noise: crate::scenario::LotNoise::default(),
             islands: vec![],
             obstacles: vec![
                 Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(30.35, 1.1), 0.0)),
@@ -175,7 +175,7 @@ mod tests {
             speed_bumps: vec![],
         };
         let world = CollisionWorld::new(&scenario);
-        let body = BodyBox::new(&VehicleParams::hyundai_hg300());
+        let body = BodyBox::new(&VehicleSettings::hyundai_hg300());
         let hits = |x: f32, y: f32, heading: f32, set| world.body_hits(&body, Pose::new(Vec2::new(x, y), heading), set);
         // Front bumper 3.80 m ahead of the axle; the pillar's near face is at x = 30.0.
         assert!(!hits(26.19, 0.0, 0.0, NonDrivable) && hits(26.21, 0.0, 0.0, NonDrivable));

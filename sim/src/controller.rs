@@ -2,7 +2,7 @@
 
 use crate::driver::{Decision, LookAheadPoint, Source};
 use crate::sensing::GridGeometry;
-use crate::vehicle::{VehicleCommand, VehicleParams};
+use crate::vehicle::{VehicleCommand, VehicleSettings};
 use serde::{Deserialize, Serialize};
 
 /// Which form of pure pursuit.
@@ -21,7 +21,7 @@ pub enum PursuitLaw {
 ///
 /// methods.md prefers B with points as far as the way is open. The car is steered 7 m ahead, so such a point lies far
 /// beyond, on the circle through what is steered at: moving the car by 20 cm moves it by 1.5 m, and η̂ stays below .8.
-/// Law A with points half as far (`BandConfig::reach_share` in `expert`) drives the same circle at about the same speed,
+/// Law A with points half as far (`ElasticBandSettings::reach_share` in `expert`) drives the same circle at about the same speed,
 /// the point lies near what is steered at, and η̂ passes .9. Both the formula and the half of the paper are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -40,7 +40,7 @@ pub enum SpeedLaw {
 /// Settings of the controller.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ControllerConfig {
+pub struct ControllerSettings {
     /// Form of pure pursuit.
     pub pursuit: PursuitLaw,
     /// Speed law of the expert and of learned policies.
@@ -53,7 +53,7 @@ pub struct ControllerConfig {
     pub speed_max_mps: f32,
 }
 
-impl ControllerConfig {
+impl ControllerSettings {
     /// Experimental Setup: 0.5 to 2.2 m/s.
     pub fn paper() -> Self {
         Self {
@@ -73,18 +73,21 @@ const LOOK_AHEAD_MIN_M: f32 = 1.0;
 
 /// The command that drives at a decision's look-ahead point.
 pub fn pursue(
-    config: &ControllerConfig,
-    params: &VehicleParams,
+    settings: &ControllerSettings,
+    params: &VehicleSettings,
     geometry: &GridGeometry,
     decision: &Decision,
 ) -> VehicleCommand {
-    let steering_rad = steering(config.pursuit, params, geometry, decision.look_ahead);
-    let law = if decision.source == Source::Planner { config.planner_speed_law } else { config.speed_law };
-    VehicleCommand { steering_rad, speed_mps: speed(law, config, params, geometry, decision.look_ahead, steering_rad) }
+    let steering_rad = steering(settings.pursuit, params, geometry, decision.look_ahead);
+    let law = if decision.source == Source::Planner { settings.planner_speed_law } else { settings.speed_law };
+    VehicleCommand {
+        steering_rad,
+        speed_mps: speed(law, settings, params, geometry, decision.look_ahead, steering_rad),
+    }
 }
 
 /// Road-wheel angle that steers at a point, radians, within the vehicle's limits.
-pub fn steering(law: PursuitLaw, params: &VehicleParams, geometry: &GridGeometry, target: LookAheadPoint) -> f32 {
+pub fn steering(law: PursuitLaw, params: &VehicleSettings, geometry: &GridGeometry, target: LookAheadPoint) -> f32 {
     let LookAheadPoint { ahead_m, left_m } = target;
     let steering_rad = match law {
         PursuitLaw::Paper => {
@@ -109,8 +112,8 @@ pub fn steering(law: PursuitLaw, params: &VehicleParams, geometry: &GridGeometry
 
 fn speed(
     law: SpeedLaw,
-    config: &ControllerConfig,
-    params: &VehicleParams,
+    settings: &ControllerSettings,
+    params: &VehicleSettings,
     geometry: &GridGeometry,
     target: LookAheadPoint,
     steering_rad: f32,
@@ -122,10 +125,10 @@ fn speed(
         SpeedLaw::HalfOfAhead => ahead_m / 2.0,
         SpeedLaw::FallsWithSteering => {
             let share = steering_rad.abs() / params.steering_max_rad; // |δ_sw| / 540°
-            config.speed_max_mps - share * (config.speed_max_mps - config.speed_min_mps)
+            settings.speed_max_mps - share * (settings.speed_max_mps - settings.speed_min_mps)
         }
     };
-    speed_mps.clamp(config.speed_min_mps, config.speed_max_mps)
+    speed_mps.clamp(settings.speed_min_mps, settings.speed_max_mps)
 }
 
 #[cfg(test)]
@@ -134,7 +137,7 @@ mod tests {
 
     #[test]
     fn the_paper_law_drives_the_circle_through_the_point() {
-        let (params, geometry) = (VehicleParams::hyundai_hg300(), GridGeometry::paper());
+        let (params, geometry) = (VehicleSettings::hyundai_hg300(), GridGeometry::paper());
         for (ahead_m, left_m) in [(8.0, 1.0), (5.0, -2.0), (12.0, 4.0), (16.0, 0.0)] {
             let target = LookAheadPoint { ahead_m, left_m };
             let curvature = steering(PursuitLaw::Paper, &params, &geometry, target).tan() / params.wheelbase_m;
@@ -150,9 +153,9 @@ mod tests {
 
     #[test]
     fn speed_laws_match_the_paper() {
-        let (params, geometry, config) =
-            (VehicleParams::hyundai_hg300(), GridGeometry::paper(), ControllerConfig::paper());
-        let at = |law, ahead_m| speed(law, &config, &params, &geometry, LookAheadPoint { ahead_m, left_m: 0.0 }, 0.0);
+        let (params, geometry, settings) =
+            (VehicleSettings::hyundai_hg300(), GridGeometry::paper(), ControllerSettings::paper());
+        let at = |law, ahead_m| speed(law, &settings, &params, &geometry, LookAheadPoint { ahead_m, left_m: 0.0 }, 0.0);
         // 0.5 + X_bev = 4.48 m → law B 1.0 m/s, A 2.0 m/s, C capped at 2.2 m/s.
         let ahead_m = 4.3 - 0.5 + 4.48;
         assert!((at(SpeedLaw::Halved, ahead_m) - 1.0).abs() < 1e-5);
@@ -161,7 +164,7 @@ mod tests {
         assert_eq!(at(SpeedLaw::Halved, 4.3), 0.5);
         let planner = |steering_rad| {
             let target = LookAheadPoint { ahead_m: 8.0, left_m: 0.0 };
-            speed(SpeedLaw::FallsWithSteering, &config, &params, &geometry, target, steering_rad)
+            speed(SpeedLaw::FallsWithSteering, &settings, &params, &geometry, target, steering_rad)
         };
         assert_eq!(planner(0.0), 2.2);
         assert!((planner(params.steering_max_rad) - 0.5).abs() < 1e-5);

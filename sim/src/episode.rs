@@ -12,15 +12,15 @@
 //! ```
 
 use crate::collision::BodyBox;
-use crate::controller::{self, ControllerConfig};
+use crate::controller::{self, ControllerSettings};
 use crate::driver::{Decision, Driver, GroundTruth, Seat, Situation};
 use crate::geometry::Pose;
 use crate::map::Map;
-use crate::metrics::{EpisodeMetrics, MetricsConfig, SafeRing, Tally};
+use crate::metrics::{EpisodeMetrics, MetricsAccumulator, MetricsSettings, SafeRing};
 use crate::seed::RootSeed;
-use crate::sensing::noise::NoiseConfig;
-use crate::sensing::{Observation, SensingConfig, Sensor};
-use crate::vehicle::{self, VehicleCommand, VehicleParams, VehicleState};
+use crate::sensing::noise::NoiseSettings;
+use crate::sensing::{Observation, SensingSettings, Sensor};
+use crate::vehicle::{self, VehicleCommand, VehicleSettings, VehicleState};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -28,32 +28,32 @@ use std::sync::Arc;
 /// Everything an episode needs besides a map and a seed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct EpisodeConfig {
+pub struct EpisodeSettings {
     /// The car.
-    pub vehicle: VehicleParams,
+    pub vehicle: VehicleSettings,
     /// From look-ahead point to command.
-    pub controller: ControllerConfig,
+    pub controller: ControllerSettings,
     /// What is seen.
-    pub sensing: SensingConfig,
+    pub sensing: SensingSettings,
     /// What is seen wrongly.
-    pub noise: NoiseConfig,
+    pub noise: NoiseSettings,
     /// What is measured.
-    pub metrics: MetricsConfig,
+    pub metrics: MetricsSettings,
     /// Physics step, milliseconds.
     pub physics_step_ms: u32,
     /// Control period, milliseconds; a multiple of the physics step (paper: 50 ms).
     pub control_period_ms: u32,
 }
 
-impl EpisodeConfig {
+impl EpisodeSettings {
     /// The paper's set-up at noise level `paper`.
     pub fn paper() -> Self {
         Self {
-            vehicle: VehicleParams::hyundai_hg300(),
-            controller: ControllerConfig::paper(),
-            sensing: SensingConfig::paper(),
-            noise: NoiseConfig::of(crate::scenario::NoiseLevel::Paper),
-            metrics: MetricsConfig::paper(),
+            vehicle: VehicleSettings::hyundai_hg300(),
+            controller: ControllerSettings::paper(),
+            sensing: SensingSettings::paper(),
+            noise: NoiseSettings::of(crate::scenario::NoiseLevel::Paper),
+            metrics: MetricsSettings::paper(),
             physics_step_ms: 10,
             control_period_ms: 50,
         }
@@ -178,7 +178,7 @@ enum Phase {
 /// One run that can be stepped.
 #[derive(Debug, Clone)]
 pub struct Episode {
-    config: Arc<EpisodeConfig>,
+    settings: Arc<EpisodeSettings>,
     map: Arc<Map>,
     body: Arc<BodyBox>,
     ring: Arc<SafeRing>,
@@ -198,23 +198,23 @@ pub struct Episode {
     touches: bool,
     observation: Observation,
     was_reset: bool,
-    tally: Tally,
+    tally: MetricsAccumulator,
     events: Vec<(u32, Event)>,
     ending: Option<Ending>,
 }
 
 impl Episode {
     /// A car at rest at the start of a map's route; all noise is drawn from `seed`.
-    pub fn new(config: Arc<EpisodeConfig>, map: Arc<Map>, seed: RootSeed) -> Self {
+    pub fn new(settings: Arc<EpisodeSettings>, map: Arc<Map>, seed: RootSeed) -> Self {
         assert!(
-            config.physics_step_ms > 0 && config.control_period_ms.is_multiple_of(config.physics_step_ms),
+            settings.physics_step_ms > 0 && settings.control_period_ms.is_multiple_of(settings.physics_step_ms),
             "the control period is a multiple of the physics step"
         );
-        let sensor = Sensor::new(&map, config.sensing.clone(), &config.noise, seed);
-        let pixel_m = config.sensing.geometry.pixel_m();
+        let sensor = Sensor::new(&map, settings.sensing.clone(), &settings.noise, seed);
+        let pixel_m = settings.sensing.geometry.pixel_m();
         Self {
-            body: Arc::new(BodyBox::new(&config.vehicle)),
-            ring: Arc::new(SafeRing::new(&config.vehicle, &config.metrics, pixel_m)),
+            body: Arc::new(BodyBox::new(&settings.vehicle)),
+            ring: Arc::new(SafeRing::new(&settings.vehicle, &settings.metrics, pixel_m)),
             sensor,
             vehicle: VehicleState::at_rest(map.start()),
             phase: Phase::Driving,
@@ -228,30 +228,30 @@ impl Episode {
             touches: false,
             observation: Observation::default(),
             was_reset: true,
-            tally: Tally::new(map.path().length_m()),
+            tally: MetricsAccumulator::new(map.path().length_m()),
             events: Vec::new(),
             ending: None,
-            config,
+            settings,
             map,
         }
     }
 
     /// A sensor like the one of this episode, with noise of its own.
     pub fn another_sensor(&self, seed: RootSeed) -> Sensor {
-        Sensor::new(&self.map, self.config.sensing.clone(), &self.config.noise, seed)
+        Sensor::new(&self.map, self.settings.sensing.clone(), &self.settings.noise, seed)
     }
 
     /// The same, but already under way: for asking what would have happened from a state that was met elsewhere.
     /// Commands still on their way then are not known; the car holds its wheels and speed until the first new one.
     pub fn under_way(
-        config: Arc<EpisodeConfig>,
+        settings: Arc<EpisodeSettings>,
         map: Arc<Map>,
         seed: RootSeed,
         vehicle: VehicleState,
         progress_m: f32,
     ) -> Self {
         let command = VehicleCommand { steering_rad: vehicle.steering_rad, speed_mps: vehicle.speed_mps };
-        Self { vehicle, command, progress_m, advance: (progress_m, 0), ..Self::new(config, map, seed) }
+        Self { vehicle, command, progress_m, advance: (progress_m, 0), ..Self::new(settings, map, seed) }
     }
 
     /// Looks. Call once before each decision.
@@ -286,8 +286,8 @@ impl Episode {
     }
 
     /// The settings driven with.
-    pub fn config(&self) -> &EpisodeConfig {
-        &self.config
+    pub fn settings(&self) -> &EpisodeSettings {
+        &self.settings
     }
 
     /// The vehicle now.
@@ -323,9 +323,10 @@ impl Episode {
             self.tick,
             self.map.scenario().name
         );
-        let config = Arc::clone(&self.config);
-        let command = controller::pursue(&config.controller, &config.vehicle, &config.sensing.geometry, &decision);
-        let holds_from = self.physics_step + config.physics_steps(config.vehicle.dead_time_s);
+        let settings = Arc::clone(&self.settings);
+        let command =
+            controller::pursue(&settings.controller, &settings.vehicle, &settings.sensing.geometry, &decision);
+        let holds_from = self.physics_step + settings.physics_steps(settings.vehicle.dead_time_s);
         self.in_flight.push_back((holds_from, command));
         self.was_reset = false;
 
@@ -339,13 +340,13 @@ impl Episode {
             decision,
             command,
             progress_m: self.progress_m,
-            safe_ratio: self.ring.safe_ratio(distance, seen_from.pose, config.sensing.geometry.pixel_m()),
+            safe_ratio: self.ring.safe_ratio(distance, seen_from.pose, settings.sensing.geometry.pixel_m()),
             clearance_m: self.body.clearance_m(distance, seen_from.pose),
             driven_m: 0.0,
             contacts: 0,
             event: Event::Drove,
         };
-        let steps_per_tick = config.control_period_ms / config.physics_step_ms;
+        let steps_per_tick = settings.control_period_ms / settings.physics_step_ms;
         let mut steps = 0;
         while steps < steps_per_tick || self.phase == Phase::Braking {
             self.step_physics(&mut frame);
@@ -354,7 +355,7 @@ impl Episode {
         self.tick += 1;
         self.progress_m = self.map.path().project_near(self.vehicle.pose.position(), self.progress_m, 5.0, 5.0);
         self.judge_progress(&mut frame);
-        frame.time_s = self.physics_step as f32 * config.physics_step_s();
+        frame.time_s = self.physics_step as f32 * settings.physics_step_s();
         self.tally.frame(&frame);
         if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
             self.events.push((frame.tick, frame.event));
@@ -373,30 +374,30 @@ impl Episode {
     }
 
     fn step_physics(&mut self, frame: &mut Frame) {
-        let config = &self.config;
-        let dt_s = config.physics_step_s();
+        let settings = &self.settings;
+        let dt_s = settings.physics_step_s();
         let before = self.vehicle;
         match self.phase {
             Phase::Driving => {
                 while self.in_flight.front().is_some_and(|&(step, _)| step <= self.physics_step) {
                     self.command = self.in_flight.pop_front().map_or(self.command, |(_, command)| command);
                 }
-                self.vehicle = vehicle::step(&config.vehicle, before, self.command, dt_s);
+                self.vehicle = vehicle::step(&settings.vehicle, before, self.command, dt_s);
             }
-            Phase::Braking => self.vehicle = vehicle::step_emergency_stop(&config.vehicle, before, dt_s),
+            Phase::Braking => self.vehicle = vehicle::step_emergency_stop(&settings.vehicle, before, dt_s),
         }
         self.physics_step += 1;
         frame.driven_m += 0.5 * (before.speed_mps + self.vehicle.speed_mps) * dt_s;
 
-        let (pose, set) = (self.vehicle.pose, config.metrics.obstacle_set);
-        let curvature = self.vehicle.curvature_per_m(&config.vehicle);
+        let (pose, set) = (self.vehicle.pose, settings.metrics.obstacle_set);
+        let curvature = self.vehicle.curvature_per_m(&settings.vehicle);
         let sweeps_into_something = self.body.sweep_hits(
             self.map.distance_field(),
             self.map.collision(),
             set,
             pose,
             curvature,
-            config.metrics.near_collision_m,
+            settings.metrics.near_collision_m,
         );
         let touches = sweeps_into_something && self.map.collision().body_hits(&self.body, pose, set);
         frame.contacts += u32::from(touches && !self.touches);
@@ -429,7 +430,7 @@ impl Episode {
         self.command = VehicleCommand::default();
         self.progress_m = s_m;
         self.advance = (s_m, self.physics_step);
-        self.counts_from_step = self.physics_step + self.config.physics_steps(self.config.metrics.refractory_s);
+        self.counts_from_step = self.physics_step + self.settings.physics_steps(self.settings.metrics.refractory_s);
         self.touches = false;
         self.was_reset = true;
         self.phase = Phase::Driving;
@@ -437,7 +438,7 @@ impl Episode {
 
     /// Whether the body is free when it follows the path for a few metres, and straight on for the near-collision range.
     fn is_free_from(&self, s_m: f32) -> bool {
-        let (path, metrics) = (self.map.path(), &self.config.metrics);
+        let (path, metrics) = (self.map.path(), &self.settings.metrics);
         let is_free = |pose: Pose| !self.map.collision().body_hits(&self.body, pose, metrics.obstacle_set);
         let start = path.pose_at(s_m);
         let steps = (metrics.resume_free_m / 0.25).ceil() as u32;
@@ -449,10 +450,10 @@ impl Episode {
     /// Recognises a stuck car and the finish.
     fn judge_progress(&mut self, frame: &mut Frame) {
         let (best_m, since_step) = self.advance;
-        let metrics = &self.config.metrics;
+        let metrics = &self.settings.metrics;
         if self.progress_m >= best_m + metrics.stuck_progress_m {
             self.advance = (self.progress_m, self.physics_step);
-        } else if self.physics_step - since_step >= self.config.physics_steps(metrics.stuck_after_s) {
+        } else if self.physics_step - since_step >= self.settings.physics_steps(metrics.stuck_after_s) {
             frame.event = Event::Stuck { at: self.vehicle.pose, progress_m: self.progress_m };
             self.resume_on_path();
         }
@@ -463,7 +464,7 @@ impl Episode {
     }
 
     fn judge_ending(&self, frame: &Frame) -> Option<Ending> {
-        let metrics = &self.config.metrics;
+        let metrics = &self.settings.metrics;
         if self.progress_m >= self.map.path().length_m() - 1e-3 {
             Some(Ending::ReachedEnd)
         } else if self.events.len() >= metrics.events_max as usize {

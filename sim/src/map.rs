@@ -8,7 +8,7 @@ use crate::geometry::{Circles, Outline, Pose, Vec2};
 use crate::path::Path;
 use crate::scenario::{Scenario, ScenarioError};
 use crate::validate::validate;
-use crate::vehicle::VehicleParams;
+use crate::vehicle::VehicleSettings;
 
 /// The clean world: what is drivable, what is solid, and the route.
 #[derive(Debug)]
@@ -41,7 +41,7 @@ impl Map {
     ///
     /// # Errors
     /// The first thing wrong with the scenario, with its place and a remedy.
-    pub fn build(scenario: Scenario, vehicle: &VehicleParams) -> Result<Self, ScenarioError> {
+    pub fn build(scenario: Scenario, vehicle: &VehicleSettings) -> Result<Self, ScenarioError> {
         validate(&scenario, vehicle)?;
         let path = Path::new(&scenario.reference_path);
         let mut distance = DistanceField::of_boundary(&scenario.boundary);

@@ -5,13 +5,13 @@ use crate::distance_field::{DistanceField, change_max_m};
 use crate::driver::Source;
 use crate::episode::{Event, Frame};
 use crate::geometry::{Pose, Vec2, WorldFromEgo, distance_to_segment, edges, polygon_contains};
-use crate::vehicle::VehicleParams;
+use crate::vehicle::VehicleSettings;
 use serde::{Deserialize, Serialize};
 
 /// Definitions of the metrics and of stop–count–resume.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MetricsConfig {
+pub struct MetricsSettings {
     /// A near-collision is something within this travel along the present arc, metres (paper: 0.5 m).
     pub near_collision_m: f32,
     /// What counts as something.
@@ -34,7 +34,7 @@ pub struct MetricsConfig {
     pub resume_free_m: f32,
 }
 
-impl MetricsConfig {
+impl MetricsSettings {
     /// The paper's definitions where it gives them, methods.md 8 elsewhere.
     pub fn paper() -> Self {
         Self {
@@ -184,15 +184,15 @@ impl Quarter {
 
 impl SafeRing {
     /// The ring (body ⊕ disc) minus body, at a pixel size.
-    pub fn new(params: &VehicleParams, config: &MetricsConfig, pixel_m: f32) -> Self {
+    pub fn new(params: &VehicleSettings, settings: &MetricsSettings, pixel_m: f32) -> Self {
         let body = params.body_in_ego();
         let is_in_range = |point: Vec2| {
-            let is_ahead = config.safe_range == SafeRange::Full || point.x >= params.front_m();
-            let near = edges(&body).any(|(a, b)| distance_to_segment(point, a, b) <= config.safe_range_m);
+            let is_ahead = settings.safe_range == SafeRange::Full || point.x >= params.front_m();
+            let near = edges(&body).any(|(a, b)| distance_to_segment(point, a, b) <= settings.safe_range_m);
             is_ahead && near && !polygon_contains(&body, point)
         };
         let block_m = pixel_m * BLOCK as f32;
-        let reach_m = params.length_m + config.safe_range_m;
+        let reach_m = params.length_m + settings.safe_range_m;
         let n = (reach_m / block_m).ceil() as i32;
         // A pixel centre lies on the axle, so that neither the body's sides nor the ring's fall on centres.
         let corners = (-n..n).flat_map(|row| (-n..n).map(move |col| Vec2::new(row as f32, col as f32) * block_m));
@@ -273,7 +273,7 @@ impl EpisodeMetrics {
 
 /// Accumulates frames into metrics.
 #[derive(Debug, Clone, Default)]
-pub struct Tally {
+pub struct MetricsAccumulator {
     metrics: EpisodeMetrics,
     safe_ratio_sum: f64,
     driven_m: f64,
@@ -294,7 +294,7 @@ struct Steering {
 /// Hysteresis of steering reversals, radians.
 const REVERSAL_RAD: f32 = 2.0 * std::f32::consts::PI / 180.0;
 
-impl Tally {
+impl MetricsAccumulator {
     /// Nothing measured yet on a route of this length.
     pub fn new(reference_m: f32) -> Self {
         let metrics = EpisodeMetrics { reference_m, clearance_min_m: f32::INFINITY, ..EpisodeMetrics::default() };
@@ -352,7 +352,7 @@ impl Tally {
 /// [`EpisodeMetrics::steering_reversals`].
 pub fn steering_reversals(angles_rad: impl IntoIterator<Item = f32>) -> u32 {
     let mut angles_rad = angles_rad.into_iter();
-    let mut tally = Tally::default();
+    let mut tally = MetricsAccumulator::default();
     if let Some(first) = angles_rad.next() {
         tally.steering = Steering { last_rad: first, turning: 0.0, extreme_rad: first };
     }
@@ -376,7 +376,7 @@ mod tests {
     use crate::vehicle::{VehicleCommand, VehicleState};
 
     fn ring() -> SafeRing {
-        SafeRing::new(&VehicleParams::hyundai_hg300(), &MetricsConfig::paper(), 0.06)
+        SafeRing::new(&VehicleSettings::hyundai_hg300(), &MetricsSettings::paper(), 0.06)
     }
 
     #[test]
@@ -389,8 +389,8 @@ mod tests {
     /// Ahead of the bumper: 1.86·1 + π·1²/2 = 3.43 m² = 953 pixels.
     #[test]
     fn the_front_of_the_ring_is_a_rectangle_and_two_quarter_discs() {
-        let config = MetricsConfig { safe_range: SafeRange::FrontOnly, ..MetricsConfig::paper() };
-        let n = SafeRing::new(&VehicleParams::hyundai_hg300(), &config, 0.06).n_pixels();
+        let settings = MetricsSettings { safe_range: SafeRange::FrontOnly, ..MetricsSettings::paper() };
+        let n = SafeRing::new(&VehicleSettings::hyundai_hg300(), &settings, 0.06).n_pixels();
         assert!(n.abs_diff(953) < 953 / 30, "{n} pixels");
     }
 
@@ -473,7 +473,7 @@ mod tests {
         let near = Event::NearCollision { at: Pose::default(), progress_m: 0.0 };
         let stuck = Event::Stuck { at: Pose::default(), progress_m: 0.0 };
         let frames = [(10.0, Event::Drove), (0.0, Event::Drove), (-3.0, near), (0.0, stuck), (4.0, Event::ReachedEnd)];
-        let mut tally = Tally::new(200.0);
+        let mut tally = MetricsAccumulator::new(200.0);
         for (tick, (steering_deg, event)) in frames.into_iter().enumerate() {
             tally.frame(&frame(tick as u32, steering_deg, event));
         }

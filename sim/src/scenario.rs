@@ -18,7 +18,7 @@ pub struct Scenario {
     pub reference_path: ReferencePath,
     /// Sensor noise of this lot; the command line may override the level.
     #[serde(default)]
-    pub noise: NoiseSettings,
+    pub noise: LotNoise,
     /// Non-drivable areas inside the boundary.
     #[serde(default, rename = "island", skip_serializing_if = "Vec::is_empty")]
     pub islands: Vec<Island>,
@@ -224,7 +224,7 @@ pub enum NoiseLevel {
 /// Sensor noise of a lot.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct NoiseSettings {
+pub struct LotNoise {
     /// Overall level.
     #[serde(default)]
     pub level: NoiseLevel,

@@ -37,7 +37,7 @@ pub enum Stream {
     /// Candidates of a search for parameters.
     Search = 12,
     /// Sensor noise of further looks at a tick that is learned from.
-    Relook = 13,
+    NoiseAugmentation = 13,
     /// Nudges of the wheel while collecting.
     Disturbance = 14,
 }

@@ -1,11 +1,11 @@
 //! What the car sees: a bird's-eye view of 200×200 pixels, reduced to a 25×25 occupancy grid (methods.md 1).
 
 pub mod noise;
+mod occlusion;
 mod quadtree;
 mod sensor;
-mod smear;
 
-pub use sensor::{Inspection, SensingConfig, Sensor};
+pub use sensor::{Inspection, SensingSettings, Sensor};
 
 use crate::geometry::Vec2;
 use serde::{Deserialize, Serialize};

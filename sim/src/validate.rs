@@ -5,7 +5,7 @@
 use crate::geometry::{Pose, Vec2, distance_to_segment, edges, polygon_contains};
 use crate::path::Path;
 use crate::scenario::{Obstacle, Place, ReferencePath, Scenario, ScenarioError};
-use crate::vehicle::VehicleParams;
+use crate::vehicle::VehicleSettings;
 
 /// Largest extent of a lot, metres: its raster of distances then takes 100 MB.
 pub const EXTENT_MAX_M: f32 = 500.0;
@@ -24,7 +24,7 @@ const CHORDS_PER_BLOCK: usize = 16;
 ///
 /// # Errors
 /// The first problem found, with its place and a remedy.
-pub fn validate(scenario: &Scenario, vehicle: &VehicleParams) -> Result<(), ScenarioError> {
+pub fn validate(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), ScenarioError> {
     check_name(&scenario.name)?;
     check_polygon(&scenario.boundary, Place::Boundary)?;
     check_extent(&scenario.boundary)?;
@@ -210,7 +210,7 @@ fn check_path_points(path: &ReferencePath, lot: (Vec2, Vec2)) -> Result<(), Scen
 }
 
 /// The body at the start must stand on free ground.
-fn check_start(scenario: &Scenario, vehicle: &VehicleParams, start: Pose) -> Result<(), ScenarioError> {
+fn check_start(scenario: &Scenario, vehicle: &VehicleSettings, start: Pose) -> Result<(), ScenarioError> {
     let place = Place::ReferencePath(Some(0));
     let world_from_ego = start.world_from_ego();
     let body = vehicle.body_in_ego().map(|corner| world_from_ego.point(corner));
@@ -410,7 +410,7 @@ fn at(point: Vec2) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::{Island, NoiseSettings, ObstacleClass, SpeedBump};
+    use crate::scenario::{Island, LotNoise, ObstacleClass, SpeedBump};
 
     /// A straight lane, 40 m × 6 m, driven from (5, 0) to (30, 0).
     fn lane() -> Scenario {
@@ -422,7 +422,7 @@ mod tests {
                 points: vec![Vec2::new(5.0, 0.0), Vec2::new(30.0, 0.0)],
                 corner_radius_m: 5.0,
             },
-            noise: NoiseSettings::default(),
+            noise: LotNoise::default(),
             islands: Vec::new(),
             obstacles: vec![obstacle(ObstacleClass::Sedan, 20.0, 2.5)],
             speed_bumps: vec![SpeedBump { x_m: 12.0, y_m: 0.0, heading_deg: 0.0, length_m: 0.5, width_m: 6.0 }],
@@ -439,7 +439,7 @@ mod tests {
 
     #[test]
     fn a_sound_lane_is_accepted() {
-        assert_eq!(validate(&lane(), &VehicleParams::hyundai_hg300()), Ok(()));
+        assert_eq!(validate(&lane(), &VehicleSettings::hyundai_hg300()), Ok(()));
     }
 
     #[test]
@@ -522,7 +522,7 @@ mod tests {
         for (break_it, expected) in table {
             let mut scenario = lane();
             break_it(&mut scenario);
-            match validate(&scenario, &VehicleParams::hyundai_hg300()) {
+            match validate(&scenario, &VehicleSettings::hyundai_hg300()) {
                 Ok(()) => panic!("accepted, expected: {expected}"),
                 Err(error) => {
                     let message = error.to_string();
@@ -540,7 +540,7 @@ mod tests {
         scenario.obstacles.push(obstacle(ObstacleClass::Person, 20.0, -0.3));
         scenario.obstacles.push(obstacle(ObstacleClass::Cone, 8.9, 1.2));
         scenario.obstacles.push(obstacle(ObstacleClass::Truck, 20.0, 9.0));
-        assert_eq!(validate(&scenario, &VehicleParams::hyundai_hg300()), Ok(()));
+        assert_eq!(validate(&scenario, &VehicleSettings::hyundai_hg300()), Ok(()));
     }
 
     /// An island need not contain a vertex of the boundary to cross it: a notch of the boundary can reach into it.
@@ -550,7 +550,7 @@ mod tests {
         let notch = [(32.0, 3.0), (31.9, 1.5), (31.8, 3.0)].map(|(x, y)| Vec2::new(x, y));
         scenario.boundary.splice(3..3, notch);
         scenario.islands.push(island(&[(31.0, 1.0), (33.0, 1.0), (33.0, 2.0), (31.0, 2.0)]));
-        let error = validate(&scenario, &VehicleParams::hyundai_hg300()).expect_err("crosses");
+        let error = validate(&scenario, &VehicleSettings::hyundai_hg300()).expect_err("crosses");
         assert!(error.to_string().starts_with("island 1: it crosses the boundary's edge from vertex 4"), "{error}");
     }
 }

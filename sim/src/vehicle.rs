@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Dimensions and limits of the vehicle.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct VehicleParams {
+pub struct VehicleSettings {
     /// Distance between the axles, metres (L in the paper).
     pub wheelbase_m: f32,
     /// Bumper to bumper, metres.
@@ -44,7 +44,7 @@ pub struct VehicleParams {
     pub dead_time_s: f32,
 }
 
-impl VehicleParams {
+impl VehicleSettings {
     /// Hyundai HG 300 of the paper. Sources per number: methods.md 2.1 and 2.3.
     pub fn hyundai_hg300() -> Self {
         Self {
@@ -115,7 +115,7 @@ impl VehicleState {
     }
 
     /// Curvature of the present arc of the rear axle, 1/m, positive to the left.
-    pub fn curvature_per_m(&self, params: &VehicleParams) -> f32 {
+    pub fn curvature_per_m(&self, params: &VehicleSettings) -> f32 {
         self.steering_rad.tan() / params.wheelbase_m
     }
 }
@@ -130,7 +130,7 @@ pub struct VehicleCommand {
 }
 
 /// One physics step: actuators first, then the exact arc.
-pub fn step(params: &VehicleParams, state: VehicleState, command: VehicleCommand, dt_s: f32) -> VehicleState {
+pub fn step(params: &VehicleSettings, state: VehicleState, command: VehicleCommand, dt_s: f32) -> VehicleState {
     let error_mps = command.speed_mps - state.speed_mps;
     let integral = (state.speed_integral_mps2 + params.speed_gain_i_per_s2 * error_mps * dt_s)
         .clamp(-params.integral_max_mps2, params.integral_max_mps2);
@@ -144,11 +144,11 @@ pub fn step(params: &VehicleParams, state: VehicleState, command: VehicleCommand
 }
 
 /// One physics step of an emergency stop: full braking, wheels held.
-pub fn step_emergency_stop(params: &VehicleParams, state: VehicleState, dt_s: f32) -> VehicleState {
+pub fn step_emergency_stop(params: &VehicleSettings, state: VehicleState, dt_s: f32) -> VehicleState {
     roll(params, state, state.steering_rad, -params.emergency_brake_mps2, dt_s)
 }
 
-fn roll(params: &VehicleParams, state: VehicleState, steering_rad: f32, accel_mps2: f32, dt_s: f32) -> VehicleState {
+fn roll(params: &VehicleSettings, state: VehicleState, steering_rad: f32, accel_mps2: f32, dt_s: f32) -> VehicleState {
     let rate_step = params.steering_rate_max_radps * dt_s;
     let steering_rad = steering_rad
         .clamp(-params.steering_max_rad, params.steering_max_rad)

@@ -3,26 +3,26 @@
 
 use sim::batch::run_lockstep_until;
 use sim::driver::{Decision, Driver, LookAheadPoint, OneDriverEach, Situation, Source};
-use sim::episode::{self, Ending, Episode, EpisodeConfig, Event, Frame};
+use sim::episode::{self, Ending, Episode, EpisodeSettings, Event, Frame};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
-use sim::scenario::{NoiseLevel, NoiseSettings, Obstacle, ObstacleClass, ReferencePath, Scenario};
+use sim::scenario::{LotNoise, NoiseLevel, Obstacle, ObstacleClass, ReferencePath, Scenario};
 use sim::seed::RootSeed;
-use sim::sensing::noise::NoiseConfig;
-use sim::vehicle::{VehicleCommand, VehicleParams, VehicleState, step, step_emergency_stop};
+use sim::sensing::noise::NoiseSettings;
+use sim::vehicle::{VehicleCommand, VehicleSettings, VehicleState, step, step_emergency_stop};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 fn drive(mut state: VehicleState, command: VehicleCommand, seconds: f32) -> VehicleState {
     for _ in 0..(seconds * 100.0).round() as u32 {
-        state = step(&VehicleParams::hyundai_hg300(), state, command, 0.01);
+        state = step(&VehicleSettings::hyundai_hg300(), state, command, 0.01);
     }
     state
 }
 
 #[test]
 fn steady_steering_drives_a_circle_of_radius_l_over_tan_delta() {
-    let params = VehicleParams::hyundai_hg300();
+    let params = VehicleSettings::hyundai_hg300();
     for steering_rad in [0.1_f32, -0.3, 0.6] {
         let start = VehicleState { steering_rad, speed_mps: 1.5, ..VehicleState::at_rest(Pose::default()) };
         let radius_m = params.wheelbase_m / steering_rad.tan();
@@ -52,7 +52,7 @@ fn the_speed_loop_settles_without_exceeding_its_limits() {
     for _ in 0..3000 {
         let before = state;
         state =
-            step(&VehicleParams::hyundai_hg300(), state, VehicleCommand { steering_rad: 0.0, speed_mps: 2.0 }, 0.01);
+            step(&VehicleSettings::hyundai_hg300(), state, VehicleCommand { steering_rad: 0.0, speed_mps: 2.0 }, 0.01);
         assert!((-2.0..=1.0).contains(&state.accel_mps2));
         assert!((state.accel_demand_mps2 - before.accel_demand_mps2).abs() <= 0.02 + 1e-5);
         fastest_mps = fastest_mps.max(state.speed_mps);
@@ -63,7 +63,7 @@ fn the_speed_loop_settles_without_exceeding_its_limits() {
 
 #[test]
 fn an_emergency_stop_takes_v_squared_over_2a() {
-    let params = VehicleParams::hyundai_hg300();
+    let params = VehicleSettings::hyundai_hg300();
     let mut state = VehicleState { speed_mps: 2.2, ..VehicleState::at_rest(Pose::default()) };
     while state.speed_mps > 0.0 {
         state = step_emergency_stop(&params, state, 0.01);
@@ -87,29 +87,29 @@ fn lane(length_m: f32, obstacles: Vec<Obstacle>) -> Arc<Map> {
         name: "lane".into(),
         boundary,
         reference_path: ReferencePath { points: vec![Vec2::ZERO, Vec2::new(length_m, 0.0)], corner_radius_m: 0.0 },
-        noise: NoiseSettings::default(),
+        noise: LotNoise::default(),
         islands: vec![],
         obstacles,
         speed_bumps: vec![],
     };
-    Arc::new(Map::build(scenario, &VehicleParams::hyundai_hg300()).unwrap())
+    Arc::new(Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap())
 }
 
-fn config() -> Arc<EpisodeConfig> {
-    Arc::new(EpisodeConfig { noise: NoiseConfig::of(NoiseLevel::Clean), ..EpisodeConfig::paper() })
+fn settings() -> Arc<EpisodeSettings> {
+    Arc::new(EpisodeSettings { noise: NoiseSettings::of(NoiseLevel::Clean), ..EpisodeSettings::paper() })
 }
 
-fn run(map: Arc<Map>, point: (f32, f32), config: Arc<EpisodeConfig>) -> (episode::EpisodeReport, Vec<Frame>) {
+fn run(map: Arc<Map>, point: (f32, f32), settings: Arc<EpisodeSettings>) -> (episode::EpisodeReport, Vec<Frame>) {
     let mut frames = Vec::new();
     let mut driver = Fixed(LookAheadPoint { ahead_m: point.0, left_m: point.1 });
     let mut sink = |frame: &Frame| frames.push(*frame);
-    let report = episode::run(Episode::new(config, map, RootSeed(1)), &mut driver, &mut sink);
+    let report = episode::run(Episode::new(settings, map, RootSeed(1)), &mut driver, &mut sink);
     (report, frames)
 }
 
 #[test]
 fn a_free_lane_is_driven_to_its_end() {
-    let (report, frames) = run(lane(50.0, vec![]), (16.3, 0.0), config());
+    let (report, frames) = run(lane(50.0, vec![]), (16.3, 0.0), settings());
     assert_eq!(report.ending, Ending::ReachedEnd);
     assert_eq!((report.metrics.near_collisions, report.metrics.contacts, report.metrics.stuck), (0, 0, 0));
     assert!((report.metrics.driven_m - 50.0).abs() < 0.3, "{} m", report.metrics.driven_m);
@@ -126,9 +126,9 @@ fn a_near_collision_is_counted_half_a_metre_before_the_obstacle() {
     let pillar = Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(30.35, 1.1), 0.0));
     // Off the centre line, so that the path itself is valid; its inner side (y 0.75) is in the body's way.
     // At 2.2 m/s the stop takes 2.2²/6 = 0.81 m, more than the 0.5 m left: a contact. At 1.0 m/s it takes 0.17 m.
-    let (fast, _) = run(lane(60.0, vec![pillar.clone()]), (16.3, 0.0), config());
+    let (fast, _) = run(lane(60.0, vec![pillar.clone()]), (16.3, 0.0), settings());
     assert_eq!((fast.metrics.near_collisions, fast.metrics.contacts), (1, 1), "{fast:?}");
-    let (report, frames) = run(lane(60.0, vec![pillar]), (6.04, 0.0), config());
+    let (report, frames) = run(lane(60.0, vec![pillar]), (6.04, 0.0), settings());
     assert_eq!((report.metrics.near_collisions, report.metrics.contacts), (1, 0), "{report:?}");
     // A contact while braking is a clearance below zero.
     assert!(fast.metrics.clearance_min_m < 0.0, "{} m", fast.metrics.clearance_min_m);
@@ -168,10 +168,10 @@ impl Driver for LeftAfterResume {
 fn nothing_is_counted_in_the_first_second_after_a_resume() {
     let pillar = |x, y| Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(x, y), 0.0));
     let ticks_to_second_event = |refractory_s| {
-        let mut config = (*config()).clone();
-        config.metrics.refractory_s = refractory_s;
+        let mut settings = (*settings()).clone();
+        settings.metrics.refractory_s = refractory_s;
         let map = lane(60.0, vec![pillar(30.35, 1.1), pillar(36.5, 0.93 + 0.06 + 0.35)]);
-        let episode = Episode::new(Arc::new(config), map, RootSeed(1));
+        let episode = Episode::new(Arc::new(settings), map, RootSeed(1));
         let report = episode::run(episode, &mut LeftAfterResume::default(), &mut |_: &Frame| ());
         report.events[1].0 - report.events[0].0
     };
@@ -184,7 +184,7 @@ fn nothing_is_counted_in_the_first_second_after_a_resume() {
 fn a_parked_car_beside_the_path_is_no_near_collision() {
     // 0.3 m between the body (y −0.93) and the parked car (y −1.23 …): nothing lies on the arc.
     let parked = Obstacle::new(ObstacleClass::Sedan, Pose::new(Vec2::new(25.0, -1.23 - 0.925), 0.0));
-    let (report, _) = run(lane(60.0, vec![parked]), (16.3, 0.0), config());
+    let (report, _) = run(lane(60.0, vec![parked]), (16.3, 0.0), settings());
     assert_eq!(report.metrics.near_collisions, 0);
     assert!((report.metrics.clearance_min_m - 0.3).abs() < 0.03, "{} m", report.metrics.clearance_min_m);
     assert!(report.metrics.safe_ratio < 1.0);
@@ -197,8 +197,8 @@ fn a_car_that_does_not_advance_is_stuck_and_put_back() {
     let mut scenario = lane(40.0, vec![]).scenario().clone();
     scenario.boundary =
         [(-30.0, -30.0), (90.0, -30.0), (90.0, 30.0), (-30.0, 30.0)].map(|(x, y)| Vec2::new(x, y)).to_vec();
-    let map = Arc::new(Map::build(scenario, &VehicleParams::hyundai_hg300()).unwrap());
-    let mut short = (*config()).clone();
+    let map = Arc::new(Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap());
+    let mut short = (*settings()).clone();
     short.metrics.events_max = 3;
     let (report, _) = run(map, (4.3, 4.3), Arc::new(short));
     assert_eq!(report.ending, Ending::TooManyEvents);
@@ -207,7 +207,7 @@ fn a_car_that_does_not_advance_is_stuck_and_put_back() {
 
 #[test]
 fn a_run_times_out() {
-    let mut short = (*config()).clone();
+    let mut short = (*settings()).clone();
     short.metrics.timeout_s = 2.0;
     let (report, frames) = run(lane(60.0, vec![]), (16.3, 0.0), Arc::new(short));
     assert_eq!(report.ending, Ending::TimedOut);
@@ -218,9 +218,9 @@ fn a_run_times_out() {
 #[test]
 fn commands_reach_the_wheels_after_the_dead_time() {
     let moved_after_ticks = |dead_time_s| {
-        let mut config = (*config()).clone();
-        config.vehicle.dead_time_s = dead_time_s;
-        let mut episode = Episode::new(Arc::new(config), lane(60.0, vec![]), RootSeed(1));
+        let mut settings = (*settings()).clone();
+        settings.vehicle.dead_time_s = dead_time_s;
+        let mut episode = Episode::new(Arc::new(settings), lane(60.0, vec![]), RootSeed(1));
         let decision =
             Decision { look_ahead: LookAheadPoint { ahead_m: 8.0, left_m: 2.0 }, source: Source::Expert, spread: None };
         (0..10)
@@ -238,7 +238,7 @@ fn commands_reach_the_wheels_after_the_dead_time() {
 
 #[test]
 fn the_same_seed_gives_the_same_frames() {
-    let noisy = Arc::new(EpisodeConfig::paper());
+    let noisy = Arc::new(EpisodeSettings::paper());
     let frames = || {
         let (_, frames) = run(lane(40.0, vec![]), (16.3, 0.1), Arc::clone(&noisy));
         frames.iter().map(|frame| (frame.observation, frame.vehicle)).collect::<Vec<_>>()
@@ -248,7 +248,7 @@ fn the_same_seed_gives_the_same_frames() {
 
 #[test]
 fn a_batch_can_be_stopped_and_keeps_what_has_ended() {
-    let start = |length_m| Episode::new(config(), lane(length_m, vec![]), RootSeed(1));
+    let start = |length_m| Episode::new(settings(), lane(length_m, vec![]), RootSeed(1));
     let ahead = || Fixed(LookAheadPoint { ahead_m: 16.3, left_m: 0.0 });
     let mut fleet = OneDriverEach(vec![ahead(), ahead()]);
     let mut has_short_one_ended = false;
@@ -264,9 +264,9 @@ fn a_batch_can_be_stopped_and_keeps_what_has_ended() {
 #[test]
 fn an_episode_under_way_goes_on_from_its_state() {
     let map = lane(40.0, vec![]);
-    let (_, frames) = run(Arc::clone(&map), (16.3, 0.0), config());
+    let (_, frames) = run(Arc::clone(&map), (16.3, 0.0), settings());
     let met = frames.iter().find(|frame| frame.progress_m > 20.0).unwrap();
-    let episode = Episode::under_way(config(), map, RootSeed(1), met.vehicle, met.progress_m);
+    let episode = Episode::under_way(settings(), map, RootSeed(1), met.vehicle, met.progress_m);
     let mut driver = Fixed(LookAheadPoint { ahead_m: 16.3, left_m: 0.0 });
     let mut positions = Vec::new();
     let report = episode::run(episode, &mut driver, &mut |frame: &Frame| positions.push(frame.vehicle.pose.x_m));

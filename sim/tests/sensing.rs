@@ -5,9 +5,9 @@ use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, ReferencePath, Scenario, SpeedBump};
 use sim::seed::RootSeed;
-use sim::sensing::noise::{Layer, NoiseConfig};
-use sim::sensing::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid, SensingConfig, Sensor};
-use sim::vehicle::VehicleParams;
+use sim::sensing::noise::{Layer, NoiseSettings};
+use sim::sensing::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid, SensingSettings, Sensor};
+use sim::vehicle::VehicleSettings;
 
 /// A 5 m lane along x with a parked car on the right, a cone on the left and a speed bump.
 fn lane() -> Map {
@@ -17,7 +17,7 @@ fn lane() -> Map {
         name: "lane".into(),
         boundary: boundary.map(|(x, y)| Vec2::new(x, y)).to_vec(),
         reference_path: ReferencePath { points: vec![Vec2::new(0.0, 0.0), Vec2::new(60.0, 0.0)], corner_radius_m: 0.0 },
-        noise: sim::scenario::NoiseSettings::default(),
+        noise: sim::scenario::LotNoise::default(),
         islands: vec![],
         obstacles: vec![
             obstacle(ObstacleClass::Sedan, 20.0, -1.9),
@@ -26,12 +26,12 @@ fn lane() -> Map {
         ],
         speed_bumps: vec![SpeedBump { x_m: 25.0, y_m: 0.0, heading_deg: 0.0, length_m: 0.8, width_m: 5.0 }],
     };
-    Map::build(scenario, &VehicleParams::hyundai_hg300()).unwrap()
+    Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap()
 }
 
 fn sensor(map: &Map, level: NoiseLevel, seed: u64) -> Sensor {
-    let no_dropout = NoiseConfig { dropout: 0.0, ..NoiseConfig::of(level) };
-    Sensor::new(map, SensingConfig::paper(), &no_dropout, RootSeed(seed))
+    let no_dropout = NoiseSettings { dropout: 0.0, ..NoiseSettings::of(level) };
+    Sensor::new(map, SensingSettings::paper(), &no_dropout, RootSeed(seed))
 }
 
 #[test]
@@ -56,8 +56,8 @@ fn the_fast_grid_is_the_max_pool_where_openings_overlap() {
     let map = lane();
     let mut n_open_more = 0;
     for seed in 0..3 {
-        let noise = NoiseConfig { false_free: 8.0, dropout: 0.0, ..NoiseConfig::of(NoiseLevel::Paper) };
-        let mut sensor = Sensor::new(&map, SensingConfig::paper(), &noise, RootSeed(seed));
+        let noise = NoiseSettings { false_free: 8.0, dropout: 0.0, ..NoiseSettings::of(NoiseLevel::Paper) };
+        let mut sensor = Sensor::new(&map, SensingSettings::paper(), &noise, RootSeed(seed));
         for i in 0..120_u32 {
             let pose = Pose::new(Vec2::new(i as f32 * 0.5, (i as f32 * 0.37).sin()), (i as f32 * 0.21).sin() * 0.9);
             let fast = sensor.observe(&map, pose, i).grid;
@@ -78,12 +78,12 @@ fn a_straight_lane_looks_like_one() {
         name: "narrow".into(),
         boundary,
         reference_path,
-        noise: sim::scenario::NoiseSettings::default(),
+        noise: sim::scenario::LotNoise::default(),
         islands: vec![],
         obstacles: vec![],
         speed_bumps: vec![],
     };
-    let map = Map::build(scenario, &VehicleParams::hyundai_hg300()).unwrap();
+    let map = Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap();
     let grid = sensor(&map, NoiseLevel::Clean, 0).observe(&map, Pose::default(), 0).grid;
     // Cells are 0.48 m: |y| ≤ 1.5 m holds the five cells of centre |y| ≤ 0.96 whole, and no more.
     for row in 0..GRID_CELLS {
@@ -110,9 +110,9 @@ fn a_turned_grid_is_the_view_of_the_turned_car() {
 #[test]
 fn things_hide_the_ground_behind_them_only_when_smear_is_on() {
     let map = lane();
-    let occupied = |smear| {
-        let config = SensingConfig { smear, ..SensingConfig::paper() };
-        let mut sensor = Sensor::new(&map, config, &NoiseConfig::of(NoiseLevel::Clean), RootSeed(0));
+    let occupied = |occlusion| {
+        let settings = SensingSettings { occlusion, ..SensingSettings::paper() };
+        let mut sensor = Sensor::new(&map, settings, &NoiseSettings::of(NoiseLevel::Clean), RootSeed(0));
         sensor.observe(&map, Pose::new(Vec2::new(10.0, 0.0), 0.0), 0).grid.count_occupied()
     };
     assert!(occupied(true) > occupied(false));
@@ -122,7 +122,7 @@ fn things_hide_the_ground_behind_them_only_when_smear_is_on() {
 #[test]
 fn a_shadow_stays_where_it_is_while_the_car_drives_by() {
     let map = lane();
-    let only_shadows = NoiseConfig {
+    let only_shadows = NoiseSettings {
         boundary: 0.0,
         speed_bump: 0.0,
         false_free: 0.0,
@@ -130,10 +130,10 @@ fn a_shadow_stays_where_it_is_while_the_car_drives_by() {
         stain: 0.0,
         flicker: 0.0,
         dropout: 0.0,
-        ..NoiseConfig::of(NoiseLevel::Hard)
+        ..NoiseSettings::of(NoiseLevel::Hard)
     };
-    let config = SensingConfig { smear: false, ..SensingConfig::paper() };
-    let sensor = Sensor::new(&map, config, &only_shadows, RootSeed(5));
+    let settings = SensingSettings { occlusion: false, ..SensingSettings::paper() };
+    let sensor = Sensor::new(&map, settings, &only_shadows, RootSeed(5));
     let geometry = GridGeometry::paper();
     let wrong_at = |pose: Pose| {
         let (noisy, clean) = (sensor.perceived_view(&map, pose, 3), sensor.clean_view(&map, pose));
@@ -202,9 +202,9 @@ fn grids_round_trip_through_cells() {
     assert_eq!(GRID_CELLS * CELL_PIXELS, 200);
 }
 
-fn only(layer: Layer) -> NoiseConfig {
+fn only(layer: Layer) -> NoiseSettings {
     let amount = |of: Layer| if of == layer { 1.0 } else { 0.0 };
-    NoiseConfig {
+    NoiseSettings {
         intensity: 2.0,
         boundary: amount(Layer::Boundary),
         shadow: amount(Layer::Shadow),
@@ -224,7 +224,7 @@ fn an_inspection_blames_the_layer_that_is_on_and_nothing_else() {
     for layer in Layer::ALL {
         let (mut pixels, mut cells) = (0, 0);
         for seed in 0..8 {
-            let mut sensor = Sensor::new(&map, SensingConfig::paper(), &only(layer), RootSeed(seed));
+            let mut sensor = Sensor::new(&map, SensingSettings::paper(), &only(layer), RootSeed(seed));
             for i in 0..12_u32 {
                 let (pose, tick) = (Pose::new(Vec2::new(4.0 * i as f32, 0.3), 0.1), 31 * i);
                 let shown = sensor.observe(&map, pose, tick);
@@ -245,7 +245,7 @@ fn an_inspection_blames_the_layer_that_is_on_and_nothing_else() {
 #[test]
 fn an_inspection_explains_every_wrong_pixel_and_cell() {
     let map = lane();
-    let mut sensor = Sensor::new(&map, SensingConfig::paper(), &NoiseConfig::of(NoiseLevel::Hard), RootSeed(3));
+    let mut sensor = Sensor::new(&map, SensingSettings::paper(), &NoiseSettings::of(NoiseLevel::Hard), RootSeed(3));
     for tick in 0..60_u32 {
         let pose = Pose::new(Vec2::new(0.7 * tick as f32, 0.2), (0.3 * tick as f32).sin() * 0.4);
         let shown = sensor.observe(&map, pose, tick);

@@ -4,7 +4,7 @@ use crate::run_dir;
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
 use expert::ScriptedExpert;
-use policy::baselines::{Baseline, Planner, Rig};
+use planners::{Baseline, Planner, PlannerContext};
 use policy::checkpoint::Checkpoint;
 use policy::drivers::NetFleet;
 use rayon::prelude::*;
@@ -40,7 +40,7 @@ pub fn specs() -> Vec<(&'static str, &'static str)> {
 
 /// A driver by name.
 #[derive(Debug, Clone)]
-pub struct Contestant {
+pub struct DriverSpec {
     /// In tables.
     pub name: String,
     kind: Kind,
@@ -53,7 +53,7 @@ enum Kind {
     Baseline(Baseline),
 }
 
-impl Contestant {
+impl DriverSpec {
     /// The scripted expert.
     pub fn expert() -> Self {
         Self { name: "expert".to_owned(), kind: Kind::Expert }
@@ -142,7 +142,7 @@ impl Contestant {
     /// A planner of its own that can be asked what it weighed; `None` for who is no planner.
     pub fn planner(&self, settings: &Settings) -> Option<Planner> {
         match &self.kind {
-            Kind::Baseline(baseline) => Some(baseline.planner(&Rig::of(&settings.episode))),
+            Kind::Baseline(baseline) => Some(baseline.planner(&PlannerContext::of(&settings.episode))),
             Kind::Expert | Kind::Network(_) => None,
         }
     }
@@ -153,7 +153,7 @@ impl Contestant {
             Kind::Expert => Box::new(OneEach((0..cars).map(|_| expert(settings)).collect())),
             Kind::Network(checkpoint) => Box::new(NetFleet::new((**checkpoint).clone(), settings.dagger.device)),
             Kind::Baseline(baseline) => {
-                let planner = baseline.planner(&Rig::of(&settings.episode));
+                let planner = baseline.planner(&PlannerContext::of(&settings.episode));
                 Box::new(OneEach(vec![SensorsOnly(planner); cars]))
             }
         }

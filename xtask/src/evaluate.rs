@@ -5,8 +5,8 @@
 //! depend on how many lots there are, and what an interrupted evaluation leaves is paired.
 
 use crate::cli::{Directions, EvaluateArgs};
-use crate::drivers::Contestant;
-use crate::failures::{Cause, Failure, Findings, Group, Sighting, Watch, is_again};
+use crate::drivers::DriverSpec;
+use crate::failures::{Cause, Failure, Findings, Incident, IncidentMonitor, TrialBatch, is_again};
 use crate::interrupt::{self, Interrupted};
 use crate::lots::Lot;
 use crate::progress::{Stopwatch, Work};
@@ -15,8 +15,8 @@ use crate::report::{self, RunLine, Summary, WallTimeLine};
 use crate::run_dir::{self, Place, RunDir};
 use crate::run_report;
 use crate::settings::{NoiseChoice, Settings};
-use crate::summary::Ledger;
-use crate::trials::{self, Job, Purpose};
+use crate::summary::EvaluationResults;
+use crate::trials::{self, Purpose, Trial};
 use crate::visualise;
 use crate::visualise::drive::Detail;
 use crate::visualise::live::{Live, View};
@@ -40,9 +40,9 @@ const SWEEP: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
 
 /// A driver that takes part.
 #[derive(Debug, Clone)]
-pub struct Entry {
+pub struct NamedDriver {
     /// Who.
-    pub contestant: Contestant,
+    pub contestant: DriverSpec,
     /// As named on the command line, for replay keys.
     pub spec: String,
 }
@@ -53,7 +53,7 @@ pub struct Plan<'a> {
     /// With which settings.
     pub settings: &'a Settings,
     /// By whom.
-    pub entries: &'a [Entry],
+    pub entries: &'a [NamedDriver],
     /// Where.
     pub lots: &'a [Lot],
     /// The driver the others are compared with, an index of `entries`.
@@ -70,7 +70,7 @@ impl Plan<'_> {
         let evaluation = &self.settings.evaluation;
         for lot in self.lots.iter().filter(|lot| lot.is_from_file()) {
             let lot = std::slice::from_ref(lot);
-            let jobs = Job::all(evaluation.seed, Purpose::Evaluation, lot, 1, &evaluation.directions);
+            let jobs = Trial::all(evaluation.seed, Purpose::Evaluation, lot, 1, &evaluation.directions);
             jobs.map(|job| job.map(&self.settings.episode)).collect::<anyhow::Result<Vec<Map>>>()?;
         }
         Ok(())
@@ -82,9 +82,9 @@ impl Plan<'_> {
 /// # Errors
 /// If something named does not exist or cannot be written, or by Ctrl-C.
 pub fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
-    let entries: Vec<Entry> = Contestant::parse_all(&args.drivers)?
+    let entries: Vec<NamedDriver> = DriverSpec::parse_all(&args.drivers)?
         .into_iter()
-        .map(|contestant| Entry { spec: contestant.name.clone(), contestant })
+        .map(|contestant| NamedDriver { spec: contestant.name.clone(), contestant })
         .collect();
     let compare_with = compare_with(args, &entries)?;
     let (settings, preset) = resolve(args)?;
@@ -122,9 +122,9 @@ struct Finished<'a> {
 }
 
 /// `--compare-with`, else the last network, else the first driver.
-fn compare_with(args: &EvaluateArgs, entries: &[Entry]) -> anyhow::Result<usize> {
+fn compare_with(args: &EvaluateArgs, entries: &[NamedDriver]) -> anyhow::Result<usize> {
     let Some(spec) = &args.compare_with else {
-        let is_network = |entry: &Entry| entry.spec.starts_with("run:") || entry.spec.starts_with("net:");
+        let is_network = |entry: &NamedDriver| entry.spec.starts_with("run:") || entry.spec.starts_with("net:");
         return Ok(entries.iter().rposition(is_network).unwrap_or(0));
     };
     let found = entries.iter().position(|entry| entry.spec == *spec);
@@ -205,15 +205,16 @@ pub fn measure(
     stopwatch: &mut Stopwatch,
 ) -> anyhow::Result<()> {
     let evaluation = &plan.settings.evaluation;
-    let mut ledger = Ledger::new(plan);
+    let mut results = EvaluationResults::new(plan);
     let mut lines = Lines::create(run)?;
-    let mut jobs = Job::all(evaluation.seed, Purpose::Evaluation, plan.lots, evaluation.trials, &evaluation.directions);
+    let mut jobs =
+        Trial::all(evaluation.seed, Purpose::Evaluation, plan.lots, evaluation.trials, &evaluation.directions);
     let count = jobs.clone().count() * plan.entries.len() * evaluation.noise.len();
     let mut track = Track { work: Work::begin("driving"), runs: count, done: 0, near_collisions: 0 };
     let mut first_job = 0;
     let mut is_complete = true;
     while is_complete {
-        let group: Vec<Job<'_>> = jobs.by_ref().take(GROUP).collect();
+        let group: Vec<Trial<'_>> = jobs.by_ref().take(GROUP).collect();
         if group.is_empty() {
             break;
         }
@@ -221,15 +222,15 @@ pub fn measure(
         'group: for (level, &noise) in evaluation.noise.iter().enumerate() {
             for (driver, entry) in plan.entries.iter().enumerate() {
                 let contestant = &entry.contestant;
-                let group = Group { settings: plan.settings, contestant, jobs: &group, maps: &maps, noise };
+                let group = TrialBatch { settings: plan.settings, contestant, jobs: &group, maps: &maps, noise };
                 let driven = drive(&group, live.as_deref_mut(), &mut track);
                 let failures = failures(&group, entry, evaluation.seed, &driven);
                 lines.add(&group, entry, evaluation.seed, &driven, &failures)?;
                 for (i, (job, report)) in driven.finished(&group) {
-                    ledger.add(level, driver, first_job + i, job, report);
+                    results.add(level, driver, first_job + i, job, report);
                 }
                 for (episode, failure) in &failures {
-                    ledger.add_cause(
+                    results.add_cause(
                         level,
                         driver,
                         group.jobs[*episode].lot,
@@ -249,7 +250,7 @@ pub fn measure(
     stopwatch.add("evaluation", track.work.seconds());
     track.work.end(&format!("{} of {count} runs, {} near-collisions", track.done, track.near_collisions));
 
-    let summary = Summary::new(plan, &ledger);
+    let summary = Summary::new(plan, &results);
     println!("\n{}", summary.to_markdown());
     summary.write(run)?;
     if is_complete {
@@ -262,61 +263,61 @@ pub fn measure(
 struct Driven {
     /// `None` for runs cut short by Ctrl-C.
     reports: Vec<Option<EpisodeReport>>,
-    sightings: Vec<Sighting>,
+    incidents: Vec<Incident>,
     wall_s: f64,
 }
 
 impl Driven {
     fn finished<'a>(
         &'a self,
-        group: &Group<'a>,
-    ) -> impl Iterator<Item = (usize, (&'a Job<'a>, &'a EpisodeReport))> + use<'a> {
+        group: &TrialBatch<'a>,
+    ) -> impl Iterator<Item = (usize, (&'a Trial<'a>, &'a EpisodeReport))> + use<'a> {
         let both = group.jobs.iter().zip(&self.reports).enumerate();
         both.filter_map(|(i, (job, report))| Some((i, (job, report.as_ref()?))))
     }
 }
 
 /// The near-collisions of the finished runs, each with the index of its run within the group.
-fn failures(group: &Group<'_>, entry: &Entry, seed: RootSeed, driven: &Driven) -> Vec<(usize, Failure)> {
-    let is_kept = |sighting: &&Sighting| driven.reports[sighting.episode].is_some();
-    let sightings: Vec<Sighting> = driven.sightings.iter().filter(is_kept).copied().collect();
-    let explained = group.explain(&sightings, !interrupt::is_requested());
-    let failure = |(sighting, (cause, findings)): (&Sighting, (Cause, Findings))| {
-        let job = &group.jobs[sighting.episode];
+fn failures(group: &TrialBatch<'_>, entry: &NamedDriver, seed: RootSeed, driven: &Driven) -> Vec<(usize, Failure)> {
+    let is_kept = |incident: &&Incident| driven.reports[incident.episode].is_some();
+    let incidents: Vec<Incident> = driven.incidents.iter().filter(is_kept).copied().collect();
+    let explained = group.explain(&incidents, !interrupt::is_requested());
+    let failure = |(incident, (cause, findings)): (&Incident, (Cause, Findings))| {
+        let job = &group.jobs[incident.episode];
         let failure = Failure {
             driver: entry.contestant.name.clone(),
             lot: job.lot.name().to_owned(),
             direction: job.direction,
             trial: job.trial,
             noise: group.noise,
-            tick: sighting.tick,
-            route_m: sighting.route_m,
-            x_m: sighting.at.x_m,
-            y_m: sighting.at.y_m,
-            heading_deg: sighting.at.heading_rad.to_degrees(),
-            speed_mps: sighting.speed_mps,
+            tick: incident.tick,
+            route_m: incident.route_m,
+            x_m: incident.at.x_m,
+            y_m: incident.at.y_m,
+            heading_deg: incident.at.heading_rad.to_degrees(),
+            speed_mps: incident.speed_mps,
             cause,
             findings,
-            replay: replay_key(entry, job, group.noise, seed, sighting.tick).to_string(),
+            replay: replay_key(entry, job, group.noise, seed, incident.tick).to_string(),
         };
-        (sighting.episode, failure)
+        (incident.episode, failure)
     };
-    sightings.iter().zip(explained).map(failure).collect()
+    incidents.iter().zip(explained).map(failure).collect()
 }
 
-fn replay_key(entry: &Entry, job: &Job<'_>, noise: NoiseChoice, seed: RootSeed, tick: u32) -> ReplayKey {
+fn replay_key(entry: &NamedDriver, job: &Trial<'_>, noise: NoiseChoice, seed: RootSeed, tick: u32) -> ReplayKey {
     let (driver, lot) = (entry.spec.clone(), job.lot.spec());
     ReplayKey { driver, lot, direction: job.direction, trial: job.trial, noise, seed, tick }
 }
 
-fn drive(group: &Group<'_>, mut live: Option<&mut Live>, track: &mut Track) -> Driven {
+fn drive(group: &TrialBatch<'_>, mut live: Option<&mut Live>, track: &mut Track) -> Driven {
     let started = Instant::now();
     let episodes = trials::start(group.jobs, group.maps, group.settings, group.noise);
     if let Some(live) = &mut live {
         record(group, &episodes, live);
     }
     let mut fleet = group.contestant.fleet(group.settings, episodes.len());
-    let mut watch = Watch::new(episodes.len(), &group.settings.episode);
+    let mut watch = IncidentMonitor::new(episodes.len(), &group.settings.episode);
     let mut shares = vec![0.0_f32; episodes.len()];
     let mut frames = 0_u32;
     let reports = run_lockstep_until(episodes, &mut *fleet, &mut |episode, frame| {
@@ -337,13 +338,13 @@ fn drive(group: &Group<'_>, mut live: Option<&mut Live>, track: &mut Track) -> D
         ControlFlow::Continue(())
     });
     track.done += reports.iter().flatten().count();
-    Driven { reports, sightings: watch.into_sightings(), wall_s: started.elapsed().as_secs_f64() }
+    Driven { reports, incidents: watch.into_incidents(), wall_s: started.elapsed().as_secs_f64() }
 }
 
 /// Records the first runs of this driver at this noise level.
-fn record(group: &Group<'_>, episodes: &[Episode], live: &mut Live) {
-    let Group { settings, contestant, jobs, noise, .. } = group;
-    let name = |job: &Job<'_>| format!("{}, {}, trial {}", job.lot.name(), report::name(job.direction), job.trial);
+fn record(group: &TrialBatch<'_>, episodes: &[Episode], live: &mut Live) {
+    let TrialBatch { settings, contestant, jobs, noise, .. } = group;
+    let name = |job: &Trial<'_>| format!("{}, {}, trial {}", job.lot.name(), report::name(job.direction), job.trial);
     let names: Vec<String> = jobs.iter().map(name).collect();
     let root = visualise::root_of(&contestant.name);
     let view = View { root: &root, detail: Detail::Frames, novice: None };
@@ -394,8 +395,8 @@ impl Lines {
 
     fn add(
         &mut self,
-        group: &Group<'_>,
-        entry: &Entry,
+        group: &TrialBatch<'_>,
+        entry: &NamedDriver,
         seed: RootSeed,
         driven: &Driven,
         failures: &[(usize, Failure)],

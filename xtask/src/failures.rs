@@ -13,13 +13,13 @@
 //! Apart from its cause, a near-collision within [`NEAR_M`] of route after a resume is marked as one more at the same
 //! place: the car was put back where it had failed, and failed again.
 
-use crate::drivers::Contestant;
+use crate::drivers::DriverSpec;
 use crate::report;
 use crate::settings::{NoiseChoice, Settings};
-use crate::trials::{self, Job};
+use crate::trials::{self, Trial};
 use serde::{Deserialize, Serialize};
 use sim::batch::run_lockstep_until;
-use sim::episode::{Episode, EpisodeConfig, Event, Frame};
+use sim::episode::{Episode, EpisodeSettings, Event, Frame};
 use sim::geometry::{Pose, wrap_angle};
 use sim::map::Map;
 use sim::metrics::steering_reversals;
@@ -157,8 +157,8 @@ pub fn is_again(since_resume_m: Option<f32>) -> bool {
 
 impl Findings {
     /// The first rule that holds. `noisy`: whether there was any noise to blame.
-    fn cause(&self, noisy: bool, config: &EpisodeConfig) -> Cause {
-        let narrow_m = config.vehicle.width_m + 2.0 * config.metrics.near_collision_m;
+    fn cause(&self, noisy: bool, episode: &EpisodeSettings) -> Cause {
+        let narrow_m = episode.vehicle.width_m + 2.0 * episode.metrics.near_collision_m;
         if noisy && self.passes_on_clean_grid == Some(true) {
             Cause::NoiseInduced
         } else if self.reversals_before >= OSCILLATION_REVERSALS {
@@ -175,7 +175,7 @@ impl Findings {
 
 /// A near-collision when it happened.
 #[derive(Debug, Clone, Copy)]
-pub struct Sighting {
+pub struct Incident {
     /// Index of the episode within its group.
     pub episode: usize,
     /// Control tick.
@@ -195,24 +195,24 @@ pub struct Sighting {
 
 /// Remembers the last seconds of every episode of a group; its size does not depend on how long they last.
 #[derive(Debug)]
-pub struct Watch {
+pub struct IncidentMonitor {
     control_period_s: f32,
     recent: Vec<VecDeque<(VehicleState, f32)>>,
     /// Where along the route the car was last put back, metres.
     resumed_at_m: Vec<Option<f32>>,
-    sightings: Vec<Sighting>,
+    incidents: Vec<Incident>,
 }
 
-impl Watch {
+impl IncidentMonitor {
     /// Over so many episodes.
-    pub fn new(episodes: usize, config: &EpisodeConfig) -> Self {
-        let control_period_s = config.control_period_s();
+    pub fn new(episodes: usize, episode: &EpisodeSettings) -> Self {
+        let control_period_s = episode.control_period_s();
         let ticks = (LOOK_BACK_S / control_period_s) as usize + 1;
         Self {
             control_period_s,
             recent: vec![VecDeque::with_capacity(ticks); episodes],
             resumed_at_m: vec![None; episodes],
-            sightings: Vec::new(),
+            incidents: Vec::new(),
         }
     }
 
@@ -229,7 +229,7 @@ impl Watch {
         if let Event::NearCollision { at, progress_m } = frame.event {
             let ticks = (OSCILLATION_S / self.control_period_s) as usize;
             let last = recent.iter().skip(recent.len().saturating_sub(ticks));
-            self.sightings.push(Sighting {
+            self.incidents.push(Incident {
                 episode,
                 tick: frame.tick,
                 at,
@@ -247,78 +247,78 @@ impl Watch {
     }
 
     /// The near-collisions seen, episode by episode.
-    pub fn into_sightings(mut self) -> Vec<Sighting> {
-        self.sightings.sort_by_key(|sighting| (sighting.episode, sighting.tick));
-        self.sightings
+    pub fn into_incidents(mut self) -> Vec<Incident> {
+        self.incidents.sort_by_key(|incident| (incident.episode, incident.tick));
+        self.incidents
     }
 }
 
 /// A driver in a group of episodes, of which some ended in near-collisions.
 #[derive(Debug, Clone, Copy)]
-pub struct Group<'a> {
+pub struct TrialBatch<'a> {
     /// Car, sensor, metrics.
     pub settings: &'a Settings,
     /// Who drove.
-    pub contestant: &'a Contestant,
+    pub contestant: &'a DriverSpec,
     /// Where, in the order of the episodes.
-    pub jobs: &'a [Job<'a>],
+    pub jobs: &'a [Trial<'a>],
     /// Their maps.
     pub maps: &'a [Arc<Map>],
     /// What was seen wrongly.
     pub noise: NoiseChoice,
 }
 
-impl Group<'_> {
-    /// Cause and findings of every sighting. `try_clean`: whether to spend time on the clean grid.
-    pub fn explain(&self, sightings: &[Sighting], try_clean: bool) -> Vec<(Cause, Findings)> {
-        let is_noisy = |sighting: &Sighting| {
-            trials::episode_config(self.settings, self.noise, &self.maps[sighting.episode]).noise.intensity > 0.0
+impl TrialBatch<'_> {
+    /// Cause and findings of every incident. `try_clean`: whether to spend time on the clean grid.
+    pub fn explain(&self, incidents: &[Incident], try_clean: bool) -> Vec<(Cause, Findings)> {
+        let is_noisy = |incident: &Incident| {
+            trials::episode_config(self.settings, self.noise, &self.maps[incident.episode]).noise.intensity > 0.0
         };
-        let noisy: Vec<Sighting> = sightings.iter().copied().filter(is_noisy).collect();
+        let noisy: Vec<Incident> = incidents.iter().copied().filter(is_noisy).collect();
         let mut passes = if try_clean {
             self.passes_on_clean_grid(&noisy).into_iter().map(Some).collect()
         } else {
             vec![None; noisy.len()]
         }
         .into_iter();
-        let explain = |sighting: &Sighting| {
-            let noisy = is_noisy(sighting);
-            let (map, config) = (&self.maps[sighting.episode], &self.settings.episode);
+        let explain = |incident: &Incident| {
+            let noisy = is_noisy(incident);
+            let (map, episode) = (&self.maps[incident.episode], &self.settings.episode);
             let findings = Findings {
                 passes_on_clean_grid: if noisy { passes.next().flatten() } else { Some(false) },
-                reversals_before: sighting.reversals_before,
-                free_width_m: free_width_m(map, sighting.route_m),
-                turn_deg: turn_deg(map, sighting.route_m),
-                since_resume_m: sighting.since_resume_m,
+                reversals_before: incident.reversals_before,
+                free_width_m: free_width_m(map, incident.route_m),
+                turn_deg: turn_deg(map, incident.route_m),
+                since_resume_m: incident.since_resume_m,
             };
-            (findings.cause(noisy, config), findings)
+            (findings.cause(noisy, episode), findings)
         };
-        sightings.iter().map(explain).collect()
+        incidents.iter().map(explain).collect()
     }
 
-    /// Drives on from the state before each sighting on the clean grid.
-    fn passes_on_clean_grid(&self, sightings: &[Sighting]) -> Vec<bool> {
+    /// Drives on from the state before each incident on the clean grid.
+    fn passes_on_clean_grid(&self, incidents: &[Incident]) -> Vec<bool> {
         // As many at a time as in the evaluation itself: memory does not depend on how often a driver fails.
-        sightings.chunks(self.jobs.len()).flat_map(|sightings| self.passes_at_once(sightings)).collect()
+        incidents.chunks(self.jobs.len()).flat_map(|incidents| self.passes_at_once(incidents)).collect()
     }
 
-    fn passes_at_once(&self, sightings: &[Sighting]) -> Vec<bool> {
-        let start = |sighting: &Sighting| {
-            let (map, job) = (&self.maps[sighting.episode], &self.jobs[sighting.episode]);
-            let mut config = trials::episode_config(self.settings, NoiseChoice::Clean, map);
-            config.metrics.events_max = 1;
-            config.metrics.timeout_s = sighting.earlier_s + PASS_WITHIN_S;
-            let (vehicle, progress_m) = sighting.earlier;
-            Episode::under_way(Arc::new(config), Arc::clone(map), job.episode_seed(), vehicle, progress_m)
+    fn passes_at_once(&self, incidents: &[Incident]) -> Vec<bool> {
+        let start = |incident: &Incident| {
+            let (map, job) = (&self.maps[incident.episode], &self.jobs[incident.episode]);
+            let mut episode = trials::episode_config(self.settings, NoiseChoice::Clean, map);
+            episode.metrics.events_max = 1;
+            episode.metrics.timeout_s = incident.earlier_s + PASS_WITHIN_S;
+            let (vehicle, progress_m) = incident.earlier;
+            Episode::under_way(Arc::new(episode), Arc::clone(map), job.episode_seed(), vehicle, progress_m)
         };
-        let episodes: Vec<Episode> = sightings.iter().map(start).collect();
+        let episodes: Vec<Episode> = incidents.iter().map(start).collect();
         let mut fleet = self.contestant.fleet(self.settings, episodes.len());
         let mut verdicts: Vec<Option<bool>> = vec![None; episodes.len()];
         run_lockstep_until(episodes, &mut *fleet, &mut |episode, frame| {
             let verdict = match frame.event {
                 Event::NearCollision { .. } | Event::Stuck { .. } => Some(false),
                 Event::ReachedEnd => Some(true),
-                Event::Drove => (frame.progress_m > sightings[episode].route_m + PASS_M).then_some(true),
+                Event::Drove => (frame.progress_m > incidents[episode].route_m + PASS_M).then_some(true),
             };
             verdicts[episode] = verdicts[episode].or(verdict);
             if verdicts.iter().all(Option::is_some) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

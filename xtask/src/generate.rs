@@ -6,14 +6,14 @@ use crate::lots::Lot;
 use crate::progress::Work;
 use crate::render::{self, lot};
 use crate::run_dir::write_whole;
-use crate::trials::{Job, Purpose};
+use crate::trials::{Purpose, Trial};
 use anyhow::{Context as _, bail, ensure};
 use rayon::prelude::*;
 use scenarios::import::{self, MapLot};
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 use std::path::Path;
 
 /// Lots made at a time; between two groups Ctrl-C is looked at.
@@ -37,8 +37,8 @@ pub fn run(args: &GenerateArgs) -> anyhow::Result<()> {
     );
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{}: cannot be created; choose another --out", args.out.display()))?;
-    let jobs: Vec<Job<'_>> =
-        Job::all(RootSeed(args.seed), Purpose::Pictures, &lots, args.count, &[Direction::Forward]).collect();
+    let jobs: Vec<Trial<'_>> =
+        Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, args.count, &[Direction::Forward]).collect();
     let mut work = Work::begin("generating");
     let mut made = Vec::new();
     for group in jobs.chunks(GROUP) {
@@ -96,7 +96,7 @@ struct Made {
     line: String,
 }
 
-fn write(args: &GenerateArgs, job: &Job<'_>) -> anyhow::Result<Made> {
+fn write(args: &GenerateArgs, job: &Trial<'_>) -> anyhow::Result<Made> {
     let name = match (job.lot.is_drawn_per_trial(), args.count) {
         (false, _) => job.lot.name().to_owned(),
         (true, 1) => format!("{}-s{}", job.lot.name(), args.seed),
@@ -114,7 +114,7 @@ fn write(args: &GenerateArgs, job: &Job<'_>) -> anyhow::Result<Made> {
     let mut drawn = job.lot.draw(job.seed);
     // The file is a lot of its own, told apart from its siblings in tables.
     drawn.scenario.name.clone_from(&name);
-    let vehicle = VehicleParams::hyundai_hg300();
+    let vehicle = VehicleSettings::hyundai_hg300();
     let text = scenarios::load::to_toml(&drawn.scenario);
     let map = Map::build(drawn.scenario, &vehicle).with_context(|| name.clone())?;
     write_whole(&png, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?.to_png()?)?;

@@ -5,7 +5,7 @@ use crate::drivers::{self, PlannerFile};
 use crate::lots;
 use crate::settings::{PRESETS, Settings};
 use anyhow::Context as _;
-use policy::baselines::Baseline;
+use planners::Baseline;
 
 /// Prints the resolved settings as TOML, which `--config` reads again.
 ///

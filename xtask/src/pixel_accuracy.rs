@@ -6,7 +6,7 @@ use crate::lots::Lot;
 use crate::progress::Work;
 use crate::report::markdown;
 use crate::settings::{NoiseChoice, Settings};
-use crate::trials::{Job, Purpose, episode_config};
+use crate::trials::{Purpose, Trial, episode_config};
 use anyhow::ensure;
 use rayon::prelude::*;
 use sim::scenario::Direction;
@@ -75,15 +75,15 @@ pub fn run(args: &PixelAccuracyArgs) -> anyhow::Result<()> {
 
 fn look(settings: &Settings, lot: &Lot, noise: NoiseChoice, trials: u32) -> anyhow::Result<Pixels> {
     let lots = std::slice::from_ref(lot);
-    let jobs: Vec<_> = Job::all(settings.seed, Purpose::Calibration, lots, trials, &Direction::BOTH).collect();
+    let jobs: Vec<_> = Trial::all(settings.seed, Purpose::Calibration, lots, trials, &Direction::BOTH).collect();
     let parts = jobs.par_iter().map(|job| along_route(settings, job, noise)).collect::<anyhow::Result<Vec<_>>>()?;
     Ok(parts.into_iter().fold(Pixels::default(), Pixels::plus))
 }
 
-fn along_route(settings: &Settings, job: &Job<'_>, noise: NoiseChoice) -> anyhow::Result<Pixels> {
+fn along_route(settings: &Settings, job: &Trial<'_>, noise: NoiseChoice) -> anyhow::Result<Pixels> {
     let map = job.map(&settings.episode)?;
-    let config = episode_config(settings, noise, &map);
-    let sensor = Sensor::new(&map, config.sensing.clone(), &config.noise, job.episode_seed());
+    let episode = episode_config(settings, noise, &map);
+    let sensor = Sensor::new(&map, episode.sensing.clone(), &episode.noise, job.episode_seed());
     let poses = (map.path().length_m() / SPACING_M) as u32;
     let mut pixels = Pixels::default();
     for index in 0..poses {

@@ -21,17 +21,17 @@ use crate::cli::{
     ColourChoice, Directions, EvaluateArgs, RenderArgs, RenderLotArgs, RenderNoiseArgs, RenderWhat, SamplesArgs,
     TrajectoriesArgs, Way,
 };
-use crate::drivers::{self, Contestant};
+use crate::drivers::{self, DriverSpec};
 use crate::lots::Lot;
 use crate::progress::{Stopwatch, Work};
 use crate::run_dir::{self, write_whole};
 use crate::settings::{NoiseChoice, Settings};
-use crate::trials::{self, Job, Purpose};
+use crate::trials::{self, Purpose, Trial};
 use crate::{evaluate, report, run_report, train};
 use anyhow::{Context as _, ensure};
 use drawing::Drawing;
 use policy::checkpoint::Checkpoint;
-use policy::dagger::Arbiter;
+use policy::dagger::GatedCollector;
 use policy::dataset::store::Store;
 use policy::network::Predictor;
 use rayon::prelude::*;
@@ -100,11 +100,11 @@ pub fn file_name(name: &str) -> String {
 
 fn maps(args: &RenderLotArgs) -> anyhow::Result<Vec<Map>> {
     let lots = Lot::parse_all(&args.lots)?;
-    let jobs: Vec<Job<'_>> =
-        Job::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).collect();
-    let config = Settings::preset("default")?.episode;
+    let jobs: Vec<Trial<'_>> =
+        Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).collect();
+    let episode = Settings::preset("default")?.episode;
     let work = Work::begin("drawing lots");
-    let maps = jobs.par_iter().map(|job| job.map(&config)).collect::<anyhow::Result<Vec<Map>>>()?;
+    let maps = jobs.par_iter().map(|job| job.map(&episode)).collect::<anyhow::Result<Vec<Map>>>()?;
     work.end(&format!("{} lots", maps.len()));
     Ok(maps)
 }
@@ -161,13 +161,13 @@ fn driven_anew(args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
         overwrite: false,
         ..EvaluateArgs::default()
     };
-    let contestants = Contestant::parse_all(&args.drivers)?;
+    let contestants = DriverSpec::parse_all(&args.drivers)?;
     let (settings, _) = evaluate::resolve(&evaluation)?;
     contestants.iter().try_for_each(|contestant| contestant.check(&settings))?;
     let lots = Lot::parse_all(&settings.evaluation.lots)?;
     ensure!(lots.len() == 1, "{:?} stands for {} lots; name one", args.lot, lots.len());
     let seed = trials::trial_seed(settings.evaluation.seed, Purpose::Evaluation, args.trial);
-    let job = Job { lot: &lots[0], direction, trial: args.trial, seed };
+    let job = Trial { lot: &lots[0], direction, trial: args.trial, seed };
     let map = Arc::new(job.map(&settings.episode)?);
     let noise = settings.evaluation.noise[0];
     let mut driven = Vec::new();
@@ -195,9 +195,9 @@ fn driven_in_training(run: &Path, args: &TrajectoriesArgs) -> anyhow::Result<Dri
     let jitter = u64::from(args.round) << 20 | u64::from(args.trial);
     let expert = drivers::expert(&settings).with_jitter_seed(settings.seed, jitter);
     let dagger = &settings.dagger;
-    let mut arbiter = Arbiter::new(novice, vec![Box::new(expert)], dagger.rule, dagger.keep, dagger.geometry);
+    let mut collector = GatedCollector::new(novice, vec![Box::new(expert)], dagger.rule, dagger.keep, dagger.geometry);
     let name = format!("{} round {} drive {}", map.scenario().name, args.round, args.trial);
-    Ok((map, vec![drive("training", vec![episode], &mut arbiter)], name))
+    Ok((map, vec![drive("training", vec![episode], &mut collector)], name))
 }
 
 fn drive(name: &str, episodes: Vec<Episode>, fleet: &mut dyn Fleet) -> Trajectory {
@@ -242,7 +242,7 @@ fn render_samples(args: &SamplesArgs, output: &Output<'_>) -> anyhow::Result<()>
 
 fn render_noise(args: &RenderNoiseArgs, output: &Output<'_>) -> anyhow::Result<()> {
     let lots = Lot::parse_all(std::slice::from_ref(&args.lot))?;
-    let job = Job::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next();
+    let job = Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next();
     let (Some(job), 1, Some(&last)) = (job, lots.len(), args.noise.last()) else {
         anyhow::bail!("{:?} stands for {} lots; name one", args.lot, lots.len());
     };
@@ -265,10 +265,10 @@ fn render_noise(args: &RenderNoiseArgs, output: &Output<'_>) -> anyhow::Result<(
 }
 
 /// What is seen on the route at a place, about when a car at 1.4 m/s gets there.
-fn inspect(settings: &Settings, job: &Job<'_>, map: &Map, noise: NoiseChoice, at_m: f32) -> Inspection {
-    let config = trials::episode_config(settings, noise, map);
-    let tick = (at_m / (1.4 * config.control_period_s())) as u32;
-    let mut sensor = Sensor::new(map, config.sensing, &config.noise, job.episode_seed());
+fn inspect(settings: &Settings, job: &Trial<'_>, map: &Map, noise: NoiseChoice, at_m: f32) -> Inspection {
+    let episode = trials::episode_config(settings, noise, map);
+    let tick = (at_m / (1.4 * episode.control_period_s())) as u32;
+    let mut sensor = Sensor::new(map, episode.sensing, &episode.noise, job.episode_seed());
     let pose = map.path().pose_at(at_m);
     let shown = sensor.observe(map, pose, tick);
     sensor.inspect(map, pose, tick, &shown)

@@ -5,8 +5,8 @@ use crate::failures::Cause;
 use crate::paper::{self, PaperLot, PaperResult};
 use crate::run_dir::RunDir;
 use crate::settings::{EvaluationSettings, NoiseChoice};
-use crate::summary::{Comparison, Ledger, Scope, Standing, Totals};
-use crate::trials::Job;
+use crate::summary::{Comparison, DriverEstimate, EvaluationResults, Slice, Totals};
+use crate::trials::Trial;
 use comfy_table::{Table, presets};
 use serde::Serialize;
 use sim::episode::{Ending, EpisodeReport};
@@ -43,7 +43,13 @@ pub struct RunLine<'a> {
 
 impl<'a> RunLine<'a> {
     /// Of a finished run; `replay` is its key ([`crate::replay_key`]).
-    pub fn new(driver: &'a str, job: &Job<'a>, noise: NoiseChoice, replay: String, report: &'a EpisodeReport) -> Self {
+    pub fn new(
+        driver: &'a str,
+        job: &Trial<'a>,
+        noise: NoiseChoice,
+        replay: String,
+        report: &'a EpisodeReport,
+    ) -> Self {
         let timed_out = report.ending == Ending::TimedOut;
         let mean_speed_mps = report.metrics.mean_speed_mps();
         let (lot, direction, trial) = (job.lot.name(), job.direction, job.trial);
@@ -149,33 +155,33 @@ struct CauseRow {
     near_collisions: u32,
 }
 
-/// One noise level in one scope, judged.
+/// One noise level in one slice, judged.
 struct Judged {
     level: usize,
-    scope: Scope,
-    standings: Vec<Standing>,
+    slice: Slice,
+    estimates: Vec<DriverEstimate>,
     comparisons: Vec<Comparison>,
 }
 
 /// An evaluation, counted and judged.
 pub struct Summary<'a> {
     plan: &'a Plan<'a>,
-    ledger: &'a Ledger,
-    /// Level by level, scope by scope.
+    results: &'a EvaluationResults,
+    /// Level by level, slice by slice.
     judged: Vec<Judged>,
 }
 
 impl<'a> Summary<'a> {
     /// Judges what was driven.
-    pub fn new(plan: &'a Plan<'a>, ledger: &'a Ledger) -> Self {
+    pub fn new(plan: &'a Plan<'a>, results: &'a EvaluationResults) -> Self {
         let evaluation = &plan.settings.evaluation;
-        let scopes = Scope::all_of(ledger);
-        let both = (0..evaluation.noise.len()).flat_map(|level| scopes.iter().map(move |scope| (level, scope.clone())));
-        let judge = |(level, scope)| {
-            let (standings, comparisons) = ledger.judge(level, &scope, plan.compare_with, evaluation.seed);
-            Judged { level, scope, standings, comparisons }
+        let slices = Slice::all_of(results);
+        let both = (0..evaluation.noise.len()).flat_map(|level| slices.iter().map(move |slice| (level, slice.clone())));
+        let judge = |(level, slice)| {
+            let (estimates, comparisons) = results.judge(level, &slice, plan.compare_with, evaluation.seed);
+            Judged { level, slice, estimates, comparisons }
         };
-        Self { plan, ledger, judged: both.map(judge).collect() }
+        Self { plan, results, judged: both.map(judge).collect() }
     }
 
     /// Writes `summary.md`, `.json`, `.csv`, `comparisons.csv`, and `noise_sweep.csv` if there are several levels.
@@ -247,11 +253,11 @@ impl<'a> Summary<'a> {
         self.judged.iter().filter(move |judged| judged.level == level)
     }
 
-    /// Driver by driver, scope by scope, where anything was driven.
-    fn standings(&self, level: usize) -> impl Iterator<Item = (usize, &Judged, Totals)> {
+    /// Driver by driver, slice by slice, where anything was driven.
+    fn estimates(&self, level: usize) -> impl Iterator<Item = (usize, &Judged, Totals)> {
         (0..self.plan.entries.len()).flat_map(move |driver| {
             self.at_level(level).filter_map(move |judged| {
-                let totals = self.ledger.totals(level, driver, &judged.scope, None);
+                let totals = self.results.totals(level, driver, &judged.slice, None);
                 (totals.runs > 0).then_some((driver, judged, totals))
             })
         })
@@ -260,7 +266,7 @@ impl<'a> Summary<'a> {
     /// The paper's rows of the lots that were driven: its own driver's, and those of its planners that took part.
     fn paper_rows(&self) -> impl Iterator<Item = (&'static str, &'static PaperLot, &'static PaperResult)> {
         let took_part = |driver: &str| (0..self.plan.entries.len()).any(|index| self.driver(index) == driver);
-        let lots = paper::LOTS.iter().filter(|lot| self.ledger.families().iter().any(|family| family.name == lot.lot));
+        let lots = paper::LOTS.iter().filter(|lot| self.results.families().iter().any(|family| family.name == lot.lot));
         let drivers = (0..).zip(paper::DRIVERS).filter(move |&(index, driver)| index == 0 || took_part(driver));
         drivers.flat_map(move |(index, driver)| lots.clone().map(move |lot| (driver, lot, &lot.results[index])))
     }
@@ -275,21 +281,21 @@ impl<'a> Summary<'a> {
             "unweighted",
             "dispersion",
         ]);
-        for (driver, judged, totals) in self.standings(level) {
+        for (driver, judged, totals) in self.estimates(level) {
             let way = |direction| {
-                let totals = self.ledger.totals(level, driver, &judged.scope, Some(direction));
+                let totals = self.results.totals(level, driver, &judged.slice, Some(direction));
                 if totals.runs == 0 { "–".to_owned() } else { totals.near_collisions.to_string() }
             };
             let [forward, reverse] = Direction::BOTH.map(way);
-            let standing = &judged.standings[driver];
+            let estimate = &judged.estimates[driver];
             table.add_row([
                 self.driver(driver).to_owned(),
-                judged.scope.label.clone(),
+                judged.slice.label.clone(),
                 format!("{:.0} m", totals.reference_m),
                 format!("{} ({forward}, {reverse})", totals.near_collisions),
-                quoted_rate(&totals, standing),
-                self.unweighted(level, driver, &judged.scope, 0, 2),
-                standing.dispersion.map_or_else(|| "–".to_owned(), |dispersion| format!("{:.1}", dispersion.index)),
+                quoted_rate(&totals, estimate),
+                self.unweighted(level, driver, &judged.slice, 0, 2),
+                estimate.dispersion.map_or_else(|| "–".to_owned(), |dispersion| format!("{:.1}", dispersion.index)),
             ]);
         }
         for (driver, lot, paper) in self.paper_rows().filter(|_| has_paper) {
@@ -309,15 +315,15 @@ impl<'a> Summary<'a> {
 
     fn safe_ratio_table(&self, level: usize, has_paper: bool) -> Table {
         let mut table = table_of(&["driver", "lots", "runs", "safe ratio [95 %]", "unweighted"]);
-        for (driver, judged, totals) in self.standings(level) {
-            let interval = judged.standings[driver].safe_ratio;
+        for (driver, judged, totals) in self.estimates(level) {
+            let interval = judged.estimates[driver].safe_ratio;
             let interval = interval.map_or_else(String::new, |i| format!(" [{:.3}, {:.3}]", i.lower, i.upper));
             table.add_row([
                 self.driver(driver).to_owned(),
-                judged.scope.label.clone(),
+                judged.slice.label.clone(),
                 totals.runs.to_string(),
                 format!("{:.3}{interval}", totals.safe_ratio()),
-                self.unweighted(level, driver, &judged.scope, 1, 3),
+                self.unweighted(level, driver, &judged.slice, 1, 3),
             ]);
         }
         for (driver, lot, paper) in self.paper_rows().filter(|_| has_paper) {
@@ -328,9 +334,9 @@ impl<'a> Summary<'a> {
     }
 
     /// The mean over lots and directions with equal weights; empty where there is nothing to weigh.
-    fn unweighted(&self, level: usize, driver: usize, scope: &Scope, which: usize, digits: usize) -> String {
-        if scope.is_pooled() {
-            format!("{:.digits$}", self.ledger.unweighted(level, driver, scope)[which])
+    fn unweighted(&self, level: usize, driver: usize, slice: &Slice, which: usize, digits: usize) -> String {
+        if slice.is_pooled() {
+            format!("{:.digits$}", self.results.unweighted(level, driver, slice)[which])
         } else {
             String::new()
         }
@@ -349,10 +355,10 @@ impl<'a> Summary<'a> {
             "reversals /100 m",
             "steering rad/100 m",
         ]);
-        for (driver, judged, totals) in self.standings(level) {
+        for (driver, judged, totals) in self.estimates(level) {
             table.add_row([
                 self.driver(driver).to_owned(),
-                judged.scope.label.clone(),
+                judged.slice.label.clone(),
                 totals.contacts.to_string(),
                 totals.stuck.to_string(),
                 totals.timed_out.to_string(),
@@ -384,7 +390,7 @@ impl<'a> Summary<'a> {
                         |value: Option<f64>| value.map_or_else(|| "∞".to_owned(), |value| format!("{value:.2}"));
                     table.add_row([
                         self.driver(driver).to_owned(),
-                        judged.scope.label.clone(),
+                        judged.slice.label.clone(),
                         difference(comparison.difference_per_100m, 2),
                         match ratio.ratio {
                             Some(value) => format!("{value:.2} [{:.2}, {}]", ratio.lower, number(ratio.upper)),
@@ -405,12 +411,12 @@ impl<'a> Summary<'a> {
         header.extend(Cause::ALL.map(Cause::name));
         header.extend(["again at the same place", "places per 100 m"]);
         let mut table = table_of(&header);
-        for (driver, judged, totals) in self.standings(level).filter(|(.., totals)| totals.near_collisions > 0) {
-            let count = |cause| self.ledger.count_of_cause(level, driver, &judged.scope, cause);
+        for (driver, judged, totals) in self.estimates(level).filter(|(.., totals)| totals.near_collisions > 0) {
+            let count = |cause| self.results.count_of_cause(level, driver, &judged.slice, cause);
             let share = |cause| format!("{:.0} %", 100.0 * f64::from(count(cause)) / f64::from(totals.near_collisions));
-            let mut row = vec![self.driver(driver).to_owned(), judged.scope.label.clone()];
+            let mut row = vec![self.driver(driver).to_owned(), judged.slice.label.clone()];
             row.extend(Cause::ALL.map(|cause| format!("{} ({})", count(cause), share(cause))));
-            let again = self.ledger.count_of_again(level, driver, &judged.scope);
+            let again = self.results.count_of_again(level, driver, &judged.slice);
             let places = f64::from(totals.near_collisions.saturating_sub(again));
             row.extend([again.to_string(), format!("{:.2}", 100.0 * places / totals.reference_m)]);
             table.add_row(row);
@@ -423,16 +429,16 @@ impl<'a> Summary<'a> {
         header.extend(self.levels().iter().map(|noise| format!("noise {noise}")));
         let mut table = markdown(header);
         for driver in 0..self.plan.entries.len() {
-            for scope in Scope::all_of(self.ledger) {
+            for slice in Slice::all_of(self.results) {
                 let rate = |level| {
-                    let totals = self.ledger.totals(level, driver, &scope, None);
+                    let totals = self.results.totals(level, driver, &slice, None);
                     if totals.runs == 0 {
                         "–".to_owned()
                     } else {
                         exact_rate(totals.near_collisions, totals.reference_m)
                     }
                 };
-                let mut row = vec![self.driver(driver).to_owned(), scope.label.clone()];
+                let mut row = vec![self.driver(driver).to_owned(), slice.label.clone()];
                 row.extend((0..self.levels().len()).map(rate));
                 table.add_row(row);
             }
@@ -444,9 +450,9 @@ impl<'a> Summary<'a> {
         let ways = [("both", None), ("forward", Some(Direction::Forward)), ("reverse", Some(Direction::Reverse))];
         let mut rows = Vec::new();
         for level in 0..self.levels().len() {
-            for (driver, judged, _) in self.standings(level) {
+            for (driver, judged, _) in self.estimates(level) {
                 for (name, direction) in ways {
-                    let totals = self.ledger.totals(level, driver, &judged.scope, direction);
+                    let totals = self.results.totals(level, driver, &judged.slice, direction);
                     if totals.runs > 0 {
                         rows.push(self.row(driver, judged, name, &totals));
                     }
@@ -460,13 +466,13 @@ impl<'a> Summary<'a> {
         let rate = totals.rate();
         // Resampled and weighed is only the whole.
         let is_whole = direction == "both";
-        let standing = if is_whole { judged.standings[driver].clone() } else { Standing::default() };
-        let unweighted =
-            (is_whole && judged.scope.is_pooled()).then(|| self.ledger.unweighted(judged.level, driver, &judged.scope));
+        let estimate = if is_whole { judged.estimates[driver].clone() } else { DriverEstimate::default() };
+        let unweighted = (is_whole && judged.slice.is_pooled())
+            .then(|| self.results.unweighted(judged.level, driver, &judged.slice));
         Row {
             driver: self.driver(driver).to_owned(),
             noise: self.levels()[judged.level],
-            lots: judged.scope.label.clone(),
+            lots: judged.slice.label.clone(),
             direction,
             runs: totals.runs,
             reference_m: totals.reference_m,
@@ -476,14 +482,14 @@ impl<'a> Summary<'a> {
             garwood_lower: rate.lower,
             garwood_upper: rate.upper,
             one_sided_upper: bound_per_100m(totals.near_collisions, totals.reference_m),
-            bootstrap_lower: standing.per_100m.map(|interval| interval.lower),
-            bootstrap_upper: standing.per_100m.map(|interval| interval.upper),
-            dispersion: standing.dispersion.map(|dispersion| dispersion.index),
-            dispersion_p: standing.dispersion.map(|dispersion| dispersion.p_value),
+            bootstrap_lower: estimate.per_100m.map(|interval| interval.lower),
+            bootstrap_upper: estimate.per_100m.map(|interval| interval.upper),
+            dispersion: estimate.dispersion.map(|dispersion| dispersion.index),
+            dispersion_p: estimate.dispersion.map(|dispersion| dispersion.p_value),
             per_100m_unweighted: unweighted.map(|[rate, _]| rate),
             safe_ratio: totals.safe_ratio(),
-            safe_ratio_lower: standing.safe_ratio.map(|interval| interval.lower),
-            safe_ratio_upper: standing.safe_ratio.map(|interval| interval.upper),
+            safe_ratio_lower: estimate.safe_ratio.map(|interval| interval.lower),
+            safe_ratio_upper: estimate.safe_ratio.map(|interval| interval.upper),
             safe_ratio_unweighted: unweighted.map(|[_, safe_ratio]| safe_ratio),
             contacts: totals.contacts,
             stuck: totals.stuck,
@@ -501,7 +507,7 @@ impl<'a> Summary<'a> {
             driver: self.driver(comparison.driver).to_owned(),
             compared_with: self.driver(self.plan.compare_with).to_owned(),
             noise: self.levels()[judged.level],
-            lots: judged.scope.label.clone(),
+            lots: judged.slice.label.clone(),
             pairs: comparison.pairs,
             difference_per_100m: comparison.difference_per_100m.map(|interval| interval.estimate),
             difference_lower: comparison.difference_per_100m.map(|interval| interval.lower),
@@ -523,11 +529,11 @@ impl<'a> Summary<'a> {
     fn sweep_rows(&self) -> Vec<SweepRow> {
         let mut rows = Vec::new();
         for (level, &noise) in self.levels().iter().enumerate() {
-            for (driver, judged, totals) in self.standings(level) {
+            for (driver, judged, totals) in self.estimates(level) {
                 let rate = totals.rate();
                 rows.push(SweepRow {
                     driver: self.driver(driver).to_owned(),
-                    lots: judged.scope.label.clone(),
+                    lots: judged.slice.label.clone(),
                     noise,
                     times_paper: noise.times_paper(),
                     reference_m: totals.reference_m,
@@ -545,13 +551,13 @@ impl<'a> Summary<'a> {
     fn cause_rows(&self) -> Vec<CauseRow> {
         let mut rows = Vec::new();
         for (level, &noise) in self.levels().iter().enumerate() {
-            for (driver, judged, _) in self.standings(level) {
+            for (driver, judged, _) in self.estimates(level) {
                 rows.extend(Cause::ALL.map(|cause| CauseRow {
                     driver: self.driver(driver).to_owned(),
                     noise,
-                    lots: judged.scope.label.clone(),
+                    lots: judged.slice.label.clone(),
                     cause,
-                    near_collisions: self.ledger.count_of_cause(level, driver, &judged.scope, cause),
+                    near_collisions: self.results.count_of_cause(level, driver, &judged.slice, cause),
                 }));
             }
         }
@@ -568,9 +574,9 @@ pub(crate) fn csv_of(rows: &[impl Serialize]) -> anyhow::Result<Vec<u8>> {
 }
 
 /// The rate with the interval that may be quoted (methods.md 8.3).
-pub(crate) fn quoted_rate(totals: &Totals, standing: &Standing) -> String {
-    let is_clustered = standing.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
-    match standing.per_100m.filter(|_| is_clustered) {
+pub(crate) fn quoted_rate(totals: &Totals, estimate: &DriverEstimate) -> String {
+    let is_clustered = estimate.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
+    match estimate.per_100m.filter(|_| is_clustered) {
         Some(Interval { lower, upper, .. }) => {
             format!("{:.2} [{lower:.2}, {upper:.2}] (b)", totals.rate().per_unit)
         }
@@ -625,13 +631,13 @@ mod tests {
         assert_eq!(exact_rate(71, 5180.0), "1.37 [1.07, 1.73]");
         let totals = Totals { near_collisions: 71, reference_m: 5180.0, ..Totals::default() };
         let interval = Interval { estimate: 1.37, lower: 0.9, upper: 2.0 };
-        let standing = |index| Standing {
+        let estimate = |index| DriverEstimate {
             dispersion: Some(statistics::poisson::Dispersion { index, freedom: 9, p_value: 0.1 }),
             per_100m: Some(interval),
             safe_ratio: None,
         };
-        assert_eq!(quoted_rate(&totals, &standing(1.5)), "1.37 [1.07, 1.73]");
-        assert_eq!(quoted_rate(&totals, &standing(1.6)), "1.37 [0.90, 2.00] (b)");
+        assert_eq!(quoted_rate(&totals, &estimate(1.5)), "1.37 [1.07, 1.73]");
+        assert_eq!(quoted_rate(&totals, &estimate(1.6)), "1.37 [0.90, 2.00] (b)");
         assert_eq!(difference(Some(interval), 1), "+1.4 [+0.9, +2.0] *");
         let around_zero = Interval { lower: -0.1, ..interval };
         assert_eq!(difference(Some(around_zero), 1), "+1.4 [-0.1, +2.0]");

@@ -7,8 +7,8 @@ pub mod stages;
 pub mod watched;
 
 use crate::cli::ReproduceArgs;
-use crate::drivers::{self, Contestant};
-use crate::evaluate::{self, Entry, Plan};
+use crate::drivers::{self, DriverSpec};
+use crate::evaluate::{self, NamedDriver, Plan};
 use crate::interrupt::{self, Interrupted};
 use crate::lots::Lot;
 use crate::progress::Stopwatch;
@@ -128,14 +128,14 @@ fn tuned(folder: Option<&Path>) -> anyhow::Result<Vec<String>> {
         let shipped = drivers::specs().into_iter().map(|(spec, _)| spec).filter(|spec| spec.starts_with("tuned:"));
         return Ok(shipped.map(str::to_owned).collect());
     };
-    let specs: Vec<String> = policy::baselines::Baseline::all()
+    let specs: Vec<String> = planners::Baseline::all()
         .iter()
         .map(|planner| (planner.name(), folder.join(format!("{}.toml", planner.name()))))
         .filter(|(_, file)| file.is_file())
         .map(|(name, file)| format!("{name}:{}", file.display()))
         .collect();
     ensure!(!specs.is_empty(), "--tuned {}: no parameters are there; cargo xtask tune writes them", folder.display());
-    Contestant::parse_all(&specs)?;
+    DriverSpec::parse_all(&specs)?;
     Ok(specs)
 }
 
@@ -178,7 +178,7 @@ fn perform(stage: &Stage, root: &Path, stopwatch: &mut Stopwatch) -> anyhow::Res
             let drivers = entries.iter().map(|entry| entry.spec.as_str()).collect();
             run.finish(&Driven { drivers })?;
         }
-        Step::Watch => {
+        Step::IncidentMonitor => {
             let started = std::time::Instant::now();
             if !watched::watch(settings, root, &run)? {
                 return Ok(false);
@@ -196,16 +196,16 @@ struct Driven<'a> {
 }
 
 /// Drivers by their names in tables.
-pub(crate) fn entries(drivers: &[(String, String)]) -> anyhow::Result<Vec<Entry>> {
+pub(crate) fn entries(drivers: &[(String, String)]) -> anyhow::Result<Vec<NamedDriver>> {
     let entry = |(name, spec): &(String, String)| {
-        let contestant = drivers::Contestant::parse_all(std::slice::from_ref(spec))?.remove(0).renamed(name);
-        Ok(Entry { contestant, spec: spec.clone() })
+        let contestant = drivers::DriverSpec::parse_all(std::slice::from_ref(spec))?.remove(0).renamed(name);
+        Ok(NamedDriver { contestant, spec: spec.clone() })
     };
     drivers.iter().map(entry).collect()
 }
 
 /// The paper's driver, where it takes part.
-pub(crate) fn compare_with(entries: &[Entry]) -> usize {
+pub(crate) fn compare_with(entries: &[NamedDriver]) -> usize {
     entries.iter().position(|entry| entry.contestant.name == conclusions::DAGGER).unwrap_or(0)
 }
 

@@ -10,10 +10,10 @@ mod ranges;
 
 use crate::cli::LayerArgs;
 use anyhow::{Context as _, ensure};
-use expert::ExpertConfig;
-use policy::dagger::DaggerConfig;
+use expert::ExpertSettings;
+use policy::dagger::DaggerSettings;
 use serde::{Deserialize, Serialize};
-use sim::episode::EpisodeConfig;
+use sim::episode::EpisodeSettings;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::path::Path;
@@ -32,11 +32,11 @@ pub struct Settings {
     /// The closed-loop check.
     pub evaluation: EvaluationSettings,
     /// Data sampling, network and training.
-    pub dagger: DaggerConfig,
+    pub dagger: DaggerSettings,
     /// The teacher.
-    pub expert: ExpertConfig,
+    pub expert: ExpertSettings,
     /// Car, sensor, controller, metrics.
-    pub episode: EpisodeConfig,
+    pub episode: EpisodeSettings,
 }
 
 /// Where training data come from.

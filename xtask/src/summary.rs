@@ -1,14 +1,14 @@
 //! Runs pooled: counts, rates and what they say about the drivers (methods.md 8).
 
 mod read;
-mod scopes;
+mod slices;
 
-pub use scopes::{Comparison, Scope, Standing};
+pub use slices::{Comparison, DriverEstimate, Slice};
 
 use crate::evaluate::Plan;
 use crate::failures::Cause;
 use crate::lots::Lot;
-use crate::trials::Job;
+use crate::trials::Trial;
 use serde::Serialize;
 use sim::episode::{Ending, EpisodeReport};
 use sim::scenario::Direction;
@@ -114,7 +114,7 @@ fn smaller(a: Option<f32>, b: Option<f32>) -> Option<f32> {
 
 /// Lots that share a row of the tables: a lot by itself, or all generated lots of one kind.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Family {
+pub struct LotGroup {
     /// As [`Lot::family`].
     pub name: String,
     /// Lots in it.
@@ -123,7 +123,7 @@ pub struct Family {
     pub is_trained_on: bool,
 }
 
-impl Family {
+impl LotGroup {
     /// Its name in tables.
     pub fn label(&self) -> String {
         if self.lots == 1 { self.name.clone() } else { format!("{} ({} lots)", self.name, self.lots) }
@@ -132,7 +132,7 @@ impl Family {
 
 /// One run, as far as it is kept: the bootstrap needs every one of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Unit {
+struct RunSummary {
     job: u32,
     family: u32,
     /// Units of one cluster are resampled together.
@@ -146,9 +146,9 @@ struct Unit {
 
 /// One driver at one noise level.
 #[derive(Debug, Clone, Default)]
-struct Account {
+struct DriverResults {
     /// In the order of the jobs.
-    units: Vec<Unit>,
+    units: Vec<RunSummary>,
     /// By family and direction.
     totals: BTreeMap<(u32, Direction), Totals>,
     /// By family.
@@ -159,15 +159,15 @@ struct Account {
 
 /// Everything that is kept of an evaluation: sums, and 32 bytes per run.
 #[derive(Debug)]
-pub struct Ledger {
-    families: Vec<Family>,
-    /// Family and cluster of a lot by name; no cluster where every run is one.
+pub struct EvaluationResults {
+    families: Vec<LotGroup>,
+    /// LotGroup and cluster of a lot by name; no cluster where every run is one.
     lots: BTreeMap<String, (u32, Option<u32>)>,
     /// By noise level, then by driver.
-    accounts: Vec<Vec<Account>>,
+    drivers: Vec<Vec<DriverResults>>,
 }
 
-impl Ledger {
+impl EvaluationResults {
     /// Nothing driven yet.
     pub fn new(plan: &Plan<'_>) -> Self {
         // Specs that no longer stand for anything (a file that moved) were trained on by nobody here.
@@ -180,32 +180,32 @@ impl Ledger {
             .flatten()
             .map(|lot| lot.family())
             .collect();
-        let mut ledger = Self {
+        let mut results = Self {
             families: Vec::new(),
             lots: BTreeMap::new(),
-            accounts: vec![vec![Account::default(); plan.entries.len()]; plan.settings.evaluation.noise.len()],
+            drivers: vec![vec![DriverResults::default(); plan.entries.len()]; plan.settings.evaluation.noise.len()],
         };
         for (index, lot) in plan.lots.iter().enumerate() {
             let name = lot.family();
-            let family = ledger.families.iter().position(|family| family.name == name).unwrap_or_else(|| {
+            let family = results.families.iter().position(|family| family.name == name).unwrap_or_else(|| {
                 let is_trained_on = trained_on.contains(&name);
-                ledger.families.push(Family { name, lots: 0, is_trained_on });
-                ledger.families.len() - 1
+                results.families.push(LotGroup { name, lots: 0, is_trained_on });
+                results.families.len() - 1
             });
-            ledger.families[family].lots += 1;
+            results.families[family].lots += 1;
             let cluster = lot.is_generated().then_some(index as u32);
-            ledger.lots.insert(lot.name().to_owned(), (family as u32, cluster));
+            results.lots.insert(lot.name().to_owned(), (family as u32, cluster));
         }
-        ledger
+        results
     }
 
     /// Takes a run into account: which level and driver of the plan, which of its jobs. Jobs come in order.
-    pub fn add(&mut self, level: usize, driver: usize, job_index: usize, job: &Job<'_>, report: &EpisodeReport) {
+    pub fn add(&mut self, level: usize, driver: usize, job_index: usize, job: &Trial<'_>, report: &EpisodeReport) {
         let (family, cluster) = self.lots[job.lot.name()];
-        let account = &mut self.accounts[level][driver];
+        let account = &mut self.drivers[level][driver];
         account.totals.entry((family, job.direction)).or_default().add(report);
         let metrics = &report.metrics;
-        account.units.push(Unit {
+        account.units.push(RunSummary {
             job: job_index as u32,
             family,
             // Behind the lots, of which each can be a cluster.
@@ -221,21 +221,21 @@ impl Ledger {
     /// Takes the cause of a near-collision into account, and whether it is one more at the same place.
     pub fn add_cause(&mut self, level: usize, driver: usize, lot: &Lot, cause: Cause, is_again: bool) {
         let (family, _) = self.lots[lot.name()];
-        let account = &mut self.accounts[level][driver];
+        let account = &mut self.drivers[level][driver];
         *account.causes.entry((family, cause)).or_default() += 1;
         *account.again.entry(family).or_default() += u32::from(is_again);
     }
 
     /// Families, in the order of the plan.
-    pub fn families(&self) -> &[Family] {
+    pub fn families(&self) -> &[LotGroup] {
         &self.families
     }
 
-    /// Sums over a scope, in one direction or both.
-    pub fn totals(&self, level: usize, driver: usize, scope: &Scope, direction: Option<Direction>) -> Totals {
+    /// Sums over a slice, in one direction or both.
+    pub fn totals(&self, level: usize, driver: usize, slice: &Slice, direction: Option<Direction>) -> Totals {
         let mut sum = Totals::default();
-        for (&(family, way), totals) in &self.accounts[level][driver].totals {
-            if scope.contains(family) && direction.is_none_or(|direction| direction == way) {
+        for (&(family, way), totals) in &self.drivers[level][driver].totals {
+            if slice.contains(family) && direction.is_none_or(|direction| direction == way) {
                 sum.merge(totals);
             }
         }
@@ -244,8 +244,8 @@ impl Ledger {
 
     /// Mean over (lot, direction) of the rate per 100 m and of the safe ratio, all with the same weight whatever their
     /// length: the paper's "mean".
-    pub fn unweighted(&self, level: usize, driver: usize, scope: &Scope) -> [f64; 2] {
-        let cells = self.accounts[level][driver].totals.iter().filter(|((family, _), _)| scope.contains(*family));
+    pub fn unweighted(&self, level: usize, driver: usize, slice: &Slice) -> [f64; 2] {
+        let cells = self.drivers[level][driver].totals.iter().filter(|((family, _), _)| slice.contains(*family));
         let (mut n, mut rate, mut safe_ratio) = (0, 0.0, 0.0);
         for (_, totals) in cells {
             n += 1;
@@ -255,16 +255,16 @@ impl Ledger {
         [rate, safe_ratio].map(|sum| sum / f64::from(n.max(1)))
     }
 
-    /// Near-collisions of a cause within a scope.
-    pub fn count_of_cause(&self, level: usize, driver: usize, scope: &Scope, cause: Cause) -> u32 {
-        let counts = &self.accounts[level][driver].causes;
-        counts.iter().filter(|((family, of), _)| *of == cause && scope.contains(*family)).map(|(_, n)| n).sum()
+    /// Near-collisions of a cause within a slice.
+    pub fn count_of_cause(&self, level: usize, driver: usize, slice: &Slice, cause: Cause) -> u32 {
+        let counts = &self.drivers[level][driver].causes;
+        counts.iter().filter(|((family, of), _)| *of == cause && slice.contains(*family)).map(|(_, n)| n).sum()
     }
 
-    /// Near-collisions at the place of the one before within a scope.
-    pub fn count_of_again(&self, level: usize, driver: usize, scope: &Scope) -> u32 {
-        let counts = &self.accounts[level][driver].again;
-        counts.iter().filter(|(family, _)| scope.contains(**family)).map(|(_, n)| n).sum()
+    /// Near-collisions at the place of the one before within a slice.
+    pub fn count_of_again(&self, level: usize, driver: usize, slice: &Slice) -> u32 {
+        let counts = &self.drivers[level][driver].again;
+        counts.iter().filter(|(family, _)| slice.contains(**family)).map(|(_, n)| n).sum()
     }
 }
 

@@ -1,8 +1,8 @@
 //! `train-bc` and `train-dagger`.
 
 use crate::cli::TrainArgs;
-use crate::drivers::{self, Contestant};
-use crate::evaluate::{self, Entry, Plan};
+use crate::drivers::{self, DriverSpec};
+use crate::evaluate::{self, NamedDriver, Plan};
 use crate::interrupt::{self, Interrupted};
 use crate::learning::Recorder;
 use crate::lots::Lot;
@@ -10,7 +10,7 @@ use crate::progress::{Stopwatch, Work};
 use crate::run_dir::{Place, RunDir};
 use crate::settings::Settings;
 use crate::table1::Table1;
-use crate::trials::{self, Job, Purpose};
+use crate::trials::{self, Purpose, Trial};
 use crate::visualise::drive::Detail;
 use crate::visualise::live::{Live, View};
 use crate::{learning, run_report};
@@ -132,15 +132,15 @@ fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
 }
 
 /// Expert, behaviour cloning and what became of it.
-fn entries(run: &RunDir, policy: Checkpoint, rounds: usize) -> anyhow::Result<Vec<Entry>> {
+fn entries(run: &RunDir, policy: Checkpoint, rounds: usize) -> anyhow::Result<Vec<NamedDriver>> {
     let folder = run.path().display();
     let cloned = Checkpoint::load(&run.path().join("round-00")).context("behaviour cloning of this run")?;
     let mut entries = vec![
-        Entry { contestant: Contestant::expert(), spec: "expert".to_owned() },
-        Entry { contestant: Contestant::network("BC", cloned), spec: format!("run:{folder}/bc") },
+        NamedDriver { contestant: DriverSpec::expert(), spec: "expert".to_owned() },
+        NamedDriver { contestant: DriverSpec::network("BC", cloned), spec: format!("run:{folder}/bc") },
     ];
     if rounds > 1 {
-        entries.push(Entry { contestant: Contestant::network("DAgger", policy), spec: format!("run:{folder}") });
+        entries.push(NamedDriver { contestant: DriverSpec::network("DAgger", policy), spec: format!("run:{folder}") });
     }
     Ok(entries)
 }
@@ -229,7 +229,8 @@ pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Res
     let (generated, others): (Vec<Lot>, Vec<Lot>) = lots.iter().cloned().partition(Lot::is_generated);
     let of_a_kind = |lot: &Lot| generated.iter().filter(|other| other.family() == lot.family()).count() as u64;
     let generated: Vec<Lot> = generated.iter().map(|lot| lot.in_round(round, of_a_kind(lot))).collect();
-    let jobs = |lots, trials| Job::all(settings.seed, Purpose::Training { round }, lots, trials, &training.directions);
+    let jobs =
+        |lots, trials| Trial::all(settings.seed, Purpose::Training { round }, lots, trials, &training.directions);
     let jobs: Vec<_> = jobs(&others, training.trials).chain(jobs(&generated, 1)).collect();
     trials::episodes(&jobs, settings, training.noise)
 }

@@ -17,7 +17,7 @@ use crate::lots::Lot;
 use crate::settings::{NoiseChoice, Settings};
 use anyhow::Context as _;
 use rayon::prelude::*;
-use sim::episode::{Episode, EpisodeConfig};
+use sim::episode::{Episode, EpisodeSettings};
 use sim::map::Map;
 use sim::scenario::{Direction, Scenario};
 use sim::seed::{RootSeed, Stream};
@@ -66,7 +66,7 @@ pub fn episode_seed(trial: RootSeed, lot: &str, direction: Direction) -> RootSee
 
 /// One run to be driven.
 #[derive(Debug, Clone, Copy)]
-pub struct Job<'a> {
+pub struct Trial<'a> {
     /// Where.
     pub lot: &'a Lot,
     /// Which way.
@@ -77,7 +77,7 @@ pub struct Job<'a> {
     pub seed: RootSeed,
 }
 
-impl<'a> Job<'a> {
+impl<'a> Trial<'a> {
     /// Every combination: lot by lot, trial by trial, direction by direction.
     pub fn all(
         root: RootSeed,
@@ -103,16 +103,16 @@ impl<'a> Job<'a> {
     ///
     /// # Errors
     /// If the lot cannot be driven.
-    fn map_of(&self, drawn: Scenario, config: &EpisodeConfig) -> anyhow::Result<Map> {
-        Map::build(self.direction.of(drawn), &config.vehicle).with_context(|| self.lot.name().to_owned())
+    fn map_of(&self, drawn: Scenario, episode: &EpisodeSettings) -> anyhow::Result<Map> {
+        Map::build(self.direction.of(drawn), &episode.vehicle).with_context(|| self.lot.name().to_owned())
     }
 
     /// Draws the lot and builds the map.
     ///
     /// # Errors
     /// If the lot cannot be driven.
-    pub fn map(&self, config: &EpisodeConfig) -> anyhow::Result<Map> {
-        self.map_of(self.lot.draw(self.seed).scenario, config)
+    pub fn map(&self, episode: &EpisodeSettings) -> anyhow::Result<Map> {
+        self.map_of(self.lot.draw(self.seed).scenario, episode)
     }
 
     /// Seed of the noise.
@@ -125,8 +125,8 @@ impl<'a> Job<'a> {
 ///
 /// # Errors
 /// If a lot cannot be driven.
-pub fn maps(jobs: &[Job<'_>], settings: &Settings) -> anyhow::Result<Vec<Arc<Map>>> {
-    let neighbours: Vec<&[Job<'_>]> = jobs.chunk_by(Job::shares_obstacles_with).collect();
+pub fn maps(jobs: &[Trial<'_>], settings: &Settings) -> anyhow::Result<Vec<Arc<Map>>> {
+    let neighbours: Vec<&[Trial<'_>]> = jobs.chunk_by(Trial::shares_obstacles_with).collect();
     let maps = neighbours
         .par_iter()
         .map(|jobs| {
@@ -138,10 +138,10 @@ pub fn maps(jobs: &[Job<'_>], settings: &Settings) -> anyhow::Result<Vec<Arc<Map
 }
 
 /// A car at the start of every job, in order, on maps that several drivers may share.
-pub fn start(jobs: &[Job<'_>], maps: &[Arc<Map>], settings: &Settings, noise: NoiseChoice) -> Vec<Episode> {
-    let start = |(job, map): (&Job<'_>, &Arc<Map>)| {
-        let config = Arc::new(episode_config(settings, noise, map));
-        Episode::new(config, Arc::clone(map), job.episode_seed())
+pub fn start(jobs: &[Trial<'_>], maps: &[Arc<Map>], settings: &Settings, noise: NoiseChoice) -> Vec<Episode> {
+    let start = |(job, map): (&Trial<'_>, &Arc<Map>)| {
+        let episode = Arc::new(episode_config(settings, noise, map));
+        Episode::new(episode, Arc::clone(map), job.episode_seed())
     };
     jobs.par_iter().zip(maps).map(start).collect()
 }
@@ -150,15 +150,15 @@ pub fn start(jobs: &[Job<'_>], maps: &[Arc<Map>], settings: &Settings, noise: No
 ///
 /// # Errors
 /// If a lot cannot be driven.
-pub fn episodes(jobs: &[Job<'_>], settings: &Settings, noise: NoiseChoice) -> anyhow::Result<Vec<Episode>> {
+pub fn episodes(jobs: &[Trial<'_>], settings: &Settings, noise: NoiseChoice) -> anyhow::Result<Vec<Episode>> {
     Ok(start(jobs, &maps(jobs, settings)?, settings, noise))
 }
 
 /// The settings of an episode on a map. The choice multiplies `episode.noise.intensity`.
-pub fn episode_config(settings: &Settings, noise: NoiseChoice, map: &Map) -> EpisodeConfig {
-    let mut config = settings.episode.clone();
-    config.noise.intensity *= noise.intensity(map.scenario().noise.level);
-    config
+pub fn episode_config(settings: &Settings, noise: NoiseChoice, map: &Map) -> EpisodeSettings {
+    let mut episode = settings.episode.clone();
+    episode.noise.intensity *= noise.intensity(map.scenario().noise.level);
+    episode
 }
 
 #[cfg(test)]

@@ -15,10 +15,10 @@ use crate::report::markdown;
 use crate::run_dir::{Place, RunDir};
 use crate::settings::{NoiseChoice, Settings};
 use crate::summary::Totals;
-use crate::trials::{self, Job, Purpose};
+use crate::trials::{self, Purpose, Trial};
 use anyhow::{Context as _, ensure};
-use policy::baselines::search::{GENERATION, Search};
-use policy::baselines::{Baseline, Rig};
+use planners::search::{GENERATION, Search};
+use planners::{Baseline, PlannerContext};
 use rayon::prelude::*;
 use serde::Serialize;
 use sim::driver::SensorsOnly;
@@ -112,7 +112,7 @@ fn planners(names: &[String]) -> anyhow::Result<Vec<Baseline>> {
 
 /// Cars at the start of all runs that a candidate drives.
 struct Course {
-    rig: Rig,
+    rig: PlannerContext,
     /// Every candidate's.
     search: Vec<Episode>,
     /// The finalists'.
@@ -124,10 +124,10 @@ impl Course {
         let evaluation = &settings.evaluation;
         let trials = evaluation.trials;
         // Lots that are the same in every trial get fresh noise; lot a gets fresh obstacles too.
-        let jobs = Job::all(evaluation.seed, Purpose::Tuning, lots, 2 * trials, &evaluation.directions);
-        let (search, fresh): (Vec<Job<'_>>, Vec<Job<'_>>) = jobs.partition(|job| job.trial < trials);
-        let episodes = |jobs: &[Job<'_>]| trials::episodes(jobs, settings, noise);
-        Ok(Self { rig: Rig::of(&settings.episode), search: episodes(&search)?, fresh: episodes(&fresh)? })
+        let jobs = Trial::all(evaluation.seed, Purpose::Tuning, lots, 2 * trials, &evaluation.directions);
+        let (search, fresh): (Vec<Trial<'_>>, Vec<Trial<'_>>) = jobs.partition(|job| job.trial < trials);
+        let episodes = |jobs: &[Trial<'_>]| trials::episodes(jobs, settings, noise);
+        Ok(Self { rig: PlannerContext::of(&settings.episode), search: episodes(&search)?, fresh: episodes(&fresh)? })
     }
 
     /// Drives some runs with every candidate, in parallel; sums come in the order of the candidates.

@@ -19,7 +19,7 @@ pub mod sensors;
 pub mod training;
 
 use crate::cli::{EpisodeArgs, EvaluateArgs, FailuresArgs, LayerArgs, SinkArgs, VisualiseArgs, VisualiseLotArgs, What};
-use crate::drivers::Contestant;
+use crate::drivers::DriverSpec;
 use crate::evaluate;
 use crate::interrupt;
 use crate::lots::Lot;
@@ -28,7 +28,7 @@ use crate::recorder::{RERUN_VERSION, Recorder};
 use crate::replay_key::ReplayKey;
 use crate::report;
 use crate::settings::Settings;
-use crate::trials::{self, Job, Purpose};
+use crate::trials::{self, Purpose, Trial};
 use anyhow::{Context as _, ensure};
 use drive::{Detail, Drive};
 use protocol::{Header, Layout, Mark, Message, Shape, Sink};
@@ -66,7 +66,7 @@ fn of_lot(args: &VisualiseLotArgs, sink: &SinkArgs) -> anyhow::Result<()> {
     let lots = Lot::parse_all(std::slice::from_ref(&args.lot))?;
     let lot = only(&lots, &args.lot)?;
     let seed = trials::trial_seed(RootSeed(args.seed), Purpose::Pictures, 0);
-    let map = Job { lot, direction: Direction::Forward, trial: 0, seed }.map(&settings.episode)?;
+    let map = Trial { lot, direction: Direction::Forward, trial: 0, seed }.map(&settings.episode)?;
     let name = format!("{} seed {}", lot.name(), args.seed);
     let target = Target::of(sink, &format!("lot-{}-s{}", lot.name(), args.seed))?;
     let header = target.header("lot", name, layout::of_lot(&map), None);
@@ -102,14 +102,14 @@ fn of_episode(args: &EpisodeArgs, sink: &SinkArgs) -> anyhow::Result<()> {
         ..EvaluateArgs::default()
     };
     let (settings, _) = evaluate::resolve(&asked)?;
-    let contestants = Contestant::parse_all(&args.drivers)?;
+    let contestants = DriverSpec::parse_all(&args.drivers)?;
     let noise = settings.evaluation.noise[0];
     ensure!(settings.evaluation.noise.len() == 1, "--noise: name one level; a recording shows one");
     let direction = if args.reverse { Direction::Reverse } else { Direction::Forward };
     let lots = Lot::parse_all(&settings.evaluation.lots)?;
     let lot = only(&lots, &args.lot)?;
     let seed = trials::trial_seed(settings.evaluation.seed, Purpose::Evaluation, args.trial);
-    let job = Job { lot, direction, trial: args.trial, seed };
+    let job = Trial { lot, direction, trial: args.trial, seed };
     let episode = start(&job, &settings, noise)?;
     let name = format!(
         "{}, {}, trial {}, {noise}: {}",
@@ -126,18 +126,18 @@ fn of_episode(args: &EpisodeArgs, sink: &SinkArgs) -> anyhow::Result<()> {
 /// The run of a replay key.
 struct Replay {
     settings: Settings,
-    contestants: Vec<Contestant>,
+    contestants: Vec<DriverSpec>,
     episode: Episode,
     lot: String,
 }
 
 impl Replay {
     fn of(key: &ReplayKey, settings: Settings) -> anyhow::Result<Self> {
-        let contestants = Contestant::parse_all(std::slice::from_ref(&key.driver))?;
+        let contestants = DriverSpec::parse_all(std::slice::from_ref(&key.driver))?;
         let lots = Lot::parse_all(std::slice::from_ref(&key.lot))?;
         let lot = only(&lots, &key.lot)?;
         let seed = trials::trial_seed(key.seed, Purpose::Evaluation, key.trial);
-        let job = Job { lot, direction: key.direction, trial: key.trial, seed };
+        let job = Trial { lot, direction: key.direction, trial: key.trial, seed };
         let episode = start(&job, &settings, key.noise)?;
         Ok(Self { lot: lot.name().to_owned(), settings, contestants, episode })
     }
@@ -216,7 +216,7 @@ fn of_failures(args: &FailuresArgs, sink: &SinkArgs) -> anyhow::Result<()> {
     targets.iter().try_for_each(Target::report)
 }
 
-fn start(job: &Job<'_>, settings: &Settings, noise: crate::settings::NoiseChoice) -> anyhow::Result<Episode> {
+fn start(job: &Trial<'_>, settings: &Settings, noise: crate::settings::NoiseChoice) -> anyhow::Result<Episode> {
     let map = Arc::new(job.map(&settings.episode)?);
     let config = Arc::new(trials::episode_config(settings, noise, &map));
     Ok(Episode::new(config, map, job.episode_seed()))
@@ -225,7 +225,7 @@ fn start(job: &Job<'_>, settings: &Settings, noise: crate::settings::NoiseChoice
 /// The same episode, driven by each of several drivers.
 struct Show<'a> {
     settings: &'a Settings,
-    contestants: &'a [Contestant],
+    contestants: &'a [DriverSpec],
     episode: &'a Episode,
     /// Moment of interest.
     focus_tick: Option<u32>,
@@ -248,7 +248,7 @@ impl Show<'_> {
         let names: Vec<&str> = self.contestants.iter().map(|contestant| contestant.name.as_str()).collect();
         let roots = roots_of(&names);
         let focus_s = self.focus_tick.map(|tick| {
-            let at_s = f64::from(tick) * f64::from(self.episode.config().control_period_s());
+            let at_s = f64::from(tick) * f64::from(self.episode.settings().control_period_s());
             [(at_s - FOCUS_S[0]).max(0.0), at_s + FOCUS_S[1]]
         });
         let layout = layout::of_drives(map, &roots, Detail::Everything);
@@ -264,7 +264,7 @@ impl Show<'_> {
 
     /// First and last tick to record. The viewer begins where a recording does: not long before what is to be seen.
     fn ticks(&self) -> [u32; 2] {
-        let control_period_s = f64::from(self.episode.config().control_period_s());
+        let control_period_s = f64::from(self.episode.settings().control_period_s());
         let [before, after] = AROUND_S.map(|seconds| (seconds / control_period_s) as u32);
         self.focus_tick.map_or([0, u32::MAX], |tick| [tick.saturating_sub(before), tick.saturating_add(after)])
     }
@@ -275,7 +275,7 @@ impl Show<'_> {
         let drive = Drive::new(root, self.episode, self.settings, Detail::Everything);
         let mut drive = drive.with_planner(contestant.planner(self.settings));
         if self.contestants.len() > 1 {
-            let sources: Vec<Source> = self.contestants.iter().map(Contestant::source).collect();
+            let sources: Vec<Source> = self.contestants.iter().map(DriverSpec::source).collect();
             drive = drive.among_others(colours::of_drivers(&sources)[index]);
         }
         recorder.send(Message::Always { recording, marks: drive.always() });

@@ -7,10 +7,10 @@ use crate::drivers::{NetFleet, NetPolicy};
 use crate::fit::Budget;
 use crate::network::ConvConfig;
 use sim::driver::{Decision, Fleet, LookAheadPoint, OneDriverEach, SensorsOnly, Situation, Source};
-use sim::episode::EpisodeConfig;
+use sim::episode::EpisodeSettings;
 use sim::geometry::Vec2;
 use sim::map::Map;
-use sim::scenario::{NoiseSettings, ReferencePath, Scenario};
+use sim::scenario::{LotNoise, ReferencePath, Scenario};
 use std::sync::Arc;
 
 /// Drives to the point of the route ten metres ahead.
@@ -29,22 +29,22 @@ impl Driver for RouteFollower {
 /// A lane 7 m wide: 25 m straight on, then 30° to the left.
 fn episodes(count: usize) -> Vec<Episode> {
     let v = Vec2::new;
-    let config = EpisodeConfig::paper();
+    let settings = EpisodeSettings::paper();
     let scenario = Scenario {
         name: "bent lane".to_string(),
         boundary: vec![v(-4.0, -3.5), v(26.0, -3.5), v(52.0, 11.5), v(48.5, 17.6), v(24.0, 3.5), v(-4.0, 3.5)],
         reference_path: ReferencePath { points: vec![v(0.0, 0.0), v(25.0, 0.0), v(42.0, 9.8)], corner_radius_m: 12.0 },
-        noise: NoiseSettings::default(),
+        noise: LotNoise::default(),
         islands: Vec::new(),
         obstacles: Vec::new(),
         speed_bumps: Vec::new(),
     };
-    let map = Arc::new(Map::build(scenario, &config.vehicle).unwrap());
-    let config = Arc::new(config);
-    (0..count).map(|i| Episode::new(Arc::clone(&config), Arc::clone(&map), RootSeed(40 + i as u64))).collect()
+    let map = Arc::new(Map::build(scenario, &settings.vehicle).unwrap());
+    let settings = Arc::new(settings);
+    (0..count).map(|i| Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(40 + i as u64))).collect()
 }
 
-fn config() -> DaggerConfig {
+fn settings() -> DaggerSettings {
     let fit = FitSettings {
         budget: Budget::Steps(25),
         batch: 32,
@@ -52,10 +52,10 @@ fn config() -> DaggerConfig {
         validate_every: 25,
         ..FitSettings::quick(25)
     };
-    DaggerConfig {
+    DaggerSettings {
         eta: 0.999,
         iterations_max: 2,
-        relooks: 1,
+        noise_augmentations: 1,
         start: StartFrom::Previous,
         network: LookAheadNetConfig {
             conv1: ConvConfig { channels: 16, kernel: 3 },
@@ -63,20 +63,20 @@ fn config() -> DaggerConfig {
             hidden: 32,
             dropout_features: 0.0,
             dropout_hidden: 0.1,
-            symmetric: false,
-            memory_ticks: 2.0,
+            mirror_averaging: false,
+            smoothing_ticks: 2.0,
         },
         // Loose enough that both novice and expert drive after so little training.
         rule: DecisionRule::AllBelow { tau: 0.25, chi: 1.0, chi_on: crate::decision_rule::ChiOn::StdPerAxis },
         fit_cloning: fit.clone(),
         fit_iteration: fit,
-        ..DaggerConfig::paper()
+        ..DaggerSettings::paper()
     }
 }
 
 fn run_in(
     folder: &Path,
-    config: &DaggerConfig,
+    settings: &DaggerSettings,
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Outcome, DaggerError> {
     let store = Store::open(folder).unwrap();
@@ -86,7 +86,7 @@ fn run_in(
         on_frame: &mut |_, _, _| {},
         progress,
     };
-    run(config, &store, RootSeed(6), &mut hooks)
+    run(settings, &store, RootSeed(6), &mut hooks)
 }
 
 fn go_on(_: &Progress<'_>) -> ControlFlow<()> {
@@ -96,7 +96,7 @@ fn go_on(_: &Progress<'_>) -> ControlFlow<()> {
 #[test]
 fn a_run_leaves_data_and_policy_of_every_round() {
     let folder = scratch("dagger");
-    let outcome = run_in(&folder, &config(), &mut go_on).unwrap();
+    let outcome = run_in(&folder, &settings(), &mut go_on).unwrap();
     assert_eq!(outcome.stop, Stop::IterationCap);
     assert_eq!(outcome.rows.len(), 3);
     let store = Store::open(&folder).unwrap();
@@ -107,8 +107,13 @@ fn a_run_leaves_data_and_policy_of_every_round() {
         assert_eq!((row.round, row.samples, row.dataset), (round as u32, data.samples.len(), total));
         let kept = if round == 0 { about.ticks } else { about.ticks - about.novice_ticks };
         assert_eq!(data.samples.len() as u64, kept, "round {round} keeps the expert's ticks");
-        assert_eq!(data.relooks.len(), data.samples.len(), "one further look at each");
-        let differ = data.samples.iter().zip(&data.relooks).filter(|(sample, relook)| sample.grid != **relook).count();
+        assert_eq!(data.noise_augmentations.len(), data.samples.len(), "one further look at each");
+        let differ = data
+            .samples
+            .iter()
+            .zip(&data.noise_augmentations)
+            .filter(|(sample, relook)| sample.grid != **relook)
+            .count();
         assert!(2 * differ > data.samples.len(), "{differ} of {} have noise of their own", data.samples.len());
         assert!(Checkpoint::exists(&store.round_folder(round as u32)));
         assert_eq!(row.eta_hat.is_some(), round > 0);
@@ -124,7 +129,7 @@ fn a_run_leaves_data_and_policy_of_every_round() {
 fn only_iterations_are_nudged() {
     let rounds_of = |name, disturbance| {
         let folder = scratch(name);
-        run_in(&folder, &DaggerConfig { disturbance, iterations_max: 1, ..config() }, &mut go_on).unwrap();
+        run_in(&folder, &DaggerSettings { disturbance, iterations_max: 1, ..settings() }, &mut go_on).unwrap();
         let store = Store::open(&folder).unwrap();
         let rounds = [0, 1].map(|round| store.read_round::<Collection>(round).unwrap().0);
         std::fs::remove_dir_all(folder).unwrap();
@@ -139,16 +144,16 @@ fn only_iterations_are_nudged() {
 #[test]
 fn an_interrupted_run_continues_to_the_same_end() {
     let (whole, parts) = (scratch("whole"), scratch("parts"));
-    let at_once = run_in(&whole, &config(), &mut go_on).unwrap();
+    let at_once = run_in(&whole, &settings(), &mut go_on).unwrap();
     // Interrupted in the middle of the training of round 1, after its collection.
     let mut interrupt = |progress: &Progress<'_>| match progress {
         Progress::Fitting { round: Some(1), fit } if fit.step == 5 => ControlFlow::Break(()),
         _ => ControlFlow::Continue(()),
     };
-    let first = run_in(&parts, &config(), &mut interrupt).unwrap();
+    let first = run_in(&parts, &settings(), &mut interrupt).unwrap();
     assert_eq!((first.stop, first.rows.len()), (Stop::Interrupted, 1));
     assert_eq!(first.policy, Some(Checkpoint::load(&parts.join("round-00")).unwrap()));
-    let second = run_in(&parts, &config(), &mut go_on).unwrap();
+    let second = run_in(&parts, &settings(), &mut go_on).unwrap();
     assert_eq!(second.rows, at_once.rows);
     assert_eq!(second.policy, at_once.policy);
     std::fs::remove_dir_all(whole).unwrap();
@@ -159,9 +164,9 @@ fn an_interrupted_run_continues_to_the_same_end() {
 fn a_folder_is_continued_only_with_its_own_settings() {
     let folder = scratch("claimed");
     let mut stop = |_: &Progress<'_>| ControlFlow::Break(());
-    let outcome = run_in(&folder, &config(), &mut stop).unwrap();
+    let outcome = run_in(&folder, &settings(), &mut stop).unwrap();
     assert_eq!((outcome.stop, outcome.policy), (Stop::Interrupted, None));
-    let other = DaggerConfig { eta: 0.5, ..config() };
+    let other = DaggerSettings { eta: 0.5, ..settings() };
     let error = run_in(&folder, &other, &mut go_on).unwrap_err().to_string();
     assert!(error.contains("dagger.toml") && error.contains("other settings"), "{error}");
     std::fs::remove_dir_all(folder).unwrap();
@@ -170,14 +175,14 @@ fn a_folder_is_continued_only_with_its_own_settings() {
 #[test]
 fn eta_ends_the_iterations_and_a_final_fit_follows() {
     let folder = scratch("eta");
-    let config = DaggerConfig {
+    let settings = DaggerSettings {
         // The network always drives: η̂ = 1.
         rule: DecisionRule::TauOnly { tau: 2.0 },
         keep: Keep::EveryTick,
-        fit_final: Some(FitSettings { budget: Budget::Steps(3), ..config().fit_iteration }),
-        ..config()
+        fit_final: Some(FitSettings { budget: Budget::Steps(3), ..settings().fit_iteration }),
+        ..settings()
     };
-    let outcome = run_in(&folder, &config, &mut go_on).unwrap();
+    let outcome = run_in(&folder, &settings, &mut go_on).unwrap();
     assert_eq!(outcome.stop, Stop::EtaReached);
     assert_eq!(outcome.rows.len(), 2, "line 8 still trains on what line 6 collected");
     assert_eq!(outcome.rows[1].eta_hat, Some(1.0));
@@ -188,16 +193,16 @@ fn eta_ends_the_iterations_and_a_final_fit_follows() {
 
 #[test]
 fn presets_survive_toml() {
-    for config in [DaggerConfig::paper(), DaggerConfig::quick()] {
-        let text = toml::to_string(&config).unwrap();
-        assert_eq!(toml::from_str::<DaggerConfig>(&text).unwrap(), config);
+    for settings in [DaggerSettings::paper(), DaggerSettings::quick()] {
+        let text = toml::to_string(&settings).unwrap();
+        assert_eq!(toml::from_str::<DaggerSettings>(&text).unwrap(), settings);
     }
 }
 
 /// In DAgger, in a fleet and alone, with its memory and what it forgets when the car is put back.
 #[test]
 fn the_network_drives_the_same_whoever_seats_it() {
-    let network = LookAheadNetConfig { symmetric: true, memory_ticks: 8.0, ..config().network };
+    let network = LookAheadNetConfig { mirror_averaging: true, smoothing_ticks: 8.0, ..settings().network };
     let checkpoint = Checkpoint { weights: Weights::init(network, RootSeed(3), 0), geometry: GridGeometry::paper() };
     let drive = |fleet: &mut dyn Fleet| {
         let mut driven = Vec::new();
@@ -213,9 +218,9 @@ fn the_network_drives_the_same_whoever_seats_it() {
     let novice = Predictor::new(checkpoint.weights.clone(), device);
     let experts: Vec<Box<dyn Driver + Send>> = vec![Box::new(RouteFollower), Box::new(RouteFollower)];
     let always = DecisionRule::TauOnly { tau: 9.0 };
-    let mut arbiter = Arbiter::new(Some(novice), experts, always, Keep::EveryTick, checkpoint.geometry);
-    assert_eq!(drive(&mut arbiter).0, in_fleet);
-    let forgetful = LookAheadNetConfig { memory_ticks: 0.0, ..network };
+    let mut collector = GatedCollector::new(Some(novice), experts, always, Keep::EveryTick, checkpoint.geometry);
+    assert_eq!(drive(&mut collector).0, in_fleet);
+    let forgetful = LookAheadNetConfig { smoothing_ticks: 0.0, ..network };
     let weights = Weights::init(forgetful, RootSeed(3), 0);
     assert_ne!(drive(&mut NetFleet::new(Checkpoint { weights, ..checkpoint }, device)).0, in_fleet, "memory matters");
 }

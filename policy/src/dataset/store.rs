@@ -3,7 +3,7 @@
 //! ```text
 //! round-00/grids.npy        u8  [n, 25, 25]   1 = non-drivable, row 0 = far, column 0 = left
 //!          labels.npy       f32 [n, 3]        u, w, τ̂ (image fractions)
-//!          relooks.npz      u8  [n, k, 25, 25]  array `relooks`: the same scenes with other noise, if k > 0
+//!          noise_augmentations.npz      u8  [n, k, 25, 25]  array `noise_augmentations`: the same scenes with other noise, if k > 0
 //!          round.toml       how it was collected
 //!          model.safetensors, model.toml, fit.toml    the network trained after it
 //! round-01/…
@@ -42,8 +42,8 @@ impl StoreError {
 }
 
 const WRITE_REMEDY: &str = "check that the folder exists, is writable and has space";
-const RELOOKS: &str = "relooks.npz";
-const RELOOKS_ARRAY: &str = "relooks";
+const RELOOKS: &str = "noise_augmentations.npz";
+const RELOOKS_ARRAY: &str = "noise_augmentations";
 const READ_REMEDY: &str = "delete this round and all later ones to collect them again, or restore the file";
 
 /// The folder of one run.
@@ -110,14 +110,15 @@ impl Store {
         write_atomically(&partial.join("labels.npy"), |file| {
             labels.write_npy(file).map_err(|error| error.to_string())
         })?;
-        if !round.relooks.is_empty() {
-            let cells = round.relooks.iter().flat_map(OccupancyGrid::cells).collect();
-            let shape = [n, round.relooks.len() / n, GRID_CELLS, GRID_CELLS];
-            let relooks = Array4::from_shape_vec(shape, cells).expect("every sample has as many further looks");
+        if !round.noise_augmentations.is_empty() {
+            let cells = round.noise_augmentations.iter().flat_map(OccupancyGrid::cells).collect();
+            let shape = [n, round.noise_augmentations.len() / n, GRID_CELLS, GRID_CELLS];
+            let noise_augmentations =
+                Array4::from_shape_vec(shape, cells).expect("every sample has as many further looks");
             // k times as large as the grids: 20 times smaller when compressed.
             write_atomically(&partial.join(RELOOKS), |file| {
                 let mut archive = NpzWriter::new_compressed(file);
-                let written = archive.add_array(RELOOKS_ARRAY, &relooks).and_then(|()| archive.finish());
+                let written = archive.add_array(RELOOKS_ARRAY, &noise_augmentations).and_then(|()| archive.finish());
                 written.map(drop).map_err(|error| error.to_string())
             })?;
         }
@@ -133,8 +134,8 @@ impl Store {
         let folder = self.round_folder(index);
         let about = read_toml(&folder.join("round.toml"))?;
         let samples = self.read_samples(index)?;
-        let relooks = Self::read_relooks(&folder.join(RELOOKS), samples.len())?;
-        Ok((Round { samples, relooks }, about))
+        let noise_augmentations = Self::read_relooks(&folder.join(RELOOKS), samples.len())?;
+        Ok((Round { samples, noise_augmentations }, about))
     }
 
     /// Reads the samples of a round without the further looks at them.
@@ -244,7 +245,8 @@ pub(crate) mod tests {
         let folder = scratch("round");
         let store = Store::open(&folder).unwrap();
         let (mut round, about) = (round(33), About { collected_by: "expert".to_string() });
-        round.relooks = round.samples.iter().flat_map(|sample| [sample.grid.mirrored(), sample.grid]).collect();
+        round.noise_augmentations =
+            round.samples.iter().flat_map(|sample| [sample.grid.mirrored(), sample.grid]).collect();
         assert!(!store.has_round(0));
         store.write_round(0, &round, &about).unwrap();
         assert!(store.has_round(0));

@@ -11,8 +11,8 @@ fn tiny() -> LookAheadNetConfig {
         hidden: 40,
         dropout_features: 0.1,
         dropout_hidden: 0.2,
-        symmetric: false,
-        memory_ticks: 0.0,
+        mirror_averaging: false,
+        smoothing_ticks: 0.0,
     }
 }
 
@@ -142,7 +142,7 @@ fn nothing_to_learn_from_is_an_error() {
 #[test]
 fn every_sample_is_dealt_once_per_epoch() {
     let samples = round(50).samples;
-    let mut deck = Deck::new(&samples, Mirror::Off, RootSeed(4));
+    let mut deck = BatchSampler::new(&samples, Mirror::Off, RootSeed(4));
     let (mut first, mut second) = (Vec::new(), Vec::new());
     deck.deal(50, &mut first);
     deck.deal(50, &mut second);

@@ -122,7 +122,7 @@ impl Predictor {
     /// Raw outputs per grid: means of u and w, raw log-variances of both.
     pub fn raw(&mut self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
         let mut outputs = self.one_sided(grids);
-        if self.weights.config().symmetric {
+        if self.weights.config().mirror_averaging {
             let images: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
             let of_images = self.one_sided(&images.iter().collect::<Vec<_>>());
             for (output, [u, w, raw_u, raw_w]) in outputs.iter_mut().zip(of_images) {

@@ -6,7 +6,7 @@ use super::{CURVATURE_SHARE, DistanceToGo, Goal, NONE, Open, Scene, Search, Wayp
 use geo::{Coord, LineString, Simplify as _};
 use sim::geometry::{Pose, Vec2};
 use sim::scenario::{ReferencePath, Scenario};
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 use std::collections::{BTreeSet, BinaryHeap};
 
 /// Gives up after this many expansions: ten times what a generated lot may take, a few seconds.
@@ -74,7 +74,7 @@ pub fn find(
     ground: &Scenario,
     start: Pose,
     finish: Finish,
-    vehicle: &VehicleParams,
+    vehicle: &VehicleSettings,
     clearance_m: f32,
 ) -> Result<ReferencePath, NoRoute> {
     let scene = Scene::new(ground);
@@ -123,7 +123,7 @@ pub fn find(
 }
 
 /// Tightest radius of the rear axle that the search drives, metres.
-pub fn radius_min_m(vehicle: &VehicleParams) -> f32 {
+pub fn radius_min_m(vehicle: &VehicleSettings) -> f32 {
     1.0 / (CURVATURE_SHARE * vehicle.curvature_max_per_m())
 }
 

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// Strength of each layer, relative to the calibrated level `paper`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct NoiseConfig {
+pub struct NoiseSettings {
     /// Multiplies every layer: 0 = clean, 1 = `paper`, 2 = `hard`.
     pub intensity: f32,
     /// Ragged boundaries: the signed distance is shifted (both signs).
@@ -38,7 +38,7 @@ pub struct NoiseConfig {
     pub dropout: f32,
 }
 
-impl NoiseConfig {
+impl NoiseSettings {
     /// All layers at one level.
     pub fn of(level: NoiseLevel) -> Self {
         let intensity = match level {
@@ -98,7 +98,7 @@ const FLICKER_TICKS: u32 = 2;
 /// Probability that a frame repeats the last grid.
 const DROPOUT_PER_TICK: f32 = 0.002;
 
-/// What makes a part of the view wrong: the layers of [`NoiseConfig`].
+/// What makes a part of the view wrong: the layers of [`NoiseSettings`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Layer {
@@ -121,7 +121,7 @@ pub enum Layer {
 }
 
 impl Layer {
-    /// Every layer, in the order of [`NoiseConfig`].
+    /// Every layer, in the order of [`NoiseSettings`].
     pub const ALL: [Self; 8] = [
         Self::Boundary,
         Self::Shadow,
@@ -321,24 +321,24 @@ pub struct NoiseField {
 
 impl NoiseField {
     /// Draws the latents of an episode on a map. `cell_radius_m`: from the centre of a grid cell to its farthest pixel.
-    pub(super) fn new(map: &Map, config: &NoiseConfig, seed: RootSeed, cell_radius_m: f32) -> Self {
-        let amount = |layer: f32| config.intensity * layer;
+    pub(super) fn new(map: &Map, settings: &NoiseSettings, seed: RootSeed, cell_radius_m: f32) -> Self {
+        let amount = |layer: f32| settings.intensity * layer;
         let mut field = Self {
             seed: seed.child(Stream::Sensor, 0).0,
-            wobble: amount(config.boundary),
-            flicker: amount(config.flicker),
-            dropout: amount(config.dropout),
+            wobble: amount(settings.boundary),
+            flicker: amount(settings.flicker),
+            dropout: amount(settings.dropout),
             misread_as_occupied: Patches::default(),
             misread_as_free: Patches::default(),
             shadows: Vec::new(),
         };
         // One stream per layer: strengthening one layer never moves another.
         let rng = |layer: u64| seed.rng(Stream::Sensor, 1 + layer);
-        field.cast_shadows(map, amount(config.shadow), cell_radius_m, &mut rng(0));
-        field.misread_speed_bumps(map, amount(config.speed_bump), &mut rng(1));
-        field.open_boundaries(map, amount(config.false_free), &mut rng(2));
-        field.scatter_blobs(map, amount(config.blob), &mut rng(3));
-        field.spill_stains(map, amount(config.stain), &mut rng(4));
+        field.cast_shadows(map, amount(settings.shadow), cell_radius_m, &mut rng(0));
+        field.misread_speed_bumps(map, amount(settings.speed_bump), &mut rng(1));
+        field.open_boundaries(map, amount(settings.false_free), &mut rng(2));
+        field.scatter_blobs(map, amount(settings.blob), &mut rng(3));
+        field.spill_stains(map, amount(settings.stain), &mut rng(4));
         field.misread_as_occupied.arrange();
         field.misread_as_free.arrange();
         field

@@ -1,4 +1,4 @@
-//! The sensor of one episode: clean view → smear → noise → grid.
+//! The sensor of one episode: clean view → occlusion → noise → grid.
 
 mod inspect;
 mod openings;
@@ -7,9 +7,9 @@ pub use inspect::Inspection;
 
 use openings::Openings;
 
-use super::noise::{BoundaryShift, NoiseConfig, NoiseField, Patch, Reads, Region, Shadow, wobble_growth};
+use super::noise::{BoundaryShift, NoiseField, NoiseSettings, Patch, Reads, Region, Shadow, wobble_growth};
+use super::occlusion::{Camera, CellBox, ConvexInEgo, TallThing};
 use super::quadtree::{BLOCK_CELLS, BLOCKS, PixelLattice, ROW_LANES, pixels_of, to_corner_m};
-use super::smear::{Camera, CellBox, ConvexInEgo, TallThing};
 use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
 use crate::distance_field::{DistanceField, change_max_m};
 use crate::geometry::{Pose, Vec2, WorldFromEgo, bits};
@@ -21,28 +21,28 @@ use std::ops::Range;
 /// Settings of the sensor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SensingConfig {
+pub struct SensingSettings {
     /// Where the patch lies.
     pub geometry: GridGeometry,
     /// Whether tall things hide the ground behind them (methods.md 1.7).
-    pub smear: bool,
+    pub occlusion: bool,
     /// Camera ahead of the rear axle, metres (methods.md 9.2).
     pub camera_ahead_m: f32,
     /// Camera above ground, metres.
     pub camera_height_m: f32,
 }
 
-impl SensingConfig {
-    /// The paper's camera, smear on.
+impl SensingSettings {
+    /// The paper's camera, occlusion on.
     pub fn paper() -> Self {
-        Self { geometry: GridGeometry::paper(), smear: true, camera_ahead_m: 1.59, camera_height_m: 1.55 }
+        Self { geometry: GridGeometry::paper(), occlusion: true, camera_ahead_m: 1.59, camera_height_m: 1.55 }
     }
 }
 
 /// The sensor of one episode.
 #[derive(Debug, Clone)]
 pub struct Sensor {
-    config: SensingConfig,
+    settings: SensingSettings,
     noise: NoiseField,
     /// The noise's boundary wobble, with what was drawn of it for the last view.
     shift: BoundaryShift,
@@ -53,12 +53,12 @@ pub struct Sensor {
 
 impl Sensor {
     /// A sensor whose noise is drawn from `seed`.
-    pub fn new(map: &Map, config: SensingConfig, noise: &NoiseConfig, seed: RootSeed) -> Self {
-        let geometry = &config.geometry;
+    pub fn new(map: &Map, settings: SensingSettings, noise: &NoiseSettings, seed: RootSeed) -> Self {
+        let geometry = &settings.geometry;
         let noise = NoiseField::new(map, noise, seed, to_corner_m(geometry.pixel_m(), CELL_PIXELS));
         let ahead_of_patch_m = |row: usize| geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m;
         let wobble_growth = std::array::from_fn(|row| wobble_growth(ahead_of_patch_m(row)));
-        Self { shift: noise.boundary_shift(), wobble_growth, config, noise, last: None }
+        Self { shift: noise.boundary_shift(), wobble_growth, settings, noise, last: None }
     }
 
     /// What the car perceives from a pose at a tick.
@@ -73,11 +73,11 @@ impl Sensor {
 
     /// The perceived grid, without ever computing all 40 000 pixels.
     fn perceive_grid(&mut self, map: &Map, pose: Pose, tick: u32) -> OccupancyGrid {
-        let ego = EgoView::new(&self.config.geometry, pose);
+        let ego = EgoView::new(&self.settings.geometry, pose);
         let mut grid = self.beyond_boundaries(map, &ego, tick);
         self.hide_ground(map, &ego, &mut grid);
         for polygon in self.misread(&ego, tick) {
-            polygon.occupy(&self.config.geometry, &mut grid);
+            polygon.occupy(&self.settings.geometry, &mut grid);
         }
         self.darken(&ego, tick, &mut grid);
         grid
@@ -137,7 +137,7 @@ impl Sensor {
     /// The cells of a row of blocks whose blocks are wholly beyond a boundary however noise shifts it, bit = column, and
     /// columns of cells around all blocks that are not wholly on one side.
     fn look_at_blocks(&self, field: &DistanceField, ego: &EgoView, block_row: usize) -> (u32, Range<usize>) {
-        let within_m = change_max_m(to_corner_m(self.config.geometry.pixel_m(), BLOCK_CELLS * CELL_PIXELS));
+        let within_m = change_max_m(to_corner_m(self.settings.geometry.pixel_m(), BLOCK_CELLS * CELL_PIXELS));
         // Noise is largest far ahead.
         let sure_m = self.shift_max_m(block_row * BLOCK_CELLS) + within_m;
         let (drivable, beyond) = sides(&ego.lattice.nearest_nodes_of_blocks(field, block_row), sure_m, -sure_m);
@@ -173,7 +173,7 @@ impl Sensor {
 
     /// Marks the cells of which tall things hide a pixel.
     fn hide_ground(&self, map: &Map, ego: &EgoView, grid: &mut OccupancyGrid) {
-        let geometry = &self.config.geometry;
+        let geometry = &self.settings.geometry;
         for thing in self.occluders(map, ego) {
             // Most hidden ground lies beyond the lane, where everything is occupied already.
             let Some((low, high)) = thing.hidden_box() else { continue };
@@ -188,7 +188,7 @@ impl Sensor {
 
     /// Marks the cells that hold a misread pixel of a shadow.
     fn darken(&self, ego: &EgoView, tick: u32, grid: &mut OccupancyGrid) {
-        let geometry = &self.config.geometry;
+        let geometry = &self.settings.geometry;
         self.for_each_shadow(ego, tick, |polygon, shadow, threshold| {
             let Some(spans) = polygon.spans_of_free_cells(geometry, grid) else { return };
             let is_any_of_row_misread = |row: usize, cell_col: usize| {
@@ -217,7 +217,7 @@ impl Sensor {
     /// The perceived view in full resolution, by brute force. Its max-pool is the grid of [`Self::observe`], dropped
     /// frames excepted.
     pub fn perceived_view(&self, map: &Map, pose: Pose, tick: u32) -> BirdsEyeView {
-        let geometry = &self.config.geometry;
+        let geometry = &self.settings.geometry;
         let ego = EgoView::new(geometry, pose);
         let (mut open, mut covered) = (PixelRows::empty(), PixelRows::empty());
         for polygon in self.patches(&ego, tick, Reads::Free) {
@@ -252,12 +252,12 @@ impl Sensor {
         })
     }
 
-    /// The view a faultless segmentation would give: smear is geometry, not an error.
+    /// The view a faultless segmentation would give: occlusion is geometry, not an error.
     pub fn clean_view(&self, map: &Map, pose: Pose) -> BirdsEyeView {
-        let ego = EgoView::new(&self.config.geometry, pose);
+        let ego = EgoView::new(&self.settings.geometry, pose);
         let mut hidden = PixelRows::empty();
         for polygon in self.hidden_ground(map, &ego) {
-            polygon.for_each_row(&self.config.geometry, |row, first, last| hidden.set(row, first, last));
+            polygon.for_each_row(&self.settings.geometry, |row, first, last| hidden.set(row, first, last));
         }
         BirdsEyeView::from_fn(|row, col| {
             map.signed_distance_m(ego.lattice.point(row as f32, col as f32)) <= 0.0 || hidden.get(row, col)
@@ -270,7 +270,7 @@ impl Sensor {
     }
 
     fn flicker(&self, tick: u32) -> Option<ConvexInEgo> {
-        let geometry = &self.config.geometry;
+        let geometry = &self.settings.geometry;
         let (centre, side_m) = self.noise.flicker(tick, geometry.near_edge_ahead_m, geometry.side_m)?;
         Some(ConvexInEgo::new(crate::geometry::rectangle(Pose::new(centre, 0.0), side_m, side_m)))
     }
@@ -281,8 +281,8 @@ impl Sensor {
 
     /// Tall things around the patch as seen by the camera; none if ground is not hidden.
     fn occluders<'a>(&'a self, map: &'a Map, ego: &'a EgoView) -> impl Iterator<Item = TallThing> + 'a {
-        let camera = Camera { ahead_m: self.config.camera_ahead_m, height_m: self.config.camera_height_m };
-        let near = self.config.smear.then(|| map.occluders_near(ego.patch_centre, ego.patch_radius_m));
+        let camera = Camera { ahead_m: self.settings.camera_ahead_m, height_m: self.settings.camera_height_m };
+        let near = self.settings.occlusion.then(|| map.occluders_near(ego.patch_centre, ego.patch_radius_m));
         near.into_iter().flatten().map(move |occluder| {
             TallThing::new(&ego.world_from_ego.inverse_outline(&occluder.corners), occluder.height_m, camera)
         })
@@ -297,7 +297,7 @@ impl Sensor {
     }
 
     fn openings(&self, ego: &EgoView, tick: u32) -> Openings {
-        let geometry = &self.config.geometry;
+        let geometry = &self.settings.geometry;
         Openings::new(self.patches(ego, tick, Reads::Free).filter_map(|polygon| polygon.all_spans(geometry)).collect())
     }
 

@@ -3,10 +3,10 @@ use crate::lots::Lot;
 use crate::trials::Purpose;
 use sim::driver::{Decision, LookAheadPoint, Source};
 use sim::geometry::Vec2;
-use sim::scenario::{NoiseSettings, Obstacle, ObstacleClass, ReferencePath, Scenario};
+use sim::scenario::{LotNoise, Obstacle, ObstacleClass, ReferencePath, Scenario};
 use sim::seed::RootSeed;
 use sim::sensing::Observation;
-use sim::vehicle::{VehicleCommand, VehicleParams};
+use sim::vehicle::{VehicleCommand, VehicleSettings};
 
 /// 40 m straight on in a lane 4 m wide, then left; at 20 m two pillars leave 2.7 m.
 fn map() -> Map {
@@ -23,12 +23,12 @@ fn map() -> Map {
             points: points(&[(0.0, 0.0), (41.5, 0.0), (41.5, 30.0)]),
             corner_radius_m: 5.0,
         },
-        noise: NoiseSettings::default(),
+        noise: LotNoise::default(),
         islands: vec![],
         obstacles: vec![pillar(1.65), pillar(-1.65)],
         speed_bumps: vec![],
     };
-    Map::build(scenario, &VehicleParams::hyundai_hg300()).unwrap()
+    Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap()
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn widths_and_turns_are_those_of_the_drawing() {
 
 #[test]
 fn the_first_rule_that_holds_is_the_cause() {
-    let config = EpisodeConfig::paper();
+    let episode = EpisodeSettings::paper();
     // 1.86 m of car and 0.5 m on both sides are 2.86 m.
     let all = Findings {
         passes_on_clean_grid: Some(true),
@@ -53,7 +53,7 @@ fn the_first_rule_that_holds_is_the_cause() {
         turn_deg: 30.0,
         since_resume_m: None,
     };
-    let cause = |findings: Findings, noisy| findings.cause(noisy, &config);
+    let cause = |findings: Findings, noisy| findings.cause(noisy, &episode);
     assert_eq!(cause(all, true), Cause::NoiseInduced);
     assert_eq!(cause(all, false), Cause::Oscillation, "no noise to blame");
     let clean = Findings { passes_on_clean_grid: Some(false), ..all };
@@ -89,7 +89,7 @@ fn frame(tick: u32, steering_deg: f32, event: Event) -> Frame {
 #[test]
 fn the_watch_looks_back_six_seconds_and_not_beyond_a_resume() {
     let near = Event::NearCollision { at: Pose::default(), progress_m: 1.0 };
-    let mut watch = Watch::new(2, &EpisodeConfig::paper());
+    let mut watch = IncidentMonitor::new(2, &EpisodeSettings::paper());
     // 200 ticks of weaving with a period of 40 ticks = 2 s: two reversals in each.
     for tick in 0..200 {
         let steering_deg = if tick / 20 % 2 == 0 { 5.0 } else { -5.0 };
@@ -97,15 +97,15 @@ fn the_watch_looks_back_six_seconds_and_not_beyond_a_resume() {
     }
     watch.frame(1, &frame(200, 0.0, Event::Drove));
     watch.frame(1, &frame(201, 0.0, near));
-    let sightings = watch.into_sightings();
-    assert_eq!(sightings.iter().map(|sighting| sighting.tick).collect::<Vec<_>>(), [199, 201]);
+    let incidents = watch.into_incidents();
+    assert_eq!(incidents.iter().map(|incident| incident.tick).collect::<Vec<_>>(), [199, 201]);
     // 6 s are 120 ticks before the last one.
-    assert!((sightings[0].earlier.1 - 0.1 * 79.0).abs() < 1e-4, "{:?}", sightings[0]);
+    assert!((incidents[0].earlier.1 - 0.1 * 79.0).abs() < 1e-4, "{:?}", incidents[0]);
     // The last 100 ticks hold five half-periods; the first change of direction is where the count starts.
-    assert_eq!(sightings[0].reversals_before, 3);
-    assert_eq!((sightings[1].earlier.1, sightings[1].reversals_before), (20.0, 0));
+    assert_eq!(incidents[0].reversals_before, 3);
+    assert_eq!((incidents[1].earlier.1, incidents[1].reversals_before), (20.0, 0));
     // Put back at 20.0 m of route, the second one happens at 1.0 m (as written above).
-    assert_eq!((sightings[0].since_resume_m, sightings[1].since_resume_m), (None, Some(-19.0)));
+    assert_eq!((incidents[0].since_resume_m, incidents[1].since_resume_m), (None, Some(-19.0)));
 }
 
 /// The expert does not look at the grid, so noise cannot be blamed: put where it was in a run of its own, it passes
@@ -114,11 +114,11 @@ fn the_watch_looks_back_six_seconds_and_not_beyond_a_resume() {
 fn a_driver_that_can_pass_passes_on_the_clean_grid() {
     let settings = Settings::preset("smoke").unwrap();
     let lots = Lot::parse_all(&["lot-b"]).unwrap();
-    let jobs: Vec<Job<'_>> = Job::all(RootSeed(1), Purpose::Evaluation, &lots, 1, &[Direction::Forward]).collect();
+    let jobs: Vec<Trial<'_>> = Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 1, &[Direction::Forward]).collect();
     let maps = trials::maps(&jobs, &settings).unwrap();
-    let contestant = Contestant::expert();
+    let contestant = DriverSpec::expert();
     let noise = NoiseChoice::Paper;
-    let group = Group { settings: &settings, contestant: &contestant, jobs: &jobs, maps: &maps, noise };
+    let group = TrialBatch { settings: &settings, contestant: &contestant, jobs: &jobs, maps: &maps, noise };
 
     let episodes = trials::start(&jobs, &maps, &settings, noise);
     let mut met = None;
@@ -131,7 +131,7 @@ fn a_driver_that_can_pass_passes_on_the_clean_grid() {
         ControlFlow::Break(())
     });
     let (vehicle, progress_m) = met.unwrap();
-    let sighting = |vehicle: VehicleState| Sighting {
+    let incident = |vehicle: VehicleState| Incident {
         episode: 0,
         tick: 500,
         at: vehicle.pose,
@@ -144,8 +144,8 @@ fn a_driver_that_can_pass_passes_on_the_clean_grid() {
     };
     let heading_rad = vehicle.pose.heading_rad + std::f32::consts::FRAC_PI_2;
     let across = VehicleState::at_rest(Pose { heading_rad, ..vehicle.pose });
-    let explained = group.explain(&[sighting(vehicle), sighting(across)], true);
+    let explained = group.explain(&[incident(vehicle), incident(across)], true);
     assert_eq!(explained[0].0, Cause::NoiseInduced, "{explained:?}");
     assert_eq!(explained[1].1.passes_on_clean_grid, Some(false), "it faces a wall: {explained:?}");
-    assert_eq!(group.explain(&[sighting(vehicle)], false)[0].1.passes_on_clean_grid, None);
+    assert_eq!(group.explain(&[incident(vehicle)], false)[0].1.passes_on_clean_grid, None);
 }

@@ -1,7 +1,7 @@
 //! Grids and views as the driver sees them: far is up, left is left.
 
 use super::drawing::{Drawing, Font, Rgb};
-use super::lot::{Entry, INK};
+use super::lot::{INK, NamedDriver};
 use super::trajectories::rgb;
 use sim::driver::{LookAheadPoint, Spread};
 use sim::geometry::Vec2;
@@ -123,7 +123,7 @@ pub fn draw_label(drawing: &mut Drawing, point: LookAheadPoint, geometry: &GridG
 }
 
 /// Swatches with small letters, in rows that fit into a width; returns their height, pixels.
-pub fn draw_small_legend(drawing: &mut Drawing, at: Vec2, width_px: f32, entries: &[Entry]) -> f32 {
+pub fn draw_small_legend(drawing: &mut Drawing, at: Vec2, width_px: f32, entries: &[NamedDriver]) -> f32 {
     let (places, height_px) = small_legend(width_px, entries);
     for ((rgb, name), place) in entries.iter().zip(places) {
         drawing.rectangle(at + place + Vec2::new(0.0, 2.0), Vec2::splat(14.0), *rgb);
@@ -133,10 +133,10 @@ pub fn draw_small_legend(drawing: &mut Drawing, at: Vec2, width_px: f32, entries
 }
 
 /// Where the entries of a small legend stand, and its height, pixels.
-pub fn small_legend(width_px: f32, entries: &[Entry]) -> (Vec<Vec2>, f32) {
+pub fn small_legend(width_px: f32, entries: &[NamedDriver]) -> (Vec<Vec2>, f32) {
     let line = Font::Small.height_px() + 6.0;
     let mut next = Vec2::ZERO;
-    let place = |(_, name): &Entry| {
+    let place = |(_, name): &NamedDriver| {
         let needed = 20.0 + Font::Small.width_px(name);
         if next.x > 0.0 && next.x + needed > width_px {
             next = Vec2::new(0.0, next.y + line);

@@ -4,7 +4,7 @@ use super::drawing::{Drawing, Font, Rgb};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::scenario::{Obstacle, ObstacleClass};
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 
 /// Around the lot, metres.
 const MARGIN_M: f32 = 3.0;
@@ -104,7 +104,7 @@ impl View {
 ///
 /// # Errors
 /// If the picture would be too large.
-pub fn top_view(map: &Map, vehicle: &VehicleParams, px_per_m: Option<f32>) -> anyhow::Result<Drawing> {
+pub fn top_view(map: &Map, vehicle: &VehicleSettings, px_per_m: Option<f32>) -> anyhow::Result<Drawing> {
     let view = View::of_map(map, px_per_m);
     let legend = legend_of(map);
     let lot = view.size_px();
@@ -179,13 +179,13 @@ fn lighter(rgb: Rgb) -> Rgb {
 }
 
 /// Outline of the car with its rear axle at a pose.
-pub fn draw_car(drawing: &mut Drawing, view: &View, vehicle: &VehicleParams, pose: Pose, rgb: Rgb, width_px: f32) {
+pub fn draw_car(drawing: &mut Drawing, view: &View, vehicle: &VehicleSettings, pose: Pose, rgb: Rgb, width_px: f32) {
     let world_from_ego = pose.world_from_ego();
     let body = vehicle.body_in_ego().map(|corner| world_from_ego.point(corner));
     drawing.outline(view.pixels(body), rgb, width_px);
 }
 
-fn draw_route(drawing: &mut Drawing, view: &View, map: &Map, vehicle: &VehicleParams) {
+fn draw_route(drawing: &mut Drawing, view: &View, map: &Map, vehicle: &VehicleSettings) {
     let path = map.path();
     drawing.dashed(view.pixels(path.poses().iter().map(|pose| pose.position())), ROUTE, 2.5, [12.0, 8.0]);
     let mut at_m = 12.0;
@@ -237,10 +237,10 @@ pub fn shortened(text: &str, letters: usize) -> String {
 }
 
 /// A colour and what it stands for.
-pub type Entry = (Rgb, String);
+pub type NamedDriver = (Rgb, String);
 
 /// Colours and names of what is in the lot, with counts.
-fn legend_of(map: &Map) -> Vec<Entry> {
+fn legend_of(map: &Map) -> Vec<NamedDriver> {
     let scenario = map.scenario();
     let classes = ObstacleClass::ALL.into_iter().filter_map(|class| {
         let count = scenario.obstacles.iter().filter(|obstacle| obstacle.class == class).count();
@@ -265,7 +265,7 @@ fn entry_px(name: &str) -> f32 {
 }
 
 /// Ranges of legend entries per row.
-pub fn layout(legend: &[Entry], width_px: f32) -> Vec<std::ops::Range<usize>> {
+pub fn layout(legend: &[NamedDriver], width_px: f32) -> Vec<std::ops::Range<usize>> {
     let mut rows = Vec::new();
     let (mut from, mut used_px) = (0, 16.0);
     for (index, (_, name)) in legend.iter().enumerate() {
@@ -280,7 +280,7 @@ pub fn layout(legend: &[Entry], width_px: f32) -> Vec<std::ops::Range<usize>> {
 }
 
 /// Swatches with names, in rows from [`layout`].
-pub fn draw_legend(drawing: &mut Drawing, legend: &[Entry], rows: &[std::ops::Range<usize>], top_px: f32) {
+pub fn draw_legend(drawing: &mut Drawing, legend: &[NamedDriver], rows: &[std::ops::Range<usize>], top_px: f32) {
     for (index, row) in rows.iter().enumerate() {
         let y = top_px + index as f32 * LINE_PX;
         let mut x = 16.0;

@@ -4,7 +4,7 @@ use super::*;
 use sim::driver::{LookAheadPoint, Source, Spread};
 use sim::geometry::Vec2;
 use sim::sensing::{GRID_CELLS, GridGeometry, OccupancyGrid};
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 use tiny_skia::Pixmap;
 
 fn at(pixmap: &Pixmap, place: Vec2) -> Rgb {
@@ -14,7 +14,7 @@ fn at(pixmap: &Pixmap, place: Vec2) -> Rgb {
 
 fn map_of(spec: &str) -> Map {
     let lots = Lot::parse_all(&[spec]).unwrap();
-    let job = Job::all(RootSeed(1), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next().unwrap();
+    let job = Trial::all(RootSeed(1), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next().unwrap();
     job.map(&Settings::preset("default").unwrap().episode).unwrap()
 }
 
@@ -59,7 +59,7 @@ fn pictures_that_cannot_be_are_refused() {
 #[test]
 fn a_top_view_shows_the_ground_where_it_is() {
     let map = map_of("lot-b");
-    let vehicle = VehicleParams::hyundai_hg300();
+    let vehicle = VehicleSettings::hyundai_hg300();
     let drawing = lot::top_view(&map, &vehicle, Some(6.0)).unwrap();
     let (view, pixmap) = (View::of_map(&map, Some(6.0)), drawing.pixmap());
     assert_eq!(pixmap.width(), (view.size_m.x * 6.0) as u32);
@@ -155,7 +155,7 @@ fn a_contact_sheet_has_a_tile_per_lot() {
 fn noise_is_shown_per_level() {
     let settings = Settings::preset("default").unwrap();
     let lots = Lot::parse_all(&["lot-a"]).unwrap();
-    let job = Job::all(RootSeed(1), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next().unwrap();
+    let job = Trial::all(RootSeed(1), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next().unwrap();
     let map = job.map(&settings.episode).unwrap();
     let inspected = |noise: NoiseChoice| (noise.name(), inspect(&settings, &job, &map, noise, 60.0));
     let levels = [inspected(NoiseChoice::Clean), inspected(NoiseChoice::Hard)];

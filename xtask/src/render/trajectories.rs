@@ -1,7 +1,7 @@
 //! Drives over a lot, coloured by speed or by who drove.
 
 use super::drawing::{Drawing, Rgb};
-use super::lot::{self, Entry, LINE_PX, View};
+use super::lot::{self, LINE_PX, NamedDriver, View};
 use crate::plots::style::colour;
 use sim::driver::Source;
 use sim::episode::{Event, Frame};
@@ -166,9 +166,9 @@ pub fn cross(drawing: &mut Drawing, at: Vec2) {
     }
 }
 
-fn legend(trajectories: &[Trajectory], by: ColourBy) -> Vec<Entry> {
+fn legend(trajectories: &[Trajectory], by: ColourBy) -> Vec<NamedDriver> {
     let points = || trajectories.iter().flat_map(|trajectory| &trajectory.points);
-    let mut legend: Vec<Entry> = match by {
+    let mut legend: Vec<NamedDriver> = match by {
         ColourBy::Speed => [0.0, 0.5, 1.0, 1.5, 2.0].map(|mps| (of_speed(mps), format!("{mps:.1} m/s"))).to_vec(),
         ColourBy::Driver => {
             let near =

@@ -7,7 +7,7 @@ use crate::evaluate::Plan;
 use crate::failures::Cause;
 use crate::paper;
 use crate::report::{difference, exact_rate};
-use crate::summary::{Comparison, Ledger, Scope, Totals};
+use crate::summary::{Comparison, EvaluationResults, Slice, Totals};
 use policy::dagger::IterationRow;
 use serde::Serialize;
 use statistics::bootstrap::Interval;
@@ -74,7 +74,7 @@ pub struct Driven<'a> {
     /// What.
     pub plan: &'a Plan<'a>,
     /// What came of it.
-    pub ledger: &'a Ledger,
+    pub results: &'a EvaluationResults,
 }
 
 impl Driven<'_> {
@@ -84,31 +84,31 @@ impl Driven<'_> {
     }
 
     /// All lots together.
-    pub fn all(&self) -> Scope {
-        Scope::all_of(self.ledger).pop().expect("at least one lot is driven")
+    pub fn all(&self) -> Slice {
+        Slice::all_of(self.results).pop().expect("at least one lot is driven")
     }
 
     /// The lots nobody was trained on; `None` if that is all or nothing.
-    pub fn unseen(&self) -> Option<Scope> {
-        let families = self.ledger.families();
+    pub fn unseen(&self) -> Option<Slice> {
+        let families = self.results.families();
         let unseen: Vec<&str> =
             families.iter().filter(|family| !family.is_trained_on).map(|family| family.name.as_str()).collect();
         (unseen.len() < families.len()).then_some(())?;
-        let scopes = Scope::all_of(self.ledger);
+        let slices = Slice::all_of(self.results);
         match unseen[..] {
             [] => None,
             [_] => {
-                (0..).zip(families).find(|(_, f)| !f.is_trained_on).and_then(|(i, _)| scopes.get(i as usize).cloned())
+                (0..).zip(families).find(|(_, f)| !f.is_trained_on).and_then(|(i, _)| slices.get(i as usize).cloned())
             }
-            _ => scopes.into_iter().find(|scope| scope.label == "unseen"),
+            _ => slices.into_iter().find(|slice| slice.label == "unseen"),
         }
     }
 
-    /// How all drivers compare with DAgger in a scope; `None` where it did not drive.
-    pub fn against_dagger(&self, scope: Scope, place: &str) -> Option<Against<'_>> {
+    /// How all drivers compare with DAgger in a slice; `None` where it did not drive.
+    pub fn against_dagger(&self, slice: Slice, place: &str) -> Option<Against<'_>> {
         let dagger = self.driver(DAGGER)?;
-        let (_, comparisons) = self.ledger.judge(0, &scope, dagger, self.plan.settings.evaluation.seed);
-        Some(Against { driven: *self, dagger, scope, place: place.to_owned(), comparisons })
+        let (_, comparisons) = self.results.judge(0, &slice, dagger, self.plan.settings.evaluation.seed);
+        Some(Against { driven: *self, dagger, slice, place: place.to_owned(), comparisons })
     }
 }
 
@@ -117,7 +117,7 @@ impl Driven<'_> {
 pub struct Against<'a> {
     driven: Driven<'a>,
     dagger: usize,
-    scope: Scope,
+    slice: Slice,
     /// The lots, as in "on the paper's lots".
     place: String,
     /// Differences are theirs − DAgger's.
@@ -154,7 +154,7 @@ impl Against<'_> {
     }
 
     fn totals(&self, driver: usize) -> Totals {
-        self.driven.ledger.totals(0, driver, &self.scope, None)
+        self.driven.results.totals(0, driver, &self.slice, None)
     }
 
     /// `None` also with too few runs to decide by.
@@ -224,7 +224,7 @@ impl Against<'_> {
     /// Near-collisions that the same driver avoids on the clean grid. They are few: compared exactly, without pairs.
     fn minds_noise_less(&self, other: usize) -> Statement {
         let count = |driver| {
-            let noisy = self.driven.ledger.count_of_cause(0, driver, &self.scope, Cause::NoiseInduced);
+            let noisy = self.driven.results.count_of_cause(0, driver, &self.slice, Cause::NoiseInduced);
             (noisy, self.totals(driver).reference_m / 100.0)
         };
         let name = self.name(other);
@@ -251,7 +251,7 @@ impl Against<'_> {
         let name = self.name(planner);
         let of_paper = paper::DRIVERS.iter().position(|known| *known == name)?;
         let (events, metres) = paper::count(of_paper, |_| true);
-        let families = self.driven.ledger.families();
+        let families = self.driven.results.families();
         let has_all = paper::LOTS.iter().all(|lot| families.iter().any(|family| family.name == lot.lot));
         let ours = (has_all && families.len() == paper::LOTS.len()).then(|| self.totals(planner))?;
         let ratio = RateRatio::new((ours.near_collisions, ours.reference_m / 100.0), (events, metres / 100.0));

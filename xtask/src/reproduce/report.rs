@@ -4,14 +4,14 @@ use super::Recipe;
 use super::conclusions::{self, Against, Driven, Statement, Verdict};
 use super::stages::{self, Chain, Stage, Step, named};
 use super::watched::{Calibration, Effect, States, Watched};
-use crate::evaluate::{Entry, Plan};
+use crate::evaluate::{NamedDriver, Plan};
 use crate::lots::Lot;
 use crate::page::{Image, Page};
 use crate::paper::{self, PaperLot};
 use crate::plots::{self, AxisCalibration, Bar, BarGroup, EtaSeries, RateRow};
 use crate::report::{csv_of, difference, exact_rate, quoted_rate, table_of};
 use crate::run_dir::RunDir;
-use crate::summary::{Ledger, Scope};
+use crate::summary::{EvaluationResults, Slice};
 use anyhow::Context as _;
 use policy::dagger::IterationRow;
 use serde::{Deserialize, Serialize};
@@ -35,7 +35,7 @@ fn rows_of(root: &Path, chain: Chain, seed: RootSeed) -> anyhow::Result<Vec<Iter
 /// A stage that drove, read back.
 struct Drive<'a> {
     stage: &'a Stage,
-    entries: Vec<Entry>,
+    entries: Vec<NamedDriver>,
     lots: Vec<Lot>,
 }
 
@@ -64,10 +64,13 @@ pub(super) fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
         [stages::REFERENCE, stages::UNSEEN, stages::RULES].map(|folder| Drive::open(recipe, folder));
     let (reference, unseen, rules) = (reference?, unseen?, rules?);
     let plans = [reference.plan(), unseen.plan(), rules.plan()];
-    let ledger = |plan: &Plan<'_>, folder: &str| Ledger::read(plan, &root.join(folder));
-    let ledgers =
-        [ledger(&plans[0], stages::REFERENCE)?, ledger(&plans[1], stages::UNSEEN)?, ledger(&plans[2], stages::RULES)?];
-    let [reference, unseen, rules] = [0, 1, 2].map(|i| Driven { plan: &plans[i], ledger: &ledgers[i] });
+    let results = |plan: &Plan<'_>, folder: &str| EvaluationResults::read(plan, &root.join(folder));
+    let ledgers = [
+        results(&plans[0], stages::REFERENCE)?,
+        results(&plans[1], stages::UNSEEN)?,
+        results(&plans[2], stages::RULES)?,
+    ];
+    let [reference, unseen, rules] = [0, 1, 2].map(|i| Driven { plan: &plans[i], results: &ledgers[i] });
     let watched = Watched::read(&root.join(stages::WATCHED))?;
     let rows = |chain| rows_of(root, chain, settings.seed);
     let (weighted, unweighted) = (rows(Chain::Weighted)?, rows(Chain::Unweighted)?);
@@ -204,17 +207,17 @@ fn table_1(page: &mut Page, eta: f64, weighted: &[IterationRow], unweighted: &[I
 /// Lots as columns, as in the paper: families, then what is pooled.
 fn by_lot(
     driven: &Driven<'_>,
-    cell: &dyn Fn(usize, &Scope) -> String,
+    cell: &dyn Fn(usize, &Slice) -> String,
     paper: &dyn Fn(usize, &str) -> String,
 ) -> String {
-    let scopes = Scope::all_of(driven.ledger);
-    let header: Vec<&str> = std::iter::once("driver").chain(scopes.iter().map(|scope| scope.label.as_str())).collect();
+    let slices = Slice::all_of(driven.results);
+    let header: Vec<&str> = std::iter::once("driver").chain(slices.iter().map(|slice| slice.label.as_str())).collect();
     let mut table = table_of(&header);
     for (driver, entry) in driven.plan.entries.iter().enumerate() {
         let name = &entry.contestant.name;
-        table.add_row(std::iter::once(name.clone()).chain(scopes.iter().map(|scope| cell(driver, scope))));
+        table.add_row(std::iter::once(name.clone()).chain(slices.iter().map(|slice| cell(driver, slice))));
         if let Some(of_paper) = paper::DRIVERS.iter().position(|known| known == name) {
-            let cells: Vec<String> = scopes.iter().map(|scope| paper(of_paper, &scope.label)).collect();
+            let cells: Vec<String> = slices.iter().map(|slice| paper(of_paper, &slice.label)).collect();
             if cells.iter().any(|cell| !cell.is_empty()) {
                 table.add_row(std::iter::once(format!("  paper: {name}")).chain(cells));
             }
@@ -223,7 +226,7 @@ fn by_lot(
     table.to_string()
 }
 
-/// Near-collisions and metres of a driver of the paper on a lot, or on those that a pooled scope stands for.
+/// Near-collisions and metres of a driver of the paper on a lot, or on those that a pooled slice stands for.
 fn count_of_paper(driver: usize, label: &str) -> Option<(u32, f64)> {
     let count = paper::count(driver, |lot| match label {
         "all" => true,
@@ -234,13 +237,13 @@ fn count_of_paper(driver: usize, label: &str) -> Option<(u32, f64)> {
 }
 
 fn rates_table(driven: &Driven<'_>, with_paper: bool) -> String {
-    let judged = |scope: &Scope| driven.ledger.judge(0, scope, 0, driven.plan.settings.evaluation.seed).0;
-    let standings: Vec<_> = Scope::all_of(driven.ledger).iter().map(judged).collect();
-    let scopes = Scope::all_of(driven.ledger);
-    let cell = |driver: usize, scope: &Scope| {
-        let totals = driven.ledger.totals(0, driver, scope, None);
-        let index = scopes.iter().position(|known| known == scope).expect("one of them");
-        format!("{}: {}", totals.near_collisions, quoted_rate(&totals, &standings[index][driver]))
+    let judged = |slice: &Slice| driven.results.judge(0, slice, 0, driven.plan.settings.evaluation.seed).0;
+    let estimates: Vec<_> = Slice::all_of(driven.results).iter().map(judged).collect();
+    let slices = Slice::all_of(driven.results);
+    let cell = |driver: usize, slice: &Slice| {
+        let totals = driven.results.totals(0, driver, slice, None);
+        let index = slices.iter().position(|known| known == slice).expect("one of them");
+        format!("{}: {}", totals.near_collisions, quoted_rate(&totals, &estimates[index][driver]))
     };
     let of_paper = |driver: usize, label: &str| {
         let count = count_of_paper(driver, label).filter(|_| with_paper);
@@ -259,8 +262,8 @@ fn collision_rates(page: &mut Page, driven: &Driven<'_>) {
     );
     let rates = bars_beside_paper(
         driven,
-        &|driver, scope| {
-            let rate = driven.ledger.totals(0, driver, scope, None).rate();
+        &|driver, slice| {
+            let rate = driven.results.totals(0, driver, slice, None).rate();
             (rate.per_unit, Some([rate.lower, rate.upper]))
         },
         &|driver, lot| {
@@ -283,15 +286,15 @@ type Height = (f64, Option<[f64; 2]>);
 /// The paper's drivers on its lots, as far as they were driven: its bar, then ours.
 fn bars_beside_paper(
     driven: &Driven<'_>,
-    ours: &dyn Fn(usize, &Scope) -> Height,
+    ours: &dyn Fn(usize, &Slice) -> Height,
     theirs: &dyn Fn(usize, &PaperLot) -> Height,
 ) -> Vec<BarGroup> {
-    let scopes = Scope::all_of(driven.ledger);
-    let lots = paper::LOTS.iter().filter_map(|lot| Some((lot, scopes.iter().find(|scope| scope.label == lot.lot)?)));
-    let group = |(lot, scope): (&PaperLot, &Scope)| {
+    let slices = Slice::all_of(driven.results);
+    let lots = paper::LOTS.iter().filter_map(|lot| Some((lot, slices.iter().find(|slice| slice.label == lot.lot)?)));
+    let group = |(lot, slice): (&PaperLot, &Slice)| {
         let bars = paper::DRIVERS.into_iter().enumerate().flat_map(|(driver, name)| {
             let bar = |(value, interval): Height, is_papers| Bar { driver, value, interval, is_papers };
-            let ours = driven.driver(name).map(|index| bar(ours(index, scope), false));
+            let ours = driven.driver(name).map(|index| bar(ours(index, slice), false));
             std::iter::once(bar(theirs(driver, lot), true)).chain(ours)
         });
         BarGroup { name: lot.lot.to_owned(), bars: bars.collect() }
@@ -301,9 +304,9 @@ fn bars_beside_paper(
 
 /// A row per driver, its lots together.
 fn rates_of_all(driven: &Driven<'_>) -> String {
-    let scope = driven.all();
-    let row = |(driver, entry): (usize, &Entry)| {
-        let totals = driven.ledger.totals(0, driver, &scope, None);
+    let slice = driven.all();
+    let row = |(driver, entry): (usize, &NamedDriver)| {
+        let totals = driven.results.totals(0, driver, &slice, None);
         let rate = totals.rate();
         let name = entry.contestant.name.clone();
         let group = match name.as_str() {
@@ -315,18 +318,18 @@ fn rates_of_all(driven: &Driven<'_>) -> String {
         RateRow { name, per_100m: rate.per_unit, interval: [rate.lower, rate.upper], group }
     };
     let rows: Vec<RateRow> = driven.plan.entries.iter().enumerate().map(row).collect();
-    plots::rates(&format!("Near-collisions, {}", scope.label), &rows)
+    plots::rates(&format!("Near-collisions, {}", slice.label), &rows)
 }
 
 fn safe_ratios(page: &mut Page, driven: &Driven<'_>) {
-    let scopes = Scope::all_of(driven.ledger);
+    let slices = Slice::all_of(driven.results);
     let seed = driven.plan.settings.evaluation.seed;
-    let standings: Vec<_> = scopes.iter().map(|scope| driven.ledger.judge(0, scope, 0, seed).0).collect();
-    let cell = |driver: usize, scope: &Scope| {
-        let index = scopes.iter().position(|known| known == scope).expect("one of them");
-        let interval = standings[index][driver].safe_ratio;
+    let estimates: Vec<_> = slices.iter().map(|slice| driven.results.judge(0, slice, 0, seed).0).collect();
+    let cell = |driver: usize, slice: &Slice| {
+        let index = slices.iter().position(|known| known == slice).expect("one of them");
+        let interval = estimates[index][driver].safe_ratio;
         let interval = interval.map_or_else(String::new, |i| format!(" [{:.3}, {:.3}]", i.lower, i.upper));
-        format!("{:.3}{interval}", driven.ledger.totals(0, driver, scope, None).safe_ratio())
+        format!("{:.3}{interval}", driven.results.totals(0, driver, slice, None).safe_ratio())
     };
     let of_paper = |driver: usize, label: &str| {
         let lot = paper::LOTS.iter().find(|lot| lot.lot == label);
@@ -336,10 +339,10 @@ fn safe_ratios(page: &mut Page, driven: &Driven<'_>) {
     page.section("Safe ratios on the paper's lots", format!("{text}\n\n{}", by_lot(driven, &cell, &of_paper)));
     let ratios = bars_beside_paper(
         driven,
-        &|driver, scope| {
-            let index = scopes.iter().position(|known| known == scope).expect("one of them");
-            let interval = standings[index][driver].safe_ratio.map(|interval| [interval.lower, interval.upper]);
-            (driven.ledger.totals(0, driver, scope, None).safe_ratio(), interval)
+        &|driver, slice| {
+            let index = slices.iter().position(|known| known == slice).expect("one of them");
+            let interval = estimates[index][driver].safe_ratio.map(|interval| [interval.lower, interval.upper]);
+            (driven.results.totals(0, driver, slice, None).safe_ratio(), interval)
         },
         &|driver, lot| (lot.results[driver].safe_ratio, None),
     );
@@ -370,13 +373,13 @@ fn decision_rules(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::R
         "then driving: near-collisions",
         "safe ratio",
     ]);
-    let scope = driven.all();
+    let slice = driven.all();
     let chains = [Chain::Weighted, Chain::AnyBelow, Chain::TauOnly];
     for (driver, chain) in chains.into_iter().enumerate() {
         let rows = rows_of(root, chain, seed)?;
         let first = rows.get(1);
         let cell = |of: fn(&IterationRow) -> Option<String>| first.and_then(of).unwrap_or_else(|| "–".to_owned());
-        let totals = driven.ledger.totals(0, driver, &scope, None);
+        let totals = driven.results.totals(0, driver, &slice, None);
         table.add_row([
             driven.plan.entries[driver].contestant.name.clone(),
             cell(|row| Some(row.samples.to_string())),
@@ -400,12 +403,12 @@ fn weight_and_cloning(driven: &Driven<'_>) -> String {
     let pairs = [("BC", "DAgger"), ("DAgger, α = 0", "DAgger")];
     for (name, with) in pairs {
         let (Some(driver), Some(with_index)) = (driven.driver(name), driven.driver(with)) else { continue };
-        for scope in Scope::all_of(driven.ledger) {
-            let (_, comparisons) = driven.ledger.judge(0, &scope, with_index, seed);
+        for slice in Slice::all_of(driven.results) {
+            let (_, comparisons) = driven.results.judge(0, &slice, with_index, seed);
             let Some(found) = comparisons.into_iter().find(|comparison| comparison.driver == driver) else { continue };
             table.add_row([
                 format!("{name} − {with}"),
-                scope.label.clone(),
+                slice.label.clone(),
                 difference(found.difference_per_100m, 2),
                 difference(found.difference_safe_ratio, 3),
             ]);
@@ -466,10 +469,10 @@ fn training_seeds(recipe: &Recipe, reference: &Driven<'_>, unseen: &Driven<'_>) 
     for base in ["BC", "DAgger", "DAgger, α = 0"] {
         for seed in stages::seeds(&recipe.settings, &recipe.extent) {
             let name = named(base, seed, &recipe.settings);
-            let cell = |driven: &Driven<'_>, scope: Option<Scope>| {
-                let found = driven.driver(&name).zip(scope);
-                found.map_or_else(String::new, |(driver, scope)| {
-                    let totals = driven.ledger.totals(0, driver, &scope, None);
+            let cell = |driven: &Driven<'_>, slice: Option<Slice>| {
+                let found = driven.driver(&name).zip(slice);
+                found.map_or_else(String::new, |(driver, slice)| {
+                    let totals = driven.results.totals(0, driver, &slice, None);
                     format!("{}: {}", totals.near_collisions, exact_rate(totals.near_collisions, totals.reference_m))
                 })
             };

@@ -14,8 +14,8 @@
 
 use crate::lots::Lot;
 use crate::settings::Settings;
-use policy::baselines::Baseline;
-use policy::dagger::DaggerConfig;
+use planners::Baseline;
+use policy::dagger::DaggerSettings;
 use policy::decision_rule::{ChiOn, DecisionRule};
 use policy::fit::FitSettings;
 use policy::network::LookAheadNetConfig;
@@ -64,7 +64,7 @@ pub enum Step {
         drivers: Vec<(String, String)>,
     },
     /// Lets networks drive while the expert watches.
-    Watch,
+    IncidentMonitor,
 }
 
 /// A training chain.
@@ -143,7 +143,7 @@ fn chi_on(rule: &DecisionRule) -> ChiOn {
     }
 }
 
-fn fits_mut(dagger: &mut DaggerConfig) -> impl Iterator<Item = &mut FitSettings> {
+fn fits_mut(dagger: &mut DaggerSettings) -> impl Iterator<Item = &mut FitSettings> {
     [&mut dagger.fit_cloning, &mut dagger.fit_iteration].into_iter().chain(dagger.fit_final.as_mut())
 }
 
@@ -219,7 +219,7 @@ pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
         folder: WATCHED.to_owned(),
         about: "networks drive, the expert watches".to_owned(),
         settings: settings.clone(),
-        step: Step::Watch,
+        step: Step::IncidentMonitor,
     });
     stages
 }
@@ -265,7 +265,7 @@ impl Stage {
                 let runs = runs(&evaluation.lots, evaluation.directions.len(), evaluation.trials, false);
                 runs * (drivers.len() * evaluation.noise.len()) as f64 * DRIVEN_RUN_S
             }
-            Step::Watch => {
+            Step::IncidentMonitor => {
                 let runs = runs(&evaluation.lots, evaluation.directions.len(), 1, false);
                 (2.0 * rounds + 1.0) * runs * WATCHED_RUN_S
             }

@@ -8,10 +8,10 @@ use crate::plots::AxisCalibration;
 use crate::progress::Work;
 use crate::run_dir::{self, RunDir};
 use crate::settings::Settings;
-use crate::trials::{self, Job, Purpose};
+use crate::trials::{self, Purpose, Trial};
 use anyhow::Context as _;
 use policy::checkpoint::Checkpoint;
-use policy::dagger::{Arbiter, Collected, Keep};
+use policy::dagger::{Collected, GatedCollector, Keep};
 use policy::dataset::store::Store;
 use policy::dataset::{Dataset, Sample, Split, ValidationSplit};
 use policy::decision_rule::{DecisionRule, Evidence};
@@ -196,16 +196,17 @@ impl<'a> Drives<'a> {
 fn shadow(settings: &Settings, policy: &Checkpoint) -> anyhow::Result<Collected> {
     let evaluation = &settings.evaluation;
     let lots = Lot::parse_all(&evaluation.lots)?;
-    let jobs: Vec<Job<'_>> = Job::all(evaluation.seed, Purpose::Evaluation, &lots, 1, &evaluation.directions).collect();
+    let jobs: Vec<Trial<'_>> =
+        Trial::all(evaluation.seed, Purpose::Evaluation, &lots, 1, &evaluation.directions).collect();
     let episodes = trials::episodes(&jobs, settings, settings.training.noise)?;
     let expert = |_| Box::new(drivers::expert(settings)) as Box<dyn Driver + Send>;
     let experts = (0..episodes.len()).map(expert).collect();
     let novice = Predictor::new(policy.weights.clone(), settings.dagger.device);
     // Every discrepancy is below infinity: the network drives, always.
     let rule = DecisionRule::TauOnly { tau: f32::INFINITY };
-    let mut arbiter = Arbiter::new(Some(novice), experts, rule, Keep::EveryTick, policy.geometry);
-    run_lockstep(episodes, &mut arbiter, &mut |_, _| {});
-    Ok(arbiter.into_collected())
+    let mut collector = GatedCollector::new(Some(novice), experts, rule, Keep::EveryTick, policy.geometry);
+    run_lockstep(episodes, &mut collector, &mut |_, _| {});
+    Ok(collector.into_collected())
 }
 
 fn tau_hat_per_s(settings: &Settings, collected: &Collected) -> f64 {

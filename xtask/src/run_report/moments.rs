@@ -1,6 +1,6 @@
 //! A near-collision as a picture: driven again from its replay key.
 
-use crate::drivers::Contestant;
+use crate::drivers::DriverSpec;
 use crate::lots::Lot;
 use crate::render::drawing::{Drawing, Font};
 use crate::render::grids::{self, PREDICTION, of_layer};
@@ -8,7 +8,7 @@ use crate::render::lot::{self, INK, View};
 use crate::render::trajectories::{self, ColourBy, NEAR_COLLISION, Point, Trajectory};
 use crate::replay_key::ReplayKey;
 use crate::settings::Settings;
-use crate::trials::{self, Job, Purpose};
+use crate::trials::{self, Purpose, Trial};
 use anyhow::{Context as _, ensure};
 use sim::batch::run_lockstep_until;
 use sim::episode::{Event, Frame};
@@ -71,9 +71,9 @@ pub(super) fn picture(key: &str, settings: &Settings) -> anyhow::Result<Vec<u8>>
 fn drive_again(key: &ReplayKey, settings: &Settings) -> anyhow::Result<Moment> {
     let lots = Lot::parse_all(std::slice::from_ref(&key.lot))?;
     ensure!(lots.len() == 1, "{:?} stands for {} lots", key.lot, lots.len());
-    let contestant = Contestant::parse_all(std::slice::from_ref(&key.driver))?.remove(0);
+    let contestant = DriverSpec::parse_all(std::slice::from_ref(&key.driver))?.remove(0);
     let seed = trials::trial_seed(key.seed, Purpose::Evaluation, key.trial);
-    let job = Job { lot: &lots[0], direction: key.direction, trial: key.trial, seed };
+    let job = Trial { lot: &lots[0], direction: key.direction, trial: key.trial, seed };
     let map = Arc::new(job.map(&settings.episode)?);
     let episodes = trials::start(&[job], &[Arc::clone(&map)], settings, key.noise);
     let mut fleet = contestant.fleet(settings, 1);
@@ -88,10 +88,10 @@ fn drive_again(key: &ReplayKey, settings: &Settings) -> anyhow::Result<Moment> {
         Event::Drove | Event::Stuck { .. } | Event::ReachedEnd => None,
     });
     let (frame, at) = found.context("driven again, it does not happen: was the network trained anew since?")?;
-    let config = trials::episode_config(settings, key.noise, &map);
-    let ticks = (BEFORE_S / config.control_period_s()) as usize;
+    let episode = trials::episode_config(settings, key.noise, &map);
+    let ticks = (BEFORE_S / episode.control_period_s()) as usize;
     let points = points.split_off(points.len().saturating_sub(ticks));
-    let sensor = Sensor::new(&map, config.sensing, &config.noise, job.episode_seed());
+    let sensor = Sensor::new(&map, episode.sensing, &episode.noise, job.episode_seed());
     let inspection = sensor.inspect(&map, frame.vehicle.pose, frame.tick, &frame.observation);
     let driven = Trajectory { name: key.driver.clone(), points };
     Ok(Moment { map, settings: settings.clone(), driven, frame, at, inspection })
@@ -129,7 +129,7 @@ impl Moment {
             .map(|(ahead, left)| world_from_ego.point(Vec2::new(ahead, left)))
     }
 
-    fn legend(&self) -> Vec<lot::Entry> {
+    fn legend(&self) -> Vec<lot::NamedDriver> {
         let mut legend = vec![
             (NEAR_COLLISION, "car".to_owned()),
             (PREDICTION, "look-ahead point".to_owned()),

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use sim::scenario::NoiseLevel;
-use sim::sensing::noise::NoiseConfig;
+use sim::sensing::noise::NoiseSettings;
 use std::fmt;
 use std::str::FromStr;
 
@@ -35,7 +35,7 @@ const NAMED: [(&str, NoiseChoice); 4] = [
 impl NoiseChoice {
     /// What `episode.noise.intensity` is multiplied with, on a lot that asks for a level.
     pub fn intensity(self, of_lot: NoiseLevel) -> f32 {
-        let of = |level| NoiseConfig::of(level).intensity;
+        let of = |level| NoiseSettings::of(level).intensity;
         match self {
             Self::Clean => of(NoiseLevel::Clean),
             Self::Paper => of(NoiseLevel::Paper),

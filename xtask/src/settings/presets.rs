@@ -2,12 +2,12 @@
 
 use super::{EvaluationSettings, NoiseChoice, Settings, TrainingSettings};
 use anyhow::bail;
-use expert::ExpertConfig;
-use policy::dagger::{DaggerConfig, DisturbanceSettings, StartFrom};
+use expert::ExpertSettings;
+use policy::dagger::{DaggerSettings, DisturbanceSettings, StartFrom};
 use policy::dataset::ValidationSplit;
 use policy::fit::{Budget, FitSettings};
 use policy::network::{ConvConfig, LookAheadNetConfig};
-use sim::episode::EpisodeConfig;
+use sim::episode::EpisodeSettings;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 
@@ -45,7 +45,11 @@ pub(super) fn by_name(name: &str) -> anyhow::Result<Settings> {
 fn default() -> Settings {
     let lots = ["lot-a", "train:4:easy", "train:12", "train:20:hard"].map(str::to_owned).to_vec();
     let base = paper();
-    Settings { training: TrainingSettings { lots, trials: 8, ..base.training }, dagger: DaggerConfig::quick(), ..base }
+    Settings {
+        training: TrainingSettings { lots, trials: 8, ..base.training },
+        dagger: DaggerSettings::quick(),
+        ..base
+    }
 }
 
 /// Paper: data from lot a, one round trip per round; evaluation on three lots, both ways, five trials.
@@ -66,9 +70,9 @@ fn paper() -> Settings {
             trials: 5,
             noise: vec![NoiseChoice::Paper],
         },
-        dagger: DaggerConfig::paper(),
-        expert: ExpertConfig::paper(),
-        episode: EpisodeConfig::paper(),
+        dagger: DaggerSettings::paper(),
+        expert: ExpertSettings::paper(),
+        episode: EpisodeSettings::paper(),
     }
 }
 
@@ -90,9 +94,9 @@ fn smoke() -> Settings {
             trials: 1,
             ..base.evaluation
         },
-        dagger: DaggerConfig {
+        dagger: DaggerSettings {
             iterations_max: 1,
-            relooks: 1,
+            noise_augmentations: 1,
             disturbance: Some(DisturbanceSettings::quick()),
             start: StartFrom::Previous,
             network: LookAheadNetConfig {
@@ -101,8 +105,8 @@ fn smoke() -> Settings {
                 hidden: 64,
                 dropout_features: 0.0,
                 dropout_hidden: 0.1,
-                symmetric: true,
-                memory_ticks: 4.0,
+                mirror_averaging: true,
+                smoothing_ticks: 4.0,
             },
             fit_cloning: fit.clone(),
             fit_iteration: fit,

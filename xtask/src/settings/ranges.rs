@@ -2,9 +2,9 @@
 //! nonsense.
 
 use anyhow::{Context as _, ensure};
-use expert::ExpertConfig;
+use expert::ExpertSettings;
 use policy::dagger::DisturbanceSettings;
-use sim::episode::EpisodeConfig;
+use sim::episode::EpisodeSettings;
 
 /// Lengths, times and gains that may also be zero: switched off. So may every layer of the noise
 /// and every weight of the expert's plans.
@@ -29,7 +29,7 @@ const MAY_BE_ZERO: [&str; 17] = [
 ];
 
 /// Everything is finite and none of it negative; what is divided by, waited for or driven over is not zero.
-pub(super) fn check(episode: &EpisodeConfig) -> anyhow::Result<()> {
+pub(super) fn check(episode: &EpisodeSettings) -> anyhow::Result<()> {
     let table = toml::Table::try_from(episode).context("settings are plain values")?;
     check_table("episode", &table)?;
     let (low, high) = (episode.controller.speed_min_mps, episode.controller.speed_max_mps);
@@ -41,7 +41,7 @@ pub(super) fn check(episode: &EpisodeConfig) -> anyhow::Result<()> {
 }
 
 /// The same of the expert.
-pub(super) fn check_expert(expert: &ExpertConfig) -> anyhow::Result<()> {
+pub(super) fn check_expert(expert: &ExpertSettings) -> anyhow::Result<()> {
     let table = toml::Table::try_from(expert).context("settings are plain values")?;
     check_table("expert", &table)
 }

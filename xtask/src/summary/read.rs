@@ -1,10 +1,10 @@
 //! An evaluation counted again from what it wrote.
 
-use super::Ledger;
+use super::EvaluationResults;
 use crate::evaluate::Plan;
 use crate::failures::{self, Cause};
 use crate::settings::NoiseChoice;
-use crate::trials::{Job, Purpose};
+use crate::trials::{Purpose, Trial};
 use anyhow::Context as _;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -35,17 +35,18 @@ struct Failed {
     since_resume_m: Option<f32>,
 }
 
-impl Ledger {
-    /// Reads `runs.jsonl` and `failures.jsonl` of a folder: the same ledger as after driving the plan.
+impl EvaluationResults {
+    /// Reads `runs.jsonl` and `failures.jsonl` of a folder: the same results as after driving the plan.
     ///
     /// # Errors
     /// If a file cannot be read, or was not written by this plan.
     pub fn read(plan: &Plan<'_>, folder: &Path) -> anyhow::Result<Self> {
-        let mut ledger = Self::new(plan);
+        let mut results = Self::new(plan);
         let evaluation = &plan.settings.evaluation;
-        let jobs = Job::all(evaluation.seed, Purpose::Evaluation, plan.lots, evaluation.trials, &evaluation.directions);
-        let jobs: Vec<Job<'_>> = jobs.collect();
-        let key = |job: &Job<'_>| (job.lot.name().to_owned(), job.direction, job.trial);
+        let jobs =
+            Trial::all(evaluation.seed, Purpose::Evaluation, plan.lots, evaluation.trials, &evaluation.directions);
+        let jobs: Vec<Trial<'_>> = jobs.collect();
+        let key = |job: &Trial<'_>| (job.lot.name().to_owned(), job.direction, job.trial);
         let index_of: BTreeMap<_, usize> = jobs.iter().map(key).zip(0..).collect();
         let level_of = |noise| evaluation.noise.iter().position(|&level| level == noise).context("another noise level");
         let driver_of = |name: &str| {
@@ -54,16 +55,16 @@ impl Ledger {
         };
         each_line(&folder.join("runs.jsonl"), |run: Driven| {
             let index = index_of.get(&(run.lot, run.direction, run.trial)).copied().context("another run")?;
-            ledger.add(level_of(run.noise)?, driver_of(&run.driver)?, index, &jobs[index], &run.report);
+            results.add(level_of(run.noise)?, driver_of(&run.driver)?, index, &jobs[index], &run.report);
             Ok(())
         })?;
         each_line(&folder.join("failures.jsonl"), |failed: Failed| {
             let lot = plan.lots.iter().find(|lot| lot.name() == failed.lot).context("another lot")?;
             let (level, driver) = (level_of(failed.noise)?, driver_of(&failed.driver)?);
-            ledger.add_cause(level, driver, lot, failed.cause, failures::is_again(failed.since_resume_m));
+            results.add_cause(level, driver, lot, failed.cause, failures::is_again(failed.since_resume_m));
             Ok(())
         })?;
-        Ok(ledger)
+        Ok(results)
     }
 }
 

@@ -1,6 +1,6 @@
 use super::*;
-use crate::drivers::Contestant;
-use crate::evaluate::Entry;
+use crate::drivers::DriverSpec;
+use crate::evaluate::NamedDriver;
 use crate::settings::Settings;
 use crate::trials::Purpose;
 use sim::metrics::EpisodeMetrics;
@@ -12,65 +12,66 @@ fn report(near_collisions: u32, reference_m: f32, safe_ratio: f32) -> EpisodeRep
     EpisodeReport { ending: Ending::ReachedEnd, metrics, events: Vec::new() }
 }
 
-fn entries(n: usize) -> Vec<Entry> {
-    (0..n).map(|i| Entry { contestant: Contestant::expert(), spec: format!("driver {i}") }).collect()
+fn entries(n: usize) -> Vec<NamedDriver> {
+    (0..n).map(|i| NamedDriver { contestant: DriverSpec::expert(), spec: format!("driver {i}") }).collect()
 }
 
 /// Two drivers over lots a and b and two generated lots, both ways, three trials; what they did is given by a function.
-fn ledger(drivers: usize, of: impl Fn(usize, &Job<'_>) -> Option<EpisodeReport>) -> Ledger {
+fn results(drivers: usize, of: impl Fn(usize, &Trial<'_>) -> Option<EpisodeReport>) -> EvaluationResults {
     let settings = Settings::preset("default").unwrap();
     let lots = Lot::parse_all(&["lot-a", "lot-b", "test:2"]).unwrap();
     let entries = entries(drivers);
     let plan = Plan { settings: &settings, entries: &entries, lots: &lots, compare_with: 0 };
-    let mut ledger = Ledger::new(&plan);
-    let jobs = Job::all(RootSeed(1), Purpose::Evaluation, &lots, 3, &Direction::BOTH);
+    let mut results = EvaluationResults::new(&plan);
+    let jobs = Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 3, &Direction::BOTH);
     for (index, job) in jobs.enumerate() {
         for driver in 0..drivers {
             if let Some(report) = of(driver, &job) {
-                ledger.add(0, driver, index, &job, &report);
+                results.add(0, driver, index, &job, &report);
             }
         }
     }
-    ledger
+    results
 }
 
-fn scope(ledger: &Ledger, label: &str) -> Scope {
-    Scope::all_of(ledger).into_iter().find(|scope| scope.label == label).unwrap()
+fn slice(results: &EvaluationResults, label: &str) -> Slice {
+    Slice::all_of(results).into_iter().find(|slice| slice.label == label).unwrap()
 }
 
 #[test]
 fn pooled_and_unweighted_means_differ_where_lots_differ_in_length() {
     // 2 events in every run of lot a over 200 m, 1 in every run of lot b over 50 m: 1 and 2 per 100 m.
-    let ledger = ledger(1, |_, job| match job.lot.name() {
+    let results = results(1, |_, job| match job.lot.name() {
         "lot-a" => Some(report(2, 200.0, 0.5)),
         "lot-b" => Some(report(1, 50.0, 0.8)),
         _ => None,
     });
-    let labels: Vec<String> = Scope::all_of(&ledger).into_iter().map(|scope| scope.label).collect();
+    let labels: Vec<String> = Slice::all_of(&results).into_iter().map(|slice| slice.label).collect();
     assert_eq!(labels, ["lot-a", "lot-b", "test-medium (2 lots)", "unseen", "all"], "lot a is the training lot");
-    let all = scope(&ledger, "all");
-    let totals = ledger.totals(0, 0, &all, None);
+    let all = slice(&results, "all");
+    let totals = results.totals(0, 0, &all, None);
     assert_eq!((totals.runs, totals.near_collisions), (12, 18));
     assert!((totals.rate().per_unit - 18.0 / 15.0).abs() < 1e-9, "18 events in 1500 m");
-    let [rate, safe_ratio] = ledger.unweighted(0, 0, &all);
+    let [rate, safe_ratio] = results.unweighted(0, 0, &all);
     assert!((rate - 1.5).abs() < 1e-6 && (safe_ratio - 0.65).abs() < 1e-6, "{rate} {safe_ratio}");
     assert!((totals.safe_ratio() - 0.65).abs() < 1e-6, "six runs on either lot");
-    assert_eq!(ledger.totals(0, 0, &all, Some(Direction::Reverse)).runs, 6);
-    assert_eq!(ledger.totals(0, 0, &scope(&ledger, "unseen"), None).near_collisions, 6);
+    assert_eq!(results.totals(0, 0, &all, Some(Direction::Reverse)).runs, 6);
+    assert_eq!(results.totals(0, 0, &slice(&results, "unseen"), None).near_collisions, 6);
 }
 
 #[test]
 fn a_constant_difference_has_a_narrow_interval_however_hard_the_trials_are() {
-    let ledger = ledger(2, |driver, job| Some(report(job.trial * 4 + driver as u32, 100.0, 0.5 + 0.1 * driver as f32)));
-    let (standings, comparisons) = ledger.judge(0, &scope(&ledger, "lot-b"), 0, RootSeed(1));
+    let results =
+        results(2, |driver, job| Some(report(job.trial * 4 + driver as u32, 100.0, 0.5 + 0.1 * driver as f32)));
+    let (estimates, comparisons) = results.judge(0, &slice(&results, "lot-b"), 0, RootSeed(1));
     let found = &comparisons[0];
     assert_eq!((found.driver, found.pairs), (1, 6));
     let difference = found.difference_per_100m.unwrap();
     assert!((difference.lower - 1.0).abs() < 1e-9 && (difference.upper - 1.0).abs() < 1e-9, "{difference:?}");
     assert!((found.difference_safe_ratio.unwrap().estimate - 0.1).abs() < 1e-6);
     // Trials 0, 4, 8 in both directions: mean 4, variance 64/5, index 3.2: clusters.
-    assert!((standings[0].dispersion.unwrap().index - 3.2).abs() < 1e-9, "{standings:?}");
-    assert!(standings[0].per_100m.unwrap().lower < 2.8);
+    assert!((estimates[0].dispersion.unwrap().index - 3.2).abs() < 1e-9, "{estimates:?}");
+    assert!(estimates[0].per_100m.unwrap().lower < 2.8);
     // 30 events against 24: the exact test, which knows of no pairs, sees nothing.
     assert!((found.ratio.ratio.unwrap() - 30.0 / 24.0).abs() < 1e-9 && found.ratio.p_value > 0.4, "{found:?}");
     assert_eq!(found.p_holm, found.ratio.p_value, "a single comparison");
@@ -79,24 +80,24 @@ fn a_constant_difference_has_a_narrow_interval_however_hard_the_trials_are() {
 #[test]
 fn generated_lots_are_resampled_as_wholes() {
     // All events are on one of two lots: whole lots drawn give 0, 1 or 2 of it.
-    let ledger = ledger(1, |_, job| {
+    let results = results(1, |_, job| {
         let is_hard = job.lot.name() == "test-medium-1";
         Some(report(if is_hard { 2 } else { 0 }, 100.0, 0.5))
     });
-    let (standings, _) = ledger.judge(0, &scope(&ledger, "test-medium (2 lots)"), 0, RootSeed(1));
-    let interval = standings[0].per_100m.unwrap();
+    let (estimates, _) = results.judge(0, &slice(&results, "test-medium (2 lots)"), 0, RootSeed(1));
+    let interval = estimates[0].per_100m.unwrap();
     assert_eq!((interval.lower, interval.estimate, interval.upper), (0.0, 1.0, 2.0));
-    let (dispersion, mean, variance) = (standings[0].dispersion.unwrap(), 6.0, 72.0);
+    let (dispersion, mean, variance) = (estimates[0].dispersion.unwrap(), 6.0, 72.0);
     assert!((dispersion.index - variance / mean).abs() < 1e-9, "{dispersion:?}");
 }
 
 #[test]
 fn only_runs_that_all_drivers_have_driven_are_compared() {
-    let ledger = ledger(2, |driver, job| (driver == 0 || job.trial < 2).then(|| report(1, 100.0, 0.5)));
-    let (_, comparisons) = ledger.judge(0, &scope(&ledger, "lot-a"), 0, RootSeed(1));
+    let results = results(2, |driver, job| (driver == 0 || job.trial < 2).then(|| report(1, 100.0, 0.5)));
+    let (_, comparisons) = results.judge(0, &slice(&results, "lot-a"), 0, RootSeed(1));
     assert_eq!(comparisons[0].pairs, 4);
     assert_eq!(comparisons[0].ratio.ratio, Some(1.0), "the third trial of the first driver does not count");
-    assert_eq!(ledger.totals(0, 0, &scope(&ledger, "lot-a"), None).runs, 6, "but is in its own row");
+    assert_eq!(results.totals(0, 0, &slice(&results, "lot-a"), None).runs, 6, "but is in its own row");
 }
 
 #[test]

@@ -9,14 +9,14 @@ use super::sensors::{self, Sensors};
 use crate::drivers;
 use crate::settings::Settings;
 use expert::{Inspection, Rule, ScriptedExpert};
-use policy::baselines::Planner;
-use policy::baselines::explanation::Explanation;
+use planners::Planner;
+use planners::explanation::Explanation;
 use policy::decision_rule::{DecisionRule, Evidence};
 use policy::drivers::NetPolicy;
 use policy::network::Prediction;
 use protocol::{Arrow, Block, Clock, Colour, Dot, Mark, Pose, Shape, Strip};
 use sim::driver::{Driver as _, GroundTruth, LookAheadPoint, Policy as _, Situation, Source, Spread};
-use sim::episode::{Episode, EpisodeConfig, Event, Frame};
+use sim::episode::{Episode, EpisodeSettings, Event, Frame};
 use sim::geometry::Vec2;
 use sim::map::Map;
 use std::f32::consts::TAU;
@@ -44,7 +44,7 @@ pub enum Detail {
 pub struct Drive {
     root: String,
     map: Arc<Map>,
-    config: EpisodeConfig,
+    episode: EpisodeSettings,
     rule: DecisionRule,
     /// A copy of the teacher that watches.
     expert: Option<ScriptedExpert>,
@@ -73,7 +73,7 @@ impl Drive {
         Self {
             root: root.to_owned(),
             map: Arc::clone(episode.map()),
-            config: episode.config().clone(),
+            episode: episode.settings().clone(),
             rule: settings.dagger.rule,
             expert: is_full.then(|| drivers::expert(settings)),
             novice: None,
@@ -116,7 +116,7 @@ impl Drive {
 
     /// What does not change: the car, its ring, names and colours.
     pub fn always(&self) -> Vec<Mark> {
-        let vehicle = &self.config.vehicle;
+        let vehicle = &self.episode.vehicle;
         let middle_m = 0.5 * (vehicle.front_m() - vehicle.rear_overhang_m);
         let body = Block {
             centre: [middle_m, 0.0, 0.75],
@@ -186,7 +186,7 @@ impl Drive {
 
     /// The car, its wheels, and where it is told to go.
     fn car(&self, frame: &Frame, marks: &mut Vec<Mark>) {
-        let (pose, vehicle) = (frame.vehicle.pose, &self.config.vehicle);
+        let (pose, vehicle) = (frame.vehicle.pose, &self.episode.vehicle);
         let at = |at, yaw_rad| Shape::Pose(Pose { at, yaw_rad, scale: [1.0; 3] });
         marks.push(self.mark("car", at([pose.x_m, pose.y_m, 0.0], pose.heading_rad)));
         let half_track_m = 0.5 * vehicle.width_m - WHEEL_M[1];
@@ -213,7 +213,7 @@ impl Drive {
         self.swept = Some(position);
         self.driven.push(position);
         let world_from_ego = frame.vehicle.pose.world_from_ego();
-        let body = self.config.vehicle.body_in_ego().map(|corner| world_from_ego.point(corner));
+        let body = self.episode.vehicle.body_in_ego().map(|corner| world_from_ego.point(corner));
         let colour = colours::of_source(frame.decision.source);
         let swept = Strip { radius_pt: 0.5, ..outline(&body, LINE_Z_M, colours::faded(colour, 110)) };
         marks.push(self.mark("swept", Shape::Strips(vec![swept])));
@@ -325,7 +325,7 @@ impl Drive {
             self.doubt(learner.look_ahead, spread, marks);
         }
         if let Some(expert) = expert {
-            let geometry = &self.config.sensing.geometry;
+            let geometry = &self.episode.sensing.geometry;
             let predicted = Prediction { mean: learner.look_ahead.to_image_fraction(geometry), sigma: [0.0; 2] };
             let evidence = Evidence::new(&predicted, expert.to_image_fraction(geometry));
             marks.push(self.signal("discrepancy/tau_hat", f64::from(evidence.discrepancy)));
@@ -341,7 +341,7 @@ impl Drive {
         if !std::mem::replace(&mut self.has_spread, true) {
             marks.push(self.mark("car/spread/ellipses", Shape::Strips([1.0, 2.0].map(circle).to_vec())));
         }
-        let side_m = self.config.sensing.geometry.side_m;
+        let side_m = self.episode.sensing.geometry.side_m;
         let sigma = [spread.left_m, spread.ahead_m].map(|metres| metres / side_m);
         let (doubt, chi) = match self.rule {
             DecisionRule::AllBelow { chi, chi_on, .. } | DecisionRule::AnyBelowLiteral { chi, chi_on, .. } => {
@@ -394,7 +394,7 @@ impl Drive {
         marks.push(self.mark("events", Shape::Line { text, is_warning: at.is_some() }));
         if let Some(at) = at {
             self.failures.push(Dot {
-                at: raised(at.world_from_ego().point(Vec2::new(self.config.vehicle.front_m(), 0.0)), 1.5),
+                at: raised(at.world_from_ego().point(Vec2::new(self.episode.vehicle.front_m(), 0.0)), 1.5),
                 radius_pt: 9.0,
                 colour: colours::FAILURE,
                 label: format!("{what}, tick {tick}"),
@@ -405,8 +405,8 @@ impl Drive {
 
     /// The range within which the safe ratio is measured: the body, grown on all sides.
     fn safe_ring(&self) -> Strip {
-        let range_m = self.config.metrics.safe_range_m;
-        let body = self.config.vehicle.body_in_ego();
+        let range_m = self.episode.metrics.safe_range_m;
+        let body = self.episode.vehicle.body_in_ego();
         let quarter = |corner: Vec2, from_rad: f32| {
             (0..=6).map(move |i| corner + range_m * Vec2::from_angle(from_rad + i as f32 * TAU / 24.0))
         };
@@ -417,7 +417,7 @@ impl Drive {
     }
 
     fn seen_patch(&self) -> Strip {
-        let geometry = &self.config.sensing.geometry;
+        let geometry = &self.episode.sensing.geometry;
         let (near_m, far_m, half_m) = (geometry.near_edge_ahead_m, geometry.far_edge_ahead_m(), 0.5 * geometry.side_m);
         let corners = [[far_m, half_m], [near_m, half_m], [near_m, -half_m], [far_m, -half_m]].map(Vec2::from);
         Strip { radius_pt: 0.6, ..outline(&corners, LINE_Z_M, colours::PATCH) }

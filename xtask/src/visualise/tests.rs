@@ -1,17 +1,17 @@
 use super::drive::{Detail, Drive};
 use super::*;
 use crate::drivers;
-use policy::baselines::explanation::Explanation;
+use planners::explanation::Explanation;
 use protocol::{Clock, Dot, Moments, Pose, Strip};
 use sim::driver::Driver;
 use sim::episode::{Event, Frame};
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Lot b with the obstacles of one trial.
 pub(super) fn map() -> Map {
     let lots = Lot::parse_all(&["lot-b"]).unwrap();
-    Map::build(lots[0].draw(RootSeed(1)).scenario, &VehicleParams::hyundai_hg300()).unwrap()
+    Map::build(lots[0].draw(RootSeed(1)).scenario, &VehicleSettings::hyundai_hg300()).unwrap()
 }
 
 /// The first ticks of a drive by whoever answers, with everything that is shown.
@@ -232,7 +232,7 @@ fn a_training_is_read_from_its_folder() {
 fn a_planner_shows_what_it_weighed() {
     let settings = Settings::preset("smoke").unwrap();
     for name in ["tentacle", "vvf", "apf"] {
-        let contestant = &Contestant::parse_all(&[name.to_owned()]).unwrap()[0];
+        let contestant = &DriverSpec::parse_all(&[name.to_owned()]).unwrap()[0];
         let mut planner = contestant.planner(&settings).unwrap();
         let mut episode = Episode::new(Arc::new(settings.episode.clone()), Arc::new(map()), RootSeed(2));
         for _ in 0..10 {

@@ -92,7 +92,7 @@ impl Sensor {
 
     /// What the patches in sight say about every pixel.
     fn claims(&self, pose: Pose, tick: u32) -> Claims {
-        let geometry = &self.config.geometry;
+        let geometry = &self.settings.geometry;
         let ego = EgoView::new(geometry, pose);
         let mut claims =
             Claims { occupied: vec![None; BEV_PIXELS * BEV_PIXELS], free: vec![None; BEV_PIXELS * BEV_PIXELS] };

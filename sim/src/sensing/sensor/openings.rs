@@ -2,8 +2,8 @@
 
 use crate::distance_field::DistanceField;
 use crate::geometry::bits;
+use crate::sensing::occlusion::Spans;
 use crate::sensing::quadtree::{PixelLattice, pixels_of};
-use crate::sensing::smear::Spans;
 use crate::sensing::{CELL_PIXELS, GRID_CELLS};
 use std::ops::Range;
 

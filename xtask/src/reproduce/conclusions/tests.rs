@@ -1,18 +1,18 @@
 use super::*;
-use crate::drivers::Contestant;
-use crate::evaluate::Entry;
+use crate::drivers::DriverSpec;
+use crate::evaluate::NamedDriver;
 use crate::lots::Lot;
 use crate::settings::Settings;
-use crate::trials::{Job, Purpose};
+use crate::trials::{Purpose, Trial};
 use sim::episode::{Ending, EpisodeReport};
 use sim::metrics::EpisodeMetrics;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 
-fn entry(name: &str) -> Entry {
-    let mut contestant = Contestant::expert();
+fn entry(name: &str) -> NamedDriver {
+    let mut contestant = DriverSpec::expert();
     contestant.name = name.to_owned();
-    Entry { contestant, spec: name.to_owned() }
+    NamedDriver { contestant, spec: name.to_owned() }
 }
 
 /// What a driver did in a run.
@@ -24,13 +24,13 @@ struct Run {
 }
 
 /// Statements about made-up runs of 1 km on the paper's lots: five trials, both ways.
-fn statements(names: &[&str], of: impl Fn(&str, &Job<'_>) -> Run) -> Vec<Statement> {
+fn statements(names: &[&str], of: impl Fn(&str, &Trial<'_>) -> Run) -> Vec<Statement> {
     let settings = Settings::preset("default").unwrap();
-    let entries: Vec<Entry> = names.iter().map(|name| entry(name)).collect();
+    let entries: Vec<NamedDriver> = names.iter().map(|name| entry(name)).collect();
     let lots = Lot::parse_all(&["reference"]).unwrap();
     let plan = Plan { settings: &settings, entries: &entries, lots: &lots, compare_with: 0 };
-    let mut ledger = Ledger::new(&plan);
-    for (index, job) in Job::all(RootSeed(1), Purpose::Evaluation, &lots, 5, &Direction::BOTH).enumerate() {
+    let mut results = EvaluationResults::new(&plan);
+    for (index, job) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 5, &Direction::BOTH).enumerate() {
         for (driver, name) in names.iter().enumerate() {
             let Run { near_collisions, safe_ratio, steering_reversals } = of(name, &job);
             let metrics = EpisodeMetrics {
@@ -41,10 +41,10 @@ fn statements(names: &[&str], of: impl Fn(&str, &Job<'_>) -> Run) -> Vec<Stateme
                 driven_m: 1000.0,
                 ..EpisodeMetrics::default()
             };
-            ledger.add(0, driver, index, &job, &EpisodeReport { ending: Ending::ReachedEnd, metrics, events: vec![] });
+            results.add(0, driver, index, &job, &EpisodeReport { ending: Ending::ReachedEnd, metrics, events: vec![] });
         }
     }
-    on_reference_lots(&Driven { plan: &plan, ledger: &ledger })
+    on_reference_lots(&Driven { plan: &plan, results: &results })
 }
 
 fn verdict(statements: &[Statement], claim: &str) -> Verdict {
@@ -122,11 +122,11 @@ fn none_in_a_few_metres_is_no_proof() {
     let lots = Lot::parse_all(&["lot-b"]).unwrap();
     let plan = Plan { settings: &settings, entries: &entries, lots: &lots, compare_with: 0 };
     let driven_m = |reference_m| {
-        let mut ledger = Ledger::new(&plan);
+        let mut results = EvaluationResults::new(&plan);
         let metrics = EpisodeMetrics { reference_m, driven_m: reference_m, ..EpisodeMetrics::default() };
-        let job = Job::all(RootSeed(1), Purpose::Evaluation, &lots, 1, &[Direction::Forward]).next().unwrap();
-        ledger.add(0, 0, 0, &job, &EpisodeReport { ending: Ending::ReachedEnd, metrics, events: vec![] });
-        on_reference_lots(&Driven { plan: &plan, ledger: &ledger })[0].verdict
+        let job = Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 1, &[Direction::Forward]).next().unwrap();
+        results.add(0, 0, 0, &job, &EpisodeReport { ending: Ending::ReachedEnd, metrics, events: vec![] });
+        on_reference_lots(&Driven { plan: &plan, results: &results })[0].verdict
     };
     // 3.0 / 0.1 hundred metres (methods.md 8.3).
     assert_eq!((driven_m(2990.0), driven_m(3000.0)), (Verdict::CannotBeTold, Verdict::Holds));

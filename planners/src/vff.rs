@@ -6,7 +6,7 @@
 //! distance. The steering is smoothed from tick to tick, as the original does against oscillation.
 
 use super::search::{Dimension, Span};
-use super::{Goal, Method, Rig, Sight, head_for, within};
+use super::{Goal, Method, PlannerContext, Sight, head_for, within};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
@@ -95,7 +95,7 @@ impl Method for Params {
         within("look_ahead_m", self.look_ahead_m, 0.5, 20.0)
     }
 
-    fn planner(&self, rig: &Rig) -> VirtualForceField {
+    fn planner(&self, rig: &PlannerContext) -> VirtualForceField {
         let bumper = rig.bumper();
         let push = |index: usize| {
             let offset = bumper - rig.geometry.cell_in_ego(index / GRID_CELLS, index % GRID_CELLS);

@@ -9,7 +9,7 @@ use crate::distance_field::{floor, to_index};
 use crate::geometry::{Outline, Vec2};
 use std::ops::Range;
 
-/// Longest smear, as a multiple of the range: from 2 m on it leaves the patch.
+/// Longest occlusion, as a multiple of the range: from 2 m on it leaves the patch.
 const FACTOR_MAX: f32 = 12.0;
 /// Corners a polygon may have; an octagon's shadow has ten.
 const CORNERS_MAX: usize = 12;
@@ -256,7 +256,7 @@ pub(super) struct Camera {
 pub(super) struct TallThing {
     /// Counter-clockwise; relative to the camera, ahead and left.
     outline: Outline,
-    /// How many times as far as the thing its smear reaches.
+    /// How many times as far as the thing its occlusion reaches.
     factor: f32,
     camera: Vec2,
 }

@@ -8,7 +8,7 @@
 
 use super::explanation::{FieldSample, sample};
 use super::search::{Dimension, Span};
-use super::{DISTANCE_FLOOR_M, Method, Nearest, Rig, WALK_AHEAD_MIN_M};
+use super::{DISTANCE_FLOOR_M, Method, Nearest, PlannerContext, WALK_AHEAD_MIN_M};
 use super::{head_for, khatib_repulsion, walk_along_field, within};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
@@ -121,7 +121,7 @@ impl Method for Params {
         within("ahead_min_m", self.ahead_min_m, 0.2, 12.0)
     }
 
-    fn planner(&self, rig: &Rig) -> VelocityVectorField {
+    fn planner(&self, rig: &PlannerContext) -> VelocityVectorField {
         VelocityVectorField { params: self.clone(), rig: Arc::new(rig.clone()) }
     }
 }
@@ -130,7 +130,7 @@ impl Method for Params {
 #[derive(Debug, Clone)]
 pub struct VelocityVectorField {
     params: Params,
-    rig: Arc<Rig>,
+    rig: Arc<PlannerContext>,
 }
 
 impl VelocityVectorField {

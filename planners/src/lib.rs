@@ -31,34 +31,34 @@ pub mod vvf;
 use search::Dimension;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
-use sim::controller::{self, ControllerConfig};
+use sim::controller::{self, ControllerSettings};
 use sim::driver::{Decision, LookAheadPoint, Policy, Source};
-use sim::episode::EpisodeConfig;
+use sim::episode::EpisodeSettings;
 use sim::geometry::{Pose, Vec2};
 use sim::sensing::{GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
-use sim::vehicle::VehicleParams;
+use sim::vehicle::VehicleSettings;
 
 /// The car a planner is installed in: what it may know besides the grid.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Rig {
+pub struct PlannerContext {
     /// Dimensions and limits.
-    pub vehicle: VehicleParams,
+    pub vehicle: VehicleSettings,
     /// Where the grid lies.
     pub geometry: GridGeometry,
     /// What becomes of an answer.
-    pub controller: ControllerConfig,
+    pub controller: ControllerSettings,
     /// Between two answers, seconds.
     pub control_period_s: f32,
 }
 
-impl Rig {
+impl PlannerContext {
     /// The car of an episode.
-    pub fn of(config: &EpisodeConfig) -> Self {
+    pub fn of(settings: &EpisodeSettings) -> Self {
         Self {
-            vehicle: config.vehicle.clone(),
-            geometry: config.sensing.geometry,
-            controller: config.controller.clone(),
-            control_period_s: config.control_period_s(),
+            vehicle: settings.vehicle.clone(),
+            geometry: settings.sensing.geometry,
+            controller: settings.controller.clone(),
+            control_period_s: settings.control_period_s(),
         }
     }
 
@@ -108,7 +108,7 @@ struct WheelEstimate {
 }
 
 impl WheelEstimate {
-    fn new(rig: &Rig) -> Self {
+    fn new(rig: &PlannerContext) -> Self {
         let rate_rad_per_tick = rig.vehicle.steering_rate_max_radps * rig.control_period_s;
         Self { steering_rad: 0.0, command_rad: 0.0, rate_rad_per_tick }
     }
@@ -199,7 +199,7 @@ const FIELD_MIN: f32 = 0.05;
 /// would answer "straight on", into the wall.
 fn walk_along_field(
     grid: &OccupancyGrid,
-    rig: &Rig,
+    rig: &PlannerContext,
     range_m: f32,
     length_m: f32,
     field: impl Fn(Vec2, Option<Nearest>) -> Vec2,
@@ -258,7 +258,7 @@ const RAY_STEP_M: f32 = 0.24;
 const RAYS_PER_SIDE: i32 = 30;
 
 impl Sight {
-    fn new(rig: &Rig) -> Self {
+    fn new(rig: &PlannerContext) -> Self {
         let geometry = &rig.geometry;
         let ray = |bearing_rad: f32| {
             let direction = Vec2::from_angle(bearing_rad);
@@ -329,7 +329,7 @@ pub trait Method: Clone + std::fmt::Debug + PartialEq + Serialize + DeserializeO
     fn check(&self) -> Result<(), String>;
 
     /// A planner for a car.
-    fn planner(&self, rig: &Rig) -> Self::Planner;
+    fn planner(&self, rig: &PlannerContext) -> Self::Planner;
 }
 
 /// Writes a number as people would: TOML's floats are f64, and 2.3 as f32 is 2.299999952316284 as f64.
@@ -385,7 +385,7 @@ macro_rules! baselines {
             }
 
             /// A planner for a car. Making one takes milliseconds (tables); clones share them.
-            pub fn planner(&self, rig: &Rig) -> Planner {
+            pub fn planner(&self, rig: &PlannerContext) -> Planner {
                 match self { $(Self::$variant(params) => Planner::$variant(params.planner(rig)),)* }
             }
 

@@ -1,6 +1,6 @@
 //! Which ground is known to the expert.
 
-use crate::config::Sees;
+use crate::settings::Sees;
 use sim::geometry::{Pose, Vec2, WorldFromEgo};
 use sim::map::{Map, Occluder};
 use sim::sensing::GridGeometry;
@@ -15,9 +15,9 @@ const TALL_M: f32 = 1.2;
 
 /// Which ground is known at one decision: all of it, or what the patch shows.
 #[derive(Debug, Clone)]
-pub(crate) struct Sight(Option<PatchSight>);
+pub(crate) struct LineOfSight(Option<PatchSight>);
 
-impl Sight {
+impl LineOfSight {
     pub(crate) fn new(sees: Sees, map: &Map, pose: Pose, geometry: GridGeometry) -> Self {
         match sees {
             Sees::WholeMap => Self(None),
@@ -74,7 +74,7 @@ impl PatchSight {
         self.geometry.contains(in_ego) && from_camera.length_squared() <= self.range_squared[bearing_bin(from_camera)]
     }
 
-    /// Sight ends, by bearing, where a ray from the camera enters the outline.
+    /// LineOfSight ends, by bearing, where a ray from the camera enters the outline.
     fn cast_shadow(&mut self, occluder: &Occluder) {
         let camera = Vec2::new(CAMERA_AHEAD_M, 0.0);
         let from_camera = |in_world: Vec2| self.world_from_ego.inverse_point(in_world) - camera;
@@ -123,13 +123,13 @@ mod tests {
                 points: vec![Vec2::new(-20.0, 0.0), Vec2::new(20.0, 0.0)],
                 corner_radius_m: 0.0,
             },
-            noise: sim::scenario::NoiseSettings::default(),
+            noise: sim::scenario::LotNoise::default(),
             islands: Vec::new(),
             obstacles: vec![Obstacle::new(ObstacleClass::Sedan, Pose::new(Vec2::new(10.0, 2.5), 0.0))],
             speed_bumps: Vec::new(),
         };
-        let map = Map::build(scenario, &sim::vehicle::VehicleParams::hyundai_hg300()).unwrap();
-        let sight = Sight::new(Sees::PatchOnly, &map, Pose::default(), GridGeometry::paper());
+        let map = Map::build(scenario, &sim::vehicle::VehicleSettings::hyundai_hg300()).unwrap();
+        let sight = LineOfSight::new(Sees::PatchOnly, &map, Pose::default(), GridGeometry::paper());
         let knows = |x, y| sight.knows(Vec2::new(x, y));
         assert!(knows(8.0, 0.0) && knows(16.0, 0.0) && knows(7.0, -5.9), "in the patch");
         assert!(!knows(16.4, 0.0) && !knows(8.0, 6.1), "beyond the patch");

@@ -1,6 +1,6 @@
 //! What a planner weighed, for pictures: worked out again when asked for, so that it costs nothing otherwise.
 
-use super::{Planner, Rig, nearest_occupied};
+use super::{Planner, PlannerContext, nearest_occupied};
 use sim::geometry::Vec2;
 use sim::sensing::{GRID_CELLS, Observation, OccupancyGrid};
 
@@ -48,7 +48,7 @@ impl Planner {
 /// A field at every other free cell of the patch.
 pub(super) fn sample(
     grid: &OccupancyGrid,
-    rig: &Rig,
+    rig: &PlannerContext,
     range_m: f32,
     field: impl Fn(Vec2, Option<super::Nearest>) -> Vec2,
 ) -> Vec<FieldSample> {

@@ -1,6 +1,6 @@
 //! What is looked at together, and how drivers stand there.
 
-use super::{Ledger, Unit};
+use super::{EvaluationResults, RunSummary};
 use serde::Serialize;
 use sim::seed::RootSeed;
 use statistics::bootstrap::{DRAWS, Interval, Units};
@@ -9,29 +9,29 @@ use statistics::poisson::Dispersion;
 
 /// Lots that are looked at together.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Scope {
+pub struct Slice {
     /// Its name in tables.
     pub label: String,
     families: Vec<u32>,
 }
 
-impl Scope {
+impl Slice {
     /// Every family by itself; then, where that is something else, those nobody was trained on, and all.
-    pub fn all_of(ledger: &Ledger) -> Vec<Self> {
-        let families = ledger.families();
+    pub fn all_of(results: &EvaluationResults) -> Vec<Self> {
+        let families = results.families();
         let of = |label: &str, wanted: &dyn Fn(usize) -> bool| Self {
             label: label.to_owned(),
             families: (0..families.len()).filter(|&i| wanted(i)).map(|i| i as u32).collect(),
         };
-        let mut scopes: Vec<Self> = families.iter().enumerate().map(|(i, f)| of(&f.label(), &|j| i == j)).collect();
+        let mut slices: Vec<Self> = families.iter().enumerate().map(|(i, f)| of(&f.label(), &|j| i == j)).collect();
         let unseen = of("unseen", &|i| !families[i].is_trained_on);
         if (2..families.len()).contains(&unseen.families.len()) {
-            scopes.push(unseen);
+            slices.push(unseen);
         }
         if families.len() > 1 {
-            scopes.push(of("all", &|_| true));
+            slices.push(of("all", &|_| true));
         }
-        scopes
+        slices
     }
 
     /// Whether it holds more than one family.
@@ -45,9 +45,9 @@ impl Scope {
     }
 }
 
-/// A driver in a scope, judged by resampling.
+/// A driver in a slice, judged by resampling.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Standing {
+pub struct DriverEstimate {
     /// How clustered its near-collisions are; `None` where that cannot be said.
     pub dispersion: Option<Dispersion>,
     /// Near-collisions per 100 m; `None` with a single unit per lot.
@@ -77,26 +77,32 @@ pub struct Comparison {
     pub p_holm: f64,
 }
 
-impl Ledger {
-    /// How the drivers stand in a scope at a noise level, and how they compare with one of them. Resampled are units
+impl EvaluationResults {
+    /// How the drivers stand in a slice at a noise level, and how they compare with one of them. Resampled are units
     /// (lot, direction, seed) within each lot (methods.md 8.3); of generated lots, which are a sample themselves, whole
     /// lots within their kind (chosen). Only runs that all drivers have driven count.
-    pub fn judge(&self, level: usize, scope: &Scope, with: usize, seed: RootSeed) -> (Vec<Standing>, Vec<Comparison>) {
-        let pairs = self.common_units(level, scope);
-        let drivers = self.accounts[level].len();
-        let mut standings = vec![Standing::default(); drivers];
+    pub fn judge(
+        &self,
+        level: usize,
+        slice: &Slice,
+        with: usize,
+        seed: RootSeed,
+    ) -> (Vec<DriverEstimate>, Vec<Comparison>) {
+        let pairs = self.common_units(level, slice);
+        let drivers = self.drivers[level].len();
+        let mut estimates = vec![DriverEstimate::default(); drivers];
         if pairs.is_empty() {
-            return (standings, Vec::new());
+            return (estimates, Vec::new());
         }
-        for (driver, standing) in standings.iter_mut().enumerate() {
-            standing.dispersion = dispersion(&pairs, driver);
+        for (driver, estimate) in estimates.iter_mut().enumerate() {
+            estimate.dispersion = dispersion(&pairs, driver);
         }
         let others: Vec<usize> = (0..drivers).filter(|&driver| driver != with).collect();
         let intervals = bootstrap(&pairs, &others, with, seed);
         let interval = |index: usize| intervals.as_ref().map(|intervals| intervals[index]);
-        for (driver, standing) in standings.iter_mut().enumerate() {
-            standing.per_100m = interval(STATISTICS * driver);
-            standing.safe_ratio = interval(STATISTICS * driver + 1);
+        for (driver, estimate) in estimates.iter_mut().enumerate() {
+            estimate.per_100m = interval(STATISTICS * driver);
+            estimate.safe_ratio = interval(STATISTICS * driver + 1);
         }
         let counts = |driver: usize| {
             let units = pairs.iter().map(|row| row[driver]);
@@ -119,26 +125,27 @@ impl Ledger {
                 p_holm,
             }
         });
-        (standings, comparisons.collect())
+        (estimates, comparisons.collect())
     }
 
-    /// Per job of the scope that every driver has finished, the units of all drivers.
-    fn common_units(&self, level: usize, scope: &Scope) -> Vec<Vec<Unit>> {
-        let Some((first, rest)) = self.accounts[level].split_first() else { return Vec::new() };
-        let of_job =
-            |units: &[Unit], job: u32| units.binary_search_by_key(&job, |unit| unit.job).ok().map(|index| units[index]);
-        let row = |unit: &Unit| {
+    /// Per job of the slice that every driver has finished, the units of all drivers.
+    fn common_units(&self, level: usize, slice: &Slice) -> Vec<Vec<RunSummary>> {
+        let Some((first, rest)) = self.drivers[level].split_first() else { return Vec::new() };
+        let of_job = |units: &[RunSummary], job: u32| {
+            units.binary_search_by_key(&job, |unit| unit.job).ok().map(|index| units[index])
+        };
+        let row = |unit: &RunSummary| {
             let rest = rest.iter().map(|account| of_job(&account.units, unit.job));
             std::iter::once(Some(*unit)).chain(rest).collect()
         };
-        first.units.iter().filter(|unit| scope.contains(unit.family)).filter_map(row).collect()
+        first.units.iter().filter(|unit| slice.contains(unit.family)).filter_map(row).collect()
     }
 }
 
-fn dispersion(pairs: &[Vec<Unit>], driver: usize) -> Option<Dispersion> {
+fn dispersion(pairs: &[Vec<RunSummary>], driver: usize) -> Option<Dispersion> {
     let strata: Vec<Vec<(u32, f64)>> = strata(pairs)
         .map(|clusters| {
-            let cluster = |rows: &[Vec<Unit>]| {
+            let cluster = |rows: &[Vec<RunSummary>]| {
                 let units = rows.iter().map(|row| row[driver]);
                 units.fold((0, 0.0), |(n, m), unit| (n + unit.near_collisions, m + f64::from(unit.reference_m)))
             };
@@ -149,7 +156,7 @@ fn dispersion(pairs: &[Vec<Unit>], driver: usize) -> Option<Dispersion> {
 }
 
 /// Stratum by stratum its clusters. Jobs are ordered lot by lot, so clusters lie together; families need not.
-fn strata(pairs: &[Vec<Unit>]) -> impl Iterator<Item = Vec<&[Vec<Unit>]>> {
+fn strata(pairs: &[Vec<RunSummary>]) -> impl Iterator<Item = Vec<&[Vec<RunSummary>]>> {
     let mut families: Vec<u32> = pairs.iter().map(|row| row[0].family).collect();
     families.sort_unstable();
     families.dedup();
@@ -167,7 +174,7 @@ const SHARED: usize = 2;
 
 /// The statistics of every driver, then their differences of every other driver from `with`. `None` if nothing varies
 /// because every stratum has a single cluster.
-fn bootstrap(pairs: &[Vec<Unit>], others: &[usize], with: usize, seed: RootSeed) -> Option<Vec<Interval>> {
+fn bootstrap(pairs: &[Vec<RunSummary>], others: &[usize], with: usize, seed: RootSeed) -> Option<Vec<Interval>> {
     let drivers = pairs[0].len();
     let columns = SHARED + COLUMNS * drivers;
     let mut units = Units::new(columns);

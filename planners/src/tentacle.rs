@@ -13,7 +13,7 @@
 
 use super::explanation::CandidatePath;
 use super::search::{Dimension, Span};
-use super::{Method, Rig, WheelEstimate, spread_curvatures, steer_along, within};
+use super::{Method, PlannerContext, WheelEstimate, spread_curvatures, steer_along, within};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::{Pose, Vec2};
@@ -187,7 +187,7 @@ impl Method for Params {
         within("speed_mps", self.speed_mps, 0.1, 10.0)
     }
 
-    fn planner(&self, rig: &Rig) -> Tentacles {
+    fn planner(&self, rig: &PlannerContext) -> Tentacles {
         Tentacles::new(self, rig)
     }
 }
@@ -218,7 +218,7 @@ impl Around {
 #[derive(Debug, Clone)]
 pub struct Tentacles {
     params: Params,
-    rig: Arc<Rig>,
+    rig: Arc<PlannerContext>,
     /// Starting angles by candidate paths.
     around: Arc<Vec<Vec<Around>>>,
     /// Final curvature and weighted V_fwd of each candidate.
@@ -228,7 +228,7 @@ pub struct Tentacles {
 }
 
 impl Tentacles {
-    fn new(params: &Params, rig: &Rig) -> Self {
+    fn new(params: &Params, rig: &PlannerContext) -> Self {
         let paths = params.paths();
         let outermost = paths[0].0.abs().max(f32::MIN_POSITIVE);
         let candidates = paths.iter().map(|(kappa, _)| (*kappa, params.forward_weight * kappa.abs() / outermost));
@@ -309,7 +309,7 @@ impl Policy for Tentacles {
 }
 
 /// The cells around one path.
-fn around_path(params: &Params, rig: &Rig, start_rad: f32, path: (f32, f32)) -> Around {
+fn around_path(params: &Params, rig: &PlannerContext, start_rad: f32, path: (f32, f32)) -> Around {
     let mut marks = Marks::new(&rig.geometry, params.detection_range_m);
     points(params, rig, start_rad, path).for_each(|point| marks.mark(point));
     marks.around()
@@ -319,7 +319,7 @@ fn around_path(params: &Params, rig: &Rig, start_rad: f32, path: (f32, f32)) -> 
 /// s_r = v|δ_k − δ_0|/δ̇, at least 0.3 m.
 fn points(
     params: &Params,
-    rig: &Rig,
+    rig: &PlannerContext,
     start_rad: f32,
     (curvature_per_m, length_m): (f32, f32),
 ) -> impl Iterator<Item = Vec2> {

@@ -1,9 +1,9 @@
 //! One decision of each model-based planner in a lane with a corner.
 
 use divan::{Bencher, black_box};
-use policy::baselines::{Baseline, Rig};
+use planners::{Baseline, PlannerContext};
 use sim::driver::Policy as _;
-use sim::episode::EpisodeConfig;
+use sim::episode::EpisodeSettings;
 use sim::sensing::{Observation, OccupancyGrid};
 
 fn main() {
@@ -18,6 +18,6 @@ fn decision(bencher: Bencher<'_, '_>, name: &str) {
     (16..25).for_each(|row| grid.occupy_row(row, 0x1FF_01FF));
     let baselines = Baseline::all();
     let baseline = baselines.iter().find(|baseline| baseline.name() == name).expect("a baseline's name");
-    let mut planner = baseline.planner(&Rig::of(&EpisodeConfig::paper()));
+    let mut planner = baseline.planner(&PlannerContext::of(&EpisodeSettings::paper()));
     bencher.bench_local(|| planner.act(black_box(&Observation { grid })));
 }

@@ -21,7 +21,7 @@ pub enum Keep {
 }
 
 /// Novice and expert at the wheel of every seat of a batch.
-pub struct Arbiter {
+pub struct GatedCollector {
     novice: Option<Novice>,
     experts: Vec<Box<dyn Driver + Send>>,
     rule: DecisionRule,
@@ -39,8 +39,8 @@ pub struct Arbiter {
 struct SeatRecord {
     samples: Vec<Sample>,
     /// Look at the scenes of the samples, too.
-    lookers: Vec<Sensor>,
-    relooks: Vec<OccupancyGrid>,
+    augmenting_sensors: Vec<Sensor>,
+    noise_augmentations: Vec<OccupancyGrid>,
     /// Nudges whoever drives.
     disturbance: Option<Disturbance>,
     /// Decisions so far.
@@ -51,9 +51,11 @@ impl SeatRecord {
     /// Line 15, and further looks at the same scene.
     fn keep(&mut self, sample: Sample, truth: &GroundTruth<'_>) {
         self.samples.push(sample);
-        let looks =
-            self.lookers.iter_mut().map(|sensor| sensor.observe(truth.map, truth.vehicle.pose, self.ticks).grid);
-        self.relooks.extend(looks);
+        let looks = self
+            .augmenting_sensors
+            .iter_mut()
+            .map(|sensor| sensor.observe(truth.map, truth.vehicle.pose, self.ticks).grid);
+        self.noise_augmentations.extend(looks);
     }
 }
 
@@ -70,7 +72,7 @@ pub struct Collected {
     pub tau_hat_sum: f64,
 }
 
-impl Arbiter {
+impl GatedCollector {
     /// One expert per seat. Without a novice the experts drive and every tick is kept: behaviour cloning.
     pub fn new(
         novice: Option<Predictor>,
@@ -86,9 +88,9 @@ impl Arbiter {
 
     /// Sensors of every seat that look at the kept ticks, too.
     #[must_use]
-    pub fn with_lookers(mut self, lookers: Vec<Vec<Sensor>>) -> Self {
-        for (seat, lookers) in self.seats.iter_mut().zip(lookers) {
-            seat.lookers = lookers;
+    pub fn with_augmenting_sensors(mut self, augmenting_sensors: Vec<Vec<Sensor>>) -> Self {
+        for (seat, augmenting_sensors) in self.seats.iter_mut().zip(augmenting_sensors) {
+            seat.augmenting_sensors = augmenting_sensors;
         }
         self
     }
@@ -107,7 +109,7 @@ impl Arbiter {
         let mut round = Round::default();
         for seat in self.seats {
             round.samples.extend(seat.samples);
-            round.relooks.extend(seat.relooks);
+            round.noise_augmentations.extend(seat.noise_augmentations);
         }
         Collected { round, n_tot: self.n_tot, n_net: self.n_net, tau_hat_sum: self.tau_hat_sum }
     }
@@ -148,7 +150,7 @@ fn at_seats<'a, 's, T>(of_episodes: &'a mut [T], seats: &'a [Seat<'s>]) -> Vec<(
     found
 }
 
-impl Fleet for Arbiter {
+impl Fleet for GatedCollector {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
         let first = decisions.len();
         let predictions = self.novice.as_mut().map(|novice| novice.answers(seats)); // line 5

@@ -7,7 +7,7 @@
 //! v ≤ √(2·dist·v̇_b).
 
 use super::search::{Dimension, Span};
-use super::{Method, Rig, WheelEstimate, steer_along, within};
+use super::{Method, PlannerContext, WheelEstimate, steer_along, within};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::{Pose, Vec2};
@@ -112,7 +112,7 @@ impl Method for Params {
         within("brake_mps2", self.brake_mps2, 0.1, 10.0)
     }
 
-    fn planner(&self, rig: &Rig) -> DynamicWindow {
+    fn planner(&self, rig: &PlannerContext) -> DynamicWindow {
         let arcs: Vec<Rated> = (-(SIDE as i32)..=SIDE as i32)
             .map(|k| {
                 let steering_rad = rig.vehicle.steering_max_rad * k as f32 / SIDE as f32;
@@ -150,7 +150,7 @@ struct Rated {
 #[derive(Debug, Clone)]
 pub struct DynamicWindow {
     params: Params,
-    rig: Arc<Rig>,
+    rig: Arc<PlannerContext>,
     arcs: Arc<Vec<Rated>>,
     /// Travel until the body meets a cell (row-major), by arc, metres; at most the largest distance that counts.
     contact_m: Arc<Vec<[f32; 2 * SIDE + 1]>>,
@@ -208,7 +208,7 @@ impl Policy for DynamicWindow {
 
 /// Travel until the body, widened by a margin, meets the centre of each cell, by arc. The right arcs are the mirror image
 /// of the left ones, to the bit.
-fn contacts(rig: &Rig, arcs: &[Rated], margin_m: f32, distance_max_m: f32) -> Vec<[f32; 2 * SIDE + 1]> {
+fn contacts(rig: &PlannerContext, arcs: &[Rated], margin_m: f32, distance_max_m: f32) -> Vec<[f32; 2 * SIDE + 1]> {
     let (front_m, rear_m) = (rig.vehicle.front_m() + margin_m, rig.vehicle.rear_overhang_m + margin_m);
     let side_m = 0.5 * rig.vehicle.width_m + margin_m;
     let mut contact_m = vec![[distance_max_m; 2 * SIDE + 1]; GRID_CELLS * GRID_CELLS];

@@ -6,7 +6,7 @@
 //! curvatures that the wheels can reach; the controller slows down with steering, so a curvature fixes its speed.
 
 use super::search::{Dimension, Span};
-use super::{Method, Rig, WheelEstimate, steer_along, within};
+use super::{Method, PlannerContext, WheelEstimate, steer_along, within};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
@@ -102,7 +102,7 @@ impl Method for Params {
         within("margin_m", self.margin_m, 0.0, 2.0)
     }
 
-    fn planner(&self, rig: &Rig) -> CurvatureVelocity {
+    fn planner(&self, rig: &PlannerContext) -> CurvatureVelocity {
         let curvature_max = rig.vehicle.curvature_max_per_m();
         let candidates = (-(SIDE as i32)..=SIDE as i32).map(|k| {
             let curvature_per_m = curvature_max * k as f32 / SIDE as f32;
@@ -152,7 +152,7 @@ impl Disc {
 #[derive(Debug, Clone)]
 pub struct CurvatureVelocity {
     params: Params,
-    rig: Arc<Rig>,
+    rig: Arc<PlannerContext>,
     /// Curvature, and what it is worth whatever the grid.
     candidates: Arc<Vec<(f32, f32)>>,
     /// Of every cell, row-major.

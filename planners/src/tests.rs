@@ -3,8 +3,8 @@
 use super::*;
 use proptest::prelude::*;
 
-pub(super) fn rig() -> Rig {
-    Rig::of(&EpisodeConfig::paper())
+pub(super) fn rig() -> PlannerContext {
+    PlannerContext::of(&EpisodeSettings::paper())
 }
 
 /// A grid with these cells (row, column) occupied.

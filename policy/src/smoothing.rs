@@ -9,7 +9,7 @@ use sim::sensing::GridGeometry;
 
 /// What one driver remembers.
 #[derive(Debug, Clone)]
-pub(crate) struct Steadying {
+pub(crate) struct ActionSmoothing {
     /// Share of the way from the mean to a new answer, 0…1.
     gain: f32,
     geometry: GridGeometry,
@@ -23,15 +23,15 @@ struct Aim {
     range_m: f32,
 }
 
-impl Steadying {
+impl ActionSmoothing {
     pub(crate) fn new(config: &LookAheadNetConfig, geometry: GridGeometry) -> Self {
         // A step is followed as by 1 − exp(−t / memory); without memory at once.
-        let gain = if config.memory_ticks > 0.0 { 1.0 - (-1.0 / config.memory_ticks).exp() } else { 1.0 };
+        let gain = if config.smoothing_ticks > 0.0 { 1.0 - (-1.0 / config.smoothing_ticks).exp() } else { 1.0 };
         Self { gain, geometry, mean: None }
     }
 
     /// The exponential mean of curvature and range over the answers so far. The doubt stays that of the last one.
-    pub(crate) fn steadied(&mut self, answer: Prediction) -> Prediction {
+    pub(crate) fn smoothed(&mut self, answer: Prediction) -> Prediction {
         if self.gain == 1.0 {
             return answer;
         }
@@ -48,14 +48,14 @@ impl Steadying {
 
 /// What the drivers of a batch remember, by episode.
 #[derive(Debug, Clone)]
-pub(crate) struct Steadyings {
-    fresh: Steadying,
-    of_episodes: Vec<Steadying>,
+pub(crate) struct FleetSmoothing {
+    fresh: ActionSmoothing,
+    of_episodes: Vec<ActionSmoothing>,
 }
 
-impl Steadyings {
+impl FleetSmoothing {
     pub(crate) fn new(config: &LookAheadNetConfig, geometry: GridGeometry) -> Self {
-        Self { fresh: Steadying::new(config, geometry), of_episodes: Vec::new() }
+        Self { fresh: ActionSmoothing::new(config, geometry), of_episodes: Vec::new() }
     }
 
     /// Steadies the answer at every seat.
@@ -64,11 +64,11 @@ impl Steadyings {
             if self.of_episodes.len() <= seat.episode {
                 self.of_episodes.resize(seat.episode + 1, self.fresh.clone());
             }
-            let steadying = &mut self.of_episodes[seat.episode];
+            let smoothing = &mut self.of_episodes[seat.episode];
             if seat.was_reset {
-                steadying.reset();
+                smoothing.reset();
             }
-            *answer = steadying.steadied(*answer);
+            *answer = smoothing.smoothed(*answer);
         }
     }
 }
@@ -102,29 +102,32 @@ mod tests {
         Prediction { mean, sigma: [0.03, 0.05] }
     }
 
-    fn steadying(memory_ticks: f32) -> Steadying {
-        Steadying::new(&LookAheadNetConfig { memory_ticks, ..LookAheadNetConfig::compact() }, GridGeometry::paper())
+    fn smoothing(smoothing_ticks: f32) -> ActionSmoothing {
+        ActionSmoothing::new(
+            &LookAheadNetConfig { smoothing_ticks, ..LookAheadNetConfig::compact() },
+            GridGeometry::paper(),
+        )
     }
 
     #[test]
     fn without_memory_answers_stay_as_they_are_to_the_bit() {
-        let mut steadying = steadying(0.0);
+        let mut smoothing = smoothing(0.0);
         let outside = Prediction { mean: [-0.1, 1.2], sigma: [0.03, 0.05] };
-        assert_eq!([at(9.0, 1.0), outside].map(|answer| steadying.steadied(answer)), [at(9.0, 1.0), outside]);
+        assert_eq!([at(9.0, 1.0), outside].map(|answer| smoothing.smoothed(answer)), [at(9.0, 1.0), outside]);
     }
 
     #[test]
     fn a_step_is_followed_exponentially_and_a_constant_answer_exactly() {
-        let mut steadying = steadying(8.0);
-        let first = steadying.steadied(at(8.0, 0.0)).look_ahead(GridGeometry::paper());
+        let mut smoothing = smoothing(8.0);
+        let first = smoothing.smoothed(at(8.0, 0.0)).look_ahead(GridGeometry::paper());
         assert!((first.ahead_m - 8.0).abs() < 1e-5 && first.left_m.abs() < 1e-5, "the first answer is taken at once");
-        let last = (0..8).map(|_| steadying.steadied(at(12.0, 0.0))).last().unwrap();
+        let last = (0..8).map(|_| smoothing.smoothed(at(12.0, 0.0))).last().unwrap();
         let reached_m = last.look_ahead(GridGeometry::paper()).ahead_m;
         // 8 + 4 · (1 − 1/e): one memory later.
         assert!((reached_m - 10.5285).abs() < 1e-3, "{reached_m}");
         assert_eq!(last.sigma, [0.03, 0.05]);
-        steadying.reset();
-        let again = steadying.steadied(at(6.0, -2.0)).look_ahead(GridGeometry::paper());
+        smoothing.reset();
+        let again = smoothing.smoothed(at(6.0, -2.0)).look_ahead(GridGeometry::paper());
         assert!((again.ahead_m - 6.0).abs() < 1e-4 && (again.left_m + 2.0).abs() < 1e-4, "{again:?}");
     }
 }

@@ -4,7 +4,7 @@
 //! would a label taken from the winner; no network could learn that from a grid of half-metre cells. The band forgets
 //! which plan it came from: it is where a person would drive, and it lies still in the world while the car moves.
 
-use crate::config::BandConfig;
+use crate::settings::ElasticBandSettings;
 use sim::distance_field::DistanceField;
 use sim::geometry::Vec2;
 
@@ -17,13 +17,13 @@ const PROBE_M: f32 = 0.4;
 
 /// Points of the rear axle's way, world, the first under the axle.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Band {
+pub(crate) struct ElasticBand {
     points: [Vec2; POINTS],
     /// Travel from the first point to each.
     travels_m: [f32; POINTS],
 }
 
-impl Band {
+impl ElasticBand {
     /// A band along given points, [`SPACING_M`] apart, straight on where they end.
     pub(crate) fn along(way: impl Iterator<Item = Vec2>, ahead: Vec2) -> Self {
         let mut points = [Vec2::ZERO; POINTS];
@@ -56,20 +56,20 @@ impl Band {
     /// Each round goes from the first point to the last, and a point looks `stiff` points back, where this round has
     /// been, and as many ahead, where only the round before has. So while this round is at one point, the next can be
     /// `stiff + 1` points behind it, and so on: those are moved side by side.
-    pub(crate) fn relax(&mut self, field: &DistanceField, config: &BandConfig) {
-        let stiff = ((config.stiffness_m / SPACING_M).round() as usize).max(1);
+    pub(crate) fn relax(&mut self, field: &DistanceField, settings: &ElasticBandSettings) {
+        let stiff = ((settings.stiffness_m / SPACING_M).round() as usize).max(1);
         let (apart, last) = (stiff + 1, POINTS - 1);
-        let rounds = config.iterations as usize;
+        let rounds = settings.iterations as usize;
         for tick in 1..(last + apart * rounds).saturating_sub(stiff) {
             // The rounds under way. Point of a round: tick - round * apart.
             let from = tick.saturating_sub(last).div_ceil(apart);
             let to = rounds.min((tick - 1) / apart + 1);
             let (front, n) = (tick - from * apart, to - from);
             if front == last {
-                self.relax_apart::<1>(last, 1, stiff, field, config);
-                self.relax_apart::<LANES>(last.saturating_sub(apart), n - 1, stiff, field, config);
+                self.relax_apart::<1>(last, 1, stiff, field, settings);
+                self.relax_apart::<LANES>(last.saturating_sub(apart), n - 1, stiff, field, settings);
             } else {
-                self.relax_apart::<LANES>(front, n, stiff, field, config);
+                self.relax_apart::<LANES>(front, n, stiff, field, settings);
             }
         }
         self.measure();
@@ -82,7 +82,7 @@ impl Band {
         n: usize,
         stiff: usize,
         field: &DistanceField,
-        config: &BandConfig,
+        settings: &ElasticBandSettings,
     ) {
         let mut lanes = Lanes::<N>::new();
         let at = |lane: usize| front - lane * (stiff + 1);
@@ -100,7 +100,7 @@ impl Band {
             };
             lanes.set(lane, here, straight, along);
         }
-        lanes.move_all(field, config);
+        lanes.move_all(field, settings);
         for lane in 0..n {
             self.points[at(lane)] = Vec2::new(lanes.here.x[lane], lanes.here.y[lane]);
         }
@@ -162,7 +162,7 @@ impl<const N: usize> Lanes<N> {
     }
 
     /// One step of every point towards the middle and straightness.
-    fn move_all(&mut self, field: &DistanceField, config: &BandConfig) {
+    fn move_all(&mut self, field: &DistanceField, settings: &ElasticBandSettings) {
         let left: [Vec2; N] = std::array::from_fn(|i| {
             let along = Vec2::new(self.along.x[i], self.along.y[i]);
             along.normalize_or_zero().perp()
@@ -171,17 +171,17 @@ impl<const N: usize> Lanes<N> {
             let x_m = std::array::from_fn(|i| self.here.x[i] + left[i].x * (side * PROBE_M));
             let y_m = std::array::from_fn(|i| self.here.y[i] + left[i].y * (side * PROBE_M));
             field.at_each::<N>(&x_m, &y_m).map(|at_m| {
-                let missing_m = (config.comfort_m - at_m).max(0.0);
+                let missing_m = (settings.comfort_m - at_m).max(0.0);
                 missing_m * missing_m
             })
         };
         let (push_left, push_right) = (push(-1.0), push(1.0));
         for i in 0..N {
-            let to_middle = (push_left[i] - push_right[i]) * (config.middle_gain / (4.0 * PROBE_M));
+            let to_middle = (push_left[i] - push_right[i]) * (settings.middle_gain / (4.0 * PROBE_M));
             let here = Vec2::new(self.here.x[i], self.here.y[i]);
             let straight = Vec2::new(self.straight.x[i], self.straight.y[i]);
-            let step = (straight - here) * config.straight_gain + left[i] * to_middle;
-            let there = here + step.clamp_length_max(config.step_max_m);
+            let step = (straight - here) * settings.straight_gain + left[i] * to_middle;
+            let there = here + step.clamp_length_max(settings.step_max_m);
             (self.here.x[i], self.here.y[i]) = (there.x, there.y);
         }
     }
@@ -190,12 +190,12 @@ impl<const N: usize> Lanes<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ExpertConfig;
+    use crate::ExpertSettings;
 
     /// One point after the other, one round after the other: what moving points side by side must equal to the bit.
-    fn relax_in_order(band: &mut Band, field: &DistanceField, config: &BandConfig) {
-        let stiff = ((config.stiffness_m / SPACING_M).round() as usize).max(1);
-        for _ in 0..config.iterations {
+    fn relax_in_order(band: &mut ElasticBand, field: &DistanceField, settings: &ElasticBandSettings) {
+        let stiff = ((settings.stiffness_m / SPACING_M).round() as usize).max(1);
+        for _ in 0..settings.iterations {
             for i in 1..POINTS {
                 let here = band.points[i];
                 let reach = stiff.min(i).min(POINTS - 1 - i);
@@ -208,12 +208,12 @@ mod tests {
                 };
                 let left = along.normalize_or_zero().perp();
                 let push = |side: f32| {
-                    let missing_m = (config.comfort_m - field.at(here + left * (side * PROBE_M))).max(0.0);
+                    let missing_m = (settings.comfort_m - field.at(here + left * (side * PROBE_M))).max(0.0);
                     missing_m * missing_m
                 };
-                let to_middle = (push(-1.0) - push(1.0)) * (config.middle_gain / (4.0 * PROBE_M));
-                let step = (straight - here) * config.straight_gain + left * to_middle;
-                band.points[i] = here + step.clamp_length_max(config.step_max_m);
+                let to_middle = (push(-1.0) - push(1.0)) * (settings.middle_gain / (4.0 * PROBE_M));
+                let step = (straight - here) * settings.straight_gain + left * to_middle;
+                band.points[i] = here + step.clamp_length_max(settings.step_max_m);
             }
         }
         band.measure();
@@ -226,11 +226,11 @@ mod tests {
         field.carve_disc(Vec2::new(6.0, 1.1), 0.5);
         field.carve_disc(Vec2::new(11.0, -1.2), 0.6);
         for (rounds, stiffness_m) in [(0, 0.6), (1, 0.6), (7, 1.2), (60, 0.6), (60, 3.0), (5, 9.0)] {
-            let config = BandConfig { iterations: rounds, stiffness_m, ..ExpertConfig::paper().band };
+            let settings = ElasticBandSettings { iterations: rounds, stiffness_m, ..ExpertSettings::paper().band };
             let way = (0..20).map(|i| Vec2::new(0.6 * i as f32, 0.02 * (i * i % 17) as f32));
-            let (mut band, mut expected) = (Band::along(way.clone(), Vec2::X), Band::along(way, Vec2::X));
-            band.relax(&field, &config);
-            relax_in_order(&mut expected, &field, &config);
+            let (mut band, mut expected) = (ElasticBand::along(way.clone(), Vec2::X), ElasticBand::along(way, Vec2::X));
+            band.relax(&field, &settings);
+            relax_in_order(&mut expected, &field, &settings);
             assert_eq!(band.points, expected.points, "{rounds} rounds, stiffness {stiffness_m} m");
             assert_eq!(band.travels_m, expected.travels_m);
         }

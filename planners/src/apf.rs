@@ -7,7 +7,7 @@
 use super::explanation::{FieldSample, sample};
 use super::search::{Dimension, Span};
 use super::{
-    DISTANCE_FLOOR_M, Goal, Method, Nearest, Rig, Sight, WALK_AHEAD_MIN_M, head_for, khatib_repulsion,
+    DISTANCE_FLOOR_M, Goal, Method, Nearest, PlannerContext, Sight, WALK_AHEAD_MIN_M, head_for, khatib_repulsion,
     walk_along_field, within,
 };
 use serde::{Deserialize, Serialize};
@@ -96,7 +96,7 @@ impl Method for Params {
         within("walk_m", self.walk_m, 0.1, 20.0)
     }
 
-    fn planner(&self, rig: &Rig) -> PotentialField {
+    fn planner(&self, rig: &PlannerContext) -> PotentialField {
         PotentialField { params: self.clone(), sight: Arc::new(Sight::new(rig)), rig: Arc::new(rig.clone()) }
     }
 }
@@ -105,7 +105,7 @@ impl Method for Params {
 #[derive(Debug, Clone)]
 pub struct PotentialField {
     params: Params,
-    rig: Arc<Rig>,
+    rig: Arc<PlannerContext>,
     sight: Arc<Sight>,
 }
 

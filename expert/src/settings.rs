@@ -36,7 +36,7 @@ pub struct PlanWeights {
 /// 5 cm (`examples/label_sources`): the paper says only that the distance to obstacles is kept as large as possible.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct BandConfig {
+pub struct ElasticBandSettings {
     /// Rounds of relaxation: a band then hardly remembers which plan it came from.
     pub iterations: u32,
     /// Something nearer than this pushes the band away, metres: half of the widest lane with a middle.
@@ -83,7 +83,7 @@ pub struct BandConfig {
 /// Settings of [`crate::ScriptedExpert`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ExpertConfig {
+pub struct ExpertSettings {
     /// Which ground it may plan over.
     pub sees: Sees,
     /// Decisions are this late, seconds (realism; 0 = off).
@@ -124,12 +124,12 @@ pub struct ExpertConfig {
     /// What makes a plan good.
     pub weights: PlanWeights,
     /// How the way ahead is smoothed.
-    pub band: BandConfig,
+    pub band: ElasticBandSettings,
     /// A plan must gain this share of its travel along the route: no turning back (methods.md 3.2).
     pub progress_share: f32,
 
     /// Where a plan's own arc is steered at (in corners): share of the free travel ahead of the bumper at which the
-    /// point lies: half of the .8 of expert-findings.md 5.2, as `BandConfig::reach_share`.
+    /// point lies: half of the .8 of expert-findings.md 5.2, as `ElasticBandSettings::reach_share`.
     pub station_share: f32,
     /// Clearance of the point and of the way to it, metres (expert-findings.md 5.2).
     pub point_clearance_m: f32,
@@ -149,7 +149,7 @@ pub struct ExpertConfig {
     pub label_retreat_step_m: f32,
 }
 
-impl ExpertConfig {
+impl ExpertSettings {
     /// The measured recipe of expert-findings.md 5 for the paper's three rules. The paper itself gives no number.
     pub fn paper() -> Self {
         Self {
@@ -176,7 +176,7 @@ impl ExpertConfig {
                 first_free: 0.3,
                 change: 0.1,
             },
-            band: BandConfig {
+            band: ElasticBandSettings {
                 iterations: 60,
                 comfort_m: 2.2,
                 middle_gain: 0.5,
