@@ -28,9 +28,10 @@ fn bad_input_gets_one_clear_error() {
     refuses(&["evaluate", "--driver", "expert", "--noise", "paper,paper"], &["paper", "twice"]);
     refuses(&["evaluate", "--driver", "expert", "--compare-with", "nobody"], &["nobody", "--driver"]);
     refuses(&["evaluate", "--driver", "expert", "--driver", "expert"], &["expert", "twice"]);
-    refuses(&["metres", "--below", "0"], &["--below 0"]);
-    refuses(&["metres", "--between", "1,1"], &["equal rates"]);
-    refuses(&["metres", "--between", "1,2", "--power", "1.5"], &["--power 1.5"]);
+    refuses(&["metres"], &["sample-size"]);
+    refuses(&["sample-size", "--below", "0"], &["--below 0"]);
+    refuses(&["sample-size", "--between", "1,1"], &["equal rates"]);
+    refuses(&["sample-size", "--between", "1,2", "--power", "1.5"], &["--power 1.5"]);
 }
 
 #[test]
@@ -90,8 +91,8 @@ fn settings_and_folders_that_cannot_be_used_leave_nothing() {
 }
 
 #[test]
-fn metres_are_calculated() {
-    let printed = succeed(xtask().args(["metres", "--below", "0.1", "--between", "1,0"]));
+fn sample_sizes_are_calculated() {
+    let printed = succeed(xtask().args(["sample-size", "--below", "0.1", "--between", "1,0"]));
     assert!(printed.contains("2996 m") && printed.contains("791 m"), "{printed}");
     refuses(&["train-dagger", "--resume", "no/such/run"], &["no/such/run"]);
 }
@@ -282,7 +283,7 @@ fn a_finished_run_is_not_overwritten() {
 
 #[test]
 fn help_has_examples_and_lists_are_printed() {
-    for command in ["train-dagger", "train-bc", "evaluate", "generate", "metres", "render"] {
+    for command in ["train-dagger", "train-bc", "evaluate", "generate", "sample-size", "render"] {
         let help = succeed(xtask().args([command, "--help"]));
         assert!(help.contains("Examples:"), "{command} --help has examples");
     }

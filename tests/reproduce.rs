@@ -14,7 +14,7 @@ const STAGES: [&str; 8] = [
     "drives/reference",
     "drives/unseen",
     "drives/rules",
-    "watched",
+    "on-policy",
 ];
 
 /// Files by name; the folder of the run, which replay keys name, is written as RUN.
@@ -80,7 +80,7 @@ fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
     for lost in ["finished.toml", "report.md", "report.html", "conclusions.csv", "chains/s1-any-below/finished.toml"] {
         std::fs::remove_file(resumed.join(lost)).unwrap();
     }
-    for lost in ["figures", "drives", "watched", "chains/s1-tau-only", "chains/s1-any-below/round-01"] {
+    for lost in ["figures", "drives", "on-policy", "chains/s1-tau-only", "chains/s1-any-below/round-01"] {
         std::fs::remove_dir_all(resumed.join(lost)).unwrap();
     }
     let printed_again = succeed(xtask().args(["--threads", "1", "reproduce", "--resume"]).arg(&resumed));

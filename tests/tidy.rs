@@ -3,6 +3,7 @@
 use crate::bench::{cargo, root, succeed};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// Normal dependencies (no dev, no build) of every workspace member.
 fn dependencies() -> BTreeMap<String, Vec<String>> {
@@ -20,44 +21,75 @@ fn dependencies() -> BTreeMap<String, Vec<String>> {
         .collect()
 }
 
+/// Each crate with the siblings that it may use: the data flows from left to right, never back.
+const LAYERS: [(&str, &[&str]); 9] = [
+    ("sim", &[]),
+    ("scenarios", &["sim"]),
+    ("expert", &["sim"]),
+    ("planners", &["sim"]),
+    ("policy", &["sim"]),
+    ("experiment", &["sim", "scenarios", "expert", "planners", "policy"]),
+    ("evaluation", &["sim", "planners", "policy", "experiment"]),
+    ("report", &["sim", "policy", "experiment", "evaluation"]),
+    ("xtask", &["sim", "scenarios", "planners", "policy", "experiment", "evaluation", "report"]),
+];
+
 #[test]
 fn dependencies_point_one_way() {
     let dependencies = dependencies();
-    let siblings = ["scenarios", "expert", "policy"];
-    for sibling in siblings {
-        assert!(dependencies[sibling].contains(&"sim".to_owned()), "{sibling} uses sim");
-        for other in siblings.iter().filter(|&&other| other != sibling) {
-            assert!(!dependencies[sibling].contains(&(*other).to_owned()), "{sibling} must not know {other}");
+    let crates = LAYERS.map(|(name, _)| name);
+    for (name, allowed) in LAYERS {
+        for sibling in dependencies[name].iter().filter(|name| crates.contains(&name.as_str())) {
+            assert!(allowed.contains(&sibling.as_str()), "{name} must not know {sibling}");
         }
     }
-    let forbidden_in_sim = ["scenarios", "expert", "policy", "xtask", "burn", "rerun", "clap", "image", "toml"];
-    for forbidden in forbidden_in_sim {
+    for forbidden in ["burn", "rerun", "clap", "image", "toml", "anyhow"] {
         assert!(!dependencies["sim"].contains(&forbidden.to_owned()), "sim must not know {forbidden}");
     }
     for (name, dependencies) in &dependencies {
-        for only_in_xtask in ["clap", "rerun", "indicatif", "anyhow"] {
+        for only_in_xtask in ["clap", "indicatif", "ctrlc"] {
             let knows = dependencies.contains(&only_in_xtask.to_owned());
             assert!(!knows || name == "xtask", "only xtask may know {only_in_xtask}, {name} does");
         }
+        assert!(!dependencies.contains(&"rerun".to_owned()), "nobody who trains waits for rerun, {name} does");
     }
+}
+
+/// Libraries report and return; only the command line prints.
+#[test]
+fn libraries_do_not_print() {
+    for (name, _) in LAYERS.iter().filter(|(name, _)| *name != "xtask") {
+        each_source(&root().join(name).join("src"), &mut |path, text| {
+            for word in ["println!", "eprintln!", "print!(", "clap::", "std::env::args"] {
+                assert!(!text.contains(word), "{} uses {word}", path.display());
+            }
+        });
+    }
+}
+
+/// Calls with every source file below a folder; returns how many there were.
+fn each_source(folder: &Path, look: &mut dyn FnMut(&Path, &str)) -> usize {
+    let mut seen = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            seen += each_source(&path, look);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            look(&path, &std::fs::read_to_string(&path).unwrap());
+            seen += 1;
+        }
+    }
+    seen
 }
 
 /// `sim` computes; it neither reads nor writes files, nor looks at the clock.
 #[test]
 fn sim_touches_no_files_and_no_clock() {
-    let mut files = vec![root().join("sim/src")];
-    let mut seen = 0;
-    while let Some(path) = files.pop() {
-        if path.is_dir() {
-            files.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
-            continue;
-        }
-        seen += 1;
-        let text = std::fs::read_to_string(&path).unwrap();
+    let seen = each_source(&root().join("sim/src"), &mut |path, text| {
         for word in ["std::fs", "std::time", "std::env", "println!", "rand::rng()"] {
             assert!(!text.contains(word), "{} uses {word}", path.display());
         }
-    }
+    });
     assert!(seen > 15, "only {seen} files were looked at");
 }
 
@@ -65,10 +97,10 @@ fn sim_touches_no_files_and_no_clock() {
 #[test]
 fn what_the_readme_names_exists() {
     let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
-    let crates = ["sim/", "scenarios/", "expert/", "policy/", "xtask/", "tests/"];
+    let crates = LAYERS.map(|(name, _)| format!("{name}/"));
     let mut named = 0;
     for word in readme.split('`').skip(1).step_by(2) {
-        if crates.iter().any(|folder| word.starts_with(folder)) && !word.contains([' ', '*', '{', '<']) {
+        if crates.iter().any(|folder| word.starts_with(folder.as_str())) && !word.contains([' ', '*', '{', '<']) {
             named += 1;
             assert!(root().join(word).exists(), "README.md names {word}, which does not exist");
         }

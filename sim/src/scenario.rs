@@ -253,6 +253,14 @@ impl Direction {
     /// Both, forward first.
     pub const BOTH: [Self; 2] = [Self::Forward, Self::Reverse];
 
+    /// `forward` or `reverse`, as in settings, tables and replay keys.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Forward => "forward",
+            Self::Reverse => "reverse",
+        }
+    }
+
     /// The scenario as driven in this direction.
     pub fn of(self, scenario: Scenario) -> Scenario {
         match self {

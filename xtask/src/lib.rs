@@ -1,48 +1,46 @@
-//! The bench: parse → resolve → call → report. No algorithm lives here.
-//!
-//! | file | what |
-//! |---|---|
-//! | [`cli`] | the command line, nothing else |
-//! | [`settings`] | preset → file → `--set` → flags, into one checked [`settings::Settings`] |
-//! | [`train`], [`evaluate`], [`reproduce`], [`generate`], [`pixel_accuracy`], [`metres`], [`tune`], [`listing`], [`render`] | the commands |
-//! | [`plots`] | plots as SVG |
-//! | [`run_report`], [`learning`] | `report.html` and `learning.csv` of a run |
-//! | [`lots`], [`drivers`] | what can be named on the command line |
-//! | [`trials`] | which obstacles and which noise a trial has |
-//! | [`failures`], [`replay_key`] | near-collisions one by one, and how to see one again |
-//! | [`table1`], [`summary`], [`report`], [`page`], [`paper`] | what is printed and written |
-//! | [`run_dir`] | the folder of a run and how it is claimed |
-//! | [`visualise`], [`recorder`] | recordings for Rerun's viewer |
-//! | [`progress`], [`interrupt`] | bars, Ctrl-C |
+//! The command line of lotpilot: clap → settings → call → exit code. No algorithm lives here.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what a command does")]
 #![allow(clippy::disallowed_methods, reason = "wall time is shown to people here; nothing computed depends on it")]
+#![allow(missing_docs, reason = "what users read is the help of clap")]
 
+mod args;
+mod build_info;
 pub mod cli;
-pub mod drivers;
-pub mod evaluate;
-pub mod failures;
-pub mod generate;
-pub mod interrupt;
-pub mod learning;
-pub mod listing;
-pub mod lots;
-pub mod metres;
-pub mod page;
-pub mod paper;
-pub mod pixel_accuracy;
-pub mod plots;
-pub mod progress;
-pub mod recorder;
-pub mod render;
-pub mod replay_key;
-pub mod report;
-pub mod reproduce;
-pub mod run_dir;
-pub mod run_report;
-pub mod settings;
-pub mod summary;
-pub mod table1;
-pub mod train;
-pub mod trials;
-pub mod tune;
-pub mod visualise;
+mod commands;
+mod console;
+mod interrupt;
+
+use clap::Parser as _;
+use experiment::progress::Interrupted;
+use std::process::ExitCode;
+
+/// Of every thread of the pool: as much as the main thread has on Linux.
+const STACK_BYTES: usize = 8 << 20;
+/// Bad input, or an environment in which the work cannot be done. Our own bugs panic (101).
+const EXIT_REFUSED: u8 = 2;
+/// Ended by Ctrl-C, as shells have it.
+const EXIT_INTERRUPTED: u8 = 130;
+
+/// Parses the command line, runs the command, and says what went wrong.
+pub fn main() -> ExitCode {
+    let cli = cli::Cli::parse();
+    match run(&cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) if error.is::<Interrupted>() => {
+            eprintln!("{error}");
+            ExitCode::from(EXIT_INTERRUPTED)
+        }
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(EXIT_REFUSED)
+        }
+    }
+}
+
+fn run(cli: &cli::Cli) -> anyhow::Result<()> {
+    interrupt::install()?;
+    rayon::ThreadPoolBuilder::new().num_threads(cli.threads()).stack_size(STACK_BYTES).build_global()?;
+    // Within the pool: a thread outside it goes to sleep and is woken up at every parallel step, three times per control
+    // tick. On a busy machine that costs more than the driving.
+    rayon::scope(|_| cli.run())
+}

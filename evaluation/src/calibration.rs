@@ -1,0 +1,72 @@
+//! Whether a network knows how wrong it is: errors against the σ predicted for them.
+
+use policy::checkpoint::Checkpoint;
+use policy::dataset::Sample;
+use policy::network::{DeviceChoice, Predictor};
+
+/// Bins of an axis, each with the same number of samples.
+const BINS: usize = 10;
+/// Errors of one axis of the look-ahead point against the σ predicted for them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct AxisCalibration {
+    /// `across`, `along`.
+    pub name: String,
+    /// Samples.
+    pub samples: usize,
+    /// Share of the labels within 1 σ and 2 σ of the answer, 0…1.
+    pub coverage: [f64; 2],
+    /// Root mean square of the predicted σ and of the error, metres, from the surest tenth of the samples to the least
+    /// sure.
+    pub bins: Vec<[f64; 2]>,
+}
+
+impl AxisCalibration {
+    /// Of `(error, predicted σ)` per sample, metres.
+    pub fn of(name: &str, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let mut samples: Vec<(f64, f64)> = samples.into_iter().collect();
+        samples.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let n = samples.len().max(1) as f64;
+        let within = |k: f64| samples.iter().filter(|(error, sigma)| error.abs() <= k * sigma).count() as f64 / n;
+        let rms =
+            |values: &mut dyn Iterator<Item = f64>, n: usize| (values.map(|v| v * v).sum::<f64>() / n as f64).sqrt();
+        let size = samples.len().div_ceil(BINS).max(1);
+        let bin = |bin: &[(f64, f64)]| {
+            [rms(&mut bin.iter().map(|s| s.1), bin.len()), rms(&mut bin.iter().map(|s| s.0), bin.len())]
+        };
+        Self {
+            name: name.to_owned(),
+            samples: samples.len(),
+            coverage: [within(1.0), within(2.0)],
+            bins: samples.chunks(size).map(bin).collect(),
+        }
+    }
+}
+
+/// Both axes of a policy on labelled samples: across and along the car, metres.
+pub fn of_policy(policy: &Checkpoint, samples: &[Sample], device: DeviceChoice) -> [AxisCalibration; 2] {
+    let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
+    let predictions = Predictor::new(policy.weights.clone(), device).predict(&grids);
+    let side_m = f64::from(policy.geometry.side_m);
+    [("across", 0), ("along", 1)].map(|(name, axis)| {
+        let errors = samples.iter().zip(&predictions).map(|(sample, prediction)| {
+            let error = f64::from(sample.label[axis] - prediction.mean[axis]);
+            (side_m * error, side_m * f64::from(prediction.sigma[axis]))
+        });
+        AxisCalibration::of(name, errors)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four errors by hand: σ = 1 for all, errors 0.5, −0.9, 1.5 and 3: half within 1 σ, three quarters within 2 σ.
+    #[test]
+    fn coverage_by_hand() {
+        let of = AxisCalibration::of("along", [(0.5, 1.0), (-0.9, 1.0), (1.5, 1.0), (3.0, 1.0)]);
+        assert_eq!((of.samples, of.coverage), (4, [0.5, 0.75]));
+        // The surest first: σ 0.1 with error 0.2, then σ 2 with error 1.
+        let of = AxisCalibration::of("along", [(1.0, 2.0), (-0.2, 0.1)]);
+        assert_eq!(of.bins, [[0.1, 0.2], [2.0, 1.0]]);
+    }
+}

@@ -1,0 +1,343 @@
+//! Which of the paper's conclusions hold here: decided by rule, from paired intervals, one sentence each.
+//!
+//! A comparison holds where the interval of 95 % of the paired difference lies on the paper's side of zero, does not hold
+//! where it lies on the other, and cannot be told where it contains zero.
+
+use crate::format::{difference, exact_rate};
+use crate::incidents::Cause;
+use crate::judge::Comparison;
+use crate::paper;
+use crate::plan::Plan;
+use crate::results::EvaluationResults;
+use crate::slices::Slice;
+use crate::statistics::bootstrap::Interval;
+use crate::statistics::comparison::RateRatio;
+use crate::statistics::poisson::{CONFIDENCE, upper_bound};
+use crate::statistics::sample_size::Question;
+use crate::totals::Totals;
+use experiment::drivers::NamedDriver;
+use policy::dagger::IterationRow;
+use serde::Serialize;
+
+/// The paper's driver.
+pub const DAGGER: &str = "DAgger";
+/// No near-collision supports "none" from the metres on that bound the rate here, one-sided, near-collisions per 100 m:
+/// 3 km.
+const NONE_PER_100M: f64 = 0.1;
+/// With fewer paired runs a resampled interval is too narrow to decide by (chosen: a reference lot has ten).
+const PAIRS_MIN: usize = 10;
+/// A rate is "as in the paper" within this factor.
+const AS_IN_THE_PAPER: f64 = 2.0;
+
+/// Index of the paper's driver; the first where it does not take part.
+pub fn compare_with(drivers: &[NamedDriver]) -> usize {
+    drivers.iter().position(|driver| driver.name == DAGGER).unwrap_or(0)
+}
+
+/// What became of a conclusion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Here, too.
+    Holds,
+    /// The opposite is seen.
+    DoesNotHold,
+    /// Not with this many metres.
+    CannotBeTold,
+}
+
+impl Verdict {
+    /// Heading in the report.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Holds => "Holds",
+            Self::DoesNotHold => "Does not hold",
+            Self::CannotBeTold => "Cannot be told with this many metres",
+        }
+    }
+
+    /// Of an interval that lies above zero if the paper is right.
+    fn of(interval: Option<Interval>) -> Self {
+        match interval {
+            Some(Interval { lower, .. }) if lower > 0.0 => Self::Holds,
+            Some(Interval { upper, .. }) if upper < 0.0 => Self::DoesNotHold,
+            _ => Self::CannotBeTold,
+        }
+    }
+}
+
+/// A conclusion and what became of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Statement {
+    /// The conclusion, in our words.
+    pub claim: String,
+    /// What became of it.
+    pub verdict: Verdict,
+    /// The figures it rests on.
+    pub figures: String,
+}
+
+/// An evaluation that has been driven.
+#[derive(Debug, Clone, Copy)]
+pub struct Driven<'a> {
+    /// What.
+    pub plan: &'a Plan<'a>,
+    /// What came of it.
+    pub results: &'a EvaluationResults,
+}
+
+impl Driven<'_> {
+    /// Index of a driver.
+    pub fn driver(&self, name: &str) -> Option<usize> {
+        self.plan.drivers.iter().position(|driver| driver.name == name)
+    }
+
+    /// All lots together.
+    pub fn all(&self) -> Slice {
+        self.results.slices().pop().expect("at least one lot is driven")
+    }
+
+    /// The lots nobody was trained on; `None` if that is all or nothing.
+    pub fn unseen(&self) -> Option<Slice> {
+        let groups = self.results.groups();
+        let unseen: Vec<&str> =
+            groups.iter().filter(|group| !group.is_trained_on).map(|group| group.name.as_str()).collect();
+        (unseen.len() < groups.len()).then_some(())?;
+        let slices = self.results.slices();
+        match unseen[..] {
+            [] => None,
+            [_] => (0..).zip(groups).find(|(_, f)| !f.is_trained_on).and_then(|(i, _)| slices.get(i as usize).cloned()),
+            _ => slices.into_iter().find(|slice| slice.label == "unseen"),
+        }
+    }
+
+    /// How all drivers compare with DAgger in a slice; `None` where it did not drive.
+    pub fn against_dagger(&self, slice: Slice, place: &str) -> Option<Against<'_>> {
+        let dagger = self.driver(DAGGER)?;
+        let (_, comparisons) = self.results.judge(0, &slice, dagger, self.plan.settings.evaluation.seed);
+        Some(Against { driven: *self, dagger, slice, place: place.to_owned(), comparisons })
+    }
+}
+
+/// The other drivers against DAgger on some lots.
+#[derive(Debug)]
+pub struct Against<'a> {
+    driven: Driven<'a>,
+    dagger: usize,
+    slice: Slice,
+    /// The lots, as in "on the paper's lots".
+    place: String,
+    /// Differences are theirs − DAgger's.
+    comparisons: Vec<Comparison>,
+}
+
+/// What the paper concludes from its drives on its lots.
+pub fn on_reference_lots(driven: &Driven<'_>) -> Vec<Statement> {
+    let Some(all) = driven.against_dagger(driven.all(), "on the paper's lots") else { return Vec::new() };
+    let unseen = driven.unseen().and_then(|unseen| driven.against_dagger(unseen, "on the lots it was not trained on"));
+    let mut statements = vec![all.no_near_collision()];
+    statements.extend(unseen.as_ref().map(Against::no_near_collision));
+    for planner in ["tentacle", "vvf"] {
+        let Some(other) = driven.driver(planner) else { continue };
+        statements.push(all.fails_less(other));
+        statements.extend(unseen.as_ref().map(|unseen| unseen.fails_less(other)));
+        statements.extend([all.keeps_further_away(other), all.steers_calmer(other), all.minds_noise_less(other)]);
+        statements.extend(all.fails_as_in_the_paper(other));
+    }
+    statements.extend(driven.driver("BC").map(|bc| all.fails_less(bc)));
+    statements
+}
+
+impl Against<'_> {
+    /// What should hold beyond the paper's own comparison: against all planners, of their kin and tuned ones included.
+    pub fn planners(&self) -> Vec<Statement> {
+        let is_planner =
+            |&other: &usize| !["expert", "BC", DAGGER].iter().any(|known| self.name(other).starts_with(known));
+        (0..self.driven.plan.drivers.len()).filter(is_planner).map(|other| self.fails_less(other)).collect()
+    }
+
+    fn name(&self, driver: usize) -> &str {
+        &self.driven.plan.drivers[driver].name
+    }
+
+    fn totals(&self, driver: usize) -> Totals {
+        self.driven.results.totals(0, driver, &self.slice, None)
+    }
+
+    /// `None` also with too few runs to decide by.
+    fn comparison(&self, other: usize) -> Option<&Comparison> {
+        let found = self.comparisons.iter().find(|comparison| comparison.driver == other);
+        found.filter(|comparison| comparison.pairs >= PAIRS_MIN)
+    }
+
+    fn rate(&self, driver: usize) -> String {
+        let Totals { near_collisions, reference_m, .. } = self.totals(driver);
+        let rate = exact_rate(near_collisions, reference_m);
+        format!("{} {near_collisions} in {reference_m:.0} m, {rate} per 100 m", self.name(driver))
+    }
+
+    fn no_near_collision(&self) -> Statement {
+        let totals = self.totals(self.dagger);
+        let bound = 100.0 * upper_bound(totals.near_collisions, CONFIDENCE) / totals.reference_m.max(f64::MIN_POSITIVE);
+        let verdict = match totals.near_collisions {
+            0 if bound <= NONE_PER_100M => Verdict::Holds,
+            0 => Verdict::CannotBeTold,
+            _ => Verdict::DoesNotHold,
+        };
+        Statement {
+            claim: format!("DAgger drives {} without a near-collision", self.place),
+            verdict,
+            figures: self.rate(self.dagger),
+        }
+    }
+
+    fn fails_less(&self, other: usize) -> Statement {
+        let found = self.comparison(other).and_then(|comparison| comparison.difference_per_100m);
+        let verdict = Verdict::of(found);
+        let (ours, theirs) = (self.rate(self.dagger), self.rate(other));
+        let mut figures = format!("{ours}; {theirs}; difference {}", difference(found, 2));
+        if verdict == Verdict::CannotBeTold {
+            figures += &metres_needed([other, self.dagger].map(|driver| self.totals(driver).rate().per_unit));
+        }
+        let claim = format!("DAgger has fewer near-collisions than {} {}", self.name(other), self.place);
+        Statement { claim, verdict, figures }
+    }
+
+    fn keeps_further_away(&self, other: usize) -> Statement {
+        let found = self.comparison(other).and_then(|comparison| comparison.difference_safe_ratio).map(negated);
+        let name = self.name(other);
+        let [ours, theirs] = [self.dagger, other].map(|driver| self.totals(driver).safe_ratio());
+        Statement {
+            claim: format!("DAgger has a larger safe ratio than {name}"),
+            verdict: Verdict::of(found),
+            figures: format!("DAgger {ours:.3}, {name} {theirs:.3}; difference {}", difference(found, 3)),
+        }
+    }
+
+    fn steers_calmer(&self, other: usize) -> Statement {
+        let found = self.comparison(other).and_then(|comparison| comparison.difference_reversals_per_100m);
+        let name = self.name(other);
+        let [ours, theirs] = [self.dagger, other].map(|driver| self.totals(driver).reversals_per_100m());
+        Statement {
+            claim: format!("DAgger oscillates less than {name}"),
+            verdict: Verdict::of(found),
+            figures: format!(
+                "steering reversals per 100 m: DAgger {ours:.1}, {name} {theirs:.1}; difference {}",
+                difference(found, 1)
+            ),
+        }
+    }
+
+    /// Near-collisions that the same driver avoids on the clean grid. They are few: compared exactly, without pairs.
+    fn minds_noise_less(&self, other: usize) -> Statement {
+        let count = |driver| {
+            let noisy = self.driven.results.count_of_cause(0, driver, &self.slice, Cause::NoiseInduced);
+            (noisy, self.totals(driver).reference_m / 100.0)
+        };
+        let name = self.name(other);
+        let [ours, theirs] = [self.dagger, other].map(count);
+        let ratio = RateRatio::new(theirs, ours);
+        let verdict = if ratio.lower > 1.0 {
+            Verdict::Holds
+        } else if ratio.upper.is_some_and(|upper| upper < 1.0) {
+            Verdict::DoesNotHold
+        } else {
+            Verdict::CannotBeTold
+        };
+        let figures = format!(
+            "noise-induced near-collisions: DAgger {}, {name} {}; rate ratio {}",
+            ours.0,
+            theirs.0,
+            interval_of(&ratio)
+        );
+        Statement { claim: format!("DAgger is more robust against noise than {name}"), verdict, figures }
+    }
+
+    /// Whether a planner of the paper fails about as often here; `None` where the paper did not drive.
+    fn fails_as_in_the_paper(&self, planner: usize) -> Option<Statement> {
+        let name = self.name(planner);
+        let of_paper = paper::DRIVERS.iter().position(|known| *known == name)?;
+        let (events, metres) = paper::count(of_paper, |_| true);
+        let groups = self.driven.results.groups();
+        let has_all = paper::LOTS.iter().all(|lot| groups.iter().any(|group| group.name == lot.lot));
+        let ours = (has_all && groups.len() == paper::LOTS.len()).then(|| self.totals(planner))?;
+        let ratio = RateRatio::new((ours.near_collisions, ours.reference_m / 100.0), (events, metres / 100.0));
+        let upper = ratio.upper.unwrap_or(f64::INFINITY);
+        let verdict = if 1.0 / AS_IN_THE_PAPER <= ratio.lower && upper <= AS_IN_THE_PAPER {
+            Verdict::Holds
+        } else if ratio.lower > 1.0 || upper < 1.0 {
+            Verdict::DoesNotHold
+        } else {
+            Verdict::CannotBeTold
+        };
+        Some(Statement {
+            claim: format!("{name} fails about as often as in the paper (within a factor of {AS_IN_THE_PAPER})"),
+            verdict,
+            figures: format!(
+                "{}; paper {events} in {metres:.0} m, {} per 100 m; rate ratio {}",
+                self.rate(planner),
+                exact_rate(events, metres),
+                interval_of(&ratio)
+            ),
+        })
+    }
+}
+
+fn negated(Interval { estimate, lower, upper }: Interval) -> Interval {
+    Interval { estimate: -estimate, lower: -upper, upper: -lower }
+}
+
+/// What it would take to tell two rates apart, if they are what was seen.
+fn metres_needed(per_100m: [f64; 2]) -> String {
+    if per_100m[0] == per_100m[1] {
+        return String::new();
+    }
+    let question = Question { per_100m, power: 0.8, alpha: 1.0 - CONFIDENCE, dispersion: 1.0 };
+    format!("; if these are the rates, about {:.0} km each would tell", (question.metres_each() / 1000.0).ceil())
+}
+
+fn interval_of(ratio: &RateRatio) -> String {
+    let number = |value: Option<f64>| value.map_or_else(|| "∞".to_owned(), |value| format!("{value:.2}"));
+    let estimate = ratio.ratio.map_or_else(|| "–".to_owned(), |value| format!("{value:.2}"));
+    format!("{estimate} [{:.2}, {}]", ratio.lower, number(ratio.upper))
+}
+
+/// The network's share rises from iteration to iteration until it passes η. One training decides; there is no interval.
+pub fn share_of_the_network(rows: &[IterationRow], eta: f64) -> Statement {
+    let shares: Vec<f64> = rows.iter().filter_map(|row| row.eta_hat).collect();
+    let verdict = match shares[..] {
+        [first, .., last] if last > eta && last > first => Verdict::Holds,
+        [only] if only > eta => Verdict::CannotBeTold,
+        [] => Verdict::CannotBeTold,
+        _ => Verdict::DoesNotHold,
+    };
+    let shares: Vec<String> = shares.iter().map(|share| format!("{share:.3}")).collect();
+    Statement {
+        claim: format!("η̂ rises over the iterations to more than {eta}"),
+        verdict,
+        figures: format!("η̂ = {}; paper .44, .64, .65, .74, .90", shares.join(", ")),
+    }
+}
+
+/// The weight α τ̂ makes Σ τ̂ smaller: the ratio of an iteration lies below one.
+pub fn effect_of_the_weight(iteration: u32, ratio: Option<Interval>) -> Statement {
+    let below_one = ratio.map(|Interval { estimate, lower, upper }| Interval {
+        estimate: 1.0 - estimate,
+        lower: 1.0 - upper,
+        upper: 1.0 - lower,
+    });
+    let figures = ratio.map_or_else(
+        || "too few held-back samples".to_owned(),
+        |Interval { estimate, lower, upper }| {
+            format!("Σ τ̂ with the weight over without: {estimate:.3} [{lower:.3}, {upper:.3}]; paper .62 … .91")
+        },
+    );
+    Statement {
+        claim: format!("the weight on τ̂ lowers the network's error (iteration {iteration})"),
+        verdict: Verdict::of(below_one),
+        figures,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,170 @@
+use super::*;
+use experiment::drivers::NamedDriver;
+use experiment::lots::Lot;
+use experiment::settings::Settings;
+use experiment::trials::{Purpose, Trial};
+use sim::episode::{Ending, EpisodeReport};
+use sim::metrics::EpisodeMetrics;
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+
+fn driver(name: &str) -> NamedDriver {
+    NamedDriver::expert(&expert::ExpertSettings::paper()).renamed(name)
+}
+
+/// What a driver did in a run.
+#[derive(Clone, Copy)]
+struct Run {
+    near_collisions: u32,
+    safe_ratio: f32,
+    steering_reversals: u32,
+}
+
+/// Statements about made-up runs of 1 km on the paper's lots: five trials, both ways.
+fn statements(names: &[&str], of: impl Fn(&str, &Trial<'_>) -> Run) -> Vec<Statement> {
+    let settings = Settings::preset("default").unwrap();
+    let drivers: Vec<NamedDriver> = names.iter().map(|name| driver(name)).collect();
+    let lots = Lot::parse_all(&["reference"]).unwrap();
+    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0 };
+    let mut results = EvaluationResults::new(&plan);
+    for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 5, &Direction::BOTH).enumerate() {
+        for (driver, name) in names.iter().enumerate() {
+            let Run { near_collisions, safe_ratio, steering_reversals } = of(name, &trial);
+            let metrics = EpisodeMetrics {
+                near_collisions,
+                safe_ratio,
+                steering_reversals,
+                reference_m: 1000.0,
+                driven_m: 1000.0,
+                ..EpisodeMetrics::default()
+            };
+            results.add(
+                0,
+                driver,
+                index,
+                &trial,
+                &EpisodeReport { ending: Ending::ReachedEnd, metrics, events: vec![] },
+            );
+        }
+    }
+    on_reference_lots(&Driven { plan: &plan, results: &results })
+}
+
+fn verdict(statements: &[Statement], claim: &str) -> Verdict {
+    let found: Vec<&Statement> = statements.iter().filter(|statement| statement.claim.contains(claim)).collect();
+    assert_eq!(found.len(), 1, "{claim}: {statements:#?}");
+    found[0].verdict
+}
+
+#[test]
+fn where_the_paper_is_right_everything_holds() {
+    let found = statements(&["BC", DAGGER, "tentacle", "vvf"], |name, trial| match name {
+        DAGGER => Run { near_collisions: 0, safe_ratio: 0.85, steering_reversals: 10 },
+        "BC" => Run { near_collisions: 1, safe_ratio: 0.84, steering_reversals: 11 },
+        // 1.37 per 100 m and more reversals, a little different in every run.
+        _ => Run { near_collisions: 13 + trial.index % 3, safe_ratio: 0.7, steering_reversals: 40 + trial.index },
+    });
+    for claim in [
+        "paper's lots without a near-collision",
+        "not trained on without a near-collision",
+        "fewer near-collisions than tentacle on the paper's",
+        "fewer near-collisions than vvf on the lots it was not",
+        "fewer near-collisions than BC",
+        "larger safe ratio than tentacle",
+        "oscillates less than vvf",
+        "tentacle fails about as often",
+    ] {
+        assert_eq!(verdict(&found, claim), Verdict::Holds, "{claim}: {found:#?}");
+    }
+    // No cause was found for any of them.
+    assert_eq!(verdict(&found, "robust against noise than vvf"), Verdict::CannotBeTold);
+    let figures =
+        &found.iter().find(|statement| statement.claim.contains("than tentacle on the paper's")).unwrap().figures;
+    assert!(figures.contains("DAgger 0 in 30000 m, 0.00 [0.00, 0.01]") && figures.contains('*'), "{figures}");
+}
+
+#[test]
+fn the_opposite_does_not_hold() {
+    let found = statements(&[DAGGER, "vvf"], |name, trial| {
+        if name == DAGGER {
+            Run { near_collisions: 30 + trial.index, safe_ratio: 0.7, steering_reversals: 50 }
+        } else {
+            Run { near_collisions: 1, safe_ratio: 0.8, steering_reversals: 20 + trial.index }
+        }
+    });
+    for claim in [
+        "paper's lots without",
+        "fewer near-collisions than vvf on the paper's",
+        "safe ratio",
+        "oscillates",
+        "as often",
+    ] {
+        assert_eq!(verdict(&found, claim), Verdict::DoesNotHold, "{claim}: {found:#?}");
+    }
+}
+
+#[test]
+fn what_goes_either_way_cannot_be_told_and_the_metres_that_would_tell_are_named() {
+    // Differences of +1 and −1 in turns; in the last trial of every lot +2 and 0.
+    let found = statements(&[DAGGER, "tentacle"], |name, trial| {
+        let is_worse = (trial.index + u32::from(trial.direction == Direction::Reverse)) % 2 == 0;
+        let near_collisions =
+            if name == DAGGER { 2 } else { 2 + u32::from(is_worse) * 2 - u32::from(trial.index != 4) };
+        Run { near_collisions, safe_ratio: 0.8, steering_reversals: 10 }
+    });
+    assert_eq!(verdict(&found, "fewer near-collisions than tentacle on the paper's"), Verdict::CannotBeTold);
+    let statement = found.iter().find(|statement| statement.claim.contains("tentacle on the paper's")).unwrap();
+    assert!(statement.figures.contains("km each would tell"), "{statement:?}");
+    // Equal everywhere: the interval is the point zero.
+    assert_eq!(verdict(&found, "larger safe ratio"), Verdict::CannotBeTold);
+}
+
+#[test]
+fn none_in_a_few_metres_is_no_proof() {
+    let settings = Settings::preset("default").unwrap();
+    let drivers = [driver(DAGGER)];
+    let lots = Lot::parse_all(&["lot-b"]).unwrap();
+    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0 };
+    let driven_m = |reference_m| {
+        let mut results = EvaluationResults::new(&plan);
+        let metrics = EpisodeMetrics { reference_m, driven_m: reference_m, ..EpisodeMetrics::default() };
+        let trial = Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 1, &[Direction::Forward]).next().unwrap();
+        results.add(0, 0, 0, &trial, &EpisodeReport { ending: Ending::ReachedEnd, metrics, events: vec![] });
+        on_reference_lots(&Driven { plan: &plan, results: &results })[0].verdict
+    };
+    // 3.0 / 0.1 hundred metres (methods.md 8.3).
+    assert_eq!((driven_m(2990.0), driven_m(3000.0)), (Verdict::CannotBeTold, Verdict::Holds));
+}
+
+#[test]
+fn shares_and_effects() {
+    let rows = |shares: &[f64]| -> Vec<IterationRow> {
+        let row = |(round, share): (u32, &f64)| IterationRow {
+            round,
+            samples: 1,
+            dataset: 1,
+            eta_hat: Some(*share),
+            tau_hat_per_s: None,
+            near_collisions: 0,
+            validation_nll: None,
+            validation_rmse_m: None,
+        };
+        (1..).zip(shares).map(row).collect()
+    };
+    for (shares, expected) in [
+        (&[0.44, 0.64, 0.91] as &[f64], Verdict::Holds),
+        (&[0.87, 0.84, 0.85], Verdict::DoesNotHold),
+        (&[0.95], Verdict::CannotBeTold),
+        (&[0.80], Verdict::DoesNotHold),
+        (&[], Verdict::CannotBeTold),
+    ] {
+        assert_eq!(share_of_the_network(&rows(shares), 0.9).verdict, expected, "{shares:?}");
+    }
+    let effect = |lower, upper| {
+        effect_of_the_weight(1, Some(Interval { estimate: 0.5 * (lower + upper), lower, upper })).verdict
+    };
+    assert_eq!(effect(0.6, 0.9), Verdict::Holds);
+    assert_eq!(effect(0.9, 1.1), Verdict::CannotBeTold);
+    assert_eq!(effect(1.1, 1.2), Verdict::DoesNotHold);
+    assert_eq!(effect_of_the_weight(1, None).verdict, Verdict::CannotBeTold);
+}

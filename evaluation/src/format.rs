@@ -1,0 +1,73 @@
+//! How rates, differences and p-values are written.
+
+use crate::judge::DriverEstimate;
+use crate::statistics::bootstrap::Interval;
+use crate::statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
+use crate::totals::Totals;
+
+/// The rate with the interval that may be quoted (methods.md 8.3).
+pub fn quoted_rate(totals: &Totals, estimate: &DriverEstimate) -> String {
+    let is_clustered = estimate.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
+    match estimate.per_100m.filter(|_| is_clustered) {
+        Some(Interval { lower, upper, .. }) => {
+            format!("{:.2} [{lower:.2}, {upper:.2}] (b)", totals.rate().per_unit)
+        }
+        None => exact_rate(totals.near_collisions, totals.reference_m),
+    }
+}
+
+/// The rate with its exact interval; for a count of zero the bound it really supports.
+pub fn exact_rate(near_collisions: u32, reference_m: f64) -> String {
+    let rate = Rate::new(near_collisions, reference_m / 100.0);
+    let interval = format!("{:.2} [{:.2}, {:.2}]", rate.per_unit, rate.lower, rate.upper);
+    if near_collisions > 0 {
+        return interval;
+    }
+    format!("{interval}, < {:.3} one-sided", bound_per_100m(0, reference_m))
+}
+
+/// The one-sided upper bound that a count supports, near-collisions per 100 m.
+pub fn bound_per_100m(near_collisions: u32, reference_m: f64) -> f64 {
+    100.0 * upper_bound(near_collisions, CONFIDENCE) / reference_m
+}
+
+/// A difference with its interval; `*` if that excludes zero.
+pub fn difference(interval: Option<Interval>, digits: usize) -> String {
+    interval.map_or_else(
+        || "–".to_owned(),
+        |interval| {
+            let Interval { estimate, lower, upper } = interval;
+            let mark = if interval.excludes_zero() { " *" } else { "" };
+            format!("{estimate:+.digits$} [{lower:+.digits$}, {upper:+.digits$}]{mark}")
+        },
+    )
+}
+
+/// A p-value to four decimals.
+pub fn p_value(p: f64) -> String {
+    if p < 1e-4 { "< .0001".to_owned() } else { format!("{p:.4}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::statistics::poisson::Dispersion;
+
+    #[test]
+    fn a_zero_says_what_it_supports_and_clusters_are_quoted_by_the_bootstrap() {
+        assert_eq!(exact_rate(0, 5180.0), "0.00 [0.00, 0.07], < 0.058 one-sided");
+        assert_eq!(exact_rate(71, 5180.0), "1.37 [1.07, 1.73]");
+        let totals = Totals { near_collisions: 71, reference_m: 5180.0, ..Totals::default() };
+        let interval = Interval { estimate: 1.37, lower: 0.9, upper: 2.0 };
+        let estimate = |index| DriverEstimate {
+            dispersion: Some(Dispersion { index, freedom: 9, p_value: 0.1 }),
+            per_100m: Some(interval),
+            safe_ratio: None,
+        };
+        assert_eq!(quoted_rate(&totals, &estimate(1.5)), "1.37 [1.07, 1.73]");
+        assert_eq!(quoted_rate(&totals, &estimate(1.6)), "1.37 [0.90, 2.00] (b)");
+        assert_eq!(difference(Some(interval), 1), "+1.4 [+0.9, +2.0] *");
+        let around_zero = Interval { lower: -0.1, ..interval };
+        assert_eq!(difference(Some(around_zero), 1), "+1.4 [-0.1, +2.0]");
+    }
+}

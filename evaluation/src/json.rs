@@ -1,0 +1,32 @@
+//! JSON files with a version.
+
+use anyhow::{Context as _, ensure};
+use serde::de::DeserializeOwned;
+use std::path::Path;
+
+/// Reads a file whose field `schema` is the version of its format; `None` if there is no such file.
+///
+/// # Errors
+/// If it is not what it should be, or of another version.
+pub fn read_versioned<T: DeserializeOwned>(path: &Path, schema: u32) -> anyhow::Result<Option<T>> {
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let value: serde_json::Value = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
+    let found = value.get("schema").and_then(serde_json::Value::as_u64).unwrap_or(0);
+    ensure!(
+        found == u64::from(schema),
+        "{}: written by another version of lotpilot (schema {found}, this one reads {schema}); make it again",
+        path.display()
+    );
+    serde_json::from_value(value).map(Some).with_context(|| path.display().to_string())
+}
+
+/// Pretty JSON with a newline at its end.
+///
+/// # Errors
+/// If the value cannot be written as JSON.
+pub fn to_text(value: &impl serde::Serialize) -> anyhow::Result<String> {
+    Ok(serde_json::to_string_pretty(value)? + "\n")
+}

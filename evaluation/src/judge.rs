@@ -1,0 +1,178 @@
+//! How drivers compare in a slice of the lots, judged by resampling (docs/methods.md 8.3).
+
+use crate::results::{EvaluationResults, RunSummary};
+use crate::slices::Slice;
+use crate::statistics::bootstrap::{DRAWS, Interval, Units};
+use crate::statistics::comparison::{RateRatio, holm};
+use crate::statistics::poisson::Dispersion;
+use serde::Serialize;
+use sim::seed::RootSeed;
+
+/// A driver in a slice, judged by resampling.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct DriverEstimate {
+    /// How clustered its near-collisions are; `None` where that cannot be said.
+    pub dispersion: Option<Dispersion>,
+    /// Near-collisions per 100 m; `None` with a single unit per lot.
+    pub per_100m: Option<Interval>,
+    /// Safe ratio, mean over runs.
+    pub safe_ratio: Option<Interval>,
+}
+
+/// A driver against the one all are compared with: differences are driver − other, so that a positive one speaks for
+/// the other.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Index of the driver in the plan.
+    #[serde(skip)]
+    pub driver: usize,
+    /// Runs both have driven.
+    pub pairs: usize,
+    /// Near-collisions per 100 m, paired bootstrap; `None` with a single unit per lot.
+    pub difference_per_100m: Option<Interval>,
+    /// Safe ratio, paired bootstrap.
+    pub difference_safe_ratio: Option<Interval>,
+    /// Steering reversals per 100 m driven, paired bootstrap.
+    pub difference_reversals_per_100m: Option<Interval>,
+    /// Rates, exact if events are independent.
+    pub ratio: RateRatio,
+    /// Its p-value, adjusted for the number of drivers compared (Holm).
+    pub p_holm: f64,
+}
+
+impl EvaluationResults {
+    /// How the drivers stand in a slice at a noise level, and how they compare with one of them. Resampled are units
+    /// (lot, direction, seed) within each lot (methods.md 8.3); of generated lots, which are a sample themselves, whole
+    /// lots within their kind (chosen). Only runs that all drivers have driven count.
+    pub fn judge(
+        &self,
+        level: usize,
+        slice: &Slice,
+        with: usize,
+        seed: RootSeed,
+    ) -> (Vec<DriverEstimate>, Vec<Comparison>) {
+        let pairs = self.common_runs(level, slice);
+        let drivers = self.drivers[level].len();
+        let mut estimates = vec![DriverEstimate::default(); drivers];
+        if pairs.is_empty() {
+            return (estimates, Vec::new());
+        }
+        for (driver, estimate) in estimates.iter_mut().enumerate() {
+            estimate.dispersion = dispersion(&pairs, driver);
+        }
+        let others: Vec<usize> = (0..drivers).filter(|&driver| driver != with).collect();
+        let intervals = bootstrap(&pairs, &others, with, seed);
+        let interval = |index: usize| intervals.as_ref().map(|intervals| intervals[index]);
+        for (driver, estimate) in estimates.iter_mut().enumerate() {
+            estimate.per_100m = interval(STATISTICS * driver);
+            estimate.safe_ratio = interval(STATISTICS * driver + 1);
+        }
+        let counts = |driver: usize| {
+            let units = pairs.iter().map(|row| row[driver]);
+            let (events, metres) = units.fold((0, 0.0), |(events, metres), unit| {
+                (events + unit.near_collisions, metres + f64::from(unit.reference_m))
+            });
+            (events, metres / 100.0)
+        };
+        let ratios: Vec<RateRatio> = others.iter().map(|&other| RateRatio::new(counts(other), counts(with))).collect();
+        let p_holm = holm(&ratios.iter().map(|ratio| ratio.p_value).collect::<Vec<_>>());
+        let comparisons = others.iter().zip(ratios).zip(p_holm).enumerate().map(|(i, ((&driver, ratio), p_holm))| {
+            let first = STATISTICS * (drivers + i);
+            Comparison {
+                driver,
+                pairs: pairs.len(),
+                difference_per_100m: interval(first),
+                difference_safe_ratio: interval(first + 1),
+                difference_reversals_per_100m: interval(first + 2),
+                ratio,
+                p_holm,
+            }
+        });
+        (estimates, comparisons.collect())
+    }
+
+    /// Per trial of the slice that every driver has finished, the units of all drivers.
+    fn common_runs(&self, level: usize, slice: &Slice) -> Vec<Vec<RunSummary>> {
+        let Some((first, rest)) = self.drivers[level].split_first() else { return Vec::new() };
+        let of_trial = |units: &[RunSummary], trial: u32| {
+            units.binary_search_by_key(&trial, |unit| unit.trial).ok().map(|index| units[index])
+        };
+        let row = |unit: &RunSummary| {
+            let rest = rest.iter().map(|results| of_trial(&results.runs, unit.trial));
+            std::iter::once(Some(*unit)).chain(rest).collect()
+        };
+        first.runs.iter().filter(|unit| slice.contains(unit.group)).filter_map(row).collect()
+    }
+}
+
+fn dispersion(pairs: &[Vec<RunSummary>], driver: usize) -> Option<Dispersion> {
+    let strata: Vec<Vec<(u32, f64)>> = strata(pairs)
+        .map(|clusters| {
+            let cluster = |rows: &[Vec<RunSummary>]| {
+                let units = rows.iter().map(|row| row[driver]);
+                units.fold((0, 0.0), |(n, m), unit| (n + unit.near_collisions, m + f64::from(unit.reference_m)))
+            };
+            clusters.into_iter().map(cluster).collect()
+        })
+        .collect();
+    Dispersion::within(strata.iter().map(Vec::as_slice))
+}
+
+/// Stratum by stratum its clusters. Trials are ordered lot by lot, so clusters lie together; groups need not.
+fn strata(pairs: &[Vec<RunSummary>]) -> impl Iterator<Item = Vec<&[Vec<RunSummary>]>> {
+    let mut groups: Vec<u32> = pairs.iter().map(|row| row[0].group).collect();
+    groups.sort_unstable();
+    groups.dedup();
+    groups.into_iter().map(|group| {
+        let clusters = pairs.chunk_by(|a, b| a[0].cluster == b[0].cluster);
+        clusters.filter(|rows| rows[0][0].group == group).collect()
+    })
+}
+
+/// Resampled of every driver: near-collisions per 100 m, safe ratio, steering reversals per 100 m driven.
+const STATISTICS: usize = 3;
+/// Sums per driver that they are made of, behind the runs and the hundreds of metres that all share.
+const COLUMNS: usize = 4;
+const SHARED: usize = 2;
+
+/// The statistics of every driver, then their differences of every other driver from `with`. `None` if nothing varies
+/// because every stratum has a single cluster.
+fn bootstrap(pairs: &[Vec<RunSummary>], others: &[usize], with: usize, seed: RootSeed) -> Option<Vec<Interval>> {
+    let drivers = pairs[0].len();
+    let columns = SHARED + COLUMNS * drivers;
+    let mut units = Units::new(columns);
+    let mut largest = 0;
+    for clusters in strata(pairs) {
+        units.begin_stratum();
+        largest = largest.max(clusters.len());
+        for rows in clusters {
+            let mut sums = vec![0.0; columns];
+            for row in rows {
+                sums[0] += 1.0;
+                sums[1] += f64::from(row[0].reference_m) / 100.0;
+                for (sums, unit) in sums[SHARED..].chunks_exact_mut(COLUMNS).zip(row) {
+                    sums[0] += f64::from(unit.near_collisions);
+                    sums[1] += f64::from(unit.safe_ratio);
+                    sums[2] += f64::from(unit.steering_reversals);
+                    sums[3] += f64::from(unit.driven_m) / 100.0;
+                }
+            }
+            units.push(&sums);
+        }
+    }
+    let of_sums = |sums: &[f64], out: &mut [f64]| {
+        let of_drivers = sums[SHARED..].chunks_exact(COLUMNS);
+        for (of_driver, out) in of_drivers.zip(out.chunks_exact_mut(STATISTICS)) {
+            out[0] = of_driver[0] / sums[1];
+            out[1] = of_driver[1] / sums[0];
+            out[2] = of_driver[2] / of_driver[3].max(f64::MIN_POSITIVE);
+        }
+        for (i, &other) in others.iter().enumerate() {
+            for which in 0..STATISTICS {
+                let of = |driver: usize| out[STATISTICS * driver + which];
+                out[STATISTICS * (drivers + i) + which] = of(other) - of(with);
+            }
+        }
+    };
+    (largest > 1).then(|| units.percentile_intervals(seed, DRAWS, STATISTICS * (drivers + others.len()), &of_sums))
+}

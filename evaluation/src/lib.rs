@@ -1,0 +1,36 @@
+//! What drivers did: measured, explained and compared, as data. What people read of it is made by `report`.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`plan`], [`mod@evaluate`] | drivers × lots × directions × trials × noise levels, driven and written down |
+//! | [`records`] | the lines of `runs.jsonl`, `failures.jsonl`, `wall_time.jsonl` |
+//! | [`incidents`] | near-collisions one by one, and why they happened |
+//! | [`totals`], [`slices`], [`results`], [`judge`] | runs added up, pooled and compared |
+//! | [`statistics`] | exact intervals, comparisons, paired bootstrap, sample sizes |
+//! | [`summary`], [`table1`] | the tables as data |
+//! | [`calibration`], [`on_policy`] | whether the predicted variance is right, on held-back and on driven states |
+//! | [`paper`], [`conclusions`], [`stages`] | the paper's figures, which of its conclusions hold here, and what is done to find out |
+//! | [`tune`] | parameters of planners, searched alike for each |
+//! | [`pixel_accuracy`] | how wrong the noisy view is |
+
+pub mod calibration;
+pub mod conclusions;
+pub mod evaluate;
+pub mod format;
+pub mod incidents;
+pub mod json;
+pub mod judge;
+pub mod on_policy;
+pub mod paper;
+pub mod pixel_accuracy;
+pub mod plan;
+pub mod read;
+pub mod records;
+pub mod results;
+pub mod slices;
+pub mod stages;
+pub mod statistics;
+pub mod summary;
+pub mod table1;
+pub mod totals;
+pub mod tune;

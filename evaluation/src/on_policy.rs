@@ -1,0 +1,283 @@
+//! On-policy labelled rollouts: networks drive, the expert labels every tick. Is the predicted variance right there, and
+//! what does the weight on τ̂ change?
+
+use crate::calibration::{self, AxisCalibration};
+use crate::json;
+use crate::stages::Chain;
+use crate::statistics::bootstrap::{DRAWS, Interval, Units};
+use anyhow::Context as _;
+use experiment::lots::Lot;
+use experiment::progress::Progress;
+use experiment::run_dir::{self, RunDir};
+use experiment::settings::Settings;
+use experiment::trials::{self, Purpose, Trial};
+use experiment::{drive, drivers};
+use policy::checkpoint::Checkpoint;
+use policy::dagger::{Collected, GatedCollector, Keep};
+use policy::dataset::store::Store;
+use policy::dataset::{Dataset, Sample, Split, ValidationSplit};
+use policy::decision_rule::{DecisionRule, Evidence};
+use policy::network::Predictor;
+use serde::{Deserialize, Serialize};
+use sim::batch::run_lockstep;
+use sim::driver::Driver;
+use sim::seed::RootSeed;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The version of `on_policy.json` that this program writes.
+pub const SCHEMA: u32 = 1;
+const FILE: &str = "on_policy.json";
+
+/// What was found; `on_policy.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OnPolicy {
+    /// Version of the format: [`SCHEMA`].
+    pub schema: u32,
+    /// Per policy, kind of states and axis.
+    pub calibration: Vec<Calibration>,
+    /// Per iteration.
+    pub effect: Vec<Effect>,
+}
+
+/// How large errors are where the network says how large they will be.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// Whose.
+    pub policy: String,
+    /// In which states.
+    pub states: States,
+    /// `across` or `along`.
+    pub axis: String,
+    /// Labels.
+    pub samples: usize,
+    /// Share of the labels within 1 σ and 2 σ of the mean, 0…1; .683 and .954 if errors are normal and σ is right.
+    pub coverage: [f64; 2],
+    /// Root mean squares of the predicted σ and of the error, metres, by tenths of the samples, the surest first.
+    pub bins: Vec<[f64; 2]>,
+}
+
+/// Where errors were looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum States {
+    /// Samples of its data set that it was not trained on.
+    HeldBack,
+    /// Those it came into by driving.
+    OnPolicy,
+}
+
+/// Σ τ̂ of two policies of the same iteration, trained with and without the weight α τ̂.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Effect {
+    /// Which.
+    pub iteration: u32,
+    /// Ratio on the held-back samples of both data sets so far; resampled in stretches of a validation block.
+    pub held_back: Option<Interval>,
+    /// Σ τ̂ per second while driving, with the weight and without.
+    pub driving_per_s: [f64; 2],
+}
+
+impl OnPolicy {
+    /// Of a finished stage.
+    ///
+    /// # Errors
+    /// If its file cannot be read.
+    pub fn read(folder: &Path) -> anyhow::Result<Self> {
+        let path = folder.join(FILE);
+        json::read_versioned(&path, SCHEMA)?.with_context(|| format!("{}: is missing", path.display()))
+    }
+}
+
+/// A finished training.
+struct Trained {
+    store: Store,
+    rounds: Vec<u32>,
+}
+
+impl Trained {
+    fn open(folder: &Path) -> anyhow::Result<Self> {
+        let store = Store::open(folder)?;
+        let rounds = (0..u32::MAX).take_while(|&round| Checkpoint::exists(&store.round_folder(round))).collect();
+        Ok(Self { store, rounds })
+    }
+
+    fn iterations(&self) -> u32 {
+        self.rounds.last().copied().unwrap_or(0)
+    }
+
+    /// Samples held back of the rounds from one to another.
+    fn held_back(&self, from: u32, to: u32, by: ValidationSplit) -> anyhow::Result<Vec<Sample>> {
+        let mut dataset = Dataset::default();
+        let mut skipped = 0;
+        for round in 0..=to {
+            if round == from {
+                skipped = dataset.split(by).validation.len();
+            }
+            dataset.push(self.store.read_samples(round)?.into());
+        }
+        let Split { mut validation, .. } = dataset.split(by);
+        Ok(validation.split_off(skipped))
+    }
+}
+
+/// Drives, compares and writes; `false` if it was cancelled.
+///
+/// # Errors
+/// If a chain is incomplete or a file cannot be read or written.
+pub fn run(settings: &Settings, root: &Path, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<bool> {
+    let folder = |chain: Chain| root.join(chain.folder(settings.seed));
+    let weighted = Trained::open(&folder(Chain::Weighted))?;
+    let unweighted = Trained::open(&folder(Chain::Unweighted))?;
+    let iterations = weighted.iterations().min(unweighted.iterations());
+    let by = settings.dagger.fit_iteration.validation;
+    let mut drives = Drives::new(settings, 3 + 2 * iterations, progress);
+    let mut calibration = Vec::new();
+    for (name, path, chain, rounds) in [
+        ("BC", weighted.store.round_folder(0), &weighted, 0),
+        ("DAgger", run_dir::policy_folder(&folder(Chain::Weighted))?, &weighted, weighted.iterations()),
+        ("DAgger, α = 0", run_dir::policy_folder(&folder(Chain::Unweighted))?, &unweighted, unweighted.iterations()),
+    ] {
+        let Some(driven) = drives.of(&path)? else { return Ok(false) };
+        let policy = Checkpoint::load(&path)?;
+        let held_back = chain.held_back(0, rounds, by)?;
+        calibration.extend(calibrations(name, States::HeldBack, settings, &policy, &held_back));
+        calibration.extend(calibrations(name, States::OnPolicy, settings, &policy, &driven.round.samples));
+    }
+    let mut effect = Vec::new();
+    for iteration in 1..=iterations {
+        let mut samples = weighted.held_back(0, iteration, by)?;
+        samples.extend(unweighted.held_back(1, iteration, by)?);
+        let (mut driving_per_s, mut sums) = ([0.0; 2], [Vec::new(), Vec::new()]);
+        for (index, chain) in [&weighted, &unweighted].into_iter().enumerate() {
+            let path = chain.store.round_folder(iteration);
+            let Some(driven) = drives.of(&path)? else { return Ok(false) };
+            driving_per_s[index] = tau_hat_per_s(settings, driven);
+            sums[index] = tau_hats(settings, &Checkpoint::load(&path)?, &samples);
+        }
+        let held_back = ratio(&sums, by.block, settings.evaluation.seed);
+        effect.push(Effect { iteration, held_back, driving_per_s });
+    }
+    drives.end();
+    run.write(FILE, json::to_text(&OnPolicy { schema: SCHEMA, calibration, effect })?.as_bytes())?;
+    Ok(true)
+}
+
+/// What policies collected at the wheel; each drives once, however often it is asked for.
+struct Drives<'a> {
+    settings: &'a Settings,
+    by_folder: BTreeMap<PathBuf, Collected>,
+    progress: &'a dyn Progress,
+    at_most: u32,
+}
+
+impl<'a> Drives<'a> {
+    fn new(settings: &'a Settings, at_most: u32, progress: &'a dyn Progress) -> Self {
+        progress.begin("on-policy rollouts", "on-policy rollouts");
+        Self { settings, by_folder: BTreeMap::new(), progress, at_most }
+    }
+
+    /// Of the policy in a folder; `None` if cancelled.
+    fn of(&mut self, folder: &Path) -> anyhow::Result<Option<&Collected>> {
+        if self.progress.is_cancelled() {
+            return Ok(None);
+        }
+        if !self.by_folder.contains_key(folder) {
+            let done = self.by_folder.len();
+            self.progress.at(done as f64 / f64::from(self.at_most), &mut |_| folder.display().to_string());
+            let collected = rollout(self.settings, &Checkpoint::load(folder)?)?;
+            self.by_folder.insert(folder.to_owned(), collected);
+        }
+        Ok(self.by_folder.get(folder))
+    }
+
+    fn end(self) {
+        self.progress.end(&format!("{} policies", self.by_folder.len()));
+    }
+}
+
+/// The network alone drives one trial of every lot of the evaluation; the expert labels every tick.
+fn rollout(settings: &Settings, policy: &Checkpoint) -> anyhow::Result<Collected> {
+    let evaluation = &settings.evaluation;
+    let lots = Lot::parse_all(&evaluation.lots)?;
+    let trials: Vec<Trial<'_>> =
+        Trial::all(evaluation.seed, Purpose::Evaluation, &lots, 1, &evaluation.directions).collect();
+    let maps = trials::maps(&trials, &settings.episode)?;
+    let episodes = drive::start(&trials, &maps, &settings.episode, settings.training.noise);
+    let expert = |_| Box::new(drivers::expert(&settings.expert, &settings.episode)) as Box<dyn Driver + Send>;
+    let experts = (0..episodes.len()).map(expert).collect();
+    let novice = Predictor::new(policy.weights.clone(), settings.dagger.device);
+    // Every discrepancy is below infinity: the network drives, always.
+    let rule = DecisionRule::TauOnly { tau: f32::INFINITY };
+    let mut collector = GatedCollector::new(Some(novice), experts, rule, Keep::EveryTick, policy.geometry);
+    run_lockstep(episodes, &mut collector, &mut |_, _| {});
+    Ok(collector.into_collected())
+}
+
+fn tau_hat_per_s(settings: &Settings, collected: &Collected) -> f64 {
+    let seconds = collected.n_tot as f64 * f64::from(settings.episode.control_period_s());
+    collected.tau_hat_sum / seconds.max(f64::MIN_POSITIVE)
+}
+
+/// τ̂ of a policy on samples.
+fn tau_hats(settings: &Settings, policy: &Checkpoint, samples: &[Sample]) -> Vec<f64> {
+    let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
+    let predictions = Predictor::new(policy.weights.clone(), settings.dagger.device).predict(&grids);
+    let of = |(sample, prediction): (&Sample, _)| f64::from(Evidence::new(prediction, sample.label).discrepancy);
+    samples.iter().zip(&predictions).map(of).collect()
+}
+
+/// First sum over second, with its interval; `None` for fewer than two stretches. Neighbouring samples look alike, so
+/// stretches are resampled, both policies' together.
+fn ratio([first, second]: &[Vec<f64>; 2], stretch: usize, seed: RootSeed) -> Option<Interval> {
+    let stretch = stretch.max(1);
+    if first.len() <= stretch {
+        return None;
+    }
+    let mut units = Units::new(2);
+    units.begin_stratum();
+    for (first, second) in first.chunks(stretch).zip(second.chunks(stretch)) {
+        units.push(&[first.iter().sum(), second.iter().sum()]);
+    }
+    let of_sums = |sums: &[f64], out: &mut [f64]| out[0] = sums[0] / sums[1].max(f64::MIN_POSITIVE);
+    units.percentile_intervals(seed, DRAWS, 1, &of_sums).pop()
+}
+
+/// Both axes of a policy on labelled states.
+fn calibrations(
+    name: &str,
+    states: States,
+    settings: &Settings,
+    policy: &Checkpoint,
+    samples: &[Sample],
+) -> impl Iterator<Item = Calibration> {
+    let axes = calibration::of_policy(policy, samples, settings.dagger.device);
+    axes.into_iter().map(move |AxisCalibration { name: axis, samples, coverage, bins }| Calibration {
+        policy: name.to_owned(),
+        states,
+        axis,
+        samples,
+        coverage,
+        bins,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ratio_of_sums_is_resampled_in_stretches() {
+        let first = vec![0.1; 40];
+        let half = vec![0.2; 40];
+        let interval = ratio(&[first.clone(), half], 10, RootSeed(1)).unwrap();
+        for value in [interval.lower, interval.estimate, interval.upper] {
+            assert!((value - 0.5).abs() < 1e-12, "{interval:?}");
+        }
+        // All of the second policy's error lies in one stretch of four: without it, the ratio is very large.
+        let late: Vec<f64> = (0..40).map(|i| if i < 10 { 0.8 } else { 0.0 }).collect();
+        let interval = ratio(&[first.clone(), late], 10, RootSeed(1)).unwrap();
+        assert!((interval.estimate - 0.5).abs() < 1e-12 && interval.upper > 1.0, "{interval:?}");
+        assert_eq!(ratio(&[first.clone(), first], 40, RootSeed(1)), None);
+    }
+}

@@ -1,0 +1,42 @@
+//! What is to be driven.
+
+use experiment::drivers::NamedDriver;
+use experiment::lots::Lot;
+use experiment::settings::Settings;
+use experiment::trials::{Purpose, Trial};
+
+/// Drivers × lots × directions × trials × noise levels.
+#[derive(Debug, Clone, Copy)]
+pub struct Plan<'a> {
+    /// The section `evaluation` says which trials; `episode` and `training` what is driven with, and what was trained on.
+    pub settings: &'a Settings,
+    /// By whom.
+    pub drivers: &'a [NamedDriver],
+    /// Where.
+    pub lots: &'a [Lot],
+    /// The driver the others are compared with, an index of `drivers`.
+    pub compare_with: usize,
+}
+
+impl<'a> Plan<'a> {
+    /// Every trial, in order.
+    pub fn trials(&self) -> impl Iterator<Item = Trial<'a>> + Clone + use<'a> {
+        let evaluation = &self.settings.evaluation;
+        Trial::all(evaluation.seed, Purpose::Evaluation, self.lots, evaluation.trials, &evaluation.directions)
+    }
+
+    /// What can be known to go wrong before the first step.
+    ///
+    /// # Errors
+    /// If a driver was trained for another patch of ground, or a lot from a file cannot be driven.
+    pub fn check(&self) -> anyhow::Result<()> {
+        self.drivers.iter().try_for_each(|driver| driver.check(&self.settings.episode))?;
+        let evaluation = &self.settings.evaluation;
+        for lot in self.lots.iter().filter(|lot| lot.is_from_file()) {
+            for &direction in &evaluation.directions {
+                Trial::of_evaluation(evaluation.seed, lot, direction, 0).map(&self.settings.episode)?;
+            }
+        }
+        Ok(())
+    }
+}

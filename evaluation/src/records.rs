@@ -1,0 +1,146 @@
+//! The lines that an evaluation leaves: one type per file, written and read.
+
+use crate::incidents::{Cause, Findings};
+use anyhow::{Context as _, ensure};
+use experiment::replay_key::ReplayKey;
+use experiment::settings::NoiseChoice;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use sim::episode::{Ending, EpisodeReport};
+use sim::scenario::Direction;
+use std::path::Path;
+
+/// The version of `runs.jsonl`, `failures.jsonl` and `wall_time.jsonl` that this program writes.
+pub const SCHEMA: u32 = 1;
+/// Names of the files.
+pub const RUNS: &str = "runs.jsonl";
+/// See [`RUNS`].
+pub const FAILURES: &str = "failures.jsonl";
+/// See [`RUNS`].
+pub const WALL_TIME: &str = "wall_time.jsonl";
+
+/// Who drove where: what all lines begin with.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Driven {
+    /// Version of the format: [`SCHEMA`].
+    pub schema: u32,
+    /// Who drove, as named in tables.
+    pub driver: String,
+    /// Where.
+    pub lot: String,
+    /// Which way.
+    pub direction: Direction,
+    /// Which trial of the lot, from 0.
+    pub trial: u32,
+    /// What was seen wrongly.
+    pub noise: NoiseChoice,
+}
+
+/// One run, as a line of `runs.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct RunRecord {
+    /// Who drove where.
+    #[serde(flatten)]
+    pub driven: Driven,
+    /// Whether it was ended by the time limit.
+    pub timed_out: bool,
+    /// Driven way per simulated time, m/s.
+    pub mean_speed_mps: f32,
+    /// Replays it: [`ReplayKey`].
+    pub replay: String,
+    /// How it ended, its metrics and its events.
+    #[serde(flatten)]
+    pub report: EpisodeReport,
+}
+
+impl RunRecord {
+    /// Of a finished run.
+    pub fn new(driven: Driven, replay: &ReplayKey, report: &EpisodeReport) -> Self {
+        Self {
+            driven,
+            timed_out: report.ending == Ending::TimedOut,
+            mean_speed_mps: report.metrics.mean_speed_mps(),
+            replay: replay.to_string(),
+            report: report.clone(),
+        }
+    }
+}
+
+/// A near-collision, as a line of `failures.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FailureRecord {
+    /// Who drove where.
+    #[serde(flatten)]
+    pub driven: Driven,
+    /// When: the control tick, from 0.
+    pub tick: u32,
+    /// Where along the route, metres.
+    pub route_m: f32,
+    /// Rear axle in the world, metres.
+    pub x_m: f32,
+    /// Rear axle in the world, metres.
+    pub y_m: f32,
+    /// Heading in the world, degrees, counter-clockwise from x.
+    pub heading_deg: f32,
+    /// Speed at the last observation, m/s.
+    pub speed_mps: f32,
+    /// Why.
+    pub cause: Cause,
+    /// What the rules found.
+    #[serde(flatten)]
+    pub findings: Findings,
+    /// Replays it: [`ReplayKey`].
+    pub replay: String,
+}
+
+/// What a run took, as a line of `wall_time.jsonl`: apart, because everything else is the same in every repetition.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct WallTimeRecord {
+    /// Who drove where.
+    #[serde(flatten)]
+    pub driven: Driven,
+    /// Seconds: the run's share, by decisions, of what its batch took in lock-step.
+    pub wall_s: f64,
+}
+
+/// Reads a file line by line.
+///
+/// # Errors
+/// If it cannot be read, is of another version, or `take` refuses a line.
+pub fn each_line<T: DeserializeOwned>(
+    path: &Path,
+    mut take: impl FnMut(T) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
+    let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    for (index, line) in text.lines().enumerate() {
+        let taken = parse(line).and_then(&mut take);
+        taken.with_context(|| {
+            format!("{}:{}: not of this evaluation; drive it again into another folder", path.display(), index + 1)
+        })?;
+    }
+    Ok(())
+}
+
+/// All lines of a file.
+///
+/// # Errors
+/// See [`each_line`].
+pub fn read<T: DeserializeOwned>(path: &Path) -> anyhow::Result<Vec<T>> {
+    let mut records = Vec::new();
+    each_line(path, |record| {
+        records.push(record);
+        Ok(())
+    })?;
+    Ok(records)
+}
+
+fn parse<T: DeserializeOwned>(line: &str) -> anyhow::Result<T> {
+    #[derive(Deserialize)]
+    struct Version {
+        #[serde(default)]
+        schema: u32,
+    }
+    let Version { schema } = serde_json::from_str(line)?;
+    ensure!(schema == SCHEMA, "written by another version of lotpilot (schema {schema}, this one reads {SCHEMA})");
+    Ok(serde_json::from_str(line)?)
+}

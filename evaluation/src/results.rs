@@ -1,0 +1,157 @@
+//! What came of an evaluation: sums, and a few numbers per run.
+
+use crate::incidents::Cause;
+use crate::plan::Plan;
+use crate::slices::{LotGroup, Slice};
+use crate::totals::Totals;
+use experiment::lots::Lot;
+use experiment::trials::Trial;
+use sim::episode::EpisodeReport;
+use sim::scenario::Direction;
+use std::collections::BTreeMap;
+
+/// One run, as far as it is kept: the bootstrap needs every one of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RunSummary {
+    pub(crate) trial: u32,
+    pub(crate) group: u32,
+    /// Units of one cluster are resampled together.
+    pub(crate) cluster: u32,
+    pub(crate) near_collisions: u32,
+    pub(crate) reference_m: f32,
+    pub(crate) safe_ratio: f32,
+    pub(crate) driven_m: f32,
+    pub(crate) steering_reversals: u32,
+}
+
+/// One driver at one noise level.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct DriverResults {
+    /// In the order of the trials.
+    pub(crate) runs: Vec<RunSummary>,
+    /// By group and direction.
+    totals: BTreeMap<(u32, Direction), Totals>,
+    /// By group.
+    causes: BTreeMap<(u32, Cause), u32>,
+    /// By group: near-collisions at the place of the one before.
+    again: BTreeMap<u32, u32>,
+}
+
+/// Everything that is kept of an evaluation: sums, and 32 bytes per run.
+#[derive(Debug)]
+pub struct EvaluationResults {
+    groups: Vec<LotGroup>,
+    /// Group and cluster of a lot by name; no cluster where every run is one.
+    lots: BTreeMap<String, (u32, Option<u32>)>,
+    /// By noise level, then by driver.
+    pub(crate) drivers: Vec<Vec<DriverResults>>,
+}
+
+impl EvaluationResults {
+    /// Nothing driven yet.
+    pub fn new(plan: &Plan<'_>) -> Self {
+        // Specs that no longer stand for anything (a file that moved) were trained on by nobody here.
+        let trained_on: Vec<String> = plan
+            .settings
+            .training
+            .lots
+            .iter()
+            .filter_map(|spec| Lot::parse_all(&[spec]).ok())
+            .flatten()
+            .map(|lot| lot.group())
+            .collect();
+        let mut results = Self {
+            groups: Vec::new(),
+            lots: BTreeMap::new(),
+            drivers: vec![vec![DriverResults::default(); plan.drivers.len()]; plan.settings.evaluation.noise.len()],
+        };
+        for (index, lot) in plan.lots.iter().enumerate() {
+            let name = lot.group();
+            let group = results.groups.iter().position(|group| group.name == name).unwrap_or_else(|| {
+                let is_trained_on = trained_on.contains(&name);
+                results.groups.push(LotGroup { name, lots: 0, is_trained_on });
+                results.groups.len() - 1
+            });
+            results.groups[group].lots += 1;
+            let cluster = lot.is_generated().then_some(index as u32);
+            results.lots.insert(lot.name().to_owned(), (group as u32, cluster));
+        }
+        results
+    }
+
+    /// Takes a run into account: which level and driver of the plan, which of its trials. Trials come in order.
+    pub fn add(&mut self, level: usize, driver: usize, trial_index: usize, trial: &Trial<'_>, report: &EpisodeReport) {
+        let (group, cluster) = self.lots[trial.lot.name()];
+        let driver_results = &mut self.drivers[level][driver];
+        driver_results.totals.entry((group, trial.direction)).or_default().add(report);
+        let metrics = &report.metrics;
+        driver_results.runs.push(RunSummary {
+            trial: trial_index as u32,
+            group,
+            // Behind the lots, of which each can be a cluster.
+            cluster: cluster.unwrap_or(self.lots.len() as u32 + trial_index as u32),
+            near_collisions: metrics.near_collisions,
+            reference_m: metrics.reference_m,
+            safe_ratio: metrics.safe_ratio,
+            driven_m: metrics.driven_m,
+            steering_reversals: metrics.steering_reversals,
+        });
+    }
+
+    /// Takes the cause of a near-collision into driver_results, and whether it is one more at the same place.
+    pub fn add_cause(&mut self, level: usize, driver: usize, lot: &Lot, cause: Cause, is_again: bool) {
+        let (group, _) = self.lots[lot.name()];
+        let driver_results = &mut self.drivers[level][driver];
+        *driver_results.causes.entry((group, cause)).or_default() += 1;
+        *driver_results.again.entry(group).or_default() += u32::from(is_again);
+    }
+
+    /// Families, in the order of the plan.
+    pub fn groups(&self) -> &[LotGroup] {
+        &self.groups
+    }
+
+    /// What is looked at together: every group by itself, then the pooled ones.
+    pub fn slices(&self) -> Vec<Slice> {
+        Slice::all_of(&self.groups)
+    }
+
+    /// Sums over a slice, in one direction or both.
+    pub fn totals(&self, level: usize, driver: usize, slice: &Slice, direction: Option<Direction>) -> Totals {
+        let mut sum = Totals::default();
+        for (&(group, way), totals) in &self.drivers[level][driver].totals {
+            if slice.contains(group) && direction.is_none_or(|direction| direction == way) {
+                sum.merge(totals);
+            }
+        }
+        sum
+    }
+
+    /// Mean over (lot, direction) of the rate per 100 m and of the safe ratio, all with the same weight whatever their
+    /// length: the paper's "mean".
+    pub fn unweighted(&self, level: usize, driver: usize, slice: &Slice) -> [f64; 2] {
+        let cells = self.drivers[level][driver].totals.iter().filter(|((group, _), _)| slice.contains(*group));
+        let (mut n, mut rate, mut safe_ratio) = (0, 0.0, 0.0);
+        for (_, totals) in cells {
+            n += 1;
+            rate += totals.rate().per_unit;
+            safe_ratio += totals.safe_ratio();
+        }
+        [rate, safe_ratio].map(|sum| sum / f64::from(n.max(1)))
+    }
+
+    /// Near-collisions of a cause within a slice.
+    pub fn count_of_cause(&self, level: usize, driver: usize, slice: &Slice, cause: Cause) -> u32 {
+        let counts = &self.drivers[level][driver].causes;
+        counts.iter().filter(|((group, of), _)| *of == cause && slice.contains(*group)).map(|(_, n)| n).sum()
+    }
+
+    /// Near-collisions at the place of the one before within a slice.
+    pub fn count_of_again(&self, level: usize, driver: usize, slice: &Slice) -> u32 {
+        let counts = &self.drivers[level][driver].again;
+        counts.iter().filter(|(group, _)| slice.contains(**group)).map(|(_, n)| n).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests;

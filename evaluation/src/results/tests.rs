@@ -1,0 +1,115 @@
+use super::*;
+use experiment::drivers::NamedDriver;
+use experiment::settings::Settings;
+use experiment::trials::Purpose;
+use sim::episode::Ending;
+use sim::metrics::EpisodeMetrics;
+use sim::seed::RootSeed;
+
+fn report(near_collisions: u32, reference_m: f32, safe_ratio: f32) -> EpisodeReport {
+    let metrics =
+        EpisodeMetrics { near_collisions, safe_ratio, reference_m, driven_m: 50.0, ..EpisodeMetrics::default() };
+    EpisodeReport { ending: Ending::ReachedEnd, metrics, events: Vec::new() }
+}
+
+fn drivers_named(n: usize) -> Vec<NamedDriver> {
+    let expert = expert::ExpertSettings::paper();
+    (0..n).map(|i| NamedDriver::expert(&expert).renamed(&format!("driver {i}"))).collect()
+}
+
+/// Two drivers over lots a and b and two generated lots, both ways, three trials; what they did is given by a function.
+fn results(drivers: usize, of: impl Fn(usize, &Trial<'_>) -> Option<EpisodeReport>) -> EvaluationResults {
+    let settings = Settings::preset("default").unwrap();
+    let lots = Lot::parse_all(&["lot-a", "lot-b", "test:2"]).unwrap();
+    let named = drivers_named(drivers);
+    let plan = Plan { settings: &settings, drivers: &named, lots: &lots, compare_with: 0 };
+    let mut results = EvaluationResults::new(&plan);
+    let trials = Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 3, &Direction::BOTH);
+    for (index, trial) in trials.enumerate() {
+        for driver in 0..drivers {
+            if let Some(report) = of(driver, &trial) {
+                results.add(0, driver, index, &trial, &report);
+            }
+        }
+    }
+    results
+}
+
+fn slice(results: &EvaluationResults, label: &str) -> Slice {
+    results.slices().into_iter().find(|slice| slice.label == label).unwrap()
+}
+
+#[test]
+fn pooled_and_unweighted_means_differ_where_lots_differ_in_length() {
+    // 2 events in every run of lot a over 200 m, 1 in every run of lot b over 50 m: 1 and 2 per 100 m.
+    let results = results(1, |_, trial| match trial.lot.name() {
+        "lot-a" => Some(report(2, 200.0, 0.5)),
+        "lot-b" => Some(report(1, 50.0, 0.8)),
+        _ => None,
+    });
+    let labels: Vec<String> = results.slices().into_iter().map(|slice| slice.label).collect();
+    assert_eq!(labels, ["lot-a", "lot-b", "test-medium (2 lots)", "unseen", "all"], "lot a is the training lot");
+    let all = slice(&results, "all");
+    let totals = results.totals(0, 0, &all, None);
+    assert_eq!((totals.runs, totals.near_collisions), (12, 18));
+    assert!((totals.rate().per_unit - 18.0 / 15.0).abs() < 1e-9, "18 events in 1500 m");
+    let [rate, safe_ratio] = results.unweighted(0, 0, &all);
+    assert!((rate - 1.5).abs() < 1e-6 && (safe_ratio - 0.65).abs() < 1e-6, "{rate} {safe_ratio}");
+    assert!((totals.safe_ratio() - 0.65).abs() < 1e-6, "six runs on either lot");
+    assert_eq!(results.totals(0, 0, &all, Some(Direction::Reverse)).runs, 6);
+    assert_eq!(results.totals(0, 0, &slice(&results, "unseen"), None).near_collisions, 6);
+}
+
+#[test]
+fn a_constant_difference_has_a_narrow_interval_however_hard_the_trials_are() {
+    let results =
+        results(2, |driver, trial| Some(report(trial.index * 4 + driver as u32, 100.0, 0.5 + 0.1 * driver as f32)));
+    let (estimates, comparisons) = results.judge(0, &slice(&results, "lot-b"), 0, RootSeed(1));
+    let found = &comparisons[0];
+    assert_eq!((found.driver, found.pairs), (1, 6));
+    let difference = found.difference_per_100m.unwrap();
+    assert!((difference.lower - 1.0).abs() < 1e-9 && (difference.upper - 1.0).abs() < 1e-9, "{difference:?}");
+    assert!((found.difference_safe_ratio.unwrap().estimate - 0.1).abs() < 1e-6);
+    // Trials 0, 4, 8 in both directions: mean 4, variance 64/5, index 3.2: clusters.
+    assert!((estimates[0].dispersion.unwrap().index - 3.2).abs() < 1e-9, "{estimates:?}");
+    assert!(estimates[0].per_100m.unwrap().lower < 2.8);
+    // 30 events against 24: the exact test, which knows of no pairs, sees nothing.
+    assert!((found.ratio.ratio.unwrap() - 30.0 / 24.0).abs() < 1e-9 && found.ratio.p_value > 0.4, "{found:?}");
+    assert_eq!(found.p_holm, found.ratio.p_value, "a single comparison");
+}
+
+#[test]
+fn generated_lots_are_resampled_as_wholes() {
+    // All events are on one of two lots: whole lots drawn give 0, 1 or 2 of it.
+    let results = results(1, |_, trial| {
+        let is_hard = trial.lot.name() == "test-medium-1";
+        Some(report(if is_hard { 2 } else { 0 }, 100.0, 0.5))
+    });
+    let (estimates, _) = results.judge(0, &slice(&results, "test-medium (2 lots)"), 0, RootSeed(1));
+    let interval = estimates[0].per_100m.unwrap();
+    assert_eq!((interval.lower, interval.estimate, interval.upper), (0.0, 1.0, 2.0));
+    let (dispersion, mean, variance) = (estimates[0].dispersion.unwrap(), 6.0, 72.0);
+    assert!((dispersion.index - variance / mean).abs() < 1e-9, "{dispersion:?}");
+}
+
+#[test]
+fn only_runs_that_all_drivers_have_driven_are_compared() {
+    let results = results(2, |driver, trial| (driver == 0 || trial.index < 2).then(|| report(1, 100.0, 0.5)));
+    let (_, comparisons) = results.judge(0, &slice(&results, "lot-a"), 0, RootSeed(1));
+    assert_eq!(comparisons[0].pairs, 4);
+    assert_eq!(comparisons[0].ratio.ratio, Some(1.0), "the third trial of the first driver does not count");
+    assert_eq!(results.totals(0, 0, &slice(&results, "lot-a"), None).runs, 6, "but is in its own row");
+}
+
+#[test]
+fn oscillation_is_per_driven_way() {
+    let mut totals = Totals::default();
+    let mut driven = report(0, 100.0, 0.5);
+    (driven.metrics.steering_reversals, driven.metrics.steering_effort_rad) = (4, 3.0);
+    totals.add(&driven);
+    totals.add(&driven);
+    assert!((totals.reversals_per_100m() - 8.0).abs() < 1e-9 && (totals.effort_rad_per_100m() - 6.0).abs() < 1e-6);
+    let mut twice = totals.clone();
+    twice.merge(&totals);
+    assert_eq!((twice.runs, twice.steering_reversals), (4, 16));
+}

@@ -1,0 +1,56 @@
+//! Lots that share a row of the tables, and rows that are looked at together.
+
+/// Lots that share a row of the tables: a lot by itself, or all generated lots of one kind.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct LotGroup {
+    /// As [`experiment::lots::Lot::group`].
+    pub name: String,
+    /// Lots in it.
+    pub lots: usize,
+    /// Whether drivers were trained on it.
+    pub is_trained_on: bool,
+}
+
+impl LotGroup {
+    /// Its name in tables.
+    pub fn label(&self) -> String {
+        if self.lots == 1 { self.name.clone() } else { format!("{} ({} lots)", self.name, self.lots) }
+    }
+}
+
+/// Lots that are looked at together.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Slice {
+    /// Its name in tables.
+    pub label: String,
+    groups: Vec<u32>,
+}
+
+impl Slice {
+    /// Every group by itself; then, where that is something else, those nobody was trained on, and all.
+    pub fn all_of(groups: &[LotGroup]) -> Vec<Self> {
+        let of = |label: &str, wanted: &dyn Fn(usize) -> bool| Self {
+            label: label.to_owned(),
+            groups: (0..groups.len()).filter(|&i| wanted(i)).map(|i| i as u32).collect(),
+        };
+        let mut slices: Vec<Self> = groups.iter().enumerate().map(|(i, f)| of(&f.label(), &|j| i == j)).collect();
+        let unseen = of("unseen", &|i| !groups[i].is_trained_on);
+        if (2..groups.len()).contains(&unseen.groups.len()) {
+            slices.push(unseen);
+        }
+        if groups.len() > 1 {
+            slices.push(of("all", &|_| true));
+        }
+        slices
+    }
+
+    /// Whether it holds more than one group.
+    pub fn is_pooled(&self) -> bool {
+        self.groups.len() > 1
+    }
+
+    /// Whether a group belongs to it.
+    pub fn contains(&self, group: u32) -> bool {
+        self.groups.contains(&group)
+    }
+}

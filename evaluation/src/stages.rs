@@ -1,0 +1,356 @@
+//! What is done, as a list: read it beside the paper's experiments.
+//!
+//! | stage | what the report needs it for |
+//! |---|---|
+//! | `chains/sN-weighted` | behaviour cloning and `DAgger` with the paper's weight α on τ̂: Table 1, the driver of every table |
+//! | `chains/sN-unweighted` | the same with α = 0: Table 1's effect of the weight |
+//! | `chains/s1-any-below`, `-tau-only` | the other two readings of Algorithm 2, line 9, for a few iterations |
+//! | `drives/reference` | the paper's tables: every driver on its lots |
+//! | `drives/unseen` | generated lots that nothing was trained or tuned on |
+//! | `drives/rules` | the policies after the first iterations under each decision rule |
+//! | `on-policy` | on-policy labelled rollouts: calibration of the variance, Σ τ̂ with and without the weight |
+//!
+//! Behaviour cloning has no τ̂, so that neither α nor the rule changes a bit of it: it is trained once per seed.
+
+use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::lots::Lot;
+use experiment::settings::Settings;
+use planners::Baseline;
+use policy::dagger::DaggerSettings;
+use policy::decision_rule::{ChiOn, DecisionRule};
+use policy::fit::FitSettings;
+use policy::network::LookAheadNetConfig;
+use serde::{Deserialize, Serialize};
+use sim::seed::RootSeed;
+use std::path::Path;
+
+/// How much is done, besides what the settings say; `reproduce.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Extent {
+    /// Trainings, each from a root seed of its own, the settings' first.
+    pub seeds: u64,
+    /// Generated lots that all drivers meet for the first time; driven once each way.
+    pub unseen: Vec<String>,
+    /// Iterations of the chains that compare decision rules.
+    pub rule_iterations: u32,
+    /// Tuned planners, as named on the command line.
+    pub tuned: Vec<String>,
+}
+
+/// One step, with a folder of its own within the run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stage {
+    /// Its folder.
+    pub folder: String,
+    /// What it does, for people.
+    pub about: String,
+    /// With which settings.
+    pub settings: Settings,
+    /// The step itself.
+    pub step: Step,
+}
+
+/// What can be done in a stage.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Step {
+    /// Trains a chain.
+    Train {
+        /// Folder of the chain whose behaviour cloning is taken over.
+        cloning_of: Option<String>,
+    },
+    /// Drives `(name, spec)`, all compared with the driver of this name.
+    Drive {
+        /// Names in tables, specs of the command line.
+        drivers: Vec<(String, String)>,
+    },
+    /// Networks drive, the expert labels every tick.
+    OnPolicy,
+}
+
+/// A training chain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Chain {
+    /// The paper's.
+    Weighted,
+    /// α = 0.
+    Unweighted,
+    /// Algorithm 2 as printed.
+    AnyBelow,
+    /// Without χ.
+    TauOnly,
+}
+
+impl Chain {
+    /// Its folder.
+    pub fn folder(self, seed: RootSeed) -> String {
+        let name = match self {
+            Self::Weighted => "weighted",
+            Self::Unweighted => "unweighted",
+            Self::AnyBelow => "any-below",
+            Self::TauOnly => "tau-only",
+        };
+        format!("chains/s{}-{name}", seed.0)
+    }
+
+    fn about(self) -> &'static str {
+        match self {
+            Self::Weighted => "behaviour cloning, DAgger with the weight α on τ̂",
+            Self::Unweighted => "DAgger with α = 0",
+            Self::AnyBelow => "DAgger under \"any below\", Algorithm 2 as printed",
+            Self::TauOnly => "DAgger under \"τ̂ alone\"",
+        }
+    }
+
+    fn stage(self, settings: &Settings, extent: &Extent) -> Stage {
+        let mut settings = settings.clone();
+        let dagger = &mut settings.dagger;
+        let [tau, chi] = thresholds(&dagger.rule);
+        match self {
+            Self::Weighted => {}
+            Self::Unweighted => {
+                fits_mut(dagger).for_each(|fit| fit.loss.alpha = 0.0);
+            }
+            Self::AnyBelow => dagger.rule = DecisionRule::AnyBelowLiteral { tau, chi, chi_on: chi_on(&dagger.rule) },
+            Self::TauOnly => dagger.rule = DecisionRule::TauOnly { tau },
+        }
+        if matches!(self, Self::AnyBelow | Self::TauOnly) {
+            dagger.iterations_max = dagger.iterations_max.min(extent.rule_iterations);
+            dagger.iterations_min = dagger.iterations_min.min(extent.rule_iterations);
+        }
+        let cloning_of = (self != Self::Weighted).then(|| Self::Weighted.folder(settings.seed));
+        Stage {
+            folder: self.folder(settings.seed),
+            about: self.about().to_owned(),
+            settings,
+            step: Step::Train { cloning_of },
+        }
+    }
+}
+
+/// τ and χ of a rule; χ = 0.1 (paper) where it has none.
+fn thresholds(rule: &DecisionRule) -> [f32; 2] {
+    match *rule {
+        DecisionRule::AllBelow { tau, chi, .. } | DecisionRule::AnyBelowLiteral { tau, chi, .. } => [tau, chi],
+        DecisionRule::TauOnly { tau } => [tau, 0.1],
+        DecisionRule::ExpertOnly => [0.07, 0.1],
+    }
+}
+
+fn chi_on(rule: &DecisionRule) -> ChiOn {
+    match *rule {
+        DecisionRule::AllBelow { chi_on, .. } | DecisionRule::AnyBelowLiteral { chi_on, .. } => chi_on,
+        DecisionRule::TauOnly { .. } | DecisionRule::ExpertOnly => ChiOn::default(),
+    }
+}
+
+fn fits_mut(dagger: &mut DaggerSettings) -> impl Iterator<Item = &mut FitSettings> {
+    [&mut dagger.fit_cloning, &mut dagger.fit_iteration].into_iter().chain(dagger.fit_final.as_mut())
+}
+
+/// Root seeds of the trainings.
+pub fn seeds(settings: &Settings, extent: &Extent) -> Vec<RootSeed> {
+    (0..extent.seeds).map(|index| RootSeed(settings.seed.0 + index)).collect()
+}
+
+/// Name of what was trained from a seed: the first one's is that of the paper's driver.
+pub fn named(base: &str, seed: RootSeed, settings: &Settings) -> String {
+    if seed == settings.seed { base.to_owned() } else { format!("{base} (seed {})", seed.0) }
+}
+
+/// Folders of the stages that drive, and of the one with on-policy rollouts.
+pub const REFERENCE: &str = "drives/reference";
+/// See [`REFERENCE`].
+pub const UNSEEN: &str = "drives/unseen";
+/// See [`REFERENCE`].
+pub const RULES: &str = "drives/rules";
+/// See [`REFERENCE`].
+pub const ON_POLICY: &str = "on-policy";
+
+/// Everything, in the order in which it is done. `root`: the folder of the whole run.
+pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
+    let mut stages = Vec::new();
+    for seed in seeds(settings, extent) {
+        let of_seed = Settings { seed, ..settings.clone() };
+        stages.extend([Chain::Weighted, Chain::Unweighted].map(|chain| chain.stage(&of_seed, extent)));
+    }
+    stages.extend([Chain::AnyBelow, Chain::TauOnly].map(|chain| chain.stage(settings, extent)));
+    let spec = |chain: Chain, seed, rest: &str| format!("run:{}/{}{rest}", root.display(), chain.folder(seed));
+
+    let mut networks = Vec::new();
+    for seed in seeds(settings, extent) {
+        networks.push((named("BC", seed, settings), spec(Chain::Weighted, seed, "/bc")));
+        networks.push((named("DAgger", seed, settings), spec(Chain::Weighted, seed, "")));
+        networks.push((named("DAgger, α = 0", seed, settings), spec(Chain::Unweighted, seed, "")));
+    }
+    let own = |name: &str| (name.to_owned(), name.to_owned());
+    let tuned: Vec<_> = extent.tuned.iter().map(|spec| (tuned_name(spec), spec.clone())).collect();
+    let planners: Vec<_> = Baseline::all().iter().map(|planner| own(planner.name())).collect();
+    // Where a planner has been tuned, only the paper's two take part as they are, too: the others stand for nothing.
+    let is_tuned = |name: &str| tuned.iter().any(|(tuned, _)| *tuned == tuned_name(name));
+    let enough = planners.iter().filter(|(name, _)| name == "tentacle" || name == "vvf" || !is_tuned(name)).cloned();
+    let join =
+        |planners: Vec<(String, String)>| [vec![own("expert")], networks.clone(), planners, tuned.clone()].concat();
+    let drive = |folder: &str, about: &str, lots: &[String], trials: u32, drivers: Vec<(String, String)>| {
+        let mut settings = settings.clone();
+        (settings.evaluation.lots, settings.evaluation.trials) = (lots.to_vec(), trials);
+        let step = Step::Drive { drivers };
+        Stage { folder: folder.to_owned(), about: about.to_owned(), settings, step }
+    };
+    let evaluation = &settings.evaluation;
+    let (lots, trials) = (&evaluation.lots, evaluation.trials);
+    stages.push(drive(REFERENCE, "every driver on the paper's lots", lots, trials, join(planners.clone())));
+    stages.push(drive(UNSEEN, "drivers on generated lots", &extent.unseen, 1, join(enough.collect())));
+    let after = |name: &str, chain: Chain| {
+        let round = extent.rule_iterations.min(settings.dagger.iterations_max);
+        let folder = chain.folder(settings.seed);
+        // The other chains end there, or earlier: their last network is meant.
+        let spec = match chain {
+            Chain::Weighted if round < settings.dagger.iterations_max => {
+                format!("net:{}/{folder}/round-{round:02}", root.display())
+            }
+            _ => spec(chain, settings.seed, ""),
+        };
+        (name.to_owned(), spec)
+    };
+    let rules =
+        [after("all below", Chain::Weighted), after("any below", Chain::AnyBelow), after("τ̂ alone", Chain::TauOnly)];
+    stages.push(drive(RULES, "policies under each decision rule", lots, trials, rules.to_vec()));
+    stages.push(Stage {
+        folder: ON_POLICY.to_owned(),
+        about: "on-policy labelled rollouts: networks drive, the expert labels".to_owned(),
+        settings: settings.clone(),
+        step: Step::OnPolicy,
+    });
+    stages
+}
+
+/// Loads drivers under their names in tables.
+///
+/// # Errors
+/// If something named does not exist.
+pub fn load(drivers: &[(String, String)], settings: &Settings) -> anyhow::Result<Vec<NamedDriver>> {
+    let load = |(name, spec): &(String, String)| {
+        Ok(spec.parse::<DriverSpec>()?.load(&settings.expert, settings.dagger.device)?.renamed(name))
+    };
+    drivers.iter().map(load).collect()
+}
+
+/// `tuned:vvf` and `vvf:FILE` → `vvf, tuned`.
+fn tuned_name(spec: &str) -> String {
+    let name = spec.strip_prefix("tuned:").or_else(|| spec.split(':').next()).unwrap_or(spec);
+    format!("{name}, tuned")
+}
+
+/// Measured on two cores of an AMD EPYC (Zen 3): seconds per run that is collected from, with noise augmentations.
+const COLLECTED_RUN_S: f64 = 0.6;
+/// The same per run driven; networks take longer, planners less.
+const DRIVEN_RUN_S: f64 = 0.25;
+/// The same per labelled rollout, with the answers on held-back samples.
+const ON_POLICY_RUN_S: f64 = 2.5;
+/// Multiply-adds of a network's answer that training gets through per second, both directions counted as one.
+const TRAINED_PER_S: f64 = 1.2e10;
+
+impl Stage {
+    /// About how long it takes, seconds.
+    pub fn estimate_s(&self) -> f64 {
+        let Settings { training, evaluation, dagger, .. } = &self.settings;
+        let runs = |lots: &[String], ways: usize, trials: u32, is_training: bool| {
+            // In training, generated lots are driven once.
+            let trials = |lot: &Lot| if is_training && lot.is_generated() { 1.0 } else { f64::from(trials) };
+            let of_each_way: f64 = Lot::parse_all(lots).unwrap_or_default().iter().map(trials).sum();
+            of_each_way * ways as f64
+        };
+        let rounds = f64::from(dagger.iterations_max);
+        match &self.step {
+            Step::Train { cloning_of } => {
+                let (steps, clonings) = match cloning_of {
+                    Some(_) => (0.0, 0.0),
+                    None => (samples(&dagger.fit_cloning), 1.0),
+                };
+                let collected =
+                    (rounds + clonings) * runs(&training.lots, training.directions.len(), training.trials, true);
+                let trained = steps + rounds * samples(&dagger.fit_iteration);
+                collected * COLLECTED_RUN_S + trained * multiply_adds(&dagger.network) / TRAINED_PER_S
+            }
+            Step::Drive { drivers } => {
+                let runs = runs(&evaluation.lots, evaluation.directions.len(), evaluation.trials, false);
+                runs * (drivers.len() * evaluation.noise.len()) as f64 * DRIVEN_RUN_S
+            }
+            Step::OnPolicy => {
+                let runs = runs(&evaluation.lots, evaluation.directions.len(), 1, false);
+                (2.0 * rounds + 1.0) * runs * ON_POLICY_RUN_S
+            }
+        }
+    }
+}
+
+/// Trained on in all, on about as many as eight round trips of lot a give.
+fn samples(fit: &FitSettings) -> f64 {
+    f64::from(fit.steps(50_000)) * fit.batch as f64
+}
+
+fn multiply_adds(network: &LookAheadNetConfig) -> f64 {
+    let LookAheadNetConfig { conv1, conv2, hidden, .. } = network;
+    let first = 25 * 25 * conv1.kernel.pow(2) * conv1.channels;
+    let second = 12 * 12 * conv2.kernel.pow(2) * conv1.channels * conv2.channels;
+    let dense = 6 * 6 * conv2.channels * hidden;
+    (first + second + dense) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn extent() -> Extent {
+        Extent { seeds: 1, unseen: vec!["test:20".to_owned()], rule_iterations: 1, tuned: Vec::new() }
+    }
+
+    #[test]
+    fn chains_differ_from_the_papers_in_one_thing_each() {
+        let settings = Settings::preset("default").unwrap();
+        let stages = all(&settings, &extent(), Path::new("R"));
+        let of = |folder: &str| stages.iter().find(|stage| stage.folder == folder).unwrap().settings.dagger.clone();
+        assert_eq!(of("chains/s1-weighted"), settings.dagger);
+        let mut unweighted = of("chains/s1-unweighted");
+        assert_eq!(unweighted.fit_iteration.loss.alpha, 0.0);
+        fits_mut(&mut unweighted).for_each(|fit| fit.loss.alpha = 1.5);
+        assert_eq!(unweighted, settings.dagger);
+        let any = of("chains/s1-any-below");
+        assert_eq!(any.rule, DecisionRule::AnyBelowLiteral { tau: 0.07, chi: 0.1, chi_on: ChiOn::StdPerAxis });
+        assert_eq!((any.iterations_max, any.fit_iteration), (1, settings.dagger.fit_iteration.clone()));
+        assert_eq!(of("chains/s1-tau-only").rule, DecisionRule::TauOnly { tau: 0.07 });
+    }
+
+    #[test]
+    fn drivers_are_named_and_more_seeds_add_theirs() {
+        let settings = Settings::preset("default").unwrap();
+        let tuned = ["dwa:t/dwa.toml", "tuned:vff"].map(str::to_owned).to_vec();
+        let extent = Extent { seeds: 2, tuned, ..extent() };
+        let stages = all(&settings, &extent, Path::new("R"));
+        let names = |folder: &str| -> Vec<String> {
+            let stage = stages.iter().find(|stage| stage.folder == folder).unwrap();
+            let Step::Drive { drivers } = &stage.step else { panic!("{folder} drives") };
+            drivers.iter().map(|(name, _)| name.clone()).collect()
+        };
+        let reference = names(REFERENCE);
+        for name in ["expert", "BC", "DAgger", "DAgger, α = 0", "DAgger (seed 2)", "tentacle", "dwa", "dwa, tuned"] {
+            assert!(reference.iter().any(|found| found == name), "{name} is missing from {reference:?}");
+        }
+        assert!(names(UNSEEN).contains(&"vff, tuned".to_owned()));
+        for name in ["dwa", "vff"] {
+            assert!(!names(UNSEEN).contains(&name.to_owned()), "its tuned variant stands for {name}");
+        }
+        assert!(names(UNSEEN).contains(&"vvf".to_owned()) && names(UNSEEN).contains(&"cvm".to_owned()));
+    }
+
+    /// Issue 3: at most 30 minutes on two cores, with all six planners tuned.
+    #[test]
+    fn the_default_budget_is_half_an_hour() {
+        let settings = Settings::preset("default").unwrap();
+        let tuned = Baseline::all().iter().map(|planner| format!("{}:x.toml", planner.name())).collect();
+        let stages = all(&settings, &Extent { tuned, ..extent() }, Path::new("R"));
+        let minutes = stages.iter().map(Stage::estimate_s).sum::<f64>() / 60.0;
+        assert!((15.0..30.0).contains(&minutes), "{minutes:.1} minutes");
+    }
+}

@@ -1,0 +1,184 @@
+//! Intervals that hold however events cluster: resampling whole units.
+//!
+//! A unit is a row of sums (events, metres, … of every driver in the same place), so that resampling rows is paired: all
+//! drivers get the same units in every draw. Rows are drawn with replacement within their stratum.
+
+use super::poisson::CONFIDENCE;
+use rand::RngExt as _;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use sim::seed::{RootSeed, Stream};
+
+/// Draws of the bootstrap (methods.md 8.3).
+pub const DRAWS: u64 = 10_000;
+
+/// Percentile interval of a statistic.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    /// Of the units as they are.
+    pub estimate: f64,
+    /// 2.5 % of the draws are below.
+    pub lower: f64,
+    /// 2.5 % of the draws are above.
+    pub upper: f64,
+}
+
+impl Interval {
+    /// Whether zero lies outside.
+    pub fn excludes_zero(&self) -> bool {
+        self.lower > 0.0 || self.upper < 0.0
+    }
+}
+
+/// Units to resample.
+#[derive(Debug, Clone, Default)]
+pub struct Units {
+    columns: usize,
+    /// Row-major, stratum after stratum.
+    values: Vec<f64>,
+    /// Rows per stratum.
+    strata: Vec<u32>,
+}
+
+impl Units {
+    /// Nothing yet, with so many values per unit.
+    pub fn new(columns: usize) -> Self {
+        Self { columns, ..Self::default() }
+    }
+
+    /// Begins a stratum: what follows is resampled among itself.
+    pub fn begin_stratum(&mut self) {
+        self.strata.push(0);
+    }
+
+    /// Adds a unit to the present stratum.
+    ///
+    /// # Panics
+    /// Without a stratum, or with a wrong number of values.
+    pub fn push(&mut self, unit: &[f64]) {
+        assert_eq!(unit.len(), self.columns, "every unit has the same columns");
+        *self.strata.last_mut().expect("a stratum is begun first") += 1;
+        self.values.extend_from_slice(unit);
+    }
+
+    /// 95 % percentile intervals of several statistics, each a function of the sums of all columns. `of_sums` writes
+    /// `statistics` values. Every draw has its own random stream: the result does not depend on the number of threads.
+    pub fn percentile_intervals(
+        &self,
+        seed: RootSeed,
+        draws: u64,
+        statistics: usize,
+        of_sums: &(dyn Fn(&[f64], &mut [f64]) + Sync),
+    ) -> Vec<Interval> {
+        let mut estimates = vec![0.0; statistics];
+        let mut sums = vec![0.0; self.columns];
+        self.values.chunks_exact(self.columns).for_each(|unit| add(&mut sums, unit));
+        of_sums(&sums, &mut estimates);
+
+        let mut drawn = vec![0.0; draws as usize * statistics];
+        drawn.par_chunks_exact_mut(statistics).enumerate().for_each_init(
+            || vec![0.0; self.columns],
+            |sums, (draw, statistics)| {
+                self.resample(seed, draw as u64, sums);
+                of_sums(sums, statistics);
+            },
+        );
+        let tail = 0.5 * (1.0 - CONFIDENCE);
+        let interval = |(statistic, &estimate): (usize, &f64)| {
+            let mut values: Vec<f64> = drawn.iter().skip(statistic).step_by(statistics).copied().collect();
+            values.sort_by(f64::total_cmp);
+            Interval { estimate, lower: quantile(&values, tail), upper: quantile(&values, 1.0 - tail) }
+        };
+        estimates.par_iter().enumerate().map(interval).collect()
+    }
+
+    fn resample(&self, seed: RootSeed, draw: u64, sums: &mut [f64]) {
+        let mut rng = seed.rng(Stream::Bootstrap, draw);
+        sums.fill(0.0);
+        let mut first = 0;
+        for &rows in &self.strata {
+            for _ in 0..rows {
+                let row = first + rng.random_range(0..rows) as usize;
+                add(sums, &self.values[row * self.columns..(row + 1) * self.columns]);
+            }
+            first += rows as usize;
+        }
+    }
+}
+
+fn add(sums: &mut [f64], unit: &[f64]) {
+    for (sum, value) in sums.iter_mut().zip(unit) {
+        *sum += value;
+    }
+}
+
+/// Of sorted values, linear between order statistics (type 7 of Hyndman and Fan 1996, R's default).
+fn quantile(sorted: &[f64], probability: f64) -> f64 {
+    let at = probability * (sorted.len() - 1) as f64;
+    let (low, share) = (at as usize, at.fract());
+    let high = (low + 1).min(sorted.len() - 1);
+    sorted[low] + share * (sorted[high] - sorted[low])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mean_interval(values: &[f64], draws: u64) -> Interval {
+        let mut units = Units::new(2);
+        units.begin_stratum();
+        for &value in values {
+            units.push(&[value, 1.0]);
+        }
+        units.percentile_intervals(RootSeed(1), draws, 1, &|sums, out| out[0] = sums[0] / sums[1])[0]
+    }
+
+    #[test]
+    fn quantiles_are_those_of_r() {
+        // quantile(c(1, 2, 3, 4, 10), c(.25, .9)) = 2, 7.6
+        let values = [1.0, 2.0, 3.0, 4.0, 10.0];
+        assert_eq!(quantile(&values, 0.25), 2.0);
+        assert!((quantile(&values, 0.9) - 7.6).abs() < 1e-12);
+        assert_eq!((quantile(&values, 0.0), quantile(&values, 1.0)), (1.0, 10.0));
+    }
+
+    /// The bootstrap distribution of a mean of n zeros and ones is binomial, known exactly: n = 100, p = 0.3 has its
+    /// 2.5 % and 97.5 % quantiles at 21 and 39.
+    #[test]
+    fn the_mean_of_zeros_and_ones_has_the_binomial_interval() {
+        let values: Vec<f64> = (0..100).map(|i| f64::from(u8::from(i < 30))).collect();
+        let interval = mean_interval(&values, DRAWS);
+        assert!((interval.estimate - 0.3).abs() < 1e-12);
+        assert!((interval.lower - 0.21).abs() < 0.0101 && (interval.upper - 0.39).abs() < 0.0101, "{interval:?}");
+    }
+
+    /// Pairing removes what both drivers share, strata what lies between lots.
+    #[test]
+    fn shared_difficulty_and_strata_do_not_widen_a_difference() {
+        let mut units = Units::new(3);
+        for lot in [0.0, 50.0] {
+            units.begin_stratum();
+            for i in 0..10 {
+                let shared = lot + f64::from(i * i);
+                units.push(&[shared + 1.0, shared, 1.0]);
+            }
+        }
+        let intervals = units.percentile_intervals(RootSeed(1), 500, 2, &|sums, out| {
+            out[0] = (sums[0] - sums[1]) / sums[2];
+            out[1] = sums[2];
+        });
+        assert_eq!((intervals[0].lower, intervals[0].upper), (1.0, 1.0));
+        assert!(intervals[0].excludes_zero());
+        assert_eq!((intervals[1].lower, intervals[1].upper), (20.0, 20.0), "every draw has as many units");
+    }
+
+    #[test]
+    fn one_and_two_threads_draw_the_same() {
+        let values: Vec<f64> = (0..50).map(|i| f64::from(i % 7)).collect();
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| mean_interval(&values, 1000))
+        };
+        assert_eq!(with(1), with(2));
+    }
+}

@@ -1,0 +1,411 @@
+//! An evaluation, counted and judged: the tables as data.
+
+use crate::format::bound_per_100m;
+use crate::incidents::Cause;
+use crate::json;
+use crate::judge::{Comparison, DriverEstimate};
+use crate::plan::Plan;
+use crate::results::EvaluationResults;
+use crate::slices::Slice;
+use crate::totals::Totals;
+use experiment::run_dir::RunDir;
+use experiment::settings::{EvaluationSettings, NoiseChoice};
+use serde::{Deserialize, Serialize};
+use sim::scenario::Direction;
+use std::path::Path;
+
+/// The version of `summary.json` that this program writes.
+pub const SCHEMA: u32 = 1;
+const FILE: &str = "summary.json";
+
+/// All tables of an evaluation; `summary.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tables {
+    /// Version of the format: [`SCHEMA`].
+    pub schema: u32,
+    /// Which trials.
+    pub settings: EvaluationSettings,
+    /// Drivers by slice, noise and direction.
+    pub rows: Vec<Row>,
+    /// Every other driver against one.
+    pub comparisons: Vec<ComparisonRow>,
+    /// Near-collisions by cause.
+    pub causes: Vec<CauseRow>,
+    /// Drivers against noise.
+    pub noise_sweep: Vec<SweepRow>,
+}
+
+impl Tables {
+    /// Reads `summary.json`; `None` if nothing was evaluated there.
+    ///
+    /// # Errors
+    /// If it is not what it should be, or of another version.
+    pub fn read(folder: &Path) -> anyhow::Result<Option<Self>> {
+        json::read_versioned(&folder.join(FILE), SCHEMA)
+    }
+}
+
+/// A row of `summary.csv`: a driver on some lots at one noise level. Intervals are of 95 %.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Who drove.
+    pub driver: String,
+    /// What was seen wrongly.
+    pub noise: NoiseChoice,
+    /// Where: the label of a slice.
+    pub lots: String,
+    /// `both`, `forward` or `reverse`.
+    pub direction: String,
+    /// Runs driven.
+    pub runs: u32,
+    /// Length of the routes, metres: what rates are per.
+    pub reference_m: f64,
+    /// Way driven, metres.
+    pub driven_m: f64,
+    /// Near-collisions.
+    pub near_collisions: u32,
+    /// Near-collisions per 100 m of route.
+    pub per_100m: f64,
+    /// Exact Poisson interval, per 100 m.
+    pub garwood_lower: f64,
+    /// See `garwood_lower`.
+    pub garwood_upper: f64,
+    /// One-sided upper bound, per 100 m.
+    pub one_sided_upper: f64,
+    /// Interval by paired bootstrap, per 100 m.
+    pub bootstrap_lower: Option<f64>,
+    /// See `bootstrap_lower`.
+    pub bootstrap_upper: Option<f64>,
+    /// Variance over mean of the counts; 1 = independent events.
+    pub dispersion: Option<f64>,
+    /// p-value of a dispersion as large, if events were independent.
+    pub dispersion_p: Option<f64>,
+    /// Mean over lots and directions, per 100 m.
+    pub per_100m_unweighted: Option<f64>,
+    /// Mean over runs, 0…1.
+    pub safe_ratio: f64,
+    /// Interval by bootstrap.
+    pub safe_ratio_lower: Option<f64>,
+    /// See `safe_ratio_lower`.
+    pub safe_ratio_upper: Option<f64>,
+    /// Mean over lots and directions.
+    pub safe_ratio_unweighted: Option<f64>,
+    /// Times the body touched something.
+    pub contacts: u32,
+    /// Times the car got stuck.
+    pub stuck: u32,
+    /// Runs ended by the time limit.
+    pub timed_out: u32,
+    /// Runs given up after too many events.
+    pub given_up: u32,
+    /// Driven way per simulated time, m/s.
+    pub mean_speed_mps: f64,
+    /// Least clearance in any run, metres.
+    pub clearance_min_m: Option<f32>,
+    /// Changes of the steering direction per 100 m driven.
+    pub steering_reversals_per_100m: f64,
+    /// Road-wheel angle steered per 100 m driven, radians.
+    pub steering_effort_rad_per_100m: f64,
+}
+
+/// A row of `comparisons.csv`: differences are driver − `compared_with`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ComparisonRow {
+    /// Who drove.
+    pub driver: String,
+    /// The driver it is compared with.
+    pub compared_with: String,
+    /// What was seen wrongly.
+    pub noise: NoiseChoice,
+    /// Where: the label of a slice.
+    pub lots: String,
+    /// Runs both have driven.
+    pub pairs: usize,
+    /// Near-collisions per 100 m, driver − other.
+    pub difference_per_100m: Option<f64>,
+    /// Interval by paired bootstrap.
+    pub difference_lower: Option<f64>,
+    /// See `difference_lower`.
+    pub difference_upper: Option<f64>,
+    /// Whether the interval excludes zero.
+    pub excludes_zero: Option<bool>,
+    /// Rate ratio, driver / other.
+    pub ratio: Option<f64>,
+    /// Exact interval.
+    pub ratio_lower: f64,
+    /// See `ratio_lower`; `None` if unbounded.
+    pub ratio_upper: Option<f64>,
+    /// Exact test of equal rates.
+    pub p_value: f64,
+    /// The same, adjusted for the number of comparisons.
+    pub p_holm: f64,
+    /// Safe ratio, driver − other.
+    pub difference_safe_ratio: Option<f64>,
+    /// Interval by paired bootstrap.
+    pub difference_safe_ratio_lower: Option<f64>,
+    /// See `difference_safe_ratio_lower`.
+    pub difference_safe_ratio_upper: Option<f64>,
+}
+
+/// A row of `noise_sweep.csv`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SweepRow {
+    /// Who drove.
+    pub driver: String,
+    /// Where: the label of a slice.
+    pub lots: String,
+    /// What was seen wrongly.
+    pub noise: NoiseChoice,
+    /// The noise as a multiple of `paper`; `None` for what the lots ask for.
+    pub times_paper: Option<f64>,
+    /// Length of the routes, metres: what rates are per.
+    pub reference_m: f64,
+    /// Near-collisions.
+    pub near_collisions: u32,
+    /// Near-collisions per 100 m of route.
+    pub per_100m: f64,
+    /// Exact Poisson interval, per 100 m.
+    pub lower: f64,
+    /// See `lower`.
+    pub upper: f64,
+    /// Mean over runs, 0…1.
+    pub safe_ratio: f64,
+}
+
+/// Near-collisions of a cause.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CauseRow {
+    /// Who drove.
+    pub driver: String,
+    /// What was seen wrongly.
+    pub noise: NoiseChoice,
+    /// Where: the label of a slice.
+    pub lots: String,
+    /// Why.
+    pub cause: Cause,
+    /// Near-collisions.
+    pub near_collisions: u32,
+}
+
+/// One noise level in one slice, judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    /// Index of the noise level.
+    pub level: usize,
+    /// The lots.
+    pub slice: Slice,
+    /// By driver.
+    pub estimates: Vec<DriverEstimate>,
+    /// Every other driver against `compare_with`.
+    pub comparisons: Vec<Comparison>,
+}
+
+/// An evaluation, counted and judged.
+#[derive(Debug)]
+pub struct Summary<'a> {
+    /// What was to be driven.
+    pub plan: &'a Plan<'a>,
+    /// What came of it.
+    pub results: &'a EvaluationResults,
+    /// Level by level, slice by slice.
+    judged: Vec<Judged>,
+}
+
+impl<'a> Summary<'a> {
+    /// Judges what was driven.
+    pub fn new(plan: &'a Plan<'a>, results: &'a EvaluationResults) -> Self {
+        let evaluation = &plan.settings.evaluation;
+        let slices = results.slices();
+        let both = (0..evaluation.noise.len()).flat_map(|level| slices.iter().map(move |slice| (level, slice.clone())));
+        let judge = |(level, slice)| {
+            let (estimates, comparisons) = results.judge(level, &slice, plan.compare_with, evaluation.seed);
+            Judged { level, slice, estimates, comparisons }
+        };
+        Self { plan, results, judged: both.map(judge).collect() }
+    }
+
+    /// Everything that the tables hold.
+    pub fn tables(&self) -> Tables {
+        Tables {
+            schema: SCHEMA,
+            settings: self.plan.settings.evaluation.clone(),
+            rows: self.rows(),
+            comparisons: self.comparison_rows(),
+            causes: self.cause_rows(),
+            noise_sweep: self.sweep_rows(),
+        }
+    }
+
+    /// Writes `summary.json`, `summary.csv`, `comparisons.csv`, and `noise_sweep.csv` if there are several levels.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn write(&self, run: &RunDir) -> anyhow::Result<()> {
+        let tables = self.tables();
+        run.write(FILE, json::to_text(&tables)?.as_bytes())?;
+        run.write("summary.csv", &csv_of(&tables.rows)?)?;
+        if !tables.comparisons.is_empty() {
+            run.write("comparisons.csv", &csv_of(&tables.comparisons)?)?;
+        }
+        if self.levels().len() > 1 {
+            run.write("noise_sweep.csv", &csv_of(&tables.noise_sweep)?)?;
+        }
+        Ok(())
+    }
+
+    /// The noise levels, in the order of their indices.
+    pub fn levels(&self) -> &'a [NoiseChoice] {
+        &self.plan.settings.evaluation.noise
+    }
+
+    /// The name of a driver.
+    pub fn driver(&self, index: usize) -> &'a str {
+        &self.plan.drivers[index].name
+    }
+
+    /// What was judged at a noise level, slice by slice.
+    pub fn at_level(&self, level: usize) -> impl Iterator<Item = &Judged> {
+        self.judged.iter().filter(move |judged| judged.level == level)
+    }
+
+    /// Driver by driver, slice by slice, where anything was driven.
+    pub fn estimates(&self, level: usize) -> impl Iterator<Item = (usize, &Judged, Totals)> {
+        (0..self.plan.drivers.len()).flat_map(move |driver| {
+            self.at_level(level).filter_map(move |judged| {
+                let totals = self.results.totals(level, driver, &judged.slice, None);
+                (totals.runs > 0).then_some((driver, judged, totals))
+            })
+        })
+    }
+
+    fn rows(&self) -> Vec<Row> {
+        let ways = [("both", None), ("forward", Some(Direction::Forward)), ("reverse", Some(Direction::Reverse))];
+        let mut rows = Vec::new();
+        for level in 0..self.levels().len() {
+            for (driver, judged, _) in self.estimates(level) {
+                for (name, direction) in ways {
+                    let totals = self.results.totals(level, driver, &judged.slice, direction);
+                    if totals.runs > 0 {
+                        rows.push(self.row(driver, judged, name, &totals));
+                    }
+                }
+            }
+        }
+        rows
+    }
+
+    fn row(&self, driver: usize, judged: &Judged, direction: &str, totals: &Totals) -> Row {
+        let rate = totals.rate();
+        // Resampled and weighed is only the whole.
+        let is_whole = direction == "both";
+        let estimate = if is_whole { judged.estimates[driver].clone() } else { DriverEstimate::default() };
+        let unweighted = (is_whole && judged.slice.is_pooled())
+            .then(|| self.results.unweighted(judged.level, driver, &judged.slice));
+        Row {
+            driver: self.driver(driver).to_owned(),
+            noise: self.levels()[judged.level],
+            lots: judged.slice.label.clone(),
+            direction: direction.to_owned(),
+            runs: totals.runs,
+            reference_m: totals.reference_m,
+            driven_m: totals.driven_m,
+            near_collisions: totals.near_collisions,
+            per_100m: rate.per_unit,
+            garwood_lower: rate.lower,
+            garwood_upper: rate.upper,
+            one_sided_upper: bound_per_100m(totals.near_collisions, totals.reference_m),
+            bootstrap_lower: estimate.per_100m.map(|interval| interval.lower),
+            bootstrap_upper: estimate.per_100m.map(|interval| interval.upper),
+            dispersion: estimate.dispersion.map(|dispersion| dispersion.index),
+            dispersion_p: estimate.dispersion.map(|dispersion| dispersion.p_value),
+            per_100m_unweighted: unweighted.map(|[rate, _]| rate),
+            safe_ratio: totals.safe_ratio(),
+            safe_ratio_lower: estimate.safe_ratio.map(|interval| interval.lower),
+            safe_ratio_upper: estimate.safe_ratio.map(|interval| interval.upper),
+            safe_ratio_unweighted: unweighted.map(|[_, safe_ratio]| safe_ratio),
+            contacts: totals.contacts,
+            stuck: totals.stuck,
+            timed_out: totals.timed_out,
+            given_up: totals.given_up,
+            mean_speed_mps: totals.mean_speed_mps(),
+            clearance_min_m: totals.clearance_min_m,
+            steering_reversals_per_100m: totals.reversals_per_100m(),
+            steering_effort_rad_per_100m: totals.effort_rad_per_100m(),
+        }
+    }
+
+    fn comparison_rows(&self) -> Vec<ComparisonRow> {
+        let row = |judged: &Judged, comparison: &Comparison| ComparisonRow {
+            driver: self.driver(comparison.driver).to_owned(),
+            compared_with: self.driver(self.plan.compare_with).to_owned(),
+            noise: self.levels()[judged.level],
+            lots: judged.slice.label.clone(),
+            pairs: comparison.pairs,
+            difference_per_100m: comparison.difference_per_100m.map(|interval| interval.estimate),
+            difference_lower: comparison.difference_per_100m.map(|interval| interval.lower),
+            difference_upper: comparison.difference_per_100m.map(|interval| interval.upper),
+            excludes_zero: comparison.difference_per_100m.map(|interval| interval.excludes_zero()),
+            ratio: comparison.ratio.ratio,
+            ratio_lower: comparison.ratio.lower,
+            ratio_upper: comparison.ratio.upper,
+            p_value: comparison.ratio.p_value,
+            p_holm: comparison.p_holm,
+            difference_safe_ratio: comparison.difference_safe_ratio.map(|interval| interval.estimate),
+            difference_safe_ratio_lower: comparison.difference_safe_ratio.map(|interval| interval.lower),
+            difference_safe_ratio_upper: comparison.difference_safe_ratio.map(|interval| interval.upper),
+        };
+        let rows = self.judged.iter().flat_map(|judged| judged.comparisons.iter().map(move |c| (judged, c)));
+        rows.map(|(judged, comparison)| row(judged, comparison)).collect()
+    }
+
+    fn sweep_rows(&self) -> Vec<SweepRow> {
+        let mut rows = Vec::new();
+        for (level, &noise) in self.levels().iter().enumerate() {
+            for (driver, judged, totals) in self.estimates(level) {
+                let rate = totals.rate();
+                rows.push(SweepRow {
+                    driver: self.driver(driver).to_owned(),
+                    lots: judged.slice.label.clone(),
+                    noise,
+                    times_paper: noise.times_paper(),
+                    reference_m: totals.reference_m,
+                    near_collisions: totals.near_collisions,
+                    per_100m: rate.per_unit,
+                    lower: rate.lower,
+                    upper: rate.upper,
+                    safe_ratio: totals.safe_ratio(),
+                });
+            }
+        }
+        rows
+    }
+
+    fn cause_rows(&self) -> Vec<CauseRow> {
+        let mut rows = Vec::new();
+        for (level, &noise) in self.levels().iter().enumerate() {
+            for (driver, judged, _) in self.estimates(level) {
+                rows.extend(Cause::ALL.map(|cause| CauseRow {
+                    driver: self.driver(driver).to_owned(),
+                    noise,
+                    lots: judged.slice.label.clone(),
+                    cause,
+                    near_collisions: self.results.count_of_cause(level, driver, &judged.slice, cause),
+                }));
+            }
+        }
+        rows
+    }
+}
+
+/// Rows as CSV with a header.
+///
+/// # Errors
+/// If a row cannot be written as one.
+pub fn csv_of(rows: &[impl Serialize]) -> anyhow::Result<Vec<u8>> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        csv.serialize(row)?;
+    }
+    Ok(csv.into_inner()?)
+}

@@ -1,0 +1,102 @@
+//! Runs added up: counts, metres and the rates made of them (docs/methods.md 8).
+
+use crate::statistics::poisson::Rate;
+use serde::Serialize;
+use sim::episode::{Ending, EpisodeReport};
+
+/// Sums over runs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Totals {
+    /// Runs driven.
+    pub runs: u32,
+    /// Length of the routes, metres: what rates are per.
+    pub reference_m: f64,
+    /// Way driven, metres.
+    pub driven_m: f64,
+    /// Simulated time, seconds.
+    pub duration_s: f64,
+    /// Near-collisions.
+    pub near_collisions: u32,
+    /// Times the body touched something.
+    pub contacts: u32,
+    /// Times the car got stuck.
+    pub stuck: u32,
+    /// Runs ended by the time limit.
+    pub timed_out: u32,
+    /// Runs given up after too many events.
+    pub given_up: u32,
+    /// Safe ratios of the runs, added up.
+    pub safe_ratio_sum: f64,
+    /// Smallest clearance in any run, metres.
+    pub clearance_min_m: Option<f32>,
+    /// Changes of the steering direction.
+    pub steering_reversals: u32,
+    /// Road-wheel angle steered, radians.
+    pub steering_effort_rad: f64,
+}
+
+impl Totals {
+    /// Takes one run into account.
+    pub fn add(&mut self, report: &EpisodeReport) {
+        let metrics = &report.metrics;
+        self.runs += 1;
+        self.reference_m += f64::from(metrics.reference_m);
+        self.driven_m += f64::from(metrics.driven_m);
+        self.duration_s += f64::from(metrics.duration_s);
+        self.near_collisions += metrics.near_collisions;
+        self.contacts += metrics.contacts;
+        self.stuck += metrics.stuck;
+        self.timed_out += u32::from(report.ending == Ending::TimedOut);
+        self.given_up += u32::from(report.ending == Ending::TooManyEvents);
+        self.safe_ratio_sum += f64::from(metrics.safe_ratio);
+        self.clearance_min_m = smaller(self.clearance_min_m, Some(metrics.clearance_min_m));
+        self.steering_reversals += metrics.steering_reversals;
+        self.steering_effort_rad += f64::from(metrics.steering_effort_rad);
+    }
+
+    /// Adds other sums.
+    pub fn merge(&mut self, other: &Self) {
+        self.runs += other.runs;
+        self.reference_m += other.reference_m;
+        self.driven_m += other.driven_m;
+        self.duration_s += other.duration_s;
+        self.near_collisions += other.near_collisions;
+        self.contacts += other.contacts;
+        self.stuck += other.stuck;
+        self.timed_out += other.timed_out;
+        self.given_up += other.given_up;
+        self.safe_ratio_sum += other.safe_ratio_sum;
+        self.clearance_min_m = smaller(self.clearance_min_m, other.clearance_min_m);
+        self.steering_reversals += other.steering_reversals;
+        self.steering_effort_rad += other.steering_effort_rad;
+    }
+
+    /// Near-collisions per 100 m of route with their interval.
+    pub fn rate(&self) -> Rate {
+        Rate::new(self.near_collisions, self.reference_m / 100.0)
+    }
+
+    /// Mean over runs.
+    pub fn safe_ratio(&self) -> f64 {
+        self.safe_ratio_sum / f64::from(self.runs.max(1))
+    }
+
+    /// Steering reversals per 100 m driven: the paper's oscillation as a number.
+    pub fn reversals_per_100m(&self) -> f64 {
+        100.0 * f64::from(self.steering_reversals) / self.driven_m.max(f64::MIN_POSITIVE)
+    }
+
+    /// Road-wheel angle steered per 100 m driven, radians.
+    pub fn effort_rad_per_100m(&self) -> f64 {
+        100.0 * self.steering_effort_rad / self.driven_m.max(f64::MIN_POSITIVE)
+    }
+
+    /// Driven way per simulated time, m/s.
+    pub fn mean_speed_mps(&self) -> f64 {
+        self.driven_m / self.duration_s.max(f64::MIN_POSITIVE)
+    }
+}
+
+fn smaller(a: Option<f32>, b: Option<f32>) -> Option<f32> {
+    [a, b].into_iter().flatten().filter(|value| value.is_finite()).min_by(f32::total_cmp)
+}

@@ -1,0 +1,321 @@
+//! `tune`: parameters of the model-based planners, searched the same way and for as long for each.
+//!
+//! Only lot a and training lots are driven, in trials of their own. All candidates of a planner meet the same obstacles
+//! and noise. Fewer failures win — near-collisions plus stuck events, after both of which the car is put back on its
+//! path, so that neither can be traded for the other —, then fewer near-collisions, then the larger safe ratio; runs
+//! that do not reach the end come last. The best few and the starting point then drive fresh trials, and the best over
+//! all of its trials is kept: picking the luckiest of many candidates would promise too much.
+
+use crate::totals::Totals;
+use anyhow::{Context as _, ensure};
+use experiment::drive::{self, TrialBatch};
+use experiment::drivers::{NamedDriver, PlannerFile};
+use experiment::lots::Lot;
+use experiment::progress::Progress;
+use experiment::run_dir::RunDir;
+use experiment::settings::{NoiseChoice, Settings};
+use experiment::trials::{self, Purpose, Trial};
+use planners::Baseline;
+use planners::search::{GENERATION, Search};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use sim::episode::{Episode, EpisodeSettings, Event};
+use sim::map::Map;
+use sim::seed::RootSeed;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Candidates that drive fresh trials besides the starting point.
+const FINALISTS: usize = 4;
+
+/// Tunes planners one after another and writes `NAME.toml` for each as it is found. Lots, trials, directions, noise and
+/// seed are those of the section `evaluation`. Ends early if cancelled: what is returned is what was found by then.
+///
+/// # Errors
+/// If a lot is not for training or cannot be driven, or a file cannot be written.
+pub fn tune(
+    settings: &Settings,
+    planners: &[Baseline],
+    budget: usize,
+    run: &RunDir,
+    progress: &dyn Progress,
+) -> anyhow::Result<Vec<Found>> {
+    let evaluation = &settings.evaluation;
+    let lots = Lot::parse_all(&evaluation.lots)?;
+    check(&lots)?;
+    progress.begin("lots", "drawing lots");
+    let course = Course::new(settings, &lots, evaluation.noise[0])?;
+    progress.end(&format!("{} runs per candidate", course.search.trials.len()));
+    let mut tuned = Vec::new();
+    for planner in planners {
+        progress.begin("tuning", &format!("tuning {}", planner.name()));
+        let Some(found) = search(&course, planner, budget, evaluation.seed, progress) else { break };
+        progress.end(&format!(
+            "{:.2} → {:.2} failures per 100 m",
+            found.before.failures_per_100m, found.after.failures_per_100m
+        ));
+        run.write(&format!("{}.toml", planner.name()), found.to_toml(settings)?.as_bytes())?;
+        tuned.push(found);
+    }
+    Ok(tuned)
+}
+
+/// Whether parameters may be tuned on these lots.
+///
+/// # Errors
+/// If one of them must stay unseen.
+pub fn check(lots: &[Lot]) -> anyhow::Result<()> {
+    let unseen = lots.iter().find(|lot| !lot.is_for_training());
+    ensure!(
+        unseen.is_none(),
+        "lot {:?}: parameters are tuned on lot-a and generated training lots only (train:N), so that the others stay \
+         unseen",
+        unseen.map_or("", Lot::name)
+    );
+    Ok(())
+}
+
+/// The planners of these names, in the order of [`Baseline::all`]; all if none is named.
+///
+/// # Errors
+/// If nothing is named so.
+pub fn planners_named(names: &[String]) -> anyhow::Result<Vec<Baseline>> {
+    let all = Baseline::all();
+    for name in names {
+        let known: Vec<&str> = all.iter().map(Baseline::name).collect();
+        ensure!(known.contains(&name.as_str()), "no planner {name:?}; there are {}", known.join(", "));
+    }
+    let is_wanted = |planner: &Baseline| names.is_empty() || names.iter().any(|name| name == planner.name());
+    Ok(all.into_iter().filter(is_wanted).collect())
+}
+
+/// Trials with their maps.
+struct Stretch<'a> {
+    trials: Vec<Trial<'a>>,
+    maps: Vec<Arc<Map>>,
+}
+
+/// All runs that candidates drive.
+struct Course<'a> {
+    episode: &'a EpisodeSettings,
+    noise: NoiseChoice,
+    /// Every candidate's.
+    search: Stretch<'a>,
+    /// The finalists'.
+    fresh: Stretch<'a>,
+}
+
+impl<'a> Course<'a> {
+    fn new(settings: &'a Settings, lots: &'a [Lot], noise: NoiseChoice) -> anyhow::Result<Self> {
+        let evaluation = &settings.evaluation;
+        let count = evaluation.trials;
+        // Lots that are the same in every trial get fresh noise; lot a gets fresh obstacles too.
+        let all = Trial::all(evaluation.seed, Purpose::Tuning, lots, 2 * count, &evaluation.directions);
+        let (search, fresh): (Vec<Trial<'_>>, Vec<Trial<'_>>) = all.partition(|trial| trial.index < count);
+        let episode = &settings.episode;
+        let stretch = |trials: Vec<Trial<'a>>| {
+            let maps = trials::maps(&trials, episode)?;
+            Ok::<_, anyhow::Error>(Stretch { trials, maps })
+        };
+        Ok(Self { episode, noise, search: stretch(search)?, fresh: stretch(fresh)? })
+    }
+
+    /// Drives a stretch with every candidate, in parallel; sums come in the order of the candidates.
+    fn drive(&self, candidates: &[Baseline], stretch: &Stretch<'_>, on_run: &(dyn Fn() + Sync)) -> Vec<Totals> {
+        let starts: Vec<Episode> = drive::start(&stretch.trials, &stretch.maps, self.episode, self.noise);
+        let drive = |candidate: &Baseline| {
+            let driver = &NamedDriver::planner(candidate.clone());
+            let (trials, maps) = (&stretch.trials, &stretch.maps);
+            let batch = TrialBatch { episode: self.episode, driver, trials, maps, noise: self.noise };
+            let reports = batch.drive_from(starts.clone(), &mut |_, frame| {
+                if frame.event == Event::ReachedEnd {
+                    on_run();
+                }
+                ControlFlow::Continue(())
+            });
+            let mut totals = Totals::default();
+            reports.iter().flatten().for_each(|report| totals.add(report));
+            totals
+        };
+        candidates.par_iter().map(drive).collect()
+    }
+}
+
+/// What decides between candidates; smaller is better.
+fn rank(totals: &Totals) -> (u32, u32, u32, i64) {
+    let unfinished = totals.timed_out + totals.given_up;
+    let safe = (totals.safe_ratio() * 1e9) as i64;
+    (unfinished, totals.near_collisions + totals.stuck, totals.near_collisions, -safe)
+}
+
+/// What a search found.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// The planner with the parameters found.
+    pub planner: Baseline,
+    budget: usize,
+    seed: RootSeed,
+    /// Whether nothing better than the starting point was found.
+    pub is_start: bool,
+    /// The starting point and the found parameters, over search and fresh trials.
+    pub before: Score,
+    /// See `before`.
+    pub after: Score,
+    /// Over fresh trials alone: what the choice did not profit from as much.
+    before_fresh: Score,
+    after_fresh: Score,
+}
+
+/// Sums as they are written down.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// Near-collisions and stuck events per 100 m of route.
+    pub failures_per_100m: f64,
+    /// Near-collisions.
+    pub near_collisions: u32,
+    /// Near-collisions per 100 m of route.
+    pub near_collisions_per_100m: f64,
+    /// Stuck events.
+    pub stuck: u32,
+    /// Runs that did not reach the end.
+    pub unfinished_runs: u32,
+    /// Mean over runs, 0…1.
+    pub safe_ratio: f64,
+    /// Length of the routes, metres.
+    pub reference_m: f64,
+}
+
+impl Score {
+    fn of(totals: &Totals) -> Self {
+        let per_100m = |count: u32| round(100.0 * f64::from(count) / totals.reference_m);
+        Self {
+            failures_per_100m: per_100m(totals.near_collisions + totals.stuck),
+            near_collisions: totals.near_collisions,
+            near_collisions_per_100m: per_100m(totals.near_collisions),
+            stuck: totals.stuck,
+            unfinished_runs: totals.timed_out + totals.given_up,
+            safe_ratio: round(totals.safe_ratio()),
+            reference_m: round(totals.reference_m),
+        }
+    }
+}
+
+/// To four decimals, for people.
+fn round(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
+
+/// Searches around one planner; `None` if cancelled.
+fn search(
+    course: &Course<'_>,
+    start: &Baseline,
+    budget: usize,
+    seed: RootSeed,
+    progress: &dyn Progress,
+) -> Option<Found> {
+    let finalists_max = FINALISTS.min(budget - 1) + 1;
+    let runs_all = budget * course.search.trials.len() + finalists_max * course.fresh.trials.len();
+    let runs_done = AtomicUsize::new(0);
+    let on_run = || {
+        runs_done.fetch_add(1, Ordering::Relaxed);
+    };
+    // The same draws for every planner, as far as their dimensions allow.
+    let mut search = Search::new(start.to_unit_cube(), budget, seed, 0);
+    let mut tried: Vec<(Vec<f32>, Baseline, Totals)> = Vec::with_capacity(budget);
+    loop {
+        let best = tried.iter().min_by_key(|(_, _, totals)| rank(totals));
+        let share = runs_done.load(Ordering::Relaxed) as f64 / runs_all as f64;
+        let status = || best.map_or_else(String::new, |(_, _, totals)| format!("{} failures", rank(totals).1));
+        progress.at(share, &mut |_| status());
+        let generation = search.ask(best.map(|(point, ..)| point.as_slice()));
+        if generation.is_empty() {
+            break;
+        }
+        if progress.is_cancelled() {
+            return None;
+        }
+        // The starting point is driven as it is: its parameters may lie outside the ranges.
+        let candidate = |point: &Vec<f32>| start.at(point);
+        let mut candidates: Vec<Baseline> = generation.iter().map(candidate).collect();
+        if tried.is_empty() {
+            candidates[0] = start.clone();
+        }
+        let totals = course.drive(&candidates, &course.search, &on_run);
+        tried.extend(
+            generation.into_iter().zip(candidates).zip(totals).map(|((point, of), totals)| (point, of, totals)),
+        );
+    }
+    let mut order: Vec<usize> = (1..tried.len()).collect();
+    order.sort_by_key(|&index| rank(&tried[index].2));
+    order.truncate(finalists_max - 1);
+    order.insert(0, 0);
+    let finalists: Vec<Baseline> = order.iter().map(|&index| tried[index].1.clone()).collect();
+    let fresh = course.drive(&finalists, &course.fresh, &on_run);
+    let together: Vec<Totals> = order
+        .iter()
+        .zip(&fresh)
+        .map(|(&index, fresh)| {
+            let mut totals = tried[index].2.clone();
+            totals.merge(fresh);
+            totals
+        })
+        .collect();
+    let winner = (0..together.len()).min_by_key(|&place| (rank(&together[place]), place))?;
+    Some(Found {
+        planner: finalists[winner].clone(),
+        budget,
+        seed,
+        is_start: winner == 0,
+        before: Score::of(&together[0]),
+        after: Score::of(&together[winner]),
+        before_fresh: Score::of(&fresh[0]),
+        after_fresh: Score::of(&fresh[winner]),
+    })
+}
+
+/// How parameters were found, as written beside them.
+#[derive(Serialize)]
+struct Record<'a> {
+    method: String,
+    candidates: usize,
+    seed: u64,
+    lots: &'a [String],
+    trials: u32,
+    noise: Vec<String>,
+    kept_the_starting_point: bool,
+    ranges: Vec<String>,
+    before: Score,
+    after: Score,
+    before_on_fresh_trials: Score,
+    after_on_fresh_trials: Score,
+}
+
+impl Found {
+    fn to_toml(&self, settings: &Settings) -> anyhow::Result<String> {
+        let evaluation = &settings.evaluation;
+        let record = Record {
+            method: format!(
+                "half of the candidates uniform, half normal around the best, generations of {GENERATION}; the best \
+                 {FINALISTS} and the starting point on fresh trials"
+            ),
+            candidates: self.budget,
+            seed: self.seed.0,
+            lots: &evaluation.lots,
+            trials: evaluation.trials,
+            noise: evaluation.noise.iter().map(|noise| noise.name()).collect(),
+            kept_the_starting_point: self.is_start,
+            ranges: self.planner.search_space().iter().map(|(name, span)| format!("{name}: {span}")).collect(),
+            before: self.before,
+            after: self.after,
+            before_on_fresh_trials: self.before_fresh,
+            after_on_fresh_trials: self.after_fresh,
+        };
+        let file = PlannerFile {
+            planner: self.planner.name().to_owned(),
+            parameters: self.planner.parameters(),
+            search: Some(toml::Table::try_from(&record).context("a record is plain values")?),
+        };
+        Ok(toml::to_string(&file)?)
+    }
+}

@@ -1,0 +1,127 @@
+//! The one loop: a driver on a batch of trials, in lock-step, frame by frame for whoever observes it.
+//!
+//! Evaluation, tuning, replays, pictures and recordings all drive with [`TrialBatch::drive`]; training drives the same
+//! episodes with a collector at the wheel ([`crate::training`]). What differs is only what an observer does with frames.
+
+use crate::drivers::NamedDriver;
+use crate::lots::Lot;
+use crate::replay_key::ReplayKey;
+use crate::settings::NoiseChoice;
+use crate::trials::{self, Trial};
+use anyhow::ensure;
+use rayon::prelude::*;
+use sim::batch::run_lockstep_until;
+use sim::driver::Fleet;
+use sim::episode::{Episode, EpisodeReport, EpisodeSettings, Frame};
+use sim::map::Map;
+use sim::seed::RootSeed;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// Called with the index of the trial within the batch and its frame; a break ends the batch after this tick.
+pub type Observer<'a> = &'a mut dyn FnMut(usize, &Frame) -> ControlFlow<()>;
+
+/// Trials that are driven together, by one driver after another: all meet the same maps, obstacles, noise and starts.
+#[derive(Debug, Clone, Copy)]
+pub struct TrialBatch<'a> {
+    /// Car, sensor, controller, metrics.
+    pub episode: &'a EpisodeSettings,
+    /// Who drives.
+    pub driver: &'a NamedDriver,
+    /// Where, in the order of the episodes.
+    pub trials: &'a [Trial<'a>],
+    /// Their maps ([`trials::maps`]).
+    pub maps: &'a [Arc<Map>],
+    /// What is seen wrongly.
+    pub noise: NoiseChoice,
+}
+
+impl TrialBatch<'_> {
+    /// A car at the start of every trial, in order.
+    pub fn episodes(&self) -> Vec<Episode> {
+        start(self.trials, self.maps, self.episode, self.noise)
+    }
+
+    /// Seats the driver in this many cars.
+    pub fn fleet(&self, cars: usize) -> Box<dyn Fleet> {
+        self.driver.fleet(self.episode, cars)
+    }
+
+    /// Drives every trial to its end, or until the observer breaks: `None` for what had not ended by then.
+    pub fn drive(&self, observer: Observer<'_>) -> Vec<Option<EpisodeReport>> {
+        self.drive_from(self.episodes(), observer)
+    }
+
+    /// The same from episodes of the caller's.
+    pub fn drive_from(&self, episodes: Vec<Episode>, observer: Observer<'_>) -> Vec<Option<EpisodeReport>> {
+        let mut fleet = self.fleet(episodes.len());
+        run_lockstep_until(episodes, &mut *fleet, observer)
+    }
+
+    /// The key that replays a trial of the batch; `seed`: that of the evaluation.
+    pub fn replay_key(&self, trial: &Trial<'_>, seed: RootSeed, tick: u32) -> ReplayKey {
+        let (driver, lot) = (self.driver.spec.clone(), trial.lot.spec());
+        ReplayKey { driver, lot, direction: trial.direction, trial: trial.index, noise: self.noise, seed, tick }
+    }
+}
+
+/// A car at the start of every trial, in order, on maps that several drivers may share.
+pub fn start(trials: &[Trial<'_>], maps: &[Arc<Map>], episode: &EpisodeSettings, noise: NoiseChoice) -> Vec<Episode> {
+    let start = |(trial, map): (&Trial<'_>, &Arc<Map>)| {
+        let settings = Arc::new(trials::episode_settings(episode, noise, map));
+        Episode::new(settings, Arc::clone(map), trial.episode_seed())
+    };
+    trials.par_iter().zip(maps).map(start).collect()
+}
+
+/// The trial that a replay key names, ready to be driven again.
+#[derive(Debug, Clone)]
+pub struct Replay {
+    /// Where; the only lot of its name.
+    pub lot: Lot,
+    /// Its map, as driven in the direction of the key.
+    pub map: Arc<Map>,
+    key: ReplayKey,
+}
+
+impl Replay {
+    /// Draws the lot and builds the map.
+    ///
+    /// # Errors
+    /// If the key names several lots, or one that cannot be driven.
+    pub fn new(key: &ReplayKey, episode: &EpisodeSettings) -> anyhow::Result<Self> {
+        let mut lots = Lot::parse_all(std::slice::from_ref(&key.lot))?;
+        ensure!(lots.len() == 1, "{:?} stands for {} lots; name one, as in test-hard-7", key.lot, lots.len());
+        let lot = lots.remove(0);
+        let map = Arc::new(Trial::of_evaluation(key.seed, &lot, key.direction, key.trial).map(episode)?);
+        Ok(Self { lot, map, key: key.clone() })
+    }
+
+    /// The trial.
+    pub fn trial(&self) -> Trial<'_> {
+        Trial::of_evaluation(self.key.seed, &self.lot, self.key.direction, self.key.trial)
+    }
+
+    /// The settings of its episode.
+    pub fn episode_settings(&self, episode: &EpisodeSettings) -> EpisodeSettings {
+        trials::episode_settings(episode, self.key.noise, &self.map)
+    }
+
+    /// A car at its start.
+    pub fn episode(&self, episode: &EpisodeSettings) -> Episode {
+        start(&[self.trial()], std::slice::from_ref(&self.map), episode, self.key.noise).remove(0)
+    }
+
+    /// Drives it again, until the observer breaks.
+    pub fn drive(
+        &self,
+        episode: &EpisodeSettings,
+        driver: &NamedDriver,
+        mut observer: impl FnMut(&Frame) -> ControlFlow<()>,
+    ) -> Option<EpisodeReport> {
+        let trials = [self.trial()];
+        let maps = std::slice::from_ref(&self.map);
+        let batch = TrialBatch { episode, driver, trials: &trials, maps, noise: self.key.noise };
+        batch.drive(&mut |_, frame| observer(frame)).remove(0)
+    }
+}

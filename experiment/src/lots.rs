@@ -1,0 +1,182 @@
+//! Lots that can be named on the command line: [`scenarios::suite`], checked before anything is driven.
+
+use anyhow::ensure;
+use scenarios::LotSpec;
+use scenarios::generator;
+use scenarios::import::MapLot;
+use scenarios::reference::ReferenceLot;
+use scenarios::split::Split;
+use sim::scenario::Scenario;
+use sim::seed::RootSeed;
+use std::path::Path;
+
+/// A lot, before a trial has drawn its obstacles.
+#[derive(Debug, Clone)]
+pub struct Lot {
+    name: String,
+    spec: LotSpec,
+    /// Of a file: read once, so that its errors come before any work.
+    from_file: Option<Scenario>,
+}
+
+/// A lot as it stands in one trial.
+#[derive(Debug, Clone)]
+pub struct Drawn {
+    /// The lot.
+    pub scenario: Scenario,
+    /// Draws the generator needed, this one included; `None` if it was not generated.
+    pub attempts: Option<u32>,
+}
+
+/// Ways to name lots: how it is written, what it means.
+pub const SPECS: [(&str, &str); 9] = [
+    ("lot-a", "the paper's training lot rebuilt: 231 m; obstacles drawn anew for every trial"),
+    ("lot-b", "139 m, the narrowest, never trained on"),
+    ("lot-c", "149 m, the widest, never trained on"),
+    ("reference", "all three"),
+    ("test:N", "the first N generated lots of a split: train, validation or test; :easy or :hard may follow"),
+    ("test-hard-7", "one of them"),
+    ("PATH.toml", "a lot written by hand (cargo xtask generate writes examples), or the route on a map, PATH.lot.toml"),
+    ("PATH.yaml", "a ROS map, driven as PATH.lot.toml beside it says (see scenarios/examples/car-park.lot.toml)"),
+    ("PATH.csv", "a TPCAP case with a drive forwards; PATH.lot.toml may change it"),
+];
+
+impl Lot {
+    /// The lots that specs stand for.
+    ///
+    /// # Errors
+    /// If nothing is named so, a file does not describe a lot, or two lots have the same name.
+    pub fn parse_all<S: AsRef<str>>(specs: &[S]) -> anyhow::Result<Vec<Self>> {
+        let mut lots: Vec<Self> = Vec::new();
+        for spec in specs {
+            for spec in scenarios::suite(spec.as_ref())? {
+                lots.push(Self::new(spec)?);
+            }
+        }
+        let mut names: Vec<&str> = lots.iter().map(Self::name).collect();
+        names.sort_unstable();
+        let twice = names.windows(2).find(|pair| pair[0] == pair[1]);
+        ensure!(twice.is_none(), "lot {:?} is named twice; results are told apart by name", twice.unwrap_or(&[""])[0]);
+        Ok(lots)
+    }
+
+    fn new(spec: LotSpec) -> anyhow::Result<Self> {
+        let from_file = match &spec {
+            LotSpec::File(path) => Some(scenarios::load::load(path)?),
+            LotSpec::Reference(_) | LotSpec::Generated { .. } => None,
+        };
+        let name = from_file.as_ref().map_or_else(|| spec.to_string(), |scenario| scenario.name.clone());
+        Ok(Self { name, spec, from_file })
+    }
+
+    /// A map with a route that may differ from what is written beside it.
+    ///
+    /// # Errors
+    /// If no lot can be made of it.
+    pub fn of_map(path: &Path, lot: &MapLot) -> anyhow::Result<Self> {
+        let scenario = lot.scenario()?;
+        Ok(Self { name: scenario.name.clone(), spec: LotSpec::File(path.to_owned()), from_file: Some(scenario) })
+    }
+
+    /// Name in tables.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What a row of a printed table is about: generated lots of one kind share a row.
+    pub fn group(&self) -> String {
+        match &self.spec {
+            LotSpec::Generated { split, difficulty, .. } => format!("{}-{}", split.name(), difficulty.name()),
+            LotSpec::Reference(_) | LotSpec::File(_) => self.name.clone(),
+        }
+    }
+
+    /// As named on the command line; stands for this lot alone.
+    pub fn spec(&self) -> String {
+        self.spec.to_string()
+    }
+
+    /// Whether it is one of many drawn from a distribution, so that lots themselves are the sample.
+    pub fn is_generated(&self) -> bool {
+        matches!(self.spec, LotSpec::Generated { .. })
+    }
+
+    /// Whether it may turn out not to be drivable: a lot written by hand.
+    pub fn is_from_file(&self) -> bool {
+        self.from_file.is_some()
+    }
+
+    /// Whether drivers may be trained or tuned on it: lot a and the generator's training lots.
+    pub fn is_for_training(&self) -> bool {
+        match &self.spec {
+            LotSpec::Generated { split, .. } => *split == Split::Train,
+            LotSpec::Reference(lot) => *lot == ReferenceLot::A,
+            LotSpec::File(_) => false,
+        }
+    }
+
+    /// Whether trials draw their own obstacles; other lots are the same in every trial.
+    pub fn is_drawn_per_trial(&self) -> bool {
+        matches!(self.spec, LotSpec::Reference(_))
+    }
+
+    /// The lot that takes its place in a round of training: of `count` generated lots of a kind, round after round the
+    /// next `count`. Other lots stay: they draw new obstacles, or are files.
+    #[must_use]
+    pub fn in_round(&self, round: u32, count: u64) -> Self {
+        let mut lot = self.clone();
+        if let LotSpec::Generated { index, .. } = &mut lot.spec {
+            *index += u64::from(round) * count;
+            lot.name = lot.spec.to_string();
+        }
+        lot
+    }
+
+    /// The lot with the obstacles of a trial.
+    pub fn draw(&self, trial: RootSeed) -> Drawn {
+        match (&self.from_file, &self.spec) {
+            (Some(scenario), _) => Drawn { scenario: scenario.clone(), attempts: None },
+            (None, LotSpec::Generated { split, difficulty, index }) => {
+                let generated = generator::generate(*split, *index, *difficulty);
+                Drawn { scenario: generated.scenario, attempts: Some(generated.attempts) }
+            }
+            (None, spec) => {
+                let scenario = spec.scenario(trial).expect("only files can be wrong, and they are read already");
+                Drawn { scenario, attempts: None }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_become_lots_and_doubles_are_refused() {
+        let names = |specs: &[&str]| {
+            let lots = Lot::parse_all(specs)?;
+            Ok::<_, anyhow::Error>(lots.iter().map(|lot| lot.name().to_owned()).collect::<Vec<_>>())
+        };
+        assert_eq!(names(&["lot-a", "test:2"]).unwrap(), ["lot-a", "test-medium-0", "test-medium-1"]);
+        for (specs, part) in [
+            (&["lot-d"] as &[&str], "there are lot-a, lot-b"),
+            (&["lot-a", "reference"], "\"lot-a\" is named twice"),
+            (&["no/such.toml"], "no/such.toml"),
+        ] {
+            let error = format!("{:#}", names(specs).unwrap_err());
+            assert!(error.contains(part), "{specs:?}: {part:?} is missing in: {error}");
+        }
+    }
+
+    #[test]
+    fn every_round_of_training_has_generated_lots_of_its_own() {
+        let names = |round| -> Vec<String> {
+            let lots = Lot::parse_all(&["lot-a", "train:2", "train:1:hard"]).unwrap();
+            let of_a_kind = |lot: &Lot| lots.iter().filter(|other| other.group() == lot.group()).count() as u64;
+            lots.iter().map(|lot| lot.in_round(round, of_a_kind(lot)).name().to_owned()).collect()
+        };
+        assert_eq!(names(0), ["lot-a", "train-medium-0", "train-medium-1", "train-hard-0"]);
+        assert_eq!(names(1), ["lot-a", "train-medium-2", "train-medium-3", "train-hard-1"]);
+    }
+}

@@ -1,0 +1,388 @@
+//! The folder of a run: claimed before the first step, never written over by accident.
+//!
+//! ```text
+//! runs/train-dagger-default-s1/
+//!   manifest.toml      who made this: revision, compiler, command line, seed
+//!   settings.toml      every setting
+//!   round-00/ …        data, network and loss curve of each round (policy::dataset::store)
+//!   table1.md .json    the paper's table from this run
+//!   summary.md .json .csv, comparisons.csv, noise_sweep.csv, runs.jsonl, failures.md .jsonl     (evaluate)
+//!   wall_time.jsonl    the only file that differs from one repetition to the next, but for the manifest
+//!   finished.toml      written last
+//! ```
+
+use crate::settings::Settings;
+use anyhow::{Context as _, bail, ensure};
+use policy::checkpoint::Checkpoint;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+const MANIFEST: &str = "manifest.toml";
+const SETTINGS: &str = "settings.toml";
+const FINISHED: &str = "finished.toml";
+
+/// A claimed folder.
+#[derive(Debug, Clone)]
+pub struct RunDir {
+    path: PathBuf,
+}
+
+/// What made a run: `manifest.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Version of this format: [`MANIFEST_SCHEMA`].
+    pub schema: u32,
+    /// The name and version of the program.
+    pub program: String,
+    /// The command line, without the name of the program.
+    pub command_line: Vec<String>,
+    /// What the settings started from.
+    pub preset: String,
+    /// Root seed of the training.
+    pub root_seed: u64,
+    /// Root seed of the trials of the evaluation.
+    pub evaluation_seed: u64,
+    /// Revision of the repository that the program was built from, if known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub git_revision: Option<String>,
+    /// Whether files of the repository differed from that revision.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub git_dirty: Option<bool>,
+    /// The compiler that built the program.
+    pub rustc_version: String,
+    /// Threads it computed with; results do not depend on it.
+    pub threads: usize,
+    /// Architecture and operating system.
+    pub target: String,
+}
+
+/// The version of `manifest.toml` that this program writes.
+pub const MANIFEST_SCHEMA: u32 = 1;
+
+/// The program that makes a run, as its manifest describes it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Build {
+    /// Name and version.
+    pub program: String,
+    /// The command line, without the name of the program.
+    pub command_line: Vec<String>,
+    /// Revision of the repository, if known.
+    pub git_revision: Option<String>,
+    /// Whether files of the repository differ from that revision.
+    pub git_dirty: Option<bool>,
+    /// The compiler.
+    pub rustc_version: String,
+}
+
+/// Where a run goes.
+#[derive(Debug, Clone, Copy)]
+pub struct Place<'a> {
+    /// Who makes it.
+    pub build: &'a Build,
+    /// The folder; `None`: the next free one in `runs/`.
+    pub out: Option<&'a Path>,
+    /// Whether to delete what an earlier run left there.
+    pub overwrite: bool,
+    /// What is done, as part of the folder's name.
+    pub command: &'a str,
+    /// Name of the preset.
+    pub preset: &'a str,
+    /// Seed that belongs into the name.
+    pub seed: u64,
+}
+
+impl RunDir {
+    /// Claims a folder and writes down what is about to happen.
+    ///
+    /// # Errors
+    /// If the folder is taken or cannot be written.
+    pub fn create(place: &Place<'_>, settings: &Settings) -> anyhow::Result<Self> {
+        let path = match place.out {
+            Some(out) => claim_named(out, place.overwrite)?,
+            None => claim_next_free(&format!("{}-{}-s{}", place.command, place.preset, place.seed))?,
+        };
+        let run = Self { path };
+        run.write(SETTINGS, settings.to_toml().as_bytes())?;
+        let manifest =
+            toml::to_string(&Manifest::new(place.build, place.preset, settings)).expect("a manifest is plain values");
+        run.write(MANIFEST, manifest.as_bytes())?;
+        Ok(run)
+    }
+
+    /// Reopens the folder of an interrupted run.
+    ///
+    /// # Errors
+    /// If there is none, or it is finished.
+    pub fn resume(path: &Path) -> anyhow::Result<(Self, Settings)> {
+        ensure!(path.is_dir(), "{}: there is no such run to resume", path.display());
+        ensure!(!path.join(FINISHED).is_file(), "{}: this run is finished; nothing is left to resume", path.display());
+        let settings = Settings::read(&path.join(SETTINGS))?;
+        Ok((Self { path: path.to_path_buf() }, settings))
+    }
+
+    /// Claims the folder of a stage within a run: `None` if it is finished, else as an interrupted one left it or new.
+    /// Its place belongs to the run: what cannot be continued there is made again.
+    ///
+    /// # Errors
+    /// If it was begun with other settings, or cannot be written.
+    pub fn stage(path: &Path, place: &Place<'_>, settings: &Settings) -> anyhow::Result<Option<Self>> {
+        if is_finished(path) {
+            return Ok(None);
+        }
+        if path.join(MANIFEST).is_file() {
+            let (run, found) = Self::resume(path)?;
+            ensure!(
+                found == *settings,
+                "{}: this stage was begun with other settings; delete the folder, or choose another --out",
+                path.display()
+            );
+            return Ok(Some(run));
+        }
+        if path.exists() {
+            fs::remove_dir_all(path).with_context(|| format!("{}: cannot be deleted", path.display()))?;
+        }
+        Self::create(&Place { out: Some(path), ..*place }, settings).map(Some)
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes a file beside and renames it, so that it is never there half.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
+        write_whole(&self.path.join(name), content)
+    }
+
+    /// Marks the run as finished.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn finish(&self, result: &impl Serialize) -> anyhow::Result<()> {
+        self.write(FINISHED, toml::to_string(result)?.as_bytes())
+    }
+}
+
+/// Whether a run has come to its end.
+pub fn is_finished(path: &Path) -> bool {
+    path.join(FINISHED).is_file()
+}
+
+/// Writes a file beside and renames it.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_whole(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+    let partial = path.with_added_extension("partial");
+    let write = || {
+        let mut file = fs::File::create(&partial)?;
+        file.write_all(content)?;
+        file.sync_all()?;
+        fs::rename(&partial, path)
+    };
+    write().with_context(|| {
+        format!("{}: cannot be written; check that the folder is writable and has space", path.display())
+    })
+}
+
+/// The folder with the checkpoint that `run:DIR` or `run:DIR/bc` names.
+///
+/// # Errors
+/// If there is no run, or no network in it yet.
+pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
+    let (run, is_bc) = run_of(spec)?;
+    let last = if is_bc {
+        Some(run.join("round-00"))
+    } else {
+        let mut rounds: Vec<PathBuf> = fs::read_dir(run)
+            .with_context(|| run.display().to_string())?
+            .filter_map(|entry| Some(entry.ok()?.path()))
+            .filter(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("round-")))
+            .filter(|path| Checkpoint::exists(path))
+            .collect();
+        rounds.sort();
+        let last_fit = Some(run.join("final")).filter(|path| Checkpoint::exists(path));
+        last_fit.or_else(|| rounds.pop())
+    };
+    last.filter(|path| Checkpoint::exists(path))
+        .with_context(|| format!("{}: no network is trained there yet; finish it with --resume {0}", run.display()))
+}
+
+/// The settings of the run that `run:DIR` or `run:DIR/bc` names.
+///
+/// # Errors
+/// If there is no run, or its settings are not of this program.
+pub fn settings_of(spec: &Path) -> anyhow::Result<Settings> {
+    Settings::read(&run_of(spec)?.0.join(SETTINGS))
+}
+
+/// The folder of the run, and whether its behaviour cloning is meant.
+fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
+    let (run, is_bc) = match (spec.file_name(), spec.parent()) {
+        (Some(name), Some(run)) if name == "bc" && !spec.is_dir() => (run, true),
+        _ => (spec, false),
+    };
+    ensure!(
+        run.join(SETTINGS).is_file(),
+        "{}: this is no run; train one with cargo xtask train-dagger, or list the folders in runs/",
+        run.display()
+    );
+    Ok((run, is_bc))
+}
+
+fn claim_named(path: &Path, overwrite: bool) -> anyhow::Result<PathBuf> {
+    if path.exists() && fs::read_dir(path).map_or(true, |mut entries| entries.next().is_some()) {
+        if !overwrite {
+            let way_out = if path.join(FINISHED).is_file() || !path.join(SETTINGS).is_file() {
+                "choose another --out, or delete it with --overwrite".to_owned()
+            } else {
+                format!(
+                    "continue it with --resume {}, choose another --out, or delete it with --overwrite",
+                    path.display()
+                )
+            };
+            bail!("{}: this folder is not empty; {way_out}", path.display());
+        }
+        ensure!(
+            path.join(SETTINGS).is_file(),
+            "{}: this folder is not a run, so --overwrite will not delete it; choose another --out",
+            path.display()
+        );
+        fs::remove_dir_all(path).with_context(|| format!("{}: cannot be deleted", path.display()))?;
+    }
+    fs::create_dir_all(path).with_context(|| format!("{}: cannot be created; choose another --out", path.display()))?;
+    Ok(path.to_path_buf())
+}
+
+/// `runs/NAME`, or with the next free number. Creating the folder is the claim: two commands started at once get two.
+fn claim_next_free(name: &str) -> anyhow::Result<PathBuf> {
+    let runs = Path::new("runs");
+    fs::create_dir_all(runs).context("runs: cannot be created here; choose a folder with --out")?;
+    let mut n = 1;
+    loop {
+        let path = runs.join(if n == 1 { name.to_owned() } else { format!("{name}-{n}") });
+        match fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => n += 1,
+            Err(error) => {
+                return Err(error).with_context(|| format!("{}: choose a folder with --out", path.display()));
+            }
+        }
+    }
+}
+
+impl Manifest {
+    fn new(build: &Build, preset: &str, settings: &Settings) -> Self {
+        Self {
+            schema: MANIFEST_SCHEMA,
+            program: build.program.clone(),
+            command_line: build.command_line.clone(),
+            preset: preset.to_owned(),
+            root_seed: settings.seed.0,
+            evaluation_seed: settings.evaluation.seed.0,
+            git_revision: build.git_revision.clone(),
+            git_dirty: build.git_dirty,
+            rustc_version: build.rustc_version.clone(),
+            threads: rayon::current_num_threads(),
+            target: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
+        }
+    }
+
+    /// Reads the manifest of a run.
+    ///
+    /// # Errors
+    /// If it cannot be read or is of another version.
+    pub fn read(run: &Path) -> anyhow::Result<Self> {
+        let path = run.join(MANIFEST);
+        let text = fs::read_to_string(&path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        let table: toml::Table = text.parse().with_context(|| path.display().to_string())?;
+        let schema = table.get("schema").and_then(toml::Value::as_integer).unwrap_or(0);
+        ensure!(
+            schema == i64::from(MANIFEST_SCHEMA),
+            "{}: written by another version of lotpilot (schema {schema}, this one reads {MANIFEST_SCHEMA}); make the \
+             run again, or use the revision it names",
+            path.display()
+        );
+        table.try_into().with_context(|| path.display().to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use policy::network::Weights;
+    use sim::seed::RootSeed;
+
+    fn scratch(name: &str) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("xtask-test-{}-{name}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        path
+    }
+
+    fn create(out: &Path, overwrite: bool) -> anyhow::Result<RunDir> {
+        let settings = Settings::preset("smoke")?;
+        let place = Place {
+            build: &Build::default(),
+            out: Some(out),
+            overwrite,
+            command: "train-dagger",
+            preset: "smoke",
+            seed: 1,
+        };
+        RunDir::create(&place, &settings)
+    }
+
+    fn message<T: std::fmt::Debug>(result: anyhow::Result<T>) -> String {
+        format!("{:#}", result.unwrap_err())
+    }
+
+    #[test]
+    fn a_run_is_resumed_until_finished_and_overwritten_only_when_told() {
+        let path = scratch("claim");
+        let run = create(&path, false).unwrap();
+        assert!(message(create(&path, false)).contains("--resume"));
+        assert_eq!(RunDir::resume(&path).unwrap().1, Settings::preset("smoke").unwrap());
+        run.finish(&std::collections::BTreeMap::from([("stop", "test")])).unwrap();
+        assert!(message(RunDir::resume(&path)).contains("finished"));
+        assert!(message(create(&path, false)).contains("--overwrite"));
+        create(&path, true).unwrap();
+        assert!(!path.join(FINISHED).exists());
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn a_folder_that_is_no_run_is_never_deleted() {
+        let path = scratch("foreign");
+        fs::create_dir_all(&path).unwrap();
+        fs::write(path.join("thesis.txt"), "years of work").unwrap();
+        assert!(message(create(&path, true)).contains("not a run"));
+        assert!(path.join("thesis.txt").exists());
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn the_policy_of_a_run_is_its_last_network() {
+        let path = scratch("policy");
+        assert!(message(policy_folder(&path)).contains("this is no run"));
+        create(&path, false).unwrap();
+        assert!(message(policy_folder(&path)).contains("no network"));
+        let settings = Settings::preset("smoke").unwrap();
+        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
+        let checkpoint = Checkpoint { weights, geometry: settings.dagger.geometry };
+        for round in ["round-00", "round-01", "round-10"] {
+            checkpoint.save(&path.join(round)).unwrap();
+        }
+        fs::create_dir_all(path.join("round-11")).unwrap(); // collected, not trained yet
+        assert_eq!(policy_folder(&path).unwrap(), path.join("round-10"));
+        assert_eq!(policy_folder(&path.join("bc")).unwrap(), path.join("round-00"));
+        checkpoint.save(&path.join("final")).unwrap();
+        assert_eq!(policy_folder(&path).unwrap(), path.join("final"));
+        fs::remove_dir_all(path).unwrap();
+    }
+}

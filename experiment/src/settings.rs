@@ -1,0 +1,19 @@
+//! All settings in one TOML: every section is the settings type of the crate that it belongs to.
+//!
+//! Layers, lowest priority first: preset, file, `--set`, flags. What comes out is complete and checked, and is
+//! written into the folder of a run before its first step.
+
+mod check;
+mod layers;
+mod noise;
+mod presets;
+mod ranges;
+mod schema;
+
+pub use layers::Layers;
+pub use noise::{NOISE_MAX, NoiseChoice};
+pub use presets::PRESETS;
+pub use schema::{EvaluationSettings, Settings, TrainingSettings};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,187 @@
+//! Laying changes over a preset, and saying precisely what is wrong with one.
+
+use super::schema::Settings;
+use anyhow::{Context as _, anyhow, bail};
+use sim::seed::RootSeed;
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// Where settings come from, lowest priority first: preset, file, single overrides.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Layers {
+    /// Name of the preset to start from; `default` if `None`.
+    pub preset: Option<String>,
+    /// TOML file with the settings to change.
+    pub file: Option<PathBuf>,
+    /// Single changes, each as `key.of.setting=VALUE`.
+    pub overrides: Vec<String>,
+}
+
+impl Layers {
+    /// The preset that is meant where none is named.
+    pub fn preset_name(&self) -> &str {
+        self.preset.as_deref().unwrap_or("default")
+    }
+
+    /// Whether other settings than a run's own are asked for.
+    pub fn names_a_base(&self) -> bool {
+        self.preset.is_some() || self.file.is_some()
+    }
+}
+
+impl Settings {
+    /// Preset → file → overrides → seed.
+    ///
+    /// # Errors
+    /// Naming what is wrong in which layer.
+    pub fn resolve(layers: &Layers, seed: Option<u64>) -> anyhow::Result<Self> {
+        Self::resolve_over(&Self::preset(layers.preset_name())?, layers, seed)
+    }
+
+    /// The same over other settings than a preset's, e.g. a run's own.
+    ///
+    /// # Errors
+    /// Naming what is wrong in which layer.
+    pub fn resolve_over(base: &Self, layers: &Layers, seed: Option<u64>) -> anyhow::Result<Self> {
+        let mut settings = apply(base, layers.file.as_deref(), &layers.overrides)?;
+        if let Some(seed) = seed {
+            settings.seed = RootSeed(seed);
+        }
+        settings.check()?;
+        Ok(settings)
+    }
+
+    /// Reads complete settings, as written into a run.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is not complete.
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        let text = std::fs::read_to_string(path)
+            .with_context(|| format!("{}: not a run of this program, or not finished being created", path.display()))?;
+        let settings: Self = toml::from_str(&text).with_context(|| path.display().to_string())?;
+        settings.check()?;
+        Ok(settings)
+    }
+}
+
+/// Lays a file and then single overrides over a base.
+pub(super) fn apply(base: &Settings, file: Option<&Path>, overrides: &[String]) -> anyhow::Result<Settings> {
+    let mut tree = Table::try_from(base).expect("settings are plain values");
+    if let Some(path) = file {
+        let text = std::fs::read_to_string(path)
+            .with_context(|| format!("{}: cannot be read; name a TOML file with settings", path.display()))?;
+        let changes: Table = text
+            .parse()
+            .map_err(|error: toml::de::Error| anyhow!("{}: {}", place(path, &text, error.span()), error.message()))?;
+        merge(&mut tree, changes);
+        settings_from(&tree).map_err(|Fault { key, problem }| {
+            anyhow!("{}: {key}: {problem}", place(path, &text, span_of(&text, &key)))
+        })?;
+    }
+    for text in overrides {
+        let (key, value) = parse_override(text)?;
+        merge(&mut tree, nested(&key, value));
+        settings_from(&tree).map_err(|Fault { key, problem }| anyhow!("--set {text}: {key}: {problem}"))?;
+    }
+    settings_from(&tree).map_err(|Fault { key, problem }| anyhow!("{key}: {problem}"))
+}
+
+/// What is wrong, and with which key.
+struct Fault {
+    key: String,
+    problem: String,
+}
+
+fn settings_from(tree: &Table) -> Result<Settings, Fault> {
+    serde_path_to_error::deserialize(Value::Table(tree.clone())).map_err(|error| {
+        let key = error.path().to_string();
+        let key = key.trim_end_matches(".?").to_owned();
+        let problem = explain(&key, error.inner().message());
+        Fault { key, problem }
+    })
+}
+
+/// Adds the nearest valid key to "unknown field `etta`, expected one of `eta`, …".
+fn explain(key: &str, message: &str) -> String {
+    let message = message.lines().next().unwrap_or(message);
+    let Some((_, expected)) = message.split_once("unknown field ").or_else(|| message.split_once("unknown variant "))
+    else {
+        return message.to_owned();
+    };
+    let mut quoted = expected.split('`').skip(1).step_by(2);
+    let wrong = quoted.next().unwrap_or_default();
+    let valid: Vec<&str> = quoted.collect();
+    let nearest = valid
+        .iter()
+        .map(|candidate| (strsim::jaro_winkler(wrong, candidate), candidate))
+        .filter(|(likeness, _)| *likeness > 0.8)
+        .max_by(|(a, _), (b, _)| a.total_cmp(b));
+    let hint = nearest.map(|(_, candidate)| format!("; did you mean {candidate:?}?")).unwrap_or_default();
+    let section = key.rsplit_once('.').map_or_else(|| "at the top".to_owned(), |(section, _)| format!("in {section}"));
+    let what = if message.contains("unknown variant") { "value" } else { "key" };
+    format!("no {what} {wrong:?}{hint}; {section} there are {}", valid.join(", "))
+}
+
+/// Lays `changes` over `tree`.
+fn merge(tree: &mut Table, changes: Table) {
+    for (key, change) in changes {
+        match (tree.get_mut(&key), change) {
+            (Some(Value::Table(old)), Value::Table(new)) if !switches_variant(old, &new) => merge(old, new),
+            (_, change) => {
+                tree.insert(key, change);
+            }
+        }
+    }
+}
+
+/// `rule = { all_below = … }` laid over with `rule = { tau_only = … }`: an enum has one variant, not two. A section of
+/// a single key is an enum; no struct of the settings has only one field.
+fn switches_variant(old: &Table, new: &Table) -> bool {
+    old.len() == 1 && new.len() == 1 && !old.keys().eq(new.keys())
+}
+
+/// `a.b.c=VALUE`.
+fn parse_override(text: &str) -> anyhow::Result<(Vec<String>, Value)> {
+    let (key, value) = text
+        .split_once('=')
+        .with_context(|| format!("--set {text}: a key and a value are needed, as in --set dagger.eta=0.8"))?;
+    let key = key.trim().split('.').map(str::to_owned).collect();
+    let value = value.trim();
+    let parsed = format!("value = {value}").parse::<Table>().ok().and_then(|mut table| table.remove("value"));
+    let is_word = !value.is_empty() && value.chars().all(|c| c.is_alphanumeric() || "-_".contains(c));
+    match parsed {
+        Some(value) => Ok((key, value)),
+        // A bare word can only be meant as a string.
+        None if is_word => Ok((key, Value::String(value.to_owned()))),
+        None => {
+            bail!("--set {text}: {value:?} is no TOML value; texts and lists of texts need quotes, as in '[\"lot-a\"]'")
+        }
+    }
+}
+
+/// `{a = {b = {c = value}}}`.
+fn nested(path: &[String], value: Value) -> Table {
+    let (first, rest) = path.split_first().expect("splitting yields at least one part");
+    let value = if rest.is_empty() { value } else { Value::Table(nested(rest, value)) };
+    Table::from_iter([(first.clone(), value)])
+}
+
+/// `file:line`, if the line is known.
+fn place(path: &Path, text: &str, span: Option<std::ops::Range<usize>>) -> String {
+    let line = span.map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
+    line.map_or_else(|| path.display().to_string(), |line| format!("{}:{line}", path.display()))
+}
+
+/// Where a dotted key stands in a TOML text.
+fn span_of(text: &str, key: &str) -> Option<std::ops::Range<usize>> {
+    let document = toml_edit::Document::parse(text).ok()?;
+    let mut table: &dyn toml_edit::TableLike = document.as_table();
+    let mut span = None;
+    for part in key.split('.') {
+        let Some((found, item)) = table.get_key_value(part) else { break };
+        span = found.span().or_else(|| item.span());
+        let Some(inner) = item.as_table_like() else { break };
+        table = inner;
+    }
+    span
+}

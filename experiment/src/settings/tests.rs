@@ -1,0 +1,148 @@
+//! Layers and the sentences that errors are made of.
+
+use super::*;
+use sim::seed::RootSeed;
+
+fn layers(overrides: &[&str]) -> Layers {
+    Layers { preset: None, file: None, overrides: overrides.iter().map(|&text| text.into()).collect() }
+}
+
+fn error(overrides: &[&str]) -> String {
+    format!("{:#}", Settings::resolve(&layers(overrides), None).unwrap_err())
+}
+
+fn resolved(overrides: &[&str]) -> Settings {
+    Settings::resolve(&layers(overrides), None).unwrap()
+}
+
+/// Settings from a file of this text.
+fn from_file(name: &str, text: &str) -> anyhow::Result<Settings> {
+    let path = std::env::temp_dir().join(format!("xtask-test-{}-{name}.toml", std::process::id()));
+    std::fs::write(&path, text).unwrap();
+    let result = Settings::resolve(&Layers { file: Some(path.clone()), ..layers(&[]) }, None);
+    std::fs::remove_file(path).unwrap();
+    result
+}
+
+#[test]
+fn every_preset_is_sound_and_survives_toml() {
+    for preset in PRESETS {
+        let settings = Settings::preset(preset.name).unwrap();
+        settings.check().unwrap();
+        assert_eq!(toml::from_str::<Settings>(&settings.to_toml()).unwrap(), settings, "{}", preset.name);
+        let untouched = layers::apply(&settings, None, &[]).unwrap();
+        assert_eq!(untouched, settings, "no change is no change");
+    }
+}
+
+#[test]
+fn the_paper_preset_is_the_papers() {
+    use policy::fit::{Budget, Mirror};
+    let fit = Settings::preset("paper").unwrap().dagger.fit_iteration;
+    assert_eq!((fit.learning_rate.peak, fit.batch, fit.budget), (1e-5, 512, Budget::Steps(100_000)));
+    assert_eq!(fit.mirror, Mirror::Off);
+}
+
+#[test]
+fn later_layers_win() {
+    let text = "seed = 5\n[dagger]\neta = 0.7\niterations_max = 3\n[evaluation]\ntrials = 2\n";
+    let path = std::env::temp_dir().join(format!("xtask-test-{}-layers.toml", std::process::id()));
+    std::fs::write(&path, text).unwrap();
+    let args = Layers { file: Some(path.clone()), ..layers(&["dagger.eta=0.6", "seed=6", "training.noise=hard"]) };
+    let settings = Settings::resolve(&args, Some(7)).unwrap();
+    std::fs::remove_file(path).unwrap();
+    assert_eq!(settings.seed, RootSeed(7), "the flag");
+    assert_eq!(settings.dagger.eta, 0.6, "--set");
+    assert_eq!(settings.dagger.iterations_max, 3, "the file");
+    assert_eq!(settings.evaluation.trials, 2, "the file");
+    assert_eq!(settings.training.noise, NoiseChoice::Hard);
+    assert_eq!(settings.expert, Settings::preset("default").unwrap().expert, "the preset");
+}
+
+#[test]
+fn enums_change_their_variant_whole() {
+    use policy::decision_rule::DecisionRule;
+    use policy::fit::Budget;
+    use policy::loss::WeightForm;
+    let rule = DecisionRule::TauOnly { tau: 0.05 };
+    assert_eq!(resolved(&["dagger.rule={tau_only={tau=0.05}}"]).dagger.rule, rule);
+    assert_eq!(resolved(&["dagger.rule.tau_only.tau=0.05"]).dagger.rule, rule);
+    assert_eq!(from_file("rule", "[dagger.rule.tau_only]\ntau = 0.05\n").unwrap().dagger.rule, rule);
+    assert_eq!(resolved(&["dagger.rule=expert_only"]).dagger.rule, DecisionRule::ExpertOnly);
+    let budget = resolved(&["dagger.fit_cloning.budget.epochs=3"]).dagger.fit_cloning.budget;
+    assert_eq!(budget, Budget::Epochs(3.0));
+    let weight = resolved(&["dagger.fit_cloning.loss.weight.linear.gain=10"]).dagger.fit_cloning.loss.weight;
+    assert_eq!(weight, WeightForm::Linear { gain: 10.0 });
+    let DecisionRule::AllBelow { tau, chi, .. } = resolved(&["dagger.rule.all_below.tau=0.06"]).dagger.rule else {
+        panic!("a changed value is no changed variant");
+    };
+    assert_eq!((tau, chi), (0.06, 0.1));
+}
+
+#[test]
+fn optional_settings_can_be_given() {
+    let settings = resolved(&["dagger.fit_cloning.gradient_norm_max=2"]);
+    assert_eq!(settings.dagger.fit_cloning.gradient_norm_max, Some(2.0));
+}
+
+#[test]
+fn errors_name_the_key_and_what_there_is() {
+    for (overrides, parts) in [
+        (
+            &["dagger.etta=0.8"] as &[&str],
+            &["--set dagger.etta=0.8", "no key \"etta\"", "did you mean \"eta\"?", "iterations_max"] as &[&str],
+        ),
+        (&["dager.eta=0.8"], &["no key \"dager\"", "did you mean \"dagger\"?", "evaluation"]),
+        (&["training.noise=papr"], &["training.noise", "did you mean \"paper\"?", "hard"]),
+        (&["dagger.eta=high"], &["dagger.eta", "f64"]),
+        (&["dagger.eta"], &["--set dagger.eta", "as in --set dagger.eta=0.8"]),
+        (&["training.lots=[lot-a]"], &["quotes"]),
+        (&["seed.of=1"], &["seed"]),
+        (&["evaluation.trials=0"], &["evaluation.trials is 0"]),
+        (&["dagger.geometry.side_m=10"], &["episode.sensing.geometry", "set both"]),
+        (&["dagger.network.conv1.channels=17"], &["dagger.network", "conv1", "17"]),
+        (&["episode.control_period_ms=45"], &["45", "multiple"]),
+        (&["episode.metrics.near_collision_m=-1"], &["episode.metrics.near_collision_m = -1", "be more than 0"]),
+        (&["episode.metrics.safe_range_m=0"], &["episode.metrics.safe_range_m = 0", "be more than 0"]),
+        (
+            &["dagger.disturbance={ pause_ticks = 9, lasts_ticks = 9, curvature_max_per_m = -0.1 }"],
+            &["dagger.disturbance.curvature_max_per_m = -0.1", "be more than 0"],
+        ),
+        (&["episode.noise.blob=-0.5"], &["episode.noise.blob = -0.5", "not be negative"]),
+        (&["episode.vehicle.wheelbase_m=nan"], &["episode.vehicle.wheelbase_m = NaN"]),
+        (&["expert.band.reach_share=-1"], &["expert.band.reach_share = -1", "be more than 0"]),
+        (&["expert.station_share=nan"], &["expert.station_share = NaN"]),
+        (&["expert.weights.load=-0.1"], &["expert.weights.load = -0.1", "not be negative"]),
+        (&["expert.branch_travels_m=[0.8, 2.0, -3.6, 5.4, 7.6]"], &["expert.branch_travels_m = -3.6"]),
+        (&["episode.controller.speed_min_mps=3"], &["speed_min_mps = 3", "speed_max_mps = 2.2"]),
+    ] {
+        let error = error(overrides);
+        for part in parts {
+            assert!(error.contains(part), "{overrides:?}: {part:?} is missing in: {error}");
+        }
+    }
+}
+
+#[test]
+fn errors_in_files_name_the_line() {
+    for (name, text, parts) in [
+        ("syntax", "seed = 1\n\n[dagger\neta = 1\n", &[":3"] as &[&str]),
+        ("key", "seed = 1\n[dagger]\nkeep = \"expert_ticks\"\netta = 0.8\n", &[":4", "did you mean \"eta\"?"]),
+        ("type", "[training]\ntrials = \"two\"\n", &[":2", "training.trials"]),
+        ("deep", "[dagger.fit_cloning]\nbatch = 64\n[dagger.fit_cloning.adam]\nbeta3 = 1\n", &[":4", "beta3"]),
+    ] {
+        let error = format!("{:#}", from_file(name, text).unwrap_err());
+        for part in parts {
+            assert!(error.contains(part), "{name}: {part:?} is missing in: {error}");
+        }
+    }
+    let missing = Layers { file: Some("nowhere/at-all.toml".into()), ..layers(&[]) };
+    let error = format!("{:#}", Settings::resolve(&missing, None).unwrap_err());
+    assert!(error.contains("nowhere/at-all.toml"), "{error}");
+}
+
+#[test]
+fn unknown_presets_list_the_known() {
+    let error = Settings::preset("papper").unwrap_err().to_string();
+    assert!(error.contains("papper") && error.contains("default, paper, smoke"), "{error}");
+}

@@ -1,0 +1,182 @@
+//! Behaviour cloning and DAgger into a run folder: Algorithm 1 with its files, its progress and its learning curves.
+
+use crate::drivers;
+use crate::lots::Lot;
+use crate::progress::{Elapsed, Progress};
+use crate::run_dir::RunDir;
+use crate::settings::Settings;
+use crate::trials::{self, Purpose, Trial};
+use crate::{drive, learning};
+use policy::dagger::{Hooks, Outcome, Progress as DaggerProgress};
+use policy::dataset::store::Store;
+use policy::fit::{FitProgress, FitReport};
+use sim::driver::Source;
+use sim::episode::{Episode, Frame};
+use std::cell::RefCell;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Trains, or goes on with what an interrupted training left in the folder, to the same result.
+///
+/// # Errors
+/// If a lot cannot be driven, or a file cannot be read or written. Cancelling is no error: the outcome says so.
+pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<Outcome> {
+    let lots = Lot::parse_all(&settings.training.lots)?;
+    // A lot that cannot be driven is found here, with its error, not in the middle of a round.
+    episodes_of(settings, &lots, 0)?;
+    let store = Store::open(run.path())?;
+    let monitor = RefCell::new(Monitor::new(progress, store.clone()));
+    let mut hooks = Hooks {
+        episodes: &mut |round| {
+            let episodes = episodes_of(settings, &lots, round)
+                .unwrap_or_else(|error| panic!("round {round} of seed {:?}: {error:#}", settings.seed));
+            monitor.borrow_mut().collection = Collection::of(&episodes);
+            episodes
+        },
+        expert: &mut |round, episode| {
+            // 2^20 rounds of 2^20 episodes, as in `trials`.
+            let index = u64::from(round) << 20 | episode as u64;
+            let expert = drivers::expert(&settings.expert, &settings.episode);
+            Box::new(expert.with_jitter_seed(settings.seed, index))
+        },
+        on_frame: &mut |_, episode, frame| monitor.borrow_mut().frame(episode, frame),
+        progress: &mut |report| {
+            let mut monitor = monitor.borrow_mut();
+            monitor.report(report);
+            let is_over = progress.is_cancelled() || monitor.failed.is_some();
+            if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        },
+    };
+    let outcome = policy::dagger::run(&settings.dagger, &store, settings.seed, &mut hooks)?;
+    let mut monitor = monitor.into_inner();
+    if monitor.task.is_some() {
+        progress.end("stopped");
+    }
+    if let (Some(fit), None) = (learning::report(&store.final_folder())?, &monitor.failed) {
+        monitor.keep_curve(&store.final_folder(), &fit);
+    }
+    monitor.failed.map_or(Ok(outcome), Err)
+}
+
+/// Lots that draw their obstacles are driven `training.trials` times. A generated lot looks the same every time: it is
+/// driven once, and the next round has other ones.
+///
+/// # Errors
+/// If a lot cannot be driven.
+pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<Episode>> {
+    let training = &settings.training;
+    let (generated, others): (Vec<Lot>, Vec<Lot>) = lots.iter().cloned().partition(Lot::is_generated);
+    let of_a_kind = |lot: &Lot| generated.iter().filter(|other| other.group() == lot.group()).count() as u64;
+    let generated: Vec<Lot> = generated.iter().map(|lot| lot.in_round(round, of_a_kind(lot))).collect();
+    let all = |lots, trials| Trial::all(settings.seed, Purpose::Training { round }, lots, trials, &training.directions);
+    let trials: Vec<_> = all(&others, training.trials).chain(all(&generated, 1)).collect();
+    Ok(drive::start(&trials, &trials::maps(&trials, &settings.episode)?, &settings.episode, training.noise))
+}
+
+/// Passes on what is reported during a training, and keeps learning curves.
+struct Monitor<'a> {
+    progress: &'a dyn Progress,
+    task: Option<Task>,
+    collection: Collection,
+    store: Store,
+    curve: learning::Recorder,
+    /// A file that could not be written: ends the run at the next safe point.
+    failed: Option<anyhow::Error>,
+}
+
+/// What is being done at present.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Task {
+    Collecting,
+    Fitting,
+}
+
+/// Where the cars of a collection are.
+#[derive(Default)]
+struct Collection {
+    lengths_m: Vec<f32>,
+    progress_m: Vec<f32>,
+    novice_ticks: u64,
+    ticks: u64,
+}
+
+impl Collection {
+    fn of(episodes: &[Episode]) -> Self {
+        let lengths_m: Vec<f32> = episodes.iter().map(|episode| episode.map().path().length_m()).collect();
+        Self { progress_m: vec![0.0; lengths_m.len()], lengths_m, novice_ticks: 0, ticks: 0 }
+    }
+
+    fn share(&self) -> f64 {
+        f64::from(self.progress_m.iter().sum::<f32>() / self.lengths_m.iter().sum::<f32>().max(f32::MIN_POSITIVE))
+    }
+}
+
+impl<'a> Monitor<'a> {
+    fn new(progress: &'a dyn Progress, store: Store) -> Self {
+        let (collection, curve) = (Collection::default(), learning::Recorder::default());
+        Self { progress, task: None, collection, store, curve, failed: None }
+    }
+
+    fn frame(&mut self, episode: usize, frame: &Frame) {
+        let collection = &mut self.collection;
+        collection.progress_m[episode] = frame.progress_m;
+        collection.ticks += 1;
+        collection.novice_ticks += u64::from(frame.decision.source == Source::Novice);
+        self.progress.at(collection.share(), &mut |Elapsed { seconds }| {
+            let per_s = collection.ticks as f64 / seconds;
+            let eta_hat = collection.novice_ticks as f64 / collection.ticks as f64;
+            format!("η̂ {eta_hat:.2}, {per_s:.0} ticks/s")
+        });
+    }
+
+    fn report(&mut self, report: &DaggerProgress<'_>) {
+        match *report {
+            DaggerProgress::Collecting { round, .. } => {
+                self.begin(Task::Collecting, &format!("round {round}: collecting"));
+            }
+            DaggerProgress::Collected { round, collection, dataset } => {
+                let eta = if round > 0 { format!(", η̂ {:.3}", collection.eta_hat()) } else { String::new() };
+                self.end(&format!("{} samples, {dataset} in all{eta}", collection.samples));
+            }
+            DaggerProgress::Fitting { round, fit } => self.fitting(round, fit),
+            DaggerProgress::Finished { row, fit } => {
+                self.keep_curve(&self.store.round_folder(row.round), fit);
+                let error_m = row.validation_rmse_m.map_or_else(String::new, |error| format!("{error:.3} m off"));
+                self.end(&format!("validation {error_m}"));
+            }
+        }
+    }
+
+    fn keep_curve(&mut self, folder: &Path, fit: &FitReport) {
+        self.failed = self.failed.take().or(self.curve.write(folder, fit).err());
+    }
+
+    fn fitting(&mut self, round: Option<u32>, fit: &FitProgress) {
+        self.curve.step(fit);
+        if self.task.is_none() {
+            let label = round.map_or_else(|| "final training".to_owned(), |round| format!("round {round}: training"));
+            self.begin(Task::Fitting, &label);
+        }
+        self.progress.at(f64::from(fit.step) / f64::from(fit.steps), &mut |Elapsed { seconds }| {
+            let per_s = fit.samples_done as f64 / seconds;
+            let validation = fit.validation.map_or_else(String::new, |at| format!(", validation {:.3} m", at.rmse_m));
+            format!("loss {:.3}{validation}, {per_s:.0} samples/s", fit.loss.total)
+        });
+    }
+
+    fn begin(&mut self, task: Task, label: &str) {
+        let stage = match task {
+            Task::Collecting => "collecting",
+            Task::Fitting => "training",
+        };
+        self.progress.begin(stage, label);
+        self.task = Some(task);
+    }
+
+    /// Rounds that were found on disk were never begun, and say nothing.
+    fn end(&mut self, result: &str) {
+        if self.task.take().is_some() {
+            self.progress.end(result);
+        }
+    }
+}

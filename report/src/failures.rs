@@ -1,0 +1,35 @@
+//! `failures.md`: near-collisions one by one.
+
+use evaluation::records::{self, FailureRecord};
+use experiment::run_dir::RunDir;
+use std::fmt::Write as _;
+
+const HEAD: &str = "\
+# Near-collisions
+
+One row each. The rules behind the causes are in `docs/methods.md` and at the top of `evaluation/src/incidents.rs`; \
+`failures.jsonl` has what they found.
+
+| driver | lot | way | trial | noise | tick | route m | x m | y m | m/s | cause | replay key |
+|---|---|---|---|---|---|---|---|---|---|---|---|
+";
+
+/// Writes `failures.md` from `failures.jsonl`.
+///
+/// # Errors
+/// If a file cannot be read or written.
+pub fn write(run: &RunDir) -> anyhow::Result<()> {
+    let mut text = HEAD.to_owned();
+    records::each_line(&run.path().join(records::FAILURES), |failure: FailureRecord| {
+        let FailureRecord { driven, tick, route_m, x_m, y_m, speed_mps, replay, .. } = &failure;
+        let (way, cause) = (driven.direction.name(), failure.cause.name());
+        let _ = writeln!(
+            text,
+            "| {} | {} | {way} | {} | {} | {tick} | {route_m:.1} | {x_m:.2} | {y_m:.2} | {speed_mps:.2} | {cause} | \
+             `{replay}` |",
+            driven.driver, driven.lot, driven.trial, driven.noise
+        );
+        Ok(())
+    })?;
+    run.write("failures.md", text.as_bytes())
+}

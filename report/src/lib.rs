@@ -1,0 +1,23 @@
+//! What people read and look at, made from what runs left: Markdown, HTML, plots, pictures.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`markdown`], [`summary`], [`table1`], [`failures`], [`tuning`], [`pixel_accuracy`] | tables as Markdown |
+//! | [`plots`] | plots as SVG |
+//! | [`pictures`] | lots, drives, samples and noise as PNG and SVG |
+//! | [`page`] | one HTML page that loads nothing |
+//! | [`run_report`], [`moments`] | `report.html` of a run, with its worst near-collisions |
+//! | [`reproduction`] | the report of `reproduce` |
+
+pub mod failures;
+pub mod markdown;
+pub mod moments;
+pub mod page;
+pub mod pictures;
+pub mod pixel_accuracy;
+pub mod plots;
+pub mod reproduction;
+pub mod run_report;
+pub mod summary;
+pub mod table1;
+pub mod tuning;

@@ -1,0 +1,284 @@
+//! A report as Markdown with its figures beside it, and as one HTML page that needs nothing else: no script, no font, no
+//! file and no network.
+//!
+//! ```
+//! use xtask::page::{Image, Page};
+//! let mut page = Page::new("Near-collisions");
+//! page.section("Rates", "| driver | per 100 m |\n|---|---|\n| expert | 0.00 |");
+//! page.figure("rates", "Rates with intervals of 95 %.", Image::Svg("<svg viewBox='0 0 1 1'/>".to_owned()));
+//! assert!(page.to_html().contains("<table>"));
+//! assert!(page.to_markdown().contains("](figures/rates.svg)"));
+//! ```
+
+use anyhow::Context as _;
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
+use experiment::run_dir::write_whole;
+use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd, html};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Folder of the figures, beside the Markdown.
+const FIGURES: &str = "figures";
+
+/// A report, part by part in the order of reading.
+#[derive(Debug, Clone)]
+pub struct Page {
+    title: String,
+    parts: Vec<Part>,
+}
+
+/// A picture.
+#[derive(Debug, Clone)]
+pub enum Image {
+    /// The text of an SVG file.
+    Svg(String),
+    /// The bytes of a PNG file.
+    Png(Vec<u8>),
+}
+
+#[derive(Debug, Clone)]
+enum Part {
+    /// Heading of the second level; its place is the anchor of the table of contents.
+    Heading(String),
+    Markdown(String),
+    Figure {
+        name: String,
+        caption: String,
+        image: Image,
+    },
+}
+
+impl Page {
+    /// An empty page.
+    pub fn new(title: impl Into<String>) -> Self {
+        Self { title: title.into(), parts: Vec::new() }
+    }
+
+    /// Adds Markdown, tables included; HTML in it is shown as text, pictures as their description.
+    pub fn text(&mut self, markdown: impl Into<String>) -> &mut Self {
+        self.parts.push(Part::Markdown(markdown.into()));
+        self
+    }
+
+    /// Adds a heading, which the table of contents lists, with Markdown under it.
+    pub fn section(&mut self, title: impl Into<String>, markdown: impl Into<String>) -> &mut Self {
+        self.parts.push(Part::Heading(title.into()));
+        self.text(markdown)
+    }
+
+    /// Adds a picture. `name`: its file without ending; `caption`: Markdown.
+    pub fn figure(&mut self, name: impl Into<String>, caption: impl Into<String>, image: Image) -> &mut Self {
+        self.parts.push(Part::Figure { name: name.into(), caption: caption.into(), image });
+        self
+    }
+
+    /// Writes `STEM.md`, `STEM.html` and `figures/`.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn write(&self, folder: &Path, stem: &str) -> anyhow::Result<()> {
+        let figures = folder.join(FIGURES);
+        for part in &self.parts {
+            if let Part::Figure { name, image, .. } = part {
+                std::fs::create_dir_all(&figures)
+                    .with_context(|| format!("{}: cannot be created; is the folder writable?", figures.display()))?;
+                write_whole(&folder.join(image.path(name)), image.bytes())?;
+            }
+        }
+        write_whole(&folder.join(format!("{stem}.md")), self.to_markdown().as_bytes())?;
+        write_whole(&folder.join(format!("{stem}.html")), self.to_html().as_bytes())
+    }
+
+    /// Markdown that names the figures as files beside it.
+    pub fn to_markdown(&self) -> String {
+        let mut text = format!("# {}\n", self.title);
+        for part in &self.parts {
+            let _ = match part {
+                Part::Heading(title) => write!(text, "\n## {title}\n"),
+                Part::Markdown(markdown) => write!(text, "\n{}\n", markdown.trim_end()),
+                Part::Figure { name, caption, image } => {
+                    write!(text, "\n![{name}]({})\n\n{}\n", image.path(name), caption.trim_end())
+                }
+            };
+        }
+        text
+    }
+
+    /// One page with everything in it.
+    pub fn to_html(&self) -> String {
+        let mut body = format!("<h1>{}</h1>\n", escaped(&self.title));
+        let headings = self.parts.iter().filter(|part| matches!(part, Part::Heading(_))).count();
+        if headings > 2 {
+            body += &self.contents();
+        }
+        for (index, part) in self.parts.iter().enumerate() {
+            let _ = match part {
+                Part::Heading(title) => writeln!(body, "<h2 id=\"part-{index}\">{}</h2>", escaped(title)),
+                Part::Markdown(markdown) => writeln!(body, "{}", html_of(markdown)),
+                Part::Figure { caption, image, .. } => writeln!(
+                    body,
+                    "<figure><div class=\"scroll\">{}</div><figcaption>{}</figcaption></figure>",
+                    image.to_html(),
+                    html_of(caption)
+                ),
+            };
+        }
+        let title = escaped(&self.title);
+        format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
+             <style>{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+        )
+    }
+
+    fn contents(&self) -> String {
+        let mut list = "<nav><ul>\n".to_owned();
+        for (index, part) in self.parts.iter().enumerate() {
+            if let Part::Heading(title) = part {
+                let _ = writeln!(list, "<li><a href=\"#part-{index}\">{}</a></li>", escaped(title));
+            }
+        }
+        list + "</ul></nav>\n"
+    }
+}
+
+impl Image {
+    /// Of a picture of this name, relative to the Markdown.
+    fn path(&self, name: &str) -> String {
+        let ending = match self {
+            Self::Svg(_) => "svg",
+            Self::Png(_) => "png",
+        };
+        format!("{FIGURES}/{name}.{ending}")
+    }
+
+    fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Svg(text) => text.as_bytes(),
+            Self::Png(bytes) => bytes,
+        }
+    }
+
+    fn to_html(&self) -> String {
+        match self {
+            // In HTML there is no XML declaration.
+            Self::Svg(text) => text.find("<svg").map_or_else(String::new, |start| text[start..].to_owned()),
+            Self::Png(bytes) => {
+                format!("<img alt=\"\" src=\"data:image/png;base64,{}\">", BASE64_STANDARD.encode(bytes))
+            }
+        }
+    }
+}
+
+/// Markdown as HTML that loads nothing: tables in boxes of their own, which scroll on narrow screens.
+fn html_of(markdown: &str) -> String {
+    let parser = Parser::new_ext(markdown, Options::ENABLE_TABLES).flat_map(|event| match event {
+        start @ Event::Start(Tag::Table(_)) => vec![Event::Html(CowStr::Borrowed("<div class=\"scroll\">")), start],
+        end @ Event::End(TagEnd::Table) => vec![end, Event::Html(CowStr::Borrowed("</div>\n"))],
+        Event::Html(text) | Event::InlineHtml(text) => vec![Event::Text(text)],
+        Event::Start(Tag::Image { .. }) | Event::End(TagEnd::Image) => Vec::new(),
+        other => vec![other],
+    });
+    let mut out = String::new();
+    html::push_html(&mut out, parser);
+    out
+}
+
+fn escaped(text: &str) -> String {
+    let mut out = String::new();
+    html::push_html(&mut out, std::iter::once(Event::Text(text.into())));
+    out
+}
+
+/// Screens from 320 px, and paper.
+const STYLE: &str = "
+:root { color-scheme: light; }
+body { max-width: 62rem; margin: 0 auto; padding: 1.5rem 1rem 4rem; background: #fff; color: #1a1a1a;
+  font: 16px/1.5 system-ui, -apple-system, 'Segoe UI', 'Noto Sans', sans-serif; overflow-wrap: break-word; }
+h1 { font-size: 1.7rem; line-height: 1.2; }
+h2 { font-size: 1.3rem; margin-top: 2.5rem; padding-bottom: .2rem; border-bottom: 1px solid #ccc; }
+h3 { font-size: 1.05rem; margin-top: 1.8rem; }
+nav ul { padding-left: 1.2rem; columns: 18rem; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .875rem; font-variant-numeric: tabular-nums; margin: .5rem 0 1rem; }
+th, td { padding: .25rem .6rem; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top;
+  white-space: nowrap; overflow-wrap: normal; }
+th { border-bottom: 2px solid #888; }
+td:last-child { white-space: normal; min-width: 9rem; }
+tbody tr:nth-child(even) { background: #f6f6f6; }
+figure { margin: 1.5rem 0; }
+figure svg, figure img { display: block; width: 100%; min-width: 34rem; max-width: 46rem; height: auto; }
+figcaption { font-size: .9rem; color: #444; }
+code { font: .9em ui-monospace, 'Noto Sans Mono', monospace; background: #f2f2f2; padding: .05em .25em; }
+pre { overflow-x: auto; background: #f2f2f2; padding: .6rem; }
+pre code { padding: 0; }
+@media (max-width: 40rem) { body { font-size: 15px; } figure svg { min-width: 28rem; }
+  figure img { min-width: 0; } }
+@media print { body { max-width: none; padding: 0; font-size: 10pt; } nav { display: none; }
+  .scroll { overflow: visible; } table { font-size: 7.5pt; } th, td { white-space: normal; padding: .15rem .3rem; }
+  figure svg, figure img { min-width: 0; width: auto; max-width: 100%; max-height: 9cm; } figure img { max-height: 13cm; }
+  pre { font-size: 6.5pt; columns: 2; } figure, tr { break-inside: avoid; } h2, h3 { break-after: avoid; } }
+";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn page() -> Page {
+        let mut page = Page::new("Drivers <&> lots");
+        page.text("All of *it*.");
+        page.section(
+            "Rates",
+            "| driver | rate |\n|---|---|\n| a<b | 1 |\n\n<script src=\"https://x.y/z.js\"></script>",
+        );
+        page.text("![seen](https://x.y/z.png) and <img src='z.png'>, [a link](https://x.y)");
+        page.figure(
+            "bars",
+            "Bars **with** intervals.",
+            Image::Svg("<?xml version=\"1.0\"?>\n<svg viewBox=\"0 0 2 1\"><rect/></svg>".to_owned()),
+        );
+        page.figure("view", "A view.", Image::Png(b"\x89PNG".to_vec()));
+        page
+    }
+
+    #[test]
+    fn the_page_loads_nothing() {
+        let html = page().to_html();
+        for (found, why) in
+            [("<script", "scripts"), ("<link", "files"), ("@import", "styles"), ("url(", "styles"), ("<?xml", "XML")]
+        {
+            assert!(!html.contains(found), "no {why}: {html}");
+        }
+        // What is between < and > of a tag; text has its < escaped.
+        let tags = html.split('<').skip(1).map(|tag| tag.split('>').next().unwrap());
+        let sources: Vec<&str> = tags.filter(|tag| tag.contains("src=")).collect();
+        assert_eq!(sources, ["img alt=\"\" src=\"data:image/png;base64,iVBORw==\""], "{html}");
+        assert!(html.contains("Drivers &lt;&amp;&gt; lots") && html.contains("a&lt;b"), "{html}");
+        assert!(html.contains("<div class=\"scroll\"><table>") && html.contains("</table>\n</div>"), "{html}");
+        assert!(html.contains("name=\"viewport\"") && html.contains("@media print"), "{html}");
+    }
+
+    #[test]
+    fn markdown_names_its_figures_and_files_are_written() {
+        let folder = std::env::temp_dir().join(format!("xtask-test-{}-page", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        page().write(&folder, "report").unwrap();
+        let markdown = std::fs::read_to_string(folder.join("report.md")).unwrap();
+        assert!(markdown.starts_with("# Drivers <&> lots\n\nAll of *it*.\n\n## Rates\n"), "{markdown}");
+        assert!(markdown.contains("\n![bars](figures/bars.svg)\n\nBars **with** intervals.\n"), "{markdown}");
+        assert!(folder.join("figures/bars.svg").is_file() && folder.join("figures/view.png").is_file());
+        assert_eq!(std::fs::read_to_string(folder.join("report.html")).unwrap(), page().to_html());
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn longer_reports_have_a_table_of_contents() {
+        let mut page = Page::new("x");
+        page.section("One", "").section("Two", "");
+        assert!(!page.to_html().contains("<nav>"));
+        page.section("Three & more", "");
+        assert!(page.to_html().contains("<a href=\"#part-4\">Three &amp; more</a>"), "{}", page.to_html());
+        assert!(page.to_html().contains("<h2 id=\"part-4\">"));
+    }
+}

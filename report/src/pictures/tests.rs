@@ -1,0 +1,174 @@
+use super::drawing::{Drawing, Font, Rgb};
+use super::lot::{ASPHALT, GROUND, View};
+use super::trajectories::{ColourBy, Point, Trajectory};
+use super::{contact_sheet, grids, lot, noise, trajectories};
+use experiment::lots::Lot;
+use experiment::settings::{NoiseChoice, Settings};
+use experiment::trials::{Purpose, Trial};
+use sim::driver::{LookAheadPoint, Source, Spread};
+use sim::geometry::Vec2;
+use sim::map::Map;
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+use sim::sensing::noise::Layer;
+use sim::sensing::{GRID_CELLS, GridGeometry, OccupancyGrid};
+use sim::vehicle::VehicleSettings;
+use tiny_skia::Pixmap;
+
+fn at(pixmap: &Pixmap, place: Vec2) -> Rgb {
+    let pixel = pixmap.pixel(place.x as u32, place.y as u32).unwrap();
+    [pixel.red(), pixel.green(), pixel.blue()]
+}
+
+fn map_of(spec: &str) -> Map {
+    let lots = Lot::parse_all(&[spec]).unwrap();
+    let trial = Trial::all(RootSeed(1), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next().unwrap();
+    trial.map(&Settings::preset("default").unwrap().episode).unwrap()
+}
+
+#[test]
+fn shapes_lie_where_they_are_put_in_png_and_svg() {
+    let mut drawing = Drawing::new(Vec2::new(60.0, 40.0), [255; 3]).unwrap();
+    drawing.rectangle(Vec2::new(10.0, 5.0), Vec2::new(20.0, 10.0), [200, 0, 0]);
+    drawing.disc(Vec2::new(45.0, 20.0), 5.0, [0, 0, 200]);
+    let mut inset = Drawing::new(Vec2::splat(10.0), [0, 200, 0]).unwrap();
+    inset.disc(Vec2::splat(10.0), 40.0, [9, 9, 9]);
+    drawing.inset(inset, Vec2::new(0.0, 30.0));
+    drawing.text("a<b & c", Vec2::new(2.0, 22.0), Font::Small, [1, 2, 3]);
+    let pixmap = drawing.pixmap();
+    assert_eq!((pixmap.width(), pixmap.height()), (60, 40));
+    for (x, y, rgb) in [
+        (11.0, 6.0, [200, 0, 0]),
+        (29.0, 14.0, [200, 0, 0]),
+        (31.0, 14.0, [255; 3]),
+        (45.0, 20.0, [0, 0, 200]),
+        (9.0, 39.0, [9, 9, 9]),
+        (12.0, 35.0, [255; 3]), // an inset ends at its edges
+    ] {
+        assert_eq!(at(&pixmap, Vec2::new(x, y)), rgb, "({x}, {y})");
+    }
+    let svg = drawing.to_svg();
+    let document = roxmltree::Document::parse(&svg).unwrap();
+    let root = document.root_element();
+    assert_eq!((root.attribute("width"), root.attribute("viewBox")), (Some("60"), Some("0 0 60 40")));
+    let text = document.descendants().find(|node| node.has_tag_name("text")).unwrap();
+    assert_eq!(text.text(), Some("a<b & c"));
+    let disc = document.descendants().find(|node| node.has_tag_name("circle")).unwrap();
+    assert_eq!((disc.attribute("cx"), disc.attribute("fill")), (Some("45.00"), Some("#0000c8")));
+}
+
+#[test]
+fn pictures_that_cannot_be_are_refused() {
+    let error = Drawing::new(Vec2::new(20_000.0, 10.0), [0; 3]).unwrap_err().to_string();
+    assert!(error.contains("20000") && error.contains("--pixels-per-metre"), "{error}");
+    assert!(Drawing::new(Vec2::new(0.4, 10.0), [0; 3]).is_err());
+}
+
+#[test]
+fn a_top_view_shows_the_ground_where_it_is() {
+    let map = map_of("lot-b");
+    let vehicle = VehicleSettings::hyundai_hg300();
+    let drawing = lot::top_view(&map, &vehicle, Some(6.0)).unwrap();
+    let (view, pixmap) = (View::of_map(&map, Some(6.0)), drawing.pixmap());
+    assert_eq!(pixmap.width(), (view.size_m.x * 6.0) as u32);
+    assert_eq!(at(&pixmap, Vec2::splat(2.0)), GROUND, "the margin");
+    // The start: a green dot. Beside the route, where nothing stands: asphalt.
+    assert_eq!(at(&pixmap, view.pixel(map.start().position())), lot::ROUTE);
+    let free = (0..200)
+        .map(|i| map.path().pose_at(0.5 * i as f32))
+        .map(|pose| pose.position() + 0.9 * pose.ahead().perp())
+        .filter(|&place| map.signed_distance_m(place) > 0.6 && place.distance(map.start().position()) > 8.0);
+    let (mut asphalt, mut all) = (0, 0);
+    for place in free {
+        asphalt += u32::from(at(&pixmap, view.pixel(place)) == ASPHALT);
+        all += 1;
+    }
+    // Arrows of the route are wider than 0.9 m here and there.
+    assert!(all > 50 && asphalt > all * 8 / 10, "{asphalt} of {all} places beside the route are asphalt");
+}
+
+#[test]
+fn a_drive_has_the_colour_of_who_drove_and_its_near_collisions_are_crossed() {
+    let map = map_of("lot-a");
+    let point = |s_m: f32, source| Point {
+        at: map.path().pose_at(s_m).position(),
+        speed_mps: 1.1,
+        source,
+        is_last: false,
+        near_collision: (s_m == 50.0).then(|| map.path().pose_at(50.0).position()),
+    };
+    let points = (0..80).map(|s| point(s as f32, if s < 40 { Source::Expert } else { Source::Novice })).collect();
+    let driven = [Trajectory { name: "network".to_owned(), points }];
+    let draw = |by| trajectories::picture(&map, &driven, by, "drive", Some(8.0)).unwrap().pixmap();
+    let view = View::of_map(&map, Some(8.0));
+    let place = |s_m: f32| view.pixel(map.path().pose_at(s_m).position());
+    let by_source = draw(ColourBy::Source);
+    assert_eq!(at(&by_source, place(20.0)), trajectories::of_source(Source::Expert));
+    assert_eq!(at(&by_source, place(70.0)), trajectories::of_source(Source::Novice));
+    assert_eq!(at(&by_source, place(50.0)), trajectories::NEAR_COLLISION);
+    assert_eq!(at(&draw(ColourBy::Speed), place(70.0)), trajectories::of_speed(1.1));
+    assert_eq!(at(&draw(ColourBy::Driver), place(70.0)), trajectories::rgb(0));
+    assert_ne!(trajectories::of_speed(0.0), trajectories::of_speed(2.0));
+}
+
+#[test]
+fn a_grid_shows_wrong_cells_in_the_colour_of_their_layer() {
+    let mut cells = OccupancyGrid::free();
+    cells.set_occupied(0, 0);
+    cells.set_occupied(3, 24);
+    let wrong = |row, col| match (row, col) {
+        (3, 24) => Some(Layer::Blob),
+        (24, 0) => Some(Layer::FalseFree),
+        _ => None,
+    };
+    let pixmap = grids::grid(&cells, 10.0, wrong).unwrap().pixmap();
+    assert_eq!(pixmap.width() as usize, 10 * GRID_CELLS);
+    let cell = |row: usize, col: usize| Vec2::new(col as f32 * 10.0 + 5.0, row as f32 * 10.0 + 5.0);
+    assert_eq!(at(&pixmap, cell(0, 0)), grids::OCCUPIED);
+    assert_eq!(at(&pixmap, cell(3, 24)), grids::of_layer(Layer::Blob));
+    assert_eq!(at(&pixmap, cell(24, 0)), grids::FREE, "the middle of a cell wrongly free");
+    assert_eq!(at(&pixmap, cell(24, 0) - Vec2::splat(4.5)), grids::of_layer(Layer::FalseFree), "its frame");
+    assert_eq!(at(&pixmap, cell(12, 12)), grids::FREE);
+}
+
+#[test]
+fn points_lie_in_the_patch_as_in_the_paper() {
+    let geometry = GridGeometry::paper();
+    let mut drawing = grids::grid(&OccupancyGrid::free(), 8.0, |_, _| None).unwrap();
+    let far_left = LookAheadPoint { ahead_m: geometry.near_edge_ahead_m + 9.0, left_m: 3.0 };
+    let near_right = LookAheadPoint { ahead_m: geometry.near_edge_ahead_m + 3.0, left_m: -3.0 };
+    grids::draw_label(&mut drawing, far_left, &geometry);
+    grids::draw_prediction(&mut drawing, near_right, Some(Spread { ahead_m: 1.0, left_m: 0.5 }), &geometry);
+    let pixmap = drawing.pixmap();
+    assert_eq!(at(&pixmap, Vec2::new(50.0, 50.0)), grids::LABEL);
+    assert_eq!(at(&pixmap, Vec2::new(150.0, 150.0)), grids::PREDICTION);
+    // One σ ahead of it: 1 m = 16.7 pixels.
+    assert_ne!(at(&pixmap, Vec2::new(150.0, 133.0)), grids::FREE);
+}
+
+#[test]
+fn a_contact_sheet_has_a_tile_per_lot() {
+    let maps = ["lot-a", "lot-b", "lot-c"].map(map_of);
+    let sheet = contact_sheet::picture(&maps).unwrap();
+    assert!(sheet.size_px().x <= 700.0 && sheet.size_px().y <= 700.0, "{:?}", sheet.size_px());
+    let svg = sheet.to_svg();
+    let document = roxmltree::Document::parse(&svg).unwrap();
+    let names: Vec<&str> =
+        document.descendants().filter(|node| node.has_tag_name("text")).filter_map(|node| node.text()).collect();
+    assert_eq!(names.len(), 3);
+    assert!(names[1].starts_with("lot-b, 1"), "{names:?}");
+}
+
+#[test]
+fn noise_is_shown_per_level() {
+    let settings = Settings::preset("default").unwrap();
+    let lots = Lot::parse_all(&["lot-a"]).unwrap();
+    let trial = Trial::all(RootSeed(1), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next().unwrap();
+    let map = trial.map(&settings.episode).unwrap();
+    let inspected = |level: NoiseChoice| (level.name(), noise::inspect(&settings.episode, &trial, &map, level, 60.0));
+    let levels = [inspected(NoiseChoice::Clean), inspected(NoiseChoice::Hard)];
+    assert!(Layer::ALL.iter().all(|&layer| levels[0].1.count_cells(layer) == 0), "clean is clean");
+    assert!(Layer::ALL.iter().any(|&layer| levels[1].1.count_cells(layer) > 0));
+    let sheet = noise::picture("lot-a", &levels).unwrap();
+    assert_eq!(sheet.size_px().x, 2.0 * 400.0 + 3.0 * 16.0);
+}

@@ -1,0 +1,145 @@
+//! How a training went.
+
+use super::style::{self, Axis, Figure, Key, Labels, Look, colour};
+use experiment::learning::LearningCurve;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// Optimiser steps of a fit.
+fn steps(curve: &LearningCurve) -> u32 {
+    curve.training.iter().chain(&curve.validation).map(|&(step, _)| step).max().unwrap_or(0)
+}
+
+/// Loss over optimiser steps, rounds after each other: of training above, as means over up to 240 stretches of equal
+/// length; of held-back samples below. Each has its own axis, because with β > 0 ([`policy::loss`]) they are different
+/// quantities.
+pub fn learning(rounds: &[LearningCurve]) -> String {
+    let steps: u32 = rounds.iter().map(steps).sum();
+    let stretch = (steps / 240).max(1);
+    let training: Vec<Vec<(u32, f64)>> = rounds.iter().map(|round| means(&round.training, stretch)).collect();
+    let validation: Vec<Vec<(u32, f64)>> = rounds.iter().map(|round| round.validation.clone()).collect();
+    let [above, below] = [("Training loss", "", &training), ("Validation loss", "optimiser step", &validation)]
+        .map(|(label, x_label, curves)| panel(label, x_label, steps, curves));
+    style::one_above_the_other("Learning curves", 2 * PANEL_PX, |[top, bottom]| {
+        above.draw(top, |chart| draw_rounds(chart, rounds, &training, 0))?;
+        below.draw(bottom, |chart| draw_rounds(chart, rounds, &validation, 1))
+    })
+}
+
+/// Height of one of two curves, pixels.
+const PANEL_PX: u32 = 250;
+
+fn panel<'a>(title: &'a str, x_label: &'a str, steps: u32, curves: &[Vec<(u32, f64)>]) -> Figure<'a> {
+    let (low, high) = loss_range(curves);
+    Figure {
+        title,
+        height_px: PANEL_PX,
+        x: Axis { label: x_label, range: 0.0..1.01 * f64::from(steps.max(1)), ticks: 6, labels: Labels::Numbers(0) },
+        y: Axis {
+            label: "nats per sample",
+            range: low..high,
+            ticks: 5,
+            labels: Labels::Numbers(style::decimals(high - low)),
+        },
+        left_px: 66,
+        legend: Vec::new(),
+    }
+}
+
+fn draw_rounds(
+    chart: &mut style::Chart<'_, '_>,
+    rounds: &[LearningCurve],
+    curves: &[Vec<(u32, f64)>],
+    series: usize,
+) -> style::Drawn {
+    let (low, high) = loss_range(curves);
+    let mut first = 0;
+    for (index, (round, curve)) in rounds.iter().zip(curves).enumerate() {
+        let at = |&(step, loss): &(u32, f64)| (f64::from(first + step), loss.clamp(low, high));
+        let points: Vec<(f64, f64)> = curve.iter().map(at).collect();
+        if let Some(&last) = points.last() {
+            style::marker(chart, series, last, colour(series))?;
+        }
+        style::line(chart, points, colour(series), 2)?;
+        if index > 0 {
+            style::dashes(chart, (f64::from(first), low), (f64::from(first), high), style::FAINT)?;
+        }
+        first += steps(round);
+        if rounds.len() > 1 {
+            // Where a round ends its curve is low.
+            let all: u32 = rounds.iter().map(steps).sum();
+            let at = (f64::from(first) - 0.012 * f64::from(all), high);
+            style::label(chart, &round.name, at, style::INK, Pos::new(HPos::Right, VPos::Top))?;
+        }
+    }
+    Ok(())
+}
+
+/// Means of stretches of so many steps, each at its last step.
+fn means(points: &[(u32, f64)], stretch: u32) -> Vec<(u32, f64)> {
+    let same = |a: &(u32, f64), b: &(u32, f64)| a.0.saturating_sub(1) / stretch == b.0.saturating_sub(1) / stretch;
+    let mean = |points: &[(u32, f64)]| {
+        let sum: f64 = points.iter().map(|&(_, loss)| loss).sum();
+        Some((points.last()?.0, sum / points.len() as f64))
+    };
+    points.chunk_by(same).filter_map(mean).collect()
+}
+
+/// From the lowest loss to the 99th percentile: the first few steps are many times higher than all others.
+fn loss_range(curves: &[Vec<(u32, f64)>]) -> (f64, f64) {
+    let mut losses: Vec<f64> = curves.iter().flatten().map(|&(_, loss)| loss).filter(|loss| loss.is_finite()).collect();
+    losses.sort_by(f64::total_cmp);
+    let (Some(&low), Some(&high)) = (losses.first(), losses.get((losses.len().max(1) - 1) * 99 / 100)) else {
+        return (0.0, 1.0);
+    };
+    let room = 0.1 * (high - low).max(0.02);
+    // The names of the rounds stand at the top.
+    (low - room, high + 2.5 * room)
+}
+
+/// η̂ of one training.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct EtaSeries {
+    /// In the legend.
+    pub name: String,
+    /// Iteration, from 1, and the share of ticks the network drove, 0…1.
+    pub points: Vec<(u32, f64)>,
+}
+
+/// η̂ per iteration of one or more trainings beside the paper's; `threshold` is η, above which iterations end.
+pub fn eta(ours: &[EtaSeries], paper: &[(u32, f64)], threshold: f64) -> String {
+    let points = ours.iter().flat_map(|series| &series.points).chain(paper);
+    let last = points.map(|&(iteration, _)| iteration).max().unwrap_or(1).max(2);
+    let mut legend: Vec<Key> = ours
+        .iter()
+        .enumerate()
+        .map(|(i, series)| Key { name: series.name.clone(), colour: colour(i), look: Look::Marked(i) })
+        .collect();
+    legend.push(Key { name: "paper".to_owned(), colour: style::FAINT, look: Look::Marked(2) });
+    legend.push(Key { name: format!("η = {threshold}: stop"), colour: style::INK, look: Look::Dashes });
+    let figure = Figure {
+        title: "Share of ticks driven by the network",
+        height_px: style::HEIGHT_PX,
+        x: Axis {
+            label: "DAgger iteration",
+            range: 0.7..f64::from(last) + 0.3,
+            ticks: last as usize,
+            labels: Labels::Numbers(0),
+        },
+        y: Axis { label: "η̂ (share of ticks)", range: 0.0..1.05, ticks: 6, labels: Labels::Numbers(1) },
+        left_px: 62,
+        legend,
+    };
+    figure.svg(|chart| {
+        style::dashes(chart, (0.7, threshold), (f64::from(last) + 0.3, threshold), style::INK)?;
+        let paper = std::iter::once((2, style::FAINT, paper));
+        let ours = ours.iter().enumerate().map(|(i, series)| (i, colour(i), series.points.as_slice()));
+        for (shape, colour, points) in paper.chain(ours) {
+            let points: Vec<(f64, f64)> = points.iter().map(|&(i, eta)| (f64::from(i), eta)).collect();
+            style::line(chart, points.clone(), colour, 2)?;
+            for at in points {
+                style::marker(chart, shape, at, colour)?;
+            }
+        }
+        Ok(())
+    })
+}

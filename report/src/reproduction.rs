@@ -1,0 +1,510 @@
+//! The one report: what holds, the paper's tables beside ours, ablations. Made from what the stages wrote.
+
+use crate::markdown::{table_of, with_header};
+use crate::page::{Image, Page};
+use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
+use anyhow::Context as _;
+use evaluation::calibration::AxisCalibration;
+use evaluation::conclusions::{self, Against, Driven, Statement, Verdict};
+use evaluation::format::{difference, exact_rate, quoted_rate};
+use evaluation::on_policy::{Calibration, Effect, OnPolicy, States};
+use evaluation::paper::{self, PaperLot};
+use evaluation::plan::Plan;
+use evaluation::results::EvaluationResults;
+use evaluation::slices::Slice;
+use evaluation::stages::{self, Chain, Extent, Stage, Step, named};
+use evaluation::statistics::poisson::Rate;
+use evaluation::summary::csv_of;
+use evaluation::table1::Table1;
+use experiment::drivers::NamedDriver;
+use experiment::lots::Lot;
+use experiment::run_dir::RunDir;
+use experiment::settings::Settings;
+use policy::dagger::IterationRow;
+use sim::seed::RootSeed;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Everything that decides what was done.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recipe {
+    /// Every setting.
+    pub settings: Settings,
+    /// How much.
+    pub extent: Extent,
+    /// What is done, in order.
+    pub stages: Vec<Stage>,
+}
+
+fn rows_of(root: &Path, chain: Chain, seed: RootSeed) -> anyhow::Result<Vec<IterationRow>> {
+    let folder = root.join(chain.folder(seed));
+    let table1 = Table1::read(&folder)?;
+    Ok(table1.with_context(|| format!("{}: table1.json is missing", folder.display()))?.rows)
+}
+
+/// A stage that drove, read back.
+struct Drive<'a> {
+    stage: &'a Stage,
+    drivers: Vec<NamedDriver>,
+    lots: Vec<Lot>,
+}
+
+impl<'a> Drive<'a> {
+    fn open(recipe: &'a Recipe, folder: &str) -> anyhow::Result<Self> {
+        let stage = recipe.stages.iter().find(|stage| stage.folder == folder).context("every report has this stage")?;
+        let Step::Drive { drivers } = &stage.step else { anyhow::bail!("{folder} drives") };
+        let drivers = stages::load(drivers, &stage.settings)?;
+        let lots = Lot::parse_all(&stage.settings.evaluation.lots)?;
+        Ok(Self { stage, drivers, lots })
+    }
+
+    fn plan(&self) -> Plan<'_> {
+        let compare_with = conclusions::compare_with(&self.drivers);
+        Plan { settings: &self.stage.settings, drivers: &self.drivers, lots: &self.lots, compare_with }
+    }
+}
+
+/// Writes `report.md`, `report.html`, `conclusions.csv` and the figures; returns the conclusions as printed.
+///
+/// # Errors
+/// If what a stage wrote cannot be read, or a file cannot be written.
+pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
+    let root = run.path();
+    let settings = &recipe.settings;
+    let [reference, unseen, rules] =
+        [stages::REFERENCE, stages::UNSEEN, stages::RULES].map(|folder| Drive::open(recipe, folder));
+    let (reference, unseen, rules) = (reference?, unseen?, rules?);
+    let plans = [reference.plan(), unseen.plan(), rules.plan()];
+    let results = |plan: &Plan<'_>, folder: &str| EvaluationResults::read(plan, &root.join(folder));
+    let results_of = [
+        results(&plans[0], stages::REFERENCE)?,
+        results(&plans[1], stages::UNSEEN)?,
+        results(&plans[2], stages::RULES)?,
+    ];
+    let [reference, unseen, rules] = [0, 1, 2].map(|i| Driven { plan: &plans[i], results: &results_of[i] });
+    let on_policy = OnPolicy::read(&root.join(stages::ON_POLICY))?;
+    let rows = |chain| rows_of(root, chain, settings.seed);
+    let (weighted, unweighted) = (rows(Chain::Weighted)?, rows(Chain::Unweighted)?);
+
+    let statements = statements(settings.dagger.eta, &reference, &unseen, &weighted, &on_policy.effect);
+    let mut page = Page::new("The paper in a box");
+    page.text(introduction(recipe));
+    let verdicts = verdicts(&statements);
+    page.section("What holds here", verdicts.clone());
+    table_1(&mut page, settings.dagger.eta, &weighted, &unweighted, &on_policy.effect);
+    collision_rates(&mut page, &reference);
+    safe_ratios(&mut page, &reference);
+    unseen_lots(&mut page, &unseen);
+    page.section("Ablations", "");
+    page.text(decision_rules(root, settings.seed, &rules)?);
+    page.text(weight_and_cloning(&reference));
+    calibration(&mut page, &on_policy.calibration);
+    if recipe.extent.seeds > 1 {
+        page.section("Training seeds", training_seeds(recipe, &reference, &unseen));
+    }
+    page.section("Where to look further", further());
+    page.write(root, "report")?;
+    run.write("conclusions.csv", &csv_of(&statements)?)?;
+    Ok(verdicts)
+}
+
+fn statements(
+    eta: f64,
+    reference: &Driven<'_>,
+    unseen: &Driven<'_>,
+    weighted: &[IterationRow],
+    effect: &[Effect],
+) -> Vec<Statement> {
+    let mut statements = conclusions::on_reference_lots(reference);
+    statements.push(conclusions::share_of_the_network(weighted, eta));
+    statements
+        .extend(effect.iter().map(|effect| conclusions::effect_of_the_weight(effect.iteration, effect.held_back)));
+    let unseen_lots =
+        reference.unseen().and_then(|it| reference.against_dagger(it, "on the lots it was not trained on"));
+    let generated = unseen.against_dagger(unseen.all(), "on unseen generated lots");
+    for others in [unseen_lots, generated].iter().flatten().map(Against::planners) {
+        let is_new = |other: &Statement| statements.iter().all(|known| known.claim != other.claim);
+        statements.extend(others.into_iter().filter(is_new).collect::<Vec<_>>());
+    }
+    statements
+}
+
+fn introduction(recipe: &Recipe) -> String {
+    let settings = &recipe.settings;
+    let (evaluation, extent) = (&settings.evaluation, &recipe.extent);
+    format!(
+        "Vision-based Autonomous Driving for Unstructured Environments Using Imitation Learning (Ahn, Kim, Park), \
+         rebuilt in simulation: trained on {}, driven on {} in {} trials, and on {}. Root seed {}{}, seed of the \
+         evaluation {}. Everything that made this is in `manifest.toml`, `settings.toml` and `reproduce.toml` beside \
+         this report; the same command gives the same bytes.\n\n\
+         Intervals are of 95 %: exact Poisson intervals (Garwood) for rates, or (b) a paired bootstrap over lot, \
+         direction and seed where events come in clusters; bootstrap for safe ratios and differences. All drivers met \
+         the same obstacles and the same noise.",
+        settings.training.lots.join(", "),
+        evaluation.lots.join(", "),
+        evaluation.trials,
+        extent.unseen.join(", "),
+        settings.seed.0,
+        if extent.seeds > 1 { format!(" and {} more", extent.seeds - 1) } else { String::new() },
+        evaluation.seed.0,
+    )
+}
+
+/// A list under each verdict.
+fn verdicts(statements: &[Statement]) -> String {
+    let mut text = "Decided from the runs of this report: a comparison *holds* where the paired interval of 95 % lies on the \
+                    paper's side of zero, *does not hold* where it lies on the other, and *cannot be told* where it contains \
+                    zero (differences are the other driver's − DAgger's in near-collisions and reversals, DAgger's − the \
+                    other driver's in safe ratios; * = excludes zero).\n"
+        .to_owned();
+    for verdict in [Verdict::Holds, Verdict::DoesNotHold, Verdict::CannotBeTold] {
+        let found: Vec<&Statement> = statements.iter().filter(|statement| statement.verdict == verdict).collect();
+        let _ = write!(text, "\n### {}: {} of {}\n\n", verdict.title(), found.len(), statements.len());
+        if found.is_empty() {
+            text += "None.\n";
+        }
+        for Statement { claim, figures, .. } in found {
+            let _ = writeln!(text, "- **{claim}**: {}.", figures.replace('*', "\\*"));
+        }
+    }
+    text
+}
+
+fn table_1(page: &mut Page, eta: f64, weighted: &[IterationRow], unweighted: &[IterationRow], effect: &[Effect]) {
+    let columns = weighted.len().max(unweighted.len()).max(paper::TABLE_1.dataset.len());
+    let header: Vec<String> = (0..columns).map(|i| if i == 0 { "BC".to_owned() } else { format!("i = {i}") }).collect();
+    let mut table = with_header(std::iter::once(String::new()).chain(header).collect());
+    let mut add = |name: &str, value: &dyn Fn(usize) -> Option<String>| {
+        let cells = (0..columns).map(|i| value(i).unwrap_or_else(|| "–".to_owned()));
+        table.add_row(std::iter::once(name.to_owned()).chain(cells).collect::<Vec<_>>());
+    };
+    let eta_of =
+        |rows: &[IterationRow], i: usize| rows.get(i).and_then(|row| row.eta_hat).map(|eta| format!("{eta:.3}"));
+    let of_paper = |values: &[Option<f64>; 6], i: usize| values.get(i).copied().flatten().map(|v| format!("{v:.2}"));
+    let effect_of = |i: usize| effect.iter().find(|effect| effect.iteration as usize == i);
+    add("samples", &|i| weighted.get(i).map(|row| row.samples.to_string()));
+    add("  paper", &|i| paper::TABLE_1.dataset.get(i).map(ToString::to_string));
+    add("η̂ = network / total", &|i| eta_of(weighted, i));
+    add("  with α = 0", &|i| eta_of(unweighted, i));
+    add("  paper", &|i| of_paper(&paper::TABLE_1.eta_hat, i));
+    add("effect of the weight, held-back samples", &|i| {
+        let interval = effect_of(i)?.held_back?;
+        Some(format!("{:.2} [{:.2}, {:.2}]", interval.estimate, interval.lower, interval.upper))
+    });
+    add("effect of the weight, driving", &|i| {
+        let [with, without] = effect_of(i)?.driving_per_s;
+        Some(format!("{:.2}", with / without.max(f64::MIN_POSITIVE)))
+    });
+    add("  paper", &|i| of_paper(&paper::TABLE_1.effect, i));
+    page.section(
+        "Table 1: DAgger iterations",
+        format!(
+            "{table}\n\nη̂ of a column is of the policy trained in the column before. The effect compares the two policies \
+             trained in a column, with α = 1.5 and with α = 0 on the same data seeds: Σ τ̂ with the weight over Σ τ̂ \
+             without, smaller is better. *Held-back samples*: of both data sets so far, resampled in stretches. \
+             *Driving*: per second at the wheel of one trial of every lot, the expert watching."
+        ),
+    );
+    let points = |rows: &[IterationRow]| {
+        rows.iter().filter_map(|row| Some((row.round, row.eta_hat?))).collect::<Vec<(u32, f64)>>()
+    };
+    let ours = [("α = 1.5", weighted), ("α = 0", unweighted)]
+        .map(|(name, rows)| EtaSeries { name: name.to_owned(), points: points(rows) });
+    let of_paper: Vec<(u32, f64)> =
+        (0..).zip(paper::TABLE_1.eta_hat).filter_map(|(round, eta)| Some((round, eta?))).collect();
+    page.figure("eta", "Share of the network by iteration.", Image::Svg(plots::eta(&ours, &of_paper, eta)));
+}
+
+/// Lots as columns, as in the paper: groups, then what is pooled.
+fn by_lot(
+    driven: &Driven<'_>,
+    cell: &dyn Fn(usize, &Slice) -> String,
+    paper: &dyn Fn(usize, &str) -> String,
+) -> String {
+    let slices = driven.results.slices();
+    let header: Vec<&str> = std::iter::once("driver").chain(slices.iter().map(|slice| slice.label.as_str())).collect();
+    let mut table = table_of(&header);
+    for (driver, entry) in driven.plan.drivers.iter().enumerate() {
+        let name = &entry.name;
+        table.add_row(std::iter::once(name.clone()).chain(slices.iter().map(|slice| cell(driver, slice))));
+        if let Some(of_paper) = paper::DRIVERS.iter().position(|known| known == name) {
+            let cells: Vec<String> = slices.iter().map(|slice| paper(of_paper, &slice.label)).collect();
+            if cells.iter().any(|cell| !cell.is_empty()) {
+                table.add_row(std::iter::once(format!("  paper: {name}")).chain(cells));
+            }
+        }
+    }
+    table.to_string()
+}
+
+/// Near-collisions and metres of a driver of the paper on a lot, or on those that a pooled slice stands for.
+fn count_of_paper(driver: usize, label: &str) -> Option<(u32, f64)> {
+    let count = paper::count(driver, |lot| match label {
+        "all" => true,
+        "unseen" => !lot.is_trained_on,
+        label => lot.lot == label,
+    });
+    (count.1 > 0.0).then_some(count)
+}
+
+fn rates_table(driven: &Driven<'_>, with_paper: bool) -> String {
+    let judged = |slice: &Slice| driven.results.judge(0, slice, 0, driven.plan.settings.evaluation.seed).0;
+    let estimates: Vec<_> = driven.results.slices().iter().map(judged).collect();
+    let slices = driven.results.slices();
+    let cell = |driver: usize, slice: &Slice| {
+        let totals = driven.results.totals(0, driver, slice, None);
+        let index = slices.iter().position(|known| known == slice).expect("one of them");
+        format!("{}: {}", totals.near_collisions, quoted_rate(&totals, &estimates[index][driver]))
+    };
+    let of_paper = |driver: usize, label: &str| {
+        let count = count_of_paper(driver, label).filter(|_| with_paper);
+        count.map_or_else(String::new, |(events, metres)| format!("{events}: {}", exact_rate(events, metres)))
+    };
+    by_lot(driven, &cell, &of_paper)
+}
+
+fn collision_rates(page: &mut Page, driven: &Driven<'_>) {
+    page.section(
+        "Collision rates on the paper's lots",
+        format!(
+            "Near-collisions, and per 100 m of the route [95 %]. The paper's counts are recovered from its rates.\n\n{}",
+            rates_table(driven, true)
+        ),
+    );
+    let rates = bars_beside_paper(
+        driven,
+        &|driver, slice| {
+            let rate = driven.results.totals(0, driver, slice, None).rate();
+            (rate.per_unit, Some([rate.lower, rate.upper]))
+        },
+        &|driver, lot| {
+            let (events, metres) = paper::count(driver, |known| known.lot == lot.lot);
+            let rate = Rate::new(events, metres / 100.0);
+            (rate.per_unit, Some([rate.lower, rate.upper]))
+        },
+    );
+    page.figure(
+        "rates-beside-paper",
+        "The paper's comparison beside ours, with exact intervals of 95 %.",
+        Image::Svg(plots::bars("Collision rate", "near-collisions per 100 m", &paper::DRIVERS, &rates)),
+    );
+    page.figure("rates", "Every driver, all lots of the paper together.", Image::Svg(rates_of_all(driven)));
+}
+
+/// A height and its interval.
+type Height = (f64, Option<[f64; 2]>);
+
+/// The paper's drivers on its lots, as far as they were driven: its bar, then ours.
+fn bars_beside_paper(
+    driven: &Driven<'_>,
+    ours: &dyn Fn(usize, &Slice) -> Height,
+    theirs: &dyn Fn(usize, &PaperLot) -> Height,
+) -> Vec<BarGroup> {
+    let slices = driven.results.slices();
+    let lots = paper::LOTS.iter().filter_map(|lot| Some((lot, slices.iter().find(|slice| slice.label == lot.lot)?)));
+    let group = |(lot, slice): (&PaperLot, &Slice)| {
+        let bars = paper::DRIVERS.into_iter().enumerate().flat_map(|(driver, name)| {
+            let bar = |(value, interval): Height, is_papers| Bar { driver, value, interval, is_papers };
+            let ours = driven.driver(name).map(|index| bar(ours(index, slice), false));
+            std::iter::once(bar(theirs(driver, lot), true)).chain(ours)
+        });
+        BarGroup { name: lot.lot.to_owned(), bars: bars.collect() }
+    };
+    lots.map(group).collect()
+}
+
+/// A row per driver, its lots together.
+fn rates_of_all(driven: &Driven<'_>) -> String {
+    let slice = driven.all();
+    let row = |(driver, entry): (usize, &NamedDriver)| {
+        let totals = driven.results.totals(0, driver, &slice, None);
+        let rate = totals.rate();
+        let name = entry.name.clone();
+        let group = match name.as_str() {
+            "expert" => 0,
+            name if name.starts_with("BC") || name.starts_with("DAgger") => 1,
+            name if name.ends_with("tuned") => 3,
+            _ => 2,
+        };
+        RateRow { name, per_100m: rate.per_unit, interval: [rate.lower, rate.upper], group }
+    };
+    let rows: Vec<RateRow> = driven.plan.drivers.iter().enumerate().map(row).collect();
+    plots::rates(&format!("Near-collisions, {}", slice.label), &rows)
+}
+
+fn safe_ratios(page: &mut Page, driven: &Driven<'_>) {
+    let slices = driven.results.slices();
+    let seed = driven.plan.settings.evaluation.seed;
+    let estimates: Vec<_> = slices.iter().map(|slice| driven.results.judge(0, slice, 0, seed).0).collect();
+    let cell = |driver: usize, slice: &Slice| {
+        let index = slices.iter().position(|known| known == slice).expect("one of them");
+        let interval = estimates[index][driver].safe_ratio;
+        let interval = interval.map_or_else(String::new, |i| format!(" [{:.3}, {:.3}]", i.lower, i.upper));
+        format!("{:.3}{interval}", driven.results.totals(0, driver, slice, None).safe_ratio())
+    };
+    let of_paper = |driver: usize, label: &str| {
+        let lot = paper::LOTS.iter().find(|lot| lot.lot == label);
+        lot.map_or_else(String::new, |lot| format!("{:.2}", lot.results[driver].safe_ratio))
+    };
+    let text = "Drivable share of the metre around the body, mean over runs [95 %].";
+    page.section("Safe ratios on the paper's lots", format!("{text}\n\n{}", by_lot(driven, &cell, &of_paper)));
+    let ratios = bars_beside_paper(
+        driven,
+        &|driver, slice| {
+            let index = slices.iter().position(|known| known == slice).expect("one of them");
+            let interval = estimates[index][driver].safe_ratio.map(|interval| [interval.lower, interval.upper]);
+            (driven.results.totals(0, driver, slice, None).safe_ratio(), interval)
+        },
+        &|driver, lot| (lot.results[driver].safe_ratio, None),
+    );
+    page.figure(
+        "safe-ratios-beside-paper",
+        "The paper's safe ratios beside ours; the paper gives no intervals.",
+        Image::Svg(plots::bars("Safe ratio", "drivable share of the ring", &paper::DRIVERS, &ratios)),
+    );
+}
+
+fn unseen_lots(page: &mut Page, driven: &Driven<'_>) {
+    page.section(
+        "Unseen generated lots",
+        format!(
+            "Near-collisions, and per 100 m of the route [95 %]; nothing was trained or tuned on these lots.\n\n{}",
+            rates_table(driven, false)
+        ),
+    );
+    page.figure("rates-unseen", "Every driver on generated lots.", Image::Svg(rates_of_all(driven)));
+}
+
+fn decision_rules(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::Result<String> {
+    let mut table = table_of(&[
+        "network drives if",
+        "samples, i = 1",
+        "η̂, i = 1",
+        "near-collisions while collecting, i = 1",
+        "then driving: near-collisions",
+        "safe ratio",
+    ]);
+    let slice = driven.all();
+    let chains = [Chain::Weighted, Chain::AnyBelow, Chain::TauOnly];
+    for (driver, chain) in chains.into_iter().enumerate() {
+        let rows = rows_of(root, chain, seed)?;
+        let first = rows.get(1);
+        let cell = |of: fn(&IterationRow) -> Option<String>| first.and_then(of).unwrap_or_else(|| "–".to_owned());
+        let totals = driven.results.totals(0, driver, &slice, None);
+        table.add_row([
+            driven.plan.drivers[driver].name.clone(),
+            cell(|row| Some(row.samples.to_string())),
+            cell(|row| row.eta_hat.map(|eta| format!("{eta:.3}"))),
+            cell(|row| Some(row.near_collisions.to_string())),
+            format!("{}: {}", totals.near_collisions, exact_rate(totals.near_collisions, totals.reference_m)),
+            format!("{:.3}", totals.safe_ratio()),
+        ]);
+    }
+    Ok(format!(
+        "### Decision rule\n\nAlgorithm 2, line 9, three ways: all of τ̂ < τ, χ̂ < χ (the text and the figures), any of \
+         them (the listing as printed), τ̂ < τ alone. All start from the same behaviour cloning and are driven after the \
+         same number of iterations.\n\n{table}"
+    ))
+}
+
+/// Pairs of drivers that differ in one thing.
+fn weight_and_cloning(driven: &Driven<'_>) -> String {
+    let mut table = table_of(&["", "lots", "Δ near-collisions per 100 m [95 %]", "Δ safe ratio [95 %]"]);
+    let seed = driven.plan.settings.evaluation.seed;
+    let pairs = [("BC", "DAgger"), ("DAgger, α = 0", "DAgger")];
+    for (name, with) in pairs {
+        let (Some(driver), Some(with_index)) = (driven.driver(name), driven.driver(with)) else { continue };
+        for slice in driven.results.slices() {
+            let (_, comparisons) = driven.results.judge(0, &slice, with_index, seed);
+            let Some(found) = comparisons.into_iter().find(|comparison| comparison.driver == driver) else { continue };
+            table.add_row([
+                format!("{name} − {with}"),
+                slice.label.clone(),
+                difference(found.difference_per_100m, 2),
+                difference(found.difference_safe_ratio, 3),
+            ]);
+        }
+    }
+    format!(
+        "### α, and behaviour cloning against DAgger\n\nPaired differences on the paper's lots; a positive one in \
+         near-collisions speaks for DAgger with the weight (*: excludes zero).\n\n{table}"
+    )
+}
+
+fn calibration(page: &mut Page, found: &[Calibration]) {
+    let mut table = table_of(&["policy", "states", "axis", "samples", "within 1 σ", "within 2 σ", "RMS error / RMS σ"]);
+    for Calibration { policy, states, axis, samples, coverage, bins } in found {
+        let states = match states {
+            States::HeldBack => "held-back samples",
+            States::OnPolicy => "driving, expert watching",
+        };
+        // Bins hold as many samples each, the last one fewer: close enough for a ratio of two digits.
+        let mean_square = |which: usize| bins.iter().map(|bin| bin[which].powi(2)).sum::<f64>();
+        let ratio = (mean_square(1) / mean_square(0).max(f64::MIN_POSITIVE)).sqrt();
+        table.add_row([
+            policy.clone(),
+            states.to_owned(),
+            axis.clone(),
+            samples.to_string(),
+            format!("{:.1} %", 100.0 * coverage[0]),
+            format!("{:.1} %", 100.0 * coverage[1]),
+            format!("{ratio:.2}"),
+        ]);
+    }
+    page.text(format!(
+        "### Calibration of the predicted variance\n\nShares of the expert's answers within 1 σ and 2 σ of the network's \
+         (normal errors with the right σ: 68.3 % and 95.4 %), and how large errors are against σ.\n\n{table}"
+    ));
+    let of = |states: States| -> Vec<AxisCalibration> {
+        let of_dagger = found.iter().filter(|row| row.states == states && row.policy == conclusions::DAGGER);
+        of_dagger
+            .map(|row| AxisCalibration {
+                name: row.axis.clone(),
+                samples: row.samples,
+                coverage: row.coverage,
+                bins: row.bins.clone(),
+            })
+            .collect()
+    };
+    for (name, caption, states) in [
+        ("calibration-held-back", "DAgger on held-back samples.", States::HeldBack),
+        ("calibration-driving", "DAgger at the wheel, the expert watching.", States::OnPolicy),
+    ] {
+        page.figure(name, caption, Image::Svg(plots::calibration(&of(states))));
+    }
+}
+
+fn training_seeds(recipe: &Recipe, reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
+    let mut table =
+        table_of(&["policy", "seed", "the paper's lots", "of them not trained on", "unseen generated lots"]);
+    for base in ["BC", "DAgger", "DAgger, α = 0"] {
+        for seed in stages::seeds(&recipe.settings, &recipe.extent) {
+            let name = named(base, seed, &recipe.settings);
+            let cell = |driven: &Driven<'_>, slice: Option<Slice>| {
+                let found = driven.driver(&name).zip(slice);
+                found.map_or_else(String::new, |(driver, slice)| {
+                    let totals = driven.results.totals(0, driver, &slice, None);
+                    format!("{}: {}", totals.near_collisions, exact_rate(totals.near_collisions, totals.reference_m))
+                })
+            };
+            table.add_row([
+                base.to_owned(),
+                seed.0.to_string(),
+                cell(reference, Some(reference.all())),
+                cell(reference, reference.unseen()),
+                cell(unseen, Some(unseen.all())),
+            ]);
+        }
+    }
+    format!(
+        "Trainings that differ in nothing but their root seed. Conclusions above are of the first one; an interval does \
+         not cover what another training would have given, these rows do.\n\n{table}"
+    )
+}
+
+fn further() -> String {
+    "- `drives/*/summary.md`: every table of every evaluation; `failures.md`: each near-collision with its place, its \
+     cause and the key that replays it; `cargo xtask render report FOLDER` shows them.\n- `chains/*`: data, networks and Table 1 of each training.\n- \
+     `on-policy/on_policy.json`, `conclusions.csv`: the figures of this report.\n"
+        .to_owned()
+}

@@ -1,0 +1,396 @@
+//! `report.html` of a run: one page that loads nothing, made from what the run left on disk. Beside it the same as
+//! `report.md`, and its pictures in `figures/`.
+//!
+//! A file that cannot be read or written is an error. A near-collision that can no longer be driven again (its network
+//! moved away) is not: the page says so in place of the picture.
+
+use crate::moments;
+use crate::page::{Image, Page};
+use crate::plots::{self, Distribution, EtaSeries, NoisePoint, NoiseSeries, RateRow};
+use anyhow::Context as _;
+use evaluation::calibration::{self, AxisCalibration};
+use evaluation::records::{self, Driven, FailureRecord, RunRecord};
+use evaluation::statistics::poisson::DISPERSION_MAX;
+use evaluation::summary::{Row, SweepRow, Tables};
+use evaluation::table1::Table1;
+use experiment::learning::{self, LearningCurve};
+use experiment::progress::Progress;
+use experiment::replay_key::ReplayKey;
+use experiment::run_dir::{self, Manifest};
+use experiment::settings::{NoiseChoice, Settings};
+use policy::checkpoint::Checkpoint;
+use policy::dataset::Dataset;
+use policy::dataset::store::Store;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Name of the file.
+pub const FILE: &str = "report.html";
+const STEM: &str = "report";
+/// Near-collisions that are shown.
+const MOMENTS: usize = 6;
+/// Of these at most so many of one driver on one lot.
+const MOMENTS_OF_A_KIND: usize = 2;
+/// Rows of one plot; with more only the pooled lots are drawn.
+const ROWS_MAX: usize = 18;
+
+/// Everything the report is made of, as the run left it on disk.
+#[derive(Debug)]
+struct Sources {
+    settings: Settings,
+    manifest: Manifest,
+    /// The training, if it was one.
+    training: Option<Training>,
+    /// The evaluation, if anything was driven.
+    evaluation: Option<Evaluation>,
+}
+
+#[derive(Debug)]
+struct Training {
+    table: String,
+    table1: Table1,
+    rounds: Vec<LearningCurve>,
+}
+
+#[derive(Debug)]
+struct Evaluation {
+    text: String,
+    tables: Tables,
+    runs: Vec<RunRecord>,
+    failures: Vec<FailureRecord>,
+}
+
+impl Sources {
+    fn read(folder: &Path) -> anyhow::Result<Self> {
+        Ok(Self {
+            settings: run_dir::settings_of(folder)?,
+            manifest: Manifest::read(folder)?,
+            training: Training::read(folder)?,
+            evaluation: Evaluation::read(folder)?,
+        })
+    }
+}
+
+impl Training {
+    fn read(folder: &Path) -> anyhow::Result<Option<Self>> {
+        let Some(table1) = Table1::read(folder)? else { return Ok(None) };
+        let mut rounds = Vec::new();
+        for row in &table1.rows {
+            let name = if row.round == 0 { "BC".to_owned() } else { format!("i = {}", row.round) };
+            rounds.extend(learning::read(&folder.join(format!("round-{:02}", row.round)), &name)?);
+        }
+        rounds.extend(learning::read(&folder.join("final"), "final")?);
+        Ok(Some(Self { table: text(&folder.join("table1.md"))?, table1, rounds }))
+    }
+}
+
+impl Evaluation {
+    fn read(folder: &Path) -> anyhow::Result<Option<Self>> {
+        let Some(tables) = Tables::read(folder)? else { return Ok(None) };
+        Ok(Some(Self {
+            text: text(&folder.join("summary.md"))?,
+            tables,
+            runs: records::read(&folder.join(records::RUNS))?,
+            failures: records::read(&folder.join(records::FAILURES))?,
+        }))
+    }
+
+    /// The lots that stand for all: pooled where there are several.
+    fn pooled(&self) -> &str {
+        self.tables.rows.last().map_or("all", |row| row.lots.as_str())
+    }
+}
+
+fn text(path: &Path) -> anyhow::Result<String> {
+    std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read for the report", path.display()))
+}
+
+/// The command line, quoted as a shell needs it.
+fn command_line(manifest: &Manifest) -> String {
+    let is_plain = |word: &str| word.chars().all(|c| c.is_alphanumeric() || "-_./:=,@%+".contains(c));
+    let quoted =
+        |word: &String| if is_plain(word) { word.clone() } else { format!("'{}'", word.replace('\'', "'\\''")) };
+    let words = manifest.command_line.iter().map(quoted);
+    std::iter::once("cargo xtask".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
+/// Writes the report of the run in a folder.
+///
+/// # Errors
+/// If what the run left cannot be read, or the report cannot be written.
+pub fn write(folder: &Path, progress: &dyn Progress) -> anyhow::Result<()> {
+    progress.begin("report", "report");
+    let page = page(folder, progress).with_context(|| format!("report of {}", folder.display()))?;
+    page.write(folder, STEM)?;
+    progress.end(&folder.join(FILE).display().to_string());
+    Ok(())
+}
+
+fn page(folder: &Path, progress: &dyn Progress) -> anyhow::Result<Page> {
+    let sources = Sources::read(folder)?;
+    let name = folder.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into());
+    let mut page = Page::new(name);
+    page.text(overview(&sources));
+    if let Some(training) = &sources.training {
+        add_training(&mut page, &sources.settings, training);
+        progress.at(0.1, &mut |_| "calibration".to_owned());
+        if let Some(axes) = held_back_calibration(folder, &sources.settings)? {
+            page.figure("calibration", calibration_caption(&axes), Image::Svg(plots::calibration(&axes)));
+        }
+    }
+    if let Some(evaluation) = &sources.evaluation {
+        add_evaluation(&mut page, evaluation);
+        add_moments(&mut page, folder, &sources.settings, evaluation, progress);
+    }
+    page.section("Configuration", configuration(&sources));
+    Ok(page)
+}
+
+fn overview(sources: &Sources) -> String {
+    let manifest = &sources.manifest;
+    let dirty = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };
+    let revision = manifest.git_revision.as_deref().unwrap_or("unknown");
+    let mut text = format!("Made by\n\n```\n{}\n```\n\nfrom revision `{revision}`{dirty}.", command_line(manifest));
+    if let Some(evaluation) = &sources.evaluation {
+        text += "\n\n| driver | noise | lots | near-collisions | per 100 m [95 %] | safe ratio |\n|---|---|---|---|---|---|\n";
+        for row in
+            evaluation.tables.rows.iter().filter(|row| row.direction == "both" && row.lots == evaluation.pooled())
+        {
+            let [lower, upper] = interval(row);
+            let _ = writeln!(
+                text,
+                "| {} | {} | {} | {} in {:.0} m | {:.2} [{lower:.2}, {upper:.2}] | {:.3} |",
+                row.driver, row.noise, row.lots, row.near_collisions, row.reference_m, row.per_100m, row.safe_ratio
+            );
+        }
+    }
+    text
+}
+
+fn add_training(page: &mut Page, settings: &Settings, training: &Training) {
+    page.section("Training", training.table.as_str());
+    let rows = &training.table1.rows;
+    let ours: Vec<(u32, f64)> = rows.iter().filter_map(|row| Some((row.round, row.eta_hat?))).collect();
+    if !ours.is_empty() {
+        let paper = (0..).zip(&training.table1.paper.eta_hat).filter_map(|(i, eta)| Some((i, (*eta)?)));
+        let series = EtaSeries { name: "this run".to_owned(), points: ours };
+        let svg = plots::eta(&[series], &paper.collect::<Vec<_>>(), settings.dagger.eta);
+        page.figure(
+            "eta",
+            "How much the network drove while data were collected, beside the paper's table.",
+            Image::Svg(svg),
+        );
+    }
+    let caption = "Loss over optimiser steps, round after round; training as means of stretches of steps. Training and \
+                   validation loss are different quantities where β > 0, and different rounds have different data.";
+    page.figure("learning", caption, Image::Svg(plots::learning(&training.rounds)));
+}
+
+/// The network of the run on all samples that were held back.
+fn held_back_calibration(folder: &Path, settings: &Settings) -> anyhow::Result<Option<[AxisCalibration; 2]>> {
+    let Ok(network) = run_dir::policy_folder(folder) else { return Ok(None) };
+    let store = Store::open(folder)?;
+    let mut dataset = Dataset::default();
+    for round in (0..).take_while(|&round| store.has_round(round)) {
+        dataset.push(store.read_samples(round)?.into());
+    }
+    let held_back = dataset.split(settings.dagger.fit_iteration.validation).validation;
+    if held_back.is_empty() {
+        return Ok(None);
+    }
+    let policy = Checkpoint::load(&network)?;
+    Ok(Some(calibration::of_policy(&policy, &held_back, settings.dagger.device)))
+}
+
+fn calibration_caption(axes: &[AxisCalibration]) -> String {
+    let mut text = "Whether the network knows how wrong it is, on held-back samples: left the share of the labels within \
+                    1σ and 2σ of its answer (dashed: a normal distribution), right its error in ten groups of equal size \
+                    from sure to unsure. Above the dashed line it is too sure of itself."
+        .to_owned();
+    for axis in axes {
+        let [one, two] = axis.coverage.map(|share| 100.0 * share);
+        let _ = write!(text, " {}: {one:.0} % and {two:.0} % of {} samples.", axis.name, axis.samples);
+    }
+    text
+}
+
+/// The interval that may be quoted, as in the tables.
+fn interval(row: &Row) -> [f64; 2] {
+    let is_clustered = row.dispersion.is_some_and(|index| index > DISPERSION_MAX);
+    match (row.bootstrap_lower, row.bootstrap_upper) {
+        (Some(lower), Some(upper)) if is_clustered => [lower, upper],
+        _ => [row.garwood_lower, row.garwood_upper],
+    }
+}
+
+fn add_evaluation(page: &mut Page, evaluation: &Evaluation) {
+    page.section("Evaluation", "");
+    let drivers = first_seen(evaluation.tables.rows.iter().map(|row| row.driver.as_str()));
+    let levels: Vec<NoiseChoice> = evaluation.tables.rows.iter().fold(Vec::new(), |mut levels, row| {
+        if !levels.contains(&row.noise) {
+            levels.push(row.noise);
+        }
+        levels
+    });
+    for (index, &noise) in levels.iter().enumerate() {
+        let rows = rate_rows(evaluation, noise, &drivers);
+        let title = format!("Near-collisions, noise {noise}");
+        let caption = "Dots: near-collisions per 100 m of route; whiskers: 95 % intervals, as in the tables.";
+        page.figure(format!("rates-{index}"), caption, Image::Svg(plots::rates(&title, &rows)));
+    }
+    if levels.len() > 1 {
+        let series = noise_series(evaluation, &drivers);
+        let title = format!("Near-collisions against noise, {}", evaluation.pooled());
+        let svg = plots::rates_against_noise(&title, &series);
+        page.figure("noise", "Near-collisions over the noise level; whiskers: exact 95 % intervals.", Image::Svg(svg));
+    }
+    for (index, &noise) in levels.iter().enumerate() {
+        let row = |(group, driver): (usize, &&str)| Distribution {
+            name: (*driver).to_owned(),
+            values: safe_ratios(evaluation, noise, driver),
+            group,
+        };
+        let rows: Vec<Distribution> = drivers.iter().enumerate().map(row).collect();
+        let title = format!("Safe ratio of every run, noise {noise}");
+        let caption = "Dots: runs (lot, direction, trial); box: quartiles; bar: median.";
+        page.figure(format!("safe-ratio-{index}"), caption, Image::Svg(plots::safe_ratios(&title, &rows)));
+    }
+    page.section("Tables", evaluation.text.as_str());
+}
+
+fn first_seen<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    names.fold(Vec::new(), |mut seen, name| {
+        if !seen.contains(&name) {
+            seen.push(name);
+        }
+        seen
+    })
+}
+
+/// Lot by lot, driver by driver; only the pooled lots where that would be too many.
+fn rate_rows(evaluation: &Evaluation, noise: NoiseChoice, drivers: &[&str]) -> Vec<RateRow> {
+    let rows = || evaluation.tables.rows.iter().filter(|row| row.noise == noise && row.direction == "both");
+    let pooled_only = rows().count() > ROWS_MAX;
+    let lots = first_seen(rows().map(|row| row.lots.as_str()));
+    let mut drawn = Vec::new();
+    for lot in lots.iter().filter(|&&lot| !pooled_only || lot == evaluation.pooled()) {
+        for row in rows().filter(|row| row.lots == **lot) {
+            let name = if pooled_only { row.driver.clone() } else { format!("{}, {}", row.driver, row.lots) };
+            let group = drivers.iter().position(|driver| *driver == row.driver).unwrap_or(0);
+            drawn.push(RateRow { name, per_100m: row.per_100m, interval: interval(row), group });
+        }
+    }
+    drawn
+}
+
+fn noise_series(evaluation: &Evaluation, drivers: &[&str]) -> Vec<NoiseSeries> {
+    let points = |driver: &str| {
+        let rows = evaluation.tables.noise_sweep.iter();
+        let rows = rows.filter(|row| row.driver == driver && row.lots == evaluation.pooled());
+        let point = |row: &SweepRow| {
+            let (times_paper, per_100m) = (row.times_paper?, row.per_100m);
+            Some(NoisePoint { times_paper, per_100m, interval: [row.lower, row.upper] })
+        };
+        let mut points: Vec<NoisePoint> = rows.filter_map(point).collect();
+        points.sort_by(|a, b| a.times_paper.total_cmp(&b.times_paper));
+        points
+    };
+    drivers.iter().map(|driver| NoiseSeries { name: (*driver).to_owned(), points: points(driver) }).collect()
+}
+
+fn safe_ratios(evaluation: &Evaluation, noise: NoiseChoice, driver: &str) -> Vec<f64> {
+    let runs = evaluation.runs.iter().filter(|run| run.driven.noise == noise && run.driven.driver == driver);
+    runs.map(|run| f64::from(run.report.metrics.safe_ratio)).collect()
+}
+
+/// The fastest near-collisions: how fast the car still was is how far the driver was from seeing it come.
+fn worst(failures: &[FailureRecord]) -> Vec<&FailureRecord> {
+    let mut fastest: Vec<&FailureRecord> = failures.iter().collect();
+    fastest.sort_by(|a, b| b.speed_mps.total_cmp(&a.speed_mps));
+    let mut chosen: Vec<&FailureRecord> = Vec::new();
+    for failure in fastest {
+        let alike = chosen
+            .iter()
+            .filter(|other| other.driven.driver == failure.driven.driver && other.driven.lot == failure.driven.lot)
+            .count();
+        if chosen.len() < MOMENTS && alike < MOMENTS_OF_A_KIND {
+            chosen.push(failure);
+        }
+    }
+    chosen
+}
+
+fn add_moments(page: &mut Page, folder: &Path, settings: &Settings, evaluation: &Evaluation, progress: &dyn Progress) {
+    let count = evaluation.failures.len();
+    if count == 0 {
+        page.section("Near-collisions", "There was none.");
+        return;
+    }
+    let worst = worst(&evaluation.failures);
+    page.section(
+        "Near-collisions",
+        format!(
+            "{count} in all, each with its cause in `failures.md`. Shown are the {} in which the car was fastest, at most \
+             {MOMENTS_OF_A_KIND} of one driver on one lot. The commands show them again in Rerun's viewer; run them where \
+             this run was made.",
+            worst.len()
+        ),
+    );
+    for (index, failure) in worst.iter().enumerate() {
+        progress.at(0.2 + 0.8 * index as f64 / worst.len() as f64, &mut |_| {
+            format!("near-collision {} of {}", index + 1, worst.len())
+        });
+        let FailureRecord { driven, tick, route_m, speed_mps, .. } = failure;
+        let Driven { driver, lot, trial, noise, .. } = driven;
+        let way = driven.direction.name();
+        page.text(format!("### {driver} on {lot}, {way}\n"));
+        let cause = failure.cause.name();
+        let caption = format!(
+            "Trial {trial}, noise {noise}, tick {tick}, {route_m:.1} m along the route, at {speed_mps:.2} m/s: {cause}."
+        );
+        let drawn = if progress.is_cancelled() { None } else { Some(moments::picture(&failure.replay, settings)) };
+        match drawn {
+            Some(Ok(png)) => {
+                page.figure(format!("near-collision-{index}"), caption, Image::Png(png));
+            }
+            Some(Err(error)) => {
+                page.text(format!("{caption} It could not be driven again: {error:#}."));
+            }
+            None => {
+                page.text(format!("{caption} Not drawn: the command was interrupted."));
+            }
+        }
+        page.text(format!("```\n{}\n```", visualise(&failure.replay, folder)));
+    }
+}
+
+/// The command that shows a near-collision again. Drivers that are no runs do not bring their settings along.
+fn visualise(key: &str, folder: &Path) -> String {
+    let brings_settings = key.parse::<ReplayKey>().is_ok_and(|key| key.driver.run().is_some());
+    if brings_settings {
+        return format!("cargo xtask visualise replay {key}");
+    }
+    format!("cargo xtask visualise replay {key} --config {}/settings.toml", folder.display())
+}
+
+fn configuration(sources: &Sources) -> String {
+    let manifest = &sources.manifest;
+    let mut text = "| | |\n|---|---|\n".to_owned();
+    for (name, value) in [
+        ("program", &manifest.program),
+        ("preset", &manifest.preset),
+        ("root seed", &manifest.root_seed.to_string()),
+        ("seed of the evaluation", &manifest.evaluation_seed.to_string()),
+        ("compiler", &manifest.rustc_version),
+        ("target", &manifest.target),
+        ("threads", &manifest.threads.to_string()),
+    ] {
+        let _ = writeln!(text, "| {name} | {value} |");
+    }
+    let settings = sources.settings.to_toml();
+    let _ = write!(text, "\nEvery setting (`settings.toml`):\n\n```toml\n{}\n```", settings.trim_end());
+    text
+}
+
+#[cfg(test)]
+mod tests;

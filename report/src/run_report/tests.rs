@@ -1,0 +1,76 @@
+use super::*;
+use evaluation::incidents::{Cause, Findings};
+use experiment::run_dir::MANIFEST_SCHEMA;
+use sim::scenario::Direction;
+
+fn failure(driver: &str, lot: &str, speed_mps: f32) -> FailureRecord {
+    FailureRecord {
+        driven: Driven {
+            schema: records::SCHEMA,
+            driver: driver.to_owned(),
+            lot: lot.to_owned(),
+            direction: Direction::Forward,
+            trial: 0,
+            noise: NoiseChoice::Paper,
+        },
+        tick: 10,
+        route_m: 3.0,
+        x_m: 0.0,
+        y_m: 0.0,
+        heading_deg: 0.0,
+        speed_mps,
+        cause: Cause::Corner,
+        findings: Findings {
+            passes_on_clean_grid: None,
+            reversals_before: 0,
+            free_width_m: 4.0,
+            turn_deg: 90.0,
+            since_resume_m: None,
+        },
+        replay: format!("{driver}@{lot}@forward@0@paper@1@10"),
+    }
+}
+
+#[test]
+fn the_fastest_are_the_worst_and_no_driver_fills_the_list() {
+    let mut failures: Vec<FailureRecord> = (0..9).map(|i| failure("tentacle", "lot-a", 1.0 + 0.1 * i as f32)).collect();
+    failures.push(failure("run:x", "lot-a", 0.4));
+    failures.push(failure("tentacle", "lot-b", 0.3));
+    let worst: Vec<f32> = worst(&failures).iter().map(|failure| failure.speed_mps).collect();
+    assert_eq!(worst, [1.8, 1.7, 0.4, 0.3]);
+}
+
+#[test]
+fn commands_can_be_pasted_into_a_shell() {
+    let words = ["evaluate", "--set", "training.lots=[\"lot-a\"]", "--out", "my runs/it's"];
+    let manifest = Manifest {
+        schema: MANIFEST_SCHEMA,
+        program: "lotpilot".to_owned(),
+        command_line: words.map(str::to_owned).to_vec(),
+        preset: "smoke".to_owned(),
+        root_seed: 1,
+        evaluation_seed: 1,
+        git_revision: None,
+        git_dirty: None,
+        rustc_version: String::new(),
+        threads: 1,
+        target: String::new(),
+    };
+    let expected = r#"cargo xtask evaluate --set 'training.lots=["lot-a"]' --out 'my runs/it'\''s'"#;
+    assert_eq!(command_line(&manifest), expected);
+    let runs = Path::new("runs/x");
+    assert_eq!(
+        visualise("run:runs/y@lot-a@forward@0@paper@1@5", runs),
+        "cargo xtask visualise replay run:runs/y@lot-a@forward@0@paper@1@5"
+    );
+    assert!(visualise("vvf@lot-a@forward@0@paper@1@5", runs).ends_with("--config runs/x/settings.toml"));
+}
+
+/// A near-collision of the planner that has most, found by an evaluation and driven again for its picture.
+#[test]
+fn a_near_collision_is_driven_again_to_the_tick() {
+    let settings = Settings::preset("default").unwrap();
+    let missed = moments::picture("tentacle@lot-b@forward@0@paper@1@3", &settings).unwrap_err().to_string();
+    assert!(missed.contains("it does not happen"), "{missed}");
+    assert!(moments::picture("nobody@lot-b@forward@0@paper@1@3", &settings).is_err());
+}

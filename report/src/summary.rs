@@ -1,0 +1,237 @@
+//! Tables of an evaluation as Markdown, which is readable in a terminal, too.
+
+use crate::markdown::{table_of, with_header};
+use comfy_table::Table;
+use evaluation::format::{difference, exact_rate, p_value, quoted_rate};
+use evaluation::incidents::Cause;
+use evaluation::paper::{self, PaperLot, PaperResult};
+use evaluation::slices::Slice;
+use evaluation::statistics::bootstrap::DRAWS;
+use evaluation::statistics::poisson::DISPERSION_MAX;
+use evaluation::summary::Summary;
+use experiment::run_dir::RunDir;
+use experiment::settings::{EvaluationSettings, NoiseChoice};
+use sim::scenario::Direction;
+use std::fmt::Write as _;
+
+/// Writes `summary.md`; returns its text.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write(summary: &Summary<'_>, run: &RunDir) -> anyhow::Result<String> {
+    let text = to_markdown(summary);
+    run.write("summary.md", format!("{text}\n").as_bytes())?;
+    Ok(text)
+}
+
+/// All tables.
+pub fn to_markdown(summary: &Summary<'_>) -> String {
+    let mut text = String::new();
+    for (level, noise) in summary.levels().iter().enumerate() {
+        let has_paper = *noise == NoiseChoice::Paper;
+        let _ = write!(text, "Near-collisions, noise {noise}\n\n{}\n\n", rates_table(summary, level, has_paper));
+        let _ = write!(text, "Safe ratio, noise {noise}\n\n{}\n\n", safe_ratio_table(summary, level, has_paper));
+        let _ = write!(text, "How they drove, noise {noise}\n\n{}\n\n", driving_table(summary, level));
+        if summary.plan.drivers.len() > 1 {
+            let with = summary.driver(summary.plan.compare_with);
+            let table = comparison_table(summary, level);
+            let _ = write!(text, "Compared with {with} (others − {with}), noise {noise}\n\n{table}\n\n");
+        }
+        if let Some(table) = causes_table(summary, level) {
+            let _ = write!(text, "Causes of near-collisions, noise {noise}\n\n{table}\n\n");
+        }
+    }
+    if summary.levels().len() > 1 {
+        let _ = write!(text, "Near-collisions per 100 m against noise\n\n{}\n\n", sweep_table(summary));
+    }
+    let EvaluationSettings { seed, trials, .. } = &summary.plan.settings.evaluation;
+    let _ = write!(
+        text,
+        "Trials per lot and direction: {trials}, seed: {}. Intervals of 95 %: exact Poisson, or (b) paired bootstrap \
+         ({DRAWS} draws over lot, direction, seed) where the dispersion exceeds {DISPERSION_MAX} and events cannot be \
+         taken for independent; safe ratios and differences: bootstrap; * = excludes zero; p: exact test of equal \
+         rates, and after Holm. Rates are per length of the route: for runs given up early they are too low.",
+        seed.0
+    );
+    text
+}
+
+/// The paper's rows of the lots that were driven: its own driver's, and those of its planners that took part.
+fn paper_rows<'a>(
+    summary: &'a Summary<'_>,
+) -> impl Iterator<Item = (&'static str, &'static PaperLot, &'static PaperResult)> + use<'a> {
+    let took_part = |driver: &str| (0..summary.plan.drivers.len()).any(|index| summary.driver(index) == driver);
+    let lots = paper::LOTS.iter().filter(|lot| summary.results.groups().iter().any(|group| group.name == lot.lot));
+    let drivers = (0..).zip(paper::DRIVERS).filter(move |&(index, driver)| index == 0 || took_part(driver));
+    drivers.flat_map(move |(index, driver)| lots.clone().map(move |lot| (driver, lot, &lot.results[index])))
+}
+
+fn rates_table(summary: &Summary<'_>, level: usize, has_paper: bool) -> Table {
+    let mut table = table_of(&[
+        "driver",
+        "lots",
+        "route",
+        "near-collisions (→, ←)",
+        "per 100 m [95 %]",
+        "unweighted",
+        "dispersion",
+    ]);
+    for (driver, judged, totals) in summary.estimates(level) {
+        let way = |direction| {
+            let totals = summary.results.totals(level, driver, &judged.slice, Some(direction));
+            if totals.runs == 0 { "–".to_owned() } else { totals.near_collisions.to_string() }
+        };
+        let [forward, reverse] = Direction::BOTH.map(way);
+        let estimate = &judged.estimates[driver];
+        table.add_row([
+            summary.driver(driver).to_owned(),
+            judged.slice.label.clone(),
+            format!("{:.0} m", totals.reference_m),
+            format!("{} ({forward}, {reverse})", totals.near_collisions),
+            quoted_rate(&totals, estimate),
+            unweighted(summary, level, driver, &judged.slice, 0, 2),
+            estimate.dispersion.map_or_else(|| "–".to_owned(), |dispersion| format!("{:.1}", dispersion.index)),
+        ]);
+    }
+    for (driver, lot, paper) in paper_rows(summary).filter(|_| has_paper) {
+        let [forward, reverse] = paper.near_collisions;
+        table.add_row([
+            format!("paper: {driver}"),
+            lot.lot.to_owned(),
+            format!("{:.0} m", lot.driven_m()),
+            format!("{} ({forward}, {reverse})", forward + reverse),
+            exact_rate(forward + reverse, lot.driven_m()),
+            String::new(),
+            "–".to_owned(),
+        ]);
+    }
+    table
+}
+
+fn safe_ratio_table(summary: &Summary<'_>, level: usize, has_paper: bool) -> Table {
+    let mut table = table_of(&["driver", "lots", "runs", "safe ratio [95 %]", "unweighted"]);
+    for (driver, judged, totals) in summary.estimates(level) {
+        let interval = judged.estimates[driver].safe_ratio;
+        let interval = interval.map_or_else(String::new, |i| format!(" [{:.3}, {:.3}]", i.lower, i.upper));
+        table.add_row([
+            summary.driver(driver).to_owned(),
+            judged.slice.label.clone(),
+            totals.runs.to_string(),
+            format!("{:.3}{interval}", totals.safe_ratio()),
+            unweighted(summary, level, driver, &judged.slice, 1, 3),
+        ]);
+    }
+    for (driver, lot, paper) in paper_rows(summary).filter(|_| has_paper) {
+        let ratio = format!("{:.2}", paper.safe_ratio);
+        table.add_row([format!("paper: {driver}"), lot.lot.to_owned(), "10".to_owned(), ratio, String::new()]);
+    }
+    table
+}
+
+/// The mean over lots and directions with equal weights; empty where there is nothing to weigh.
+fn unweighted(
+    summary: &Summary<'_>,
+    level: usize,
+    driver: usize,
+    slice: &Slice,
+    which: usize,
+    digits: usize,
+) -> String {
+    if slice.is_pooled() {
+        format!("{:.digits$}", summary.results.unweighted(level, driver, slice)[which])
+    } else {
+        String::new()
+    }
+}
+
+fn driving_table(summary: &Summary<'_>, level: usize) -> Table {
+    let mut table = table_of(&[
+        "driver",
+        "lots",
+        "contacts",
+        "stuck",
+        "timed out",
+        "given up",
+        "m/s",
+        "least clearance m",
+        "reversals /100 m",
+        "steering rad/100 m",
+    ]);
+    for (driver, judged, totals) in summary.estimates(level) {
+        table.add_row([
+            summary.driver(driver).to_owned(),
+            judged.slice.label.clone(),
+            totals.contacts.to_string(),
+            totals.stuck.to_string(),
+            totals.timed_out.to_string(),
+            totals.given_up.to_string(),
+            format!("{:.2}", totals.mean_speed_mps()),
+            totals.clearance_min_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2}")),
+            format!("{:.1}", totals.reversals_per_100m()),
+            format!("{:.1}", totals.effort_rad_per_100m()),
+        ]);
+    }
+    table
+}
+
+fn comparison_table(summary: &Summary<'_>, level: usize) -> Table {
+    let mut table =
+        table_of(&["driver", "lots", "Δ per 100 m [95 %]", "rate ratio [95 %]", "p", "p Holm", "Δ safe ratio [95 %]"]);
+    for driver in 0..summary.plan.drivers.len() {
+        for judged in summary.at_level(level) {
+            for comparison in judged.comparisons.iter().filter(|comparison| comparison.driver == driver) {
+                let ratio = &comparison.ratio;
+                let number = |value: Option<f64>| value.map_or_else(|| "∞".to_owned(), |value| format!("{value:.2}"));
+                table.add_row([
+                    summary.driver(driver).to_owned(),
+                    judged.slice.label.clone(),
+                    difference(comparison.difference_per_100m, 2),
+                    match ratio.ratio {
+                        Some(value) => format!("{value:.2} [{:.2}, {}]", ratio.lower, number(ratio.upper)),
+                        None => format!("– [{:.2}, {}]", ratio.lower, number(ratio.upper)),
+                    },
+                    p_value(ratio.p_value),
+                    p_value(comparison.p_holm),
+                    difference(comparison.difference_safe_ratio, 3),
+                ]);
+            }
+        }
+    }
+    table
+}
+
+fn causes_table(summary: &Summary<'_>, level: usize) -> Option<Table> {
+    let mut header = vec!["driver", "lots"];
+    header.extend(Cause::ALL.map(Cause::name));
+    header.extend(["again at the same place", "places per 100 m"]);
+    let mut table = table_of(&header);
+    for (driver, judged, totals) in summary.estimates(level).filter(|(.., totals)| totals.near_collisions > 0) {
+        let count = |cause| summary.results.count_of_cause(level, driver, &judged.slice, cause);
+        let share = |cause| format!("{:.0} %", 100.0 * f64::from(count(cause)) / f64::from(totals.near_collisions));
+        let mut row = vec![summary.driver(driver).to_owned(), judged.slice.label.clone()];
+        row.extend(Cause::ALL.map(|cause| format!("{} ({})", count(cause), share(cause))));
+        let again = summary.results.count_of_again(level, driver, &judged.slice);
+        let places = f64::from(totals.near_collisions.saturating_sub(again));
+        row.extend([again.to_string(), format!("{:.2}", 100.0 * places / totals.reference_m)]);
+        table.add_row(row);
+    }
+    (table.row_count() > 0).then_some(table)
+}
+
+fn sweep_table(summary: &Summary<'_>) -> Table {
+    let mut header = vec!["driver".to_owned(), "lots".to_owned()];
+    header.extend(summary.levels().iter().map(|noise| format!("noise {noise}")));
+    let mut table = with_header(header);
+    for driver in 0..summary.plan.drivers.len() {
+        for slice in summary.results.slices() {
+            let rate = |level| {
+                let totals = summary.results.totals(level, driver, &slice, None);
+                if totals.runs == 0 { "–".to_owned() } else { exact_rate(totals.near_collisions, totals.reference_m) }
+            };
+            let mut row = vec![summary.driver(driver).to_owned(), slice.label.clone()];
+            row.extend((0..summary.levels().len()).map(rate));
+            table.add_row(row);
+        }
+    }
+    table
+}

@@ -1,0 +1,74 @@
+//! The paper's table of DAgger iterations, from a run beside the paper's, as Markdown.
+
+use crate::markdown::with_header;
+use evaluation::table1::Table1;
+use experiment::run_dir::RunDir;
+use policy::dagger::{IterationRow, Stop};
+
+/// Writes `table1.md`; returns its text.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write(table1: &Table1, run: &RunDir) -> anyhow::Result<String> {
+    let text = to_markdown(table1);
+    run.write("table1.md", format!("{text}\n").as_bytes())?;
+    Ok(text)
+}
+
+/// A column per round.
+pub fn to_markdown(table1: &Table1) -> String {
+    let columns = table1.rows.len().max(table1.paper.dataset.len());
+    let header = std::iter::once(String::new())
+        .chain((0..columns).map(|i| if i == 0 { "BC".to_owned() } else { format!("i = {i}") }));
+    let mut table = with_header(header.collect());
+    let mut add = |name: &str, value: &dyn Fn(usize) -> Option<String>| {
+        let values = (0..columns).map(|i| value(i).unwrap_or_else(|| "–".to_owned()));
+        table.add_row(std::iter::once(name.to_owned()).chain(values).collect::<Vec<_>>());
+    };
+    let ours = |of: fn(&IterationRow) -> Option<String>| move |i: usize| table1.rows.get(i).and_then(of);
+    add("samples", &ours(|row| Some(row.samples.to_string())));
+    add("  paper", &|i| table1.paper.dataset.get(i).map(ToString::to_string));
+    add("η̂ = network / total", &ours(|row| row.eta_hat.map(|eta| format!("{eta:.3}"))));
+    add("  paper", &|i| table1.paper.eta_hat.get(i).copied().flatten().map(|eta| format!("{eta:.2}")));
+    add("samples in all", &ours(|row| Some(row.dataset.to_string())));
+    add("validation NLL", &ours(|row| row.validation_nll.map(|nll| format!("{nll:.3}"))));
+    add("validation error, m", &ours(|row| row.validation_rmse_m.map(|error| format!("{error:.3}"))));
+    add("Σ τ̂ per second", &ours(|row| row.tau_hat_per_s.map(|sum| format!("{sum:.3}"))));
+    add("near-collisions", &ours(|row| Some(row.near_collisions.to_string())));
+    let why = match table1.stop {
+        Stop::EtaReached => "η̂ passed the threshold η",
+        Stop::IterationCap => "the cap on iterations was reached",
+        Stop::Interrupted => "interrupted",
+    };
+    format!(
+        "{table}\n\nEnded: {why}. η̂ and near-collisions of a column are of the policy trained in the column before; \
+         the validation is of the policy trained in this one."
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use policy::dagger::IterationRow;
+
+    #[test]
+    fn shorter_and_longer_runs_than_the_papers_fill_up_with_dashes() {
+        let row = |round| IterationRow {
+            round,
+            samples: 100 + round as usize,
+            dataset: 1000,
+            eta_hat: (round > 0).then_some(0.5),
+            tau_hat_per_s: None,
+            near_collisions: 0,
+            validation_nll: Some(-2.0),
+            validation_rmse_m: None,
+        };
+        for (count, columns) in [(2, 6), (8, 8)] {
+            let rows: Vec<_> = (0..count).map(row).collect();
+            let text = to_markdown(&Table1::new(rows, Stop::EtaReached));
+            let lines: Vec<&str> = text.lines().take_while(|line| line.starts_with('|')).collect();
+            assert!(lines.iter().all(|line| line.matches('|').count() == columns + 2), "{text}");
+            assert!(text.contains("6425") && text.contains("101"), "{text}");
+        }
+    }
+}

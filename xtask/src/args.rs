@@ -1,0 +1,108 @@
+//! Arguments that several commands share.
+
+use clap::{Args, ValueEnum};
+use experiment::run_dir::Place;
+use experiment::settings::{Layers, NoiseChoice};
+use sim::scenario::Direction;
+use std::path::PathBuf;
+
+/// What `--noise sweep` stands for, in multiples of the level `paper`: clean to hard.
+const SWEEP: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
+
+/// Where settings come from, lowest priority first: preset, file, `--set`, then the flags of the command.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Settings")]
+pub(crate) struct LayerArgs {
+    /// Named set of settings to start from [default: default].
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
+    /// TOML file with the settings to change; the rest stays as in the preset.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Changes one setting, e.g. `dagger.eta=0.8`; may be repeated. `cargo xtask settings` lists them.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+}
+
+impl From<&LayerArgs> for Layers {
+    fn from(args: &LayerArgs) -> Self {
+        Self { preset: args.preset.clone(), file: args.config.clone(), overrides: args.overrides.clone() }
+    }
+}
+
+/// Where a run goes.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct OutArgs {
+    /// Folder of the run [default: runs/COMMAND-PRESET-sSEED, the next free one].
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Deletes what an earlier run left in `--out`.
+    #[arg(long, requires = "out")]
+    pub(crate) overwrite: bool,
+}
+
+impl OutArgs {
+    /// The folder that is asked for.
+    pub(crate) fn place<'a>(&'a self, command: &'a str, preset: &'a str, seed: u64) -> Place<'a> {
+        Place {
+            build: crate::build_info::get(),
+            out: self.out.as_deref(),
+            overwrite: self.overwrite,
+            command,
+            preset,
+            seed,
+        }
+    }
+}
+
+/// Ways a lot can be driven.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Directions {
+    /// Forward and reverse.
+    Both,
+    /// From start to finish.
+    Forward,
+    /// From finish to start.
+    Reverse,
+}
+
+impl Directions {
+    pub(crate) fn to_vec(self) -> Vec<Direction> {
+        match self {
+            Self::Both => Direction::BOTH.to_vec(),
+            Self::Forward => vec![Direction::Forward],
+            Self::Reverse => vec![Direction::Reverse],
+        }
+    }
+}
+
+/// One way to drive a lot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OneDirection {
+    /// From start to finish.
+    Forward,
+    /// From finish to start.
+    Reverse,
+}
+
+impl From<OneDirection> for Direction {
+    fn from(direction: OneDirection) -> Self {
+        match direction {
+            OneDirection::Forward => Self::Forward,
+            OneDirection::Reverse => Self::Reverse,
+        }
+    }
+}
+
+/// Noise levels as named on the command line; `sweep` stands for several.
+pub(crate) fn noise_levels(names: &[String]) -> anyhow::Result<Vec<NoiseChoice>> {
+    let mut levels = Vec::new();
+    for name in names {
+        if name == "sweep" {
+            levels.extend(SWEEP.map(NoiseChoice::Times));
+        } else {
+            levels.push(name.parse().map_err(|error| anyhow::anyhow!("--noise {name}: {error}"))?);
+        }
+    }
+    Ok(levels)
+}

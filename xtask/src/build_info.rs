@@ -1,0 +1,32 @@
+//! Which program this is, for the manifest of every run.
+
+use experiment::run_dir::Build;
+use std::path::Path;
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// Name and version, as in `--version` and manifests.
+pub(crate) const PROGRAM: &str = concat!("lotpilot ", env!("CARGO_PKG_VERSION"));
+
+/// What made this program, and how it was called.
+pub(crate) fn get() -> &'static Build {
+    static BUILD: OnceLock<Build> = OnceLock::new();
+    BUILD.get_or_init(|| {
+        let status = git(&["status", "--porcelain", "--untracked-files=no"]);
+        Build {
+            program: PROGRAM.to_owned(),
+            command_line: std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect(),
+            git_revision: git(&["rev-parse", "HEAD"]),
+            git_dirty: status.map(|changes| !changes.is_empty()),
+            rustc_version: env!("XTASK_RUSTC").to_owned(),
+        }
+    })
+}
+
+/// What git says about the checkout that this program lies in; `None` without git or checkout.
+fn git(args: &[&str]) -> Option<String> {
+    let program = std::env::current_exe().ok()?;
+    let folder = program.parent().unwrap_or(Path::new("."));
+    let output = Command::new("git").arg("-C").arg(folder).args(args).output().ok()?;
+    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}

@@ -1,0 +1,13 @@
+//! The commands, one file each: arguments → settings → call → what is printed.
+
+pub(crate) mod drivers;
+pub(crate) mod evaluate;
+pub(crate) mod generate;
+pub(crate) mod lots;
+pub(crate) mod pixel_accuracy;
+pub(crate) mod render;
+pub(crate) mod reproduce;
+pub(crate) mod sample_size;
+pub(crate) mod settings;
+pub(crate) mod train;
+pub(crate) mod tune;

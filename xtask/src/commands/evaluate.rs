@@ -1,0 +1,149 @@
+//! `evaluate`: drivers × lots × directions × trials × noise levels.
+
+use crate::args::{Directions, LayerArgs, OutArgs, noise_levels};
+use crate::console::Console;
+use anyhow::{Context as _, ensure};
+use clap::Args;
+use evaluation::plan::Plan;
+use evaluation::summary::Summary;
+use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::lots::Lot;
+use experiment::progress::{Interrupted, Progress};
+use experiment::run_dir::{self, RunDir};
+use experiment::settings::{Layers, Settings};
+use serde::Serialize;
+use sim::seed::RootSeed;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask evaluate --driver expert --lots lot-a --trials 2
+  cargo xtask evaluate --driver run:runs/train-dagger-default-s1/bc --driver run:runs/train-dagger-default-s1
+  cargo xtask evaluate --driver net:runs/train-dagger-default-s1/round-03 --lots lot-b --noise hard --out runs/hard
+  cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1 --noise sweep --lots test:100";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct EvaluateArgs {
+    /// Who drives; may be repeated. See `cargo xtask drivers`. The settings of the first `run:DIR` are used unless
+    /// `--config` or `--preset` names others.
+    #[arg(long = "driver", value_name = "SPEC", required = true, num_args = 1..)]
+    drivers: Vec<String>,
+    /// Lots to drive; see `cargo xtask lots` [default: the setting evaluation.lots].
+    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',')]
+    lots: Vec<String>,
+    /// Trials per lot and direction; each draws its own obstacles and noise.
+    #[arg(long, value_name = "N")]
+    trials: Option<u32>,
+    /// Which ways the lots are driven.
+    #[arg(long, alias = "direction")]
+    directions: Option<Directions>,
+    /// What is seen wrongly: clean, paper, hard, lot (as the lot asks for) or multiples of paper; several are compared,
+    /// `sweep` stands for 0,0.5,1,1.5,2.
+    #[arg(long, value_name = "LEVEL", num_args = 1.., value_delimiter = ',')]
+    noise: Vec<String>,
+    /// Driver the others are compared with [default: the last network, else the first driver].
+    #[arg(long, value_name = "SPEC")]
+    compare_with: Option<String>,
+    /// Seed of obstacles and noise of the trials.
+    #[arg(long)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    layers: LayerArgs,
+    #[command(flatten)]
+    out: OutArgs,
+}
+
+pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
+    let specs = DriverSpec::parse_all(&args.drivers)?;
+    let compare_with = compare_with(args, &specs)?;
+    let (mut settings, preset) = settings_for(&specs, &Layers::from(&args.layers))?;
+    override_trials(&mut settings, args)?;
+    let load = |spec: DriverSpec| spec.load(&settings.expert, settings.dagger.device);
+    let drivers: Vec<NamedDriver> = specs.into_iter().map(load).collect::<anyhow::Result<_>>()?;
+    let lots = Lot::parse_all(&settings.evaluation.lots)?;
+    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with };
+    plan.check()?;
+    let run = RunDir::create(&args.out.place("evaluate", &preset, settings.evaluation.seed.0), &settings)?;
+    let console = Console::default();
+    measure(&plan, &run, &console)?;
+    report::run_report::write(run.path(), &console)?;
+    run.finish(&Finished { drivers: args.drivers.clone() })?;
+    eprintln!(
+        "written: {}/report.html, summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl",
+        run.path().display()
+    );
+    console.report_time();
+    Ok(())
+}
+
+/// `finished.toml` of an evaluation.
+#[derive(Debug, Serialize)]
+pub(crate) struct Finished {
+    pub(crate) drivers: Vec<String>,
+}
+
+/// Drives the plan, writes and prints the tables.
+///
+/// # Errors
+/// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is written.
+pub(crate) fn measure(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<()> {
+    let evaluated = evaluation::evaluate::evaluate(plan, run, progress)?;
+    let summary = Summary::new(plan, &evaluated.results);
+    summary.write(run)?;
+    report::failures::write(run)?;
+    println!("\n{}", report::summary::write(&summary, run)?);
+    if evaluated.is_complete {
+        return Ok(());
+    }
+    Err(Interrupted { kept: format!("the runs driven so far are in {}", run.path().display()) }.into())
+}
+
+/// `--compare-with`, else the last network, else the first driver.
+fn compare_with(args: &EvaluateArgs, specs: &[DriverSpec]) -> anyhow::Result<usize> {
+    let Some(wanted) = &args.compare_with else {
+        return Ok(specs.iter().rposition(DriverSpec::is_network).unwrap_or(0));
+    };
+    let wanted: DriverSpec = wanted.parse()?;
+    let found = specs.iter().position(|spec| *spec == wanted);
+    found.with_context(|| format!("--compare-with {wanted}: name one of the drivers given with --driver"))
+}
+
+/// The settings, and the name of what they start from: `--preset` or `--config` if given, else the first run that is
+/// named as a driver, else the default preset.
+///
+/// # Errors
+/// If something named does not exist, or runs were trained with settings that differ.
+pub(crate) fn settings_for(specs: &[DriverSpec], layers: &Layers) -> anyhow::Result<(Settings, String)> {
+    let mut runs = specs.iter().filter_map(|spec| Some((spec, spec.run()?)));
+    let Some((spec, path)) = runs.next().filter(|_| !layers.names_a_base()) else {
+        return Ok((Settings::resolve(layers, None)?, layers.preset_name().to_owned()));
+    };
+    let of_run = run_dir::settings_of(path).with_context(|| format!("driver {spec}"))?;
+    for (other, path) in runs {
+        let of_other = run_dir::settings_of(path).with_context(|| format!("driver {other}"))?;
+        ensure!(
+            of_other.episode == of_run.episode,
+            "drivers {spec} and {other} were trained with different settings of episode (car, sensor, metrics), so \
+             neither run's settings are fair to both; choose with --config or --preset"
+        );
+    }
+    eprintln!("settings: those of {} (others: --config or --preset)", path.display());
+    Ok((Settings::resolve_over(&of_run, layers, None)?, "run".to_owned()))
+}
+
+fn override_trials(settings: &mut Settings, args: &EvaluateArgs) -> anyhow::Result<()> {
+    let evaluation = &mut settings.evaluation;
+    if let Some(seed) = args.seed {
+        evaluation.seed = RootSeed(seed);
+    }
+    if !args.lots.is_empty() {
+        evaluation.lots.clone_from(&args.lots);
+    }
+    evaluation.trials = args.trials.unwrap_or(evaluation.trials);
+    if let Some(directions) = args.directions {
+        evaluation.directions = directions.to_vec();
+    }
+    if !args.noise.is_empty() {
+        evaluation.noise = noise_levels(&args.noise)?;
+    }
+    settings.check()
+}

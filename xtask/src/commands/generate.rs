@@ -1,0 +1,191 @@
+//! `generate`: lots as TOML plus a top-view PNG.
+
+use crate::console::Console;
+use anyhow::{Context as _, bail, ensure};
+use clap::Args;
+use experiment::lots::Lot;
+use experiment::progress::{Interrupted, Progress as _};
+use experiment::run_dir::write_whole;
+use experiment::trials::{Purpose, Trial};
+use rayon::prelude::*;
+use report::pictures::{self, lot};
+use scenarios::import::{self, MapLot};
+use sim::map::Map;
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+use sim::vehicle::VehicleSettings;
+use std::path::{Path, PathBuf};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask generate --lots lot-a,lot-b,lot-c --out lots
+  cargo xtask generate --lots lot-a --seed 7 --count 5 --out lots
+  cargo xtask generate --lots my-map.yaml --scale 20 --start 0.4,1.2,90 --goal 3.1,0.5,-90 --out lots
+  cargo xtask generate --lots my-map.yaml --start 4,2,0 --loop --out lots";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct GenerateArgs {
+    /// Lots to write; see `cargo xtask lots`.
+    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', required = true)]
+    lots: Vec<String>,
+    /// Seed of the obstacles.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Drawings of each lot, each with its own obstacles.
+    #[arg(long, default_value_t = 1)]
+    count: u32,
+    /// Folder to write into.
+    #[arg(long, value_name = "DIR", default_value = "lots")]
+    out: PathBuf,
+    /// Pixels per metre of the pictures [default: as fits 1600 pixels].
+    #[arg(long, value_name = "PIXELS")]
+    pixels_per_metre: Option<f32>,
+    /// Replaces files of the same name.
+    #[arg(long)]
+    overwrite: bool,
+    /// Where to drive on a map.
+    #[command(flatten)]
+    map: MapArgs,
+}
+
+/// Where to drive on a ROS map (`--lots MAP.yaml`) or TPCAP case (`--lots CASE.csv`). Coordinates are those of the map;
+/// `MAP.lot.toml` can hold the same and is read first.
+#[derive(Debug, Clone, Default, PartialEq, Args)]
+#[command(next_help_heading = "Maps")]
+pub(crate) struct MapArgs {
+    /// Makes the lot this many times as large as the map.
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
+    scale: Option<f32>,
+    /// Where the rear axle starts: metres, metres, degrees counter-clockwise from x.
+    #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
+    start: Option<[f32; 3]>,
+    /// Where it is to arrive; the route there is found automatically.
+    #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
+    goal: Option<[f32; 3]>,
+    /// Instead of a goal: a route round a loop, back to the start.
+    #[arg(long = "loop", conflicts_with = "goal")]
+    is_loop: bool,
+    /// Instead of all three: CSV file with the route of the rear axle, x and y in metres.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["start", "goal", "is_loop"])]
+    centre_line: Option<PathBuf>,
+    /// Clearance that a route found automatically keeps around the body, metres in the lot [default: 0.25].
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    clearance: Option<f32>,
+}
+
+/// `X,Y,DEG`.
+fn pose(text: &str) -> Result<[f32; 3], String> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    numbers
+        .and_then(|numbers| numbers.try_into().ok())
+        .ok_or_else(|| "write x,y,degrees, e.g. 3.5,-2,90, without spaces".to_owned())
+}
+
+/// Lots made at a time; between two batches Ctrl-C is looked at.
+const BATCH: usize = 8;
+
+pub(crate) fn run(args: &GenerateArgs) -> anyhow::Result<()> {
+    ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
+    ensure!(args.count > 0, "--count is 0; at least one is needed");
+    let lots = lots(args)?;
+    let fixed = lots.iter().find(|lot| !lot.is_drawn_per_trial());
+    ensure!(
+        args.count == 1 || fixed.is_none(),
+        "--count {}: only the reference lots have other obstacles in every trial, {:?} has not; for several generated \
+         lots write --lots train:{0}",
+        args.count,
+        fixed.map_or("", Lot::name)
+    );
+    std::fs::create_dir_all(&args.out)
+        .with_context(|| format!("{}: cannot be created; choose another --out", args.out.display()))?;
+    let trials: Vec<Trial<'_>> =
+        Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, args.count, &[Direction::Forward]).collect();
+    let console = Console::default();
+    console.begin("generating", "generating");
+    let mut made = Vec::new();
+    for batch in trials.chunks(BATCH) {
+        if console.is_cancelled() {
+            let kept = format!("{} of {} lots are in {}", made.len(), trials.len(), args.out.display());
+            return Err(Interrupted { kept }.into());
+        }
+        let written = batch.par_iter().map(|trial| write(args, trial)).collect::<anyhow::Result<Vec<Made>>>()?;
+        for lot in &written {
+            println!("{}", lot.line);
+        }
+        made.extend(written);
+        console.at(made.len() as f64 / trials.len() as f64, &mut |_| format!("{} lots", made.len()));
+    }
+    console.end(&format!("{} lots", made.len()));
+    let attempts: Vec<u32> = made.iter().filter_map(|made| made.attempts).collect();
+    if !attempts.is_empty() {
+        let drawn: u32 = attempts.iter().sum();
+        let rejected = drawn - attempts.len() as u32;
+        println!(
+            "generator: {rejected} of {drawn} draws rejected ({:.1} %)",
+            100.0 * f64::from(rejected) / f64::from(drawn)
+        );
+    }
+    Ok(())
+}
+
+/// The lots named; of a map with the route the command line asks for.
+fn lots(args: &GenerateArgs) -> anyhow::Result<Vec<Lot>> {
+    let MapArgs { scale, start, goal, is_loop, centre_line, clearance } = &args.map;
+    if args.map == MapArgs::default() {
+        return Lot::parse_all(&args.lots);
+    }
+    let [path] = args.lots.as_slice() else {
+        bail!("--scale, --start and the like are about one map, and {} lots are named; name one", args.lots.len());
+    };
+    let path = Path::new(path);
+    ensure!(
+        import::is_map(path),
+        "--scale, --start and the like are about maps, and {} is none; name a .yaml (ROS) or .csv (TPCAP) file",
+        path.display()
+    );
+    let mut lot = MapLot::read(path)?;
+    lot.scale = scale.unwrap_or(lot.scale);
+    lot.clearance_m = clearance.unwrap_or(lot.clearance_m);
+    lot.start = start.or(lot.start);
+    if goal.is_some() || *is_loop || centre_line.is_some() {
+        (lot.goal, lot.is_loop, lot.centre_line) = (*goal, *is_loop, centre_line.clone());
+    }
+    Ok(vec![Lot::of_map(path, &lot)?])
+}
+
+struct Made {
+    attempts: Option<u32>,
+    line: String,
+}
+
+fn write(args: &GenerateArgs, trial: &Trial<'_>) -> anyhow::Result<Made> {
+    let name = match (trial.lot.is_drawn_per_trial(), args.count) {
+        (false, _) => trial.lot.name().to_owned(),
+        (true, 1) => format!("{}-s{}", trial.lot.name(), args.seed),
+        (true, _) => format!("{}-s{}-{}", trial.lot.name(), args.seed, trial.index + 1),
+    };
+    let name = pictures::file_name(&name);
+    let [toml, png] = ["toml", "png"].map(|extension| args.out.join(format!("{name}.{extension}")));
+    for path in [&toml, &png] {
+        ensure!(
+            args.overwrite || !path.exists(),
+            "{}: exists already; choose another --out or --seed, or replace it with --overwrite",
+            path.display()
+        );
+    }
+    let mut drawn = trial.lot.draw(trial.seed);
+    // The file is a lot of its own, told apart from its siblings in tables.
+    drawn.scenario.name.clone_from(&name);
+    let vehicle = VehicleSettings::hyundai_hg300();
+    let text = scenarios::load::to_toml(&drawn.scenario);
+    let map = Map::build(drawn.scenario, &vehicle).with_context(|| name.clone())?;
+    write_whole(&png, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?.to_png()?)?;
+    write_whole(&toml, text.as_bytes())?;
+    let (length_m, obstacles) = (map.path().length_m(), map.scenario().obstacles.len());
+    // A route found for one way need not leave room at its finish to start back from there.
+    let back = Map::build(map.scenario().clone().reversed(), &vehicle);
+    let ways =
+        back.err().map_or(String::new(), |error| format!("; --directions forward only: on the way back, {error}"));
+    let line = format!("{} and .png: route {length_m:.1} m, {obstacles} obstacles{ways}", toml.display());
+    Ok(Made { attempts: drawn.attempts, line })
+}

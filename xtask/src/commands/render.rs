@@ -1,0 +1,387 @@
+//! `render`: pictures of lots, drives, samples and noise.
+
+use super::evaluate;
+use crate::args::{LayerArgs, OneDirection, noise_levels};
+use crate::console::Console;
+use anyhow::{Context as _, ensure};
+use clap::{Args, Subcommand, ValueEnum};
+use experiment::drive::Replay;
+use experiment::drivers::{self, DriverSpec};
+use experiment::lots::Lot;
+use experiment::progress::Progress as _;
+use experiment::replay_key::ReplayKey;
+use experiment::run_dir::{self, write_whole};
+use experiment::settings::{Layers, NoiseChoice, Settings};
+use experiment::training;
+use experiment::trials::{Purpose, Trial};
+use policy::checkpoint::Checkpoint;
+use policy::dagger::GatedCollector;
+use policy::dataset::store::Store;
+use policy::network::Predictor;
+use rayon::prelude::*;
+use report::pictures::drawing::Drawing;
+use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
+use report::pictures::{contact_sheet, file_name, lot, noise, samples};
+use report::run_report;
+use sim::batch::run_lockstep;
+use sim::map::Map;
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+use sim::sensing::Inspection;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask render lot --lots lot-a,test:2
+  cargo xtask render contact-sheet --lots train:6:easy,train:6,train:6:hard
+  cargo xtask render trajectories --driver expert --driver run:runs/NAME --lots lot-b
+  cargo xtask render trajectories --driver expert --lots lot-a --by speed
+  cargo xtask render trajectories --run runs/NAME --round 1
+  cargo xtask render samples runs/NAME/round-01 --count 8
+  cargo xtask render noise --lots lot-a --noise paper,hard
+  cargo xtask render report runs/NAME";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RenderArgs {
+    /// What is drawn.
+    #[command(subcommand)]
+    what: RenderWhat,
+    /// Folder to write into.
+    #[arg(long, global = true, value_name = "DIR", default_value = "pictures")]
+    out: PathBuf,
+    /// Replaces files of the same name.
+    #[arg(long, global = true)]
+    overwrite: bool,
+}
+
+/// What is drawn.
+#[derive(Debug, Clone, Subcommand)]
+pub(crate) enum RenderWhat {
+    /// Lots from above, PNG and SVG.
+    Lot(RenderLotArgs),
+    /// The lines drivers drove over a lot, PNG and SVG.
+    Trajectories(TrajectoriesArgs),
+    /// Many lots on one page, PNG and SVG.
+    ContactSheet(RenderLotArgs),
+    /// Samples of a round's data set with labels and predictions, PNG.
+    Samples(SamplesArgs),
+    /// What each noise layer makes wrong in one view, PNG.
+    Noise(RenderNoiseArgs),
+    /// The report of a run anew, into its folder.
+    Report(RenderReportArgs),
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RenderReportArgs {
+    /// Folder of a training or an evaluation.
+    #[arg(value_name = "RUN")]
+    run: PathBuf,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RenderLotArgs {
+    /// Lots to draw; see `cargo xtask lots`.
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', required = true)]
+    lots: Vec<String>,
+    /// Seed of the obstacles.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Pixels per metre of single lots [default: as fits 1600 pixels].
+    #[arg(long, value_name = "PIXELS")]
+    pixels_per_metre: Option<f32>,
+}
+
+/// What colours mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ColourChoice {
+    /// How fast.
+    Speed,
+    /// Which driver.
+    Driver,
+    /// Expert or network.
+    Who,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct TrajectoriesArgs {
+    /// Who drives, as in an evaluation; may be repeated. See `cargo xtask drivers`.
+    #[arg(long = "driver", value_name = "SPEC", num_args = 1.., required_unless_present = "run")]
+    drivers: Vec<String>,
+    /// Instead: a drive of a training run, network and expert in turn as the decision rule chose.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["drivers", "lot", "direction", "noise", "seed", "preset", "config", "overrides"])]
+    run: Option<PathBuf>,
+    /// Round of the training run; 0 = behaviour cloning.
+    #[arg(long, default_value_t = 1, requires = "run")]
+    round: u32,
+    /// Lot to drive; see `cargo xtask lots`.
+    #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
+    lot: String,
+    /// Which way.
+    #[arg(long = "directions", alias = "direction", default_value = "forward")]
+    direction: OneDirection,
+    /// Which trial: obstacles and noise; of a training run, which of its drives.
+    #[arg(long, default_value_t = 0)]
+    trial: u32,
+    /// What is seen wrongly: clean, paper, hard, lot or a multiple of paper.
+    #[arg(long, value_name = "LEVEL", default_value = "paper")]
+    noise: String,
+    /// Seed of obstacles and noise of the trials.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// What colours mean [default: driver; of a training run, who].
+    #[arg(long)]
+    by: Option<ColourChoice>,
+    /// Pixels per metre [default: as fits 1600 pixels].
+    #[arg(long, value_name = "PIXELS")]
+    pixels_per_metre: Option<f32>,
+    #[command(flatten)]
+    layers: LayerArgs,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SamplesArgs {
+    /// Folder of the round, e.g. runs/NAME/round-01.
+    #[arg(value_name = "ROUND")]
+    round: PathBuf,
+    /// Samples to draw, evenly spaced over the round.
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    count: usize,
+    /// Folder of the network that predicts [default: the one trained after the round, if it is there].
+    #[arg(long, value_name = "DIR")]
+    net: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RenderNoiseArgs {
+    /// Lot to look at; see `cargo xtask lots`.
+    #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
+    lot: String,
+    /// Noise levels: paper, hard or multiples of paper.
+    #[arg(long, value_name = "LEVEL", num_args = 1.., value_delimiter = ',', default_value = "paper,hard")]
+    noise: Vec<NoiseChoice>,
+    /// Where the rear axle stands, metres along the route [default: where most layers of the last level show].
+    #[arg(long, value_name = "METRES")]
+    at: Option<f32>,
+    /// Seed of obstacles and noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
+    let output = Output { folder: &args.out, overwrite: args.overwrite };
+    match &args.what {
+        RenderWhat::Lot(what) => render_lots(what, &output),
+        RenderWhat::ContactSheet(what) => contact_sheet(what, &output),
+        RenderWhat::Trajectories(what) => render_trajectories(what, &output),
+        RenderWhat::Samples(what) => render_samples(what, &output),
+        RenderWhat::Noise(what) => render_noise(what, &output),
+        RenderWhat::Report(what) => render_report(&what.run),
+    }
+}
+
+/// Where pictures go.
+struct Output<'a> {
+    folder: &'a Path,
+    overwrite: bool,
+}
+
+impl Output<'_> {
+    /// Writes a picture as PNG, and as SVG where it is made of lines.
+    fn write(&self, name: &str, drawing: &Drawing, is_vector: bool) -> anyhow::Result<()> {
+        let folder = self.folder;
+        std::fs::create_dir_all(folder)
+            .with_context(|| format!("{}: cannot be created; choose another --out", folder.display()))?;
+        let name = file_name(name);
+        let mut files = vec![(folder.join(format!("{name}.png")), drawing.to_png()?)];
+        if is_vector {
+            files.push((folder.join(format!("{name}.svg")), drawing.to_svg().into_bytes()));
+        }
+        for (path, content) in files {
+            ensure!(
+                self.overwrite || !path.exists(),
+                "{}: exists already; choose another --out, or replace it with --overwrite",
+                path.display()
+            );
+            write_whole(&path, &content)?;
+            println!("{}: {} kB", path.display(), content.len().div_ceil(1000));
+        }
+        Ok(())
+    }
+}
+
+fn maps(args: &RenderLotArgs) -> anyhow::Result<Vec<Map>> {
+    let lots = Lot::parse_all(&args.lots)?;
+    let trials: Vec<Trial<'_>> =
+        Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).collect();
+    let episode = Settings::preset("default")?.episode;
+    let console = Console::default();
+    console.begin("lots", "drawing lots");
+    let maps = trials.par_iter().map(|trial| trial.map(&episode)).collect::<anyhow::Result<Vec<Map>>>()?;
+    console.end(&format!("{} lots", maps.len()));
+    Ok(maps)
+}
+
+fn render_lots(args: &RenderLotArgs, output: &Output<'_>) -> anyhow::Result<()> {
+    ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
+    let vehicle = Settings::preset("default")?.episode.vehicle;
+    for map in maps(args)? {
+        output.write(&map.scenario().name, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?, true)?;
+    }
+    Ok(())
+}
+
+fn contact_sheet(args: &RenderLotArgs, output: &Output<'_>) -> anyhow::Result<()> {
+    output.write("contact-sheet", &contact_sheet::picture(&maps(args)?)?, true)
+}
+
+fn render_trajectories(args: &TrajectoriesArgs, output: &Output<'_>) -> anyhow::Result<()> {
+    ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
+    let (map, driven, name) = match &args.run {
+        Some(run) => driven_in_training(run, args)?,
+        None => driven_anew(args)?,
+    };
+    let by = match args.by.unwrap_or(if args.run.is_some() { ColourChoice::Who } else { ColourChoice::Driver }) {
+        ColourChoice::Speed => ColourBy::Speed,
+        ColourChoice::Driver => ColourBy::Driver,
+        ColourChoice::Who => ColourBy::Source,
+    };
+    output.write(
+        &format!("drive-{name}"),
+        &trajectories::picture(&map, &driven, by, &name, args.pixels_per_metre)?,
+        true,
+    )
+}
+
+type Drives = (Arc<Map>, Vec<Trajectory>, String);
+
+/// One drive per driver, all on the same obstacles and noise as in an evaluation.
+fn driven_anew(args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
+    let specs = DriverSpec::parse_all(&args.drivers)?;
+    let (mut settings, _) = evaluate::settings_for(&specs, &Layers::from(&args.layers))?;
+    settings.evaluation.seed = args.seed.map_or(settings.evaluation.seed, RootSeed);
+    let levels = noise_levels(std::slice::from_ref(&args.noise))?;
+    let [noise] = levels[..] else { anyhow::bail!("--noise {}: name one level", args.noise) };
+    let key = |driver: &DriverSpec| ReplayKey {
+        driver: driver.clone(),
+        lot: args.lot.clone(),
+        direction: args.direction.into(),
+        trial: args.trial,
+        noise,
+        seed: settings.evaluation.seed,
+        tick: 0,
+    };
+    let replay = Replay::new(&key(&specs[0]), &settings.episode)?;
+    let console = Console::default();
+    let mut driven = Vec::new();
+    for spec in specs {
+        let driver = spec.load(&settings.expert, settings.dagger.device)?;
+        driver.check(&settings.episode)?;
+        console.begin("driving", &driver.name);
+        let length_m = replay.map.path().length_m();
+        let mut points = Vec::new();
+        let report = replay.drive(&settings.episode, &driver, |frame| {
+            points.push(Point::of(frame));
+            console.at(f64::from(frame.progress_m / length_m), &mut |_| format!("{} ticks", points.len()));
+            ControlFlow::Continue(())
+        });
+        let near_collisions = report.map_or(0, |report| report.metrics.near_collisions);
+        console.end(&format!("near-collisions: {near_collisions} in {length_m:.0} m"));
+        driven.push(Trajectory { name: driver.name, points });
+    }
+    let name = format!("{} {} trial {}", replay.lot.name(), Direction::from(args.direction).name(), args.trial);
+    Ok((Arc::clone(&replay.map), driven, name))
+}
+
+/// A drive of a training round: the network of the round before and the expert, as in the training itself.
+fn driven_in_training(run: &Path, args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
+    let settings = run_dir::settings_of(run)?;
+    let lots = Lot::parse_all(&settings.training.lots)?;
+    let mut episodes = training::episodes_of(&settings, &lots, args.round)?;
+    let count = episodes.len();
+    ensure!((args.trial as usize) < count, "--trial {}: a round has {count} drives, counted from 0", args.trial);
+    let episode = episodes.swap_remove(args.trial as usize);
+    let map = Arc::clone(episode.map());
+    let novice = args.round.checked_sub(1).map(|before| run.join(format!("round-{before:02}")));
+    let novice = novice.map(|folder| Checkpoint::load(&folder)).transpose()?;
+    let novice = novice.map(|checkpoint| Predictor::new(checkpoint.weights, settings.dagger.device));
+    let jitter = u64::from(args.round) << 20 | u64::from(args.trial);
+    let expert = drivers::expert(&settings.expert, &settings.episode).with_jitter_seed(settings.seed, jitter);
+    let dagger = &settings.dagger;
+    let mut collector = GatedCollector::new(novice, vec![Box::new(expert)], dagger.rule, dagger.keep, dagger.geometry);
+    let name = format!("{} round {} drive {}", map.scenario().name, args.round, args.trial);
+    let length_m = map.path().length_m();
+    let console = Console::default();
+    console.begin("driving", "training");
+    let mut points = Vec::new();
+    let reports = run_lockstep(vec![episode], &mut collector, &mut |_, frame| {
+        points.push(Point::of(frame));
+        console.at(f64::from(frame.progress_m / length_m), &mut |_| format!("{} ticks", points.len()));
+    });
+    console.end(&format!("near-collisions: {} in {length_m:.0} m", reports[0].metrics.near_collisions));
+    Ok((map, vec![Trajectory { name: "training".to_owned(), points }], name))
+}
+
+fn render_samples(args: &SamplesArgs, output: &Output<'_>) -> anyhow::Result<()> {
+    ensure!(args.count > 0, "--count is 0; at least one is needed");
+    let name = args.round.file_name().unwrap_or_default().to_string_lossy();
+    let index = name.strip_prefix("round-").and_then(|index| index.parse().ok());
+    let (Some(index), Some(run)) = (index, args.round.parent()) else {
+        anyhow::bail!("{}: this is no round; name one, as in runs/NAME/round-01", args.round.display());
+    };
+    // Opening a store creates its folder.
+    ensure!(args.round.is_dir(), "{}: there is no such round", args.round.display());
+    let kept = Store::open(run)?.read_samples(index)?;
+    let settings = run_dir::settings_of(run)?;
+    let folder = args.net.as_deref().unwrap_or(&args.round);
+    let checkpoint =
+        (args.net.is_some() || Checkpoint::exists(folder)).then(|| Checkpoint::load(folder)).transpose()?;
+    let count = args.count.min(kept.len());
+    let chosen: Vec<usize> = (0..count).map(|i| (2 * i + 1) * kept.len() / (2 * count)).collect();
+    let grids: Vec<_> = chosen.iter().map(|&i| &kept[i].grid).collect();
+    let answers =
+        checkpoint.map(|checkpoint| Predictor::new(checkpoint.weights, settings.dagger.device).predict(&grids));
+    let samples: Vec<_> = chosen
+        .iter()
+        .enumerate()
+        .map(|(place, &i)| (i, kept[i], answers.as_ref().map(|answers| answers[place])))
+        .collect();
+    let title = format!("{name}: {count} of {} samples", kept.len());
+    output.write(&format!("samples-{name}"), &samples::picture(&title, &samples, &settings.dagger.geometry)?, false)
+}
+
+fn render_noise(args: &RenderNoiseArgs, output: &Output<'_>) -> anyhow::Result<()> {
+    let lots = Lot::parse_all(std::slice::from_ref(&args.lot))?;
+    let trial = Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next();
+    let (Some(trial), 1, Some(&last)) = (trial, lots.len(), args.noise.last()) else {
+        anyhow::bail!("{:?} stands for {} lots; name one", args.lot, lots.len());
+    };
+    let settings = Settings::preset("default")?;
+    let map = trial.map(&settings.episode)?;
+    let inspect = |level: NoiseChoice, at_m: f32| noise::inspect(&settings.episode, &trial, &map, level, at_m);
+    let at_m = match args.at {
+        Some(at_m) => at_m,
+        None => noise::richest_place(map.path().length_m(), |at_m| inspect(last, at_m)),
+    };
+    ensure!(
+        (0.0..=map.path().length_m()).contains(&at_m),
+        "--at {at_m}: the route is {:.1} m long",
+        map.path().length_m()
+    );
+    let levels: Vec<(String, Inspection)> =
+        args.noise.iter().map(|&noise| (noise.name(), inspect(noise, at_m))).collect();
+    let title = format!("{}, {at_m:.1} m along the route, seed {}", trial.lot.name(), args.seed);
+    output.write(&format!("noise-{}", trial.lot.name()), &noise::picture(&title, &levels)?, false)
+}
+
+fn render_report(run: &Path) -> anyhow::Result<()> {
+    ensure!(
+        run.join("settings.toml").is_file(),
+        "{}: this is no run; name a folder that train-dagger, train-bc or evaluate made",
+        run.display()
+    );
+    run_report::write(run, &Console::default())?;
+    println!("{}", run.join(run_report::FILE).display());
+    Ok(())
+}

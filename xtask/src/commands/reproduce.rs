@@ -1,0 +1,238 @@
+//! `reproduce`: the paper in a box. Trains, drives and writes one report; every stage has a folder of its own and is
+//! skipped where it is finished already.
+
+use super::{evaluate, train};
+use crate::args::{LayerArgs, OutArgs};
+use crate::build_info;
+use crate::console::Console;
+use anyhow::{Context as _, ensure};
+use clap::Args;
+use evaluation::conclusions;
+use evaluation::on_policy;
+use evaluation::plan::Plan;
+use evaluation::stages::{self, Extent, Stage, Step};
+use experiment::drivers::{self, DriverSpec};
+use experiment::lots::Lot;
+use experiment::progress::{Interrupted, Progress as _};
+use experiment::run_dir::{self, Place, RunDir};
+use experiment::settings::{Layers, Settings};
+use report::reproduction::{self, Recipe};
+use serde::Serialize;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask reproduce                               half an hour on two cores
+  cargo xtask reproduce --preset smoke --out runs/try   every stage within a minute
+  cargo xtask reproduce --full --unseen test:50
+  cargo xtask reproduce --resume runs/reproduce-default-s1";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ReproduceArgs {
+    #[command(flatten)]
+    layers: LayerArgs,
+    /// Root seed of the first training.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Five training seeds, twice the trials, more unseen lots, longer ablations.
+    #[arg(long)]
+    full: bool,
+    /// Lots that no driver has met; see `cargo xtask lots` [default: test:20; test:100 with --full].
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',')]
+    unseen: Vec<String>,
+    /// Folder of `cargo xtask tune`: planners also drive with the parameters found there [default: those in planners/tuned].
+    #[arg(long, value_name = "DIR")]
+    tuned: Option<PathBuf>,
+    #[command(flatten)]
+    out: OutArgs,
+    /// Continues an interrupted run with its own settings, to the same result; finished stages are skipped.
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all = ["preset", "config", "overrides", "seed", "out", "full", "unseen", "tuned"]
+    )]
+    resume: Option<PathBuf>,
+}
+
+const EXTENT: &str = "reproduce.toml";
+/// Trainings of `--full`.
+const SEEDS_FULL: u64 = 5;
+
+pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
+    let (run, settings, extent) = if let Some(path) = &args.resume { resume(path)? } else { begin(args)? };
+    let stages = stages::all(&settings, &extent, run.path());
+    let recipe = Recipe { settings, extent, stages };
+    eprintln!("run: {}", run.path().display());
+    announce(&recipe.stages, run.path());
+    let console = Console::default();
+    for (index, stage) in recipe.stages.iter().enumerate() {
+        eprintln!("\n{} of {}: {} ({})", index + 1, recipe.stages.len(), stage.about, stage.folder);
+        let is_done = if console.is_cancelled() { Ok(false) } else { perform(stage, run.path(), &console) };
+        match is_done {
+            Ok(true) => {}
+            Ok(false) => return Err(cut_short(run.path(), index)),
+            Err(error) if error.is::<Interrupted>() => return Err(cut_short(run.path(), index)),
+            Err(error) => return Err(error.context(format!("stage {}", stage.folder))),
+        }
+    }
+    let conclusions = reproduction::write(&recipe, &run)?;
+    println!("\nWhat holds here\n\n{conclusions}");
+    run.finish(&Finished { stages: recipe.stages.len() })?;
+    eprintln!("written: {}/report.html, report.md, conclusions.csv and figures/", run.path().display());
+    console.report_time();
+    Ok(())
+}
+
+fn cut_short(root: &Path, finished: usize) -> anyhow::Error {
+    let root = root.display();
+    let kept = format!("{finished} finished stages are in {root}; go on with: cargo xtask reproduce --resume {root}");
+    Interrupted { kept }.into()
+}
+
+fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
+    let layers = Layers::from(&args.layers);
+    let mut settings = Settings::resolve(&layers, args.seed)?;
+    let is_smoke = layers.preset_name() == "smoke";
+    if args.full {
+        settings.evaluation.trials *= 2;
+    }
+    let unseen = match &args.unseen[..] {
+        [] if args.full => vec!["test:100".to_owned()],
+        [] if is_smoke => vec!["test:1:easy".to_owned()],
+        [] => vec!["test:20".to_owned()],
+        named => named.to_vec(),
+    };
+    let extent = Extent {
+        seeds: if args.full { SEEDS_FULL } else { 1 },
+        unseen,
+        rule_iterations: if args.full { settings.dagger.iterations_max } else { 1 },
+        tuned: tuned(args.tuned.as_deref())?,
+    };
+    // Before the folder is claimed: a misspelt lot should not leave one behind.
+    for lots in [&settings.training.lots, &settings.evaluation.lots, &extent.unseen] {
+        Lot::parse_all(lots)?;
+    }
+    let trained_on = Lot::parse_all(&settings.training.lots)?;
+    for lot in Lot::parse_all(&extent.unseen)? {
+        let is_unseen = !lot.is_for_training() && trained_on.iter().all(|known| known.name() != lot.name());
+        ensure!(is_unseen, "--unseen {}: drivers are trained or tuned on it; name others, e.g. test:20", lot.name());
+    }
+    ensure!(
+        settings.seed.0.checked_add(extent.seeds).is_some_and(|last| i64::try_from(last).is_ok()),
+        "seed {} leaves no room for {} trainings; choose a smaller one",
+        settings.seed.0,
+        extent.seeds
+    );
+    let command = if args.full { "reproduce-full" } else { "reproduce" };
+    let place = args.out.place(command, layers.preset_name(), settings.seed.0);
+    let run = RunDir::create(&place, &settings)?;
+    run.write(EXTENT, toml::to_string(&extent)?.as_bytes())?;
+    Ok((run, settings, extent))
+}
+
+fn resume(path: &Path) -> anyhow::Result<(RunDir, Settings, Extent)> {
+    let (run, settings) = RunDir::resume(path)?;
+    let file = path.join(EXTENT);
+    let text = fs::read_to_string(&file).with_context(|| {
+        format!("{}: cannot be read; only a folder of cargo xtask reproduce can be resumed", file.display())
+    })?;
+    let extent = toml::from_str(&text).with_context(|| file.display().to_string())?;
+    Ok((run, settings, extent))
+}
+
+/// Planners with tuned parameters: those of a folder that `tune` wrote, else those that ship with the program.
+fn tuned(folder: Option<&Path>) -> anyhow::Result<Vec<String>> {
+    let Some(folder) = folder else {
+        return Ok(drivers::tuned_specs());
+    };
+    let specs: Vec<String> = planners::Baseline::all()
+        .iter()
+        .map(|planner| (planner.name(), folder.join(format!("{}.toml", planner.name()))))
+        .filter(|(_, file)| file.is_file())
+        .map(|(name, file)| format!("{name}:{}", file.display()))
+        .collect();
+    ensure!(!specs.is_empty(), "--tuned {}: no parameters are there; cargo xtask tune writes them", folder.display());
+    DriverSpec::parse_all(&specs)?;
+    Ok(specs)
+}
+
+/// What will be done, with a guess at how long it takes.
+fn announce(stages: &[Stage], root: &Path) {
+    let mut left_s = 0.0;
+    eprintln!("stages, with the minutes they take on two quiet cores:");
+    for (index, stage) in stages.iter().enumerate() {
+        let is_finished = run_dir::is_finished(&root.join(&stage.folder));
+        let estimate_s = if is_finished { 0.0 } else { stage.estimate_s() };
+        left_s += estimate_s;
+        let minutes = if is_finished { "done".to_owned() } else { format!("{:.1}", estimate_s / 60.0) };
+        eprintln!("{:>3}. {minutes:>6}  {} ({})", index + 1, stage.about, stage.folder);
+    }
+    eprintln!("about {:.0} minutes in all", (left_s / 60.0).ceil());
+}
+
+/// Does a stage unless it is done; `false` if cut short by Ctrl-C.
+fn perform(stage: &Stage, root: &Path, console: &Console) -> anyhow::Result<bool> {
+    let path = root.join(&stage.folder);
+    let settings = &stage.settings;
+    let build = build_info::get();
+    let place =
+        Place { build, out: None, overwrite: false, command: "reproduce", preset: "reproduce", seed: settings.seed.0 };
+    let Some(run) = RunDir::stage(&path, &place, settings)? else {
+        eprintln!("done before");
+        return Ok(true);
+    };
+    match &stage.step {
+        Step::Train { cloning_of } => {
+            if let Some(chain) = cloning_of {
+                take_over_cloning(&root.join(chain), &path)?;
+            }
+            let Ok((_, finished)) = train::tabulated(settings, &run, console)? else { return Ok(false) };
+            run.finish(&finished)?;
+        }
+        Step::Drive { drivers } => {
+            let specs = drivers.iter().map(|(_, spec)| spec.clone()).collect();
+            let (drivers, lots) = (stages::load(drivers, settings)?, Lot::parse_all(&settings.evaluation.lots)?);
+            let compare_with = conclusions::compare_with(&drivers);
+            let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with };
+            plan.check()?;
+            evaluate::measure(&plan, &run, console)?;
+            run.finish(&evaluate::Finished { drivers: specs })?;
+        }
+        Step::OnPolicy => {
+            if !on_policy::run(settings, root, &run, console)? {
+                return Ok(false);
+            }
+            run.finish(&evaluate::Finished { drivers: Vec::new() })?;
+        }
+    }
+    Ok(true)
+}
+
+/// `finished.toml` of a reproduction.
+#[derive(Serialize)]
+struct Finished {
+    stages: usize,
+}
+
+/// Copies behaviour cloning from a finished chain: complete or not at all.
+fn take_over_cloning(from: &Path, to: &Path) -> anyhow::Result<()> {
+    const ROUND: &str = "round-00";
+    let (source, target) = (from.join(ROUND), to.join(ROUND));
+    if target.exists() {
+        return Ok(());
+    }
+    let partial: PathBuf = to.join("round-00.partial");
+    let copy = || {
+        if partial.exists() {
+            fs::remove_dir_all(&partial)?;
+        }
+        fs::create_dir_all(&partial)?;
+        for entry in fs::read_dir(&source)? {
+            let entry = entry?;
+            fs::copy(entry.path(), partial.join(entry.file_name()))?;
+        }
+        fs::rename(&partial, &target)
+    };
+    copy().with_context(|| format!("{}: cannot be copied to {}", source.display(), target.display()))
+}

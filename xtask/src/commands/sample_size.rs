@@ -1,0 +1,72 @@
+//! `sample-size`: how far must be driven.
+
+use anyhow::ensure;
+use clap::Args;
+use evaluation::statistics::sample_size::{Question, to_bound};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask sample-size --below 0.1                      no event within these metres shows less than 0.1 per 100 m
+  cargo xtask sample-size --between 1.4,0.5                to tell two drivers apart
+  cargo xtask sample-size --between 1.4,1.2 --power 0.9 --dispersion 2";
+
+/// Rates are near-collisions per 100 m.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct SampleSizeArgs {
+    /// A rate to be shown as not reached, by a run without an event.
+    #[arg(long, value_name = "RATE", required_unless_present = "between")]
+    below: Option<f64>,
+    /// Two rates to be told apart.
+    #[arg(long, value_name = "RATE,RATE", value_parser = two_rates)]
+    between: Option<[f64; 2]>,
+    /// Probability of seeing a difference that is there.
+    #[arg(long, default_value_t = 0.8)]
+    power: f64,
+    /// Confidence: one-sided for `--below`, two-sided for `--between`.
+    #[arg(long, default_value_t = 0.95)]
+    confidence: f64,
+    /// Variance over mean of the counts, as printed by `evaluate`; 1 = independent events.
+    #[arg(long, default_value_t = 1.0)]
+    dispersion: f64,
+}
+
+fn two_rates(text: &str) -> Result<[f64; 2], String> {
+    let rates = text.split_once(',').and_then(|(a, b)| Some([a.trim().parse().ok()?, b.trim().parse().ok()?]));
+    rates.ok_or_else(|| "two numbers with a comma between them are needed, as in 1.4,0.5".to_owned())
+}
+
+pub(crate) fn run(args: &SampleSizeArgs) -> anyhow::Result<()> {
+    for (flag, probability) in [("--power", args.power), ("--confidence", args.confidence)] {
+        ensure!(probability > 0.0 && probability < 1.0, "{flag} {probability} is no probability between 0 and 1");
+    }
+    let dispersion = args.dispersion;
+    ensure!((1.0..=1e3).contains(&dispersion), "--dispersion {dispersion} is not within 1 (independent events) … 1000");
+    let percent = 100.0 * args.confidence;
+    if let Some(rate) = args.below {
+        check(&[rate], "--below")?;
+        ensure!(rate > 0.0, "--below 0: no distance shows that a rate is zero; name a rate that would be good enough");
+        println!(
+            "{:.0} m without a near-collision show a rate below {rate} per 100 m ({percent} %, one-sided)",
+            to_bound(rate, args.confidence)
+        );
+    }
+    if let Some([a, b]) = args.between {
+        check(&[a, b], "--between")?;
+        ensure!(a != b, "--between {a},{b}: equal rates cannot be told apart");
+        let question = Question { per_100m: [a, b], power: args.power, alpha: 1.0 - args.confidence, dispersion };
+        println!(
+            "{:.0} m per driver tell {a} from {b} per 100 m in {} % of all evaluations (exact test, {percent} %, \
+             dispersion {dispersion})",
+            question.metres_each(),
+            100.0 * args.power
+        );
+    }
+    Ok(())
+}
+
+fn check(rates: &[f64], flag: &str) -> anyhow::Result<()> {
+    for &rate in rates {
+        ensure!((0.0..=1e3).contains(&rate), "{flag} {rate}: a rate is a number of events per 100 m within 0 … 1000");
+    }
+    Ok(())
+}

@@ -1,0 +1,144 @@
+//! `train-bc` and `train-dagger`.
+
+use super::evaluate;
+use crate::args::{LayerArgs, OutArgs};
+use crate::console::Console;
+use anyhow::Context as _;
+use clap::Args;
+use evaluation::plan::Plan;
+use evaluation::table1::Table1;
+use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::lots::Lot;
+use experiment::progress::{Interrupted, Progress};
+use experiment::run_dir::RunDir;
+use experiment::settings::{Layers, Settings};
+use experiment::training;
+use policy::checkpoint::Checkpoint;
+use policy::dagger::Stop;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+pub(crate) const DAGGER_EXAMPLES: &str = "\
+Examples:
+  cargo xtask train-dagger --seed 2
+  cargo xtask train-dagger --set dagger.eta=0.85 --set dagger.fit_iteration.budget.steps=2000
+  cargo xtask train-dagger --set training.lots='[\"lot-a\", \"lot-c\"]' --no-eval
+  cargo xtask train-dagger --resume runs/train-dagger-default-s1";
+
+pub(crate) const BC_EXAMPLES: &str = "\
+Examples:
+  cargo xtask train-bc --seed 2
+  cargo xtask train-bc --set training.trials=1 --no-eval
+  cargo xtask evaluate --driver run:runs/train-bc-default-s1 --lots test:10";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct TrainArgs {
+    #[command(flatten)]
+    layers: LayerArgs,
+    /// Root seed of training data, weights and shuffling.
+    #[arg(long)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    out: OutArgs,
+    /// Continues an interrupted run with its own settings, to the same result.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "config", "overrides", "seed", "out"])]
+    resume: Option<PathBuf>,
+    /// Trains only: no closed-loop check at the end.
+    #[arg(long)]
+    no_eval: bool,
+}
+
+/// Behaviour cloning alone: DAgger without an iteration.
+pub(crate) fn bc(args: &TrainArgs) -> anyhow::Result<()> {
+    train(args, "train-bc", |settings| {
+        settings.dagger.iterations_max = 0;
+        settings.dagger.iterations_min = 0;
+    })
+}
+
+pub(crate) fn dagger(args: &TrainArgs) -> anyhow::Result<()> {
+    train(args, "train-dagger", |_| {})
+}
+
+fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) -> anyhow::Result<()> {
+    let (run, settings) = if let Some(path) = &args.resume {
+        RunDir::resume(path)?
+    } else {
+        let layers = Layers::from(&args.layers);
+        let mut settings = Settings::resolve(&layers, args.seed)?;
+        adjust(&mut settings);
+        // Before the folder is claimed: a misspelt lot should not leave one behind.
+        Lot::parse_all(&settings.training.lots)?;
+        Lot::parse_all(&settings.evaluation.lots)?;
+        let place = args.out.place(command, layers.preset_name(), settings.seed.0);
+        (RunDir::create(&place, &settings)?, settings)
+    };
+    eprintln!("run: {}", run.path().display());
+
+    let console = Console::default();
+    let (policy, finished) = tabulated(&settings, &run, &console)?.map_err(|rounds| cut_short(run.path(), rounds))?;
+    if !args.no_eval {
+        let drivers = drivers(&settings, &run, policy, finished.rounds)?;
+        let lots = Lot::parse_all(&settings.evaluation.lots)?;
+        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: drivers.len() - 1 };
+        plan.check()?;
+        evaluate::measure(&plan, &run, &console)?;
+    }
+    report::run_report::write(run.path(), &console)?;
+    run.finish(&finished)?;
+    print_next_steps(run.path());
+    console.report_time();
+    Ok(())
+}
+
+/// Trains, prints and writes the paper's table. The inner error of a training cut short is the number of rounds that
+/// were finished.
+pub(crate) fn tabulated(
+    settings: &Settings,
+    run: &RunDir,
+    progress: &dyn Progress,
+) -> anyhow::Result<Result<(Checkpoint, Finished), usize>> {
+    let outcome = training::train(settings, run, progress)?;
+    let table1 = Table1::new(outcome.rows, outcome.stop);
+    table1.write(run)?;
+    println!("\nDAgger iterations\n\n{}", report::table1::write(&table1, run)?);
+    let rounds = table1.rows.len();
+    let (Stop::EtaReached | Stop::IterationCap, Some(policy)) = (outcome.stop, outcome.policy) else {
+        return Ok(Err(rounds));
+    };
+    Ok(Ok((policy, Finished { stop: outcome.stop, rounds })))
+}
+
+/// How a training ended: `finished.toml`.
+#[derive(Debug, Serialize)]
+pub(crate) struct Finished {
+    stop: Stop,
+    rounds: usize,
+}
+
+fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
+    let path = path.display();
+    let kept = format!("{rounds} finished rounds are in {path}; go on with: cargo xtask train-dagger --resume {path}");
+    Interrupted { kept }.into()
+}
+
+/// Expert, behaviour cloning and what became of it.
+fn drivers(settings: &Settings, run: &RunDir, policy: Checkpoint, rounds: usize) -> anyhow::Result<Vec<NamedDriver>> {
+    let device = settings.dagger.device;
+    let cloned = Checkpoint::load(&run.path().join("round-00")).context("behaviour cloning of this run")?;
+    let spec = |folder: PathBuf| DriverSpec::Run { folder };
+    let mut drivers = vec![
+        NamedDriver::expert(&settings.expert),
+        NamedDriver::network("BC", spec(run.path().join("bc")), cloned, device),
+    ];
+    if rounds > 1 {
+        drivers.push(NamedDriver::network("DAgger", spec(run.path().to_owned()), policy, device));
+    }
+    Ok(drivers)
+}
+
+fn print_next_steps(path: &Path) {
+    let path = path.display();
+    println!("\nPolicy: {path} (the last round; model.safetensors opens in PyTorch)");
+    println!("Next:   cargo xtask evaluate --driver run:{path} --seed 2");
+}

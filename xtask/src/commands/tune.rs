@@ -1,0 +1,81 @@
+//! `tune`: parameters of the model-based planners.
+
+use crate::args::{LayerArgs, OutArgs};
+use crate::console::Console;
+use anyhow::ensure;
+use clap::Args;
+use evaluation::tune;
+use experiment::lots::Lot;
+use experiment::progress::Interrupted;
+use experiment::run_dir::RunDir;
+use experiment::settings::{Layers, NoiseChoice, Settings};
+use serde::Serialize;
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask tune
+  cargo xtask tune --planner vvf --budget 128 --out runs/tune-vvf
+  cargo xtask evaluate --driver vvf --driver vvf:runs/tune-default-s1/vvf.toml";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct TuneArgs {
+    /// Planners to tune [default: all].
+    #[arg(long = "planner", value_name = "NAME", num_args = 1.., value_delimiter = ',')]
+    planners: Vec<String>,
+    /// Lots to tune on: lot-a and generated training lots only.
+    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "lot-a,train:4")]
+    lots: Vec<String>,
+    /// Candidates per planner, its own parameters included.
+    #[arg(long, value_name = "N", default_value_t = 48)]
+    budget: u32,
+    /// Trials per lot and direction that every candidate drives; the best few drive as many fresh ones again.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    trials: u32,
+    /// Seed of candidates, obstacles and noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// What is seen wrongly.
+    #[arg(long, value_name = "LEVEL", default_value = "paper")]
+    noise: NoiseChoice,
+    #[command(flatten)]
+    layers: LayerArgs,
+    #[command(flatten)]
+    out: OutArgs,
+}
+
+/// `finished.toml` of a tuning.
+#[derive(Serialize)]
+struct Finished {
+    planners: Vec<&'static str>,
+}
+
+pub(crate) fn run(args: &TuneArgs) -> anyhow::Result<()> {
+    let layers = Layers::from(&args.layers);
+    let mut settings = Settings::resolve(&layers, None)?;
+    // Written into the folder, so that it says what was driven.
+    settings.evaluation.seed = RootSeed(args.seed);
+    settings.evaluation.lots.clone_from(&args.lots);
+    settings.evaluation.trials = args.trials;
+    settings.evaluation.directions = Direction::BOTH.to_vec();
+    settings.evaluation.noise = vec![args.noise];
+    settings.check()?;
+    ensure!(args.budget > 0, "--budget is 0; at least the starting point must be driven");
+    let planners = tune::planners_named(&args.planners)?;
+    tune::check(&Lot::parse_all(&args.lots)?)?;
+    let run = RunDir::create(&args.out.place("tune", layers.preset_name(), args.seed), &settings)?;
+    let console = Console::default();
+    let tuned = tune::tune(&settings, &planners, args.budget as usize, &run, &console)?;
+    if tuned.len() < planners.len() {
+        let kept = format!("{} of {} planners are tuned in {}", tuned.len(), planners.len(), run.path().display());
+        return Err(Interrupted { kept }.into());
+    }
+    let table = report::tuning::table(&tuned);
+    println!("\n{table}");
+    run.write("tuning.md", format!("{table}\n").as_bytes())?;
+    run.finish(&Finished { planners: tuned.iter().map(|found| found.planner.name()).collect() })?;
+    eprintln!("written: {}/*.toml; drive one with --driver NAME:{0}/NAME.toml", run.path().display());
+    console.report_time();
+    Ok(())
+}
