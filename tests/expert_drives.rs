@@ -2,7 +2,8 @@
 
 use expert::{ExpertSettings, ScriptedExpert};
 use scenarios::reference::{ReferenceLot, lot};
-use sim::episode::{self, Ending, Episode, EpisodeSettings};
+use sim::episode::{self, Episode, EpisodeSettings};
+use sim::frame::Ending;
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -42,7 +43,8 @@ fn the_expert_drives_the_example_maps_without_a_near_collision() {
         ("car-park-centre.lot.toml", &Direction::BOTH),
         ("open-lot.csv", &[Direction::Forward]),
     ] {
-        let scenario = scenarios::load::load(&examples.join(file)).unwrap_or_else(|error| panic!("{error}"));
+        let scenario =
+            scenarios::load::load(&examples.join(file), &settings.vehicle).unwrap_or_else(|error| panic!("{error}"));
         for &direction in directions {
             let map = Arc::new(Map::build(direction.of(scenario.clone()), &settings.vehicle).unwrap());
             let mut expert = ScriptedExpert::new(ExpertSettings::paper(), &settings.vehicle, settings.sensing.geometry);

@@ -16,6 +16,7 @@ mod commands;
 mod determinism;
 mod expert_drives;
 mod formats;
+mod import_graph;
 mod planners;
 mod reproduce;
 mod tidy;

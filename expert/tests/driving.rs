@@ -3,7 +3,8 @@
 use expert::{ExpertSettings, ExpertStats, ScriptedExpert, Sees};
 use proptest::prelude::*;
 use sim::driver::{Driver, GroundTruth, LookAheadPoint, Situation};
-use sim::episode::{Ending, Episode, EpisodeReport, EpisodeSettings};
+use sim::episode::{Episode, EpisodeReport, EpisodeSettings};
+use sim::frame::Ending;
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::scenario::{Direction, LotNoise, Obstacle, ObstacleClass, ReferencePath, Scenario};

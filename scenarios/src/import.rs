@@ -5,16 +5,18 @@
 //! shows them; `scale` then enlarges the whole about (0, 0), so that a map of a small robot's world fits a car.
 
 mod contour;
+mod ground;
 mod ros;
 mod tpcap;
 
-use crate::load::LoadError;
+use crate::error::{LoadError, read_text};
 use crate::solver;
 use crate::solver::route::{self, Finish, NoRoute};
+use ground::Ground;
 use serde::Deserialize;
 use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
-use sim::scenario::{Island, LotNoise, Obstacle, Place, ReferencePath, Scenario, ScenarioError};
+use sim::scenario::{Island, LotNoise, Place, ReferencePath, Scenario, ScenarioError};
 use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
@@ -78,13 +80,6 @@ enum Source {
     Case(tpcap::Case),
 }
 
-/// What a map gives.
-struct Ground {
-    boundary: Vec<Vec2>,
-    islands: Vec<Vec<Vec2>>,
-    obstacles: Vec<Obstacle>,
-}
-
 impl MapLot {
     /// Reads a `NAME.lot.toml`; of a map, the `NAME.lot.toml` beside it, if there is one.
     ///
@@ -92,7 +87,7 @@ impl MapLot {
     /// If the file cannot be read or says something else.
     pub fn read(path: &Path) -> Result<Self, LoadError> {
         if !is_map(path) {
-            return Self::parse(&crate::load::read_text(path)?, path);
+            return Self::parse(&read_text(path)?, path);
         }
         let beside = path.with_extension("lot.toml");
         if !beside.is_file() {
@@ -136,11 +131,11 @@ impl MapLot {
         Ok(lot)
     }
 
-    /// The lot, checked: it can be driven from its start to its finish.
+    /// The lot, checked: a vehicle can drive it from its start to its finish.
     ///
     /// # Errors
     /// The first thing wrong with it, with file, place and remedy.
-    pub fn scenario(&self) -> Result<Scenario, LoadError> {
+    pub fn scenario(&self, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
         self.check()?;
         let is_case = self.map.extension().is_some_and(|extension| extension == "csv");
         let source =
@@ -158,7 +153,9 @@ impl MapLot {
         };
         let ground = match &source {
             Source::Case(case) => case.ground(self.scale),
-            Source::Map(map) => self.ros_ground(map, seed, goal.map(|goal| self.pose_in_lot(goal).position()))?,
+            Source::Map(map) => {
+                self.ros_ground(map, seed, goal.map(|goal| self.pose_in_lot(goal).position()), vehicle)?
+            }
         };
         let mut scenario = Scenario {
             name: self.name(),
@@ -169,18 +166,18 @@ impl MapLot {
             obstacles: ground.obstacles,
             speed_bumps: Vec::new(),
         };
-        validate_ground(&scenario).map_err(|error| self.in_lot(error))?;
+        validate_ground(&scenario, vehicle).map_err(|error| self.in_lot(error))?;
         scenario.reference_path = match (centre_line, start) {
-            (Some(points), _) => self.checked_centre_line(points, &scenario)?,
+            (Some(points), _) => self.checked_centre_line(points, &scenario, vehicle)?,
             (None, Some(start)) => {
                 let start = self.pose_in_lot(start);
                 let finish = goal.map_or(Finish::Start, |goal| Finish::At(self.pose_in_lot(goal)));
-                route::find(&scenario, start, finish, &vehicle(), self.clearance_m)
-                    .map_err(|reason| self.no_route(reason, start, finish))?
+                route::find(&scenario, start, finish, vehicle, self.clearance_m)
+                    .map_err(|reason| self.no_route(reason, start, finish, vehicle))?
             }
             (None, None) => return Err(self.nothing_to_drive()),
         };
-        validate(&scenario, &vehicle()).map_err(|error| self.in_lot(error))?;
+        validate(&scenario, vehicle).map_err(|error| self.in_lot(error))?;
         Ok(scenario)
     }
 
@@ -218,7 +215,13 @@ impl MapLot {
     }
 
     /// The outlines of the drivable pixels around the seed, in the lot, as simple as they can be and stay sound.
-    fn ros_ground(&self, map: &ros::Map, seed: Vec2, goal: Option<Vec2>) -> Result<Ground, LoadError> {
+    fn ros_ground(
+        &self,
+        map: &ros::Map,
+        seed: Vec2,
+        goal: Option<Vec2>,
+        vehicle: &VehicleSettings,
+    ) -> Result<Ground, LoadError> {
         let place = if self.centre_line.is_some() { "centre_line, point 1" } else { "start" };
         let mut pixels = Vec::new();
         for (place, point) in [(place, Some(seed)), ("goal", goal)] {
@@ -253,7 +256,7 @@ impl MapLot {
                 islands: inner.iter().zip(&steps[1..]).map(|(ring, &step)| outline(ring, step)).collect(),
                 obstacles: Vec::new(),
             };
-            let Err(error) = validate_ground(&outlines_only(&ground)) else {
+            let Err(error) = validate_ground(&outlines_only(&ground), vehicle) else {
                 return Ok(ground);
             };
             // The outline at fault is followed more closely; if it is exact already, so is the boundary.
@@ -271,7 +274,7 @@ impl MapLot {
     /// The points of a CSV file, in the lot.
     fn read_centre_line(&self, file: &Path) -> Result<Vec<Vec2>, LoadError> {
         let name = file.display().to_string();
-        let text = crate::load::read_text(file)?;
+        let text = read_text(file)?;
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -316,7 +319,12 @@ impl MapLot {
     }
 
     /// The car must find room along the whole line: half its width to either side.
-    fn checked_centre_line(&self, points: Vec<Vec2>, ground: &Scenario) -> Result<ReferencePath, LoadError> {
+    fn checked_centre_line(
+        &self,
+        points: Vec<Vec2>,
+        ground: &Scenario,
+        vehicle: &VehicleSettings,
+    ) -> Result<ReferencePath, LoadError> {
         let mut room = DistanceField::of_boundary(&ground.boundary);
         for island in &ground.islands {
             room.carve_polygon(&island.polygon);
@@ -326,7 +334,7 @@ impl MapLot {
         }
         let line = ReferencePath { points, corner_radius_m: CENTRE_LINE_RADIUS_M };
         let path = sim::path::Path::new(&line);
-        let half_width_m = 0.5 * vehicle().width_m;
+        let half_width_m = 0.5 * vehicle.width_m;
         for (i, pose) in path.poses().iter().enumerate() {
             let room_m = room.at(pose.position());
             if room_m >= half_width_m {
@@ -387,12 +395,11 @@ impl MapLot {
         self.fault("route", "the map does not say where to drive".to_owned(), &remedy)
     }
 
-    fn no_route(&self, reason: NoRoute, start: Pose, finish: Finish) -> LoadError {
-        let car = vehicle();
+    fn no_route(&self, reason: NoRoute, start: Pose, finish: Finish, car: &VehicleSettings) -> LoadError {
         let clearance_m = self.clearance_m;
         let blocked = |place: &str, pose: Pose| {
             let problem = format!(
-                "the car ({} m × {} m, and {clearance_m} m around it) does not stand free at {}",
+                "the car ({:.2} m × {:.2} m, and {clearance_m} m around it) does not stand free at {}",
                 car.length_m,
                 car.width_m,
                 self.in_map(pose.position())
@@ -427,7 +434,7 @@ impl MapLot {
                     "no drive forwards was found: it got to {}, about {to_go_m:.0} m of the lot before the goal. The car \
                      does not reverse, and turns with a radius of {:.1} m or more",
                     self.in_map(reached),
-                    route::radius_min_m(&car)
+                    route::radius_min_m(car)
                 );
                 let remedy = "widen the map there, turn or move start and goal, enlarge the lot with scale, or lower \
                               clearance_m";
@@ -437,17 +444,13 @@ impl MapLot {
     }
 }
 
-fn vehicle() -> VehicleSettings {
-    VehicleSettings::hyundai_hg300()
-}
-
 fn kerbed(polygon: Vec<Vec2>) -> Island {
     Island { polygon, height_m: 0.15 }
 }
 
 /// Checks a scenario that has no route yet. Everything else is checked before the route.
-fn validate_ground(scenario: &Scenario) -> Result<(), ScenarioError> {
-    match validate(scenario, &vehicle()) {
+fn validate_ground(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), ScenarioError> {
+    match validate(scenario, vehicle) {
         Err(ScenarioError { place: Place::ReferencePath(_), .. }) => Ok(()),
         other => other,
     }

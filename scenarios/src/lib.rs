@@ -14,6 +14,7 @@
 
 pub mod clutter;
 pub mod corridor;
+mod error;
 pub mod generator;
 pub mod import;
 pub mod load;
@@ -21,10 +22,12 @@ pub mod reference;
 pub mod solver;
 pub mod split;
 
-use load::LoadError;
+pub use error::{LoadError, Location};
+
 use reference::ReferenceLot;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
+use sim::vehicle::VehicleSettings;
 use split::{Difficulty, Split};
 use std::path::PathBuf;
 
@@ -70,17 +73,19 @@ pub enum LotSpec {
 }
 
 impl LotSpec {
-    /// The lot as it stands in one trial. Methods that are compared get the same trial seeds, hence the same lots.
+    /// The lot in one trial. Methods that are compared get the same trial seeds, hence the same lots.
+    ///
+    /// Generated lots do not depend on the vehicle: their rules are made for the paper's.
     ///
     /// # Errors
-    /// Only for files: what is wrong with it.
-    pub fn scenario(&self, trial_seed: RootSeed) -> Result<Scenario, LoadError> {
+    /// Only for files: what is wrong with them, among it that the vehicle does not fit.
+    pub fn scenario(&self, trial_seed: RootSeed, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
         match self {
             Self::Reference(lot) => Ok(reference::lot(*lot, trial_seed)),
             Self::Generated { split, difficulty, index } => {
                 Ok(generator::generate(*split, *index, *difficulty).scenario)
             }
-            Self::File(path) => load::load(path),
+            Self::File(path) => load::load(path, vehicle),
         }
     }
 }
@@ -236,8 +241,10 @@ mod tests {
     /// Reference lots change with the trial, others do not; every lot carries the name it was asked for by.
     #[test]
     fn a_trial_seed_re_draws_reference_lots_only() {
-        let draw =
-            |name: &str, seed| name.parse::<LotSpec>().expect("a lot").scenario(RootSeed(seed)).expect("a scenario");
+        let vehicle = VehicleSettings::hyundai_hg300();
+        let draw = |name: &str, seed| {
+            name.parse::<LotSpec>().expect("a lot").scenario(RootSeed(seed), &vehicle).expect("a scenario")
+        };
         assert_ne!(draw("lot-b", 1).obstacles, draw("lot-b", 2).obstacles);
         assert_eq!(draw("lot-b", 1), draw("lot-b", 1));
         assert_eq!(draw("test-easy-3", 1), draw("test-easy-3", 2));

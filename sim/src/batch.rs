@@ -1,7 +1,8 @@
 //! Many episodes at a time.
 
 use crate::driver::{Decision, Fleet};
-use crate::episode::{Episode, EpisodeReport, Frame};
+use crate::episode::{Episode, EpisodeReport};
+use crate::frame::Frame;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 

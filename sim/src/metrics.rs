@@ -3,7 +3,7 @@
 use crate::collision::ObstacleSet;
 use crate::distance_field::{DistanceField, change_max_m};
 use crate::driver::Source;
-use crate::episode::{Event, Frame};
+use crate::frame::{Event, Frame};
 use crate::geometry::{Pose, Vec2, WorldFromEgo, distance_to_segment, edges, polygon_contains};
 use crate::vehicle::VehicleSettings;
 use serde::{Deserialize, Serialize};

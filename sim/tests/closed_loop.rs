@@ -3,7 +3,8 @@
 
 use sim::batch::run_lockstep_until;
 use sim::driver::{Decision, Driver, LookAheadPoint, OneDriverEach, Situation, Source};
-use sim::episode::{self, Ending, Episode, EpisodeSettings, Event, Frame};
+use sim::episode::{self, Episode, EpisodeSettings};
+use sim::frame::{Ending, Event, Frame};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::scenario::{LotNoise, NoiseLevel, Obstacle, ObstacleClass, ReferencePath, Scenario};

@@ -8,6 +8,7 @@ use scenarios::reference::ReferenceLot;
 use scenarios::split::Split;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
+use sim::vehicle::VehicleSettings;
 use std::path::Path;
 
 /// A lot, before a trial has drawn its obstacles.
@@ -62,7 +63,7 @@ impl Lot {
 
     fn new(spec: LotSpec) -> anyhow::Result<Self> {
         let from_file = match &spec {
-            LotSpec::File(path) => Some(scenarios::load::load(path)?),
+            LotSpec::File(path) => Some(scenarios::load::load(path, &VehicleSettings::hyundai_hg300())?),
             LotSpec::Reference(_) | LotSpec::Generated { .. } => None,
         };
         let name = from_file.as_ref().map_or_else(|| spec.to_string(), |scenario| scenario.name.clone());
@@ -74,7 +75,7 @@ impl Lot {
     /// # Errors
     /// If no lot can be made of it.
     pub fn of_map(path: &Path, lot: &MapLot) -> anyhow::Result<Self> {
-        let scenario = lot.scenario()?;
+        let scenario = lot.scenario(&VehicleSettings::hyundai_hg300())?;
         Ok(Self { name: scenario.name.clone(), spec: LotSpec::File(path.to_owned()), from_file: Some(scenario) })
     }
 
@@ -141,7 +142,9 @@ impl Lot {
                 Drawn { scenario: generated.scenario, attempts: Some(generated.attempts) }
             }
             (None, spec) => {
-                let scenario = spec.scenario(trial).expect("only files can be wrong, and they are read already");
+                let scenario = spec
+                    .scenario(trial, &VehicleSettings::hyundai_hg300())
+                    .expect("only files can be wrong, and they are read already");
                 Drawn { scenario, attempts: None }
             }
         }

@@ -9,7 +9,8 @@ use crate::summary::{Comparison, DriverEstimate, EvaluationResults, Slice, Total
 use crate::trials::Trial;
 use comfy_table::{Table, presets};
 use serde::Serialize;
-use sim::episode::{Ending, EpisodeReport};
+use sim::episode::EpisodeReport;
+use sim::frame::Ending;
 use sim::scenario::Direction;
 use statistics::bootstrap::{DRAWS, Interval};
 use statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};

@@ -11,7 +11,7 @@ use crate::settings::Settings;
 use crate::trials::{self, Purpose, Trial};
 use anyhow::{Context as _, ensure};
 use sim::batch::run_lockstep_until;
-use sim::episode::{Event, Frame};
+use sim::frame::{Event, Frame};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::sensing::noise::Layer;

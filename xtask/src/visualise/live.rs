@@ -9,7 +9,8 @@ use anyhow::Context as _;
 use policy::dagger::Progress;
 use policy::drivers::NetPolicy;
 use protocol::{Message, Sink};
-use sim::episode::{Episode, Frame};
+use sim::episode::Episode;
+use sim::frame::Frame;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

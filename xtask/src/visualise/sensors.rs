@@ -1,7 +1,8 @@
 //! What the sensor showed, beside what it should have shown.
 
 use protocol::{Mark, Picture, Shape};
-use sim::episode::{Episode, Frame};
+use sim::episode::Episode;
+use sim::frame::Frame;
 use sim::map::Map;
 use sim::sensing::noise::Layer;
 use sim::sensing::{BEV_PIXELS, GRID_CELLS, Sensor};

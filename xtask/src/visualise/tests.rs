@@ -4,7 +4,7 @@ use crate::drivers;
 use planners::explanation::Explanation;
 use protocol::{Clock, Dot, Moments, Pose, Strip};
 use sim::driver::Driver;
-use sim::episode::{Event, Frame};
+use sim::frame::{Event, Frame};
 use sim::vehicle::VehicleSettings;
 use std::collections::{BTreeMap, BTreeSet};
 
