@@ -21,7 +21,7 @@ use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
 
-/// Corners of a centre line are rounded with this radius, metres, as those of the reference lots (methods.md 11).
+/// Corners of a centre line are rounded with this radius, metres, as those of the reference lots (docs/methods.md 11).
 const CENTRE_LINE_RADIUS_M: f32 = 5.0;
 /// Points of a centre line nearer than this count as one, metres in the lot.
 const SAME_POINT_M: f32 = 0.01;
@@ -157,15 +157,8 @@ impl MapLot {
                 self.ros_ground(map, seed, goal.map(|goal| self.pose_in_lot(goal).position()), vehicle)?
             }
         };
-        let mut scenario = Scenario {
-            name: self.name(),
-            boundary: ground.boundary,
-            reference_path: ReferencePath { points: Vec::new(), corner_radius_m: 0.0 },
-            noise: self.noise.clone(),
-            islands: ground.islands.into_iter().map(kerbed).collect(),
-            obstacles: ground.obstacles,
-            speed_bumps: Vec::new(),
-        };
+        let mut scenario = outlines(self.name(), &ground).with_obstacles(ground.obstacles);
+        scenario.noise = self.noise.clone();
         validate_ground(&scenario, vehicle).map_err(|error| self.in_lot(error))?;
         scenario.reference_path = match (centre_line, start) {
             (Some(points), _) => self.checked_centre_line(points, &scenario, vehicle)?,
@@ -256,7 +249,7 @@ impl MapLot {
                 islands: inner.iter().zip(&steps[1..]).map(|(ring, &step)| outline(ring, step)).collect(),
                 obstacles: Vec::new(),
             };
-            let Err(error) = validate_ground(&outlines_only(&ground), vehicle) else {
+            let Err(error) = validate_ground(&outlines(self.name(), &ground), vehicle) else {
                 return Ok(ground);
             };
             // The outline at fault is followed more closely; if it is exact already, so is the boundary.
@@ -456,17 +449,10 @@ fn validate_ground(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(),
     }
 }
 
-/// A scenario without a route, for the check of its outlines.
-fn outlines_only(ground: &Ground) -> Scenario {
-    Scenario {
-        name: "map".to_owned(),
-        boundary: ground.boundary.clone(),
-        reference_path: ReferencePath { points: Vec::new(), corner_radius_m: 0.0 },
-        noise: LotNoise::default(),
-        islands: ground.islands.iter().cloned().map(kerbed).collect(),
-        obstacles: Vec::new(),
-        speed_bumps: Vec::new(),
-    }
+/// Boundary and islands of a scenario that has no route yet.
+fn outlines(name: String, ground: &Ground) -> Scenario {
+    let islands = ground.islands.iter().cloned().map(kerbed).collect();
+    Scenario { islands, ..Scenario::new(name, ground.boundary.iter().copied(), [Vec2::ZERO; 0]) }
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ pub struct LookAheadPoint {
 
 impl LookAheadPoint {
     /// Image fractions `[u, w]` of the bird's-eye view: u 0 = left … 1 = right, w 0 = far … 1 = near
-    /// (methods.md 0; the paper's a_x and a_y). Not clipped.
+    /// (docs/methods.md 0; the paper's a_x and a_y). Not clipped.
     pub fn to_image_fraction(self, geometry: &GridGeometry) -> [f32; 2] {
         [0.5 - self.left_m / geometry.side_m, 1.0 - (self.ahead_m - geometry.near_edge_ahead_m) / geometry.side_m]
     }

@@ -117,7 +117,7 @@ pub struct Episode {
     touches: bool,
     observation: Observation,
     was_reset: bool,
-    tally: MetricsAccumulator,
+    metrics: MetricsAccumulator,
     events: Vec<(u32, Event)>,
     ending: Option<Ending>,
 }
@@ -147,7 +147,7 @@ impl Episode {
             touches: false,
             observation: Observation::default(),
             was_reset: true,
-            tally: MetricsAccumulator::new(map.path().length_m()),
+            metrics: MetricsAccumulator::new(map.path().length_m()),
             events: Vec::new(),
             ending: None,
             settings,
@@ -275,7 +275,7 @@ impl Episode {
         self.progress_m = self.map.path().project_near(self.vehicle.pose.position(), self.progress_m, 5.0, 5.0);
         self.judge_progress(&mut frame);
         frame.time_s = self.physics_step as f32 * settings.physics_step_s();
-        self.tally.frame(&frame);
+        self.metrics.frame(&frame);
         if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
             self.events.push((frame.tick, frame.event));
         }
@@ -287,7 +287,7 @@ impl Episode {
     pub fn report(&self) -> EpisodeReport {
         EpisodeReport {
             ending: self.ending.unwrap_or(Ending::TimedOut),
-            metrics: self.tally.metrics(),
+            metrics: self.metrics.metrics(),
             events: self.events.clone(),
         }
     }

@@ -45,7 +45,7 @@ impl Pose {
 
     /// The pose after `travel_m` along an arc of curvature `curvature_per_m` (exact; negative travel drives back).
     ///
-    /// `x += (sin(θ+Δθ) − sin θ)/κ`, `y −= (cos(θ+Δθ) − cos θ)/κ` (methods.md 2.2), written with half angles so
+    /// `x += (sin(θ+Δθ) − sin θ)/κ`, `y −= (cos(θ+Δθ) − cos θ)/κ` (docs/methods.md 2.2), written with half angles so
     /// that it stays accurate as κ → 0.
     #[must_use]
     pub fn advanced_along_arc(self, curvature_per_m: f32, travel_m: f32) -> Self {

@@ -210,7 +210,7 @@ fn with_parameters(baseline: &Baseline, text: &str) -> anyhow::Result<Baseline> 
 
 /// A fresh expert.
 pub fn expert(settings: &Settings) -> ScriptedExpert {
-    ScriptedExpert::new(settings.expert.clone(), &settings.episode.vehicle, settings.episode.sensing.geometry)
+    ScriptedExpert::new(settings.expert.clone(), &settings.episode)
 }
 
 /// A driver per car, asked in parallel: each answers for its own car alone, so the order does not matter.

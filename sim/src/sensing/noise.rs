@@ -1,8 +1,8 @@
-//! Perception errors (methods.md 10): errors belong to places, so every layer is anchored in the world and is a pure
+//! Perception errors (docs/methods.md 10): errors belong to places, so every layer is anchored in the world and is a pure
 //! function of (seed, place, tick). A shadow stays where it is while the car drives by, whoever drives.
 //!
 //! The paper names the types (shadows, ragged boundaries, misrecognition); sizes and rates are chosen, and calibrated
-//! so that about 98 % of the pixels are right (`cargo xtask pixel-accuracy`). Where methods.md 10 asks for AR(1)
+//! so that about 98 % of the pixels are right (`cargo xtask pixel-accuracy`). Where docs/methods.md 10 asks for AR(1)
 //! processes per tick we use value noise in time with the same correlation time: it needs no state, so a frame can be
 //! recomputed alone and every driver meets the same noise.
 
@@ -60,7 +60,7 @@ impl NoiseSettings {
     }
 }
 
-// Constants of level `paper`, from the table of methods.md 10 unless said otherwise. With that table's wobble and
+// Constants of level `paper`, from the table of docs/methods.md 10 unless said otherwise. With that table's wobble and
 // shadows only 96.3 % of the pixels are right (`pixel-accuracy`, lot a, seed 1: wobble alone costs 1.9 %, shadows
 // 1.5 %); both are halved here to meet the paper's 98 %.
 /// Static boundary wobble: standard deviation and correlation length, metres.

@@ -1,7 +1,7 @@
 //! Convex polygons laid over the view, and the ground hidden behind tall things.
 //!
 //! The label image was warped by a ground homography (paper), so a thing of height h at ground range r smears away
-//! from the camera to r·H/(H − h), and to infinity for h ≥ H (methods.md 1.7).
+//! from the camera to r·H/(H − h), and to infinity for h ≥ H (docs/methods.md 1.7).
 
 use super::quadtree::pixels_of;
 use super::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid};

@@ -24,9 +24,9 @@ use std::ops::Range;
 pub struct SensingSettings {
     /// Where the patch lies.
     pub geometry: GridGeometry,
-    /// Whether tall things hide the ground behind them (methods.md 1.7).
+    /// Whether tall things hide the ground behind them (docs/methods.md 1.7).
     pub occlusion: bool,
-    /// Camera ahead of the rear axle, metres (methods.md 9.2).
+    /// Camera ahead of the rear axle, metres (docs/methods.md 9.2).
     pub camera_ahead_m: f32,
     /// Camera above ground, metres.
     pub camera_height_m: f32,
