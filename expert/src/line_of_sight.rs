@@ -123,17 +123,31 @@ mod tests {
     use super::*;
     use sim::scenario::{Obstacle, ObstacleClass, Scenario};
 
-    #[test]
-    fn ground_beyond_the_patch_and_behind_a_car_is_unknown() {
+    /// What is known at the origin beside a car whose right side is at y = 1.57, from x = 7.65 to 12.35.
+    fn knows(sensing: &SensingSettings, x: f32, y: f32) -> bool {
         let scenario = Scenario::lane(-40.0..=40.0, 40.0, -20.0..=20.0)
             .with_obstacles([Obstacle::new(ObstacleClass::Sedan, Pose::new(Vec2::new(10.0, 2.5), 0.0))]);
         let map = Map::build(scenario, &sim::vehicle::VehicleSettings::hyundai_hg300()).unwrap();
-        let sight = LineOfSight::new(Sees::PatchOnly, &map, Pose::default(), &SensingSettings::paper());
-        let knows = |x, y| sight.knows(Vec2::new(x, y));
+        LineOfSight::new(Sees::PatchOnly, &map, Pose::default(), sensing).knows(Vec2::new(x, y))
+    }
+
+    #[test]
+    fn ground_beyond_the_patch_and_behind_a_car_is_unknown() {
+        let knows = |x, y| knows(&SensingSettings::paper(), x, y);
         assert!(knows(8.0, 0.0) && knows(16.0, 0.0) && knows(7.0, -5.9), "in the patch");
         assert!(!knows(16.4, 0.0) && !knows(8.0, 6.1), "beyond the patch");
         assert!(knows(0.0, 9.0) && knows(-9.0, 0.0), "beside and behind the car");
-        // Its far right corner stands at (12.35, 1.57): past it one sees what is below y/(x − 1.59) = .146.
+        // Past the far right corner at (12.35, 1.57) one sees what is below y/(x − 1.59) = .146.
         assert!(!knows(14.0, 4.0) && !knows(14.0, 2.1) && knows(14.0, 1.5), "behind the car and past it");
+    }
+
+    #[test]
+    fn ground_is_hidden_from_the_camera_of_the_sensor() {
+        let paper = SensingSettings::paper();
+        assert!(!knows(&paper, 14.0, 1.9));
+        // From x = 7, the line past the corner has a slope of .294, and the point lies at .271.
+        assert!(knows(&SensingSettings { camera_ahead_m: 7.0, ..paper.clone() }, 14.0, 1.9), "farther ahead");
+        assert!(knows(&SensingSettings { camera_height_m: 9.0, ..paper.clone() }, 14.0, 4.0), "above the car");
+        assert!(knows(&SensingSettings { occlusion: false, ..paper }, 14.0, 4.0), "no occlusion");
     }
 }
