@@ -238,3 +238,67 @@ fn use_tree(tokens: &[TokenTree], prefix: &[String], leaves: &mut Vec<(Vec<Strin
         }
     }
 }
+
+/// Writes files into a folder of their own and looks for a circle.
+fn circle_among(name: &str, files: &[(&str, &str)]) -> Option<String> {
+    let folder = crate::bench::scratch(name);
+    for (file, text) in files {
+        let path = folder.join(file);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    }
+    let folder = format!("{}/", folder.display());
+    Crate::read(Path::new(&(folder.clone() + "lib.rs"))).circle().map(|circle| circle.replace(&folder, ""))
+}
+
+#[test]
+fn files_that_import_each_other_are_a_circle() {
+    let lib = ("lib.rs", "pub mod a; pub mod b; pub mod c;");
+    let ring = [
+        lib,
+        ("a.rs", "use crate::b::{self, Bee};"),
+        ("b.rs", "pub struct Bee; fn f() { crate::c::g(); }"),
+        ("c.rs", "use super::a as other; pub fn g() {}"),
+    ];
+    assert_eq!(circle_among("ring", &ring).as_deref(), Some("a.rs → b.rs → c.rs → a.rs"));
+    let open = [lib, ("a.rs", "use crate::b::Bee;"), ("b.rs", "pub struct Bee;"), ("c.rs", "use crate::{a, b::Bee};")];
+    assert_eq!(circle_among("open", &open), None);
+}
+
+#[test]
+fn a_parent_may_pass_its_child_on_but_not_use_it_while_the_child_uses_the_parent() {
+    let child = ("shapes/round.rs", "use super::Point; pub struct Disc(Point);");
+    let passing = "mod round; pub use round::Disc; pub struct Point;";
+    let with_parent = |name, parent| circle_among(name, &[("lib.rs", "mod shapes;"), ("shapes.rs", parent), child]);
+    assert_eq!(with_parent("passing", passing), None);
+    let circle = Some("shapes.rs → shapes/round.rs → shapes.rs");
+    let using = format!("{passing} fn f(disc: Disc) {{}}");
+    assert_eq!(with_parent("using", &using).as_deref(), circle, "by the name that it passes on");
+    let calling = "mod round; pub struct Point; fn f() { let _ = round::Disc::new; }";
+    assert_eq!(with_parent("calling", calling).as_deref(), circle, "by a path");
+}
+
+#[test]
+fn what_is_passed_on_is_imported_from_where_it_is_defined() {
+    let files = |user| {
+        [
+            ("lib.rs", "mod outer; mod user; pub use outer::Thing;"),
+            ("outer.rs", "mod inner; pub use inner::Thing; use crate::user::help;"),
+            ("outer/inner.rs", "pub struct Thing;"),
+            ("user.rs", user),
+        ]
+    };
+    assert_eq!(circle_among("from-inner", &files("use crate::outer::Thing; pub fn help() {}")), None);
+    assert_eq!(circle_among("from-root", &files("use crate::Thing; pub fn help() {}")), None);
+    let circle = circle_among("from-outer", &files("use crate::outer::other; pub fn help() {}"));
+    assert_eq!(circle.as_deref(), Some("outer.rs → user.rs → outer.rs"));
+}
+
+#[test]
+fn tests_may_import_what_they_test() {
+    let test = "pub struct Bee; #[cfg(test)] mod tests { use crate::a::f; } #[cfg(test)] use crate::a::f;";
+    assert_eq!(
+        circle_among("tests", &[("lib.rs", "mod a; mod b;"), ("a.rs", "use crate::b::Bee;"), ("b.rs", test)]),
+        None
+    );
+}

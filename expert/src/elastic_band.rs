@@ -1,8 +1,9 @@
-//! The way ahead as an elastic band: a plan's way, pulled into the middle of the free space and straightened.
+//! The way ahead as an elastic band (Quinlan & Khatib 1993): a plan's way, pulled into the middle of the free space and
+//! straightened.
 //!
-//! The plans of the search are two arcs out of a few hundred. Which of them wins changes with centimetres, and so
-//! would a label taken from the winner; no network could learn that from a grid of half-metre cells. The band forgets
-//! which plan it came from: it is where a person would drive, and it lies still in the world while the car moves.
+//! A plan of the search is two arcs out of a few hundred. Centimetres decide which plan wins, and so would a label taken
+//! from the winner; no network could learn that from a grid of half-metre cells. The relaxed band hardly depends on the
+//! plan it came from: it lies where a person would drive, and stays in place while the car moves.
 
 use crate::settings::ElasticBandSettings;
 use sim::distance_field::DistanceField;

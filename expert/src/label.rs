@@ -10,7 +10,7 @@ use sim::geometry::{Pose, Vec2};
 /// Step along a label's arc, metres.
 const MARCH_M: f32 = 0.2;
 
-/// A look-ahead point as pure pursuit drives it: a circle through the rear axle and a place on it.
+/// A look-ahead point as pure pursuit follows it: a circle through the rear axle and a place on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Label {
     /// Curvature of the circle, 1/m, positive to the left.
@@ -41,8 +41,8 @@ impl Label {
         share.abs().powf(1.0 / 1.5).copysign(share)
     }
 
-    /// Moves from the last label towards this one, within the limits of a tick. The speed of the wheels limits the
-    /// car anyway; what is limited here is that labels of neighbouring ticks contradict each other.
+    /// Moves from the last label towards this one, within the limits of a tick. The steering rate limits the car anyway;
+    /// these limits keep the labels of neighbouring ticks from contradicting each other.
     pub(crate) fn smoothed(self, last: Self, settings: &ExpertSettings) -> Self {
         let lateral_per_m = 2.0 * settings.label_lateral_step_m / (last.arc_length_m * last.arc_length_m);
         let step_per_m = settings.label_curvature_step_per_m.min(lateral_per_m);
@@ -103,8 +103,8 @@ impl Ground<'_> {
 
     /// Whether the point after some travel lies in the open and the arc to it follows the band, 0…1.
     ///
-    /// It does not matter how near the arc comes to a boundary: in a lane that would hang on centimetres that no grid
-    /// of half-metre cells shows.
+    /// How near the arc comes to a boundary does not count: in a lane that would depend on centimetres that no grid of
+    /// half-metre cells shows.
     fn openness(&self, band: &ElasticBand, travel_m: f32) -> f32 {
         let target = band.at(travel_m);
         if !self.sight.knows(target) {

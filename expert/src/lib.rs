@@ -5,17 +5,18 @@
 //!    around the way to it.
 //! 3. Otherwise it lies as far ahead as possible inside drivable space.
 //!
-//! The paper says no more. Here, a decision takes four steps, each a file:
+//! The paper gives no more detail. Here, a decision takes four steps, each in a file:
 //!
 //! - `search`: plans of two arcs each, forecast with the car's body and the speed of its steering (`rollout`); the best
 //!   one says whether, where and with how much clearance what is ahead can be avoided (rule two);
-//! - `band`: its way, pulled into the middle of the free space, which no longer depends on which plan it came from;
+//! - `elastic_band`: the way of that plan, pulled into the middle of the free space, so that it no longer depends on
+//!   which plan it came from;
 //! - `label`: the point on that way, half as far as the way is open (rule three; the paper's half "for safety reasons",
 //!   see [`sim::controller::SpeedLaw`]) and drivable (rule one), and smoothed from tick to tick;
 //! - `stats`: which rule it was.
 //!
-//! How the numbers came about is in docs/methods.md 3 and E5. The expert decides from the clean scene around
-//! the car. The route serves one purpose only: a plan that turns back is refused. Same situation and memory, same bytes.
+//! Where the numbers come from is in docs/methods.md 3 and E5. The expert decides from the clean scene around the car.
+//! The route has one purpose: a plan that turns back is refused. The same situation and memory give the same bytes.
 
 mod context;
 mod elastic_band;
@@ -43,7 +44,7 @@ use sim::geometry::Vec2;
 use sim::seed::{Rng, RootSeed, Stream};
 use std::collections::VecDeque;
 
-/// Two labels farther apart than this contradict each other, metres.
+/// Consecutive labels farther apart than this count as a jump, metres.
 const JUMP_M: f32 = 1.0;
 /// Ranges at which steering at the smoothed way is tried, from the open one to the nearest.
 const RANGES: usize = 5;
@@ -55,16 +56,16 @@ pub struct ScriptedExpert {
     context: ExpertContext,
     footprint: Footprint,
     arcs: Arcs,
-    /// What was decided last; all of the expert's memory when delay and jitter are off.
+    /// The last decision: the expert's only memory while delay and jitter are off.
     last: Option<Label>,
-    /// Points decided but not yet said (reaction delay).
-    unsaid: VecDeque<LookAheadPoint>,
+    /// Points decided but not yet answered (reaction delay).
+    delayed: VecDeque<LookAheadPoint>,
     jitter: Rng,
     stats: ExpertStats,
     inspection: Option<Inspection>,
 }
 
-/// How the last decision came about.
+/// How a decision was reached.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inspection {
     /// Which rule fired.
@@ -99,7 +100,7 @@ impl ScriptedExpert {
             arcs: Arcs::new(&settings),
             context: ExpertContext::of(episode),
             last: None,
-            unsaid: VecDeque::new(),
+            delayed: VecDeque::new(),
             jitter: RootSeed(0).rng(Stream::Expert, 0),
             stats: ExpertStats::default(),
             inspection: None,
@@ -124,7 +125,7 @@ impl ScriptedExpert {
         &self.settings
     }
 
-    /// Decides and says how: costs about twice a decision.
+    /// Decides and explains the decision. Takes about twice as long as deciding.
     pub fn inspect(&mut self, situation: &Situation<'_>) -> (Decision, Inspection) {
         self.inspection = Some(Inspection::empty());
         let decision = self.decide(situation);
@@ -190,7 +191,7 @@ impl ScriptedExpert {
     /// The label on the smoothed way: half as far ahead as that is open, steering at the farthest point that it is safe
     /// to steer at; in corners, and where pursuing the way is never safe, the plan's own arc.
     ///
-    /// Every share falls to 0 gradually, so that a small change of the scene moves the label a little.
+    /// Every share fades to 0 gradually, so a small change of the scene moves the label little.
     fn smoothed(&self, search: &Search<'_>, ground: &Ground<'_>, plan: &Plan, arc: Label) -> Label {
         let mut band = ElasticBand::along(search.way(plan, elastic_band::SPACING_M), search.start.ahead);
         band.relax(search.truth.map.distance_field(), &self.settings.elastic_band);
@@ -234,12 +235,12 @@ impl ScriptedExpert {
         Ground { settings: &self.settings, context: &self.context, truth, sight }
     }
 
-    /// Reaction delay and jitter of a human hand; both are off by default.
-    fn said(&mut self, decided: LookAheadPoint) -> LookAheadPoint {
+    /// Adds the reaction delay and the jitter of a human hand; both are off by default.
+    fn as_by_hand(&mut self, decided: LookAheadPoint) -> LookAheadPoint {
         let delay_ticks = (self.settings.reaction_delay_s / self.context.control_period_s).round() as usize;
-        self.unsaid.push_back(decided);
+        self.delayed.push_back(decided);
         let point =
-            if self.unsaid.len() > delay_ticks { self.unsaid.pop_front() } else { self.unsaid.front().copied() };
+            if self.delayed.len() > delay_ticks { self.delayed.pop_front() } else { self.delayed.front().copied() };
         let point = point.unwrap_or(decided);
         if self.settings.label_jitter == 0.0 {
             return point;
@@ -268,12 +269,12 @@ impl Driver for ScriptedExpert {
             inspection.decided = label.point();
         }
         self.inspection = inspection;
-        Decision { look_ahead: self.said(label.point()), source: Source::Expert, spread: None }
+        Decision { look_ahead: self.as_by_hand(label.point()), source: Source::Expert, spread: None }
     }
 
     fn reset(&mut self) {
         self.last = None;
-        self.unsaid.clear();
+        self.delayed.clear();
     }
 }
 

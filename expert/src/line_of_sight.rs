@@ -1,4 +1,4 @@
-//! Which ground is known to the expert.
+//! Which ground the expert knows.
 
 use crate::settings::Sees;
 use sim::geometry::{Pose, Vec2, WorldFromEgo};

@@ -25,7 +25,7 @@ const FIRST_EXPONENT: f32 = 1.5;
 const SECOND_EXPONENT: f32 = 1.4;
 /// Travels at which second arcs branch off.
 const BRANCHES: usize = 5;
-/// How much nearer than at the start something may come in a tight start, metres: what interpolation rounds away.
+/// Clearance that may be lost in a tight start, metres: the error of the distances' interpolation.
 const START_SLACK_M: f32 = 0.02;
 
 /// Curvatures of both stages, straight on first and then ever tighter, left before right.
@@ -131,7 +131,7 @@ impl Search<'_> {
     pub(crate) fn best_plan(&self, clearance_m: f32, mut candidates: Option<&mut Vec<Candidate>>) -> Option<Plan> {
         let thresholds = self.thresholds(clearance_m);
         let firsts: [FirstArc; FIRST_ARCS] = std::array::from_fn(|i| self.follow_first(i, thresholds));
-        // The most promising first: its plans prune those of the others.
+        // The most promising first: its plans prune the others.
         let mut order: [(f32, usize); FIRST_ARCS] = std::array::from_fn(|i| (self.bound_of_first(&firsts[i]), i));
         order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
 
@@ -369,7 +369,7 @@ impl Search<'_> {
         share * share
     }
 
-    /// Do not turn back: the bumper gains on the route. A filter only, so that labels remain functions of the scene.
+    /// No turning back: the bumper gains on the route. This only filters plans, so labels remain functions of the scene.
     fn makes_progress(&self, end: &Motion, travel_m: f32) -> bool {
         let path = self.truth.map.path();
         let reach_m = self.horizon_m + self.context.vehicle.front_m();

@@ -14,7 +14,7 @@ pub enum Sees {
     PatchOnly,
 }
 
-/// What is good about a plan, and how much it counts in metres of free travel per [`Self::unit_m`].
+/// How plans are scored: free travel in units of [`Self::unit_m`], and the weights of everything else.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanWeights {
@@ -37,9 +37,9 @@ pub struct PlanWeights {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ElasticBandSettings {
-    /// Rounds of relaxation: a band then hardly remembers which plan it came from.
+    /// Rounds of relaxation: enough that the band hardly depends on the plan it came from.
     pub iterations: u32,
-    /// Something nearer than this pushes the band away, metres: half of the widest lane with a middle.
+    /// Obstacles nearer than this push the band away, metres: half the width of the widest lane with a middle.
     pub comfort_m: f32,
     /// Share of the way to the middle taken per round where one metre is missing on one side.
     pub middle_gain: f32,

@@ -82,7 +82,7 @@ pub struct LaneEncroachment {
     pub protrusion_m: f32,
 }
 
-/// What stands in a lot.
+/// The obstacles of a lot.
 #[derive(Debug, Clone)]
 pub struct Clutter {
     /// In the lane and outside.
@@ -330,7 +330,7 @@ fn draw_clusters(placement: &Placement<'_>, leg: usize, wanted_m: f32, rng: &mut
     let (from_m, to_m) = placement.usable(leg);
     let mut clusters: Vec<Cluster> = Vec::new();
     let (mut missing_m, mut room_m) = (wanted_m, to_m - from_m);
-    // Half a car too much is as good as half a car too little.
+    // Half a car too many is as good as half a car too few.
     while missing_m > 0.5 * TYPICAL_CAR_M {
         let cars = rng.random_range(1..=3).min((missing_m / TYPICAL_CAR_M).round().max(1.0) as usize);
         let side = if rng.random_bool(0.5) { Side::Left } else { Side::Right };
@@ -420,7 +420,7 @@ fn place_double_parked_car(
 
 /// A car in a stall, or a wheel stop in an empty one.
 fn place_parked(placement: &mut Placement<'_>, stall: &Stall, rng: &mut Rng) {
-    // All draws first: what stands elsewhere must not shift the stream of the next stall.
+    // All draws come first: obstacles elsewhere must not shift the random stream of the next stall.
     let occupied = rng.random_bool(f64::from(placement.plan.stall_occupancy));
     let class = draw_car(rng);
     let nose_m = if rng.random_bool(f64::from(placement.plan.nose_share)) { rng.random_range(0.3..0.6) } else { 0.0 };

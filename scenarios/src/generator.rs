@@ -1,8 +1,8 @@
-//! Procedural lots: corridors with corners, bends, bulges, islands, closed side branches and everything that stands
-//! about, each verified to be drivable in both directions.
+//! Procedural lots: corridors with corners, bends, bulges, islands, closed side branches, parked cars and other obstacles,
+//! each verified to be drivable in both directions.
 //!
-//! A lot's seed decides all of it. A draw that is invalid or that [`crate::solver`] cannot drive is thrown away and the
-//! next one of the same seed taken; [`Generated::attempts`] says how many it took.
+//! A lot is a function of its seed. A draw that is invalid or that [`crate::solver`] cannot drive is rejected and the next
+//! draw of the same seed is taken; [`Generated::attempts`] counts them.
 
 use crate::clutter::{self, ClutterPlan, Furniture, LaneEncroachment};
 use crate::corridor::{Blueprint, Branch, Bulge, CornerPlan, Corridor, Leg, LegPlan, Side, WidthStep, to_millimetres};
@@ -15,19 +15,20 @@ use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
 use std::ops::Range;
 
-/// A lot and what it took.
+/// A generated lot.
 #[derive(Debug, Clone)]
 pub struct Generated {
     /// Valid and solvable in both directions.
     pub scenario: Scenario,
-    /// Draws until this one, itself included: `1 − 1/mean` is the rejection rate.
+    /// Draws up to and including this one: the rejection rate is `1 − 1/mean`.
     pub attempts: u32,
 }
 
-/// A lot of a split.
+/// Generates a lot. It is drivable for the paper's vehicle; it does not depend on the vehicle that will drive it, because
+/// its name fixes it.
 ///
 /// # Panics
-/// When 1000 draws in a row are rejected; of hard ones about one in five is, of others hardly any.
+/// If 1000 draws in a row are rejected. About one hard draw in five is, and hardly any other.
 pub fn generate(split: Split, index: u64, difficulty: Difficulty) -> Generated {
     let seed = split.seed(difficulty, index);
     let vehicle = VehicleSettings::hyundai_hg300();
@@ -68,7 +69,7 @@ struct DifficultySettings {
 
 impl DifficultySettings {
     /// Gaps of `Hard` are those of the narrow reference lots; the solver's 0.25 m clearance needs 2.4 m and more beside
-    /// a car that stands askew, which is what most rejected draws lack.
+    /// a car parked at an angle, which is what most rejected draws lack.
     fn of(difficulty: Difficulty) -> Self {
         match difficulty {
             Difficulty::Easy => Self {
@@ -213,8 +214,8 @@ fn draw_layout(settings: &DifficultySettings, rng: &mut Rng) -> Layout {
     Layout { blueprint, islands }
 }
 
-/// Right angles mostly, else bends of 30–80°. The route never turns by more than 180° in sum, so that it does not
-/// bite its own tail too often.
+/// Mostly right angles, otherwise bends of 30–80°. The turns never add up to more than 180°, so the route rarely meets
+/// itself.
 fn draw_corners(settings: &DifficultySettings, count: usize, rng: &mut Rng) -> Vec<CornerPlan> {
     let mut turned_deg = 0.0_f32;
     (0..count)
@@ -338,7 +339,7 @@ fn island(corridor: &Corridor, plan: &IslandPlan) -> Island {
     Island { polygon, height_m: 0.15 }
 }
 
-/// A post on an island, as high as a lamp: it hides little, but it is seen.
+/// A post on an island, as high as a lamp: it hides little, but is visible.
 fn tree(corridor: &Corridor, plan: &IslandPlan) -> Obstacle {
     let leg = &corridor.legs[plan.leg];
     let at = to_millimetres(leg.world(0.5 * (plan.from_m + plan.to_m), island_middle_m(leg, plan)));

@@ -5,7 +5,7 @@
 //! | module | |
 //! |---|---|
 //! | [`corridor`] | lane geometry: legs, corners, widths, bulges → one boundary polygon |
-//! | [`clutter`] | parked cars and everything else that stands about, under gap rules |
+//! | [`clutter`] | parked cars and other obstacles, under gap rules |
 //! | [`mod@reference`] | lots a, b and c of the paper |
 //! | [`generator`] | procedural lots, each verified by the [`solver`] |
 //! | [`split`] | which generated lots may be trained on |
@@ -31,7 +31,7 @@ use sim::vehicle::VehicleSettings;
 use split::{Difficulty, Split};
 use std::path::PathBuf;
 
-/// The lots a name stands for; several names are separated by commas.
+/// The lots that a name means; several names are separated by commas.
 ///
 /// `lot-a`, `lot-b`, `lot-c` · `reference` (all three) · `train:N`, `validation:N`, `test:N` (the first N generated lots
 /// of a split, medium unless `:easy`, `:medium` or `:hard` follows) · `test-hard-7` (one of them) · a path ending in
@@ -45,7 +45,7 @@ use std::path::PathBuf;
 /// ```
 ///
 /// # Errors
-/// A name that stands for nothing, with what there is.
+/// A name that means no lot; the message lists the names there are.
 pub fn suite(names: &str) -> Result<Vec<LotSpec>, SpecError> {
     let mut lots = Vec::new();
     for name in names.split(',').map(str::trim) {
@@ -113,7 +113,7 @@ impl std::str::FromStr for LotSpec {
     }
 }
 
-/// A name that stands for no lot.
+/// A name that means no lot.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{name:?} {problem}; there are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N and test:N \

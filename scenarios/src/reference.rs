@@ -1,6 +1,6 @@
-//! The three lots of the paper, rebuilt: length, corners and difficulty are its, the drawing is ours.
+//! The three lots of the paper, rebuilt: length, corners and difficulty are the paper's, everything else is chosen.
 //!
-//! The paper prints only lengths and pictures; turns and widths are those with which a scripted expert reaches the
+//! The paper prints only lengths and pictures; turns and widths are such that a scripted expert reaches the
 //! paper's safe ratios .83/.72/.91 (docs/methods.md E3). A lot's geometry is fixed, its obstacles are drawn anew for
 //! every trial.
 
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lane_is_as_wide_as_the_sheet_says() {
+    fn the_lane_is_as_wide_as_the_table_says() {
         for which in ReferenceLot::ALL {
             let plan = which.plan();
             let scenario = lot(which, RootSeed(1));
@@ -260,8 +260,8 @@ mod tests {
         }
     }
 
-    /// The gap rules, measured on the finished scenario with rays across the route: nothing is asked of the code that
-    /// places things.
+    /// The gap rules, measured on the finished scenario with rays across the route, independently of the code that places
+    /// the obstacles.
     #[test]
     fn whatever_narrows_the_lane_obeys_the_gap_rules() {
         for which in ReferenceLot::ALL {

@@ -29,7 +29,7 @@ const CURVATURE_SHARE: f32 = 0.92;
 /// Poses closer than this count as one: metres and radians.
 const SAME_PLACE_M: f32 = 0.3;
 const SAME_HEADING_RAD: f32 = 4.0 * std::f32::consts::PI / 180.0;
-/// Greediness: a path, not the shortest one, is wanted.
+/// Greedy on purpose: any path will do, not the shortest.
 const HEURISTIC_WEIGHT: f32 = 1.8;
 /// Gives up after this many expansions. Solvable lots take a few hundred to a few thousand.
 const EXPANSIONS_MAX: usize = 20_000;
@@ -191,7 +191,7 @@ impl<'a> Search<'a> {
             }
             let [(middle, first_curvature), (end, curvature)] = self.halves(pose, steering, next);
             if self.is_free(middle, first_curvature) && self.is_free(end, curvature) {
-                // Small prices: prefer few and gentle movements of the wheel, and the middle of the free space.
+                // Small costs: prefer few and gentle movements of the wheel, and the middle of the free space.
                 let effort = 0.02 * f32::from((next - steering).abs()) + 0.01 * f32::from(next.abs());
                 let closeness = 0.2 * (1.8 - self.scene.clearance_m(end.position())).max(0.0);
                 self.push(end, next, cost + STEP_M * (1.0 + effort + closeness), parent);
@@ -417,7 +417,7 @@ impl Scene {
     }
 }
 
-/// Distance to the finish along free ground, with a price for narrow passages; infinite where there is no way.
+/// Distance to the finish along free ground, with a cost for narrow passages; infinite where there is no way.
 struct DistanceToGo(Raster<f32>);
 
 impl DistanceToGo {

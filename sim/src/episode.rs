@@ -34,9 +34,9 @@ pub struct EpisodeSettings {
     pub vehicle: VehicleSettings,
     /// From look-ahead point to command.
     pub controller: ControllerSettings,
-    /// What is seen.
+    /// Camera and bird's-eye view.
     pub sensing: SensingSettings,
-    /// What is seen wrongly.
+    /// Perception errors.
     pub noise: NoiseSettings,
     /// What is measured.
     pub metrics: MetricsSettings,
@@ -85,10 +85,10 @@ pub struct EpisodeReport {
     pub events: Vec<(u32, Event)>,
 }
 
-/// Where stop–count–resume stands.
+/// State of stop–count–resume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
-    /// Somebody drives.
+    /// The driver is in control.
     Driving,
     /// Counted; emergency braking until the car rests.
     Braking,
@@ -160,8 +160,9 @@ impl Episode {
         Sensor::new(&self.map, self.settings.sensing.clone(), &self.settings.noise, seed)
     }
 
-    /// The same, but already under way: for asking what would have happened from a state that was met elsewhere.
-    /// Commands still on their way then are not known; the car holds its wheels and speed until the first new one.
+    /// An episode that starts from a state met in another one, to ask what would have happened from there. Commands that
+    /// were still on their way to the actuators are not known: the car keeps its steering and speed until the first new
+    /// command takes hold.
     pub fn under_way(
         settings: Arc<EpisodeSettings>,
         map: Arc<Map>,
@@ -173,12 +174,12 @@ impl Episode {
         Self { vehicle, command, progress_m, advance: (progress_m, 0), ..Self::new(settings, map, seed) }
     }
 
-    /// Looks. Call once before each decision.
+    /// Takes an observation. Call once before each decision.
     pub fn observe(&mut self) {
         self.observation = self.sensor.observe(&self.map, self.vehicle.pose, self.tick);
     }
 
-    /// What a driver may be shown.
+    /// What the driver is shown.
     pub fn situation(&self) -> Situation<'_> {
         let truth = GroundTruth { map: &self.map, vehicle: self.vehicle, progress_m: self.progress_m };
         Situation { observation: &self.observation, truth }
@@ -229,12 +230,13 @@ impl Episode {
         self.progress_m
     }
 
-    /// Drives one control tick; a near-collision is braked to rest and put back on the path within it.
+    /// Drives one control tick. After a near-collision the tick lasts until the car has braked to rest and stands on the
+    /// path again.
     ///
     /// # Panics
     /// If the episode has ended, or the look-ahead point is not finite.
     pub fn apply(&mut self, decision: Decision) -> Frame {
-        assert!(self.ending.is_none(), "an ended episode is not driven on");
+        assert!(self.ending.is_none(), "the episode has ended");
         let point = decision.look_ahead;
         assert!(
             point.ahead_m.is_finite() && point.left_m.is_finite(),
@@ -366,7 +368,7 @@ impl Episode {
             && is_free(start.advanced_along_arc(0.0, metrics.near_collision_m))
     }
 
-    /// Recognises a stuck car and the finish.
+    /// Detects a stuck car and the finish.
     fn judge_progress(&mut self, frame: &mut Frame) {
         let (best_m, since_step) = self.advance;
         let metrics = &self.settings.metrics;

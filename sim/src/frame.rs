@@ -1,4 +1,4 @@
-//! What falls out of the loop: one [`Frame`] per control tick. Metrics, datasets and recordings read nothing else.
+//! What the loop puts out: one [`Frame`] per control tick. Metrics, data sets and recordings read nothing else.
 
 use crate::driver::Decision;
 use crate::geometry::Pose;
@@ -42,7 +42,7 @@ pub enum Ending {
     TimedOut,
 }
 
-/// One control tick as seen from outside.
+/// One control tick.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame {
     /// Index of the decision, from 0.
@@ -72,7 +72,7 @@ pub struct Frame {
     pub event: Event,
 }
 
-/// Reads frames; cannot influence or fail an episode.
+/// Receives frames. It cannot influence the episode.
 pub trait FrameSink {
     /// Takes one frame.
     fn frame(&mut self, frame: &Frame);

@@ -70,7 +70,7 @@ pub struct SafeRing {
     n_pixels: u32,
 }
 
-/// Blocks that are looked up together.
+/// Blocks whose centres are looked up together.
 #[derive(Debug, Clone)]
 struct Batch {
     centres: Points<BATCH>,
@@ -254,13 +254,13 @@ pub struct EpisodeMetrics {
     pub stuck: u32,
     /// Mean over ticks of the drivable share of the safe range, 0…1.
     pub safe_ratio: f32,
-    /// Smallest distance between body and non-drivable space, metres, negative on contact. Looked at when the car
-    /// observes and where an emergency stop ends.
+    /// Smallest distance between body and non-drivable space, metres, negative on contact. Sampled at every
+    /// observation and where an emergency stop ends.
     pub clearance_min_m: f32,
     /// Changes of the steering direction by more than 2° of road-wheel angle: the steering reversals of SAE J2944, with
-    /// a gap (chosen) that ignores the follow-up of noise. What a resume straightens does not count.
+    /// a gap (chosen) that ignores the response to noise. Wheels straightened by a resume do not count.
     pub steering_reversals: u32,
-    /// Road-wheel angle steered, radians: the sum of all changes from tick to tick (chosen), resumes left out.
+    /// Road-wheel angle steered, radians: the sum of all changes from tick to tick (chosen), without resumes.
     pub steering_effort_rad: f32,
 }
 
@@ -295,7 +295,7 @@ struct Steering {
 const REVERSAL_RAD: f32 = 2.0 * std::f32::consts::PI / 180.0;
 
 impl MetricsAccumulator {
-    /// Nothing measured yet on a route of this length.
+    /// An empty accumulator for a route of this length.
     pub fn new(reference_m: f32) -> Self {
         let metrics = EpisodeMetrics { reference_m, clearance_min_m: f32::INFINITY, ..EpisodeMetrics::default() };
         Self { metrics, ..Self::default() }
@@ -318,7 +318,7 @@ impl MetricsAccumulator {
         self.driven_m += f64::from(frame.driven_m);
         self.steer(frame.vehicle.steering_rad);
         if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
-            // The next frame shows straight wheels on the path, which nobody steered.
+            // The next frame shows a car that was put back with straight wheels: nobody steered that.
             self.steering = Steering::default();
         }
     }

@@ -1,4 +1,4 @@
-//! What a lot is made of: plain data that serialises to TOML, nothing derived.
+//! What a lot consists of: plain data that serialises to TOML, nothing derived.
 //!
 //! Metres and degrees, because people write these files by hand; everything behind [`crate::map::Map::build`] is in
 //! radians. Unknown keys are refused.
@@ -23,7 +23,7 @@ pub struct Scenario {
     /// Non-drivable areas inside the boundary.
     #[serde(default, rename = "island", skip_serializing_if = "Vec::is_empty")]
     pub islands: Vec<Island>,
-    /// Everything solid that stands in the lot.
+    /// Solid objects.
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     pub obstacles: Vec<Obstacle>,
     /// Speed bumps: drivable, but their edges can fool the perception.
@@ -59,7 +59,7 @@ pub struct ReferencePath {
     pub corner_radius_m: f32,
 }
 
-/// One solid thing.
+/// A solid object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Obstacle {
@@ -181,7 +181,7 @@ impl ObstacleClass {
         }
     }
 
-    /// Round things have a diameter and no width of their own.
+    /// Round objects have a diameter instead of length and width.
     pub fn is_round(self) -> bool {
         matches!(self, Self::Cone | Self::Bollard | Self::Person)
     }

@@ -9,11 +9,11 @@ use crate::vehicle::VehicleSettings;
 
 /// Largest extent of a lot, metres: its raster of distances then takes 100 MB.
 pub const EXTENT_MAX_M: f32 = 500.0;
-/// Things that stand farther than this from the lot are typing errors, metres.
+/// An object farther than this from the lot is a typing error, metres.
 const STRAY_M: f32 = 50.0;
 /// Points nearer than this count as one, metres.
 const COINCIDENT_M: f32 = 1e-3;
-/// A route shorter than about one car length measures nothing, metres.
+/// A route shorter than about a car's length measures nothing, metres.
 const PATH_MIN_M: f32 = 5.0;
 /// The route is tested in chords of about this length, metres: a chord of a 5 m corner strays by 6 mm.
 const CHORD_M: f32 = 0.5;

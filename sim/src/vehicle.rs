@@ -82,7 +82,7 @@ impl VehicleSettings {
     }
 }
 
-/// Everything that moves.
+/// The state of a moving vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct VehicleState {
     /// Rear-axle pose in the world.
@@ -118,7 +118,7 @@ impl VehicleState {
     }
 }
 
-/// What a controller asks of the vehicle.
+/// What the controller demands.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct VehicleCommand {
     /// Road-wheel angle, radians, positive to the left.
