@@ -88,7 +88,9 @@ impl Recorder {
         let Decision { look_ahead, source, spread } = frame.decision;
         floats(decisions, &[look_ahead.ahead_m, look_ahead.left_m]);
         decisions.update([source as u8, u8::from(spread.is_some())]);
-        spread.iter().for_each(|spread| floats(decisions, &[spread.ahead_m, spread.left_m]));
+        if let Some(spread) = spread {
+            floats(decisions, &[spread.ahead_m, spread.left_m]);
+        }
         let (vehicle, command) = (&frame.vehicle, &frame.command);
         pose(trajectory, vehicle.pose);
         floats(trajectory, &[vehicle.speed_mps, vehicle.steering_rad, vehicle.accel_mps2, vehicle.accel_demand_mps2]);
@@ -121,14 +123,16 @@ impl Recorder {
         let Golden { observations, decisions, trajectory, metrics } = &mut self.golden;
         for (layer, words) in self.layers.iter_mut().zip([observations, decisions, trajectory, metrics]) {
             let digest = layer.finalize_reset();
-            let word: String = digest[..4].iter().map(|byte| format!("{byte:02x}")).collect();
+            let word = format!("{:08x}", u32::from_be_bytes([digest[0], digest[1], digest[2], digest[3]]));
             *words = if words.is_empty() { word } else { format!("{words} {word}") };
         }
     }
 }
 
 fn floats(layer: &mut Sha256, values: &[f32]) {
-    values.iter().for_each(|value| layer.update(value.to_bits().to_le_bytes()));
+    for value in values {
+        layer.update(value.to_bits().to_le_bytes());
+    }
 }
 
 fn pose(layer: &mut Sha256, pose: Pose) {

@@ -37,14 +37,14 @@ impl Crate {
         let text = std::fs::read_to_string(&path).unwrap();
         let tokens: TokenStream = text.parse().unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         let mut file = File { path, ..File::default() };
-        file.scan(&module, tokens.into_iter().collect());
+        file.scan(&module, &tokens.into_iter().collect::<Vec<_>>());
         for child in &file.children {
             let beside = folder.join(format!("{child}.rs"));
             let inside = folder.join(child).join("mod.rs");
             let path = if beside.exists() { beside } else { inside };
             // A module with a `#[path]` of its own belongs to no one file.
             if path.exists() {
-                self.read_module([&module[..], &[child.clone()]].concat(), path, &folder.join(child));
+                self.read_module([&module[..], std::slice::from_ref(child)].concat(), path, &folder.join(child));
             }
         }
         self.files.insert(module, file);
@@ -101,9 +101,9 @@ impl Crate {
         // Whatever imports nothing that is left is part of no circle.
         while let Some(leaf) = edges.iter().find(|(_, targets)| targets.is_empty()).map(|(module, _)| *module) {
             edges.remove(leaf);
-            edges.values_mut().for_each(|targets| {
+            for targets in edges.values_mut() {
                 targets.remove(leaf);
-            });
+            }
         }
         let mut way = vec![*edges.keys().next()?];
         loop {
@@ -126,23 +126,23 @@ impl Crate {
 }
 
 impl File {
-    fn scan(&mut self, module: &Module, tokens: Vec<TokenTree>) {
+    fn scan(&mut self, module: &Module, tokens: &[TokenTree]) {
         let mut at = 0;
         while at < tokens.len() {
             if is_cfg_test(&tokens[at..]) {
-                at = end_of_item(&tokens, at + 2);
+                at = end_of_item(tokens, at + 2);
             } else if is_word(tokens.get(at), "mod") && matches!(tokens.get(at + 1), Some(TokenTree::Ident(_))) {
                 let name = tokens[at + 1].to_string();
                 match tokens.get(at + 2) {
                     Some(TokenTree::Group(body)) => {
                         let inside = [&module[..], &[name]].concat();
-                        self.scan(&inside, body.stream().into_iter().collect());
+                        self.scan(&inside, &body.stream().into_iter().collect::<Vec<_>>());
                     }
                     _ => drop(self.children.insert(name)),
                 }
                 at += 3;
             } else if is_word(tokens.get(at), "use") {
-                let end = end_of_item(&tokens, at);
+                let end = end_of_item(tokens, at);
                 let is_public = at > 0
                     && (is_word(tokens.get(at - 1), "pub")
                         || at > 1
@@ -160,7 +160,7 @@ impl File {
                 }
                 at = end;
             } else if matches!(tokens[at], TokenTree::Ident(_)) {
-                let (path, next) = path_at(&tokens, at);
+                let (path, next) = path_at(tokens, at);
                 // The words of `pub(crate)` and of `self.field` lead nowhere.
                 if path.len() > 1 || !["crate", "self", "super"].contains(&path[0].as_str()) {
                     self.paths.push((module.clone(), path));
@@ -168,7 +168,7 @@ impl File {
                 at = next;
             } else {
                 if let TokenTree::Group(group) = &tokens[at] {
-                    self.scan(module, group.stream().into_iter().collect());
+                    self.scan(module, &group.stream().into_iter().collect::<Vec<_>>());
                 }
                 at += 1;
             }

@@ -115,7 +115,7 @@ fn drive(expert: &ExpertSettings, which: ReferenceLot, direction: Direction, see
 }
 
 fn fresh_answer(asked: Asked, settings: &EpisodeSettings, map: &Map, progress_m: f32) -> LookAheadPoint {
-    let mut driver = ScriptedExpert::new(asked.settings, &settings);
+    let mut driver = ScriptedExpert::new(asked.settings, settings);
     let truth = GroundTruth { map, vehicle: asked.vehicle, progress_m };
     driver.decide(&Situation { observation: &Observation::default(), truth }).look_ahead
 }

@@ -1,7 +1,8 @@
 //! Maps small enough to know their outlines by heart, and every way in which a map can be wrong.
 
 use super::*;
-use crate::load::load;
+use crate::load::{check_direction, load};
+use sim::scenario::Direction;
 use std::f64::consts::FRAC_PI_2;
 
 fn car() -> VehicleSettings {
@@ -235,6 +236,23 @@ fn faults_of_the_files_are_named() {
     std::fs::write(&lot.map, &sound).unwrap();
     std::fs::write(lot.map.with_file_name("map.pgm"), "P2\n60 7\n255\n1 2 3\n").unwrap();
     assert!(refusal(&lot).contains("map.pgm: no readable image: "), "{}", refusal(&lot));
+}
+
+/// A centre line may end where the car cannot turn round to drive back: a metre before a wall.
+#[test]
+fn a_map_that_cannot_be_driven_in_reverse_is_refused_with_the_line_of_its_route() {
+    let lot = lane("reverse", 5);
+    let file = lot.map.with_file_name("map.lot.toml");
+    std::fs::write(lot.map.with_file_name("line.csv"), "5, 3.5\n58, 3.5\n").unwrap();
+    std::fs::write(&file, "map = 'map.yaml'\n\ncentre_line = 'line.csv'\n").unwrap();
+    for named in [&file, &lot.map] {
+        let scenario = load(named, &car()).unwrap();
+        assert_eq!(check_direction(named, &scenario, Direction::Forward, &car()), Ok(()));
+        let error = check_direction(named, &scenario, Direction::Reverse, &car()).unwrap_err().to_string();
+        let expected =
+            format!("{}:3: the lot cannot be driven in reverse: reference_path, point 2: the car", file.display());
+        assert!(error.starts_with(&expected), "{error}");
+    }
 }
 
 #[test]
