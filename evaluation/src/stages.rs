@@ -15,7 +15,7 @@
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::settings::Settings;
-use planners::Baseline;
+use planners::PlannerSpec;
 use policy::dagger::DaggerSettings;
 use policy::decision_rule::{ChiOn, DecisionRule};
 use policy::fit::FitSettings;
@@ -185,7 +185,7 @@ pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     }
     let own = |name: &str| (name.to_owned(), name.to_owned());
     let tuned: Vec<_> = extent.tuned.iter().map(|spec| (tuned_name(spec), spec.clone())).collect();
-    let planners: Vec<_> = Baseline::all().iter().map(|planner| own(planner.name())).collect();
+    let planners: Vec<_> = PlannerSpec::all().iter().map(|planner| own(planner.name())).collect();
     // Where a planner has been tuned, only the paper's two take part as they are, too: the others stand for nothing.
     let is_tuned = |name: &str| tuned.iter().any(|(tuned, _)| *tuned == tuned_name(name));
     let enough = planners.iter().filter(|(name, _)| name == "tentacle" || name == "vvf" || !is_tuned(name)).cloned();
@@ -348,7 +348,7 @@ mod tests {
     #[test]
     fn the_default_budget_is_half_an_hour() {
         let settings = Settings::preset("default").unwrap();
-        let tuned = Baseline::all().iter().map(|planner| format!("{}:x.toml", planner.name())).collect();
+        let tuned = PlannerSpec::all().iter().map(|planner| format!("{}:x.toml", planner.name())).collect();
         let stages = all(&settings, &Extent { tuned, ..extent() }, Path::new("R"));
         let minutes = stages.iter().map(Stage::estimate_s).sum::<f64>() / 60.0;
         assert!((15.0..30.0).contains(&minutes), "{minutes:.1} minutes");
