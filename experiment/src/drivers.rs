@@ -268,7 +268,7 @@ impl NamedDriver {
     pub fn fleet(&self, episode: &EpisodeSettings, cars: usize) -> Box<dyn Fleet> {
         match &self.model {
             Model::Expert(settings) => Box::new(OneEach((0..cars).map(|_| expert(settings, episode)).collect())),
-            Model::Network(checkpoint, device) => Box::new(NetFleet::new((**checkpoint).clone(), *device)),
+            Model::Network(checkpoint, device) => Box::new(NetFleet::new(checkpoint, *device)),
             Model::Planner(planner) => {
                 let planner = planner.planner(&PlannerContext::of(episode));
                 Box::new(OneEach(vec![SensorsOnly(planner); cars]))
