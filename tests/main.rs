@@ -8,6 +8,7 @@
 //! | [`expert_drives`] | the expert on the reference lots |
 //! | [`formats`] | data sets open as NPY, weights as safetensors |
 //! | [`planners`] | model-based planners: naming, parameter files, tuning |
+//! | [`python`] | the Python of docs/formats.md answers as Rust does |
 //! | [`reproduce`] | the paper in a box: its report, resumed to the same bytes |
 #![allow(clippy::unwrap_used, reason = "tests")]
 
@@ -17,5 +18,6 @@ mod determinism;
 mod expert_drives;
 mod formats;
 mod planners;
+mod python;
 mod reproduce;
 mod tidy;

@@ -138,8 +138,15 @@ impl Checkpoint {
         }
         let sound = about.network.validate().and_then(|()| about.inference.validate());
         sound.map_err(|error| FileError::new(&path, error, RESTORE))?;
-        if about.layers != layers(&about.network) {
-            return Err(FileError::new(&path, "its layers are not those of its network", RESTORE));
+        let expected = layers(&about.network);
+        if about.layers.len() != expected.len() {
+            let problem = format!("{} layers instead of {}", about.layers.len(), expected.len());
+            return Err(FileError::new(&path, problem, RESTORE));
+        }
+        if let Some((found, expected)) = about.layers.iter().zip(&expected).find(|(found, expected)| found != expected)
+        {
+            let problem = format!("layer {found:?} is not what its network has: {expected:?}");
+            return Err(FileError::new(&path, problem, RESTORE));
         }
 
         let path = folder.join(NUMBERS);
