@@ -22,7 +22,7 @@ mod formats;
 mod goldens;
 mod import_graph;
 mod planners;
-mod regressions;
 mod python;
+mod regressions;
 mod reproduce;
 mod tidy;

@@ -59,8 +59,8 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
     monitor.failed.map_or(Ok(outcome), Err)
 }
 
-/// The episodes of a round with their experts. Lots that draw their obstacles are driven `training.trials` times. A generated lot looks the same every time: it is
-/// driven once, and the next round has other ones.
+/// The episodes of a round with their experts. Lots that draw their obstacles are driven `training.trials` times. A
+/// generated lot looks the same every time: it is driven once, and the next round has other ones.
 ///
 /// # Errors
 /// If a lot cannot be driven.
