@@ -18,6 +18,7 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         "train-dagger",
         "evaluate",
         "reproduce",
+        "guard",
         "generate",
         "pixel-accuracy",
         "sample-size",
@@ -34,7 +35,7 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         assert!(quiet < threads && help.rfind("--").unwrap() >= threads, "{command}: --threads is the last flag");
         insta::assert_snapshot!(format!("help-{command}"), help);
     }
-    for what in ["lot", "trajectories", "contact-sheet", "samples", "noise", "report"] {
+    for what in ["lot", "trajectories", "contact-sheet", "samples", "noise", "report", "results"] {
         insta::assert_snapshot!(format!("help-render-{what}"), printed(&["render", what, "--help"]));
     }
 }

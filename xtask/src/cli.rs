@@ -1,17 +1,16 @@
 //! The command line: which commands there are.
 
-use crate::build_info::PROGRAM;
 use crate::commands::{
-    completions, drivers, evaluate, generate, lots, pixel_accuracy, render, reproduce, sample_size, settings, train,
-    tune,
+    completions, drivers, evaluate, generate, guard, lots, pixel_accuracy, render, reproduce, sample_size, settings,
+    train, tune,
 };
 use crate::output::{Color, Output};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use std::num::NonZeroUsize;
 
 /// lotpilot: learns to drive through parking lots in simulation, and measures how well.
 #[derive(Debug, Parser)]
-#[command(name = "cargo xtask", bin_name = "cargo xtask", version = PROGRAM, after_help = EXAMPLES)]
+#[command(name = "lotpilot", bin_name = "cargo xtask", version, after_help = EXAMPLES)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -57,6 +56,9 @@ enum Command {
     /// The paper in a box: trains, drives and writes one report with the paper's tables beside ours.
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(reproduce::ReproduceArgs),
+    /// Trains the default and fails if its policy has become worse: for a nightly run.
+    #[command(after_help = guard::EXAMPLES)]
+    Guard(guard::GuardArgs),
     /// Writes lots as TOML plus a top-view PNG.
     #[command(after_help = generate::EXAMPLES)]
     Generate(generate::GenerateArgs),
@@ -106,6 +108,7 @@ impl Cli {
             Command::TrainDagger(args) => train::dagger(args, output),
             Command::Evaluate(args) => evaluate::run(args, output),
             Command::Reproduce(args) => reproduce::run(args, output),
+            Command::Guard(args) => guard::run(args, output),
             Command::Generate(args) => generate::run(args, output),
             Command::PixelAccuracy(args) => pixel_accuracy::run(args, output),
             Command::SampleSize(args) => sample_size::run(args, output),
@@ -114,7 +117,7 @@ impl Cli {
             Command::Drivers(args) => drivers::run(args, output),
             Command::Tune(args) => tune::run(args, output),
             Command::Render(args) => render::run(args, output),
-            Command::Completions(args) => completions::run(args, output),
+            Command::Completions(args) => completions::run(args, Self::command(), output),
             Command::Metres => anyhow::bail!("the command metres is named sample-size now"),
         }?;
         output.finish()
@@ -133,6 +136,7 @@ impl Command {
             | Self::Lots(lots::LotsArgs { json })
             | Self::Drivers(drivers::DriversArgs { json, .. }) => json.json,
             Self::Reproduce(_)
+            | Self::Guard(_)
             | Self::Generate(_)
             | Self::Settings(_)
             | Self::Tune(_)

@@ -90,7 +90,7 @@ impl fmt::Display for Range {
         match (self.low.is_included, self.high.is_included) {
             (true, true) => write!(f, "{low} to {high}"),
             (false, true) => write!(f, "more than {low}, at most {high}"),
-            (true, false) => write!(f, "{low} or more, less than {high}"),
+            (true, false) => write!(f, "{low} to below {high}"),
             (false, false) => write!(f, "more than {low}, less than {high}"),
         }
     }

@@ -1,9 +1,8 @@
 //! `completions`: what completes commands and flags in a shell.
 
-use crate::cli::Cli;
 use crate::output::Output;
 use anyhow::Context as _;
-use clap::{Args, CommandFactory as _};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -18,9 +17,9 @@ pub(crate) struct CompletionsArgs {
     shell: Shell,
 }
 
-pub(crate) fn run(args: &CompletionsArgs, output: &Output) -> anyhow::Result<()> {
+pub(crate) fn run(args: &CompletionsArgs, command: Command, output: &Output) -> anyhow::Result<()> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command().bin_name("lotpilot"), "lotpilot", &mut script);
+    clap_complete::generate(args.shell, &mut command.bin_name("lotpilot"), "lotpilot", &mut script);
     output.print(String::from_utf8(script).context("scripts are text")?.trim_end());
     Ok(())
 }

@@ -1,6 +1,6 @@
 //! `render`: pictures of lots, drives, samples and noise.
 
-use super::evaluate;
+use super::{evaluate, reproduce};
 use crate::args::{LayerArgs, OneDirection, noise_levels};
 use crate::console::Console;
 use crate::output::Output;
@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use report::pictures::drawing::Drawing;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
 use report::pictures::{contact_sheet, file_name, lot, noise, samples};
-use report::run_report;
+use report::{reproduction, run_report};
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -69,6 +69,8 @@ pub(crate) enum RenderWhat {
     Noise(RenderNoiseArgs),
     /// The report of a run anew, into its folder and that of `--out`.
     Report(RenderReportArgs),
+    /// docs/results.md and its figures from a finished `reproduce`.
+    Results(RenderResultsArgs),
 }
 
 #[derive(Debug, Clone, Args)]
@@ -76,6 +78,16 @@ pub(crate) struct RenderReportArgs {
     /// Folder of a training or an evaluation.
     #[arg(value_name = "RUN")]
     run: PathBuf,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RenderResultsArgs {
+    /// Folder of a finished `reproduce`.
+    #[arg(value_name = "RUN")]
+    run: PathBuf,
+    /// File to write; figures go to `pictures/results` beside it.
+    #[arg(long, value_name = "FILE.md", default_value = "docs/results.md")]
+    to: PathBuf,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -177,6 +189,7 @@ pub(crate) fn run(args: &RenderArgs, output: &Output) -> anyhow::Result<()> {
         RenderWhat::Samples(what) => render_samples(what, &folder),
         RenderWhat::Noise(what) => render_noise(what, &folder),
         RenderWhat::Report(what) => render_report(&what.run, args.out.is_some().then_some(&folder), output),
+        RenderWhat::Results(what) => render_results(what, output),
     }
 }
 
@@ -397,6 +410,17 @@ fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<(
         args.noise.iter().map(|&noise| (noise.name(), inspect(noise, at_m))).collect();
     let title = format!("{}, {at_m:.1} m along the route, seed {}", trial.lot.name(), args.seed);
     folder.write(&format!("noise-{}", trial.lot.name()), &noise::picture(&title, &levels)?, false)
+}
+
+fn render_results(args: &RenderResultsArgs, output: &Output) -> anyhow::Result<()> {
+    ensure!(
+        run_dir::is_finished(&args.run),
+        "{}: this is no finished run; make one with cargo xtask reproduce",
+        args.run.display()
+    );
+    reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.to)?;
+    output.print(args.to.display());
+    Ok(())
 }
 
 fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyhow::Result<()> {
