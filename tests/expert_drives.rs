@@ -2,7 +2,8 @@
 
 use expert::{ExpertSettings, ScriptedExpert};
 use scenarios::reference::{ReferenceLot, lot};
-use sim::episode::{self, Ending, Episode, EpisodeSettings};
+use sim::episode::{self, Episode, EpisodeSettings};
+use sim::frame::Ending;
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -16,7 +17,7 @@ fn the_expert_drives_every_reference_lot_both_ways_without_a_near_collision() {
         for direction in Direction::BOTH {
             let seed = RootSeed(4);
             let map = Arc::new(Map::build(direction.of(lot(which, seed)), &settings.vehicle).unwrap());
-            let mut expert = ScriptedExpert::new(ExpertSettings::paper(), &settings.vehicle, settings.sensing.geometry);
+            let mut expert = ScriptedExpert::new(ExpertSettings::paper(), &settings);
             let report = episode::run(Episode::new(Arc::clone(&settings), map, seed), &mut expert, &mut ());
             let metrics = &report.metrics;
             assert_eq!(report.ending, Ending::ReachedEnd, "{which:?} {direction:?}");
@@ -42,10 +43,11 @@ fn the_expert_drives_the_example_maps_without_a_near_collision() {
         ("car-park-centre.lot.toml", &Direction::BOTH),
         ("open-lot.csv", &[Direction::Forward]),
     ] {
-        let scenario = scenarios::load::load(&examples.join(file)).unwrap_or_else(|error| panic!("{error}"));
+        let scenario =
+            scenarios::load::load(&examples.join(file), &settings.vehicle).unwrap_or_else(|error| panic!("{error}"));
         for &direction in directions {
             let map = Arc::new(Map::build(direction.of(scenario.clone()), &settings.vehicle).unwrap());
-            let mut expert = ScriptedExpert::new(ExpertSettings::paper(), &settings.vehicle, settings.sensing.geometry);
+            let mut expert = ScriptedExpert::new(ExpertSettings::paper(), &settings);
             let report = episode::run(Episode::new(Arc::clone(&settings), map, RootSeed(4)), &mut expert, &mut ());
             assert_eq!(report.ending, Ending::ReachedEnd, "{file} {direction:?}");
             let metrics = &report.metrics;

@@ -7,7 +7,9 @@
 //! | [`determinism`] | same seed, same bytes, for 1 and 2 threads |
 //! | [`expert_drives`] | the expert on the reference lots |
 //! | [`formats`] | data sets open as NPY, weights as safetensors |
+//! | [`goldens`] | digests of episodes, by layer |
 //! | [`planners`] | model-based planners: naming, parameter files, tuning |
+//! | [`regressions`] | what once went wrong, named by symptom |
 //! | [`reproduce`] | the paper in a box: its report, resumed to the same bytes |
 #![allow(clippy::unwrap_used, reason = "tests")]
 
@@ -16,6 +18,9 @@ mod commands;
 mod determinism;
 mod expert_drives;
 mod formats;
+mod goldens;
+mod import_graph;
 mod planners;
+mod regressions;
 mod reproduce;
 mod tidy;

@@ -199,7 +199,7 @@ impl<'a> Drives<'a> {
 /// The network alone drives one trial of every lot of the evaluation; the expert labels every tick.
 fn rollout(settings: &Settings, policy: &Checkpoint) -> anyhow::Result<Collected> {
     let evaluation = &settings.evaluation;
-    let lots = Lot::parse_all(&evaluation.lots)?;
+    let lots = Lot::parse_all(&evaluation.lots, &settings.episode.vehicle)?;
     let trials: Vec<Trial<'_>> =
         Trial::all(evaluation.seed, Purpose::Evaluation, &lots, 1, &evaluation.directions).collect();
     let maps = trials::maps(&trials, &settings.episode)?;

@@ -6,7 +6,8 @@ use experiment::replay_key::ReplayKey;
 use experiment::settings::NoiseChoice;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use sim::episode::{Ending, EpisodeReport};
+use sim::episode::EpisodeReport;
+use sim::frame::Ending;
 use sim::scenario::Direction;
 use std::path::Path;
 

@@ -56,7 +56,7 @@ impl EvaluationResults {
             .training
             .lots
             .iter()
-            .filter_map(|spec| Lot::parse_all(&[spec]).ok())
+            .filter_map(|spec| Lot::parse_all(&[spec], &plan.settings.episode.vehicle).ok())
             .flatten()
             .map(|lot| lot.group())
             .collect();

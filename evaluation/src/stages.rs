@@ -254,11 +254,11 @@ const TRAINED_PER_S: f64 = 1.2e10;
 impl Stage {
     /// About how long it takes, seconds.
     pub fn estimate_s(&self) -> f64 {
-        let Settings { training, evaluation, dagger, .. } = &self.settings;
+        let Settings { training, evaluation, dagger, episode, .. } = &self.settings;
         let runs = |lots: &[String], ways: usize, trials: u32, is_training: bool| {
             // In training, generated lots are driven once.
             let trials = |lot: &Lot| if is_training && lot.is_generated() { 1.0 } else { f64::from(trials) };
-            let of_each_way: f64 = Lot::parse_all(lots).unwrap_or_default().iter().map(trials).sum();
+            let of_each_way: f64 = Lot::parse_all(lots, &episode.vehicle).unwrap_or_default().iter().map(trials).sum();
             of_each_way * ways as f64
         };
         let rounds = f64::from(dagger.iterations_max);

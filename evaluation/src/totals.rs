@@ -2,7 +2,8 @@
 
 use crate::statistics::poisson::Rate;
 use serde::Serialize;
-use sim::episode::{Ending, EpisodeReport};
+use sim::episode::EpisodeReport;
+use sim::frame::Ending;
 
 /// Sums over runs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]

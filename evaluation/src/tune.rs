@@ -19,7 +19,8 @@ use planners::Baseline;
 use planners::search::{GENERATION, Search};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sim::episode::{Episode, EpisodeSettings, Event};
+use sim::episode::{Episode, EpisodeSettings};
+use sim::frame::Event;
 use sim::map::Map;
 use sim::seed::RootSeed;
 use std::ops::ControlFlow;
@@ -42,7 +43,7 @@ pub fn tune(
     progress: &dyn Progress,
 ) -> anyhow::Result<Vec<Found>> {
     let evaluation = &settings.evaluation;
-    let lots = Lot::parse_all(&evaluation.lots)?;
+    let lots = Lot::parse_all(&evaluation.lots, &settings.episode.vehicle)?;
     check(&lots)?;
     progress.begin("lots", "drawing lots");
     let course = Course::new(settings, &lots, evaluation.noise[0])?;

@@ -12,7 +12,8 @@ use anyhow::ensure;
 use rayon::prelude::*;
 use sim::batch::run_lockstep_until;
 use sim::driver::Fleet;
-use sim::episode::{Episode, EpisodeReport, EpisodeSettings, Frame};
+use sim::episode::{Episode, EpisodeReport, EpisodeSettings};
+use sim::frame::Frame;
 use sim::map::Map;
 use sim::seed::RootSeed;
 use std::ops::ControlFlow;
@@ -90,7 +91,7 @@ impl Replay {
     /// # Errors
     /// If the key names several lots, or one that cannot be driven.
     pub fn new(key: &ReplayKey, episode: &EpisodeSettings) -> anyhow::Result<Self> {
-        let mut lots = Lot::parse_all(std::slice::from_ref(&key.lot))?;
+        let mut lots = Lot::parse_all(std::slice::from_ref(&key.lot), &episode.vehicle)?;
         ensure!(lots.len() == 1, "{:?} stands for {} lots; name one, as in test-hard-7", key.lot, lots.len());
         let lot = lots.remove(0);
         let map = Arc::new(Trial::of_evaluation(key.seed, &lot, key.direction, key.trial).map(episode)?);

@@ -279,7 +279,7 @@ impl NamedDriver {
 
 /// A fresh expert.
 pub fn expert(settings: &ExpertSettings, episode: &EpisodeSettings) -> ScriptedExpert {
-    ScriptedExpert::new(settings.clone(), &episode.vehicle, episode.sensing.geometry)
+    ScriptedExpert::new(settings.clone(), episode)
 }
 
 /// Parameters of a planner on disk.

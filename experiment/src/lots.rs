@@ -4,10 +4,11 @@ use anyhow::ensure;
 use scenarios::LotSpec;
 use scenarios::generator;
 use scenarios::import::MapLot;
-use scenarios::reference::ReferenceLot;
+use scenarios::reference::{self, ReferenceLot};
 use scenarios::split::Split;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
+use sim::vehicle::VehicleSettings;
 use std::path::Path;
 
 /// A lot, before a trial has drawn its obstacles.
@@ -42,15 +43,15 @@ pub const SPECS: [(&str, &str); 9] = [
 ];
 
 impl Lot {
-    /// The lots that specs stand for.
+    /// The lots that specs stand for. Files are checked with the car that is to drive there.
     ///
     /// # Errors
     /// If nothing is named so, a file does not describe a lot, or two lots have the same name.
-    pub fn parse_all<S: AsRef<str>>(specs: &[S]) -> anyhow::Result<Vec<Self>> {
+    pub fn parse_all<S: AsRef<str>>(specs: &[S], vehicle: &VehicleSettings) -> anyhow::Result<Vec<Self>> {
         let mut lots: Vec<Self> = Vec::new();
         for spec in specs {
             for spec in scenarios::suite(spec.as_ref())? {
-                lots.push(Self::new(spec)?);
+                lots.push(Self::new(spec, vehicle)?);
             }
         }
         let mut names: Vec<&str> = lots.iter().map(Self::name).collect();
@@ -60,9 +61,9 @@ impl Lot {
         Ok(lots)
     }
 
-    fn new(spec: LotSpec) -> anyhow::Result<Self> {
+    fn new(spec: LotSpec, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
         let from_file = match &spec {
-            LotSpec::File(path) => Some(scenarios::load::load(path)?),
+            LotSpec::File(path) => Some(scenarios::load::load(path, vehicle)?),
             LotSpec::Reference(_) | LotSpec::Generated { .. } => None,
         };
         let name = from_file.as_ref().map_or_else(|| spec.to_string(), |scenario| scenario.name.clone());
@@ -73,8 +74,8 @@ impl Lot {
     ///
     /// # Errors
     /// If no lot can be made of it.
-    pub fn of_map(path: &Path, lot: &MapLot) -> anyhow::Result<Self> {
-        let scenario = lot.scenario()?;
+    pub fn of_map(path: &Path, lot: &MapLot, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
+        let scenario = lot.scenario(vehicle)?;
         Ok(Self { name: scenario.name.clone(), spec: LotSpec::File(path.to_owned()), from_file: Some(scenario) })
     }
 
@@ -134,14 +135,14 @@ impl Lot {
 
     /// The lot with the obstacles of a trial.
     pub fn draw(&self, trial: RootSeed) -> Drawn {
-        match (&self.from_file, &self.spec) {
-            (Some(scenario), _) => Drawn { scenario: scenario.clone(), attempts: None },
-            (None, LotSpec::Generated { split, difficulty, index }) => {
+        match &self.spec {
+            LotSpec::Reference(lot) => Drawn { scenario: reference::lot(*lot, trial), attempts: None },
+            LotSpec::Generated { split, difficulty, index } => {
                 let generated = generator::generate(*split, *index, *difficulty);
                 Drawn { scenario: generated.scenario, attempts: Some(generated.attempts) }
             }
-            (None, spec) => {
-                let scenario = spec.scenario(trial).expect("only files can be wrong, and they are read already");
+            LotSpec::File(_) => {
+                let scenario = self.from_file.clone().expect("files are read when they are named");
                 Drawn { scenario, attempts: None }
             }
         }
@@ -155,7 +156,7 @@ mod tests {
     #[test]
     fn names_become_lots_and_doubles_are_refused() {
         let names = |specs: &[&str]| {
-            let lots = Lot::parse_all(specs)?;
+            let lots = Lot::parse_all(specs, &VehicleSettings::hyundai_hg300())?;
             Ok::<_, anyhow::Error>(lots.iter().map(|lot| lot.name().to_owned()).collect::<Vec<_>>())
         };
         assert_eq!(names(&["lot-a", "test:2"]).unwrap(), ["lot-a", "test-medium-0", "test-medium-1"]);
@@ -172,7 +173,8 @@ mod tests {
     #[test]
     fn every_round_of_training_has_generated_lots_of_its_own() {
         let names = |round| -> Vec<String> {
-            let lots = Lot::parse_all(&["lot-a", "train:2", "train:1:hard"]).unwrap();
+            let lots =
+                Lot::parse_all(&["lot-a", "train:2", "train:1:hard"], &VehicleSettings::hyundai_hg300()).unwrap();
             let of_a_kind = |lot: &Lot| lots.iter().filter(|other| other.group() == lot.group()).count() as u64;
             lots.iter().map(|lot| lot.in_round(round, of_a_kind(lot)).name().to_owned()).collect()
         };

@@ -11,7 +11,8 @@ use policy::dagger::{Hooks, Outcome, Progress as DaggerProgress};
 use policy::dataset::store::Store;
 use policy::fit::{FitProgress, FitReport};
 use sim::driver::Source;
-use sim::episode::{Episode, Frame};
+use sim::episode::Episode;
+use sim::frame::Frame;
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -21,7 +22,7 @@ use std::path::Path;
 /// # Errors
 /// If a lot cannot be driven, or a file cannot be read or written. Cancelling is no error: the outcome says so.
 pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<Outcome> {
-    let lots = Lot::parse_all(&settings.training.lots)?;
+    let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     // A lot that cannot be driven is found here, with its error, not in the middle of a round.
     episodes_of(settings, &lots, 0)?;
     let store = Store::open(run.path())?;

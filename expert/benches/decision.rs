@@ -39,7 +39,7 @@ fn bench(bencher: divan::Bencher<'_, '_>, name: char, sees: Sees) {
     let settings = EpisodeSettings::paper();
     let map = Arc::new(Map::build(lot(which, RootSeed(1)), &settings.vehicle).expect("reference lots are valid"));
     let expert = ExpertSettings { sees, ..ExpertSettings::paper() };
-    let new_driver = || ScriptedExpert::new(expert.clone(), &settings.vehicle, settings.sensing.geometry);
+    let new_driver = || ScriptedExpert::new(expert.clone(), &settings);
 
     let mut episode = Episode::new(Arc::new(settings.clone()), Arc::clone(&map), RootSeed(1));
     let mut driver = new_driver();

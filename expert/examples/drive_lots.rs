@@ -1,6 +1,6 @@
 //! Drives the scripted expert over the reference lots and prints what came of it.
 //!
-//! `cargo run -p expert --example drive_lots -- --seeds 20 --lots a --set station_share=0.7`
+//! `cargo run -p expert --example drive_lots -- --seeds 20 --lots a --set arc_reach_share=0.7`
 #![allow(clippy::print_stdout, reason = "a tool that prints")]
 #![allow(clippy::disallowed_methods, reason = "it also times: microseconds per decision")]
 
@@ -13,7 +13,8 @@ use expert::{ExpertSettings, ExpertStats, Rule, ScriptedExpert};
 use rayon::prelude::*;
 use scenarios::reference::{ReferenceLot, lot};
 use sim::driver::Driver;
-use sim::episode::{Episode, EpisodeReport, EpisodeSettings, Event, Frame};
+use sim::episode::{Episode, EpisodeReport, EpisodeSettings};
+use sim::frame::{Event, Frame};
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -94,7 +95,7 @@ fn drive(expert: &ExpertSettings, which: ReferenceLot, direction: Direction, see
     let settings = Arc::new(EpisodeSettings::paper());
     let scenario = direction.of(lot(which, RootSeed(seed)));
     let map = Arc::new(Map::build(scenario, &settings.vehicle).expect("reference lots are valid"));
-    let mut driver = ScriptedExpert::new(expert.clone(), &settings.vehicle, settings.sensing.geometry);
+    let mut driver = ScriptedExpert::new(expert.clone(), &settings);
     let mut episode = Episode::new(Arc::clone(&settings), map, RootSeed(seed));
     let mut seconds = 0.0;
     let mut incidents = Vec::new();

@@ -92,7 +92,7 @@ fn drive(expert: &ExpertSettings, which: ReferenceLot, direction: Direction, see
     let settings = Arc::new(EpisodeSettings::paper());
     let scenario = direction.of(lot(which, RootSeed(seed)));
     let map = Arc::new(Map::build(scenario, &settings.vehicle).expect("reference lots are valid"));
-    let mut driver = ScriptedExpert::new(expert.clone(), &settings.vehicle, settings.sensing.geometry);
+    let mut driver = ScriptedExpert::new(expert.clone(), &settings);
     let mut episode = Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(seed));
     let mut moves = Vec::new();
     while episode.ending().is_none() {
@@ -115,7 +115,7 @@ fn drive(expert: &ExpertSettings, which: ReferenceLot, direction: Direction, see
 }
 
 fn fresh_answer(asked: Asked, settings: &EpisodeSettings, map: &Map, progress_m: f32) -> LookAheadPoint {
-    let mut driver = ScriptedExpert::new(asked.settings, &settings.vehicle, settings.sensing.geometry);
+    let mut driver = ScriptedExpert::new(asked.settings, settings);
     let truth = GroundTruth { map, vehicle: asked.vehicle, progress_m };
     driver.decide(&Situation { observation: &Observation::default(), truth }).look_ahead
 }

@@ -1,8 +1,9 @@
-//! The way ahead as an elastic band: a plan's way, pulled into the middle of the free space and straightened.
+//! The way ahead as an elastic band (Quinlan & Khatib 1993): a plan's way, pulled into the middle of the free space and
+//! straightened.
 //!
-//! The plans of the search are two arcs out of a few hundred. Which of them wins changes with centimetres, and so
-//! would a label taken from the winner; no network could learn that from a grid of half-metre cells. The band forgets
-//! which plan it came from: it is where a person would drive, and it lies still in the world while the car moves.
+//! A plan of the search is two arcs out of a few hundred. Centimetres decide which plan wins, and so would a label taken
+//! from the winner; no network could learn that from a grid of half-metre cells. The relaxed band hardly depends on the
+//! plan it came from: it lies where a person would drive, and stays in place while the car moves.
 
 use crate::settings::ElasticBandSettings;
 use sim::distance_field::DistanceField;
@@ -226,7 +227,8 @@ mod tests {
         field.carve_disc(Vec2::new(6.0, 1.1), 0.5);
         field.carve_disc(Vec2::new(11.0, -1.2), 0.6);
         for (rounds, stiffness_m) in [(0, 0.6), (1, 0.6), (7, 1.2), (60, 0.6), (60, 3.0), (5, 9.0)] {
-            let settings = ElasticBandSettings { iterations: rounds, stiffness_m, ..ExpertSettings::paper().band };
+            let settings =
+                ElasticBandSettings { iterations: rounds, stiffness_m, ..ExpertSettings::paper().elastic_band };
             let way = (0..20).map(|i| Vec2::new(0.6 * i as f32, 0.02 * (i * i % 17) as f32));
             let (mut band, mut expected) = (ElasticBand::along(way.clone(), Vec2::X), ElasticBand::along(way, Vec2::X));
             band.relax(&field, &settings);

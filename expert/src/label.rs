@@ -1,16 +1,16 @@
 //! From an arc to a look-ahead point: how far along (which decides the speed), and how fast it may move.
 
+use crate::context::ExpertContext;
 use crate::elastic_band::{self, ElasticBand};
 use crate::line_of_sight::LineOfSight;
 use crate::settings::ExpertSettings;
 use sim::driver::{GroundTruth, LookAheadPoint};
 use sim::geometry::{Pose, Vec2};
-use sim::sensing::GridGeometry;
-use sim::vehicle::VehicleSettings;
 
-/// Step of the march along a label's arc, metres.
+/// Step along a label's arc, metres.
 const MARCH_M: f32 = 0.2;
-/// A look-ahead point as pure pursuit drives it: a circle through the rear axle and a place on it.
+
+/// A look-ahead point as pure pursuit follows it: a circle through the rear axle and a place on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Label {
     /// Curvature of the circle, 1/m, positive to the left.
@@ -41,11 +41,11 @@ impl Label {
         share.abs().powf(1.0 / 1.5).copysign(share)
     }
 
-    /// Moves from the last label towards this one, within the limits of a tick. The speed of the wheels limits the
-    /// car anyway; what is limited here is that labels of neighbouring ticks contradict each other.
+    /// Moves from the last label towards this one, within the limits of a tick. The steering rate limits the car anyway;
+    /// these limits keep the labels of neighbouring ticks from contradicting each other.
     pub(crate) fn smoothed(self, last: Self, settings: &ExpertSettings) -> Self {
-        let sideways_per_m = 2.0 * settings.label_sideways_step_m / (last.arc_length_m * last.arc_length_m);
-        let step_per_m = settings.label_curvature_step_per_m.min(sideways_per_m);
+        let lateral_per_m = 2.0 * settings.label_lateral_step_m / (last.arc_length_m * last.arc_length_m);
+        let step_per_m = settings.label_curvature_step_per_m.min(lateral_per_m);
         let curvature_per_m =
             self.curvature_per_m.clamp(last.curvature_per_m - step_per_m, last.curvature_per_m + step_per_m);
         let arc_length_m = self.arc_length_m.clamp(
@@ -60,8 +60,7 @@ impl Label {
 #[derive(Debug)]
 pub(crate) struct Ground<'a> {
     pub(crate) settings: &'a ExpertSettings,
-    pub(crate) vehicle: &'a VehicleSettings,
-    pub(crate) geometry: &'a GridGeometry,
+    pub(crate) context: &'a ExpertContext,
     pub(crate) truth: &'a GroundTruth<'a>,
     pub(crate) sight: &'a LineOfSight,
 }
@@ -70,20 +69,20 @@ impl Ground<'_> {
     /// The point of an arc: far where the way is free (the paper's third rule), and near where it is not, which is
     /// slow. `first_free_m` and `plan_free_m` are travels of the bumper.
     pub(crate) fn label_on(&self, curvature_per_m: f32, first_free_m: f32, plan_free_m: f32) -> Label {
-        let point_free_m = self.drivable_station(curvature_per_m) - self.vehicle.front_m();
+        let point_free_m = self.drivable_arc_length_m(curvature_per_m) - self.context.vehicle.front_m();
         let free_m = first_free_m.max(point_free_m.min(plan_free_m));
-        let arc_length_m = self.vehicle.front_m() + self.settings.station_share * free_m;
+        let arc_length_m = self.context.vehicle.front_m() + self.settings.arc_reach_share * free_m;
         self.kept_drivable(Label { curvature_per_m, arc_length_m })
     }
 
     /// How far along a band a point can be seen and reached over open ground, metres from the rear axle: the paper's
     /// third rule. Where the arc to a point comes near a boundary, it fades.
     pub(crate) fn open_way_m(&self, band: &ElasticBand) -> f32 {
-        let near_m = self.geometry.near_edge_ahead_m;
+        let near_m = self.context.geometry().near_edge_ahead_m;
         let mut reach_m = near_m;
         let mut open = 1.0_f32;
         let mut travel_m = near_m + elastic_band::SPACING_M;
-        let settings = &self.settings.band;
+        let settings = &self.settings.elastic_band;
         let (mut low, mut high) = (0.0_f32, 0.0_f32);
         let reference = self.truth.vehicle.pose.ahead();
         while travel_m <= band.length_m() && open > 0.0 {
@@ -104,8 +103,8 @@ impl Ground<'_> {
 
     /// Whether the point after some travel lies in the open and the arc to it follows the band, 0…1.
     ///
-    /// It does not matter how near the arc comes to a boundary: in a lane that would hang on centimetres that no grid
-    /// of half-metre cells shows.
+    /// How near the arc comes to a boundary does not count: in a lane that would depend on centimetres that no grid of
+    /// half-metre cells shows.
     fn openness(&self, band: &ElasticBand, travel_m: f32) -> f32 {
         let target = band.at(travel_m);
         if !self.sight.knows(target) {
@@ -118,7 +117,7 @@ impl Ground<'_> {
             .map(|point| distance_to_arc_m(curvature_per_m, world_from_ego.inverse_point(point)))
             .fold(0.0, f32::max);
         let gap_m = self.truth.map.distance_field().at(target);
-        let settings = &self.settings.band;
+        let settings = &self.settings.elastic_band;
         let follows = (settings.aside_to_m - aside_m) / (settings.aside_to_m - settings.aside_from_m);
         let is_open = (gap_m - settings.gap_from_m) / (settings.gap_to_m - settings.gap_from_m);
         follows.min(is_open).clamp(0.0, 1.0)
@@ -126,22 +125,22 @@ impl Ground<'_> {
 
     /// The nearest point of an arc: the slowest.
     pub(crate) fn nearest_label_on(&self, curvature_per_m: f32) -> Label {
-        Label { curvature_per_m, arc_length_m: self.stations(curvature_per_m).0 }
+        Label { curvature_per_m, arc_length_m: self.arc_lengths_in_patch_m(curvature_per_m).0 }
     }
 
     /// Rule one: the point lies inside drivable space, and inside the patch.
     pub(crate) fn kept_drivable(&self, label: Label) -> Label {
         let max_per_m = self.settings.curvature_max_per_m;
         let label = Label { curvature_per_m: label.curvature_per_m.clamp(-max_per_m, max_per_m), ..label };
-        let (near_m, far_m) = self.stations(label.curvature_per_m);
+        let (near_m, far_m) = self.arc_lengths_in_patch_m(label.curvature_per_m);
         let drivable_m =
-            if label.arc_length_m <= near_m { near_m } else { self.drivable_station(label.curvature_per_m) };
+            if label.arc_length_m <= near_m { near_m } else { self.drivable_arc_length_m(label.curvature_per_m) };
         Label { arc_length_m: label.arc_length_m.min(drivable_m).clamp(near_m, far_m), ..label }
     }
 
     /// How far along an arc every point keeps its clearance, metres from the rear axle, within the patch.
-    fn drivable_station(&self, curvature_per_m: f32) -> f32 {
-        let (near_m, far_m) = self.stations(curvature_per_m);
+    fn drivable_arc_length_m(&self, curvature_per_m: f32) -> f32 {
+        let (near_m, far_m) = self.arc_lengths_in_patch_m(curvature_per_m);
         let field = self.truth.map.distance_field();
         let world_from_ego = self.truth.vehicle.pose.world_from_ego();
         let mut arc_length_m = near_m;
@@ -157,15 +156,16 @@ impl Ground<'_> {
     }
 
     /// Arc lengths at which an arc enters the patch, and at which it leaves it or has turned as far as a label may.
-    fn stations(&self, curvature_per_m: f32) -> (f32, f32) {
+    fn arc_lengths_in_patch_m(&self, curvature_per_m: f32) -> (f32, f32) {
         // X = sin(κs)/κ and |Y| = (1 − cos(κs))/|κ|, kept a millimetre inside.
         let kappa = curvature_per_m.abs().max(1e-5);
-        let (near_x, far_x) = (self.geometry.near_edge_ahead_m + 1e-3, self.geometry.far_edge_ahead_m() - 1e-3);
-        let half_y = 0.5 * self.geometry.side_m - 1e-3;
-        let station_at_x = |x_m: f32| (kappa * x_m).min(1.0).asin() / kappa;
-        let station_at_y = |y_m: f32| (1.0 - kappa * y_m).max(-1.0).acos() / kappa;
-        let near_m = station_at_x(near_x);
-        let far_m = station_at_x(far_x).min(station_at_y(half_y)).min(self.settings.label_turn_max_rad / kappa);
+        let geometry = self.context.geometry();
+        let (near_x, far_x) = (geometry.near_edge_ahead_m + 1e-3, geometry.far_edge_ahead_m() - 1e-3);
+        let half_y = 0.5 * geometry.side_m - 1e-3;
+        let arc_length_at_x = |x_m: f32| (kappa * x_m).min(1.0).asin() / kappa;
+        let arc_length_at_y = |y_m: f32| (1.0 - kappa * y_m).max(-1.0).acos() / kappa;
+        let near_m = arc_length_at_x(near_x);
+        let far_m = arc_length_at_x(far_x).min(arc_length_at_y(half_y)).min(self.settings.label_turn_max_rad / kappa);
         (near_m, far_m.max(near_m))
     }
 }

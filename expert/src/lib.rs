@@ -5,18 +5,20 @@
 //!    around the way to it.
 //! 3. Otherwise it lies as far ahead as possible inside drivable space.
 //!
-//! The paper says no more. Here, a decision takes four steps, each a file:
+//! The paper gives no more detail. Here, a decision takes four steps, each in a file:
 //!
 //! - `search`: plans of two arcs each, forecast with the car's body and the speed of its steering (`rollout`); the best
 //!   one says whether, where and with how much clearance what is ahead can be avoided (rule two);
-//! - `band`: its way, pulled into the middle of the free space, which no longer depends on which plan it came from;
+//! - `elastic_band`: the way of that plan, pulled into the middle of the free space, so that it no longer depends on
+//!   which plan it came from;
 //! - `label`: the point on that way, half as far as the way is open (rule three; the paper's half "for safety reasons",
 //!   see [`sim::controller::SpeedLaw`]) and drivable (rule one), and smoothed from tick to tick;
 //! - `stats`: which rule it was.
 //!
-//! How the numbers came about is in methods.md 3 and expert-findings.md. The expert decides from the clean scene around
-//! the car. The route serves one purpose only: a plan that turns back is refused. Same situation and memory, same bytes.
+//! Where the numbers come from is in docs/methods.md 3 and E5. The expert decides from the clean scene around the car.
+//! The route has one purpose: a plan that turns back is refused. The same situation and memory give the same bytes.
 
+mod context;
 mod elastic_band;
 mod label;
 mod line_of_sight;
@@ -29,6 +31,7 @@ pub use search::Candidate;
 pub use settings::{ExpertSettings, PlanWeights, Sees};
 pub use stats::{ExpertStats, Rule};
 
+use context::ExpertContext;
 use elastic_band::ElasticBand;
 use label::{Ground, Label};
 use line_of_sight::LineOfSight;
@@ -36,37 +39,33 @@ use rand::Rng as _;
 use rollout::{Footprint, Motion};
 use search::{Arcs, Plan, Search};
 use sim::driver::{Decision, Driver, GroundTruth, LookAheadPoint, Situation, Source};
+use sim::episode::EpisodeSettings;
 use sim::geometry::Vec2;
 use sim::seed::{Rng, RootSeed, Stream};
-use sim::sensing::GridGeometry;
-use sim::vehicle::VehicleSettings;
 use std::collections::VecDeque;
 
-/// Two labels farther apart than this contradict each other, metres.
+/// Consecutive labels farther apart than this count as a jump, metres.
 const JUMP_M: f32 = 1.0;
 /// Ranges at which steering at the smoothed way is tried, from the open one to the nearest.
 const RANGES: usize = 5;
-/// Control period, seconds (paper: 20 Hz). Limits of labels are per tick; only the reaction delay is a time.
-const CONTROL_PERIOD_S: f32 = 0.05;
 
 /// The expert at the wheel.
 #[derive(Debug, Clone)]
 pub struct ScriptedExpert {
     settings: ExpertSettings,
-    vehicle: VehicleSettings,
-    geometry: GridGeometry,
+    context: ExpertContext,
     footprint: Footprint,
     arcs: Arcs,
-    /// What was decided last; all of the expert's memory when delay and jitter are off.
+    /// The last decision: the expert's only memory while delay and jitter are off.
     last: Option<Label>,
-    /// Points decided but not yet said (reaction delay).
-    unsaid: VecDeque<LookAheadPoint>,
+    /// Points decided but not yet answered (reaction delay).
+    delayed: VecDeque<LookAheadPoint>,
     jitter: Rng,
     stats: ExpertStats,
     inspection: Option<Inspection>,
 }
 
-/// How the last decision came about.
+/// How a decision was reached.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inspection {
     /// Which rule fired.
@@ -94,15 +93,14 @@ struct Wish {
 }
 
 impl ScriptedExpert {
-    /// An expert for a vehicle and the patch its points must lie in.
-    pub fn new(settings: ExpertSettings, vehicle: &VehicleSettings, geometry: GridGeometry) -> Self {
+    /// An expert for the vehicle, camera and controller of an episode.
+    pub fn new(settings: ExpertSettings, episode: &EpisodeSettings) -> Self {
         Self {
-            footprint: Footprint::new(vehicle, settings.nose_margin_m, settings.disc_relief_m),
+            footprint: Footprint::new(&episode.vehicle, settings.nose_margin_m, settings.disc_relief_m),
             arcs: Arcs::new(&settings),
-            vehicle: vehicle.clone(),
-            geometry,
+            context: ExpertContext::of(episode),
             last: None,
-            unsaid: VecDeque::new(),
+            delayed: VecDeque::new(),
             jitter: RootSeed(0).rng(Stream::Expert, 0),
             stats: ExpertStats::default(),
             inspection: None,
@@ -127,7 +125,7 @@ impl ScriptedExpert {
         &self.settings
     }
 
-    /// Decides and says how: costs about twice a decision.
+    /// Decides and explains the decision. Takes about twice as long as deciding.
     pub fn inspect(&mut self, situation: &Situation<'_>) -> (Decision, Inspection) {
         self.inspection = Some(Inspection::empty());
         let decision = self.decide(situation);
@@ -139,7 +137,7 @@ impl ScriptedExpert {
     fn wish(&self, truth: &GroundTruth<'_>, sight: &LineOfSight, mut inspection: Option<&mut Inspection>) -> Wish {
         let search = Search {
             settings: &self.settings,
-            vehicle: &self.vehicle,
+            context: &self.context,
             footprint: &self.footprint,
             arcs: &self.arcs,
             truth,
@@ -193,12 +191,12 @@ impl ScriptedExpert {
     /// The label on the smoothed way: half as far ahead as that is open, steering at the farthest point that it is safe
     /// to steer at; in corners, and where pursuing the way is never safe, the plan's own arc.
     ///
-    /// Every share falls to 0 gradually, so that a small change of the scene moves the label a little.
+    /// Every share fades to 0 gradually, so a small change of the scene moves the label little.
     fn smoothed(&self, search: &Search<'_>, ground: &Ground<'_>, plan: &Plan, arc: Label) -> Label {
         let mut band = ElasticBand::along(search.way(plan, elastic_band::SPACING_M), search.start.ahead);
-        band.relax(search.truth.map.distance_field(), &self.settings.band);
+        band.relax(search.truth.map.distance_field(), &self.settings.elastic_band);
         let open_m = ground.open_way_m(&band);
-        let settings = &self.settings.band;
+        let settings = &self.settings.elastic_band;
         // From the preferred range to the nearest, each takes the share it deserves of what is left.
         let near_m = settings.steer_near_m;
         let turn_rad = search.truth.vehicle.pose.ahead().angle_to(band.heading_at(settings.steer_m)).abs();
@@ -215,7 +213,7 @@ impl ScriptedExpert {
             }
         }
         curvature_per_m += rest * arc.curvature_per_m;
-        let front_m = self.vehicle.front_m();
+        let front_m = self.context.vehicle.front_m();
         let arc_length_m = front_m + (settings.reach_share * (open_m - front_m)).min(settings.reach_max_m);
         ground.kept_drivable(Label { curvature_per_m, arc_length_m })
     }
@@ -223,40 +221,41 @@ impl ScriptedExpert {
     /// The car when it begins to obey: the dead time further on, steering at the last label meanwhile.
     fn when_obeyed(&self, truth: &GroundTruth<'_>) -> Motion {
         let state = truth.vehicle;
-        let curvature_per_m = state.curvature_per_m(&self.vehicle);
+        let vehicle = &self.context.vehicle;
+        let curvature_per_m = state.curvature_per_m(vehicle);
         let mut motion = Motion::new(state.pose, curvature_per_m);
-        let dead_time_s = self.vehicle.dead_time_s;
-        let change_per_m = self.vehicle.steering_rate_max_radps / self.vehicle.wheelbase_m * dead_time_s;
+        let dead_time_s = vehicle.dead_time_s;
+        let change_per_m = vehicle.steering_rate_max_radps / vehicle.wheelbase_m * dead_time_s;
         let pending_per_m = self.last.map_or(curvature_per_m, |last| last.curvature_per_m);
         motion.step(pending_per_m, change_per_m, state.speed_mps * dead_time_s);
         motion
     }
 
     fn ground<'a>(&'a self, truth: &'a GroundTruth<'a>, sight: &'a LineOfSight) -> Ground<'a> {
-        Ground { settings: &self.settings, vehicle: &self.vehicle, geometry: &self.geometry, truth, sight }
+        Ground { settings: &self.settings, context: &self.context, truth, sight }
     }
 
-    /// Reaction delay and jitter of a human hand; both are off by default.
-    fn said(&mut self, decided: LookAheadPoint) -> LookAheadPoint {
-        let delay_ticks = (self.settings.reaction_delay_s / CONTROL_PERIOD_S).round() as usize;
-        self.unsaid.push_back(decided);
+    /// Adds the reaction delay and the jitter of a human hand; both are off by default.
+    fn as_by_hand(&mut self, decided: LookAheadPoint) -> LookAheadPoint {
+        let delay_ticks = (self.settings.reaction_delay_s / self.context.control_period_s).round() as usize;
+        self.delayed.push_back(decided);
         let point =
-            if self.unsaid.len() > delay_ticks { self.unsaid.pop_front() } else { self.unsaid.front().copied() };
+            if self.delayed.len() > delay_ticks { self.delayed.pop_front() } else { self.delayed.front().copied() };
         let point = point.unwrap_or(decided);
         if self.settings.label_jitter == 0.0 {
             return point;
         }
-        let [u, w] = point.to_image_fraction(&self.geometry);
+        let [u, w] = point.to_image_fraction(self.context.geometry());
         let sigma = self.settings.label_jitter;
         let [u, w] = [u, w].map(|fraction| (fraction + sigma * standard_normal(&mut self.jitter)).clamp(0.0, 1.0));
-        LookAheadPoint::from_image_fraction([u, w], &self.geometry)
+        LookAheadPoint::from_image_fraction([u, w], self.context.geometry())
     }
 }
 
 impl Driver for ScriptedExpert {
     fn decide(&mut self, situation: &Situation<'_>) -> Decision {
         let truth = &situation.truth;
-        let sight = LineOfSight::new(self.settings.sees, truth.map, truth.vehicle.pose, self.geometry);
+        let sight = LineOfSight::new(self.settings.sees, truth.map, truth.vehicle.pose, &self.context.sensing);
         let mut inspection = self.inspection.take();
         let wish = self.wish(truth, &sight, inspection.as_mut());
         // Rule one has the last word: the point lies inside drivable space.
@@ -270,12 +269,12 @@ impl Driver for ScriptedExpert {
             inspection.decided = label.point();
         }
         self.inspection = inspection;
-        Decision { look_ahead: self.said(label.point()), source: Source::Expert, spread: None }
+        Decision { look_ahead: self.as_by_hand(label.point()), source: Source::Expert, spread: None }
     }
 
     fn reset(&mut self) {
         self.last = None;
-        self.unsaid.clear();
+        self.delayed.clear();
     }
 }
 

@@ -1,27 +1,25 @@
-//! Which ground is known to the expert.
+//! Which ground the expert knows.
 
 use crate::settings::Sees;
 use sim::geometry::{Pose, Vec2, WorldFromEgo};
 use sim::map::{Map, Occluder};
-use sim::sensing::GridGeometry;
+use sim::sensing::{GridGeometry, SensingSettings};
 
 /// Bearings into which the half plane ahead of the camera is divided.
 const BEARINGS: usize = 128;
-/// The camera, ahead of the rear axle, metres (methods.md 9.2).
-const CAMERA_AHEAD_M: f32 = 1.59;
-/// Things at least this high hide the ground behind them out of the patch: their shadow is 4.4 times as long as
-/// their range (methods.md 1.7, camera height 1.55 m). Lower things hide little more than themselves.
-const TALL_M: f32 = 1.2;
+/// A thing that hides the ground up to this many times its range or farther hides all ground behind it within the
+/// patch (docs/methods.md 1.7): from 1.2 m on for a camera at 1.55 m. Lower things hide little more than themselves.
+const OCCLUSION_FACTOR_MIN: f32 = 4.4;
 
 /// Which ground is known at one decision: all of it, or what the patch shows.
 #[derive(Debug, Clone)]
-pub(crate) struct LineOfSight(Option<PatchSight>);
+pub(crate) struct LineOfSight(Option<VisiblePatch>);
 
 impl LineOfSight {
-    pub(crate) fn new(sees: Sees, map: &Map, pose: Pose, geometry: GridGeometry) -> Self {
+    pub(crate) fn new(sees: Sees, map: &Map, pose: Pose, sensing: &SensingSettings) -> Self {
         match sees {
             Sees::WholeMap => Self(None),
-            Sees::PatchOnly => Self(Some(PatchSight::new(map, pose, geometry))),
+            Sees::PatchOnly => Self(Some(VisiblePatch::new(map, pose, sensing))),
         }
     }
 
@@ -41,27 +39,38 @@ impl LineOfSight {
     }
 }
 
-/// The patch and the shadows of tall things in it.
+/// The patch without what tall things hide in it.
 #[derive(Debug, Clone)]
-pub(crate) struct PatchSight {
+pub(crate) struct VisiblePatch {
     geometry: GridGeometry,
+    /// Ego frame, metres.
+    camera: Vec2,
     world_from_ego: WorldFromEgo,
     /// Range from the camera at which sight ends, metres, squared, by bearing from right to left.
     range_squared: [f32; BEARINGS],
 }
 
-impl PatchSight {
-    fn new(map: &Map, pose: Pose, geometry: GridGeometry) -> Self {
-        let mut sight =
-            Self { geometry, world_from_ego: pose.world_from_ego(), range_squared: [f32::INFINITY; BEARINGS] };
+impl VisiblePatch {
+    fn new(map: &Map, pose: Pose, sensing: &SensingSettings) -> Self {
+        let geometry = sensing.geometry;
+        let mut patch = Self {
+            geometry,
+            camera: Vec2::new(sensing.camera_ahead_m, 0.0),
+            world_from_ego: pose.world_from_ego(),
+            range_squared: [f32::INFINITY; BEARINGS],
+        };
+        if !sensing.occlusion {
+            return patch;
+        }
+        let tall_m = sensing.camera_height_m * (1.0 - 1.0 / OCCLUSION_FACTOR_MIN);
         let reach_m = geometry.far_edge_ahead_m().hypot(0.5 * geometry.side_m);
         for occluder in map.occluders() {
             let is_near = occluder.centre.distance(pose.position()) < reach_m + occluder.radius_m;
-            if is_near && occluder.height_m >= TALL_M {
-                sight.cast_shadow(occluder);
+            if is_near && occluder.height_m >= tall_m {
+                patch.cast_shadow(occluder);
             }
         }
-        sight
+        patch
     }
 
     #[inline]
@@ -70,14 +79,14 @@ impl PatchSight {
         if in_ego.x < self.geometry.near_edge_ahead_m {
             return true;
         }
-        let from_camera = in_ego - Vec2::new(CAMERA_AHEAD_M, 0.0);
+        let from_camera = in_ego - self.camera;
         self.geometry.contains(in_ego) && from_camera.length_squared() <= self.range_squared[bearing_bin(from_camera)]
     }
 
-    /// LineOfSight ends, by bearing, where a ray from the camera enters the outline.
+    /// The line of sight ends, by bearing, where a ray from the camera enters the outline.
     fn cast_shadow(&mut self, occluder: &Occluder) {
-        let camera = Vec2::new(CAMERA_AHEAD_M, 0.0);
-        let from_camera = |in_world: Vec2| self.world_from_ego.inverse_point(in_world) - camera;
+        let (world_from_ego, camera) = (self.world_from_ego, self.camera);
+        let from_camera = |in_world: Vec2| world_from_ego.inverse_point(in_world) - camera;
         for (a, b) in sim::geometry::edges(&occluder.outline) {
             let (a, b) = (from_camera(a), from_camera(b));
             if a.x < 0.1 || b.x < 0.1 {
@@ -112,29 +121,33 @@ fn bin_centre(bin: usize) -> Vec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sim::scenario::{Obstacle, ObstacleClass, ReferencePath, Scenario};
+    use sim::scenario::{Obstacle, ObstacleClass, Scenario};
+
+    /// What is known at the origin beside a car whose right side is at y = 1.57, from x = 7.65 to 12.35.
+    fn knows(sensing: &SensingSettings, x: f32, y: f32) -> bool {
+        let scenario = Scenario::lane(-40.0..=40.0, 40.0, -20.0..=20.0)
+            .with_obstacles([Obstacle::new(ObstacleClass::Sedan, Pose::new(Vec2::new(10.0, 2.5), 0.0))]);
+        let map = Map::build(scenario, &sim::vehicle::VehicleSettings::hyundai_hg300()).unwrap();
+        LineOfSight::new(Sees::PatchOnly, &map, Pose::default(), sensing).knows(Vec2::new(x, y))
+    }
 
     #[test]
     fn ground_beyond_the_patch_and_behind_a_car_is_unknown() {
-        let scenario = Scenario {
-            name: "yard".to_owned(),
-            boundary: sim::geometry::rectangle(Pose::default(), 80.0, 40.0).to_vec(),
-            reference_path: ReferencePath {
-                points: vec![Vec2::new(-20.0, 0.0), Vec2::new(20.0, 0.0)],
-                corner_radius_m: 0.0,
-            },
-            noise: sim::scenario::LotNoise::default(),
-            islands: Vec::new(),
-            obstacles: vec![Obstacle::new(ObstacleClass::Sedan, Pose::new(Vec2::new(10.0, 2.5), 0.0))],
-            speed_bumps: Vec::new(),
-        };
-        let map = Map::build(scenario, &sim::vehicle::VehicleSettings::hyundai_hg300()).unwrap();
-        let sight = LineOfSight::new(Sees::PatchOnly, &map, Pose::default(), GridGeometry::paper());
-        let knows = |x, y| sight.knows(Vec2::new(x, y));
+        let knows = |x, y| knows(&SensingSettings::paper(), x, y);
         assert!(knows(8.0, 0.0) && knows(16.0, 0.0) && knows(7.0, -5.9), "in the patch");
         assert!(!knows(16.4, 0.0) && !knows(8.0, 6.1), "beyond the patch");
         assert!(knows(0.0, 9.0) && knows(-9.0, 0.0), "beside and behind the car");
-        // Its far right corner stands at (12.35, 1.57): past it one sees what is below y/(x − 1.59) = .146.
+        // Past the far right corner at (12.35, 1.57) one sees what is below y/(x − 1.59) = .146.
         assert!(!knows(14.0, 4.0) && !knows(14.0, 2.1) && knows(14.0, 1.5), "behind the car and past it");
+    }
+
+    #[test]
+    fn ground_is_hidden_from_the_camera_of_the_sensor() {
+        let paper = SensingSettings::paper();
+        assert!(!knows(&paper, 14.0, 1.9));
+        // From x = 7, the line past the corner has a slope of .294, and the point lies at .271.
+        assert!(knows(&SensingSettings { camera_ahead_m: 7.0, ..paper.clone() }, 14.0, 1.9), "farther ahead");
+        assert!(knows(&SensingSettings { camera_height_m: 9.0, ..paper.clone() }, 14.0, 4.0), "above the car");
+        assert!(knows(&SensingSettings { occlusion: false, ..paper }, 14.0, 4.0), "no occlusion");
     }
 }

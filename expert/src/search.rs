@@ -1,16 +1,16 @@
 //! Two-stage look-ahead: first arcs a point can steer at, and second arcs that branch off them.
 //!
-//! One constant arc can express neither "out and back" nor "straight on, then turn" (expert-findings.md 4). A first
+//! One constant arc can express neither "out and back" nor "straight on, then turn" (docs/methods.md E4). A first
 //! arc is therefore as good as the best plan that begins with it: this is the paper's "a point from which avoidance
 //! is possible".
 
+use crate::context::ExpertContext;
 use crate::elastic_band::ElasticBand;
 use crate::line_of_sight::LineOfSight;
 use crate::rollout::{Footprint, Motion};
 use crate::settings::ExpertSettings;
 use sim::driver::GroundTruth;
 use sim::geometry::Vec2;
-use sim::vehicle::VehicleSettings;
 
 /// First arcs to either side of straight on.
 const FIRST_SIDE: usize = 16;
@@ -19,13 +19,13 @@ pub(crate) const FIRST_ARCS: usize = 2 * FIRST_SIDE + 1;
 /// Second arcs to either side of straight on.
 const SECOND_SIDE: usize = 7;
 const SECOND_ARCS: usize = 2 * SECOND_SIDE + 1;
-/// First arcs are densest where a small change of curvature moves a far point most (methods.md 3.2).
+/// First arcs are densest where a small change of curvature moves a far point most (docs/methods.md 3.2).
 const FIRST_EXPONENT: f32 = 1.5;
-/// Second arcs (expert-findings.md 5.1).
+/// Second arcs (docs/methods.md E5.1).
 const SECOND_EXPONENT: f32 = 1.4;
 /// Travels at which second arcs branch off.
 const BRANCHES: usize = 5;
-/// How much nearer than at the start something may come in a tight start, metres: what interpolation rounds away.
+/// Clearance that may be lost in a tight start, metres: the error of the distances' interpolation.
 const START_SLACK_M: f32 = 0.02;
 
 /// Curvatures of both stages, straight on first and then ever tighter, left before right.
@@ -65,7 +65,7 @@ impl Arcs {
 #[derive(Debug)]
 pub(crate) struct Search<'a> {
     pub(crate) settings: &'a ExpertSettings,
-    pub(crate) vehicle: &'a VehicleSettings,
+    pub(crate) context: &'a ExpertContext,
     pub(crate) footprint: &'a Footprint,
     pub(crate) arcs: &'a Arcs,
     pub(crate) truth: &'a GroundTruth<'a>,
@@ -131,7 +131,7 @@ impl Search<'_> {
     pub(crate) fn best_plan(&self, clearance_m: f32, mut candidates: Option<&mut Vec<Candidate>>) -> Option<Plan> {
         let thresholds = self.thresholds(clearance_m);
         let firsts: [FirstArc; FIRST_ARCS] = std::array::from_fn(|i| self.follow_first(i, thresholds));
-        // The most promising first: its plans prune those of the others.
+        // The most promising first: its plans prune the others.
         let mut order: [(f32, usize); FIRST_ARCS] = std::array::from_fn(|i| (self.bound_of_first(&firsts[i]), i));
         order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
 
@@ -203,7 +203,7 @@ impl Search<'_> {
         let (settings, field) = (self.settings, self.truth.map.distance_field());
         let step_m = settings.second_step_m;
         let change_per_m = self.change_per_step(step_m);
-        let of_band = &settings.band;
+        let of_band = &settings.elastic_band;
         let per_m = 1.0 / (of_band.trust_to_m - of_band.trust_from_m);
         let mut motion = self.start;
         let mut trust = 1.0_f32;
@@ -226,8 +226,10 @@ impl Search<'_> {
     /// How far the curvature can change per step at the present speed. Linear in the travel: it takes the rate of
     /// straight wheels, at which the curvature changes slowest.
     fn change_per_step(&self, step_m: f32) -> f32 {
-        let speed_mps = self.truth.vehicle.speed_mps.max(SPEED_MIN_MPS);
-        self.vehicle.steering_rate_max_radps / (self.vehicle.wheelbase_m * speed_mps) * step_m
+        // Standing still, the wheels would turn on the spot.
+        let speed_mps = self.truth.vehicle.speed_mps.max(self.context.speed_min_mps);
+        let vehicle = &self.context.vehicle;
+        vehicle.steering_rate_max_radps / (vehicle.wheelbase_m * speed_mps) * step_m
     }
 
     fn thresholds(&self, clearance_m: f32) -> Thresholds {
@@ -363,17 +365,17 @@ impl Search<'_> {
     /// keeps the car in the middle.
     #[inline]
     fn load(&self, clearance_m: f32) -> f32 {
-        let share = (1.0 - clearance_m / self.settings.load_band_m).clamp(0.0, 1.0);
+        let share = (1.0 - clearance_m / self.settings.load_range_m).clamp(0.0, 1.0);
         share * share
     }
 
-    /// Do not turn back: the bumper gains on the route. A filter only, so that labels remain functions of the scene.
+    /// No turning back: the bumper gains on the route. This only filters plans, so labels remain functions of the scene.
     fn makes_progress(&self, end: &Motion, travel_m: f32) -> bool {
         let path = self.truth.map.path();
-        let reach_m = self.horizon_m + self.vehicle.front_m();
+        let reach_m = self.horizon_m + self.context.vehicle.front_m();
         let progress_of = |motion: &Motion| {
-            let bumper = motion.on_axis(self.vehicle.front_m());
-            path.project_near(bumper, self.truth.progress_m, self.vehicle.front_m(), reach_m + 4.0)
+            let bumper = motion.on_axis(self.context.vehicle.front_m());
+            path.project_near(bumper, self.truth.progress_m, self.context.vehicle.front_m(), reach_m + 4.0)
         };
         let reached_m = progress_of(end);
         // Behind the finish progress saturates.
@@ -381,9 +383,6 @@ impl Search<'_> {
             || reached_m - progress_of(&self.start) >= self.settings.progress_share * travel_m
     }
 }
-
-/// Slowest speed the controller commands, m/s (paper): standing still, the wheels would turn on the spot.
-const SPEED_MIN_MPS: f32 = 0.5;
 
 /// Clearance a forecast must keep.
 #[derive(Debug, Clone, Copy)]

@@ -14,21 +14,21 @@ pub enum Sees {
     PatchOnly,
 }
 
-/// What is good about a plan, and how much it counts in metres of free travel per [`Self::unit_m`].
+/// How plans are scored: free travel in units of [`Self::unit_m`], and the weights of everything else.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlanWeights {
-    /// Free travel that is worth 1, metres (methods.md 3.2: side of the patch).
+    /// Free travel that is worth 1, metres (docs/methods.md 3.2: side of the patch).
     pub unit_m: f32,
-    /// Mean obstacle load along the plan (methods.md 3.2; insensitive between .35 and .7, expert-findings.md 5).
+    /// Mean obstacle load along the plan (docs/methods.md 3.2; insensitive between .35 and .7, docs/methods.md E5).
     pub load: f32,
-    /// Curvature index of the first arc, 0…1 (expert-findings.md 5.1).
+    /// Curvature index of the first arc, 0…1 (docs/methods.md E5.1).
     pub first_curvature: f32,
-    /// Curvature index of the second arc, 0…1 (expert-findings.md 5.1).
+    /// Curvature index of the second arc, 0…1 (docs/methods.md E5.1).
     pub second_curvature: f32,
-    /// Free travel of the first arc alone: longer first arcs are faster by 10 % (expert-findings.md 5.1).
+    /// Free travel of the first arc alone: longer first arcs are faster by 10 % (docs/methods.md E5.1).
     pub first_free: f32,
-    /// Change of the curvature index since the last label, 0…2 (expert-findings.md 5.1).
+    /// Change of the curvature index since the last label, 0…2 (docs/methods.md E5.1).
     pub change: f32,
 }
 
@@ -37,9 +37,9 @@ pub struct PlanWeights {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ElasticBandSettings {
-    /// Rounds of relaxation: a band then hardly remembers which plan it came from.
+    /// Rounds of relaxation: enough that the band hardly depends on the plan it came from.
     pub iterations: u32,
-    /// Something nearer than this pushes the band away, metres: half of the widest lane with a middle.
+    /// Obstacles nearer than this push the band away, metres: half the width of the widest lane with a middle.
     pub comfort_m: f32,
     /// Share of the way to the middle taken per round where one metre is missing on one side.
     pub middle_gain: f32,
@@ -92,65 +92,65 @@ pub struct ExpertSettings {
     pub label_jitter: f32,
 
     /// Tightest arc of a label, 1/m. The tightest circle that meets the patch at all has 1/4.30 m = .2326, but there
-    /// the label's sideways place has infinite slope in the curvature (expert-findings.md 5.6).
+    /// the label's sideways place has infinite slope in the curvature (docs/methods.md E5.6).
     pub curvature_max_per_m: f32,
-    /// Tightest second arc, 1/m: those are never labels (expert-findings.md 5.1).
+    /// Tightest second arc, 1/m: those are never labels (docs/methods.md E5.1).
     pub second_curvature_max_per_m: f32,
-    /// Travels along the first arc at which second arcs branch off, metres, increasing (expert-findings.md 5.1).
+    /// Travels along the first arc at which second arcs branch off, metres, increasing (docs/methods.md E5.1).
     pub branch_travels_m: [f32; 5],
-    /// Length of a forecast, metres (expert-findings.md 5.1; insensitive between 14 and 18).
+    /// Length of a forecast, metres (docs/methods.md E5.1; insensitive between 14 and 18).
     pub horizon_m: f32,
-    /// Step along first arcs, metres (expert-findings.md 5.1).
+    /// Step along first arcs, metres (docs/methods.md E5.1).
     pub first_step_m: f32,
-    /// Step along second arcs, metres (expert-findings.md 5.1).
+    /// Step along second arcs, metres (docs/methods.md E5.1).
     pub second_step_m: f32,
 
     /// Clearance a forecast must keep, metres: the comfortable one first, then what is relaxed to when no plan is
-    /// left (expert-findings.md 5.3: .30 leaves nothing in lanes of 2.7 to 3.0 m).
+    /// left (docs/methods.md E5.3: .30 leaves nothing in lanes of 2.7 to 3.0 m).
     pub clearances_m: [f32; 3],
     /// A plan that is free for less than this does not avoid what is ahead, metres (chosen: the shortest stop from
     /// 0.5 m/s plus the 0.5 m of a near-collision plus a nose margin, with a metre to steer).
     pub avoidable_m: f32,
     /// Within this travel the present clearance is good enough: else a tight start kills every arc, metres
-    /// (expert-findings.md 5.3).
+    /// (docs/methods.md E5.3).
     pub tight_start_m: f32,
-    /// The body is lengthened by this at the nose, metres: mirrors the near-collision rule (expert-findings.md 5.4).
+    /// The body is lengthened by this at the nose, metres: mirrors the near-collision rule (docs/methods.md E5.4).
     pub nose_margin_m: f32,
-    /// Half of what the covering discs overstate the half-width by is given back, metres (expert-findings.md 5.4:
+    /// Half of what the covering discs overstate the half-width by is given back, metres (docs/methods.md E5.4:
     /// radius 1.034 m, clearance = distance − 0.987 m).
     pub disc_relief_m: f32,
-    /// Something nearer than this is an obstacle load, metres (methods.md 3.2).
-    pub load_band_m: f32,
+    /// Something nearer than this is an obstacle load, metres (docs/methods.md 3.2).
+    pub load_range_m: f32,
     /// What makes a plan good.
     pub weights: PlanWeights,
     /// How the way ahead is smoothed.
-    pub band: ElasticBandSettings,
-    /// A plan must gain this share of its travel along the route: no turning back (methods.md 3.2).
+    pub elastic_band: ElasticBandSettings,
+    /// A plan must gain this share of its travel along the route: no turning back (docs/methods.md 3.2).
     pub progress_share: f32,
 
     /// Where a plan's own arc is steered at (in corners): share of the free travel ahead of the bumper at which the
-    /// point lies: half of the .8 of expert-findings.md 5.2, as `ElasticBandSettings::reach_share`.
-    pub station_share: f32,
-    /// Clearance of the point and of the way to it, metres (expert-findings.md 5.2).
+    /// point lies: half of the .8 of docs/methods.md E5.2, as `ElasticBandSettings::reach_share`.
+    pub arc_reach_share: f32,
+    /// Clearance of the point and of the way to it, metres (docs/methods.md E5.2).
     pub point_clearance_m: f32,
-    /// Free travel along the first arc below which an obstacle is "ahead", metres (methods.md 3.2.5). For counting.
+    /// Free travel along the first arc below which an obstacle is "ahead", metres (docs/methods.md 3.2.5). For counting.
     pub obstacle_ahead_m: f32,
 
     /// A label lies at most this far round its circle, radians. Farther round, the point moves by metres when the
     /// curvature changes a little, and beyond π/2 a farther point would mean a lower speed.
     pub label_turn_max_rad: f32,
-    /// Largest change of a label's curvature per tick, 1/m (expert-findings.md 5.5; the steering manages .006) …
+    /// Largest change of a label's curvature per tick, 1/m (docs/methods.md E5.5; the steering manages .006) …
     pub label_curvature_step_per_m: f32,
-    /// … and largest sideways move it may cause at the last range, metres (expert-findings.md 5.5).
-    pub label_sideways_step_m: f32,
-    /// Largest growth of a label's range per tick, metres: half of expert-findings.md 5.5, as the ranges are.
+    /// … and largest sideways move it may cause at the last range, metres (docs/methods.md E5.5).
+    pub label_lateral_step_m: f32,
+    /// Largest growth of a label's range per tick, metres: half of docs/methods.md E5.5, as the ranges are.
     pub label_advance_step_m: f32,
-    /// Largest drop of a label's range per tick, metres: half of expert-findings.md 5.5.
+    /// Largest drop of a label's range per tick, metres: half of docs/methods.md E5.5.
     pub label_retreat_step_m: f32,
 }
 
 impl ExpertSettings {
-    /// The measured recipe of expert-findings.md 5 for the paper's three rules. The paper itself gives no number.
+    /// The measured recipe of docs/methods.md E5 for the paper's three rules. The paper itself gives no number.
     pub fn paper() -> Self {
         Self {
             sees: Sees::WholeMap,
@@ -167,7 +167,7 @@ impl ExpertSettings {
             tight_start_m: 2.5,
             nose_margin_m: 0.5,
             disc_relief_m: 0.047,
-            load_band_m: 1.2,
+            load_range_m: 1.2,
             weights: PlanWeights {
                 unit_m: 12.0,
                 load: 0.35,
@@ -176,7 +176,7 @@ impl ExpertSettings {
                 first_free: 0.3,
                 change: 0.1,
             },
-            band: ElasticBandSettings {
+            elastic_band: ElasticBandSettings {
                 iterations: 60,
                 comfort_m: 2.2,
                 middle_gain: 0.5,
@@ -199,12 +199,12 @@ impl ExpertSettings {
                 trust_from_m: 0.1,
             },
             progress_share: 0.3,
-            station_share: 0.4,
+            arc_reach_share: 0.4,
             point_clearance_m: 0.1,
             obstacle_ahead_m: 8.0,
             label_turn_max_rad: 0.8,
             label_curvature_step_per_m: 0.012,
-            label_sideways_step_m: 0.5,
+            label_lateral_step_m: 0.5,
             label_advance_step_m: 0.2,
             label_retreat_step_m: 0.4,
         }

@@ -1,4 +1,4 @@
-//! What the expert did, counted.
+//! Counts of the expert's decisions.
 
 use serde::{Deserialize, Serialize};
 

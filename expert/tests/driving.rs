@@ -3,32 +3,19 @@
 use expert::{ExpertSettings, ExpertStats, ScriptedExpert, Sees};
 use proptest::prelude::*;
 use sim::driver::{Driver, GroundTruth, LookAheadPoint, Situation};
-use sim::episode::{Ending, Episode, EpisodeReport, EpisodeSettings};
+use sim::episode::{Episode, EpisodeReport, EpisodeSettings};
+use sim::frame::Ending;
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
-use sim::scenario::{Direction, LotNoise, Obstacle, ObstacleClass, ReferencePath, Scenario};
+use sim::scenario::{Direction, Obstacle, ObstacleClass, Scenario};
 use sim::seed::RootSeed;
 use sim::sensing::{GridGeometry, Observation};
 use sim::vehicle::{VehicleSettings, VehicleState};
 use std::sync::Arc;
 
-fn scenario(boundary: Vec<Vec2>, route: Vec<Vec2>, obstacles: Vec<Obstacle>) -> Scenario {
-    Scenario {
-        name: "scene".to_owned(),
-        boundary,
-        reference_path: ReferencePath { points: route, corner_radius_m: 5.0 },
-        noise: LotNoise::default(),
-        islands: Vec::new(),
-        obstacles,
-        speed_bumps: Vec::new(),
-    }
-}
-
 /// A lane along x, 100 m long, with its middle on y = 0; the route ends 30 m before the lane does.
 fn lane(width_m: f32, obstacles: Vec<Obstacle>) -> Scenario {
-    let half = 0.5 * width_m;
-    let boundary = [(-20.0, -half), (80.0, -half), (80.0, half), (-20.0, half)].map(|(x, y)| Vec2::new(x, y));
-    scenario(boundary.to_vec(), vec![Vec2::new(-5.0, 0.0), Vec2::new(50.0, 0.0)], obstacles)
+    Scenario::lane(-20.0..=80.0, width_m, -5.0..=50.0).with_corner_radius_m(5.0).with_obstacles(obstacles)
 }
 
 fn car(x_m: f32, y_m: f32, heading_rad: f32) -> Obstacle {
@@ -38,9 +25,7 @@ fn car(x_m: f32, y_m: f32, heading_rad: f32) -> Obstacle {
 /// Two 6 m aisles that meet at a right angle, to the left when driven forward.
 fn corner() -> Scenario {
     let boundary = [(-25.0, -3.0), (33.0, -3.0), (33.0, 55.0), (27.0, 55.0), (27.0, 3.0), (-25.0, 3.0)];
-    let route = [(-5.0, 0.0), (30.0, 0.0), (30.0, 35.0)];
-    let points = |pairs: &[(f32, f32)]| pairs.iter().map(|&(x, y)| Vec2::new(x, y)).collect();
-    scenario(points(&boundary), points(&route), Vec::new())
+    Scenario::new("corner", boundary, [(-5.0, 0.0), (30.0, 0.0), (30.0, 35.0)]).with_corner_radius_m(5.0)
 }
 
 fn map(scenario: Scenario) -> Map {
@@ -49,7 +34,7 @@ fn map(scenario: Scenario) -> Map {
 
 fn expert(sees: Sees) -> ScriptedExpert {
     let settings = ExpertSettings { sees, ..ExpertSettings::paper() };
-    ScriptedExpert::new(settings, &VehicleSettings::hyundai_hg300(), GridGeometry::paper())
+    ScriptedExpert::new(settings, &EpisodeSettings::paper())
 }
 
 /// First answer of an expert without a past.
@@ -75,7 +60,7 @@ fn drive(scenario: Scenario, sees: Sees) -> (EpisodeReport, Vec<LookAheadPoint>,
 
 #[test]
 fn an_open_lane_is_looked_down_in_the_middle() {
-    let far_m = ExpertSettings::paper().band.reach_max_m + VehicleSettings::hyundai_hg300().front_m();
+    let far_m = ExpertSettings::paper().elastic_band.reach_max_m + VehicleSettings::hyundai_hg300().front_m();
     for width_m in [2.8, 3.4, 5.0] {
         let point = answer(&map(lane(width_m, Vec::new())), Pose::default(), 1.5);
         assert!((point.ahead_m - far_m).abs() < 0.1 && point.left_m.abs() < 0.1, "{width_m} m: {point:?}");
@@ -88,7 +73,7 @@ fn from_beside_the_middle_the_car_is_steered_back_to_it() {
     let pose = Pose::new(Vec2::new(0.0, 0.3), 0.02);
     let map = map(lane(3.4, Vec::new()));
     let point = answer(&map, pose, 1.5);
-    let steer_m = ExpertSettings::paper().band.steer_m;
+    let steer_m = ExpertSettings::paper().elastic_band.steer_m;
     let met = pose.advanced_along_arc(point.curvature_per_m(), steer_m).position();
     assert!(met.y.abs() < 0.1, "{point:?} leads through {met}");
 }

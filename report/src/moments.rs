@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use experiment::drive::Replay;
 use experiment::replay_key::ReplayKey;
 use experiment::settings::Settings;
-use sim::episode::{Event, Frame};
+use sim::frame::{Event, Frame};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::sensing::noise::Layer;

@@ -54,7 +54,7 @@ impl<'a> Drive<'a> {
         let stage = recipe.stages.iter().find(|stage| stage.folder == folder).context("every report has this stage")?;
         let Step::Drive { drivers } = &stage.step else { anyhow::bail!("{folder} drives") };
         let drivers = stages::load(drivers, &stage.settings)?;
-        let lots = Lot::parse_all(&stage.settings.evaluation.lots)?;
+        let lots = Lot::parse_all(&stage.settings.evaluation.lots, &stage.settings.episode.vehicle)?;
         Ok(Self { stage, drivers, lots })
     }
 

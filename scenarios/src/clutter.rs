@@ -1,8 +1,8 @@
-//! Parked cars and everything else that stands about, placed under rules that keep a lot drivable.
+//! Parked cars and other obstacles, placed under rules that keep a lot drivable.
 //!
-//! Two kinds of things: those outside the lane, which only hide ground and look like a parking lot, and *intruders*,
-//! which narrow the lane. Every encroachment leaves a free gap to the opposite edge, keeps away from corners and from
-//! intruders on the other side; `tests` below measures that with a routine of its own.
+//! Some obstacles stand outside the lane: they hide ground and make the place look like a parking lot. Others narrow the
+//! lane. Each such [`LaneEncroachment`] leaves a free gap to the opposite edge and keeps away from corners and from
+//! encroachments on the other side; the tests of [`mod@crate::reference`] measure that with rays across the route.
 
 use crate::corridor::{Corridor, Leg, STALL_DEPTH_M, Side, Stall, overlap, to_millimetres};
 use rand::RngExt as _;
@@ -11,13 +11,13 @@ use sim::scenario::{Obstacle, ObstacleClass, SpeedBump};
 use sim::seed::Rng;
 use std::ops::RangeInclusive;
 
-/// Distance of intruders on the same side, metres; nearer ones belong to one cluster or row.
+/// Distance of encroachments on the same side, metres; nearer ones belong to one cluster or row.
 const SAME_SIDE_CLEAR_M: f32 = 2.0;
 /// Distance between clusters of double-parked cars on the same side, metres.
 const CLUSTER_CLEAR_M: f32 = 4.0;
-/// Less than this is not worth calling an intrusion, metres.
+/// An obstacle that reaches less far into the lane than this does not count as an encroachment, metres.
 const PROTRUSION_MIN_M: f32 = 0.05;
-/// A double-parked car stands at least this far from its stall line (methods.md 11), metres: its width plus this is
+/// A double-parked car stands at least this far from its stall line (docs/methods.md 11), metres: its width plus this is
 /// the most it can take from the lane.
 const KERB_GAP_M: f32 = 0.3;
 /// Spacing of cones that close something, metres; the car is 1.86 m wide.
@@ -34,11 +34,11 @@ pub struct ClutterPlan {
     pub free_gap_m: RangeInclusive<f32>,
     /// Share of the route's length with a double-parked cluster beside it.
     pub double_parked_share: f32,
-    /// Intruders keep this far from the edge of the crossing aisle, metres.
+    /// Encroachments keep this far from the edge of the crossing aisle, metres.
     pub corner_clear_m: f32,
-    /// Intruders on opposite sides keep this far apart, metres along the lane.
+    /// Encroachments on opposite sides keep this far apart, metres along the lane.
     pub opposite_clear_m: f32,
-    /// Intruders keep this far from start and finish, metres.
+    /// Encroachments keep this far from start and finish, metres.
     pub end_clear_m: f32,
     /// Double-parked cars stand up to this far from parallel, degrees.
     pub double_parked_yaw_deg: f32,
@@ -82,20 +82,20 @@ pub struct LaneEncroachment {
     pub protrusion_m: f32,
 }
 
-/// What stands in a lot.
+/// The obstacles of a lot.
 #[derive(Debug, Clone)]
 pub struct Clutter {
     /// In the lane and outside.
     pub obstacles: Vec<Obstacle>,
     /// The stretches they narrow, reserved ones included.
-    pub intruders: Vec<LaneEncroachment>,
+    pub encroachments: Vec<LaneEncroachment>,
 }
 
-/// Fills a corridor. `reserved` stretches (islands) are treated as intruders that already stand there.
+/// Fills a corridor. `reserved` stretches (islands) count as encroachments.
 pub fn place(corridor: &Corridor, plan: &ClutterPlan, reserved: &[LaneEncroachment], rng: &mut Rng) -> Clutter {
     let arms = if plan.closed_arms { closed_arms(corridor) } else { Vec::new() };
     let reserved_ground: Vec<_> = arms.iter().map(|arm| arm.ground).collect();
-    let mut placement = Placement { corridor, plan, intruders: reserved.to_vec(), things: Vec::new() };
+    let mut placement = Placement { corridor, plan, encroachments: reserved.to_vec(), things: Vec::new() };
     for leg in 0..corridor.legs.len() {
         close_branches(&mut placement, leg);
     }
@@ -108,7 +108,7 @@ pub fn place(corridor: &Corridor, plan: &ClutterPlan, reserved: &[LaneEncroachme
     }
     place_furniture(&mut placement, rng);
     let obstacles = placement.things.into_iter().map(|thing| thing.obstacle).collect();
-    Clutter { obstacles, intruders: placement.intruders }
+    Clutter { obstacles, encroachments: placement.encroachments }
 }
 
 /// One speed bump per `every_m` of route, each in a leg's lane, across its whole width.
@@ -139,11 +139,11 @@ pub fn speed_bumps(corridor: &Corridor, every_m: f32) -> Vec<SpeedBump> {
         .collect()
 }
 
-/// What stands where so far.
+/// The obstacles placed so far.
 struct Placement<'a> {
     corridor: &'a Corridor,
     plan: &'a ClutterPlan,
-    intruders: Vec<LaneEncroachment>,
+    encroachments: Vec<LaneEncroachment>,
     things: Vec<Thing>,
 }
 
@@ -178,7 +178,7 @@ impl Placement<'_> {
         !self.things.iter().any(|thing| overlap(&thing.outline, outline))
     }
 
-    /// Where intruders may stand in a leg, metres along it.
+    /// Where encroachments may stand in a leg, metres along it.
     fn usable(&self, leg: usize) -> (f32, f32) {
         let clear_m = |corner: usize| {
             let corner = &self.corridor.corners[corner];
@@ -196,7 +196,7 @@ impl Placement<'_> {
             let clear_m = if other.side == side { SAME_SIDE_CLEAR_M } else { self.plan.opposite_clear_m };
             other.leg != leg || other.to_m + clear_m <= from_m || to_m + clear_m <= other.from_m
         };
-        usable_from_m <= from_m && to_m <= usable_to_m && self.intruders.iter().all(keeps_apart)
+        usable_from_m <= from_m && to_m <= usable_to_m && self.encroachments.iter().all(keeps_apart)
     }
 
     /// The place of a thing at `s_m` whose nearest point to the lane protrudes by `protrusion_m` (negative: stands
@@ -330,7 +330,7 @@ fn draw_clusters(placement: &Placement<'_>, leg: usize, wanted_m: f32, rng: &mut
     let (from_m, to_m) = placement.usable(leg);
     let mut clusters: Vec<Cluster> = Vec::new();
     let (mut missing_m, mut room_m) = (wanted_m, to_m - from_m);
-    // Half a car too much is as good as half a car too little.
+    // Half a car too many is as good as half a car too few.
     while missing_m > 0.5 * TYPICAL_CAR_M {
         let cars = rng.random_range(1..=3).min((missing_m / TYPICAL_CAR_M).round().max(1.0) as usize);
         let side = if rng.random_bool(0.5) { Side::Left } else { Side::Right };
@@ -408,19 +408,19 @@ fn place_double_parked_car(
         placed = placement.against_edge(leg, side, body, wish);
     }
     // Reserved stretches (islands, branches) come first; the car's own cluster does not count.
-    let blocked = placement.intruders.iter().any(|other| {
+    let blocked = placement.encroachments.iter().any(|other| {
         let clear_m = if other.side == side { 0.0 } else { placement.plan.opposite_clear_m };
         other.leg == leg && placed.from_m < other.to_m + clear_m && other.from_m < placed.to_m + clear_m
     });
     if !blocked && placement.is_free(&placed.outline) {
         placement.stand(class, placed.centre);
-        placement.intruders.push(placed.encroachment(leg, side));
+        placement.encroachments.push(placed.encroachment(leg, side));
     }
 }
 
 /// A car in a stall, or a wheel stop in an empty one.
 fn place_parked(placement: &mut Placement<'_>, stall: &Stall, rng: &mut Rng) {
-    // All draws first: what stands elsewhere must not shift the stream of the next stall.
+    // All draws come first: obstacles elsewhere must not shift the random stream of the next stall.
     let occupied = rng.random_bool(f64::from(placement.plan.stall_occupancy));
     let class = draw_car(rng);
     let nose_m = if rng.random_bool(f64::from(placement.plan.nose_share)) { rng.random_range(0.3..0.6) } else { 0.0 };
@@ -450,7 +450,7 @@ fn place_parked(placement: &mut Placement<'_>, stall: &Stall, rng: &mut Rng) {
         && placement.is_free(&nose.outline);
     if reaches_out {
         placement.stand(class, nose.centre);
-        placement.intruders.push(nose.encroachment(stall.leg, stall.side));
+        placement.encroachments.push(nose.encroachment(stall.leg, stall.side));
         return;
     }
     let wish = Protrusion { wanted_m: -set_back_m, gap_m: 0.0 };
@@ -529,7 +529,7 @@ fn place_group(placement: &mut Placement<'_>, group: &Group, rng: &mut Rng) {
             }
             if intrudes {
                 let protrusion_m = row.iter().map(|placed| placed.protrusion_m).fold(0.0, f32::max);
-                placement.intruders.push(LaneEncroachment { leg: index, side, from_m, to_m, protrusion_m });
+                placement.encroachments.push(LaneEncroachment { leg: index, side, from_m, to_m, protrusion_m });
             }
             return;
         }
@@ -552,7 +552,13 @@ fn close_branches(placement: &mut Placement<'_>, index: usize) {
         for centre in centres {
             placement.stand(ObstacleClass::Cone, Pose::new(centre, 0.0));
         }
-        placement.intruders.push(LaneEncroachment { leg: index, side: branch.side, from_m, to_m, protrusion_m: 0.0 });
+        placement.encroachments.push(LaneEncroachment {
+            leg: index,
+            side: branch.side,
+            from_m,
+            to_m,
+            protrusion_m: 0.0,
+        });
     }
 }
 

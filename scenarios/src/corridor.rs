@@ -14,7 +14,7 @@ const WIDTH_RAMP_M: f32 = 3.0;
 /// Chords per right angle of a rounded inner corner (3 m radius: 4 cm inside the arc).
 const CHORDS_PER_RIGHT_ANGLE: f32 = 6.0;
 
-/// Depth and width of a right-angle stall, metres (Seoul 1990, methods.md 11).
+/// Depth and width of a right-angle stall, metres (Seoul 1990, docs/methods.md 11).
 pub const STALL_DEPTH_M: f32 = 5.0;
 /// See [`STALL_DEPTH_M`].
 pub const STALL_WIDTH_M: f32 = 2.3;
@@ -125,7 +125,7 @@ pub struct CornerPlan {
 }
 
 impl CornerPlan {
-    /// The right-angled corner of the reference lots (expert-findings.md 3).
+    /// The right-angled corner of the reference lots (docs/methods.md E3).
     pub fn right_angle(side: Side) -> Self {
         Self {
             turn_rad: side.sign() * std::f32::consts::FRAC_PI_2,

@@ -1,8 +1,8 @@
-//! Procedural lots: corridors with corners, bends, bulges, islands, closed side branches and everything that stands
-//! about, each verified to be drivable in both directions.
+//! Procedural lots: corridors with corners, bends, bulges, islands, closed side branches, parked cars and other obstacles,
+//! each verified to be drivable in both directions.
 //!
-//! A lot's seed decides all of it. A draw that is invalid or that [`crate::solver`] cannot drive is thrown away and the
-//! next one of the same seed taken; [`Generated::attempts`] says how many it took.
+//! A lot is a function of its seed. A draw that is invalid or that [`crate::solver`] cannot drive is rejected and the next
+//! draw of the same seed is taken; [`Generated::attempts`] counts them.
 
 use crate::clutter::{self, ClutterPlan, Furniture, LaneEncroachment};
 use crate::corridor::{Blueprint, Branch, Bulge, CornerPlan, Corridor, Leg, LegPlan, Side, WidthStep, to_millimetres};
@@ -15,19 +15,20 @@ use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
 use std::ops::Range;
 
-/// A lot and what it took.
+/// A generated lot.
 #[derive(Debug, Clone)]
 pub struct Generated {
     /// Valid and solvable in both directions.
     pub scenario: Scenario,
-    /// Draws until this one, itself included: `1 − 1/mean` is the rejection rate.
+    /// Draws up to and including this one: the rejection rate is `1 − 1/mean`.
     pub attempts: u32,
 }
 
-/// A lot of a split.
+/// Generates a lot. It is drivable for the paper's vehicle; it does not depend on the vehicle that will drive it, because
+/// its name fixes it.
 ///
 /// # Panics
-/// When 1000 draws in a row are rejected; of hard ones about one in five is, of others hardly any.
+/// If 1000 draws in a row are rejected. About one hard draw in five is, and hardly any other.
 pub fn generate(split: Split, index: u64, difficulty: Difficulty) -> Generated {
     let seed = split.seed(difficulty, index);
     let vehicle = VehicleSettings::hyundai_hg300();
@@ -35,7 +36,7 @@ pub fn generate(split: Split, index: u64, difficulty: Difficulty) -> Generated {
         let name = format!("{}-{}-{index}", split.name(), difficulty.name());
         let mut layout_rng = seed.rng(Stream::Layout, attempt);
         let mut obstacle_rng = seed.rng(Stream::Obstacles, attempt);
-        let scenario = draw(name, &DifficultyParams::of(difficulty), &mut layout_rng, &mut obstacle_rng);
+        let scenario = draw(name, &DifficultySettings::of(difficulty), &mut layout_rng, &mut obstacle_rng);
         if is_drivable(&scenario, &vehicle) {
             return Generated { scenario, attempts: attempt as u32 + 1 };
         }
@@ -53,7 +54,7 @@ fn is_drivable(scenario: &Scenario, vehicle: &VehicleSettings) -> bool {
 }
 
 /// What a difficulty means.
-struct DifficultyParams {
+struct DifficultySettings {
     lane_m: Range<f32>,
     corner_width_m: Range<f32>,
     inner_radius_m: Range<f32>,
@@ -66,9 +67,9 @@ struct DifficultyParams {
     furniture: f32,
 }
 
-impl DifficultyParams {
+impl DifficultySettings {
     /// Gaps of `Hard` are those of the narrow reference lots; the solver's 0.25 m clearance needs 2.4 m and more beside
-    /// a car that stands askew, which is what most rejected draws lack.
+    /// a car parked at an angle, which is what most rejected draws lack.
     fn of(difficulty: Difficulty) -> Self {
         match difficulty {
             Difficulty::Easy => Self {
@@ -118,7 +119,7 @@ const LEG_MIN_M: f32 = 28.0;
 /// See [`crate::reference`].
 const RUN_OUT_M: f32 = 18.0;
 const END_CLEAR_M: f32 = 9.0;
-/// More than in the reference lots: these lanes are wider, and intruders reach farther into them.
+/// More than in the reference lots: these lanes are wider, and encroachments reach farther into them.
 const CORNER_CLEAR_M: f32 = 10.0;
 const PATH_RADIUS_M: f32 = 5.0;
 const SPEED_BUMP_EVERY_M: f32 = 60.0;
@@ -146,24 +147,24 @@ struct IslandPlan {
     width_m: f32,
 }
 
-fn draw(name: String, params: &DifficultyParams, layout_rng: &mut Rng, obstacle_rng: &mut Rng) -> Scenario {
-    let layout = draw_layout(params, layout_rng);
+fn draw(name: String, settings: &DifficultySettings, layout_rng: &mut Rng, obstacle_rng: &mut Rng) -> Scenario {
+    let layout = draw_layout(settings, layout_rng);
     let corridor = Corridor::draw(&layout.blueprint);
     let plan = ClutterPlan {
-        free_gap_m: params.free_gap_m.start..=params.free_gap_m.end,
-        double_parked_share: obstacle_rng.random_range(params.double_parked_share.clone()),
+        free_gap_m: settings.free_gap_m.start..=settings.free_gap_m.end,
+        double_parked_share: obstacle_rng.random_range(settings.double_parked_share.clone()),
         corner_clear_m: CORNER_CLEAR_M,
-        opposite_clear_m: params.opposite_clear_m,
+        opposite_clear_m: settings.opposite_clear_m,
         end_clear_m: END_CLEAR_M,
-        double_parked_yaw_deg: params.double_parked_yaw_deg,
+        double_parked_yaw_deg: settings.double_parked_yaw_deg,
         stall_occupancy: obstacle_rng.random_range(0.6..0.95),
-        nose_share: params.nose_share,
+        nose_share: settings.nose_share,
         furniture_per_100m: Furniture {
-            cones: 3.0 * params.furniture,
-            bollards: 1.5 * params.furniture,
-            pillars: 2.5 * params.furniture,
-            carts: 2.0 * params.furniture,
-            people: 3.0 * params.furniture,
+            cones: 3.0 * settings.furniture,
+            bollards: 1.5 * settings.furniture,
+            pillars: 2.5 * settings.furniture,
+            carts: 2.0 * settings.furniture,
+            people: 3.0 * settings.furniture,
         },
         closed_arms: true,
     };
@@ -183,7 +184,7 @@ fn draw(name: String, params: &DifficultyParams, layout_rng: &mut Rng, obstacle_
     obstacles.extend(layout.islands.iter().map(|plan| tree(&corridor, plan)));
     Scenario {
         name,
-        reference_path: route_around(&corridor, &clutter.intruders),
+        reference_path: route_around(&corridor, &clutter.encroachments),
         noise: LotNoise::default(),
         islands: layout.islands.iter().map(|plan| island(&corridor, plan)).collect(),
         obstacles,
@@ -192,30 +193,30 @@ fn draw(name: String, params: &DifficultyParams, layout_rng: &mut Rng, obstacle_
     }
 }
 
-fn draw_layout(params: &DifficultyParams, rng: &mut Rng) -> Layout {
+fn draw_layout(settings: &DifficultySettings, rng: &mut Rng) -> Layout {
     let total_m = rng.random_range(LEGS_M);
     let most_corners = (total_m / LEG_MIN_M) as usize - 1;
     let legs = 1 + rng.random_range(1..=most_corners.min(4));
     // Shares of what is left after every leg has its minimum.
     let shares: Vec<f32> = (0..legs).map(|_| rng.random_range(0.2..1.0)).collect();
     let spare_m = (total_m - legs as f32 * LEG_MIN_M) / shares.iter().sum::<f32>();
-    let corners = draw_corners(params, legs - 1, rng);
+    let corners = draw_corners(settings, legs - 1, rng);
     let mut islands = Vec::new();
     let legs = shares
         .iter()
         .enumerate()
         .map(|(i, share)| {
             let ends = (i.checked_sub(1).map(|before| &corners[before]), corners.get(i));
-            draw_leg(params, i, LEG_MIN_M + share * spare_m, ends, &mut islands, rng)
+            draw_leg(settings, i, LEG_MIN_M + share * spare_m, ends, &mut islands, rng)
         })
         .collect();
     let blueprint = Blueprint { legs, corners, path_radius_m: PATH_RADIUS_M, run_out_m: RUN_OUT_M };
     Layout { blueprint, islands }
 }
 
-/// Right angles mostly, else bends of 30–80°. The route never turns by more than 180° in sum, so that it does not
-/// bite its own tail too often.
-fn draw_corners(params: &DifficultyParams, count: usize, rng: &mut Rng) -> Vec<CornerPlan> {
+/// Mostly right angles, otherwise bends of 30–80°. The turns never add up to more than 180°, so the route rarely meets
+/// itself.
+fn draw_corners(settings: &DifficultySettings, count: usize, rng: &mut Rng) -> Vec<CornerPlan> {
     let mut turned_deg = 0.0_f32;
     (0..count)
         .map(|_| {
@@ -226,24 +227,24 @@ fn draw_corners(params: &DifficultyParams, count: usize, rng: &mut Rng) -> Vec<C
             let gentle = bend_deg < 60.0;
             CornerPlan {
                 turn_rad: side.sign() * bend_deg.to_radians(),
-                width_m: rng.random_range(params.corner_width_m.clone()) - if gentle { 1.0 } else { 0.0 },
+                width_m: rng.random_range(settings.corner_width_m.clone()) - if gentle { 1.0 } else { 0.0 },
                 reach_m: if gentle { 3.5 } else { 5.0 },
                 taper_m: rng.random_range(4.5..5.5),
-                inner_radius_m: rng.random_range(params.inner_radius_m.clone()),
+                inner_radius_m: rng.random_range(settings.inner_radius_m.clone()),
             }
         })
         .collect()
 }
 
 fn draw_leg(
-    params: &DifficultyParams,
+    settings: &DifficultySettings,
     index: usize,
     length_m: f32,
     (before, after): (Option<&CornerPlan>, Option<&CornerPlan>),
     islands: &mut Vec<IslandPlan>,
     rng: &mut Rng,
 ) -> LegPlan {
-    let mut widths = draw_widths(params, length_m, rng);
+    let mut widths = draw_widths(settings, length_m, rng);
     let clear_m = |corner: Option<&CornerPlan>| {
         corner.map_or(END_CLEAR_M, |corner| corner.extent_m().max(0.5 * corner.width_m + CORNER_CLEAR_M))
     };
@@ -261,7 +262,7 @@ fn draw_leg(
         let start_of = |feature_m: f32| slot_from_m + place * (slot_m - feature_m);
         match kind {
             0..=3 if bulge.is_none() && slot_m > BULGE_LENGTH_M => {
-                let offset_m = side.sign() * lerp(&params.bulge_m, size);
+                let offset_m = side.sign() * lerp(&settings.bulge_m, size);
                 let centre_m = start_of(BULGE_LENGTH_M) + 0.5 * BULGE_LENGTH_M;
                 bulge = Some(Bulge { centre_m, offset_m, length_m: BULGE_LENGTH_M });
             }
@@ -290,11 +291,11 @@ fn draw_leg(
 }
 
 /// A new width every 9–18 m.
-fn draw_widths(params: &DifficultyParams, length_m: f32, rng: &mut Rng) -> Vec<WidthStep> {
+fn draw_widths(settings: &DifficultySettings, length_m: f32, rng: &mut Rng) -> Vec<WidthStep> {
     let mut widths = Vec::new();
     let mut at_m = -RUN_OUT_M;
     while at_m < length_m + RUN_OUT_M {
-        widths.push(WidthStep { from_m: at_m, width_m: rng.random_range(params.lane_m.clone()) });
+        widths.push(WidthStep { from_m: at_m, width_m: rng.random_range(settings.lane_m.clone()) });
         at_m += rng.random_range(9.0..18.0);
     }
     widths
@@ -338,7 +339,7 @@ fn island(corridor: &Corridor, plan: &IslandPlan) -> Island {
     Island { polygon, height_m: 0.15 }
 }
 
-/// A post on an island, as high as a lamp: it hides little, but it is seen.
+/// A post on an island, as high as a lamp: it hides little, but is visible.
 fn tree(corridor: &Corridor, plan: &IslandPlan) -> Obstacle {
     let leg = &corridor.legs[plan.leg];
     let at = to_millimetres(leg.world(0.5 * (plan.from_m + plan.to_m), island_middle_m(leg, plan)));
@@ -353,9 +354,9 @@ fn tree(corridor: &Corridor, plan: &IslandPlan) -> Obstacle {
     }
 }
 
-/// A smooth line through what intruders leave free: a car put back onto the route stands on free ground, whichever way
+/// A smooth line through what encroachments leave free: a car put back onto the route finds free ground, whichever way
 /// it is headed.
-fn route_around(corridor: &Corridor, intruders: &[LaneEncroachment]) -> ReferencePath {
+fn route_around(corridor: &Corridor, encroachments: &[LaneEncroachment]) -> ReferencePath {
     let mut points = Vec::new();
     for (index, leg) in corridor.legs.iter().enumerate() {
         // A rounded corner takes at most half of the segments beside it.
@@ -366,7 +367,7 @@ fn route_around(corridor: &Corridor, intruders: &[LaneEncroachment]) -> Referenc
         let to_m = leg.length_m - straight_m(corridor.corners.get(index));
         let pieces = (to_m - from_m).floor();
         let at_m: Vec<f32> = (0..=pieces as usize).map(|k| from_m + k as f32 * (to_m - from_m) / pieces).collect();
-        let room: Vec<_> = at_m.iter().map(|&s_m| room_for_route(leg, index, intruders, s_m)).collect();
+        let room: Vec<_> = at_m.iter().map(|&s_m| room_for_route(leg, index, encroachments, s_m)).collect();
         let way = smoothest_within(&room);
         points.push(leg.world(0.0, 0.0));
         let bends = (1..way.len() - 1).filter(|&k| (way[k - 1] + way[k + 1] - 2.0 * way[k]).abs() > FLAT_M);
@@ -382,7 +383,7 @@ fn route_around(corridor: &Corridor, intruders: &[LaneEncroachment]) -> Referenc
 const FLAT_M: f32 = 2e-3;
 
 /// Lowest and highest `d` of the rear axle, metres, such that the body stands free in either direction of driving.
-fn room_for_route(leg: &Leg, index: usize, intruders: &[LaneEncroachment], s_m: f32) -> (f32, f32) {
+fn room_for_route(leg: &Leg, index: usize, encroachments: &[LaneEncroachment], s_m: f32) -> (f32, f32) {
     /// The body reaches 3.8 m ahead of the rear axle, and its corners farther aside the more the route slopes.
     const REACH_M: f32 = 2.5;
     /// Half the car's width and a margin for the slope of the route.
@@ -390,7 +391,7 @@ fn room_for_route(leg: &Leg, index: usize, intruders: &[LaneEncroachment], s_m: 
     let limit_m = |side: Side| {
         let edge_m = |t_m: f32| side.sign() * leg.edge_m(side, t_m);
         let narrowest_m = (-3..=3).map(|k| edge_m(s_m + k as f32 * REACH_M / 3.0)).fold(f32::INFINITY, f32::min);
-        intruders
+        encroachments
             .iter()
             .filter(|other| other.leg == index && other.side == side)
             .filter(|other| other.from_m - REACH_M < s_m && s_m < other.to_m + REACH_M)
@@ -495,7 +496,7 @@ mod tests {
         for index in 0..LOTS {
             for difficulty in Difficulty::ALL {
                 let seed = Split::Train.seed(difficulty, index);
-                let layout = draw_layout(&DifficultyParams::of(difficulty), &mut seed.rng(Stream::Layout, 0));
+                let layout = draw_layout(&DifficultySettings::of(difficulty), &mut seed.rng(Stream::Layout, 0));
                 for corner in &layout.blueprint.corners {
                     let is_right_angle = corner.turn_rad.abs() > 1.57;
                     right_angles += usize::from(is_right_angle);

@@ -5,21 +5,23 @@
 //! shows them; `scale` then enlarges the whole about (0, 0), so that a map of a small robot's world fits a car.
 
 mod contour;
+mod ground;
 mod ros;
 mod tpcap;
 
-use crate::load::LoadError;
+use crate::error::{LoadError, read_text};
 use crate::solver;
 use crate::solver::route::{self, Finish, NoRoute};
+use ground::Ground;
 use serde::Deserialize;
 use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
-use sim::scenario::{Island, LotNoise, Obstacle, Place, ReferencePath, Scenario, ScenarioError};
+use sim::scenario::{Island, LotNoise, Place, ReferencePath, Scenario, ScenarioError};
 use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
 
-/// Corners of a centre line are rounded with this radius, metres, as those of the reference lots (methods.md 11).
+/// Corners of a centre line are rounded with this radius, metres, as those of the reference lots (docs/methods.md 11).
 const CENTRE_LINE_RADIUS_M: f32 = 5.0;
 /// Points of a centre line nearer than this count as one, metres in the lot.
 const SAME_POINT_M: f32 = 0.01;
@@ -78,13 +80,6 @@ enum Source {
     Case(tpcap::Case),
 }
 
-/// What a map gives.
-struct Ground {
-    boundary: Vec<Vec2>,
-    islands: Vec<Vec<Vec2>>,
-    obstacles: Vec<Obstacle>,
-}
-
 impl MapLot {
     /// Reads a `NAME.lot.toml`; of a map, the `NAME.lot.toml` beside it, if there is one.
     ///
@@ -92,7 +87,7 @@ impl MapLot {
     /// If the file cannot be read or says something else.
     pub fn read(path: &Path) -> Result<Self, LoadError> {
         if !is_map(path) {
-            return Self::parse(&crate::load::read_text(path)?, path);
+            return Self::parse(&read_text(path)?, path);
         }
         let beside = path.with_extension("lot.toml");
         if !beside.is_file() {
@@ -136,11 +131,11 @@ impl MapLot {
         Ok(lot)
     }
 
-    /// The lot, checked: it can be driven from its start to its finish.
+    /// The lot, checked: a vehicle can drive it from its start to its finish.
     ///
     /// # Errors
     /// The first thing wrong with it, with file, place and remedy.
-    pub fn scenario(&self) -> Result<Scenario, LoadError> {
+    pub fn scenario(&self, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
         self.check()?;
         let is_case = self.map.extension().is_some_and(|extension| extension == "csv");
         let source =
@@ -158,29 +153,24 @@ impl MapLot {
         };
         let ground = match &source {
             Source::Case(case) => case.ground(self.scale),
-            Source::Map(map) => self.ros_ground(map, seed, goal.map(|goal| self.pose_in_lot(goal).position()))?,
+            Source::Map(map) => {
+                self.ros_ground(map, seed, goal.map(|goal| self.pose_in_lot(goal).position()), vehicle)?
+            }
         };
-        let mut scenario = Scenario {
-            name: self.name(),
-            boundary: ground.boundary,
-            reference_path: ReferencePath { points: Vec::new(), corner_radius_m: 0.0 },
-            noise: self.noise.clone(),
-            islands: ground.islands.into_iter().map(kerbed).collect(),
-            obstacles: ground.obstacles,
-            speed_bumps: Vec::new(),
-        };
-        validate_ground(&scenario).map_err(|error| self.in_lot(error))?;
+        let mut scenario = outlines(self.name(), &ground).with_obstacles(ground.obstacles);
+        scenario.noise = self.noise.clone();
+        validate_ground(&scenario, vehicle).map_err(|error| self.in_lot(error))?;
         scenario.reference_path = match (centre_line, start) {
-            (Some(points), _) => self.checked_centre_line(points, &scenario)?,
+            (Some(points), _) => self.checked_centre_line(points, &scenario, vehicle)?,
             (None, Some(start)) => {
                 let start = self.pose_in_lot(start);
                 let finish = goal.map_or(Finish::Start, |goal| Finish::At(self.pose_in_lot(goal)));
-                route::find(&scenario, start, finish, &vehicle(), self.clearance_m)
-                    .map_err(|reason| self.no_route(reason, start, finish))?
+                route::find(&scenario, start, finish, vehicle, self.clearance_m)
+                    .map_err(|reason| self.no_route(reason, start, finish, vehicle))?
             }
             (None, None) => return Err(self.nothing_to_drive()),
         };
-        validate(&scenario, &vehicle()).map_err(|error| self.in_lot(error))?;
+        validate(&scenario, vehicle).map_err(|error| self.in_lot(error))?;
         Ok(scenario)
     }
 
@@ -218,7 +208,13 @@ impl MapLot {
     }
 
     /// The outlines of the drivable pixels around the seed, in the lot, as simple as they can be and stay sound.
-    fn ros_ground(&self, map: &ros::Map, seed: Vec2, goal: Option<Vec2>) -> Result<Ground, LoadError> {
+    fn ros_ground(
+        &self,
+        map: &ros::Map,
+        seed: Vec2,
+        goal: Option<Vec2>,
+        vehicle: &VehicleSettings,
+    ) -> Result<Ground, LoadError> {
         let place = if self.centre_line.is_some() { "centre_line, point 1" } else { "start" };
         let mut pixels = Vec::new();
         for (place, point) in [(place, Some(seed)), ("goal", goal)] {
@@ -253,7 +249,7 @@ impl MapLot {
                 islands: inner.iter().zip(&steps[1..]).map(|(ring, &step)| outline(ring, step)).collect(),
                 obstacles: Vec::new(),
             };
-            let Err(error) = validate_ground(&outlines_only(&ground)) else {
+            let Err(error) = validate_ground(&outlines(self.name(), &ground), vehicle) else {
                 return Ok(ground);
             };
             // The outline at fault is followed more closely; if it is exact already, so is the boundary.
@@ -271,7 +267,7 @@ impl MapLot {
     /// The points of a CSV file, in the lot.
     fn read_centre_line(&self, file: &Path) -> Result<Vec<Vec2>, LoadError> {
         let name = file.display().to_string();
-        let text = crate::load::read_text(file)?;
+        let text = read_text(file)?;
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -316,7 +312,12 @@ impl MapLot {
     }
 
     /// The car must find room along the whole line: half its width to either side.
-    fn checked_centre_line(&self, points: Vec<Vec2>, ground: &Scenario) -> Result<ReferencePath, LoadError> {
+    fn checked_centre_line(
+        &self,
+        points: Vec<Vec2>,
+        ground: &Scenario,
+        vehicle: &VehicleSettings,
+    ) -> Result<ReferencePath, LoadError> {
         let mut room = DistanceField::of_boundary(&ground.boundary);
         for island in &ground.islands {
             room.carve_polygon(&island.polygon);
@@ -326,7 +327,7 @@ impl MapLot {
         }
         let line = ReferencePath { points, corner_radius_m: CENTRE_LINE_RADIUS_M };
         let path = sim::path::Path::new(&line);
-        let half_width_m = 0.5 * vehicle().width_m;
+        let half_width_m = 0.5 * vehicle.width_m;
         for (i, pose) in path.poses().iter().enumerate() {
             let room_m = room.at(pose.position());
             if room_m >= half_width_m {
@@ -387,12 +388,11 @@ impl MapLot {
         self.fault("route", "the map does not say where to drive".to_owned(), &remedy)
     }
 
-    fn no_route(&self, reason: NoRoute, start: Pose, finish: Finish) -> LoadError {
-        let car = vehicle();
+    fn no_route(&self, reason: NoRoute, start: Pose, finish: Finish, car: &VehicleSettings) -> LoadError {
         let clearance_m = self.clearance_m;
         let blocked = |place: &str, pose: Pose| {
             let problem = format!(
-                "the car ({} m × {} m, and {clearance_m} m around it) does not stand free at {}",
+                "the car ({:.2} m × {:.2} m, and {clearance_m} m around it) does not stand free at {}",
                 car.length_m,
                 car.width_m,
                 self.in_map(pose.position())
@@ -427,7 +427,7 @@ impl MapLot {
                     "no drive forwards was found: it got to {}, about {to_go_m:.0} m of the lot before the goal. The car \
                      does not reverse, and turns with a radius of {:.1} m or more",
                     self.in_map(reached),
-                    route::radius_min_m(&car)
+                    route::radius_min_m(car)
                 );
                 let remedy = "widen the map there, turn or move start and goal, enlarge the lot with scale, or lower \
                               clearance_m";
@@ -437,33 +437,22 @@ impl MapLot {
     }
 }
 
-fn vehicle() -> VehicleSettings {
-    VehicleSettings::hyundai_hg300()
-}
-
 fn kerbed(polygon: Vec<Vec2>) -> Island {
     Island { polygon, height_m: 0.15 }
 }
 
 /// Checks a scenario that has no route yet. Everything else is checked before the route.
-fn validate_ground(scenario: &Scenario) -> Result<(), ScenarioError> {
-    match validate(scenario, &vehicle()) {
+fn validate_ground(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), ScenarioError> {
+    match validate(scenario, vehicle) {
         Err(ScenarioError { place: Place::ReferencePath(_), .. }) => Ok(()),
         other => other,
     }
 }
 
-/// A scenario without a route, for the check of its outlines.
-fn outlines_only(ground: &Ground) -> Scenario {
-    Scenario {
-        name: "map".to_owned(),
-        boundary: ground.boundary.clone(),
-        reference_path: ReferencePath { points: Vec::new(), corner_radius_m: 0.0 },
-        noise: LotNoise::default(),
-        islands: ground.islands.iter().cloned().map(kerbed).collect(),
-        obstacles: Vec::new(),
-        speed_bumps: Vec::new(),
-    }
+/// Boundary and islands of a scenario that has no route yet.
+fn outlines(name: String, ground: &Ground) -> Scenario {
+    let islands = ground.islands.iter().cloned().map(kerbed).collect();
+    Scenario { islands, ..Scenario::new(name, ground.boundary.iter().copied(), [Vec2::ZERO; 0]) }
 }
 
 #[cfg(test)]

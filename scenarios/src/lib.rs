@@ -5,7 +5,7 @@
 //! | module | |
 //! |---|---|
 //! | [`corridor`] | lane geometry: legs, corners, widths, bulges → one boundary polygon |
-//! | [`clutter`] | parked cars and everything else that stands about, under gap rules |
+//! | [`clutter`] | parked cars and other obstacles, under gap rules |
 //! | [`mod@reference`] | lots a, b and c of the paper |
 //! | [`generator`] | procedural lots, each verified by the [`solver`] |
 //! | [`split`] | which generated lots may be trained on |
@@ -14,6 +14,7 @@
 
 pub mod clutter;
 pub mod corridor;
+mod error;
 pub mod generator;
 pub mod import;
 pub mod load;
@@ -21,14 +22,16 @@ pub mod reference;
 pub mod solver;
 pub mod split;
 
-use load::LoadError;
+pub use error::{LoadError, Location};
+
 use reference::ReferenceLot;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
+use sim::vehicle::VehicleSettings;
 use split::{Difficulty, Split};
 use std::path::PathBuf;
 
-/// The lots a name stands for; several names are separated by commas.
+/// The lots that a name means; several names are separated by commas.
 ///
 /// `lot-a`, `lot-b`, `lot-c` · `reference` (all three) · `train:N`, `validation:N`, `test:N` (the first N generated lots
 /// of a split, medium unless `:easy`, `:medium` or `:hard` follows) · `test-hard-7` (one of them) · a path ending in
@@ -42,7 +45,7 @@ use std::path::PathBuf;
 /// ```
 ///
 /// # Errors
-/// A name that stands for nothing, with what there is.
+/// A name that means no lot; the message lists the names there are.
 pub fn suite(names: &str) -> Result<Vec<LotSpec>, SpecError> {
     let mut lots = Vec::new();
     for name in names.split(',').map(str::trim) {
@@ -70,17 +73,19 @@ pub enum LotSpec {
 }
 
 impl LotSpec {
-    /// The lot as it stands in one trial. Methods that are compared get the same trial seeds, hence the same lots.
+    /// The lot in one trial. Methods that are compared get the same trial seeds, hence the same lots.
+    ///
+    /// Generated lots do not depend on the vehicle: their rules are made for the paper's.
     ///
     /// # Errors
-    /// Only for files: what is wrong with it.
-    pub fn scenario(&self, trial_seed: RootSeed) -> Result<Scenario, LoadError> {
+    /// Only for files: what is wrong with them, among it that the vehicle does not fit.
+    pub fn scenario(&self, trial_seed: RootSeed, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
         match self {
             Self::Reference(lot) => Ok(reference::lot(*lot, trial_seed)),
             Self::Generated { split, difficulty, index } => {
                 Ok(generator::generate(*split, *index, *difficulty).scenario)
             }
-            Self::File(path) => load::load(path),
+            Self::File(path) => load::load(path, vehicle),
         }
     }
 }
@@ -108,7 +113,7 @@ impl std::str::FromStr for LotSpec {
     }
 }
 
-/// A name that stands for no lot.
+/// A name that means no lot.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{name:?} {problem}; there are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N and test:N \
@@ -236,8 +241,10 @@ mod tests {
     /// Reference lots change with the trial, others do not; every lot carries the name it was asked for by.
     #[test]
     fn a_trial_seed_re_draws_reference_lots_only() {
-        let draw =
-            |name: &str, seed| name.parse::<LotSpec>().expect("a lot").scenario(RootSeed(seed)).expect("a scenario");
+        let vehicle = VehicleSettings::hyundai_hg300();
+        let draw = |name: &str, seed| {
+            name.parse::<LotSpec>().expect("a lot").scenario(RootSeed(seed), &vehicle).expect("a scenario")
+        };
         assert_ne!(draw("lot-b", 1).obstacles, draw("lot-b", 2).obstacles);
         assert_eq!(draw("lot-b", 1), draw("lot-b", 1));
         assert_eq!(draw("test-easy-3", 1), draw("test-easy-3", 2));

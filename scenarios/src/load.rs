@@ -1,86 +1,76 @@
 //! Lots as files: TOML that a person can write by hand, and maps of other programs ([`crate::import`]); `examples/` has
 //! annotated ones.
 //!
-//! Whatever is wrong with a file comes back as one error that names file, line and remedy.
+//! Whatever is wrong with a file is one error that names file, line and remedy.
 
+use crate::error::{LoadError, Location, line_at, read_text};
 use crate::import::{self, MapLot};
-use sim::scenario::{Place, Scenario, ScenarioError};
+use sim::scenario::{Direction, Place, Scenario, ScenarioError};
 use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
 use std::path::Path;
 use toml_edit::visit_mut::{self, VisitMut};
 use toml_edit::{Array, Document, Formatted, InlineTable, Item, Value};
 
-/// Why a lot cannot be had.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum LoadError {
-    /// The file cannot be read.
-    #[error("{file}: cannot be read: {problem}; check the path")]
-    Unreadable {
-        /// As given.
-        file: String,
-        /// What the operating system says.
-        problem: String,
-    },
-    /// The file is no scenario, or one that cannot be driven.
-    #[error("{file}:{line}: {problem}; {remedy}")]
-    Faulty {
-        /// As given.
-        file: String,
-        /// Counted from 1.
-        line: usize,
-        /// What is wrong there.
-        problem: String,
-        /// What would make it right.
-        remedy: String,
-    },
-    /// A map of another program from which no lot can be made.
-    #[error("{file}: {place}: {problem}; {remedy}")]
-    Map {
-        /// As given.
-        file: String,
-        /// The key, image or place at fault.
-        place: String,
-        /// What is wrong there.
-        problem: String,
-        /// What would make it right.
-        remedy: String,
-    },
-}
-
-impl LoadError {
-    pub(crate) fn faulty(file: &str, text: &str, offset: usize, problem: String, remedy: String) -> Self {
-        let line = 1 + text.get(..offset).unwrap_or(text).matches('\n').count();
-        Self::Faulty { file: file.to_owned(), line, problem, remedy }
-    }
-}
-
-/// Reads and checks a lot: a scenario file, a `NAME.lot.toml` that names a map, or a map with such a file beside it.
+/// Reads a lot and checks that a vehicle can drive it forward: a scenario file, a `NAME.lot.toml` that names a map, or a
+/// map with such a file beside it.
 ///
 /// # Errors
 /// The first thing wrong with it, with its place.
-pub fn load(path: &Path) -> Result<Scenario, LoadError> {
+pub fn load(path: &Path, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
     if import::is_map(path) {
-        return MapLot::read(path)?.scenario();
+        return MapLot::read(path)?.scenario(vehicle);
     }
     let text = read_text(path)?;
-    if Document::parse(text.as_str()).is_ok_and(|document| document.as_table().contains_key("map")) {
-        return MapLot::read(path)?.scenario();
+    if Document::parse(text.as_str()).is_ok_and(|document| names_a_map(&document)) {
+        return MapLot::read(path)?.scenario(vehicle);
     }
-    parse(&text, &path.display().to_string())
+    parse(&text, &path.display().to_string(), vehicle)
 }
 
-/// The text of a file.
-pub(crate) fn read_text(path: &Path) -> Result<String, LoadError> {
-    std::fs::read_to_string(path)
-        .map_err(|error| LoadError::Unreadable { file: path.display().to_string(), problem: error.to_string() })
+fn names_a_map(document: &Document<&str>) -> bool {
+    document.as_table().contains_key("map")
 }
 
-/// Reads and checks the text of a scenario file; `file` is its name in errors.
+/// Checks that the lot of a file, as [`load`] returned it, can be driven in a direction.
+///
+/// # Errors
+/// [`LoadError::ForwardOnly`] with the line of the route's last point, where a drive in reverse starts; for a map, the
+/// line of the key that says where the route ends.
+pub fn check_direction(
+    path: &Path,
+    scenario: &Scenario,
+    direction: Direction,
+    vehicle: &VehicleSettings,
+) -> Result<(), LoadError> {
+    let Err(error) = validate(&direction.of(scenario.clone()), vehicle) else {
+        return Ok(());
+    };
+    let n_points = scenario.reference_path.points.len();
+    let place = match (direction, error.place) {
+        (Direction::Reverse, Place::ReferencePath(Some(i))) => Place::ReferencePath(Some(n_points - 1 - i)),
+        (_, place) => place,
+    };
+    let file = if import::is_map(path) { path.with_extension("lot.toml") } else { path.to_owned() };
+    let line = read_text(&file).ok().and_then(|text| {
+        let document = Document::parse(text.as_str()).ok()?;
+        let offset = if names_a_map(&document) { offset_of_finish(&document) } else { offset_of(&document, place) };
+        offset.map(|offset| line_at(&text, offset))
+    });
+    // A map without a file beside it is itself the place.
+    let file = if line.is_some() { &file } else { path };
+    Err(LoadError::ForwardOnly {
+        location: Location { file: file.display().to_string(), line },
+        problem: format!("{place}: {}", error.problem),
+        remedy: error.remedy,
+    })
+}
+
+/// Reads the text of a scenario file and checks that a vehicle can drive it forward; `file` is its name in errors.
 ///
 /// # Errors
 /// The first thing wrong with it, with its line.
-pub fn parse(text: &str, file: &str) -> Result<Scenario, LoadError> {
+pub fn parse(text: &str, file: &str, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
     let faulty =
         |offset: usize, problem: String, remedy: String| LoadError::faulty(file, text, offset, problem, remedy);
     let document = Document::parse(text).map_err(|error| {
@@ -97,7 +87,7 @@ pub fn parse(text: &str, file: &str) -> Result<Scenario, LoadError> {
         // The deserialiser of points reads two numbers and ignores the rest.
         return Err(faulty(offset, format!("a point of {length} numbers"), "write points as [x, y]".to_owned()));
     }
-    validate(&scenario, &VehicleSettings::hyundai_hg300()).map_err(|error| {
+    validate(&scenario, vehicle).map_err(|error| {
         let offset = offset_of(&document, error.place).unwrap_or(0);
         let ScenarioError { place, problem, remedy } = error;
         faulty(offset, format!("{place}: {problem}"), remedy)
@@ -156,7 +146,14 @@ fn offset_of(document: &Document<&str>, place: Place) -> Option<usize> {
     start.map(|span| span.start)
 }
 
-/// Offset and length of the first point that has not two numbers.
+/// Where a `NAME.lot.toml` says where its route ends.
+fn offset_of_finish(document: &Document<&str>) -> Option<usize> {
+    let root = document.as_table();
+    let item = ["goal", "centre_line", "loop"].into_iter().find_map(|key| root.get(key))?;
+    item.span().map(|span| span.start)
+}
+
+/// Offset and length of the first point that does not have two numbers.
 fn first_odd_point(document: &Document<&str>) -> Option<(usize, usize)> {
     let root = document.as_table();
     let islands: Vec<&Array> = match root.get("island") {
@@ -232,7 +229,7 @@ mod tests {
     const EXAMPLE: &str = include_str!("../examples/slalom.toml");
 
     fn message(text: &str) -> String {
-        match parse(text, "lot.toml") {
+        match parse(text, "lot.toml", &VehicleSettings::hyundai_hg300()) {
             Ok(_) => "accepted".to_owned(),
             Err(error) => error.to_string(),
         }
@@ -247,7 +244,7 @@ mod tests {
         files.sort();
         assert!(files.len() >= 5, "{files:?}");
         for file in files {
-            let scenario = load(&file).unwrap_or_else(|error| panic!("{error}"));
+            let scenario = load(&file, &VehicleSettings::hyundai_hg300()).unwrap_or_else(|error| panic!("{error}"));
             let back = scenario.reversed();
             validate(&back, &VehicleSettings::hyundai_hg300())
                 .unwrap_or_else(|error| panic!("{}: {error}", file.display()));
@@ -256,6 +253,7 @@ mod tests {
 
     #[test]
     fn writing_and_reading_gives_the_same_lot() {
+        let parse = |text: &str, file: &str| parse(text, file, &VehicleSettings::hyundai_hg300());
         for lot in ReferenceLot::ALL {
             let scenario = reference::lot(lot, RootSeed(3));
             assert_eq!(parse(&to_toml(&scenario), "lot.toml"), Ok(scenario));
@@ -266,6 +264,7 @@ mod tests {
 
     #[test]
     fn a_written_lot_is_short_and_exact() {
+        let parse = |text: &str, file: &str| parse(text, file, &VehicleSettings::hyundai_hg300());
         let text = to_toml(&parse(EXAMPLE, "slalom.toml").expect("the example is sound"));
         for line in [
             "    [-18.0, -2.5],",
@@ -395,7 +394,7 @@ mod tests {
                 }
                 damaged[i] = words.join(" ");
             }
-            match parse(&damaged.join("\n"), "lot.toml") {
+            match parse(&damaged.join("\n"), "lot.toml", &VehicleSettings::hyundai_hg300()) {
                 Ok(scenario) => {
                     accepted += 1;
                     if accepted % 20 == 0 {
@@ -415,7 +414,7 @@ mod tests {
 
     #[test]
     fn a_missing_file_is_named() {
-        let error = load(Path::new("no/such/lot.toml")).expect_err("there is none");
+        let error = load(Path::new("no/such/lot.toml"), &VehicleSettings::hyundai_hg300()).expect_err("there is none");
         assert!(error.to_string().starts_with("no/such/lot.toml: cannot be read: No such file"), "{error}");
     }
 }

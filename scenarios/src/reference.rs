@@ -1,7 +1,7 @@
-//! The three lots of the paper, rebuilt: length, corners and difficulty are its, the drawing is ours.
+//! The three lots of the paper, rebuilt: length, corners and difficulty are the paper's, everything else is chosen.
 //!
-//! The paper prints only lengths and pictures; turns and widths are those with which a scripted expert reaches the
-//! paper's safe ratios .83/.72/.91 (expert-findings.md 3). A lot's geometry is fixed, its obstacles are drawn anew for
+//! The paper prints only lengths and pictures; turns and widths are such that a scripted expert reaches the
+//! paper's safe ratios .83/.72/.91 (docs/methods.md E3). A lot's geometry is fixed, its obstacles are drawn anew for
 //! every trial.
 
 use crate::clutter::{self, ClutterPlan, Furniture};
@@ -35,7 +35,7 @@ impl ReferenceLot {
         }
     }
 
-    /// Length of the reference path, metres (paper; a is derived from its event counts, methods.md 0).
+    /// Length of the reference path, metres (paper; a is derived from its event counts, docs/methods.md 0).
     pub fn length_m(self) -> f32 {
         self.plan().length_m
     }
@@ -73,19 +73,19 @@ impl ReferenceLot {
 
 /// Seed of the fixed geometry. Another number gives other lots of the same kind, and other results.
 const LAYOUT_SEED: RootSeed = RootSeed(2020);
-/// Radius of the reference path at corners, metres (methods.md 11).
+/// Radius of the reference path at corners, metres (docs/methods.md 11).
 const PATH_RADIUS_M: f32 = 5.0;
 /// The lane goes on this far behind the finish: the 12 m patch ahead of a bumper at the finish, plus the car's front.
 const RUN_OUT_M: f32 = 18.0;
-/// Intruders keep this far from start and finish: the car's front at 3.8 m, and room to get going.
+/// Encroachments keep this far from start and finish: the car's front at 3.8 m, and room to get going.
 const END_CLEAR_M: f32 = 9.0;
 /// Legs longer than this have a bulge, metres.
 const BULGE_FROM_LEG_M: f32 = 40.0;
 const BULGE_LENGTH_M: f32 = 14.0;
-/// One speed bump per this much route, metres (methods.md 11).
+/// One speed bump per this much route, metres (docs/methods.md 11).
 const SPEED_BUMP_EVERY_M: f32 = 60.0;
 
-/// A row of the table in expert-findings.md 3.
+/// A row of the table in docs/methods.md E3.
 struct LotPlan {
     /// Of the rounded route.
     length_m: f32,
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lane_is_as_wide_as_the_sheet_says() {
+    fn the_lane_is_as_wide_as_the_table_says() {
         for which in ReferenceLot::ALL {
             let plan = which.plan();
             let scenario = lot(which, RootSeed(1));
@@ -260,8 +260,8 @@ mod tests {
         }
     }
 
-    /// The gap rules, measured on the finished scenario with rays across the route: nothing is asked of the code that
-    /// places things.
+    /// The gap rules, measured on the finished scenario with rays across the route, independently of the code that places
+    /// the obstacles.
     #[test]
     fn whatever_narrows_the_lane_obeys_the_gap_rules() {
         for which in ReferenceLot::ALL {

@@ -12,9 +12,9 @@ use std::collections::{BTreeSet, BinaryHeap};
 
 pub mod route;
 
-/// Clearance that generated lots must leave around the body, metres (methods.md 11).
+/// Clearance that generated lots must leave around the body, metres (docs/methods.md 11).
 pub const CLEARANCE_M: f32 = 0.25;
-/// Look-ahead of the near-collision rule, metres (methods.md 8.1).
+/// Look-ahead of the near-collision rule, metres (docs/methods.md 8.1).
 const SWEEP_AHEAD_M: f32 = 0.5;
 /// Share of the clearance that is kept there too.
 const SWEEP_CLEARANCE_SHARE: f32 = 0.4;
@@ -29,7 +29,7 @@ const CURVATURE_SHARE: f32 = 0.92;
 /// Poses closer than this count as one: metres and radians.
 const SAME_PLACE_M: f32 = 0.3;
 const SAME_HEADING_RAD: f32 = 4.0 * std::f32::consts::PI / 180.0;
-/// Greediness: a path, not the shortest one, is wanted.
+/// Greedy on purpose: any path will do, not the shortest.
 const HEURISTIC_WEIGHT: f32 = 1.8;
 /// Gives up after this many expansions. Solvable lots take a few hundred to a few thousand.
 const EXPANSIONS_MAX: usize = 20_000;
@@ -191,7 +191,7 @@ impl<'a> Search<'a> {
             }
             let [(middle, first_curvature), (end, curvature)] = self.halves(pose, steering, next);
             if self.is_free(middle, first_curvature) && self.is_free(end, curvature) {
-                // Small prices: prefer few and gentle movements of the wheel, and the middle of the free space.
+                // Small costs: prefer few and gentle movements of the wheel, and the middle of the free space.
                 let effort = 0.02 * f32::from((next - steering).abs()) + 0.01 * f32::from(next.abs());
                 let closeness = 0.2 * (1.8 - self.scene.clearance_m(end.position())).max(0.0);
                 self.push(end, next, cost + STEP_M * (1.0 + effort + closeness), parent);
@@ -417,7 +417,7 @@ impl Scene {
     }
 }
 
-/// Distance to the finish along free ground, with a price for narrow passages; infinite where there is no way.
+/// Distance to the finish along free ground, with a cost for narrow passages; infinite where there is no way.
 struct DistanceToGo(Raster<f32>);
 
 impl DistanceToGo {
@@ -552,7 +552,7 @@ mod tests {
     use super::*;
     use crate::reference::{self, ReferenceLot};
     use geo::{Contains, Intersects, LineString, Polygon};
-    use sim::scenario::{Direction, LotNoise, Obstacle, ObstacleClass, ReferencePath};
+    use sim::scenario::{Direction, Obstacle, ObstacleClass};
     use sim::seed::RootSeed;
 
     fn car() -> VehicleSettings {
@@ -561,23 +561,9 @@ mod tests {
 
     /// A straight lane of a width, 70 m long, driven from x = 10 to x = 50.
     fn lane(width_m: f32, obstacles: &[(ObstacleClass, f32, f32)]) -> Scenario {
-        let half_m = 0.5 * width_m;
-        let boundary = [(0.0, -half_m), (70.0, -half_m), (70.0, half_m), (0.0, half_m)];
-        Scenario {
-            name: "lane".to_owned(),
-            boundary: boundary.map(|(x, y)| Vec2::new(x, y)).to_vec(),
-            reference_path: ReferencePath {
-                points: vec![Vec2::new(10.0, 0.0), Vec2::new(50.0, 0.0)],
-                corner_radius_m: 5.0,
-            },
-            noise: LotNoise::default(),
-            islands: Vec::new(),
-            obstacles: obstacles
-                .iter()
-                .map(|&(class, x_m, y_m)| Obstacle::new(class, Pose { x_m, y_m, heading_rad: 0.0 }))
-                .collect(),
-            speed_bumps: Vec::new(),
-        }
+        let things =
+            obstacles.iter().map(|&(class, x_m, y_m)| Obstacle::new(class, Pose { x_m, y_m, heading_rad: 0.0 }));
+        Scenario::lane(0.0..=70.0, width_m, 10.0..=50.0).with_corner_radius_m(5.0).with_obstacles(things)
     }
 
     /// An L of two aisles of a width with a sharp inner corner.
@@ -591,10 +577,7 @@ mod tests {
             (40.0 - half_m, half_m),
             (0.0, half_m),
         ];
-        let mut scenario = lane(width_m, &[]);
-        scenario.boundary = boundary.map(|(x, y)| Vec2::new(x, y)).to_vec();
-        scenario.reference_path.points = vec![Vec2::new(10.0, 0.0), Vec2::new(40.0, 0.0), Vec2::new(40.0, 20.0)];
-        scenario
+        Scenario::new("corner", boundary, [(10.0, 0.0), (40.0, 0.0), (40.0, 20.0)]).with_corner_radius_m(5.0)
     }
 
     #[test]
@@ -612,7 +595,7 @@ mod tests {
             ("a double-parked car that leaves 2.3 m", lane(5.0, &[(Sedan, 25.0, 0.725)]), false),
             ("a slalom with 10 m between the cars", lane(5.5, &[(Sedan, 22.65, 1.8), (Sedan, 37.35, -1.8)]), true),
             ("two cars side by side", lane(5.0, &[(Sedan, 25.0, 1.5), (Sedan, 27.0, -1.5)]), false),
-            // methods.md 11: a sharp right angle needs at least 4.1–4.2 m, 4.6–4.7 m with 0.3 m clearance.
+            // docs/methods.md 11: a sharp right angle needs at least 4.1–4.2 m, 4.6–4.7 m with 0.3 m clearance.
             ("a sharp corner of two 5 m aisles", sharp_corner(5.0), true),
             ("a sharp corner of two 4 m aisles", sharp_corner(4.0), false),
         ];

@@ -19,7 +19,7 @@ pub enum Split {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Difficulty {
-    /// Wide lanes, few intruders.
+    /// Wide lanes, few encroachments.
     Easy,
     /// Between the two.
     #[default]

@@ -6,7 +6,7 @@ use sim::driver::{Decision, LookAheadPoint, Source};
 use sim::episode::{Episode, EpisodeSettings};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
-use sim::scenario::{LotNoise, NoiseLevel, Obstacle, ObstacleClass, ReferencePath, Scenario, SpeedBump};
+use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, Scenario, SpeedBump};
 use sim::seed::RootSeed;
 use sim::sensing::noise::NoiseSettings;
 use sim::sensing::{SensingSettings, Sensor};
@@ -23,7 +23,6 @@ fn main() {
 /// A 200 m lane of some width, with parked cars in stalls on both sides, double-parked noses and bumps.
 fn scenario(width_m: f32) -> Scenario {
     let half = 0.5 * width_m;
-    let boundary = [(-20.0, -half), (220.0, -half), (220.0, half), (-20.0, half)];
     let parked = (0..90).flat_map(|i| {
         [(half + 2.6, 90.0), (-half - 2.6, -90.0)].map(|(y, heading_deg): (f32, f32)| {
             Obstacle::new(ObstacleClass::Sedan, Pose::new(Vec2::new(2.4 * i as f32, y), heading_deg.to_radians()))
@@ -31,17 +30,10 @@ fn scenario(width_m: f32) -> Scenario {
     });
     let noses = (0..10)
         .map(|i| Obstacle::new(ObstacleClass::Compact, Pose::new(Vec2::new(15.0 + 20.0 * i as f32, half + 0.55), 0.0)));
-    Scenario {
-        name: "bench".into(),
-        boundary: boundary.map(|(x, y)| Vec2::new(x, y)).to_vec(),
-        reference_path: ReferencePath { points: vec![Vec2::ZERO, Vec2::new(200.0, 0.0)], corner_radius_m: 0.0 },
-        noise: LotNoise::default(),
-        islands: vec![],
-        obstacles: parked.chain(noses).collect(),
-        speed_bumps: (0..3)
-            .map(|i| SpeedBump { x_m: 60.0 * i as f32, y_m: 0.0, heading_deg: 0.0, length_m: 0.5, width_m })
-            .collect(),
-    }
+    let bump = |i| SpeedBump { x_m: 60.0 * i as f32, y_m: 0.0, heading_deg: 0.0, length_m: 0.5, width_m };
+    Scenario::lane(-20.0..=220.0, width_m, 0.0..=200.0)
+        .with_obstacles(parked.chain(noses))
+        .with_speed_bumps((0..3).map(bump))
 }
 
 fn map(width_m: f32) -> Arc<Map> {

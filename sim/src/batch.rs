@@ -1,11 +1,12 @@
-//! Many episodes at a time.
+//! Many episodes in lock-step.
 
 use crate::driver::{Decision, Fleet};
-use crate::episode::{Episode, EpisodeReport, Frame};
+use crate::episode::{Episode, EpisodeReport};
+use crate::frame::Frame;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Drives episodes in lock-step to their ends: one call of the fleet per tick answers for all that still run.
+/// Drives episodes in lock-step until all have ended. Each tick is one call of the fleet for all that still run.
 ///
 /// Reports come in the order of the episodes. `on_frame(episode, frame)` is called in that order within a tick.
 pub fn run_lockstep(
@@ -20,7 +21,8 @@ pub fn run_lockstep(
     reports.into_iter().map(|report| report.expect("nothing stopped them")).collect()
 }
 
-/// As [`run_lockstep`], but all stop after the tick in which `on_frame` breaks: `None` for what had not ended by then.
+/// Like [`run_lockstep`], but stops all episodes after the tick in which `on_frame` breaks. `None` stands for an episode
+/// that had not ended by then.
 pub fn run_lockstep_until(
     mut episodes: Vec<Episode>,
     fleet: &mut dyn Fleet,
@@ -45,7 +47,7 @@ pub fn run_lockstep_until(
             .zip(&decisions)
             .map(|((index, episode), &decision)| (*index, episode.apply(decision)))
             .collect_into_vec(&mut frames);
-        // Everybody's frame is seen, also after the first break: a tick is never half.
+        // Every frame of the tick is passed on, even after a break: callers never see half a tick.
         if frames.iter().filter(|(index, frame)| on_frame(*index, frame).is_break()).count() > 0 {
             break;
         }

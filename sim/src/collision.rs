@@ -1,4 +1,7 @@
 //! Exact intersection of the car body with the scene. The only file that names rapier2d and parry2d.
+//!
+//! A static scene needs one query, which parry2d's bounding-volume tree would answer without rapier2d. rapier2d stays
+//! because moving bodies come later, and behind this file, so that nothing else depends on it.
 
 use crate::distance_field::DistanceField;
 use crate::geometry::{Pose, Vec2, edges};
@@ -91,12 +94,12 @@ pub struct BodyBox {
 
 impl BodyBox {
     /// The body of a vehicle.
-    pub fn new(params: &VehicleSettings) -> Self {
-        let cuboid = Cuboid::new(Vec2::new(0.5 * params.length_m, 0.5 * params.width_m));
-        let segment_m = params.length_m / BODY_DISCS as f32;
-        let disc_centres_m = std::array::from_fn(|i| (i as f32 + 0.5) * segment_m - params.rear_overhang_m);
-        let disc_radius_m = (0.5 * segment_m).hypot(0.5 * params.width_m);
-        let corners = params.body_in_ego();
+    pub fn new(vehicle: &VehicleSettings) -> Self {
+        let cuboid = Cuboid::new(Vec2::new(0.5 * vehicle.length_m, 0.5 * vehicle.width_m));
+        let segment_m = vehicle.length_m / BODY_DISCS as f32;
+        let disc_centres_m = std::array::from_fn(|i| (i as f32 + 0.5) * segment_m - vehicle.rear_overhang_m);
+        let disc_radius_m = (0.5 * segment_m).hypot(0.5 * vehicle.width_m);
+        let corners = vehicle.body_in_ego();
         let outline_in_ego = edges(&corners)
             .flat_map(|(a, b)| {
                 let pieces = ((b - a).length() / 0.2).ceil() as usize;
@@ -105,14 +108,14 @@ impl BodyBox {
             .collect();
         Self {
             cuboid,
-            centre_ahead_m: 0.5 * params.length_m - params.rear_overhang_m,
+            centre_ahead_m: 0.5 * vehicle.length_m - vehicle.rear_overhang_m,
             disc_centres_m,
             disc_radius_m,
             outline_in_ego,
         }
     }
 
-    /// Whether the body, swept along an arc from `pose` over `travel_m`, meets the scene (methods.md 8.1).
+    /// Whether the body, swept along an arc from `pose` over `travel_m`, meets the scene (docs/methods.md 8.1).
     ///
     /// Free space is recognised on the distance raster first; only a body close to something is tested exactly.
     pub fn sweep_hits(
@@ -157,23 +160,14 @@ fn isometry(pose: Pose) -> Isometry {
 mod tests {
     use super::ObstacleSet::{NonDrivable, Solid};
     use super::*;
-    use crate::scenario::{Obstacle, ObstacleClass, ReferencePath};
+    use crate::scenario::{Obstacle, ObstacleClass};
 
     #[test]
     fn the_body_hits_what_it_overlaps_and_nothing_else() {
-        let boundary = [(-10.0, -4.0), (60.0, -4.0), (60.0, 4.0), (-10.0, 4.0)].map(|(x, y)| Vec2::new(x, y)).to_vec();
-        let scenario = Scenario {
-            name: "lane".into(),
-            boundary,
-            reference_path: ReferencePath { points: vec![Vec2::ZERO, Vec2::new(40.0, 0.0)], corner_radius_m: 0.0 },
-            noise: crate::scenario::LotNoise::default(),
-            islands: vec![],
-            obstacles: vec![
-                Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(30.35, 1.1), 0.0)),
-                Obstacle::new(ObstacleClass::Person, Pose::new(Vec2::new(10.0, 0.0), 0.0)),
-            ],
-            speed_bumps: vec![],
-        };
+        let scenario = Scenario::lane(-10.0..=60.0, 8.0, 0.0..=40.0).with_obstacles([
+            Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(30.35, 1.1), 0.0)),
+            Obstacle::new(ObstacleClass::Person, Pose::new(Vec2::new(10.0, 0.0), 0.0)),
+        ]);
         let world = CollisionWorld::new(&scenario);
         let body = BodyBox::new(&VehicleSettings::hyundai_hg300());
         let hits = |x: f32, y: f32, heading: f32, set| world.body_hits(&body, Pose::new(Vec2::new(x, y), heading), set);

@@ -1,4 +1,4 @@
-//! From a look-ahead point to a vehicle command: pure pursuit and the speed law (methods.md 2.4, 2.5).
+//! From a look-ahead point to a vehicle command: pure pursuit and the speed law (docs/methods.md 2.4, 2.5).
 
 use crate::driver::{Decision, LookAheadPoint, Source};
 use crate::sensing::GridGeometry;
@@ -12,21 +12,22 @@ pub enum PursuitLaw {
     /// δ = atan(2 L sin θ_l / L_f) about the rear axle: the exact circle through the point (paper).
     #[default]
     Paper,
-    /// δ = atan(L sin η / (0.75 L_f + 0.3 cos η)) measured from 0.5 m behind the lower image edge (authors' code).
+    /// δ = atan(L sin η / (0.75 L_f + 0.3 cos η)) measured from the front bumper, 0.5 m behind the
+    /// lower image edge (authors' code).
     AuthorsCode,
 }
 
 /// How fast to drive at a look-ahead point. The paper says v = a_y/2.24 "where the final v was set to half of a_y for
-/// safety reasons"; methods.md 2.5 lists the readings. Distances are measured from the front bumper.
+/// safety reasons"; docs/methods.md 2.5 lists the readings. Distances are measured from the front bumper.
 ///
-/// methods.md prefers B with points as far as the way is open. The car is steered 7 m ahead, so such a point lies far
-/// beyond, on the circle through what is steered at: moving the car by 20 cm moves it by 1.5 m, and η̂ stays below .8.
-/// Law A with points half as far (`ElasticBandSettings::reach_share` in `expert`) drives the same circle at about the same speed,
-/// the point lies near what is steered at, and η̂ passes .9. Both the formula and the half of the paper are kept.
+/// Law B goes with points as far as the way is open. The car is steered at a point 7 m ahead, so a farther point lies on
+/// the circle through that one: moving the car by 20 cm moves it by 1.5 m, and η̂ stays below .8. Law A with points half
+/// as far (`ElasticBandSettings::reach_share` in `expert`) drives the same circle at about the same speed, the point
+/// lies near the one that is steered at, and η̂ exceeds .9. So the formula is the paper's, and so is the half.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SpeedLaw {
-    /// A: v = a_y / 2.24, the formula as printed and Kuwata's look-ahead schedule. The half is in the expert's points.
+    /// A: v = a_y / 2.24, the formula as printed and Kuwata's look-ahead schedule. The expert's points are half as far.
     #[default]
     Full,
     /// B: v = a_y / 4.48. Gives the paper's derived 1.43 m/s with points as far as the way is open.
@@ -66,65 +67,76 @@ impl ControllerSettings {
     }
 }
 
-/// Gap between the front bumper and the lower edge of the patch that the speed law adds, metres (methods.md 2.5).
-const BUMPER_TO_PATCH_M: f32 = 0.5;
 /// Shortest look-ahead distance, metres: below it the circle through the point is meaningless.
 const LOOK_AHEAD_MIN_M: f32 = 1.0;
+
+/// From the front bumper to the lower edge of the patch, metres: 0.5 m for the paper's car and patch (docs/methods.md 2.5).
+///
+/// In whole millimetres: single precision makes 0.500_000_5 m of 4.30 m − (4.91 m − 1.11 m).
+fn bumper_to_patch_m(vehicle: &VehicleSettings, geometry: &GridGeometry) -> f32 {
+    ((geometry.near_edge_ahead_m - vehicle.front_m()) * 1000.0).round() / 1000.0
+}
+
+/// How far ahead of the front bumper a point lies, metres: a_y of the paper. A point has the same speed wherever the patch
+/// lies.
+fn ahead_of_bumper_m(vehicle: &VehicleSettings, geometry: &GridGeometry, target: LookAheadPoint) -> f32 {
+    target.ahead_m - geometry.near_edge_ahead_m + bumper_to_patch_m(vehicle, geometry)
+}
 
 /// The command that drives at a decision's look-ahead point.
 pub fn pursue(
     settings: &ControllerSettings,
-    params: &VehicleSettings,
+    vehicle: &VehicleSettings,
     geometry: &GridGeometry,
     decision: &Decision,
 ) -> VehicleCommand {
-    let steering_rad = steering(settings.pursuit, params, geometry, decision.look_ahead);
+    let steering_rad = steering(settings.pursuit, vehicle, geometry, decision.look_ahead);
     let law = if decision.source == Source::Planner { settings.planner_speed_law } else { settings.speed_law };
     VehicleCommand {
         steering_rad,
-        speed_mps: speed(law, settings, params, geometry, decision.look_ahead, steering_rad),
+        speed_mps: speed(law, settings, vehicle, geometry, decision.look_ahead, steering_rad),
     }
 }
 
 /// Road-wheel angle that steers at a point, radians, within the vehicle's limits.
-pub fn steering(law: PursuitLaw, params: &VehicleSettings, geometry: &GridGeometry, target: LookAheadPoint) -> f32 {
+pub fn steering(law: PursuitLaw, vehicle: &VehicleSettings, geometry: &GridGeometry, target: LookAheadPoint) -> f32 {
     let LookAheadPoint { ahead_m, left_m } = target;
     let steering_rad = match law {
         PursuitLaw::Paper => {
             if ahead_m <= 0.1 {
                 // Beside or behind the axle: no forward circle reaches it, turn as hard as possible.
-                params.steering_max_rad * left_m.signum()
+                vehicle.steering_max_rad * left_m.signum()
             } else {
                 let distance_m = ahead_m.hypot(left_m).max(LOOK_AHEAD_MIN_M); // L_f
                 let bearing_rad = left_m.atan2(ahead_m); // θ_l
-                (2.0 * params.wheelbase_m * bearing_rad.sin() / distance_m).atan()
+                (2.0 * vehicle.wheelbase_m * bearing_rad.sin() / distance_m).atan()
             }
         }
         PursuitLaw::AuthorsCode => {
-            let ahead_m = ahead_m - geometry.near_edge_ahead_m + BUMPER_TO_PATCH_M;
+            let ahead_m = ahead_of_bumper_m(vehicle, geometry, target);
             let distance_m = ahead_m.hypot(left_m).max(LOOK_AHEAD_MIN_M);
             let bearing_rad = left_m.atan2(ahead_m);
-            (params.wheelbase_m * bearing_rad.sin() / (0.75 * distance_m + 0.3 * bearing_rad.cos())).atan()
+            (vehicle.wheelbase_m * bearing_rad.sin() / (0.75 * distance_m + 0.3 * bearing_rad.cos())).atan()
         }
     };
-    steering_rad.clamp(-params.steering_max_rad, params.steering_max_rad)
+    steering_rad.clamp(-vehicle.steering_max_rad, vehicle.steering_max_rad)
 }
 
 fn speed(
     law: SpeedLaw,
     settings: &ControllerSettings,
-    params: &VehicleSettings,
+    vehicle: &VehicleSettings,
     geometry: &GridGeometry,
     target: LookAheadPoint,
     steering_rad: f32,
 ) -> f32 {
-    let ahead_m = target.ahead_m - geometry.near_edge_ahead_m + BUMPER_TO_PATCH_M; // a_y, from the bumper
+    let ahead_m = ahead_of_bumper_m(vehicle, geometry, target); // a_y
     let speed_mps = match law {
         SpeedLaw::Full => ahead_m / 2.24,
         SpeedLaw::Halved => ahead_m / 4.48,
         SpeedLaw::HalfOfAhead => ahead_m / 2.0,
         SpeedLaw::FallsWithSteering => {
-            let share = steering_rad.abs() / params.steering_max_rad; // |δ_sw| / 540°
+            let share = steering_rad.abs() / vehicle.steering_max_rad; // |δ_sw| / 540°
             settings.speed_max_mps - share * (settings.speed_max_mps - settings.speed_min_mps)
         }
     };
@@ -137,10 +149,10 @@ mod tests {
 
     #[test]
     fn the_paper_law_drives_the_circle_through_the_point() {
-        let (params, geometry) = (VehicleSettings::hyundai_hg300(), GridGeometry::paper());
+        let (vehicle, geometry) = (VehicleSettings::hyundai_hg300(), GridGeometry::paper());
         for (ahead_m, left_m) in [(8.0, 1.0), (5.0, -2.0), (12.0, 4.0), (16.0, 0.0)] {
             let target = LookAheadPoint { ahead_m, left_m };
-            let curvature = steering(PursuitLaw::Paper, &params, &geometry, target).tan() / params.wheelbase_m;
+            let curvature = steering(PursuitLaw::Paper, &vehicle, &geometry, target).tan() / vehicle.wheelbase_m;
             assert!((curvature - target.curvature_per_m()).abs() < 1e-5);
             // Rolling along that arc arrives at the point.
             let chord_m = ahead_m.hypot(left_m);
@@ -153,9 +165,10 @@ mod tests {
 
     #[test]
     fn speed_laws_match_the_paper() {
-        let (params, geometry, settings) =
+        let (vehicle, geometry, settings) =
             (VehicleSettings::hyundai_hg300(), GridGeometry::paper(), ControllerSettings::paper());
-        let at = |law, ahead_m| speed(law, &settings, &params, &geometry, LookAheadPoint { ahead_m, left_m: 0.0 }, 0.0);
+        let at =
+            |law, ahead_m| speed(law, &settings, &vehicle, &geometry, LookAheadPoint { ahead_m, left_m: 0.0 }, 0.0);
         // 0.5 + X_bev = 4.48 m → law B 1.0 m/s, A 2.0 m/s, C capped at 2.2 m/s.
         let ahead_m = 4.3 - 0.5 + 4.48;
         assert!((at(SpeedLaw::Halved, ahead_m) - 1.0).abs() < 1e-5);
@@ -164,9 +177,22 @@ mod tests {
         assert_eq!(at(SpeedLaw::Halved, 4.3), 0.5);
         let planner = |steering_rad| {
             let target = LookAheadPoint { ahead_m: 8.0, left_m: 0.0 };
-            speed(SpeedLaw::FallsWithSteering, &settings, &params, &geometry, target, steering_rad)
+            speed(SpeedLaw::FallsWithSteering, &settings, &vehicle, &geometry, target, steering_rad)
         };
         assert_eq!(planner(0.0), 2.2);
-        assert!((planner(params.steering_max_rad) - 0.5).abs() < 1e-5);
+        assert!((planner(vehicle.steering_max_rad) - 0.5).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_bumper_is_where_the_vehicle_ends() {
+        let (vehicle, geometry) = (VehicleSettings::hyundai_hg300(), GridGeometry::paper());
+        assert_eq!(bumper_to_patch_m(&vehicle, &geometry), 0.5, "the authors' constant");
+        let target = LookAheadPoint { ahead_m: 8.3, left_m: 0.0 };
+        for near_edge_ahead_m in [3.8, 4.3, 5.1, 6.0] {
+            let geometry = GridGeometry { near_edge_ahead_m, ..geometry };
+            assert!((ahead_of_bumper_m(&vehicle, &geometry, target) - 4.5).abs() < 1e-5, "{near_edge_ahead_m} m");
+        }
+        let longer = VehicleSettings { length_m: vehicle.length_m + 0.3, ..vehicle };
+        assert!((ahead_of_bumper_m(&longer, &geometry, target) - 4.2).abs() < 1e-5);
     }
 }

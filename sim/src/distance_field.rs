@@ -7,7 +7,7 @@ use crate::geometry::{Vec2, distance_to_segment, edges, polygon_contains};
 
 /// Spacing of the nodes, metres.
 pub const NODE_M: f32 = 0.1;
-/// Distances are capped here, metres: nothing asks for more.
+/// Distances are capped here, metres: no caller needs more.
 pub const CAP_M: f32 = 3.0;
 
 /// How much [`DistanceField::at`] may differ, anywhere within `radius_m` of a place, from the value at the node nearest
@@ -18,7 +18,7 @@ pub const CAP_M: f32 = 3.0;
 /// the second term, f(1 − f) per axis, is at most half a squared spacing.
 #[must_use]
 pub fn change_max_m(radius_m: f32) -> f32 {
-    /// Rounding of single precision, with a lot to spare.
+    /// A generous bound of rounding in single precision.
     const ROUNDING_M: f32 = 1e-4;
     let to_node_m = std::f32::consts::FRAC_1_SQRT_2 * NODE_M;
     (radius_m + to_node_m).hypot(std::f32::consts::FRAC_1_SQRT_2 * NODE_M) + ROUNDING_M

@@ -1,4 +1,4 @@
-//! Who is at the wheel, and what they may see.
+//! Who drives, and what they may see.
 //!
 //! A [`Policy`] receives an [`Observation`] and nothing else; only a [`Driver`] receives [`GroundTruth`]. A policy
 //! that peeks does not compile.
@@ -19,7 +19,7 @@ pub struct LookAheadPoint {
 
 impl LookAheadPoint {
     /// Image fractions `[u, w]` of the bird's-eye view: u 0 = left … 1 = right, w 0 = far … 1 = near
-    /// (methods.md 0; the paper's a_x and a_y). Not clipped.
+    /// (docs/methods.md 0; the paper's a_x and a_y). Not clipped.
     pub fn to_image_fraction(self, geometry: &GridGeometry) -> [f32; 2] {
         [0.5 - self.left_m / geometry.side_m, 1.0 - (self.ahead_m - geometry.near_edge_ahead_m) / geometry.side_m]
     }
@@ -67,19 +67,19 @@ pub struct Decision {
     pub spread: Option<Spread>,
 }
 
-/// Noise-free surroundings: what only the expert, the metrics and the collision check may use.
+/// Noise-free surroundings, for the expert, the metrics and the collision check only.
 #[derive(Debug, Clone, Copy)]
 pub struct GroundTruth<'a> {
     /// The clean map.
     pub map: &'a Map,
-    /// The vehicle as it is.
+    /// The true state of the vehicle.
     pub vehicle: VehicleState,
     /// Arc length along the reference path of the point nearest to the rear axle, metres. For the "no turning back"
     /// filter only.
     pub progress_m: f32,
 }
 
-/// All a driver can be shown at one control tick.
+/// Everything a driver can be shown at one control tick.
 #[derive(Debug, Clone, Copy)]
 pub struct Situation<'a> {
     /// The noisy grid.
@@ -97,7 +97,7 @@ pub trait Policy {
     fn reset(&mut self) {}
 }
 
-/// Whoever is at the wheel of one episode.
+/// The driver of one episode.
 pub trait Driver {
     /// Answers one situation.
     fn decide(&mut self, situation: &Situation<'_>) -> Decision;
@@ -106,7 +106,7 @@ pub trait Driver {
     fn reset(&mut self) {}
 }
 
-/// Seats a [`Policy`] at the wheel and withholds the truth from it.
+/// Makes a [`Policy`] a [`Driver`] and withholds the truth from it.
 #[derive(Debug, Clone)]
 pub struct SensorsOnly<P>(pub P);
 
@@ -133,7 +133,7 @@ pub struct Seat<'a> {
 
 /// Drives many episodes in lock-step, so that a network answers for all of them in one call.
 ///
-/// What one seat is answered must not depend on which other seats are in the call.
+/// The answer for one seat must not depend on which other seats are in the call.
 pub trait Fleet {
     /// Pushes exactly one decision per seat, in order.
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>);

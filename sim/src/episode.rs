@@ -14,6 +14,7 @@
 use crate::collision::BodyBox;
 use crate::controller::{self, ControllerSettings};
 use crate::driver::{Decision, Driver, GroundTruth, Seat, Situation};
+use crate::frame::{Ending, Event, Frame, FrameSink};
 use crate::geometry::Pose;
 use crate::map::Map;
 use crate::metrics::{EpisodeMetrics, MetricsAccumulator, MetricsSettings, SafeRing};
@@ -33,9 +34,9 @@ pub struct EpisodeSettings {
     pub vehicle: VehicleSettings,
     /// From look-ahead point to command.
     pub controller: ControllerSettings,
-    /// What is seen.
+    /// Camera and bird's-eye view.
     pub sensing: SensingSettings,
-    /// What is seen wrongly.
+    /// Perception errors.
     pub noise: NoiseSettings,
     /// What is measured.
     pub metrics: MetricsSettings,
@@ -73,88 +74,6 @@ impl EpisodeSettings {
     }
 }
 
-/// What happened in one tick.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", tag = "kind")]
-pub enum Event {
-    /// Nothing.
-    Drove,
-    /// The car headed at something within 0.5 m; it was stopped and put back on the path.
-    NearCollision {
-        /// Rear-axle pose when it was counted.
-        at: Pose,
-        /// Progress along the reference path then, metres.
-        progress_m: f32,
-    },
-    /// No progress for ten seconds; the car was put back on the path.
-    Stuck {
-        /// Rear-axle pose when it was counted.
-        at: Pose,
-        /// Progress along the reference path then, metres.
-        progress_m: f32,
-    },
-    /// The finish.
-    ReachedEnd,
-}
-
-/// How a run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Ending {
-    /// At the finish.
-    ReachedEnd,
-    /// Given up after too many near-collisions and stuck events.
-    TooManyEvents,
-    /// Given up after too long a time.
-    TimedOut,
-}
-
-/// One control tick as seen from outside.
-#[derive(Debug, Clone, Copy)]
-pub struct Frame {
-    /// Index of the decision, from 0.
-    pub tick: u32,
-    /// Simulated time at the end of the tick, seconds.
-    pub time_s: f32,
-    /// The vehicle when it was observed.
-    pub vehicle: VehicleState,
-    /// What was seen.
-    pub observation: Observation,
-    /// What was answered.
-    pub decision: Decision,
-    /// What the controller made of it.
-    pub command: VehicleCommand,
-    /// Progress along the reference path when observed, metres.
-    pub progress_m: f32,
-    /// Drivable share of the safe range when observed, 0…1.
-    pub safe_ratio: f32,
-    /// Distance between body and non-drivable space when observed, or after an emergency stop in this tick if that is
-    /// less, metres.
-    pub clearance_m: f32,
-    /// Way driven in this tick, metres.
-    pub driven_m: f32,
-    /// Times the body began to touch something in this tick.
-    pub contacts: u32,
-    /// What happened.
-    pub event: Event,
-}
-
-/// Reads frames; cannot influence or fail an episode.
-pub trait FrameSink {
-    /// Takes one frame.
-    fn frame(&mut self, frame: &Frame);
-}
-
-impl FrameSink for () {
-    fn frame(&mut self, _frame: &Frame) {}
-}
-
-impl<F: FnMut(&Frame)> FrameSink for F {
-    fn frame(&mut self, frame: &Frame) {
-        self(frame);
-    }
-}
-
 /// Result of a finished run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeReport {
@@ -166,10 +85,10 @@ pub struct EpisodeReport {
     pub events: Vec<(u32, Event)>,
 }
 
-/// Where stop–count–resume stands.
+/// State of stop–count–resume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
-    /// Somebody drives.
+    /// The driver is in control.
     Driving,
     /// Counted; emergency braking until the car rests.
     Braking,
@@ -198,7 +117,7 @@ pub struct Episode {
     touches: bool,
     observation: Observation,
     was_reset: bool,
-    tally: MetricsAccumulator,
+    metrics: MetricsAccumulator,
     events: Vec<(u32, Event)>,
     ending: Option<Ending>,
 }
@@ -228,7 +147,7 @@ impl Episode {
             touches: false,
             observation: Observation::default(),
             was_reset: true,
-            tally: MetricsAccumulator::new(map.path().length_m()),
+            metrics: MetricsAccumulator::new(map.path().length_m()),
             events: Vec::new(),
             ending: None,
             settings,
@@ -241,8 +160,9 @@ impl Episode {
         Sensor::new(&self.map, self.settings.sensing.clone(), &self.settings.noise, seed)
     }
 
-    /// The same, but already under way: for asking what would have happened from a state that was met elsewhere.
-    /// Commands still on their way then are not known; the car holds its wheels and speed until the first new one.
+    /// An episode that starts from a state met in another one, to ask what would have happened from there. Commands that
+    /// were still on their way to the actuators are not known: the car keeps its steering and speed until the first new
+    /// command takes hold.
     pub fn under_way(
         settings: Arc<EpisodeSettings>,
         map: Arc<Map>,
@@ -254,12 +174,12 @@ impl Episode {
         Self { vehicle, command, progress_m, advance: (progress_m, 0), ..Self::new(settings, map, seed) }
     }
 
-    /// Looks. Call once before each decision.
+    /// Takes an observation. Call once before each decision.
     pub fn observe(&mut self) {
         self.observation = self.sensor.observe(&self.map, self.vehicle.pose, self.tick);
     }
 
-    /// What a driver may be shown.
+    /// What the driver is shown.
     pub fn situation(&self) -> Situation<'_> {
         let truth = GroundTruth { map: &self.map, vehicle: self.vehicle, progress_m: self.progress_m };
         Situation { observation: &self.observation, truth }
@@ -310,12 +230,13 @@ impl Episode {
         self.progress_m
     }
 
-    /// Drives one control tick; a near-collision is braked to rest and put back on the path within it.
+    /// Drives one control tick. After a near-collision the tick lasts until the car has braked to rest and stands on the
+    /// path again.
     ///
     /// # Panics
     /// If the episode has ended, or the look-ahead point is not finite.
     pub fn apply(&mut self, decision: Decision) -> Frame {
-        assert!(self.ending.is_none(), "an ended episode is not driven on");
+        assert!(self.ending.is_none(), "the episode has ended");
         let point = decision.look_ahead;
         assert!(
             point.ahead_m.is_finite() && point.left_m.is_finite(),
@@ -356,7 +277,7 @@ impl Episode {
         self.progress_m = self.map.path().project_near(self.vehicle.pose.position(), self.progress_m, 5.0, 5.0);
         self.judge_progress(&mut frame);
         frame.time_s = self.physics_step as f32 * settings.physics_step_s();
-        self.tally.frame(&frame);
+        self.metrics.frame(&frame);
         if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
             self.events.push((frame.tick, frame.event));
         }
@@ -368,7 +289,7 @@ impl Episode {
     pub fn report(&self) -> EpisodeReport {
         EpisodeReport {
             ending: self.ending.unwrap_or(Ending::TimedOut),
-            metrics: self.tally.metrics(),
+            metrics: self.metrics.metrics(),
             events: self.events.clone(),
         }
     }
@@ -447,7 +368,7 @@ impl Episode {
             && is_free(start.advanced_along_arc(0.0, metrics.near_collision_m))
     }
 
-    /// Recognises a stuck car and the finish.
+    /// Detects a stuck car and the finish.
     fn judge_progress(&mut self, frame: &mut Frame) {
         let (best_m, since_step) = self.advance;
         let metrics = &self.settings.metrics;

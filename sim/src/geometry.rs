@@ -45,7 +45,7 @@ impl Pose {
 
     /// The pose after `travel_m` along an arc of curvature `curvature_per_m` (exact; negative travel drives back).
     ///
-    /// `x += (sin(θ+Δθ) − sin θ)/κ`, `y −= (cos(θ+Δθ) − cos θ)/κ` (methods.md 2.2), written with half angles so
+    /// `x += (sin(θ+Δθ) − sin θ)/κ`, `y −= (cos(θ+Δθ) − cos θ)/κ` (docs/methods.md 2.2), written with half angles so
     /// that it stays accurate as κ → 0.
     #[must_use]
     pub fn advanced_along_arc(self, curvature_per_m: f32, travel_m: f32) -> Self {
@@ -100,7 +100,7 @@ const CORNERS: usize = 8;
 pub(crate) struct Outline {
     xs: [f32; CORNERS],
     ys: [f32; CORNERS],
-    /// Those beyond repeat the last one.
+    /// Unused corners repeat the last one.
     n_corners: usize,
 }
 
@@ -157,8 +157,8 @@ impl FromIterator<Vec2> for Outline {
     }
 }
 
-/// Many circles, arranged so that several are tested at once. Neighbours in their order should be neighbours in the plane:
-/// circles that lie together are passed over together.
+/// Many circles, arranged so that several are tested at once. Circles that follow each other should lie near each other:
+/// blocks of them are skipped together.
 #[derive(Debug, Clone, Default)]
 pub struct Circles {
     blocks: Vec<CircleBlock>,
@@ -218,7 +218,7 @@ impl FromIterator<(Vec2, f32)> for Circles {
 
 /// A circle around circles, given and returned as (centre, radius in metres).
 fn around(circles: &[(Vec2, f32)]) -> (Vec2, f32) {
-    /// Rounding of single precision, with a lot to spare, metres.
+    /// A generous bound of rounding in single precision, metres.
     const ROUNDING_M: f32 = 1e-3;
     let middle = circles.iter().map(|&(centre, _)| centre).sum::<Vec2>() / circles.len() as f32;
     let reach_m = circles.iter().map(|&(centre, radius_m)| centre.distance(middle) + radius_m).fold(0.0, f32::max);
@@ -282,7 +282,7 @@ pub fn rectangle(centre: Pose, length_m: f32, width_m: f32) -> [Vec2; 4] {
 mod tests {
     use super::*;
 
-    /// Culling is common to the sensor and to its brute-force check, so that only this test would see it go wrong.
+    /// The sensor and its brute-force check share this culling, so only this test would see it go wrong.
     #[test]
     fn circles_that_overlap_are_all_found_and_no_others() {
         let circles: Vec<(Vec2, f32)> = (0..21)
@@ -298,7 +298,7 @@ mod tests {
         assert_eq!(Circles::default().overlapping(Vec2::ZERO, 9.0).count(), 0);
     }
 
-    /// Along a lane most are passed over together.
+    /// Along a lane most blocks are skipped.
     #[test]
     fn circles_along_a_lane_are_found_from_anywhere_beside_it() {
         let circle = |i: usize| (Vec2::new(2.4 * i as f32, (i % 2) as f32), 0.2 + 0.3 * (i % 5) as f32);

@@ -2,8 +2,8 @@
 //!
 //! A [`scenario::Scenario`] is compiled into a [`map::Map`]; an [`episode::Episode`] on that map shows the driver an
 //! [`sensing::Observation`]; the driver answers with a [`driver::LookAheadPoint`]; the [`controller`] turns it into a
-//! [`vehicle::VehicleCommand`]; the vehicle moves; an [`episode::Frame`] falls out, and metrics, datasets and
-//! recordings only ever read frames. Nothing flows backwards.
+//! [`vehicle::VehicleCommand`]; the vehicle moves; the result is a [`frame::Frame`]. Metrics, data sets and
+//! recordings read frames only; nothing flows backwards.
 //!
 //! This crate knows no sibling, no burn, no rerun, no clap and no files.
 
@@ -13,6 +13,7 @@ pub mod controller;
 pub mod distance_field;
 pub mod driver;
 pub mod episode;
+pub mod frame;
 pub mod geometry;
 pub mod map;
 pub mod metrics;

@@ -21,12 +21,12 @@ pub struct Map {
     occluder_circles: Circles,
 }
 
-/// A convex thing that hides the ground behind it from the camera.
+/// A convex object that hides the ground behind it from the camera.
 #[derive(Debug, Clone)]
 pub struct Occluder {
     /// Convex outline in the world, counter-clockwise.
     pub outline: Vec<Vec2>,
-    /// The same, to be moved at once.
+    /// The same corners, arranged to be transformed together.
     pub(crate) corners: Outline,
     /// Centre of a circle around the outline, world.
     pub centre: Vec2,

@@ -1,9 +1,9 @@
-//! What is measured on a run (methods.md 8): always on the clean map.
+//! What is measured on a run (docs/methods.md 8): always on the clean map.
 
 use crate::collision::ObstacleSet;
 use crate::distance_field::{DistanceField, change_max_m};
 use crate::driver::Source;
-use crate::episode::{Event, Frame};
+use crate::frame::{Event, Frame};
 use crate::geometry::{Pose, Vec2, WorldFromEgo, distance_to_segment, edges, polygon_contains};
 use crate::vehicle::VehicleSettings;
 use serde::{Deserialize, Serialize};
@@ -35,7 +35,7 @@ pub struct MetricsSettings {
 }
 
 impl MetricsSettings {
-    /// The paper's definitions where it gives them, methods.md 8 elsewhere.
+    /// The paper's definitions where it gives them, docs/methods.md 8 elsewhere.
     pub fn paper() -> Self {
         Self {
             near_collision_m: 0.5,
@@ -70,7 +70,7 @@ pub struct SafeRing {
     n_pixels: u32,
 }
 
-/// Blocks that are looked up together.
+/// Blocks whose centres are looked up together.
 #[derive(Debug, Clone)]
 struct Batch {
     centres: Points<BATCH>,
@@ -184,15 +184,15 @@ impl Quarter {
 
 impl SafeRing {
     /// The ring (body ⊕ disc) minus body, at a pixel size.
-    pub fn new(params: &VehicleSettings, settings: &MetricsSettings, pixel_m: f32) -> Self {
-        let body = params.body_in_ego();
+    pub fn new(vehicle: &VehicleSettings, settings: &MetricsSettings, pixel_m: f32) -> Self {
+        let body = vehicle.body_in_ego();
         let is_in_range = |point: Vec2| {
-            let is_ahead = settings.safe_range == SafeRange::Full || point.x >= params.front_m();
+            let is_ahead = settings.safe_range == SafeRange::Full || point.x >= vehicle.front_m();
             let near = edges(&body).any(|(a, b)| distance_to_segment(point, a, b) <= settings.safe_range_m);
             is_ahead && near && !polygon_contains(&body, point)
         };
         let block_m = pixel_m * BLOCK as f32;
-        let reach_m = params.length_m + settings.safe_range_m;
+        let reach_m = vehicle.length_m + settings.safe_range_m;
         let n = (reach_m / block_m).ceil() as i32;
         // A pixel centre lies on the axle, so that neither the body's sides nor the ring's fall on centres.
         let corners = (-n..n).flat_map(|row| (-n..n).map(move |col| Vec2::new(row as f32, col as f32) * block_m));
@@ -254,13 +254,13 @@ pub struct EpisodeMetrics {
     pub stuck: u32,
     /// Mean over ticks of the drivable share of the safe range, 0…1.
     pub safe_ratio: f32,
-    /// Smallest distance between body and non-drivable space, metres, negative on contact. Looked at when the car
-    /// observes and where an emergency stop ends.
+    /// Smallest distance between body and non-drivable space, metres, negative on contact. Sampled at every
+    /// observation and where an emergency stop ends.
     pub clearance_min_m: f32,
     /// Changes of the steering direction by more than 2° of road-wheel angle: the steering reversals of SAE J2944, with
-    /// a gap (chosen) that ignores the follow-up of noise. What a resume straightens does not count.
+    /// a gap (chosen) that ignores the response to noise. Wheels straightened by a resume do not count.
     pub steering_reversals: u32,
-    /// Road-wheel angle steered, radians: the sum of all changes from tick to tick (chosen), resumes left out.
+    /// Road-wheel angle steered, radians: the sum of all changes from tick to tick (chosen), without resumes.
     pub steering_effort_rad: f32,
 }
 
@@ -295,7 +295,7 @@ struct Steering {
 const REVERSAL_RAD: f32 = 2.0 * std::f32::consts::PI / 180.0;
 
 impl MetricsAccumulator {
-    /// Nothing measured yet on a route of this length.
+    /// An empty accumulator for a route of this length.
     pub fn new(reference_m: f32) -> Self {
         let metrics = EpisodeMetrics { reference_m, clearance_min_m: f32::INFINITY, ..EpisodeMetrics::default() };
         Self { metrics, ..Self::default() }
@@ -318,7 +318,7 @@ impl MetricsAccumulator {
         self.driven_m += f64::from(frame.driven_m);
         self.steer(frame.vehicle.steering_rad);
         if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
-            // The next frame shows straight wheels on the path, which nobody steered.
+            // The next frame shows a car that was put back with straight wheels: nobody steered that.
             self.steering = Steering::default();
         }
     }
@@ -352,12 +352,12 @@ impl MetricsAccumulator {
 /// [`EpisodeMetrics::steering_reversals`].
 pub fn steering_reversals(angles_rad: impl IntoIterator<Item = f32>) -> u32 {
     let mut angles_rad = angles_rad.into_iter();
-    let mut tally = MetricsAccumulator::default();
+    let mut accumulator = MetricsAccumulator::default();
     if let Some(first) = angles_rad.next() {
-        tally.steering = Steering { last_rad: first, turning: 0.0, extreme_rad: first };
+        accumulator.steering = Steering { last_rad: first, turning: 0.0, extreme_rad: first };
     }
-    angles_rad.for_each(|angle| tally.steer(angle));
-    tally.metrics.steering_reversals
+    angles_rad.for_each(|angle| accumulator.steer(angle));
+    accumulator.metrics.steering_reversals
 }
 
 /// Near-collisions per 100 m of reference path (paper, collision rate): events and metres pooled over runs.
@@ -403,7 +403,7 @@ mod tests {
         assert_eq!(moved.mean_speed_mps(), 1.5);
     }
 
-    /// A centred car in a straight lane: methods.md 8.2 lists .53, .69, .84, 1.0 for 2.6, 3.0, 3.4, ≥ 4.0 m.
+    /// A centred car in a straight lane: docs/methods.md 8.2 lists .53, .69, .84, 1.0 for 2.6, 3.0, 3.4, ≥ 4.0 m.
     #[test]
     fn straight_lanes_give_the_derived_ratios() {
         for (width_m, expected) in [(2.6, 0.53), (3.0, 0.69), (3.4, 0.84), (4.2, 1.0)] {
@@ -469,15 +469,15 @@ mod tests {
     /// Five frames added up by hand: 10° and back are 20° and one reversal; a near-collision; what the resume
     /// straightens (3°) is nobody's steering; 4° more after it.
     #[test]
-    fn a_tally_is_the_sum_of_its_frames() {
+    fn metrics_are_the_sum_of_their_frames() {
         let near = Event::NearCollision { at: Pose::default(), progress_m: 0.0 };
         let stuck = Event::Stuck { at: Pose::default(), progress_m: 0.0 };
         let frames = [(10.0, Event::Drove), (0.0, Event::Drove), (-3.0, near), (0.0, stuck), (4.0, Event::ReachedEnd)];
-        let mut tally = MetricsAccumulator::new(200.0);
+        let mut accumulator = MetricsAccumulator::new(200.0);
         for (tick, (steering_deg, event)) in frames.into_iter().enumerate() {
-            tally.frame(&frame(tick as u32, steering_deg, event));
+            accumulator.frame(&frame(tick as u32, steering_deg, event));
         }
-        let metrics = tally.metrics();
+        let metrics = accumulator.metrics();
         assert_eq!((metrics.ticks, metrics.novice_ticks), (5, 1));
         assert_eq!((metrics.near_collisions, metrics.stuck, metrics.contacts), (1, 1, 1));
         assert_eq!(metrics.steering_reversals, 1);

@@ -1,10 +1,11 @@
-//! What a lot is made of: plain data that serialises to TOML, nothing derived.
+//! What a lot consists of: plain data that serialises to TOML, nothing derived.
 //!
 //! Metres and degrees, because people write these files by hand; everything behind [`crate::map::Map::build`] is in
 //! radians. Unknown keys are refused.
 
 use crate::geometry::{Pose, Vec2};
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// A parking lot with obstacles and the route to be driven.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -22,7 +23,7 @@ pub struct Scenario {
     /// Non-drivable areas inside the boundary.
     #[serde(default, rename = "island", skip_serializing_if = "Vec::is_empty")]
     pub islands: Vec<Island>,
-    /// Everything solid that stands in the lot.
+    /// Solid objects.
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     pub obstacles: Vec<Obstacle>,
     /// Speed bumps: drivable, but their edges can fool the perception.
@@ -58,7 +59,7 @@ pub struct ReferencePath {
     pub corner_radius_m: f32,
 }
 
-/// One solid thing.
+/// A solid object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Obstacle {
@@ -162,7 +163,7 @@ impl ObstacleClass {
         Self::Person,
     ];
 
-    /// Typical `[length, width, height]` in metres (methods.md 11).
+    /// Typical `[length, width, height]` in metres (docs/methods.md 11).
     pub fn default_size_m(self) -> [f32; 3] {
         match self {
             Self::Sedan => [4.70, 1.85, 1.45],
@@ -180,7 +181,7 @@ impl ObstacleClass {
         }
     }
 
-    /// Round things have a diameter and no width of their own.
+    /// Round objects have a diameter instead of length and width.
     pub fn is_round(self) -> bool {
         matches!(self, Self::Cone | Self::Bollard | Self::Person)
     }
@@ -231,6 +232,58 @@ pub struct LotNoise {
 }
 
 impl Scenario {
+    /// An empty lot: its boundary, and a route whose corners are not rounded. World metres.
+    ///
+    /// ```
+    /// # use sim::{geometry::Pose, scenario::{Obstacle, ObstacleClass, Scenario}};
+    /// let yard = Scenario::new("yard", [(0.0, 0.0), (40.0, 0.0), (40.0, 20.0), (0.0, 20.0)], [(5.0, 10.0), (30.0, 10.0)])
+    ///     .with_obstacles([Obstacle::new(ObstacleClass::Cone, Pose { x_m: 20.0, y_m: 12.0, heading_rad: 0.0 })]);
+    /// assert_eq!(yard.obstacles.len(), 1);
+    /// ```
+    pub fn new<P: Into<Vec2>, Q: Into<Vec2>>(
+        name: impl Into<String>,
+        boundary: impl IntoIterator<Item = P>,
+        route: impl IntoIterator<Item = Q>,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            boundary: boundary.into_iter().map(Into::into).collect(),
+            reference_path: ReferencePath { points: route.into_iter().map(Into::into).collect(), corner_radius_m: 0.0 },
+            noise: LotNoise::default(),
+            islands: Vec::new(),
+            obstacles: Vec::new(),
+            speed_bumps: Vec::new(),
+        }
+    }
+
+    /// A straight lane along world x with its middle on y = 0, and a route along the middle. Ranges of x, metres.
+    pub fn lane(x_m: RangeInclusive<f32>, width_m: f32, route_m: RangeInclusive<f32>) -> Self {
+        let (from, to, half) = (*x_m.start(), *x_m.end(), 0.5 * width_m);
+        let boundary = [(from, -half), (to, -half), (to, half), (from, half)];
+        Self::new("lane", boundary, [(*route_m.start(), 0.0), (*route_m.end(), 0.0)])
+    }
+
+    /// With the corners of the route rounded.
+    #[must_use]
+    pub fn with_corner_radius_m(mut self, corner_radius_m: f32) -> Self {
+        self.reference_path.corner_radius_m = corner_radius_m;
+        self
+    }
+
+    /// With more obstacles.
+    #[must_use]
+    pub fn with_obstacles(mut self, obstacles: impl IntoIterator<Item = Obstacle>) -> Self {
+        self.obstacles.extend(obstacles);
+        self
+    }
+
+    /// With more speed bumps.
+    #[must_use]
+    pub fn with_speed_bumps(mut self, speed_bumps: impl IntoIterator<Item = SpeedBump>) -> Self {
+        self.speed_bumps.extend(speed_bumps);
+        self
+    }
+
     /// The same lot driven from finish to start.
     #[must_use]
     pub fn reversed(mut self) -> Self {

@@ -36,9 +36,9 @@ pub enum Stream {
     Suite = 11,
     /// Candidates of a search for parameters.
     Search = 12,
-    /// Sensor noise of further looks at a tick that is learned from.
+    /// Sensor noise of the additional observations of a training tick.
     NoiseAugmentation = 13,
-    /// Nudges of the wheel while collecting.
+    /// Disturbances injected into the steering while collecting data (DART).
     Disturbance = 14,
 }
 

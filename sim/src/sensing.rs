@@ -1,4 +1,4 @@
-//! What the car sees: a bird's-eye view of 200×200 pixels, reduced to a 25×25 occupancy grid (methods.md 1).
+//! What the car sees: a bird's-eye view of 200×200 pixels, reduced to a 25×25 occupancy grid (docs/methods.md 1).
 
 pub mod noise;
 mod occlusion;
@@ -21,14 +21,14 @@ pub const BEV_PIXELS: usize = GRID_CELLS * CELL_PIXELS;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GridGeometry {
-    /// Side of the patch, metres (R in methods.md; 12.0 m from the authors' constants).
+    /// Side of the patch, metres (R in docs/methods.md; 12.0 m from the authors' constants).
     pub side_m: f32,
     /// From the rear axle to the lower edge of the patch, metres.
     pub near_edge_ahead_m: f32,
 }
 
 impl GridGeometry {
-    /// 12 m patch that starts 4.30 m ahead of the rear axle, 0.5 m ahead of the bumper (methods.md 1.3–1.4).
+    /// 12 m patch that starts 4.30 m ahead of the rear axle, 0.5 m ahead of the bumper (docs/methods.md 1.3–1.4).
     pub fn paper() -> Self {
         Self { side_m: 12.0, near_edge_ahead_m: 4.30 }
     }

@@ -9,11 +9,11 @@ use crate::vehicle::VehicleSettings;
 
 /// Largest extent of a lot, metres: its raster of distances then takes 100 MB.
 pub const EXTENT_MAX_M: f32 = 500.0;
-/// Things that stand farther than this from the lot are typing errors, metres.
+/// An object farther than this from the lot is a typing error, metres.
 const STRAY_M: f32 = 50.0;
 /// Points nearer than this count as one, metres.
 const COINCIDENT_M: f32 = 1e-3;
-/// A route shorter than about one car length measures nothing, metres.
+/// A route shorter than about a car's length measures nothing, metres.
 const PATH_MIN_M: f32 = 5.0;
 /// The route is tested in chords of about this length, metres: a chord of a 5 m corner strays by 6 mm.
 const CHORD_M: f32 = 0.5;
@@ -226,9 +226,9 @@ fn check_start(scenario: &Scenario, vehicle: &VehicleSettings, start: Pose) -> R
     if crosses_line || stands_outside {
         let (length_m, width_m) = (vehicle.length_m, vehicle.width_m);
         let problem =
-            format!("the car ({length_m} m × {width_m} m) does not fit at the start, {}", at(start.position()));
+            format!("the car ({length_m:.2} m × {width_m:.2} m) does not fit at the start, {}", at(start.position()));
         let remedy = format!(
-            "leave {} m behind, {} m ahead of and {:.2} m beside the first point drivable",
+            "leave {:.2} m behind, {:.2} m ahead of and {:.2} m beside the first point drivable",
             vehicle.rear_overhang_m,
             vehicle.front_m(),
             0.5 * width_m
@@ -410,23 +410,14 @@ fn at(point: Vec2) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::{Island, LotNoise, ObstacleClass, SpeedBump};
+    use crate::scenario::{Island, ObstacleClass, SpeedBump};
 
     /// A straight lane, 40 m × 6 m, driven from (5, 0) to (30, 0).
     fn lane() -> Scenario {
-        let corners = [(0.0, -3.0), (40.0, -3.0), (40.0, 3.0), (0.0, 3.0)];
-        Scenario {
-            name: "lane".to_owned(),
-            boundary: corners.map(|(x, y)| Vec2::new(x, y)).to_vec(),
-            reference_path: ReferencePath {
-                points: vec![Vec2::new(5.0, 0.0), Vec2::new(30.0, 0.0)],
-                corner_radius_m: 5.0,
-            },
-            noise: LotNoise::default(),
-            islands: Vec::new(),
-            obstacles: vec![obstacle(ObstacleClass::Sedan, 20.0, 2.5)],
-            speed_bumps: vec![SpeedBump { x_m: 12.0, y_m: 0.0, heading_deg: 0.0, length_m: 0.5, width_m: 6.0 }],
-        }
+        Scenario::lane(0.0..=40.0, 6.0, 5.0..=30.0)
+            .with_corner_radius_m(5.0)
+            .with_obstacles([obstacle(ObstacleClass::Sedan, 20.0, 2.5)])
+            .with_speed_bumps([SpeedBump { x_m: 12.0, y_m: 0.0, heading_deg: 0.0, length_m: 0.5, width_m: 6.0 }])
     }
 
     fn obstacle(class: ObstacleClass, x_m: f32, y_m: f32) -> Obstacle {

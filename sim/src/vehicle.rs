@@ -1,7 +1,7 @@
 //! The car: parameters, state and command are three types, and [`step`] is a pure function of them.
 //!
 //! Kinematic bicycle about the rear axle with an exact arc step, a steering-rate limit and a PI speed loop
-//! (methods.md 2.1–2.3).
+//! (docs/methods.md 2.1–2.3).
 
 use crate::geometry::{Pose, Vec2};
 use serde::{Deserialize, Serialize};
@@ -22,8 +22,6 @@ pub struct VehicleSettings {
     pub steering_max_rad: f32,
     /// Fastest change of the road-wheel angle, rad/s.
     pub steering_rate_max_radps: f32,
-    /// Steering-wheel angle per road-wheel angle.
-    pub steering_ratio: f32,
     /// Proportional gain of the speed loop, 1/s.
     pub speed_gain_p_per_s: f32,
     /// Integral gain of the speed loop, 1/s².
@@ -45,7 +43,7 @@ pub struct VehicleSettings {
 }
 
 impl VehicleSettings {
-    /// Hyundai HG 300 of the paper. Sources per number: methods.md 2.1 and 2.3.
+    /// Hyundai HG 300 of the paper. Sources per number: docs/methods.md 2.1 and 2.3.
     pub fn hyundai_hg300() -> Self {
         Self {
             wheelbase_m: 2.845,
@@ -53,8 +51,8 @@ impl VehicleSettings {
             width_m: 1.860,
             rear_overhang_m: 1.11,
             steering_max_rad: 35.5_f32.to_radians(),
-            steering_rate_max_radps: 0.344, // 300 °/s at the steering wheel / 15.2
-            steering_ratio: 15.2,           // ±540° (paper) over ±35.5°
+            // 300 °/s at the steering wheel; it turns ±540° (paper) for ±35.5°, a ratio of 15.2.
+            steering_rate_max_radps: 0.344,
             speed_gain_p_per_s: 1.0,
             speed_gain_i_per_s2: 0.3,
             integral_max_mps2: 0.5,
@@ -84,7 +82,7 @@ impl VehicleSettings {
     }
 }
 
-/// Everything that moves.
+/// The state of a moving vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct VehicleState {
     /// Rear-axle pose in the world.
@@ -115,12 +113,12 @@ impl VehicleState {
     }
 
     /// Curvature of the present arc of the rear axle, 1/m, positive to the left.
-    pub fn curvature_per_m(&self, params: &VehicleSettings) -> f32 {
-        self.steering_rad.tan() / params.wheelbase_m
+    pub fn curvature_per_m(&self, settings: &VehicleSettings) -> f32 {
+        self.steering_rad.tan() / settings.wheelbase_m
     }
 }
 
-/// What a controller asks of the vehicle.
+/// What the controller demands.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct VehicleCommand {
     /// Road-wheel angle, radians, positive to the left.
@@ -130,32 +128,38 @@ pub struct VehicleCommand {
 }
 
 /// One physics step: actuators first, then the exact arc.
-pub fn step(params: &VehicleSettings, state: VehicleState, command: VehicleCommand, dt_s: f32) -> VehicleState {
+pub fn step(settings: &VehicleSettings, state: VehicleState, command: VehicleCommand, dt_s: f32) -> VehicleState {
     let error_mps = command.speed_mps - state.speed_mps;
-    let integral = (state.speed_integral_mps2 + params.speed_gain_i_per_s2 * error_mps * dt_s)
-        .clamp(-params.integral_max_mps2, params.integral_max_mps2);
+    let integral = (state.speed_integral_mps2 + settings.speed_gain_i_per_s2 * error_mps * dt_s)
+        .clamp(-settings.integral_max_mps2, settings.integral_max_mps2);
     let wanted =
-        (params.speed_gain_p_per_s * error_mps + integral).clamp(-params.brake_max_mps2, params.accel_max_mps2);
-    let jerk_step = params.jerk_max_mps3 * dt_s;
+        (settings.speed_gain_p_per_s * error_mps + integral).clamp(-settings.brake_max_mps2, settings.accel_max_mps2);
+    let jerk_step = settings.jerk_max_mps3 * dt_s;
     let demand = wanted.clamp(state.accel_demand_mps2 - jerk_step, state.accel_demand_mps2 + jerk_step);
-    let accel = state.accel_mps2 + (demand - state.accel_mps2) * (dt_s / params.drivetrain_lag_s).min(1.0);
+    let accel = state.accel_mps2 + (demand - state.accel_mps2) * (dt_s / settings.drivetrain_lag_s).min(1.0);
     let actuated = VehicleState { accel_demand_mps2: demand, speed_integral_mps2: integral, ..state };
-    roll(params, actuated, command.steering_rad, accel, dt_s)
+    roll(settings, actuated, command.steering_rad, accel, dt_s)
 }
 
 /// One physics step of an emergency stop: full braking, wheels held.
-pub fn step_emergency_stop(params: &VehicleSettings, state: VehicleState, dt_s: f32) -> VehicleState {
-    roll(params, state, state.steering_rad, -params.emergency_brake_mps2, dt_s)
+pub fn step_emergency_stop(settings: &VehicleSettings, state: VehicleState, dt_s: f32) -> VehicleState {
+    roll(settings, state, state.steering_rad, -settings.emergency_brake_mps2, dt_s)
 }
 
-fn roll(params: &VehicleSettings, state: VehicleState, steering_rad: f32, accel_mps2: f32, dt_s: f32) -> VehicleState {
-    let rate_step = params.steering_rate_max_radps * dt_s;
+fn roll(
+    settings: &VehicleSettings,
+    state: VehicleState,
+    steering_rad: f32,
+    accel_mps2: f32,
+    dt_s: f32,
+) -> VehicleState {
+    let rate_step = settings.steering_rate_max_radps * dt_s;
     let steering_rad = steering_rad
-        .clamp(-params.steering_max_rad, params.steering_max_rad)
+        .clamp(-settings.steering_max_rad, settings.steering_max_rad)
         .clamp(state.steering_rad - rate_step, state.steering_rad + rate_step);
     let speed_mps = (state.speed_mps + accel_mps2 * dt_s).max(0.0);
     let travel_m = 0.5 * (state.speed_mps + speed_mps) * dt_s;
-    let curvature_per_m = steering_rad.tan() / params.wheelbase_m;
+    let curvature_per_m = steering_rad.tan() / settings.wheelbase_m;
     let pose = state.pose.advanced_along_arc(curvature_per_m, travel_m);
     VehicleState { pose, speed_mps, steering_rad, accel_mps2, ..state }
 }

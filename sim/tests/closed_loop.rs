@@ -3,10 +3,11 @@
 
 use sim::batch::run_lockstep_until;
 use sim::driver::{Decision, Driver, LookAheadPoint, OneDriverEach, Situation, Source};
-use sim::episode::{self, Ending, Episode, EpisodeSettings, Event, Frame};
+use sim::episode::{self, Episode, EpisodeSettings};
+use sim::frame::{Ending, Event, Frame};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
-use sim::scenario::{LotNoise, NoiseLevel, Obstacle, ObstacleClass, ReferencePath, Scenario};
+use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, Scenario};
 use sim::seed::RootSeed;
 use sim::sensing::noise::NoiseSettings;
 use sim::vehicle::{VehicleCommand, VehicleSettings, VehicleState, step, step_emergency_stop};
@@ -21,14 +22,14 @@ fn drive(mut state: VehicleState, command: VehicleCommand, seconds: f32) -> Vehi
 }
 
 #[test]
-fn steady_steering_drives_a_circle_of_radius_l_over_tan_delta() {
-    let params = VehicleSettings::hyundai_hg300();
+fn constant_steering_drives_a_circle_of_radius_l_over_tan_delta() {
+    let vehicle = VehicleSettings::hyundai_hg300();
     for steering_rad in [0.1_f32, -0.3, 0.6] {
         let start = VehicleState { steering_rad, speed_mps: 1.5, ..VehicleState::at_rest(Pose::default()) };
-        let radius_m = params.wheelbase_m / steering_rad.tan();
+        let radius_m = vehicle.wheelbase_m / steering_rad.tan();
         let mut state = start;
         for _ in 0..2000 {
-            state = step(&params, state, VehicleCommand { steering_rad, speed_mps: 1.5 }, 0.01);
+            state = step(&vehicle, state, VehicleCommand { steering_rad, speed_mps: 1.5 }, 0.01);
             let off_circle_m = state.pose.position().distance(Vec2::new(0.0, radius_m)) - radius_m.abs();
             assert!(off_circle_m.abs() < 2e-3, "{off_circle_m} m off a circle of {radius_m} m");
         }
@@ -63,10 +64,10 @@ fn the_speed_loop_settles_without_exceeding_its_limits() {
 
 #[test]
 fn an_emergency_stop_takes_v_squared_over_2a() {
-    let params = VehicleSettings::hyundai_hg300();
+    let vehicle = VehicleSettings::hyundai_hg300();
     let mut state = VehicleState { speed_mps: 2.2, ..VehicleState::at_rest(Pose::default()) };
     while state.speed_mps > 0.0 {
-        state = step_emergency_stop(&params, state, 0.01);
+        state = step_emergency_stop(&vehicle, state, 0.01);
     }
     assert!((state.pose.x_m - 2.2 * 2.2 / 6.0).abs() < 0.02, "{} m", state.pose.x_m);
 }
@@ -81,17 +82,7 @@ impl Driver for Fixed {
 }
 
 fn lane(length_m: f32, obstacles: Vec<Obstacle>) -> Arc<Map> {
-    let end = length_m + 20.0;
-    let boundary = [(-10.0, -4.0), (end, -4.0), (end, 4.0), (-10.0, 4.0)].map(|(x, y)| Vec2::new(x, y)).to_vec();
-    let scenario = Scenario {
-        name: "lane".into(),
-        boundary,
-        reference_path: ReferencePath { points: vec![Vec2::ZERO, Vec2::new(length_m, 0.0)], corner_radius_m: 0.0 },
-        noise: LotNoise::default(),
-        islands: vec![],
-        obstacles,
-        speed_bumps: vec![],
-    };
+    let scenario = Scenario::lane(-10.0..=length_m + 20.0, 8.0, 0.0..=length_m).with_obstacles(obstacles);
     Arc::new(Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap())
 }
 
@@ -194,9 +185,7 @@ fn a_parked_car_beside_the_path_is_no_near_collision() {
 fn a_car_that_does_not_advance_is_stuck_and_put_back() {
     // Full lock to the left within an 8 m lane is a circle that would leave the lane; a near-collision is counted, not
     // a stuck event. In a 60 m wide hall it circles on the spot instead.
-    let mut scenario = lane(40.0, vec![]).scenario().clone();
-    scenario.boundary =
-        [(-30.0, -30.0), (90.0, -30.0), (90.0, 30.0), (-30.0, 30.0)].map(|(x, y)| Vec2::new(x, y)).to_vec();
+    let scenario = Scenario::lane(-30.0..=90.0, 60.0, 0.0..=40.0);
     let map = Arc::new(Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap());
     let mut short = (*settings()).clone();
     short.metrics.events_max = 3;

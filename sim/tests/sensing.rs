@@ -3,7 +3,7 @@
 
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
-use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, ReferencePath, Scenario, SpeedBump};
+use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, Scenario, SpeedBump};
 use sim::seed::RootSeed;
 use sim::sensing::noise::{Layer, NoiseSettings};
 use sim::sensing::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid, SensingSettings, Sensor};
@@ -11,21 +11,14 @@ use sim::vehicle::VehicleSettings;
 
 /// A 5 m lane along x with a parked car on the right, a cone on the left and a speed bump.
 fn lane() -> Map {
-    let boundary = [(-10.0, -2.5), (90.0, -2.5), (90.0, 2.5), (-10.0, 2.5)];
     let obstacle = |class, x, y| Obstacle::new(class, Pose::new(Vec2::new(x, y), 0.0));
-    let scenario = Scenario {
-        name: "lane".into(),
-        boundary: boundary.map(|(x, y)| Vec2::new(x, y)).to_vec(),
-        reference_path: ReferencePath { points: vec![Vec2::new(0.0, 0.0), Vec2::new(60.0, 0.0)], corner_radius_m: 0.0 },
-        noise: sim::scenario::LotNoise::default(),
-        islands: vec![],
-        obstacles: vec![
+    let scenario = Scenario::lane(-10.0..=90.0, 5.0, 0.0..=60.0)
+        .with_obstacles([
             obstacle(ObstacleClass::Sedan, 20.0, -1.9),
             obstacle(ObstacleClass::Cone, 30.0, 2.0),
             obstacle(ObstacleClass::Person, 40.0, -2.0),
-        ],
-        speed_bumps: vec![SpeedBump { x_m: 25.0, y_m: 0.0, heading_deg: 0.0, length_m: 0.8, width_m: 5.0 }],
-    };
+        ])
+        .with_speed_bumps([SpeedBump { x_m: 25.0, y_m: 0.0, heading_deg: 0.0, length_m: 0.8, width_m: 5.0 }]);
     Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap()
 }
 
@@ -72,17 +65,7 @@ fn the_fast_grid_is_the_max_pool_where_openings_overlap() {
 
 #[test]
 fn a_straight_lane_looks_like_one() {
-    let boundary = [(-10.0, -1.5), (90.0, -1.5), (90.0, 1.5), (-10.0, 1.5)].map(|(x, y)| Vec2::new(x, y)).to_vec();
-    let reference_path = ReferencePath { points: vec![Vec2::ZERO, Vec2::new(60.0, 0.0)], corner_radius_m: 0.0 };
-    let scenario = Scenario {
-        name: "narrow".into(),
-        boundary,
-        reference_path,
-        noise: sim::scenario::LotNoise::default(),
-        islands: vec![],
-        obstacles: vec![],
-        speed_bumps: vec![],
-    };
+    let scenario = Scenario::lane(-10.0..=90.0, 3.0, 0.0..=60.0);
     let map = Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap();
     let grid = sensor(&map, NoiseLevel::Clean, 0).observe(&map, Pose::default(), 0).grid;
     // Cells are 0.48 m: |y| ≤ 1.5 m holds the five cells of centre |y| ≤ 0.96 whole, and no more.
@@ -108,7 +91,7 @@ fn a_turned_grid_is_the_view_of_the_turned_car() {
 }
 
 #[test]
-fn things_hide_the_ground_behind_them_only_when_smear_is_on() {
+fn things_hide_the_ground_behind_them_only_when_occlusion_is_on() {
     let map = lane();
     let occupied = |occlusion| {
         let settings = SensingSettings { occlusion, ..SensingSettings::paper() };

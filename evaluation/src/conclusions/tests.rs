@@ -3,7 +3,8 @@ use experiment::drivers::NamedDriver;
 use experiment::lots::Lot;
 use experiment::settings::Settings;
 use experiment::trials::{Purpose, Trial};
-use sim::episode::{Ending, EpisodeReport};
+use sim::episode::EpisodeReport;
+use sim::frame::Ending;
 use sim::metrics::EpisodeMetrics;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -24,7 +25,7 @@ struct Run {
 fn statements(names: &[&str], of: impl Fn(&str, &Trial<'_>) -> Run) -> Vec<Statement> {
     let settings = Settings::preset("default").unwrap();
     let drivers: Vec<NamedDriver> = names.iter().map(|name| driver(name)).collect();
-    let lots = Lot::parse_all(&["reference"]).unwrap();
+    let lots = Lot::parse_all(&["reference"], &settings.episode.vehicle).unwrap();
     let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0 };
     let mut results = EvaluationResults::new(&plan);
     for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 5, &Direction::BOTH).enumerate() {
@@ -123,7 +124,7 @@ fn what_goes_either_way_cannot_be_told_and_the_metres_that_would_tell_are_named(
 fn none_in_a_few_metres_is_no_proof() {
     let settings = Settings::preset("default").unwrap();
     let drivers = [driver(DAGGER)];
-    let lots = Lot::parse_all(&["lot-b"]).unwrap();
+    let lots = Lot::parse_all(&["lot-b"], &settings.episode.vehicle).unwrap();
     let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0 };
     let driven_m = |reference_m| {
         let mut results = EvaluationResults::new(&plan);

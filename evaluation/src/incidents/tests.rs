@@ -116,7 +116,7 @@ fn the_monitor_looks_back_six_seconds_and_not_beyond_a_resume() {
 #[test]
 fn a_driver_that_can_pass_passes_on_the_clean_grid() {
     let settings = Settings::preset("smoke").unwrap();
-    let lots = Lot::parse_all(&["lot-b"]).unwrap();
+    let lots = Lot::parse_all(&["lot-b"], &settings.episode.vehicle).unwrap();
     let trials: Vec<Trial<'_>> =
         Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 1, &[Direction::Forward]).collect();
     let maps = trials::maps(&trials, &settings.episode).unwrap();

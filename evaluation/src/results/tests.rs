@@ -2,7 +2,7 @@ use super::*;
 use experiment::drivers::NamedDriver;
 use experiment::settings::Settings;
 use experiment::trials::Purpose;
-use sim::episode::Ending;
+use sim::frame::Ending;
 use sim::metrics::EpisodeMetrics;
 use sim::seed::RootSeed;
 
@@ -20,7 +20,7 @@ fn drivers_named(n: usize) -> Vec<NamedDriver> {
 /// Two drivers over lots a and b and two generated lots, both ways, three trials; what they did is given by a function.
 fn results(drivers: usize, of: impl Fn(usize, &Trial<'_>) -> Option<EpisodeReport>) -> EvaluationResults {
     let settings = Settings::preset("default").unwrap();
-    let lots = Lot::parse_all(&["lot-a", "lot-b", "test:2"]).unwrap();
+    let lots = Lot::parse_all(&["lot-a", "lot-b", "test:2"], &settings.episode.vehicle).unwrap();
     let named = drivers_named(drivers);
     let plan = Plan { settings: &settings, drivers: &named, lots: &lots, compare_with: 0 };
     let mut results = EvaluationResults::new(&plan);

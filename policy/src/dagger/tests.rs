@@ -8,9 +8,8 @@ use crate::fit::Budget;
 use crate::network::ConvConfig;
 use sim::driver::{Decision, Fleet, LookAheadPoint, OneDriverEach, SensorsOnly, Situation, Source};
 use sim::episode::EpisodeSettings;
-use sim::geometry::Vec2;
 use sim::map::Map;
-use sim::scenario::{LotNoise, ReferencePath, Scenario};
+use sim::scenario::Scenario;
 use std::sync::Arc;
 
 /// Drives to the point of the route ten metres ahead.
@@ -28,17 +27,10 @@ impl Driver for RouteFollower {
 
 /// A lane 7 m wide: 25 m straight on, then 30° to the left.
 fn episodes(count: usize) -> Vec<Episode> {
-    let v = Vec2::new;
     let settings = EpisodeSettings::paper();
-    let scenario = Scenario {
-        name: "bent lane".to_string(),
-        boundary: vec![v(-4.0, -3.5), v(26.0, -3.5), v(52.0, 11.5), v(48.5, 17.6), v(24.0, 3.5), v(-4.0, 3.5)],
-        reference_path: ReferencePath { points: vec![v(0.0, 0.0), v(25.0, 0.0), v(42.0, 9.8)], corner_radius_m: 12.0 },
-        noise: LotNoise::default(),
-        islands: Vec::new(),
-        obstacles: Vec::new(),
-        speed_bumps: Vec::new(),
-    };
+    let boundary = [(-4.0, -3.5), (26.0, -3.5), (52.0, 11.5), (48.5, 17.6), (24.0, 3.5), (-4.0, 3.5)];
+    let scenario =
+        Scenario::new("bent lane", boundary, [(0.0, 0.0), (25.0, 0.0), (42.0, 9.8)]).with_corner_radius_m(12.0);
     let map = Arc::new(Map::build(scenario, &settings.vehicle).unwrap());
     let settings = Arc::new(settings);
     (0..count).map(|i| Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(40 + i as u64))).collect()

@@ -21,9 +21,10 @@ fn at(pixmap: &Pixmap, place: Vec2) -> Rgb {
 }
 
 fn map_of(spec: &str) -> Map {
-    let lots = Lot::parse_all(&[spec]).unwrap();
+    let settings = Settings::preset("default").unwrap();
+    let lots = Lot::parse_all(&[spec], &settings.episode.vehicle).unwrap();
     let trial = Trial::all(RootSeed(1), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next().unwrap();
-    trial.map(&Settings::preset("default").unwrap().episode).unwrap()
+    trial.map(&settings.episode).unwrap()
 }
 
 #[test]
@@ -162,7 +163,7 @@ fn a_contact_sheet_has_a_tile_per_lot() {
 #[test]
 fn noise_is_shown_per_level() {
     let settings = Settings::preset("default").unwrap();
-    let lots = Lot::parse_all(&["lot-a"]).unwrap();
+    let lots = Lot::parse_all(&["lot-a"], &settings.episode.vehicle).unwrap();
     let trial = Trial::all(RootSeed(1), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next().unwrap();
     let map = trial.map(&settings.episode).unwrap();
     let inspected = |level: NoiseChoice| (level.name(), noise::inspect(&settings.episode, &trial, &map, level, 60.0));

@@ -4,7 +4,7 @@ use super::drawing::{Drawing, Rgb};
 use super::lot::{self, LINE_PX, LegendEntry, View};
 use crate::plots::style::colour;
 use sim::driver::Source;
-use sim::episode::{Event, Frame};
+use sim::frame::{Event, Frame};
 use sim::geometry::Vec2;
 use sim::map::Map;
 

@@ -5,7 +5,7 @@
 //! 50 %. Unknown is not drivable. Transparent pixels are unknown in every mode.
 
 use super::contour::Mask;
-use crate::load::{LoadError, read_text};
+use crate::error::{LoadError, read_text};
 use image::DynamicImage;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};

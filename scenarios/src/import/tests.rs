@@ -1,7 +1,13 @@
 //! Maps small enough to know their outlines by heart, and every way in which a map can be wrong.
 
 use super::*;
+use crate::load::{check_direction, load};
+use sim::scenario::Direction;
 use std::f64::consts::FRAC_PI_2;
+
+fn car() -> VehicleSettings {
+    VehicleSettings::hyundai_hg300()
+}
 
 /// A fresh folder with files in it.
 fn folder(name: &str, files: &[(&str, &str)]) -> PathBuf {
@@ -47,7 +53,7 @@ fn small_map(name: &str, origin: &str) -> MapLot {
 }
 
 fn ground(lot: &MapLot, seed: Vec2) -> Ground {
-    lot.ros_ground(&ros::Map::read(&lot.map).unwrap(), seed, None).unwrap()
+    lot.ros_ground(&ros::Map::read(&lot.map).unwrap(), seed, None, &car()).unwrap()
 }
 
 #[test]
@@ -104,12 +110,12 @@ fn lane(name: &str, gap: usize) -> MapLot {
 }
 
 fn refusal(lot: &MapLot) -> String {
-    lot.scenario().expect_err("it cannot be driven").to_string()
+    lot.scenario(&car()).expect_err("it cannot be driven").to_string()
 }
 
 #[test]
 fn a_route_is_found_from_start_to_goal() {
-    let scenario = lane("found", 5).scenario().unwrap();
+    let scenario = lane("found", 5).scenario(&car()).unwrap();
     assert_eq!(scenario.name, "map");
     let path = sim::path::Path::new(&scenario.reference_path);
     assert!(path.pose_at(0.0).position().distance(Vec2::new(5.0, 3.5)) < 1e-3);
@@ -127,8 +133,8 @@ fn a_small_map_is_driven_when_it_is_scaled() {
     lot.goal = Some([4.5, 0.35, 0.0]);
     assert!(refusal(&lot).contains("start: the car (4.91 m × 1.86 m"), "{}", refusal(&lot));
     lot.scale = 10.0;
-    let route = lot.scenario().unwrap().reference_path;
-    assert_eq!(route, lane("scaled-reference", 5).scenario().unwrap().reference_path);
+    let route = lot.scenario(&car()).unwrap().reference_path;
+    assert_eq!(route, lane("scaled-reference", 5).scenario(&car()).unwrap().reference_path);
 }
 
 #[test]
@@ -177,7 +183,7 @@ fn a_centre_line_must_have_room_for_the_car() {
         lot
     };
     let line = "x_m, y_m, width\n5.0, 3.5, 2\n 5.0, 3.5, 2\n45.0, 3.5, 2\n";
-    let scenario = with_line("line", 5, line).scenario().unwrap();
+    let scenario = with_line("line", 5, line).scenario(&car()).unwrap();
     assert_eq!(scenario.reference_path.points, vertices(&[(5.0, 3.5), (45.0, 3.5)]));
 
     let wall = refusal(&with_line("line-wall", 0, line));
@@ -232,17 +238,34 @@ fn faults_of_the_files_are_named() {
     assert!(refusal(&lot).contains("map.pgm: no readable image: "), "{}", refusal(&lot));
 }
 
+/// A centre line may end where the car cannot turn round to drive back: a metre before a wall.
+#[test]
+fn a_map_that_cannot_be_driven_in_reverse_is_refused_with_the_line_of_its_route() {
+    let lot = lane("reverse", 5);
+    let file = lot.map.with_file_name("map.lot.toml");
+    std::fs::write(lot.map.with_file_name("line.csv"), "5, 3.5\n58, 3.5\n").unwrap();
+    std::fs::write(&file, "map = 'map.yaml'\n\ncentre_line = 'line.csv'\n").unwrap();
+    for named in [&file, &lot.map] {
+        let scenario = load(named, &car()).unwrap();
+        assert_eq!(check_direction(named, &scenario, Direction::Forward, &car()), Ok(()));
+        let error = check_direction(named, &scenario, Direction::Reverse, &car()).unwrap_err().to_string();
+        let expected =
+            format!("{}:3: the lot cannot be driven in reverse: reference_path, point 2: the car", file.display());
+        assert!(error.starts_with(&expected), "{error}");
+    }
+}
+
 #[test]
 fn faults_of_the_lot_file_are_named() {
     let lot = lane("lot-faults", 5);
     let file = lot.map.with_file_name("map.lot.toml");
     let message = |text: &str| {
         std::fs::write(&file, text).unwrap();
-        crate::load::load(&file).map_or_else(|error| error.to_string(), |scenario| scenario.name)
+        load(&file, &car()).map_or_else(|error| error.to_string(), |scenario| scenario.name)
     };
     assert_eq!(message("map = 'map.yaml'\nstart = [5, 3.5, 0]\ngoal = [45, 3.5, 0]\n"), "map");
     assert_eq!(message("map = 'map.yaml'\nname = 'lane'\nstart = [5, 3.5, 0]\ngoal = [45, 3.5, 0]\n"), "lane");
-    assert_eq!(crate::load::load(&lot.map).unwrap().name, "lane", "the file beside the map is found");
+    assert_eq!(load(&lot.map, &car()).unwrap().name, "lane", "the file beside the map is found");
     for (text, expected) in [
         (
             "map = 'map.yaml'\nstart = [5, 3.5, 0]\n",
@@ -270,7 +293,7 @@ fn faults_of_the_lot_file_are_named() {
 #[test]
 fn a_loop_leads_back_to_its_start() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/car-park-loop.lot.toml");
-    let scenario = crate::load::load(&file).unwrap();
+    let scenario = load(&file, &car()).unwrap();
     let path = sim::path::Path::new(&scenario.reference_path);
     let (start, end) = (path.pose_at(0.0), path.pose_at(path.length_m()));
     assert!(start.position().distance(end.position()) < 3.0, "{start:?} {end:?}");
@@ -316,7 +339,7 @@ fn a_case_is_read_in_one_row_or_one_column() {
 #[test]
 fn the_example_case_becomes_a_lot() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/open-lot.csv");
-    let scenario = crate::load::load(&file).unwrap();
+    let scenario = load(&file, &car()).unwrap();
     assert_eq!((scenario.name.as_str(), scenario.islands.len(), scenario.obstacles.len()), ("open-lot", 3, 2));
     let end = *scenario.reference_path.points.last().unwrap();
     assert!(end.distance(Vec2::new(30.0, 6.0)) < 1.3, "{end}");

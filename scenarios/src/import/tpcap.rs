@@ -7,8 +7,8 @@
 //! A case has no outer boundary; the ground reaches [`MARGIN_M`] beyond everything in it. Its solutions may reverse,
 //! cars here do not: only cases with a drive forwards become lots.
 
-use super::Ground;
-use crate::load::{LoadError, read_text};
+use super::ground::Ground;
+use crate::error::{LoadError, read_text};
 use sim::geometry::{Pose, Vec2, wrap_angle};
 use sim::scenario::{Obstacle, ObstacleClass};
 use std::path::Path;

@@ -1,6 +1,6 @@
-//! A route for ground that has none: from a pose to a pose, or round a loop.
+//! Finds a route where none is given: from pose to pose, or around a loop.
 //!
-//! The search of [`super::solve`] with a tight goal; where it fails, the reason is looked for and given with its place.
+//! The search of [`super::solve`] with a tight goal. If it fails, the error gives the reason and its place.
 
 use super::{CURVATURE_SHARE, DistanceToGo, Goal, NONE, Open, Scene, Search, Waypoint};
 use geo::{Coord, LineString, Simplify as _};
@@ -19,7 +19,7 @@ const GOAL_HEADING_COS: f32 = 0.94;
 pub const LOOP_GAP_M: f32 = 2.5;
 /// The gate that makes a loop go round stands this far ahead of the start, metres: between rear and front axle.
 const GATE_AHEAD_M: f32 = 1.6;
-/// A passage narrower than this is none, metres: the raster of distances tells no finer things apart.
+/// A passage narrower than this counts as a wall, metres: the raster of distances resolves nothing finer.
 const WALL_M: f32 = 0.5;
 /// Waypoints that lie this near the chord of their neighbours are left out of the route, metres.
 const ROUTE_TOLERANCE_M: f64 = 0.02;

@@ -1,8 +1,8 @@
-//! Perception errors (methods.md 10): errors belong to places, so every layer is anchored in the world and is a pure
-//! function of (seed, place, tick). A shadow stays where it is while the car drives by, whoever drives.
+//! Perception errors (docs/methods.md 10). Errors belong to places: every layer is anchored in the world and is a pure
+//! function of (seed, place, tick). A shadow stays where it is while the car passes, whoever drives.
 //!
 //! The paper names the types (shadows, ragged boundaries, misrecognition); sizes and rates are chosen, and calibrated
-//! so that about 98 % of the pixels are right (`cargo xtask pixel-accuracy`). Where methods.md 10 asks for AR(1)
+//! so that about 98 % of the pixels are right (`cargo xtask pixel-accuracy`). Where docs/methods.md 10 asks for AR(1)
 //! processes per tick we use value noise in time with the same correlation time: it needs no state, so a frame can be
 //! recomputed alone and every driver meets the same noise.
 
@@ -60,7 +60,7 @@ impl NoiseSettings {
     }
 }
 
-// Constants of level `paper`, from the table of methods.md 10 unless said otherwise. With that table's wobble and
+// Constants of level `paper`, from the table of docs/methods.md 10 unless said otherwise. With that table's wobble and
 // shadows only 96.3 % of the pixels are right (`pixel-accuracy`, lot a, seed 1: wobble alone costs 1.9 %, shadows
 // 1.5 %); both are halved here to meet the paper's 98 %.
 /// Static boundary wobble: standard deviation and correlation length, metres.
@@ -352,7 +352,7 @@ impl NoiseField {
         }
     }
 
-    /// The boundary wobble, not yet looked at anywhere.
+    /// A sampler of the boundary wobble.
     pub(super) fn boundary_shift(&self) -> BoundaryShift {
         let (static_m, static_corr_m) = WOBBLE_STATIC;
         let (moving_m, moving_corr_m) = WOBBLE_MOVING;
@@ -432,8 +432,8 @@ impl NoiseField {
         }
     }
 
-    /// Sections of the boundary, 3–8 m long, opened to 1–3 m depth including the boundary line; shorter and shallower
-    /// where real things stand behind it, because those are seen.
+    /// Opens sections of the boundary, 3–8 m long and 1–3 m deep including the line; shorter and shallower where real
+    /// objects stand behind it, because those are seen.
     fn open_boundaries(&mut self, map: &Map, amount: f32, rng: &mut Rng) {
         along_route(map, FALSE_FREE_SPACING_M, amount, rng, |place, rng| {
             let side = if rng.random::<bool>() { 1.0 } else { -1.0 };
@@ -511,7 +511,7 @@ fn is_empty_ground(map: &Map, polygon: &[Vec2]) -> bool {
     })
 }
 
-/// The boundary wobble around one view. It remembers what it drew, so that the next view near by finds most of it drawn.
+/// The boundary wobble around one view. What it has drawn is kept for the next view, which shares most of it.
 #[derive(Debug, Clone)]
 pub(super) struct BoundaryShift {
     lasting: Lattice,
@@ -545,7 +545,7 @@ const LATTICE_NODES: usize = 20;
 /// Cells of a [`Lattice`], each between a node and the next ones to the right and above; row by row.
 const LATTICE_CELLS: usize = LATTICE_NODES * LATTICE_NODES;
 
-/// Value noise around a place at one instant. Of the hundreds of cells in sight few lie beside a boundary, so that a cell is
+/// Value noise around a place at one instant. Few of the hundreds of visible cells lie beside a boundary, so a cell is
 /// drawn when it is first needed.
 #[derive(Debug, Clone)]
 struct Lattice {

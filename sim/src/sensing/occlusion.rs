@@ -1,7 +1,7 @@
 //! Convex polygons laid over the view, and the ground hidden behind tall things.
 //!
-//! The label image was warped by a ground homography (paper), so a thing of height h at ground range r smears away
-//! from the camera to r·H/(H − h), and to infinity for h ≥ H (methods.md 1.7).
+//! The label image was warped by a ground homography (paper), so an object of height h at ground range r covers
+//! the ground behind it up to range r·H/(H − h), and to infinity for h ≥ H (docs/methods.md 1.7).
 
 use super::quadtree::pixels_of;
 use super::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid};
@@ -13,7 +13,7 @@ use std::ops::Range;
 const FACTOR_MAX: f32 = 12.0;
 /// Corners a polygon may have; an octagon's shadow has ten.
 const CORNERS_MAX: usize = 12;
-/// Things nearer than this ahead of the camera hide nothing, metres.
+/// Objects nearer to the camera than this hide nothing, metres ahead.
 const AHEAD_MIN_M: f32 = 0.05;
 
 /// A convex polygon in the ego frame, without allocation.
@@ -252,16 +252,16 @@ pub(super) struct Camera {
     pub(super) height_m: f32,
 }
 
-/// A convex thing of some height, seen from the camera.
-pub(super) struct TallThing {
+/// A convex object of some height, seen from the camera.
+pub(super) struct TallObject {
     /// Counter-clockwise; relative to the camera, ahead and left.
     outline: Outline,
-    /// How many times as far as the thing its occlusion reaches.
+    /// Range up to which ground is hidden, as a multiple of the object's range.
     factor: f32,
     camera: Vec2,
 }
 
-impl TallThing {
+impl TallObject {
     /// `outline_in_ego`: convex and counter-clockwise.
     #[inline]
     pub(super) fn new(outline_in_ego: &Outline, height_m: f32, camera: Camera) -> Self {
@@ -308,7 +308,7 @@ mod tests {
     const CAMERA: Camera = Camera { ahead_m: 1.59, height_m: 1.55 };
 
     fn hidden_ground(outline: &[Vec2], height_m: f32, camera: Camera) -> Option<ConvexInEgo> {
-        TallThing::new(&outline.iter().copied().collect(), height_m, camera).hidden_ground()
+        TallObject::new(&outline.iter().copied().collect(), height_m, camera).hidden_ground()
     }
 
     fn box_ahead() -> [Vec2; 4] {
@@ -316,7 +316,7 @@ mod tests {
     }
 
     /// Hand-computed: camera at (1.6, 0), H 1.55, h 0.775 → factor 2. The box spans ranges 5.4–7.4 ahead of the camera,
-    /// so its far side smears to 1.6 + 2 · 7.4 = 16.4 m ahead, between the bearings ±1/5.4 of its near corners.
+    /// so it hides ground up to 1.6 + 2 · 7.4 = 16.4 m ahead, between the bearings ±1/5.4 of its near corners.
     #[test]
     fn a_box_of_half_the_camera_height_doubles_its_range() {
         let geometry = GridGeometry::paper();
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn a_curb_smears_by_a_tenth_and_a_car_to_the_horizon() {
+    fn a_curb_hides_a_tenth_of_its_range_and_a_car_everything_behind_it() {
         let geometry = GridGeometry::paper();
         let reach = |height_m| {
             let mut first_row = BEV_PIXELS;

@@ -194,7 +194,7 @@ impl PixelLattice {
     /// False only if no pixel of a block of `SIDE` × `SIDE` pixels can have a signed distance of at most `threshold_m`.
     #[inline(never)]
     fn may_be_below<const SIDE: usize>(&self, field: &DistanceField, row: f32, col: f32, threshold_m: f32) -> bool {
-        /// Rounding of single precision, with a lot to spare, metres.
+        /// A generous bound of rounding in single precision, metres.
         const ROUNDING_M: f32 = 1e-4;
         let (low, high) = self.box_around::<SIDE>(row, col, ROUNDING_M);
         field.lowest_within(low, high) <= threshold_m + ROUNDING_M
@@ -203,7 +203,7 @@ impl PixelLattice {
     /// A box in the world, given by its lowest and highest coordinates, around the pixels of a cell.
     #[inline]
     pub(super) fn box_around_cell(&self, row: usize, col: usize) -> (Vec2, Vec2) {
-        /// Rounding of single precision a kilometre away, with a lot to spare, metres.
+        /// A generous bound of rounding in single precision a kilometre from the origin, metres.
         const ROUNDING_M: f32 = 1e-3;
         self.box_around::<CELL_PIXELS>((row * CELL_PIXELS) as f32, (col * CELL_PIXELS) as f32, ROUNDING_M)
     }

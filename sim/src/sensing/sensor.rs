@@ -8,7 +8,7 @@ pub use inspect::Inspection;
 use openings::Openings;
 
 use super::noise::{BoundaryShift, NoiseField, NoiseSettings, Patch, Reads, Region, Shadow, wobble_growth};
-use super::occlusion::{Camera, CellBox, ConvexInEgo, TallThing};
+use super::occlusion::{Camera, CellBox, ConvexInEgo, TallObject};
 use super::quadtree::{BLOCK_CELLS, BLOCKS, PixelLattice, ROW_LANES, pixels_of, to_corner_m};
 use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
 use crate::distance_field::{DistanceField, change_max_m};
@@ -24,9 +24,9 @@ use std::ops::Range;
 pub struct SensingSettings {
     /// Where the patch lies.
     pub geometry: GridGeometry,
-    /// Whether tall things hide the ground behind them (methods.md 1.7).
+    /// Whether tall objects hide the ground behind them (docs/methods.md 1.7).
     pub occlusion: bool,
-    /// Camera ahead of the rear axle, metres (methods.md 9.2).
+    /// Camera ahead of the rear axle, metres (docs/methods.md 9.2).
     pub camera_ahead_m: f32,
     /// Camera above ground, metres.
     pub camera_height_m: f32,
@@ -280,11 +280,11 @@ impl Sensor {
     }
 
     /// Tall things around the patch as seen by the camera; none if ground is not hidden.
-    fn occluders<'a>(&'a self, map: &'a Map, ego: &'a EgoView) -> impl Iterator<Item = TallThing> + 'a {
+    fn occluders<'a>(&'a self, map: &'a Map, ego: &'a EgoView) -> impl Iterator<Item = TallObject> + 'a {
         let camera = Camera { ahead_m: self.settings.camera_ahead_m, height_m: self.settings.camera_height_m };
         let near = self.settings.occlusion.then(|| map.occluders_near(ego.patch_centre, ego.patch_radius_m));
         near.into_iter().flatten().map(move |occluder| {
-            TallThing::new(&ego.world_from_ego.inverse_outline(&occluder.corners), occluder.height_m, camera)
+            TallObject::new(&ego.world_from_ego.inverse_outline(&occluder.corners), occluder.height_m, camera)
         })
     }
 
@@ -348,7 +348,7 @@ fn cells_from_first_to_last_block(blocks: u32) -> Range<usize> {
     }
 }
 
-/// Cells that take a closer look.
+/// Cells that one look-up does not decide.
 struct UnsureCells {
     rows: [u8; UNSURE_MAX],
     cols: [u8; UNSURE_MAX],

@@ -62,7 +62,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     override_trials(&mut settings, args)?;
     let load = |spec: DriverSpec| spec.load(&settings.expert, settings.dagger.device);
     let drivers: Vec<NamedDriver> = specs.into_iter().map(load).collect::<anyhow::Result<_>>()?;
-    let lots = Lot::parse_all(&settings.evaluation.lots)?;
+    let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with };
     plan.check()?;
     let run = RunDir::create(&args.out.place("evaluate", &preset, settings.evaluation.seed.0), &settings)?;

@@ -87,7 +87,8 @@ const BATCH: usize = 8;
 pub(crate) fn run(args: &GenerateArgs) -> anyhow::Result<()> {
     ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
     ensure!(args.count > 0, "--count is 0; at least one is needed");
-    let lots = lots(args)?;
+    let vehicle = VehicleSettings::hyundai_hg300();
+    let lots = lots(args, &vehicle)?;
     let fixed = lots.iter().find(|lot| !lot.is_drawn_per_trial());
     ensure!(
         args.count == 1 || fixed.is_none(),
@@ -129,10 +130,10 @@ pub(crate) fn run(args: &GenerateArgs) -> anyhow::Result<()> {
 }
 
 /// The lots named; of a map with the route the command line asks for.
-fn lots(args: &GenerateArgs) -> anyhow::Result<Vec<Lot>> {
+fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lot>> {
     let MapArgs { scale, start, goal, is_loop, centre_line, clearance } = &args.map;
     if args.map == MapArgs::default() {
-        return Lot::parse_all(&args.lots);
+        return Lot::parse_all(&args.lots, vehicle);
     }
     let [path] = args.lots.as_slice() else {
         bail!("--scale, --start and the like are about one map, and {} lots are named; name one", args.lots.len());
@@ -150,7 +151,7 @@ fn lots(args: &GenerateArgs) -> anyhow::Result<Vec<Lot>> {
     if goal.is_some() || *is_loop || centre_line.is_some() {
         (lot.goal, lot.is_loop, lot.centre_line) = (*goal, *is_loop, centre_line.clone());
     }
-    Ok(vec![Lot::of_map(path, &lot)?])
+    Ok(vec![Lot::of_map(path, &lot, vehicle)?])
 }
 
 struct Made {

@@ -30,7 +30,7 @@ pub(crate) struct PixelAccuracyArgs {
 pub(crate) fn run(args: &PixelAccuracyArgs) -> anyhow::Result<()> {
     ensure!(args.trials > 0, "--trials is 0; at least one is needed");
     let settings = Settings::resolve(&Layers::from(&args.layers), args.seed)?;
-    let lots = Lot::parse_all(&args.lots)?;
+    let lots = Lot::parse_all(&args.lots, &settings.episode.vehicle)?;
     let mut table = report::pixel_accuracy::table();
     let console = Console::default();
     console.begin("looking", "looking");

@@ -212,10 +212,10 @@ impl Output<'_> {
 }
 
 fn maps(args: &RenderLotArgs) -> anyhow::Result<Vec<Map>> {
-    let lots = Lot::parse_all(&args.lots)?;
+    let episode = Settings::preset("default")?.episode;
+    let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
     let trials: Vec<Trial<'_>> =
         Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).collect();
-    let episode = Settings::preset("default")?.episode;
     let console = Console::default();
     console.begin("lots", "drawing lots");
     let maps = trials.par_iter().map(|trial| trial.map(&episode)).collect::<anyhow::Result<Vec<Map>>>()?;
@@ -297,7 +297,7 @@ fn driven_anew(args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
 /// A drive of a training round: the network of the round before and the expert, as in the training itself.
 fn driven_in_training(run: &Path, args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
     let settings = run_dir::settings_of(run)?;
-    let lots = Lot::parse_all(&settings.training.lots)?;
+    let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     let mut episodes = training::episodes_of(&settings, &lots, args.round)?;
     let count = episodes.len();
     ensure!((args.trial as usize) < count, "--trial {}: a round has {count} drives, counted from 0", args.trial);
@@ -352,12 +352,12 @@ fn render_samples(args: &SamplesArgs, output: &Output<'_>) -> anyhow::Result<()>
 }
 
 fn render_noise(args: &RenderNoiseArgs, output: &Output<'_>) -> anyhow::Result<()> {
-    let lots = Lot::parse_all(std::slice::from_ref(&args.lot))?;
+    let settings = Settings::preset("default")?;
+    let lots = Lot::parse_all(std::slice::from_ref(&args.lot), &settings.episode.vehicle)?;
     let trial = Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next();
     let (Some(trial), 1, Some(&last)) = (trial, lots.len(), args.noise.last()) else {
         anyhow::bail!("{:?} stands for {} lots; name one", args.lot, lots.len());
     };
-    let settings = Settings::preset("default")?;
     let map = trial.map(&settings.episode)?;
     let inspect = |level: NoiseChoice, at_m: f32| noise::inspect(&settings.episode, &trial, &map, level, at_m);
     let at_m = match args.at {

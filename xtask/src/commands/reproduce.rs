@@ -111,10 +111,10 @@ fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
     };
     // Before the folder is claimed: a misspelt lot should not leave one behind.
     for lots in [&settings.training.lots, &settings.evaluation.lots, &extent.unseen] {
-        Lot::parse_all(lots)?;
+        Lot::parse_all(lots, &settings.episode.vehicle)?;
     }
-    let trained_on = Lot::parse_all(&settings.training.lots)?;
-    for lot in Lot::parse_all(&extent.unseen)? {
+    let trained_on = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
+    for lot in Lot::parse_all(&extent.unseen, &settings.episode.vehicle)? {
         let is_unseen = !lot.is_for_training() && trained_on.iter().all(|known| known.name() != lot.name());
         ensure!(is_unseen, "--unseen {}: drivers are trained or tuned on it; name others, e.g. test:20", lot.name());
     }
@@ -192,7 +192,10 @@ fn perform(stage: &Stage, root: &Path, console: &Console) -> anyhow::Result<bool
         }
         Step::Drive { drivers } => {
             let specs = drivers.iter().map(|(_, spec)| spec.clone()).collect();
-            let (drivers, lots) = (stages::load(drivers, settings)?, Lot::parse_all(&settings.evaluation.lots)?);
+            let (drivers, lots) = (
+                stages::load(drivers, settings)?,
+                Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?,
+            );
             let compare_with = conclusions::compare_with(&drivers);
             let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with };
             plan.check()?;

@@ -72,8 +72,8 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
         let mut settings = Settings::resolve(&layers, args.seed)?;
         adjust(&mut settings);
         // Before the folder is claimed: a misspelt lot should not leave one behind.
-        Lot::parse_all(&settings.training.lots)?;
-        Lot::parse_all(&settings.evaluation.lots)?;
+        Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
+        Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
         let place = args.out.place(command, layers.preset_name(), settings.seed.0);
         (RunDir::create(&place, &settings)?, settings)
     };
@@ -87,7 +87,7 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
     });
     if !args.no_eval {
         let drivers = drivers(&settings, &run, policy, finished.rounds)?;
-        let lots = Lot::parse_all(&settings.evaluation.lots)?;
+        let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
         let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: drivers.len() - 1 };
         plan.check()?;
         evaluate::measure(&plan, &run, &console)?;

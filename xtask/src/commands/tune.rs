@@ -63,7 +63,7 @@ pub(crate) fn run(args: &TuneArgs) -> anyhow::Result<()> {
     settings.check()?;
     ensure!(args.budget > 0, "--budget is 0; at least the starting point must be driven");
     let planners = tune::planners_named(&args.planners)?;
-    tune::check(&Lot::parse_all(&args.lots)?)?;
+    tune::check(&Lot::parse_all(&args.lots, &settings.episode.vehicle)?)?;
     let run = RunDir::create(&args.out.place("tune", layers.preset_name(), args.seed), &settings)?;
     let console = Console::default();
     let tuned = tune::tune(&settings, &planners, args.budget as usize, &run, &console)?;

@@ -1,4 +1,4 @@
-//! Which noise layer made what wrong. Computed from scratch when somebody looks: driving does not pay for it.
+//! Which noise layer caused which error. Computed on demand, so driving does not pay for it.
 
 use super::{EgoView, Sensor};
 use crate::geometry::Pose;
@@ -60,7 +60,7 @@ impl Sensor {
     /// Explains what was shown from a pose at a tick: `shown` is the answer of [`Sensor::observe`]. Any sensor with the
     /// same seed explains it, also later. Takes some milliseconds.
     ///
-    /// Ground hidden behind tall things is no error: it is occupied in the clean view too.
+    /// Ground hidden behind tall objects is no error: it is occupied in the clean view too.
     pub fn inspect(&self, map: &Map, pose: Pose, tick: u32, shown: &Observation) -> Inspection {
         let (clean, perceived) = (self.clean_view(map, pose), self.perceived_view(map, pose, tick));
         let claims = self.claims(pose, tick);
@@ -90,7 +90,7 @@ impl Sensor {
         inspection
     }
 
-    /// What the patches in sight say about every pixel.
+    /// What the visible patches say about every pixel.
     fn claims(&self, pose: Pose, tick: u32) -> Claims {
         let geometry = &self.settings.geometry;
         let ego = EgoView::new(geometry, pose);

@@ -1,4 +1,4 @@
-//! Ground that is taken for road although it is not.
+//! Ground mistaken for road.
 
 use crate::distance_field::DistanceField;
 use crate::geometry::bits;

@@ -1,0 +1,86 @@
+//! What is wrong with a lot file, with its place and a remedy.
+
+use std::path::Path;
+
+/// Why a lot cannot be loaded.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LoadError {
+    /// The file cannot be read.
+    #[error("{file}: cannot be read: {problem}; check the path")]
+    Unreadable {
+        /// As given.
+        file: String,
+        /// What the operating system says.
+        problem: String,
+    },
+    /// The file is not a scenario, or a scenario that cannot be driven.
+    #[error("{file}:{line}: {problem}; {remedy}")]
+    Faulty {
+        /// As given.
+        file: String,
+        /// Counted from 1.
+        line: usize,
+        /// What is wrong there.
+        problem: String,
+        /// What would make it right.
+        remedy: String,
+    },
+    /// A map of another program from which no lot can be made.
+    #[error("{file}: {place}: {problem}; {remedy}")]
+    Map {
+        /// As given.
+        file: String,
+        /// The key, image or place at fault.
+        place: String,
+        /// What is wrong there.
+        problem: String,
+        /// What would make it right.
+        remedy: String,
+    },
+    /// A lot that can be driven forward, but not in reverse. Driving it forward only is always a remedy, too.
+    #[error("{location}: the lot cannot be driven in reverse: {problem}; {remedy}")]
+    ForwardOnly {
+        /// The file, and the line that says where a drive in reverse starts.
+        location: Location,
+        /// What is wrong there.
+        problem: String,
+        /// What would make the lot drivable in reverse.
+        remedy: String,
+    },
+}
+
+/// A file and, where it is known, a line of it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Location {
+    /// As given.
+    pub file: String,
+    /// Counted from 1.
+    pub line: Option<usize>,
+}
+
+impl std::fmt::Display for Location {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.line {
+            Some(line) => write!(f, "{}:{line}", self.file),
+            None => f.write_str(&self.file),
+        }
+    }
+}
+
+impl LoadError {
+    /// A fault at a byte offset of a file's text.
+    pub(crate) fn faulty(file: &str, text: &str, offset: usize, problem: String, remedy: String) -> Self {
+        Self::Faulty { file: file.to_owned(), line: line_at(text, offset), problem, remedy }
+    }
+}
+
+/// The line of a byte offset, counted from 1.
+pub(crate) fn line_at(text: &str, offset: usize) -> usize {
+    1 + text.get(..offset).unwrap_or(text).matches('\n').count()
+}
+
+/// The text of a file.
+pub(crate) fn read_text(path: &Path) -> Result<String, LoadError> {
+    std::fs::read_to_string(path)
+        .map_err(|error| LoadError::Unreadable { file: path.display().to_string(), problem: error.to_string() })
+}

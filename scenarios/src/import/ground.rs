@@ -1,0 +1,14 @@
+//! What every kind of map gives.
+
+use sim::geometry::Vec2;
+use sim::scenario::Obstacle;
+
+/// Drivable ground without a route, in the lot's frame.
+pub(super) struct Ground {
+    /// Outline of the drivable ground, metres.
+    pub(super) boundary: Vec<Vec2>,
+    /// Outlines of what is not drivable within, metres.
+    pub(super) islands: Vec<Vec<Vec2>>,
+    /// What has the shape of a car.
+    pub(super) obstacles: Vec<Obstacle>,
+}
