@@ -104,7 +104,7 @@ impl<'a> Replay<'a> {
             let is_over = frame.tick >= last || context.progress.is_cancelled();
             if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
-        context.progress.end(&report.map_or_else(|| "a part".to_owned(), |report| result_of(&report.metrics)));
+        context.progress.end(&report.map_or_else(|| "done".to_owned(), |report| result_of(&report.metrics)));
     }
 }
 

@@ -107,13 +107,15 @@ impl Shown {
         ticks.into_iter().chain(std::iter::repeat(i64::MIN)).zip(values).collect()
     }
 
-    /// Values of a signal, by the times of a time line.
+    /// Values of a signal that are on a time line, by their times.
     fn signal(&self, entity: &str, timeline: &'static str) -> BTreeMap<i64, f64> {
-        let component = Scalars::descriptor_scalars();
-        let values = self.chunks_of(entity).flat_map(|chunk| {
-            chunk.iter_slices::<f64>(component.component).map(|values| values[0]).collect::<Vec<_>>()
-        });
-        self.times(entity, timeline, &component).into_iter().zip(values).collect()
+        let (component, name) = (Scalars::descriptor_scalars().component, TimelineName::from_static_str(timeline));
+        let on_it = self.chunks_of(entity).filter(|chunk| chunk.timelines().contains_key(&name));
+        let values = |chunk: &'_ Chunk| -> Vec<(i64, f64)> {
+            let times = chunk.iter_component_indices(name, component).map(|(time, _)| time.as_i64());
+            times.zip(chunk.iter_slices::<f64>(component).map(|values| values[0])).collect()
+        };
+        on_it.flat_map(values).collect()
     }
 
     /// PNGs of an entity, by control tick, as indices into their palette.
