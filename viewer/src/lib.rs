@@ -90,7 +90,7 @@ impl Context<'_> {
 
     fn show_lot(&mut self, spec: &str, seed: RootSeed) -> anyhow::Result<()> {
         let settings = Settings::preset("default")?;
-        let lots = Lot::parse_all(&[spec])?;
+        let lots = Lot::parse_all(&[spec], &settings.episode.vehicle)?;
         let [lot] = lots.as_slice() else {
             bail!("{spec:?} stands for {} lots; name one, as in test-hard-7", lots.len())
         };

@@ -25,7 +25,7 @@ const ROOT: &str = "dagger";
 /// Records the first episodes of every round that is finished.
 pub(crate) fn show(run: &Path, episodes: usize, context: &mut Context<'_>) -> anyhow::Result<()> {
     let settings = run_dir::settings_of(run)?;
-    let lots = Lot::parse_all(&settings.training.lots)?;
+    let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     let store = Store::open(run)?;
     ensure!(store.has_round(0), "{}: no round is collected there yet", run.display());
     (0..).take_while(|&round| store.has_round(round)).try_for_each(|round| {

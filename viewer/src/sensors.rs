@@ -2,7 +2,8 @@
 
 use crate::picture::Picture;
 use crate::recording::Recording;
-use sim::episode::{Episode, Frame};
+use sim::episode::Episode;
+use sim::frame::Frame;
 use sim::map::Map;
 use sim::sensing::noise::Layer;
 use sim::sensing::{BEV_PIXELS, GRID_CELLS, Sensor};

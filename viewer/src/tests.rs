@@ -18,7 +18,8 @@ use rerun::{
     ComponentDescriptor, EncodedImage, Points3D, Scalars, StateChange, TextDocument, TimelineName, Transform3D,
 };
 use sim::driver::{Decision, Driver, LookAheadPoint, Policy as _, Situation, Source, Spread};
-use sim::episode::{Episode, Event, Frame};
+use sim::episode::Episode;
+use sim::frame::{Event, Frame};
 use sim::map::Map;
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
@@ -32,8 +33,9 @@ use std::sync::Arc;
 
 /// Lot b with the obstacles of one trial.
 pub(crate) fn map() -> Map {
-    let lots = Lot::parse_all(&["lot-b"]).unwrap();
-    Map::build(lots[0].draw(RootSeed(1)).scenario, &VehicleSettings::hyundai_hg300()).unwrap()
+    let vehicle = VehicleSettings::hyundai_hg300();
+    let lots = Lot::parse_all(&["lot-b"], &vehicle).unwrap();
+    Map::build(lots[0].draw(RootSeed(1)).scenario, &vehicle).unwrap()
 }
 
 /// A header that says nothing in particular.

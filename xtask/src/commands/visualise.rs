@@ -181,7 +181,7 @@ fn recordings_of(run: &Path) -> PathBuf {
 fn episode_of(args: &EpisodeArgs) -> anyhow::Result<(Show, String)> {
     let drivers = DriverSpec::parse_all(&args.drivers)?;
     let (settings, _) = evaluate::settings_for(&drivers, &Layers::from(&args.layers))?;
-    let lots = Lot::parse_all(std::slice::from_ref(&args.lot))?;
+    let lots = Lot::parse_all(std::slice::from_ref(&args.lot), &settings.episode.vehicle)?;
     let [lot] = lots.as_slice() else {
         bail!("--lot {}: {} lots are named so; name one, as in test-hard-7", args.lot, lots.len())
     };
