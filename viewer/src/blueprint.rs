@@ -117,7 +117,7 @@ impl Writer<'_> {
         for entity in &view.trails {
             let entity = EntityPath::parse_forgiving(entity);
             let overrides = ViewContents::blueprint_base_visualizer_path_for_entity(id, &entity);
-            self.blueprint.log(overrides, &self.everything_up_to_now())?;
+            self.blueprint.log(overrides, &everything_up_to_now())?;
         }
         Ok(path)
     }
@@ -143,13 +143,6 @@ impl Writer<'_> {
         }
     }
 
-    fn everything_up_to_now(&self) -> VisibleTimeRanges {
-        let range =
-            || TimeRange { start: TimeRangeBoundary::Infinite, end: TimeRangeBoundary::CursorRelative(0_i64.into()) };
-        let timelines = ["sim_time", "tick", EVENT_TIME];
-        VisibleTimeRanges::new(timelines.map(|timeline| VisibleTimeRange { timeline: timeline.into(), range: range() }))
-    }
-
     fn panels(&self) -> RecordingStreamResult<()> {
         let collapsed = || PanelBlueprint::new().with_state(PanelState::Collapsed);
         self.blueprint.log("blueprint_panel", &collapsed())?;
@@ -173,4 +166,12 @@ impl Writer<'_> {
 
 fn eye_controls(eye: &Eye) -> EyeControls3D {
     EyeControls3D::new().with_position(eye.position).with_look_target(eye.target).with_eye_up(eye.up)
+}
+
+/// Everything from the beginning to the cursor, not the latest only.
+fn everything_up_to_now() -> VisibleTimeRanges {
+    let range =
+        || TimeRange { start: TimeRangeBoundary::Infinite, end: TimeRangeBoundary::CursorRelative(0_i64.into()) };
+    let timelines = ["sim_time", "tick", EVENT_TIME];
+    VisibleTimeRanges::new(timelines.map(|timeline| VisibleTimeRange { timeline: timeline.into(), range: range() }))
 }

@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn pictures_keep_their_pixels_and_stay_small() {
-        let palette = vec![[0, 0, 0], [255, 255, 255], [255, 0, 0], [0, 0, 255]];
+        let palette = [[0, 0, 0], [255, 255, 255], [255, 0, 0], [0, 0, 255]];
         for colours in 2..=4 {
             let pixels: Vec<u8> = (0..200 * 200).map(|i| (i / 8 % colours) as u8).collect();
             let picture = Picture { width: 200, pixels, palette: palette[..colours].to_vec() };

@@ -33,7 +33,7 @@ pub(crate) fn show(run: &Path, episodes: usize, context: &mut Context<'_>) -> an
         let policy = before.transpose().with_context(|| format!("the policy that collected round {round}"))?;
         let mut first = episodes_of(&settings, &lots, round)?;
         first.truncate(episodes);
-        Round { settings: &settings, round, policy }.record(first, context)
+        Round { settings: &settings, number: round, policy }.record(first, context)
     })
 }
 
@@ -41,7 +41,7 @@ pub(crate) fn show(run: &Path, episodes: usize, context: &mut Context<'_>) -> an
 struct Round<'a> {
     settings: &'a Settings,
     /// 0 = behaviour cloning.
-    round: u32,
+    number: u32,
     /// The policy that collects; `None` while the expert drives alone.
     policy: Option<Checkpoint>,
 }
@@ -52,12 +52,12 @@ impl Round<'_> {
             let lot = &episode.map().scenario().name;
             let header = Header {
                 application: "drive",
-                title: format!("round {:02}, episode {index}, {lot}", self.round),
+                title: format!("round {:02}, episode {index}, {lot}", self.number),
                 layout: layout::of_drives(episode.map(), &[ROOT.to_owned()]),
                 timeline: "sim_time",
                 event: None,
             };
-            let recording = context.begin(&format!("round-{:02}-episode-{index}-{lot}", self.round), &header)?;
+            let recording = context.begin(&format!("round-{:02}-episode-{index}-{lot}", self.number), &header)?;
             show_map(episode.map(), legend::DRIVE, &recording);
             Ok(recording)
         };
@@ -71,7 +71,7 @@ impl Round<'_> {
         let mut drives: Vec<Drive<'_>> = recordings.iter().zip(&episodes).map(watched).collect();
         let length_m: f32 = episodes.iter().map(|episode| episode.map().path().length_m()).sum();
         let mut progress_m = vec![0.0; episodes.len()];
-        context.progress.begin("recording", &format!("recording: round {}", self.round));
+        context.progress.begin("recording", &format!("recording: round {}", self.number));
         let mut collector = self.collector(episodes.len());
         let reports = run_lockstep(episodes, &mut collector, &mut |episode, frame| {
             // Drives that are cancelled are driven on: recording takes nearly all of their time.
@@ -94,7 +94,7 @@ impl Round<'_> {
         let Settings { dagger, seed, .. } = self.settings;
         let expert = |episode: usize| -> Box<dyn Driver + Send> {
             let expert = drivers::expert(&self.settings.expert, &self.settings.episode);
-            Box::new(expert.with_jitter_seed(*seed, u64::from(self.round) << 20 | episode as u64))
+            Box::new(expert.with_jitter_seed(*seed, u64::from(self.number) << 20 | episode as u64))
         };
         let novice = self.policy.as_ref().map(|policy| Predictor::new(policy.weights.clone(), dagger.device));
         GatedCollector::new(novice, (0..episodes).map(expert).collect(), dagger.rule, dagger.keep, dagger.geometry)

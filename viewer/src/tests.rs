@@ -81,7 +81,7 @@ impl Shown {
 
     /// Everything that is shown, apart from properties of the recording itself.
     pub(crate) fn entities(&self) -> BTreeSet<String> {
-        let paths = self.chunks.iter().map(|chunk| chunk.entity_path());
+        let paths = self.chunks.iter().map(Chunk::entity_path);
         let own = paths.filter(|path| !path.is_reserved());
         own.map(|path| path.to_string().trim_start_matches('/').to_owned()).collect()
     }
