@@ -2,7 +2,7 @@
 
 use crate::commands::{
     completions, drivers, evaluate, generate, guard, lots, pixel_accuracy, render, reproduce, sample_size, settings,
-    train, tune,
+    train, tune, visualise,
 };
 use crate::output::{Color, Output};
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -83,6 +83,9 @@ enum Command {
     /// Draws lots, drives, samples and noise as PNG and SVG.
     #[command(after_help = render::EXAMPLES)]
     Render(render::RenderArgs),
+    /// Records lots, drives and near-collisions, to be looked at in Rerun's viewer.
+    #[command(after_help = visualise::EXAMPLES)]
+    Visualise(visualise::VisualiseArgs),
     /// Prints a script that completes commands and flags in a shell.
     #[command(after_help = completions::EXAMPLES)]
     Completions(completions::CompletionsArgs),
@@ -117,6 +120,7 @@ impl Cli {
             Command::Drivers(args) => drivers::run(args, output),
             Command::Tune(args) => tune::run(args, output),
             Command::Render(args) => render::run(args, output),
+            Command::Visualise(args) => visualise::run(args, output),
             Command::Completions(args) => completions::run(args, Self::command(), output),
             Command::Metres => anyhow::bail!("the command metres is named sample-size now"),
         }?;
@@ -141,6 +145,7 @@ impl Command {
             | Self::Settings(_)
             | Self::Tune(_)
             | Self::Render(_)
+            | Self::Visualise(_)
             | Self::Completions(_)
             | Self::Metres => false,
         }

@@ -1,5 +1,6 @@
 //! `evaluate`: drivers × lots × directions × trials × noise levels.
 
+use super::visualise::{self, RecordArgs};
 use crate::args::{Directions, JsonArgs, LayerArgs, OutArgs, noise_levels};
 use crate::console::Console;
 use crate::output::Output;
@@ -55,6 +56,8 @@ pub(crate) struct EvaluateArgs {
     layers: LayerArgs,
     #[command(flatten)]
     out: OutArgs,
+    #[command(flatten)]
+    record: RecordArgs,
 }
 
 pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
@@ -78,7 +81,8 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
         run.path().display()
     ));
     console.report_time();
-    Ok(())
+    let runs = args.record.record;
+    runs.map_or(Ok(()), |runs| visualise::record(run.path(), vec![visualise::first_runs(&plan, runs)], output))
 }
 
 /// `finished.toml` of an evaluation.

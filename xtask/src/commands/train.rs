@@ -1,6 +1,7 @@
 //! `train-bc` and `train-dagger`.
 
 use super::evaluate;
+use super::visualise::{self, RecordArgs};
 use crate::args::{JsonArgs, LayerArgs, OutArgs};
 use crate::console::Console;
 use crate::output::Output;
@@ -15,6 +16,7 @@ use experiment::progress::{Interrupted, Progress};
 use experiment::run_dir::RunDir;
 use experiment::settings::{Layers, Settings};
 use experiment::training;
+use experiment::view_request::Show;
 use policy::checkpoint::Checkpoint;
 use policy::dagger::Stop;
 use serde::Serialize;
@@ -50,6 +52,8 @@ pub(crate) struct TrainArgs {
     no_eval: bool,
     #[command(flatten)]
     pub(crate) json: JsonArgs,
+    #[command(flatten)]
+    record: RecordArgs,
 }
 
 /// Behaviour cloning alone: DAgger without an iteration.
@@ -87,18 +91,23 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
     console.plan(tasks);
     let (policy, finished) =
         tabulated(&settings, &run, &console, output)?.map_err(|rounds| cut_short(run.path(), rounds))?;
+    let mut to_record = args.record.record.map_or_else(Vec::new, |episodes| {
+        let folder = || run.path().to_owned();
+        vec![Show::Training { run: folder() }, Show::Rollouts { run: folder(), episodes }]
+    });
     if !args.no_eval {
         let drivers = drivers(&settings, &run, policy, finished.rounds)?;
         let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
         let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: drivers.len() - 1 };
         evaluate::check(&plan)?;
         evaluate::measure(&plan, &run, &console, output)?;
+        to_record.extend(args.record.record.map(|runs| visualise::first_runs(&plan, runs)));
     }
     report::run_report::write(run.path(), &console)?;
     run.finish(&finished)?;
     print_next_steps(run.path(), output);
     console.report_time();
-    Ok(())
+    if to_record.is_empty() { Ok(()) } else { visualise::record(run.path(), to_record, output) }
 }
 
 /// Lots that do not exist, or cannot be driven as the settings ask.
