@@ -90,8 +90,8 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
     let mut depth = 0_u32;
     text.split(move |c: char| {
         depth = match c {
-            '[' => depth + 1,
-            ']' => depth.saturating_sub(1),
+            '[' | '(' => depth + 1,
+            ']' | ')' => depth.saturating_sub(1),
             _ => depth,
         };
         c == ' ' && depth == 0
