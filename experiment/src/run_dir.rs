@@ -14,6 +14,7 @@
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
 use policy::checkpoint::Checkpoint;
+use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::Write as _;
@@ -64,6 +65,47 @@ pub struct Manifest {
 
 /// The version of `manifest.toml` that this program writes.
 pub const MANIFEST_SCHEMA: u32 = 1;
+
+/// What a run came to, written last: `finished.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Finished {
+    /// Version of this format: [`FINISHED_SCHEMA`].
+    pub schema: u32,
+    /// What was done.
+    pub outcome: Outcome,
+}
+
+/// The version of `finished.toml` that this program writes.
+pub const FINISHED_SCHEMA: u32 = 1;
+
+/// What was done in a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind", deny_unknown_fields)]
+pub enum Outcome {
+    /// Behaviour cloning, or DAgger.
+    Training {
+        /// Why it ended.
+        stop: Stop,
+        /// Rounds, behaviour cloning included.
+        rounds: usize,
+    },
+    /// Drivers were driven.
+    Evaluation {
+        /// Who, as named on the command line.
+        drivers: Vec<String>,
+    },
+    /// Parameters of planners were searched.
+    Tuning {
+        /// Which.
+        planners: Vec<String>,
+    },
+    /// The paper was reproduced.
+    Reproduction {
+        /// Stages that were done.
+        stages: usize,
+    },
+}
 
 /// The program that makes a run, as its manifest describes it.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -169,8 +211,9 @@ impl RunDir {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn finish(&self, result: &impl Serialize) -> anyhow::Result<()> {
-        self.write(FINISHED, toml::to_string(result)?.as_bytes())
+    pub fn finish(&self, outcome: Outcome) -> anyhow::Result<()> {
+        let finished = Finished { schema: FINISHED_SCHEMA, outcome };
+        self.write(FINISHED, toml::to_string(&finished)?.as_bytes())
     }
 }
 
@@ -354,7 +397,7 @@ mod tests {
         let run = create(&path, false).unwrap();
         assert!(message(create(&path, false)).contains("--resume"));
         assert_eq!(RunDir::resume(&path).unwrap().1, Settings::preset("smoke").unwrap());
-        run.finish(&std::collections::BTreeMap::from([("stop", "test")])).unwrap();
+        run.finish(Outcome::Reproduction { stages: 8 }).unwrap();
         assert!(message(RunDir::resume(&path)).contains("finished"));
         assert!(message(create(&path, false)).contains("--overwrite"));
         create(&path, true).unwrap();

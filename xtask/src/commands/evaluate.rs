@@ -10,9 +10,8 @@ use evaluation::summary::Summary;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress};
-use experiment::run_dir::{self, RunDir};
+use experiment::run_dir::{self, Outcome, RunDir};
 use experiment::settings::{Layers, Settings};
-use serde::Serialize;
 use sim::seed::RootSeed;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -69,7 +68,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     let console = Console::default();
     measure(&plan, &run, &console)?;
     report::run_report::write(run.path(), &console)?;
-    run.finish(&Finished { drivers: args.drivers.clone() })?;
+    run.finish(Outcome::Evaluation { drivers: args.drivers.clone() })?;
     eprintln!(
         "written: {}/report.html, summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl",
         run.path().display()
@@ -77,12 +76,6 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     console.report_time();
     let runs = args.record.record;
     runs.map_or(Ok(()), |runs| visualise::record(run.path(), vec![visualise::first_runs(&plan, runs)]))
-}
-
-/// `finished.toml` of an evaluation.
-#[derive(Debug, Serialize)]
-pub(crate) struct Finished {
-    pub(crate) drivers: Vec<String>,
 }
 
 /// Drives the plan, writes and prints the tables.
