@@ -5,6 +5,7 @@
 //! | [`tidy`] | dependency direction, licence files, what the README names exists |
 //! | [`commands`] | whole commands run from outside: results, exit codes, errors |
 //! | [`determinism`] | same seed, same bytes, for 1 and 2 threads |
+//! | [`docs`] | what the docs name exists: links, sections, commands, flags, settings, paths |
 //! | [`expert_drives`] | the expert on the reference lots |
 //! | [`formats`] | data sets open as NPY, weights as safetensors |
 //! | [`goldens`] | digests of episodes, by layer |
@@ -16,6 +17,7 @@
 mod bench;
 mod commands;
 mod determinism;
+mod docs;
 mod expert_drives;
 mod formats;
 mod goldens;

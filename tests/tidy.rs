@@ -69,7 +69,7 @@ fn libraries_do_not_print() {
 }
 
 /// Calls with every source file below a folder; returns how many there were.
-fn each_source(folder: &Path, look: &mut dyn FnMut(&Path, &str)) -> usize {
+pub(crate) fn each_source(folder: &Path, look: &mut dyn FnMut(&Path, &str)) -> usize {
     let mut seen = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
