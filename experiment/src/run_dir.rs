@@ -374,7 +374,8 @@ mod tests {
         assert!(message(policy_folder(&path)).contains("no network"));
         let settings = Settings::preset("smoke").unwrap();
         let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
-        let checkpoint = Checkpoint { weights, geometry: settings.dagger.geometry };
+        let checkpoint =
+            Checkpoint { weights, geometry: settings.episode.sensing.geometry, inference: settings.dagger.inference };
         for round in ["round-00", "round-01", "round-10"] {
             checkpoint.save(&path.join(round)).unwrap();
         }

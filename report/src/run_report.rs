@@ -194,7 +194,7 @@ fn held_back_calibration(folder: &Path, settings: &Settings) -> anyhow::Result<O
     for round in (0..).take_while(|&round| store.has_round(round)) {
         dataset.push(store.read_samples(round)?.into());
     }
-    let held_back = dataset.split(settings.dagger.fit_iteration.validation).validation;
+    let held_back = dataset.split(settings.dagger.fit.validation).validation;
     if held_back.is_empty() {
         return Ok(None);
     }

@@ -146,7 +146,7 @@ fn tuned(folder: Option<&Path>) -> anyhow::Result<Vec<String>> {
     let Some(folder) = folder else {
         return Ok(drivers::tuned_specs());
     };
-    let specs: Vec<String> = planners::Baseline::all()
+    let specs: Vec<String> = planners::PlannerSpec::all()
         .iter()
         .map(|planner| (planner.name(), folder.join(format!("{}.toml", planner.name()))))
         .filter(|(_, file)| file.is_file())
