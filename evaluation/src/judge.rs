@@ -42,7 +42,7 @@ pub struct Comparison {
 
 impl EvaluationResults {
     /// How the drivers stand in a slice at a noise level, and how they compare with one of them. Resampled are units
-    /// (lot, direction, seed) within each lot (methods.md 8.3); of generated lots, which are a sample themselves, whole
+    /// (lot, direction, seed) within each lot (docs/methods.md 8.3); of generated lots, which are a sample themselves, whole
     /// lots within their kind (chosen). Only runs that all drivers have driven count.
     pub fn judge(
         &self,
