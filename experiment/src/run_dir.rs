@@ -57,6 +57,9 @@ pub struct Manifest {
     pub threads: usize,
     /// Architecture and operating system.
     pub target: String,
+    /// The processor, if known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub processor: Option<String>,
 }
 
 /// The version of `manifest.toml` that this program writes.
@@ -75,6 +78,8 @@ pub struct Build {
     pub git_dirty: Option<bool>,
     /// The compiler.
     pub rustc_version: String,
+    /// The processor that it runs on, if known.
+    pub processor: Option<String>,
 }
 
 /// Where a run goes.
@@ -291,6 +296,7 @@ impl Manifest {
             rustc_version: build.rustc_version.clone(),
             threads: rayon::current_num_threads(),
             target: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
+            processor: build.processor.clone(),
         }
     }
 

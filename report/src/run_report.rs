@@ -4,6 +4,7 @@
 //! A file that cannot be read or written is an error. A near-collision that can no longer be driven again (its network
 //! moved away) is not: the page says so in place of the picture.
 
+use crate::command_line::command_line;
 use crate::moments;
 use crate::page::{Image, Page};
 use crate::plots::{self, Distribution, EtaSeries, NoisePoint, NoiseSeries, RateRow};
@@ -103,15 +104,6 @@ impl Evaluation {
 
 fn text(path: &Path) -> anyhow::Result<String> {
     std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read for the report", path.display()))
-}
-
-/// The command line, quoted as a shell needs it.
-fn command_line(manifest: &Manifest) -> String {
-    let is_plain = |word: &str| word.chars().all(|c| c.is_alphanumeric() || "-_./:=,@%+".contains(c));
-    let quoted =
-        |word: &String| if is_plain(word) { word.clone() } else { format!("'{}'", word.replace('\'', "'\\''")) };
-    let words = manifest.command_line.iter().map(quoted);
-    std::iter::once("cargo xtask".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
 /// Writes the report of the run in a folder.

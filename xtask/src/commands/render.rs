@@ -1,6 +1,6 @@
 //! `render`: pictures of lots, drives, samples and noise.
 
-use super::evaluate;
+use super::{evaluate, reproduce};
 use crate::args::{LayerArgs, OneDirection, noise_levels};
 use crate::console::Console;
 use anyhow::{Context as _, ensure};
@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use report::pictures::drawing::Drawing;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
 use report::pictures::{contact_sheet, file_name, lot, noise, samples};
-use report::run_report;
+use report::{reproduction, run_report};
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -68,6 +68,8 @@ pub(crate) enum RenderWhat {
     Noise(RenderNoiseArgs),
     /// The report of a run anew, into its folder.
     Report(RenderReportArgs),
+    /// docs/results.md and its figures from a finished `reproduce`.
+    Results(RenderResultsArgs),
 }
 
 #[derive(Debug, Clone, Args)]
@@ -75,6 +77,16 @@ pub(crate) struct RenderReportArgs {
     /// Folder of a training or an evaluation.
     #[arg(value_name = "RUN")]
     run: PathBuf,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RenderResultsArgs {
+    /// Folder of a finished `reproduce`.
+    #[arg(value_name = "RUN")]
+    run: PathBuf,
+    /// File to write; figures go to `pictures/results` beside it.
+    #[arg(long, value_name = "FILE.md", default_value = "docs/results.md")]
+    to: PathBuf,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -174,6 +186,7 @@ pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
         RenderWhat::Trajectories(what) => render_trajectories(what, &output),
         RenderWhat::Samples(what) => render_samples(what, &output),
         RenderWhat::Noise(what) => render_noise(what, &output),
+        RenderWhat::Results(what) => render_results(what),
         RenderWhat::Report(what) => render_report(&what.run),
     }
 }
@@ -361,6 +374,17 @@ fn render_noise(args: &RenderNoiseArgs, output: &Output<'_>) -> anyhow::Result<(
         args.noise.iter().map(|&noise| (noise.name(), inspect(noise, at_m))).collect();
     let title = format!("{}, {at_m:.1} m along the route, seed {}", trial.lot.name(), args.seed);
     output.write(&format!("noise-{}", trial.lot.name()), &noise::picture(&title, &levels)?, false)
+}
+
+fn render_results(args: &RenderResultsArgs) -> anyhow::Result<()> {
+    ensure!(
+        run_dir::is_finished(&args.run),
+        "{}: this is no finished run; make one with cargo xtask reproduce",
+        args.run.display()
+    );
+    reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.to)?;
+    println!("{}", args.to.display());
+    Ok(())
 }
 
 fn render_report(run: &Path) -> anyhow::Result<()> {
