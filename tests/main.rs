@@ -12,6 +12,7 @@
 //! | [`planners`] | model-based planners: naming, parameter files, tuning |
 //! | [`regressions`] | what once went wrong, named by symptom |
 //! | [`python`] | the Python of docs/formats.md answers as Rust does |
+//! | [`words`] | words that were replaced do not come back |
 //! | [`reproduce`] | the paper in a box: its report, resumed to the same bytes |
 #![allow(clippy::unwrap_used, reason = "tests")]
 
@@ -28,3 +29,4 @@ mod python;
 mod regressions;
 mod reproduce;
 mod tidy;
+mod words;

@@ -93,7 +93,11 @@ pub(crate) fn run(args: &GuardArgs) -> anyhow::Result<()> {
         );
     }
     run.finish(&Finished { drivers: vec!["DAgger".to_owned()] })?;
-    ensure!(reference.near_collisions == 0, "the default policy has near-collisions on the three lots; see {}/reference", run.path().display());
+    ensure!(
+        reference.near_collisions == 0,
+        "the default policy has near-collisions on the three lots; see {}/reference",
+        run.path().display()
+    );
     let rate = development.rate().per_unit;
     ensure!(
         rate <= record.upper_per_100m,
