@@ -113,21 +113,6 @@ fn sim_touches_no_files_and_no_clock() {
     assert!(seen > 15, "only {seen} files were looked at");
 }
 
-/// Every path the README names in back-ticks exists.
-#[test]
-fn what_the_readme_names_exists() {
-    let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
-    let crates = LAYERS.map(|(name, _)| format!("{name}/"));
-    let mut named = 0;
-    for word in readme.split('`').skip(1).step_by(2) {
-        if crates.iter().any(|folder| word.starts_with(folder.as_str())) && !word.contains([' ', '*', '{', '<']) {
-            named += 1;
-            assert!(root().join(word).exists(), "README.md names {word}, which does not exist");
-        }
-    }
-    assert!(named > 10, "the README's code map names only {named} paths");
-}
-
 #[test]
 fn licences_are_there() {
     for file in ["LICENSE-MIT", "LICENSE-APACHE", "Cargo.lock", "README.md"] {

@@ -12,3 +12,4 @@ pub(crate) mod sample_size;
 pub(crate) mod settings;
 pub(crate) mod train;
 pub(crate) mod tune;
+pub(crate) mod visualise;
