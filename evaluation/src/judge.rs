@@ -19,8 +19,8 @@ pub struct DriverEstimate {
     pub safe_ratio: Option<Interval>,
 }
 
-/// A driver against the one all are compared with: differences are driver − other, so that a positive one speaks for
-/// the other.
+/// A driver against the reference driver. Differences are driver − reference, so that a positive one favours
+/// the reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// Index of the driver in the plan.
