@@ -396,8 +396,9 @@ fn settings_keys() -> BTreeSet<String> {
         }
     }
     let mut keys = BTreeSet::new();
+    let all = Helps::default().has_flag(&["settings"], "--all").then_some("--all");
     for preset in ["default", "paper", "smoke"] {
-        let text = succeed(xtask().args(["settings", "--preset", preset]));
+        let text = succeed(xtask().args(["settings", "--preset", preset]).args(all));
         collect("", &text.parse().unwrap(), &mut keys);
     }
     keys

@@ -101,7 +101,7 @@ impl MapLot {
         Ok(lot)
     }
 
-    /// A map of which nothing else is said.
+    /// A map without further settings.
     fn of_map(map: &Path) -> Self {
         Self {
             map: map.to_owned(),
