@@ -5,18 +5,21 @@
 //! | [`tidy`] | dependency direction, licence files, what the README names exists |
 //! | [`commands`] | whole commands run from outside: results, exit codes, errors |
 //! | [`determinism`] | same seed, same bytes, for 1 and 2 threads |
+//! | [`docs`] | what the docs name exists: links, sections, commands, flags, settings, paths |
 //! | [`expert_drives`] | the expert on the reference lots |
 //! | [`formats`] | data sets open as NPY, weights as safetensors |
 //! | [`goldens`] | digests of episodes, by layer |
 //! | [`planners`] | model-based planners: naming, parameter files, tuning |
 //! | [`regressions`] | what once went wrong, named by symptom |
 //! | [`python`] | the Python of docs/formats.md answers as Rust does |
+//! | [`words`] | words that were replaced do not come back |
 //! | [`reproduce`] | the paper in a box: its report, resumed to the same bytes |
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod bench;
 mod commands;
 mod determinism;
+mod docs;
 mod expert_drives;
 mod formats;
 mod goldens;
@@ -26,3 +29,4 @@ mod python;
 mod regressions;
 mod reproduce;
 mod tidy;
+mod words;

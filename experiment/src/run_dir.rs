@@ -1,4 +1,4 @@
-//! The folder of a run: claimed before the first step, never written over by accident.
+//! The folder of a run: claimed before the first step, never overwritten by accident.
 //!
 //! ```text
 //! runs/train-dagger-default-s1/
@@ -133,16 +133,16 @@ pub struct Place<'a> {
     pub out: Option<&'a Path>,
     /// Whether to delete what an earlier run left there.
     pub overwrite: bool,
-    /// What is done, as part of the folder's name.
+    /// The command, as part of the folder's name.
     pub command: &'a str,
     /// Name of the preset.
     pub preset: &'a str,
-    /// Seed that belongs into the name.
+    /// Seed, as part of the folder's name.
     pub seed: u64,
 }
 
 impl RunDir {
-    /// Claims a folder and writes down what is about to happen.
+    /// Claims a folder and writes settings and manifest into it.
     ///
     /// # Errors
     /// If the folder is taken or cannot be written.
@@ -171,7 +171,7 @@ impl RunDir {
     }
 
     /// Claims the folder of a stage within a run: `None` if it is finished, else as an interrupted one left it or new.
-    /// Its place belongs to the run: what cannot be continued there is made again.
+    /// The folder belongs to the run: what cannot be continued there is started again.
     ///
     /// # Errors
     /// If it was begun with other settings, or cannot be written.
@@ -199,7 +199,7 @@ impl RunDir {
         &self.path
     }
 
-    /// Writes a file beside and renames it, so that it is never there half.
+    /// Writes a file under a temporary name and renames it, so that it never exists half-written.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -217,12 +217,12 @@ impl RunDir {
     }
 }
 
-/// Whether a run has come to its end.
+/// Whether a run is finished.
 pub fn is_finished(path: &Path) -> bool {
     path.join(FINISHED).is_file()
 }
 
-/// Writes a file beside and renames it.
+/// Writes a file under a temporary name and renames it.
 ///
 /// # Errors
 /// If it cannot be written.
@@ -270,7 +270,7 @@ pub fn settings_of(spec: &Path) -> anyhow::Result<Settings> {
     Settings::read(&run_of(spec)?.0.join(SETTINGS))
 }
 
-/// The folder of the run, and whether its behaviour cloning is meant.
+/// The folder of the run, and whether its policy after behaviour cloning is meant.
 fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
     let (run, is_bc) = match (spec.file_name(), spec.parent()) {
         (Some(name), Some(run)) if name == "bc" && !spec.is_dir() => (run, true),

@@ -120,7 +120,7 @@ impl Shown {
         on_it.flat_map(values).collect()
     }
 
-    /// PNGs of an entity, by control tick, as indices into their palette.
+    /// Pictures of an entity as PNG, by control tick, as indices into their palette.
     fn pictures(&self, entity: &str) -> BTreeMap<i64, Vec<u8>> {
         let component = EncodedImage::descriptor_blob();
         let blobs = self.chunks_of(entity).flat_map(|chunk| {

@@ -9,6 +9,7 @@ pub mod cli;
 mod commands;
 mod console;
 mod interrupt;
+mod record;
 mod viewer;
 
 use clap::Parser as _;

@@ -42,7 +42,7 @@ pub fn colour(series: usize) -> RGBColor {
     PALETTE[series % PALETTE.len()]
 }
 
-/// Fails never: what is drawn into is memory.
+/// Never fails: plots are drawn into memory.
 pub(super) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 pub(super) type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -57,7 +57,7 @@ pub(super) struct Axis<'a> {
     pub(super) labels: Labels<'a>,
 }
 
-/// What stands at an axis.
+/// Label and ticks of an axis.
 pub(super) enum Labels<'a> {
     /// Numbers with so many decimals.
     Numbers(usize),

@@ -12,7 +12,7 @@ fn texts<'a>(document: &'a Document<'a>) -> Vec<(String, f64, f64)> {
     document.descendants().filter(|node| node.has_tag_name("text")).map(text).collect()
 }
 
-/// Where a text stands.
+/// Position of a text.
 fn place(texts: &[(String, f64, f64)], wanted: &str) -> (f64, f64) {
     let found = texts.iter().find(|(text, ..)| text == wanted);
     found.map_or_else(|| panic!("{wanted:?} is not among {texts:?}"), |&(_, x, y)| (x, y))

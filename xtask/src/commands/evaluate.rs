@@ -1,8 +1,8 @@
 //! `evaluate`: drivers × lots × directions × trials × noise levels.
 
-use super::visualise::{self, RecordArgs};
 use crate::args::{Directions, LayerArgs, OutArgs, noise_levels};
 use crate::console::Console;
+use crate::record::{self, RecordArgs};
 use anyhow::{Context as _, ensure};
 use clap::Args;
 use evaluation::plan::Plan;
@@ -75,7 +75,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
     );
     console.report_time();
     let runs = args.record.record;
-    runs.map_or(Ok(()), |runs| visualise::record(run.path(), vec![visualise::first_runs(&plan, runs)]))
+    runs.map_or(Ok(()), |runs| record::record(run.path(), vec![record::first_runs(&plan, runs)]))
 }
 
 /// Drives the plan, writes and prints the tables.

@@ -1,9 +1,9 @@
 //! `train-bc` and `train-dagger`.
 
 use super::evaluate;
-use super::visualise::{self, RecordArgs};
 use crate::args::{LayerArgs, OutArgs};
 use crate::console::Console;
+use crate::record::{self, RecordArgs};
 use anyhow::Context as _;
 use clap::Args;
 use evaluation::plan::Plan;
@@ -90,13 +90,13 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
         let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: drivers.len() - 1 };
         plan.check()?;
         evaluate::measure(&plan, &run, &console)?;
-        to_record.extend(args.record.record.map(|runs| visualise::first_runs(&plan, runs)));
+        to_record.extend(args.record.record.map(|runs| record::first_runs(&plan, runs)));
     }
     report::run_report::write(run.path(), &console)?;
     run.finish(outcome)?;
     print_next_steps(run.path());
     console.report_time();
-    if to_record.is_empty() { Ok(()) } else { visualise::record(run.path(), to_record) }
+    if to_record.is_empty() { Ok(()) } else { record::record(run.path(), to_record) }
 }
 
 /// Trains, prints and writes the paper's table. The inner error of a training cut short is the number of rounds that
