@@ -47,7 +47,7 @@ fn a_refused_evaluation_writes_nothing() {
         (vec!["--driver", "nobody"], "nobody"),
         (vec!["--driver", "expert", "--lots", &lot_name], "wall"),
         (vec!["--driver", "expert", "--noise", "-3"], "-3"),
-        (vec!["--driver", "expert", "--trials", "0"], "trials"),
+        (vec!["--driver", "expert", "--trials", "0"], "evaluation.trials = 0 is out of range"),
     ] {
         let arguments: Vec<&str> = ["evaluate", "--out", &out_name].into_iter().chain(arguments).collect();
         refuses(&arguments, &[part]);
@@ -257,7 +257,7 @@ fn pictures_are_drawn_and_never_replaced_unasked() {
     succeed(xtask().args(["render", "noise", "--lots", "lot-b", "--at", "30", "--out", &out]));
     let line =
         succeed(xtask().args(["render", "trajectories", "--driver", "tentacle", "--lots", "lot-b", "--out", &out]));
-    assert!(line.contains("drive-lot-b-forward-trial-0.png"), "{line}");
+    assert!(line.contains("drive-lot-b-forward-trial-0-tentacle.png"), "{line}");
     for name in ["lot-b.png", "lot-b.svg", "contact-sheet.png", "contact-sheet.svg", "noise-lot-b.png"] {
         assert!(Path::new(&out).join(name).is_file(), "{name} is missing");
     }
@@ -281,14 +281,150 @@ fn a_finished_run_is_not_overwritten() {
     assert_eq!(std::fs::read(run.join("round-00/labels.npy")).unwrap(), before);
 }
 
+/// Keys of earlier versions name the new ones; numbers out of range, e.g. in a wrong unit, name the range.
 #[test]
-fn help_has_examples_and_lists_are_printed() {
-    for command in ["train-dagger", "train-bc", "evaluate", "generate", "sample-size", "render"] {
-        let help = succeed(xtask().args([command, "--help"]));
-        assert!(help.contains("Examples:"), "{command} --help has examples");
+fn old_keys_and_wrong_units_are_refused_with_a_remedy() {
+    let folder = scratch("old-keys");
+    let out = folder.join("out").to_string_lossy().into_owned();
+    for (change, expected) in [
+        ("dagger.relooks=2", &["dagger.relooks is dagger.noise_augmentations now"] as &[&str]),
+        ("dagger.network.symmetric=true", &["dagger.inference.mirror_averaging"]),
+        ("dagger.fit_iteration.batch=64", &["dagger.fit_iteration is dagger.fit now"]),
+        ("dagger.fit_cloning.budget.steps=5", &["dagger.cloning_budget"]),
+        ("expert.band.reach_share=0.4", &["expert.elastic_band"]),
+        ("episode.sensing.smear=true", &["episode.sensing.occlusion"]),
+        ("episode.vehicle.steering_ratio=15", &["is gone", "steering_max_rad"]),
+        ("episode.vehicle.steering_max_rad=35.5", &["35.5 is out of range", "at most 1.5 rad"]),
+        ("episode.vehicle.wheelbase_m=nan", &["NaN is out of range", "at most 20 m"]),
+        ("dagger.eta=90", &["dagger.eta = 90 is out of range: 0 to 1 share of ticks"]),
+    ] {
+        refuses(&["evaluate", "--driver", "expert", "--out", &out, "--set", change], expected);
+        assert!(!Path::new(&out).exists(), "{change} leaves {out}");
     }
-    assert!(succeed(xtask().arg("lots")).contains("lot-a"));
-    assert!(succeed(xtask().arg("drivers")).contains("expert"));
-    let settings = succeed(xtask().args(["settings", "--preset", "paper"]));
-    assert!(settings.contains("eta = 0.9"), "{settings}");
+    refuses(&["settings", "--explain", "dagger.etta"], &["did you mean \"dagger.eta\"?"]);
+    refuses(&["settings", "--explain", "dagger.relooks"], &["dagger.noise_augmentations"]);
+}
+
+/// Both forms are read again, and say the same settings.
+#[test]
+fn printed_settings_can_be_given_back() {
+    let folder = scratch("settings");
+    let plain = |arguments: &[&str]| succeed(xtask().arg("settings").args(arguments));
+    let all = plain(&["--preset", "paper", "--all"]);
+    for (name, text) in [("all.toml", &all), ("common.toml", &plain(&["--preset", "paper"]))] {
+        let file = folder.join(name);
+        std::fs::write(&file, text).unwrap();
+        let file = file.to_string_lossy().into_owned();
+        assert_eq!(plain(&["--preset", "paper", "--all", "--config", &file]), all, "{name}");
+    }
+    assert!(all.lines().filter(|line| line.contains(" = ")).count() > 100);
+}
+
+#[test]
+fn a_lot_that_can_only_be_driven_forward_is_refused_with_its_line_and_the_flag() {
+    let folder = scratch("forward-only");
+    let (out, lot) = (folder.join("out"), folder.join("lot.toml"));
+    let text = "name = \"x\"\nboundary = [[0.0, 0.0], [40.0, 0.0], [40.0, 6.0], [0.0, 6.0]]\n\n[reference_path]\n\
+                points = [[5.0, 3.0], [39.2, 3.0]]\n";
+    std::fs::write(&lot, text).unwrap();
+    let (out, lot) = (out.to_string_lossy().into_owned(), lot.to_string_lossy().into_owned());
+    refuses(
+        &["evaluate", "--driver", "expert", "--lots", &lot, "--out", &out],
+        &["lot.toml:5", "in reverse", "--directions forward"],
+    );
+    let lots = format!("training.lots=[\"{lot}\"]");
+    refuses(&["train-bc", "--set", &lots, "--out", &out], &["lot.toml:5", "training.directions='[\"forward\"]'"]);
+    assert!(!Path::new(&out).exists());
+}
+
+/// `| head` closes the pipe: no panic, and what was asked for is on disk.
+#[test]
+fn a_closed_pipe_loses_no_result() {
+    use std::process::Stdio;
+    let out = scratch("closed-pipe").join("out");
+    let lists: &[&[&str]] = &[&["lots"], &["settings", "--all"], &["evaluate", "--help"]];
+    for arguments in lists {
+        let mut child = xtask().args(*arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        assert!(output.status.success() && output.stderr.is_empty(), "{arguments:?}: {}", text(&output).1);
+    }
+    let mut child = xtask()
+        .args(["evaluate", "--driver", "tentacle", "--lots", "lot-b", "--trials", "1", "--directions", "forward"])
+        .arg("--out")
+        .arg(&out)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop((child.stdout.take(), child.stderr.take()));
+    assert!(child.wait().unwrap().success());
+    assert!(out.join("summary.md").is_file() && out.join("finished.toml").is_file());
+}
+
+#[test]
+fn tables_are_printed_as_json_and_nothing_else_is() {
+    let json = |arguments: &[&str]| -> Vec<serde_json::Value> {
+        let printed = succeed(xtask().args(arguments).arg("--json"));
+        printed.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    };
+    assert_eq!(json(&["lots"])[0][0]["name"], "lot-a");
+    assert!(json(&["drivers"])[0].as_array().unwrap().iter().any(|driver| driver["name"] == "vvf"));
+    let sizes = &json(&["sample-size", "--below", "0.1"])[0];
+    assert_eq!(sizes[0]["metres"].as_f64().unwrap().round(), 2996.0);
+    let out = scratch("json").join("run").to_string_lossy().into_owned();
+    let tables = json(&["train-bc", "--preset", "smoke", "--quiet", "--out", &out]);
+    assert_eq!(tables.len(), 2, "iterations and evaluation");
+    assert!(tables[0]["rows"][0]["samples"].is_number() && tables[1]["rows"][0]["near_collisions"].is_number());
+}
+
+#[test]
+fn quiet_commands_say_nothing_and_colours_are_asked_for() {
+    let output = xtask().args(["pixel-accuracy", "--lots", "lot-b", "--trials", "1", "-q"]).output().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty(), "{}", text(&output).1);
+    for (arguments, is_coloured) in [
+        (&["--color", "always", "settings", "--explain", "x"] as &[&str], true),
+        (&["settings", "--explain", "x", "--color=never"], false),
+        (&["settings", "--explain", "x"], false),
+        (&["--color", "always", "no-such-command"], true),
+        (&["no-such-command"], false),
+    ] {
+        let output = xtask().args(arguments).output().unwrap();
+        assert_eq!(text(&output).1.contains('\x1b'), is_coloured, "{arguments:?}");
+    }
+    assert_eq!(succeed(xtask().arg("--version")).trim(), concat!("lotpilot ", env!("CARGO_PKG_VERSION")));
+    assert!(succeed(xtask().args(["completions", "bash"])).contains("train-dagger"));
+}
+
+/// Words that earlier versions used are understood where they mean the same.
+#[test]
+fn old_flags_still_work() {
+    let lines = |arguments: &[&str]| {
+        let out = scratch("aliases").join("pictures").to_string_lossy().into_owned();
+        succeed(xtask().args(arguments).args(["--out", &out])).lines().count()
+    };
+    assert_eq!(lines(&["render", "lot", "--lot", "lot-b"]), 2);
+    assert_eq!(lines(&["render", "noise", "--lot", "lot-b", "--at", "30", "--level", "hard"]), 1);
+    let old = ["--driver", "tentacle", "--lot", "lot-b", "--direction", "reverse"];
+    assert_eq!(lines(&[&["render", "trajectories"], &old[..]].concat()), 2);
+}
+
+/// Files are looked for before anything is driven, and two drivers do not write the same one.
+#[test]
+fn drives_are_not_replaced_unasked_and_reports_go_where_they_should() {
+    let folder = scratch("drives");
+    let out = folder.join("pictures").to_string_lossy().into_owned();
+    let draw = |driver: &'static str| ["render", "trajectories", "--driver", driver, "--lots", "lot-b", "--out", &out];
+    succeed(xtask().args(draw("tentacle")));
+    succeed(xtask().args(draw("vvf")));
+    let refused = xtask().args(draw("vvf")).output().unwrap();
+    let stderr = text(&refused).1;
+    assert!(stderr.contains("--overwrite") && !stderr.contains("near-collisions"), "before it drives: {stderr}");
+    let run = folder.join("run").to_string_lossy().into_owned();
+    let trials = ["--lots", "lot-b", "--trials", "1", "--directions", "forward"];
+    succeed(xtask().args(["evaluate", "--driver", "tentacle", "--out", &run]).args(trials));
+    let report = ["render", "report", &run, "--out", &out];
+    succeed(xtask().args(report));
+    assert!(Path::new(&out).join("report.html").is_file());
+    refuses(&report, &["report.html", "--overwrite"]);
 }

@@ -11,6 +11,7 @@
 //! | [`goldens`] | digests of episodes, by layer |
 //! | [`planners`] | model-based planners: naming, parameter files, tuning |
 //! | [`regressions`] | what once went wrong, named by symptom |
+//! | [`printed`] | every `--help` and every printed table, as people read them |
 //! | [`python`] | the Python of docs/formats.md answers as Rust does |
 //! | [`words`] | words that were replaced do not come back |
 //! | [`reproduce`] | the paper in a box: its report, resumed to the same bytes |
@@ -25,6 +26,7 @@ mod formats;
 mod goldens;
 mod import_graph;
 mod planners;
+mod printed;
 mod python;
 mod regressions;
 mod reproduce;

@@ -4,6 +4,7 @@ use experiment::lots::Lot;
 use experiment::settings::{NoiseChoice, Settings};
 use experiment::trials::{self, Purpose, Trial};
 use rayon::prelude::*;
+use serde::Serialize;
 use sim::scenario::Direction;
 use sim::sensing::{BEV_PIXELS, Sensor};
 
@@ -16,7 +17,7 @@ const TICKS_PER_POSE: u32 = 14;
 pub const PAPER: [(&str, f64); 3] = [("lot-a", 98.14), ("lot-b", 97.75), ("lot-c", 97.85)];
 
 /// Shares of pixels, summed over poses.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Pixels {
     /// Poses looked from.
     pub poses: u64,

@@ -28,13 +28,14 @@ impl<'a> Plan<'a> {
     /// What can be known to go wrong before the first step.
     ///
     /// # Errors
-    /// If a driver was trained for another patch of ground, or a lot from a file cannot be driven.
+    /// If a driver was trained for another patch of ground, or a lot from a file cannot be driven: a
+    /// `scenarios::LoadError`.
     pub fn check(&self) -> anyhow::Result<()> {
         self.drivers.iter().try_for_each(|driver| driver.check(&self.settings.episode))?;
         let evaluation = &self.settings.evaluation;
-        for lot in self.lots.iter().filter(|lot| lot.is_from_file()) {
+        for lot in self.lots {
             for &direction in &evaluation.directions {
-                Trial::of_evaluation(evaluation.seed, lot, direction, 0).map(&self.settings.episode)?;
+                lot.check_direction(direction, &self.settings.episode.vehicle)?;
             }
         }
         Ok(())

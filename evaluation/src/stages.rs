@@ -12,13 +12,11 @@
 //!
 //! Behaviour cloning has no τ̂, so that neither α nor the rule changes a bit of it: it is trained once per seed.
 
+use crate::estimate::{self, Task};
 use experiment::drivers::{DriverSpec, NamedDriver};
-use experiment::lots::Lot;
 use experiment::settings::Settings;
 use planners::PlannerSpec;
 use policy::decision_rule::{ChiOn, DecisionRule};
-use policy::fit::FitSettings;
-use policy::network::NetworkArchitecture;
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
 use std::path::Path;
@@ -237,60 +235,20 @@ fn tuned_name(spec: &str) -> String {
     format!("{name}, tuned")
 }
 
-/// Measured on two cores of an AMD EPYC (Zen 3): seconds per run that is collected from, with noise augmentations.
-const COLLECTED_RUN_S: f64 = 0.6;
-/// The same per run driven; networks take longer, planners less.
-const DRIVEN_RUN_S: f64 = 0.25;
-/// The same per labelled rollout, with the answers on held-back samples.
-const ON_POLICY_RUN_S: f64 = 2.5;
-/// Multiply-adds of a network's answer that training gets through per second, both directions counted as one.
-const TRAINED_PER_S: f64 = 1.2e10;
-
 impl Stage {
-    /// About how long it takes, seconds.
-    pub fn estimate_s(&self) -> f64 {
-        let Settings { training, evaluation, dagger, episode, .. } = &self.settings;
-        let runs = |lots: &[String], ways: usize, trials: u32, is_training: bool| {
-            // In training, generated lots are driven once.
-            let trials = |lot: &Lot| if is_training && lot.is_generated() { 1.0 } else { f64::from(trials) };
-            let of_each_way: f64 = Lot::parse_all(lots, &episode.vehicle).unwrap_or_default().iter().map(trials).sum();
-            of_each_way * ways as f64
-        };
-        let rounds = f64::from(dagger.iterations_max);
+    /// What it does, with estimated seconds.
+    pub fn tasks(&self) -> Vec<Task> {
         match &self.step {
-            Step::Train { cloning_of } => {
-                let (steps, clonings) = match cloning_of {
-                    Some(_) => (0.0, 0.0),
-                    None => (samples(&dagger.cloning_fit()), 1.0),
-                };
-                let collected =
-                    (rounds + clonings) * runs(&training.lots, training.directions.len(), training.trials, true);
-                let trained = steps + rounds * samples(&dagger.fit);
-                collected * COLLECTED_RUN_S + trained * multiply_adds(&dagger.network) / TRAINED_PER_S
-            }
-            Step::Drive { drivers } => {
-                let runs = runs(&evaluation.lots, evaluation.directions.len(), evaluation.trials, false);
-                runs * (drivers.len() * evaluation.noise.len()) as f64 * DRIVEN_RUN_S
-            }
-            Step::OnPolicy => {
-                let runs = runs(&evaluation.lots, evaluation.directions.len(), 1, false);
-                (2.0 * rounds + 1.0) * runs * ON_POLICY_RUN_S
-            }
+            Step::Train { cloning_of } => estimate::training(&self.settings, cloning_of.is_none()),
+            Step::Drive { drivers } => vec![estimate::evaluation(&self.settings, drivers.len())],
+            Step::OnPolicy => vec![estimate::on_policy(&self.settings)],
         }
     }
-}
 
-/// Trained on in all, on about as many as eight round trips of lot a give.
-fn samples(fit: &FitSettings) -> f64 {
-    f64::from(fit.steps(50_000)) * fit.batch as f64
-}
-
-fn multiply_adds(network: &NetworkArchitecture) -> f64 {
-    let NetworkArchitecture { conv1, conv2, hidden, .. } = network;
-    let first = 25 * 25 * conv1.kernel.pow(2) * conv1.channels;
-    let second = 12 * 12 * conv2.kernel.pow(2) * conv1.channels * conv2.channels;
-    let dense = 6 * 6 * conv2.channels * hidden;
-    (first + second + dense) as f64
+    /// About how long it takes, seconds.
+    pub fn estimate_s(&self) -> f64 {
+        self.tasks().iter().map(|(_, seconds)| seconds).sum()
+    }
 }
 
 #[cfg(test)]

@@ -100,7 +100,11 @@ impl FromStr for DriverSpec {
                 if Checkpoint::exists(path) {
                     bail!("no driver {text:?}; did you mean net:{text}?");
                 }
-                let known: Vec<&str> = specs().iter().map(|(spec, _)| *spec).collect();
+                let known = if text.starts_with("tuned:") {
+                    tuned_specs()
+                } else {
+                    specs().iter().map(|(spec, _)| (*spec).to_owned()).collect()
+                };
                 bail!("no driver {text:?}; there are {}", known.join(", "))
             }
         }

@@ -6,7 +6,7 @@ use scenarios::generator;
 use scenarios::import::MapLot;
 use scenarios::reference::{self, ReferenceLot};
 use scenarios::split::Split;
-use sim::scenario::Scenario;
+use sim::scenario::{Direction, Scenario};
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
 use std::path::Path;
@@ -102,9 +102,18 @@ impl Lot {
         matches!(self.spec, LotSpec::Generated { .. })
     }
 
-    /// Whether it may turn out not to be drivable: a lot written by hand.
-    pub fn is_from_file(&self) -> bool {
-        self.from_file.is_some()
+    /// Checks that it can be driven in a direction. Generated lots can; one written by hand may leave no room to start
+    /// back from its finish.
+    ///
+    /// # Errors
+    /// [`scenarios::LoadError::ForwardOnly`], with file and line.
+    pub fn check_direction(&self, direction: Direction, vehicle: &VehicleSettings) -> anyhow::Result<()> {
+        match (&self.spec, &self.from_file) {
+            (LotSpec::File(path), Some(scenario)) => {
+                Ok(scenarios::load::check_direction(path, scenario, direction, vehicle)?)
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Whether drivers may be trained or tuned on it: lot a and the generator's training lots.

@@ -4,10 +4,12 @@
 //! written into the folder of a run before its first step.
 
 mod check;
+mod commented;
 mod layers;
 mod noise;
 mod presets;
-mod ranges;
+pub mod reference;
+mod renamed;
 mod schema;
 
 pub use layers::Layers;

@@ -13,3 +13,143 @@ pub fn with_header(header: Vec<String>) -> Table {
 pub fn table_of(header: &[&str]) -> Table {
     with_header(header.iter().map(|&title| title.to_owned()).collect())
 }
+
+/// The text for a terminal: cells of tables that are wider than `width` columns, and other lines, are wrapped. Files keep
+/// the text as it is, because a row of Markdown is one line.
+pub fn fit(text: &str, width: usize) -> String {
+    let lines: Vec<&str> = text.lines().collect();
+    let is_row = |line: &str| line.starts_with('|');
+    let mut fitted = Vec::new();
+    for block in lines.chunk_by(|a, b| is_row(a) == is_row(b)) {
+        if !is_row(block[0]) {
+            fitted.extend(block.iter().flat_map(|line| wrap(line, width)));
+        } else if block.iter().all(|line| length(line) <= width) {
+            fitted.extend(block.iter().map(|&line| line.to_owned()));
+        } else {
+            fitted.extend(fit_table(block, width));
+        }
+    }
+    fitted.join("\n")
+}
+
+/// A table without its empty columns, with cells of several lines.
+fn fit_table(rows: &[&str], width: usize) -> Vec<String> {
+    let cells = |row: &&str| -> Vec<String> {
+        let row = row.strip_prefix('|').unwrap_or(row);
+        row.strip_suffix('|').unwrap_or(row).split('|').map(|cell| cell.trim().to_owned()).collect()
+    };
+    let mut rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
+    // The second row of Markdown is the rule below the header.
+    rows.remove(1);
+    let columns = rows.iter().map(Vec::len).min().unwrap_or(0);
+    let is_used = |&column: &usize| rows.iter().skip(1).any(|row| !row[column].is_empty());
+    let used: Vec<usize> = (0..columns).filter(is_used).collect();
+    let rows: Vec<Vec<String>> =
+        rows.iter().map(|row| used.iter().map(|&column| row[column].clone()).collect()).collect();
+    let widths = widths(&rows, width);
+    let mut lines = Vec::new();
+    for (index, row) in rows.iter().enumerate() {
+        let cells: Vec<Vec<String>> = row.iter().zip(&widths).map(|(cell, &width)| wrap(cell, width)).collect();
+        for line in 0..cells.iter().map(Vec::len).max().unwrap_or(0) {
+            let part = |(cell, &width): (&Vec<String>, &usize)| {
+                let text = cell.get(line).map_or("", String::as_str);
+                format!(" {text}{} ", " ".repeat(width.saturating_sub(length(text))))
+            };
+            lines.push(format!("|{}|", cells.iter().zip(&widths).map(part).collect::<Vec<_>>().join("|")));
+        }
+        if index == 0 {
+            let rule: Vec<String> = widths.iter().map(|width| "-".repeat(width + 2)).collect();
+            lines.push(format!("|{}|", rule.join("|")));
+        }
+    }
+    lines
+}
+
+/// Widths of the columns that make a table `width` wide: the widest become narrower first, none narrower than its longest
+/// word as long as another one can.
+fn widths(rows: &[Vec<String>], width: usize) -> Vec<usize> {
+    const BROKEN: usize = 8;
+    let of = |measure: &dyn Fn(&str) -> usize| -> Vec<usize> {
+        (0..rows[0].len()).map(|column| rows.iter().map(|row| measure(&row[column])).max().unwrap_or(0)).collect()
+    };
+    let mut widths = of(&length);
+    let longest_words = of(&|cell| words(cell).map(length).max().unwrap_or(0));
+    let room = width.saturating_sub(3 * widths.len() + 1);
+    while widths.iter().sum::<usize>() > room {
+        let widest = |least: &dyn Fn(usize) -> usize| {
+            (0..widths.len()).filter(|&column| widths[column] > least(column)).max_by_key(|&column| widths[column])
+        };
+        let Some(column) = widest(&|column| longest_words[column]).or_else(|| widest(&|_| BROKEN)) else { break };
+        widths[column] -= 1;
+    }
+    widths
+}
+
+/// Parts of a text between which a line may end: at spaces, but not within brackets.
+fn words(text: &str) -> impl Iterator<Item = &str> {
+    let mut depth = 0_u32;
+    text.split(move |c: char| {
+        depth = match c {
+            '[' => depth + 1,
+            ']' => depth.saturating_sub(1),
+            _ => depth,
+        };
+        c == ' ' && depth == 0
+    })
+}
+
+/// Lines of at most `width`; a word that is longer is broken.
+fn wrap(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in words(text) {
+        let line = lines.last_mut().expect("there is one from the start");
+        if line.is_empty() {
+            line.push_str(word);
+        } else if length(line) + 1 + length(word) <= width {
+            line.push(' ');
+            line.push_str(word);
+        } else {
+            lines.push(word.to_owned());
+        }
+        while let Some(line) = lines.last_mut()
+            && length(line) > width
+            && let Some((end, _)) = line.char_indices().nth(width.max(1))
+        {
+            let rest = line.split_off(end);
+            lines.push(rest);
+        }
+    }
+    lines
+}
+
+/// Columns of a terminal, near enough: combining marks, as in η̂, take none.
+fn length(text: &str) -> usize {
+    text.chars().filter(|c| !('\u{300}'..='\u{36f}').contains(c)).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_fits_stays_and_what_does_not_is_wrapped_without_losing_a_word() {
+        let mut table = table_of(&["driver", "empty", "what was found", "interval"]);
+        table.add_row(["one", "", "a few words", "0.00 [0.00, 2.65]"]);
+        let text = format!("Title\n\n{table}\n\nA sentence of a few more words than fit here.");
+        assert_eq!(fit(&text, 100), text);
+        let expected = "\
+Title
+
+| driver | what was    | interval     |
+|        | found       |              |
+|--------|-------------|--------------|
+| one    | a few words | 0.00         |
+|        |             | [0.00, 2.65] |
+
+A sentence of a few more words than fit
+here.";
+        assert_eq!(fit(&text, 39), expected);
+        let broken = fit("| header |\n|--------|\n| run:runs/a-long-name |", 12);
+        assert_eq!(broken, "| header   |\n|----------|\n| run:runs |\n| /a-long- |\n| name     |");
+    }
+}

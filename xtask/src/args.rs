@@ -19,7 +19,7 @@ pub(crate) struct LayerArgs {
     /// TOML file with the settings to change; the rest stays as in the preset.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Changes one setting, e.g. `dagger.eta=0.8`; may be repeated. `cargo xtask settings` lists them.
+    /// Changes one setting, e.g. `dagger.eta=0.8`; may be repeated. `cargo xtask settings --explain KEY` explains it.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
 }
@@ -28,6 +28,14 @@ impl From<&LayerArgs> for Layers {
     fn from(args: &LayerArgs) -> Self {
         Self { preset: args.preset.clone(), file: args.config.clone(), overrides: args.overrides.clone() }
     }
+}
+
+/// How tables are printed.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub(crate) struct JsonArgs {
+    /// Prints tables as JSON, one line each.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 /// Where a run goes.

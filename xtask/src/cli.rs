@@ -1,21 +1,36 @@
 //! The command line: which commands there are.
 
-use crate::build_info::PROGRAM;
 use crate::commands::{
-    drivers, evaluate, generate, guard, lots, pixel_accuracy, render, reproduce, sample_size, settings, train, tune,
-    visualise,
+    completions, drivers, evaluate, generate, guard, lots, pixel_accuracy, render, reproduce, sample_size, settings,
+    train, tune, visualise,
 };
-use clap::{Parser, Subcommand};
+use crate::output::{Color, Output};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use std::num::NonZeroUsize;
 
 /// lotpilot: learns to drive through parking lots in simulation, and measures how well.
 #[derive(Debug, Parser)]
-#[command(name = "cargo xtask", bin_name = "cargo xtask", version = PROGRAM, after_help = EXAMPLES)]
+#[command(name = "lotpilot", bin_name = "cargo xtask", version, after_help = EXAMPLES)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Prints results and errors only.
+    #[arg(long, short, global = true, display_order = 1000, help_heading = "Everywhere")]
+    quiet: bool,
+    /// When to colour: auto (on a terminal, unless `NO_COLOR` is set), always or never.
+    #[arg(
+        long,
+        global = true,
+        value_enum,
+        value_name = "WHEN",
+        default_value_t,
+        display_order = 1001,
+        hide_possible_values = true,
+        help_heading = "Everywhere"
+    )]
+    color: Color,
     /// Threads to compute with [default: all cores]. Changes nothing but the time it takes.
-    #[arg(long, global = true, value_name = "N", display_order = 1000)]
+    #[arg(long, global = true, value_name = "N", display_order = 1002, help_heading = "Everywhere")]
     threads: Option<NonZeroUsize>,
 }
 
@@ -24,7 +39,7 @@ Examples:
   cargo xtask train-dagger                       train, print the paper's table, check on three lots
   cargo xtask train-dagger --preset smoke        the same line end to end in seconds
   cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1
-  cargo xtask settings --preset paper            every setting there is
+  cargo xtask settings --explain dagger.eta      what a setting means
   cargo xtask generate --lots lot-a --out lots   TOML and a picture";
 
 #[derive(Debug, Subcommand)]
@@ -48,15 +63,19 @@ enum Command {
     #[command(after_help = generate::EXAMPLES)]
     Generate(generate::GenerateArgs),
     /// How many pixels of the noisy bird's-eye view are right.
+    #[command(after_help = pixel_accuracy::EXAMPLES)]
     PixelAccuracy(pixel_accuracy::PixelAccuracyArgs),
     /// How far must be driven to see a difference in near-collisions, or to bound their rate.
     #[command(after_help = sample_size::EXAMPLES)]
     SampleSize(sample_size::SampleSizeArgs),
-    /// Prints the resolved settings as TOML.
+    /// Prints settings as TOML that `--config` reads, or explains one.
+    #[command(after_help = settings::EXAMPLES)]
     Settings(settings::SettingsArgs),
     /// Lists the lots that can be named.
+    #[command(after_help = lots::EXAMPLES)]
     Lots(lots::LotsArgs),
     /// Lists the drivers that can be named, or prints the parameters of one planner as a file.
+    #[command(after_help = drivers::EXAMPLES)]
     Drivers(drivers::DriversArgs),
     /// Searches parameters of the model-based planners on lot a and training lots, the same way for each.
     #[command(after_help = tune::EXAMPLES)]
@@ -67,6 +86,9 @@ enum Command {
     /// Records lots, drives and near-collisions, to be looked at in Rerun's viewer.
     #[command(after_help = visualise::EXAMPLES)]
     Visualise(visualise::VisualiseArgs),
+    /// Prints a script that completes commands and flags in a shell.
+    #[command(after_help = completions::EXAMPLES)]
+    Completions(completions::CompletionsArgs),
     /// Old name of `sample-size`.
     #[command(hide = true)]
     Metres,
@@ -83,22 +105,49 @@ impl Cli {
     /// # Errors
     /// If something named does not exist or cannot be read or written, or by Ctrl-C.
     pub fn run(&self) -> anyhow::Result<()> {
+        let output = &Output::new(self.quiet, self.command.is_json());
         match &self.command {
-            Command::TrainBc(args) => train::bc(args),
-            Command::TrainDagger(args) => train::dagger(args),
-            Command::Evaluate(args) => evaluate::run(args),
-            Command::Reproduce(args) => reproduce::run(args),
-            Command::Guard(args) => guard::run(args),
-            Command::Generate(args) => generate::run(args),
-            Command::PixelAccuracy(args) => pixel_accuracy::run(args),
-            Command::SampleSize(args) => sample_size::run(args),
-            Command::Settings(args) => settings::run(args),
-            Command::Lots(args) => lots::run(args),
-            Command::Drivers(args) => drivers::run(args),
-            Command::Tune(args) => tune::run(args),
-            Command::Render(args) => render::run(args),
-            Command::Visualise(args) => visualise::run(args),
+            Command::TrainBc(args) => train::bc(args, output),
+            Command::TrainDagger(args) => train::dagger(args, output),
+            Command::Evaluate(args) => evaluate::run(args, output),
+            Command::Reproduce(args) => reproduce::run(args, output),
+            Command::Guard(args) => guard::run(args, output),
+            Command::Generate(args) => generate::run(args, output),
+            Command::PixelAccuracy(args) => pixel_accuracy::run(args, output),
+            Command::SampleSize(args) => sample_size::run(args, output),
+            Command::Settings(args) => settings::run(args, output),
+            Command::Lots(args) => lots::run(args, output),
+            Command::Drivers(args) => drivers::run(args, output),
+            Command::Tune(args) => tune::run(args, output),
+            Command::Render(args) => render::run(args, output),
+            Command::Visualise(args) => visualise::run(args, output),
+            Command::Completions(args) => completions::run(args, Self::command(), output),
             Command::Metres => anyhow::bail!("the command metres is named sample-size now"),
+        }?;
+        output.finish()
+    }
+}
+
+impl Command {
+    /// Whether tables are printed as JSON.
+    fn is_json(&self) -> bool {
+        match self {
+            Self::TrainBc(train::TrainArgs { json, .. })
+            | Self::TrainDagger(train::TrainArgs { json, .. })
+            | Self::Evaluate(evaluate::EvaluateArgs { json, .. })
+            | Self::PixelAccuracy(pixel_accuracy::PixelAccuracyArgs { json, .. })
+            | Self::SampleSize(sample_size::SampleSizeArgs { json, .. })
+            | Self::Lots(lots::LotsArgs { json })
+            | Self::Drivers(drivers::DriversArgs { json, .. }) => json.json,
+            Self::Reproduce(_)
+            | Self::Guard(_)
+            | Self::Generate(_)
+            | Self::Settings(_)
+            | Self::Tune(_)
+            | Self::Render(_)
+            | Self::Visualise(_)
+            | Self::Completions(_)
+            | Self::Metres => false,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Progress on stderr: a bar on a terminal, a line every few seconds anywhere else.
 
 use crate::interrupt;
+use crate::output::{Output, note};
 use experiment::progress::{Elapsed, Progress};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::cell::RefCell;
@@ -12,11 +13,15 @@ use std::time::{Duration, Instant};
 const LINE_EVERY: Duration = Duration::from_secs(5);
 /// Positions of a bar: work is reported as a share, so that seconds, ticks and steps can share one scale.
 const LENGTH: u64 = 10_000;
+/// Seconds of work that an estimate is worth before there is anything to measure.
+const ESTIMATE_S: f64 = 10.0;
 
-/// Shows what is going on, and adds up where the time went.
-#[derive(Debug, Default)]
+/// Shows what is going on, when the whole command is done, and adds up where the time went.
+#[derive(Debug)]
 pub(crate) struct Console {
+    is_quiet: bool,
     task: RefCell<Option<Task>>,
+    plan: RefCell<Plan>,
     /// Seconds by stage, in the order in which stages began.
     stages: RefCell<Vec<(&'static str, f64)>>,
 }
@@ -28,15 +33,61 @@ struct Task {
     bar: Option<ProgressBar>,
     started: Instant,
     last_shown: Instant,
+    /// Estimated seconds; `None` if it is not in the plan.
+    planned_s: Option<f64>,
+}
+
+/// Tasks to come with estimated seconds, and how the estimates of those that are done compare with the time they took.
+#[derive(Debug, Default)]
+pub(crate) struct Plan {
+    to_come: Vec<(&'static str, f64)>,
+    estimated_s: f64,
+    taken_s: f64,
+}
+
+impl Plan {
+    /// Takes the next task of this stage off the plan, and what was to come before it: that is not needed any more.
+    fn begin(&mut self, stage: &str) -> Option<f64> {
+        let place = self.to_come.iter().position(|(planned, _)| *planned == stage)?;
+        self.to_come.drain(..=place).last().map(|(_, seconds)| seconds)
+    }
+
+    /// Seconds left of the whole command, given how much of the running task is done.
+    fn left_s(&self, planned_s: f64, share: f64, seconds: f64) -> f64 {
+        let estimated_s = self.estimated_s + planned_s * share;
+        let pace = (self.taken_s + seconds + ESTIMATE_S) / (estimated_s + ESTIMATE_S);
+        let to_come_s: f64 = self.to_come.iter().map(|(_, seconds)| seconds).sum();
+        // A task that has begun is its own best estimate, once there is something to see of it.
+        let alone_s = seconds * (1.0 - share) / share.max(1e-3);
+        let planned_left_s = pace * planned_s * (1.0 - share);
+        let trust = share.clamp(0.0, 1.0);
+        trust * alone_s + (1.0 - trust) * planned_left_s + pace * to_come_s
+    }
 }
 
 impl Console {
+    pub(crate) fn new(output: &Output) -> Self {
+        let is_quiet = output.is_quiet();
+        Self { is_quiet, task: RefCell::default(), plan: RefCell::default(), stages: RefCell::default() }
+    }
+
+    /// The tasks of the whole command, by stage, with the seconds that each is estimated to take.
+    pub(crate) fn plan(&self, to_come: Vec<(&'static str, f64)>) {
+        self.plan.borrow_mut().to_come = to_come;
+    }
+
     /// Says where the time went.
     pub(crate) fn report_time(&self) {
         let stages = self.stages.borrow();
         let total: f64 = stages.iter().map(|(_, seconds)| seconds).sum();
         let parts: Vec<String> = stages.iter().map(|(stage, seconds)| format!("{stage} {seconds:.1} s")).collect();
-        eprintln!("time: {}, {total:.1} s in all", parts.join(", "));
+        self.note(&format!("time: {}, {total:.1} s in all", parts.join(", ")));
+    }
+
+    fn note(&self, text: &str) {
+        if !self.is_quiet {
+            note(text);
+        }
     }
 
     /// Ends the running task; its line, if it has a result.
@@ -47,7 +98,12 @@ impl Console {
             bar.finish_and_clear();
         }
         if let Some(result) = result {
-            eprintln!("{}: {result} ({seconds:.1} s)", task.label);
+            self.note(&format!("{}: {result} ({seconds:.1} s)", task.label));
+        }
+        if let Some(planned_s) = task.planned_s {
+            let mut plan = self.plan.borrow_mut();
+            plan.estimated_s += planned_s;
+            plan.taken_s += seconds;
         }
         let mut stages = self.stages.borrow_mut();
         match stages.iter_mut().find(|(stage, _)| *stage == task.stage) {
@@ -60,19 +116,20 @@ impl Console {
 impl Progress for Console {
     fn begin(&self, stage: &'static str, label: &str) {
         self.finish(None);
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let style = ProgressStyle::with_template("{prefix:22} {bar:30} {percent:>3} %  eta {eta:>4}  {msg}")
+        let bar = (!self.is_quiet && std::io::stderr().is_terminal()).then(|| {
+            let style = ProgressStyle::with_template("{prefix:22} {bar:30} {percent:>3} %  {msg}")
                 .expect("the template is well-formed");
             let bar = ProgressBar::with_draw_target(Some(LENGTH), ProgressDrawTarget::stderr()).with_style(style);
             bar.with_prefix(label.to_owned())
         });
-        let now = Instant::now();
-        *self.task.borrow_mut() = Some(Task { stage, label: label.to_owned(), bar, started: now, last_shown: now });
+        let (now, planned_s) = (Instant::now(), self.plan.borrow_mut().begin(stage));
+        let label = label.to_owned();
+        *self.task.borrow_mut() = Some(Task { stage, label, bar, started: now, last_shown: now, planned_s });
     }
 
     fn at(&self, share: f64, status: &mut dyn FnMut(Elapsed) -> String) {
         let mut task = self.task.borrow_mut();
-        let Some(task) = task.as_mut() else { return };
+        let Some(task) = task.as_mut().filter(|_| !self.is_quiet) else { return };
         let share = share.clamp(0.0, 1.0);
         // Faster than eyes, and building messages is not free.
         let every = if task.bar.is_some() { Duration::from_millis(80) } else { LINE_EVERY };
@@ -81,17 +138,21 @@ impl Progress for Console {
         }
         task.last_shown = Instant::now();
         let seconds = task.started.elapsed().as_secs_f64().max(1e-9);
+        // A task that nobody planned is all there is.
+        let left_s = match task.planned_s {
+            Some(planned_s) => self.plan.borrow().left_s(planned_s, share, seconds),
+            None => seconds * (1.0 - share) / share.max(1e-3),
+        };
         let status = status(Elapsed { seconds });
+        let mut line = format!("about {} left", duration(left_s));
+        if !status.is_empty() {
+            let _ = write!(line, ", {status}");
+        }
         if let Some(bar) = &task.bar {
-            bar.set_message(status);
+            bar.set_message(line);
             bar.set_position((share * LENGTH as f64) as u64);
         } else {
-            let left_s = seconds * (1.0 - share) / share.max(1e-3);
-            let mut line = format!("{}: {:.0} %, about {left_s:.0} s left", task.label, 100.0 * share);
-            if !status.is_empty() {
-                let _ = write!(line, ", {status}");
-            }
-            eprintln!("{line}");
+            note(format_args!("{}: {:.0} %, {line}", task.label, 100.0 * share));
         }
     }
 
@@ -101,5 +162,38 @@ impl Progress for Console {
 
     fn is_cancelled(&self) -> bool {
         interrupt::is_requested()
+    }
+}
+
+/// `40 s`, `3 min`, `2 h 5 min`.
+fn duration(seconds: f64) -> String {
+    let minutes = (seconds / 60.0).round() as u64;
+    match (seconds, minutes) {
+        (..90.0, _) => format!("{seconds:.0} s"),
+        (_, ..60) => format!("{minutes} min"),
+        _ => format!("{} h {} min", minutes / 60, minutes % 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_that_of_the_whole_command() {
+        let mut plan = Plan { to_come: vec![("a", 100.0), ("b", 50.0), ("c", 50.0)], ..Plan::default() };
+        let planned_s = plan.begin("a").unwrap();
+        assert!((plan.left_s(planned_s, 0.0, 0.0) - 200.0).abs() < 1e-9, "the estimate, before anything is seen");
+        // Twice as slow as estimated, half of the first task in.
+        let left_s = plan.left_s(planned_s, 0.5, 100.0);
+        assert!((250.0..400.0).contains(&left_s), "{left_s}");
+        plan.estimated_s += 100.0;
+        plan.taken_s += 200.0;
+        // A task that is skipped is not waited for.
+        let planned_s = plan.begin("c").unwrap();
+        let left_s = plan.left_s(planned_s, 0.0, 0.0);
+        assert!((90.0..101.0).contains(&left_s), "{left_s}");
+        assert_eq!(plan.begin("b"), None);
+        assert_eq!([45.0, 600.0, 7500.0].map(duration), ["45 s", "10 min", "2 h 5 min"]);
     }
 }

@@ -14,7 +14,7 @@ pub(crate) fn install() -> anyhow::Result<()> {
             // 130 = 128 + SIGINT. Files are renamed into place when complete, so ending here leaves nothing half.
             std::process::exit(130);
         }
-        eprintln!("\nfinishing what is running; Ctrl-C again to end at once");
+        crate::output::note("\nfinishing what is running; Ctrl-C again to end at once");
     })?;
     Ok(())
 }

@@ -1,5 +1,4 @@
 //! The command line of lotpilot: clap → settings → call → exit code. No algorithm lives here.
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what a command does")]
 #![allow(clippy::disallowed_methods, reason = "wall time is shown to people here; nothing computed depends on it")]
 #![allow(missing_docs, reason = "what users read is the help of clap")]
 
@@ -9,10 +8,11 @@ pub mod cli;
 mod commands;
 mod console;
 mod interrupt;
+mod output;
 mod record;
 mod viewer;
 
-use clap::Parser as _;
+use clap::{CommandFactory as _, FromArgMatches as _};
 use experiment::progress::Interrupted;
 use std::process::ExitCode;
 
@@ -25,15 +25,19 @@ const EXIT_INTERRUPTED: u8 = 130;
 
 /// Parses the command line, runs the command, and says what went wrong.
 pub fn main() -> ExitCode {
-    let cli = cli::Cli::parse();
+    let command = cli::Cli::command().color(output::Color::from_args().of_clap());
+    let cli = match cli::Cli::from_arg_matches(&command.get_matches()) {
+        Ok(cli) => cli,
+        Err(error) => error.exit(),
+    };
     match run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if error.is::<Interrupted>() => {
-            eprintln!("{error}");
+            output::note(error);
             ExitCode::from(EXIT_INTERRUPTED)
         }
         Err(error) => {
-            eprintln!("error: {error:#}");
+            output::error(format_args!("{error:#}"));
             ExitCode::from(EXIT_REFUSED)
         }
     }

@@ -1,5 +1,6 @@
 //! `--record` of commands that drive: what they drove, replayed by the viewer program into the folder of the run.
 
+use crate::output::Output;
 use crate::viewer;
 use clap::Args;
 use evaluation::plan::Plan;
@@ -48,10 +49,10 @@ pub(crate) fn first_runs(plan: &Plan<'_>, runs: usize) -> Show {
 ///
 /// # Errors
 /// By Ctrl-C.
-pub(crate) fn record(run: &Path, show: Vec<Show>) -> anyhow::Result<()> {
-    match viewer::ask(&ViewRequest { sink: Sink::Folder(recordings_of(run)), show }) {
+pub(crate) fn record(run: &Path, show: Vec<Show>, output: &Output) -> anyhow::Result<()> {
+    match viewer::ask(&ViewRequest { sink: Sink::Folder(recordings_of(run)), show }, output) {
         Err(error) if !error.is::<Interrupted>() => {
-            eprintln!("warning: {error:#}");
+            output.note(format_args!("warning: {error:#}"));
             Ok(())
         }
         result => result,

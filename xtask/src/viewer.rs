@@ -1,6 +1,7 @@
 //! The viewer program (`viewer/`): a workspace of its own, built when first needed, because rerun takes minutes to compile.
 
 use crate::interrupt;
+use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use experiment::progress::Interrupted;
 use experiment::view_request::ViewRequest;
@@ -23,7 +24,7 @@ const BACKENDS: &[&str] = &[
 ///
 /// # Errors
 /// If it cannot be built, it failed (it has said why), or by Ctrl-C.
-pub(crate) fn ask(request: &ViewRequest) -> anyhow::Result<()> {
+pub(crate) fn ask(request: &ViewRequest, output: &Output) -> anyhow::Result<()> {
     let manifest = manifest()?;
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
@@ -40,7 +41,7 @@ pub(crate) fn ask(request: &ViewRequest) -> anyhow::Result<()> {
     if target.is_some_and(|target| target.join(program).is_file()) {
         command.arg("--quiet");
     } else {
-        eprintln!("building the viewer program: about 8 minutes on two cores, the first time only …");
+        output.note("building the viewer program: about 8 minutes on two cores, the first time only …");
     }
     command.env("RAYON_NUM_THREADS", rayon::current_num_threads().to_string()).stdin(Stdio::piped());
     let mut child = command.spawn().context("cargo, which builds the viewer program, cannot be started")?;

@@ -1,6 +1,6 @@
 //! What makes settings wrong as a whole: checked before a run folder exists.
 
-use super::ranges;
+use super::reference;
 use super::schema::Settings;
 use anyhow::{Context as _, ensure};
 
@@ -18,13 +18,13 @@ impl Settings {
                 i64::MAX
             );
         }
-        for (section, lots, directions, trials) in [
-            ("training", &self.training.lots, &self.training.directions, self.training.trials),
-            ("evaluation", &self.evaluation.lots, &self.evaluation.directions, self.evaluation.trials),
+        reference::check(&toml::Table::try_from(self).context("settings are plain values")?, "")?;
+        for (section, lots, directions) in [
+            ("training", &self.training.lots, &self.training.directions),
+            ("evaluation", &self.evaluation.lots, &self.evaluation.directions),
         ] {
             ensure!(!lots.is_empty(), "{section}.lots is empty; name at least one lot (cargo xtask lots)");
             ensure!(!directions.is_empty(), "{section}.directions is empty; name \"forward\", \"reverse\" or both");
-            ensure!(trials > 0, "{section}.trials is 0; at least one is needed");
         }
         let noise = &self.evaluation.noise;
         ensure!(
@@ -39,14 +39,15 @@ impl Settings {
         }
         let (physics, control) = (self.episode.physics_step_ms, self.episode.control_period_ms);
         ensure!(
-            physics > 0 && control > 0 && control.is_multiple_of(physics),
+            control.is_multiple_of(physics),
             "episode.control_period_ms = {control} is not a multiple of episode.physics_step_ms = {physics}"
         );
-        ranges::check(&self.episode)?;
-        ranges::check_expert(&self.expert)?;
-        ranges::check_disturbance(&self.dagger.disturbance)?;
+        let (low, high) = (self.episode.controller.speed_min_mps, self.episode.controller.speed_max_mps);
+        ensure!(
+            low <= high,
+            "episode.controller.speed_min_mps = {low} is more than episode.controller.speed_max_mps = {high}"
+        );
         self.dagger.network.validate().context("dagger.network")?;
-        self.dagger.inference.validate().context("dagger.inference")?;
         Ok(())
     }
 }

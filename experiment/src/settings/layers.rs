@@ -1,5 +1,7 @@
 //! Laying changes over a preset, and saying precisely what is wrong with one.
 
+use super::reference;
+use super::renamed;
 use super::schema::Settings;
 use anyhow::{Context as _, anyhow, bail};
 use sim::seed::RootSeed;
@@ -58,7 +60,8 @@ impl Settings {
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path)
             .with_context(|| format!("{}: not a run of this program, or not finished being created", path.display()))?;
-        let settings: Self = toml::from_str(&text).with_context(|| path.display().to_string())?;
+        let tree = parse(path, &text)?;
+        let settings = settings_from(&tree).map_err(|fault| fault.in_file(path, &text))?;
         settings.check()?;
         Ok(settings)
     }
@@ -70,13 +73,8 @@ pub(super) fn apply(base: &Settings, file: Option<&Path>, overrides: &[String]) 
     if let Some(path) = file {
         let text = std::fs::read_to_string(path)
             .with_context(|| format!("{}: cannot be read; name a TOML file with settings", path.display()))?;
-        let changes: Table = text
-            .parse()
-            .map_err(|error: toml::de::Error| anyhow!("{}: {}", place(path, &text, error.span()), error.message()))?;
-        merge(&mut tree, changes);
-        settings_from(&tree).map_err(|Fault { key, problem }| {
-            anyhow!("{}: {key}: {problem}", place(path, &text, span_of(&text, &key)))
-        })?;
+        merge(&mut tree, parse(path, &text)?);
+        settings_from(&tree).map_err(|fault| fault.in_file(path, &text))?;
     }
     for text in overrides {
         let (key, value) = parse_override(text)?;
@@ -86,10 +84,20 @@ pub(super) fn apply(base: &Settings, file: Option<&Path>, overrides: &[String]) 
     settings_from(&tree).map_err(|Fault { key, problem }| anyhow!("{key}: {problem}"))
 }
 
+fn parse(path: &Path, text: &str) -> anyhow::Result<Table> {
+    text.parse().map_err(|error: toml::de::Error| anyhow!("{}: {}", place(path, text, error.span()), error.message()))
+}
+
 /// What is wrong, and with which key.
 struct Fault {
     key: String,
     problem: String,
+}
+
+impl Fault {
+    fn in_file(self, path: &Path, text: &str) -> anyhow::Error {
+        anyhow!("{}: {}: {}", place(path, text, span_of(text, &self.key)), self.key, self.problem)
+    }
 }
 
 fn settings_from(tree: &Table) -> Result<Settings, Fault> {
@@ -101,13 +109,18 @@ fn settings_from(tree: &Table) -> Result<Settings, Fault> {
     })
 }
 
-/// Adds the nearest valid key to "unknown field `etta`, expected one of `eta`, …".
+/// Adds the nearest valid key to "unknown field `etta`, expected one of `eta`, …", of an old key the new one, and to
+/// anything else what the setting may be.
 fn explain(key: &str, message: &str) -> String {
     let message = message.lines().next().unwrap_or(message);
     let Some((_, expected)) = message.split_once("unknown field ").or_else(|| message.split_once("unknown variant "))
     else {
-        return message.to_owned();
+        let domain = reference::entry(key).map(reference::Entry::domain).filter(|domain| !domain.is_empty());
+        return domain.map_or_else(|| message.to_owned(), |domain| format!("{message}; it may be {domain}"));
     };
+    if let Some(hint) = renamed::hint(key) {
+        return hint;
+    }
     let mut quoted = expected.split('`').skip(1).step_by(2);
     let wrong = quoted.next().unwrap_or_default();
     let valid: Vec<&str> = quoted.collect();

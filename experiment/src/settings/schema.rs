@@ -60,7 +60,7 @@ pub struct EvaluationSettings {
 }
 
 impl Settings {
-    /// As written into a run and printed by `cargo xtask settings`.
+    /// As written into a run.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("settings are plain values")
     }

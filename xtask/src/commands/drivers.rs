@@ -1,23 +1,31 @@
 //! `drivers`: how drivers are named, or the parameters of one planner as a file.
 
+use crate::args::JsonArgs;
+use crate::output::Output;
 use clap::Args;
 use experiment::drivers::{self, PlannerFile};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask drivers
+  cargo xtask drivers vvf > mine.toml                       edit, then drive with it:
+  cargo xtask evaluate --driver vvf --driver vvf:mine.toml";
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DriversArgs {
     /// A planner, whose parameters are printed as the file that `NAME:FILE` reads.
     #[arg(value_name = "PLANNER")]
     planner: Option<String>,
+    #[command(flatten)]
+    pub(crate) json: JsonArgs,
 }
 
-pub(crate) fn run(args: &DriversArgs) -> anyhow::Result<()> {
+pub(crate) fn run(args: &DriversArgs, output: &Output) -> anyhow::Result<()> {
     match &args.planner {
-        Some(name) => print!("{}", PlannerFile::text_of(name)?),
-        None => {
-            for (spec, about) in drivers::specs() {
-                println!("{spec:15} {about}");
-            }
+        Some(name) => {
+            output.print(PlannerFile::text_of(name)?.trim_end());
+            Ok(())
         }
+        None => output.names(&drivers::specs()),
     }
-    Ok(())
 }

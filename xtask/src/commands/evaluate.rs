@@ -1,10 +1,12 @@
 //! `evaluate`: drivers × lots × directions × trials × noise levels.
 
-use crate::args::{Directions, LayerArgs, OutArgs, noise_levels};
+use crate::args::{Directions, JsonArgs, LayerArgs, OutArgs, noise_levels};
 use crate::console::Console;
+use crate::output::Output;
 use crate::record::{self, RecordArgs};
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, anyhow, ensure};
 use clap::Args;
+use evaluation::estimate;
 use evaluation::plan::Plan;
 use evaluation::summary::Summary;
 use experiment::drivers::{DriverSpec, NamedDriver};
@@ -12,6 +14,7 @@ use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress};
 use experiment::run_dir::{self, Outcome, RunDir};
 use experiment::settings::{Layers, Settings};
+use scenarios::LoadError;
 use sim::seed::RootSeed;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -34,11 +37,11 @@ pub(crate) struct EvaluateArgs {
     #[arg(long, value_name = "N")]
     trials: Option<u32>,
     /// Which ways the lots are driven.
-    #[arg(long, alias = "direction")]
+    #[arg(long, alias = "direction", value_name = "WAY")]
     directions: Option<Directions>,
     /// What is seen wrongly: clean, paper, hard, lot (as the lot asks for) or multiples of paper; several are compared,
     /// `sweep` stands for 0,0.5,1,1.5,2.
-    #[arg(long, value_name = "LEVEL", num_args = 1.., value_delimiter = ',')]
+    #[arg(long, alias = "level", value_name = "LEVEL", num_args = 1.., value_delimiter = ',')]
     noise: Vec<String>,
     /// Driver the others are compared with [default: the last network, else the first driver].
     #[arg(long, value_name = "SPEC")]
@@ -47,6 +50,8 @@ pub(crate) struct EvaluateArgs {
     #[arg(long)]
     seed: Option<u64>,
     #[command(flatten)]
+    pub(crate) json: JsonArgs,
+    #[command(flatten)]
     layers: LayerArgs,
     #[command(flatten)]
     out: OutArgs,
@@ -54,44 +59,67 @@ pub(crate) struct EvaluateArgs {
     record: RecordArgs,
 }
 
-pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
+pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     let specs = DriverSpec::parse_all(&args.drivers)?;
     let compare_with = compare_with(args, &specs)?;
-    let (mut settings, preset) = settings_for(&specs, &Layers::from(&args.layers))?;
+    let (mut settings, preset) = settings_for(&specs, &Layers::from(&args.layers), output)?;
     override_trials(&mut settings, args)?;
     let load = |spec: DriverSpec| spec.load(&settings.expert, settings.dagger.device);
     let drivers: Vec<NamedDriver> = specs.into_iter().map(load).collect::<anyhow::Result<_>>()?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with };
-    plan.check()?;
+    check(&plan)?;
     let run = RunDir::create(&args.out.place("evaluate", &preset, settings.evaluation.seed.0), &settings)?;
-    let console = Console::default();
-    measure(&plan, &run, &console)?;
+    let console = Console::new(output);
+    console.plan(tasks(&settings, drivers.len()));
+    measure(&plan, &run, &console, output)?;
     report::run_report::write(run.path(), &console)?;
     run.finish(Outcome::Evaluation { drivers: args.drivers.clone() })?;
-    eprintln!(
+    output.note(format_args!(
         "written: {}/report.html, summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl",
         run.path().display()
-    );
+    ));
     console.report_time();
     let runs = args.record.record;
-    runs.map_or(Ok(()), |runs| record::record(run.path(), vec![record::first_runs(&plan, runs)]))
+    runs.map_or(Ok(()), |runs| record::record(run.path(), vec![record::first_runs(&plan, runs)], output))
 }
 
 /// Drives the plan, writes and prints the tables.
 ///
 /// # Errors
 /// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is written.
-pub(crate) fn measure(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<()> {
+pub(crate) fn measure(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress, output: &Output) -> anyhow::Result<()> {
     let evaluated = evaluation::evaluate::evaluate(plan, run, progress)?;
     let summary = Summary::new(plan, &evaluated.results);
     summary.write(run)?;
     report::failures::write(run)?;
-    println!("\n{}", report::summary::write(&summary, run)?);
+    let text = report::summary::write(&summary, run)?;
+    output.table(|| format!("\n{text}"), &summary.tables())?;
     if evaluated.is_complete {
         return Ok(());
     }
     Err(Interrupted { kept: format!("the runs driven so far are in {}", run.path().display()) }.into())
+}
+
+/// The tasks of an evaluation with their estimated seconds.
+pub(crate) fn tasks(settings: &Settings, drivers: usize) -> Vec<estimate::Task> {
+    vec![estimate::evaluation(settings, drivers), estimate::report()]
+}
+
+/// What can be known to go wrong before the first step.
+///
+/// # Errors
+/// Of a lot that can only be driven forward, with the flag that says so.
+pub(crate) fn check(plan: &Plan<'_>) -> anyhow::Result<()> {
+    plan.check().map_err(|error| or_forward(error, "--directions forward"))
+}
+
+/// Adds the flag that helps to the error of a lot that can only be driven forward.
+pub(crate) fn or_forward(error: anyhow::Error, flag: &str) -> anyhow::Error {
+    match error.downcast_ref::<LoadError>() {
+        Some(LoadError::ForwardOnly { .. }) => anyhow!("{error:#}, or drive it forward only: {flag}"),
+        _ => error,
+    }
 }
 
 /// `--compare-with`, else the last network, else the first driver.
@@ -99,8 +127,8 @@ fn compare_with(args: &EvaluateArgs, specs: &[DriverSpec]) -> anyhow::Result<usi
     let Some(wanted) = &args.compare_with else {
         return Ok(specs.iter().rposition(DriverSpec::is_network).unwrap_or(0));
     };
-    let wanted: DriverSpec = wanted.parse()?;
-    let found = specs.iter().position(|spec| *spec == wanted);
+    let spec = wanted.parse::<DriverSpec>().ok();
+    let found = specs.iter().position(|given| Some(given) == spec.as_ref());
     found.with_context(|| format!("--compare-with {wanted}: name one of the drivers given with --driver"))
 }
 
@@ -109,7 +137,11 @@ fn compare_with(args: &EvaluateArgs, specs: &[DriverSpec]) -> anyhow::Result<usi
 ///
 /// # Errors
 /// If something named does not exist, or runs were trained with settings that differ.
-pub(crate) fn settings_for(specs: &[DriverSpec], layers: &Layers) -> anyhow::Result<(Settings, String)> {
+pub(crate) fn settings_for(
+    specs: &[DriverSpec],
+    layers: &Layers,
+    output: &Output,
+) -> anyhow::Result<(Settings, String)> {
     let mut runs = specs.iter().filter_map(|spec| Some((spec, spec.run()?)));
     let Some((spec, path)) = runs.next().filter(|_| !layers.names_a_base()) else {
         return Ok((Settings::resolve(layers, None)?, layers.preset_name().to_owned()));
@@ -123,7 +155,7 @@ pub(crate) fn settings_for(specs: &[DriverSpec], layers: &Layers) -> anyhow::Res
              neither run's settings are fair to both; choose with --config or --preset"
         );
     }
-    eprintln!("settings: those of {} (others: --config or --preset)", path.display());
+    output.note(format_args!("settings: those of {} (others: --config or --preset)", path.display()));
     Ok((Settings::resolve_over(&of_run, layers, None)?, "run".to_owned()))
 }
 

@@ -1,6 +1,7 @@
 //! `generate`: lots as TOML plus a top-view PNG.
 
 use crate::console::Console;
+use crate::output::Output;
 use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 use experiment::lots::Lot;
@@ -84,7 +85,7 @@ fn pose(text: &str) -> Result<[f32; 3], String> {
 /// Lots generated at a time; Ctrl-C takes effect between two batches.
 const BATCH: usize = 8;
 
-pub(crate) fn run(args: &GenerateArgs) -> anyhow::Result<()> {
+pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
     ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
     ensure!(args.count > 0, "--count is 0; at least one is needed");
     let vehicle = VehicleSettings::hyundai_hg300();
@@ -101,7 +102,7 @@ pub(crate) fn run(args: &GenerateArgs) -> anyhow::Result<()> {
         .with_context(|| format!("{}: cannot be created; choose another --out", args.out.display()))?;
     let trials: Vec<Trial<'_>> =
         Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, args.count, &[Direction::Forward]).collect();
-    let console = Console::default();
+    let console = Console::new(output);
     console.begin("generating", "generating");
     let mut made = Vec::new();
     for batch in trials.chunks(BATCH) {
@@ -111,7 +112,7 @@ pub(crate) fn run(args: &GenerateArgs) -> anyhow::Result<()> {
         }
         let written = batch.par_iter().map(|trial| write(args, trial)).collect::<anyhow::Result<Vec<Made>>>()?;
         for lot in &written {
-            println!("{}", lot.line);
+            output.print(&lot.line);
         }
         made.extend(written);
         console.at(made.len() as f64 / trials.len() as f64, &mut |_| format!("{} lots", made.len()));
@@ -121,10 +122,8 @@ pub(crate) fn run(args: &GenerateArgs) -> anyhow::Result<()> {
     if !attempts.is_empty() {
         let drawn: u32 = attempts.iter().sum();
         let rejected = drawn - attempts.len() as u32;
-        println!(
-            "generator: {rejected} of {drawn} draws rejected ({:.1} %)",
-            100.0 * f64::from(rejected) / f64::from(drawn)
-        );
+        let percent = 100.0 * f64::from(rejected) / f64::from(drawn);
+        output.print(format_args!("generator: {rejected} of {drawn} draws rejected ({percent:.1} %)"));
     }
     Ok(())
 }

@@ -3,8 +3,10 @@
 use super::train;
 use crate::args::OutArgs;
 use crate::console::Console;
+use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::Args;
+use evaluation::estimate;
 use evaluation::format::exact_rate;
 use evaluation::plan::Plan;
 use evaluation::totals::Totals;
@@ -12,7 +14,7 @@ use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::Interrupted;
 use experiment::run_dir::{Outcome, Place, RunDir};
-use experiment::settings::Settings;
+use experiment::settings::{EvaluationSettings, Settings};
 use serde::Deserialize;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -42,14 +44,22 @@ struct Record {
     recorded: String,
 }
 
-pub(crate) fn run(args: &GuardArgs) -> anyhow::Result<()> {
+pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     let record: Record = toml::from_str(RECORD).context("guard.toml")?;
-    let mut settings = Settings::preset("default")?;
-    let console = Console::default();
+    let settings = Settings::preset("default")?;
+    let development = Settings {
+        evaluation: EvaluationSettings { lots: record.lots, trials: 1, ..settings.evaluation.clone() },
+        ..settings.clone()
+    };
+    let console = Console::new(output);
+    let driving = [&settings, &development].map(|settings| estimate::evaluation(settings, 1));
+    console.plan(estimate::training(&settings, true).into_iter().chain(driving).collect());
     let run = RunDir::create(&args.out.place("guard", "default", settings.seed.0), &settings)?;
-    eprintln!("run: {}", run.path().display());
+    output.note(format_args!("run: {}", run.path().display()));
     let interrupted = || Interrupted { kept: format!("what was done is in {}", run.path().display()) };
-    let Ok((policy, outcome)) = train::tabulated(&settings, &run, &console)? else { return Err(interrupted().into()) };
+    let Ok((policy, outcome)) = train::tabulated(&settings, &run, &console, output)? else {
+        return Err(interrupted().into());
+    };
     let driver = NamedDriver::network(
         "DAgger",
         DriverSpec::Run { folder: run.path().to_owned() },
@@ -80,16 +90,15 @@ pub(crate) fn run(args: &GuardArgs) -> anyhow::Result<()> {
         Ok(evaluated.results.totals(0, 0, &all, None))
     };
     let reference = drive(&settings, "reference")?;
-    (settings.evaluation.lots, settings.evaluation.trials) = (record.lots, 1);
-    let development = drive(&settings, "development")?;
+    let development = drive(&development, "development")?;
     for (place, totals) in [("the three lots", &reference), ("development lots", &development)] {
-        println!(
+        output.print(format_args!(
             "{place}: near-collisions {} in {:.0} m, per 100 m {}; contacts {}",
             totals.near_collisions,
             totals.reference_m,
             exact_rate(totals.near_collisions, totals.reference_m),
             totals.contacts
-        );
+        ));
     }
     run.finish(outcome)?;
     ensure!(
@@ -105,6 +114,6 @@ pub(crate) fn run(args: &GuardArgs) -> anyhow::Result<()> {
         record.upper_per_100m,
         run.path().display()
     );
-    println!("as good as recorded");
+    output.print("as good as recorded");
     Ok(())
 }

@@ -1,14 +1,22 @@
 //! `lots`: how lots are named.
 
+use crate::args::JsonArgs;
+use crate::output::Output;
 use clap::Args;
 use experiment::lots;
 
-#[derive(Debug, Clone, Args)]
-pub(crate) struct LotsArgs {}
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask lots
+  cargo xtask render lot --lots lot-a,test:2:hard           draws them
+  cargo xtask evaluate --driver expert --lots test:10";
 
-pub(crate) fn run(_: &LotsArgs) -> anyhow::Result<()> {
-    for (spec, about) in lots::SPECS {
-        println!("{spec:15} {about}");
-    }
-    Ok(())
+#[derive(Debug, Clone, Args)]
+pub(crate) struct LotsArgs {
+    #[command(flatten)]
+    pub(crate) json: JsonArgs,
+}
+
+pub(crate) fn run(_: &LotsArgs, output: &Output) -> anyhow::Result<()> {
+    output.names(&lots::SPECS)
 }

@@ -1,13 +1,20 @@
 //! `pixel-accuracy`: how many pixels of the noisy bird's-eye view are right.
 
-use crate::args::LayerArgs;
+use crate::args::{JsonArgs, LayerArgs};
 use crate::console::Console;
+use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
-use evaluation::pixel_accuracy::{SPACING_M, look};
+use evaluation::pixel_accuracy::{Pixels, SPACING_M, look};
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::settings::{Layers, NoiseChoice, Settings};
+use serde::Serialize;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask pixel-accuracy
+  cargo xtask pixel-accuracy --lots test:5 --noise paper,hard --trials 2";
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct PixelAccuracyArgs {
@@ -15,7 +22,7 @@ pub(crate) struct PixelAccuracyArgs {
     #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "lot-a,lot-b,lot-c")]
     lots: Vec<String>,
     /// Noise levels.
-    #[arg(long, value_name = "LEVEL", num_args = 1.., value_delimiter = ',', default_value = "paper")]
+    #[arg(long, alias = "level", value_name = "LEVEL", num_args = 1.., value_delimiter = ',', default_value = "paper")]
     noise: Vec<NoiseChoice>,
     /// Trials per lot and direction.
     #[arg(long, value_name = "N", default_value_t = 5)]
@@ -24,34 +31,45 @@ pub(crate) struct PixelAccuracyArgs {
     #[arg(long)]
     seed: Option<u64>,
     #[command(flatten)]
+    pub(crate) json: JsonArgs,
+    #[command(flatten)]
     layers: LayerArgs,
 }
 
-pub(crate) fn run(args: &PixelAccuracyArgs) -> anyhow::Result<()> {
+/// A row of the table, as JSON.
+#[derive(Debug, Serialize)]
+struct Row<'a> {
+    lot: &'a str,
+    noise: NoiseChoice,
+    #[serde(flatten)]
+    pixels: Pixels,
+}
+
+pub(crate) fn run(args: &PixelAccuracyArgs, output: &Output) -> anyhow::Result<()> {
     ensure!(args.trials > 0, "--trials is 0; at least one is needed");
     let settings = Settings::resolve(&Layers::from(&args.layers), args.seed)?;
     let lots = Lot::parse_all(&args.lots, &settings.episode.vehicle)?;
     let mut table = report::pixel_accuracy::table();
-    let console = Console::default();
+    let mut rows = Vec::new();
+    let console = Console::new(output);
     console.begin("looking", "looking");
     let stretches = (lots.len() * args.noise.len()) as f64;
     let mut done = 0.0;
     for lot in &lots {
         for &noise in &args.noise {
             if console.is_cancelled() {
-                println!("{table}");
+                output.table(|| table.to_string(), &rows)?;
                 return Err(Interrupted { kept: "the table holds what was measured".to_owned() }.into());
             }
             console.at(done / stretches, &mut |_| lot.name().to_owned());
             let pixels = look(&settings, lot, noise, args.trials)?;
             table.add_row(report::pixel_accuracy::row(&pixels, lot.name(), noise));
+            rows.push(Row { lot: lot.name(), noise, pixels });
             done += 1.0;
         }
     }
     console.end(&format!("{} lots", lots.len()));
-    println!(
-        "{table}\n\nPoses every {SPACING_M} m along the routes, both directions, trials: {}, seed: {}.",
-        args.trials, settings.seed.0
-    );
-    Ok(())
+    let (trials, seed) = (args.trials, settings.seed.0);
+    let note = format!("Poses every {SPACING_M} m along the routes, both directions, trials: {trials}, seed: {seed}.");
+    output.table(|| format!("{table}\n\n{note}"), &rows)
 }

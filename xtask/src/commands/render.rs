@@ -3,10 +3,11 @@
 use super::{evaluate, reproduce};
 use crate::args::{LayerArgs, OneDirection, noise_levels};
 use crate::console::Console;
+use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use experiment::drive::Replay;
-use experiment::drivers::DriverSpec;
+use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::Progress as _;
 use experiment::replay_key::ReplayKey;
@@ -45,9 +46,9 @@ pub(crate) struct RenderArgs {
     /// What is drawn.
     #[command(subcommand)]
     what: RenderWhat,
-    /// Folder to write into.
-    #[arg(long, global = true, value_name = "DIR", default_value = "pictures")]
-    out: PathBuf,
+    /// Folder to write into [default: pictures; of a report, its run].
+    #[arg(long, global = true, value_name = "DIR")]
+    out: Option<PathBuf>,
     /// Replaces files of the same name.
     #[arg(long, global = true)]
     overwrite: bool,
@@ -66,7 +67,7 @@ pub(crate) enum RenderWhat {
     Samples(SamplesArgs),
     /// What each noise layer makes wrong in one view, PNG.
     Noise(RenderNoiseArgs),
-    /// The report of a run anew, into its folder.
+    /// The report of a run anew, into its folder and that of `--out`.
     Report(RenderReportArgs),
     /// docs/results.md and its figures from a finished `reproduce`.
     Results(RenderResultsArgs),
@@ -92,7 +93,7 @@ pub(crate) struct RenderResultsArgs {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RenderLotArgs {
     /// Lots to draw; see `cargo xtask lots`.
-    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', required = true)]
+    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', required = true)]
     lots: Vec<String>,
     /// Seed of the obstacles.
     #[arg(long, default_value_t = 1)]
@@ -128,13 +129,13 @@ pub(crate) struct TrajectoriesArgs {
     #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
     lot: String,
     /// Which way.
-    #[arg(long = "directions", alias = "direction", default_value = "forward")]
+    #[arg(long = "directions", alias = "direction", value_name = "WAY", default_value = "forward")]
     direction: OneDirection,
     /// Which trial: obstacles and noise; of a training run, which of its drives.
     #[arg(long, default_value_t = 0)]
     trial: u32,
     /// What is seen wrongly: clean, paper, hard, lot or a multiple of paper.
-    #[arg(long, value_name = "LEVEL", default_value = "paper")]
+    #[arg(long, alias = "level", value_name = "LEVEL", default_value = "paper")]
     noise: String,
     /// Seed of obstacles and noise of the trials.
     #[arg(long)]
@@ -168,7 +169,7 @@ pub(crate) struct RenderNoiseArgs {
     #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
     lot: String,
     /// Noise levels: paper, hard or multiples of paper.
-    #[arg(long, value_name = "LEVEL", num_args = 1.., value_delimiter = ',', default_value = "paper,hard")]
+    #[arg(long, alias = "level", value_name = "LEVEL", num_args = 1.., value_delimiter = ',', default_value = "paper,hard")]
     noise: Vec<NoiseChoice>,
     /// Where the rear axle stands, metres along the route [default: where most layers of the last level show].
     #[arg(long, value_name = "METRES")]
@@ -178,116 +179,149 @@ pub(crate) struct RenderNoiseArgs {
     seed: u64,
 }
 
-pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
-    let output = Output { folder: &args.out, overwrite: args.overwrite };
+pub(crate) fn run(args: &RenderArgs, output: &Output) -> anyhow::Result<()> {
+    let path = args.out.as_deref().unwrap_or(Path::new("pictures"));
+    let folder = Folder { path, overwrite: args.overwrite, output };
     match &args.what {
-        RenderWhat::Lot(what) => render_lots(what, &output),
-        RenderWhat::ContactSheet(what) => contact_sheet(what, &output),
-        RenderWhat::Trajectories(what) => render_trajectories(what, &output),
-        RenderWhat::Samples(what) => render_samples(what, &output),
-        RenderWhat::Noise(what) => render_noise(what, &output),
-        RenderWhat::Results(what) => render_results(what),
-        RenderWhat::Report(what) => render_report(&what.run),
+        RenderWhat::Lot(what) => render_lots(what, &folder),
+        RenderWhat::ContactSheet(what) => contact_sheet(what, &folder),
+        RenderWhat::Trajectories(what) => render_trajectories(what, &folder),
+        RenderWhat::Samples(what) => render_samples(what, &folder),
+        RenderWhat::Noise(what) => render_noise(what, &folder),
+        RenderWhat::Report(what) => render_report(&what.run, args.out.is_some().then_some(&folder), output),
+        RenderWhat::Results(what) => render_results(what, output),
     }
 }
 
 /// Where pictures go.
-struct Output<'a> {
-    folder: &'a Path,
+struct Folder<'a> {
+    path: &'a Path,
     overwrite: bool,
+    output: &'a Output,
 }
 
-impl Output<'_> {
+impl Folder<'_> {
     /// Writes a picture as PNG, and as SVG where it is made of lines.
     fn write(&self, name: &str, drawing: &Drawing, is_vector: bool) -> anyhow::Result<()> {
-        let folder = self.folder;
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("{}: cannot be created; choose another --out", folder.display()))?;
-        let name = file_name(name);
-        let mut files = vec![(folder.join(format!("{name}.png")), drawing.to_png()?)];
+        self.check(name, is_vector)?;
+        let mut contents = vec![drawing.to_png()?];
         if is_vector {
-            files.push((folder.join(format!("{name}.svg")), drawing.to_svg().into_bytes()));
+            contents.push(drawing.to_svg().into_bytes());
         }
-        for (path, content) in files {
-            ensure!(
-                self.overwrite || !path.exists(),
-                "{}: exists already; choose another --out, or replace it with --overwrite",
-                path.display()
-            );
-            write_whole(&path, &content)?;
-            println!("{}: {} kB", path.display(), content.len().div_ceil(1000));
-        }
+        self.files(name, is_vector).iter().zip(contents).try_for_each(|(path, content)| self.put(path, &content))
+    }
+
+    fn files(&self, name: &str, is_vector: bool) -> Vec<PathBuf> {
+        let extensions: &[&str] = if is_vector { &["png", "svg"] } else { &["png"] };
+        extensions.iter().map(|extension| self.path.join(format!("{}.{extension}", file_name(name)))).collect()
+    }
+
+    /// Refuses to replace files unasked: before anything is driven or drawn.
+    fn check(&self, name: &str, is_vector: bool) -> anyhow::Result<()> {
+        self.files(name, is_vector).iter().try_for_each(|path| self.check_file(path))
+    }
+
+    fn check_file(&self, path: &Path) -> anyhow::Result<()> {
+        ensure!(
+            self.overwrite || !path.exists(),
+            "{}: exists already; choose another --out, or replace it with --overwrite",
+            path.display()
+        );
+        Ok(())
+    }
+
+    fn put(&self, path: &Path, content: &[u8]) -> anyhow::Result<()> {
+        std::fs::create_dir_all(self.path)
+            .with_context(|| format!("{}: cannot be created; choose another --out", self.path.display()))?;
+        write_whole(path, content)?;
+        self.output.print(format_args!("{}: {} kB", path.display(), content.len().div_ceil(1000)));
         Ok(())
     }
 }
 
-fn maps(args: &RenderLotArgs) -> anyhow::Result<Vec<Map>> {
+fn maps(args: &RenderLotArgs, output: &Output) -> anyhow::Result<Vec<Map>> {
     let episode = Settings::preset("default")?.episode;
     let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
     let trials: Vec<Trial<'_>> =
         Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).collect();
-    let console = Console::default();
+    let console = Console::new(output);
     console.begin("lots", "drawing lots");
     let maps = trials.par_iter().map(|trial| trial.map(&episode)).collect::<anyhow::Result<Vec<Map>>>()?;
     console.end(&format!("{} lots", maps.len()));
     Ok(maps)
 }
 
-fn render_lots(args: &RenderLotArgs, output: &Output<'_>) -> anyhow::Result<()> {
+fn render_lots(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
     ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
     let vehicle = Settings::preset("default")?.episode.vehicle;
-    for map in maps(args)? {
-        output.write(&map.scenario().name, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?, true)?;
+    for map in maps(args, folder.output)? {
+        folder.write(&map.scenario().name, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?, true)?;
     }
     Ok(())
 }
 
-fn contact_sheet(args: &RenderLotArgs, output: &Output<'_>) -> anyhow::Result<()> {
-    output.write("contact-sheet", &contact_sheet::picture(&maps(args)?)?, true)
+fn contact_sheet(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
+    folder.write("contact-sheet", &contact_sheet::picture(&maps(args, folder.output)?)?, true)
 }
 
-fn render_trajectories(args: &TrajectoriesArgs, output: &Output<'_>) -> anyhow::Result<()> {
+fn render_trajectories(args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
     ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
-    let (map, driven, name) = match &args.run {
-        Some(run) => driven_in_training(run, args)?,
-        None => driven_anew(args)?,
+    let drives = match &args.run {
+        Some(run) => driven_in_training(run, args, folder)?,
+        None => driven_anew(args, folder)?,
     };
     let by = match args.by.unwrap_or(if args.run.is_some() { ColourChoice::Who } else { ColourChoice::Driver }) {
         ColourChoice::Speed => ColourBy::Speed,
         ColourChoice::Driver => ColourBy::Driver,
         ColourChoice::Who => ColourBy::Source,
     };
-    output.write(
-        &format!("drive-{name}"),
-        &trajectories::picture(&map, &driven, by, &name, args.pixels_per_metre)?,
-        true,
-    )
+    let Drives { map, driven, title, file } = drives;
+    folder.write(&file, &trajectories::picture(&map, &driven, by, &title, args.pixels_per_metre)?, true)
 }
 
-type Drives = (Arc<Map>, Vec<Trajectory>, String);
+struct Drives {
+    map: Arc<Map>,
+    driven: Vec<Trajectory>,
+    title: String,
+    /// Name of the picture.
+    file: String,
+}
 
 /// One drive per driver, all on the same obstacles and noise as in an evaluation.
-fn driven_anew(args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
+fn driven_anew(args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<Drives> {
     let specs = DriverSpec::parse_all(&args.drivers)?;
-    let (mut settings, _) = evaluate::settings_for(&specs, &Layers::from(&args.layers))?;
+    let (mut settings, _) = evaluate::settings_for(&specs, &Layers::from(&args.layers), folder.output)?;
     settings.evaluation.seed = args.seed.map_or(settings.evaluation.seed, RootSeed);
     let levels = noise_levels(std::slice::from_ref(&args.noise))?;
     let [noise] = levels[..] else { anyhow::bail!("--noise {}: name one level", args.noise) };
+    let direction = Direction::from(args.direction);
     let key = |driver: &DriverSpec| ReplayKey {
         driver: driver.clone(),
         lot: args.lot.clone(),
-        direction: args.direction.into(),
+        direction,
         trial: args.trial,
         noise,
         seed: settings.evaluation.seed,
         tick: 0,
     };
     let replay = Replay::new(&key(&specs[0]), &settings.episode)?;
-    let console = Console::default();
+    let title = format!("{} {} trial {}", replay.lot.name(), direction.name(), args.trial);
+    let noise = if noise == NoiseChoice::Paper { String::new() } else { format!(" noise {noise}") };
+    let names: Vec<String> = specs.iter().map(ToString::to_string).collect();
+    let file = format!("drive {title}{noise} {}", names.join(" "));
+    folder.check(&file, true)?;
+    let drivers: Vec<NamedDriver> = specs
+        .into_iter()
+        .map(|spec| {
+            let driver = spec.load(&settings.expert, settings.dagger.device)?;
+            driver.check(&settings.episode)?;
+            Ok(driver)
+        })
+        .collect::<anyhow::Result<_>>()?;
+    let console = Console::new(folder.output);
+    console.plan(drivers.iter().map(|_| ("driving", 2.0)).collect());
     let mut driven = Vec::new();
-    for spec in specs {
-        let driver = spec.load(&settings.expert, settings.dagger.device)?;
-        driver.check(&settings.episode)?;
+    for driver in drivers {
         console.begin("driving", &driver.name);
         let length_m = replay.map.path().length_m();
         let mut points = Vec::new();
@@ -300,16 +334,18 @@ fn driven_anew(args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
         console.end(&format!("near-collisions: {near_collisions} in {length_m:.0} m"));
         driven.push(Trajectory { name: driver.name, points });
     }
-    let name = format!("{} {} trial {}", replay.lot.name(), Direction::from(args.direction).name(), args.trial);
-    Ok((Arc::clone(&replay.map), driven, name))
+    Ok(Drives { map: Arc::clone(&replay.map), driven, title, file })
 }
 
 /// A drive of a training round: the network of the round before and the expert, as in the training itself.
-fn driven_in_training(run: &Path, args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
+fn driven_in_training(run: &Path, args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<Drives> {
     let (map, rollouts) = training::drive_again(run, args.round, args.trial)?;
-    let name = format!("{} round {} drive {}", map.scenario().name, args.round, args.trial);
+    let title = format!("{} round {} drive {}", map.scenario().name, args.round, args.trial);
+    let name = run.file_name().unwrap_or_default().to_string_lossy();
+    let file = format!("drive {title} {name}");
+    folder.check(&file, true)?;
     let length_m = map.path().length_m();
-    let console = Console::default();
+    let console = Console::new(folder.output);
     console.begin("driving", "training");
     let mut points = Vec::new();
     let collected = rollouts.drive(&mut |_, frame| {
@@ -318,10 +354,11 @@ fn driven_in_training(run: &Path, args: &TrajectoriesArgs) -> anyhow::Result<Dri
     });
     let near_collisions = collected.reports[0].metrics.near_collisions;
     console.end(&format!("near-collisions: {near_collisions} in {length_m:.0} m"));
-    Ok((map, vec![Trajectory { name: "training".to_owned(), points }], name))
+    let driven = vec![Trajectory { name: "training".to_owned(), points }];
+    Ok(Drives { map, driven, title, file })
 }
 
-fn render_samples(args: &SamplesArgs, output: &Output<'_>) -> anyhow::Result<()> {
+fn render_samples(args: &SamplesArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
     ensure!(args.count > 0, "--count is 0; at least one is needed");
     let name = args.round.file_name().unwrap_or_default().to_string_lossy();
     let index = name.strip_prefix("round-").and_then(|index| index.parse().ok());
@@ -332,9 +369,8 @@ fn render_samples(args: &SamplesArgs, output: &Output<'_>) -> anyhow::Result<()>
     ensure!(args.round.is_dir(), "{}: there is no such round", args.round.display());
     let kept = Store::open(run)?.read_samples(index)?;
     let settings = run_dir::settings_of(run)?;
-    let folder = args.net.as_deref().unwrap_or(&args.round);
-    let checkpoint =
-        (args.net.is_some() || Checkpoint::exists(folder)).then(|| Checkpoint::load(folder)).transpose()?;
+    let net = args.net.as_deref().unwrap_or(&args.round);
+    let checkpoint = (args.net.is_some() || Checkpoint::exists(net)).then(|| Checkpoint::load(net)).transpose()?;
     let count = args.count.min(kept.len());
     let chosen: Vec<usize> = (0..count).map(|i| (2 * i + 1) * kept.len() / (2 * count)).collect();
     let grids: Vec<_> = chosen.iter().map(|&i| &kept[i].grid).collect();
@@ -345,14 +381,14 @@ fn render_samples(args: &SamplesArgs, output: &Output<'_>) -> anyhow::Result<()>
         .map(|(place, &i)| (i, kept[i], answers.as_ref().map(|answers| answers[place])))
         .collect();
     let title = format!("{name}: {count} of {} samples", kept.len());
-    output.write(
+    folder.write(
         &format!("samples-{name}"),
         &samples::picture(&title, &samples, &settings.episode.sensing.geometry)?,
         false,
     )
 }
 
-fn render_noise(args: &RenderNoiseArgs, output: &Output<'_>) -> anyhow::Result<()> {
+fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
     let settings = Settings::preset("default")?;
     let lots = Lot::parse_all(std::slice::from_ref(&args.lot), &settings.episode.vehicle)?;
     let trial = Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next();
@@ -373,27 +409,36 @@ fn render_noise(args: &RenderNoiseArgs, output: &Output<'_>) -> anyhow::Result<(
     let levels: Vec<(String, Inspection)> =
         args.noise.iter().map(|&noise| (noise.name(), inspect(noise, at_m))).collect();
     let title = format!("{}, {at_m:.1} m along the route, seed {}", trial.lot.name(), args.seed);
-    output.write(&format!("noise-{}", trial.lot.name()), &noise::picture(&title, &levels)?, false)
+    folder.write(&format!("noise-{}", trial.lot.name()), &noise::picture(&title, &levels)?, false)
 }
 
-fn render_results(args: &RenderResultsArgs) -> anyhow::Result<()> {
+fn render_results(args: &RenderResultsArgs, output: &Output) -> anyhow::Result<()> {
     ensure!(
         run_dir::is_finished(&args.run),
         "{}: this is no finished run; make one with cargo xtask reproduce",
         args.run.display()
     );
     reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.to)?;
-    println!("{}", args.to.display());
+    output.print(args.to.display());
     Ok(())
 }
 
-fn render_report(run: &Path) -> anyhow::Result<()> {
+fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyhow::Result<()> {
     ensure!(
         run.join("settings.toml").is_file(),
         "{}: this is no run; name a folder that train-dagger, train-bc or evaluate made",
         run.display()
     );
-    run_report::write(run, &Console::default())?;
-    println!("{}", run.join(run_report::FILE).display());
+    let report = run.join(run_report::FILE);
+    let copy = copy.map(|folder| (folder, folder.path.join(run_report::FILE)));
+    if let Some((folder, path)) = &copy {
+        folder.check_file(path)?;
+    }
+    run_report::write(run, &Console::new(output))?;
+    output.print(report.display());
+    if let Some((folder, path)) = copy {
+        let content = std::fs::read(&report).with_context(|| format!("{}: cannot be read", report.display()))?;
+        folder.put(&path, &content)?;
+    }
     Ok(())
 }

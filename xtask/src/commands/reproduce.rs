@@ -5,6 +5,7 @@ use super::{evaluate, train};
 use crate::args::{LayerArgs, OutArgs};
 use crate::build_info;
 use crate::console::Console;
+use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::Args;
 use evaluation::conclusions;
@@ -58,16 +59,19 @@ const EXTENT: &str = "reproduce.toml";
 /// Trainings of `--full`.
 const SEEDS_FULL: u64 = 5;
 
-pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
+pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
     let (run, settings, extent) = if let Some(path) = &args.resume { resume(path)? } else { begin(args)? };
     let stages = stages::all(&settings, &extent, run.path());
     let recipe = Recipe { settings, extent, stages };
-    eprintln!("run: {}", run.path().display());
-    announce(&recipe.stages, run.path());
-    let console = Console::default();
+    output.note(format_args!("run: {}", run.path().display()));
+    announce(&recipe.stages, run.path(), output);
+    let console = Console::new(output);
+    let is_to_do = |stage: &&Stage| !run_dir::is_finished(&run.path().join(&stage.folder));
+    console.plan(recipe.stages.iter().filter(is_to_do).flat_map(Stage::tasks).collect());
     for (index, stage) in recipe.stages.iter().enumerate() {
-        eprintln!("\n{} of {}: {} ({})", index + 1, recipe.stages.len(), stage.about, stage.folder);
-        let is_done = if console.is_cancelled() { Ok(false) } else { perform(stage, run.path(), &console) };
+        let (place, of) = (index + 1, recipe.stages.len());
+        output.note(format_args!("\n{place} of {of}: {} ({})", stage.about, stage.folder));
+        let is_done = if console.is_cancelled() { Ok(false) } else { perform(stage, run.path(), &console, output) };
         match is_done {
             Ok(true) => {}
             Ok(false) => return Err(cut_short(run.path(), index)),
@@ -76,9 +80,9 @@ pub(crate) fn run(args: &ReproduceArgs) -> anyhow::Result<()> {
         }
     }
     let conclusions = reproduction::write(&recipe, &run)?;
-    println!("\nWhat holds here\n\n{conclusions}");
+    output.table(|| format!("\nWhat holds here\n\n{conclusions}"), &())?;
     run.finish(Outcome::Reproduction { stages: recipe.stages.len() })?;
-    eprintln!("written: {}/report.html, report.md, conclusions.csv and figures/", run.path().display());
+    output.note(format_args!("written: {}/report.html, report.md, conclusions.csv and figures/", run.path().display()));
     console.report_time();
     Ok(())
 }
@@ -167,28 +171,28 @@ fn tuned(folder: Option<&Path>) -> anyhow::Result<Vec<String>> {
 }
 
 /// What will be done, with a guess at how long it takes.
-fn announce(stages: &[Stage], root: &Path) {
+fn announce(stages: &[Stage], root: &Path, output: &Output) {
     let mut left_s = 0.0;
-    eprintln!("stages, with the minutes they take on two quiet cores:");
+    output.note("stages, with the minutes they take on two quiet cores:");
     for (index, stage) in stages.iter().enumerate() {
         let is_finished = run_dir::is_finished(&root.join(&stage.folder));
         let estimate_s = if is_finished { 0.0 } else { stage.estimate_s() };
         left_s += estimate_s;
         let minutes = if is_finished { "done".to_owned() } else { format!("{:.1}", estimate_s / 60.0) };
-        eprintln!("{:>3}. {minutes:>6}  {} ({})", index + 1, stage.about, stage.folder);
+        output.note(format_args!("{:>3}. {minutes:>6}  {} ({})", index + 1, stage.about, stage.folder));
     }
-    eprintln!("about {:.0} minutes in all", (left_s / 60.0).ceil());
+    output.note(format_args!("about {:.0} minutes in all", (left_s / 60.0).ceil()));
 }
 
 /// Does a stage unless it is done; `false` if cut short by Ctrl-C.
-fn perform(stage: &Stage, root: &Path, console: &Console) -> anyhow::Result<bool> {
+fn perform(stage: &Stage, root: &Path, console: &Console, output: &Output) -> anyhow::Result<bool> {
     let path = root.join(&stage.folder);
     let settings = &stage.settings;
     let build = build_info::get();
     let place =
         Place { build, out: None, overwrite: false, command: "reproduce", preset: "reproduce", seed: settings.seed.0 };
     let Some(run) = RunDir::stage(&path, &place, settings)? else {
-        eprintln!("done before");
+        output.note("done before");
         return Ok(true);
     };
     match &stage.step {
@@ -196,7 +200,7 @@ fn perform(stage: &Stage, root: &Path, console: &Console) -> anyhow::Result<bool
             if let Some(chain) = cloning_of {
                 take_over_cloning(&root.join(chain), &path)?;
             }
-            let Ok((_, outcome)) = train::tabulated(settings, &run, console)? else { return Ok(false) };
+            let Ok((_, outcome)) = train::tabulated(settings, &run, console, output)? else { return Ok(false) };
             run.finish(outcome)?;
         }
         Step::Drive { drivers } => {
@@ -207,8 +211,8 @@ fn perform(stage: &Stage, root: &Path, console: &Console) -> anyhow::Result<bool
             );
             let compare_with = conclusions::compare_with(&drivers);
             let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with };
-            plan.check()?;
-            evaluate::measure(&plan, &run, console)?;
+            evaluate::check(&plan)?;
+            evaluate::measure(&plan, &run, console, output)?;
             run.finish(Outcome::Evaluation { drivers: specs })?;
         }
         Step::OnPolicy => {

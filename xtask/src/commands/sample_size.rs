@@ -1,8 +1,11 @@
 //! `sample-size`: how far must be driven.
 
+use crate::args::JsonArgs;
+use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
 use evaluation::statistics::sample_size::{Question, to_bound};
+use serde::Serialize;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -28,6 +31,18 @@ pub(crate) struct SampleSizeArgs {
     /// Variance over mean of the counts, as printed by `evaluate`; 1 = independent events.
     #[arg(long, default_value_t = 1.0)]
     dispersion: f64,
+    #[command(flatten)]
+    pub(crate) json: JsonArgs,
+}
+
+/// An answer as JSON: rates per 100 m, and the metres that each driver must drive.
+#[derive(Debug, Serialize)]
+struct Answer {
+    rates: Vec<f64>,
+    metres: f64,
+    confidence: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    power: Option<f64>,
 }
 
 fn two_rates(text: &str) -> Result<[f64; 2], String> {
@@ -35,33 +50,37 @@ fn two_rates(text: &str) -> Result<[f64; 2], String> {
     rates.ok_or_else(|| "two numbers with a comma between them are needed, as in 1.4,0.5".to_owned())
 }
 
-pub(crate) fn run(args: &SampleSizeArgs) -> anyhow::Result<()> {
+pub(crate) fn run(args: &SampleSizeArgs, output: &Output) -> anyhow::Result<()> {
     for (flag, probability) in [("--power", args.power), ("--confidence", args.confidence)] {
         ensure!(probability > 0.0 && probability < 1.0, "{flag} {probability} is no probability between 0 and 1");
     }
     let dispersion = args.dispersion;
     ensure!((1.0..=1e3).contains(&dispersion), "--dispersion {dispersion} is not within 1 (independent events) … 1000");
     let percent = 100.0 * args.confidence;
+    let mut answers = Vec::new();
     if let Some(rate) = args.below {
         check(&[rate], "--below")?;
         ensure!(rate > 0.0, "--below 0: no distance shows that a rate is zero; name a rate that would be good enough");
-        println!(
-            "{:.0} m without a near-collision show a rate below {rate} per 100 m ({percent} %, one-sided)",
-            to_bound(rate, args.confidence)
-        );
+        let metres = to_bound(rate, args.confidence);
+        output.remark(format_args!(
+            "{metres:.0} m without a near-collision show a rate below {rate} per 100 m ({percent} %, one-sided)"
+        ));
+        answers.push(Answer { rates: vec![rate], metres, confidence: args.confidence, power: None });
     }
     if let Some([a, b]) = args.between {
         check(&[a, b], "--between")?;
         ensure!(a != b, "--between {a},{b}: equal rates cannot be told apart");
         let question = Question { per_100m: [a, b], power: args.power, alpha: 1.0 - args.confidence, dispersion };
-        println!(
-            "{:.0} m per driver tell {a} from {b} per 100 m in {} % of all evaluations (exact test, {percent} %, \
+        let metres = question.metres_each();
+        output.remark(format_args!(
+            "{metres:.0} m per driver tell {a} from {b} per 100 m in {} % of all evaluations (exact test, {percent} %, \
              dispersion {dispersion})",
-            question.metres_each(),
             100.0 * args.power
-        );
+        ));
+        let (confidence, power) = (args.confidence, Some(args.power));
+        answers.push(Answer { rates: vec![a, b], metres, confidence, power });
     }
-    Ok(())
+    if args.json.json { output.table(String::new, &answers) } else { Ok(()) }
 }
 
 fn check(rates: &[f64], flag: &str) -> anyhow::Result<()> {

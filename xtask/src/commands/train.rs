@@ -1,11 +1,13 @@
 //! `train-bc` and `train-dagger`.
 
 use super::evaluate;
-use crate::args::{LayerArgs, OutArgs};
+use crate::args::{JsonArgs, LayerArgs, OutArgs};
 use crate::console::Console;
+use crate::output::Output;
 use crate::record::{self, RecordArgs};
 use anyhow::Context as _;
 use clap::Args;
+use evaluation::estimate;
 use evaluation::plan::Plan;
 use evaluation::table1::Table1;
 use experiment::drivers::{DriverSpec, NamedDriver};
@@ -48,22 +50,24 @@ pub(crate) struct TrainArgs {
     #[arg(long)]
     no_eval: bool,
     #[command(flatten)]
+    pub(crate) json: JsonArgs,
+    #[command(flatten)]
     record: RecordArgs,
 }
 
 /// Behaviour cloning alone: DAgger without an iteration.
-pub(crate) fn bc(args: &TrainArgs) -> anyhow::Result<()> {
-    train(args, "train-bc", |settings| {
+pub(crate) fn bc(args: &TrainArgs, output: &Output) -> anyhow::Result<()> {
+    train(args, "train-bc", output, |settings| {
         settings.dagger.iterations_max = 0;
         settings.dagger.iterations_min = 0;
     })
 }
 
-pub(crate) fn dagger(args: &TrainArgs) -> anyhow::Result<()> {
-    train(args, "train-dagger", |_| {})
+pub(crate) fn dagger(args: &TrainArgs, output: &Output) -> anyhow::Result<()> {
+    train(args, "train-dagger", output, |_| {})
 }
 
-fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) -> anyhow::Result<()> {
+fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&mut Settings)) -> anyhow::Result<()> {
     let (run, settings) = if let Some(path) = &args.resume {
         RunDir::resume(path)?
     } else {
@@ -71,15 +75,21 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
         let mut settings = Settings::resolve(&layers, args.seed)?;
         adjust(&mut settings);
         // Before the folder is claimed: a misspelt lot should not leave one behind.
-        Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
-        Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
+        check_lots(&settings)?;
         let place = args.out.place(command, layers.preset_name(), settings.seed.0);
         (RunDir::create(&place, &settings)?, settings)
     };
-    eprintln!("run: {}", run.path().display());
+    output.note(format_args!("run: {}", run.path().display()));
 
-    let console = Console::default();
-    let (policy, outcome) = tabulated(&settings, &run, &console)?.map_err(|rounds| cut_short(run.path(), rounds))?;
+    let console = Console::new(output);
+    let mut tasks = estimate::training(&settings, true);
+    if !args.no_eval {
+        // The expert, behaviour cloning and what became of it.
+        tasks.extend(evaluate::tasks(&settings, if settings.dagger.iterations_max > 0 { 3 } else { 2 }));
+    }
+    console.plan(tasks);
+    let (policy, outcome) =
+        tabulated(&settings, &run, &console, output)?.map_err(|rounds| cut_short(run.path(), rounds))?;
     let mut to_record = args.record.record.map_or_else(Vec::new, |episodes| {
         let folder = || run.path().to_owned();
         vec![Show::Training { run: folder() }, Show::Rollouts { run: folder(), episodes }]
@@ -88,15 +98,30 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
         let drivers = drivers(&settings, &run, policy)?;
         let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
         let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: drivers.len() - 1 };
-        plan.check()?;
-        evaluate::measure(&plan, &run, &console)?;
+        evaluate::check(&plan)?;
+        evaluate::measure(&plan, &run, &console, output)?;
         to_record.extend(args.record.record.map(|runs| record::first_runs(&plan, runs)));
     }
     report::run_report::write(run.path(), &console)?;
     run.finish(outcome)?;
-    print_next_steps(run.path());
+    print_next_steps(run.path(), output);
     console.report_time();
-    if to_record.is_empty() { Ok(()) } else { record::record(run.path(), to_record) }
+    if to_record.is_empty() { Ok(()) } else { record::record(run.path(), to_record, output) }
+}
+
+/// Lots that do not exist, or cannot be driven as the settings ask.
+fn check_lots(settings: &Settings) -> anyhow::Result<()> {
+    let Settings { training, evaluation, episode, .. } = settings;
+    for (section, lots, directions) in
+        [("training", &training.lots, &training.directions), ("evaluation", &evaluation.lots, &evaluation.directions)]
+    {
+        for lot in Lot::parse_all(lots, &episode.vehicle)? {
+            let flag = format!("--set {section}.directions='[\"forward\"]'");
+            let check = |&direction| lot.check_direction(direction, &episode.vehicle);
+            directions.iter().try_for_each(check).map_err(|error| evaluate::or_forward(error, &flag))?;
+        }
+    }
+    Ok(())
 }
 
 /// Trains, prints and writes the paper's table. The inner error of a training cut short is the number of rounds that
@@ -105,11 +130,13 @@ pub(crate) fn tabulated(
     settings: &Settings,
     run: &RunDir,
     progress: &dyn Progress,
+    output: &Output,
 ) -> anyhow::Result<Result<(Checkpoint, Outcome), usize>> {
     let outcome = training::train(settings, run, progress)?;
     let table1 = Table1::new(outcome.rows, outcome.stop);
     table1.write(run)?;
-    println!("\nDAgger iterations\n\n{}", report::table1::write(&table1, run)?);
+    let text = report::table1::write(&table1, run)?;
+    output.table(|| format!("\nDAgger iterations\n\n{text}"), &table1)?;
     let rounds = table1.rows.len();
     let (Stop::EtaReached | Stop::IterationCap, Some(policy)) = (outcome.stop, outcome.policy) else {
         return Ok(Err(rounds));
@@ -138,8 +165,8 @@ fn drivers(settings: &Settings, run: &RunDir, policy: Checkpoint) -> anyhow::Res
     Ok(drivers)
 }
 
-fn print_next_steps(path: &Path) {
+fn print_next_steps(path: &Path, output: &Output) {
     let path = path.display();
-    println!("\nPolicy: {path} (the last round; model.safetensors opens in PyTorch)");
-    println!("Next:   cargo xtask evaluate --driver run:{path} --seed 2");
+    output.remark(format_args!("\nPolicy: {path} (the last round; model.safetensors opens in PyTorch)"));
+    output.remark(format_args!("Next:   cargo xtask evaluate --driver run:{path} --seed 2"));
 }

@@ -2,6 +2,7 @@
 
 use crate::args::{LayerArgs, OutArgs};
 use crate::console::Console;
+use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
 use evaluation::tune;
@@ -36,7 +37,7 @@ pub(crate) struct TuneArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// What is seen wrongly.
-    #[arg(long, value_name = "LEVEL", default_value = "paper")]
+    #[arg(long, alias = "level", value_name = "LEVEL", default_value = "paper")]
     noise: NoiseChoice,
     #[command(flatten)]
     layers: LayerArgs,
@@ -44,7 +45,7 @@ pub(crate) struct TuneArgs {
     out: OutArgs,
 }
 
-pub(crate) fn run(args: &TuneArgs) -> anyhow::Result<()> {
+pub(crate) fn run(args: &TuneArgs, output: &Output) -> anyhow::Result<()> {
     let layers = Layers::from(&args.layers);
     let mut settings = Settings::resolve(&layers, None)?;
     // Written into the folder, so that it says what was driven.
@@ -58,17 +59,19 @@ pub(crate) fn run(args: &TuneArgs) -> anyhow::Result<()> {
     let planners = tune::planners_named(&args.planners)?;
     tune::check(&Lot::parse_all(&args.lots, &settings.episode.vehicle)?)?;
     let run = RunDir::create(&args.out.place("tune", layers.preset_name(), args.seed), &settings)?;
-    let console = Console::default();
+    let console = Console::new(output);
+    // Planners take about as long as each other.
+    console.plan([("lots", 1.0)].into_iter().chain(planners.iter().map(|_| ("tuning", 120.0))).collect());
     let tuned = tune::tune(&settings, &planners, args.budget as usize, &run, &console)?;
     if tuned.len() < planners.len() {
         let kept = format!("{} of {} planners are tuned in {}", tuned.len(), planners.len(), run.path().display());
         return Err(Interrupted { kept }.into());
     }
     let table = report::tuning::table(&tuned);
-    println!("\n{table}");
+    output.table(|| format!("\n{table}"), &())?;
     run.write("tuning.md", format!("{table}\n").as_bytes())?;
     run.finish(Outcome::Tuning { planners: tuned.iter().map(|found| found.planner.name().to_owned()).collect() })?;
-    eprintln!("written: {}/*.toml; drive one with --driver NAME:{0}/NAME.toml", run.path().display());
+    output.note(format_args!("written: {}/*.toml; drive one with --driver NAME:{0}/NAME.toml", run.path().display()));
     console.report_time();
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use super::evaluate;
 use crate::args::{LayerArgs, OneDirection};
+use crate::output::Output;
 use crate::record::recordings_of;
 use crate::viewer;
 use anyhow::{bail, ensure};
@@ -21,7 +22,7 @@ use std::path::{Path, PathBuf};
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask visualise lot lot-b
-  cargo xtask visualise episode --driver expert --driver run:runs/train-dagger-default-s1 --lot lot-b
+  cargo xtask visualise episode --driver expert --driver run:runs/train-dagger-default-s1 --lots lot-b
   cargo xtask visualise replay run:runs/train-dagger-default-s1@lot-b@reverse@3@paper@1@842
   cargo xtask visualise run runs/train-dagger-default-s1
   cargo xtask visualise failures runs/evaluate-default-s1 --limit 5
@@ -84,16 +85,16 @@ struct EpisodeArgs {
     #[arg(long = "driver", value_name = "SPEC", required = true, num_args = 1..)]
     drivers: Vec<String>,
     /// The lot; see `cargo xtask lots`.
-    #[arg(long, alias = "lots", value_name = "SPEC", default_value = "lot-a")]
+    #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
     lot: String,
     /// Which trial.
     #[arg(long, value_name = "N", default_value_t = 0)]
     trial: u32,
     /// Which way it is driven.
-    #[arg(long, alias = "directions", default_value = "forward")]
+    #[arg(long = "directions", alias = "direction", value_name = "WAY", default_value = "forward")]
     direction: OneDirection,
     /// What is seen wrongly: clean, paper, hard, lot or multiples of paper [default: the first of evaluation.noise].
-    #[arg(long, value_name = "LEVEL")]
+    #[arg(long, alias = "level", value_name = "LEVEL")]
     noise: Option<NoiseChoice>,
     /// Seed of the evaluation.
     #[arg(long)]
@@ -129,14 +130,14 @@ struct FailuresArgs {
     limit: usize,
 }
 
-pub(crate) fn run(args: &VisualiseArgs) -> anyhow::Result<()> {
+pub(crate) fn run(args: &VisualiseArgs, output: &Output) -> anyhow::Result<()> {
     let (show, file) = match &args.what {
         What::Lot(lot) => {
             let show = Show::Lot { lot: lot.lot.clone(), seed: RootSeed(lot.seed) };
             (show, format!("lot-{}-s{}", file_name(&lot.lot), lot.seed))
         }
-        What::Episode(episode) => episode_of(episode)?,
-        What::Replay(replay) => replay_of(&replay.key, &replay.layers)?,
+        What::Episode(episode) => episode_of(episode, output)?,
+        What::Replay(replay) => replay_of(&replay.key, &replay.layers, output)?,
         What::Run(run) => {
             let name = run.run.file_name().map_or_else(|| "training".into(), |name| name.to_string_lossy());
             (Show::Training { run: run.run.clone() }, format!("run-{}", file_name(&name)))
@@ -146,11 +147,11 @@ pub(crate) fn run(args: &VisualiseArgs) -> anyhow::Result<()> {
             let folder_name = folder.display().to_string();
             ensure!(args.sink.out.is_none(), "--out: every near-collision is a file of its own, in {folder_name}");
             let sink = sink_of(&args.sink, Sink::Folder(folder));
-            return viewer::ask(&ViewRequest { sink, show: vec![failures_of(failures)?] });
+            return viewer::ask(&ViewRequest { sink, show: vec![failures_of(failures, output)?] }, output);
         }
     };
     let sink = sink_of(&args.sink, Sink::File(Path::new("recordings").join(format!("{file}.rrd"))));
-    viewer::ask(&ViewRequest { sink, show: vec![show] })
+    viewer::ask(&ViewRequest { sink, show: vec![show] }, output)
 }
 
 fn sink_of(args: &SinkArgs, otherwise: Sink) -> Sink {
@@ -163,12 +164,12 @@ fn sink_of(args: &SinkArgs, otherwise: Sink) -> Sink {
 }
 
 /// A run by several drivers, and the name of its file.
-fn episode_of(args: &EpisodeArgs) -> anyhow::Result<(Show, String)> {
+fn episode_of(args: &EpisodeArgs, output: &Output) -> anyhow::Result<(Show, String)> {
     let drivers = DriverSpec::parse_all(&args.drivers)?;
-    let (settings, _) = evaluate::settings_for(&drivers, &Layers::from(&args.layers))?;
+    let (settings, _) = evaluate::settings_for(&drivers, &Layers::from(&args.layers), output)?;
     let lots = Lot::parse_all(std::slice::from_ref(&args.lot), &settings.episode.vehicle)?;
     let [lot] = lots.as_slice() else {
-        bail!("--lot {}: {} lots are named so; name one, as in test-hard-7", args.lot, lots.len())
+        bail!("--lots {}: {} lots are named so; name one, as in test-hard-7", args.lot, lots.len())
     };
     let evaluation = &settings.evaluation;
     let (direction, trial) = (Direction::from(args.direction), args.trial);
@@ -182,21 +183,22 @@ fn episode_of(args: &EpisodeArgs) -> anyhow::Result<(Show, String)> {
 }
 
 /// The run of a key, and the name of its file.
-fn replay_of(key: &ReplayKey, layers: &LayerArgs) -> anyhow::Result<(Show, String)> {
-    let (settings, _) = evaluate::settings_for(std::slice::from_ref(&key.driver), &Layers::from(layers))?;
+fn replay_of(key: &ReplayKey, layers: &LayerArgs, output: &Output) -> anyhow::Result<(Show, String)> {
+    let (settings, _) = evaluate::settings_for(std::slice::from_ref(&key.driver), &Layers::from(layers), output)?;
     let file = format!("replay-{}-{}-t{}-{}", file_name(&key.lot), key.direction.name(), key.trial, key.tick);
     let drive = DriveRequest { file: file.clone(), title: key.to_string(), keys: vec![key.clone()] };
     Ok((Show::Drives { settings: Box::new(settings), drives: vec![drive] }, file))
 }
 
 /// Near-collisions of an evaluation, a recording each, of the seconds around it.
-fn failures_of(args: &FailuresArgs) -> anyhow::Result<Show> {
+fn failures_of(args: &FailuresArgs, output: &Output) -> anyhow::Result<Show> {
     let list = args.run.join("failures.jsonl");
     let failures: Vec<FailureRecord> = records::read(&list)?;
     ensure!(!failures.is_empty(), "{}: there is no near-collision in it, so there is nothing to see", list.display());
     if failures.len() > args.limit {
         let left = failures.len() - args.limit;
-        eprintln!("{left} more near-collisions are in {}; see them with --limit {}", list.display(), failures.len());
+        let (list, all) = (list.display(), failures.len());
+        output.note(format_args!("{left} more near-collisions are in {list}; see them with --limit {all}"));
     }
     let drive = |(index, failure): (usize, &FailureRecord)| {
         let key: ReplayKey = failure.replay.parse()?;

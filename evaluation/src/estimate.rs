@@ -1,0 +1,79 @@
+//! How long work takes on two quiet cores, as tasks: the stages that [`Progress`](experiment::progress::Progress) is
+//! told, with seconds. For people: nothing that is computed depends on it.
+
+use experiment::lots::Lot;
+use experiment::settings::Settings;
+use policy::fit::FitSettings;
+use policy::network::NetworkArchitecture;
+
+/// A stage of [`Progress::begin`](experiment::progress::Progress::begin) and how long it takes, seconds.
+pub type Task = (&'static str, f64);
+
+/// Measured on two cores of an AMD EPYC (Zen 3): seconds per run that is collected from, with noise augmentations.
+const COLLECTED_RUN_S: f64 = 0.6;
+/// The same per run driven; networks take longer, planners less.
+const DRIVEN_RUN_S: f64 = 0.25;
+/// The same per labelled rollout, with the answers on held-back samples.
+const ON_POLICY_RUN_S: f64 = 2.5;
+/// Multiply-adds of a network's answer that training gets through per second, both directions counted as one.
+const TRAINED_PER_S: f64 = 1.2e10;
+/// The report of a run, whose worst near-collisions are driven again.
+const REPORT_S: f64 = 15.0;
+
+/// A training of as many iterations as there can be; with behaviour cloning, unless that is taken over.
+pub fn training(settings: &Settings, has_cloning: bool) -> Vec<Task> {
+    let dagger = &settings.dagger;
+    let training = &settings.training;
+    let runs_per_way: f64 = lots(&training.lots, settings)
+        .iter()
+        // Generated lots are driven once.
+        .map(|lot| if lot.is_generated() { 1.0 } else { f64::from(training.trials) })
+        .sum();
+    let collecting_s = runs_per_way * training.directions.len() as f64 * COLLECTED_RUN_S;
+    let fitting_s = |fit: &FitSettings| {
+        // On about as many samples as eight round trips of lot a give.
+        f64::from(fit.steps(50_000)) * fit.batch as f64 * multiply_adds(&dagger.network) / TRAINED_PER_S
+    };
+    let rounds = if has_cloning { 0 } else { 1 }..=dagger.iterations_max;
+    let mut tasks: Vec<Task> = rounds
+        .flat_map(|round| [("collecting", collecting_s), ("training", fitting_s(&dagger.fit_of_round(round)))])
+        .collect();
+    tasks.extend(dagger.final_fit().map(|fit| ("training", fitting_s(&fit))));
+    tasks
+}
+
+/// An evaluation of so many drivers.
+pub fn evaluation(settings: &Settings, drivers: usize) -> Task {
+    let evaluation = &settings.evaluation;
+    let runs = runs(settings, evaluation.trials) * (drivers * evaluation.noise.len()) as f64;
+    ("evaluation", runs * DRIVEN_RUN_S)
+}
+
+/// On-policy rollouts of every policy of two trainings.
+pub fn on_policy(settings: &Settings) -> Task {
+    let policies = 2.0 * f64::from(settings.dagger.iterations_max) + 1.0;
+    ("on-policy rollouts", policies * runs(settings, 1) * ON_POLICY_RUN_S)
+}
+
+/// The report of a run.
+pub fn report() -> Task {
+    ("report", REPORT_S)
+}
+
+/// Runs over the evaluation's lots.
+fn runs(settings: &Settings, trials: u32) -> f64 {
+    let evaluation = &settings.evaluation;
+    lots(&evaluation.lots, settings).len() as f64 * evaluation.directions.len() as f64 * f64::from(trials)
+}
+
+fn lots(specs: &[String], settings: &Settings) -> Vec<Lot> {
+    Lot::parse_all(specs, &settings.episode.vehicle).unwrap_or_default()
+}
+
+fn multiply_adds(network: &NetworkArchitecture) -> f64 {
+    let NetworkArchitecture { conv1, conv2, hidden, .. } = network;
+    let first = 25 * 25 * conv1.kernel.pow(2) * conv1.channels;
+    let second = 12 * 12 * conv2.kernel.pow(2) * conv1.channels * conv2.channels;
+    let dense = 6 * 6 * conv2.channels * hidden;
+    (first + second + dense) as f64
+}

@@ -1,0 +1,157 @@
+//! The reference is complete, and says nothing that is not so.
+
+use super::*;
+use crate::settings::Layers;
+use std::collections::BTreeSet;
+
+fn resolve(change: &str) -> anyhow::Result<Settings> {
+    Settings::resolve(&Layers { overrides: vec![change.to_owned()], ..Layers::default() }, None)
+}
+
+/// Dotted keys of all values.
+fn leaves(settings: &Settings) -> BTreeSet<String> {
+    fn collect(table: &Table, prefix: &str, found: &mut BTreeSet<String>) {
+        for (key, value) in table {
+            let key = format!("{prefix}{key}");
+            match value {
+                Value::Table(section) => collect(section, &format!("{key}."), found),
+                _ => {
+                    found.insert(key);
+                }
+            }
+        }
+    }
+    let mut found = BTreeSet::new();
+    collect(&Table::try_from(settings).unwrap(), "", &mut found);
+    found
+}
+
+/// Every key of every preset and of every variant has an entry, and every entry is such a key.
+#[test]
+fn every_setting_is_described_and_every_description_has_a_setting() {
+    let presets = PRESETS.iter().map(|preset| Settings::preset(preset.name).unwrap());
+    let variants = [
+        "dagger.rule=any_below_literal",
+        "dagger.rule=tau_only",
+        "dagger.rule=expert_only",
+        "dagger.fit.loss.weight=linear",
+        "dagger.fit.budget.epochs=1",
+        "dagger.cloning_budget.epochs=1",
+        "dagger.final_budget.epochs=1",
+    ];
+    let settings = presets.chain(variants.map(|change| resolve(change).unwrap()));
+    let keys: BTreeSet<String> = settings.flat_map(|settings| leaves(&settings)).collect();
+    let described: BTreeSet<String> = entries().iter().map(|entry| entry.key.clone()).collect();
+    assert_eq!(described.len(), entries().len(), "no entry twice");
+    assert_eq!(described.difference(&keys).collect::<Vec<_>>(), Vec::<&String>::new(), "entries without a setting");
+    assert_eq!(keys.difference(&described).collect::<Vec<_>>(), Vec::<&String>::new(), "settings without an entry");
+}
+
+#[test]
+fn every_number_has_a_range_and_is_refused_outside_of_it() {
+    for entry in entries() {
+        let Some(range) = entry.range else { continue };
+        assert!(range.low.value < range.high.value, "{}", entry.key);
+        for wrong in [range.low.value - 1.0, range.high.value * 1.5, f64::NAN] {
+            let change = format!("{}={}", entry.key, if wrong.is_nan() { "nan".to_owned() } else { wrong.to_string() });
+            let Err(error) = resolve(&change) else { panic!("{change} is accepted") };
+            let error = format!("{error:#}");
+            assert!(error.contains(&entry.key), "{change}: {error}");
+        }
+    }
+    let numbers = |settings: &Settings| {
+        let table = Table::try_from(settings).unwrap();
+        leaves(settings).into_iter().filter(move |key| {
+            let value = key.split('.').try_fold(&Value::Table(table.clone()), |value, part| value.get(part)).cloned();
+            matches!(value, Some(Value::Float(_) | Value::Integer(_)))
+        })
+    };
+    for preset in PRESETS {
+        for key in numbers(&Settings::preset(preset.name).unwrap()) {
+            assert!(entry(&key).unwrap().range.is_some() || key.ends_with("seed"), "{key} has a range");
+        }
+    }
+}
+
+/// The words are those that the settings take.
+#[test]
+fn choices_are_those_that_are_read() {
+    for entry in entries().iter().filter(|entry| !entry.choices.is_empty()) {
+        let is_gpu = |choice: &String| ["cuda", "wgpu", "vulkan"].contains(&choice.as_str());
+        for choice in entry.choices.iter().filter(|choice| !is_gpu(choice)) {
+            let value = if entry.key.ends_with("directions") { format!("[\"{choice}\"]") } else { choice.clone() };
+            // Of a variant that is in use.
+            let result = resolve(&format!("{}={value}", entry.key));
+            assert!(result.is_ok(), "{}={value}: {:#}", entry.key, result.unwrap_err());
+        }
+        let error = format!("{:#}", resolve(&format!("{}=no-such-word", entry.key)).unwrap_err());
+        if let Some((_, known)) = error.split_once("there are ") {
+            let known: BTreeSet<&str> = known.split(';').next().unwrap().split(", ").map(str::trim).collect();
+            let named: BTreeSet<&str> =
+                entry.choices.iter().filter(|choice| !is_gpu(choice)).map(String::as_str).collect();
+            assert_eq!(named, known, "{}: {error}", entry.key);
+        }
+    }
+}
+
+#[test]
+fn named_sections_of_the_docs_exist() {
+    let docs = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+    for entry in entries() {
+        let (file, section) = entry.docs.split_once(' ').unwrap();
+        let text = std::fs::read_to_string(docs.join(file)).unwrap();
+        let is_there = text.lines().any(|line| {
+            let heading = line.trim_start_matches('#');
+            heading.len() < line.len() && heading.split_whitespace().next() == Some(section)
+        });
+        assert!(is_there, "{}: no section {section} in docs/{file}", entry.key);
+        let tags = ["paper", "authors' code", "cited", "derived", "chosen"];
+        assert!(tags.iter().any(|tag| entry.source.starts_with(tag)), "{}: {}", entry.key, entry.source);
+    }
+}
+
+#[test]
+fn a_key_is_explained_with_its_value_in_every_preset() {
+    let text = explain("dagger.fit.learning_rate.peak").unwrap();
+    for part in ["Highest learning rate", "range    more than 0, at most 1", "0.001 (default), 0.00001 (paper)", "4.2"]
+    {
+        assert!(text.contains(part), "{part:?} is missing in:\n{text}");
+    }
+    assert!(explain("dagger.eta").unwrap().contains("default  0.9\n"), "presets agree");
+    assert!(explain("dagger.fit").unwrap().contains("dagger.fit.adam.beta1"), "a section");
+    let error = explain("dagger.etta").unwrap_err().to_string();
+    assert!(error.contains("did you mean \"dagger.eta\"?"), "{error}");
+    assert!(explain("dagger.relooks").unwrap_err().to_string().contains("dagger.noise_augmentations"));
+}
+
+#[test]
+fn printed_settings_are_read_again_and_lines_stay_short() {
+    for preset in PRESETS {
+        let settings = Settings::preset(preset.name).unwrap();
+        let all = settings.to_commented_toml();
+        assert_eq!(toml::from_str::<Settings>(&all).unwrap(), settings, "{}", preset.name);
+        let common = settings.common_to_commented_toml();
+        let values = common.lines().filter(|line| line.contains(" = ") && !line.starts_with('#')).count();
+        let comments = common.lines().filter(|line| line.starts_with('#')).count();
+        assert!((15..=25).contains(&values) && comments == values, "{values} values, {comments} comments:\n{common}");
+        let file = std::env::temp_dir().join(format!("xtask-test-{}-{}.toml", std::process::id(), preset.name));
+        std::fs::write(&file, &common).unwrap();
+        let layers = Layers { preset: Some(preset.name.to_owned()), file: Some(file.clone()), overrides: Vec::new() };
+        assert_eq!(Settings::resolve(&layers, None).unwrap(), settings, "{}", preset.name);
+        std::fs::remove_file(file).unwrap();
+        for line in common.lines() {
+            assert!(line.chars().count() <= 120, "{line}");
+        }
+    }
+}
+
+#[test]
+fn every_old_key_leads_to_a_new_one() {
+    let exists = |key: &str| entries().iter().any(|e| e.key == key || e.key.starts_with(&format!("{key}.")));
+    for (old, new) in renamed::RENAMED {
+        assert!(exists(new) && !exists(old), "{old} → {new}");
+    }
+    for (old, _) in renamed::REMOVED {
+        assert!(!exists(old), "{old}");
+    }
+}

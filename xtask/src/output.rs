@@ -1,0 +1,154 @@
+//! What is printed: results on stdout, everything else on stderr. A closed pipe (`| head`) is no error: the work goes on,
+//! and its files are written.
+
+use clap::{ColorChoice, ValueEnum};
+use serde::Serialize;
+use std::fmt::Display;
+use std::io::{self, ErrorKind, IsTerminal as _, Write as _};
+use std::sync::Mutex;
+
+/// Columns of a printed table at most.
+const WIDTH: usize = 100;
+
+/// When to colour.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Color {
+    /// On a terminal, unless the environment variable `NO_COLOR` is set.
+    #[default]
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+impl Color {
+    /// As given on the command line, before that is parsed: clap colours its errors, too.
+    pub(crate) fn from_args() -> Self {
+        let args: Vec<_> = std::env::args().take_while(|arg| arg != "--").collect();
+        let value = args.iter().enumerate().find_map(|(i, arg)| match arg.strip_prefix("--color") {
+            Some("") => args.get(i + 1).map(String::as_str),
+            Some(value) => value.strip_prefix('='),
+            None => None,
+        });
+        value.and_then(|value| Self::from_str(value, false).ok()).unwrap_or_default()
+    }
+
+    pub(crate) fn of_clap(self) -> ColorChoice {
+        match self {
+            Self::Auto => ColorChoice::Auto,
+            Self::Always => ColorChoice::Always,
+            Self::Never => ColorChoice::Never,
+        }
+    }
+
+    fn on_stderr(self) -> bool {
+        match self {
+            Self::Auto => {
+                let is_plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+                !is_plain && io::stderr().is_terminal()
+            }
+            Self::Always => true,
+            Self::Never => false,
+        }
+    }
+}
+
+/// Where commands print.
+#[derive(Debug, Default)]
+pub(crate) struct Output {
+    is_quiet: bool,
+    is_json: bool,
+    /// Why results could not be printed, if not for a closed pipe.
+    failed: Mutex<Option<io::Error>>,
+}
+
+impl Output {
+    pub(crate) fn new(is_quiet: bool, is_json: bool) -> Self {
+        Self { is_quiet, is_json, failed: Mutex::default() }
+    }
+
+    /// Prints a line of a result.
+    pub(crate) fn print(&self, text: impl Display) {
+        let mut stdout = io::stdout().lock();
+        if let Err(error) = writeln!(stdout, "{text}").and_then(|()| stdout.flush())
+            && error.kind() != ErrorKind::BrokenPipe
+            && let Ok(mut failed) = self.failed.lock()
+        {
+            failed.get_or_insert(error);
+        }
+    }
+
+    /// Prints tables, no wider than a terminal; as JSON, if that is asked for.
+    ///
+    /// # Errors
+    /// If the data cannot be written as JSON.
+    pub(crate) fn table(&self, text: impl FnOnce() -> String, data: &impl Serialize) -> anyhow::Result<()> {
+        if self.is_json {
+            self.print(serde_json::to_string(data)?);
+        } else {
+            self.print(report::markdown::fit(&text(), WIDTH));
+        }
+        Ok(())
+    }
+
+    /// Prints names and what they stand for.
+    ///
+    /// # Errors
+    /// As [`Self::table`].
+    pub(crate) fn names(&self, names: &[(&str, &str)]) -> anyhow::Result<()> {
+        #[derive(Serialize)]
+        struct Name<'a> {
+            name: &'a str,
+            about: &'a str,
+        }
+        if !self.is_json {
+            names.iter().for_each(|(name, about)| self.print(format_args!("{name:15} {about}")));
+            return Ok(());
+        }
+        let names: Vec<Name<'_>> = names.iter().map(|&(name, about)| Name { name, about }).collect();
+        self.table(String::new, &names)
+    }
+
+    /// Prints a line for people that is no result: not with `--json`.
+    pub(crate) fn remark(&self, text: impl Display) {
+        if !self.is_json {
+            self.print(text);
+        }
+    }
+
+    /// Says what is going on: not with `--quiet`.
+    pub(crate) fn note(&self, text: impl Display) {
+        if !self.is_quiet {
+            note(text);
+        }
+    }
+
+    pub(crate) fn is_quiet(&self) -> bool {
+        self.is_quiet
+    }
+
+    /// Why results could not be printed.
+    ///
+    /// # Errors
+    /// If they could not, e.g. because the disk is full.
+    pub(crate) fn finish(&self) -> anyhow::Result<()> {
+        let failed = self.failed.lock().ok().and_then(|mut failed| failed.take());
+        failed.map_or(Ok(()), |error| Err(anyhow::Error::new(error).context("results cannot be printed")))
+    }
+}
+
+/// A line on stderr.
+pub(crate) fn note(text: impl Display) {
+    // Nobody to tell if stderr is closed.
+    let _ = writeln!(io::stderr().lock(), "{text}");
+}
+
+/// An error on stderr.
+pub(crate) fn error(text: impl Display) {
+    if Color::from_args().on_stderr() {
+        note(format_args!("\x1b[1;31merror:\x1b[0m {text}"));
+    } else {
+        note(format_args!("error: {text}"));
+    }
+}
