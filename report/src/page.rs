@@ -1,8 +1,9 @@
-//! A report as Markdown with its figures beside it, and as one HTML page that needs nothing else: no script, no font, no
-//! file and no network.
+//! A report as Markdown with its figures beside it, and as one HTML page that loads nothing: no font, no file, nothing
+//! from the network, which its content security policy forbids. Its only script plays pictures; without it they stand
+//! still.
 //!
 //! ```
-//! use xtask::page::{Image, Page};
+//! use report::page::{Image, Page};
 //! let mut page = Page::new("Near-collisions");
 //! page.section("Rates", "| driver | per 100 m |\n|---|---|\n| expert | 0.00 |");
 //! page.figure("rates", "Rates with intervals of 95 %.", Image::Svg("<svg viewBox='0 0 1 1'/>".to_owned()));
@@ -15,6 +16,8 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use experiment::run_dir::write_whole;
 use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd, html};
+use sha2::{Digest as _, Sha256};
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -35,6 +38,55 @@ pub enum Image {
     Svg(String),
     /// The bytes of a PNG file.
     Png(Vec<u8>),
+    /// Pictures to be played.
+    Player(Player),
+}
+
+/// Pictures over one background, with a button and a slider; a still where no script runs.
+#[derive(Debug, Clone)]
+pub struct Player {
+    /// Width and height.
+    pub size_px: [f32; 2],
+    /// SVG elements under every picture.
+    pub background: String,
+    /// What is written beside the slider, and SVG elements.
+    pub frames: Vec<(String, String)>,
+    /// The picture that is shown first, and where no script runs.
+    pub still: usize,
+    /// Pictures per second.
+    pub rate_per_s: f32,
+}
+
+impl Player {
+    fn svg(&self, frames: &str) -> String {
+        let [width, height] = self.size_px;
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\">\n{}{frames}</svg>\n",
+            self.background
+        )
+    }
+
+    /// The still as a file.
+    fn to_svg(&self) -> String {
+        self.svg(self.frames.get(self.still).map_or("", |(_, elements)| elements.as_str()))
+    }
+
+    fn to_html(&self) -> String {
+        let mut frames = String::new();
+        for (index, (label, elements)) in self.frames.iter().enumerate() {
+            let display = if index == self.still { "" } else { " display=\"none\"" };
+            let _ = write!(frames, "<g class=\"frame\" data-label=\"{}\"{display}>\n{elements}</g>\n", escaped(label));
+        }
+        format!(
+            "<div class=\"player\" data-period-ms=\"{:.0}\">{}<div class=\"controls\" hidden>\
+             <button type=\"button\">Play</button>\
+             <input type=\"range\" min=\"0\" max=\"{}\" value=\"{}\" aria-label=\"time\"><output></output></div></div>",
+            1000.0 / self.rate_per_s,
+            self.svg(&frames),
+            self.frames.len().saturating_sub(1),
+            self.still
+        )
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -83,7 +135,7 @@ impl Page {
             if let Part::Figure { name, image, .. } = part {
                 std::fs::create_dir_all(&figures)
                     .with_context(|| format!("{}: cannot be created; is the folder writable?", figures.display()))?;
-                write_whole(&folder.join(image.path(name)), image.bytes())?;
+                write_whole(&folder.join(image.path(name)), &image.bytes())?;
             }
         }
         write_whole(&folder.join(format!("{stem}.md")), self.to_markdown().as_bytes())?;
@@ -125,10 +177,19 @@ impl Page {
             };
         }
         let title = escaped(&self.title);
+        let plays = self.parts.iter().any(|part| matches!(part, Part::Figure { image: Image::Player(_), .. }));
+        let (policy, script) = if plays {
+            let hash = BASE64_STANDARD.encode(Sha256::digest(SCRIPT));
+            (format!("; script-src 'sha256-{hash}'"), format!("<script>{SCRIPT}</script>\n"))
+        } else {
+            (String::new(), String::new())
+        };
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
-             <style>{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
+             style-src 'unsafe-inline'{policy}\">\n<title>{title}</title>\n\
+             <style>{STYLE}</style>\n</head>\n<body>\n{body}{script}</body>\n</html>\n"
         )
     }
 
@@ -147,16 +208,17 @@ impl Image {
     /// Of a picture of this name, relative to the Markdown.
     fn path(&self, name: &str) -> String {
         let ending = match self {
-            Self::Svg(_) => "svg",
+            Self::Svg(_) | Self::Player(_) => "svg",
             Self::Png(_) => "png",
         };
         format!("{FIGURES}/{name}.{ending}")
     }
 
-    fn bytes(&self) -> &[u8] {
+    fn bytes(&self) -> Cow<'_, [u8]> {
         match self {
-            Self::Svg(text) => text.as_bytes(),
-            Self::Png(bytes) => bytes,
+            Self::Svg(text) => text.as_bytes().into(),
+            Self::Png(bytes) => bytes.into(),
+            Self::Player(player) => player.to_svg().into_bytes().into(),
         }
     }
 
@@ -167,6 +229,7 @@ impl Image {
             Self::Png(bytes) => {
                 format!("<img alt=\"\" src=\"data:image/png;base64,{}\">", BASE64_STANDARD.encode(bytes))
             }
+            Self::Player(player) => player.to_html(),
         }
     }
 }
@@ -190,6 +253,35 @@ fn escaped(text: &str) -> String {
     html::push_html(&mut out, std::iter::once(Event::Text(text.into())));
     out
 }
+
+/// Button and slider of every player.
+const SCRIPT: &str = "
+for (const player of document.querySelectorAll('.player')) {
+  const frames = player.querySelectorAll('.frame');
+  const controls = player.querySelector('.controls');
+  const [button, slider, label] = controls.children;
+  let timer = null;
+  const show = (index) => {
+    frames.forEach((frame, i) => frame.setAttribute('display', i === index ? 'inline' : 'none'));
+    slider.value = index;
+    label.value = frames[index].dataset.label;
+  };
+  const stop = () => { clearInterval(timer); timer = null; button.textContent = 'Play'; };
+  const step = () => {
+    const next = Number(slider.value) + 1;
+    if (next < frames.length) { show(next); } else { stop(); }
+  };
+  button.addEventListener('click', () => {
+    if (timer !== null) { stop(); return; }
+    if (Number(slider.value) + 1 >= frames.length) { show(0); }
+    timer = setInterval(step, Number(player.dataset.periodMs));
+    button.textContent = 'Pause';
+  });
+  slider.addEventListener('input', () => { stop(); show(Number(slider.value)); });
+  controls.hidden = false;
+  show(Number(slider.value));
+}
+";
 
 /// Screens from 320 px, and paper.
 const STYLE: &str = "

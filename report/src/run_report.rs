@@ -348,10 +348,10 @@ fn add_moments(page: &mut Page, folder: &Path, settings: &Settings, evaluation: 
         let caption = format!(
             "Trial {trial}, noise {noise}, tick {tick}, {route_m:.1} m along the route, at {speed_mps:.2} m/s: {cause}."
         );
-        let drawn = if progress.is_cancelled() { None } else { Some(moments::picture(&failure.replay, settings)) };
+        let drawn = if progress.is_cancelled() { None } else { Some(moments::player(&failure.replay, settings)) };
         match drawn {
-            Some(Ok(png)) => {
-                page.figure(format!("near-collision-{index}"), caption, Image::Png(png));
+            Some(Ok(player)) => {
+                page.figure(format!("near-collision-{index}"), caption, Image::Player(player));
             }
             Some(Err(error)) => {
                 page.text(format!("{caption} It could not be driven again: {error:#}."));

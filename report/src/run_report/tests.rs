@@ -70,7 +70,7 @@ fn commands_can_be_pasted_into_a_shell() {
 #[test]
 fn a_near_collision_is_driven_again_to_the_tick() {
     let settings = Settings::preset("default").unwrap();
-    let missed = moments::picture("tentacle@lot-b@forward@0@paper@1@3", &settings).unwrap_err().to_string();
+    let missed = moments::player("tentacle@lot-b@forward@0@paper@1@3", &settings).unwrap_err().to_string();
     assert!(missed.contains("it does not happen"), "{missed}");
-    assert!(moments::picture("nobody@lot-b@forward@0@paper@1@3", &settings).is_err());
+    assert!(moments::player("nobody@lot-b@forward@0@paper@1@3", &settings).is_err());
 }

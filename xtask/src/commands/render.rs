@@ -1,6 +1,7 @@
 //! `render`: pictures of lots, drives, samples and noise.
 
 use super::evaluate;
+use super::render_animation::{self, AnimationArgs};
 use crate::args::{LayerArgs, OneDirection, noise_levels};
 use crate::console::Console;
 use anyhow::{Context as _, ensure};
@@ -39,6 +40,8 @@ Examples:
   cargo xtask render trajectories --driver expert --driver run:runs/NAME --lots lot-b
   cargo xtask render trajectories --driver expert --lots lot-a --by speed
   cargo xtask render trajectories --run runs/NAME --round 1
+  cargo xtask render animation --driver expert --driver run:runs/NAME --lots lot-b
+  cargo xtask render animation 'tentacle@lot-b@forward@0@paper@1@842'
   cargo xtask render samples runs/NAME/round-01 --count 8
   cargo xtask render noise --lots lot-a --noise paper,hard
   cargo xtask render report runs/NAME";
@@ -63,6 +66,8 @@ pub(crate) enum RenderWhat {
     Lot(RenderLotArgs),
     /// The lines drivers drove over a lot, PNG and SVG.
     Trajectories(TrajectoriesArgs),
+    /// Drives that move: lot and grids side by side, GIF or APNG.
+    Animation(AnimationArgs),
     /// Many lots on one page, PNG and SVG.
     ContactSheet(RenderLotArgs),
     /// Samples of a round's data set with labels and predictions, PNG.
@@ -175,6 +180,7 @@ pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
         RenderWhat::Lot(what) => render_lots(what, &output),
         RenderWhat::ContactSheet(what) => contact_sheet(what, &output),
         RenderWhat::Trajectories(what) => render_trajectories(what, &output),
+        RenderWhat::Animation(what) => render_animation::run(what, &output),
         RenderWhat::Samples(what) => render_samples(what, &output),
         RenderWhat::Noise(what) => render_noise(what, &output),
         RenderWhat::Report(what) => render_report(&what.run),
@@ -182,7 +188,7 @@ pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
 }
 
 /// Where pictures go.
-struct Output<'a> {
+pub(super) struct Output<'a> {
     folder: &'a Path,
     overwrite: bool,
 }
@@ -190,23 +196,34 @@ struct Output<'a> {
 impl Output<'_> {
     /// Writes a picture as PNG, and as SVG where it is made of lines.
     fn write(&self, name: &str, drawing: &Drawing, is_vector: bool) -> anyhow::Result<()> {
+        let mut files = vec![(self.path(name, "png")?, drawing.to_png()?)];
+        if is_vector {
+            files.push((self.path(name, "svg")?, drawing.to_svg().into_bytes()));
+        }
+        files.iter().try_for_each(|(path, content)| Self::write_file(path, content))
+    }
+
+    /// Where a file will be. Asked before work begins that would be lost if it could not be written.
+    ///
+    /// # Errors
+    /// If it is there already, or its folder cannot be made.
+    pub(super) fn path(&self, name: &str, extension: &str) -> anyhow::Result<PathBuf> {
         let folder = self.folder;
         std::fs::create_dir_all(folder)
             .with_context(|| format!("{}: cannot be created; choose another --out", folder.display()))?;
-        let name = file_name(name);
-        let mut files = vec![(folder.join(format!("{name}.png")), drawing.to_png()?)];
-        if is_vector {
-            files.push((folder.join(format!("{name}.svg")), drawing.to_svg().into_bytes()));
-        }
-        for (path, content) in files {
-            ensure!(
-                self.overwrite || !path.exists(),
-                "{}: exists already; choose another --out, or replace it with --overwrite",
-                path.display()
-            );
-            write_whole(&path, &content)?;
-            println!("{}: {} kB", path.display(), content.len().div_ceil(1000));
-        }
+        let path = folder.join(format!("{}.{extension}", file_name(name)));
+        ensure!(
+            self.overwrite || !path.exists(),
+            "{}: exists already; choose another --out, or replace it with --overwrite",
+            path.display()
+        );
+        Ok(path)
+    }
+
+    /// Writes a file and says so.
+    pub(super) fn write_file(path: &Path, content: &[u8]) -> anyhow::Result<()> {
+        write_whole(path, content)?;
+        println!("{}: {} kB", path.display(), content.len().div_ceil(1000));
         Ok(())
     }
 }
