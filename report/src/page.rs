@@ -380,7 +380,8 @@ pre code { padding: 0; }
   td, td:last-child { display: flex; justify-content: space-between; gap: 1rem; padding: 0; border: 0;
     white-space: normal; text-align: right; overflow-wrap: anywhere; }
   td::before { content: attr(data-label); color: var(--soft); text-align: left; overflow-wrap: normal; }
-  td:first-child { font-weight: 600; } td:empty { display: none; } }
+  td:first-child { font-weight: 600; justify-content: start; text-align: left; }
+  td:first-child::before, td:empty { display: none; } }
 @media print { :root { color-scheme: light; } body { max-width: none; padding: 0; font-size: 10pt; background: #fff;
   color: #000; } nav, .controls { display: none; }
   .scroll { overflow: visible; } table { font-size: 7.5pt; } th, td { white-space: normal; padding: .15rem .3rem; }
