@@ -9,8 +9,8 @@
 
 use crate::bench::root;
 use expert::{ExpertSettings, ScriptedExpert};
-use planners::{Baseline, PlannerContext};
-use policy::network::{DeviceChoice, LookAheadNetConfig, Predictor, Weights};
+use planners::{PlannerContext, PlannerSpec};
+use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Predictor, Weights};
 use scenarios::reference::{ReferenceLot, lot};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
@@ -169,10 +169,9 @@ impl Policy for Untrained {
 
 fn drivers(settings: &EpisodeSettings) -> Vec<(&'static str, Box<dyn Driver>)> {
     let geometry = settings.sensing.geometry;
-    let tentacle = Baseline::all().into_iter().find(|planner| planner.name() == "tentacle").unwrap();
-    let config = LookAheadNetConfig { mirror_averaging: false, ..LookAheadNetConfig::compact() };
-    let weights = Weights::init(config, RootSeed(1), 0);
-    let untrained = Untrained(Predictor::new(weights, DeviceChoice::Cpu), geometry);
+    let tentacle = PlannerSpec::all().into_iter().find(|planner| planner.name() == "tentacle").unwrap();
+    let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
+    let untrained = Untrained(Predictor::new(weights, InferenceSettings::plain(), DeviceChoice::Cpu), geometry);
     vec![
         ("middle of the row", Box::new(SensorsOnly(MiddleOfTheRow(geometry)))),
         ("expert", Box::new(ScriptedExpert::new(ExpertSettings::paper(), settings))),

@@ -10,6 +10,7 @@
 //! | [`goldens`] | digests of episodes, by layer |
 //! | [`planners`] | model-based planners: naming, parameter files, tuning |
 //! | [`regressions`] | what once went wrong, named by symptom |
+//! | [`python`] | the Python of docs/formats.md answers as Rust does |
 //! | [`reproduce`] | the paper in a box: its report, resumed to the same bytes |
 #![allow(clippy::unwrap_used, reason = "tests")]
 
@@ -21,6 +22,7 @@ mod formats;
 mod goldens;
 mod import_graph;
 mod planners;
+mod python;
 mod regressions;
 mod reproduce;
 mod tidy;

@@ -13,15 +13,13 @@ use experiment::settings::Settings;
 use experiment::trials::{self, Purpose, Trial};
 use experiment::{drive, drivers};
 use policy::checkpoint::Checkpoint;
-use policy::dagger::{Collected, GatedCollector, Keep};
+use policy::dagger::{Collected, Rollouts, RoundEpisode};
 use policy::dataset::store::Store;
 use policy::dataset::{Dataset, Sample, Split, ValidationSplit};
-use policy::decision_rule::{DecisionRule, Evidence};
-use policy::network::Predictor;
+use policy::decision_rule::Evidence;
 use serde::{Deserialize, Serialize};
-use sim::batch::run_lockstep;
-use sim::driver::Driver;
-use sim::seed::RootSeed;
+use sim::episode::Episode;
+use sim::seed::{EpisodeIndex, RootSeed};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -130,7 +128,7 @@ pub fn run(settings: &Settings, root: &Path, run: &RunDir, progress: &dyn Progre
     let weighted = Trained::open(&folder(Chain::Weighted))?;
     let unweighted = Trained::open(&folder(Chain::Unweighted))?;
     let iterations = weighted.iterations().min(unweighted.iterations());
-    let by = settings.dagger.fit_iteration.validation;
+    let by = settings.dagger.fit.validation;
     let mut drives = Drives::new(settings, 3 + 2 * iterations, progress);
     let mut calibration = Vec::new();
     for (name, path, chain, rounds) in [
@@ -152,7 +150,7 @@ pub fn run(settings: &Settings, root: &Path, run: &RunDir, progress: &dyn Progre
         for (index, chain) in [&weighted, &unweighted].into_iter().enumerate() {
             let path = chain.store.round_folder(iteration);
             let Some(driven) = drives.of(&path)? else { return Ok(false) };
-            driving_per_s[index] = tau_hat_per_s(settings, driven);
+            driving_per_s[index] = tau_hat_per_s(driven);
             sums[index] = tau_hats(settings, &Checkpoint::load(&path)?, &samples);
         }
         let held_back = ratio(&sums, by.block, settings.evaluation.seed);
@@ -204,25 +202,22 @@ fn rollout(settings: &Settings, policy: &Checkpoint) -> anyhow::Result<Collected
         Trial::all(evaluation.seed, Purpose::Evaluation, &lots, 1, &evaluation.directions).collect();
     let maps = trials::maps(&trials, &settings.episode)?;
     let episodes = drive::start(&trials, &maps, &settings.episode, settings.training.noise);
-    let expert = |_| Box::new(drivers::expert(&settings.expert, &settings.episode)) as Box<dyn Driver + Send>;
-    let experts = (0..episodes.len()).map(expert).collect();
-    let novice = Predictor::new(policy.weights.clone(), settings.dagger.device);
-    // Every discrepancy is below infinity: the network drives, always.
-    let rule = DecisionRule::TauOnly { tau: f32::INFINITY };
-    let mut collector = GatedCollector::new(Some(novice), experts, rule, Keep::EveryTick, policy.geometry);
-    run_lockstep(episodes, &mut collector, &mut |_, _| {});
-    Ok(collector.into_collected())
+    let seated = |((index, trial), episode): ((EpisodeIndex, &Trial<'_>), Episode)| {
+        let expert = Box::new(drivers::expert(&settings.expert, &settings.episode));
+        RoundEpisode { index, direction: trial.direction, episode, expert }
+    };
+    let episodes = EpisodeIndex::of_round(0, trials.len()).zip(&trials).zip(episodes).map(seated).collect();
+    Ok(Rollouts::on_policy(policy, settings.dagger.device, episodes).drive(&mut |_, _| {}))
 }
 
-fn tau_hat_per_s(settings: &Settings, collected: &Collected) -> f64 {
-    let seconds = collected.n_tot as f64 * f64::from(settings.episode.control_period_s());
-    collected.tau_hat_sum / seconds.max(f64::MIN_POSITIVE)
+fn tau_hat_per_s(collected: &Collected) -> f64 {
+    collected.tau_hat_sum / collected.driven_s.max(f64::MIN_POSITIVE)
 }
 
 /// τ̂ of a policy on samples.
 fn tau_hats(settings: &Settings, policy: &Checkpoint, samples: &[Sample]) -> Vec<f64> {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
-    let predictions = Predictor::new(policy.weights.clone(), settings.dagger.device).predict(&grids);
+    let predictions = policy.predictor(settings.dagger.device).predict(&grids);
     let of = |(sample, prediction): (&Sample, _)| f64::from(Evidence::new(prediction, sample.label).discrepancy);
     samples.iter().zip(&predictions).map(of).collect()
 }

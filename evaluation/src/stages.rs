@@ -15,11 +15,10 @@
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::settings::Settings;
-use planners::Baseline;
-use policy::dagger::DaggerSettings;
+use planners::PlannerSpec;
 use policy::decision_rule::{ChiOn, DecisionRule};
 use policy::fit::FitSettings;
-use policy::network::LookAheadNetConfig;
+use policy::network::NetworkArchitecture;
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
 use std::path::Path;
@@ -109,7 +108,7 @@ impl Chain {
         match self {
             Self::Weighted => {}
             Self::Unweighted => {
-                fits_mut(dagger).for_each(|fit| fit.loss.alpha = 0.0);
+                dagger.fit.loss.alpha = 0.0;
             }
             Self::AnyBelow => dagger.rule = DecisionRule::AnyBelowLiteral { tau, chi, chi_on: chi_on(&dagger.rule) },
             Self::TauOnly => dagger.rule = DecisionRule::TauOnly { tau },
@@ -142,10 +141,6 @@ fn chi_on(rule: &DecisionRule) -> ChiOn {
         DecisionRule::AllBelow { chi_on, .. } | DecisionRule::AnyBelowLiteral { chi_on, .. } => chi_on,
         DecisionRule::TauOnly { .. } | DecisionRule::ExpertOnly => ChiOn::default(),
     }
-}
-
-fn fits_mut(dagger: &mut DaggerSettings) -> impl Iterator<Item = &mut FitSettings> {
-    [&mut dagger.fit_cloning, &mut dagger.fit_iteration].into_iter().chain(dagger.fit_final.as_mut())
 }
 
 /// Root seeds of the trainings.
@@ -185,7 +180,7 @@ pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     }
     let own = |name: &str| (name.to_owned(), name.to_owned());
     let tuned: Vec<_> = extent.tuned.iter().map(|spec| (tuned_name(spec), spec.clone())).collect();
-    let planners: Vec<_> = Baseline::all().iter().map(|planner| own(planner.name())).collect();
+    let planners: Vec<_> = PlannerSpec::all().iter().map(|planner| own(planner.name())).collect();
     // Where a planner has been tuned, only the paper's two take part as they are, too: the others stand for nothing.
     let is_tuned = |name: &str| tuned.iter().any(|(tuned, _)| *tuned == tuned_name(name));
     let enough = planners.iter().filter(|(name, _)| name == "tentacle" || name == "vvf" || !is_tuned(name)).cloned();
@@ -266,11 +261,11 @@ impl Stage {
             Step::Train { cloning_of } => {
                 let (steps, clonings) = match cloning_of {
                     Some(_) => (0.0, 0.0),
-                    None => (samples(&dagger.fit_cloning), 1.0),
+                    None => (samples(&dagger.cloning_fit()), 1.0),
                 };
                 let collected =
                     (rounds + clonings) * runs(&training.lots, training.directions.len(), training.trials, true);
-                let trained = steps + rounds * samples(&dagger.fit_iteration);
+                let trained = steps + rounds * samples(&dagger.fit);
                 collected * COLLECTED_RUN_S + trained * multiply_adds(&dagger.network) / TRAINED_PER_S
             }
             Step::Drive { drivers } => {
@@ -290,8 +285,8 @@ fn samples(fit: &FitSettings) -> f64 {
     f64::from(fit.steps(50_000)) * fit.batch as f64
 }
 
-fn multiply_adds(network: &LookAheadNetConfig) -> f64 {
-    let LookAheadNetConfig { conv1, conv2, hidden, .. } = network;
+fn multiply_adds(network: &NetworkArchitecture) -> f64 {
+    let NetworkArchitecture { conv1, conv2, hidden, .. } = network;
     let first = 25 * 25 * conv1.kernel.pow(2) * conv1.channels;
     let second = 12 * 12 * conv2.kernel.pow(2) * conv1.channels * conv2.channels;
     let dense = 6 * 6 * conv2.channels * hidden;
@@ -313,12 +308,12 @@ mod tests {
         let of = |folder: &str| stages.iter().find(|stage| stage.folder == folder).unwrap().settings.dagger.clone();
         assert_eq!(of("chains/s1-weighted"), settings.dagger);
         let mut unweighted = of("chains/s1-unweighted");
-        assert_eq!(unweighted.fit_iteration.loss.alpha, 0.0);
-        fits_mut(&mut unweighted).for_each(|fit| fit.loss.alpha = 1.5);
+        assert_eq!(unweighted.fit.loss.alpha, 0.0);
+        unweighted.fit.loss.alpha = 1.5;
         assert_eq!(unweighted, settings.dagger);
         let any = of("chains/s1-any-below");
         assert_eq!(any.rule, DecisionRule::AnyBelowLiteral { tau: 0.07, chi: 0.1, chi_on: ChiOn::StdPerAxis });
-        assert_eq!((any.iterations_max, any.fit_iteration), (1, settings.dagger.fit_iteration.clone()));
+        assert_eq!((any.iterations_max, any.fit), (1, settings.dagger.fit.clone()));
         assert_eq!(of("chains/s1-tau-only").rule, DecisionRule::TauOnly { tau: 0.07 });
     }
 
@@ -348,7 +343,7 @@ mod tests {
     #[test]
     fn the_default_budget_is_half_an_hour() {
         let settings = Settings::preset("default").unwrap();
-        let tuned = Baseline::all().iter().map(|planner| format!("{}:x.toml", planner.name())).collect();
+        let tuned = PlannerSpec::all().iter().map(|planner| format!("{}:x.toml", planner.name())).collect();
         let stages = all(&settings, &Extent { tuned, ..extent() }, Path::new("R"));
         let minutes = stages.iter().map(Stage::estimate_s).sum::<f64>() / 60.0;
         assert!((15.0..30.0).contains(&minutes), "{minutes:.1} minutes");

@@ -15,7 +15,7 @@ use experiment::progress::Progress;
 use experiment::run_dir::RunDir;
 use experiment::settings::{NoiseChoice, Settings};
 use experiment::trials::{self, Purpose, Trial};
-use planners::Baseline;
+use planners::PlannerSpec;
 use planners::search::{GENERATION, Search};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ const FINALISTS: usize = 4;
 /// If a lot is not for training or cannot be driven, or a file cannot be written.
 pub fn tune(
     settings: &Settings,
-    planners: &[Baseline],
+    planners: &[PlannerSpec],
     budget: usize,
     run: &RunDir,
     progress: &dyn Progress,
@@ -77,17 +77,17 @@ pub fn check(lots: &[Lot]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The planners of these names, in the order of [`Baseline::all`]; all if none is named.
+/// The planners of these names, in the order of [`PlannerSpec::all`]; all if none is named.
 ///
 /// # Errors
 /// If nothing is named so.
-pub fn planners_named(names: &[String]) -> anyhow::Result<Vec<Baseline>> {
-    let all = Baseline::all();
+pub fn planners_named(names: &[String]) -> anyhow::Result<Vec<PlannerSpec>> {
+    let all = PlannerSpec::all();
     for name in names {
-        let known: Vec<&str> = all.iter().map(Baseline::name).collect();
+        let known: Vec<&str> = all.iter().map(PlannerSpec::name).collect();
         ensure!(known.contains(&name.as_str()), "no planner {name:?}; there are {}", known.join(", "));
     }
-    let is_wanted = |planner: &Baseline| names.is_empty() || names.iter().any(|name| name == planner.name());
+    let is_wanted = |planner: &PlannerSpec| names.is_empty() || names.iter().any(|name| name == planner.name());
     Ok(all.into_iter().filter(is_wanted).collect())
 }
 
@@ -123,9 +123,9 @@ impl<'a> Course<'a> {
     }
 
     /// Drives a stretch with every candidate, in parallel; sums come in the order of the candidates.
-    fn drive(&self, candidates: &[Baseline], stretch: &Stretch<'_>, on_run: &(dyn Fn() + Sync)) -> Vec<Totals> {
+    fn drive(&self, candidates: &[PlannerSpec], stretch: &Stretch<'_>, on_run: &(dyn Fn() + Sync)) -> Vec<Totals> {
         let starts: Vec<Episode> = drive::start(&stretch.trials, &stretch.maps, self.episode, self.noise);
-        let drive = |candidate: &Baseline| {
+        let drive = |candidate: &PlannerSpec| {
             let driver = &NamedDriver::planner(candidate.clone());
             let (trials, maps) = (&stretch.trials, &stretch.maps);
             let batch = TrialBatch { episode: self.episode, driver, trials, maps, noise: self.noise };
@@ -154,7 +154,7 @@ fn rank(totals: &Totals) -> (u32, u32, u32, i64) {
 #[derive(Debug, Clone)]
 pub struct Found {
     /// The planner with the parameters found.
-    pub planner: Baseline,
+    pub planner: PlannerSpec,
     budget: usize,
     seed: RootSeed,
     /// Whether nothing better than the starting point was found.
@@ -210,7 +210,7 @@ fn round(value: f64) -> f64 {
 /// Searches around one planner; `None` if cancelled.
 fn search(
     course: &Course<'_>,
-    start: &Baseline,
+    start: &PlannerSpec,
     budget: usize,
     seed: RootSeed,
     progress: &dyn Progress,
@@ -223,7 +223,7 @@ fn search(
     };
     // The same draws for every planner, as far as their dimensions allow.
     let mut search = Search::new(start.to_unit_cube(), budget, seed, 0);
-    let mut tried: Vec<(Vec<f32>, Baseline, Totals)> = Vec::with_capacity(budget);
+    let mut tried: Vec<(Vec<f32>, PlannerSpec, Totals)> = Vec::with_capacity(budget);
     loop {
         let best = tried.iter().min_by_key(|(_, _, totals)| rank(totals));
         let share = runs_done.load(Ordering::Relaxed) as f64 / runs_all as f64;
@@ -238,7 +238,7 @@ fn search(
         }
         // The starting point is driven as it is: its parameters may lie outside the ranges.
         let candidate = |point: &Vec<f32>| start.at(point);
-        let mut candidates: Vec<Baseline> = generation.iter().map(candidate).collect();
+        let mut candidates: Vec<PlannerSpec> = generation.iter().map(candidate).collect();
         if tried.is_empty() {
             candidates[0] = start.clone();
         }
@@ -251,7 +251,7 @@ fn search(
     order.sort_by_key(|&index| rank(&tried[index].2));
     order.truncate(finalists_max - 1);
     order.insert(0, 0);
-    let finalists: Vec<Baseline> = order.iter().map(|&index| tried[index].1.clone()).collect();
+    let finalists: Vec<PlannerSpec> = order.iter().map(|&index| tried[index].1.clone()).collect();
     let fresh = course.drive(&finalists, &course.fresh, &on_run);
     let together: Vec<Totals> = order
         .iter()

@@ -3,7 +3,7 @@
 use crate::run_dir;
 use anyhow::{Context as _, bail, ensure};
 use expert::{ExpertSettings, ScriptedExpert};
-use planners::{Baseline, Planner, PlannerContext};
+use planners::{Planner, PlannerContext, PlannerSpec};
 use policy::checkpoint::Checkpoint;
 use policy::drivers::NetFleet;
 use policy::network::DeviceChoice;
@@ -68,7 +68,7 @@ pub fn specs() -> Vec<(&'static str, &'static str)> {
         ("run:DIR/bc", "its policy after behaviour cloning"),
         ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
     ];
-    specs.extend(Baseline::all().iter().map(|planner| (planner.name(), planner.about())));
+    specs.extend(PlannerSpec::all().iter().map(|planner| (planner.name(), planner.about())));
     specs.push(("tuned:NAME", "one of these planners with parameters found by cargo xtask tune (planners/tuned/)"));
     specs.push(("NAME:FILE", "one of these planners with parameters from a TOML file (cargo xtask tune writes them)"));
     specs
@@ -83,7 +83,7 @@ impl FromStr for DriverSpec {
     type Err = anyhow::Error;
 
     fn from_str(text: &str) -> anyhow::Result<Self> {
-        let is_planner = |name: &str| Baseline::all().iter().any(|planner| planner.name() == name);
+        let is_planner = |name: &str| PlannerSpec::all().iter().any(|planner| planner.name() == name);
         let planner = |name: &str, parameters| Ok(Self::Planner { name: name.to_owned(), parameters });
         match text.split_once(':') {
             None if text == "expert" => Ok(Self::Expert),
@@ -190,7 +190,7 @@ pub struct NamedDriver {
 enum Model {
     Expert(ExpertSettings),
     Network(Box<Checkpoint>, DeviceChoice),
-    Planner(Baseline),
+    Planner(PlannerSpec),
 }
 
 impl NamedDriver {
@@ -217,7 +217,7 @@ impl NamedDriver {
     }
 
     /// A planner with parameters of the caller's.
-    pub fn planner(planner: Baseline) -> Self {
+    pub fn planner(planner: PlannerSpec) -> Self {
         let name = planner.name().to_owned();
         let spec = DriverSpec::Planner { name: name.clone(), parameters: Parameters::Published };
         Self { name, spec, model: Model::Planner(planner) }
@@ -268,7 +268,7 @@ impl NamedDriver {
     pub fn fleet(&self, episode: &EpisodeSettings, cars: usize) -> Box<dyn Fleet> {
         match &self.model {
             Model::Expert(settings) => Box::new(OneEach((0..cars).map(|_| expert(settings, episode)).collect())),
-            Model::Network(checkpoint, device) => Box::new(NetFleet::new((**checkpoint).clone(), *device)),
+            Model::Network(checkpoint, device) => Box::new(NetFleet::new(checkpoint, *device)),
             Model::Planner(planner) => {
                 let planner = planner.planner(&PlannerContext::of(episode));
                 Box::new(OneEach(vec![SensorsOnly(planner); cars]))
@@ -314,9 +314,9 @@ impl PlannerFile {
     }
 }
 
-fn published(name: &str) -> anyhow::Result<Baseline> {
-    let planners = Baseline::all();
-    let names: Vec<&str> = planners.iter().map(Baseline::name).collect();
+fn published(name: &str) -> anyhow::Result<PlannerSpec> {
+    let planners = PlannerSpec::all();
+    let names: Vec<&str> = planners.iter().map(PlannerSpec::name).collect();
     let known = names.join(", ");
     planners
         .into_iter()
@@ -324,7 +324,7 @@ fn published(name: &str) -> anyhow::Result<Baseline> {
         .with_context(|| format!("no planner {name:?}; there are {known}"))
 }
 
-fn planner(name: &str, parameters: &Parameters) -> anyhow::Result<Baseline> {
+fn planner(name: &str, parameters: &Parameters) -> anyhow::Result<PlannerSpec> {
     let planner = published(name)?;
     match parameters {
         Parameters::Published => Ok(planner),
@@ -344,7 +344,7 @@ fn planner(name: &str, parameters: &Parameters) -> anyhow::Result<Baseline> {
 }
 
 /// A planner with the parameters in the text of a [`PlannerFile`].
-fn with_parameters(planner: &Baseline, text: &str) -> anyhow::Result<Baseline> {
+fn with_parameters(planner: &PlannerSpec, text: &str) -> anyhow::Result<PlannerSpec> {
     let file: PlannerFile = toml::from_str(text)?;
     let name = planner.name();
     ensure!(file.planner == name, "these are parameters of {:?}, but {name:?} is asked for", file.planner);

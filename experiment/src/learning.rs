@@ -111,12 +111,7 @@ pub fn read(folder: &Path, name: &str) -> anyhow::Result<Option<LearningCurve>> 
 /// # Errors
 /// If the file is not what it should be.
 pub fn report(folder: &Path) -> anyhow::Result<Option<FitReport>> {
-    let path = folder.join("fit.toml");
-    if !path.is_file() {
-        return Ok(None);
-    }
-    let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-    toml::from_str(&text).map(Some).with_context(|| path.display().to_string())
+    Ok(FitReport::read(folder)?)
 }
 
 #[cfg(test)]

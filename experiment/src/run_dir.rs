@@ -57,6 +57,9 @@ pub struct Manifest {
     pub threads: usize,
     /// Architecture and operating system.
     pub target: String,
+    /// The processor, if known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub processor: Option<String>,
 }
 
 /// The version of `manifest.toml` that this program writes.
@@ -75,6 +78,8 @@ pub struct Build {
     pub git_dirty: Option<bool>,
     /// The compiler.
     pub rustc_version: String,
+    /// The processor that it runs on, if known.
+    pub processor: Option<String>,
 }
 
 /// Where a run goes.
@@ -291,6 +296,7 @@ impl Manifest {
             rustc_version: build.rustc_version.clone(),
             threads: rayon::current_num_threads(),
             target: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
+            processor: build.processor.clone(),
         }
     }
 
@@ -374,7 +380,8 @@ mod tests {
         assert!(message(policy_folder(&path)).contains("no network"));
         let settings = Settings::preset("smoke").unwrap();
         let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
-        let checkpoint = Checkpoint { weights, geometry: settings.dagger.geometry };
+        let checkpoint =
+            Checkpoint { weights, geometry: settings.episode.sensing.geometry, inference: settings.dagger.inference };
         for round in ["round-00", "round-01", "round-10"] {
             checkpoint.save(&path.join(round)).unwrap();
         }

@@ -3,19 +3,24 @@
 use crate::drivers;
 use crate::lots::Lot;
 use crate::progress::{Elapsed, Progress};
-use crate::run_dir::RunDir;
+use crate::run_dir::{self, RunDir};
 use crate::settings::Settings;
 use crate::trials::{self, Purpose, Trial};
 use crate::{drive, learning};
-use policy::dagger::{Hooks, Outcome, Progress as DaggerProgress};
+use anyhow::ensure;
+use policy::checkpoint::Checkpoint;
+use policy::dagger::{Hooks, Outcome, Progress as DaggerProgress, Rollouts, RoundEpisode};
 use policy::dataset::store::Store;
 use policy::fit::{FitProgress, FitReport};
 use sim::driver::Source;
 use sim::episode::Episode;
 use sim::frame::Frame;
+use sim::map::Map;
+use sim::seed::EpisodeIndex;
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Trains, or goes on with what an interrupted training left in the folder, to the same result.
 ///
@@ -27,18 +32,13 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
     episodes_of(settings, &lots, 0)?;
     let store = Store::open(run.path())?;
     let monitor = RefCell::new(Monitor::new(progress, store.clone()));
+    let geometry = settings.episode.sensing.geometry;
     let mut hooks = Hooks {
         episodes: &mut |round| {
             let episodes = episodes_of(settings, &lots, round)
                 .unwrap_or_else(|error| panic!("round {round} of seed {:?}: {error:#}", settings.seed));
             monitor.borrow_mut().collection = Collection::of(&episodes);
             episodes
-        },
-        expert: &mut |round, episode| {
-            // 2^20 rounds of 2^20 episodes, as in `trials`.
-            let index = u64::from(round) << 20 | episode as u64;
-            let expert = drivers::expert(&settings.expert, &settings.episode);
-            Box::new(expert.with_jitter_seed(settings.seed, index))
         },
         on_frame: &mut |_, episode, frame| monitor.borrow_mut().frame(episode, frame),
         progress: &mut |report| {
@@ -48,7 +48,7 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
             if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         },
     };
-    let outcome = policy::dagger::run(&settings.dagger, &store, settings.seed, &mut hooks)?;
+    let outcome = policy::dagger::run(&settings.dagger, geometry, &store, settings.seed, &mut hooks)?;
     let mut monitor = monitor.into_inner();
     if monitor.task.is_some() {
         progress.end("stopped");
@@ -59,19 +59,43 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
     monitor.failed.map_or(Ok(outcome), Err)
 }
 
-/// Lots that draw their obstacles are driven `training.trials` times. A generated lot looks the same every time: it is
-/// driven once, and the next round has other ones.
+/// The episodes of a round with their experts. Lots that draw their obstacles are driven `training.trials` times. A
+/// generated lot looks the same every time: it is driven once, and the next round has other ones.
 ///
 /// # Errors
 /// If a lot cannot be driven.
-pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<Episode>> {
+pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<RoundEpisode>> {
     let training = &settings.training;
     let (generated, others): (Vec<Lot>, Vec<Lot>) = lots.iter().cloned().partition(Lot::is_generated);
     let of_a_kind = |lot: &Lot| generated.iter().filter(|other| other.group() == lot.group()).count() as u64;
     let generated: Vec<Lot> = generated.iter().map(|lot| lot.in_round(round, of_a_kind(lot))).collect();
     let all = |lots, trials| Trial::all(settings.seed, Purpose::Training { round }, lots, trials, &training.directions);
     let trials: Vec<_> = all(&others, training.trials).chain(all(&generated, 1)).collect();
-    Ok(drive::start(&trials, &trials::maps(&trials, &settings.episode)?, &settings.episode, training.noise))
+    let starts = drive::start(&trials, &trials::maps(&trials, &settings.episode)?, &settings.episode, training.noise);
+    let seated = |((index, trial), episode): ((EpisodeIndex, &Trial<'_>), Episode)| {
+        let expert = drivers::expert(&settings.expert, &settings.episode);
+        let expert = Box::new(expert.with_jitter_seed(settings.seed, index.stream()));
+        RoundEpisode { index, direction: trial.direction, episode, expert }
+    };
+    Ok(EpisodeIndex::of_round(round, trials.len()).zip(&trials).zip(starts).map(seated).collect())
+}
+
+/// One drive of a round of a finished training at its start, to be driven as it was: with its noise, its disturbances and
+/// the network of the round before. `drive` counts from 0.
+///
+/// # Errors
+/// If there is no such run, round or drive, or a file of it cannot be read.
+pub fn drive_again(run: &Path, round: u32, drive: u32) -> anyhow::Result<(Arc<Map>, Rollouts)> {
+    let settings = run_dir::settings_of(run)?;
+    let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
+    let mut episodes = episodes_of(&settings, &lots, round)?;
+    let count = episodes.len();
+    ensure!((drive as usize) < count, "drive {drive} of round {round}: it has {count} drives, counted from 0");
+    let episode = episodes.swap_remove(drive as usize);
+    let map = Arc::clone(episode.episode.map());
+    let novice = round.checked_sub(1).map(|before| run.join(format!("round-{before:02}")));
+    let novice = novice.map(|folder| Checkpoint::load(&folder)).transpose()?;
+    Ok((map, Rollouts::of_round(&settings.dagger, settings.seed, novice.as_ref(), vec![episode])))
 }
 
 /// Passes on what is reported during a training, and keeps learning curves.
@@ -102,8 +126,8 @@ struct Collection {
 }
 
 impl Collection {
-    fn of(episodes: &[Episode]) -> Self {
-        let lengths_m: Vec<f32> = episodes.iter().map(|episode| episode.map().path().length_m()).collect();
+    fn of(episodes: &[RoundEpisode]) -> Self {
+        let lengths_m: Vec<f32> = episodes.iter().map(|item| item.episode.map().path().length_m()).collect();
         Self { progress_m: vec![0.0; lengths_m.len()], lengths_m, novice_ticks: 0, ticks: 0 }
     }
 
@@ -179,5 +203,46 @@ impl<'a> Monitor<'a> {
         if self.task.take().is_some() {
             self.progress.end(result);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use policy::fit::Budget;
+
+    /// A drive of a training that is driven again is the drive that was trained on: its expert, noise, disturbances and
+    /// network.
+    #[test]
+    fn a_drive_of_a_training_is_driven_again_as_it_was_collected() {
+        let run = std::env::temp_dir().join(format!("experiment-test-{}-drive-again", std::process::id()));
+        let _ = std::fs::remove_dir_all(&run);
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.training.lots = vec!["train:2:easy".to_owned()];
+        settings.dagger.fit.budget = Budget::Steps(30);
+        settings.dagger.cloning_budget = Budget::Steps(30);
+        assert!(settings.dagger.disturbance.enabled);
+        let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle).unwrap();
+        let store = Store::open(&run).unwrap();
+        std::fs::write(run.join("settings.toml"), settings.to_toml()).unwrap();
+        let mut hooks = Hooks {
+            episodes: &mut |round| episodes_of(&settings, &lots, round).unwrap(),
+            on_frame: &mut |_, _, _| {},
+            progress: &mut |_| ControlFlow::Continue(()),
+        };
+        let geometry = settings.episode.sensing.geometry;
+        policy::dagger::run(&settings.dagger, geometry, &store, settings.seed, &mut hooks).unwrap();
+        for round in 0..2 {
+            let (stored, collection) = store.read_round(round).unwrap();
+            assert_eq!(collection.episodes.len(), 2);
+            let (map, rollouts) = drive_again(&run, round, 1).unwrap();
+            assert_eq!(map.scenario().name, collection.episodes[1].lot);
+            let again = rollouts.drive(&mut |_, _| {}).round;
+            let first = collection.episodes[0].samples;
+            assert_eq!(again.samples, stored.samples[first..], "round {round}");
+            assert_eq!(again.ticks, stored.ticks[first..], "round {round}");
+        }
+        assert!(drive_again(&run, 1, 2).is_err_and(|error| error.to_string().contains("2 drives")));
+        std::fs::remove_dir_all(run).unwrap();
     }
 }

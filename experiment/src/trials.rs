@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use sim::episode::EpisodeSettings;
 use sim::map::Map;
 use sim::scenario::{Direction, Scenario};
-use sim::seed::{RootSeed, Stream};
+use sim::seed::{EpisodeIndex, RootSeed, Stream};
 use std::sync::Arc;
 
 /// What a trial is for.
@@ -50,8 +50,7 @@ pub fn trial_seed(root: RootSeed, purpose: Purpose, trial: u32) -> RootSeed {
         Purpose::Pictures => (3, 0),
         Purpose::Tuning => (4, 0),
     };
-    assert!(trial < 1 << 20 && round < 1 << 20, "a round has fewer than 2^20 trials, a run fewer than 2^20 rounds");
-    root.child(Stream::Episode, range << 40 | u64::from(round) << 20 | u64::from(trial))
+    root.child(Stream::Episode, range << 40 | EpisodeIndex::new(round, trial).stream())
 }
 
 /// Seed of one direction of a trial on a lot.

@@ -1,7 +1,7 @@
 //! One decision of each model-based planner in a lane with a corner.
 
 use divan::{Bencher, black_box};
-use planners::{Baseline, PlannerContext};
+use planners::{PlannerContext, PlannerSpec};
 use sim::driver::Policy as _;
 use sim::episode::EpisodeSettings;
 use sim::sensing::{Observation, OccupancyGrid};
@@ -16,8 +16,8 @@ fn decision(bencher: Bencher<'_, '_>, name: &str) {
     (0..6).for_each(|row| grid.occupy_row(row, u32::MAX));
     (6..16).for_each(|row| grid.occupy_row(row, 0x1FF_0000));
     (16..25).for_each(|row| grid.occupy_row(row, 0x1FF_01FF));
-    let baselines = Baseline::all();
-    let baseline = baselines.iter().find(|baseline| baseline.name() == name).expect("a baseline's name");
-    let mut planner = baseline.planner(&PlannerContext::of(&EpisodeSettings::paper()));
+    let planners = PlannerSpec::all();
+    let spec = planners.iter().find(|spec| spec.name() == name).expect("a planner's name");
+    let mut planner = spec.planner(&PlannerContext::of(&EpisodeSettings::paper()));
     bencher.bench_local(|| planner.act(black_box(&Observation { grid })));
 }

@@ -1,15 +1,16 @@
-//! Artificial potential field (paper, introduction; methods.md 7.1; Khatib 1986, Ge and Cui 2000): repulsion of the nearest
+//! Artificial potential field (paper, introduction; docs/methods.md 7.1; Khatib 1986, Ge and Cui 2000): repulsion of the nearest
 //! obstacle plus attraction of a goal. The paper did not run it, for want of a goal; here the goal is local ([`Goal`]).
 //!
 //! U_rep = ½η(1/ρ − 1/ρ_0)²·ρ_goal^n and U_att = ½ξρ_goal² (Ge and Cui; with n > 0 the goal stays the minimum even beside
 //! an obstacle). The walk from the front bumper follows −∇(U_rep + U_att) to the look-ahead point.
 
-use super::explanation::{FieldSample, sample};
-use super::search::{Dimension, Span};
-use super::{
-    DISTANCE_FLOOR_M, Goal, Method, Nearest, PlannerContext, Sight, WALK_AHEAD_MIN_M, head_for, khatib_repulsion,
-    walk_along_field, within,
-};
+use crate::context::{PlannerContext, head_for};
+use crate::explanation::{FieldSample, sample};
+use crate::field::{DISTANCE_FLOOR_M, WALK_AHEAD_MIN_M, khatib_repulsion, walk_along_field};
+use crate::goal::{Goal, LinesOfSight};
+use crate::method::{Method, within};
+use crate::nearest::Nearest;
+use crate::search::{Dimension, Span};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
@@ -96,8 +97,12 @@ impl Method for Params {
         within("walk_m", self.walk_m, 0.1, 20.0)
     }
 
-    fn planner(&self, rig: &PlannerContext) -> PotentialField {
-        PotentialField { params: self.clone(), sight: Arc::new(Sight::new(rig)), rig: Arc::new(rig.clone()) }
+    fn planner(&self, context: &PlannerContext) -> PotentialField {
+        PotentialField {
+            params: self.clone(),
+            sight: Arc::new(LinesOfSight::new(context)),
+            context: Arc::new(context.clone()),
+        }
     }
 }
 
@@ -105,15 +110,15 @@ impl Method for Params {
 #[derive(Debug, Clone)]
 pub struct PotentialField {
     params: Params,
-    rig: Arc<PlannerContext>,
-    sight: Arc<Sight>,
+    context: Arc<PlannerContext>,
+    sight: Arc<LinesOfSight>,
 }
 
 impl PotentialField {
     /// The field over the patch.
-    pub(super) fn sampled(&self, grid: &OccupancyGrid) -> Vec<FieldSample> {
+    pub(crate) fn sampled(&self, grid: &OccupancyGrid) -> Vec<FieldSample> {
         let goal = self.sight.goal(self.params.goal, grid);
-        sample(grid, &self.rig, self.params.range_m, |point, nearest| self.params.field(nearest, goal - point))
+        sample(grid, &self.context, self.params.range_m, |point, nearest| self.params.field(nearest, goal - point))
     }
 }
 
@@ -121,15 +126,15 @@ impl Policy for PotentialField {
     fn act(&mut self, observation: &Observation) -> Decision {
         let goal = self.sight.goal(self.params.goal, &observation.grid);
         let field = |point, nearest| self.params.field(nearest, goal - point);
-        let end = walk_along_field(&observation.grid, &self.rig, self.params.range_m, self.params.walk_m, field);
+        let end = walk_along_field(&observation.grid, &self.context, self.params.range_m, self.params.walk_m, field);
         head_for(Vec2::new(end.x.max(WALK_AHEAD_MIN_M), end.y))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{grid_with, rig};
     use super::*;
+    use crate::test_scenes::{context, grid_with};
 
     /// The field is the slope of the potential, by finite differences around an obstacle at the origin.
     #[test]
@@ -152,7 +157,7 @@ mod tests {
 
     #[test]
     fn free_ground_is_driven_straight_and_an_obstacle_pushes_away() {
-        let mut planner = Params::paper().planner(&rig());
+        let mut planner = Params::paper().planner(&context());
         assert_eq!(planner.act(&Observation { grid: OccupancyGrid::free() }).look_ahead.left_m, 0.0);
         let grid = grid_with(&[(16, 11), (17, 11)]);
         assert!(planner.act(&Observation { grid }).look_ahead.left_m < -0.3);

@@ -1,12 +1,13 @@
-//! Curvature velocity method (paper, introduction; methods.md 7.3; Simmons 1996). The paper did not run it.
+//! Curvature velocity method (paper, introduction; docs/methods.md 7.3; Simmons 1996). The paper did not run it.
 //!
 //! Obstacles are discs around occupied cells, grown by half the body width. Each disc blocks one interval of curvatures,
 //! κ = 2(y ± r)/(x² + y² − r²), and over the whole interval the distance to it counts as constant: its chord less the
 //! radius and the nose of the car. Maximised is 0.1·v/v_max + 0.7·d/d_max + 0.2·(1 − |θ|/π) (weights *recalled*) over the
 //! curvatures that the wheels can reach; the controller slows down with steering, so a curvature fixes its speed.
 
-use super::search::{Dimension, Span};
-use super::{Method, PlannerContext, WheelEstimate, steer_along, within};
+use crate::context::{PlannerContext, WheelEstimate, steer_along};
+use crate::method::{Method, within};
+use crate::search::{Dimension, Span};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
@@ -102,27 +103,28 @@ impl Method for Params {
         within("margin_m", self.margin_m, 0.0, 2.0)
     }
 
-    fn planner(&self, rig: &PlannerContext) -> CurvatureVelocity {
-        let curvature_max = rig.vehicle.curvature_max_per_m();
+    fn planner(&self, context: &PlannerContext) -> CurvatureVelocity {
+        let curvature_max = context.vehicle.curvature_max_per_m();
         let candidates = (-(SIDE as i32)..=SIDE as i32).map(|k| {
             let curvature_per_m = curvature_max * k as f32 / SIDE as f32;
-            let speed_mps = rig.speed_mps(curvature_per_m);
+            let speed_mps = context.speed_mps(curvature_per_m);
             let turn_rad = (curvature_per_m * speed_mps * self.heading_after_s).abs();
             let heading = 1.0 - (turn_rad / std::f32::consts::PI).min(1.0);
-            let worth = self.velocity_weight * speed_mps / rig.controller.speed_max_mps + self.heading_weight * heading;
+            let worth =
+                self.velocity_weight * speed_mps / context.controller.speed_max_mps + self.heading_weight * heading;
             (curvature_per_m, worth)
         });
-        let radius_m = 0.5 * rig.vehicle.width_m + self.margin_m;
+        let radius_m = 0.5 * context.vehicle.width_m + self.margin_m;
         let disc = |cell: usize| {
-            let centre = rig.geometry.cell_in_ego(cell / GRID_CELLS, cell % GRID_CELLS);
-            Disc::new(centre, radius_m, rig.vehicle.front_m(), curvature_max / SIDE as f32)
+            let centre = context.geometry.cell_in_ego(cell / GRID_CELLS, cell % GRID_CELLS);
+            Disc::new(centre, radius_m, context.vehicle.front_m(), curvature_max / SIDE as f32)
         };
         CurvatureVelocity {
             params: self.clone(),
-            rig: Arc::new(rig.clone()),
+            context: Arc::new(context.clone()),
             candidates: Arc::new(candidates.collect()),
             discs: Arc::new((0..GRID_CELLS * GRID_CELLS).map(disc).collect()),
-            wheel: WheelEstimate::new(rig),
+            wheel: WheelEstimate::new(context),
         }
     }
 }
@@ -152,7 +154,7 @@ impl Disc {
 #[derive(Debug, Clone)]
 pub struct CurvatureVelocity {
     params: Params,
-    rig: Arc<PlannerContext>,
+    context: Arc<PlannerContext>,
     /// Curvature, and what it is worth whatever the grid.
     candidates: Arc<Vec<(f32, f32)>>,
     /// Of every cell, row-major.
@@ -189,11 +191,11 @@ impl Policy for CurvatureVelocity {
     fn act(&mut self, observation: &Observation) -> Decision {
         let distances_m = self.distances_m(&observation.grid);
         let steering_rad = self.wheel.advance();
-        let reach_rad = self.rig.vehicle.steering_rate_max_radps * self.params.window_s;
-        let limit_rad = self.rig.vehicle.steering_max_rad;
+        let reach_rad = self.context.vehicle.steering_rate_max_radps * self.params.window_s;
+        let limit_rad = self.context.vehicle.steering_max_rad;
         let index = |angle_rad: f32| {
-            let curvature_per_m = self.rig.curvature_per_m(angle_rad.clamp(-limit_rad, limit_rad));
-            let share = (curvature_per_m / self.rig.vehicle.curvature_max_per_m()).clamp(-1.0, 1.0);
+            let curvature_per_m = self.context.curvature_per_m(angle_rad.clamp(-limit_rad, limit_rad));
+            let share = (curvature_per_m / self.context.vehicle.curvature_max_per_m()).clamp(-1.0, 1.0);
             (SIDE as f32 * (1.0 + share)).round() as usize
         };
         // Among equals the straightest.
@@ -202,7 +204,7 @@ impl Policy for CurvatureVelocity {
             of_a.total_cmp(&of_b).then(b.abs_diff(SIDE).cmp(&a.abs_diff(SIDE)))
         });
         let curvature_per_m = self.candidates[best.unwrap_or(SIDE)].0;
-        self.wheel.command_rad = self.rig.steering_rad(curvature_per_m);
+        self.wheel.command_rad = self.context.steering_rad(curvature_per_m);
         steer_along(curvature_per_m)
     }
 
@@ -213,8 +215,8 @@ impl Policy for CurvatureVelocity {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{grid_with, rig};
     use super::*;
+    use crate::test_scenes::{context, grid_with};
 
     /// A disc blocks exactly the arcs that come within its radius of its centre.
     #[test]
@@ -233,7 +235,7 @@ mod tests {
     /// Cell (20, 12) lies 6.46 m ahead: d = 6.46 − 1.08 − 3.80 = 1.58. Straight on G = .1 + .7·1.58/3 + .2.
     #[test]
     fn the_objective_is_the_weighted_sum() {
-        let planner = Params::paper().planner(&rig());
+        let planner = Params::paper().planner(&context());
         let distances_m = planner.distances_m(&grid_with(&[(20, 12)]));
         assert!((distances_m[SIDE] - 1.58).abs() < 1e-4);
         assert!((planner.objective(SIDE, distances_m[SIDE]) - (0.3 + 0.7 * 1.58 / 3.0)).abs() < 1e-5);
@@ -245,7 +247,7 @@ mod tests {
 
     #[test]
     fn a_free_lane_is_driven_straight_and_a_block_is_passed() {
-        let mut planner = Params::paper().planner(&rig());
+        let mut planner = Params::paper().planner(&context());
         assert_eq!(planner.act(&Observation { grid: OccupancyGrid::free() }).look_ahead.left_m, 0.0);
         let mut grid = OccupancyGrid::free();
         for row in 18..22 {

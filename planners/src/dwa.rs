@@ -1,4 +1,4 @@
-//! Dynamic window approach (paper, introduction; methods.md 7.2; Fox, Burgard, Thrun 1997) for a car. The paper did not
+//! Dynamic window approach (paper, introduction; docs/methods.md 7.2; Fox, Burgard, Thrun 1997) for a car. The paper did not
 //! run it.
 //!
 //! G = α·heading + β·dist + γ·velocity is maximised over the steering angles that can be reached within the window, each
@@ -6,8 +6,9 @@
 //! dimension; an arc is admissible if that speed can be braked away before what the body would meet on it:
 //! v ≤ √(2·dist·v̇_b).
 
-use super::search::{Dimension, Span};
-use super::{Method, PlannerContext, WheelEstimate, steer_along, within};
+use crate::context::{PlannerContext, WheelEstimate, steer_along};
+use crate::method::{Method, within};
+use crate::search::{Dimension, Span};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::{Pose, Vec2};
@@ -112,26 +113,26 @@ impl Method for Params {
         within("brake_mps2", self.brake_mps2, 0.1, 10.0)
     }
 
-    fn planner(&self, rig: &PlannerContext) -> DynamicWindow {
+    fn planner(&self, context: &PlannerContext) -> DynamicWindow {
         let arcs: Vec<Rated> = (-(SIDE as i32)..=SIDE as i32)
             .map(|k| {
-                let steering_rad = rig.vehicle.steering_max_rad * k as f32 / SIDE as f32;
-                let curvature_per_m = rig.curvature_per_m(steering_rad);
-                let speed_mps = rig.speed_mps(curvature_per_m);
+                let steering_rad = context.vehicle.steering_max_rad * k as f32 / SIDE as f32;
+                let curvature_per_m = context.curvature_per_m(steering_rad);
+                let speed_mps = context.speed_mps(curvature_per_m);
                 let yaw_rad = (curvature_per_m * speed_mps * self.heading_after_s).abs();
                 let heading = 1.0 - (yaw_rad / std::f32::consts::PI).min(1.0);
                 let score =
-                    self.heading_weight * heading + self.velocity_weight * speed_mps / rig.controller.speed_max_mps;
+                    self.heading_weight * heading + self.velocity_weight * speed_mps / context.controller.speed_max_mps;
                 let stop_m = 0.5 * speed_mps * speed_mps / self.brake_mps2;
                 Rated { curvature_per_m, score, stop_m }
             })
             .collect();
         DynamicWindow {
             params: self.clone(),
-            rig: Arc::new(rig.clone()),
-            contact_m: Arc::new(contacts(rig, &arcs, self.margin_m, self.distance_max_m)),
+            context: Arc::new(context.clone()),
+            contact_m: Arc::new(contacts(context, &arcs, self.margin_m, self.distance_max_m)),
             arcs: Arc::new(arcs),
-            wheel: WheelEstimate::new(rig),
+            wheel: WheelEstimate::new(context),
         }
     }
 }
@@ -150,7 +151,7 @@ struct Rated {
 #[derive(Debug, Clone)]
 pub struct DynamicWindow {
     params: Params,
-    rig: Arc<PlannerContext>,
+    context: Arc<PlannerContext>,
     arcs: Arc<Vec<Rated>>,
     /// Travel until the body meets a cell (row-major), by arc, metres; at most the largest distance that counts.
     contact_m: Arc<Vec<[f32; 2 * SIDE + 1]>>,
@@ -185,9 +186,9 @@ impl Policy for DynamicWindow {
     fn act(&mut self, observation: &Observation) -> Decision {
         let free_m = self.free_m(&observation.grid);
         let steering_rad = self.wheel.advance();
-        let reach_rad = self.rig.vehicle.steering_rate_max_radps * self.params.window_s;
+        let reach_rad = self.context.vehicle.steering_rate_max_radps * self.params.window_s;
         let index = |angle_rad: f32| {
-            let share = (angle_rad / self.rig.vehicle.steering_max_rad).clamp(-1.0, 1.0);
+            let share = (angle_rad / self.context.vehicle.steering_max_rad).clamp(-1.0, 1.0);
             (SIDE as f32 * (1.0 + share)).round() as usize
         };
         let window = index(steering_rad - reach_rad)..=index(steering_rad + reach_rad);
@@ -197,7 +198,7 @@ impl Policy for DynamicWindow {
             of_a.total_cmp(&of_b).then(b.abs_diff(SIDE).cmp(&a.abs_diff(SIDE)))
         });
         let curvature_per_m = self.arcs[best.unwrap_or(SIDE)].curvature_per_m;
-        self.wheel.command_rad = self.rig.steering_rad(curvature_per_m);
+        self.wheel.command_rad = self.context.steering_rad(curvature_per_m);
         steer_along(curvature_per_m)
     }
 
@@ -208,9 +209,9 @@ impl Policy for DynamicWindow {
 
 /// Travel until the body, widened by a margin, meets the centre of each cell, by arc. The right arcs are the mirror image
 /// of the left ones, to the bit.
-fn contacts(rig: &PlannerContext, arcs: &[Rated], margin_m: f32, distance_max_m: f32) -> Vec<[f32; 2 * SIDE + 1]> {
-    let (front_m, rear_m) = (rig.vehicle.front_m() + margin_m, rig.vehicle.rear_overhang_m + margin_m);
-    let side_m = 0.5 * rig.vehicle.width_m + margin_m;
+fn contacts(context: &PlannerContext, arcs: &[Rated], margin_m: f32, distance_max_m: f32) -> Vec<[f32; 2 * SIDE + 1]> {
+    let (front_m, rear_m) = (context.vehicle.front_m() + margin_m, context.vehicle.rear_overhang_m + margin_m);
+    let side_m = 0.5 * context.vehicle.width_m + margin_m;
     let mut contact_m = vec![[distance_max_m; 2 * SIDE + 1]; GRID_CELLS * GRID_CELLS];
     for k in SIDE..=2 * SIDE {
         // From far to near, so that the first contact is written last.
@@ -219,7 +220,7 @@ fn contacts(rig: &PlannerContext, arcs: &[Rated], margin_m: f32, distance_max_m:
             let world_from_body =
                 Pose::default().advanced_along_arc(arcs[k].curvature_per_m, travel_m).world_from_ego();
             for (cell, of_cell) in contact_m.iter_mut().enumerate() {
-                let centre = rig.geometry.cell_in_ego(cell / GRID_CELLS, cell % GRID_CELLS);
+                let centre = context.geometry.cell_in_ego(cell / GRID_CELLS, cell % GRID_CELLS);
                 let Vec2 { x, y } = world_from_body.inverse_point(centre);
                 if x <= front_m && x >= -rear_m && y.abs() <= side_m {
                     of_cell[k] = travel_m;
@@ -238,11 +239,11 @@ fn contacts(rig: &PlannerContext, arcs: &[Rated], margin_m: f32, distance_max_m:
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{grid_with, rig};
     use super::*;
+    use crate::test_scenes::{context, grid_with};
 
     fn planner() -> DynamicWindow {
-        Params::paper().planner(&rig())
+        Params::paper().planner(&context())
     }
 
     /// Cell (20, 12) lies at X 4.30 + 4.5·0.48 = 6.46 on the axis; the nose with margin starts at 3.95: 2.51 m of free
@@ -282,7 +283,7 @@ mod tests {
         let curvature = planner.act(&Observation { grid }).look_ahead.curvature_per_m();
         assert!(curvature > 0.01, "{curvature}");
         // Half a second allows 9.9° from straight: 11 of the steps of 0.8875°.
-        let mut narrow = Params { window_s: 0.5, heading_weight: 0.0, ..Params::paper() }.planner(&rig());
+        let mut narrow = Params { window_s: 0.5, heading_weight: 0.0, ..Params::paper() }.planner(&context());
         let steering = (narrow.act(&Observation { grid }).look_ahead.curvature_per_m() * 2.845).atan().to_degrees();
         assert!(steering > 0.0 && steering < 11.5 * 0.8875, "{steering}");
     }

@@ -1,8 +1,9 @@
 //! What a planner weighed, for pictures: worked out again when asked for, so that it costs nothing otherwise.
 
-use super::{Planner, PlannerContext, nearest_occupied};
+use crate::context::PlannerContext;
+use crate::nearest::{Nearest, nearest_occupied};
 use sim::geometry::Vec2;
-use sim::sensing::{GRID_CELLS, Observation, OccupancyGrid};
+use sim::sensing::{GRID_CELLS, OccupancyGrid};
 
 /// What a planner weighed. Points are in the ego frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,30 +34,18 @@ pub struct FieldSample {
     pub field: Vec2,
 }
 
-impl Planner {
-    /// What was weighed in the last answer, which was to this observation; `None` for methods that do not say.
-    pub fn explain(&self, observation: &Observation) -> Option<Explanation> {
-        match self {
-            Self::Tentacle(tentacles) => Some(Explanation::Paths(tentacles.weighed(&observation.grid))),
-            Self::Vvf(field) => Some(Explanation::Field(field.sampled(&observation.grid))),
-            Self::Apf(field) => Some(Explanation::Field(field.sampled(&observation.grid))),
-            Self::Dwa(_) | Self::Cvm(_) | Self::Vff(_) => None,
-        }
-    }
-}
-
 /// A field at every other free cell of the patch.
-pub(super) fn sample(
+pub(crate) fn sample(
     grid: &OccupancyGrid,
-    rig: &PlannerContext,
+    context: &PlannerContext,
     range_m: f32,
-    field: impl Fn(Vec2, Option<super::Nearest>) -> Vec2,
+    field: impl Fn(Vec2, Option<Nearest>) -> Vec2,
 ) -> Vec<FieldSample> {
     let cells = (0..GRID_CELLS).step_by(2).flat_map(|row| (0..GRID_CELLS).step_by(2).map(move |col| (row, col)));
     let free = cells.filter(|&(row, col)| !grid.is_occupied(row, col));
     free.map(|(row, col)| {
-        let at = rig.geometry.cell_in_ego(row, col);
-        FieldSample { at, field: field(at, nearest_occupied(grid, &rig.geometry, at, range_m)) }
+        let at = context.geometry.cell_in_ego(row, col);
+        FieldSample { at, field: field(at, nearest_occupied(grid, &context.geometry, at, range_m)) }
     })
     .collect()
 }

@@ -1,4 +1,4 @@
-//! Search of parameters: the same method and the same number of candidates for every baseline.
+//! Search of parameters: the same method and the same number of candidates for every planner.
 //!
 //! Parameters are searched in the unit cube that [`Span`] maps to their ranges. The first half of the candidates is drawn
 //! uniformly (the starting point first of all), the second half normally around the best so far, narrower from

@@ -1,4 +1,4 @@
-//! Tentacles (paper, "Tentacle Algorithm"; methods.md 6): 81 candidate paths, the cheapest is driven.
+//! Tentacles (paper, "Tentacle Algorithm"; docs/methods.md 6): 81 candidate paths, the cheapest is driven.
 //!
 //! J = 1·V_clear + 0·V_flat + 0·V_traj + 0.3·V_fwd (paper). The flatness term needs probabilities and the trajectory term
 //! a global path; the grid has neither, so they have no parameter here.
@@ -11,9 +11,10 @@
 //! For every steering angle to start from, the cells around each path are tabulated once; a decision is 81 masked
 //! popcounts.
 
-use super::explanation::CandidatePath;
-use super::search::{Dimension, Span};
-use super::{Method, PlannerContext, WheelEstimate, spread_curvatures, steer_along, within};
+use crate::context::{PlannerContext, WheelEstimate, steer_along};
+use crate::explanation::CandidatePath;
+use crate::method::{Method, within};
+use crate::search::{Dimension, Span};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::{Pose, Vec2};
@@ -33,7 +34,7 @@ const SAMPLES_PER_M: usize = 5;
 const UNSEEN_ROWS: usize = 24;
 
 /// Half the body width (0.93 m) plus the paper's safety distance of 0.15 m. The paper says "0.35 m, which is the width of
-/// the vehicle (0.2 m) plus the safety distance (0.15 m)"; 0.2 m is no car's width (methods.md 6.4).
+/// the vehicle (0.2 m) plus the safety distance (0.15 m)"; 0.2 m is no car's width (docs/methods.md 6.4).
 pub const DETECTION_RANGE_M: f32 = 1.08;
 /// The paper's 0.35 m taken literally: narrower than the body, so the car hits what the path misses.
 pub const DETECTION_RANGE_LITERAL_M: f32 = 0.35;
@@ -65,9 +66,9 @@ pub struct Params {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TentacleSet {
-    /// From the present steering angle to one of 81 as fast as the wheels turn (methods.md 6.4).
+    /// From the present steering angle to one of 81 as fast as the wheels turn (docs/methods.md 6.4).
     ClothoidSteer,
-    /// Circular arcs of speed set j = 0…15 of von Hundelshausen 2008 (methods.md 6.1; growth of the radii and of the
+    /// Circular arcs of speed set j = 0…15 of von Hundelshausen 2008 (docs/methods.md 6.1; growth of the radii and of the
     /// lengths *recalled*). The set nearest 2.2 m/s is j = 4; its tightest radius of 11.3 m takes no corner of a lot.
     Arc2008(u8),
 }
@@ -77,7 +78,7 @@ pub enum TentacleSet {
 #[serde(rename_all = "snake_case")]
 pub enum PathOrigin {
     /// The middle of the front bumper (*chosen*): at full lock the rear axle never reaches the patch, so its path would be
-    /// scored on unseen ground and win whenever the front is blocked (methods.md 6.4).
+    /// scored on unseen ground and win whenever the front is blocked (docs/methods.md 6.4).
     FrontBumper,
     /// The rear axle.
     RearAxle,
@@ -187,8 +188,8 @@ impl Method for Params {
         within("speed_mps", self.speed_mps, 0.1, 10.0)
     }
 
-    fn planner(&self, rig: &PlannerContext) -> Tentacles {
-        Tentacles::new(self, rig)
+    fn planner(&self, context: &PlannerContext) -> Tentacles {
+        Tentacles::new(self, context)
     }
 }
 
@@ -218,7 +219,7 @@ impl Around {
 #[derive(Debug, Clone)]
 pub struct Tentacles {
     params: Params,
-    rig: Arc<PlannerContext>,
+    context: Arc<PlannerContext>,
     /// Starting angles by candidate paths.
     around: Arc<Vec<Vec<Around>>>,
     /// Final curvature and weighted V_fwd of each candidate.
@@ -228,15 +229,15 @@ pub struct Tentacles {
 }
 
 impl Tentacles {
-    fn new(params: &Params, rig: &PlannerContext) -> Self {
+    fn new(params: &Params, context: &PlannerContext) -> Self {
         let paths = params.paths();
         let outermost = paths[0].0.abs().max(f32::MIN_POSITIVE);
         let candidates = paths.iter().map(|(kappa, _)| (*kappa, params.forward_weight * kappa.abs() / outermost));
         let starts = if params.set == TentacleSet::ClothoidSteer { STARTS } else { 0 };
-        let start_rad = |start: usize| rig.vehicle.steering_max_rad * start as f32 / STARTS as f32;
+        let start_rad = |start: usize| context.vehicle.steering_max_rad * start as f32 / STARTS as f32;
         // To the left and straight; the right half is the mirror image, to the bit.
         let mut left: Vec<Vec<Around>> = (0..=starts)
-            .map(|start| paths.iter().map(|path| around_path(params, rig, start_rad(start), *path)).collect())
+            .map(|start| paths.iter().map(|path| around_path(params, context, start_rad(start), *path)).collect())
             .collect();
         for k in 0..SIDE {
             left[0][k] = left[0][2 * SIDE - k].mirrored();
@@ -245,10 +246,10 @@ impl Tentacles {
         let around = right.chain(left.iter().cloned()).collect();
         Self {
             params: params.clone(),
-            rig: Arc::new(rig.clone()),
+            context: Arc::new(context.clone()),
             around: Arc::new(around),
             candidates: Arc::new(candidates.collect()),
-            wheel: WheelEstimate::new(rig),
+            wheel: WheelEstimate::new(context),
             previous: SIDE,
         }
     }
@@ -256,7 +257,7 @@ impl Tentacles {
     /// Index of the tabulated starting angle nearest to a steering angle.
     fn start(&self, steering_rad: f32) -> usize {
         let straight = (self.around.len() / 2) as f32;
-        (straight + (steering_rad / self.rig.vehicle.steering_max_rad * straight).round()) as usize
+        (straight + (steering_rad / self.context.vehicle.steering_max_rad * straight).round()) as usize
     }
 
     /// J of every candidate from a starting angle.
@@ -266,15 +267,15 @@ impl Tentacles {
     }
 
     /// The paths of the last answer with their costs.
-    pub(super) fn weighed(&self, grid: &OccupancyGrid) -> Vec<CandidatePath> {
+    pub(crate) fn weighed(&self, grid: &OccupancyGrid) -> Vec<CandidatePath> {
         let start_rad = self.wheel.steering_rad;
         let straight = (self.around.len() / 2) as f32;
         let tabulated_rad = match straight {
             0.0 => start_rad,
-            _ => (self.start(start_rad) as f32 - straight) / straight * self.rig.vehicle.steering_max_rad,
+            _ => (self.start(start_rad) as f32 - straight) / straight * self.context.vehicle.steering_max_rad,
         };
         let weighed = |(k, (path, cost)): (usize, ((f32, f32), f32))| {
-            let points = points(&self.params, &self.rig, tabulated_rad, path).step_by(SAMPLES_PER_M).collect();
+            let points = points(&self.params, &self.context, tabulated_rad, path).step_by(SAMPLES_PER_M).collect();
             CandidatePath { points, cost, is_chosen: k == self.previous }
         };
         self.params.paths().into_iter().zip(self.costs(grid, start_rad)).enumerate().map(weighed).collect()
@@ -298,7 +299,7 @@ impl Policy for Tentacles {
         let steering_rad = self.wheel.advance();
         self.previous = self.choose(&observation.grid, steering_rad);
         let curvature_per_m = self.candidates[self.previous].0;
-        self.wheel.command_rad = self.rig.steering_rad(curvature_per_m);
+        self.wheel.command_rad = self.context.steering_rad(curvature_per_m);
         steer_along(curvature_per_m)
     }
 
@@ -309,9 +310,9 @@ impl Policy for Tentacles {
 }
 
 /// The cells around one path.
-fn around_path(params: &Params, rig: &PlannerContext, start_rad: f32, path: (f32, f32)) -> Around {
-    let mut marks = Marks::new(&rig.geometry, params.detection_range_m);
-    points(params, rig, start_rad, path).for_each(|point| marks.mark(point));
+fn around_path(params: &Params, context: &PlannerContext, start_rad: f32, path: (f32, f32)) -> Around {
+    let mut marks = Marks::new(&context.geometry, params.detection_range_m);
+    points(params, context, start_rad, path).for_each(|point| marks.mark(point));
     marks.around()
 }
 
@@ -319,22 +320,22 @@ fn around_path(params: &Params, rig: &PlannerContext, start_rad: f32, path: (f32
 /// s_r = v|δ_k − δ_0|/δ̇, at least 0.3 m.
 fn points(
     params: &Params,
-    rig: &PlannerContext,
+    context: &PlannerContext,
     start_rad: f32,
     (curvature_per_m, length_m): (f32, f32),
 ) -> impl Iterator<Item = Vec2> {
     let (start_per_m, ramp_m) = match params.set {
         TentacleSet::ClothoidSteer => {
-            let turn_rad = (rig.steering_rad(curvature_per_m) - start_rad).abs();
-            let ramp_m = (params.speed_mps * turn_rad / rig.vehicle.steering_rate_max_radps).max(0.3);
-            (rig.curvature_per_m(start_rad), ramp_m)
+            let turn_rad = (context.steering_rad(curvature_per_m) - start_rad).abs();
+            let ramp_m = (params.speed_mps * turn_rad / context.vehicle.steering_rate_max_radps).max(0.3);
+            (context.curvature_per_m(start_rad), ramp_m)
         }
         TentacleSet::Arc2008(_) => (curvature_per_m, 1.0),
     };
     let (axle_m, ahead_of_axle_m) = match params.path_origin {
-        PathOrigin::FrontBumper => (0.0, rig.vehicle.front_m()),
+        PathOrigin::FrontBumper => (0.0, context.vehicle.front_m()),
         PathOrigin::RearAxle => (0.0, 0.0),
-        PathOrigin::BelowPatch => (rig.geometry.near_edge_ahead_m - 1.0, 0.0),
+        PathOrigin::BelowPatch => (context.geometry.near_edge_ahead_m - 1.0, 0.0),
     };
     let mut pose = Pose::new(Vec2::new(axle_m, 0.0), 0.0);
     let samples = (length_m / SAMPLE_M).round() as usize;
@@ -385,13 +386,19 @@ impl<'a> Marks<'a> {
     }
 }
 
+/// Curvatures from −max to max, `2 · side + 1` of them, dense near zero: κ_k = κ_max·sgn(k)(|k|/side)^power.
+fn spread_curvatures(side: i32, max_per_m: f32, power: f32) -> Vec<f32> {
+    let share = |k: i32| (k.abs() as f32 / side as f32).powf(power);
+    (-side..=side).map(|k| k.signum() as f32 * max_per_m * share(k)).collect()
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{grid_with, rig};
     use super::*;
+    use crate::test_scenes::{context, grid_with};
 
     fn paper() -> Tentacles {
-        Params::paper().planner(&rig())
+        Params::paper().planner(&context())
     }
 
     /// Straight path of the bumper from X 3.80 on, range 1.08 m: 5 columns (|Y| ≤ 0.96) in all 25 rows; of the unseen
@@ -431,7 +438,7 @@ mod tests {
         assert!(planner.act(&Observation { grid }).look_ahead.left_m > 0.5);
     }
 
-    /// methods.md 6.1: set j = 4 is 14.9 m long at the outermost path, whose radius is 11.3 m.
+    /// docs/methods.md 6.1: set j = 4 is 14.9 m long at the outermost path, whose radius is 11.3 m.
     #[test]
     fn arcs_of_2008_match_the_published_set() {
         let params = Params { set: TentacleSet::Arc2008(4), ..Params::paper() };
@@ -456,7 +463,7 @@ mod tests {
 
     #[test]
     fn the_literal_range_looks_at_a_strip_narrower_than_the_body() {
-        let planner = Params::paper_literal_range().planner(&rig());
+        let planner = Params::paper_literal_range().planner(&context());
         assert_eq!(planner.around[STARTS][SIDE].cells[10].count_ones(), 1);
     }
 }

@@ -1,12 +1,14 @@
-//! Virtual force field (paper, introduction; methods.md 7.1; Borenstein and Koren): every occupied cell within an active
+//! Virtual force field (paper, introduction; docs/methods.md 7.1; Borenstein and Koren): every occupied cell within an active
 //! window pushes the car off, a target point draws it on, and the car steers along the sum. The paper did not run it.
 //!
 //! A cell at distance d from the front bumper pushes with F_cr·C/dⁿ (certainty C = 1: the grid is binary; the factor of
 //! the original that makes up for the width of its robot is part of F_cr). The target draws with F_ct = 1 whatever its
 //! distance. The steering is smoothed from tick to tick, as the original does against oscillation.
 
-use super::search::{Dimension, Span};
-use super::{Goal, Method, PlannerContext, Sight, head_for, within};
+use crate::context::{PlannerContext, head_for};
+use crate::goal::{Goal, LinesOfSight};
+use crate::method::{Method, within};
+use crate::search::{Dimension, Span};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
@@ -95,12 +97,13 @@ impl Method for Params {
         within("look_ahead_m", self.look_ahead_m, 0.5, 20.0)
     }
 
-    fn planner(&self, rig: &PlannerContext) -> VirtualForceField {
-        let bumper = rig.bumper();
+    fn planner(&self, context: &PlannerContext) -> VirtualForceField {
+        let bumper = context.bumper();
         let push = |index: usize| {
-            let offset = bumper - rig.geometry.cell_in_ego(index / GRID_CELLS, index % GRID_CELLS);
+            let offset = bumper - context.geometry.cell_in_ego(index / GRID_CELLS, index % GRID_CELLS);
             let is_active = offset.abs().max_element() <= self.window_m;
-            let strength = self.repulsion_gain / offset.length().max(rig.geometry.cell_m()).powf(self.distance_power);
+            let strength =
+                self.repulsion_gain / offset.length().max(context.geometry.cell_m()).powf(self.distance_power);
             if is_active { strength * offset.normalize_or_zero() } else { Vec2::ZERO }
         };
         let pushes: Vec<Vec2> = (0..GRID_CELLS * GRID_CELLS).map(push).collect();
@@ -115,7 +118,7 @@ impl Method for Params {
             bumper,
             pushes: Arc::new(pushes),
             active_rows: Arc::new(active_rows),
-            sight: Arc::new(Sight::new(rig)),
+            sight: Arc::new(LinesOfSight::new(context)),
             bearing_rad: 0.0,
         }
     }
@@ -130,7 +133,7 @@ pub struct VirtualForceField {
     pushes: Arc<Vec<Vec2>>,
     /// Cells within the window; bit = column.
     active_rows: Arc<Vec<u32>>,
-    sight: Arc<Sight>,
+    sight: Arc<LinesOfSight>,
     /// Of the last answer.
     bearing_rad: f32,
 }
@@ -170,12 +173,12 @@ impl Policy for VirtualForceField {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{grid_with, rig};
     use super::*;
+    use crate::test_scenes::{context, grid_with};
     use sim::sensing::OccupancyGrid;
 
     fn force(cells: &[(usize, usize)]) -> Vec2 {
-        Params::paper().planner(&rig()).force(&Observation { grid: grid_with(cells) })
+        Params::paper().planner(&context()).force(&Observation { grid: grid_with(cells) })
     }
 
     /// Cell (22, 10) lies at X 5.50, Y 0.96: 1.70 m ahead of the bumper, 0.96 m left of it, d² = 3.8116. It pushes with
@@ -191,14 +194,14 @@ mod tests {
 
     #[test]
     fn the_bearing_approaches_the_force_and_is_forgotten_on_reset() {
-        let mut planner = Params { repulsion_gain: 50.0, ..Params::paper() }.planner(&rig());
+        let mut planner = Params { repulsion_gain: 50.0, ..Params::paper() }.planner(&context());
         let observation = Observation { grid: grid_with(&[(22, 9), (23, 9), (24, 9)]) };
         let first = planner.act(&observation).look_ahead;
         let second = planner.act(&observation).look_ahead;
         assert!(second.left_m < first.left_m && first.left_m < 0.0);
         planner.reset();
         assert_eq!(planner.act(&observation).look_ahead, first);
-        let mut free = Params::paper().planner(&rig());
+        let mut free = Params::paper().planner(&context());
         let straight = free.act(&Observation { grid: OccupancyGrid::free() }).look_ahead;
         assert!((straight.ahead_m - 7.8).abs() < 1e-5 && straight.left_m == 0.0);
     }

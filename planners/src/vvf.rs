@@ -1,4 +1,4 @@
-//! Velocity vector field (paper, "VVF Algorithm"; methods.md 7.1): pushed off by the nearest obstacle, drawn forward.
+//! Velocity vector field (paper, "VVF Algorithm"; docs/methods.md 7.1): pushed off by the nearest obstacle, drawn forward.
 //!
 //! "The repulsive, attractive, and velocity fields were set to a ratio of 1:0:0.5" (paper): no goal, so no attraction.
 //!
@@ -6,10 +6,12 @@
 //! ρ < ρ_0 = 2.3 m, 0 elsewhere. F̂ is the repulsion squashed to |F̂| < 1 by F/(1 + |F|), lest 1/ρ³ swamp everything
 //! (*chosen*). The look-ahead point is where a walk along V from the front bumper ends.
 
-use super::explanation::{FieldSample, sample};
-use super::search::{Dimension, Span};
-use super::{DISTANCE_FLOOR_M, Method, Nearest, PlannerContext, WALK_AHEAD_MIN_M};
-use super::{head_for, khatib_repulsion, walk_along_field, within};
+use crate::context::{PlannerContext, head_for};
+use crate::explanation::{FieldSample, sample};
+use crate::field::{DISTANCE_FLOOR_M, WALK_AHEAD_MIN_M, khatib_repulsion, walk_along_field};
+use crate::method::{Method, within};
+use crate::nearest::Nearest;
+use crate::search::{Dimension, Span};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
@@ -121,8 +123,8 @@ impl Method for Params {
         within("ahead_min_m", self.ahead_min_m, 0.2, 12.0)
     }
 
-    fn planner(&self, rig: &PlannerContext) -> VelocityVectorField {
-        VelocityVectorField { params: self.clone(), rig: Arc::new(rig.clone()) }
+    fn planner(&self, context: &PlannerContext) -> VelocityVectorField {
+        VelocityVectorField { params: self.clone(), context: Arc::new(context.clone()) }
     }
 }
 
@@ -130,13 +132,13 @@ impl Method for Params {
 #[derive(Debug, Clone)]
 pub struct VelocityVectorField {
     params: Params,
-    rig: Arc<PlannerContext>,
+    context: Arc<PlannerContext>,
 }
 
 impl VelocityVectorField {
     /// The field over the patch.
-    pub(super) fn sampled(&self, grid: &OccupancyGrid) -> Vec<FieldSample> {
-        sample(grid, &self.rig, self.params.range_m, |_, nearest| self.params.field(nearest))
+    pub(crate) fn sampled(&self, grid: &OccupancyGrid) -> Vec<FieldSample> {
+        sample(grid, &self.context, self.params.range_m, |_, nearest| self.params.field(nearest))
     }
 }
 
@@ -144,15 +146,15 @@ impl Policy for VelocityVectorField {
     fn act(&mut self, observation: &Observation) -> Decision {
         let Params { range_m, walk_m, ahead_min_m, .. } = self.params;
         let field = |_, nearest| self.params.field(nearest);
-        let end = walk_along_field(&observation.grid, &self.rig, range_m, walk_m, field);
+        let end = walk_along_field(&observation.grid, &self.context, range_m, walk_m, field);
         head_for(Vec2::new(end.x.max(ahead_min_m), end.y))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{grid_with, rig};
     use super::*;
+    use crate::test_scenes::{context, grid_with};
 
     /// At ρ = 1 m to the left: F = (1 − 1/2.3)/1 = .5652, squashed .3611 to the right; forward .5·(1 − .5).
     #[test]
@@ -175,7 +177,7 @@ mod tests {
 
     #[test]
     fn free_ground_is_driven_straight_for_the_whole_walk() {
-        let mut planner = Params::paper().planner(&rig());
+        let mut planner = Params::paper().planner(&context());
         let answer = planner.act(&Observation { grid: OccupancyGrid::free() }).look_ahead;
         assert!((answer.ahead_m - 9.8).abs() < 1e-3 && answer.left_m == 0.0, "{answer:?}");
     }
@@ -184,7 +186,7 @@ mod tests {
     /// right; the walk slides along it to where it ends: a hard turn to the right, not "straight on".
     #[test]
     fn a_wall_at_the_bumper_is_turned_away_from() {
-        let mut planner = Params::paper().planner(&rig());
+        let mut planner = Params::paper().planner(&context());
         let mut grid = OccupancyGrid::free();
         for row in 0..25 {
             // Columns up to 11 in row 24 (X 4.30…4.78), one more to the right per row farther away.
@@ -198,7 +200,7 @@ mod tests {
     /// turns it to the right.
     #[test]
     fn a_lane_is_kept_and_an_obstacle_pushes_away() {
-        let mut planner = Params::paper().planner(&rig());
+        let mut planner = Params::paper().planner(&context());
         let mut grid = OccupancyGrid::free();
         for row in 0..25 {
             grid.occupy_row(row, 0x1FF_01FF);

@@ -3,8 +3,8 @@
 
 use divan::{Bencher, counter::ItemsCount};
 use policy::dataset::{Dataset, Round, Sample, ValidationSplit};
-use policy::fit::{FitProgress, FitSettings, KeepWeights, fit};
-use policy::network::{DeviceChoice, LookAheadNetConfig, Predictor, Weights};
+use policy::fit::{FitContext, FitProgress, FitSettings, KeepWeights, fit};
+use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Predictor, Weights};
 use sim::seed::RootSeed;
 use sim::sensing::{GridGeometry, OccupancyGrid};
 use std::ops::ControlFlow;
@@ -18,10 +18,10 @@ fn main() {
 
 const NETS: [&str; 2] = ["compact", "paper"];
 
-fn net(name: &str) -> LookAheadNetConfig {
+fn net(name: &str) -> NetworkArchitecture {
     match name {
-        "compact" => LookAheadNetConfig::compact(),
-        _ => LookAheadNetConfig::paper(),
+        "compact" => NetworkArchitecture::compact(),
+        _ => NetworkArchitecture::paper(),
     }
 }
 
@@ -62,8 +62,10 @@ fn train<const NET: usize>(bencher: Bencher<'_, '_>, batch: usize) {
     let start = Weights::init(net(NETS[NET]), RootSeed(1), 0);
     bencher.counter(ItemsCount::new(batch * STEPS as usize)).bench_local(|| {
         let mut progress = |_: &FitProgress| ControlFlow::Continue(());
-        let geometry = GridGeometry::paper();
-        fit(start.clone(), &dataset, &settings, geometry, DeviceChoice::Cpu, RootSeed(1), &mut progress)
+        let inference = InferenceSettings::plain();
+        let (geometry, device, seed) = (GridGeometry::paper(), DeviceChoice::Cpu, RootSeed(1));
+        let context = FitContext { geometry, inference, device, seed };
+        fit(start.clone(), &dataset, &settings, context, &mut progress)
     });
 }
 
@@ -71,7 +73,9 @@ fn train<const NET: usize>(bencher: Bencher<'_, '_>, batch: usize) {
 fn infer<const NET: usize>(bencher: Bencher<'_, '_>, batch: usize) {
     let grids = grids(batch);
     let grids: Vec<_> = grids.iter().collect();
-    let mut predictor = Predictor::new(Weights::init(net(NETS[NET]), RootSeed(1), 0), DeviceChoice::Cpu);
+    let inference = if NETS[NET] == "paper" { InferenceSettings::plain() } else { InferenceSettings::smoothed() };
+    let weights = Weights::init(net(NETS[NET]), RootSeed(1), 0);
+    let mut predictor = Predictor::new(weights, inference, DeviceChoice::Cpu);
     predictor.predict(&grids);
     bencher.counter(ItemsCount::new(batch)).bench_local(|| predictor.predict(&grids));
 }

@@ -3,8 +3,11 @@
 //! The tensors are laid out as `PyTorch` has them: convolutions `[out, in, rows, columns]`, dense layers `[out, in]`
 //! with inputs in the order channel, row, column (what `flatten(1)` makes of `[batch, channel, row, column]`).
 
-use crate::dataset::store::{StoreError, read_toml, write_atomically, write_toml};
-use crate::network::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, LookAheadNetConfig, OUTPUTS, POOLED_2, Weights};
+use crate::files::{self, FileError, Format, SCHEMA_REMEDY, write_atomically};
+use crate::network::{
+    ConvLayer, DeviceChoice, InferenceSettings, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture, OUTPUTS,
+    POOLED_2, Predictor, Weights,
+};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use sim::sensing::GridGeometry;
@@ -12,38 +15,79 @@ use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
-/// A network and the meaning of its numbers.
+/// A network, the meaning of its numbers, and how it is used.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checkpoint {
     /// The network.
     pub weights: Weights,
     /// The patch of ground its grids show and its answers are fractions of.
     pub geometry: GridGeometry,
+    /// How it drives.
+    pub inference: InferenceSettings,
 }
 
-const FORMAT_VERSION: u32 = 1;
 const NUMBERS: &str = "model.safetensors";
-const CARD: &str = "model.toml";
 
 /// `model.toml`.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Card {
-    format_version: u32,
+struct ModelFile {
     input: String,
     output: String,
     log_variance_min: f32,
     log_variance_max: f32,
     geometry: GridGeometry,
-    network: LookAheadNetConfig,
+    inference: InferenceSettings,
+    network: NetworkArchitecture,
+    /// In the order in which they are computed. Follows from `network`; for readers in other languages.
+    layers: Vec<Layer>,
+}
+
+/// A layer, and what is applied to its output.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Layer {
+    name: String,
+    kind: LayerKind,
+    /// Of `NAME.weight`; that of `NAME.bias` is its first number.
+    weight_shape: Vec<usize>,
+    /// Zeros around the input: cells at the top and at the left, then at the bottom and at the right. Convolutions only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    padding: Option<[usize; 2]>,
+    /// Side and stride of the max-pool that follows. Convolutions only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    max_pool: Option<usize>,
+    /// Applied last.
+    activation: Activation,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum LayerKind {
+    Conv2d,
+    Linear,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Activation {
+    Relu,
+    Identity,
+}
+
+impl Format for ModelFile {
+    const NAME: &'static str = "model.toml";
+    /// 1 had `format_version`, and the settings of inference under `network`.
+    const SCHEMA: u32 = 2;
 }
 
 const INPUT: &str = "grid [batch, 1, 25, 25]: 1 = non-drivable, 0 = drivable; row 0 = far, column 0 = left";
 const OUTPUT: &str = "[u, w, raw_u, raw_w]: (u, w) look-ahead point in image fractions, u 0 = left 1 = right, w 0 = far \
                       1 = near, clipped to [0, 1] in use; log sigma^2 = mid + half * tanh((raw - mid) / half) between \
-                      log_variance_min and log_variance_max; if network.mirror_averaging, the mean of the output for the grid and \
-                      the output for grid.flip(-1) with 1 - u in place of u; driven at is the exponential mean over \
-                      network.smoothing_ticks of the point's curvature 2 Y / (X^2 + Y^2) and range (X^2 + Y^2)^0.5";
+                      log_variance_min and log_variance_max; if inference.mirror_averaging, the mean of the output for \
+                      the grid and the output for grid.flip(-1) with 1 - u in place of u; driven at is the exponential \
+                      mean over inference.smoothing_ticks of the point's curvature 2 Y / (X^2 + Y^2) and range \
+                      (X^2 + Y^2)^0.5";
 
 impl Checkpoint {
     /// Whether a folder holds a finished checkpoint.
@@ -55,19 +99,20 @@ impl Checkpoint {
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub fn save(&self, folder: &Path) -> Result<(), StoreError> {
-        fs::create_dir_all(folder)
-            .map_err(|error| StoreError::new(folder, error, "check that the parent folder is writable"))?;
-        let card = Card {
-            format_version: FORMAT_VERSION,
+    pub fn save(&self, folder: &Path) -> Result<(), FileError> {
+        files::create_folder(folder)?;
+        let network = self.weights.architecture();
+        let about = ModelFile {
             input: INPUT.to_string(),
             output: OUTPUT.to_string(),
             log_variance_min: LOG_VARIANCE_MIN,
             log_variance_max: LOG_VARIANCE_MAX,
             geometry: self.geometry,
-            network: self.weights.config(),
+            inference: self.inference,
+            network,
+            layers: layers(&network),
         };
-        write_toml(&folder.join(CARD), &card)?;
+        files::write(folder, &about)?;
 
         let path = folder.join(NUMBERS);
         let tensors: Vec<Tensor> = to_pytorch(&self.weights);
@@ -76,52 +121,82 @@ impl Checkpoint {
             (tensor.name, view)
         });
         let bytes = safetensors::serialize(views, None)
-            .map_err(|error| StoreError::new(&path, error, "report this: the weights cannot be serialised"))?;
+            .map_err(|error| FileError::new(&path, error, "report this: the weights cannot be serialised"))?;
         write_atomically(&path, |file| file.write_all(&bytes).map_err(|error| error.to_string()))
     }
 
     /// Reads both files.
     ///
     /// # Errors
-    /// If a file is missing, of another version, or its tensors are those of another network.
-    pub fn load(folder: &Path) -> Result<Self, StoreError> {
-        let path = folder.join(CARD);
-        let card: Card = read_toml(&path)?;
-        if card.format_version != FORMAT_VERSION {
-            let problem = format!("format version {} instead of {FORMAT_VERSION}", card.format_version);
-            return Err(StoreError::new(&path, problem, "train again, or use the program that wrote it"));
+    /// If a file is missing, of another schema, or its tensors are those of another network.
+    pub fn load(folder: &Path) -> Result<Self, FileError> {
+        let about: ModelFile = files::read(folder)?;
+        let path = folder.join(ModelFile::NAME);
+        if (about.log_variance_min, about.log_variance_max) != (LOG_VARIANCE_MIN, LOG_VARIANCE_MAX) {
+            let problem = format!("log-variance bounds [{}, {}]", about.log_variance_min, about.log_variance_max);
+            return Err(FileError::new(&path, problem, SCHEMA_REMEDY));
         }
-        if (card.log_variance_min, card.log_variance_max) != (LOG_VARIANCE_MIN, LOG_VARIANCE_MAX) {
-            let problem = format!("log-variance bounds [{}, {}]", card.log_variance_min, card.log_variance_max);
-            return Err(StoreError::new(&path, problem, "train again, or use the program that wrote it"));
+        let sound = about.network.validate().and_then(|()| about.inference.validate());
+        sound.map_err(|error| FileError::new(&path, error, RESTORE))?;
+        let expected = layers(&about.network);
+        if about.layers.len() != expected.len() {
+            let problem = format!("{} layers instead of {}", about.layers.len(), expected.len());
+            return Err(FileError::new(&path, problem, RESTORE));
         }
-        card.network
-            .validate()
-            .map_err(|error| StoreError::new(&path, error, "restore the file the training wrote"))?;
+        if let Some((found, expected)) = about.layers.iter().zip(&expected).find(|(found, expected)| found != expected)
+        {
+            let problem = format!("layer {found:?} is not what its network has: {expected:?}");
+            return Err(FileError::new(&path, problem, RESTORE));
+        }
 
         let path = folder.join(NUMBERS);
-        let bytes = fs::read(&path).map_err(|error| StoreError::new(&path, error, RESTORE))?;
-        let tensors = SafeTensors::deserialize(&bytes).map_err(|error| StoreError::new(&path, error, RESTORE))?;
-        let mut weights = Weights::zeros(card.network);
+        let bytes = fs::read(&path).map_err(|error| FileError::new(&path, error, RESTORE))?;
+        let tensors = SafeTensors::deserialize(&bytes).map_err(|error| FileError::new(&path, error, RESTORE))?;
+        let mut weights = Weights::zeros(about.network);
         from_pytorch(&mut weights, |name, shape| {
             let tensor = tensors.tensor(name).map_err(|error| {
-                StoreError::new(&path, format!("tensor {name} of shape {shape:?} expected: {error}"), RESTORE)
+                FileError::new(&path, format!("tensor {name} of shape {shape:?} expected: {error}"), RESTORE)
             })?;
             if tensor.shape() != shape || tensor.dtype() != Dtype::F32 {
                 let found = (tensor.dtype(), tensor.shape());
                 let problem = format!("tensor {name}: expected F32 {shape:?}, found {:?} {:?}", found.0, found.1);
-                return Err(StoreError::new(&path, problem, RESTORE));
+                return Err(FileError::new(&path, problem, RESTORE));
             }
             Ok(tensor.data().as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect())
         })?;
         if let Some(index) = weights.values().iter().position(|value| !value.is_finite()) {
-            return Err(StoreError::new(&path, format!("value {index} is not finite"), RESTORE));
+            return Err(FileError::new(&path, format!("value {index} is not finite"), RESTORE));
         }
-        Ok(Self { weights, geometry: card.geometry })
+        Ok(Self { weights, geometry: about.geometry, inference: about.inference })
+    }
+
+    /// The network ready to answer, without action smoothing.
+    pub fn predictor(&self, device: DeviceChoice) -> Predictor {
+        Predictor::new(self.weights.clone(), self.inference, device)
     }
 }
 
 const RESTORE: &str = "model.safetensors and model.toml belong together: restore both, or train again";
+
+fn layers(architecture: &NetworkArchitecture) -> Vec<Layer> {
+    let of_conv = |conv: ConvLayer| {
+        let (before, after) = conv.padding();
+        Some([before, after])
+    };
+    let weights =
+        shapes(architecture).into_iter().filter_map(|(name, shape)| Some((name.strip_suffix(".weight")?, shape)));
+    weights
+        .map(|(name, weight_shape)| {
+            let (kind, padding, activation) = match name {
+                "conv1" => (LayerKind::Conv2d, of_conv(architecture.conv1), Activation::Relu),
+                "conv2" => (LayerKind::Conv2d, of_conv(architecture.conv2), Activation::Relu),
+                "fc1" => (LayerKind::Linear, None, Activation::Relu),
+                _ => (LayerKind::Linear, None, Activation::Identity),
+            };
+            Layer { name: name.to_owned(), kind, weight_shape, padding, max_pool: padding.map(|_| 2), activation }
+        })
+        .collect()
+}
 
 /// One tensor as it is stored.
 struct Tensor {
@@ -131,14 +206,14 @@ struct Tensor {
 }
 
 /// Names and shapes in the order of [`crate::network::Parts`].
-fn shapes(config: &LookAheadNetConfig) -> [(&'static str, Vec<usize>); 8] {
-    let (conv1, conv2, hidden) = (config.conv1, config.conv2, config.hidden);
+fn shapes(architecture: &NetworkArchitecture) -> [(&'static str, Vec<usize>); 8] {
+    let (conv1, conv2, hidden) = (architecture.conv1, architecture.conv2, architecture.hidden);
     [
         ("conv1.weight", vec![conv1.channels, 1, conv1.kernel, conv1.kernel]),
         ("conv1.bias", vec![conv1.channels]),
         ("conv2.weight", vec![conv2.channels, conv1.channels, conv2.kernel, conv2.kernel]),
         ("conv2.bias", vec![conv2.channels]),
-        ("fc1.weight", vec![hidden, config.features()]),
+        ("fc1.weight", vec![hidden, architecture.features()]),
         ("fc1.bias", vec![hidden]),
         ("fc2.weight", vec![OUTPUTS, hidden]),
         ("fc2.bias", vec![OUTPUTS]),
@@ -146,19 +221,19 @@ fn shapes(config: &LookAheadNetConfig) -> [(&'static str, Vec<usize>); 8] {
 }
 
 fn to_pytorch(weights: &Weights) -> Vec<Tensor> {
-    let config = weights.config();
+    let architecture = weights.architecture();
     let parts = weights.parts();
     let values: [Vec<f32>; 8] = [
         parts.conv1_weight.to_vec(),
         parts.conv1_bias.to_vec(),
         parts.conv2_weight.to_vec(),
         parts.conv2_bias.to_vec(),
-        (0..parts.fc1_weight.len()).map(|stored| parts.fc1_weight[fc1_index(&config, stored)]).collect(),
+        (0..parts.fc1_weight.len()).map(|stored| parts.fc1_weight[fc1_index(&architecture, stored)]).collect(),
         parts.fc1_bias.to_vec(),
-        (0..parts.fc2_weight.len()).map(|stored| parts.fc2_weight[fc2_index(&config, stored)]).collect(),
+        (0..parts.fc2_weight.len()).map(|stored| parts.fc2_weight[fc2_index(&architecture, stored)]).collect(),
         parts.fc2_bias.to_vec(),
     ];
-    shapes(&config)
+    shapes(&architecture)
         .into_iter()
         .zip(values)
         .map(|((name, shape), values)| {
@@ -172,7 +247,7 @@ fn from_pytorch<E>(
     weights: &mut Weights,
     mut tensor: impl FnMut(&str, &[usize]) -> Result<Vec<f32>, E>,
 ) -> Result<(), E> {
-    let config = weights.config();
+    let architecture = weights.architecture();
     let parts = weights.parts_mut();
     let into = [
         parts.conv1_weight,
@@ -184,11 +259,11 @@ fn from_pytorch<E>(
         parts.fc2_weight,
         parts.fc2_bias,
     ];
-    for ((name, shape), into) in shapes(&config).into_iter().zip(into) {
+    for ((name, shape), into) in shapes(&architecture).into_iter().zip(into) {
         for (stored, value) in tensor(name, &shape)?.into_iter().enumerate() {
             let index = match name {
-                "fc1.weight" => fc1_index(&config, stored),
-                "fc2.weight" => fc2_index(&config, stored),
+                "fc1.weight" => fc1_index(&architecture, stored),
+                "fc2.weight" => fc2_index(&architecture, stored),
                 _ => stored,
             };
             into[index] = value;
@@ -198,32 +273,34 @@ fn from_pytorch<E>(
 }
 
 /// Ours is `[row, column, channel, hidden]`, stored is `[hidden, channel, row, column]`.
-fn fc1_index(config: &LookAheadNetConfig, stored: usize) -> usize {
+fn fc1_index(architecture: &NetworkArchitecture, stored: usize) -> usize {
     let cells = POOLED_2 * POOLED_2;
-    let (unit, feature) = (stored / config.features(), stored % config.features());
+    let (unit, feature) = (stored / architecture.features(), stored % architecture.features());
     let (channel, cell) = (feature / cells, feature % cells);
-    (cell * config.conv2.channels + channel) * config.hidden + unit
+    (cell * architecture.conv2.channels + channel) * architecture.hidden + unit
 }
 
 /// Ours is `[hidden, output]`, stored is `[output, hidden]`.
-fn fc2_index(config: &LookAheadNetConfig, stored: usize) -> usize {
-    stored % config.hidden * OUTPUTS + stored / config.hidden
+fn fc2_index(architecture: &NetworkArchitecture, stored: usize) -> usize {
+    stored % architecture.hidden * OUTPUTS + stored / architecture.hidden
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::store::tests::scratch;
+    use crate::test_data::scratch;
     use sim::seed::RootSeed;
 
-    fn checkpoint(config: LookAheadNetConfig) -> Checkpoint {
-        Checkpoint { weights: Weights::init(config, RootSeed(1), 0), geometry: GridGeometry::paper() }
+    fn checkpoint(architecture: NetworkArchitecture) -> Checkpoint {
+        let weights = Weights::init(architecture, RootSeed(1), 0);
+        let inference = InferenceSettings { mirror_averaging: true, smoothing_ticks: 3.5 };
+        Checkpoint { weights, geometry: GridGeometry::paper(), inference }
     }
 
     #[test]
     fn a_checkpoint_reads_back_bit_by_bit() {
         let folder = scratch("checkpoint");
-        let saved = checkpoint(LookAheadNetConfig::paper());
+        let saved = checkpoint(NetworkArchitecture::paper());
         assert!(!Checkpoint::exists(&folder));
         saved.save(&folder).unwrap();
         assert!(Checkpoint::exists(&folder));
@@ -236,8 +313,8 @@ mod tests {
     /// `fc1.weight[unit, (channel, row, column)]` is the weight from that feature to that unit.
     #[test]
     fn dense_layers_are_stored_in_pytorch_order() {
-        let config = LookAheadNetConfig { hidden: 3, ..LookAheadNetConfig::compact() };
-        let weights = Weights::init(config, RootSeed(2), 0);
+        let architecture = NetworkArchitecture { hidden: 3, ..NetworkArchitecture::compact() };
+        let weights = Weights::init(architecture, RootSeed(2), 0);
         let tensors = to_pytorch(&weights);
         let value =
             |tensor: &Tensor, index: usize| f32::from_le_bytes(*tensor.bytes[4 * index..].first_chunk::<4>().unwrap());
@@ -252,14 +329,36 @@ mod tests {
     #[test]
     fn another_architecture_is_refused_by_tensor_and_shape() {
         let folder = scratch("architecture");
-        checkpoint(LookAheadNetConfig::compact()).save(&folder).unwrap();
+        checkpoint(NetworkArchitecture::compact()).save(&folder).unwrap();
         let small = fs::read(folder.join(NUMBERS)).unwrap();
-        checkpoint(LookAheadNetConfig::paper()).save(&folder).unwrap();
+        checkpoint(NetworkArchitecture::paper()).save(&folder).unwrap();
         fs::write(folder.join(NUMBERS), small).unwrap();
         let error = Checkpoint::load(&folder).unwrap_err().to_string();
         for part in ["model.safetensors", "conv1.weight", "[32, 1, 5, 5]", "[16, 1, 3, 3]"] {
             assert!(error.contains(part), "{error}");
         }
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn the_file_lists_the_layers_in_order_with_their_shapes() {
+        let layers = layers(&NetworkArchitecture::paper());
+        let names: Vec<&str> = layers.iter().map(|layer| layer.name.as_str()).collect();
+        assert_eq!(names, ["conv1", "conv2", "fc1", "fc2"]);
+        assert_eq!((layers[1].weight_shape.clone(), layers[1].padding), (vec![64, 32, 2, 2], Some([0, 1])));
+        assert_eq!((layers[2].weight_shape.clone(), layers[2].max_pool), (vec![1000, 64 * 6 * 6], None));
+        assert_eq!(layers[3].activation, Activation::Identity);
+    }
+
+    #[test]
+    fn a_checkpoint_of_an_older_version_is_refused_by_name() {
+        let folder = scratch("older");
+        checkpoint(NetworkArchitecture::compact()).save(&folder).unwrap();
+        let path = folder.join("model.toml");
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, text.replace("schema = 2", "format_version = 1")).unwrap();
+        let error = Checkpoint::load(&folder).unwrap_err().to_string();
+        assert!(error.contains("model.toml") && error.contains("older version"), "{error}");
         fs::remove_dir_all(folder).unwrap();
     }
 

@@ -1,4 +1,4 @@
-//! May the network drive this tick? Algorithm 2, line 9, in the readings that make sense (methods.md 4.3, 4.4).
+//! May the network drive this tick? Algorithm 2, line 9, in the readings that make sense (docs/methods.md 4.3, 4.4).
 
 use crate::network::Prediction;
 use serde::{Deserialize, Serialize};
@@ -21,15 +21,17 @@ impl Evidence {
     }
 }
 
-/// When the network may drive. All comparisons are strict, as printed.
+/// When the network may drive. All comparisons are strict, as printed. Thresholds that are not given are the paper's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum DecisionRule {
     /// All of τ̂ < τ, `χ̂_u` < χ, `χ̂_w` < χ: the text, the figures, and the only reading that gives the paper's table.
     AllBelow {
         /// Threshold of the discrepancy, image fractions.
+        #[serde(default = "paper_tau")]
         tau: f32,
         /// Threshold of the doubt, in the unit of `chi_on`.
+        #[serde(default = "paper_chi")]
         chi: f32,
         /// What χ is compared with.
         #[serde(default)]
@@ -38,8 +40,10 @@ pub enum DecisionRule {
     /// Any of them: Algorithm 2 as printed ("or").
     AnyBelowLiteral {
         /// Threshold of the discrepancy, image fractions.
+        #[serde(default = "paper_tau")]
         tau: f32,
         /// Threshold of the doubt, in the unit of `chi_on`.
+        #[serde(default = "paper_chi")]
         chi: f32,
         /// What χ is compared with.
         #[serde(default)]
@@ -48,10 +52,19 @@ pub enum DecisionRule {
     /// τ̂ < τ alone.
     TauOnly {
         /// Threshold of the discrepancy, image fractions.
+        #[serde(default = "paper_tau")]
         tau: f32,
     },
     /// Never: the expert drives, as in behaviour cloning.
     ExpertOnly,
+}
+
+fn paper_tau() -> f32 {
+    0.07
+}
+
+fn paper_chi() -> f32 {
+    0.1
 }
 
 /// What χ is compared with.
@@ -70,7 +83,7 @@ pub enum ChiOn {
 impl DecisionRule {
     /// τ = 0.07, χ = 0.1 (paper), all below, χ on σ per axis.
     pub fn paper() -> Self {
-        Self::AllBelow { tau: 0.07, chi: 0.1, chi_on: ChiOn::StdPerAxis }
+        Self::AllBelow { tau: paper_tau(), chi: paper_chi(), chi_on: ChiOn::StdPerAxis }
     }
 
     /// Whether the network drives.
@@ -142,12 +155,28 @@ mod tests {
         assert_eq!(evidence.doubt, [0.1, 0.2]);
     }
 
+    #[derive(Debug, Serialize, Deserialize)]
+    struct File {
+        #[serde(deserialize_with = "crate::string_or_table::string_or_table")]
+        rule: DecisionRule,
+    }
+
+    #[test]
+    fn a_name_alone_is_a_rule_with_the_papers_thresholds() {
+        let read = |text: &str| toml::from_str::<File>(text).map(|file| file.rule).map_err(|error| error.to_string());
+        assert_eq!(read("rule = 'tau_only'"), Ok(DecisionRule::TauOnly { tau: 0.07 }));
+        assert_eq!(read("rule = 'all_below'"), Ok(DecisionRule::paper()));
+        assert_eq!(read("rule = 'expert_only'"), Ok(DecisionRule::ExpertOnly));
+        assert_eq!(read("rule = { tau_only = {} }"), Ok(DecisionRule::TauOnly { tau: 0.07 }));
+        assert_eq!(read("rule = { tau_only = { tau = 0.2 } }"), Ok(DecisionRule::TauOnly { tau: 0.2 }));
+        for (text, part) in [("rule = 'tau_onli'", "all_below"), ("rule = { tau_only = { chi = 1 } }", "chi")] {
+            let error = read(text).unwrap_err();
+            assert!(error.contains(part), "{text}: {error}");
+        }
+    }
+
     #[test]
     fn rules_survive_toml() {
-        #[derive(Serialize, Deserialize)]
-        struct File {
-            rule: DecisionRule,
-        }
         let text = toml::to_string(&File { rule: DecisionRule::paper() }).unwrap();
         assert_eq!(toml::from_str::<File>(&text).unwrap().rule, DecisionRule::paper());
     }

@@ -1,8 +1,8 @@
 //! The trained network at the wheel: of many cars in lock-step, or of one.
 
+use crate::action_smoothing::{ActionSmoothing, FleetSmoothing};
 use crate::checkpoint::Checkpoint;
 use crate::network::{DeviceChoice, Prediction, Predictor};
-use crate::smoothing::{ActionSmoothing, FleetSmoothing};
 use sim::driver::{Decision, Fleet, Policy, Seat, Source};
 use sim::sensing::{GridGeometry, Observation};
 
@@ -15,9 +15,8 @@ pub struct NetFleet {
 
 impl NetFleet {
     /// Seats a network.
-    pub fn new(checkpoint: Checkpoint, device: DeviceChoice) -> Self {
-        let Checkpoint { weights, geometry } = checkpoint;
-        Self { novice: Novice::new(Predictor::new(weights, device), geometry), geometry }
+    pub fn new(checkpoint: &Checkpoint, device: DeviceChoice) -> Self {
+        Self { novice: Novice::new(checkpoint, device), geometry: checkpoint.geometry }
     }
 }
 
@@ -28,7 +27,7 @@ impl Fleet for NetFleet {
     }
 }
 
-/// The network as it answers at the wheel of many cars: with what it remembers of each.
+/// The network as it answers at the wheel of many cars: with the action smoothing of each.
 #[derive(Debug, Clone)]
 pub(crate) struct Novice {
     predictor: Predictor,
@@ -36,16 +35,16 @@ pub(crate) struct Novice {
 }
 
 impl Novice {
-    pub(crate) fn new(predictor: Predictor, geometry: GridGeometry) -> Self {
-        let smoothing = FleetSmoothing::new(&predictor.weights().config(), geometry);
-        Self { predictor, smoothing }
+    pub(crate) fn new(checkpoint: &Checkpoint, device: DeviceChoice) -> Self {
+        let smoothing = FleetSmoothing::new(checkpoint.inference, checkpoint.geometry);
+        Self { predictor: checkpoint.predictor(device), smoothing }
     }
 
     /// What it answers at every seat, smoothed.
     pub(crate) fn answers(&mut self, seats: &[Seat<'_>]) -> Vec<Prediction> {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
         let mut answers = self.predictor.predict(&grids);
-        self.smoothing.steady(seats, &mut answers);
+        self.smoothing.smooth(seats, &mut answers);
         answers
     }
 }
@@ -60,10 +59,10 @@ pub struct NetPolicy {
 
 impl NetPolicy {
     /// Seats a network.
-    pub fn new(checkpoint: Checkpoint, device: DeviceChoice) -> Self {
-        let Checkpoint { weights, geometry } = checkpoint;
-        let smoothing = ActionSmoothing::new(&weights.config(), geometry);
-        Self { predictor: Predictor::new(weights, device), geometry, smoothing }
+    pub fn new(checkpoint: &Checkpoint, device: DeviceChoice) -> Self {
+        let geometry = checkpoint.geometry;
+        let smoothing = ActionSmoothing::new(checkpoint.inference, geometry);
+        Self { predictor: checkpoint.predictor(device), geometry, smoothing }
     }
 }
 
@@ -90,18 +89,19 @@ pub(crate) fn novice_decision(prediction: &Prediction, geometry: GridGeometry) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::fast::tests::lots;
-    use crate::network::{LookAheadNetConfig, Weights};
+    use crate::network::{InferenceSettings, NetworkArchitecture, Weights};
+    use crate::test_data::lots;
     use sim::seed::RootSeed;
 
     #[test]
     fn a_policy_answers_what_the_network_says() {
-        let weights = Weights::init(LookAheadNetConfig::compact(), RootSeed(1), 0);
+        let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
         let geometry = GridGeometry::paper();
         let grid = lots(1)[0];
-        let mut policy = NetPolicy::new(Checkpoint { weights: weights.clone(), geometry }, DeviceChoice::Cpu);
+        let checkpoint = Checkpoint { weights, geometry, inference: InferenceSettings::smoothed() };
+        let mut policy = NetPolicy::new(&checkpoint, DeviceChoice::Cpu);
         let decision = policy.act(&Observation { grid });
-        let prediction = Predictor::new(weights, DeviceChoice::Cpu).predict(&[&grid])[0];
+        let prediction = checkpoint.predictor(DeviceChoice::Cpu).predict(&[&grid])[0];
         assert_eq!(decision.source, Source::Novice);
         assert_eq!(decision.look_ahead.to_image_fraction(&geometry).map(round), prediction.clipped_mean().map(round));
         assert_eq!(decision.spread.unwrap().ahead_m, prediction.sigma[1] * geometry.side_m);

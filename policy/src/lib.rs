@@ -8,17 +8,22 @@
 //! | [`fit`] | "train policy `π_net` on D": behaviour cloning is one call, a `DAgger` iteration another |
 //! | [`decision_rule`] | Algorithm 2, line 9: may the network drive this tick? |
 //! | [`dagger`] | Algorithms 1 and 2, top to bottom |
-//! | [`drivers`] | the trained network at the wheel |
+//! | [`drivers`] | the trained network at the wheel, with action smoothing |
 //! | [`checkpoint`] | a trained network on disk |
+//! | [`files`] | files of a run: errors, schema versions |
 //!
-//! Images: u = column fraction (0 = left, 1 = right), w = row fraction (0 = far, 1 = near), as in methods.md 0.
+//! Images: u = column fraction (0 = left, 1 = right), w = row fraction (0 = far, 1 = near), as in docs/methods.md 0.
 
+mod action_smoothing;
 pub mod checkpoint;
 pub mod dagger;
 pub mod dataset;
 pub mod decision_rule;
 pub mod drivers;
+pub mod files;
 pub mod fit;
 pub mod loss;
 pub mod network;
-mod smoothing;
+mod string_or_table;
+#[cfg(test)]
+mod test_data;

@@ -1,4 +1,4 @@
-//! The loss of the paper: Gaussian log-likelihood with the gain (1 + α τ̂) on the residual (methods.md 4.2).
+//! The loss of the paper: Gaussian log-likelihood with the gain (1 + α τ̂) on the residual (docs/methods.md 4.2).
 //!
 //! Per sample, with s = log σ² and e = label − mean, both axes j averaged:
 //!
@@ -7,6 +7,7 @@
 //! Two forms: closed ([`of_sample`], used on CPUs) and on burn tensors ([`of_batch`], used on GPUs).
 
 use crate::network::{self, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, OUTPUTS};
+use crate::string_or_table::string_or_table;
 use burn::tensor::Tensor;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +18,7 @@ pub struct LossSettings {
     /// α, gain of the discrepancy τ̂. 0 switches the paper's weighting off.
     pub alpha: f32,
     /// Where the gain enters.
+    #[serde(deserialize_with = "string_or_table")]
     pub weight: WeightForm,
     /// β of β-NLL (Seitzer 2022): the loss of each axis times σ^2β, as a constant. 0 = the paper's loss.
     pub beta: f32,
@@ -30,9 +32,14 @@ pub enum WeightForm {
     ResidualSq,
     /// The authors' published code: on the squared error, 1 + gain · τ̂; α is not used.
     Linear {
-        /// Their value is 10.
+        /// 10 (authors' code).
+        #[serde(default = "authors_gain")]
         gain: f32,
     },
+}
+
+fn authors_gain() -> f32 {
+    10.0
 }
 
 impl LossSettings {

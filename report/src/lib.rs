@@ -9,6 +9,7 @@
 //! | [`run_report`], [`moments`] | `report.html` of a run, with its worst near-collisions |
 //! | [`reproduction`] | the report of `reproduce` |
 
+mod command_line;
 pub mod failures;
 pub mod glossary;
 pub mod markdown;

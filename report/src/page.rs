@@ -138,22 +138,42 @@ impl Page {
             if let Part::Figure { name, image, .. } = part {
                 std::fs::create_dir_all(&figures)
                     .with_context(|| format!("{}: cannot be created; is the folder writable?", figures.display()))?;
-                write_whole(&folder.join(image.path(name)), &image.bytes())?;
+                write_whole(&figures.join(image.file(name)), &image.bytes())?;
             }
         }
         write_whole(&folder.join(format!("{stem}.md")), self.to_markdown().as_bytes())?;
         write_whole(&folder.join(format!("{stem}.html")), self.to_html().as_bytes())
     }
 
+    /// Writes Markdown alone, as a file of a repository: `figures` is a folder relative to its own.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn write_markdown(&self, path: &Path, figures: &str) -> anyhow::Result<()> {
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let into = folder.join(figures);
+        std::fs::create_dir_all(&into).with_context(|| format!("{}: cannot be created", into.display()))?;
+        for part in &self.parts {
+            if let Part::Figure { name, image, .. } = part {
+                write_whole(&into.join(image.file(name)), &image.bytes())?;
+            }
+        }
+        write_whole(path, self.markdown_with(figures).as_bytes())
+    }
+
     /// Markdown that names the figures as files beside it.
     pub fn to_markdown(&self) -> String {
+        self.markdown_with(FIGURES)
+    }
+
+    fn markdown_with(&self, figures: &str) -> String {
         let mut text = format!("# {}\n", escaped_markdown(&self.title));
         for part in &self.parts {
             let _ = match part {
                 Part::Heading(title) => write!(text, "\n## {title}\n"),
                 Part::Markdown(markdown) => write!(text, "\n{}\n", markdown.trim_end()),
                 Part::Figure { name, caption, image } => {
-                    write!(text, "\n![{name}]({})\n\n{}\n", image.path(name), caption.trim_end())
+                    write!(text, "\n![{name}]({figures}/{})\n\n{}\n", image.file(name), caption.trim_end())
                 }
             };
         }
@@ -208,13 +228,13 @@ impl Page {
 }
 
 impl Image {
-    /// Of a picture of this name, relative to the Markdown.
-    fn path(&self, name: &str) -> String {
+    /// The file of a picture of this name.
+    fn file(&self, name: &str) -> String {
         let ending = match self {
             Self::Svg(_) | Self::Player(_) => "svg",
             Self::Png(_) => "png",
         };
-        format!("{FIGURES}/{name}.{ending}")
+        format!("{name}.{ending}")
     }
 
     fn bytes(&self) -> Cow<'_, [u8]> {

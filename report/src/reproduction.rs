@@ -1,5 +1,6 @@
 //! The one report: what holds, the paper's tables beside ours, ablations. Made from what the stages wrote.
 
+use crate::command_line::command_line;
 use crate::markdown::{table_of, with_header};
 use crate::page::{Image, Page};
 use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
@@ -18,7 +19,7 @@ use evaluation::summary::csv_of;
 use evaluation::table1::Table1;
 use experiment::drivers::NamedDriver;
 use experiment::lots::Lot;
-use experiment::run_dir::RunDir;
+use experiment::run_dir::{Manifest, RunDir};
 use experiment::settings::Settings;
 use policy::dagger::IterationRow;
 use sim::seed::RootSeed;
@@ -69,43 +70,178 @@ impl<'a> Drive<'a> {
 /// # Errors
 /// If what a stage wrote cannot be read, or a file cannot be written.
 pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
-    let root = run.path();
-    let settings = &recipe.settings;
-    let [reference, unseen, rules] =
-        [stages::REFERENCE, stages::UNSEEN, stages::RULES].map(|folder| Drive::open(recipe, folder));
-    let (reference, unseen, rules) = (reference?, unseen?, rules?);
-    let plans = [reference.plan(), unseen.plan(), rules.plan()];
-    let results = |plan: &Plan<'_>, folder: &str| EvaluationResults::read(plan, &root.join(folder));
-    let results_of = [
-        results(&plans[0], stages::REFERENCE)?,
-        results(&plans[1], stages::UNSEEN)?,
-        results(&plans[2], stages::RULES)?,
-    ];
-    let [reference, unseen, rules] = [0, 1, 2].map(|i| Driven { plan: &plans[i], results: &results_of[i] });
-    let on_policy = OnPolicy::read(&root.join(stages::ON_POLICY))?;
-    let rows = |chain| rows_of(root, chain, settings.seed);
-    let (weighted, unweighted) = (rows(Chain::Weighted)?, rows(Chain::Unweighted)?);
-
-    let statements = statements(settings.dagger.eta, &reference, &unseen, &weighted, &on_policy.effect);
+    let found = Found::read(recipe, run.path())?;
     let mut page = Page::new("The paper in a box");
     page.text(introduction(recipe));
-    let verdicts = verdicts(&statements);
-    page.section("What holds here", verdicts.clone());
-    table_1(&mut page, settings.dagger.eta, &weighted, &unweighted, &on_policy.effect);
-    collision_rates(&mut page, &reference);
-    safe_ratios(&mut page, &reference);
-    unseen_lots(&mut page, &unseen);
-    page.section("Ablations", "");
-    page.text(decision_rules(root, settings.seed, &rules)?);
-    page.text(weight_and_cloning(&reference));
-    calibration(&mut page, &on_policy.calibration);
-    if recipe.extent.seeds > 1 {
-        page.section("Training seeds", training_seeds(recipe, &reference, &unseen));
-    }
+    found.add_to(&mut page, recipe, run.path())?;
     page.section("Where to look further", further());
-    page.write(root, "report")?;
-    run.write("conclusions.csv", &csv_of(&statements)?)?;
-    Ok(verdicts)
+    page.write(run.path(), "report")?;
+    run.write("conclusions.csv", &csv_of(&found.statements)?)?;
+    Ok(verdicts(&found.statements))
+}
+
+/// Writes the same as a page of the documentation, with what made it in its head; figures go to `pictures/results` beside
+/// it.
+///
+/// # Errors
+/// If what a stage wrote cannot be read, or a file cannot be written.
+pub fn write_docs(recipe: &Recipe, run: &Path, to: &Path) -> anyhow::Result<()> {
+    let manifest = Manifest::read(run)?;
+    let unknown = || "unknown".to_owned();
+    let mut head = "Written by a command from one run; nothing here is typed by hand.\n\n| | |\n|---|---|\n".to_owned();
+    let changes = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };
+    for (name, value) in [
+        ("command", format!("`{}`", command_line(&manifest))),
+        ("written by", format!("`cargo xtask render results {}`", run.display())),
+        ("commit", format!("`{}`{changes}", manifest.git_revision.clone().unwrap_or_else(unknown))),
+        ("program", manifest.program.clone()),
+        ("machine", format!("{}, {} threads", manifest.processor.clone().unwrap_or_else(unknown), manifest.threads)),
+        ("system", manifest.target.clone()),
+        ("compiler", manifest.rustc_version.clone()),
+        ("preset", format!("`{}`", manifest.preset)),
+        ("training seeds", seeds_of(recipe)),
+        ("seed of the trials", manifest.evaluation_seed.to_string()),
+    ] {
+        let _ = writeln!(head, "| {name} | {value} |");
+    }
+    let mut page = Page::new("Results");
+    page.text(head);
+    page.text(introduction(recipe));
+    page.text(CAUTIONS);
+    Found::read(recipe, run)?.add_to(&mut page, recipe, run)?;
+    page.write_markdown(to, "pictures/results")
+}
+
+/// What a reader must know before quoting a figure.
+const CAUTIONS: &str = "\
+Before quoting a figure: the widths of the three reference lots were chosen so that the expert meets the paper's safe \
+ratios ([methods](methods.md#11-the-lots)). The expert's points lie at half of the open way, which is our reading of the \
+paper ([paper](paper.md)); it raises η̂ at an unchanged τ, so that η̂ is not comparable with the paper's. Forward and reverse \
+drives of a trial share their obstacles. One training is one sample: intervals say how sure the rate of *this* network is, \
+not what another training would give.";
+
+fn seeds_of(recipe: &Recipe) -> String {
+    let seeds = stages::seeds(&recipe.settings, &recipe.extent);
+    seeds.iter().map(|seed| seed.0.to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// What the stages found.
+struct Found {
+    statements: Vec<Statement>,
+    weighted: Vec<IterationRow>,
+    unweighted: Vec<IterationRow>,
+    on_policy: OnPolicy,
+}
+
+/// Calls with what was driven in the three stages that drive: the paper's lots, unseen lots, decision rules.
+fn with_drives<T>(
+    recipe: &Recipe,
+    root: &Path,
+    then: impl FnOnce(&Driven<'_>, &Driven<'_>, &Driven<'_>) -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
+    let folders = [stages::REFERENCE, stages::UNSEEN, stages::RULES];
+    let [reference, unseen, rules] = folders.map(|folder| Drive::open(recipe, folder));
+    let drives = [reference?, unseen?, rules?];
+    let plans = [0, 1, 2].map(|i: usize| drives[i].plan());
+    let [reference, unseen, rules] = [0, 1, 2].map(|i| EvaluationResults::read(&plans[i], &root.join(folders[i])));
+    let results = [reference?, unseen?, rules?];
+    let [reference, unseen, rules] = [0, 1, 2].map(|i| Driven { plan: &plans[i], results: &results[i] });
+    then(&reference, &unseen, &rules)
+}
+
+impl Found {
+    fn read(recipe: &Recipe, root: &Path) -> anyhow::Result<Self> {
+        let settings = &recipe.settings;
+        let rows = |chain| rows_of(root, chain, settings.seed);
+        let (weighted, unweighted) = (rows(Chain::Weighted)?, rows(Chain::Unweighted)?);
+        let on_policy = OnPolicy::read(&root.join(stages::ON_POLICY))?;
+        let statements = with_drives(recipe, root, |reference, unseen, _| {
+            Ok(statements(settings.dagger.eta, reference, unseen, &weighted, &on_policy.effect))
+        })?;
+        Ok(Self { statements, weighted, unweighted, on_policy })
+    }
+
+    fn add_to(&self, page: &mut Page, recipe: &Recipe, root: &Path) -> anyhow::Result<()> {
+        let settings = &recipe.settings;
+        with_drives(recipe, root, |reference, unseen, rules| {
+            headline(page, reference, unseen);
+            page.section("What holds here", verdicts(&self.statements));
+            table_1(page, settings.dagger.eta, &self.weighted, &self.unweighted, &self.on_policy.effect);
+            collision_rates(page, reference);
+            safe_ratios(page, reference);
+            unseen_lots(page, unseen);
+            page.section("How they drove", how_they_drove(reference, unseen));
+            page.section("Ablations", "");
+            page.text(decision_rules(root, settings.seed, rules)?);
+            page.text(weight_and_cloning(reference));
+            calibration(page, &self.on_policy.calibration);
+            if recipe.extent.seeds > 1 {
+                page.section("Training seeds", training_seeds(recipe, reference, unseen));
+            }
+            Ok(())
+        })
+    }
+}
+
+/// The learned drivers and the best of the others: near-collisions, contacts and least clearance side by side.
+fn headline(page: &mut Page, reference: &Driven<'_>, unseen: &Driven<'_>) {
+    let mut table =
+        table_of(&["driver", "lots", "route", "near-collisions", "per 100 m [95 %]", "contacts", "least clearance"]);
+    for (driven, label) in [(reference, "the paper's three"), (unseen, "unseen, generated")] {
+        let slice = driven.all();
+        for name in ["expert", "DAgger", "BC", "tentacle, tuned"] {
+            let Some(driver) = driven.driver(name) else { continue };
+            let totals = driven.results.totals(0, driver, &slice, None);
+            table.add_row([
+                name.to_owned(),
+                label.to_owned(),
+                format!("{:.0} m", totals.reference_m),
+                totals.near_collisions.to_string(),
+                exact_rate(totals.near_collisions, totals.reference_m),
+                totals.contacts.to_string(),
+                totals.clearance_min_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2} m")),
+            ]);
+        }
+    }
+    page.section(
+        "In short",
+        format!(
+            "{table}\n\nA *near-collision*: something lies within 0.5 m in the direction of travel; the car is stopped, put \
+             back on the route, and drives on. A *contact*: the body touches something. *Least clearance*: the smallest \
+             distance of the body to anything in any run."
+        ),
+    );
+}
+
+/// Contacts, clearance, speed and steering of every driver.
+fn how_they_drove(reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
+    let mut table = table_of(&[
+        "driver",
+        "lots",
+        "contacts",
+        "stuck",
+        "given up",
+        "least clearance m",
+        "m/s",
+        "reversals per 100 m",
+    ]);
+    for (driven, label) in [(reference, "the paper's"), (unseen, "unseen")] {
+        let slice = driven.all();
+        for (driver, named) in driven.plan.drivers.iter().enumerate() {
+            let totals = driven.results.totals(0, driver, &slice, None);
+            table.add_row([
+                named.name.clone(),
+                label.to_owned(),
+                totals.contacts.to_string(),
+                totals.stuck.to_string(),
+                totals.given_up.to_string(),
+                totals.clearance_min_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2}")),
+                format!("{:.2}", totals.mean_speed_mps()),
+                format!("{:.1}", totals.reversals_per_100m()),
+            ]);
+        }
+    }
+    format!("Rates are per length of the route: for runs that were given up they are too low.\n\n{table}")
 }
 
 fn statements(

@@ -4,6 +4,7 @@
 //! A file that cannot be read or written is an error. A near-collision that cannot be replayed (its network has moved)
 //! is not: the page says so in place of the picture.
 
+use crate::command_line::command_line;
 use crate::glossary;
 use crate::markdown::escaped;
 use crate::moments;
@@ -130,15 +131,6 @@ impl Evaluation {
 
 fn text(path: &Path) -> anyhow::Result<String> {
     std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read for the report", path.display()))
-}
-
-/// The command line, quoted as a shell needs it.
-fn command_line(manifest: &Manifest) -> String {
-    let is_plain = |word: &str| word.chars().all(|c| c.is_alphanumeric() || "-_./:=,@%+".contains(c));
-    let quoted =
-        |word: &String| if is_plain(word) { word.clone() } else { format!("'{}'", word.replace('\'', "'\\''")) };
-    let words = manifest.command_line.iter().map(quoted);
-    std::iter::once("cargo xtask".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
 /// Writes the report of the run in a folder.
@@ -269,7 +261,7 @@ fn held_back_calibration(folder: &Path, settings: &Settings) -> anyhow::Result<O
     for round in (0..).take_while(|&round| store.has_round(round)) {
         dataset.push(store.read_samples(round)?.into());
     }
-    let held_back = dataset.split(settings.dagger.fit_iteration.validation).validation;
+    let held_back = dataset.split(settings.dagger.fit.validation).validation;
     if held_back.is_empty() {
         return Ok(None);
     }

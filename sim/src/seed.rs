@@ -63,9 +63,75 @@ impl RootSeed {
     }
 }
 
+/// An episode of a round, and the index of its random streams.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct EpisodeIndex {
+    round: u32,
+    episode: u32,
+}
+
+impl EpisodeIndex {
+    /// A run has fewer rounds than this, and a round fewer episodes.
+    pub const LIMIT: u32 = 1 << 20;
+
+    /// Episode `episode` of round `round`, both from 0.
+    ///
+    /// # Panics
+    /// If either is [`Self::LIMIT`] or more.
+    pub fn new(round: u32, episode: u32) -> Self {
+        assert!(
+            round < Self::LIMIT && episode < Self::LIMIT,
+            "round {round}, episode {episode}: a run has fewer than 2^20 rounds of fewer than 2^20 episodes"
+        );
+        Self { round, episode }
+    }
+
+    /// The first `count` episodes of a round.
+    pub fn of_round(round: u32, count: usize) -> impl Iterator<Item = Self> {
+        (0..count).map(move |episode| Self::new(round, u32::try_from(episode).unwrap_or(u32::MAX)))
+    }
+
+    /// The round, from 0.
+    pub fn round(self) -> u32 {
+        self.round
+    }
+
+    /// The episode within its round, from 0.
+    pub fn episode(self) -> u32 {
+        self.episode
+    }
+
+    /// Index for [`RootSeed::rng`] and [`RootSeed::child`]: 40 bits, different for every episode of a run.
+    pub fn stream(self) -> u64 {
+        u64::from(self.round) << 20 | u64::from(self.episode)
+    }
+
+    /// Index of one of up to 256 streams of the episode: 48 bits.
+    pub fn part(self, part: u8) -> u64 {
+        self.stream() << 8 | u64::from(part)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The bits are part of the reproducibility contract.
+    #[test]
+    fn episodes_of_a_run_have_indices_of_their_own() {
+        assert_eq!(EpisodeIndex::new(3, 7).stream(), 3 * 1_048_576 + 7);
+        assert_eq!(EpisodeIndex::new(3, 7).part(2), (3 * 1_048_576 + 7) * 256 + 2);
+        let last = EpisodeIndex::new(EpisodeIndex::LIMIT - 1, EpisodeIndex::LIMIT - 1);
+        assert_eq!(last.part(255), (1 << 48) - 1, "fits below the purpose of a stream");
+        let second: Vec<u64> = EpisodeIndex::of_round(1, 2).map(EpisodeIndex::stream).collect();
+        assert_eq!(second, [1 << 20, (1 << 20) + 1]);
+    }
+
+    #[test]
+    #[should_panic(expected = "fewer than 2^20")]
+    fn an_episode_beyond_the_limit_would_share_the_streams_of_another() {
+        EpisodeIndex::new(0, EpisodeIndex::LIMIT);
+    }
 
     /// Golden: the first draw of streams. If this fails, every recorded result changes; say why in the commit.
     #[test]

@@ -19,6 +19,7 @@ pub(crate) fn get() -> &'static Build {
             git_revision: git(&["rev-parse", "HEAD"]),
             git_dirty: status.map(|changes| !changes.is_empty()),
             rustc_version: env!("XTASK_RUSTC").to_owned(),
+            processor: processor(),
         }
     })
 }
@@ -29,4 +30,11 @@ fn git(args: &[&str]) -> Option<String> {
     let folder = program.parent().unwrap_or(Path::new("."));
     let output = Command::new("git").arg("-C").arg(folder).args(args).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
+/// The name of the processor, where the system tells (Linux).
+fn processor() -> Option<String> {
+    let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let name = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'))?.1;
+    Some(name.trim().to_owned())
 }

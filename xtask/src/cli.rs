@@ -2,7 +2,7 @@
 
 use crate::build_info::PROGRAM;
 use crate::commands::{
-    drivers, evaluate, generate, lots, pixel_accuracy, render, reproduce, sample_size, settings, train, tune,
+    drivers, evaluate, generate, guard, lots, pixel_accuracy, render, reproduce, sample_size, settings, train, tune,
 };
 use clap::{Parser, Subcommand};
 use std::num::NonZeroUsize;
@@ -40,6 +40,9 @@ enum Command {
     /// The paper in a box: trains, drives and writes one report with the paper's tables beside ours.
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(reproduce::ReproduceArgs),
+    /// Trains the default and fails if its policy has become worse: for a nightly run.
+    #[command(after_help = guard::EXAMPLES)]
+    Guard(guard::GuardArgs),
     /// Writes lots as TOML plus a top-view PNG.
     #[command(after_help = generate::EXAMPLES)]
     Generate(generate::GenerateArgs),
@@ -81,6 +84,7 @@ impl Cli {
             Command::TrainDagger(args) => train::dagger(args),
             Command::Evaluate(args) => evaluate::run(args),
             Command::Reproduce(args) => reproduce::run(args),
+            Command::Guard(args) => guard::run(args),
             Command::Generate(args) => generate::run(args),
             Command::PixelAccuracy(args) => pixel_accuracy::run(args),
             Command::SampleSize(args) => sample_size::run(args),

@@ -3,6 +3,7 @@
 pub(crate) mod drivers;
 pub(crate) mod evaluate;
 pub(crate) mod generate;
+pub(crate) mod guard;
 pub(crate) mod lots;
 pub(crate) mod pixel_accuracy;
 pub(crate) mod render;

@@ -18,13 +18,6 @@ impl Settings {
                 i64::MAX
             );
         }
-        ensure!(
-            self.dagger.geometry == self.episode.sensing.geometry,
-            "dagger.geometry {:?} and episode.sensing.geometry {:?} differ: the network would misread its own answers; \
-             set both",
-            self.dagger.geometry,
-            self.episode.sensing.geometry
-        );
         for (section, lots, directions, trials) in [
             ("training", &self.training.lots, &self.training.directions, self.training.trials),
             ("evaluation", &self.evaluation.lots, &self.evaluation.directions, self.evaluation.trials),
@@ -51,8 +44,9 @@ impl Settings {
         );
         ranges::check(&self.episode)?;
         ranges::check_expert(&self.expert)?;
-        self.dagger.disturbance.as_ref().map_or(Ok(()), ranges::check_disturbance)?;
+        ranges::check_disturbance(&self.dagger.disturbance)?;
         self.dagger.network.validate().context("dagger.network")?;
+        self.dagger.inference.validate().context("dagger.inference")?;
         Ok(())
     }
 }

@@ -7,7 +7,7 @@ use expert::ExpertSettings;
 use policy::dagger::{DaggerSettings, DisturbanceSettings, StartFrom};
 use policy::dataset::ValidationSplit;
 use policy::fit::{Budget, FitSettings};
-use policy::network::{ConvConfig, LookAheadNetConfig};
+use policy::network::{ConvLayer, InferenceSettings, NetworkArchitecture};
 use sim::episode::EpisodeSettings;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -104,19 +104,18 @@ fn smoke() -> Settings {
         dagger: DaggerSettings {
             iterations_max: 1,
             noise_augmentations: 1,
-            disturbance: Some(DisturbanceSettings::quick()),
+            disturbance: DisturbanceSettings::quick(),
             start: StartFrom::Previous,
-            network: LookAheadNetConfig {
-                conv1: ConvConfig { channels: 16, kernel: 3 },
-                conv2: ConvConfig { channels: 16, kernel: 2 },
+            network: NetworkArchitecture {
+                conv1: ConvLayer { channels: 16, kernel: 3 },
+                conv2: ConvLayer { channels: 16, kernel: 2 },
                 hidden: 64,
                 dropout_features: 0.0,
                 dropout_hidden: 0.1,
-                mirror_averaging: true,
-                smoothing_ticks: 4.0,
             },
-            fit_cloning: fit.clone(),
-            fit_iteration: fit,
+            inference: InferenceSettings { mirror_averaging: true, smoothing_ticks: 4.0 },
+            cloning_budget: fit.budget,
+            fit,
             ..base.dagger
         },
         ..base

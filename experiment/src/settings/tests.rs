@@ -38,7 +38,7 @@ fn every_preset_is_sound_and_survives_toml() {
 #[test]
 fn the_paper_preset_is_the_papers() {
     use policy::fit::{Budget, Mirror};
-    let fit = Settings::preset("paper").unwrap().dagger.fit_iteration;
+    let fit = Settings::preset("paper").unwrap().dagger.fit;
     assert_eq!((fit.learning_rate.peak, fit.batch, fit.budget), (1e-5, 512, Budget::Steps(100_000)));
     assert_eq!(fit.mirror, Mirror::Off);
 }
@@ -69,20 +69,33 @@ fn enums_change_their_variant_whole() {
     assert_eq!(resolved(&["dagger.rule.tau_only.tau=0.05"]).dagger.rule, rule);
     assert_eq!(from_file("rule", "[dagger.rule.tau_only]\ntau = 0.05\n").unwrap().dagger.rule, rule);
     assert_eq!(resolved(&["dagger.rule=expert_only"]).dagger.rule, DecisionRule::ExpertOnly);
-    let budget = resolved(&["dagger.fit_cloning.budget.epochs=3"]).dagger.fit_cloning.budget;
-    assert_eq!(budget, Budget::Epochs(3.0));
-    let weight = resolved(&["dagger.fit_cloning.loss.weight.linear.gain=10"]).dagger.fit_cloning.loss.weight;
-    assert_eq!(weight, WeightForm::Linear { gain: 10.0 });
+    assert_eq!(resolved(&["dagger.cloning_budget.epochs=3"]).dagger.cloning_budget, Budget::Epochs(3.0));
+    let weight = resolved(&["dagger.fit.loss.weight.linear.gain=8"]).dagger.fit.loss.weight;
+    assert_eq!(weight, WeightForm::Linear { gain: 8.0 });
     let DecisionRule::AllBelow { tau, chi, .. } = resolved(&["dagger.rule.all_below.tau=0.06"]).dagger.rule else {
         panic!("a changed value is no changed variant");
     };
     assert_eq!((tau, chi), (0.06, 0.1));
 }
 
+/// As the README names them: the variant alone, with the defaults of its fields.
 #[test]
-fn optional_settings_can_be_given() {
-    let settings = resolved(&["dagger.fit_cloning.gradient_norm_max=2"]);
-    assert_eq!(settings.dagger.fit_cloning.gradient_norm_max, Some(2.0));
+fn enums_are_named_by_their_variant_alone() {
+    use policy::decision_rule::DecisionRule;
+    use policy::loss::WeightForm;
+    assert_eq!(resolved(&["dagger.rule=tau_only"]).dagger.rule, DecisionRule::TauOnly { tau: 0.07 });
+    assert_eq!(resolved(&["dagger.rule=all_below"]).dagger.rule, DecisionRule::paper());
+    let weight = resolved(&["dagger.fit.loss.weight=linear"]).dagger.fit.loss.weight;
+    assert_eq!(weight, WeightForm::Linear { gain: 10.0 });
+}
+
+/// What is switched off is printed, too: a key that is not seen is not found.
+#[test]
+fn printed_settings_show_what_is_switched_off() {
+    let text = Settings::preset("default").unwrap().to_toml();
+    for part in ["[dagger.disturbance]\nenabled = false", "[dagger.final_budget]\nsteps = 0", "patience = 0"] {
+        assert!(text.contains(part), "{part:?} is missing in:\n{text}");
+    }
 }
 
 #[test]
@@ -99,13 +112,14 @@ fn errors_name_the_key_and_what_there_is() {
         (&["training.lots=[lot-a]"], &["quotes"]),
         (&["seed.of=1"], &["seed"]),
         (&["evaluation.trials=0"], &["evaluation.trials is 0"]),
-        (&["dagger.geometry.side_m=10"], &["episode.sensing.geometry", "set both"]),
+        (&["dagger.rule=tau_onli"], &["dagger.rule", "no value \"tau_onli\"", "did you mean \"tau_only\"?"]),
+        (&["dagger.inference.smoothing_ticks=-1"], &["dagger.inference", "smoothing_ticks is -1"]),
         (&["dagger.network.conv1.channels=17"], &["dagger.network", "conv1", "17"]),
         (&["episode.control_period_ms=45"], &["45", "multiple"]),
         (&["episode.metrics.near_collision_m=-1"], &["episode.metrics.near_collision_m = -1", "be more than 0"]),
         (&["episode.metrics.safe_range_m=0"], &["episode.metrics.safe_range_m = 0", "be more than 0"]),
         (
-            &["dagger.disturbance={ pause_ticks = 9, lasts_ticks = 9, curvature_max_per_m = -0.1 }"],
+            &["dagger.disturbance={ enabled = true, curvature_max_per_m = -0.1 }"],
             &["dagger.disturbance.curvature_max_per_m = -0.1", "be more than 0"],
         ),
         (&["episode.noise.blob=-0.5"], &["episode.noise.blob = -0.5", "not be negative"]),
@@ -129,7 +143,7 @@ fn errors_in_files_name_the_line() {
         ("syntax", "seed = 1\n\n[dagger\neta = 1\n", &[":3"] as &[&str]),
         ("key", "seed = 1\n[dagger]\nkeep = \"expert_ticks\"\netta = 0.8\n", &[":4", "did you mean \"eta\"?"]),
         ("type", "[training]\ntrials = \"two\"\n", &[":2", "training.trials"]),
-        ("deep", "[dagger.fit_cloning]\nbatch = 64\n[dagger.fit_cloning.adam]\nbeta3 = 1\n", &[":4", "beta3"]),
+        ("deep", "[dagger.fit]\nbatch = 64\n[dagger.fit.adam]\nbeta3 = 1\n", &[":4", "beta3"]),
     ] {
         let error = format!("{:#}", from_file(name, text).unwrap_err());
         for part in parts {

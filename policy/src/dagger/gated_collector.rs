@@ -1,10 +1,9 @@
-//! Algorithm 2, the data-sampling function: who drives this tick, and what is written down.
+//! Algorithm 2, the data-sampling function: who drives this tick, and which ticks are kept.
 
-use super::disturbance::Disturbance;
-use crate::dataset::{Round, Sample};
+use crate::dagger::disturbance::Disturbance;
+use crate::dataset::Sample;
 use crate::decision_rule::{DecisionRule, Evidence};
 use crate::drivers::{Novice, novice_decision};
-use crate::network::Predictor;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Driver, Fleet, GroundTruth, Seat};
@@ -20,105 +19,82 @@ pub enum Keep {
     EveryTick,
 }
 
-/// Novice and expert at the wheel of every seat of a batch.
-pub struct GatedCollector {
-    novice: Option<Novice>,
-    experts: Vec<Box<dyn Driver + Send>>,
-    rule: DecisionRule,
-    keep: Keep,
-    geometry: GridGeometry,
-    /// `D_i`, by seat.
-    seats: Vec<SeatRecord>,
-    n_tot: u64,
-    n_net: u64,
-    tau_hat_sum: f64,
+/// Novice and expert at the wheel of every seat of a batch. Without a novice the experts drive and every tick is kept:
+/// behaviour cloning.
+pub(crate) struct GatedCollector {
+    pub(crate) novice: Option<Novice>,
+    pub(crate) rule: DecisionRule,
+    pub(crate) keep: Keep,
+    pub(crate) geometry: GridGeometry,
+    /// By episode.
+    pub(crate) seats: Vec<CollectorSeat>,
+    /// Executed actions.
+    pub(crate) n_tot: u64,
+    /// Executed actions of the network.
+    pub(crate) n_net: u64,
+    /// Sum of τ̂ over all ticks, kept or not.
+    pub(crate) tau_hat_sum: f64,
 }
 
-/// What is written down at one seat.
-#[derive(Default)]
-struct SeatRecord {
-    samples: Vec<Sample>,
-    /// Look at the scenes of the samples, too.
-    augmenting_sensors: Vec<Sensor>,
-    noise_augmentations: Vec<OccupancyGrid>,
-    /// Nudges whoever drives.
-    disturbance: Option<Disturbance>,
+/// What belongs to one episode.
+pub(crate) struct CollectorSeat {
+    pub(crate) expert: Box<dyn Driver + Send>,
+    /// Each observes the scene of every sample with noise of its own.
+    pub(crate) augmenting_sensors: Vec<Sensor>,
+    /// Disturbs whoever drives.
+    pub(crate) disturbance: Option<Disturbance>,
+    /// What was kept so far: `D_i` of this seat.
+    pub(crate) kept: Kept,
     /// Decisions so far.
     ticks: u32,
 }
 
-impl SeatRecord {
-    /// Line 15, and further looks at the same scene.
+/// The kept ticks of one episode.
+#[derive(Default)]
+pub(crate) struct Kept {
+    pub(crate) samples: Vec<Sample>,
+    /// Which decisions they were, counted from 0.
+    pub(crate) ticks: Vec<u32>,
+    pub(crate) noise_augmentations: Vec<OccupancyGrid>,
+}
+
+impl CollectorSeat {
+    pub(crate) fn new(
+        expert: Box<dyn Driver + Send>,
+        augmenting_sensors: Vec<Sensor>,
+        disturbance: Option<Disturbance>,
+    ) -> Self {
+        Self { expert, augmenting_sensors, disturbance, kept: Kept::default(), ticks: 0 } // line 2: D_i ← ∅
+    }
+
+    /// Line 15, with the noise augmentations of the sample.
     fn keep(&mut self, sample: Sample, truth: &GroundTruth<'_>) {
-        self.samples.push(sample);
-        let looks = self
+        self.kept.samples.push(sample);
+        self.kept.ticks.push(self.ticks);
+        let grids = self
             .augmenting_sensors
             .iter_mut()
             .map(|sensor| sensor.observe(truth.map, truth.vehicle.pose, self.ticks).grid);
-        self.noise_augmentations.extend(looks);
+        self.kept.noise_augmentations.extend(grids);
     }
-}
-
-/// What Algorithm 2 returns.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Collected {
-    /// `D_i`: seat by seat, in order of time within a seat.
-    pub round: Round,
-    /// Executed actions.
-    pub n_tot: u64,
-    /// Executed actions of the network.
-    pub n_net: u64,
-    /// Sum of τ̂ over all ticks, stored or not.
-    pub tau_hat_sum: f64,
 }
 
 impl GatedCollector {
-    /// One expert per seat. Without a novice the experts drive and every tick is kept: behaviour cloning.
-    pub fn new(
-        novice: Option<Predictor>,
-        experts: Vec<Box<dyn Driver + Send>>,
+    pub(crate) fn new(
+        novice: Option<Novice>,
         rule: DecisionRule,
         keep: Keep,
         geometry: GridGeometry,
+        seats: Vec<CollectorSeat>,
     ) -> Self {
-        let seats = experts.iter().map(|_| SeatRecord::default()).collect(); // line 2: D_i ← ∅
-        let novice = novice.map(|predictor| Novice::new(predictor, geometry));
-        Self { novice, experts, rule, keep, geometry, seats, n_tot: 0, n_net: 0, tau_hat_sum: 0.0 } // line 3
-    }
-
-    /// Sensors of every seat that look at the kept ticks, too.
-    #[must_use]
-    pub fn with_augmenting_sensors(mut self, augmenting_sensors: Vec<Vec<Sensor>>) -> Self {
-        for (seat, augmenting_sensors) in self.seats.iter_mut().zip(augmenting_sensors) {
-            seat.augmenting_sensors = augmenting_sensors;
-        }
-        self
-    }
-
-    /// Nudges for the wheel of every seat.
-    #[must_use]
-    pub(super) fn with_disturbances(mut self, disturbances: Vec<Disturbance>) -> Self {
-        for (seat, disturbance) in self.seats.iter_mut().zip(disturbances) {
-            seat.disturbance = Some(disturbance);
-        }
-        self
-    }
-
-    /// Line 20. Samples are joined in the order of the seats.
-    pub fn into_collected(self) -> Collected {
-        let mut round = Round::default();
-        for seat in self.seats {
-            round.samples.extend(seat.samples);
-            round.noise_augmentations.extend(seat.noise_augmentations);
-        }
-        Collected { round, n_tot: self.n_tot, n_net: self.n_net, tau_hat_sum: self.tau_hat_sum }
+        Self { novice, rule, keep, geometry, seats, n_tot: 0, n_net: 0, tau_hat_sum: 0.0 } // line 3
     }
 
     /// Line 6, for all seats at once; each expert sees only its own seat.
     fn ask_experts(&mut self, seats: &[Seat<'_>]) -> Vec<Decision> {
-        at_seats(&mut self.experts, seats)
+        at_seats(&mut self.seats, seats)
             .par_iter_mut()
-            .map(|(expert, seat)| {
+            .map(|(CollectorSeat { expert, .. }, seat)| {
                 if seat.was_reset {
                     expert.reset();
                 }
@@ -127,18 +103,18 @@ impl GatedCollector {
             .collect()
     }
 
-    /// Line 15 for all seats at once, with further looks.
-    fn write_down(&mut self, seats: &[Seat<'_>], kept: &[Option<Sample>]) {
-        at_seats(&mut self.seats, seats).par_iter_mut().zip(kept).for_each(|((record, seat), kept)| {
+    /// Line 15 for all seats at once.
+    fn store(&mut self, seats: &[Seat<'_>], kept: &[Option<Sample>]) {
+        at_seats(&mut self.seats, seats).par_iter_mut().zip(kept).for_each(|((collector, seat), kept)| {
             if let Some(sample) = *kept {
-                record.keep(sample, &seat.situation.truth);
+                collector.keep(sample, &seat.situation.truth);
             }
-            record.ticks += 1;
+            collector.ticks += 1;
         });
     }
 }
 
-/// What belongs to the episodes that wait for a decision, of what there is one of for every episode.
+/// The items of the episodes that wait for a decision; `of_episodes` has one item per episode of the batch.
 fn at_seats<'a, 's, T>(of_episodes: &'a mut [T], seats: &'a [Seat<'s>]) -> Vec<(&'a mut T, &'a Seat<'s>)> {
     let mut waiting = seats.iter().peekable();
     let found = of_episodes
@@ -179,7 +155,7 @@ impl Fleet for GatedCollector {
             let is_kept = !trusts_novice || self.keep == Keep::EveryTick;
             kept.push(is_kept.then_some(Sample { grid, label: a_exp, tau_hat }));
         }
-        self.write_down(seats, &kept);
+        self.store(seats, &kept);
         for (seat, decision) in seats.iter().zip(&mut decisions[first..]) {
             if let Some(disturbance) = &mut self.seats[seat.episode].disturbance {
                 decision.look_ahead = disturbance.disturb(decision.look_ahead);

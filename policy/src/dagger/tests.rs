@@ -1,15 +1,25 @@
 //! Two tiny rounds on a bent lane: what lands on disk, and that an interrupted run continues as if nothing had been.
 
 use super::*;
+use crate::checkpoint::Checkpoint;
 use crate::dataset::ValidationSplit;
-use crate::dataset::store::tests::scratch;
+use crate::dataset::store::Store;
+use crate::decision_rule::DecisionRule;
 use crate::drivers::{NetFleet, NetPolicy};
-use crate::fit::Budget;
-use crate::network::ConvConfig;
-use sim::driver::{Decision, Fleet, LookAheadPoint, OneDriverEach, SensorsOnly, Situation, Source};
-use sim::episode::EpisodeSettings;
+use crate::fit::{Budget, FitSettings};
+use crate::network::{ConvLayer, DeviceChoice, InferenceSettings, NetworkArchitecture, Weights};
+use crate::test_data::scratch;
+use sim::batch::run_lockstep;
+use sim::driver::{Decision, Driver, Fleet, LookAheadPoint, OneDriverEach, SensorsOnly, Situation, Source};
+use sim::episode::{Episode, EpisodeSettings};
+use sim::frame::Frame;
+use sim::geometry::Vec2;
 use sim::map::Map;
-use sim::scenario::Scenario;
+use sim::scenario::{Direction, LotNoise, ReferencePath, Scenario};
+use sim::seed::{EpisodeIndex, RootSeed};
+use sim::sensing::GridGeometry;
+use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Drives to the point of the route ten metres ahead.
@@ -27,13 +37,30 @@ impl Driver for RouteFollower {
 
 /// A lane 7 m wide: 25 m straight on, then 30° to the left.
 fn episodes(count: usize) -> Vec<Episode> {
+    let v = Vec2::new;
     let settings = EpisodeSettings::paper();
-    let boundary = [(-4.0, -3.5), (26.0, -3.5), (52.0, 11.5), (48.5, 17.6), (24.0, 3.5), (-4.0, 3.5)];
-    let scenario =
-        Scenario::new("bent lane", boundary, [(0.0, 0.0), (25.0, 0.0), (42.0, 9.8)]).with_corner_radius_m(12.0);
+    let scenario = Scenario {
+        name: "bent lane".to_string(),
+        boundary: vec![v(-4.0, -3.5), v(26.0, -3.5), v(52.0, 11.5), v(48.5, 17.6), v(24.0, 3.5), v(-4.0, 3.5)],
+        reference_path: ReferencePath { points: vec![v(0.0, 0.0), v(25.0, 0.0), v(42.0, 9.8)], corner_radius_m: 12.0 },
+        noise: LotNoise::default(),
+        islands: Vec::new(),
+        obstacles: Vec::new(),
+        speed_bumps: Vec::new(),
+    };
     let map = Arc::new(Map::build(scenario, &settings.vehicle).unwrap());
     let settings = Arc::new(settings);
     (0..count).map(|i| Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(40 + i as u64))).collect()
+}
+
+fn of_round(round: u32, count: usize) -> Vec<RoundEpisode> {
+    let seated = |(index, episode)| RoundEpisode {
+        index,
+        direction: Direction::Forward,
+        episode,
+        expert: Box::new(RouteFollower),
+    };
+    EpisodeIndex::of_round(round, count).zip(episodes(count)).map(seated).collect()
 }
 
 fn settings() -> DaggerSettings {
@@ -49,19 +76,18 @@ fn settings() -> DaggerSettings {
         iterations_max: 2,
         noise_augmentations: 1,
         start: StartFrom::Previous,
-        network: LookAheadNetConfig {
-            conv1: ConvConfig { channels: 16, kernel: 3 },
-            conv2: ConvConfig { channels: 16, kernel: 2 },
+        network: NetworkArchitecture {
+            conv1: ConvLayer { channels: 16, kernel: 3 },
+            conv2: ConvLayer { channels: 16, kernel: 2 },
             hidden: 32,
             dropout_features: 0.0,
             dropout_hidden: 0.1,
-            mirror_averaging: false,
-            smoothing_ticks: 2.0,
         },
+        inference: InferenceSettings { mirror_averaging: false, smoothing_ticks: 2.0 },
         // Loose enough that both novice and expert drive after so little training.
         rule: DecisionRule::AllBelow { tau: 0.25, chi: 1.0, chi_on: crate::decision_rule::ChiOn::StdPerAxis },
-        fit_cloning: fit.clone(),
-        fit_iteration: fit,
+        cloning_budget: fit.budget,
+        fit,
         ..DaggerSettings::paper()
     }
 }
@@ -72,13 +98,8 @@ fn run_in(
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Outcome, DaggerError> {
     let store = Store::open(folder).unwrap();
-    let mut hooks = Hooks {
-        episodes: &mut |_| episodes(2),
-        expert: &mut |_, _| Box::new(RouteFollower),
-        on_frame: &mut |_, _, _| {},
-        progress,
-    };
-    run(settings, &store, RootSeed(6), &mut hooks)
+    let mut hooks = Hooks { episodes: &mut |round| of_round(round, 2), on_frame: &mut |_, _, _| {}, progress };
+    run(settings, GridGeometry::paper(), &store, RootSeed(6), &mut hooks)
 }
 
 fn go_on(_: &Progress<'_>) -> ControlFlow<()> {
@@ -94,43 +115,44 @@ fn a_run_leaves_data_and_policy_of_every_round() {
     let store = Store::open(&folder).unwrap();
     let mut total = 0;
     for (round, row) in outcome.rows.iter().enumerate() {
-        let (data, about) = store.read_round::<Collection>(round as u32).unwrap();
+        let (data, about) = store.read_round(round as u32).unwrap();
+        assert_eq!(data.ticks.len(), data.samples.len());
         total += data.samples.len();
         assert_eq!((row.round, row.samples, row.dataset), (round as u32, data.samples.len(), total));
         let kept = if round == 0 { about.ticks } else { about.ticks - about.novice_ticks };
         assert_eq!(data.samples.len() as u64, kept, "round {round} keeps the expert's ticks");
-        assert_eq!(data.noise_augmentations.len(), data.samples.len(), "one further look at each");
+        assert_eq!(data.noise_augmentations.len(), data.samples.len(), "one noise augmentation of each");
         let differ = data
             .samples
             .iter()
             .zip(&data.noise_augmentations)
-            .filter(|(sample, relook)| sample.grid != **relook)
+            .filter(|(sample, augmented)| sample.grid != **augmented)
             .count();
         assert!(2 * differ > data.samples.len(), "{differ} of {} have noise of their own", data.samples.len());
         assert!(Checkpoint::exists(&store.round_folder(round as u32)));
         assert_eq!(row.eta_hat.is_some(), round > 0);
     }
-    assert!(store.read_round::<Collection>(0).unwrap().0.samples.iter().all(|sample| sample.tau_hat == 0.0));
+    assert!(store.read_round(0).unwrap().0.samples.iter().all(|sample| sample.tau_hat == 0.0));
     let last = Checkpoint::load(&store.round_folder(2)).unwrap();
     assert_eq!(outcome.policy, Some(last));
     std::fs::remove_dir_all(folder).unwrap();
 }
 
-/// Nudges change where cars go in iterations, and nothing in behaviour cloning.
+/// Disturbances change where cars go in iterations, and nothing in behaviour cloning.
 #[test]
-fn only_iterations_are_nudged() {
+fn only_iterations_are_disturbed() {
     let rounds_of = |name, disturbance| {
         let folder = scratch(name);
         run_in(&folder, &DaggerSettings { disturbance, iterations_max: 1, ..settings() }, &mut go_on).unwrap();
         let store = Store::open(&folder).unwrap();
-        let rounds = [0, 1].map(|round| store.read_round::<Collection>(round).unwrap().0);
+        let rounds = [0, 1].map(|round| store.read_round(round).unwrap().0);
         std::fs::remove_dir_all(folder).unwrap();
         rounds
     };
-    let nudges = super::DisturbanceSettings { pause_ticks: 20, lasts_ticks: 20, curvature_max_per_m: 0.1 };
-    let [plain, nudged] = [rounds_of("plain", None), rounds_of("nudged", Some(nudges))];
-    assert_eq!(plain[0], nudged[0]);
-    assert_ne!(plain[1], nudged[1]);
+    let often = DisturbanceSettings { pause_ticks: 20, ..DisturbanceSettings::quick() };
+    let [plain, disturbed] = [rounds_of("plain", DisturbanceSettings::off()), rounds_of("disturbed", often)];
+    assert_eq!(plain[0], disturbed[0]);
+    assert_ne!(plain[1], disturbed[1]);
 }
 
 #[test]
@@ -171,7 +193,7 @@ fn eta_ends_the_iterations_and_a_final_fit_follows() {
         // The network always drives: η̂ = 1.
         rule: DecisionRule::TauOnly { tau: 2.0 },
         keep: Keep::EveryTick,
-        fit_final: Some(FitSettings { budget: Budget::Steps(3), ..settings().fit_iteration }),
+        final_budget: Budget::Steps(3),
         ..settings()
     };
     let outcome = run_in(&folder, &settings, &mut go_on).unwrap();
@@ -191,28 +213,91 @@ fn presets_survive_toml() {
     }
 }
 
-/// In DAgger, in a fleet and alone, with its memory and what it forgets when the car is put back.
+/// In DAgger, in a fleet and alone, with its action smoothing and the reset when the car is put back.
 #[test]
 fn the_network_drives_the_same_whoever_seats_it() {
-    let network = LookAheadNetConfig { mirror_averaging: true, smoothing_ticks: 8.0, ..settings().network };
-    let checkpoint = Checkpoint { weights: Weights::init(network, RootSeed(3), 0), geometry: GridGeometry::paper() };
+    let weights = Weights::init(settings().network, RootSeed(3), 0);
+    let inference = InferenceSettings::smoothed();
+    let checkpoint = Checkpoint { weights, geometry: GridGeometry::paper(), inference };
     let drive = |fleet: &mut dyn Fleet| {
         let mut driven = Vec::new();
         let reports = run_lockstep(episodes(2), fleet, &mut |episode, frame| driven.push((episode, frame.decision)));
         (driven, reports)
     };
     let device = DeviceChoice::Cpu;
-    let (in_fleet, reports) = drive(&mut NetFleet::new(checkpoint.clone(), device));
+    let (in_fleet, reports) = drive(&mut NetFleet::new(&checkpoint, device));
     let put_back = reports.iter().map(|report| report.metrics.near_collisions).sum::<u32>();
-    assert!(put_back > 0, "nothing was forgotten: {reports:?}");
-    let alone = |_| SensorsOnly(NetPolicy::new(checkpoint.clone(), device));
+    assert!(put_back > 0, "nothing was reset: {reports:?}");
+    let alone = |_| SensorsOnly(NetPolicy::new(&checkpoint, device));
     assert_eq!(drive(&mut OneDriverEach((0..2).map(alone).collect())).0, in_fleet);
-    let novice = Predictor::new(checkpoint.weights.clone(), device);
-    let experts: Vec<Box<dyn Driver + Send>> = vec![Box::new(RouteFollower), Box::new(RouteFollower)];
-    let always = DecisionRule::TauOnly { tau: 9.0 };
-    let mut collector = GatedCollector::new(Some(novice), experts, always, Keep::EveryTick, checkpoint.geometry);
-    assert_eq!(drive(&mut collector).0, in_fleet);
-    let forgetful = LookAheadNetConfig { smoothing_ticks: 0.0, ..network };
-    let weights = Weights::init(forgetful, RootSeed(3), 0);
-    assert_ne!(drive(&mut NetFleet::new(Checkpoint { weights, ..checkpoint }, device)).0, in_fleet, "memory matters");
+    let mut driven = Vec::new();
+    let rollouts = Rollouts::on_policy(&checkpoint, device, of_round(0, 2));
+    let collected = rollouts.drive(&mut |episode, frame| driven.push((episode, frame.decision)));
+    assert_eq!(driven, in_fleet);
+    assert_eq!(
+        (collected.n_net, collected.round.samples.len()),
+        (collected.n_tot, driven.len()),
+        "every tick is labelled"
+    );
+    let plain = Checkpoint { inference: InferenceSettings { smoothing_ticks: 0.0, ..inference }, ..checkpoint };
+    assert_ne!(drive(&mut NetFleet::new(&plain, device)).0, in_fleet, "smoothing matters");
+}
+
+/// Whoever drives an episode of a round again gets its samples: noise, disturbances, augmentations and all.
+#[test]
+fn one_episode_of_a_round_driven_again_is_the_same() {
+    let folder = scratch("again");
+    let settings = DaggerSettings { disturbance: DisturbanceSettings::quick(), iterations_max: 1, ..settings() };
+    run_in(&folder, &settings, &mut go_on).unwrap();
+    let store = Store::open(&folder).unwrap();
+    for round in 0..2 {
+        let (stored, _) = store.read_round(round).unwrap();
+        let novice = round.checked_sub(1).map(|before| Checkpoint::load(&store.round_folder(before)).unwrap());
+        let second = of_round(round, 2).pop().into_iter().collect();
+        let again = Rollouts::of_round(&settings, RootSeed(6), novice.as_ref(), second).drive(&mut |_, _| {}).round;
+        let first = stored.ticks.iter().position(|tick| tick.episode == 1).unwrap();
+        assert!(first > 0 && again.samples.len() > 50, "{first}");
+        assert_eq!(again.samples, stored.samples[first..], "round {round}");
+        assert_eq!(again.ticks, stored.ticks[first..], "round {round}");
+        assert_eq!(again.noise_augmentations, stored.noise_augmentations[first..], "round {round}");
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// Every row of `ticks.npz` is what the frame of that tick showed, and the label of its sample is given from there.
+#[test]
+fn ticks_say_where_and_when_samples_were_taken() {
+    let settings = DaggerSettings { disturbance: DisturbanceSettings::quick(), ..settings() };
+    let weights = Weights::init(settings.network, RootSeed(3), 0);
+    let checkpoint = Checkpoint { weights, geometry: GridGeometry::paper(), inference: settings.inference };
+    let mut frames: Vec<Vec<Frame>> = vec![Vec::new(); 2];
+    let rollouts = Rollouts::of_round(&settings, RootSeed(6), Some(&checkpoint), of_round(1, 2));
+    let collected = rollouts.drive(&mut |episode, frame| frames[episode].push(*frame));
+    let Collected { round, episodes: records, reports, .. } = collected;
+    assert_eq!(round.ticks.len(), round.samples.len());
+    assert!(round.ticks.is_sorted_by_key(|tick| (tick.episode, tick.tick)));
+    assert!(round.ticks.windows(2).all(|pair| pair[0].episode < pair[1].episode || pair[0].tick < pair[1].tick));
+    for (tick, sample) in round.ticks.iter().zip(&round.samples) {
+        let of_episode = &frames[tick.episode as usize];
+        let frame = &of_episode[tick.tick as usize];
+        assert_eq!((tick.x_m, tick.y_m), (frame.vehicle.pose.x_m, frame.vehicle.pose.y_m));
+        assert_eq!((tick.heading_rad, tick.speed_mps), (frame.vehicle.pose.heading_rad, frame.vehicle.speed_mps));
+        assert_eq!(tick.steering_rad, frame.vehicle.steering_rad);
+        assert_eq!((tick.command_steering_rad, tick.command_speed_mps), {
+            (frame.command.steering_rad, frame.command.speed_mps)
+        });
+        assert_eq!((tick.driver, sample.grid), (frame.decision.source, frame.observation.grid));
+        let before_s = tick.tick.checked_sub(1).map_or(0.0, |before| of_episode[before as usize].time_s);
+        assert_eq!(tick.time_s, before_s);
+        // Between near-collisions, a tick takes 50 ms.
+        assert!(tick.time_s >= 0.05 * tick.tick as f32 - 1e-3);
+    }
+    for (episode, (record, report)) in records.iter().zip(&reports).enumerate() {
+        let of_episode = round.ticks.iter().filter(|tick| tick.episode as usize == episode).count();
+        assert_eq!((record.samples, record.lot.as_str()), (of_episode, "bent lane"));
+        assert_eq!(
+            (record.near_collisions, record.driven_m),
+            (report.metrics.near_collisions, report.metrics.driven_m)
+        );
+    }
 }

@@ -26,7 +26,7 @@ impl AdamSettings {
 
 /// Adam's memory.
 #[derive(Debug, Clone)]
-pub(super) struct Adam {
+pub(crate) struct Adam {
     settings: AdamSettings,
     mean: Vec<f32>,
     mean_square: Vec<f32>,
@@ -37,12 +37,12 @@ pub(super) struct Adam {
 const CHUNK: usize = 1 << 15;
 
 impl Adam {
-    pub(super) fn new(settings: AdamSettings, len: usize) -> Self {
+    pub(crate) fn new(settings: AdamSettings, len: usize) -> Self {
         Self { settings, mean: vec![0.0; len], mean_square: vec![0.0; len], step: 0 }
     }
 
     /// One step along `gradient · scale`.
-    pub(super) fn step(&mut self, learning_rate: f32, weights: &mut [f32], gradient: &[f32], scale: f32) {
+    pub(crate) fn step(&mut self, learning_rate: f32, weights: &mut [f32], gradient: &[f32], scale: f32) {
         self.step += 1;
         let AdamSettings { beta1, beta2, epsilon, weight_decay } = self.settings;
         let step_size = learning_rate / (1.0 - beta1.powi(self.step));
@@ -69,7 +69,7 @@ impl Adam {
 }
 
 /// Adds `others` to `first` in order and returns the Euclidean norm of the sum.
-pub(super) fn sum_and_norm(first: &mut [f32], others: &[&[f32]]) -> f32 {
+pub(crate) fn sum_and_norm(first: &mut [f32], others: &[&[f32]]) -> f32 {
     let squares: Vec<f64> = first
         .par_chunks_mut(CHUNK)
         .enumerate()

@@ -1,17 +1,17 @@
 //! The gradient of one batch, on CPUs or on a burn device.
 
-use super::adam::sum_and_norm;
 use crate::dataset::Sample;
+use crate::fit::adam::sum_and_norm;
 use crate::loss::{self, LossParts, LossSettings};
 use crate::network::fast::{self, Prepared, Trace};
-use crate::network::{DeviceChoice, DropoutDraw, LookAheadNet, LookAheadNetConfig, OUTPUTS, Weights, grid_tensor};
+use crate::network::{DeviceChoice, DropoutDraw, LookAheadNet, NetworkArchitecture, OUTPUTS, Weights, grid_tensor};
 use burn::tensor::{Device, Tensor, TensorData};
 use rayon::prelude::*;
 use sim::seed::RootSeed;
 use sim::sensing::OccupancyGrid;
 
 /// Computes gradients; keeps its memory between steps.
-pub(super) struct Engine {
+pub(crate) struct Engine {
     shards: Vec<Shard>,
     /// The burn device to compute on, with autodiff; `None` = [`fast`].
     device: Option<Device>,
@@ -27,20 +27,20 @@ struct Shard {
 }
 
 impl Engine {
-    pub(super) fn new(config: LookAheadNetConfig, shards: usize, device: DeviceChoice) -> Self {
+    pub(crate) fn new(architecture: NetworkArchitecture, shards: usize, device: DeviceChoice) -> Self {
         let device = device.burn_device().map(Device::autodiff);
         let shard = || Shard {
             trace: Trace::default(),
             grids: Vec::new(),
             d_outputs: Vec::new(),
-            gradient: Weights::zeros(config),
+            gradient: Weights::zeros(architecture),
             loss: LossParts::default(),
         };
         Self { shards: (0..shards).map(|_| shard()).collect(), device }
     }
 
     /// Mean loss of a batch; its gradient stays in the shards.
-    pub(super) fn gradient(
+    pub(crate) fn gradient(
         &mut self,
         weights: &Weights,
         batch: &[Sample],
@@ -48,14 +48,14 @@ impl Engine {
         seed: RootSeed,
         step: u32,
     ) -> LossParts {
-        let config = weights.config();
+        let architecture = weights.architecture();
         let prepared = Prepared::new(weights);
         let rows = batch.len().div_ceil(self.shards.len());
         let shards = self.shards.len() as u64;
         let device = self.device.as_ref();
         let compute = |(index, shard): (usize, &mut Shard)| {
             let samples = batch.chunks(rows).nth(index).unwrap_or_default();
-            let draw = DropoutDraw::new(&config, samples.len(), seed, u64::from(step) * shards + index as u64);
+            let draw = DropoutDraw::new(&architecture, samples.len(), seed, u64::from(step) * shards + index as u64);
             let scale = 1.0 / batch.len() as f32;
             match device {
                 None => shard.compute(weights, &prepared, samples, settings, &draw, scale),
@@ -77,14 +77,14 @@ impl Engine {
     }
 
     /// Adds the shards' gradients, in order, into the first; returns the norm.
-    pub(super) fn reduce(&mut self) -> f32 {
+    pub(crate) fn reduce(&mut self) -> f32 {
         let (first, others) = self.shards.split_first_mut().expect("there is at least one shard");
         let others: Vec<&[f32]> = others.iter().map(|shard| shard.gradient.values()).collect();
         sum_and_norm(first.gradient.values_mut(), &others)
     }
 
     /// The sum after [`Self::reduce`].
-    pub(super) fn reduced(&self) -> &[f32] {
+    pub(crate) fn reduced(&self) -> &[f32] {
         self.shards[0].gradient.values()
     }
 }
@@ -125,7 +125,7 @@ impl Shard {
         draw: &DropoutDraw,
         scale: f32,
     ) {
-        let (n, config) = (samples.len(), weights.config());
+        let (n, architecture) = (samples.len(), weights.architecture());
         if n == 0 {
             self.gradient.values_mut().fill(0.0);
             self.loss = LossParts::default();
@@ -136,7 +136,7 @@ impl Shard {
         let gains: Vec<f32> = samples.iter().map(|s| settings.weight_of_squared_error(s.tau_hat)).collect();
         let tensor = |values: Vec<f32>, columns| Tensor::<2>::from_data(TensorData::new(values, [n, columns]), device);
         let net = LookAheadNet::from_weights(weights, device);
-        let factors = draw.to_factors(&config, n, device);
+        let factors = draw.to_factors(&architecture, n, device);
         let outputs = net.forward(grid_tensor(&grids, n, device), Some(factors));
         let loss = loss::of_batch(settings, outputs, tensor(labels, 2), tensor(gains, 1));
         // A mean over the shard becomes the shard's share of the mean over the batch.
@@ -144,6 +144,6 @@ impl Shard {
         let (misfit, log_variance) = (loss.misfit * share, loss.log_variance * share);
         self.loss.misfit = misfit.clone().into_scalar();
         self.loss.log_variance = log_variance.clone().into_scalar();
-        self.gradient = net.gradient(config, &(misfit + log_variance).backward());
+        self.gradient = net.gradient(architecture, &(misfit + log_variance).backward());
     }
 }

@@ -1,18 +1,22 @@
 //! Training learns, repeats, stops, and does not care about threads.
 
 use super::*;
-use crate::dataset::tests::round;
-use crate::network::{ConvConfig, LookAheadNetConfig};
+use crate::dataset::{Dataset, Sample, ValidationSplit};
+use crate::fit::batch_sampler::BatchSampler;
+use crate::loss::LossSettings;
+use crate::network::{ConvLayer, DeviceChoice, InferenceSettings, NetworkArchitecture, Weights};
+use crate::test_data::round;
+use sim::seed::RootSeed;
+use sim::sensing::GridGeometry;
+use std::ops::ControlFlow;
 
-fn tiny() -> LookAheadNetConfig {
-    LookAheadNetConfig {
-        conv1: ConvConfig { channels: 16, kernel: 3 },
-        conv2: ConvConfig { channels: 16, kernel: 2 },
+fn tiny() -> NetworkArchitecture {
+    NetworkArchitecture {
+        conv1: ConvLayer { channels: 16, kernel: 3 },
+        conv2: ConvLayer { channels: 16, kernel: 2 },
         hidden: 40,
         dropout_features: 0.1,
         dropout_hidden: 0.2,
-        mirror_averaging: false,
-        smoothing_ticks: 0.0,
     }
 }
 
@@ -27,7 +31,7 @@ fn settings(steps: u32) -> FitSettings {
         batch: 33, // shards of different sizes
         validation: ValidationSplit { block: 20, every: 5 },
         validate_every: 20,
-        patience: None,
+        patience: 0,
         ..FitSettings::quick(steps)
     }
 }
@@ -35,7 +39,11 @@ fn settings(steps: u32) -> FitSettings {
 fn train(dataset: &Dataset, settings: &FitSettings, device: DeviceChoice) -> FitOutcome {
     let start = Weights::init(tiny(), RootSeed(1), 0);
     let mut progress = |_: &FitProgress| ControlFlow::Continue(());
-    fit(start, dataset, settings, GridGeometry::paper(), device, RootSeed(2), &mut progress).unwrap()
+    fit(start, dataset, settings, context(device), &mut progress).unwrap()
+}
+
+fn context(device: DeviceChoice) -> FitContext {
+    FitContext { geometry: GridGeometry::paper(), inference: InferenceSettings::plain(), device, seed: RootSeed(2) }
 }
 
 #[test]
@@ -43,7 +51,7 @@ fn a_readable_rule_is_learned() {
     let dataset = dataset(1500);
     let start = Weights::init(tiny(), RootSeed(1), 0);
     let held_back = dataset.split(settings(1).validation).validation;
-    let before = evaluate(&start, &held_back, &LossSettings::paper(), GridGeometry::paper(), DeviceChoice::Cpu);
+    let before = evaluate(&start, &held_back, &LossSettings::paper(), context(DeviceChoice::Cpu));
     let outcome = train(&dataset, &settings(400), DeviceChoice::Cpu);
     let after = outcome.report.validation.unwrap();
     assert!(after.rmse_m < 0.4 * before.rmse_m, "{before:?} {:?}", outcome.report);
@@ -66,13 +74,12 @@ fn one_and_two_threads_learn_the_same_bits() {
 #[test]
 fn the_number_of_shards_changes_only_roundings() {
     let dataset = dataset(200);
-    let no_dropout = LookAheadNetConfig { dropout_features: 0.0, dropout_hidden: 0.0, ..tiny() };
+    let no_dropout = NetworkArchitecture { dropout_features: 0.0, dropout_hidden: 0.0, ..tiny() };
     let with_shards = |shards| {
         let settings = FitSettings { shards, ..settings(5) };
         let start = Weights::init(no_dropout, RootSeed(1), 0);
         let mut progress = |_: &FitProgress| ControlFlow::Continue(());
-        let geometry = GridGeometry::paper();
-        fit(start, &dataset, &settings, geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress).unwrap()
+        fit(start, &dataset, &settings, context(DeviceChoice::Cpu), &mut progress).unwrap()
     };
     let (one, three) = (with_shards(1).report, with_shards(3).report);
     let (one, three) = (one.validation.unwrap(), three.validation.unwrap());
@@ -98,8 +105,7 @@ fn a_stop_keeps_what_was_learned() {
         seen.push((now.step, now.samples_done));
         if now.step == 7 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let geometry = GridGeometry::paper();
-    let outcome = fit(start, &dataset, &settings(50), geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress).unwrap();
+    let outcome = fit(start, &dataset, &settings(50), context(DeviceChoice::Cpu), &mut progress).unwrap();
     assert!(outcome.report.stopped);
     assert_eq!((outcome.report.steps, outcome.report.kept_step), (7, 7));
     assert_eq!(seen.last(), Some(&(7, 7 * 33)));
@@ -109,11 +115,11 @@ fn a_stop_keeps_what_was_learned() {
 #[test]
 fn the_weights_returned_are_validated_on_everything_held_back() {
     let dataset = dataset(400);
-    let settings = FitSettings { validate_on_max: Some(7), ..settings(40) };
+    let settings = FitSettings { validate_on_max: 7, ..settings(40) };
     let outcome = train(&dataset, &settings, DeviceChoice::Cpu);
     assert!(outcome.report.curve.iter().all(|point| point.validation.unwrap().samples == 7));
     let held_back = dataset.split(settings.validation).validation;
-    let all = evaluate(&outcome.weights, &held_back, &settings.loss, GridGeometry::paper(), DeviceChoice::Cpu);
+    let all = evaluate(&outcome.weights, &held_back, &settings.loss, context(DeviceChoice::Cpu));
     assert_eq!(outcome.report.validation, Some(all));
 }
 
@@ -124,7 +130,7 @@ fn the_best_weights_are_those_reported() {
     let outcome = train(&dataset, &settings, DeviceChoice::Cpu);
     let best = outcome.report.curve.iter().map(|point| point.validation.unwrap().loss).fold(f32::INFINITY, f32::min);
     let held_back = dataset.split(settings.validation).validation;
-    let again = evaluate(&outcome.weights, &held_back, &settings.loss, GridGeometry::paper(), DeviceChoice::Cpu);
+    let again = evaluate(&outcome.weights, &held_back, &settings.loss, context(DeviceChoice::Cpu));
     assert_eq!(outcome.report.validation, Some(again));
     assert_eq!(again.loss, best);
 }
@@ -133,22 +139,21 @@ fn the_best_weights_are_those_reported() {
 fn nothing_to_learn_from_is_an_error() {
     let start = Weights::init(tiny(), RootSeed(1), 0);
     let mut progress = |_: &FitProgress| ControlFlow::Continue(());
-    let geometry = GridGeometry::paper();
     let empty = Dataset::default();
-    let error = fit(start, &empty, &settings(1), geometry, DeviceChoice::Cpu, RootSeed(2), &mut progress);
+    let error = fit(start, &empty, &settings(1), context(DeviceChoice::Cpu), &mut progress);
     assert!(matches!(error, Err(FitError::NoTrainingSamples { samples: 0, .. })));
 }
 
 #[test]
-fn every_sample_is_dealt_once_per_epoch() {
+fn every_sample_is_drawn_once_per_epoch() {
     let samples = round(50).samples;
-    let mut deck = BatchSampler::new(&samples, Mirror::Off, RootSeed(4));
+    let mut sampler = BatchSampler::new(&samples, Mirror::Off, RootSeed(4));
     let (mut first, mut second) = (Vec::new(), Vec::new());
-    deck.deal(50, &mut first);
-    deck.deal(50, &mut second);
+    sampler.draw(50, &mut first);
+    sampler.draw(50, &mut second);
     assert_ne!(first, second, "a new order per epoch");
-    let keys = |dealt: &[Sample]| {
-        let mut keys: Vec<_> = dealt.iter().map(|sample| sample.label.map(f32::to_bits)).collect();
+    let keys = |drawn: &[Sample]| {
+        let mut keys: Vec<_> = drawn.iter().map(|sample| sample.label.map(f32::to_bits)).collect();
         keys.sort_unstable();
         keys
     };
@@ -159,7 +164,7 @@ fn every_sample_is_dealt_once_per_epoch() {
 #[test]
 fn patience_ends_a_training_that_no_longer_improves() {
     let dataset = dataset(400);
-    let hasty = FitSettings { learning_rate: LearningRate::constant(3e-3), patience: Some(2), ..settings(2000) };
+    let hasty = FitSettings { learning_rate: LearningRate::constant(3e-3), patience: 2, ..settings(2000) };
     let report = train(&dataset, &hasty, DeviceChoice::Cpu).report;
     assert!(!report.stopped && report.steps < 2000, "{} steps", report.steps);
     // The best, then two validations that are not better.

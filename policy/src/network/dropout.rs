@@ -1,9 +1,18 @@
 //! Dropout drawn from our own stream: the same masks for any number of threads, on any device.
 
-use super::{DropoutFactors, LookAheadNetConfig};
+use crate::network::architecture::NetworkArchitecture;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng as _;
 use sim::seed::{RootSeed, Stream};
+
+/// Factors that dropout puts on two layers: 0 or 1/(1 − share).
+#[derive(Debug, Clone)]
+pub struct DropoutFactors {
+    /// `[batch, features]`.
+    pub features: Tensor<2>,
+    /// `[batch, hidden]`.
+    pub hidden: Tensor<2>,
+}
 
 /// One draw of dropout for a batch: which values of two layers survive.
 #[derive(Debug, Clone)]
@@ -14,41 +23,46 @@ pub struct DropoutDraw {
 
 impl DropoutDraw {
     /// Draws for `rows` samples. `index` names the step (and the shard within it); the same index draws the same.
-    pub fn new(config: &LookAheadNetConfig, rows: usize, seed: RootSeed, index: u64) -> Self {
+    pub fn new(architecture: &NetworkArchitecture, rows: usize, seed: RootSeed, index: u64) -> Self {
         let mut rng = seed.rng(Stream::Dropout, index);
         let mut layer = |share: f32, width: usize| Layer::draw(share, rows * width, &mut rng);
         Self {
-            features: layer(config.dropout_features, config.features()),
-            hidden: layer(config.dropout_hidden, config.hidden),
+            features: layer(architecture.dropout_features, architecture.features()),
+            hidden: layer(architecture.dropout_hidden, architecture.hidden),
         }
     }
 
-    pub(super) fn apply_to_features(&self, values: &mut [f32]) {
+    pub(crate) fn apply_to_features(&self, values: &mut [f32]) {
         self.features.apply(values);
     }
 
-    pub(super) fn apply_to_hidden(&self, values: &mut [f32]) {
+    pub(crate) fn apply_to_hidden(&self, values: &mut [f32]) {
         self.hidden.apply(values);
     }
 
-    pub(super) fn features_scale(&self) -> f32 {
+    pub(crate) fn features_scale(&self) -> f32 {
         self.features.scale()
     }
 
-    pub(super) fn hidden_scale(&self) -> f32 {
+    pub(crate) fn hidden_scale(&self) -> f32 {
         self.hidden.scale()
     }
 
-    /// The same draw as tensors, for [`super::LookAheadNet::forward`].
-    pub(crate) fn to_factors(&self, config: &LookAheadNetConfig, rows: usize, device: &Device) -> DropoutFactors {
+    /// The same draw as tensors, for [`LookAheadNet::forward`](crate::network::LookAheadNet::forward).
+    pub(crate) fn to_factors(
+        &self,
+        architecture: &NetworkArchitecture,
+        rows: usize,
+        device: &Device,
+    ) -> DropoutFactors {
         let tensor = |layer: &Layer, width: usize| {
             let mut factors = vec![1.0; rows * width];
             layer.apply(&mut factors);
             Tensor::from_data(TensorData::new(factors, [rows, width]), device)
         };
         DropoutFactors {
-            features: tensor(&self.features, config.features()),
-            hidden: tensor(&self.hidden, config.hidden),
+            features: tensor(&self.features, architecture.features()),
+            hidden: tensor(&self.hidden, architecture.hidden),
         }
     }
 }
@@ -88,9 +102,9 @@ mod tests {
 
     #[test]
     fn a_draw_keeps_the_mean_and_repeats() {
-        let config = LookAheadNetConfig::paper();
-        let draw = |index| DropoutDraw::new(&config, 64, RootSeed(3), index);
-        let mut values = vec![1.0; 64 * config.features()];
+        let architecture = NetworkArchitecture::paper();
+        let draw = |index| DropoutDraw::new(&architecture, 64, RootSeed(3), index);
+        let mut values = vec![1.0; 64 * architecture.features()];
         draw(0).apply_to_features(&mut values);
         let mean = values.iter().sum::<f32>() / values.len() as f32;
         assert!((mean - 1.0).abs() < 0.01, "mean {mean}");
@@ -105,9 +119,10 @@ mod tests {
 
     #[test]
     fn no_dropout_changes_nothing() {
-        let config = LookAheadNetConfig { dropout_features: 0.0, dropout_hidden: 0.0, ..LookAheadNetConfig::compact() };
-        let mut values = vec![3.0; config.features()];
-        DropoutDraw::new(&config, 1, RootSeed(3), 0).apply_to_features(&mut values);
+        let architecture =
+            NetworkArchitecture { dropout_features: 0.0, dropout_hidden: 0.0, ..NetworkArchitecture::compact() };
+        let mut values = vec![3.0; architecture.features()];
+        DropoutDraw::new(&architecture, 1, RootSeed(3), 0).apply_to_features(&mut values);
         assert!(values.iter().all(|value| *value == 3.0));
     }
 }

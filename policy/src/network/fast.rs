@@ -1,4 +1,4 @@
-//! The network arranged for CPUs: the values and gradients of [`super::LookAheadNet`], several times as fast.
+//! The network arranged for CPUs: the values and gradients of [`LookAheadNet`](crate::network::LookAheadNet), several times as fast.
 //!
 //! Where the time goes, and what is done about it:
 //!
@@ -12,16 +12,16 @@
 //! wants answers independent of the batch calls with a constant number of rows.
 
 mod encoder;
+mod matrix;
 
-use super::{DropoutDraw, LookAheadNetConfig, OUTPUTS, Weights};
+use crate::network::architecture::{NetworkArchitecture, OUTPUTS};
+use crate::network::dropout::DropoutDraw;
+use crate::network::weights::Weights;
 pub use encoder::TILE;
 use encoder::{Encoder, EncoderTrace};
-use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
+use faer::Accum;
+use matrix::{product, rows};
 use sim::sensing::OccupancyGrid;
-
-/// Channels are handled in groups of this many.
-pub const LANES: usize = 16;
 
 /// Weights in the arrangement the forward pass wants; to be renewed when the weights change.
 #[derive(Debug, Clone)]
@@ -73,8 +73,8 @@ pub fn forward<'t>(
     trace: &'t mut Trace,
 ) -> &'t [[f32; OUTPUTS]] {
     assert!(grids.len() <= rows_in_all, "{} grids do not fit into {rows_in_all} rows", grids.len());
-    let config = weights.config();
-    let (batch, features, hidden) = (rows_in_all, config.features(), config.hidden);
+    let architecture = weights.architecture();
+    let (batch, features, hidden) = (rows_in_all, architecture.features(), architecture.hidden);
     let parts = weights.parts();
     trace.features.resize(batch * features, 0.0);
     trace.hidden.resize(batch * hidden, 0.0);
@@ -115,8 +115,8 @@ pub fn backward(
     trace: &mut Trace,
     gradient: &mut Weights,
 ) {
-    let config = weights.config();
-    let (features, hidden) = (config.features(), config.hidden);
+    let architecture = weights.architecture();
+    let (features, hidden) = (architecture.features(), architecture.hidden);
     let parts = weights.parts();
     let into = gradient.parts_mut();
     let d_outputs = d_outputs.as_flattened();
@@ -158,17 +158,6 @@ pub fn backward(
     );
 }
 
-/// A row-major matrix.
-fn rows(values: &[f32], columns: usize) -> MatRef<'_, f32> {
-    MatRef::from_row_major_slice(values, values.len() / columns, columns)
-}
-
-/// `into` (row-major) = or += left · right, on the calling thread.
-fn product(accumulate: Accum, into: &mut [f32], left: MatRef<'_, f32>, right: MatRef<'_, f32>) {
-    let into = MatMut::from_row_major_slice_mut(into, left.nrows(), right.ncols());
-    matmul(into, accumulate, left, right, 1.0, Par::Seq);
-}
-
 /// Passes a gradient on, scaled, where the unit was alive.
 fn gate(gradient: &mut [f32], activations: &[f32], scale: f32) {
     for (gradient, activation) in gradient.iter_mut().zip(activations) {
@@ -187,12 +176,13 @@ fn column_sums(values: &[f32], sums: &mut [f32]) {
 }
 
 /// Floating point operations of one sample, forward and backward, as a plain implementation would count them.
-pub fn training_flop(config: &LookAheadNetConfig) -> usize {
-    let conv1 = 2 * 25 * 25 * config.conv1.kernel.pow(2) * config.conv1.channels;
-    let conv2 = 2 * 12 * 12 * config.conv2.kernel.pow(2) * config.conv1.channels * config.conv2.channels;
-    let dense = 2 * config.features() * config.hidden + 2 * config.hidden * OUTPUTS;
+pub fn training_flop(architecture: &NetworkArchitecture) -> usize {
+    let conv1 = 2 * 25 * 25 * architecture.conv1.kernel.pow(2) * architecture.conv1.channels;
+    let conv2 =
+        2 * 12 * 12 * architecture.conv2.kernel.pow(2) * architecture.conv1.channels * architecture.conv2.channels;
+    let dense = 2 * architecture.features() * architecture.hidden + 2 * architecture.hidden * OUTPUTS;
     2 * conv1 + 3 * (conv2 + dense)
 }
 
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;

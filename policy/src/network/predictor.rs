@@ -1,48 +1,16 @@
 //! A trained network that answers grids.
 
-use super::fast::{self, Prepared, Trace};
-use super::{LookAheadNet, OUTPUTS, Weights, grid_tensor, soft_clamp_log_variance};
+use crate::network::architecture::OUTPUTS;
+use crate::network::device::DeviceChoice;
+use crate::network::fast::{self, Prepared, Trace};
+use crate::network::inference::InferenceSettings;
+use crate::network::log_variance::soft_clamp_log_variance;
+use crate::network::look_ahead_net::{LookAheadNet, grid_tensor};
+use crate::network::weights::Weights;
 use burn::tensor::Device;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use sim::driver::{LookAheadPoint, Spread};
 use sim::sensing::{GridGeometry, OccupancyGrid};
-
-/// Where the network is computed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DeviceChoice {
-    /// [`fast`], on all threads of the current rayon pool.
-    #[default]
-    Cpu,
-    /// burn's CPU backend: the reference, slower.
-    Flex,
-    /// First CUDA device.
-    #[cfg(feature = "cuda")]
-    Cuda,
-    /// Default device of wgpu with WGSL shaders.
-    #[cfg(feature = "wgpu")]
-    Wgpu,
-    /// Default device of wgpu with SPIR-V shaders.
-    #[cfg(feature = "vulkan")]
-    Vulkan,
-}
-
-impl DeviceChoice {
-    /// The burn device, or `None` for [`fast`].
-    pub(crate) fn burn_device(self) -> Option<Device> {
-        match self {
-            Self::Cpu => None,
-            Self::Flex => Some(Device::flex()),
-            #[cfg(feature = "cuda")]
-            Self::Cuda => Some(Device::cuda(0)),
-            #[cfg(feature = "wgpu")]
-            Self::Wgpu => Some(Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)),
-            #[cfg(feature = "vulkan")]
-            Self::Vulkan => Some(Device::vulkan(burn::tensor::DeviceKind::DefaultDevice)),
-        }
-    }
-}
 
 /// What the network answers to one grid, in image fractions.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,6 +58,7 @@ const DEVICE_GROUP: usize = 64;
 #[derive(Debug, Clone)]
 pub struct Predictor {
     weights: Weights,
+    mirror_averaging: bool,
     engine: Engine,
 }
 
@@ -100,13 +69,13 @@ enum Engine {
 }
 
 impl Predictor {
-    /// Makes a network ready on a device.
-    pub fn new(weights: Weights, device: DeviceChoice) -> Self {
+    /// Makes a network ready on a device. Action smoothing is not done here: it has a memory per car.
+    pub fn new(weights: Weights, inference: InferenceSettings, device: DeviceChoice) -> Self {
         let engine = match device.burn_device() {
             None => Engine::Cpu { prepared: Prepared::new(&weights), traces: Vec::new() },
             Some(device) => Engine::Burn { net: Box::new(LookAheadNet::from_weights(&weights, &device)), device },
         };
-        Self { weights, engine }
+        Self { weights, mirror_averaging: inference.mirror_averaging, engine }
     }
 
     /// The weights it answers with.
@@ -122,7 +91,7 @@ impl Predictor {
     /// Raw outputs per grid: means of u and w, raw log-variances of both.
     pub fn raw(&mut self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
         let mut outputs = self.one_sided(grids);
-        if self.weights.config().mirror_averaging {
+        if self.mirror_averaging {
             let images: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
             let of_images = self.one_sided(&images.iter().collect::<Vec<_>>());
             for (output, [u, w, raw_u, raw_w]) in outputs.iter_mut().zip(of_images) {
@@ -184,16 +153,20 @@ const TRACES_MAX: usize = 64;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::LookAheadNetConfig;
-    use crate::network::fast::tests::lots;
+    use crate::network::architecture::NetworkArchitecture;
+    use crate::test_data::lots;
     use sim::seed::RootSeed;
 
     /// The property that makes closed-loop results independent of how many cars are still on the road.
     #[test]
     fn an_answer_does_not_depend_on_the_other_grids() {
         let grids = lots(3 * GROUP + 5);
-        for config in [LookAheadNetConfig::paper(), LookAheadNetConfig::compact()] {
-            let mut predictor = Predictor::new(Weights::init(config, RootSeed(1), 0), DeviceChoice::Cpu);
+        for (architecture, inference) in [
+            (NetworkArchitecture::paper(), InferenceSettings::plain()),
+            (NetworkArchitecture::compact(), InferenceSettings::smoothed()),
+        ] {
+            let weights = Weights::init(architecture, RootSeed(1), 0);
+            let mut predictor = Predictor::new(weights, inference, DeviceChoice::Cpu);
             let all: Vec<&OccupancyGrid> = grids.iter().collect();
             let together = predictor.raw(&all);
             for (index, grid) in grids.iter().enumerate() {
@@ -208,11 +181,11 @@ mod tests {
 
     /// To the bit, but for the rounding of 1 − u.
     #[test]
-    fn a_symmetric_network_answers_mirror_images_alike() {
+    fn mirror_averaging_answers_mirror_images_alike() {
         let grids = lots(20);
         let mirrored: Vec<OccupancyGrid> = grids.iter().map(OccupancyGrid::mirrored).collect();
-        let weights = Weights::init(LookAheadNetConfig::compact(), RootSeed(1), 0);
-        let mut predictor = Predictor::new(weights, DeviceChoice::Cpu);
+        let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
+        let mut predictor = Predictor::new(weights, InferenceSettings::smoothed(), DeviceChoice::Cpu);
         let answers = predictor.predict(&grids.iter().collect::<Vec<_>>());
         let images = predictor.predict(&mirrored.iter().collect::<Vec<_>>());
         for (answer, image) in answers.iter().zip(&images) {
@@ -225,10 +198,12 @@ mod tests {
     fn one_and_two_threads_answer_the_same_bits() {
         let grids = lots(100);
         let grids: Vec<&OccupancyGrid> = grids.iter().collect();
-        let weights = Weights::init(LookAheadNetConfig::compact(), RootSeed(1), 0);
+        let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
         let with_threads = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| Predictor::new(weights.clone(), DeviceChoice::Cpu).raw(&grids))
+            pool.install(|| {
+                Predictor::new(weights.clone(), InferenceSettings::smoothed(), DeviceChoice::Cpu).raw(&grids)
+            })
         };
         assert_eq!(with_threads(1), with_threads(2));
     }
@@ -237,9 +212,9 @@ mod tests {
     fn burn_and_fast_answer_alike() {
         let grids = lots(70);
         let grids: Vec<&OccupancyGrid> = grids.iter().collect();
-        let weights = Weights::init(LookAheadNetConfig::paper(), RootSeed(1), 0);
-        let fast = Predictor::new(weights.clone(), DeviceChoice::Cpu).predict(&grids);
-        let burn = Predictor::new(weights, DeviceChoice::Flex).predict(&grids);
+        let weights = Weights::init(NetworkArchitecture::paper(), RootSeed(1), 0);
+        let answers = |device| Predictor::new(weights.clone(), InferenceSettings::plain(), device).predict(&grids);
+        let (fast, burn) = (answers(DeviceChoice::Cpu), answers(DeviceChoice::Flex));
         for (a, b) in fast.iter().zip(&burn) {
             for axis in 0..2 {
                 assert!((a.mean[axis] - b.mean[axis]).abs() < 1e-5, "{a:?} {b:?}");

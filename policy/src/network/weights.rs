@@ -1,12 +1,13 @@
 //! The weights of a network on the host: one flat vector, cut into eight named parts.
 
-use super::{LookAheadNetConfig, OUTPUTS, soft_clamp_inverse};
+use crate::network::architecture::NetworkArchitecture;
+use crate::network::log_variance::soft_clamp_inverse;
 use sim::seed::{RootSeed, Stream};
 
 /// All trainable values of one network, in the order of [`Parts`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Weights {
-    config: LookAheadNetConfig,
+    architecture: NetworkArchitecture,
     values: Vec<f32>,
 }
 
@@ -29,24 +30,6 @@ pub struct Parts<T> {
     pub fc1_bias: T,
     pub fc2_weight: T,
     pub fc2_bias: T,
-}
-
-impl Parts<()> {
-    /// Values per part, in order.
-    pub(super) fn lengths(config: &LookAheadNetConfig) -> impl Iterator<Item = usize> {
-        let (conv1, conv2) = (config.conv1, config.conv2);
-        [
-            conv1.channels * conv1.kernel * conv1.kernel,
-            conv1.channels,
-            conv2.channels * conv1.channels * conv2.kernel * conv2.kernel,
-            conv2.channels,
-            config.features() * config.hidden,
-            config.hidden,
-            config.hidden * OUTPUTS,
-            OUTPUTS,
-        ]
-        .into_iter()
-    }
 }
 
 impl<T> Parts<T> {
@@ -72,21 +55,21 @@ const INITIAL_MEAN: [f32; 2] = [0.5, 0.4];
 const INITIAL_LOG_SIGMA: f32 = -1.9;
 
 impl Weights {
-    /// He initialisation, small last layer, biases as in methods.md 4.1. `index` tells apart networks of one seed.
+    /// He initialisation, small last layer, biases as in docs/methods.md 4.1. `index` tells apart networks of one seed.
     ///
     /// Drawn in the order of the parts from our own stream, so that no other thread can shift a draw.
     ///
     /// # Panics
     /// If the shape was not validated.
-    pub fn init(config: LookAheadNetConfig, seed: RootSeed, index: u64) -> Self {
-        let mut weights = Self::zeros(config);
+    pub fn init(architecture: NetworkArchitecture, seed: RootSeed, index: u64) -> Self {
+        let mut weights = Self::zeros(architecture);
         let mut normal = Normal { rng: seed.rng(Stream::Weights, index), spare: None };
-        let fan_in_1 = config.conv1.kernel.pow(2);
-        let fan_in_2 = config.conv2.kernel.pow(2) * config.conv1.channels;
+        let fan_in_1 = architecture.conv1.kernel.pow(2);
+        let fan_in_2 = architecture.conv2.kernel.pow(2) * architecture.conv1.channels;
         let parts = weights.parts_mut();
         normal.fill(parts.conv1_weight, he_std(fan_in_1));
         normal.fill(parts.conv2_weight, he_std(fan_in_2));
-        normal.fill(parts.fc1_weight, he_std(config.features()));
+        normal.fill(parts.fc1_weight, he_std(architecture.features()));
         normal.fill(parts.fc2_weight, LAST_LAYER_STD);
         let raw_log_variance = soft_clamp_inverse(2.0 * INITIAL_LOG_SIGMA);
         parts.fc2_bias.copy_from_slice(&[INITIAL_MEAN[0], INITIAL_MEAN[1], raw_log_variance, raw_log_variance]);
@@ -97,16 +80,16 @@ impl Weights {
     ///
     /// # Panics
     /// If the shape was not validated.
-    pub fn zeros(config: LookAheadNetConfig) -> Self {
-        if let Err(error) = config.validate() {
+    pub fn zeros(architecture: NetworkArchitecture) -> Self {
+        if let Err(error) = architecture.validate() {
             panic!("network shape was not validated: {error}");
         }
-        Self { config, values: vec![0.0; config.parameter_count()] }
+        Self { architecture, values: vec![0.0; architecture.parameter_count()] }
     }
 
     /// The shape.
-    pub fn config(&self) -> LookAheadNetConfig {
-        self.config
+    pub fn architecture(&self) -> NetworkArchitecture {
+        self.architecture
     }
 
     /// All values.
@@ -122,14 +105,14 @@ impl Weights {
     /// The values by name.
     pub fn parts(&self) -> Parts<&[f32]> {
         let mut rest = self.values.as_slice();
-        let mut lengths = Parts::lengths(&self.config);
+        let mut lengths = self.architecture.lengths().into_iter();
         Parts::from_fn(|| rest.split_off(..lengths.next().expect("eight parts")).expect("the values fill the parts"))
     }
 
     /// The values by name, to be changed.
     pub fn parts_mut(&mut self) -> Parts<&mut [f32]> {
         let mut rest = self.values.as_mut_slice();
-        let mut lengths = Parts::lengths(&self.config);
+        let mut lengths = self.architecture.lengths().into_iter();
         Parts::from_fn(|| {
             rest.split_off_mut(..lengths.next().expect("eight parts")).expect("the values fill the parts")
         })
@@ -173,24 +156,24 @@ mod tests {
 
     #[test]
     fn the_paper_network_has_2_318_092_parameters() {
-        assert_eq!(LookAheadNetConfig::paper().parameter_count(), 2_318_092);
-        assert_eq!(LookAheadNetConfig::compact().parameter_count(), 300_996);
+        assert_eq!(NetworkArchitecture::paper().parameter_count(), 2_318_092);
+        assert_eq!(NetworkArchitecture::compact().parameter_count(), 300_996);
     }
 
     #[test]
     fn initial_weights_have_the_intended_spread() {
-        let weights = Weights::init(LookAheadNetConfig::compact(), RootSeed(1), 0);
+        let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
         let std = |values: &[f32]| (values.iter().map(|v| v * v).sum::<f32>() / values.len() as f32).sqrt();
         let parts = weights.parts();
         assert!((std(parts.fc1_weight) / he_std(1152) - 1.0).abs() < 0.01);
         assert!((std(parts.conv2_weight) / he_std(144) - 1.0).abs() < 0.05);
         assert!((std(parts.fc2_weight) / 0.01 - 1.0).abs() < 0.05);
-        assert!((super::super::soft_clamp_log_variance(parts.fc2_bias[2]) - -3.8).abs() < 1e-5);
+        assert!((crate::network::log_variance::soft_clamp_log_variance(parts.fc2_bias[2]) - -3.8).abs() < 1e-5);
     }
 
     #[test]
     fn a_seed_fixes_the_weights_and_an_index_changes_them() {
-        let init = |seed, index| Weights::init(LookAheadNetConfig::compact(), RootSeed(seed), index);
+        let init = |seed, index| Weights::init(NetworkArchitecture::compact(), RootSeed(seed), index);
         assert_eq!(init(7, 0), init(7, 0));
         assert_ne!(init(7, 0), init(7, 1));
         assert_ne!(init(7, 0), init(8, 0));

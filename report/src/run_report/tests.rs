@@ -58,6 +58,7 @@ fn commands_can_be_pasted_into_a_shell() {
         rustc_version: String::new(),
         threads: 1,
         target: String::new(),
+        processor: None,
     };
     let expected = r#"cargo xtask evaluate --set 'training.lots=["lot-a"]' --out 'my runs/it'\''s'"#;
     assert_eq!(command_line(&manifest), expected);

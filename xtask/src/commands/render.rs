@@ -1,13 +1,13 @@
 //! `render`: pictures of lots, drives, samples and noise.
 
-use super::evaluate;
 use super::render_animation::{self, AnimationArgs};
+use super::{evaluate, reproduce};
 use crate::args::{LayerArgs, OneDirection, noise_levels};
 use crate::console::Console;
 use anyhow::{Context as _, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use experiment::drive::Replay;
-use experiment::drivers::{self, DriverSpec};
+use experiment::drivers::DriverSpec;
 use experiment::lots::Lot;
 use experiment::progress::Progress as _;
 use experiment::replay_key::ReplayKey;
@@ -16,15 +16,12 @@ use experiment::settings::{Layers, NoiseChoice, Settings};
 use experiment::training;
 use experiment::trials::{Purpose, Trial};
 use policy::checkpoint::Checkpoint;
-use policy::dagger::GatedCollector;
 use policy::dataset::store::Store;
-use policy::network::Predictor;
 use rayon::prelude::*;
 use report::pictures::drawing::Drawing;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
 use report::pictures::{contact_sheet, file_name, lot, noise, samples};
-use report::run_report;
-use sim::batch::run_lockstep;
+use report::{reproduction, run_report};
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -76,6 +73,8 @@ pub(crate) enum RenderWhat {
     Noise(RenderNoiseArgs),
     /// The report of a run anew, into its folder.
     Report(RenderReportArgs),
+    /// docs/results.md and its figures from a finished `reproduce`.
+    Results(RenderResultsArgs),
 }
 
 #[derive(Debug, Clone, Args)]
@@ -83,6 +82,16 @@ pub(crate) struct RenderReportArgs {
     /// Folder of a training or an evaluation.
     #[arg(value_name = "RUN")]
     run: PathBuf,
+}
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RenderResultsArgs {
+    /// Folder of a finished `reproduce`.
+    #[arg(value_name = "RUN")]
+    run: PathBuf,
+    /// File to write; figures go to `pictures/results` beside it.
+    #[arg(long, value_name = "FILE.md", default_value = "docs/results.md")]
+    to: PathBuf,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -183,6 +192,7 @@ pub(crate) fn run(args: &RenderArgs) -> anyhow::Result<()> {
         RenderWhat::Animation(what) => render_animation::run(what, &output),
         RenderWhat::Samples(what) => render_samples(what, &output),
         RenderWhat::Noise(what) => render_noise(what, &output),
+        RenderWhat::Results(what) => render_results(what),
         RenderWhat::Report(what) => render_report(&what.run),
     }
 }
@@ -313,30 +323,18 @@ fn driven_anew(args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
 
 /// A drive of a training round: the network of the round before and the expert, as in the training itself.
 fn driven_in_training(run: &Path, args: &TrajectoriesArgs) -> anyhow::Result<Drives> {
-    let settings = run_dir::settings_of(run)?;
-    let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
-    let mut episodes = training::episodes_of(&settings, &lots, args.round)?;
-    let count = episodes.len();
-    ensure!((args.trial as usize) < count, "--trial {}: a round has {count} drives, counted from 0", args.trial);
-    let episode = episodes.swap_remove(args.trial as usize);
-    let map = Arc::clone(episode.map());
-    let novice = args.round.checked_sub(1).map(|before| run.join(format!("round-{before:02}")));
-    let novice = novice.map(|folder| Checkpoint::load(&folder)).transpose()?;
-    let novice = novice.map(|checkpoint| Predictor::new(checkpoint.weights, settings.dagger.device));
-    let jitter = u64::from(args.round) << 20 | u64::from(args.trial);
-    let expert = drivers::expert(&settings.expert, &settings.episode).with_jitter_seed(settings.seed, jitter);
-    let dagger = &settings.dagger;
-    let mut collector = GatedCollector::new(novice, vec![Box::new(expert)], dagger.rule, dagger.keep, dagger.geometry);
+    let (map, rollouts) = training::drive_again(run, args.round, args.trial)?;
     let name = format!("{} round {} drive {}", map.scenario().name, args.round, args.trial);
     let length_m = map.path().length_m();
     let console = Console::default();
     console.begin("driving", "training");
     let mut points = Vec::new();
-    let reports = run_lockstep(vec![episode], &mut collector, &mut |_, frame| {
+    let collected = rollouts.drive(&mut |_, frame| {
         points.push(Point::of(frame));
         console.at(f64::from(frame.progress_m / length_m), &mut |_| format!("{} ticks", points.len()));
     });
-    console.end(&format!("near-collisions: {} in {length_m:.0} m", reports[0].metrics.near_collisions));
+    let near_collisions = collected.reports[0].metrics.near_collisions;
+    console.end(&format!("near-collisions: {near_collisions} in {length_m:.0} m"));
     Ok((map, vec![Trajectory { name: "training".to_owned(), points }], name))
 }
 
@@ -357,15 +355,18 @@ fn render_samples(args: &SamplesArgs, output: &Output<'_>) -> anyhow::Result<()>
     let count = args.count.min(kept.len());
     let chosen: Vec<usize> = (0..count).map(|i| (2 * i + 1) * kept.len() / (2 * count)).collect();
     let grids: Vec<_> = chosen.iter().map(|&i| &kept[i].grid).collect();
-    let answers =
-        checkpoint.map(|checkpoint| Predictor::new(checkpoint.weights, settings.dagger.device).predict(&grids));
+    let answers = checkpoint.map(|checkpoint| checkpoint.predictor(settings.dagger.device).predict(&grids));
     let samples: Vec<_> = chosen
         .iter()
         .enumerate()
         .map(|(place, &i)| (i, kept[i], answers.as_ref().map(|answers| answers[place])))
         .collect();
     let title = format!("{name}: {count} of {} samples", kept.len());
-    output.write(&format!("samples-{name}"), &samples::picture(&title, &samples, &settings.dagger.geometry)?, false)
+    output.write(
+        &format!("samples-{name}"),
+        &samples::picture(&title, &samples, &settings.episode.sensing.geometry)?,
+        false,
+    )
 }
 
 fn render_noise(args: &RenderNoiseArgs, output: &Output<'_>) -> anyhow::Result<()> {
@@ -390,6 +391,17 @@ fn render_noise(args: &RenderNoiseArgs, output: &Output<'_>) -> anyhow::Result<(
         args.noise.iter().map(|&noise| (noise.name(), inspect(noise, at_m))).collect();
     let title = format!("{}, {at_m:.1} m along the route, seed {}", trial.lot.name(), args.seed);
     output.write(&format!("noise-{}", trial.lot.name()), &noise::picture(&title, &levels)?, false)
+}
+
+fn render_results(args: &RenderResultsArgs) -> anyhow::Result<()> {
+    ensure!(
+        run_dir::is_finished(&args.run),
+        "{}: this is no finished run; make one with cargo xtask reproduce",
+        args.run.display()
+    );
+    reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.to)?;
+    println!("{}", args.to.display());
+    Ok(())
 }
 
 fn render_report(run: &Path) -> anyhow::Result<()> {

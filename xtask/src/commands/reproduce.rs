@@ -131,13 +131,23 @@ fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
     Ok((run, settings, extent))
 }
 
+/// What a run did, by the files that it left.
+pub(crate) fn recipe_of(path: &Path) -> anyhow::Result<Recipe> {
+    let (settings, extent) = (run_dir::settings_of(path)?, extent_of(path)?);
+    let stages = stages::all(&settings, &extent, path);
+    Ok(Recipe { settings, extent, stages })
+}
+
+fn extent_of(path: &Path) -> anyhow::Result<Extent> {
+    let file = path.join(EXTENT);
+    let text = fs::read_to_string(&file)
+        .with_context(|| format!("{}: cannot be read; this is no folder of cargo xtask reproduce", file.display()))?;
+    toml::from_str(&text).with_context(|| file.display().to_string())
+}
+
 fn resume(path: &Path) -> anyhow::Result<(RunDir, Settings, Extent)> {
     let (run, settings) = RunDir::resume(path)?;
-    let file = path.join(EXTENT);
-    let text = fs::read_to_string(&file).with_context(|| {
-        format!("{}: cannot be read; only a folder of cargo xtask reproduce can be resumed", file.display())
-    })?;
-    let extent = toml::from_str(&text).with_context(|| file.display().to_string())?;
+    let extent = extent_of(path)?;
     Ok((run, settings, extent))
 }
 
@@ -146,7 +156,7 @@ fn tuned(folder: Option<&Path>) -> anyhow::Result<Vec<String>> {
     let Some(folder) = folder else {
         return Ok(drivers::tuned_specs());
     };
-    let specs: Vec<String> = planners::Baseline::all()
+    let specs: Vec<String> = planners::PlannerSpec::all()
         .iter()
         .map(|planner| (planner.name(), folder.join(format!("{}.toml", planner.name()))))
         .filter(|(_, file)| file.is_file())

@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 pub(crate) const DAGGER_EXAMPLES: &str = "\
 Examples:
   cargo xtask train-dagger --seed 2
-  cargo xtask train-dagger --set dagger.eta=0.85 --set dagger.fit_iteration.budget.steps=2000
+  cargo xtask train-dagger --set dagger.eta=0.85 --set dagger.fit.budget.steps=2000
   cargo xtask train-dagger --set training.lots='[\"lot-a\", \"lot-c\"]' --no-eval
   cargo xtask train-dagger --resume runs/train-dagger-default-s1";
 

@@ -1,15 +1,16 @@
 //! Both convolutions with their pools, forward and backward.
 
-use super::LANES;
-use crate::network::{ConvConfig, POOLED_1, POOLED_2, Weights};
+use crate::network::architecture::{ConvLayer, LANES, POOLED_1, POOLED_2};
+use crate::network::fast::matrix::{product, rows};
+use crate::network::weights::Weights;
 use faer::Accum;
 use sim::sensing::{GRID_CELLS, OccupancyGrid};
 
 /// The weights of both convolutions as the passes below want them.
 #[derive(Debug, Clone)]
-pub(super) struct Encoder {
-    conv1: ConvConfig,
-    conv2: ConvConfig,
+pub(crate) struct Encoder {
+    conv1: ConvLayer,
+    conv2: ConvLayer,
     /// `[kernel row, pattern, channel]`: what a kernel row adds when its cells hold `pattern` (bit = kernel column).
     table: Vec<f32>,
     /// `[kernel row · kernel column · input channel, output channel]`.
@@ -18,7 +19,7 @@ pub(super) struct Encoder {
 
 /// What the forward pass leaves for the backward pass.
 #[derive(Debug, Clone, Default)]
-pub(super) struct EncoderTrace {
+pub(crate) struct EncoderTrace {
     /// `[batch, padded row, padded column, channel]`: first pool, zero-padded for the second convolution.
     pooled_1: Vec<f32>,
     /// `[batch, row, column, channel]`: which of four cells won the first pool, [`SILENT`] if `ReLU` cut it off.
@@ -45,8 +46,8 @@ const SILENT: u8 = 4;
 const POOL: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];
 
 impl Encoder {
-    pub(super) fn new(weights: &Weights) -> Self {
-        let (conv1, conv2) = (weights.config().conv1, weights.config().conv2);
+    pub(crate) fn new(weights: &Weights) -> Self {
+        let (conv1, conv2) = (weights.architecture().conv1, weights.architecture().conv2);
         let parts = weights.parts();
         let mut table = vec![0.0; table_len(conv1)];
         for_each_table_entry(conv1, |entry, weight| table[entry] += parts.conv1_weight[weight]);
@@ -56,7 +57,7 @@ impl Encoder {
     }
 
     /// Grids to `features` `[batch, 6 · 6 · channel]`.
-    pub(super) fn forward(
+    pub(crate) fn forward(
         &self,
         grids: &[OccupancyGrid],
         bias_1: &[f32],
@@ -83,8 +84,8 @@ impl Encoder {
                 self.copy_windows(pooled_1, block_mut(&mut trace.windows, sample, sizes.windows));
             }
             let conv_2 = &mut trace.conv_2[..tile * sizes.conv_2];
-            let windows = super::rows(&trace.windows[..tile * sizes.windows], self.window_len());
-            super::product(Accum::Replace, conv_2, windows, super::rows(&self.matrix, self.conv2.channels));
+            let windows = rows(&trace.windows[..tile * sizes.windows], self.window_len());
+            product(Accum::Replace, conv_2, windows, rows(&self.matrix, self.conv2.channels));
             for sample in 0..tile {
                 let index = first + sample;
                 pool_2(
@@ -100,7 +101,7 @@ impl Encoder {
 
     /// Writes the gradients of both convolutions, given the gradient of the features of the last forward pass.
     #[expect(clippy::too_many_arguments, reason = "four gradients, each with its name at the call")]
-    pub(super) fn backward(
+    pub(crate) fn backward(
         &self,
         grids: &[OccupancyGrid],
         d_features: &[f32],
@@ -135,12 +136,12 @@ impl Encoder {
                     d_bias_2,
                 );
             }
-            let d_conv_2 = super::rows(&trace.conv_2[..tile * sizes.conv_2], self.conv2.channels);
-            let windows = super::rows(&trace.windows[..tile * sizes.windows], self.window_len());
-            super::product(Accum::Add, &mut trace.d_matrix, windows.transpose(), d_conv_2);
-            let matrix = super::rows(&self.matrix, self.conv2.channels);
+            let d_conv_2 = rows(&trace.conv_2[..tile * sizes.conv_2], self.conv2.channels);
+            let windows = rows(&trace.windows[..tile * sizes.windows], self.window_len());
+            product(Accum::Add, &mut trace.d_matrix, windows.transpose(), d_conv_2);
+            let matrix = rows(&self.matrix, self.conv2.channels);
             // The windows are done with; their memory takes their gradient.
-            super::product(Accum::Replace, &mut trace.windows[..tile * sizes.windows], d_conv_2, matrix.transpose());
+            product(Accum::Replace, &mut trace.windows[..tile * sizes.windows], d_conv_2, matrix.transpose());
             for sample in 0..tile {
                 let index = first + sample;
                 self.add_windows(block(&trace.windows, sample, sizes.windows), &mut trace.d_pooled_1);
@@ -339,7 +340,7 @@ struct PoolEntries {
 /// The rows of a grid with "same" padding, bit `c + padding` = column `c`.
 type PaddedWords = [u32; GRID_CELLS + MAX_KERNEL - 1];
 
-fn padded_words(grid: &OccupancyGrid, conv: ConvConfig) -> PaddedWords {
+fn padded_words(grid: &OccupancyGrid, conv: ConvLayer) -> PaddedWords {
     let (before, _) = conv.padding();
     let mut words = [0; GRID_CELLS + MAX_KERNEL - 1];
     for (row, word) in words[before..before + GRID_CELLS].iter_mut().enumerate() {
@@ -350,12 +351,12 @@ fn padded_words(grid: &OccupancyGrid, conv: ConvConfig) -> PaddedWords {
     words
 }
 
-fn table_len(conv: ConvConfig) -> usize {
+fn table_len(conv: ConvLayer) -> usize {
     (conv.kernel << conv.kernel) * conv.channels
 }
 
 /// Calls with every pair (table entry, weight that is part of it).
-fn for_each_table_entry(conv: ConvConfig, mut visit: impl FnMut(usize, usize)) {
+fn for_each_table_entry(conv: ConvLayer, mut visit: impl FnMut(usize, usize)) {
     let (kernel, channels) = (conv.kernel, conv.channels);
     for row in 0..kernel {
         for pattern in 0..1usize << kernel {
@@ -369,7 +370,7 @@ fn for_each_table_entry(conv: ConvConfig, mut visit: impl FnMut(usize, usize)) {
 }
 
 /// Calls with every pair (entry of the window matrix, weight it is).
-fn for_each_matrix_entry(conv1: ConvConfig, conv2: ConvConfig, mut visit: impl FnMut(usize, usize)) {
+fn for_each_matrix_entry(conv1: ConvLayer, conv2: ConvLayer, mut visit: impl FnMut(usize, usize)) {
     let (inputs, outputs, cells) = (conv1.channels, conv2.channels, conv2.kernel * conv2.kernel);
     for cell in 0..cells {
         for input in 0..inputs {

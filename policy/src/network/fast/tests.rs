@@ -2,46 +2,27 @@
 
 use super::*;
 use crate::loss::{self, LossSettings};
-use crate::network::{ConvConfig, LookAheadNet, grid_tensor};
+use crate::network::architecture::ConvLayer;
+use crate::network::look_ahead_net::{LookAheadNet, grid_tensor};
+use crate::test_data::lots;
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::RngExt as _;
 use sim::seed::{RootSeed, Stream};
+use sim::sensing::OccupancyGrid;
 
-/// Grids like those of a parking lot: free ground, blocks of cars, some speckle.
-pub(crate) fn lots(count: usize) -> Vec<OccupancyGrid> {
-    let mut rng = RootSeed(11).rng(Stream::Layout, 0);
-    (0..count)
-        .map(|_| {
-            let mut grid = OccupancyGrid::free();
-            for _ in 0..4 {
-                let (row, col) = (rng.random_range(0..25), rng.random_range(0..25));
-                for r in row..(row + 7).min(25) {
-                    for c in col..(col + 5).min(25) {
-                        grid.set_occupied(r, c);
-                    }
-                }
-            }
-            for _ in 0..20 {
-                grid.set_occupied(rng.random_range(0..25), rng.random_range(0..25));
-            }
-            grid
-        })
-        .collect()
-}
-
-fn shapes() -> [LookAheadNetConfig; 3] {
-    let odd = LookAheadNetConfig {
-        conv1: ConvConfig { channels: 16, kernel: 4 },
-        conv2: ConvConfig { channels: 48, kernel: 5 },
+fn shapes() -> [NetworkArchitecture; 3] {
+    let odd = NetworkArchitecture {
+        conv1: ConvLayer { channels: 16, kernel: 4 },
+        conv2: ConvLayer { channels: 48, kernel: 5 },
         hidden: 70,
-        ..LookAheadNetConfig::paper()
+        ..NetworkArchitecture::paper()
     };
-    [LookAheadNetConfig::paper(), LookAheadNetConfig::compact(), odd]
+    [NetworkArchitecture::paper(), NetworkArchitecture::compact(), odd]
 }
 
 /// Biases start at 0; here they must matter.
-fn weights_with_biases(config: LookAheadNetConfig) -> Weights {
-    let mut weights = Weights::init(config, RootSeed(5), 0);
+fn weights_with_biases(architecture: NetworkArchitecture) -> Weights {
+    let mut weights = Weights::init(architecture, RootSeed(5), 0);
     let mut rng = RootSeed(5).rng(Stream::Weights, 1);
     let parts = weights.parts_mut();
     for bias in [parts.conv1_bias, parts.conv2_bias, parts.fc1_bias] {
@@ -58,9 +39,9 @@ fn values_and_gradients_equal_those_of_burn() {
     let labels: Vec<[f32; 2]> = (0..batch).map(|i| [0.1 * i as f32, 0.9 - 0.1 * i as f32]).collect();
     let tau_hats: Vec<f32> = (0..batch).map(|i| 0.05 * i as f32).collect();
     let settings = LossSettings::paper();
-    for config in shapes() {
-        let weights = weights_with_biases(config);
-        let draw = DropoutDraw::new(&config, batch, RootSeed(9), 0);
+    for architecture in shapes() {
+        let weights = weights_with_biases(architecture);
+        let draw = DropoutDraw::new(&architecture, batch, RootSeed(9), 0);
 
         let prepared = Prepared::new(&weights);
         let mut trace = Trace::default();
@@ -68,13 +49,13 @@ fn values_and_gradients_equal_those_of_burn() {
         let d_outputs: Vec<[f32; OUTPUTS]> = (0..batch)
             .map(|i| loss::of_sample(&settings, outputs[i], labels[i], tau_hats[i]).gradient.map(|g| g / batch as f32))
             .collect();
-        let mut gradient = Weights::zeros(config);
+        let mut gradient = Weights::zeros(architecture);
         backward(&weights, &prepared, &grids, &d_outputs, Some(&draw), &mut trace, &mut gradient);
 
         let device = Device::flex().autodiff();
         let net = LookAheadNet::from_weights(&weights, &device);
         let refs: Vec<&OccupancyGrid> = grids.iter().collect();
-        let factors = draw.to_factors(&config, batch, &device);
+        let factors = draw.to_factors(&architecture, batch, &device);
         let burn_outputs = net.forward(grid_tensor(&refs, batch, &device), Some(factors));
         let values: Vec<f32> = burn_outputs.clone().into_data().try_into_vec().unwrap();
         assert_close("outputs", outputs.as_flattened(), &values);
@@ -82,7 +63,7 @@ fn values_and_gradients_equal_those_of_burn() {
         let sample_weights = tau_hats.iter().map(|tau| settings.weight_of_squared_error(*tau)).collect();
         let sample_weights = Tensor::from_data(TensorData::new::<f32, _>(sample_weights, [batch, 1]), &device);
         let parts = loss::of_batch(&settings, burn_outputs, labels, sample_weights);
-        let burn_gradient = net.gradient(config, &(parts.misfit + parts.log_variance).backward());
+        let burn_gradient = net.gradient(architecture, &(parts.misfit + parts.log_variance).backward());
 
         let (ours, theirs) = (gradient.parts(), burn_gradient.parts());
         for (name, a, b) in [
@@ -95,7 +76,7 @@ fn values_and_gradients_equal_those_of_burn() {
             ("fc2.weight", ours.fc2_weight, theirs.fc2_weight),
             ("fc2.bias", ours.fc2_bias, theirs.fc2_bias),
         ] {
-            assert!(a.iter().any(|value| *value != 0.0), "{name} of {config:?} has a gradient");
+            assert!(a.iter().any(|value| *value != 0.0), "{name} of {architecture:?} has a gradient");
             assert_close(name, a, b);
         }
     }
@@ -111,14 +92,14 @@ fn assert_close(name: &str, a: &[f32], b: &[f32]) {
 
 #[test]
 fn a_trace_can_be_used_again() {
-    let config = LookAheadNetConfig::compact();
-    let weights = weights_with_biases(config);
+    let architecture = NetworkArchitecture::compact();
+    let weights = weights_with_biases(architecture);
     let prepared = Prepared::new(&weights);
     let grids = lots(9);
     let fresh = forward(&weights, &prepared, &grids, grids.len(), None, &mut Trace::default()).to_vec();
     let mut used = Trace::default();
     forward(&weights, &prepared, &lots(12)[3..], 9, None, &mut used);
-    let mut gradient = Weights::zeros(config);
+    let mut gradient = Weights::zeros(architecture);
     backward(&weights, &prepared, &lots(12)[3..], &[[1.0; OUTPUTS]; 9], None, &mut used, &mut gradient);
     assert_eq!(forward(&weights, &prepared, &grids, grids.len(), None, &mut used), fresh);
 }

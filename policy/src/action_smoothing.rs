@@ -1,13 +1,13 @@
-//! A steady hand: the point that is driven at follows the network's answers with some inertia.
+//! Action smoothing: the point that is driven at is an exponential mean of the network's answers.
 //!
-//! Answers to neighbouring grids differ by what noise does to single cells, and the car answers each of them a moment
-//! later: that can build up to weaving. A mean over some ticks damps it.
+//! Answers to successive grids differ by sensor noise, and the car responds to each with a delay, which can build up to
+//! weaving. A mean over some ticks damps it.
 
-use crate::network::{LookAheadNetConfig, Prediction};
+use crate::network::{InferenceSettings, Prediction};
 use sim::driver::{LookAheadPoint, Seat};
 use sim::sensing::GridGeometry;
 
-/// What one driver remembers.
+/// The smoothing of one car.
 #[derive(Debug, Clone)]
 pub(crate) struct ActionSmoothing {
     /// Share of the way from the mean to a new answer, 0…1.
@@ -24,13 +24,13 @@ struct Aim {
 }
 
 impl ActionSmoothing {
-    pub(crate) fn new(config: &LookAheadNetConfig, geometry: GridGeometry) -> Self {
-        // A step is followed as by 1 − exp(−t / memory); without memory at once.
-        let gain = if config.smoothing_ticks > 0.0 { 1.0 - (-1.0 / config.smoothing_ticks).exp() } else { 1.0 };
+    pub(crate) fn new(inference: InferenceSettings, geometry: GridGeometry) -> Self {
+        // The response to a step is 1 − exp(−t / time constant).
+        let gain = if inference.smoothing_ticks > 0.0 { 1.0 - (-1.0 / inference.smoothing_ticks).exp() } else { 1.0 };
         Self { gain, geometry, mean: None }
     }
 
-    /// The exponential mean of curvature and range over the answers so far. The doubt stays that of the last one.
+    /// The exponential mean of curvature and range over the answers so far. The standard deviations are those of the last one.
     pub(crate) fn smoothed(&mut self, answer: Prediction) -> Prediction {
         if self.gain == 1.0 {
             return answer;
@@ -46,7 +46,7 @@ impl ActionSmoothing {
     }
 }
 
-/// What the drivers of a batch remember, by episode.
+/// The smoothing of every car of a batch, by episode.
 #[derive(Debug, Clone)]
 pub(crate) struct FleetSmoothing {
     fresh: ActionSmoothing,
@@ -54,12 +54,12 @@ pub(crate) struct FleetSmoothing {
 }
 
 impl FleetSmoothing {
-    pub(crate) fn new(config: &LookAheadNetConfig, geometry: GridGeometry) -> Self {
-        Self { fresh: ActionSmoothing::new(config, geometry), of_episodes: Vec::new() }
+    pub(crate) fn new(inference: InferenceSettings, geometry: GridGeometry) -> Self {
+        Self { fresh: ActionSmoothing::new(inference, geometry), of_episodes: Vec::new() }
     }
 
-    /// Steadies the answer at every seat.
-    pub(crate) fn steady(&mut self, seats: &[Seat<'_>], answers: &mut [Prediction]) {
+    /// Smooths the answer at every seat.
+    pub(crate) fn smooth(&mut self, seats: &[Seat<'_>], answers: &mut [Prediction]) {
         for (seat, answer) in seats.iter().zip(answers) {
             if self.of_episodes.len() <= seat.episode {
                 self.of_episodes.resize(seat.episode + 1, self.fresh.clone());
@@ -103,14 +103,11 @@ mod tests {
     }
 
     fn smoothing(smoothing_ticks: f32) -> ActionSmoothing {
-        ActionSmoothing::new(
-            &LookAheadNetConfig { smoothing_ticks, ..LookAheadNetConfig::compact() },
-            GridGeometry::paper(),
-        )
+        ActionSmoothing::new(InferenceSettings { smoothing_ticks, ..InferenceSettings::plain() }, GridGeometry::paper())
     }
 
     #[test]
-    fn without_memory_answers_stay_as_they_are_to_the_bit() {
+    fn without_smoothing_answers_stay_as_they_are_to_the_bit() {
         let mut smoothing = smoothing(0.0);
         let outside = Prediction { mean: [-0.1, 1.2], sigma: [0.03, 0.05] };
         assert_eq!([at(9.0, 1.0), outside].map(|answer| smoothing.smoothed(answer)), [at(9.0, 1.0), outside]);
@@ -123,7 +120,7 @@ mod tests {
         assert!((first.ahead_m - 8.0).abs() < 1e-5 && first.left_m.abs() < 1e-5, "the first answer is taken at once");
         let last = (0..8).map(|_| smoothing.smoothed(at(12.0, 0.0))).last().unwrap();
         let reached_m = last.look_ahead(GridGeometry::paper()).ahead_m;
-        // 8 + 4 · (1 − 1/e): one memory later.
+        // 8 + 4 · (1 − 1/e): one time constant later.
         assert!((reached_m - 10.5285).abs() < 1e-3, "{reached_m}");
         assert_eq!(last.sigma, [0.03, 0.05]);
         smoothing.reset();

@@ -1,0 +1,201 @@
+//! Algorithms 1 and 2, in their order and with their line numbers.
+
+use crate::checkpoint::Checkpoint;
+use crate::dagger::iteration_row::IterationRow;
+use crate::dagger::progress::{DaggerError, Hooks, Outcome, Progress, Stop};
+use crate::dagger::rollouts::Rollouts;
+use crate::dagger::run_file::RunFile;
+use crate::dagger::settings::{DaggerSettings, StartFrom};
+use crate::dataset::store::Store;
+use crate::dataset::{Collection, Dataset, Round};
+use crate::files;
+use crate::fit::{self, FitContext, FitOutcome, FitProgress, FitReport, FitSettings};
+use crate::network::Weights;
+use sim::seed::{RootSeed, Stream};
+use sim::sensing::GridGeometry;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Behaviour cloning, then Algorithm 1. Rounds found in `store` are read instead of made again, so that a run that was
+/// interrupted continues, with the same result. `geometry`: the patch of ground that the grids of all episodes show.
+///
+/// # Errors
+/// If the store holds another run, or a file cannot be read or written.
+pub fn run(
+    settings: &DaggerSettings,
+    geometry: GridGeometry,
+    store: &Store,
+    seed: RootSeed,
+    hooks: &mut Hooks<'_>,
+) -> Result<Outcome, DaggerError> {
+    settings.network.validate()?;
+    settings.inference.validate()?;
+    RunFile { seed, geometry, settings: settings.clone() }.claim(store.folder())?;
+    let mut run = Run { settings, geometry, store, seed, hooks, rows: Vec::new() };
+    let (policy, stop) = match run.dagger() {
+        Ok((policy, stop)) => (Some(policy), stop),
+        Err(Halt::Interrupted(policy)) => (policy, Stop::Interrupted),
+        Err(Halt::Failed(error)) => return Err(error),
+    };
+    let policy = policy.map(|weights| run.checkpoint(weights));
+    Ok(Outcome { policy, rows: run.rows, stop })
+}
+
+/// One run in progress.
+struct Run<'r, 'h> {
+    settings: &'r DaggerSettings,
+    geometry: GridGeometry,
+    store: &'r Store,
+    seed: RootSeed,
+    hooks: &'r mut Hooks<'h>,
+    rows: Vec<IterationRow>,
+}
+
+/// Why the algorithm did not come to its end.
+enum Halt {
+    /// With the policy finished last.
+    Interrupted(Option<Weights>),
+    Failed(DaggerError),
+}
+
+impl<E: Into<DaggerError>> From<E> for Halt {
+    fn from(error: E) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+impl Run<'_, '_> {
+    /// Algorithm 1.
+    fn dagger(&mut self) -> Result<(Weights, Stop), Halt> {
+        let (d_bc, collected) = self.data_sampling_function(None, 0)?;
+        let mut d = Dataset::default(); // line 3: D ← D_BC
+        self.aggregate(&mut d, d_bc, 0, &collected, None)?;
+        let mut policy = self.train(None, &d, 0, &collected)?; // line 2: π_net,1 ← π_BC
+        let mut eta_hat = 0.0; // line 4
+        let mut i = 1;
+        // Line 5: while η̂ ≤ η. Unrounded: the paper's last row prints 0.90 and stops (docs/methods.md 12, 15).
+        while eta_hat <= self.settings.eta || i <= self.settings.iterations_min {
+            if i > self.settings.iterations_max {
+                return Ok((self.finish(policy, &d)?, Stop::IterationCap));
+            }
+            let (d_i, collected) = self.data_sampling_function(Some(&policy), i)?; // line 6
+            eta_hat = collected.eta_hat();
+            self.aggregate(&mut d, d_i, i, &collected, Some(&policy))?; // line 7
+            policy = self.train(Some(policy), &d, i, &collected)?; // line 8
+            i += 1; // line 9
+        }
+        Ok((self.finish(policy, &d)?, Stop::EtaReached)) // line 11
+    }
+
+    /// Algorithm 2 over the episodes of a round, or what an earlier run found there. Behaviour cloning (`policy` =
+    /// `None`) is the same with the expert at the wheel and every tick kept.
+    fn data_sampling_function(&mut self, policy: Option<&Weights>, round: u32) -> Result<(Round, Collection), Halt> {
+        if self.store.has_round(round) {
+            return Ok(self.store.read_round(round)?);
+        }
+        let episodes = (self.hooks.episodes)(round);
+        self.report(&Progress::Collecting { round, episodes: episodes.len() }, policy)?;
+        let novice = policy.map(|weights| self.checkpoint(weights.clone()));
+        let rollouts = Rollouts::of_round(self.settings, self.seed, novice.as_ref(), episodes);
+        let on_frame = &mut *self.hooks.on_frame;
+        let collected = rollouts.drive(&mut |episode, frame| on_frame(round, episode, frame));
+        let collection = collected.record(round);
+        self.store.write_round(&collected.round, &collection)?;
+        Ok((collected.round, collection))
+    }
+
+    /// Line 7: D ← D ∪ `D_i`.
+    fn aggregate(
+        &mut self,
+        d: &mut Dataset,
+        d_i: Round,
+        round: u32,
+        collection: &Collection,
+        policy: Option<&Weights>,
+    ) -> Result<(), Halt> {
+        d.push(d_i);
+        self.report(&Progress::Collected { round, collection, dataset: d.len() }, policy)
+    }
+
+    /// Line 8: trains on D, or reads what an earlier run trained.
+    fn train(
+        &mut self,
+        previous: Option<Weights>,
+        d: &Dataset,
+        round: u32,
+        collection: &Collection,
+    ) -> Result<Weights, Halt> {
+        let settings = self.settings;
+        let folder = self.store.round_folder(round);
+        let start = match (settings.start, &previous) {
+            (StartFrom::Previous, Some(weights)) => weights.clone(),
+            _ => Weights::init(settings.network, self.seed, u64::from(round)),
+        };
+        let trained = self.trained_in(&folder, start, d, &settings.fit_of_round(round), Some(round))?;
+        let Some((weights, fit)) = trained else {
+            return Err(Halt::Interrupted(previous));
+        };
+        let row = IterationRow::new(collection, d.len(), &fit);
+        self.report(&Progress::Finished { row: &row, fit: &fit }, Some(&weights))?;
+        self.rows.push(row);
+        Ok(weights)
+    }
+
+    /// The optional longer training at the end.
+    fn finish(&mut self, policy: Weights, d: &Dataset) -> Result<Weights, Halt> {
+        let Some(settings) = self.settings.final_fit() else {
+            return Ok(policy);
+        };
+        let start = match self.settings.start {
+            StartFrom::Previous => policy.clone(),
+            StartFrom::Scratch => Weights::init(self.settings.network, self.seed, FINAL),
+        };
+        let trained = self.trained_in(&self.store.final_folder(), start, d, &settings, None)?;
+        trained.map(|(weights, _)| weights).ok_or(Halt::Interrupted(Some(policy)))
+    }
+
+    /// Trains into a folder, unless that was done before. `None` if interrupted.
+    fn trained_in(
+        &mut self,
+        folder: &Path,
+        start: Weights,
+        d: &Dataset,
+        settings: &FitSettings,
+        round: Option<u32>,
+    ) -> Result<Option<(Weights, FitReport)>, Halt> {
+        if Checkpoint::exists(folder) {
+            return Ok(Some((Checkpoint::load(folder)?.weights, files::read(folder)?)));
+        }
+        let index = round.map_or(FINAL, u64::from);
+        let seed = self.seed.child(Stream::Shuffle, index);
+        let progress = &mut *self.hooks.progress;
+        let mut on_step = |fit: &FitProgress| progress(&Progress::Fitting { round, fit });
+        let DaggerSettings { inference, device, .. } = *self.settings;
+        let context = FitContext { geometry: self.geometry, inference, device, seed };
+        let FitOutcome { weights, report } = fit::fit(start, d, settings, context, &mut on_step)
+            .map_err(|source| DaggerError::Fit { round: round.unwrap_or(u32::MAX), source })?;
+        if report.stopped {
+            return Ok(None);
+        }
+        // The checkpoint comes last: where it is, the training is complete.
+        files::create_folder(folder)?;
+        files::write(folder, &report)?;
+        let checkpoint = self.checkpoint(weights);
+        checkpoint.save(folder)?;
+        Ok(Some((checkpoint.weights, report)))
+    }
+
+    fn checkpoint(&self, weights: Weights) -> Checkpoint {
+        Checkpoint { weights, geometry: self.geometry, inference: self.settings.inference }
+    }
+
+    fn report(&mut self, progress: &Progress<'_>, policy: Option<&Weights>) -> Result<(), Halt> {
+        match (self.hooks.progress)(progress) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(Halt::Interrupted(policy.cloned())),
+        }
+    }
+}
+
+/// Index of the final training among the seeds of the rounds.
+const FINAL: u64 = 0xFFFF;

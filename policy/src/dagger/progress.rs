@@ -1,0 +1,99 @@
+//! What a run asks, reports and ends with.
+
+use crate::checkpoint::Checkpoint;
+use crate::dagger::iteration_row::IterationRow;
+use crate::dagger::rollouts::RoundEpisode;
+use crate::dataset::Collection;
+use crate::files::FileError;
+use crate::fit::{FitError, FitProgress, FitReport};
+use crate::network::NetworkError;
+use serde::{Deserialize, Serialize};
+use sim::frame::Frame;
+use std::ops::ControlFlow;
+
+/// What `run` asks of its caller.
+pub struct Hooks<'a> {
+    /// The episodes of a round with their experts: 0 = behaviour cloning, then the iterations.
+    pub episodes: &'a mut dyn FnMut(u32) -> Vec<RoundEpisode>,
+    /// Every frame while collecting: round, episode, frame.
+    pub on_frame: &'a mut dyn FnMut(u32, usize, &Frame),
+    /// Called often; a break ends the run at the next safe point. What was finished stays on disk.
+    pub progress: &'a mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+}
+
+/// How far a run is.
+#[derive(Debug)]
+pub enum Progress<'a> {
+    /// A collection begins.
+    Collecting {
+        /// 0 = behaviour cloning.
+        round: u32,
+        /// Episodes driven in lock-step.
+        episodes: usize,
+    },
+    /// A collection is on disk (or was found there).
+    Collected {
+        /// 0 = behaviour cloning.
+        round: u32,
+        /// What was collected.
+        collection: &'a Collection,
+        /// Samples in the data set now.
+        dataset: usize,
+    },
+    /// A training step.
+    Fitting {
+        /// The round whose data were added last; `None` = the final training.
+        round: Option<u32>,
+        /// The step.
+        fit: &'a FitProgress,
+    },
+    /// An iteration is on disk (or was found there).
+    Finished {
+        /// Its line of the table.
+        row: &'a IterationRow,
+        /// Its training.
+        fit: &'a FitReport,
+    },
+}
+
+/// Why a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stop {
+    /// η̂ > η: the network drives nearly always.
+    EtaReached,
+    /// The cap on iterations.
+    IterationCap,
+    /// The caller said so.
+    Interrupted,
+}
+
+/// Result of a run.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The policy trained last; `None` if interrupted before behaviour cloning was done.
+    pub policy: Option<Checkpoint>,
+    /// One line per finished round, behaviour cloning first.
+    pub rows: Vec<IterationRow>,
+    /// Why it ended.
+    pub stop: Stop,
+}
+
+/// Why a run failed.
+#[derive(Debug, thiserror::Error)]
+pub enum DaggerError {
+    /// A file.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A training that cannot start.
+    #[error("round {round}: {source}")]
+    Fit {
+        /// Which round.
+        round: u32,
+        /// Why.
+        source: FitError,
+    },
+    /// A shape the network cannot have.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+}

@@ -1,0 +1,169 @@
+//! How the drives of a round are set up: the one place, for a training and for whoever drives a round again.
+
+use crate::checkpoint::Checkpoint;
+use crate::dagger::disturbance::Disturbance;
+use crate::dagger::gated_collector::{CollectorSeat, GatedCollector, Keep};
+use crate::dagger::settings::DaggerSettings;
+use crate::dataset::{Collection, EpisodeRecord, Round, Tick};
+use crate::decision_rule::DecisionRule;
+use crate::drivers::Novice;
+use crate::network::DeviceChoice;
+use rayon::prelude::*;
+use sim::batch::run_lockstep;
+use sim::driver::Driver;
+use sim::episode::{Episode, EpisodeReport};
+use sim::frame::Frame;
+use sim::scenario::Direction;
+use sim::seed::{EpisodeIndex, RootSeed, Stream};
+use sim::sensing::{GridGeometry, Sensor};
+
+/// An episode at its start, and the expert that labels it.
+pub struct RoundEpisode {
+    /// Which one of which round: its disturbances and noise augmentations are drawn from streams of this index.
+    pub index: EpisodeIndex,
+    /// Which way the lot is driven; for the record, the episode's map is turned already.
+    pub direction: Direction,
+    /// The episode.
+    pub episode: Episode,
+    /// Its expert, which has seen nothing yet.
+    pub expert: Box<dyn Driver + Send>,
+}
+
+/// Drives that are about to be collected from.
+pub struct Rollouts {
+    collector: GatedCollector,
+    episodes: Vec<Episode>,
+    origins: Vec<(EpisodeIndex, Direction)>,
+}
+
+/// What the drives gave: what Algorithm 2 returns, and how it came about.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Collected {
+    /// `D_i`: episode by episode, in order of time within an episode.
+    pub round: Round,
+    /// By episode.
+    pub episodes: Vec<EpisodeRecord>,
+    /// By episode.
+    pub reports: Vec<EpisodeReport>,
+    /// Executed actions.
+    pub n_tot: u64,
+    /// Executed actions of the network.
+    pub n_net: u64,
+    /// Sum of τ̂ over all ticks, stored or not.
+    pub tau_hat_sum: f64,
+    /// Executed actions in seconds.
+    pub driven_s: f64,
+}
+
+impl Rollouts {
+    /// Episodes of a training round, or some of them: network and expert in turn, as the decision rule says, with the
+    /// disturbances and noise augmentations of the training with root seed `seed`. An episode is driven the same whichever
+    /// others are with it. Without a `novice` the experts drive: behaviour cloning.
+    pub fn of_round(
+        settings: &DaggerSettings,
+        seed: RootSeed,
+        novice: Option<&Checkpoint>,
+        episodes: Vec<RoundEpisode>,
+    ) -> Self {
+        let novice = novice.map(|checkpoint| Novice::new(checkpoint, settings.device));
+        let augmenting_sensors = |index: EpisodeIndex, episode: &Episode| -> Vec<Sensor> {
+            let sensor = |part| episode.another_sensor(seed.child(Stream::NoiseAugmentation, index.part(part)));
+            (0..settings.noise_augmentations).map(sensor).collect()
+        };
+        let disturbance = |index: EpisodeIndex| {
+            let is_disturbed = settings.disturbance.enabled && index.round() > 0;
+            is_disturbed.then(|| Disturbance::new(settings.disturbance, seed.rng(Stream::Disturbance, index.stream())))
+        };
+        Self::new(novice, settings.rule, settings.keep, episodes, &augmenting_sensors, &disturbance)
+    }
+
+    /// On-policy labelled rollouts: the network alone drives, undisturbed, and the expert labels every tick.
+    pub fn on_policy(novice: &Checkpoint, device: DeviceChoice, episodes: Vec<RoundEpisode>) -> Self {
+        let novice = Novice::new(novice, device);
+        // Every discrepancy is below infinity: the network always drives.
+        let rule = DecisionRule::TauOnly { tau: f32::INFINITY };
+        Self::new(Some(novice), rule, Keep::EveryTick, episodes, &|_, _| Vec::new(), &|_| None)
+    }
+
+    fn new(
+        novice: Option<Novice>,
+        rule: DecisionRule,
+        keep: Keep,
+        episodes: Vec<RoundEpisode>,
+        augmenting_sensors: &(dyn Fn(EpisodeIndex, &Episode) -> Vec<Sensor> + Sync),
+        disturbance: &dyn Fn(EpisodeIndex) -> Option<Disturbance>,
+    ) -> Self {
+        let (mut origins, mut starts, mut experts) = (Vec::new(), Vec::new(), Vec::new());
+        for RoundEpisode { index, direction, episode, expert } in episodes {
+            origins.push((index, direction));
+            starts.push(episode);
+            experts.push(expert);
+        }
+        // A sensor draws what it needs of its noise at once: milliseconds each.
+        let sensors: Vec<Vec<Sensor>> = (origins.par_iter(), &starts)
+            .into_par_iter()
+            .map(|(&(index, _), episode)| augmenting_sensors(index, episode))
+            .collect();
+        let seats = experts
+            .into_iter()
+            .zip(sensors)
+            .zip(&origins)
+            .map(|((expert, sensors), &(index, _))| CollectorSeat::new(expert, sensors, disturbance(index)))
+            .collect();
+        let geometry = starts.first().map_or_else(GridGeometry::paper, |start| start.settings().sensing.geometry);
+        let collector = GatedCollector::new(novice, rule, keep, geometry, seats);
+        Self { collector, episodes: starts, origins }
+    }
+
+    /// Drives all episodes to their ends. `on_frame` is called with the place of the episode among those given, from 0.
+    pub fn drive(self, on_frame: &mut dyn FnMut(usize, &Frame)) -> Collected {
+        let Self { mut collector, episodes, origins } = self;
+        let lots: Vec<String> = episodes.iter().map(|episode| episode.map().scenario().name.clone()).collect();
+        let control_period_s = episodes.first().map_or(0.0, |episode| episode.settings().control_period_s());
+        let mut ticks: Vec<Vec<Tick>> = vec![Vec::new(); episodes.len()];
+        let mut time_s = vec![0.0; episodes.len()];
+        let reports = run_lockstep(episodes, &mut collector, &mut |place, frame| {
+            ticks[place].push(Tick::new(origins[place].0.episode(), time_s[place], frame));
+            time_s[place] = frame.time_s;
+            on_frame(place, frame);
+        });
+
+        let GatedCollector { seats, n_tot, n_net, tau_hat_sum, .. } = collector;
+        let mut round = Round::default(); // line 20
+        let mut records = Vec::with_capacity(seats.len());
+        for (place, seat) in seats.into_iter().enumerate() {
+            let kept = seat.kept;
+            let EpisodeReport { metrics, .. } = &reports[place];
+            records.push(EpisodeRecord {
+                lot: lots[place].clone(),
+                direction: origins[place].1,
+                samples: kept.samples.len(),
+                near_collisions: metrics.near_collisions,
+                driven_m: metrics.driven_m,
+            });
+            round.ticks.extend(kept.ticks.iter().map(|&tick| ticks[place][tick as usize]));
+            round.samples.extend(kept.samples);
+            round.noise_augmentations.extend(kept.noise_augmentations);
+        }
+        let driven_s = n_tot as f64 * f64::from(control_period_s);
+        Collected { round, episodes: records, reports, n_tot, n_net, tau_hat_sum, driven_s }
+    }
+}
+
+impl Collected {
+    /// The record of these drives as those of a round.
+    pub(crate) fn record(&self, round: u32) -> Collection {
+        Collection {
+            round,
+            samples: self.round.samples.len(),
+            noise_augmentations: self.round.augmentations_each(),
+            ticks: self.n_tot,
+            novice_ticks: self.n_net,
+            tau_hat_sum: self.tau_hat_sum,
+            driven_s: self.driven_s,
+            near_collisions: self.reports.iter().map(|report| report.metrics.near_collisions).sum(),
+            driven_m: self.reports.iter().map(|report| f64::from(report.metrics.driven_m)).sum(),
+            episodes: self.episodes.clone(),
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! How a training goes, and how it went.
+
+use crate::files::{self, FileError, Format};
+use crate::loss::LossParts;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// What a step looked like, for bars and logs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitProgress {
+    /// Steps done.
+    pub step: u32,
+    /// Steps in all.
+    pub steps: u32,
+    /// Samples trained on so far, repetitions counted.
+    pub samples_done: u64,
+    /// Learning rate of this step.
+    pub learning_rate: f32,
+    /// Loss of this batch.
+    pub loss: LossParts,
+    /// The latest validation.
+    pub validation: Option<Validation>,
+}
+
+/// How well a network answers samples it was not trained on.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Validation {
+    /// Number of samples.
+    pub samples: usize,
+    /// The loss as trained, β aside: what "best" is judged by.
+    pub loss: f32,
+    /// Plain negative log-likelihood: comparable between weighted and unweighted training.
+    pub nll: f32,
+    /// Root mean square distance between answer and label, metres.
+    pub rmse_m: f32,
+}
+
+/// One point of the loss curve.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CurvePoint {
+    /// After this step.
+    pub step: u32,
+    /// Mean training loss since the previous point.
+    pub training: LossParts,
+    /// Validation here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validation: Option<Validation>,
+}
+
+/// What a training did: `fit.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitReport {
+    /// Samples trained on.
+    pub training_samples: usize,
+    /// Samples held back.
+    pub validation_samples: usize,
+    /// Steps done.
+    pub steps: u32,
+    /// The step whose weights are returned.
+    pub kept_step: u32,
+    /// Whether it was told to stop early.
+    pub stopped: bool,
+    /// Validation of the weights that are returned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub validation: Option<Validation>,
+    /// Loss over steps.
+    pub curve: Vec<CurvePoint>,
+}
+
+impl Format for FitReport {
+    const NAME: &'static str = "fit.toml";
+    const SCHEMA: u32 = 1;
+}
+
+impl FitReport {
+    /// Reads `fit.toml` of a folder; `None` if there is none.
+    ///
+    /// # Errors
+    /// If the file is of another schema, or is not what it should be.
+    pub fn read(folder: &Path) -> Result<Option<Self>, FileError> {
+        files::read_if_there(folder)
+    }
+}

@@ -1,0 +1,140 @@
+//! What `docs/formats.md` shows for Python is what lies in `tests/python/`, and it answers as Rust does.
+//!
+//! `PYTHON` names the interpreter, `python3` if it is not set. Without numpy (or torch) there is nothing to compare, which
+//! is a failure where `CI` is set (for numpy).
+
+use crate::bench::{root, scratch, succeed, text, xtask};
+use ndarray::{Array2, Array3};
+use policy::checkpoint::Checkpoint;
+use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Prediction, Weights};
+use sim::seed::RootSeed;
+use sim::sensing::{GridGeometry, OccupancyGrid};
+use std::path::Path;
+use std::process::Command;
+
+fn python() -> Command {
+    Command::new(std::env::var_os("PYTHON").unwrap_or_else(|| "python3".into()))
+}
+
+fn can_import(modules: &str) -> bool {
+    python().args(["-c", &format!("import {modules}")]).output().is_ok_and(|output| output.status.success())
+}
+
+/// Free ground with blocks here and there.
+fn grids(count: usize) -> Vec<OccupancyGrid> {
+    let grid = |index: usize| {
+        let mut grid = OccupancyGrid::free();
+        for row in 0..25 {
+            let blocks = 0x1F0_003F_u32.rotate_left((7 * index) as u32) ^ (0x0030_0C00 >> (index % 5));
+            grid.occupy_row(row, if (row + index) % 9 < 6 { blocks & 0x1FF_FFFF } else { 0 });
+        }
+        grid
+    };
+    (0..count).map(grid).collect()
+}
+
+/// Runs a script on a checkpoint and grids; four numbers per grid.
+fn answers(script: &str, checkpoint: &Checkpoint, grids: &[OccupancyGrid], folder: &Path) -> Array2<f32> {
+    checkpoint.save(folder).unwrap();
+    let cells = grids.iter().flat_map(OccupancyGrid::cells).collect();
+    let cells = Array3::from_shape_vec([grids.len(), 25, 25], cells).unwrap();
+    let (input, output) = (folder.join("grids.npy"), folder.join("answers.npy"));
+    ndarray_npy::write_npy(&input, &cells).unwrap();
+    let output_of = python().arg(root().join("tests/python").join(script)).args([folder, &input, &output]).output();
+    let ran = output_of.unwrap();
+    assert!(ran.status.success(), "{script}: {:?}", text(&ran));
+    ndarray_npy::read_npy(output).unwrap()
+}
+
+/// Both presets' networks, one with an even kernel, with and without mirror averaging.
+fn checkpoints() -> [Checkpoint; 2] {
+    let geometry = GridGeometry::paper();
+    let of = |architecture, inference| Checkpoint {
+        weights: Weights::init(architecture, RootSeed(8), 0),
+        geometry,
+        inference,
+    };
+    [
+        of(NetworkArchitecture::paper(), InferenceSettings::plain()),
+        of(NetworkArchitecture::compact(), InferenceSettings::smoothed()),
+    ]
+}
+
+fn assert_near(found: &Array2<f32>, expected: &[[f32; 4]], what: &str) {
+    assert_eq!(found.dim(), (expected.len(), 4));
+    for (row, expected) in found.outer_iter().zip(expected) {
+        let is_near = row.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-4);
+        assert!(is_near, "{what}: {row} instead of {expected:?}");
+    }
+    let differ = expected.windows(2).filter(|pair| (pair[0][0] - pair[1][0]).abs() > 1e-3).count();
+    assert!(differ > expected.len() / 2, "{what}: grids with one answer compare nothing");
+}
+
+#[test]
+fn numpy_answers_as_rust_does() {
+    if !can_import("numpy, tomllib") {
+        assert!(std::env::var_os("CI").is_none(), "numpy and Python 3.11 are needed; PYTHON names an interpreter");
+        eprintln!("skipped: no numpy");
+        return;
+    }
+    let (grids, folder) = (grids(40), scratch("numpy"));
+    for checkpoint in checkpoints() {
+        let expected = checkpoint.predictor(DeviceChoice::Cpu).predict(&grids.iter().collect::<Vec<_>>());
+        let expected: Vec<_> =
+            expected.iter().map(|Prediction { mean, sigma }| [mean[0], mean[1], sigma[0], sigma[1]]).collect();
+        assert_near(&answers("numpy_forward.py", &checkpoint, &grids, &folder), &expected, "numpy");
+    }
+}
+
+#[test]
+fn torch_answers_as_rust_does() {
+    if !can_import("torch, numpy, safetensors, tomllib") {
+        eprintln!("skipped: no torch");
+        return;
+    }
+    let (grids, folder) = (grids(40), scratch("torch"));
+    for checkpoint in checkpoints() {
+        // The module gives raw outputs: no mirror averaging, which is a property of its use.
+        let plain = Checkpoint { inference: InferenceSettings::plain(), ..checkpoint };
+        let expected = plain.predictor(DeviceChoice::Cpu).raw(&grids.iter().collect::<Vec<_>>());
+        assert_near(&answers("torch_module.py", &plain, &grids, &folder), &expected, "torch");
+    }
+}
+
+#[test]
+fn the_docs_show_the_scripts_word_for_word() {
+    let docs = std::fs::read_to_string(root().join("docs/formats.md")).unwrap();
+    for script in ["numpy_forward.py", "torch_module.py"] {
+        let code = std::fs::read_to_string(root().join("tests/python").join(script)).unwrap();
+        assert!(docs.contains(&format!("```python\n{code}```")), "docs/formats.md shows another {script}");
+    }
+}
+
+/// Every key of every TOML file that a training round leaves has its row, and so has every column of `ticks.npz`.
+#[test]
+fn the_docs_name_every_key_of_a_round() {
+    let run = scratch("documented").join("run");
+    succeed(xtask().args(["train-bc", "--preset", "smoke", "--no-eval", "--out"]).arg(&run));
+    let docs = std::fs::read_to_string(root().join("docs/formats.md")).unwrap();
+    let section = |name: &str| {
+        let heading = format!("`{name}`\n");
+        docs.split("\n### ").find(|section| section.starts_with(&heading)).unwrap()
+    };
+    for name in ["round.toml", "model.toml", "fit.toml"] {
+        let file: toml::Table = std::fs::read_to_string(run.join("round-00").join(name)).unwrap().parse().unwrap();
+        assert!(file.contains_key("schema"), "{name}");
+        for key in file.keys() {
+            assert!(section(name).contains(&format!("`{key}")), "docs/formats.md says nothing of {key} in {name}");
+        }
+    }
+    let file = std::fs::File::open(run.join("round-00/ticks.npz")).unwrap();
+    let columns = ndarray_npy::NpzReader::new(file).unwrap().names().unwrap();
+    assert_eq!(columns.len(), 11);
+    for column in columns {
+        assert!(section("ticks.npz").contains(&format!("`{column}`")), "docs/formats.md says nothing of {column}");
+    }
+    let header = std::fs::read_to_string(run.join("round-00/learning.csv")).unwrap();
+    for column in header.lines().next().unwrap().split(',') {
+        assert!(section("learning.csv").contains(&format!("`{column}`")), "docs/formats.md says nothing of {column}");
+    }
+}

@@ -1,0 +1,111 @@
+//! `guard`: does the claim still hold? Trains the default and fails if its policy has become worse. For a nightly run.
+
+use super::evaluate::Finished;
+use super::train;
+use crate::args::OutArgs;
+use crate::console::Console;
+use anyhow::{Context as _, ensure};
+use clap::Args;
+use evaluation::format::exact_rate;
+use evaluation::plan::Plan;
+use evaluation::totals::Totals;
+use experiment::drivers::NamedDriver;
+use experiment::lots::Lot;
+use experiment::progress::Interrupted;
+use experiment::run_dir::RunDir;
+use experiment::settings::Settings;
+use serde::Deserialize;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask guard                       train, drive, compare: about 12 minutes on two cores
+  cargo xtask guard --out runs/nightly --overwrite";
+
+/// What the policy did when it was last recorded.
+const RECORD: &str = include_str!("guard.toml");
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct GuardArgs {
+    #[command(flatten)]
+    out: OutArgs,
+}
+
+/// `guard.toml`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Record {
+    /// Development lots: neither trained on nor test lots.
+    lots: Vec<String>,
+    /// Upper end of the interval of the recorded rate, near-collisions per 100 m.
+    upper_per_100m: f64,
+    /// Commit, command and figures of the record.
+    #[expect(dead_code, reason = "for people")]
+    recorded: String,
+}
+
+pub(crate) fn run(args: &GuardArgs) -> anyhow::Result<()> {
+    let record: Record = toml::from_str(RECORD).context("guard.toml")?;
+    let mut settings = Settings::preset("default")?;
+    let console = Console::default();
+    let run = RunDir::create(&args.out.place("guard", "default", settings.seed.0), &settings)?;
+    eprintln!("run: {}", run.path().display());
+    let interrupted = || Interrupted { kept: format!("what was done is in {}", run.path().display()) };
+    let Ok((policy, _)) = train::tabulated(&settings, &run, &console)? else { return Err(interrupted().into()) };
+    let driver = NamedDriver::network(
+        "DAgger",
+        experiment::drivers::DriverSpec::Run { folder: run.path().to_owned() },
+        policy,
+        settings.dagger.device,
+    );
+    let drivers = [driver];
+    let drive = |settings: &Settings, folder: &str| -> anyhow::Result<Totals> {
+        let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
+        let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with: 0 };
+        let build = crate::build_info::get();
+        let path = run.path().join(folder);
+        let place = experiment::run_dir::Place {
+            build,
+            out: Some(&path),
+            overwrite: false,
+            command: "guard",
+            preset: "default",
+            seed: settings.seed.0,
+        };
+        let stage = RunDir::create(&place, settings)?;
+        let evaluated = evaluation::evaluate::evaluate(&plan, &stage, &console)?;
+        if !evaluated.is_complete {
+            return Err(interrupted().into());
+        }
+        stage.finish(&Finished { drivers: vec!["DAgger".to_owned()] })?;
+        let all = evaluated.results.slices().pop().context("nothing was driven")?;
+        Ok(evaluated.results.totals(0, 0, &all, None))
+    };
+    let reference = drive(&settings, "reference")?;
+    (settings.evaluation.lots, settings.evaluation.trials) = (record.lots, 1);
+    let development = drive(&settings, "development")?;
+    for (place, totals) in [("the three lots", &reference), ("development lots", &development)] {
+        println!(
+            "{place}: near-collisions {} in {:.0} m, per 100 m {}; contacts {}",
+            totals.near_collisions,
+            totals.reference_m,
+            exact_rate(totals.near_collisions, totals.reference_m),
+            totals.contacts
+        );
+    }
+    run.finish(&Finished { drivers: vec!["DAgger".to_owned()] })?;
+    ensure!(
+        reference.near_collisions == 0,
+        "the default policy has near-collisions on the three lots; see {}/reference",
+        run.path().display()
+    );
+    let rate = development.rate().per_unit;
+    ensure!(
+        rate <= record.upper_per_100m,
+        "on development lots the rate {rate:.3} per 100 m lies above the recorded interval, which ends at {}; see \
+         {}/development. If the change is meant, record the new figures in xtask/src/commands/guard.toml",
+        record.upper_per_100m,
+        run.path().display()
+    );
+    println!("as good as recorded");
+    Ok(())
+}
