@@ -386,7 +386,7 @@ impl Scene {
         let count = self.takes.len();
         let cell_px = match (self.layout, count) {
             (Layout::Beside, 1) => 10.0,
-            (Layout::Below, 1) | (Layout::Beside, 2) => 8.0,
+            (Layout::Below, 1 | 2) | (Layout::Beside, 2) => 8.0,
             _ => 6.0,
         };
         let grid_px = cell_px * GRID_CELLS as f32;
