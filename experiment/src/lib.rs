@@ -9,6 +9,7 @@
 //! | [`replay_key`] | a short text that stands for exactly one run and a moment in it |
 //! | [`training`], [`learning`] | behaviour cloning and DAgger into a run folder |
 //! | [`run_dir`] | the folder of a run and how it is claimed |
+//! | [`view_request`] | what the viewer program is asked to record |
 //! | [`progress`] | how long work reports, and how it is cancelled |
 //!
 //! Nothing here prints or knows the command line.
@@ -23,3 +24,4 @@ pub mod run_dir;
 pub mod settings;
 pub mod training;
 pub mod trials;
+pub mod view_request;

@@ -13,13 +13,15 @@
 use crate::drivers::DriverSpec;
 use crate::settings::NoiseChoice;
 use anyhow::{Context as _, bail, ensure};
+use serde::{Deserialize, Serialize};
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::fmt;
 use std::str::FromStr;
 
-/// One run, and a moment in it.
-#[derive(Debug, Clone, PartialEq)]
+/// One run, and a moment in it. Serialised as its text.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct ReplayKey {
     /// The driver, as on the command line (`cargo xtask drivers`).
     pub driver: DriverSpec,
@@ -77,6 +79,20 @@ impl FromStr for ReplayKey {
             seed: RootSeed(number("seed", seed)?),
             tick: small("tick", tick)?,
         })
+    }
+}
+
+impl TryFrom<String> for ReplayKey {
+    type Error = anyhow::Error;
+
+    fn try_from(text: String) -> anyhow::Result<Self> {
+        text.parse()
+    }
+}
+
+impl From<ReplayKey> for String {
+    fn from(key: ReplayKey) -> Self {
+        key.to_string()
     }
 }
 

@@ -21,7 +21,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Params {
-    /// Where to: straight ahead (*chosen*, as the paper did for the VVF).
+    /// Where the goal lies. Default straight ahead (*chosen*, as the paper did for the VVF).
     pub goal: Goal,
     /// Range ρ_0 of the repulsion, metres: 2.3, that of the paper's VVF (*chosen*).
     pub range_m: f32,

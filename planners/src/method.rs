@@ -14,7 +14,7 @@ pub trait Method: Clone + std::fmt::Debug + PartialEq + Serialize + DeserializeO
     const ABOUT: &'static str;
     /// What the tuner varies, and how far.
     const SEARCH: &'static [Dimension<Self>];
-    /// What sits at the wheel.
+    /// The planner that drives.
     type Planner: Policy + Clone + Send + Sync;
 
     /// The paper's values where it ran the method, the literature's otherwise.

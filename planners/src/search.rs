@@ -2,7 +2,7 @@
 //!
 //! Parameters are searched in the unit cube that [`Span`] maps to their ranges. The first half of the candidates is drawn
 //! uniformly (the starting point first of all), the second half normally around the best so far, narrower from
-//! generation to generation: plain, without settings of its own, and hard to get wrong.
+//! generation to generation. The search has no settings of its own.
 
 use rand::RngExt as _;
 use sim::seed::{Rng, RootSeed, Stream};
@@ -15,9 +15,9 @@ const SPREAD: [f32; 2] = [0.25, 0.05];
 /// One parameter that is searched.
 #[derive(Debug)]
 pub struct Dimension<P> {
-    /// Of the parameter, as in its file.
+    /// Name of the parameter, as in its file.
     pub name: &'static str,
-    /// How far.
+    /// Its range.
     pub span: Span,
     /// Reads it.
     pub get: fn(&P) -> f32,

@@ -20,7 +20,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Params {
-    /// Where to: straight ahead (*chosen*, as the paper did for the VVF).
+    /// Where the goal lies. Default straight ahead (*chosen*, as the paper did for the VVF).
     pub goal: Goal,
     /// Half the side of the active window around the front bumper, metres: 3.0 (*chosen*; the original's 33×33 cells of
     /// 0.1 m, *recalled*, scaled up from its 0.8 m robot to a car would be 3.8).

@@ -3,8 +3,8 @@
 //! "The repulsive, attractive, and velocity fields were set to a ratio of 1:0:0.5" (paper): no goal, so no attraction.
 //!
 //! V = F̂ + 0.5·(1 − μ·m(ρ))·f̂, with ρ the distance to the nearest occupied cell, f̂ straight ahead, and m = 1 where
-//! ρ < ρ_0 = 2.3 m, 0 elsewhere. F̂ is the repulsion squashed to |F̂| < 1 by F/(1 + |F|), lest 1/ρ³ swamp everything
-//! (*chosen*). The look-ahead point is where a walk along V from the front bumper ends.
+//! ρ < ρ_0 = 2.3 m, 0 elsewhere. F̂ is the repulsion limited to |F̂| < 1 by F/(1 + |F|), because 1/ρ³ would outweigh
+//! all else (*chosen*). The look-ahead point is where a walk along V from the front bumper ends.
 
 use crate::context::{PlannerContext, head_for};
 use crate::explanation::{FieldSample, sample};
@@ -30,7 +30,7 @@ pub struct Params {
     pub velocity_weight: f32,
     /// μ: by how much the velocity field is masked within the range, 0…1. "Only the repulsive field was applied around
     /// obstacles with a range of 2.3 m" (*paper*) reads as 1, the ratio 1:0:0.5 as 0; 0.5 (*chosen*), because in a lane
-    /// under 4.6 m μ = 1 leaves no wish to go forward.
+    /// under 4.6 m μ = 1 leaves no forward field.
     pub mask: f32,
     /// Longest walk along the field, metres: 6 (*chosen*).
     pub walk_m: f32,

@@ -3,6 +3,7 @@
 use crate::build_info::PROGRAM;
 use crate::commands::{
     drivers, evaluate, generate, guard, lots, pixel_accuracy, render, reproduce, sample_size, settings, train, tune,
+    visualise,
 };
 use clap::{Parser, Subcommand};
 use std::num::NonZeroUsize;
@@ -63,6 +64,9 @@ enum Command {
     /// Draws lots, drives, samples and noise as PNG and SVG.
     #[command(after_help = render::EXAMPLES)]
     Render(render::RenderArgs),
+    /// Records lots, drives and near-collisions, to be looked at in Rerun's viewer.
+    #[command(after_help = visualise::EXAMPLES)]
+    Visualise(visualise::VisualiseArgs),
     /// Old name of `sample-size`.
     #[command(hide = true)]
     Metres,
@@ -93,6 +97,7 @@ impl Cli {
             Command::Drivers(args) => drivers::run(args),
             Command::Tune(args) => tune::run(args),
             Command::Render(args) => render::run(args),
+            Command::Visualise(args) => visualise::run(args),
             Command::Metres => anyhow::bail!("the command metres is named sample-size now"),
         }
     }

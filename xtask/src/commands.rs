@@ -13,3 +13,4 @@ pub(crate) mod sample_size;
 pub(crate) mod settings;
 pub(crate) mod train;
 pub(crate) mod tune;
+pub(crate) mod visualise;

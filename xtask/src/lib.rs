@@ -9,6 +9,7 @@ pub mod cli;
 mod commands;
 mod console;
 mod interrupt;
+mod viewer;
 
 use clap::Parser as _;
 use experiment::progress::Interrupted;

@@ -51,7 +51,7 @@ struct Run<'r, 'h> {
     rows: Vec<IterationRow>,
 }
 
-/// Why the algorithm did not come to its end.
+/// Why the algorithm ended early.
 enum Halt {
     /// With the policy finished last.
     Interrupted(Option<Weights>),

@@ -4,7 +4,7 @@ use crate::dataset::Collection;
 use crate::fit::FitReport;
 use serde::{Deserialize, Serialize};
 
-/// One column of the paper's `DAgger` table, and what else is worth knowing.
+/// One column of the paper's `DAgger` table, with more counts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct IterationRow {

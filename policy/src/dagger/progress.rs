@@ -1,4 +1,4 @@
-//! What a run asks, reports and ends with.
+//! Hooks, progress and outcome of a run.
 
 use crate::checkpoint::Checkpoint;
 use crate::dagger::iteration_row::IterationRow;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use sim::frame::Frame;
 use std::ops::ControlFlow;
 
-/// What `run` asks of its caller.
+/// Callbacks of `run`.
 pub struct Hooks<'a> {
     /// The episodes of a round with their experts: 0 = behaviour cloning, then the iterations.
     pub episodes: &'a mut dyn FnMut(u32) -> Vec<RoundEpisode>,
@@ -49,7 +49,7 @@ pub enum Progress<'a> {
     },
     /// An iteration is on disk (or was found there).
     Finished {
-        /// Its line of the table.
+        /// Its row of the table.
         row: &'a IterationRow,
         /// Its training.
         fit: &'a FitReport,
@@ -64,7 +64,7 @@ pub enum Stop {
     EtaReached,
     /// The cap on iterations.
     IterationCap,
-    /// The caller said so.
+    /// The caller stopped it.
     Interrupted,
 }
 
@@ -82,7 +82,7 @@ pub struct Outcome {
 /// Why a run failed.
 #[derive(Debug, thiserror::Error)]
 pub enum DaggerError {
-    /// A file.
+    /// A file cannot be read or written, or does not fit.
     #[error(transparent)]
     File(#[from] FileError),
     /// A training that cannot start.
@@ -93,7 +93,7 @@ pub enum DaggerError {
         /// Why.
         source: FitError,
     },
-    /// A shape the network cannot have.
+    /// Settings of the network that are impossible.
     #[error(transparent)]
     Network(#[from] NetworkError),
 }

@@ -1,4 +1,4 @@
-//! How the drives of a round are set up: the one place, for a training and for whoever drives a round again.
+//! The one place where the drives of a round are set up, in a training and when a round is driven again.
 
 use crate::checkpoint::Checkpoint;
 use crate::dagger::disturbance::Disturbance;
@@ -25,25 +25,25 @@ pub struct RoundEpisode {
     pub direction: Direction,
     /// The episode.
     pub episode: Episode,
-    /// Its expert, which has seen nothing yet.
+    /// Its expert, freshly made.
     pub expert: Box<dyn Driver + Send>,
 }
 
-/// Drives that are about to be collected from.
+/// Drives that samples are collected from, at their start.
 pub struct Rollouts {
     collector: GatedCollector,
     episodes: Vec<Episode>,
     origins: Vec<(EpisodeIndex, Direction)>,
 }
 
-/// What the drives gave: what Algorithm 2 returns, and how it came about.
+/// What the drives gave: the result of Algorithm 2, with its record by episode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Collected {
     /// `D_i`: episode by episode, in order of time within an episode.
     pub round: Round,
-    /// By episode.
+    /// Lot, direction and counts of each episode.
     pub episodes: Vec<EpisodeRecord>,
-    /// By episode.
+    /// Metrics of each episode.
     pub reports: Vec<EpisodeReport>,
     /// Executed actions.
     pub n_tot: u64,

@@ -1,4 +1,4 @@
-//! Two tiny rounds on a bent lane: what lands on disk, and that an interrupted run continues as if nothing had been.
+//! Two tiny rounds on a bent lane: what lands on disk, and that an interrupted run continues to the same result.
 
 use super::*;
 use crate::checkpoint::Checkpoint;
@@ -264,7 +264,7 @@ fn one_episode_of_a_round_driven_again_is_the_same() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
-/// Every row of `ticks.npz` is what the frame of that tick showed, and the label of its sample is given from there.
+/// Every row of `ticks.npz` is what the frame of that tick showed, and its sample is what that frame observed.
 #[test]
 fn ticks_say_where_and_when_samples_were_taken() {
     let settings = DaggerSettings { disturbance: DisturbanceSettings::quick(), ..settings() };

@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-/// The context of a sample. Poses are those of the rear axle in the world frame of the lot.
+/// The context of a sample: when and where it was taken, and who drove. Poses are those of the rear axle in the world frame of the lot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tick {
     /// Episode of the round, from 0.
@@ -38,6 +38,9 @@ pub struct Tick {
 
 const NAME: &str = "ticks.npz";
 
+/// Reads a column of a tick.
+type Column = fn(&Tick) -> f32;
+
 impl Tick {
     /// Of a frame of an episode, which was observed at `time_s`.
     pub(crate) fn new(episode: u32, time_s: f32, frame: &Frame) -> Self {
@@ -62,7 +65,7 @@ impl Tick {
         files::write_atomically(&folder.join(NAME), |file| {
             let mut archive = NpzWriter::new_compressed(file);
             let fail = |error: ndarray_npy::WriteNpzError| error.to_string();
-            let floats: [(&str, fn(&Self) -> f32); 8] = [
+            let floats: [(&str, Column); 8] = [
                 ("time_s", |tick| tick.time_s),
                 ("x_m", |tick| tick.x_m),
                 ("y_m", |tick| tick.y_m),

@@ -24,7 +24,7 @@ impl AdamSettings {
     }
 }
 
-/// Adam's memory.
+/// Adam's running means.
 #[derive(Debug, Clone)]
 pub(crate) struct Adam {
     settings: AdamSettings,

@@ -1,11 +1,11 @@
-//! How a training goes, and how it went.
+//! Progress and report of a training.
 
 use crate::files::{self, FileError, Format};
 use crate::loss::LossParts;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// What a step looked like, for bars and logs.
+/// The state after a step, for progress bars and logs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitProgress {
     /// Steps done.
@@ -28,7 +28,7 @@ pub struct FitProgress {
 pub struct Validation {
     /// Number of samples.
     pub samples: usize,
-    /// The loss as trained, β aside: what "best" is judged by.
+    /// The loss as trained, with β = 0: "best" means the lowest of these.
     pub loss: f32,
     /// Plain negative log-likelihood: comparable between weighted and unweighted training.
     pub nll: f32,

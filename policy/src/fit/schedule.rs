@@ -12,7 +12,7 @@ pub struct LearningRate {
     pub floor: f32,
     /// Steps from 0 to the peak.
     pub warm_up_steps: u32,
-    /// After the warm-up.
+    /// Course after the warm-up.
     pub shape: ScheduleShape,
 }
 

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitSettings {
-    /// How long.
+    /// When training ends.
     pub budget: Budget,
     /// Samples per step.
     pub batch: usize,
@@ -18,7 +18,7 @@ pub struct FitSettings {
     pub shards: usize,
     /// Learning rate over time.
     pub learning_rate: LearningRate,
-    /// The rest of Adam.
+    /// Adam without its learning rate.
     pub adam: AdamSettings,
     /// Norm above which a gradient is scaled down to it; 0 = never.
     pub gradient_norm_max: f32,
@@ -26,7 +26,7 @@ pub struct FitSettings {
     pub loss: LossSettings,
     /// Whether mirror images are trained on.
     pub mirror: Mirror,
-    /// What is held back.
+    /// Which samples are held back.
     pub validation: ValidationSplit,
     /// Steps between validations; 0 = only at the end.
     pub validate_every: u32,

@@ -111,7 +111,7 @@ fn a_stop_keeps_what_was_learned() {
     assert_eq!(seen.last(), Some(&(7, 7 * 33)));
 }
 
-/// Watched on a few samples, reported on all of them.
+/// While training, a few samples are validated on; the report is on all of them.
 #[test]
 fn the_weights_returned_are_validated_on_everything_held_back() {
     let dataset = dataset(400);

@@ -13,19 +13,19 @@ use sim::sensing::GridGeometry;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 
-/// Trained weights and how it went.
+/// Trained weights and the report of their training.
 #[derive(Debug, Clone)]
 pub struct FitOutcome {
     /// The weights.
     pub weights: Weights,
-    /// How it went.
+    /// What the training did.
     pub report: FitReport,
 }
 
 /// Why a training cannot start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// Nothing to learn from.
+    /// The data set has no sample to train on.
     #[error("no training sample among {samples} samples: collect more, or hold back less than every {every}th block")]
     NoTrainingSamples {
         /// Samples in the data set.
@@ -33,7 +33,7 @@ pub enum FitError {
         /// From the split.
         every: usize,
     },
-    /// A batch that cannot be cut.
+    /// A batch without samples or without shards.
     #[error("batch {batch} and shards {shards}: both must be positive")]
     EmptyBatch {
         /// From the settings.
@@ -140,7 +140,7 @@ fn thinned(samples: &[Sample], at_most: usize) -> Cow<'_, [Sample]> {
     Cow::Owned((0..at_most).map(|i| samples[i * samples.len() / at_most]).collect())
 }
 
-/// Answers samples and compares with their labels.
+/// Compares the answers to samples with their labels.
 pub fn evaluate(weights: &Weights, samples: &[Sample], loss: &LossSettings, context: FitContext) -> Validation {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
     let outputs = Predictor::new(weights.clone(), context.inference, context.device).raw(&grids);
@@ -166,7 +166,7 @@ struct Best {
     weights: Weights,
     step: u32,
     validation: Option<Validation>,
-    /// Offers since the last validation that was better than all before.
+    /// Validations since the last new best.
     offers_since: u32,
     lowest: f32,
 }

@@ -1,5 +1,6 @@
 //! `evaluate`: drivers × lots × directions × trials × noise levels.
 
+use super::visualise::{self, RecordArgs};
 use crate::args::{Directions, LayerArgs, OutArgs, noise_levels};
 use crate::console::Console;
 use anyhow::{Context as _, ensure};
@@ -50,6 +51,8 @@ pub(crate) struct EvaluateArgs {
     layers: LayerArgs,
     #[command(flatten)]
     out: OutArgs,
+    #[command(flatten)]
+    record: RecordArgs,
 }
 
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
@@ -72,7 +75,8 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<()> {
         run.path().display()
     );
     console.report_time();
-    Ok(())
+    let runs = args.record.record;
+    runs.map_or(Ok(()), |runs| visualise::record(run.path(), vec![visualise::first_runs(&plan, runs)]))
 }
 
 /// `finished.toml` of an evaluation.

@@ -1,6 +1,7 @@
 //! `train-bc` and `train-dagger`.
 
 use super::evaluate;
+use super::visualise::{self, RecordArgs};
 use crate::args::{LayerArgs, OutArgs};
 use crate::console::Console;
 use anyhow::Context as _;
@@ -13,6 +14,7 @@ use experiment::progress::{Interrupted, Progress};
 use experiment::run_dir::RunDir;
 use experiment::settings::{Layers, Settings};
 use experiment::training;
+use experiment::view_request::Show;
 use policy::checkpoint::Checkpoint;
 use policy::dagger::Stop;
 use serde::Serialize;
@@ -46,6 +48,8 @@ pub(crate) struct TrainArgs {
     /// Trains only: no closed-loop check at the end.
     #[arg(long)]
     no_eval: bool,
+    #[command(flatten)]
+    record: RecordArgs,
 }
 
 /// Behaviour cloning alone: DAgger without an iteration.
@@ -77,18 +81,23 @@ fn train(args: &TrainArgs, command: &str, adjust: impl FnOnce(&mut Settings)) ->
 
     let console = Console::default();
     let (policy, finished) = tabulated(&settings, &run, &console)?.map_err(|rounds| cut_short(run.path(), rounds))?;
+    let mut to_record = args.record.record.map_or_else(Vec::new, |episodes| {
+        let folder = || run.path().to_owned();
+        vec![Show::Training { run: folder() }, Show::Rollouts { run: folder(), episodes }]
+    });
     if !args.no_eval {
         let drivers = drivers(&settings, &run, policy, finished.rounds)?;
         let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
         let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: drivers.len() - 1 };
         plan.check()?;
         evaluate::measure(&plan, &run, &console)?;
+        to_record.extend(args.record.record.map(|runs| visualise::first_runs(&plan, runs)));
     }
     report::run_report::write(run.path(), &console)?;
     run.finish(&finished)?;
     print_next_steps(run.path());
     console.report_time();
-    Ok(())
+    if to_record.is_empty() { Ok(()) } else { visualise::record(run.path(), to_record) }
 }
 
 /// Trains, prints and writes the paper's table. The inner error of a training cut short is the number of rounds that

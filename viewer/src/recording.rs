@@ -1,0 +1,189 @@
+//! One recording: a stream of Rerun with the layout of its first view.
+
+use crate::blueprint;
+use crate::layout::Layout;
+use anyhow::Context as _;
+use experiment::view_request::Sink;
+use rerun::log::{ChunkBatcherConfig, PendingRow};
+use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder, Scalars, SpawnOptions};
+use std::cell::{Cell, RefCell};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// The version of the viewer that opens these recordings.
+pub const RERUN_VERSION: &str = "0.36.3";
+
+/// What waits in memory before it is written to a file, bytes: a few large chunks per entity instead of many small ones.
+const BATCH_BYTES: u64 = 16 << 20;
+
+/// What a recording is.
+pub(crate) struct Header {
+    /// Recordings of one application share what the user changes about their layout.
+    pub(crate) application: &'static str,
+    /// Shown in the viewer's list of recordings.
+    pub(crate) title: String,
+    /// The first view.
+    pub(crate) layout: Layout,
+    /// The time line that is shown first.
+    pub(crate) timeline: &'static str,
+    /// What the recording is about, if it is a moment.
+    pub(crate) event: Option<Moment>,
+}
+
+/// A moment of interest.
+///
+/// The viewer starts at the beginning of a time line. So there is one, [`EVENT_TIME`], that begins shortly before the
+/// moment; what came earlier is on the other time lines.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Moment {
+    /// Where [`EVENT_TIME`] begins, and until when it is played again and again: simulated seconds.
+    pub(crate) played_s: [f64; 2],
+}
+
+/// Simulated time from shortly before a moment of interest on.
+pub(crate) const EVENT_TIME: &str = "event_time";
+
+/// An open recording.
+pub(crate) struct Recording {
+    stream: RecordingStream,
+    event: Option<Moment>,
+    /// Whether the time is before what [`EVENT_TIME`] shows.
+    is_before_event: Cell<bool>,
+    /// The first thing that could not be logged.
+    failed: RefCell<Option<anyhow::Error>>,
+    /// Where it goes, if that is a file.
+    file: Option<PathBuf>,
+}
+
+impl Recording {
+    /// Begins a recording and sends its layout. `name`: of its file in a folder.
+    ///
+    /// # Errors
+    /// If the file cannot be created, or there is no viewer.
+    pub(crate) fn begin(sink: &Sink, name: &str, header: &Header) -> anyhow::Result<Self> {
+        let builder = RecordingStreamBuilder::new(application(header)?);
+        let (stream, file) = match sink {
+            Sink::File(path) => (save(builder, path)?, Some(path.clone())),
+            Sink::Folder(folder) => {
+                let path = folder.join(format!("{name}.rrd"));
+                (save(builder, &path)?, Some(path))
+            }
+            Sink::Connect(Some(url)) => (builder.connect_grpc_opts(url.as_str()).with_context(|| url.clone())?, None),
+            Sink::Connect(None) => (builder.connect_grpc().context("the viewer of this machine")?, None),
+            Sink::Spawn => (spawn(builder)?, None),
+        };
+        Self::with_layout(stream, file, header)
+    }
+
+    fn with_layout(stream: RecordingStream, file: Option<PathBuf>, header: &Header) -> anyhow::Result<Self> {
+        // A wall clock means nothing in a simulation, and would make every file differ.
+        stream.set_log_time_enabled(false);
+        stream.send_recording_name(header.title.as_str())?;
+        blueprint::send(&stream, application(header)?, header)?;
+        let (is_before_event, failed) = (Cell::new(false), RefCell::new(None));
+        Ok(Self { stream, event: header.event, is_before_event, failed, file })
+    }
+
+    /// What is logged from now on holds from this control tick on.
+    pub(crate) fn at_tick(&self, tick: u32, sim_time_s: f64) {
+        self.stream.set_time_sequence("tick", i64::from(tick));
+        self.stream.set_duration_secs("sim_time", sim_time_s);
+        if let Some(Moment { played_s: [first_s, _] }) = self.event {
+            self.is_before_event.set(sim_time_s < first_s);
+            // Shapes that were logged earlier are there when the time line begins.
+            self.stream.set_duration_secs(EVENT_TIME, sim_time_s.max(first_s));
+        }
+    }
+
+    /// What is logged from now on holds from this optimiser step on, counted over all rounds.
+    pub(crate) fn at_step(&self, step: i64, round: i64) {
+        self.stream.set_time_sequence("step", step);
+        self.stream.set_time_sequence("round", round);
+    }
+
+    /// Shows something from now on, until the same entity shows something else. What cannot be logged fails the
+    /// recording when it ends.
+    pub(crate) fn log(&self, entity: &str, shape: &impl AsComponents) {
+        self.keep(entity, self.stream.log(entity, shape));
+    }
+
+    /// Shows the value of a signal. Unlike shapes, earlier values stay visible, each at its own time only.
+    pub(crate) fn log_value(&self, entity: &str, value: f64) {
+        if self.is_before_event.get() {
+            let mut earlier = self.stream.now();
+            earlier.remove(&EVENT_TIME.into());
+            let row = PendingRow::from_iter(earlier, Scalars::single(value).as_serialized_batches());
+            self.stream.record_row(entity.into(), row, false);
+        } else {
+            self.log(entity, &Scalars::single(value));
+        }
+    }
+
+    /// Shows something at all times.
+    pub(crate) fn log_static(&self, entity: &str, shape: &impl AsComponents) {
+        self.keep(entity, self.stream.log_static(entity, shape));
+    }
+
+    fn keep(&self, entity: &str, logged: rerun::RecordingStreamResult<()>) {
+        if let Err(error) = logged {
+            self.failed.borrow_mut().get_or_insert_with(|| anyhow::Error::from(error).context(entity.to_owned()));
+        }
+    }
+
+    /// Waits until everything is written; the file, if it is one.
+    ///
+    /// # Errors
+    /// If something could not be logged or written.
+    pub(crate) fn end(self) -> anyhow::Result<Option<PathBuf>> {
+        let place = self.file.as_ref().map_or_else(|| "the viewer".to_owned(), |file| file.display().to_string());
+        if let Some(error) = self.failed.into_inner() {
+            return Err(error.context(place));
+        }
+        self.stream
+            .flush_blocking()
+            .with_context(|| format!("{place}: cannot be written; is the disk full, or the viewer gone?"))?;
+        self.stream.disconnect();
+        Ok(self.file)
+    }
+
+    /// A recording that stays in memory.
+    #[cfg(test)]
+    pub(crate) fn in_memory(header: &Header) -> (Self, rerun::sink::MemorySinkStorage) {
+        let (stream, storage) = RecordingStreamBuilder::new(application(header).unwrap()).memory().unwrap();
+        (Self::with_layout(stream, None, header).unwrap(), storage)
+    }
+}
+
+fn application(header: &Header) -> anyhow::Result<ApplicationId> {
+    Ok(ApplicationId::try_from(format!("lotpilot-{}", header.application))?)
+}
+
+fn save(builder: RecordingStreamBuilder, path: &Path) -> anyhow::Result<RecordingStream> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::fs::create_dir_all(folder)
+        .with_context(|| format!("{}: cannot be created; choose a file with --out", folder.display()))?;
+    let batches =
+        ChunkBatcherConfig { flush_tick: Duration::MAX, flush_num_bytes: BATCH_BYTES, ..ChunkBatcherConfig::DEFAULT };
+    builder.batcher_config(batches).save(path).with_context(|| path.display().to_string())
+}
+
+/// A viewer of this machine that nobody else can reach.
+fn spawn(builder: RecordingStreamBuilder) -> anyhow::Result<RecordingStream> {
+    let options = SpawnOptions { extra_args: vec!["--bind=127.0.0.1".to_owned()], ..SpawnOptions::default() };
+    builder.spawn_opts(&options).with_context(|| {
+        format!("no viewer could be started; install it with: pip install rerun-sdk=={RERUN_VERSION} (or write a file)")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_viewer_that_is_named_is_the_one_that_opens_these_recordings() {
+        let package = include_str!("../Cargo.toml");
+        assert!(package.contains(&format!("rerun = {{ version = \"={RERUN_VERSION}\"")), "{package}");
+        let readme = include_str!("../../README.md");
+        assert!(readme.contains(&format!("pip install rerun-sdk=={RERUN_VERSION}")));
+    }
+}

@@ -1,0 +1,102 @@
+//! Episodes of a training, driven again as they were collected: round by round, by the expert and the network of the time.
+
+use crate::drive::Drive;
+use crate::recording::{Header, Recording};
+use crate::{Context, layout, legend, result_of, show_map};
+use anyhow::{Context as _, ensure};
+use experiment::drivers;
+use experiment::lots::Lot;
+use experiment::run_dir;
+use experiment::settings::Settings;
+use experiment::training::episodes_of;
+use policy::checkpoint::Checkpoint;
+use policy::dagger::GatedCollector;
+use policy::dataset::store::Store;
+use policy::drivers::NetPolicy;
+use policy::network::Predictor;
+use sim::batch::run_lockstep;
+use sim::driver::Driver;
+use sim::episode::Episode;
+use std::path::Path;
+
+/// Entity of the car.
+const ROOT: &str = "dagger";
+
+/// Records the first episodes of every round that is finished.
+pub(crate) fn show(run: &Path, episodes: usize, context: &mut Context<'_>) -> anyhow::Result<()> {
+    let settings = run_dir::settings_of(run)?;
+    let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
+    let store = Store::open(run)?;
+    ensure!(store.has_round(0), "{}: no round is collected there yet", run.display());
+    (0..).take_while(|&round| store.has_round(round)).try_for_each(|round| {
+        let before = round.checked_sub(1).map(|before| Checkpoint::load(&store.round_folder(before)));
+        let policy = before.transpose().with_context(|| format!("the policy that collected round {round}"))?;
+        let mut first = episodes_of(&settings, &lots, round)?;
+        first.truncate(episodes);
+        Round { settings: &settings, number: round, policy }.record(first, context)
+    })
+}
+
+/// A round of a training.
+struct Round<'a> {
+    settings: &'a Settings,
+    /// 0 = behaviour cloning.
+    number: u32,
+    /// The policy that collects; `None` while the expert drives alone.
+    policy: Option<Checkpoint>,
+}
+
+impl Round<'_> {
+    fn record(&self, episodes: Vec<Episode>, context: &mut Context<'_>) -> anyhow::Result<()> {
+        let begin = |(index, episode): (usize, &Episode)| {
+            let lot = &episode.map().scenario().name;
+            let header = Header {
+                application: "drive",
+                title: format!("round {:02}, episode {index}, {lot}", self.number),
+                layout: layout::of_drives(episode.map(), &[ROOT.to_owned()]),
+                timeline: "sim_time",
+                event: None,
+            };
+            let recording = context.begin(&format!("round-{:02}-episode-{index}-{lot}", self.number), &header)?;
+            show_map(episode.map(), legend::DRIVE, &recording);
+            Ok(recording)
+        };
+        let recordings = episodes.iter().enumerate().map(begin).collect::<anyhow::Result<Vec<Recording>>>()?;
+        let watched = |(recording, episode)| {
+            let novice = self.policy.clone().map(|policy| NetPolicy::new(policy, self.settings.dagger.device));
+            let drive = Drive::new(recording, ROOT, episode, self.settings).with_novice(novice);
+            drive.show_static();
+            drive
+        };
+        let mut drives: Vec<Drive<'_>> = recordings.iter().zip(&episodes).map(watched).collect();
+        let length_m: f32 = episodes.iter().map(|episode| episode.map().path().length_m()).sum();
+        let mut progress_m = vec![0.0; episodes.len()];
+        context.progress.begin("recording", &format!("recording: round {}", self.number));
+        let mut collector = self.collector(episodes.len());
+        let reports = run_lockstep(episodes, &mut collector, &mut |episode, frame| {
+            // Drives that are cancelled are driven on: recording takes nearly all of their time.
+            if !context.progress.is_cancelled() {
+                drives[episode].frame(frame);
+                progress_m[episode] = frame.progress_m;
+                let driven_m: f32 = progress_m.iter().sum();
+                let status = &mut |_| format!("{driven_m:.0} of {length_m:.0} m");
+                context.progress.at(f64::from(driven_m / length_m), status);
+            }
+        });
+        drop(drives);
+        let results: Vec<String> = reports.iter().map(|report| result_of(&report.metrics)).collect();
+        context.progress.end(&results.join("; "));
+        recordings.into_iter().try_for_each(|recording| context.end(recording))
+    }
+
+    /// As the training seated it.
+    fn collector(&self, episodes: usize) -> GatedCollector {
+        let Settings { dagger, seed, .. } = self.settings;
+        let expert = |episode: usize| -> Box<dyn Driver + Send> {
+            let expert = drivers::expert(&self.settings.expert, &self.settings.episode);
+            Box::new(expert.with_jitter_seed(*seed, u64::from(self.number) << 20 | episode as u64))
+        };
+        let novice = self.policy.as_ref().map(|policy| Predictor::new(policy.weights.clone(), dagger.device));
+        GatedCollector::new(novice, (0..episodes).map(expert).collect(), dagger.rule, dagger.keep, dagger.geometry)
+    }
+}

@@ -1,0 +1,100 @@
+//! A training as signals: its learning curves, and what every round collected.
+
+use crate::colours::{self, Colour};
+use crate::layout;
+use crate::recording::Recording;
+use crate::shapes::color;
+use anyhow::{Context as _, ensure};
+use experiment::{learning, run_dir};
+use policy::dagger::Collection;
+use policy::fit::{FitReport, FitSettings};
+use rerun::{SeriesLines, SeriesPoints, TextDocument};
+use serde::de::DeserializeOwned;
+use std::path::Path;
+
+/// Signals of a training: entity, name, colour.
+const CURVES: [(&str, &str, Colour); 6] = [
+    ("training/loss/misfit", "misfit", colours::EXPERT),
+    ("training/loss/log_variance", "log variance", colours::PATCH),
+    ("training/loss/total", "training loss, total", colours::RING),
+    ("training/validation/nll", "validation, negative log-likelihood", colours::NOVICE),
+    ("training/validation_error/rmse", "validation error, m", colours::NOVICE),
+    ("training/learning_rate", "learning rate", colours::PLANNER),
+];
+/// Signals with one point per round.
+const ROUNDS: [(&str, &str, Colour); 4] = [
+    ("rounds/eta_hat/eta_hat", "η̂: share the network drove", colours::NOVICE),
+    ("rounds/samples/new", "new in this round", colours::EXPERT),
+    ("rounds/samples/dataset", "in the data set", colours::FAINT),
+    ("rounds/near_collisions", "near-collisions per 100 m", colours::FAILURE),
+];
+
+/// Shows what the folder of a training holds.
+///
+/// # Errors
+/// If there is no training, or a file of it cannot be read.
+pub(crate) fn show(run: &Path, recording: &Recording) -> anyhow::Result<()> {
+    let settings = run_dir::settings_of(run)?;
+    for (entity, name, colour) in CURVES {
+        let line = SeriesLines::new().with_names([name]).with_colors([color(colour)]).with_widths([1.5]);
+        recording.log_static(entity, &line);
+    }
+    for (entity, name, colour) in ROUNDS {
+        let points = SeriesPoints::new().with_names([name]).with_colors([color(colour)]).with_marker_sizes([4.0]);
+        recording.log_static(entity, &points);
+    }
+    let (mut rounds, mut dataset, mut first_step) = (0_u32, 0, 0_i64);
+    loop {
+        let folder = run.join(format!("round-{rounds:02}"));
+        if !folder.join("round.toml").is_file() {
+            break;
+        }
+        let collection: Collection = toml_of(&folder.join("round.toml"))?;
+        dataset += collection.samples;
+        recording.at_step(first_step, i64::from(rounds));
+        collected(&collection, dataset, recording);
+        if let Some(fit) = learning::report(&folder)? {
+            let of_round = if rounds == 0 { &settings.dagger.fit_cloning } else { &settings.dagger.fit_iteration };
+            fitted(&fit, of_round, first_step, i64::from(rounds), recording);
+            first_step += i64::from(fit.steps);
+        }
+        rounds += 1;
+    }
+    ensure!(rounds > 0, "{}: no round is finished there; runs of train-bc and train-dagger have rounds", run.display());
+    for (entity, name) in layout::TABLES {
+        let text = std::fs::read_to_string(run.join(name)).unwrap_or_else(|_| format!("This run has no `{name}` yet."));
+        recording.log_static(entity, &TextDocument::from_markdown(text));
+    }
+    Ok(())
+}
+
+fn collected(collection: &Collection, dataset: usize, recording: &Recording) {
+    let value = |entity: &str, value: f64| recording.log_value(entity, value);
+    value("rounds/samples/new", collection.samples as f64);
+    value("rounds/samples/dataset", dataset as f64);
+    value("rounds/near_collisions", 100.0 * f64::from(collection.near_collisions) / collection.driven_m.max(1.0));
+    if collection.round > 0 {
+        value("rounds/eta_hat/eta_hat", collection.eta_hat());
+    }
+}
+
+/// A finished fit, point by point.
+fn fitted(fit: &FitReport, settings: &FitSettings, first_step: i64, round: i64, recording: &Recording) {
+    let value = |entity: &str, value: f32| recording.log_value(entity, f64::from(value));
+    for point in &fit.curve {
+        recording.at_step(first_step + i64::from(point.step), round);
+        value("training/loss/misfit", point.training.misfit);
+        value("training/loss/log_variance", point.training.log_variance);
+        value("training/loss/total", point.training.total);
+        value("training/learning_rate", settings.learning_rate.at(point.step.saturating_sub(1), fit.steps));
+        if let Some(validation) = &point.validation {
+            value("training/validation/nll", validation.nll);
+            value("training/validation_error/rmse", validation.rmse_m);
+        }
+    }
+}
+
+fn toml_of<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
+    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+    toml::from_str(&text).with_context(|| path.display().to_string())
+}

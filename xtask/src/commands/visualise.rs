@@ -1,0 +1,264 @@
+//! `visualise`, and `--record` of other commands: requests to the viewer program.
+
+use super::evaluate;
+use crate::args::{LayerArgs, OneDirection};
+use crate::viewer;
+use anyhow::{bail, ensure};
+use clap::{Args, Subcommand};
+use evaluation::plan::Plan;
+use evaluation::records::{self, FailureRecord};
+use experiment::drivers::DriverSpec;
+use experiment::lots::Lot;
+use experiment::progress::Interrupted;
+use experiment::replay_key::ReplayKey;
+use experiment::run_dir;
+use experiment::settings::{Layers, NoiseChoice};
+use experiment::view_request::{DriveRequest, Show, Sink, ViewRequest};
+use report::pictures::file_name;
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+use std::path::{Path, PathBuf};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask visualise lot lot-b
+  cargo xtask visualise episode --driver expert --driver run:runs/train-dagger-default-s1 --lot lot-b
+  cargo xtask visualise replay run:runs/train-dagger-default-s1@lot-b@reverse@3@paper@1@842
+  cargo xtask visualise run runs/train-dagger-default-s1
+  cargo xtask visualise failures runs/evaluate-default-s1 --limit 5
+
+The viewer that fits: pip install rerun-sdk==0.36.3, then: rerun recordings/*.rrd
+The first time, the program that records is built (about 8 minutes on two cores).";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct VisualiseArgs {
+    /// What to look at.
+    #[command(subcommand)]
+    what: What,
+    #[command(flatten)]
+    sink: SinkArgs,
+}
+
+/// Where recordings go.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Recording")]
+struct SinkArgs {
+    /// File to write [default: recordings/NAME.rrd].
+    #[arg(long, global = true, value_name = "FILE.rrd", conflicts_with_all = ["spawn", "connect"])]
+    out: Option<PathBuf>,
+    /// Shows it in a viewer of this machine instead, started if none runs.
+    #[arg(long, global = true, conflicts_with = "connect")]
+    spawn: bool,
+    /// Shows it in a viewer that runs already [default: on this machine].
+    #[arg(long, global = true, value_name = "URL", num_args = 0..=1, default_missing_value = "")]
+    connect: Option<String>,
+}
+
+#[derive(Debug, Clone, Subcommand)]
+enum What {
+    /// A lot.
+    Lot(LotArgs),
+    /// An episode of an evaluation, driven by one driver, or by several side by side.
+    Episode(EpisodeArgs),
+    /// The run of a replay key, around its moment.
+    Replay(ReplayArgs),
+    /// A training: loss, validation, learning rate, and what every round collected.
+    Run(RunArgs),
+    /// Near-collisions of an evaluation, a recording each.
+    Failures(FailuresArgs),
+}
+
+#[derive(Debug, Clone, Args)]
+struct LotArgs {
+    /// The lot; see `cargo xtask lots`.
+    #[arg(value_name = "SPEC")]
+    lot: String,
+    /// Seed of the obstacles, as in `generate`.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+/// Obstacles and noise are those of the same trial in `evaluate`.
+#[derive(Debug, Clone, Args)]
+struct EpisodeArgs {
+    /// Who drives; may be repeated. See `cargo xtask drivers`.
+    #[arg(long = "driver", value_name = "SPEC", required = true, num_args = 1..)]
+    drivers: Vec<String>,
+    /// The lot; see `cargo xtask lots`.
+    #[arg(long, alias = "lots", value_name = "SPEC", default_value = "lot-a")]
+    lot: String,
+    /// Which trial.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    trial: u32,
+    /// Which way it is driven.
+    #[arg(long, alias = "directions", default_value = "forward")]
+    direction: OneDirection,
+    /// What is seen wrongly: clean, paper, hard, lot or multiples of paper [default: the first of evaluation.noise].
+    #[arg(long, value_name = "LEVEL")]
+    noise: Option<NoiseChoice>,
+    /// Seed of the evaluation.
+    #[arg(long)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    layers: LayerArgs,
+}
+
+#[derive(Debug, Clone, Args)]
+struct ReplayArgs {
+    /// From `failures.md`, `failures.jsonl` or `runs.jsonl`. Unless a `run:` drives, name the settings it was driven
+    /// with: `--config RUN/settings.toml`.
+    #[arg(value_name = "KEY")]
+    key: ReplayKey,
+    #[command(flatten)]
+    layers: LayerArgs,
+}
+
+#[derive(Debug, Clone, Args)]
+struct RunArgs {
+    /// Folder of a training.
+    #[arg(value_name = "DIR")]
+    run: PathBuf,
+}
+
+#[derive(Debug, Clone, Args)]
+struct FailuresArgs {
+    /// Folder of an evaluation, or of a training with one.
+    #[arg(value_name = "DIR")]
+    run: PathBuf,
+    /// Near-collisions to record, from the top of the list.
+    #[arg(long, value_name = "N", default_value_t = 12)]
+    limit: usize,
+}
+
+/// `--record`.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct RecordArgs {
+    /// When all is done, records the first N runs of every driver at every noise level for Rerun's viewer, into the folder
+    /// of the run; of a training also its learning curves and the first N episodes of every round.
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1")]
+    pub(crate) record: Option<usize>,
+}
+
+pub(crate) fn run(args: &VisualiseArgs) -> anyhow::Result<()> {
+    let (show, file) = match &args.what {
+        What::Lot(lot) => {
+            let show = Show::Lot { lot: lot.lot.clone(), seed: RootSeed(lot.seed) };
+            (show, format!("lot-{}-s{}", file_name(&lot.lot), lot.seed))
+        }
+        What::Episode(episode) => episode_of(episode)?,
+        What::Replay(replay) => replay_of(&replay.key, &replay.layers)?,
+        What::Run(run) => {
+            let name = run.run.file_name().map_or_else(|| "training".into(), |name| name.to_string_lossy());
+            (Show::Training { run: run.run.clone() }, format!("run-{}", file_name(&name)))
+        }
+        What::Failures(failures) => {
+            let folder = recordings_of(&failures.run);
+            let folder_name = folder.display().to_string();
+            ensure!(args.sink.out.is_none(), "--out: every near-collision is a file of its own, in {folder_name}");
+            let sink = sink_of(&args.sink, Sink::Folder(folder));
+            return viewer::ask(&ViewRequest { sink, show: vec![failures_of(failures)?] });
+        }
+    };
+    let sink = sink_of(&args.sink, Sink::File(Path::new("recordings").join(format!("{file}.rrd"))));
+    viewer::ask(&ViewRequest { sink, show: vec![show] })
+}
+
+fn sink_of(args: &SinkArgs, otherwise: Sink) -> Sink {
+    match (&args.out, args.spawn, &args.connect) {
+        (Some(file), _, _) => Sink::File(file.clone()),
+        (None, true, _) => Sink::Spawn,
+        (None, false, Some(url)) => Sink::Connect((!url.is_empty()).then(|| url.clone())),
+        (None, false, None) => otherwise,
+    }
+}
+
+/// Where the recordings of a run are kept.
+fn recordings_of(run: &Path) -> PathBuf {
+    run.join("recordings")
+}
+
+/// A run by several drivers, and the name of its file.
+fn episode_of(args: &EpisodeArgs) -> anyhow::Result<(Show, String)> {
+    let drivers = DriverSpec::parse_all(&args.drivers)?;
+    let (settings, _) = evaluate::settings_for(&drivers, &Layers::from(&args.layers))?;
+    let lots = Lot::parse_all(std::slice::from_ref(&args.lot), &settings.episode.vehicle)?;
+    let [lot] = lots.as_slice() else {
+        bail!("--lot {}: {} lots are named so; name one, as in test-hard-7", args.lot, lots.len())
+    };
+    let evaluation = &settings.evaluation;
+    let (direction, trial) = (Direction::from(args.direction), args.trial);
+    let (noise, seed) = (args.noise.unwrap_or(evaluation.noise[0]), args.seed.map_or(evaluation.seed, RootSeed));
+    let key = |driver: DriverSpec| ReplayKey { driver, lot: lot.spec(), direction, trial, noise, seed, tick: 0 };
+    let way = direction.name();
+    let file = format!("{}-{way}-t{trial}", lot.name());
+    let title = format!("{}, {way}, trial {trial}, {noise}: {}", lot.name(), args.drivers.join(", "));
+    let drive = DriveRequest { file: file.clone(), title, keys: drivers.into_iter().map(key).collect() };
+    Ok((Show::Drives { settings: Box::new(settings), drives: vec![drive] }, file))
+}
+
+/// The run of a key, and the name of its file.
+fn replay_of(key: &ReplayKey, layers: &LayerArgs) -> anyhow::Result<(Show, String)> {
+    let (settings, _) = evaluate::settings_for(std::slice::from_ref(&key.driver), &Layers::from(layers))?;
+    let file = format!("replay-{}-{}-t{}-{}", file_name(&key.lot), key.direction.name(), key.trial, key.tick);
+    let drive = DriveRequest { file: file.clone(), title: key.to_string(), keys: vec![key.clone()] };
+    Ok((Show::Drives { settings: Box::new(settings), drives: vec![drive] }, file))
+}
+
+/// Near-collisions of an evaluation, a recording each, of the seconds around it.
+fn failures_of(args: &FailuresArgs) -> anyhow::Result<Show> {
+    let list = args.run.join("failures.jsonl");
+    let failures: Vec<FailureRecord> = records::read(&list)?;
+    ensure!(!failures.is_empty(), "{}: there is no near-collision in it, so there is nothing to see", list.display());
+    if failures.len() > args.limit {
+        let left = failures.len() - args.limit;
+        eprintln!("{left} more near-collisions are in {}; see them with --limit {}", list.display(), failures.len());
+    }
+    let drive = |(index, failure): (usize, &FailureRecord)| {
+        let key: ReplayKey = failure.replay.parse()?;
+        let cause = failure.cause.name();
+        let file = format!("failure-{:03}-{}-{}", index + 1, file_name(&key.lot), file_name(cause));
+        Ok(DriveRequest { file, title: format!("{cause}: {key}"), keys: vec![key] })
+    };
+    let drives = failures.iter().take(args.limit).enumerate().map(drive).collect::<anyhow::Result<_>>()?;
+    Ok(Show::Drives { settings: Box::new(run_dir::settings_of(&args.run)?), drives })
+}
+
+/// The first runs of every driver at every noise level, as in the evaluation.
+pub(crate) fn first_runs(plan: &Plan<'_>, runs: usize) -> Show {
+    let evaluation = &plan.settings.evaluation;
+    let mut drives = Vec::new();
+    for &noise in &evaluation.noise {
+        for driver in plan.drivers {
+            for trial in plan.trials().take(runs) {
+                let (lot, way, index) = (trial.lot.name(), trial.direction.name(), trial.index);
+                let title = format!("{}, {noise}, {lot}, {way}, trial {index}", driver.name);
+                let key = ReplayKey {
+                    driver: driver.spec.clone(),
+                    lot: trial.lot.spec(),
+                    direction: trial.direction,
+                    trial: index,
+                    noise,
+                    seed: evaluation.seed,
+                    tick: 0,
+                };
+                let file = file_name(&title.replace(", ", "-").replace(' ', "-"));
+                drives.push(DriveRequest { file, title, keys: vec![key] });
+            }
+        }
+    }
+    Show::Drives { settings: Box::new(plan.settings.clone()), drives }
+}
+
+/// Records into the folder of a run that is finished. What goes wrong is said and does the run no harm.
+///
+/// # Errors
+/// By Ctrl-C.
+pub(crate) fn record(run: &Path, show: Vec<Show>) -> anyhow::Result<()> {
+    match viewer::ask(&ViewRequest { sink: Sink::Folder(recordings_of(run)), show }) {
+        Err(error) if !error.is::<Interrupted>() => {
+            eprintln!("warning: {error:#}");
+            Ok(())
+        }
+        result => result,
+    }
+}

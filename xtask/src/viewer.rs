@@ -1,0 +1,89 @@
+//! The viewer program (`viewer/`): a workspace of its own, built when first needed, because rerun takes minutes to compile.
+
+use crate::interrupt;
+use anyhow::{Context as _, ensure};
+use experiment::progress::Interrupted;
+use experiment::view_request::ViewRequest;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Its exit status after Ctrl-C.
+const EXIT_INTERRUPTED: i32 = 130;
+/// Backends of the network that this program has: a run may ask for one.
+const BACKENDS: &[&str] = &[
+    #[cfg(feature = "cuda")]
+    "cuda",
+    #[cfg(feature = "vulkan")]
+    "vulkan",
+    #[cfg(feature = "wgpu")]
+    "wgpu",
+];
+
+/// Builds the viewer program unless that is done, and has it show what is asked for.
+///
+/// # Errors
+/// If it cannot be built, it failed (it has said why), or by Ctrl-C.
+pub(crate) fn ask(request: &ViewRequest) -> anyhow::Result<()> {
+    let manifest = manifest()?;
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut command = Command::new(cargo);
+    command.args(["run", "--locked", "--manifest-path"]).arg(&manifest);
+    for backend in BACKENDS {
+        command.args(["--features", backend]);
+    }
+    // Beside this program, so that dependencies of both are compiled once.
+    let target = target_folder();
+    if let Some(target) = &target {
+        command.arg("--target-dir").arg(target);
+    }
+    let program = Path::new("debug").join(format!("viewer{}", std::env::consts::EXE_SUFFIX));
+    if target.is_some_and(|target| target.join(program).is_file()) {
+        command.arg("--quiet");
+    } else {
+        eprintln!("building the viewer program: about 8 minutes on two cores, the first time only …");
+    }
+    command.env("RAYON_NUM_THREADS", rayon::current_num_threads().to_string()).stdin(Stdio::piped());
+    let mut child = command.spawn().context("cargo, which builds the viewer program, cannot be started")?;
+    // If it ends before it has read everything, its status says why.
+    let _ = serde_json::to_writer(child.stdin.take().context("the pipe to the viewer program")?, request);
+    let status = child.wait().context("the viewer program")?;
+    if interrupt::is_requested() || status.code() == Some(EXIT_INTERRUPTED) {
+        return Err(Interrupted { kept: "the recordings made so far are complete".to_owned() }.into());
+    }
+    ensure!(status.success(), "{}: the viewer program failed ({status}), see above", manifest.display());
+    Ok(())
+}
+
+/// The manifest of the viewer program in this checkout, wherever that was moved to.
+fn manifest() -> anyhow::Result<PathBuf> {
+    let starts = [std::env::current_exe(), std::env::current_dir()];
+    let mut folders = starts.iter().flatten().flat_map(|start| start.ancestors());
+    let is_checkout = |folder: &&Path| {
+        ["viewer", "experiment", "xtask"].iter().all(|package| folder.join(package).join("Cargo.toml").is_file())
+    };
+    folders.find(is_checkout).map(|checkout| checkout.join("viewer/Cargo.toml")).context(
+        "viewer/Cargo.toml is found neither above this program nor above the current folder; run it in the checkout",
+    )
+}
+
+/// The target folder that this program was built in.
+fn target_folder() -> Option<PathBuf> {
+    let program = std::env::current_exe().ok()?;
+    let is_profile = |folder: &&Path| folder.file_name().is_some_and(|name| name == "debug" || name == "release");
+    program.ancestors().find(is_profile).and_then(Path::parent).map(Path::to_owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_viewer_program_of_this_checkout_is_found() {
+        assert!(std::fs::read_to_string(manifest().unwrap()).unwrap().contains("name = \"viewer\""));
+    }
+
+    #[test]
+    fn whoever_only_trains_does_not_compile_rerun() {
+        assert!(!include_str!("../../Cargo.lock").contains("name = \"rerun\""));
+    }
+}
