@@ -464,6 +464,7 @@ fn episodes_of_a_training_are_driven_again_as_they_were() {
         git_revision: None,
         git_dirty: None,
         rustc_version: String::new(),
+        processor: None,
     };
     let place = Place { build: &build, out: Some(&run), overwrite: false, command: "test", preset: "smoke", seed: 1 };
     let folder = RunDir::create(&place, &settings).unwrap();
