@@ -228,9 +228,9 @@ fn a_run_can_be_evaluated_later_and_generated_lots_can_be_driven() {
     }
     assert_eq!(read("failures.jsonl").lines().count() as u64, near_collisions);
     assert_eq!(read("wall_time.jsonl").lines().count(), 2);
-    is_a_report(&read("report.html"), &["Near-collisions, noise paper", "Safe ratio of every run", "Configuration"]);
+    is_a_report(&read("report.html"), &["Near-collisions, noise paper", "Safe ratio on ", "Configuration"]);
     let html = std::fs::read_to_string(run.join("report.html")).unwrap();
-    is_a_report(&html, &["Training loss", "predicted σ", "Configuration"]);
+    is_a_report(&html, &["Validation error of the look-ahead point", "predicted σ", "Configuration"]);
     assert!(run.join("round-00/learning.csv").is_file());
 }
 
@@ -239,9 +239,11 @@ fn is_a_report(html: &str, parts: &[&str]) {
     for part in parts {
         assert!(html.contains(part), "{part:?} is missing in the report");
     }
-    for (found, why) in [("<script", "scripts"), ("<link", "files"), ("url(", "files"), ("@import", "styles")] {
+    for (found, why) in [("<script ", "foreign scripts"), ("<link", "files"), ("url(", "files"), ("@import", "styles")]
+    {
         assert!(!html.contains(found), "the report has no {why}");
     }
+    assert!(html.contains("default-src 'none'"), "its policy forbids to load anything");
     let tags = html.split('<').skip(1).filter_map(|tag| tag.split('>').next());
     for tag in tags.filter(|tag| tag.contains("src=") || tag.contains("href=")) {
         assert!(tag.contains("src=\"data:image/png;base64,") || tag.contains("href=\"#"), "{tag}");
@@ -261,6 +263,21 @@ fn pictures_are_drawn_and_never_replaced_unasked() {
     for name in ["lot-b.png", "lot-b.svg", "contact-sheet.png", "contact-sheet.svg", "noise-lot-b.png"] {
         assert!(Path::new(&out).join(name).is_file(), "{name} is missing");
     }
+    let animation = ["render", "animation", "--driver", "expert", "vvf", "--lots", "lot-b", "--to", "4", "--out", &out];
+    let line = succeed(xtask().args(animation));
+    let gif = Path::new(&out).join("drive-lot-b-forward-trial-0.gif");
+    assert!(line.contains("drive-lot-b-forward-trial-0.gif"), "{line}");
+    let bytes = std::fs::read(&gif).unwrap();
+    assert!(bytes.starts_with(b"GIF89a") && bytes.len() < 3_000_000, "{} bytes", bytes.len());
+    let key = "expert@lot-b@forward@0@paper@1@40";
+    let keys = ["render", "animation", key, "--to", "3", "--view", "follow", "--format", "apng", "--name", "key"];
+    succeed(xtask().args(keys).args(["--out", &out]));
+    assert!(std::fs::read(Path::new(&out).join("key.png")).unwrap().windows(4).any(|chunk| chunk == b"acTL"));
+    refuses(&animation, &["drive-lot-b-forward-trial-0.gif", "--overwrite"]);
+    let other = "expert@lot-b@forward@1@paper@1@40";
+    refuses(&["render", "animation", key, other, "--name", "two", "--out", &out], &["another trial"]);
+    let late = ["render", "animation", key, "--from", "9", "--to", "8", "--name", "late", "--out", &out];
+    refuses(&late, &["nothing to show", "--from"]);
     refuses(&["render", "lot", "--lots", "lot-b", "--out", &out], &["lot-b.png", "--overwrite"]);
     refuses(&["render", "noise", "--lots", "lot-b", "--at", "1000", "--out", &out], &["--at 1000", "139"]);
     refuses(&["render", "noise", "--lots", "test:2", "--out", &out], &["test:2", "2 lots"]);

@@ -98,7 +98,7 @@ fn an_evaluation_is_the_same_for_one_and_two_threads() {
         "failures.jsonl",
         "failures.md",
         "figures/noise.svg",
-        "figures/near-collision-0.png",
+        "figures/near-collision-0.svg",
     ] {
         assert!(one.get(needed).is_some_and(|bytes| !bytes.is_empty()), "{needed} is missing from {:?}", one.keys());
     }

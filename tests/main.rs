@@ -5,6 +5,7 @@
 //! | [`tidy`] | dependency direction, licence files, what the README names exists |
 //! | [`commands`] | whole commands run from outside: results, exit codes, errors |
 //! | [`determinism`] | same seed, same bytes, for 1 and 2 threads |
+//! | [`docs`] | what the docs name exists: links, sections, commands, flags, settings, paths |
 //! | [`expert_drives`] | the expert on the reference lots |
 //! | [`formats`] | data sets open as NPY, weights as safetensors |
 //! | [`goldens`] | digests of episodes, by layer |
@@ -12,12 +13,14 @@
 //! | [`regressions`] | what once went wrong, named by symptom |
 //! | [`printed`] | every `--help` and every printed table, as people read them |
 //! | [`python`] | the Python of docs/formats.md answers as Rust does |
+//! | [`words`] | words that were replaced do not come back |
 //! | [`reproduce`] | the paper in a box: its report, resumed to the same bytes |
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod bench;
 mod commands;
 mod determinism;
+mod docs;
 mod expert_drives;
 mod formats;
 mod goldens;
@@ -28,3 +31,4 @@ mod python;
 mod regressions;
 mod reproduce;
 mod tidy;
+mod words;

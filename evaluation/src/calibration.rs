@@ -1,4 +1,4 @@
-//! Whether a network knows how wrong it is: errors against the σ predicted for them.
+//! Calibration of a network: its errors against the σ that it predicts.
 
 use policy::checkpoint::Checkpoint;
 use policy::dataset::Sample;

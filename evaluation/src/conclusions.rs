@@ -34,15 +34,15 @@ pub fn compare_with(drivers: &[NamedDriver]) -> usize {
     drivers.iter().position(|driver| driver.name == DAGGER).unwrap_or(0)
 }
 
-/// What became of a conclusion.
+/// Whether a conclusion holds here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Here, too.
+    /// It holds here, too.
     Holds,
-    /// The opposite is seen.
+    /// The opposite holds here.
     DoesNotHold,
-    /// Not with this many metres.
+    /// It cannot be told from this many metres.
     CannotBeTold,
 }
 
@@ -71,7 +71,7 @@ impl Verdict {
 pub struct Statement {
     /// The conclusion, in our words.
     pub claim: String,
-    /// What became of it.
+    /// Whether it holds here.
     pub verdict: Verdict,
     /// The figures it rests on.
     pub figures: String,
@@ -82,7 +82,7 @@ pub struct Statement {
 pub struct Driven<'a> {
     /// What.
     pub plan: &'a Plan<'a>,
-    /// What came of it.
+    /// Its results.
     pub results: &'a EvaluationResults,
 }
 
@@ -97,7 +97,7 @@ impl Driven<'_> {
         self.results.slices().pop().expect("at least one lot is driven")
     }
 
-    /// The lots nobody was trained on; `None` if that is all or nothing.
+    /// The lots that no driver was trained on; `None` if that is every lot or none.
     pub fn unseen(&self) -> Option<Slice> {
         let groups = self.results.groups();
         let unseen: Vec<&str> =

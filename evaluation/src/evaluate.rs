@@ -1,7 +1,7 @@
-//! Drives a plan and writes down what happened, line by line.
+//! Drives a plan and writes one line per run and near-collision.
 //!
 //! Runs are driven batch by batch. In a batch every driver meets the same maps, obstacles, noise and starts, one driver
-//! after the other at every noise level; then the batch is forgotten but for a few numbers per run. So memory does not
+//! after the other at every noise level; then only a few numbers per run are kept. So memory does not
 //! depend on how many lots there are, and what an interrupted evaluation leaves is paired.
 
 use crate::incidents::{self, Incident, IncidentMonitor};
@@ -25,7 +25,7 @@ use std::time::Instant;
 /// Trials driven at a time. A constant: neither memory nor results depend on how many runs or threads there are.
 const BATCH: usize = 16;
 
-/// What came of a plan.
+/// The outcome of a plan.
 #[derive(Debug)]
 pub struct Evaluated {
     /// Everything that is kept of the runs.
@@ -166,7 +166,7 @@ fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> DrivenBatch {
     DrivenBatch { reports, incidents: monitor.into_incidents(), wall_s: started.elapsed().as_secs_f64() }
 }
 
-/// How far the whole evaluation is.
+/// Progress of the whole evaluation.
 struct Track<'a> {
     progress: &'a dyn Progress,
     runs: usize,
@@ -220,7 +220,7 @@ impl Lines {
         self.flush()
     }
 
-    /// What is finished is on disk, also if the process is ended.
+    /// Flushes, so that finished runs are on disk even if the process is killed.
     fn flush(&mut self) -> anyhow::Result<()> {
         for file in [&mut self.runs, &mut self.failures, &mut self.wall_time] {
             file.flush().context("a file of the run cannot be written; is the disk full?")?;

@@ -5,7 +5,7 @@ use crate::statistics::bootstrap::Interval;
 use crate::statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
 use crate::totals::Totals;
 
-/// The rate with the interval that may be quoted (methods.md 8.3).
+/// The rate with the interval that may be quoted (docs/methods.md 8.3).
 pub fn quoted_rate(totals: &Totals, estimate: &DriverEstimate) -> String {
     let is_clustered = estimate.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
     match estimate.per_100m.filter(|_| is_clustered) {

@@ -1,4 +1,4 @@
-//! Near-collisions one by one: where, why, and how to see them again.
+//! Near-collisions one by one: where, why, and the key that replays each.
 //!
 //! Four rules, each on the clean map [all chosen]; the first that holds is the cause:
 //!
@@ -27,7 +27,8 @@ use std::collections::VecDeque;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// How far back the driver is shown the clean grid, seconds: about the 8 m in which the place came into view.
+/// How long before the incident the driver is shown the clean grid, seconds: about the 8 m in which the place comes into
+/// view.
 pub const LOOK_BACK_S: f32 = 6.0;
 /// How far it must get beyond the place, metres: the length of the car.
 pub const PASS_M: f32 = 5.0;
@@ -41,7 +42,7 @@ pub const OSCILLATION_S: f32 = 5.0;
 pub const NEAR_M: f32 = 5.0;
 /// What is a corner, degrees.
 pub const CORNER_DEG: f32 = 30.0;
-/// Free width is looked for up to here on either side, metres.
+/// Free width is measured up to here on either side, metres.
 const WIDTH_MAX_M: f32 = 5.0;
 
 /// Why.
@@ -50,9 +51,9 @@ const WIDTH_MAX_M: f32 = 5.0;
 pub enum Cause {
     /// On the clean grid the driver would have passed.
     NoiseInduced,
-    /// It steered to and fro.
+    /// The car oscillated.
     Oscillation,
-    /// There is hardly room.
+    /// The passage is hardly wider than the car.
     NarrowPassage,
     /// The route turns.
     Corner,
@@ -158,7 +159,7 @@ impl IncidentMonitor {
         }
     }
 
-    /// Takes one frame into account.
+    /// Adds one frame.
     pub fn frame(&mut self, episode: usize, frame: &Frame) {
         let recent = &mut self.recent[episode];
         if recent.is_empty() && frame.tick > 0 {

@@ -19,8 +19,8 @@ pub struct DriverEstimate {
     pub safe_ratio: Option<Interval>,
 }
 
-/// A driver against the one all are compared with: differences are driver − other, so that a positive one speaks for
-/// the other.
+/// A driver against the reference driver. Differences are driver − reference, so that a positive one favours
+/// the reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// Index of the driver in the plan.
@@ -42,7 +42,7 @@ pub struct Comparison {
 
 impl EvaluationResults {
     /// How the drivers stand in a slice at a noise level, and how they compare with one of them. Resampled are units
-    /// (lot, direction, seed) within each lot (methods.md 8.3); of generated lots, which are a sample themselves, whole
+    /// (lot, direction, seed) within each lot (docs/methods.md 8.3); of generated lots, which are a sample themselves, whole
     /// lots within their kind (chosen). Only runs that all drivers have driven count.
     pub fn judge(
         &self,

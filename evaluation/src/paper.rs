@@ -1,11 +1,11 @@
-//! The figures the paper prints, with what can be recovered of the counts behind them (docs/methods.md 0).
+//! The figures that the paper prints, and the counts recovered from them (docs/methods.md 0).
 
 use serde::{Deserialize, Serialize};
 
 /// A lot of the paper.
 #[derive(Debug, Clone, Copy)]
 pub struct PaperLot {
-    /// Our rebuilding of it.
+    /// The reference lot that stands for it.
     pub lot: &'static str,
     /// Length of its reference path, metres.
     pub length_m: f64,

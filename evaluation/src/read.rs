@@ -1,4 +1,4 @@
-//! An evaluation counted again from what it wrote.
+//! Results of an evaluation, read back from its files.
 
 use crate::incidents;
 use crate::plan::Plan;

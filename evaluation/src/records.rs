@@ -33,7 +33,7 @@ pub struct Driven {
     pub direction: Direction,
     /// Which trial of the lot, from 0.
     pub trial: u32,
-    /// What was seen wrongly.
+    /// Sensor noise.
     pub noise: NoiseChoice,
 }
 

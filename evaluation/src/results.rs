@@ -1,4 +1,4 @@
-//! What came of an evaluation: sums, and a few numbers per run.
+//! Results of an evaluation: sums, and a few numbers per run.
 
 use crate::incidents::Cause;
 use crate::plan::Plan;
@@ -10,7 +10,7 @@ use sim::episode::EpisodeReport;
 use sim::scenario::Direction;
 use std::collections::BTreeMap;
 
-/// One run, as far as it is kept: the bootstrap needs every one of them.
+/// What is kept of one run: the bootstrap needs every one of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RunSummary {
     pub(crate) trial: u32,
@@ -79,7 +79,7 @@ impl EvaluationResults {
         results
     }
 
-    /// Takes a run into account: which level and driver of the plan, which of its trials. Trials come in order.
+    /// Adds a run of a noise level, driver and trial of the plan. Trials come in order.
     pub fn add(&mut self, level: usize, driver: usize, trial_index: usize, trial: &Trial<'_>, report: &EpisodeReport) {
         let (group, cluster) = self.lots[trial.lot.name()];
         let driver_results = &mut self.drivers[level][driver];
@@ -98,7 +98,7 @@ impl EvaluationResults {
         });
     }
 
-    /// Takes the cause of a near-collision into driver_results, and whether it is one more at the same place.
+    /// Adds the cause of a near-collision, and whether it happened at the place of the one before.
     pub fn add_cause(&mut self, level: usize, driver: usize, lot: &Lot, cause: Cause, is_again: bool) {
         let (group, _) = self.lots[lot.name()];
         let driver_results = &mut self.drivers[level][driver];
@@ -106,12 +106,12 @@ impl EvaluationResults {
         *driver_results.again.entry(group).or_default() += u32::from(is_again);
     }
 
-    /// Families, in the order of the plan.
+    /// Groups of lots, in the order of the plan.
     pub fn groups(&self) -> &[LotGroup] {
         &self.groups
     }
 
-    /// What is looked at together: every group by itself, then the pooled ones.
+    /// Every slice: each group by itself, then the pooled ones.
     pub fn slices(&self) -> Vec<Slice> {
         Slice::all_of(&self.groups)
     }

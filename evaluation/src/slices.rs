@@ -1,4 +1,4 @@
-//! Lots that share a row of the tables, and rows that are looked at together.
+//! Groups of lots that share a row of the tables, and slices that pool groups.
 
 /// Lots that share a row of the tables: a lot by itself, or all generated lots of one kind.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,7 +18,7 @@ impl LotGroup {
     }
 }
 
-/// Lots that are looked at together.
+/// Groups of lots that are evaluated together.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Slice {
     /// Its name in tables.
@@ -27,7 +27,8 @@ pub struct Slice {
 }
 
 impl Slice {
-    /// Every group by itself; then, where that is something else, those nobody was trained on, and all.
+    /// Every group by itself; then all groups that no driver was trained on, and all groups, unless a slice has them
+    /// already.
     pub fn all_of(groups: &[LotGroup]) -> Vec<Self> {
         let of = |label: &str, wanted: &dyn Fn(usize) -> bool| Self {
             label: label.to_owned(),

@@ -1,4 +1,4 @@
-//! What can be said about a driver from the runs it drove (docs/methods.md 8.3).
+//! Statistics of drivers: intervals, comparisons, sample sizes (docs/methods.md 8.3).
 //!
 //! | file | question |
 //! |---|---|

@@ -51,7 +51,7 @@ impl Tables {
 pub struct Row {
     /// Who drove.
     pub driver: String,
-    /// What was seen wrongly.
+    /// Sensor noise.
     pub noise: NoiseChoice,
     /// Where: the label of a slice.
     pub lots: String,
@@ -116,7 +116,7 @@ pub struct ComparisonRow {
     pub driver: String,
     /// The driver it is compared with.
     pub compared_with: String,
-    /// What was seen wrongly.
+    /// Sensor noise.
     pub noise: NoiseChoice,
     /// Where: the label of a slice.
     pub lots: String,
@@ -155,7 +155,7 @@ pub struct SweepRow {
     pub driver: String,
     /// Where: the label of a slice.
     pub lots: String,
-    /// What was seen wrongly.
+    /// Sensor noise.
     pub noise: NoiseChoice,
     /// The noise as a multiple of `paper`; `None` for what the lots ask for.
     pub times_paper: Option<f64>,
@@ -178,7 +178,7 @@ pub struct SweepRow {
 pub struct CauseRow {
     /// Who drove.
     pub driver: String,
-    /// What was seen wrongly.
+    /// Sensor noise.
     pub noise: NoiseChoice,
     /// Where: the label of a slice.
     pub lots: String,
@@ -206,7 +206,7 @@ pub struct Judged {
 pub struct Summary<'a> {
     /// What was to be driven.
     pub plan: &'a Plan<'a>,
-    /// What came of it.
+    /// Its results.
     pub results: &'a EvaluationResults,
     /// Level by level, slice by slice.
     judged: Vec<Judged>,

@@ -11,7 +11,7 @@ use std::path::Path;
 pub const SCHEMA: u32 = 1;
 const FILE: &str = "table1.json";
 
-/// What a training went through; `table1.json`.
+/// The rounds of a training; `table1.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Table1 {

@@ -1,4 +1,4 @@
-//! Runs added up: counts, metres and the rates made of them (docs/methods.md 8).
+//! Sums over runs, and the rates computed from them (docs/methods.md 8).
 
 use crate::statistics::poisson::Rate;
 use serde::Serialize;
@@ -37,7 +37,7 @@ pub struct Totals {
 }
 
 impl Totals {
-    /// Takes one run into account.
+    /// Adds one run.
     pub fn add(&mut self, report: &EpisodeReport) {
         let metrics = &report.metrics;
         self.runs += 1;

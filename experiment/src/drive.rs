@@ -1,7 +1,7 @@
-//! The one loop: a driver on a batch of trials, in lock-step, frame by frame for whoever observes it.
+//! The one loop: drives a batch of trials in lock-step and passes every frame to an observer.
 //!
 //! Evaluation, tuning, replays, pictures and recordings all drive with [`TrialBatch::drive`]; training drives the same
-//! episodes with a collector at the wheel ([`crate::training`]). What differs is only what an observer does with frames.
+//! episodes with a collector at the wheel ([`crate::training`]). They differ only in what the observer does.
 
 use crate::drivers::NamedDriver;
 use crate::lots::Lot;
@@ -33,7 +33,7 @@ pub struct TrialBatch<'a> {
     pub trials: &'a [Trial<'a>],
     /// Their maps ([`trials::maps`]).
     pub maps: &'a [Arc<Map>],
-    /// What is seen wrongly.
+    /// Sensor noise.
     pub noise: NoiseChoice,
 }
 
@@ -48,18 +48,18 @@ impl TrialBatch<'_> {
         self.driver.fleet(self.episode, cars)
     }
 
-    /// Drives every trial to its end, or until the observer breaks: `None` for what had not ended by then.
+    /// Drives every trial to its end, or until the observer breaks; `None` marks trials that had not ended by then.
     pub fn drive(&self, observer: Observer<'_>) -> Vec<Option<EpisodeReport>> {
         self.drive_from(self.episodes(), observer)
     }
 
-    /// The same from episodes of the caller's.
+    /// Like [`Self::drive`], starting from the given episodes.
     pub fn drive_from(&self, episodes: Vec<Episode>, observer: Observer<'_>) -> Vec<Option<EpisodeReport>> {
         let mut fleet = self.fleet(episodes.len());
         run_lockstep_until(episodes, &mut *fleet, observer)
     }
 
-    /// The key that replays a trial of the batch; `seed`: that of the evaluation.
+    /// The key that replays a trial of the batch. `seed` is that of the evaluation.
     pub fn replay_key(&self, trial: &Trial<'_>, seed: RootSeed, tick: u32) -> ReplayKey {
         let (driver, lot) = (self.driver.spec.clone(), trial.lot.spec());
         ReplayKey { driver, lot, direction: trial.direction, trial: trial.index, noise: self.noise, seed, tick }
@@ -78,9 +78,9 @@ pub fn start(trials: &[Trial<'_>], maps: &[Arc<Map>], episode: &EpisodeSettings,
 /// The trial that a replay key names, ready to be driven again.
 #[derive(Debug, Clone)]
 pub struct Replay {
-    /// Where; the only lot of its name.
+    /// The lot.
     pub lot: Lot,
-    /// Its map, as driven in the direction of the key.
+    /// Its map, in the direction of the key.
     pub map: Arc<Map>,
     key: ReplayKey,
 }

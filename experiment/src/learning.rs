@@ -42,7 +42,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Takes a step into account; the first one forgets what an earlier fit left.
+    /// Adds a step; step 1 starts a new curve.
     pub fn step(&mut self, fit: &FitProgress) {
         if fit.step == 1 {
             self.steps.clear();
@@ -50,8 +50,8 @@ impl Recorder {
         self.steps.push((fit.learning_rate, fit.loss));
     }
 
-    /// Writes `learning.csv` into the folder of the fit. Nothing is written for a fit that was not watched: one that an
-    /// earlier command made.
+    /// Writes `learning.csv` into the folder of the fit. Nothing is written for a fit that was not recorded, such
+    /// as one of an earlier command.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -106,7 +106,7 @@ pub fn read(folder: &Path, name: &str) -> anyhow::Result<Option<LearningCurve>> 
     Ok(Some(round))
 }
 
-/// What is written down about the fit in a folder; `None` if there is none.
+/// The report of the fit in a folder; `None` if there is none.
 ///
 /// # Errors
 /// If the file is not what it should be.

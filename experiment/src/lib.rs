@@ -1,18 +1,18 @@
-//! What an experiment is: its settings, who drives where, in which trials, and the folder that holds the result.
+//! An experiment: its settings, its drivers, lots and trials, the loop that drives them, and its run folder.
 //!
 //! | module | what |
 //! |---|---|
 //! | [`settings`] | preset → file → overrides, into one checked [`settings::Settings`] |
-//! | [`lots`], [`drivers`] | what lots and drivers are called |
-//! | [`trials`] | which obstacles and which noise a trial has |
-//! | [`drive`] | the one loop: a driver on a batch of trials, frame by frame for an observer |
-//! | [`replay_key`] | a short text that stands for exactly one run and a moment in it |
+//! | [`lots`], [`drivers`] | names of lots and drivers, and what they stand for |
+//! | [`trials`] | seeds of trials: their obstacles and their noise |
+//! | [`drive`] | the one loop: a driver on a batch of trials, with an observer of every frame |
+//! | [`replay_key`] | a short text that identifies one run and a tick in it |
 //! | [`training`], [`learning`] | behaviour cloning and DAgger into a run folder |
-//! | [`run_dir`] | the folder of a run and how it is claimed |
+//! | [`run_dir`] | the run folder, its manifest, and how it is claimed |
 //! | [`view_request`] | what the viewer program is asked to record |
-//! | [`progress`] | how long work reports, and how it is cancelled |
+//! | [`progress`] | how long tasks report progress and are cancelled |
 //!
-//! Nothing here prints or knows the command line.
+//! Nothing here prints or parses command lines.
 
 pub mod drive;
 pub mod drivers;

@@ -1,6 +1,6 @@
-//! How long work reports how far it is, and how it is cancelled.
+//! How long tasks report progress and are cancelled.
 
-/// Told how far work is, and asked whether to go on. Shared between threads: implementations use interior mutability.
+/// Receives progress and says whether to go on. Shared between threads: implementations use interior mutability.
 ///
 /// Work is a sequence of tasks, one at a time: `begin`, any number of `at`, `end`. A task that is begun while another
 /// runs ends that one without a result.
@@ -25,7 +25,7 @@ pub struct Elapsed {
     pub seconds: f64,
 }
 
-/// Work was cancelled; what was kept.
+/// The error of cancelled work.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted: {kept}")]
 pub struct Interrupted {

@@ -1,4 +1,4 @@
-//! A short text that stands for exactly one run, and a moment in it.
+//! A short text that identifies one run and a control tick in it.
 //!
 //! ```text
 //! run:runs/mine/bc@lot-b@reverse@3@paper@1@842
@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Obstacles, noise and start follow from these parts ([`crate::trials`]) and the settings: replay with the
-//! `settings.toml` beside the list the key comes from. The parts contain no blank and nothing a shell touches; `@` and
-//! `%` within names are written `%40` and `%25`.
+//! `settings.toml` of the folder that the key comes from. Keys need no quoting in a
+//! shell; `@` and `%` within names are written `%40` and `%25`.
 
 use crate::drivers::DriverSpec;
 use crate::settings::NoiseChoice;
@@ -31,7 +31,7 @@ pub struct ReplayKey {
     pub direction: Direction,
     /// Which trial: with `seed` it decides obstacles and noise.
     pub trial: u32,
-    /// What was seen wrongly.
+    /// Sensor noise.
     pub noise: NoiseChoice,
     /// Seed of the evaluation (`evaluation.seed`).
     pub seed: RootSeed,

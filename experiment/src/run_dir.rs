@@ -1,4 +1,4 @@
-//! The folder of a run: claimed before the first step, never written over by accident.
+//! The folder of a run: claimed before the first step, never overwritten by accident.
 //!
 //! ```text
 //! runs/train-dagger-default-s1/
@@ -14,6 +14,7 @@
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
 use policy::checkpoint::Checkpoint;
+use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io::Write as _;
@@ -65,6 +66,47 @@ pub struct Manifest {
 /// The version of `manifest.toml` that this program writes.
 pub const MANIFEST_SCHEMA: u32 = 1;
 
+/// What a run came to, written last: `finished.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Finished {
+    /// Version of this format: [`FINISHED_SCHEMA`].
+    pub schema: u32,
+    /// What was done.
+    pub outcome: Outcome,
+}
+
+/// The version of `finished.toml` that this program writes.
+pub const FINISHED_SCHEMA: u32 = 1;
+
+/// What was done in a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind", deny_unknown_fields)]
+pub enum Outcome {
+    /// Behaviour cloning, or DAgger.
+    Training {
+        /// Why it ended.
+        stop: Stop,
+        /// Rounds, behaviour cloning included.
+        rounds: usize,
+    },
+    /// Drivers were driven.
+    Evaluation {
+        /// Who, as named on the command line.
+        drivers: Vec<String>,
+    },
+    /// Parameters of planners were searched.
+    Tuning {
+        /// Which.
+        planners: Vec<String>,
+    },
+    /// The paper was reproduced.
+    Reproduction {
+        /// Stages that were done.
+        stages: usize,
+    },
+}
+
 /// The program that makes a run, as its manifest describes it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Build {
@@ -91,16 +133,16 @@ pub struct Place<'a> {
     pub out: Option<&'a Path>,
     /// Whether to delete what an earlier run left there.
     pub overwrite: bool,
-    /// What is done, as part of the folder's name.
+    /// The command, as part of the folder's name.
     pub command: &'a str,
     /// Name of the preset.
     pub preset: &'a str,
-    /// Seed that belongs into the name.
+    /// Seed, as part of the folder's name.
     pub seed: u64,
 }
 
 impl RunDir {
-    /// Claims a folder and writes down what is about to happen.
+    /// Claims a folder and writes settings and manifest into it.
     ///
     /// # Errors
     /// If the folder is taken or cannot be written.
@@ -129,7 +171,7 @@ impl RunDir {
     }
 
     /// Claims the folder of a stage within a run: `None` if it is finished, else as an interrupted one left it or new.
-    /// Its place belongs to the run: what cannot be continued there is made again.
+    /// The folder belongs to the run: what cannot be continued there is started again.
     ///
     /// # Errors
     /// If it was begun with other settings, or cannot be written.
@@ -157,7 +199,7 @@ impl RunDir {
         &self.path
     }
 
-    /// Writes a file beside and renames it, so that it is never there half.
+    /// Writes a file under a temporary name and renames it, so that it never exists half-written.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -169,17 +211,18 @@ impl RunDir {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub fn finish(&self, result: &impl Serialize) -> anyhow::Result<()> {
-        self.write(FINISHED, toml::to_string(result)?.as_bytes())
+    pub fn finish(&self, outcome: Outcome) -> anyhow::Result<()> {
+        let finished = Finished { schema: FINISHED_SCHEMA, outcome };
+        self.write(FINISHED, toml::to_string(&finished)?.as_bytes())
     }
 }
 
-/// Whether a run has come to its end.
+/// Whether a run is finished.
 pub fn is_finished(path: &Path) -> bool {
     path.join(FINISHED).is_file()
 }
 
-/// Writes a file beside and renames it.
+/// Writes a file under a temporary name and renames it.
 ///
 /// # Errors
 /// If it cannot be written.
@@ -227,7 +270,7 @@ pub fn settings_of(spec: &Path) -> anyhow::Result<Settings> {
     Settings::read(&run_of(spec)?.0.join(SETTINGS))
 }
 
-/// The folder of the run, and whether its behaviour cloning is meant.
+/// The folder of the run, and whether its policy after behaviour cloning is meant.
 fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
     let (run, is_bc) = match (spec.file_name(), spec.parent()) {
         (Some(name), Some(run)) if name == "bc" && !spec.is_dir() => (run, true),
@@ -354,7 +397,7 @@ mod tests {
         let run = create(&path, false).unwrap();
         assert!(message(create(&path, false)).contains("--resume"));
         assert_eq!(RunDir::resume(&path).unwrap().1, Settings::preset("smoke").unwrap());
-        run.finish(&std::collections::BTreeMap::from([("stop", "test")])).unwrap();
+        run.finish(Outcome::Reproduction { stages: 8 }).unwrap();
         assert!(message(RunDir::resume(&path)).contains("finished"));
         assert!(message(create(&path, false)).contains("--overwrite"));
         create(&path, true).unwrap();

@@ -1,6 +1,6 @@
-//! All settings in one TOML: every section is the settings type of the crate that it belongs to.
+//! All settings in one TOML file; each section is the settings type of the crate that uses it.
 //!
-//! Layers, lowest priority first: preset, file, `--set`, flags. What comes out is complete and checked, and is
+//! Layers, lowest priority first: preset, file, `--set`, flags. The result is complete and checked, and is
 //! written into the folder of a run before its first step.
 
 mod check;

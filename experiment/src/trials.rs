@@ -1,4 +1,4 @@
-//! Which obstacles and which noise a trial has.
+//! Seeds of trials: which obstacles and which noise each has.
 //!
 //! Everything is a child of a root seed under [`Stream::Episode`], at indices that training and evaluation never share:
 //!

@@ -5,12 +5,13 @@
 //! | [`markdown`], [`summary`], [`table1`], [`failures`], [`tuning`], [`pixel_accuracy`] | tables as Markdown |
 //! | [`plots`] | plots as SVG |
 //! | [`pictures`] | lots, drives, samples and noise as PNG and SVG |
-//! | [`page`] | one HTML page that loads nothing |
+//! | [`page`], [`glossary`] | one HTML page that loads nothing, and what its words mean |
 //! | [`run_report`], [`moments`] | `report.html` of a run, with its worst near-collisions |
 //! | [`reproduction`] | the report of `reproduce` |
 
 mod command_line;
 pub mod failures;
+pub mod glossary;
 pub mod markdown;
 pub mod moments;
 pub mod page;

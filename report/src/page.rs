@@ -1,8 +1,9 @@
-//! A report as Markdown with its figures beside it, and as one HTML page that needs nothing else: no script, no font, no
-//! file and no network.
+//! A report as Markdown with its figures beside it, and as one HTML page that loads nothing: no font, no file, nothing
+//! from the network, which its content security policy forbids. Its only script plays pictures; without it they stand
+//! still.
 //!
 //! ```
-//! use xtask::page::{Image, Page};
+//! use report::page::{Image, Page};
 //! let mut page = Page::new("Near-collisions");
 //! page.section("Rates", "| driver | per 100 m |\n|---|---|\n| expert | 0.00 |");
 //! page.figure("rates", "Rates with intervals of 95 %.", Image::Svg("<svg viewBox='0 0 1 1'/>".to_owned()));
@@ -10,14 +11,19 @@
 //! assert!(page.to_markdown().contains("](figures/rates.svg)"));
 //! ```
 
+use crate::markdown::escaped as escaped_markdown;
 use anyhow::Context as _;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use experiment::run_dir::write_whole;
 use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd, html};
+use sha2::{Digest as _, Sha256};
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// What made the page.
+const PROGRAM: &str = concat!("lotpilot ", env!("CARGO_PKG_VERSION"));
 /// Folder of the figures, beside the Markdown.
 const FIGURES: &str = "figures";
 
@@ -35,6 +41,55 @@ pub enum Image {
     Svg(String),
     /// The bytes of a PNG file.
     Png(Vec<u8>),
+    /// Pictures to be played.
+    Player(Player),
+}
+
+/// Pictures over one background, with a button and a slider; a still where no script runs.
+#[derive(Debug, Clone)]
+pub struct Player {
+    /// Width and height.
+    pub size_px: [f32; 2],
+    /// SVG elements under every picture.
+    pub background: String,
+    /// What is written beside the slider, and SVG elements.
+    pub frames: Vec<(String, String)>,
+    /// The picture that is shown first, and where no script runs.
+    pub still: usize,
+    /// Pictures per second.
+    pub rate_per_s: f32,
+}
+
+impl Player {
+    fn svg(&self, frames: &str) -> String {
+        let [width, height] = self.size_px;
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\">\n{}{frames}</svg>\n",
+            self.background
+        )
+    }
+
+    /// The still as a file.
+    fn to_svg(&self) -> String {
+        self.svg(self.frames.get(self.still).map_or("", |(_, elements)| elements.as_str()))
+    }
+
+    fn to_html(&self) -> String {
+        let mut frames = String::new();
+        for (index, (label, elements)) in self.frames.iter().enumerate() {
+            let display = if index == self.still { "" } else { " display=\"none\"" };
+            let _ = write!(frames, "<g class=\"frame\" data-label=\"{}\"{display}>\n{elements}</g>\n", escaped(label));
+        }
+        format!(
+            "<div class=\"player\" data-period-ms=\"{:.0}\">{}<div class=\"controls\" hidden>\
+             <button type=\"button\">Play</button>\
+             <input type=\"range\" min=\"0\" max=\"{}\" value=\"{}\" aria-label=\"time\"><output></output></div></div>",
+            1000.0 / self.rate_per_s,
+            self.svg(&frames),
+            self.frames.len().saturating_sub(1),
+            self.still
+        )
+    }
 }
 
 #[derive(Debug, Clone)]
@@ -83,7 +138,7 @@ impl Page {
             if let Part::Figure { name, image, .. } = part {
                 std::fs::create_dir_all(&figures)
                     .with_context(|| format!("{}: cannot be created; is the folder writable?", figures.display()))?;
-                write_whole(&figures.join(image.file(name)), image.bytes())?;
+                write_whole(&figures.join(image.file(name)), &image.bytes())?;
             }
         }
         write_whole(&folder.join(format!("{stem}.md")), self.to_markdown().as_bytes())?;
@@ -100,7 +155,7 @@ impl Page {
         std::fs::create_dir_all(&into).with_context(|| format!("{}: cannot be created", into.display()))?;
         for part in &self.parts {
             if let Part::Figure { name, image, .. } = part {
-                write_whole(&into.join(image.file(name)), image.bytes())?;
+                write_whole(&into.join(image.file(name)), &image.bytes())?;
             }
         }
         write_whole(path, self.markdown_with(figures).as_bytes())
@@ -112,7 +167,7 @@ impl Page {
     }
 
     fn markdown_with(&self, figures: &str) -> String {
-        let mut text = format!("# {}\n", self.title);
+        let mut text = format!("# {}\n", escaped_markdown(&self.title));
         for part in &self.parts {
             let _ = match part {
                 Part::Heading(title) => write!(text, "\n## {title}\n"),
@@ -127,7 +182,7 @@ impl Page {
 
     /// One page with everything in it.
     pub fn to_html(&self) -> String {
-        let mut body = format!("<h1>{}</h1>\n", escaped(&self.title));
+        let mut body = format!("<p class=\"program\">{PROGRAM}</p>\n<h1>{}</h1>\n", escaped(&self.title));
         let headings = self.parts.iter().filter(|part| matches!(part, Part::Heading(_))).count();
         if headings > 2 {
             body += &self.contents();
@@ -145,10 +200,19 @@ impl Page {
             };
         }
         let title = escaped(&self.title);
+        let plays = self.parts.iter().any(|part| matches!(part, Part::Figure { image: Image::Player(_), .. }));
+        let (policy, script) = if plays {
+            let hash = BASE64_STANDARD.encode(Sha256::digest(SCRIPT));
+            (format!("; script-src 'sha256-{hash}'"), format!("<script>{SCRIPT}</script>\n"))
+        } else {
+            (String::new(), String::new())
+        };
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
-             <style>{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
+             style-src 'unsafe-inline'{policy}\">\n<meta name=\"generator\" content=\"{PROGRAM}\">\n<title>{title} – {PROGRAM}</title>\n\
+             <style>{STYLE}</style>\n</head>\n<body>\n{body}{script}</body>\n</html>\n"
         )
     }
 
@@ -167,16 +231,17 @@ impl Image {
     /// The file of a picture of this name.
     fn file(&self, name: &str) -> String {
         let ending = match self {
-            Self::Svg(_) => "svg",
+            Self::Svg(_) | Self::Player(_) => "svg",
             Self::Png(_) => "png",
         };
         format!("{name}.{ending}")
     }
 
-    fn bytes(&self) -> &[u8] {
+    fn bytes(&self) -> Cow<'_, [u8]> {
         match self {
-            Self::Svg(text) => text.as_bytes(),
-            Self::Png(bytes) => bytes,
+            Self::Svg(text) => text.as_bytes().into(),
+            Self::Png(bytes) => bytes.into(),
+            Self::Player(player) => player.to_svg().into_bytes().into(),
         }
     }
 
@@ -187,15 +252,63 @@ impl Image {
             Self::Png(bytes) => {
                 format!("<img alt=\"\" src=\"data:image/png;base64,{}\">", BASE64_STANDARD.encode(bytes))
             }
+            Self::Player(player) => player.to_html(),
         }
     }
 }
 
-/// Markdown as HTML that loads nothing: tables in boxes of their own, which scroll on narrow screens.
+/// Markdown as HTML that loads nothing and leads nowhere else: links go to places of the page itself, of HTML there are
+/// only anchors. Tables are in boxes of their own; their cells know their column, for narrow screens.
 fn html_of(markdown: &str) -> String {
+    let (mut columns, mut column, mut in_head) = (Vec::<String>::new(), 0, false);
+    let mut is_link_kept = Vec::new();
     let parser = Parser::new_ext(markdown, Options::ENABLE_TABLES).flat_map(|event| match event {
-        start @ Event::Start(Tag::Table(_)) => vec![Event::Html(CowStr::Borrowed("<div class=\"scroll\">")), start],
-        end @ Event::End(TagEnd::Table) => vec![end, Event::Html(CowStr::Borrowed("</div>\n"))],
+        Event::Start(Tag::Table(_)) => {
+            columns.clear();
+            vec![Event::Html(CowStr::Borrowed("<div class=\"scroll\">")), event]
+        }
+        Event::End(TagEnd::Table) => vec![event, Event::Html(CowStr::Borrowed("</div>\n"))],
+        Event::Start(Tag::TableHead) => {
+            in_head = true;
+            vec![event]
+        }
+        Event::End(TagEnd::TableHead) => {
+            in_head = false;
+            vec![event]
+        }
+        Event::Start(Tag::TableRow) => {
+            column = 0;
+            vec![event]
+        }
+        Event::Start(Tag::TableCell) if in_head => {
+            columns.push(String::new());
+            vec![event]
+        }
+        Event::Start(Tag::TableCell) => {
+            let label = columns.get(column).map_or("", String::as_str);
+            column += 1;
+            vec![Event::Html(format!("<td data-label=\"{}\">", escaped(label)).into())]
+        }
+        Event::End(TagEnd::TableCell) if !in_head => vec![Event::Html(CowStr::Borrowed("</td>"))],
+        Event::Text(ref text) => {
+            if let Some(label) = columns.last_mut().filter(|_| in_head) {
+                *label += text;
+            }
+            vec![event]
+        }
+        Event::Start(Tag::Link { ref dest_url, .. }) => {
+            let is_kept = dest_url.starts_with('#');
+            is_link_kept.push(is_kept);
+            if is_kept { vec![event] } else { Vec::new() }
+        }
+        Event::End(TagEnd::Link) => {
+            if is_link_kept.pop() == Some(true) {
+                vec![event]
+            } else {
+                Vec::new()
+            }
+        }
+        Event::Html(ref text) | Event::InlineHtml(ref text) if is_anchor(text) => vec![event],
         Event::Html(text) | Event::InlineHtml(text) => vec![Event::Text(text)],
         Event::Start(Tag::Image { .. }) | Event::End(TagEnd::Image) => Vec::new(),
         other => vec![other],
@@ -205,39 +318,94 @@ fn html_of(markdown: &str) -> String {
     out
 }
 
+/// Whether HTML is the beginning or the end of an anchor as a glossary has it, and nothing else.
+fn is_anchor(html: &str) -> bool {
+    let name = html.strip_prefix("<a id=\"").and_then(|rest| rest.strip_suffix("\">"));
+    html == "</a>" || name.is_some_and(|name| name.chars().all(|c| c.is_ascii_lowercase() || c == '-'))
+}
+
 fn escaped(text: &str) -> String {
     let mut out = String::new();
     html::push_html(&mut out, std::iter::once(Event::Text(text.into())));
     out
 }
 
-/// Screens from 320 px, and paper.
+/// Button and slider of every player.
+const SCRIPT: &str = "
+for (const player of document.querySelectorAll('.player')) {
+  const frames = player.querySelectorAll('.frame');
+  const controls = player.querySelector('.controls');
+  const [button, slider, label] = controls.children;
+  let timer = null;
+  const show = (index) => {
+    frames.forEach((frame, i) => frame.setAttribute('display', i === index ? 'inline' : 'none'));
+    slider.value = index;
+    label.value = frames[index].dataset.label;
+  };
+  const stop = () => { clearInterval(timer); timer = null; button.textContent = 'Play'; };
+  const step = () => {
+    const next = Number(slider.value) + 1;
+    if (next < frames.length) { show(next); } else { stop(); }
+  };
+  button.addEventListener('click', () => {
+    if (timer !== null) { stop(); return; }
+    if (Number(slider.value) + 1 >= frames.length) { show(0); }
+    timer = setInterval(step, Number(player.dataset.periodMs));
+    button.textContent = 'Pause';
+  });
+  slider.addEventListener('input', () => { stop(); show(Number(slider.value)); });
+  controls.hidden = false;
+  show(Number(slider.value));
+}
+";
+
+/// Screens from 320 px, light and dark, and paper. Pictures are on white cards in the dark, too: their colours mean things.
 const STYLE: &str = "
-:root { color-scheme: light; }
-body { max-width: 62rem; margin: 0 auto; padding: 1.5rem 1rem 4rem; background: #fff; color: #1a1a1a;
+:root { color-scheme: light dark; --ground: #fff; --ink: #1a1a1a; --soft: #444; --rule: #ccc; --faint: #ddd;
+  --band: #f6f6f6; --code: #f2f2f2; --link: #0b57a4; }
+@media (prefers-color-scheme: dark) { :root { --ground: #16181c; --ink: #e6e6e6; --soft: #b4b8be; --rule: #4a4f57;
+  --faint: #34383e; --band: #1d2025; --code: #262a30; --link: #86b9f2; } }
+body { max-width: 62rem; margin: 0 auto; padding: 1.5rem 1rem 4rem; background: var(--ground); color: var(--ink);
   font: 16px/1.5 system-ui, -apple-system, 'Segoe UI', 'Noto Sans', sans-serif; overflow-wrap: break-word; }
-h1 { font-size: 1.7rem; line-height: 1.2; }
-h2 { font-size: 1.3rem; margin-top: 2.5rem; padding-bottom: .2rem; border-bottom: 1px solid #ccc; }
+a { color: var(--link); }
+a[title] { color: inherit; text-decoration: underline dotted; text-underline-offset: .2em; }
+.program { margin: 0; color: var(--soft); font-size: .9rem; }
+h1 { font-size: 1.7rem; line-height: 1.2; margin-top: .2rem; }
+h2 { font-size: 1.3rem; margin-top: 2.5rem; padding-bottom: .2rem; border-bottom: 1px solid var(--rule); }
 h3 { font-size: 1.05rem; margin-top: 1.8rem; }
 nav ul { padding-left: 1.2rem; columns: 18rem; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-size: .875rem; font-variant-numeric: tabular-nums; margin: .5rem 0 1rem; }
-th, td { padding: .25rem .6rem; border-bottom: 1px solid #ddd; text-align: left; vertical-align: top;
+th, td { padding: .25rem .6rem; border-bottom: 1px solid var(--faint); text-align: left; vertical-align: top;
   white-space: nowrap; overflow-wrap: normal; }
-th { border-bottom: 2px solid #888; }
-td:last-child { white-space: normal; min-width: 9rem; }
-tbody tr:nth-child(even) { background: #f6f6f6; }
+th { border-bottom: 2px solid var(--rule); }
+td:last-child { white-space: normal; }
+tbody tr:nth-child(even) { background: var(--band); }
 figure { margin: 1.5rem 0; }
-figure svg, figure img { display: block; width: 100%; min-width: 34rem; max-width: 46rem; height: auto; }
-figcaption { font-size: .9rem; color: #444; }
-code { font: .9em ui-monospace, 'Noto Sans Mono', monospace; background: #f2f2f2; padding: .05em .25em; }
-pre { overflow-x: auto; background: #f2f2f2; padding: .6rem; }
+figure svg, figure img { display: block; width: 100%; max-width: 46rem; height: auto; background: #fff;
+  border-radius: .4rem; }
+figure .player svg { max-width: 30rem; }
+.controls { display: flex; gap: .6rem; align-items: center; max-width: 30rem; margin-top: .4rem; }
+.controls[hidden] { display: none; }
+.controls button { font: inherit; min-width: 5rem; padding: .2rem .6rem; }
+.controls input { flex: 1; min-width: 0; }
+.controls output { min-width: 4rem; text-align: right; font-variant-numeric: tabular-nums; }
+figcaption { font-size: .9rem; color: var(--soft); }
+code { font: .9em ui-monospace, 'Noto Sans Mono', monospace; background: var(--code); padding: .05em .25em; }
+pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--code); padding: .6rem; }
 pre code { padding: 0; }
-@media (max-width: 40rem) { body { font-size: 15px; } figure svg { min-width: 28rem; }
-  figure img { min-width: 0; } }
-@media print { body { max-width: none; padding: 0; font-size: 10pt; } nav { display: none; }
+@media screen and (max-width: 44rem) { body { font-size: 15px; }
+  table, tbody, tr, td { display: block; } thead { display: none; } table { margin: .5rem 0; }
+  tr { padding: .35rem .5rem; border-bottom: 1px solid var(--rule); }
+  td, td:last-child { display: flex; justify-content: space-between; gap: 1rem; padding: 0; border: 0;
+    white-space: normal; text-align: right; overflow-wrap: anywhere; }
+  td::before { content: attr(data-label); color: var(--soft); text-align: left; overflow-wrap: normal; }
+  td:first-child { font-weight: 600; justify-content: start; text-align: left; }
+  td:first-child::before, td:empty { display: none; } }
+@media print { :root { color-scheme: light; } body { max-width: none; padding: 0; font-size: 10pt; background: #fff;
+  color: #000; } nav, .controls { display: none; }
   .scroll { overflow: visible; } table { font-size: 7.5pt; } th, td { white-space: normal; padding: .15rem .3rem; }
-  figure svg, figure img { min-width: 0; width: auto; max-width: 100%; max-height: 9cm; } figure img { max-height: 13cm; }
+  figure svg, figure img { width: auto; max-width: 100%; max-height: 9cm; } figure .player svg { max-height: 13cm; }
   pre { font-size: 6.5pt; columns: 2; } figure, tr { break-inside: avoid; } h2, h3 { break-after: avoid; } }
 ";
 
@@ -265,9 +433,14 @@ mod tests {
     #[test]
     fn the_page_loads_nothing() {
         let html = page().to_html();
-        for (found, why) in
-            [("<script", "scripts"), ("<link", "files"), ("@import", "styles"), ("url(", "styles"), ("<?xml", "XML")]
-        {
+        for (found, why) in [
+            ("<script", "scripts where nothing plays"),
+            ("<link", "files"),
+            ("@import", "styles"),
+            ("url(", "styles"),
+            ("<?xml", "XML"),
+            ("<a href=\"http", "links"),
+        ] {
             assert!(!html.contains(found), "no {why}: {html}");
         }
         // What is between < and > of a tag; text has its < escaped.
@@ -277,6 +450,56 @@ mod tests {
         assert!(html.contains("Drivers &lt;&amp;&gt; lots") && html.contains("a&lt;b"), "{html}");
         assert!(html.contains("<div class=\"scroll\"><table>") && html.contains("</table>\n</div>"), "{html}");
         assert!(html.contains("name=\"viewport\"") && html.contains("@media print"), "{html}");
+        assert!(html.contains("default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"), "{html}");
+        assert!(html.contains(">a link<") || html.contains(", a link"), "the words of a link stay: {html}");
+        let program = format!("lotpilot {}", env!("CARGO_PKG_VERSION"));
+        assert!(html.contains(&format!("<title>Drivers &lt;&amp;&gt; lots – {program}</title>")), "{html}");
+    }
+
+    #[test]
+    fn cells_know_their_column_on_narrow_screens() {
+        let html = page().to_html();
+        assert!(
+            html.contains("<tr><td data-label=\"driver\">a&lt;b</td><td data-label=\"rate\">1</td></tr>"),
+            "{html}"
+        );
+        assert!(html.contains("prefers-color-scheme: dark"), "{html}");
+    }
+
+    fn player() -> Player {
+        let frame = |i: usize| (format!("{i}.0 s"), format!("<circle cx=\"{i}\" cy=\"1\" r=\"1\"/>\n"));
+        Player {
+            size_px: [9.0, 4.0],
+            background: "<rect width=\"9\" height=\"4\"/>\n".to_owned(),
+            frames: (0..5).map(frame).collect(),
+            still: 3,
+            rate_per_s: 4.0,
+        }
+    }
+
+    #[test]
+    fn a_player_stands_still_without_its_script_and_allows_no_other() {
+        let mut page = Page::new("x");
+        page.figure("moment", "A moment.", Image::Player(player()));
+        let html = page.to_html();
+        let hidden: Vec<bool> =
+            html.split("<g class=\"frame\"").skip(1).map(|frame| frame.contains("display=\"none\"")).collect();
+        assert_eq!(hidden, [true, true, true, false, true], "only the still is shown");
+        assert!(html.contains("class=\"controls\" hidden") && html.contains("max=\"4\" value=\"3\""), "{html}");
+        assert!(html.contains("data-period-ms=\"250\""), "{html}");
+        let script = html.split("<script>").nth(1).unwrap().split("</script>").next().unwrap();
+        let hash = BASE64_STANDARD.encode(Sha256::digest(script));
+        assert!(html.contains(&format!("script-src 'sha256-{hash}'\">")), "{html}");
+        assert!(!script.contains("fetch") && !script.contains("http") && !script.contains("import"), "{script}");
+    }
+
+    #[test]
+    fn in_markdown_a_player_is_its_still() {
+        let still = player().to_svg();
+        let document = roxmltree::Document::parse(&still).unwrap();
+        let circles: Vec<_> = document.descendants().filter(|node| node.has_tag_name("circle")).collect();
+        assert_eq!(circles.len(), 1);
+        assert_eq!(circles[0].attribute("cx"), Some("3"));
     }
 
     #[test]
@@ -285,7 +508,7 @@ mod tests {
         std::fs::create_dir_all(&folder).unwrap();
         page().write(&folder, "report").unwrap();
         let markdown = std::fs::read_to_string(folder.join("report.md")).unwrap();
-        assert!(markdown.starts_with("# Drivers <&> lots\n\nAll of *it*.\n\n## Rates\n"), "{markdown}");
+        assert!(markdown.starts_with("# Drivers \\<\\&> lots\n\nAll of *it*.\n\n## Rates\n"), "{markdown}");
         assert!(markdown.contains("\n![bars](figures/bars.svg)\n\nBars **with** intervals.\n"), "{markdown}");
         assert!(folder.join("figures/bars.svg").is_file() && folder.join("figures/view.png").is_file());
         assert_eq!(std::fs::read_to_string(folder.join("report.html")).unwrap(), page().to_html());

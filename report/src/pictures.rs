@@ -8,9 +8,12 @@
 //! | [`contact_sheet`] | many lots on one page |
 //! | [`grids`] | grids and views, predictions and labels |
 //! | [`samples`], [`noise`] | pages of them |
+//! | [`animation`], [`encode`] | drives that move, as GIF, APNG and in reports |
 
+pub mod animation;
 pub mod contact_sheet;
 pub mod drawing;
+pub mod encode;
 pub mod grids;
 pub mod lot;
 pub mod noise;

@@ -2,7 +2,7 @@
 //!
 //! | function | what it shows |
 //! |---|---|
-//! | [`learning`] | training and validation loss over optimiser steps, round after round |
+//! | [`learning`] | validation error and losses over optimiser steps, round after round |
 //! | [`eta`] | η̂ per iteration beside the paper's |
 //! | [`rates`] | near-collisions per 100 m with intervals, a row per driver |
 //! | [`rates_against_noise`] | the same over the noise level |

@@ -115,7 +115,7 @@ pub fn write_docs(recipe: &Recipe, run: &Path, to: &Path) -> anyhow::Result<()> 
 /// What a reader must know before quoting a figure.
 const CAUTIONS: &str = "\
 Before quoting a figure: the widths of the three reference lots were chosen so that the expert meets the paper's safe \
-ratios ([methods](methods.md#11-the-lots)). The expert's points lie at half of the open way, which is our reading of the \
+ratios ([methods](methods.md#11-lots)). The expert's points lie at half of the open way, which is our reading of the \
 paper ([paper](paper.md)); it raises η̂ at an unchanged τ, so that η̂ is not comparable with the paper's. Forward and reverse \
 drives of a trial share their obstacles. One training is one sample: intervals say how sure the rate of *this* network is, \
 not what another training would give.";

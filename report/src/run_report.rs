@@ -1,10 +1,12 @@
-//! `report.html` of a run: one page that loads nothing, made from what the run left on disk. Beside it the same as
-//! `report.md`, and its pictures in `figures/`.
+//! `report.html` of a run: one page that loads nothing, made from the files of the run. Next to it the same as
+//! `report.md`, with its pictures in `figures/`.
 //!
-//! A file that cannot be read or written is an error. A near-collision that can no longer be driven again (its network
-//! moved away) is not: the page says so in place of the picture.
+//! A file that cannot be read or written is an error. A near-collision that cannot be replayed (its network has moved)
+//! is not: the page says so in place of the picture.
 
 use crate::command_line::command_line;
+use crate::glossary;
+use crate::markdown::escaped;
 use crate::moments;
 use crate::page::{Image, Page};
 use crate::plots::{self, Distribution, EtaSeries, NoisePoint, NoiseSeries, RateRow};
@@ -100,6 +102,31 @@ impl Evaluation {
     fn pooled(&self) -> &str {
         self.tables.rows.last().map_or("all", |row| row.lots.as_str())
     }
+
+    /// Rows of both directions at a noise level.
+    fn rows(&self, noise: NoiseChoice) -> impl Iterator<Item = &Row> {
+        self.tables.rows.iter().filter(move |row| row.noise == noise && row.direction == "both")
+    }
+
+    /// The same of the pooled lots.
+    fn pooled_rows(&self, noise: NoiseChoice) -> impl Iterator<Item = &Row> {
+        self.rows(noise).filter(|row| row.lots == self.pooled())
+    }
+
+    /// In the order of the tables.
+    fn drivers(&self) -> Vec<&str> {
+        first_seen(self.tables.rows.iter().map(|row| row.driver.as_str()))
+    }
+
+    /// In the order of the tables.
+    fn levels(&self) -> Vec<NoiseChoice> {
+        self.tables.rows.iter().fold(Vec::new(), |mut levels, row| {
+            if !levels.contains(&row.noise) {
+                levels.push(row.noise);
+            }
+            levels
+        })
+    }
 }
 
 fn text(path: &Path) -> anyhow::Result<String> {
@@ -122,7 +149,7 @@ fn page(folder: &Path, progress: &dyn Progress) -> anyhow::Result<Page> {
     let sources = Sources::read(folder)?;
     let name = folder.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into());
     let mut page = Page::new(name);
-    page.text(overview(&sources));
+    overview(&mut page, &sources);
     if let Some(training) = &sources.training {
         add_training(&mut page, &sources.settings, training);
         progress.at(0.1, &mut |_| "calibration".to_owned());
@@ -134,48 +161,96 @@ fn page(folder: &Path, progress: &dyn Progress) -> anyhow::Result<Page> {
         add_evaluation(&mut page, evaluation);
         add_moments(&mut page, folder, &sources.settings, evaluation, progress);
     }
+    glossary::add(&mut page);
     page.section("Configuration", configuration(&sources));
     Ok(page)
 }
 
-fn overview(sources: &Sources) -> String {
-    let manifest = &sources.manifest;
-    let dirty = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };
-    let revision = manifest.git_revision.as_deref().unwrap_or("unknown");
-    let mut text = format!("Made by\n\n```\n{}\n```\n\nfrom revision `{revision}`{dirty}.", command_line(manifest));
+fn overview(page: &mut Page, sources: &Sources) {
     if let Some(evaluation) = &sources.evaluation {
-        text += "\n\n| driver | noise | lots | near-collisions | per 100 m [95 %] | safe ratio |\n|---|---|---|---|---|---|\n";
-        for row in
-            evaluation.tables.rows.iter().filter(|row| row.direction == "both" && row.lots == evaluation.pooled())
-        {
-            let [lower, upper] = interval(row);
-            let _ = writeln!(
-                text,
-                "| {} | {} | {} | {} in {:.0} m | {:.2} [{lower:.2}, {upper:.2}] | {:.3} |",
-                row.driver, row.noise, row.lots, row.near_collisions, row.reference_m, row.per_100m, row.safe_ratio
+        let drivers = evaluation.drivers();
+        if let Some(&noise) = evaluation.levels().first() {
+            let rows = pooled_rates(evaluation, noise, &drivers);
+            let title = format!("Near-collisions, noise {noise}, lots: {}", evaluation.pooled());
+            let caption = format!(
+                "{} per 100 m of route, with 95 % intervals.",
+                glossary::NEAR_COLLISION.link("Near-collisions")
             );
+            page.figure("headline", caption, Image::Svg(plots::rates(&title, &rows)));
         }
+        for noise in evaluation.levels() {
+            page.text(headline(evaluation, noise));
+        }
+    } else if let Some(training) = &sources.training {
+        page.figure("headline", LEARNING_CAPTION, Image::Svg(plots::learning(&training.rounds)));
+    }
+    let manifest = &sources.manifest;
+    let dirty = if manifest.git_dirty == Some(true) { ", with uncommitted changes" } else { "" };
+    let revision = manifest
+        .git_revision
+        .as_ref()
+        .map_or_else(String::new, |revision| format!(", at revision `{revision}`{dirty}"));
+    page.text(format!("Made with{revision}:\n\n```\n{}\n```", command_line(manifest)));
+}
+
+/// Every driver on all lots together at one noise level.
+fn headline(evaluation: &Evaluation, noise: NoiseChoice) -> String {
+    let route_m = evaluation.pooled_rows(noise).next().map_or(0.0, |row| row.reference_m);
+    let mut text = format!(
+        "Lots: {}; {}; {route_m:.0} m of route per driver.\n\n| driver | {} | per 100 m [95 %] | {} | {} | {} |\n\
+         |---|---|---|---|---|---|\n",
+        escaped(evaluation.pooled()),
+        glossary::NOISE.link(&format!("noise {noise}")),
+        glossary::NEAR_COLLISION.link("near-collisions"),
+        glossary::CONTACT.link("contacts"),
+        glossary::LEAST_CLEARANCE.link("least clearance, m"),
+        glossary::SAFE_RATIO.link("safe ratio"),
+    );
+    for row in evaluation.pooled_rows(noise) {
+        let [lower, upper] = interval(row);
+        let clearance = row.clearance_min_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2}"));
+        let _ = writeln!(
+            text,
+            "| {} | {} | {:.2} [{lower:.2}, {upper:.2}] | {} | {clearance} | {:.2} |",
+            escaped(&row.driver),
+            row.near_collisions,
+            row.per_100m,
+            row.contacts,
+            row.safe_ratio
+        );
     }
     text
 }
 
+const LEARNING_CAPTION: &str = "Top: the error of the look-ahead point on held-back samples, in metres. This is what \
+    counts. Below: the losses, in nats. Training and validation loss are different quantities where β > 0, and the \
+    validation loss may rise while the policy gets better: β-NLL pays for predicted variance as well as for errors. Each \
+    round has more data than the one before, so curves of different rounds do not compare.";
+
 fn add_training(page: &mut Page, settings: &Settings, training: &Training) {
-    page.section("Training", training.table.as_str());
+    page.section(
+        "Training",
+        format!(
+            "One column per round: {}, then the iterations of {}. {} is the share of ticks in which the network drove, {} \
+             its distance from the expert. The expert drives where the discrepancy exceeds {} or the {} is too large.",
+            glossary::BC.link("BC"),
+            glossary::DAGGER.link("DAgger"),
+            glossary::ETA_HAT.link("η̂"),
+            glossary::DISCREPANCY.link("τ̂"),
+            glossary::TAU.link("τ"),
+            glossary::DOUBT.link("doubt"),
+        ),
+    );
+    page.text(training.table.as_str());
     let rows = &training.table1.rows;
     let ours: Vec<(u32, f64)> = rows.iter().filter_map(|row| Some((row.round, row.eta_hat?))).collect();
     if !ours.is_empty() {
         let paper = (0..).zip(&training.table1.paper.eta_hat).filter_map(|(i, eta)| Some((i, (*eta)?)));
         let series = EtaSeries { name: "this run".to_owned(), points: ours };
         let svg = plots::eta(&[series], &paper.collect::<Vec<_>>(), settings.dagger.eta);
-        page.figure(
-            "eta",
-            "How much the network drove while data were collected, beside the paper's table.",
-            Image::Svg(svg),
-        );
+        page.figure("eta", "How much the network drove in each iteration, here and in the paper.", Image::Svg(svg));
     }
-    let caption = "Loss over optimiser steps, round after round; training as means of stretches of steps. Training and \
-                   validation loss are different quantities where β > 0, and different rounds have different data.";
-    page.figure("learning", caption, Image::Svg(plots::learning(&training.rounds)));
+    page.figure("learning", LEARNING_CAPTION, Image::Svg(plots::learning(&training.rounds)));
 }
 
 /// The network of the run on all samples that were held back.
@@ -195,13 +270,13 @@ fn held_back_calibration(folder: &Path, settings: &Settings) -> anyhow::Result<O
 }
 
 fn calibration_caption(axes: &[AxisCalibration]) -> String {
-    let mut text = "Whether the network knows how wrong it is, on held-back samples: left the share of the labels within \
-                    1σ and 2σ of its answer (dashed: a normal distribution), right its error in ten groups of equal size \
-                    from sure to unsure. Above the dashed line it is too sure of itself."
+    let mut text = "Whether the network knows how wrong it is, on held-back samples. Left: the share of labels within 1σ and \
+                    2σ of its answer (dashed: normal distribution). Right: its error against the σ it predicted, in ten \
+                    groups of equal size. Above the dashed line the network is overconfident."
         .to_owned();
     for axis in axes {
         let [one, two] = axis.coverage.map(|share| 100.0 * share);
-        let _ = write!(text, " {}: {one:.0} % and {two:.0} % of {} samples.", axis.name, axis.samples);
+        let _ = write!(text, " {}: {one:.0} % and {two:.0} % ({} samples).", axis.name, axis.samples);
     }
     text
 }
@@ -217,37 +292,53 @@ fn interval(row: &Row) -> [f64; 2] {
 
 fn add_evaluation(page: &mut Page, evaluation: &Evaluation) {
     page.section("Evaluation", "");
-    let drivers = first_seen(evaluation.tables.rows.iter().map(|row| row.driver.as_str()));
-    let levels: Vec<NoiseChoice> = evaluation.tables.rows.iter().fold(Vec::new(), |mut levels, row| {
-        if !levels.contains(&row.noise) {
-            levels.push(row.noise);
-        }
-        levels
-    });
+    let (drivers, levels) = (evaluation.drivers(), evaluation.levels());
     for (index, &noise) in levels.iter().enumerate() {
-        let rows = rate_rows(evaluation, noise, &drivers);
+        let by_lot = rates_by_lot(evaluation, noise, &drivers);
+        let is_by_lot = by_lot.len() <= ROWS_MAX;
+        if index == 0 && (!is_by_lot || by_lot.len() == drivers.len()) {
+            continue; // the same is at the top of the page
+        }
+        let rows = if is_by_lot { by_lot } else { pooled_rates(evaluation, noise, &drivers) };
         let title = format!("Near-collisions, noise {noise}");
-        let caption = "Dots: near-collisions per 100 m of route; whiskers: 95 % intervals, as in the tables.";
+        let caption = "Dots: near-collisions per 100 m of route. Whiskers: 95 % intervals, as in the tables.";
         page.figure(format!("rates-{index}"), caption, Image::Svg(plots::rates(&title, &rows)));
     }
     if levels.len() > 1 {
         let series = noise_series(evaluation, &drivers);
-        let title = format!("Near-collisions against noise, {}", evaluation.pooled());
+        let title = format!("Near-collisions against noise, lots: {}", evaluation.pooled());
         let svg = plots::rates_against_noise(&title, &series);
-        page.figure("noise", "Near-collisions over the noise level; whiskers: exact 95 % intervals.", Image::Svg(svg));
+        page.figure("noise", "Near-collisions at each noise level. Whiskers: exact 95 % intervals.", Image::Svg(svg));
     }
     for (index, &noise) in levels.iter().enumerate() {
-        let row = |(group, driver): (usize, &&str)| Distribution {
-            name: (*driver).to_owned(),
-            values: safe_ratios(evaluation, noise, driver),
-            group,
-        };
-        let rows: Vec<Distribution> = drivers.iter().enumerate().map(row).collect();
-        let title = format!("Safe ratio of every run, noise {noise}");
-        let caption = "Dots: runs (lot, direction, trial); box: quartiles; bar: median.";
-        page.figure(format!("safe-ratio-{index}"), caption, Image::Svg(plots::safe_ratios(&title, &rows)));
+        for (place, lots) in single_lots(evaluation).into_iter().enumerate() {
+            let row = |(group, driver): (usize, &&str)| Distribution {
+                name: (*driver).to_owned(),
+                values: safe_ratios(evaluation, noise, driver, lots),
+                group,
+            };
+            let rows: Vec<Distribution> = drivers.iter().enumerate().map(row).collect();
+            let title = format!("Safe ratio on {lots}, noise {noise}");
+            let caption = "One dot per run. Box: quartiles; bar: median.";
+            let name = format!("safe-ratio-{index}-{place}");
+            page.figure(name, caption, Image::Svg(plots::safe_ratios(&title, &rows)));
+        }
     }
     page.section("Tables", evaluation.text.as_str());
+}
+
+/// Lots, or generated lots of one kind, that have rows of their own: safe ratios of different lots do not compare,
+/// because lanes differ in width.
+fn single_lots(evaluation: &Evaluation) -> Vec<&str> {
+    let is_of = |lots: &str| evaluation.runs.iter().any(|run| is_in(&run.driven.lot, lots));
+    first_seen(evaluation.tables.rows.iter().map(|row| row.lots.as_str()).filter(|lots| is_of(lots)))
+}
+
+/// Whether a lot belongs to a row: `lot-b`, or `test-hard (8 lots)` for `test-hard-3`.
+fn is_in(lot: &str, lots: &str) -> bool {
+    let kind = lots.rsplit_once(" (").map_or(lots, |(kind, _)| kind);
+    let index = lot.strip_prefix(kind).and_then(|rest| rest.strip_prefix('-'));
+    lot == lots || index.is_some_and(|index| index.parse::<u32>().is_ok())
 }
 
 fn first_seen<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
@@ -259,20 +350,21 @@ fn first_seen<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     })
 }
 
-/// Lot by lot, driver by driver; only the pooled lots where that would be too many.
-fn rate_rows(evaluation: &Evaluation, noise: NoiseChoice, drivers: &[&str]) -> Vec<RateRow> {
-    let rows = || evaluation.tables.rows.iter().filter(|row| row.noise == noise && row.direction == "both");
-    let pooled_only = rows().count() > ROWS_MAX;
-    let lots = first_seen(rows().map(|row| row.lots.as_str()));
-    let mut drawn = Vec::new();
-    for lot in lots.iter().filter(|&&lot| !pooled_only || lot == evaluation.pooled()) {
-        for row in rows().filter(|row| row.lots == **lot) {
-            let name = if pooled_only { row.driver.clone() } else { format!("{}, {}", row.driver, row.lots) };
-            let group = drivers.iter().position(|driver| *driver == row.driver).unwrap_or(0);
-            drawn.push(RateRow { name, per_100m: row.per_100m, interval: interval(row), group });
-        }
-    }
-    drawn
+/// Lot by lot, driver by driver.
+fn rates_by_lot(evaluation: &Evaluation, noise: NoiseChoice, drivers: &[&str]) -> Vec<RateRow> {
+    let lots = first_seen(evaluation.rows(noise).map(|row| row.lots.as_str()));
+    let rows = lots.iter().flat_map(|lots| evaluation.rows(noise).filter(move |row| row.lots == **lots));
+    rows.map(|row| rate_row(row, format!("{}, {}", row.driver, row.lots), drivers)).collect()
+}
+
+/// Driver by driver, all lots together.
+fn pooled_rates(evaluation: &Evaluation, noise: NoiseChoice, drivers: &[&str]) -> Vec<RateRow> {
+    evaluation.pooled_rows(noise).map(|row| rate_row(row, row.driver.clone(), drivers)).collect()
+}
+
+fn rate_row(row: &Row, name: String, drivers: &[&str]) -> RateRow {
+    let group = drivers.iter().position(|driver| *driver == row.driver).unwrap_or(0);
+    RateRow { name, per_100m: row.per_100m, interval: interval(row), group }
 }
 
 fn noise_series(evaluation: &Evaluation, drivers: &[&str]) -> Vec<NoiseSeries> {
@@ -290,9 +382,9 @@ fn noise_series(evaluation: &Evaluation, drivers: &[&str]) -> Vec<NoiseSeries> {
     drivers.iter().map(|driver| NoiseSeries { name: (*driver).to_owned(), points: points(driver) }).collect()
 }
 
-fn safe_ratios(evaluation: &Evaluation, noise: NoiseChoice, driver: &str) -> Vec<f64> {
+fn safe_ratios(evaluation: &Evaluation, noise: NoiseChoice, driver: &str, lots: &str) -> Vec<f64> {
     let runs = evaluation.runs.iter().filter(|run| run.driven.noise == noise && run.driven.driver == driver);
-    runs.map(|run| f64::from(run.report.metrics.safe_ratio)).collect()
+    runs.filter(|run| is_in(&run.driven.lot, lots)).map(|run| f64::from(run.report.metrics.safe_ratio)).collect()
 }
 
 /// The fastest near-collisions: how fast the car still was is how far the driver was from seeing it come.
@@ -315,17 +407,27 @@ fn worst(failures: &[FailureRecord]) -> Vec<&FailureRecord> {
 fn add_moments(page: &mut Page, folder: &Path, settings: &Settings, evaluation: &Evaluation, progress: &dyn Progress) {
     let count = evaluation.failures.len();
     if count == 0 {
-        page.section("Near-collisions", "There was none.");
+        page.section("Near-collisions", "There were none.");
         return;
     }
     let worst = worst(&evaluation.failures);
+    let (listed, shown) = match (count, worst.len()) {
+        (1, _) => ("`failures.md` lists the only near-collision with its cause.".to_owned(), String::new()),
+        (_, all) if all == count => (format!("`failures.md` lists all {count} with their causes."), String::new()),
+        (_, some) => (
+            format!("`failures.md` lists all {count} with their causes."),
+            format!(
+                " Shown are the {some} in which the car was fastest, at most {MOMENTS_OF_A_KIND} per driver and lot."
+            ),
+        ),
+    };
     page.section(
         "Near-collisions",
         format!(
-            "{count} in all, each with its cause in `failures.md`. Shown are the {} in which the car was fastest, at most \
-             {MOMENTS_OF_A_KIND} of one driver on one lot. The commands show them again in Rerun's viewer; run them where \
-             this run was made.",
-            worst.len()
+            "{listed}{shown} The dot is the {}, in the grid with the ellipses of 1σ and 2σ that a network predicts; \
+             coloured cells are wrong, and the colour says why. The commands replay the drive; run them in the folder in \
+             which this report was made.",
+            glossary::LOOK_AHEAD_POINT.link("look-ahead point")
         ),
     );
     for (index, failure) in worst.iter().enumerate() {
@@ -335,18 +437,19 @@ fn add_moments(page: &mut Page, folder: &Path, settings: &Settings, evaluation: 
         let FailureRecord { driven, tick, route_m, speed_mps, .. } = failure;
         let Driven { driver, lot, trial, noise, .. } = driven;
         let way = driven.direction.name();
-        page.text(format!("### {driver} on {lot}, {way}\n"));
+        page.text(format!("### {} on {}, {way}\n", escaped(driver), escaped(lot)));
         let cause = failure.cause.name();
         let caption = format!(
-            "Trial {trial}, noise {noise}, tick {tick}, {route_m:.1} m along the route, at {speed_mps:.2} m/s: {cause}."
+            "Trial {trial}, noise {noise}, tick {tick}: {route_m:.1} m along the route, at {speed_mps:.2} m/s. Cause: \
+             {cause}."
         );
-        let drawn = if progress.is_cancelled() { None } else { Some(moments::picture(&failure.replay, settings)) };
+        let drawn = if progress.is_cancelled() { None } else { Some(moments::player(&failure.replay, settings)) };
         match drawn {
-            Some(Ok(png)) => {
-                page.figure(format!("near-collision-{index}"), caption, Image::Png(png));
+            Some(Ok(player)) => {
+                page.figure(format!("near-collision-{index}"), caption, Image::Player(player));
             }
             Some(Err(error)) => {
-                page.text(format!("{caption} It could not be driven again: {error:#}."));
+                page.text(format!("{caption} It could not be replayed: {}.", escaped(&format!("{error:#}"))));
             }
             None => {
                 page.text(format!("{caption} Not drawn: the command was interrupted."));
@@ -372,12 +475,12 @@ fn configuration(sources: &Sources) -> String {
         ("program", &manifest.program),
         ("preset", &manifest.preset),
         ("root seed", &manifest.root_seed.to_string()),
-        ("seed of the evaluation", &manifest.evaluation_seed.to_string()),
+        ("evaluation seed", &manifest.evaluation_seed.to_string()),
         ("compiler", &manifest.rustc_version),
         ("target", &manifest.target),
         ("threads", &manifest.threads.to_string()),
     ] {
-        let _ = writeln!(text, "| {name} | {value} |");
+        let _ = writeln!(text, "| {name} | {} |", escaped(value));
     }
     let settings = sources.settings.to_toml();
     let _ = write!(text, "\nEvery setting (`settings.toml`):\n\n```toml\n{}\n```", settings.trim_end());

@@ -72,7 +72,7 @@ pub struct Furniture {
 pub struct LaneEncroachment {
     /// Index of the leg.
     pub leg: usize,
-    /// Side it stands on.
+    /// Side of the lane that it is on.
     pub side: Side,
     /// Stretch, metres along the leg.
     pub from_m: f32,

@@ -59,7 +59,7 @@ pub struct Blueprint {
     pub corners: Vec<CornerPlan>,
     /// Radius of the reference path at corners, metres.
     pub path_radius_m: f32,
-    /// How far the lane runs on straight before the start and behind the finish, metres: nobody faces a wall there.
+    /// Length of straight lane before the start and behind the finish, metres, so that no wall is close there.
     pub run_out_m: f32,
 }
 

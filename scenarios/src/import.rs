@@ -101,7 +101,7 @@ impl MapLot {
         Ok(lot)
     }
 
-    /// A map of which nothing else is said.
+    /// A map without further settings.
     fn of_map(map: &Path) -> Self {
         Self {
             map: map.to_owned(),
@@ -353,7 +353,7 @@ impl MapLot {
         Pose::new(Vec2::new(x_m, y_m) * self.scale, sim::geometry::wrap_angle(heading_deg.to_radians()))
     }
 
-    /// A point of the lot as the map's frame has it.
+    /// A point of the lot in the frame of the map.
     fn in_map(&self, point: Vec2) -> String {
         let point = point / self.scale;
         format!("({:.2}, {:.2})", point.x, point.y)

@@ -78,7 +78,7 @@ impl LotSpec {
     /// Generated lots do not depend on the vehicle: their rules are made for the paper's.
     ///
     /// # Errors
-    /// Only for files: what is wrong with them, among it that the vehicle does not fit.
+    /// Only for files: if one cannot be read, or the vehicle does not fit.
     pub fn scenario(&self, trial_seed: RootSeed, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
         match self {
             Self::Reference(lot) => Ok(reference::lot(*lot, trial_seed)),

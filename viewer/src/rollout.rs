@@ -4,19 +4,14 @@ use crate::drive::Drive;
 use crate::recording::{Header, Recording};
 use crate::{Context, layout, legend, result_of, show_map};
 use anyhow::{Context as _, ensure};
-use experiment::drivers;
 use experiment::lots::Lot;
 use experiment::run_dir;
 use experiment::settings::Settings;
 use experiment::training::episodes_of;
 use policy::checkpoint::Checkpoint;
-use policy::dagger::GatedCollector;
+use policy::dagger::{Rollouts, RoundEpisode};
 use policy::dataset::store::Store;
 use policy::drivers::NetPolicy;
-use policy::network::Predictor;
-use sim::batch::run_lockstep;
-use sim::driver::Driver;
-use sim::episode::Episode;
 use std::path::Path;
 
 /// Entity of the car.
@@ -47,9 +42,9 @@ struct Round<'a> {
 }
 
 impl Round<'_> {
-    fn record(&self, episodes: Vec<Episode>, context: &mut Context<'_>) -> anyhow::Result<()> {
-        let begin = |(index, episode): (usize, &Episode)| {
-            let lot = &episode.map().scenario().name;
+    fn record(&self, episodes: Vec<RoundEpisode>, context: &mut Context<'_>) -> anyhow::Result<()> {
+        let begin = |RoundEpisode { index, episode, .. }: &RoundEpisode| {
+            let (index, lot) = (index.episode(), &episode.map().scenario().name);
             let header = Header {
                 application: "drive",
                 title: format!("round {:02}, episode {index}, {lot}", self.number),
@@ -61,42 +56,32 @@ impl Round<'_> {
             show_map(episode.map(), legend::DRIVE, &recording);
             Ok(recording)
         };
-        let recordings = episodes.iter().enumerate().map(begin).collect::<anyhow::Result<Vec<Recording>>>()?;
-        let watched = |(recording, episode)| {
-            let novice = self.policy.clone().map(|policy| NetPolicy::new(policy, self.settings.dagger.device));
-            let drive = Drive::new(recording, ROOT, episode, self.settings).with_novice(novice);
+        let recordings = episodes.iter().map(begin).collect::<anyhow::Result<Vec<Recording>>>()?;
+        let watched = |(recording, start): (_, &RoundEpisode)| {
+            let novice = self.policy.as_ref().map(|policy| NetPolicy::new(policy, self.settings.dagger.device));
+            let drive = Drive::new(recording, ROOT, &start.episode, self.settings).with_novice(novice);
             drive.show_static();
             drive
         };
         let mut drives: Vec<Drive<'_>> = recordings.iter().zip(&episodes).map(watched).collect();
-        let length_m: f32 = episodes.iter().map(|episode| episode.map().path().length_m()).sum();
+        let length_m: f32 = episodes.iter().map(|start| start.episode.map().path().length_m()).sum();
         let mut progress_m = vec![0.0; episodes.len()];
         context.progress.begin("recording", &format!("recording: round {}", self.number));
-        let mut collector = self.collector(episodes.len());
-        let reports = run_lockstep(episodes, &mut collector, &mut |episode, frame| {
+        let Settings { dagger, seed, .. } = self.settings;
+        let rollouts = Rollouts::of_round(dagger, *seed, self.policy.as_ref(), episodes);
+        let collected = rollouts.drive(&mut |place, frame| {
             // Drives that are cancelled are driven on: recording takes nearly all of their time.
             if !context.progress.is_cancelled() {
-                drives[episode].frame(frame);
-                progress_m[episode] = frame.progress_m;
+                drives[place].frame(frame);
+                progress_m[place] = frame.progress_m;
                 let driven_m: f32 = progress_m.iter().sum();
                 let status = &mut |_| format!("{driven_m:.0} of {length_m:.0} m");
                 context.progress.at(f64::from(driven_m / length_m), status);
             }
         });
         drop(drives);
-        let results: Vec<String> = reports.iter().map(|report| result_of(&report.metrics)).collect();
+        let results: Vec<String> = collected.reports.iter().map(|report| result_of(&report.metrics)).collect();
         context.progress.end(&results.join("; "));
         recordings.into_iter().try_for_each(|recording| context.end(recording))
-    }
-
-    /// As the training seated it.
-    fn collector(&self, episodes: usize) -> GatedCollector {
-        let Settings { dagger, seed, .. } = self.settings;
-        let expert = |episode: usize| -> Box<dyn Driver + Send> {
-            let expert = drivers::expert(&self.settings.expert, &self.settings.episode);
-            Box::new(expert.with_jitter_seed(*seed, u64::from(self.number) << 20 | episode as u64))
-        };
-        let novice = self.policy.as_ref().map(|policy| Predictor::new(policy.weights.clone(), dagger.device));
-        GatedCollector::new(novice, (0..episodes).map(expert).collect(), dagger.rule, dagger.keep, dagger.geometry)
     }
 }

@@ -8,9 +8,12 @@ use experiment::drive::Replay;
 use experiment::drivers::{self, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::{Elapsed, Interrupted, Progress, Silent};
+use experiment::run_dir::{Build, Place, RunDir};
 use experiment::settings::Settings;
+use experiment::training as training_run;
 use experiment::view_request::{DriveRequest, Show, Sink, ViewRequest};
 use planners::explanation::Explanation;
+use policy::dataset::Collection;
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::re_log_types::StoreKind;
 use rerun::log::{Chunk, LogMsg};
@@ -120,7 +123,7 @@ impl Shown {
         on_it.flat_map(values).collect()
     }
 
-    /// PNGs of an entity, by control tick, as indices into their palette.
+    /// Pictures of an entity as PNG, by control tick, as indices into their palette.
     fn pictures(&self, entity: &str) -> BTreeMap<i64, Vec<u8>> {
         let component = EncodedImage::descriptor_blob();
         let blobs = self.chunks_of(entity).flat_map(|chunk| {
@@ -412,8 +415,8 @@ fn a_training_is_read_from_its_folder() {
         let folder = run.join(format!("round-{round:02}"));
         std::fs::create_dir_all(&folder).unwrap();
         let collection = format!(
-            "round = {round}\nsamples = {}\nticks = 1000\nnovice_ticks = {}\ntau_hat_sum = 1.0\ndriven_s = 50.0\n\
-             near_collisions = 1\ndriven_m = 50.0\nepisodes = 2\n",
+            "schema = 1\nround = {round}\nsamples = {}\nnoise_augmentations = 0\nticks = 1000\nnovice_ticks = {}\n\
+             tau_hat_sum = 1.0\ndriven_s = 50.0\nnear_collisions = 1\ndriven_m = 50.0\nepisodes = []\n",
             500 - 100 * round,
             600 * round
         );
@@ -424,7 +427,7 @@ fn a_training_is_read_from_its_folder() {
                  validation = {{ samples = 9, loss = -1.0, nll = -1.25, rmse_m = 0.75 }}\n"
             )
         };
-        let head = "training_samples = 90\nvalidation_samples = 9\nsteps = 100\nkept_step = 100\nstopped = false\n";
+        let head = "schema = 1\ntraining_samples = 90\nvalidation_samples = 9\nsteps = 100\nkept_step = 100\nstopped = false\n";
         std::fs::write(folder.join("fit.toml"), format!("{head}{}{}", point(50), point(100))).unwrap();
     }
     std::fs::write(run.join("settings.toml"), settings.to_toml()).unwrap();
@@ -440,12 +443,54 @@ fn a_training_is_read_from_its_folder() {
     assert_eq!(steps("rounds/samples/dataset"), BTreeMap::from([(0, 500.0), (100, 900.0)]));
     assert_eq!(steps("rounds/near_collisions")[&0], 2.0, "per 100 m");
     assert_eq!(shown.signal("rounds/samples/new", "round"), BTreeMap::from([(0, 500.0), (1, 400.0)]));
-    let last = f64::from(settings.dagger.fit_iteration.learning_rate.at(99, 100));
+    let last = f64::from(settings.dagger.fit.learning_rate.at(99, 100));
     assert_eq!(steps("training/learning_rate")[&200], last);
     let entities = shown.entities();
     for path in named(&layout::of_training()) {
         assert!(entities.iter().any(|entity| entity.starts_with(&path)), "{path} is not recorded: {entities:?}");
     }
+}
+
+/// With disturbances and noise augmentations: the network drives as often, and fails as often, as in the training.
+#[test]
+fn episodes_of_a_training_are_driven_again_as_they_were() {
+    let run = scratch("rollouts");
+    let _ = std::fs::remove_dir_all(&run);
+    let mut settings = Settings::preset("smoke").unwrap();
+    settings.training.lots = vec!["lot-b".to_owned()];
+    let build = Build {
+        program: "test".to_owned(),
+        command_line: Vec::new(),
+        git_revision: None,
+        git_dirty: None,
+        rustc_version: String::new(),
+        processor: None,
+    };
+    let place = Place { build: &build, out: Some(&run), overwrite: false, command: "test", preset: "smoke", seed: 1 };
+    let folder = RunDir::create(&place, &settings).unwrap();
+    let outcome = training_run::train(&settings, &folder, &Silent).unwrap();
+    assert_eq!(outcome.rows.len(), 2);
+    let request = ViewRequest {
+        sink: Sink::Folder(run.join("recordings")),
+        show: vec![Show::Rollouts { run: run.clone(), episodes: usize::MAX }],
+    };
+    let mut files = Vec::new();
+    crate::show(&request, &Silent, &mut files).unwrap();
+    let collection = Collection::read(&run.join("round-01")).unwrap().unwrap();
+    let shown: Vec<Shown> = files.iter().filter(|file| is_round(file, 1)).map(|file| Shown::of_file(file)).collect();
+    std::fs::remove_dir_all(&run).unwrap();
+    assert_eq!(shown.len(), collection.episodes.len());
+    let speeds = shown.iter().map(|shown| shown.signal("dagger/signals/speed/actual", "tick").len() as u64);
+    assert_eq!(speeds.sum::<u64>(), collection.ticks);
+    let failures = shown
+        .iter()
+        .map(|shown| shown.points("dagger/near_collisions", &Points3D::descriptor_positions()).len() as u32);
+    assert_eq!(failures.sum::<u32>(), collection.near_collisions);
+    assert!(collection.near_collisions > 0, "this network still fails");
+}
+
+fn is_round(file: &Path, round: u32) -> bool {
+    file.file_name().is_some_and(|name| name.to_string_lossy().starts_with(&format!("round-{round:02}")))
 }
 
 /// The paths drawn are those that were weighed: the chosen one is the cheapest, and leads where the planner steers.

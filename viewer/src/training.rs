@@ -4,12 +4,11 @@ use crate::colours::{self, Colour};
 use crate::layout;
 use crate::recording::Recording;
 use crate::shapes::color;
-use anyhow::{Context as _, ensure};
-use experiment::{learning, run_dir};
-use policy::dagger::Collection;
+use anyhow::ensure;
+use experiment::run_dir;
+use policy::dataset::Collection;
 use policy::fit::{FitReport, FitSettings};
 use rerun::{SeriesLines, SeriesPoints, TextDocument};
-use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// Signals of a training: entity, name, colour.
@@ -46,16 +45,12 @@ pub(crate) fn show(run: &Path, recording: &Recording) -> anyhow::Result<()> {
     let (mut rounds, mut dataset, mut first_step) = (0_u32, 0, 0_i64);
     loop {
         let folder = run.join(format!("round-{rounds:02}"));
-        if !folder.join("round.toml").is_file() {
-            break;
-        }
-        let collection: Collection = toml_of(&folder.join("round.toml"))?;
+        let Some(collection) = Collection::read(&folder)? else { break };
         dataset += collection.samples;
         recording.at_step(first_step, i64::from(rounds));
         collected(&collection, dataset, recording);
-        if let Some(fit) = learning::report(&folder)? {
-            let of_round = if rounds == 0 { &settings.dagger.fit_cloning } else { &settings.dagger.fit_iteration };
-            fitted(&fit, of_round, first_step, i64::from(rounds), recording);
+        if let Some(fit) = FitReport::read(&folder)? {
+            fitted(&fit, &settings.dagger.fit_of_round(rounds), first_step, i64::from(rounds), recording);
             first_step += i64::from(fit.steps);
         }
         rounds += 1;
@@ -92,9 +87,4 @@ fn fitted(fit: &FitReport, settings: &FitSettings, first_step: i64, round: i64, 
             value("training/validation_error/rmse", validation.rmse_m);
         }
     }
-}
-
-fn toml_of<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
-    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-    toml::from_str(&text).with_context(|| path.display().to_string())
 }

@@ -100,7 +100,7 @@ impl Cli {
         self.threads.map_or(0, NonZeroUsize::get)
     }
 
-    /// Does what is asked for.
+    /// Runs the command.
     ///
     /// # Errors
     /// If something named does not exist or cannot be read or written, or by Ctrl-C.

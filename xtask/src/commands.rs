@@ -8,6 +8,7 @@ pub(crate) mod guard;
 pub(crate) mod lots;
 pub(crate) mod pixel_accuracy;
 pub(crate) mod render;
+mod render_animation;
 pub(crate) mod reproduce;
 pub(crate) mod sample_size;
 pub(crate) mod settings;

@@ -9,6 +9,7 @@ mod commands;
 mod console;
 mod interrupt;
 mod output;
+mod record;
 mod viewer;
 
 use clap::{CommandFactory as _, FromArgMatches as _};

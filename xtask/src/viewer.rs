@@ -20,7 +20,7 @@ const BACKENDS: &[&str] = &[
     "wgpu",
 ];
 
-/// Builds the viewer program unless that is done, and has it show what is asked for.
+/// Builds the viewer program if necessary and runs it on a request.
 ///
 /// # Errors
 /// If it cannot be built, it failed (it has said why), or by Ctrl-C.

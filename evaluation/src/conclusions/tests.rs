@@ -133,7 +133,7 @@ fn none_in_a_few_metres_is_no_proof() {
         results.add(0, 0, 0, &trial, &EpisodeReport { ending: Ending::ReachedEnd, metrics, events: vec![] });
         on_reference_lots(&Driven { plan: &plan, results: &results })[0].verdict
     };
-    // 3.0 / 0.1 hundred metres (methods.md 8.3).
+    // 3.0 / 0.1 hundred metres (docs/methods.md 8.3).
     assert_eq!((driven_m(2990.0), driven_m(3000.0)), (Verdict::CannotBeTold, Verdict::Holds));
 }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim::seed::{RootSeed, Stream};
 
-/// Draws of the bootstrap (methods.md 8.3).
+/// Draws of the bootstrap (docs/methods.md 8.3).
 pub const DRAWS: u64 = 10_000;
 
 /// Percentile interval of a statistic.

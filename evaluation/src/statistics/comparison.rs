@@ -30,7 +30,7 @@ pub fn clopper_pearson(successes: u32, trials: u32, confidence: f64) -> [f64; 2]
 }
 
 /// One rate over another. Given the sum of both counts, the first is binomial with p = E₁/(E₁ + E₂) if the rates are
-/// equal (methods.md 8.3; R's `poisson.test` with two counts).
+/// equal (docs/methods.md 8.3; R's `poisson.test` with two counts).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RateRatio {
     /// First rate / second rate; `None` without an event in the second.

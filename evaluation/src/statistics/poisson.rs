@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 /// Two-sided confidence of every interval that is printed.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// From this dispersion on the events cannot be taken for independent: quote the bootstrap only (methods.md 8.3).
+/// From this dispersion on the events cannot be taken for independent: quote the bootstrap only (docs/methods.md 8.3).
 pub const DISPERSION_MAX: f64 = 1.5;
 
 /// Quantile of the χ² distribution with `2·half_freedom` degrees of freedom, halved.
@@ -127,7 +127,7 @@ mod tests {
         assert_interval([rate.lower, rate.upper], [4.753_125, 6.692_709], 6);
     }
 
-    /// methods.md 8.3: `DAgger` 0 in 51.8 → [0, .071], one-sided .058; tentacle 71 → [1.07, 1.73]; VVF 75 → [1.14, 1.81];
+    /// docs/methods.md 8.3: `DAgger` 0 in 51.8 → [0, .071], one-sided .058; tentacle 71 → [1.07, 1.73]; VVF 75 → [1.14, 1.81];
     /// 13 in 11.55 → [.60, 1.92].
     #[test]
     fn the_figures_of_methods_8_3() {

@@ -7,7 +7,7 @@ use statrs::distribution::{Binomial, ContinuousCDF as _, Discrete as _, Discrete
 /// within a per cent.
 const EXACT_UP_TO: f64 = 3000.0;
 
-/// Metres without an event that show, one-sided, a rate below `per_100m` (methods.md 8.3: 0.1 → 3 km at 95 %).
+/// Metres without an event that show, one-sided, a rate below `per_100m` (docs/methods.md 8.3: 0.1 → 3 km at 95 %).
 pub fn to_bound(per_100m: f64, confidence: f64) -> f64 {
     100.0 * poisson::upper_bound(0, confidence) / per_100m
 }

@@ -73,7 +73,7 @@ impl Run<'_, '_> {
         let mut policy = self.train(None, &d, 0, &collected)?; // line 2: π_net,1 ← π_BC
         let mut eta_hat = 0.0; // line 4
         let mut i = 1;
-        // Line 5: while η̂ ≤ η. Unrounded: the paper's last row prints 0.90 and stops (docs/methods.md 12, 15).
+        // Line 5: while η̂ ≤ η. Unrounded: the paper's last row prints 0.90 and stops (docs/methods.md 12, item 15).
         while eta_hat <= self.settings.eta || i <= self.settings.iterations_min {
             if i > self.settings.iterations_max {
                 return Ok((self.finish(policy, &d)?, Stop::IterationCap));

@@ -4,7 +4,8 @@ use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_wid
 use sim::geometry::Vec2;
 use std::fmt::Write as _;
 use tiny_skia::{
-    Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, PixmapPaint, Stroke, StrokeDash, Transform,
+    Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, PixmapPaint, Rect, Stroke, StrokeDash,
+    Transform,
 };
 
 /// Red, green, blue.
@@ -46,7 +47,7 @@ impl Font {
 pub struct Drawing {
     width_px: f32,
     height_px: f32,
-    ground: Rgb,
+    ground: Option<Rgb>,
     shapes: Vec<Shape>,
 }
 
@@ -55,6 +56,7 @@ enum Shape {
     Polygon { points: Vec<Vec2>, rgb: Rgb },
     Line { points: Vec<Vec2>, closed: bool, rgb: Rgb, width_px: f32, dash_px: Vec<f32> },
     Disc { centre: Vec2, radius_px: f32, rgb: Rgb },
+    Squares { corners: Vec<Vec2>, side_px: f32, pitch_px: f32, rgb: Rgb },
     Text { text: String, at: Vec2, font: Font, rgb: Rgb },
     Inset { drawing: Drawing, at: Vec2 },
 }
@@ -70,7 +72,12 @@ impl Drawing {
             width_px >= 1.0 && height_px >= 1.0 && width_px.max(height_px) <= SIDE_MAX_PX,
             "{width_px:.0}×{height_px:.0} pixels are too many or too few; choose another --pixels-per-metre"
         );
-        Ok(Self { width_px, height_px, ground, shapes: Vec::new() })
+        Ok(Self { width_px, height_px, ground: Some(ground), shapes: Vec::new() })
+    }
+
+    /// An empty picture that hides nothing: what changes from frame to frame, to be laid over a picture of this size.
+    pub fn overlay(&self) -> Self {
+        Self { ground: None, shapes: Vec::new(), ..*self }
     }
 
     /// Width and height, pixels.
@@ -107,6 +114,12 @@ impl Drawing {
     /// A filled disc.
     pub fn disc(&mut self, centre: Vec2, radius_px: f32, rgb: Rgb) {
         self.shapes.push(Shape::Disc { centre, radius_px, rgb });
+    }
+
+    /// Filled upright squares of one size and colour: cells of a grid, row by row. A pitch is the way from one square of a
+    /// row to the next.
+    pub fn squares(&mut self, corners: Vec<Vec2>, [side_px, pitch_px]: [f32; 2], rgb: Rgb) {
+        self.shapes.push(Shape::Squares { corners, side_px, pitch_px, rgb });
     }
 
     /// ASCII text with its upper left corner at a point.
@@ -147,16 +160,32 @@ impl Drawing {
     /// Never: sizes are checked when a drawing is made.
     pub fn pixmap(&self) -> Pixmap {
         let mut pixmap = Pixmap::new(self.width_px as u32, self.height_px as u32).expect("the size is checked in new");
-        pixmap.fill(colour(self.ground));
-        for shape in &self.shapes {
-            shape.draw(&mut pixmap);
+        if let Some(ground) = self.ground {
+            pixmap.fill(colour(ground));
         }
+        self.draw_on(&mut pixmap);
         pixmap
+    }
+
+    /// Draws the shapes over pixels that are already there.
+    pub fn draw_on(&self, pixmap: &mut Pixmap) {
+        for shape in &self.shapes {
+            shape.draw(pixmap);
+        }
+    }
+
+    /// The elements of the SVG without the `svg` around them.
+    pub fn svg_elements(&self) -> String {
+        let mut svg = String::new();
+        self.write_svg(&mut svg);
+        svg
     }
 
     fn write_svg(&self, svg: &mut String) {
         let (width, height) = (self.width_px, self.height_px);
-        let _ = writeln!(svg, "<rect width=\"{width}\" height=\"{height}\" fill=\"{}\"/>", hex(self.ground));
+        if let Some(ground) = self.ground {
+            let _ = writeln!(svg, "<rect width=\"{width}\" height=\"{height}\" fill=\"{}\"/>", hex(ground));
+        }
         for shape in &self.shapes {
             shape.write_svg(svg);
         }
@@ -185,6 +214,17 @@ impl Shape {
             }
             Self::Disc { centre, radius_px, rgb } => {
                 if let Some(path) = PathBuilder::from_circle(centre.x, centre.y, *radius_px) {
+                    pixmap.fill_path(&path, &paint(*rgb), FillRule::Winding, Transform::identity(), None);
+                }
+            }
+            Self::Squares { corners, side_px, rgb, .. } => {
+                let mut builder = PathBuilder::new();
+                for corner in corners {
+                    if let Some(square) = Rect::from_xywh(corner.x, corner.y, *side_px, *side_px) {
+                        builder.push_rect(square);
+                    }
+                }
+                if let Some(path) = builder.finish() {
                     pixmap.fill_path(&path, &paint(*rgb), FillRule::Winding, Transform::identity(), None);
                 }
             }
@@ -222,6 +262,22 @@ impl Shape {
                 centre.y,
                 hex(*rgb)
             ),
+            // Neighbours of a row are the dashes of one line: a tenth of the bytes of squares.
+            Self::Squares { corners, side_px, pitch_px, rgb } => {
+                let is_next = |a: &Vec2, b: &Vec2| a.y == b.y && (b.x - a.x - pitch_px).abs() < 1e-3;
+                let line = |row: &[Vec2]| {
+                    let length_px = (row.len() - 1) as f32 * pitch_px + side_px;
+                    format!("M{} {}h{length_px}", row[0].x, row[0].y + 0.5 * side_px)
+                };
+                let lines: String = corners.chunk_by(is_next).map(line).collect();
+                writeln!(
+                    svg,
+                    "<path d=\"{lines}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{side_px}\" \
+                     stroke-dasharray=\"{side_px} {}\"/>",
+                    hex(*rgb),
+                    pitch_px - side_px
+                )
+            }
             Self::Text { text, at, font, rgb } => {
                 let escaped = text.replace('&', "&amp;").replace('<', "&lt;");
                 // The letters of the bitmap font are 0.86 of their height; any monospace font is fitted to their width.

@@ -12,7 +12,8 @@ use sim::sensing::{BEV_PIXELS, GRID_CELLS, GridGeometry, Inspection, OccupancyGr
 pub const FREE: Rgb = [0xF4, 0xF4, 0xF2];
 /// Not drivable.
 pub const OCCUPIED: Rgb = [0x55, 0x5B, 0x66];
-const LINE: Rgb = [0xDC, 0xDD, 0xDF];
+/// Between cells.
+pub const LINE: Rgb = [0xDC, 0xDD, 0xDF];
 
 /// Colour of what a layer made wrong.
 pub fn of_layer(layer: Layer) -> Rgb {

@@ -147,7 +147,7 @@ pub fn draw_ground(drawing: &mut Drawing, view: &View, map: &Map) {
     drawing.outline(boundary, BOUNDARY, 2.0);
 }
 
-/// What stands on it.
+/// Obstacles on it.
 pub fn draw_obstacles(drawing: &mut Drawing, view: &View, map: &Map) {
     for obstacle in &map.scenario().obstacles {
         draw_obstacle(drawing, view, obstacle);
@@ -236,10 +236,10 @@ pub fn shortened(text: &str, letters: usize) -> String {
     text.chars().take(letters.saturating_sub(2)).chain("..".chars()).collect()
 }
 
-/// A colour and what it stands for.
+/// A colour and its meaning.
 pub type LegendEntry = (Rgb, String);
 
-/// Colours and names of what is in the lot, with counts.
+/// Colours, names and counts of what the lot contains.
 fn legend_of(map: &Map) -> Vec<LegendEntry> {
     let scenario = map.scenario();
     let classes = ObstacleClass::ALL.into_iter().filter_map(|class| {

@@ -1,8 +1,13 @@
+use super::animation::{Camera, Layout, Scene, Take};
 use super::drawing::{Drawing, Font, Rgb};
+use super::encode::Format;
 use super::lot::{ASPHALT, GROUND, View};
 use super::trajectories::{ColourBy, Point, Trajectory};
 use super::{contact_sheet, grids, lot, noise, trajectories};
+use experiment::drive::Replay;
+use experiment::drivers::DriverSpec;
 use experiment::lots::Lot;
+use experiment::replay_key::ReplayKey;
 use experiment::settings::{NoiseChoice, Settings};
 use experiment::trials::{Purpose, Trial};
 use sim::driver::{LookAheadPoint, Source, Spread};
@@ -172,4 +177,61 @@ fn noise_is_shown_per_level() {
     assert!(Layer::ALL.iter().any(|&layer| levels[1].1.count_cells(layer) > 0));
     let sheet = noise::picture("lot-a", &levels).unwrap();
     assert_eq!(sheet.size_px().x, 2.0 * 400.0 + 3.0 * 16.0);
+}
+
+/// Expert and planner on one lot: a second of it, at both layouts and all cameras.
+#[test]
+fn an_animation_shows_every_driver_and_has_the_same_bytes_twice() {
+    let settings = Settings::preset("default").unwrap();
+    let key: ReplayKey = "expert@lot-b@forward@0@paper@1@0".parse().unwrap();
+    let replay = Replay::new(&key, &settings.episode).unwrap();
+    let take = |spec: &str| {
+        let driver = spec.parse::<DriverSpec>().unwrap().load(&settings.expert, settings.dagger.device).unwrap();
+        Take::of(&replay, &settings.episode, &driver, Some(100), |_| {})
+    };
+    let takes = [take("expert"), take("vvf")];
+    assert_eq!(takes[0].frames.len(), 101);
+    let times: Vec<f32> = (0..8).map(|i| 3.0 + 0.1 * i as f32).collect();
+    let scene = |count: usize, camera, layout| {
+        Scene::new(&replay, &settings.episode, takes[..count].to_vec(), &times, (camera, layout), "lot-b")
+    };
+    let place = Camera::Place(takes[0].frames[60].vehicle.pose.position());
+    for (count, camera, layout) in
+        [(2, Camera::Lot, Layout::Below), (1, Camera::Follow, Layout::Beside), (1, place, Layout::Below)]
+    {
+        let scene = scene(count, camera, layout);
+        let background = scene.background(0).unwrap();
+        let svg = background.to_svg();
+        let names: Vec<&str> = takes[..count].iter().map(|take| take.name.as_str()).collect();
+        assert!(names.iter().all(|name| svg.contains(&format!(">{name}</text>"))), "{names:?}");
+        let overlay = scene.overlay(7).unwrap().to_svg();
+        assert_eq!(overlay.matches(" m/s</text>").count(), count);
+        assert!(overlay.contains(">0 near-collisions</text>") && overlay.contains(">3.7 s</text>"), "{overlay}");
+        for svg in [svg, overlay] {
+            roxmltree::Document::parse(&svg).unwrap();
+        }
+    }
+    let encoded = || scene(2, Camera::Lot, Layout::Below).reel().unwrap().encode(1, 10, Format::Gif).unwrap();
+    let bytes = encoded();
+    assert!(bytes == encoded());
+    let mut decoder = gif::DecodeOptions::new().read_info(bytes.as_slice()).unwrap();
+    let mut frames = 0;
+    while decoder.read_next_frame().unwrap().is_some() {
+        frames += 1;
+    }
+    assert_eq!(frames, times.len());
+    assert!(bytes.len() < 100_000, "{} bytes for 8 frames: 320 must fit into 3 MB", bytes.len());
+}
+
+#[test]
+fn squares_of_a_row_are_dashes_of_one_line() {
+    let mut drawing = Drawing::new(Vec2::new(40.0, 20.0), [255; 3]).unwrap();
+    let corners = [(0.0, 0.0), (8.0, 0.0), (24.0, 0.0), (8.0, 8.0)].map(|(x, y)| Vec2::new(x, y)).to_vec();
+    drawing.squares(corners, [7.0, 8.0], [9, 9, 9]);
+    let svg = drawing.to_svg();
+    assert!(svg.contains("d=\"M0 3.5h15M24 3.5h7M8 11.5h7\"") && svg.contains("stroke-dasharray=\"7 1\""), "{svg}");
+    let pixmap = drawing.pixmap();
+    for (x, y, rgb) in [(3.0, 3.0, [9; 3]), (7.0, 3.0, [255; 3]), (10.0, 12.0, [9; 3]), (20.0, 3.0, [255; 3])] {
+        assert_eq!(at(&pixmap, Vec2::new(x, y)), rgb, "({x}, {y})");
+    }
 }

@@ -127,30 +127,46 @@ pub fn picture(
 
 /// The driven lines, and a cross at every near-collision.
 pub fn draw(drawing: &mut Drawing, view: &View, trajectories: &[Trajectory], by: ColourBy) {
+    // Later ones are thinner: where all drive the same line, all are seen.
+    let width_px = |index| 4.0 + 2.5 * (trajectories.len() - 1 - index) as f32;
+    let colour = |index, point: &Point| match by {
+        ColourBy::Speed => of_speed(point.speed_mps),
+        ColourBy::Driver => rgb(index),
+        ColourBy::Source => of_source(point.source),
+    };
+    if by == ColourBy::Speed {
+        // Fast is light: on asphalt it needs an edge.
+        draw_lines(drawing, view, trajectories, |index| width_px(index) + 2.5, |_, _| lot::INK);
+    }
+    draw_lines(drawing, view, trajectories, width_px, colour);
+    draw_crosses(drawing, view, trajectories);
+}
+
+/// The driven lines, in widths and colours by the number of the driver.
+pub fn draw_lines(
+    drawing: &mut Drawing,
+    view: &View,
+    trajectories: &[Trajectory],
+    width_px: impl Fn(usize) -> f32,
+    colour: impl Fn(usize, &Point) -> Rgb,
+) {
     for (index, trajectory) in trajectories.iter().enumerate() {
-        // Later ones are thinner: where all drive the same line, all are seen.
-        let width_px = 4.0 + 2.5 * (trajectories.len() - 1 - index) as f32;
-        let colour = |point: &Point| match by {
-            ColourBy::Speed => of_speed(point.speed_mps),
-            ColourBy::Driver => rgb(index),
-            ColourBy::Source => of_source(point.source),
-        };
         for drive in trajectory.points.split_inclusive(|point| point.is_last) {
-            if by == ColourBy::Speed {
-                // Fast is light: on asphalt it needs an edge.
-                drawing.line(view.pixels(drive.iter().map(|point| point.at)), lot::INK, width_px + 2.5);
-            }
             let mut from = 0;
             while from + 1 < drive.len() {
-                let rgb = colour(&drive[from]);
-                let same = drive[from..].iter().take_while(|point| colour(point) == rgb).count();
+                let rgb = colour(index, &drive[from]);
+                let same = drive[from..].iter().take_while(|point| colour(index, point) == rgb).count();
                 // To the first point of the next colour, so that no gap is left.
                 let to = (from + same).min(drive.len() - 1);
-                drawing.line(view.pixels(drive[from..=to].iter().map(|point| point.at)), rgb, width_px);
+                drawing.line(view.pixels(drive[from..=to].iter().map(|point| point.at)), rgb, width_px(index));
                 from = to;
             }
         }
     }
+}
+
+/// A cross at every near-collision.
+pub fn draw_crosses(drawing: &mut Drawing, view: &View, trajectories: &[Trajectory]) {
     let near = trajectories.iter().flat_map(|trajectory| &trajectory.points).filter_map(|point| point.near_collision);
     for at in near {
         cross(drawing, view.pixel(at));
@@ -173,7 +189,8 @@ fn legend(trajectories: &[Trajectory], by: ColourBy) -> Vec<LegendEntry> {
         ColourBy::Driver => {
             let near =
                 |trajectory: &Trajectory| trajectory.points.iter().filter(|p| p.near_collision.is_some()).count();
-            let name = |t: &Trajectory| format!("{}: {} near-collisions", t.name, near(t));
+            let plural = |count| if count == 1 { "" } else { "s" };
+            let name = |t: &Trajectory| format!("{}: {} near-collision{}", t.name, near(t), plural(near(t)));
             trajectories.iter().enumerate().map(|(i, trajectory)| (rgb(i), name(trajectory))).collect()
         }
         ColourBy::Source => [(Source::Expert, "expert"), (Source::Novice, "network"), (Source::Planner, "planner")]

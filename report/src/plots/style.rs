@@ -42,7 +42,7 @@ pub fn colour(series: usize) -> RGBColor {
     PALETTE[series % PALETTE.len()]
 }
 
-/// Fails never: what is drawn into is memory.
+/// Never fails: plots are drawn into memory.
 pub(super) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 pub(super) type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -57,7 +57,7 @@ pub(super) struct Axis<'a> {
     pub(super) labels: Labels<'a>,
 }
 
-/// What stands at an axis.
+/// Label and ticks of an axis.
 pub(super) enum Labels<'a> {
     /// Numbers with so many decimals.
     Numbers(usize),
@@ -158,9 +158,9 @@ pub(super) fn side_by_side(title: &str, height_px: u32, draw: impl FnOnce(&[Area
     picture(title, height_px, |root| draw(&root.split_horizontally(WIDTH_PX / 2).into()))
 }
 
-/// Two figures, one above the other, as one picture.
-pub(super) fn one_above_the_other(title: &str, height_px: u32, draw: impl FnOnce(&[Area<'_>; 2]) -> Drawn) -> String {
-    picture(title, height_px, |root| draw(&root.split_vertically(height_px / 2).into()))
+/// Areas of equal height, one above the other, as one picture.
+pub(super) fn stacked(title: &str, count: usize, height_px: u32, draw: impl FnOnce(&[Area<'_>]) -> Drawn) -> String {
+    picture(title, count as u32 * height_px, |root| draw(&root.split_evenly((count, 1))))
 }
 
 fn picture(title: &str, height_px: u32, draw: impl FnOnce(&Area<'_>) -> Drawn) -> String {

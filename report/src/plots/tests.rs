@@ -12,7 +12,7 @@ fn texts<'a>(document: &'a Document<'a>) -> Vec<(String, f64, f64)> {
     document.descendants().filter(|node| node.has_tag_name("text")).map(text).collect()
 }
 
-/// Where a text stands.
+/// Position of a text.
 fn place(texts: &[(String, f64, f64)], wanted: &str) -> (f64, f64) {
     let found = texts.iter().find(|(text, ..)| text == wanted);
     found.map_or_else(|| panic!("{wanted:?} is not among {texts:?}"), |&(_, x, y)| (x, y))
@@ -47,7 +47,7 @@ fn ratios() -> Vec<Distribution> {
 
 fn rounds() -> Vec<LearningCurve> {
     let round = |name: &str, steps: u32, floor: f64| LearningCurve {
-        validation_rmse_m: Vec::new(),
+        validation_rmse_m: (1..=steps / 250).map(|k| (250 * k, 0.3 + (-f64::from(k) / 3.0).exp())).collect(),
         name: name.to_owned(),
         training: (1..=steps)
             .map(|s| (s, floor + 3.0 * (-f64::from(s) / 300.0).exp() + 0.1 * f64::from(s * 7919 % 13) / 13.0))
@@ -202,4 +202,14 @@ fn nothing_to_show_is_still_a_picture() {
     ] {
         Document::parse(&svg).unwrap();
     }
+}
+
+#[test]
+fn learning_curves_show_metres_first() {
+    let svg = learning(&rounds());
+    let document = Document::parse(&svg).unwrap();
+    let texts = texts(&document);
+    let height = |title| place(&texts, title).1;
+    let (error, validation) = (height("Validation error of the look-ahead point"), height("Validation loss"));
+    assert!(error < validation && validation < height("Training loss"), "{texts:?}");
 }

@@ -9,37 +9,37 @@ fn steps(curve: &LearningCurve) -> u32 {
     curve.training.iter().chain(&curve.validation).map(|&(step, _)| step).max().unwrap_or(0)
 }
 
-/// Loss over optimiser steps, rounds after each other: of training above, as means over up to 240 stretches of equal
-/// length; of held-back samples below. Each has its own axis, because with β > 0 ([`policy::loss`]) they are different
-/// quantities.
+/// Over optimiser steps, rounds after each other: the error of the look-ahead point on held-back samples, metres, which
+/// says how good the policy is; under it the losses, each on an axis of its own, because with β > 0 ([`policy::loss`])
+/// they are different quantities. The training loss is drawn as means over up to 240 stretches of equal length.
 pub fn learning(rounds: &[LearningCurve]) -> String {
     let steps: u32 = rounds.iter().map(steps).sum();
     let stretch = (steps / 240).max(1);
-    let training: Vec<Vec<(u32, f64)>> = rounds.iter().map(|round| means(&round.training, stretch)).collect();
-    let validation: Vec<Vec<(u32, f64)>> = rounds.iter().map(|round| round.validation.clone()).collect();
-    let [above, below] = [("Training loss", "", &training), ("Validation loss", "optimiser step", &validation)]
-        .map(|(label, x_label, curves)| panel(label, x_label, steps, curves));
-    style::one_above_the_other("Learning curves", 2 * PANEL_PX, |[top, bottom]| {
-        above.draw(top, |chart| draw_rounds(chart, rounds, &training, 0))?;
-        below.draw(bottom, |chart| draw_rounds(chart, rounds, &validation, 1))
+    let curves = |of: &dyn Fn(&LearningCurve) -> Vec<(u32, f64)>| rounds.iter().map(of).collect::<Vec<_>>();
+    let panels = [
+        ("Validation error of the look-ahead point", "RMS, m", "", curves(&|round| round.validation_rmse_m.clone())),
+        ("Validation loss", "nats per sample", "", curves(&|round| round.validation.clone())),
+        ("Training loss", "nats per sample", "optimiser step", curves(&|round| means(&round.training, stretch))),
+    ];
+    style::stacked("Learning curves", panels.len(), PANEL_PX, |areas| {
+        for (series, (area, (title, y_label, x_label, curves))) in areas.iter().zip(&panels).enumerate() {
+            panel(title, [x_label, y_label], steps, curves)
+                .draw(area, |chart| draw_rounds(chart, rounds, curves, series))?;
+        }
+        Ok(())
     })
 }
 
-/// Height of one of two curves, pixels.
-const PANEL_PX: u32 = 250;
+/// Height of one of the curves, pixels.
+const PANEL_PX: u32 = 230;
 
-fn panel<'a>(title: &'a str, x_label: &'a str, steps: u32, curves: &[Vec<(u32, f64)>]) -> Figure<'a> {
-    let (low, high) = loss_range(curves);
+fn panel<'a>(title: &'a str, [x_label, y_label]: [&'a str; 2], steps: u32, curves: &[Vec<(u32, f64)>]) -> Figure<'a> {
+    let (low, high) = range(curves);
     Figure {
         title,
         height_px: PANEL_PX,
         x: Axis { label: x_label, range: 0.0..1.01 * f64::from(steps.max(1)), ticks: 6, labels: Labels::Numbers(0) },
-        y: Axis {
-            label: "nats per sample",
-            range: low..high,
-            ticks: 5,
-            labels: Labels::Numbers(style::decimals(high - low)),
-        },
+        y: Axis { label: y_label, range: low..high, ticks: 5, labels: Labels::Numbers(style::decimals(high - low)) },
         left_px: 66,
         legend: Vec::new(),
     }
@@ -51,10 +51,10 @@ fn draw_rounds(
     curves: &[Vec<(u32, f64)>],
     series: usize,
 ) -> style::Drawn {
-    let (low, high) = loss_range(curves);
+    let (low, high) = range(curves);
     let mut first = 0;
     for (index, (round, curve)) in rounds.iter().zip(curves).enumerate() {
-        let at = |&(step, loss): &(u32, f64)| (f64::from(first + step), loss.clamp(low, high));
+        let at = |&(step, value): &(u32, f64)| (f64::from(first + step), value.clamp(low, high));
         let points: Vec<(f64, f64)> = curve.iter().map(at).collect();
         if let Some(&last) = points.last() {
             style::marker(chart, series, last, colour(series))?;
@@ -78,17 +78,18 @@ fn draw_rounds(
 fn means(points: &[(u32, f64)], stretch: u32) -> Vec<(u32, f64)> {
     let same = |a: &(u32, f64), b: &(u32, f64)| a.0.saturating_sub(1) / stretch == b.0.saturating_sub(1) / stretch;
     let mean = |points: &[(u32, f64)]| {
-        let sum: f64 = points.iter().map(|&(_, loss)| loss).sum();
+        let sum: f64 = points.iter().map(|&(_, value)| value).sum();
         Some((points.last()?.0, sum / points.len() as f64))
     };
     points.chunk_by(same).filter_map(mean).collect()
 }
 
-/// From the lowest loss to the 99th percentile: the first few steps are many times higher than all others.
-fn loss_range(curves: &[Vec<(u32, f64)>]) -> (f64, f64) {
-    let mut losses: Vec<f64> = curves.iter().flatten().map(|&(_, loss)| loss).filter(|loss| loss.is_finite()).collect();
-    losses.sort_by(f64::total_cmp);
-    let (Some(&low), Some(&high)) = (losses.first(), losses.get((losses.len().max(1) - 1) * 99 / 100)) else {
+/// From the lowest value to the 99th percentile: the first few steps are many times higher than all others.
+fn range(curves: &[Vec<(u32, f64)>]) -> (f64, f64) {
+    let mut values: Vec<f64> =
+        curves.iter().flatten().map(|&(_, value)| value).filter(|value| value.is_finite()).collect();
+    values.sort_by(f64::total_cmp);
+    let (Some(&low), Some(&high)) = (values.first(), values.get((values.len().max(1) - 1) * 99 / 100)) else {
         return (0.0, 1.0);
     };
     let room = 0.1 * (high - low).max(0.02);

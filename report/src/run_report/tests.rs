@@ -1,7 +1,10 @@
 use super::*;
 use evaluation::incidents::{Cause, Findings};
+use experiment::drive::Replay;
 use experiment::run_dir::MANIFEST_SCHEMA;
+use sim::frame::Event;
 use sim::scenario::Direction;
+use std::ops::ControlFlow;
 
 fn failure(driver: &str, lot: &str, speed_mps: f32) -> FailureRecord {
     FailureRecord {
@@ -67,11 +70,38 @@ fn commands_can_be_pasted_into_a_shell() {
     assert!(visualise("vvf@lot-a@forward@0@paper@1@5", runs).ends_with("--config runs/x/settings.toml"));
 }
 
-/// A near-collision of the planner that has most, found by an evaluation and driven again for its picture.
+/// A near-collision of a planner that has many, found by driving, and replayed for its pictures.
 #[test]
-fn a_near_collision_is_driven_again_to_the_tick() {
+fn a_near_collision_plays_and_stands_still_at_its_moment() {
     let settings = Settings::preset("default").unwrap();
-    let missed = moments::picture("tentacle@lot-b@forward@0@paper@1@3", &settings).unwrap_err().to_string();
+    let key: ReplayKey = "tentacle@lot-b@forward@0@paper@1@0".parse().unwrap();
+    let replay = Replay::new(&key, &settings.episode).unwrap();
+    let driver = key.driver.clone().load(&settings.expert, settings.dagger.device).unwrap();
+    let mut tick = None;
+    replay.drive(&settings.episode, &driver, |frame| {
+        tick = matches!(frame.event, Event::NearCollision { .. }).then_some(frame.tick);
+        if tick.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    let key = ReplayKey { tick: tick.unwrap(), ..key }.to_string();
+    let player = moments::player(&key, &settings).unwrap();
+    let shows = |frame: &(String, String)| frame.1.contains(">1 near-collision</text>");
+    let shown = player.frames.iter().position(shows);
+    assert_eq!(shown, Some(player.still), "counted from its moment on");
+    assert!(player.frames.len() > player.still + 5, "and what follows: {}", player.frames.len());
+    let bytes: usize = player.frames.iter().map(|(_, elements)| elements.len()).sum();
+    assert!(bytes + player.background.len() < 1_000_000, "{bytes} bytes: six must fit into 6 MB");
+
+    let missed = moments::player("tentacle@lot-b@forward@0@paper@1@3", &settings).unwrap_err().to_string();
     assert!(missed.contains("it does not happen"), "{missed}");
-    assert!(moments::picture("nobody@lot-b@forward@0@paper@1@3", &settings).is_err());
+    assert!(moments::player("nobody@lot-b@forward@0@paper@1@3", &settings).is_err());
+}
+
+#[test]
+fn runs_are_of_their_lot_or_of_its_kind() {
+    for (lot, lots) in [("lot-b", "lot-b"), ("test-hard-12", "test-hard (13 lots)"), ("test-hard-0", "test-hard")] {
+        assert!(is_in(lot, lots), "{lot} {lots}");
+    }
+    for (lot, lots) in [("lot-b", "all"), ("test-hard-0", "test-hard-1"), ("test-hardest-0", "test-hard (2 lots)")] {
+        assert!(!is_in(lot, lots), "{lot} {lots}");
+    }
 }

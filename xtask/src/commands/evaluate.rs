@@ -1,9 +1,9 @@
 //! `evaluate`: drivers × lots × directions × trials × noise levels.
 
-use super::visualise::{self, RecordArgs};
 use crate::args::{Directions, JsonArgs, LayerArgs, OutArgs, noise_levels};
 use crate::console::Console;
 use crate::output::Output;
+use crate::record::{self, RecordArgs};
 use anyhow::{Context as _, anyhow, ensure};
 use clap::Args;
 use evaluation::estimate;
@@ -12,10 +12,9 @@ use evaluation::summary::Summary;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress};
-use experiment::run_dir::{self, RunDir};
+use experiment::run_dir::{self, Outcome, RunDir};
 use experiment::settings::{Layers, Settings};
 use scenarios::LoadError;
-use serde::Serialize;
 use sim::seed::RootSeed;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -75,20 +74,14 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     console.plan(tasks(&settings, drivers.len()));
     measure(&plan, &run, &console, output)?;
     report::run_report::write(run.path(), &console)?;
-    run.finish(&Finished { drivers: args.drivers.clone() })?;
+    run.finish(Outcome::Evaluation { drivers: args.drivers.clone() })?;
     output.note(format_args!(
         "written: {}/report.html, summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl",
         run.path().display()
     ));
     console.report_time();
     let runs = args.record.record;
-    runs.map_or(Ok(()), |runs| visualise::record(run.path(), vec![visualise::first_runs(&plan, runs)], output))
-}
-
-/// `finished.toml` of an evaluation.
-#[derive(Debug, Serialize)]
-pub(crate) struct Finished {
-    pub(crate) drivers: Vec<String>,
+    runs.map_or(Ok(()), |runs| record::record(run.path(), vec![record::first_runs(&plan, runs)], output))
 }
 
 /// Drives the plan, writes and prints the tables.

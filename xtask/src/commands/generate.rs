@@ -82,7 +82,7 @@ fn pose(text: &str) -> Result<[f32; 3], String> {
         .ok_or_else(|| "write x,y,degrees, e.g. 3.5,-2,90, without spaces".to_owned())
 }
 
-/// Lots made at a time; between two batches Ctrl-C is looked at.
+/// Lots generated at a time; Ctrl-C takes effect between two batches.
 const BATCH: usize = 8;
 
 pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {

@@ -1,6 +1,5 @@
 //! `guard`: does the claim still hold? Trains the default and fails if its policy has become worse. For a nightly run.
 
-use super::evaluate::Finished;
 use super::train;
 use crate::args::OutArgs;
 use crate::console::Console;
@@ -11,10 +10,10 @@ use evaluation::estimate;
 use evaluation::format::exact_rate;
 use evaluation::plan::Plan;
 use evaluation::totals::Totals;
-use experiment::drivers::NamedDriver;
+use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::Interrupted;
-use experiment::run_dir::RunDir;
+use experiment::run_dir::{Outcome, Place, RunDir};
 use experiment::settings::{EvaluationSettings, Settings};
 use serde::Deserialize;
 
@@ -58,12 +57,12 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     let run = RunDir::create(&args.out.place("guard", "default", settings.seed.0), &settings)?;
     output.note(format_args!("run: {}", run.path().display()));
     let interrupted = || Interrupted { kept: format!("what was done is in {}", run.path().display()) };
-    let Ok((policy, _)) = train::tabulated(&settings, &run, &console, output)? else {
+    let Ok((policy, outcome)) = train::tabulated(&settings, &run, &console, output)? else {
         return Err(interrupted().into());
     };
     let driver = NamedDriver::network(
         "DAgger",
-        experiment::drivers::DriverSpec::Run { folder: run.path().to_owned() },
+        DriverSpec::Run { folder: run.path().to_owned() },
         policy,
         settings.dagger.device,
     );
@@ -73,7 +72,7 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
         let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with: 0 };
         let build = crate::build_info::get();
         let path = run.path().join(folder);
-        let place = experiment::run_dir::Place {
+        let place = Place {
             build,
             out: Some(&path),
             overwrite: false,
@@ -86,7 +85,7 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
         if !evaluated.is_complete {
             return Err(interrupted().into());
         }
-        stage.finish(&Finished { drivers: vec!["DAgger".to_owned()] })?;
+        stage.finish(Outcome::Evaluation { drivers: vec!["DAgger".to_owned()] })?;
         let all = evaluated.results.slices().pop().context("nothing was driven")?;
         Ok(evaluated.results.totals(0, 0, &all, None))
     };
@@ -101,7 +100,7 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
             totals.contacts
         ));
     }
-    run.finish(&Finished { drivers: vec!["DAgger".to_owned()] })?;
+    run.finish(outcome)?;
     ensure!(
         reference.near_collisions == 0,
         "the default policy has near-collisions on the three lots; see {}/reference",

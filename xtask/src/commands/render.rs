@@ -1,5 +1,6 @@
 //! `render`: pictures of lots, drives, samples and noise.
 
+use super::render_animation::{self, AnimationArgs};
 use super::{evaluate, reproduce};
 use crate::args::{LayerArgs, OneDirection, noise_levels};
 use crate::console::Console;
@@ -37,6 +38,8 @@ Examples:
   cargo xtask render trajectories --driver expert --driver run:runs/NAME --lots lot-b
   cargo xtask render trajectories --driver expert --lots lot-a --by speed
   cargo xtask render trajectories --run runs/NAME --round 1
+  cargo xtask render animation --driver expert --driver run:runs/NAME --lots lot-b
+  cargo xtask render animation 'tentacle@lot-b@forward@0@paper@1@842'
   cargo xtask render samples runs/NAME/round-01 --count 8
   cargo xtask render noise --lots lot-a --noise paper,hard
   cargo xtask render report runs/NAME";
@@ -61,6 +64,8 @@ pub(crate) enum RenderWhat {
     Lot(RenderLotArgs),
     /// The lines drivers drove over a lot, PNG and SVG.
     Trajectories(TrajectoriesArgs),
+    /// Drives that move: lot and grids side by side, GIF or APNG.
+    Animation(AnimationArgs),
     /// Many lots on one page, PNG and SVG.
     ContactSheet(RenderLotArgs),
     /// Samples of a round's data set with labels and predictions, PNG.
@@ -186,6 +191,7 @@ pub(crate) fn run(args: &RenderArgs, output: &Output) -> anyhow::Result<()> {
         RenderWhat::Lot(what) => render_lots(what, &folder),
         RenderWhat::ContactSheet(what) => contact_sheet(what, &folder),
         RenderWhat::Trajectories(what) => render_trajectories(what, &folder),
+        RenderWhat::Animation(what) => render_animation::run(what, &folder),
         RenderWhat::Samples(what) => render_samples(what, &folder),
         RenderWhat::Noise(what) => render_noise(what, &folder),
         RenderWhat::Report(what) => render_report(&what.run, args.out.is_some().then_some(&folder), output),
@@ -194,10 +200,11 @@ pub(crate) fn run(args: &RenderArgs, output: &Output) -> anyhow::Result<()> {
 }
 
 /// Where pictures go.
-struct Folder<'a> {
+pub(super) struct Folder<'a> {
     path: &'a Path,
     overwrite: bool,
-    output: &'a Output,
+    /// What is said goes here.
+    pub(super) output: &'a Output,
 }
 
 impl Folder<'_> {
@@ -230,7 +237,18 @@ impl Folder<'_> {
         Ok(())
     }
 
-    fn put(&self, path: &Path, content: &[u8]) -> anyhow::Result<()> {
+    /// The file of a picture. Asked before work begins that would be lost if it could not be written.
+    ///
+    /// # Errors
+    /// If it is there already.
+    pub(super) fn file(&self, name: &str, extension: &str) -> anyhow::Result<PathBuf> {
+        let path = self.path.join(format!("{}.{extension}", file_name(name)));
+        self.check_file(&path)?;
+        Ok(path)
+    }
+
+    /// Writes a file and says so.
+    pub(super) fn put(&self, path: &Path, content: &[u8]) -> anyhow::Result<()> {
         std::fs::create_dir_all(self.path)
             .with_context(|| format!("{}: cannot be created; choose another --out", self.path.display()))?;
         write_whole(path, content)?;

@@ -15,10 +15,9 @@ use evaluation::stages::{self, Extent, Stage, Step};
 use experiment::drivers::{self, DriverSpec};
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress as _};
-use experiment::run_dir::{self, Place, RunDir};
+use experiment::run_dir::{self, Outcome, Place, RunDir};
 use experiment::settings::{Layers, Settings};
 use report::reproduction::{self, Recipe};
-use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -82,7 +81,7 @@ pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
     }
     let conclusions = reproduction::write(&recipe, &run)?;
     output.table(|| format!("\nWhat holds here\n\n{conclusions}"), &())?;
-    run.finish(&Finished { stages: recipe.stages.len() })?;
+    run.finish(Outcome::Reproduction { stages: recipe.stages.len() })?;
     output.note(format_args!("written: {}/report.html, report.md, conclusions.csv and figures/", run.path().display()));
     console.report_time();
     Ok(())
@@ -201,8 +200,8 @@ fn perform(stage: &Stage, root: &Path, console: &Console, output: &Output) -> an
             if let Some(chain) = cloning_of {
                 take_over_cloning(&root.join(chain), &path)?;
             }
-            let Ok((_, finished)) = train::tabulated(settings, &run, console, output)? else { return Ok(false) };
-            run.finish(&finished)?;
+            let Ok((_, outcome)) = train::tabulated(settings, &run, console, output)? else { return Ok(false) };
+            run.finish(outcome)?;
         }
         Step::Drive { drivers } => {
             let specs = drivers.iter().map(|(_, spec)| spec.clone()).collect();
@@ -214,22 +213,16 @@ fn perform(stage: &Stage, root: &Path, console: &Console, output: &Output) -> an
             let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with };
             evaluate::check(&plan)?;
             evaluate::measure(&plan, &run, console, output)?;
-            run.finish(&evaluate::Finished { drivers: specs })?;
+            run.finish(Outcome::Evaluation { drivers: specs })?;
         }
         Step::OnPolicy => {
             if !on_policy::run(settings, root, &run, console)? {
                 return Ok(false);
             }
-            run.finish(&evaluate::Finished { drivers: Vec::new() })?;
+            run.finish(Outcome::Evaluation { drivers: Vec::new() })?;
         }
     }
     Ok(true)
-}
-
-/// `finished.toml` of a reproduction.
-#[derive(Serialize)]
-struct Finished {
-    stages: usize,
 }
 
 /// Copies behaviour cloning from a finished chain: complete or not at all.

@@ -1,10 +1,10 @@
 //! `train-bc` and `train-dagger`.
 
 use super::evaluate;
-use super::visualise::{self, RecordArgs};
 use crate::args::{JsonArgs, LayerArgs, OutArgs};
 use crate::console::Console;
 use crate::output::Output;
+use crate::record::{self, RecordArgs};
 use anyhow::Context as _;
 use clap::Args;
 use evaluation::estimate;
@@ -13,13 +13,12 @@ use evaluation::table1::Table1;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress};
-use experiment::run_dir::RunDir;
+use experiment::run_dir::{Outcome, RunDir};
 use experiment::settings::{Layers, Settings};
 use experiment::training;
 use experiment::view_request::Show;
 use policy::checkpoint::Checkpoint;
 use policy::dagger::Stop;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 pub(crate) const DAGGER_EXAMPLES: &str = "\
@@ -89,25 +88,25 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         tasks.extend(evaluate::tasks(&settings, if settings.dagger.iterations_max > 0 { 3 } else { 2 }));
     }
     console.plan(tasks);
-    let (policy, finished) =
+    let (policy, outcome) =
         tabulated(&settings, &run, &console, output)?.map_err(|rounds| cut_short(run.path(), rounds))?;
     let mut to_record = args.record.record.map_or_else(Vec::new, |episodes| {
         let folder = || run.path().to_owned();
         vec![Show::Training { run: folder() }, Show::Rollouts { run: folder(), episodes }]
     });
     if !args.no_eval {
-        let drivers = drivers(&settings, &run, policy, finished.rounds)?;
+        let drivers = drivers(&settings, &run, policy)?;
         let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
         let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: drivers.len() - 1 };
         evaluate::check(&plan)?;
         evaluate::measure(&plan, &run, &console, output)?;
-        to_record.extend(args.record.record.map(|runs| visualise::first_runs(&plan, runs)));
+        to_record.extend(args.record.record.map(|runs| record::first_runs(&plan, runs)));
     }
     report::run_report::write(run.path(), &console)?;
-    run.finish(&finished)?;
+    run.finish(outcome)?;
     print_next_steps(run.path(), output);
     console.report_time();
-    if to_record.is_empty() { Ok(()) } else { visualise::record(run.path(), to_record, output) }
+    if to_record.is_empty() { Ok(()) } else { record::record(run.path(), to_record, output) }
 }
 
 /// Lots that do not exist, or cannot be driven as the settings ask.
@@ -132,7 +131,7 @@ pub(crate) fn tabulated(
     run: &RunDir,
     progress: &dyn Progress,
     output: &Output,
-) -> anyhow::Result<Result<(Checkpoint, Finished), usize>> {
+) -> anyhow::Result<Result<(Checkpoint, Outcome), usize>> {
     let outcome = training::train(settings, run, progress)?;
     let table1 = Table1::new(outcome.rows, outcome.stop);
     table1.write(run)?;
@@ -142,14 +141,7 @@ pub(crate) fn tabulated(
     let (Stop::EtaReached | Stop::IterationCap, Some(policy)) = (outcome.stop, outcome.policy) else {
         return Ok(Err(rounds));
     };
-    Ok(Ok((policy, Finished { stop: outcome.stop, rounds })))
-}
-
-/// How a training ended: `finished.toml`.
-#[derive(Debug, Serialize)]
-pub(crate) struct Finished {
-    stop: Stop,
-    rounds: usize,
+    Ok(Ok((policy, Outcome::Training { stop: outcome.stop, rounds })))
 }
 
 fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
@@ -159,7 +151,7 @@ fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
 }
 
 /// Expert, behaviour cloning and what became of it.
-fn drivers(settings: &Settings, run: &RunDir, policy: Checkpoint, rounds: usize) -> anyhow::Result<Vec<NamedDriver>> {
+fn drivers(settings: &Settings, run: &RunDir, policy: Checkpoint) -> anyhow::Result<Vec<NamedDriver>> {
     let device = settings.dagger.device;
     let cloned = Checkpoint::load(&run.path().join("round-00")).context("behaviour cloning of this run")?;
     let spec = |folder: PathBuf| DriverSpec::Run { folder };
@@ -167,7 +159,7 @@ fn drivers(settings: &Settings, run: &RunDir, policy: Checkpoint, rounds: usize)
         NamedDriver::expert(&settings.expert),
         NamedDriver::network("BC", spec(run.path().join("bc")), cloned, device),
     ];
-    if rounds > 1 {
+    if run.path().join("round-01").is_dir() {
         drivers.push(NamedDriver::network("DAgger", spec(run.path().to_owned()), policy, device));
     }
     Ok(drivers)

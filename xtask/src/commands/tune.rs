@@ -8,9 +8,8 @@ use clap::Args;
 use evaluation::tune;
 use experiment::lots::Lot;
 use experiment::progress::Interrupted;
-use experiment::run_dir::RunDir;
+use experiment::run_dir::{Outcome, RunDir};
 use experiment::settings::{Layers, NoiseChoice, Settings};
-use serde::Serialize;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 
@@ -46,12 +45,6 @@ pub(crate) struct TuneArgs {
     out: OutArgs,
 }
 
-/// `finished.toml` of a tuning.
-#[derive(Serialize)]
-struct Finished {
-    planners: Vec<&'static str>,
-}
-
 pub(crate) fn run(args: &TuneArgs, output: &Output) -> anyhow::Result<()> {
     let layers = Layers::from(&args.layers);
     let mut settings = Settings::resolve(&layers, None)?;
@@ -77,7 +70,7 @@ pub(crate) fn run(args: &TuneArgs, output: &Output) -> anyhow::Result<()> {
     let table = report::tuning::table(&tuned);
     output.table(|| format!("\n{table}"), &())?;
     run.write("tuning.md", format!("{table}\n").as_bytes())?;
-    run.finish(&Finished { planners: tuned.iter().map(|found| found.planner.name()).collect() })?;
+    run.finish(Outcome::Tuning { planners: tuned.iter().map(|found| found.planner.name().to_owned()).collect() })?;
     output.note(format_args!("written: {}/*.toml; drive one with --driver NAME:{0}/NAME.toml", run.path().display()));
     console.report_time();
     Ok(())

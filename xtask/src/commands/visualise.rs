@@ -1,16 +1,15 @@
-//! `visualise`, and `--record` of other commands: requests to the viewer program.
+//! `visualise`: requests to the viewer program.
 
 use super::evaluate;
 use crate::args::{LayerArgs, OneDirection};
 use crate::output::Output;
+use crate::record::recordings_of;
 use crate::viewer;
 use anyhow::{bail, ensure};
 use clap::{Args, Subcommand};
-use evaluation::plan::Plan;
 use evaluation::records::{self, FailureRecord};
 use experiment::drivers::DriverSpec;
 use experiment::lots::Lot;
-use experiment::progress::Interrupted;
 use experiment::replay_key::ReplayKey;
 use experiment::run_dir;
 use experiment::settings::{Layers, NoiseChoice};
@@ -131,15 +130,6 @@ struct FailuresArgs {
     limit: usize,
 }
 
-/// `--record`.
-#[derive(Debug, Clone, Default, Args)]
-pub(crate) struct RecordArgs {
-    /// When all is done, records the first N runs of every driver at every noise level for Rerun's viewer, into the folder
-    /// of the run; of a training also its learning curves and the first N episodes of every round.
-    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1")]
-    pub(crate) record: Option<usize>,
-}
-
 pub(crate) fn run(args: &VisualiseArgs, output: &Output) -> anyhow::Result<()> {
     let (show, file) = match &args.what {
         What::Lot(lot) => {
@@ -171,11 +161,6 @@ fn sink_of(args: &SinkArgs, otherwise: Sink) -> Sink {
         (None, false, Some(url)) => Sink::Connect((!url.is_empty()).then(|| url.clone())),
         (None, false, None) => otherwise,
     }
-}
-
-/// Where the recordings of a run are kept.
-fn recordings_of(run: &Path) -> PathBuf {
-    run.join("recordings")
 }
 
 /// A run by several drivers, and the name of its file.
@@ -223,44 +208,4 @@ fn failures_of(args: &FailuresArgs, output: &Output) -> anyhow::Result<Show> {
     };
     let drives = failures.iter().take(args.limit).enumerate().map(drive).collect::<anyhow::Result<_>>()?;
     Ok(Show::Drives { settings: Box::new(run_dir::settings_of(&args.run)?), drives })
-}
-
-/// The first runs of every driver at every noise level, as in the evaluation.
-pub(crate) fn first_runs(plan: &Plan<'_>, runs: usize) -> Show {
-    let evaluation = &plan.settings.evaluation;
-    let mut drives = Vec::new();
-    for &noise in &evaluation.noise {
-        for driver in plan.drivers {
-            for trial in plan.trials().take(runs) {
-                let (lot, way, index) = (trial.lot.name(), trial.direction.name(), trial.index);
-                let title = format!("{}, {noise}, {lot}, {way}, trial {index}", driver.name);
-                let key = ReplayKey {
-                    driver: driver.spec.clone(),
-                    lot: trial.lot.spec(),
-                    direction: trial.direction,
-                    trial: index,
-                    noise,
-                    seed: evaluation.seed,
-                    tick: 0,
-                };
-                let file = file_name(&title.replace(", ", "-").replace(' ', "-"));
-                drives.push(DriveRequest { file, title, keys: vec![key] });
-            }
-        }
-    }
-    Show::Drives { settings: Box::new(plan.settings.clone()), drives }
-}
-
-/// Records into the folder of a run that is finished. What goes wrong is said and does the run no harm.
-///
-/// # Errors
-/// By Ctrl-C.
-pub(crate) fn record(run: &Path, show: Vec<Show>, output: &Output) -> anyhow::Result<()> {
-    match viewer::ask(&ViewRequest { sink: Sink::Folder(recordings_of(run)), show }, output) {
-        Err(error) if !error.is::<Interrupted>() => {
-            output.note(format_args!("warning: {error:#}"));
-            Ok(())
-        }
-        result => result,
-    }
 }

@@ -1,0 +1,198 @@
+//! `render animation`: drives that move, as GIF or APNG.
+
+use super::evaluate;
+use super::render::Folder;
+use crate::args::{LayerArgs, OneDirection, noise_levels};
+use crate::console::Console;
+use crate::output::Output;
+use anyhow::{Context as _, ensure};
+use clap::{Args, ValueEnum};
+use experiment::drive::Replay;
+use experiment::drivers::DriverSpec;
+use experiment::progress::{Interrupted, Progress as _};
+use experiment::replay_key::ReplayKey;
+use experiment::settings::{Layers, Settings};
+use report::pictures::animation::{Camera, Layout, Scene, Take};
+use report::pictures::encode::Format;
+use sim::seed::RootSeed;
+
+/// Before and after the tick of a replay key, seconds.
+const AROUND_S: [f32; 2] = [8.0, 3.0];
+/// What a README or a report may carry.
+const LIMIT_BYTES: usize = 3_000_000;
+/// Frames of a whole drive that play faster than life.
+const FRAMES_WANTED: f32 = 320.0;
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct AnimationArgs {
+    /// Replay keys of one trial, as a report or failures.md lists them: the seconds around their ticks.
+    #[arg(value_name = "KEY", required_unless_present = "drivers")]
+    keys: Vec<String>,
+    /// Instead: who drives, as in an evaluation; may be repeated. See `cargo xtask drivers`.
+    #[arg(long = "driver", value_name = "SPEC", num_args = 1.., conflicts_with = "keys")]
+    drivers: Vec<String>,
+    /// Lot to drive; see `cargo xtask lots`.
+    #[arg(long, value_name = "SPEC", default_value = "lot-a", conflicts_with = "keys")]
+    lots: String,
+    /// Which way.
+    #[arg(long, default_value = "forward", conflicts_with = "keys")]
+    directions: OneDirection,
+    /// Which trial: obstacles and noise.
+    #[arg(long, default_value_t = 0, conflicts_with = "keys")]
+    trial: u32,
+    /// What is seen wrongly: clean, paper, hard, lot or a multiple of paper.
+    #[arg(long, value_name = "LEVEL", default_value = "paper", conflicts_with = "keys")]
+    noise: String,
+    /// Seed of obstacles and noise of the trials.
+    #[arg(long, conflicts_with = "keys")]
+    seed: Option<u64>,
+    /// Start of what is shown, seconds [default: 8 s before the tick of a key, else 0].
+    #[arg(long, value_name = "SECONDS")]
+    from: Option<f32>,
+    /// End of what is shown, seconds [default: 3 s after the tick of a key, else the end of the drives].
+    #[arg(long, value_name = "SECONDS")]
+    to: Option<f32>,
+    /// What the top view shows [default: the place around the tick of a key, else the lot].
+    #[arg(long)]
+    view: Option<ViewChoice>,
+    /// Times faster than life [default: 1 for keys, else so that it takes about half a minute].
+    #[arg(long, value_name = "FACTOR")]
+    speed: Option<f32>,
+    /// Frames per second; fewer are kept where the file would be larger than 3 MB.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=50))]
+    fps: u16,
+    /// File format.
+    #[arg(long, default_value = "gif")]
+    format: FormatChoice,
+    /// Name of the file without ending [default: drive-LOT-DIRECTION-trial-N].
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+    #[command(flatten)]
+    layers: LayerArgs,
+}
+
+/// What the top view shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ViewChoice {
+    /// The whole lot.
+    Lot,
+    /// 28 m around the car of the first driver.
+    Follow,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum FormatChoice {
+    /// GIF.
+    Gif,
+    /// Animated PNG.
+    Apng,
+}
+
+pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
+    let (settings, keys) = resolve(args, folder.output)?;
+    let first = &keys[0];
+    let trial = format!("{} {} trial {}", first.lot, first.direction.name(), first.trial);
+    let format = match args.format {
+        FormatChoice::Gif => Format::Gif,
+        FormatChoice::Apng => Format::Apng,
+    };
+    let path = folder.file(args.name.as_ref().unwrap_or(&format!("drive-{trial}")), format.extension())?;
+
+    let replay = Replay::new(first, &settings.episode)?;
+    let period_s = replay.episode_settings(&settings.episode).control_period_s();
+    let ticks: Vec<f32> = keys.iter().filter(|key| key.tick > 0).map(|key| key.tick as f32 * period_s).collect();
+    let earliest_s = ticks.iter().copied().reduce(f32::min);
+    let to_s = args.to.or(ticks.iter().copied().reduce(f32::max).map(|latest_s| latest_s + AROUND_S[1]));
+    let takes = drive(&replay, &settings, &keys, to_s.map(|to_s| (to_s / period_s).ceil() as u32), folder.output)?;
+
+    let end_s = takes.iter().map(|take| take.frames.len() - 1).max().unwrap_or(0) as f32 * period_s;
+    let from_s = args.from.or(earliest_s.map(|at_s| at_s - AROUND_S[0])).unwrap_or(0.0).max(0.0);
+    let to_s = to_s.unwrap_or(end_s).min(end_s);
+    ensure!(from_s < to_s, "from {from_s:.1} s to {to_s:.1} s there is nothing to show; choose other --from and --to");
+    let fps = f32::from(args.fps);
+    let whole = ((to_s - from_s) * fps / FRAMES_WANTED).ceil().max(1.0);
+    let speed = args.speed.unwrap_or(if ticks.is_empty() { whole } else { 1.0 });
+    ensure!(speed > 0.0, "--speed must be positive");
+    let step_s = speed / fps;
+    let times: Vec<f32> = (0..=((to_s - from_s) / step_s) as u32).map(|i| from_s + i as f32 * step_s).collect();
+
+    let camera = match (args.view, earliest_s) {
+        (Some(ViewChoice::Follow), _) => Camera::Follow,
+        (None, Some(at_s)) => {
+            let frames = &takes[0].frames;
+            let pose = frames[((at_s / period_s).round() as usize).min(frames.len() - 1)].vehicle.pose;
+            Camera::Place(pose.position() + 3.0 * pose.ahead())
+        }
+        (Some(ViewChoice::Lot), _) | (None, None) => Camera::Lot,
+    };
+    let layout = if camera == Camera::Lot { Layout::fitting(&replay.map) } else { Layout::Beside };
+    let title = format!("{trial}, noise {}, {speed:.0}x", first.noise);
+    let console = Console::new(folder.output);
+    console.begin("animation", "drawing");
+    let scene = Scene::new(&replay, &settings.episode, takes, &times, (camera, layout), title);
+    let reel = scene.reel()?;
+    let (bytes, stride) = reel.encode_within(LIMIT_BYTES, 100 / args.fps, format)?;
+    let fewer = if stride == 1 { String::new() } else { format!(", one of {stride} kept for size") };
+    console.end(&format!("{} frames{fewer}", reel.len()));
+    folder.put(&path, &bytes)
+}
+
+/// What is to be driven: a key per driver.
+fn resolve(args: &AnimationArgs, output: &Output) -> anyhow::Result<(Settings, Vec<ReplayKey>)> {
+    let keys: Vec<ReplayKey> = args.keys.iter().map(|key| key.parse()).collect::<anyhow::Result<_>>()?;
+    let drivers = if keys.is_empty() {
+        DriverSpec::parse_all(&args.drivers)?
+    } else {
+        keys.iter().map(|key| key.driver.clone()).collect()
+    };
+    let (settings, _) = evaluate::settings_for(&drivers, &Layers::from(&args.layers), output)?;
+    if let Some(first) = keys.first() {
+        let trial = |key: &ReplayKey| (key.lot.clone(), key.direction, key.trial, key.noise, key.seed);
+        for key in &keys {
+            ensure!(
+                trial(key) == trial(first),
+                "{key} is of another trial than {first}; one animation shows one lot, direction, trial, noise and seed"
+            );
+        }
+        return Ok((settings, keys));
+    }
+    let levels = noise_levels(std::slice::from_ref(&args.noise))?;
+    let [noise] = levels[..] else { anyhow::bail!("--noise {}: name one level", args.noise) };
+    let seed = args.seed.map_or(settings.evaluation.seed, RootSeed);
+    let key = |driver: DriverSpec| ReplayKey {
+        driver,
+        lot: args.lots.clone(),
+        direction: args.directions.into(),
+        trial: args.trial,
+        noise,
+        seed,
+        tick: 0,
+    };
+    Ok((settings, drivers.into_iter().map(key).collect()))
+}
+
+fn drive(
+    replay: &Replay,
+    settings: &Settings,
+    keys: &[ReplayKey],
+    last_tick: Option<u32>,
+    output: &Output,
+) -> anyhow::Result<Vec<Take>> {
+    let console = Console::new(output);
+    let length_m = replay.map.path().length_m();
+    let mut takes = Vec::new();
+    for key in keys {
+        let driver = key.driver.clone().load(&settings.expert, settings.dagger.device)?;
+        driver.check(&settings.episode).with_context(|| key.to_string())?;
+        console.begin("driving", &driver.name);
+        let take = Take::of(replay, &settings.episode, &driver, last_tick, |frame| {
+            console.at(f64::from(frame.progress_m / length_m), &mut |_| format!("{} ticks", frame.tick));
+        });
+        if console.is_cancelled() {
+            return Err(Interrupted { kept: "nothing was written".to_owned() }.into());
+        }
+        console.end(&format!("{} ticks", take.frames.len()));
+        takes.push(take);
+    }
+    Ok(takes)
+}

@@ -1,0 +1,65 @@
+//! `--record` of commands that drive: what they drove, replayed by the viewer program into the folder of the run.
+
+use crate::output::Output;
+use crate::viewer;
+use clap::Args;
+use evaluation::plan::Plan;
+use experiment::progress::Interrupted;
+use experiment::replay_key::ReplayKey;
+use experiment::view_request::{DriveRequest, Show, Sink, ViewRequest};
+use report::pictures::file_name;
+use std::path::{Path, PathBuf};
+
+/// `--record`.
+#[derive(Debug, Clone, Default, Args)]
+pub(crate) struct RecordArgs {
+    /// When all is done, records the first N runs of every driver at every noise level for Rerun's viewer, into the folder
+    /// of the run; of a training also its learning curves and the first N episodes of every round.
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1")]
+    pub(crate) record: Option<usize>,
+}
+
+/// The first runs of every driver at every noise level, as in the evaluation.
+pub(crate) fn first_runs(plan: &Plan<'_>, runs: usize) -> Show {
+    let evaluation = &plan.settings.evaluation;
+    let mut drives = Vec::new();
+    for &noise in &evaluation.noise {
+        for driver in plan.drivers {
+            for trial in plan.trials().take(runs) {
+                let (lot, way, index) = (trial.lot.name(), trial.direction.name(), trial.index);
+                let title = format!("{}, {noise}, {lot}, {way}, trial {index}", driver.name);
+                let key = ReplayKey {
+                    driver: driver.spec.clone(),
+                    lot: trial.lot.spec(),
+                    direction: trial.direction,
+                    trial: index,
+                    noise,
+                    seed: evaluation.seed,
+                    tick: 0,
+                };
+                let file = file_name(&title.replace(", ", "-").replace(' ', "-"));
+                drives.push(DriveRequest { file, title, keys: vec![key] });
+            }
+        }
+    }
+    Show::Drives { settings: Box::new(plan.settings.clone()), drives }
+}
+
+/// Records into the folder of a run that is finished. What goes wrong is said and does the run no harm.
+///
+/// # Errors
+/// By Ctrl-C.
+pub(crate) fn record(run: &Path, show: Vec<Show>, output: &Output) -> anyhow::Result<()> {
+    match viewer::ask(&ViewRequest { sink: Sink::Folder(recordings_of(run)), show }, output) {
+        Err(error) if !error.is::<Interrupted>() => {
+            output.note(format_args!("warning: {error:#}"));
+            Ok(())
+        }
+        result => result,
+    }
+}
+
+/// Where the recordings of a run are kept.
+pub(crate) fn recordings_of(run: &Path) -> PathBuf {
+    run.join("recordings")
+}
