@@ -36,7 +36,7 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         assert!(quiet < threads && help.rfind("--").unwrap() >= threads, "{command}: --threads is the last flag");
         insta::assert_snapshot!(format!("help-{command}"), help);
     }
-    for what in ["lot", "trajectories", "contact-sheet", "samples", "noise", "report", "results"] {
+    for what in ["lot", "trajectories", "contact-sheet", "samples", "noise", "report", "results", "animation"] {
         insta::assert_snapshot!(format!("help-render-{what}"), printed(&["render", what, "--help"]));
     }
 }
