@@ -396,9 +396,8 @@ fn settings_keys() -> BTreeSet<String> {
         }
     }
     let mut keys = BTreeSet::new();
-    let all = Helps::default().has_flag(&["settings"], "--all").then_some("--all");
     for preset in ["default", "paper", "smoke"] {
-        let text = succeed(xtask().args(["settings", "--preset", preset]).args(all));
+        let text = succeed(xtask().args(["settings", "--all", "--preset", preset]));
         collect("", &text.parse().unwrap(), &mut keys);
     }
     keys
