@@ -25,7 +25,7 @@ const REPLACED: [(&str, &str); 24] = [
     ("smear", "occlusion"),
     ("smeared", "occluded"),
     ("station_m", "arc_length_m"),
-    ("station_share", "arc_reach_share"),
+    ("station_share", "reach_share"),
     ("steady hand", "action smoothing"),
     ("the bench", "the command line"),
     ("what stands about", "obstacles"),

@@ -1,6 +1,6 @@
 //! Drives the scripted expert over the reference lots and prints what came of it.
 //!
-//! `cargo run -p expert --example drive_lots -- --seeds 20 --lots a --set arc_reach_share=0.7`
+//! `cargo run -p expert --example drive_lots -- --seeds 20 --lots a --set point_clearance_m=0.2`
 #![allow(clippy::print_stdout, reason = "a tool that prints")]
 #![allow(clippy::disallowed_methods, reason = "it also times: microseconds per decision")]
 

@@ -66,15 +66,6 @@ pub(crate) struct Ground<'a> {
 }
 
 impl Ground<'_> {
-    /// The point of an arc: far where the way is free (the paper's third rule), and near where it is not, which is
-    /// slow. `first_free_m` and `plan_free_m` are travels of the bumper.
-    pub(crate) fn label_on(&self, curvature_per_m: f32, first_free_m: f32, plan_free_m: f32) -> Label {
-        let point_free_m = self.drivable_arc_length_m(curvature_per_m) - self.context.vehicle.front_m();
-        let free_m = first_free_m.max(point_free_m.min(plan_free_m));
-        let arc_length_m = self.context.vehicle.front_m() + self.settings.arc_reach_share * free_m;
-        self.kept_drivable(Label { curvature_per_m, arc_length_m })
-    }
-
     /// How far along a band a point can be seen and reached over open ground, metres from the rear axle: the paper's
     /// third rule. Where the arc to a point comes near a boundary, it fades.
     pub(crate) fn open_way_m(&self, band: &ElasticBand) -> f32 {

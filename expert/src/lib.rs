@@ -164,9 +164,8 @@ impl ScriptedExpert {
         }
 
         let (chosen, clearance_m, wish) = if let Some((level, plan)) = best {
-            // Rule three: on that arc, half as far as possible.
-            let arc = ground.label_on(self.arcs.curvature_per_m(plan.first), plan.first_free_m, plan.free_m);
-            let label = self.smoothed(&search, &ground, &plan, arc);
+            // Rule three: half as far as possible.
+            let label = self.smoothed(&search, &ground, &plan);
             let rule = match level {
                 0 if plan.first_free_m >= self.settings.obstacle_ahead_m => Rule::Far,
                 0 => Rule::Avoid,
@@ -192,7 +191,7 @@ impl ScriptedExpert {
     /// to steer at; in corners, and where pursuing the way is never safe, the plan's own arc.
     ///
     /// Every share fades to 0 gradually, so a small change of the scene moves the label little.
-    fn smoothed(&self, search: &Search<'_>, ground: &Ground<'_>, plan: &Plan, arc: Label) -> Label {
+    fn smoothed(&self, search: &Search<'_>, ground: &Ground<'_>, plan: &Plan) -> Label {
         let mut band = ElasticBand::along(search.way(plan, elastic_band::SPACING_M), search.start.ahead);
         band.relax(search.truth.map.distance_field(), &self.settings.elastic_band);
         let open_m = ground.open_way_m(&band);
@@ -212,7 +211,7 @@ impl ScriptedExpert {
                 break;
             }
         }
-        curvature_per_m += rest * arc.curvature_per_m;
+        curvature_per_m += rest * self.arcs.curvature_per_m(plan.first);
         let front_m = self.context.vehicle.front_m();
         let arc_length_m = front_m + (settings.reach_share * (open_m - front_m)).min(settings.reach_max_m);
         ground.kept_drivable(Label { curvature_per_m, arc_length_m })

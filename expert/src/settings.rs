@@ -128,9 +128,6 @@ pub struct ExpertSettings {
     /// A plan must gain this share of its travel along the route: no turning back (docs/methods.md 3.2).
     pub progress_share: f32,
 
-    /// Where a plan's own arc is steered at (in corners): share of the free travel ahead of the bumper at which the
-    /// point lies: half of the .8 of docs/methods.md E5.2, as `ElasticBandSettings::reach_share`.
-    pub arc_reach_share: f32,
     /// Clearance of the point and of the way to it, metres (docs/methods.md E5.2).
     pub point_clearance_m: f32,
     /// Free travel along the first arc below which an obstacle is "ahead", metres (docs/methods.md 3.2.5). For counting.
@@ -199,7 +196,6 @@ impl ExpertSettings {
                 trust_from_m: 0.1,
             },
             progress_share: 0.3,
-            arc_reach_share: 0.4,
             point_clearance_m: 0.1,
             obstacle_ahead_m: 8.0,
             label_turn_max_rad: 0.8,

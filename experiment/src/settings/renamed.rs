@@ -1,7 +1,7 @@
 //! Keys of earlier versions and what became of them.
 
 /// Old key or section, new one.
-pub(super) const RENAMED: [(&str, &str); 12] = [
+pub(super) const RENAMED: [(&str, &str); 11] = [
     ("dagger.relooks", "dagger.noise_augmentations"),
     ("dagger.network.symmetric", "dagger.inference.mirror_averaging"),
     ("dagger.network.mirror_averaging", "dagger.inference.mirror_averaging"),
@@ -10,20 +10,20 @@ pub(super) const RENAMED: [(&str, &str); 12] = [
     ("dagger.disturbance.lasts_ticks", "dagger.disturbance.duration_ticks"),
     ("dagger.fit_iteration", "dagger.fit"),
     ("expert.band", "expert.elastic_band"),
-    ("expert.station_share", "expert.arc_reach_share"),
     ("expert.load_band_m", "expert.load_range_m"),
     ("expert.label_sideways_step_m", "expert.label_lateral_step_m"),
     ("episode.sensing.smear", "episode.sensing.occlusion"),
 ];
 
 /// Old key or section, and why it is gone.
-pub(super) const REMOVED: [(&str, &str); 4] = [
+pub(super) const REMOVED: [(&str, &str); 5] = [
     ("dagger.geometry", "the grid is that of episode.sensing.geometry"),
     (
         "dagger.fit_cloning",
         "every training has the settings dagger.fit; behaviour cloning differs in dagger.cloning_budget",
     ),
     ("dagger.fit_final", "every training has the settings dagger.fit; the last one differs in dagger.final_budget"),
+    ("expert.station_share", "its range was discarded; set expert.elastic_band.reach_share"),
     ("episode.vehicle.steering_ratio", "nothing read it; set steering_max_rad and steering_rate_max_radps"),
 ];
 

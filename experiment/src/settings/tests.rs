@@ -138,7 +138,7 @@ fn errors_name_the_key_and_what_there_is() {
         (&["episode.noise.blob=-0.5"], &["episode.noise.blob = -0.5", "0 to 100 × level paper"]),
         (&["episode.vehicle.wheelbase_m=nan"], &["episode.vehicle.wheelbase_m = NaN"]),
         (&["expert.elastic_band.reach_share=-1"], &["expert.elastic_band.reach_share = -1", "more than 0, at most 1"]),
-        (&["expert.arc_reach_share=nan"], &["expert.arc_reach_share = NaN"]),
+        (&["expert.point_clearance_m=nan"], &["expert.point_clearance_m = NaN"]),
         (&["expert.weights.load=-0.1"], &["expert.weights.load = -0.1", "0 to 100"]),
         (&["expert.branch_travels_m=[0.8, 2.0, -3.6, 5.4, 7.6]"], &["expert.branch_travels_m = -3.6"]),
         (&["episode.controller.speed_min_mps=3"], &["speed_min_mps = 3", "speed_max_mps = 2.2"]),
