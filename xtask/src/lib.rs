@@ -9,6 +9,7 @@ mod commands;
 mod console;
 mod interrupt;
 mod output;
+mod picture_folder;
 mod record;
 mod viewer;
 

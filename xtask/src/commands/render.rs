@@ -5,6 +5,7 @@ use super::{evaluate, reproduce};
 use crate::args::{LayerArgs, OneDirection, noise_levels};
 use crate::console::Console;
 use crate::output::Output;
+use crate::picture_folder::Folder;
 use anyhow::{Context as _, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use experiment::drive::Replay;
@@ -12,16 +13,15 @@ use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::Progress as _;
 use experiment::replay_key::ReplayKey;
-use experiment::run_dir::{self, write_whole};
+use experiment::run_dir;
 use experiment::settings::{Layers, NoiseChoice, Settings};
 use experiment::training;
 use experiment::trials::{Purpose, Trial};
 use policy::checkpoint::Checkpoint;
 use policy::dataset::store::Store;
 use rayon::prelude::*;
-use report::pictures::drawing::Drawing;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
-use report::pictures::{contact_sheet, file_name, lot, noise, samples};
+use report::pictures::{contact_sheet, lot, noise, samples};
 use report::{reproduction, run_report};
 use sim::map::Map;
 use sim::scenario::Direction;
@@ -196,64 +196,6 @@ pub(crate) fn run(args: &RenderArgs, output: &Output) -> anyhow::Result<()> {
         RenderWhat::Noise(what) => render_noise(what, &folder),
         RenderWhat::Report(what) => render_report(&what.run, args.out.is_some().then_some(&folder), output),
         RenderWhat::Results(what) => render_results(what, output),
-    }
-}
-
-/// Where pictures go.
-pub(super) struct Folder<'a> {
-    path: &'a Path,
-    overwrite: bool,
-    /// What is said goes here.
-    pub(super) output: &'a Output,
-}
-
-impl Folder<'_> {
-    /// Writes a picture as PNG, and as SVG where it is made of lines.
-    fn write(&self, name: &str, drawing: &Drawing, is_vector: bool) -> anyhow::Result<()> {
-        self.check(name, is_vector)?;
-        let mut contents = vec![drawing.to_png()?];
-        if is_vector {
-            contents.push(drawing.to_svg().into_bytes());
-        }
-        self.files(name, is_vector).iter().zip(contents).try_for_each(|(path, content)| self.put(path, &content))
-    }
-
-    fn files(&self, name: &str, is_vector: bool) -> Vec<PathBuf> {
-        let extensions: &[&str] = if is_vector { &["png", "svg"] } else { &["png"] };
-        extensions.iter().map(|extension| self.path.join(format!("{}.{extension}", file_name(name)))).collect()
-    }
-
-    /// Refuses to replace files unasked: before anything is driven or drawn.
-    fn check(&self, name: &str, is_vector: bool) -> anyhow::Result<()> {
-        self.files(name, is_vector).iter().try_for_each(|path| self.check_file(path))
-    }
-
-    fn check_file(&self, path: &Path) -> anyhow::Result<()> {
-        ensure!(
-            self.overwrite || !path.exists(),
-            "{}: exists already; choose another --out, or replace it with --overwrite",
-            path.display()
-        );
-        Ok(())
-    }
-
-    /// The file of a picture. Asked before work begins that would be lost if it could not be written.
-    ///
-    /// # Errors
-    /// If it is there already.
-    pub(super) fn file(&self, name: &str, extension: &str) -> anyhow::Result<PathBuf> {
-        let path = self.path.join(format!("{}.{extension}", file_name(name)));
-        self.check_file(&path)?;
-        Ok(path)
-    }
-
-    /// Writes a file and says so.
-    pub(super) fn put(&self, path: &Path, content: &[u8]) -> anyhow::Result<()> {
-        std::fs::create_dir_all(self.path)
-            .with_context(|| format!("{}: cannot be created; choose another --out", self.path.display()))?;
-        write_whole(path, content)?;
-        self.output.print(format_args!("{}: {} kB", path.display(), content.len().div_ceil(1000)));
-        Ok(())
     }
 }
 

@@ -1,10 +1,10 @@
 //! `render animation`: drives that move, as GIF or APNG.
 
 use super::evaluate;
-use super::render::Folder;
 use crate::args::{LayerArgs, OneDirection, noise_levels};
 use crate::console::Console;
 use crate::output::Output;
+use crate::picture_folder::Folder;
 use anyhow::{Context as _, ensure};
 use clap::{Args, ValueEnum};
 use experiment::drive::Replay;
