@@ -91,7 +91,9 @@ impl Page {
                 Event::Text(part) if is_commands => page.add_block(line, &part),
                 Event::Text(part) => heading.iter_mut().for_each(|title| title.push_str(&part)),
                 Event::Code(code) => {
-                    heading.iter_mut().for_each(|title| title.push_str(&code));
+                    if let Some(title) = &mut heading {
+                        title.push_str(&code);
+                    }
                     page.inline.push(Code { line, text: code.replace('\n', " ") });
                 }
                 _ => {}

@@ -34,7 +34,7 @@ pub fn training(settings: &Settings, has_cloning: bool) -> Vec<Task> {
         // On about as many samples as eight round trips of lot a give.
         f64::from(fit.steps(50_000)) * fit.batch as f64 * multiply_adds(&dagger.network) / TRAINED_PER_S
     };
-    let rounds = if has_cloning { 0 } else { 1 }..=dagger.iterations_max;
+    let rounds = u32::from(!has_cloning)..=dagger.iterations_max;
     let mut tasks: Vec<Task> = rounds
         .flat_map(|round| [("collecting", collecting_s), ("training", fitting_s(&dagger.fit_of_round(round)))])
         .collect();

@@ -143,6 +143,7 @@ fn failures(
     kept.iter().zip(explained).map(failure).collect()
 }
 
+#[expect(clippy::disallowed_methods, reason = "wall_time.jsonl is for people; nothing computed depends on it")]
 fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> DrivenBatch {
     let started = Instant::now();
     let mut monitor = IncidentMonitor::new(batch.trials.len(), batch.episode);

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Driver, Fleet, Seat, SensorsOnly, Source};
 use sim::episode::EpisodeSettings;
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -311,7 +311,7 @@ impl PlannerFile {
         let planner = published(spec)?;
         let mut text = format!("# {}\n", planner.about());
         for (parameter, span) in planner.search_space() {
-            text += &format!("# cargo xtask tune searches {parameter}: {span}\n");
+            let _ = writeln!(text, "# cargo xtask tune searches {parameter}: {span}");
         }
         let file = Self { planner: spec.to_owned(), parameters: planner.parameters(), search: None };
         Ok(text + "\n" + &toml::to_string(&file)?)

@@ -137,12 +137,11 @@ pub fn escaped(text: &str) -> String {
         // Within a word, as in `my_lot`, an underscore means nothing.
         let is_inner = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
         let is_special = match letter {
-            '\\' | '`' | '*' | '[' | ']' | '<' | '|' | '~' | '&' | '!' => true,
+            '\\' | '`' | '*' | '[' | ']' | '<' | '|' | '~' | '&' | '!' | '@' => true,
             '_' => !(is_inner(before) && is_inner(rest.peek().copied())),
             // What some renderers make links of by themselves.
             ':' => rest.peek() == Some(&'/'),
             '.' => out.to_lowercase().ends_with("www"),
-            '@' => true,
             _ => false,
         };
         if is_special {

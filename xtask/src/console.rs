@@ -49,7 +49,7 @@ impl Plan {
     /// Takes the next task of this stage off the plan, and what was to come before it: that is not needed any more.
     fn begin(&mut self, stage: &str) -> Option<f64> {
         let place = self.to_come.iter().position(|(planned, _)| *planned == stage)?;
-        self.to_come.drain(..=place).last().map(|(_, seconds)| seconds)
+        self.to_come.drain(..=place).next_back().map(|(_, seconds)| seconds)
     }
 
     /// Seconds left of the whole command, given how much of the running task is done.

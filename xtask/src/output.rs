@@ -103,7 +103,9 @@ impl Output {
             about: &'a str,
         }
         if !self.is_json {
-            names.iter().for_each(|(name, about)| self.print(format_args!("{name:15} {about}")));
+            for (name, about) in names {
+                self.print(format_args!("{name:15} {about}"));
+            }
             return Ok(());
         }
         let names: Vec<Name<'_>> = names.iter().map(|&(name, about)| Name { name, about }).collect();

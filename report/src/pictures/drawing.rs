@@ -76,6 +76,7 @@ impl Drawing {
     }
 
     /// An empty picture that hides nothing: what changes from frame to frame, to be laid over a picture of this size.
+    #[must_use]
     pub fn overlay(&self) -> Self {
         Self { ground: None, shapes: Vec::new(), ..*self }
     }
