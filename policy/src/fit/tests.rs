@@ -146,3 +146,17 @@ fn patience_ends_a_training_that_no_longer_improves() {
     // The best, then two validations that are not better.
     assert_eq!(report.kept_step + 2 * hasty.validate_every, report.steps);
 }
+
+/// The same loop on the plain operations of a GPU. `.ci/gpu` runs it on a software Vulkan.
+#[cfg(feature = "wgpu")]
+#[test]
+fn a_gpu_learns_as_a_cpu_does() {
+    let dataset = dataset(200);
+    let (cpu, gpu) = (
+        train(&dataset, &settings(20), DeviceChoice::Cpu).report,
+        train(&dataset, &settings(20), DeviceChoice::Wgpu).report,
+    );
+    let (cpu, gpu) = (cpu.curve[0], gpu.curve[0]);
+    assert!((cpu.training.total - gpu.training.total).abs() < 1e-3, "{cpu:?} {gpu:?}");
+    assert!((cpu.validation.unwrap().rmse_m - gpu.validation.unwrap().rmse_m).abs() < 1e-3, "{cpu:?} {gpu:?}");
+}
