@@ -81,7 +81,7 @@ struct Forward<'a> {
 /// inputs that are 0, which a `ReLU` makes many.
 const ROWS: usize = 4;
 /// Rows from which on it pays to copy a block of the weights, so that it lies in one piece.
-const PACKED_FROM: usize = 4 * ROWS;
+const PACKED_FROM: usize = 32 * ROWS;
 
 impl WithSimd for Forward<'_> {
     type Output = ();
@@ -127,13 +127,18 @@ impl Forward<'_> {
                 }
             }
         });
-        let mut nonzero = Vec::with_capacity(inputs);
+        let mut nonzero = vec![(0, 0.0); inputs];
         for (x, y) in x_single.chunks_exact(inputs).zip(y_single.chunks_exact_mut(outputs)) {
-            nonzero.clear();
-            nonzero.extend(x.iter().enumerate().filter(|(_, value)| **value != 0.0).map(|(at, value)| (at, *value)));
+            // Without a branch: which inputs are 0 cannot be predicted.
+            let mut count = 0;
+            for (at, value) in x.iter().enumerate() {
+                nonzero[count] = (at, *value);
+                count += usize::from(*value != 0.0);
+            }
+            let nonzero = &nonzero[..count];
             for_each_block::<S, 8>(outputs, |first, width| match width {
-                8 => sparse_block::<S, 8>(simd, &nonzero, weight, bias, first, y),
-                _ => sparse_block::<S, 1>(simd, &nonzero, weight, bias, first, y),
+                8 => sparse_block::<S, 8>(simd, nonzero, weight, bias, first, y),
+                _ => sparse_block::<S, 1>(simd, nonzero, weight, bias, first, y),
             });
         }
     }

@@ -257,7 +257,7 @@ impl WithSimd for Backward<'_> {
             (second.map_len(), weights.winners_1_len(), weights.features_len());
         let mut share = Share::new(weights);
         let mut d_pooled = vec![0.0; map_len];
-        let mut sparse = Sparse::default();
+        let mut sparse = Sparse::new(second);
         for sample in samples {
             second.backward(
                 simd,

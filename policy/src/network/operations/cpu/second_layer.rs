@@ -9,7 +9,7 @@
 use super::first_layer::PaddedMap;
 use super::vectors::{int_vectors_mut, vectors, vectors_mut};
 use super::{POOL, SILENT};
-use crate::network::architecture::{ConvLayer, POOLED_2};
+use crate::network::architecture::{ConvLayer, LANES, POOLED_2};
 use pulp::Simd;
 
 /// Sizes of the layer.
@@ -21,13 +21,51 @@ pub(super) struct SecondLayer {
     pub(super) map: PaddedMap,
 }
 
-/// Products that a backward pass has to compute, by what they share.
-#[derive(Debug, Clone, Default)]
+/// The outputs of a block: some vectors from channel `first` on.
+struct Block<'a> {
+    /// `[window value, output]`.
+    weights: &'a [f32],
+    bias: &'a [f32],
+    first: usize,
+}
+
+/// Memory for the products that a backward pass has to compute, by what they share.
+#[derive(Debug, Clone)]
 pub(super) struct Sparse {
-    /// Per output channel: (start of the window, gradient).
+    /// Of one output channel: (start of the window, gradient).
     of_channel: Vec<(usize, f32)>,
-    /// Per cell of the convolution: (output channel, gradient), for the four cells of a pool.
-    of_cell: [Vec<(usize, f32)>; 4],
+    /// Of one cell of the convolution: (start of the output's weights, gradient).
+    of_cell: Vec<(usize, f32)>,
+}
+
+impl Sparse {
+    pub(super) fn new(layer: SecondLayer) -> Self {
+        // One more than fits: what is not kept is written there.
+        let of_channel = vec![(0, 0.0); POOLED_2 * POOLED_2 + 1];
+        Self { of_channel, of_cell: vec![(0, 0.0); layer.conv.channels + 1] }
+    }
+}
+
+/// A list that is filled without a branch: who wins a pool cannot be predicted.
+struct List<'a> {
+    memory: &'a mut [(usize, f32)],
+    len: usize,
+}
+
+impl<'a> List<'a> {
+    fn new(memory: &'a mut [(usize, f32)]) -> Self {
+        Self { memory, len: 0 }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, item: (usize, f32), is_kept: bool) {
+        self.memory[self.len] = item;
+        self.len += usize::from(is_kept);
+    }
+
+    fn pushed(&self) -> &[(usize, f32)] {
+        &self.memory[..self.len]
+    }
 }
 
 impl SecondLayer {
@@ -102,60 +140,63 @@ impl SecondLayer {
     ) {
         for (first, len) in blocks::<S>(self.conv.channels) {
             let weights = &by_window[first * self.window_len()..][..len * self.window_len()];
-            if len == 2 * S::F32_LANES {
-                self.forward_block::<S, 2>(simd, pooled, weights, bias, first, features, winners);
-            } else {
-                self.forward_block::<S, 1>(simd, pooled, weights, bias, first, features, winners);
+            let block = Block { weights, bias: &bias[first..first + len], first };
+            // As many sums as fit the registers: with AVX-512 those of two pools.
+            match (len == 2 * S::F32_LANES, S::F32_LANES == LANES) {
+                (true, true) => self.forward_block::<S, 2, 8>(simd, pooled, &block, features, winners),
+                (true, false) => self.forward_block::<S, 2, 4>(simd, pooled, &block, features, winners),
+                (false, _) => self.forward_block::<S, 1, 8>(simd, pooled, &block, features, winners),
             }
         }
     }
 
-    /// `WIDTH` vectors of outputs from channel `first` on.
+    /// `WIDTH` vectors of outputs, `CELLS` cells of the convolution at a time: one pool or two.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "as in `forward`, and the block")]
-    fn forward_block<S: Simd, const WIDTH: usize>(
+    fn forward_block<S: Simd, const WIDTH: usize, const CELLS: usize>(
         self,
         simd: S,
         pooled: &[f32],
-        weights: &[f32],
-        bias: &[f32],
-        first: usize,
+        block: &Block<'_>,
         features: &mut [f32],
         winners: &mut [u32],
     ) {
         let (zero, silent) = (simd.splat_f32s(0.0), simd.splat_u32s(SILENT));
-        let bias = &vectors::<S>(&bias[first..][..WIDTH * S::F32_LANES]);
-        for pool in 0..POOLED_2 * POOLED_2 {
-            let mut sums = [[zero; WIDTH]; 4];
-            let starts = self.windows_of_pool(pool);
+        let bias = vectors::<S>(block.bias);
+        let span = self.span();
+        for first_pool in (0..POOLED_2 * POOLED_2).step_by(CELLS / POOL.len()) {
+            let mut sums = [[zero; WIDTH]; CELLS];
+            let starts: [usize; CELLS] =
+                std::array::from_fn(|cell| self.windows_of_pool(first_pool + cell / POOL.len())[cell % POOL.len()]);
             for kernel_row in 0..self.conv.kernel {
                 let offset = kernel_row * self.map.side * self.inputs;
-                let [a, b, c, d] = starts.map(|start| &pooled[start + offset..][..self.span()]);
-                let weights = vectors::<S>(&weights[kernel_row * self.span() * WIDTH * S::F32_LANES..]);
-                let weights = weights[..self.span() * WIDTH].as_chunks::<WIDTH>().0;
-                for ((((a, b), c), d), weights) in a.iter().zip(b).zip(c).zip(d).zip(weights) {
-                    for (sums, value) in sums.iter_mut().zip([*a, *b, *c, *d]) {
-                        let value = simd.splat_f32s(value);
+                let values = starts.map(|start| &pooled[start + offset..][..span]);
+                let weights = vectors::<S>(&block.weights[kernel_row * span * WIDTH * S::F32_LANES..]);
+                let weights = &weights.as_chunks::<WIDTH>().0[..span];
+                for at in 0..span {
+                    for cell in 0..CELLS {
+                        let value = simd.splat_f32s(values[cell][at]);
                         for v in 0..WIDTH {
-                            sums[v] = simd.mul_add_f32s(value, weights[v], sums[v]);
+                            sums[cell][v] = simd.mul_add_f32s(value, weights[at][v], sums[cell][v]);
                         }
                     }
                 }
             }
-            let at = pool * self.conv.channels + first;
-            let features = vectors_mut::<S>(&mut features[at..at + WIDTH * S::F32_LANES]);
-            let winners = int_vectors_mut::<S>(&mut winners[at..at + WIDTH * S::F32_LANES]);
-            for v in 0..WIDTH {
-                let (mut best, mut from) = (sums[0][v], simd.splat_u32s(0));
-                for cell in 1..POOL.len() {
-                    let wins = simd.greater_than_f32s(sums[cell][v], best);
-                    best = simd.select_f32s(wins, sums[cell][v], best);
-                    from = simd.select_u32s(wins, simd.splat_u32s(cell as u32), from);
+            for (pool, sums) in (first_pool..).zip(sums.as_chunks::<4>().0) {
+                let at = pool * self.conv.channels + block.first;
+                let features = vectors_mut::<S>(&mut features[at..at + WIDTH * S::F32_LANES]);
+                let winners = int_vectors_mut::<S>(&mut winners[at..at + WIDTH * S::F32_LANES]);
+                for v in 0..WIDTH {
+                    let (mut best, mut from) = (sums[0][v], simd.splat_u32s(0));
+                    for cell in 1..POOL.len() {
+                        let wins = simd.greater_than_f32s(sums[cell][v], best);
+                        best = simd.select_f32s(wins, sums[cell][v], best);
+                        from = simd.select_u32s(wins, simd.splat_u32s(cell as u32), from);
+                    }
+                    let value = simd.add_f32s(best, bias[v]);
+                    let is_alive = simd.greater_than_f32s(value, zero);
+                    features[v] = simd.select_f32s(is_alive, value, zero);
+                    winners[v] = simd.select_u32s(is_alive, from, silent);
                 }
-                let value = simd.add_f32s(best, bias[v]);
-                let is_alive = simd.greater_than_f32s(value, zero);
-                features[v] = simd.select_f32s(is_alive, value, zero);
-                winners[v] = simd.select_u32s(is_alive, from, silent);
             }
         }
     }
@@ -179,36 +220,31 @@ impl SecondLayer {
         let channels = self.conv.channels;
         // Gradients of the weights: per output channel, its windows.
         for channel in 0..channels {
-            let list = &mut sparse.of_channel;
-            list.clear();
+            let mut list = List::new(&mut sparse.of_channel);
             let mut sum = 0.0;
             for pool in 0..POOLED_2 * POOLED_2 {
                 let at = pool * channels + channel;
-                if winners[at] != SILENT {
-                    list.push((self.windows_of_pool(pool)[winners[at] as usize], d_features[at]));
-                    sum += d_features[at];
-                }
+                let is_alive = winners[at] != SILENT;
+                // A silent pool has no window; whichever is listed is overwritten by the next.
+                list.push((self.windows_of_pool(pool)[(winners[at] % SILENT) as usize], d_features[at]), is_alive);
+                sum += if is_alive { d_features[at] } else { 0.0 };
             }
             d_bias[channel] += sum;
             let into = &mut d_by_output[channel * self.window_len()..][..self.window_len()];
-            self.add_windows(simd, pooled, list, into);
+            self.add_windows(simd, pooled, list.pushed(), into);
         }
         // Gradient of the map: per cell of the convolution, its output channels.
         d_pooled.fill(0.0);
         for pool in 0..POOLED_2 * POOLED_2 {
-            for list in &mut sparse.of_cell {
-                list.clear();
-            }
-            let at = pool * channels;
-            for (channel, (gradient, winner)) in
-                d_features[at..at + channels].iter().zip(&winners[at..at + channels]).enumerate()
-            {
-                if let Some(list) = sparse.of_cell.get_mut(*winner as usize) {
-                    list.push((channel * self.window_len(), *gradient));
+            let of_pool = pool * channels..(pool + 1) * channels;
+            for (cell, start) in self.windows_of_pool(pool).into_iter().enumerate() {
+                let mut list = List::new(&mut sparse.of_cell);
+                for (channel, (gradient, winner)) in
+                    d_features[of_pool.clone()].iter().zip(&winners[of_pool.clone()]).enumerate()
+                {
+                    list.push((channel * self.window_len(), *gradient), *winner == cell as u32);
                 }
-            }
-            for (start, list) in self.windows_of_pool(pool).into_iter().zip(&sparse.of_cell) {
-                self.add_outputs(simd, by_output, list, &mut d_pooled[start..]);
+                self.add_outputs(simd, by_output, list.pushed(), &mut d_pooled[start..]);
             }
         }
     }
