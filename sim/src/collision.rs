@@ -6,6 +6,7 @@
 use crate::distance_field::DistanceField;
 use crate::geometry::{Pose, Vec2, edges};
 use crate::scenario::Scenario;
+use crate::vectors::{FourPoints, f32x4, lowest};
 use crate::vehicle::VehicleSettings;
 use parry2d::shape::Cuboid;
 use rapier2d::geometry::{ColliderBuilder, Group, InteractionGroups, InteractionTestMode};
@@ -87,9 +88,9 @@ impl CollisionWorld {
 pub struct BodyBox {
     cuboid: Cuboid,
     centre_ahead_m: f32,
-    disc_centres_m: [f32; BODY_DISCS],
+    discs_in_ego: Vec<FourPoints>,
     disc_radius_m: f32,
-    outline_in_ego: Vec<Vec2>,
+    outline_in_ego: Vec<FourPoints>,
 }
 
 impl BodyBox {
@@ -97,10 +98,11 @@ impl BodyBox {
     pub fn new(vehicle: &VehicleSettings) -> Self {
         let cuboid = Cuboid::new(Vec2::new(0.5 * vehicle.length_m, 0.5 * vehicle.width_m));
         let segment_m = vehicle.length_m / BODY_DISCS as f32;
-        let disc_centres_m = std::array::from_fn(|i| (i as f32 + 0.5) * segment_m - vehicle.rear_overhang_m);
+        let discs = (0..BODY_DISCS).map(|i| Vec2::new((i as f32 + 0.5) * segment_m - vehicle.rear_overhang_m, 0.0));
+        let discs_in_ego = FourPoints::all(&discs.collect::<Vec<Vec2>>());
         let disc_radius_m = (0.5 * segment_m).hypot(0.5 * vehicle.width_m);
         let corners = vehicle.body_in_ego();
-        let outline_in_ego = edges(&corners)
+        let outline: Vec<Vec2> = edges(&corners)
             .flat_map(|(a, b)| {
                 let pieces = ((b - a).length() / 0.2).ceil() as usize;
                 (0..pieces).map(move |i| a.lerp(b, i as f32 / pieces as f32))
@@ -109,9 +111,9 @@ impl BodyBox {
         Self {
             cuboid,
             centre_ahead_m: 0.5 * vehicle.length_m - vehicle.rear_overhang_m,
-            disc_centres_m,
+            discs_in_ego,
             disc_radius_m,
-            outline_in_ego,
+            outline_in_ego: FourPoints::all(&outline),
         }
     }
 
@@ -139,16 +141,23 @@ impl BodyBox {
 
     /// Conservative test of a pose by covering discs on the distance raster.
     fn is_surely_free(&self, distance: &DistanceField, pose: Pose) -> bool {
-        let (origin, ahead) = (pose.position(), pose.ahead());
-        let keep_m = self.disc_radius_m + RASTER_SLACK_M;
-        self.disc_centres_m.iter().all(|&x_m| distance.at(origin + ahead * x_m) > keep_m)
+        self.is_surely_free_by(distance, pose, 0.0)
+    }
+
+    /// [`Self::is_surely_free`], also after every disc has moved by up to `margin_m`.
+    fn is_surely_free_by(&self, distance: &DistanceField, pose: Pose, margin_m: f32) -> bool {
+        let world_from_ego = pose.world_from_ego();
+        let keep_m = f32x4::splat(self.disc_radius_m + RASTER_SLACK_M + margin_m);
+        self.discs_in_ego.iter().all(|&discs| distance.at_four(world_from_ego.four_points(discs)).simd_gt(keep_m).all())
     }
 
     /// Distance from the body outline to the nearest non-drivable point, metres; negative when they overlap, capped
     /// at 3 m. Measured at outline points 0.2 m apart, hence up to 5 cm too large beside a corner.
     pub fn clearance_m(&self, distance: &DistanceField, pose: Pose) -> f32 {
         let world_from_ego = pose.world_from_ego();
-        self.outline_in_ego.iter().map(|&point| distance.at(world_from_ego.point(point))).fold(f32::INFINITY, f32::min)
+        let distances_m =
+            self.outline_in_ego.iter().map(|&points| distance.at_four(world_from_ego.four_points(points)));
+        lowest(distances_m.fold(f32x4::splat(f32::INFINITY), f32x4::fast_min))
     }
 }
 
