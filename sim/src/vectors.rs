@@ -10,7 +10,7 @@
 //!   costs more than several look-ups, so the lanes to be looked at more closely are [`Picked`] first, then done together.
 //! - A look-up takes one lane at a time: indices leave a vector by `to_array`, what they name comes back by `from`.
 
-use crate::geometry::{Vec2, WorldFromEgo, edges};
+use glam::Vec2;
 use std::ops::{Add, Mul, Sub};
 pub use wide::f32x4;
 pub(crate) use wide::i32x4;
@@ -48,31 +48,6 @@ impl FourPoints {
     }
 }
 
-impl FourPoints {
-    /// [`crate::geometry::distance_to_segment`] of each, to the bit, metres.
-    #[inline]
-    pub(crate) fn distance_to_segment(self, a: Vec2, b: Vec2) -> f32x4 {
-        let ab = b - a;
-        let from_a = self - Self::splat(a);
-        let along = Self::splat(ab);
-        let dot = from_a.x * along.x + from_a.y * along.y;
-        let share = (dot / f32x4::splat(ab.length_squared().max(f32::MIN_POSITIVE))).fast_max(f32x4::ZERO);
-        let apart = from_a - along * share.fast_min(f32x4::ONE);
-        (apart.x * apart.x + apart.y * apart.y).sqrt()
-    }
-
-    /// [`crate::geometry::polygon_contains`] of each, as a mask.
-    #[inline]
-    pub(crate) fn are_inside(self, polygon: &[Vec2]) -> f32x4 {
-        edges(polygon).fold(f32x4::ZERO, |are_inside, (a, b)| {
-            let is_across = f32x4::splat(a.y).simd_gt(self.y) ^ f32x4::splat(b.y).simd_gt(self.y);
-            let crossing =
-                f32x4::splat(a.x) + (self.y - f32x4::splat(a.y)) / f32x4::splat(b.y - a.y) * f32x4::splat(b.x - a.x);
-            are_inside ^ (is_across & self.x.simd_lt(crossing))
-        })
-    }
-}
-
 impl From<[Vec2; LANES]> for FourPoints {
     #[inline]
     fn from(points: [Vec2; LANES]) -> Self {
@@ -107,22 +82,28 @@ impl Mul<f32x4> for FourPoints {
     }
 }
 
-impl WorldFromEgo {
-    /// [`Self::point`] of four points, to the bit.
-    #[inline]
-    pub fn four_points(&self, in_ego: FourPoints) -> FourPoints {
-        let FourPoints { x: cos, y: sin } = FourPoints::splat(self.rotation);
-        let rotated = FourPoints { x: cos * in_ego.x - sin * in_ego.y, y: sin * in_ego.x + cos * in_ego.y };
-        FourPoints::splat(self.translation) + rotated
-    }
-}
-
 /// Numbers of lanes that are picked without branching.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Picked {
     numbers: Vec<u16>,
     n_picked: usize,
 }
+
+/// The set bits of every mask, lowest first, and how many there are.
+const SET_LANES: [([u16; LANES], usize); 1 << LANES] = {
+    let mut table = [([0; LANES], 0); 1 << LANES];
+    let mut i = 0;
+    while i < LANES << LANES {
+        let (mask, lane) = (i / LANES, i % LANES);
+        if mask >> lane & 1 == 1 {
+            let (lanes, n_set) = &mut table[mask];
+            lanes[*n_set] = lane as u16;
+            *n_set += 1;
+        }
+        i += 1;
+    }
+    table
+};
 
 impl Picked {
     /// Nothing picked, with room for what may be.
@@ -138,10 +119,10 @@ impl Picked {
     /// Picks those of four consecutive numbers whose bits are set.
     #[inline]
     pub(crate) fn pick(&mut self, first: usize, lanes: u32) {
-        for lane in 0..LANES {
-            self.numbers[self.n_picked] = (first + lane) as u16;
-            self.n_picked += (lanes >> lane & 1) as usize;
-        }
+        let (set_lanes, n_set) = SET_LANES[(lanes & ALL_LANES) as usize];
+        // All four are written; what was not picked is overwritten next.
+        self.numbers[self.n_picked..self.n_picked + LANES].copy_from_slice(&set_lanes.map(|lane| first as u16 + lane));
+        self.n_picked += n_set;
     }
 
     /// Picks a number, or not.
@@ -189,4 +170,11 @@ pub(crate) fn whole_and_part(coordinates: f32x4) -> (i32x4, f32x4) {
 pub(crate) fn lowest(values: f32x4) -> f32 {
     let [a, b, c, d] = values.to_array();
     a.min(b).min(c.min(d))
+}
+
+/// The highest lane.
+#[inline]
+pub(crate) fn highest(values: f32x4) -> f32 {
+    let [a, b, c, d] = values.to_array();
+    a.max(b).max(c.max(d))
 }
