@@ -112,7 +112,8 @@ impl DistanceField {
     }
 
     /// [`Self::at`] at four points, to the bit.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "called, it takes and returns vectors through memory: a tenth of the loop")]
+    #[inline(always)]
     pub fn at_four(&self, points: FourPoints) -> f32x4 {
         let node = self.nodes_from_world(points);
         let (cols, into_x) = whole_and_part(bounded(node.x, count(self.cols - 2)));
