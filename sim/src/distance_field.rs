@@ -3,8 +3,9 @@
 //! Node values are distances to the exact polygons; between nodes they are interpolated bilinearly. That is exact
 //! beside straight edges, within 3 cm beside corners, and up to 5 cm too small half-way between two things.
 
-use crate::geometry::{Vec2, distance_to_segment, edges, polygon_contains};
-use crate::vectors::{FourPoints, LANES, bounded, f32x4, i32x4, whole_and_part};
+use crate::geometry::{Vec2, edges};
+use crate::vectors::{FourPoints, LANES, bounded, counted_from, f32x4, i32x4, whole_and_part};
+use std::ops::Range;
 
 /// Spacing of the nodes, metres.
 pub const NODE_M: f32 = 0.1;
@@ -59,30 +60,31 @@ impl DistanceField {
         let origin = low - margin;
         let size = (high + margin - origin) / NODE_M;
         let (cols, rows) = (size.x.ceil() as usize + 1, size.y.ceil() as usize + 1);
-        let mut field =
-            Self { origin, cols, rows, nodes: vec![CAP_M.to_bits() ^ FAR_OUTSIDE; cols * rows + SPARE_NODES] };
+        let mut field = Self { origin, cols, rows, nodes: vec![0; cols * rows + SPARE_NODES] };
+        field.fill(boundary);
         for (a, b) in edges(boundary) {
-            let (low, high) = bounds(&[a, b]);
-            field.lower_within(low, high, CAP_M, |point| distance_to_segment(point, a, b));
+            field.bring_near(a, b);
         }
-        field.negate_outside(boundary);
         field
     }
 
     /// Carves a non-drivable polygon (any winding, need not be convex).
     pub fn carve_polygon(&mut self, polygon: &[Vec2]) {
-        let (low, high) = bounds(polygon);
-        self.lower_within(low, high, CAP_M, |point| {
-            let distance_m =
-                edges(polygon).map(|(a, b)| distance_to_segment(point, a, b)).fold(f32::INFINITY, f32::min);
-            if polygon_contains(polygon, point) { -distance_m } else { distance_m }
+        self.carve(bounds(polygon), |points, is_in_box| {
+            let squared = edges(polygon).map(|(a, b)| points.squared_distance_to_segment(a, b));
+            let distances_m = squared.fold(f32x4::splat(f32::INFINITY), f32x4::fast_min).sqrt();
+            let are_inside = if is_in_box { points.are_inside(polygon) } else { f32x4::ZERO };
+            are_inside.select(-distances_m, distances_m)
         });
     }
 
     /// Carves a non-drivable disc.
     pub fn carve_disc(&mut self, centre: Vec2, radius_m: f32) {
         let half = Vec2::splat(radius_m);
-        self.lower_within(centre - half, centre + half, CAP_M, |point| point.distance(centre) - radius_m);
+        self.carve((centre - half, centre + half), |points, _| {
+            let FourPoints { x, y } = points - FourPoints::splat(centre);
+            (x * x + y * y).sqrt() - f32x4::splat(radius_m)
+        });
     }
 
     /// Signed distance at a world point, metres, capped at ±[`CAP_M`]; outside the raster −[`CAP_M`].
@@ -112,7 +114,10 @@ impl DistanceField {
     }
 
     /// [`Self::at`] at four points, to the bit.
-    #[expect(clippy::inline_always, reason = "called, it takes and returns vectors through memory: a tenth of the loop")]
+    #[expect(
+        clippy::inline_always,
+        reason = "called, it takes and returns vectors through memory: a tenth of the loop"
+    )]
     #[inline(always)]
     pub fn at_four(&self, points: FourPoints) -> f32x4 {
         let node = self.nodes_from_world(points);
@@ -225,45 +230,102 @@ impl DistanceField {
         (self.origin, self.origin + Vec2::new((self.cols - 1) as f32, (self.rows - 1) as f32) * NODE_M)
     }
 
-    /// Takes the minimum with `distance_m` at every node within `reach_m` of a box.
-    fn lower_within(&mut self, low: Vec2, high: Vec2, reach_m: f32, distance_m: impl Fn(Vec2) -> f32) {
-        let first = ((low - Vec2::splat(reach_m) - self.origin) / NODE_M).floor().max(Vec2::ZERO);
-        let last = ((high + Vec2::splat(reach_m) - self.origin) / NODE_M).ceil();
-        let (col_end, row_end) =
-            ((last.x.max(0.0) as usize + 1).min(self.cols), (last.y.max(0.0) as usize + 1).min(self.rows));
-        for row in first.y as usize..row_end {
-            for col in first.x as usize..col_end {
-                let point = self.origin + Vec2::new(col as f32, row as f32) * NODE_M;
-                let index = row * self.cols + col;
-                let value = self.node_m(index).min(distance_m(point).max(-CAP_M));
-                self.nodes[index] = value.to_bits() ^ FAR_OUTSIDE;
+    /// Even-odd scan conversion: nodes inside the polygon are as far from its boundary as can be.
+    fn fill(&mut self, polygon: &[Vec2]) {
+        let mut crossings: Vec<(usize, f32)> = Vec::new();
+        for (a, b) in edges(polygon) {
+            for row in self.rows_within(a.y.min(b.y), a.y.max(b.y)) {
+                let y = self.node_y(row);
+                if (a.y > y) != (b.y > y) {
+                    crossings.push((row, a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x)));
+                }
+            }
+        }
+        crossings.sort_by(|(row, x), (other_row, other_x)| row.cmp(other_row).then(x.total_cmp(other_x)));
+        for &[(row, first), (_, end)] in crossings.as_chunks().0 {
+            let [first, end] = [first, end].map(|x| self.first_col_from(x));
+            self.nodes[row * self.cols + first..row * self.cols + end].fill(CAP_M.to_bits() ^ FAR_OUTSIDE);
+        }
+    }
+
+    /// Brings the boundary near, on either side, to nodes within [`CAP_M`] of one of its edges.
+    fn bring_near(&mut self, a: Vec2, b: Vec2) {
+        let (low, high) = if a.y <= b.y { (a, b) } else { (b, a) };
+        let along = high - low;
+        // Across a strip of twice the cap, horizontally.
+        let strip_m = CAP_M * along.length() / along.y;
+        for row in self.rows_within(low.y - CAP_M, high.y + CAP_M) {
+            let y = self.node_y(row);
+            // The part of the edge that is level with the row, give or take the cap.
+            let x_at =
+                |y: f32| if along.y > 0.0 { low.x + along.x * ((y - low.y) / along.y).clamp(0.0, 1.0) } else { low.x };
+            let (from, to) = if along.y > CAP_M { (x_at(y - CAP_M), x_at(y + CAP_M)) } else { (low.x, high.x) };
+            let (mut left, mut right) = (from.min(to) - CAP_M, from.max(to) + CAP_M);
+            if along.y > CAP_M {
+                let x = low.x + along.x * ((y - low.y) / along.y);
+                (left, right) = (left.max(x - strip_m), right.min(x + strip_m));
+            }
+            self.for_each_four(row, left, right, |points, nodes_m| {
+                let distances_m = points.squared_distance_to_segment(a, b).sqrt();
+                let sign = f32x4::splat(-0.0);
+                Some((nodes_m & !sign).fast_min(distances_m) | (nodes_m & sign))
+            });
+        }
+    }
+
+    /// Lowers nodes to the signed distances from a thing within a box. `signed_distances_m` is also told whether any of the
+    /// points lies in the box.
+    fn carve(&mut self, (low, high): (Vec2, Vec2), signed_distances_m: impl Fn(FourPoints, bool) -> f32x4) {
+        /// A generous bound of rounding in single precision, relative.
+        const ROUNDING: f32 = 1.0 + 1e-4;
+        for row in self.rows_within(low.y - CAP_M, high.y + CAP_M) {
+            let y = self.node_y(row);
+            let above_or_below_m = (low.y - y).max(y - high.y).max(0.0);
+            self.for_each_four(row, low.x - CAP_M, high.x + CAP_M, |points, nodes_m| {
+                let beside_m = (f32x4::splat(low.x) - points.x).fast_max(points.x - f32x4::splat(high.x));
+                let beside_m = beside_m.fast_max(f32x4::ZERO);
+                let to_box = beside_m * beside_m + f32x4::splat(above_or_below_m * above_or_below_m);
+                // Most nodes are nearer to something else, or outside already.
+                let is_in_box = to_box.simd_le(f32x4::ZERO).any();
+                let is_nearer =
+                    nodes_m.simd_gt(f32x4::ZERO) & (nodes_m * nodes_m * f32x4::splat(ROUNDING)).simd_gt(to_box);
+                (is_in_box || is_nearer.any())
+                    .then(|| nodes_m.fast_min(signed_distances_m(points, is_in_box).fast_max(f32x4::splat(-CAP_M))))
+            });
+        }
+    }
+
+    /// Replaces nodes of a row from one world x to another one, four at a time.
+    fn for_each_four(&mut self, row: usize, left: f32, right: f32, new_m: impl Fn(FourPoints, f32x4) -> Option<f32x4>) {
+        let col = |x: f32| ((x - self.origin.x) / NODE_M).max(0.0) as usize;
+        let (first, end) = (col(left), (col(right) + 2).min(self.cols));
+        let y = f32x4::splat(self.node_y(row));
+        for col in (first..end).step_by(LANES) {
+            // The last four of a row overlap those before.
+            let col = col.min(self.cols - LANES);
+            let index = row * self.cols + col;
+            let x = f32x4::splat(self.origin.x) + counted_from(col) * f32x4::splat(NODE_M);
+            if let Some(new_m) = new_m(FourPoints { x, y }, self.four_nodes_m(index)) {
+                let stored = new_m.to_array().map(|node_m| node_m.to_bits() ^ FAR_OUTSIDE);
+                self.nodes[index..index + LANES].copy_from_slice(&stored);
             }
         }
     }
 
-    /// Even-odd scan conversion: nodes outside the polygon become negative.
-    fn negate_outside(&mut self, polygon: &[Vec2]) {
-        let mut crossings = Vec::new();
-        for row in 0..self.rows {
-            let y = self.origin.y + row as f32 * NODE_M;
-            crossings.clear();
-            crossings.extend(
-                edges(polygon)
-                    .filter(|(a, b)| (a.y > y) != (b.y > y))
-                    .map(|(a, b)| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x)),
-            );
-            crossings.sort_by(f32::total_cmp);
-            let mut passed = 0;
-            for col in 0..self.cols {
-                let x = self.origin.x + col as f32 * NODE_M;
-                while passed < crossings.len() && crossings[passed] <= x {
-                    passed += 1;
-                }
-                if passed % 2 == 0 {
-                    self.nodes[row * self.cols + col] = (-self.node_m(row * self.cols + col)).to_bits() ^ FAR_OUTSIDE;
-                }
-            }
-        }
+    /// Rows from one world y to another one, and one more on either side.
+    fn rows_within(&self, low: f32, high: f32) -> Range<usize> {
+        let row = |y: f32| ((y - self.origin.y) / NODE_M).max(0.0) as usize;
+        row(low).saturating_sub(1)..(row(high) + 2).min(self.rows)
+    }
+
+    fn node_y(&self, row: usize) -> f32 {
+        self.origin.y + row as f32 * NODE_M
+    }
+
+    /// The first column at or beyond a world x.
+    fn first_col_from(&self, x: f32) -> usize {
+        let near = (((x - self.origin.x) / NODE_M).max(0.0) as usize).saturating_sub(1);
+        (near..self.cols).find(|&col| self.origin.x + col as f32 * NODE_M >= x).unwrap_or(self.cols)
     }
 }
 
@@ -287,6 +349,7 @@ pub fn bounds(points: &[Vec2]) -> (Vec2, Vec2) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Pose, distance_to_segment, polygon_contains};
 
     fn rectangle() -> Vec<Vec2> {
         vec![Vec2::new(0.0, 0.0), Vec2::new(20.0, 0.0), Vec2::new(20.0, 8.0), Vec2::new(0.0, 8.0)]
@@ -304,10 +367,55 @@ mod tests {
         assert!(field.at(Vec2::new(-500.0, 4.0)) <= -CAP_M + 1e-3);
     }
 
+    /// Every node from every edge, one by one.
+    fn plain_field(boundary: &[Vec2], islands: &[Vec<Vec2>], disc: (Vec2, f32)) -> DistanceField {
+        let mut field = DistanceField::of_boundary(boundary);
+        let to_edges_m = |polygon: &[Vec2], point: Vec2| {
+            edges(polygon).map(|(a, b)| distance_to_segment(point, a, b)).fold(f32::INFINITY, f32::min)
+        };
+        for index in 0..field.rows * field.cols {
+            let node = Vec2::new((index % field.cols) as f32, (index / field.cols) as f32);
+            let point = field.origin + node * NODE_M;
+            let sign = if polygon_contains(boundary, point) { 1.0 } else { -1.0 };
+            let mut node_m = sign * to_edges_m(boundary, point).min(CAP_M);
+            for island in islands {
+                let sign = if polygon_contains(island, point) { -1.0 } else { 1.0 };
+                node_m = node_m.min((sign * to_edges_m(island, point)).max(-CAP_M));
+            }
+            node_m = node_m.min((point.distance(disc.0) - disc.1).max(-CAP_M));
+            field.nodes[index] = node_m.to_bits() ^ FAR_OUTSIDE;
+        }
+        field
+    }
+
+    #[test]
+    fn a_field_of_what_is_near_is_the_field_of_everything() {
+        // A lane with a bend and a notch, turned; a kerb, a long island, a disc.
+        let lane =
+            [(0.0, 0.0), (31.0, 0.0), (31.0, 24.0), (25.0, 24.0), (25.0, 6.5), (12.0, 6.5), (12.0, 5.0), (0.0, 7.0)];
+        let islands = [
+            vec![(4.0, 3.0), (9.0, 3.2), (6.0, 4.0)],
+            vec![(27.0, 4.0), (28.0, 4.0), (28.0, 19.0), (27.5, 10.0), (27.0, 19.0)],
+        ];
+        for turned_rad in [0.0, 0.5, std::f32::consts::FRAC_PI_4, 1.9, 4.0] {
+            let turned = Pose::new(Vec2::new(-7.3, 2.1), turned_rad).world_from_ego();
+            let turn =
+                |points: &[(f32, f32)]| points.iter().map(|&point| turned.point(point.into())).collect::<Vec<Vec2>>();
+            let (boundary, islands) = (turn(&lane), islands.each_ref().map(|island| turn(island)));
+            let disc = (turned.point(Vec2::new(16.0, 2.0)), 0.4);
+            let mut field = DistanceField::of_boundary(&boundary);
+            islands.iter().for_each(|island| field.carve_polygon(island));
+            field.carve_disc(disc.0, disc.1);
+            let plain = plain_field(&boundary, &islands, disc);
+            let different = (0..plain.nodes.len()).filter(|&index| field.nodes[index] != plain.nodes[index]).count();
+            assert_eq!(different, 0, "of {} nodes, turned by {turned_rad}", plain.nodes.len());
+        }
+    }
+
     #[test]
     fn carved_shapes_are_exact_to_centimetres() {
         let mut field = DistanceField::of_boundary(&rectangle());
-        let tilted = crate::geometry::rectangle(crate::geometry::Pose::new(Vec2::new(9.0, 4.0), 0.3), 4.0, 1.8);
+        let tilted = crate::geometry::rectangle(Pose::new(Vec2::new(9.0, 4.0), 0.3), 4.0, 1.8);
         field.carve_polygon(&tilted);
         field.carve_disc(Vec2::new(15.0, 4.0), 0.25);
         for i in 0..4000 {

@@ -264,13 +264,19 @@ impl FourPoints {
     /// [`distance_to_segment`] of each, to the bit, metres.
     #[inline]
     pub(crate) fn distance_to_segment(self, a: Vec2, b: Vec2) -> f32x4 {
+        self.squared_distance_to_segment(a, b).sqrt()
+    }
+
+    /// Square of [`Self::distance_to_segment`].
+    #[inline]
+    pub(crate) fn squared_distance_to_segment(self, a: Vec2, b: Vec2) -> f32x4 {
         let ab = b - a;
         let from_a = self - Self::splat(a);
         let along = Self::splat(ab);
         let dot = from_a.x * along.x + from_a.y * along.y;
         let share = (dot / f32x4::splat(ab.length_squared().max(f32::MIN_POSITIVE))).fast_max(f32x4::ZERO);
         let apart = from_a - along * share.fast_min(f32x4::ONE);
-        (apart.x * apart.x + apart.y * apart.y).sqrt()
+        apart.x * apart.x + apart.y * apart.y
     }
 
     /// [`polygon_contains`] of each, as a mask.

@@ -152,6 +152,12 @@ impl Picked {
     }
 }
 
+/// A number and the next three.
+#[inline]
+pub(crate) fn counted_from(first: usize) -> f32x4 {
+    f32x4::splat(first as f32) + f32x4::from([0.0, 1.0, 2.0, 3.0])
+}
+
 /// Bounds coordinates to 0…`last`.
 #[inline]
 pub(crate) fn bounded(coordinates: f32x4, last: f32) -> f32x4 {

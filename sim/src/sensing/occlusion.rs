@@ -3,10 +3,10 @@
 //! The label image was warped by a ground homography (paper), so an object of height h at ground range r covers
 //! the ground behind it up to range r·H/(H − h), and to infinity for h ≥ H (docs/methods.md 1.7).
 
-use super::quadtree::{counted_from, pixels_of};
+use super::quadtree::pixels_of;
 use super::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid};
 use crate::geometry::{Outline, Vec2};
-use crate::vectors::{FourPoints, LANES, bounded, f32x4};
+use crate::vectors::{FourPoints, LANES, bounded, counted_from, f32x4};
 use std::ops::Range;
 
 /// Longest occlusion, as a multiple of the range: from 2 m on it leaves the patch.

@@ -3,7 +3,7 @@
 use super::{CELL_PIXELS, GRID_CELLS, GridGeometry};
 use crate::distance_field::{DistanceField, change_max_m};
 use crate::geometry::{Pose, Vec2};
-use crate::vectors::{FourPoints, LANES, f32x4, lowest};
+use crate::vectors::{FourPoints, LANES, counted_from, f32x4, lowest};
 use std::ops::Range;
 
 /// World positions of the pixel centres of one view. The only place where pixels are turned into world points, so
@@ -61,12 +61,6 @@ fn centres_of_cells(indices: f32x4) -> f32x4 {
 #[inline]
 fn centres_of<const SIDE: usize>(indices: f32x4) -> f32x4 {
     indices * f32x4::splat(SIDE as f32) + f32x4::splat(0.5 * (SIDE - 1) as f32)
-}
-
-/// A number and the next three.
-#[inline]
-pub(super) fn counted_from(first: usize) -> f32x4 {
-    f32x4::splat(first as f32) + f32x4::from([0.0, 1.0, 2.0, 3.0])
 }
 
 impl PixelLattice {
