@@ -13,6 +13,7 @@ use crate::seed::{Rng, RootSeed, Stream};
 use crate::vectors::{FourPoints, LANES, bounded, f32x4, whole_and_part};
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// Strength of each layer, relative to the calibrated level `paper`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -216,40 +217,57 @@ impl Patch {
 #[derive(Debug, Clone)]
 pub(super) struct Shadow {
     pub(super) region: Region,
+    seed: u64,
+    /// From the centre of a grid cell to its farthest pixel, metres.
+    cell_radius_m: f32,
     origin: Vec2,
     cols: usize,
     rows: usize,
-    /// Rank of the local noise within the shadow, 0…255: a threshold is then a share of the area.
-    ranks: Vec<u8>,
+    /// Drawn when first seen: it takes longer than all else that a sensor draws in advance.
+    ranks: OnceLock<Ranks>,
+}
+
+/// Rank of the local noise within a shadow, 0…255: a threshold is then a share of the area. By raster cells.
+#[derive(Debug, Clone)]
+struct Ranks {
+    own: Vec<u8>,
     /// Lowest and highest rank that any pixel of a grid cell centred here can have.
-    ranks_around: Vec<(u8, u8)>,
+    lowest_around: Vec<u8>,
+    highest_around: Vec<u8>,
 }
 
 impl Shadow {
-    /// `cell_radius_m`: from the centre of a grid cell to its farthest pixel.
     fn new(polygon: Vec<Vec2>, seed: u64, cell_radius_m: f32) -> Self {
         let (low, high) = crate::distance_field::bounds(&polygon);
         let size = ((high - low) / SHADOW_CELL_M).ceil();
         let (cols, rows) = (size.x as usize + 1, size.y as usize + 1);
-        let noise: Vec<f32> = (0..rows * cols)
-            .map(|i| {
-                let point = low + Vec2::new((i % cols) as f32, (i / cols) as f32) * SHADOW_CELL_M;
-                // Two octaves, correlation 1.2 m.
-                value_noise(seed, point / 1.2, 0.0) + 0.5 * value_noise(seed ^ 1, point / 0.6, 0.0)
-            })
-            .collect();
-        let mut sorted = noise.clone();
-        sorted.sort_by(f32::total_cmp);
-        let rank = |value: f32| (sorted.partition_point(|&other| other < value) * 255 / sorted.len()) as u8;
-        let ranks: Vec<u8> = noise.iter().map(|&value| rank(value)).collect();
-        // Both the centre and the pixel are rounded to a raster cell.
-        let ranks_around = extremes_around(&ranks, cols, (cell_radius_m / SHADOW_CELL_M + 1.0) as usize);
-        Self { region: Region::new(polygon), origin: low, cols, rows, ranks, ranks_around }
+        let ranks = OnceLock::new();
+        Self { region: Region::new(polygon), seed, cell_radius_m, origin: low, cols, rows, ranks }
+    }
+
+    fn ranks(&self) -> &Ranks {
+        self.ranks.get_or_init(|| {
+            // Two octaves, correlation 1.2 m.
+            let octave = |seed: u64, spacing_m: f32| {
+                let along = |origin: f32, count: usize| {
+                    (0..count).map(|i| (origin + i as f32 * SHADOW_CELL_M) / spacing_m).collect::<Vec<f32>>()
+                };
+                value_noise_raster(seed, &along(self.origin.x, self.cols), &along(self.origin.y, self.rows))
+            };
+            let (first, second) = (octave(self.seed, 1.2), octave(self.seed ^ 1, 0.6));
+            let noise: Vec<f32> = first.iter().zip(second).map(|(first, second)| first + 0.5 * second).collect();
+            let own = ranks(&noise);
+            // Both the centre and the pixel are rounded to a raster cell.
+            let reach = (self.cell_radius_m / SHADOW_CELL_M + 1.0) as usize;
+            let lowest_around = joined_around(&own, self.cols, reach, u8::min);
+            let highest_around = joined_around(&own, self.cols, reach, u8::max);
+            Ranks { own, lowest_around, highest_around }
+        })
     }
 
     #[inline]
     pub(super) fn is_misread(&self, point: Vec2, threshold: u8) -> bool {
-        self.ranks[self.index(point)] >= threshold
+        self.ranks().own[self.index(point)] >= threshold
     }
 
     /// [`Self::is_misread`] at four points, bit = index.
@@ -260,7 +278,8 @@ impl Shadow {
         let (cols, _) = whole_and_part(bounded(cell.x, (self.cols - 1) as f32));
         let (rows, _) = whole_and_part(bounded(cell.y, (self.rows - 1) as f32));
         let (cols, rows) = (cols.to_array(), rows.to_array());
-        let is_misread = |i: usize| self.ranks[rows[i] as usize * self.cols + cols[i] as usize] >= threshold;
+        let ranks = &self.ranks().own;
+        let is_misread = |i: usize| ranks[rows[i] as usize * self.cols + cols[i] as usize] >= threshold;
         (0..LANES).fold(0, |bits, i| bits | u32::from(is_misread(i)) << i)
     }
 
@@ -268,7 +287,8 @@ impl Shadow {
     /// one must look.
     #[inline]
     pub(super) fn are_misread_around(&self, point: Vec2, threshold: u8) -> Option<bool> {
-        let (low, high) = self.ranks_around[self.index(point)];
+        let (ranks, index) = (self.ranks(), self.index(point));
+        let (low, high) = (ranks.lowest_around[index], ranks.highest_around[index]);
         if high < threshold {
             Some(false)
         } else if low >= threshold {
@@ -282,9 +302,10 @@ impl Shadow {
     #[inline]
     pub(super) fn may_be_misread_within(&self, low: Vec2, high: Vec2, threshold: u8) -> bool {
         let ((first_row, first_col), (last_row, last_col)) = (self.cell(low), self.cell(high));
+        let ranks = &self.ranks().own;
         (first_row..=last_row).any(|row| {
             let start = row * self.cols;
-            self.ranks[start + first_col..=start + last_col].iter().any(|&rank| rank >= threshold)
+            ranks[start + first_col..=start + last_col].iter().any(|&rank| rank >= threshold)
         })
     }
 
@@ -670,23 +691,43 @@ fn lattice_cells(nodes: f32x4) -> (f32x4, f32x4) {
     (cells, progress * progress * (f32x4::splat(3.0) - f32x4::splat(2.0) * progress))
 }
 
-/// Lowest and highest value within `reach` cells along both axes of every cell of a raster.
-fn extremes_around(values: &[u8], cols: usize, reach: usize) -> Vec<(u8, u8)> {
-    let rows = values.len() / cols;
-    let join = |(low, high): (u8, u8), &(l, h): &(u8, u8)| (low.min(l), high.max(h));
-    let pairs: Vec<(u8, u8)> = values.iter().map(|&value| (value, value)).collect();
-    // Along the rows, then along the columns.
-    let along = |pairs: &[(u8, u8)], n: usize, at: &dyn Fn(usize, usize) -> usize| {
-        let others = pairs.len() / n;
-        let mut joined = vec![(u8::MAX, 0); pairs.len()];
-        for (other, i) in (0..others).flat_map(|other| (0..n).map(move |i| (other, i))) {
-            let near = i.saturating_sub(reach)..=(i + reach).min(n - 1);
-            joined[at(other, i)] = near.map(|i| &pairs[at(other, i)]).fold((u8::MAX, 0), join);
+/// The share of other values below each value, 0…255.
+fn ranks(values: &[f32]) -> Vec<u8> {
+    let mut order: Vec<(f32, u32)> = values.iter().copied().zip(0..).collect();
+    order.sort_unstable_by(|(a, _), (b, _)| a.total_cmp(b));
+    let mut ranks = vec![0; values.len()];
+    let mut n_below = 0;
+    for (i, &(value, index)) in order.iter().enumerate() {
+        if value > order[n_below].0 {
+            n_below = i;
         }
-        joined
+        ranks[index as usize] = (n_below * 255 / values.len()) as u8;
+    }
+    ranks
+}
+
+/// What `join` makes of all values within `reach` cells along both axes of every cell of a raster.
+fn joined_around(values: &[u8], cols: usize, reach: usize, join: impl Fn(u8, u8) -> u8) -> Vec<u8> {
+    let rows = values.len() / cols;
+    let join_all = |joined: &mut [u8], others: &[u8]| {
+        for (value, &other) in joined.iter_mut().zip(others) {
+            *value = join(*value, other);
+        }
     };
-    let in_rows = along(&pairs, cols, &|row, col| row * cols + col);
-    along(&in_rows, rows, &|col, row| row * cols + col)
+    // Along the rows, then along the columns.
+    let mut in_rows = values.to_vec();
+    for (joined, values) in in_rows.chunks_mut(cols).zip(values.chunks(cols)) {
+        for offset in 1..=reach.min(cols - 1) {
+            join_all(joined, &values[offset..]);
+            join_all(&mut joined[offset..], values);
+        }
+    }
+    let mut joined = in_rows.clone();
+    for offset in 1..=reach.min(rows - 1) {
+        join_all(&mut joined, &in_rows[offset * cols..]);
+        join_all(&mut joined[offset * cols..], &in_rows);
+    }
+    joined
 }
 
 /// Cubic fade from 0 to 1.
@@ -734,6 +775,36 @@ fn value_noise(seed: u64, place: Vec2, time: f32) -> f32 {
     };
     let value = if ft == 0.0 { plane(0) } else { plane(0) * (1.0 - ft) + plane(1) * ft };
     (2.0 * value - 1.0) * VALUE_NOISE_MAX
+}
+
+/// [`value_noise`] at time 0 on a raster of places, to the bit; row by row.
+fn value_noise_raster(seed: u64, xs: &[f32], ys: &[f32]) -> Vec<f32> {
+    let key = key(seed, 0);
+    // On the lines of the lattice, at every x.
+    let line = |y: i32| -> Vec<f32> {
+        let mut drawn: Option<(i32, f32, f32)> = None;
+        let at = |&x: &f32| {
+            let cell = x.floor() as i32;
+            let (_, left, right) = drawn.filter(|&(drawn, ..)| drawn == cell).unwrap_or_else(|| {
+                let nodes = [cell, cell + 1].map(|x| unit(mix(key, x, y)));
+                (cell, nodes[0], nodes[1])
+            });
+            drawn = Some((cell, left, right));
+            left + fade(x - x.floor()) * (right - left)
+        };
+        xs.iter().map(at).collect()
+    };
+    let (Some(&low), Some(&high)) = (ys.first(), ys.last()) else { return Vec::new() };
+    let first = low.floor() as i32;
+    let lines: Vec<Vec<f32>> = (first..=high.floor() as i32 + 1).map(line).collect();
+    let mut values = Vec::with_capacity(xs.len() * ys.len());
+    for &y in ys {
+        let (cell, share) = (y.floor(), fade(y - y.floor()));
+        let above = (cell as i32 - first) as usize;
+        let value = |(&near, &far): (&f32, &f32)| (2.0 * (near + share * (far - near)) - 1.0) * VALUE_NOISE_MAX;
+        values.extend(lines[above].iter().zip(&lines[above + 1]).map(value));
+    }
+    values
 }
 
 /// Uniform in [0, 1).
@@ -784,6 +855,30 @@ mod tests {
                 assert!((value - expected).abs() < 1e-4, "view {view}, {}: {value}, not {expected}", place(i));
             }
         }
+    }
+
+    #[test]
+    fn a_raster_of_value_noise_is_value_noise() {
+        let along = |from: f32, count: usize| (0..count).map(|i| from + 0.1 * i as f32).collect::<Vec<f32>>();
+        let (xs, ys) = (along(-1.75, 43), along(-0.2, 31));
+        let raster = value_noise_raster(9, &xs, &ys);
+        for (i, value) in raster.into_iter().enumerate() {
+            let place = Vec2::new(xs[i % xs.len()], ys[i / xs.len()]);
+            assert_eq!(value.to_bits(), value_noise(9, place, 0.0).to_bits(), "at {place}");
+        }
+    }
+
+    #[test]
+    fn ranks_count_what_is_below_and_reach_around() {
+        let values = [0.5, -1.0, 0.5, 3.0, 2.0, -1.0];
+        let below = |value: f32| values.iter().filter(|&&other| other < value).count();
+        let own = ranks(&values);
+        assert_eq!(own, values.map(|value| (below(value) * 255 / 6) as u8));
+        // Three rows of two, one cell to either side.
+        let lowest = joined_around(&own, 2, 1, u8::min);
+        let highest = joined_around(&own, 2, 1, u8::max);
+        assert_eq!(lowest, [own[1], own[1], own[1], own[1], own[5], own[5]]);
+        assert_eq!(highest, [own[3], own[3], own[3], own[3], own[3], own[3]]);
     }
 
     #[test]
