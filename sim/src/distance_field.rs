@@ -4,7 +4,7 @@
 //! beside straight edges, within 3 cm beside corners, and up to 5 cm too small half-way between two things.
 
 use crate::geometry::{Vec2, edges};
-use crate::vectors::{FourPoints, LANES, bounded, counted_from, f32x4, i32x4, whole_and_part};
+use crate::vectors::{FourPoints, LANES, bounded, counted_from, f32x4, indices, whole_and_part};
 use std::ops::Range;
 
 /// Spacing of the nodes, metres.
@@ -50,7 +50,7 @@ pub struct DistanceField {
 }
 
 /// What is read beyond the last node when four neighbours are.
-const SPARE_NODES: usize = LANES - 2;
+const SPARE_NODES: usize = LANES;
 
 impl DistanceField {
     /// Distances inside a boundary polygon: its outside is non-drivable.
@@ -60,6 +60,7 @@ impl DistanceField {
         let origin = low - margin;
         let size = (high + margin - origin) / NODE_M;
         let (cols, rows) = (size.x.ceil() as usize + 1, size.y.ceil() as usize + 1);
+        assert!(cols.max(rows) <= i16::MAX as usize, "a raster of {cols} x {rows} nodes takes gigabytes");
         let mut field = Self { origin, cols, rows, nodes: vec![0; cols * rows + SPARE_NODES] };
         field.fill(boundary);
         for (a, b) in edges(boundary) {
@@ -123,12 +124,14 @@ impl DistanceField {
         let node = self.nodes_from_world(points);
         let (cols, into_x) = whole_and_part(bounded(node.x, count(self.cols - 2)));
         let (rows, into_y) = whole_and_part(bounded(node.y, count(self.rows - 2)));
-        let near = self.indices(rows, cols);
-        let across = |indices: [usize; LANES]| {
-            let [left, right, ..] = f32x4::transpose(indices.map(|index| self.four_nodes_m(index)));
-            left + into_x * (right - left)
+        let around = indices(rows, cols, self.n_cols()).map(|index| &self.nodes[index..index + self.cols + LANES]);
+        let near = around.map(|nodes| as_lanes(nodes.first_chunk().expect("a row and four")));
+        let far = around.map(|nodes| as_lanes(nodes.last_chunk().expect("a row and four")));
+        let across = |stored: [f32x4; LANES]| {
+            let [left_m, right_m, ..] = f32x4::transpose(stored).map(from_stored);
+            left_m + into_x * (right_m - left_m)
         };
-        let (near_m, far_m) = (across(near), across(near.map(|index| index + self.cols)));
+        let (near_m, far_m) = (across(near), across(far));
         near_m + into_y * (far_m - near_m)
     }
 
@@ -138,7 +141,7 @@ impl DistanceField {
         let node = self.nodes_from_world(points) + FourPoints::splat(Vec2::splat(0.5));
         let (cols, _) = whole_and_part(bounded(node.x, count(self.cols - 1)));
         let (rows, _) = whole_and_part(bounded(node.y, count(self.rows - 1)));
-        f32x4::from(self.indices(rows, cols).map(|index| self.node_m(index)))
+        from_stored(as_lanes(&indices(rows, cols, self.n_cols()).map(|index| self.nodes[index])))
     }
 
     /// [`Self::at`] at the points (`xs[i]`, `ys[i]`), to the bit.
@@ -201,9 +204,8 @@ impl DistanceField {
     }
 
     #[inline]
-    fn indices(&self, rows: i32x4, cols: i32x4) -> [usize; LANES] {
-        let (rows, cols) = (rows.to_array(), cols.to_array());
-        std::array::from_fn(|i| rows[i] as u32 as usize * self.cols + cols[i] as u32 as usize)
+    fn n_cols(&self) -> i16 {
+        self.cols as i16
     }
 
     #[inline]
@@ -214,7 +216,7 @@ impl DistanceField {
     /// A node and the next three.
     #[inline]
     fn four_nodes_m(&self, index: usize) -> f32x4 {
-        from_stored(self.nodes[index..index + LANES].first_chunk().expect("four"))
+        from_stored(as_lanes(self.nodes[index..index + LANES].first_chunk().expect("four")))
     }
 
     /// A node and the next seven; `None` at the very end of the raster.
@@ -222,7 +224,7 @@ impl DistanceField {
     fn eight_nodes_m(&self, index: usize) -> Option<[f32x4; 2]> {
         let nodes = self.nodes.get(index..index + 2 * LANES)?;
         let (first, second) = nodes.split_at(LANES);
-        Some([first, second].map(|nodes| from_stored(nodes.first_chunk().expect("four"))))
+        Some([first, second].map(|nodes| from_stored(as_lanes(nodes.first_chunk().expect("four")))))
     }
 
     /// Lower-left and upper-right corners of the raster, world metres.
@@ -335,10 +337,16 @@ fn count(nodes: usize) -> f32 {
     nodes as i32 as f32
 }
 
-/// Distances of four nodes.
+/// Four nodes as they are stored, in a vector.
 #[inline]
-fn from_stored(nodes: &[u32; LANES]) -> f32x4 {
-    f32x4::from(nodes.map(|bits| f32::from_bits(bits ^ FAR_OUTSIDE)))
+fn as_lanes(nodes: &[u32; LANES]) -> f32x4 {
+    f32x4::from(nodes.map(f32::from_bits))
+}
+
+/// Distances of four nodes as they are stored.
+#[inline]
+fn from_stored(nodes: f32x4) -> f32x4 {
+    nodes ^ f32x4::splat(-CAP_M)
 }
 
 /// Smallest axis-aligned box around points.

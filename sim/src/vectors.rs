@@ -13,6 +13,7 @@
 use glam::Vec2;
 use std::ops::{Add, Mul, Sub};
 pub use wide::f32x4;
+use wide::i16x8;
 pub(crate) use wide::i32x4;
 
 /// Numbers done at once.
@@ -169,6 +170,14 @@ pub(crate) fn bounded(coordinates: f32x4, last: f32) -> f32x4 {
 pub(crate) fn whole_and_part(coordinates: f32x4) -> (i32x4, f32x4) {
     let whole = coordinates.fast_trunc_int();
     (whole, coordinates - f32x4::from_i32x4(whole))
+}
+
+/// Rows and columns as indices into a raster, row by row. Of whole numbers, every x86-64 multiplies 16 bits at once.
+#[inline]
+pub(crate) fn indices(rows: i32x4, cols: i32x4, n_cols: i16) -> [usize; LANES] {
+    let rows_and_cols: i16x8 = bytemuck::cast(rows | cols << 16_u32);
+    let indices = rows_and_cols.dot(i16x8::from([n_cols, 1, n_cols, 1, n_cols, 1, n_cols, 1]));
+    indices.to_array().map(|index| index as u32 as usize)
 }
 
 /// The lowest lane.

@@ -636,12 +636,18 @@ impl Lattice {
         let nodes = (places - FourPoints::splat(self.origin)) * f32x4::splat(self.per_m);
         let ((cols, into_x), (rows, into_y)) = (lattice_cells(nodes.x), lattice_cells(nodes.y));
         let firsts = (rows * f32x4::splat(LATTICE_NODES as f32) + cols).fast_trunc_int().to_array();
-        let across = |firsts: [i32; LANES]| {
-            let four = |first: i32| f32x4::from(*self.nodes[first as usize..].first_chunk().expect("some to spare"));
-            let [left, right, ..] = f32x4::transpose(firsts.map(four));
+        // Of each place the near nodes and the far ones, and what lies between.
+        let around = firsts.map(|first| {
+            let nodes: &[f32; LATTICE_NODES + LANES] =
+                self.nodes[first as u32 as usize..].first_chunk().expect("spare");
+            nodes
+        });
+        let across = |nodes: [f32x4; LANES]| {
+            let [left, right, ..] = f32x4::transpose(nodes);
             left + into_x * (right - left)
         };
-        let (near, far) = (across(firsts), across(firsts.map(|first| first + LATTICE_NODES as i32)));
+        let near = across(around.map(|nodes| f32x4::from(*nodes.first_chunk().expect("four"))));
+        let far = across(around.map(|nodes| f32x4::from(*nodes.last_chunk().expect("four"))));
         near + into_y * (far - near)
     }
 }
