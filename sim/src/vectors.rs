@@ -86,19 +86,19 @@ impl Mul<f32x4> for FourPoints {
 /// Numbers of lanes that are picked without branching.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Picked {
-    numbers: Vec<u16>,
+    numbers: Vec<i16>,
     n_picked: usize,
 }
 
 /// The set bits of every mask, lowest first, and how many there are.
-const SET_LANES: [([u16; LANES], usize); 1 << LANES] = {
-    let mut table = [([0; LANES], 0); 1 << LANES];
+const SET_LANES: [([i16; 2 * LANES], usize); 1 << LANES] = {
+    let mut table = [([0; 2 * LANES], 0); 1 << LANES];
     let mut i = 0;
     while i < LANES << LANES {
         let (mask, lane) = (i / LANES, i % LANES);
         if mask >> lane & 1 == 1 {
             let (lanes, n_set) = &mut table[mask];
-            lanes[*n_set] = lane as u16;
+            lanes[*n_set] = lane as i16;
             *n_set += 1;
         }
         i += 1;
@@ -109,7 +109,7 @@ const SET_LANES: [([u16; LANES], usize); 1 << LANES] = {
 impl Picked {
     /// Nothing picked, with room for what may be.
     pub(crate) fn up_to(n_lanes: usize) -> Self {
-        Self { numbers: vec![0; n_lanes + LANES], n_picked: 0 }
+        Self { numbers: vec![0; n_lanes + 2 * LANES], n_picked: 0 }
     }
 
     /// Forgets what was picked.
@@ -121,35 +121,36 @@ impl Picked {
     #[inline]
     pub(crate) fn pick(&mut self, first: usize, lanes: u32) {
         let (set_lanes, n_set) = SET_LANES[(lanes & ALL_LANES) as usize];
-        // All four are written; what was not picked is overwritten next.
-        self.numbers[self.n_picked..self.n_picked + LANES].copy_from_slice(&set_lanes.map(|lane| first as u16 + lane));
+        let numbers = i16x8::splat(first as i16) + i16x8::from(set_lanes);
+        // More are written than are picked: they are overwritten next.
+        self.numbers[self.n_picked..self.n_picked + 2 * LANES].copy_from_slice(numbers.as_array());
         self.n_picked += n_set;
     }
 
     /// Picks a number, or not.
     #[inline]
     pub(crate) fn pick_if(&mut self, is_picked: bool, number: usize) {
-        self.numbers[self.n_picked] = number as u16;
+        self.numbers[self.n_picked] = number as i16;
         self.n_picked += usize::from(is_picked);
     }
 
     /// One of the numbers that were picked.
     #[inline]
     pub(crate) fn get(&self, index: usize) -> usize {
-        usize::from(self.numbers[index.min(self.n_picked - 1)])
+        self.numbers[index.min(self.n_picked - 1)] as usize
     }
 
     /// What was picked, four at a time, in order; the last one is repeated.
     #[inline]
     pub(crate) fn fours(&self) -> impl Iterator<Item = [usize; LANES]> + '_ {
         let picked = &self.numbers[..self.n_picked];
-        picked.chunks(LANES).map(|four| std::array::from_fn(|i| usize::from(four[i.min(four.len() - 1)])))
+        picked.chunks(LANES).map(|four| std::array::from_fn(|i| four[i.min(four.len() - 1)] as usize))
     }
 
     /// What was picked, in order.
     #[inline]
     pub(crate) fn iter(&self) -> impl ExactSizeIterator<Item = usize> + '_ {
-        self.numbers[..self.n_picked].iter().map(|&number| usize::from(number))
+        self.numbers[..self.n_picked].iter().map(|&number| number as usize)
     }
 }
 
