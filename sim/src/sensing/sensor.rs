@@ -66,7 +66,7 @@ impl Sensor {
             settings,
             noise,
             last: None,
-            undecided: Undecided::default(),
+            undecided: Undecided::with_room(),
         }
     }
 
@@ -378,7 +378,7 @@ fn col_of_cell(number: usize) -> usize {
 }
 
 /// What is left undecided at one stage after the other. Kept between views for its memory only.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Undecided {
     /// Blocks of cells, row by row.
     blocks: Picked,
@@ -393,8 +393,8 @@ struct Undecided {
     inside: Picked,
 }
 
-impl Default for Undecided {
-    fn default() -> Self {
+impl Undecided {
+    fn with_room() -> Self {
         const NUMBERS: usize = GRID_CELLS * NUMBERS_PER_ROW;
         Self {
             blocks: Picked::up_to(BLOCKS * BLOCKS),
@@ -405,9 +405,7 @@ impl Default for Undecided {
             inside: Picked::up_to(NUMBERS),
         }
     }
-}
 
-impl Undecided {
     fn clear(&mut self) {
         let Self { blocks, cells, shifted, thresholds_m, inside, .. } = self;
         [blocks, cells, shifted, inside].into_iter().for_each(Picked::clear);
