@@ -50,13 +50,8 @@ impl TrialBatch<'_> {
     /// Like [`Self::drive`], starting from the given episodes.
     pub fn drive_from(&self, episodes: Vec<Episode>, observer: Observer<'_>) -> Vec<Option<EpisodeReport>> {
         let cars_each = self.driver.cars_per_fleet(episodes.len());
-        let mut waiting = episodes.into_iter().peekable();
-        let fleets = std::iter::from_fn(|| {
-            waiting.peek()?;
-            let cars: Vec<Episode> = waiting.by_ref().take(cars_each).collect();
-            Some(SeatedFleet::new(self.driver.fleet(self.episode, cars.len()), cars))
-        });
-        run_fleets_until(fleets.collect(), observer)
+        let fleets = SeatedFleet::in_all(episodes, cars_each, |cars| self.driver.fleet(self.episode, cars));
+        run_fleets_until(fleets, observer)
     }
 
     /// The key that replays a trial of the batch. `seed` is that of the evaluation.

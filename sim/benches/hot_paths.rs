@@ -4,7 +4,7 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use sim::batch::{SeatedFleet, run_fleets, run_lockstep};
-use sim::driver::{Decision, Driver, GroundTruth, LookAheadPoint, OneDriverEach, Situation, Source};
+use sim::driver::{Decision, Driver, Fleet, GroundTruth, LookAheadPoint, OneDriverEach, Situation, Source};
 use sim::episode::{self, Episode, EpisodeSettings};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
@@ -99,8 +99,8 @@ fn closed_loop_in_lockstep(bencher: Bencher<'_, '_>, (threads, is_parted): (usiz
         let mut fleet = OneDriverEach(vec![AlongRoute; episodes.len()]);
         pool.install(|| {
             if is_parted {
-                let seated = |episode| SeatedFleet::new(Box::new(OneDriverEach(vec![AlongRoute])), vec![episode]);
-                run_fleets(episodes.into_iter().map(seated).collect(), &mut |_, _| ())
+                let fleet = |cars| -> Box<dyn Fleet + Send> { Box::new(OneDriverEach(vec![AlongRoute; cars])) };
+                run_fleets(SeatedFleet::in_all(episodes, 1, fleet), &mut |_, _| ())
             } else {
                 run_lockstep(episodes, &mut fleet, &mut |_, _| ())
             }

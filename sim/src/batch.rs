@@ -77,6 +77,21 @@ impl SeatedFleet {
         Self { fleet, episodes, frames: Vec::new() }
     }
 
+    /// Seats fleets in all cars, each in up to `cars_each` of them. `fleet` is called with the number of its cars.
+    pub fn in_all(
+        episodes: Vec<Episode>,
+        cars_each: usize,
+        mut fleet: impl FnMut(usize) -> Box<dyn Fleet + Send>,
+    ) -> Vec<Self> {
+        let mut waiting = episodes.into_iter().peekable();
+        let seated = std::iter::from_fn(|| {
+            waiting.peek()?;
+            let episodes: Vec<Episode> = waiting.by_ref().take(cars_each).collect();
+            Some(Self::new(fleet(episodes.len()), episodes))
+        });
+        seated.collect()
+    }
+
     /// Drives on for [`TICKS_AT_ONCE`], or until all have ended.
     fn drive(&mut self) {
         let mut decisions: Vec<Decision> = Vec::with_capacity(self.episodes.len());
