@@ -205,6 +205,7 @@ mod tests {
     use super::ObstacleSet::{NonDrivable, Solid};
     use super::*;
     use crate::scenario::{Obstacle, ObstacleClass};
+    use crate::vehicle::VehicleCommand;
 
     #[test]
     fn the_body_hits_what_it_overlaps_and_nothing_else() {
@@ -223,5 +224,41 @@ mod tests {
         assert!(!hits(5.94, 0.0, 0.0, NonDrivable) && hits(5.96, 0.0, 0.0, NonDrivable));
         // The boundary counts as non-drivable, not as solid.
         assert!(hits(45.0, 3.08, 0.0, NonDrivable) && !hits(45.0, 3.08, 0.0, Solid) && hits(28.0, 0.0, 0.0, Solid));
+    }
+
+    /// However it is steered and driven: the clear car sweeps into nothing in any step of the tick.
+    #[test]
+    fn what_stays_clear_for_a_tick_sweeps_into_nothing() {
+        let vehicle = VehicleSettings::hyundai_hg300();
+        let pillar = |x, y| Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(x, y), 0.4));
+        let scenario =
+            Scenario::lane(-10.0..=60.0, 6.0, 0.0..=40.0).with_obstacles([pillar(14.0, 1.9), pillar(25.0, -1.8)]);
+        let map = crate::map::Map::build(scenario, &vehicle).unwrap();
+        let (distance, world, body) = (map.distance_field(), map.collision(), BodyBox::new(&vehicle));
+        let (mut n_clear, mut n_hits) = (0, 0);
+        for i in 0..600_u32 {
+            let share = |k: u32| (i * k % 97) as f32 / 96.0;
+            let pose = Pose::new(Vec2::new(0.05 * i as f32, 2.4 * share(5) - 1.2), 0.6 * share(7) - 0.3);
+            let start = VehicleState {
+                speed_mps: 2.4 * share(11),
+                steering_rad: 1.2 * share(13) - 0.6,
+                accel_mps2: share(17),
+                accel_demand_mps2: share(17),
+                ..VehicleState::at_rest(pose)
+            };
+            let is_clear = body.stays_clear(distance, &vehicle, &start, 0.5, 0.05);
+            n_clear += u32::from(is_clear);
+            for (steering_rad, speed_mps) in [(-0.62, 2.2), (0.62, 2.2), (0.0, 9.0), (0.62, 0.0)] {
+                let mut state = start;
+                for _ in 0..5 {
+                    state = crate::vehicle::step(&vehicle, state, VehicleCommand { steering_rad, speed_mps }, 0.01);
+                    let curvature = state.curvature_per_m(&vehicle);
+                    let hits = body.sweep_hits(distance, world, NonDrivable, state.pose, curvature, 0.5);
+                    assert!(!(is_clear && hits), "from {start:?} to {state:?}");
+                    n_hits += u32::from(hits);
+                }
+            }
+        }
+        assert!(n_clear > 100 && n_hits > 100, "{n_clear} clear, {n_hits} hits");
     }
 }

@@ -4,7 +4,7 @@
 //! beside straight edges, within 3 cm beside corners, and up to 5 cm too small half-way between two things.
 
 use crate::geometry::{Vec2, edges};
-use crate::vectors::{FourPoints, LANES, bounded, counted_from, f32x4, indices, whole_and_part};
+use crate::vectors::{FourPoints, LANES, bounded, coordinate, counted_from, f32x4, indices, whole_and_part};
 use std::ops::Range;
 
 /// Spacing of the nodes, metres.
@@ -122,8 +122,8 @@ impl DistanceField {
     #[inline(always)]
     pub fn at_four(&self, points: FourPoints) -> f32x4 {
         let node = self.nodes_from_world(points);
-        let (cols, into_x) = whole_and_part(bounded(node.x, count(self.cols - 2)));
-        let (rows, into_y) = whole_and_part(bounded(node.y, count(self.rows - 2)));
+        let (cols, into_x) = whole_and_part(bounded(node.x, coordinate(self.cols - 2)));
+        let (rows, into_y) = whole_and_part(bounded(node.y, coordinate(self.rows - 2)));
         let around = indices(rows, cols, self.n_cols()).map(|index| &self.nodes[index..index + self.cols + LANES]);
         let near = around.map(|nodes| as_lanes(nodes.first_chunk().expect("a row and four")));
         let far = around.map(|nodes| as_lanes(nodes.last_chunk().expect("a row and four")));
@@ -139,8 +139,8 @@ impl DistanceField {
     #[inline]
     pub fn at_four_nearest_nodes(&self, points: FourPoints) -> f32x4 {
         let node = self.nodes_from_world(points) + FourPoints::splat(Vec2::splat(0.5));
-        let (cols, _) = whole_and_part(bounded(node.x, count(self.cols - 1)));
-        let (rows, _) = whole_and_part(bounded(node.y, count(self.rows - 1)));
+        let (cols, _) = whole_and_part(bounded(node.x, coordinate(self.cols - 1)));
+        let (rows, _) = whole_and_part(bounded(node.y, coordinate(self.rows - 1)));
         from_stored(as_lanes(&indices(rows, cols, self.n_cols()).map(|index| self.nodes[index])))
     }
 
@@ -165,8 +165,8 @@ impl DistanceField {
     #[inline]
     pub fn lowest_within(&self, low: Vec2, high: Vec2) -> f32 {
         let node = self.nodes_from_world([low, high, low, high].into());
-        let (cols, into_x) = whole_and_part(bounded(node.x, count(self.cols - 2)));
-        let (rows, into_y) = whole_and_part(bounded(node.y, count(self.rows - 2)));
+        let (cols, into_x) = whole_and_part(bounded(node.x, coordinate(self.cols - 2)));
+        let (rows, into_y) = whole_and_part(bounded(node.y, coordinate(self.rows - 2)));
         let ([first_col, last_col, ..], [first_row, last_row, ..]) = (cols.to_array(), rows.to_array());
         let ([into_first_col, into_last_col, ..], [into_first_row, into_last_row, ..]) =
             (into_x.to_array(), into_y.to_array());
@@ -331,12 +331,6 @@ impl DistanceField {
     }
 }
 
-/// A number of nodes as a coordinate; from 64 bits it takes several instructions.
-#[inline]
-fn count(nodes: usize) -> f32 {
-    nodes as i32 as f32
-}
-
 /// Four nodes as they are stored, in a vector.
 #[inline]
 fn as_lanes(nodes: &[u32; LANES]) -> f32x4 {
@@ -417,6 +411,23 @@ mod tests {
             let plain = plain_field(&boundary, &islands, disc);
             let different = (0..plain.nodes.len()).filter(|&index| field.nodes[index] != plain.nodes[index]).count();
             assert_eq!(different, 0, "of {} nodes, turned by {turned_rad}", plain.nodes.len());
+        }
+    }
+
+    #[test]
+    fn distances_at_four_points_are_those_at_each() {
+        let mut field = DistanceField::of_boundary(&rectangle());
+        field.carve_disc(Vec2::new(6.0, 4.0), 0.5);
+        for i in 0..500 {
+            // Some of them beyond the raster.
+            let point = |k: usize| Vec2::new(-9.0 + 0.077 * (i + 11 * k) as f32, 17.0 - 0.051 * (i * (k + 1)) as f32);
+            let points = std::array::from_fn(point);
+            let distances_m = field.at_four(points.into()).to_array();
+            let nearest_m = field.at_four_nearest_nodes(points.into()).to_array();
+            for (k, &point) in points.iter().enumerate() {
+                assert_eq!(distances_m[k].to_bits(), field.at(point).to_bits(), "at {point}");
+                assert!((nearest_m[k] - field.at_nearest_node(point)).abs() <= 1.5 * NODE_M, "at {point}");
+            }
         }
     }
 

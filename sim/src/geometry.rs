@@ -343,4 +343,25 @@ mod tests {
             assert_eq!(in_ego.bounds(), crate::distance_field::bounds(&expected));
         }
     }
+
+    #[test]
+    fn four_points_are_each_point() {
+        let frame = Pose::new(Vec2::new(3.0, -8.0), 0.7).world_from_ego();
+        let polygon = [Vec2::new(-2.0, -1.0), Vec2::new(3.0, -2.0), Vec2::new(1.0, 0.5), Vec2::new(0.5, 3.0)];
+        for i in 0..300 {
+            let point =
+                |k: usize| Vec2::new(0.031 * (i * (k + 1) % 200) as f32 - 3.0, 0.043 * (i + 7 * k) as f32 - 4.0);
+            let points: [Vec2; LANES] = std::array::from_fn(point);
+            let four = FourPoints::from(points);
+            let (there, back) = (frame.four_points(four), frame.inverse_four_points(four));
+            let to_edge_m = four.distance_to_segment(polygon[0], polygon[1]).to_array();
+            let are_inside = four.are_inside(&polygon).to_bitmask();
+            for (k, &point) in points.iter().enumerate() {
+                let lane = |four: FourPoints| Vec2::new(four.x.as_array()[k], four.y.as_array()[k]);
+                assert_eq!((lane(there), lane(back)), (frame.point(point), frame.inverse_point(point)));
+                assert_eq!(to_edge_m[k].to_bits(), distance_to_segment(point, polygon[0], polygon[1]).to_bits());
+                assert_eq!(are_inside >> k & 1 == 1, polygon_contains(&polygon, point), "{point}");
+            }
+        }
+    }
 }

@@ -137,14 +137,17 @@ impl Picked {
     /// One of the numbers that were picked.
     #[inline]
     pub(crate) fn get(&self, index: usize) -> usize {
-        self.numbers[index.min(self.n_picked - 1)] as usize
+        self.numbers[index] as usize
     }
 
-    /// What was picked, four at a time, in order; the last one is repeated.
+    /// What was picked, four at a time, in order; the last one is repeated. With each, the lanes that repeat nothing.
     #[inline]
-    pub(crate) fn fours(&self) -> impl Iterator<Item = [usize; LANES]> + '_ {
+    pub(crate) fn fours(&self) -> impl Iterator<Item = ([usize; LANES], u32)> + '_ {
         let picked = &self.numbers[..self.n_picked];
-        picked.chunks(LANES).map(|four| std::array::from_fn(|i| four[i.min(four.len() - 1)] as usize))
+        picked.chunks(LANES).map(|four| {
+            let numbers = std::array::from_fn(|i| four[i.min(four.len() - 1)] as usize);
+            (numbers, ALL_LANES >> (LANES - four.len()))
+        })
     }
 
     /// What was picked, in order.
@@ -154,10 +157,16 @@ impl Picked {
     }
 }
 
+/// An index as a coordinate; from 64 bits it takes several instructions.
+#[inline]
+pub(crate) fn coordinate(index: usize) -> f32 {
+    index as i32 as f32
+}
+
 /// A number and the next three.
 #[inline]
 pub(crate) fn counted_from(first: usize) -> f32x4 {
-    f32x4::splat(first as f32) + f32x4::from([0.0, 1.0, 2.0, 3.0])
+    f32x4::splat(coordinate(first)) + f32x4::from([0.0, 1.0, 2.0, 3.0])
 }
 
 /// Bounds coordinates to 0…`last`.
@@ -193,4 +202,34 @@ pub(crate) fn lowest(values: f32x4) -> f32 {
 pub(crate) fn highest(values: f32x4) -> f32 {
     let [a, b, c, d] = values.to_array();
     a.max(b).max(c.max(d))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn picked_lanes_are_those_that_are_set_in_order() {
+        let mut picked = Picked::up_to(64);
+        let mut expected = Vec::new();
+        for mask in 0..16_u32 {
+            let first = 4 * mask as usize;
+            // Bits beyond the lanes do not count.
+            picked.pick(first, mask | 0xF0);
+            expected.extend((0..LANES).filter(|lane| mask >> lane & 1 == 1).map(|lane| first + lane));
+        }
+        picked.pick_if(false, 70);
+        picked.pick_if(true, 71);
+        expected.push(71);
+        assert_eq!(picked.iter().collect::<Vec<usize>>(), expected);
+        assert_eq!((picked.get(5), picked.fours().count()), (expected[5], expected.len().div_ceil(4)));
+        assert_eq!(picked.fours().last(), Some(([71; LANES], 0b0001)), "33 are eight fours and one");
+    }
+
+    #[test]
+    fn indices_go_row_by_row_up_to_the_largest_raster() {
+        let (rows, cols) = ([0, 3, 5000, 32_000], [7, 4999, 0, 32_766]);
+        let expected = std::array::from_fn(|i| (rows[i] * 32_767 + cols[i]) as usize);
+        assert_eq!(indices(i32x4::from(rows), i32x4::from(cols), 32_767), expected);
+    }
 }

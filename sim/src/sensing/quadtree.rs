@@ -3,7 +3,7 @@
 use super::{CELL_PIXELS, GRID_CELLS, GridGeometry};
 use crate::distance_field::{DistanceField, change_max_m};
 use crate::geometry::{Pose, Vec2};
-use crate::vectors::{FourPoints, LANES, counted_from, f32x4, lowest};
+use crate::vectors::{FourPoints, LANES, coordinate, counted_from, f32x4, lowest};
 use std::ops::Range;
 
 /// World positions of the pixel centres of one view. The only place where pixels are turned into world points, so
@@ -48,7 +48,7 @@ pub(super) fn pixels_of(cell: usize) -> Range<usize> {
 /// Index of the first pixel of a cell, along one axis.
 #[inline]
 fn first_pixel(cell: usize) -> f32 {
-    (cell * CELL_PIXELS) as i32 as f32
+    coordinate(cell * CELL_PIXELS)
 }
 
 /// Pixel indices of the centres of cells, along one axis.

@@ -15,7 +15,7 @@ use crate::distance_field::{DistanceField, change_max_m};
 use crate::geometry::{Pose, Vec2, WorldFromEgo, bits};
 use crate::map::Map;
 use crate::seed::RootSeed;
-use crate::vectors::{ALL_LANES, FourPoints, LANES, Picked, f32x4};
+use crate::vectors::{ALL_LANES, FourPoints, LANES, Picked, coordinate, f32x4};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -170,15 +170,14 @@ impl Sensor {
     /// Marks the undecided cells of which the centre tells, once it is known how noise shifts the boundary.
     fn occupy_beyond_shifted(&self, ego: &EgoView, grid: &mut OccupancyGrid, undecided: &mut Undecided) {
         let Undecided { cells, centres_m, shifted, thresholds_m, .. } = undecided;
-        for (i, cells) in cells.fours().enumerate() {
+        for (i, (cells, lanes)) in cells.fours().enumerate() {
             let (rows, cols) = (cells.map(row_of_cell), cells.map(col_of_cell));
-            let index = |index: usize| index as i32 as f32;
-            let of_four_m = self.thresholds_m(ego, rows.map(index).into(), cols.map(index).into());
+            let of_four_m = self.thresholds_m(ego, rows.map(coordinate).into(), cols.map(coordinate).into());
             let (are_above, are_below) = ego.lattice.are_decided(cells.map(|cell| centres_m[cell]).into(), of_four_m);
             for lane in 0..LANES {
                 grid.occupy_row(rows[lane], (are_below >> lane & 1) << cols[lane]);
             }
-            shifted.pick(i * LANES, !(are_above | are_below) & ALL_LANES);
+            shifted.pick(i * LANES, !(are_above | are_below) & lanes);
             thresholds_m.extend(of_four_m.to_array());
         }
     }
