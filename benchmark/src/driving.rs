@@ -10,7 +10,7 @@ use expert::{ExpertSettings, ScriptedExpert};
 use policy::checkpoint::Checkpoint;
 use policy::network::{DeviceChoice, Weights};
 use rayon::prelude::*;
-use sim::batch::run_lockstep;
+use sim::batch::{SeatedFleet, run_fleets, run_lockstep};
 use sim::driver::{Decision, Driver, Fleet, LookAheadPoint, OneDriverEach, Situation, Source};
 use sim::episode::{self, Episode};
 use sim::map::Map;
@@ -62,10 +62,10 @@ impl Course {
         drive::start(&self.trials(), &self.maps, &self.settings.episode, NoiseChoice::Paper)
     }
 
-    /// Control steps of a fleet in lock-step, all together.
-    fn lock_step(&self, fleet: &mut dyn Fleet) -> f64 {
+    /// Control steps in lock-step, all together: of fleets of up to `cars_each` cars, as trials are driven.
+    fn lock_step(&self, cars_each: usize, fleet: impl FnMut(usize) -> Box<dyn Fleet + Send>) -> f64 {
         let mut steps = 0_u64;
-        run_lockstep(self.episodes(), fleet, &mut |_, _| steps += 1);
+        run_fleets(SeatedFleet::in_all(self.episodes(), cars_each, fleet), &mut |_, _| steps += 1);
         steps as f64
     }
 
@@ -97,7 +97,7 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     report(times("two cores over one, by episodes", &two, &one, 1.9));
     report(two);
     let two = steps("the same on two cores, in lock-step", 2, None, &mut || {
-        course.lock_step(&mut OneDriverEach(vec![Centred; FLEET]))
+        course.lock_step(1, |cars| Box::new(OneDriverEach(vec![Centred; cars])))
     });
     report(times("two cores over one, in lock-step", &two, &one, 1.9));
     report(two);
@@ -117,7 +117,7 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
         steps as f64
     }));
     report(steps("fleet of 32 with the network, two cores", 2, Some(Goal::AtLeast(60_000.0)), &mut || {
-        course.lock_step(&mut *network.fleet(&settings.episode, FLEET))
+        course.lock_step(network.cars_per_fleet(FLEET), |cars| network.fleet(&settings.episode, cars))
     }));
     report(steps("one car with the expert", 1, None, &mut || {
         let expert = || ScriptedExpert::new(ExpertSettings::paper(), &settings.episode);

@@ -10,8 +10,7 @@ use crate::settings::NoiseChoice;
 use crate::trials::{self, Trial};
 use anyhow::ensure;
 use rayon::prelude::*;
-use sim::batch::run_lockstep_until;
-use sim::driver::Fleet;
+use sim::batch::{SeatedFleet, run_fleets_until};
 use sim::episode::{Episode, EpisodeReport, EpisodeSettings};
 use sim::frame::Frame;
 use sim::map::Map;
@@ -43,11 +42,6 @@ impl TrialBatch<'_> {
         start(self.trials, self.maps, self.episode, self.noise)
     }
 
-    /// Seats the driver in this many cars.
-    pub fn fleet(&self, cars: usize) -> Box<dyn Fleet> {
-        self.driver.fleet(self.episode, cars)
-    }
-
     /// Drives every trial to its end, or until the observer breaks; `None` marks trials that had not ended by then.
     pub fn drive(&self, observer: Observer<'_>) -> Vec<Option<EpisodeReport>> {
         self.drive_from(self.episodes(), observer)
@@ -55,8 +49,9 @@ impl TrialBatch<'_> {
 
     /// Like [`Self::drive`], starting from the given episodes.
     pub fn drive_from(&self, episodes: Vec<Episode>, observer: Observer<'_>) -> Vec<Option<EpisodeReport>> {
-        let mut fleet = self.fleet(episodes.len());
-        run_lockstep_until(episodes, &mut *fleet, observer)
+        let cars_each = self.driver.cars_per_fleet(episodes.len());
+        let fleets = SeatedFleet::in_all(episodes, cars_each, |cars| self.driver.fleet(self.episode, cars));
+        run_fleets_until(fleets, observer)
     }
 
     /// The key that replays a trial of the batch. `seed` is that of the evaluation.

@@ -7,9 +7,8 @@ use planners::{Planner, PlannerContext, PlannerSpec};
 use policy::checkpoint::Checkpoint;
 use policy::drivers::NetFleet;
 use policy::network::DeviceChoice;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sim::driver::{Decision, Driver, Fleet, Seat, SensorsOnly, Source};
+use sim::driver::{Fleet, OneDriverEach, SensorsOnly, Source};
 use sim::episode::EpisodeSettings;
 use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -268,14 +267,23 @@ impl NamedDriver {
         }
     }
 
+    /// How many of some cars, which are driven in lock-step, one fleet drives best: a network answers for a thread's share
+    /// of them in one call, others answer for each car alone.
+    pub fn cars_per_fleet(&self, cars: usize) -> usize {
+        match self.model {
+            Model::Network(..) => cars.div_ceil(rayon::current_num_threads()).max(1),
+            Model::Expert(_) | Model::Planner(_) => 1,
+        }
+    }
+
     /// Seats it in this many cars, which are driven in lock-step.
-    pub fn fleet(&self, episode: &EpisodeSettings, cars: usize) -> Box<dyn Fleet> {
+    pub fn fleet(&self, episode: &EpisodeSettings, cars: usize) -> Box<dyn Fleet + Send> {
         match &self.model {
-            Model::Expert(settings) => Box::new(OneEach((0..cars).map(|_| expert(settings, episode)).collect())),
+            Model::Expert(settings) => Box::new(OneDriverEach((0..cars).map(|_| expert(settings, episode)).collect())),
             Model::Network(checkpoint, device) => Box::new(NetFleet::new(checkpoint, *device)),
             Model::Planner(planner) => {
                 let planner = planner.planner(&PlannerContext::of(episode));
-                Box::new(OneEach(vec![SensorsOnly(planner); cars]))
+                Box::new(OneDriverEach(vec![SensorsOnly(planner); cars]))
             }
         }
     }
@@ -355,30 +363,6 @@ fn with_parameters(planner: &PlannerSpec, text: &str) -> anyhow::Result<PlannerS
     let changed = planner.with_parameters(file.parameters).context("parameters")?;
     changed.check().map_err(anyhow::Error::msg).context("parameters")?;
     Ok(changed)
-}
-
-/// A driver per car, asked in parallel: each answers for its own car alone, so the order does not matter.
-struct OneEach<D>(Vec<D>);
-
-impl<D: Driver + Send> Fleet for OneEach<D> {
-    fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
-        let mut waiting = seats.iter().peekable();
-        let mut asked: Vec<_> = self
-            .0
-            .iter_mut()
-            .enumerate()
-            .filter_map(|(episode, driver)| Some((driver, waiting.next_if(|seat| seat.episode == episode)?)))
-            .collect();
-        asked
-            .par_iter_mut()
-            .map(|(driver, seat)| {
-                if seat.was_reset {
-                    driver.reset();
-                }
-                driver.decide(&seat.situation)
-            })
-            .collect_into_vec(decisions);
-    }
 }
 
 #[cfg(test)]

@@ -1,9 +1,11 @@
-//! One observation, one control step without a driver, one map. `cargo bench --profile dev --workspace --bench hot_paths`.
+//! The closed loop and its parts, maps and episodes. `cargo bench --profile dev -p sim --bench hot_paths`.
 #![allow(missing_docs, reason = "a benchmark")]
 
 use divan::Bencher;
-use sim::driver::{Decision, LookAheadPoint, Source};
-use sim::episode::{Episode, EpisodeSettings};
+use divan::counter::ItemsCount;
+use sim::batch::{SeatedFleet, run_fleets, run_lockstep};
+use sim::driver::{Decision, Driver, Fleet, GroundTruth, LookAheadPoint, OneDriverEach, Situation, Source};
+use sim::episode::{self, Episode, EpisodeSettings};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, Scenario, SpeedBump};
@@ -69,9 +71,80 @@ fn control_step_without_driver(bencher: Bencher<'_, '_>, lane_m: f32) {
     });
 }
 
+/// Control steps of whole runs with noise `paper` and a driver that costs next to nothing: it heads for the route 7 m ahead.
+#[divan::bench(args = [WIDTH_M, 2.7], sample_count = 10)]
+fn closed_loop(bencher: Bencher<'_, '_>, lane_m: f32) {
+    let (settings, map) = (Arc::new(EpisodeSettings::paper()), map(lane_m));
+    let drive = || {
+        let episode = Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(1));
+        episode::run(episode, &mut AlongRoute, &mut ())
+    };
+    bencher.counter(ItemsCount::new(drive().metrics.ticks)).bench_local(drive);
+}
+
+/// The same in lock-step, 32 cars on one thread or on two, for 40 s each. Parted: every car has a fleet of its own;
+/// otherwise one fleet answers for all.
+#[divan::bench(args = [(1, true), (2, true), (1, false), (2, false)], sample_count = 10)]
+fn closed_loop_in_lockstep(bencher: Bencher<'_, '_>, (threads, is_parted): (usize, bool)) {
+    const CARS: usize = 32;
+    let mut settings = EpisodeSettings::paper();
+    settings.metrics.timeout_s = 40.0;
+    let (settings, map) = (Arc::new(settings), map(WIDTH_M));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
+    let episodes = || -> Vec<Episode> {
+        let episode = |seed| Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(seed));
+        (0..CARS as u64).map(episode).collect()
+    };
+    let drive = |episodes: Vec<Episode>| {
+        let mut fleet = OneDriverEach(vec![AlongRoute; episodes.len()]);
+        pool.install(|| {
+            if is_parted {
+                let fleet = |cars| -> Box<dyn Fleet + Send> { Box::new(OneDriverEach(vec![AlongRoute; cars])) };
+                run_fleets(SeatedFleet::in_all(episodes, 1, fleet), &mut |_, _| ())
+            } else {
+                run_lockstep(episodes, &mut fleet, &mut |_, _| ())
+            }
+        })
+    };
+    let n_steps: u32 = drive(episodes()).iter().map(|report| report.metrics.ticks).sum();
+    bencher.counter(ItemsCount::new(n_steps)).with_inputs(episodes).bench_local_values(drive);
+}
+
+#[derive(Clone)]
+struct AlongRoute;
+
+impl Driver for AlongRoute {
+    fn decide(&mut self, situation: &Situation<'_>) -> Decision {
+        let GroundTruth { map, vehicle, progress_m } = situation.truth;
+        let target = map.path().pose_at(progress_m + 7.0).position();
+        let in_ego = vehicle.pose.world_from_ego().inverse_point(target);
+        let look_ahead = LookAheadPoint { ahead_m: in_ego.x.max(1.0), left_m: in_ego.y };
+        Decision { look_ahead, source: Source::Expert, spread: None }
+    }
+}
+
 #[divan::bench]
-fn map_build(bencher: Bencher<'_, '_>) {
+fn episode_new(bencher: Bencher<'_, '_>) {
+    let (settings, map) = (Arc::new(EpisodeSettings::paper()), map(WIDTH_M));
+    bencher.bench_local(|| Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(1)));
+}
+
+/// Of the lane turned by some degrees.
+#[divan::bench(args = [0, 45])]
+fn map_build(bencher: Bencher<'_, '_>, turned_deg: i32) {
+    let lane = turned(&scenario(WIDTH_M), (turned_deg as f32).to_radians());
     bencher
-        .with_inputs(|| scenario(WIDTH_M))
-        .bench_local_values(|scenario| Map::build(scenario, &VehicleSettings::hyundai_hg300()));
+        .with_inputs(|| lane.clone())
+        .bench_local_values(|scenario| Map::build(scenario, &VehicleSettings::hyundai_hg300()).expect("it is sound"));
+}
+
+/// A scenario turned about the origin.
+fn turned(scenario: &Scenario, by_rad: f32) -> Scenario {
+    let turn = Pose::new(Vec2::ZERO, by_rad).world_from_ego();
+    let all = |points: &[Vec2]| points.iter().map(|&point| turn.point(point)).collect::<Vec<Vec2>>();
+    let obstacles = scenario.obstacles.iter().map(|obstacle| {
+        let Pose { heading_rad, .. } = obstacle.centre();
+        Obstacle::new(obstacle.class, Pose::new(turn.point(obstacle.centre().position()), heading_rad + by_rad))
+    });
+    Scenario::new("lane", all(&scenario.boundary), all(&scenario.reference_path.points)).with_obstacles(obstacles)
 }

@@ -1,4 +1,7 @@
 //! Many episodes in lock-step.
+//!
+//! A fleet that answers for cars together is called once per tick ([`run_lockstep`]). Where the cars can be parted, each
+//! part with a fleet of its own ([`run_fleets`]), threads meet once in many ticks instead. Observers see no difference.
 
 use crate::driver::{Decision, Fleet};
 use crate::episode::{Episode, EpisodeReport};
@@ -30,22 +33,24 @@ pub fn run_lockstep_until(
 ) -> Vec<Option<EpisodeReport>> {
     let mut decisions: Vec<Decision> = Vec::with_capacity(episodes.len());
     let mut frames: Vec<(usize, Frame)> = Vec::with_capacity(episodes.len());
+    episodes.par_iter_mut().filter(|episode| episode.ending().is_none()).for_each(Episode::observe);
     loop {
-        let mut running: Vec<(usize, &mut Episode)> =
-            episodes.iter_mut().enumerate().filter(|(_, episode)| episode.ending().is_none()).collect();
+        let mut running: Vec<(usize, &mut Episode)> = running(&mut episodes);
         if running.is_empty() {
             break;
         }
-        running.par_iter_mut().for_each(|(_, episode)| episode.observe());
-        let seats: Vec<_> = running.iter().map(|(index, episode)| episode.seat(*index)).collect();
-        decisions.clear();
-        fleet.decide(&seats, &mut decisions);
-        assert_eq!(decisions.len(), seats.len(), "a fleet answers every seat");
-        drop(seats);
+        decide(&running, fleet, &mut decisions);
+        // Each car takes its next observation at once, so that threads meet once per tick.
         running
             .par_iter_mut()
             .zip(&decisions)
-            .map(|((index, episode), &decision)| (*index, episode.apply(decision)))
+            .map(|((index, episode), &decision)| {
+                let frame = episode.apply(decision);
+                if episode.ending().is_none() {
+                    episode.observe();
+                }
+                (*index, frame)
+            })
             .collect_into_vec(&mut frames);
         // Every frame of the tick is passed on, even after a break: callers never see half a tick.
         if frames.iter().filter(|(index, frame)| on_frame(*index, frame).is_break()).count() > 0 {
@@ -53,4 +58,108 @@ pub fn run_lockstep_until(
         }
     }
     episodes.iter().map(|episode| episode.ending().map(|_| episode.report())).collect()
+}
+
+/// Cars and the fleet that drives them, and them only.
+pub struct SeatedFleet {
+    fleet: Box<dyn Fleet + Send>,
+    episodes: Vec<Episode>,
+    /// Of each tick since they were last passed on, a frame of each car that drove, with its index among these cars.
+    frames: Vec<Vec<(usize, Frame)>>,
+}
+
+/// Ticks that a fleet drives before its frames are passed on.
+const TICKS_AT_ONCE: usize = 16;
+
+impl SeatedFleet {
+    /// A fleet in the cars of some episodes; it knows each by its index among them.
+    pub fn new(fleet: Box<dyn Fleet + Send>, episodes: Vec<Episode>) -> Self {
+        Self { fleet, episodes, frames: Vec::new() }
+    }
+
+    /// Seats fleets in all cars, each in up to `cars_each` of them. `fleet` is called with the number of its cars.
+    pub fn in_all(
+        episodes: Vec<Episode>,
+        cars_each: usize,
+        mut fleet: impl FnMut(usize) -> Box<dyn Fleet + Send>,
+    ) -> Vec<Self> {
+        let mut waiting = episodes.into_iter().peekable();
+        let seated = std::iter::from_fn(|| {
+            waiting.peek()?;
+            let episodes: Vec<Episode> = waiting.by_ref().take(cars_each).collect();
+            Some(Self::new(fleet(episodes.len()), episodes))
+        });
+        seated.collect()
+    }
+
+    /// Drives on for [`TICKS_AT_ONCE`], or until all have ended.
+    fn drive(&mut self) {
+        let mut decisions: Vec<Decision> = Vec::with_capacity(self.episodes.len());
+        self.frames.clear();
+        for _ in 0..TICKS_AT_ONCE {
+            let mut running = running(&mut self.episodes);
+            running.iter_mut().for_each(|(_, episode)| episode.observe());
+            decide(&running, &mut *self.fleet, &mut decisions);
+            let drive =
+                |((index, episode), &decision): ((usize, &mut Episode), &Decision)| (index, episode.apply(decision));
+            self.frames.push(running.into_iter().zip(&decisions).map(drive).collect());
+        }
+    }
+}
+
+/// Drives fleets in lock-step until all episodes have ended. Episodes are counted on from one fleet to the next; otherwise
+/// as [`run_lockstep`].
+pub fn run_fleets(fleets: Vec<SeatedFleet>, on_frame: &mut dyn FnMut(usize, &Frame)) -> Vec<EpisodeReport> {
+    let reports = run_fleets_until(fleets, &mut |episode, frame| {
+        on_frame(episode, frame);
+        ControlFlow::Continue(())
+    });
+    reports.into_iter().map(|report| report.expect("nothing stopped them")).collect()
+}
+
+/// Like [`run_fleets`], but stops as [`run_lockstep_until`] does.
+pub fn run_fleets_until(
+    mut fleets: Vec<SeatedFleet>,
+    on_frame: &mut dyn FnMut(usize, &Frame) -> ControlFlow<()>,
+) -> Vec<Option<EpisodeReport>> {
+    // Fleets may drive on beyond the tick in which `on_frame` breaks; only frames that were passed on count.
+    let mut n_passed_on: Vec<u32> = fleets.iter().flat_map(|fleet| &fleet.episodes).map(Episode::tick).collect();
+    'driving: loop {
+        fleets.par_iter_mut().for_each(SeatedFleet::drive);
+        for tick in 0..TICKS_AT_ONCE {
+            let (mut has_driven, mut is_over) = (false, false);
+            let mut first = 0;
+            for fleet in &fleets {
+                for (index, frame) in &fleet.frames[tick] {
+                    has_driven = true;
+                    is_over |= on_frame(first + index, frame).is_break();
+                    n_passed_on[first + index] += 1;
+                }
+                first += fleet.episodes.len();
+            }
+            if is_over || !has_driven {
+                break 'driving;
+            }
+        }
+    }
+    let episodes = fleets.iter().flat_map(|fleet| &fleet.episodes);
+    let report = |(episode, passed_on): (&Episode, u32)| {
+        (episode.ending().is_some() && episode.tick() == passed_on).then(|| episode.report())
+    };
+    episodes.zip(n_passed_on).map(report).collect()
+}
+
+/// The episodes that have not ended, with their indices.
+fn running(episodes: &mut [Episode]) -> Vec<(usize, &mut Episode)> {
+    episodes.iter_mut().enumerate().filter(|(_, episode)| episode.ending().is_none()).collect()
+}
+
+/// Asks a fleet for the decisions of cars that have observed.
+fn decide(cars: &[(usize, &mut Episode)], fleet: &mut dyn Fleet, decisions: &mut Vec<Decision>) {
+    let seats: Vec<_> = cars.iter().map(|(index, episode)| episode.seat(*index)).collect();
+    decisions.clear();
+    if !seats.is_empty() {
+        fleet.decide(&seats, decisions);
+    }
+    assert_eq!(decisions.len(), seats.len(), "a fleet answers every seat");
 }

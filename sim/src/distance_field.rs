@@ -3,7 +3,9 @@
 //! Node values are distances to the exact polygons; between nodes they are interpolated bilinearly. That is exact
 //! beside straight edges, within 3 cm beside corners, and up to 5 cm too small half-way between two things.
 
-use crate::geometry::{Vec2, distance_to_segment, edges, polygon_contains};
+use crate::geometry::{Vec2, edges};
+use crate::vectors::{FourPoints, LANES, bounded, coordinate, counted_from, f32x4, indices, whole_and_part};
+use std::ops::Range;
 
 /// Spacing of the nodes, metres.
 pub const NODE_M: f32 = 0.1;
@@ -18,11 +20,23 @@ pub const CAP_M: f32 = 3.0;
 /// the second term, f(1 − f) per axis, is at most half a squared spacing.
 #[must_use]
 pub fn change_max_m(radius_m: f32) -> f32 {
-    /// A generous bound of rounding in single precision.
-    const ROUNDING_M: f32 = 1e-4;
     let to_node_m = std::f32::consts::FRAC_1_SQRT_2 * NODE_M;
     (radius_m + to_node_m).hypot(std::f32::consts::FRAC_1_SQRT_2 * NODE_M) + ROUNDING_M
 }
+
+/// How much [`DistanceField::at`] may differ between two places that are `apart_m` apart, metres.
+///
+/// Neighbouring nodes differ by no more than they are apart, so it changes by no more than 1 m per metre along each axis.
+#[must_use]
+pub fn interpolated_change_max_m(apart_m: f32) -> f32 {
+    std::f32::consts::SQRT_2 * apart_m + ROUNDING_M
+}
+
+/// A generous bound of rounding in single precision, metres.
+const ROUNDING_M: f32 = 1e-4;
+
+/// Bits of a distance far outside the lot, −[`CAP_M`].
+const FAR_OUTSIDE: u32 = (-CAP_M).to_bits();
 
 /// Signed distance to the non-drivable set, metres: positive in drivable space.
 #[derive(Debug, Clone)]
@@ -30,8 +44,13 @@ pub struct DistanceField {
     origin: Vec2,
     cols: usize,
     rows: usize,
-    values_m: Vec<f32>,
+    /// Row by row, the bits of the distance, exclusive or [`FAR_OUTSIDE`]. Far outside is 0, as memory comes from the
+    /// system: of a lot that fills little of its bounding box, most of the raster is never touched.
+    nodes: Vec<u32>,
 }
+
+/// What is read beyond the last node when four neighbours are.
+const SPARE_NODES: usize = LANES;
 
 impl DistanceField {
     /// Distances inside a boundary polygon: its outside is non-drivable.
@@ -41,29 +60,32 @@ impl DistanceField {
         let origin = low - margin;
         let size = (high + margin - origin) / NODE_M;
         let (cols, rows) = (size.x.ceil() as usize + 1, size.y.ceil() as usize + 1);
-        let mut field = Self { origin, cols, rows, values_m: vec![CAP_M; cols * rows] };
+        assert!(cols.max(rows) <= i16::MAX as usize, "a raster of {cols} x {rows} nodes takes gigabytes");
+        let mut field = Self { origin, cols, rows, nodes: vec![0; cols * rows + SPARE_NODES] };
+        field.fill(boundary);
         for (a, b) in edges(boundary) {
-            let (low, high) = bounds(&[a, b]);
-            field.lower_within(low, high, CAP_M, |point| distance_to_segment(point, a, b));
+            field.bring_near(a, b);
         }
-        field.negate_outside(boundary);
         field
     }
 
     /// Carves a non-drivable polygon (any winding, need not be convex).
     pub fn carve_polygon(&mut self, polygon: &[Vec2]) {
-        let (low, high) = bounds(polygon);
-        self.lower_within(low, high, CAP_M, |point| {
-            let distance_m =
-                edges(polygon).map(|(a, b)| distance_to_segment(point, a, b)).fold(f32::INFINITY, f32::min);
-            if polygon_contains(polygon, point) { -distance_m } else { distance_m }
+        self.carve(bounds(polygon), |points, is_in_box| {
+            let squared = edges(polygon).map(|(a, b)| points.squared_distance_to_segment(a, b));
+            let distances_m = squared.fold(f32x4::splat(f32::INFINITY), f32x4::fast_min).sqrt();
+            let are_inside = if is_in_box { points.are_inside(polygon) } else { f32x4::ZERO };
+            are_inside.select(-distances_m, distances_m)
         });
     }
 
     /// Carves a non-drivable disc.
     pub fn carve_disc(&mut self, centre: Vec2, radius_m: f32) {
         let half = Vec2::splat(radius_m);
-        self.lower_within(centre - half, centre + half, CAP_M, |point| point.distance(centre) - radius_m);
+        self.carve((centre - half, centre + half), |points, _| {
+            let FourPoints { x, y } = points - FourPoints::splat(centre);
+            (x * x + y * y).sqrt() - f32x4::splat(radius_m)
+        });
     }
 
     /// Signed distance at a world point, metres, capped at ±[`CAP_M`]; outside the raster −[`CAP_M`].
@@ -77,7 +99,7 @@ impl DistanceField {
         let (fx, fy) = ((x - col as f32).min(1.0), (y - row as f32).min(1.0));
         let base = row as usize * self.cols + col as usize;
         let [a, b] = [base, base + self.cols].map(|start| {
-            let &[left, right] = self.values_m[start..].first_chunk::<2>().expect("clamped to the raster");
+            let (left, right) = (self.node_m(start), self.node_m(start + 1));
             left + fx * (right - left)
         });
         a + fy * (b - a)
@@ -89,68 +111,50 @@ impl DistanceField {
         let node = (point - self.origin) * (1.0 / NODE_M) + Vec2::splat(0.5);
         let col = node.x.clamp(0.0, (self.cols - 1) as f32) as i32;
         let row = node.y.clamp(0.0, (self.rows - 1) as f32) as i32;
-        self.values_m[row as usize * self.cols + col as usize]
+        self.node_m(row as usize * self.cols + col as usize)
     }
 
-    /// [`Self::at`] at the points (`xs[i]`, `ys[i]`), to the bit. All but the look-ups is done for several points at once.
+    /// [`Self::at`] at four points, to the bit.
+    #[expect(
+        clippy::inline_always,
+        reason = "called, it takes and returns vectors through memory: a tenth of the loop"
+    )]
+    #[inline(always)]
+    pub fn at_four(&self, points: FourPoints) -> f32x4 {
+        let node = self.nodes_from_world(points);
+        let (cols, into_x) = whole_and_part(bounded(node.x, coordinate(self.cols - 2)));
+        let (rows, into_y) = whole_and_part(bounded(node.y, coordinate(self.rows - 2)));
+        let around = indices(rows, cols, self.n_cols()).map(|index| &self.nodes[index..index + self.cols + LANES]);
+        let near = around.map(|nodes| as_lanes(nodes.first_chunk().expect("a row and four")));
+        let far = around.map(|nodes| as_lanes(nodes.last_chunk().expect("a row and four")));
+        let across = |stored: [f32x4; LANES]| {
+            let [left_m, right_m, ..] = f32x4::transpose(stored).map(from_stored);
+            left_m + into_x * (right_m - left_m)
+        };
+        let (near_m, far_m) = (across(near), across(far));
+        near_m + into_y * (far_m - near_m)
+    }
+
+    /// [`Self::at_nearest_node`] at four points; half-way between two nodes it may choose the other one.
+    #[inline]
+    pub fn at_four_nearest_nodes(&self, points: FourPoints) -> f32x4 {
+        let node = self.nodes_from_world(points) + FourPoints::splat(Vec2::splat(0.5));
+        let (cols, _) = whole_and_part(bounded(node.x, coordinate(self.cols - 1)));
+        let (rows, _) = whole_and_part(bounded(node.y, coordinate(self.rows - 1)));
+        from_stored(as_lanes(&indices(rows, cols, self.n_cols()).map(|index| self.nodes[index])))
+    }
+
+    /// [`Self::at`] at the points (`xs[i]`, `ys[i]`), to the bit.
     #[inline]
     pub fn at_each<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
-        let (last_x, last_y) = (count(self.cols - 2), count(self.rows - 2));
-        let stride = self.cols as u32;
-        let (mut nodes, mut fxs, mut fys) = ([0; N], [0.0; N], [0.0; N]);
-        for i in 0..N {
-            let x = clamp_to_raster((xs[i] - self.origin.x) * (1.0 / NODE_M), last_x);
-            let y = clamp_to_raster((ys[i] - self.origin.y) * (1.0 / NODE_M), last_y);
-            let (floor_x, floor_y) = (floor(x), floor(y));
-            (fxs[i], fys[i]) = (x - floor_x, y - floor_y);
-            nodes[i] = to_index(floor_y) * stride + to_index(floor_x);
+        let mut distances_m = [0.0; N];
+        let points = xs.chunks(LANES).zip(ys.chunks(LANES));
+        for ((xs, ys), distances_m) in points.zip(distances_m.chunks_mut(LANES)) {
+            let four = |values: &[f32]| f32x4::from(std::array::from_fn(|i| values[i.min(values.len() - 1)]));
+            let of_four_m = self.at_four(FourPoints { x: four(xs), y: four(ys) }).to_array();
+            distances_m.copy_from_slice(&of_four_m[..distances_m.len()]);
         }
-        // The four nodes around each point, near and far pair; one bounds check for both.
-        let stride = stride as usize;
-        let (mut near, mut far) = ([[0.0; 2]; N], [[0.0; 2]; N]);
-        for i in 0..N {
-            let base = nodes[i] as usize;
-            let nodes_m = &self.values_m[base..base + stride + 2];
-            near[i] = [nodes_m[0], nodes_m[1]];
-            far[i] = [nodes_m[stride], nodes_m[stride + 1]];
-        }
-        std::array::from_fn(|i| {
-            let [near, far] = [near[i], far[i]].map(|[left, right]| left + fxs[i] * (right - left));
-            near + fys[i] * (far - near)
-        })
-    }
-
-    /// [`Self::at_nearest_node`] at the points (`xs[i]`, `ys[i]`); half-way between two nodes it may choose the other one.
-    /// All but the look-ups is done for several points at once.
-    #[inline]
-    pub fn at_nearest_nodes<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
-        let (last_x, last_y) = (count(self.cols - 1), count(self.rows - 1));
-        let stride = self.cols as u32;
-        let mut nodes = [0; N];
-        for i in 0..N {
-            let x = clamp_to_raster((xs[i] - self.origin.x) * (1.0 / NODE_M), last_x);
-            let y = clamp_to_raster((ys[i] - self.origin.y) * (1.0 / NODE_M), last_y);
-            nodes[i] = to_nearest_index(y) * stride + to_nearest_index(x);
-        }
-        std::array::from_fn(|i| self.values_m[nodes[i] as usize])
-    }
-
-    /// [`Self::at_nearest_nodes`] at the points `start` + (`xs[i]`, `ys[i]`): as many as there is room for in `values_m`, a
-    /// multiple of 4 up to 32.
-    // Not inlined: on its own and of unknown length, the first loop is compiled to instructions that take four points.
-    #[inline(never)]
-    pub fn at_many_nearest_nodes(&self, start: Vec2, xs: &[f32], ys: &[f32], values_m: &mut [f32]) {
-        let (last_x, last_y) = (count(self.cols - 1), count(self.rows - 1));
-        let stride = self.cols as u32;
-        let mut nodes = [0; 32];
-        for ((node, &x), &y) in nodes.iter_mut().zip(xs).zip(ys) {
-            let x = clamp_to_raster((start.x + x - self.origin.x) * (1.0 / NODE_M), last_x);
-            let y = clamp_to_raster((start.y + y - self.origin.y) * (1.0 / NODE_M), last_y);
-            *node = to_nearest_index(y) * stride + to_nearest_index(x);
-        }
-        for (four_m, nodes) in values_m.as_chunks_mut::<4>().0.iter_mut().zip(nodes.as_chunks::<4>().0) {
-            *four_m = nodes.map(|node| self.values_m[node as usize]);
-        }
+        distances_m
     }
 
     /// A lower bound of [`Self::at`] in a box of at most 0.6 m by 0.6 m, but for rounding. Minus infinity if the box is
@@ -160,36 +164,67 @@ impl DistanceField {
     /// rows and columns meet its sides.
     #[inline]
     pub fn lowest_within(&self, low: Vec2, high: Vec2) -> f32 {
-        /// Nodes along one side of the largest box.
-        const LANES: usize = 8;
-        let last = Vec2::new(count(self.cols - 2), count(self.rows - 2));
-        let node = |point: Vec2| {
-            let node = (point - self.origin) * (1.0 / NODE_M);
-            Vec2::new(clamp_to_raster(node.x, last.x), clamp_to_raster(node.y, last.y))
+        let node = self.nodes_from_world([low, high, low, high].into());
+        let (cols, into_x) = whole_and_part(bounded(node.x, coordinate(self.cols - 2)));
+        let (rows, into_y) = whole_and_part(bounded(node.y, coordinate(self.rows - 2)));
+        let ([first_col, last_col, ..], [first_row, last_row, ..]) = (cols.to_array(), rows.to_array());
+        let ([into_first_col, into_last_col, ..], [into_first_row, into_last_row, ..]) =
+            (into_x.to_array(), into_y.to_array());
+        let row = |row: i32| self.eight_nodes_m(row as usize * self.cols + first_col as usize);
+        let mixed = |near: [f32x4; 2], far: [f32x4; 2], share: f32| {
+            [0, 1].map(|i| near[i] + f32x4::splat(share) * (far[i] - near[i]))
         };
-        let (low, high) = (node(low), node(high));
-        let [low_cell, high_cell] = [low, high].map(|node| Vec2::new(floor(node.x), floor(node.y)));
-        let (into_low, into_high) = (low - low_cell, high - high_cell);
-        let [(first_col, first_row), (last_col, last_row)] =
-            [low_cell, high_cell].map(|cell| (to_index(cell.x) as usize, to_index(cell.y) as usize));
-        let nodes_m = |row: usize| self.values_m[row * self.cols + first_col..].first_chunk::<LANES>();
-        let around_sides = (nodes_m(first_row), nodes_m(first_row + 1), nodes_m(last_row), nodes_m(last_row + 1));
-        let (Some(below_lower), Some(above_lower), Some(below_upper), Some(above_upper)) = around_sides else {
+        let lower = |a: [f32x4; 2], b: [f32x4; 2]| [a[0].fast_min(b[0]), a[1].fast_min(b[1])];
+        let (Some(before_first), Some(after_first), Some(before_last), Some(after_last)) =
+            (row(first_row), row(first_row + 1), row(last_row), row(last_row + 1))
+        else {
             return f32::NEG_INFINITY;
         };
-        let mut lowest_m = mixed(below_lower, above_lower, into_low.y);
-        lower_each(&mut lowest_m, &mixed(below_upper, above_upper, into_high.y));
-        for row in first_row + 1..=last_row {
-            let Some(nodes_m) = nodes_m(row) else { return f32::NEG_INFINITY };
-            lower_each(&mut lowest_m, nodes_m);
+        let mut lowest_m =
+            lower(mixed(before_first, after_first, into_first_row), mixed(before_last, after_last, into_last_row));
+        for nodes_m in (first_row + 1..=last_row).map(row) {
+            let Some(nodes_m) = nodes_m else { return f32::NEG_INFINITY };
+            lowest_m = lower(lowest_m, nodes_m);
         }
         // Of these, across: the two sides and what is between them.
-        let n = last_col - first_col;
-        let Some(&[.., left_m, right_m]) = lowest_m.get(..n + 2) else { return f32::NEG_INFINITY };
-        let first_m = lowest_m[0] + into_low.x * (lowest_m[1] - lowest_m[0]);
-        let last_m = left_m + into_high.x * (right_m - left_m);
-        let sides_m = if first_m < last_m { first_m } else { last_m };
-        lowest_m[1..=n].iter().fold(sides_m, |low, &value| if value < low { value } else { low })
+        let mut columns_m = [0.0; 2 * LANES];
+        columns_m[..LANES].copy_from_slice(lowest_m[0].as_array());
+        columns_m[LANES..].copy_from_slice(lowest_m[1].as_array());
+        let between = (last_col - first_col) as usize;
+        let Some(&[.., left_m, right_m]) = columns_m.get(..between + 2) else { return f32::NEG_INFINITY };
+        let first_m = columns_m[0] + into_first_col * (columns_m[1] - columns_m[0]);
+        let last_m = left_m + into_last_col * (right_m - left_m);
+        columns_m[1..=between].iter().fold(first_m.min(last_m), |low, &value| if value < low { value } else { low })
+    }
+
+    /// Coordinates in nodes from the first one.
+    #[inline]
+    fn nodes_from_world(&self, points: FourPoints) -> FourPoints {
+        (points - FourPoints::splat(self.origin)) * f32x4::splat(1.0 / NODE_M)
+    }
+
+    #[inline]
+    fn n_cols(&self) -> i16 {
+        self.cols as i16
+    }
+
+    #[inline]
+    fn node_m(&self, index: usize) -> f32 {
+        f32::from_bits(self.nodes[index] ^ FAR_OUTSIDE)
+    }
+
+    /// A node and the next three.
+    #[inline]
+    fn four_nodes_m(&self, index: usize) -> f32x4 {
+        from_stored(as_lanes(self.nodes[index..index + LANES].first_chunk().expect("four")))
+    }
+
+    /// A node and the next seven; `None` at the very end of the raster.
+    #[inline]
+    fn eight_nodes_m(&self, index: usize) -> Option<[f32x4; 2]> {
+        let nodes = self.nodes.get(index..index + 2 * LANES)?;
+        let (first, second) = nodes.split_at(LANES);
+        Some([first, second].map(|nodes| from_stored(as_lanes(nodes.first_chunk().expect("four")))))
     }
 
     /// Lower-left and upper-right corners of the raster, world metres.
@@ -197,95 +232,115 @@ impl DistanceField {
         (self.origin, self.origin + Vec2::new((self.cols - 1) as f32, (self.rows - 1) as f32) * NODE_M)
     }
 
-    /// Takes the minimum with `distance_m` at every node within `reach_m` of a box.
-    fn lower_within(&mut self, low: Vec2, high: Vec2, reach_m: f32, distance_m: impl Fn(Vec2) -> f32) {
-        let first = ((low - Vec2::splat(reach_m) - self.origin) / NODE_M).floor().max(Vec2::ZERO);
-        let last = ((high + Vec2::splat(reach_m) - self.origin) / NODE_M).ceil();
-        let (col_end, row_end) =
-            ((last.x.max(0.0) as usize + 1).min(self.cols), (last.y.max(0.0) as usize + 1).min(self.rows));
-        for row in first.y as usize..row_end {
-            for col in first.x as usize..col_end {
-                let point = self.origin + Vec2::new(col as f32, row as f32) * NODE_M;
-                let value = &mut self.values_m[row * self.cols + col];
-                *value = value.min(distance_m(point).max(-CAP_M));
+    /// Even-odd scan conversion: nodes inside the polygon are as far from its boundary as can be.
+    fn fill(&mut self, polygon: &[Vec2]) {
+        let mut crossings: Vec<(usize, f32)> = Vec::new();
+        for (a, b) in edges(polygon) {
+            for row in self.rows_within(a.y.min(b.y), a.y.max(b.y)) {
+                let y = self.node_y(row);
+                if (a.y > y) != (b.y > y) {
+                    crossings.push((row, a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x)));
+                }
+            }
+        }
+        crossings.sort_by(|(row, x), (other_row, other_x)| row.cmp(other_row).then(x.total_cmp(other_x)));
+        for &[(row, first), (_, end)] in crossings.as_chunks().0 {
+            let [first, end] = [first, end].map(|x| self.first_col_from(x));
+            self.nodes[row * self.cols + first..row * self.cols + end].fill(CAP_M.to_bits() ^ FAR_OUTSIDE);
+        }
+    }
+
+    /// Brings the boundary near, on either side, to nodes within [`CAP_M`] of one of its edges.
+    fn bring_near(&mut self, a: Vec2, b: Vec2) {
+        let (low, high) = if a.y <= b.y { (a, b) } else { (b, a) };
+        let along = high - low;
+        // Across a strip of twice the cap, horizontally.
+        let strip_m = CAP_M * along.length() / along.y;
+        for row in self.rows_within(low.y - CAP_M, high.y + CAP_M) {
+            let y = self.node_y(row);
+            // The part of the edge that is level with the row, give or take the cap.
+            let x_at =
+                |y: f32| if along.y > 0.0 { low.x + along.x * ((y - low.y) / along.y).clamp(0.0, 1.0) } else { low.x };
+            let (from, to) = if along.y > CAP_M { (x_at(y - CAP_M), x_at(y + CAP_M)) } else { (low.x, high.x) };
+            let (mut left, mut right) = (from.min(to) - CAP_M, from.max(to) + CAP_M);
+            if along.y > CAP_M {
+                let x = low.x + along.x * ((y - low.y) / along.y);
+                (left, right) = (left.max(x - strip_m), right.min(x + strip_m));
+            }
+            self.for_each_four(row, left, right, |points, nodes_m| {
+                let distances_m = points.squared_distance_to_segment(a, b).sqrt();
+                let sign = f32x4::splat(-0.0);
+                Some((nodes_m & !sign).fast_min(distances_m) | (nodes_m & sign))
+            });
+        }
+    }
+
+    /// Lowers nodes to the signed distances from a thing within a box. `signed_distances_m` is also told whether any of the
+    /// points lies in the box.
+    fn carve(&mut self, (low, high): (Vec2, Vec2), signed_distances_m: impl Fn(FourPoints, bool) -> f32x4) {
+        /// A generous bound of rounding in single precision, relative.
+        const ROUNDING: f32 = 1.0 + 1e-4;
+        for row in self.rows_within(low.y - CAP_M, high.y + CAP_M) {
+            let y = self.node_y(row);
+            let above_or_below_m = (low.y - y).max(y - high.y).max(0.0);
+            self.for_each_four(row, low.x - CAP_M, high.x + CAP_M, |points, nodes_m| {
+                let beside_m = (f32x4::splat(low.x) - points.x).fast_max(points.x - f32x4::splat(high.x));
+                let beside_m = beside_m.fast_max(f32x4::ZERO);
+                let to_box = beside_m * beside_m + f32x4::splat(above_or_below_m * above_or_below_m);
+                // Most nodes are nearer to something else, or outside already.
+                let is_in_box = to_box.simd_le(f32x4::ZERO).any();
+                let is_nearer =
+                    nodes_m.simd_gt(f32x4::ZERO) & (nodes_m * nodes_m * f32x4::splat(ROUNDING)).simd_gt(to_box);
+                (is_in_box || is_nearer.any())
+                    .then(|| nodes_m.fast_min(signed_distances_m(points, is_in_box).fast_max(f32x4::splat(-CAP_M))))
+            });
+        }
+    }
+
+    /// Replaces nodes of a row from one world x to another one, four at a time.
+    fn for_each_four(&mut self, row: usize, left: f32, right: f32, new_m: impl Fn(FourPoints, f32x4) -> Option<f32x4>) {
+        let col = |x: f32| ((x - self.origin.x) / NODE_M).max(0.0) as usize;
+        let (first, end) = (col(left), (col(right) + 2).min(self.cols));
+        let y = f32x4::splat(self.node_y(row));
+        for col in (first..end).step_by(LANES) {
+            // The last four of a row overlap those before.
+            let col = col.min(self.cols - LANES);
+            let index = row * self.cols + col;
+            let x = f32x4::splat(self.origin.x) + counted_from(col) * f32x4::splat(NODE_M);
+            if let Some(new_m) = new_m(FourPoints { x, y }, self.four_nodes_m(index)) {
+                let stored = new_m.to_array().map(|node_m| node_m.to_bits() ^ FAR_OUTSIDE);
+                self.nodes[index..index + LANES].copy_from_slice(&stored);
             }
         }
     }
 
-    /// Even-odd scan conversion: nodes outside the polygon become negative.
-    fn negate_outside(&mut self, polygon: &[Vec2]) {
-        let mut crossings = Vec::new();
-        for row in 0..self.rows {
-            let y = self.origin.y + row as f32 * NODE_M;
-            crossings.clear();
-            crossings.extend(
-                edges(polygon)
-                    .filter(|(a, b)| (a.y > y) != (b.y > y))
-                    .map(|(a, b)| a.x + (y - a.y) / (b.y - a.y) * (b.x - a.x)),
-            );
-            crossings.sort_by(f32::total_cmp);
-            let mut passed = 0;
-            for col in 0..self.cols {
-                let x = self.origin.x + col as f32 * NODE_M;
-                while passed < crossings.len() && crossings[passed] <= x {
-                    passed += 1;
-                }
-                if passed % 2 == 0 {
-                    self.values_m[row * self.cols + col] *= -1.0;
-                }
-            }
-        }
+    /// Rows from one world y to another one, and one more on either side.
+    fn rows_within(&self, low: f32, high: f32) -> Range<usize> {
+        let row = |y: f32| ((y - self.origin.y) / NODE_M).max(0.0) as usize;
+        row(low).saturating_sub(1)..(row(high) + 2).min(self.rows)
+    }
+
+    fn node_y(&self, row: usize) -> f32 {
+        self.origin.y + row as f32 * NODE_M
+    }
+
+    /// The first column at or beyond a world x.
+    fn first_col_from(&self, x: f32) -> usize {
+        let near = (((x - self.origin.x) / NODE_M).max(0.0) as usize).saturating_sub(1);
+        (near..self.cols).find(|&col| self.origin.x + col as f32 * NODE_M >= x).unwrap_or(self.cols)
     }
 }
 
-/// A number of nodes as a coordinate; from 64 bits it takes several instructions.
+/// Four nodes as they are stored, in a vector.
 #[inline]
-fn count(nodes: usize) -> f32 {
-    nodes as i32 as f32
+fn as_lanes(nodes: &[u32; LANES]) -> f32x4 {
+    f32x4::from(nodes.map(f32::from_bits))
 }
 
-/// Each value moved by a share of the way to the other one.
+/// Distances of four nodes as they are stored.
 #[inline]
-fn mixed<const N: usize>(values: &[f32; N], others: &[f32; N], share: f32) -> [f32; N] {
-    std::array::from_fn(|i| values[i] + share * (others[i] - values[i]))
-}
-
-/// Lowers each value to the other one.
-#[inline]
-fn lower_each<const N: usize>(values: &mut [f32; N], others: &[f32; N]) {
-    for (value, &other) in values.iter_mut().zip(others) {
-        *value = if other < *value { other } else { *value };
-    }
-}
-
-/// Bounds a coordinate to the raster, like `clamp`; what is not a number becomes 0.
-#[inline]
-pub(crate) fn clamp_to_raster(node: f32, last: f32) -> f32 {
-    let node = if node > 0.0 { node } else { 0.0 };
-    if node < last { node } else { last }
-}
-
-/// From here on, single precision holds whole numbers only.
-const WHOLE_FROM: f32 = (1 << 23) as f32;
-
-/// Largest whole number at or below a coordinate of the raster. Unlike casts and `f32::floor`, which is a library call
-/// on baseline x86-64, this compiles to instructions that take four numbers at once.
-#[inline]
-pub(crate) fn floor(node: f32) -> f32 {
-    let rounded = (node + WHOLE_FROM) - WHOLE_FROM;
-    rounded - if rounded > node { 1.0 } else { 0.0 }
-}
-
-/// A whole coordinate of the raster as an index.
-#[inline]
-pub(crate) fn to_index(whole: f32) -> u32 {
-    to_nearest_index(whole)
-}
-
-/// The index nearest to a coordinate of the raster, the even one half-way between two: adding rounds.
-#[inline]
-fn to_nearest_index(node: f32) -> u32 {
-    (node + WHOLE_FROM).to_bits() - WHOLE_FROM.to_bits()
+fn from_stored(nodes: f32x4) -> f32x4 {
+    nodes ^ f32x4::splat(-CAP_M)
 }
 
 /// Smallest axis-aligned box around points.
@@ -296,6 +351,7 @@ pub fn bounds(points: &[Vec2]) -> (Vec2, Vec2) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Pose, distance_to_segment, polygon_contains};
 
     fn rectangle() -> Vec<Vec2> {
         vec![Vec2::new(0.0, 0.0), Vec2::new(20.0, 0.0), Vec2::new(20.0, 8.0), Vec2::new(0.0, 8.0)]
@@ -313,10 +369,72 @@ mod tests {
         assert!(field.at(Vec2::new(-500.0, 4.0)) <= -CAP_M + 1e-3);
     }
 
+    /// Every node from every edge, one by one.
+    fn plain_field(boundary: &[Vec2], islands: &[Vec<Vec2>], disc: (Vec2, f32)) -> DistanceField {
+        let mut field = DistanceField::of_boundary(boundary);
+        let to_edges_m = |polygon: &[Vec2], point: Vec2| {
+            edges(polygon).map(|(a, b)| distance_to_segment(point, a, b)).fold(f32::INFINITY, f32::min)
+        };
+        for index in 0..field.rows * field.cols {
+            let node = Vec2::new((index % field.cols) as f32, (index / field.cols) as f32);
+            let point = field.origin + node * NODE_M;
+            let sign = if polygon_contains(boundary, point) { 1.0 } else { -1.0 };
+            let mut node_m = sign * to_edges_m(boundary, point).min(CAP_M);
+            for island in islands {
+                let sign = if polygon_contains(island, point) { -1.0 } else { 1.0 };
+                node_m = node_m.min((sign * to_edges_m(island, point)).max(-CAP_M));
+            }
+            node_m = node_m.min((point.distance(disc.0) - disc.1).max(-CAP_M));
+            field.nodes[index] = node_m.to_bits() ^ FAR_OUTSIDE;
+        }
+        field
+    }
+
+    #[test]
+    fn a_field_of_what_is_near_is_the_field_of_everything() {
+        // A lane with a bend and a notch, turned; a kerb, a long island, a disc.
+        let lane =
+            [(0.0, 0.0), (31.0, 0.0), (31.0, 24.0), (25.0, 24.0), (25.0, 6.5), (12.0, 6.5), (12.0, 5.0), (0.0, 7.0)];
+        let islands = [
+            vec![(4.0, 3.0), (9.0, 3.2), (6.0, 4.0)],
+            vec![(27.0, 4.0), (28.0, 4.0), (28.0, 19.0), (27.5, 10.0), (27.0, 19.0)],
+        ];
+        for turned_rad in [0.0, 0.5, std::f32::consts::FRAC_PI_4, 1.9, 4.0] {
+            let turned = Pose::new(Vec2::new(-7.3, 2.1), turned_rad).world_from_ego();
+            let turn =
+                |points: &[(f32, f32)]| points.iter().map(|&point| turned.point(point.into())).collect::<Vec<Vec2>>();
+            let (boundary, islands) = (turn(&lane), islands.each_ref().map(|island| turn(island)));
+            let disc = (turned.point(Vec2::new(16.0, 2.0)), 0.4);
+            let mut field = DistanceField::of_boundary(&boundary);
+            islands.iter().for_each(|island| field.carve_polygon(island));
+            field.carve_disc(disc.0, disc.1);
+            let plain = plain_field(&boundary, &islands, disc);
+            let different = (0..plain.nodes.len()).filter(|&index| field.nodes[index] != plain.nodes[index]).count();
+            assert_eq!(different, 0, "of {} nodes, turned by {turned_rad}", plain.nodes.len());
+        }
+    }
+
+    #[test]
+    fn distances_at_four_points_are_those_at_each() {
+        let mut field = DistanceField::of_boundary(&rectangle());
+        field.carve_disc(Vec2::new(6.0, 4.0), 0.5);
+        for i in 0..500 {
+            // Some of them beyond the raster.
+            let point = |k: usize| Vec2::new(-9.0 + 0.077 * (i + 11 * k) as f32, 17.0 - 0.051 * (i * (k + 1)) as f32);
+            let points = std::array::from_fn(point);
+            let distances_m = field.at_four(points.into()).to_array();
+            let nearest_m = field.at_four_nearest_nodes(points.into()).to_array();
+            for (k, &point) in points.iter().enumerate() {
+                assert_eq!(distances_m[k].to_bits(), field.at(point).to_bits(), "at {point}");
+                assert!((nearest_m[k] - field.at_nearest_node(point)).abs() <= 1.5 * NODE_M, "at {point}");
+            }
+        }
+    }
+
     #[test]
     fn carved_shapes_are_exact_to_centimetres() {
         let mut field = DistanceField::of_boundary(&rectangle());
-        let tilted = crate::geometry::rectangle(crate::geometry::Pose::new(Vec2::new(9.0, 4.0), 0.3), 4.0, 1.8);
+        let tilted = crate::geometry::rectangle(Pose::new(Vec2::new(9.0, 4.0), 0.3), 4.0, 1.8);
         field.carve_polygon(&tilted);
         field.carve_disc(Vec2::new(15.0, 4.0), 0.25);
         for i in 0..4000 {

@@ -78,12 +78,10 @@ impl Path {
     }
 
     fn project_between(&self, point: Vec2, first: usize, last: usize) -> f32 {
-        let nearest = (first..=last)
-            .min_by(|&a, &b| {
-                let distance = |i: usize| self.poses[i].position().distance_squared(point);
-                distance(a).total_cmp(&distance(b))
-            })
-            .unwrap_or(first);
+        let distances = self.poses[first..=last].iter().map(|pose| pose.position().distance_squared(point));
+        let (nearest, _) = (first..)
+            .zip(distances)
+            .fold((first, f32::INFINITY), |nearest, other| if other.1 < nearest.1 { other } else { nearest });
         // Refine along the tangent of the nearest sample.
         let pose = self.poses[nearest];
         let along_m = (point - pose.position()).dot(pose.ahead()).clamp(-self.spacing_m, self.spacing_m);

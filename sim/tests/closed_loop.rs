@@ -1,7 +1,7 @@
 //! The vehicle against closed forms, and stop–count–resume against a hand-computed scene.
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
-use sim::batch::run_lockstep_until;
+use sim::batch::{SeatedFleet, run_fleets_until, run_lockstep_until};
 use sim::driver::{Decision, Driver, LookAheadPoint, OneDriverEach, Situation, Source};
 use sim::episode::{self, Episode, EpisodeSettings};
 use sim::frame::{Ending, Event, Frame};
@@ -247,6 +247,41 @@ fn a_batch_can_be_stopped_and_keeps_what_has_ended() {
     });
     assert!(reports[0].as_ref().is_some_and(|report| report.ending == Ending::ReachedEnd));
     assert_eq!(reports[1], None);
+}
+
+/// Whether cars are driven by one fleet or by several, the same frames come in the same order, and a break stops them in
+/// the same tick.
+#[test]
+fn fleets_of_their_own_drive_as_one_fleet() {
+    let start = |(seed, length_m): (u64, f32)| Episode::new(settings(), lane(length_m, vec![]), RootSeed(seed));
+    let episodes = || (1..).zip([20.0, 31.0, 20.0, 26.0, 35.0]).map(start).collect::<Vec<Episode>>();
+    let ahead = |episode: usize| Fixed(LookAheadPoint { ahead_m: 10.0 + episode as f32, left_m: 0.0 });
+    for stops_after in [7, 1200, u32::MAX] {
+        let mut drives = Vec::new();
+        for cars_each in [5, 1, 2] {
+            let mut seen = Vec::new();
+            let mut on_frame = |episode: usize, frame: &Frame| {
+                seen.push((episode, frame.tick, frame.vehicle, frame.event));
+                if seen.len() as u32 == stops_after { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            let reports = if cars_each == 5 {
+                let mut fleet = OneDriverEach((0..5).map(ahead).collect());
+                run_lockstep_until(episodes(), &mut fleet, &mut on_frame)
+            } else {
+                let all: Vec<(usize, Episode)> = episodes().into_iter().enumerate().collect();
+                let seated = |cars: &[(usize, Episode)]| {
+                    let drivers = cars.iter().map(|&(index, _)| ahead(index)).collect();
+                    SeatedFleet::new(Box::new(OneDriverEach(drivers)), cars.iter().map(|car| car.1.clone()).collect())
+                };
+                run_fleets_until(all.chunks(cars_each).map(seated).collect(), &mut on_frame)
+            };
+            drives.push((reports, seen));
+        }
+        assert_eq!(drives[0].0.iter().any(Option::is_none), stops_after != u32::MAX);
+        assert!(drives[0].0.iter().any(Option::is_some) || stops_after == 7);
+        assert_eq!(drives[0], drives[1], "stopped after {stops_after} frames, a car each");
+        assert_eq!(drives[0], drives[2], "stopped after {stops_after} frames, two cars each");
+    }
 }
 
 /// From a state met at 20 m the rest is driven as by the car that was met.

@@ -6,13 +6,14 @@
 //! processes per tick we use value noise in time with the same correlation time: it needs no state, so a frame can be
 //! recomputed alone and every driver meets the same noise.
 
-use crate::distance_field::{clamp_to_raster, floor, to_index};
-use crate::geometry::{Circles, Pose, Vec2, mask};
+use crate::geometry::{Circles, Pose, Vec2};
 use crate::map::Map;
 use crate::scenario::NoiseLevel;
 use crate::seed::{Rng, RootSeed, Stream};
+use crate::vectors::{FourPoints, LANES, bounded, f32x4, whole_and_part};
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// Strength of each layer, relative to the calibrated level `paper`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -216,62 +217,78 @@ impl Patch {
 #[derive(Debug, Clone)]
 pub(super) struct Shadow {
     pub(super) region: Region,
+    seed: u64,
+    /// From the centre of a grid cell to its farthest pixel, metres.
+    cell_radius_m: f32,
     origin: Vec2,
     cols: usize,
     rows: usize,
-    /// Rank of the local noise within the shadow, 0…255: a threshold is then a share of the area.
-    ranks: Vec<u8>,
+    /// Drawn when first seen: it takes longer than all else that a sensor draws in advance.
+    ranks: OnceLock<Ranks>,
+}
+
+/// Rank of the local noise within a shadow, 0…255: a threshold is then a share of the area. By raster cells.
+#[derive(Debug, Clone)]
+struct Ranks {
+    own: Vec<u8>,
     /// Lowest and highest rank that any pixel of a grid cell centred here can have.
-    ranks_around: Vec<(u8, u8)>,
+    lowest_around: Vec<u8>,
+    highest_around: Vec<u8>,
 }
 
 impl Shadow {
-    /// `cell_radius_m`: from the centre of a grid cell to its farthest pixel.
     fn new(polygon: Vec<Vec2>, seed: u64, cell_radius_m: f32) -> Self {
         let (low, high) = crate::distance_field::bounds(&polygon);
         let size = ((high - low) / SHADOW_CELL_M).ceil();
         let (cols, rows) = (size.x as usize + 1, size.y as usize + 1);
-        let noise: Vec<f32> = (0..rows * cols)
-            .map(|i| {
-                let point = low + Vec2::new((i % cols) as f32, (i / cols) as f32) * SHADOW_CELL_M;
-                // Two octaves, correlation 1.2 m.
-                value_noise(seed, point / 1.2, 0.0) + 0.5 * value_noise(seed ^ 1, point / 0.6, 0.0)
-            })
-            .collect();
-        let mut sorted = noise.clone();
-        sorted.sort_by(f32::total_cmp);
-        let rank = |value: f32| (sorted.partition_point(|&other| other < value) * 255 / sorted.len()) as u8;
-        let ranks: Vec<u8> = noise.iter().map(|&value| rank(value)).collect();
-        // Both the centre and the pixel are rounded to a raster cell.
-        let ranks_around = extremes_around(&ranks, cols, (cell_radius_m / SHADOW_CELL_M + 1.0) as usize);
-        Self { region: Region::new(polygon), origin: low, cols, rows, ranks, ranks_around }
+        let ranks = OnceLock::new();
+        Self { region: Region::new(polygon), seed, cell_radius_m, origin: low, cols, rows, ranks }
+    }
+
+    fn ranks(&self) -> &Ranks {
+        self.ranks.get_or_init(|| {
+            // Two octaves, correlation 1.2 m.
+            let octave = |seed: u64, spacing_m: f32| {
+                let along = |origin: f32, count: usize| {
+                    (0..count).map(|i| (origin + i as f32 * SHADOW_CELL_M) / spacing_m).collect::<Vec<f32>>()
+                };
+                value_noise_raster(seed, &along(self.origin.x, self.cols), &along(self.origin.y, self.rows))
+            };
+            let (first, second) = (octave(self.seed, 1.2), octave(self.seed ^ 1, 0.6));
+            let noise: Vec<f32> = first.iter().zip(second).map(|(first, second)| first + 0.5 * second).collect();
+            let own = ranks(&noise);
+            // Both the centre and the pixel are rounded to a raster cell.
+            let reach = (self.cell_radius_m / SHADOW_CELL_M + 1.0) as usize;
+            let lowest_around = joined_around(&own, self.cols, reach, u8::min);
+            let highest_around = joined_around(&own, self.cols, reach, u8::max);
+            Ranks { own, lowest_around, highest_around }
+        })
     }
 
     #[inline]
     pub(super) fn is_misread(&self, point: Vec2, threshold: u8) -> bool {
-        self.ranks[self.index(point)] >= threshold
+        self.ranks().own[self.index(point)] >= threshold
     }
 
-    /// [`Self::is_misread`] at the points (`xs[i]`, `ys[i]`), bit = index. All but the look-ups is done for several points
-    /// at once.
+    /// [`Self::is_misread`] at four points, bit = index.
     #[inline]
-    pub(super) fn are_misread<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N], threshold: u8) -> u32 {
-        let (cols, last_col, last_row) = (self.cols as f32, (self.cols - 1) as f32, (self.rows - 1) as f32);
-        let mut indices = [0; N];
-        for i in 0..N {
-            let col = floor(clamp_to_raster((xs[i] - self.origin.x) * (1.0 / SHADOW_CELL_M) + 0.5, last_col));
-            let row = floor(clamp_to_raster((ys[i] - self.origin.y) * (1.0 / SHADOW_CELL_M) + 0.5, last_row));
-            // As numbers, because whole ones are not multiplied four at once.
-            indices[i] = to_index(row * cols + col);
-        }
-        mask(indices.map(|index| self.ranks[index as usize] >= threshold))
+    pub(super) fn are_misread(&self, points: FourPoints, threshold: u8) -> u32 {
+        let cell = (points - FourPoints::splat(self.origin)) * f32x4::splat(1.0 / SHADOW_CELL_M)
+            + FourPoints::splat(Vec2::splat(0.5));
+        let (cols, _) = whole_and_part(bounded(cell.x, (self.cols - 1) as f32));
+        let (rows, _) = whole_and_part(bounded(cell.y, (self.rows - 1) as f32));
+        let (cols, rows) = (cols.to_array(), rows.to_array());
+        let ranks = &self.ranks().own;
+        let is_misread = |i: usize| ranks[rows[i] as usize * self.cols + cols[i] as usize] >= threshold;
+        (0..LANES).fold(0, |bits, i| bits | u32::from(is_misread(i)) << i)
     }
 
     /// Whether pixels of the shadow in the grid cell around a point are misread: none of them, all of them, or (`None`)
     /// one must look.
     #[inline]
     pub(super) fn are_misread_around(&self, point: Vec2, threshold: u8) -> Option<bool> {
-        let (low, high) = self.ranks_around[self.index(point)];
+        let (ranks, index) = (self.ranks(), self.index(point));
+        let (low, high) = (ranks.lowest_around[index], ranks.highest_around[index]);
         if high < threshold {
             Some(false)
         } else if low >= threshold {
@@ -285,9 +302,10 @@ impl Shadow {
     #[inline]
     pub(super) fn may_be_misread_within(&self, low: Vec2, high: Vec2, threshold: u8) -> bool {
         let ((first_row, first_col), (last_row, last_col)) = (self.cell(low), self.cell(high));
+        let ranks = &self.ranks().own;
         (first_row..=last_row).any(|row| {
             let start = row * self.cols;
-            self.ranks[start + first_col..=start + last_col].iter().any(|&rank| rank >= threshold)
+            ranks[start + first_col..=start + last_col].iter().any(|&rank| rank >= threshold)
         })
     }
 
@@ -362,7 +380,7 @@ impl NoiseField {
         }
     }
 
-    /// Bound of [`BoundaryShift::at_each`], metres. `growth`: [`wobble_growth`] there.
+    /// Bound of [`BoundaryShift::at_four`], metres. `growth`: [`wobble_growth`] there.
     #[inline]
     pub(super) fn boundary_shift_max_m(&self, growth: f32) -> f32 {
         self.wobble * (WOBBLE_STATIC.0 + WOBBLE_MOVING.0) * VALUE_NOISE_MAX * growth
@@ -519,17 +537,16 @@ pub(super) struct BoundaryShift {
 }
 
 impl BoundaryShift {
-    /// Turns to a circle of the world at a tick; [`Self::at_each`] answers inside of it.
+    /// Turns to a circle of the world at a tick; [`Self::at_four`] answers inside of it.
     pub(super) fn look_at(&mut self, centre: Vec2, radius_m: f32, tick: u32) {
         self.lasting.look_at(centre, radius_m, 0.0);
         self.moving.look_at(centre, radius_m, tick as f32 / WOBBLE_TICKS);
     }
 
-    /// Shifts of the signed distance at the places (`xs[i]`, `ys[i]`), metres. `growth`: [`wobble_growth`] there.
+    /// Shifts of the signed distance at four places, metres. `growth`: [`wobble_growth`] there.
     #[inline]
-    pub(super) fn at_each<const N: usize>(&mut self, xs: &[f32; N], ys: &[f32; N], growth: &[f32; N]) -> [f32; N] {
-        let (lasting, moving) = (self.lasting.at_each(xs, ys), self.moving.at_each(xs, ys));
-        std::array::from_fn(|i| (lasting[i] + moving[i]) * growth[i])
+    pub(super) fn at_four(&self, places: FourPoints, growth: f32x4) -> f32x4 {
+        (self.lasting.at_four(places) + self.moving.at_four(places)) * growth
     }
 }
 
@@ -542,11 +559,10 @@ pub(super) fn wobble_growth(ahead_of_patch_m: f32) -> f32 {
 /// Nodes per side of a [`Lattice`]: the patch's diagonal at 1 m spacing and one more on either side.
 const LATTICE_NODES: usize = 20;
 
-/// Cells of a [`Lattice`], each between a node and the next ones to the right and above; row by row.
-const LATTICE_CELLS: usize = LATTICE_NODES * LATTICE_NODES;
+/// Nodes of a [`Lattice`], and what is read beyond the last when four neighbours are.
+const LATTICE_STORED: usize = LATTICE_NODES * LATTICE_NODES + LANES;
 
-/// Value noise around a place at one instant. Few of the hundreds of visible cells lie beside a boundary, so a cell is
-/// drawn when it is first needed.
+/// Value noise around a place at one instant.
 #[derive(Debug, Clone)]
 struct Lattice {
     seed: u64,
@@ -558,13 +574,11 @@ struct Lattice {
     origin: Vec2,
     /// Of the even and of the odd ticks of the noise, one of them the last and one the next.
     draws: [LatticeDraws; 2],
-    /// In each cell the near left node and the step to its right neighbour, then the same of the far nodes.
-    cells: Box<[[f32; 4]; LATTICE_CELLS]>,
-    /// Which of the cells are drawn for this view.
-    is_drawn: [bool; LATTICE_CELLS],
+    /// Values at the nodes, row by row.
+    nodes: Vec<f32>,
 }
 
-/// What the cells of a [`Lattice`] depend on: where it lies and when.
+/// What the nodes of a [`Lattice`] depend on: where it lies and when.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct LatticeView {
     /// Indices of the first node, whole numbers.
@@ -586,8 +600,7 @@ impl Lattice {
             // Equal to none.
             view: LatticeView { first: Vec2::NAN, tick: 0, phase: 0.0 },
             draws: std::array::from_fn(|_| LatticeDraws::new()),
-            cells: Box::new([[f32::NAN; 4]; LATTICE_CELLS]),
-            is_drawn: [false; LATTICE_CELLS],
+            nodes: vec![0.0; LATTICE_STORED],
         }
     }
 
@@ -595,63 +608,47 @@ impl Lattice {
     fn look_at(&mut self, centre: Vec2, radius_m: f32, time: f32) {
         let first = ((centre - Vec2::splat(radius_m)) / self.spacing_m).floor();
         let view = LatticeView { first, tick: time as i32, phase: fade(time.fract()) };
-        if view == self.view {
+        if view == self.view || self.amplitude == 0.0 {
             return;
         }
         (self.view, self.origin) = (view, first * self.spacing_m);
-        self.is_drawn.fill(false);
-        for tick in [view.tick, view.tick + 1] {
-            self.draws[parity(tick)].look_at(first, key(self.seed, tick));
-        }
-    }
-
-    /// Values at the places (`xs[i]`, `ys[i]`). All but the look-ups is done for several places at once.
-    #[inline]
-    fn at_each<const N: usize>(&mut self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
-        if self.amplitude == 0.0 {
-            return [0.0; N];
-        }
-        let (mut indices, mut fxs, mut fys) = ([0; N], [0.0; N], [0.0; N]);
-        for i in 0..N {
-            let (col, fx) = lattice_cell((xs[i] - self.origin.x) * self.per_m);
-            let (row, fy) = lattice_cell((ys[i] - self.origin.y) * self.per_m);
-            (fxs[i], fys[i]) = (fx, fy);
-            // As numbers, because whole ones are not multiplied four at once.
-            indices[i] = to_index(row * LATTICE_NODES as f32 + col);
-        }
-        if !indices.iter().fold(true, |are_drawn, &index| are_drawn & self.is_drawn[index as usize]) {
-            self.draw(&indices);
-        }
-        let cells = indices.map(|index| self.cells[index as usize]);
-        std::array::from_fn(|i| {
-            let [near_left, near_step, far_left, far_step] = cells[i];
-            let (near, far) = (near_left + fxs[i] * near_step, far_left + fxs[i] * far_step);
-            near + fys[i] * (far - near)
-        })
-    }
-
-    /// Draws those of some cells that are not drawn yet.
-    #[inline(never)]
-    fn draw(&mut self, indices: &[u32]) {
-        for &index in indices {
-            let index = index as usize;
-            if !self.is_drawn[index] {
-                self.cells[index] = self.cell(index);
-                self.is_drawn[index] = true;
-            }
-        }
-    }
-
-    fn cell(&mut self, index: usize) -> [f32; 4] {
-        let LatticeView { tick, phase, .. } = self.view;
-        let mut nodes = self.draws[parity(tick)].around(index);
+        let LatticeView { tick, phase, .. } = view;
+        self.draws[parity(tick)].look_at(first, key(self.seed, tick));
         if phase != 0.0 {
-            let next = self.draws[parity(tick + 1)].around(index);
-            nodes = std::array::from_fn(|i| nodes[i] * (1.0 - phase) + next[i] * phase);
+            self.draws[parity(tick + 1)].look_at(first, key(self.seed, tick + 1));
         }
-        let [near_left, near_right, far_left, far_right] =
-            nodes.map(|node| self.amplitude * (2.0 * node - 1.0) * VALUE_NOISE_MAX);
-        [near_left, near_right - near_left, far_left, far_right - far_left]
+        let [last, next] = [tick, tick + 1].map(|tick| self.draws[parity(tick)].nodes.as_chunks::<LANES>().0);
+        for ((nodes, &last), &next) in self.nodes.as_chunks_mut::<LANES>().0.iter_mut().zip(last).zip(next) {
+            let (last, next) = (f32x4::from(last), f32x4::from(next));
+            let mixed = last * f32x4::splat(1.0 - phase) + next * f32x4::splat(phase);
+            let drawn = if phase == 0.0 { last } else { mixed };
+            let centred = f32x4::splat(2.0) * drawn - f32x4::ONE;
+            *nodes = (f32x4::splat(self.amplitude) * centred * f32x4::splat(VALUE_NOISE_MAX)).to_array();
+        }
+    }
+
+    /// Values at four places.
+    #[inline]
+    fn at_four(&self, places: FourPoints) -> f32x4 {
+        if self.amplitude == 0.0 {
+            return f32x4::ZERO;
+        }
+        let nodes = (places - FourPoints::splat(self.origin)) * f32x4::splat(self.per_m);
+        let ((cols, into_x), (rows, into_y)) = (lattice_cells(nodes.x), lattice_cells(nodes.y));
+        let firsts = (rows * f32x4::splat(LATTICE_NODES as f32) + cols).fast_trunc_int().to_array();
+        // Of each place the near nodes and the far ones, and what lies between.
+        let around = firsts.map(|first| {
+            let nodes: &[f32; LATTICE_NODES + LANES] =
+                self.nodes[first as u32 as usize..].first_chunk().expect("spare");
+            nodes
+        });
+        let across = |nodes: [f32x4; LANES]| {
+            let [left, right, ..] = f32x4::transpose(nodes);
+            left + into_x * (right - left)
+        };
+        let near = across(around.map(|nodes| f32x4::from(*nodes.first_chunk().expect("four"))));
+        let far = across(around.map(|nodes| f32x4::from(*nodes.last_chunk().expect("four"))));
+        near + into_y * (far - near)
     }
 }
 
@@ -660,80 +657,83 @@ fn parity(tick: i32) -> usize {
     (tick & 1) as usize
 }
 
-/// What the cells of a [`Lattice`] draw at one tick of the noise. Several ticks of the simulation make one of the noise.
+/// What the nodes of a [`Lattice`] draw at one tick of the noise. Several ticks of the simulation make one of the noise.
 #[derive(Debug, Clone)]
 struct LatticeDraws {
     /// Indices of the first node, whole numbers.
     first: Vec2,
     /// Of the seed and the tick.
     key: u64,
-    /// Uniform numbers in [0, 1) at the four nodes around each cell: near left, near right, far left, far right.
-    nodes: Box<[[f32; 4]; LATTICE_CELLS]>,
-    is_drawn: [bool; LATTICE_CELLS],
+    /// Uniform numbers in [0, 1) at the nodes, row by row.
+    nodes: Vec<f32>,
 }
 
 impl LatticeDraws {
     fn new() -> Self {
-        Self {
-            first: Vec2::NAN,
-            key: 0,
-            nodes: Box::new([[f32::NAN; 4]; LATTICE_CELLS]),
-            is_drawn: [false; LATTICE_CELLS],
-        }
+        Self { first: Vec2::NAN, key: 0, nodes: vec![0.0; LATTICE_STORED] }
     }
 
     /// Turns to a place and a tick; what is drawn stays if they are the same as before.
     fn look_at(&mut self, first: Vec2, key: u64) {
-        if (first, key) != (self.first, self.key) {
-            (self.first, self.key) = (first, key);
-            self.is_drawn.fill(false);
+        if (first, key) == (self.first, self.key) {
+            return;
         }
-    }
-
-    #[inline]
-    fn around(&mut self, cell: usize) -> [f32; 4] {
-        if !self.is_drawn[cell] {
-            self.draw(cell);
+        (self.first, self.key) = (first, key);
+        for (y, row) in (first.y as i32..).zip(self.nodes[..LATTICE_NODES * LATTICE_NODES].chunks_mut(LATTICE_NODES)) {
+            for (x, node) in (first.x as i32..).zip(row) {
+                *node = unit(mix(key, x, y));
+            }
         }
-        self.nodes[cell]
-    }
-
-    #[inline(never)]
-    fn draw(&mut self, cell: usize) {
-        let x = self.first.x as i32 + (cell % LATTICE_NODES) as i32;
-        let y = self.first.y as i32 + (cell / LATTICE_NODES) as i32;
-        self.nodes[cell] = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| unit(mix(self.key, x, y)));
-        self.is_drawn[cell] = true;
     }
 }
 
-/// The cell of a [`Lattice`] that holds a coordinate, a whole number, and the faded progress through it, 0…1.
+/// The cells of a [`Lattice`] that hold coordinates, whole numbers, and the faded progress through them, 0…1.
 #[inline]
-fn lattice_cell(node: f32) -> (f32, f32) {
+fn lattice_cells(nodes: f32x4) -> (f32x4, f32x4) {
     const LAST: f32 = (LATTICE_NODES - 2) as f32;
-    let node = if node > 0.0 { node } else { 0.0 };
-    let whole = floor(node);
-    let cell = if whole < LAST { whole } else { LAST };
-    (cell, fade(node - cell))
+    let nodes = nodes.fast_max(f32x4::ZERO);
+    let cells = f32x4::from_i32x4(nodes.fast_trunc_int()).fast_min(f32x4::splat(LAST));
+    let progress = nodes - cells;
+    (cells, progress * progress * (f32x4::splat(3.0) - f32x4::splat(2.0) * progress))
 }
 
-/// Lowest and highest value within `reach` cells along both axes of every cell of a raster.
-fn extremes_around(values: &[u8], cols: usize, reach: usize) -> Vec<(u8, u8)> {
-    let rows = values.len() / cols;
-    let join = |(low, high): (u8, u8), &(l, h): &(u8, u8)| (low.min(l), high.max(h));
-    let pairs: Vec<(u8, u8)> = values.iter().map(|&value| (value, value)).collect();
-    // Along the rows, then along the columns.
-    let along = |pairs: &[(u8, u8)], n: usize, at: &dyn Fn(usize, usize) -> usize| {
-        let others = pairs.len() / n;
-        let mut joined = vec![(u8::MAX, 0); pairs.len()];
-        for (other, i) in (0..others).flat_map(|other| (0..n).map(move |i| (other, i))) {
-            let near = i.saturating_sub(reach)..=(i + reach).min(n - 1);
-            joined[at(other, i)] = near.map(|i| &pairs[at(other, i)]).fold((u8::MAX, 0), join);
+/// The share of other values below each value, 0…255.
+fn ranks(values: &[f32]) -> Vec<u8> {
+    let mut order: Vec<(f32, u32)> = values.iter().copied().zip(0..).collect();
+    order.sort_unstable_by(|(a, _), (b, _)| a.total_cmp(b));
+    let mut ranks = vec![0; values.len()];
+    let mut n_below = 0;
+    for (i, &(value, index)) in order.iter().enumerate() {
+        if value > order[n_below].0 {
+            n_below = i;
         }
-        joined
+        ranks[index as usize] = (n_below * 255 / values.len()) as u8;
+    }
+    ranks
+}
+
+/// What `join` makes of all values within `reach` cells along both axes of every cell of a raster.
+fn joined_around(values: &[u8], cols: usize, reach: usize, join: impl Fn(u8, u8) -> u8) -> Vec<u8> {
+    let rows = values.len() / cols;
+    let join_all = |joined: &mut [u8], others: &[u8]| {
+        for (value, &other) in joined.iter_mut().zip(others) {
+            *value = join(*value, other);
+        }
     };
-    let in_rows = along(&pairs, cols, &|row, col| row * cols + col);
-    along(&in_rows, rows, &|col, row| row * cols + col)
+    // Along the rows, then along the columns.
+    let mut in_rows = values.to_vec();
+    for (joined, values) in in_rows.chunks_mut(cols).zip(values.chunks(cols)) {
+        for offset in 1..=reach.min(cols - 1) {
+            join_all(joined, &values[offset..]);
+            join_all(&mut joined[offset..], values);
+        }
+    }
+    let mut joined = in_rows.clone();
+    for offset in 1..=reach.min(rows - 1) {
+        join_all(&mut joined, &in_rows[offset * cols..]);
+        join_all(&mut joined[offset * cols..], &in_rows);
+    }
+    joined
 }
 
 /// Cubic fade from 0 to 1.
@@ -783,6 +783,36 @@ fn value_noise(seed: u64, place: Vec2, time: f32) -> f32 {
     (2.0 * value - 1.0) * VALUE_NOISE_MAX
 }
 
+/// [`value_noise`] at time 0 on a raster of places, to the bit; row by row.
+fn value_noise_raster(seed: u64, xs: &[f32], ys: &[f32]) -> Vec<f32> {
+    let key = key(seed, 0);
+    // On the lines of the lattice, at every x.
+    let line = |y: i32| -> Vec<f32> {
+        let mut drawn: Option<(i32, f32, f32)> = None;
+        let at = |&x: &f32| {
+            let cell = x.floor() as i32;
+            let (_, left, right) = drawn.filter(|&(drawn, ..)| drawn == cell).unwrap_or_else(|| {
+                let nodes = [cell, cell + 1].map(|x| unit(mix(key, x, y)));
+                (cell, nodes[0], nodes[1])
+            });
+            drawn = Some((cell, left, right));
+            left + fade(x - x.floor()) * (right - left)
+        };
+        xs.iter().map(at).collect()
+    };
+    let (Some(&low), Some(&high)) = (ys.first(), ys.last()) else { return Vec::new() };
+    let first = low.floor() as i32;
+    let lines: Vec<Vec<f32>> = (first..=high.floor() as i32 + 1).map(line).collect();
+    let mut values = Vec::with_capacity(xs.len() * ys.len());
+    for &y in ys {
+        let (cell, share) = (y.floor(), fade(y - y.floor()));
+        let above = (cell as i32 - first) as usize;
+        let value = |(&near, &far): (&f32, &f32)| (2.0 * (near + share * (far - near)) - 1.0) * VALUE_NOISE_MAX;
+        values.extend(lines[above].iter().zip(&lines[above + 1]).map(value));
+    }
+    values
+}
+
 /// Uniform in [0, 1).
 #[inline]
 fn unit(bits: u32) -> f32 {
@@ -825,12 +855,36 @@ mod tests {
             let time = (view / 2) as f32 / 3.0;
             lattice.look_at(centre, radius_m, time);
             let place = |i: usize| centre + 0.25 * i as f32 * Vec2::from_angle(2.4 * i as f32);
-            let [xs, ys] = [std::array::from_fn(|i| place(i).x), std::array::from_fn(|i| place(i).y)];
-            for (i, value) in lattice.at_each::<32>(&xs, &ys).into_iter().enumerate() {
+            for i in 0..32 {
+                let value = lattice.at_four(FourPoints::splat(place(i))).to_array()[i % 4];
                 let expected = amplitude * value_noise(5, place(i) / spacing_m, time);
                 assert!((value - expected).abs() < 1e-4, "view {view}, {}: {value}, not {expected}", place(i));
             }
         }
+    }
+
+    #[test]
+    fn a_raster_of_value_noise_is_value_noise() {
+        let along = |from: f32, count: usize| (0..count).map(|i| from + 0.1 * i as f32).collect::<Vec<f32>>();
+        let (xs, ys) = (along(-1.75, 43), along(-0.2, 31));
+        let raster = value_noise_raster(9, &xs, &ys);
+        for (i, value) in raster.into_iter().enumerate() {
+            let place = Vec2::new(xs[i % xs.len()], ys[i / xs.len()]);
+            assert_eq!(value.to_bits(), value_noise(9, place, 0.0).to_bits(), "at {place}");
+        }
+    }
+
+    #[test]
+    fn ranks_count_what_is_below_and_reach_around() {
+        let values = [0.5, -1.0, 0.5, 3.0, 2.0, -1.0];
+        let below = |value: f32| values.iter().filter(|&&other| other < value).count();
+        let own = ranks(&values);
+        assert_eq!(own, values.map(|value| (below(value) * 255 / 6) as u8));
+        // Three rows of two, one cell to either side.
+        let lowest = joined_around(&own, 2, 1, u8::min);
+        let highest = joined_around(&own, 2, 1, u8::max);
+        assert_eq!(lowest, [own[1], own[1], own[1], own[1], own[5], own[5]]);
+        assert_eq!(highest, [own[3], own[3], own[3], own[3], own[3], own[3]]);
     }
 
     #[test]

@@ -5,8 +5,8 @@
 
 use super::quadtree::pixels_of;
 use super::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid};
-use crate::distance_field::{floor, to_index};
 use crate::geometry::{Outline, Vec2};
+use crate::vectors::{FourPoints, LANES, bounded, counted_from, f32x4};
 use std::ops::Range;
 
 /// Longest occlusion, as a multiple of the range: from 2 m on it leaves the patch.
@@ -73,52 +73,91 @@ impl ConvexInEgo {
     }
 
     /// The pixels whose centres lie inside the polygon, in some of the rows; `None` if it is out of view.
-    #[expect(clippy::needless_bitwise_bool, reason = "values instead of branches are computed for four rows at once")]
     fn spans(&self, geometry: &GridGeometry, rows: &Range<usize>) -> Option<Spans> {
         let (low, high) = self.bounds();
         let half_m = 0.5 * geometry.side_m;
-        let rows = whole_fours(&common(&rows_between(geometry, low.x, high.x), rows));
-        if rows.is_empty() || low.y > half_m || high.y < -half_m {
+        let fours = fours(&common(&rows_between(geometry, low.x, high.x), rows));
+        if fours.is_empty() || low.y > half_m || high.y < -half_m {
             return None;
         }
-        let (pixel_m, pixels_per_m) = (geometry.pixel_m(), 1.0 / geometry.pixel_m());
-        let far_m = geometry.far_edge_ahead_m();
-        // Walk the edges: each lends its crossing to the rows between its ends. Conditions are values here, not branches,
-        // so that four rows are done at once.
-        let mut right_m = [f32::INFINITY; BEV_PIXELS];
-        let mut left_m = [f32::NEG_INFINITY; BEV_PIXELS];
-        let corners = &self.corners[..self.n_corners];
-        let mut a = corners[corners.len() - 1];
-        for &b in corners {
-            let (low, high) = if a.x <= b.x { (a, b) } else { (b, a) };
-            // Rows with low.x <= ahead < high.x; one more on either side, then tested exactly.
-            let rows = whole_fours(&common(&rows_between(geometry, low.x, high.x), &rows));
-            let slope = (high.y - low.y) / (high.x - low.x);
-            let first = rows.start as i32;
-            let crossings = right_m[rows.clone()].iter_mut().zip(&mut left_m[rows]);
-            for (row, (right_m, left_m)) in (first..).zip(crossings) {
-                let ahead_m = far_m - (row as f32 + 0.5) * pixel_m;
-                let is_crossed = (low.x <= ahead_m) & (ahead_m < high.x);
-                let y = low.y + (ahead_m - low.x) * slope;
-                *right_m = if is_crossed & (y < *right_m) { y } else { *right_m };
-                *left_m = if is_crossed & (y > *left_m) { y } else { *left_m };
+        let (pixel_m, pixels_per_m) = (f32x4::splat(geometry.pixel_m()), f32x4::splat(1.0 / geometry.pixel_m()));
+        let far_m = f32x4::splat(geometry.far_edge_ahead_m());
+        // Walk the edges: each lends its crossing to the rows between its ends.
+        let mut right_m = [f32x4::splat(f32::INFINITY); BEV_PIXELS / LANES];
+        let mut left_m = [f32x4::splat(f32::NEG_INFINITY); BEV_PIXELS / LANES];
+        for first in (0..self.n_corners).step_by(LANES) {
+            let edges = FourEdges::new(self, first, geometry, &fours);
+            for lane in 0..LANES.min(self.n_corners - first) {
+                let edge = |of: &f32x4| f32x4::splat(of.as_array()[lane]);
+                let (low_x, high_x, low_y) = (edge(&edges.low.x), edge(&edges.high.x), edge(&edges.low.y));
+                let slope = edge(&edges.slopes);
+                // Rows with low.x <= ahead < high.x; one more on either side, then tested exactly.
+                for four in edges.first_fours[lane] as usize..edges.end_fours[lane] as usize {
+                    let ahead_m = far_m - (counted_from(four * LANES) + f32x4::HALF) * pixel_m;
+                    let is_crossed = low_x.simd_le(ahead_m) & ahead_m.simd_lt(high_x);
+                    let y = low_y + (ahead_m - low_x) * slope;
+                    right_m[four] = is_crossed.select(y.fast_min(right_m[four]), right_m[four]);
+                    left_m[four] = is_crossed.select(y.fast_max(left_m[four]), left_m[four]);
+                }
             }
-            a = b;
         }
         // Pixel centres: left = half − (col + ½)·pixel.
-        let col_of = |y: f32| (half_m - y) * pixels_per_m - 0.5;
-        let mut spans = Spans { first: [0; BEV_PIXELS], end: [0; BEV_PIXELS], rows: rows.clone() };
-        let crossings = right_m[rows.clone()].iter().zip(&left_m[rows.clone()]);
-        let columns = spans.first[rows.clone()].iter_mut().zip(&mut spans.end[rows]);
-        for ((&right_m, &left_m), (first, end)) in crossings.zip(columns) {
-            let from = ceil(between(col_of(left_m), 0.0, BEV_PIXELS as f32));
-            let last = col_of(right_m);
-            let last = if last < (BEV_PIXELS - 1) as f32 { last } else { (BEV_PIXELS - 1) as f32 };
-            let is_empty = (left_m < right_m) | (last < from);
-            *first = if is_empty { 0 } else { to_index(from) as u8 };
-            *end = if is_empty { 0 } else { to_index(floor(last)) as u8 + 1 };
+        let col_of = |y: f32x4| (f32x4::splat(half_m) - y) * pixels_per_m - f32x4::HALF;
+        let rows = fours.start * LANES..fours.end * LANES;
+        let mut spans = Spans { first: [0; BEV_PIXELS], end: [0; BEV_PIXELS], rows };
+        for four in fours {
+            let first = ceil(bounded(col_of(left_m[four]), BEV_PIXELS as f32));
+            let last = col_of(right_m[four]).fast_min(f32x4::splat((BEV_PIXELS - 1) as f32));
+            let is_empty = left_m[four].simd_lt(right_m[four]) | last.simd_lt(first);
+            let end = (last + f32x4::ONE).fast_trunc_int();
+            let columns = |of: f32x4| (!is_empty & of).fast_trunc_int().to_array().map(|col| col as u8);
+            let rows = four * LANES..(four + 1) * LANES;
+            spans.first[rows.clone()].copy_from_slice(&columns(first));
+            spans.end[rows].copy_from_slice(&columns(f32x4::from_i32x4(end)));
         }
         Some(spans)
+    }
+}
+
+/// Four edges of a polygon.
+struct FourEdges {
+    /// The ends that are less far ahead, and the others.
+    low: FourPoints,
+    high: FourPoints,
+    /// Left per ahead.
+    slopes: f32x4,
+    /// The fours of rows between their ends, one row more on either side.
+    first_fours: [i32; LANES],
+    end_fours: [i32; LANES],
+}
+
+impl FourEdges {
+    /// The edges that end in four corners from one on, as far as they lie in some fours of rows.
+    fn new(polygon: &ConvexInEgo, first: usize, geometry: &GridGeometry, fours: &Range<usize>) -> Self {
+        let n = polygon.n_corners;
+        let from = FourPoints::from(std::array::from_fn(|i| polygon.corners[(first + i + n - 1) % n]));
+        let to = FourPoints::from(std::array::from_fn(|i| polygon.corners[(first + i) % n]));
+        let is_from_low = from.x.simd_le(to.x);
+        let lower = |a: FourPoints, b: FourPoints| FourPoints {
+            x: is_from_low.select(a.x, b.x),
+            y: is_from_low.select(a.y, b.y),
+        };
+        let (low, high) = (lower(from, to), lower(to, from));
+        let row_of = |ahead_m: f32x4| {
+            (f32x4::splat(geometry.far_edge_ahead_m()) - ahead_m) * f32x4::splat(1.0 / geometry.pixel_m())
+        };
+        let index = |fours_of_rows: f32x4| {
+            let within = fours_of_rows.fast_max(f32x4::splat(fours.start as f32));
+            within.fast_min(f32x4::splat(fours.end as f32)).fast_trunc_int().to_array()
+        };
+        let per_four = f32x4::splat(1.0 / LANES as f32);
+        Self {
+            low,
+            high,
+            slopes: (high.y - low.y) / (high.x - low.x),
+            first_fours: index((row_of(high.x) - f32x4::ONE) * per_four),
+            end_fours: index((row_of(low.x) + f32x4::ONE) * per_four + f32x4::ONE),
+        }
     }
 }
 
@@ -139,7 +178,6 @@ impl Spans {
     }
 
     /// The cells of a row of cells that hold pixels, bit = column.
-    #[expect(clippy::manual_div_ceil, reason = "`div_ceil` is not done for four rows at once")]
     #[inline]
     pub(super) fn touched_cells(&self, cell_row: usize) -> u32 {
         const PIXELS: u32 = CELL_PIXELS as u32;
@@ -206,11 +244,11 @@ impl CellBox {
     }
 }
 
-/// Smallest whole number at or above a non-negative value. `f32::ceil` is a library call on baseline x86-64.
+/// Smallest whole numbers at or above values that are not negative.
 #[inline]
-fn ceil(value: f32) -> f32 {
-    let whole = floor(value);
-    whole + if value > whole { 1.0 } else { 0.0 }
+fn ceil(values: f32x4) -> f32x4 {
+    let whole = f32x4::from_i32x4(values.fast_trunc_int());
+    whole + (whole.simd_lt(values) & f32x4::ONE)
 }
 
 /// Bounds a value, like `clamp`, by values instead of branches.
@@ -227,10 +265,10 @@ fn common(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     start..a.end.min(b.end).max(start)
 }
 
-/// A range of pixel rows, extended to what is done for four rows at once.
+/// The fours that hold a range of rows.
 #[inline]
-fn whole_fours(rows: &Range<usize>) -> Range<usize> {
-    rows.start & !3..rows.end.next_multiple_of(4)
+fn fours(rows: &Range<usize>) -> Range<usize> {
+    rows.start / LANES..rows.end.div_ceil(LANES)
 }
 
 /// Pixel rows whose centres may lie between two distances ahead; up to one row too many at either end.
