@@ -20,6 +20,7 @@
 
 mod context;
 mod elastic_band;
+mod fan;
 mod label;
 mod line_of_sight;
 mod rollout;
@@ -95,9 +96,10 @@ struct Wish {
 impl ScriptedExpert {
     /// An expert for the vehicle, camera and controller of an episode.
     pub fn new(settings: ExpertSettings, episode: &EpisodeSettings) -> Self {
+        let footprint = Footprint::new(&episode.vehicle, settings.nose_margin_m, settings.disc_relief_m);
         Self {
-            footprint: Footprint::new(&episode.vehicle, settings.nose_margin_m, settings.disc_relief_m),
-            arcs: Arcs::new(&settings),
+            arcs: Arcs::new(&settings, footprint.nose_m()),
+            footprint,
             context: ExpertContext::of(episode),
             last: None,
             delayed: VecDeque::new(),
@@ -222,12 +224,11 @@ impl ScriptedExpert {
         let state = truth.vehicle;
         let vehicle = &self.context.vehicle;
         let curvature_per_m = state.curvature_per_m(vehicle);
-        let mut motion = Motion::new(state.pose, curvature_per_m);
+        let motion = Motion::new(state.pose, curvature_per_m);
         let dead_time_s = vehicle.dead_time_s;
         let change_per_m = vehicle.steering_rate_max_radps / vehicle.wheelbase_m * dead_time_s;
         let pending_per_m = self.last.map_or(curvature_per_m, |last| last.curvature_per_m);
-        motion.step(pending_per_m, change_per_m, state.speed_mps * dead_time_s);
-        motion
+        motion.step(pending_per_m, change_per_m, state.speed_mps * dead_time_s)
     }
 
     fn ground<'a>(&'a self, truth: &'a GroundTruth<'a>, sight: &'a LineOfSight) -> Ground<'a> {

@@ -23,25 +23,54 @@ impl Motion {
         Self { position: pose.position(), ahead: pose.ahead(), curvature_per_m }
     }
 
-    /// Drives on by `travel_m` while the curvature moves towards `target_per_m`, at most by `change_per_m`.
+    /// After another `travel_m` on which the curvature moves towards `target_per_m`, at most by `change_per_m`.
+    #[must_use]
     #[inline]
-    pub(crate) fn step(&mut self, target_per_m: f32, change_per_m: f32, travel_m: f32) {
-        let next_per_m = target_per_m.clamp(self.curvature_per_m - change_per_m, self.curvature_per_m + change_per_m);
+    pub(crate) fn step(self, target_per_m: f32, change_per_m: f32, travel_m: f32) -> Self {
+        let next_per_m = self.next_curvature_per_m(target_per_m, change_per_m);
+        let half_turn = HalfTurn::new(self.curvature_per_m + next_per_m, travel_m);
+        Self { curvature_per_m: next_per_m, ..self.turn(half_turn, travel_m) }
+    }
+
+    /// After another `travel_m` at the present curvature, given its half turn: [`Self::step`] without a change, to the bit.
+    #[must_use]
+    #[inline]
+    pub(crate) fn turn(self, half_turn: HalfTurn, travel_m: f32) -> Self {
         // The chord of a step points along its mean heading; its shortening is below 0.1 mm.
-        let half_turn = 0.25 * (self.curvature_per_m + next_per_m) * travel_m;
-        let square = half_turn * half_turn;
-        // cos and sin to 4th and 3rd order: half a turn of a step is below 0.04 rad.
-        let rotation = Vec2::new(1.0 - square * (0.5 - square / 24.0), half_turn * (1.0 - square / 6.0));
-        let along = rotation.rotate(self.ahead);
-        self.position += along * travel_m;
-        self.ahead = rotation.rotate(along);
-        self.curvature_per_m = next_per_m;
+        let along = half_turn.0.rotate(self.ahead);
+        Self { position: self.position + along * travel_m, ahead: half_turn.0.rotate(along), ..self }
+    }
+
+    /// Whether a step towards `target_per_m` gets there.
+    #[inline]
+    pub(crate) fn reaches(self, target_per_m: f32, change_per_m: f32) -> bool {
+        self.next_curvature_per_m(target_per_m, change_per_m) == target_per_m
+    }
+
+    #[inline]
+    fn next_curvature_per_m(self, target_per_m: f32, change_per_m: f32) -> f32 {
+        target_per_m.clamp(self.curvature_per_m - change_per_m, self.curvature_per_m + change_per_m)
     }
 
     /// A point on the vehicle axis, world.
     #[inline]
     pub(crate) fn on_axis(&self, ahead_m: f32) -> Vec2 {
         self.position + self.ahead * ahead_m
+    }
+}
+
+/// Half of what the heading changes by in one step, as a rotation.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct HalfTurn(Vec2);
+
+impl HalfTurn {
+    /// Of a step at whose ends the curvatures have this sum.
+    #[inline]
+    pub(crate) fn new(sum_per_m: f32, travel_m: f32) -> Self {
+        let half_turn = 0.25 * sum_per_m * travel_m;
+        let square = half_turn * half_turn;
+        // cos and sin to 4th and 3rd order: half a turn of a step is below 0.04 rad.
+        Self(Vec2::new(1.0 - square * (0.5 - square / 24.0), half_turn * (1.0 - square / 6.0)))
     }
 }
 
@@ -66,6 +95,11 @@ impl Footprint {
     /// Centre of the foremost disc, metres ahead of the rear axle.
     pub(crate) fn nose_m(&self) -> f32 {
         self.disc_centres_m[DISCS - 1]
+    }
+
+    /// Distance of a disc's centre to the nearest non-drivable point at a clearance, metres.
+    pub(crate) fn distance_m(&self, clearance_m: f32) -> f32 {
+        clearance_m + self.keep_m
     }
 
     /// Clearance of the whole body, metres.
@@ -95,7 +129,7 @@ mod tests {
     fn small_steps_follow_the_exact_arc() {
         for curvature in [-0.2326_f32, -0.05, 0.0, 0.11, 0.2326] {
             let mut motion = Motion::new(Pose::default(), curvature);
-            (0..47).for_each(|_| motion.step(curvature, 0.0, 0.3));
+            (0..47).for_each(|_| motion = motion.step(curvature, 0.0, 0.3));
             let exact = Pose::default().advanced_along_arc(curvature, 47.0 * 0.3);
             assert!(motion.position.distance(exact.position()) < 0.01, "{curvature}: {motion:?}");
             assert!((motion.ahead.length() - 1.0).abs() < 1e-4);
@@ -113,9 +147,9 @@ mod tests {
     #[test]
     fn steering_takes_its_time() {
         let mut motion = Motion::new(Pose::default(), 0.0);
-        motion.step(0.2, 0.024, 0.2);
+        motion = motion.step(0.2, 0.024, 0.2);
         assert_eq!(motion.curvature_per_m, 0.024);
-        (0..20).for_each(|_| motion.step(0.2, 0.024, 0.2));
+        (0..20).for_each(|_| motion = motion.step(0.2, 0.024, 0.2));
         assert_eq!(motion.curvature_per_m, 0.2);
     }
 }

@@ -6,58 +6,47 @@
 
 use crate::context::ExpertContext;
 use crate::elastic_band::ElasticBand;
+use crate::fan::{Arc, Fan};
 use crate::line_of_sight::LineOfSight;
 use crate::rollout::{Footprint, Motion};
 use crate::settings::ExpertSettings;
+use sim::distance_field::{DistanceField, NODE_M};
 use sim::driver::GroundTruth;
 use sim::geometry::Vec2;
 
-/// First arcs to either side of straight on.
-const FIRST_SIDE: usize = 16;
-/// First arcs.
-pub(crate) const FIRST_ARCS: usize = 2 * FIRST_SIDE + 1;
-/// Second arcs to either side of straight on.
-const SECOND_SIDE: usize = 7;
-const SECOND_ARCS: usize = 2 * SECOND_SIDE + 1;
+/// First arcs: 16 to either side of straight on.
+const FIRST_ARCS: usize = 33;
+/// Second arcs: 7 to either side of straight on.
+const SECOND_ARCS: usize = 15;
 /// First arcs are densest where a small change of curvature moves a far point most (docs/methods.md 3.2).
 const FIRST_EXPONENT: f32 = 1.5;
 /// Second arcs (docs/methods.md E5.1).
 const SECOND_EXPONENT: f32 = 1.4;
 /// Travels at which second arcs branch off.
 const BRANCHES: usize = 5;
+/// How much less than at a probe the distance may be at the nearest node of the step there, metres: the places differ by
+/// rounding, so the nodes by one row and one column.
+const PROBE_SLACK_M: f32 = 1.5 * NODE_M;
 /// Clearance that may be lost in a tight start, metres: the error of the distances' interpolation.
 const START_SLACK_M: f32 = 0.02;
 
-/// Curvatures of both stages, straight on first and then ever tighter, left before right.
+/// Arcs of both stages.
 #[derive(Debug, Clone)]
 pub(crate) struct Arcs {
-    first: [Arc; FIRST_ARCS],
-    second: [Arc; SECOND_ARCS],
-}
-
-/// One curvature to steer at.
-#[derive(Debug, Clone, Copy)]
-struct Arc {
-    curvature_per_m: f32,
-    /// Index relative to the tightest arc, −1…1.
-    index: f32,
+    first: Fan<FIRST_ARCS>,
+    second: Fan<SECOND_ARCS>,
 }
 
 impl Arcs {
-    pub(crate) fn new(settings: &ExpertSettings) -> Self {
-        let arc = |i: usize, n_side: usize, max_per_m: f32, exponent: f32| {
-            let side = if i.is_multiple_of(2) { -1.0 } else { 1.0 };
-            let index = i.div_ceil(2) as f32 / n_side as f32;
-            Arc { curvature_per_m: side * max_per_m * index.powf(exponent), index: side * index }
-        };
+    pub(crate) fn new(settings: &ExpertSettings, nose_m: f32) -> Self {
         Self {
-            first: std::array::from_fn(|i| arc(i, FIRST_SIDE, settings.curvature_max_per_m, FIRST_EXPONENT)),
-            second: std::array::from_fn(|i| arc(i, SECOND_SIDE, settings.second_curvature_max_per_m, SECOND_EXPONENT)),
+            first: Fan::new(settings.curvature_max_per_m, FIRST_EXPONENT, settings.first_step_m, nose_m),
+            second: Fan::new(settings.second_curvature_max_per_m, SECOND_EXPONENT, settings.second_step_m, nose_m),
         }
     }
 
     pub(crate) fn curvature_per_m(&self, first: usize) -> f32 {
-        self.first[first].curvature_per_m
+        self.first.arcs[first].curvature_per_m
     }
 }
 
@@ -104,24 +93,25 @@ pub struct Candidate {
     pub score: Option<f32>,
 }
 
-/// A forecast first arc.
+/// A forecast: the free way so far.
 #[derive(Debug, Clone, Copy)]
-struct FirstArc {
-    free_m: f32,
-    load_m: f32,
-    end: Motion,
-    branches: [Branch; BRANCHES],
-    n_branches: usize,
-    /// What a plan that begins with it scores without travel and load.
-    offset: f32,
-}
-
-/// Where second arcs begin.
-#[derive(Debug, Clone, Copy)]
-struct Branch {
+struct Rollout {
     motion: Motion,
     travel_m: f32,
     load_m: f32,
+}
+
+/// A forecast first arc.
+#[derive(Debug, Clone, Copy)]
+struct FirstArc {
+    rollout: Rollout,
+    /// Where second arcs begin.
+    branches: [Rollout; BRANCHES],
+    n_branches: usize,
+    /// So many of the branches lie on the ramp, and every arc that leaves it later has the same ones.
+    n_on_ramp: usize,
+    /// What a plan that begins with it scores without travel and load.
+    offset: f32,
 }
 
 impl Search<'_> {
@@ -130,25 +120,26 @@ impl Search<'_> {
     /// Branch and bound: a plan that could not win if all the rest of its way were free is not followed.
     pub(crate) fn best_plan(&self, clearance_m: f32, mut candidates: Option<&mut Vec<Candidate>>) -> Option<Plan> {
         let thresholds = self.thresholds(clearance_m);
-        let firsts: [FirstArc; FIRST_ARCS] = std::array::from_fn(|i| self.follow_first(i, thresholds));
+        let firsts = self.follow_firsts(thresholds);
         // The most promising first: its plans prune the others.
         let mut order: [(f32, usize); FIRST_ARCS] = std::array::from_fn(|i| (self.bound_of_first(&firsts[i]), i));
         order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
 
         let mut best: Option<Plan> = None;
+        let mut followed = Followed::default();
         for (bound, first) in order {
             if best.is_some_and(|best| bound <= best.score) {
                 break;
             }
-            self.follow_plans(first, &firsts[first], thresholds, &mut best);
+            self.follow_plans(first, &firsts[first], thresholds, &mut followed, &mut best);
         }
         if let Some(candidates) = &mut candidates {
             candidates.clear();
             candidates.extend(firsts.iter().enumerate().map(|(i, first)| {
                 let mut own = None;
-                self.follow_plans(i, first, thresholds, &mut own);
-                let curvature_per_m = self.arcs.first[i].curvature_per_m;
-                Candidate { curvature_per_m, free_m: first.free_m, score: own.map(|plan| plan.score) }
+                self.follow_plans(i, first, thresholds, &mut Followed::default(), &mut own);
+                let curvature_per_m = self.arcs.curvature_per_m(i);
+                Candidate { curvature_per_m, free_m: first.rollout.travel_m, score: own.map(|plan| plan.score) }
             }));
         }
         best
@@ -162,7 +153,7 @@ impl Search<'_> {
         let gap_m = |first: usize| {
             let mut motion = self.start;
             (0..steps).fold(f32::INFINITY, |gap_m, _| {
-                motion.step(self.arcs.first[first].curvature_per_m, change_per_m, self.settings.first_step_m);
+                motion = motion.step(self.arcs.curvature_per_m(first), change_per_m, self.settings.first_step_m);
                 gap_m.min(self.footprint.clearance_m(field, &motion))
             })
         };
@@ -181,7 +172,7 @@ impl Search<'_> {
         let step_m = self.settings.first_step_m;
         let change_per_m = self.change_per_step(step_m);
         let steps_per_sample = (spacing_m / step_m).round() as usize;
-        let first_per_m = self.arcs.first[plan.first].curvature_per_m;
+        let first_per_m = self.arcs.curvature_per_m(plan.first);
         let (second, mut motion) = (plan.second, self.start);
         let samples = (plan.free_m / spacing_m) as usize;
         std::iter::once(self.start.position).chain((0..samples).map(move |sample| {
@@ -192,7 +183,7 @@ impl Search<'_> {
                     Some((branch_m, second_per_m)) if travel_m + 0.5 * step_m > branch_m => second_per_m,
                     _ => first_per_m,
                 };
-                motion.step(target_per_m, change_per_m, step_m);
+                motion = motion.step(target_per_m, change_per_m, step_m);
             }
             motion.position
         }))
@@ -200,7 +191,7 @@ impl Search<'_> {
 
     /// How safe it is to pursue a band, always steering at the point `ahead_m` along it, 0…1 by the least clearance.
     pub(crate) fn trust(&self, band: &ElasticBand, ahead_m: f32) -> f32 {
-        let (settings, field) = (self.settings, self.truth.map.distance_field());
+        let (settings, field) = (self.settings, self.field());
         let step_m = settings.second_step_m;
         let change_per_m = self.change_per_step(step_m);
         let of_band = &settings.elastic_band;
@@ -213,7 +204,7 @@ impl Search<'_> {
             let left_m = motion.ahead.perp_dot(target);
             let target_per_m = (2.0 * left_m / target.length_squared())
                 .clamp(-settings.curvature_max_per_m, settings.curvature_max_per_m);
-            motion.step(target_per_m, change_per_m, step_m);
+            motion = motion.step(target_per_m, change_per_m, step_m);
             let clearance_m = self.footprint.clearance_m(field, &motion);
             trust = trust.min((clearance_m - of_band.trust_from_m) * per_m);
             if trust <= 0.0 {
@@ -237,45 +228,55 @@ impl Search<'_> {
         Thresholds { near_m: clearance_m.min(present_m - START_SLACK_M), far_m: clearance_m }
     }
 
-    fn follow_first(&self, first: usize, thresholds: Thresholds) -> FirstArc {
-        let (settings, field) = (self.settings, self.truth.map.distance_field());
-        let Arc { curvature_per_m, index } = self.arcs.first[first];
-        let weights = &settings.weights;
-        let change = self.last_index.map_or(0.0, |last_index| (index - last_index).abs());
-        let mut arc = FirstArc {
-            free_m: 0.0,
-            load_m: 0.0,
-            end: self.start,
-            branches: [Branch { motion: self.start, travel_m: 0.0, load_m: 0.0 }; BRANCHES],
-            n_branches: 0,
-            offset: 0.0,
-        };
-        let step_m = settings.first_step_m;
-        let change_per_m = self.change_per_step(step_m);
-        let mut motion = self.start;
-        let mut travel_m = 0.0;
-        while travel_m < self.horizon_m {
-            motion.step(curvature_per_m, change_per_m, step_m);
-            travel_m += step_m;
-            let clearance_m = self.footprint.clearance_m(field, &motion);
-            if clearance_m < thresholds.at(travel_m, settings)
-                || !self.sight.knows(motion.on_axis(self.footprint.nose_m()))
-            {
-                break;
+    fn follow_firsts(&self, thresholds: Thresholds) -> [FirstArc; FIRST_ARCS] {
+        let (settings, fan, weights) = (self.settings, &self.arcs.first, &self.settings.weights);
+        let start = Rollout { motion: self.start, travel_m: 0.0, load_m: 0.0 };
+        let start = FirstArc { rollout: start, branches: [start; BRANCHES], n_branches: 0, n_on_ramp: 0, offset: 0.0 };
+        let drive_on = |arc: &mut FirstArc, next: Motion, index: Option<usize>| {
+            let clearance_m = self.footprint.clearance_m(self.field(), &next);
+            if !self.drive_on(&mut arc.rollout, next, fan.step_m, clearance_m, thresholds) {
+                return false;
             }
-            arc.free_m = travel_m;
-            arc.load_m += self.load(clearance_m) * step_m;
-            arc.end = motion;
             // Half a step: travels are sums of steps.
-            if arc.n_branches < BRANCHES && travel_m + 0.5 * step_m > settings.branch_travels_m[arc.n_branches] {
-                arc.branches[arc.n_branches] = Branch { motion, travel_m, load_m: arc.load_m };
+            let reached_m = arc.rollout.travel_m + 0.5 * fan.step_m;
+            if arc.n_branches < BRANCHES && reached_m > settings.branch_travels_m[arc.n_branches] {
+                arc.branches[arc.n_branches] = arc.rollout;
                 arc.n_branches += 1;
+                arc.n_on_ramp += usize::from(index.is_none());
             }
+            true
+        };
+        let change_per_m = self.change_per_step(fan.step_m);
+        let mut firsts = fan.follow(start, change_per_m, |arc| arc.rollout.motion, drive_on, |_, _| false);
+        for (first, Arc { index, .. }) in firsts.iter_mut().zip(&fan.arcs) {
+            let change = self.last_index.map_or(0.0, |last_index| (index - last_index).abs());
+            first.offset = weights.first_free * first.rollout.travel_m.min(self.horizon_m) / weights.unit_m
+                - weights.first_curvature * index.abs()
+                - weights.change * change;
         }
-        arc.offset = weights.first_free * arc.free_m.min(self.horizon_m) / weights.unit_m
-            - weights.first_curvature * index.abs()
-            - weights.change * change;
-        arc
+        firsts
+    }
+
+    /// Moves a forecast to its next step, unless it ends before: at the horizon, at an obstacle or on unknown ground.
+    #[inline]
+    fn drive_on(
+        &self,
+        rollout: &mut Rollout,
+        next: Motion,
+        step_m: f32,
+        clearance_m: f32,
+        thresholds: Thresholds,
+    ) -> bool {
+        let travel_m = rollout.travel_m + step_m;
+        if rollout.travel_m >= self.horizon_m
+            || clearance_m < thresholds.at(travel_m, self.settings)
+            || !self.sight.knows(next.on_axis(self.footprint.nose_m()))
+        {
+            return false;
+        }
+        let load_m = rollout.load_m + self.load(clearance_m) * step_m;
+        *rollout = Rollout { motion: next, travel_m, load_m };
+        true
     }
 
     /// No plan that begins with this arc can score more.
@@ -297,8 +298,16 @@ impl Search<'_> {
     }
 
     /// Replaces `best` by the best plan that begins with a first arc, if that is better.
-    fn follow_plans(&self, index: usize, first: &FirstArc, thresholds: Thresholds, best: &mut Option<Plan>) {
-        if first.free_m == 0.0 {
+    fn follow_plans(
+        &self,
+        index: usize,
+        first: &FirstArc,
+        thresholds: Thresholds,
+        followed: &mut Followed,
+        best: &mut Option<Plan>,
+    ) {
+        let Rollout { motion, travel_m: first_free_m, load_m } = first.rollout;
+        if first_free_m == 0.0 {
             return;
         }
         let horizon_m = self.horizon_m;
@@ -307,22 +316,30 @@ impl Search<'_> {
             let score = self.worth(free_m, load_m) + first.offset - penalty;
             let is_better = best.is_none_or(|best| score > best.score);
             if is_better && self.makes_progress(end, free_m) {
-                *best = Some(Plan { first: index, second, first_free_m: first.free_m, free_m, score });
+                *best = Some(Plan { first: index, second, first_free_m, free_m, score });
             }
             best.map_or(f32::NEG_INFINITY, |best| best.score)
         };
-        let mut to_beat = offer(None, first.free_m, first.load_m, 0.0, &first.end);
-        for branch in first.branches[..first.n_branches].iter().rev() {
-            for second in &self.arcs.second {
-                let penalty = self.settings.weights.second_curvature * second.index.abs();
-                let load_max_m = self.load_at_bound(to_beat - first.offset + penalty);
-                if let Some((free_m, load_m, end)) =
-                    self.follow_second(branch, second.curvature_per_m, thresholds, load_max_m)
-                {
-                    to_beat = offer(Some((branch.travel_m, second.curvature_per_m)), free_m, load_m, penalty, &end);
+        let mut to_beat = offer(None, first_free_m, load_m, 0.0, &motion);
+        let side = usize::from(self.arcs.curvature_per_m(index) < self.start.curvature_per_m);
+        for (i, branch) in first.branches[..first.n_branches].iter().enumerate().rev() {
+            if i < first.n_on_ramp {
+                let offset = &mut followed.0[side][i];
+                if first.offset <= *offset {
+                    continue;
                 }
+                *offset = first.offset;
+            }
+            let ends = self.follow_seconds(branch, thresholds, to_beat - first.offset);
+            for (second, end) in self.arcs.second.arcs.iter().zip(ends) {
+                let branching = Some((branch.travel_m, second.curvature_per_m));
+                to_beat = offer(branching, end.travel_m, end.load_m, self.penalty(second), &end.motion);
             }
         }
+    }
+
+    fn penalty(&self, second: &Arc) -> f32 {
+        self.settings.weights.second_curvature * second.index.abs()
     }
 
     /// The load above which [`Self::bound`] falls below a worth.
@@ -331,34 +348,31 @@ impl Search<'_> {
         (self.horizon_m / weights.unit_m - worth) * self.horizon_m / weights.load
     }
 
-    /// Free travel, load and end of a second arc; `None` once it has collected more than `load_max_m`.
-    fn follow_second(
-        &self,
-        branch: &Branch,
-        curvature_per_m: f32,
-        thresholds: Thresholds,
-        load_max_m: f32,
-    ) -> Option<(f32, f32, Motion)> {
-        let (settings, field) = (self.settings, self.truth.map.distance_field());
-        let step_m = settings.second_step_m;
-        let change_per_m = self.change_per_step(step_m);
-        let Branch { mut motion, mut travel_m, mut load_m } = *branch;
-        while travel_m < self.horizon_m {
-            if load_m > load_max_m {
-                return None;
+    /// Second arcs from a branch, as far as they are free or can still be worth more than `worth_min` (of which those that
+    /// end early are never worth more).
+    fn follow_seconds(&self, branch: &Rollout, thresholds: Thresholds, worth_min: f32) -> [Rollout; SECOND_ARCS] {
+        let fan = &self.arcs.second;
+        let load_max_m = fan.arcs.each_ref().map(|second| self.load_at_bound(worth_min + self.penalty(second)));
+        let load_max_on_ramp_m = self.load_at_bound(worth_min);
+        let drive_on = |rollout: &mut Rollout, next: Motion, index: Option<usize>| {
+            if rollout.load_m > index.map_or(load_max_on_ramp_m, |i| load_max_m[i]) {
+                return false;
             }
-            let before = motion;
-            motion.step(curvature_per_m, change_per_m, step_m);
-            let clearance_m = self.footprint.coarse_clearance_m(field, &motion);
-            if clearance_m < thresholds.at(travel_m + step_m, settings)
-                || !self.sight.knows(motion.on_axis(self.footprint.nose_m()))
-            {
-                return Some((travel_m, load_m, before));
-            }
-            travel_m += step_m;
-            load_m += self.load(clearance_m) * step_m;
-        }
-        Some((travel_m, load_m, motion))
+            let clearance_m = self.footprint.coarse_clearance_m(self.field(), &next);
+            self.drive_on(rollout, next, fan.step_m, clearance_m, thresholds)
+        };
+        let is_hopeless = |rollout: &Rollout, arc: &Arc| {
+            let worth_min = worth_min + self.penalty(arc);
+            let blocked_m = self.footprint.distance_m(thresholds.near_m) - PROBE_SLACK_M;
+            arc.probes(rollout.motion, fan.step_m)
+                .take_while(|&(travel_m, _)| self.worth(rollout.travel_m + travel_m, rollout.load_m) <= worth_min)
+                .any(|(_, nose)| self.field().at_nearest_node(nose) < blocked_m)
+        };
+        fan.follow(*branch, self.change_per_step(fan.step_m), |rollout| rollout.motion, drive_on, is_hopeless)
+    }
+
+    fn field(&self) -> &DistanceField {
+        self.truth.map.distance_field()
     }
 
     /// How much something at a clearance weighs, 0…1: "fewest obstacles around the trajectory" (paper), and what
@@ -381,6 +395,16 @@ impl Search<'_> {
         // Behind the finish progress saturates.
         reached_m > path.length_m() - 0.5
             || reached_m - progress_of(&self.start) >= self.settings.progress_share * travel_m
+    }
+}
+
+/// What the first arcs had as their offset whose branches on the ramps were followed, by side and branch. The plans of
+/// another one from the same branch differ from theirs in nothing but the offset.
+struct Followed([[f32; BRANCHES]; 2]);
+
+impl Default for Followed {
+    fn default() -> Self {
+        Self([[f32::NEG_INFINITY; BRANCHES]; 2])
     }
 }
 
