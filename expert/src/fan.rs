@@ -4,7 +4,7 @@ use crate::rollout::{HalfTurn, Motion};
 use sim::geometry::{Pose, Vec2};
 
 /// Points per arc at which its forecast can be probed.
-const PROBES: usize = 10;
+const PROBES: usize = 14;
 /// Steps between them.
 const PROBE_STEPS: usize = 5;
 
@@ -29,6 +29,20 @@ pub(crate) struct Arc {
     probes: [Vec2; PROBES],
 }
 
+/// What is carried along an arc.
+pub(crate) trait Forecast: Copy {
+    /// Where it has got to.
+    fn motion(&self) -> Motion;
+}
+
+/// A forecast where it gets to the curvature of its arc, or where it ends before.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Entry<F> {
+    pub(crate) forecast: F,
+    /// Whether it can go on.
+    pub(crate) is_free: bool,
+}
+
 impl<const N: usize> Fan<N> {
     /// Arcs up to ±`max_per_m`, spaced by a power of their index. `nose_m` is where they are probed, ahead of the axle.
     pub(crate) fn new(max_per_m: f32, exponent: f32, step_m: f32, nose_m: f32) -> Self {
@@ -49,53 +63,61 @@ impl<const N: usize> Fan<N> {
         Self { arcs, from_right, step_m }
     }
 
-    /// Follows every arc from one start, and returns how far each forecast got, by index of the arc.
+    /// Forecasts from one start until each has got to the curvature of its arc, by index of the arc.
     ///
     /// Arcs to the same side begin alike, with the wheels turning as fast as they can. This ramp is followed once for all
     /// of them, and each arc leaves it where its curvature is reached.
     ///
     /// `drive_on` moves a forecast to the next motion, or returns that it ends before. It is told the arc, or `None` on a
-    /// ramp. A forecast that `is_hopeless` ends where it gets to the curvature of its arc.
-    pub(crate) fn follow<F: Copy>(
+    /// ramp.
+    pub(crate) fn enter<F: Forecast>(
         &self,
         start: F,
         change_per_m: f32,
-        motion_of: impl Fn(&F) -> Motion,
         drive_on: impl Fn(&mut F, Motion, Option<usize>) -> bool,
-        is_hopeless: impl Fn(&F, &Arc) -> bool,
-    ) -> [F; N] {
-        let mut ends = [start; N];
-        let mut follow_side = |side: &mut dyn Iterator<Item = usize>| {
-            let (mut ramp, mut is_free) = (start, true);
+    ) -> [Entry<F>; N] {
+        let start = Entry { forecast: start, is_free: true };
+        let mut entries = [start; N];
+        let mut enter_side = |side: &mut dyn Iterator<Item = usize>| {
+            let mut ramp = start;
             for i in side {
-                let arc = &self.arcs[i];
-                let &Arc { curvature_per_m, half_turn, .. } = arc;
-                let step = |forecast: &F| motion_of(forecast).step(curvature_per_m, change_per_m, self.step_m);
-                while is_free && !motion_of(&ramp).reaches(curvature_per_m, change_per_m) {
-                    let next = step(&ramp);
-                    is_free = drive_on(&mut ramp, next, None);
+                let target_per_m = self.arcs[i].curvature_per_m;
+                let drive_on = |Entry { forecast, is_free }: &mut Entry<F>, arc| {
+                    *is_free = drive_on(forecast, forecast.motion().step(target_per_m, change_per_m, self.step_m), arc);
+                };
+                while ramp.is_free && !ramp.forecast.motion().reaches(target_per_m, change_per_m) {
+                    drive_on(&mut ramp, None);
                 }
-                ends[i] = ramp;
-                let own = &mut ends[i];
-                let mut next = step(own);
-                if is_free && drive_on(own, next, Some(i)) && !is_hopeless(own, arc) {
-                    next = next.turn(half_turn, self.step_m);
-                    while drive_on(own, next, Some(i)) {
-                        next = next.turn(half_turn, self.step_m);
-                    }
+                entries[i] = ramp;
+                if ramp.is_free {
+                    drive_on(&mut entries[i], Some(i));
                 }
             }
         };
-        let present_per_m = motion_of(&start).curvature_per_m;
+        let present_per_m = start.forecast.motion().curvature_per_m;
         let n_right = self.from_right.partition_point(|&i| self.arcs[i].curvature_per_m < present_per_m);
         let (right, left) = self.from_right.split_at(n_right);
-        follow_side(&mut right.iter().rev().copied());
-        follow_side(&mut left.iter().copied());
-        ends
+        enter_side(&mut right.iter().rev().copied());
+        enter_side(&mut left.iter().copied());
+        entries
     }
 }
 
 impl Arc {
+    /// Follows the arc with a forecast that has entered it for as long as `drive_on` moves it.
+    pub(crate) fn follow<F: Forecast>(
+        &self,
+        entry: &mut Entry<F>,
+        step_m: f32,
+        drive_on: impl Fn(&mut F, Motion) -> bool,
+    ) {
+        let mut next = entry.forecast.motion();
+        while entry.is_free {
+            next = next.turn(self.half_turn, step_m);
+            entry.is_free = drive_on(&mut entry.forecast, next);
+        }
+    }
+
     /// Where the nose gets to along the arc every few steps of `step_m`, and the travel there.
     pub(crate) fn probes(&self, from: Motion, step_m: f32) -> impl Iterator<Item = (f32, Vec2)> {
         self.probes.iter().enumerate().map(move |(i, &in_ego)| {

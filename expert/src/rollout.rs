@@ -105,9 +105,9 @@ impl Footprint {
     /// Clearance of the whole body, metres.
     #[inline]
     pub(crate) fn clearance_m(&self, field: &DistanceField, motion: &Motion) -> f32 {
-        let nearest_m =
-            self.disc_centres_m.iter().map(|&x_m| field.at(motion.on_axis(x_m))).fold(f32::INFINITY, f32::min);
-        nearest_m - self.keep_m
+        let xs = self.disc_centres_m.map(|ahead_m| motion.on_axis(ahead_m).x);
+        let ys = self.disc_centres_m.map(|ahead_m| motion.on_axis(ahead_m).y);
+        field.at_each(&xs, &ys).into_iter().fold(f32::INFINITY, f32::min) - self.keep_m
     }
 
     /// Clearance of nose, middle and rear axle, metres, to within the raster's node spacing.

@@ -6,7 +6,7 @@
 
 use crate::context::ExpertContext;
 use crate::elastic_band::ElasticBand;
-use crate::fan::{Arc, Fan};
+use crate::fan::{Arc, Entry, Fan, Forecast};
 use crate::line_of_sight::LineOfSight;
 use crate::rollout::{Footprint, Motion};
 use crate::settings::ExpertSettings;
@@ -101,45 +101,73 @@ struct Rollout {
     load_m: f32,
 }
 
-/// A forecast first arc.
+/// A first arc, as far as it is forecast.
 #[derive(Debug, Clone, Copy)]
 struct FirstArc {
+    entry: Entry<FirstRollout>,
+    /// What a plan that begins with it scores without travel and load, at most while it can go on.
+    offset: f32,
+    /// No plan that begins with it can score more.
+    bound: f32,
+    /// Whether its plans have been followed.
+    is_done: bool,
+}
+
+/// A forecast first arc.
+#[derive(Debug, Clone, Copy)]
+struct FirstRollout {
     rollout: Rollout,
     /// Where second arcs begin.
     branches: [Rollout; BRANCHES],
     n_branches: usize,
     /// So many of the branches lie on the ramp, and every arc that leaves it later has the same ones.
     n_on_ramp: usize,
-    /// What a plan that begins with it scores without travel and load.
-    offset: f32,
+}
+
+impl Forecast for Rollout {
+    fn motion(&self) -> Motion {
+        self.motion
+    }
+}
+
+impl Forecast for FirstRollout {
+    fn motion(&self) -> Motion {
+        self.rollout.motion
+    }
 }
 
 impl Search<'_> {
     /// The best plan that keeps a clearance; `None` if not even a step is free.
     ///
-    /// Branch and bound: a plan that could not win if all the rest of its way were free is not followed.
-    pub(crate) fn best_plan(&self, clearance_m: f32, mut candidates: Option<&mut Vec<Candidate>>) -> Option<Plan> {
+    /// Branch and bound: a plan that could not win if all the rest of its way were free is not followed, and neither is a
+    /// first arc whose plans could not.
+    pub(crate) fn best_plan(&self, clearance_m: f32, candidates: Option<&mut Vec<Candidate>>) -> Option<Plan> {
         let thresholds = self.thresholds(clearance_m);
-        let firsts = self.follow_firsts(thresholds);
-        // The most promising first: its plans prune the others.
-        let mut order: [(f32, usize); FIRST_ARCS] = std::array::from_fn(|i| (self.bound_of_first(&firsts[i]), i));
-        order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-
+        let mut firsts = self.enter_firsts(thresholds);
         let mut best: Option<Plan> = None;
         let mut followed = Followed::default();
-        for (bound, first) in order {
-            if best.is_some_and(|best| bound <= best.score) {
+        // The most promising first: its plans prune the others.
+        while let Some(i) = most_promising(&firsts) {
+            let first = &mut firsts[i];
+            if best.is_some_and(|best| first.bound <= best.score) {
                 break;
             }
-            self.follow_plans(first, &firsts[first], thresholds, &mut followed, &mut best);
+            if first.entry.is_free {
+                self.follow_first(i, first, thresholds);
+            } else {
+                self.follow_plans(i, first, thresholds, &mut followed, &mut best);
+                first.is_done = true;
+            }
         }
-        if let Some(candidates) = &mut candidates {
+        if let Some(candidates) = candidates {
             candidates.clear();
-            candidates.extend(firsts.iter().enumerate().map(|(i, first)| {
+            candidates.extend(firsts.iter_mut().enumerate().map(|(i, first)| {
                 let mut own = None;
+                self.follow_first(i, first, thresholds);
                 self.follow_plans(i, first, thresholds, &mut Followed::default(), &mut own);
+                let free_m = first.entry.forecast.rollout.travel_m;
                 let curvature_per_m = self.arcs.curvature_per_m(i);
-                Candidate { curvature_per_m, free_m: first.rollout.travel_m, score: own.map(|plan| plan.score) }
+                Candidate { curvature_per_m, free_m, score: own.map(|plan| plan.score) }
             }));
         }
         best
@@ -228,33 +256,68 @@ impl Search<'_> {
         Thresholds { near_m: clearance_m.min(present_m - START_SLACK_M), far_m: clearance_m }
     }
 
-    fn follow_firsts(&self, thresholds: Thresholds) -> [FirstArc; FIRST_ARCS] {
-        let (settings, fan, weights) = (self.settings, &self.arcs.first, &self.settings.weights);
+    /// First arcs up to where each has its curvature.
+    fn enter_firsts(&self, thresholds: Thresholds) -> [FirstArc; FIRST_ARCS] {
+        let fan = &self.arcs.first;
         let start = Rollout { motion: self.start, travel_m: 0.0, load_m: 0.0 };
-        let start = FirstArc { rollout: start, branches: [start; BRANCHES], n_branches: 0, n_on_ramp: 0, offset: 0.0 };
-        let drive_on = |arc: &mut FirstArc, next: Motion, index: Option<usize>| {
-            let clearance_m = self.footprint.clearance_m(self.field(), &next);
-            if !self.drive_on(&mut arc.rollout, next, fan.step_m, clearance_m, thresholds) {
-                return false;
+        let start = FirstRollout { rollout: start, branches: [start; BRANCHES], n_branches: 0, n_on_ramp: 0 };
+        let entries = fan.enter(start, self.change_per_step(fan.step_m), |first, next, arc| {
+            let is_free = self.drive_on_first(first, next, thresholds);
+            if arc.is_none() {
+                first.n_on_ramp = first.n_branches;
             }
-            // Half a step: travels are sums of steps.
-            let reached_m = arc.rollout.travel_m + 0.5 * fan.step_m;
-            if arc.n_branches < BRANCHES && reached_m > settings.branch_travels_m[arc.n_branches] {
-                arc.branches[arc.n_branches] = arc.rollout;
-                arc.n_branches += 1;
-                arc.n_on_ramp += usize::from(index.is_none());
-            }
-            true
-        };
-        let change_per_m = self.change_per_step(fan.step_m);
-        let mut firsts = fan.follow(start, change_per_m, |arc| arc.rollout.motion, drive_on, |_, _| false);
-        for (first, Arc { index, .. }) in firsts.iter_mut().zip(&fan.arcs) {
-            let change = self.last_index.map_or(0.0, |last_index| (index - last_index).abs());
-            first.offset = weights.first_free * first.rollout.travel_m.min(self.horizon_m) / weights.unit_m
-                - weights.first_curvature * index.abs()
-                - weights.change * change;
+            is_free
+        });
+        let mut i = 0;
+        entries.map(|entry| {
+            let mut first = FirstArc { entry, offset: 0.0, bound: 0.0, is_done: false };
+            let Rollout { motion, travel_m, .. } = entry.forecast.rollout;
+            let free_max_m = if entry.is_free {
+                let blocked_m = self.footprint.distance_m(thresholds.near_m) - PROBE_SLACK_M;
+                let mut probes = fan.arcs[i].probes(motion, fan.step_m);
+                let blocked = probes.find(|&(_, nose)| self.field().at_nearest_node(nose) < blocked_m);
+                blocked.map_or(self.horizon_m, |(probed_m, _)| travel_m + probed_m)
+            } else {
+                travel_m
+            };
+            self.rate_first(i, &mut first, free_max_m);
+            i += 1;
+            first
+        })
+    }
+
+    /// Forecasts a first arc to its end.
+    fn follow_first(&self, i: usize, first: &mut FirstArc, thresholds: Thresholds) {
+        let fan = &self.arcs.first;
+        let drive_on = |first: &mut FirstRollout, next| self.drive_on_first(first, next, thresholds);
+        fan.arcs[i].follow(&mut first.entry, fan.step_m, drive_on);
+        self.rate_first(i, first, first.entry.forecast.rollout.travel_m);
+    }
+
+    fn drive_on_first(&self, first: &mut FirstRollout, next: Motion, thresholds: Thresholds) -> bool {
+        let step_m = self.settings.first_step_m;
+        let clearance_m = self.footprint.clearance_m(self.field(), &next);
+        if !self.drive_on(&mut first.rollout, next, step_m, clearance_m, thresholds) {
+            return false;
         }
-        firsts
+        // Half a step: travels are sums of steps.
+        let reached_m = first.rollout.travel_m + 0.5 * step_m;
+        if first.n_branches < BRANCHES && reached_m > self.settings.branch_travels_m[first.n_branches] {
+            first.branches[first.n_branches] = first.rollout;
+            first.n_branches += 1;
+        }
+        true
+    }
+
+    fn rate_first(&self, i: usize, first: &mut FirstArc, free_m: f32) {
+        let (weights, index) = (&self.settings.weights, self.arcs.first.arcs[i].index);
+        let change = self.last_index.map_or(0.0, |last_index| (index - last_index).abs());
+        first.offset = weights.first_free * free_m.min(self.horizon_m) / weights.unit_m
+            - weights.first_curvature * index.abs()
+            - weights.change * change;
+        let FirstRollout { branches, n_branches, .. } = &first.entry.forecast;
+        let load_m = branches[..*n_branches].first().map_or(0.0, |branch| branch.load_m);
+        first.bound = first.offset + self.bound(load_m);
     }
 
     /// Moves a forecast to its next step, unless it ends before: at the horizon, at an obstacle or on unknown ground.
@@ -279,12 +342,6 @@ impl Search<'_> {
         true
     }
 
-    /// No plan that begins with this arc can score more.
-    fn bound_of_first(&self, first: &FirstArc) -> f32 {
-        let load_m = first.branches[..first.n_branches].first().map_or(0.0, |branch| branch.load_m);
-        first.offset + self.bound(load_m)
-    }
-
     /// Best of travel and load once `load_m` has been collected: free to the horizon without any more.
     #[inline]
     fn bound(&self, load_m: f32) -> f32 {
@@ -306,7 +363,8 @@ impl Search<'_> {
         followed: &mut Followed,
         best: &mut Option<Plan>,
     ) {
-        let Rollout { motion, travel_m: first_free_m, load_m } = first.rollout;
+        let forecast = &first.entry.forecast;
+        let Rollout { motion, travel_m: first_free_m, load_m } = forecast.rollout;
         if first_free_m == 0.0 {
             return;
         }
@@ -322,16 +380,16 @@ impl Search<'_> {
         };
         let mut to_beat = offer(None, first_free_m, load_m, 0.0, &motion);
         let side = usize::from(self.arcs.curvature_per_m(index) < self.start.curvature_per_m);
-        for (i, branch) in first.branches[..first.n_branches].iter().enumerate().rev() {
-            if i < first.n_on_ramp {
+        for (i, branch) in forecast.branches[..forecast.n_branches].iter().enumerate().rev() {
+            if i < forecast.n_on_ramp {
                 let offset = &mut followed.0[side][i];
                 if first.offset <= *offset {
                     continue;
                 }
                 *offset = first.offset;
             }
-            let ends = self.follow_seconds(branch, thresholds, to_beat - first.offset);
-            for (second, end) in self.arcs.second.arcs.iter().zip(ends) {
+            let seconds = self.follow_seconds(branch, thresholds, to_beat - first.offset);
+            for (second, Entry { forecast: end, .. }) in self.arcs.second.arcs.iter().zip(seconds) {
                 let branching = Some((branch.travel_m, second.curvature_per_m));
                 to_beat = offer(branching, end.travel_m, end.load_m, self.penalty(second), &end.motion);
             }
@@ -350,25 +408,37 @@ impl Search<'_> {
 
     /// Second arcs from a branch, as far as they are free or can still be worth more than `worth_min` (of which those that
     /// end early are never worth more).
-    fn follow_seconds(&self, branch: &Rollout, thresholds: Thresholds, worth_min: f32) -> [Rollout; SECOND_ARCS] {
+    fn follow_seconds(
+        &self,
+        branch: &Rollout,
+        thresholds: Thresholds,
+        worth_min: f32,
+    ) -> [Entry<Rollout>; SECOND_ARCS] {
         let fan = &self.arcs.second;
         let load_max_m = fan.arcs.each_ref().map(|second| self.load_at_bound(worth_min + self.penalty(second)));
         let load_max_on_ramp_m = self.load_at_bound(worth_min);
-        let drive_on = |rollout: &mut Rollout, next: Motion, index: Option<usize>| {
-            if rollout.load_m > index.map_or(load_max_on_ramp_m, |i| load_max_m[i]) {
+        let drive_on = |rollout: &mut Rollout, next: Motion, arc: Option<usize>| {
+            if rollout.load_m > arc.map_or(load_max_on_ramp_m, |i| load_max_m[i]) {
                 return false;
             }
             let clearance_m = self.footprint.coarse_clearance_m(self.field(), &next);
             self.drive_on(rollout, next, fan.step_m, clearance_m, thresholds)
         };
-        let is_hopeless = |rollout: &Rollout, arc: &Arc| {
+        let blocked_m = self.footprint.distance_m(thresholds.near_m) - PROBE_SLACK_M;
+        let mut entries = fan.enter(*branch, self.change_per_step(fan.step_m), drive_on);
+        for (i, (arc, entry)) in fan.arcs.iter().zip(&mut entries).enumerate() {
+            let Rollout { motion, travel_m, load_m } = entry.forecast;
             let worth_min = worth_min + self.penalty(arc);
-            let blocked_m = self.footprint.distance_m(thresholds.near_m) - PROBE_SLACK_M;
-            arc.probes(rollout.motion, fan.step_m)
-                .take_while(|&(travel_m, _)| self.worth(rollout.travel_m + travel_m, rollout.load_m) <= worth_min)
-                .any(|(_, nose)| self.field().at_nearest_node(nose) < blocked_m)
-        };
-        fan.follow(*branch, self.change_per_step(fan.step_m), |rollout| rollout.motion, drive_on, is_hopeless)
+            let is_hopeless = || {
+                arc.probes(motion, fan.step_m)
+                    .take_while(|&(probed_m, _)| self.worth(travel_m + probed_m, load_m) <= worth_min)
+                    .any(|(_, nose)| self.field().at_nearest_node(nose) < blocked_m)
+            };
+            if entry.is_free && !is_hopeless() {
+                arc.follow(entry, fan.step_m, |rollout, next| drive_on(rollout, next, Some(i)));
+            }
+        }
+        entries
     }
 
     fn field(&self) -> &DistanceField {
@@ -396,6 +466,12 @@ impl Search<'_> {
         reached_m > path.length_m() - 0.5
             || reached_m - progress_of(&self.start) >= self.settings.progress_share * travel_m
     }
+}
+
+/// The first arc with the highest bound of those that are not done; of equal ones, the straightest.
+fn most_promising(firsts: &[FirstArc]) -> Option<usize> {
+    let open = firsts.iter().enumerate().filter(|(_, first)| !first.is_done);
+    open.max_by(|(i, a), (j, b)| a.bound.total_cmp(&b.bound).then(j.cmp(i))).map(|(i, _)| i)
 }
 
 /// What the first arcs had as their offset whose branches on the ramps were followed, by side and branch. The plans of
