@@ -35,7 +35,7 @@ pub(crate) trait Forecast: Copy {
     fn motion(&self) -> Motion;
 }
 
-/// A forecast where it gets to the curvature of its arc, or where it ends before.
+/// A forecast up to where its arc leaves the ramp, or farther.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry<F> {
     pub(crate) forecast: F,
@@ -63,66 +63,63 @@ impl<const N: usize> Fan<N> {
         Self { arcs, from_right, step_m }
     }
 
-    /// Forecasts from one start until each has got to the curvature of its arc, by index of the arc.
+    /// Forecasts from one start until a step gets to the curvature of their arc, by index of the arc.
     ///
     /// Arcs to the same side begin alike, with the wheels turning as fast as they can. This ramp is followed once for all
     /// of them, and each arc leaves it where its curvature is reached.
     ///
-    /// `drive_on` moves a forecast to the next motion, or returns that it ends before. It is told the arc, or `None` on a
-    /// ramp.
-    pub(crate) fn enter<F: Forecast>(
+    /// `drive_on` moves a forecast to the next motion, or returns that it ends before.
+    pub(crate) fn follow_ramps<F: Forecast>(
         &self,
         start: F,
         change_per_m: f32,
-        drive_on: impl Fn(&mut F, Motion, Option<usize>) -> bool,
+        drive_on: impl Fn(&mut F, Motion) -> bool,
     ) -> [Entry<F>; N] {
         let start = Entry { forecast: start, is_free: true };
         let mut entries = [start; N];
-        let mut enter_side = |side: &mut dyn Iterator<Item = usize>| {
+        let mut follow_ramp = |side: &mut dyn Iterator<Item = usize>| {
             let mut ramp = start;
             for i in side {
-                let target_per_m = self.arcs[i].curvature_per_m;
-                let drive_on = |Entry { forecast, is_free }: &mut Entry<F>, arc| {
-                    *is_free = drive_on(forecast, forecast.motion().step(target_per_m, change_per_m, self.step_m), arc);
-                };
-                while ramp.is_free && !ramp.forecast.motion().reaches(target_per_m, change_per_m) {
-                    drive_on(&mut ramp, None);
+                let curvature_per_m = self.arcs[i].curvature_per_m;
+                while ramp.is_free && !ramp.forecast.motion().reaches(curvature_per_m, change_per_m) {
+                    let next = ramp.forecast.motion().step(curvature_per_m, change_per_m, self.step_m);
+                    ramp.is_free = drive_on(&mut ramp.forecast, next);
                 }
                 entries[i] = ramp;
-                if ramp.is_free {
-                    drive_on(&mut entries[i], Some(i));
-                }
             }
         };
         let present_per_m = start.forecast.motion().curvature_per_m;
         let n_right = self.from_right.partition_point(|&i| self.arcs[i].curvature_per_m < present_per_m);
         let (right, left) = self.from_right.split_at(n_right);
-        enter_side(&mut right.iter().rev().copied());
-        enter_side(&mut left.iter().copied());
+        follow_ramp(&mut right.iter().rev().copied());
+        follow_ramp(&mut left.iter().copied());
         entries
     }
-}
 
-impl Arc {
-    /// Follows the arc with a forecast that has entered it for as long as `drive_on` moves it.
-    pub(crate) fn follow<F: Forecast>(
-        &self,
-        entry: &mut Entry<F>,
-        step_m: f32,
-        drive_on: impl Fn(&mut F, Motion) -> bool,
-    ) {
-        let mut next = entry.forecast.motion();
-        while entry.is_free {
-            next = next.turn(self.half_turn, step_m);
-            entry.is_free = drive_on(&mut entry.forecast, next);
-        }
+    /// The step that leaves the ramp for an arc.
+    pub(crate) fn enter(&self, i: usize, ramp: Motion) -> Motion {
+        ramp.step(self.arcs[i].curvature_per_m, f32::INFINITY, self.step_m)
     }
 
-    /// Where the nose gets to along the arc every few steps of `step_m`, and the travel there.
-    pub(crate) fn probes(&self, from: Motion, step_m: f32) -> impl Iterator<Item = (f32, Vec2)> {
-        self.probes.iter().enumerate().map(move |(i, &in_ego)| {
-            let travel_m = ((i + 1) * PROBE_STEPS) as f32 * step_m;
-            (travel_m, from.position + from.ahead.rotate(in_ego))
+    /// Where the nose gets to along an arc every few steps after it was entered, with the travel there from the ramp.
+    pub(crate) fn probes(&self, i: usize, entered: Motion) -> impl Iterator<Item = (f32, Vec2)> {
+        self.arcs[i].probes.iter().enumerate().map(move |(probe, &in_ego)| {
+            let travel_m = (1 + (probe + 1) * PROBE_STEPS) as f32 * self.step_m;
+            (travel_m, entered.position + entered.ahead.rotate(in_ego))
         })
+    }
+
+    /// Follows an arc from the ramp for as long as `drive_on` moves the forecast.
+    pub(crate) fn follow<F: Forecast>(
+        &self,
+        i: usize,
+        entry: &mut Entry<F>,
+        drive_on: impl Fn(&mut F, Motion) -> bool,
+    ) {
+        let mut next = self.enter(i, entry.forecast.motion());
+        while entry.is_free {
+            entry.is_free = drive_on(&mut entry.forecast, next);
+            next = next.turn(self.arcs[i].half_turn, self.step_m);
+        }
     }
 }

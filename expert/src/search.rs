@@ -104,8 +104,9 @@ struct Rollout {
 /// A first arc, as far as it is forecast.
 #[derive(Debug, Clone, Copy)]
 struct FirstArc {
+    /// While it can go on, it is not yet followed farther than the ramp.
     entry: Entry<FirstRollout>,
-    /// What a plan that begins with it scores without travel and load, at most while it can go on.
+    /// What a plan that begins with it scores without travel and load, at most.
     offset: f32,
     /// No plan that begins with it can score more.
     bound: f32,
@@ -256,41 +257,37 @@ impl Search<'_> {
         Thresholds { near_m: clearance_m.min(present_m - START_SLACK_M), far_m: clearance_m }
     }
 
-    /// First arcs up to where each has its curvature.
+    /// First arcs as far as their ramps.
     fn enter_firsts(&self, thresholds: Thresholds) -> [FirstArc; FIRST_ARCS] {
         let fan = &self.arcs.first;
         let start = Rollout { motion: self.start, travel_m: 0.0, load_m: 0.0 };
         let start = FirstRollout { rollout: start, branches: [start; BRANCHES], n_branches: 0, n_on_ramp: 0 };
-        let entries = fan.enter(start, self.change_per_step(fan.step_m), |first, next, arc| {
+        let drive_on = |first: &mut FirstRollout, next| {
             let is_free = self.drive_on_first(first, next, thresholds);
-            if arc.is_none() {
-                first.n_on_ramp = first.n_branches;
-            }
+            first.n_on_ramp = first.n_branches;
             is_free
-        });
-        let mut i = 0;
-        entries.map(|entry| {
-            let mut first = FirstArc { entry, offset: 0.0, bound: 0.0, is_done: false };
-            let Rollout { motion, travel_m, .. } = entry.forecast.rollout;
-            let free_max_m = if entry.is_free {
-                let blocked_m = self.footprint.distance_m(thresholds.near_m) - PROBE_SLACK_M;
-                let mut probes = fan.arcs[i].probes(motion, fan.step_m);
+        };
+        let entries = fan.follow_ramps(start, self.change_per_step(fan.step_m), drive_on);
+        let blocked_m = self.blocked_m(thresholds);
+        std::array::from_fn(|i| {
+            let mut first = FirstArc { entry: entries[i], offset: 0.0, bound: 0.0, is_done: false };
+            let Rollout { motion, travel_m, .. } = first.entry.forecast.rollout;
+            let free_max_m = if first.entry.is_free {
+                let mut probes = fan.probes(i, fan.enter(i, motion));
                 let blocked = probes.find(|&(_, nose)| self.field().at_nearest_node(nose) < blocked_m);
                 blocked.map_or(self.horizon_m, |(probed_m, _)| travel_m + probed_m)
             } else {
                 travel_m
             };
             self.rate_first(i, &mut first, free_max_m);
-            i += 1;
             first
         })
     }
 
     /// Forecasts a first arc to its end.
     fn follow_first(&self, i: usize, first: &mut FirstArc, thresholds: Thresholds) {
-        let fan = &self.arcs.first;
         let drive_on = |first: &mut FirstRollout, next| self.drive_on_first(first, next, thresholds);
-        fan.arcs[i].follow(&mut first.entry, fan.step_m, drive_on);
+        self.arcs.first.follow(i, &mut first.entry, drive_on);
         self.rate_first(i, first, first.entry.forecast.rollout.travel_m);
     }
 
@@ -378,6 +375,7 @@ impl Search<'_> {
             }
             best.map_or(f32::NEG_INFINITY, |best| best.score)
         };
+        let blocked_m = self.blocked_m(thresholds);
         let mut to_beat = offer(None, first_free_m, load_m, 0.0, &motion);
         let side = usize::from(self.arcs.curvature_per_m(index) < self.start.curvature_per_m);
         for (i, branch) in forecast.branches[..forecast.n_branches].iter().enumerate().rev() {
@@ -388,10 +386,25 @@ impl Search<'_> {
                 }
                 *offset = first.offset;
             }
-            let seconds = self.follow_seconds(branch, thresholds, to_beat - first.offset);
-            for (second, Entry { forecast: end, .. }) in self.arcs.second.arcs.iter().zip(seconds) {
-                let branching = Some((branch.travel_m, second.curvature_per_m));
-                to_beat = offer(branching, end.travel_m, end.load_m, self.penalty(second), &end.motion);
+            let fan = &self.arcs.second;
+            let load_max_m = self.load_at_bound(to_beat - first.offset);
+            let drive_on = |rollout: &mut Rollout, next| self.drive_on_second(rollout, next, thresholds, load_max_m);
+            let entries = fan.follow_ramps(*branch, self.change_per_step(fan.step_m), drive_on);
+            for (i, mut entry) in entries.into_iter().enumerate() {
+                let penalty = self.penalty(&fan.arcs[i]);
+                if entry.is_free {
+                    let worth_min = to_beat - first.offset + penalty;
+                    if self.is_hopeless(i, &entry.forecast, worth_min, blocked_m) {
+                        continue;
+                    }
+                    let load_max_m = self.load_at_bound(worth_min);
+                    let drive_on =
+                        |rollout: &mut Rollout, next| self.drive_on_second(rollout, next, thresholds, load_max_m);
+                    fan.follow(i, &mut entry, drive_on);
+                }
+                let branching = Some((branch.travel_m, fan.arcs[i].curvature_per_m));
+                let Rollout { motion, travel_m, load_m } = entry.forecast;
+                to_beat = offer(branching, travel_m, load_m, penalty, &motion);
             }
         }
     }
@@ -406,39 +419,26 @@ impl Search<'_> {
         (self.horizon_m / weights.unit_m - worth) * self.horizon_m / weights.load
     }
 
-    /// Second arcs from a branch, as far as they are free or can still be worth more than `worth_min` (of which those that
-    /// end early are never worth more).
-    fn follow_seconds(
-        &self,
-        branch: &Rollout,
-        thresholds: Thresholds,
-        worth_min: f32,
-    ) -> [Entry<Rollout>; SECOND_ARCS] {
+    /// Whether a second arc from the ramp must be blocked before it is worth more than `worth_min`.
+    fn is_hopeless(&self, second: usize, ramp: &Rollout, worth_min: f32, blocked_m: f32) -> bool {
         let fan = &self.arcs.second;
-        let load_max_m = fan.arcs.each_ref().map(|second| self.load_at_bound(worth_min + self.penalty(second)));
-        let load_max_on_ramp_m = self.load_at_bound(worth_min);
-        let drive_on = |rollout: &mut Rollout, next: Motion, arc: Option<usize>| {
-            if rollout.load_m > arc.map_or(load_max_on_ramp_m, |i| load_max_m[i]) {
-                return false;
-            }
-            let clearance_m = self.footprint.coarse_clearance_m(self.field(), &next);
-            self.drive_on(rollout, next, fan.step_m, clearance_m, thresholds)
-        };
-        let blocked_m = self.footprint.distance_m(thresholds.near_m) - PROBE_SLACK_M;
-        let mut entries = fan.enter(*branch, self.change_per_step(fan.step_m), drive_on);
-        for (i, (arc, entry)) in fan.arcs.iter().zip(&mut entries).enumerate() {
-            let Rollout { motion, travel_m, load_m } = entry.forecast;
-            let worth_min = worth_min + self.penalty(arc);
-            let is_hopeless = || {
-                arc.probes(motion, fan.step_m)
-                    .take_while(|&(probed_m, _)| self.worth(travel_m + probed_m, load_m) <= worth_min)
-                    .any(|(_, nose)| self.field().at_nearest_node(nose) < blocked_m)
-            };
-            if entry.is_free && !is_hopeless() {
-                arc.follow(entry, fan.step_m, |rollout, next| drive_on(rollout, next, Some(i)));
-            }
+        fan.probes(second, fan.enter(second, ramp.motion))
+            .take_while(|&(probed_m, _)| self.worth(ramp.travel_m + probed_m, ramp.load_m) <= worth_min)
+            .any(|(_, nose)| self.field().at_nearest_node(nose) < blocked_m)
+    }
+
+    /// Moves a second arc to its next step, unless it has collected more than `load_max_m`: it is worth less then.
+    fn drive_on_second(&self, rollout: &mut Rollout, next: Motion, thresholds: Thresholds, load_max_m: f32) -> bool {
+        if rollout.load_m > load_max_m {
+            return false;
         }
-        entries
+        let clearance_m = self.footprint.coarse_clearance_m(self.field(), &next);
+        self.drive_on(rollout, next, self.settings.second_step_m, clearance_m, thresholds)
+    }
+
+    /// A probe that finds less than this at the nearest node finds a forecast blocked, metres.
+    fn blocked_m(&self, thresholds: Thresholds) -> f32 {
+        self.footprint.distance_m(thresholds.near_m) - PROBE_SLACK_M
     }
 
     fn field(&self) -> &DistanceField {
