@@ -6,7 +6,8 @@
 use crate::distance_field::DistanceField;
 use crate::geometry::{Pose, Vec2, edges};
 use crate::scenario::Scenario;
-use crate::vehicle::VehicleSettings;
+use crate::vectors::{FourPoints, f32x4, lowest};
+use crate::vehicle::{VehicleSettings, VehicleState};
 use parry2d::shape::Cuboid;
 use rapier2d::geometry::{ColliderBuilder, Group, InteractionGroups, InteractionTestMode};
 use rapier2d::math::Pose as Isometry;
@@ -87,9 +88,11 @@ impl CollisionWorld {
 pub struct BodyBox {
     cuboid: Cuboid,
     centre_ahead_m: f32,
-    disc_centres_m: [f32; BODY_DISCS],
+    discs_in_ego: Vec<FourPoints>,
     disc_radius_m: f32,
-    outline_in_ego: Vec<Vec2>,
+    /// From the rear axle to the farthest centre of a disc, metres.
+    disc_reach_m: f32,
+    outline_in_ego: Vec<FourPoints>,
 }
 
 impl BodyBox {
@@ -97,10 +100,11 @@ impl BodyBox {
     pub fn new(vehicle: &VehicleSettings) -> Self {
         let cuboid = Cuboid::new(Vec2::new(0.5 * vehicle.length_m, 0.5 * vehicle.width_m));
         let segment_m = vehicle.length_m / BODY_DISCS as f32;
-        let disc_centres_m = std::array::from_fn(|i| (i as f32 + 0.5) * segment_m - vehicle.rear_overhang_m);
+        let discs = (0..BODY_DISCS).map(|i| Vec2::new((i as f32 + 0.5) * segment_m - vehicle.rear_overhang_m, 0.0));
+        let discs: Vec<Vec2> = discs.collect();
         let disc_radius_m = (0.5 * segment_m).hypot(0.5 * vehicle.width_m);
         let corners = vehicle.body_in_ego();
-        let outline_in_ego = edges(&corners)
+        let outline: Vec<Vec2> = edges(&corners)
             .flat_map(|(a, b)| {
                 let pieces = ((b - a).length() / 0.2).ceil() as usize;
                 (0..pieces).map(move |i| a.lerp(b, i as f32 / pieces as f32))
@@ -109,9 +113,10 @@ impl BodyBox {
         Self {
             cuboid,
             centre_ahead_m: 0.5 * vehicle.length_m - vehicle.rear_overhang_m,
-            disc_centres_m,
+            discs_in_ego: FourPoints::all(&discs),
             disc_radius_m,
-            outline_in_ego,
+            disc_reach_m: discs.iter().map(|disc| disc.length()).fold(0.0, f32::max),
+            outline_in_ego: FourPoints::all(&outline),
         }
     }
 
@@ -127,29 +132,68 @@ impl BodyBox {
         curvature_per_m: f32,
         travel_m: f32,
     ) -> bool {
-        let coarse_steps = (travel_m / (2.0 * SWEEP_STEP_M)).ceil().max(1.0) as usize;
+        let coarse_steps = sweep_steps(travel_m) / 2;
         let pose_at = |i: usize, n: usize| pose.advanced_along_arc(curvature_per_m, travel_m * i as f32 / n as f32);
         if (0..=coarse_steps).all(|i| self.is_surely_free(distance, pose_at(i, coarse_steps))) {
             return false;
         }
-        let steps = 2 * coarse_steps;
+        let steps = sweep_steps(travel_m);
         // Farthest first: that is where a car that drives ahead meets something.
         (0..=steps).rev().any(|i| collision.body_hits(self, pose_at(i, steps), set))
     }
 
+    /// Whether [`Self::sweep_hits`] is surely false after each of the steps that a vehicle makes within `duration_s`, however
+    /// it is steered: at the poses of the sweep from here, the covering discs keep their distance by more than they can
+    /// move.
+    pub fn stays_clear(
+        &self,
+        distance: &DistanceField,
+        vehicle: &VehicleSettings,
+        state: &VehicleState,
+        travel_m: f32,
+        duration_s: f32,
+    ) -> bool {
+        let accel_mps2 = state.accel_mps2.max(vehicle.accel_max_mps2);
+        let driven_m = (state.speed_mps + accel_mps2 * duration_s) * duration_s;
+        let curvature_per_m = state.curvature_per_m(vehicle);
+        let steered_rad = state.steering_rad.abs() + vehicle.steering_rate_max_radps * duration_s;
+        let curvature_max_per_m = steered_rad.tan() / vehicle.wheelbase_m;
+        // Driving on before the sweep changes heading and position of its poses, and so does another curvature.
+        let bent_per_m = curvature_max_per_m - curvature_per_m.abs();
+        let turned_rad = curvature_max_per_m * driven_m + bent_per_m * (driven_m + travel_m);
+        let moved_m = driven_m + 0.5 * bent_per_m * travel_m * travel_m + self.disc_reach_m * turned_rad;
+        let steps = sweep_steps(travel_m);
+        (0..=steps).all(|i| {
+            let pose = state.pose.advanced_along_arc(curvature_per_m, travel_m * i as f32 / steps as f32);
+            self.is_surely_free_by(distance, pose, moved_m)
+        })
+    }
+
     /// Conservative test of a pose by covering discs on the distance raster.
     fn is_surely_free(&self, distance: &DistanceField, pose: Pose) -> bool {
-        let (origin, ahead) = (pose.position(), pose.ahead());
-        let keep_m = self.disc_radius_m + RASTER_SLACK_M;
-        self.disc_centres_m.iter().all(|&x_m| distance.at(origin + ahead * x_m) > keep_m)
+        self.is_surely_free_by(distance, pose, 0.0)
+    }
+
+    /// [`Self::is_surely_free`], also after every disc has moved by up to `margin_m`.
+    fn is_surely_free_by(&self, distance: &DistanceField, pose: Pose, margin_m: f32) -> bool {
+        let world_from_ego = pose.world_from_ego();
+        let keep_m = f32x4::splat(self.disc_radius_m + RASTER_SLACK_M + margin_m);
+        self.discs_in_ego.iter().all(|&discs| distance.at_four(world_from_ego.four_points(discs)).simd_gt(keep_m).all())
     }
 
     /// Distance from the body outline to the nearest non-drivable point, metres; negative when they overlap, capped
     /// at 3 m. Measured at outline points 0.2 m apart, hence up to 5 cm too large beside a corner.
     pub fn clearance_m(&self, distance: &DistanceField, pose: Pose) -> f32 {
         let world_from_ego = pose.world_from_ego();
-        self.outline_in_ego.iter().map(|&point| distance.at(world_from_ego.point(point))).fold(f32::INFINITY, f32::min)
+        let distances_m =
+            self.outline_in_ego.iter().map(|&points| distance.at_four(world_from_ego.four_points(points)));
+        lowest(distances_m.fold(f32x4::splat(f32::INFINITY), f32x4::fast_min))
     }
+}
+
+/// Into how many steps a sweep is divided, an even number.
+fn sweep_steps(travel_m: f32) -> usize {
+    2 * (travel_m / (2.0 * SWEEP_STEP_M)).ceil().max(1.0) as usize
 }
 
 fn isometry(pose: Pose) -> Isometry {

@@ -4,6 +4,7 @@
 //! beside straight edges, within 3 cm beside corners, and up to 5 cm too small half-way between two things.
 
 use crate::geometry::{Vec2, distance_to_segment, edges, polygon_contains};
+use crate::vectors::{FourPoints, LANES, bounded, f32x4, i32x4, whole_and_part};
 
 /// Spacing of the nodes, metres.
 pub const NODE_M: f32 = 0.1;
@@ -24,14 +25,22 @@ pub fn change_max_m(radius_m: f32) -> f32 {
     (radius_m + to_node_m).hypot(std::f32::consts::FRAC_1_SQRT_2 * NODE_M) + ROUNDING_M
 }
 
+/// Bits of a distance far outside the lot, −[`CAP_M`].
+const FAR_OUTSIDE: u32 = (-CAP_M).to_bits();
+
 /// Signed distance to the non-drivable set, metres: positive in drivable space.
 #[derive(Debug, Clone)]
 pub struct DistanceField {
     origin: Vec2,
     cols: usize,
     rows: usize,
-    values_m: Vec<f32>,
+    /// Row by row, the bits of the distance, exclusive or [`FAR_OUTSIDE`]. Far outside is 0, as memory comes from the
+    /// system: of a lot that fills little of its bounding box, most of the raster is never touched.
+    nodes: Vec<u32>,
 }
+
+/// What is read beyond the last node when four neighbours are.
+const SPARE_NODES: usize = LANES - 2;
 
 impl DistanceField {
     /// Distances inside a boundary polygon: its outside is non-drivable.
@@ -41,7 +50,8 @@ impl DistanceField {
         let origin = low - margin;
         let size = (high + margin - origin) / NODE_M;
         let (cols, rows) = (size.x.ceil() as usize + 1, size.y.ceil() as usize + 1);
-        let mut field = Self { origin, cols, rows, values_m: vec![CAP_M; cols * rows] };
+        let mut field =
+            Self { origin, cols, rows, nodes: vec![CAP_M.to_bits() ^ FAR_OUTSIDE; cols * rows + SPARE_NODES] };
         for (a, b) in edges(boundary) {
             let (low, high) = bounds(&[a, b]);
             field.lower_within(low, high, CAP_M, |point| distance_to_segment(point, a, b));
@@ -77,7 +87,7 @@ impl DistanceField {
         let (fx, fy) = ((x - col as f32).min(1.0), (y - row as f32).min(1.0));
         let base = row as usize * self.cols + col as usize;
         let [a, b] = [base, base + self.cols].map(|start| {
-            let &[left, right] = self.values_m[start..].first_chunk::<2>().expect("clamped to the raster");
+            let (left, right) = (self.node_m(start), self.node_m(start + 1));
             left + fx * (right - left)
         });
         a + fy * (b - a)
@@ -89,68 +99,44 @@ impl DistanceField {
         let node = (point - self.origin) * (1.0 / NODE_M) + Vec2::splat(0.5);
         let col = node.x.clamp(0.0, (self.cols - 1) as f32) as i32;
         let row = node.y.clamp(0.0, (self.rows - 1) as f32) as i32;
-        self.values_m[row as usize * self.cols + col as usize]
+        self.node_m(row as usize * self.cols + col as usize)
     }
 
-    /// [`Self::at`] at the points (`xs[i]`, `ys[i]`), to the bit. All but the look-ups is done for several points at once.
+    /// [`Self::at`] at four points, to the bit.
+    #[inline]
+    pub fn at_four(&self, points: FourPoints) -> f32x4 {
+        let node = self.nodes_from_world(points);
+        let (cols, into_x) = whole_and_part(bounded(node.x, count(self.cols - 2)));
+        let (rows, into_y) = whole_and_part(bounded(node.y, count(self.rows - 2)));
+        let near = self.indices(rows, cols);
+        let across = |indices: [usize; LANES]| {
+            let [left, right, ..] = f32x4::transpose(indices.map(|index| self.four_nodes_m(index)));
+            left + into_x * (right - left)
+        };
+        let (near_m, far_m) = (across(near), across(near.map(|index| index + self.cols)));
+        near_m + into_y * (far_m - near_m)
+    }
+
+    /// [`Self::at_nearest_node`] at four points; half-way between two nodes it may choose the other one.
+    #[inline]
+    pub fn at_four_nearest_nodes(&self, points: FourPoints) -> f32x4 {
+        let node = self.nodes_from_world(points) + FourPoints::splat(Vec2::splat(0.5));
+        let (cols, _) = whole_and_part(bounded(node.x, count(self.cols - 1)));
+        let (rows, _) = whole_and_part(bounded(node.y, count(self.rows - 1)));
+        f32x4::from(self.indices(rows, cols).map(|index| self.node_m(index)))
+    }
+
+    /// [`Self::at`] at the points (`xs[i]`, `ys[i]`), to the bit.
     #[inline]
     pub fn at_each<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
-        let (last_x, last_y) = (count(self.cols - 2), count(self.rows - 2));
-        let stride = self.cols as u32;
-        let (mut nodes, mut fxs, mut fys) = ([0; N], [0.0; N], [0.0; N]);
-        for i in 0..N {
-            let x = clamp_to_raster((xs[i] - self.origin.x) * (1.0 / NODE_M), last_x);
-            let y = clamp_to_raster((ys[i] - self.origin.y) * (1.0 / NODE_M), last_y);
-            let (floor_x, floor_y) = (floor(x), floor(y));
-            (fxs[i], fys[i]) = (x - floor_x, y - floor_y);
-            nodes[i] = to_index(floor_y) * stride + to_index(floor_x);
+        let mut distances_m = [0.0; N];
+        let points = xs.chunks(LANES).zip(ys.chunks(LANES));
+        for ((xs, ys), distances_m) in points.zip(distances_m.chunks_mut(LANES)) {
+            let four = |values: &[f32]| f32x4::from(std::array::from_fn(|i| values[i.min(values.len() - 1)]));
+            let of_four_m = self.at_four(FourPoints { x: four(xs), y: four(ys) }).to_array();
+            distances_m.copy_from_slice(&of_four_m[..distances_m.len()]);
         }
-        // The four nodes around each point, near and far pair; one bounds check for both.
-        let stride = stride as usize;
-        let (mut near, mut far) = ([[0.0; 2]; N], [[0.0; 2]; N]);
-        for i in 0..N {
-            let base = nodes[i] as usize;
-            let nodes_m = &self.values_m[base..base + stride + 2];
-            near[i] = [nodes_m[0], nodes_m[1]];
-            far[i] = [nodes_m[stride], nodes_m[stride + 1]];
-        }
-        std::array::from_fn(|i| {
-            let [near, far] = [near[i], far[i]].map(|[left, right]| left + fxs[i] * (right - left));
-            near + fys[i] * (far - near)
-        })
-    }
-
-    /// [`Self::at_nearest_node`] at the points (`xs[i]`, `ys[i]`); half-way between two nodes it may choose the other one.
-    /// All but the look-ups is done for several points at once.
-    #[inline]
-    pub fn at_nearest_nodes<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
-        let (last_x, last_y) = (count(self.cols - 1), count(self.rows - 1));
-        let stride = self.cols as u32;
-        let mut nodes = [0; N];
-        for i in 0..N {
-            let x = clamp_to_raster((xs[i] - self.origin.x) * (1.0 / NODE_M), last_x);
-            let y = clamp_to_raster((ys[i] - self.origin.y) * (1.0 / NODE_M), last_y);
-            nodes[i] = to_nearest_index(y) * stride + to_nearest_index(x);
-        }
-        std::array::from_fn(|i| self.values_m[nodes[i] as usize])
-    }
-
-    /// [`Self::at_nearest_nodes`] at the points `start` + (`xs[i]`, `ys[i]`): as many as there is room for in `values_m`, a
-    /// multiple of 4 up to 32.
-    // Not inlined: on its own and of unknown length, the first loop is compiled to instructions that take four points.
-    #[inline(never)]
-    pub fn at_many_nearest_nodes(&self, start: Vec2, xs: &[f32], ys: &[f32], values_m: &mut [f32]) {
-        let (last_x, last_y) = (count(self.cols - 1), count(self.rows - 1));
-        let stride = self.cols as u32;
-        let mut nodes = [0; 32];
-        for ((node, &x), &y) in nodes.iter_mut().zip(xs).zip(ys) {
-            let x = clamp_to_raster((start.x + x - self.origin.x) * (1.0 / NODE_M), last_x);
-            let y = clamp_to_raster((start.y + y - self.origin.y) * (1.0 / NODE_M), last_y);
-            *node = to_nearest_index(y) * stride + to_nearest_index(x);
-        }
-        for (four_m, nodes) in values_m.as_chunks_mut::<4>().0.iter_mut().zip(nodes.as_chunks::<4>().0) {
-            *four_m = nodes.map(|node| self.values_m[node as usize]);
-        }
+        distances_m
     }
 
     /// A lower bound of [`Self::at`] in a box of at most 0.6 m by 0.6 m, but for rounding. Minus infinity if the box is
@@ -160,36 +146,68 @@ impl DistanceField {
     /// rows and columns meet its sides.
     #[inline]
     pub fn lowest_within(&self, low: Vec2, high: Vec2) -> f32 {
-        /// Nodes along one side of the largest box.
-        const LANES: usize = 8;
-        let last = Vec2::new(count(self.cols - 2), count(self.rows - 2));
-        let node = |point: Vec2| {
-            let node = (point - self.origin) * (1.0 / NODE_M);
-            Vec2::new(clamp_to_raster(node.x, last.x), clamp_to_raster(node.y, last.y))
+        let node = self.nodes_from_world([low, high, low, high].into());
+        let (cols, into_x) = whole_and_part(bounded(node.x, count(self.cols - 2)));
+        let (rows, into_y) = whole_and_part(bounded(node.y, count(self.rows - 2)));
+        let ([first_col, last_col, ..], [first_row, last_row, ..]) = (cols.to_array(), rows.to_array());
+        let ([into_first_col, into_last_col, ..], [into_first_row, into_last_row, ..]) =
+            (into_x.to_array(), into_y.to_array());
+        let row = |row: i32| self.eight_nodes_m(row as usize * self.cols + first_col as usize);
+        let mixed = |near: [f32x4; 2], far: [f32x4; 2], share: f32| {
+            [0, 1].map(|i| near[i] + f32x4::splat(share) * (far[i] - near[i]))
         };
-        let (low, high) = (node(low), node(high));
-        let [low_cell, high_cell] = [low, high].map(|node| Vec2::new(floor(node.x), floor(node.y)));
-        let (into_low, into_high) = (low - low_cell, high - high_cell);
-        let [(first_col, first_row), (last_col, last_row)] =
-            [low_cell, high_cell].map(|cell| (to_index(cell.x) as usize, to_index(cell.y) as usize));
-        let nodes_m = |row: usize| self.values_m[row * self.cols + first_col..].first_chunk::<LANES>();
-        let around_sides = (nodes_m(first_row), nodes_m(first_row + 1), nodes_m(last_row), nodes_m(last_row + 1));
-        let (Some(below_lower), Some(above_lower), Some(below_upper), Some(above_upper)) = around_sides else {
+        let lower = |a: [f32x4; 2], b: [f32x4; 2]| [a[0].fast_min(b[0]), a[1].fast_min(b[1])];
+        let (Some(before_first), Some(after_first), Some(before_last), Some(after_last)) =
+            (row(first_row), row(first_row + 1), row(last_row), row(last_row + 1))
+        else {
             return f32::NEG_INFINITY;
         };
-        let mut lowest_m = mixed(below_lower, above_lower, into_low.y);
-        lower_each(&mut lowest_m, &mixed(below_upper, above_upper, into_high.y));
-        for row in first_row + 1..=last_row {
-            let Some(nodes_m) = nodes_m(row) else { return f32::NEG_INFINITY };
-            lower_each(&mut lowest_m, nodes_m);
+        let mut lowest_m =
+            lower(mixed(before_first, after_first, into_first_row), mixed(before_last, after_last, into_last_row));
+        for nodes_m in (first_row + 1..=last_row).map(row) {
+            let Some(nodes_m) = nodes_m else { return f32::NEG_INFINITY };
+            lowest_m = lower(lowest_m, nodes_m);
         }
         // Of these, across: the two sides and what is between them.
-        let n = last_col - first_col;
-        let Some(&[.., left_m, right_m]) = lowest_m.get(..n + 2) else { return f32::NEG_INFINITY };
-        let first_m = lowest_m[0] + into_low.x * (lowest_m[1] - lowest_m[0]);
-        let last_m = left_m + into_high.x * (right_m - left_m);
-        let sides_m = if first_m < last_m { first_m } else { last_m };
-        lowest_m[1..=n].iter().fold(sides_m, |low, &value| if value < low { value } else { low })
+        let mut columns_m = [0.0; 2 * LANES];
+        columns_m[..LANES].copy_from_slice(lowest_m[0].as_array());
+        columns_m[LANES..].copy_from_slice(lowest_m[1].as_array());
+        let between = (last_col - first_col) as usize;
+        let Some(&[.., left_m, right_m]) = columns_m.get(..between + 2) else { return f32::NEG_INFINITY };
+        let first_m = columns_m[0] + into_first_col * (columns_m[1] - columns_m[0]);
+        let last_m = left_m + into_last_col * (right_m - left_m);
+        columns_m[1..=between].iter().fold(first_m.min(last_m), |low, &value| if value < low { value } else { low })
+    }
+
+    /// Coordinates in nodes from the first one.
+    #[inline]
+    fn nodes_from_world(&self, points: FourPoints) -> FourPoints {
+        (points - FourPoints::splat(self.origin)) * f32x4::splat(1.0 / NODE_M)
+    }
+
+    #[inline]
+    fn indices(&self, rows: i32x4, cols: i32x4) -> [usize; LANES] {
+        let (rows, cols) = (rows.to_array(), cols.to_array());
+        std::array::from_fn(|i| rows[i] as u32 as usize * self.cols + cols[i] as u32 as usize)
+    }
+
+    #[inline]
+    fn node_m(&self, index: usize) -> f32 {
+        f32::from_bits(self.nodes[index] ^ FAR_OUTSIDE)
+    }
+
+    /// A node and the next three.
+    #[inline]
+    fn four_nodes_m(&self, index: usize) -> f32x4 {
+        from_stored(self.nodes[index..index + LANES].first_chunk().expect("four"))
+    }
+
+    /// A node and the next seven; `None` at the very end of the raster.
+    #[inline]
+    fn eight_nodes_m(&self, index: usize) -> Option<[f32x4; 2]> {
+        let nodes = self.nodes.get(index..index + 2 * LANES)?;
+        let (first, second) = nodes.split_at(LANES);
+        Some([first, second].map(|nodes| from_stored(nodes.first_chunk().expect("four"))))
     }
 
     /// Lower-left and upper-right corners of the raster, world metres.
@@ -206,8 +224,9 @@ impl DistanceField {
         for row in first.y as usize..row_end {
             for col in first.x as usize..col_end {
                 let point = self.origin + Vec2::new(col as f32, row as f32) * NODE_M;
-                let value = &mut self.values_m[row * self.cols + col];
-                *value = value.min(distance_m(point).max(-CAP_M));
+                let index = row * self.cols + col;
+                let value = self.node_m(index).min(distance_m(point).max(-CAP_M));
+                self.nodes[index] = value.to_bits() ^ FAR_OUTSIDE;
             }
         }
     }
@@ -231,7 +250,7 @@ impl DistanceField {
                     passed += 1;
                 }
                 if passed % 2 == 0 {
-                    self.values_m[row * self.cols + col] *= -1.0;
+                    self.nodes[row * self.cols + col] = (-self.node_m(row * self.cols + col)).to_bits() ^ FAR_OUTSIDE;
                 }
             }
         }
@@ -244,48 +263,10 @@ fn count(nodes: usize) -> f32 {
     nodes as i32 as f32
 }
 
-/// Each value moved by a share of the way to the other one.
+/// Distances of four nodes.
 #[inline]
-fn mixed<const N: usize>(values: &[f32; N], others: &[f32; N], share: f32) -> [f32; N] {
-    std::array::from_fn(|i| values[i] + share * (others[i] - values[i]))
-}
-
-/// Lowers each value to the other one.
-#[inline]
-fn lower_each<const N: usize>(values: &mut [f32; N], others: &[f32; N]) {
-    for (value, &other) in values.iter_mut().zip(others) {
-        *value = if other < *value { other } else { *value };
-    }
-}
-
-/// Bounds a coordinate to the raster, like `clamp`; what is not a number becomes 0.
-#[inline]
-pub(crate) fn clamp_to_raster(node: f32, last: f32) -> f32 {
-    let node = if node > 0.0 { node } else { 0.0 };
-    if node < last { node } else { last }
-}
-
-/// From here on, single precision holds whole numbers only.
-const WHOLE_FROM: f32 = (1 << 23) as f32;
-
-/// Largest whole number at or below a coordinate of the raster. Unlike casts and `f32::floor`, which is a library call
-/// on baseline x86-64, this compiles to instructions that take four numbers at once.
-#[inline]
-pub(crate) fn floor(node: f32) -> f32 {
-    let rounded = (node + WHOLE_FROM) - WHOLE_FROM;
-    rounded - if rounded > node { 1.0 } else { 0.0 }
-}
-
-/// A whole coordinate of the raster as an index.
-#[inline]
-pub(crate) fn to_index(whole: f32) -> u32 {
-    to_nearest_index(whole)
-}
-
-/// The index nearest to a coordinate of the raster, the even one half-way between two: adding rounds.
-#[inline]
-fn to_nearest_index(node: f32) -> u32 {
-    (node + WHOLE_FROM).to_bits() - WHOLE_FROM.to_bits()
+fn from_stored(nodes: &[u32; LANES]) -> f32x4 {
+    f32x4::from(nodes.map(|bits| f32::from_bits(bits ^ FAR_OUTSIDE)))
 }
 
 /// Smallest axis-aligned box around points.

@@ -115,6 +115,8 @@ pub struct Episode {
     /// No near-collision is counted before this physics step.
     counts_from_step: u32,
     touches: bool,
+    /// Nothing is near enough to be met in this tick.
+    is_clear: bool,
     observation: Observation,
     was_reset: bool,
     metrics: MetricsAccumulator,
@@ -145,6 +147,7 @@ impl Episode {
             advance: (0.0, 0),
             counts_from_step: 0,
             touches: false,
+            is_clear: false,
             observation: Observation::default(),
             was_reset: true,
             metrics: MetricsAccumulator::new(map.path().length_m()),
@@ -267,6 +270,14 @@ impl Episode {
             contacts: 0,
             event: Event::Drove,
         };
+        self.is_clear = self.phase == Phase::Driving
+            && self.body.stays_clear(
+                distance,
+                &settings.vehicle,
+                &seen_from,
+                settings.metrics.near_collision_m,
+                settings.control_period_s(),
+            );
         let steps_per_tick = settings.control_period_ms / settings.physics_step_ms;
         let mut steps = 0;
         while steps < steps_per_tick || self.phase == Phase::Braking {
@@ -311,15 +322,15 @@ impl Episode {
         frame.driven_m += 0.5 * (before.speed_mps + self.vehicle.speed_mps) * dt_s;
 
         let (pose, set) = (self.vehicle.pose, settings.metrics.obstacle_set);
-        let curvature = self.vehicle.curvature_per_m(&settings.vehicle);
-        let sweeps_into_something = self.body.sweep_hits(
-            self.map.distance_field(),
-            self.map.collision(),
-            set,
-            pose,
-            curvature,
-            settings.metrics.near_collision_m,
-        );
+        let sweeps_into_something = !self.is_clear
+            && self.body.sweep_hits(
+                self.map.distance_field(),
+                self.map.collision(),
+                set,
+                pose,
+                self.vehicle.curvature_per_m(&settings.vehicle),
+                settings.metrics.near_collision_m,
+            );
         let touches = sweeps_into_something && self.map.collision().body_hits(&self.body, pose, set);
         frame.contacts += u32::from(touches && !self.touches);
         self.touches = touches;

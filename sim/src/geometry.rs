@@ -7,6 +7,7 @@
 //!
 //! Transforms are named `target_from_source`, so that adjacent names match when they are chained.
 
+use crate::vectors::{FourPoints, LANES, f32x4, highest, lowest};
 pub use glam::Vec2;
 use serde::{Deserialize, Serialize};
 
@@ -73,6 +74,22 @@ impl WorldFromEgo {
         self.translation + self.rotation.rotate(in_ego)
     }
 
+    /// [`Self::point`] of four points, to the bit.
+    #[inline]
+    pub fn four_points(&self, in_ego: FourPoints) -> FourPoints {
+        let FourPoints { x: cos, y: sin } = FourPoints::splat(self.rotation);
+        let rotated = FourPoints { x: cos * in_ego.x - sin * in_ego.y, y: sin * in_ego.x + cos * in_ego.y };
+        FourPoints::splat(self.translation) + rotated
+    }
+
+    /// [`Self::inverse_point`] of four points, to the bit.
+    #[inline]
+    pub fn inverse_four_points(&self, in_world: FourPoints) -> FourPoints {
+        let FourPoints { x: cos, y: sin } = FourPoints::splat(self.rotation);
+        let FourPoints { x, y } = in_world - FourPoints::splat(self.translation);
+        FourPoints { x: cos * x + sin * y, y: cos * y - sin * x }
+    }
+
     /// Maps a world point to (ahead, left).
     #[inline]
     pub fn inverse_point(&self, in_world: Vec2) -> Vec2 {
@@ -82,25 +99,19 @@ impl WorldFromEgo {
     /// [`Self::inverse_point`] of every corner.
     #[inline]
     pub(crate) fn inverse_outline(&self, in_world: &Outline) -> Outline {
-        let (cos, sin) = (self.rotation.x, self.rotation.y);
-        let from_here = in_world.moved(-self.translation);
-        Outline {
-            xs: std::array::from_fn(|i| cos * from_here.xs[i] + sin * from_here.ys[i]),
-            ys: std::array::from_fn(|i| cos * from_here.ys[i] - sin * from_here.xs[i]),
-            ..from_here
-        }
+        let corners = in_world.corners.map(|corners| self.inverse_four_points(corners));
+        Outline { corners, ..*in_world }
     }
 }
 
 /// Corners an [`Outline`] may have.
 const CORNERS: usize = 8;
 
-/// A polygon of 1 to 8 corners, arranged so that several corners are moved at once.
+/// A polygon of 1 to 8 corners, in vectors.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Outline {
-    xs: [f32; CORNERS],
-    ys: [f32; CORNERS],
     /// Unused corners repeat the last one.
+    corners: [FourPoints; CORNERS / LANES],
     n_corners: usize,
 }
 
@@ -113,33 +124,26 @@ impl Outline {
     /// One of its corners.
     #[inline]
     pub(crate) fn corner(&self, index: usize) -> Vec2 {
-        Vec2::new(self.xs[index], self.ys[index])
+        let FourPoints { x, y } = &self.corners[index / LANES];
+        Vec2::new(x.as_array()[index % LANES], y.as_array()[index % LANES])
     }
 
     /// Each corner moved by the same vector.
     #[inline]
     #[must_use]
     pub(crate) fn moved(&self, by: Vec2) -> Self {
-        Self { xs: self.xs.map(|x| x + by.x), ys: self.ys.map(|y| y + by.y), ..*self }
+        Self { corners: self.corners.map(|corners| corners + FourPoints::splat(by)), ..*self }
     }
 
     /// Smallest axis-aligned box around it: lowest and highest coordinates.
     #[inline]
     pub(crate) fn bounds(&self) -> (Vec2, Vec2) {
-        let lower = |a: f32, b: f32| if b < a { b } else { a };
-        let higher = |a: f32, b: f32| if b > a { b } else { a };
+        let [a, b] = self.corners;
         (
-            Vec2::new(reduce(&self.xs, lower), reduce(&self.ys, lower)),
-            Vec2::new(reduce(&self.xs, higher), reduce(&self.ys, higher)),
+            Vec2::new(lowest(a.x.fast_min(b.x)), lowest(a.y.fast_min(b.y))),
+            Vec2::new(highest(a.x.fast_max(b.x)), highest(a.y.fast_max(b.y))),
         )
     }
-}
-
-/// Joins eight numbers by halves, four at once first.
-#[inline]
-fn reduce(values: &[f32; CORNERS], join: impl Fn(f32, f32) -> f32) -> f32 {
-    let [a, b, c, d] = std::array::from_fn(|i| join(values[i], values[i + CORNERS / 2]));
-    join(join(a, c), join(b, d))
 }
 
 impl FromIterator<Vec2> for Outline {
@@ -148,53 +152,52 @@ impl FromIterator<Vec2> for Outline {
     fn from_iter<T: IntoIterator<Item = Vec2>>(corners: T) -> Self {
         let corners: Vec<Vec2> = corners.into_iter().collect();
         assert!((1..=CORNERS).contains(&corners.len()), "an outline of {} corners", corners.len());
-        let corner = |i: usize| corners[i.min(corners.len() - 1)];
-        Self {
-            xs: std::array::from_fn(|i| corner(i).x),
-            ys: std::array::from_fn(|i| corner(i).y),
-            n_corners: corners.len(),
-        }
+        let four = |first: usize| FourPoints::up_to_four(&corners[first.min(corners.len() - 1)..]);
+        Self { corners: [four(0), four(LANES)], n_corners: corners.len() }
     }
 }
 
-/// Many circles, arranged so that several are tested at once. Circles that follow each other should lie near each other:
-/// blocks of them are skipped together.
+/// Many circles, tested four at a time. Circles that follow each other should lie near each other: circles around four of
+/// them are tested first.
 #[derive(Debug, Clone, Default)]
 pub struct Circles {
-    blocks: Vec<CircleBlock>,
+    circles: Vec<FourCircles>,
+    around_four: Vec<FourCircles>,
 }
 
-/// Circles per block: as many as are tested at once.
-const CIRCLES: usize = 4;
+#[derive(Debug, Clone, Copy)]
+struct FourCircles {
+    centres: FourPoints,
+    radii_m: f32x4,
+}
 
-#[derive(Debug, Clone)]
-struct CircleBlock {
-    /// A circle around them all: centre, and radius in metres.
-    around: (Vec2, f32),
-    xs: [f32; CIRCLES],
-    ys: [f32; CIRCLES],
-    radii_m: [f32; CIRCLES],
+impl FourCircles {
+    /// What fills up the last four overlaps nothing.
+    fn new(circles: &[(Vec2, f32)]) -> Self {
+        let circle = |i: usize| *circles.get(i).unwrap_or(&(Vec2::INFINITY, 0.0));
+        Self {
+            centres: std::array::from_fn(|i| circle(i).0).into(),
+            radii_m: std::array::from_fn(|i| circle(i).1).into(),
+        }
+    }
+
+    /// Those that overlap a circle, bit = lane.
+    #[inline]
+    fn overlapping(&self, centre: Vec2, radius_m: f32) -> u32 {
+        let FourPoints { x, y } = self.centres - FourPoints::splat(centre);
+        let reach_m = f32x4::splat(radius_m) + self.radii_m;
+        (x * x + y * y).simd_lt(reach_m * reach_m).to_bitmask()
+    }
 }
 
 impl Circles {
     /// Indices of the circles that overlap a circle, lowest first.
     pub fn overlapping(&self, centre: Vec2, radius_m: f32) -> impl Iterator<Item = usize> + '_ {
-        let may_overlap = move |block: &CircleBlock| {
-            let (around, around_m) = block.around;
-            around.distance_squared(centre) < (radius_m + around_m) * (radius_m + around_m)
+        let indices = move |circles: &[FourCircles], i: usize| {
+            bits(circles[i].overlapping(centre, radius_m)).map(move |lane| i * LANES + lane)
         };
-        let overlap = move |block: &CircleBlock| {
-            mask(std::array::from_fn::<_, CIRCLES, _>(|i| {
-                let (x, y) = (block.xs[i] - centre.x, block.ys[i] - centre.y);
-                let reach_m = radius_m + block.radii_m[i];
-                x * x + y * y < reach_m * reach_m
-            }))
-        };
-        self.blocks
-            .iter()
-            .enumerate()
-            .filter(move |(_, block)| may_overlap(block))
-            .flat_map(move |(i, block)| bits(overlap(block)).map(move |bit| i * CIRCLES + bit))
+        let fours = (0..self.around_four.len()).flat_map(move |i| indices(&self.around_four, i));
+        fours.flat_map(move |i| indices(&self.circles, i))
     }
 }
 
@@ -202,17 +205,9 @@ impl FromIterator<(Vec2, f32)> for Circles {
     /// Circles as (centre, radius in metres).
     fn from_iter<T: IntoIterator<Item = (Vec2, f32)>>(circles: T) -> Self {
         let circles: Vec<(Vec2, f32)> = circles.into_iter().collect();
-        // What fills up the last block overlaps nothing.
-        let block = |chunk: &[(Vec2, f32)]| {
-            let circle = |i: usize| *chunk.get(i).unwrap_or(&(Vec2::INFINITY, 0.0));
-            CircleBlock {
-                around: around(chunk),
-                xs: std::array::from_fn(|i| circle(i).0.x),
-                ys: std::array::from_fn(|i| circle(i).0.y),
-                radii_m: std::array::from_fn(|i| circle(i).1),
-            }
-        };
-        Self { blocks: circles.chunks(CIRCLES).map(block).collect() }
+        let around_four: Vec<(Vec2, f32)> = circles.chunks(LANES).map(around).collect();
+        let fours = |circles: &[(Vec2, f32)]| circles.chunks(LANES).map(FourCircles::new).collect();
+        Self { circles: fours(&circles), around_four: fours(&around_four) }
     }
 }
 
@@ -223,12 +218,6 @@ fn around(circles: &[(Vec2, f32)]) -> (Vec2, f32) {
     let middle = circles.iter().map(|&(centre, _)| centre).sum::<Vec2>() / circles.len() as f32;
     let reach_m = circles.iter().map(|&(centre, radius_m)| centre.distance(middle) + radius_m).fold(0.0, f32::max);
     (middle, reach_m + ROUNDING_M)
-}
-
-/// Conditions as bits, bit = index.
-#[inline]
-pub(crate) fn mask<const N: usize>(conditions: [bool; N]) -> u32 {
-    (0..N).fold(0, |mask, i| mask | u32::from(conditions[i]) << i)
 }
 
 /// Indices of the set bits, lowest first.
@@ -269,6 +258,31 @@ pub fn distance_to_segment(point: Vec2, a: Vec2, b: Vec2) -> f32 {
     let ab = b - a;
     let t = ((point - a).dot(ab) / ab.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
     (point - a - ab * t).length()
+}
+
+impl FourPoints {
+    /// [`distance_to_segment`] of each, to the bit, metres.
+    #[inline]
+    pub(crate) fn distance_to_segment(self, a: Vec2, b: Vec2) -> f32x4 {
+        let ab = b - a;
+        let from_a = self - Self::splat(a);
+        let along = Self::splat(ab);
+        let dot = from_a.x * along.x + from_a.y * along.y;
+        let share = (dot / f32x4::splat(ab.length_squared().max(f32::MIN_POSITIVE))).fast_max(f32x4::ZERO);
+        let apart = from_a - along * share.fast_min(f32x4::ONE);
+        (apart.x * apart.x + apart.y * apart.y).sqrt()
+    }
+
+    /// [`polygon_contains`] of each, as a mask.
+    #[inline]
+    pub(crate) fn are_inside(self, polygon: &[Vec2]) -> f32x4 {
+        edges(polygon).fold(f32x4::ZERO, |are_inside, (a, b)| {
+            let is_across = f32x4::splat(a.y).simd_gt(self.y) ^ f32x4::splat(b.y).simd_gt(self.y);
+            let crossing =
+                f32x4::splat(a.x) + (self.y - f32x4::splat(a.y)) / f32x4::splat(b.y - a.y) * f32x4::splat(b.x - a.x);
+            are_inside ^ (is_across & self.x.simd_lt(crossing))
+        })
+    }
 }
 
 /// The four corners of a rectangle, counter-clockwise from its front left corner.

@@ -22,4 +22,5 @@ pub mod scenario;
 pub mod seed;
 pub mod sensing;
 pub mod validate;
+pub mod vectors;
 pub mod vehicle;

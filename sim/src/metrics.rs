@@ -1,10 +1,11 @@
 //! What is measured on a run (docs/methods.md 8): always on the clean map.
 
 use crate::collision::ObstacleSet;
-use crate::distance_field::{DistanceField, change_max_m};
+use crate::distance_field::{DistanceField, bounds, change_max_m};
 use crate::driver::Source;
 use crate::frame::{Event, Frame};
-use crate::geometry::{Pose, Vec2, WorldFromEgo, distance_to_segment, edges, polygon_contains};
+use crate::geometry::{Pose, Vec2, WorldFromEgo, edges};
+use crate::vectors::{ALL_LANES, FourPoints, LANES, Picked, f32x4};
 use crate::vehicle::VehicleSettings;
 use serde::{Deserialize, Serialize};
 
@@ -64,121 +65,40 @@ pub enum SafeRange {
 }
 
 /// The pixels within the safe range of the body, in the ego frame: N_ran of the paper.
+///
+/// They are looked up by squares: where the centre of a square is far from any boundary, all or none of it is drivable;
+/// of others, the quarters are looked up.
 #[derive(Debug, Clone)]
 pub struct SafeRing {
-    batches: Vec<Batch>,
+    /// Four by four, blocks of 4×4 pixels.
+    blocks: Vec<FourSquares>,
+    /// Of each block, its quarters.
+    quarters: Vec<FourSquares>,
+    /// Of each quarter, its pixels.
+    pixels: Vec<FourSquares>,
     n_pixels: u32,
 }
 
-/// Blocks whose centres are looked up together.
-#[derive(Debug, Clone)]
-struct Batch {
-    centres: Points<BATCH>,
-    blocks: Vec<Block>,
+/// Four squares of pixels, of which only those in the range count.
+#[derive(Debug, Clone, Copy)]
+struct FourSquares {
+    centres: FourPoints,
+    n_pixels: f32x4,
 }
 
-/// 4×4 pixels, or as many of them as are in the range.
-#[derive(Debug, Clone)]
-struct Block {
-    n_pixels: u32,
-    /// Centres of its quarters.
-    centres: Points<4>,
-    quarters: [Quarter; 4],
-}
-
-/// 2×2 pixels, or as many of them as are in the range.
-#[derive(Debug, Clone)]
-struct Quarter {
-    n_pixels: u32,
-    /// Those in the range first.
-    pixels: Points<4>,
-}
-
-/// Blocks per batch.
-const BATCH: usize = 16;
 /// Pixels per side of a block.
-const BLOCK: i32 = 4;
+const BLOCK: u8 = 4;
 /// Pixels per side of a quarter of a block.
-const QUARTER: i32 = BLOCK / 2;
+const QUARTER: u8 = BLOCK / 2;
 
-/// Points in the ego frame, arranged so that several are transformed at once.
-#[derive(Debug, Clone)]
-struct Points<const N: usize> {
-    ahead_m: [f32; N],
-    left_m: [f32; N],
-}
-
-impl<const N: usize> Points<N> {
-    /// Up to `N` points; the last is repeated.
-    fn new(points: &[Vec2]) -> Self {
-        let point = |i: usize| points[i.min(points.len() - 1)];
-        Self { ahead_m: std::array::from_fn(|i| point(i).x), left_m: std::array::from_fn(|i| point(i).y) }
-    }
-
-    /// World coordinates x and y.
+impl FourSquares {
+    /// Number of pixels that are drivable because the centres of their squares (the nearest nodes) are farther from any
+    /// boundary than `sure_m`; and the squares of which the centre does not tell, bit = lane.
     #[inline]
-    fn in_world(&self, world_from_ego: &WorldFromEgo) -> ([f32; N], [f32; N]) {
-        let (mut xs, mut ys) = ([0.0; N], [0.0; N]);
-        for i in 0..N {
-            let point = world_from_ego.point(Vec2::new(self.ahead_m[i], self.left_m[i]));
-            (xs[i], ys[i]) = (point.x, point.y);
-        }
-        (xs, ys)
-    }
-
-    #[inline]
-    fn at_nearest_nodes(&self, distance: &DistanceField, world_from_ego: &WorldFromEgo) -> [f32; N] {
-        let (xs, ys) = self.in_world(world_from_ego);
-        distance.at_nearest_nodes(&xs, &ys)
-    }
-}
-
-impl Block {
-    /// The block with its first pixel at a corner; `None` if no pixel is in the range.
-    fn new(corner: Vec2, pixel_m: f32, is_in_range: impl Fn(Vec2) -> bool) -> Option<Self> {
-        let firsts = [(0, 0), (0, QUARTER), (QUARTER, 0), (QUARTER, QUARTER)];
-        let quarters = firsts.map(|(row, col)| {
-            let pixels: Vec<Vec2> = (0..QUARTER * QUARTER)
-                .map(|i| corner + Vec2::new((row + i / QUARTER) as f32, (col + i % QUARTER) as f32) * pixel_m)
-                .filter(|&pixel| is_in_range(pixel))
-                .collect();
-            let n_pixels = pixels.len() as u32;
-            Quarter { n_pixels, pixels: Points::new(if pixels.is_empty() { &[Vec2::ZERO] } else { &pixels }) }
-        });
-        let n_pixels = quarters.iter().map(|quarter| quarter.n_pixels).sum();
-        let to_centre = 0.5 * (QUARTER - 1) as f32;
-        let centres = firsts.map(|(row, col)| corner + (Vec2::new(row as f32, col as f32) + to_centre) * pixel_m);
-        (n_pixels > 0).then(|| Self { n_pixels, centres: Points::new(&centres), quarters })
-    }
-
-    fn centre(&self) -> Vec2 {
-        let mean = |values: &[f32; 4]| values.iter().sum::<f32>() / 4.0;
-        Vec2::new(mean(&self.centres.ahead_m), mean(&self.centres.left_m))
-    }
-
-    /// Number of its pixels that are drivable; where the centre of a quarter is farther from the boundary than `sure_m`,
-    /// all or none of it is.
-    #[inline]
-    fn count_drivable(&self, distance: &DistanceField, world_from_ego: &WorldFromEgo, sure_m: f32) -> u32 {
-        let centres_m = self.centres.at_nearest_nodes(distance, world_from_ego);
-        let counts = self.quarters.iter().zip(centres_m).map(|(quarter, centre_m)| {
-            if centre_m > sure_m {
-                quarter.n_pixels
-            } else if centre_m < -sure_m {
-                0
-            } else {
-                quarter.count_drivable(distance, world_from_ego)
-            }
-        });
-        counts.sum()
-    }
-}
-
-impl Quarter {
-    fn count_drivable(&self, distance: &DistanceField, world_from_ego: &WorldFromEgo) -> u32 {
-        let (xs, ys) = self.pixels.in_world(world_from_ego);
-        let distances_m = distance.at_each(&xs, &ys);
-        (0..).zip(distances_m).map(|(i, distance_m)| u32::from(distance_m > 0.0) & u32::from(i < self.n_pixels)).sum()
+    fn surely_drivable(&self, distance: &DistanceField, world_from_ego: &WorldFromEgo, sure_m: f32x4) -> (f32x4, u32) {
+        let centres_m = distance.at_four_nearest_nodes(world_from_ego.four_points(self.centres));
+        let is_drivable = centres_m.simd_gt(sure_m);
+        (is_drivable & self.n_pixels, !(is_drivable | centres_m.simd_lt(-sure_m)).to_bitmask() & ALL_LANES)
     }
 }
 
@@ -186,23 +106,55 @@ impl SafeRing {
     /// The ring (body ⊕ disc) minus body, at a pixel size.
     pub fn new(vehicle: &VehicleSettings, settings: &MetricsSettings, pixel_m: f32) -> Self {
         let body = vehicle.body_in_ego();
-        let is_in_range = |point: Vec2| {
-            let is_ahead = settings.safe_range == SafeRange::Full || point.x >= vehicle.front_m();
-            let near = edges(&body).any(|(a, b)| distance_to_segment(point, a, b) <= settings.safe_range_m);
-            is_ahead && near && !polygon_contains(&body, point)
+        let front_m = if settings.safe_range == SafeRange::Full { f32::NEG_INFINITY } else { vehicle.front_m() };
+        let in_range = |points: FourPoints| {
+            let is_near = |(a, b)| points.distance_to_segment(a, b).simd_le(f32x4::splat(settings.safe_range_m));
+            let is_near = edges(&body).map(is_near).fold(f32x4::ZERO, |any, near| any | near);
+            let is_ahead = points.x.simd_ge(f32x4::splat(front_m));
+            is_near & is_ahead & !points.are_inside(&body) & f32x4::ONE
         };
-        let block_m = pixel_m * BLOCK as f32;
-        let reach_m = vehicle.length_m + settings.safe_range_m;
-        let n = (reach_m / block_m).ceil() as i32;
-        // A pixel centre lies on the axle, so that neither the body's sides nor the ring's fall on centres.
-        let corners = (-n..n).flat_map(|row| (-n..n).map(move |col| Vec2::new(row as f32, col as f32) * block_m));
-        let blocks: Vec<Block> = corners.filter_map(|corner| Block::new(corner, pixel_m, is_in_range)).collect();
-        let n_pixels = blocks.iter().map(|block| block.n_pixels).sum();
-        let batches = blocks.chunks(BATCH).map(|blocks| {
-            let centres: Vec<Vec2> = blocks.iter().map(Block::centre).collect();
-            Batch { centres: Points::new(&centres), blocks: blocks.to_vec() }
-        });
-        Self { batches: batches.collect(), n_pixels }
+        let block_m = pixel_m * f32::from(BLOCK);
+        let (low, high) = bounds(&body);
+        let reach = Vec2::splat(settings.safe_range_m);
+        let first = ((low - reach) / block_m).floor().as_ivec2() - 1;
+        let last = ((high + reach) / block_m).floor().as_ivec2();
+        let mut ring = Self { blocks: Vec::new(), quarters: Vec::new(), pixels: Vec::new(), n_pixels: 0 };
+        let mut blocks = Vec::new();
+        for (row, col) in (first.x..=last.x).flat_map(|row| (first.y..=last.y).map(move |col| (row, col))) {
+            // A pixel centre lies on the axle, so that neither the body's sides nor the ring's fall on centres.
+            let corner = Vec2::new(row as f32, col as f32) * block_m;
+            let centre_of = |side: u8, row: u8, col: u8| {
+                let to_centre = 0.5 * (f32::from(side) - 1.0);
+                corner + (Vec2::new(f32::from(row), f32::from(col)) + to_centre) * pixel_m
+            };
+            let firsts = [(0, 0), (0, QUARTER), (QUARTER, 0), (QUARTER, QUARTER)];
+            let pixels = firsts.map(|(row, col)| {
+                let centres = [0, 1, 2, 3].map(|i| centre_of(1, row + i / QUARTER, col + i % QUARTER)).into();
+                FourSquares { centres, n_pixels: in_range(centres) }
+            });
+            let quarters = FourSquares {
+                centres: firsts.map(|(row, col)| centre_of(QUARTER, row, col)).into(),
+                n_pixels: pixels.map(|pixels| pixels.n_pixels.reduce_add()).into(),
+            };
+            let n_pixels = quarters.n_pixels.reduce_add();
+            if n_pixels > 0.0 {
+                blocks.push((centre_of(BLOCK, 0, 0), n_pixels));
+                ring.quarters.push(quarters);
+                ring.pixels.extend(pixels);
+                ring.n_pixels += n_pixels as u32;
+            }
+        }
+        // What fills up the last four has no pixels.
+        let no_pixels = FourSquares { centres: FourPoints::splat(Vec2::ZERO), n_pixels: f32x4::ZERO };
+        blocks.resize(blocks.len().next_multiple_of(LANES), (Vec2::ZERO, 0.0));
+        ring.quarters.resize(blocks.len(), no_pixels);
+        ring.pixels.resize(blocks.len() * LANES, no_pixels);
+        let four = |four: &[(Vec2, f32); LANES]| FourSquares {
+            centres: four.map(|(centre, _)| centre).into(),
+            n_pixels: four.map(|(_, n_pixels)| n_pixels).into(),
+        };
+        ring.blocks = blocks.as_chunks().0.iter().map(four).collect();
+        ring
     }
 
     /// Number of pixels in the range.
@@ -214,22 +166,28 @@ impl SafeRing {
     pub fn safe_ratio(&self, distance: &DistanceField, pose: Pose, pixel_m: f32) -> f32 {
         let world_from_ego = pose.world_from_ego();
         // Where the centre is farther from a boundary than the pixels are from it, one look-up decides.
-        let sure_m = |side: i32| change_max_m(std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (side - 1) as f32);
+        let sure_m =
+            |side: u8| f32x4::splat(change_max_m(std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (f32::from(side) - 1.0)));
         let (block_m, quarter_m) = (sure_m(BLOCK), sure_m(QUARTER));
-        let mut drivable = 0;
-        for batch in &self.batches {
-            let centres_m = batch.centres.at_nearest_nodes(distance, &world_from_ego);
-            for (block, centre_m) in batch.blocks.iter().zip(centres_m) {
-                drivable += if centre_m > block_m {
-                    block.n_pixels
-                } else if centre_m < -block_m {
-                    0
-                } else {
-                    block.count_drivable(distance, &world_from_ego, quarter_m)
-                };
-            }
+        let mut n_drivable = f32x4::ZERO;
+        let mut unsure_blocks = Picked::up_to(self.quarters.len());
+        for (i, blocks) in self.blocks.iter().enumerate() {
+            let (n_pixels, unsure) = blocks.surely_drivable(distance, &world_from_ego, block_m);
+            n_drivable += n_pixels;
+            unsure_blocks.pick(i * LANES, unsure);
         }
-        drivable as f32 / self.n_pixels as f32
+        let mut unsure_quarters = Picked::up_to(unsure_blocks.iter().len() * LANES);
+        for block in unsure_blocks.iter() {
+            let (n_pixels, unsure) = self.quarters[block].surely_drivable(distance, &world_from_ego, quarter_m);
+            n_drivable += n_pixels;
+            unsure_quarters.pick(block * LANES, unsure);
+        }
+        for quarter in unsure_quarters.iter() {
+            let FourSquares { centres, n_pixels } = self.pixels[quarter];
+            let distances_m = distance.at_four(world_from_ego.four_points(centres));
+            n_drivable += distances_m.simd_gt(f32x4::ZERO) & n_pixels;
+        }
+        n_drivable.reduce_add() / self.n_pixels as f32
     }
 }
 
@@ -423,10 +381,9 @@ mod tests {
         for i in 0..40 {
             let pose = Pose::new(Vec2::new(-4.0 + 0.2 * i as f32, 0.1), 0.02 * i as f32);
             let world_from_ego = pose.world_from_ego();
-            let quarters = ring.batches.iter().flat_map(|batch| &batch.blocks).flat_map(|block| &block.quarters);
-            let pixels = quarters.flat_map(|quarter| {
-                let Points { ahead_m, left_m } = &quarter.pixels;
-                (0..quarter.n_pixels as usize).map(|i| Vec2::new(ahead_m[i], left_m[i]))
+            let pixels = ring.pixels.iter().flat_map(|FourSquares { centres, n_pixels }| {
+                let (xs, ys, n_pixels) = (centres.x.to_array(), centres.y.to_array(), n_pixels.to_array());
+                (0..LANES).filter(move |&i| n_pixels[i] == 1.0).map(move |i| Vec2::new(xs[i], ys[i]))
             });
             let brute = pixels.filter(|&pixel| distance.at(world_from_ego.point(pixel)) > 0.0).count();
             assert_eq!(ring.safe_ratio(&distance, pose, 0.06), brute as f32 / ring.n_pixels() as f32);

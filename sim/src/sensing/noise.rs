@@ -6,11 +6,11 @@
 //! processes per tick we use value noise in time with the same correlation time: it needs no state, so a frame can be
 //! recomputed alone and every driver meets the same noise.
 
-use crate::distance_field::{clamp_to_raster, floor, to_index};
-use crate::geometry::{Circles, Pose, Vec2, mask};
+use crate::geometry::{Circles, Pose, Vec2};
 use crate::map::Map;
 use crate::scenario::NoiseLevel;
 use crate::seed::{Rng, RootSeed, Stream};
+use crate::vectors::{FourPoints, LANES, bounded, f32x4, whole_and_part};
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
 
@@ -252,19 +252,16 @@ impl Shadow {
         self.ranks[self.index(point)] >= threshold
     }
 
-    /// [`Self::is_misread`] at the points (`xs[i]`, `ys[i]`), bit = index. All but the look-ups is done for several points
-    /// at once.
+    /// [`Self::is_misread`] at four points, bit = index.
     #[inline]
-    pub(super) fn are_misread<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N], threshold: u8) -> u32 {
-        let (cols, last_col, last_row) = (self.cols as f32, (self.cols - 1) as f32, (self.rows - 1) as f32);
-        let mut indices = [0; N];
-        for i in 0..N {
-            let col = floor(clamp_to_raster((xs[i] - self.origin.x) * (1.0 / SHADOW_CELL_M) + 0.5, last_col));
-            let row = floor(clamp_to_raster((ys[i] - self.origin.y) * (1.0 / SHADOW_CELL_M) + 0.5, last_row));
-            // As numbers, because whole ones are not multiplied four at once.
-            indices[i] = to_index(row * cols + col);
-        }
-        mask(indices.map(|index| self.ranks[index as usize] >= threshold))
+    pub(super) fn are_misread(&self, points: FourPoints, threshold: u8) -> u32 {
+        let cell = (points - FourPoints::splat(self.origin)) * f32x4::splat(1.0 / SHADOW_CELL_M)
+            + FourPoints::splat(Vec2::splat(0.5));
+        let (cols, _) = whole_and_part(bounded(cell.x, (self.cols - 1) as f32));
+        let (rows, _) = whole_and_part(bounded(cell.y, (self.rows - 1) as f32));
+        let (cols, rows) = (cols.to_array(), rows.to_array());
+        let is_misread = |i: usize| self.ranks[rows[i] as usize * self.cols + cols[i] as usize] >= threshold;
+        (0..LANES).fold(0, |bits, i| bits | u32::from(is_misread(i)) << i)
     }
 
     /// Whether pixels of the shadow in the grid cell around a point are misread: none of them, all of them, or (`None`)
@@ -362,7 +359,7 @@ impl NoiseField {
         }
     }
 
-    /// Bound of [`BoundaryShift::at_each`], metres. `growth`: [`wobble_growth`] there.
+    /// Bound of [`BoundaryShift::at_four`], metres. `growth`: [`wobble_growth`] there.
     #[inline]
     pub(super) fn boundary_shift_max_m(&self, growth: f32) -> f32 {
         self.wobble * (WOBBLE_STATIC.0 + WOBBLE_MOVING.0) * VALUE_NOISE_MAX * growth
@@ -519,17 +516,16 @@ pub(super) struct BoundaryShift {
 }
 
 impl BoundaryShift {
-    /// Turns to a circle of the world at a tick; [`Self::at_each`] answers inside of it.
+    /// Turns to a circle of the world at a tick; [`Self::at_four`] answers inside of it.
     pub(super) fn look_at(&mut self, centre: Vec2, radius_m: f32, tick: u32) {
         self.lasting.look_at(centre, radius_m, 0.0);
         self.moving.look_at(centre, radius_m, tick as f32 / WOBBLE_TICKS);
     }
 
-    /// Shifts of the signed distance at the places (`xs[i]`, `ys[i]`), metres. `growth`: [`wobble_growth`] there.
+    /// Shifts of the signed distance at four places, metres. `growth`: [`wobble_growth`] there.
     #[inline]
-    pub(super) fn at_each<const N: usize>(&mut self, xs: &[f32; N], ys: &[f32; N], growth: &[f32; N]) -> [f32; N] {
-        let (lasting, moving) = (self.lasting.at_each(xs, ys), self.moving.at_each(xs, ys));
-        std::array::from_fn(|i| (lasting[i] + moving[i]) * growth[i])
+    pub(super) fn at_four(&self, places: FourPoints, growth: f32x4) -> f32x4 {
+        (self.lasting.at_four(places) + self.moving.at_four(places)) * growth
     }
 }
 
@@ -542,11 +538,10 @@ pub(super) fn wobble_growth(ahead_of_patch_m: f32) -> f32 {
 /// Nodes per side of a [`Lattice`]: the patch's diagonal at 1 m spacing and one more on either side.
 const LATTICE_NODES: usize = 20;
 
-/// Cells of a [`Lattice`], each between a node and the next ones to the right and above; row by row.
-const LATTICE_CELLS: usize = LATTICE_NODES * LATTICE_NODES;
+/// Nodes of a [`Lattice`], and what is read beyond the last when four neighbours are.
+const LATTICE_STORED: usize = LATTICE_NODES * LATTICE_NODES + LANES;
 
-/// Value noise around a place at one instant. Few of the hundreds of visible cells lie beside a boundary, so a cell is
-/// drawn when it is first needed.
+/// Value noise around a place at one instant.
 #[derive(Debug, Clone)]
 struct Lattice {
     seed: u64,
@@ -558,13 +553,11 @@ struct Lattice {
     origin: Vec2,
     /// Of the even and of the odd ticks of the noise, one of them the last and one the next.
     draws: [LatticeDraws; 2],
-    /// In each cell the near left node and the step to its right neighbour, then the same of the far nodes.
-    cells: Box<[[f32; 4]; LATTICE_CELLS]>,
-    /// Which of the cells are drawn for this view.
-    is_drawn: [bool; LATTICE_CELLS],
+    /// Values at the nodes, row by row.
+    nodes: Vec<f32>,
 }
 
-/// What the cells of a [`Lattice`] depend on: where it lies and when.
+/// What the nodes of a [`Lattice`] depend on: where it lies and when.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct LatticeView {
     /// Indices of the first node, whole numbers.
@@ -586,8 +579,7 @@ impl Lattice {
             // Equal to none.
             view: LatticeView { first: Vec2::NAN, tick: 0, phase: 0.0 },
             draws: std::array::from_fn(|_| LatticeDraws::new()),
-            cells: Box::new([[f32::NAN; 4]; LATTICE_CELLS]),
-            is_drawn: [false; LATTICE_CELLS],
+            nodes: vec![0.0; LATTICE_STORED],
         }
     }
 
@@ -595,63 +587,41 @@ impl Lattice {
     fn look_at(&mut self, centre: Vec2, radius_m: f32, time: f32) {
         let first = ((centre - Vec2::splat(radius_m)) / self.spacing_m).floor();
         let view = LatticeView { first, tick: time as i32, phase: fade(time.fract()) };
-        if view == self.view {
+        if view == self.view || self.amplitude == 0.0 {
             return;
         }
         (self.view, self.origin) = (view, first * self.spacing_m);
-        self.is_drawn.fill(false);
-        for tick in [view.tick, view.tick + 1] {
-            self.draws[parity(tick)].look_at(first, key(self.seed, tick));
-        }
-    }
-
-    /// Values at the places (`xs[i]`, `ys[i]`). All but the look-ups is done for several places at once.
-    #[inline]
-    fn at_each<const N: usize>(&mut self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
-        if self.amplitude == 0.0 {
-            return [0.0; N];
-        }
-        let (mut indices, mut fxs, mut fys) = ([0; N], [0.0; N], [0.0; N]);
-        for i in 0..N {
-            let (col, fx) = lattice_cell((xs[i] - self.origin.x) * self.per_m);
-            let (row, fy) = lattice_cell((ys[i] - self.origin.y) * self.per_m);
-            (fxs[i], fys[i]) = (fx, fy);
-            // As numbers, because whole ones are not multiplied four at once.
-            indices[i] = to_index(row * LATTICE_NODES as f32 + col);
-        }
-        if !indices.iter().fold(true, |are_drawn, &index| are_drawn & self.is_drawn[index as usize]) {
-            self.draw(&indices);
-        }
-        let cells = indices.map(|index| self.cells[index as usize]);
-        std::array::from_fn(|i| {
-            let [near_left, near_step, far_left, far_step] = cells[i];
-            let (near, far) = (near_left + fxs[i] * near_step, far_left + fxs[i] * far_step);
-            near + fys[i] * (far - near)
-        })
-    }
-
-    /// Draws those of some cells that are not drawn yet.
-    #[inline(never)]
-    fn draw(&mut self, indices: &[u32]) {
-        for &index in indices {
-            let index = index as usize;
-            if !self.is_drawn[index] {
-                self.cells[index] = self.cell(index);
-                self.is_drawn[index] = true;
-            }
-        }
-    }
-
-    fn cell(&mut self, index: usize) -> [f32; 4] {
-        let LatticeView { tick, phase, .. } = self.view;
-        let mut nodes = self.draws[parity(tick)].around(index);
+        let LatticeView { tick, phase, .. } = view;
+        self.draws[parity(tick)].look_at(first, key(self.seed, tick));
         if phase != 0.0 {
-            let next = self.draws[parity(tick + 1)].around(index);
-            nodes = std::array::from_fn(|i| nodes[i] * (1.0 - phase) + next[i] * phase);
+            self.draws[parity(tick + 1)].look_at(first, key(self.seed, tick + 1));
         }
-        let [near_left, near_right, far_left, far_right] =
-            nodes.map(|node| self.amplitude * (2.0 * node - 1.0) * VALUE_NOISE_MAX);
-        [near_left, near_right - near_left, far_left, far_right - far_left]
+        let [last, next] = [tick, tick + 1].map(|tick| self.draws[parity(tick)].nodes.as_chunks::<LANES>().0);
+        for ((nodes, &last), &next) in self.nodes.as_chunks_mut::<LANES>().0.iter_mut().zip(last).zip(next) {
+            let (last, next) = (f32x4::from(last), f32x4::from(next));
+            let mixed = last * f32x4::splat(1.0 - phase) + next * f32x4::splat(phase);
+            let drawn = if phase == 0.0 { last } else { mixed };
+            let centred = f32x4::splat(2.0) * drawn - f32x4::ONE;
+            *nodes = (f32x4::splat(self.amplitude) * centred * f32x4::splat(VALUE_NOISE_MAX)).to_array();
+        }
+    }
+
+    /// Values at four places.
+    #[inline]
+    fn at_four(&self, places: FourPoints) -> f32x4 {
+        if self.amplitude == 0.0 {
+            return f32x4::ZERO;
+        }
+        let nodes = (places - FourPoints::splat(self.origin)) * f32x4::splat(self.per_m);
+        let ((cols, into_x), (rows, into_y)) = (lattice_cells(nodes.x), lattice_cells(nodes.y));
+        let firsts = (rows * f32x4::splat(LATTICE_NODES as f32) + cols).fast_trunc_int().to_array();
+        let across = |firsts: [i32; LANES]| {
+            let four = |first: i32| f32x4::from(*self.nodes[first as usize..].first_chunk().expect("some to spare"));
+            let [left, right, ..] = f32x4::transpose(firsts.map(four));
+            left + into_x * (right - left)
+        };
+        let (near, far) = (across(firsts), across(firsts.map(|first| first + LATTICE_NODES as i32)));
+        near + into_y * (far - near)
     }
 }
 
@@ -660,61 +630,44 @@ fn parity(tick: i32) -> usize {
     (tick & 1) as usize
 }
 
-/// What the cells of a [`Lattice`] draw at one tick of the noise. Several ticks of the simulation make one of the noise.
+/// What the nodes of a [`Lattice`] draw at one tick of the noise. Several ticks of the simulation make one of the noise.
 #[derive(Debug, Clone)]
 struct LatticeDraws {
     /// Indices of the first node, whole numbers.
     first: Vec2,
     /// Of the seed and the tick.
     key: u64,
-    /// Uniform numbers in [0, 1) at the four nodes around each cell: near left, near right, far left, far right.
-    nodes: Box<[[f32; 4]; LATTICE_CELLS]>,
-    is_drawn: [bool; LATTICE_CELLS],
+    /// Uniform numbers in [0, 1) at the nodes, row by row.
+    nodes: Vec<f32>,
 }
 
 impl LatticeDraws {
     fn new() -> Self {
-        Self {
-            first: Vec2::NAN,
-            key: 0,
-            nodes: Box::new([[f32::NAN; 4]; LATTICE_CELLS]),
-            is_drawn: [false; LATTICE_CELLS],
-        }
+        Self { first: Vec2::NAN, key: 0, nodes: vec![0.0; LATTICE_STORED] }
     }
 
     /// Turns to a place and a tick; what is drawn stays if they are the same as before.
     fn look_at(&mut self, first: Vec2, key: u64) {
-        if (first, key) != (self.first, self.key) {
-            (self.first, self.key) = (first, key);
-            self.is_drawn.fill(false);
+        if (first, key) == (self.first, self.key) {
+            return;
         }
-    }
-
-    #[inline]
-    fn around(&mut self, cell: usize) -> [f32; 4] {
-        if !self.is_drawn[cell] {
-            self.draw(cell);
+        (self.first, self.key) = (first, key);
+        for (y, row) in (first.y as i32..).zip(self.nodes[..LATTICE_NODES * LATTICE_NODES].chunks_mut(LATTICE_NODES)) {
+            for (x, node) in (first.x as i32..).zip(row) {
+                *node = unit(mix(key, x, y));
+            }
         }
-        self.nodes[cell]
-    }
-
-    #[inline(never)]
-    fn draw(&mut self, cell: usize) {
-        let x = self.first.x as i32 + (cell % LATTICE_NODES) as i32;
-        let y = self.first.y as i32 + (cell / LATTICE_NODES) as i32;
-        self.nodes[cell] = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].map(|(x, y)| unit(mix(self.key, x, y)));
-        self.is_drawn[cell] = true;
     }
 }
 
-/// The cell of a [`Lattice`] that holds a coordinate, a whole number, and the faded progress through it, 0…1.
+/// The cells of a [`Lattice`] that hold coordinates, whole numbers, and the faded progress through them, 0…1.
 #[inline]
-fn lattice_cell(node: f32) -> (f32, f32) {
+fn lattice_cells(nodes: f32x4) -> (f32x4, f32x4) {
     const LAST: f32 = (LATTICE_NODES - 2) as f32;
-    let node = if node > 0.0 { node } else { 0.0 };
-    let whole = floor(node);
-    let cell = if whole < LAST { whole } else { LAST };
-    (cell, fade(node - cell))
+    let nodes = nodes.fast_max(f32x4::ZERO);
+    let cells = f32x4::from_i32x4(nodes.fast_trunc_int()).fast_min(f32x4::splat(LAST));
+    let progress = nodes - cells;
+    (cells, progress * progress * (f32x4::splat(3.0) - f32x4::splat(2.0) * progress))
 }
 
 /// Lowest and highest value within `reach` cells along both axes of every cell of a raster.
@@ -825,8 +778,8 @@ mod tests {
             let time = (view / 2) as f32 / 3.0;
             lattice.look_at(centre, radius_m, time);
             let place = |i: usize| centre + 0.25 * i as f32 * Vec2::from_angle(2.4 * i as f32);
-            let [xs, ys] = [std::array::from_fn(|i| place(i).x), std::array::from_fn(|i| place(i).y)];
-            for (i, value) in lattice.at_each::<32>(&xs, &ys).into_iter().enumerate() {
+            for i in 0..32 {
+                let value = lattice.at_four(FourPoints::splat(place(i))).to_array()[i % 4];
                 let expected = amplitude * value_noise(5, place(i) / spacing_m, time);
                 assert!((value - expected).abs() < 1e-4, "view {view}, {}: {value}, not {expected}", place(i));
             }

@@ -3,10 +3,10 @@
 //! The label image was warped by a ground homography (paper), so an object of height h at ground range r covers
 //! the ground behind it up to range r·H/(H − h), and to infinity for h ≥ H (docs/methods.md 1.7).
 
-use super::quadtree::pixels_of;
+use super::quadtree::{counted_from, pixels_of};
 use super::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid};
-use crate::distance_field::{floor, to_index};
 use crate::geometry::{Outline, Vec2};
+use crate::vectors::{LANES, bounded, f32x4};
 use std::ops::Range;
 
 /// Longest occlusion, as a multiple of the range: from 2 m on it leaves the patch.
@@ -73,50 +73,46 @@ impl ConvexInEgo {
     }
 
     /// The pixels whose centres lie inside the polygon, in some of the rows; `None` if it is out of view.
-    #[expect(clippy::needless_bitwise_bool, reason = "values instead of branches are computed for four rows at once")]
     fn spans(&self, geometry: &GridGeometry, rows: &Range<usize>) -> Option<Spans> {
         let (low, high) = self.bounds();
         let half_m = 0.5 * geometry.side_m;
-        let rows = whole_fours(&common(&rows_between(geometry, low.x, high.x), rows));
-        if rows.is_empty() || low.y > half_m || high.y < -half_m {
+        let fours = fours(&common(&rows_between(geometry, low.x, high.x), rows));
+        if fours.is_empty() || low.y > half_m || high.y < -half_m {
             return None;
         }
-        let (pixel_m, pixels_per_m) = (geometry.pixel_m(), 1.0 / geometry.pixel_m());
-        let far_m = geometry.far_edge_ahead_m();
-        // Walk the edges: each lends its crossing to the rows between its ends. Conditions are values here, not branches,
-        // so that four rows are done at once.
-        let mut right_m = [f32::INFINITY; BEV_PIXELS];
-        let mut left_m = [f32::NEG_INFINITY; BEV_PIXELS];
+        let (pixel_m, pixels_per_m) = (f32x4::splat(geometry.pixel_m()), f32x4::splat(1.0 / geometry.pixel_m()));
+        let far_m = f32x4::splat(geometry.far_edge_ahead_m());
+        // Walk the edges: each lends its crossing to the rows between its ends.
+        let mut right_m = [f32x4::splat(f32::INFINITY); BEV_PIXELS / LANES];
+        let mut left_m = [f32x4::splat(f32::NEG_INFINITY); BEV_PIXELS / LANES];
         let corners = &self.corners[..self.n_corners];
         let mut a = corners[corners.len() - 1];
         for &b in corners {
             let (low, high) = if a.x <= b.x { (a, b) } else { (b, a) };
+            let slope = f32x4::splat((high.y - low.y) / (high.x - low.x));
             // Rows with low.x <= ahead < high.x; one more on either side, then tested exactly.
-            let rows = whole_fours(&common(&rows_between(geometry, low.x, high.x), &rows));
-            let slope = (high.y - low.y) / (high.x - low.x);
-            let first = rows.start as i32;
-            let crossings = right_m[rows.clone()].iter_mut().zip(&mut left_m[rows]);
-            for (row, (right_m, left_m)) in (first..).zip(crossings) {
-                let ahead_m = far_m - (row as f32 + 0.5) * pixel_m;
-                let is_crossed = (low.x <= ahead_m) & (ahead_m < high.x);
-                let y = low.y + (ahead_m - low.x) * slope;
-                *right_m = if is_crossed & (y < *right_m) { y } else { *right_m };
-                *left_m = if is_crossed & (y > *left_m) { y } else { *left_m };
+            for four in common(&self::fours(&rows_between(geometry, low.x, high.x)), &fours) {
+                let ahead_m = far_m - (counted_from(four * LANES) + f32x4::HALF) * pixel_m;
+                let is_crossed = f32x4::splat(low.x).simd_le(ahead_m) & ahead_m.simd_lt(f32x4::splat(high.x));
+                let y = f32x4::splat(low.y) + (ahead_m - f32x4::splat(low.x)) * slope;
+                right_m[four] = is_crossed.select(y.fast_min(right_m[four]), right_m[four]);
+                left_m[four] = is_crossed.select(y.fast_max(left_m[four]), left_m[four]);
             }
             a = b;
         }
         // Pixel centres: left = half − (col + ½)·pixel.
-        let col_of = |y: f32| (half_m - y) * pixels_per_m - 0.5;
-        let mut spans = Spans { first: [0; BEV_PIXELS], end: [0; BEV_PIXELS], rows: rows.clone() };
-        let crossings = right_m[rows.clone()].iter().zip(&left_m[rows.clone()]);
-        let columns = spans.first[rows.clone()].iter_mut().zip(&mut spans.end[rows]);
-        for ((&right_m, &left_m), (first, end)) in crossings.zip(columns) {
-            let from = ceil(between(col_of(left_m), 0.0, BEV_PIXELS as f32));
-            let last = col_of(right_m);
-            let last = if last < (BEV_PIXELS - 1) as f32 { last } else { (BEV_PIXELS - 1) as f32 };
-            let is_empty = (left_m < right_m) | (last < from);
-            *first = if is_empty { 0 } else { to_index(from) as u8 };
-            *end = if is_empty { 0 } else { to_index(floor(last)) as u8 + 1 };
+        let col_of = |y: f32x4| (f32x4::splat(half_m) - y) * pixels_per_m - f32x4::HALF;
+        let rows = fours.start * LANES..fours.end * LANES;
+        let mut spans = Spans { first: [0; BEV_PIXELS], end: [0; BEV_PIXELS], rows };
+        for four in fours {
+            let first = ceil(bounded(col_of(left_m[four]), BEV_PIXELS as f32));
+            let last = col_of(right_m[four]).fast_min(f32x4::splat((BEV_PIXELS - 1) as f32));
+            let is_empty = left_m[four].simd_lt(right_m[four]) | last.simd_lt(first);
+            let end = (last + f32x4::ONE).fast_trunc_int();
+            let columns = |of: f32x4| (!is_empty & of).fast_trunc_int().to_array().map(|col| col as u8);
+            let rows = four * LANES..(four + 1) * LANES;
+            spans.first[rows.clone()].copy_from_slice(&columns(first));
+            spans.end[rows].copy_from_slice(&columns(f32x4::from_i32x4(end)));
         }
         Some(spans)
     }
@@ -139,7 +135,6 @@ impl Spans {
     }
 
     /// The cells of a row of cells that hold pixels, bit = column.
-    #[expect(clippy::manual_div_ceil, reason = "`div_ceil` is not done for four rows at once")]
     #[inline]
     pub(super) fn touched_cells(&self, cell_row: usize) -> u32 {
         const PIXELS: u32 = CELL_PIXELS as u32;
@@ -206,11 +201,11 @@ impl CellBox {
     }
 }
 
-/// Smallest whole number at or above a non-negative value. `f32::ceil` is a library call on baseline x86-64.
+/// Smallest whole numbers at or above values that are not negative.
 #[inline]
-fn ceil(value: f32) -> f32 {
-    let whole = floor(value);
-    whole + if value > whole { 1.0 } else { 0.0 }
+fn ceil(values: f32x4) -> f32x4 {
+    let whole = f32x4::from_i32x4(values.fast_trunc_int());
+    whole + (whole.simd_lt(values) & f32x4::ONE)
 }
 
 /// Bounds a value, like `clamp`, by values instead of branches.
@@ -227,10 +222,10 @@ fn common(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     start..a.end.min(b.end).max(start)
 }
 
-/// A range of pixel rows, extended to what is done for four rows at once.
+/// The fours that hold a range of rows.
 #[inline]
-fn whole_fours(rows: &Range<usize>) -> Range<usize> {
-    rows.start & !3..rows.end.next_multiple_of(4)
+fn fours(rows: &Range<usize>) -> Range<usize> {
+    rows.start / LANES..rows.end.div_ceil(LANES)
 }
 
 /// Pixel rows whose centres may lie between two distances ahead; up to one row too many at either end.

@@ -2,7 +2,8 @@
 
 use super::{CELL_PIXELS, GRID_CELLS, GridGeometry};
 use crate::distance_field::{DistanceField, change_max_m};
-use crate::geometry::{Pose, Vec2, mask};
+use crate::geometry::{Pose, Vec2};
+use crate::vectors::{FourPoints, LANES, f32x4, lowest};
 use std::ops::Range;
 
 /// World positions of the pixel centres of one view. The only place where pixels are turned into world points, so
@@ -13,10 +14,8 @@ pub(super) struct PixelLattice {
     origin: Vec2,
     per_row: Vec2,
     per_col: Vec2,
-    /// From there to the centres of the columns of cells, x and y.
-    to_cols: ([f32; ROW_LANES], [f32; ROW_LANES]),
-    /// From the centre of a cell to its farthest pixel, metres.
-    cell_corner_m: f32,
+    /// From there to the centres of the columns of cells, by columns of blocks.
+    to_cols: [FourPoints; BLOCKS],
     /// How much the field may change from the centre of a cell to any of its pixels, metres.
     cell_within_m: f32,
     /// The same for a quarter of a cell.
@@ -28,17 +27,12 @@ pub(super) struct PixelLattice {
 /// Pixels per side of a quarter of a cell.
 const QUARTER_PIXELS: usize = CELL_PIXELS / 2;
 
-/// Cells per side of a block of cells. Blocks are looked up first: most are on one side of every boundary.
-pub(super) const BLOCK_CELLS: usize = 4;
+/// Cells per side of a block of cells. Blocks are looked up first: most are on one side of every boundary. The cells of
+/// one row of a block are looked up together.
+pub(super) const BLOCK_CELLS: usize = LANES;
 
 /// Blocks per side of the view; the last ones reach beyond it.
 pub(super) const BLOCKS: usize = GRID_CELLS.div_ceil(BLOCK_CELLS);
-
-/// Blocks of a row, rounded up to what four at a time come to.
-const BLOCK_LANES: usize = BLOCKS.next_multiple_of(4);
-
-/// Cells of a row of blocks.
-pub(super) const ROW_LANES: usize = BLOCKS * BLOCK_CELLS;
 
 /// Distance from the centre of a block of `side` × `side` pixels to the farthest pixel centre.
 pub(super) fn to_corner_m(pixel_m: f32, side: usize) -> f32 {
@@ -51,16 +45,28 @@ pub(super) fn pixels_of(cell: usize) -> Range<usize> {
     cell * CELL_PIXELS..(cell + 1) * CELL_PIXELS
 }
 
-/// Pixel index of the centre of a cell, along one axis.
+/// Index of the first pixel of a cell, along one axis.
 #[inline]
-fn centre_of_cell(index: f32) -> f32 {
-    centre_of::<CELL_PIXELS>(index)
+fn first_pixel(cell: usize) -> f32 {
+    (cell * CELL_PIXELS) as i32 as f32
 }
 
-/// Pixel index of the centre of a block of `SIDE` × `SIDE` pixels, along one axis.
+/// Pixel indices of the centres of cells, along one axis.
 #[inline]
-fn centre_of<const SIDE: usize>(index: f32) -> f32 {
-    index * SIDE as f32 + 0.5 * (SIDE - 1) as f32
+fn centres_of_cells(indices: f32x4) -> f32x4 {
+    centres_of::<CELL_PIXELS>(indices)
+}
+
+/// Pixel indices of the centres of blocks of `SIDE` × `SIDE` pixels, along one axis.
+#[inline]
+fn centres_of<const SIDE: usize>(indices: f32x4) -> f32x4 {
+    indices * f32x4::splat(SIDE as f32) + f32x4::splat(0.5 * (SIDE - 1) as f32)
+}
+
+/// A number and the next three.
+#[inline]
+pub(super) fn counted_from(first: usize) -> f32x4 {
+    f32x4::splat(first as f32) + f32x4::from([0.0, 1.0, 2.0, 3.0])
 }
 
 impl PixelLattice {
@@ -73,11 +79,9 @@ impl PixelLattice {
             origin: world_from_ego.point(geometry.pixel_in_ego(0, 0)),
             per_row,
             per_col,
-            to_cols: (
-                std::array::from_fn(|col| per_col.x * centre_of_cell(col as f32)),
-                std::array::from_fn(|col| per_col.y * centre_of_cell(col as f32)),
-            ),
-            cell_corner_m: to_corner_m(pixel_m, CELL_PIXELS),
+            to_cols: std::array::from_fn(|block| {
+                FourPoints::splat(per_col) * centres_of_cells(counted_from(block * BLOCK_CELLS))
+            }),
             cell_within_m: change_max_m(to_corner_m(pixel_m, CELL_PIXELS)),
             quarter_within_m: change_max_m(to_corner_m(pixel_m, QUARTER_PIXELS)),
             four_within_m: change_max_m(to_corner_m(pixel_m, 2)),
@@ -90,47 +94,45 @@ impl PixelLattice {
         self.origin + self.per_row * row + self.per_col * col
     }
 
+    /// World positions at pixel indices.
+    #[inline]
+    fn points(&self, rows: f32x4, cols: f32x4) -> FourPoints {
+        FourPoints::splat(self.origin) + FourPoints::splat(self.per_row) * rows + FourPoints::splat(self.per_col) * cols
+    }
+
     /// World position of the centre of a cell.
     #[inline]
     pub(super) fn cell_centre(&self, row: usize, col: usize) -> Vec2 {
-        self.point(centre_of_cell(row as f32), centre_of_cell(col as f32))
+        let centre = |index: usize| (index * CELL_PIXELS) as f32 + 0.5 * (CELL_PIXELS - 1) as f32;
+        self.point(centre(row), centre(col))
     }
 
-    /// World positions of the centres of cells, given as rows and columns, x and y.
+    /// World positions of the centres of cells.
     #[inline]
-    pub(super) fn cell_centres<const N: usize>(&self, rows: &[u32; N], cols: &[u32; N]) -> ([f32; N], [f32; N]) {
-        self.points(rows.map(|row| centre_of_cell(row as f32)), cols.map(|col| centre_of_cell(col as f32)))
+    pub(super) fn cell_centres(&self, rows: f32x4, cols: f32x4) -> FourPoints {
+        self.points(centres_of_cells(rows), centres_of_cells(cols))
     }
 
-    /// World positions of the pixels of a row of pixels in a column of cells, x and y.
+    /// World positions of the pixels of a row of pixels in a column of cells.
     #[inline]
-    pub(super) fn pixels_of_cell(&self, row: usize, cell_col: usize) -> ([f32; CELL_PIXELS], [f32; CELL_PIXELS]) {
-        let first_col = cell_col * CELL_PIXELS;
-        self.points([row as f32; CELL_PIXELS], std::array::from_fn(|i| (first_col + i) as f32))
+    pub(super) fn pixels_of_cell(&self, row: usize, cell_col: usize) -> [FourPoints; CELL_PIXELS / LANES] {
+        let row = f32x4::splat(row as f32);
+        std::array::from_fn(|i| self.points(row, counted_from(cell_col * CELL_PIXELS + i * LANES)))
     }
 
-    /// Signed distances at the nodes nearest to the centres of some cells of a row: of columns that are a multiple of 4 in
-    /// number, into their places in `nodes_m`.
+    /// Signed distances at the nodes nearest to the centres of the cells of a row in a column of blocks.
     #[inline]
-    pub(super) fn nearest_nodes_of_cells(
-        &self,
-        field: &DistanceField,
-        row: usize,
-        cols: Range<usize>,
-        nodes_m: &mut [f32; ROW_LANES],
-    ) {
-        let start = self.origin + self.per_row * centre_of_cell(row as f32);
-        let (xs, ys) = (&self.to_cols.0[cols.clone()], &self.to_cols.1[cols.clone()]);
-        field.at_many_nearest_nodes(start, xs, ys, &mut nodes_m[cols]);
+    pub(super) fn nearest_nodes_of_cells(&self, field: &DistanceField, row: usize, block_col: usize) -> f32x4 {
+        let start = self.origin + self.per_row * (row as f32 * CELL_PIXELS as f32 + 0.5 * (CELL_PIXELS - 1) as f32);
+        field.at_four_nearest_nodes(FourPoints::splat(start) + self.to_cols[block_col])
     }
 
-    /// Signed distances at the nodes nearest to the centres of a row of blocks.
+    /// Signed distances at the nodes nearest to the centres of four blocks in a row of blocks.
     #[inline]
-    pub(super) fn nearest_nodes_of_blocks(&self, field: &DistanceField, row: usize) -> [f32; BLOCK_LANES] {
+    pub(super) fn nearest_nodes_of_blocks(&self, field: &DistanceField, row: usize, first_col: usize) -> f32x4 {
         const SIDE: usize = BLOCK_CELLS * CELL_PIXELS;
-        let cols = std::array::from_fn(|col| centre_of::<SIDE>(col as f32));
-        let (xs, ys) = self.points([centre_of::<SIDE>(row as f32); BLOCK_LANES], cols);
-        field.at_nearest_nodes(&xs, &ys)
+        let (rows, cols) = (centres_of::<SIDE>(f32x4::splat(row as f32)), centres_of::<SIDE>(counted_from(first_col)));
+        field.at_four_nearest_nodes(self.points(rows, cols))
     }
 
     /// Two distances, metres: a cell has no pixel of at most a threshold if its centre (the nearest node) is more than the
@@ -140,59 +142,43 @@ impl PixelLattice {
         (self.cell_within_m, self.four_within_m)
     }
 
-    /// How many of the cells with these distances at the centre (at the nearest node) have no pixel of at most
+    /// Which of the cells with these distances at the centre (at the nearest node) have no pixel of at most
     /// `thresholds_m`, and which have one, as far as the centre tells; bit = index.
     #[inline]
-    pub(super) fn are_decided<const N: usize>(&self, centres_m: &[f32; N], thresholds_m: &[f32; N]) -> (u32, u32) {
+    pub(super) fn are_decided(&self, centres_m: f32x4, thresholds_m: f32x4) -> (u32, u32) {
         let (above_m, below_m) = self.decided_m();
-        (
-            mask(std::array::from_fn::<_, N, _>(|i| centres_m[i] > thresholds_m[i] + above_m)),
-            mask(std::array::from_fn::<_, N, _>(|i| centres_m[i] < thresholds_m[i] - below_m)),
-        )
+        let are_above = centres_m.simd_gt(thresholds_m + f32x4::splat(above_m));
+        let are_below = centres_m.simd_lt(thresholds_m - f32x4::splat(below_m));
+        (are_above.to_bitmask(), are_below.to_bitmask())
     }
 
-    /// Whether any pixel of a cell has a signed distance of at most `threshold_m`. `centre_m`: the one at the node nearest to
-    /// its centre.
-    ///
-    /// Most cells of which the centre does not tell ([`Self::are_decided`]) have such a pixel in a corner, or the field
-    /// around them is nowhere as low; what remains is quartered.
+    /// Whether a pixel in a corner of a cell has a signed distance of at most `threshold_m`.
     #[inline]
-    pub(super) fn any_below(&self, field: &DistanceField, row: u32, col: u32, centre_m: f32, threshold_m: f32) -> bool {
+    pub(super) fn any_corner_below(&self, field: &DistanceField, row: usize, col: usize, threshold_m: f32) -> bool {
         const LAST: f32 = (CELL_PIXELS - 1) as f32;
-        let [first_row, first_col] = [row, col].map(|index| (index * CELL_PIXELS as u32) as f32);
-        let (last_row, last_col) = (first_row + LAST, first_col + LAST);
-        let (rows, cols) = ([first_row, first_row, last_row, last_row], [first_col, last_col, first_col, last_col]);
-        let any_corner = || self.any_of_these_below(field, rows, cols, threshold_m);
-        let may_be = || self.may_be_below::<CELL_PIXELS>(field, first_row, first_col, threshold_m);
-        let any_quarter = || self.any_quarter_below(field, first_row, first_col, threshold_m);
-        // First the question that is likely to settle it.
-        if centre_m > threshold_m + self.cell_corner_m {
-            may_be() && (any_corner() || any_quarter())
-        } else {
-            any_corner() || may_be() && any_quarter()
-        }
+        let [row, col] = [row, col].map(first_pixel);
+        let rows = f32x4::splat(row) + f32x4::from([0.0, 0.0, LAST, LAST]);
+        let cols = f32x4::splat(col) + f32x4::from([0.0, LAST, 0.0, LAST]);
+        self.any_of_these_below(field, rows, cols, threshold_m)
+    }
+
+    /// Whether any pixel of a cell has a signed distance of at most `threshold_m`: by a bound for all of them, then by
+    /// quarters of the cell.
+    #[inline]
+    pub(super) fn any_below(&self, field: &DistanceField, row: usize, col: usize, threshold_m: f32) -> bool {
+        let [row, col] = [row, col].map(first_pixel);
+        self.may_be_below::<CELL_PIXELS>(field, row, col, threshold_m)
+            && self.any_quarter_below(field, row, col, threshold_m)
     }
 
     /// Whether one of four pixels has a signed distance of at most `threshold_m`.
     #[inline]
-    fn any_of_these_below(&self, field: &DistanceField, rows: [f32; 4], cols: [f32; 4], threshold_m: f32) -> bool {
-        let (xs, ys) = self.points(rows, cols);
-        field.at_each(&xs, &ys).into_iter().fold(f32::INFINITY, f32::min) <= threshold_m
-    }
-
-    /// World positions at pixel indices, x and y.
-    #[inline]
-    fn points<const N: usize>(&self, rows: [f32; N], cols: [f32; N]) -> ([f32; N], [f32; N]) {
-        let (mut xs, mut ys) = ([0.0; N], [0.0; N]);
-        for i in 0..N {
-            let point = self.point(rows[i], cols[i]);
-            (xs[i], ys[i]) = (point.x, point.y);
-        }
-        (xs, ys)
+    fn any_of_these_below(&self, field: &DistanceField, rows: f32x4, cols: f32x4, threshold_m: f32) -> bool {
+        lowest(field.at_four(self.points(rows, cols))) <= threshold_m
     }
 
     /// False only if no pixel of a block of `SIDE` × `SIDE` pixels can have a signed distance of at most `threshold_m`.
-    #[inline(never)]
+    #[inline]
     fn may_be_below<const SIDE: usize>(&self, field: &DistanceField, row: f32, col: f32, threshold_m: f32) -> bool {
         /// A generous bound of rounding in single precision, metres.
         const ROUNDING_M: f32 = 1e-4;
@@ -217,14 +203,16 @@ impl PixelLattice {
         (centre - half, centre + half)
     }
 
-    /// [`Self::any_below`] by quarters of the cell. `row`, `col`: its first pixel.
+    /// Whether any pixel of a quarter of a cell has a signed distance of at most `threshold_m`. `row`, `col`: the first
+    /// pixel of the cell.
     fn any_quarter_below(&self, field: &DistanceField, row: f32, col: f32, threshold_m: f32) -> bool {
         const SIDE: f32 = QUARTER_PIXELS as f32;
-        const TO_CENTRE: f32 = 0.5 * (SIDE - 1.0);
-        let (rows, cols) = ([row, row, row + SIDE, row + SIDE], [col, col + SIDE, col, col + SIDE]);
-        let (xs, ys) = self.points(rows.map(|row| row + TO_CENTRE), cols.map(|col| col + TO_CENTRE));
-        let centres_m = field.at_nearest_nodes(&xs, &ys);
-        (0..4).any(|i| {
+        let to_centre = f32x4::splat(0.5 * (SIDE - 1.0));
+        let rows = f32x4::splat(row) + f32x4::from([0.0, 0.0, SIDE, SIDE]);
+        let cols = f32x4::splat(col) + f32x4::from([0.0, SIDE, 0.0, SIDE]);
+        let centres_m = field.at_four_nearest_nodes(self.points(rows + to_centre, cols + to_centre)).to_array();
+        let (rows, cols) = (rows.to_array(), cols.to_array());
+        (0..LANES).any(|i| {
             if centres_m[i] > threshold_m + self.quarter_within_m {
                 false
             } else if centres_m[i] < threshold_m - self.four_within_m {
@@ -237,7 +225,7 @@ impl PixelLattice {
     }
 
     fn any_pixel_of_quarter_below(&self, field: &DistanceField, row: f32, col: f32, threshold_m: f32) -> bool {
-        let cols = [col, col + 1.0, col + 2.0, col + 3.0];
-        (0..QUARTER_PIXELS).any(|i| self.any_of_these_below(field, [row + i as f32; 4], cols, threshold_m))
+        let cols = f32x4::splat(col) + counted_from(0);
+        (0..QUARTER_PIXELS).any(|i| self.any_of_these_below(field, f32x4::splat(row + i as f32), cols, threshold_m))
     }
 }

@@ -9,12 +9,13 @@ use openings::Openings;
 
 use super::noise::{BoundaryShift, NoiseField, NoiseSettings, Patch, Reads, Region, Shadow, wobble_growth};
 use super::occlusion::{Camera, CellBox, ConvexInEgo, TallObject};
-use super::quadtree::{BLOCK_CELLS, BLOCKS, PixelLattice, ROW_LANES, pixels_of, to_corner_m};
+use super::quadtree::{BLOCK_CELLS, BLOCKS, PixelLattice, pixels_of, to_corner_m};
 use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
 use crate::distance_field::{DistanceField, change_max_m};
 use crate::geometry::{Pose, Vec2, WorldFromEgo, bits};
 use crate::map::Map;
 use crate::seed::RootSeed;
+use crate::vectors::{ALL_LANES, FourPoints, LANES, Picked, f32x4};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
@@ -49,6 +50,7 @@ pub struct Sensor {
     /// How much larger the wobble is in each row of cells than at the patch's lower edge.
     wobble_growth: [f32; GRID_CELLS],
     last: Option<Observation>,
+    undecided: Undecided,
 }
 
 impl Sensor {
@@ -58,7 +60,14 @@ impl Sensor {
         let noise = NoiseField::new(map, noise, seed, to_corner_m(geometry.pixel_m(), CELL_PIXELS));
         let ahead_of_patch_m = |row: usize| geometry.cell_in_ego(row, 0).x - geometry.near_edge_ahead_m;
         let wobble_growth = std::array::from_fn(|row| wobble_growth(ahead_of_patch_m(row)));
-        Self { shift: noise.boundary_shift(), wobble_growth, settings, noise, last: None }
+        Self {
+            shift: noise.boundary_shift(),
+            wobble_growth,
+            settings,
+            noise,
+            last: None,
+            undecided: Undecided::default(),
+        }
     }
 
     /// What the car perceives from a pose at a tick.
@@ -84,64 +93,94 @@ impl Sensor {
     }
 
     /// The cells that hold a pixel beyond a boundary, as shifted and opened by noise.
+    ///
+    /// First blocks of cells are looked up, then cells, then the noise, then pixels: each for what the one before has left
+    /// undecided.
     fn beyond_boundaries(&mut self, map: &Map, ego: &EgoView, tick: u32) -> OccupancyGrid {
         let field = map.distance_field();
         let openings = self.openings(ego, tick);
         let mut grid = OccupancyGrid::free();
-        let mut unsure = UnsureCells::new();
-        self.occupy_surely_beyond(field, ego, &openings, &mut grid, &mut unsure);
+        let mut undecided = std::mem::take(&mut self.undecided);
+        undecided.clear();
+        self.occupy_blocks(field, ego, &openings, &mut grid, &mut undecided);
+        self.occupy_surely_beyond(field, ego, &openings, &mut grid, &mut undecided);
         self.shift.look_at(ego.patch_centre, ego.patch_radius_m, tick);
-        for cells in unsure.fours() {
-            let thresholds_m = self.thresholds_m(ego, &cells.rows, &cells.cols);
-            let (is_above, is_below) = ego.lattice.are_decided(&cells.centres_m, &thresholds_m);
-            for i in bits(!is_above & 0b1111) {
-                let (row, col) = (cells.rows[i], cells.cols[i]);
-                let is_occupied = is_below >> i & 1 == 1
-                    || ego.lattice.any_below(field, row, col, cells.centres_m[i], thresholds_m[i]);
-                grid.occupy_row(row as usize, u32::from(is_occupied) << col);
-            }
-        }
+        self.occupy_beyond_shifted(ego, &mut grid, &mut undecided);
+        undecided.occupy_by_pixels(field, &ego.lattice, &mut grid);
+        self.undecided = undecided;
         self.occupy_parted(field, ego, &openings, &mut grid);
         grid
     }
 
-    /// Marks the cells that are beyond a boundary however noise shifts it; `unsure` gets those that take a look at the
-    /// noise, but for cells that hold open pixels.
+    /// Marks the cells of blocks that are wholly beyond a boundary however noise shifts it.
+    fn occupy_blocks(
+        &self,
+        field: &DistanceField,
+        ego: &EgoView,
+        openings: &Openings,
+        grid: &mut OccupancyGrid,
+        undecided: &mut Undecided,
+    ) {
+        let within_m = change_max_m(to_corner_m(self.settings.geometry.pixel_m(), BLOCK_CELLS * CELL_PIXELS));
+        for block_row in 0..BLOCKS {
+            // Noise is largest far ahead.
+            let sure_m = f32x4::splat(self.shift_max_m(block_row * BLOCK_CELLS) + within_m);
+            let mut beyond = 0;
+            for first in (0..BLOCKS).step_by(LANES) {
+                let centres_m = ego.lattice.nearest_nodes_of_blocks(field, block_row, first);
+                let (is_drivable, is_beyond) = (centres_m.simd_gt(sure_m), centres_m.simd_lt(-sure_m));
+                beyond |= is_beyond.to_bitmask() << first;
+                let unsure = !(is_drivable | is_beyond).to_bitmask() & ALL_BLOCKS >> first;
+                undecided.blocks.pick(block_row * BLOCKS + first, unsure);
+            }
+            for row in rows_of_block(block_row) {
+                grid.occupy_row(row, cells_of_blocks(beyond) & !openings.whole_cells(row));
+            }
+        }
+    }
+
+    /// Marks the cells of undecided blocks of which a pixel is beyond a boundary however noise shifts it. Leaves out cells
+    /// that hold open pixels.
     fn occupy_surely_beyond(
         &self,
         field: &DistanceField,
         ego: &EgoView,
         openings: &Openings,
         grid: &mut OccupancyGrid,
-        unsure: &mut UnsureCells,
+        undecided: &mut Undecided,
     ) {
         let (above_m, below_m) = ego.lattice.decided_m();
-        let mut centres_m = [0.0; ROW_LANES];
-        for block_row in 0..BLOCKS {
-            let (beyond_blocks, unsure_cols) = self.look_at_blocks(field, ego, block_row);
-            let are_looked_at = (1 << unsure_cols.end) - (1 << unsure_cols.start);
-            for row in block_row * BLOCK_CELLS..((block_row + 1) * BLOCK_CELLS).min(GRID_CELLS) {
-                ego.lattice.nearest_nodes_of_cells(field, row, unsure_cols.clone(), &mut centres_m);
+        for block in undecided.blocks.iter() {
+            let (block_row, block_col) = (block / BLOCKS, block % BLOCKS);
+            let first_col = block_col * BLOCK_CELLS;
+            for row in rows_of_block(block_row) {
+                let centres_m = ego.lattice.nearest_nodes_of_cells(field, row, block_col);
                 let shift_m = self.shift_max_m(row);
-                let (drivable, beyond) = sides(&centres_m[unsure_cols.clone()], shift_m + above_m, -shift_m - below_m);
-                let [drivable, beyond] = [drivable, beyond].map(|cells| cells << unsure_cols.start);
-                // All pixels of a cell in such a block are beyond, of other such cells some pixel is, which may be open.
-                let touched = openings.touched_cells(row);
-                let occupied = beyond_blocks & !openings.whole_cells(row) | beyond & !touched;
-                grid.occupy_row(row, occupied);
-                unsure.push_row(row, are_looked_at & !(drivable | occupied | touched), &centres_m);
+                let drivable = centres_m.simd_gt(f32x4::splat(shift_m + above_m)).to_bitmask();
+                let beyond = centres_m.simd_lt(f32x4::splat(-shift_m - below_m)).to_bitmask();
+                let untouched = (!openings.touched_cells(row) & OccupancyGrid::ROW_MASK) >> first_col & ALL_LANES;
+                grid.occupy_row(row, (beyond & untouched) << first_col);
+                let first = cell_number(row, first_col);
+                undecided.cells.pick(first, !(drivable | beyond) & untouched);
+                undecided.centres_m[first..first + LANES].copy_from_slice(centres_m.as_array());
             }
         }
     }
 
-    /// The cells of a row of blocks whose blocks are wholly beyond a boundary however noise shifts it, bit = column, and
-    /// columns of cells around all blocks that are not wholly on one side.
-    fn look_at_blocks(&self, field: &DistanceField, ego: &EgoView, block_row: usize) -> (u32, Range<usize>) {
-        let within_m = change_max_m(to_corner_m(self.settings.geometry.pixel_m(), BLOCK_CELLS * CELL_PIXELS));
-        // Noise is largest far ahead.
-        let sure_m = self.shift_max_m(block_row * BLOCK_CELLS) + within_m;
-        let (drivable, beyond) = sides(&ego.lattice.nearest_nodes_of_blocks(field, block_row), sure_m, -sure_m);
-        (cells_of_blocks(beyond), cells_from_first_to_last_block(!(drivable | beyond)))
+    /// Marks the undecided cells of which the centre tells, once it is known how noise shifts the boundary.
+    fn occupy_beyond_shifted(&self, ego: &EgoView, grid: &mut OccupancyGrid, undecided: &mut Undecided) {
+        let Undecided { cells, centres_m, shifted, thresholds_m, .. } = undecided;
+        for (i, cells) in cells.fours().enumerate() {
+            let (rows, cols) = (cells.map(row_of_cell), cells.map(col_of_cell));
+            let index = |index: usize| index as i32 as f32;
+            let of_four_m = self.thresholds_m(ego, rows.map(index).into(), cols.map(index).into());
+            let (are_above, are_below) = ego.lattice.are_decided(cells.map(|cell| centres_m[cell]).into(), of_four_m);
+            for lane in 0..LANES {
+                grid.occupy_row(rows[lane], (are_below >> lane & 1) << cols[lane]);
+            }
+            shifted.pick(i * LANES, !(are_above | are_below) & ALL_LANES);
+            thresholds_m.extend(of_four_m.to_array());
+        }
     }
 
     /// How far noise may shift a boundary in a row of cells, metres.
@@ -150,25 +189,24 @@ impl Sensor {
     }
 
     /// Marks the cells that keep a pixel beyond a boundary although noise opens others.
-    fn occupy_parted(&mut self, field: &DistanceField, ego: &EgoView, openings: &Openings, grid: &mut OccupancyGrid) {
+    fn occupy_parted(&self, field: &DistanceField, ego: &EgoView, openings: &Openings, grid: &mut OccupancyGrid) {
         for (row, parted) in openings.parted_cells() {
             for col in bits(parted & !grid.row(row)) {
-                let [threshold_m] = self.thresholds_m(ego, &[row as u32], &[col as u32]);
+                let thresholds_m = self.thresholds_m(ego, f32x4::splat(row as f32), f32x4::splat(col as f32));
                 let centre_m = field.at_nearest_node(ego.lattice.cell_centre(row, col));
-                let (is_above, _) = ego.lattice.are_decided(&[centre_m], &[threshold_m]);
-                let is_occupied =
-                    is_above == 0 && openings.any_closed_pixel_below(field, &ego.lattice, row, col, threshold_m);
+                let (are_above, _) = ego.lattice.are_decided(f32x4::splat(centre_m), thresholds_m);
+                let is_occupied = are_above == 0
+                    && openings.any_closed_pixel_below(field, &ego.lattice, row, col, thresholds_m.as_array()[0]);
                 grid.occupy_row(row, u32::from(is_occupied) << col);
             }
         }
     }
 
-    /// Signed distances up to which pixels of cells, given as rows and columns, are beyond a boundary, metres.
+    /// Signed distances up to which pixels of cells are beyond a boundary, metres.
     #[inline]
-    fn thresholds_m<const N: usize>(&mut self, ego: &EgoView, rows: &[u32; N], cols: &[u32; N]) -> [f32; N] {
-        let (xs, ys) = ego.lattice.cell_centres(rows, cols);
-        let growth = rows.map(|row| self.wobble_growth[row as usize]);
-        self.shift.at_each(&xs, &ys, &growth).map(|shift_m| -shift_m)
+    fn thresholds_m(&self, ego: &EgoView, rows: f32x4, cols: f32x4) -> f32x4 {
+        let growth = rows.to_array().map(|row| self.wobble_growth[row as usize]);
+        -self.shift.at_four(ego.lattice.cell_centres(rows, cols), growth.into())
     }
 
     /// Marks the cells of which tall things hide a pixel.
@@ -194,8 +232,9 @@ impl Sensor {
             let is_any_of_row_misread = |row: usize, cell_col: usize| {
                 let pixels = spans.pixels_of_cell(row, cell_col);
                 pixels != 0 && {
-                    let (xs, ys) = ego.lattice.pixels_of_cell(row, cell_col);
-                    shadow.are_misread(&xs, &ys, threshold) & u32::from(pixels) != 0
+                    let [left, right] = ego.lattice.pixels_of_cell(row, cell_col);
+                    let are_misread = |points| shadow.are_misread(points, threshold);
+                    (are_misread(left) | are_misread(right) << LANES) & u32::from(pixels) != 0
                 }
             };
             let is_any_misread = |cell_row: usize, cell_col: usize| {
@@ -241,8 +280,7 @@ impl Sensor {
             .map(|cell| {
                 let (row, col) = (cell / GRID_CELLS, cell % GRID_CELLS);
                 let centre = ego.lattice.cell_centre(row, col);
-                let [shift_m] = shift.at_each(&[centre.x], &[centre.y], &[self.wobble_growth[row]]);
-                shift_m
+                shift.at_four(FourPoints::splat(centre), f32x4::splat(self.wobble_growth[row])).as_array()[0]
             })
             .collect();
         BirdsEyeView::from_fn(|row, col| {
@@ -310,91 +348,91 @@ impl Sensor {
     }
 }
 
-/// Which distances, at most a row of them, are above a bound and which are below another one; bit = index.
-fn sides(distances_m: &[f32], above_m: f32, below_m: f32) -> (u32, u32) {
-    const BITS: [[u32; 4]; ROW_LANES / 4] = {
-        let mut bits = [[0; 4]; ROW_LANES / 4];
-        let mut i = 0;
-        while i < ROW_LANES {
-            bits[i / 4][i % 4] = 1 << i;
-            i += 1;
-        }
-        bits
-    };
-    // Four distances at once, whose bits are joined at the end.
-    let (mut are_above, mut are_below) = ([0; 4], [0; 4]);
-    for (four_m, bits) in distances_m.as_chunks::<4>().0.iter().zip(&BITS) {
-        for i in 0..4 {
-            are_above[i] |= if four_m[i] > above_m { bits[i] } else { 0 };
-            are_below[i] |= if four_m[i] < below_m { bits[i] } else { 0 };
-        }
-    }
-    let join = |four: [u32; 4]| four.into_iter().fold(0, |all, bits| all | bits);
-    (join(are_above), join(are_below))
-}
+/// The blocks of a row, bit = column.
+const ALL_BLOCKS: u32 = (1 << BLOCKS) - 1;
 
 /// The cells of blocks in a row of blocks, bit = column.
 fn cells_of_blocks(blocks: u32) -> u32 {
     const BLOCK: u32 = (1 << BLOCK_CELLS) - 1;
-    bits(blocks).fold(0, |cells, block| cells | BLOCK << (block * BLOCK_CELLS))
+    (0..BLOCKS).fold(0, |cells, block| cells | (blocks >> block & 1) * BLOCK << (block * BLOCK_CELLS))
 }
 
-/// The columns of cells from the first to the last of some blocks in a row of blocks.
-fn cells_from_first_to_last_block(blocks: u32) -> Range<usize> {
-    const ALL: u32 = (1 << BLOCKS) - 1;
-    match blocks & ALL {
-        0 => 0..0,
-        blocks => blocks.trailing_zeros() as usize * BLOCK_CELLS..(blocks.ilog2() as usize + 1) * BLOCK_CELLS,
-    }
+/// Rows of cells in a row of blocks.
+fn rows_of_block(block_row: usize) -> Range<usize> {
+    block_row * BLOCK_CELLS..((block_row + 1) * BLOCK_CELLS).min(GRID_CELLS)
 }
 
-/// Cells that one look-up does not decide.
-struct UnsureCells {
-    rows: [u8; UNSURE_MAX],
-    cols: [u8; UNSURE_MAX],
-    /// Signed distance at the node nearest to the centre of each.
-    centres_m: [f32; UNSURE_MAX],
-    n_cells: usize,
+/// Cells are numbered row by row, with gaps where blocks reach beyond the view.
+const NUMBERS_PER_ROW: usize = 32;
+
+fn cell_number(row: usize, col: usize) -> usize {
+    row * NUMBERS_PER_ROW + col
 }
 
-/// All cells, and what four at a time may read beyond the last.
-const UNSURE_MAX: usize = GRID_CELLS * GRID_CELLS + 3;
-
-/// Four cells: their rows and columns, and signed distances at the nodes nearest to their centres.
-struct FourCells {
-    rows: [u32; 4],
-    cols: [u32; 4],
-    centres_m: [f32; 4],
+fn row_of_cell(number: usize) -> usize {
+    number / NUMBERS_PER_ROW
 }
 
-impl UnsureCells {
-    fn new() -> Self {
-        Self { rows: [0; UNSURE_MAX], cols: [0; UNSURE_MAX], centres_m: [f32::INFINITY; UNSURE_MAX], n_cells: 0 }
-    }
+fn col_of_cell(number: usize) -> usize {
+    number % NUMBERS_PER_ROW
+}
 
-    #[inline]
-    fn push_row(&mut self, row: usize, cols: u32, centres_m: &[f32; ROW_LANES]) {
-        for col in bits(cols & OccupancyGrid::ROW_MASK) {
-            (self.rows[self.n_cells], self.cols[self.n_cells]) = (row as u8, col as u8);
-            self.centres_m[self.n_cells] = centres_m[col];
-            self.n_cells += 1;
+/// What is left undecided at one stage after the other. Kept between views for its memory only.
+#[derive(Debug, Clone)]
+struct Undecided {
+    /// Blocks of cells, row by row.
+    blocks: Picked,
+    /// Cells by number, and of each the signed distance at the node nearest to its centre.
+    cells: Picked,
+    centres_m: Vec<f32>,
+    /// Indices of those of the cells that are undecided when the shift of the boundary is known, and of each of the cells
+    /// the signed distance up to which its pixels are beyond.
+    shifted: Picked,
+    thresholds_m: Vec<f32>,
+    /// Indices of those of the cells of which no pixel in a corner is beyond.
+    inside: Picked,
+}
+
+impl Default for Undecided {
+    fn default() -> Self {
+        const NUMBERS: usize = GRID_CELLS * NUMBERS_PER_ROW;
+        Self {
+            blocks: Picked::up_to(BLOCKS * BLOCKS),
+            cells: Picked::up_to(NUMBERS),
+            centres_m: vec![0.0; NUMBERS],
+            shifted: Picked::up_to(NUMBERS),
+            thresholds_m: Vec::new(),
+            inside: Picked::up_to(NUMBERS),
         }
     }
-
-    /// The cells, four at a time. What fills up the last four is far from any boundary.
-    fn fours(&self) -> impl Iterator<Item = FourCells> + '_ {
-        (0..self.n_cells).step_by(4).map(|first| FourCells {
-            rows: four(&self.rows, first).map(u32::from),
-            cols: four(&self.cols, first).map(u32::from),
-            centres_m: four(&self.centres_m, first),
-        })
-    }
 }
 
-/// Four neighbours in an array.
-#[inline]
-fn four<T: Copy>(values: &[T; UNSURE_MAX], first: usize) -> [T; 4] {
-    *values[first..].first_chunk().expect("there are three to spare")
+impl Undecided {
+    fn clear(&mut self) {
+        let Self { blocks, cells, shifted, thresholds_m, inside, .. } = self;
+        [blocks, cells, shifted, inside].into_iter().for_each(Picked::clear);
+        thresholds_m.clear();
+    }
+
+    /// Marks the cells of which a pixel is beyond a boundary, by looking at pixels: first at those in the corners, where
+    /// most have one.
+    fn occupy_by_pixels(&mut self, field: &DistanceField, lattice: &PixelLattice, grid: &mut OccupancyGrid) {
+        let Self { cells, shifted, thresholds_m, inside, .. } = self;
+        let cell = |index: usize| {
+            let number = cells.get(index);
+            (row_of_cell(number), col_of_cell(number), thresholds_m[index])
+        };
+        for index in shifted.iter() {
+            let (row, col, threshold_m) = cell(index);
+            let is_beyond = lattice.any_corner_below(field, row, col, threshold_m);
+            grid.occupy_row(row, u32::from(is_beyond) << col);
+            inside.pick_if(!is_beyond, index);
+        }
+        for index in inside.iter() {
+            let (row, col, threshold_m) = cell(index);
+            grid.occupy_row(row, u32::from(lattice.any_below(field, row, col, threshold_m)) << col);
+        }
+    }
 }
 
 /// One pose, prepared for sensing.

@@ -2,9 +2,10 @@
 
 use crate::distance_field::DistanceField;
 use crate::geometry::bits;
+use crate::sensing::GRID_CELLS;
 use crate::sensing::occlusion::Spans;
 use crate::sensing::quadtree::{PixelLattice, pixels_of};
-use crate::sensing::{CELL_PIXELS, GRID_CELLS};
+use crate::vectors::{LANES, f32x4};
 use std::ops::Range;
 
 /// Openings in one view.
@@ -64,9 +65,10 @@ impl Openings {
             if opened == u8::MAX {
                 return false;
             }
-            let (xs, ys) = lattice.pixels_of_cell(row, col);
-            let distances_m = field.at_each(&xs, &ys);
-            (0..CELL_PIXELS).any(|i| opened >> i & 1 == 0 && distances_m[i] <= threshold_m)
+            let [left, right] = lattice
+                .pixels_of_cell(row, col)
+                .map(|pixels| field.at_four(pixels).simd_le(f32x4::splat(threshold_m)).to_bitmask());
+            (left | right << LANES) & !u32::from(opened) != 0
         })
     }
 
