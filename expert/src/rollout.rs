@@ -2,10 +2,13 @@
 
 use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
+use sim::vectors::{FourPoints, f32x4};
 use sim::vehicle::VehicleSettings;
 
 /// Discs that cover the body with its lengthened nose.
 const DISCS: usize = 6;
+/// Those that are enough along an arc: nose, middle and rear axle.
+const COARSE_DISCS: [usize; 3] = [5, 3, 1];
 
 /// A moving rear axle. No angle is kept: a step needs no trigonometry.
 #[derive(Debug, Clone, Copy)]
@@ -47,6 +50,12 @@ impl Motion {
         self.next_curvature_per_m(target_per_m, change_per_m) == target_per_m
     }
 
+    /// Four points on the vehicle axis, world.
+    #[inline]
+    fn four_on_axis(&self, ahead_m: f32x4) -> FourPoints {
+        FourPoints::splat(self.position) + FourPoints::splat(self.ahead) * ahead_m
+    }
+
     #[inline]
     fn next_curvature_per_m(self, target_per_m: f32, change_per_m: f32) -> f32 {
         target_per_m.clamp(self.curvature_per_m - change_per_m, self.curvature_per_m + change_per_m)
@@ -77,7 +86,11 @@ impl HalfTurn {
 /// The body, covered by discs, as the forecast sees it.
 #[derive(Debug, Clone)]
 pub(crate) struct Footprint {
-    disc_centres_m: [f32; DISCS],
+    /// Centres of the discs, metres ahead of the rear axle; the last one is repeated.
+    disc_centres_m: [f32x4; 2],
+    /// And of the coarse ones.
+    coarse_disc_centres_m: f32x4,
+    nose_m: f32,
     /// Distance of a disc's centre to the nearest non-drivable point at which the clearance is 0, metres.
     keep_m: f32,
 }
@@ -86,15 +99,20 @@ impl Footprint {
     pub(crate) fn new(vehicle: &VehicleSettings, nose_margin_m: f32, disc_relief_m: f32) -> Self {
         let segment_m = (vehicle.length_m + nose_margin_m) / DISCS as f32;
         let radius_m = (0.5 * segment_m).hypot(0.5 * vehicle.width_m);
+        let centre_m = |disc: usize| (disc as f32 + 0.5) * segment_m - vehicle.rear_overhang_m;
+        let four_m = |of_lane: [usize; 4]| f32x4::from(of_lane.map(centre_m));
+        let [nose, middle, rear] = COARSE_DISCS;
         Self {
-            disc_centres_m: std::array::from_fn(|i| (i as f32 + 0.5) * segment_m - vehicle.rear_overhang_m),
+            disc_centres_m: [four_m([0, 1, 2, 3]), four_m([4, 5, 5, 5])],
+            coarse_disc_centres_m: four_m([nose, middle, rear, rear]),
+            nose_m: centre_m(DISCS - 1),
             keep_m: radius_m - disc_relief_m,
         }
     }
 
     /// Centre of the foremost disc, metres ahead of the rear axle.
     pub(crate) fn nose_m(&self) -> f32 {
-        self.disc_centres_m[DISCS - 1]
+        self.nose_m
     }
 
     /// Distance of a disc's centre to the nearest non-drivable point at a clearance, metres.
@@ -105,9 +123,8 @@ impl Footprint {
     /// Clearance of the whole body, metres.
     #[inline]
     pub(crate) fn clearance_m(&self, field: &DistanceField, motion: &Motion) -> f32 {
-        let xs = self.disc_centres_m.map(|ahead_m| motion.on_axis(ahead_m).x);
-        let ys = self.disc_centres_m.map(|ahead_m| motion.on_axis(ahead_m).y);
-        field.at_each(&xs, &ys).into_iter().fold(f32::INFINITY, f32::min) - self.keep_m
+        let [rear, front] = self.disc_centres_m.map(|ahead_m| field.at_four(motion.four_on_axis(ahead_m)));
+        lowest(rear.fast_min(front)) - self.keep_m
     }
 
     /// Clearance of nose, middle and rear axle, metres, to within the raster's node spacing.
@@ -116,9 +133,15 @@ impl Footprint {
     /// between them is met by the middle half a body length later than by all discs.
     #[inline]
     pub(crate) fn coarse_clearance_m(&self, field: &DistanceField, motion: &Motion) -> f32 {
-        let at = |disc: usize| field.at_nearest_node(motion.on_axis(self.disc_centres_m[disc]));
-        at(5).min(at(1)).min(at(3)) - self.keep_m
+        lowest(field.at_four_nearest_nodes(motion.four_on_axis(self.coarse_disc_centres_m))) - self.keep_m
     }
+}
+
+/// The lowest lane.
+#[inline]
+fn lowest(values: f32x4) -> f32 {
+    let [a, b, c, d] = values.to_array();
+    a.min(b).min(c.min(d))
 }
 
 #[cfg(test)]
