@@ -1,12 +1,13 @@
 //! Arcs to steer at, and forecasts along all of them.
 
 use crate::rollout::{HalfTurn, Motion};
-use sim::geometry::{Pose, Vec2};
+use sim::geometry::{Pose, Vec2, WorldFromEgo};
+use sim::vectors::{FourPoints, f32x4};
 
-/// Points per arc at which its forecast can be probed.
-const PROBES: usize = 14;
+/// Points per arc at which its forecast can be probed, in fours.
+const PROBE_FOURS: usize = 4;
 /// Steps between them.
-const PROBE_STEPS: usize = 5;
+const PROBE_STEPS: usize = 4;
 
 /// Arcs to steer at, straight on first and then ever tighter, left before right.
 #[derive(Debug, Clone)]
@@ -26,7 +27,8 @@ pub(crate) struct Arc {
     pub(crate) index: f32,
     /// Of one step along the arc.
     half_turn: HalfTurn,
-    probes: [Vec2; PROBES],
+    /// Where the nose gets to every [`PROBE_STEPS`] after the arc was entered, ego frame then.
+    probes: [FourPoints; PROBE_FOURS],
 }
 
 /// What is carried along an arc.
@@ -53,8 +55,11 @@ impl<const N: usize> Fan<N> {
             let half_turn = HalfTurn::new(curvature_per_m + curvature_per_m, step_m);
             let mut motion = Motion::new(Pose::default(), curvature_per_m);
             let probes = std::array::from_fn(|_| {
-                motion = (0..PROBE_STEPS).fold(motion, |motion, _| motion.turn(half_turn, step_m));
-                motion.on_axis(nose_m)
+                let four: [Vec2; 4] = std::array::from_fn(|_| {
+                    motion = (0..PROBE_STEPS).fold(motion, |motion, _| motion.turn(half_turn, step_m));
+                    motion.on_axis(nose_m)
+                });
+                FourPoints::from(four)
             });
             Arc { curvature_per_m, index: side * index, half_turn, probes }
         });
@@ -101,11 +106,13 @@ impl<const N: usize> Fan<N> {
         ramp.step(self.arcs[i].curvature_per_m, f32::INFINITY, self.step_m)
     }
 
-    /// Where the nose gets to along an arc every few steps after it was entered, with the travel there from the ramp.
-    pub(crate) fn probes(&self, i: usize, entered: Motion) -> impl Iterator<Item = (f32, Vec2)> {
-        self.arcs[i].probes.iter().enumerate().map(move |(probe, &in_ego)| {
-            let travel_m = (1 + (probe + 1) * PROBE_STEPS) as f32 * self.step_m;
-            (travel_m, entered.position + entered.ahead.rotate(in_ego))
+    /// Where the nose gets to along an arc every few steps after it was entered, with the travels there from the ramp, in
+    /// fours.
+    pub(crate) fn probes(&self, i: usize, entered: Motion) -> impl Iterator<Item = (f32x4, FourPoints)> {
+        let world_from_ego = WorldFromEgo { rotation: entered.ahead, translation: entered.position };
+        self.arcs[i].probes.iter().enumerate().map(move |(four, &in_ego)| {
+            let travels_m = [1, 2, 3, 4].map(|i| (1 + (4 * four + i) * PROBE_STEPS) as f32 * self.step_m);
+            (travels_m.into(), world_from_ego.four_points(in_ego))
         })
     }
 

@@ -43,6 +43,7 @@ use sim::driver::{Decision, Driver, GroundTruth, LookAheadPoint, Situation, Sour
 use sim::episode::EpisodeSettings;
 use sim::geometry::Vec2;
 use sim::seed::{Rng, RootSeed, Stream};
+use std::cell::OnceCell;
 use std::collections::VecDeque;
 
 /// Consecutive labels farther apart than this count as a jump, metres.
@@ -145,6 +146,7 @@ impl ScriptedExpert {
             truth,
             sight,
             start: self.when_obeyed(truth),
+            start_progress_m: OnceCell::new(),
             horizon_m: sight.horizon_m(self.settings.horizon_m, self.footprint.nose_m()),
             last_index: self.last.map(|last| last.index(&self.settings)),
         };

@@ -13,6 +13,8 @@ use crate::settings::ExpertSettings;
 use sim::distance_field::{DistanceField, NODE_M};
 use sim::driver::GroundTruth;
 use sim::geometry::Vec2;
+use sim::vectors::f32x4;
+use std::cell::OnceCell;
 
 /// First arcs: 16 to either side of straight on.
 const FIRST_ARCS: usize = 33;
@@ -61,6 +63,8 @@ pub(crate) struct Search<'a> {
     pub(crate) sight: &'a LineOfSight,
     /// The car when it begins to obey this decision.
     pub(crate) start: Motion,
+    /// Progress of the bumper there along the route, metres, once it was asked for.
+    pub(crate) start_progress_m: OnceCell<f32>,
     /// Curvature index of the last label, −1…1.
     pub(crate) last_index: Option<f32>,
     /// Length of a forecast, metres.
@@ -274,8 +278,11 @@ impl Search<'_> {
             let Rollout { motion, travel_m, .. } = first.entry.forecast.rollout;
             let free_max_m = if first.entry.is_free {
                 let mut probes = fan.probes(i, fan.enter(i, motion));
-                let blocked = probes.find(|&(_, nose)| self.field().at_nearest_node(nose) < blocked_m);
-                blocked.map_or(self.horizon_m, |(probed_m, _)| travel_m + probed_m)
+                let blocked = probes.find_map(|(travels_m, noses)| {
+                    let blocked = self.field().at_four_nearest_nodes(noses).simd_lt(blocked_m).to_bitmask();
+                    (blocked != 0).then(|| travels_m.to_array()[blocked.trailing_zeros() as usize])
+                });
+                blocked.map_or(self.horizon_m, |probed_m| travel_m + probed_m)
             } else {
                 travel_m
             };
@@ -351,6 +358,12 @@ impl Search<'_> {
         travel_m / self.settings.weights.unit_m - self.settings.weights.load * load_m / travel_m
     }
 
+    /// The travel above which a load is worth more than this: the inverse of [`Self::worth`].
+    fn travel_at_worth(&self, worth: f32, load_m: f32) -> f32 {
+        let weights = &self.settings.weights;
+        0.5 * weights.unit_m * (worth + (worth * worth + 4.0 * weights.load * load_m / weights.unit_m).sqrt())
+    }
+
     /// Replaces `best` by the best plan that begins with a first arc, if that is better.
     fn follow_plans(
         &self,
@@ -420,11 +433,19 @@ impl Search<'_> {
     }
 
     /// Whether a second arc from the ramp must be blocked before it is worth more than `worth_min`.
-    fn is_hopeless(&self, second: usize, ramp: &Rollout, worth_min: f32, blocked_m: f32) -> bool {
+    fn is_hopeless(&self, second: usize, ramp: &Rollout, worth_min: f32, blocked_m: f32x4) -> bool {
         let fan = &self.arcs.second;
-        fan.probes(second, fan.enter(second, ramp.motion))
-            .take_while(|&(probed_m, _)| self.worth(ramp.travel_m + probed_m, ramp.load_m) <= worth_min)
-            .any(|(_, nose)| self.field().at_nearest_node(nose) < blocked_m)
+        let to_probe_m = f32x4::splat(self.travel_at_worth(worth_min, ramp.load_m) - ramp.travel_m);
+        for (travels_m, noses) in fan.probes(second, fan.enter(second, ramp.motion)) {
+            let counts = travels_m.simd_lt(to_probe_m);
+            if (counts & self.field().at_four_nearest_nodes(noses).simd_lt(blocked_m)).any() {
+                return true;
+            }
+            if !counts.all() {
+                break;
+            }
+        }
+        false
     }
 
     /// Moves a second arc to its next step, unless it has collected more than `load_max_m`: it is worth less then.
@@ -437,8 +458,8 @@ impl Search<'_> {
     }
 
     /// A probe that finds less than this at the nearest node finds a forecast blocked, metres.
-    fn blocked_m(&self, thresholds: Thresholds) -> f32 {
-        self.footprint.distance_m(thresholds.near_m) - PROBE_SLACK_M
+    fn blocked_m(&self, thresholds: Thresholds) -> f32x4 {
+        f32x4::splat(self.footprint.distance_m(thresholds.near_m) - PROBE_SLACK_M)
     }
 
     fn field(&self) -> &DistanceField {
@@ -462,9 +483,9 @@ impl Search<'_> {
             path.project_near(bumper, self.truth.progress_m, self.context.vehicle.front_m(), reach_m + 4.0)
         };
         let reached_m = progress_of(end);
+        let start_m = *self.start_progress_m.get_or_init(|| progress_of(&self.start));
         // Behind the finish progress saturates.
-        reached_m > path.length_m() - 0.5
-            || reached_m - progress_of(&self.start) >= self.settings.progress_share * travel_m
+        reached_m > path.length_m() - 0.5 || reached_m - start_m >= self.settings.progress_share * travel_m
     }
 }
 
