@@ -19,11 +19,20 @@ pub const CAP_M: f32 = 3.0;
 /// the second term, f(1 − f) per axis, is at most half a squared spacing.
 #[must_use]
 pub fn change_max_m(radius_m: f32) -> f32 {
-    /// A generous bound of rounding in single precision.
-    const ROUNDING_M: f32 = 1e-4;
     let to_node_m = std::f32::consts::FRAC_1_SQRT_2 * NODE_M;
     (radius_m + to_node_m).hypot(std::f32::consts::FRAC_1_SQRT_2 * NODE_M) + ROUNDING_M
 }
+
+/// How much [`DistanceField::at`] may differ between two places that are `apart_m` apart, metres.
+///
+/// Neighbouring nodes differ by no more than they are apart, so it changes by no more than 1 m per metre along each axis.
+#[must_use]
+pub fn interpolated_change_max_m(apart_m: f32) -> f32 {
+    std::f32::consts::SQRT_2 * apart_m + ROUNDING_M
+}
+
+/// A generous bound of rounding in single precision, metres.
+const ROUNDING_M: f32 = 1e-4;
 
 /// Bits of a distance far outside the lot, −[`CAP_M`].
 const FAR_OUTSIDE: u32 = (-CAP_M).to_bits();
@@ -103,7 +112,8 @@ impl DistanceField {
     }
 
     /// [`Self::at`] at four points, to the bit.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "called, it takes and returns vectors through memory: a tenth of the loop")]
+    #[inline(always)]
     pub fn at_four(&self, points: FourPoints) -> f32x4 {
         let node = self.nodes_from_world(points);
         let (cols, into_x) = whole_and_part(bounded(node.x, count(self.cols - 2)));

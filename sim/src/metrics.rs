@@ -1,11 +1,11 @@
 //! What is measured on a run (docs/methods.md 8): always on the clean map.
 
 use crate::collision::ObstacleSet;
-use crate::distance_field::{DistanceField, bounds, change_max_m};
+use crate::distance_field::{DistanceField, bounds, change_max_m, interpolated_change_max_m};
 use crate::driver::Source;
 use crate::frame::{Event, Frame};
-use crate::geometry::{Pose, Vec2, WorldFromEgo, edges};
-use crate::vectors::{ALL_LANES, FourPoints, LANES, Picked, f32x4};
+use crate::geometry::{Pose, Vec2, edges};
+use crate::vectors::{FourPoints, LANES, Picked, f32x4};
 use crate::vehicle::VehicleSettings;
 use serde::{Deserialize, Serialize};
 
@@ -92,13 +92,12 @@ const BLOCK: u8 = 4;
 const QUARTER: u8 = BLOCK / 2;
 
 impl FourSquares {
-    /// Number of pixels that are drivable because the centres of their squares (the nearest nodes) are farther from any
+    /// Number of pixels that are drivable because the centres of their squares, at these distances, are farther from any
     /// boundary than `sure_m`; and the squares of which the centre does not tell, bit = lane.
     #[inline]
-    fn surely_drivable(&self, distance: &DistanceField, world_from_ego: &WorldFromEgo, sure_m: f32x4) -> (f32x4, u32) {
-        let centres_m = distance.at_four_nearest_nodes(world_from_ego.four_points(self.centres));
+    fn surely_drivable(&self, centres_m: f32x4, sure_m: f32x4) -> (f32x4, u32) {
         let is_drivable = centres_m.simd_gt(sure_m);
-        (is_drivable & self.n_pixels, !(is_drivable | centres_m.simd_lt(-sure_m)).to_bitmask() & ALL_LANES)
+        (is_drivable & self.n_pixels, !(is_drivable | centres_m.simd_lt(-sure_m)).to_bitmask())
     }
 }
 
@@ -166,19 +165,22 @@ impl SafeRing {
     pub fn safe_ratio(&self, distance: &DistanceField, pose: Pose, pixel_m: f32) -> f32 {
         let world_from_ego = pose.world_from_ego();
         // Where the centre is farther from a boundary than the pixels are from it, one look-up decides.
-        let sure_m =
-            |side: u8| f32x4::splat(change_max_m(std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (f32::from(side) - 1.0)));
-        let (block_m, quarter_m) = (sure_m(BLOCK), sure_m(QUARTER));
+        let to_corner_m = |side: u8| std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (f32::from(side) - 1.0);
+        let block_m = f32x4::splat(change_max_m(to_corner_m(BLOCK)));
+        let quarter_m = f32x4::splat(interpolated_change_max_m(to_corner_m(QUARTER)));
         let mut n_drivable = f32x4::ZERO;
         let mut unsure_blocks = Picked::up_to(self.quarters.len());
         for (i, blocks) in self.blocks.iter().enumerate() {
-            let (n_pixels, unsure) = blocks.surely_drivable(distance, &world_from_ego, block_m);
+            let centres_m = distance.at_four_nearest_nodes(world_from_ego.four_points(blocks.centres));
+            let (n_pixels, unsure) = blocks.surely_drivable(centres_m, block_m);
             n_drivable += n_pixels;
             unsure_blocks.pick(i * LANES, unsure);
         }
         let mut unsure_quarters = Picked::up_to(unsure_blocks.iter().len() * LANES);
         for block in unsure_blocks.iter() {
-            let (n_pixels, unsure) = self.quarters[block].surely_drivable(distance, &world_from_ego, quarter_m);
+            let quarters = &self.quarters[block];
+            let centres_m = distance.at_four(world_from_ego.four_points(quarters.centres));
+            let (n_pixels, unsure) = quarters.surely_drivable(centres_m, quarter_m);
             n_drivable += n_pixels;
             unsure_quarters.pick(block * LANES, unsure);
         }

@@ -6,7 +6,7 @@
 use super::quadtree::{counted_from, pixels_of};
 use super::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid};
 use crate::geometry::{Outline, Vec2};
-use crate::vectors::{LANES, bounded, f32x4};
+use crate::vectors::{FourPoints, LANES, bounded, f32x4};
 use std::ops::Range;
 
 /// Longest occlusion, as a multiple of the range: from 2 m on it leaves the patch.
@@ -85,20 +85,21 @@ impl ConvexInEgo {
         // Walk the edges: each lends its crossing to the rows between its ends.
         let mut right_m = [f32x4::splat(f32::INFINITY); BEV_PIXELS / LANES];
         let mut left_m = [f32x4::splat(f32::NEG_INFINITY); BEV_PIXELS / LANES];
-        let corners = &self.corners[..self.n_corners];
-        let mut a = corners[corners.len() - 1];
-        for &b in corners {
-            let (low, high) = if a.x <= b.x { (a, b) } else { (b, a) };
-            let slope = f32x4::splat((high.y - low.y) / (high.x - low.x));
-            // Rows with low.x <= ahead < high.x; one more on either side, then tested exactly.
-            for four in common(&self::fours(&rows_between(geometry, low.x, high.x)), &fours) {
-                let ahead_m = far_m - (counted_from(four * LANES) + f32x4::HALF) * pixel_m;
-                let is_crossed = f32x4::splat(low.x).simd_le(ahead_m) & ahead_m.simd_lt(f32x4::splat(high.x));
-                let y = f32x4::splat(low.y) + (ahead_m - f32x4::splat(low.x)) * slope;
-                right_m[four] = is_crossed.select(y.fast_min(right_m[four]), right_m[four]);
-                left_m[four] = is_crossed.select(y.fast_max(left_m[four]), left_m[four]);
+        for first in (0..self.n_corners).step_by(LANES) {
+            let edges = FourEdges::new(self, first, geometry, &fours);
+            for lane in 0..LANES.min(self.n_corners - first) {
+                let edge = |of: &f32x4| f32x4::splat(of.as_array()[lane]);
+                let (low_x, high_x, low_y) = (edge(&edges.low.x), edge(&edges.high.x), edge(&edges.low.y));
+                let slope = edge(&edges.slopes);
+                // Rows with low.x <= ahead < high.x; one more on either side, then tested exactly.
+                for four in edges.first_fours[lane] as usize..edges.end_fours[lane] as usize {
+                    let ahead_m = far_m - (counted_from(four * LANES) + f32x4::HALF) * pixel_m;
+                    let is_crossed = low_x.simd_le(ahead_m) & ahead_m.simd_lt(high_x);
+                    let y = low_y + (ahead_m - low_x) * slope;
+                    right_m[four] = is_crossed.select(y.fast_min(right_m[four]), right_m[four]);
+                    left_m[four] = is_crossed.select(y.fast_max(left_m[four]), left_m[four]);
+                }
             }
-            a = b;
         }
         // Pixel centres: left = half − (col + ½)·pixel.
         let col_of = |y: f32x4| (f32x4::splat(half_m) - y) * pixels_per_m - f32x4::HALF;
@@ -115,6 +116,48 @@ impl ConvexInEgo {
             spans.end[rows].copy_from_slice(&columns(f32x4::from_i32x4(end)));
         }
         Some(spans)
+    }
+}
+
+/// Four edges of a polygon.
+struct FourEdges {
+    /// The ends that are less far ahead, and the others.
+    low: FourPoints,
+    high: FourPoints,
+    /// Left per ahead.
+    slopes: f32x4,
+    /// The fours of rows between their ends, one row more on either side.
+    first_fours: [i32; LANES],
+    end_fours: [i32; LANES],
+}
+
+impl FourEdges {
+    /// The edges that end in four corners from one on, as far as they lie in some fours of rows.
+    fn new(polygon: &ConvexInEgo, first: usize, geometry: &GridGeometry, fours: &Range<usize>) -> Self {
+        let n = polygon.n_corners;
+        let from = FourPoints::from(std::array::from_fn(|i| polygon.corners[(first + i + n - 1) % n]));
+        let to = FourPoints::from(std::array::from_fn(|i| polygon.corners[(first + i) % n]));
+        let is_from_low = from.x.simd_le(to.x);
+        let lower = |a: FourPoints, b: FourPoints| FourPoints {
+            x: is_from_low.select(a.x, b.x),
+            y: is_from_low.select(a.y, b.y),
+        };
+        let (low, high) = (lower(from, to), lower(to, from));
+        let row_of = |ahead_m: f32x4| {
+            (f32x4::splat(geometry.far_edge_ahead_m()) - ahead_m) * f32x4::splat(1.0 / geometry.pixel_m())
+        };
+        let index = |fours_of_rows: f32x4| {
+            let within = fours_of_rows.fast_max(f32x4::splat(fours.start as f32));
+            within.fast_min(f32x4::splat(fours.end as f32)).fast_trunc_int().to_array()
+        };
+        let per_four = f32x4::splat(1.0 / LANES as f32);
+        Self {
+            low,
+            high,
+            slopes: (high.y - low.y) / (high.x - low.x),
+            first_fours: index((row_of(high.x) - f32x4::ONE) * per_four),
+            end_fours: index((row_of(low.x) + f32x4::ONE) * per_four + f32x4::ONE),
+        }
     }
 }
 
