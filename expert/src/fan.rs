@@ -81,10 +81,16 @@ impl<const N: usize> Fan<N> {
         drive_on: impl Fn(&mut F, Motion) -> bool,
     ) -> [Entry<F>; N] {
         let start = Entry { forecast: start, is_free: true };
+        let present_per_m = start.forecast.motion().curvature_per_m;
+        let n_right = self.from_right.partition_point(|&i| self.arcs[i].curvature_per_m < present_per_m);
+        // To either side, ever farther from the present curvature.
+        let mut order = self.from_right;
+        order[..n_right].reverse();
+        let (right, left) = order.split_at(n_right);
         let mut entries = [start; N];
-        let mut follow_ramp = |side: &mut dyn Iterator<Item = usize>| {
+        for side in [right, left] {
             let mut ramp = start;
-            for i in side {
+            for &i in side {
                 let curvature_per_m = self.arcs[i].curvature_per_m;
                 while ramp.is_free && !ramp.forecast.motion().reaches(curvature_per_m, change_per_m) {
                     let next = ramp.forecast.motion().step(curvature_per_m, change_per_m, self.step_m);
@@ -92,12 +98,7 @@ impl<const N: usize> Fan<N> {
                 }
                 entries[i] = ramp;
             }
-        };
-        let present_per_m = start.forecast.motion().curvature_per_m;
-        let n_right = self.from_right.partition_point(|&i| self.arcs[i].curvature_per_m < present_per_m);
-        let (right, left) = self.from_right.split_at(n_right);
-        follow_ramp(&mut right.iter().rev().copied());
-        follow_ramp(&mut left.iter().copied());
+        }
         entries
     }
 

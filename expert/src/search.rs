@@ -72,7 +72,7 @@ pub(crate) struct Search<'a> {
 }
 
 /// A first arc and what follows it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Plan {
     /// Which first arc.
     pub(crate) first: usize,
@@ -187,7 +187,7 @@ impl Search<'_> {
             let mut motion = self.start;
             (0..steps).fold(f32::INFINITY, |gap_m, _| {
                 motion = motion.step(self.arcs.curvature_per_m(first), change_per_m, self.settings.first_step_m);
-                gap_m.min(self.footprint.clearance_m(field, &motion))
+                gap_m.min(self.footprint.clearance_m(field, motion))
             })
         };
         let mut widest = (0, gap_m(0));
@@ -238,7 +238,7 @@ impl Search<'_> {
             let target_per_m = (2.0 * left_m / target.length_squared())
                 .clamp(-settings.curvature_max_per_m, settings.curvature_max_per_m);
             motion = motion.step(target_per_m, change_per_m, step_m);
-            let clearance_m = self.footprint.clearance_m(field, &motion);
+            let clearance_m = self.footprint.clearance_m(field, motion);
             trust = trust.min((clearance_m - of_band.trust_from_m) * per_m);
             if trust <= 0.0 {
                 return 0.0;
@@ -257,7 +257,7 @@ impl Search<'_> {
     }
 
     fn thresholds(&self, clearance_m: f32) -> Thresholds {
-        let present_m = self.footprint.clearance_m(self.truth.map.distance_field(), &self.start);
+        let present_m = self.footprint.clearance_m(self.field(), self.start);
         Thresholds { near_m: clearance_m.min(present_m - START_SLACK_M), far_m: clearance_m }
     }
 
@@ -298,9 +298,10 @@ impl Search<'_> {
         self.rate_first(i, first, first.entry.forecast.rollout.travel_m);
     }
 
+    #[inline]
     fn drive_on_first(&self, first: &mut FirstRollout, next: Motion, thresholds: Thresholds) -> bool {
         let step_m = self.settings.first_step_m;
-        let clearance_m = self.footprint.clearance_m(self.field(), &next);
+        let clearance_m = self.footprint.clearance_m(self.field(), next);
         if !self.drive_on(&mut first.rollout, next, step_m, clearance_m, thresholds) {
             return false;
         }
@@ -325,7 +326,11 @@ impl Search<'_> {
     }
 
     /// Moves a forecast to its next step, unless it ends before: at the horizon, at an obstacle or on unknown ground.
-    #[inline]
+    #[expect(
+        clippy::inline_always,
+        reason = "called, it takes motions through memory: numbers that are stored, and loaded as vectors"
+    )]
+    #[inline(always)]
     fn drive_on(
         &self,
         rollout: &mut Rollout,
@@ -379,7 +384,7 @@ impl Search<'_> {
             return;
         }
         let horizon_m = self.horizon_m;
-        let mut offer = |second, free_m: f32, load_m: f32, penalty: f32, end: &Motion| {
+        let mut offer = |second, free_m: f32, load_m: f32, penalty: f32, end: Motion| {
             let free_m = free_m.min(horizon_m);
             let score = self.worth(free_m, load_m) + first.offset - penalty;
             let is_better = best.is_none_or(|best| score > best.score);
@@ -389,7 +394,7 @@ impl Search<'_> {
             best.map_or(f32::NEG_INFINITY, |best| best.score)
         };
         let blocked_m = self.blocked_m(thresholds);
-        let mut to_beat = offer(None, first_free_m, load_m, 0.0, &motion);
+        let mut to_beat = offer(None, first_free_m, load_m, 0.0, motion);
         let side = usize::from(self.arcs.curvature_per_m(index) < self.start.curvature_per_m);
         for (i, branch) in forecast.branches[..forecast.n_branches].iter().enumerate().rev() {
             if i < forecast.n_on_ramp {
@@ -417,7 +422,7 @@ impl Search<'_> {
                 }
                 let branching = Some((branch.travel_m, fan.arcs[i].curvature_per_m));
                 let Rollout { motion, travel_m, load_m } = entry.forecast;
-                to_beat = offer(branching, travel_m, load_m, penalty, &motion);
+                to_beat = offer(branching, travel_m, load_m, penalty, motion);
             }
         }
     }
@@ -449,11 +454,16 @@ impl Search<'_> {
     }
 
     /// Moves a second arc to its next step, unless it has collected more than `load_max_m`: it is worth less then.
+    #[expect(
+        clippy::inline_always,
+        reason = "called, it takes motions through memory: numbers that are stored, and loaded as vectors"
+    )]
+    #[inline(always)]
     fn drive_on_second(&self, rollout: &mut Rollout, next: Motion, thresholds: Thresholds, load_max_m: f32) -> bool {
         if rollout.load_m > load_max_m {
             return false;
         }
-        let clearance_m = self.footprint.coarse_clearance_m(self.field(), &next);
+        let clearance_m = self.footprint.coarse_clearance_m(self.field(), next);
         self.drive_on(rollout, next, self.settings.second_step_m, clearance_m, thresholds)
     }
 
@@ -475,15 +485,15 @@ impl Search<'_> {
     }
 
     /// No turning back: the bumper gains on the route. This only filters plans, so labels remain functions of the scene.
-    fn makes_progress(&self, end: &Motion, travel_m: f32) -> bool {
+    fn makes_progress(&self, end: Motion, travel_m: f32) -> bool {
         let path = self.truth.map.path();
         let reach_m = self.horizon_m + self.context.vehicle.front_m();
-        let progress_of = |motion: &Motion| {
+        let progress_of = |motion: Motion| {
             let bumper = motion.on_axis(self.context.vehicle.front_m());
             path.project_near(bumper, self.truth.progress_m, self.context.vehicle.front_m(), reach_m + 4.0)
         };
         let reached_m = progress_of(end);
-        let start_m = *self.start_progress_m.get_or_init(|| progress_of(&self.start));
+        let start_m = *self.start_progress_m.get_or_init(|| progress_of(self.start));
         // Behind the finish progress saturates.
         reached_m > path.length_m() - 0.5 || reached_m - start_m >= self.settings.progress_share * travel_m
     }
@@ -519,3 +529,6 @@ impl Thresholds {
         if travel_m < settings.tight_start_m { self.near_m } else { self.far_m }
     }
 }
+
+#[cfg(test)]
+mod tests;
