@@ -7,7 +7,7 @@
 //!
 //! The paper gives no more detail. Here, a decision takes four steps, each in a file:
 //!
-//! - `search`: plans of two arcs each, forecast with the car's body and the speed of its steering (`rollout`); the best
+//! - `search`: plans of two arcs each (`fan`), forecast with the car's body and the speed of its steering (`rollout`); the best
 //!   one says whether, where and with how much clearance what is ahead can be avoided (rule two);
 //! - `elastic_band`: the way of that plan, pulled into the middle of the free space, so that it no longer depends on
 //!   which plan it came from;
@@ -128,7 +128,7 @@ impl ScriptedExpert {
         &self.settings
     }
 
-    /// Decides and explains the decision. Takes about twice as long as deciding.
+    /// Decides and explains the decision. Takes several times as long as deciding: every first arc is followed.
     pub fn inspect(&mut self, situation: &Situation<'_>) -> (Decision, Inspection) {
         self.inspection = Some(Inspection::empty());
         let decision = self.decide(situation);

@@ -3,6 +3,10 @@
 //! One constant arc can express neither "out and back" nor "straight on, then turn" (docs/methods.md E4). A first
 //! arc is therefore as good as the best plan that begins with it: this is the paper's "a point from which avoidance
 //! is possible".
+//!
+//! Few of the plans are followed to their end. Bounds say which could not win; arcs that begin alike share what they have
+//! in common (`fan`); and probes far along an arc find most of those that are blocked. The best plan is that of a search
+//! without all this, to the bit (`tests`).
 
 use crate::context::ExpertContext;
 use crate::elastic_band::ElasticBand;
