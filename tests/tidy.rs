@@ -23,7 +23,7 @@ fn dependencies() -> BTreeMap<String, Vec<String>> {
 }
 
 /// Each crate with the siblings that it may use: the data flows from left to right, never back.
-const LAYERS: [(&str, &[&str]); 9] = [
+const LAYERS: [(&str, &[&str]); 10] = [
     ("sim", &[]),
     ("scenarios", &["sim"]),
     ("expert", &["sim"]),
@@ -32,7 +32,8 @@ const LAYERS: [(&str, &[&str]); 9] = [
     ("experiment", &["sim", "scenarios", "expert", "planners", "policy"]),
     ("evaluation", &["sim", "planners", "policy", "experiment"]),
     ("report", &["sim", "policy", "experiment", "evaluation"]),
-    ("xtask", &["sim", "scenarios", "planners", "policy", "experiment", "evaluation", "report"]),
+    ("benchmark", &["sim", "scenarios", "expert", "policy", "experiment"]),
+    ("xtask", &["sim", "scenarios", "planners", "policy", "experiment", "evaluation", "report", "benchmark"]),
 ];
 
 #[test]

@@ -136,7 +136,12 @@ mod tests {
             stopped: false,
             validation: validation(1.5),
             curve: [(2, 2.5), (4, 1.5)]
-                .map(|(step, at)| CurvePoint { step, training: loss(3.0), validation: validation(at) })
+                .map(|(step, at)| CurvePoint {
+                    step,
+                    learning_rate: 1e-3,
+                    training: loss(3.0),
+                    validation: validation(at),
+                })
                 .to_vec(),
         };
         let mut recorder = Recorder::default();

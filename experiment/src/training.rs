@@ -185,7 +185,8 @@ impl<'a> Monitor<'a> {
         self.progress.at(f64::from(fit.step) / f64::from(fit.steps), &mut |Elapsed { seconds }| {
             let per_s = fit.samples_done as f64 / seconds;
             let validation = fit.validation.map_or_else(String::new, |at| format!(", validation {:.3} m", at.rmse_m));
-            format!("loss {:.3}{validation}, {per_s:.0} samples/s", fit.loss.total)
+            let (loss, learning_rate) = (fit.loss.total, fit.learning_rate);
+            format!("loss {loss:.3}{validation}, learning rate {learning_rate:.1e}, {per_s:.0} samples/s")
         });
     }
 

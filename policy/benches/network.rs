@@ -1,13 +1,10 @@
-//! Samples per second of training and inference. `cargo bench --profile dev -p policy` shares the optimised
+//! Answers of the network; trainings are measured by `cargo xtask bench`. `cargo bench --profile dev -p policy` shares the optimised
 //! development profile (and its artefacts) with everything else.
 
 use divan::{Bencher, counter::ItemsCount};
-use policy::dataset::{Dataset, Round, Sample, ValidationSplit};
-use policy::fit::{FitContext, FitProgress, FitSettings, KeepWeights, fit};
 use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Predictor, Weights};
 use sim::seed::RootSeed;
-use sim::sensing::{GridGeometry, OccupancyGrid};
-use std::ops::ControlFlow;
+use sim::sensing::OccupancyGrid;
 
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
@@ -42,31 +39,6 @@ fn grids(count: usize) -> Vec<OccupancyGrid> {
             grid
         })
         .collect()
-}
-
-/// Steps per measurement: enough to make the start of a training negligible.
-const STEPS: u32 = 10;
-
-#[divan::bench(args = [64, 128, 256, 512], consts = [0, 1], sample_count = 5)]
-fn train<const NET: usize>(bencher: Bencher<'_, '_>, batch: usize) {
-    let samples: Vec<_> =
-        grids(2048).into_iter().map(|grid| Sample { grid, label: [0.5, 0.4], tau_hat: 0.1 }).collect();
-    let mut dataset = Dataset::default();
-    dataset.push(Round::from(samples));
-    let settings = FitSettings {
-        batch,
-        validation: ValidationSplit::none(),
-        keep: KeepWeights::Last,
-        ..FitSettings::quick(STEPS)
-    };
-    let start = Weights::init(net(NETS[NET]), RootSeed(1), 0);
-    bencher.counter(ItemsCount::new(batch * STEPS as usize)).bench_local(|| {
-        let mut progress = |_: &FitProgress| ControlFlow::Continue(());
-        let inference = InferenceSettings::plain();
-        let (geometry, device, seed) = (GridGeometry::paper(), DeviceChoice::Cpu, RootSeed(1));
-        let context = FitContext { geometry, inference, device, seed };
-        fit(start.clone(), &dataset, &settings, context, &mut progress)
-    });
 }
 
 #[divan::bench(args = [1, 16, 64, 512], consts = [0, 1], sample_count = 20)]

@@ -1,31 +1,26 @@
-//! The driving policy network: what it is, its weights, and two ways to compute it.
+//! The driving policy network: a module of burn, its weights on the host, and how it answers.
 //!
-//! | type | computes with | used for |
-//! |---|---|---|
-//! | [`LookAheadNet`] | burn, on any of its devices | the definition; GPUs |
-//! | [`Predictor`] on [`DeviceChoice::Cpu`] | [`fast`]: the same network arranged for CPUs | everything by default |
-//!
-//! Tests compare the two, values and gradients.
+//! [`LookAheadNet`] is the network. Its two convolutions and its dense layers are custom [`operations`]: fast on CPUs,
+//! plain burn on GPUs. The same module is trained (with autodiff) and drives (without, in [`Predictor`]).
 
 mod architecture;
 mod device;
 mod dropout;
 mod error;
-pub mod fast;
 mod inference;
 mod log_variance;
 mod look_ahead_net;
+pub mod operations;
 mod predictor;
 mod weights;
 
 pub use architecture::{ConvLayer, LANES, NetworkArchitecture, OUTPUTS, POOLED_1, POOLED_2};
 pub use device::DeviceChoice;
-pub use dropout::{DropoutDraw, DropoutFactors};
+pub use dropout::DropoutFactors;
 pub use error::NetworkError;
 pub use inference::InferenceSettings;
-pub(crate) use log_variance::soft_clamp_slope;
 pub use log_variance::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, soft_clamp_log_variance};
 pub use look_ahead_net::LookAheadNet;
-pub(crate) use look_ahead_net::grid_tensor;
+pub(crate) use look_ahead_net::occupied_tensor;
 pub use predictor::{Prediction, Predictor};
 pub use weights::{Parts, Weights};

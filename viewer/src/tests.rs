@@ -423,11 +423,11 @@ fn a_training_is_read_from_its_folder() {
         std::fs::write(folder.join("round.toml"), collection).unwrap();
         let point = |step: u32| {
             format!(
-                "[[curve]]\nstep = {step}\ntraining = {{ misfit = 1.5, log_variance = -2.0, total = -0.5 }}\n\
+                "[[curve]]\nstep = {step}\nlearning_rate = 0.25\ntraining = {{ misfit = 1.5, log_variance = -2.0, total = -0.5 }}\n\
                  validation = {{ samples = 9, loss = -1.0, nll = -1.25, rmse_m = 0.75 }}\n"
             )
         };
-        let head = "schema = 1\ntraining_samples = 90\nvalidation_samples = 9\nsteps = 100\nkept_step = 100\nstopped = false\n";
+        let head = "schema = 2\ntraining_samples = 90\nvalidation_samples = 9\nsteps = 100\nkept_step = 100\nstopped = false\n";
         std::fs::write(folder.join("fit.toml"), format!("{head}{}{}", point(50), point(100))).unwrap();
     }
     std::fs::write(run.join("settings.toml"), settings.to_toml()).unwrap();
@@ -443,8 +443,7 @@ fn a_training_is_read_from_its_folder() {
     assert_eq!(steps("rounds/samples/dataset"), BTreeMap::from([(0, 500.0), (100, 900.0)]));
     assert_eq!(steps("rounds/near_collisions")[&0], 2.0, "per 100 m");
     assert_eq!(shown.signal("rounds/samples/new", "round"), BTreeMap::from([(0, 500.0), (1, 400.0)]));
-    let last = f64::from(settings.dagger.fit.learning_rate.at(99, 100));
-    assert_eq!(steps("training/learning_rate")[&200], last);
+    assert_eq!(steps("training/learning_rate")[&200], 0.25);
     let entities = shown.entities();
     for path in named(&layout::of_training()) {
         assert!(entities.iter().any(|entity| entity.starts_with(&path)), "{path} is not recorded: {entities:?}");

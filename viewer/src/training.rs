@@ -5,9 +5,8 @@ use crate::layout;
 use crate::recording::Recording;
 use crate::shapes::color;
 use anyhow::ensure;
-use experiment::run_dir;
 use policy::dataset::Collection;
-use policy::fit::{FitReport, FitSettings};
+use policy::fit::FitReport;
 use rerun::{SeriesLines, SeriesPoints, TextDocument};
 use std::path::Path;
 
@@ -33,7 +32,6 @@ const ROUNDS: [(&str, &str, Colour); 4] = [
 /// # Errors
 /// If there is no training, or a file of it cannot be read.
 pub(crate) fn show(run: &Path, recording: &Recording) -> anyhow::Result<()> {
-    let settings = run_dir::settings_of(run)?;
     for (entity, name, colour) in CURVES {
         let line = SeriesLines::new().with_names([name]).with_colors([color(colour)]).with_widths([1.5]);
         recording.log_static(entity, &line);
@@ -50,7 +48,7 @@ pub(crate) fn show(run: &Path, recording: &Recording) -> anyhow::Result<()> {
         recording.at_step(first_step, i64::from(rounds));
         collected(&collection, dataset, recording);
         if let Some(fit) = FitReport::read(&folder)? {
-            fitted(&fit, &settings.dagger.fit_of_round(rounds), first_step, i64::from(rounds), recording);
+            fitted(&fit, first_step, i64::from(rounds), recording);
             first_step += i64::from(fit.steps);
         }
         rounds += 1;
@@ -74,14 +72,14 @@ fn collected(collection: &Collection, dataset: usize, recording: &Recording) {
 }
 
 /// A finished fit, point by point.
-fn fitted(fit: &FitReport, settings: &FitSettings, first_step: i64, round: i64, recording: &Recording) {
+fn fitted(fit: &FitReport, first_step: i64, round: i64, recording: &Recording) {
     let value = |entity: &str, value: f32| recording.log_value(entity, f64::from(value));
     for point in &fit.curve {
         recording.at_step(first_step + i64::from(point.step), round);
         value("training/loss/misfit", point.training.misfit);
         value("training/loss/log_variance", point.training.log_variance);
         value("training/loss/total", point.training.total);
-        value("training/learning_rate", settings.learning_rate.at(point.step.saturating_sub(1), fit.steps));
+        value("training/learning_rate", point.learning_rate);
         if let Some(validation) = &point.validation {
             value("training/validation/nll", validation.nll);
             value("training/validation_error/rmse", validation.rmse_m);

@@ -1,8 +1,8 @@
 //! The command line: which commands there are.
 
 use crate::commands::{
-    completions, drivers, evaluate, generate, guard, lots, pixel_accuracy, render, reproduce, sample_size, settings,
-    train, tune, visualise,
+    bench, completions, drivers, evaluate, generate, guard, lots, pixel_accuracy, render, reproduce, sample_size,
+    settings, train, tune, visualise,
 };
 use crate::output::{Color, Output};
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -68,6 +68,9 @@ enum Command {
     /// How far must be driven to see a difference in near-collisions, or to bound their rate.
     #[command(after_help = sample_size::EXAMPLES)]
     SampleSize(sample_size::SampleSizeArgs),
+    /// How fast this is on this machine, beside other simulators and libraries if asked.
+    #[command(after_help = bench::EXAMPLES)]
+    Bench(bench::BenchArgs),
     /// Prints settings as TOML that `--config` reads, or explains one.
     #[command(after_help = settings::EXAMPLES)]
     Settings(settings::SettingsArgs),
@@ -115,6 +118,7 @@ impl Cli {
             Command::Generate(args) => generate::run(args, output),
             Command::PixelAccuracy(args) => pixel_accuracy::run(args, output),
             Command::SampleSize(args) => sample_size::run(args, output),
+            Command::Bench(args) => bench::run(args, output),
             Command::Settings(args) => settings::run(args, output),
             Command::Lots(args) => lots::run(args, output),
             Command::Drivers(args) => drivers::run(args, output),
@@ -142,6 +146,7 @@ impl Command {
             Self::Reproduce(_)
             | Self::Guard(_)
             | Self::Generate(_)
+            | Self::Bench(_)
             | Self::Settings(_)
             | Self::Tune(_)
             | Self::Render(_)

@@ -1,5 +1,6 @@
 //! The commands, one file each: arguments → settings → call → what is printed.
 
+pub(crate) mod bench;
 pub(crate) mod completions;
 pub(crate) mod drivers;
 pub(crate) mod evaluate;

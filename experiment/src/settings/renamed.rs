@@ -16,7 +16,8 @@ pub(super) const RENAMED: [(&str, &str); 11] = [
 ];
 
 /// Old key or section, and why it is gone.
-pub(super) const REMOVED: [(&str, &str); 5] = [
+pub(super) const REMOVED: [(&str, &str); 6] = [
+    ("dagger.fit.shards", "the result does not depend on how a batch is cut for threads; leave it out"),
     ("dagger.geometry", "the grid is that of episode.sensing.geometry"),
     (
         "dagger.fit_cloning",

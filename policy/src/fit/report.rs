@@ -42,6 +42,8 @@ pub struct Validation {
 pub struct CurvePoint {
     /// After this step.
     pub step: u32,
+    /// Learning rate of this step.
+    pub learning_rate: f32,
     /// Mean training loss since the previous point.
     pub training: LossParts,
     /// Validation here.
@@ -72,7 +74,8 @@ pub struct FitReport {
 
 impl Format for FitReport {
     const NAME: &'static str = "fit.toml";
-    const SCHEMA: u32 = 1;
+    /// 1 had no learning rates.
+    const SCHEMA: u32 = 2;
 }
 
 impl FitReport {

@@ -1,5 +1,9 @@
 //! Learning rate over time.
 
+use burn::lr_scheduler::cosine::CosineAnnealingLrSchedulerConfig;
+use burn::lr_scheduler::linear::LinearLrSchedulerConfig;
+use burn::lr_scheduler::module_lr_scheduler::ModuleLrScheduler;
+use burn::lr_scheduler::sequential::SequentialLrSchedulerConfig;
 use serde::{Deserialize, Serialize};
 
 /// Learning rate over time: linear warm-up, then a shape.
@@ -32,19 +36,25 @@ impl LearningRate {
         Self { peak: value, floor: value, warm_up_steps: 0, shape: ScheduleShape::Constant }
     }
 
-    /// Value in step `step` of `steps`, from 0.
-    pub fn at(&self, step: u32, steps: u32) -> f32 {
-        if step < self.warm_up_steps {
-            return self.peak * (step + 1) as f32 / self.warm_up_steps as f32;
-        }
-        match self.shape {
-            ScheduleShape::Constant => self.peak,
+    /// burn's scheduler for a training of `steps` steps.
+    ///
+    /// # Errors
+    /// If a value is outside of what burn accepts: the peak above 0 and at most 1, the floor from 0 to the peak.
+    pub fn scheduler(&self, steps: u32) -> Result<ModuleLrScheduler, String> {
+        let (peak, floor) = (f64::from(self.peak), f64::from(self.floor));
+        let shape = match self.shape {
+            ScheduleShape::Constant => LinearLrSchedulerConfig::new(peak, peak, 1).into(),
             ScheduleShape::Cosine => {
                 let span = steps.saturating_sub(self.warm_up_steps + 1).max(1);
-                let share = ((step - self.warm_up_steps) as f32 / span as f32).min(1.0);
-                self.floor + 0.5 * (self.peak - self.floor) * (1.0 + (std::f32::consts::PI * share).cos())
+                CosineAnnealingLrSchedulerConfig::new(peak, span as usize).with_min_lr(floor).into()
             }
-        }
+        };
+        let warm_up = match self.warm_up_steps {
+            0 => return SequentialLrSchedulerConfig::new(vec![shape], Vec::new()).init(),
+            1 => LinearLrSchedulerConfig::new(peak, peak, 1),
+            steps => LinearLrSchedulerConfig::new(peak / f64::from(steps), peak, steps as usize - 1),
+        };
+        SequentialLrSchedulerConfig::new(vec![warm_up.into(), shape], vec![self.warm_up_steps as usize]).init()
     }
 }
 
@@ -52,12 +62,26 @@ impl LearningRate {
 mod tests {
     use super::*;
 
+    fn first(rate: LearningRate, steps: u32) -> Vec<f64> {
+        let mut scheduler = rate.scheduler(steps).unwrap();
+        (0..steps).map(|_| scheduler.step().base()).collect()
+    }
+
     #[test]
     fn cosine_with_warm_up_by_table() {
         let rate = LearningRate { peak: 1.0, floor: 0.1, warm_up_steps: 4, shape: ScheduleShape::Cosine };
-        for (step, expected) in [(0, 0.25), (3, 1.0), (4, 1.0), (9, 0.55), (14, 0.1), (20, 0.1)] {
-            assert!((rate.at(step, 15) - expected).abs() < 1e-6, "step {step}: {}", rate.at(step, 15));
+        let found = first(rate, 15);
+        for (step, expected) in [(0, 0.25), (3, 1.0), (4, 1.0), (9, 0.55), (14, 0.1)] {
+            assert!((found[step] - expected).abs() < 1e-6, "step {step}: {}", found[step]);
         }
-        assert_eq!(LearningRate::constant(0.3).at(7, 10), 0.3);
+        for warm_up_steps in [0, 1] {
+            let found = first(LearningRate { warm_up_steps, ..rate }, 15);
+            assert_eq!((found[0], found[1] <= 1.0), (1.0, true), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_constant_rate_stays() {
+        assert!(first(LearningRate::constant(0.3), 10).iter().all(|rate| (rate - 0.3).abs() < 1e-6));
     }
 }

@@ -1,7 +1,7 @@
 //! How to train.
 
 use crate::dataset::ValidationSplit;
-use crate::fit::adam::AdamSettings;
+use crate::fit::optimizer::AdamSettings;
 use crate::fit::schedule::{LearningRate, ScheduleShape};
 use crate::loss::LossSettings;
 use serde::{Deserialize, Serialize};
@@ -14,13 +14,11 @@ pub struct FitSettings {
     pub budget: Budget,
     /// Samples per step.
     pub batch: usize,
-    /// Parts a batch is cut into for threads. Part of the result: another number gives other bits.
-    pub shards: usize,
     /// Learning rate over time.
     pub learning_rate: LearningRate,
     /// Adam without its learning rate.
     pub adam: AdamSettings,
-    /// Norm above which a gradient is scaled down to it; 0 = never.
+    /// Norm above which the gradient of a parameter (a layer's weights or biases) is scaled down to it; 0 = never.
     pub gradient_norm_max: f32,
     /// The loss.
     pub loss: LossSettings,
@@ -85,7 +83,6 @@ impl FitSettings {
         Self {
             budget: Budget::Steps(100_000),
             batch: 512,
-            shards: 2,
             learning_rate: LearningRate::constant(1e-5),
             adam: AdamSettings::paper(),
             gradient_norm_max: 5.0,

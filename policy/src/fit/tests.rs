@@ -28,7 +28,7 @@ fn dataset(samples: usize) -> Dataset {
 
 fn settings(steps: u32) -> FitSettings {
     FitSettings {
-        batch: 33, // shards of different sizes
+        batch: 33, // two chunks and a part of one
         validation: ValidationSplit { block: 20, every: 5 },
         validate_every: 20,
         patience: 0,
@@ -60,7 +60,7 @@ fn a_readable_rule_is_learned() {
 }
 
 #[test]
-fn one_and_two_threads_learn_the_same_bits() {
+fn one_two_and_eight_threads_learn_the_same_bits() {
     let dataset = dataset(200);
     let with_threads = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -68,32 +68,8 @@ fn one_and_two_threads_learn_the_same_bits() {
     };
     let one = with_threads(1);
     assert_eq!(one.values(), with_threads(2).values());
+    assert_eq!(one.values(), with_threads(8).values());
     assert_ne!(one, Weights::init(tiny(), RootSeed(1), 0));
-}
-
-#[test]
-fn the_number_of_shards_changes_only_roundings() {
-    let dataset = dataset(200);
-    let no_dropout = NetworkArchitecture { dropout_features: 0.0, dropout_hidden: 0.0, ..tiny() };
-    let with_shards = |shards| {
-        let settings = FitSettings { shards, ..settings(5) };
-        let start = Weights::init(no_dropout, RootSeed(1), 0);
-        let mut progress = |_: &FitProgress| ControlFlow::Continue(());
-        fit(start, &dataset, &settings, context(DeviceChoice::Cpu), &mut progress).unwrap()
-    };
-    let (one, three) = (with_shards(1).report, with_shards(3).report);
-    let (one, three) = (one.validation.unwrap(), three.validation.unwrap());
-    assert!((one.nll - three.nll).abs() < 1e-3, "{one:?} {three:?}");
-}
-
-#[test]
-fn burn_and_fast_learn_alike() {
-    let dataset = dataset(200);
-    let fast = train(&dataset, &settings(6), DeviceChoice::Cpu).report;
-    let burn = train(&dataset, &settings(6), DeviceChoice::Flex).report;
-    let (a, b) = (fast.curve[0], burn.curve[0]);
-    assert!((a.training.total - b.training.total).abs() < 1e-3, "{a:?} {b:?}");
-    assert!((a.validation.unwrap().nll - b.validation.unwrap().nll).abs() < 1e-3, "{a:?} {b:?}");
 }
 
 #[test]
@@ -169,4 +145,18 @@ fn patience_ends_a_training_that_no_longer_improves() {
     assert!(!report.stopped && report.steps < 2000, "{} steps", report.steps);
     // The best, then two validations that are not better.
     assert_eq!(report.kept_step + 2 * hasty.validate_every, report.steps);
+}
+
+/// The same loop on the plain operations of a GPU. `.ci/gpu` runs it on a software Vulkan.
+#[cfg(feature = "wgpu")]
+#[test]
+fn a_gpu_learns_as_a_cpu_does() {
+    let dataset = dataset(200);
+    let (cpu, gpu) = (
+        train(&dataset, &settings(20), DeviceChoice::Cpu).report,
+        train(&dataset, &settings(20), DeviceChoice::Wgpu).report,
+    );
+    let (cpu, gpu) = (cpu.curve[0], gpu.curve[0]);
+    assert!((cpu.training.total - gpu.training.total).abs() < 1e-3, "{cpu:?} {gpu:?}");
+    assert!((cpu.validation.unwrap().rmse_m - gpu.validation.unwrap().rmse_m).abs() < 1e-3, "{cpu:?} {gpu:?}");
 }

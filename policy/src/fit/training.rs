@@ -1,13 +1,15 @@
 //! One training: steps, validation, and which weights are kept.
 
 use crate::dataset::{Dataset, Sample};
-use crate::fit::adam::Adam;
 use crate::fit::batch_sampler::BatchSampler;
-use crate::fit::engine::Engine;
 use crate::fit::report::{CurvePoint, FitProgress, FitReport, Validation};
 use crate::fit::settings::{FitSettings, KeepWeights};
-use crate::loss::{self, LossParts, LossSettings};
-use crate::network::{DeviceChoice, InferenceSettings, Predictor, Weights};
+use crate::loss::{self, BatchLoss, LossParts, LossSettings};
+use crate::network::{
+    DeviceChoice, DropoutFactors, InferenceSettings, LookAheadNet, OUTPUTS, Predictor, Weights, occupied_tensor,
+};
+use burn::optim::GradientsParams;
+use burn::tensor::{Device, Tensor, TensorData};
 use sim::seed::RootSeed;
 use sim::sensing::GridGeometry;
 use std::borrow::Cow;
@@ -33,13 +35,14 @@ pub enum FitError {
         /// From the split.
         every: usize,
     },
-    /// A batch without samples or without shards.
-    #[error("batch {batch} and shards {shards}: both must be positive")]
-    EmptyBatch {
-        /// From the settings.
-        batch: usize,
-        /// From the settings.
-        shards: usize,
+    /// A batch without samples.
+    #[error("a batch of 0 samples: it must be positive")]
+    EmptyBatch,
+    /// A learning rate that burn does not accept.
+    #[error("learning rate: {problem}")]
+    LearningRate {
+        /// What is wrong.
+        problem: String,
     },
 }
 
@@ -59,7 +62,7 @@ pub struct FitContext {
 /// Trains `start` on a data set. `progress` is called after every step and may stop it.
 ///
 /// # Errors
-/// If there is nothing to train on.
+/// If there is nothing to train on, or the learning rate is impossible.
 pub fn fit(
     start: Weights,
     dataset: &Dataset,
@@ -67,8 +70,8 @@ pub fn fit(
     context: FitContext,
     progress: &mut dyn FnMut(&FitProgress) -> ControlFlow<()>,
 ) -> Result<FitOutcome, FitError> {
-    if settings.batch == 0 || settings.shards == 0 {
-        return Err(FitError::EmptyBatch { batch: settings.batch, shards: settings.shards });
+    if settings.batch == 0 {
+        return Err(FitError::EmptyBatch);
     }
     let split = dataset.split(settings.validation);
     if split.training.is_empty() {
@@ -80,39 +83,45 @@ pub fn fit(
         (!samples.is_empty()).then(|| evaluate(weights, samples, &settings.loss, context))
     };
 
-    let mut weights = start;
-    let mut adam = Adam::new(settings.adam, weights.values().len());
-    let mut engine = Engine::new(weights.architecture(), settings.shards, context.device);
+    let architecture = start.architecture();
+    let device = context.device.device().autodiff();
+    let mut net = LookAheadNet::from_weights(&start, &device);
+    let mut optimizer = settings.adam.optimizer(settings.gradient_norm_max);
+    let mut scheduler =
+        settings.learning_rate.scheduler(steps).map_err(|problem| FitError::LearningRate { problem })?;
     let mut sampler = BatchSampler::new(&split.training, settings.mirror, context.seed);
     let mut batch = Vec::with_capacity(settings.batch);
     let mut curve = Vec::new();
     let mut since_point = MeanLoss::default();
-    let mut best = Best::new(&weights);
+    let mut best = Best::new(start);
     let mut latest = None;
     let mut done = 0;
     let mut stopped = false;
     while done < steps && !stopped {
         sampler.draw(settings.batch, &mut batch);
-        let loss = engine.gradient(&weights, &batch, &settings.loss, context.seed, done);
+        let dropout = DropoutFactors::draw(&architecture, batch.len(), context.seed, u64::from(done), &device);
+        let outputs = net.forward(occupied(&batch, &device), Some(dropout));
+        let BatchLoss { misfit, log_variance } = batch_loss(&settings.loss, outputs, &batch, &device);
+        let (misfit, log_variance) = (misfit.mean(), log_variance.mean());
+        let gradients = (misfit.clone() + log_variance.clone()).backward();
+        let loss = LossParts::new(misfit.into_scalar(), log_variance.into_scalar());
         assert!(loss.total.is_finite(), "the loss became {loss:?} in step {done}: lower the learning rate");
-        let norm = engine.reduce();
-        let scale = match settings.gradient_norm_max {
-            0.0 => 1.0,
-            max => (max / norm.max(f32::MIN_POSITIVE)).min(1.0),
-        };
-        let learning_rate = settings.learning_rate.at(done, steps);
-        adam.step(learning_rate, weights.values_mut(), engine.reduced(), scale);
+        let gradients = GradientsParams::from_grads(gradients, &net);
+        let learning_rate = scheduler.step();
+        net = optimizer.step(learning_rate.clone(), net, gradients);
         done += 1;
         since_point.add(loss);
 
         let samples_done = u64::from(done) * settings.batch as u64;
+        let learning_rate = learning_rate.base() as f32;
         let now = FitProgress { step: done, steps, samples_done, learning_rate, loss, validation: latest };
         stopped = progress(&now).is_break();
         let is_last = done == steps || stopped;
         if is_last || settings.validate_every > 0 && done % settings.validate_every == 0 {
+            let weights = net.to_weights(architecture);
             latest = validate(&weights, &validated);
-            curve.push(CurvePoint { step: done, training: since_point.take(), validation: latest });
-            best.offer(&weights, done, latest, settings.keep);
+            curve.push(CurvePoint { step: done, learning_rate, training: since_point.take(), validation: latest });
+            best.offer(weights, done, latest, settings.keep);
             if settings.patience > 0 && best.offers_since >= settings.patience {
                 break;
             }
@@ -140,24 +149,40 @@ fn thinned(samples: &[Sample], at_most: usize) -> Cow<'_, [Sample]> {
     Cow::Owned((0..at_most).map(|i| samples[i * samples.len() / at_most]).collect())
 }
 
+fn occupied(samples: &[Sample], device: &Device) -> Tensor<3, burn::tensor::Bool> {
+    occupied_tensor(samples.iter().map(|sample| &sample.grid), samples.len(), device)
+}
+
+fn batch_loss(settings: &LossSettings, outputs: Tensor<2>, samples: &[Sample], device: &Device) -> BatchLoss {
+    let labels: Vec<f32> = samples.iter().flat_map(|sample| sample.label).collect();
+    let weights: Vec<f32> = samples.iter().map(|s| settings.weight_of_squared_error(s.tau_hat)).collect();
+    let tensor =
+        |values: Vec<f32>, columns| Tensor::<2>::from_data(TensorData::new(values, [samples.len(), columns]), device);
+    loss::of_batch(settings, outputs, tensor(labels, 2), tensor(weights, 1))
+}
+
 /// Compares the answers to samples with their labels.
 pub fn evaluate(weights: &Weights, samples: &[Sample], loss: &LossSettings, context: FitContext) -> Validation {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
     let outputs = Predictor::new(weights.clone(), context.inference, context.device).raw(&grids);
-    let as_trained = LossSettings { beta: 0.0, ..*loss };
-    let (mut total, mut nll, mut squared_error) = (0.0, 0.0, 0.0);
-    for (raw, sample) in outputs.into_iter().zip(samples) {
-        total += f64::from(loss::of_sample(&as_trained, raw, sample.label, sample.tau_hat).parts.total);
-        let plain = loss::of_sample(&LossSettings::unweighted(), raw, sample.label, 0.0);
-        nll += f64::from(plain.parts.total);
-        squared_error += f64::from(plain.squared_error);
-    }
-    let n = samples.len().max(1) as f64;
+    let squared_error: f64 = outputs
+        .iter()
+        .zip(samples)
+        .flat_map(|(raw, sample)| (0..2).map(|axis| f64::from(sample.label[axis] - raw[axis]).powi(2)))
+        .sum();
+    let device = DeviceChoice::Cpu.device();
+    let mean_loss = |settings: &LossSettings| {
+        let raw = TensorData::new(outputs.as_flattened().to_vec(), [samples.len(), OUTPUTS]);
+        let loss = batch_loss(settings, Tensor::from_data(raw, &device), samples, &device);
+        let values: Vec<f32> = (loss.misfit + loss.log_variance).into_data().try_into_vec().expect("losses are f32");
+        let sum: f64 = values.iter().map(|value| f64::from(*value)).sum();
+        (sum / values.len().max(1) as f64) as f32
+    };
     Validation {
         samples: samples.len(),
-        loss: (total / n) as f32,
-        nll: (nll / n) as f32,
-        rmse_m: (squared_error / n).sqrt() as f32 * context.geometry.side_m,
+        loss: mean_loss(&LossSettings { beta: 0.0, ..*loss }),
+        nll: mean_loss(&LossSettings::unweighted()),
+        rmse_m: (squared_error / samples.len().max(1) as f64).sqrt() as f32 * context.geometry.side_m,
     }
 }
 
@@ -172,11 +197,11 @@ struct Best {
 }
 
 impl Best {
-    fn new(weights: &Weights) -> Self {
-        Self { weights: weights.clone(), step: 0, validation: None, offers_since: 0, lowest: f32::INFINITY }
+    fn new(weights: Weights) -> Self {
+        Self { weights, step: 0, validation: None, offers_since: 0, lowest: f32::INFINITY }
     }
 
-    fn offer(&mut self, weights: &Weights, step: u32, found: Option<Validation>, keep: KeepWeights) {
+    fn offer(&mut self, weights: Weights, step: u32, found: Option<Validation>, keep: KeepWeights) {
         let is_lowest = found.is_some_and(|found| found.loss < self.lowest);
         if let Some(found) = found {
             self.lowest = self.lowest.min(found.loss);
@@ -187,7 +212,7 @@ impl Best {
             (KeepWeights::BestByValidation, Some(_)) => is_lowest,
         };
         if is_kept {
-            self.weights.values_mut().copy_from_slice(weights.values());
+            self.weights = weights;
             self.step = step;
             self.validation = found;
         }
@@ -211,6 +236,6 @@ impl MeanLoss {
     fn take(&mut self) -> LossParts {
         let Self { sum, count } = std::mem::take(self);
         let [misfit, log_variance] = sum.map(|sum| (sum / f64::from(count.max(1))) as f32);
-        LossParts { misfit, log_variance, total: misfit + log_variance }
+        LossParts::new(misfit, log_variance)
     }
 }

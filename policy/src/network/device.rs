@@ -7,11 +7,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DeviceChoice {
-    /// [`fast`](crate::network::fast), on all threads of the current rayon pool.
+    /// burn's CPU backend with the operations of [`operations`](crate::network::operations), on all threads of the
+    /// current rayon pool.
     #[default]
     Cpu,
-    /// burn's CPU backend: the reference, slower.
-    Flex,
     /// First CUDA device.
     #[cfg(feature = "cuda")]
     Cuda,
@@ -24,17 +23,16 @@ pub enum DeviceChoice {
 }
 
 impl DeviceChoice {
-    /// The burn device, or `None` for [`fast`](crate::network::fast).
-    pub(crate) fn burn_device(self) -> Option<Device> {
+    /// The device of burn.
+    pub fn device(self) -> Device {
         match self {
-            Self::Cpu => None,
-            Self::Flex => Some(Device::flex()),
+            Self::Cpu => Device::flex(),
             #[cfg(feature = "cuda")]
-            Self::Cuda => Some(Device::cuda(0)),
+            Self::Cuda => Device::cuda(0),
             #[cfg(feature = "wgpu")]
-            Self::Wgpu => Some(Device::wgpu(burn::tensor::DeviceKind::DefaultDevice)),
+            Self::Wgpu => Device::wgpu(burn::tensor::DeviceKind::DefaultDevice),
             #[cfg(feature = "vulkan")]
-            Self::Vulkan => Some(Device::vulkan(burn::tensor::DeviceKind::DefaultDevice)),
+            Self::Vulkan => Device::vulkan(burn::tensor::DeviceKind::DefaultDevice),
         }
     }
 }

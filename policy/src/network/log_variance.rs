@@ -12,12 +12,6 @@ pub fn soft_clamp_log_variance(raw: f32) -> f32 {
     CLAMP_MID + CLAMP_HALF * ((raw - CLAMP_MID) / CLAMP_HALF).tanh()
 }
 
-/// Slope of [`soft_clamp_log_variance`], given its value.
-pub(crate) fn soft_clamp_slope(log_variance: f32) -> f32 {
-    let tanh = (log_variance - CLAMP_MID) / CLAMP_HALF;
-    1.0 - tanh * tanh
-}
-
 /// Inverse of [`soft_clamp_log_variance`], for initial values.
 pub(crate) fn soft_clamp_inverse(log_variance: f32) -> f32 {
     CLAMP_MID + CLAMP_HALF * ((log_variance - CLAMP_MID) / CLAMP_HALF).atanh()

@@ -1,15 +1,14 @@
-//! The network as burn computes it: its definition.
+//! The network as a module of burn.
 
 use crate::network::architecture::{ConvLayer, NetworkArchitecture, OUTPUTS};
 use crate::network::dropout::DropoutFactors;
+use crate::network::operations::{dense, encode};
 use crate::network::weights::Weights;
 use burn::module::{Module, Param};
 use burn::nn::conv::{Conv2d, Conv2dConfig};
 use burn::nn::{Linear, LinearConfig, PaddingConfig2d};
 use burn::tensor::activation::relu;
-use burn::tensor::module::max_pool2d;
-use burn::tensor::ops::MaxPoolOptions;
-use burn::tensor::{Device, Gradients, Tensor, TensorData};
+use burn::tensor::{Bool, Device, Tensor, TensorData};
 use sim::sensing::{GRID_CELLS, OccupancyGrid};
 
 /// The network as burn sees it.
@@ -49,53 +48,66 @@ impl LookAheadNet {
         }
     }
 
-    /// Grids `[batch, 1, 25, 25]` to raw outputs `[batch, 4]`: means of u and w, then both raw log-variances, before
-    /// [`soft_clamp_log_variance`](crate::network::soft_clamp_log_variance).
-    pub fn forward(&self, grids: Tensor<4>, dropout: Option<DropoutFactors>) -> Tensor<2> {
-        let half = || MaxPoolOptions::new([2, 2]).with_stride([2, 2]);
-        let x = relu(max_pool2d(self.conv1.forward(grids), half())); // [batch, conv1, 12, 12]
-        let x = relu(max_pool2d(self.conv2.forward(x), half())); // [batch, conv2, 6, 6]
-        let [batch, channels, rows, cols] = x.dims();
-        // Channels last: the order of the inputs of `fc1` (see `Weights`).
-        let features = x.permute([0, 2, 3, 1]).reshape([batch, rows * cols * channels]);
+    /// Occupied cells `[batch, 25, 25]` to raw outputs `[batch, 4]`: means of u and w, then both raw log-variances,
+    /// before [`soft_clamp_log_variance`](crate::network::soft_clamp_log_variance).
+    pub fn forward(&self, occupied: Tensor<3, Bool>, dropout: Option<DropoutFactors>) -> Tensor<2> {
         let (on_features, on_hidden) = dropout.map(|factors| (factors.features, factors.hidden)).unzip();
-        let features = times(features, on_features);
-        let hidden = times(relu(self.fc1.forward(features)), on_hidden); // [batch, hidden]
-        self.fc2.forward(hidden)
+        let features = encode(
+            occupied,
+            self.conv1.weight.val(),
+            bias(self.conv1.bias.as_ref()),
+            self.conv2.weight.val(),
+            bias(self.conv2.bias.as_ref()),
+        ); // [batch, features]
+        let features = times(features, on_features.flatten());
+        let hidden = relu(dense(features, self.fc1.weight.val(), bias(self.fc1.bias.as_ref())));
+        let hidden = times(hidden, on_hidden.flatten()); // [batch, hidden]
+        dense(hidden, self.fc2.weight.val(), bias(self.fc2.bias.as_ref()))
     }
 
-    /// The gradients of all parameters, on the host.
-    pub(crate) fn gradient(&self, architecture: NetworkArchitecture, gradients: &Gradients) -> Weights {
+    /// The weights of both convolutions.
+    #[cfg(test)]
+    pub(crate) fn convolutions(&self) -> (&Param<Tensor<4>>, &Param<Tensor<4>>) {
+        (&self.conv1.weight, &self.conv2.weight)
+    }
+
+    /// The parameters on the host.
+    pub fn to_weights(&self, architecture: NetworkArchitecture) -> Weights {
         let mut weights = Weights::zeros(architecture);
         let parts = weights.parts_mut();
-        for (layer, weight, bias) in
-            [(&self.conv1, parts.conv1_weight, parts.conv1_bias), (&self.conv2, parts.conv2_weight, parts.conv2_bias)]
-        {
-            read_gradient(&layer.weight, gradients, weight);
-            read_gradient(layer.bias.as_ref().expect("every layer has a bias"), gradients, bias);
-        }
-        for (layer, weight, bias) in
-            [(&self.fc1, parts.fc1_weight, parts.fc1_bias), (&self.fc2, parts.fc2_weight, parts.fc2_bias)]
-        {
-            read_gradient(&layer.weight, gradients, weight);
-            read_gradient(layer.bias.as_ref().expect("every layer has a bias"), gradients, bias);
-        }
+        read(self.conv1.weight.val(), parts.conv1_weight);
+        read(bias(self.conv1.bias.as_ref()), parts.conv1_bias);
+        read(self.conv2.weight.val(), parts.conv2_weight);
+        read(bias(self.conv2.bias.as_ref()), parts.conv2_bias);
+        read(self.fc1.weight.val(), parts.fc1_weight);
+        read(bias(self.fc1.bias.as_ref()), parts.fc1_bias);
+        read(self.fc2.weight.val(), parts.fc2_weight);
+        read(bias(self.fc2.bias.as_ref()), parts.fc2_bias);
         weights
     }
 }
 
-fn read_gradient<const D: usize>(parameter: &Param<Tensor<D>>, gradients: &Gradients, into: &mut [f32]) {
-    let gradient = parameter.val().grad(gradients).expect("every parameter takes part in the loss");
-    let values: Vec<f32> = gradient.into_data().try_into_vec().expect("gradients are f32");
+fn bias(bias: Option<&Param<Tensor<1>>>) -> Tensor<1> {
+    bias.expect("every layer has a bias").val()
+}
+
+fn read<const D: usize>(tensor: Tensor<D>, into: &mut [f32]) {
+    let values: Vec<f32> = tensor.into_data().try_into_vec().expect("parameters are f32");
     into.copy_from_slice(&values);
 }
 
-/// Grids as a tensor `[batch, 1, 25, 25]`, 1 = non-drivable; rows beyond `grids` are free.
-pub(crate) fn grid_tensor(grids: &[&OccupancyGrid], batch: usize, device: &Device) -> Tensor<4> {
-    assert!(grids.len() <= batch, "{} grids do not fit a batch of {batch}", grids.len());
-    let mut cells: Vec<f32> = grids.iter().flat_map(|grid| grid.cells().map(f32::from)).collect();
-    cells.resize(batch * GRID_CELLS * GRID_CELLS, 0.0);
-    Tensor::from_data(TensorData::new(cells, [batch, 1, GRID_CELLS, GRID_CELLS]), device)
+/// Grids as a tensor `[batch, 25, 25]`, true = non-drivable; rows beyond `grids` are free.
+pub(crate) fn occupied_tensor<'a>(
+    grids: impl Iterator<Item = &'a OccupancyGrid>,
+    batch: usize,
+    device: &Device,
+) -> Tensor<3, Bool> {
+    let mut cells = Vec::with_capacity(batch * GRID_CELLS * GRID_CELLS);
+    for grid in grids {
+        cells.extend(grid.cells().map(|cell| cell == 1));
+    }
+    cells.resize(batch * GRID_CELLS * GRID_CELLS, false);
+    Tensor::from_data(TensorData::new(cells, [batch, GRID_CELLS, GRID_CELLS]), device)
 }
 
 fn param<const D: usize>(values: &[f32], shape: [usize; D], device: &Device) -> Param<Tensor<D>> {

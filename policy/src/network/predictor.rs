@@ -2,13 +2,11 @@
 
 use crate::network::architecture::OUTPUTS;
 use crate::network::device::DeviceChoice;
-use crate::network::fast::{self, Prepared, Trace};
 use crate::network::inference::InferenceSettings;
 use crate::network::log_variance::soft_clamp_log_variance;
-use crate::network::look_ahead_net::{LookAheadNet, grid_tensor};
+use crate::network::look_ahead_net::{LookAheadNet, occupied_tensor};
 use crate::network::weights::Weights;
 use burn::tensor::Device;
-use rayon::prelude::*;
 use sim::driver::{LookAheadPoint, Spread};
 use sim::sensing::{GridGeometry, OccupancyGrid};
 
@@ -48,34 +46,28 @@ impl Prediction {
     }
 }
 
-/// Rows computed together on CPUs. The dense layers are always computed for this many rows (and the convolutions for
-/// whole tiles), so that an answer never depends on which other grids were asked about. A multiple of [`fast::TILE`].
-const GROUP: usize = 16;
-/// The same on a burn device, where a call costs more than its rows.
-const DEVICE_GROUP: usize = 64;
+/// Most rows computed in one call: bounds the memory. On CPUs an answer does not depend on the other rows.
+const ROWS_MAX: usize = 1024;
+/// Rows computed in every call on a GPU, where kernels are chosen by the number of rows.
+#[cfg(any(feature = "cuda", feature = "vulkan", feature = "wgpu"))]
+const GPU_ROWS: usize = 64;
 
 /// A network ready to answer.
 #[derive(Debug, Clone)]
 pub struct Predictor {
     weights: Weights,
     mirror_averaging: bool,
-    engine: Engine,
-}
-
-#[derive(Debug, Clone)]
-enum Engine {
-    Cpu { prepared: Prepared, traces: Vec<Trace> },
-    Burn { net: Box<LookAheadNet>, device: Device },
+    net: LookAheadNet,
+    choice: DeviceChoice,
+    device: Device,
 }
 
 impl Predictor {
     /// Makes a network ready on a device. Action smoothing is not done here: it has a memory per car.
-    pub fn new(weights: Weights, inference: InferenceSettings, device: DeviceChoice) -> Self {
-        let engine = match device.burn_device() {
-            None => Engine::Cpu { prepared: Prepared::new(&weights), traces: Vec::new() },
-            Some(device) => Engine::Burn { net: Box::new(LookAheadNet::from_weights(&weights, &device)), device },
-        };
-        Self { weights, mirror_averaging: inference.mirror_averaging, engine }
+    pub fn new(weights: Weights, inference: InferenceSettings, choice: DeviceChoice) -> Self {
+        let device = choice.device();
+        let net = LookAheadNet::from_weights(&weights, &device);
+        Self { weights, mirror_averaging: inference.mirror_averaging, net, choice, device }
     }
 
     /// The weights it answers with.
@@ -90,65 +82,37 @@ impl Predictor {
 
     /// Raw outputs per grid: means of u and w, raw log-variances of both.
     pub fn raw(&mut self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
-        let mut outputs = self.one_sided(grids);
-        if self.mirror_averaging {
-            let images: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
-            let of_images = self.one_sided(&images.iter().collect::<Vec<_>>());
-            for (output, [u, w, raw_u, raw_w]) in outputs.iter_mut().zip(of_images) {
-                let image = [1.0 - u, w, raw_u, raw_w];
-                *output = std::array::from_fn(|i| 0.5 * (output[i] + image[i]));
-            }
+        if !self.mirror_averaging {
+            return self.one_sided(grids.iter().copied(), grids.len());
+        }
+        // The images in the same call: two small calls cost more than one of twice the size.
+        let images: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
+        let mut outputs = self.one_sided(grids.iter().copied().chain(&images), 2 * grids.len());
+        let of_images = outputs.split_off(grids.len());
+        for (output, [u, w, raw_u, raw_w]) in outputs.iter_mut().zip(of_images) {
+            let image = [1.0 - u, w, raw_u, raw_w];
+            *output = std::array::from_fn(|i| 0.5 * (output[i] + image[i]));
         }
         outputs
     }
 
     /// The outputs of the network itself.
-    fn one_sided(&mut self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
-        match &mut self.engine {
-            Engine::Cpu { prepared, traces } => raw_on_cpu(&self.weights, prepared, traces, grids),
-            Engine::Burn { net, device } => grids
-                .chunks(DEVICE_GROUP)
-                .flat_map(|group| {
-                    let outputs = net.forward(grid_tensor(group, DEVICE_GROUP, device), None);
-                    let outputs: Vec<f32> = outputs.into_data().try_into_vec().expect("outputs are f32");
-                    outputs.as_chunks::<OUTPUTS>().0[..group.len()].to_vec()
-                })
-                .collect(),
+    fn one_sided<'a>(&self, mut grids: impl Iterator<Item = &'a OccupancyGrid>, count: usize) -> Vec<[f32; OUTPUTS]> {
+        let mut outputs = Vec::with_capacity(count);
+        while outputs.len() < count {
+            let left = count - outputs.len();
+            let (taken, rows) = match self.choice {
+                DeviceChoice::Cpu => (left.min(ROWS_MAX), left.min(ROWS_MAX)),
+                #[cfg(any(feature = "cuda", feature = "vulkan", feature = "wgpu"))]
+                _ => (left.min(GPU_ROWS), GPU_ROWS),
+            };
+            let occupied = occupied_tensor(grids.by_ref().take(taken), rows, &self.device);
+            let answers: Vec<f32> = self.net.forward(occupied, None).into_data().try_into_vec().expect("f32");
+            outputs.extend_from_slice(&answers.as_chunks::<OUTPUTS>().0[..taken]);
         }
+        outputs
     }
 }
-
-fn raw_on_cpu(
-    weights: &Weights,
-    prepared: &Prepared,
-    traces: &mut Vec<Trace>,
-    grids: &[&OccupancyGrid],
-) -> Vec<[f32; OUTPUTS]> {
-    let groups = grids.len().div_ceil(GROUP);
-    if traces.len() < groups.min(TRACES_MAX) {
-        traces.resize_with(groups.min(TRACES_MAX), Trace::default);
-    }
-    let mut outputs = vec![[0.0; OUTPUTS]; grids.len()];
-    // A fixed number of traces, each with its share of the groups: memory stays bounded for large calls.
-    let share = GROUP * groups.div_ceil(TRACES_MAX).max(1);
-    (grids.par_chunks(share), outputs.par_chunks_mut(share), traces.par_iter_mut()).into_par_iter().for_each(
-        |(grids, outputs, trace)| {
-            for (grids, outputs) in grids.chunks(GROUP).zip(outputs.chunks_mut(GROUP)) {
-                let mut padded = [OccupancyGrid::free(); GROUP];
-                for (into, from) in padded.iter_mut().zip(grids) {
-                    *into = **from;
-                }
-                let encoded = &padded[..grids.len().next_multiple_of(fast::TILE)];
-                let answers = fast::forward(weights, prepared, encoded, GROUP, None, trace);
-                outputs.copy_from_slice(&answers[..outputs.len()]);
-            }
-        },
-    );
-    outputs
-}
-
-/// Bound of the memory kept between calls; more than threads on most machines.
-const TRACES_MAX: usize = 64;
 
 #[cfg(test)]
 mod tests {
@@ -160,7 +124,7 @@ mod tests {
     /// The property that makes closed-loop results independent of how many cars are still on the road.
     #[test]
     fn an_answer_does_not_depend_on_the_other_grids() {
-        let grids = lots(3 * GROUP + 5);
+        let grids = lots(53);
         for (architecture, inference) in [
             (NetworkArchitecture::paper(), InferenceSettings::plain()),
             (NetworkArchitecture::compact(), InferenceSettings::smoothed()),
@@ -206,21 +170,6 @@ mod tests {
             })
         };
         assert_eq!(with_threads(1), with_threads(2));
-    }
-
-    #[test]
-    fn burn_and_fast_answer_alike() {
-        let grids = lots(70);
-        let grids: Vec<&OccupancyGrid> = grids.iter().collect();
-        let weights = Weights::init(NetworkArchitecture::paper(), RootSeed(1), 0);
-        let answers = |device| Predictor::new(weights.clone(), InferenceSettings::plain(), device).predict(&grids);
-        let (fast, burn) = (answers(DeviceChoice::Cpu), answers(DeviceChoice::Flex));
-        for (a, b) in fast.iter().zip(&burn) {
-            for axis in 0..2 {
-                assert!((a.mean[axis] - b.mean[axis]).abs() < 1e-5, "{a:?} {b:?}");
-                assert!((a.sigma[axis] - b.sigma[axis]).abs() < 1e-5, "{a:?} {b:?}");
-            }
-        }
     }
 
     #[test]

@@ -1,0 +1,121 @@
+//! How fast lotpilot is: what `cargo xtask bench` prints and docs/performance.md shows.
+//!
+//! | file | figures |
+//! |---|---|
+//! | [`driving`] | the closed loop, on one core and on two, with a cheap driver, the network and the expert |
+//! | [`maps`] | building a map, starting an episode |
+//! | [`network`] | answers and training |
+//! | [`peers`] | other simulators and libraries in the same run |
+//!
+//! A figure is the median of several measurements, each long enough to leave the start behind, with the least and the
+//! largest beside it. Nothing here asserts a time.
+
+pub mod driving;
+pub mod maps;
+pub mod network;
+pub mod peers;
+
+use std::time::{Duration, Instant};
+
+/// One figure.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// What was measured.
+    pub what: String,
+    /// The median.
+    pub median: f64,
+    /// The least and the largest measurement.
+    pub range: (f64, f64),
+    /// Of all three.
+    pub unit: &'static str,
+    /// What it should be.
+    pub goal: Option<Goal>,
+}
+
+/// What a figure should be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Goal {
+    /// The larger the better.
+    AtLeast(f64),
+    /// The smaller the better.
+    AtMost(f64),
+}
+
+impl Goal {
+    /// Whether a figure meets it.
+    pub fn is_met(self, value: f64) -> bool {
+        match self {
+            Self::AtLeast(least) => value >= least,
+            Self::AtMost(most) => value <= most,
+        }
+    }
+}
+
+/// How long to measure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// Measurements per figure; 1 or more.
+    pub repeats: usize,
+    /// Least duration of one measurement.
+    pub at_least: Duration,
+    /// Optimiser steps of a training.
+    pub training_steps: u32,
+}
+
+impl Effort {
+    /// For docs/performance.md: about twenty minutes on two cores.
+    pub fn full() -> Self {
+        Self { repeats: 5, at_least: Duration::from_secs(2), training_steps: 5000 }
+    }
+
+    /// For a look: about two minutes.
+    pub fn quick() -> Self {
+        Self { repeats: 3, at_least: Duration::from_millis(500), training_steps: 500 }
+    }
+}
+
+/// Collects figures; called with each as soon as it is there.
+pub type Report<'a> = &'a mut dyn FnMut(Figure);
+
+/// Work done per second. `work` does some and says how much.
+fn rate(effort: Effort, what: &str, unit: &'static str, goal: Option<Goal>, mut work: impl FnMut() -> f64) -> Figure {
+    let mut once = || {
+        let began = Instant::now();
+        let mut done = 0.0;
+        while began.elapsed() < effort.at_least {
+            done += work();
+        }
+        done / began.elapsed().as_secs_f64()
+    };
+    figure(what, unit, goal, (0..effort.repeats).map(|_| once()).collect())
+}
+
+/// Time of one call, in units of `unit_s` seconds.
+fn time(
+    effort: Effort,
+    what: &str,
+    (unit, unit_s): (&'static str, f64),
+    goal: Option<Goal>,
+    mut call: impl FnMut(),
+) -> Figure {
+    let mut per_second = rate(effort, what, unit, goal, || {
+        call();
+        1.0
+    });
+    let seconds = |rate: f64| 1.0 / rate / unit_s;
+    per_second.median = seconds(per_second.median);
+    per_second.range = (seconds(per_second.range.1), seconds(per_second.range.0));
+    per_second
+}
+
+fn figure(what: &str, unit: &'static str, goal: Option<Goal>, mut measured: Vec<f64>) -> Figure {
+    measured.sort_by(f64::total_cmp);
+    let range = (measured[0], measured[measured.len() - 1]);
+    Figure { what: what.to_owned(), median: measured[measured.len() / 2], range, unit, goal }
+}
+
+/// Runs on a pool of so many threads.
+fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
+    pool.install(work)
+}

@@ -1,0 +1,98 @@
+//! Other simulators and libraries, in a virtual environment of Python made from PyPI.
+
+use anyhow::{Context as _, ensure};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// A program in `peers/`, what it needs and how it is called.
+#[derive(Debug, Clone, Copy)]
+pub struct Peer {
+    /// In tables.
+    pub name: &'static str,
+    /// Packages of PyPI.
+    pub packages: &'static [&'static str],
+    /// File in `peers/`.
+    pub script: &'static str,
+    /// Its arguments.
+    pub arguments: &'static [&'static str],
+    /// What a step or a call is there.
+    pub about: &'static str,
+}
+
+/// All of them.
+pub const PEERS: [Peer; 7] = [
+    Peer {
+        name: "onnxruntime",
+        packages: &["onnxruntime", "onnx", "numpy"],
+        script: "onnx_inference.py",
+        arguments: &["compact", "1", "64", "512"],
+        about: "the same network, one thread; a call is one `run` on random binary cells",
+    },
+    Peer {
+        name: "PyTorch, compact network, batch 128",
+        packages: &["torch", "numpy"],
+        script: "torch_training.py",
+        arguments: &["compact", "128", "2000"],
+        about: "the same network and loss, channels last, fused Adam, denormals flushed, two threads",
+    },
+    Peer {
+        name: "PyTorch, compact network, batch 512",
+        packages: &["torch", "numpy"],
+        script: "torch_training.py",
+        arguments: &["compact", "512", "500"],
+        about: "as above",
+    },
+    Peer {
+        name: "PyTorch, the paper's network, batch 128",
+        packages: &["torch", "numpy"],
+        script: "torch_training.py",
+        arguments: &["paper", "128", "500"],
+        about: "as above",
+    },
+    Peer {
+        name: "PyTorch, the paper's network, batch 512",
+        packages: &["torch", "numpy"],
+        script: "torch_training.py",
+        arguments: &["paper", "512", "150"],
+        about: "as above",
+    },
+    Peer {
+        name: "HighwayEnv, parking-v0 and racetrack-v0",
+        packages: &["highway-env", "gymnasium", "numpy"],
+        script: "highway_env_steps.py",
+        arguments: &[],
+        about: "a step is one action with an occupancy grid of 25×25 presence cells (racetrack) or the kinematics that \
+                parking has; no distances, no noise",
+    },
+    Peer {
+        name: "IR-SIM",
+        packages: &["ir-sim", "numpy"],
+        script: "irsim_steps.py",
+        arguments: &[],
+        about: "a step moves one Ackermann car among polygons and casts a laser scan of 180 rays; no grid, no noise",
+    },
+];
+
+/// Runs a peer and returns what it printed, line by line.
+///
+/// # Errors
+/// If the environment cannot be made, a package cannot be installed, or the script fails.
+pub fn run(peer: &Peer, environment: &Path) -> anyhow::Result<Vec<String>> {
+    let python = python(environment)?;
+    let installed = Command::new(&python).args(["-m", "pip", "install", "--quiet"]).args(peer.packages).output()?;
+    ensure!(installed.status.success(), "pip install: {}", String::from_utf8_lossy(&installed.stderr).trim());
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("peers").join(peer.script);
+    let output = Command::new(&python).arg(&script).args(peer.arguments).output()?;
+    ensure!(output.status.success(), "{}: {}", peer.script, String::from_utf8_lossy(&output.stderr).trim());
+    Ok(String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect())
+}
+
+/// The interpreter of the environment, which is made if it is not there.
+fn python(environment: &Path) -> anyhow::Result<PathBuf> {
+    let python = environment.join("bin/python");
+    if !python.is_file() {
+        let made = Command::new("python3").args(["-m", "venv"]).arg(environment).status().context("python3")?;
+        ensure!(made.success(), "python3 -m venv {} failed; install python3-venv", environment.display());
+    }
+    Ok(python)
+}

@@ -1,0 +1,127 @@
+//! One step of Adam in one pass over its values.
+
+use super::vectors;
+use crate::network::operations::AdamStep;
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
+
+/// Values handled by one thread at a time.
+const CHUNK: usize = 1 << 14;
+
+/// Below this a mean of gradients is 0, and [`SQUARE_MIN`] is for the mean of squares: far too small to move a weight,
+/// far above the denormal numbers that processors are slow with and decaying means get stuck at.
+pub(crate) const MEAN_MIN: f32 = 1e-30;
+/// See [`MEAN_MIN`].
+pub(crate) const SQUARE_MIN: f32 = 1e-36;
+
+/// Updates weights and both means in place.
+pub(crate) fn step(step: AdamStep, weights: &mut [f32], gradient: &[f32], mean: &mut [f32], mean_square: &mut [f32]) {
+    let scale = step.gradient_scale(norm(gradient));
+    (
+        weights.par_chunks_mut(CHUNK),
+        gradient.par_chunks(CHUNK),
+        mean.par_chunks_mut(CHUNK),
+        mean_square.par_chunks_mut(CHUNK),
+    )
+        .into_par_iter()
+        .for_each(|(weights, gradient, mean, mean_square)| {
+            vectors::run(Kernel { step, scale, weights, gradient, mean, mean_square });
+        });
+}
+
+/// Euclidean norm, summed in a fixed order: lanes within a chunk, then chunks.
+fn norm(values: &[f32]) -> f32 {
+    let squares: Vec<f64> = values.par_chunks(CHUNK).map(|values| vectors::run(SumOfSquares { values })).collect();
+    squares.into_iter().sum::<f64>().sqrt() as f32
+}
+
+struct SumOfSquares<'a> {
+    values: &'a [f32],
+}
+
+impl WithSimd for SumOfSquares<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> f64 {
+        // As many sums as there are values in a line, whatever the width of a vector: the order stays the same.
+        let (lines, rest) = self.values.as_chunks::<LINE>();
+        let mut sums = [0.0; LINE];
+        for line in lines {
+            let sums = vectors::vectors_mut::<S>(&mut sums);
+            for (sum, values) in sums.iter_mut().zip(vectors::vectors::<S>(line)) {
+                *sum = simd.mul_add_f32s(*values, *values, *sum);
+            }
+        }
+        sums.iter().map(|sum| f64::from(*sum)).chain(rest.iter().map(|value| f64::from(*value).powi(2))).sum()
+    }
+}
+
+/// Values whose squares are summed side by side.
+const LINE: usize = 64;
+
+struct Kernel<'a> {
+    step: AdamStep,
+    /// Factor of the gradient.
+    scale: f32,
+    weights: &'a mut [f32],
+    gradient: &'a [f32],
+    mean: &'a mut [f32],
+    mean_square: &'a mut [f32],
+}
+
+impl WithSimd for Kernel<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { step, scale, weights, gradient, mean, mean_square } = self;
+        let (weights, weights_rest) = S::as_mut_simd_f32s(weights);
+        let (gradient, gradient_rest) = S::as_simd_f32s(gradient);
+        let (mean, mean_rest) = S::as_mut_simd_f32s(mean);
+        let (mean_square, mean_square_rest) = S::as_mut_simd_f32s(mean_square);
+        for (((weights, gradient), mean), mean_square) in weights.iter_mut().zip(gradient).zip(mean).zip(mean_square) {
+            [*weights, *mean, *mean_square] = update(simd, step, scale, *weights, *gradient, *mean, *mean_square);
+        }
+        if !gradient_rest.is_empty() {
+            let [new, new_mean, new_square] = update(
+                simd,
+                step,
+                scale,
+                simd.partial_load_f32s(weights_rest),
+                simd.partial_load_f32s(gradient_rest),
+                simd.partial_load_f32s(mean_rest),
+                simd.partial_load_f32s(mean_square_rest),
+            );
+            simd.partial_store_f32s(weights_rest, new);
+            simd.partial_store_f32s(mean_rest, new_mean);
+            simd.partial_store_f32s(mean_square_rest, new_square);
+        }
+    }
+}
+
+/// Weights, mean and mean of squares after one step.
+#[inline(always)]
+fn update<S: Simd>(
+    simd: S,
+    step: AdamStep,
+    scale: f32,
+    weights: S::f32s,
+    gradient: S::f32s,
+    mean: S::f32s,
+    mean_square: S::f32s,
+) -> [S::f32s; 3] {
+    let times = |vector, factor: f32| simd.mul_f32s(vector, simd.splat_f32s(factor));
+    let above = |vector, least: f32| {
+        let is_above = simd.greater_than_f32s(simd.abs_f32s(vector), simd.splat_f32s(least));
+        simd.select_f32s(is_above, vector, simd.splat_f32s(0.0))
+    };
+    let gradient = times(gradient, scale);
+    let mean = simd.add_f32s(times(mean, step.beta_1), times(gradient, 1.0 - step.beta_1));
+    let mean = above(mean, MEAN_MIN);
+    let square = simd.mul_f32s(times(gradient, 1.0 - step.beta_2), gradient);
+    let mean_square = above(simd.add_f32s(times(mean_square, step.beta_2), square), SQUARE_MIN);
+    let root = simd.add_f32s(times(simd.sqrt_f32s(mean_square), step.root_correction()), simd.splat_f32s(step.epsilon));
+    let change = simd.div_f32s(times(mean, step.step_size()), root);
+    [simd.sub_f32s(times(weights, step.keep()), change), mean, mean_square]
+}

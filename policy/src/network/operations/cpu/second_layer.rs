@@ -1,0 +1,325 @@
+//! Second convolution, max-pool and `ReLU`.
+//!
+//! Forward, a window is read where it lies: a row of the kernel's window is one contiguous run of the padded map. The
+//! four convolutions of a pool are computed together, so that each weight is loaded once for four products.
+//!
+//! Backward, a pool sends its gradient to one of its four cells and a silent one sends none, so that at most a quarter
+//! of the products of a dense implementation remain. They are listed first and then computed without a branch.
+
+use super::first_layer::PaddedMap;
+use super::vectors::{int_vectors_mut, vectors, vectors_mut};
+use super::{POOL, SILENT};
+use crate::network::architecture::{ConvLayer, POOLED_2};
+use pulp::Simd;
+
+/// Sizes of the layer.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SecondLayer {
+    /// Channels of the input.
+    pub(super) inputs: usize,
+    pub(super) conv: ConvLayer,
+    pub(super) map: PaddedMap,
+}
+
+/// Products that a backward pass has to compute, by what they share.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sparse {
+    /// Per output channel: (start of the window, gradient).
+    of_channel: Vec<(usize, f32)>,
+    /// Per cell of the convolution: (output channel, gradient), for the four cells of a pool.
+    of_cell: [Vec<(usize, f32)>; 4],
+}
+
+impl SecondLayer {
+    /// Values of one row of a window: they lie side by side in the padded map.
+    fn span(self) -> usize {
+        self.conv.kernel * self.inputs
+    }
+
+    /// Values of a window.
+    pub(super) fn window_len(self) -> usize {
+        self.conv.kernel * self.span()
+    }
+
+    /// Values of the padded map.
+    pub(super) fn map_len(self) -> usize {
+        self.map.side * self.map.side * self.inputs
+    }
+
+    /// Where the windows of the four cells of a pool start in the padded map.
+    #[inline(always)]
+    fn windows_of_pool(self, pool: usize) -> [usize; 4] {
+        let (row, col) = (2 * (pool / POOLED_2), 2 * (pool % POOLED_2));
+        POOL.map(|(down, right)| ((row + down) * self.map.side + col + right) * self.inputs)
+    }
+
+    /// Weights `[output, input, row, column]` as `[window value, output]`, cut into blocks of two vectors of outputs
+    /// (the last may be of one): block by block, so that a block is read in one run.
+    #[inline(always)]
+    pub(super) fn by_window<S: Simd>(self, weight: &[f32]) -> Vec<f32> {
+        let mut packed = Vec::with_capacity(weight.len());
+        for (first, len) in blocks::<S>(self.conv.channels) {
+            for at in 0..self.window_len() {
+                let from = self.weight_index(at);
+                packed.extend((first..first + len).map(|output| weight[output * self.window_len() + from]));
+            }
+        }
+        packed
+    }
+
+    /// Weights `[output, input, row, column]` as `[output, window value]`.
+    pub(super) fn by_output(self, weight: &[f32]) -> Vec<f32> {
+        let order: Vec<usize> = (0..self.window_len()).map(|at| self.weight_index(at)).collect();
+        weight.chunks_exact(self.window_len()).flat_map(|of_output| order.iter().map(|from| of_output[*from])).collect()
+    }
+
+    /// The transpose of [`Self::by_output`].
+    pub(super) fn d_weight(self, by_output: &[f32], d_weight: &mut [f32]) {
+        for (from, into) in by_output.chunks_exact(self.window_len()).zip(d_weight.chunks_exact_mut(self.window_len()))
+        {
+            for (at, value) in from.iter().enumerate() {
+                into[self.weight_index(at)] = *value;
+            }
+        }
+    }
+
+    /// Which weight of an output `[input, row, column]` meets value `at` of a window `[row, column, input]`.
+    fn weight_index(self, at: usize) -> usize {
+        let (cell, input) = (at / self.inputs, at % self.inputs);
+        input * self.conv.kernel * self.conv.kernel + cell
+    }
+
+    /// One padded map to features `[6 · 6, channel]`, and who won each pool.
+    #[inline(always)]
+    pub(super) fn forward<S: Simd>(
+        self,
+        simd: S,
+        pooled: &[f32],
+        by_window: &[f32],
+        bias: &[f32],
+        features: &mut [f32],
+        winners: &mut [u32],
+    ) {
+        for (first, len) in blocks::<S>(self.conv.channels) {
+            let weights = &by_window[first * self.window_len()..][..len * self.window_len()];
+            if len == 2 * S::F32_LANES {
+                self.forward_block::<S, 2>(simd, pooled, weights, bias, first, features, winners);
+            } else {
+                self.forward_block::<S, 1>(simd, pooled, weights, bias, first, features, winners);
+            }
+        }
+    }
+
+    /// `WIDTH` vectors of outputs from channel `first` on.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "as in `forward`, and the block")]
+    fn forward_block<S: Simd, const WIDTH: usize>(
+        self,
+        simd: S,
+        pooled: &[f32],
+        weights: &[f32],
+        bias: &[f32],
+        first: usize,
+        features: &mut [f32],
+        winners: &mut [u32],
+    ) {
+        let (zero, silent) = (simd.splat_f32s(0.0), simd.splat_u32s(SILENT));
+        let bias = &vectors::<S>(&bias[first..][..WIDTH * S::F32_LANES]);
+        for pool in 0..POOLED_2 * POOLED_2 {
+            let mut sums = [[zero; WIDTH]; 4];
+            let starts = self.windows_of_pool(pool);
+            for kernel_row in 0..self.conv.kernel {
+                let offset = kernel_row * self.map.side * self.inputs;
+                let [a, b, c, d] = starts.map(|start| &pooled[start + offset..][..self.span()]);
+                let weights = vectors::<S>(&weights[kernel_row * self.span() * WIDTH * S::F32_LANES..]);
+                let weights = weights[..self.span() * WIDTH].as_chunks::<WIDTH>().0;
+                for ((((a, b), c), d), weights) in a.iter().zip(b).zip(c).zip(d).zip(weights) {
+                    for (sums, value) in sums.iter_mut().zip([*a, *b, *c, *d]) {
+                        let value = simd.splat_f32s(value);
+                        for v in 0..WIDTH {
+                            sums[v] = simd.mul_add_f32s(value, weights[v], sums[v]);
+                        }
+                    }
+                }
+            }
+            let at = pool * self.conv.channels + first;
+            let features = vectors_mut::<S>(&mut features[at..at + WIDTH * S::F32_LANES]);
+            let winners = int_vectors_mut::<S>(&mut winners[at..at + WIDTH * S::F32_LANES]);
+            for v in 0..WIDTH {
+                let (mut best, mut from) = (sums[0][v], simd.splat_u32s(0));
+                for cell in 1..POOL.len() {
+                    let wins = simd.greater_than_f32s(sums[cell][v], best);
+                    best = simd.select_f32s(wins, sums[cell][v], best);
+                    from = simd.select_u32s(wins, simd.splat_u32s(cell as u32), from);
+                }
+                let value = simd.add_f32s(best, bias[v]);
+                let is_alive = simd.greater_than_f32s(value, zero);
+                features[v] = simd.select_f32s(is_alive, value, zero);
+                winners[v] = simd.select_u32s(is_alive, from, silent);
+            }
+        }
+    }
+
+    /// One sample's share: adds to the gradients of the weights (`[output, window value]`) and the bias, and writes
+    /// that of the padded map.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "three inputs, the trace, and three gradients, each by its name")]
+    pub(super) fn backward<S: Simd>(
+        self,
+        simd: S,
+        pooled: &[f32],
+        by_output: &[f32],
+        d_features: &[f32],
+        winners: &[u32],
+        sparse: &mut Sparse,
+        d_pooled: &mut [f32],
+        d_by_output: &mut [f32],
+        d_bias: &mut [f32],
+    ) {
+        let channels = self.conv.channels;
+        // Gradients of the weights: per output channel, its windows.
+        for channel in 0..channels {
+            let list = &mut sparse.of_channel;
+            list.clear();
+            let mut sum = 0.0;
+            for pool in 0..POOLED_2 * POOLED_2 {
+                let at = pool * channels + channel;
+                if winners[at] != SILENT {
+                    list.push((self.windows_of_pool(pool)[winners[at] as usize], d_features[at]));
+                    sum += d_features[at];
+                }
+            }
+            d_bias[channel] += sum;
+            let into = &mut d_by_output[channel * self.window_len()..][..self.window_len()];
+            self.add_windows(simd, pooled, list, into);
+        }
+        // Gradient of the map: per cell of the convolution, its output channels.
+        d_pooled.fill(0.0);
+        for pool in 0..POOLED_2 * POOLED_2 {
+            for list in &mut sparse.of_cell {
+                list.clear();
+            }
+            let at = pool * channels;
+            for (channel, (gradient, winner)) in
+                d_features[at..at + channels].iter().zip(&winners[at..at + channels]).enumerate()
+            {
+                if let Some(list) = sparse.of_cell.get_mut(*winner as usize) {
+                    list.push((channel * self.window_len(), *gradient));
+                }
+            }
+            for (start, list) in self.windows_of_pool(pool).into_iter().zip(&sparse.of_cell) {
+                self.add_outputs(simd, by_output, list, &mut d_pooled[start..]);
+            }
+        }
+    }
+
+    /// `into` `[window value]` += Σ gradient · window.
+    #[inline(always)]
+    fn add_windows<S: Simd>(self, simd: S, pooled: &[f32], list: &[(usize, f32)], into: &mut [f32]) {
+        let stride = self.map.side * self.inputs / S::F32_LANES;
+        let span = self.span() / S::F32_LANES;
+        let (pooled, into) = (vectors::<S>(pooled), vectors_mut::<S>(into));
+        for_each_group(into.len(), |first, group| {
+            // Where the vectors of the group lie in a window.
+            let offset = |v: usize| (first + v) / span * stride + (first + v) % span;
+            match group {
+                Group::Nine => accumulate::<S, 9>(simd, pooled, list, std::array::from_fn(offset), into, first),
+                Group::Eight => accumulate::<S, 8>(simd, pooled, list, std::array::from_fn(offset), into, first),
+                Group::One => accumulate::<S, 1>(simd, pooled, list, std::array::from_fn(offset), into, first),
+            }
+        });
+    }
+
+    /// The window that begins at `d_pooled` += Σ gradient · weights of the output.
+    #[inline(always)]
+    fn add_outputs<S: Simd>(self, simd: S, by_output: &[f32], list: &[(usize, f32)], d_pooled: &mut [f32]) {
+        if list.is_empty() {
+            return;
+        }
+        let stride = self.map.side * self.inputs / S::F32_LANES;
+        let span = self.span() / S::F32_LANES;
+        let len = self.window_len() / S::F32_LANES;
+        let (by_output, d_pooled) = (vectors::<S>(by_output), vectors_mut::<S>(d_pooled));
+        for_each_group(len, |first, group| {
+            let offset = |v: usize| (first + v) / span * stride + (first + v) % span;
+            match group {
+                Group::Nine => scatter::<S, 9>(simd, by_output, list, first, std::array::from_fn(offset), d_pooled),
+                Group::Eight => scatter::<S, 8>(simd, by_output, list, first, std::array::from_fn(offset), d_pooled),
+                Group::One => scatter::<S, 1>(simd, by_output, list, first, std::array::from_fn(offset), d_pooled),
+            }
+        });
+    }
+}
+
+/// `into[first..]` += Σ gradient · the `N` vectors at `offsets` from each start.
+#[inline(always)]
+fn accumulate<S: Simd, const N: usize>(
+    simd: S,
+    values: &[S::f32s],
+    list: &[(usize, f32)],
+    offsets: [usize; N],
+    into: &mut [S::f32s],
+    first: usize,
+) {
+    let mut sums = [simd.splat_f32s(0.0); N];
+    for (start, gradient) in list {
+        let (values, gradient) = (&values[start / S::F32_LANES..], simd.splat_f32s(*gradient));
+        for v in 0..N {
+            sums[v] = simd.mul_add_f32s(gradient, values[offsets[v]], sums[v]);
+        }
+    }
+    for v in 0..N {
+        into[first + v] = simd.add_f32s(into[first + v], sums[v]);
+    }
+}
+
+/// The `N` vectors at `offsets` += Σ gradient · the `N` vectors from `first` on of each output.
+#[inline(always)]
+fn scatter<S: Simd, const N: usize>(
+    simd: S,
+    by_output: &[S::f32s],
+    list: &[(usize, f32)],
+    first: usize,
+    offsets: [usize; N],
+    into: &mut [S::f32s],
+) {
+    let mut sums = [simd.splat_f32s(0.0); N];
+    for (start, gradient) in list {
+        let weights = &by_output[start / S::F32_LANES + first..][..N];
+        let gradient = simd.splat_f32s(*gradient);
+        for v in 0..N {
+            sums[v] = simd.mul_add_f32s(gradient, weights[v], sums[v]);
+        }
+    }
+    for v in 0..N {
+        into[offsets[v]] = simd.add_f32s(into[offsets[v]], sums[v]);
+    }
+}
+
+/// Vectors that are summed side by side in registers.
+enum Group {
+    Nine,
+    Eight,
+    One,
+}
+
+/// Cuts `len` vectors into groups: by nines where that works out (a 3×3 kernel), else by eights.
+#[inline(always)]
+fn for_each_group(len: usize, mut visit: impl FnMut(usize, Group)) {
+    let mut first = 0;
+    while first < len {
+        let (step, group) = match len - first {
+            _ if len % 9 == 0 => (9, Group::Nine),
+            8.. => (8, Group::Eight),
+            _ => (1, Group::One),
+        };
+        visit(first, group);
+        first += step;
+    }
+}
+
+/// Blocks of outputs: (first, number), two vectors each, then one if the number of vectors is odd.
+fn blocks<S: Simd>(channels: usize) -> impl Iterator<Item = (usize, usize)> {
+    let block = 2 * S::F32_LANES;
+    (0..channels).step_by(block).map(move |first| (first, block.min(channels - first)))
+}

@@ -1,0 +1,67 @@
+//! What the operations mean, in plain operations of burn: computed on GPUs, compared with in tests.
+
+use super::{AdamMoments, AdamStep};
+use burn::backend::tensor::{BoolTensor, FloatTensor};
+use burn::backend::{Backend, FloatDType, Scalar, TensorMetadata as _};
+use burn::tensor::Shape;
+use burn::tensor::ops::ConvOptions;
+
+pub(crate) fn encode<B: Backend>(
+    occupied: BoolTensor<B>,
+    weight_1: FloatTensor<B>,
+    bias_1: FloatTensor<B>,
+    weight_2: FloatTensor<B>,
+    bias_2: FloatTensor<B>,
+) -> FloatTensor<B> {
+    let [batch, rows, cols] = occupied.shape().dims();
+    let cells = B::float_reshape(B::bool_into_float(occupied, FloatDType::F32), Shape::new([batch, 1, rows, cols]));
+    let pooled = layer::<B>(cells, weight_1, bias_1);
+    let pooled = layer::<B>(pooled, weight_2, bias_2); // [batch, channel, 6, 6]
+    let [batch, channels, rows, cols] = pooled.shape().dims();
+    let channels_last = B::float_permute(pooled, &[0, 2, 3, 1]);
+    B::float_reshape(channels_last, Shape::new([batch, rows * cols * channels]))
+}
+
+/// Convolution with "same" padding, max-pool of 2, `ReLU`.
+fn layer<B: Backend>(x: FloatTensor<B>, weight: FloatTensor<B>, bias: FloatTensor<B>) -> FloatTensor<B> {
+    let [_, _, kernel, _] = weight.shape().dims();
+    let mut options = ConvOptions::new([1, 1], [0, 0], [1, 1], 1);
+    options.padding = [((kernel - 1) / 2, kernel / 2); 2];
+    let convolved = B::conv2d(x, weight, Some(bias), options);
+    B::relu(B::max_pool2d(convolved, [2, 2], [2, 2], [0, 0], [1, 1], false))
+}
+
+pub(crate) fn dense<B: Backend>(x: FloatTensor<B>, weight: FloatTensor<B>, bias: FloatTensor<B>) -> FloatTensor<B> {
+    let [outputs] = bias.shape().dims();
+    B::float_add(B::float_matmul(x, weight), B::float_reshape(bias, Shape::new([1, outputs])))
+}
+
+pub(crate) fn adam_step<B: Backend>(
+    step: AdamStep,
+    gradient: FloatTensor<B>,
+    moments: AdamMoments<B>,
+) -> AdamMoments<B> {
+    let times = |tensor, factor: f32| B::float_mul_scalar(tensor, Scalar::from(factor));
+    let AdamMoments { weights, mean, mean_square } = moments;
+    let gradient = clipped::<B>(gradient, step.gradient_norm_max);
+    let mean = B::float_add(times(mean, step.beta_1), times(gradient.clone(), 1.0 - step.beta_1));
+    let square = B::float_mul(times(gradient.clone(), 1.0 - step.beta_2), gradient);
+    let mean_square = B::float_add(times(mean_square, step.beta_2), square);
+    let root = times(B::float_sqrt(mean_square.clone()), step.root_correction());
+    let root = B::float_add_scalar(root, Scalar::from(step.epsilon));
+    let change = B::float_div(times(mean.clone(), step.step_size()), root);
+    AdamMoments { weights: B::float_sub(times(weights, step.keep()), change), mean, mean_square }
+}
+
+/// The gradient, scaled down to a norm of `norm_max` if it is above; 0 = as it is.
+fn clipped<B: Backend>(gradient: FloatTensor<B>, norm_max: f32) -> FloatTensor<B> {
+    if norm_max == 0.0 {
+        return gradient;
+    }
+    let norm = B::float_sqrt(B::float_sum(B::float_mul(gradient.clone(), gradient.clone()))); // [1]
+    let norm = B::float_clamp_min(norm, Scalar::from(f32::MIN_POSITIVE));
+    let scale = B::float_mul_scalar(B::float_recip(norm), Scalar::from(norm_max));
+    let scale = B::float_clamp_max(scale, Scalar::from(1.0_f32));
+    let ones = Shape::from(vec![1; gradient.shape().num_dims()]);
+    B::float_mul(gradient, B::float_reshape(scale, ones))
+}
