@@ -7,8 +7,8 @@
 //!
 //! The paper gives no more detail. Here, a decision takes four steps, each in a file:
 //!
-//! - `search`: plans of two arcs each (`fan`), forecast with the car's body and the speed of its steering (`rollout`); the best
-//!   one says whether, where and with how much clearance what is ahead can be avoided (rule two);
+//! - `search`: plans of two arcs each (`fan`), forecast with the car's body and the speed of its steering (`rollout`);
+//!   the best one says whether, where and with how much clearance what is ahead can be avoided (rule two);
 //! - `elastic_band`: the way of that plan, pulled into the middle of the free space, so that it no longer depends on
 //!   which plan it came from;
 //! - `label`: the point on that way, half as far as the way is open (rule three; the paper's half "for safety reasons",
