@@ -1,60 +1,73 @@
-//! Time of one decision, in situations met on the way through the reference lots.
+//! Time of one decision, over every tick of drives through the reference lots and generated ones, both ways.
 //!
 //! `cargo bench --profile dev -p expert`
 #![allow(missing_docs, reason = "divan's macro writes functions without docs")]
 
 use divan::counter::ItemsCount;
 use expert::{ExpertSettings, ScriptedExpert, Sees};
-use scenarios::reference::{ReferenceLot, lot};
 use sim::driver::{Driver, GroundTruth, Situation};
 use sim::episode::{Episode, EpisodeSettings};
 use sim::map::Map;
+use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use sim::sensing::Observation;
+use sim::vehicle::VehicleState;
 use std::sync::Arc;
 
-/// Every how many ticks a situation is kept: prime, so that it beats with nothing.
-const EVERY_TICKS: usize = 17;
+const LOTS: [&str; 4] = ["lot-a", "lot-b", "lot-c", "test:4"];
 
 fn main() {
     divan::main();
 }
 
-#[divan::bench(args = ['a', 'b', 'c'], sample_count = 20, sample_size = 1)]
-fn whole_map(bencher: divan::Bencher<'_, '_>, name: char) {
-    bench(bencher, name, Sees::WholeMap);
+#[divan::bench(args = LOTS, sample_count = 10, sample_size = 1)]
+fn whole_map(bencher: divan::Bencher<'_, '_>, lots: &str) {
+    bench(bencher, lots, Sees::WholeMap);
 }
 
-#[divan::bench(args = ['a', 'b', 'c'], sample_count = 20, sample_size = 1)]
-fn patch_only(bencher: divan::Bencher<'_, '_>, name: char) {
-    bench(bencher, name, Sees::PatchOnly);
+#[divan::bench(args = LOTS, sample_count = 10, sample_size = 1)]
+fn patch_only(bencher: divan::Bencher<'_, '_>, lots: &str) {
+    bench(bencher, lots, Sees::PatchOnly);
 }
 
-fn bench(bencher: divan::Bencher<'_, '_>, name: char, sees: Sees) {
-    let which = match name {
-        'a' => ReferenceLot::A,
-        'b' => ReferenceLot::B,
-        _ => ReferenceLot::C,
-    };
-    let settings = EpisodeSettings::paper();
-    let map = Arc::new(Map::build(lot(which, RootSeed(1)), &settings.vehicle).expect("reference lots are valid"));
-    let expert = ExpertSettings { sees, ..ExpertSettings::paper() };
-    let new_driver = || ScriptedExpert::new(expert.clone(), &settings);
+/// What the expert met on one drive, tick by tick.
+struct Drive {
+    map: Arc<Map>,
+    ticks: Vec<(VehicleState, f32)>,
+}
 
-    let mut episode = Episode::new(Arc::new(settings.clone()), Arc::clone(&map), RootSeed(1));
-    let mut driver = new_driver();
-    let mut situations = Vec::new();
-    while episode.ending().is_none() {
-        let truth = GroundTruth { map: &map, vehicle: episode.vehicle(), progress_m: episode.progress_m() };
-        situations.push((driver.clone(), truth));
-        let decision = driver.decide(&episode.situation());
-        episode.apply(decision);
+/// Decides every tick of the drives again, each drive with the memory of an expert that drives it.
+fn bench(bencher: divan::Bencher<'_, '_>, lots: &str, sees: Sees) {
+    let settings = Arc::new(EpisodeSettings::paper());
+    let expert = ScriptedExpert::new(ExpertSettings { sees, ..ExpertSettings::paper() }, &settings);
+    let mut drives = Vec::new();
+    for lot in scenarios::suite(lots).expect("there are such lots") {
+        for direction in Direction::BOTH {
+            let scenario = lot.scenario(RootSeed(1), &settings.vehicle).expect("no file is read");
+            let map = Map::build(direction.of(scenario), &settings.vehicle).expect("lots are valid");
+            drives.push(drive(expert.clone(), &settings, Arc::new(map)));
+        }
     }
-    let situations: Vec<_> = situations.into_iter().step_by(EVERY_TICKS).collect();
+    let n_decisions: usize = drives.iter().map(|drive| drive.ticks.len()).sum();
     let observation = Observation::default();
-    bencher.counter(ItemsCount::new(situations.len())).with_inputs(|| situations.clone()).bench_values(|situations| {
-        for (mut driver, truth) in situations {
-            divan::black_box(driver.decide(&Situation { observation: &observation, truth }));
+    bencher.counter(ItemsCount::new(n_decisions)).bench(|| {
+        for Drive { map, ticks } in &drives {
+            let mut expert = expert.clone();
+            for &(vehicle, progress_m) in ticks {
+                let truth = GroundTruth { map, vehicle, progress_m };
+                divan::black_box(expert.decide(&Situation { observation: &observation, truth }));
+            }
         }
     });
+}
+
+fn drive(mut expert: ScriptedExpert, settings: &Arc<EpisodeSettings>, map: Arc<Map>) -> Drive {
+    let mut episode = Episode::new(Arc::clone(settings), Arc::clone(&map), RootSeed(1));
+    let mut ticks = Vec::new();
+    while episode.ending().is_none() {
+        ticks.push((episode.vehicle(), episode.progress_m()));
+        let decision = expert.decide(&episode.situation());
+        episode.apply(decision);
+    }
+    Drive { map, ticks }
 }

@@ -8,6 +8,7 @@
 use crate::settings::ElasticBandSettings;
 use sim::distance_field::DistanceField;
 use sim::geometry::Vec2;
+use sim::vectors::{FourPoints, f32x4};
 
 /// Points of a band: 15 m.
 pub(crate) const POINTS: usize = 26;
@@ -56,7 +57,7 @@ impl ElasticBand {
     ///
     /// Each round goes from the first point to the last, and a point looks `stiff` points back, where this round has
     /// been, and as many ahead, where only the round before has. So while this round is at one point, the next can be
-    /// `stiff + 1` points behind it, and so on: those are moved side by side.
+    /// `stiff + 1` points behind it, and so on: those are moved side by side, four at a time.
     pub(crate) fn relax(&mut self, field: &DistanceField, settings: &ElasticBandSettings) {
         let stiff = ((settings.stiffness_m / SPACING_M).round() as usize).max(1);
         let (apart, last) = (stiff + 1, POINTS - 1);
@@ -65,45 +66,42 @@ impl ElasticBand {
             // The rounds under way. Point of a round: tick - round * apart.
             let from = tick.saturating_sub(last).div_ceil(apart);
             let to = rounds.min((tick - 1) / apart + 1);
-            let (front, n) = (tick - from * apart, to - from);
-            if front == last {
-                self.relax_apart::<1>(last, 1, stiff, field, settings);
-                self.relax_apart::<LANES>(last.saturating_sub(apart), n - 1, stiff, field, settings);
-            } else {
-                self.relax_apart::<LANES>(front, n, stiff, field, settings);
+            for first in (from..to).step_by(4) {
+                let four = std::array::from_fn(|lane| tick - (first + lane).min(to - 1) * apart);
+                self.move_four(four, stiff, field, settings);
             }
         }
         self.measure();
     }
 
-    /// Moves `n` points, `stiff + 1` apart, the foremost at `front`.
-    fn relax_apart<const N: usize>(
-        &mut self,
-        front: usize,
-        n: usize,
-        stiff: usize,
-        field: &DistanceField,
-        settings: &ElasticBandSettings,
-    ) {
-        let mut lanes = Lanes::<N>::new();
-        let at = |lane: usize| front - lane * (stiff + 1);
-        for lane in 0..n {
-            let i = at(lane);
-            let here = self.points[i];
+    /// One step of four points towards the middle of the free space and straightness.
+    fn move_four(&mut self, four: [usize; 4], stiff: usize, field: &DistanceField, settings: &ElasticBandSettings) {
+        let here = four.map(|i| self.points[i]);
+        let (mut straight, mut along) = ([Vec2::ZERO; 4], [Vec2::ZERO; 4]);
+        for (lane, i) in four.into_iter().enumerate() {
             let reach = stiff.min(i).min(POINTS - 1 - i);
             // Middle of its neighbours; at the free end, straight on.
-            let (straight, along) = if reach > 0 {
+            (straight[lane], along[lane]) = if reach > 0 {
                 let (before, after) = (self.points[i - reach], self.points[i + reach]);
                 (0.5 * (before + after), after - before)
             } else {
                 let (before, earlier) = (self.points[i - 1], self.points[i - 2]);
-                (before + (before - earlier), here - earlier)
+                (before + (before - earlier), here[lane] - earlier)
             };
-            lanes.set(lane, here, straight, along);
         }
-        lanes.move_all(field, settings);
-        for lane in 0..n {
-            self.points[at(lane)] = Vec2::new(lanes.here.x[lane], lanes.here.y[lane]);
+        let (here, straight) = (FourPoints::from(here), FourPoints::from(straight));
+        let left = left_of(along.into());
+        let push = |side: f32| {
+            let at_m = field.at_four(here + left * f32x4::splat(side * PROBE_M));
+            let missing_m = (f32x4::splat(settings.comfort_m) - at_m).fast_max(f32x4::ZERO);
+            missing_m * missing_m
+        };
+        let to_middle = (push(-1.0) - push(1.0)) * f32x4::splat(settings.middle_gain / (4.0 * PROBE_M));
+        let step = (straight - here) * f32x4::splat(settings.straight_gain) + left * to_middle;
+        let there = here + shortened(step, settings.step_max_m);
+        let (x, y) = (there.x.to_array(), there.y.to_array());
+        for (lane, i) in four.into_iter().enumerate() {
+            self.points[i] = Vec2::new(x[lane], y[lane]);
         }
     }
 
@@ -128,64 +126,27 @@ impl ElasticBand {
     }
 }
 
-/// Points between the ends of a band that can be moved at once: every other one.
-const LANES: usize = POINTS / 2 - 1;
-
-/// Points side by side, by their coordinates.
-#[derive(Debug, Clone, Copy)]
-struct Column<const N: usize> {
-    x: [f32; N],
-    y: [f32; N],
+/// Unit vectors to the left of four vectors; of those without a direction, zero.
+#[inline]
+fn left_of(along: FourPoints) -> FourPoints {
+    let per_length = f32x4::ONE / (along.x * along.x + along.y * along.y).sqrt();
+    let has_direction = per_length.simd_lt(f32x4::splat(f32::INFINITY)) & per_length.simd_gt(f32x4::ZERO);
+    let unit = along * (per_length & has_direction);
+    FourPoints { x: -unit.y, y: unit.x }
 }
 
-/// Points that are moved at once.
-#[derive(Debug, Clone, Copy)]
-struct Lanes<const N: usize> {
-    here: Column<N>,
-    /// Where the band would be straight.
-    straight: Column<N>,
-    /// Along the band, of any length.
-    along: Column<N>,
-}
-
-impl<const N: usize> Lanes<N> {
-    fn new() -> Self {
-        let column = Column { x: [0.0; N], y: [0.0; N] };
-        Self { here: column, straight: column, along: column }
+/// Four vectors, none longer than `length_max_m`.
+#[inline]
+fn shortened(vectors: FourPoints, length_max_m: f32) -> FourPoints {
+    let square = vectors.x * vectors.x + vectors.y * vectors.y;
+    let length_max_m = f32x4::splat(length_max_m);
+    let is_long = square.simd_gt(length_max_m * length_max_m);
+    if is_long.none() {
+        return vectors;
     }
-
-    #[inline]
-    fn set(&mut self, lane: usize, here: Vec2, straight: Vec2, along: Vec2) {
-        let columns = [(&mut self.here, here), (&mut self.straight, straight), (&mut self.along, along)];
-        for (column, value) in columns {
-            (column.x[lane], column.y[lane]) = (value.x, value.y);
-        }
-    }
-
-    /// One step of every point towards the middle and straightness.
-    fn move_all(&mut self, field: &DistanceField, settings: &ElasticBandSettings) {
-        let left: [Vec2; N] = std::array::from_fn(|i| {
-            let along = Vec2::new(self.along.x[i], self.along.y[i]);
-            along.normalize_or_zero().perp()
-        });
-        let push = |side: f32| {
-            let x_m = std::array::from_fn(|i| self.here.x[i] + left[i].x * (side * PROBE_M));
-            let y_m = std::array::from_fn(|i| self.here.y[i] + left[i].y * (side * PROBE_M));
-            field.at_each::<N>(&x_m, &y_m).map(|at_m| {
-                let missing_m = (settings.comfort_m - at_m).max(0.0);
-                missing_m * missing_m
-            })
-        };
-        let (push_left, push_right) = (push(-1.0), push(1.0));
-        for i in 0..N {
-            let to_middle = (push_left[i] - push_right[i]) * (settings.middle_gain / (4.0 * PROBE_M));
-            let here = Vec2::new(self.here.x[i], self.here.y[i]);
-            let straight = Vec2::new(self.straight.x[i], self.straight.y[i]);
-            let step = (straight - here) * settings.straight_gain + left[i] * to_middle;
-            let there = here + step.clamp_length_max(settings.step_max_m);
-            (self.here.x[i], self.here.y[i]) = (there.x, there.y);
-        }
-    }
+    let length_m = square.sqrt();
+    let shortened = |of_axis: f32x4| is_long.select(length_max_m * (of_axis / length_m), of_axis);
+    FourPoints { x: shortened(vectors.x), y: shortened(vectors.y) }
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@
 //!
 //! The paper gives no more detail. Here, a decision takes four steps, each in a file:
 //!
-//! - `search`: plans of two arcs each, forecast with the car's body and the speed of its steering (`rollout`); the best
-//!   one says whether, where and with how much clearance what is ahead can be avoided (rule two);
+//! - `search`: plans of two arcs each (`fan`), forecast with the car's body and the speed of its steering (`rollout`);
+//!   the best one says whether, where and with how much clearance what is ahead can be avoided (rule two);
 //! - `elastic_band`: the way of that plan, pulled into the middle of the free space, so that it no longer depends on
 //!   which plan it came from;
 //! - `label`: the point on that way, half as far as the way is open (rule three; the paper's half "for safety reasons",
@@ -20,6 +20,7 @@
 
 mod context;
 mod elastic_band;
+mod fan;
 mod label;
 mod line_of_sight;
 mod rollout;
@@ -42,6 +43,7 @@ use sim::driver::{Decision, Driver, GroundTruth, LookAheadPoint, Situation, Sour
 use sim::episode::EpisodeSettings;
 use sim::geometry::Vec2;
 use sim::seed::{Rng, RootSeed, Stream};
+use std::cell::OnceCell;
 use std::collections::VecDeque;
 
 /// Consecutive labels farther apart than this count as a jump, metres.
@@ -95,9 +97,10 @@ struct Wish {
 impl ScriptedExpert {
     /// An expert for the vehicle, camera and controller of an episode.
     pub fn new(settings: ExpertSettings, episode: &EpisodeSettings) -> Self {
+        let footprint = Footprint::new(&episode.vehicle, settings.nose_margin_m, settings.disc_relief_m);
         Self {
-            footprint: Footprint::new(&episode.vehicle, settings.nose_margin_m, settings.disc_relief_m),
-            arcs: Arcs::new(&settings),
+            arcs: Arcs::new(&settings, footprint.nose_m()),
+            footprint,
             context: ExpertContext::of(episode),
             last: None,
             delayed: VecDeque::new(),
@@ -125,7 +128,7 @@ impl ScriptedExpert {
         &self.settings
     }
 
-    /// Decides and explains the decision. Takes about twice as long as deciding.
+    /// Decides and explains the decision. Takes several times as long as deciding: every first arc is followed.
     pub fn inspect(&mut self, situation: &Situation<'_>) -> (Decision, Inspection) {
         self.inspection = Some(Inspection::empty());
         let decision = self.decide(situation);
@@ -143,6 +146,7 @@ impl ScriptedExpert {
             truth,
             sight,
             start: self.when_obeyed(truth),
+            start_progress_m: OnceCell::new(),
             horizon_m: sight.horizon_m(self.settings.horizon_m, self.footprint.nose_m()),
             last_index: self.last.map(|last| last.index(&self.settings)),
         };
@@ -222,12 +226,11 @@ impl ScriptedExpert {
         let state = truth.vehicle;
         let vehicle = &self.context.vehicle;
         let curvature_per_m = state.curvature_per_m(vehicle);
-        let mut motion = Motion::new(state.pose, curvature_per_m);
+        let motion = Motion::new(state.pose, curvature_per_m);
         let dead_time_s = vehicle.dead_time_s;
         let change_per_m = vehicle.steering_rate_max_radps / vehicle.wheelbase_m * dead_time_s;
         let pending_per_m = self.last.map_or(curvature_per_m, |last| last.curvature_per_m);
-        motion.step(pending_per_m, change_per_m, state.speed_mps * dead_time_s);
-        motion
+        motion.step(pending_per_m, change_per_m, state.speed_mps * dead_time_s)
     }
 
     fn ground<'a>(&'a self, truth: &'a GroundTruth<'a>, sight: &'a LineOfSight) -> Ground<'a> {

@@ -2,10 +2,13 @@
 
 use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
+use sim::vectors::{FourPoints, f32x4};
 use sim::vehicle::VehicleSettings;
 
 /// Discs that cover the body with its lengthened nose.
 const DISCS: usize = 6;
+/// Those that are enough along an arc: nose, middle and rear axle.
+const COARSE_DISCS: [usize; 3] = [5, 3, 1];
 
 /// A moving rear axle. No angle is kept: a step needs no trigonometry.
 #[derive(Debug, Clone, Copy)]
@@ -23,32 +26,75 @@ impl Motion {
         Self { position: pose.position(), ahead: pose.ahead(), curvature_per_m }
     }
 
-    /// Drives on by `travel_m` while the curvature moves towards `target_per_m`, at most by `change_per_m`.
+    /// After another `travel_m` on which the curvature moves towards `target_per_m`, at most by `change_per_m`.
+    #[must_use]
     #[inline]
-    pub(crate) fn step(&mut self, target_per_m: f32, change_per_m: f32, travel_m: f32) {
-        let next_per_m = target_per_m.clamp(self.curvature_per_m - change_per_m, self.curvature_per_m + change_per_m);
+    pub(crate) fn step(self, target_per_m: f32, change_per_m: f32, travel_m: f32) -> Self {
+        let next_per_m = self.next_curvature_per_m(target_per_m, change_per_m);
+        let half_turn = HalfTurn::new(self.curvature_per_m + next_per_m, travel_m);
+        Self { curvature_per_m: next_per_m, ..self.turn(half_turn, travel_m) }
+    }
+
+    /// After another `travel_m` at the present curvature, given its half turn: [`Self::step`] without a change, to the bit.
+    #[must_use]
+    #[inline]
+    pub(crate) fn turn(self, half_turn: HalfTurn, travel_m: f32) -> Self {
         // The chord of a step points along its mean heading; its shortening is below 0.1 mm.
-        let half_turn = 0.25 * (self.curvature_per_m + next_per_m) * travel_m;
-        let square = half_turn * half_turn;
-        // cos and sin to 4th and 3rd order: half a turn of a step is below 0.04 rad.
-        let rotation = Vec2::new(1.0 - square * (0.5 - square / 24.0), half_turn * (1.0 - square / 6.0));
-        let along = rotation.rotate(self.ahead);
-        self.position += along * travel_m;
-        self.ahead = rotation.rotate(along);
-        self.curvature_per_m = next_per_m;
+        let along = half_turn.0.rotate(self.ahead);
+        Self { position: self.position + along * travel_m, ahead: half_turn.0.rotate(along), ..self }
+    }
+
+    /// Whether a step towards `target_per_m` gets there.
+    #[inline]
+    pub(crate) fn reaches(self, target_per_m: f32, change_per_m: f32) -> bool {
+        self.next_curvature_per_m(target_per_m, change_per_m) == target_per_m
+    }
+
+    /// Four points on the vehicle axis, world.
+    #[expect(
+        clippy::inline_always,
+        reason = "called, it takes motions through memory: numbers that are stored, and loaded as vectors"
+    )]
+    #[inline(always)]
+    fn four_on_axis(self, ahead_m: f32x4) -> FourPoints {
+        FourPoints::splat(self.position) + FourPoints::splat(self.ahead) * ahead_m
+    }
+
+    #[inline]
+    fn next_curvature_per_m(self, target_per_m: f32, change_per_m: f32) -> f32 {
+        target_per_m.clamp(self.curvature_per_m - change_per_m, self.curvature_per_m + change_per_m)
     }
 
     /// A point on the vehicle axis, world.
     #[inline]
-    pub(crate) fn on_axis(&self, ahead_m: f32) -> Vec2 {
+    pub(crate) fn on_axis(self, ahead_m: f32) -> Vec2 {
         self.position + self.ahead * ahead_m
+    }
+}
+
+/// Half of what the heading changes by in one step, as a rotation.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct HalfTurn(Vec2);
+
+impl HalfTurn {
+    /// Of a step at whose ends the curvatures have this sum.
+    #[inline]
+    pub(crate) fn new(sum_per_m: f32, travel_m: f32) -> Self {
+        let half_turn = 0.25 * sum_per_m * travel_m;
+        let square = half_turn * half_turn;
+        // cos and sin to 4th and 3rd order: half a turn of a step is below 0.04 rad.
+        Self(Vec2::new(1.0 - square * (0.5 - square / 24.0), half_turn * (1.0 - square / 6.0)))
     }
 }
 
 /// The body, covered by discs, as the forecast sees it.
 #[derive(Debug, Clone)]
 pub(crate) struct Footprint {
-    disc_centres_m: [f32; DISCS],
+    /// Centres of the discs, metres ahead of the rear axle; the last one is repeated.
+    disc_centres_m: [f32x4; 2],
+    /// And of the coarse ones.
+    coarse_disc_centres_m: f32x4,
+    nose_m: f32,
     /// Distance of a disc's centre to the nearest non-drivable point at which the clearance is 0, metres.
     keep_m: f32,
 }
@@ -57,34 +103,55 @@ impl Footprint {
     pub(crate) fn new(vehicle: &VehicleSettings, nose_margin_m: f32, disc_relief_m: f32) -> Self {
         let segment_m = (vehicle.length_m + nose_margin_m) / DISCS as f32;
         let radius_m = (0.5 * segment_m).hypot(0.5 * vehicle.width_m);
+        let centre_m = |disc: usize| (disc as f32 + 0.5) * segment_m - vehicle.rear_overhang_m;
+        let four_m = |of_lane: [usize; 4]| f32x4::from(of_lane.map(centre_m));
+        let [nose, middle, rear] = COARSE_DISCS;
         Self {
-            disc_centres_m: std::array::from_fn(|i| (i as f32 + 0.5) * segment_m - vehicle.rear_overhang_m),
+            disc_centres_m: [four_m([0, 1, 2, 3]), four_m([4, 5, 5, 5])],
+            coarse_disc_centres_m: four_m([nose, middle, rear, rear]),
+            nose_m: centre_m(DISCS - 1),
             keep_m: radius_m - disc_relief_m,
         }
     }
 
     /// Centre of the foremost disc, metres ahead of the rear axle.
     pub(crate) fn nose_m(&self) -> f32 {
-        self.disc_centres_m[DISCS - 1]
+        self.nose_m
+    }
+
+    /// Distance of a disc's centre to the nearest non-drivable point at a clearance, metres.
+    pub(crate) fn distance_m(&self, clearance_m: f32) -> f32 {
+        clearance_m + self.keep_m
     }
 
     /// Clearance of the whole body, metres.
     #[inline]
-    pub(crate) fn clearance_m(&self, field: &DistanceField, motion: &Motion) -> f32 {
-        let nearest_m =
-            self.disc_centres_m.iter().map(|&x_m| field.at(motion.on_axis(x_m))).fold(f32::INFINITY, f32::min);
-        nearest_m - self.keep_m
+    pub(crate) fn clearance_m(&self, field: &DistanceField, motion: Motion) -> f32 {
+        let [rear, front] = self.disc_centres_m.map(|ahead_m| field.at_four(motion.four_on_axis(ahead_m)));
+        lowest(rear.fast_min(front)) - self.keep_m
     }
 
     /// Clearance of nose, middle and rear axle, metres, to within the raster's node spacing.
     ///
     /// Enough along an arc: its inner edge is swept by the rear axle, its outer edge by the nose, and what lies
     /// between them is met by the middle half a body length later than by all discs.
-    #[inline]
-    pub(crate) fn coarse_clearance_m(&self, field: &DistanceField, motion: &Motion) -> f32 {
-        let at = |disc: usize| field.at_nearest_node(motion.on_axis(self.disc_centres_m[disc]));
-        at(5).min(at(1)).min(at(3)) - self.keep_m
+    #[expect(
+        clippy::inline_always,
+        reason = "called, it takes motions through memory: numbers that are stored, and loaded as vectors"
+    )]
+    #[inline(always)]
+    pub(crate) fn coarse_clearance_m(&self, field: &DistanceField, motion: Motion) -> f32 {
+        lowest(field.at_four_nearest_nodes(motion.four_on_axis(self.coarse_disc_centres_m))) - self.keep_m
     }
+}
+
+/// The lowest lane.
+#[inline]
+fn lowest(values: f32x4) -> f32 {
+    // Unlike `f32::min`, one instruction: no lane is ever not a number.
+    let lower = |a: f32, b: f32| if b < a { b } else { a };
+    let [a, b, c, d] = values.to_array();
+    lower(lower(a, b), lower(c, d))
 }
 
 #[cfg(test)]
@@ -95,7 +162,7 @@ mod tests {
     fn small_steps_follow_the_exact_arc() {
         for curvature in [-0.2326_f32, -0.05, 0.0, 0.11, 0.2326] {
             let mut motion = Motion::new(Pose::default(), curvature);
-            (0..47).for_each(|_| motion.step(curvature, 0.0, 0.3));
+            (0..47).for_each(|_| motion = motion.step(curvature, 0.0, 0.3));
             let exact = Pose::default().advanced_along_arc(curvature, 47.0 * 0.3);
             assert!(motion.position.distance(exact.position()) < 0.01, "{curvature}: {motion:?}");
             assert!((motion.ahead.length() - 1.0).abs() < 1e-4);
@@ -113,9 +180,9 @@ mod tests {
     #[test]
     fn steering_takes_its_time() {
         let mut motion = Motion::new(Pose::default(), 0.0);
-        motion.step(0.2, 0.024, 0.2);
+        motion = motion.step(0.2, 0.024, 0.2);
         assert_eq!(motion.curvature_per_m, 0.024);
-        (0..20).for_each(|_| motion.step(0.2, 0.024, 0.2));
+        (0..20).for_each(|_| motion = motion.step(0.2, 0.024, 0.2));
         assert_eq!(motion.curvature_per_m, 0.2);
     }
 }

@@ -3,61 +3,56 @@
 //! One constant arc can express neither "out and back" nor "straight on, then turn" (docs/methods.md E4). A first
 //! arc is therefore as good as the best plan that begins with it: this is the paper's "a point from which avoidance
 //! is possible".
+//!
+//! Few of the plans are followed to their end. Bounds say which could not win; arcs that begin alike share what they have
+//! in common (`fan`); and probes far along an arc find most of those that are blocked. The best plan is that of a search
+//! without all this, to the bit (`tests`).
 
 use crate::context::ExpertContext;
 use crate::elastic_band::ElasticBand;
+use crate::fan::{Arc, Entry, Fan, Forecast};
 use crate::line_of_sight::LineOfSight;
 use crate::rollout::{Footprint, Motion};
 use crate::settings::ExpertSettings;
+use sim::distance_field::{DistanceField, NODE_M};
 use sim::driver::GroundTruth;
 use sim::geometry::Vec2;
+use sim::vectors::f32x4;
+use std::cell::OnceCell;
 
-/// First arcs to either side of straight on.
-const FIRST_SIDE: usize = 16;
-/// First arcs.
-pub(crate) const FIRST_ARCS: usize = 2 * FIRST_SIDE + 1;
-/// Second arcs to either side of straight on.
-const SECOND_SIDE: usize = 7;
-const SECOND_ARCS: usize = 2 * SECOND_SIDE + 1;
+/// First arcs: 16 to either side of straight on.
+const FIRST_ARCS: usize = 33;
+/// Second arcs: 7 to either side of straight on.
+const SECOND_ARCS: usize = 15;
 /// First arcs are densest where a small change of curvature moves a far point most (docs/methods.md 3.2).
 const FIRST_EXPONENT: f32 = 1.5;
 /// Second arcs (docs/methods.md E5.1).
 const SECOND_EXPONENT: f32 = 1.4;
 /// Travels at which second arcs branch off.
 const BRANCHES: usize = 5;
+/// How much less than at a probe the distance may be at the nearest node of the step there, metres: the places differ by
+/// rounding, so the nodes by one row and one column.
+const PROBE_SLACK_M: f32 = 1.5 * NODE_M;
 /// Clearance that may be lost in a tight start, metres: the error of the distances' interpolation.
 const START_SLACK_M: f32 = 0.02;
 
-/// Curvatures of both stages, straight on first and then ever tighter, left before right.
+/// Arcs of both stages.
 #[derive(Debug, Clone)]
 pub(crate) struct Arcs {
-    first: [Arc; FIRST_ARCS],
-    second: [Arc; SECOND_ARCS],
-}
-
-/// One curvature to steer at.
-#[derive(Debug, Clone, Copy)]
-struct Arc {
-    curvature_per_m: f32,
-    /// Index relative to the tightest arc, −1…1.
-    index: f32,
+    first: Fan<FIRST_ARCS>,
+    second: Fan<SECOND_ARCS>,
 }
 
 impl Arcs {
-    pub(crate) fn new(settings: &ExpertSettings) -> Self {
-        let arc = |i: usize, n_side: usize, max_per_m: f32, exponent: f32| {
-            let side = if i.is_multiple_of(2) { -1.0 } else { 1.0 };
-            let index = i.div_ceil(2) as f32 / n_side as f32;
-            Arc { curvature_per_m: side * max_per_m * index.powf(exponent), index: side * index }
-        };
+    pub(crate) fn new(settings: &ExpertSettings, nose_m: f32) -> Self {
         Self {
-            first: std::array::from_fn(|i| arc(i, FIRST_SIDE, settings.curvature_max_per_m, FIRST_EXPONENT)),
-            second: std::array::from_fn(|i| arc(i, SECOND_SIDE, settings.second_curvature_max_per_m, SECOND_EXPONENT)),
+            first: Fan::new(settings.curvature_max_per_m, FIRST_EXPONENT, settings.first_step_m, nose_m),
+            second: Fan::new(settings.second_curvature_max_per_m, SECOND_EXPONENT, settings.second_step_m, nose_m),
         }
     }
 
     pub(crate) fn curvature_per_m(&self, first: usize) -> f32 {
-        self.first[first].curvature_per_m
+        self.first.arcs[first].curvature_per_m
     }
 }
 
@@ -72,6 +67,8 @@ pub(crate) struct Search<'a> {
     pub(crate) sight: &'a LineOfSight,
     /// The car when it begins to obey this decision.
     pub(crate) start: Motion,
+    /// Progress of the bumper there along the route, metres, once it was asked for.
+    pub(crate) start_progress_m: OnceCell<f32>,
     /// Curvature index of the last label, −1…1.
     pub(crate) last_index: Option<f32>,
     /// Length of a forecast, metres.
@@ -79,7 +76,7 @@ pub(crate) struct Search<'a> {
 }
 
 /// A first arc and what follows it.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Plan {
     /// Which first arc.
     pub(crate) first: usize,
@@ -104,51 +101,82 @@ pub struct Candidate {
     pub score: Option<f32>,
 }
 
-/// A forecast first arc.
+/// A forecast: the free way so far.
 #[derive(Debug, Clone, Copy)]
-struct FirstArc {
-    free_m: f32,
-    load_m: f32,
-    end: Motion,
-    branches: [Branch; BRANCHES],
-    n_branches: usize,
-    /// What a plan that begins with it scores without travel and load.
-    offset: f32,
-}
-
-/// Where second arcs begin.
-#[derive(Debug, Clone, Copy)]
-struct Branch {
+struct Rollout {
     motion: Motion,
     travel_m: f32,
     load_m: f32,
 }
 
+/// A first arc, as far as it is forecast.
+#[derive(Debug, Clone, Copy)]
+struct FirstArc {
+    /// While it can go on, it is not yet followed farther than the ramp.
+    entry: Entry<FirstRollout>,
+    /// What a plan that begins with it scores without travel and load, at most.
+    offset: f32,
+    /// No plan that begins with it can score more.
+    bound: f32,
+    /// Whether its plans have been followed.
+    is_done: bool,
+}
+
+/// A forecast first arc.
+#[derive(Debug, Clone, Copy)]
+struct FirstRollout {
+    rollout: Rollout,
+    /// Where second arcs begin.
+    branches: [Rollout; BRANCHES],
+    n_branches: usize,
+    /// So many of the branches lie on the ramp, and every arc that leaves it later has the same ones.
+    n_on_ramp: usize,
+}
+
+impl Forecast for Rollout {
+    fn motion(&self) -> Motion {
+        self.motion
+    }
+}
+
+impl Forecast for FirstRollout {
+    fn motion(&self) -> Motion {
+        self.rollout.motion
+    }
+}
+
 impl Search<'_> {
     /// The best plan that keeps a clearance; `None` if not even a step is free.
     ///
-    /// Branch and bound: a plan that could not win if all the rest of its way were free is not followed.
-    pub(crate) fn best_plan(&self, clearance_m: f32, mut candidates: Option<&mut Vec<Candidate>>) -> Option<Plan> {
+    /// Branch and bound: a plan that could not win if all the rest of its way were free is not followed, and neither is a
+    /// first arc whose plans could not.
+    pub(crate) fn best_plan(&self, clearance_m: f32, candidates: Option<&mut Vec<Candidate>>) -> Option<Plan> {
         let thresholds = self.thresholds(clearance_m);
-        let firsts: [FirstArc; FIRST_ARCS] = std::array::from_fn(|i| self.follow_first(i, thresholds));
-        // The most promising first: its plans prune the others.
-        let mut order: [(f32, usize); FIRST_ARCS] = std::array::from_fn(|i| (self.bound_of_first(&firsts[i]), i));
-        order.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-
+        let mut firsts = self.enter_firsts(thresholds);
         let mut best: Option<Plan> = None;
-        for (bound, first) in order {
-            if best.is_some_and(|best| bound <= best.score) {
+        let mut followed = Followed::default();
+        // The most promising first: its plans prune the others.
+        while let Some(i) = most_promising(&firsts) {
+            let first = &mut firsts[i];
+            if best.is_some_and(|best| first.bound <= best.score) {
                 break;
             }
-            self.follow_plans(first, &firsts[first], thresholds, &mut best);
+            if first.entry.is_free {
+                self.follow_first(i, first, thresholds);
+            } else {
+                self.follow_plans(i, first, thresholds, &mut followed, &mut best);
+                first.is_done = true;
+            }
         }
-        if let Some(candidates) = &mut candidates {
+        if let Some(candidates) = candidates {
             candidates.clear();
-            candidates.extend(firsts.iter().enumerate().map(|(i, first)| {
+            candidates.extend(firsts.iter_mut().enumerate().map(|(i, first)| {
                 let mut own = None;
-                self.follow_plans(i, first, thresholds, &mut own);
-                let curvature_per_m = self.arcs.first[i].curvature_per_m;
-                Candidate { curvature_per_m, free_m: first.free_m, score: own.map(|plan| plan.score) }
+                self.follow_first(i, first, thresholds);
+                self.follow_plans(i, first, thresholds, &mut Followed::default(), &mut own);
+                let free_m = first.entry.forecast.rollout.travel_m;
+                let curvature_per_m = self.arcs.curvature_per_m(i);
+                Candidate { curvature_per_m, free_m, score: own.map(|plan| plan.score) }
             }));
         }
         best
@@ -162,8 +190,8 @@ impl Search<'_> {
         let gap_m = |first: usize| {
             let mut motion = self.start;
             (0..steps).fold(f32::INFINITY, |gap_m, _| {
-                motion.step(self.arcs.first[first].curvature_per_m, change_per_m, self.settings.first_step_m);
-                gap_m.min(self.footprint.clearance_m(field, &motion))
+                motion = motion.step(self.arcs.curvature_per_m(first), change_per_m, self.settings.first_step_m);
+                gap_m.min(self.footprint.clearance_m(field, motion))
             })
         };
         let mut widest = (0, gap_m(0));
@@ -181,7 +209,7 @@ impl Search<'_> {
         let step_m = self.settings.first_step_m;
         let change_per_m = self.change_per_step(step_m);
         let steps_per_sample = (spacing_m / step_m).round() as usize;
-        let first_per_m = self.arcs.first[plan.first].curvature_per_m;
+        let first_per_m = self.arcs.curvature_per_m(plan.first);
         let (second, mut motion) = (plan.second, self.start);
         let samples = (plan.free_m / spacing_m) as usize;
         std::iter::once(self.start.position).chain((0..samples).map(move |sample| {
@@ -192,7 +220,7 @@ impl Search<'_> {
                     Some((branch_m, second_per_m)) if travel_m + 0.5 * step_m > branch_m => second_per_m,
                     _ => first_per_m,
                 };
-                motion.step(target_per_m, change_per_m, step_m);
+                motion = motion.step(target_per_m, change_per_m, step_m);
             }
             motion.position
         }))
@@ -200,7 +228,7 @@ impl Search<'_> {
 
     /// How safe it is to pursue a band, always steering at the point `ahead_m` along it, 0…1 by the least clearance.
     pub(crate) fn trust(&self, band: &ElasticBand, ahead_m: f32) -> f32 {
-        let (settings, field) = (self.settings, self.truth.map.distance_field());
+        let (settings, field) = (self.settings, self.field());
         let step_m = settings.second_step_m;
         let change_per_m = self.change_per_step(step_m);
         let of_band = &settings.elastic_band;
@@ -213,8 +241,8 @@ impl Search<'_> {
             let left_m = motion.ahead.perp_dot(target);
             let target_per_m = (2.0 * left_m / target.length_squared())
                 .clamp(-settings.curvature_max_per_m, settings.curvature_max_per_m);
-            motion.step(target_per_m, change_per_m, step_m);
-            let clearance_m = self.footprint.clearance_m(field, &motion);
+            motion = motion.step(target_per_m, change_per_m, step_m);
+            let clearance_m = self.footprint.clearance_m(field, motion);
             trust = trust.min((clearance_m - of_band.trust_from_m) * per_m);
             if trust <= 0.0 {
                 return 0.0;
@@ -233,55 +261,98 @@ impl Search<'_> {
     }
 
     fn thresholds(&self, clearance_m: f32) -> Thresholds {
-        let present_m = self.footprint.clearance_m(self.truth.map.distance_field(), &self.start);
+        let present_m = self.footprint.clearance_m(self.field(), self.start);
         Thresholds { near_m: clearance_m.min(present_m - START_SLACK_M), far_m: clearance_m }
     }
 
-    fn follow_first(&self, first: usize, thresholds: Thresholds) -> FirstArc {
-        let (settings, field) = (self.settings, self.truth.map.distance_field());
-        let Arc { curvature_per_m, index } = self.arcs.first[first];
-        let weights = &settings.weights;
-        let change = self.last_index.map_or(0.0, |last_index| (index - last_index).abs());
-        let mut arc = FirstArc {
-            free_m: 0.0,
-            load_m: 0.0,
-            end: self.start,
-            branches: [Branch { motion: self.start, travel_m: 0.0, load_m: 0.0 }; BRANCHES],
-            n_branches: 0,
-            offset: 0.0,
+    /// First arcs as far as their ramps.
+    fn enter_firsts(&self, thresholds: Thresholds) -> [FirstArc; FIRST_ARCS] {
+        let fan = &self.arcs.first;
+        let start = Rollout { motion: self.start, travel_m: 0.0, load_m: 0.0 };
+        let start = FirstRollout { rollout: start, branches: [start; BRANCHES], n_branches: 0, n_on_ramp: 0 };
+        let drive_on = |first: &mut FirstRollout, next| {
+            let is_free = self.drive_on_first(first, next, thresholds);
+            first.n_on_ramp = first.n_branches;
+            is_free
         };
-        let step_m = settings.first_step_m;
-        let change_per_m = self.change_per_step(step_m);
-        let mut motion = self.start;
-        let mut travel_m = 0.0;
-        while travel_m < self.horizon_m {
-            motion.step(curvature_per_m, change_per_m, step_m);
-            travel_m += step_m;
-            let clearance_m = self.footprint.clearance_m(field, &motion);
-            if clearance_m < thresholds.at(travel_m, settings)
-                || !self.sight.knows(motion.on_axis(self.footprint.nose_m()))
-            {
-                break;
-            }
-            arc.free_m = travel_m;
-            arc.load_m += self.load(clearance_m) * step_m;
-            arc.end = motion;
-            // Half a step: travels are sums of steps.
-            if arc.n_branches < BRANCHES && travel_m + 0.5 * step_m > settings.branch_travels_m[arc.n_branches] {
-                arc.branches[arc.n_branches] = Branch { motion, travel_m, load_m: arc.load_m };
-                arc.n_branches += 1;
-            }
-        }
-        arc.offset = weights.first_free * arc.free_m.min(self.horizon_m) / weights.unit_m
-            - weights.first_curvature * index.abs()
-            - weights.change * change;
-        arc
+        let entries = fan.follow_ramps(start, self.change_per_step(fan.step_m), drive_on);
+        let blocked_m = self.blocked_m(thresholds);
+        std::array::from_fn(|i| {
+            let mut first = FirstArc { entry: entries[i], offset: 0.0, bound: 0.0, is_done: false };
+            let Rollout { motion, travel_m, .. } = first.entry.forecast.rollout;
+            let free_max_m = if first.entry.is_free {
+                let mut probes = fan.probes(i, fan.enter(i, motion));
+                let blocked = probes.find_map(|(travels_m, noses)| {
+                    let blocked = self.field().at_four_nearest_nodes(noses).simd_lt(blocked_m).to_bitmask();
+                    (blocked != 0).then(|| travels_m.to_array()[blocked.trailing_zeros() as usize])
+                });
+                blocked.map_or(self.horizon_m, |probed_m| travel_m + probed_m)
+            } else {
+                travel_m
+            };
+            self.rate_first(i, &mut first, free_max_m);
+            first
+        })
     }
 
-    /// No plan that begins with this arc can score more.
-    fn bound_of_first(&self, first: &FirstArc) -> f32 {
-        let load_m = first.branches[..first.n_branches].first().map_or(0.0, |branch| branch.load_m);
-        first.offset + self.bound(load_m)
+    /// Forecasts a first arc to its end.
+    fn follow_first(&self, i: usize, first: &mut FirstArc, thresholds: Thresholds) {
+        let drive_on = |first: &mut FirstRollout, next| self.drive_on_first(first, next, thresholds);
+        self.arcs.first.follow(i, &mut first.entry, drive_on);
+        self.rate_first(i, first, first.entry.forecast.rollout.travel_m);
+    }
+
+    #[inline]
+    fn drive_on_first(&self, first: &mut FirstRollout, next: Motion, thresholds: Thresholds) -> bool {
+        let step_m = self.settings.first_step_m;
+        let clearance_m = self.footprint.clearance_m(self.field(), next);
+        if !self.drive_on(&mut first.rollout, next, step_m, clearance_m, thresholds) {
+            return false;
+        }
+        // Half a step: travels are sums of steps.
+        let reached_m = first.rollout.travel_m + 0.5 * step_m;
+        if first.n_branches < BRANCHES && reached_m > self.settings.branch_travels_m[first.n_branches] {
+            first.branches[first.n_branches] = first.rollout;
+            first.n_branches += 1;
+        }
+        true
+    }
+
+    fn rate_first(&self, i: usize, first: &mut FirstArc, free_m: f32) {
+        let (weights, index) = (&self.settings.weights, self.arcs.first.arcs[i].index);
+        let change = self.last_index.map_or(0.0, |last_index| (index - last_index).abs());
+        first.offset = weights.first_free * free_m.min(self.horizon_m) / weights.unit_m
+            - weights.first_curvature * index.abs()
+            - weights.change * change;
+        let FirstRollout { branches, n_branches, .. } = &first.entry.forecast;
+        let load_m = branches[..*n_branches].first().map_or(0.0, |branch| branch.load_m);
+        first.bound = first.offset + self.bound(load_m);
+    }
+
+    /// Moves a forecast to its next step, unless it ends before: at the horizon, at an obstacle or on unknown ground.
+    #[expect(
+        clippy::inline_always,
+        reason = "called, it takes motions through memory: numbers that are stored, and loaded as vectors"
+    )]
+    #[inline(always)]
+    fn drive_on(
+        &self,
+        rollout: &mut Rollout,
+        next: Motion,
+        step_m: f32,
+        clearance_m: f32,
+        thresholds: Thresholds,
+    ) -> bool {
+        let travel_m = rollout.travel_m + step_m;
+        if rollout.travel_m >= self.horizon_m
+            || clearance_m < thresholds.at(travel_m, self.settings)
+            || !self.sight.knows(next.on_axis(self.footprint.nose_m()))
+        {
+            return false;
+        }
+        let load_m = rollout.load_m + self.load(clearance_m) * step_m;
+        *rollout = Rollout { motion: next, travel_m, load_m };
+        true
     }
 
     /// Best of travel and load once `load_m` has been collected: free to the horizon without any more.
@@ -296,33 +367,72 @@ impl Search<'_> {
         travel_m / self.settings.weights.unit_m - self.settings.weights.load * load_m / travel_m
     }
 
+    /// The travel above which a load is worth more than this: the inverse of [`Self::worth`].
+    fn travel_at_worth(&self, worth: f32, load_m: f32) -> f32 {
+        let weights = &self.settings.weights;
+        0.5 * weights.unit_m * (worth + (worth * worth + 4.0 * weights.load * load_m / weights.unit_m).sqrt())
+    }
+
     /// Replaces `best` by the best plan that begins with a first arc, if that is better.
-    fn follow_plans(&self, index: usize, first: &FirstArc, thresholds: Thresholds, best: &mut Option<Plan>) {
-        if first.free_m == 0.0 {
+    fn follow_plans(
+        &self,
+        index: usize,
+        first: &FirstArc,
+        thresholds: Thresholds,
+        followed: &mut Followed,
+        best: &mut Option<Plan>,
+    ) {
+        let forecast = &first.entry.forecast;
+        let Rollout { motion, travel_m: first_free_m, load_m } = forecast.rollout;
+        if first_free_m == 0.0 {
             return;
         }
         let horizon_m = self.horizon_m;
-        let mut offer = |second, free_m: f32, load_m: f32, penalty: f32, end: &Motion| {
+        let mut offer = |second, free_m: f32, load_m: f32, penalty: f32, end: Motion| {
             let free_m = free_m.min(horizon_m);
             let score = self.worth(free_m, load_m) + first.offset - penalty;
             let is_better = best.is_none_or(|best| score > best.score);
             if is_better && self.makes_progress(end, free_m) {
-                *best = Some(Plan { first: index, second, first_free_m: first.free_m, free_m, score });
+                *best = Some(Plan { first: index, second, first_free_m, free_m, score });
             }
             best.map_or(f32::NEG_INFINITY, |best| best.score)
         };
-        let mut to_beat = offer(None, first.free_m, first.load_m, 0.0, &first.end);
-        for branch in first.branches[..first.n_branches].iter().rev() {
-            for second in &self.arcs.second {
-                let penalty = self.settings.weights.second_curvature * second.index.abs();
-                let load_max_m = self.load_at_bound(to_beat - first.offset + penalty);
-                if let Some((free_m, load_m, end)) =
-                    self.follow_second(branch, second.curvature_per_m, thresholds, load_max_m)
-                {
-                    to_beat = offer(Some((branch.travel_m, second.curvature_per_m)), free_m, load_m, penalty, &end);
+        let blocked_m = self.blocked_m(thresholds);
+        let mut to_beat = offer(None, first_free_m, load_m, 0.0, motion);
+        let side = usize::from(self.arcs.curvature_per_m(index) < self.start.curvature_per_m);
+        for (i, branch) in forecast.branches[..forecast.n_branches].iter().enumerate().rev() {
+            if i < forecast.n_on_ramp {
+                let offset = &mut followed.0[side][i];
+                if first.offset <= *offset {
+                    continue;
                 }
+                *offset = first.offset;
+            }
+            let fan = &self.arcs.second;
+            let load_max_m = self.load_at_bound(to_beat - first.offset);
+            let drive_on = |rollout: &mut Rollout, next| self.drive_on_second(rollout, next, thresholds, load_max_m);
+            let entries = fan.follow_ramps(*branch, self.change_per_step(fan.step_m), drive_on);
+            for (i, mut entry) in entries.into_iter().enumerate() {
+                let penalty = self.penalty(&fan.arcs[i]);
+                if entry.is_free {
+                    let worth_min = to_beat - first.offset + penalty;
+                    if self.is_hopeless(i, &entry.forecast, worth_min, blocked_m) {
+                        continue;
+                    }
+                    let load_max_m = self.load_at_bound(worth_min);
+                    let drive_on =
+                        |rollout: &mut Rollout, next| self.drive_on_second(rollout, next, thresholds, load_max_m);
+                    fan.follow(i, &mut entry, drive_on);
+                }
+                let branching = Some((branch.travel_m, fan.arcs[i].curvature_per_m));
+                let Rollout { motion, travel_m, load_m } = entry.forecast;
+                to_beat = offer(branching, travel_m, load_m, penalty, motion);
             }
         }
+    }
+
+    fn penalty(&self, second: &Arc) -> f32 {
+        self.settings.weights.second_curvature * second.index.abs()
     }
 
     /// The load above which [`Self::bound`] falls below a worth.
@@ -331,34 +441,43 @@ impl Search<'_> {
         (self.horizon_m / weights.unit_m - worth) * self.horizon_m / weights.load
     }
 
-    /// Free travel, load and end of a second arc; `None` once it has collected more than `load_max_m`.
-    fn follow_second(
-        &self,
-        branch: &Branch,
-        curvature_per_m: f32,
-        thresholds: Thresholds,
-        load_max_m: f32,
-    ) -> Option<(f32, f32, Motion)> {
-        let (settings, field) = (self.settings, self.truth.map.distance_field());
-        let step_m = settings.second_step_m;
-        let change_per_m = self.change_per_step(step_m);
-        let Branch { mut motion, mut travel_m, mut load_m } = *branch;
-        while travel_m < self.horizon_m {
-            if load_m > load_max_m {
-                return None;
+    /// Whether a second arc from the ramp must be blocked before it is worth more than `worth_min`.
+    fn is_hopeless(&self, second: usize, ramp: &Rollout, worth_min: f32, blocked_m: f32x4) -> bool {
+        let fan = &self.arcs.second;
+        let to_probe_m = f32x4::splat(self.travel_at_worth(worth_min, ramp.load_m) - ramp.travel_m);
+        for (travels_m, noses) in fan.probes(second, fan.enter(second, ramp.motion)) {
+            let counts = travels_m.simd_lt(to_probe_m);
+            if (counts & self.field().at_four_nearest_nodes(noses).simd_lt(blocked_m)).any() {
+                return true;
             }
-            let before = motion;
-            motion.step(curvature_per_m, change_per_m, step_m);
-            let clearance_m = self.footprint.coarse_clearance_m(field, &motion);
-            if clearance_m < thresholds.at(travel_m + step_m, settings)
-                || !self.sight.knows(motion.on_axis(self.footprint.nose_m()))
-            {
-                return Some((travel_m, load_m, before));
+            if !counts.all() {
+                break;
             }
-            travel_m += step_m;
-            load_m += self.load(clearance_m) * step_m;
         }
-        Some((travel_m, load_m, motion))
+        false
+    }
+
+    /// Moves a second arc to its next step, unless it has collected more than `load_max_m`: it is worth less then.
+    #[expect(
+        clippy::inline_always,
+        reason = "called, it takes motions through memory: numbers that are stored, and loaded as vectors"
+    )]
+    #[inline(always)]
+    fn drive_on_second(&self, rollout: &mut Rollout, next: Motion, thresholds: Thresholds, load_max_m: f32) -> bool {
+        if rollout.load_m > load_max_m {
+            return false;
+        }
+        let clearance_m = self.footprint.coarse_clearance_m(self.field(), next);
+        self.drive_on(rollout, next, self.settings.second_step_m, clearance_m, thresholds)
+    }
+
+    /// A probe that finds less than this at the nearest node finds a forecast blocked, metres.
+    fn blocked_m(&self, thresholds: Thresholds) -> f32x4 {
+        f32x4::splat(self.footprint.distance_m(thresholds.near_m) - PROBE_SLACK_M)
+    }
+
+    fn field(&self) -> &DistanceField {
+        self.truth.map.distance_field()
     }
 
     /// How much something at a clearance weighs, 0…1: "fewest obstacles around the trajectory" (paper), and what
@@ -370,17 +489,33 @@ impl Search<'_> {
     }
 
     /// No turning back: the bumper gains on the route. This only filters plans, so labels remain functions of the scene.
-    fn makes_progress(&self, end: &Motion, travel_m: f32) -> bool {
+    fn makes_progress(&self, end: Motion, travel_m: f32) -> bool {
         let path = self.truth.map.path();
         let reach_m = self.horizon_m + self.context.vehicle.front_m();
-        let progress_of = |motion: &Motion| {
+        let progress_of = |motion: Motion| {
             let bumper = motion.on_axis(self.context.vehicle.front_m());
             path.project_near(bumper, self.truth.progress_m, self.context.vehicle.front_m(), reach_m + 4.0)
         };
         let reached_m = progress_of(end);
+        let start_m = *self.start_progress_m.get_or_init(|| progress_of(self.start));
         // Behind the finish progress saturates.
-        reached_m > path.length_m() - 0.5
-            || reached_m - progress_of(&self.start) >= self.settings.progress_share * travel_m
+        reached_m > path.length_m() - 0.5 || reached_m - start_m >= self.settings.progress_share * travel_m
+    }
+}
+
+/// The first arc with the highest bound of those that are not done; of equal ones, the straightest.
+fn most_promising(firsts: &[FirstArc]) -> Option<usize> {
+    let open = firsts.iter().enumerate().filter(|(_, first)| !first.is_done);
+    open.max_by(|(i, a), (j, b)| a.bound.total_cmp(&b.bound).then(j.cmp(i))).map(|(i, _)| i)
+}
+
+/// What the first arcs had as their offset whose branches on the ramps were followed, by side and branch. The plans of
+/// another one from the same branch differ from theirs in nothing but the offset.
+struct Followed([[f32; BRANCHES]; 2]);
+
+impl Default for Followed {
+    fn default() -> Self {
+        Self([[f32::NEG_INFINITY; BRANCHES]; 2])
     }
 }
 
@@ -398,3 +533,6 @@ impl Thresholds {
         if travel_m < settings.tight_start_m { self.near_m } else { self.far_m }
     }
 }
+
+#[cfg(test)]
+mod tests;
