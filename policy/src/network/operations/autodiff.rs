@@ -1,9 +1,9 @@
 //! Gradients on CPUs, written by hand.
 
-use super::NetworkOps;
 use super::cpu::dense;
 use super::cpu::encoder::EncoderTrace;
 use super::flex::{EncoderParameters, contiguous, from_vec, values};
+use super::ops::NetworkOps;
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;

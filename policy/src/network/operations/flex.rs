@@ -1,8 +1,9 @@
 //! The operations on burn's CPU backend: tensors to slices and back.
 
+use super::adam::{AdamMoments, AdamStep};
 use super::cpu::encoder::EncoderWeights;
 use super::cpu::{adam, dense};
-use super::{AdamMoments, AdamStep, NetworkOps, OptimizerOps};
+use super::ops::{NetworkOps, OptimizerOps};
 use crate::network::architecture::ConvLayer;
 use burn::backend::flex::FlexTensor;
 use burn::backend::{Flex, TensorMetadata as _};

@@ -1,6 +1,6 @@
 //! What the operations mean, in plain operations of burn: computed on GPUs, compared with in tests.
 
-use super::{AdamMoments, AdamStep};
+use super::adam::{AdamMoments, AdamStep};
 use burn::backend::tensor::{BoolTensor, FloatTensor};
 use burn::backend::{Backend, FloatDType, Scalar, TensorMetadata as _};
 use burn::tensor::Shape;

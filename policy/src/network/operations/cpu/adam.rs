@@ -1,7 +1,7 @@
 //! One step of Adam in one pass over its values.
 
 use super::vectors;
-use crate::network::operations::AdamStep;
+use crate::network::operations::adam::AdamStep;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
