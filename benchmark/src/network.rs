@@ -14,11 +14,12 @@ use sim::sensing::noise::NoiseSettings;
 use sim::sensing::{GridGeometry, OccupancyGrid, Sensor};
 use std::hint::black_box;
 use std::ops::ControlFlow;
-use std::time::Instant;
 
 /// The networks that are measured.
-pub const NETWORKS: [(&str, fn() -> NetworkArchitecture); 2] =
-    [("compact", NetworkArchitecture::compact), ("paper", NetworkArchitecture::paper)];
+fn networks() -> [(&'static str, NetworkArchitecture); 2] {
+    [("compact", NetworkArchitecture::compact()), ("paper", NetworkArchitecture::paper())]
+}
+
 /// Sizes of batches that are answered.
 pub const ANSWERED: [usize; 3] = [1, 64, 512];
 /// Sizes of batches that are trained on.
@@ -45,8 +46,8 @@ fn grids(count: usize) -> anyhow::Result<Vec<OccupancyGrid>> {
 /// If the reference lot cannot be built.
 pub fn answers(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     let grids = grids(ANSWERED[2])?;
-    for (name, architecture) in NETWORKS {
-        let weights = Weights::init(architecture(), RootSeed(1), 0);
+    for (name, architecture) in networks() {
+        let weights = Weights::init(architecture, RootSeed(1), 0);
         let mut predictor = Predictor::new(weights, InferenceSettings::plain(), DeviceChoice::Cpu);
         for batch in ANSWERED {
             let asked: Vec<&OccupancyGrid> = grids[..batch].iter().collect();
@@ -77,9 +78,9 @@ pub fn training(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
         .collect();
     let mut dataset = Dataset::default();
     dataset.push(Round::from(samples));
-    for (name, architecture) in NETWORKS {
+    for (name, architecture) in networks() {
         for batch in TRAINED {
-            report(on_threads(2, || trained(effort, name, architecture(), batch, &dataset)));
+            report(on_threads(2, || trained(effort, name, architecture, batch, &dataset)));
         }
     }
     Ok(())
@@ -97,11 +98,11 @@ fn trained(effort: Effort, name: &str, architecture: NetworkArchitecture, batch:
     let (geometry, inference, seed) = (GridGeometry::paper(), InferenceSettings::plain(), RootSeed(1));
     let context = FitContext { geometry, inference, device: DeviceChoice::Cpu, seed };
     let part = (steps / 5).max(1);
-    let (mut rates, mut began) = (Vec::new(), Instant::now());
+    let (mut rates, mut began) = (Vec::new(), crate::now());
     let mut progress = |now: &FitProgress| {
-        if now.step % part == 0 {
+        if now.step.is_multiple_of(part) {
             rates.push(f64::from(part) * batch as f64 / began.elapsed().as_secs_f64());
-            began = Instant::now();
+            began = crate::now();
         }
         ControlFlow::Continue(())
     };

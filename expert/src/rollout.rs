@@ -89,6 +89,7 @@ impl HalfTurn {
 
 /// The body, covered by discs, as the forecast sees it.
 #[derive(Debug, Clone)]
+#[expect(clippy::struct_field_names, reason = "lengths in metres, as everywhere")]
 pub(crate) struct Footprint {
     /// Centres of the discs, metres ahead of the rear axle; the last one is repeated.
     disc_centres_m: [f32x4; 2],

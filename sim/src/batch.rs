@@ -98,7 +98,9 @@ impl SeatedFleet {
         self.frames.clear();
         for _ in 0..TICKS_AT_ONCE {
             let mut running = running(&mut self.episodes);
-            running.iter_mut().for_each(|(_, episode)| episode.observe());
+            for (_, episode) in &mut running {
+                episode.observe();
+            }
             decide(&running, &mut *self.fleet, &mut decisions);
             let drive =
                 |((index, episode), &decision): ((usize, &mut Episode), &Decision)| (index, episode.apply(decision));

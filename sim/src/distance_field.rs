@@ -60,7 +60,7 @@ impl DistanceField {
         let origin = low - margin;
         let size = (high + margin - origin) / NODE_M;
         let (cols, rows) = (size.x.ceil() as usize + 1, size.y.ceil() as usize + 1);
-        assert!(cols.max(rows) <= i16::MAX as usize, "a raster of {cols} x {rows} nodes takes gigabytes");
+        assert!(i16::try_from(cols.max(rows)).is_ok(), "a raster of {cols} x {rows} nodes takes gigabytes");
         let mut field = Self { origin, cols, rows, nodes: vec![0; cols * rows + SPARE_NODES] };
         field.fill(boundary);
         for (a, b) in edges(boundary) {
@@ -406,7 +406,9 @@ mod tests {
             let (boundary, islands) = (turn(&lane), islands.each_ref().map(|island| turn(island)));
             let disc = (turned.point(Vec2::new(16.0, 2.0)), 0.4);
             let mut field = DistanceField::of_boundary(&boundary);
-            islands.iter().for_each(|island| field.carve_polygon(island));
+            for island in &islands {
+                field.carve_polygon(island);
+            }
             field.carve_disc(disc.0, disc.1);
             let plain = plain_field(&boundary, &islands, disc);
             let different = (0..plain.nodes.len()).filter(|&index| field.nodes[index] != plain.nodes[index]).count();

@@ -185,7 +185,7 @@ impl Spans {
         let spans = self.first[rows.clone()].iter().zip(&self.end[rows]);
         // A span without pixels is 0..0, whose bits are none.
         let cells = spans.map(|(&first, &end)| {
-            let (first, end) = (u32::from(first) / PIXELS, (u32::from(end) + (PIXELS - 1)) / PIXELS);
+            let (first, end) = (u32::from(first) / PIXELS, u32::from(end).div_ceil(PIXELS));
             (1 << end) - (1 << first)
         });
         cells.fold(0, |all, cells| all | cells)

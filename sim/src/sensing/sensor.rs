@@ -353,7 +353,7 @@ const ALL_BLOCKS: u32 = (1 << BLOCKS) - 1;
 /// The cells of blocks in a row of blocks, bit = column.
 fn cells_of_blocks(blocks: u32) -> u32 {
     const BLOCK: u32 = (1 << BLOCK_CELLS) - 1;
-    (0..BLOCKS).fold(0, |cells, block| cells | (blocks >> block & 1) * BLOCK << (block * BLOCK_CELLS))
+    (0..BLOCKS).fold(0, |cells, block| cells | (((blocks >> block & 1) * BLOCK) << (block * BLOCK_CELLS)))
 }
 
 /// Rows of cells in a row of blocks.

@@ -49,7 +49,7 @@ const BEGIN: &str = "<!-- bench -->";
 const END: &str = "<!-- /bench -->";
 
 pub(crate) fn run(args: &BenchArgs, output: &Output) -> anyhow::Result<()> {
-    let page = args.write.as_deref().map(|path| Page::read(path)).transpose()?;
+    let page = args.write.as_deref().map(Page::read).transpose()?;
     let effort = if args.quick { Effort::quick() } else { Effort::full() };
     let mut text = format!("{}\n\n| | median | range | goal |\n|---|---|---|---|\n", machine());
     output.print(text.trim_end());

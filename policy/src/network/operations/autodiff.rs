@@ -21,8 +21,8 @@ impl<C: CheckpointStrategy> NetworkOps for Autodiff<Flex, C> {
         weight_2: FloatTensor<Self>,
         bias_2: FloatTensor<Self>,
     ) -> FloatTensor<Self> {
-        let nodes = [&weight_1, &bias_1, &weight_2, &bias_2].map(|tensor| tensor.node());
-        let parameters = [weight_1, bias_1, weight_2, bias_2].map(|tensor| tensor.into_primitive());
+        let nodes = [&weight_1, &bias_1, &weight_2, &bias_2].map(FloatTensor::<Self>::node);
+        let parameters = [weight_1, bias_1, weight_2, bias_2].map(FloatTensor::<Self>::into_primitive);
         match Encode.prepare::<C>(nodes).compute_bound().stateful() {
             OpsKind::UnTracked(prepared) => {
                 let [weight_1, bias_1, weight_2, bias_2] = parameters;
@@ -39,7 +39,7 @@ impl<C: CheckpointStrategy> NetworkOps for Autodiff<Flex, C> {
     }
 
     fn dense(x: FloatTensor<Self>, weight: FloatTensor<Self>, bias: FloatTensor<Self>) -> FloatTensor<Self> {
-        let nodes = [&x, &weight, &bias].map(|tensor| tensor.node());
+        let nodes = [&x, &weight, &bias].map(FloatTensor::<Self>::node);
         let [x, weight, bias] = [x, weight, bias].map(|tensor| contiguous(tensor.into_primitive()));
         match Dense.prepare::<C>(nodes).compute_bound().stateful() {
             OpsKind::UnTracked(prepared) => prepared.finish(Flex::dense(x, weight, bias)),

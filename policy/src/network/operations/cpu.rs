@@ -1,4 +1,8 @@
 //! The operations arranged for CPUs, on slices. What is fast and why is said in each file.
+#![expect(
+    clippy::inline_always,
+    reason = "a kernel is compiled in one piece for each instruction set; calls would leave it"
+)]
 
 pub(crate) mod adam;
 pub(crate) mod dense;

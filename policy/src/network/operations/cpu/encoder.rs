@@ -47,7 +47,7 @@ pub(crate) struct EncoderTrace {
     winners_2: Vec<u32>,
 }
 
-impl<'a> EncoderWeights<'a> {
+impl EncoderWeights<'_> {
     fn map(&self) -> PaddedMap {
         PaddedMap { side: POOLED_1 + self.conv2.kernel - 1, before: self.conv2.padding().0 }
     }
@@ -121,10 +121,10 @@ impl<'a> EncoderWeights<'a> {
         let mut sum = Share::new(self);
         for share in &shares {
             for (sum, share) in [
-                (&mut sum.d_table, &share.d_table),
-                (&mut sum.d_bias_1, &share.d_bias_1),
-                (&mut sum.d_by_output, &share.d_by_output),
-                (&mut sum.d_bias_2, &share.d_bias_2),
+                (&mut sum.table, &share.table),
+                (&mut sum.bias_1, &share.bias_1),
+                (&mut sum.by_output, &share.by_output),
+                (&mut sum.bias_2, &share.bias_2),
             ] {
                 for (sum, value) in sum.iter_mut().zip(share) {
                     *sum += value;
@@ -133,12 +133,12 @@ impl<'a> EncoderWeights<'a> {
         }
         let mut gradients = EncoderGradients {
             weight_1: vec![0.0; self.weight_1.len()],
-            bias_1: sum.d_bias_1,
+            bias_1: sum.bias_1,
             weight_2: vec![0.0; self.weight_2.len()],
-            bias_2: sum.d_bias_2,
+            bias_2: sum.bias_2,
         };
-        FirstLayer::d_weight(self.conv1, &sum.d_table, &mut gradients.weight_1);
-        self.second_layer().d_weight(&sum.d_by_output, &mut gradients.weight_2);
+        FirstLayer::d_weight(self.conv1, &sum.table, &mut gradients.weight_1);
+        self.second_layer().d_weight(&sum.by_output, &mut gradients.weight_2);
         gradients
     }
 }
@@ -217,21 +217,22 @@ impl WithSimd for Forward<'_> {
     }
 }
 
-/// One chunk's share of the gradients.
+/// One chunk's share of the gradients: of the table and the bias of the first layer, of the weights and the bias of the
+/// second.
 struct Share {
-    d_table: Vec<f32>,
-    d_bias_1: Vec<f32>,
-    d_by_output: Vec<f32>,
-    d_bias_2: Vec<f32>,
+    table: Vec<f32>,
+    bias_1: Vec<f32>,
+    by_output: Vec<f32>,
+    bias_2: Vec<f32>,
 }
 
 impl Share {
     fn new(weights: &EncoderWeights<'_>) -> Self {
         Self {
-            d_table: vec![0.0; FirstLayer::table_len(weights.conv1)],
-            d_bias_1: vec![0.0; weights.bias_1.len()],
-            d_by_output: vec![0.0; weights.weight_2.len()],
-            d_bias_2: vec![0.0; weights.bias_2.len()],
+            table: vec![0.0; FirstLayer::table_len(weights.conv1)],
+            bias_1: vec![0.0; weights.bias_1.len()],
+            by_output: vec![0.0; weights.weight_2.len()],
+            bias_2: vec![0.0; weights.bias_2.len()],
         }
     }
 }
@@ -267,8 +268,8 @@ impl WithSimd for Backward<'_> {
                 &trace.winners_2[sample * features_len..][..features_len],
                 &mut sparse,
                 &mut d_pooled,
-                &mut share.d_by_output,
-                &mut share.d_bias_2,
+                &mut share.by_output,
+                &mut share.bias_2,
             );
             first.backward(
                 simd,
@@ -276,8 +277,8 @@ impl WithSimd for Backward<'_> {
                 second.map,
                 &d_pooled,
                 &trace.winners_1[sample * winners_1_len..][..winners_1_len],
-                &mut share.d_table,
-                &mut share.d_bias_1,
+                &mut share.table,
+                &mut share.bias_1,
             );
         }
         share

@@ -187,10 +187,10 @@ impl SecondLayer {
                 let winners = int_vectors_mut::<S>(&mut winners[at..at + WIDTH * S::F32_LANES]);
                 for v in 0..WIDTH {
                     let (mut best, mut from) = (sums[0][v], simd.splat_u32s(0));
-                    for cell in 1..POOL.len() {
-                        let wins = simd.greater_than_f32s(sums[cell][v], best);
-                        best = simd.select_f32s(wins, sums[cell][v], best);
-                        from = simd.select_u32s(wins, simd.splat_u32s(cell as u32), from);
+                    for (cell, sums) in (1..).zip(&sums[1..]) {
+                        let wins = simd.greater_than_f32s(sums[v], best);
+                        best = simd.select_f32s(wins, sums[v], best);
+                        from = simd.select_u32s(wins, simd.splat_u32s(cell), from);
                     }
                     let value = simd.add_f32s(best, bias[v]);
                     let is_alive = simd.greater_than_f32s(value, zero);
@@ -345,7 +345,7 @@ fn for_each_group(len: usize, mut visit: impl FnMut(usize, Group)) {
     let mut first = 0;
     while first < len {
         let (step, group) = match len - first {
-            _ if len % 9 == 0 => (9, Group::Nine),
+            _ if len.is_multiple_of(9) => (9, Group::Nine),
             8.. => (8, Group::Eight),
             _ => (1, Group::One),
         };
