@@ -267,10 +267,11 @@ impl NamedDriver {
         }
     }
 
-    /// How many of some cars, which are driven in lock-step, one fleet drives best: a network answers for a thread's share
-    /// of them in one call, others answer for each car alone.
+    /// How many of some cars, which are driven in lock-step, one fleet drives best: on CPUs a network answers for a thread's
+    /// share of them in one call, on a GPU for all; others answer for each car alone.
     pub fn cars_per_fleet(&self, cars: usize) -> usize {
         match self.model {
+            Model::Network(_, device) if device != DeviceChoice::default() => cars.max(1),
             Model::Network(..) => cars.div_ceil(rayon::current_num_threads()).max(1),
             Model::Expert(_) | Model::Planner(_) => 1,
         }
