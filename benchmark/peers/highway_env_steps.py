@@ -13,7 +13,7 @@ GRID = {
         "as_image": False, "align_to_vehicle_axes": True,
     }
 }
-for name, config in [("racetrack-v0", GRID), ("parking-v0", {})]:
+for name, config in [("racetrack-v1", GRID), ("parking-v0", {})]:
     env = gymnasium.make(name, config=config)
     env.reset(seed=1)
     steps, began = 0, time.perf_counter()

@@ -1,10 +1,14 @@
 """Control steps per second of IR-SIM: one Ackermann car, a lane of parked cars, a laser scan, no display."""
 
+import contextlib
 import os
+import sys
 import tempfile
 import time
 
-import irsim
+os.environ["MPLBACKEND"] = "Agg"
+with contextlib.redirect_stdout(sys.stderr):  # it lists the windows that it cannot open
+    import irsim
 
 WORLD = """
 world: {height: 60, width: 60, step_time: 0.05, sample_time: 0.05, offset: [0, -30], collision_mode: 'unobstructed'}

@@ -57,7 +57,7 @@ pub const PEERS: [Peer; 7] = [
         about: "as above",
     },
     Peer {
-        name: "HighwayEnv, parking-v0 and racetrack-v0",
+        name: "HighwayEnv, racetrack and parking",
         packages: &["highway-env", "gymnasium", "numpy"],
         script: "highway_env_steps.py",
         arguments: &[],
