@@ -7,7 +7,7 @@
 //!   bits of it, bit = lane.
 //! - What does not come in fours repeats its last element, or carries a mask.
 //! - What is asked next depends on what was found, for one lane or the other. A branch per lane that cannot be foreseen
-//!   costs more than several look-ups, so the lanes to be looked at more closely are [`Picked`] first, then done together.
+//!   costs more than several look-ups, so the lanes to be looked at more closely are picked first, then done together.
 //! - A look-up takes one lane at a time: indices leave a vector by `to_array`, what they name comes back by `from`.
 
 use glam::Vec2;

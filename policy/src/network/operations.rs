@@ -1,14 +1,14 @@
 //! Custom operations of burn: what its CPU backend does slowly, or not to the same bits on every machine.
 //!
-//! | operation | on CPUs ([`cpu`]) | why not burn-flex's |
+//! | operation | on CPUs (`cpu`) | why not burn-flex's |
 //! |---|---|---|
 //! | [`encode`]: both convolutions with pools and `ReLU`s | table look-up, sparse backward pass | an eighth of the speed |
 //! | [`dense`]: x · weight + bias | one chain of multiply-adds per output | its sums depend on the machine's caches |
 //! | [`adam_step`]: Adam and the clipping of its gradient | two passes over the values | a dozen, and denormal numbers |
 //!
 //! They are registered through burn's backend extension (the burn book, chapter "Backend Extension"). On every other
-//! backend they are what they mean, in plain operations of burn ([`plain`]), which is also what tests compare with.
-//! Gradients on CPUs are written by hand ([`autodiff`]).
+//! backend they are what they mean, in plain operations of burn (`plain`), which is also what tests compare with.
+//! Gradients on CPUs are written by hand (`autodiff`).
 
 pub(crate) mod adam;
 mod autodiff;
