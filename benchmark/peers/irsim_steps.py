@@ -28,7 +28,8 @@ for i in range(20):
         WORLD += f"  - {{shape: {{name: 'rectangle', length: 2.0, width: 4.6}}, state: [{2.4 * i}, {y}, 0]}}\n"
 with tempfile.NamedTemporaryFile("w", suffix=".yaml", delete=False) as file:
     file.write(WORLD)
-env = irsim.make(file.name, display=False, log_level="WARNING")
+with contextlib.redirect_stdout(sys.stderr):  # and the packages that it does without
+    env = irsim.make(file.name, display=False, log_level="ERROR")
 steps, began = 0, time.perf_counter()
 while time.perf_counter() - began < 10:
     env.step()
