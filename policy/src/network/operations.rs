@@ -2,7 +2,7 @@
 //!
 //! | operation | on CPUs (`cpu`) | why not burn-flex's |
 //! |---|---|---|
-//! | [`encode`]: both convolutions with pools and `ReLU`s | table look-up, sparse backward pass | an eighth of the speed |
+//! | [`encode`]: both convolutions with pools and `ReLU`s | table look-up, sparse backward pass | a fraction of the speed |
 //! | [`dense`]: x · weight + bias | one chain of multiply-adds per output | its sums depend on the machine's caches |
 //! | [`adam_step`]: Adam and the clipping of its gradient | two passes over the values | a dozen, and denormal numbers |
 //!
