@@ -171,7 +171,7 @@ fn drivers(settings: &EpisodeSettings) -> Vec<(&'static str, Box<dyn Driver>)> {
     let geometry = settings.sensing.geometry;
     let tentacle = PlannerSpec::all().into_iter().find(|planner| planner.name() == "tentacle").unwrap();
     let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
-    let untrained = Untrained(Predictor::new(weights, InferenceSettings::plain(), DeviceChoice::Cpu), geometry);
+    let untrained = Untrained(Predictor::new(&weights, InferenceSettings::plain(), DeviceChoice::Cpu), geometry);
     vec![
         ("middle of the row", Box::new(SensorsOnly(MiddleOfTheRow(geometry)))),
         ("expert", Box::new(ScriptedExpert::new(ExpertSettings::paper(), settings))),

@@ -28,34 +28,10 @@ pub const PEERS: [Peer; 7] = [
         arguments: &["compact", "1", "64", "512"],
         about: "the same network, one thread; a call is one `run` on random binary cells",
     },
-    Peer {
-        name: "PyTorch, compact network, batch 128",
-        packages: &["torch", "numpy"],
-        script: "torch_training.py",
-        arguments: &["compact", "128", "2000"],
-        about: "the same network and loss, channels last, fused Adam, denormals flushed, two threads",
-    },
-    Peer {
-        name: "PyTorch, compact network, batch 512",
-        packages: &["torch", "numpy"],
-        script: "torch_training.py",
-        arguments: &["compact", "512", "500"],
-        about: "as above",
-    },
-    Peer {
-        name: "PyTorch, the paper's network, batch 128",
-        packages: &["torch", "numpy"],
-        script: "torch_training.py",
-        arguments: &["paper", "128", "500"],
-        about: "as above",
-    },
-    Peer {
-        name: "PyTorch, the paper's network, batch 512",
-        packages: &["torch", "numpy"],
-        script: "torch_training.py",
-        arguments: &["paper", "512", "150"],
-        about: "as above",
-    },
+    torch("PyTorch, compact network, batch 128", &["compact", "128", "2000"]),
+    torch("PyTorch, compact network, batch 512", &["compact", "512", "500"]),
+    torch("PyTorch, the paper's network, batch 128", &["paper", "128", "500"]),
+    torch("PyTorch, the paper's network, batch 512", &["paper", "512", "150"]),
     Peer {
         name: "HighwayEnv, racetrack and parking",
         packages: &["highway-env", "gymnasium", "numpy"],
@@ -72,6 +48,12 @@ pub const PEERS: [Peer; 7] = [
         about: "a step moves one Ackermann car among polygons and casts a laser scan of 180 rays; no grid, no noise",
     },
 ];
+
+/// PyTorch trains a network: its name, batch and steps.
+const fn torch(name: &'static str, arguments: &'static [&'static str]) -> Peer {
+    let about = "the same network and loss, channels last, fused Adam, denormals flushed, two threads";
+    Peer { name, packages: &["torch", "numpy"], script: "torch_training.py", arguments, about }
+}
 
 /// Runs a peer and returns what it printed, line by line.
 ///

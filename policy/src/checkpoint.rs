@@ -172,7 +172,7 @@ impl Checkpoint {
 
     /// The network ready to answer, without action smoothing.
     pub fn predictor(&self, device: DeviceChoice) -> Predictor {
-        Predictor::new(self.weights.clone(), self.inference, device)
+        Predictor::new(&self.weights, self.inference, device)
     }
 }
 

@@ -74,3 +74,47 @@ impl Optimizer for Adam {
         AdamState::new(state.momentum.to_device(device))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use burn::grad_clipping::GradientClippingConfig;
+    use burn::module::Param;
+    use burn::nn::{Linear, LinearConfig};
+    use burn::optim::{AdamWConfig, GradientsParams};
+    use burn::tensor::TensorData;
+
+    /// Ten steps of a layer towards the same answers; its weights.
+    fn stepped(mut optimizer: ModuleOptimizer) -> Vec<f32> {
+        let device = Device::flex().autodiff();
+        let values = |n: usize, factor: f32| (0..n).map(|i| (factor * i as f32).sin()).collect::<Vec<f32>>();
+        let tensor = |rows: usize, columns: usize, factor| {
+            Tensor::<2>::from_data(TensorData::new(values(rows * columns, factor), [rows, columns]), &device)
+        };
+        let mut layer: Linear = LinearConfig::new(37, 5).init(&device);
+        layer.weight = Param::from_tensor(tensor(37, 5, 0.7));
+        layer.bias = Some(Param::from_tensor(Tensor::zeros([5], &device)));
+        for step in 0..10 {
+            // Steep at first, so that some gradients are clipped and some are not.
+            let error = (layer.forward(tensor(8, 37, 1.3)) - tensor(8, 5, 2.1)) * (3.0 / (1.0 + step as f32));
+            let gradients = GradientsParams::from_grads(error.square().sum().backward(), &layer);
+            layer = optimizer.step(0.01, layer, gradients);
+        }
+        layer.weight.val().into_data().try_into_vec().unwrap()
+    }
+
+    #[test]
+    fn steps_are_those_of_burns_own_adam_with_its_clipping() {
+        for (weight_decay, norm_max) in [(0.0, 5.0), (0.3, 5.0), (0.3, 0.0)] {
+            let ours = AdamSettings { weight_decay, ..AdamSettings::paper() };
+            let mut burns = AdamWConfig::new().with_epsilon(ours.epsilon).with_weight_decay(weight_decay);
+            if norm_max > 0.0 {
+                burns = burns.with_grad_clipping(Some(GradientClippingConfig::Norm(norm_max)));
+            }
+            let (found, expected) = (stepped(ours.optimizer(norm_max)), stepped(burns.init()));
+            for (a, b) in found.iter().zip(&expected) {
+                assert!((a - b).abs() < 1e-5, "decay {weight_decay}, clipped at {norm_max}: {a} against burn's {b}");
+            }
+        }
+    }
+}

@@ -164,7 +164,7 @@ fn batch_loss(settings: &LossSettings, outputs: Tensor<2>, samples: &[Sample], d
 /// Compares the answers to samples with their labels.
 pub fn evaluate(weights: &Weights, samples: &[Sample], loss: &LossSettings, context: FitContext) -> Validation {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
-    let outputs = Predictor::new(weights.clone(), context.inference, context.device).raw(&grids);
+    let outputs = Predictor::new(weights, context.inference, context.device).raw(&grids);
     let squared_error: f64 = outputs
         .iter()
         .zip(samples)

@@ -55,7 +55,6 @@ const GPU_ROWS: usize = 64;
 /// A network ready to answer.
 #[derive(Debug, Clone)]
 pub struct Predictor {
-    weights: Weights,
     mirror_averaging: bool,
     net: LookAheadNet,
     choice: DeviceChoice,
@@ -64,15 +63,10 @@ pub struct Predictor {
 
 impl Predictor {
     /// Makes a network ready on a device. Action smoothing is not done here: it has a memory per car.
-    pub fn new(weights: Weights, inference: InferenceSettings, choice: DeviceChoice) -> Self {
+    pub fn new(weights: &Weights, inference: InferenceSettings, choice: DeviceChoice) -> Self {
         let device = choice.device();
-        let net = LookAheadNet::from_weights(&weights, &device);
-        Self { weights, mirror_averaging: inference.mirror_averaging, net, choice, device }
-    }
-
-    /// The weights it answers with.
-    pub fn weights(&self) -> &Weights {
-        &self.weights
+        let net = LookAheadNet::from_weights(weights, &device);
+        Self { mirror_averaging: inference.mirror_averaging, net, choice, device }
     }
 
     /// Answers every grid, in order.
@@ -130,7 +124,7 @@ mod tests {
             (NetworkArchitecture::compact(), InferenceSettings::smoothed()),
         ] {
             let weights = Weights::init(architecture, RootSeed(1), 0);
-            let mut predictor = Predictor::new(weights, inference, DeviceChoice::Cpu);
+            let mut predictor = Predictor::new(&weights, inference, DeviceChoice::Cpu);
             let all: Vec<&OccupancyGrid> = grids.iter().collect();
             let together = predictor.raw(&all);
             for (index, grid) in grids.iter().enumerate() {
@@ -149,7 +143,7 @@ mod tests {
         let grids = lots(20);
         let mirrored: Vec<OccupancyGrid> = grids.iter().map(OccupancyGrid::mirrored).collect();
         let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
-        let mut predictor = Predictor::new(weights, InferenceSettings::smoothed(), DeviceChoice::Cpu);
+        let mut predictor = Predictor::new(&weights, InferenceSettings::smoothed(), DeviceChoice::Cpu);
         let answers = predictor.predict(&grids.iter().collect::<Vec<_>>());
         let images = predictor.predict(&mirrored.iter().collect::<Vec<_>>());
         for (answer, image) in answers.iter().zip(&images) {
@@ -165,9 +159,7 @@ mod tests {
         let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
         let with_threads = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| {
-                Predictor::new(weights.clone(), InferenceSettings::smoothed(), DeviceChoice::Cpu).raw(&grids)
-            })
+            pool.install(|| Predictor::new(&weights, InferenceSettings::smoothed(), DeviceChoice::Cpu).raw(&grids))
         };
         assert_eq!(with_threads(1), with_threads(2));
     }

@@ -32,7 +32,7 @@ impl<C: CheckpointStrategy> NetworkOps for Autodiff<Flex, C> {
                 let parameters = EncoderParameters::new(parameters);
                 let occupied = contiguous(occupied);
                 let (features, trace) = parameters.weights().forward_traced(occupied.bytes());
-                let features = from_vec(features, [occupied.shape()[0], parameters.features()]);
+                let features = from_vec(features, [occupied.shape()[0], parameters.weights().features_len()]);
                 prepared.finish(Arc::new(EncodeState { parameters, trace }), features)
             }
         }

@@ -8,6 +8,7 @@ pub(crate) mod adam;
 pub(crate) mod dense;
 pub(crate) mod encoder;
 mod first_layer;
+mod pool;
 mod second_layer;
 mod vectors;
 
@@ -19,12 +20,6 @@ const CHUNK: usize = 16;
 
 /// Largest kernel of the first convolution whose patterns are tabulated.
 const KERNEL_MAX: usize = 7;
-
-/// The winner of a pool whose value is cut off by `ReLU`.
-const SILENT: u32 = 4;
-
-/// The four cells of a pool, row by row; the first of equals wins.
-const POOL: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];
 
 /// Calls with every chunk: on all threads of the pool, or on this one if there is only one chunk.
 fn for_each_chunk<T: Send>(chunks: impl Iterator<Item = T>, visit: impl Fn(T) + Sync + Send) {

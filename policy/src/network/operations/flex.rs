@@ -21,7 +21,7 @@ impl NetworkOps for Flex {
         let batch = occupied.shape()[0];
         let parameters = EncoderParameters::new([weight_1, bias_1, weight_2, bias_2]);
         let features = parameters.weights().forward(occupied.bytes());
-        from_vec(features, [batch, parameters.features()])
+        from_vec(features, [batch, parameters.weights().features_len()])
     }
 
     fn dense(x: FlexTensor, weight: FlexTensor, bias: FlexTensor) -> FlexTensor {
@@ -69,11 +69,6 @@ impl EncoderParameters {
             weight_2: values(&self.weight_2),
             bias_2: values(&self.bias_2),
         }
-    }
-
-    /// Features of one sample.
-    pub(super) fn features(&self) -> usize {
-        crate::network::POOLED_2 * crate::network::POOLED_2 * self.conv2.channels
     }
 
     /// Gradients as tensors: weight and bias of the first convolution, then of the second.

@@ -1,6 +1,7 @@
 //! What the operations mean, in plain operations of burn: computed on GPUs, compared with in tests.
 
 use super::adam::{AdamMoments, AdamStep};
+use crate::network::architecture::ConvLayer;
 use burn::backend::tensor::{BoolTensor, FloatTensor};
 use burn::backend::{Backend, FloatDType, Scalar, TensorMetadata as _};
 use burn::tensor::Shape;
@@ -24,9 +25,9 @@ pub(crate) fn encode<B: Backend>(
 
 /// Convolution with "same" padding, max-pool of 2, `ReLU`.
 fn layer<B: Backend>(x: FloatTensor<B>, weight: FloatTensor<B>, bias: FloatTensor<B>) -> FloatTensor<B> {
-    let [_, _, kernel, _] = weight.shape().dims();
+    let [channels, _, kernel, _] = weight.shape().dims();
     let mut options = ConvOptions::new([1, 1], [0, 0], [1, 1], 1);
-    options.padding = [((kernel - 1) / 2, kernel / 2); 2];
+    options.padding = [ConvLayer { channels, kernel }.padding(); 2];
     let convolved = B::conv2d(x, weight, Some(bias), options);
     B::relu(B::max_pool2d(convolved, [2, 2], [2, 2], [0, 0], [1, 1], false))
 }

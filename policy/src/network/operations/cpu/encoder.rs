@@ -60,7 +60,8 @@ impl EncoderWeights<'_> {
         POOLED_1 * POOLED_1 * self.conv1.channels
     }
 
-    fn features_len(&self) -> usize {
+    /// Features of one sample.
+    pub(crate) fn features_len(&self) -> usize {
         POOLED_2 * POOLED_2 * self.conv2.channels
     }
 

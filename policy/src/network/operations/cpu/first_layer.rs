@@ -3,8 +3,9 @@
 //! The input is binary, so a row of the kernel meets one of 2^kernel patterns. What it answers is looked up in a table,
 //! and the rows of the kernel are added: no multiplication. Where all four cells of a pool see the same, one is enough.
 
+use super::KERNEL_MAX;
+use super::pool::{POOL, SILENT, better, with_relu};
 use super::vectors::{int_vectors, int_vectors_mut, vectors, vectors_mut};
-use super::{KERNEL_MAX, POOL, SILENT};
 use crate::network::architecture::{ConvLayer, LANES, POOLED_1};
 use pulp::Simd;
 use sim::sensing::GRID_CELLS;
@@ -74,7 +75,6 @@ impl<'a> FirstLayer<'a> {
         let width = self.conv.channels / S::F32_LANES;
         let (table, bias) = (vectors::<S>(&self.table), vectors::<S>(self.bias));
         let (pooled, winners) = (vectors_mut::<S>(pooled), int_vectors_mut::<S>(winners));
-        let (zero, silent) = (simd.splat_f32s(0.0), simd.splat_u32s(SILENT));
         for row in 0..POOLED_1 {
             for col in 0..POOLED_1 {
                 let entries = self.table_rows(rows, row, col);
@@ -87,19 +87,13 @@ impl<'a> FirstLayer<'a> {
                             .iter()
                             .fold(table[of_rows[0] * width + v], |sum, row| simd.add_f32s(sum, table[row * width + v]))
                     };
-                    let (mut best, mut from) = (sum(0), simd.splat_u32s(0));
+                    let mut best = (sum(0), simd.splat_u32s(0));
                     if !entries.are_equal {
                         for cell in 1..POOL.len() {
-                            let value = sum(cell);
-                            let wins = simd.greater_than_f32s(value, best);
-                            best = simd.select_f32s(wins, value, best);
-                            from = simd.select_u32s(wins, simd.splat_u32s(cell as u32), from);
+                            best = better(simd, best, sum(cell), cell as u32);
                         }
                     }
-                    let value = simd.add_f32s(best, bias[v]);
-                    let is_alive = simd.greater_than_f32s(value, zero);
-                    pooled[v] = simd.select_f32s(is_alive, value, zero);
-                    winners[v] = simd.select_u32s(is_alive, from, silent);
+                    (pooled[v], winners[v]) = with_relu(simd, best, bias[v]);
                 }
             }
         }

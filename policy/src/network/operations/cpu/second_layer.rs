@@ -7,8 +7,8 @@
 //! of the products of a dense implementation remain. They are listed first and then computed without a branch.
 
 use super::first_layer::PaddedMap;
+use super::pool::{POOL, SILENT, better, with_relu};
 use super::vectors::{int_vectors_mut, vectors, vectors_mut};
-use super::{POOL, SILENT};
 use crate::network::architecture::{ConvLayer, LANES, POOLED_2};
 use pulp::Simd;
 
@@ -160,7 +160,7 @@ impl SecondLayer {
         features: &mut [f32],
         winners: &mut [u32],
     ) {
-        let (zero, silent) = (simd.splat_f32s(0.0), simd.splat_u32s(SILENT));
+        let zero = simd.splat_f32s(0.0);
         let bias = vectors::<S>(block.bias);
         let span = self.span();
         for first_pool in (0..POOLED_2 * POOLED_2).step_by(CELLS / POOL.len()) {
@@ -186,16 +186,10 @@ impl SecondLayer {
                 let features = vectors_mut::<S>(&mut features[at..at + WIDTH * S::F32_LANES]);
                 let winners = int_vectors_mut::<S>(&mut winners[at..at + WIDTH * S::F32_LANES]);
                 for v in 0..WIDTH {
-                    let (mut best, mut from) = (sums[0][v], simd.splat_u32s(0));
-                    for (cell, sums) in (1..).zip(&sums[1..]) {
-                        let wins = simd.greater_than_f32s(sums[v], best);
-                        best = simd.select_f32s(wins, sums[v], best);
-                        from = simd.select_u32s(wins, simd.splat_u32s(cell), from);
-                    }
-                    let value = simd.add_f32s(best, bias[v]);
-                    let is_alive = simd.greater_than_f32s(value, zero);
-                    features[v] = simd.select_f32s(is_alive, value, zero);
-                    winners[v] = simd.select_u32s(is_alive, from, silent);
+                    let first = (sums[0][v], simd.splat_u32s(0));
+                    let best =
+                        (1..).zip(&sums[1..]).fold(first, |best, (cell, sums)| better(simd, best, sums[v], cell));
+                    (features[v], winners[v]) = with_relu(simd, best, bias[v]);
                 }
             }
         }
@@ -252,16 +246,12 @@ impl SecondLayer {
     /// `into` `[window value]` += Σ gradient · window.
     #[inline(always)]
     fn add_windows<S: Simd>(self, simd: S, pooled: &[f32], list: &[(usize, f32)], into: &mut [f32]) {
-        let stride = self.map.side * self.inputs / S::F32_LANES;
-        let span = self.span() / S::F32_LANES;
-        let (pooled, into) = (vectors::<S>(pooled), vectors_mut::<S>(into));
-        for_each_group(into.len(), |first, group| {
-            // Where the vectors of the group lie in a window.
-            let offset = |v: usize| (first + v) / span * stride + (first + v) % span;
+        for_each_group(self.window_len() / S::F32_LANES, |first, group| {
+            let (read, written) = (|v| self.vector_of_window::<S>(first + v), |v| first + v);
             match group {
-                Group::Nine => accumulate::<S, 9>(simd, pooled, list, std::array::from_fn(offset), into, first),
-                Group::Eight => accumulate::<S, 8>(simd, pooled, list, std::array::from_fn(offset), into, first),
-                Group::One => accumulate::<S, 1>(simd, pooled, list, std::array::from_fn(offset), into, first),
+                Group::Nine => accumulate::<S, 9>(simd, pooled, list, read, into, written),
+                Group::Eight => accumulate::<S, 8>(simd, pooled, list, read, into, written),
+                Group::One => accumulate::<S, 1>(simd, pooled, list, read, into, written),
             }
         });
     }
@@ -272,63 +262,45 @@ impl SecondLayer {
         if list.is_empty() {
             return;
         }
-        let stride = self.map.side * self.inputs / S::F32_LANES;
-        let span = self.span() / S::F32_LANES;
-        let len = self.window_len() / S::F32_LANES;
-        let (by_output, d_pooled) = (vectors::<S>(by_output), vectors_mut::<S>(d_pooled));
-        for_each_group(len, |first, group| {
-            let offset = |v: usize| (first + v) / span * stride + (first + v) % span;
+        for_each_group(self.window_len() / S::F32_LANES, |first, group| {
+            let (read, written) = (|v| first + v, |v| self.vector_of_window::<S>(first + v));
             match group {
-                Group::Nine => scatter::<S, 9>(simd, by_output, list, first, std::array::from_fn(offset), d_pooled),
-                Group::Eight => scatter::<S, 8>(simd, by_output, list, first, std::array::from_fn(offset), d_pooled),
-                Group::One => scatter::<S, 1>(simd, by_output, list, first, std::array::from_fn(offset), d_pooled),
+                Group::Nine => accumulate::<S, 9>(simd, by_output, list, read, d_pooled, written),
+                Group::Eight => accumulate::<S, 8>(simd, by_output, list, read, d_pooled, written),
+                Group::One => accumulate::<S, 1>(simd, by_output, list, read, d_pooled, written),
             }
         });
     }
+
+    /// Where vector `at` of a window lies in the padded map, in vectors from the start of the window.
+    #[inline(always)]
+    fn vector_of_window<S: Simd>(self, at: usize) -> usize {
+        let (stride, span) = (self.map.side * self.inputs / S::F32_LANES, self.span() / S::F32_LANES);
+        at / span * stride + at % span
+    }
 }
 
-/// `into[first..]` += Σ gradient · the `N` vectors at `offsets` from each start.
+/// The `N` vectors of `into` at `written` += Σ gradient · the `N` vectors of `values` at `read` from each start.
 #[inline(always)]
 fn accumulate<S: Simd, const N: usize>(
     simd: S,
-    values: &[S::f32s],
+    values: &[f32],
     list: &[(usize, f32)],
-    offsets: [usize; N],
-    into: &mut [S::f32s],
-    first: usize,
+    read: impl Fn(usize) -> usize,
+    into: &mut [f32],
+    written: impl Fn(usize) -> usize,
 ) {
+    let read: [usize; N] = std::array::from_fn(read);
+    let (values, into) = (vectors::<S>(values), vectors_mut::<S>(into));
     let mut sums = [simd.splat_f32s(0.0); N];
     for (start, gradient) in list {
         let (values, gradient) = (&values[start / S::F32_LANES..], simd.splat_f32s(*gradient));
         for v in 0..N {
-            sums[v] = simd.mul_add_f32s(gradient, values[offsets[v]], sums[v]);
+            sums[v] = simd.mul_add_f32s(gradient, values[read[v]], sums[v]);
         }
     }
     for v in 0..N {
-        into[first + v] = simd.add_f32s(into[first + v], sums[v]);
-    }
-}
-
-/// The `N` vectors at `offsets` += Σ gradient · the `N` vectors from `first` on of each output.
-#[inline(always)]
-fn scatter<S: Simd, const N: usize>(
-    simd: S,
-    by_output: &[S::f32s],
-    list: &[(usize, f32)],
-    first: usize,
-    offsets: [usize; N],
-    into: &mut [S::f32s],
-) {
-    let mut sums = [simd.splat_f32s(0.0); N];
-    for (start, gradient) in list {
-        let weights = &by_output[start / S::F32_LANES + first..][..N];
-        let gradient = simd.splat_f32s(*gradient);
-        for v in 0..N {
-            sums[v] = simd.mul_add_f32s(gradient, weights[v], sums[v]);
-        }
-    }
-    for v in 0..N {
-        into[offsets[v]] = simd.add_f32s(into[offsets[v]], sums[v]);
+        into[written(v)] = simd.add_f32s(into[written(v)], sums[v]);
     }
 }
 
