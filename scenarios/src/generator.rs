@@ -190,6 +190,7 @@ fn draw(name: String, settings: &DifficultySettings, layout_rng: &mut Rng, obsta
         obstacles,
         speed_bumps: clutter::speed_bumps(&corridor, SPEED_BUMP_EVERY_M),
         boundary: corridor.boundary,
+        boundary_height_m: 0.0,
     }
 }
 

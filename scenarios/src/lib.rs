@@ -11,13 +11,16 @@
 //! | [`split`] | which generated lots may be trained on |
 //! | [`load`] | lots as TOML files |
 //! | [`import`] | ROS maps and TPCAP cases as lots |
+//! | [`note`] | what an import did and found, for people |
 
+mod branches;
 pub mod clutter;
 pub mod corridor;
 mod error;
 pub mod generator;
 pub mod import;
 pub mod load;
+pub mod note;
 pub mod reference;
 pub mod solver;
 pub mod split;

@@ -5,6 +5,7 @@
 
 use crate::error::{LoadError, Location, line_at, read_text};
 use crate::import::{self, MapLot};
+use crate::note::Loaded;
 use sim::scenario::{Direction, Place, Scenario, ScenarioError};
 use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
@@ -18,6 +19,14 @@ use toml_edit::{Array, Document, Formatted, InlineTable, Item, Value};
 /// # Errors
 /// The first thing wrong with it, with its place.
 pub fn load(path: &Path, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
+    load_with_notes(path, vehicle).map(|loaded| loaded.scenario)
+}
+
+/// [`load`], and what is to be said about the lot.
+///
+/// # Errors
+/// The first thing wrong with it, with its place.
+pub fn load_with_notes(path: &Path, vehicle: &VehicleSettings) -> Result<Loaded, LoadError> {
     if import::is_map(path) {
         return MapLot::read(path)?.scenario(vehicle);
     }
@@ -25,7 +34,8 @@ pub fn load(path: &Path, vehicle: &VehicleSettings) -> Result<Scenario, LoadErro
     if Document::parse(text.as_str()).is_ok_and(|document| names_a_map(&document)) {
         return MapLot::read(path)?.scenario(vehicle);
     }
-    parse(&text, &path.display().to_string(), vehicle)
+    let scenario = parse(&text, &path.display().to_string(), vehicle)?;
+    Ok(Loaded { scenario, notes: Vec::new() })
 }
 
 fn names_a_map(document: &Document<&str>) -> bool {
