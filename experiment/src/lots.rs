@@ -37,7 +37,7 @@ pub const SPECS: [(&str, &str); 11] = [
     ("lot-c", "149 m, the widest, never trained on"),
     ("reference", "all three"),
     ("test:N", "the first N generated lots of a split: train, validation or test; medium, unless a family follows"),
-    ("test:N:FAMILY", "easy, medium, hard or lane; all: one of each in turn"),
+    ("test:N:FAMILY", "easy, medium, hard, lane, rooms, street, aisles, track or open; all: one of each in turn"),
     (
         "sealed:PHRASE:N",
         "N lots that nobody has tuned on, drawn from a phrase: easy, medium, hard in turn, or a family",

@@ -121,7 +121,8 @@ impl std::str::FromStr for LotSpec {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{name:?} {problem}; there are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N, test:N and \
-     sealed:PHRASE:N (N generated lots; add :all, :easy, :medium, :hard or :lane), single ones such as test-hard-7, and paths ending in .toml, .yaml (ROS map) or .csv (TPCAP case)"
+     sealed:PHRASE:N (N generated lots; add :all, :easy, :medium, :hard, :lane, :rooms, :street, :aisles, :track or \
+     :open), single ones such as test-hard-7, and paths ending in .toml, .yaml (ROS map) or .csv (TPCAP case)"
 )]
 pub struct SpecError {
     name: String,
@@ -231,7 +232,7 @@ mod tests {
             ("validation:1:easy, lot-c", &["validation-easy-0", "lot-c"]),
             ("test:3:hard", &["test-hard-0", "test-hard-1", "test-hard-2"]),
             ("test-hard-41", &["test-hard-41"]),
-            ("train:2:lane", &["train-lane-0", "train-lane-1"]),
+            ("train:2:rooms", &["train-rooms-0", "train-rooms-1"]),
             ("sealed:spring:2:lane", &["sealed-spring-lane-0", "sealed-spring-lane-1"]),
             (
                 "sealed:a-b-hard-3:4",

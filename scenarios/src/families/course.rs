@@ -24,6 +24,10 @@ impl Course {
         self.length_m
     }
 
+    pub(super) fn width_m(&self) -> f32 {
+        self.width_m
+    }
+
     /// What follows has another width.
     pub(super) fn widen(&mut self, width_m: f32) {
         self.width_m = width_m;
@@ -53,18 +57,18 @@ impl Course {
         if (self.heading_rad + turn_rad).abs() > limit_deg.to_radians() { -turn_rad } else { turn_rad }
     }
 
-    fn strip(&self) -> Option<Strip> {
+    pub(super) fn strip(&self) -> Option<Strip> {
         Strip::new(Pose::default(), &self.pieces)
     }
 }
 
-/// Centre lines are no longer than this, run-outs included, metres.
-const LONGEST_M: f32 = 236.0;
+/// Of centre lines, run-outs included, metres.
+const LENGTH_M: Range<f32> = 116.0..236.0;
 
 /// The first of some draws whose strip keeps apart from itself by twice a distance.
 pub(super) fn first_apart(rng: &mut Rng, distance_m: f32, mut draw: impl FnMut(&mut Rng) -> Course) -> Option<Strip> {
     const TRIES: usize = 40;
     (0..TRIES)
         .filter_map(|_| draw(rng).strip())
-        .find(|strip| strip.length_m() < LONGEST_M && strip.keeps_apart(distance_m))
+        .find(|strip| LENGTH_M.contains(&strip.length_m()) && strip.keeps_apart(distance_m))
 }

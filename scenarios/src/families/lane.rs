@@ -6,7 +6,7 @@ use super::walls::{self, Wall};
 use super::{RUN_OUT_M, lot, things_on};
 use rand::RngExt as _;
 use sim::geometry::Vec2;
-use sim::scenario::{Obstacle, ObstacleClass, Scenario};
+use sim::scenario::{ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::ops::Range;
 
@@ -140,7 +140,7 @@ fn small_things(things: &mut Things<'_>, length_m: f32, width_m: f32, rng: &mut 
         let class = [ObstacleClass::Cone, ObstacleClass::Bollard, ObstacleClass::Pillar][rng.random_range(0..3)];
         let side = side(rng);
         let protrusion_m = rng.random_range(0.05_f32..0.5).min(width_m - rules.gap_m);
-        let thing = Obstacle { heading_deg: 0.0, ..things.beside(class, side, s_m.min(length_m), protrusion_m, 0.0) };
+        let thing = things.beside(class, side, s_m.min(length_m), protrusion_m, 0.0);
         things.narrow(thing, side, s_m.min(length_m), &rules);
     }
 }

@@ -48,10 +48,17 @@ impl<'a> Things<'a> {
 
     /// Puts something where nothing else stands; it is not looked at whether it stands in the way.
     pub(super) fn stand(&mut self, obstacle: Obstacle) -> bool {
-        let outline = obstacle.outline();
-        let is_free = !self.outlines.iter().any(|other| overlap(other, &outline));
+        let is_free = self.reserve(obstacle.outline());
         if is_free {
             self.obstacles.push(obstacle);
+        }
+        is_free
+    }
+
+    /// Keeps ground free of other things, unless some stand there: then it is `false`.
+    pub(super) fn reserve(&mut self, outline: Vec<Vec2>) -> bool {
+        let is_free = !self.outlines.iter().any(|other| overlap(other, &outline));
+        if is_free {
             self.outlines.push(outline);
         }
         is_free
@@ -116,6 +123,11 @@ impl<'a> Things<'a> {
 pub(super) fn obstacle(class: ObstacleClass, at: Vec2, heading_rad: f32) -> Obstacle {
     let heading_deg = (wrap_angle(heading_rad).to_degrees() * 10.0).round() / 10.0;
     Obstacle { heading_deg, ..Obstacle::new(class, Pose::new(to_millimetres(at), 0.0)) }
+}
+
+/// Round things have no heading.
+pub(super) fn upright(thing: Obstacle) -> Obstacle {
+    Obstacle { heading_deg: 0.0, ..thing }
 }
 
 /// Either way a parked car may face.
