@@ -213,7 +213,7 @@ fn pillar_hall() -> Drawing {
         shapes.push((turned(72.1, along + 20.0, 0.7, 0.7, 0.0), OCCUPIED));
     }
     // A stairwell in the outer corner.
-    shapes.push((area(71.0, 1.0, 77.0, 7.0), OCCUPIED));
+    shapes.push((area(66.0, 1.0, 77.0, 7.0), OCCUPIED));
     Drawing {
         name: "pillar-hall",
         about: "An L-shaped hall of 16 m with two rows of pillars.",
