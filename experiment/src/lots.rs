@@ -31,12 +31,17 @@ pub struct Drawn {
 }
 
 /// Ways to name lots: how it is written, what it means.
-pub const SPECS: [(&str, &str); 9] = [
+pub const SPECS: [(&str, &str); 11] = [
     ("lot-a", "the paper's training lot rebuilt: 231 m; obstacles drawn anew for every trial"),
     ("lot-b", "139 m, the narrowest, never trained on"),
     ("lot-c", "149 m, the widest, never trained on"),
     ("reference", "all three"),
-    ("test:N", "the first N generated lots of a split: train, validation or test; :easy or :hard may follow"),
+    ("test:N", "the first N generated lots of a split: train, validation or test; medium, unless a family follows"),
+    ("test:N:FAMILY", "easy, medium, hard or lane; all: one of each in turn"),
+    (
+        "sealed:PHRASE:N",
+        "N lots that nobody has tuned on, drawn from a phrase: easy, medium, hard in turn, or a family",
+    ),
     ("test-hard-7", "one of them"),
     ("PATH.toml", "a lot written by hand (cargo xtask generate writes examples), or the route on a map, PATH.lot.toml"),
     ("PATH.yaml", "a ROS map, driven as PATH.lot.toml beside it says (see scenarios/examples/car-park.lot.toml)"),
@@ -98,7 +103,7 @@ impl Lot {
     /// What a row of a printed table is about: generated lots of one kind share a row.
     pub fn group(&self) -> String {
         match &self.spec {
-            LotSpec::Generated { split, difficulty, .. } => format!("{}-{}", split.name(), difficulty.name()),
+            LotSpec::Generated { split, family, .. } => format!("{split}-{}", family.name()),
             LotSpec::Reference(_) | LotSpec::File(_) => self.name.clone(),
         }
     }
@@ -157,8 +162,8 @@ impl Lot {
     pub fn draw(&self, trial: RootSeed) -> Drawn {
         match &self.spec {
             LotSpec::Reference(lot) => Drawn { scenario: reference::lot(*lot, trial), attempts: None },
-            LotSpec::Generated { split, difficulty, index } => {
-                let generated = generator::generate(*split, *index, *difficulty);
+            LotSpec::Generated { split, family, index } => {
+                let generated = generator::generate(split, *index, *family);
                 Drawn { scenario: generated.scenario, attempts: Some(generated.attempts) }
             }
             LotSpec::File(_) => {

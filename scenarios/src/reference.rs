@@ -430,7 +430,7 @@ mod tests {
             }
         }
         for class in ObstacleClass::ALL {
-            if matches!(class, ObstacleClass::Curb) {
+            if matches!(class, ObstacleClass::Curb | ObstacleClass::Wall) {
                 continue;
             }
             let [total, in_lane] = seen.get(&class).copied().unwrap_or_default();

@@ -155,11 +155,12 @@ pub enum ObstacleClass {
     Pillar,
     Cart,
     Person,
+    Wall,
 }
 
 impl ObstacleClass {
     /// Every class, in the order of declaration.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Sedan,
         Self::Suv,
         Self::Compact,
@@ -172,6 +173,7 @@ impl ObstacleClass {
         Self::Pillar,
         Self::Cart,
         Self::Person,
+        Self::Wall,
     ];
 
     /// Typical `[length, width, height]` in metres (docs/methods.md 11).
@@ -189,6 +191,7 @@ impl ObstacleClass {
             Self::Pillar => [0.70, 0.70, 3.00],
             Self::Cart => [1.00, 0.60, 1.00],
             Self::Person => [0.50, 0.50, 1.70],
+            Self::Wall => [5.00, 0.20, 3.00],
         }
     }
 

@@ -77,7 +77,7 @@ struct Fixed(LookAheadPoint);
 
 impl Driver for Fixed {
     fn decide(&mut self, _: &Situation<'_>) -> Decision {
-        Decision { look_ahead: self.0, source: Source::Expert, spread: None }
+        Decision::at(self.0, Source::Expert)
     }
 }
 
@@ -144,7 +144,7 @@ struct LeftAfterResume {
 impl Driver for LeftAfterResume {
     fn decide(&mut self, _: &Situation<'_>) -> Decision {
         let left_m = if self.resets > 1 { 5.0 } else { 0.0 };
-        Decision { look_ahead: LookAheadPoint { ahead_m: 6.0, left_m }, source: Source::Expert, spread: None }
+        Decision::at(LookAheadPoint { ahead_m: 6.0, left_m }, Source::Expert)
     }
 
     fn reset(&mut self) {
@@ -210,8 +210,7 @@ fn commands_reach_the_wheels_after_the_dead_time() {
         let mut settings = (*settings()).clone();
         settings.vehicle.dead_time_s = dead_time_s;
         let mut episode = Episode::new(Arc::new(settings), lane(60.0, vec![]), RootSeed(1));
-        let decision =
-            Decision { look_ahead: LookAheadPoint { ahead_m: 8.0, left_m: 2.0 }, source: Source::Expert, spread: None };
+        let decision = Decision::at(LookAheadPoint { ahead_m: 8.0, left_m: 2.0 }, Source::Expert);
         (0..10)
             .find(|_| {
                 episode.observe();
@@ -268,12 +267,15 @@ fn fleets_of_their_own_drive_as_one_fleet() {
                 let mut fleet = OneDriverEach((0..5).map(ahead).collect());
                 run_lockstep_until(episodes(), &mut fleet, &mut on_frame)
             } else {
-                let all: Vec<(usize, Episode)> = episodes().into_iter().enumerate().collect();
-                let seated = |cars: &[(usize, Episode)]| {
+                // Dealt out one by one, as `SeatedFleet::in_all` does.
+                let fleets = 5_usize.div_ceil(cars_each);
+                let seated = |first: usize| {
+                    let cars: Vec<(usize, Episode)> =
+                        episodes().into_iter().enumerate().skip(first).step_by(fleets).collect();
                     let drivers = cars.iter().map(|&(index, _)| ahead(index)).collect();
-                    SeatedFleet::new(Box::new(OneDriverEach(drivers)), cars.iter().map(|car| car.1.clone()).collect())
+                    SeatedFleet::new(Box::new(OneDriverEach(drivers)), cars)
                 };
-                run_fleets_until(all.chunks(cars_each).map(seated).collect(), &mut on_frame)
+                run_fleets_until((0..fleets).map(seated).collect(), &mut on_frame)
             };
             drives.push((reports, seen));
         }
