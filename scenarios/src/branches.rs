@@ -7,7 +7,6 @@
 use sim::geometry::{Vec2, distance_to_segment};
 use sim::map::Map;
 use sim::scenario::{Island, KERB_MAX_M, Scenario};
-use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -18,8 +17,8 @@ const CELL_M: f32 = 0.25;
 const ROOM_M: f32 = 0.05;
 /// Ground up to this far from the route belongs to it, metres: half of a wide aisle.
 const BESIDE_M: f32 = 4.0;
-/// A way that goes on for more than this is a branch, metres: longer than a stall.
-const GOES_ON_M: f32 = 8.0;
+/// A way that goes on for more than this is a branch, metres: longer than a stall, or the other half of a wide hall.
+const GOES_ON_M: f32 = 12.0;
 /// Ways that leave within this distance of the start or finish only go on where the route does not, metres.
 const AT_END_M: f32 = 2.0;
 /// Mouths nearer to each other than this are one, metres.
@@ -34,6 +33,8 @@ const KERB_GAP_M: f32 = 0.3;
 const KERB_BESIDE_M: f32 = 2.5;
 /// Directions in which a kerb is tried.
 const KERB_DIRECTIONS: u8 = 36;
+/// Kerbs that are tried are this far from each other, metres.
+const KERBS_APART_M: f32 = 1.0;
 /// Kerbs that are laid at most; a lot that needs more is open ground.
 const KERBS_MAX: usize = 40;
 
@@ -67,31 +68,51 @@ pub(crate) fn close(lot: &mut Scenario, vehicle: &VehicleSettings) -> Vec<Vec2> 
     while closed.len() < KERBS_MAX
         && let Ok(map) = Map::build(lot.clone(), vehicle)
     {
-        // A kerb may close several ways, or open none: look again after each.
-        let kerb = find(&map, vehicle).into_iter().find_map(|branch| {
-            let with_kerb = with_kerb(&map, &branch)?;
-            validate(&with_kerb, vehicle).is_ok().then_some((branch.mouth, with_kerb))
+        // A kerb may close several ways: look again after each.
+        let closing = find(&map, vehicle).into_iter().find_map(|branch| {
+            let with_kerb = kerbs(&map, &branch).into_iter().find(|lot| closes(lot, &branch, vehicle))?;
+            Some((branch.mouth, with_kerb))
         });
-        let Some((mouth, with_kerb)) = kerb else { break };
+        let Some((mouth, with_kerb)) = closing else { break };
         *lot = with_kerb;
         closed.push(mouth);
     }
     closed
 }
 
-/// A lot with the shortest kerb across a branch, if there is one.
-fn with_kerb(map: &Map, branch: &Branch) -> Option<Scenario> {
+/// Whether a branch is none of a lot's any more.
+fn closes(with_kerb: &Scenario, branch: &Branch, vehicle: &VehicleSettings) -> bool {
+    Map::build(with_kerb.clone(), vehicle).is_ok_and(|map| {
+        find(&map, vehicle).iter().all(|other| other.mouth.distance(branch.mouth) > 0.5 * SAME_MOUTH_M)
+    })
+}
+
+/// The lot with a kerb across a branch, for each place along it, shortest kerb first.
+fn kerbs(map: &Map, branch: &Branch) -> Vec<Scenario> {
     let route: Vec<Vec2> = map.path().poses().iter().map(|pose| pose.position()).collect();
     let is_beside_route =
         |&(a, b): &(Vec2, Vec2)| route.iter().all(|&point| distance_to_segment(point, a, b) > KERB_BESIDE_M);
-    let chords = branch.way.iter().flat_map(|&point| (0..KERB_DIRECTIONS).filter_map(move |k| chord(map, point, k)));
-    let (a, b) = chords.filter(is_beside_route).min_by(|a, b| a.0.distance(a.1).total_cmp(&b.0.distance(b.1)))?;
-    let along = (b - a).normalize_or_zero();
-    let (a, b, half) = (a + KERB_GAP_M * along, b - KERB_GAP_M * along, 0.5 * KERB_WIDTH_M * along.perp());
-    let polygon = [a - half, b - half, b + half, a + half].map(crate::corridor::to_millimetres).to_vec();
-    let mut lot = map.scenario().clone();
-    lot.islands.push(Island { polygon, height_m: KERB_MAX_M });
-    Some(lot)
+    let by_length = |a: &(Vec2, Vec2), b: &(Vec2, Vec2)| a.0.distance(a.1).total_cmp(&b.0.distance(b.1));
+    let shortest_at = |&point: &Vec2| {
+        (0..KERB_DIRECTIONS).filter_map(|k| chord(map, point, k)).filter(is_beside_route).min_by(by_length)
+    };
+    let mut sorted: Vec<_> = branch.way.iter().filter_map(shortest_at).collect();
+    sorted.sort_by(by_length);
+    let mut chords: Vec<(Vec2, Vec2)> = Vec::new();
+    for (a, b) in sorted {
+        if chords.iter().all(|&(c, d)| a.midpoint(b).distance(c.midpoint(d)) > KERBS_APART_M) {
+            chords.push((a, b));
+        }
+    }
+    let with_kerb = |(a, b): (Vec2, Vec2)| {
+        let along = (b - a).normalize_or_zero();
+        let (a, b, half) = (a + KERB_GAP_M * along, b - KERB_GAP_M * along, 0.5 * KERB_WIDTH_M * along.perp());
+        let polygon = [a - half, b - half, b + half, a + half].map(crate::corridor::to_millimetres).to_vec();
+        let mut lot = map.scenario().clone();
+        lot.islands.push(Island { polygon, height_m: KERB_MAX_M });
+        lot
+    };
+    chords.into_iter().map(with_kerb).collect()
 }
 
 /// From wall to wall through a point.

@@ -233,6 +233,7 @@ impl VisitMut for Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::note::Note;
     use crate::reference::{self, ReferenceLot};
     use sim::seed::RootSeed;
 
@@ -258,6 +259,28 @@ mod tests {
             let back = scenario.reversed();
             validate(&back, &VehicleSettings::hyundai_hg300())
                 .unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        }
+    }
+
+    #[test]
+    fn every_map_in_the_folder_becomes_a_lot_without_junctions_that_the_solver_drives_both_ways() {
+        let car = VehicleSettings::hyundai_hg300();
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/maps");
+        let mut files: Vec<_> = folder.read_dir().expect("maps").map(|entry| entry.expect("entry").path()).collect();
+        files.retain(|file| file.extension().is_some_and(|extension| extension == "yaml"));
+        files.sort();
+        assert!(files.len() >= 12, "{files:?}");
+        for file in files {
+            let Loaded { scenario, notes } = load_with_notes(&file, &car).unwrap_or_else(|error| panic!("{error}"));
+            let is_open = |note: &Note| matches!(note, Note::Open { .. });
+            assert!(!notes.iter().any(is_open), "{}: {notes:?}", file.display());
+            let length_m = sim::path::Path::new(&scenario.reference_path).length_m();
+            assert!((80.0..=300.0).contains(&length_m), "{}: {length_m} m", file.display());
+            for direction in Direction::BOTH {
+                let scenario = direction.of(scenario.clone());
+                let solution = crate::solver::solve(&scenario, &car, 0.1);
+                assert!(solution.is_some(), "{} {direction:?}", file.display());
+            }
         }
     }
 
