@@ -4,9 +4,10 @@ use anyhow::ensure;
 use scenarios::LotSpec;
 use scenarios::generator;
 use scenarios::import::MapLot;
+use scenarios::note::{Loaded, Note};
 use scenarios::reference::{self, ReferenceLot};
 use scenarios::split::Split;
-use sim::scenario::{Direction, Scenario};
+use sim::scenario::{Direction, NoiseLevel, Scenario};
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
 use std::path::Path;
@@ -17,7 +18,7 @@ pub struct Lot {
     name: String,
     spec: LotSpec,
     /// Of a file: read once, so that its errors come before any work.
-    from_file: Option<Scenario>,
+    from_file: Option<Loaded>,
 }
 
 /// A lot as it stands in one trial.
@@ -30,12 +31,17 @@ pub struct Drawn {
 }
 
 /// Ways to name lots: how it is written, what it means.
-pub const SPECS: [(&str, &str); 9] = [
+pub const SPECS: [(&str, &str); 11] = [
     ("lot-a", "the paper's training lot rebuilt: 231 m; obstacles drawn anew for every trial"),
     ("lot-b", "139 m, the narrowest, never trained on"),
     ("lot-c", "149 m, the widest, never trained on"),
     ("reference", "all three"),
-    ("test:N", "the first N generated lots of a split: train, validation or test; :easy or :hard may follow"),
+    ("test:N", "the first N generated lots of a split: train, validation or test; medium, unless a family follows"),
+    ("test:N:FAMILY", "easy, medium, hard, lane, rooms, street, aisles, track or open; all: one of each in turn"),
+    (
+        "sealed:PHRASE:N",
+        "N lots that nobody has tuned on, drawn from a phrase: easy, medium, hard in turn, or a family",
+    ),
     ("test-hard-7", "one of them"),
     ("PATH.toml", "a lot written by hand (cargo xtask generate writes examples), or the route on a map, PATH.lot.toml"),
     ("PATH.yaml", "a ROS map, driven as PATH.lot.toml beside it says (see scenarios/examples/car-park.lot.toml)"),
@@ -63,10 +69,10 @@ impl Lot {
 
     fn new(spec: LotSpec, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
         let from_file = match &spec {
-            LotSpec::File(path) => Some(scenarios::load::load(path, vehicle)?),
+            LotSpec::File(path) => Some(scenarios::load::load_with_notes(path, vehicle)?),
             LotSpec::Reference(_) | LotSpec::Generated { .. } => None,
         };
-        let name = from_file.as_ref().map_or_else(|| spec.to_string(), |scenario| scenario.name.clone());
+        let name = from_file.as_ref().map_or_else(|| spec.to_string(), |loaded| loaded.scenario.name.clone());
         Ok(Self { name, spec, from_file })
     }
 
@@ -75,8 +81,18 @@ impl Lot {
     /// # Errors
     /// If no lot can be made of it.
     pub fn of_map(path: &Path, lot: &MapLot, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
-        let scenario = lot.scenario(vehicle)?;
-        Ok(Self { name: scenario.name.clone(), spec: LotSpec::File(path.to_owned()), from_file: Some(scenario) })
+        let loaded = lot.scenario(vehicle)?;
+        Ok(Self { name: loaded.scenario.name.clone(), spec: LotSpec::File(path.to_owned()), from_file: Some(loaded) })
+    }
+
+    /// What is to be said about a lot from a file.
+    pub fn notes(&self) -> &[Note] {
+        self.from_file.as_ref().map_or(&[], |loaded| &loaded.notes)
+    }
+
+    /// The noise level that a lot from a file asks for.
+    pub fn asks_for_noise(&self) -> Option<NoiseLevel> {
+        self.from_file.as_ref().map(|loaded| loaded.scenario.noise.level)
     }
 
     /// Name in tables.
@@ -87,7 +103,7 @@ impl Lot {
     /// What a row of a printed table is about: generated lots of one kind share a row.
     pub fn group(&self) -> String {
         match &self.spec {
-            LotSpec::Generated { split, difficulty, .. } => format!("{}-{}", split.name(), difficulty.name()),
+            LotSpec::Generated { split, family, .. } => format!("{split}-{}", family.name()),
             LotSpec::Reference(_) | LotSpec::File(_) => self.name.clone(),
         }
     }
@@ -109,7 +125,7 @@ impl Lot {
     /// [`scenarios::LoadError::ForwardOnly`], with file and line.
     pub fn check_direction(&self, direction: Direction, vehicle: &VehicleSettings) -> anyhow::Result<()> {
         match (&self.spec, &self.from_file) {
-            (LotSpec::File(path), Some(scenario)) => {
+            (LotSpec::File(path), Some(Loaded { scenario, .. })) => {
                 Ok(scenarios::load::check_direction(path, scenario, direction, vehicle)?)
             }
             _ => Ok(()),
@@ -146,13 +162,13 @@ impl Lot {
     pub fn draw(&self, trial: RootSeed) -> Drawn {
         match &self.spec {
             LotSpec::Reference(lot) => Drawn { scenario: reference::lot(*lot, trial), attempts: None },
-            LotSpec::Generated { split, difficulty, index } => {
-                let generated = generator::generate(*split, *index, *difficulty);
+            LotSpec::Generated { split, family, index } => {
+                let generated = generator::generate(split, *index, *family);
                 Drawn { scenario: generated.scenario, attempts: Some(generated.attempts) }
             }
             LotSpec::File(_) => {
-                let scenario = self.from_file.clone().expect("files are read when they are named");
-                Drawn { scenario, attempts: None }
+                let loaded = self.from_file.clone().expect("files are read when they are named");
+                Drawn { scenario: loaded.scenario, attempts: None }
             }
         }
     }

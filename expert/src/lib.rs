@@ -271,7 +271,7 @@ impl Driver for ScriptedExpert {
             inspection.decided = label.point();
         }
         self.inspection = inspection;
-        Decision { look_ahead: self.as_by_hand(label.point()), source: Source::Expert, spread: None }
+        Decision::at(self.as_by_hand(label.point()), Source::Expert)
     }
 
     fn reset(&mut self) {

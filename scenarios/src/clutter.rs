@@ -592,7 +592,8 @@ fn closed_arms(corridor: &Corridor) -> Vec<Arm> {
     arms
 }
 
-fn draw_car(rng: &mut Rng) -> ObstacleClass {
+/// What stands in a stall.
+pub(crate) fn draw_car(rng: &mut Rng) -> ObstacleClass {
     // Roughly a Korean apartment lot; the paper gives no shares.
     match rng.random_range(0..100) {
         0..50 => ObstacleClass::Sedan,

@@ -523,7 +523,8 @@ fn contains_convex(outline: &[Vec2], point: Vec2) -> bool {
     edges(outline).all(|(a, b)| (b - a).perp_dot(point - a) >= 0.0)
 }
 
-fn segments_cross(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> bool {
+/// Whether two segments share a point.
+pub(crate) fn segments_cross(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> bool {
     let side = |p: Vec2, q: Vec2, r: Vec2| (q - p).perp_dot(r - p);
     side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) <= 0.0
 }

@@ -11,13 +11,17 @@
 //! | [`split`] | which generated lots may be trained on |
 //! | [`load`] | lots as TOML files |
 //! | [`import`] | ROS maps and TPCAP cases as lots |
+//! | [`note`] | what an import did and found, for people |
 
+mod branches;
 pub mod clutter;
 pub mod corridor;
 mod error;
+mod families;
 pub mod generator;
 pub mod import;
 pub mod load;
+pub mod note;
 pub mod reference;
 pub mod solver;
 pub mod split;
@@ -28,14 +32,16 @@ use reference::ReferenceLot;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
-use split::{Difficulty, Split};
+use split::{Family, Phrase, Split};
 use std::path::PathBuf;
 
 /// The lots that a name means; several names are separated by commas.
 ///
 /// `lot-a`, `lot-b`, `lot-c` · `reference` (all three) · `train:N`, `validation:N`, `test:N` (the first N generated lots
-/// of a split, medium unless `:easy`, `:medium` or `:hard` follows) · `test-hard-7` (one of them) · a path ending in
-/// `.toml`, or in `.yaml` or `.csv` for a map with its route beside it (see [`import`]).
+/// of a split, medium unless `:hard` or another [`Family`] follows; `:all` takes all families in turn) ·
+/// `sealed:PHRASE:N` (lots that nobody has seen before the phrase was chosen: easy, medium and hard in turn unless a
+/// family or `:all` follows) · `test-hard-7` (one of them) · a path ending in `.toml`, or in `.yaml` or `.csv` for a map
+/// with its route beside it (see [`import`]).
 ///
 /// ```
 /// let lots = scenarios::suite("lot-a,test:2:hard")?;
@@ -63,8 +69,8 @@ pub enum LotSpec {
     Generated {
         /// What it may be used for.
         split: Split,
-        /// How hard it is.
-        difficulty: Difficulty,
+        /// Which kind.
+        family: Family,
         /// Its number within both.
         index: u64,
     },
@@ -82,9 +88,7 @@ impl LotSpec {
     pub fn scenario(&self, trial_seed: RootSeed, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
         match self {
             Self::Reference(lot) => Ok(reference::lot(*lot, trial_seed)),
-            Self::Generated { split, difficulty, index } => {
-                Ok(generator::generate(*split, *index, *difficulty).scenario)
-            }
+            Self::Generated { split, family, index } => Ok(generator::generate(split, *index, *family).scenario),
             Self::File(path) => load::load(path, vehicle),
         }
     }
@@ -94,7 +98,7 @@ impl std::fmt::Display for LotSpec {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Reference(lot) => write!(f, "{}", lot.name()),
-            Self::Generated { split, difficulty, index } => write!(f, "{}-{}-{index}", split.name(), difficulty.name()),
+            Self::Generated { split, family, index } => write!(f, "{split}-{}-{index}", family.name()),
             Self::File(path) => write!(f, "{}", path.display()),
         }
     }
@@ -116,9 +120,9 @@ impl std::str::FromStr for LotSpec {
 /// A name that means no lot.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{name:?} {problem}; there are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N and test:N \
-     (N generated lots; add :easy, :medium or :hard), single ones such as test-hard-7, and paths ending in .toml, .yaml \
-     (ROS map) or .csv (TPCAP case)"
+    "{name:?} {problem}; there are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N, test:N and \
+     sealed:PHRASE:N (N generated lots; add :all, :easy, :medium, :hard, :lane, :rooms, :street, :aisles, :track or \
+     :open), single ones such as test-hard-7, and paths ending in .toml, .yaml (ROS map) or .csv (TPCAP case)"
 )]
 pub struct SpecError {
     name: String,
@@ -148,41 +152,61 @@ fn lots_of(name: &str) -> Result<Vec<LotSpec>, SpecError> {
     generated_suite(name)
 }
 
-/// `test-hard-7`.
+/// `test-hard-7` or `sealed-PHRASE-hard-7`.
 fn generated_lot(name: &str) -> Option<LotSpec> {
-    let [split, difficulty, index] = name.split('-').collect::<Vec<_>>().try_into().ok()?;
-    let split = split_called(split)?;
-    let difficulty = difficulty_called(difficulty)?;
-    Some(LotSpec::Generated { split, difficulty, index: index.parse().ok().filter(|index| *index < 1 << 56)? })
+    let [index, family, split] = name.rsplitn(3, '-').collect::<Vec<_>>().try_into().ok()?;
+    let split = match split.strip_prefix("sealed-") {
+        Some(phrase) => Split::Sealed(Phrase::new(phrase)?),
+        None => split_called(split)?,
+    };
+    let family = family_called(family)?;
+    let index = index.parse().ok().filter(|index| *index < split.size())?;
+    Some(LotSpec::Generated { split, family, index })
 }
 
-/// `test:100` or `test:100:hard`.
+/// `test:100`, `test:100:hard`, `test:100:all` or the same of `sealed:PHRASE`.
 fn generated_suite(name: &str) -> Result<Vec<LotSpec>, SpecError> {
     let fault = |problem: String| SpecError::new(name, problem);
     let mut parts = name.split(':');
-    let split = parts.next().and_then(split_called).ok_or_else(|| fault("is no lot".to_owned()))?;
+    let split = match parts.next() {
+        Some("sealed") => {
+            let phrase = parts.next().ok_or_else(|| fault("does not say which phrase".to_owned()))?;
+            Split::Sealed(Phrase::new(phrase).ok_or_else(|| {
+                fault(format!(
+                    "has the phrase {phrase:?}; write 1 to 40 of a-z, 0-9 and -, which is neither first nor last"
+                ))
+            })?)
+        }
+        other => other.and_then(split_called).ok_or_else(|| fault("is no lot".to_owned()))?,
+    };
     let count = parts.next().ok_or_else(|| fault("does not say how many lots".to_owned()))?;
     let count: u64 = count
         .parse()
         .ok()
         .filter(|count| (1..=1_000_000).contains(count))
         .ok_or_else(|| fault(format!("asks for {count:?} lots, not for a number from 1 to 1000000")))?;
-    let difficulty = match parts.next() {
-        None => Difficulty::default(),
-        Some(called) => difficulty_called(called).ok_or_else(|| fault(format!("has no difficulty {called:?}")))?,
+    let families = match (parts.next(), &split) {
+        (Some("all"), _) => Family::ALL.to_vec(),
+        (Some(called), _) => vec![family_called(called).ok_or_else(|| fault(format!("has no family {called:?}")))?],
+        (None, Split::Sealed(_)) => Family::CORRIDORS.to_vec(),
+        (None, Split::Train | Split::Validation | Split::Test) => vec![Family::default()],
     };
     if let Some(extra) = parts.next() {
         return Err(fault(format!("has {extra:?} too much")));
     }
-    Ok((0..count).map(|index| LotSpec::Generated { split, difficulty, index }).collect())
+    // In turn: of several families, each has its first lots.
+    let turns = families.len() as u64;
+    let lot =
+        |k: u64| LotSpec::Generated { split: split.clone(), family: families[(k % turns) as usize], index: k / turns };
+    Ok((0..count).map(lot).collect())
 }
 
 fn split_called(name: &str) -> Option<Split> {
-    Split::ALL.into_iter().find(|split| split.name() == name)
+    Split::OPEN.into_iter().find(|split| split.to_string() == name)
 }
 
-fn difficulty_called(name: &str) -> Option<Difficulty> {
-    Difficulty::ALL.into_iter().find(|difficulty| difficulty.name() == name)
+fn family_called(name: &str) -> Option<Family> {
+    Family::ALL.into_iter().find(|family| family.name() == name)
 }
 
 /// FNV-1a: pins text in tests.
@@ -208,6 +232,18 @@ mod tests {
             ("validation:1:easy, lot-c", &["validation-easy-0", "lot-c"]),
             ("test:3:hard", &["test-hard-0", "test-hard-1", "test-hard-2"]),
             ("test-hard-41", &["test-hard-41"]),
+            ("train:2:rooms", &["train-rooms-0", "train-rooms-1"]),
+            ("sealed:spring:2:lane", &["sealed-spring-lane-0", "sealed-spring-lane-1"]),
+            (
+                "sealed:a-b-hard-3:4",
+                &[
+                    "sealed-a-b-hard-3-easy-0",
+                    "sealed-a-b-hard-3-medium-0",
+                    "sealed-a-b-hard-3-hard-0",
+                    "sealed-a-b-hard-3-easy-1",
+                ],
+            ),
+            ("sealed-a-b-hard-3-easy-1", &["sealed-a-b-hard-3-easy-1"]),
             ("some/where.toml", &["some/where.toml"]),
         ];
         for (name, expected) in table {
@@ -225,9 +261,17 @@ mod tests {
             ("train", "\"train\" does not say how many lots; there are"),
             ("train:x", "\"train:x\" asks for \"x\" lots, not for a number from 1 to"),
             ("test:0", "\"test:0\" asks for \"0\" lots"),
-            ("test:5:brutal", "\"test:5:brutal\" has no difficulty \"brutal\"; there are"),
+            ("test:5:brutal", "\"test:5:brutal\" has no family \"brutal\"; there are"),
             ("test:5:hard:1", "\"test:5:hard:1\" has \"1\" too much"),
             ("test-hard-x", "\"test-hard-x\" is no lot"),
+            ("sealed", "\"sealed\" does not say which phrase; there are"),
+            ("sealed:spring", "\"sealed:spring\" does not say how many lots; there are"),
+            (
+                "sealed:Spring:3",
+                "\"sealed:Spring:3\" has the phrase \"Spring\"; write 1 to 40 of a-z, 0-9 and -, which",
+            ),
+            ("sealed-spring-hard-1048576", "\"sealed-spring-hard-1048576\" is no lot"),
+            ("sealed-hard-7", "\"sealed-hard-7\" is no lot"),
             ("test-hard-99999999999999999999", "\"test-hard-99999999999999999999\" is no lot"),
         ];
         for (name, expected) in table {

@@ -120,6 +120,7 @@ pub fn lot(which: ReferenceLot, seed: RootSeed) -> Scenario {
     Scenario {
         name: which.name().to_owned(),
         boundary: corridor.boundary,
+        boundary_height_m: 0.0,
         reference_path: corridor.reference_path,
         noise: LotNoise::default(),
         islands: Vec::new(),
@@ -429,7 +430,7 @@ mod tests {
             }
         }
         for class in ObstacleClass::ALL {
-            if matches!(class, ObstacleClass::Curb) {
+            if matches!(class, ObstacleClass::Curb | ObstacleClass::Wall) {
                 continue;
             }
             let [total, in_lane] = seen.get(&class).copied().unwrap_or_default();

@@ -68,6 +68,7 @@ pub(crate) fn of_class(class: ObstacleClass) -> Colour {
         ObstacleClass::Pillar => [0x8C, 0x7B, 0x6B, 0xFF],
         ObstacleClass::Cart => [0x5F, 0xB3, 0xA6, 0xFF],
         ObstacleClass::Person => [0xE0, 0x6C, 0x9F, 0xFF],
+        ObstacleClass::Wall => [0xB0, 0x6A, 0x55, 0xFF],
     }
 }
 

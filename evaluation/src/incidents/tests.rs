@@ -22,6 +22,7 @@ fn map() -> Map {
     let scenario = Scenario {
         name: "bend".into(),
         boundary: points(&[(-5.0, -2.0), (45.0, -2.0), (45.0, 40.0), (38.0, 40.0), (38.0, 2.0), (-5.0, 2.0)]),
+        boundary_height_m: 0.0,
         reference_path: ReferencePath {
             points: points(&[(0.0, 0.0), (41.5, 0.0), (41.5, 30.0)]),
             corner_radius_m: 5.0,
@@ -78,7 +79,7 @@ fn frame(tick: u32, steering_deg: f32, event: Event) -> Frame {
         time_s: 0.05 * (tick + 1) as f32,
         vehicle,
         observation: Observation::default(),
-        decision: Decision { look_ahead, source: Source::Planner, spread: None },
+        decision: Decision::at(look_ahead, Source::Planner),
         command: VehicleCommand::default(),
         progress_m: 0.1 * tick as f32,
         safe_ratio: 1.0,

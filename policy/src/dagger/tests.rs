@@ -31,7 +31,7 @@ impl Driver for RouteFollower {
         let goal = truth.map.path().pose_at(truth.progress_m + 10.0).position();
         let in_ego = truth.vehicle.pose.world_from_ego().inverse_point(goal);
         let look_ahead = LookAheadPoint { ahead_m: in_ego.x.clamp(4.4, 16.0), left_m: in_ego.y.clamp(-6.0, 6.0) };
-        Decision { look_ahead, source: Source::Expert, spread: None }
+        Decision::at(look_ahead, Source::Expert)
     }
 }
 
@@ -42,6 +42,7 @@ fn episodes(count: usize) -> Vec<Episode> {
     let scenario = Scenario {
         name: "bent lane".to_string(),
         boundary: vec![v(-4.0, -3.5), v(26.0, -3.5), v(52.0, 11.5), v(48.5, 17.6), v(24.0, 3.5), v(-4.0, 3.5)],
+        boundary_height_m: 0.0,
         reference_path: ReferencePath { points: vec![v(0.0, 0.0), v(25.0, 0.0), v(42.0, 9.8)], corner_radius_m: 12.0 },
         noise: LotNoise::default(),
         islands: Vec::new(),

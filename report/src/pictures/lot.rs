@@ -46,6 +46,7 @@ fn look(class: ObstacleClass) -> (Rgb, &'static str) {
         ObstacleClass::Pillar => ([0x3A, 0x3A, 0x3A], "pillar"),
         ObstacleClass::Cart => ([0x17, 0xA2, 0x98], "cart"),
         ObstacleClass::Person => ([0xE3, 0x3C, 0x96], "person"),
+        ObstacleClass::Wall => ([0x6B, 0x3A, 0x2E], "wall"),
     }
 }
 

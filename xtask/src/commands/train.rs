@@ -3,6 +3,7 @@
 use super::evaluate;
 use crate::args::{JsonArgs, LayerArgs, OutArgs};
 use crate::console::Console;
+use crate::notes;
 use crate::output::Output;
 use crate::record::{self, RecordArgs};
 use anyhow::Context as _;
@@ -75,7 +76,7 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         let mut settings = Settings::resolve(&layers, args.seed)?;
         adjust(&mut settings);
         // Before the folder is claimed: a misspelt lot should not leave one behind.
-        check_lots(&settings)?;
+        check_lots(&settings, output)?;
         let place = args.out.place(command, layers.preset_name(), settings.seed.0);
         (RunDir::create(&place, &settings)?, settings)
     };
@@ -110,12 +111,16 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
 }
 
 /// Lots that do not exist, or cannot be driven as the settings ask.
-fn check_lots(settings: &Settings) -> anyhow::Result<()> {
+fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result<()> {
     let Settings { training, evaluation, episode, .. } = settings;
-    for (section, lots, directions) in
-        [("training", &training.lots, &training.directions), ("evaluation", &evaluation.lots, &evaluation.directions)]
-    {
-        for lot in Lot::parse_all(lots, &episode.vehicle)? {
+    let noise = std::slice::from_ref(&training.noise);
+    for (section, lots, directions, noise) in [
+        ("training", &training.lots, &training.directions, noise),
+        ("evaluation", &evaluation.lots, &evaluation.directions, &evaluation.noise),
+    ] {
+        let lots = Lot::parse_all(lots, &episode.vehicle)?;
+        notes::say(&lots, noise, output);
+        for lot in lots {
             let flag = format!("--set {section}.directions='[\"forward\"]'");
             let check = |&direction| lot.check_direction(direction, &episode.vehicle);
             directions.iter().try_for_each(check).map_err(|error| evaluate::or_forward(error, &flag))?;

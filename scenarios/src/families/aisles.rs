@@ -1,0 +1,164 @@
+//! Car parks with several parallel aisles: rows of stalls, many of them empty, on both sides; the way goes round the row
+//! ends from aisle to aisle; side aisles are closed or dead ends.
+
+use super::course::{Course, first_apart};
+use super::strip::{Notch, Strip, Stub};
+use super::things::{self, Rules, Things, facing, side, yaw_rad};
+use super::walls::{Wall, yard};
+use super::{RUN_OUT_M, close, lot, things_on};
+use crate::clutter::draw_car;
+use crate::corridor::{STALL_DEPTH_M, Side};
+use rand::RngExt as _;
+use sim::geometry::Vec2;
+use sim::scenario::{ObstacleClass, Scenario};
+use sim::seed::Rng;
+use std::ops::Range;
+
+/// Aisles are so wide, metres.
+const AISLE_M: Range<f32> = 5.0..8.0;
+/// The piece of an aisle that is driven, corner to corner, metres.
+const LEG_M: Range<f32> = 26.0..60.0;
+const STALL_WIDTH_M: Range<f32> = 2.3..2.7;
+/// Between two rows that stand back to back, metres.
+const MEDIAN_M: Range<f32> = 0.5..2.5;
+/// Between the cross aisle and the first stall, metres.
+const ROW_END_M: Range<f32> = 1.0..3.0;
+const SIDE_AISLE_M: Range<f32> = 4.5..6.0;
+/// How far the ends of aisles go on behind what closes them, metres.
+const DEAD_END_M: Range<f32> = 5.0..10.0;
+/// The centre line at most, run-outs included, metres.
+const LENGTH_MAX_M: f32 = 225.0;
+
+pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
+    let stall_m = layout.random_range(STALL_WIDTH_M);
+    let mut strip = first_apart(layout, 0.2, course)?;
+    let (rows, side_aisles) = rows(&strip, stall_m, layout);
+    strip.notches = rows.iter().chain(&side_aisles).copied().collect();
+    if !strip.keeps_apart(0.2) {
+        return None;
+    }
+    let mut things = things_on(&strip);
+    let mouths: Vec<_> = side_aisles.iter().map(|aisle| strip.mouth(aisle)).chain(strip.stub_mouths()).collect();
+    for mouth in mouths {
+        close(&mut things, mouth, obstacles);
+    }
+    let occupancy = obstacles.random_range(0.25..0.9);
+    for row in &rows {
+        park(&mut things, &strip, row, stall_m, occupancy, obstacles);
+    }
+    in_the_aisle(&mut things, &strip, obstacles);
+    let boundary = enclose(&mut things, strip.outline(0.0), layout);
+    Some(lot(&strip, boundary, things))
+}
+
+/// The ground beside is solid, or lies behind a kerb or a low wall.
+fn enclose(things: &mut Things<'_>, outline: Vec<Vec2>, rng: &mut Rng) -> Vec<Vec2> {
+    let wall = match rng.random_range(0..10) {
+        0..5 => return outline,
+        5..8 => Wall::kerb(),
+        _ => Wall::low(rng),
+    };
+    things.obstacles.extend(wall.around(&outline, &[]));
+    yard(&outline, 2.0..8.0, rng)
+}
+
+/// Up and down, from aisle to aisle.
+fn course(rng: &mut Rng) -> Course {
+    let aisle_m = rng.random_range(AISLE_M);
+    let cross_m = rng.random_range(AISLE_M);
+    let pitch_m = aisle_m + 2.0 * STALL_DEPTH_M + rng.random_range(MEDIAN_M);
+    let leg_m = rng.random_range(LEG_M);
+    let mut turn_rad = if rng.random_bool(0.5) { 1.0 } else { -1.0 } * std::f32::consts::FRAC_PI_2;
+    let mut course = Course::new(aisle_m);
+    course.straight(RUN_OUT_M + leg_m * rng.random_range(0.4..1.0));
+    let aisles = rng.random_range(2..=4);
+    for k in 1..aisles {
+        let needs_m = pitch_m + if k == aisles - 1 { 0.0 } else { leg_m };
+        if course.length_m() + needs_m > LENGTH_MAX_M {
+            break;
+        }
+        let chamfer_m = rng.random_range(0.0..1.0);
+        let stub = |rng: &mut Rng, is_first: bool| {
+            let depth_m = rng.random_range(DEAD_END_M);
+            let ahead = if is_first { Stub::Ahead(depth_m) } else { Stub::Behind(depth_m) };
+            rng.random_bool(0.5).then_some(ahead)
+        };
+        course.corner(turn_rad, chamfer_m, stub(rng, true));
+        course.widen(cross_m);
+        course.straight(pitch_m);
+        course.corner(turn_rad, chamfer_m, stub(rng, false));
+        course.widen(aisle_m);
+        course.straight(if k == aisles - 1 { leg_m * rng.random_range(0.4..1.0) + RUN_OUT_M } else { leg_m });
+        turn_rad = -turn_rad;
+    }
+    course
+}
+
+/// Rows of stalls along the aisles, and side aisles through them.
+fn rows(strip: &Strip, stall_m: f32, rng: &mut Rng) -> (Vec<Notch>, Vec<Notch>) {
+    let (mut rows, mut side_aisles) = (Vec::new(), Vec::new());
+    for (i, (from_m, to_m)) in strip.straights().into_iter().enumerate() {
+        // Every other piece crosses from aisle to aisle; its ends are corners.
+        if i % 2 == 1 {
+            continue;
+        }
+        for side in Side::BOTH {
+            let (from_m, to_m) = (from_m + rng.random_range(ROW_END_M), to_m - rng.random_range(ROW_END_M));
+            let gap_m = rng.random_range(SIDE_AISLE_M);
+            let has_gap = to_m - from_m > 3.0 * gap_m && rng.random_bool(0.4);
+            let depth_m = STALL_DEPTH_M;
+            if !has_gap {
+                push_row(&mut rows, side, (from_m, to_m), stall_m);
+                continue;
+            }
+            let at_m = rng.random_range(from_m + gap_m..to_m - 2.0 * gap_m);
+            side_aisles.push(Notch { side, from_m: at_m, to_m: at_m + gap_m, depth_m });
+            push_row(&mut rows, side, (from_m, at_m - 0.5), stall_m);
+            push_row(&mut rows, side, (at_m + gap_m + 0.5, to_m), stall_m);
+        }
+    }
+    (rows, side_aisles)
+}
+
+/// As many stalls as there is room for.
+fn push_row(rows: &mut Vec<Notch>, side: Side, (from_m, to_m): (f32, f32), stall_m: f32) {
+    let stalls = ((to_m - from_m) / stall_m).floor();
+    if stalls >= 2.0 {
+        rows.push(Notch { side, from_m, to_m: from_m + stalls * stall_m, depth_m: STALL_DEPTH_M });
+    }
+}
+
+/// Cars in some of the stalls, at a right angle to the aisle; wheel stops in others.
+fn park(things: &mut Things<'_>, strip: &Strip, row: &Notch, stall_m: f32, occupancy: f64, rng: &mut Rng) {
+    let stalls = ((row.to_m - row.from_m) / stall_m).round() as usize;
+    for k in 0..stalls {
+        let s_m = row.from_m + (k as f32 + 0.5) * stall_m;
+        let edge_m = strip.half_width_m(s_m);
+        let heading_rad = strip.pose(s_m).heading_rad + std::f32::consts::FRAC_PI_2;
+        let class = draw_car(rng);
+        let set_back_m = rng.random_range(0.1..0.4);
+        let heading = heading_rad + yaw_rad(rng, 3.0) + facing(rng);
+        let (class, d_m, heading) = if rng.random_bool(occupancy) {
+            (class, edge_m + set_back_m + 0.5 * class.default_size_m()[0], heading)
+        } else if rng.random_bool(0.5) {
+            (ObstacleClass::WheelStop, edge_m + STALL_DEPTH_M - 0.6, heading_rad + std::f32::consts::FRAC_PI_2)
+        } else {
+            continue;
+        };
+        things.stand(things::obstacle(class, strip.point(s_m, row.side.sign() * d_m), heading));
+    }
+}
+
+/// A cone, a cart or a car that waits beside the row.
+fn in_the_aisle(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
+    let rules = Rules { gap_m: 2.9, apart_m: 9.0, corner_clear_m: 8.0 };
+    for _ in 0..rng.random_range(0..5) {
+        let s_m = rng.random_range(0.0..strip.length_m());
+        let side = side(rng);
+        let class = [ObstacleClass::Cone, ObstacleClass::Cart, ObstacleClass::Person, ObstacleClass::Sedan]
+            [rng.random_range(0..4)];
+        let protrusion_m = class.default_size_m()[1] + rng.random_range(-0.2..0.1);
+        let thing = things.beside(class, side, s_m, protrusion_m, yaw_rad(rng, 3.0));
+        things.narrow(thing, side, s_m, &rules);
+    }
+}
