@@ -152,7 +152,7 @@ impl Policy for MiddleOfTheRow {
             ahead_m: self.0.cell_in_ego(ROW, 0).x,
             left_m: if free.is_empty() { 0.0 } else { sum_m / free.len() as f32 },
         };
-        Decision::at(look_ahead, Source::Planner)
+        Decision { look_ahead, source: Source::Planner, spread: None }
     }
 }
 

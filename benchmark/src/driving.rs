@@ -31,7 +31,7 @@ impl Driver for Centred {
         let ahead = truth.map.path().pose_at(truth.progress_m + 6.0).position();
         let in_ego = truth.vehicle.pose.world_from_ego().inverse_point(ahead);
         let look_ahead = LookAheadPoint { ahead_m: in_ego.x, left_m: in_ego.y };
-        Decision::at(look_ahead, Source::Planner)
+        Decision { look_ahead, source: Source::Planner, spread: None }
     }
 
     fn reset(&mut self) {}

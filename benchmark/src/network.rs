@@ -35,7 +35,7 @@ fn grids(count: usize) -> anyhow::Result<Vec<OccupancyGrid>> {
         .map(|tick| {
             let on_path = map.path().pose_at((tick as f32 * 0.37) % length_m);
             let turned = Pose::new(on_path.position(), on_path.heading_rad + 0.2 * (tick as f32 * 0.7).sin());
-            sensor.observe(&map, turned, tick)
+            sensor.observe(&map, turned, tick).grid
         })
         .collect())
 }

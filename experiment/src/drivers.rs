@@ -7,7 +7,6 @@ use planners::{Planner, PlannerContext, PlannerSpec};
 use policy::checkpoint::Checkpoint;
 use policy::drivers::NetFleet;
 use policy::network::DeviceChoice;
-use safety::{FilteredFleet, SafetySettings};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Fleet, OneDriverEach, SensorsOnly, Source};
 use sim::episode::EpisodeSettings;
@@ -47,12 +46,7 @@ pub enum DriverSpec {
         /// Its parameters.
         parameters: Parameters,
     },
-    /// `SPEC+filter`: one of the others behind a safety filter.
-    Filtered(Box<DriverSpec>),
 }
-
-/// How a driver behind a safety filter ends.
-const FILTER_SUFFIX: &str = "+filter";
 
 /// Where a planner's parameters come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -90,11 +84,6 @@ impl FromStr for DriverSpec {
     fn from_str(text: &str) -> anyhow::Result<Self> {
         let is_planner = |name: &str| PlannerSpec::all().iter().any(|planner| planner.name() == name);
         let planner = |name: &str, parameters| Ok(Self::Planner { name: name.to_owned(), parameters });
-        if let Some(inner) = text.strip_suffix(FILTER_SUFFIX) {
-            let inner: Self = inner.parse()?;
-            ensure!(!matches!(inner, Self::Filtered(_)), "driver {text:?} has two filters; one is enough");
-            return Ok(Self::Filtered(Box::new(inner)));
-        }
         match text.split_once(':') {
             None if text == "expert" => Ok(Self::Expert),
             None if is_planner(text) => planner(text, Parameters::Published),
@@ -130,7 +119,6 @@ impl fmt::Display for DriverSpec {
             Self::Planner { name, parameters: Parameters::Published } => f.write_str(name),
             Self::Planner { name, parameters: Parameters::Tuned } => write!(f, "tuned:{name}"),
             Self::Planner { name, parameters: Parameters::File(path) } => write!(f, "{name}:{}", path.display()),
-            Self::Filtered(inner) => write!(f, "{inner}{FILTER_SUFFIX}"),
         }
     }
 }
@@ -152,18 +140,13 @@ impl DriverSpec {
 
     /// Whether it is a learned policy.
     pub fn is_network(&self) -> bool {
-        match self {
-            Self::Run { .. } | Self::Checkpoint { .. } => true,
-            Self::Expert | Self::Planner { .. } => false,
-            Self::Filtered(inner) => inner.is_network(),
-        }
+        matches!(self, Self::Run { .. } | Self::Checkpoint { .. })
     }
 
     /// The training run it comes from; `/bc` is part of it.
     pub fn run(&self) -> Option<&Path> {
         match self {
             Self::Run { folder } => Some(folder),
-            Self::Filtered(inner) => inner.run(),
             Self::Expert | Self::Checkpoint { .. } | Self::Planner { .. } => None,
         }
     }
@@ -173,11 +156,6 @@ impl DriverSpec {
     /// # Errors
     /// If they are not what they should be.
     pub fn load(self, expert: &ExpertSettings, device: DeviceChoice) -> anyhow::Result<NamedDriver> {
-        if let Self::Filtered(inner) = &self {
-            let inner = inner.as_ref().clone().load(expert, device)?;
-            let filter = Some(SafetySettings::default());
-            return Ok(NamedDriver { name: self.to_string(), spec: self, filter, ..inner });
-        }
         let name = self.to_string();
         let in_driver = || format!("driver {name:?}");
         let model = match &self {
@@ -196,9 +174,8 @@ impl DriverSpec {
                 Model::Network(Box::new(Checkpoint::load(folder).with_context(in_driver)?), device)
             }
             Self::Planner { name, parameters } => Model::Planner(planner(name, parameters)?),
-            Self::Filtered(_) => unreachable!("handled above"),
         };
-        Ok(NamedDriver { name, spec: self, model, filter: None })
+        Ok(NamedDriver { name, spec: self, model })
     }
 }
 
@@ -210,8 +187,6 @@ pub struct NamedDriver {
     /// As named on the command line, for replay keys.
     pub spec: DriverSpec,
     model: Model,
-    /// What its answers pass.
-    filter: Option<SafetySettings>,
 }
 
 #[derive(Debug, Clone)]
@@ -236,25 +211,19 @@ impl NamedDriver {
 
     /// The scripted expert.
     pub fn expert(settings: &ExpertSettings) -> Self {
-        Self {
-            name: "expert".to_owned(),
-            spec: DriverSpec::Expert,
-            model: Model::Expert(settings.clone()),
-            filter: None,
-        }
+        Self { name: "expert".to_owned(), spec: DriverSpec::Expert, model: Model::Expert(settings.clone()) }
     }
 
     /// A network that is loaded already.
     pub fn network(name: &str, spec: DriverSpec, checkpoint: Checkpoint, device: DeviceChoice) -> Self {
-        let model = Model::Network(Box::new(checkpoint), device);
-        Self { name: name.to_owned(), spec, model, filter: None }
+        Self { name: name.to_owned(), spec, model: Model::Network(Box::new(checkpoint), device) }
     }
 
     /// A planner with parameters of the caller's.
     pub fn planner(planner: PlannerSpec) -> Self {
         let name = planner.name().to_owned();
         let spec = DriverSpec::Planner { name: name.clone(), parameters: Parameters::Published };
-        Self { name, spec, model: Model::Planner(planner), filter: None }
+        Self { name, spec, model: Model::Planner(planner) }
     }
 
     /// The same with another name in tables.
@@ -310,14 +279,6 @@ impl NamedDriver {
 
     /// Seats it in this many cars, which are driven in lock-step.
     pub fn fleet(&self, episode: &EpisodeSettings, cars: usize) -> Box<dyn Fleet + Send> {
-        let fleet = self.unfiltered_fleet(episode, cars);
-        match &self.filter {
-            Some(settings) => Box::new(FilteredFleet::new(fleet, settings, episode, cars)),
-            None => fleet,
-        }
-    }
-
-    fn unfiltered_fleet(&self, episode: &EpisodeSettings, cars: usize) -> Box<dyn Fleet + Send> {
         match &self.model {
             Model::Expert(settings) => Box::new(OneDriverEach((0..cars).map(|_| expert(settings, episode)).collect())),
             Model::Network(checkpoint, device) => Box::new(NetFleet::new(checkpoint, *device)),

@@ -271,7 +271,7 @@ impl Driver for ScriptedExpert {
             inspection.decided = label.point();
         }
         self.inspection = inspection;
-        Decision::at(self.as_by_hand(label.point()), Source::Expert)
+        Decision { look_ahead: self.as_by_hand(label.point()), source: Source::Expert, spread: None }
     }
 
     fn reset(&mut self) {

@@ -19,5 +19,5 @@ fn decision(bencher: Bencher<'_, '_>, name: &str) {
     let planners = PlannerSpec::all();
     let spec = planners.iter().find(|spec| spec.name() == name).expect("a planner's name");
     let mut planner = spec.planner(&PlannerContext::of(&EpisodeSettings::paper()));
-    bencher.bench_local(|| planner.act(black_box(&Observation::from(grid))));
+    bencher.bench_local(|| planner.act(black_box(&Observation { grid })));
 }

@@ -158,8 +158,8 @@ mod tests {
     #[test]
     fn free_ground_is_driven_straight_and_an_obstacle_pushes_away() {
         let mut planner = Params::paper().planner(&context());
-        assert_eq!(planner.act(&Observation::from(OccupancyGrid::free())).look_ahead.left_m, 0.0);
+        assert_eq!(planner.act(&Observation { grid: OccupancyGrid::free() }).look_ahead.left_m, 0.0);
         let grid = grid_with(&[(16, 11), (17, 11)]);
-        assert!(planner.act(&Observation::from(grid)).look_ahead.left_m < -0.3);
+        assert!(planner.act(&Observation { grid }).look_ahead.left_m < -0.3);
     }
 }

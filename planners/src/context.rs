@@ -64,7 +64,7 @@ pub(crate) fn steer_along(curvature_per_m: f32) -> Decision {
 /// Answers with a point, ego frame.
 pub(crate) fn head_for(point: Vec2) -> Decision {
     let look_ahead = LookAheadPoint { ahead_m: point.x, left_m: point.y };
-    Decision::at(look_ahead, Source::Planner)
+    Decision { look_ahead, source: Source::Planner, spread: None }
 }
 
 /// Where the wheels probably stand. No planner is shown the wheel angle; it knows what it asked for and how fast the

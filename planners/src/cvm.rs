@@ -248,11 +248,11 @@ mod tests {
     #[test]
     fn a_free_lane_is_driven_straight_and_a_block_is_passed() {
         let mut planner = Params::paper().planner(&context());
-        assert_eq!(planner.act(&Observation::from(OccupancyGrid::free())).look_ahead.left_m, 0.0);
+        assert_eq!(planner.act(&Observation { grid: OccupancyGrid::free() }).look_ahead.left_m, 0.0);
         let mut grid = OccupancyGrid::free();
         for row in 18..22 {
             grid.occupy_row(row, !0 << 11);
         }
-        assert!(planner.act(&Observation::from(grid)).look_ahead.curvature_per_m() > 0.01);
+        assert!(planner.act(&Observation { grid }).look_ahead.curvature_per_m() > 0.01);
     }
 }

@@ -274,17 +274,17 @@ mod tests {
     #[test]
     fn a_free_lane_is_driven_straight_and_the_window_limits_a_turn() {
         let mut planner = planner();
-        let free = Observation::from(OccupancyGrid::free());
+        let free = Observation { grid: OccupancyGrid::free() };
         assert_eq!(planner.act(&free).look_ahead.left_m, 0.0);
         let mut grid = OccupancyGrid::free();
         for row in 14..18 {
             grid.occupy_row(row, !0 << 13);
         }
-        let curvature = planner.act(&Observation::from(grid)).look_ahead.curvature_per_m();
+        let curvature = planner.act(&Observation { grid }).look_ahead.curvature_per_m();
         assert!(curvature > 0.01, "{curvature}");
         // Half a second allows 9.9° from straight: 11 of the steps of 0.8875°.
         let mut narrow = Params { window_s: 0.5, heading_weight: 0.0, ..Params::paper() }.planner(&context());
-        let steering = (narrow.act(&Observation::from(grid)).look_ahead.curvature_per_m() * 2.845).atan().to_degrees();
+        let steering = (narrow.act(&Observation { grid }).look_ahead.curvature_per_m() * 2.845).atan().to_degrees();
         assert!(steering > 0.0 && steering < 11.5 * 0.8875, "{steering}");
     }
 }

@@ -428,14 +428,14 @@ mod tests {
     #[test]
     fn a_free_lane_is_driven_straight_and_a_block_is_passed() {
         let mut planner = paper();
-        let answer = planner.act(&Observation::from(OccupancyGrid::free())).look_ahead;
+        let answer = planner.act(&Observation { grid: OccupancyGrid::free() }).look_ahead;
         assert_eq!(answer.left_m, 0.0);
         // Everything to the right and a bit to the left of the axis is blocked, five metres ahead: to the left.
         let mut grid = OccupancyGrid::free();
         for row in 8..14 {
             grid.occupy_row(row, !0 << 11);
         }
-        assert!(planner.act(&Observation::from(grid)).look_ahead.left_m > 0.5);
+        assert!(planner.act(&Observation { grid }).look_ahead.left_m > 0.5);
     }
 
     /// docs/methods.md 6.1: set j = 4 is 14.9 m long at the outermost path, whose radius is 11.3 m.

@@ -64,7 +64,7 @@ fn search_spaces_hold_the_starting_point() {
 /// Two grids after each other: state included.
 fn answers(planner: &Planner, grids: [OccupancyGrid; 2]) -> [LookAheadPoint; 2] {
     let mut planner = planner.clone();
-    grids.map(|grid| planner.act(&Observation::from(grid)).look_ahead)
+    grids.map(|grid| planner.act(&Observation { grid }).look_ahead)
 }
 
 proptest! {
@@ -102,7 +102,7 @@ fn no_grid_makes_an_answer_that_is_not_finite() {
         let mut planner = spec.planner(&context());
         for grid in [OccupancyGrid::free(), OccupancyGrid::occupied(), grid_with(&alternating)] {
             for _ in 0..40 {
-                let point = planner.act(&Observation::from(grid)).look_ahead;
+                let point = planner.act(&Observation { grid }).look_ahead;
                 assert!(point.ahead_m.is_finite() && point.left_m.is_finite(), "{}: {point:?}", spec.name());
             }
         }

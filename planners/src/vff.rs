@@ -178,7 +178,7 @@ mod tests {
     use sim::sensing::OccupancyGrid;
 
     fn force(cells: &[(usize, usize)]) -> Vec2 {
-        Params::paper().planner(&context()).force(&Observation::from(grid_with(cells)))
+        Params::paper().planner(&context()).force(&Observation { grid: grid_with(cells) })
     }
 
     /// Cell (22, 10) lies at X 5.50, Y 0.96: 1.70 m ahead of the bumper, 0.96 m left of it, d² = 3.8116. It pushes with
@@ -195,14 +195,14 @@ mod tests {
     #[test]
     fn the_bearing_approaches_the_force_and_is_forgotten_on_reset() {
         let mut planner = Params { repulsion_gain: 50.0, ..Params::paper() }.planner(&context());
-        let observation = Observation::from(grid_with(&[(22, 9), (23, 9), (24, 9)]));
+        let observation = Observation { grid: grid_with(&[(22, 9), (23, 9), (24, 9)]) };
         let first = planner.act(&observation).look_ahead;
         let second = planner.act(&observation).look_ahead;
         assert!(second.left_m < first.left_m && first.left_m < 0.0);
         planner.reset();
         assert_eq!(planner.act(&observation).look_ahead, first);
         let mut free = Params::paper().planner(&context());
-        let straight = free.act(&Observation::from(OccupancyGrid::free())).look_ahead;
+        let straight = free.act(&Observation { grid: OccupancyGrid::free() }).look_ahead;
         assert!((straight.ahead_m - 7.8).abs() < 1e-5 && straight.left_m == 0.0);
     }
 }

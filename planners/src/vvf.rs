@@ -178,7 +178,7 @@ mod tests {
     #[test]
     fn free_ground_is_driven_straight_for_the_whole_walk() {
         let mut planner = Params::paper().planner(&context());
-        let answer = planner.act(&Observation::from(OccupancyGrid::free())).look_ahead;
+        let answer = planner.act(&Observation { grid: OccupancyGrid::free() }).look_ahead;
         assert!((answer.ahead_m - 9.8).abs() < 1e-3 && answer.left_m == 0.0, "{answer:?}");
     }
 
@@ -192,7 +192,7 @@ mod tests {
             // Columns up to 11 in row 24 (X 4.30…4.78), one more to the right per row farther away.
             grid.occupy_row(row, u32::MAX >> (31 - (35 - row).min(24)));
         }
-        let answer = planner.act(&Observation::from(grid)).look_ahead;
+        let answer = planner.act(&Observation { grid }).look_ahead;
         assert!(answer.left_m < -2.0, "{answer:?}");
     }
 
@@ -205,9 +205,9 @@ mod tests {
         for row in 0..25 {
             grid.occupy_row(row, 0x1FF_01FF);
         }
-        let answer = planner.act(&Observation::from(grid)).look_ahead;
+        let answer = planner.act(&Observation { grid }).look_ahead;
         assert!(answer.left_m.abs() < 1e-4 && answer.ahead_m > 9.0, "{answer:?}");
         let grid = grid_with(&[(16, 11), (17, 11)]);
-        assert!(planner.act(&Observation::from(grid)).look_ahead.left_m < -0.5);
+        assert!(planner.act(&Observation { grid }).look_ahead.left_m < -0.5);
     }
 }

@@ -83,7 +83,6 @@ pub(crate) fn novice_decision(prediction: &Prediction, geometry: GridGeometry) -
         look_ahead: prediction.look_ahead(geometry),
         source: Source::Novice,
         spread: Some(prediction.spread(geometry)),
-        speed_limit_mps: None,
     }
 }
 
@@ -101,7 +100,7 @@ mod tests {
         let grid = lots(1)[0];
         let checkpoint = Checkpoint { weights, geometry, inference: InferenceSettings::smoothed() };
         let mut policy = NetPolicy::new(&checkpoint, DeviceChoice::Cpu);
-        let decision = policy.act(&Observation::from(grid));
+        let decision = policy.act(&Observation { grid });
         let prediction = checkpoint.predictor(DeviceChoice::Cpu).predict(&[&grid])[0];
         assert_eq!(decision.source, Source::Novice);
         assert_eq!(decision.look_ahead.to_image_fraction(&geometry).map(round), prediction.clipped_mean().map(round));

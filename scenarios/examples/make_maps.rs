@@ -432,10 +432,10 @@ fn winding_track() -> Drawing {
 
 /// Racks with aisles of 3.8 m; the route leads down one of them and back by the next but one.
 fn warehouse() -> Drawing {
-    let mut shapes = vec![(area(11.0, 4.6, 87.0, 41.4), FREE)];
+    let mut shapes = vec![(area(11.0, 9.0, 87.0, 41.4), FREE)];
     for i in 0..5 {
         let y = 8.6 + 6.6 * i as f32;
-        shapes.push((area(20.0, y, 78.0, y + 2.8), OCCUPIED));
+        shapes.push((area(20.0, y, 76.0, y + 2.8), OCCUPIED));
     }
     // Pallets, and columns before the heads of the racks.
     shapes.push((area(40.0, 8.0, 41.2, 8.8), OCCUPIED));

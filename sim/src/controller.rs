@@ -92,9 +92,10 @@ pub fn pursue(
 ) -> VehicleCommand {
     let steering_rad = steering(settings.pursuit, vehicle, geometry, decision.look_ahead);
     let law = if decision.source == Source::Planner { settings.planner_speed_law } else { settings.speed_law };
-    let speed_mps = speed(law, settings, vehicle, geometry, decision.look_ahead, steering_rad);
-    let limit_mps = decision.speed_limit_mps.unwrap_or(f32::INFINITY).max(0.0);
-    VehicleCommand { steering_rad, speed_mps: speed_mps.min(limit_mps) }
+    VehicleCommand {
+        steering_rad,
+        speed_mps: speed(law, settings, vehicle, geometry, decision.look_ahead, steering_rad),
+    }
 }
 
 /// Road-wheel angle that steers at a point, radians, within the vehicle's limits.

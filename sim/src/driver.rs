@@ -65,15 +65,6 @@ pub struct Decision {
     pub source: Source,
     /// How sure they are, where they say.
     pub spread: Option<Spread>,
-    /// Drive no faster than this, m/s, whatever the speed law says.
-    pub speed_limit_mps: Option<f32>,
-}
-
-impl Decision {
-    /// A point at the speed of the speed law.
-    pub fn at(look_ahead: LookAheadPoint, source: Source) -> Self {
-        Self { look_ahead, source, spread: None, speed_limit_mps: None }
-    }
 }
 
 /// Noise-free surroundings, for the expert, the metrics and the collision check only.

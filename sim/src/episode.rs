@@ -20,7 +20,7 @@ use crate::map::Map;
 use crate::metrics::{EpisodeMetrics, MetricsAccumulator, MetricsSettings, SafeRing};
 use crate::seed::RootSeed;
 use crate::sensing::noise::NoiseSettings;
-use crate::sensing::{Observation, Odometry, SensingSettings, Sensor};
+use crate::sensing::{Observation, SensingSettings, Sensor};
 use crate::vehicle::{self, VehicleCommand, VehicleSettings, VehicleState};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -118,8 +118,6 @@ pub struct Episode {
     /// Nothing is near enough to be met in this tick.
     is_clear: bool,
     observation: Observation,
-    /// Where the last observation was taken.
-    observed_from: Pose,
     was_reset: bool,
     metrics: MetricsAccumulator,
     events: Vec<(u32, Event)>,
@@ -151,7 +149,6 @@ impl Episode {
             touches: false,
             is_clear: false,
             observation: Observation::default(),
-            observed_from: map.start(),
             was_reset: true,
             metrics: MetricsAccumulator::new(map.path().length_m()),
             events: Vec::new(),
@@ -182,13 +179,7 @@ impl Episode {
 
     /// Takes an observation. Call once before each decision.
     pub fn observe(&mut self) {
-        let VehicleState { pose, speed_mps, steering_rad, .. } = self.vehicle;
-        let since_last = if self.was_reset { Pose::default() } else { pose.seen_from(self.observed_from) };
-        self.observed_from = pose;
-        self.observation = Observation {
-            grid: self.sensor.observe(&self.map, pose, self.tick),
-            odometry: Odometry { since_last, speed_mps, steering_rad },
-        };
+        self.observation = self.sensor.observe(&self.map, self.vehicle.pose, self.tick);
     }
 
     /// What the driver is shown.

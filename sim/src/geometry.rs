@@ -44,20 +44,6 @@ impl Pose {
         WorldFromEgo { rotation: Vec2::from_angle(self.heading_rad), translation: self.position() }
     }
 
-    /// This pose in the ego frame of another, both given in one frame.
-    #[must_use]
-    pub fn seen_from(self, other: Self) -> Self {
-        let position = other.world_from_ego().inverse_point(self.position());
-        Self::new(position, wrap_angle(self.heading_rad - other.heading_rad))
-    }
-
-    /// A pose given in the ego frame of this one, in the frame that this one is given in; undoes [`Self::seen_from`].
-    #[must_use]
-    pub fn followed_by(self, in_ego: Self) -> Self {
-        let position = self.world_from_ego().point(in_ego.position());
-        Self::new(position, wrap_angle(self.heading_rad + in_ego.heading_rad))
-    }
-
     /// The pose after `travel_m` along an arc of curvature `curvature_per_m` (exact; negative travel drives back).
     ///
     /// `x += (sin(θ+Δθ) − sin θ)/κ`, `y −= (cos(θ+Δθ) − cos θ)/κ` (docs/methods.md 2.2), written with half angles so

@@ -7,7 +7,7 @@ mod sensor;
 
 pub use sensor::{Inspection, SensingSettings, Sensor};
 
-use crate::geometry::{Pose, Vec2};
+use crate::geometry::Vec2;
 use serde::{Deserialize, Serialize};
 
 /// Cells per side of the grid.
@@ -164,31 +164,10 @@ impl std::fmt::Display for OccupancyGrid {
 }
 
 /// All a policy is shown.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Observation {
     /// The perceived scene.
     pub grid: OccupancyGrid,
-    /// The car's own motion.
-    pub odometry: Odometry,
-}
-
-impl From<OccupancyGrid> for Observation {
-    /// A car at rest.
-    fn from(grid: OccupancyGrid) -> Self {
-        Self { grid, odometry: Odometry::default() }
-    }
-}
-
-/// What the car knows of its own motion from its wheels. Exact: over the few metres that a driver remembers, wheel odometry
-/// errs by centimetres.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Odometry {
-    /// The car in its own frame at the observation before; zero for the first one, and after it was put back on the path.
-    pub since_last: Pose,
-    /// Forward speed, m/s.
-    pub speed_mps: f32,
-    /// Road-wheel angle, radians, positive to the left.
-    pub steering_rad: f32,
 }
 
 /// The bird's-eye view in full resolution, for pictures and calibration: row 0 = far, column 0 = left.

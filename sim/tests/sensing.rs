@@ -60,7 +60,7 @@ fn the_fast_grid_is_the_max_pool_of_the_brute_force_view() {
         for i in 0..120_u32 {
             let pose = Pose::new(Vec2::new(i as f32 * 0.5, (i as f32 * 0.37).sin()), (i as f32 * 0.21).sin() * 0.9);
             let tick = 7 * i;
-            let fast = sensor.observe(map, pose, tick);
+            let fast = sensor.observe(map, pose, tick).grid;
             let brute = sensor.perceived_view(map, pose, tick).to_grid();
             assert_eq!(fast, brute, "{level:?}, seed {seed}, tick {tick}\n{fast}\n{brute}");
         }
@@ -77,7 +77,7 @@ fn the_fast_grid_is_the_max_pool_where_openings_overlap() {
         let mut sensor = Sensor::new(&map, SensingSettings::paper(), &noise, RootSeed(seed));
         for i in 0..120_u32 {
             let pose = Pose::new(Vec2::new(i as f32 * 0.5, (i as f32 * 0.37).sin()), (i as f32 * 0.21).sin() * 0.9);
-            let fast = sensor.observe(&map, pose, i);
+            let fast = sensor.observe(&map, pose, i).grid;
             let brute = sensor.perceived_view(&map, pose, i).to_grid();
             assert_eq!(fast, brute, "seed {seed}, tick {i}\n{fast}\n{brute}");
             let clean = sensor.clean_view(&map, pose).to_grid();
@@ -91,7 +91,7 @@ fn the_fast_grid_is_the_max_pool_where_openings_overlap() {
 fn a_straight_lane_looks_like_one() {
     let scenario = Scenario::lane(-10.0..=90.0, 3.0, 0.0..=60.0);
     let map = Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap();
-    let grid = sensor(&map, NoiseLevel::Clean, 0).observe(&map, Pose::default(), 0);
+    let grid = sensor(&map, NoiseLevel::Clean, 0).observe(&map, Pose::default(), 0).grid;
     // Cells are 0.48 m: |y| ≤ 1.5 m holds the five cells of centre |y| ≤ 0.96 whole, and no more.
     for row in 0..GRID_CELLS {
         for col in 0..GRID_CELLS {
@@ -104,7 +104,7 @@ fn a_straight_lane_looks_like_one() {
 fn a_turned_grid_is_the_view_of_the_turned_car() {
     // The world mirrored about the vehicle axis gives the mirrored grid.
     let map = lane();
-    let grid = sensor(&map, NoiseLevel::Clean, 0).observe(&map, Pose::new(Vec2::new(8.0, 0.0), 0.0), 0);
+    let grid = sensor(&map, NoiseLevel::Clean, 0).observe(&map, Pose::new(Vec2::new(8.0, 0.0), 0.0), 0).grid;
     // The sedan (x 17.65–22.35, y −2.8…−0.97) lies 8.35 m … beyond the patch ahead, on the right: columns > 12.
     let geometry = GridGeometry::paper();
     let row_of = |ahead_m: f32| ((geometry.far_edge_ahead_m() - ahead_m) / geometry.cell_m()) as usize;
@@ -120,7 +120,7 @@ fn things_hide_the_ground_behind_them_only_when_occlusion_is_on() {
     let occupied = |occlusion| {
         let settings = SensingSettings { occlusion, ..SensingSettings::paper() };
         let mut sensor = Sensor::new(&map, settings, &NoiseSettings::of(NoiseLevel::Clean), RootSeed(0));
-        sensor.observe(&map, Pose::new(Vec2::new(10.0, 0.0), 0.0), 0).count_occupied()
+        sensor.observe(&map, Pose::new(Vec2::new(10.0, 0.0), 0.0), 0).grid.count_occupied()
     };
     assert!(occupied(true) > occupied(false));
 }
@@ -295,7 +295,7 @@ fn an_inspection_explains_every_wrong_pixel_and_cell() {
         let pose = Pose::new(Vec2::new(0.7 * tick as f32, 0.2), (0.3 * tick as f32).sin() * 0.4);
         let shown = sensor.observe(&map, pose, tick);
         let inspection = sensor.inspect(&map, pose, tick, &shown);
-        assert_eq!(inspection.shown_grid, shown);
+        assert_eq!(inspection.shown_grid, shown.grid);
         for i in 0..BEV_PIXELS * BEV_PIXELS {
             let (row, col) = (i / BEV_PIXELS, i % BEV_PIXELS);
             let is_wrong = inspection.perceived.is_occupied(row, col) != inspection.clean.is_occupied(row, col);

@@ -39,7 +39,7 @@ impl Sensors {
 
     /// Shows the views of a tick: the clean view, the perceived one, and the grid that the driver was given.
     pub(crate) fn show(&self, map: &Map, frame: &Frame, recording: &Recording) {
-        let seen = self.sensor.inspect(map, frame.vehicle.pose, frame.tick, &frame.observation.grid);
+        let seen = self.sensor.inspect(map, frame.vehicle.pose, frame.tick, &frame.observation);
         let clean = picture(BEV_PIXELS, |row, col| (seen.clean.is_occupied(row, col), None));
         let noisy = picture(BEV_PIXELS, |row, col| (seen.perceived.is_occupied(row, col), seen.pixel(row, col)));
         let grid = picture(GRID_CELLS, |row, col| (seen.shown_grid.is_occupied(row, col), seen.cell(row, col)));

@@ -54,6 +54,7 @@ fn default() -> Settings {
     let base = paper();
     Settings {
         training: TrainingSettings { lots, trials: 8, ..base.training },
+        evaluation: EvaluationSettings { elsewhere: vec!["validation:4:all".to_owned()], ..base.evaluation },
         dagger: DaggerSettings::quick(),
         ..base
     }
@@ -73,6 +74,7 @@ fn paper() -> Settings {
         evaluation: EvaluationSettings {
             seed: RootSeed(1),
             lots: names(&["lot-a", "lot-b", "lot-c"]),
+            elsewhere: Vec::new(),
             directions: Direction::BOTH.to_vec(),
             trials: 5,
             noise: vec![NoiseChoice::Paper],
@@ -98,6 +100,7 @@ fn smoke() -> Settings {
         evaluation: EvaluationSettings {
             directions: vec![Direction::Forward],
             lots: vec!["lot-b".to_owned()],
+            elsewhere: vec!["validation:1:lane".to_owned()],
             trials: 1,
             ..base.evaluation
         },

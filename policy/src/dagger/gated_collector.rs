@@ -71,8 +71,10 @@ impl CollectorSeat {
     fn keep(&mut self, sample: Sample, truth: &GroundTruth<'_>) {
         self.kept.samples.push(sample);
         self.kept.ticks.push(self.ticks);
-        let grids =
-            self.augmenting_sensors.iter_mut().map(|sensor| sensor.observe(truth.map, truth.vehicle.pose, self.ticks));
+        let grids = self
+            .augmenting_sensors
+            .iter_mut()
+            .map(|sensor| sensor.observe(truth.map, truth.vehicle.pose, self.ticks).grid);
         self.kept.noise_augmentations.extend(grids);
     }
 }

@@ -31,7 +31,7 @@ impl Driver for RouteFollower {
         let goal = truth.map.path().pose_at(truth.progress_m + 10.0).position();
         let in_ego = truth.vehicle.pose.world_from_ego().inverse_point(goal);
         let look_ahead = LookAheadPoint { ahead_m: in_ego.x.clamp(4.4, 16.0), left_m: in_ego.y.clamp(-6.0, 6.0) };
-        Decision::at(look_ahead, Source::Expert)
+        Decision { look_ahead, source: Source::Expert, spread: None }
     }
 }
 

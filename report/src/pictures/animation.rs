@@ -126,7 +126,7 @@ impl Scene {
         let period_s = episode.control_period_s();
         let shown = |take: &Take, time_s: f32| {
             let frame = &take.frames[index_at(take, time_s, period_s)];
-            let inspection = sensor.inspect(&replay.map, frame.vehicle.pose, frame.tick, &frame.observation.grid);
+            let inspection = sensor.inspect(&replay.map, frame.vehicle.pose, frame.tick, &frame.observation);
             let grid = &inspection.shown_grid;
             let cells = || (0..GRID_CELLS * GRID_CELLS).map(|i| (i / GRID_CELLS, i % GRID_CELLS));
             let wrong = |(row, col)| inspection.cell(row, col).map(|layer| (row, col, layer));

@@ -10,7 +10,7 @@ use openings::Openings;
 use super::noise::{BoundaryShift, NoiseField, NoiseSettings, Patch, Reads, Region, Shadow, wobble_growth};
 use super::occlusion::{Camera, CellBox, ConvexInEgo, TallObject};
 use super::quadtree::{BLOCK_CELLS, BLOCKS, PixelLattice, pixels_of, to_corner_m};
-use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid};
+use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
 use crate::distance_field::{DistanceField, change_max_m};
 use crate::geometry::{Pose, Vec2, WorldFromEgo, bits};
 use crate::map::{Map, Occluder};
@@ -49,7 +49,7 @@ pub struct Sensor {
     shift: BoundaryShift,
     /// How much larger the wobble is in each row of cells than at the patch's lower edge.
     wobble_growth: [f32; GRID_CELLS],
-    last: Option<OccupancyGrid>,
+    last: Option<Observation>,
     undecided: Undecided,
 }
 
@@ -71,13 +71,13 @@ impl Sensor {
     }
 
     /// What the car perceives from a pose at a tick.
-    pub fn observe(&mut self, map: &Map, pose: Pose, tick: u32) -> OccupancyGrid {
-        let grid = match self.last {
+    pub fn observe(&mut self, map: &Map, pose: Pose, tick: u32) -> Observation {
+        let observation = match self.last {
             Some(last) if self.noise.drops_frame(tick) => last,
-            _ => self.perceive_grid(map, pose, tick),
+            _ => Observation { grid: self.perceive_grid(map, pose, tick) },
         };
-        self.last = Some(grid);
-        grid
+        self.last = Some(observation);
+        observation
     }
 
     /// The perceived grid, without ever computing all 40 000 pixels.

@@ -4,7 +4,7 @@ use super::{EgoView, Sensor};
 use crate::geometry::Pose;
 use crate::map::Map;
 use crate::sensing::noise::{Layer, Reads};
-use crate::sensing::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, OccupancyGrid};
+use crate::sensing::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, Observation, OccupancyGrid};
 
 /// One observation, explained pixel by pixel and cell by cell: row 0 = far, column 0 = left.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -61,7 +61,7 @@ impl Sensor {
     /// same seed explains it, also later. Takes some milliseconds.
     ///
     /// Ground hidden behind tall objects is no error: it is occupied in the clean view too.
-    pub fn inspect(&self, map: &Map, pose: Pose, tick: u32, shown: &OccupancyGrid) -> Inspection {
+    pub fn inspect(&self, map: &Map, pose: Pose, tick: u32, shown: &Observation) -> Inspection {
         let (clean, perceived) = (self.clean_view(map, pose), self.perceived_view(map, pose, tick));
         let claims = self.claims(pose, tick);
         let pixel = |i: usize| {
@@ -75,11 +75,11 @@ impl Sensor {
             pixels: (0..BEV_PIXELS * BEV_PIXELS).map(pixel).collect(),
             cells: Vec::new(),
             clean_grid: clean.to_grid(),
-            shown_grid: *shown,
+            shown_grid: shown.grid,
             clean,
             perceived,
         };
-        let is_dropped = self.noise.drops_frame(tick) && inspection.perceived.to_grid() != *shown;
+        let is_dropped = self.noise.drops_frame(tick) && inspection.perceived.to_grid() != shown.grid;
         let cell = |i: usize| {
             let (row, col) = (i / GRID_CELLS, i % GRID_CELLS);
             let is_wrong = inspection.shown_grid.is_occupied(row, col) != inspection.clean_grid.is_occupied(row, col);
