@@ -44,17 +44,18 @@ const END_CLEAR_M: f32 = 9.0;
 
 /// Draws a lot without a name; `None` if the draw came to nothing.
 pub(crate) fn draw(family: Family, layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
-    match family {
-        Family::Easy => Some(corridor::draw(&DifficultySettings::easy(), layout, obstacles)),
-        Family::Medium => Some(corridor::draw(&DifficultySettings::medium(), layout, obstacles)),
-        Family::Hard => Some(corridor::draw(&DifficultySettings::hard(), layout, obstacles)),
+    let on_strip = match family {
+        Family::Easy => return Some(corridor::draw(&DifficultySettings::easy(), layout, obstacles)),
+        Family::Medium => return Some(corridor::draw(&DifficultySettings::medium(), layout, obstacles)),
+        Family::Hard => return Some(corridor::draw(&DifficultySettings::hard(), layout, obstacles)),
         Family::Lane => lane::draw(layout, obstacles),
         Family::Rooms => rooms::draw(layout, obstacles),
         Family::Street => street::draw(layout, obstacles),
         Family::Aisles => aisles::draw(layout, obstacles),
         Family::Track => track::draw(layout, obstacles),
         Family::Open => open::draw(layout, obstacles),
-    }
+    };
+    on_strip.map(|(scenario, _)| scenario)
 }
 
 /// Clearance around the body that lots of a family leave, metres.
@@ -106,5 +107,124 @@ fn lot(strip: &Strip, boundary: Vec<sim::geometry::Vec2>, things: Things<'_>) ->
         islands: Vec::new(),
         obstacles: things.obstacles,
         speed_bumps: Vec::new(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::split::Split;
+    use sim::geometry::{Vec2, polygon_contains};
+    use sim::map::Map;
+    use sim::seed::Stream;
+    use sim::vehicle::VehicleSettings;
+    use std::collections::BTreeSet;
+
+    type Draw = fn(&mut Rng, &mut Rng) -> Option<(Scenario, Strip)>;
+    const DRAWS: [(Family, Draw); 6] = [
+        (Family::Lane, lane::draw),
+        (Family::Rooms, rooms::draw),
+        (Family::Street, street::draw),
+        (Family::Aisles, aisles::draw),
+        (Family::Track, track::draw),
+        (Family::Open, open::draw),
+    ];
+
+    /// A car that does not know the route must not find another way. Ground that a disc a little wider than the car can
+    /// get to is flooded: it ends at the edges of the strip and before what closes side roads.
+    #[test]
+    fn only_one_way_is_open() {
+        for (family, draw) in DRAWS {
+            for index in 0..10 {
+                let seed = Split::Test.seed(family, index);
+                let drawn = draw(&mut seed.rng(Stream::Layout, 0), &mut seed.rng(Stream::Obstacles, 0));
+                let Some((scenario, strip)) = drawn else { continue };
+                let scenario = Scenario { name: family.name().to_owned(), ..scenario };
+                let outline = strip.outline(0.0);
+                let is_closed = |&(_, depth_m): &(Mouth, f32)| depth_m >= 3.0;
+                let mouths: Vec<_> =
+                    strip.stub_mouths().into_iter().filter(is_closed).map(|(mouth, _)| mouth).collect();
+                let Ok(map) = Map::build(scenario, &VehicleSettings::hyundai_hg300()) else { continue };
+                let reached = flooded(&map);
+                if family != Family::Track {
+                    let stray = reached.iter().find(|&&cell| !polygon_contains(&outline, place(cell)));
+                    assert!(stray.is_none(), "{family:?} {index}: a way out at {:?}", stray.map(|&cell| place(cell)));
+                }
+                for (a, b) in mouths {
+                    let aside = (b - a).normalize().perp() * 1.6;
+                    let is_reached = |at: Vec2| reached.contains(&((at / CELL_M).round().as_ivec2().into()));
+                    let [one, other] = [0.5 * (a + b) + aside, 0.5 * (a + b) - aside];
+                    assert!(
+                        !is_reached(one) || !is_reached(other),
+                        "{family:?} {index}: the way at {a} to {b} is open"
+                    );
+                }
+            }
+        }
+    }
+
+    /// Families are what the docs say (docs/maps.md).
+    #[test]
+    fn families_are_varied() {
+        let lots = |family: Family| {
+            let draw = DRAWS.iter().find(|(other, _)| *other == family).expect("a family on strips").1;
+            let drawn = move |index| {
+                let seed = Split::Train.seed(family, index);
+                draw(&mut seed.rng(Stream::Layout, 0), &mut seed.rng(Stream::Obstacles, 0))
+            };
+            (0..60).filter_map(drawn).collect::<Vec<_>>()
+        };
+        let share = |lots: &[(Scenario, Strip)], is: &dyn Fn(&Scenario, &Strip) -> bool| {
+            lots.iter().filter(|(scenario, strip)| is(scenario, strip)).count() as f32 / lots.len() as f32
+        };
+        let has = |scenario: &Scenario, class| scenario.obstacles.iter().any(|obstacle| obstacle.class == class);
+        let is_walled = |scenario: &Scenario, heights_m: std::ops::RangeInclusive<f32>| {
+            let is_such = |wall: &&sim::scenario::Obstacle| {
+                wall.class == ObstacleClass::Wall && heights_m.contains(&wall.size_m()[2])
+            };
+            scenario.obstacles.iter().filter(is_such).count() > 20
+        };
+        // Family, what, share of its lots: at least and at most.
+        let all: [(Family, &str, &dyn Fn(&Scenario, &Strip) -> bool, f32, f32); 14] = [
+            (Family::Lane, "narrower than 3.8 m", &|_, strip| strip.half_width_m(0.0) < 1.9, 0.35, 0.65),
+            (Family::Lane, "narrower than 3.0 m", &|_, strip| strip.half_width_m(0.0) < 1.5, 0.03, 0.3),
+            (Family::Lane, "wider than 6 m", &|_, strip| strip.half_width_m(0.0) > 3.0, 0.05, 0.4),
+            (Family::Lane, "behind walls", &|lot, _| is_walled(lot, 0.3..=3.0), 0.2, 0.6),
+            (Family::Rooms, "between tall walls", &|lot, _| is_walled(lot, 3.0..=3.0), 0.5, 0.8),
+            (Family::Rooms, "between low walls", &|lot, _| is_walled(lot, 0.3..=1.0), 0.2, 0.5),
+            (Family::Rooms, "with pillars", &|lot, _| has(lot, ObstacleClass::Pillar), 0.2, 0.9),
+            (Family::Street, "with kerbs", &|lot, _| has(lot, ObstacleClass::Curb), 1.0, 1.0),
+            (Family::Street, "with parked cars", &|lot, _| has(lot, ObstacleClass::Sedan), 0.9, 1.0),
+            (Family::Aisles, "with rows of stalls", &|_, strip| strip.notches.len() > 3, 0.9, 1.0),
+            (Family::Aisles, "with more than two aisles", &|_, strip| strip.straights().len() > 3, 0.2, 0.9),
+            (Family::Track, "around an island", &|lot, _| !lot.islands.is_empty(), 0.3, 0.7),
+            (Family::Track, "between walls", &|lot, _| is_walled(lot, 0.3..=3.0), 0.3, 0.7),
+            (Family::Open, "with planters", &|lot, _| lot.islands.len() > 3, 0.6, 1.0),
+        ];
+        for (family, what, is, least, most) in all {
+            let share = share(&lots(family), is);
+            assert!((least..=most).contains(&share), "{family:?} {what}: {share}");
+        }
+    }
+
+    const CELL_M: f32 = 0.25;
+
+    fn place((x, y): (i32, i32)) -> Vec2 {
+        Vec2::new(x as f32, y as f32) * CELL_M
+    }
+
+    /// Cells of the ground around the start that are joined to it by a passage of 2.1 m.
+    fn flooded(map: &Map) -> BTreeSet<(i32, i32)> {
+        let start: (i32, i32) = (map.start().position() / CELL_M).round().as_ivec2().into();
+        let mut reached = BTreeSet::from([start]);
+        let mut open = vec![start];
+        while let Some((x, y)) = open.pop() {
+            for next in [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)] {
+                if map.signed_distance_m(place(next)) > 1.05 && reached.insert(next) {
+                    open.push(next);
+                }
+            }
+        }
+        reached
     }
 }

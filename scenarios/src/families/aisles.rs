@@ -29,7 +29,7 @@ const DEAD_END_M: Range<f32> = 5.0..10.0;
 /// The centre line at most, run-outs included, metres.
 const LENGTH_MAX_M: f32 = 225.0;
 
-pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
+pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
     let stall_m = layout.random_range(STALL_WIDTH_M);
     let mut strip = first_apart(layout, 0.2, course)?;
     let (rows, side_aisles) = rows(&strip, stall_m, layout);
@@ -38,7 +38,11 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
         return None;
     }
     let mut things = things_on(&strip);
-    let mouths: Vec<_> = side_aisles.iter().map(|aisle| strip.mouth(aisle)).chain(strip.stub_mouths()).collect();
+    let mouths: Vec<_> = side_aisles
+        .iter()
+        .map(|aisle| strip.mouth(aisle))
+        .chain(strip.stub_mouths().into_iter().map(|(mouth, _)| mouth))
+        .collect();
     for mouth in mouths {
         close(&mut things, mouth, obstacles);
     }
@@ -48,7 +52,7 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
     }
     in_the_aisle(&mut things, &strip, obstacles);
     let boundary = enclose(&mut things, strip.outline(0.0), layout);
-    Some(lot(&strip, boundary, things))
+    Some((lot(&strip, boundary, things), strip))
 }
 
 /// The ground beside is solid, or lies behind a kerb or a low wall.

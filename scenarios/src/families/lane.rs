@@ -1,6 +1,7 @@
 //! Lanes of one width all along: bends that are not widened, S-curves, chicanes, offset gaps beside double-parked cars.
 
 use super::course::{Course, first_apart};
+use super::strip::Strip;
 use super::things::{Rules, Things, facing, side, yaw_rad};
 use super::walls::{self, Wall};
 use super::{RUN_OUT_M, lot, things_on};
@@ -10,8 +11,9 @@ use sim::scenario::{ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::ops::Range;
 
-/// Half of the lanes are narrower than the middle of these, metres.
+/// Half of all lanes are as narrow as this, metres.
 const NARROW_M: Range<f32> = 2.8..3.8;
+/// Of most others, metres.
 const WIDE_M: Range<f32> = 3.8..8.0;
 /// Of the centre line, metres.
 const RADIUS_M: Range<f32> = 8.0..30.0;
@@ -30,7 +32,7 @@ enum Obstruction {
     DoubleParked,
 }
 
-pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
+pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
     let obstruction = match obstacles.random_range(0..100) {
         0..50 => Obstruction::Nothing,
         50..75 => Obstruction::Small,
@@ -40,7 +42,7 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
     let width_m = match obstruction {
         // The car takes the rest.
         Obstruction::DoubleParked => gap_m + layout.random_range(1.9..2.3),
-        _ if layout.random_bool(0.55) => layout.random_range(NARROW_M),
+        _ if layout.random_bool(0.67) => layout.random_range(NARROW_M),
         _ => layout.random_range(WIDE_M),
     };
     let strip = first_apart(layout, 1.0, |rng| course(width_m, rng))?;
@@ -52,7 +54,7 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
     }
     let outline = strip.outline(0.0);
     let boundary = enclose(&mut things, outline, layout);
-    Some(lot(&strip, boundary, things))
+    Some((lot(&strip, boundary, things), strip))
 }
 
 /// Solid ground beside the lane, or a wall or a kerb with free ground behind.

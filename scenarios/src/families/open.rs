@@ -38,6 +38,36 @@ enum Kind {
     Cone,
 }
 
+/// One of them.
+#[derive(Clone, Copy)]
+struct Item {
+    kind: Kind,
+    class: ObstacleClass,
+    /// Along the edge, metres.
+    length_m: f32,
+    /// Away from it, metres.
+    depth_m: f32,
+}
+
+impl Item {
+    fn draw(kind: Kind, rng: &mut Rng) -> Self {
+        let class = match kind {
+            Kind::ParkedAlong | Kind::ParkedAcross => draw_car(rng),
+            Kind::Planter | Kind::Wall => ObstacleClass::Wall,
+            Kind::Pillar => ObstacleClass::Pillar,
+            Kind::Cone => ObstacleClass::Cone,
+        };
+        let [class_length_m, class_width_m, _] = class.default_size_m();
+        let (length_m, depth_m) = match kind {
+            Kind::ParkedAcross => (class_width_m, class_length_m),
+            Kind::Planter => (rng.random_range(1.0..6.0), rng.random_range(0.8..2.5)),
+            Kind::Wall => (rng.random_range(2.0..9.0), class_width_m),
+            Kind::ParkedAlong | Kind::Pillar | Kind::Cone => (class_length_m, class_width_m),
+        };
+        Self { kind, class, length_m, depth_m }
+    }
+}
+
 /// An area beside the way, in which planters are raised.
 struct Ground<'a> {
     things: Things<'a>,
@@ -45,7 +75,7 @@ struct Ground<'a> {
     wall: Wall,
 }
 
-pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
+pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
     let strip = first_apart(layout, 3.0, course)?;
     let outline = strip.outline(0.0);
     let boundary = yard(&outline, AROUND_M, layout);
@@ -57,7 +87,7 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
     on_the_way(&mut ground.things, &strip, obstacles);
     ground.scatter(&outline, &boundary, obstacles);
     let Ground { things, planters, .. } = ground;
-    Some(Scenario { islands: planters, ..lot(&strip, boundary, things) })
+    Some((Scenario { islands: planters, ..lot(&strip, boundary, things) }, strip))
 }
 
 fn course(rng: &mut Rng) -> Course {
@@ -126,58 +156,40 @@ impl Ground<'_> {
         let length_m: f32 = stretch.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
         let mut at_m = rng.random_range(0.0..0.5);
         while length_m - at_m > 0.5 {
-            let mut kind = palette[rng.random_range(0..palette.len())];
-            let mut size_m = self.size_m(kind, rng);
-            if size_m[0] > length_m - at_m {
-                kind = Wall;
-                size_m = [length_m - at_m, 0.2];
+            let mut item = Item::draw(palette[rng.random_range(0..palette.len())], rng);
+            if item.length_m > length_m - at_m {
+                item = Item { length_m: length_m - at_m, ..Item::draw(Wall, rng) };
             }
-            let (a, b) = (point_at(stretch, at_m), point_at(stretch, at_m + size_m[0]));
+            let (a, b) = (point_at(stretch, at_m), point_at(stretch, at_m + item.length_m));
             let set_back_m = rng.random_range(0.0..SET_BACK_M);
-            if !self.put(kind, a, b, size_m, set_back_m, rng) {
+            if !self.put(&item, a, b, set_back_m, rng) {
                 // Something else stands there; a wall closes what it leaves.
                 let walls = self.wall.straight(a, b);
                 self.things.obstacles.extend(walls);
             }
-            at_m += size_m[0] + rng.random_range(GAP_M);
-        }
-    }
-
-    /// Length along the edge and depth, metres.
-    fn size_m(&self, kind: Kind, rng: &mut Rng) -> [f32; 2] {
-        match kind {
-            Kind::ParkedAlong => [4.9, 1.9],
-            Kind::ParkedAcross => [2.0, 4.9],
-            Kind::Planter => [rng.random_range(1.0..6.0), rng.random_range(0.8..2.5)],
-            Kind::Wall => [rng.random_range(2.0..9.0), 0.2],
-            Kind::Pillar => [0.7, 0.7],
-            Kind::Cone => [0.4, 0.4],
+            at_m += item.length_m + rng.random_range(GAP_M);
         }
     }
 
     /// Puts a thing outside of the edge from `a` to `b`; whether there was room.
-    fn put(&mut self, kind: Kind, a: Vec2, b: Vec2, size_m: [f32; 2], set_back_m: f32, rng: &mut Rng) -> bool {
+    fn put(&mut self, item: &Item, a: Vec2, b: Vec2, set_back_m: f32, rng: &mut Rng) -> bool {
         let along = (b - a).normalize();
-        let centre = 0.5 * (a + b) - along.perp() * (set_back_m + 0.5 * size_m[1]);
+        let centre = 0.5 * (a + b) - along.perp() * (set_back_m + 0.5 * item.depth_m);
         let heading_rad = along.to_angle();
-        let across_rad = heading_rad + std::f32::consts::FRAC_PI_2;
-        match kind {
-            Kind::ParkedAlong => {
-                let heading_rad = heading_rad + yaw_rad(rng, 2.0) + facing(rng);
-                self.things.stand(things::obstacle(draw_car(rng), centre, heading_rad))
+        match item.kind {
+            Kind::ParkedAlong | Kind::ParkedAcross => {
+                let is_across = matches!(item.kind, Kind::ParkedAcross);
+                let across_rad = if is_across { std::f32::consts::FRAC_PI_2 } else { 0.0 };
+                let heading_rad = heading_rad + across_rad + yaw_rad(rng, 2.0) + facing(rng);
+                self.things.stand(things::obstacle(item.class, centre, heading_rad))
             }
-            Kind::ParkedAcross => {
-                let heading_rad = across_rad + yaw_rad(rng, 3.0) + facing(rng);
-                self.things.stand(things::obstacle(draw_car(rng), centre, heading_rad))
-            }
-            Kind::Planter => self.plant(Pose::new(centre, heading_rad), size_m, rng),
+            Kind::Planter => self.plant(Pose::new(centre, heading_rad), [item.length_m, item.depth_m], rng),
             Kind::Wall => {
                 let outward = -along.perp() * set_back_m;
                 let walls = self.wall.straight(a + outward, b + outward);
                 walls.into_iter().all(|wall| self.things.stand(wall))
             }
-            Kind::Pillar => self.things.stand(things::obstacle(ObstacleClass::Pillar, centre, heading_rad)),
-            Kind::Cone => self.things.stand(things::obstacle(ObstacleClass::Cone, centre, 0.0)),
+            Kind::Pillar | Kind::Cone => self.things.stand(things::obstacle(item.class, centre, heading_rad)),
         }
     }
 
@@ -204,22 +216,19 @@ impl Ground<'_> {
         let area_m2 = (high - low).element_product();
         for _ in 0..(area_m2 / rng.random_range(100.0..400.0)) as usize {
             let kind = [ParkedAlong, ParkedAcross, Planter, Wall, Pillar, Cone][rng.random_range(0..6)];
-            let size_m = self.size_m(kind, rng);
+            let item = Item::draw(kind, rng);
             let at = Vec2::new(rng.random_range(low.x..high.x), rng.random_range(low.y..high.y));
             let along = Vec2::from_angle(rng.random_range(-std::f32::consts::PI..std::f32::consts::PI));
-            let (a, b) = (at - 0.5 * size_m[0] * along, at + 0.5 * size_m[0] * along);
+            let (a, b) = (at - 0.5 * item.length_m * along, at + 0.5 * item.length_m * along);
             // A little larger than the thing.
-            let reach = rectangle(
-                Pose::new(at - along.perp() * 0.5 * size_m[1], along.to_angle()),
-                size_m[0] + 1.0,
-                size_m[1] + 1.0,
-            );
+            let centre = at - along.perp() * 0.5 * item.depth_m;
+            let reach = rectangle(Pose::new(centre, along.to_angle()), item.length_m + 1.0, item.depth_m + 1.0);
             let is_on_way = edges(outline)
                 .any(|(c, d)| edges(&reach).any(|(e, f)| crate::corridor::segments_cross(c, d, e, f)))
                 || polygon_contains(outline, at);
             let is_inside = reach.iter().all(|&corner| polygon_contains(boundary, corner));
             if is_inside && !is_on_way {
-                self.put(kind, a, b, size_m, 0.0, rng);
+                self.put(&item, a, b, 0.0, rng);
             }
         }
     }

@@ -2,7 +2,7 @@
 //! the car, pillars, dead ends beside the way.
 
 use super::course::{Course, first_apart};
-use super::strip::{Notch, Strip, Stub};
+use super::strip::{Mouth, Notch, Strip, Stub};
 use super::things::{Rules, Things, side};
 use super::walls::{Opening, Wall, yard};
 use super::{RUN_OUT_M, lot, things_on};
@@ -17,21 +17,25 @@ use std::ops::Range;
 const LENGTH_M: Range<f32> = 90.0..180.0;
 const LEG_M: Range<f32> = 14.0..45.0;
 const WIDTH_M: Range<f32> = 3.2..6.5;
-/// What a sharp corner between two corridors needs, each the mean of both, metres (docs/methods.md 11); narrower ones have
-/// their inner corner cut off.
-const SHARP_CORNER_M: f32 = 5.2;
+/// What is comfortable at a sharp corner between two corridors, metres (docs/methods.md 11 has the least); narrower ones
+/// have their inner corner cut off.
+const SHARP_CORNER_M: f32 = 5.8;
 /// The car is 1.86 m wide.
 const DOOR_M: Range<f32> = 0.8..1.6;
 const NICHE_WIDTH_M: Range<f32> = 0.8..1.7;
 const NICHE_DEPTH_M: Range<f32> = 0.4..2.5;
 /// A car may look into a dead end, but not go far.
 const DEAD_END_M: Range<f32> = 1.5..4.5;
+/// At a corner a driver might take one for the way.
+const CORNER_RECESS_M: Range<f32> = 0.5..1.8;
+/// Corridors that go on behind a wall with a door.
+const BEHIND_DOOR_M: Range<f32> = 3.0..10.0;
 /// Between doors, niches and corners, metres.
 const SPACING_M: Range<f32> = 4.0..14.0;
 /// Rooms around the corridor are this deep, metres.
 const ROOM_M: Range<f32> = 4.0..10.0;
 
-pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
+pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
     let mut strip = first_apart(layout, 1.5, course)?;
     let doors = cut_walls(&mut strip, layout);
     let outline = strip.outline(0.0);
@@ -39,10 +43,13 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
     let boundary = yard(&outline, ROOM_M, layout);
     let mut walls = wall.around(&outline, &doors);
     walls.extend(partitions(&outline, &boundary, &wall, layout));
+    for (mouth, _) in strip.stub_mouths().into_iter().filter(|(_, depth_m)| *depth_m >= BEHIND_DOOR_M.start) {
+        walls.extend(wall_with_door(mouth, &wall, layout));
+    }
     let mut things = things_on(&strip);
     pillars(&mut things, &strip, obstacles);
     things.obstacles.extend(walls);
-    Some(lot(&strip, boundary, things))
+    Some((lot(&strip, boundary, things), strip))
 }
 
 fn course(rng: &mut Rng) -> Course {
@@ -53,14 +60,16 @@ fn course(rng: &mut Rng) -> Course {
         let before_m = course.width_m();
         let after_m = if rng.random_bool(0.5) { before_m } else { rng.random_range(WIDTH_M) };
         let turn_rad = course.turn_rad(rng, 90.0..90.1, 100.0).signum() * std::f32::consts::FRAC_PI_2;
-        let lacking_m = (SHARP_CORNER_M - 0.5 * (before_m + after_m)).max(0.0);
-        let depth_m = rng.random_range(DEAD_END_M);
+        // The narrower one counts more.
+        let lacking_m = (SHARP_CORNER_M - 0.65 * before_m.min(after_m) - 0.35 * before_m.max(after_m)).max(0.0);
+        let is_recess = rng.random_bool(0.4);
+        let depth_m = rng.random_range(if is_recess { CORNER_RECESS_M } else { BEHIND_DOOR_M });
         let stub = match rng.random_range(0..10) {
-            0..2 => Some(Stub::Ahead(depth_m)),
-            2..4 => Some(Stub::Behind(depth_m)),
+            0..3 => Some(Stub::Ahead(depth_m)),
+            3..6 => Some(Stub::Behind(depth_m)),
             _ => None,
         };
-        course.corner(turn_rad, lacking_m * rng.random_range(1.2..1.8), stub);
+        course.corner(turn_rad, lacking_m * rng.random_range(1.3..1.8), stub);
         course.widen(after_m);
         course.straight(rng.random_range(LEG_M));
     }
@@ -96,6 +105,16 @@ fn cut_walls(strip: &mut Strip, rng: &mut Rng) -> Vec<Opening> {
     }
     strip.notches = notches;
     doors
+}
+
+/// Across a mouth.
+fn wall_with_door((a, b): Mouth, wall: &Wall, rng: &mut Rng) -> Vec<Obstacle> {
+    let half_door_m = 0.5 * rng.random_range(DOOR_M);
+    let along = (b - a).normalize();
+    let door = a.lerp(b, rng.random_range(0.35..0.65));
+    let mut walls = wall.straight(a, door - along * half_door_m);
+    walls.extend(wall.straight(door + along * half_door_m, b));
+    walls
 }
 
 /// Walls between the rooms beside the corridor, from its walls to the next wall.

@@ -28,7 +28,7 @@ const SIDE_ROAD_WIDTH_M: Range<f32> = 4.0..6.0;
 const SIDE_ROAD_DEPTH_M: Range<f32> = 6.0..12.0;
 const PAVEMENT_M: Range<f32> = 1.5..3.5;
 
-pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
+pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
     let pavement_m = layout.random_range(PAVEMENT_M);
     let mut strip = first_apart(layout, pavement_m, course)?;
     strip.notches = side_roads(&strip, pavement_m, layout);
@@ -36,14 +36,19 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
         strip.notches.clear();
     }
     let mut things = things_on(&strip);
-    let mouths: Vec<_> = strip.notches.iter().map(|notch| strip.mouth(notch)).chain(strip.stub_mouths()).collect();
+    let mouths: Vec<_> = strip
+        .notches
+        .iter()
+        .map(|notch| strip.mouth(notch))
+        .chain(strip.stub_mouths().into_iter().map(|(mouth, _)| mouth))
+        .collect();
     for mouth in mouths {
         close(&mut things, mouth, obstacles);
     }
     parked_cars(&mut things, &strip, obstacles);
     on_the_pavement(&mut things, &strip, pavement_m, obstacles);
     things.obstacles.extend(Wall::kerb().around(&strip.outline(0.0), &[]));
-    Some(lot(&strip, strip.outline(pavement_m), things))
+    Some((lot(&strip, strip.outline(pavement_m), things), strip))
 }
 
 fn course(rng: &mut Rng) -> Course {

@@ -303,20 +303,20 @@ impl Strip {
         (self.point(notch.from_m, d_m), self.point(notch.to_m, d_m))
     }
 
-    /// Mouths of the stubs.
-    pub(super) fn stub_mouths(&self) -> Vec<Mouth> {
+    /// Mouths of the stubs, and how deep they are, metres.
+    pub(super) fn stub_mouths(&self) -> Vec<(Mouth, f32)> {
         let pairs = self.legs.iter().zip(self.legs.iter().skip(1));
         let mouth = |(leg, next): (&Leg, &Leg)| {
             let corner = leg.corner_after?;
             let (half_m, next_half_m) = (leg.half_width_m, next.half_width_m);
             let d_m = corner.outer_side().sign() * half_m;
-            let ends = match corner.stub? {
-                Stub::Ahead(_) => [(next_half_m, -half_m), (next_half_m, half_m)],
-                Stub::Behind(_) => [(-next_half_m, d_m), (next_half_m, d_m)],
+            let (depth_m, ends) = match corner.stub? {
+                Stub::Ahead(depth_m) => (depth_m, [(next_half_m, -half_m), (next_half_m, half_m)]),
+                Stub::Behind(depth_m) => (depth_m, [(-next_half_m, d_m), (next_half_m, d_m)]),
             };
             let frame = leg.start.world_from_ego();
             let [a, b] = ends.map(|(x_m, y_m)| frame.point(Vec2::new(leg.length_m + x_m, y_m)));
-            Some((a, b))
+            Some(((a, b), depth_m))
         };
         pairs.filter_map(mouth).collect()
     }
@@ -359,4 +359,95 @@ pub(super) fn is_simple(polygon: &[Vec2]) -> bool {
             is_apart || !segments_cross(a, b, c, d)
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::FRAC_PI_2;
+
+    fn straight(length_m: f32, width_m: f32) -> Piece {
+        Piece::Straight { length_m, width_m }
+    }
+
+    fn corner(chamfer_m: f32, stub: Option<Stub>) -> Piece {
+        Piece::Corner(Corner { turn_rad: FRAC_PI_2, chamfer_m, stub })
+    }
+
+    fn strip(pieces: &[Piece]) -> Strip {
+        Strip::new(Pose::default(), pieces).expect("long enough for its corners")
+    }
+
+    fn outline(pieces: &[Piece]) -> Vec<(f32, f32)> {
+        strip(pieces).outline(0.0).into_iter().map(|p| (p.x, p.y)).collect()
+    }
+
+    /// An L to the left of a 4 m and a 6 m corridor, in closed form.
+    #[test]
+    fn corridors_of_different_widths_meet_in_a_corner() {
+        let ell = [(0.0, -2.0), (23.0, -2.0), (23.0, 20.0), (17.0, 20.0), (17.0, 2.0), (0.0, 2.0)];
+        assert_eq!(outline(&[straight(20.0, 4.0), corner(0.0, None), straight(20.0, 6.0)]), ell);
+        let cut = [(0.0, -2.0), (23.0, -2.0), (23.0, 20.0), (17.0, 20.0), (17.0, 3.0), (16.0, 2.0), (0.0, 2.0)];
+        assert_eq!(outline(&[straight(20.0, 4.0), corner(1.0, None), straight(20.0, 6.0)]), cut);
+    }
+
+    #[test]
+    fn stubs_go_on_beyond_a_corner() {
+        let ahead = outline(&[straight(20.0, 4.0), corner(0.0, Some(Stub::Ahead(5.0))), straight(20.0, 6.0)]);
+        assert_eq!(ahead[1..4], [(28.0, -2.0), (28.0, 2.0), (23.0, 2.0)]);
+        let behind = outline(&[straight(20.0, 4.0), corner(0.0, Some(Stub::Behind(5.0))), straight(20.0, 6.0)]);
+        assert_eq!(behind[1..5], [(17.0, -2.0), (17.0, -7.0), (23.0, -7.0), (23.0, 20.0)]);
+    }
+
+    #[test]
+    fn a_notch_is_cut_into_its_edge() {
+        let mut strip = strip(&[straight(20.0, 4.0)]);
+        strip.notches.push(Notch { side: Side::Left, from_m: 8.0, to_m: 10.0, depth_m: 1.0 });
+        let left: Vec<_> = strip.edge(Side::Left, 0.0).into_iter().map(|p| (p.x, p.y)).collect();
+        assert_eq!(left, [(0.0, 2.0), (8.0, 2.0), (8.0, 3.0), (10.0, 3.0), (10.0, 2.0), (20.0, 2.0)]);
+        assert_eq!(strip.edge(Side::Left, 1.5).len(), 2, "too shallow to show in an edge moved by 1.5 m");
+    }
+
+    #[test]
+    fn a_bend_keeps_its_width() {
+        let bend = Piece::Arc { radius_m: 9.0, turn_rad: -2.0, width_m: 3.0 };
+        let strip = strip(&[straight(5.0, 3.0), bend, straight(5.0, 3.0)]);
+        let centre = Vec2::new(5.0, -9.0);
+        for (side, radius_m) in [(Side::Left, 10.5), (Side::Right, 7.5)] {
+            let edge = strip.edge(side, 0.0);
+            let on_arc = &edge[1..edge.len() - 1];
+            assert!(
+                on_arc.len() > 10 && on_arc.iter().all(|p| (p.distance(centre) - radius_m).abs() < 2e-3),
+                "{edge:?}"
+            );
+        }
+    }
+
+    /// The axis rounds corners; places are found again by `s` and `d` on every piece.
+    #[test]
+    fn the_axis_is_smooth_and_local_is_the_inverse_of_point() {
+        let bend = Piece::Arc { radius_m: 9.0, turn_rad: 2.0, width_m: 3.0 };
+        let strip = strip(&[straight(20.0, 4.0), corner(0.0, None), straight(20.0, 6.0), bend]);
+        assert!((strip.length_m() - (15.0 + 2.5 * std::f32::consts::PI + 15.0 + 18.0)).abs() < 1e-3);
+        let mut before = strip.pose(0.0);
+        for k in 1..600 {
+            let s_m = k as f32 * 0.09;
+            let pose = strip.pose(s_m);
+            assert!(wrap_angle(pose.heading_rad - before.heading_rad).abs() < 0.02, "a kink at {s_m} m");
+            for d_m in [-1.5, 0.0, 1.5] {
+                let at = strip.local(strip.point(s_m, d_m), s_m + 1.0);
+                assert!(at.distance(Vec2::new(s_m, d_m)) < 5e-3, "{at} instead of {s_m}, {d_m}");
+            }
+            before = pose;
+        }
+    }
+
+    #[test]
+    fn a_strip_that_meets_itself_is_told() {
+        let bend = |turn_rad| Piece::Arc { radius_m: 6.0, turn_rad, width_m: 4.0 };
+        let back = strip(&[straight(20.0, 4.0), bend(std::f32::consts::PI), straight(20.0, 4.0)]);
+        assert!(back.keeps_apart(3.9) && !back.keeps_apart(4.1), "8 m of ground are between its edges");
+        let round = strip(&[straight(20.0, 4.0), bend(4.5), straight(20.0, 4.0)]);
+        assert!(!round.keeps_apart(0.1));
+    }
 }

@@ -22,7 +22,7 @@ const STRAIGHT_MIN_M: f32 = 12.0;
 /// Left between the band and itself, metres.
 const APART_M: f32 = 1.5;
 
-pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
+pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
     const TRIES: usize = 200;
     let width_m = layout.random_range(WIDTH_M);
     let strip = (0..TRIES).find_map(|_| ring(width_m, layout))?;
@@ -38,13 +38,13 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
     };
     let Some(wall) = wall else {
         let infield = Island { polygon: inner, height_m: 0.15 };
-        return Some(Scenario { islands: vec![infield], ..lot(&strip, outer, things) });
+        return Some((Scenario { islands: vec![infield], ..lot(&strip, outer, things) }, strip));
     };
     things.obstacles.extend(wall.around(&outer, &[]));
     // The other way round, so that it stands inside.
     let inner: Vec<_> = inner.into_iter().rev().collect();
     things.obstacles.extend(wall.around(&inner, &[]));
-    Some(lot(&strip, yard(&outer, 2.0..8.0, layout), things))
+    Some((lot(&strip, yard(&outer, 2.0..8.0, layout), things), strip))
 }
 
 /// A polygon around a middle, its corners rounded, to the left, from the middle of its longest side.

@@ -119,3 +119,67 @@ pub(super) fn yard(outline: &[Vec2], margin_m: std::ops::Range<f32>, rng: &mut R
     let high = high + Vec2::new(margin(), margin());
     [low, Vec2::new(high.x, low.y), high, Vec2::new(low.x, high.y)].map(to_millimetres).to_vec()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::families::strip::{Corner, Piece, Strip};
+    use sim::geometry::polygon_contains;
+
+    const WALL: Wall = Wall { class: ObstacleClass::Wall, thickness_m: 0.1, height_m: 3.0 };
+
+    /// A straight piece, a corner, a bend.
+    fn outline() -> Vec<Vec2> {
+        let width_m = 4.0;
+        let corner = Corner { turn_rad: -std::f32::consts::FRAC_PI_2, chamfer_m: 1.0, stub: None };
+        let pieces = [
+            Piece::Straight { length_m: 30.0, width_m },
+            Piece::Corner(corner),
+            Piece::Straight { length_m: 20.0, width_m: 5.0 },
+            Piece::Arc { radius_m: 8.0, turn_rad: 2.5, width_m: 5.0 },
+            Piece::Straight { length_m: 10.0, width_m },
+        ];
+        Strip::new(Pose::default(), &pieces).expect("long enough for its corner").outline(0.0)
+    }
+
+    /// Points a quarter and three quarters into the wall, all along the line.
+    fn points_within(outline: &[Vec2]) -> Vec<Vec2> {
+        edges(outline)
+            .flat_map(|(a, b)| {
+                let steps = (a.distance(b) / 0.05).ceil() as usize;
+                let outward = -(b - a).normalize().perp() * WALL.thickness_m;
+                (0..=steps).flat_map(move |k| {
+                    let on_line = a.lerp(b, k as f32 / steps as f32);
+                    [on_line + 0.25 * outward, on_line + 0.75 * outward]
+                })
+            })
+            .collect()
+    }
+
+    #[test]
+    fn walls_have_no_holes_and_leave_the_ground_free() {
+        let outline = outline();
+        let walls: Vec<_> = WALL.around(&outline, &[]).iter().map(Obstacle::outline).collect();
+        for point in points_within(&outline) {
+            let is_wall = walls.iter().any(|wall| polygon_contains(wall, point));
+            assert!(is_wall || polygon_contains(&outline, point), "a hole at {point}");
+        }
+        for corner in walls.iter().flatten() {
+            let nearest_m =
+                edges(&outline).map(|(a, b)| distance_to_segment(*corner, a, b)).fold(f32::INFINITY, f32::min);
+            let reaches_in = polygon_contains(&outline, *corner) && nearest_m > 2e-3;
+            assert!(!reaches_in, "a wall reaches {nearest_m} m into the ground at {corner}");
+        }
+    }
+
+    #[test]
+    fn an_opening_is_as_wide_as_asked_for() {
+        let outline = outline();
+        let door = Opening { centre: Vec2::new(15.0, 2.0), width_m: 1.2 };
+        let walls: Vec<_> = WALL.around(&outline, &[door]).iter().map(Obstacle::outline).collect();
+        let is_open = |x_m: f32| !walls.iter().any(|wall| polygon_contains(wall, Vec2::new(x_m, 2.05)));
+        let open_m = (0..3000).filter(|&k| is_open(k as f32 * 0.01)).count() as f32 * 0.01;
+        assert!((open_m - 1.2).abs() < 0.03, "{open_m} m");
+        assert!(is_open(15.0) && !is_open(14.3) && !is_open(15.7));
+    }
+}
