@@ -391,7 +391,9 @@ fn tables_are_printed_as_json_and_nothing_else_is() {
     assert_eq!(sizes[0]["metres"].as_f64().unwrap().round(), 2996.0);
     let out = scratch("json").join("run").to_string_lossy().into_owned();
     let tables = json(&["train-bc", "--preset", "smoke", "--quiet", "--out", &out]);
-    assert_eq!(tables.len(), 2, "iterations and evaluation");
+    assert_eq!(tables.len(), 3, "iterations, evaluation and the check elsewhere");
+    assert_eq!(tables[2][0]["lots"], "validation-lane");
+    assert!(tables[2].as_array().unwrap().iter().all(|row| row["contacts"].is_number()), "{}", tables[2]);
     assert!(tables[0]["rows"][0]["samples"].is_number() && tables[1]["rows"][0]["near_collisions"].is_number());
 }
 

@@ -16,7 +16,8 @@ pub(crate) fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
                 folders.push(path);
             } else {
                 let name = path.strip_prefix(folder).unwrap().to_string_lossy().into_owned();
-                if !["manifest.toml", "report.html", "report.md", "wall_time.jsonl"].contains(&name.as_str()) {
+                let file_name = path.file_name().unwrap().to_string_lossy();
+                if !["manifest.toml", "report.html", "report.md", "wall_time.jsonl"].contains(&&*file_name) {
                     files.insert(name, std::fs::read(&path).unwrap());
                 }
             }

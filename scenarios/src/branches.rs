@@ -44,7 +44,7 @@ pub(crate) struct Branch {
     /// Where it leaves, world metres.
     pub(crate) mouth: Vec2,
     /// Where along the route, metres from the start.
-    station_m: f32,
+    arc_length_m: f32,
     /// The way from beside the route on, world metres.
     way: Vec<Vec2>,
 }
@@ -58,7 +58,7 @@ pub(crate) fn find(map: &Map, vehicle: &VehicleSettings) -> Vec<Branch> {
             branches.push(branch);
         }
     }
-    branches.sort_by(|a, b| a.station_m.total_cmp(&b.station_m));
+    branches.sort_by(|a, b| a.arc_length_m.total_cmp(&b.arc_length_m));
     branches
 }
 
@@ -220,7 +220,7 @@ impl GroundFromRoute {
         self.low + (Vec2::new((cell % self.cols) as f32, (cell / self.cols) as f32) + 0.5) * CELL_M
     }
 
-    fn station_m(&self, cell: usize) -> f32 {
+    fn arc_length_m(&self, cell: usize) -> f32 {
         self.cells[cell].station as f32 * self.spacing_m
     }
 
@@ -234,7 +234,7 @@ impl GroundFromRoute {
             from_route_m.is_finite()
                 && from_route_m > far_m
                 && self.cells[parent].from_route_m <= far_m
-                && between.contains(&self.station_m(cell))
+                && between.contains(&self.arc_length_m(cell))
         };
         (0..self.cells.len()).filter(is_end).collect()
     }
@@ -250,7 +250,7 @@ impl GroundFromRoute {
             way.push(self.cells[cell].parent);
         }
         let way: Vec<Vec2> = way.into_iter().rev().map(|cell| self.centre(cell)).collect();
-        Branch { mouth: self.centre(mouth), station_m: self.station_m(end), way }
+        Branch { mouth: self.centre(mouth), arc_length_m: self.arc_length_m(end), way }
     }
 }
 
