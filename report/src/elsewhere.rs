@@ -43,7 +43,11 @@ pub fn rows(results: &EvaluationResults, drivers: &[&str]) -> Vec<Row> {
             least_clearance_m: clearance_min_m,
         }
     };
-    slices.iter().flat_map(|slice| (0..drivers.len()).map(move |driver| (slice, driver))).map(|(s, d)| row(s, d)).collect()
+    slices
+        .iter()
+        .flat_map(|slice| (0..drivers.len()).map(move |driver| (slice, driver)))
+        .map(|(s, d)| row(s, d))
+        .collect()
 }
 
 /// A line per kind of lot, for each driver `near-collisions (contacts; least clearance)`, and the rate of the last one.

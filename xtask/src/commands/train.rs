@@ -141,7 +141,10 @@ fn check_elsewhere(
     let rows = report::elsewhere::rows(&results, &names);
     let text = || {
         let noise = &settings.evaluation.noise[0];
-        format!("\nElsewhere: lots that nobody trained on, noise {noise}\n\n{}", report::elsewhere::table(&rows, &names))
+        format!(
+            "\nElsewhere: lots that nobody trained on, noise {noise}\n\n{}",
+            report::elsewhere::table(&rows, &names)
+        )
     };
     output.table(text, &rows)
 }
