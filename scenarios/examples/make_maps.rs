@@ -105,8 +105,8 @@ impl Drawing {
         let lot = format!("# {about} Drawn by examples/make_maps.rs.\nmap = \"{name}.yaml\"\n{lot}");
         let mut texts = vec![(format!("{name}.yaml"), yaml), (format!("{name}.lot.toml"), lot)];
         if let Some(line) = centre_line {
-            let points: String = line.iter().map(|point| format!("{:.2},{:.2}\n", point.x, point.y)).collect();
-            texts.push((format!("{name}.csv"), format!("x,y\n{points}")));
+            let points: Vec<String> = line.iter().map(|point| format!("{:.2},{:.2}", point.x, point.y)).collect();
+            texts.push((format!("{name}.csv"), format!("x,y\n{}\n", points.join("\n"))));
         }
         texts
     }
@@ -280,7 +280,7 @@ fn one_aisle() -> Drawing {
     let mut shapes = vec![(area(1.0, 1.0, 83.0, 17.0), FREE), (area(67.0, 1.0, 83.0, 75.0), FREE)];
     for i in 0..31 {
         let along = 2.2 + 2.5 * i as f32;
-        let is_empty = |row: usize| (i * 5 + row * 3) % 7 == 0;
+        let is_empty = |row: usize| (i * 5 + row * 3).is_multiple_of(7);
         if along < 80.0 && !is_empty(0) {
             shapes.push(car(along, 3.6 + 0.1 * (i % 3) as f32, 90.0));
         }
