@@ -195,6 +195,16 @@ mod tests {
         }
     }
 
+    /// Neither drivers nor planners ever learn from lots that figures are reported on.
+    #[test]
+    fn training_lots_are_lot_a_and_those_of_the_split_train() {
+        let specs =
+            ["lot-a", "lot-b", "train:3:all", "validation:1", "test:1:rooms", "sealed:train:2", "sealed-a-easy-0"];
+        let lots = Lot::parse_all(&specs, &VehicleSettings::hyundai_hg300()).unwrap();
+        let for_training: Vec<_> = lots.iter().filter(|lot| lot.is_for_training()).map(Lot::name).collect();
+        assert_eq!(for_training, ["lot-a", "train-easy-0", "train-medium-0", "train-hard-0"]);
+    }
+
     #[test]
     fn every_round_of_training_has_generated_lots_of_its_own() {
         let names = |round| -> Vec<String> {

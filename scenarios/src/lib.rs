@@ -7,8 +7,8 @@
 //! | [`corridor`] | lane geometry: legs, corners, widths, bulges → one boundary polygon |
 //! | [`clutter`] | parked cars and other obstacles, under gap rules |
 //! | [`mod@reference`] | lots a, b and c of the paper |
-//! | [`generator`] | procedural lots, each verified by the [`solver`] |
-//! | [`split`] | which generated lots may be trained on |
+//! | [`generator`] | procedural lots of several families, each verified by the [`solver`] |
+//! | [`split`] | splits and families of generated lots, sealed ones included |
 //! | [`load`] | lots as TOML files |
 //! | [`import`] | ROS maps and TPCAP cases as lots |
 //! | [`note`] | what an import did and found, for people |

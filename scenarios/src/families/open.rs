@@ -16,7 +16,7 @@ use std::ops::Range;
 
 /// The centre line between the run-outs, metres.
 const LENGTH_M: Range<f32> = 85.0..170.0;
-const WIDTH_M: Range<f32> = 5.5..10.0;
+const WIDTH_M: Range<f32> = 4.5..10.0;
 const RADIUS_M: Range<f32> = 9.0..25.0;
 /// Between two things at the edge of the way; the car is 1.86 m wide.
 const GAP_M: Range<f32> = 0.4..1.4;
@@ -236,8 +236,8 @@ impl Ground<'_> {
 
 /// Things that stand at the edge of the way.
 fn on_the_way(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
-    let rules = Rules { gap_m: rng.random_range(2.9..3.6), apart_m: 10.0, corner_clear_m: 8.0 };
-    for _ in 0..rng.random_range(0..7) {
+    let rules = Rules { gap_m: rng.random_range(2.8..3.6), apart_m: 9.0, corner_clear_m: 7.0 };
+    for _ in 0..rng.random_range(0..10) {
         let s_m = rng.random_range(0.0..strip.length_m());
         let side = side(rng);
         let class = match rng.random_range(0..6) {
