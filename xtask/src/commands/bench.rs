@@ -25,7 +25,7 @@ pub(crate) struct BenchArgs {
     /// Measures one area only; may be repeated.
     #[arg(long, value_enum, value_name = "AREA")]
     only: Vec<Area>,
-    /// Measures other simulators and libraries, too, in a virtual environments made from PyPI (gigabytes).
+    /// Measures other simulators and libraries, too, in virtual environments made from PyPI (gigabytes).
     #[arg(long)]
     peers: bool,
     /// Where the environment is that most of them share; others have theirs beside it.
