@@ -37,12 +37,19 @@ fn the_expert_drives_every_reference_lot_both_ways_without_a_near_collision() {
 fn the_expert_drives_the_example_maps_without_a_near_collision() {
     let settings = Arc::new(EpisodeSettings::paper());
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/examples");
+    let maps = examples.join("maps").read_dir().unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut maps: Vec<String> =
+        maps.filter(|file| file.ends_with(".yaml")).map(|file| format!("maps/{file}")).collect();
+    maps.sort();
     for (file, directions) in [
         ("car-park.yaml", &Direction::BOTH[..]),
         ("car-park-loop.lot.toml", &Direction::BOTH),
         ("car-park-centre.lot.toml", &Direction::BOTH),
         ("open-lot.csv", &[Direction::Forward]),
-    ] {
+    ]
+    .into_iter()
+    .chain(maps.iter().map(|file| (file.as_str(), &Direction::BOTH[..])))
+    {
         let scenario =
             scenarios::load::load(&examples.join(file), &settings.vehicle).unwrap_or_else(|error| panic!("{error}"));
         for &direction in directions {

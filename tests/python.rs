@@ -6,6 +6,7 @@
 use crate::bench::{root, scratch, succeed, text, xtask};
 use ndarray::{Array2, Array3};
 use policy::checkpoint::Checkpoint;
+use policy::dataset::store::Store;
 use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Prediction, Weights};
 use sim::seed::RootSeed;
 use sim::sensing::{GridGeometry, OccupancyGrid};
@@ -108,6 +109,34 @@ fn the_docs_show_the_scripts_word_for_word() {
         let code = std::fs::read_to_string(root().join("tests/python").join(script)).unwrap();
         assert!(docs.contains(&format!("```python\n{code}```")), "docs/formats.md shows another {script}");
     }
+}
+
+/// What `docs/formats.md` shows to unpack the grids of a round gives the grids that lotpilot reads.
+#[test]
+fn the_docs_unpack_the_grids_of_a_round() {
+    if !can_import("numpy") {
+        assert!(std::env::var_os("CI").is_none(), "numpy is needed; PYTHON names an interpreter");
+        eprintln!("skipped: no numpy");
+        return;
+    }
+    let run = scratch("unpacked").join("run");
+    succeed(xtask().args(["train-bc", "--preset", "smoke", "--no-eval", "--out"]).arg(&run));
+    let (round, _) = Store::open(&run).unwrap().read_round(0).unwrap();
+    assert!(!round.noise_augmentations.is_empty());
+    let docs = std::fs::read_to_string(root().join("docs/formats.md")).unwrap();
+    let folder = run.join("round-00");
+    let unpacked = |name: &str, array: &str| {
+        let section = docs.split("\n### ").find(|section| section.starts_with(&format!("`{name}`\n"))).unwrap();
+        let code = section.split("```").nth(1).unwrap().strip_prefix("python\n").unwrap();
+        let code = format!("{code}np.save('cells.npy', {array}.reshape(-1, 625))");
+        let ran = python().args(["-c", &code]).current_dir(&folder).output().unwrap();
+        assert!(ran.status.success(), "{name}: {:?}", text(&ran));
+        let cells: Array2<u8> = ndarray_npy::read_npy(folder.join("cells.npy")).unwrap();
+        cells.outer_iter().map(|cells| OccupancyGrid::from_cells(&cells.to_vec())).collect::<Vec<_>>()
+    };
+    let expected: Vec<_> = round.samples.iter().map(|sample| sample.grid).collect();
+    assert!(unpacked("grids.npy", "grids") == expected);
+    assert!(unpacked("noise_augmentations.npz", "augmentations") == round.noise_augmentations);
 }
 
 /// Every key of every TOML file that a training round leaves has its row, and so has every column of `ticks.npz`.

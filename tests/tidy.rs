@@ -32,7 +32,7 @@ const LAYERS: [(&str, &[&str]); 10] = [
     ("experiment", &["sim", "scenarios", "expert", "planners", "policy"]),
     ("evaluation", &["sim", "planners", "policy", "experiment"]),
     ("report", &["sim", "policy", "experiment", "evaluation"]),
-    ("benchmark", &["sim", "scenarios", "expert", "policy", "experiment"]),
+    ("benchmark", &["sim", "scenarios", "expert", "policy", "experiment", "evaluation"]),
     ("xtask", &["sim", "scenarios", "planners", "policy", "experiment", "evaluation", "report", "benchmark"]),
 ];
 

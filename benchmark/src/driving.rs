@@ -1,6 +1,6 @@
 //! The closed loop: control steps per second.
 
-use crate::{Effort, Figure, Goal, Report, on_threads, rate};
+use crate::{Effort, Goal, Report, on_threads, rate, ratio};
 use experiment::drive;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
@@ -94,12 +94,12 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     });
     report(one.clone());
     let two = steps("the same on two cores, by episodes", 2, None, &mut || course.by_episodes(|| Centred));
-    report(times("two cores over one, by episodes", &two, &one, 1.9));
+    report(ratio("two cores over one, by episodes", &two, &one, Goal::AtLeast(1.9)));
     report(two);
     let two = steps("the same on two cores, in lock-step", 2, None, &mut || {
         course.lock_step(1, |cars| Box::new(OneDriverEach(vec![Centred; cars])))
     });
-    report(times("two cores over one, in lock-step", &two, &one, 1.9));
+    report(ratio("two cores over one, in lock-step", &two, &one, Goal::AtLeast(1.9)));
     report(two);
 
     let settings = &course.settings;
@@ -127,11 +127,4 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
         steps as f64
     }));
     Ok(())
-}
-
-fn times(what: &str, two: &Figure, one: &Figure, goal: f64) -> Figure {
-    let range = (two.range.0 / one.range.1, two.range.1 / one.range.0);
-    Figure {
-        what: what.to_owned(), median: two.median / one.median, range, unit: "×", goal: Some(Goal::AtLeast(goal))
-    }
 }

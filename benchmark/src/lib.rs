@@ -3,6 +3,7 @@
 //! | file | figures |
 //! |---|---|
 //! | [`driving`] | the closed loop, on one core and on two, with a cheap driver, the network and the expert |
+//! | [`evaluating`] | `evaluate` on one thread and on two |
 //! | [`maps`] | building a map, starting an episode |
 //! | [`network`] | answers and training |
 //! | [`peers`] | other simulators and libraries in the same run |
@@ -11,6 +12,7 @@
 //! largest beside it. Nothing here asserts a time.
 
 pub mod driving;
+pub mod evaluating;
 pub mod maps;
 pub mod network;
 pub mod peers;
@@ -112,6 +114,12 @@ fn figure(what: &str, unit: &'static str, goal: Option<Goal>, mut measured: Vec<
     measured.sort_by(f64::total_cmp);
     let range = (measured[0], measured[measured.len() - 1]);
     Figure { what: what.to_owned(), median: measured[measured.len() / 2], range, unit, goal }
+}
+
+/// One figure over another.
+fn ratio(what: &str, above: &Figure, below: &Figure, goal: Goal) -> Figure {
+    let range = (above.range.0 / below.range.1, above.range.1 / below.range.0);
+    Figure { what: what.to_owned(), median: above.median / below.median, range, unit: "×", goal: Some(goal) }
 }
 
 #[expect(clippy::disallowed_methods, reason = "what this crate is for")]

@@ -4,9 +4,10 @@ use anyhow::ensure;
 use scenarios::LotSpec;
 use scenarios::generator;
 use scenarios::import::MapLot;
+use scenarios::note::{Loaded, Note};
 use scenarios::reference::{self, ReferenceLot};
 use scenarios::split::Split;
-use sim::scenario::{Direction, Scenario};
+use sim::scenario::{Direction, NoiseLevel, Scenario};
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
 use std::path::Path;
@@ -17,7 +18,7 @@ pub struct Lot {
     name: String,
     spec: LotSpec,
     /// Of a file: read once, so that its errors come before any work.
-    from_file: Option<Scenario>,
+    from_file: Option<Loaded>,
 }
 
 /// A lot as it stands in one trial.
@@ -68,10 +69,10 @@ impl Lot {
 
     fn new(spec: LotSpec, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
         let from_file = match &spec {
-            LotSpec::File(path) => Some(scenarios::load::load(path, vehicle)?),
+            LotSpec::File(path) => Some(scenarios::load::load_with_notes(path, vehicle)?),
             LotSpec::Reference(_) | LotSpec::Generated { .. } => None,
         };
-        let name = from_file.as_ref().map_or_else(|| spec.to_string(), |scenario| scenario.name.clone());
+        let name = from_file.as_ref().map_or_else(|| spec.to_string(), |loaded| loaded.scenario.name.clone());
         Ok(Self { name, spec, from_file })
     }
 
@@ -80,8 +81,18 @@ impl Lot {
     /// # Errors
     /// If no lot can be made of it.
     pub fn of_map(path: &Path, lot: &MapLot, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
-        let scenario = lot.scenario(vehicle)?;
-        Ok(Self { name: scenario.name.clone(), spec: LotSpec::File(path.to_owned()), from_file: Some(scenario) })
+        let loaded = lot.scenario(vehicle)?;
+        Ok(Self { name: loaded.scenario.name.clone(), spec: LotSpec::File(path.to_owned()), from_file: Some(loaded) })
+    }
+
+    /// What is to be said about a lot from a file.
+    pub fn notes(&self) -> &[Note] {
+        self.from_file.as_ref().map_or(&[], |loaded| &loaded.notes)
+    }
+
+    /// The noise level that a lot from a file asks for.
+    pub fn asks_for_noise(&self) -> Option<NoiseLevel> {
+        self.from_file.as_ref().map(|loaded| loaded.scenario.noise.level)
     }
 
     /// Name in tables.
@@ -114,7 +125,7 @@ impl Lot {
     /// [`scenarios::LoadError::ForwardOnly`], with file and line.
     pub fn check_direction(&self, direction: Direction, vehicle: &VehicleSettings) -> anyhow::Result<()> {
         match (&self.spec, &self.from_file) {
-            (LotSpec::File(path), Some(scenario)) => {
+            (LotSpec::File(path), Some(Loaded { scenario, .. })) => {
                 Ok(scenarios::load::check_direction(path, scenario, direction, vehicle)?)
             }
             _ => Ok(()),
@@ -156,8 +167,8 @@ impl Lot {
                 Drawn { scenario: generated.scenario, attempts: Some(generated.attempts) }
             }
             LotSpec::File(_) => {
-                let scenario = self.from_file.clone().expect("files are read when they are named");
-                Drawn { scenario, attempts: None }
+                let loaded = self.from_file.clone().expect("files are read when they are named");
+                Drawn { scenario: loaded.scenario, attempts: None }
             }
         }
     }

@@ -2,6 +2,7 @@
 
 mod aggregate;
 mod collection;
+mod packed;
 mod round;
 mod sample;
 pub mod store;

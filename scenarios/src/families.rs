@@ -101,6 +101,7 @@ fn lot(strip: &Strip, boundary: Vec<sim::geometry::Vec2>, things: Things<'_>) ->
     Scenario {
         name: String::new(),
         boundary,
+        boundary_height_m: 0.0,
         reference_path: route::along(strip, driven_m(strip), &things.narrowings),
         noise: LotNoise::default(),
         islands: Vec::new(),

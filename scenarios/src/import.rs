@@ -5,17 +5,22 @@
 //! shows them; `scale` then enlarges the whole about (0, 0), so that a map of a small robot's world fits a car.
 
 mod contour;
+mod frame;
 mod ground;
 mod ros;
 mod tpcap;
 
+use crate::branches;
 use crate::error::{LoadError, read_text};
+use crate::note::{Loaded, Note};
 use crate::solver;
 use crate::solver::route::{self, Finish, NoRoute};
+use frame::Frame;
 use ground::Ground;
 use serde::Deserialize;
 use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
+use sim::map::Map;
 use sim::scenario::{Island, LotNoise, Place, ReferencePath, Scenario, ScenarioError};
 use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
@@ -23,8 +28,17 @@ use std::path::{Path, PathBuf};
 
 /// Corners of a centre line are rounded with this radius, metres, as those of the reference lots (docs/methods.md 11).
 const CENTRE_LINE_RADIUS_M: f32 = 5.0;
+/// Height of what a map says is not drivable, metres: a lidar that saw it looks over kerbs, and most of what it sees, walls
+/// and parked cars, is higher than the camera.
+const WALL_HEIGHT_M: f32 = 2.0;
+/// Height of islands where `wall_height_m` is 0, metres.
+const PAINT_M: f32 = 0.01;
+/// Smallest island, m² in the lot: a little more than [`validate`] asks for. Smaller specks are made as large.
+const ISLAND_MIN_M2: f64 = 0.0105;
+/// How far simplification may move an outline, metres in the lot: less than the clearance that routes keep.
+const SIMPLIFIED_M: f64 = 0.2;
 /// Points of a centre line nearer than this count as one, metres in the lot.
-const SAME_POINT_M: f32 = 0.01;
+const SAME_POINT_M: f64 = 0.01;
 
 /// A map and the route on it: the content of a `NAME.lot.toml`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -37,13 +51,13 @@ pub struct MapLot {
     pub name: Option<String>,
     /// The lot is this many times as large as the map.
     #[serde(default = "one")]
-    pub scale: f32,
+    pub scale: f64,
     /// Where the rear axle starts: x and y in metres, heading in degrees counter-clockwise from x.
     #[serde(default)]
-    pub start: Option<[f32; 3]>,
+    pub start: Option<[f64; 3]>,
     /// Where it is to arrive.
     #[serde(default)]
-    pub goal: Option<[f32; 3]>,
+    pub goal: Option<[f64; 3]>,
     /// Instead of a goal: round a loop, back to the start.
     #[serde(default, rename = "loop")]
     pub is_loop: bool,
@@ -53,6 +67,15 @@ pub struct MapLot {
     /// Clearance that a route found automatically keeps around the body, metres in the lot.
     #[serde(default = "clearance_m")]
     pub clearance_m: f32,
+    /// Height of what is not drivable, metres in the lot: above 0.15 it hides the ground behind it.
+    #[serde(default = "wall_height_m")]
+    pub wall_height_m: f32,
+    /// Occupied specks up to this size are taken for free ground, m² in the lot.
+    #[serde(default)]
+    pub drop_specks_m2: f64,
+    /// Whether ways that leave the route are closed with kerbs.
+    #[serde(default)]
+    pub close_branches: bool,
     /// Sensor noise of the lot.
     #[serde(default)]
     pub noise: LotNoise,
@@ -61,8 +84,12 @@ pub struct MapLot {
     file: PathBuf,
 }
 
-fn one() -> f32 {
+fn one() -> f64 {
     1.0
+}
+
+fn wall_height_m() -> f32 {
+    WALL_HEIGHT_M
 }
 
 fn clearance_m() -> f32 {
@@ -112,6 +139,9 @@ impl MapLot {
             is_loop: false,
             centre_line: None,
             clearance_m: clearance_m(),
+            wall_height_m: wall_height_m(),
+            drop_specks_m2: 0.0,
+            close_branches: false,
             noise: LotNoise::default(),
             file: map.to_owned(),
         }
@@ -135,7 +165,7 @@ impl MapLot {
     ///
     /// # Errors
     /// The first thing wrong with it, with file, place and remedy.
-    pub fn scenario(&self, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
+    pub fn scenario(&self, vehicle: &VehicleSettings) -> Result<Loaded, LoadError> {
         self.check()?;
         let is_case = self.map.extension().is_some_and(|extension| extension == "csv");
         let source =
@@ -148,30 +178,39 @@ impl MapLot {
         let centre_line = self.centre_line.as_deref().map(|file| self.read_centre_line(file)).transpose()?;
         let seed = match (&centre_line, start, goal, self.is_loop) {
             (Some(points), ..) => points[0],
-            (None, Some(start), Some(_), false) | (None, Some(start), None, true) => self.pose_in_lot(start).position(),
+            (None, Some([x, y, _]), Some(_), false) | (None, Some([x, y, _]), None, true) => [x, y],
             _ => return Err(self.nothing_to_drive()),
         };
+        let frame = Frame::around(seed, self.scale);
+        let mut notes = Vec::new();
+        notes.extend(frame.is_recentred().then_some(Note::Recentred { origin: frame.origin }));
         let ground = match &source {
-            Source::Case(case) => case.ground(self.scale),
-            Source::Map(map) => {
-                self.ros_ground(map, seed, goal.map(|goal| self.pose_in_lot(goal).position()), vehicle)?
-            }
+            Source::Case(case) => case.ground(frame),
+            Source::Map(map) => self.ros_ground(map, frame, seed, goal.map(|[x, y, _]| [x, y]), vehicle, &mut notes)?,
         };
-        let mut scenario = outlines(self.name(), &ground).with_obstacles(ground.obstacles);
+        let mut scenario = self.outlines(&ground).with_obstacles(ground.obstacles);
         scenario.noise = self.noise.clone();
         validate_ground(&scenario, vehicle).map_err(|error| self.in_lot(error))?;
         scenario.reference_path = match (centre_line, start) {
-            (Some(points), _) => self.checked_centre_line(points, &scenario, vehicle)?,
+            (Some(points), _) => self.checked_centre_line(&points, frame, &scenario, vehicle)?,
             (None, Some(start)) => {
-                let start = self.pose_in_lot(start);
-                let finish = goal.map_or(Finish::Start, |goal| Finish::At(self.pose_in_lot(goal)));
+                let start = frame.pose_in_lot(start);
+                let finish = goal.map_or(Finish::Start, |goal| Finish::At(frame.pose_in_lot(goal)));
                 route::find(&scenario, start, finish, vehicle, self.clearance_m)
-                    .map_err(|reason| self.no_route(reason, start, finish, vehicle))?
+                    .map_err(|reason| self.no_route(reason, frame, start, finish, vehicle))?
             }
             (None, None) => return Err(self.nothing_to_drive()),
         };
         validate(&scenario, vehicle).map_err(|error| self.in_lot(error))?;
-        Ok(scenario)
+        let in_map = |mouths: Vec<Vec2>| mouths.into_iter().map(|mouth| frame.in_map(mouth)).collect::<Vec<_>>();
+        if self.close_branches {
+            let mouths = in_map(branches::close(&mut scenario, vehicle));
+            notes.extend((!mouths.is_empty()).then_some(Note::Closed { mouths }));
+        }
+        let map = Map::build(scenario.clone(), vehicle).map_err(|error| self.in_lot(error))?;
+        let mouths = in_map(branches::find(&map, vehicle).into_iter().map(|branch| branch.mouth).collect());
+        notes.extend((!mouths.is_empty()).then_some(Note::Open { mouths }));
+        Ok(Loaded { scenario, notes })
     }
 
     fn check(&self) -> Result<(), LoadError> {
@@ -186,6 +225,14 @@ impl MapLot {
         if !(0.0..=2.0).contains(&self.clearance_m) {
             let remedy = "write a number of metres from 0 to 2";
             return Err(self.fault("clearance_m", format!("it is {}", self.clearance_m), remedy));
+        }
+        if !(0.0..=5.0).contains(&self.wall_height_m) {
+            let remedy = "write a number of metres from 0 to 5";
+            return Err(self.fault("wall_height_m", format!("it is {}", self.wall_height_m), remedy));
+        }
+        if !(0.0..=100.0).contains(&self.drop_specks_m2) {
+            let remedy = "write a number of m² from 0 to 100";
+            return Err(self.fault("drop_specks_m2", format!("it is {}", self.drop_specks_m2), remedy));
         }
         for (place, pose) in [("start", self.start), ("goal", self.goal)] {
             if let Some(value) = pose.into_iter().flatten().find(|value| !value.is_finite()) {
@@ -211,61 +258,83 @@ impl MapLot {
     fn ros_ground(
         &self,
         map: &ros::Map,
-        seed: Vec2,
-        goal: Option<Vec2>,
+        frame: Frame,
+        seed: [f64; 2],
+        goal: Option<[f64; 2]>,
         vehicle: &VehicleSettings,
+        notes: &mut Vec<Note>,
     ) -> Result<Ground, LoadError> {
         let place = if self.centre_line.is_some() { "centre_line, point 1" } else { "start" };
-        let mut pixels = Vec::new();
-        for (place, point) in [(place, Some(seed)), ("goal", goal)] {
-            let Some(point) = point else { continue };
-            let pixel = map.pixel_at((point / self.scale).as_dvec2().to_array());
-            if !map.drivable.at(pixel) {
-                let problem = format!("{} is not drivable: {}", self.in_map(point), map.pixel_said(pixel));
-                let remedy = "move it onto free pixels; x and y are metres in the map's frame";
-                return Err(self.fault(place, problem, remedy));
+        let drivable_pixel = |place: &str, [x, y]: [f64; 2], drivable: &contour::Mask| {
+            let pixel = map.pixel_at([x, y]);
+            if drivable.at(pixel) {
+                return Ok(pixel);
             }
-            pixels.push(pixel);
-        }
-        let region = map.drivable.region_of(pixels[0]);
+            let problem = format!("({x:.2}, {y:.2}) is not drivable: {}", map.pixel_said(pixel));
+            Err(self.fault(place, problem, "move it onto free pixels; x and y are metres in the map's frame"))
+        };
+        let pixel = drivable_pixel(place, seed, &map.drivable)?;
+        goal.map(|goal| drivable_pixel("goal", goal, &map.drivable)).transpose()?;
+        let pixel_m = map.resolution_m * self.scale;
+        let in_px2 = |m2: f64| m2 / (pixel_m * pixel_m);
+        let (region, dropped) = map.drivable.region_of(pixel).without_specks(in_px2(self.drop_specks_m2));
+        let (region, padded) = region.with_large_specks(pixel, in_px2(ISLAND_MIN_M2));
+        let up_to_m2 = self.drop_specks_m2;
+        notes.extend((dropped > 0).then_some(Note::Dropped { specks: dropped, up_to_m2 }));
+        notes.extend((padded > 0).then_some(Note::Padded { specks: padded }));
+        drivable_pixel(place, seed, &region)?;
         let rings = region.outlines();
-        let in_lot = |[x, y]: [f64; 2]| {
-            let [x, y] = map.point_at([x, y]).map(|metres| metres * f64::from(self.scale));
-            let point = Vec2::new(x as f32, y as f32);
+        let in_lot = |point: [f64; 2]| {
+            let point = frame.in_lot(map.point_at(point));
             // Whole millimetres keep lot files short; a map finer than that keeps what it has.
-            if map.resolution_m * f64::from(self.scale) > 0.02 { crate::corridor::to_millimetres(point) } else { point }
+            if pixel_m > 0.02 { crate::corridor::to_millimetres(point) } else { point }
         };
         let (outer, inner): (Vec<_>, Vec<_>) = rings.iter().partition(|ring| contour::signed_area_px2(ring) > 0.0);
         let Some(outer) = outer.first() else {
             unreachable!("a region has an outline");
         };
+        let tolerances_px = contour::TOLERANCES_PX.map(|tolerance_px| tolerance_px.min(SIMPLIFIED_M / pixel_m));
         let mut steps = vec![0; 1 + inner.len()];
         loop {
             let outline = |ring: &contour::Ring, step: usize| -> Vec<Vec2> {
-                contour::simplified(ring, contour::TOLERANCES_PX[step]).into_iter().map(in_lot).collect()
+                contour::simplified(ring, tolerances_px[step]).into_iter().map(in_lot).collect()
             };
             let ground = Ground {
                 boundary: outline(outer, steps[0]),
+                is_walled: true,
                 islands: inner.iter().zip(&steps[1..]).map(|(ring, &step)| outline(ring, step)).collect(),
                 obstacles: Vec::new(),
             };
-            let Err(error) = validate_ground(&outlines(self.name(), &ground), vehicle) else {
+            let Err(error) = validate_ground(&self.outlines(&ground), vehicle) else {
                 return Ok(ground);
             };
             // The outline at fault is followed more closely; if it is exact already, so is the boundary.
             let at_fault = match error.place {
-                Place::Island(i) if steps[i + 1] + 1 < contour::TOLERANCES_PX.len() => i + 1,
+                Place::Island(i) if steps[i + 1] + 1 < tolerances_px.len() => i + 1,
                 _ => 0,
             };
             steps[at_fault] += 1;
-            if steps[at_fault] == contour::TOLERANCES_PX.len() {
+            if steps[at_fault] == tolerances_px.len() {
                 return Err(self.in_lot(error));
             }
         }
     }
 
-    /// The points of a CSV file, in the lot.
-    fn read_centre_line(&self, file: &Path) -> Result<Vec<Vec2>, LoadError> {
+    /// Boundary and islands of a lot that has no route yet.
+    fn outlines(&self, ground: &Ground) -> Scenario {
+        // What has no height of its own is painted: as low as the lowest kerb.
+        let height_m = self.wall_height_m.max(PAINT_M);
+        let islands = ground.islands.iter().cloned().map(|polygon| Island { polygon, height_m }).collect();
+        let boundary_height_m = if ground.is_walled { self.wall_height_m } else { 0.0 };
+        Scenario {
+            islands,
+            boundary_height_m,
+            ..Scenario::new(self.name(), ground.boundary.iter().copied(), [Vec2::ZERO; 0])
+        }
+    }
+
+    /// The points of a CSV file, in the map's frame.
+    fn read_centre_line(&self, file: &Path) -> Result<Vec<[f64; 2]>, LoadError> {
         let name = file.display().to_string();
         let text = read_text(file)?;
         let mut reader = csv::ReaderBuilder::new()
@@ -274,7 +343,7 @@ impl MapLot {
             .comment(Some(b'#'))
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
-        let mut points: Vec<Vec2> = Vec::new();
+        let mut points: Vec<[f64; 2]> = Vec::new();
         for (i, record) in reader.records().enumerate() {
             let faulty = |line: usize, problem: String| LoadError::Faulty {
                 file: name.clone(),
@@ -284,12 +353,12 @@ impl MapLot {
             };
             let record = record.map_err(|error| faulty(i + 1, format!("not CSV: {error}")))?;
             let line = record.position().map_or(i + 1, |position| position.line() as usize);
-            let numbers: Vec<Option<f32>> = record.iter().take(2).map(|cell| cell.parse().ok()).collect();
+            let numbers: Vec<Option<f64>> = record.iter().take(2).map(|cell| cell.parse().ok()).collect();
             match numbers[..] {
                 [Some(x), Some(y)] if x.is_finite() && y.is_finite() => {
-                    let point = Vec2::new(x, y) * self.scale;
-                    if points.last().is_none_or(|last| last.distance(point) > SAME_POINT_M) {
-                        points.push(point);
+                    let is_far = |&[a, b]: &[f64; 2]| self.scale * (a - x).hypot(b - y) > SAME_POINT_M;
+                    if points.last().is_none_or(is_far) {
+                        points.push([x, y]);
                     }
                 }
                 // A first line of words is a header.
@@ -314,7 +383,8 @@ impl MapLot {
     /// The car must find room along the whole line: half its width to either side.
     fn checked_centre_line(
         &self,
-        points: Vec<Vec2>,
+        points: &[[f64; 2]],
+        frame: Frame,
         ground: &Scenario,
         vehicle: &VehicleSettings,
     ) -> Result<ReferencePath, LoadError> {
@@ -325,6 +395,7 @@ impl MapLot {
         for obstacle in &ground.obstacles {
             room.carve_polygon(&obstacle.outline());
         }
+        let points = points.iter().map(|&point| frame.in_lot(point)).collect();
         let line = ReferencePath { points, corner_radius_m: CENTRE_LINE_RADIUS_M };
         let path = sim::path::Path::new(&line);
         let half_width_m = 0.5 * vehicle.width_m;
@@ -333,8 +404,9 @@ impl MapLot {
             if room_m >= half_width_m {
                 continue;
             }
-            let place = format!("centre_line, {:.1} m from its start", i as f32 * path.spacing_m() / self.scale);
-            let at = self.in_map(pose.position());
+            let along_m = f64::from(i as f32 * path.spacing_m()) / self.scale;
+            let place = format!("centre_line, {along_m:.1} m from its start");
+            let at = frame.said(pose.position());
             let remedy = "lead the line round it, or enlarge the lot with scale; corners are rounded with 5 m";
             let problem = if room_m <= 0.0 {
                 format!("it runs through a wall at {at}")
@@ -349,16 +421,6 @@ impl MapLot {
         Ok(line)
     }
 
-    fn pose_in_lot(&self, [x_m, y_m, heading_deg]: [f32; 3]) -> Pose {
-        Pose::new(Vec2::new(x_m, y_m) * self.scale, sim::geometry::wrap_angle(heading_deg.to_radians()))
-    }
-
-    /// A point of the lot in the frame of the map.
-    fn in_map(&self, point: Vec2) -> String {
-        let point = point / self.scale;
-        format!("({:.2}, {:.2})", point.x, point.y)
-    }
-
     fn fault(&self, place: &str, problem: String, remedy: &str) -> LoadError {
         LoadError::Map {
             file: self.file.display().to_string(),
@@ -370,7 +432,7 @@ impl MapLot {
 
     /// An error of the lot made from the map.
     fn in_lot(&self, ScenarioError { place, problem, remedy }: ScenarioError) -> LoadError {
-        let frame = if self.scale == 1.0 {
+        let frame = if (self.scale - 1.0).abs() < f64::EPSILON {
             String::new()
         } else {
             format!(" (coordinates are the map's times {})", self.scale)
@@ -388,14 +450,14 @@ impl MapLot {
         self.fault("route", "the map does not say where to drive".to_owned(), &remedy)
     }
 
-    fn no_route(&self, reason: NoRoute, start: Pose, finish: Finish, car: &VehicleSettings) -> LoadError {
+    fn no_route(&self, reason: NoRoute, frame: Frame, start: Pose, finish: Finish, car: &VehicleSettings) -> LoadError {
         let clearance_m = self.clearance_m;
         let blocked = |place: &str, pose: Pose| {
             let problem = format!(
                 "the car ({:.2} m × {:.2} m, and {clearance_m} m around it) does not stand free at {}",
                 car.length_m,
                 car.width_m,
-                self.in_map(pose.position())
+                frame.said(pose.position())
             );
             self.fault(place, problem, "move or turn it away from what is not drivable, or enlarge the lot with scale")
         };
@@ -407,26 +469,35 @@ impl MapLot {
             }
             (NoRoute::StartBlocked, _) => blocked("start", start),
             (NoRoute::Walled { at }, Finish::At(_)) => {
-                let problem = format!("the goal cannot be reached: a wall is in the way near {}", self.in_map(at));
+                let problem = format!("the goal cannot be reached: a wall is in the way near {}", frame.said(at));
                 self.fault("route", problem, "open the map there, or put start and goal on the same side of it")
             }
             (NoRoute::Walled { at }, Finish::Start) => {
-                let problem = format!("there is no loop: the way back to the start ends near {}", self.in_map(at));
+                let problem = format!("there is no loop: the way back to the start ends near {}", frame.said(at));
                 self.fault("route", problem, "open the map there, or give a goal instead of loop")
             }
             (NoRoute::Narrow { at, width_m }, _) => {
                 let need_m = car.width_m + 2.0 * clearance_m;
                 let problem = format!(
                     "the passage near {} is too narrow: about {width_m:.1} m in the lot, and the car needs {need_m:.2} m",
-                    self.in_map(at)
+                    frame.said(at)
                 );
                 self.fault("route", problem, "widen it, enlarge the lot with scale, or lower clearance_m")
+            }
+            (NoRoute::Askew { at, off_deg }, _) => {
+                let problem = format!(
+                    "the car gets to the goal, but at best turned {off_deg:.0}° away from it, at {}",
+                    frame.said(at)
+                );
+                let remedy = "turn the goal, or move it to where the car can turn before it; headings are degrees \
+                              counter-clockwise from x";
+                self.fault("goal", problem, remedy)
             }
             (NoRoute::Tight { reached, to_go_m }, _) => {
                 let problem = format!(
                     "no drive forwards was found: it got to {}, about {to_go_m:.0} m of the lot before the goal. The car \
                      does not reverse, and turns with a radius of {:.1} m or more",
-                    self.in_map(reached),
+                    frame.said(reached),
                     route::radius_min_m(car)
                 );
                 let remedy = "widen the map there, turn or move start and goal, enlarge the lot with scale, or lower \
@@ -437,22 +508,12 @@ impl MapLot {
     }
 }
 
-fn kerbed(polygon: Vec<Vec2>) -> Island {
-    Island { polygon, height_m: 0.15 }
-}
-
 /// Checks a scenario that has no route yet. Everything else is checked before the route.
 fn validate_ground(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), ScenarioError> {
     match validate(scenario, vehicle) {
         Err(ScenarioError { place: Place::ReferencePath(_), .. }) => Ok(()),
         other => other,
     }
-}
-
-/// Boundary and islands of a scenario that has no route yet.
-fn outlines(name: String, ground: &Ground) -> Scenario {
-    let islands = ground.islands.iter().cloned().map(kerbed).collect();
-    Scenario { islands, ..Scenario::new(name, ground.boundary.iter().copied(), [Vec2::ZERO; 0]) }
 }
 
 #[cfg(test)]

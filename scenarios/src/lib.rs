@@ -11,7 +11,9 @@
 //! | [`split`] | splits and families of generated lots, sealed ones included |
 //! | [`load`] | lots as TOML files |
 //! | [`import`] | ROS maps and TPCAP cases as lots |
+//! | [`note`] | what an import did and found, for people |
 
+mod branches;
 pub mod clutter;
 pub mod corridor;
 mod error;
@@ -19,6 +21,7 @@ mod families;
 pub mod generator;
 pub mod import;
 pub mod load;
+pub mod note;
 pub mod reference;
 pub mod solver;
 pub mod split;

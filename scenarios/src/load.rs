@@ -5,6 +5,7 @@
 
 use crate::error::{LoadError, Location, line_at, read_text};
 use crate::import::{self, MapLot};
+use crate::note::Loaded;
 use sim::scenario::{Direction, Place, Scenario, ScenarioError};
 use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
@@ -18,6 +19,14 @@ use toml_edit::{Array, Document, Formatted, InlineTable, Item, Value};
 /// # Errors
 /// The first thing wrong with it, with its place.
 pub fn load(path: &Path, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
+    load_with_notes(path, vehicle).map(|loaded| loaded.scenario)
+}
+
+/// [`load`], and what is to be said about the lot.
+///
+/// # Errors
+/// The first thing wrong with it, with its place.
+pub fn load_with_notes(path: &Path, vehicle: &VehicleSettings) -> Result<Loaded, LoadError> {
     if import::is_map(path) {
         return MapLot::read(path)?.scenario(vehicle);
     }
@@ -25,7 +34,8 @@ pub fn load(path: &Path, vehicle: &VehicleSettings) -> Result<Scenario, LoadErro
     if Document::parse(text.as_str()).is_ok_and(|document| names_a_map(&document)) {
         return MapLot::read(path)?.scenario(vehicle);
     }
-    parse(&text, &path.display().to_string(), vehicle)
+    let scenario = parse(&text, &path.display().to_string(), vehicle)?;
+    Ok(Loaded { scenario, notes: Vec::new() })
 }
 
 fn names_a_map(document: &Document<&str>) -> bool {
@@ -223,6 +233,7 @@ impl VisitMut for Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::note::Note;
     use crate::reference::{self, ReferenceLot};
     use sim::seed::RootSeed;
 
@@ -248,6 +259,26 @@ mod tests {
             let back = scenario.reversed();
             validate(&back, &VehicleSettings::hyundai_hg300())
                 .unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        }
+    }
+
+    #[test]
+    fn every_map_in_the_folder_becomes_a_lot_without_junctions_for_both_ways() {
+        let car = VehicleSettings::hyundai_hg300();
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/maps");
+        let mut files: Vec<_> = folder.read_dir().expect("maps").map(|entry| entry.expect("entry").path()).collect();
+        files.retain(|file| file.extension().is_some_and(|extension| extension == "yaml"));
+        files.sort();
+        assert!(files.len() >= 12, "{files:?}");
+        for file in files {
+            let Loaded { scenario, notes } = load_with_notes(&file, &car).unwrap_or_else(|error| panic!("{error}"));
+            let is_open = |note: &Note| matches!(note, Note::Open { .. });
+            assert!(!notes.iter().any(is_open), "{}: {notes:?}", file.display());
+            let length_m = sim::path::Path::new(&scenario.reference_path).length_m();
+            assert!((80.0..=300.0).contains(&length_m), "{}: {length_m} m", file.display());
+            for direction in Direction::BOTH {
+                assert_eq!(check_direction(&file, &scenario, direction, &car), Ok(()));
+            }
         }
     }
 

@@ -120,6 +120,7 @@ pub fn lot(which: ReferenceLot, seed: RootSeed) -> Scenario {
     Scenario {
         name: which.name().to_owned(),
         boundary: corridor.boundary,
+        boundary_height_m: 0.0,
         reference_path: corridor.reference_path,
         noise: LotNoise::default(),
         islands: Vec::new(),

@@ -88,11 +88,18 @@ impl Goal {
     }
 
     fn is_reached(&self, pose: Pose) -> bool {
+        self.is_in_reach(pose) && self.heading_cos_of(pose) > self.heading_cos
+    }
+
+    /// Whether a car is where it is to arrive, whatever its heading.
+    fn is_in_reach(&self, pose: Pose) -> bool {
         let from_goal = pose.position() - self.point;
         let past_m = from_goal.dot(self.direction);
-        (0.0..2.0 * STEP_M).contains(&past_m)
-            && from_goal.perp_dot(self.direction).abs() < self.reach_m
-            && pose.ahead().dot(self.direction) > self.heading_cos
+        (0.0..2.0 * STEP_M).contains(&past_m) && from_goal.perp_dot(self.direction).abs() < self.reach_m
+    }
+
+    fn heading_cos_of(&self, pose: Pose) -> f32 {
+        pose.ahead().dot(self.direction)
     }
 }
 

@@ -8,7 +8,7 @@ use sim::driver::{Decision, Driver, Fleet, GroundTruth, LookAheadPoint, OneDrive
 use sim::episode::{self, Episode, EpisodeSettings};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
-use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, Scenario, SpeedBump};
+use sim::scenario::{Island, NoiseLevel, Obstacle, ObstacleClass, Scenario, SpeedBump};
 use sim::seed::RootSeed;
 use sim::sensing::noise::NoiseSettings;
 use sim::sensing::{SensingSettings, Sensor};
@@ -47,6 +47,27 @@ fn observation(bencher: Bencher<'_, '_>, (level, occlusion): (NoiseLevel, bool))
     let map = map(WIDTH_M);
     let settings = SensingSettings { occlusion, ..SensingSettings::paper() };
     let mut sensor = Sensor::new(&map, settings, &NoiseSettings::of(level), RootSeed(1));
+    let mut tick = 0;
+    bencher.bench_local(|| {
+        tick += 1;
+        let pose = Pose::new(Vec2::new((tick % 1900) as f32 * 0.1, 0.1), 0.05 * (tick as f32 * 0.1).sin());
+        sensor.observe(&map, pose, tick)
+    });
+}
+
+/// A lane between rooms: walls of some height in 300 pieces of up to 4 m.
+#[divan::bench(args = [0.15, 2.0])]
+fn observation_between_walls(bencher: Bencher<'_, '_>, wall_height_m: f32) {
+    let wall = |x, y, length_m, width_m| Island {
+        polygon: sim::geometry::rectangle(Pose::new(Vec2::new(x, y), 0.0), length_m, width_m).to_vec(),
+        height_m: wall_height_m,
+    };
+    let along = (0..12).flat_map(|i| [2.0, -2.0].map(|y| wall(17.0 * i as f32, y, 14.0, 0.2)));
+    let across = (0..12).flat_map(|i| [6.0, -6.0].map(|y| wall(17.0 * i as f32, y, 0.2, 6.0)));
+    let mut scenario = Scenario::lane(-20.0..=220.0, 20.0, 0.0..=200.0);
+    scenario.islands = along.chain(across).collect();
+    let map = Map::build(scenario, &VehicleSettings::hyundai_hg300()).expect("the rooms are sound");
+    let mut sensor = Sensor::new(&map, SensingSettings::paper(), &NoiseSettings::of(NoiseLevel::Paper), RootSeed(1));
     let mut tick = 0;
     bencher.bench_local(|| {
         tick += 1;

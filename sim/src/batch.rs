@@ -64,7 +64,9 @@ pub fn run_lockstep_until(
 pub struct SeatedFleet {
     fleet: Box<dyn Fleet + Send>,
     episodes: Vec<Episode>,
-    /// Of each tick since they were last passed on, a frame of each car that drove, with its index among these cars.
+    /// The index of each of them among the episodes of all fleets.
+    indices: Vec<usize>,
+    /// Of each tick since they were last passed on, a frame of each car that drove, with its index among all.
     frames: Vec<Vec<(usize, Frame)>>,
 }
 
@@ -72,24 +74,32 @@ pub struct SeatedFleet {
 const TICKS_AT_ONCE: usize = 16;
 
 impl SeatedFleet {
-    /// A fleet in the cars of some episodes; it knows each by its index among them.
-    pub fn new(fleet: Box<dyn Fleet + Send>, episodes: Vec<Episode>) -> Self {
-        Self { fleet, episodes, frames: Vec::new() }
+    /// A fleet in the cars of some episodes, each with its index among those of all fleets. The fleet knows each by its
+    /// place among its own.
+    pub fn new(fleet: Box<dyn Fleet + Send>, episodes: Vec<(usize, Episode)>) -> Self {
+        let (indices, episodes) = episodes.into_iter().unzip();
+        Self { fleet, episodes, indices, frames: Vec::new() }
     }
 
     /// Seats fleets in all cars, each in up to `cars_each` of them. `fleet` is called with the number of its cars.
+    ///
+    /// Cars are dealt out one by one: neighbours are often of the same lot, and so the fleets end at about the same time.
     pub fn in_all(
         episodes: Vec<Episode>,
         cars_each: usize,
         mut fleet: impl FnMut(usize) -> Box<dyn Fleet + Send>,
     ) -> Vec<Self> {
-        let mut waiting = episodes.into_iter().peekable();
-        let seated = std::iter::from_fn(|| {
-            waiting.peek()?;
-            let episodes: Vec<Episode> = waiting.by_ref().take(cars_each).collect();
-            Some(Self::new(fleet(episodes.len()), episodes))
-        });
-        seated.collect()
+        let fleets = episodes.len().div_ceil(cars_each);
+        let mut dealt: Vec<Vec<(usize, Episode)>> = (0..fleets).map(|_| Vec::with_capacity(cars_each)).collect();
+        for (index, episode) in episodes.into_iter().enumerate() {
+            dealt[index % fleets].push((index, episode));
+        }
+        dealt.into_iter().map(|episodes| Self::new(fleet(episodes.len()), episodes)).collect()
+    }
+
+    /// The cars with their indices among those of all fleets.
+    fn cars(&self) -> impl Iterator<Item = (&usize, &Episode)> {
+        self.indices.iter().zip(&self.episodes)
     }
 
     /// Drives on for [`TICKS_AT_ONCE`], or until all have ended.
@@ -102,15 +112,16 @@ impl SeatedFleet {
                 episode.observe();
             }
             decide(&running, &mut *self.fleet, &mut decisions);
-            let drive =
-                |((index, episode), &decision): ((usize, &mut Episode), &Decision)| (index, episode.apply(decision));
+            let drive = |((car, episode), &decision): ((usize, &mut Episode), &Decision)| {
+                (self.indices[car], episode.apply(decision))
+            };
             self.frames.push(running.into_iter().zip(&decisions).map(drive).collect());
         }
     }
 }
 
-/// Drives fleets in lock-step until all episodes have ended. Episodes are counted on from one fleet to the next; otherwise
-/// as [`run_lockstep`].
+/// Drives fleets in lock-step until all episodes have ended. Episodes are ordered by their index among those of all
+/// fleets; otherwise as [`run_lockstep`].
 pub fn run_fleets(fleets: Vec<SeatedFleet>, on_frame: &mut dyn FnMut(usize, &Frame)) -> Vec<EpisodeReport> {
     let reports = run_fleets_until(fleets, &mut |episode, frame| {
         on_frame(episode, frame);
@@ -125,30 +136,31 @@ pub fn run_fleets_until(
     on_frame: &mut dyn FnMut(usize, &Frame) -> ControlFlow<()>,
 ) -> Vec<Option<EpisodeReport>> {
     // Fleets may drive on beyond the tick in which `on_frame` breaks; only frames that were passed on count.
-    let mut n_passed_on: Vec<u32> = fleets.iter().flat_map(|fleet| &fleet.episodes).map(Episode::tick).collect();
+    let mut passed_on: Vec<u32> = vec![0; fleets.iter().map(|fleet| fleet.episodes.len()).sum()];
+    for (&index, episode) in fleets.iter().flat_map(SeatedFleet::cars) {
+        passed_on[index] = episode.tick();
+    }
     'driving: loop {
         fleets.par_iter_mut().for_each(SeatedFleet::drive);
         for tick in 0..TICKS_AT_ONCE {
-            let (mut has_driven, mut is_over) = (false, false);
-            let mut first = 0;
-            for fleet in &fleets {
-                for (index, frame) in &fleet.frames[tick] {
-                    has_driven = true;
-                    is_over |= on_frame(first + index, frame).is_break();
-                    n_passed_on[first + index] += 1;
-                }
-                first += fleet.episodes.len();
+            let mut frames: Vec<&(usize, Frame)> = fleets.iter().flat_map(|fleet| &fleet.frames[tick]).collect();
+            frames.sort_by_key(|(index, _)| *index);
+            let mut is_over = frames.is_empty();
+            for (index, frame) in frames {
+                is_over |= on_frame(*index, frame).is_break();
+                passed_on[*index] += 1;
             }
-            if is_over || !has_driven {
+            if is_over {
                 break 'driving;
             }
         }
     }
-    let episodes = fleets.iter().flat_map(|fleet| &fleet.episodes);
-    let report = |(episode, passed_on): (&Episode, u32)| {
-        (episode.ending().is_some() && episode.tick() == passed_on).then(|| episode.report())
-    };
-    episodes.zip(n_passed_on).map(report).collect()
+    let mut reports: Vec<Option<EpisodeReport>> = vec![None; passed_on.len()];
+    for (&index, episode) in fleets.iter().flat_map(SeatedFleet::cars) {
+        let has_ended = episode.ending().is_some() && episode.tick() == passed_on[index];
+        reports[index] = has_ended.then(|| episode.report());
+    }
+    reports
 }
 
 /// The episodes that have not ended, with their indices.

@@ -35,6 +35,9 @@ pub fn interpolated_change_max_m(apart_m: f32) -> f32 {
 /// A generous bound of rounding in single precision, metres.
 const ROUNDING_M: f32 = 1e-4;
 
+/// Polygons of more edges are carved by the edges near each node, which takes a raster of its own.
+const FEW_EDGES: usize = 12;
+
 /// Bits of a distance far outside the lot, −[`CAP_M`].
 const FAR_OUTSIDE: u32 = (-CAP_M).to_bits();
 
@@ -61,22 +64,44 @@ impl DistanceField {
         let size = (high + margin - origin) / NODE_M;
         let (cols, rows) = (size.x.ceil() as usize + 1, size.y.ceil() as usize + 1);
         assert!(i16::try_from(cols.max(rows)).is_ok(), "a raster of {cols} x {rows} nodes takes gigabytes");
-        let mut field = Self { origin, cols, rows, nodes: vec![0; cols * rows + SPARE_NODES] };
-        field.fill(boundary);
-        for (a, b) in edges(boundary) {
-            field.bring_near(a, b);
+        Self { origin, cols, rows, nodes: vec![0; cols * rows + SPARE_NODES] }.with_polygon(boundary)
+    }
+
+    /// A field that is far outside everywhere with the inside of a polygon.
+    fn with_polygon(mut self, polygon: &[Vec2]) -> Self {
+        self.fill(polygon);
+        for (a, b) in edges(polygon) {
+            self.bring_near(a, b);
         }
-        field
+        self
     }
 
     /// Carves a non-drivable polygon (any winding, need not be convex).
     pub fn carve_polygon(&mut self, polygon: &[Vec2]) {
+        if polygon.len() <= FEW_EDGES { self.carve_by_every_edge(polygon) } else { self.carve_by_near_edges(polygon) }
+    }
+
+    /// Each node from every edge.
+    fn carve_by_every_edge(&mut self, polygon: &[Vec2]) {
         self.carve(bounds(polygon), |points, is_in_box| {
             let squared = edges(polygon).map(|(a, b)| points.squared_distance_to_segment(a, b));
             let distances_m = squared.fold(f32x4::splat(f32::INFINITY), f32x4::fast_min).sqrt();
             let are_inside = if is_in_box { points.are_inside(polygon) } else { f32x4::ZERO };
             are_inside.select(-distances_m, distances_m)
         });
+    }
+
+    /// Each node from the edges near it: the polygon's own field, turned inside out, on the same nodes. To the bit what
+    /// [`Self::carve_by_every_edge`] carves.
+    fn carve_by_near_edges(&mut self, polygon: &[Vec2]) {
+        let island = Self { nodes: vec![0; self.nodes.len()], ..*self }.with_polygon(polygon);
+        let (low, high) = bounds(polygon);
+        for row in self.rows_within(low.y - CAP_M, high.y + CAP_M) {
+            let cols = self.cols;
+            self.for_each_four(row, low.x - CAP_M, high.x + CAP_M, |col, _, nodes_m| {
+                Some(nodes_m.fast_min(-island.four_nodes_m(row * cols + col)))
+            });
+        }
     }
 
     /// Carves a non-drivable disc.
@@ -267,7 +292,7 @@ impl DistanceField {
                 let x = low.x + along.x * ((y - low.y) / along.y);
                 (left, right) = (left.max(x - strip_m), right.min(x + strip_m));
             }
-            self.for_each_four(row, left, right, |points, nodes_m| {
+            self.for_each_four(row, left, right, |_, points, nodes_m| {
                 let distances_m = points.squared_distance_to_segment(a, b).sqrt();
                 let sign = f32x4::splat(-0.0);
                 Some((nodes_m & !sign).fast_min(distances_m) | (nodes_m & sign))
@@ -283,7 +308,7 @@ impl DistanceField {
         for row in self.rows_within(low.y - CAP_M, high.y + CAP_M) {
             let y = self.node_y(row);
             let above_or_below_m = (low.y - y).max(y - high.y).max(0.0);
-            self.for_each_four(row, low.x - CAP_M, high.x + CAP_M, |points, nodes_m| {
+            self.for_each_four(row, low.x - CAP_M, high.x + CAP_M, |_, points, nodes_m| {
                 let beside_m = (f32x4::splat(low.x) - points.x).fast_max(points.x - f32x4::splat(high.x));
                 let beside_m = beside_m.fast_max(f32x4::ZERO);
                 let to_box = beside_m * beside_m + f32x4::splat(above_or_below_m * above_or_below_m);
@@ -297,8 +322,15 @@ impl DistanceField {
         }
     }
 
-    /// Replaces nodes of a row from one world x to another one, four at a time.
-    fn for_each_four(&mut self, row: usize, left: f32, right: f32, new_m: impl Fn(FourPoints, f32x4) -> Option<f32x4>) {
+    /// Replaces nodes of a row from one world x to another one, four at a time. `new_m` is given the column of the first,
+    /// where they are, and what they hold.
+    fn for_each_four(
+        &mut self,
+        row: usize,
+        left: f32,
+        right: f32,
+        new_m: impl Fn(usize, FourPoints, f32x4) -> Option<f32x4>,
+    ) {
         let col = |x: f32| ((x - self.origin.x) / NODE_M).max(0.0) as usize;
         let (first, end) = (col(left), (col(right) + 2).min(self.cols));
         let y = f32x4::splat(self.node_y(row));
@@ -307,7 +339,7 @@ impl DistanceField {
             let col = col.min(self.cols - LANES);
             let index = row * self.cols + col;
             let x = f32x4::splat(self.origin.x) + counted_from(col) * f32x4::splat(NODE_M);
-            if let Some(new_m) = new_m(FourPoints { x, y }, self.four_nodes_m(index)) {
+            if let Some(new_m) = new_m(col, FourPoints { x, y }, self.four_nodes_m(index)) {
                 let stored = new_m.to_array().map(|node_m| node_m.to_bits() ^ FAR_OUTSIDE);
                 self.nodes[index..index + LANES].copy_from_slice(&stored);
             }
@@ -413,6 +445,36 @@ mod tests {
             let plain = plain_field(&boundary, &islands, disc);
             let different = (0..plain.nodes.len()).filter(|&index| field.nodes[index] != plain.nodes[index]).count();
             assert_eq!(different, 0, "of {} nodes, turned by {turned_rad}", plain.nodes.len());
+        }
+    }
+
+    /// A star of many edges in a lot, by both ways of carving; at some turns nodes lie on its edges.
+    #[test]
+    fn an_island_of_many_edges_is_carved_to_the_bit_as_by_every_edge() {
+        let star = |arms: usize, turned_rad: f32| -> Vec<Vec2> {
+            let corner = |i: usize| {
+                let radius_m = if i.is_multiple_of(2) { 9.0 } else { 6.3 };
+                Vec2::new(14.0, 13.0)
+                    + radius_m * Vec2::from_angle(turned_rad + i as f32 * std::f32::consts::PI / arms as f32)
+            };
+            (0..2 * arms).map(corner).collect()
+        };
+        let stairs: Vec<Vec2> = (0..10)
+            .flat_map(|i| [(5 + i, 5 + i), (6 + i, 5 + i)])
+            .chain([(16, 20), (5, 20)])
+            .map(|(x, y)| Vec2::new(x as f32, y as f32))
+            .collect();
+        let lot = [(0.0, 0.0), (28.0, 0.0), (28.0, 26.0), (0.0, 26.0)].map(Vec2::from);
+        for island in [star(8, 0.0), star(40, 0.3), star(7, 2.0), stairs] {
+            let (mut near, mut every) = (DistanceField::of_boundary(&lot), DistanceField::of_boundary(&lot));
+            for field in [&mut near, &mut every] {
+                field.carve_disc(Vec2::new(4.0, 13.0), 1.5);
+            }
+            near.carve_by_near_edges(&island);
+            every.carve_by_every_edge(&island);
+            let different = (0..near.nodes.len()).filter(|&index| near.nodes[index] != every.nodes[index]).count();
+            assert_eq!(different, 0, "of an island of {} edges", island.len());
+            assert!(near.at(Vec2::new(14.0, 13.0)) <= -CAP_M || island.len() == 22);
         }
     }
 

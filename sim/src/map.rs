@@ -4,11 +4,14 @@
 
 use crate::collision::CollisionWorld;
 use crate::distance_field::DistanceField;
-use crate::geometry::{Circles, Outline, Pose, Vec2};
+use crate::geometry::{Circles, Outline, Pose, Vec2, edges};
 use crate::path::Path;
-use crate::scenario::{Scenario, ScenarioError};
+use crate::scenario::{KERB_MAX_M, Obstacle, Scenario, ScenarioError};
 use crate::validate::validate;
 use crate::vehicle::VehicleSettings;
+
+/// Walls are cut into pieces of at most this length, metres: a circle around a piece then tells well whether it is near.
+const WALL_PIECE_M: f32 = 8.0;
 
 /// The clean world: what is drivable, what is solid, and the route.
 #[derive(Debug)]
@@ -21,10 +24,10 @@ pub struct Map {
     occluder_circles: Circles,
 }
 
-/// A convex object that hides the ground behind it from the camera.
+/// A convex object, or a piece of a wall, that hides the ground behind it from the camera.
 #[derive(Debug, Clone)]
 pub struct Occluder {
-    /// Convex outline in the world, counter-clockwise.
+    /// Convex outline in the world, counter-clockwise; the two ends of a piece of a wall.
     pub outline: Vec<Vec2>,
     /// The same corners, arranged to be transformed together.
     pub(crate) corners: Outline,
@@ -34,6 +37,48 @@ pub struct Occluder {
     pub radius_m: f32,
     /// Height above ground, metres.
     pub height_m: f32,
+}
+
+impl Occluder {
+    /// Whether it is the far side of a wall that is no lower than the camera: what it hides, the near side hides as well.
+    #[inline]
+    pub(crate) fn is_far_side(&self, camera: Vec2, camera_height_m: f32) -> bool {
+        let &[from, to] = &self.outline[..] else { return false };
+        self.height_m >= camera_height_m && (from - camera).perp_dot(to - camera) >= 0.0
+    }
+}
+
+impl Occluder {
+    fn of_obstacle(obstacle: &Obstacle) -> Self {
+        let [length_m, width_m, height_m] = obstacle.size_m();
+        let centre = obstacle.centre().position();
+        let outline = obstacle.outline();
+        let corners = outline.iter().copied().collect();
+        Self { outline, corners, centre, radius_m: 0.5 * length_m.hypot(width_m), height_m }
+    }
+
+    fn of_wall(from: Vec2, to: Vec2, height_m: f32) -> Self {
+        let outline = vec![from, to];
+        let corners = outline.iter().copied().collect();
+        Self { outline, corners, centre: from.midpoint(to), radius_m: 0.5 * from.distance(to), height_m }
+    }
+}
+
+/// The outlines of everything higher than a kerb, in short pieces with free ground to their right. What an outline hides is what the solid within it
+/// hides: every line of sight that meets the solid meets its outline first.
+fn walls(scenario: &Scenario) -> impl Iterator<Item = Occluder> {
+    let boundary = std::iter::once((&scenario.boundary, scenario.boundary_height_m, true));
+    let islands = scenario.islands.iter().map(|island| (&island.polygon, island.height_m, false));
+    let high = boundary.chain(islands).filter(|&(_, height_m, _)| height_m > KERB_MAX_M);
+    high.flat_map(|(outline, height_m, is_free_inside)| {
+        let is_counter_clockwise = edges(outline).map(|(a, b)| a.perp_dot(b)).sum::<f32>() > 0.0;
+        edges(outline).flat_map(move |(a, b)| {
+            let (from, to) = if is_counter_clockwise == is_free_inside { (b, a) } else { (a, b) };
+            let n_pieces = (from.distance(to) / WALL_PIECE_M).ceil().max(1.0) as usize;
+            let end = move |i: usize| from.lerp(to, i as f32 / n_pieces as f32);
+            (0..n_pieces).map(move |i| Occluder::of_wall(end(i), end(i + 1), height_m))
+        })
+    })
 }
 
 impl Map {
@@ -62,17 +107,8 @@ impl Map {
                 distance.carve_polygon(&obstacle.outline());
             }
         }
-        let occluders: Vec<Occluder> = scenario
-            .obstacles
-            .iter()
-            .map(|obstacle| {
-                let [length_m, width_m, height_m] = obstacle.size_m();
-                let centre = obstacle.centre().position();
-                let outline = obstacle.outline();
-                let corners = outline.iter().copied().collect();
-                Occluder { outline, corners, centre, radius_m: 0.5 * length_m.hypot(width_m), height_m }
-            })
-            .collect();
+        let occluders: Vec<Occluder> =
+            scenario.obstacles.iter().map(Occluder::of_obstacle).chain(walls(&scenario)).collect();
         let occluder_circles = occluders.iter().map(|occluder| (occluder.centre, occluder.radius_m)).collect();
         let collision = CollisionWorld::new(&scenario);
         Ok(Self { scenario, path, distance, collision, occluders, occluder_circles })

@@ -15,6 +15,9 @@ pub struct Scenario {
     pub name: String,
     /// Outline of the drivable ground, world metres, either winding. Everything outside is non-drivable.
     pub boundary: Vec<Vec2>,
+    /// Height of what stands along the boundary, metres: above [`KERB_MAX_M`] it hides the drivable ground behind it.
+    #[serde(default, skip_serializing_if = "is_flat")]
+    pub boundary_height_m: f32,
     /// Route of the rear axle, from start to finish. Used by metrics and resets, never shown to a policy.
     pub reference_path: ReferencePath,
     /// Sensor noise of this lot; the command line may override the level.
@@ -31,20 +34,28 @@ pub struct Scenario {
     pub speed_bumps: Vec<SpeedBump>,
 }
 
+/// Islands and boundaries up to this height are kerbs and hide nothing, metres; higher ones are walls.
+pub const KERB_MAX_M: f32 = 0.15;
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_flat(height_m: &f32) -> bool {
+    *height_m == 0.0
+}
+
 /// A raised area inside the boundary: planted island, kerbed median.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Island {
     /// Outline, world metres.
     pub polygon: Vec<Vec2>,
-    /// Height of the kerb, metres.
+    /// Height above ground, metres: above [`KERB_MAX_M`] it hides the ground behind it.
     #[serde(default = "Island::default_height_m")]
     pub height_m: f32,
 }
 
 impl Island {
     fn default_height_m() -> f32 {
-        0.15
+        KERB_MAX_M
     }
 }
 
@@ -251,6 +262,7 @@ impl Scenario {
         Self {
             name: name.into(),
             boundary: boundary.into_iter().map(Into::into).collect(),
+            boundary_height_m: 0.0,
             reference_path: ReferencePath { points: route.into_iter().map(Into::into).collect(), corner_radius_m: 0.0 },
             noise: LotNoise::default(),
             islands: Vec::new(),

@@ -9,6 +9,8 @@ use crate::vehicle::VehicleSettings;
 
 /// Largest extent of a lot, metres: its raster of distances then takes 100 MB.
 pub const EXTENT_MAX_M: f32 = 500.0;
+/// Largest coordinate, metres: single precision resolves 1 mm up to here.
+pub const FAR_MAX_M: f32 = 8192.0;
 /// An object farther than this from the lot is a typing error, metres.
 const STRAY_M: f32 = 50.0;
 /// Points nearer than this count as one, metres.
@@ -26,8 +28,12 @@ const CHORDS_PER_BLOCK: usize = 16;
 /// The first problem found, with its place and a remedy.
 pub fn validate(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), ScenarioError> {
     check_name(&scenario.name)?;
+    check_near_origin(&scenario.boundary)?;
     check_polygon(&scenario.boundary, Place::Boundary)?;
     check_extent(&scenario.boundary)?;
+    if scenario.boundary_height_m != 0.0 {
+        check_size(Place::Boundary(None), "boundary_height_m", scenario.boundary_height_m, 5.0)?;
+    }
     let lot = bounds(&scenario.boundary);
     for (i, island) in scenario.islands.iter().enumerate() {
         check_polygon(&island.polygon, |_| Place::Island(i))?;
@@ -148,9 +154,14 @@ fn check_extent(boundary: &[Vec2]) -> Result<(), ScenarioError> {
         let remedy = format!("keep it within {EXTENT_MAX_M} m; coordinates are in metres");
         return fault(Place::Boundary(None), problem, remedy);
     }
-    // Single precision resolves 1 mm up to here.
+    Ok(())
+}
+
+/// Before anything else: far away, different points become the same.
+fn check_near_origin(boundary: &[Vec2]) -> Result<(), ScenarioError> {
+    let (low, high) = bounds(boundary);
     let far = low.abs().max(high.abs()).max_element();
-    if far > 8192.0 {
+    if far > FAR_MAX_M && far.is_finite() {
         let problem = format!("a coordinate is {far:.0} m from the origin");
         return fault(Place::Boundary(None), problem, "move the lot near (0, 0)");
     }
@@ -452,6 +463,8 @@ mod tests {
                 "boundary, vertex 1: the edge from vertex 1 to 2 meets the edge from vertex 2 to 3 near (50.00, -3.00)",
             ),
             (|s| s.boundary[1].x = 4000.0, "boundary: the lot spans 4000 m"),
+            (|s| s.boundary_height_m = 7.5, "boundary: boundary_height_m is 7.5; write a number of metres above 0"),
+            (|s| s.boundary.iter_mut().for_each(|p| p.x += 5e6), "boundary: a coordinate is 5000040 m from the origin"),
             (|s| s.boundary.iter_mut().for_each(|p| p.y += 9000.0), "boundary: a coordinate is 9003 m from the origin"),
             (
                 |s| s.boundary.iter_mut().for_each(|p| *p *= 1e-3),

@@ -268,12 +268,15 @@ fn fleets_of_their_own_drive_as_one_fleet() {
                 let mut fleet = OneDriverEach((0..5).map(ahead).collect());
                 run_lockstep_until(episodes(), &mut fleet, &mut on_frame)
             } else {
-                let all: Vec<(usize, Episode)> = episodes().into_iter().enumerate().collect();
-                let seated = |cars: &[(usize, Episode)]| {
+                // Dealt out one by one, as `SeatedFleet::in_all` does.
+                let fleets = 5_usize.div_ceil(cars_each);
+                let seated = |first: usize| {
+                    let cars: Vec<(usize, Episode)> =
+                        episodes().into_iter().enumerate().skip(first).step_by(fleets).collect();
                     let drivers = cars.iter().map(|&(index, _)| ahead(index)).collect();
-                    SeatedFleet::new(Box::new(OneDriverEach(drivers)), cars.iter().map(|car| car.1.clone()).collect())
+                    SeatedFleet::new(Box::new(OneDriverEach(drivers)), cars)
                 };
-                run_fleets_until(all.chunks(cars_each).map(seated).collect(), &mut on_frame)
+                run_fleets_until((0..fleets).map(seated).collect(), &mut on_frame)
             };
             drives.push((reports, seen));
         }

@@ -3,7 +3,7 @@
 
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
-use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, Scenario, SpeedBump};
+use sim::scenario::{Island, NoiseLevel, Obstacle, ObstacleClass, Scenario, SpeedBump};
 use sim::seed::RootSeed;
 use sim::sensing::noise::{Layer, NoiseSettings};
 use sim::sensing::{BEV_PIXELS, CELL_PIXELS, GRID_CELLS, GridGeometry, OccupancyGrid, SensingSettings, Sensor};
@@ -22,6 +22,24 @@ fn lane() -> Map {
     Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap()
 }
 
+/// Two rooms and a corridor behind thin walls, the boundary as high as they are.
+fn rooms() -> Map {
+    let rectangle = |x: f32, y: f32, length_m: f32, width_m: f32| Island {
+        polygon: sim::geometry::rectangle(Pose::new(Vec2::new(x, y), 0.0), length_m, width_m).to_vec(),
+        height_m: 2.0,
+    };
+    let mut scenario = Scenario::lane(-10.0..=90.0, 24.0, 0.0..=60.0);
+    scenario.boundary.extend([(-10.0, 6.0), (-4.0, 6.0), (-4.0, 5.0), (-10.0, 5.0)].map(Vec2::from));
+    scenario.boundary_height_m = 2.0;
+    scenario.islands = vec![
+        rectangle(30.0, 2.5, 50.0, 0.2),
+        rectangle(20.0, -2.5, 30.0, 0.2),
+        rectangle(50.0, -2.5, 20.0, 0.2),
+        rectangle(25.0, 7.0, 0.3, 8.0),
+    ];
+    Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap()
+}
+
 fn sensor(map: &Map, level: NoiseLevel, seed: u64) -> Sensor {
     let no_dropout = NoiseSettings { dropout: 0.0, ..NoiseSettings::of(level) };
     Sensor::new(map, SensingSettings::paper(), &no_dropout, RootSeed(seed))
@@ -29,15 +47,21 @@ fn sensor(map: &Map, level: NoiseLevel, seed: u64) -> Sensor {
 
 #[test]
 fn the_fast_grid_is_the_max_pool_of_the_brute_force_view() {
-    let map = lane();
-    for (level, seed) in [(NoiseLevel::Clean, 1), (NoiseLevel::Paper, 2), (NoiseLevel::Paper, 3), (NoiseLevel::Hard, 4)]
-    {
-        let mut sensor = sensor(&map, level, seed);
+    let (lane, rooms) = (lane(), rooms());
+    for (map, level, seed) in [
+        (&lane, NoiseLevel::Clean, 1),
+        (&lane, NoiseLevel::Paper, 2),
+        (&lane, NoiseLevel::Paper, 3),
+        (&lane, NoiseLevel::Hard, 4),
+        (&rooms, NoiseLevel::Clean, 5),
+        (&rooms, NoiseLevel::Paper, 6),
+    ] {
+        let mut sensor = sensor(map, level, seed);
         for i in 0..120_u32 {
             let pose = Pose::new(Vec2::new(i as f32 * 0.5, (i as f32 * 0.37).sin()), (i as f32 * 0.21).sin() * 0.9);
             let tick = 7 * i;
-            let fast = sensor.observe(&map, pose, tick).grid;
-            let brute = sensor.perceived_view(&map, pose, tick).to_grid();
+            let fast = sensor.observe(map, pose, tick).grid;
+            let brute = sensor.perceived_view(map, pose, tick).to_grid();
             assert_eq!(fast, brute, "{level:?}, seed {seed}, tick {tick}\n{fast}\n{brute}");
         }
     }
@@ -99,6 +123,44 @@ fn things_hide_the_ground_behind_them_only_when_occlusion_is_on() {
         sensor.observe(&map, Pose::new(Vec2::new(10.0, 0.0), 0.0), 0).grid.count_occupied()
     };
     assert!(occupied(true) > occupied(false));
+}
+
+/// Whether a line of sight is free is asked of the raster of distances, step by step: nothing that the sensor uses.
+#[test]
+fn high_walls_hide_what_no_line_of_sight_reaches_and_low_ones_nothing() {
+    let map = rooms();
+    let low = {
+        let mut scenario = map.scenario().clone();
+        scenario.boundary_height_m = 0.0;
+        scenario.islands.iter_mut().for_each(|island| island.height_m = sim::scenario::KERB_MAX_M);
+        Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap()
+    };
+    let settings = SensingSettings::paper();
+    let geometry = settings.geometry;
+    let (mut wrong, mut hidden) = (0, 0);
+    for i in 0..40_u32 {
+        let pose = Pose::new(Vec2::new(1.5 * i as f32, 0.3 * (i as f32 * 0.37).sin()), 0.5 * (i as f32 * 0.7).sin());
+        let camera = pose.position() + pose.ahead() * settings.camera_ahead_m;
+        let view = sensor(&map, NoiseLevel::Clean, 0).clean_view(&map, pose);
+        let low_view = sensor(&low, NoiseLevel::Clean, 0).clean_view(&low, pose);
+        for (row, col) in
+            (0..BEV_PIXELS).step_by(7).flat_map(|row| (0..BEV_PIXELS).step_by(7).map(move |col| (row, col)))
+        {
+            let point = pose.world_from_ego().point(geometry.pixel_in_ego(row, col));
+            let is_drivable = map.signed_distance_m(point) > 0.0;
+            assert_eq!(low_view.is_occupied(row, col), !is_drivable, "low walls hide nothing");
+            let steps = (camera.distance(point) / 0.02) as usize;
+            let on_sight = |k: usize| map.signed_distance_m(camera.lerp(point, k as f32 / steps as f32));
+            let sight_m = (0..=steps).map(on_sight).fold(f32::INFINITY, f32::min);
+            // Lines of sight that graze an edge are left out: the raster is right to centimetres.
+            if sight_m.abs() > 0.05 || view.is_occupied(row, col) == (sight_m < 0.0) {
+                wrong += u32::from(view.is_occupied(row, col) != (sight_m < 0.0));
+                hidden += u32::from(is_drivable && sight_m < 0.0);
+            }
+        }
+    }
+    assert!(hidden > 3000, "{hidden} pixels are hidden");
+    assert!(wrong < 20, "{wrong} pixels are judged otherwise, of {hidden} hidden ones");
 }
 
 /// Errors belong to places: the misread ground stays where it is while the car drives by.

@@ -16,3 +16,4 @@ pub(crate) mod settings;
 pub(crate) mod train;
 pub(crate) mod tune;
 pub(crate) mod visualise;
+mod within;

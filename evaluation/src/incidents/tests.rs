@@ -22,6 +22,7 @@ fn map() -> Map {
     let scenario = Scenario {
         name: "bend".into(),
         boundary: points(&[(-5.0, -2.0), (45.0, -2.0), (45.0, 40.0), (38.0, 40.0), (38.0, 2.0), (-5.0, 2.0)]),
+        boundary_height_m: 0.0,
         reference_path: ReferencePath {
             points: points(&[(0.0, 0.0), (41.5, 0.0), (41.5, 30.0)]),
             corner_radius_m: 5.0,

@@ -50,6 +50,8 @@ pub struct EvaluationSettings {
     pub seed: RootSeed,
     /// Lots to drive.
     pub lots: Vec<String>,
+    /// Lots unlike those that are trained on, for the check at the end of a training; may be empty.
+    pub elsewhere: Vec<String>,
     /// Ways they are driven.
     pub directions: Vec<Direction>,
     /// Times every lot is driven in each direction (paper: five).

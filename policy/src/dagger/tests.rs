@@ -42,6 +42,7 @@ fn episodes(count: usize) -> Vec<Episode> {
     let scenario = Scenario {
         name: "bent lane".to_string(),
         boundary: vec![v(-4.0, -3.5), v(26.0, -3.5), v(52.0, 11.5), v(48.5, 17.6), v(24.0, 3.5), v(-4.0, 3.5)],
+        boundary_height_m: 0.0,
         reference_path: ReferencePath { points: vec![v(0.0, 0.0), v(25.0, 0.0), v(42.0, 9.8)], corner_radius_m: 12.0 },
         noise: LotNoise::default(),
         islands: Vec::new(),

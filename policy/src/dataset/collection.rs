@@ -49,7 +49,7 @@ pub struct EpisodeRecord {
 
 impl Format for Collection {
     const NAME: &'static str = "round.toml";
-    const SCHEMA: u32 = 1;
+    const SCHEMA: u32 = 2;
 }
 
 impl Collection {

@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! round-00/round.toml       how it was collected
-//!          grids.npy        u8  [n, 25, 25]   1 = non-drivable, row 0 = far, column 0 = left
+//!          grids.npy        u8  [n, 79]       a bit per cell (`packed.rs`): 1 = non-drivable
 //!          labels.npy       f32 [n, 3]        u, w, τ̂ (image fractions)
 //!          ticks.npz        [n] per column    episode, time, pose, command and driver of each sample
-//!          noise_augmentations.npz   u8 [n, k, 25, 25]   the same scenes with other noise, if k > 0
+//!          noise_augmentations.npz   u8 [n, k, 79]   the same scenes with other noise, if k > 0
 //!          model.safetensors, model.toml, fit.toml       the network trained after it
 //! round-01/…
 //! final/                    an optional longer fit on everything
@@ -14,20 +14,19 @@
 //! Every file and folder appears under its name only when it is complete: it is written beside, then renamed.
 
 use crate::dataset::collection::Collection;
+use crate::dataset::packed;
 use crate::dataset::round::Round;
 use crate::dataset::sample::Sample;
 use crate::dataset::tick::Tick;
-use crate::files::{self, FileError, RESTORE_REMEDY, SCHEMA_REMEDY, WRITE_REMEDY, open, write_atomically};
-use ndarray::{Array2, Array3, Array4};
+use crate::files::{self, FileError, RESTORE_REMEDY, WRITE_REMEDY, open, write_atomically};
+use ndarray::{Array2, Array3, ArrayView1};
 use ndarray_npy::{NpzReader, NpzWriter, ReadNpyExt as _, WriteNpyExt as _};
-use sim::sensing::{GRID_CELLS, OccupancyGrid};
+use sim::sensing::OccupancyGrid;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 const AUGMENTATIONS: &str = "noise_augmentations.npz";
 const AUGMENTATIONS_ARRAY: &str = "noise_augmentations";
-/// The name of the same file in older versions.
-const AUGMENTATIONS_ONCE: &str = "relooks.npz";
 
 /// The folder of one run.
 #[derive(Debug, Clone)]
@@ -91,8 +90,7 @@ impl Store {
         }
         files::create_folder(&partial)?;
 
-        let cells = round.samples.iter().flat_map(|sample| sample.grid.cells()).collect();
-        let grids = Array3::from_shape_vec([n, GRID_CELLS, GRID_CELLS], cells).expect("a grid has 25×25 cells");
+        let grids = packed::pack(round.samples.iter().map(|sample| &sample.grid));
         let labels = round.samples.iter().flat_map(|s| [s.label[0], s.label[1], s.tau_hat]).collect();
         let labels = Array2::from_shape_vec([n, 3], labels).expect("a label has three values");
         write_atomically(&partial.join("grids.npy"), |file| grids.write_npy(file).map_err(|error| error.to_string()))?;
@@ -101,10 +99,10 @@ impl Store {
         })?;
         Tick::write_all(&round.ticks, &partial)?;
         if each > 0 {
-            let cells = round.noise_augmentations.iter().flat_map(OccupancyGrid::cells).collect();
-            let augmentations = Array4::from_shape_vec([n, each, GRID_CELLS, GRID_CELLS], cells)
+            let augmentations = packed::pack(round.noise_augmentations.iter())
+                .into_shape_with_order([n, each, packed::GRID_BYTES])
                 .expect("every sample has as many noise augmentations");
-            // k times as large as the grids: 20 times smaller when compressed.
+            // k times as large as the grids: nine times smaller when compressed.
             write_atomically(&partial.join(AUGMENTATIONS), |file| {
                 let mut archive = NpzWriter::new_compressed(file);
                 let written = archive.add_array(AUGMENTATIONS_ARRAY, &augmentations).and_then(|()| archive.finish());
@@ -121,17 +119,8 @@ impl Store {
     /// If a file is missing, from an older version, or does not fit the others.
     pub fn read_round(&self, index: u32) -> Result<(Round, Collection), FileError> {
         let folder = self.round_folder(index);
-        let once = folder.join(AUGMENTATIONS_ONCE);
-        if once.exists() {
-            let problem = format!("noise augmentations of an older version; they are {AUGMENTATIONS} now");
-            return Err(FileError::new(&once, problem, SCHEMA_REMEDY));
-        }
         let collection: Collection = files::read(&folder)?;
-        let samples = self.read_samples(index)?;
-        if samples.len() != collection.samples {
-            let problem = format!("{} samples, {} according to round.toml", samples.len(), collection.samples);
-            return Err(FileError::new(&folder.join("grids.npy"), problem, RESTORE_REMEDY));
-        }
+        let samples = read_samples(&folder, collection.samples)?;
         let ticks = Tick::read_all(&folder, samples.len())?;
         let noise_augmentations =
             read_augmentations(&folder.join(AUGMENTATIONS), samples.len(), collection.noise_augmentations)?;
@@ -141,52 +130,54 @@ impl Store {
     /// Reads the samples of a round alone.
     ///
     /// # Errors
-    /// If a file is missing or is not what it should be.
+    /// If a file is missing, from an older version, or is not what it should be.
     pub fn read_samples(&self, index: u32) -> Result<Vec<Sample>, FileError> {
         let folder = self.round_folder(index);
-        let (grids_path, labels_path) = (folder.join("grids.npy"), folder.join("labels.npy"));
-        let grids = Array3::<u8>::read_npy(open(&grids_path)?)
-            .map_err(|error| FileError::new(&grids_path, error, RESTORE_REMEDY))?;
-        let labels = Array2::<f32>::read_npy(open(&labels_path)?)
-            .map_err(|error| FileError::new(&labels_path, error, RESTORE_REMEDY))?;
-        let n = grids.shape()[0];
-        if grids.shape()[1..] != [GRID_CELLS, GRID_CELLS] {
-            let problem = format!("shape {:?} instead of [n, {GRID_CELLS}, {GRID_CELLS}]", grids.shape());
-            return Err(FileError::new(&grids_path, problem, RESTORE_REMEDY));
-        }
-        if labels.shape() != [n, 3] {
-            let problem = format!("shape {:?} instead of [{n}, 3], one row per grid", labels.shape());
-            return Err(FileError::new(&labels_path, problem, RESTORE_REMEDY));
-        }
-        if let Some(bad) = labels.iter().position(|value| !value.is_finite()) {
-            let problem = format!("row {} holds a value that is not finite", bad / 3);
-            return Err(FileError::new(&labels_path, problem, RESTORE_REMEDY));
-        }
-        let samples = grids
-            .outer_iter()
-            .zip(labels.outer_iter())
-            .map(|(cells, label)| {
-                let cells: Vec<u8> = cells.iter().copied().collect();
-                Sample { grid: OccupancyGrid::from_cells(&cells), label: [label[0], label[1]], tau_hat: label[2] }
-            })
-            .collect();
-        Ok(samples)
+        let collection: Collection = files::read(&folder)?;
+        read_samples(&folder, collection.samples)
     }
+}
+
+fn read_samples(folder: &Path, samples: usize) -> Result<Vec<Sample>, FileError> {
+    let (grids_path, labels_path) = (folder.join("grids.npy"), folder.join("labels.npy"));
+    let grids = Array2::<u8>::read_npy(open(&grids_path)?)
+        .map_err(|error| FileError::new(&grids_path, error, RESTORE_REMEDY))?;
+    let labels = Array2::<f32>::read_npy(open(&labels_path)?)
+        .map_err(|error| FileError::new(&labels_path, error, RESTORE_REMEDY))?;
+    if grids.shape() != [samples, packed::GRID_BYTES] {
+        let expected = [samples, packed::GRID_BYTES];
+        let problem = format!("shape {:?}; {expected:?} according to round.toml", grids.shape());
+        return Err(FileError::new(&grids_path, problem, RESTORE_REMEDY));
+    }
+    if labels.shape() != [samples, 3] {
+        let problem = format!("shape {:?} instead of [{samples}, 3], one row per grid", labels.shape());
+        return Err(FileError::new(&labels_path, problem, RESTORE_REMEDY));
+    }
+    if let Some(bad) = labels.iter().position(|value| !value.is_finite()) {
+        let problem = format!("row {} holds a value that is not finite", bad / 3);
+        return Err(FileError::new(&labels_path, problem, RESTORE_REMEDY));
+    }
+    let of = |(grid, label): (OccupancyGrid, ArrayView1<'_, f32>)| Sample {
+        grid,
+        label: [label[0], label[1]],
+        tau_hat: label[2],
+    };
+    Ok(packed::unpack(grids).zip(labels.outer_iter()).map(of).collect())
 }
 
 fn read_augmentations(path: &Path, samples: usize, each: usize) -> Result<Vec<OccupancyGrid>, FileError> {
     if each == 0 {
         return Ok(Vec::new());
     }
-    let grids: Array4<u8> = NpzReader::new(open(path)?)
+    let grids: Array3<u8> = NpzReader::new(open(path)?)
         .and_then(|mut archive| archive.by_name(AUGMENTATIONS_ARRAY))
         .map_err(|error| FileError::new(path, error, RESTORE_REMEDY))?;
-    if grids.shape() != [samples, each, GRID_CELLS, GRID_CELLS] {
-        let problem = format!("shape {:?} instead of [{samples}, {each}, {GRID_CELLS}, {GRID_CELLS}]", grids.shape());
+    let expected = [samples, each, packed::GRID_BYTES];
+    if grids.shape() != expected {
+        let problem = format!("shape {:?} instead of {expected:?}", grids.shape());
         return Err(FileError::new(path, problem, RESTORE_REMEDY));
     }
-    let cells: Vec<u8> = grids.into_iter().collect();
-    Ok(cells.chunks_exact(GRID_CELLS * GRID_CELLS).map(OccupancyGrid::from_cells).collect())
+    Ok(packed::unpack(grids).collect())
 }
 
 #[cfg(test)]
@@ -229,22 +220,32 @@ mod tests {
         fs::write(path("labels.npy"), whole).unwrap();
         Tick::write_all(&collected(4, 0).0.ticks, &store.round_folder(0)).unwrap();
         assert!(error().contains("ticks.npz") && error().contains("4 rows for 5 samples"), "{}", error());
-        fs::write(path("round.toml"), "schema = 1\nwho = 1").unwrap();
+        fs::write(path("round.toml"), "schema = 2\nwho = 1").unwrap();
         assert!(error().contains("round.toml") && error().contains("who"), "{}", error());
         fs::remove_dir_all(store.folder()).unwrap();
     }
 
     /// Trained on without them, a round would silently give another network.
     #[test]
-    fn noise_augmentations_that_are_missing_or_have_an_old_name_are_an_error() {
-        let (store, ..) = written("renamed", 5, 1);
-        let path = |name: &str| store.round_folder(0).join(name);
-        fs::rename(path(AUGMENTATIONS), path(AUGMENTATIONS_ONCE)).unwrap();
-        let error = store.read_round(0).unwrap_err().to_string();
-        assert!(error.contains("relooks.npz") && error.contains("train again"), "{error}");
-        fs::remove_file(path(AUGMENTATIONS_ONCE)).unwrap();
+    fn noise_augmentations_that_are_missing_are_an_error() {
+        let (store, ..) = written("missing", 5, 1);
+        fs::remove_file(store.round_folder(0).join(AUGMENTATIONS)).unwrap();
         let error = store.read_round(0).unwrap_err().to_string();
         assert!(error.contains(AUGMENTATIONS), "{error}");
+        fs::remove_dir_all(store.folder()).unwrap();
+    }
+
+    #[test]
+    fn a_round_with_a_byte_per_cell_is_refused_by_the_name_of_its_record() {
+        let (store, ..) = written("unpacked", 5, 0);
+        let path = |name: &str| store.round_folder(0).join(name);
+        ndarray_npy::write_npy(path("grids.npy"), &Array3::<u8>::zeros([5, 25, 25])).unwrap();
+        let record = fs::read_to_string(path("round.toml")).unwrap();
+        fs::write(path("round.toml"), record.replace("schema = 2", "schema = 1")).unwrap();
+        for error in [store.read_round(0).unwrap_err(), store.read_samples(0).unwrap_err()] {
+            let error = error.to_string();
+            assert!(error.contains("round.toml") && error.contains("schema 1"), "{error}");
+        }
         fs::remove_dir_all(store.folder()).unwrap();
     }
 }

@@ -149,6 +149,7 @@ pub(super) fn draw(settings: &DifficultySettings, layout_rng: &mut Rng, obstacle
         obstacles,
         speed_bumps: clutter::speed_bumps(&corridor, SPEED_BUMP_EVERY_M),
         boundary: corridor.boundary,
+        boundary_height_m: 0.0,
     }
 }
 

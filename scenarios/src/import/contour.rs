@@ -6,7 +6,7 @@
 //!
 //! Coordinates are pixels: x to the right, y up, (0, 0) the lower left corner of the map.
 
-use geo::{LineString, Polygon, Simplify as _};
+use geo::{Contains as _, Coord, LineString, Point, Polygon, Simplify as _};
 
 /// Steps of simplification, pixels: the first that leaves sound polygons is taken. A staircase of 45° deviates from its
 /// line by 0.71.
@@ -55,6 +55,72 @@ impl Mask {
             open.extend(ALONG.map(|step| ahead(pixel, step)));
         }
         region
+    }
+
+    /// A region with the specks that it encloses taken for free, up to an area, and how many.
+    pub(super) fn without_specks(mut self, up_to_px2: f64) -> (Self, usize) {
+        let specks = self.specks(|area_px2| area_px2 <= up_to_px2);
+        for speck in &specks {
+            let outline = speck.iter().map(|&[x, y]| Coord { x, y }).collect();
+            let inside = Polygon::new(LineString::new(outline), Vec::new());
+            let (cols, rows) = box_around(speck);
+            for pixel in (rows.0..rows.1).flat_map(|row| (cols.0..cols.1).map(move |col| [col, row])) {
+                let [x, y] = pixel.map(|index| f64::from(index) + 0.5);
+                let middle = Point::new(x, y);
+                if let Some(index) = self.index(pixel).filter(|_| inside.contains(&middle)) {
+                    self.is_free[index] = true;
+                }
+            }
+        }
+        (self, specks.len())
+    }
+
+    /// A region with the specks that it encloses made at least as large as an area, and how many. Specks become boxes of
+    /// pixels; the region is what is still joined to the seed.
+    pub(super) fn with_large_specks(self, seed: [i32; 2], area_min_px2: f64) -> (Self, usize) {
+        let (mut region, mut count) = (self, 0);
+        loop {
+            let specks = region.specks(|area_px2| area_px2 < area_min_px2);
+            if specks.is_empty() {
+                return (region, count);
+            }
+            count += specks.len();
+            for speck in &specks {
+                region.block_around(speck, area_min_px2);
+            }
+            region = region.region_of(seed);
+        }
+    }
+
+    /// Outlines of what a region encloses, of areas that count, square pixels.
+    fn specks(&self, counts: impl Fn(f64) -> bool) -> Vec<Ring> {
+        let is_speck = |ring: &Ring| {
+            let area_px2 = signed_area_px2(ring);
+            area_px2 < 0.0 && counts(-area_px2)
+        };
+        self.outlines().into_iter().filter(is_speck).collect()
+    }
+
+    /// Blocks the pixels of a box around a speck that has at least an area.
+    fn block_around(&mut self, speck: &Ring, area_min_px2: f64) {
+        let (mut cols, mut rows) = box_around(speck);
+        for grown in 0.. {
+            let area_px2 = f64::from(cols.1 - cols.0) * f64::from(rows.1 - rows.0);
+            if area_px2 >= area_min_px2 {
+                break;
+            }
+            match grown % 4 {
+                0 => cols.1 += 1,
+                1 => rows.1 += 1,
+                2 => cols.0 -= 1,
+                _ => rows.0 -= 1,
+            }
+        }
+        for pixel in (rows.0..rows.1).flat_map(|row| (cols.0..cols.1).map(move |col| [col, row])) {
+            if let Some(index) = self.index(pixel) {
+                self.is_free[index] = false;
+            }
+        }
     }
 
     /// Outlines of a region: counter-clockwise around it, clockwise around what it encloses, exact to the pixel.
@@ -110,6 +176,16 @@ impl Mask {
             }
         }
     }
+}
+
+/// The columns and rows of pixels, ends excluded, of a box around a ring.
+fn box_around(ring: &Ring) -> ((i32, i32), (i32, i32)) {
+    let side = |axis: usize| {
+        let along = ring.iter().map(|corner| corner[axis]);
+        let low = along.clone().fold(f64::INFINITY, f64::min).floor() as i32;
+        (low, along.fold(f64::NEG_INFINITY, f64::max).ceil() as i32)
+    };
+    (side(0), side(1))
 }
 
 fn ahead([col, row]: [i32; 2], [dx, dy]: [i32; 2]) -> [i32; 2] {

@@ -7,6 +7,8 @@ use sim::scenario::Obstacle;
 pub(super) struct Ground {
     /// Outline of the drivable ground, metres.
     pub(super) boundary: Vec<Vec2>,
+    /// Whether what is not drivable stands along the outline; otherwise the map merely ends there.
+    pub(super) is_walled: bool,
     /// Outlines of what is not drivable within, metres.
     pub(super) islands: Vec<Vec<Vec2>>,
     /// What has the shape of a car.

@@ -1,7 +1,7 @@
 //! ROS `map_server` maps: a YAML file that names an image (<http://wiki.ros.org/map_server>, sections "Map format" and
 //! "Value Interpretation"; ROS 2's `nav2_map_server` reads the same).
 //!
-//! What is drivable: in mode `trinary` what is free (occupancy below `free_thresh`), in the other two an occupancy below
+//! What is drivable: in mode `trinary` what is free (occupancy up to `free_thresh`, below `occupied_thresh`), in the other two an occupancy below
 //! 50 %. Unknown is not drivable. Transparent pixels are unknown in every mode.
 
 use super::contour::Mask;
@@ -105,6 +105,9 @@ impl Map {
         let image = reader
             .decode()
             .map_err(|error| fault(format!("no readable image: {error}"), "save the map as PGM or PNG"))?;
+        if image.width() == 0 || image.height() == 0 {
+            return Err(fault("it has no pixels".to_owned(), "save the map again"));
+        }
         let pixels = u64::from(image.width()) * u64::from(image.height());
         if pixels > PIXELS_MAX {
             let problem = format!("{} × {} pixels are too many", image.width(), image.height());
@@ -178,8 +181,8 @@ impl Header {
                 return Err(fault(key, format!("it is {value}"), "write an occupancy from 0 to 1"));
             }
         }
-        if free_thresh >= occupied_thresh {
-            let problem = format!("it is {free_thresh}, not below occupied_thresh, {occupied_thresh}");
+        if free_thresh > occupied_thresh {
+            let problem = format!("it is {free_thresh}, above occupied_thresh, {occupied_thresh}");
             return Err(fault("free_thresh", problem, "lower it"));
         }
         Ok(header)
@@ -207,10 +210,13 @@ impl Header {
         let value = [red, green, blue].into_iter().map(f64::from).sum::<f64>() / 3.0;
         let occupancy = if self.negate.is_set() { value / 255.0 } else { (255.0 - value) / 255.0 };
         match self.mode {
-            Mode::Trinary => occupancy < self.free_thresh,
+            // What is at both thresholds is occupied.
+            _ if occupancy >= self.occupied_thresh && self.mode != Mode::Raw => false,
+            Mode::Trinary => occupancy <= self.free_thresh,
+            Mode::Scale if occupancy <= self.free_thresh => true,
             Mode::Scale => {
                 let share = (occupancy - self.free_thresh) / (self.occupied_thresh - self.free_thresh);
-                100.0 * share.clamp(0.0, 1.0) < DRIVABLE_BELOW_PERCENT
+                100.0 * share < DRIVABLE_BELOW_PERCENT
             }
             // The value is the occupancy in per cent, and above 100 unknown; negate does not count.
             Mode::Raw => value < DRIVABLE_BELOW_PERCENT,
@@ -240,6 +246,12 @@ mod tests {
     fn modes_and_negate_decide_what_is_drivable() {
         // Free below 0.196: x > 205.02. The grey 205 of map_saver is unknown.
         assert_eq!(drivable("", &[255, 254, 206, 205, 128, 0]), [true, true, true, false, false, false]);
+        // Occupancies at thresholds, which 51/255 = 0.2 meets exactly: free up to free_thresh, occupied from
+        // occupied_thresh on, where they are the same too.
+        assert_eq!(drivable("free_thresh: 0.2", &[205, 204, 203]), [true, true, false]);
+        let same = "occupied_thresh: 0.2\nfree_thresh: 0.2";
+        assert_eq!(drivable(same, &[205, 204, 203]), [true, false, false]);
+        assert_eq!(drivable(&format!("{same}\nmode: scale"), &[205, 204, 203]), [true, false, false]);
         // Negated: p = x/255, free for x < 49.98.
         assert_eq!(drivable("negate: 1", &[0, 49, 50, 205, 255]), [true, true, false, false, false]);
         assert_eq!(drivable("negate: true", &[0, 255]), drivable("negate: 1", &[0, 255]));

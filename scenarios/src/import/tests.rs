@@ -52,14 +52,16 @@ fn small_map(name: &str, origin: &str) -> MapLot {
     MapLot::of_map(&folder.join("map.yaml"))
 }
 
-fn ground(lot: &MapLot, seed: Vec2) -> Ground {
-    lot.ros_ground(&ros::Map::read(&lot.map).unwrap(), seed, None, &car()).unwrap()
+/// `seed`: in the map's frame.
+fn ground(lot: &MapLot, seed: [f64; 2]) -> Ground {
+    let map = ros::Map::read(&lot.map).unwrap();
+    lot.ros_ground(&map, Frame::around(seed, lot.scale), seed, None, &car(), &mut Vec::new()).unwrap()
 }
 
 #[test]
 fn a_small_map_has_the_outline_computed_by_hand() {
     let lot = small_map("outline", "[1.0, 2.0, 0.0]");
-    let ground = ground(&lot, Vec2::new(1.2, 2.2));
+    let ground = ground(&lot, [1.2, 2.2]);
     let expected = [(3.0, 2.0), (3.0, 3.0), (2.5, 3.0), (2.5, 2.5), (2.0, 2.5), (2.0, 3.5), (1.0, 3.5), (1.0, 2.0)];
     assert_eq!(ground.boundary, vertices(&expected));
     assert!(ground.islands.is_empty());
@@ -69,7 +71,7 @@ fn a_small_map_has_the_outline_computed_by_hand() {
 fn a_turned_origin_turns_the_map_about_its_lower_left_corner() {
     let lot = small_map("turned", &format!("[1.0, 2.0, {FRAC_PI_2}]"));
     // Along the rows is +y now, up the columns −x.
-    let ground = ground(&lot, Vec2::new(0.8, 2.2));
+    let ground = ground(&lot, [0.8, 2.2]);
     let expected = [(1.0, 4.0), (0.0, 4.0), (0.0, 3.5), (0.5, 3.5), (0.5, 3.0), (-0.5, 3.0), (-0.5, 2.0), (1.0, 2.0)];
     assert_eq!(ground.boundary, vertices(&expected));
 }
@@ -77,7 +79,7 @@ fn a_turned_origin_turns_the_map_about_its_lower_left_corner() {
 #[test]
 fn the_scale_enlarges_everything_about_the_origin_of_the_frame() {
     let lot = MapLot { scale: 20.0, ..small_map("scaled", "[1.0, 2.0, 0.0]") };
-    let ground = ground(&lot, Vec2::new(24.0, 44.0));
+    let ground = ground(&lot, [1.2, 2.2]);
     let expected = [
         (60.0, 40.0),
         (60.0, 60.0),
@@ -115,7 +117,7 @@ fn refusal(lot: &MapLot) -> String {
 
 #[test]
 fn a_route_is_found_from_start_to_goal() {
-    let scenario = lane("found", 5).scenario(&car()).unwrap();
+    let scenario = lane("found", 5).scenario(&car()).unwrap().scenario;
     assert_eq!(scenario.name, "map");
     let path = sim::path::Path::new(&scenario.reference_path);
     assert!(path.pose_at(0.0).position().distance(Vec2::new(5.0, 3.5)) < 1e-3);
@@ -133,8 +135,8 @@ fn a_small_map_is_driven_when_it_is_scaled() {
     lot.goal = Some([4.5, 0.35, 0.0]);
     assert!(refusal(&lot).contains("start: the car (4.91 m × 1.86 m"), "{}", refusal(&lot));
     lot.scale = 10.0;
-    let route = lot.scenario(&car()).unwrap().reference_path;
-    assert_eq!(route, lane("scaled-reference", 5).scenario(&car()).unwrap().reference_path);
+    let route = lot.scenario(&car()).unwrap().scenario.reference_path;
+    assert_eq!(route, lane("scaled-reference", 5).scenario(&car()).unwrap().scenario.reference_path);
 }
 
 #[test]
@@ -149,8 +151,24 @@ fn no_route_is_explained_with_its_place_and_a_remedy() {
 
     let mut lot = lane("turn", 5);
     lot.goal = Some([40.0, 3.5, 180.0]);
+    let askew = refusal(&lot);
+    assert!(askew.contains("goal: the car gets to the goal, but at best turned 157° away from it, at (39."), "{askew}");
+    assert!(askew.contains("; turn the goal, or move it"), "{askew}");
+
+    let mut lot = lane("tight", 5);
+    // An alcove that the car would have to turn into on the spot.
+    let rows: Vec<String> = (0..14)
+        .map(|row| {
+            let is_free =
+                |col: usize| (1..59).contains(&col) && (8..13).contains(&row) || (29..32).contains(&col) && row > 0;
+            (0..60).map(|col| if is_free(col) && row < 13 { '.' } else { '#' }).collect()
+        })
+        .collect();
+    std::fs::write(lot.map.with_file_name("map.pgm"), pgm(&rows)).unwrap();
+    lot.goal = Some([30.5, 8.0, 90.0]);
     let tight = refusal(&lot);
     assert!(tight.contains("route: no drive forwards was found: it got to ("), "{tight}");
+    assert!(!tight.contains("about 0 m"), "{tight}");
 
     let mut lot = lane("blocked", 5);
     lot.goal = Some([57.0, 3.5, 0.0]);
@@ -183,7 +201,7 @@ fn a_centre_line_must_have_room_for_the_car() {
         lot
     };
     let line = "x_m, y_m, width\n5.0, 3.5, 2\n 5.0, 3.5, 2\n45.0, 3.5, 2\n";
-    let scenario = with_line("line", 5, line).scenario(&car()).unwrap();
+    let scenario = with_line("line", 5, line).scenario(&car()).unwrap().scenario;
     assert_eq!(scenario.reference_path.points, vertices(&[(5.0, 3.5), (45.0, 3.5)]));
 
     let wall = refusal(&with_line("line-wall", 0, line));
@@ -215,7 +233,7 @@ fn faults_of_the_files_are_named() {
         ("[0.0, 0.0, 0.0]", "[0.0, 0.0]", "map.yaml:4: "),
         ("[0.0, 0.0, 0.0]", "[0.0, .inf, 0.0]", "map.yaml:4: origin: a number is inf; write [x, y, yaw]"),
         ("mode: trinary", "mode: binary", "map.yaml:2: "),
-        ("free_thresh: 0.196", "free_thresh: 0.7", "map.yaml:7: free_thresh: it is 0.7, not below occupied_thresh"),
+        ("free_thresh: 0.196", "free_thresh: 0.7", "map.yaml:7: free_thresh: it is 0.7, above occupied_thresh"),
         ("occupied_thresh: 0.65", "occupied_thresh: 65", "map.yaml:6: occupied_thresh: it is 65; write an occupancy"),
         ("image: map.pgm", "image: [", "map.yaml:"),
     ];
@@ -312,7 +330,7 @@ fn a_case_is_read_in_one_row_or_one_column() {
     assert_eq!(case, tpcap::Case::read(&row.join("column.csv")).unwrap());
     assert_eq!(case.start, [0.0, 0.0, 0.0]);
     assert!((case.goal[2] - 180.0).abs() < 1e-3, "degrees: {:?}", case.goal);
-    let ground = case.ground(1.0);
+    let ground = case.ground(Frame::around([0.0, 0.0], 1.0));
     // Everything lies within x 0…30, y −4…6; 20 m are added.
     assert_eq!(ground.boundary, vertices(&[(-20.0, -24.0), (50.0, -24.0), (50.0, 26.0), (-20.0, 26.0)]));
     assert_eq!(ground.islands, [vertices(&[(10.0, 3.0), (14.0, 3.0), (12.0, 6.0)])]);
@@ -343,4 +361,181 @@ fn the_example_case_becomes_a_lot() {
     assert_eq!((scenario.name.as_str(), scenario.islands.len(), scenario.obstacles.len()), ("open-lot", 3, 2));
     let end = *scenario.reference_path.points.last().unwrap();
     assert!(end.distance(Vec2::new(30.0, 6.0)) < 1.3, "{end}");
+}
+
+/// A lane of 5 m, 60 m long; one pixel is 10 cm. With what is drawn into it: `(x, y)` in pixels is occupied.
+fn fine_lane(name: &str, is_occupied: impl Fn(usize, usize) -> bool) -> MapLot {
+    let rows: Vec<String> = (0..52)
+        .rev()
+        .map(|y| {
+            let is_wall = |x| !(1..599).contains(&x) || !(1..51).contains(&y) || is_occupied(x, y);
+            (0..600).map(|x| if is_wall(x) { '#' } else { '.' }).collect()
+        })
+        .collect();
+    let folder = folder(name, &[("map.yaml", &yaml("0.1", "[0, 0, 0]")), ("map.pgm", &pgm(&rows))]);
+    let mut lot = MapLot::of_map(&folder.join("map.yaml"));
+    (lot.start, lot.goal) = (Some([8.0, 2.6, 0.0]), Some([42.0, 2.6, 0.0]));
+    lot
+}
+
+#[test]
+fn a_speck_becomes_the_smallest_island_or_is_left_out_as_asked() {
+    // At 5 cm per pixel a pixel is a quarter of the smallest island.
+    let mut lot = fine_lane("specks", |x, y| {
+        [(300, 8), (310, 44), (333, 44)].contains(&(x, y)) || (400..403).contains(&x) && y == 9
+    });
+    std::fs::write(&lot.map, yaml("0.05", "[0, 0, 0]")).unwrap();
+    lot.scale = 2.0;
+    (lot.start, lot.goal) = (Some([4.0, 1.3, 0.0]), Some([21.0, 1.3, 0.0]));
+    let areas = |scenario: &Scenario| -> Vec<f32> {
+        let area =
+            |island: &Island| 0.5 * sim::geometry::edges(&island.polygon).map(|(a, b)| a.perp_dot(b)).sum::<f32>();
+        scenario.islands.iter().map(|island| area(island).abs()).collect()
+    };
+    // 10 cm squares in the lot are just as large as islands must be, and a little more is asked for.
+    let loaded = lot.scenario(&car()).unwrap();
+    assert_eq!(loaded.notes, [Note::Padded { specks: 3 }]);
+    let sizes = areas(&loaded.scenario);
+    assert_eq!(sizes.len(), 4);
+    assert!(sizes.iter().all(|&area_m2| (0.0105..0.031).contains(&area_m2)), "{sizes:?}");
+    for (x, y) in [(30.05, 0.85), (31.05, 4.45), (33.35, 4.45), (40.15, 0.95)] {
+        let is_inside = |island: &Island| sim::geometry::polygon_contains(&island.polygon, Vec2::new(x, y));
+        assert!(loaded.scenario.islands.iter().any(is_inside), "({x}, {y}) stays occupied");
+    }
+    lot.drop_specks_m2 = 0.02;
+    let loaded = lot.scenario(&car()).unwrap();
+    assert_eq!(loaded.notes, [Note::Dropped { specks: 3, up_to_m2: 0.02 }]);
+    assert_eq!(areas(&loaded.scenario).len(), 1, "what is larger stays");
+}
+
+/// A speck in the corner between wall and lane becomes part of the wall, not an island across the boundary.
+#[test]
+fn a_speck_beside_a_wall_grows_into_it() {
+    // At 2 cm per pixel it grows by two pixels to either side.
+    let lot = MapLot { scale: 0.2, ..fine_lane("speck-at-wall", |x, y| (x, y) == (300, 2)) };
+    let map = ros::Map::read(&lot.map).unwrap();
+    let (seed, mut notes) = ([8.0, 2.6], Vec::new());
+    let ground = lot.ros_ground(&map, Frame::around(seed, 0.2), seed, None, &car(), &mut notes).unwrap();
+    assert_eq!(notes, [Note::Padded { specks: 1 }]);
+    assert!(ground.islands.is_empty() && ground.boundary.len() > 4, "{:?}", ground.boundary);
+}
+
+#[test]
+fn walls_are_as_high_as_the_lot_says_and_hide_ground_unless_they_are_kerbs() {
+    let mut lot =
+        fine_lane("walls", |x, y| (250..260).contains(&x) && y < 9 || (300..310).contains(&x) && (36..44).contains(&y));
+    for (wall_height_m, hides) in [(None, true), (Some(0.15), false), (Some(0.0), false)] {
+        lot.wall_height_m = wall_height_m.unwrap_or(lot.wall_height_m);
+        let scenario = lot.scenario(&car()).unwrap().scenario;
+        assert_eq!(scenario.boundary_height_m.to_bits(), lot.wall_height_m.to_bits());
+        let text = crate::load::to_toml(&scenario);
+        assert_eq!(crate::load::parse(&text, "written.toml", &car()).unwrap(), scenario, "heights are written");
+        let map = Map::build(scenario, &car()).unwrap();
+        assert_eq!(!map.occluders().is_empty(), hides, "{wall_height_m:?}");
+    }
+}
+
+/// UTM coordinates of some yard: the same lot as beside the origin.
+#[test]
+fn a_map_far_from_its_origin_is_the_same_lot_about_its_start() {
+    let near = fine_lane("near", |x, y| (300..310).contains(&x) && y < 12);
+    let mut far = fine_lane("far", |x, y| (300..310).contains(&x) && y < 12);
+    std::fs::write(&far.map, yaml("0.1", "[4431992.0, 5412997.4, 0.0]")).unwrap();
+    (far.start, far.goal) = (Some([4_432_000.0, 5_413_000.0, 0.0]), Some([4_432_034.0, 5_413_000.0, 0.0]));
+    let (near, far) = (near.scenario(&car()).unwrap(), far.scenario(&car()).unwrap());
+    assert_eq!(near.notes, []);
+    assert_eq!(far.notes, [Note::Recentred { origin: [4_432_000.0, 5_413_000.0] }]);
+    let moved = Vec2::new(8.0, 2.6);
+    assert_eq!(near.scenario.boundary.len(), far.scenario.boundary.len());
+    for (a, b) in near.scenario.boundary.iter().zip(&far.scenario.boundary) {
+        assert!(a.distance(*b + moved) < 2e-3, "{a} {b}");
+    }
+    let said = far.notes[0].to_string();
+    assert_eq!(said, "the map is far from its origin; (0, 0) of the lot is (4432000, 5413000) of the map");
+}
+
+#[test]
+fn junctions_of_a_map_are_named_and_closed_when_asked() {
+    // The lane with a side street of 5 m at x = 25, 30 m long.
+    let rows: Vec<String> = (0..352)
+        .rev()
+        .map(|y| {
+            let is_free = |x: usize| {
+                (1..599).contains(&x) && (1..51).contains(&y) || (225..275).contains(&x) && (51..351).contains(&y)
+            };
+            (0..600).map(|x| if is_free(x) { '.' } else { '#' }).collect()
+        })
+        .collect();
+    let mut lot = fine_lane("junction", |_, _| false);
+    std::fs::write(lot.map.with_file_name("map.pgm"), pgm(&rows)).unwrap();
+    let loaded = lot.scenario(&car()).unwrap();
+    let [Note::Open { mouths }] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
+    assert!(mouths.len() == 1 && (mouths[0][0] - 25.0).abs() < 2.5, "{mouths:?}");
+    assert!(loaded.notes[0].to_string().starts_with("the route has 1 junction, near (2"), "{}", loaded.notes[0]);
+    lot.close_branches = true;
+    let loaded = lot.scenario(&car()).unwrap();
+    let [Note::Closed { mouths }] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
+    assert_eq!((mouths.len(), loaded.scenario.islands.len()), (1, 1));
+}
+
+#[test]
+fn an_image_without_pixels_is_refused() {
+    let lot = lane("no-pixels", 5);
+    std::fs::write(lot.map.with_file_name("map.pgm"), "P5\n0 0\n255\n").unwrap();
+    let message = refusal(&lot);
+    assert!(message.contains("map.pgm: ") && message.contains("save the map"), "{message}");
+}
+
+/// On a coarse map too: nothing that is blocked becomes drivable by more than 0.2 m, by exact polygons.
+#[test]
+fn blocked_ground_stays_blocked_to_a_fifth_of_a_metre() {
+    use geo::{Contains, Distance, Euclidean, LineString, Point, Polygon};
+    for pixel_m in [0.05, 0.25, 1.0, 2.5] {
+        let size = 60;
+        // A disc with a crooked island and a slanted wall.
+        let is_free = |x: f64, y: f64| {
+            let island = (x - 22.0).hypot(y - 31.0) < 7.0 + 2.0 * (0.9 * x).sin();
+            let wall = (y - 0.31 * x - 29.0).abs() < 1.2 && x > 33.0;
+            (x - 30.0).hypot(y - 30.0) < 27.0 && !island && !wall
+        };
+        let rows: Vec<String> = (0..size)
+            .rev()
+            .map(|y| (0..size).map(|x| if is_free(f64::from(x), f64::from(y)) { '.' } else { '#' }).collect())
+            .collect();
+        let folder =
+            folder("coarse", &[("map.yaml", &yaml(&pixel_m.to_string(), "[0, 0, 0]")), ("map.pgm", &pgm(&rows))]);
+        let lot = MapLot::of_map(&folder.join("map.yaml"));
+        let map = ros::Map::read(&lot.map).unwrap();
+        let ground = ground(&lot, [30.0 * pixel_m, 12.0 * pixel_m]);
+        let polygon = |outline: &[Vec2]| -> Polygon<f64> {
+            let ring = outline.iter().map(|p| (f64::from(p.x), f64::from(p.y))).collect::<LineString<f64>>();
+            Polygon::new(ring, Vec::new())
+        };
+        let (boundary, islands) =
+            (polygon(&ground.boundary), ground.islands.iter().map(|island| polygon(island)).collect::<Vec<_>>());
+        let mut deepest_m = 0.0_f64;
+        for i in 0..(4 * size) * (4 * size) {
+            // Four samples per pixel and axis.
+            let at = [f64::from(i % (4 * size)), f64::from(i / (4 * size))].map(|k| (k + 0.5) / 4.0);
+            let point = Point::from((at[0] * pixel_m, at[1] * pixel_m));
+            let is_drivable = boundary.contains(&point) && !islands.iter().any(|island| island.contains(&point));
+            let pixel = [at[0] as i32, at[1] as i32];
+            if !is_drivable || map.drivable.at(pixel) {
+                continue;
+            }
+            // How deep in blocked ground: to the nearest free pixel.
+            let to_free = |col: i32, row: i32| {
+                let [x, y] = [col, row].map(|k| f64::from(k) * pixel_m);
+                let side = geo::Rect::new((x, y), (x + pixel_m, y + pixel_m)).to_polygon();
+                Euclidean.distance(&point, &side)
+            };
+            let around = (-2..=2).flat_map(|dy| (-2..=2).map(move |dx| (pixel[0] + dx, pixel[1] + dy)));
+            let free = around.filter(|&(col, row)| map.drivable.at([col, row]));
+            let depth_m = free.map(|(col, row)| to_free(col, row)).fold(f64::INFINITY, f64::min);
+            deepest_m = deepest_m.max(depth_m);
+        }
+        // Whole millimetres on top.
+        assert!(deepest_m <= SIMPLIFIED_M.min(0.75 * pixel_m) + 2e-3, "{deepest_m} m at {pixel_m} m per pixel");
+        assert!(pixel_m < 0.1 || deepest_m > 0.0 || pixel_m > 0.3, "outlines are simplified at all");
+    }
 }

@@ -7,6 +7,7 @@
 //! A case has no outer boundary; the ground reaches [`MARGIN_M`] beyond everything in it. Its solutions may reverse,
 //! cars here do not: only cases with a drive forwards become lots.
 
+use super::frame::Frame;
 use super::ground::Ground;
 use crate::error::{LoadError, read_text};
 use sim::geometry::{Pose, Vec2, wrap_angle};
@@ -22,10 +23,10 @@ const COUNT_MAX: usize = 10_000;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Case {
     /// x, y in metres, heading in degrees.
-    pub(super) start: [f32; 3],
+    pub(super) start: [f64; 3],
     /// Likewise.
-    pub(super) goal: [f32; 3],
-    obstacles: Vec<Vec<Vec2>>,
+    pub(super) goal: [f64; 3],
+    obstacles: Vec<Vec<[f64; 2]>>,
 }
 
 impl Case {
@@ -39,9 +40,9 @@ impl Case {
 
     fn parse(text: &str, file: &str) -> Result<Self, LoadError> {
         let mut numbers = Numbers::of(text, file)?;
-        let mut pose = |what: &str| -> Result<[f32; 3], LoadError> {
+        let mut pose = |what: &str| -> Result<[f64; 3], LoadError> {
             let [x, y, theta_rad] = [numbers.next(what)?, numbers.next(what)?, numbers.next(what)?];
-            Ok([x, y, wrap_angle(theta_rad).to_degrees()])
+            Ok([x, y, f64::from(wrap_angle(theta_rad as f32).to_degrees())])
         };
         let (start, goal) = (pose("the start (x, y, theta)")?, pose("the goal (x, y, theta)")?);
         let count = numbers.count("the number of obstacles", 0)?;
@@ -51,9 +52,9 @@ impl Case {
         let mut obstacles = Vec::with_capacity(count);
         for (i, count) in vertices.into_iter().enumerate() {
             let what = format!("a vertex of obstacle {}", i + 1);
-            let mut outline: Vec<Vec2> = Vec::with_capacity(count);
+            let mut outline: Vec<[f64; 2]> = Vec::with_capacity(count);
             for _ in 0..count {
-                let vertex = Vec2::new(numbers.next(&what)?, numbers.next(&what)?);
+                let vertex = [numbers.next(&what)?, numbers.next(&what)?];
                 if outline.last() != Some(&vertex) {
                     outline.push(vertex);
                 }
@@ -69,9 +70,10 @@ impl Case {
     }
 
     /// The obstacles on an open plane, enlarged: what has the shape of a car as a car, anything else as an island.
-    pub(super) fn ground(&self, scale: f32) -> Ground {
-        let poses = [self.start, self.goal].map(|[x, y, _]| Vec2::new(x, y) * scale);
-        let outlines = self.obstacles.iter().map(|outline| outline.iter().map(|&p| p * scale).collect::<Vec<_>>());
+    pub(super) fn ground(&self, frame: Frame) -> Ground {
+        let poses = [self.start, self.goal].map(|[x, y, _]| frame.in_lot([x, y]));
+        let in_lot = |outline: &Vec<[f64; 2]>| outline.iter().map(|&point| frame.in_lot(point)).collect::<Vec<_>>();
+        let outlines = self.obstacles.iter().map(in_lot);
         let mut everything = poses.to_vec();
         let (mut islands, mut obstacles) = (Vec::new(), Vec::new());
         for outline in outlines {
@@ -83,7 +85,8 @@ impl Case {
         }
         let (low, high) = crate::corridor::bounds(&everything);
         let (low, high) = (low - MARGIN_M, high + MARGIN_M);
-        Ground { boundary: vec![low, Vec2::new(high.x, low.y), high, Vec2::new(low.x, high.y)], islands, obstacles }
+        let boundary = vec![low, Vec2::new(high.x, low.y), high, Vec2::new(low.x, high.y)];
+        Ground { boundary, is_walled: false, islands, obstacles }
     }
 }
 
@@ -95,6 +98,7 @@ fn car_of(outline: &[Vec2]) -> Option<Obstacle> {
     let is_rectangle = (a + c).distance(b + d) < 0.02 && (a.distance(c) - b.distance(d)).abs() < 0.01;
     let (along, across) = if a.distance(b) >= b.distance(c) { (b - a, c - b) } else { (c - b, d - c) };
     let (length_m, width_m) = (along.length(), across.length());
+    let [length_m, width_m] = [length_m, width_m].map(|metres| (metres * 1000.0).round() / 1000.0);
     (is_rectangle && (3.0..=6.5).contains(&length_m) && (1.3..=2.6).contains(&width_m)).then(|| Obstacle {
         length_m: Some(length_m),
         width_m: Some(width_m),
@@ -105,7 +109,7 @@ fn car_of(outline: &[Vec2]) -> Option<Obstacle> {
 /// The numbers of a file with their lines.
 struct Numbers<'a> {
     file: &'a str,
-    values: Vec<(usize, f32)>,
+    values: Vec<(usize, f64)>,
     taken: usize,
 }
 
@@ -116,7 +120,7 @@ impl<'a> Numbers<'a> {
             let cells =
                 line.trim_start_matches('\u{feff}').split([',', ';', ' ', '\t']).filter(|cell| !cell.is_empty());
             for cell in cells {
-                let value: Option<f32> = cell.parse().ok().filter(|value: &f32| value.is_finite());
+                let value: Option<f64> = cell.parse().ok().filter(|value: &f64| value.is_finite());
                 let Some(value) = value else {
                     return Err(LoadError::Faulty {
                         file: file.to_owned(),
@@ -140,7 +144,7 @@ impl<'a> Numbers<'a> {
         LoadError::Faulty { file: self.file.to_owned(), line, problem, remedy }
     }
 
-    fn next(&mut self, what: &str) -> Result<f32, LoadError> {
+    fn next(&mut self, what: &str) -> Result<f64, LoadError> {
         let Some(&(_, value)) = self.values.get(self.taken) else {
             return Err(self.fault(format!("the file ends after {} numbers, before {what}", self.values.len())));
         };
@@ -150,7 +154,7 @@ impl<'a> Numbers<'a> {
 
     fn count(&mut self, what: &str, least: usize) -> Result<usize, LoadError> {
         let value = self.next(what)?;
-        if value.fract() != 0.0 || !(least as f32..=COUNT_MAX as f32).contains(&value) {
+        if value.fract() != 0.0 || !(least as f64..=COUNT_MAX as f64).contains(&value) {
             self.taken -= 1;
             return Err(self.fault(format!("number {}, {what}, is {value}", self.taken + 1)));
         }

@@ -54,6 +54,13 @@ pub enum NoRoute {
         /// About how wide, metres.
         width_m: f32,
     },
+    /// The car gets to the goal, but not in its direction.
+    Askew {
+        /// Where.
+        at: Vec2,
+        /// By how much it is off at best, degrees.
+        off_deg: f32,
+    },
     /// Wide enough everywhere, but no drive forwards was found.
     Tight {
         /// The point of the search nearest the goal.
@@ -111,6 +118,11 @@ pub fn find(
     }
     if width_m < vehicle.width_m + 2.0 * clearance_m {
         return Err(NoRoute::Narrow { at, width_m });
+    }
+    let at_goal = search.nodes.iter().filter(|node| goal.is_in_reach(node.pose));
+    if let Some(best) = at_goal.max_by(|a, b| goal.heading_cos_of(a.pose).total_cmp(&goal.heading_cos_of(b.pose))) {
+        let off_deg = goal.heading_cos_of(best.pose).clamp(-1.0, 1.0).acos().to_degrees();
+        return Err(NoRoute::Askew { at: best.pose.position(), off_deg });
     }
     let from_front = |node: &super::Node| (to_go.at(front(node.pose)), front(node.pose));
     let (to_go_m, reached) = search

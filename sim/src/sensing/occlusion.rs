@@ -300,7 +300,7 @@ pub(super) struct TallObject {
 }
 
 impl TallObject {
-    /// `outline_in_ego`: convex and counter-clockwise.
+    /// `outline_in_ego`: convex and counter-clockwise, or the two ends of a wall.
     #[inline]
     pub(super) fn new(outline_in_ego: &Outline, height_m: f32, camera: Camera) -> Self {
         let factor = if height_m < camera.height_m {
@@ -309,7 +309,9 @@ impl TallObject {
             FACTOR_MAX
         };
         let camera = Vec2::new(camera.ahead_m, 0.0);
-        Self { outline: outline_in_ego.moved(-camera), factor, camera }
+        let outline = outline_in_ego.moved(-camera);
+        let outline = if outline.n_corners() == 2 { part_ahead(&outline) } else { outline };
+        Self { outline, factor, camera }
     }
 
     /// A box in the ego frame around the thing and the ground hidden behind it; `None` if it is beside or behind the
@@ -337,6 +339,22 @@ impl TallObject {
         let far = (start..=end).map(|i| self.camera + from_camera(i) * self.factor);
         Some(ConvexInEgo::new(near.into_iter().chain(far)))
     }
+}
+
+/// Of a piece of a wall, relative to the camera, the part ahead of it: walls run on beside the camera, and what they
+/// hide begins there. A piece that is not ahead at all stays as it is.
+fn part_ahead(wall: &Outline) -> Outline {
+    let ends = [wall.corner(0), wall.corner(1)];
+    let [is_first_ahead, is_second_ahead] = ends.map(|end| end.x > AHEAD_MIN_M);
+    if is_first_ahead == is_second_ahead {
+        return *wall;
+    }
+    let [first, second] = ends;
+    // Just ahead, so that the part counts as ahead.
+    let level_m = 2.0 * AHEAD_MIN_M;
+    let meets = first.lerp(second, ((level_m - first.x) / (second.x - first.x)).clamp(0.0, 1.0));
+    let meets = Vec2::new(level_m, meets.y);
+    (if is_first_ahead { [first, meets] } else { [meets, second] }).into_iter().collect()
 }
 
 #[cfg(test)]
@@ -385,6 +403,29 @@ mod tests {
         // Far side 9 m: range 7.41 · 1.107 = 8.20 → 9.79 m ahead.
         assert!((reach(0.15) - 9.79).abs() < 0.07, "{}", reach(0.15));
         assert!(reach(1.47) > 16.2);
+    }
+
+    /// A wall 2 m to the left, from behind the camera to 6 m ahead of it: ground beyond it is hidden as far as lines of
+    /// sight meet it, and the order of its ends does not matter.
+    #[test]
+    fn a_wall_beside_the_camera_hides_what_is_beyond_it() {
+        let geometry = GridGeometry::paper();
+        let camera = CAMERA.ahead_m;
+        for ends in [[(-3.0, 2.0), (6.0, 2.0)], [(6.0, 2.0), (-3.0, 2.0)]] {
+            let wall = ends.map(|(x, y)| Vec2::new(camera + x, y));
+            let polygon = hidden_ground(&wall, 2.0, CAMERA).unwrap();
+            let mut view = vec![[false; BEV_PIXELS]; BEV_PIXELS];
+            polygon.for_each_row(&geometry, |row, first, last| view[row][first..=last].fill(true));
+            for (row, pixels) in view.iter().enumerate() {
+                for (col, &is_hidden) in pixels.iter().enumerate() {
+                    let pixel = geometry.pixel_in_ego(row, col);
+                    let (ahead_m, left_m) = (pixel.x - camera, pixel.y);
+                    // The line of sight crosses y = 2 at x = 2·ahead/left, which must lie on the wall.
+                    let margin_m = (left_m - 2.0).min(6.0 * left_m - 2.0 * ahead_m);
+                    assert!(is_hidden == (margin_m > 0.0) || margin_m.abs() < 0.1, "({ahead_m}, {left_m})");
+                }
+            }
+        }
     }
 
     #[test]

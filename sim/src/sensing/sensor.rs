@@ -13,7 +13,7 @@ use super::quadtree::{BLOCK_CELLS, BLOCKS, PixelLattice, pixels_of, to_corner_m}
 use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};
 use crate::distance_field::{DistanceField, change_max_m};
 use crate::geometry::{Pose, Vec2, WorldFromEgo, bits};
-use crate::map::Map;
+use crate::map::{Map, Occluder};
 use crate::seed::RootSeed;
 use crate::vectors::{ALL_LANES, FourPoints, LANES, Picked, coordinate, f32x4};
 use serde::{Deserialize, Serialize};
@@ -320,7 +320,9 @@ impl Sensor {
     fn occluders<'a>(&'a self, map: &'a Map, ego: &'a EgoView) -> impl Iterator<Item = TallObject> + 'a {
         let camera = Camera { ahead_m: self.settings.camera_ahead_m, height_m: self.settings.camera_height_m };
         let near = self.settings.occlusion.then(|| map.occluders_near(ego.patch_centre, ego.patch_radius_m));
-        near.into_iter().flatten().map(move |occluder| {
+        let camera_in_world = ego.world_from_ego.point(Vec2::new(camera.ahead_m, 0.0));
+        let near_sides = move |occluder: &&Occluder| !occluder.is_far_side(camera_in_world, camera.height_m);
+        near.into_iter().flatten().filter(near_sides).map(move |occluder| {
             TallObject::new(&ego.world_from_ego.inverse_outline(&occluder.corners), occluder.height_m, camera)
         })
     }

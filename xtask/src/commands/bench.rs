@@ -4,7 +4,7 @@ use crate::build_info;
 use crate::output::Output;
 use anyhow::Context as _;
 use benchmark::peers::{self, PEERS};
-use benchmark::{Effort, Figure, Goal, driving, maps, network};
+use benchmark::{Effort, Figure, Goal, driving, evaluating, maps, network};
 use clap::{Args, ValueEnum};
 use experiment::run_dir::write_whole;
 use std::fmt::Write as _;
@@ -14,7 +14,7 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask bench --quick                          a look, in about two minutes
   cargo xtask bench --only training                  one area
-  cargo xtask bench --peers                          with PyTorch, onnxruntime, HighwayEnv and IR-SIM from PyPI
+  cargo xtask bench --peers                          with PyTorch, onnxruntime and other simulators from PyPI
   cargo xtask bench --peers --write docs/performance.md";
 
 #[derive(Debug, Clone, Args)]
@@ -25,10 +25,10 @@ pub(crate) struct BenchArgs {
     /// Measures one area only; may be repeated.
     #[arg(long, value_enum, value_name = "AREA")]
     only: Vec<Area>,
-    /// Measures other simulators and libraries, too, in a virtual environment made from PyPI (gigabytes).
+    /// Measures other simulators and libraries, too, in a virtual environments made from PyPI (gigabytes).
     #[arg(long)]
     peers: bool,
-    /// Where that environment is.
+    /// Where the environment is that most of them share; others have theirs beside it.
     #[arg(long, value_name = "DIR", default_value = "target/tools/peers", requires = "peers")]
     environment: PathBuf,
     /// Writes the table into this Markdown file, between its lines `<!-- bench -->` and `<!-- /bench -->`.
@@ -39,12 +39,13 @@ pub(crate) struct BenchArgs {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Area {
     Driving,
+    Evaluating,
     Maps,
     Answers,
     Training,
 }
 
-const AREAS: [Area; 4] = [Area::Driving, Area::Maps, Area::Answers, Area::Training];
+const AREAS: [Area; 5] = [Area::Driving, Area::Evaluating, Area::Maps, Area::Answers, Area::Training];
 const BEGIN: &str = "<!-- bench -->";
 const END: &str = "<!-- /bench -->";
 
@@ -61,6 +62,7 @@ pub(crate) fn run(args: &BenchArgs, output: &Output) -> anyhow::Result<()> {
     for area in AREAS.into_iter().filter(|area| args.only.is_empty() || args.only.contains(area)) {
         match area {
             Area::Driving => driving::figures(effort, &mut report)?,
+            Area::Evaluating => evaluating::figures(effort, &mut report)?,
             Area::Maps => maps::figures(effort, &mut report)?,
             Area::Answers => network::answers(effort, &mut report)?,
             Area::Training => network::training(effort, &mut report)?,

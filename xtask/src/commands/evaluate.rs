@@ -2,6 +2,7 @@
 
 use crate::args::{Directions, JsonArgs, LayerArgs, OutArgs, noise_levels};
 use crate::console::Console;
+use crate::notes;
 use crate::output::Output;
 use crate::record::{self, RecordArgs};
 use anyhow::{Context as _, anyhow, ensure};
@@ -67,6 +68,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     let load = |spec: DriverSpec| spec.load(&settings.expert, settings.dagger.device);
     let drivers: Vec<NamedDriver> = specs.into_iter().map(load).collect::<anyhow::Result<_>>()?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
+    notes::say(&lots, &settings.evaluation.noise, output);
     let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with };
     check(&plan)?;
     let run = RunDir::create(&args.out.place("evaluate", &preset, settings.evaluation.seed.0), &settings)?;

@@ -1,12 +1,14 @@
 //! `generate`: lots as TOML plus a top-view PNG.
 
 use crate::console::Console;
+use crate::notes;
 use crate::output::Output;
 use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::run_dir::write_whole;
+use experiment::settings::NoiseChoice;
 use experiment::trials::{Purpose, Trial};
 use rayon::prelude::*;
 use report::pictures::{self, lot};
@@ -56,13 +58,13 @@ pub(crate) struct GenerateArgs {
 pub(crate) struct MapArgs {
     /// Makes the lot this many times as large as the map.
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
-    scale: Option<f32>,
+    scale: Option<f64>,
     /// Where the rear axle starts: metres, metres, degrees counter-clockwise from x.
     #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
-    start: Option<[f32; 3]>,
+    start: Option<[f64; 3]>,
     /// Where it is to arrive; the route there is found automatically.
     #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
-    goal: Option<[f32; 3]>,
+    goal: Option<[f64; 3]>,
     /// Instead of a goal: a route round a loop, back to the start.
     #[arg(long = "loop", conflicts_with = "goal")]
     is_loop: bool,
@@ -72,11 +74,14 @@ pub(crate) struct MapArgs {
     /// Clearance that a route found automatically keeps around the body, metres in the lot [default: 0.25].
     #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     clearance: Option<f32>,
+    /// Closes ways that leave the route with kerbs.
+    #[arg(long)]
+    close_branches: bool,
 }
 
 /// `X,Y,DEG`.
-fn pose(text: &str) -> Result<[f32; 3], String> {
-    let numbers: Option<Vec<f32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+fn pose(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
     numbers
         .and_then(|numbers| numbers.try_into().ok())
         .ok_or_else(|| "write x,y,degrees, e.g. 3.5,-2,90, without spaces".to_owned())
@@ -90,6 +95,7 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
     ensure!(args.count > 0, "--count is 0; at least one is needed");
     let vehicle = VehicleSettings::hyundai_hg300();
     let lots = lots(args, &vehicle)?;
+    notes::say(&lots, &[NoiseChoice::Lot], output);
     let fixed = lots.iter().find(|lot| !lot.is_drawn_per_trial());
     ensure!(
         args.count == 1 || fixed.is_none(),
@@ -130,7 +136,7 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
 
 /// The lots named; of a map with the route the command line asks for.
 fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lot>> {
-    let MapArgs { scale, start, goal, is_loop, centre_line, clearance } = &args.map;
+    let MapArgs { scale, start, goal, is_loop, centre_line, clearance, close_branches } = &args.map;
     if args.map == MapArgs::default() {
         return Lot::parse_all(&args.lots, vehicle);
     }
@@ -146,6 +152,7 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
     let mut lot = MapLot::read(path)?;
     lot.scale = scale.unwrap_or(lot.scale);
     lot.clearance_m = clearance.unwrap_or(lot.clearance_m);
+    lot.close_branches |= close_branches;
     lot.start = start.or(lot.start);
     if goal.is_some() || *is_loop || centre_line.is_some() {
         (lot.goal, lot.is_loop, lot.centre_line) = (*goal, *is_loop, centre_line.clone());

@@ -1,6 +1,6 @@
 //! `guard`: does the claim still hold? Trains the default and fails if its policy has become worse. For a nightly run.
 
-use super::train;
+use super::{train, within};
 use crate::args::OutArgs;
 use crate::console::Console;
 use crate::output::Output;
@@ -8,12 +8,10 @@ use anyhow::{Context as _, ensure};
 use clap::Args;
 use evaluation::estimate;
 use evaluation::format::exact_rate;
-use evaluation::plan::Plan;
 use evaluation::totals::Totals;
 use experiment::drivers::{DriverSpec, NamedDriver};
-use experiment::lots::Lot;
 use experiment::progress::Interrupted;
-use experiment::run_dir::{Outcome, Place, RunDir};
+use experiment::run_dir::RunDir;
 use experiment::settings::{EvaluationSettings, Settings};
 use serde::Deserialize;
 
@@ -68,26 +66,9 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     );
     let drivers = [driver];
     let drive = |settings: &Settings, folder: &str| -> anyhow::Result<Totals> {
-        let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
-        let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with: 0 };
-        let build = crate::build_info::get();
-        let path = run.path().join(folder);
-        let place = Place {
-            build,
-            out: Some(&path),
-            overwrite: false,
-            command: "guard",
-            preset: "default",
-            seed: settings.seed.0,
-        };
-        let stage = RunDir::create(&place, settings)?;
-        let evaluated = evaluation::evaluate::evaluate(&plan, &stage, &console)?;
-        if !evaluated.is_complete {
-            return Err(interrupted().into());
-        }
-        stage.finish(Outcome::Evaluation { drivers: vec!["DAgger".to_owned()] })?;
-        let all = evaluated.results.slices().pop().context("nothing was driven")?;
-        Ok(evaluated.results.totals(0, 0, &all, None))
+        let results = within::evaluate(&run, folder, settings, &drivers, &console)?;
+        let all = results.slices().pop().context("nothing was driven")?;
+        Ok(results.totals(0, 0, &all, None))
     };
     let reference = drive(&settings, "reference")?;
     let development = drive(&development, "development")?;

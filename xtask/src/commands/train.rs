@@ -1,8 +1,9 @@
 //! `train-bc` and `train-dagger`.
 
-use super::evaluate;
+use super::{evaluate, within};
 use crate::args::{JsonArgs, LayerArgs, OutArgs};
 use crate::console::Console;
+use crate::notes;
 use crate::output::Output;
 use crate::record::{self, RecordArgs};
 use anyhow::Context as _;
@@ -14,7 +15,7 @@ use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress};
 use experiment::run_dir::{Outcome, RunDir};
-use experiment::settings::{Layers, Settings};
+use experiment::settings::{EvaluationSettings, Layers, Settings};
 use experiment::training;
 use experiment::view_request::Show;
 use policy::checkpoint::Checkpoint;
@@ -75,7 +76,7 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         let mut settings = Settings::resolve(&layers, args.seed)?;
         adjust(&mut settings);
         // Before the folder is claimed: a misspelt lot should not leave one behind.
-        check_lots(&settings)?;
+        check_lots(&settings, output)?;
         let place = args.out.place(command, layers.preset_name(), settings.seed.0);
         (RunDir::create(&place, &settings)?, settings)
     };
@@ -85,7 +86,9 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
     let mut tasks = estimate::training(&settings, true);
     if !args.no_eval {
         // The expert, behaviour cloning and what became of it.
-        tasks.extend(evaluate::tasks(&settings, if settings.dagger.iterations_max > 0 { 3 } else { 2 }));
+        let drivers = if settings.dagger.iterations_max > 0 { 3 } else { 2 };
+        tasks.extend(evaluate::tasks(&settings, drivers));
+        tasks.push(estimate::evaluation(&elsewhere(&settings), drivers));
     }
     console.plan(tasks);
     let (policy, outcome) =
@@ -100,6 +103,7 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: drivers.len() - 1 };
         evaluate::check(&plan)?;
         evaluate::measure(&plan, &run, &console, output)?;
+        check_elsewhere(&settings, &run, &drivers, &console, output)?;
         to_record.extend(args.record.record.map(|runs| record::first_runs(&plan, runs)));
     }
     report::run_report::write(run.path(), &console)?;
@@ -109,13 +113,54 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
     if to_record.is_empty() { Ok(()) } else { record::record(run.path(), to_record, output) }
 }
 
+/// The settings of the check on lots that nobody trained on: once each way.
+fn elsewhere(settings: &Settings) -> Settings {
+    let evaluation = EvaluationSettings {
+        lots: settings.evaluation.elsewhere.clone(),
+        elsewhere: Vec::new(),
+        trials: 1,
+        ..settings.evaluation.clone()
+    };
+    Settings { evaluation, ..settings.clone() }
+}
+
+/// Drives where nobody trained, so that few runs on lots that look like those of the training mislead nobody.
+fn check_elsewhere(
+    settings: &Settings,
+    run: &RunDir,
+    drivers: &[NamedDriver],
+    progress: &dyn Progress,
+    output: &Output,
+) -> anyhow::Result<()> {
+    let settings = elsewhere(settings);
+    if settings.evaluation.lots.is_empty() {
+        return Ok(());
+    }
+    let results = within::evaluate(run, "elsewhere", &settings, drivers, progress)?;
+    let names: Vec<&str> = drivers.iter().map(|driver| driver.name.as_str()).collect();
+    let rows = report::elsewhere::rows(&results, &names);
+    let text = || {
+        let noise = &settings.evaluation.noise[0];
+        format!(
+            "\nElsewhere: lots that nobody trained on, noise {noise}\n\n{}",
+            report::elsewhere::table(&rows, &names)
+        )
+    };
+    output.table(text, &rows)
+}
+
 /// Lots that do not exist, or cannot be driven as the settings ask.
-fn check_lots(settings: &Settings) -> anyhow::Result<()> {
+fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result<()> {
     let Settings { training, evaluation, episode, .. } = settings;
-    for (section, lots, directions) in
-        [("training", &training.lots, &training.directions), ("evaluation", &evaluation.lots, &evaluation.directions)]
-    {
-        for lot in Lot::parse_all(lots, &episode.vehicle)? {
+    let noise = std::slice::from_ref(&training.noise);
+    for (section, lots, directions, noise) in [
+        ("training", &training.lots, &training.directions, noise),
+        ("evaluation", &evaluation.lots, &evaluation.directions, &evaluation.noise),
+        ("evaluation", &evaluation.elsewhere, &evaluation.directions, &evaluation.noise),
+    ] {
+        let lots = Lot::parse_all(lots, &episode.vehicle)?;
+        notes::say(&lots, noise, output);
+        for lot in lots {
             let flag = format!("--set {section}.directions='[\"forward\"]'");
             let check = |&direction| lot.check_direction(direction, &episode.vehicle);
             directions.iter().try_for_each(check).map_err(|error| evaluate::or_forward(error, &flag))?;

@@ -1,0 +1,69 @@
+//! What drivers did on lots unlike those they were trained on, one row per kind of lot.
+
+use crate::markdown::with_header;
+use comfy_table::Table;
+use evaluation::format::exact_rate;
+use evaluation::results::EvaluationResults;
+use evaluation::slices::Slice;
+use evaluation::totals::Totals;
+use serde::Serialize;
+
+/// One driver on one kind of lot.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    /// Kind of lot, or `all`.
+    pub lots: String,
+    /// Who drove.
+    pub driver: String,
+    /// Sum of the routes, metres.
+    pub route_m: f64,
+    /// Near-collisions in all.
+    pub near_collisions: u32,
+    /// Times something was touched.
+    pub contacts: u32,
+    /// Times no progress was made.
+    pub stuck: u32,
+    /// Least clearance, metres; below 0 the body overlapped something.
+    pub least_clearance_m: Option<f32>,
+}
+
+/// The rows of an evaluation at its first noise level, kind by kind, driver by driver.
+pub fn rows(results: &EvaluationResults, drivers: &[&str]) -> Vec<Row> {
+    let slices = results.slices();
+    let row = |slice: &Slice, driver: usize| {
+        let Totals { reference_m, near_collisions, contacts, stuck, clearance_min_m, .. } =
+            results.totals(0, driver, slice, None);
+        Row {
+            lots: slice.label.clone(),
+            driver: drivers[driver].to_owned(),
+            route_m: reference_m,
+            near_collisions,
+            contacts,
+            stuck,
+            least_clearance_m: clearance_min_m,
+        }
+    };
+    slices
+        .iter()
+        .flat_map(|slice| (0..drivers.len()).map(move |driver| (slice, driver)))
+        .map(|(s, d)| row(s, d))
+        .collect()
+}
+
+/// A line per kind of lot, for each driver `near-collisions (contacts; least clearance)`, and the rate of the last one.
+pub fn table(rows: &[Row], drivers: &[&str]) -> Table {
+    let mut header = vec!["lots".to_owned(), "route".to_owned()];
+    header.extend(drivers.iter().map(|driver| format!("{driver}: near-coll. (contacts; least m)")));
+    header.extend(drivers.last().map(|driver| format!("{driver} per 100 m [95 %]")));
+    let mut table = with_header(header);
+    for of_lots in rows.chunks(drivers.len()) {
+        let mut cells = vec![of_lots[0].lots.clone(), format!("{:.0} m", of_lots[0].route_m)];
+        cells.extend(of_lots.iter().map(|row| {
+            let least = row.least_clearance_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2}"));
+            format!("{} ({}; {least})", row.near_collisions, row.contacts)
+        }));
+        cells.extend(of_lots.last().map(|row| exact_rate(row.near_collisions, row.route_m)));
+        table.add_row(cells);
+    }
+    table
+}

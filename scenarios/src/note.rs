@@ -1,0 +1,86 @@
+//! What a person should know about a lot that was imported, though nothing is wrong with it.
+
+use sim::scenario::Scenario;
+
+/// A lot from a file, and what is to be said about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loaded {
+    /// The lot.
+    pub scenario: Scenario,
+    /// What is to be said, in order of the work; of a lot written by hand, nothing.
+    pub notes: Vec<Note>,
+}
+
+/// Something an import did, or found. Places are metres in the map's own frame.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Note {
+    /// The map is far from its origin, where single precision is too coarse: the lot's origin is this place.
+    Recentred {
+        /// Of the lot's origin.
+        origin: [f64; 2],
+    },
+    /// Occupied specks smaller than the smallest island were made as large as it.
+    Padded {
+        /// How many.
+        specks: usize,
+    },
+    /// Occupied specks were taken for free ground, because the lot asks for it.
+    Dropped {
+        /// How many.
+        specks: usize,
+        /// Up to this size, m² in the lot.
+        up_to_m2: f64,
+    },
+    /// Ways that leave the route were closed, because the lot asks for it.
+    Closed {
+        /// Where they leave it.
+        mouths: Vec<[f64; 2]>,
+    },
+    /// Ways leave the route and go on.
+    Open {
+        /// Where they leave it.
+        mouths: Vec<[f64; 2]>,
+    },
+}
+
+/// Places named in a note, at most.
+const PLACES_MAX: usize = 6;
+
+impl std::fmt::Display for Note {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let are = |count: usize, one: &str, more: &str| {
+            if count == 1 { format!("1 {one}") } else { format!("{count} {more}") }
+        };
+        match self {
+            Self::Recentred { origin: [x, y] } => {
+                write!(f, "the map is far from its origin; (0, 0) of the lot is ({x}, {y}) of the map")
+            }
+            Self::Padded { specks } => write!(
+                f,
+                "{} of occupied pixels, too small for an island, made 10 cm large; drop_specks_m2 leaves out such specks",
+                are(*specks, "speck", "specks")
+            ),
+            Self::Dropped { specks, up_to_m2 } => write!(
+                f,
+                "{} of occupied pixels left out: drop_specks_m2 takes up to {up_to_m2} m² for free ground",
+                are(*specks, "speck", "specks")
+            ),
+            Self::Closed { mouths } => {
+                write!(f, "{} closed with kerbs, near {}", are(mouths.len(), "branch", "branches"), listed(mouths))
+            }
+            Self::Open { mouths } => write!(
+                f,
+                "the route has {}, near {}: drivers do not see the route and may turn off there; close_branches = true \
+                 (--close-branches of cargo xtask generate) closes branches with kerbs",
+                are(mouths.len(), "junction", "junctions"),
+                listed(mouths)
+            ),
+        }
+    }
+}
+
+fn listed(places: &[[f64; 2]]) -> String {
+    let named: Vec<_> = places.iter().take(PLACES_MAX).map(|[x, y]| format!("({x:.1}, {y:.1})")).collect();
+    let more = places.len().saturating_sub(PLACES_MAX);
+    named.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+}

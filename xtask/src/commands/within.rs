@@ -1,0 +1,42 @@
+//! Evaluations that belong to a run: in folders within its own.
+
+use anyhow::ensure;
+use evaluation::plan::Plan;
+use evaluation::results::EvaluationResults;
+use experiment::drivers::NamedDriver;
+use experiment::lots::Lot;
+use experiment::progress::{Interrupted, Progress};
+use experiment::run_dir::{Outcome, Place, RunDir};
+use experiment::settings::Settings;
+
+/// Drives drivers over the lots of some settings into a folder within a run.
+///
+/// # Errors
+/// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is written.
+pub(crate) fn evaluate(
+    run: &RunDir,
+    folder: &str,
+    settings: &Settings,
+    drivers: &[NamedDriver],
+    progress: &dyn Progress,
+) -> anyhow::Result<EvaluationResults> {
+    let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
+    ensure!(!drivers.is_empty(), "nobody drives");
+    let plan = Plan { settings, drivers, lots: &lots, compare_with: drivers.len() - 1 };
+    let path = run.path().join(folder);
+    let place = Place {
+        build: crate::build_info::get(),
+        out: Some(&path),
+        overwrite: true,
+        command: "evaluate",
+        preset: "run",
+        seed: settings.evaluation.seed.0,
+    };
+    let stage = RunDir::create(&place, settings)?;
+    let evaluated = evaluation::evaluate::evaluate(&plan, &stage, progress)?;
+    if !evaluated.is_complete {
+        return Err(Interrupted { kept: format!("what was done is in {}", run.path().display()) }.into());
+    }
+    stage.finish(Outcome::Evaluation { drivers: drivers.iter().map(|driver| driver.spec.to_string()).collect() })?;
+    Ok(evaluated.results)
+}

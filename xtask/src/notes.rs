@@ -1,0 +1,56 @@
+//! What is to be said about lots from files before anything is driven: once per lot.
+
+use crate::output::Output;
+use experiment::lots::Lot;
+use experiment::settings::NoiseChoice;
+use sim::scenario::NoiseLevel;
+
+/// Says what imports did and found, and which lots ask for noise that they are not driven with.
+pub(crate) fn say(lots: &[Lot], noise: &[NoiseChoice], output: &Output) {
+    for lot in lots {
+        for note in lot.notes() {
+            output.note(format_args!("{}: {note}", lot.name()));
+        }
+        if let Some(level) = lot.asks_for_noise().filter(|&level| is_ignored(level, noise)) {
+            let driven_with: Vec<String> = noise.iter().map(|choice| choice.name()).collect();
+            output.note(format_args!(
+                "{}: the lot asks for noise {}, but is driven with {}; noise lot is what each lot asks for",
+                lot.name(),
+                as_choice(level),
+                driven_with.join(", ")
+            ));
+        }
+    }
+}
+
+/// Whether a lot asks for another level than it is driven with. A lot that says nothing asks for `paper`.
+fn is_ignored(level: NoiseLevel, noise: &[NoiseChoice]) -> bool {
+    level != NoiseLevel::Paper && !noise.iter().any(|&choice| choice == NoiseChoice::Lot || choice == as_choice(level))
+}
+
+fn as_choice(level: NoiseLevel) -> NoiseChoice {
+    match level {
+        NoiseLevel::Clean => NoiseChoice::Clean,
+        NoiseLevel::Paper => NoiseChoice::Paper,
+        NoiseLevel::Hard => NoiseChoice::Hard,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_ignored_if_a_lot_asks_for_another_level_than_it_gets() {
+        use NoiseChoice::{Clean, Hard, Lot, Paper, Times};
+        for (level, noise, expected) in [
+            (NoiseLevel::Hard, &[Paper][..], true),
+            (NoiseLevel::Clean, &[Paper, Times(0.5)], true),
+            (NoiseLevel::Hard, &[Paper, Hard], false),
+            (NoiseLevel::Hard, &[Lot], false),
+            (NoiseLevel::Paper, &[Clean], false),
+        ] {
+            assert_eq!(is_ignored(level, noise), expected, "{level:?} {noise:?}");
+        }
+    }
+}
