@@ -44,9 +44,9 @@ impl Settings {
 }
 
 /// Eight round trips of lot a per round instead of one, and generated lots of every family beside it: here they cost
-/// seconds, not hours of a person's day. What is learned on lot a alone does not carry over, and what is learned on
-/// corridors of easy, medium and hard alone does not carry over to lots of other kinds: trained on these three, the policy
-/// had 3.0 near-collisions per 100 m on six validation lots of each family, trained on all of them .4 (docs/methods.md 11).
+/// seconds, not hours of a person's day. What is learned on lot a alone does not carry over to corridors, and what is
+/// learned on corridors (easy, medium, hard) does not carry over to other kinds of lots: on validation lots of all
+/// families the policy had 3.6 near-collisions per 100 m trained on corridors, .3 trained on all (docs/elsewhere.md).
 /// Most corridors are hard, because most of what fails among them fails there.
 fn default() -> Settings {
     let lots = [
