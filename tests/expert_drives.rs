@@ -38,8 +38,10 @@ fn the_expert_drives_the_example_maps_without_a_near_collision() {
     let settings = Arc::new(EpisodeSettings::paper());
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenarios/examples");
     let maps = examples.join("maps").read_dir().unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let mut maps: Vec<String> =
-        maps.filter(|file| file.ends_with(".yaml")).map(|file| format!("maps/{file}")).collect();
+    let mut maps: Vec<String> = maps
+        .filter(|file| Path::new(file).extension().is_some_and(|ending| ending == "yaml"))
+        .map(|file| format!("maps/{file}"))
+        .collect();
     maps.sort();
     for (file, directions) in [
         ("car-park.yaml", &Direction::BOTH[..]),

@@ -14,12 +14,14 @@
 //! | [`walls`] | walls and kerbs along outlines, with free ground behind |
 //! | [`things`] | what stands in the way and what it leaves free |
 //! | [`route`] | the reference path through that |
+//! | [`parts`] | what lots on strips share: run-outs, closed mouths, the lot as a whole |
 
 mod aisles;
 mod corridor;
 mod course;
 mod lane;
 mod open;
+mod parts;
 mod rooms;
 mod route;
 mod street;
@@ -30,17 +32,8 @@ mod walls;
 
 use crate::split::Family;
 use corridor::DifficultySettings;
-use rand::RngExt as _;
-use sim::scenario::{LotNoise, ObstacleClass, Scenario};
+use sim::scenario::Scenario;
 use sim::seed::Rng;
-use strip::{Mouth, Strip};
-use things::Things;
-use walls::Wall;
-
-/// Straight ground before the start and behind the finish, metres, so that no wall is close there.
-const RUN_OUT_M: f32 = 18.0;
-/// Nothing stands in the way this close to start and finish, metres.
-const END_CLEAR_M: f32 = 9.0;
 
 /// Draws a lot without a name; `None` if the draw came to nothing.
 pub(crate) fn draw(family: Family, layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
@@ -67,59 +60,19 @@ pub(crate) fn clearance_m(family: Family) -> f32 {
     }
 }
 
-/// The stretch of an axis that is driven.
-fn driven_m(strip: &Strip) -> (f32, f32) {
-    (RUN_OUT_M, strip.length_m() - RUN_OUT_M)
-}
-
-/// Obstacles for the stretch of an axis on which some may stand in the way.
-fn things_on(strip: &Strip) -> Things<'_> {
-    let (from_m, to_m) = driven_m(strip);
-    Things::new(strip, (from_m + END_CLEAR_M, to_m - END_CLEAR_M))
-}
-
-/// Closes the mouth of a side road by a row of cones or bollards, or by a barrier.
-fn close(things: &mut Things<'_>, (a, b): Mouth, rng: &mut Rng) {
-    /// The car is 1.86 m wide.
-    const SPACING_M: f32 = 1.2;
-    let class = match rng.random_range(0..4) {
-        0 | 1 => ObstacleClass::Cone,
-        2 => ObstacleClass::Bollard,
-        _ => {
-            things.obstacles.extend(Wall::low(rng).straight(a, b));
-            return;
-        }
-    };
-    let count = (a.distance(b) / SPACING_M).ceil();
-    for k in 0..count as usize {
-        things.stand(things::obstacle(class, a.lerp(b, (k as f32 + 0.5) / count), 0.0));
-    }
-}
-
-/// Puts a lot together.
-fn lot(strip: &Strip, boundary: Vec<sim::geometry::Vec2>, things: Things<'_>) -> Scenario {
-    Scenario {
-        name: String::new(),
-        boundary,
-        boundary_height_m: 0.0,
-        reference_path: route::along(strip, driven_m(strip), &things.narrowings),
-        noise: LotNoise::default(),
-        islands: Vec::new(),
-        obstacles: things.obstacles,
-        speed_bumps: Vec::new(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::strip::{Mouth, Strip};
     use super::*;
     use crate::split::Split;
     use sim::geometry::{Vec2, polygon_contains};
     use sim::map::Map;
+    use sim::scenario::ObstacleClass;
     use sim::seed::Stream;
     use sim::vehicle::VehicleSettings;
     use std::collections::BTreeSet;
 
+    type Is<'a> = dyn Fn(&Scenario, &Strip) -> bool + 'a;
     type Draw = fn(&mut Rng, &mut Rng) -> Option<(Scenario, Strip)>;
     const DRAWS: [(Family, Draw); 6] = [
         (Family::Lane, lane::draw),
@@ -174,7 +127,7 @@ mod tests {
             };
             (0..60).filter_map(drawn).collect::<Vec<_>>()
         };
-        let share = |lots: &[(Scenario, Strip)], is: &dyn Fn(&Scenario, &Strip) -> bool| {
+        let share = |lots: &[(Scenario, Strip)], is: &Is<'_>| {
             lots.iter().filter(|(scenario, strip)| is(scenario, strip)).count() as f32 / lots.len() as f32
         };
         let has = |scenario: &Scenario, class| scenario.obstacles.iter().any(|obstacle| obstacle.class == class);
@@ -185,7 +138,7 @@ mod tests {
             scenario.obstacles.iter().filter(is_such).count() > 20
         };
         // Family, what, share of its lots: at least and at most.
-        let all: [(Family, &str, &dyn Fn(&Scenario, &Strip) -> bool, f32, f32); 14] = [
+        let all: [(Family, &str, &Is<'_>, f32, f32); 14] = [
             (Family::Lane, "narrower than 3.8 m", &|_, strip| strip.half_width_m(0.0) < 1.9, 0.35, 0.65),
             (Family::Lane, "narrower than 3.0 m", &|_, strip| strip.half_width_m(0.0) < 1.5, 0.03, 0.3),
             (Family::Lane, "wider than 6 m", &|_, strip| strip.half_width_m(0.0) > 3.0, 0.05, 0.4),

@@ -2,10 +2,10 @@
 //! ends from aisle to aisle; side aisles are closed or dead ends.
 
 use super::course::{Course, first_apart};
+use super::parts::{RUN_OUT_M, close, lot, things_on};
 use super::strip::{Notch, Strip, Stub};
 use super::things::{self, Rules, Things, facing, side, yaw_rad};
 use super::walls::{Wall, yard};
-use super::{RUN_OUT_M, close, lot, things_on};
 use crate::clutter::draw_car;
 use crate::corridor::{STALL_DEPTH_M, Side};
 use rand::RngExt as _;

@@ -1,10 +1,10 @@
 //! Lanes of one width all along: bends that are not widened, S-curves, chicanes, offset gaps beside double-parked cars.
 
 use super::course::{Course, first_apart};
+use super::parts::{RUN_OUT_M, lot, things_on};
 use super::strip::Strip;
 use super::things::{Rules, Things, facing, side, yaw_rad};
 use super::walls::{self, Wall};
-use super::{RUN_OUT_M, lot, things_on};
 use rand::RngExt as _;
 use sim::geometry::Vec2;
 use sim::scenario::{ObstacleClass, Scenario};

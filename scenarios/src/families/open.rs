@@ -2,10 +2,10 @@
 //! way; walls face the driver where the way turns.
 
 use super::course::{Course, first_apart};
+use super::parts::{RUN_OUT_M, lot, things_on};
 use super::strip::Strip;
 use super::things::{self, Rules, Things, facing, side, yaw_rad};
 use super::walls::{Wall, yard};
-use super::{RUN_OUT_M, lot, things_on};
 use crate::clutter::draw_car;
 use crate::corridor::to_millimetres;
 use rand::RngExt as _;

@@ -2,10 +2,10 @@
 //! the car, pillars, dead ends beside the way.
 
 use super::course::{Course, first_apart};
+use super::parts::{RUN_OUT_M, lot, things_on};
 use super::strip::{Mouth, Notch, Strip, Stub};
 use super::things::{Rules, Things, side};
 use super::walls::{Opening, Wall, yard};
-use super::{RUN_OUT_M, lot, things_on};
 use crate::corridor::{Side, to_millimetres};
 use rand::RngExt as _;
 use sim::geometry::{Vec2, edges};

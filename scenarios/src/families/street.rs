@@ -2,10 +2,10 @@
 //! side roads closed by cones or barriers.
 
 use super::course::{Course, first_apart};
+use super::parts::{RUN_OUT_M, close, lot, things_on};
 use super::strip::{Notch, Strip, Stub};
 use super::things::{self, Rules, Things, facing, yaw_rad};
 use super::walls::Wall;
-use super::{RUN_OUT_M, close, lot, things_on};
 use crate::clutter::draw_car;
 use crate::corridor::Side;
 use rand::RngExt as _;

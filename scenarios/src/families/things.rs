@@ -21,6 +21,7 @@ pub(super) struct Narrowing {
 
 /// What must be left free.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::struct_field_names, reason = "the postfix is the unit")]
 pub(super) struct Rules {
     /// Beside anything that stands in the strip, metres.
     pub(super) gap_m: f32,
@@ -123,11 +124,6 @@ impl<'a> Things<'a> {
 pub(super) fn obstacle(class: ObstacleClass, at: Vec2, heading_rad: f32) -> Obstacle {
     let heading_deg = (wrap_angle(heading_rad).to_degrees() * 10.0).round() / 10.0;
     Obstacle { heading_deg, ..Obstacle::new(class, Pose::new(to_millimetres(at), 0.0)) }
-}
-
-/// Round things have no heading.
-pub(super) fn upright(thing: Obstacle) -> Obstacle {
-    Obstacle { heading_deg: 0.0, ..thing }
 }
 
 /// Either way a parked car may face.

@@ -1,14 +1,14 @@
 //! Race tracks: a closed band around an inner island or between thin walls, driven once round from a barrier back to it.
 
 use super::course::Course;
+use super::parts::{close, driven_m, lot, things_on};
 use super::strip::{Strip, is_simple};
-use super::things::{self, Rules, Things, side};
+use super::things::{Rules, Things, side};
 use super::walls::{Wall, yard};
-use super::{close, driven_m, lot, things_on};
 use crate::corridor::Side;
 use rand::RngExt as _;
 use sim::geometry::{Vec2, edges};
-use sim::scenario::{Island, ObstacleClass, Scenario};
+use sim::scenario::{Island, Obstacle, ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::f32::consts::TAU;
 use std::ops::Range;
@@ -59,7 +59,9 @@ fn ring(width_m: f32, rng: &mut Rng) -> Option<Strip> {
     let around: f32 = edges(&polygon).map(|(a, b)| a.distance(b)).sum();
     // Rounding shortens it.
     let scale_m = 1.15 * rng.random_range(LENGTH_M) / around;
-    polygon.iter_mut().for_each(|corner| *corner *= scale_m);
+    for corner in &mut polygon {
+        *corner *= scale_m;
+    }
     let side_m = |k: usize| polygon[k].distance(polygon[(k + 1) % corners]);
     let longest = (0..corners).max_by(|&a, &b| side_m(a).total_cmp(&side_m(b)))?;
     polygon.rotate_left(longest);
@@ -97,6 +99,6 @@ fn cones(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
         let (side, s_m) = (side(rng), rng.random_range(from_m..to_m));
         let protrusion_m = rng.random_range(0.3..1.2);
         let cone = things.beside(ObstacleClass::Cone, side, s_m, protrusion_m, 0.0);
-        things.narrow(things::upright(cone), side, s_m, &rules);
+        things.narrow(Obstacle { heading_deg: 0.0, ..cone }, side, s_m, &rules);
     }
 }
