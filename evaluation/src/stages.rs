@@ -296,14 +296,4 @@ mod tests {
         }
         assert!(names(UNSEEN).contains(&"vvf".to_owned()) && names(UNSEEN).contains(&"cvm".to_owned()));
     }
-
-    /// Issue 3: at most 30 minutes on two cores, with all six planners tuned.
-    #[test]
-    fn the_default_budget_is_half_an_hour() {
-        let settings = Settings::preset("default").unwrap();
-        let tuned = PlannerSpec::all().iter().map(|planner| format!("{}:x.toml", planner.name())).collect();
-        let stages = all(&settings, &Extent { tuned, ..extent() }, Path::new("R"));
-        let minutes = stages.iter().map(Stage::estimate_s).sum::<f64>() / 60.0;
-        assert!((15.0..30.0).contains(&minutes), "{minutes:.1} minutes");
-    }
 }

@@ -2,7 +2,7 @@
 
 use super::reference;
 use super::schema::Settings;
-use toml_edit::{DocumentMut, Item, Table};
+use toml_edit::{Array, DocumentMut, Item, Table};
 
 impl Settings {
     /// Every setting with what it means and what it may be.
@@ -20,6 +20,19 @@ impl Settings {
         comment(document.as_table_mut(), "", &is_shown);
         document.to_string().trim_start().to_owned()
     }
+}
+
+/// Gives every element of a long list a line of its own.
+fn break_lines(list: &mut Array) {
+    const WIDTH: usize = 100;
+    if list.to_string().len() <= WIDTH {
+        return;
+    }
+    for value in list.iter_mut() {
+        value.decor_mut().set_prefix("\n    ");
+    }
+    list.set_trailing("\n");
+    list.set_trailing_comma(true);
 }
 
 /// Comments the keys of a section and drops those that are not shown.
@@ -42,6 +55,9 @@ fn comment(table: &mut Table, prefix: &str, is_shown: &impl Fn(&reference::Entry
             Some(entry) => {
                 if let Some(mut key) = table.key_mut(&name) {
                     key.leaf_decor_mut().set_prefix(format!("# {}\n", entry.comment()));
+                }
+                if let Some(list) = table.get_mut(&name).and_then(Item::as_array_mut) {
+                    break_lines(list);
                 }
             }
             None => {
