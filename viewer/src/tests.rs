@@ -415,7 +415,7 @@ fn a_training_is_read_from_its_folder() {
         let folder = run.join(format!("round-{round:02}"));
         std::fs::create_dir_all(&folder).unwrap();
         let collection = format!(
-            "schema = 1\nround = {round}\nsamples = {}\nnoise_augmentations = 0\nticks = 1000\nnovice_ticks = {}\n\
+            "schema = 2\nround = {round}\nsamples = {}\nnoise_augmentations = 0\nticks = 1000\nnovice_ticks = {}\n\
              tau_hat_sum = 1.0\ndriven_s = 50.0\nnear_collisions = 1\ndriven_m = 50.0\nepisodes = []\n",
             500 - 100 * round,
             600 * round
