@@ -4,11 +4,11 @@
 //! The ground on which the middle of the car has room is measured from the route on, around walls. What lies far enough
 //! from it is on a branch, whose mouth is where the shortest way back comes near the route.
 
+use crate::open_list::Open;
 use sim::geometry::{Vec2, distance_to_segment};
 use sim::map::Map;
 use sim::scenario::{Island, KERB_MAX_M, Scenario};
 use sim::vehicle::VehicleSettings;
-use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 /// Spacing of the raster, metres.
@@ -147,29 +147,6 @@ struct Cell {
     station: usize,
 }
 
-struct Open {
-    from_route_m: f32,
-    cell: usize,
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Open {}
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Open {
-    /// The nearest first, ties in order of the raster.
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.from_route_m.total_cmp(&self.from_route_m).then(other.cell.cmp(&self.cell))
-    }
-}
-
 impl GroundFromRoute {
     fn measure(map: &Map, vehicle: &VehicleSettings) -> Self {
         let (low, high) = crate::corridor::bounds(&map.scenario().boundary);
@@ -190,11 +167,12 @@ impl GroundFromRoute {
             let cell = (at.y as usize).min(rows - 1) * cols + (at.x as usize).min(cols - 1);
             if ground.cells[cell].from_route_m > 0.0 {
                 ground.cells[cell] = Cell { from_route_m: 0.0, parent: cell, station };
-                open.push(Open { from_route_m: 0.0, cell });
+                open.push(Open { estimate: 0.0, node: cell as u32 });
             }
         }
         let room_m = 0.5 * vehicle.width_m + ROOM_M;
-        while let Some(Open { from_route_m, cell }) = open.pop() {
+        while let Some(Open { estimate: from_route_m, node }) = open.pop() {
+            let cell = node as usize;
             if from_route_m > ground.cells[cell].from_route_m {
                 continue;
             }
@@ -209,7 +187,7 @@ impl GroundFromRoute {
                 if total_m < ground.cells[next].from_route_m && map.signed_distance_m(ground.centre(next)) >= room_m {
                     ground.cells[next] =
                         Cell { from_route_m: total_m, parent: cell, station: ground.cells[cell].station };
-                    open.push(Open { from_route_m: total_m, cell: next });
+                    open.push(Open { estimate: total_m, node: next as u32 });
                 }
             }
         }

@@ -22,6 +22,7 @@ pub mod generator;
 pub mod import;
 pub mod load;
 pub mod note;
+mod open_list;
 pub mod reference;
 pub mod solver;
 pub mod split;

@@ -4,10 +4,10 @@
 //! has its own exact footprint test. A waypoint is free when the body, larger by a clearance all round, stands free there,
 //! and the body 0.5 m farther along the present arc too (with a margin): the near-collision rule looks that far ahead.
 
+use crate::open_list::Open;
 use sim::geometry::{Pose, Vec2, distance_to_segment, edges};
 use sim::scenario::Scenario;
 use sim::vehicle::VehicleSettings;
-use std::cmp::Ordering;
 use std::collections::{BTreeSet, BinaryHeap};
 
 pub mod route;
@@ -114,29 +114,6 @@ struct Node {
 }
 
 const NONE: u32 = u32::MAX;
-
-/// Queue entry: smallest estimate first, ties in order of creation.
-struct Open {
-    estimate: f32,
-    node: u32,
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Open {}
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.estimate.total_cmp(&self.estimate).then(other.node.cmp(&self.node))
-    }
-}
 
 struct Search<'a> {
     scene: &'a Scene,

@@ -46,9 +46,7 @@ impl Occluder {
         let &[from, to] = &self.outline[..] else { return false };
         self.height_m >= camera_height_m && (from - camera).perp_dot(to - camera) >= 0.0
     }
-}
 
-impl Occluder {
     fn of_obstacle(obstacle: &Obstacle) -> Self {
         let [length_m, width_m, height_m] = obstacle.size_m();
         let centre = obstacle.centre().position();
@@ -64,8 +62,8 @@ impl Occluder {
     }
 }
 
-/// The outlines of everything higher than a kerb, in short pieces with free ground to their right. What an outline hides is what the solid within it
-/// hides: every line of sight that meets the solid meets its outline first.
+/// The outlines of everything higher than a kerb, in short pieces with free ground to their right. What an outline hides
+/// is what the solid within it hides: every line of sight that meets the solid meets its outline first.
 fn walls(scenario: &Scenario) -> impl Iterator<Item = Occluder> {
     let boundary = std::iter::once((&scenario.boundary, scenario.boundary_height_m, true));
     let islands = scenario.islands.iter().map(|island| (&island.polygon, island.height_m, false));

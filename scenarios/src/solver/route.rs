@@ -2,7 +2,8 @@
 //!
 //! The search of [`super::solve`] with a tight goal. If it fails, the error gives the reason and its place.
 
-use super::{CURVATURE_SHARE, DistanceToGo, Goal, NONE, Open, Scene, Search, Waypoint};
+use super::{CURVATURE_SHARE, DistanceToGo, Goal, NONE, Scene, Search, Waypoint};
+use crate::open_list::Open;
 use geo::{Coord, LineString, Simplify as _};
 use sim::geometry::{Pose, Vec2};
 use sim::scenario::{ReferencePath, Scenario};
