@@ -394,6 +394,8 @@ fn tables_are_printed_as_json_and_nothing_else_is() {
     assert_eq!(tables.len(), 3, "iterations, evaluation and the check elsewhere");
     assert_eq!(tables[2][0]["lots"], "validation-lane");
     assert!(tables[2].as_array().unwrap().iter().all(|row| row["contacts"].is_number()), "{}", tables[2]);
+    let elsewhere = std::fs::read_to_string(Path::new(&out).join("elsewhere.md")).unwrap();
+    assert!(elsewhere.contains("validation-lane") && elsewhere.contains("BC per 100 m"), "{elsewhere}");
     assert!(tables[0]["rows"][0]["samples"].is_number() && tables[1]["rows"][0]["near_collisions"].is_number());
 }
 

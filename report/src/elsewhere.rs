@@ -6,6 +6,7 @@ use evaluation::format::exact_rate;
 use evaluation::results::EvaluationResults;
 use evaluation::slices::Slice;
 use evaluation::totals::Totals;
+use experiment::run_dir::RunDir;
 use serde::Serialize;
 
 /// One driver on one kind of lot.
@@ -50,8 +51,18 @@ pub fn rows(results: &EvaluationResults, drivers: &[&str]) -> Vec<Row> {
         .collect()
 }
 
+/// Writes `elsewhere.md`; returns its text.
+///
+/// # Errors
+/// If the file cannot be written.
+pub fn write(rows: &[Row], drivers: &[&str], run: &RunDir) -> anyhow::Result<String> {
+    let text = table(rows, drivers).to_string();
+    run.write("elsewhere.md", format!("{text}\n").as_bytes())?;
+    Ok(text)
+}
+
 /// A line per kind of lot, for each driver `near-collisions (contacts; least clearance)`, and the rate of the last one.
-pub fn table(rows: &[Row], drivers: &[&str]) -> Table {
+fn table(rows: &[Row], drivers: &[&str]) -> Table {
     let mut header = vec!["lots".to_owned(), "route".to_owned()];
     header.extend(drivers.iter().map(|driver| format!("{driver}: near-coll. (contacts; least m)")));
     header.extend(drivers.last().map(|driver| format!("{driver} per 100 m [95 %]")));

@@ -139,13 +139,9 @@ fn check_elsewhere(
     let results = within::evaluate(run, "elsewhere", &settings, drivers, progress)?;
     let names: Vec<&str> = drivers.iter().map(|driver| driver.name.as_str()).collect();
     let rows = report::elsewhere::rows(&results, &names);
-    let text = || {
-        let noise = &settings.evaluation.noise[0];
-        format!(
-            "\nElsewhere: lots that nobody trained on, noise {noise}\n\n{}",
-            report::elsewhere::table(&rows, &names)
-        )
-    };
+    let table = report::elsewhere::write(&rows, &names, run)?;
+    let noise = &settings.evaluation.noise[0];
+    let text = || format!("\nElsewhere: lots that nobody trained on, noise {noise}\n\n{table}");
     output.table(text, &rows)
 }
 
