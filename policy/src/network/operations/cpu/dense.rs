@@ -104,7 +104,8 @@ impl Forward<'_> {
         let (x_whole, x_single) = x.split_at(whole * inputs);
         let (y_whole, y_single) = y.split_at_mut(whole * outputs);
         let mut packed = Vec::new();
-        for_each_block::<S, WIDTH>(outputs, |first, width| {
+        // Loops, not closures: a closure that the compiler does not inline is compiled without the instruction set.
+        for (first, width) in blocks::<S, WIDTH>(outputs) {
             let columns = first..outputs.min(first + width * S::F32_LANES);
             let (weights, stride, offset) = if whole >= PACKED_FROM {
                 packed.clear();
@@ -126,7 +127,7 @@ impl Forward<'_> {
                     block::<S, 1>(simd, x, weights, bias, y);
                 }
             }
-        });
+        }
         let mut nonzero = vec![(0, 0.0); inputs];
         for (x, y) in x_single.chunks_exact(inputs).zip(y_single.chunks_exact_mut(outputs)) {
             // Without a branch: which inputs are 0 cannot be predicted.
@@ -136,23 +137,23 @@ impl Forward<'_> {
                 count += usize::from(*value != 0.0);
             }
             let nonzero = &nonzero[..count];
-            for_each_block::<S, 8>(outputs, |first, width| match width {
-                8 => sparse_block::<S, 8>(simd, nonzero, weight, bias, first, y),
-                _ => sparse_block::<S, 1>(simd, nonzero, weight, bias, first, y),
-            });
+            for (first, width) in blocks::<S, 8>(outputs) {
+                match width {
+                    8 => sparse_block::<S, 8>(simd, nonzero, weight, bias, first, y),
+                    _ => sparse_block::<S, 1>(simd, nonzero, weight, bias, first, y),
+                }
+            }
         }
     }
 }
 
-/// Cuts the outputs into blocks of `WIDTH` vectors, then of one, the last of which may be a part of one.
+/// Cuts the outputs into blocks of `WIDTH` vectors, then of one, the last of which may be a part of one: the first output
+/// of each block, and its vectors.
 #[inline(always)]
-fn for_each_block<S: Simd, const WIDTH: usize>(outputs: usize, mut visit: impl FnMut(usize, usize)) {
-    let mut first = 0;
-    while first < outputs {
-        let width = if outputs - first >= WIDTH * S::F32_LANES { WIDTH } else { 1 };
-        visit(first, width);
-        first += width * S::F32_LANES;
-    }
+fn blocks<S: Simd, const WIDTH: usize>(outputs: usize) -> impl Iterator<Item = (usize, usize)> {
+    let whole = outputs / (WIDTH * S::F32_LANES) * (WIDTH * S::F32_LANES);
+    let wide = (0..whole).step_by(WIDTH * S::F32_LANES).map(|first| (first, WIDTH));
+    wide.chain((whole..outputs).step_by(S::F32_LANES).map(|first| (first, 1)))
 }
 
 /// `WIDTH` vectors of outputs of all rows, given the weights of these outputs by input.
