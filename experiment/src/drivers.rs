@@ -39,6 +39,11 @@ pub enum DriverSpec {
         /// The folder.
         folder: PathBuf,
     },
+    /// `ensemble:DRIVER,DRIVER`: networks whose answers are taken together.
+    Ensemble {
+        /// `run:` and `net:` drivers, at least one.
+        members: Vec<DriverSpec>,
+    },
     /// `NAME`, `tuned:NAME` or `NAME:FILE`: a model-based planner.
     Planner {
         /// Its name.
@@ -67,6 +72,7 @@ pub fn specs() -> Vec<(&'static str, &'static str)> {
         ("run:DIR/bc", "its policy after behaviour cloning"),
         ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
     ];
+    specs.push(("ensemble:DRIVER,DRIVER", "run: and net: drivers whose answers are taken together"));
     specs.extend(PlannerSpec::all().iter().map(|planner| (planner.name(), planner.about())));
     specs.push(("tuned:NAME", "one of these planners with parameters found by cargo xtask tune (planners/tuned/)"));
     specs.push(("NAME:FILE", "one of these planners with parameters from a TOML file (cargo xtask tune writes them)"));
@@ -89,6 +95,7 @@ impl FromStr for DriverSpec {
             None if is_planner(text) => planner(text, Parameters::Published),
             Some(("run", folder)) => Ok(Self::Run { folder: folder.into() }),
             Some(("net", folder)) => Ok(Self::Checkpoint { folder: folder.into() }),
+            Some(("ensemble", members)) => Self::ensemble(members),
             Some(("tuned", name)) if is_planner(name) => planner(name, Parameters::Tuned),
             Some((name, file)) if is_planner(name) => planner(name, Parameters::File(file.into())),
             _ => {
@@ -116,6 +123,10 @@ impl fmt::Display for DriverSpec {
             Self::Expert => f.write_str("expert"),
             Self::Run { folder } => write!(f, "run:{}", folder.display()),
             Self::Checkpoint { folder } => write!(f, "net:{}", folder.display()),
+            Self::Ensemble { members } => {
+                let members: Vec<String> = members.iter().map(Self::to_string).collect();
+                write!(f, "ensemble:{}", members.join(","))
+            }
             Self::Planner { name, parameters: Parameters::Published } => f.write_str(name),
             Self::Planner { name, parameters: Parameters::Tuned } => write!(f, "tuned:{name}"),
             Self::Planner { name, parameters: Parameters::File(path) } => write!(f, "{name}:{}", path.display()),
@@ -140,14 +151,57 @@ impl DriverSpec {
 
     /// Whether it is a learned policy.
     pub fn is_network(&self) -> bool {
-        matches!(self, Self::Run { .. } | Self::Checkpoint { .. })
+        matches!(self, Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. })
     }
 
-    /// The training run it comes from; `/bc` is part of it.
+    /// The training run it comes from, of an ensemble the first one; `/bc` is part of it.
     pub fn run(&self) -> Option<&Path> {
         match self {
             Self::Run { folder } => Some(folder),
+            Self::Ensemble { members } => members.iter().find_map(Self::run),
             Self::Expert | Self::Checkpoint { .. } | Self::Planner { .. } => None,
+        }
+    }
+
+    fn ensemble(members: &str) -> anyhow::Result<Self> {
+        let members: Vec<Self> = members.split(',').map(str::parse).collect::<anyhow::Result<_>>()?;
+        for (at, member) in members.iter().enumerate() {
+            ensure!(
+                matches!(member, Self::Run { .. } | Self::Checkpoint { .. }),
+                "{member} cannot be part of an ensemble; its members are networks, as in ensemble:run:A,net:B/round-03"
+            );
+            ensure!(!members[..at].contains(member), "{member} is named twice in an ensemble");
+        }
+        Ok(Self::Ensemble { members })
+    }
+
+    /// The networks it names, read from their files.
+    fn checkpoints(&self) -> anyhow::Result<Vec<Checkpoint>> {
+        match self {
+            Self::Run { folder } => Ok(vec![Checkpoint::load(&run_dir::policy_folder(folder)?)?]),
+            Self::Checkpoint { folder } => {
+                ensure!(
+                    Checkpoint::exists(folder),
+                    "{} holds no model.safetensors; name the folder of a round, as in net:runs/NAME/round-03",
+                    folder.display()
+                );
+                Ok(vec![Checkpoint::load(folder)?])
+            }
+            Self::Ensemble { members } => {
+                let networks: Vec<Checkpoint> =
+                    members.iter().map(Self::checkpoints).collect::<anyhow::Result<Vec<_>>>()?.concat();
+                for (member, network) in members.iter().zip(&networks) {
+                    let (geometry, inference) = (network.geometry, network.inference);
+                    ensure!(
+                        (geometry, inference) == (networks[0].geometry, networks[0].inference),
+                        "{member} was trained on {geometry:?} and drives with {inference:?}, {} does not; members of an \
+                         ensemble must agree",
+                        members[0]
+                    );
+                }
+                Ok(networks)
+            }
+            Self::Expert | Self::Planner { .. } => Ok(Vec::new()),
         }
     }
 
@@ -157,21 +211,11 @@ impl DriverSpec {
     /// If they are not what they should be.
     pub fn load(self, expert: &ExpertSettings, device: DeviceChoice) -> anyhow::Result<NamedDriver> {
         let name = self.to_string();
-        let in_driver = || format!("driver {name:?}");
         let model = match &self {
             Self::Expert => Model::Expert(expert.clone()),
-            Self::Run { folder } => {
-                let folder = run_dir::policy_folder(folder).with_context(in_driver)?;
-                Model::Network(Box::new(Checkpoint::load(&folder).with_context(in_driver)?), device)
-            }
-            Self::Checkpoint { folder } => {
-                ensure!(
-                    Checkpoint::exists(folder),
-                    "driver {name:?}: {} holds no model.safetensors; name the folder of a round, as in \
-                     net:runs/NAME/round-03",
-                    folder.display()
-                );
-                Model::Network(Box::new(Checkpoint::load(folder).with_context(in_driver)?), device)
+            Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. } => {
+                let networks = self.checkpoints().with_context(|| format!("driver {name:?}"))?;
+                Model::Network(networks, device)
             }
             Self::Planner { name, parameters } => Model::Planner(planner(name, parameters)?),
         };
@@ -192,7 +236,8 @@ pub struct NamedDriver {
 #[derive(Debug, Clone)]
 enum Model {
     Expert(ExpertSettings),
-    Network(Box<Checkpoint>, DeviceChoice),
+    /// One network, or the members of an ensemble, which share geometry and settings of inference.
+    Network(Vec<Checkpoint>, DeviceChoice),
     Planner(PlannerSpec),
 }
 
@@ -216,7 +261,7 @@ impl NamedDriver {
 
     /// A network that is loaded already.
     pub fn network(name: &str, spec: DriverSpec, checkpoint: Checkpoint, device: DeviceChoice) -> Self {
-        Self { name: name.to_owned(), spec, model: Model::Network(Box::new(checkpoint), device) }
+        Self { name: name.to_owned(), spec, model: Model::Network(vec![checkpoint], device) }
     }
 
     /// A planner with parameters of the caller's.
@@ -246,14 +291,14 @@ impl NamedDriver {
     /// # Errors
     /// If it was trained for another patch of ground.
     pub fn check(&self, episode: &EpisodeSettings) -> anyhow::Result<()> {
-        if let Model::Network(checkpoint, _) = &self.model {
+        if let Model::Network(networks, _) = &self.model {
+            let trained = networks[0].geometry;
             let shown = episode.sensing.geometry;
             ensure!(
-                checkpoint.geometry == shown,
-                "driver {:?} was trained on {:?}, but episode.sensing.geometry is {shown:?}; use the settings it was \
+                trained == shown,
+                "driver {:?} was trained on {trained:?}, but episode.sensing.geometry is {shown:?}; use the settings it was \
                  trained with (--config RUN/settings.toml)",
-                self.name,
-                checkpoint.geometry
+                self.name
             );
         }
         Ok(())
@@ -281,7 +326,7 @@ impl NamedDriver {
     pub fn fleet(&self, episode: &EpisodeSettings, cars: usize) -> Box<dyn Fleet + Send> {
         match &self.model {
             Model::Expert(settings) => Box::new(OneDriverEach((0..cars).map(|_| expert(settings, episode)).collect())),
-            Model::Network(checkpoint, device) => Box::new(NetFleet::new(checkpoint, *device)),
+            Model::Network(networks, device) => Box::new(NetFleet::ensemble(&networks[0], &networks[1..], *device)),
             Model::Planner(planner) => {
                 let planner = planner.planner(&PlannerContext::of(episode));
                 Box::new(OneDriverEach(vec![SensorsOnly(planner); cars]))
@@ -372,14 +417,24 @@ mod tests {
 
     #[test]
     fn every_spec_is_read_back() {
-        for text in ["expert", "run:runs/mine/bc", "net:runs/mine/round-03", "tentacle", "tuned:vvf", "dwa:my/dwa.toml"]
-        {
+        for text in [
+            "expert",
+            "run:runs/mine/bc",
+            "net:runs/mine/round-03",
+            "ensemble:run:runs/a,net:runs/b/round-02",
+            "tentacle",
+            "tuned:vvf",
+            "dwa:my/dwa.toml",
+        ] {
             assert_eq!(text.parse::<DriverSpec>().unwrap().to_string(), text);
         }
         for (wrong, known) in [
             ("exprt", "there are expert, run:DIR"),
             ("", "there are expert, run:DIR"),
             ("runs/mine", "there are expert, run:DIR"),
+            ("ensemble:run:runs/a,expert", "expert cannot be part of an ensemble"),
+            ("ensemble:run:runs/a,run:runs/a", "named twice"),
+            ("ensemble:", "there are expert, run:DIR"),
             ("tuned:tentacles", "there are tuned:tentacle, tuned:vvf"),
         ] {
             let error = wrong.parse::<DriverSpec>().unwrap_err().to_string();

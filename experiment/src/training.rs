@@ -68,7 +68,8 @@ pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Res
     let training = &settings.training;
     let (generated, others): (Vec<Lot>, Vec<Lot>) = lots.iter().cloned().partition(Lot::is_generated);
     let of_a_kind = |lot: &Lot| generated.iter().filter(|other| other.group() == lot.group()).count() as u64;
-    let generated: Vec<Lot> = generated.iter().map(|lot| lot.in_round(round, of_a_kind(lot))).collect();
+    let generated: Vec<Lot> =
+        generated.iter().map(|lot| lot.in_round(round, of_a_kind(lot), training.different_lots)).collect();
     let all = |lots, trials| Trial::all(settings.seed, Purpose::Training { round }, lots, trials, &training.directions);
     let trials: Vec<_> = all(&others, training.trials).chain(all(&generated, 1)).collect();
     let starts = drive::start(&trials, &trials::maps(&trials, &settings.episode)?, &settings.episode, training.noise);

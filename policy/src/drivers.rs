@@ -1,8 +1,8 @@
-//! The trained network at the wheel: of many cars in lock-step, or of one.
+//! The trained network, or several as an ensemble, at the wheel: of many cars in lock-step, or of one.
 
 use crate::action_smoothing::{ActionSmoothing, FleetSmoothing};
 use crate::checkpoint::Checkpoint;
-use crate::network::{DeviceChoice, Prediction, Predictor};
+use crate::network::{DeviceChoice, Ensemble, Prediction, Predictor};
 use sim::driver::{Decision, Fleet, Policy, Seat, Source};
 use sim::sensing::{GridGeometry, Observation};
 
@@ -16,7 +16,13 @@ pub struct NetFleet {
 impl NetFleet {
     /// Seats a network.
     pub fn new(checkpoint: &Checkpoint, device: DeviceChoice) -> Self {
-        Self { novice: Novice::new(checkpoint, device), geometry: checkpoint.geometry }
+        Self::ensemble(checkpoint, &[], device)
+    }
+
+    /// Seats several networks that answer as one. They should have been trained for the same patch of ground; the first
+    /// one's action smoothing counts.
+    pub fn ensemble(first: &Checkpoint, others: &[Checkpoint], device: DeviceChoice) -> Self {
+        Self { novice: Novice::new(first, others, device), geometry: first.geometry }
     }
 }
 
@@ -30,20 +36,21 @@ impl Fleet for NetFleet {
 /// The network as it answers at the wheel of many cars: with the action smoothing of each.
 #[derive(Debug, Clone)]
 pub(crate) struct Novice {
-    predictor: Predictor,
+    ensemble: Ensemble,
     smoothing: FleetSmoothing,
 }
 
 impl Novice {
-    pub(crate) fn new(checkpoint: &Checkpoint, device: DeviceChoice) -> Self {
-        let smoothing = FleetSmoothing::new(checkpoint.inference, checkpoint.geometry);
-        Self { predictor: checkpoint.predictor(device), smoothing }
+    pub(crate) fn new(first: &Checkpoint, others: &[Checkpoint], device: DeviceChoice) -> Self {
+        let smoothing = FleetSmoothing::new(first.inference, first.geometry);
+        let others = others.iter().map(|checkpoint| checkpoint.predictor(device)).collect();
+        Self { ensemble: Ensemble::new(first.predictor(device), others), smoothing }
     }
 
     /// What it answers at every seat, smoothed.
     pub(crate) fn answers(&mut self, seats: &[Seat<'_>]) -> Vec<Prediction> {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
-        let mut answers = self.predictor.predict(&grids);
+        let mut answers = self.ensemble.predict(&grids);
         self.smoothing.smooth(seats, &mut answers);
         answers
     }

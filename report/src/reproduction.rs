@@ -44,7 +44,7 @@ fn rows_of(root: &Path, chain: Chain, seed: RootSeed) -> anyhow::Result<Vec<Iter
 }
 
 /// A stage that drove, read back.
-struct Drive<'a> {
+pub(crate) struct Drive<'a> {
     stage: &'a Stage,
     drivers: Vec<NamedDriver>,
     lots: Vec<Lot>,
@@ -52,14 +52,17 @@ struct Drive<'a> {
 
 impl<'a> Drive<'a> {
     fn open(recipe: &'a Recipe, folder: &str) -> anyhow::Result<Self> {
-        let stage = recipe.stages.iter().find(|stage| stage.folder == folder).context("every report has this stage")?;
-        let Step::Drive { drivers } = &stage.step else { anyhow::bail!("{folder} drives") };
+        Self::of(recipe.stages.iter().find(|stage| stage.folder == folder).context("every report has this stage")?)
+    }
+
+    pub(crate) fn of(stage: &'a Stage) -> anyhow::Result<Self> {
+        let Step::Drive { drivers } = &stage.step else { anyhow::bail!("{} drives", stage.folder) };
         let drivers = stages::load(drivers, &stage.settings)?;
         let lots = Lot::parse_all(&stage.settings.evaluation.lots, &stage.settings.episode.vehicle)?;
         Ok(Self { stage, drivers, lots })
     }
 
-    fn plan(&self) -> Plan<'_> {
+    pub(crate) fn plan(&self) -> Plan<'_> {
         let compare_with = conclusions::compare_with(&self.drivers);
         Plan { settings: &self.stage.settings, drivers: &self.drivers, lots: &self.lots, compare_with }
     }

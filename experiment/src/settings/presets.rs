@@ -79,6 +79,7 @@ fn paper() -> Settings {
             lots: names(&["lot-a"]),
             directions: Direction::BOTH.to_vec(),
             trials: 1,
+            different_lots: 0,
             noise: NoiseChoice::Paper,
         },
         evaluation: EvaluationSettings {

@@ -37,6 +37,9 @@ pub struct TrainingSettings {
     /// Times every lot is driven in each direction per round (paper: once), each with its own obstacles. Generated lots
     /// are driven once: they would look the same again.
     pub trials: u32,
+    /// Generated lots of a kind that differ, over all rounds; then they come again, with other noise. 0: every round has
+    /// new ones.
+    pub different_lots: u32,
     /// What is seen wrongly.
     pub noise: NoiseChoice,
 }

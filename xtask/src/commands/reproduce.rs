@@ -63,22 +63,8 @@ pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
     let (run, settings, extent) = if let Some(path) = &args.resume { resume(path)? } else { begin(args)? };
     let stages = stages::all(&settings, &extent, run.path());
     let recipe = Recipe { settings, extent, stages };
-    output.note(format_args!("run: {}", run.path().display()));
-    announce(&recipe.stages, run.path(), output);
     let console = Console::new(output);
-    let is_to_do = |stage: &&Stage| !run_dir::is_finished(&run.path().join(&stage.folder));
-    console.plan(recipe.stages.iter().filter(is_to_do).flat_map(Stage::tasks).collect());
-    for (index, stage) in recipe.stages.iter().enumerate() {
-        let (place, of) = (index + 1, recipe.stages.len());
-        output.note(format_args!("\n{place} of {of}: {} ({})", stage.about, stage.folder));
-        let is_done = if console.is_cancelled() { Ok(false) } else { perform(stage, run.path(), &console, output) };
-        match is_done {
-            Ok(true) => {}
-            Ok(false) => return Err(cut_short(run.path(), index)),
-            Err(error) if error.is::<Interrupted>() => return Err(cut_short(run.path(), index)),
-            Err(error) => return Err(error.context(format!("stage {}", stage.folder))),
-        }
-    }
+    perform_all("reproduce", &recipe.stages, &run, &console, output)?;
     let conclusions = reproduction::write(&recipe, &run)?;
     output.table(|| format!("\nWhat holds here\n\n{conclusions}"), &())?;
     run.finish(Outcome::Reproduction { stages: recipe.stages.len() })?;
@@ -87,9 +73,35 @@ pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn cut_short(root: &Path, finished: usize) -> anyhow::Error {
+/// Does every stage of a run that is not done yet.
+pub(crate) fn perform_all(
+    command: &str,
+    stages: &[Stage],
+    run: &RunDir,
+    console: &Console,
+    output: &Output,
+) -> anyhow::Result<()> {
+    output.note(format_args!("run: {}", run.path().display()));
+    announce(stages, run.path(), output);
+    let is_to_do = |stage: &&Stage| !run_dir::is_finished(&run.path().join(&stage.folder));
+    console.plan(stages.iter().filter(is_to_do).flat_map(Stage::tasks).collect());
+    for (index, stage) in stages.iter().enumerate() {
+        let (place, of) = (index + 1, stages.len());
+        output.note(format_args!("\n{place} of {of}: {} ({})", stage.about, stage.folder));
+        let is_done = if console.is_cancelled() { Ok(false) } else { perform(stage, run.path(), console, output) };
+        match is_done {
+            Ok(true) => {}
+            Ok(false) => return Err(cut_short(command, run.path(), index)),
+            Err(error) if error.is::<Interrupted>() => return Err(cut_short(command, run.path(), index)),
+            Err(error) => return Err(error.context(format!("stage {}", stage.folder))),
+        }
+    }
+    Ok(())
+}
+
+fn cut_short(command: &str, root: &Path, finished: usize) -> anyhow::Error {
     let root = root.display();
-    let kept = format!("{finished} finished stages are in {root}; go on with: cargo xtask reproduce --resume {root}");
+    let kept = format!("{finished} finished stages are in {root}; go on with: cargo xtask {command} --resume {root}");
     Interrupted { kept }.into()
 }
 
