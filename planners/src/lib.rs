@@ -10,7 +10,7 @@
 //! | [`vff`] | field | virtual force field (Borenstein and Koren) | no |
 //!
 //! Each method chooses a steering angle; the controller follows it with the paper's speed law for planners, slower when
-//! it steers more. There is no global path: a method that needs a goal gets "straight ahead" or a point that the grid
+//! it steers more. Methods that search speeds ask for less than that where they want to. There is no global path: a method that needs a goal gets "straight ahead" or a point that the grid
 //! suggests ([`Goal`]).
 //!
 //! Tags in the documentation of parameters, as in docs/methods.md: *paper* = stated there, *cited* = read in the cited
@@ -32,13 +32,14 @@ mod method;
 mod nearest;
 mod registry;
 pub mod search;
+mod speeds;
 pub mod tentacle;
 pub mod vff;
 pub mod vvf;
 
 pub use context::PlannerContext;
 pub use goal::Goal;
-pub use method::Method;
+pub use method::{Method, Reading};
 pub use registry::{Planner, PlannerSpec};
 
 #[cfg(test)]
