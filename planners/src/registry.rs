@@ -3,7 +3,7 @@
 use crate::context::PlannerContext;
 use crate::explanation::Explanation;
 use crate::method::Method;
-use crate::{apf, cvm, dwa, search, tentacle, vff, vvf};
+use crate::{apf, cvm, dwa, mppi, search, tentacle, vff, vvf};
 use serde::{Deserialize, Deserializer};
 use sim::driver::{Decision, Policy};
 use sim::sensing::Observation;
@@ -153,7 +153,7 @@ impl Planner {
             Self::Tentacle(tentacles) => Some(Explanation::Paths(tentacles.weighed(&observation.grid))),
             Self::Vvf(field) => Some(Explanation::Field(field.sampled(&observation.grid))),
             Self::Apf(field) => Some(Explanation::Field(field.sampled(&observation.grid))),
-            Self::Dwa(_) | Self::Cvm(_) | Self::Vff(_) => None,
+            Self::Dwa(_) | Self::Cvm(_) | Self::Vff(_) | Self::Mppi(_) => None,
         }
     }
 }
@@ -165,4 +165,5 @@ planners! {
     Cvm cvm,
     Apf apf,
     Vff vff,
+    Mppi mppi,
 }
