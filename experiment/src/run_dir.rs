@@ -365,6 +365,7 @@ impl Manifest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use policy::conditions::Conditions;
     use policy::network::Weights;
     use sim::seed::RootSeed;
 
@@ -424,7 +425,7 @@ mod tests {
         let settings = Settings::preset("smoke").unwrap();
         let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
         let checkpoint =
-            Checkpoint { weights, geometry: settings.episode.sensing.geometry, inference: settings.dagger.inference };
+            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
         for round in ["round-00", "round-01", "round-10"] {
             checkpoint.save(&path.join(round)).unwrap();
         }

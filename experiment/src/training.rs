@@ -9,6 +9,7 @@ use crate::trials::{self, Purpose, Trial};
 use crate::{drive, learning};
 use anyhow::ensure;
 use policy::checkpoint::Checkpoint;
+use policy::conditions::Conditions;
 use policy::dagger::{Hooks, Outcome, Progress as DaggerProgress, Rollouts, RoundEpisode};
 use policy::dataset::store::Store;
 use policy::fit::{FitProgress, FitReport};
@@ -32,7 +33,7 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
     episodes_of(settings, &lots, 0)?;
     let store = Store::open(run.path())?;
     let monitor = RefCell::new(Monitor::new(progress, store.clone()));
-    let geometry = settings.episode.sensing.geometry;
+    let conditions = Conditions::of(&settings.episode);
     let mut hooks = Hooks {
         episodes: &mut |round| {
             let episodes = episodes_of(settings, &lots, round)
@@ -48,7 +49,7 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
             if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         },
     };
-    let outcome = policy::dagger::run(&settings.dagger, geometry, &store, settings.seed, &mut hooks)?;
+    let outcome = policy::dagger::run(&settings.dagger, &conditions, &store, settings.seed, &mut hooks)?;
     let mut monitor = monitor.into_inner();
     if monitor.task.is_some() {
         progress.end("stopped");
@@ -232,8 +233,8 @@ mod tests {
             on_frame: &mut |_, _, _| {},
             progress: &mut |_| ControlFlow::Continue(()),
         };
-        let geometry = settings.episode.sensing.geometry;
-        policy::dagger::run(&settings.dagger, geometry, &store, settings.seed, &mut hooks).unwrap();
+        let conditions = Conditions::of(&settings.episode);
+        policy::dagger::run(&settings.dagger, &conditions, &store, settings.seed, &mut hooks).unwrap();
         for round in 0..2 {
             let (stored, collection) = store.read_round(round).unwrap();
             assert_eq!(collection.episodes.len(), 2);

@@ -276,8 +276,8 @@ fn introduction(recipe: &Recipe) -> String {
          rebuilt in simulation: trained on {}, driven on {} in {} trials, and on {}. Root seed {}{}, seed of the \
          evaluation {}. Everything that made this is in `manifest.toml`, `settings.toml` and `reproduce.toml` beside \
          this report; the same command gives the same bytes.\n\n\
-         Intervals are of 95 %: exact Poisson intervals (Garwood) for rates, or (b) a paired bootstrap over lot, \
-         direction and seed where events come in clusters; bootstrap for safe ratios and differences. All drivers met \
+         Intervals are of 95 %: exact Poisson intervals (Garwood) for rates, or (b) a paired bootstrap of \
+         whole trials, both ways together, where events come in clusters; bootstrap for safe ratios and differences. All drivers met \
          the same obstacles and the same noise.",
         settings.training.lots.join(", "),
         evaluation.lots.join(", "),
@@ -294,7 +294,7 @@ fn verdicts(statements: &[Statement]) -> String {
     let mut text = "Decided from the runs of this report: a comparison *holds* where the paired interval of 95 % lies on the \
                     paper's side of zero, *does not hold* where it lies on the other, and *cannot be told* where it contains \
                     zero (differences are the other driver's − DAgger's in near-collisions and reversals, DAgger's − the \
-                    other driver's in safe ratios; * = excludes zero).\n"
+                    other driver's in safe ratios; * = excludes zero, by six trials or more).\n"
         .to_owned();
     for verdict in [Verdict::Holds, Verdict::DoesNotHold, Verdict::CannotBeTold] {
         let found: Vec<&Statement> = statements.iter().filter(|statement| statement.verdict == verdict).collect();

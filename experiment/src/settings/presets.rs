@@ -2,6 +2,7 @@
 
 use super::noise::NoiseChoice;
 use super::schema::{EvaluationSettings, Settings, TrainingSettings};
+use super::smoothing::Smoothing;
 use anyhow::bail;
 use expert::ExpertSettings;
 use policy::dagger::{DaggerSettings, DisturbanceSettings, StartFrom};
@@ -117,6 +118,8 @@ fn paper() -> Settings {
             directions: Direction::BOTH.to_vec(),
             trials: 5,
             noise: vec![NoiseChoice::Paper],
+            smoothing: Smoothing::Own,
+            untrained_conditions: false,
         },
         dagger: DaggerSettings::paper(),
         expert: ExpertSettings::paper(),

@@ -14,7 +14,7 @@ use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress};
 use experiment::run_dir::{self, Outcome, RunDir};
-use experiment::settings::{Layers, Settings};
+use experiment::settings::{Layers, Settings, Smoothing};
 use scenarios::LoadError;
 use sim::seed::RootSeed;
 
@@ -44,6 +44,10 @@ pub(crate) struct EvaluateArgs {
     /// `sweep` stands for 0,0.5,1,1.5,2.
     #[arg(long, alias = "level", value_name = "LEVEL", num_args = 1.., value_delimiter = ',')]
     noise: Vec<String>,
+    /// Action smoothing of every driver: `own` (networks as they were trained, planners none), or a time constant in
+    /// control ticks for all, 0 = none [default: the setting evaluation.smoothing].
+    #[arg(long, value_name = "TICKS")]
+    smoothing: Option<Smoothing>,
     /// Driver the others are compared with [default: the last network, else the first driver].
     #[arg(long, value_name = "SPEC")]
     compare_with: Option<String>,
@@ -65,7 +69,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     let compare_with = compare_with(args, &specs)?;
     let (mut settings, preset) = settings_for(&specs, &Layers::from(&args.layers), output)?;
     override_trials(&mut settings, args)?;
-    let load = |spec: DriverSpec| spec.load(&settings.expert, settings.dagger.device);
+    let load = |spec: DriverSpec| spec.load(&settings);
     let drivers: Vec<NamedDriver> = specs.into_iter().map(load).collect::<anyhow::Result<_>>()?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     notes::say(&lots, &settings.evaluation.noise, output);
@@ -176,5 +180,6 @@ fn override_trials(settings: &mut Settings, args: &EvaluateArgs) -> anyhow::Resu
     if !args.noise.is_empty() {
         evaluation.noise = noise_levels(&args.noise)?;
     }
+    evaluation.smoothing = args.smoothing.unwrap_or(evaluation.smoothing);
     settings.check()
 }
