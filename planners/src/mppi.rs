@@ -23,7 +23,7 @@ const STEP_S: f32 = 0.1;
 /// smooths its answer with).
 const KNOT_S: f32 = 0.4;
 /// Circles that cover the body in a row.
-const CIRCLES: usize = 5;
+const CIRCLES: usize = 6;
 /// Speeds of the controller's law are tabulated at so many angles from 0 to full lock.
 const LAW_ANGLES: usize = 33;
 /// A clearance costs no more than one of minus this many scales.
@@ -59,6 +59,8 @@ pub struct Params {
     /// Added to half the body's width for the clearance, metres: −0.2 (*chosen*: the grid shows things larger than they are,
     /// by 0.24 m a side on average; docs/methods.md 1.1).
     pub margin_m: f32,
+    /// The body is longer by this at the nose, metres: 0.5, the distance ahead at which the paper stops the car.
+    pub nose_m: f32,
     /// Clearance from which on it is a collision, metres (*chosen*).
     pub collision_from_m: f32,
     /// The way goes on over cells at least this far from occupied ones, centre to centre, metres: 0.7, gaps of three cells
@@ -126,6 +128,7 @@ impl Method for Params {
             collision_weight: 20.0,
             change_weight: 1.0,
             margin_m: -0.2,
+            nose_m: 0.5,
             collision_from_m: -0.2,
             passable_from_m: 0.7,
             seed: 1,
@@ -145,6 +148,7 @@ impl Method for Params {
         within("collision_weight", self.collision_weight, 0.0, 1e6)?;
         within("change_weight", self.change_weight, 0.0, 1e3)?;
         within("margin_m", self.margin_m, -0.9, 2.0)?;
+        within("nose_m", self.nose_m, 0.0, 5.0)?;
         within("collision_from_m", self.collision_from_m, -2.0, 2.0)?;
         within("passable_from_m", self.passable_from_m, 0.1, 5.0)
     }
@@ -152,7 +156,8 @@ impl Method for Params {
     fn planner(&self, context: &PlannerContext) -> PathIntegral {
         let steps = (self.horizon_s / STEP_S).round() as usize;
         let vehicle = &context.vehicle;
-        let circle = |i: usize| -vehicle.rear_overhang_m + vehicle.length_m * (i as f32 + 0.5) / CIRCLES as f32;
+        let length_m = vehicle.length_m + self.nose_m;
+        let circle = |i: usize| -vehicle.rear_overhang_m + length_m * (i as f32 + 0.5) / CIRCLES as f32;
         let law_mps = |i: usize| {
             let steering_rad = vehicle.steering_max_rad * i as f32 / (LAW_ANGLES - 1) as f32;
             context.speed_mps(context.curvature_per_m(steering_rad))

@@ -63,7 +63,7 @@ impl WayField {
             from_car_m: vec![0.0; cells],
             is_passable: vec![true; cells],
             cells_to_occupied: vec![0.0; cells],
-            queue: BinaryHeap::with_capacity(8 * cells),
+            queue: BinaryHeap::with_capacity(9 * cells),
         }
     }
 
