@@ -16,6 +16,7 @@ use anyhow::{Context as _, bail, ensure};
 use policy::checkpoint::Checkpoint;
 use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
+use sim::limits::RUN_TOML_BYTES_MAX;
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -349,7 +350,8 @@ impl Manifest {
     /// If it cannot be read or is of another version.
     pub fn read(run: &Path) -> anyhow::Result<Self> {
         let path = run.join(MANIFEST);
-        let text = fs::read_to_string(&path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        let text = storage::read::text(&path, RUN_TOML_BYTES_MAX)
+            .with_context(|| format!("{}: cannot be read", path.display()))?;
         let table: toml::Table = text.parse().with_context(|| path.display().to_string())?;
         let schema = table.get("schema").and_then(toml::Value::as_integer).unwrap_or(0);
         ensure!(

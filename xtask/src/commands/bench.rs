@@ -7,6 +7,7 @@ use benchmark::peers::{self, PEERS};
 use benchmark::{Effort, Figure, Goal, driving, evaluating, maps, network};
 use clap::{Args, ValueEnum};
 use experiment::run_dir::write_whole;
+use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -141,7 +142,7 @@ struct Page<'a> {
 
 impl<'a> Page<'a> {
     fn read(path: &'a Path) -> anyhow::Result<Self> {
-        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        let text = storage::read::text(path, RUN_TEXT_BYTES_MAX).with_context(|| path.display().to_string())?;
         let parts = text.split_once(BEGIN).and_then(|(before, rest)| Some((before, rest.split_once(END)?.1)));
         let (before, after) = parts.with_context(|| {
             format!("{}: no lines {BEGIN} and {END}; write them where the table belongs", path.display())
