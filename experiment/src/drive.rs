@@ -98,6 +98,20 @@ impl Replay {
         Trial::of_evaluation(self.key.seed, &self.lot, self.key.direction, self.key.trial)
     }
 
+    /// Refuses a key whose moment is after the end of the run. Drives up to it.
+    ///
+    /// # Errors
+    /// Naming the last tick.
+    pub fn check_tick(&self, episode: &EpisodeSettings, driver: &NamedDriver) -> anyhow::Result<()> {
+        let (wanted, mut last) = (self.key.tick, 0);
+        self.drive(episode, driver, |frame| {
+            last = frame.tick;
+            if last < wanted { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+        ensure!(last >= wanted, "{}: this run ends with tick {last}; name one up to that", self.key);
+        Ok(())
+    }
+
     /// The settings of its episode.
     pub fn episode_settings(&self, episode: &EpisodeSettings) -> EpisodeSettings {
         trials::episode_settings(episode, self.key.noise, &self.map)

@@ -136,8 +136,12 @@ impl Page {
         let figures = folder.join(FIGURES);
         for part in &self.parts {
             if let Part::Figure { name, image, .. } = part {
-                std::fs::create_dir_all(&figures)
-                    .with_context(|| format!("{}: cannot be created; is the folder writable?", figures.display()))?;
+                // Not the folder itself: a run that was removed must not come back in part.
+                if !figures.is_dir() {
+                    std::fs::create_dir(&figures).with_context(|| {
+                        format!("{}: cannot be created; is the folder writable?", figures.display())
+                    })?;
+                }
                 write_whole(&figures.join(image.file(name)), &image.bytes())?;
             }
         }
