@@ -1,6 +1,5 @@
 //! `learning.csv` in the folder of a round: its learning curve, step by step.
 
-use crate::run_dir::write_whole;
 use anyhow::Context as _;
 use policy::fit::{FitProgress, FitReport};
 use policy::loss::LossParts;
@@ -76,7 +75,7 @@ impl Recorder {
                 validation_rmse_m: validation.map(|validation| validation.rmse_m),
             })?;
         }
-        write_whole(&folder.join(FILE), &csv.into_inner()?)
+        Ok(storage::whole::write(&folder.join(FILE), &csv.into_inner()?)?)
     }
 }
 

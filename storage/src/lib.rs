@@ -1,6 +1,8 @@
-//! Files of a run: read within limits.
+//! Files: read within limits, written whole or not at all, owned by one process.
 
 mod error;
+pub mod lock;
 pub mod read;
+pub mod whole;
 
 pub use error::FileError;

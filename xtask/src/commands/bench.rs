@@ -6,7 +6,6 @@ use anyhow::Context as _;
 use benchmark::peers::{self, PEERS};
 use benchmark::{Effort, Figure, Goal, driving, evaluating, maps, network};
 use clap::{Args, ValueEnum};
-use experiment::run_dir::write_whole;
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -152,7 +151,7 @@ impl<'a> Page<'a> {
 
     fn write(&self, table: &str) -> anyhow::Result<()> {
         let text = format!("{}{BEGIN}\n{}\n{END}{}", self.before, table.trim_end(), self.after);
-        write_whole(self.path, text.as_bytes())
+        Ok(storage::whole::write(self.path, text.as_bytes())?)
     }
 }
 

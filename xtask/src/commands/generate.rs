@@ -8,7 +8,6 @@ use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress as _};
-use experiment::run_dir::write_whole;
 use experiment::settings::NoiseChoice;
 use experiment::trials::{Purpose, Trial};
 use rayon::prelude::*;
@@ -191,8 +190,8 @@ fn write(args: &GenerateArgs, trial: &Trial<'_>) -> anyhow::Result<Made> {
     let vehicle = VehicleSettings::hyundai_hg300();
     let text = scenarios::load::to_toml(&drawn.scenario);
     let map = Map::build(drawn.scenario, &vehicle).with_context(|| name.clone())?;
-    write_whole(&png, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?.to_png()?)?;
-    write_whole(&toml, text.as_bytes())?;
+    storage::whole::write(&png, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?.to_png()?)?;
+    storage::whole::write(&toml, text.as_bytes())?;
     let (length_m, obstacles) = (map.path().length_m(), map.scenario().obstacles.len());
     // A route found for one way need not leave room at its finish to start back from there.
     let back = Map::build(map.scenario().clone().reversed(), &vehicle);

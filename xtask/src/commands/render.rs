@@ -13,7 +13,7 @@ use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::Progress as _;
 use experiment::replay_key::ReplayKey;
-use experiment::run_dir;
+use experiment::run_dir::{self, RunDir};
 use experiment::settings::{Layers, NoiseChoice, Settings};
 use experiment::training;
 use experiment::trials::{Purpose, Trial};
@@ -400,7 +400,8 @@ fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyh
         "{}: this is no run; name a folder that train-dagger, train-bc or evaluate made",
         run.display()
     );
-    let report = run.join(run_report::FILE);
+    let owned = RunDir::reopen(run, "render report")?;
+    let report = owned.path().join(run_report::FILE);
     let copy = copy.map(|folder| (folder, folder.path.join(run_report::FILE)));
     if let Some((folder, path)) = &copy {
         folder.check_file(path)?;

@@ -150,7 +150,7 @@ fn extent_of(path: &Path) -> anyhow::Result<Extent> {
 }
 
 fn resume(path: &Path) -> anyhow::Result<(RunDir, Settings, Extent)> {
-    let (run, settings) = RunDir::resume(path)?;
+    let (run, settings) = RunDir::resume(path, "reproduce")?;
     let extent = extent_of(path)?;
     Ok((run, settings, extent))
 }
