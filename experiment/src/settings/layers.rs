@@ -182,7 +182,10 @@ fn parse_override(text: &str) -> anyhow::Result<(Vec<String>, Value)> {
         key.len()
     );
     let value = value.trim();
-    let parsed = format!("value = {value}").parse::<Table>().ok().and_then(|mut table| table.remove("value"));
+    let parsed = format!("value = {value}")
+        .parse::<Table>()
+        .ok()
+        .and_then(|mut table| table.remove("value").filter(|_| table.is_empty()));
     let is_word = !value.is_empty() && value.chars().all(|c| c.is_alphanumeric() || "-_".contains(c));
     match parsed {
         Some(value) => Ok((key, value)),
