@@ -44,7 +44,21 @@ impl TrialBatch<'_> {
 
     /// Drives every trial to its end, or until the observer breaks; `None` marks trials that had not ended by then.
     pub fn drive(&self, observer: Observer<'_>) -> Vec<Option<EpisodeReport>> {
-        self.drive_from(self.episodes(), observer)
+        self.drive_from(self.episodes(), &mut |index, frame| {
+            let at = frame.vehicle;
+            let state = [at.pose.x_m, at.pose.y_m, at.pose.heading_rad, at.speed_mps, at.steering_rad];
+            assert!(
+                state.iter().all(|value| value.is_finite()),
+                "tick {} of {} on {}, {}, trial {}, noise {}: the state of the car is no finite number",
+                frame.tick,
+                self.driver.spec,
+                self.trials[index].lot.spec(),
+                self.trials[index].direction.name(),
+                self.trials[index].index,
+                self.noise
+            );
+            observer(index, frame)
+        })
     }
 
     /// Like [`Self::drive`], starting from the given episodes.
