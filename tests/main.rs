@@ -2,6 +2,7 @@
 //!
 //! | module | what it holds true |
 //! |---|---|
+//! | [`bad_inputs`] | the table of bad inputs: one error each, nothing left, little time and memory |
 //! | [`tidy`] | dependency direction, licence files, what the README names exists |
 //! | [`commands`] | whole commands run from outside: results, exit codes, errors |
 //! | [`determinism`] | same seed, same bytes, for 1 and 2 threads |
@@ -9,6 +10,7 @@
 //! | [`expert_drives`] | the expert on the reference lots |
 //! | [`formats`] | data sets open as NPY, weights as safetensors |
 //! | [`goldens`] | digests of episodes, by layer |
+//! | [`limits`] | the limits in docs/formats.md are those of the code |
 //! | [`planners`] | model-based planners: naming, parameter files, tuning |
 //! | [`regressions`] | what once went wrong, named by symptom |
 //! | [`printed`] | every `--help` and every printed table, as people read them |
@@ -17,6 +19,7 @@
 //! | [`reproduce`] | the paper in a box: its report, resumed to the same bytes |
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod bad_inputs;
 mod bench;
 mod commands;
 mod determinism;
@@ -25,6 +28,7 @@ mod expert_drives;
 mod formats;
 mod goldens;
 mod import_graph;
+mod limits;
 mod planners;
 mod printed;
 mod python;

@@ -23,17 +23,21 @@ fn dependencies() -> BTreeMap<String, Vec<String>> {
 }
 
 /// Each crate with the siblings that it may use: the data flows from left to right, never back.
-const LAYERS: [(&str, &[&str]); 10] = [
+const LAYERS: [(&str, &[&str]); 11] = [
     ("sim", &[]),
-    ("scenarios", &["sim"]),
+    ("storage", &[]),
+    ("scenarios", &["sim", "storage"]),
     ("expert", &["sim"]),
     ("planners", &["sim"]),
-    ("policy", &["sim"]),
-    ("experiment", &["sim", "scenarios", "expert", "planners", "policy"]),
-    ("evaluation", &["sim", "planners", "policy", "experiment"]),
-    ("report", &["sim", "policy", "experiment", "evaluation"]),
+    ("policy", &["sim", "storage"]),
+    ("experiment", &["sim", "storage", "scenarios", "expert", "planners", "policy"]),
+    ("evaluation", &["sim", "storage", "planners", "policy", "experiment"]),
+    ("report", &["sim", "storage", "policy", "experiment", "evaluation"]),
     ("benchmark", &["sim", "scenarios", "expert", "policy", "experiment", "evaluation"]),
-    ("xtask", &["sim", "scenarios", "planners", "policy", "experiment", "evaluation", "report", "benchmark"]),
+    (
+        "xtask",
+        &["sim", "storage", "scenarios", "planners", "policy", "experiment", "evaluation", "report", "benchmark"],
+    ),
 ];
 
 #[test]

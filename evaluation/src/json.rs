@@ -2,6 +2,7 @@
 
 use anyhow::{Context as _, ensure};
 use serde::de::DeserializeOwned;
+use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::path::Path;
 
 /// Reads a file whose field `schema` is the version of its format; `None` if there is no such file.
@@ -12,7 +13,8 @@ pub fn read_versioned<T: DeserializeOwned>(path: &Path, schema: u32) -> anyhow::
     if !path.is_file() {
         return Ok(None);
     }
-    let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
+    let text =
+        storage::read::text(path, RUN_TEXT_BYTES_MAX).with_context(|| format!("{}: cannot be read", path.display()))?;
     let value: serde_json::Value = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
     let found = value.get("schema").and_then(serde_json::Value::as_u64).unwrap_or(0);
     ensure!(

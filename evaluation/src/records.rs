@@ -8,7 +8,9 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sim::episode::EpisodeReport;
 use sim::frame::Ending;
+use sim::limits::{RECORD_BYTES_MAX, RUN_TEXT_BYTES_MAX};
 use sim::scenario::Direction;
+use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 
 /// The version of `runs.jsonl`, `failures.jsonl` and `wall_time.jsonl` that this program writes.
@@ -112,9 +114,15 @@ pub fn each_line<T: DeserializeOwned>(
     path: &Path,
     mut take: impl FnMut(T) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
-    for (index, line) in text.lines().enumerate() {
-        let taken = parse(line).and_then(&mut take);
+    let in_file = || format!("{}: cannot be read", path.display());
+    let mut file = BufReader::new(storage::read::open(path, RUN_TEXT_BYTES_MAX).with_context(in_file)?);
+    let mut line = String::new();
+    for index in 0.. {
+        line.clear();
+        if file.by_ref().take(RECORD_BYTES_MAX).read_line(&mut line).with_context(in_file)? == 0 {
+            break;
+        }
+        let taken = parse(&line).and_then(&mut take);
         taken.with_context(|| {
             format!("{}:{}: not of this evaluation; drive it again into another folder", path.display(), index + 1)
         })?;

@@ -44,7 +44,21 @@ impl TrialBatch<'_> {
 
     /// Drives every trial to its end, or until the observer breaks; `None` marks trials that had not ended by then.
     pub fn drive(&self, observer: Observer<'_>) -> Vec<Option<EpisodeReport>> {
-        self.drive_from(self.episodes(), observer)
+        self.drive_from(self.episodes(), &mut |index, frame| {
+            let at = frame.vehicle;
+            let state = [at.pose.x_m, at.pose.y_m, at.pose.heading_rad, at.speed_mps, at.steering_rad];
+            assert!(
+                state.iter().all(|value| value.is_finite()),
+                "tick {} of {} on {}, {}, trial {}, noise {}: the state of the car is no finite number",
+                frame.tick,
+                self.driver.spec,
+                self.trials[index].lot.spec(),
+                self.trials[index].direction.name(),
+                self.trials[index].index,
+                self.noise
+            );
+            observer(index, frame)
+        })
     }
 
     /// Like [`Self::drive`], starting from the given episodes.
@@ -96,6 +110,20 @@ impl Replay {
     /// The trial.
     pub fn trial(&self) -> Trial<'_> {
         Trial::of_evaluation(self.key.seed, &self.lot, self.key.direction, self.key.trial)
+    }
+
+    /// Refuses a key whose moment is after the end of the run. Drives up to it.
+    ///
+    /// # Errors
+    /// Naming the last tick.
+    pub fn check_tick(&self, episode: &EpisodeSettings, driver: &NamedDriver) -> anyhow::Result<()> {
+        let (wanted, mut last) = (self.key.tick, 0);
+        self.drive(episode, driver, |frame| {
+            last = frame.tick;
+            if last < wanted { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        });
+        ensure!(last >= wanted, "{}: this run ends with tick {last}; name one up to that", self.key);
+        Ok(())
     }
 
     /// The settings of its episode.

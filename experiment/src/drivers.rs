@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use sim::action_smoothing::SmoothedFleet;
 use sim::driver::{Fleet, OneDriverEach, SensorsOnly, Source};
 use sim::episode::EpisodeSettings;
+use sim::limits::PLANNER_BYTES_MAX;
 use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -426,7 +427,7 @@ fn planner(name: &str, parameters: &Parameters) -> anyhow::Result<PlannerSpec> {
             with_parameters(&planner, text).with_context(|| format!("planners/tuned/{name}.toml"))
         }
         Parameters::File(path) => {
-            let text = std::fs::read_to_string(path).with_context(|| {
+            let text = storage::read::text(path, PLANNER_BYTES_MAX).with_context(|| {
                 format!("{}: cannot be read; cargo xtask drivers {name} prints such a file", path.display())
             })?;
             with_parameters(&planner, &text)

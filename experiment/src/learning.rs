@@ -1,10 +1,10 @@
 //! `learning.csv` in the folder of a round: its learning curve, step by step.
 
-use crate::run_dir::write_whole;
 use anyhow::Context as _;
 use policy::fit::{FitProgress, FitReport};
 use policy::loss::LossParts;
 use serde::{Deserialize, Serialize};
+use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::path::Path;
 
 const FILE: &str = "learning.csv";
@@ -75,7 +75,7 @@ impl Recorder {
                 validation_rmse_m: validation.map(|validation| validation.rmse_m),
             })?;
         }
-        write_whole(&folder.join(FILE), &csv.into_inner()?)
+        Ok(storage::whole::write(&folder.join(FILE), &csv.into_inner()?)?)
     }
 }
 
@@ -88,7 +88,9 @@ pub fn read(folder: &Path, name: &str) -> anyhow::Result<Option<LearningCurve>> 
     let mut round = LearningCurve { name: name.to_owned(), ..LearningCurve::default() };
     let path = folder.join(FILE);
     if path.is_file() {
-        let mut csv = csv::Reader::from_path(&path).with_context(|| path.display().to_string())?;
+        let mut csv = csv::Reader::from_reader(
+            storage::read::open(&path, RUN_TEXT_BYTES_MAX).with_context(|| path.display().to_string())?,
+        );
         for row in csv.deserialize() {
             let row: Row = row.with_context(|| path.display().to_string())?;
             round.training.push((row.step, f64::from(row.loss)));

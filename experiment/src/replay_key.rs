@@ -14,6 +14,7 @@ use crate::drivers::DriverSpec;
 use crate::settings::NoiseChoice;
 use anyhow::{Context as _, bail, ensure};
 use serde::{Deserialize, Serialize};
+use sim::limits::TRIAL_MAX;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::fmt;
@@ -70,11 +71,13 @@ impl FromStr for ReplayKey {
             u32::try_from(number(what, part)?)
                 .with_context(|| format!("replay key {text:?}: {what} {part} is too large"))
         };
+        let index = small("trial", trial)?;
+        ensure!(index <= TRIAL_MAX, "replay key {text:?}: trial {index} is too large; there are 0 to {TRIAL_MAX}");
         Ok(Self {
             driver: unescaped(driver).parse().with_context(|| format!("replay key {text:?}"))?,
             lot: unescaped(lot),
             direction,
-            trial: small("trial", trial)?,
+            trial: index,
             noise,
             seed: RootSeed(number("seed", seed)?),
             tick: small("tick", tick)?,
@@ -145,6 +148,7 @@ mod tests {
             ("expert@lot-b@reverse@x@paper@1@842", "trial \"x\""),
             ("expert@lot-b@reverse@3@loud@1@842", "no noise \"loud\""),
             ("expert@lot-b@reverse@3@paper@1@5000000000", "too large"),
+            ("expert@lot-b@reverse@1048576@paper@1@0", "there are 0 to 1048575"),
         ] {
             let error = format!("{:#}", wrong.parse::<ReplayKey>().unwrap_err());
             assert!(error.contains(part), "{wrong}: {part:?} is missing in: {error}");

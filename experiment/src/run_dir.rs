@@ -16,18 +16,21 @@ use anyhow::{Context as _, bail, ensure};
 use policy::checkpoint::Checkpoint;
 use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
+use sim::limits::RUN_TOML_BYTES_MAX;
 use std::fs;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use storage::lock::{self, Lock};
 
 const MANIFEST: &str = "manifest.toml";
 const SETTINGS: &str = "settings.toml";
 const FINISHED: &str = "finished.toml";
 
-/// A claimed folder.
+/// A claimed folder: nobody else writes into it until the last clone is dropped, or the process ends.
 #[derive(Debug, Clone)]
 pub struct RunDir {
     path: PathBuf,
+    _lock: Arc<Lock>,
 }
 
 /// What made a run: `manifest.toml`.
@@ -145,13 +148,12 @@ impl RunDir {
     /// Claims a folder and writes settings and manifest into it.
     ///
     /// # Errors
-    /// If the folder is taken or cannot be written.
+    /// If the folder is taken, in use by another process, or cannot be written.
     pub fn create(place: &Place<'_>, settings: &Settings) -> anyhow::Result<Self> {
-        let path = match place.out {
-            Some(out) => claim_named(out, place.overwrite)?,
-            None => claim_next_free(&format!("{}-{}-s{}", place.command, place.preset, place.seed))?,
+        let run = match place.out {
+            Some(out) => Self::claim_named(out, place)?,
+            None => Self::claim_next_free(place)?,
         };
-        let run = Self { path };
         run.write(SETTINGS, settings.to_toml().as_bytes())?;
         let manifest =
             toml::to_string(&Manifest::new(place.build, place.preset, settings)).expect("a manifest is plain values");
@@ -162,25 +164,35 @@ impl RunDir {
     /// Reopens the folder of an interrupted run.
     ///
     /// # Errors
-    /// If there is none, or it is finished.
-    pub fn resume(path: &Path) -> anyhow::Result<(Self, Settings)> {
+    /// If there is none, it is finished, or another process is at it.
+    pub fn resume(path: &Path, command: &str) -> anyhow::Result<(Self, Settings)> {
         ensure!(path.is_dir(), "{}: there is no such run to resume", path.display());
+        let run = Self::locked(path.to_path_buf(), command)?;
         ensure!(!path.join(FINISHED).is_file(), "{}: this run is finished; nothing is left to resume", path.display());
         let settings = Settings::read(&path.join(SETTINGS))?;
-        Ok((Self { path: path.to_path_buf() }, settings))
+        Ok((run, settings))
+    }
+
+    /// Reopens the folder of a run to write into it, whether it is finished or not.
+    ///
+    /// # Errors
+    /// If there is none, or another process is at it.
+    pub fn reopen(path: &Path, command: &str) -> anyhow::Result<Self> {
+        ensure!(path.join(SETTINGS).is_file(), "{}: this is no run; list the folders in runs/", path.display());
+        Self::locked(path.to_path_buf(), command)
     }
 
     /// Claims the folder of a stage within a run: `None` if it is finished, else as an interrupted one left it or new.
     /// The folder belongs to the run: what cannot be continued there is started again.
     ///
     /// # Errors
-    /// If it was begun with other settings, or cannot be written.
+    /// If it was begun with other settings, is in use by another process, or cannot be written.
     pub fn stage(path: &Path, place: &Place<'_>, settings: &Settings) -> anyhow::Result<Option<Self>> {
         if is_finished(path) {
             return Ok(None);
         }
         if path.join(MANIFEST).is_file() {
-            let (run, found) = Self::resume(path)?;
+            let (run, found) = Self::resume(path, place.command)?;
             ensure!(
                 found == *settings,
                 "{}: this stage was begun with other settings; delete the folder, or choose another --out",
@@ -189,9 +201,78 @@ impl RunDir {
             return Ok(Some(run));
         }
         if path.exists() {
-            fs::remove_dir_all(path).with_context(|| format!("{}: cannot be deleted", path.display()))?;
+            Self::locked(path.to_path_buf(), place.command)?.clear()?;
         }
         Self::create(&Place { out: Some(path), ..*place }, settings).map(Some)
+    }
+
+    /// Takes the lock of a folder that is there.
+    fn locked(path: PathBuf, command: &str) -> anyhow::Result<Self> {
+        let lock = Arc::new(Lock::take(&path, command)?);
+        Ok(Self { path, _lock: lock })
+    }
+
+    fn claim_named(path: &Path, place: &Place<'_>) -> anyhow::Result<Self> {
+        fs::create_dir_all(path)
+            .with_context(|| format!("{}: cannot be created; choose another --out", path.display()))?;
+        let is_empty = fs::read_dir(path)?.all(|entry| entry.is_ok_and(|entry| entry.file_name() == lock::FILE));
+        let is_run = path.join(SETTINGS).is_file();
+        // Before the lock is taken: nothing is written into a folder that is no run.
+        if !is_empty && !is_run {
+            let way_out =
+                if place.overwrite { "so --overwrite will not delete it; choose" } else { "and not empty; choose" };
+            bail!("{}: this folder is not a run, {way_out} another --out", path.display());
+        }
+        let run = Self::locked(path.to_path_buf(), place.command)?;
+        if is_run {
+            let path = path.display();
+            ensure!(
+                place.overwrite || is_finished(&run.path),
+                "{path}: this folder is not empty; continue it with --resume {path}, choose another --out, or delete it \
+                 with --overwrite"
+            );
+            ensure!(
+                place.overwrite,
+                "{path}: this folder is not empty; choose another --out, or delete it with --overwrite"
+            );
+            run.clear()?;
+        }
+        Ok(run)
+    }
+
+    /// `runs/NAME`, or with the next free number. Creating the folder is the claim: two commands started at once get two.
+    fn claim_next_free(place: &Place<'_>) -> anyhow::Result<Self> {
+        let name = format!("{}-{}-s{}", place.command, place.preset, place.seed);
+        let runs = Path::new("runs");
+        fs::create_dir_all(runs).context("runs: cannot be created here; choose a folder with --out")?;
+        let mut n = 1;
+        loop {
+            let path = runs.join(if n == 1 { name.clone() } else { format!("{name}-{n}") });
+            match fs::create_dir(&path) {
+                Ok(()) => return Self::locked(path, place.command),
+                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => n += 1,
+                Err(error) => {
+                    return Err(error).with_context(|| format!("{}: choose a folder with --out", path.display()));
+                }
+            }
+        }
+    }
+
+    /// Deletes everything but the lock. The settings go last: until then the folder is known as a run.
+    fn clear(&self) -> anyhow::Result<()> {
+        let delete = || {
+            let mut entries = fs::read_dir(&self.path)?.collect::<Result<Vec<_>, _>>()?;
+            entries.sort_by_key(|entry| entry.file_name() == SETTINGS);
+            for entry in entries {
+                if entry.file_type()?.is_dir() {
+                    fs::remove_dir_all(entry.path())?;
+                } else if entry.file_name() != lock::FILE {
+                    fs::remove_file(entry.path())?;
+                }
+            }
+            Ok::<_, std::io::Error>(())
+        };
+        delete().with_context(|| format!("{}: cannot be deleted", self.path.display()))
     }
 
     /// The folder.
@@ -204,7 +285,7 @@ impl RunDir {
     /// # Errors
     /// If it cannot be written.
     pub fn write(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
-        write_whole(&self.path.join(name), content)
+        Ok(storage::whole::write(&self.path.join(name), content)?)
     }
 
     /// Marks the run as finished.
@@ -220,23 +301,6 @@ impl RunDir {
 /// Whether a run is finished.
 pub fn is_finished(path: &Path) -> bool {
     path.join(FINISHED).is_file()
-}
-
-/// Writes a file under a temporary name and renames it.
-///
-/// # Errors
-/// If it cannot be written.
-pub fn write_whole(path: &Path, content: &[u8]) -> anyhow::Result<()> {
-    let partial = path.with_added_extension("partial");
-    let write = || {
-        let mut file = fs::File::create(&partial)?;
-        file.write_all(content)?;
-        file.sync_all()?;
-        fs::rename(&partial, path)
-    };
-    write().with_context(|| {
-        format!("{}: cannot be written; check that the folder is writable and has space", path.display())
-    })
 }
 
 /// The folder with the checkpoint that `run:DIR` or `run:DIR/bc` names.
@@ -284,47 +348,6 @@ fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
     Ok((run, is_bc))
 }
 
-fn claim_named(path: &Path, overwrite: bool) -> anyhow::Result<PathBuf> {
-    if path.exists() && fs::read_dir(path).map_or(true, |mut entries| entries.next().is_some()) {
-        if !overwrite {
-            let way_out = if path.join(FINISHED).is_file() || !path.join(SETTINGS).is_file() {
-                "choose another --out, or delete it with --overwrite".to_owned()
-            } else {
-                format!(
-                    "continue it with --resume {}, choose another --out, or delete it with --overwrite",
-                    path.display()
-                )
-            };
-            bail!("{}: this folder is not empty; {way_out}", path.display());
-        }
-        ensure!(
-            path.join(SETTINGS).is_file(),
-            "{}: this folder is not a run, so --overwrite will not delete it; choose another --out",
-            path.display()
-        );
-        fs::remove_dir_all(path).with_context(|| format!("{}: cannot be deleted", path.display()))?;
-    }
-    fs::create_dir_all(path).with_context(|| format!("{}: cannot be created; choose another --out", path.display()))?;
-    Ok(path.to_path_buf())
-}
-
-/// `runs/NAME`, or with the next free number. Creating the folder is the claim: two commands started at once get two.
-fn claim_next_free(name: &str) -> anyhow::Result<PathBuf> {
-    let runs = Path::new("runs");
-    fs::create_dir_all(runs).context("runs: cannot be created here; choose a folder with --out")?;
-    let mut n = 1;
-    loop {
-        let path = runs.join(if n == 1 { name.to_owned() } else { format!("{name}-{n}") });
-        match fs::create_dir(&path) {
-            Ok(()) => return Ok(path),
-            Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => n += 1,
-            Err(error) => {
-                return Err(error).with_context(|| format!("{}: choose a folder with --out", path.display()));
-            }
-        }
-    }
-}
-
 impl Manifest {
     fn new(build: &Build, preset: &str, settings: &Settings) -> Self {
         Self {
@@ -349,7 +372,8 @@ impl Manifest {
     /// If it cannot be read or is of another version.
     pub fn read(run: &Path) -> anyhow::Result<Self> {
         let path = run.join(MANIFEST);
-        let text = fs::read_to_string(&path).with_context(|| format!("{}: cannot be read", path.display()))?;
+        let text = storage::read::text(&path, RUN_TOML_BYTES_MAX)
+            .with_context(|| format!("{}: cannot be read", path.display()))?;
         let table: toml::Table = text.parse().with_context(|| path.display().to_string())?;
         let schema = table.get("schema").and_then(toml::Value::as_integer).unwrap_or(0);
         ensure!(
@@ -368,6 +392,7 @@ mod tests {
     use policy::conditions::Conditions;
     use policy::network::Weights;
     use sim::seed::RootSeed;
+    use std::sync::LazyLock;
 
     fn scratch(name: &str) -> PathBuf {
         let path = std::env::temp_dir().join(format!("xtask-test-{}-{name}", std::process::id()));
@@ -375,17 +400,21 @@ mod tests {
         path
     }
 
+    fn build() -> &'static Build {
+        static BUILD: LazyLock<Build> = LazyLock::new(Build::default);
+        &BUILD
+    }
+
+    fn place(out: &Path, overwrite: bool) -> Place<'_> {
+        Place { build: build(), out: Some(out), overwrite, command: "train-dagger", preset: "smoke", seed: 1 }
+    }
+
     fn create(out: &Path, overwrite: bool) -> anyhow::Result<RunDir> {
-        let settings = Settings::preset("smoke")?;
-        let place = Place {
-            build: &Build::default(),
-            out: Some(out),
-            overwrite,
-            command: "train-dagger",
-            preset: "smoke",
-            seed: 1,
-        };
-        RunDir::create(&place, &settings)
+        RunDir::create(&place(out, overwrite), &Settings::preset("smoke")?)
+    }
+
+    fn stage(out: &Path) -> anyhow::Result<Option<RunDir>> {
+        RunDir::stage(out, &place(out, false), &Settings::preset("smoke")?)
     }
 
     fn message<T: std::fmt::Debug>(result: anyhow::Result<T>) -> String {
@@ -395,14 +424,37 @@ mod tests {
     #[test]
     fn a_run_is_resumed_until_finished_and_overwritten_only_when_told() {
         let path = scratch("claim");
-        let run = create(&path, false).unwrap();
+        drop(create(&path, false).unwrap());
         assert!(message(create(&path, false)).contains("--resume"));
-        assert_eq!(RunDir::resume(&path).unwrap().1, Settings::preset("smoke").unwrap());
+        let (run, settings) = RunDir::resume(&path, "train-dagger").unwrap();
+        assert_eq!(settings, Settings::preset("smoke").unwrap());
         run.finish(Outcome::Reproduction { stages: 8 }).unwrap();
-        assert!(message(RunDir::resume(&path)).contains("finished"));
+        drop(run);
+        assert!(message(RunDir::resume(&path, "train-dagger")).contains("finished"));
         assert!(message(create(&path, false)).contains("--overwrite"));
         create(&path, true).unwrap();
         assert!(!path.join(FINISHED).exists());
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// Both wrote into it, and what came out was of neither.
+    #[test]
+    fn a_run_has_one_owner_at_a_time() {
+        let path = scratch("owner");
+        let run = create(&path, false).unwrap();
+        let owner = format!("in use by train-dagger, process {}", std::process::id());
+        for refused in [
+            message(create(&path, false)),
+            message(create(&path, true)),
+            message(RunDir::resume(&path, "train-bc")),
+            message(RunDir::reopen(&path, "render")),
+            message(stage(&path)),
+        ] {
+            assert!(refused.contains(&owner), "{refused}");
+        }
+        assert!(path.join(SETTINGS).is_file(), "nothing is deleted");
+        drop(run);
+        create(&path, true).unwrap();
         fs::remove_dir_all(path).unwrap();
     }
 

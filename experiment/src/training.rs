@@ -16,6 +16,7 @@ use policy::fit::{FitProgress, FitReport};
 use sim::driver::Source;
 use sim::episode::Episode;
 use sim::frame::Frame;
+use sim::limits::TRIAL_MAX;
 use sim::map::Map;
 use sim::seed::EpisodeIndex;
 use std::cell::RefCell;
@@ -89,14 +90,16 @@ pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Res
 /// If there is no such run, round or drive, or a file of it cannot be read.
 pub fn drive_again(run: &Path, round: u32, drive: u32) -> anyhow::Result<(Arc<Map>, Rollouts)> {
     let settings = run_dir::settings_of(run)?;
+    ensure!(round <= TRIAL_MAX, "round {round}: there are 0 to {TRIAL_MAX}");
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
+    // First, because it says whether there is such a round.
+    let novice = round.checked_sub(1).map(|before| run.join(format!("round-{before:02}")));
+    let novice = novice.map(|folder| Checkpoint::load(&folder)).transpose()?;
     let mut episodes = episodes_of(&settings, &lots, round)?;
     let count = episodes.len();
     ensure!((drive as usize) < count, "drive {drive} of round {round}: it has {count} drives, counted from 0");
     let episode = episodes.swap_remove(drive as usize);
     let map = Arc::clone(episode.episode.map());
-    let novice = round.checked_sub(1).map(|before| run.join(format!("round-{before:02}")));
-    let novice = novice.map(|folder| Checkpoint::load(&folder)).transpose()?;
     Ok((map, Rollouts::of_round(&settings.dagger, settings.seed, novice.as_ref(), vec![episode])))
 }
 

@@ -11,8 +11,8 @@ use crate::network::{
 };
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
+use sim::limits::HEADER_BYTES_MAX;
 use sim::sensing::GridGeometry;
-use std::fs;
 use std::io::Write as _;
 use std::path::Path;
 
@@ -151,7 +151,8 @@ impl Checkpoint {
         }
 
         let path = folder.join(NUMBERS);
-        let bytes = fs::read(&path).map_err(|error| FileError::new(&path, error, RESTORE))?;
+        let bytes_max = 4 * about.network.parameter_count() as u64 + HEADER_BYTES_MAX;
+        let bytes = storage::read::bytes(&path, bytes_max).map_err(|error| FileError::new(&path, error, RESTORE))?;
         let tensors = SafeTensors::deserialize(&bytes).map_err(|error| FileError::new(&path, error, RESTORE))?;
         let mut weights = Weights::zeros(about.network);
         from_pytorch(&mut weights, |name, shape| {
@@ -297,6 +298,7 @@ mod tests {
     use crate::test_data::scratch;
     use sim::episode::EpisodeSettings;
     use sim::seed::RootSeed;
+    use std::fs;
 
     fn checkpoint(architecture: NetworkArchitecture) -> Checkpoint {
         let weights = Weights::init(architecture, RootSeed(1), 0);

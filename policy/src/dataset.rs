@@ -2,6 +2,7 @@
 
 mod aggregate;
 mod collection;
+mod npy;
 mod packed;
 mod round;
 mod sample;

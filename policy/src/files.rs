@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use sim::limits::RUN_TOML_BYTES_MAX;
 use std::fs::{self, File};
 use std::io::{BufReader, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
@@ -26,7 +27,8 @@ impl FileError {
 }
 
 pub(crate) const WRITE_REMEDY: &str = "check that the folder exists, is writable and has space";
-pub(crate) const RESTORE_REMEDY: &str = "restore the file, or delete its round and all later ones to make them again";
+pub(crate) const RESTORE_REMEDY: &str = "restore the file, or train again into another folder; a run that is not \
+                                         finished makes its rounds again when this one and all later ones are deleted";
 pub(crate) const SCHEMA_REMEDY: &str = "train again into another folder, or use the version of lotpilot that wrote it";
 
 /// A TOML file with one name and a schema version, which is its first key.
@@ -48,7 +50,8 @@ pub(crate) fn write<T: Format>(folder: &Path, content: &T) -> Result<(), FileErr
 /// Reads a file from its folder.
 pub(crate) fn read<T: Format>(folder: &Path) -> Result<T, FileError> {
     let path = folder.join(T::NAME);
-    let text = fs::read_to_string(&path).map_err(|error| FileError::new(&path, error, RESTORE_REMEDY))?;
+    let text =
+        storage::read::text(&path, RUN_TOML_BYTES_MAX).map_err(|error| FileError::new(&path, error, RESTORE_REMEDY))?;
     let mut table: Table = text.parse().map_err(|error| FileError::new(&path, error, RESTORE_REMEDY))?;
     match table.remove("schema") {
         Some(Value::Integer(schema)) if schema == i64::from(T::SCHEMA) => {}
@@ -69,14 +72,19 @@ pub(crate) fn read_if_there<T: Format>(folder: &Path) -> Result<Option<T>, FileE
     folder.join(T::NAME).is_file().then(|| read(folder)).transpose()
 }
 
-/// Creates a folder and those above it.
+/// Creates a folder if it is not there. Not those above it: a run whose folder was removed must not come back in part.
 pub(crate) fn create_folder(folder: &Path) -> Result<(), FileError> {
-    fs::create_dir_all(folder).map_err(|error| FileError::new(folder, error, WRITE_REMEDY))
+    match fs::create_dir(folder) {
+        Err(error) if !folder.is_dir() => Err(FileError::new(folder, error, WRITE_REMEDY)),
+        _ => Ok(()),
+    }
 }
 
-/// Opens a file for reading.
-pub(crate) fn open(path: &Path) -> Result<BufReader<File>, FileError> {
-    File::open(path).map(BufReader::new).map_err(|error| FileError::new(path, error, RESTORE_REMEDY))
+/// Opens a file of at most so many bytes for reading.
+pub(crate) fn open(path: &Path, bytes_max: u64) -> Result<BufReader<File>, FileError> {
+    storage::read::open(path, bytes_max)
+        .map(BufReader::new)
+        .map_err(|error| FileError::new(path, error, RESTORE_REMEDY))
 }
 
 /// Writes beside the file, then renames: under its name it is always whole.
@@ -115,6 +123,14 @@ mod tests {
     impl Format for Note {
         const NAME: &'static str = "note.toml";
         const SCHEMA: u32 = 3;
+    }
+
+    /// It was made again, with some of its files.
+    #[test]
+    fn a_folder_that_was_removed_does_not_come_back_in_part() {
+        let folder = scratch("removed");
+        let error = create_folder(&folder.join("round-01")).unwrap_err().to_string();
+        assert!(error.contains("round-01") && !folder.exists(), "{error}");
     }
 
     #[test]

@@ -15,7 +15,6 @@ use crate::markdown::escaped as escaped_markdown;
 use anyhow::Context as _;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
-use experiment::run_dir::write_whole;
 use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd, html};
 use sha2::{Digest as _, Sha256};
 use std::borrow::Cow;
@@ -136,13 +135,17 @@ impl Page {
         let figures = folder.join(FIGURES);
         for part in &self.parts {
             if let Part::Figure { name, image, .. } = part {
-                std::fs::create_dir_all(&figures)
-                    .with_context(|| format!("{}: cannot be created; is the folder writable?", figures.display()))?;
-                write_whole(&figures.join(image.file(name)), &image.bytes())?;
+                // Not the folder itself: a run that was removed must not come back in part.
+                if !figures.is_dir() {
+                    std::fs::create_dir(&figures).with_context(|| {
+                        format!("{}: cannot be created; is the folder writable?", figures.display())
+                    })?;
+                }
+                storage::whole::write(&figures.join(image.file(name)), &image.bytes())?;
             }
         }
-        write_whole(&folder.join(format!("{stem}.md")), self.to_markdown().as_bytes())?;
-        write_whole(&folder.join(format!("{stem}.html")), self.to_html().as_bytes())
+        storage::whole::write(&folder.join(format!("{stem}.md")), self.to_markdown().as_bytes())?;
+        Ok(storage::whole::write(&folder.join(format!("{stem}.html")), self.to_html().as_bytes())?)
     }
 
     /// Writes Markdown alone, as a file of a repository: `figures` is a folder relative to its own.
@@ -155,10 +158,10 @@ impl Page {
         std::fs::create_dir_all(&into).with_context(|| format!("{}: cannot be created", into.display()))?;
         for part in &self.parts {
             if let Part::Figure { name, image, .. } = part {
-                write_whole(&into.join(image.file(name)), &image.bytes())?;
+                storage::whole::write(&into.join(image.file(name)), &image.bytes())?;
             }
         }
-        write_whole(path, self.markdown_with(figures).as_bytes())
+        Ok(storage::whole::write(path, self.markdown_with(figures).as_bytes())?)
     }
 
     /// Markdown that names the figures as files beside it.

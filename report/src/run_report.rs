@@ -24,6 +24,7 @@ use experiment::settings::{NoiseChoice, Settings};
 use policy::checkpoint::Checkpoint;
 use policy::dataset::Dataset;
 use policy::dataset::store::Store;
+use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -130,7 +131,8 @@ impl Evaluation {
 }
 
 fn text(path: &Path) -> anyhow::Result<String> {
-    std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read for the report", path.display()))
+    storage::read::text(path, RUN_TEXT_BYTES_MAX)
+        .with_context(|| format!("{}: cannot be read for the report", path.display()))
 }
 
 /// Writes the report of the run in a folder.

@@ -70,7 +70,18 @@ impl std::fmt::Display for Location {
 impl LoadError {
     /// A fault at a byte offset of a file's text.
     pub(crate) fn faulty(file: &str, text: &str, offset: usize, problem: String, remedy: String) -> Self {
-        Self::Faulty { file: file.to_owned(), line: line_at(text, offset), problem, remedy }
+        Self::Faulty { file: file.to_owned(), line: line_at(text, offset), problem: shortened(&problem), remedy }
+    }
+}
+
+/// Characters that a message quotes of a file, at most.
+const QUOTED_MAX: usize = 400;
+
+/// As much of a text as an error needs.
+pub(crate) fn shortened(text: &str) -> String {
+    match text.char_indices().nth(QUOTED_MAX) {
+        Some((end, _)) => format!("{} …", &text[..end]),
+        None => text.to_owned(),
     }
 }
 
@@ -79,8 +90,8 @@ pub(crate) fn line_at(text: &str, offset: usize) -> usize {
     1 + text.get(..offset).unwrap_or(text).matches('\n').count()
 }
 
-/// The text of a file.
-pub(crate) fn read_text(path: &Path) -> Result<String, LoadError> {
-    std::fs::read_to_string(path)
+/// The text of a file of at most so many bytes.
+pub(crate) fn read_text(path: &Path, bytes_max: u64) -> Result<String, LoadError> {
+    storage::read::text(path, bytes_max)
         .map_err(|error| LoadError::Unreadable { file: path.display().to_string(), problem: error.to_string() })
 }

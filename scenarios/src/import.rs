@@ -11,7 +11,7 @@ mod ros;
 mod tpcap;
 
 use crate::branches;
-use crate::error::{LoadError, read_text};
+use crate::error::{LoadError, read_text, shortened};
 use crate::note::{Loaded, Note};
 use crate::solver;
 use crate::solver::route::{self, Finish, NoRoute};
@@ -20,6 +20,10 @@ use ground::Ground;
 use serde::Deserialize;
 use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
+use sim::limits::{
+    CSV_BYTES_MAX, LOT_BYTES_MAX, MAP_COORDINATE_MAX_M, MAP_PIXEL_M, MAP_SCALE, OUTLINE_CORNERS_MAX, ROUTE_MAX_M,
+    ROUTE_POINTS_MAX,
+};
 use sim::map::Map;
 use sim::scenario::{Island, LotNoise, Place, ReferencePath, Scenario, ScenarioError};
 use sim::validate::validate;
@@ -79,6 +83,10 @@ pub struct MapLot {
     /// Sensor noise of the lot.
     #[serde(default)]
     pub noise: LotNoise,
+    /// Whether the image of a ROS map may lie elsewhere than beside or below its YAML file. No file can say so: it would
+    /// be the one that is not trusted.
+    #[serde(skip)]
+    pub is_image_anywhere: bool,
     /// What is named in errors.
     #[serde(skip)]
     file: PathBuf,
@@ -114,7 +122,7 @@ impl MapLot {
     /// If the file cannot be read or says something else.
     pub fn read(path: &Path) -> Result<Self, LoadError> {
         if !is_map(path) {
-            return Self::parse(&read_text(path)?, path);
+            return Self::parse(&read_text(path, LOT_BYTES_MAX)?, path);
         }
         let beside = path.with_extension("lot.toml");
         if !beside.is_file() {
@@ -143,6 +151,7 @@ impl MapLot {
             drop_specks_m2: 0.0,
             close_branches: false,
             noise: LotNoise::default(),
+            is_image_anywhere: false,
             file: map.to_owned(),
         }
     }
@@ -168,8 +177,14 @@ impl MapLot {
     pub fn scenario(&self, vehicle: &VehicleSettings) -> Result<Loaded, LoadError> {
         self.check()?;
         let is_case = self.map.extension().is_some_and(|extension| extension == "csv");
-        let source =
-            if is_case { Source::Case(tpcap::Case::read(&self.map)?) } else { Source::Map(ros::Map::read(&self.map)?) };
+        let mut notes = Vec::new();
+        let source = if is_case {
+            Source::Case(tpcap::Case::read(&self.map)?)
+        } else {
+            let (map, unused) = ros::Map::read(&self.map, self.is_image_anywhere)?;
+            notes.extend(unused);
+            Source::Map(map)
+        };
         let (start, goal) = match &source {
             Source::Case(case) => (self.start.or(Some(case.start)), self.goal.or(Some(case.goal))),
             Source::Map(_) => (self.start, self.goal),
@@ -182,7 +197,6 @@ impl MapLot {
             _ => return Err(self.nothing_to_drive()),
         };
         let frame = Frame::around(seed, self.scale);
-        let mut notes = Vec::new();
         notes.extend(frame.is_recentred().then_some(Note::Recentred { origin: frame.origin }));
         let ground = match &source {
             Source::Case(case) => case.ground(frame),
@@ -218,9 +232,13 @@ impl MapLot {
             let problem = format!("{} is neither a ROS map nor a TPCAP case", self.map.display());
             return Err(self.fault("map", problem, "name a .yaml or a .csv file"));
         }
-        if !(self.scale.is_finite() && self.scale > 0.0) {
-            let remedy = "write how many times as large as the map the lot is, e.g. 20";
-            return Err(self.fault("scale", format!("it is {}", self.scale), remedy));
+        if !MAP_SCALE.contains(&self.scale) {
+            let remedy = format!(
+                "write how many times as large as the map the lot is, {} to {}, e.g. 20",
+                MAP_SCALE.start(),
+                MAP_SCALE.end()
+            );
+            return Err(self.fault("scale", format!("it is {}", self.scale), &remedy));
         }
         if !(0.0..=2.0).contains(&self.clearance_m) {
             let remedy = "write a number of metres from 0 to 2";
@@ -235,7 +253,8 @@ impl MapLot {
             return Err(self.fault("drop_specks_m2", format!("it is {}", self.drop_specks_m2), remedy));
         }
         for (place, pose) in [("start", self.start), ("goal", self.goal)] {
-            if let Some(value) = pose.into_iter().flatten().find(|value| !value.is_finite()) {
+            let is_far = |value: &f64| value.is_nan() || value.abs() > MAP_COORDINATE_MAX_M;
+            if let Some(value) = pose.into_iter().flatten().find(is_far) {
                 return Err(self.fault(place, format!("a number is {value}"), "write x, y in metres and degrees"));
             }
         }
@@ -276,8 +295,20 @@ impl MapLot {
         let pixel = drivable_pixel(place, seed, &map.drivable)?;
         goal.map(|goal| drivable_pixel("goal", goal, &map.drivable)).transpose()?;
         let pixel_m = map.resolution_m * self.scale;
+        if !MAP_PIXEL_M.contains(&pixel_m) {
+            let problem = format!("a pixel of the map is {pixel_m} m in the lot");
+            let remedy = format!("let scale make it {} m to {} m", MAP_PIXEL_M.start(), MAP_PIXEL_M.end());
+            return Err(self.fault("scale", problem, &remedy));
+        }
         let in_px2 = |m2: f64| m2 / (pixel_m * pixel_m);
-        let (region, dropped) = map.drivable.region_of(pixel).without_specks(in_px2(self.drop_specks_m2));
+        let region = map.drivable.region_of(pixel);
+        let corners = region.corners();
+        if corners > OUTLINE_CORNERS_MAX {
+            let problem = format!("the outlines of what is drivable have {corners} corners");
+            let remedy = format!("smooth the image, or crop it: {OUTLINE_CORNERS_MAX} are possible");
+            return Err(self.fault("map", problem, &remedy));
+        }
+        let (region, dropped) = region.without_specks(in_px2(self.drop_specks_m2));
         let (region, padded) = region.with_large_specks(pixel, in_px2(ISLAND_MIN_M2));
         let up_to_m2 = self.drop_specks_m2;
         notes.extend((dropped > 0).then_some(Note::Dropped { specks: dropped, up_to_m2 }));
@@ -336,7 +367,7 @@ impl MapLot {
     /// The points of a CSV file, in the map's frame.
     fn read_centre_line(&self, file: &Path) -> Result<Vec<[f64; 2]>, LoadError> {
         let name = file.display().to_string();
-        let text = read_text(file)?;
+        let text = read_text(file, CSV_BYTES_MAX)?;
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -355,7 +386,10 @@ impl MapLot {
             let line = record.position().map_or(i + 1, |position| position.line() as usize);
             let numbers: Vec<Option<f64>> = record.iter().take(2).map(|cell| cell.parse().ok()).collect();
             match numbers[..] {
-                [Some(x), Some(y)] if x.is_finite() && y.is_finite() => {
+                [Some(x), Some(y)] if x.abs() <= MAP_COORDINATE_MAX_M && y.abs() <= MAP_COORDINATE_MAX_M => {
+                    if points.len() == ROUTE_POINTS_MAX {
+                        return Err(faulty(line, format!("the line has more than {ROUTE_POINTS_MAX} points")));
+                    }
                     let is_far = |&[a, b]: &[f64; 2]| self.scale * (a - x).hypot(b - y) > SAME_POINT_M;
                     if points.last().is_none_or(is_far) {
                         points.push([x, y]);
@@ -364,7 +398,8 @@ impl MapLot {
                 // A first line of words is a header.
                 [None, ..] if i == 0 => {}
                 _ => {
-                    return Err(faulty(line, format!("{:?} is no point", record.iter().collect::<Vec<_>>().join(","))));
+                    let cells = record.iter().collect::<Vec<_>>().join(",");
+                    return Err(faulty(line, format!("{:?} is no point", shortened(&cells))));
                 }
             }
         }
@@ -395,7 +430,12 @@ impl MapLot {
         for obstacle in &ground.obstacles {
             room.carve_polygon(&obstacle.outline());
         }
-        let points = points.iter().map(|&point| frame.in_lot(point)).collect();
+        let points: Vec<Vec2> = points.iter().map(|&point| frame.in_lot(point)).collect();
+        let length_m: f32 = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+        if length_m > ROUTE_MAX_M {
+            let problem = format!("it is {:.0} km long in the lot", length_m / 1000.0);
+            return Err(self.fault("centre_line", problem, &format!("shorten it: {ROUTE_MAX_M} m are possible")));
+        }
         let line = ReferencePath { points, corner_radius_m: CENTRE_LINE_RADIUS_M };
         let path = sim::path::Path::new(&line);
         let half_width_m = 0.5 * vehicle.width_m;

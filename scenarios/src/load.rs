@@ -6,10 +6,13 @@
 use crate::error::{LoadError, Location, line_at, read_text};
 use crate::import::{self, MapLot};
 use crate::note::Loaded;
+use serde::Deserialize as _;
+use sim::limits::LOT_BYTES_MAX;
 use sim::scenario::{Direction, Place, Scenario, ScenarioError};
 use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
 use std::path::Path;
+use toml_edit::de::Deserializer;
 use toml_edit::visit_mut::{self, VisitMut};
 use toml_edit::{Array, Document, Formatted, InlineTable, Item, Value};
 
@@ -30,11 +33,12 @@ pub fn load_with_notes(path: &Path, vehicle: &VehicleSettings) -> Result<Loaded,
     if import::is_map(path) {
         return MapLot::read(path)?.scenario(vehicle);
     }
-    let text = read_text(path)?;
-    if Document::parse(text.as_str()).is_ok_and(|document| names_a_map(&document)) {
+    let (text, file) = (read_text(path, LOT_BYTES_MAX)?, path.display().to_string());
+    let document = parse_toml(&text, &file)?;
+    if names_a_map(&document) {
         return MapLot::read(path)?.scenario(vehicle);
     }
-    let scenario = parse(&text, &path.display().to_string(), vehicle)?;
+    let scenario = scenario_of(&document, &text, &file, vehicle)?;
     Ok(Loaded { scenario, notes: Vec::new() })
 }
 
@@ -62,7 +66,7 @@ pub fn check_direction(
         (_, place) => place,
     };
     let file = if import::is_map(path) { path.with_extension("lot.toml") } else { path.to_owned() };
-    let line = read_text(&file).ok().and_then(|text| {
+    let line = read_text(&file, LOT_BYTES_MAX).ok().and_then(|text| {
         let document = Document::parse(text.as_str()).ok()?;
         let offset = if names_a_map(&document) { offset_of_finish(&document) } else { offset_of(&document, place) };
         offset.map(|offset| line_at(&text, offset))
@@ -81,24 +85,37 @@ pub fn check_direction(
 /// # Errors
 /// The first thing wrong with it, with its line.
 pub fn parse(text: &str, file: &str, vehicle: &VehicleSettings) -> Result<Scenario, LoadError> {
+    scenario_of(&parse_toml(text, file)?, text, file, vehicle)
+}
+
+fn parse_toml<'a>(text: &'a str, file: &str) -> Result<Document<&'a str>, LoadError> {
+    Document::parse(text).map_err(|error| {
+        let offset = error.span().map_or(0, |span| span.start);
+        let problem = format!("not TOML: {}", error.message().trim());
+        LoadError::faulty(file, text, offset, problem, "fix the syntax there".to_owned())
+    })
+}
+
+fn scenario_of(
+    document: &Document<&str>,
+    text: &str,
+    file: &str,
+    vehicle: &VehicleSettings,
+) -> Result<Scenario, LoadError> {
     let faulty =
         |offset: usize, problem: String, remedy: String| LoadError::faulty(file, text, offset, problem, remedy);
-    let document = Document::parse(text).map_err(|error| {
-        let offset = error.span().map_or(0, |span| span.start);
-        faulty(offset, format!("not TOML: {}", error.message().trim()), "fix the syntax there".to_owned())
-    })?;
-    let scenario: Scenario = toml_edit::de::from_str(text).map_err(|error| {
+    let scenario = Scenario::deserialize(Deserializer::from(document.clone())).map_err(|error| {
         let offset = error.span().map_or(0, |span| span.start);
         let problem = error.message().trim().to_owned();
         let remedy = remedy_for(&problem).to_owned();
         faulty(offset, problem, remedy)
     })?;
-    if let Some((offset, length)) = first_odd_point(&document) {
+    if let Some((offset, length)) = first_odd_point(document) {
         // The deserialiser of points reads two numbers and ignores the rest.
         return Err(faulty(offset, format!("a point of {length} numbers"), "write points as [x, y]".to_owned()));
     }
     validate(&scenario, vehicle).map_err(|error| {
-        let offset = offset_of(&document, error.place).unwrap_or(0);
+        let offset = offset_of(document, error.place).unwrap_or(0);
         let ScenarioError { place, problem, remedy } = error;
         faulty(offset, format!("{place}: {problem}"), remedy)
     })?;

@@ -31,6 +31,11 @@ pub enum Note {
         /// Up to this size, m² in the lot.
         up_to_m2: f64,
     },
+    /// Keys of a map's YAML file mean nothing here.
+    Unused {
+        /// Which.
+        keys: Vec<String>,
+    },
     /// Ways that leave the route were closed, because the lot asks for it.
     Closed {
         /// Where they leave it.
@@ -64,6 +69,12 @@ impl std::fmt::Display for Note {
                 f,
                 "{} of occupied pixels left out: drop_specks_m2 takes up to {up_to_m2} m² for free ground",
                 are(*specks, "speck", "specks")
+            ),
+            Self::Unused { keys } => write!(
+                f,
+                "the map's YAML file has {}, which mean nothing here; known are image, resolution, origin, negate, \
+                 occupied_thresh, free_thresh and mode",
+                keys.iter().take(PLACES_MAX).map(|key| format!("{key:?}")).collect::<Vec<_>>().join(", ")
             ),
             Self::Closed { mouths } => {
                 write!(f, "{} closed with kerbs, near {}", are(mouths.len(), "branch", "branches"), listed(mouths))

@@ -16,6 +16,7 @@ pub mod driver;
 pub mod episode;
 pub mod frame;
 pub mod geometry;
+pub mod limits;
 pub mod map;
 pub mod metrics;
 pub mod path;

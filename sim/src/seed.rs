@@ -2,6 +2,7 @@
 //!
 //! A new stream never shifts an old one: each purpose has its own 64-bit `ChaCha` stream under the root seed's key.
 
+use crate::limits::TRIAL_MAX;
 use rand::{Rng as _, SeedableRng as _};
 use serde::{Deserialize, Serialize};
 
@@ -74,7 +75,7 @@ pub struct EpisodeIndex {
 
 impl EpisodeIndex {
     /// A run has fewer rounds than this, and a round fewer episodes.
-    pub const LIMIT: u32 = 1 << 20;
+    pub const LIMIT: u32 = TRIAL_MAX + 1;
 
     /// Episode `episode` of round `round`, both from 0.
     ///

@@ -3,14 +3,14 @@
 //! The order is from plain numbers to relations between things: later checks rely on earlier ones.
 
 use crate::geometry::{Pose, Vec2, distance_to_segment, edges, polygon_contains};
+use crate::limits::{
+    COORDINATE_MAX_M, LOT_EXTENT_MAX_M, NAME_CHARS_MAX, OBSTACLES_MAX, ROUTE_MAX_M, ROUTE_POINTS_MAX, SPEED_BUMPS_MAX,
+    VERTICES_MAX,
+};
 use crate::path::Path;
 use crate::scenario::{Obstacle, Place, ReferencePath, Scenario, ScenarioError};
 use crate::vehicle::VehicleSettings;
 
-/// Largest extent of a lot, metres: its raster of distances then takes 100 MB.
-pub const EXTENT_MAX_M: f32 = 500.0;
-/// Largest coordinate, metres: single precision resolves 1 mm up to here.
-pub const FAR_MAX_M: f32 = 8192.0;
 /// An object farther than this from the lot is a typing error, metres.
 const STRAY_M: f32 = 50.0;
 /// Points nearer than this count as one, metres.
@@ -28,6 +28,7 @@ const CHORDS_PER_BLOCK: usize = 16;
 /// The first problem found, with its place and a remedy.
 pub fn validate(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), ScenarioError> {
     check_name(&scenario.name)?;
+    check_counts(scenario)?;
     check_near_origin(&scenario.boundary)?;
     check_polygon(&scenario.boundary, Place::Boundary)?;
     check_extent(&scenario.boundary)?;
@@ -52,6 +53,11 @@ pub fn validate(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), Sc
         check_size(place, "width_m", bump.width_m, 30.0)?;
     }
     check_path_points(&scenario.reference_path, lot)?;
+    let length_m: f32 = scenario.reference_path.points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+    if length_m > ROUTE_MAX_M {
+        let problem = format!("the route is {:.0} km long", length_m / 1000.0);
+        return fault(Place::ReferencePath(None), problem, format!("end it earlier: {ROUTE_MAX_M} m are possible"));
+    }
     let path = Path::new(&scenario.reference_path);
     if path.length_m() < PATH_MIN_M {
         let problem = format!("the route is {:.2} m long", path.length_m());
@@ -69,11 +75,40 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
     if name.trim().is_empty() {
         return fault(Place::Name, "the name is empty", "give the lot a name; tables and files are labelled with it");
     }
-    if let Some(bad) = name.chars().find(|c| c.is_control() || matches!(c, '/' | '\\')) {
+    let length = name.chars().count();
+    if length > NAME_CHARS_MAX {
+        let start: String = name.chars().take(20).collect();
+        let problem = format!("the name {start:?} … has {length} characters");
+        return fault(Place::Name, problem, format!("shorten it: {NAME_CHARS_MAX} are possible"));
+    }
+    if let Some(bad) = name.chars().find(|&c| c.is_control() || matches!(c, '/' | '\\') || is_invisible(c)) {
         let problem = format!("the name {name:?} contains {bad:?}");
         return fault(Place::Name, problem, "use letters, digits, '-' and '_'; files are named after it");
     }
     Ok(())
+}
+
+/// What shows nothing, or turns the direction of writing: two names that look the same must be the same.
+fn is_invisible(c: char) -> bool {
+    matches!(c, '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+}
+
+/// Before anything is compared with everything else.
+fn check_counts(scenario: &Scenario) -> Result<(), ScenarioError> {
+    let Scenario { boundary, islands, obstacles, speed_bumps, reference_path, .. } = scenario;
+    let vertices = boundary.len() + islands.iter().map(|island| island.polygon.len()).sum::<usize>();
+    let counts = [
+        (Place::Boundary(None), "vertices, islands included", vertices, VERTICES_MAX),
+        (Place::Obstacle(OBSTACLES_MAX), "obstacles", obstacles.len(), OBSTACLES_MAX),
+        (Place::SpeedBump(SPEED_BUMPS_MAX), "speed bumps", speed_bumps.len(), SPEED_BUMPS_MAX),
+        (Place::ReferencePath(None), "points", reference_path.points.len(), ROUTE_POINTS_MAX),
+    ];
+    match counts.into_iter().find(|(_, _, count, max)| count > max) {
+        Some((place, what, count, max)) => {
+            fault(place, format!("there are {count} {what}"), format!("leave some out: {max} are possible"))
+        }
+        None => Ok(()),
+    }
 }
 
 fn check_finite(place: Place, numbers: &[(&str, f32)]) -> Result<(), ScenarioError> {
@@ -149,9 +184,9 @@ fn check_polygon(polygon: &[Vec2], place: impl Fn(Option<usize>) -> Place) -> Re
 fn check_extent(boundary: &[Vec2]) -> Result<(), ScenarioError> {
     let (low, high) = bounds(boundary);
     let size = high - low;
-    if size.max_element() > EXTENT_MAX_M {
+    if size.max_element() > LOT_EXTENT_MAX_M {
         let problem = format!("the lot spans {:.0} m × {:.0} m", size.x, size.y);
-        let remedy = format!("keep it within {EXTENT_MAX_M} m; coordinates are in metres");
+        let remedy = format!("keep it within {LOT_EXTENT_MAX_M} m; coordinates are in metres");
         return fault(Place::Boundary(None), problem, remedy);
     }
     Ok(())
@@ -161,7 +196,7 @@ fn check_extent(boundary: &[Vec2]) -> Result<(), ScenarioError> {
 fn check_near_origin(boundary: &[Vec2]) -> Result<(), ScenarioError> {
     let (low, high) = bounds(boundary);
     let far = low.abs().max(high.abs()).max_element();
-    if far > FAR_MAX_M && far.is_finite() {
+    if far > COORDINATE_MAX_M && far.is_finite() {
         let problem = format!("a coordinate is {far:.0} m from the origin");
         return fault(Place::Boundary(None), problem, "move the lot near (0, 0)");
     }

@@ -54,6 +54,9 @@ impl<'a> Replay<'a> {
         let map = &self.run.map;
         let names: Vec<&str> = self.drivers.iter().map(|driver| driver.name.as_str()).collect();
         let roots = roots_of(&names);
+        if self.focus_tick.is_some() {
+            self.run.check_tick(&self.settings.episode, &self.drivers[0])?;
+        }
         let header = Header {
             application: "drive",
             title: self.title.to_owned(),

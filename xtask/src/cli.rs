@@ -6,7 +6,7 @@ use crate::commands::{
 };
 use crate::output::{Color, Output};
 use clap::{CommandFactory as _, Parser, Subcommand};
-use std::num::NonZeroUsize;
+use sim::limits::THREADS_MAX;
 
 /// lotpilot: learns to drive through parking lots in simulation, and measures how well.
 #[derive(Debug, Parser)]
@@ -30,8 +30,15 @@ pub struct Cli {
     )]
     color: Color,
     /// Threads to compute with [default: all cores]. Changes nothing but the time it takes.
-    #[arg(long, global = true, value_name = "N", display_order = 1002, help_heading = "Everywhere")]
-    threads: Option<NonZeroUsize>,
+    #[arg(
+        long,
+        global = true,
+        value_name = "N",
+        value_parser = clap::value_parser!(u16).range(1..=i64::from(THREADS_MAX)),
+        display_order = 1002,
+        help_heading = "Everywhere"
+    )]
+    threads: Option<u16>,
 }
 
 const EXAMPLES: &str = "\
@@ -103,7 +110,7 @@ enum Command {
 impl Cli {
     /// Threads to compute with; 0: all cores.
     pub fn threads(&self) -> usize {
-        self.threads.map_or(0, NonZeroUsize::get)
+        self.threads.map_or(0, usize::from)
     }
 
     /// Runs the command.

@@ -14,8 +14,10 @@ mod picture_folder;
 mod record;
 mod viewer;
 
+use anyhow::ensure;
 use clap::{CommandFactory as _, FromArgMatches as _};
 use experiment::progress::Interrupted;
+use sim::limits::THREADS_MAX;
 use std::process::ExitCode;
 
 /// Of every thread of the pool: as much as the main thread has on Linux.
@@ -47,6 +49,12 @@ pub fn main() -> ExitCode {
 
 fn run(cli: &cli::Cli) -> anyhow::Result<()> {
     interrupt::install()?;
+    // What rayon reads where no number is given.
+    let asked_for = std::env::var("RAYON_NUM_THREADS").ok().and_then(|number| number.parse::<u64>().ok());
+    ensure!(
+        asked_for.is_none_or(|threads| threads <= u64::from(THREADS_MAX)),
+        "RAYON_NUM_THREADS is more than {THREADS_MAX}"
+    );
     rayon::ThreadPoolBuilder::new().num_threads(cli.threads()).stack_size(STACK_BYTES).build_global()?;
     // Within the pool: a thread outside it goes to sleep and is woken up at every parallel step, three times per control
     // tick. On a busy machine that costs more than the driving.

@@ -25,7 +25,8 @@ pub(crate) enum Color {
 impl Color {
     /// As given on the command line, before that is parsed: clap colours its errors, too.
     pub(crate) fn from_args() -> Self {
-        let args: Vec<_> = std::env::args().take_while(|arg| arg != "--").collect();
+        let args = std::env::args_os().map(|arg| arg.to_string_lossy().into_owned());
+        let args: Vec<_> = args.take_while(|arg| arg != "--").collect();
         let value = args.iter().enumerate().find_map(|(i, arg)| match arg.strip_prefix("--color") {
             Some("") => args.get(i + 1).map(String::as_str),
             Some(value) => value.strip_prefix('='),

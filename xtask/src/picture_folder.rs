@@ -2,7 +2,6 @@
 
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
-use experiment::run_dir::write_whole;
 use report::pictures::drawing::Drawing;
 use report::pictures::file_name;
 use std::path::{Path, PathBuf};
@@ -61,7 +60,7 @@ impl Folder<'_> {
     pub(crate) fn put(&self, path: &Path, content: &[u8]) -> anyhow::Result<()> {
         std::fs::create_dir_all(self.path)
             .with_context(|| format!("{}: cannot be created; choose another --out", self.path.display()))?;
-        write_whole(path, content)?;
+        storage::whole::write(path, content)?;
         self.output.print(format_args!("{}: {} kB", path.display(), content.len().div_ceil(1000)));
         Ok(())
     }

@@ -3,6 +3,7 @@
 use super::reference;
 use super::schema::Settings;
 use anyhow::{Context as _, ensure};
+use sim::limits::{DRIVES_PER_ROUND_MAX, RUNS_MAX};
 
 impl Settings {
     /// Checks ranges, and what no single section can know.
@@ -48,6 +49,42 @@ impl Settings {
             "episode.controller.speed_min_mps = {low} is more than episode.controller.speed_max_mps = {high}"
         );
         self.dagger.network.validate().context("dagger.network")?;
+        let rate = &self.dagger.fit.learning_rate;
+        ensure!(
+            rate.floor <= rate.peak,
+            "dagger.fit.learning_rate.floor = {} is more than dagger.fit.learning_rate.peak = {}",
+            rate.floor,
+            rate.peak
+        );
+        ensure!(
+            self.dagger.fit.validation.every != 1,
+            "dagger.fit.validation.every = 1 holds every block back; nothing is left to train on"
+        );
+        let travels = &self.expert.branch_travels_m;
+        ensure!(travels.is_sorted_by(|a, b| a < b), "expert.branch_travels_m = {travels:?} is not increasing");
+        self.check_lots()
+    }
+
+    /// Names of lots, and how many drives they come to. Files are not looked at.
+    fn check_lots(&self) -> anyhow::Result<()> {
+        let Self { training, evaluation, .. } = self;
+        let count = |key: &str, names: &[String]| {
+            let lots = names.iter().map(|name| Ok(scenarios::suite(name)?.len()));
+            lots.sum::<anyhow::Result<usize>>().with_context(|| key.to_owned())
+        };
+        let drives = count("training.lots", &training.lots)? * training.trials as usize * training.directions.len();
+        ensure!(
+            drives <= DRIVES_PER_ROUND_MAX,
+            "training.lots, trials and directions: {drives} drives a round; at most {DRIVES_PER_ROUND_MAX} are possible"
+        );
+        for (key, names) in [("evaluation.lots", &evaluation.lots), ("evaluation.elsewhere", &evaluation.elsewhere)] {
+            let lots = count(key, names)?;
+            let runs = lots * evaluation.trials as usize * evaluation.directions.len() * evaluation.noise.len();
+            ensure!(
+                runs <= RUNS_MAX,
+                "{key}, trials, directions and noise: {runs} runs; at most {RUNS_MAX} are possible"
+            );
+        }
         Ok(())
     }
 }

@@ -3,8 +3,10 @@
 use super::reference;
 use super::renamed;
 use super::schema::Settings;
-use anyhow::{Context as _, anyhow, bail};
+use anyhow::{Context as _, anyhow, bail, ensure};
+use sim::limits::SETTINGS_BYTES_MAX;
 use sim::seed::RootSeed;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -58,7 +60,7 @@ impl Settings {
     /// # Errors
     /// If the file cannot be read or is not complete.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
-        let text = std::fs::read_to_string(path)
+        let text = storage::read::text(path, SETTINGS_BYTES_MAX)
             .with_context(|| format!("{}: not a run of this program, or not finished being created", path.display()))?;
         let tree = parse(path, &text)?;
         let settings = settings_from(&tree).map_err(|fault| fault.in_file(path, &text))?;
@@ -71,13 +73,14 @@ impl Settings {
 pub(super) fn apply(base: &Settings, file: Option<&Path>, overrides: &[String]) -> anyhow::Result<Settings> {
     let mut tree = Table::try_from(base).expect("settings are plain values");
     if let Some(path) = file {
-        let text = std::fs::read_to_string(path)
+        let text = storage::read::text(path, SETTINGS_BYTES_MAX)
             .with_context(|| format!("{}: cannot be read; name a TOML file with settings", path.display()))?;
         merge(&mut tree, parse(path, &text)?);
         settings_from(&tree).map_err(|fault| fault.in_file(path, &text))?;
     }
     for text in overrides {
         let (key, value) = parse_override(text)?;
+        let text = shortened(text);
         merge(&mut tree, nested(&key, value));
         settings_from(&tree).map_err(|Fault { key, problem }| anyhow!("--set {text}: {key}: {problem}"))?;
     }
@@ -153,21 +156,43 @@ fn switches_variant(old: &Table, new: &Table) -> bool {
     old.len() == 1 && new.len() == 1 && !old.keys().eq(new.keys())
 }
 
+/// Parts of a key, at most.
+const KEY_PARTS_MAX: usize = 8;
+/// Characters of a change that an error repeats, at most.
+const SAID_MAX: usize = 200;
+
+/// As much of a change as an error needs.
+fn shortened(text: &str) -> Cow<'_, str> {
+    match text.char_indices().nth(SAID_MAX) {
+        Some((end, _)) => format!("{} …", &text[..end]).into(),
+        None => text.into(),
+    }
+}
+
 /// `a.b.c=VALUE`.
 fn parse_override(text: &str) -> anyhow::Result<(Vec<String>, Value)> {
+    let said = shortened(text);
     let (key, value) = text
         .split_once('=')
-        .with_context(|| format!("--set {text}: a key and a value are needed, as in --set dagger.eta=0.8"))?;
-    let key = key.trim().split('.').map(str::to_owned).collect();
+        .with_context(|| format!("--set {said}: a key and a value are needed, as in --set dagger.eta=0.8"))?;
+    let key: Vec<String> = key.trim().split('.').map(str::to_owned).collect();
+    ensure!(
+        key.len() <= KEY_PARTS_MAX,
+        "--set {said}: a key of {} parts; none has more than {KEY_PARTS_MAX}",
+        key.len()
+    );
     let value = value.trim();
-    let parsed = format!("value = {value}").parse::<Table>().ok().and_then(|mut table| table.remove("value"));
+    let parsed = format!("value = {value}")
+        .parse::<Table>()
+        .ok()
+        .and_then(|mut table| table.remove("value").filter(|_| table.is_empty()));
     let is_word = !value.is_empty() && value.chars().all(|c| c.is_alphanumeric() || "-_".contains(c));
     match parsed {
         Some(value) => Ok((key, value)),
         // A bare word can only be meant as a string.
         None if is_word => Ok((key, Value::String(value.to_owned()))),
         None => {
-            bail!("--set {text}: {value:?} is no TOML value; texts and lists of texts need quotes, as in '[\"lot-a\"]'")
+            bail!("--set {said}: this is no TOML value; texts and lists of texts need quotes, as in '[\"lot-a\"]'")
         }
     }
 }

@@ -60,6 +60,15 @@ impl Range {
     }
 }
 
+impl Range {
+    /// A number at either end. Where an end itself is outside, a millionth of the range away from it.
+    pub fn ends(&self) -> [f64; 2] {
+        let Self { low, high } = *self;
+        let inset = |end: Bound| if end.is_included { 0.0 } else { 1e-6 * (high.value - low.value) };
+        [low.value + inset(low), high.value - inset(high)]
+    }
+}
+
 impl TryFrom<String> for Range {
     type Error = String;
 

@@ -99,6 +99,7 @@ impl Run<'_, '_> {
         let rollouts = Rollouts::of_round(self.settings, self.seed, novice.as_ref(), episodes);
         let on_frame = &mut *self.hooks.on_frame;
         let collected = rollouts.drive(&mut |episode, frame| on_frame(round, episode, frame));
+        check_finite(round, &collected.round)?;
         let collection = collected.record(round);
         self.store.write_round(&collected.round, &collection)?;
         Ok((collected.round, collection))
@@ -172,8 +173,8 @@ impl Run<'_, '_> {
         let mut on_step = |fit: &FitProgress| progress(&Progress::Fitting { round, fit });
         let DaggerSettings { inference, device, .. } = *self.settings;
         let context = FitContext { geometry: self.conditions.geometry(), inference, device, seed };
-        let FitOutcome { weights, report } = fit::fit(start, d, settings, context, &mut on_step)
-            .map_err(|source| DaggerError::Fit { round: round.unwrap_or(u32::MAX), source })?;
+        let FitOutcome { weights, report } =
+            fit::fit(start, d, settings, context, &mut on_step).map_err(|source| DaggerError::Fit { round, source })?;
         if report.stopped {
             return Ok(None);
         }
@@ -195,6 +196,20 @@ impl Run<'_, '_> {
             ControlFlow::Break(()) => Err(Halt::Interrupted(policy.cloned())),
         }
     }
+}
+
+/// What is about to be learned from.
+fn check_finite(round: u32, collected: &Round) -> Result<(), DaggerError> {
+    for (sample, at) in collected.samples.iter().zip(&collected.ticks) {
+        let label = [sample.label[0], sample.label[1], sample.tau_hat];
+        let state = [at.time_s, at.x_m, at.y_m, at.heading_rad, at.speed_mps, at.steering_rad, at.command_steering_rad];
+        for (what, values) in [("the label", &label[..]), ("the state of the car", &state)] {
+            if !values.iter().all(|value| value.is_finite()) {
+                return Err(DaggerError::NotFinite { round, drive: at.episode, tick: at.tick, what });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Index of the final training among the seeds of the rounds.

@@ -85,15 +85,34 @@ pub enum DaggerError {
     /// A file cannot be read or written, or does not fit.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A training that cannot start.
-    #[error("round {round}: {source}")]
+    /// A training that cannot start or go on.
+    #[error("{}: {source}; resumed as it is, the run comes to the same", training_of(*round))]
     Fit {
-        /// Which round.
-        round: u32,
+        /// Which round; `None`: the final training.
+        round: Option<u32>,
         /// Why.
         source: FitError,
+    },
+    /// Driving that ran out of numbers.
+    #[error(
+        "round {round}, drive {drive}, tick {tick}: {what} is no finite number; see it with cargo xtask render \
+         trajectories --run RUN --round {round} --trial {drive}"
+    )]
+    NotFinite {
+        /// Which round.
+        round: u32,
+        /// Which of its drives, from 0.
+        drive: u32,
+        /// Which decision of it, from 0.
+        tick: u32,
+        /// The label or the state of the car.
+        what: &'static str,
     },
     /// Settings of the network that are impossible.
     #[error(transparent)]
     Network(#[from] NetworkError),
+}
+
+fn training_of(round: Option<u32>) -> String {
+    round.map_or_else(|| "the final training".to_owned(), |round| format!("round {round}"))
 }

@@ -14,13 +14,14 @@
 //! Every file and folder appears under its name only when it is complete: it is written beside, then renamed.
 
 use crate::dataset::collection::Collection;
+use crate::dataset::npy::{self, Archive};
 use crate::dataset::packed;
 use crate::dataset::round::Round;
 use crate::dataset::sample::Sample;
 use crate::dataset::tick::Tick;
-use crate::files::{self, FileError, RESTORE_REMEDY, WRITE_REMEDY, open, write_atomically};
+use crate::files::{self, FileError, RESTORE_REMEDY, WRITE_REMEDY, write_atomically};
 use ndarray::{Array2, Array3, ArrayView1};
-use ndarray_npy::{NpzReader, NpzWriter, ReadNpyExt as _, WriteNpyExt as _};
+use ndarray_npy::{NpzWriter, WriteNpyExt as _};
 use sim::sensing::OccupancyGrid;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -140,19 +141,8 @@ impl Store {
 
 fn read_samples(folder: &Path, samples: usize) -> Result<Vec<Sample>, FileError> {
     let (grids_path, labels_path) = (folder.join("grids.npy"), folder.join("labels.npy"));
-    let grids = Array2::<u8>::read_npy(open(&grids_path)?)
-        .map_err(|error| FileError::new(&grids_path, error, RESTORE_REMEDY))?;
-    let labels = Array2::<f32>::read_npy(open(&labels_path)?)
-        .map_err(|error| FileError::new(&labels_path, error, RESTORE_REMEDY))?;
-    if grids.shape() != [samples, packed::GRID_BYTES] {
-        let expected = [samples, packed::GRID_BYTES];
-        let problem = format!("shape {:?}; {expected:?} according to round.toml", grids.shape());
-        return Err(FileError::new(&grids_path, problem, RESTORE_REMEDY));
-    }
-    if labels.shape() != [samples, 3] {
-        let problem = format!("shape {:?} instead of [{samples}, 3], one row per grid", labels.shape());
-        return Err(FileError::new(&labels_path, problem, RESTORE_REMEDY));
-    }
+    let grids: Array2<u8> = npy::read(&grids_path, &[samples, packed::GRID_BYTES])?;
+    let labels: Array2<f32> = npy::read(&labels_path, &[samples, 3])?;
     if let Some(bad) = labels.iter().position(|value| !value.is_finite()) {
         let problem = format!("row {} holds a value that is not finite", bad / 3);
         return Err(FileError::new(&labels_path, problem, RESTORE_REMEDY));
@@ -169,14 +159,12 @@ fn read_augmentations(path: &Path, samples: usize, each: usize) -> Result<Vec<Oc
     if each == 0 {
         return Ok(Vec::new());
     }
-    let grids: Array3<u8> = NpzReader::new(open(path)?)
-        .and_then(|mut archive| archive.by_name(AUGMENTATIONS_ARRAY))
-        .map_err(|error| FileError::new(path, error, RESTORE_REMEDY))?;
-    let expected = [samples, each, packed::GRID_BYTES];
-    if grids.shape() != expected {
-        let problem = format!("shape {:?} instead of {expected:?}", grids.shape());
+    if each > usize::from(u8::MAX) {
+        let problem = format!("{each} noise augmentations according to round.toml; at most 255 are possible");
         return Err(FileError::new(path, problem, RESTORE_REMEDY));
     }
+    let shape = [samples, each, packed::GRID_BYTES];
+    let grids: Array3<u8> = Archive::open(path, &[&shape])?.read(AUGMENTATIONS_ARRAY, &shape)?;
     Ok(packed::unpack(grids).collect())
 }
 
@@ -219,7 +207,7 @@ mod tests {
         assert!(error().contains("labels.npy") && error().contains("[5, 3]"), "{}", error());
         fs::write(path("labels.npy"), whole).unwrap();
         Tick::write_all(&collected(4, 0).0.ticks, &store.round_folder(0)).unwrap();
-        assert!(error().contains("ticks.npz") && error().contains("4 rows for 5 samples"), "{}", error());
+        assert!(error().contains("ticks.npz") && error().contains("shape [4] instead of [5]"), "{}", error());
         fs::write(path("round.toml"), "schema = 2\nwho = 1").unwrap();
         assert!(error().contains("round.toml") && error().contains("who"), "{}", error());
         fs::remove_dir_all(store.folder()).unwrap();

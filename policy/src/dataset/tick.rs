@@ -1,12 +1,11 @@
 //! When and where a sample was taken, and who drove: `ticks.npz`.
 
+use crate::dataset::npy::Archive;
 use crate::files::{self, FileError, RESTORE_REMEDY};
 use ndarray::Array1;
-use ndarray_npy::{NpzReader, NpzWriter, ReadableElement, WritableElement};
+use ndarray_npy::{NpzWriter, ReadableElement, WritableElement};
 use sim::driver::Source;
 use sim::frame::Frame;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 /// The context of a sample: when and where it was taken, and who drove. Poses are those of the rear axle in the world frame of the lot.
@@ -37,6 +36,8 @@ pub struct Tick {
 }
 
 const NAME: &str = "ticks.npz";
+/// Arrays of the file.
+const COLUMNS: usize = 11;
 
 /// Reads a column of a tick.
 type Column = fn(&Tick) -> f32;
@@ -89,35 +90,32 @@ impl Tick {
     pub(crate) fn read_all(folder: &Path, samples: usize) -> Result<Vec<Self>, FileError> {
         let path = folder.join(NAME);
         let fail = |problem: String| FileError::new(&path, problem, RESTORE_REMEDY);
-        let mut archive = NpzReader::new(files::open(&path)?).map_err(|error| fail(error.to_string()))?;
-        let mut columns = Columns { archive: &mut archive, samples };
-        let mut read = || -> Result<Vec<Self>, String> {
-            let (episode, tick) = (columns.read::<u32>("episode")?, columns.read::<u32>("tick")?);
-            let (time_s, x_m, y_m) = (columns.floats("time_s")?, columns.floats("x_m")?, columns.floats("y_m")?);
-            let (heading_rad, speed_mps) = (columns.floats("heading_rad")?, columns.floats("speed_mps")?);
-            let steering_rad = columns.floats("steering_rad")?;
-            let command_steering_rad = columns.floats("command_steering_rad")?;
-            let command_speed_mps = columns.floats("command_speed_mps")?;
-            let driver = columns.read::<u8>("driver")?;
-            let tick = |i: usize| {
-                let driver = driver_of(driver[i]).ok_or_else(|| format!("driver {} in row {i}", driver[i]))?;
-                Ok(Self {
-                    episode: episode[i],
-                    tick: tick[i],
-                    time_s: time_s[i],
-                    x_m: x_m[i],
-                    y_m: y_m[i],
-                    heading_rad: heading_rad[i],
-                    speed_mps: speed_mps[i],
-                    steering_rad: steering_rad[i],
-                    command_steering_rad: command_steering_rad[i],
-                    command_speed_mps: command_speed_mps[i],
-                    driver,
-                })
-            };
-            (0..samples).map(tick).collect()
+        let archive = Archive::open(&path, &[&[samples][..]; COLUMNS])?;
+        let mut columns = Columns { archive, path: &path, samples };
+        let (episode, tick) = (columns.read::<u32>("episode")?, columns.read::<u32>("tick")?);
+        let (time_s, x_m, y_m) = (columns.floats("time_s")?, columns.floats("x_m")?, columns.floats("y_m")?);
+        let (heading_rad, speed_mps) = (columns.floats("heading_rad")?, columns.floats("speed_mps")?);
+        let steering_rad = columns.floats("steering_rad")?;
+        let command_steering_rad = columns.floats("command_steering_rad")?;
+        let command_speed_mps = columns.floats("command_speed_mps")?;
+        let driver = columns.read::<u8>("driver")?;
+        let tick = |i: usize| {
+            let driver = driver_of(driver[i]).ok_or_else(|| fail(format!("driver {} in row {i}", driver[i])))?;
+            Ok(Self {
+                episode: episode[i],
+                tick: tick[i],
+                time_s: time_s[i],
+                x_m: x_m[i],
+                y_m: y_m[i],
+                heading_rad: heading_rad[i],
+                speed_mps: speed_mps[i],
+                steering_rad: steering_rad[i],
+                command_steering_rad: command_steering_rad[i],
+                command_speed_mps: command_speed_mps[i],
+                driver,
+            })
         };
-        read().map_err(fail)
+        (0..samples).map(tick).collect()
     }
 }
 
@@ -139,24 +137,20 @@ fn column<T: WritableElement>(ticks: &[Tick], of: impl Fn(&Tick) -> T) -> Array1
 
 /// The arrays of an archive, each of one value per sample.
 struct Columns<'a> {
-    archive: &'a mut NpzReader<BufReader<File>>,
+    archive: Archive,
+    path: &'a Path,
     samples: usize,
 }
 
 impl Columns<'_> {
-    fn read<T: ReadableElement>(&mut self, name: &str) -> Result<Array1<T>, String> {
-        let column: Array1<T> = self.archive.by_name(name).map_err(|error| format!("column {name}: {error}"))?;
-        if column.len() == self.samples {
-            Ok(column)
-        } else {
-            Err(format!("column {name} has {} rows for {} samples", column.len(), self.samples))
-        }
+    fn read<T: ReadableElement>(&mut self, name: &str) -> Result<Array1<T>, FileError> {
+        self.archive.read(name, &[self.samples])
     }
 
-    fn floats(&mut self, name: &str) -> Result<Array1<f32>, String> {
+    fn floats(&mut self, name: &str) -> Result<Array1<f32>, FileError> {
         let column = self.read::<f32>(name)?;
         match column.iter().position(|value| !value.is_finite()) {
-            Some(row) => Err(format!("column {name}: row {row} is not finite")),
+            Some(row) => Err(FileError::new(self.path, format!("{name}: row {row} is not finite"), RESTORE_REMEDY)),
             None => Ok(column),
         }
     }

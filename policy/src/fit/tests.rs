@@ -160,3 +160,17 @@ fn a_gpu_learns_as_a_cpu_does() {
     assert!((cpu.training.total - gpu.training.total).abs() < 1e-3, "{cpu:?} {gpu:?}");
     assert!((cpu.validation.unwrap().rmse_m - gpu.validation.unwrap().rmse_m).abs() < 1e-3, "{cpu:?} {gpu:?}");
 }
+
+/// It was a panic, without the round that it happened in.
+#[test]
+fn a_loss_that_is_no_number_ends_the_training_with_its_step() {
+    let mut round = round(200);
+    round.samples[0].label[0] = f32::NAN;
+    let mut dataset = Dataset::default();
+    dataset.push(round);
+    let start = Weights::init(tiny(), RootSeed(1), 0);
+    let mut progress = |_: &FitProgress| ControlFlow::Continue(());
+    let settings = FitSettings { batch: 200, ..settings(3) };
+    let error = fit(start, &dataset, &settings, context(DeviceChoice::Cpu), &mut progress).unwrap_err();
+    assert_eq!(error, FitError::NotFinite { step: 1, what: "the loss" });
+}

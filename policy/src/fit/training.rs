@@ -24,7 +24,7 @@ pub struct FitOutcome {
     pub report: FitReport,
 }
 
-/// Why a training cannot start.
+/// Why a training cannot start, or go on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// The data set has no sample to train on.
@@ -38,6 +38,14 @@ pub enum FitError {
     /// A batch without samples.
     #[error("a batch of 0 samples: it must be positive")]
     EmptyBatch,
+    /// Arithmetic that ran out of numbers.
+    #[error("step {step}: {what} is no finite number; lower the learning rate or the gains of the loss")]
+    NotFinite {
+        /// The step, from 1.
+        step: u32,
+        /// The loss or the weights.
+        what: &'static str,
+    },
     /// A learning rate that burn does not accept.
     #[error("learning rate: {problem}")]
     LearningRate {
@@ -62,7 +70,7 @@ pub struct FitContext {
 /// Trains `start` on a data set. `progress` is called after every step and may stop it.
 ///
 /// # Errors
-/// If there is nothing to train on, or the learning rate is impossible.
+/// If there is nothing to train on, the learning rate is impossible, or the loss or a weight is no finite number.
 pub fn fit(
     start: Weights,
     dataset: &Dataset,
@@ -105,7 +113,9 @@ pub fn fit(
         let (misfit, log_variance) = (misfit.mean(), log_variance.mean());
         let gradients = (misfit.clone() + log_variance.clone()).backward();
         let loss = LossParts::new(misfit.into_scalar(), log_variance.into_scalar());
-        assert!(loss.total.is_finite(), "the loss became {loss:?} in step {done}: lower the learning rate");
+        if !loss.total.is_finite() {
+            return Err(FitError::NotFinite { step: done + 1, what: "the loss" });
+        }
         let gradients = GradientsParams::from_grads(gradients, &net);
         let learning_rate = scheduler.step();
         net = optimizer.step(learning_rate.clone(), net, gradients);
@@ -119,6 +129,9 @@ pub fn fit(
         let is_last = done == steps || stopped;
         if is_last || settings.validate_every > 0 && done % settings.validate_every == 0 {
             let weights = net.to_weights(architecture);
+            if !weights.values().iter().all(|value| value.is_finite()) {
+                return Err(FitError::NotFinite { step: done, what: "a weight" });
+            }
             latest = validate(&weights, &validated);
             curve.push(CurvePoint { step: done, learning_rate, training: since_point.take(), validation: latest });
             best.offer(weights, done, latest, settings.keep);

@@ -2,6 +2,7 @@
 
 use crate::network::error::NetworkError;
 use serde::{Deserialize, Serialize};
+use sim::limits::{CHANNELS_MAX, HIDDEN_MAX, PARAMETERS_MAX};
 use sim::sensing::GRID_CELLS;
 
 /// Cells per side after the first and after the second max-pool of 2: 25 → 12 → 6.
@@ -106,12 +107,23 @@ impl NetworkArchitecture {
             if conv.channels == 0 || conv.channels % LANES != 0 {
                 return Err(NetworkError::Channels { layer, channels: conv.channels, multiple: LANES });
             }
+            if conv.channels > CHANNELS_MAX {
+                let what = format!("{} channels in {layer}", conv.channels);
+                return Err(NetworkError::TooLarge { what, max: CHANNELS_MAX });
+            }
             if !(1..=7).contains(&conv.kernel) {
                 return Err(NetworkError::Kernel { layer, kernel: conv.kernel });
             }
         }
         if self.hidden == 0 {
             return Err(NetworkError::NoHiddenUnits);
+        }
+        if self.hidden > HIDDEN_MAX {
+            return Err(NetworkError::TooLarge { what: format!("{} hidden units", self.hidden), max: HIDDEN_MAX });
+        }
+        let parameters = self.parameter_count();
+        if parameters > PARAMETERS_MAX {
+            return Err(NetworkError::TooLarge { what: format!("{parameters} parameters"), max: PARAMETERS_MAX });
         }
         for (name, share) in [("dropout_features", self.dropout_features), ("dropout_hidden", self.dropout_hidden)] {
             if !(0.0..1.0).contains(&share) {

@@ -24,6 +24,14 @@ pub enum NetworkError {
     /// A fully connected layer without units.
     #[error("the fully connected layer needs at least one unit")]
     NoHiddenUnits,
+    /// More than the arithmetic has room for.
+    #[error("the network would have {what}; at most {max} are possible")]
+    TooLarge {
+        /// What there is too much of, with its number.
+        what: String,
+        /// What is possible.
+        max: usize,
+    },
     /// A smoothing that has no time constant.
     #[error("smoothing_ticks is {ticks}; 0 or more ticks are possible")]
     Smoothing {

@@ -46,15 +46,35 @@ impl Mask {
     #[must_use]
     pub(super) fn region_of(&self, seed: [i32; 2]) -> Self {
         let mut region = Self { cols: self.cols, is_free: vec![false; self.is_free.len()] };
-        let mut open = vec![seed];
+        let mut open = Vec::new();
+        let mut reach = |pixel: [i32; 2], open: &mut Vec<[i32; 2]>| {
+            if let Some(index) = self.index(pixel).filter(|&index| self.is_free[index] && !region.is_free[index]) {
+                region.is_free[index] = true;
+                open.push(pixel);
+            }
+        };
+        reach(seed, &mut open);
         while let Some(pixel) = open.pop() {
-            let Some(index) = self.index(pixel).filter(|&index| self.is_free[index] && !region.is_free[index]) else {
-                continue;
-            };
-            region.is_free[index] = true;
-            open.extend(ALONG.map(|step| ahead(pixel, step)));
+            for step in ALONG {
+                reach(ahead(pixel, step), &mut open);
+            }
         }
         region
+    }
+
+    /// How many corners its outlines have, cuts aside.
+    pub(super) fn corners(&self) -> usize {
+        let (cols, rows) = (self.cols as i32, (self.is_free.len() / self.cols) as i32);
+        let turns_at = |[x, y]: [i32; 2]| {
+            // Free pixels below and above a corner of the raster.
+            let [a, b, c, d] = [[x - 1, y - 1], [x, y - 1], [x - 1, y], [x, y]].map(|pixel| self.at(pixel));
+            match [a, b, c, d].into_iter().filter(|&is_free| is_free).count() {
+                1 | 3 => 1,
+                2 if a == d => 2,
+                _ => 0,
+            }
+        };
+        (0..=rows).flat_map(|y| (0..=cols).map(move |x| [x, y])).map(turns_at).sum()
     }
 
     /// A region with the specks that it encloses taken for free, up to an area, and how many.
@@ -249,6 +269,8 @@ mod tests {
             ]
         );
         assert_eq!(rings.iter().map(|ring| signed_area_px2(ring)).collect::<Vec<_>>(), [9.0, -1.0]);
+        assert_eq!(mask(&["#####", "#...#", "#.#.#", "#...#", "#####"]).corners(), 8);
+        assert_eq!(mask(&["##..", "##..", "..##", "..##"]).corners(), 8);
     }
 
     /// The right part of the map is only reached over a corner: it is another region, and the outline is cut there.

@@ -5,17 +5,23 @@
 //! 50 %. Unknown is not drivable. Transparent pixels are unknown in every mode.
 
 use super::contour::Mask;
-use crate::error::{LoadError, read_text};
+use crate::error::{LoadError, read_text, shortened};
+use crate::note::Note;
 use image::DynamicImage;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
+use sim::limits::{IMAGE_BYTES_MAX, IMAGE_SIDE_MAX_PX, MAP_COORDINATE_MAX_M, MAP_RESOLUTION_M, MAP_YAML_BYTES_MAX};
+use std::collections::BTreeMap;
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// Modes `scale` and `raw`: drivable below this occupancy, per cent.
 const DRIVABLE_BELOW_PERCENT: f64 = 50.0;
-/// Largest map, pixels.
-const PIXELS_MAX: u64 = 64_000_000;
 
-/// The YAML file. Other keys are ignored, as ROS does.
+/// Keys of the YAML file.
+const KEYS: [&str; 7] = ["image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh", "mode"];
+
+/// The YAML file. Other keys are ignored, as ROS does, and named in a note.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 struct Header {
     image: PathBuf,
@@ -85,35 +91,52 @@ pub(super) struct Map {
 }
 
 impl Map {
-    /// Reads the YAML file and its image.
+    /// Reads the YAML file and its image, which must be beside or below it unless it may be anywhere; also what is to be
+    /// said about the file.
     ///
     /// # Errors
     /// What is wrong with either, with file, place and remedy.
-    pub(super) fn read(path: &Path) -> Result<Self, LoadError> {
-        let header = Header::parse(&read_text(path)?, path)?;
-        let file = path.parent().unwrap_or(Path::new("")).join(&header.image);
+    pub(super) fn read(path: &Path, is_image_anywhere: bool) -> Result<(Self, Vec<Note>), LoadError> {
+        let text = read_text(path, MAP_YAML_BYTES_MAX)?;
+        let header = Header::parse(&text, path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let file = folder.join(&header.image);
         let fault = |problem: String, remedy: &str| LoadError::Map {
             file: path.display().to_string(),
             place: format!("image {}", file.display()),
             problem,
             remedy: remedy.to_owned(),
         };
-        let reader =
-            image::ImageReader::open(&file).and_then(image::ImageReader::with_guessed_format).map_err(|error| {
-                fault(format!("cannot be read: {error}"), "check the key image; paths start at the YAML file")
-            })?;
-        let image = reader
-            .decode()
-            .map_err(|error| fault(format!("no readable image: {error}"), "save the map as PGM or PNG"))?;
+        let unreadable = |error: std::io::Error| {
+            fault(format!("cannot be read: {error}"), "check the key image; paths start at the YAML file")
+        };
+        // A map from elsewhere must not make this program read what its author names.
+        let is_below = match (Path::new(".").join(folder).canonicalize(), file.canonicalize()) {
+            (Ok(folder), Ok(file)) => file.starts_with(folder),
+            (Err(error), _) | (_, Err(error)) => return Err(unreadable(error)),
+        };
+        if !is_below && !is_image_anywhere {
+            let problem = "it is neither beside the YAML file nor in a folder below".to_owned();
+            let remedy = "put it there, or import the map with cargo xtask generate --image-anywhere";
+            return Err(fault(problem, remedy));
+        }
+        let content = BufReader::new(storage::read::open(&file, IMAGE_BYTES_MAX).map_err(unreadable)?);
+        let mut reader = image::ImageReader::new(content).with_guessed_format().map_err(unreadable)?;
+        let mut limits = image::Limits::default();
+        (limits.max_image_width, limits.max_image_height) = (Some(IMAGE_SIDE_MAX_PX), Some(IMAGE_SIDE_MAX_PX));
+        reader.limits(limits);
+        let image = reader.decode().map_err(|error| match error {
+            image::ImageError::Limits(_) => {
+                let remedy =
+                    format!("crop it, or halve its resolution: {IMAGE_SIDE_MAX_PX} pixels a side are possible");
+                fault("it is too large".to_owned(), &remedy)
+            }
+            error => fault(format!("no readable image: {error}"), "save the map as PGM or PNG"),
+        })?;
         if image.width() == 0 || image.height() == 0 {
             return Err(fault("it has no pixels".to_owned(), "save the map again"));
         }
-        let pixels = u64::from(image.width()) * u64::from(image.height());
-        if pixels > PIXELS_MAX {
-            let problem = format!("{} × {} pixels are too many", image.width(), image.height());
-            return Err(fault(problem, "crop it, or halve its resolution"));
-        }
-        Ok(header.map(&image))
+        Ok((header.map(&image), unknown_keys(&text)))
     }
 
     /// The pixel at a point of the map's frame, metres, counted from the lower left.
@@ -154,7 +177,7 @@ impl Header {
         let header: Self = serde_saphyr::from_str(text).map_err(|error| LoadError::Faulty {
             file: file.clone(),
             line: error.location().map_or(1, |location| location.line() as usize),
-            problem: first_line(&error.without_snippet().to_string()),
+            problem: shortened(&first_line(&error.without_snippet().to_string())),
             remedy: "a map needs image, resolution, origin: [x, y, yaw] and may have negate, occupied_thresh, \
                      free_thresh, mode (trinary, scale or raw)"
                 .to_owned(),
@@ -170,10 +193,12 @@ impl Header {
             }
         };
         let Self { resolution, origin, occupied_thresh, free_thresh, .. } = header;
-        if !(resolution.is_finite() && resolution > 0.0) {
-            return Err(fault("resolution", format!("it is {resolution}"), "write metres per pixel, above 0"));
+        if !MAP_RESOLUTION_M.contains(&resolution) {
+            let remedy = format!("write metres per pixel, {} to {}", MAP_RESOLUTION_M.start(), MAP_RESOLUTION_M.end());
+            return Err(fault("resolution", format!("it is {resolution}"), &remedy));
         }
-        if let Some(value) = origin.iter().find(|value| !value.is_finite()) {
+        let is_far = |value: &&f64| value.is_nan() || value.abs() > MAP_COORDINATE_MAX_M;
+        if let Some(value) = origin.iter().find(is_far) {
             return Err(fault("origin", format!("a number is {value}"), "write [x, y, yaw] in metres and radians"));
         }
         for (key, value) in [("occupied_thresh", occupied_thresh), ("free_thresh", free_thresh)] {
@@ -190,9 +215,17 @@ impl Header {
 
     fn map(&self, image: &DynamicImage) -> Map {
         let (cols, rows) = (image.width() as usize, image.height() as usize);
-        let pixels = image.to_rgba8();
         // Row 0 of an image is its top, of a mask its bottom.
-        let is_free = pixels.rows().rev().flatten().map(|pixel| self.is_drivable(pixel.0)).collect::<Vec<_>>();
+        let is_free: Vec<bool> = match image {
+            // What nearly every map is.
+            DynamicImage::ImageLuma8(pixels) => {
+                let of_value: Vec<bool> =
+                    (0..=u8::MAX).map(|value| self.is_drivable([value, value, value, u8::MAX])).collect();
+                let rows = pixels.as_raw().chunks_exact(cols).rev();
+                rows.flatten().map(|&value| of_value[usize::from(value)]).collect()
+            }
+            other => other.to_rgba8().rows().rev().flatten().map(|pixel| self.is_drivable(pixel.0)).collect(),
+        };
         assert_eq!(is_free.len(), cols * rows, "every pixel is read");
         Map {
             drivable: Mask { cols, is_free },
@@ -222,6 +255,14 @@ impl Header {
             Mode::Raw => value < DRIVABLE_BELOW_PERCENT,
         }
     }
+}
+
+/// Keys that mean nothing here, as a misspelt one does.
+fn unknown_keys(text: &str) -> Vec<Note> {
+    let keys: BTreeMap<String, IgnoredAny> = serde_saphyr::from_str(text).unwrap_or_default();
+    let is_unknown = |key: &String| !KEYS.contains(&key.as_str());
+    let keys: Vec<String> = keys.into_keys().filter(is_unknown).map(|key| shortened(&key)).collect();
+    if keys.is_empty() { Vec::new() } else { vec![Note::Unused { keys }] }
 }
 
 /// A message of the YAML reader on one line, without the place, which is given apart.

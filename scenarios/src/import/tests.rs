@@ -54,7 +54,7 @@ fn small_map(name: &str, origin: &str) -> MapLot {
 
 /// `seed`: in the map's frame.
 fn ground(lot: &MapLot, seed: [f64; 2]) -> Ground {
-    let map = ros::Map::read(&lot.map).unwrap();
+    let (map, _) = ros::Map::read(&lot.map, false).unwrap();
     lot.ros_ground(&map, Frame::around(seed, lot.scale), seed, None, &car(), &mut Vec::new()).unwrap()
 }
 
@@ -225,7 +225,11 @@ fn a_centre_line_must_have_room_for_the_car() {
 fn faults_of_the_files_are_named() {
     let sound = yaml("1.0", "[0.0, 0.0, 0.0]");
     let table = [
-        ("resolution: 1.0", "resolution: 0.0", "map.yaml:3: resolution: it is 0; write metres per pixel, above 0"),
+        (
+            "resolution: 1.0",
+            "resolution: 0.0",
+            "map.yaml:3: resolution: it is 0; write metres per pixel, 0.0001 to 1000",
+        ),
         ("resolution: 1.0", "resolution: -0.05", "map.yaml:3: resolution: it is -0.05; write"),
         ("resolution: 1.0", "resolution: .nan", "map.yaml:3: resolution: it is NaN; write"),
         ("resolution: 1.0", "resolution: fine", "map.yaml:3: "),
@@ -345,7 +349,7 @@ fn a_case_is_read_in_one_row_or_one_column() {
         ("0,0,0,30,0,0,1.5", "case.csv:1: number 7, the number of obstacles, is 1.5"),
         ("0,0,0\n30,0,0\n1\n3\n5,5,6,5,6", "case.csv:5: the file ends after 13 numbers, before a vertex of obstacle 1"),
         ("0,0,0,30,0,0,0\n7", "case.csv:2: 1 numbers are left over after the last obstacle"),
-        ("x,y\n1,2", "case.csv:1: \"x\" is no number; a TPCAP case holds numbers only"),
+        ("x,y\n1,2", "case.csv:1: \"x\" is no number of metres; a TPCAP case holds numbers only"),
         ("", "case.csv:1: the file ends after 0 numbers, before the start"),
     ] {
         let folder = folder("tpcap-faulty", &[("case.csv", text)]);
@@ -413,7 +417,7 @@ fn a_speck_becomes_the_smallest_island_or_is_left_out_as_asked() {
 fn a_speck_beside_a_wall_grows_into_it() {
     // At 2 cm per pixel it grows by two pixels to either side.
     let lot = MapLot { scale: 0.2, ..fine_lane("speck-at-wall", |x, y| (x, y) == (300, 2)) };
-    let map = ros::Map::read(&lot.map).unwrap();
+    let (map, _) = ros::Map::read(&lot.map, false).unwrap();
     let (seed, mut notes) = ([8.0, 2.6], Vec::new());
     let ground = lot.ros_ground(&map, Frame::around(seed, 0.2), seed, None, &car(), &mut notes).unwrap();
     assert_eq!(notes, [Note::Padded { specks: 1 }]);
@@ -505,7 +509,7 @@ fn blocked_ground_stays_blocked_to_a_fifth_of_a_metre() {
         let folder =
             folder("coarse", &[("map.yaml", &yaml(&pixel_m.to_string(), "[0, 0, 0]")), ("map.pgm", &pgm(&rows))]);
         let lot = MapLot::of_map(&folder.join("map.yaml"));
-        let map = ros::Map::read(&lot.map).unwrap();
+        let (map, _) = ros::Map::read(&lot.map, false).unwrap();
         let ground = ground(&lot, [30.0 * pixel_m, 12.0 * pixel_m]);
         let polygon = |outline: &[Vec2]| -> Polygon<f64> {
             let ring = outline.iter().map(|p| (f64::from(p.x), f64::from(p.y))).collect::<LineString<f64>>();
@@ -538,4 +542,43 @@ fn blocked_ground_stays_blocked_to_a_fifth_of_a_metre() {
         assert!(deepest_m <= SIMPLIFIED_M.min(0.75 * pixel_m) + 2e-3, "{deepest_m} m at {pixel_m} m per pixel");
         assert!(pixel_m < 0.1 || deepest_m > 0.0 || pixel_m > 0.3, "outlines are simplified at all");
     }
+}
+
+/// Whoever sends a map must not decide which files are read.
+#[test]
+fn an_image_that_is_not_beside_its_map_is_refused_unless_it_may_be_anywhere() {
+    let rows = ["..#?", "..#.", "...."].map(str::to_owned);
+    let outer = folder("elsewhere", &[("secret.pgm", &pgm(&rows))]);
+    let inner = outer.join("map/below");
+    std::fs::create_dir_all(&inner).unwrap();
+    std::fs::copy(outer.join("secret.pgm"), inner.join("map.pgm")).unwrap();
+    let path = outer.join("map/map.yaml");
+    let read = |image: &str, is_anywhere: bool| {
+        std::fs::write(&path, yaml("0.5", "[0, 0, 0]").replace("map.pgm", image)).unwrap();
+        ros::Map::read(&path, is_anywhere).map(drop).map_err(|error| error.to_string())
+    };
+    assert_eq!(read("below/map.pgm", false), Ok(()));
+    let absolute = outer.join("secret.pgm").display().to_string();
+    for image in ["../secret.pgm", "below/../../secret.pgm", &absolute] {
+        let error = read(image, false).unwrap_err();
+        assert!(error.contains("neither beside the YAML file nor") && error.contains("--image-anywhere"), "{error}");
+        assert_eq!(read(image, true), Ok(()), "{image}");
+    }
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(outer.join("secret.pgm"), outer.join("map/link.pgm")).unwrap();
+        assert!(read("link.pgm", false).is_err_and(|error| error.contains("neither beside")), "a link leads out, too");
+    }
+}
+
+/// `negat: 1` was read as a map that is not negated.
+#[test]
+fn keys_that_mean_nothing_are_named_in_a_note() {
+    let mut lot = small_map("unused", "[0, 0, 0]");
+    let text = yaml("0.5", "[0, 0, 0]") + "negat: 1\nZ: [2]\n";
+    std::fs::write(&lot.map, text).unwrap();
+    lot.scale = 10.0;
+    let (_, notes) = ros::Map::read(&lot.map, false).unwrap();
+    assert_eq!(notes, [Note::Unused { keys: vec!["Z".to_owned(), "negat".to_owned()] }]);
+    assert!(notes[0].to_string().contains("\"negat\""), "{}", notes[0]);
 }

@@ -9,8 +9,9 @@
 
 use super::frame::Frame;
 use super::ground::Ground;
-use crate::error::{LoadError, read_text};
+use crate::error::{LoadError, read_text, shortened};
 use sim::geometry::{Pose, Vec2, wrap_angle};
+use sim::limits::{CSV_BYTES_MAX, MAP_COORDINATE_MAX_M};
 use sim::scenario::{Obstacle, ObstacleClass};
 use std::path::Path;
 
@@ -35,7 +36,7 @@ impl Case {
     /// # Errors
     /// What is wrong with it, with file, line and remedy.
     pub(super) fn read(path: &Path) -> Result<Self, LoadError> {
-        Self::parse(&read_text(path)?, &path.display().to_string())
+        Self::parse(&read_text(path, CSV_BYTES_MAX)?, &path.display().to_string())
     }
 
     fn parse(text: &str, file: &str) -> Result<Self, LoadError> {
@@ -120,12 +121,12 @@ impl<'a> Numbers<'a> {
             let cells =
                 line.trim_start_matches('\u{feff}').split([',', ';', ' ', '\t']).filter(|cell| !cell.is_empty());
             for cell in cells {
-                let value: Option<f64> = cell.parse().ok().filter(|value: &f64| value.is_finite());
+                let value: Option<f64> = cell.parse().ok().filter(|value: &f64| value.abs() <= MAP_COORDINATE_MAX_M);
                 let Some(value) = value else {
                     return Err(LoadError::Faulty {
                         file: file.to_owned(),
                         line: i + 1,
-                        problem: format!("{cell:?} is no number"),
+                        problem: format!("{:?} is no number of metres", shortened(cell)),
                         remedy: "a TPCAP case holds numbers only; a centre line belongs to the key centre_line"
                             .to_owned(),
                     });

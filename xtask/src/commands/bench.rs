@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use benchmark::peers::{self, PEERS};
 use benchmark::{Effort, Figure, Goal, driving, evaluating, maps, network};
 use clap::{Args, ValueEnum};
-use experiment::run_dir::write_whole;
+use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -141,7 +141,7 @@ struct Page<'a> {
 
 impl<'a> Page<'a> {
     fn read(path: &'a Path) -> anyhow::Result<Self> {
-        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        let text = storage::read::text(path, RUN_TEXT_BYTES_MAX).with_context(|| path.display().to_string())?;
         let parts = text.split_once(BEGIN).and_then(|(before, rest)| Some((before, rest.split_once(END)?.1)));
         let (before, after) = parts.with_context(|| {
             format!("{}: no lines {BEGIN} and {END}; write them where the table belongs", path.display())
@@ -151,7 +151,7 @@ impl<'a> Page<'a> {
 
     fn write(&self, table: &str) -> anyhow::Result<()> {
         let text = format!("{}{BEGIN}\n{}\n{END}{}", self.before, table.trim_end(), self.after);
-        write_whole(self.path, text.as_bytes())
+        Ok(storage::whole::write(self.path, text.as_bytes())?)
     }
 }
 

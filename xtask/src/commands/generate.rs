@@ -1,5 +1,6 @@
 //! `generate`: lots as TOML plus a top-view PNG.
 
+use super::render::check_scale;
 use crate::console::Console;
 use crate::notes;
 use crate::output::Output;
@@ -7,12 +8,12 @@ use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress as _};
-use experiment::run_dir::write_whole;
 use experiment::settings::NoiseChoice;
 use experiment::trials::{Purpose, Trial};
 use rayon::prelude::*;
 use report::pictures::{self, lot};
 use scenarios::import::{self, MapLot};
+use sim::limits::TRIAL_MAX;
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -35,7 +36,7 @@ pub(crate) struct GenerateArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Drawings of each lot, each with its own obstacles.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=i64::from(TRIAL_MAX)))]
     count: u32,
     /// Folder to write into.
     #[arg(long, value_name = "DIR", default_value = "lots")]
@@ -77,6 +78,9 @@ pub(crate) struct MapArgs {
     /// Closes ways that leave the route with kerbs.
     #[arg(long)]
     close_branches: bool,
+    /// Reads the image of the map wherever its YAML file says, not only beside or below that file.
+    #[arg(long)]
+    image_anywhere: bool,
 }
 
 /// `X,Y,DEG`.
@@ -91,8 +95,7 @@ fn pose(text: &str) -> Result<[f64; 3], String> {
 const BATCH: usize = 8;
 
 pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
-    ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
-    ensure!(args.count > 0, "--count is 0; at least one is needed");
+    check_scale(args.pixels_per_metre)?;
     let vehicle = VehicleSettings::hyundai_hg300();
     let lots = lots(args, &vehicle)?;
     notes::say(&lots, &[NoiseChoice::Lot], output);
@@ -136,7 +139,7 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
 
 /// The lots named; of a map with the route the command line asks for.
 fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lot>> {
-    let MapArgs { scale, start, goal, is_loop, centre_line, clearance, close_branches } = &args.map;
+    let MapArgs { scale, start, goal, is_loop, centre_line, clearance, close_branches, image_anywhere } = &args.map;
     if args.map == MapArgs::default() {
         return Lot::parse_all(&args.lots, vehicle);
     }
@@ -151,6 +154,7 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
     );
     let mut lot = MapLot::read(path)?;
     lot.scale = scale.unwrap_or(lot.scale);
+    lot.is_image_anywhere = *image_anywhere;
     lot.clearance_m = clearance.unwrap_or(lot.clearance_m);
     lot.close_branches |= close_branches;
     lot.start = start.or(lot.start);
@@ -186,8 +190,8 @@ fn write(args: &GenerateArgs, trial: &Trial<'_>) -> anyhow::Result<Made> {
     let vehicle = VehicleSettings::hyundai_hg300();
     let text = scenarios::load::to_toml(&drawn.scenario);
     let map = Map::build(drawn.scenario, &vehicle).with_context(|| name.clone())?;
-    write_whole(&png, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?.to_png()?)?;
-    write_whole(&toml, text.as_bytes())?;
+    storage::whole::write(&png, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?.to_png()?)?;
+    storage::whole::write(&toml, text.as_bytes())?;
     let (length_m, obstacles) = (map.path().length_m(), map.scenario().obstacles.len());
     // A route found for one way need not leave room at its finish to start back from there.
     let back = Map::build(map.scenario().clone().reversed(), &vehicle);

@@ -3,13 +3,13 @@
 use crate::args::{JsonArgs, LayerArgs};
 use crate::console::Console;
 use crate::output::Output;
-use anyhow::ensure;
 use clap::Args;
 use evaluation::pixel_accuracy::{Pixels, SPACING_M, look};
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::settings::{Layers, NoiseChoice, Settings};
 use serde::Serialize;
+use sim::limits::TRIAL_MAX;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -25,7 +25,7 @@ pub(crate) struct PixelAccuracyArgs {
     #[arg(long, alias = "level", value_name = "LEVEL", num_args = 1.., value_delimiter = ',', default_value = "paper")]
     noise: Vec<NoiseChoice>,
     /// Trials per lot and direction.
-    #[arg(long, value_name = "N", default_value_t = 5)]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=i64::from(TRIAL_MAX)))]
     trials: u32,
     /// Root seed of the trials.
     #[arg(long)]
@@ -46,7 +46,6 @@ struct Row<'a> {
 }
 
 pub(crate) fn run(args: &PixelAccuracyArgs, output: &Output) -> anyhow::Result<()> {
-    ensure!(args.trials > 0, "--trials is 0; at least one is needed");
     let settings = Settings::resolve(&Layers::from(&args.layers), args.seed)?;
     let lots = Lot::parse_all(&args.lots, &settings.episode.vehicle)?;
     let mut table = report::pixel_accuracy::table();

@@ -13,7 +13,7 @@ use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::Progress as _;
 use experiment::replay_key::ReplayKey;
-use experiment::run_dir;
+use experiment::run_dir::{self, RunDir};
 use experiment::settings::{Layers, NoiseChoice, Settings};
 use experiment::training;
 use experiment::trials::{Purpose, Trial};
@@ -23,6 +23,7 @@ use rayon::prelude::*;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
 use report::pictures::{contact_sheet, lot, noise, samples};
 use report::{reproduction, run_report};
+use sim::limits::{PIXELS_PER_METRE_MAX, RUN_TEXT_BYTES_MAX, TRIAL_MAX};
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -128,7 +129,7 @@ pub(crate) struct TrajectoriesArgs {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["drivers", "lot", "direction", "noise", "seed", "preset", "config", "overrides"])]
     run: Option<PathBuf>,
     /// Round of the training run; 0 = behaviour cloning.
-    #[arg(long, default_value_t = 1, requires = "run")]
+    #[arg(long, default_value_t = 1, requires = "run", value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX)))]
     round: u32,
     /// Lot to drive; see `cargo xtask lots`.
     #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
@@ -137,7 +138,7 @@ pub(crate) struct TrajectoriesArgs {
     #[arg(long = "directions", alias = "direction", value_name = "WAY", default_value = "forward")]
     direction: OneDirection,
     /// Which trial: obstacles and noise; of a training run, which of its drives.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX)))]
     trial: u32,
     /// What is seen wrongly: clean, paper, hard, lot or a multiple of paper.
     #[arg(long, alias = "level", value_name = "LEVEL", default_value = "paper")]
@@ -199,6 +200,16 @@ pub(crate) fn run(args: &RenderArgs, output: &Output) -> anyhow::Result<()> {
     }
 }
 
+/// `--pixels-per-metre`.
+pub(super) fn check_scale(pixels_per_metre: Option<f32>) -> anyhow::Result<()> {
+    let is_possible = |scale| scale > 0.0 && scale <= PIXELS_PER_METRE_MAX;
+    ensure!(
+        pixels_per_metre.is_none_or(is_possible),
+        "--pixels-per-metre must be positive, and at most {PIXELS_PER_METRE_MAX}"
+    );
+    Ok(())
+}
+
 fn maps(args: &RenderLotArgs, output: &Output) -> anyhow::Result<Vec<Map>> {
     let episode = Settings::preset("default")?.episode;
     let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
@@ -212,7 +223,7 @@ fn maps(args: &RenderLotArgs, output: &Output) -> anyhow::Result<Vec<Map>> {
 }
 
 fn render_lots(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
-    ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
+    check_scale(args.pixels_per_metre)?;
     let vehicle = Settings::preset("default")?.episode.vehicle;
     for map in maps(args, folder.output)? {
         folder.write(&map.scenario().name, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?, true)?;
@@ -225,7 +236,7 @@ fn contact_sheet(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()
 }
 
 fn render_trajectories(args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
-    ensure!(args.pixels_per_metre.is_none_or(|scale| scale > 0.0), "--pixels-per-metre must be positive");
+    check_scale(args.pixels_per_metre)?;
     let drives = match &args.run {
         Some(run) => driven_in_training(run, args, folder)?,
         None => driven_anew(args, folder)?,
@@ -389,7 +400,8 @@ fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyh
         "{}: this is no run; name a folder that train-dagger, train-bc or evaluate made",
         run.display()
     );
-    let report = run.join(run_report::FILE);
+    let owned = RunDir::reopen(run, "render report")?;
+    let report = owned.path().join(run_report::FILE);
     let copy = copy.map(|folder| (folder, folder.path.join(run_report::FILE)));
     if let Some((folder, path)) = &copy {
         folder.check_file(path)?;
@@ -397,7 +409,8 @@ fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyh
     run_report::write(run, &Console::new(output))?;
     output.print(report.display());
     if let Some((folder, path)) = copy {
-        let content = std::fs::read(&report).with_context(|| format!("{}: cannot be read", report.display()))?;
+        let content = storage::read::bytes(&report, RUN_TEXT_BYTES_MAX)
+            .with_context(|| format!("{}: cannot be read", report.display()))?;
         folder.put(&path, &content)?;
     }
     Ok(())

@@ -14,10 +14,14 @@ use experiment::replay_key::ReplayKey;
 use experiment::settings::{Layers, Settings};
 use report::pictures::animation::{Camera, Layout, Scene, Take};
 use report::pictures::encode::Format;
+use sim::limits::TRIAL_MAX;
 use sim::seed::RootSeed;
+use std::ops::RangeInclusive;
 
 /// Before and after the tick of a replay key, seconds.
 const AROUND_S: [f32; 2] = [8.0, 3.0];
+/// Times faster than life.
+const SPEEDS: RangeInclusive<f32> = 0.1..=1000.0;
 /// What a README or a report may carry.
 const LIMIT_BYTES: usize = 3_000_000;
 /// Frames of a whole drive that play faster than life.
@@ -38,7 +42,12 @@ pub(crate) struct AnimationArgs {
     #[arg(long, default_value = "forward", conflicts_with = "keys")]
     directions: OneDirection,
     /// Which trial: obstacles and noise.
-    #[arg(long, default_value_t = 0, conflicts_with = "keys")]
+    #[arg(
+        long,
+        default_value_t = 0,
+        conflicts_with = "keys",
+        value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX))
+    )]
     trial: u32,
     /// What is seen wrongly: clean, paper, hard, lot or a multiple of paper.
     #[arg(long, value_name = "LEVEL", default_value = "paper", conflicts_with = "keys")]
@@ -89,6 +98,14 @@ enum FormatChoice {
 }
 
 pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
+    let is_time = |seconds: f32| seconds >= 0.0 && seconds.is_finite();
+    ensure!([args.from, args.to].into_iter().flatten().all(is_time), "--from and --to are seconds, 0 or more");
+    ensure!(
+        args.speed.is_none_or(|speed| SPEEDS.contains(&speed)),
+        "--speed must be {} to {}",
+        SPEEDS.start(),
+        SPEEDS.end()
+    );
     let (settings, keys) = resolve(args, folder.output)?;
     let first = &keys[0];
     let trial = format!("{} {} trial {}", first.lot, first.direction.name(), first.trial);
@@ -112,7 +129,6 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
     let fps = f32::from(args.fps);
     let whole = ((to_s - from_s) * fps / FRAMES_WANTED).ceil().max(1.0);
     let speed = args.speed.unwrap_or(if ticks.is_empty() { whole } else { 1.0 });
-    ensure!(speed > 0.0, "--speed must be positive");
     let step_s = speed / fps;
     let times: Vec<f32> = (0..=((to_s - from_s) / step_s) as u32).map(|i| from_s + i as f32 * step_s).collect();
 

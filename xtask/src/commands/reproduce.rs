@@ -18,6 +18,7 @@ use experiment::progress::{Interrupted, Progress as _};
 use experiment::run_dir::{self, Outcome, Place, RunDir};
 use experiment::settings::{Layers, Settings};
 use report::reproduction::{self, Recipe};
+use sim::limits::RUN_TOML_BYTES_MAX;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -155,13 +156,13 @@ pub(crate) fn recipe_of(path: &Path) -> anyhow::Result<Recipe> {
 
 fn extent_of(path: &Path) -> anyhow::Result<Extent> {
     let file = path.join(EXTENT);
-    let text = fs::read_to_string(&file)
+    let text = storage::read::text(&file, RUN_TOML_BYTES_MAX)
         .with_context(|| format!("{}: cannot be read; this is no folder of cargo xtask reproduce", file.display()))?;
     toml::from_str(&text).with_context(|| file.display().to_string())
 }
 
 fn resume(path: &Path) -> anyhow::Result<(RunDir, Settings, Extent)> {
-    let (run, settings) = RunDir::resume(path)?;
+    let (run, settings) = RunDir::resume(path, "reproduce")?;
     let extent = extent_of(path)?;
     Ok((run, settings, extent))
 }

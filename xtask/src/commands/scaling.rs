@@ -49,7 +49,7 @@ const LOTS: &str = "train:144:all";
 
 pub(crate) fn run(args: &ScalingArgs, output: &Output) -> anyhow::Result<()> {
     let (run, settings, extent) = if let Some(path) = &args.resume {
-        let (run, settings) = RunDir::resume(path)?;
+        let (run, settings) = RunDir::resume(path, "scaling")?;
         let file = path.join(EXTENT);
         let text = fs::read_to_string(&file)
             .with_context(|| format!("{}: cannot be read; this is no folder of cargo xtask scaling", file.display()))?;

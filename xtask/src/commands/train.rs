@@ -70,7 +70,7 @@ pub(crate) fn dagger(args: &TrainArgs, output: &Output) -> anyhow::Result<()> {
 
 fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&mut Settings)) -> anyhow::Result<()> {
     let (run, settings) = if let Some(path) = &args.resume {
-        RunDir::resume(path)?
+        RunDir::resume(path, command)?
     } else {
         let layers = Layers::from(&args.layers);
         let mut settings = Settings::resolve(&layers, args.seed)?;

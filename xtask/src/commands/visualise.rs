@@ -15,6 +15,7 @@ use experiment::run_dir;
 use experiment::settings::{Layers, NoiseChoice};
 use experiment::view_request::{DriveRequest, Show, Sink, ViewRequest};
 use report::pictures::file_name;
+use sim::limits::TRIAL_MAX;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::path::{Path, PathBuf};
@@ -88,7 +89,7 @@ struct EpisodeArgs {
     #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
     lot: String,
     /// Which trial.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX)))]
     trial: u32,
     /// Which way it is driven.
     #[arg(long = "directions", alias = "direction", value_name = "WAY", default_value = "forward")]
