@@ -1,7 +1,10 @@
-//! Files of a run: written whole or not at all, owned by one process.
+//! Files of a run: written whole or not at all, listed with their SHA-256, owned by one process.
 
 mod error;
+pub mod growing;
 pub mod lock;
+pub mod sealed;
+pub mod sums;
 pub mod whole;
 
 pub use error::FileError;
