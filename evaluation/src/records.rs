@@ -10,6 +10,7 @@ use sim::episode::EpisodeReport;
 use sim::frame::Ending;
 use sim::scenario::Direction;
 use std::path::Path;
+use storage::sums;
 
 /// The version of `runs.jsonl`, `failures.jsonl` and `wall_time.jsonl` that this program writes.
 pub const SCHEMA: u32 = 1;
@@ -104,15 +105,23 @@ pub struct WallTimeRecord {
     pub wall_s: f64,
 }
 
-/// Reads a file line by line.
+/// Reads a finished file line by line.
 ///
 /// # Errors
-/// If it cannot be read, is of another version, or `take` refuses a line.
-pub fn each_line<T: DeserializeOwned>(
+/// If it is missing, damaged or of another version, or `take` refuses a line.
+pub fn each_line<T: DeserializeOwned>(path: &Path, take: impl FnMut(T) -> anyhow::Result<()>) -> anyhow::Result<()> {
+    each_line_of(path, &sums::read_to_string(path)?, take)
+}
+
+/// Reads the lines of a file; `path` is for errors.
+///
+/// # Errors
+/// If it is of another version, or `take` refuses a line.
+pub fn each_line_of<T: DeserializeOwned>(
     path: &Path,
+    text: &str,
     mut take: impl FnMut(T) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("{}: cannot be read", path.display()))?;
     for (index, line) in text.lines().enumerate() {
         let taken = parse(line).and_then(&mut take);
         taken.with_context(|| {

@@ -13,6 +13,7 @@ use sim::episode::EpisodeSettings;
 use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use storage::sums;
 
 /// Parameters that ship: the planner, and the file that `cargo xtask tune` wrote.
 const TUNED: [(&str, &str); 6] = [
@@ -96,7 +97,7 @@ impl FromStr for DriverSpec {
                 if path.join("settings.toml").is_file() {
                     bail!("no driver {text:?}; did you mean run:{text}?");
                 }
-                if Checkpoint::exists(path) {
+                if Checkpoint::exists(path).is_ok_and(|exists| exists) {
                     bail!("no driver {text:?}; did you mean net:{text}?");
                 }
                 let known = if text.starts_with("tuned:") {
@@ -166,8 +167,8 @@ impl DriverSpec {
             }
             Self::Checkpoint { folder } => {
                 ensure!(
-                    Checkpoint::exists(folder),
-                    "driver {name:?}: {} holds no model.safetensors; name the folder of a round, as in \
+                    Checkpoint::exists(folder).with_context(in_driver)?,
+                    "driver {name:?}: {} lists no finished model.safetensors in sha256sums; name the folder of a round, as in \
                      net:runs/NAME/round-03",
                     folder.display()
                 );
@@ -230,6 +231,21 @@ impl NamedDriver {
     #[must_use]
     pub fn renamed(self, name: &str) -> Self {
         Self { name: name.to_owned(), ..self }
+    }
+
+    /// SHA-256 of what its files say; `None` for one that ships.
+    pub fn digest(&self) -> Option<String> {
+        match (&self.model, &self.spec) {
+            (Model::Network(checkpoint, _), _) => {
+                let about = format!("{:?} {:?}", checkpoint.geometry, checkpoint.inference);
+                let weights = checkpoint.weights.values().iter().flat_map(|value| value.to_le_bytes());
+                Some(sums::digest(&about.into_bytes().into_iter().chain(weights).collect::<Vec<u8>>()))
+            }
+            (Model::Planner(planner), DriverSpec::Planner { parameters: Parameters::File(_), .. }) => {
+                Some(sums::digest(planner.parameters().to_string().as_bytes()))
+            }
+            (Model::Expert(_) | Model::Planner(_), _) => None,
+        }
     }
 
     /// Who it is, as decisions say it.

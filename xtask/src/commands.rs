@@ -15,5 +15,6 @@ pub(crate) mod sample_size;
 pub(crate) mod settings;
 pub(crate) mod train;
 pub(crate) mod tune;
+pub(crate) mod verify;
 pub(crate) mod visualise;
 mod within;

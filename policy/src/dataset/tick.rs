@@ -5,8 +5,7 @@ use ndarray::Array1;
 use ndarray_npy::{NpzReader, NpzWriter, ReadableElement, WritableElement};
 use sim::driver::Source;
 use sim::frame::Frame;
-use std::fs::File;
-use std::io::BufReader;
+use std::io::Cursor;
 use std::path::Path;
 
 /// The context of a sample: when and where it was taken, and who drove. Poses are those of the rear axle in the world frame of the lot.
@@ -139,7 +138,7 @@ fn column<T: WritableElement>(ticks: &[Tick], of: impl Fn(&Tick) -> T) -> Array1
 
 /// The arrays of an archive, each of one value per sample.
 struct Columns<'a> {
-    archive: &'a mut NpzReader<BufReader<File>>,
+    archive: &'a mut NpzReader<Cursor<Vec<u8>>>,
     samples: usize,
 }
 
