@@ -85,12 +85,13 @@ impl Recorder {
     fn frame(&mut self, frame: &Frame, report: &EpisodeReport) {
         let [observations, decisions, trajectory, metrics] = &mut self.layers;
         (0..GRID_CELLS).for_each(|row| observations.update(frame.observation.grid.row(row).to_le_bytes()));
-        let Decision { look_ahead, source, spread } = frame.decision;
+        let Decision { look_ahead, source, spread, speed_limit_mps } = frame.decision;
         floats(decisions, &[look_ahead.ahead_m, look_ahead.left_m]);
         decisions.update([source as u8, u8::from(spread.is_some())]);
         if let Some(spread) = spread {
             floats(decisions, &[spread.ahead_m, spread.left_m]);
         }
+        floats(decisions, speed_limit_mps.as_slice());
         let (vehicle, command) = (&frame.vehicle, &frame.command);
         pose(trajectory, vehicle.pose);
         floats(trajectory, &[vehicle.speed_mps, vehicle.steering_rad, vehicle.accel_mps2, vehicle.accel_demand_mps2]);
@@ -152,7 +153,7 @@ impl Policy for MiddleOfTheRow {
             ahead_m: self.0.cell_in_ego(ROW, 0).x,
             left_m: if free.is_empty() { 0.0 } else { sum_m / free.len() as f32 },
         };
-        Decision { look_ahead, source: Source::Planner, spread: None }
+        Decision { look_ahead, source: Source::Planner, spread: None, speed_limit_mps: None }
     }
 }
 
@@ -163,7 +164,7 @@ impl Policy for Untrained {
     fn act(&mut self, observation: &Observation) -> Decision {
         let prediction = self.0.predict(&[&observation.grid])[0];
         let spread = Some(prediction.spread(self.1));
-        Decision { look_ahead: prediction.look_ahead(self.1), source: Source::Novice, spread }
+        Decision { look_ahead: prediction.look_ahead(self.1), source: Source::Novice, spread, speed_limit_mps: None }
     }
 }
 

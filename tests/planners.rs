@@ -20,7 +20,7 @@ fn parameters_come_from_a_file_or_are_refused() {
     let out = folder.join("out");
     let listed = succeed(xtask().arg("drivers"));
     assert!(listed.lines().any(|line| line.starts_with("tuned:NAME")), "{listed}");
-    for name in ["tentacle", "vvf", "dwa", "cvm", "apf", "vff"] {
+    for name in ["tentacle", "vvf", "dwa", "dwa/fox", "cvm", "cvm/simmons", "apf", "vff", "mppi"] {
         assert!(listed.lines().any(|line| line.starts_with(name)), "{name} is not listed:\n{listed}");
     }
     let complete = succeed(xtask().args(["drivers", "vvf"]));

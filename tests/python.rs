@@ -6,10 +6,12 @@
 use crate::bench::{root, scratch, succeed, text, xtask};
 use ndarray::{Array2, Array3};
 use policy::checkpoint::Checkpoint;
+use policy::conditions::Conditions;
 use policy::dataset::store::Store;
 use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Prediction, Weights};
+use sim::episode::EpisodeSettings;
 use sim::seed::RootSeed;
-use sim::sensing::{GridGeometry, OccupancyGrid};
+use sim::sensing::OccupancyGrid;
 use std::path::Path;
 use std::process::Command;
 
@@ -49,10 +51,9 @@ fn answers(script: &str, checkpoint: &Checkpoint, grids: &[OccupancyGrid], folde
 
 /// Both presets' networks, one with an even kernel, with and without mirror averaging.
 fn checkpoints() -> [Checkpoint; 2] {
-    let geometry = GridGeometry::paper();
     let of = |architecture, inference| Checkpoint {
         weights: Weights::init(architecture, RootSeed(8), 0),
-        geometry,
+        conditions: Conditions::of(&EpisodeSettings::paper()),
         inference,
     };
     [

@@ -34,7 +34,7 @@ fn answers(settings: &ExpertSettings, episode: &EpisodeSettings, lot: Scenario, 
 fn moving_the_patch_does_not_change_the_speed() {
     let settings = ControllerSettings { speed_law: SpeedLaw::Full, ..ControllerSettings::paper() };
     let look_ahead = LookAheadPoint { ahead_m: 7.0, left_m: 0.5 };
-    let decision = Decision { look_ahead, source: Source::Expert, spread: None };
+    let decision = Decision { look_ahead, source: Source::Expert, spread: None, speed_limit_mps: None };
     let speed_mps = |near_edge_ahead_m| {
         let geometry = GridGeometry { near_edge_ahead_m, ..GridGeometry::paper() };
         pursue(&settings, &car(), &geometry, &decision).speed_mps

@@ -109,3 +109,35 @@ fn what_cannot_be_reproduced_is_refused_before_anything_is_written() {
         assert!(!Path::new(&out).exists(), "{arguments:?} leaves {out}");
     }
 }
+
+#[test]
+fn trainings_on_few_and_many_lots_end_in_one_table() {
+    let folder = scratch("scaling");
+    let out = folder.join("out");
+    let few = ["--set", "training.lots=[\"train:2:lane\"]", "--set", "dagger.fit.budget.steps=20"];
+    let run = |arguments: &[&str]| {
+        xtask()
+            .args(["scaling", "--preset", "smoke", "--set", "dagger.cloning_budget.steps=20"])
+            .args(few)
+            .args(arguments)
+            .output()
+    };
+    let out_name = out.to_string_lossy().into_owned();
+    let first = run(&["--different", "2,1", "--unseen", "validation:1:lane", "--out", &out_name]).unwrap();
+    assert!(first.status.success(), "{}", text(&first).1);
+    let table = std::fs::read_to_string(out.join("scaling.md")).unwrap();
+    let rows: Vec<&str> = table.lines().filter(|line| line.contains("BC") || line.contains("DAgger")).collect();
+    assert_eq!(rows.len(), 4, "two trainings, two policies of each:\n{table}");
+    assert!(rows[0].starts_with("| 2 ") && rows[3].starts_with("| 1 "), "{table}");
+    assert!(std::fs::read_to_string(out.join("scaling.svg")).unwrap().contains("different lots"));
+    assert!(std::fs::read_to_string(out.join("scaling.csv")).unwrap().contains("validation-lane"));
+    for (arguments, part) in [
+        (["--different", "0"], "name at least one lot"),
+        (["--different", "4,4"], "named twice"),
+        (["--unseen", "train:2"], "trained on it"),
+    ] {
+        let refused = run(&arguments).unwrap();
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(text(&refused).1.contains(part), "{arguments:?}: {}", text(&refused).1);
+    }
+}

@@ -8,6 +8,7 @@ use experiment::settings::{NoiseChoice, Settings};
 use experiment::trials::{self, Purpose, Trial};
 use expert::{ExpertSettings, ScriptedExpert};
 use policy::checkpoint::Checkpoint;
+use policy::conditions::Conditions;
 use policy::network::{DeviceChoice, Weights};
 use rayon::prelude::*;
 use sim::batch::{SeatedFleet, run_fleets, run_lockstep};
@@ -31,7 +32,7 @@ impl Driver for Centred {
         let ahead = truth.map.path().pose_at(truth.progress_m + 6.0).position();
         let in_ego = truth.vehicle.pose.world_from_ego().inverse_point(ahead);
         let look_ahead = LookAheadPoint { ahead_m: in_ego.x, left_m: in_ego.y };
-        Decision { look_ahead, source: Source::Planner, spread: None }
+        Decision { look_ahead, source: Source::Planner, spread: None, speed_limit_mps: None }
     }
 
     fn reset(&mut self) {}
@@ -105,7 +106,7 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     let settings = &course.settings;
     let checkpoint = Checkpoint {
         weights: Weights::init(settings.dagger.network, RootSeed(1), 0),
-        geometry: settings.episode.sensing.geometry,
+        conditions: Conditions::of(&settings.episode),
         inference: settings.dagger.inference,
     };
     let spec = DriverSpec::Checkpoint { folder: "untrained".into() };

@@ -46,7 +46,7 @@ impl AxisCalibration {
 pub fn of_policy(policy: &Checkpoint, samples: &[Sample], device: DeviceChoice) -> [AxisCalibration; 2] {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
     let predictions = policy.predictor(device).predict(&grids);
-    let side_m = f64::from(policy.geometry.side_m);
+    let side_m = f64::from(policy.geometry().side_m);
     [("across", 0), ("along", 1)].map(|(name, axis)| {
         let errors = samples.iter().zip(&predictions).map(|(sample, prediction)| {
             let error = f64::from(sample.label[axis] - prediction.mean[axis]);

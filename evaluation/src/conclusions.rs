@@ -59,8 +59,8 @@ impl Verdict {
     /// Of an interval that lies above zero if the paper is right.
     fn of(interval: Option<Interval>) -> Self {
         match interval {
-            Some(Interval { lower, .. }) if lower > 0.0 => Self::Holds,
-            Some(Interval { upper, .. }) if upper < 0.0 => Self::DoesNotHold,
+            Some(interval) if interval.excludes_zero() && interval.lower > 0.0 => Self::Holds,
+            Some(interval) if interval.excludes_zero() => Self::DoesNotHold,
             _ => Self::CannotBeTold,
         }
     }
@@ -283,8 +283,8 @@ impl Against<'_> {
     }
 }
 
-fn negated(Interval { estimate, lower, upper }: Interval) -> Interval {
-    Interval { estimate: -estimate, lower: -upper, upper: -lower }
+fn negated(interval: Interval) -> Interval {
+    Interval { estimate: -interval.estimate, lower: -interval.upper, upper: -interval.lower, ..interval }
 }
 
 /// What it would take to tell two rates apart, if they are what was seen.
@@ -321,14 +321,15 @@ pub fn share_of_the_network(rows: &[IterationRow], eta: f64) -> Statement {
 
 /// The weight α τ̂ makes Σ τ̂ smaller: the ratio of an iteration lies below one.
 pub fn effect_of_the_weight(iteration: u32, ratio: Option<Interval>) -> Statement {
-    let below_one = ratio.map(|Interval { estimate, lower, upper }| Interval {
-        estimate: 1.0 - estimate,
-        lower: 1.0 - upper,
-        upper: 1.0 - lower,
+    let below_one = ratio.map(|ratio| Interval {
+        estimate: 1.0 - ratio.estimate,
+        lower: 1.0 - ratio.upper,
+        upper: 1.0 - ratio.lower,
+        ..ratio
     });
     let figures = ratio.map_or_else(
         || "too few held-back samples".to_owned(),
-        |Interval { estimate, lower, upper }| {
+        |Interval { estimate, lower, upper, .. }| {
             format!("Σ τ̂ with the weight over without: {estimate:.3} [{lower:.3}, {upper:.3}]; paper .62 … .91")
         },
     );

@@ -31,12 +31,12 @@ pub fn bound_per_100m(near_collisions: u32, reference_m: f64) -> f64 {
     100.0 * upper_bound(near_collisions, CONFIDENCE) / reference_m
 }
 
-/// A difference with its interval; `*` if that excludes zero.
+/// A difference with its interval; `*` if that excludes zero, by enough units.
 pub fn difference(interval: Option<Interval>, digits: usize) -> String {
     interval.map_or_else(
         || "–".to_owned(),
         |interval| {
-            let Interval { estimate, lower, upper } = interval;
+            let Interval { estimate, lower, upper, .. } = interval;
             let mark = if interval.excludes_zero() { " *" } else { "" };
             format!("{estimate:+.digits$} [{lower:+.digits$}, {upper:+.digits$}]{mark}")
         },
@@ -58,7 +58,7 @@ mod tests {
         assert_eq!(exact_rate(0, 5180.0), "0.00 [0.00, 0.07], < 0.058 one-sided");
         assert_eq!(exact_rate(71, 5180.0), "1.37 [1.07, 1.73]");
         let totals = Totals { near_collisions: 71, reference_m: 5180.0, ..Totals::default() };
-        let interval = Interval { estimate: 1.37, lower: 0.9, upper: 2.0 };
+        let interval = Interval { estimate: 1.37, lower: 0.9, upper: 2.0, units: 15 };
         let estimate = |index| DriverEstimate {
             dispersion: Some(Dispersion { index, freedom: 9, p_value: 0.1 }),
             per_100m: Some(interval),

@@ -13,7 +13,7 @@ use sim::seed::RootSeed;
 pub struct DriverEstimate {
     /// How clustered its near-collisions are; `None` where that cannot be said.
     pub dispersion: Option<Dispersion>,
-    /// Near-collisions per 100 m; `None` with a single unit per lot.
+    /// Near-collisions per 100 m; `None` with a single trial per lot.
     pub per_100m: Option<Interval>,
     /// Safe ratio, mean over runs.
     pub safe_ratio: Option<Interval>,
@@ -28,7 +28,7 @@ pub struct Comparison {
     pub driver: usize,
     /// Runs both have driven.
     pub pairs: usize,
-    /// Near-collisions per 100 m, paired bootstrap; `None` with a single unit per lot.
+    /// Near-collisions per 100 m, paired bootstrap; `None` with a single trial per lot.
     pub difference_per_100m: Option<Interval>,
     /// Safe ratio, paired bootstrap.
     pub difference_safe_ratio: Option<Interval>,
@@ -41,9 +41,9 @@ pub struct Comparison {
 }
 
 impl EvaluationResults {
-    /// How the drivers stand in a slice at a noise level, and how they compare with one of them. Resampled are units
-    /// (lot, direction, seed) within each lot (docs/methods.md 8.3); of generated lots, which are a sample themselves, whole
-    /// lots within their kind (chosen). Only runs that all drivers have driven count.
+    /// How the drivers stand in a slice at a noise level, and how they compare with one of them. Resampled is what is
+    /// independent (docs/methods.md 8.3): of fixed lots whole trials, both ways, for they share their obstacles; of generated
+    /// lots, which are a sample themselves, whole lots within their kind (chosen). Only runs that all drivers have driven count.
     pub fn judge(
         &self,
         level: usize,

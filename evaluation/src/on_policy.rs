@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The version of `on_policy.json` that this program writes.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 const FILE: &str = "on_policy.json";
 
 /// What was found; `on_policy.json`.

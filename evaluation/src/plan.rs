@@ -31,7 +31,7 @@ impl<'a> Plan<'a> {
     /// If a driver was trained for another patch of ground, or a lot from a file cannot be driven: a
     /// `scenarios::LoadError`.
     pub fn check(&self) -> anyhow::Result<()> {
-        self.drivers.iter().try_for_each(|driver| driver.check(&self.settings.episode))?;
+        self.drivers.iter().try_for_each(|driver| driver.check(self.settings))?;
         let evaluation = &self.settings.evaluation;
         for lot in self.lots {
             for &direction in &evaluation.directions {

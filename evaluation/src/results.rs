@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 pub(crate) struct RunSummary {
     pub(crate) trial: u32,
     pub(crate) group: u32,
-    /// Units of one cluster are resampled together.
+    /// Runs that share obstacles: they are resampled together.
     pub(crate) cluster: u32,
     pub(crate) near_collisions: u32,
     pub(crate) reference_m: f32,
@@ -41,10 +41,28 @@ pub(crate) struct DriverResults {
 #[derive(Debug)]
 pub struct EvaluationResults {
     groups: Vec<LotGroup>,
-    /// Group and cluster of a lot by name; no cluster where every run is one.
-    lots: BTreeMap<String, (u32, Option<u32>)>,
+    /// Group of a lot by name, and how its runs cluster.
+    lots: BTreeMap<String, (u32, Clusters)>,
     /// By noise level, then by driver.
     pub(crate) drivers: Vec<Vec<DriverResults>>,
+}
+
+/// Which runs of a lot share obstacles.
+#[derive(Debug, Clone, Copy)]
+enum Clusters {
+    /// All, whichever way and however often: a generated lot is a draw itself.
+    WholeLot(u32),
+    /// Both ways of a trial, counted from here.
+    Trials(u32),
+}
+
+impl Clusters {
+    fn of(self, trial: &Trial<'_>) -> u32 {
+        match self {
+            Self::WholeLot(cluster) => cluster,
+            Self::Trials(first) => first + trial.index,
+        }
+    }
 }
 
 impl EvaluationResults {
@@ -65,7 +83,8 @@ impl EvaluationResults {
             lots: BTreeMap::new(),
             drivers: vec![vec![DriverResults::default(); plan.drivers.len()]; plan.settings.evaluation.noise.len()],
         };
-        for (index, lot) in plan.lots.iter().enumerate() {
+        let mut free_cluster = 0;
+        for lot in plan.lots {
             let name = lot.group();
             let group = results.groups.iter().position(|group| group.name == name).unwrap_or_else(|| {
                 let is_trained_on = trained_on.contains(&name);
@@ -73,23 +92,27 @@ impl EvaluationResults {
                 results.groups.len() - 1
             });
             results.groups[group].lots += 1;
-            let cluster = lot.is_generated().then_some(index as u32);
-            results.lots.insert(lot.name().to_owned(), (group as u32, cluster));
+            let (clusters, count) = if lot.is_generated() {
+                (Clusters::WholeLot(free_cluster), 1)
+            } else {
+                (Clusters::Trials(free_cluster), plan.settings.evaluation.trials)
+            };
+            free_cluster += count;
+            results.lots.insert(lot.name().to_owned(), (group as u32, clusters));
         }
         results
     }
 
     /// Adds a run of a noise level, driver and trial of the plan. Trials come in order.
     pub fn add(&mut self, level: usize, driver: usize, trial_index: usize, trial: &Trial<'_>, report: &EpisodeReport) {
-        let (group, cluster) = self.lots[trial.lot.name()];
+        let (group, clusters) = self.lots[trial.lot.name()];
         let driver_results = &mut self.drivers[level][driver];
         driver_results.totals.entry((group, trial.direction)).or_default().add(report);
         let metrics = &report.metrics;
         driver_results.runs.push(RunSummary {
             trial: trial_index as u32,
             group,
-            // Behind the lots, of which each can be a cluster.
-            cluster: cluster.unwrap_or(self.lots.len() as u32 + trial_index as u32),
+            cluster: clusters.of(trial),
             near_collisions: metrics.near_collisions,
             reference_m: metrics.reference_m,
             safe_ratio: metrics.safe_ratio,

@@ -223,9 +223,7 @@ pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
 /// # Errors
 /// If something named does not exist.
 pub fn load(drivers: &[(String, String)], settings: &Settings) -> anyhow::Result<Vec<NamedDriver>> {
-    let load = |(name, spec): &(String, String)| {
-        Ok(spec.parse::<DriverSpec>()?.load(&settings.expert, settings.dagger.device)?.renamed(name))
-    };
+    let load = |(name, spec): &(String, String)| Ok(spec.parse::<DriverSpec>()?.load(settings)?.renamed(name));
     drivers.iter().map(load).collect()
 }
 

@@ -40,7 +40,7 @@ const FINALISTS: usize = 4;
 /// If a lot is not for training or cannot be driven, or a file cannot be written.
 pub fn tune(
     settings: &Settings,
-    planners: &[PlannerSpec],
+    planners: &[Start],
     budget: usize,
     run: &RunDir,
     progress: &dyn Progress,
@@ -52,17 +52,18 @@ pub fn tune(
     let course = Course::new(settings, &lots, evaluation.noise[0])?;
     progress.end(&format!("{} runs per candidate", course.search.trials.len()));
     let mut tuned = Vec::new();
-    for planner in planners {
-        progress.begin("tuning", &format!("tuning {}", planner.name()));
-        let candidates = format!("{}.candidates.toml", planner.name());
+    for start in planners {
+        progress.begin("tuning", &format!("tuning {}", start.name));
+        let name = start.name.replace('/', "-");
+        let candidates = format!("{name}.candidates.toml");
         let mut driven = Driven::read(run.path().join(&candidates))?;
-        let Some(found) = search(&course, planner, budget, evaluation.seed, &mut driven, progress)? else { break };
+        let Some(found) = search(&course, start, budget, evaluation.seed, &mut driven, progress)? else { break };
         sums::list(run.path(), &[&candidates])?;
         progress.end(&format!(
             "{:.2} → {:.2} failures per 100 m",
             found.before.failures_per_100m, found.after.failures_per_100m
         ));
-        run.write(&format!("{}.toml", planner.name()), found.to_toml(settings)?.as_bytes())?;
+        run.write(&format!("{name}.toml"), found.to_toml(settings)?.as_bytes())?;
         tuned.push(found);
     }
     Ok(tuned)
@@ -83,18 +84,32 @@ pub fn check(lots: &[Lot]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The planners of these names, in the order of [`PlannerSpec::all`]; all if none is named.
+/// A planner to be tuned.
+#[derive(Debug, Clone)]
+pub struct Start {
+    /// As on the command line, with the reading: `dwa/fox`.
+    pub name: String,
+    /// The first candidate.
+    pub planner: PlannerSpec,
+}
+
+/// The planners of these names; if none is named, all as the paper or the literature has them.
 ///
 /// # Errors
 /// If nothing is named so.
-pub fn planners_named(names: &[String]) -> anyhow::Result<Vec<PlannerSpec>> {
+pub fn planners_named(names: &[String]) -> anyhow::Result<Vec<Start>> {
     let all = PlannerSpec::all();
-    for name in names {
-        let known: Vec<&str> = all.iter().map(PlannerSpec::name).collect();
-        ensure!(known.contains(&name.as_str()), "no planner {name:?}; there are {}", known.join(", "));
+    if names.is_empty() {
+        return Ok(all.into_iter().map(|planner| Start { name: planner.name().to_owned(), planner }).collect());
     }
-    let is_wanted = |planner: &PlannerSpec| names.is_empty() || names.iter().any(|name| name == planner.name());
-    Ok(all.into_iter().filter(is_wanted).collect())
+    let start = |name: &String| {
+        let planner = PlannerSpec::named(name).with_context(|| {
+            let known: Vec<&str> = all.iter().map(PlannerSpec::name).collect();
+            format!("no planner {name:?}; there are {}", known.join(", "))
+        })?;
+        Ok(Start { name: name.clone(), planner })
+    };
+    names.iter().map(start).collect()
 }
 
 /// Trials with their maps.
@@ -193,6 +208,8 @@ fn rank(totals: &Totals) -> (u32, u32, u32, i64) {
 /// What a search found.
 #[derive(Debug, Clone)]
 pub struct Found {
+    /// As on the command line.
+    pub name: String,
     /// The planner with the parameters found.
     pub planner: PlannerSpec,
     budget: usize,
@@ -250,7 +267,7 @@ fn round(value: f64) -> f64 {
 /// Searches around one planner; `None` if cancelled.
 fn search(
     course: &Course<'_>,
-    start: &PlannerSpec,
+    Start { name, planner: start }: &Start,
     budget: usize,
     seed: RootSeed,
     driven: &mut Driven,
@@ -305,6 +322,7 @@ fn search(
         .collect();
     let winner = (0..together.len()).min_by_key(|&place| (rank(&together[place]), place)).unwrap_or(0);
     Ok(Some(Found {
+        name: name.clone(),
         planner: finalists[winner].clone(),
         budget,
         seed,

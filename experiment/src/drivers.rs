@@ -1,13 +1,16 @@
 //! Drivers: how they are named, and how they get to the wheel.
 
 use crate::run_dir;
+use crate::settings::{Settings, Smoothing};
 use anyhow::{Context as _, bail, ensure};
 use expert::{ExpertSettings, ScriptedExpert};
 use planners::{Planner, PlannerContext, PlannerSpec};
 use policy::checkpoint::Checkpoint;
+use policy::conditions::Conditions;
 use policy::drivers::NetFleet;
 use policy::network::DeviceChoice;
 use serde::{Deserialize, Serialize};
+use sim::action_smoothing::SmoothedFleet;
 use sim::driver::{Fleet, OneDriverEach, SensorsOnly, Source};
 use sim::episode::EpisodeSettings;
 use std::fmt::{self, Write as _};
@@ -40,9 +43,14 @@ pub enum DriverSpec {
         /// The folder.
         folder: PathBuf,
     },
+    /// `ensemble:DRIVER,DRIVER`: networks whose answers are taken together.
+    Ensemble {
+        /// `run:` and `net:` drivers, at least one.
+        members: Vec<DriverSpec>,
+    },
     /// `NAME`, `tuned:NAME` or `NAME:FILE`: a model-based planner.
     Planner {
-        /// Its name.
+        /// Its name, with the reading if it is not the paper's: `dwa/fox`.
         name: String,
         /// Its parameters.
         parameters: Parameters,
@@ -61,17 +69,25 @@ pub enum Parameters {
 }
 
 /// Ways to name a driver: how it is written, what it means.
-pub fn specs() -> Vec<(&'static str, &'static str)> {
-    let mut specs = vec![
+pub fn specs() -> Vec<(String, String)> {
+    let own = [
         ("expert", "the scripted expert; sees the truth"),
         ("run:DIR", "the final policy of a training run"),
         ("run:DIR/bc", "its policy after behaviour cloning"),
         ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
     ];
-    specs.extend(PlannerSpec::all().iter().map(|planner| (planner.name(), planner.about())));
-    specs.push(("tuned:NAME", "one of these planners with parameters found by cargo xtask tune (planners/tuned/)"));
-    specs.push(("NAME:FILE", "one of these planners with parameters from a TOML file (cargo xtask tune writes them)"));
-    specs
+    let of_files = [
+        ("ensemble:DRIVER,DRIVER", "run: and net: drivers whose answers are taken together"),
+        ("tuned:NAME", "one of these planners with parameters found by cargo xtask tune (planners/tuned/)"),
+        ("NAME:FILE", "one of these planners with parameters from a TOML file (cargo xtask tune writes them)"),
+    ];
+    let planners = PlannerSpec::all().into_iter().flat_map(|planner| {
+        let of_reading = |(reading, about, _)| (format!("{}/{reading}", planner.name()), format!("reading: {about}"));
+        let readings = planner.readings().into_iter().map(of_reading);
+        std::iter::once((planner.name().to_owned(), planner.about().to_owned())).chain(readings).collect::<Vec<_>>()
+    });
+    let owned = |(spec, about): (&str, &str)| (spec.to_owned(), about.to_owned());
+    own.map(owned).into_iter().chain(planners).chain(of_files.map(owned)).collect()
 }
 
 /// The planners with parameters that ship.
@@ -83,13 +99,14 @@ impl FromStr for DriverSpec {
     type Err = anyhow::Error;
 
     fn from_str(text: &str) -> anyhow::Result<Self> {
-        let is_planner = |name: &str| PlannerSpec::all().iter().any(|planner| planner.name() == name);
+        let is_planner = |name: &str| PlannerSpec::named(name).is_some();
         let planner = |name: &str, parameters| Ok(Self::Planner { name: name.to_owned(), parameters });
         match text.split_once(':') {
             None if text == "expert" => Ok(Self::Expert),
             None if is_planner(text) => planner(text, Parameters::Published),
             Some(("run", folder)) => Ok(Self::Run { folder: folder.into() }),
             Some(("net", folder)) => Ok(Self::Checkpoint { folder: folder.into() }),
+            Some(("ensemble", members)) => Self::ensemble(members),
             Some(("tuned", name)) if is_planner(name) => planner(name, Parameters::Tuned),
             Some((name, file)) if is_planner(name) => planner(name, Parameters::File(file.into())),
             _ => {
@@ -103,7 +120,7 @@ impl FromStr for DriverSpec {
                 let known = if text.starts_with("tuned:") {
                     tuned_specs()
                 } else {
-                    specs().iter().map(|(spec, _)| (*spec).to_owned()).collect()
+                    specs().into_iter().map(|(spec, _)| spec).collect()
                 };
                 bail!("no driver {text:?}; there are {}", known.join(", "))
             }
@@ -117,6 +134,10 @@ impl fmt::Display for DriverSpec {
             Self::Expert => f.write_str("expert"),
             Self::Run { folder } => write!(f, "run:{}", folder.display()),
             Self::Checkpoint { folder } => write!(f, "net:{}", folder.display()),
+            Self::Ensemble { members } => {
+                let members: Vec<String> = members.iter().map(Self::to_string).collect();
+                write!(f, "ensemble:{}", members.join(","))
+            }
             Self::Planner { name, parameters: Parameters::Published } => f.write_str(name),
             Self::Planner { name, parameters: Parameters::Tuned } => write!(f, "tuned:{name}"),
             Self::Planner { name, parameters: Parameters::File(path) } => write!(f, "{name}:{}", path.display()),
@@ -141,42 +162,75 @@ impl DriverSpec {
 
     /// Whether it is a learned policy.
     pub fn is_network(&self) -> bool {
-        matches!(self, Self::Run { .. } | Self::Checkpoint { .. })
+        matches!(self, Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. })
     }
 
-    /// The training run it comes from; `/bc` is part of it.
+    /// The training run it comes from, of an ensemble the first one; `/bc` is part of it.
     pub fn run(&self) -> Option<&Path> {
         match self {
             Self::Run { folder } => Some(folder),
+            Self::Ensemble { members } => members.iter().find_map(Self::run),
             Self::Expert | Self::Checkpoint { .. } | Self::Planner { .. } => None,
         }
     }
 
-    /// Reads the files it names.
-    ///
-    /// # Errors
-    /// If they are not what they should be.
-    pub fn load(self, expert: &ExpertSettings, device: DeviceChoice) -> anyhow::Result<NamedDriver> {
-        let name = self.to_string();
-        let in_driver = || format!("driver {name:?}");
-        let model = match &self {
-            Self::Expert => Model::Expert(expert.clone()),
-            Self::Run { folder } => {
-                let folder = run_dir::policy_folder(folder).with_context(in_driver)?;
-                Model::Network(Box::new(Checkpoint::load(&folder).with_context(in_driver)?), device)
-            }
+    fn ensemble(members: &str) -> anyhow::Result<Self> {
+        let members: Vec<Self> = members.split(',').map(str::parse).collect::<anyhow::Result<_>>()?;
+        for (at, member) in members.iter().enumerate() {
+            ensure!(
+                matches!(member, Self::Run { .. } | Self::Checkpoint { .. }),
+                "{member} cannot be part of an ensemble; its members are networks, as in ensemble:run:A,net:B/round-03"
+            );
+            ensure!(!members[..at].contains(member), "{member} is named twice in an ensemble");
+        }
+        Ok(Self::Ensemble { members })
+    }
+
+    /// The networks it names, read from their files.
+    fn checkpoints(&self) -> anyhow::Result<Vec<Checkpoint>> {
+        match self {
+            Self::Run { folder } => Ok(vec![Checkpoint::load(&run_dir::policy_folder(folder)?)?]),
             Self::Checkpoint { folder } => {
                 ensure!(
-                    Checkpoint::exists(folder).with_context(in_driver)?,
-                    "driver {name:?}: {} lists no finished model.safetensors in sha256sums; name the folder of a round, as in \
+                    Checkpoint::exists(folder)?,
+                    "{} lists no finished model.safetensors in sha256sums; name the folder of a round, as in \
                      net:runs/NAME/round-03",
                     folder.display()
                 );
-                Model::Network(Box::new(Checkpoint::load(folder).with_context(in_driver)?), device)
+                Ok(vec![Checkpoint::load(folder)?])
+            }
+            Self::Ensemble { members } => {
+                let networks: Vec<Checkpoint> =
+                    members.iter().map(Self::checkpoints).collect::<anyhow::Result<Vec<_>>>()?.concat();
+                for (member, network) in members.iter().zip(&networks) {
+                    ensure!(
+                        (&network.conditions, network.inference) == (&networks[0].conditions, networks[0].inference),
+                        "{member} was trained or drives with other settings than {}; members of an ensemble must agree \
+                         (compare their model.toml)",
+                        members[0]
+                    );
+                }
+                Ok(networks)
+            }
+            Self::Expert | Self::Planner { .. } => Ok(Vec::new()),
+        }
+    }
+
+    /// Reads the files it names. It drives with the action smoothing that `evaluation.smoothing` asks for.
+    ///
+    /// # Errors
+    /// If they are not what they should be.
+    pub fn load(self, settings: &Settings) -> anyhow::Result<NamedDriver> {
+        let name = self.to_string();
+        let model = match &self {
+            Self::Expert => Model::Expert(settings.expert.clone()),
+            Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. } => {
+                let networks = self.checkpoints().with_context(|| format!("driver {name:?}"))?;
+                Model::Network(networks, settings.dagger.device)
             }
             Self::Planner { name, parameters } => Model::Planner(planner(name, parameters)?),
         };
-        Ok(NamedDriver { name, spec: self, model })
+        Ok(NamedDriver { name, spec: self, model, smoothing_ticks: 0.0 }.smoothed(settings.evaluation.smoothing))
     }
 }
 
@@ -188,12 +242,15 @@ pub struct NamedDriver {
     /// As named on the command line, for replay keys.
     pub spec: DriverSpec,
     model: Model,
+    /// Time constant of the action smoothing of who does not smooth by itself, control ticks; 0 = off.
+    smoothing_ticks: f32,
 }
 
 #[derive(Debug, Clone)]
 enum Model {
     Expert(ExpertSettings),
-    Network(Box<Checkpoint>, DeviceChoice),
+    /// One network, or the members of an ensemble, which share geometry and settings of inference.
+    Network(Vec<Checkpoint>, DeviceChoice),
     Planner(PlannerSpec),
 }
 
@@ -202,29 +259,40 @@ impl NamedDriver {
     ///
     /// # Errors
     /// If nothing is named so, its files are not what they should be, or one is named twice.
-    pub fn load_all<S: AsRef<str>>(
-        texts: &[S],
-        expert: &ExpertSettings,
-        device: DeviceChoice,
-    ) -> anyhow::Result<Vec<Self>> {
-        DriverSpec::parse_all(texts)?.into_iter().map(|spec| spec.load(expert, device)).collect()
+    pub fn load_all<S: AsRef<str>>(texts: &[S], settings: &Settings) -> anyhow::Result<Vec<Self>> {
+        DriverSpec::parse_all(texts)?.into_iter().map(|spec| spec.load(settings)).collect()
     }
 
     /// The scripted expert.
     pub fn expert(settings: &ExpertSettings) -> Self {
-        Self { name: "expert".to_owned(), spec: DriverSpec::Expert, model: Model::Expert(settings.clone()) }
+        let model = Model::Expert(settings.clone());
+        Self { name: "expert".to_owned(), spec: DriverSpec::Expert, model, smoothing_ticks: 0.0 }
     }
 
     /// A network that is loaded already.
     pub fn network(name: &str, spec: DriverSpec, checkpoint: Checkpoint, device: DeviceChoice) -> Self {
-        Self { name: name.to_owned(), spec, model: Model::Network(Box::new(checkpoint), device) }
+        let model = Model::Network(vec![checkpoint], device);
+        Self { name: name.to_owned(), spec, model, smoothing_ticks: 0.0 }
     }
 
     /// A planner with parameters of the caller's.
     pub fn planner(planner: PlannerSpec) -> Self {
         let name = planner.name().to_owned();
         let spec = DriverSpec::Planner { name: name.clone(), parameters: Parameters::Published };
-        Self { name, spec, model: Model::Planner(planner) }
+        Self { name, spec, model: Model::Planner(planner), smoothing_ticks: 0.0 }
+    }
+
+    /// The same with other action smoothing. Networks smooth by themselves, as they were trained to.
+    fn smoothed(mut self, smoothing: Smoothing) -> Self {
+        if let Smoothing::Ticks(ticks) = smoothing {
+            match &mut self.model {
+                Model::Network(networks, _) => {
+                    networks.iter_mut().for_each(|network| network.inference.smoothing_ticks = ticks);
+                }
+                Model::Expert(_) | Model::Planner(_) => self.smoothing_ticks = ticks,
+            }
+        }
+        self
     }
 
     /// The same with another name in tables.
@@ -236,10 +304,13 @@ impl NamedDriver {
     /// SHA-256 of what its files say; `None` for one that ships.
     pub fn digest(&self) -> Option<String> {
         match (&self.model, &self.spec) {
-            (Model::Network(checkpoint, _), _) => {
-                let about = format!("{:?} {:?}", checkpoint.geometry, checkpoint.inference);
-                let weights = checkpoint.weights.values().iter().flat_map(|value| value.to_le_bytes());
-                Some(sums::digest(&about.into_bytes().into_iter().chain(weights).collect::<Vec<u8>>()))
+            (Model::Network(networks, _), _) => {
+                let mut bytes = Vec::new();
+                for network in networks {
+                    bytes.extend(format!("{:?} {:?}", network.conditions, network.inference).into_bytes());
+                    bytes.extend(network.weights.values().iter().flat_map(|value| value.to_le_bytes()));
+                }
+                Some(sums::digest(&bytes))
             }
             (Model::Planner(planner), DriverSpec::Planner { parameters: Parameters::File(_), .. }) => {
                 Some(sums::digest(planner.parameters().to_string().as_bytes()))
@@ -260,18 +331,26 @@ impl NamedDriver {
     /// Whether it can drive with these settings.
     ///
     /// # Errors
-    /// If it was trained for another patch of ground.
-    pub fn check(&self, episode: &EpisodeSettings) -> anyhow::Result<()> {
-        if let Model::Network(checkpoint, _) = &self.model {
-            let shown = episode.sensing.geometry;
-            ensure!(
-                checkpoint.geometry == shown,
-                "driver {:?} was trained on {:?}, but episode.sensing.geometry is {shown:?}; use the settings it was \
-                 trained with (--config RUN/settings.toml)",
-                self.name,
-                checkpoint.geometry
-            );
+    /// If it was trained for another patch of ground; or with another controller, sensor or control period, unless
+    /// `evaluation.untrained_conditions` allows that.
+    pub fn check(&self, settings: &Settings) -> anyhow::Result<()> {
+        let Model::Network(networks, _) = &self.model else { return Ok(()) };
+        let checkpoint = &networks[0];
+        let here = Conditions::of(&settings.episode);
+        let is_same_patch = checkpoint.geometry() == here.geometry();
+        if is_same_patch && settings.evaluation.untrained_conditions {
+            return Ok(());
         }
+        let differences = checkpoint.conditions.differences(&here);
+        let listed: Vec<String> =
+            differences.iter().map(|(trained, here)| format!("{trained} (here {here})")).collect();
+        let allow = if is_same_patch { ", or allow it with --set evaluation.untrained_conditions=true" } else { "" };
+        ensure!(
+            differences.is_empty(),
+            "driver {:?} was trained with {}; use the settings it was trained with (--config RUN/settings.toml){allow}",
+            self.name,
+            listed.join(", ")
+        );
         Ok(())
     }
 
@@ -295,15 +374,22 @@ impl NamedDriver {
 
     /// Seats it in this many cars, which are driven in lock-step.
     pub fn fleet(&self, episode: &EpisodeSettings, cars: usize) -> Box<dyn Fleet + Send> {
+        let ticks = self.smoothing_ticks;
         match &self.model {
-            Model::Expert(settings) => Box::new(OneDriverEach((0..cars).map(|_| expert(settings, episode)).collect())),
-            Model::Network(checkpoint, device) => Box::new(NetFleet::new(checkpoint, *device)),
+            Model::Expert(settings) => {
+                smoothed(OneDriverEach((0..cars).map(|_| expert(settings, episode)).collect()), ticks)
+            }
+            Model::Network(networks, device) => Box::new(NetFleet::ensemble(&networks[0], &networks[1..], *device)),
             Model::Planner(planner) => {
                 let planner = planner.planner(&PlannerContext::of(episode));
-                Box::new(OneDriverEach(vec![SensorsOnly(planner); cars]))
+                smoothed(OneDriverEach(vec![SensorsOnly(planner); cars]), ticks)
             }
         }
     }
+}
+
+fn smoothed(fleet: impl Fleet + Send + 'static, ticks: f32) -> Box<dyn Fleet + Send> {
+    if ticks > 0.0 { Box::new(SmoothedFleet::new(fleet, ticks)) } else { Box::new(fleet) }
 }
 
 /// A fresh expert.
@@ -338,19 +424,16 @@ impl PlannerFile {
         for (parameter, span) in planner.search_space() {
             let _ = writeln!(text, "# cargo xtask tune searches {parameter}: {span}");
         }
-        let file = Self { planner: spec.to_owned(), parameters: planner.parameters(), search: None };
+        let file = Self { planner: planner.name().to_owned(), parameters: planner.parameters(), search: None };
         Ok(text + "\n" + &toml::to_string(&file)?)
     }
 }
 
 fn published(name: &str) -> anyhow::Result<PlannerSpec> {
-    let planners = PlannerSpec::all();
-    let names: Vec<&str> = planners.iter().map(PlannerSpec::name).collect();
-    let known = names.join(", ");
-    planners
-        .into_iter()
-        .find(|planner| planner.name() == name)
-        .with_context(|| format!("no planner {name:?}; there are {known}"))
+    PlannerSpec::named(name).with_context(|| {
+        let names: Vec<&str> = PlannerSpec::all().iter().map(PlannerSpec::name).collect();
+        format!("no planner {name:?}; there are {}", names.join(", "))
+    })
 }
 
 fn planner(name: &str, parameters: &Parameters) -> anyhow::Result<PlannerSpec> {
@@ -385,17 +468,36 @@ fn with_parameters(planner: &PlannerSpec, text: &str) -> anyhow::Result<PlannerS
 #[cfg(test)]
 mod tests {
     use super::*;
+    use policy::network::Weights;
+    use sim::controller::SpeedLaw;
+    use sim::driver::{GroundTruth, Seat, Situation};
+    use sim::map::Map;
+    use sim::scenario::Scenario;
+    use sim::seed::RootSeed;
+    use sim::sensing::Observation;
+    use sim::vehicle::VehicleState;
 
     #[test]
     fn every_spec_is_read_back() {
-        for text in ["expert", "run:runs/mine/bc", "net:runs/mine/round-03", "tentacle", "tuned:vvf", "dwa:my/dwa.toml"]
-        {
+        for text in [
+            "expert",
+            "run:runs/mine/bc",
+            "net:runs/mine/round-03",
+            "ensemble:run:runs/a,net:runs/b/round-02",
+            "tentacle",
+            "tuned:vvf",
+            "dwa/fox",
+            "dwa:my/dwa.toml",
+        ] {
             assert_eq!(text.parse::<DriverSpec>().unwrap().to_string(), text);
         }
         for (wrong, known) in [
             ("exprt", "there are expert, run:DIR"),
             ("", "there are expert, run:DIR"),
             ("runs/mine", "there are expert, run:DIR"),
+            ("ensemble:run:runs/a,expert", "expert cannot be part of an ensemble"),
+            ("ensemble:run:runs/a,run:runs/a", "named twice"),
+            ("ensemble:", "there are expert, run:DIR"),
             ("tuned:tentacles", "there are tuned:tentacle, tuned:vvf"),
         ] {
             let error = wrong.parse::<DriverSpec>().unwrap_err().to_string();
@@ -412,6 +514,76 @@ mod tests {
         let error = spec.parse::<DriverSpec>().unwrap_err().to_string();
         assert!(error.contains(&format!("did you mean run:{spec}?")), "{error}");
         std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// `net:DIR` has no run whose settings could be taken: the default preset's must not drive it at another speed.
+    #[test]
+    fn a_network_does_not_silently_drive_with_another_speed_law() {
+        let mut settings = Settings::preset("smoke").unwrap();
+        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
+        let conditions = Conditions::of(&settings.episode);
+        let folder = std::env::temp_dir().join(format!("lotpilot-conditions-{}", std::process::id()));
+        Checkpoint { weights, conditions, inference: settings.dagger.inference }.save(&folder).unwrap();
+        let driver = format!("net:{}", folder.display()).parse::<DriverSpec>().unwrap().load(&settings).unwrap();
+        driver.check(&settings).unwrap();
+        settings.episode.controller.speed_law = SpeedLaw::Halved;
+        let error = driver.check(&settings).unwrap_err().to_string();
+        for part in ["net:", "speed_law = \"full\" (here \"halved\")", "--config RUN", "untrained_conditions=true"] {
+            assert!(error.contains(part), "{error}");
+        }
+        settings.evaluation.untrained_conditions = true;
+        driver.check(&settings).unwrap();
+        settings.episode.sensing.geometry.side_m = 10.0;
+        let error = driver.check(&settings).unwrap_err().to_string();
+        assert!(error.contains("side_m = 12 (here 10)") && !error.contains("untrained"), "another patch: {error}");
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn every_driver_can_be_smoothed_and_a_network_unsmoothed() {
+        let mut settings = Settings::preset("smoke").unwrap();
+        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
+        let inference = settings.dagger.inference;
+        let checkpoint = Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference };
+        let network = NamedDriver::network("network", DriverSpec::Expert, checkpoint, DeviceChoice::Cpu);
+        let ticks = |driver: &NamedDriver| match &driver.model {
+            Model::Network(checkpoint, _) => checkpoint.inference.smoothing_ticks,
+            Model::Expert(_) | Model::Planner(_) => driver.smoothing_ticks,
+        };
+        for (smoothing, of_planner, of_network) in [
+            (Smoothing::Own, 0.0, inference.smoothing_ticks),
+            (Smoothing::Ticks(0.0), 0.0, 0.0),
+            (Smoothing::Ticks(8.0), 8.0, 8.0),
+        ] {
+            settings.evaluation.smoothing = smoothing;
+            let planner = "vvf".parse::<DriverSpec>().unwrap().load(&settings).unwrap();
+            assert_eq!((ticks(&planner), ticks(&network.clone().smoothed(smoothing))), (of_planner, of_network));
+        }
+    }
+
+    /// A wall to the left, then to the right: a smoothed planner has not yet turned when the plain one has.
+    #[test]
+    fn a_smoothed_planner_follows_with_a_lag() {
+        let settings = Settings::preset("smoke").unwrap();
+        let map = Map::build(Scenario::lane(-20.0..=60.0, 9.0, -5.0..=50.0), &settings.episode.vehicle).unwrap();
+        let planner = NamedDriver::planner(PlannerSpec::named("tentacle").unwrap());
+        let left_m = |smoothing: Smoothing| {
+            let mut fleet = planner.clone().smoothed(smoothing).fleet(&settings.episode, 1);
+            let truth = GroundTruth { map: &map, vehicle: VehicleState::at_rest(map.start()), progress_m: 0.0 };
+            let masks = [!0 << 13, (1 << 12) - 1];
+            masks.map(|mask| {
+                let mut observation = Observation::default();
+                (8..14).for_each(|row| observation.grid.occupy_row(row, mask));
+                let seat =
+                    Seat { episode: 0, was_reset: false, situation: Situation { observation: &observation, truth } };
+                let mut decisions = Vec::new();
+                fleet.decide(&[seat], &mut decisions);
+                decisions[0].look_ahead.left_m
+            })
+        };
+        let (plain, smoothed) = (left_m(Smoothing::Own), left_m(Smoothing::Ticks(8.0)));
+        assert!((plain[0] - smoothed[0]).abs() < 1e-4, "the first answer is taken at once");
+        assert!(plain[1] < smoothed[1] && smoothed[1] < smoothed[0], "{plain:?} and {smoothed:?}");
     }
 
     #[test]

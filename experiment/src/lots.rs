@@ -153,12 +153,14 @@ impl Lot {
     }
 
     /// The lot that takes its place in a round of training: of `count` generated lots of a kind, round after round the
-    /// next `count`. Other lots stay: they draw new obstacles, or are files.
+    /// next `count`, from the beginning again after `different` of them (0: never). Other lots stay: they draw new
+    /// obstacles, or are files.
     #[must_use]
-    pub fn in_round(&self, round: u32, count: u64) -> Self {
+    pub fn in_round(&self, round: u32, count: u64, different: u32) -> Self {
         let mut lot = self.clone();
         if let LotSpec::Generated { index, .. } = &mut lot.spec {
             *index += u64::from(round) * count;
+            *index = index.checked_rem(different.into()).unwrap_or(*index);
             lot.name = lot.spec.to_string();
         }
         lot
@@ -213,13 +215,14 @@ mod tests {
 
     #[test]
     fn every_round_of_training_has_generated_lots_of_its_own() {
-        let names = |round| -> Vec<String> {
+        let names = |round, different| -> Vec<String> {
             let lots =
                 Lot::parse_all(&["lot-a", "train:2", "train:1:hard"], &VehicleSettings::hyundai_hg300()).unwrap();
             let of_a_kind = |lot: &Lot| lots.iter().filter(|other| other.group() == lot.group()).count() as u64;
-            lots.iter().map(|lot| lot.in_round(round, of_a_kind(lot)).name().to_owned()).collect()
+            lots.iter().map(|lot| lot.in_round(round, of_a_kind(lot), different).name().to_owned()).collect()
         };
-        assert_eq!(names(0), ["lot-a", "train-medium-0", "train-medium-1", "train-hard-0"]);
-        assert_eq!(names(1), ["lot-a", "train-medium-2", "train-medium-3", "train-hard-1"]);
+        assert_eq!(names(0, 0), ["lot-a", "train-medium-0", "train-medium-1", "train-hard-0"]);
+        assert_eq!(names(1, 0), ["lot-a", "train-medium-2", "train-medium-3", "train-hard-1"]);
+        assert_eq!(names(1, 3), ["lot-a", "train-medium-2", "train-medium-0", "train-hard-1"], "three, then again");
     }
 }

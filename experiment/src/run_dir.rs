@@ -493,6 +493,7 @@ impl Manifest {
 mod tests {
     use super::*;
     use policy::checkpoint::Checkpoint;
+    use policy::conditions::Conditions;
     use policy::network::Weights;
     use sim::seed::RootSeed;
     use std::sync::LazyLock;
@@ -638,7 +639,7 @@ mod tests {
         let settings = Settings::preset("smoke").unwrap();
         let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
         let checkpoint =
-            Checkpoint { weights, geometry: settings.episode.sensing.geometry, inference: settings.dagger.inference };
+            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
         let save = |folder: &str| {
             checkpoint.save(&path.join(folder)).unwrap();
             sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();

@@ -11,11 +11,13 @@ mod presets;
 pub mod reference;
 mod renamed;
 mod schema;
+mod smoothing;
 
 pub use layers::Layers;
 pub use noise::{NOISE_MAX, NoiseChoice};
 pub use presets::PRESETS;
 pub use schema::{EvaluationSettings, Settings, TrainingSettings};
+pub use smoothing::Smoothing;
 
 #[cfg(test)]
 mod tests;

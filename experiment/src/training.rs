@@ -9,6 +9,7 @@ use crate::settings::Settings;
 use crate::trials::{self, Purpose, Trial};
 use anyhow::ensure;
 use policy::checkpoint::Checkpoint;
+use policy::conditions::Conditions;
 use policy::dagger::{Hooks, Outcome, Progress as DaggerProgress, Rollouts, RoundEpisode};
 use policy::dataset::store::Store;
 use policy::fit::FitProgress;
@@ -32,7 +33,7 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
     episodes_of(settings, &lots, 0)?;
     let store = Store::open(run.path())?;
     let monitor = RefCell::new(Monitor::new(progress));
-    let geometry = settings.episode.sensing.geometry;
+    let conditions = Conditions::of(&settings.episode);
     let mut hooks = Hooks {
         episodes: &mut |round| {
             let episodes = episodes_of(settings, &lots, round)
@@ -47,7 +48,7 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
             if progress.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         },
     };
-    let outcome = policy::dagger::run(&settings.dagger, geometry, &store, settings.seed, &mut hooks)?;
+    let outcome = policy::dagger::run(&settings.dagger, &conditions, &store, settings.seed, &mut hooks)?;
     if monitor.into_inner().task.is_some() {
         progress.end("stopped");
     }
@@ -63,7 +64,8 @@ pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Res
     let training = &settings.training;
     let (generated, others): (Vec<Lot>, Vec<Lot>) = lots.iter().cloned().partition(Lot::is_generated);
     let of_a_kind = |lot: &Lot| generated.iter().filter(|other| other.group() == lot.group()).count() as u64;
-    let generated: Vec<Lot> = generated.iter().map(|lot| lot.in_round(round, of_a_kind(lot))).collect();
+    let generated: Vec<Lot> =
+        generated.iter().map(|lot| lot.in_round(round, of_a_kind(lot), training.different_lots)).collect();
     let all = |lots, trials| Trial::all(settings.seed, Purpose::Training { round }, lots, trials, &training.directions);
     let trials: Vec<_> = all(&others, training.trials).chain(all(&generated, 1)).collect();
     let starts = drive::start(&trials, &trials::maps(&trials, &settings.episode)?, &settings.episode, training.noise);
@@ -215,8 +217,8 @@ mod tests {
             on_frame: &mut |_, _, _| {},
             progress: &mut |_| ControlFlow::Continue(()),
         };
-        let geometry = settings.episode.sensing.geometry;
-        policy::dagger::run(&settings.dagger, geometry, &store, settings.seed, &mut hooks).unwrap();
+        let conditions = Conditions::of(&settings.episode);
+        policy::dagger::run(&settings.dagger, &conditions, &store, settings.seed, &mut hooks).unwrap();
         for round in 0..2 {
             let (stored, collection) = store.read_round(round).unwrap();
             assert_eq!(collection.episodes.len(), 2);

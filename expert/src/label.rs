@@ -9,6 +9,8 @@ use sim::geometry::{Pose, Vec2};
 
 /// Step along a label's arc, metres.
 const MARCH_M: f32 = 0.2;
+/// Step from arc to arc in search of one that enters the patch on drivable ground, 1/m: 2 cm at the patch's lower edge.
+const TURN_PER_M: f32 = 0.002;
 
 /// A look-ahead point as pure pursuit follows it: a circle through the rear axle and a place on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,31 +121,48 @@ impl Ground<'_> {
         Label { curvature_per_m, arc_length_m: self.arc_lengths_in_patch_m(curvature_per_m).0 }
     }
 
-    /// Rule one: the point lies inside drivable space, and inside the patch.
+    /// Rule one: the point lies inside drivable space, and inside the patch. Where the arc of the label enters the patch on
+    /// ground that is not drivable, the next arc to it that does not is taken; if every arc does, the label stays on its own.
     pub(crate) fn kept_drivable(&self, label: Label) -> Label {
         let max_per_m = self.settings.curvature_max_per_m;
         let label = Label { curvature_per_m: label.curvature_per_m.clamp(-max_per_m, max_per_m), ..label };
+        let label = Label { curvature_per_m: self.nearest_open_arc_per_m(label.curvature_per_m), ..label };
         let (near_m, far_m) = self.arc_lengths_in_patch_m(label.curvature_per_m);
         let drivable_m =
             if label.arc_length_m <= near_m { near_m } else { self.drivable_arc_length_m(label.curvature_per_m) };
         Label { arc_length_m: label.arc_length_m.min(drivable_m).clamp(near_m, far_m), ..label }
     }
 
+    /// The nearest curvature whose arc enters the patch on drivable ground, 1/m; this one if there is none.
+    fn nearest_open_arc_per_m(&self, curvature_per_m: f32) -> f32 {
+        let max_per_m = self.settings.curvature_max_per_m;
+        let steps = (2.0 * max_per_m / TURN_PER_M) as u32;
+        let nearest_first = (0..=steps).flat_map(|step| [1.0, -1.0].map(|side| side * step as f32 * TURN_PER_M));
+        nearest_first
+            .map(|turn_per_m| curvature_per_m + turn_per_m)
+            .filter(|curvature_per_m| curvature_per_m.abs() <= max_per_m)
+            .find(|&curvature_per_m| self.is_drivable(curvature_per_m, self.arc_lengths_in_patch_m(curvature_per_m).0))
+            .unwrap_or(curvature_per_m)
+    }
+
     /// How far along an arc every point keeps its clearance, metres from the rear axle, within the patch.
     fn drivable_arc_length_m(&self, curvature_per_m: f32) -> f32 {
         let (near_m, far_m) = self.arc_lengths_in_patch_m(curvature_per_m);
-        let field = self.truth.map.distance_field();
-        let world_from_ego = self.truth.vehicle.pose.world_from_ego();
         let mut arc_length_m = near_m;
         while arc_length_m < far_m {
             let next_m = (arc_length_m + MARCH_M).min(far_m);
-            let in_world = world_from_ego.point(on_arc(curvature_per_m, next_m));
-            if field.at(in_world) < self.settings.point_clearance_m || !self.sight.knows(in_world) {
+            if !self.is_drivable(curvature_per_m, next_m) {
                 break;
             }
             arc_length_m = next_m;
         }
         arc_length_m
+    }
+
+    /// Whether the point at an arc length keeps its clearance and can be known.
+    fn is_drivable(&self, curvature_per_m: f32, arc_length_m: f32) -> bool {
+        let in_world = self.truth.vehicle.pose.world_from_ego().point(on_arc(curvature_per_m, arc_length_m));
+        self.truth.map.distance_field().at(in_world) >= self.settings.point_clearance_m && self.sight.knows(in_world)
     }
 
     /// Arc lengths at which an arc enters the patch, and at which it leaves it or has turned as far as a label may.
@@ -176,6 +195,10 @@ fn on_arc(curvature_per_m: f32, arc_length_m: f32) -> Vec2 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sim::episode::EpisodeSettings;
+    use sim::map::Map;
+    use sim::scenario::Scenario;
+    use sim::vehicle::VehicleState;
 
     #[test]
     fn labels_move_within_the_limits_of_a_tick() {
@@ -189,6 +212,35 @@ mod tests {
         // 2 · 0.5 / 14² = .0051: half a metre sideways at 14 m.
         assert!((0.2 - back.curvature_per_m - 0.0051).abs() < 1e-4);
         assert_eq!(wanted.smoothed(wanted, &settings), wanted);
+    }
+
+    /// Heads for the edge of a lane, which lies between bumper and patch: the arc to the label, and its nearest station, are
+    /// on the far side of it.
+    #[test]
+    fn a_label_whose_nearest_station_is_blocked_is_turned_onto_drivable_ground() {
+        let (episode, settings) = (EpisodeSettings::paper(), ExpertSettings::paper());
+        let context = ExpertContext::of(&episode);
+        let map = Map::build(Scenario::lane(-20.0..=60.0, 6.0, -5.0..=50.0), &episode.vehicle).unwrap();
+        let pose = Pose::new(Vec2::new(0.0, 1.0), 0.5);
+        let truth = GroundTruth { map: &map, vehicle: VehicleState::at_rest(pose), progress_m: 5.0 };
+        let sight = LineOfSight::new(settings.sees, &map, pose, &context.sensing);
+        let ground = Ground { settings: &settings, context: &context, truth: &truth, sight: &sight };
+        let clearance_m = |label: Label| {
+            let LookAheadPoint { ahead_m, left_m } = label.point();
+            map.distance_field().at(pose.world_from_ego().point(Vec2::new(ahead_m, left_m)))
+        };
+        let straight = Label { curvature_per_m: 0.0, arc_length_m: 6.0 };
+        assert!(clearance_m(ground.nearest_label_on(0.0)) < 0.0, "the patch begins beyond the edge");
+        let kept = ground.kept_drivable(straight);
+        assert!(clearance_m(kept) >= settings.point_clearance_m - 1e-3, "{kept:?}: {} m", clearance_m(kept));
+        assert!(kept.curvature_per_m < 0.0, "away from the edge: {kept:?}");
+        let turned_less = Label { curvature_per_m: kept.curvature_per_m + TURN_PER_M, ..kept };
+        assert!(clearance_m(ground.nearest_label_on(turned_less.curvature_per_m)) < settings.point_clearance_m);
+        // Nothing that can be reached is drivable: the label stays on its arc.
+        let outside = Pose::new(Vec2::new(0.0, 9.0), 1.5);
+        let truth = GroundTruth { vehicle: VehicleState::at_rest(outside), ..truth };
+        let kept = Ground { truth: &truth, ..ground }.kept_drivable(straight);
+        assert_eq!(kept.curvature_per_m, 0.0);
     }
 
     #[test]

@@ -271,7 +271,12 @@ impl Driver for ScriptedExpert {
             inspection.decided = label.point();
         }
         self.inspection = inspection;
-        Decision { look_ahead: self.as_by_hand(label.point()), source: Source::Expert, spread: None }
+        Decision {
+            look_ahead: self.as_by_hand(label.point()),
+            source: Source::Expert,
+            spread: None,
+            speed_limit_mps: None,
+        }
     }
 
     fn reset(&mut self) {

@@ -10,7 +10,7 @@ fn main() {
     divan::main();
 }
 
-#[divan::bench(args = ["tentacle", "vvf", "dwa", "cvm", "apf", "vff"])]
+#[divan::bench(args = ["tentacle", "vvf", "dwa", "cvm", "apf", "vff", "mppi"])]
 fn decision(bencher: Bencher<'_, '_>, name: &str) {
     let mut grid = OccupancyGrid::free();
     (0..6).for_each(|row| grid.occupy_row(row, u32::MAX));

@@ -56,6 +56,11 @@ impl PlannerContext {
 /// here the point is ahead of the axle at every curvature a car can drive.
 pub(crate) const POINT_ON_ARC_M: f32 = 6.0;
 
+/// Answers with an arc of the rear axle, to be driven at no more than a speed if one is given, m/s.
+pub(crate) fn steer_along_at(curvature_per_m: f32, speed_limit_mps: Option<f32>) -> Decision {
+    Decision { speed_limit_mps, ..steer_along(curvature_per_m) }
+}
+
 /// Answers with an arc of the rear axle.
 pub(crate) fn steer_along(curvature_per_m: f32) -> Decision {
     head_for(Pose::default().advanced_along_arc(curvature_per_m, POINT_ON_ARC_M).position())
@@ -64,7 +69,7 @@ pub(crate) fn steer_along(curvature_per_m: f32) -> Decision {
 /// Answers with a point, ego frame.
 pub(crate) fn head_for(point: Vec2) -> Decision {
     let look_ahead = LookAheadPoint { ahead_m: point.x, left_m: point.y };
-    Decision { look_ahead, source: Source::Planner, spread: None }
+    Decision { look_ahead, source: Source::Planner, spread: None, speed_limit_mps: None }
 }
 
 /// Where the wheels probably stand. No planner is shown the wheel angle; it knows what it asked for and how fast the

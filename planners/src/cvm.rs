@@ -3,11 +3,15 @@
 //! Obstacles are discs around occupied cells, grown by half the body width. Each disc blocks one interval of curvatures,
 //! κ = 2(y ± r)/(x² + y² − r²), and over the whole interval the distance to it counts as constant: its chord less the
 //! radius and the nose of the car. Maximised is 0.1·v/v_max + 0.7·d/d_max + 0.2·(1 − |θ|/π) (weights *recalled*) over the
-//! curvatures that the wheels can reach; the controller slows down with steering, so a curvature fixes its speed.
+//! curvatures that the wheels can reach.
+//!
+//! Two readings ([`Speeds`]): the controller slows down with steering (paper), so that a curvature fixes its speed; or speeds
+//! are searched together with the curvatures, as in 1996, none faster than d/T_impact.
 
-use crate::context::{PlannerContext, WheelEstimate, steer_along};
-use crate::method::{Method, within};
+use crate::context::{PlannerContext, WheelEstimate, steer_along, steer_along_at};
+use crate::method::{Method, Reading, within};
 use crate::search::{Dimension, Span};
+use crate::speeds;
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
@@ -36,6 +40,29 @@ pub struct Params {
     pub window_s: f32,
     /// Added to half the body width, metres: 0.15, the paper's safety distance (*chosen*).
     pub margin_m: f32,
+    /// Which speeds an arc may be driven at: `by_law` (paper) or `{ searched = { impact_s = … } }` (1996).
+    pub speeds: Speeds,
+}
+
+/// Which speeds an arc may be driven at.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Speeds {
+    /// That of the controller's law for planners.
+    ByLaw,
+    /// Those up to it: a slower one where something would be met within `impact_s`, the slowest where it would be anyway.
+    Searched {
+        /// `T_impact`, shortest time to what is met, seconds: 2.0 (*chosen*, on a few validation lots; that there is such a
+        /// bound is *recalled*).
+        impact_s: f32,
+    },
+}
+
+impl Params {
+    /// The velocity search of 1996.
+    fn simmons() -> Self {
+        Self { speeds: Speeds::Searched { impact_s: 2.0 }, ..Self::paper() }
+    }
 }
 
 impl Method for Params {
@@ -79,6 +106,8 @@ impl Method for Params {
             set: |p, value| p.margin_m = value,
         },
     ];
+    const READINGS: &'static [Reading<Self>] =
+        &[Reading { name: "simmons", about: "speeds are searched too, as in 1996", params: Params::simmons }];
     type Planner = CurvatureVelocity;
 
     fn paper() -> Self {
@@ -90,6 +119,7 @@ impl Method for Params {
             heading_after_s: 1.0,
             window_s: 1.0,
             margin_m: 0.15,
+            speeds: Speeds::ByLaw,
         }
     }
 
@@ -100,19 +130,31 @@ impl Method for Params {
         within("distance_max_m", self.distance_max_m, 0.5, 20.0)?;
         within("heading_after_s", self.heading_after_s, 0.1, 10.0)?;
         within("window_s", self.window_s, 0.05, 10.0)?;
-        within("margin_m", self.margin_m, 0.0, 2.0)
+        within("margin_m", self.margin_m, 0.0, 2.0)?;
+        match self.speeds {
+            Speeds::ByLaw => Ok(()),
+            Speeds::Searched { impact_s } => within("speeds.searched.impact_s", impact_s, 0.0, 10.0),
+        }
     }
 
     fn planner(&self, context: &PlannerContext) -> CurvatureVelocity {
         let curvature_max = context.vehicle.curvature_max_per_m();
-        let candidates = (-(SIDE as i32)..=SIDE as i32).map(|k| {
-            let curvature_per_m = curvature_max * k as f32 / SIDE as f32;
-            let speed_mps = context.speed_mps(curvature_per_m);
+        let rated = |curvature_per_m: f32, speed_mps: f32| {
             let turn_rad = (curvature_per_m * speed_mps * self.heading_after_s).abs();
             let heading = 1.0 - (turn_rad / std::f32::consts::PI).min(1.0);
             let worth =
                 self.velocity_weight * speed_mps / context.controller.speed_max_mps + self.heading_weight * heading;
-            (curvature_per_m, worth)
+            Rated { speed_mps, worth }
+        };
+        let candidates = (-(SIDE as i32)..=SIDE as i32).map(|k| {
+            let curvature_per_m = curvature_max * k as f32 / SIDE as f32;
+            let speeds = match self.speeds {
+                Speeds::ByLaw => vec![rated(curvature_per_m, context.speed_mps(curvature_per_m))],
+                Speeds::Searched { .. } => speeds::up_to_law_mps(context, curvature_per_m)
+                    .map(|speed_mps| rated(curvature_per_m, speed_mps))
+                    .collect(),
+            };
+            Candidate { curvature_per_m, speeds }
         });
         let radius_m = 0.5 * context.vehicle.width_m + self.margin_m;
         let disc = |cell: usize| {
@@ -127,6 +169,21 @@ impl Method for Params {
             wheel: WheelEstimate::new(context),
         }
     }
+}
+
+/// A curvature, and the speeds it may be driven at, ascending.
+#[derive(Debug, Clone)]
+struct Candidate {
+    curvature_per_m: f32,
+    speeds: Vec<Rated>,
+}
+
+/// What a speed at a curvature is worth whatever the grid.
+#[derive(Debug, Clone, Copy)]
+struct Rated {
+    speed_mps: f32,
+    /// Velocity and heading, weighted.
+    worth: f32,
 }
 
 /// What an occupied cell does to the curvatures.
@@ -155,8 +212,7 @@ impl Disc {
 pub struct CurvatureVelocity {
     params: Params,
     context: Arc<PlannerContext>,
-    /// Curvature, and what it is worth whatever the grid.
-    candidates: Arc<Vec<(f32, f32)>>,
+    candidates: Arc<Vec<Candidate>>,
     /// Of every cell, row-major.
     discs: Arc<Vec<Disc>>,
     wheel: WheelEstimate,
@@ -182,8 +238,15 @@ impl CurvatureVelocity {
         distances_m
     }
 
-    fn objective(&self, candidate: usize, distance_m: f32) -> f32 {
-        self.candidates[candidate].1 + self.params.distance_weight * distance_m / self.params.distance_max_m
+    /// The best speed of a candidate, m/s, and what it is worth; speeds that would meet something too soon come last, by
+    /// distance.
+    fn best_speed(&self, candidate: usize, distance_m: f32) -> (f32, f32) {
+        let far = self.params.distance_weight * distance_m / self.params.distance_max_m;
+        let objective = |rated: &Rated| match self.params.speeds {
+            Speeds::Searched { impact_s } if rated.speed_mps * impact_s > distance_m => distance_m - 1e3,
+            _ => rated.worth + far,
+        };
+        speeds::best_of(self.candidates[candidate].speeds.iter().map(|rated| (rated.speed_mps, objective(rated))))
     }
 }
 
@@ -200,12 +263,18 @@ impl Policy for CurvatureVelocity {
         };
         // Among equals the straightest.
         let best = (index(steering_rad - reach_rad)..=index(steering_rad + reach_rad)).max_by(|&a, &b| {
-            let [of_a, of_b] = [a, b].map(|k| self.objective(k, distances_m[k]));
+            let [(_, of_a), (_, of_b)] = [a, b].map(|k| self.best_speed(k, distances_m[k]));
             of_a.total_cmp(&of_b).then(b.abs_diff(SIDE).cmp(&a.abs_diff(SIDE)))
         });
-        let curvature_per_m = self.candidates[best.unwrap_or(SIDE)].0;
+        let best = best.unwrap_or(SIDE);
+        let curvature_per_m = self.candidates[best].curvature_per_m;
         self.wheel.command_rad = self.context.steering_rad(curvature_per_m);
-        steer_along(curvature_per_m)
+        match self.params.speeds {
+            Speeds::ByLaw => steer_along(curvature_per_m),
+            Speeds::Searched { .. } => {
+                steer_along_at(curvature_per_m, Some(self.best_speed(best, distances_m[best]).0))
+            }
+        }
     }
 
     fn reset(&mut self) {
@@ -238,11 +307,25 @@ mod tests {
         let planner = Params::paper().planner(&context());
         let distances_m = planner.distances_m(&grid_with(&[(20, 12)]));
         assert!((distances_m[SIDE] - 1.58).abs() < 1e-4);
-        assert!((planner.objective(SIDE, distances_m[SIDE]) - (0.3 + 0.7 * 1.58 / 3.0)).abs() < 1e-5);
+        assert!((planner.best_speed(SIDE, distances_m[SIDE]).1 - (0.3 + 0.7 * 1.58 / 3.0)).abs() < 1e-5);
         assert_eq!(distances_m[2 * SIDE], 3.0, "full lock passes it");
         // Full lock: .5 m/s, turn .2507·.5 = .1254 rad.
         let full_lock = 0.1 * 0.5 / 2.2 + 0.2 * (1.0 - 0.125_36 / std::f32::consts::PI) + 0.7;
-        assert!((planner.objective(2 * SIDE, 3.0) - full_lock).abs() < 1e-4);
+        assert!((planner.best_speed(2 * SIDE, 3.0).1 - full_lock).abs() < 1e-4);
+    }
+
+    /// A wall from X = 6.22 m on, across the patch: d = 6.46 − 1.08 − 3.80 = 1.58 m straight ahead, so 0.79 m/s at most for
+    /// an impact no sooner than in two seconds, and little more on the arcs that meet it farther away.
+    #[test]
+    fn a_searched_speed_meets_nothing_too_soon() {
+        let mut wall = OccupancyGrid::free();
+        (0..=20).for_each(|row| wall.occupy_row(row, u32::MAX));
+        let limit = |params: Params| params.planner(&context()).act(&Observation { grid: wall }).speed_limit_mps;
+        assert_eq!(limit(Params::paper()), None);
+        let searched = limit(Params::simmons()).unwrap();
+        assert!((0.5..1.0).contains(&searched), "{searched} m/s");
+        let late = Params { speeds: Speeds::Searched { impact_s: 10.0 }, ..Params::paper() };
+        assert_eq!(limit(late), Some(0.5), "everything is met too soon");
     }
 
     #[test]

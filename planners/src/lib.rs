@@ -8,9 +8,10 @@
 //! | [`cvm`] | candidate paths | curvature velocity method (Simmons 1996) | no |
 //! | [`apf`] | field | artificial potential field (Khatib; Ge and Cui 2000) | no |
 //! | [`vff`] | field | virtual force field (Borenstein and Koren) | no |
+//! | [`mppi`] | sampling | model predictive path integral control, as in nav2 (Williams 2017) | no |
 //!
 //! Each method chooses a steering angle; the controller follows it with the paper's speed law for planners, slower when
-//! it steers more. There is no global path: a method that needs a goal gets "straight ahead" or a point that the grid
+//! it steers more. Methods that search speeds ask for less than that where they want to. There is no global path: a method that needs a goal gets "straight ahead" or a point that the grid
 //! suggests ([`Goal`]).
 //!
 //! Tags in the documentation of parameters, as in docs/methods.md: *paper* = stated there, *cited* = read in the cited
@@ -29,16 +30,19 @@ pub mod explanation;
 mod field;
 mod goal;
 mod method;
+pub mod mppi;
 mod nearest;
 mod registry;
 pub mod search;
+mod speeds;
 pub mod tentacle;
 pub mod vff;
 pub mod vvf;
+mod way_field;
 
 pub use context::PlannerContext;
 pub use goal::Goal;
-pub use method::Method;
+pub use method::{Method, Reading};
 pub use registry::{Planner, PlannerSpec};
 
 #[cfg(test)]

@@ -14,6 +14,8 @@ pub trait Method: Clone + std::fmt::Debug + PartialEq + Serialize + DeserializeO
     const ABOUT: &'static str;
     /// What the tuner varies, and how far.
     const SEARCH: &'static [Dimension<Self>];
+    /// Other readings of the publication, where it leaves something open.
+    const READINGS: &'static [Reading<Self>] = &[];
     /// The planner that drives.
     type Planner: Policy + Clone + Send + Sync;
 
@@ -28,6 +30,17 @@ pub trait Method: Clone + std::fmt::Debug + PartialEq + Serialize + DeserializeO
 
     /// A planner for a car.
     fn planner(&self, context: &PlannerContext) -> Self::Planner;
+}
+
+/// A reading of a publication other than [`Method::paper`].
+#[derive(Debug)]
+pub struct Reading<P> {
+    /// As named on the command line, behind the method's: `dwa/fox`.
+    pub name: &'static str,
+    /// What is different, in a few words.
+    pub about: &'static str,
+    /// Its parameters.
+    pub params: fn() -> P,
 }
 
 /// `Err` unless a parameter lies within its range.

@@ -3,7 +3,7 @@
 use crate::context::PlannerContext;
 use crate::explanation::Explanation;
 use crate::method::Method;
-use crate::{apf, cvm, dwa, search, tentacle, vff, vvf};
+use crate::{apf, cvm, dwa, mppi, search, tentacle, vff, vvf};
 use serde::{Deserialize, Deserializer};
 use sim::driver::{Decision, Policy};
 use sim::sensing::Observation;
@@ -37,6 +37,14 @@ macro_rules! planners {
                 vec![$(Self::$variant($module::Params::paper()),)*]
             }
 
+            /// A method by its name, or another reading of it as `NAME/READING`.
+            pub fn named(name: &str) -> Option<Self> {
+                let (method, reading) = name.split_once('/').map_or((name, None), |(of, reading)| (of, Some(reading)));
+                let spec = Self::all().into_iter().find(|spec| spec.name() == method)?;
+                let Some(reading) = reading else { return Some(spec) };
+                spec.readings().into_iter().find(|(of, ..)| *of == reading).map(|(_, _, read)| read)
+            }
+
             /// As named on the command line.
             pub fn name(&self) -> &'static str {
                 match self { $(Self::$variant(_) => <$module::Params as Method>::NAME,)* }
@@ -45,6 +53,16 @@ macro_rules! planners {
             /// One line.
             pub fn about(&self) -> &'static str {
                 match self { $(Self::$variant(_) => <$module::Params as Method>::ABOUT,)* }
+            }
+
+            /// Other readings of the publication: name, what is different, and the method so read.
+            pub fn readings(&self) -> Vec<(&'static str, &'static str, Self)> {
+                match self {
+                    $(Self::$variant(_) => {
+                        let readings = $module::Params::READINGS.iter();
+                        readings.map(|of| (of.name, of.about, Self::$variant((of.params)()))).collect()
+                    })*
+                }
             }
 
             /// Whether a planner can be made of these parameters.
@@ -135,7 +153,7 @@ impl Planner {
             Self::Tentacle(tentacles) => Some(Explanation::Paths(tentacles.weighed(&observation.grid))),
             Self::Vvf(field) => Some(Explanation::Field(field.sampled(&observation.grid))),
             Self::Apf(field) => Some(Explanation::Field(field.sampled(&observation.grid))),
-            Self::Dwa(_) | Self::Cvm(_) | Self::Vff(_) => None,
+            Self::Dwa(_) | Self::Cvm(_) | Self::Vff(_) | Self::Mppi(_) => None,
         }
     }
 }
@@ -147,4 +165,5 @@ planners! {
     Cvm cvm,
     Apf apf,
     Vff vff,
+    Mppi mppi,
 }

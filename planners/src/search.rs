@@ -118,7 +118,7 @@ fn reflect(unit: f32) -> f32 {
 }
 
 /// A standard normal draw (Box–Muller).
-fn normal(rng: &mut Rng) -> f32 {
+pub(crate) fn normal(rng: &mut Rng) -> f32 {
     let (radius, angle): (f32, f32) = (rng.random(), rng.random());
     (-2.0 * (1.0 - radius).ln()).sqrt() * (std::f32::consts::TAU * angle).cos()
 }

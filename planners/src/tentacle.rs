@@ -13,7 +13,7 @@
 
 use crate::context::{PlannerContext, WheelEstimate, steer_along};
 use crate::explanation::CandidatePath;
-use crate::method::{Method, within};
+use crate::method::{Method, Reading, within};
 use crate::search::{Dimension, Span};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
@@ -92,8 +92,18 @@ impl PathOrigin {
 
 impl Params {
     /// The paper's parameters but for its detection range, which is taken literally.
-    pub fn paper_literal_range() -> Self {
+    fn literal_range() -> Self {
         Self { detection_range_m: DETECTION_RANGE_LITERAL_M, ..Self::paper() }
+    }
+
+    /// Shorter paths, 4.5 m to 9 m: what of the lengths that were tried on lot a does best.
+    fn short() -> Self {
+        Self { length_min_m: 4.5, ..Self::paper() }
+    }
+
+    /// The arcs of 2008 whose speed is nearest the paper's 2.2 m/s.
+    fn arcs_of_2008() -> Self {
+        Self { set: TentacleSet::Arc2008(4), ..Self::paper() }
     }
 
     /// The final curvature and the length of each of the 81 paths, from the outermost right to the outermost left.
@@ -162,6 +172,11 @@ impl Method for Params {
             get: |p| PathOrigin::OPTIONS.iter().position(|option| *option == p.path_origin).unwrap_or(0) as f32,
             set: |p, index| p.path_origin = PathOrigin::OPTIONS[index as usize],
         },
+    ];
+    const READINGS: &'static [Reading<Self>] = &[
+        Reading { name: "short", about: "paths of 4.5 m at least, not 6.5 m", params: Params::short },
+        Reading { name: "literal", about: "the detection range of 0.35 m as printed", params: Params::literal_range },
+        Reading { name: "2008", about: "circular arcs of speed set 4 of 2008", params: Params::arcs_of_2008 },
     ];
     type Planner = Tentacles;
 
@@ -463,7 +478,7 @@ mod tests {
 
     #[test]
     fn the_literal_range_looks_at_a_strip_narrower_than_the_body() {
-        let planner = Params::paper_literal_range().planner(&context());
+        let planner = Params::literal_range().planner(&context());
         assert_eq!(planner.around[STARTS][SIDE].cells[10].count_ones(), 1);
     }
 }

@@ -1,11 +1,15 @@
 //! What holds for every planner.
 
+use crate::context::head_for;
 use crate::method::Method as _;
 use crate::registry::{Planner, PlannerSpec};
 use crate::test_scenes::{context, grid_with};
 use crate::vvf;
 use proptest::prelude::*;
-use sim::driver::{LookAheadPoint, Policy as _};
+use proptest::strategy::ValueTree as _;
+use proptest::test_runner::TestRunner;
+use sim::driver::{Decision, LookAheadPoint, Policy};
+use sim::geometry::Vec2;
 use sim::sensing::{GRID_CELLS, Observation, OccupancyGrid};
 
 /// A grid, every row of which is like the last one but for a few cells.
@@ -20,6 +24,20 @@ fn grids() -> impl Strategy<Value = OccupancyGrid> {
             }
             grid
         })
+}
+
+#[test]
+fn readings_are_sound_and_named_behind_their_method() {
+    for spec in PlannerSpec::all() {
+        assert_eq!(PlannerSpec::named(spec.name()).as_ref(), Some(&spec));
+        for (reading, _, read) in spec.readings() {
+            read.check().unwrap();
+            assert_ne!(read, spec, "{reading}");
+            assert_eq!(PlannerSpec::named(&format!("{}/{reading}", spec.name())), Some(read));
+        }
+    }
+    assert_eq!(PlannerSpec::named("dwa/typo"), None);
+    assert_eq!(PlannerSpec::named("vvf/fox"), None, "that is a reading of dwa");
 }
 
 #[test]
@@ -62,9 +80,46 @@ fn search_spaces_hold_the_starting_point() {
 }
 
 /// Two grids after each other: state included.
-fn answers(planner: &Planner, grids: [OccupancyGrid; 2]) -> [LookAheadPoint; 2] {
+fn answers<P: Policy + Clone>(planner: &P, grids: [OccupancyGrid; 2]) -> [LookAheadPoint; 2] {
     let mut planner = planner.clone();
     grids.map(|grid| planner.act(&Observation { grid }).look_ahead)
+}
+
+/// The share of grids to whose mirror images a planner gives the same answer, not the mirrored one. Where two mirror images
+/// cost the same, either is right, and the tie is broken to one side.
+fn share_of_ties<P: Policy + Clone>(planner: &P, grids: &[OccupancyGrid]) -> f32 {
+    let is_tie = |grid: &&OccupancyGrid| {
+        let [[point, _], [image, _]] = [**grid, grid.mirrored()].map(|grid| answers(planner, [grid; 2]));
+        point == image && point.left_m != 0.0
+    };
+    grids.iter().filter(is_tie).count() as f32 / grids.len() as f32
+}
+
+/// Answers to the left whatever it is shown.
+#[derive(Clone)]
+struct BlindPlanner;
+
+impl Policy for BlindPlanner {
+    fn act(&mut self, _: &Observation) -> Decision {
+        head_for(Vec2::new(8.0, 1.0))
+    }
+}
+
+/// The tie that mirrored answers are excused for is not the rule: it must not excuse who does not look.
+#[test]
+fn a_planner_that_ignores_its_grid_is_no_mirror_image_of_itself() {
+    let mut runner = TestRunner::deterministic();
+    let grids: Vec<OccupancyGrid> = (0..48).map(|_| grids().new_tree(&mut runner).unwrap().current()).collect();
+    assert_eq!(share_of_ties(&BlindPlanner, &grids), 1.0);
+    for spec in PlannerSpec::all() {
+        let planner = spec.planner(&context());
+        let share = share_of_ties(&planner, &grids);
+        assert!(share < 0.4, "{}: ties on {share} of the grids", spec.name());
+        // Nor does one pass that answers straight on whatever it is shown.
+        let first = answers(&planner, [grids[0]; 2]);
+        let others = grids.iter().filter(|grid| answers(&planner, [**grid; 2]) != first).count();
+        assert!(others > grids.len() / 2, "{}: {others} other answers", spec.name());
+    }
 }
 
 proptest! {
@@ -84,7 +139,8 @@ proptest! {
             for (point, image) in found.iter().zip(&mirrored) {
                 let turned = (point.left_m + image.left_m).abs() + (point.ahead_m - image.ahead_m).abs();
                 // Where two mirror images cost the same, either is right: a tie is broken to one side.
-                let is_tie = point.left_m == image.left_m && point.ahead_m == image.ahead_m;
+                // How rare that is, `a_planner_that_ignores_its_grid_is_no_mirror_image_of_itself` says.
+                let is_tie = point == image;
                 prop_assert!(turned < 2e-3 || is_tie, "{}: {:?} and {:?}", name, point, image);
                 if is_tie {
                     break; // From here on the two have different pasts.

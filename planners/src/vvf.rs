@@ -9,7 +9,7 @@
 use crate::context::{PlannerContext, head_for};
 use crate::explanation::{FieldSample, sample};
 use crate::field::{DISTANCE_FLOOR_M, WALK_AHEAD_MIN_M, khatib_repulsion, walk_along_field};
-use crate::method::{Method, within};
+use crate::method::{Method, Reading, within};
 use crate::nearest::Nearest;
 use crate::search::{Dimension, Span};
 use serde::{Deserialize, Serialize};
@@ -72,6 +72,18 @@ impl Params {
     }
 }
 
+impl Params {
+    /// The literal sentence: no wish to go ahead within the range.
+    fn masked() -> Self {
+        Self { mask: 1.0, ..Self::paper() }
+    }
+
+    /// The literal ratio: 1 : 0 : 0.5 everywhere.
+    fn sum() -> Self {
+        Self { mask: 0.0, ..Self::paper() }
+    }
+}
+
 impl Method for Params {
     const NAME: &'static str = "vvf";
     const ABOUT: &'static str = "repulsion of the nearest obstacle plus a field pointing ahead; the paper's parameters";
@@ -101,6 +113,14 @@ impl Method for Params {
             get: |p| f32::from(u8::from(p.repulsion == Repulsion::InverseR)),
             set: |p, index| p.repulsion = Repulsion::OPTIONS[index as usize],
         },
+    ];
+    const READINGS: &'static [Reading<Self>] = &[
+        Reading {
+            name: "masked",
+            about: "within the range only the repulsion counts, as printed",
+            params: Params::masked,
+        },
+        Reading { name: "sum", about: "the fields are added everywhere", params: Params::sum },
     ];
     type Planner = VelocityVectorField;
 

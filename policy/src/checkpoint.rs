@@ -3,6 +3,7 @@
 //! The tensors are laid out as `PyTorch` has them: convolutions `[out, in, rows, columns]`, dense layers `[out, in]`
 //! with inputs in the order channel, row, column (what `flatten(1)` makes of `[batch, channel, row, column]`).
 
+use crate::conditions::Conditions;
 use crate::files::{self, FileError, Format, SCHEMA_REMEDY, write_atomically};
 use crate::network::{
     ConvLayer, DeviceChoice, InferenceSettings, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture, OUTPUTS,
@@ -20,8 +21,8 @@ use storage::sums;
 pub struct Checkpoint {
     /// The network.
     pub weights: Weights,
-    /// The patch of ground its grids show and its answers are fractions of.
-    pub geometry: GridGeometry,
+    /// What it was trained with.
+    pub conditions: Conditions,
     /// How it drives.
     pub inference: InferenceSettings,
 }
@@ -36,7 +37,7 @@ struct ModelFile {
     output: String,
     log_variance_min: f32,
     log_variance_max: f32,
-    geometry: GridGeometry,
+    conditions: Conditions,
     inference: InferenceSettings,
     network: NetworkArchitecture,
     /// In the order in which they are computed. Follows from `network`; for readers in other languages.
@@ -77,8 +78,8 @@ enum Activation {
 
 impl Format for ModelFile {
     const NAME: &'static str = "model.toml";
-    /// 1 had `format_version`, and the settings of inference under `network`.
-    const SCHEMA: u32 = 2;
+    /// 1 had `format_version`, and the settings of inference under `network`; 2 had of the conditions only the geometry.
+    const SCHEMA: u32 = 3;
 }
 
 const INPUT: &str = "grid [batch, 1, 25, 25]: 1 = non-drivable, 0 = drivable; row 0 = far, column 0 = left";
@@ -119,7 +120,7 @@ impl Checkpoint {
             output: OUTPUT.to_string(),
             log_variance_min: LOG_VARIANCE_MIN,
             log_variance_max: LOG_VARIANCE_MAX,
-            geometry: self.geometry,
+            conditions: self.conditions.clone(),
             inference: self.inference,
             network,
             layers: layers(&network),
@@ -179,7 +180,12 @@ impl Checkpoint {
         if let Some(index) = weights.values().iter().position(|value| !value.is_finite()) {
             return Err(FileError::new(&path, format!("value {index} is not finite"), RESTORE));
         }
-        Ok(Self { weights, geometry: about.geometry, inference: about.inference })
+        Ok(Self { weights, conditions: about.conditions, inference: about.inference })
+    }
+
+    /// The patch of ground its grids show and its answers are fractions of.
+    pub fn geometry(&self) -> GridGeometry {
+        self.conditions.geometry()
     }
 
     /// The network ready to answer, without action smoothing.
@@ -301,13 +307,14 @@ fn fc2_index(architecture: &NetworkArchitecture, stored: usize) -> usize {
 mod tests {
     use super::*;
     use crate::test_data::scratch;
+    use sim::episode::EpisodeSettings;
     use sim::seed::RootSeed;
     use std::fs;
 
     fn checkpoint(architecture: NetworkArchitecture) -> Checkpoint {
         let weights = Weights::init(architecture, RootSeed(1), 0);
         let inference = InferenceSettings { mirror_averaging: true, smoothing_ticks: 3.5 };
-        Checkpoint { weights, geometry: GridGeometry::paper(), inference }
+        Checkpoint { weights, conditions: Conditions::of(&EpisodeSettings::paper()), inference }
     }
 
     #[test]
@@ -369,7 +376,7 @@ mod tests {
         checkpoint(NetworkArchitecture::compact()).save(&folder).unwrap();
         let path = folder.join("model.toml");
         let text = fs::read_to_string(&path).unwrap();
-        sums::write(&folder, "model.toml", text.replace("schema = 2", "format_version = 1").as_bytes()).unwrap();
+        sums::write(&folder, "model.toml", text.replace("schema = 3", "format_version = 1").as_bytes()).unwrap();
         let error = Checkpoint::load(&folder).unwrap_err().to_string();
         assert!(error.contains("model.toml") && error.contains("older version"), "{error}");
         fs::remove_dir_all(folder).unwrap();

@@ -1,8 +1,9 @@
-//! The trained network at the wheel: of many cars in lock-step, or of one.
+//! The trained network, or several as an ensemble, at the wheel: of many cars in lock-step, or of one.
 
-use crate::action_smoothing::{ActionSmoothing, FleetSmoothing};
+use crate::action_smoothing;
 use crate::checkpoint::Checkpoint;
-use crate::network::{DeviceChoice, Prediction, Predictor};
+use crate::network::{DeviceChoice, Ensemble, Prediction, Predictor};
+use sim::action_smoothing::{ActionSmoothing, FleetSmoothing};
 use sim::driver::{Decision, Fleet, Policy, Seat, Source};
 use sim::sensing::{GridGeometry, Observation};
 
@@ -16,7 +17,13 @@ pub struct NetFleet {
 impl NetFleet {
     /// Seats a network.
     pub fn new(checkpoint: &Checkpoint, device: DeviceChoice) -> Self {
-        Self { novice: Novice::new(checkpoint, device), geometry: checkpoint.geometry }
+        Self::ensemble(checkpoint, &[], device)
+    }
+
+    /// Seats several networks that answer as one. They should have been trained for the same patch of ground; the first
+    /// one's action smoothing counts.
+    pub fn ensemble(first: &Checkpoint, others: &[Checkpoint], device: DeviceChoice) -> Self {
+        Self { novice: Novice::new(first, others, device), geometry: first.geometry() }
     }
 }
 
@@ -30,21 +37,23 @@ impl Fleet for NetFleet {
 /// The network as it answers at the wheel of many cars: with the action smoothing of each.
 #[derive(Debug, Clone)]
 pub(crate) struct Novice {
-    predictor: Predictor,
+    ensemble: Ensemble,
+    geometry: GridGeometry,
     smoothing: FleetSmoothing,
 }
 
 impl Novice {
-    pub(crate) fn new(checkpoint: &Checkpoint, device: DeviceChoice) -> Self {
-        let smoothing = FleetSmoothing::new(checkpoint.inference, checkpoint.geometry);
-        Self { predictor: checkpoint.predictor(device), smoothing }
+    pub(crate) fn new(first: &Checkpoint, others: &[Checkpoint], device: DeviceChoice) -> Self {
+        let smoothing = FleetSmoothing::new(first.inference.smoothing_ticks);
+        let others = others.iter().map(|checkpoint| checkpoint.predictor(device)).collect();
+        Self { ensemble: Ensemble::new(first.predictor(device), others), geometry: first.geometry(), smoothing }
     }
 
     /// What it answers at every seat, smoothed.
     pub(crate) fn answers(&mut self, seats: &[Seat<'_>]) -> Vec<Prediction> {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
-        let mut answers = self.predictor.predict(&grids);
-        self.smoothing.smooth(seats, &mut answers);
+        let mut answers = self.ensemble.predict(&grids);
+        action_smoothing::smooth_all(&mut self.smoothing, seats, &mut answers, self.geometry);
         answers
     }
 }
@@ -60,16 +69,16 @@ pub struct NetPolicy {
 impl NetPolicy {
     /// Seats a network.
     pub fn new(checkpoint: &Checkpoint, device: DeviceChoice) -> Self {
-        let geometry = checkpoint.geometry;
-        let smoothing = ActionSmoothing::new(checkpoint.inference, geometry);
-        Self { predictor: checkpoint.predictor(device), geometry, smoothing }
+        let smoothing = ActionSmoothing::new(checkpoint.inference.smoothing_ticks);
+        Self { predictor: checkpoint.predictor(device), geometry: checkpoint.geometry(), smoothing }
     }
 }
 
 impl Policy for NetPolicy {
     fn act(&mut self, observation: &Observation) -> Decision {
         let prediction = self.predictor.predict(&[&observation.grid])[0];
-        novice_decision(&self.smoothing.smoothed(prediction), self.geometry)
+        let smoothed = action_smoothing::smoothed(&mut self.smoothing, prediction, self.geometry);
+        novice_decision(&smoothed, self.geometry)
     }
 
     fn reset(&mut self) {
@@ -83,22 +92,26 @@ pub(crate) fn novice_decision(prediction: &Prediction, geometry: GridGeometry) -
         look_ahead: prediction.look_ahead(geometry),
         source: Source::Novice,
         spread: Some(prediction.spread(geometry)),
+        speed_limit_mps: None,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::conditions::Conditions;
     use crate::network::{InferenceSettings, NetworkArchitecture, Weights};
     use crate::test_data::lots;
+    use sim::episode::EpisodeSettings;
     use sim::seed::RootSeed;
 
     #[test]
     fn a_policy_answers_what_the_network_says() {
         let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
-        let geometry = GridGeometry::paper();
+        let conditions = Conditions::of(&EpisodeSettings::paper());
+        let geometry = conditions.geometry();
         let grid = lots(1)[0];
-        let checkpoint = Checkpoint { weights, geometry, inference: InferenceSettings::smoothed() };
+        let checkpoint = Checkpoint { weights, conditions, inference: InferenceSettings::smoothed() };
         let mut policy = NetPolicy::new(&checkpoint, DeviceChoice::Cpu);
         let decision = policy.act(&Observation { grid });
         let prediction = checkpoint.predictor(DeviceChoice::Cpu).predict(&[&grid])[0];

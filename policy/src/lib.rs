@@ -10,12 +10,14 @@
 //! | [`dagger`] | Algorithms 1 and 2, top to bottom |
 //! | [`drivers`] | the trained network at the wheel, with action smoothing |
 //! | [`checkpoint`] | a trained network on disk |
+//! | [`conditions`] | controller and sensor that it was trained with |
 //! | [`files`] | files of a run: errors, schema versions |
 //!
 //! Images: u = column fraction (0 = left, 1 = right), w = row fraction (0 = far, 1 = near), as in docs/methods.md 0.
 
 mod action_smoothing;
 pub mod checkpoint;
+pub mod conditions;
 pub mod dagger;
 pub mod dataset;
 pub mod decision_rule;

@@ -6,6 +6,7 @@
 mod architecture;
 mod device;
 mod dropout;
+mod ensemble;
 mod error;
 mod inference;
 mod log_variance;
@@ -17,6 +18,7 @@ mod weights;
 pub use architecture::{ConvLayer, LANES, NetworkArchitecture, OUTPUTS, POOLED_1, POOLED_2};
 pub use device::DeviceChoice;
 pub use dropout::DropoutFactors;
+pub use ensemble::Ensemble;
 pub use error::NetworkError;
 pub use inference::InferenceSettings;
 pub use log_variance::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, soft_clamp_log_variance};

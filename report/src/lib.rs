@@ -21,6 +21,7 @@ pub mod pixel_accuracy;
 pub mod plots;
 pub mod reproduction;
 pub mod run_report;
+pub mod scaling;
 pub mod summary;
 pub mod table1;
 pub mod tuning;

@@ -21,7 +21,7 @@ const RATE_PER_S: f32 = 5.0;
 pub fn player(key: &str, settings: &Settings) -> anyhow::Result<Player> {
     let key: ReplayKey = key.parse()?;
     let replay = Replay::new(&key, &settings.episode)?;
-    let driver = key.driver.clone().load(&settings.expert, settings.dagger.device)?;
+    let driver = key.driver.clone().load(settings)?;
     let period_s = replay.episode_settings(&settings.episode).control_period_s();
     let last_tick = key.tick + (AFTER_S / period_s).ceil() as u32;
     let take = Take::of(&replay, &settings.episode, &driver, Some(last_tick), |_| {});

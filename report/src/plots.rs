@@ -6,6 +6,7 @@
 //! | [`eta`] | η̂ per iteration beside the paper's |
 //! | [`rates`] | near-collisions per 100 m with intervals, a row per driver |
 //! | [`rates_against_noise`] | the same over the noise level |
+//! | [`rates_against_lots`] | the same over the number of different lots that were trained on |
 //! | [`safe_ratios`] | distribution of the safe ratio over runs, a row per driver |
 //! | [`bars`] | a quantity by lot and driver, the paper's beside ours |
 //! | [`calibration`] | whether the network's σ is as large as its errors |
@@ -21,7 +22,9 @@ mod training;
 
 pub use bars::{Bar, BarGroup, bars};
 pub use calibration::calibration;
-pub use driving::{Distribution, NoisePoint, NoiseSeries, RateRow, rates, rates_against_noise, safe_ratios};
+pub use driving::{
+    Distribution, RatePoint, RateRow, RateSeries, rates, rates_against_lots, rates_against_noise, safe_ratios,
+};
 pub use training::{EtaSeries, eta, learning};
 
 #[cfg(test)]

@@ -44,7 +44,7 @@ fn rows_of(root: &Path, chain: Chain, seed: RootSeed) -> anyhow::Result<Vec<Iter
 }
 
 /// A stage that drove, read back.
-struct Drive<'a> {
+pub(crate) struct Drive<'a> {
     stage: &'a Stage,
     drivers: Vec<NamedDriver>,
     lots: Vec<Lot>,
@@ -52,14 +52,17 @@ struct Drive<'a> {
 
 impl<'a> Drive<'a> {
     fn open(recipe: &'a Recipe, folder: &str) -> anyhow::Result<Self> {
-        let stage = recipe.stages.iter().find(|stage| stage.folder == folder).context("every report has this stage")?;
-        let Step::Drive { drivers } = &stage.step else { anyhow::bail!("{folder} drives") };
+        Self::of(recipe.stages.iter().find(|stage| stage.folder == folder).context("every report has this stage")?)
+    }
+
+    pub(crate) fn of(stage: &'a Stage) -> anyhow::Result<Self> {
+        let Step::Drive { drivers } = &stage.step else { anyhow::bail!("{} drives", stage.folder) };
         let drivers = stages::load(drivers, &stage.settings)?;
         let lots = Lot::parse_all(&stage.settings.evaluation.lots, &stage.settings.episode.vehicle)?;
         Ok(Self { stage, drivers, lots })
     }
 
-    fn plan(&self) -> Plan<'_> {
+    pub(crate) fn plan(&self) -> Plan<'_> {
         let compare_with = conclusions::compare_with(&self.drivers);
         Plan { settings: &self.stage.settings, drivers: &self.drivers, lots: &self.lots, compare_with }
     }
@@ -273,8 +276,8 @@ fn introduction(recipe: &Recipe) -> String {
          rebuilt in simulation: trained on {}, driven on {} in {} trials, and on {}. Root seed {}{}, seed of the \
          evaluation {}. Everything that made this is in `manifest.toml` and `settings.toml` beside \
          this report; the same command gives the same bytes.\n\n\
-         Intervals are of 95 %: exact Poisson intervals (Garwood) for rates, or (b) a paired bootstrap over lot, \
-         direction and seed where events come in clusters; bootstrap for safe ratios and differences. All drivers met \
+         Intervals are of 95 %: exact Poisson intervals (Garwood) for rates, or (b) a paired bootstrap of \
+         whole trials, both ways together, where events come in clusters; bootstrap for safe ratios and differences. All drivers met \
          the same obstacles and the same noise.",
         settings.training.lots.join(", "),
         evaluation.lots.join(", "),
@@ -291,7 +294,7 @@ fn verdicts(statements: &[Statement]) -> String {
     let mut text = "Decided from the runs of this report: a comparison *holds* where the paired interval of 95 % lies on the \
                     paper's side of zero, *does not hold* where it lies on the other, and *cannot be told* where it contains \
                     zero (differences are the other driver's − DAgger's in near-collisions and reversals, DAgger's − the \
-                    other driver's in safe ratios; * = excludes zero).\n"
+                    other driver's in safe ratios; * = excludes zero, by six trials or more).\n"
         .to_owned();
     for verdict in [Verdict::Holds, Verdict::DoesNotHold, Verdict::CannotBeTold] {
         let found: Vec<&Statement> = statements.iter().filter(|statement| statement.verdict == verdict).collect();

@@ -9,7 +9,7 @@ use crate::glossary;
 use crate::markdown::escaped;
 use crate::moments;
 use crate::page::{Image, Page};
-use crate::plots::{self, Distribution, EtaSeries, NoisePoint, NoiseSeries, RateRow};
+use crate::plots::{self, Distribution, EtaSeries, RatePoint, RateRow, RateSeries};
 use anyhow::Context as _;
 use evaluation::calibration::{self, AxisCalibration};
 use evaluation::records::{self, Driven, FailureRecord, RunRecord};
@@ -373,19 +373,19 @@ fn rate_row(row: &Row, name: String, drivers: &[&str]) -> RateRow {
     RateRow { name, per_100m: row.per_100m, interval: interval(row), group }
 }
 
-fn noise_series(evaluation: &Evaluation, drivers: &[&str]) -> Vec<NoiseSeries> {
+fn noise_series(evaluation: &Evaluation, drivers: &[&str]) -> Vec<RateSeries> {
     let points = |driver: &str| {
         let rows = evaluation.tables.noise_sweep.iter();
         let rows = rows.filter(|row| row.driver == driver && row.lots == evaluation.pooled());
         let point = |row: &SweepRow| {
             let (times_paper, per_100m) = (row.times_paper?, row.per_100m);
-            Some(NoisePoint { times_paper, per_100m, interval: [row.lower, row.upper] })
+            Some(RatePoint { x: times_paper, per_100m, interval: [row.lower, row.upper] })
         };
-        let mut points: Vec<NoisePoint> = rows.filter_map(point).collect();
-        points.sort_by(|a, b| a.times_paper.total_cmp(&b.times_paper));
+        let mut points: Vec<RatePoint> = rows.filter_map(point).collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x));
         points
     };
-    drivers.iter().map(|driver| NoiseSeries { name: (*driver).to_owned(), points: points(driver) }).collect()
+    drivers.iter().map(|driver| RateSeries { name: (*driver).to_owned(), points: points(driver) }).collect()
 }
 
 fn safe_ratios(evaluation: &Evaluation, noise: NoiseChoice, driver: &str, lots: &str) -> Vec<f64> {

@@ -31,7 +31,7 @@ pub fn table(tuned: &[Found]) -> String {
             })
             .collect();
         table.add_row(vec![
-            found.planner.name().to_owned(),
+            found.name.clone(),
             before.near_collisions.to_string(),
             after.near_collisions.to_string(),
             format!("{:.2}", before.near_collisions_per_100m),

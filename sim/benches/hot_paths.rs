@@ -81,8 +81,12 @@ fn observation_between_walls(bencher: Bencher<'_, '_>, wall_height_m: f32) {
 fn control_step_without_driver(bencher: Bencher<'_, '_>, lane_m: f32) {
     let (settings, map) = (Arc::new(EpisodeSettings::paper()), map(lane_m));
     let start = || Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(1));
-    let decision =
-        Decision { look_ahead: LookAheadPoint { ahead_m: 14.0, left_m: 0.0 }, source: Source::Expert, spread: None };
+    let decision = Decision {
+        look_ahead: LookAheadPoint { ahead_m: 14.0, left_m: 0.0 },
+        source: Source::Expert,
+        spread: None,
+        speed_limit_mps: None,
+    };
     let mut episode = start();
     bencher.bench_local(|| {
         if episode.ending().is_some() {
@@ -140,7 +144,7 @@ impl Driver for AlongRoute {
         let target = map.path().pose_at(progress_m + 7.0).position();
         let in_ego = vehicle.pose.world_from_ego().inverse_point(target);
         let look_ahead = LookAheadPoint { ahead_m: in_ego.x.max(1.0), left_m: in_ego.y };
-        Decision { look_ahead, source: Source::Expert, spread: None }
+        Decision { look_ahead, source: Source::Expert, spread: None, speed_limit_mps: None }
     }
 }
 

@@ -92,10 +92,9 @@ pub fn pursue(
 ) -> VehicleCommand {
     let steering_rad = steering(settings.pursuit, vehicle, geometry, decision.look_ahead);
     let law = if decision.source == Source::Planner { settings.planner_speed_law } else { settings.speed_law };
-    VehicleCommand {
-        steering_rad,
-        speed_mps: speed(law, settings, vehicle, geometry, decision.look_ahead, steering_rad),
-    }
+    let by_law_mps = speed(law, settings, vehicle, geometry, decision.look_ahead, steering_rad);
+    let limited_mps = |limit_mps: f32| by_law_mps.min(limit_mps).max(settings.speed_min_mps);
+    VehicleCommand { steering_rad, speed_mps: decision.speed_limit_mps.map_or(by_law_mps, limited_mps) }
 }
 
 /// Road-wheel angle that steers at a point, radians, within the vehicle's limits.
@@ -181,6 +180,18 @@ mod tests {
         };
         assert_eq!(planner(0.0), 2.2);
         assert!((planner(vehicle.steering_max_rad) - 0.5).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_driver_may_ask_for_less_speed_but_not_for_more() {
+        let (vehicle, geometry, settings) =
+            (VehicleSettings::hyundai_hg300(), GridGeometry::paper(), ControllerSettings::paper());
+        let with_limit = |speed_limit_mps| {
+            let look_ahead = LookAheadPoint { ahead_m: 8.0, left_m: 0.0 };
+            let decision = Decision { look_ahead, source: Source::Planner, spread: None, speed_limit_mps };
+            pursue(&settings, &vehicle, &geometry, &decision).speed_mps
+        };
+        assert_eq!([None, Some(9.0), Some(1.5), Some(0.0)].map(with_limit), [2.2, 2.2, 1.5, 0.5]);
     }
 
     #[test]

@@ -65,6 +65,9 @@ pub struct Decision {
     pub source: Source,
     /// How sure they are, where they say.
     pub spread: Option<Spread>,
+    /// The fastest that they would be driven, m/s; `None` leaves the speed to the controller's law. Never slower than the
+    /// controller's slowest command.
+    pub speed_limit_mps: Option<f32>,
 }
 
 /// Noise-free surroundings, for the expert, the metrics and the collision check only.

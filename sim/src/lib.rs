@@ -7,6 +7,7 @@
 //!
 //! This crate knows no sibling, no burn, no rerun, no clap and no files.
 
+pub mod action_smoothing;
 pub mod batch;
 pub mod collision;
 pub mod controller;

@@ -408,6 +408,7 @@ mod tests {
             look_ahead: LookAheadPoint { ahead_m: 8.0, left_m: 0.0 },
             source: if tick == 0 { Source::Novice } else { Source::Expert },
             spread: None,
+            speed_limit_mps: None,
         };
         Frame {
             tick,

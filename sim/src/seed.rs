@@ -40,6 +40,8 @@ pub enum Stream {
     NoiseAugmentation = 13,
     /// Disturbances injected into the steering while collecting data (DART).
     Disturbance = 14,
+    /// Control sequences that a planner rolls out.
+    Rollouts = 15,
 }
 
 /// The one number a run is reproduced from.

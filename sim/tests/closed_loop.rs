@@ -77,7 +77,7 @@ struct Fixed(LookAheadPoint);
 
 impl Driver for Fixed {
     fn decide(&mut self, _: &Situation<'_>) -> Decision {
-        Decision { look_ahead: self.0, source: Source::Expert, spread: None }
+        Decision { look_ahead: self.0, source: Source::Expert, spread: None, speed_limit_mps: None }
     }
 }
 
@@ -144,7 +144,12 @@ struct LeftAfterResume {
 impl Driver for LeftAfterResume {
     fn decide(&mut self, _: &Situation<'_>) -> Decision {
         let left_m = if self.resets > 1 { 5.0 } else { 0.0 };
-        Decision { look_ahead: LookAheadPoint { ahead_m: 6.0, left_m }, source: Source::Expert, spread: None }
+        Decision {
+            look_ahead: LookAheadPoint { ahead_m: 6.0, left_m },
+            source: Source::Expert,
+            spread: None,
+            speed_limit_mps: None,
+        }
     }
 
     fn reset(&mut self) {
@@ -210,8 +215,12 @@ fn commands_reach_the_wheels_after_the_dead_time() {
         let mut settings = (*settings()).clone();
         settings.vehicle.dead_time_s = dead_time_s;
         let mut episode = Episode::new(Arc::new(settings), lane(60.0, vec![]), RootSeed(1));
-        let decision =
-            Decision { look_ahead: LookAheadPoint { ahead_m: 8.0, left_m: 2.0 }, source: Source::Expert, spread: None };
+        let decision = Decision {
+            look_ahead: LookAheadPoint { ahead_m: 8.0, left_m: 2.0 },
+            source: Source::Expert,
+            spread: None,
+            speed_limit_mps: None,
+        };
         (0..10)
             .find(|_| {
                 episode.observe();

@@ -218,6 +218,24 @@ fn noise_does_not_depend_on_who_looked_before() {
     assert_eq!(fresh.observe(&map, pose, 77), used.observe(&map, pose, 77));
 }
 
+/// Sensors of noise augmentations look at kept ticks only: with `expert_ticks` the tick before may be one that was not kept.
+#[test]
+fn a_dropped_frame_repeats_the_tick_before_and_no_older_grid() {
+    let map = lane();
+    let every_frame = NoiseSettings { dropout: 1000.0, ..NoiseSettings::of(NoiseLevel::Paper) };
+    let sensor = || Sensor::new(&map, SensingSettings::paper(), &every_frame, RootSeed(9));
+    let [here, there] = [12.0, 30.0].map(|x_m| Pose::new(Vec2::new(x_m, 0.3), 0.1));
+    let mut steady = sensor();
+    let seen = steady.observe(&map, here, 4);
+    assert_eq!(steady.observe(&map, there, 5), seen, "dropped");
+    assert_eq!(steady.observe(&map, there, 6), seen, "dropped again");
+    let mut with_gaps = sensor();
+    with_gaps.observe(&map, here, 4);
+    let after_gap = with_gaps.observe(&map, there, 40);
+    assert_ne!(after_gap, seen, "a grid of another place");
+    assert_eq!(after_gap, sensor().observe(&map, there, 40));
+}
+
 #[test]
 fn clean_level_is_clean_and_hard_is_worse_than_paper() {
     let map = lane();
@@ -271,7 +289,8 @@ fn an_inspection_blames_the_layer_that_is_on_and_nothing_else() {
         for seed in 0..8 {
             let mut sensor = Sensor::new(&map, SensingSettings::paper(), &only(layer), RootSeed(seed));
             for i in 0..12_u32 {
-                let (pose, tick) = (Pose::new(Vec2::new(4.0 * i as f32, 0.3), 0.1), 31 * i);
+                let (pose, tick) = (Pose::new(Vec2::new(4.0 * i as f32, 0.3), 0.1), 31 * i + 1);
+                sensor.observe(&map, Pose::new(Vec2::new(4.0 * i as f32 - 2.0, 0.3), 0.1), tick - 1);
                 let shown = sensor.observe(&map, pose, tick);
                 let inspection = sensor.inspect(&map, pose, tick, &shown);
                 for other in Layer::ALL.into_iter().filter(|&other| other != layer) {

@@ -42,9 +42,9 @@ impl<'a> Replay<'a> {
         if let Some(other) = request.keys.iter().find(differs) {
             bail!("{key} and {other} are different runs; one recording shows one");
         }
-        let load = |key: &ReplayKey| key.driver.clone().load(&settings.expert, settings.dagger.device);
+        let load = |key: &ReplayKey| key.driver.clone().load(settings);
         let drivers: Vec<NamedDriver> = request.keys.iter().map(load).collect::<anyhow::Result<_>>()?;
-        drivers.iter().try_for_each(|driver| driver.check(&settings.episode))?;
+        drivers.iter().try_for_each(|driver| driver.check(settings))?;
         let run = experiment::drive::Replay::new(key, &settings.episode)?;
         let focus_tick = (key.tick > 0).then_some(key.tick);
         Ok(Self { title: &request.title, settings, drivers, run, focus_tick })

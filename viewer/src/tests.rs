@@ -218,7 +218,7 @@ impl Driver for Leftwards {
     fn decide(&mut self, _: &Situation<'_>) -> Decision {
         let look_ahead = LookAheadPoint { ahead_m: 7.0, left_m: 1.5 };
         let spread = Some(Spread { ahead_m: 0.6, left_m: 1.2 });
-        Decision { look_ahead, source: Source::Novice, spread }
+        Decision { look_ahead, source: Source::Novice, spread, speed_limit_mps: None }
     }
 }
 
@@ -309,7 +309,7 @@ fn a_replayed_drive_is_whole_small_and_on_both_time_lines() {
     assert_eq!(files, [folder.join("a.rrd")]);
     let Show::Drives { settings, drives } = &request.show[0] else { unreachable!("a drive was asked for") };
     let replay = Replay::new(&drives[0].keys[0], &settings.episode).unwrap();
-    let driver = drives[0].keys[0].driver.clone().load(&settings.expert, settings.dagger.device).unwrap();
+    let driver = drives[0].keys[0].driver.clone().load(settings).unwrap();
     let report = replay.drive(&settings.episode, &driver, |_| ControlFlow::Continue(())).unwrap();
     let (ticks, near_collisions) = (i64::from(report.metrics.ticks), report.metrics.near_collisions);
     let (file, bytes) = (folder.join("a.rrd"), std::fs::metadata(folder.join("a.rrd")).unwrap().len());
@@ -498,7 +498,7 @@ fn is_round(file: &Path, round: u32) -> bool {
 fn a_planner_shows_what_it_weighed() {
     let settings = Settings::preset("smoke").unwrap();
     for name in ["tentacle", "vvf", "apf"] {
-        let driver = &NamedDriver::load_all(&[name], &settings.expert, settings.dagger.device).unwrap()[0];
+        let driver = &NamedDriver::load_all(&[name], &settings).unwrap()[0];
         let mut planner = driver.to_planner(&settings.episode).unwrap();
         let mut episode = Episode::new(Arc::new(settings.episode.clone()), Arc::new(map()), RootSeed(2));
         for _ in 0..10 {

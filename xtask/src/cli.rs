@@ -2,7 +2,7 @@
 
 use crate::commands::{
     bench, completions, drivers, evaluate, generate, guard, lots, pixel_accuracy, render, reproduce, sample_size,
-    settings, train, tune, verify, visualise,
+    scaling, settings, train, tune, verify, visualise,
 };
 use crate::output::{Color, Output};
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -56,6 +56,9 @@ enum Command {
     /// The paper in a box: trains, drives and writes one report with the paper's tables beside ours.
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(reproduce::ReproduceArgs),
+    /// Trains on few and on many different lots, and shows how near-collisions fall.
+    #[command(after_help = scaling::EXAMPLES)]
+    Scaling(scaling::ScalingArgs),
     /// Trains the default and fails if its policy has become worse: for a nightly run.
     #[command(after_help = guard::EXAMPLES)]
     Guard(guard::GuardArgs),
@@ -117,6 +120,7 @@ impl Cli {
             Command::TrainDagger(args) => train::dagger(args, output),
             Command::Evaluate(args) => evaluate::run(args, output),
             Command::Reproduce(args) => reproduce::run(args, output),
+            Command::Scaling(args) => scaling::run(args, output),
             Command::Guard(args) => guard::run(args, output),
             Command::Generate(args) => generate::run(args, output),
             Command::PixelAccuracy(args) => pixel_accuracy::run(args, output),
@@ -149,6 +153,7 @@ impl Command {
             | Self::Drivers(drivers::DriversArgs { json, .. })
             | Self::Verify(verify::VerifyArgs { json, .. }) => json.json,
             Self::Reproduce(_)
+            | Self::Scaling(_)
             | Self::Guard(_)
             | Self::Generate(_)
             | Self::Bench(_)

@@ -12,6 +12,7 @@ pub(crate) mod render;
 mod render_animation;
 pub(crate) mod reproduce;
 pub(crate) mod sample_size;
+pub(crate) mod scaling;
 pub(crate) mod settings;
 pub(crate) mod train;
 pub(crate) mod tune;

@@ -162,7 +162,7 @@ fn shares_and_effects() {
         assert_eq!(share_of_the_network(&rows(shares), 0.9).verdict, expected, "{shares:?}");
     }
     let effect = |lower, upper| {
-        effect_of_the_weight(1, Some(Interval { estimate: 0.5 * (lower + upper), lower, upper })).verdict
+        effect_of_the_weight(1, Some(Interval { estimate: 0.5 * (lower + upper), lower, upper, units: 6 })).verdict
     };
     assert_eq!(effect(0.6, 0.9), Verdict::Holds);
     assert_eq!(effect(0.9, 1.1), Verdict::CannotBeTold);

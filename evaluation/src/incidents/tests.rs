@@ -79,7 +79,7 @@ fn frame(tick: u32, steering_deg: f32, event: Event) -> Frame {
         time_s: 0.05 * (tick + 1) as f32,
         vehicle,
         observation: Observation::default(),
-        decision: Decision { look_ahead, source: Source::Planner, spread: None },
+        decision: Decision { look_ahead, source: Source::Planner, spread: None, speed_limit_mps: None },
         command: VehicleCommand::default(),
         progress_m: 0.1 * tick as f32,
         safe_ratio: 1.0,

@@ -70,12 +70,30 @@ fn a_constant_difference_has_a_narrow_interval_however_hard_the_trials_are() {
     let difference = found.difference_per_100m.unwrap();
     assert!((difference.lower - 1.0).abs() < 1e-9 && (difference.upper - 1.0).abs() < 1e-9, "{difference:?}");
     assert!((found.difference_safe_ratio.unwrap().estimate - 0.1).abs() < 1e-6);
-    // Trials 0, 4, 8 in both directions: mean 4, variance 64/5, index 3.2: clusters.
-    assert!((estimates[0].dispersion.unwrap().index - 3.2).abs() < 1e-9, "{estimates:?}");
+    // Trials of 0, 8, 16 events both ways: mean 8, variance 64, index 8: clusters.
+    assert!((estimates[0].dispersion.unwrap().index - 8.0).abs() < 1e-9, "{estimates:?}");
     assert!(estimates[0].per_100m.unwrap().lower < 2.8);
     // 30 events against 24: the exact test, which knows of no pairs, sees nothing.
     assert!((found.ratio.ratio.unwrap() - 30.0 / 24.0).abs() < 1e-9 && found.ratio.p_value > 0.4, "{found:?}");
     assert_eq!(found.p_holm, found.ratio.p_value, "a single comparison");
+}
+
+/// All events are in one of three trials, both ways: trials drawn give 0 to 3 of it, and forward is never drawn without
+/// reverse.
+#[test]
+fn forward_and_reverse_of_a_trial_are_resampled_together() {
+    let results = results(2, |driver, trial| {
+        let (is_hard, is_forward) = (trial.index == 1, trial.direction == Direction::Forward);
+        // The second driver has the events of the other way.
+        let near_collisions = if is_hard && is_forward == (driver == 0) { 6 } else { 0 };
+        Some(report(near_collisions, 100.0, 0.5))
+    });
+    let (estimates, comparisons) = results.judge(0, &slice(&results, "lot-b"), 0, RootSeed(1));
+    let interval = estimates[0].per_100m.unwrap();
+    assert_eq!((interval.lower, interval.estimate, interval.upper), (0.0, 1.0, 3.0));
+    assert_eq!(interval.units, 3);
+    let difference = comparisons[0].difference_per_100m.unwrap();
+    assert_eq!((difference.lower, difference.upper), (0.0, 0.0), "both trials' ways are in every draw");
 }
 
 #[test]

@@ -12,6 +12,10 @@ use sim::seed::{RootSeed, Stream};
 /// Draws of the bootstrap (docs/methods.md 8.3).
 pub const DRAWS: u64 = 10_000;
 
+/// Fewer units tell nothing apart at 95 %: among five, all differ to the same side by chance with probability 2·2⁻⁵ = .06,
+/// and so a bootstrap of five would exclude zero (the sign test; docs/methods.md 8.3).
+pub const UNITS_MIN: u32 = 6;
+
 /// Percentile interval of a statistic.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
@@ -21,12 +25,14 @@ pub struct Interval {
     pub lower: f64,
     /// 2.5 % of the draws are above.
     pub upper: f64,
+    /// Units that were resampled; a stratum of one does not count, for it is the same in every draw.
+    pub units: u32,
 }
 
 impl Interval {
-    /// Whether zero lies outside.
+    /// Whether zero lies outside, by at least [`UNITS_MIN`] units.
     pub fn excludes_zero(&self) -> bool {
-        self.lower > 0.0 || self.upper < 0.0
+        self.units >= UNITS_MIN && (self.lower > 0.0 || self.upper < 0.0)
     }
 }
 
@@ -84,10 +90,11 @@ impl Units {
             },
         );
         let tail = 0.5 * (1.0 - CONFIDENCE);
+        let units = self.strata.iter().filter(|&&rows| rows > 1).sum();
         let interval = |(statistic, &estimate): (usize, &f64)| {
             let mut values: Vec<f64> = drawn.iter().skip(statistic).step_by(statistics).copied().collect();
             values.sort_by(f64::total_cmp);
-            Interval { estimate, lower: quantile(&values, tail), upper: quantile(&values, 1.0 - tail) }
+            Interval { estimate, lower: quantile(&values, tail), upper: quantile(&values, 1.0 - tail), units }
         };
         estimates.par_iter().enumerate().map(interval).collect()
     }
@@ -170,6 +177,20 @@ mod tests {
         assert_eq!((intervals[0].lower, intervals[0].upper), (1.0, 1.0));
         assert!(intervals[0].excludes_zero());
         assert_eq!((intervals[1].lower, intervals[1].upper), (20.0, 20.0), "every draw has as many units");
+    }
+
+    #[test]
+    fn an_interval_of_two_runs_gets_no_star() {
+        assert!(!mean_interval(&[1.0, 1.1], 500).excludes_zero());
+        assert!(!mean_interval(&[1.0; 5], 500).excludes_zero());
+        assert!(mean_interval(&[1.0; 6], 500).excludes_zero());
+        let mut units = Units::new(1);
+        for _ in 0..6 {
+            units.begin_stratum();
+            units.push(&[1.0]);
+        }
+        let fixed = units.percentile_intervals(RootSeed(1), 500, 1, &|sums, out| out[0] = sums[0])[0];
+        assert_eq!((fixed.units, fixed.excludes_zero()), (0, false), "six strata of one: nothing was resampled");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Every setting, section by section; each section is the settings type of the crate that it belongs to.
 
 use super::noise::{NoiseChoice, one_or_many};
+use super::smoothing::Smoothing;
 use expert::ExpertSettings;
 use policy::dagger::DaggerSettings;
 use serde::{Deserialize, Serialize};
@@ -37,6 +38,9 @@ pub struct TrainingSettings {
     /// Times every lot is driven in each direction per round (paper: once), each with its own obstacles. Generated lots
     /// are driven once: they would look the same again.
     pub trials: u32,
+    /// Generated lots of a kind that differ, over all rounds; then they come again, with other noise. 0: every round has
+    /// new ones.
+    pub different_lots: u32,
     /// What is seen wrongly.
     pub noise: NoiseChoice,
 }
@@ -59,6 +63,10 @@ pub struct EvaluationSettings {
     /// What is seen wrongly: one level, or several to be compared.
     #[serde(deserialize_with = "one_or_many")]
     pub noise: Vec<NoiseChoice>,
+    /// Action smoothing of the drivers.
+    pub smoothing: Smoothing,
+    /// Whether networks may drive with a controller, a sensor or a control period that they were not trained with.
+    pub untrained_conditions: bool,
 }
 
 impl Settings {

@@ -1,6 +1,7 @@
 //! Algorithms 1 and 2, in their order and with their line numbers.
 
 use crate::checkpoint::Checkpoint;
+use crate::conditions::Conditions;
 use crate::dagger::iteration_row::IterationRow;
 use crate::dagger::progress::{DaggerError, Hooks, Outcome, Progress, Stop};
 use crate::dagger::rollouts::Rollouts;
@@ -13,27 +14,26 @@ use crate::fit::learning;
 use crate::fit::{self, FitContext, FitOutcome, FitProgress, FitReport, FitSettings};
 use crate::network::Weights;
 use sim::seed::{RootSeed, Stream};
-use sim::sensing::GridGeometry;
 use std::ops::ControlFlow;
 use std::path::Path;
 use storage::{sums, whole};
 
 /// Behaviour cloning, then Algorithm 1. Rounds found in `store` are read instead of made again, so that a run that was
-/// interrupted continues, with the same result. `geometry`: the patch of ground that the grids of all episodes show.
+/// interrupted continues, with the same result. `conditions`: those of all episodes.
 ///
 /// # Errors
 /// If the store holds another run, or a file cannot be read or written.
 pub fn run(
     settings: &DaggerSettings,
-    geometry: GridGeometry,
+    conditions: &Conditions,
     store: &Store,
     seed: RootSeed,
     hooks: &mut Hooks<'_>,
 ) -> Result<Outcome, DaggerError> {
     settings.network.validate()?;
     settings.inference.validate()?;
-    RunFile { seed, geometry, settings: settings.clone() }.claim(store.folder())?;
-    let mut run = Run { settings, geometry, store, seed, hooks, rows: Vec::new() };
+    RunFile { seed, geometry: conditions.geometry(), settings: settings.clone() }.claim(store.folder())?;
+    let mut run = Run { settings, conditions, store, seed, hooks, rows: Vec::new() };
     let (policy, stop) = match run.dagger() {
         Ok((policy, stop)) => (Some(policy), stop),
         Err(Halt::Interrupted(policy)) => (policy, Stop::Interrupted),
@@ -46,7 +46,7 @@ pub fn run(
 /// One run in progress.
 struct Run<'r, 'h> {
     settings: &'r DaggerSettings,
-    geometry: GridGeometry,
+    conditions: &'r Conditions,
     store: &'r Store,
     seed: RootSeed,
     hooks: &'r mut Hooks<'h>,
@@ -177,7 +177,7 @@ impl Run<'_, '_> {
         let progress = &mut *self.hooks.progress;
         let mut on_step = |fit: &FitProgress| progress(&Progress::Fitting { round, fit });
         let DaggerSettings { inference, device, .. } = *self.settings;
-        let context = FitContext { geometry: self.geometry, inference, device, seed };
+        let context = FitContext { geometry: self.conditions.geometry(), inference, device, seed };
         let FitOutcome { weights, report, steps } =
             fit::fit(start, d, settings, context, Some(&unfinished), &mut on_step)
                 .map_err(|source| DaggerError::Fit { round: round.unwrap_or(u32::MAX), source })?;
@@ -197,7 +197,7 @@ impl Run<'_, '_> {
     }
 
     fn checkpoint(&self, weights: Weights) -> Checkpoint {
-        Checkpoint { weights, geometry: self.geometry, inference: self.settings.inference }
+        Checkpoint { weights, conditions: self.conditions.clone(), inference: self.settings.inference }
     }
 
     fn report(&mut self, progress: &Progress<'_>, policy: Option<&Weights>) -> Result<(), Halt> {

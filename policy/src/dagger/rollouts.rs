@@ -65,7 +65,7 @@ impl Rollouts {
         novice: Option<&Checkpoint>,
         episodes: Vec<RoundEpisode>,
     ) -> Self {
-        let novice = novice.map(|checkpoint| Novice::new(checkpoint, settings.device));
+        let novice = novice.map(|checkpoint| Novice::new(checkpoint, &[], settings.device));
         let augmenting_sensors = |index: EpisodeIndex, episode: &Episode| -> Vec<Sensor> {
             let sensor = |part| episode.another_sensor(seed.child(Stream::NoiseAugmentation, index.part(part)));
             (0..settings.noise_augmentations).map(sensor).collect()
@@ -79,7 +79,7 @@ impl Rollouts {
 
     /// On-policy labelled rollouts: the network alone drives, undisturbed, and the expert labels every tick.
     pub fn on_policy(novice: &Checkpoint, device: DeviceChoice, episodes: Vec<RoundEpisode>) -> Self {
-        let novice = Novice::new(novice, device);
+        let novice = Novice::new(novice, &[], device);
         // Every discrepancy is below infinity: the network always drives.
         let rule = DecisionRule::TauOnly { tau: f32::INFINITY };
         Self::new(Some(novice), rule, Keep::EveryTick, episodes, &|_, _| Vec::new(), &|_| None)

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::checkpoint::Checkpoint;
+use crate::conditions::Conditions;
 use crate::dataset::ValidationSplit;
 use crate::dataset::store::Store;
 use crate::decision_rule::DecisionRule;
@@ -17,7 +18,6 @@ use sim::geometry::Vec2;
 use sim::map::Map;
 use sim::scenario::{Direction, LotNoise, ReferencePath, Scenario};
 use sim::seed::{EpisodeIndex, RootSeed};
-use sim::sensing::GridGeometry;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ impl Driver for RouteFollower {
         let goal = truth.map.path().pose_at(truth.progress_m + 10.0).position();
         let in_ego = truth.vehicle.pose.world_from_ego().inverse_point(goal);
         let look_ahead = LookAheadPoint { ahead_m: in_ego.x.clamp(4.4, 16.0), left_m: in_ego.y.clamp(-6.0, 6.0) };
-        Decision { look_ahead, source: Source::Expert, spread: None }
+        Decision { look_ahead, source: Source::Expert, spread: None, speed_limit_mps: None }
     }
 }
 
@@ -100,7 +100,11 @@ fn run_in(
 ) -> Result<Outcome, DaggerError> {
     let store = Store::open(folder).unwrap();
     let mut hooks = Hooks { episodes: &mut |round| of_round(round, 2), on_frame: &mut |_, _, _| {}, progress };
-    run(settings, GridGeometry::paper(), &store, RootSeed(6), &mut hooks)
+    run(settings, &conditions(), &store, RootSeed(6), &mut hooks)
+}
+
+fn conditions() -> Conditions {
+    Conditions::of(&EpisodeSettings::paper())
 }
 
 fn go_on(_: &Progress<'_>) -> ControlFlow<()> {
@@ -219,7 +223,7 @@ fn presets_survive_toml() {
 fn the_network_drives_the_same_whoever_seats_it() {
     let weights = Weights::init(settings().network, RootSeed(3), 0);
     let inference = InferenceSettings::smoothed();
-    let checkpoint = Checkpoint { weights, geometry: GridGeometry::paper(), inference };
+    let checkpoint = Checkpoint { weights, conditions: conditions(), inference };
     let drive = |fleet: &mut dyn Fleet| {
         let mut driven = Vec::new();
         let reports = run_lockstep(episodes(2), fleet, &mut |episode, frame| driven.push((episode, frame.decision)));
@@ -270,7 +274,7 @@ fn one_episode_of_a_round_driven_again_is_the_same() {
 fn ticks_say_where_and_when_samples_were_taken() {
     let settings = DaggerSettings { disturbance: DisturbanceSettings::quick(), ..settings() };
     let weights = Weights::init(settings.network, RootSeed(3), 0);
-    let checkpoint = Checkpoint { weights, geometry: GridGeometry::paper(), inference: settings.inference };
+    let checkpoint = Checkpoint { weights, conditions: conditions(), inference: settings.inference };
     let mut frames: Vec<Vec<Frame>> = vec![Vec::new(); 2];
     let rollouts = Rollouts::of_round(&settings, RootSeed(6), Some(&checkpoint), of_round(1, 2));
     let collected = rollouts.drive(&mut |episode, frame| frames[episode].push(*frame));

@@ -186,7 +186,7 @@ fn an_animation_shows_every_driver_and_has_the_same_bytes_twice() {
     let key: ReplayKey = "expert@lot-b@forward@0@paper@1@0".parse().unwrap();
     let replay = Replay::new(&key, &settings.episode).unwrap();
     let take = |spec: &str| {
-        let driver = spec.parse::<DriverSpec>().unwrap().load(&settings.expert, settings.dagger.device).unwrap();
+        let driver = spec.parse::<DriverSpec>().unwrap().load(&settings).unwrap();
         Take::of(&replay, &settings.episode, &driver, Some(100), |_| {})
     };
     let takes = [take("expert"), take("vvf")];

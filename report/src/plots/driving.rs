@@ -42,46 +42,65 @@ pub fn rates(title: &str, rows: &[RateRow]) -> String {
     })
 }
 
-/// A rate at a noise level.
+/// A rate where something was set to a value.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct NoisePoint {
-    /// Noise in multiples of the level `paper`.
-    pub times_paper: f64,
+pub struct RatePoint {
+    /// The value, in the unit of the x axis.
+    pub x: f64,
     /// Near-collisions per 100 m.
     pub per_100m: f64,
     /// Its interval of 95 %.
     pub interval: [f64; 2],
 }
 
-/// A driver at several noise levels.
+/// A driver at several values.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct NoiseSeries {
+pub struct RateSeries {
     /// The driver.
     pub name: String,
-    /// Its rates, in order of the noise.
-    pub points: Vec<NoisePoint>,
+    /// Its rates, in order of the values.
+    pub points: Vec<RatePoint>,
+}
+
+/// Rates against the noise in multiples of the level `paper`.
+pub fn rates_against_noise(title: &str, drivers: &[RateSeries]) -> String {
+    let last = drivers.iter().flat_map(|driver| &driver.points).map(|point| point.x).fold(0.0, f64::max).max(1.0);
+    let x = Axis {
+        label: "noise, in multiples of the level “paper”",
+        range: -0.06 * last..1.06 * last,
+        ticks: 6,
+        labels: Labels::Numbers(1),
+    };
+    rates_against(title, x, drivers)
+}
+
+/// Rates against the number of different lots that were trained on: `x` is the place in `counts`, side by side whatever
+/// lies between them.
+pub fn rates_against_lots(title: &str, counts: &[String], drivers: &[RateSeries]) -> String {
+    let x = Axis {
+        label: "different lots that were trained on",
+        range: -0.4..(counts.len() as f64 - 0.6).max(0.6),
+        ticks: counts.len(),
+        labels: Labels::Names(counts),
+    };
+    rates_against(title, x, drivers)
 }
 
 /// A line with whiskers per driver. Drivers are set a little apart, so that whiskers do not hide each other.
-pub fn rates_against_noise(title: &str, drivers: &[NoiseSeries]) -> String {
+fn rates_against(title: &str, x: Axis<'_>, drivers: &[RateSeries]) -> String {
     let points = || drivers.iter().flat_map(|driver| &driver.points);
     let most = points().map(|point| point.interval[1].max(point.per_100m)).fold(0.0, f64::max);
-    let last = points().map(|point| point.times_paper).fold(0.0, f64::max).max(1.0);
     let high = style::round_up(1.02 * most);
     let legend = drivers.iter().enumerate().map(|(i, driver)| Key {
         name: style::fitting(&driver.name, 400.0),
         colour: colour(i),
         look: Look::Marked(i),
     });
+    let apart = 0.007 * (x.range.end - x.range.start);
     let figure = Figure {
         title,
         height_px: style::HEIGHT_PX + 40,
-        x: Axis {
-            label: "noise, in multiples of the level “paper”",
-            range: -0.06 * last..1.06 * last,
-            ticks: 6,
-            labels: Labels::Numbers(1),
-        },
+        x,
         y: Axis {
             label: "near-collisions per 100 m",
             range: 0.0..high,
@@ -92,10 +111,9 @@ pub fn rates_against_noise(title: &str, drivers: &[NoiseSeries]) -> String {
         legend: legend.collect(),
     };
     figure.svg(|chart| {
-        let apart = last * 0.008;
         for (i, driver) in drivers.iter().enumerate() {
             let shift = apart * (i as f64 - 0.5 * (drivers.len() as f64 - 1.0));
-            let at = |point: &NoisePoint| (point.times_paper + shift, point.per_100m);
+            let at = |point: &RatePoint| (point.x + shift, point.per_100m);
             style::line(chart, driver.points.iter().map(at).collect(), colour(i), 2)?;
             for point in &driver.points {
                 let (x, _) = at(point);

@@ -24,14 +24,14 @@ fn rows() -> Vec<RateRow> {
         .to_vec()
 }
 
-fn noise() -> Vec<NoiseSeries> {
+fn noise() -> Vec<RateSeries> {
     let series = |name: &str, slope: f64| {
         let point = |i: usize| {
             let times_paper = 0.5 * i as f64;
             let per_100m = slope * times_paper;
-            NoisePoint { times_paper, per_100m, interval: [0.7 * per_100m, 1.4 * per_100m + 0.1] }
+            RatePoint { x: times_paper, per_100m, interval: [0.7 * per_100m, 1.4 * per_100m + 0.1] }
         };
-        NoiseSeries { name: name.to_owned(), points: (0..5).map(point).collect() }
+        RateSeries { name: name.to_owned(), points: (0..5).map(point).collect() }
     };
     vec![series("DAgger", 0.4), series("tentacle", 2.0), series("run:runs/a-long-name-of-a-folder/bc", 0.9)]
 }
@@ -89,6 +89,7 @@ fn all() -> Vec<(&'static str, String)> {
         ("eta", eta(&[ours], &paper, 0.9)),
         ("rates", rates("Near-collisions, noise paper", &rows())),
         ("noise", rates_against_noise("Near-collisions against noise, all lots", &noise())),
+        ("lots", rates_against_lots("Near-collisions against lots", &["9", "36", "144"].map(str::to_owned), &noise())),
         ("safe-ratios", safe_ratios("Safe ratio, noise paper", &ratios())),
         ("bars", bars("Near-collisions", "per 100 m", &["DAgger", "tentacle", "vvf"], &groups())),
         ("calibration", calibration(&axes())),
@@ -195,6 +196,7 @@ fn nothing_to_show_is_still_a_picture() {
         eta(&[], &[], 0.9),
         rates("none", &[]),
         rates_against_noise("none", &[]),
+        rates_against_lots("none", &[], &[]),
         safe_ratios("none", &[]),
         calibration(&[]),
         bars("none", "nothing", &[], &[]),

@@ -80,7 +80,7 @@ fn a_near_collision_plays_and_stands_still_at_its_moment() {
     let settings = Settings::preset("default").unwrap();
     let key: ReplayKey = "tentacle@lot-b@forward@0@paper@1@0".parse().unwrap();
     let replay = Replay::new(&key, &settings.episode).unwrap();
-    let driver = key.driver.clone().load(&settings.expert, settings.dagger.device).unwrap();
+    let driver = key.driver.clone().load(&settings).unwrap();
     let mut tick = None;
     replay.drive(&settings.episode, &driver, |frame| {
         tick = matches!(frame.event, Event::NearCollision { .. }).then_some(frame.tick);

@@ -49,7 +49,8 @@ pub struct Sensor {
     shift: BoundaryShift,
     /// How much larger the wobble is in each row of cells than at the patch's lower edge.
     wobble_growth: [f32; GRID_CELLS],
-    last: Option<Observation>,
+    /// The last observation and its tick.
+    last: Option<(u32, Observation)>,
     undecided: Undecided,
 }
 
@@ -71,12 +72,15 @@ impl Sensor {
     }
 
     /// What the car perceives from a pose at a tick.
+    ///
+    /// A dropped frame repeats the grid of the tick before. A sensor that was not asked then has nothing to repeat: an older
+    /// grid shows another place.
     pub fn observe(&mut self, map: &Map, pose: Pose, tick: u32) -> Observation {
         let observation = match self.last {
-            Some(last) if self.noise.drops_frame(tick) => last,
+            Some((of, last)) if of + 1 == tick && self.noise.drops_frame(tick) => last,
             _ => Observation { grid: self.perceive_grid(map, pose, tick) },
         };
-        self.last = Some(observation);
+        self.last = Some((tick, observation));
         observation
     }
 

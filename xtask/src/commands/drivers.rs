@@ -26,6 +26,10 @@ pub(crate) fn run(args: &DriversArgs, output: &Output) -> anyhow::Result<()> {
             output.print(PlannerFile::text_of(name)?.trim_end());
             Ok(())
         }
-        None => output.names(&drivers::specs()),
+        None => {
+            let specs = drivers::specs();
+            let names: Vec<(&str, &str)> = specs.iter().map(|(spec, about)| (spec.as_str(), about.as_str())).collect();
+            output.names(&names)
+        }
     }
 }

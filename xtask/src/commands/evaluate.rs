@@ -16,7 +16,7 @@ use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress};
 use experiment::run_dir::{self, Outcome, Request, RunDir};
-use experiment::settings::{Layers, Settings};
+use experiment::settings::{Layers, Settings, Smoothing};
 use scenarios::LoadError;
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
@@ -51,6 +51,10 @@ pub(crate) struct EvaluateArgs {
     /// `sweep` stands for 0,0.5,1,1.5,2.
     #[arg(long, alias = "level", value_name = "LEVEL", num_args = 1.., value_delimiter = ',')]
     noise: Vec<String>,
+    /// Action smoothing of every driver: `own` (networks as they were trained, planners none), or a time constant in
+    /// control ticks for all, 0 = none [default: the setting evaluation.smoothing].
+    #[arg(long, value_name = "TICKS")]
+    smoothing: Option<Smoothing>,
     /// Driver the others are compared with [default: the last network, else the first driver].
     #[arg(long, value_name = "SPEC")]
     compare_with: Option<String>,
@@ -96,7 +100,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
         override_trials(&mut settings, args)?;
         (settings, asked, Err(preset))
     };
-    let drivers = NamedDriver::load_all(&asked.drivers, &settings.expert, settings.dagger.device)?;
+    let drivers = NamedDriver::load_all(&asked.drivers, &settings)?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     notes::say(&lots, &settings.evaluation.noise, output);
     let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: asked.compare_with };
@@ -215,5 +219,6 @@ fn override_trials(settings: &mut Settings, args: &EvaluateArgs) -> anyhow::Resu
     if !args.noise.is_empty() {
         evaluation.noise = noise_levels(&args.noise)?;
     }
+    evaluation.smoothing = args.smoothing.unwrap_or(evaluation.smoothing);
     settings.check()
 }

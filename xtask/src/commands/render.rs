@@ -273,8 +273,8 @@ fn driven_anew(args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<D
     let drivers: Vec<NamedDriver> = specs
         .into_iter()
         .map(|spec| {
-            let driver = spec.load(&settings.expert, settings.dagger.device)?;
-            driver.check(&settings.episode)?;
+            let driver = spec.load(&settings)?;
+            driver.check(&settings)?;
             Ok(driver)
         })
         .collect::<anyhow::Result<_>>()?;

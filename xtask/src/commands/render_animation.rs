@@ -182,8 +182,8 @@ fn drive(
     let length_m = replay.map.path().length_m();
     let mut takes = Vec::new();
     for key in keys {
-        let driver = key.driver.clone().load(&settings.expert, settings.dagger.device)?;
-        driver.check(&settings.episode).with_context(|| key.to_string())?;
+        let driver = key.driver.clone().load(settings)?;
+        driver.check(settings).with_context(|| key.to_string())?;
         console.begin("driving", &driver.name);
         let take = Take::of(replay, &settings.episode, &driver, last_tick, |frame| {
             console.at(f64::from(frame.progress_m / length_m), &mut |_| format!("{} ticks", frame.tick));

@@ -66,21 +66,38 @@ pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
     let (run, settings, extent) = if let Some(path) = &args.resume { resume(path)? } else { begin(args)? };
     let stages = stages::all(&settings, &extent, run.path());
     let recipe = Recipe { settings, extent, stages };
-    output.note(format_args!("run: {}", run.path().display()));
-    interrupt::can_resume(COMMAND, run.path());
-    announce(&recipe.stages, run.path(), output)?;
     let console = Console::new(output);
+    perform_all(COMMAND, &recipe.stages, &run, &console, output)?;
+    let conclusions = reproduction::write(&recipe, &run)?;
+    output.table(|| format!("\nWhat holds here\n\n{conclusions}"), &())?;
+    run.finish(Outcome::Reproduction { stages: recipe.stages.len() })?;
+    output.note(format_args!("written: {}/report.html, report.md, conclusions.csv and figures/", run.path().display()));
+    console.report_time();
+    Ok(())
+}
+
+/// Does every stage of a run that is not done yet.
+pub(crate) fn perform_all(
+    command: &str,
+    stages: &[Stage],
+    run: &RunDir,
+    console: &Console,
+    output: &Output,
+) -> anyhow::Result<()> {
+    output.note(format_args!("run: {}", run.path().display()));
+    interrupt::can_resume(command, run.path());
+    announce(stages, run.path(), output)?;
     let mut tasks = Vec::new();
-    for stage in &recipe.stages {
+    for stage in stages {
         if !run_dir::is_finished(&run.path().join(&stage.folder))? {
             tasks.extend(stage.tasks());
         }
     }
     console.plan(tasks);
-    for (index, stage) in recipe.stages.iter().enumerate() {
-        let (place, of) = (index + 1, recipe.stages.len());
+    for (index, stage) in stages.iter().enumerate() {
+        let (place, of) = (index + 1, stages.len());
         output.note(format_args!("\n{place} of {of}: {} ({})", stage.about, stage.folder));
-        let is_done = if console.is_cancelled() { Ok(false) } else { perform(stage, &run, &console, output) };
+        let is_done = if console.is_cancelled() { Ok(false) } else { perform(command, stage, run, console, output) };
         match is_done {
             Ok(true) => {}
             Ok(false) => return Err(cut_short(run.path(), index)),
@@ -88,11 +105,6 @@ pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
             Err(error) => return Err(error.context(format!("stage {}", stage.folder))),
         }
     }
-    let conclusions = reproduction::write(&recipe, &run)?;
-    output.table(|| format!("\nWhat holds here\n\n{conclusions}"), &())?;
-    run.finish(Outcome::Reproduction { stages: recipe.stages.len() })?;
-    output.note(format_args!("written: {}/report.html, report.md, conclusions.csv and figures/", run.path().display()));
-    console.report_time();
     Ok(())
 }
 
@@ -164,7 +176,7 @@ fn resume(path: &Path) -> anyhow::Result<(RunDir, Settings, Extent)> {
 fn inputs(settings: &Settings, extent: &Extent) -> anyhow::Result<Inputs> {
     let mut found = train::inputs(settings)?;
     let unseen = Lot::parse_all(&extent.unseen, &settings.episode.vehicle)?;
-    let tuned = NamedDriver::load_all(&extent.tuned, &settings.expert, settings.dagger.device)?;
+    let tuned = NamedDriver::load_all(&extent.tuned, settings)?;
     found.extend(inputs::of(&unseen, &tuned));
     Ok(found)
 }
@@ -201,10 +213,10 @@ fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<()
 }
 
 /// Does a stage unless it is done; `false` if cut short by Ctrl-C.
-fn perform(stage: &Stage, root: &RunDir, console: &Console, output: &Output) -> anyhow::Result<bool> {
+fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, output: &Output) -> anyhow::Result<bool> {
     let settings = &stage.settings;
     let build = build_info::get();
-    let place = Place { build, out: None, overwrite: false, command: COMMAND, preset: COMMAND, seed: settings.seed.0 };
+    let place = Place { build, out: None, overwrite: false, command, preset: command, seed: settings.seed.0 };
     let Some(run) = root.stage(&stage.folder, &place, settings)? else {
         output.note("done before");
         return Ok(true);

@@ -27,7 +27,7 @@ Examples:
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct TuneArgs {
-    /// Planners to tune [default: all].
+    /// Planners to tune, or readings of them, as in dwa/fox [default: all, each as published].
     #[arg(long = "planner", value_name = "NAME", num_args = 1.., value_delimiter = ',')]
     planners: Vec<String>,
     /// Lots to tune on: lot-a and generated training lots only.
@@ -88,7 +88,7 @@ pub(crate) fn run(args: &TuneArgs, output: &Output) -> anyhow::Result<()> {
     let table = report::tuning::table(&tuned);
     output.table(|| format!("\n{table}"), &())?;
     run.write("tuning.md", format!("{table}\n").as_bytes())?;
-    run.finish(Outcome::Tuning { planners: tuned.iter().map(|found| found.planner.name().to_owned()).collect() })?;
+    run.finish(Outcome::Tuning { planners: tuned.iter().map(|found| found.name.clone()).collect() })?;
     output.note(format_args!("written: {}/*.toml; drive one with --driver NAME:{0}/NAME.toml", run.path().display()));
     console.report_time();
     Ok(())

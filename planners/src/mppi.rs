@@ -1,0 +1,454 @@
+//! Model predictive path integral control (Williams et al. 2017), with the structure and the constants of the controller of
+//! that name in nav2, the navigation stack of ROS 2 (docs/methods.md 7.4). The paper did not run it: it is what a reader from
+//! the field would put on this grid.
+//!
+//! Many sequences of controls, drawn around the last answer, are rolled out with the car's own model over the grid; each is
+//! rated, and the next answer is their mean, weighted by exp(−cost/λ). Steering and speed are chosen together, so it can slow
+//! down. nav2 follows a global path; here is none, and how far the way still goes ([`WayField`]) takes its place.
+
+use crate::context::{PlannerContext, WheelEstimate, steer_along_at};
+use crate::method::{Method, within};
+use crate::search::{Dimension, Span, normal};
+use crate::way_field::WayField;
+use serde::{Deserialize, Serialize};
+use sim::driver::{Decision, Policy};
+use sim::geometry::Vec2;
+use sim::seed::{RootSeed, Stream};
+use sim::sensing::Observation;
+use std::sync::Arc;
+
+/// Between two steps of a rollout, seconds (*chosen*: twice nav2's 0.05, with half as many steps).
+const STEP_S: f32 = 0.1;
+/// Between two draws of a sequence, seconds; what lies between is interpolated (*chosen*, instead of the filter that nav2
+/// smooths its answer with).
+const KNOT_S: f32 = 0.4;
+/// Circles that cover the body in a row.
+const CIRCLES: usize = 5;
+/// Speeds of the controller's law are tabulated at so many angles from 0 to full lock.
+const LAW_ANGLES: usize = 33;
+/// A clearance costs no more than one of minus this many scales.
+const SCALES_MAX: f32 = 3.0;
+
+/// Parameters of the path integral control.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Params {
+    /// Pairs of sequences rolled out per decision, beside the last answer itself: 128 (*chosen*; nav2: 1000 sequences, which
+    /// take four times as long).
+    pub pairs: u32,
+    /// How far ahead, seconds: 2.8 (*cited*: nav2, 56 steps of 0.05 s).
+    pub horizon_s: f32,
+    /// λ, how much cost makes a sequence count e times less: 0.3 (*cited*: nav2).
+    pub temperature: f32,
+    /// γ, price of departing from the last answer: 0.015 (*cited*: nav2).
+    pub gamma: f32,
+    /// Standard deviation of the steering angles drawn, radians: 0.15 (*chosen*; nav2 draws yaw rates).
+    pub steering_std_rad: f32,
+    /// Standard deviation of the speeds drawn, m/s: 0.2 (*cited*: nav2).
+    pub speed_std_mps: f32,
+    /// Price of a metre that the way still goes from the bumper at the end (*chosen*).
+    pub way_weight: f32,
+    /// Price of a second with clearance 0 (*chosen*).
+    pub obstacle_weight: f32,
+    /// Clearance that lowers this price e times, metres (*chosen*).
+    pub clearance_scale_m: f32,
+    /// Price of a whole horizon beyond a collision (*chosen*): the sooner it comes, the more of it is due.
+    pub collision_weight: f32,
+    /// Price of a change of the angle asked for, per rad² and step (*chosen*).
+    pub change_weight: f32,
+    /// Added to half the body's width for the clearance, metres: −0.2 (*chosen*: the grid shows things larger than they are,
+    /// by 0.24 m a side on average; docs/methods.md 1.1).
+    pub margin_m: f32,
+    /// Clearance from which on it is a collision, metres (*chosen*).
+    pub collision_from_m: f32,
+    /// The way goes on over cells at least this far from occupied ones, centre to centre, metres: 0.7, gaps of three cells
+    /// (*chosen*).
+    pub passable_from_m: f32,
+    /// Root seed of the draws: 1. One set of draws serves every decision (*cited*: nav2, `regenerate_noises` off).
+    pub seed: u32,
+}
+
+impl Method for Params {
+    const NAME: &'static str = "mppi";
+    const ABOUT: &'static str =
+        "model predictive path integral control as in nav2: sampled steering and speed, rolled out over the grid";
+    const SEARCH: &'static [Dimension<Self>] = &[
+        Dimension {
+            name: "temperature",
+            span: Span::Log(0.03, 3.0),
+            get: |p| p.temperature,
+            set: |p, value| p.temperature = value,
+        },
+        Dimension {
+            name: "way_weight",
+            span: Span::Log(0.1, 10.0),
+            get: |p| p.way_weight,
+            set: |p, value| p.way_weight = value,
+        },
+        Dimension {
+            name: "obstacle_weight",
+            span: Span::Log(0.1, 30.0),
+            get: |p| p.obstacle_weight,
+            set: |p, value| p.obstacle_weight = value,
+        },
+        Dimension {
+            name: "clearance_scale_m",
+            span: Span::Linear(0.05, 0.6),
+            get: |p| p.clearance_scale_m,
+            set: |p, value| p.clearance_scale_m = value,
+        },
+        Dimension {
+            name: "margin_m",
+            span: Span::Linear(-0.5, 0.3),
+            get: |p| p.margin_m,
+            set: |p, value| p.margin_m = value,
+        },
+        Dimension {
+            name: "change_weight",
+            span: Span::Log(0.01, 30.0),
+            get: |p| p.change_weight,
+            set: |p, value| p.change_weight = value,
+        },
+    ];
+    type Planner = PathIntegral;
+
+    fn paper() -> Self {
+        Self {
+            pairs: 128,
+            horizon_s: 2.8,
+            temperature: 0.3,
+            gamma: 0.015,
+            steering_std_rad: 0.15,
+            speed_std_mps: 0.2,
+            way_weight: 1.0,
+            obstacle_weight: 2.0,
+            clearance_scale_m: 0.25,
+            collision_weight: 20.0,
+            change_weight: 1.0,
+            margin_m: -0.2,
+            collision_from_m: -0.2,
+            passable_from_m: 0.7,
+            seed: 1,
+        }
+    }
+
+    fn check(&self) -> Result<(), String> {
+        within("pairs", self.pairs as f32, 1.0, 1e5)?;
+        within("horizon_s", self.horizon_s, 0.2, 20.0)?;
+        within("temperature", self.temperature, 1e-3, 1e3)?;
+        within("gamma", self.gamma, 0.0, 10.0)?;
+        within("steering_std_rad", self.steering_std_rad, 1e-3, 1.0)?;
+        within("speed_std_mps", self.speed_std_mps, 1e-3, 5.0)?;
+        within("way_weight", self.way_weight, 0.0, 1e3)?;
+        within("obstacle_weight", self.obstacle_weight, 0.0, 1e3)?;
+        within("clearance_scale_m", self.clearance_scale_m, 0.01, 5.0)?;
+        within("collision_weight", self.collision_weight, 0.0, 1e6)?;
+        within("change_weight", self.change_weight, 0.0, 1e3)?;
+        within("margin_m", self.margin_m, -0.9, 2.0)?;
+        within("collision_from_m", self.collision_from_m, -2.0, 2.0)?;
+        within("passable_from_m", self.passable_from_m, 0.1, 5.0)
+    }
+
+    fn planner(&self, context: &PlannerContext) -> PathIntegral {
+        let steps = (self.horizon_s / STEP_S).round() as usize;
+        let vehicle = &context.vehicle;
+        let circle = |i: usize| -vehicle.rear_overhang_m + vehicle.length_m * (i as f32 + 0.5) / CIRCLES as f32;
+        let law_mps = |i: usize| {
+            let steering_rad = vehicle.steering_max_rad * i as f32 / (LAW_ANGLES - 1) as f32;
+            context.speed_mps(context.curvature_per_m(steering_rad))
+        };
+        PathIntegral {
+            tables: Arc::new(Tables {
+                params: self.clone(),
+                context: context.clone(),
+                steps,
+                noise: draw_noise(self, steps),
+                circles_m: std::array::from_fn(circle),
+                law_mps: std::array::from_fn(law_mps),
+            }),
+            field: WayField::new(context),
+            controls: vec![Control::REST; steps],
+            costs: vec![0.0; samples(self)],
+            wheel: WheelEstimate::new(context),
+            speed_mps: 0.0,
+        }
+    }
+}
+
+/// What is asked for at a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Control {
+    steering_rad: f32,
+    speed_mps: f32,
+}
+
+impl Control {
+    const REST: Self = Self { steering_rad: 0.0, speed_mps: 0.0 };
+}
+
+/// Sequences per decision.
+fn samples(params: &Params) -> usize {
+    2 * params.pairs as usize + 1
+}
+
+/// Draws for every sample and step, sample by sample. Of two neighbours one steers where the other does not, so that left and
+/// right are treated alike; the first is undisturbed.
+fn draw_noise(params: &Params, steps: usize) -> Vec<Control> {
+    let mut rng = RootSeed(u64::from(params.seed)).rng(Stream::Rollouts, 0);
+    let knots = (steps as f32 * STEP_S / KNOT_S).ceil() as usize + 1;
+    let mut noise: Vec<Control> = Vec::with_capacity(samples(params) * steps);
+    for sample in 0..samples(params) {
+        if sample % 2 == 0 && sample > 0 {
+            let last = noise.len() - steps;
+            noise.extend_from_within(last..);
+            noise[last + steps..].iter_mut().for_each(|control| control.steering_rad *= -1.0);
+            continue;
+        }
+        let scale = if sample == 0 { 0.0 } else { 1.0 };
+        let mut draw = |std: f32| -> Vec<f32> { (0..knots).map(|_| scale * std * normal(&mut rng)).collect() };
+        let (steering_rad, speed_mps) = (draw(params.steering_std_rad), draw(params.speed_std_mps));
+        noise.extend((0..steps).map(|step| {
+            let place = step as f32 * STEP_S / KNOT_S;
+            let (knot, share) = (place as usize, place.fract());
+            let between = |values: &[f32]| values[knot] + share * (values[knot + 1] - values[knot]);
+            Control { steering_rad: between(&steering_rad), speed_mps: between(&speed_mps) }
+        }));
+    }
+    noise
+}
+
+/// What does not change from decision to decision.
+#[derive(Debug)]
+struct Tables {
+    params: Params,
+    context: PlannerContext,
+    steps: usize,
+    noise: Vec<Control>,
+    /// Centres of the circles that cover the body, ahead of the rear axle, metres.
+    circles_m: [f32; CIRCLES],
+    /// What the controller drives at most, m/s, by angle.
+    law_mps: [f32; LAW_ANGLES],
+}
+
+impl Tables {
+    /// What the car can be asked for.
+    fn clamped(&self, control: Control) -> Control {
+        let limit_rad = self.context.vehicle.steering_max_rad;
+        let steering_rad = control.steering_rad.clamp(-limit_rad, limit_rad);
+        let place = steering_rad.abs() / limit_rad * (LAW_ANGLES - 1) as f32;
+        let below = (place as usize).min(LAW_ANGLES - 2);
+        let (low_mps, high_mps) = (self.law_mps[below], self.law_mps[below + 1]);
+        let law_mps = low_mps + (place - below as f32) * (high_mps - low_mps);
+        let slowest_mps = self.context.controller.speed_min_mps.min(law_mps);
+        Control { steering_rad, speed_mps: control.speed_mps.clamp(slowest_mps, law_mps) }
+    }
+
+    /// What a sample asks for at a step.
+    fn sampled(&self, controls: &[Control], sample: usize, step: usize) -> Control {
+        let (mean, noise) = (controls[step], self.noise[sample * self.steps + step]);
+        self.clamped(Control {
+            steering_rad: mean.steering_rad + noise.steering_rad,
+            speed_mps: mean.speed_mps + noise.speed_mps,
+        })
+    }
+
+    /// S, the cost of a sample from where the wheels and the speed are.
+    fn cost(&self, field: &WayField, controls: &[Control], sample: usize, start: Control) -> f32 {
+        let Self { params, context: PlannerContext { vehicle, .. }, .. } = self;
+        let turn_max_rad = vehicle.steering_rate_max_radps * STEP_S;
+        let (faster_mps, slower_mps) = (vehicle.accel_max_mps2 * STEP_S, vehicle.brake_max_mps2 * STEP_S);
+        let half_m = 0.5 * vehicle.width_m + params.margin_m;
+        let (mut position, mut ahead) = (Vec2::ZERO, Vec2::X);
+        let (mut now, mut last_rad, mut cost) = (start, start.steering_rad, 0.0);
+        for step in 0..self.steps {
+            let asked = self.sampled(controls, sample, step);
+            now.steering_rad += (asked.steering_rad - now.steering_rad).clamp(-turn_max_rad, turn_max_rad);
+            now.speed_mps += (asked.speed_mps - now.speed_mps).clamp(-slower_mps, faster_mps);
+            let travel_m = now.speed_mps * STEP_S;
+            let turn_rad = travel_m * now.steering_rad.tan() / vehicle.wheelbase_m;
+            // Of a turn of a few degrees; |ahead| stays 1 to 1e-6 over a rollout.
+            let turned = Vec2::new(1.0 - 0.5 * turn_rad * turn_rad, turn_rad - turn_rad * turn_rad * turn_rad / 6.0);
+            let before = ahead;
+            ahead = turned.rotate(ahead);
+            position += 0.5 * travel_m * (before + ahead);
+
+            let of_circle = |ahead_m: &f32| field.distance_m(position + *ahead_m * ahead);
+            let clearance_m = self.circles_m.iter().map(of_circle).fold(f32::INFINITY, f32::min) - half_m;
+            let scales = (-clearance_m / params.clearance_scale_m).min(SCALES_MAX);
+            let change_rad = asked.steering_rad - last_rad;
+            last_rad = asked.steering_rad;
+            cost += params.obstacle_weight * STEP_S * scales.exp() + params.change_weight * change_rad * change_rad;
+            cost += self.departure(controls[step], self.noise[sample * self.steps + step]);
+            if clearance_m < params.collision_from_m {
+                cost += params.collision_weight * (self.steps - step) as f32 / self.steps as f32;
+                break;
+            }
+        }
+        cost + params.way_weight * field.way_left_m(position + vehicle.front_m() * ahead)
+    }
+
+    /// γ·u·ε/σ² of a step: what keeps the mean from running away with the draws.
+    fn departure(&self, mean: Control, noise: Control) -> f32 {
+        let Params { gamma, steering_std_rad, speed_std_mps, .. } = self.params;
+        let steering = mean.steering_rad * noise.steering_rad / (steering_std_rad * steering_std_rad);
+        // The speed that the controller would drive costs nothing.
+        let slower_mps = mean.speed_mps - self.law_mps[0];
+        gamma * (steering + slower_mps * noise.speed_mps / (speed_std_mps * speed_std_mps))
+    }
+}
+
+/// Path integral control at the wheel.
+#[derive(Debug, Clone)]
+pub struct PathIntegral {
+    tables: Arc<Tables>,
+    field: WayField,
+    /// The last answer, by step: where the next draws begin.
+    controls: Vec<Control>,
+    /// Of every sample.
+    costs: Vec<f32>,
+    wheel: WheelEstimate,
+    /// Where the speed probably is; like the wheel angle, it is not shown.
+    speed_mps: f32,
+}
+
+impl PathIntegral {
+    /// The last answer as it looks a control period later.
+    fn shift(&mut self) {
+        let share = self.tables.context.control_period_s / STEP_S;
+        for step in 0..self.controls.len() {
+            let place = step as f32 + share;
+            let before = (place as usize).min(self.controls.len() - 1);
+            let after = (before + 1).min(self.controls.len() - 1);
+            let (from, to) = (self.controls[before], self.controls[after]);
+            let share = place - before as f32;
+            let between = |from: f32, to: f32| from + share.min(1.0) * (to - from);
+            self.controls[step] = Control {
+                steering_rad: between(from.steering_rad, to.steering_rad),
+                speed_mps: between(from.speed_mps, to.speed_mps),
+            };
+        }
+    }
+
+    /// The mean of the samples, weighted by exp(−S/λ).
+    fn average(&mut self) {
+        let Self { tables, controls, costs, .. } = self;
+        let least = costs.iter().copied().fold(f32::INFINITY, f32::min);
+        let mut sum = 0.0;
+        for cost in costs.iter_mut() {
+            *cost = ((least - *cost) / tables.params.temperature).exp();
+            sum += *cost;
+        }
+        for step in 0..tables.steps {
+            let mut mean = Control::REST;
+            for (sample, weight) in costs.iter().enumerate() {
+                let sampled = tables.sampled(controls, sample, step);
+                mean.steering_rad += weight * sampled.steering_rad;
+                mean.speed_mps += weight * sampled.speed_mps;
+            }
+            controls[step] = Control { steering_rad: mean.steering_rad / sum, speed_mps: mean.speed_mps / sum };
+        }
+    }
+}
+
+impl Policy for PathIntegral {
+    fn act(&mut self, observation: &Observation) -> Decision {
+        self.field.read(&observation.grid, self.tables.params.passable_from_m);
+        self.shift();
+        let start = Control { steering_rad: self.wheel.advance(), speed_mps: self.speed_mps };
+        for (sample, cost) in self.costs.iter_mut().enumerate() {
+            *cost = self.tables.cost(&self.field, &self.controls, sample, start);
+        }
+        self.average();
+        let Control { steering_rad, speed_mps } = self.controls[0];
+        let PlannerContext { vehicle, control_period_s, .. } = &self.tables.context;
+        let change_mps = speed_mps - self.speed_mps;
+        self.speed_mps +=
+            change_mps.clamp(-vehicle.brake_max_mps2 * control_period_s, vehicle.accel_max_mps2 * control_period_s);
+        self.wheel.command_rad = steering_rad;
+        steer_along_at(self.tables.context.curvature_per_m(steering_rad), Some(speed_mps))
+    }
+
+    fn reset(&mut self) {
+        self.controls.fill(Control::REST);
+        self.wheel.reset();
+        self.speed_mps = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scenes::context;
+    use sim::sensing::OccupancyGrid;
+
+    fn planner() -> PathIntegral {
+        Params::paper().planner(&context())
+    }
+
+    /// After some decisions on the same grid.
+    fn settled(planner: &mut PathIntegral, grid: OccupancyGrid) -> Decision {
+        (0..60).map(|_| planner.act(&Observation { grid })).last().unwrap()
+    }
+
+    #[test]
+    fn draws_are_mirrored_in_pairs_have_the_spread_asked_for_and_depend_on_the_seed() {
+        let params = Params { pairs: 1000, ..Params::paper() };
+        let (steps, noise) = (28, draw_noise(&params, 28));
+        assert!(noise[..steps].iter().all(|control| *control == Control::REST), "the first is undisturbed");
+        for (left, right) in noise[steps..2 * steps].iter().zip(&noise[2 * steps..3 * steps]) {
+            assert_eq!((left.steering_rad, left.speed_mps), (-right.steering_rad, right.speed_mps));
+        }
+        // At a knot, where nothing is interpolated.
+        let at_knot = noise.iter().skip(4).step_by(steps);
+        let squared: f32 = at_knot.map(|control| control.steering_rad.powi(2)).sum();
+        assert!(((squared / 2000.0).sqrt() - 0.15).abs() < 0.01, "{}", (squared / 2000.0).sqrt());
+        assert_ne!(draw_noise(&Params { seed: 2, ..params.clone() }, 28), noise);
+        assert_eq!(draw_noise(&params, 28), noise);
+    }
+
+    #[test]
+    fn open_ground_is_crossed_straight_and_fast() {
+        let mut planner = planner();
+        let decision = settled(&mut planner, OccupancyGrid::free());
+        assert!(decision.look_ahead.left_m.abs() < 0.1, "{decision:?}");
+        assert!(decision.speed_limit_mps.unwrap() > 1.7, "{decision:?}");
+    }
+
+    /// A wall with a gap on the left: it steers left, and slower than on open ground.
+    #[test]
+    fn a_block_is_passed_and_a_dead_end_is_met_slowly() {
+        let mut grid = OccupancyGrid::free();
+        (14..18).for_each(|row| grid.occupy_row(row, !0 << 11));
+        let mut planner = planner();
+        assert!(settled(&mut planner, grid).look_ahead.curvature_per_m() > 0.02);
+        planner.reset();
+        let mut wall = OccupancyGrid::free();
+        (0..23).for_each(|row| wall.occupy_row(row, u32::MAX));
+        let decision = settled(&mut planner, wall);
+        assert!(decision.speed_limit_mps.unwrap() < 1.5, "{decision:?}");
+    }
+
+    /// At rest on free ground with nothing drawn: 28 steps, from 0 to 2.2 m/s at 1 m/s² (2.42 m) and 0.6 s more (1.32 m).
+    #[test]
+    fn a_rollout_is_the_car_that_asks_for_what_the_sample_says() {
+        let mut planner = planner();
+        planner.field.read(&OccupancyGrid::free(), 0.7);
+        let fast = vec![Control { steering_rad: 0.0, speed_mps: 9.0 }; 28];
+        let params = Params { obstacle_weight: 0.0, gamma: 0.0, ..Params::paper() };
+        let tables = params.planner(&context()).tables;
+        let cost = tables.cost(&planner.field, &fast, 0, Control::REST);
+        let travel_m: f32 = (1..=28).map(|step| (0.1 * step as f32).min(2.2) * 0.1).sum();
+        let expected = planner.field.way_left_m(Vec2::new(3.8 + travel_m, 0.0));
+        assert!((cost - expected).abs() < 1e-3, "{cost} and {expected}");
+    }
+
+    #[test]
+    fn what_is_forgotten_leaves_nothing_behind() {
+        let (mut used, mut fresh) = (planner(), planner());
+        let mut grid = OccupancyGrid::free();
+        (8..14).for_each(|row| grid.occupy_row(row, !0 << 11));
+        settled(&mut used, grid);
+        used.reset();
+        assert_eq!(used.act(&Observation { grid }), fresh.act(&Observation { grid }));
+    }
+}

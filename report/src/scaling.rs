@@ -1,0 +1,108 @@
+//! Near-collisions against the number of different lots that were trained on: `scaling.md`, `.csv` and `.svg`.
+
+use crate::markdown::table_of;
+use crate::plots::{self, RatePoint, RateSeries};
+use crate::reproduction::Drive;
+use anyhow::Context as _;
+use evaluation::format::exact_rate;
+use evaluation::results::EvaluationResults;
+use evaluation::scaling::{self, Extent};
+use evaluation::stages::Stage;
+use evaluation::statistics::poisson::Rate;
+use evaluation::summary::csv_of;
+use evaluation::table1::Table1;
+use experiment::lots::Lot;
+use experiment::run_dir::RunDir;
+use experiment::settings::Settings;
+use serde::Serialize;
+use std::collections::BTreeSet;
+
+/// What was trained on so many lots, on lots of one kind or on all of them.
+#[derive(Debug, Clone, Serialize)]
+struct Row {
+    /// Different generated lots that were trained on, of all kinds together.
+    different_lots: usize,
+    /// `BC` or `DAgger`.
+    method: &'static str,
+    /// Labelled ticks that were trained on.
+    samples: usize,
+    /// Kind of lot that was driven on.
+    lots: String,
+    /// Sum of the routes, metres.
+    route_m: f64,
+    near_collisions: u32,
+    contacts: u32,
+    per_100m: f64,
+    lower: f64,
+    upper: f64,
+}
+
+/// Writes the table, its rows as CSV and the plot; returns the table.
+///
+/// # Errors
+/// If what a stage wrote cannot be read, or a file cannot be written.
+pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<String> {
+    let rows = rows(settings, extent, stages, run)?;
+    let totals: Vec<&Row> = rows.iter().filter(|row| row.lots == rows[rows.len() - 1].lots).collect();
+    let mut table =
+        table_of(&["different lots", "method", "samples", "route", "near-collisions (contacts)", "per 100 m [95 %]"]);
+    for row in &totals {
+        table.add_row(vec![
+            row.different_lots.to_string(),
+            row.method.to_owned(),
+            row.samples.to_string(),
+            format!("{:.1} km", row.route_m / 1000.0),
+            format!("{} ({})", row.near_collisions, row.contacts),
+            exact_rate(row.near_collisions, row.route_m),
+        ]);
+    }
+    run.write("scaling.md", format!("{table}\n").as_bytes())?;
+    run.write("scaling.csv", &csv_of(&rows)?)?;
+    run.write("scaling.svg", plot(&totals).as_bytes())?;
+    Ok(table.to_string())
+}
+
+fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<Row>> {
+    let drive = Drive::of(stages.last().context("the last stage drives")?)?;
+    let results = EvaluationResults::read(&drive.plan(), &run.path().join(scaling::DRIVES))?;
+    let kinds = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
+    let kinds: BTreeSet<String> = kinds.iter().filter(|lot| lot.is_generated()).map(Lot::group).collect();
+    let mut rows = Vec::new();
+    for (at, &different) in extent.different_lots.iter().enumerate() {
+        let folder = run.path().join(scaling::folder(different));
+        let table1 = Table1::read(&folder)?.with_context(|| format!("{}: no table1.json", folder.display()))?;
+        let samples = [table1.rows.first(), table1.rows.last()].map(|row| row.map_or(0, |row| row.dataset));
+        for (part, method) in ["BC", "DAgger"].into_iter().enumerate() {
+            for slice in results.slices() {
+                let totals = results.totals(0, 2 * at + part, &slice, None);
+                let rate = Rate::new(totals.near_collisions, totals.reference_m / 100.0);
+                rows.push(Row {
+                    different_lots: different as usize * kinds.len(),
+                    method,
+                    samples: samples[part],
+                    lots: slice.label.clone(),
+                    route_m: totals.reference_m,
+                    near_collisions: totals.near_collisions,
+                    contacts: totals.contacts,
+                    per_100m: rate.per_unit,
+                    lower: rate.lower,
+                    upper: rate.upper,
+                });
+            }
+        }
+    }
+    Ok(rows)
+}
+
+fn plot(rows: &[&Row]) -> String {
+    let of = |method: &'static str| rows.iter().filter(move |row| row.method == method);
+    let counts: Vec<String> = of("BC").map(|row| row.different_lots.to_string()).collect();
+    let series = ["BC", "DAgger"].map(|method| RateSeries {
+        name: method.to_owned(),
+        points: of(method)
+            .enumerate()
+            .map(|(x, row)| RatePoint { x: x as f64, per_100m: row.per_100m, interval: [row.lower, row.upper] })
+            .collect(),
+    });
+    plots::rates_against_lots("Near-collisions on unseen lots", &counts, &series)
+}

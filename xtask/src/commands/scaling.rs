@@ -1,0 +1,98 @@
+//! `scaling`: how much more different lots buy.
+
+use super::{reproduce, train};
+use crate::args::{LayerArgs, OutArgs};
+use crate::console::Console;
+use crate::output::Output;
+use anyhow::{Context as _, ensure};
+use clap::Args;
+use evaluation::scaling::{self, Extent};
+use experiment::inputs::{self, Inputs};
+use experiment::lots::Lot;
+use experiment::run_dir::{Outcome, Request, RunDir};
+use experiment::settings::{Layers, Settings};
+use std::path::PathBuf;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask scaling                                 1, 4, 16 and 64 lots of each family
+  cargo xtask scaling --different 2,8 --unseen sealed:my-phrase:90:all
+  cargo xtask scaling --resume runs/scaling-default-s1";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ScalingArgs {
+    #[command(flatten)]
+    layers: LayerArgs,
+    /// Root seed of the trainings.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Different lots of each kind that is trained on; one training each.
+    #[arg(long, value_name = "N", num_args = 1.., value_delimiter = ',', default_values_t = [1, 4, 16, 64])]
+    different: Vec<u32>,
+    /// Lots that all policies are driven on, once each way.
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "validation:180:all")]
+    unseen: Vec<String>,
+    #[command(flatten)]
+    out: OutArgs,
+    /// Continues an interrupted run with its own settings, to the same result; finished trainings are skipped.
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all = ["preset", "config", "overrides", "seed", "out", "different", "unseen"]
+    )]
+    resume: Option<PathBuf>,
+}
+
+const COMMAND: &str = "scaling";
+/// Sixteen lots of each family in every round, as much as the default trains on; no lot that is there in every training.
+const LOTS: &str = "train:144:all";
+
+pub(crate) fn run(args: &ScalingArgs, output: &Output) -> anyhow::Result<()> {
+    let (run, settings, extent) = if let Some(path) = &args.resume {
+        let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
+        let extent: Extent = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
+        manifest.check_inputs(&inputs(&settings, &extent)?)?;
+        (run, settings, extent)
+    } else {
+        begin(args)?
+    };
+    let stages = scaling::stages(&settings, &extent, run.path());
+    let console = Console::new(output);
+    reproduce::perform_all(COMMAND, &stages, &run, &console, output)?;
+    let table = report::scaling::write(&settings, &extent, &stages, &run)?;
+    output.table(|| format!("\nNear-collisions against different lots\n\n{table}"), &())?;
+    run.finish(Outcome::Reproduction { stages: stages.len() })?;
+    output.note(format_args!("written: {}/scaling.md, scaling.csv and scaling.svg", run.path().display()));
+    console.report_time();
+    Ok(())
+}
+
+fn begin(args: &ScalingArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
+    let mut layers = Layers::from(&args.layers);
+    let is_default = layers.preset_name() == "default";
+    // What the user sets comes later and counts.
+    if is_default {
+        layers.overrides.insert(0, format!("training.lots=[\"{LOTS}\"]"));
+    }
+    let settings = Settings::resolve(&layers, args.seed)?;
+    let extent = Extent { different_lots: args.different.clone(), unseen: args.unseen.clone() };
+    ensure!(!extent.different_lots.contains(&0), "--different 0: name at least one lot");
+    for (at, different) in extent.different_lots.iter().enumerate() {
+        ensure!(!extent.different_lots[..at].contains(different), "--different {different} is named twice");
+    }
+    let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
+    ensure!(lots.iter().any(Lot::is_generated), "training.lots names no generated lots, of which there could be more");
+    for lot in Lot::parse_all(&extent.unseen, &settings.episode.vehicle)? {
+        ensure!(!lot.is_for_training(), "--unseen {}: policies are trained on it; name others", lot.name());
+    }
+    let request = Request { arguments: toml::Table::try_from(&extent)?, inputs: inputs(&settings, &extent)? };
+    let run = RunDir::create(&args.out.place(COMMAND, layers.preset_name(), settings.seed.0), &settings, &request)?;
+    Ok((run, settings, extent))
+}
+
+/// The lots from files that are read.
+fn inputs(settings: &Settings, extent: &Extent) -> anyhow::Result<Inputs> {
+    let mut found = train::inputs(settings)?;
+    found.extend(inputs::of(&Lot::parse_all(&extent.unseen, &settings.episode.vehicle)?, &[]));
+    Ok(found)
+}
