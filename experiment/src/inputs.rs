@@ -2,14 +2,12 @@
 
 use crate::drivers::NamedDriver;
 use crate::lots::Lot;
-use std::collections::BTreeMap;
 
-/// SHA-256 by name, as on the command line.
-pub type Inputs = BTreeMap<String, String>;
+pub use crate::run_dir::Inputs;
 
 /// Those of some lots and drivers; what ships with the program is not among them.
 pub fn of(lots: &[Lot], drivers: &[NamedDriver]) -> Inputs {
     let lots = lots.iter().filter_map(|lot| Some((lot.spec(), lot.digest()?)));
-    let drivers = drivers.iter().filter_map(|driver| Some((driver.spec.to_string(), driver.digest()?.to_owned())));
+    let drivers = drivers.iter().filter_map(|driver| Some((driver.spec.to_string(), driver.digest()?)));
     lots.chain(drivers).collect()
 }

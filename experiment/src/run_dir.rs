@@ -13,11 +13,11 @@
 //!   .lock              who writes here
 //! ```
 
-use crate::inputs::Inputs;
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
 use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -36,6 +36,9 @@ pub struct RunDir {
     within: Option<(PathBuf, String)>,
     _lock: Arc<Lock>,
 }
+
+/// SHA-256 of what is read from elsewhere by name, as on the command line: see [`inputs`](crate::inputs).
+pub type Inputs = BTreeMap<String, String>;
 
 /// What a run was asked for beside its settings, and what it reads from elsewhere.
 #[derive(Debug, Clone, Default, PartialEq)]
