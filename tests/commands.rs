@@ -174,7 +174,7 @@ fn a_map_that_cannot_be_driven_is_refused_and_leaves_nothing() {
 }
 
 #[test]
-fn a_checkpoint_of_another_architecture_is_refused() {
+fn a_checkpoint_that_was_edited_is_refused() {
     let folder = scratch("architecture");
     let run = folder.join("run");
     succeed(xtask().args(["train-bc", "--preset", "smoke", "--no-eval", "--out"]).arg(&run));
@@ -183,7 +183,10 @@ fn a_checkpoint_of_another_architecture_is_refused() {
     std::fs::write(&model, changed).unwrap();
     let net = format!("net:{}", run.join("round-00").display());
     let out = folder.join("out").to_string_lossy().into_owned();
-    refuses(&["evaluate", "--driver", &net, "--lots", "lot-b", "--out", &out], &["model.safetensors", "fc1"]);
+    refuses(
+        &["evaluate", "--driver", &net, "--lots", "lot-b", "--out", &out],
+        &["model.toml", "SHA-256", "sha256sums"],
+    );
     assert!(!Path::new(&out).exists(), "nothing is written");
 }
 

@@ -4,8 +4,8 @@ use crate::bench::{scratch, succeed, xtask};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Every file of a run by name, but for the manifest (it names the command line), the report (it shows the manifest) and
-/// the wall time.
+/// Every file of a run by name, but for the manifest (it names the command line), the report (it shows the manifest),
+/// the wall time, and the lists of their digests.
 pub(crate) fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];
@@ -17,7 +17,9 @@ pub(crate) fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
             } else {
                 let name = path.strip_prefix(folder).unwrap().to_string_lossy().into_owned();
                 let file_name = path.file_name().unwrap().to_string_lossy();
-                if !["manifest.toml", "report.html", "report.md", "wall_time.jsonl"].contains(&&*file_name) {
+                if !["manifest.toml", "report.html", "report.md", "wall_time.jsonl", "sha256sums"]
+                    .contains(&&*file_name)
+                {
                     files.insert(name, std::fs::read(&path).unwrap());
                 }
             }

@@ -13,6 +13,7 @@
 //! | [`limits`] | the limits in docs/formats.md are those of the code |
 //! | [`planners`] | model-based planners: naming, parameter files, tuning |
 //! | [`regressions`] | what once went wrong, named by symptom |
+//! | [`reliability`] | one owner per run, nothing lost to kills and signals, every damage noticed |
 //! | [`printed`] | every `--help` and every printed table, as people read them |
 //! | [`python`] | the Python of docs/formats.md answers as Rust does |
 //! | [`words`] | words that were replaced do not come back |
@@ -33,6 +34,7 @@ mod planners;
 mod printed;
 mod python;
 mod regressions;
+mod reliability;
 mod reproduce;
 mod tidy;
 mod words;

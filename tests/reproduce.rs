@@ -4,6 +4,7 @@ use crate::bench::{scratch, succeed, text, xtask};
 use crate::determinism::files;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::Duration;
 
 /// Stages of a smoke run, in their order.
 const STAGES: [&str; 8] = [
@@ -26,19 +27,6 @@ fn contents(run: &Path) -> BTreeMap<String, Vec<u8>> {
     };
     let is_kept = |name: &str| !name.ends_with("manifest.toml") && !name.ends_with("wall_time.jsonl");
     files(run).into_iter().filter(|(name, _)| is_kept(name)).map(|(name, bytes)| (name, normal(bytes))).collect()
-}
-
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap() {
-        let entry = entry.unwrap();
-        let target = to.join(entry.file_name());
-        if entry.path().is_dir() {
-            copy(&entry.path(), &target);
-        } else {
-            std::fs::copy(entry.path(), target).unwrap();
-        }
-    }
 }
 
 #[test]
@@ -75,14 +63,14 @@ fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
     }
     assert!(html.matches("<svg").count() >= 5, "figures are in the page");
 
-    // As Ctrl-C leaves it: in the middle of the third chain, nothing driven.
-    copy(&whole, &resumed);
-    for lost in ["finished.toml", "report.md", "report.html", "conclusions.csv", "chains/s1-any-below/finished.toml"] {
-        std::fs::remove_file(resumed.join(lost)).unwrap();
+    // Killed in the middle of the third chain.
+    let mut killed = xtask().args(["reproduce", "--preset", "smoke", "--out"]).arg(&resumed).spawn().unwrap();
+    while !resumed.join("chains/s1-any-below/round-01").exists() {
+        assert!(killed.try_wait().unwrap().is_none(), "it ended before it was killed");
+        std::thread::sleep(Duration::from_millis(5));
     }
-    for lost in ["figures", "drives", "on-policy", "chains/s1-tau-only", "chains/s1-any-below/round-01"] {
-        std::fs::remove_dir_all(resumed.join(lost)).unwrap();
-    }
+    killed.kill().unwrap();
+    killed.wait().unwrap();
     let printed_again = succeed(xtask().args(["--threads", "1", "reproduce", "--resume"]).arg(&resumed));
     assert!(printed_again.contains("DAgger has fewer near-collisions"), "{printed_again}");
     let (expected, found) = (contents(&whole), contents(&resumed));

@@ -53,7 +53,7 @@ fn dependencies_point_one_way() {
         assert!(!dependencies["sim"].contains(&forbidden.to_owned()), "sim must not know {forbidden}");
     }
     for (name, dependencies) in &dependencies {
-        for only_in_xtask in ["clap", "clap_complete", "indicatif", "ctrlc"] {
+        for only_in_xtask in ["clap", "clap_complete", "indicatif", "ctrlc", "signal-hook"] {
             let knows = dependencies.contains(&only_in_xtask.to_owned());
             assert!(!knows || name == "xtask", "only xtask may know {only_in_xtask}, {name} does");
         }

@@ -8,7 +8,7 @@ use evaluation::summary::Summary;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::Silent;
-use experiment::run_dir::{Build, Place, RunDir};
+use experiment::run_dir::{Build, Place, Request, RunDir};
 use experiment::settings::Settings;
 use experiment::training;
 use policy::checkpoint::Checkpoint;
@@ -34,8 +34,11 @@ fn measure(effort: Effort, report: Report<'_>, folder: &Path) -> anyhow::Result<
         NamedDriver::network("network", spec, trained(&settings, &folder.join("trained"))?, settings.dagger.device);
     let lots = Lot::parse_all(&["lot-a", "lot-b", "lot-c"], &settings.episode.vehicle)?;
     let plan = Plan { settings: &settings, drivers: &[network], lots: &lots, compare_with: 0 };
-    let run = create(&folder.join("evaluated"), &settings)?;
-    let once = || Summary::new(&plan, &evaluate(&plan, &run, &Silent)?.results).write(&run);
+    let once = || {
+        let run = create(&folder.join("evaluated"), &settings)?;
+        let results = evaluate(&plan, &run, &Silent)?.context("nothing cancels it")?;
+        Summary::new(&plan, &results).write(&run)
+    };
     let on = |threads: usize, what: &str| {
         on_threads(threads, || {
             let mut outcome = Ok(());
@@ -64,5 +67,5 @@ fn create(folder: &Path, settings: &Settings) -> anyhow::Result<RunDir> {
     let build = Build::default();
     let place =
         Place { build: &build, out: Some(folder), overwrite: true, command: "bench", preset: "default", seed: 1 };
-    RunDir::create(&place, settings)
+    RunDir::create(&place, settings, &Request::default())
 }

@@ -2,105 +2,129 @@
 //!
 //! Runs are driven batch by batch. In a batch every driver meets the same maps, obstacles, noise and starts, one driver
 //! after the other at every noise level; then only a few numbers per run are kept. So memory does not
-//! depend on how many lots there are, and what an interrupted evaluation leaves is paired.
+//! depend on how many lots there are. What one driver drove of a batch is written at once; an interrupted evaluation goes
+//! on after that.
 
 use crate::incidents::{self, Incident, IncidentMonitor};
 use crate::plan::Plan;
 use crate::records::{self, Driven, FailureRecord, RunRecord, WallTimeRecord};
 use crate::results::EvaluationResults;
-use anyhow::Context as _;
 use experiment::drive::TrialBatch;
 use experiment::progress::Progress;
 use experiment::run_dir::RunDir;
+use experiment::settings::Settings;
 use experiment::trials::{self, Trial};
 use serde::Serialize;
 use sim::episode::EpisodeReport;
 use sim::frame::Event;
 use sim::seed::RootSeed;
-use std::fs::File;
-use std::io::{BufWriter, Write as _};
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::time::Instant;
+use storage::growing::Growing;
+use storage::sums;
 
 /// Trials driven at a time. A constant: neither memory nor results depend on how many runs or threads there are.
 const BATCH: usize = 16;
 
-/// The outcome of a plan.
-#[derive(Debug)]
-pub struct Evaluated {
-    /// Everything that is kept of the runs.
-    pub results: EvaluationResults,
-    /// `false` if it was cancelled: then the results are of what was driven by then.
-    pub is_complete: bool,
-}
+/// Files that are written line by line.
+const FILES: [&str; 3] = [records::RUNS, records::FAILURES, records::WALL_TIME];
 
-/// Drives the plan, and writes one line per run and near-collision as they come.
+/// Drives the plan, and writes one line per run and near-collision as they come. Goes on with what an interrupted
+/// evaluation left in the folder, to the same result; a finished one is read back. `None` if cancelled.
 ///
 /// # Errors
-/// If a lot cannot be built or a file cannot be written.
-pub fn evaluate(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<Evaluated> {
-    let evaluation = &plan.settings.evaluation;
-    let episode = &plan.settings.episode;
-    let mut results = EvaluationResults::new(plan);
-    let mut lines = Lines::create(run)?;
+/// If a lot cannot be built or a file cannot be read or written.
+pub fn evaluate(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<Option<EvaluationResults>> {
+    if sums::is_listed(run.path(), records::RUNS)? {
+        return EvaluationResults::read(plan, run.path()).map(Some);
+    }
+    let mut driving = Driving::open(plan, run.path(), progress)?;
     let mut trials = plan.trials();
-    let runs = trials.clone().count() * plan.drivers.len() * evaluation.noise.len();
-    progress.begin("evaluation", "driving");
-    let mut track = Track { progress, runs, done: 0, near_collisions: 0 };
-    let mut first_trial = 0;
-    let mut is_complete = true;
-    while is_complete {
+    loop {
         let batch: Vec<Trial<'_>> = trials.by_ref().take(BATCH).collect();
         if batch.is_empty() {
-            break;
+            return driving.finish().map(Some);
         }
-        let maps = trials::maps(&batch, episode)?;
-        'batch: for (level, &noise) in evaluation.noise.iter().enumerate() {
-            for (index, driver) in plan.drivers.iter().enumerate() {
-                let batch = TrialBatch { episode, driver, trials: &batch, maps: &maps, noise };
-                let driven = drive(&batch, &mut track);
-                let failures = failures(&batch, evaluation.seed, &driven, !progress.is_cancelled());
-                lines.add(&batch, evaluation.seed, &driven, &failures)?;
-                for (i, (trial, report)) in driven.finished(&batch) {
-                    results.add(level, index, first_trial + i, trial, report);
-                }
-                for (episode, failure) in &failures {
-                    let is_again = incidents::is_again(failure.findings.since_resume_m);
-                    results.add_cause(level, index, batch.trials[*episode].lot, failure.cause, is_again);
-                }
-                is_complete = driven.reports.iter().all(Option::is_some);
-                if !is_complete {
-                    break 'batch;
-                }
+        if !driving.drive(&batch)? {
+            return Ok(None);
+        }
+    }
+}
+
+/// An evaluation under way. Its parts are what one driver drives of a batch at one noise level.
+struct Driving<'a> {
+    plan: &'a Plan<'a>,
+    lines: Growing,
+    results: EvaluationResults,
+    track: Track<'a>,
+    /// Parts of the batches so far, those of an earlier command included.
+    parts: usize,
+    /// Trials of the batches so far.
+    trials: usize,
+}
+
+impl<'a> Driving<'a> {
+    fn open(plan: &'a Plan<'a>, folder: &Path, progress: &'a dyn Progress) -> anyhow::Result<Self> {
+        let (lines, left) = Growing::open(folder, "driving", &FILES)?;
+        let [runs, failures] = [0, 1].map(|file: usize| str::from_utf8(&left[file]));
+        let (runs, failures) = (runs?, failures?);
+        let results = EvaluationResults::of_lines(plan, folder, runs, failures)?;
+        progress.begin("evaluation", "driving");
+        let all = plan.trials().count() * plan.drivers.len() * plan.settings.evaluation.noise.len();
+        let (done, near_collisions) = (runs.lines().count(), failures.lines().count() as u32);
+        let track = Track { progress, runs: all, done, near_collisions };
+        Ok(Self { plan, lines, results, track, parts: 0, trials: 0 })
+    }
+
+    /// Drives a batch, but for what was driven before; `false` if cancelled.
+    fn drive(&mut self, trials: &[Trial<'_>]) -> anyhow::Result<bool> {
+        let plan = self.plan;
+        let Settings { evaluation, episode, .. } = plan.settings;
+        let before = self.parts;
+        self.parts += evaluation.noise.len() * plan.drivers.len();
+        let first_trial = self.trials;
+        self.trials += trials.len();
+        if self.parts <= self.lines.parts() {
+            return Ok(true);
+        }
+        let maps = trials::maps(trials, episode)?;
+        let levels = evaluation.noise.iter().enumerate();
+        let parts = levels.flat_map(|level| plan.drivers.iter().enumerate().map(move |driver| (level, driver)));
+        let parts: Vec<_> = parts.skip(self.lines.parts() - before).collect();
+        for ((level, &noise), (index, driver)) in parts {
+            let batch = TrialBatch { episode, driver, trials, maps: &maps, noise };
+            let Some(driven) = drive(&batch, &mut self.track) else { return Ok(false) };
+            let failures = failures(&batch, evaluation.seed, &driven);
+            self.lines.add(&lines(&batch, evaluation.seed, &driven, &failures)?)?;
+            for (i, (trial, report)) in trials.iter().zip(&driven.reports).enumerate() {
+                self.results.add(level, index, first_trial + i, trial, report);
+            }
+            for (episode, failure) in &failures {
+                let is_again = incidents::is_again(failure.findings.since_resume_m);
+                self.results.add_cause(level, index, trials[*episode].lot, failure.cause, is_again);
             }
         }
-        first_trial += batch.len();
+        Ok(true)
     }
-    lines.flush()?;
-    let near_collisions = match track.near_collisions {
-        1 => "1 near-collision".to_owned(),
-        count => format!("{count} near-collisions"),
-    };
-    progress.end(&format!("{} of {runs} runs, {near_collisions}", track.done));
-    Ok(Evaluated { results, is_complete })
+
+    fn finish(self) -> anyhow::Result<EvaluationResults> {
+        self.lines.finish()?;
+        let Track { progress, runs, done, near_collisions } = self.track;
+        let near_collisions = match near_collisions {
+            1 => "1 near-collision".to_owned(),
+            count => format!("{count} near-collisions"),
+        };
+        progress.end(&format!("{done} of {runs} runs, {near_collisions}"));
+        Ok(self.results)
+    }
 }
 
-/// One driver in one batch at one noise level.
+/// What one driver drove of a batch at one noise level.
 struct DrivenBatch {
-    /// `None` for runs that were cut short.
-    reports: Vec<Option<EpisodeReport>>,
+    reports: Vec<EpisodeReport>,
     incidents: Vec<Incident>,
     wall_s: f64,
-}
-
-impl DrivenBatch {
-    fn finished<'a>(
-        &'a self,
-        batch: &TrialBatch<'a>,
-    ) -> impl Iterator<Item = (usize, (&'a Trial<'a>, &'a EpisodeReport))> + use<'a> {
-        let both = batch.trials.iter().zip(&self.reports).enumerate();
-        both.filter_map(|(i, (trial, report))| Some((i, (trial, report.as_ref()?))))
-    }
 }
 
 fn driven_by(batch: &TrialBatch<'_>, trial: &Trial<'_>) -> Driven {
@@ -114,16 +138,9 @@ fn driven_by(batch: &TrialBatch<'_>, trial: &Trial<'_>) -> Driven {
     }
 }
 
-/// The near-collisions of the finished runs, each with the index of its run within the batch.
-fn failures(
-    batch: &TrialBatch<'_>,
-    seed: RootSeed,
-    driven: &DrivenBatch,
-    try_clean: bool,
-) -> Vec<(usize, FailureRecord)> {
-    let is_kept = |incident: &&Incident| driven.reports[incident.episode].is_some();
-    let kept: Vec<Incident> = driven.incidents.iter().filter(is_kept).copied().collect();
-    let explained = incidents::explain(batch, &kept, try_clean);
+/// The near-collisions, each with the index of its run within the batch.
+fn failures(batch: &TrialBatch<'_>, seed: RootSeed, driven: &DrivenBatch) -> Vec<(usize, FailureRecord)> {
+    let explained = incidents::explain(batch, &driven.incidents);
     let failure = |(incident, (cause, findings)): (&Incident, _)| {
         let trial = &batch.trials[incident.episode];
         let failure = FailureRecord {
@@ -140,11 +157,12 @@ fn failures(
         };
         (incident.episode, failure)
     };
-    kept.iter().zip(explained).map(failure).collect()
+    driven.incidents.iter().zip(explained).map(failure).collect()
 }
 
 #[expect(clippy::disallowed_methods, reason = "wall_time.jsonl is for people; nothing computed depends on it")]
-fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> DrivenBatch {
+/// `None` if cancelled.
+fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> Option<DrivenBatch> {
     let started = Instant::now();
     let mut monitor = IncidentMonitor::new(batch.trials.len(), batch.episode);
     let mut shares = vec![0.0_f32; batch.trials.len()];
@@ -163,8 +181,9 @@ fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> DrivenBatch {
         }
         ControlFlow::Continue(())
     });
-    track.done += reports.iter().flatten().count();
-    DrivenBatch { reports, incidents: monitor.into_incidents(), wall_s: started.elapsed().as_secs_f64() }
+    let reports: Vec<EpisodeReport> = reports.into_iter().collect::<Option<_>>()?;
+    track.done += reports.len();
+    Some(DrivenBatch { reports, incidents: monitor.into_incidents(), wall_s: started.elapsed().as_secs_f64() })
 }
 
 /// Progress of the whole evaluation.
@@ -184,53 +203,28 @@ impl Track<'_> {
     }
 }
 
-/// The files that are written line by line.
-struct Lines {
-    runs: BufWriter<File>,
-    failures: BufWriter<File>,
-    wall_time: BufWriter<File>,
+/// The text of a part for each of the [`FILES`].
+fn lines(
+    batch: &TrialBatch<'_>,
+    seed: RootSeed,
+    driven: &DrivenBatch,
+    failures: &[(usize, FailureRecord)],
+) -> anyhow::Result<[Vec<u8>; 3]> {
+    let [mut runs, mut failed, mut wall_time] = [const { Vec::new() }; 3];
+    let ticks: u32 = driven.reports.iter().map(|report| report.metrics.ticks).sum();
+    for (trial, report) in batch.trials.iter().zip(&driven.reports) {
+        let key = batch.replay_key(trial, seed, 0);
+        line(&mut runs, &RunRecord::new(driven_by(batch, trial), &key, report))?;
+        // Runs of a batch are driven at once; each has its share by the number of its decisions.
+        let wall_s = driven.wall_s * f64::from(report.metrics.ticks) / f64::from(ticks.max(1));
+        line(&mut wall_time, &WallTimeRecord { driven: driven_by(batch, trial), wall_s })?;
+    }
+    failures.iter().try_for_each(|(_, failure)| line(&mut failed, failure))?;
+    Ok([runs, failed, wall_time])
 }
 
-impl Lines {
-    fn create(run: &RunDir) -> anyhow::Result<Self> {
-        let create = |name: &str| {
-            let path = run.path().join(name);
-            let file = File::create(&path).with_context(|| format!("{}: cannot be written", path.display()))?;
-            Ok::<_, anyhow::Error>(BufWriter::new(file))
-        };
-        let [runs, failures, wall_time] = [records::RUNS, records::FAILURES, records::WALL_TIME].map(create);
-        Ok(Self { runs: runs?, failures: failures?, wall_time: wall_time? })
-    }
-
-    fn add(
-        &mut self,
-        batch: &TrialBatch<'_>,
-        seed: RootSeed,
-        driven: &DrivenBatch,
-        failures: &[(usize, FailureRecord)],
-    ) -> anyhow::Result<()> {
-        let ticks: u32 = driven.finished(batch).map(|(_, (_, report))| report.metrics.ticks).sum();
-        for (_, (trial, report)) in driven.finished(batch) {
-            let key = batch.replay_key(trial, seed, 0);
-            line(&mut self.runs, &RunRecord::new(driven_by(batch, trial), &key, report))?;
-            // Runs of a batch are driven at once; each has its share by the number of its decisions.
-            let wall_s = driven.wall_s * f64::from(report.metrics.ticks) / f64::from(ticks.max(1));
-            line(&mut self.wall_time, &WallTimeRecord { driven: driven_by(batch, trial), wall_s })?;
-        }
-        failures.iter().try_for_each(|(_, failure)| line(&mut self.failures, failure))?;
-        self.flush()
-    }
-
-    /// Flushes, so that finished runs are on disk even if the process is killed.
-    fn flush(&mut self) -> anyhow::Result<()> {
-        for file in [&mut self.runs, &mut self.failures, &mut self.wall_time] {
-            file.flush().context("a file of the run cannot be written; is the disk full?")?;
-        }
-        Ok(())
-    }
-}
-
-fn line(file: &mut BufWriter<File>, value: &impl Serialize) -> anyhow::Result<()> {
-    serde_json::to_writer(&mut *file, value)?;
-    Ok(writeln!(file)?)
+fn line(text: &mut Vec<u8>, value: &impl Serialize) -> anyhow::Result<()> {
+    serde_json::to_writer(&mut *text, value)?;
+    text.push(b'\n');
+    Ok(())
 }

@@ -80,7 +80,7 @@ impl Cause {
 /// What the rules found at a near-collision.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
-    /// Whether the driver would have passed on the clean grid; `None` if that was not tried (cut short by Ctrl-C).
+    /// Whether the driver would have passed on the clean grid; `None` in files of earlier versions, if that was not tried.
     pub passes_on_clean_grid: Option<bool>,
     /// Steering reversals just before.
     pub reversals_before: u32,
@@ -196,24 +196,19 @@ impl IncidentMonitor {
     }
 }
 
-/// Cause and findings of every incident of a batch. `try_clean`: whether to spend time on the clean grid.
-pub fn explain(batch: &TrialBatch<'_>, incidents: &[Incident], try_clean: bool) -> Vec<(Cause, Findings)> {
+/// Cause and findings of every incident of a batch.
+pub fn explain(batch: &TrialBatch<'_>, incidents: &[Incident]) -> Vec<(Cause, Findings)> {
     let is_noisy = |incident: &Incident| {
         let map = &batch.maps[incident.episode];
         trials::episode_settings(batch.episode, batch.noise, map).noise.intensity > 0.0
     };
     let noisy: Vec<Incident> = incidents.iter().copied().filter(is_noisy).collect();
-    let mut passes = if try_clean {
-        passes_on_clean_grid(batch, &noisy).into_iter().map(Some).collect()
-    } else {
-        vec![None; noisy.len()]
-    }
-    .into_iter();
+    let mut passes = passes_on_clean_grid(batch, &noisy).into_iter();
     let explain = |incident: &Incident| {
         let noisy = is_noisy(incident);
         let map = &batch.maps[incident.episode];
         let findings = Findings {
-            passes_on_clean_grid: if noisy { passes.next().flatten() } else { Some(false) },
+            passes_on_clean_grid: if noisy { passes.next() } else { Some(false) },
             reversals_before: incident.reversals_before,
             free_width_m: free_width_m(map, incident.route_m),
             turn_deg: turn_deg(map, incident.route_m),

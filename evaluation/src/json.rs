@@ -4,18 +4,15 @@ use anyhow::{Context as _, ensure};
 use serde::de::DeserializeOwned;
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::path::Path;
+use storage::sums;
 
-/// Reads a file whose field `schema` is the version of its format; `None` if there is no such file.
+/// Reads a file whose field `schema` is the version of its format; `None` if no such file is finished.
 ///
 /// # Errors
-/// If it is not what it should be, or of another version.
+/// If it is missing, damaged or of another version.
 pub fn read_versioned<T: DeserializeOwned>(path: &Path, schema: u32) -> anyhow::Result<Option<T>> {
-    if !path.is_file() {
-        return Ok(None);
-    }
-    let text =
-        storage::read::text(path, RUN_TEXT_BYTES_MAX).with_context(|| format!("{}: cannot be read", path.display()))?;
-    let value: serde_json::Value = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
+    let Some(text) = sums::read_if_listed(path, RUN_TEXT_BYTES_MAX)? else { return Ok(None) };
+    let value: serde_json::Value = serde_json::from_slice(&text).with_context(|| path.display().to_string())?;
     let found = value.get("schema").and_then(serde_json::Value::as_u64).unwrap_or(0);
     ensure!(
         found == u64::from(schema),

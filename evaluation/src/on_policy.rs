@@ -96,7 +96,10 @@ struct Trained {
 impl Trained {
     fn open(folder: &Path) -> anyhow::Result<Self> {
         let store = Store::open(folder)?;
-        let rounds = (0..u32::MAX).take_while(|&round| Checkpoint::exists(&store.round_folder(round))).collect();
+        let mut rounds = Vec::new();
+        while store.is_finished(&store.round_folder(rounds.len() as u32))? {
+            rounds.push(rounds.len() as u32);
+        }
         Ok(Self { store, rounds })
     }
 

@@ -6,15 +6,27 @@ use crate::records::{self, FailureRecord, RunRecord};
 use crate::results::EvaluationResults;
 use anyhow::Context as _;
 use experiment::trials::Trial;
+use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::collections::BTreeMap;
 use std::path::Path;
+use storage::sums;
 
 impl EvaluationResults {
     /// Reads `runs.jsonl` and `failures.jsonl` of a folder: the same results as after driving the plan.
     ///
     /// # Errors
-    /// If a file cannot be read, or was not written by this plan.
+    /// If a file is missing or damaged, or was not written by this plan.
     pub fn read(plan: &Plan<'_>, folder: &Path) -> anyhow::Result<Self> {
+        let [runs, failures] =
+            [records::RUNS, records::FAILURES].map(|name| sums::read_to_string(&folder.join(name), RUN_TEXT_BYTES_MAX));
+        Self::of_lines(plan, folder, &runs?, &failures?)
+    }
+
+    /// Of the lines of both files, as far as they are written.
+    ///
+    /// # Errors
+    /// If they were not written by this plan.
+    pub(crate) fn of_lines(plan: &Plan<'_>, folder: &Path, runs: &str, failures: &str) -> anyhow::Result<Self> {
         let mut results = Self::new(plan);
         let evaluation = &plan.settings.evaluation;
         let trials: Vec<Trial<'_>> = plan.trials().collect();
@@ -25,13 +37,13 @@ impl EvaluationResults {
             let mut names = plan.drivers.iter().map(|driver| &driver.name);
             names.position(|known| known == name).with_context(|| format!("another driver, {name:?}"))
         };
-        records::each_line(&folder.join(records::RUNS), |run: RunRecord| {
+        records::each_line_of(&folder.join(records::RUNS), runs, |run: RunRecord| {
             let driven = run.driven;
             let index = index_of.get(&(driven.lot, driven.direction, driven.trial)).copied().context("another run")?;
             results.add(level_of(driven.noise)?, driver_of(&driven.driver)?, index, &trials[index], &run.report);
             Ok(())
         })?;
-        records::each_line(&folder.join(records::FAILURES), |failure: FailureRecord| {
+        records::each_line_of(&folder.join(records::FAILURES), failures, |failure: FailureRecord| {
             let driven = failure.driven;
             let lot = plan.lots.iter().find(|lot| lot.name() == driven.lot).context("another lot")?;
             let (level, driver) = (level_of(driven.noise)?, driver_of(&driven.driver)?);

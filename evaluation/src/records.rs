@@ -10,8 +10,8 @@ use sim::episode::EpisodeReport;
 use sim::frame::Ending;
 use sim::limits::{RECORD_BYTES_MAX, RUN_TEXT_BYTES_MAX};
 use sim::scenario::Direction;
-use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
+use storage::sums;
 
 /// The version of `runs.jsonl`, `failures.jsonl` and `wall_time.jsonl` that this program writes.
 pub const SCHEMA: u32 = 1;
@@ -106,23 +106,25 @@ pub struct WallTimeRecord {
     pub wall_s: f64,
 }
 
-/// Reads a file line by line.
+/// Reads a finished file line by line.
 ///
 /// # Errors
-/// If it cannot be read, is of another version, or `take` refuses a line.
-pub fn each_line<T: DeserializeOwned>(
+/// If it is missing, damaged or of another version, or `take` refuses a line.
+pub fn each_line<T: DeserializeOwned>(path: &Path, take: impl FnMut(T) -> anyhow::Result<()>) -> anyhow::Result<()> {
+    each_line_of(path, &sums::read_to_string(path, RUN_TEXT_BYTES_MAX)?, take)
+}
+
+/// Reads the lines of a file; `path` is for errors.
+///
+/// # Errors
+/// If it is of another version, or `take` refuses a line.
+pub fn each_line_of<T: DeserializeOwned>(
     path: &Path,
+    text: &str,
     mut take: impl FnMut(T) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    let in_file = || format!("{}: cannot be read", path.display());
-    let mut file = BufReader::new(storage::read::open(path, RUN_TEXT_BYTES_MAX).with_context(in_file)?);
-    let mut line = String::new();
-    for index in 0.. {
-        line.clear();
-        if file.by_ref().take(RECORD_BYTES_MAX).read_line(&mut line).with_context(in_file)? == 0 {
-            break;
-        }
-        let taken = parse(&line).and_then(&mut take);
+    for (index, line) in text.lines().enumerate() {
+        let taken = parse(line).and_then(&mut take);
         taken.with_context(|| {
             format!("{}:{}: not of this evaluation; drive it again into another folder", path.display(), index + 1)
         })?;
@@ -149,6 +151,7 @@ fn parse<T: DeserializeOwned>(line: &str) -> anyhow::Result<T> {
         #[serde(default)]
         schema: u32,
     }
+    ensure!(line.len() as u64 <= RECORD_BYTES_MAX, "the line has {} bytes", line.len());
     let Version { schema } = serde_json::from_str(line)?;
     ensure!(schema == SCHEMA, "written by another version of lotpilot (schema {schema}, this one reads {SCHEMA})");
     Ok(serde_json::from_str(line)?)

@@ -8,7 +8,7 @@ use experiment::settings::Settings;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// How much is done, besides what the settings say; `scaling.toml`.
+/// How much is done, besides what the settings say: the arguments in the manifest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Extent {

@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
 use std::path::Path;
 
-/// How much is done, besides what the settings say; `reproduce.toml`.
+/// How much is done, besides what the settings say: the arguments in the manifest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Extent {

@@ -1,12 +1,12 @@
 //! Sums over runs, and the rates computed from them (docs/methods.md 8).
 
 use crate::statistics::poisson::Rate;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sim::episode::EpisodeReport;
 use sim::frame::Ending;
 
 /// Sums over runs.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Totals {
     /// Runs driven.
     pub runs: u32,

@@ -24,14 +24,17 @@ use sim::frame::Event;
 use sim::map::Map;
 use sim::seed::RootSeed;
 use std::ops::ControlFlow;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use storage::{sealed, sums};
 
 /// Candidates that drive fresh trials besides the starting point.
 const FINALISTS: usize = 4;
 
 /// Tunes planners one after another and writes `NAME.toml` for each as it is found. Lots, trials, directions, noise and
-/// seed are those of the section `evaluation`. Ends early if cancelled: what is returned is what was found by then.
+/// seed are those of the section `evaluation`. Ends early if cancelled: what is returned is what was found by then. What
+/// every candidate did is kept in `NAME.candidates.toml`: an interrupted search goes on from there, to the same result.
 ///
 /// # Errors
 /// If a lot is not for training or cannot be driven, or a file cannot be written.
@@ -51,12 +54,16 @@ pub fn tune(
     let mut tuned = Vec::new();
     for start in planners {
         progress.begin("tuning", &format!("tuning {}", start.name));
-        let Some(found) = search(&course, start, budget, evaluation.seed, progress) else { break };
+        let name = start.name.replace('/', "-");
+        let candidates = format!("{name}.candidates.toml");
+        let mut driven = Driven::read(run.path().join(&candidates))?;
+        let Some(found) = search(&course, start, budget, evaluation.seed, &mut driven, progress)? else { break };
+        sums::list(run.path(), &[&candidates])?;
         progress.end(&format!(
             "{:.2} → {:.2} failures per 100 m",
             found.before.failures_per_100m, found.after.failures_per_100m
         ));
-        run.write(&format!("{}.toml", start.name.replace('/', "-")), found.to_toml(settings)?.as_bytes())?;
+        run.write(&format!("{name}.toml"), found.to_toml(settings)?.as_bytes())?;
         tuned.push(found);
     }
     Ok(tuned)
@@ -157,6 +164,40 @@ impl<'a> Course<'a> {
     }
 }
 
+/// What candidates did, in the order in which they were driven: on disk after every generation.
+struct Driven {
+    path: PathBuf,
+    totals: Vec<Totals>,
+    /// How many of them the search has been told.
+    told: usize,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Candidates {
+    candidate: Vec<Totals>,
+}
+
+impl Driven {
+    /// What an interrupted search left.
+    fn read(path: PathBuf) -> anyhow::Result<Self> {
+        let text = sealed::read(&path)?.unwrap_or_else(|| b"candidate = []".to_vec());
+        let Candidates { candidate } = toml::from_slice(&text).with_context(|| path.display().to_string())?;
+        Ok(Self { path, totals: candidate, told: 0 })
+    }
+
+    /// What the next candidates did, driven unless they were before.
+    fn next(&mut self, count: usize, drive: impl FnOnce() -> Vec<Totals>) -> anyhow::Result<Vec<Totals>> {
+        if self.told + count > self.totals.len() {
+            self.totals.truncate(self.told);
+            self.totals.extend(drive());
+            let candidates = Candidates { candidate: self.totals.clone() };
+            sealed::write(&self.path, toml::to_string(&candidates)?.as_bytes())?;
+        }
+        self.told += count;
+        Ok(self.totals[self.told - count..self.told].to_vec())
+    }
+}
+
 /// What decides between candidates; smaller is better.
 fn rank(totals: &Totals) -> (u32, u32, u32, i64) {
     let unfinished = totals.timed_out + totals.given_up;
@@ -229,8 +270,9 @@ fn search(
     Start { name, planner: start }: &Start,
     budget: usize,
     seed: RootSeed,
+    driven: &mut Driven,
     progress: &dyn Progress,
-) -> Option<Found> {
+) -> anyhow::Result<Option<Found>> {
     let finalists_max = FINALISTS.min(budget - 1) + 1;
     let runs_all = budget * course.search.trials.len() + finalists_max * course.fresh.trials.len();
     let runs_done = AtomicUsize::new(0);
@@ -250,7 +292,7 @@ fn search(
             break;
         }
         if progress.is_cancelled() {
-            return None;
+            return Ok(None);
         }
         // The starting point is driven as it is: its parameters may lie outside the ranges.
         let candidate = |point: &Vec<f32>| start.at(point);
@@ -258,7 +300,7 @@ fn search(
         if tried.is_empty() {
             candidates[0] = start.clone();
         }
-        let totals = course.drive(&candidates, &course.search, &on_run);
+        let totals = driven.next(candidates.len(), || course.drive(&candidates, &course.search, &on_run))?;
         tried.extend(
             generation.into_iter().zip(candidates).zip(totals).map(|((point, of), totals)| (point, of, totals)),
         );
@@ -268,7 +310,7 @@ fn search(
     order.truncate(finalists_max - 1);
     order.insert(0, 0);
     let finalists: Vec<PlannerSpec> = order.iter().map(|&index| tried[index].1.clone()).collect();
-    let fresh = course.drive(&finalists, &course.fresh, &on_run);
+    let fresh = driven.next(finalists.len(), || course.drive(&finalists, &course.fresh, &on_run))?;
     let together: Vec<Totals> = order
         .iter()
         .zip(&fresh)
@@ -278,8 +320,8 @@ fn search(
             totals
         })
         .collect();
-    let winner = (0..together.len()).min_by_key(|&place| (rank(&together[place]), place))?;
-    Some(Found {
+    let winner = (0..together.len()).min_by_key(|&place| (rank(&together[place]), place)).unwrap_or(0);
+    Ok(Some(Found {
         name: name.clone(),
         planner: finalists[winner].clone(),
         budget,
@@ -289,7 +331,7 @@ fn search(
         after: Score::of(&together[winner]),
         before_fresh: Score::of(&fresh[0]),
         after_fresh: Score::of(&fresh[winner]),
-    })
+    }))
 }
 
 /// How parameters were found, as written beside them.

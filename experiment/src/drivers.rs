@@ -17,6 +17,7 @@ use sim::limits::PLANNER_BYTES_MAX;
 use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use storage::sums;
 
 /// Parameters that ship: the planner, and the file that `cargo xtask tune` wrote.
 const TUNED: [(&str, &str); 6] = [
@@ -114,7 +115,7 @@ impl FromStr for DriverSpec {
                 if path.join("settings.toml").is_file() {
                     bail!("no driver {text:?}; did you mean run:{text}?");
                 }
-                if Checkpoint::exists(path) {
+                if Checkpoint::exists(path).is_ok_and(|exists| exists) {
                     bail!("no driver {text:?}; did you mean net:{text}?");
                 }
                 let known = if text.starts_with("tuned:") {
@@ -192,8 +193,9 @@ impl DriverSpec {
             Self::Run { folder } => Ok(vec![Checkpoint::load(&run_dir::policy_folder(folder)?)?]),
             Self::Checkpoint { folder } => {
                 ensure!(
-                    Checkpoint::exists(folder),
-                    "{} holds no model.safetensors; name the folder of a round, as in net:runs/NAME/round-03",
+                    Checkpoint::exists(folder)?,
+                    "{} lists no finished model.safetensors in sha256sums; name the folder of a round, as in \
+                     net:runs/NAME/round-03",
                     folder.display()
                 );
                 Ok(vec![Checkpoint::load(folder)?])
@@ -298,6 +300,24 @@ impl NamedDriver {
     #[must_use]
     pub fn renamed(self, name: &str) -> Self {
         Self { name: name.to_owned(), ..self }
+    }
+
+    /// SHA-256 of what its files say; `None` for one that ships.
+    pub fn digest(&self) -> Option<String> {
+        match (&self.model, &self.spec) {
+            (Model::Network(networks, _), _) => {
+                let mut bytes = Vec::new();
+                for network in networks {
+                    bytes.extend(format!("{:?} {:?}", network.conditions, network.inference).into_bytes());
+                    bytes.extend(network.weights.values().iter().flat_map(|value| value.to_le_bytes()));
+                }
+                Some(sums::digest(&bytes))
+            }
+            (Model::Planner(planner), DriverSpec::Planner { parameters: Parameters::File(_), .. }) => {
+                Some(sums::digest(planner.parameters().to_string().as_bytes()))
+            }
+            (Model::Expert(_) | Model::Planner(_), _) => None,
+        }
     }
 
     /// Who it is, as decisions say it.

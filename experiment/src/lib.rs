@@ -16,7 +16,7 @@
 
 pub mod drive;
 pub mod drivers;
-pub mod learning;
+pub mod inputs;
 pub mod lots;
 pub mod progress;
 pub mod replay_key;

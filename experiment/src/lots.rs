@@ -95,6 +95,12 @@ impl Lot {
         self.from_file.as_ref().map(|loaded| loaded.scenario.noise.level)
     }
 
+    /// SHA-256 of a lot from a file, as it was read; `None` for one that ships or is generated.
+    pub fn digest(&self) -> Option<String> {
+        let loaded = self.from_file.as_ref()?;
+        Some(storage::sums::digest(scenarios::load::to_toml(&loaded.scenario).as_bytes()))
+    }
+
     /// Name in tables.
     pub fn name(&self) -> &str {
         &self.name

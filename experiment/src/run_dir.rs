@@ -9,18 +9,21 @@
 //!   summary.md .json .csv, comparisons.csv, noise_sweep.csv, runs.jsonl, failures.md .jsonl     (evaluate)
 //!   wall_time.jsonl    the only file that differs from one repetition to the next, but for the manifest
 //!   finished.toml      written last
+//!   sha256sums         the digest of every finished file; it appears with the claim
+//!   .lock              who writes here
 //! ```
 
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
-use policy::checkpoint::Checkpoint;
 use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
 use sim::limits::RUN_TOML_BYTES_MAX;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use storage::lock::{self, Lock};
+use storage::{sums, whole};
 
 const MANIFEST: &str = "manifest.toml";
 const SETTINGS: &str = "settings.toml";
@@ -30,7 +33,21 @@ const FINISHED: &str = "finished.toml";
 #[derive(Debug, Clone)]
 pub struct RunDir {
     path: PathBuf,
+    /// The run that this is a folder of, and its path there.
+    within: Option<(PathBuf, String)>,
     _lock: Arc<Lock>,
+}
+
+/// SHA-256 of what is read from elsewhere by name, as on the command line: see [`inputs`](crate::inputs).
+pub type Inputs = BTreeMap<String, String>;
+
+/// What a run was asked for beside its settings, and what it reads from elsewhere.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Request {
+    /// Arguments of the command.
+    pub arguments: toml::Table,
+    /// Lots, parameters and networks from files.
+    pub inputs: Inputs,
 }
 
 /// What made a run: `manifest.toml`.
@@ -41,6 +58,8 @@ pub struct Manifest {
     pub schema: u32,
     /// The name and version of the program.
     pub program: String,
+    /// The command that made it, and alone can go on with it.
+    pub command: String,
     /// The command line, without the name of the program.
     pub command_line: Vec<String>,
     /// What the settings started from.
@@ -64,10 +83,16 @@ pub struct Manifest {
     /// The processor, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub processor: Option<String>,
+    /// What was asked for beside the settings.
+    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    pub arguments: toml::Table,
+    /// SHA-256 of what was read from elsewhere.
+    #[serde(default, skip_serializing_if = "Inputs::is_empty")]
+    pub inputs: Inputs,
 }
 
 /// The version of `manifest.toml` that this program writes.
-pub const MANIFEST_SCHEMA: u32 = 1;
+pub const MANIFEST_SCHEMA: u32 = 2;
 
 /// What a run came to, written last: `finished.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -145,32 +170,43 @@ pub struct Place<'a> {
 }
 
 impl RunDir {
-    /// Claims a folder and writes settings and manifest into it.
+    /// Claims a folder with settings and manifest: it is a run from the moment in which both are listed.
     ///
     /// # Errors
     /// If the folder is taken, in use by another process, or cannot be written.
-    pub fn create(place: &Place<'_>, settings: &Settings) -> anyhow::Result<Self> {
+    pub fn create(place: &Place<'_>, settings: &Settings, request: &Request) -> anyhow::Result<Self> {
         let run = match place.out {
             Some(out) => Self::claim_named(out, place)?,
             None => Self::claim_next_free(place)?,
         };
-        run.write(SETTINGS, settings.to_toml().as_bytes())?;
-        let manifest =
-            toml::to_string(&Manifest::new(place.build, place.preset, settings)).expect("a manifest is plain values");
-        run.write(MANIFEST, manifest.as_bytes())?;
+        let manifest = toml::to_string(&Manifest::new(place, settings, request)).expect("a manifest is plain values");
+        whole::write(&run.path.join(SETTINGS), settings.to_toml().as_bytes())?;
+        whole::write(&run.path.join(MANIFEST), manifest.as_bytes())?;
+        sums::list(&run.path, &[SETTINGS, MANIFEST])?;
         Ok(run)
     }
 
     /// Reopens the folder of an interrupted run.
     ///
     /// # Errors
-    /// If there is none, it is finished, or another process is at it.
-    pub fn resume(path: &Path, command: &str) -> anyhow::Result<(Self, Settings)> {
+    /// If there is none, another command made it, it is finished, its settings were changed, or another process is at it.
+    pub fn resume(path: &Path, command: &str) -> anyhow::Result<(Self, Settings, Manifest)> {
         ensure!(path.is_dir(), "{}: there is no such run to resume", path.display());
         let run = Self::locked(path.to_path_buf(), command)?;
-        ensure!(!path.join(FINISHED).is_file(), "{}: this run is finished; nothing is left to resume", path.display());
-        let settings = Settings::read(&path.join(SETTINGS))?;
-        Ok((run, settings))
+        ensure!(
+            sums::exists(path),
+            "{0}: nothing was begun there; begin it anew with --out {0}, with --overwrite if it is not empty",
+            path.display()
+        );
+        let manifest = Manifest::read(path)?;
+        ensure!(
+            manifest.command == command,
+            "{}: this is a run of {}; go on with: cargo xtask {1} --resume {0}",
+            path.display(),
+            manifest.command
+        );
+        ensure!(!is_finished(path)?, "{}: this run is finished; nothing is left to resume", path.display());
+        Ok((run, settings_of(path)?, manifest))
     }
 
     /// Reopens the folder of a run to write into it, whether it is finished or not.
@@ -178,62 +214,76 @@ impl RunDir {
     /// # Errors
     /// If there is none, or another process is at it.
     pub fn reopen(path: &Path, command: &str) -> anyhow::Result<Self> {
-        ensure!(path.join(SETTINGS).is_file(), "{}: this is no run; list the folders in runs/", path.display());
+        ensure!(sums::exists(path), "{}: this is no run; list the folders in runs/", path.display());
         Self::locked(path.to_path_buf(), command)
     }
 
-    /// Claims the folder of a stage within a run: `None` if it is finished, else as an interrupted one left it or new.
-    /// The folder belongs to the run: what cannot be continued there is started again.
+    /// Claims a folder within this run: `None` if it is finished, else as an interrupted command left it or new. It
+    /// belongs to the run: what cannot be continued there is started again.
     ///
     /// # Errors
-    /// If it was begun with other settings, is in use by another process, or cannot be written.
-    pub fn stage(path: &Path, place: &Place<'_>, settings: &Settings) -> anyhow::Result<Option<Self>> {
-        if is_finished(path) {
+    /// If it is listed as finished but is not, was begun with other settings, is in use by another process, or cannot be
+    /// written.
+    pub fn stage(&self, folder: &str, place: &Place<'_>, settings: &Settings) -> anyhow::Result<Option<Self>> {
+        let (path, list) = (self.path.join(folder), format!("{folder}/{}", sums::FILE));
+        if sums::is_listed(&self.path, &list)? {
+            sums::read_listed(&self.path, &list, sums::LIST_BYTES_MAX)?;
             return Ok(None);
         }
-        if path.join(MANIFEST).is_file() {
-            let (run, found) = Self::resume(path, place.command)?;
+        if is_finished(&path)? {
+            sums::list(&self.path, &[&list])?;
+            return Ok(None);
+        }
+        let stage = if sums::exists(&path) {
+            let (stage, found, _) = Self::resume(&path, place.command)?;
             ensure!(
                 found == *settings,
                 "{}: this stage was begun with other settings; delete the folder, or choose another --out",
                 path.display()
             );
-            return Ok(Some(run));
-        }
-        if path.exists() {
-            Self::locked(path.to_path_buf(), place.command)?.clear()?;
-        }
-        Self::create(&Place { out: Some(path), ..*place }, settings).map(Some)
+            stage
+        } else {
+            if path.exists() {
+                Self::locked(path.clone(), place.command)?.clear()?;
+            }
+            Self::create(&Place { out: Some(&path), ..*place }, settings, &Request::default())?
+        };
+        Ok(Some(Self { within: Some((self.path.clone(), list)), ..stage }))
     }
 
     /// Takes the lock of a folder that is there.
     fn locked(path: PathBuf, command: &str) -> anyhow::Result<Self> {
         let lock = Arc::new(Lock::take(&path, command)?);
-        Ok(Self { path, _lock: lock })
+        Ok(Self { path, within: None, _lock: lock })
     }
 
     fn claim_named(path: &Path, place: &Place<'_>) -> anyhow::Result<Self> {
         fs::create_dir_all(path)
             .with_context(|| format!("{}: cannot be created; choose another --out", path.display()))?;
-        let is_empty = fs::read_dir(path)?.all(|entry| entry.is_ok_and(|entry| entry.file_name() == lock::FILE));
-        let is_run = path.join(SETTINGS).is_file();
+        let names: Vec<_> = fs::read_dir(path)?.filter_map(|entry| Some(entry.ok()?.file_name())).collect();
+        // What a process leaves that dies before its claim: nothing but this, and never without the lock.
+        let is_free = names.iter().all(|name| {
+            name == lock::FILE || name == SETTINGS || name == MANIFEST || name.to_string_lossy().ends_with(".partial")
+        }) && (names.is_empty() || names.iter().any(|name| name == lock::FILE));
+        // A run of an earlier version has no list.
+        let is_run = sums::exists(path) || path.join(SETTINGS).is_file();
         // Before the lock is taken: nothing is written into a folder that is no run.
-        if !is_empty && !is_run {
+        if !is_free && !is_run {
             let way_out =
                 if place.overwrite { "so --overwrite will not delete it; choose" } else { "and not empty; choose" };
             bail!("{}: this folder is not a run, {way_out} another --out", path.display());
         }
         let run = Self::locked(path.to_path_buf(), place.command)?;
-        if is_run {
-            let path = path.display();
+        if !is_free {
+            let name = path.display();
             ensure!(
-                place.overwrite || is_finished(&run.path),
-                "{path}: this folder is not empty; continue it with --resume {path}, choose another --out, or delete it \
+                place.overwrite || path.join(FINISHED).is_file(),
+                "{name}: this folder is not empty; continue it with --resume {name}, choose another --out, or delete it \
                  with --overwrite"
             );
             ensure!(
                 place.overwrite,
-                "{path}: this folder is not empty; choose another --out, or delete it with --overwrite"
+                "{name}: this folder is not empty; choose another --out, or delete it with --overwrite"
             );
             run.clear()?;
         }
@@ -258,11 +308,11 @@ impl RunDir {
         }
     }
 
-    /// Deletes everything but the lock. The settings go last: until then the folder is known as a run.
+    /// Deletes everything but the lock. List and settings go last: until then the folder is known as a run.
     fn clear(&self) -> anyhow::Result<()> {
         let delete = || {
             let mut entries = fs::read_dir(&self.path)?.collect::<Result<Vec<_>, _>>()?;
-            entries.sort_by_key(|entry| entry.file_name() == SETTINGS);
+            entries.sort_by_key(|entry| (entry.file_name() == SETTINGS, entry.file_name() == sums::FILE));
             for entry in entries {
                 if entry.file_type()?.is_dir() {
                     fs::remove_dir_all(entry.path())?;
@@ -275,55 +325,94 @@ impl RunDir {
         delete().with_context(|| format!("{}: cannot be deleted", self.path.display()))
     }
 
+    /// Lists this folder anew in the run that it is a finished folder of, after something was written into it.
+    ///
+    /// # Errors
+    /// If a list cannot be read or written.
+    pub fn list_in_parents(&self) -> anyhow::Result<()> {
+        let mut list = PathBuf::from(sums::FILE);
+        let mut folder = self.path.as_path();
+        while let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) {
+            list = Path::new(name).join(list);
+            let listed = list.to_string_lossy();
+            if sums::is_listed(parent, &listed)? {
+                return Ok(sums::list(parent, &[&listed])?);
+            }
+            folder = parent;
+        }
+        Ok(())
+    }
+
     /// The folder.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes a file under a temporary name and renames it, so that it never exists half-written.
+    /// Writes a file and lists it: it is there whole or not at all.
     ///
     /// # Errors
     /// If it cannot be written.
     pub fn write(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
-        Ok(storage::whole::write(&self.path.join(name), content)?)
+        Ok(sums::write(&self.path, name, content)?)
     }
 
-    /// Marks the run as finished.
+    /// Marks the run as finished, in the run that it is a folder of as well.
     ///
     /// # Errors
     /// If it cannot be written.
     pub fn finish(&self, outcome: Outcome) -> anyhow::Result<()> {
         let finished = Finished { schema: FINISHED_SCHEMA, outcome };
-        self.write(FINISHED, toml::to_string(&finished)?.as_bytes())
+        self.write(FINISHED, toml::to_string(&finished)?.as_bytes())?;
+        if let Some((run, list)) = &self.within {
+            sums::list(run, &[list])?;
+        }
+        Ok(())
     }
 }
 
+/// What a run came to; `None` if it is not finished.
+///
+/// # Errors
+/// If the file is missing, damaged or of another version.
+pub fn finished(path: &Path) -> anyhow::Result<Option<Finished>> {
+    let file = path.join(FINISHED);
+    let Some(text) = sums::read_if_listed(&file, RUN_TOML_BYTES_MAX)? else { return Ok(None) };
+    let text = String::from_utf8(text).with_context(|| file.display().to_string())?;
+    Ok(Some(toml::from_str(&text).with_context(|| file.display().to_string())?))
+}
+
 /// Whether a run is finished.
-pub fn is_finished(path: &Path) -> bool {
-    path.join(FINISHED).is_file()
+///
+/// # Errors
+/// See [`finished`].
+pub fn is_finished(path: &Path) -> anyhow::Result<bool> {
+    Ok(finished(path)?.is_some())
 }
 
 /// The folder with the checkpoint that `run:DIR` or `run:DIR/bc` names.
 ///
 /// # Errors
-/// If there is no run, or no network in it yet.
+/// If there is no run, no network in it yet, or one of its rounds is missing or incomplete.
 pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
     let (run, is_bc) = run_of(spec)?;
-    let last = if is_bc {
-        Some(run.join("round-00"))
-    } else {
-        let mut rounds: Vec<PathBuf> = fs::read_dir(run)
-            .with_context(|| run.display().to_string())?
-            .filter_map(|entry| Some(entry.ok()?.path()))
-            .filter(|path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("round-")))
-            .filter(|path| Checkpoint::exists(path))
-            .collect();
-        rounds.sort();
-        let last_fit = Some(run.join("final")).filter(|path| Checkpoint::exists(path));
-        last_fit.or_else(|| rounds.pop())
-    };
-    last.filter(|path| Checkpoint::exists(path))
-        .with_context(|| format!("{}: no network is trained there yet; finish it with --resume {0}", run.display()))
+    let names = sums::names(run)?;
+    let folders = names.iter().filter_map(|name| name.strip_suffix(&format!("/{}", sums::FILE)));
+    let mut folders: Vec<&str> = folders.filter(|folder| *folder == "final" || folder.starts_with("round-")).collect();
+    let rounds = folders.iter().filter(|folder| **folder != "final").count();
+    if let Some(Finished { outcome: Outcome::Training { rounds: expected, .. }, .. }) = finished(run)? {
+        ensure!(
+            rounds == expected,
+            "{}: {rounds} rounds are listed of {expected} that were finished; restore sha256sums from a copy, or train \
+             again into another folder",
+            run.display()
+        );
+    }
+    folders.sort_by_key(|folder| (*folder == "final", *folder));
+    let folder = if is_bc { folders.first() } else { folders.last() };
+    let folder = folder
+        .with_context(|| format!("{}: no network is trained there yet; finish it with --resume {0}", run.display()))?;
+    sums::read_listed(run, &format!("{folder}/{}", sums::FILE), sums::LIST_BYTES_MAX)?;
+    Ok(run.join(folder))
 }
 
 /// The settings of the run that `run:DIR` or `run:DIR/bc` names.
@@ -341,7 +430,7 @@ fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
         _ => (spec, false),
     };
     ensure!(
-        run.join(SETTINGS).is_file(),
+        sums::exists(run),
         "{}: this is no run; train one with cargo xtask train-dagger, or list the folders in runs/",
         run.display()
     );
@@ -349,10 +438,12 @@ fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
 }
 
 impl Manifest {
-    fn new(build: &Build, preset: &str, settings: &Settings) -> Self {
+    fn new(place: &Place<'_>, settings: &Settings, request: &Request) -> Self {
+        let Place { build, command, preset, .. } = *place;
         Self {
             schema: MANIFEST_SCHEMA,
             program: build.program.clone(),
+            command: command.to_owned(),
             command_line: build.command_line.clone(),
             preset: preset.to_owned(),
             root_seed: settings.seed.0,
@@ -363,17 +454,33 @@ impl Manifest {
             threads: rayon::current_num_threads(),
             target: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
             processor: build.processor.clone(),
+            arguments: request.arguments.clone(),
+            inputs: request.inputs.clone(),
         }
+    }
+
+    /// Whether what is read from elsewhere is what the run was begun with.
+    ///
+    /// # Errors
+    /// Naming what differs.
+    pub fn check_inputs(&self, found: &Inputs) -> anyhow::Result<()> {
+        for (name, digest) in &self.inputs {
+            ensure!(
+                found.get(name) == Some(digest),
+                "{name}: changed since this run was begun; restore it, or begin again into another folder"
+            );
+        }
+        ensure!(found.len() == self.inputs.len(), "this run was begun with other lots or drivers; begin again");
+        Ok(())
     }
 
     /// Reads the manifest of a run.
     ///
     /// # Errors
-    /// If it cannot be read or is of another version.
+    /// If it is missing, damaged or of another version.
     pub fn read(run: &Path) -> anyhow::Result<Self> {
         let path = run.join(MANIFEST);
-        let text = storage::read::text(&path, RUN_TOML_BYTES_MAX)
-            .with_context(|| format!("{}: cannot be read", path.display()))?;
+        let text = sums::read_to_string(&path, RUN_TOML_BYTES_MAX)?;
         let table: toml::Table = text.parse().with_context(|| path.display().to_string())?;
         let schema = table.get("schema").and_then(toml::Value::as_integer).unwrap_or(0);
         ensure!(
@@ -389,6 +496,7 @@ impl Manifest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use policy::checkpoint::Checkpoint;
     use policy::conditions::Conditions;
     use policy::network::Weights;
     use sim::seed::RootSeed;
@@ -410,11 +518,7 @@ mod tests {
     }
 
     fn create(out: &Path, overwrite: bool) -> anyhow::Result<RunDir> {
-        RunDir::create(&place(out, overwrite), &Settings::preset("smoke")?)
-    }
-
-    fn stage(out: &Path) -> anyhow::Result<Option<RunDir>> {
-        RunDir::stage(out, &place(out, false), &Settings::preset("smoke")?)
+        RunDir::create(&place(out, overwrite), &Settings::preset("smoke")?, &Request::default())
     }
 
     fn message<T: std::fmt::Debug>(result: anyhow::Result<T>) -> String {
@@ -426,7 +530,7 @@ mod tests {
         let path = scratch("claim");
         drop(create(&path, false).unwrap());
         assert!(message(create(&path, false)).contains("--resume"));
-        let (run, settings) = RunDir::resume(&path, "train-dagger").unwrap();
+        let (run, settings, _) = RunDir::resume(&path, "train-dagger").unwrap();
         assert_eq!(settings, Settings::preset("smoke").unwrap());
         run.finish(Outcome::Reproduction { stages: 8 }).unwrap();
         drop(run);
@@ -448,13 +552,75 @@ mod tests {
             message(create(&path, true)),
             message(RunDir::resume(&path, "train-bc")),
             message(RunDir::reopen(&path, "render")),
-            message(stage(&path)),
         ] {
             assert!(refused.contains(&owner), "{refused}");
         }
         assert!(path.join(SETTINGS).is_file(), "nothing is deleted");
-        drop(run);
+        let settings = Settings::preset("smoke").unwrap();
+        let stage = || run.stage("elsewhere", &place(&path, false), &settings);
+        let first = stage().unwrap();
+        assert!(message(stage()).contains(&owner), "a folder within a run has an owner, too");
+        drop((first, run));
         create(&path, true).unwrap();
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// Whatever is there when a process dies while it claims a folder: the folder can be used.
+    #[test]
+    fn a_death_in_the_first_moments_leaves_a_folder_that_can_be_begun_again() {
+        let path = scratch("first-moments");
+        drop(create(&path, false).unwrap());
+        let whole: Vec<_> =
+            [SETTINGS, MANIFEST, sums::FILE].map(|name| (name, fs::read(path.join(name)).unwrap())).into();
+        for written in 0..whole.len() {
+            for overwrite in [false, true] {
+                fs::remove_dir_all(&path).unwrap();
+                fs::create_dir(&path).unwrap();
+                fs::write(path.join(lock::FILE), "train-dagger, process 1\n").unwrap();
+                whole[..written].iter().for_each(|(name, content)| fs::write(path.join(name), content).unwrap());
+                fs::write(path.join(whole[written].0).with_added_extension("partial"), "half").unwrap();
+                let refused = message(RunDir::resume(&path, "train-dagger"));
+                assert!(refused.contains("nothing was begun there") && refused.contains("--out"), "{refused}");
+                drop(create(&path, overwrite).unwrap());
+                RunDir::resume(&path, "train-dagger").unwrap();
+            }
+        }
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// Another command went on with it, and settings outside the section `dagger` could be edited.
+    #[test]
+    fn a_run_is_continued_only_by_its_command_with_its_settings_and_inputs() {
+        let path = scratch("continued");
+        drop(create(&path, false).unwrap());
+        assert!(message(RunDir::resume(&path, "evaluate")).contains("cargo xtask train-dagger --resume"));
+        let settings = fs::read_to_string(path.join(SETTINGS)).unwrap();
+        fs::write(path.join(SETTINGS), settings.replacen("trials = 1", "trials = 2", 1)).unwrap();
+        let refused = message(RunDir::resume(&path, "train-dagger"));
+        assert!(refused.contains("settings.toml: is damaged"), "{refused}");
+        fs::write(path.join(SETTINGS), settings).unwrap();
+        let (_, _, manifest) = RunDir::resume(&path, "train-dagger").unwrap();
+        manifest.check_inputs(&Inputs::new()).unwrap();
+        let begun = Manifest { inputs: Inputs::from([("lots/x.toml".to_owned(), "1".to_owned())]), ..manifest };
+        begun.check_inputs(&begun.inputs).unwrap();
+        let changed = Inputs::from([("lots/x.toml".to_owned(), "2".to_owned())]);
+        assert!(message(begun.check_inputs(&changed)).contains("lots/x.toml: changed"));
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn a_folder_within_a_run_is_begun_once_continued_and_listed_when_finished() {
+        let path = scratch("stages");
+        let settings = Settings::preset("smoke").unwrap();
+        let run = create(&path, false).unwrap();
+        let stage = || run.stage("chains/one", &place(&path, false), &settings);
+        drop(stage().unwrap().unwrap());
+        let again = stage().unwrap().unwrap();
+        again.finish(Outcome::Evaluation { drivers: Vec::new() }).unwrap();
+        drop(again);
+        assert!(stage().unwrap().is_none());
+        fs::remove_file(path.join("chains/one/sha256sums")).unwrap();
+        assert!(message(stage()).contains("chains/one/sha256sums"), "listed as finished, but incomplete");
         fs::remove_dir_all(path).unwrap();
     }
 
@@ -478,14 +644,19 @@ mod tests {
         let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
         let checkpoint =
             Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
-        for round in ["round-00", "round-01", "round-10"] {
-            checkpoint.save(&path.join(round)).unwrap();
-        }
+        let save = |folder: &str| {
+            checkpoint.save(&path.join(folder)).unwrap();
+            sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
+        };
+        ["round-00", "round-01", "round-10"].iter().for_each(|folder| save(folder));
         fs::create_dir_all(path.join("round-11")).unwrap(); // collected, not trained yet
         assert_eq!(policy_folder(&path).unwrap(), path.join("round-10"));
         assert_eq!(policy_folder(&path.join("bc")).unwrap(), path.join("round-00"));
-        checkpoint.save(&path.join("final")).unwrap();
+        save("final");
         assert_eq!(policy_folder(&path).unwrap(), path.join("final"));
+        // A round that was lost is an error: another would drive under its name.
+        fs::remove_dir_all(path.join("final")).unwrap();
+        assert!(message(policy_folder(&path)).contains("final/sha256sums"));
         fs::remove_dir_all(path).unwrap();
     }
 }

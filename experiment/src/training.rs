@@ -1,18 +1,18 @@
 //! Behaviour cloning and DAgger into a run folder: Algorithm 1 with its files, its progress and its learning curves.
 
+use crate::drive;
 use crate::drivers;
 use crate::lots::Lot;
 use crate::progress::{Elapsed, Progress};
 use crate::run_dir::{self, RunDir};
 use crate::settings::Settings;
 use crate::trials::{self, Purpose, Trial};
-use crate::{drive, learning};
 use anyhow::ensure;
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
 use policy::dagger::{Hooks, Outcome, Progress as DaggerProgress, Rollouts, RoundEpisode};
 use policy::dataset::store::Store;
-use policy::fit::{FitProgress, FitReport};
+use policy::fit::FitProgress;
 use sim::driver::Source;
 use sim::episode::Episode;
 use sim::frame::Frame;
@@ -33,7 +33,7 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
     // A lot that cannot be driven is found here, with its error, not in the middle of a round.
     episodes_of(settings, &lots, 0)?;
     let store = Store::open(run.path())?;
-    let monitor = RefCell::new(Monitor::new(progress, store.clone()));
+    let monitor = RefCell::new(Monitor::new(progress));
     let conditions = Conditions::of(&settings.episode);
     let mut hooks = Hooks {
         episodes: &mut |round| {
@@ -46,19 +46,14 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
         progress: &mut |report| {
             let mut monitor = monitor.borrow_mut();
             monitor.report(report);
-            let is_over = progress.is_cancelled() || monitor.failed.is_some();
-            if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if progress.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         },
     };
     let outcome = policy::dagger::run(&settings.dagger, &conditions, &store, settings.seed, &mut hooks)?;
-    let mut monitor = monitor.into_inner();
-    if monitor.task.is_some() {
+    if monitor.into_inner().task.is_some() {
         progress.end("stopped");
     }
-    if let (Some(fit), None) = (learning::report(&store.final_folder())?, &monitor.failed) {
-        monitor.keep_curve(&store.final_folder(), &fit);
-    }
-    monitor.failed.map_or(Ok(outcome), Err)
+    Ok(outcome)
 }
 
 /// The episodes of a round with their experts. Lots that draw their obstacles are driven `training.trials` times. A
@@ -103,15 +98,11 @@ pub fn drive_again(run: &Path, round: u32, drive: u32) -> anyhow::Result<(Arc<Ma
     Ok((map, Rollouts::of_round(&settings.dagger, settings.seed, novice.as_ref(), vec![episode])))
 }
 
-/// Passes on what is reported during a training, and keeps learning curves.
+/// Passes on what is reported during a training.
 struct Monitor<'a> {
     progress: &'a dyn Progress,
     task: Option<Task>,
     collection: Collection,
-    store: Store,
-    curve: learning::Recorder,
-    /// A file that could not be written: ends the run at the next safe point.
-    failed: Option<anyhow::Error>,
 }
 
 /// What is being done at present.
@@ -142,9 +133,8 @@ impl Collection {
 }
 
 impl<'a> Monitor<'a> {
-    fn new(progress: &'a dyn Progress, store: Store) -> Self {
-        let (collection, curve) = (Collection::default(), learning::Recorder::default());
-        Self { progress, task: None, collection, store, curve, failed: None }
+    fn new(progress: &'a dyn Progress) -> Self {
+        Self { progress, task: None, collection: Collection::default() }
     }
 
     fn frame(&mut self, episode: usize, frame: &Frame) {
@@ -169,20 +159,14 @@ impl<'a> Monitor<'a> {
                 self.end(&format!("{} samples, {dataset} in all{eta}", collection.samples));
             }
             DaggerProgress::Fitting { round, fit } => self.fitting(round, fit),
-            DaggerProgress::Finished { row, fit } => {
-                self.keep_curve(&self.store.round_folder(row.round), fit);
+            DaggerProgress::Finished { row, .. } => {
                 let error_m = row.validation_rmse_m.map_or_else(String::new, |error| format!("{error:.3} m off"));
                 self.end(&format!("validation {error_m}"));
             }
         }
     }
 
-    fn keep_curve(&mut self, folder: &Path, fit: &FitReport) {
-        self.failed = self.failed.take().or(self.curve.write(folder, fit).err());
-    }
-
     fn fitting(&mut self, round: Option<u32>, fit: &FitProgress) {
-        self.curve.step(fit);
         if self.task.is_none() {
             let label = round.map_or_else(|| "final training".to_owned(), |round| format!("round {round}: training"));
             self.begin(Task::Fitting, &label);
@@ -230,7 +214,7 @@ mod tests {
         assert!(settings.dagger.disturbance.enabled);
         let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle).unwrap();
         let store = Store::open(&run).unwrap();
-        std::fs::write(run.join("settings.toml"), settings.to_toml()).unwrap();
+        storage::sums::write(&run, "settings.toml", settings.to_toml().as_bytes()).unwrap();
         let mut hooks = Hooks {
             episodes: &mut |round| episodes_of(&settings, &lots, round).unwrap(),
             on_frame: &mut |_, _, _| {},

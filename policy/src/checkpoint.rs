@@ -15,6 +15,7 @@ use sim::limits::HEADER_BYTES_MAX;
 use sim::sensing::GridGeometry;
 use std::io::Write as _;
 use std::path::Path;
+use storage::sums;
 
 /// A network, the meaning of its numbers, and how it is used.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,15 +93,27 @@ const OUTPUT: &str = "[u, w, raw_u, raw_w]: (u, w) look-ahead point in image fra
 
 impl Checkpoint {
     /// Whether a folder holds a finished checkpoint.
-    pub fn exists(folder: &Path) -> bool {
-        folder.join(NUMBERS).is_file()
+    ///
+    /// # Errors
+    /// If the list of its files is damaged.
+    pub fn exists(folder: &Path) -> Result<bool, FileError> {
+        sums::is_listed(folder, NUMBERS)
     }
 
-    /// Writes both files into a folder; the numbers last, so that their presence means a finished checkpoint.
+    /// Writes both files into a folder and lists them.
     ///
     /// # Errors
     /// If a file cannot be written.
     pub fn save(&self, folder: &Path) -> Result<(), FileError> {
+        self.write(folder)?;
+        sums::list(folder, &Self::FILES)
+    }
+
+    /// The names of its files.
+    pub(crate) const FILES: [&str; 2] = [ModelFile::NAME, NUMBERS];
+
+    /// Writes both files into a folder. They are finished when they are listed.
+    pub(crate) fn write(&self, folder: &Path) -> Result<(), FileError> {
         files::create_folder(folder)?;
         let network = self.weights.architecture();
         let about = ModelFile {
@@ -129,7 +142,7 @@ impl Checkpoint {
     /// Reads both files.
     ///
     /// # Errors
-    /// If a file is missing, of another schema, or its tensors are those of another network.
+    /// If a file is missing, damaged or of another schema, or its tensors are those of another network.
     pub fn load(folder: &Path) -> Result<Self, FileError> {
         let about: ModelFile = files::read(folder)?;
         let path = folder.join(ModelFile::NAME);
@@ -152,7 +165,7 @@ impl Checkpoint {
 
         let path = folder.join(NUMBERS);
         let bytes_max = 4 * about.network.parameter_count() as u64 + HEADER_BYTES_MAX;
-        let bytes = storage::read::bytes(&path, bytes_max).map_err(|error| FileError::new(&path, error, RESTORE))?;
+        let bytes = sums::read(&path, bytes_max)?;
         let tensors = SafeTensors::deserialize(&bytes).map_err(|error| FileError::new(&path, error, RESTORE))?;
         let mut weights = Weights::zeros(about.network);
         from_pytorch(&mut weights, |name, shape| {
@@ -310,9 +323,9 @@ mod tests {
     fn a_checkpoint_reads_back_bit_by_bit() {
         let folder = scratch("checkpoint");
         let saved = checkpoint(NetworkArchitecture::paper());
-        assert!(!Checkpoint::exists(&folder));
+        assert!(!Checkpoint::exists(&folder).unwrap());
         saved.save(&folder).unwrap();
-        assert!(Checkpoint::exists(&folder));
+        assert!(Checkpoint::exists(&folder).unwrap());
         let loaded = Checkpoint::load(&folder).unwrap();
         assert_eq!(loaded.weights.values(), saved.weights.values());
         assert_eq!(loaded, saved);
@@ -341,7 +354,7 @@ mod tests {
         checkpoint(NetworkArchitecture::compact()).save(&folder).unwrap();
         let small = fs::read(folder.join(NUMBERS)).unwrap();
         checkpoint(NetworkArchitecture::paper()).save(&folder).unwrap();
-        fs::write(folder.join(NUMBERS), small).unwrap();
+        sums::write(&folder, NUMBERS, &small).unwrap();
         let error = Checkpoint::load(&folder).unwrap_err().to_string();
         for part in ["model.safetensors", "conv1.weight", "[32, 1, 5, 5]", "[16, 1, 3, 3]"] {
             assert!(error.contains(part), "{error}");
@@ -365,7 +378,7 @@ mod tests {
         checkpoint(NetworkArchitecture::compact()).save(&folder).unwrap();
         let path = folder.join("model.toml");
         let text = fs::read_to_string(&path).unwrap();
-        fs::write(&path, text.replace("schema = 3", "format_version = 1")).unwrap();
+        sums::write(&folder, "model.toml", text.replace("schema = 3", "format_version = 1").as_bytes()).unwrap();
         let error = Checkpoint::load(&folder).unwrap_err().to_string();
         assert!(error.contains("model.toml") && error.contains("older version"), "{error}");
         fs::remove_dir_all(folder).unwrap();

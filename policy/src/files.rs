@@ -3,32 +3,16 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use sim::limits::RUN_TOML_BYTES_MAX;
-use std::fs::{self, File};
-use std::io::{BufReader, BufWriter, Write as _};
-use std::path::{Path, PathBuf};
+use std::fs;
+use std::io::{Cursor, Write as _};
+use std::path::Path;
+use storage::sums;
+pub(crate) use storage::whole::{WRITE_REMEDY, write_with as write_atomically};
 use toml::{Table, Value};
 
-/// What is wrong with a file or folder, and what to do about it.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}; {remedy}", path.display())]
-pub struct FileError {
-    /// Which file or folder.
-    pub path: PathBuf,
-    /// What is wrong.
-    pub problem: String,
-    /// What helps.
-    pub remedy: &'static str,
-}
+pub use storage::FileError;
 
-impl FileError {
-    pub(crate) fn new(path: &Path, problem: impl std::fmt::Display, remedy: &'static str) -> Self {
-        Self { path: path.to_path_buf(), problem: problem.to_string(), remedy }
-    }
-}
-
-pub(crate) const WRITE_REMEDY: &str = "check that the folder exists, is writable and has space";
-pub(crate) const RESTORE_REMEDY: &str = "restore the file, or train again into another folder; a run that is not \
-                                         finished makes its rounds again when this one and all later ones are deleted";
+pub(crate) const RESTORE_REMEDY: &str = "restore it from a copy, or train again into another folder";
 pub(crate) const SCHEMA_REMEDY: &str = "train again into another folder, or use the version of lotpilot that wrote it";
 
 /// A TOML file with one name and a schema version, which is its first key.
@@ -39,7 +23,7 @@ pub(crate) trait Format: Serialize + DeserializeOwned {
     const SCHEMA: u32;
 }
 
-/// Writes a file into its folder.
+/// Writes a file into its folder; it is finished when it is listed.
 pub(crate) fn write<T: Format>(folder: &Path, content: &T) -> Result<(), FileError> {
     let path = folder.join(T::NAME);
     let text = toml::to_string_pretty(content)
@@ -50,8 +34,7 @@ pub(crate) fn write<T: Format>(folder: &Path, content: &T) -> Result<(), FileErr
 /// Reads a file from its folder.
 pub(crate) fn read<T: Format>(folder: &Path) -> Result<T, FileError> {
     let path = folder.join(T::NAME);
-    let text =
-        storage::read::text(&path, RUN_TOML_BYTES_MAX).map_err(|error| FileError::new(&path, error, RESTORE_REMEDY))?;
+    let text = sums::read_to_string(&path, RUN_TOML_BYTES_MAX)?;
     let mut table: Table = text.parse().map_err(|error| FileError::new(&path, error, RESTORE_REMEDY))?;
     match table.remove("schema") {
         Some(Value::Integer(schema)) if schema == i64::from(T::SCHEMA) => {}
@@ -67,9 +50,9 @@ pub(crate) fn read<T: Format>(folder: &Path) -> Result<T, FileError> {
     T::deserialize(Value::Table(table)).map_err(|error| FileError::new(&path, error, RESTORE_REMEDY))
 }
 
-/// Reads a file from its folder; `None` if it is not there.
-pub(crate) fn read_if_there<T: Format>(folder: &Path) -> Result<Option<T>, FileError> {
-    folder.join(T::NAME).is_file().then(|| read(folder)).transpose()
+/// Reads a file from its folder; `None` if it is not finished.
+pub(crate) fn read_if_finished<T: Format>(folder: &Path) -> Result<Option<T>, FileError> {
+    sums::is_listed(folder, T::NAME)?.then(|| read(folder)).transpose()
 }
 
 /// Creates a folder if it is not there. Not those above it: a run whose folder was removed must not come back in part.
@@ -80,26 +63,9 @@ pub(crate) fn create_folder(folder: &Path) -> Result<(), FileError> {
     }
 }
 
-/// Opens a file of at most so many bytes for reading.
-pub(crate) fn open(path: &Path, bytes_max: u64) -> Result<BufReader<File>, FileError> {
-    storage::read::open(path, bytes_max)
-        .map(BufReader::new)
-        .map_err(|error| FileError::new(path, error, RESTORE_REMEDY))
-}
-
-/// Writes beside the file, then renames: under its name it is always whole.
-pub(crate) fn write_atomically(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
-) -> Result<(), FileError> {
-    let partial = path.with_extension("partial");
-    let fail = |problem: String| FileError::new(path, problem, WRITE_REMEDY);
-    let mut file = BufWriter::new(File::create(&partial).map_err(|error| fail(error.to_string()))?);
-    write(&mut file).map_err(fail)?;
-    let file = file.into_inner().map_err(|error| fail(error.to_string()))?;
-    // The name must not be on disk before the content is.
-    file.sync_all().map_err(|error| fail(error.to_string()))?;
-    fs::rename(&partial, path).map_err(|error| fail(error.to_string()))
+/// The content of a finished file of at most so many bytes.
+pub(crate) fn open(path: &Path, bytes_max: u64) -> Result<Cursor<Vec<u8>>, FileError> {
+    sums::read(path, bytes_max).map(Cursor::new)
 }
 
 #[cfg(test)]
@@ -138,18 +104,20 @@ mod tests {
         let folder = scratch("note");
         create_folder(&folder).unwrap();
         let note = Note { text: "hello".to_owned(), inner: Inner { number: 0.1 } };
-        assert_eq!(read_if_there::<Note>(&folder).unwrap(), None);
+        assert_eq!(read_if_finished::<Note>(&folder).unwrap(), None);
         write(&folder, &note).unwrap();
+        assert_eq!(read_if_finished::<Note>(&folder).unwrap(), None, "not listed yet");
+        sums::list_all(&folder).unwrap();
         let path = folder.join("note.toml");
         let text = fs::read_to_string(&path).unwrap();
         assert!(text.starts_with("schema = 3\n"), "{text}");
-        assert_eq!(read_if_there::<Note>(&folder).unwrap(), Some(note));
+        assert_eq!(read_if_finished::<Note>(&folder).unwrap(), Some(note));
         for (text, part) in [
             (text.replace("schema = 3\n", "schema = 2\n"), "schema 2"),
             (text.replace("schema = 3\n", ""), "older version"),
             (text.replace("text", "words"), "words"),
         ] {
-            fs::write(&path, text).unwrap();
+            sums::write(&folder, "note.toml", text.as_bytes()).unwrap();
             let error = read::<Note>(&folder).unwrap_err().to_string();
             assert!(error.contains("note.toml") && error.contains(part), "{error}");
         }

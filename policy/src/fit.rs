@@ -4,17 +4,20 @@
 //! On CPUs the result is the same bits for any number of threads.
 
 mod batch_sampler;
+pub mod learning;
 mod optimizer;
 mod report;
 mod schedule;
 mod settings;
 mod training;
+mod unfinished;
 
 pub use optimizer::AdamSettings;
-pub use report::{CurvePoint, FitProgress, FitReport, Validation};
+pub use report::{CurvePoint, FitProgress, FitReport, Step, Validation};
 pub use schedule::{LearningRate, ScheduleShape};
 pub use settings::{Budget, FitSettings, KeepWeights, Mirror};
 pub use training::{FitContext, FitError, FitOutcome, evaluate, fit};
+pub use unfinished::FILE as UNFINISHED;
 
 #[cfg(test)]
 mod tests;

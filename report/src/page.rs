@@ -20,6 +20,7 @@ use sha2::{Digest as _, Sha256};
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::Path;
+use storage::sums;
 
 /// What made the page.
 const PROGRAM: &str = concat!("lotpilot ", env!("CARGO_PKG_VERSION"));
@@ -127,25 +128,18 @@ impl Page {
         self
     }
 
-    /// Writes `STEM.md`, `STEM.html` and `figures/`.
+    /// Writes `STEM.md`, `STEM.html` and `figures/` into the folder of a run, and lists them.
     ///
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, folder: &Path, stem: &str) -> anyhow::Result<()> {
-        let figures = folder.join(FIGURES);
-        for part in &self.parts {
-            if let Part::Figure { name, image, .. } = part {
-                // Not the folder itself: a run that was removed must not come back in part.
-                if !figures.is_dir() {
-                    std::fs::create_dir(&figures).with_context(|| {
-                        format!("{}: cannot be created; is the folder writable?", figures.display())
-                    })?;
-                }
-                storage::whole::write(&figures.join(image.file(name)), &image.bytes())?;
-            }
-        }
-        storage::whole::write(&folder.join(format!("{stem}.md")), self.to_markdown().as_bytes())?;
-        Ok(storage::whole::write(&folder.join(format!("{stem}.html")), self.to_html().as_bytes())?)
+        let figures = self.parts.iter().filter_map(|part| match part {
+            Part::Figure { name, image, .. } => Some((image.file(name), image.bytes().into_owned())),
+            _ => None,
+        });
+        sums::write_folder(folder, FIGURES, figures)?;
+        sums::write(folder, &format!("{stem}.md"), self.to_markdown().as_bytes())?;
+        Ok(sums::write(folder, &format!("{stem}.html"), self.to_html().as_bytes())?)
     }
 
     /// Writes Markdown alone, as a file of a repository: `figures` is a folder relative to its own.

@@ -274,7 +274,7 @@ fn introduction(recipe: &Recipe) -> String {
     format!(
         "Vision-based Autonomous Driving for Unstructured Environments Using Imitation Learning (Ahn, Kim, Park), \
          rebuilt in simulation: trained on {}, driven on {} in {} trials, and on {}. Root seed {}{}, seed of the \
-         evaluation {}. Everything that made this is in `manifest.toml`, `settings.toml` and `reproduce.toml` beside \
+         evaluation {}. Everything that made this is in `manifest.toml` and `settings.toml` beside \
          this report; the same command gives the same bytes.\n\n\
          Intervals are of 95 %: exact Poisson intervals (Garwood) for rates, or (b) a paired bootstrap of \
          whole trials, both ways together, where events come in clusters; bootstrap for safe ratios and differences. All drivers met \

@@ -16,17 +16,18 @@ use evaluation::records::{self, Driven, FailureRecord, RunRecord};
 use evaluation::statistics::poisson::DISPERSION_MAX;
 use evaluation::summary::{Row, SweepRow, Tables};
 use evaluation::table1::Table1;
-use experiment::learning::{self, LearningCurve};
-use experiment::progress::Progress;
+use experiment::progress::{Interrupted, Progress};
 use experiment::replay_key::ReplayKey;
 use experiment::run_dir::{self, Manifest};
 use experiment::settings::{NoiseChoice, Settings};
 use policy::checkpoint::Checkpoint;
 use policy::dataset::Dataset;
 use policy::dataset::store::Store;
+use policy::fit::learning::{self, LearningCurve};
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::fmt::Write as _;
 use std::path::Path;
+use storage::sums;
 
 /// Name of the file.
 pub const FILE: &str = "report.html";
@@ -131,8 +132,7 @@ impl Evaluation {
 }
 
 fn text(path: &Path) -> anyhow::Result<String> {
-    storage::read::text(path, RUN_TEXT_BYTES_MAX)
-        .with_context(|| format!("{}: cannot be read for the report", path.display()))
+    Ok(sums::read_to_string(path, RUN_TEXT_BYTES_MAX)?)
 }
 
 /// Writes the report of the run in a folder.
@@ -155,13 +155,14 @@ fn page(folder: &Path, progress: &dyn Progress) -> anyhow::Result<Page> {
     if let Some(training) = &sources.training {
         add_training(&mut page, &sources.settings, training);
         progress.at(0.1, &mut |_| "calibration".to_owned());
-        if let Some(axes) = held_back_calibration(folder, &sources.settings)? {
+        let rounds = training.table1.rows.len() as u32;
+        if let Some(axes) = held_back_calibration(folder, rounds, &sources.settings)? {
             page.figure("calibration", calibration_caption(&axes), Image::Svg(plots::calibration(&axes)));
         }
     }
     if let Some(evaluation) = &sources.evaluation {
         add_evaluation(&mut page, evaluation);
-        add_moments(&mut page, folder, &sources.settings, evaluation, progress);
+        add_moments(&mut page, folder, &sources.settings, evaluation, progress)?;
     }
     glossary::add(&mut page);
     page.section("Configuration", configuration(&sources));
@@ -256,13 +257,17 @@ fn add_training(page: &mut Page, settings: &Settings, training: &Training) {
 }
 
 /// The network of the run on all samples that were held back.
-fn held_back_calibration(folder: &Path, settings: &Settings) -> anyhow::Result<Option<[AxisCalibration; 2]>> {
-    let Ok(network) = run_dir::policy_folder(folder) else { return Ok(None) };
+fn held_back_calibration(
+    folder: &Path,
+    rounds: u32,
+    settings: &Settings,
+) -> anyhow::Result<Option<[AxisCalibration; 2]>> {
     let store = Store::open(folder)?;
     let mut dataset = Dataset::default();
-    for round in (0..).take_while(|&round| store.has_round(round)) {
+    for round in 0..rounds {
         dataset.push(store.read_samples(round)?.into());
     }
+    let network = run_dir::policy_folder(folder)?;
     let held_back = dataset.split(settings.dagger.fit.validation).validation;
     if held_back.is_empty() {
         return Ok(None);
@@ -406,11 +411,17 @@ fn worst(failures: &[FailureRecord]) -> Vec<&FailureRecord> {
     chosen
 }
 
-fn add_moments(page: &mut Page, folder: &Path, settings: &Settings, evaluation: &Evaluation, progress: &dyn Progress) {
+fn add_moments(
+    page: &mut Page,
+    folder: &Path,
+    settings: &Settings,
+    evaluation: &Evaluation,
+    progress: &dyn Progress,
+) -> anyhow::Result<()> {
     let count = evaluation.failures.len();
     if count == 0 {
         page.section("Near-collisions", "There were none.");
-        return;
+        return Ok(());
     }
     let worst = worst(&evaluation.failures);
     let (listed, shown) = match (count, worst.len()) {
@@ -445,20 +456,16 @@ fn add_moments(page: &mut Page, folder: &Path, settings: &Settings, evaluation: 
             "Trial {trial}, noise {noise}, tick {tick}: {route_m:.1} m along the route, at {speed_mps:.2} m/s. Cause: \
              {cause}."
         );
-        let drawn = if progress.is_cancelled() { None } else { Some(moments::player(&failure.replay, settings)) };
-        match drawn {
-            Some(Ok(player)) => {
-                page.figure(format!("near-collision-{index}"), caption, Image::Player(player));
-            }
-            Some(Err(error)) => {
-                page.text(format!("{caption} It could not be replayed: {}.", escaped(&format!("{error:#}"))));
-            }
-            None => {
-                page.text(format!("{caption} Not drawn: the command was interrupted."));
-            }
+        if progress.is_cancelled() {
+            return Err(Interrupted { kept: format!("{} holds everything but its report", folder.display()) }.into());
         }
+        match moments::player(&failure.replay, settings) {
+            Ok(player) => page.figure(format!("near-collision-{index}"), caption, Image::Player(player)),
+            Err(error) => page.text(format!("{caption} It could not be replayed: {}.", escaped(&format!("{error:#}")))),
+        };
         page.text(format!("```\n{}\n```", visualise(&failure.replay, folder)));
     }
+    Ok(())
 }
 
 /// The command that shows a near-collision again. Drivers that are no runs do not bring their settings along.

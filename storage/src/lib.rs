@@ -1,8 +1,11 @@
-//! Files: read within limits, written whole or not at all, owned by one process.
+//! Files: read within limits, written whole or not at all, listed with their SHA-256, owned by one process.
 
 mod error;
+pub mod growing;
 pub mod lock;
 pub mod read;
+pub mod sealed;
+pub mod sums;
 pub mod whole;
 
 pub use error::FileError;

@@ -30,7 +30,7 @@ pub fn open(path: &Path, bytes_max: u64) -> io::Result<File> {
 pub fn bytes(path: &Path, bytes_max: u64) -> io::Result<Vec<u8>> {
     let mut content = Vec::new();
     // A file can grow, and some of the system's say that they are empty.
-    let read = open(path, bytes_max)?.take(bytes_max + 1).read_to_end(&mut content)? as u64;
+    let read = open(path, bytes_max)?.take(bytes_max.saturating_add(1)).read_to_end(&mut content)? as u64;
     if read > bytes_max { Err(too_large(read, bytes_max)) } else { Ok(content) }
 }
 

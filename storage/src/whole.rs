@@ -40,3 +40,16 @@ pub fn write_with(
     };
     write().map_err(|problem| FileError::new(path, format_args!("cannot be written: {problem}"), WRITE_REMEDY))
 }
+
+/// Deletes a file, if it is there.
+///
+/// # Errors
+/// If it cannot be deleted.
+pub fn remove(path: &Path) -> Result<(), FileError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(FileError::new(path, format_args!("cannot be deleted: {error}"), WRITE_REMEDY))
+        }
+        _ => Ok(()),
+    }
+}

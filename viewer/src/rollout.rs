@@ -22,14 +22,18 @@ pub(crate) fn show(run: &Path, episodes: usize, context: &mut Context<'_>) -> an
     let settings = run_dir::settings_of(run)?;
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     let store = Store::open(run)?;
-    ensure!(store.has_round(0), "{}: no round is collected there yet", run.display());
-    (0..).take_while(|&round| store.has_round(round)).try_for_each(|round| {
+    ensure!(store.has_round(0)?, "{}: no round is collected there yet", run.display());
+    for round in 0.. {
+        if !store.has_round(round)? {
+            break;
+        }
         let before = round.checked_sub(1).map(|before| Checkpoint::load(&store.round_folder(before)));
         let policy = before.transpose().with_context(|| format!("the policy that collected round {round}"))?;
         let mut first = episodes_of(&settings, &lots, round)?;
         first.truncate(episodes);
-        Round { settings: &settings, number: round, policy }.record(first, context)
-    })
+        Round { settings: &settings, number: round, policy }.record(first, context)?;
+    }
+    Ok(())
 }
 
 /// A round of a training.

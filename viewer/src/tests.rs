@@ -8,7 +8,7 @@ use experiment::drive::Replay;
 use experiment::drivers::{self, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::{Elapsed, Interrupted, Progress, Silent};
-use experiment::run_dir::{Build, Place, RunDir};
+use experiment::run_dir::{Build, Place, Request, RunDir};
 use experiment::settings::Settings;
 use experiment::training as training_run;
 use experiment::view_request::{DriveRequest, Show, Sink, ViewRequest};
@@ -33,6 +33,7 @@ use std::io::BufReader;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use storage::sums;
 
 /// Lot b with the obstacles of one trial.
 pub(crate) fn map() -> Map {
@@ -420,7 +421,7 @@ fn a_training_is_read_from_its_folder() {
             500 - 100 * round,
             600 * round
         );
-        std::fs::write(folder.join("round.toml"), collection).unwrap();
+        sums::write(&folder, "round.toml", collection.as_bytes()).unwrap();
         let point = |step: u32| {
             format!(
                 "[[curve]]\nstep = {step}\nlearning_rate = 0.25\ntraining = {{ misfit = 1.5, log_variance = -2.0, total = -0.5 }}\n\
@@ -428,9 +429,9 @@ fn a_training_is_read_from_its_folder() {
             )
         };
         let head = "schema = 2\ntraining_samples = 90\nvalidation_samples = 9\nsteps = 100\nkept_step = 100\nstopped = false\n";
-        std::fs::write(folder.join("fit.toml"), format!("{head}{}{}", point(50), point(100))).unwrap();
+        sums::write(&folder, "fit.toml", format!("{head}{}{}", point(50), point(100)).as_bytes()).unwrap();
     }
-    std::fs::write(run.join("settings.toml"), settings.to_toml()).unwrap();
+    sums::write(&run, "settings.toml", settings.to_toml().as_bytes()).unwrap();
     std::fs::write(run.join("table1.md"), "| the table |").unwrap();
 
     let shown = Shown::of(|recording| training::show(&run, recording).unwrap());
@@ -466,7 +467,7 @@ fn episodes_of_a_training_are_driven_again_as_they_were() {
         processor: None,
     };
     let place = Place { build: &build, out: Some(&run), overwrite: false, command: "test", preset: "smoke", seed: 1 };
-    let folder = RunDir::create(&place, &settings).unwrap();
+    let folder = RunDir::create(&place, &settings, &Request::default()).unwrap();
     let outcome = training_run::train(&settings, &folder, &Silent).unwrap();
     assert_eq!(outcome.rows.len(), 2);
     let request = ViewRequest {

@@ -2,7 +2,7 @@
 
 use crate::commands::{
     bench, completions, drivers, evaluate, generate, guard, lots, pixel_accuracy, render, reproduce, sample_size,
-    scaling, settings, train, tune, visualise,
+    scaling, settings, train, tune, verify, visualise,
 };
 use crate::output::{Color, Output};
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -93,6 +93,9 @@ enum Command {
     /// Searches parameters of the model-based planners on lot a and training lots, the same way for each.
     #[command(after_help = tune::EXAMPLES)]
     Tune(tune::TuneArgs),
+    /// Checks that every file of a run is what was written, by its SHA-256.
+    #[command(after_help = verify::EXAMPLES)]
+    Verify(verify::VerifyArgs),
     /// Draws lots, drives, samples and noise as PNG and SVG.
     #[command(after_help = render::EXAMPLES)]
     Render(render::RenderArgs),
@@ -134,6 +137,7 @@ impl Cli {
             Command::Lots(args) => lots::run(args, output),
             Command::Drivers(args) => drivers::run(args, output),
             Command::Tune(args) => tune::run(args, output),
+            Command::Verify(args) => verify::run(args, output),
             Command::Render(args) => render::run(args, output),
             Command::Visualise(args) => visualise::run(args, output),
             Command::Completions(args) => completions::run(args, Self::command(), output),
@@ -153,7 +157,8 @@ impl Command {
             | Self::PixelAccuracy(pixel_accuracy::PixelAccuracyArgs { json, .. })
             | Self::SampleSize(sample_size::SampleSizeArgs { json, .. })
             | Self::Lots(lots::LotsArgs { json })
-            | Self::Drivers(drivers::DriversArgs { json, .. }) => json.json,
+            | Self::Drivers(drivers::DriversArgs { json, .. })
+            | Self::Verify(verify::VerifyArgs { json, .. }) => json.json,
             Self::Reproduce(_)
             | Self::Scaling(_)
             | Self::Guard(_)

@@ -16,5 +16,6 @@ pub(crate) mod scaling;
 pub(crate) mod settings;
 pub(crate) mod train;
 pub(crate) mod tune;
+pub(crate) mod verify;
 pub(crate) mod visualise;
 mod within;

@@ -1,25 +1,84 @@
-//! Ctrl-C: the first one asks the work to stop at the next safe point, the second one ends the process.
+//! Ctrl-C, SIGTERM and SIGHUP: work stops at the next safe point, and the process ends within a second in any case.
+//! Every file is whole at any moment and unfinished work is on disk, so that ending anywhere loses next to nothing.
 
+use crate::output::note;
+#[cfg(unix)]
+use signal_hook::{
+    consts::{SIGHUP, SIGTERM},
+    flag,
+};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock, Mutex};
+use std::time::{Duration, Instant};
 
-static REQUESTED: AtomicBool = AtomicBool::new(false);
+/// Exit status after a signal, whichever: 128 + SIGINT, as shells have it.
+pub(crate) const EXIT: u8 = 130;
+/// What work has to stop by itself.
+const GRACE: Duration = Duration::from_millis(600);
+/// Between two looks at the flag.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// Listens for Ctrl-C from now on.
+static REQUESTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+/// How to go on with the run under way.
+static WAY_ON: Mutex<Option<String>> = Mutex::new(None);
+
+/// Listens for signals from now on.
 ///
 /// # Errors
-/// If the handler cannot be installed.
+/// If a handler cannot be installed.
 pub(crate) fn install() -> anyhow::Result<()> {
     ctrlc::set_handler(|| {
+        // The second one ends the process at once.
         if REQUESTED.swap(true, Ordering::Relaxed) {
-            // 130 = 128 + SIGINT. Files are renamed into place when complete, so ending here leaves nothing half.
-            std::process::exit(130);
+            std::process::exit(EXIT.into());
         }
-        crate::output::note("\nfinishing what is running; Ctrl-C again to end at once");
     })?;
+    #[cfg(unix)]
+    for signal in [SIGTERM, SIGHUP].into_iter().filter(|&signal| !is_ignored(signal)) {
+        flag::register_conditional_shutdown(signal, EXIT.into(), Arc::clone(&REQUESTED))?;
+        flag::register(signal, Arc::clone(&REQUESTED))?;
+    }
+    std::thread::Builder::new().name("signals".to_owned()).spawn(watch)?;
     Ok(())
 }
 
-/// Whether Ctrl-C was pressed.
+/// Whether a signal was ignored from the start, as nohup ignores hang-ups, where the system tells (Linux): then it stays
+/// ignored.
+#[cfg(unix)]
+fn is_ignored(signal: i32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask >> (signal - 1) & 1 == 1
+}
+
+fn watch() {
+    while !is_requested() {
+        std::thread::sleep(LOOK_EVERY);
+    }
+    let asked = Instant::now();
+    while asked.elapsed() < GRACE {
+        std::thread::sleep(LOOK_EVERY);
+    }
+    note(said("what is finished is on disk"));
+    std::process::exit(EXIT.into());
+}
+
+/// Notes which command goes on with which run.
+pub(crate) fn can_resume(command: &str, run: &Path) {
+    if let Ok(mut way_on) = WAY_ON.lock() {
+        *way_on = Some(format!("; go on with: cargo xtask {command} --resume {}", run.display()));
+    }
+}
+
+/// The last line of an interrupted command.
+pub(crate) fn said(kept: &str) -> String {
+    let way_on = WAY_ON.lock().ok().and_then(|way_on| way_on.clone()).unwrap_or_default();
+    format!("interrupted: {kept}{way_on}")
+}
+
+/// Whether to stop.
 pub(crate) fn is_requested() -> bool {
     REQUESTED.load(Ordering::Relaxed)
 }

@@ -24,8 +24,6 @@ use std::process::ExitCode;
 const STACK_BYTES: usize = 8 << 20;
 /// Bad input, or an environment in which the work cannot be done. Our own bugs panic (101).
 const EXIT_REFUSED: u8 = 2;
-/// Ended by Ctrl-C, as shells have it.
-const EXIT_INTERRUPTED: u8 = 130;
 
 /// Parses the command line, runs the command, and says what went wrong.
 pub fn main() -> ExitCode {
@@ -36,9 +34,11 @@ pub fn main() -> ExitCode {
     };
     match run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) if error.is::<Interrupted>() => {
-            output::note(error);
-            ExitCode::from(EXIT_INTERRUPTED)
+        // Whatever went wrong because of it.
+        Err(error) if error.is::<Interrupted>() || interrupt::is_requested() => {
+            let kept = error.downcast::<Interrupted>().map_or_else(|error| format!("{error:#}"), |error| error.kept);
+            output::note(interrupt::said(&kept));
+            ExitCode::from(interrupt::EXIT)
         }
         Err(error) => {
             output::error(format_args!("{error:#}"));

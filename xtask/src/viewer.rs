@@ -7,9 +7,12 @@ use experiment::progress::Interrupted;
 use experiment::view_request::ViewRequest;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::Duration;
 
 /// Its exit status after Ctrl-C.
-const EXIT_INTERRUPTED: i32 = 130;
+const EXIT_INTERRUPTED: i32 = interrupt::EXIT as i32;
+/// Between two looks at whether it has ended.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// Backends of the network that this program has: a run may ask for one.
 const BACKENDS: &[&str] = &[
     #[cfg(feature = "cuda")]
@@ -47,7 +50,16 @@ pub(crate) fn ask(request: &ViewRequest, output: &Output) -> anyhow::Result<()> 
     let mut child = command.spawn().context("cargo, which builds the viewer program, cannot be started")?;
     // If it ends before it has read everything, its status says why.
     let _ = serde_json::to_writer(child.stdin.take().context("the pipe to the viewer program")?, request);
-    let status = child.wait().context("the viewer program")?;
+    let status = loop {
+        if let Some(status) = child.try_wait().context("the viewer program")? {
+            break status;
+        }
+        if interrupt::is_requested() {
+            // A terminal tells it as well; whoever sends a signal to this process alone does not.
+            child.kill().context("the viewer program")?;
+        }
+        std::thread::sleep(LOOK_EVERY);
+    };
     if interrupt::is_requested() || status.code() == Some(EXIT_INTERRUPTED) {
         return Err(Interrupted { kept: "the recordings made so far are complete".to_owned() }.into());
     }

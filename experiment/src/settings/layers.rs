@@ -58,10 +58,9 @@ impl Settings {
     /// Reads complete settings, as written into a run.
     ///
     /// # Errors
-    /// If the file cannot be read or is not complete.
+    /// If the file is missing, damaged or not complete.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
-        let text = storage::read::text(path, SETTINGS_BYTES_MAX)
-            .with_context(|| format!("{}: not a run of this program, or not finished being created", path.display()))?;
+        let text = storage::sums::read_to_string(path, SETTINGS_BYTES_MAX)?;
         let tree = parse(path, &text)?;
         let settings = settings_from(&tree).map_err(|fault| fault.in_file(path, &text))?;
         settings.check()?;

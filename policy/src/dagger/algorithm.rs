@@ -9,12 +9,14 @@ use crate::dagger::run_file::RunFile;
 use crate::dagger::settings::{DaggerSettings, StartFrom};
 use crate::dataset::store::Store;
 use crate::dataset::{Collection, Dataset, Round};
-use crate::files;
+use crate::files::{self, Format as _};
+use crate::fit::learning;
 use crate::fit::{self, FitContext, FitOutcome, FitProgress, FitReport, FitSettings};
 use crate::network::Weights;
 use sim::seed::{RootSeed, Stream};
 use std::ops::ControlFlow;
 use std::path::Path;
+use storage::{sums, whole};
 
 /// Behaviour cloning, then Algorithm 1. Rounds found in `store` are read instead of made again, so that a run that was
 /// interrupted continues, with the same result. `conditions`: those of all episodes.
@@ -90,7 +92,7 @@ impl Run<'_, '_> {
     /// Algorithm 2 over the episodes of a round, or what an earlier run found there. Behaviour cloning (`policy` =
     /// `None`) is the same with the expert at the wheel and every tick kept.
     fn data_sampling_function(&mut self, policy: Option<&Weights>, round: u32) -> Result<(Round, Collection), Halt> {
-        if self.store.has_round(round) {
+        if self.store.has_round(round)? {
             return Ok(self.store.read_round(round)?);
         }
         let episodes = (self.hooks.episodes)(round);
@@ -164,25 +166,34 @@ impl Run<'_, '_> {
         settings: &FitSettings,
         round: Option<u32>,
     ) -> Result<Option<(Weights, FitReport)>, Halt> {
-        if Checkpoint::exists(folder) {
+        let unfinished = folder.join(fit::UNFINISHED);
+        if Checkpoint::exists(folder)? {
+            self.store.finish(folder)?;
+            whole::remove(&unfinished)?;
             return Ok(Some((Checkpoint::load(folder)?.weights, files::read(folder)?)));
         }
+        files::create_folder(folder)?;
         let index = round.map_or(FINAL, u64::from);
         let seed = self.seed.child(Stream::Shuffle, index);
         let progress = &mut *self.hooks.progress;
         let mut on_step = |fit: &FitProgress| progress(&Progress::Fitting { round, fit });
         let DaggerSettings { inference, device, .. } = *self.settings;
         let context = FitContext { geometry: self.conditions.geometry(), inference, device, seed };
-        let FitOutcome { weights, report } =
-            fit::fit(start, d, settings, context, &mut on_step).map_err(|source| DaggerError::Fit { round, source })?;
+        let FitOutcome { weights, report, steps } =
+            fit::fit(start, d, settings, context, Some(&unfinished), &mut on_step)
+                .map_err(|source| DaggerError::Fit { round, source })?;
         if report.stopped {
             return Ok(None);
         }
-        // The checkpoint comes last: where it is, the training is complete.
-        files::create_folder(folder)?;
+        // They are listed together: where one is finished, all are.
         files::write(folder, &report)?;
+        learning::write(folder, &steps, &report)?;
         let checkpoint = self.checkpoint(weights);
-        checkpoint.save(folder)?;
+        checkpoint.write(folder)?;
+        let [model, numbers] = Checkpoint::FILES;
+        sums::list(folder, &[FitReport::NAME, learning::FILE, model, numbers])?;
+        self.store.finish(folder)?;
+        whole::remove(&unfinished)?;
         Ok(Some((checkpoint.weights, report)))
     }
 

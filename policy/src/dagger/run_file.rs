@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
 use sim::sensing::GridGeometry;
 use std::path::Path;
+use storage::sums;
 
 /// What a folder was begun with.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -24,8 +25,11 @@ impl Format for RunFile {
 impl RunFile {
     /// Makes sure that a folder is continued only with what it was begun with.
     pub(crate) fn claim(&self, folder: &Path) -> Result<(), FileError> {
-        match files::read_if_there::<Self>(folder)? {
-            None => files::write(folder, self),
+        match files::read_if_finished::<Self>(folder)? {
+            None => {
+                files::write(folder, self)?;
+                sums::list(folder, &[Self::NAME])
+            }
             Some(theirs) if theirs == *self => Ok(()),
             Some(_) => Err(FileError::new(
                 &folder.join(Self::NAME),

@@ -134,7 +134,7 @@ fn a_run_leaves_data_and_policy_of_every_round() {
             .filter(|(sample, augmented)| sample.grid != **augmented)
             .count();
         assert!(2 * differ > data.samples.len(), "{differ} of {} have noise of their own", data.samples.len());
-        assert!(Checkpoint::exists(&store.round_folder(round as u32)));
+        assert!(Checkpoint::exists(&store.round_folder(round as u32)).unwrap());
         assert_eq!(row.eta_hat.is_some(), round > 0);
     }
     assert!(store.read_round(0).unwrap().0.samples.iter().all(|sample| sample.tau_hat == 0.0));

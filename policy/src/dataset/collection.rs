@@ -58,7 +58,7 @@ impl Collection {
     /// # Errors
     /// If the file is of another schema, or is not what it should be.
     pub fn read(folder: &Path) -> Result<Option<Self>, FileError> {
-        files::read_if_there(folder)
+        files::read_if_finished(folder)
     }
 
     /// Writes `round.toml` into a folder.

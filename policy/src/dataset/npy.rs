@@ -5,8 +5,7 @@ use crate::files::{self, FileError, RESTORE_REMEDY};
 use ndarray::{Array, Dimension};
 use ndarray_npy::{ReadNpyExt as _, ReadableElement};
 use sim::limits::HEADER_BYTES_MAX;
-use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 
@@ -21,7 +20,7 @@ pub(crate) fn read<T: ReadableElement, D: Dimension>(
     let fail = |problem: String| FileError::new(path, problem, RESTORE_REMEDY);
     let mut file = files::open(path, bytes_max(expected))?;
     let header = checked_header(&mut file, expected).map_err(fail)?;
-    let found = file.get_ref().metadata().map_err(|error| fail(error.to_string()))?.len();
+    let found = file.get_ref().len() as u64;
     if found < elements(expected).saturating_mul(size_of::<T>() as u64) {
         return Err(fail(format!("{found} bytes are too few for the shape {expected:?}")));
     }
@@ -31,7 +30,7 @@ pub(crate) fn read<T: ReadableElement, D: Dimension>(
 /// An archive of arrays by name.
 pub(crate) struct Archive {
     path: PathBuf,
-    zip: ZipArchive<BufReader<File>>,
+    zip: ZipArchive<Cursor<Vec<u8>>>,
 }
 
 impl Archive {

@@ -8,6 +8,8 @@
 //!          noise_augmentations.npz   u8 [n, k, 79]   the same scenes with other noise, if k > 0
 //!          model.safetensors, model.toml, fit.toml       the network trained after it
 //! round-01/…
+//!          learning.csv    how it was trained, step by step
+//!          sha256sums       what of this is finished
 //! final/                    an optional longer fit on everything
 //! ```
 //!
@@ -25,6 +27,7 @@ use ndarray_npy::{NpzWriter, WriteNpyExt as _};
 use sim::sensing::OccupancyGrid;
 use std::fs;
 use std::path::{Path, PathBuf};
+use storage::sums;
 
 const AUGMENTATIONS: &str = "noise_augmentations.npz";
 const AUGMENTATIONS_ARRAY: &str = "noise_augmentations";
@@ -61,8 +64,33 @@ impl Store {
     }
 
     /// Whether a round's data are there.
-    pub fn has_round(&self, round: u32) -> bool {
-        self.round_folder(round).is_dir()
+    ///
+    /// # Errors
+    /// See [`Self::is_finished`].
+    pub fn has_round(&self, round: u32) -> Result<bool, FileError> {
+        let folder = self.round_folder(round);
+        Ok(self.is_finished(&folder)? || folder.is_dir())
+    }
+
+    /// Whether a folder of the run is finished: its data and its network.
+    ///
+    /// # Errors
+    /// If the run lists it as finished, but it is missing or incomplete.
+    pub fn is_finished(&self, folder: &Path) -> Result<bool, FileError> {
+        let list = list_of(folder);
+        let is_listed = sums::is_listed(&self.folder, &list)?;
+        if is_listed {
+            sums::read_listed(&self.folder, &list, sums::LIST_BYTES_MAX)?;
+        }
+        Ok(is_listed)
+    }
+
+    /// Lists a folder of the run, all of whose files are listed there: nothing is added to it any more.
+    ///
+    /// # Errors
+    /// If the list cannot be written.
+    pub(crate) fn finish(&self, folder: &Path) -> Result<(), FileError> {
+        if self.is_finished(folder)? { Ok(()) } else { sums::list(&self.folder, &[&list_of(folder)]) }
     }
 
     /// Writes the data of a round with a record of how it was collected.
@@ -111,13 +139,14 @@ impl Store {
             })?;
         }
         collection.write(&partial)?;
+        sums::list_all(&partial)?;
         fs::rename(&partial, &folder).map_err(|error| FileError::new(&folder, error, WRITE_REMEDY))
     }
 
     /// Reads the data of a round and the record of how it was collected.
     ///
     /// # Errors
-    /// If a file is missing, from an older version, or does not fit the others.
+    /// If a file is missing, damaged, from an older version, or does not fit the others.
     pub fn read_round(&self, index: u32) -> Result<(Round, Collection), FileError> {
         let folder = self.round_folder(index);
         let collection: Collection = files::read(&folder)?;
@@ -137,6 +166,11 @@ impl Store {
         let collection: Collection = files::read(&folder)?;
         read_samples(&folder, collection.samples)
     }
+}
+
+/// The list of a folder, as the run lists it.
+fn list_of(folder: &Path) -> String {
+    format!("{}/{}", folder.file_name().unwrap_or_default().to_string_lossy(), sums::FILE)
 }
 
 fn read_samples(folder: &Path, samples: usize) -> Result<Vec<Sample>, FileError> {
@@ -183,7 +217,7 @@ mod tests {
     #[test]
     fn a_round_reads_back_as_written_and_is_never_overwritten() {
         let (store, round, collection) = written("round", 33, 2);
-        assert!(store.has_round(0) && !store.has_round(1));
+        assert!(store.has_round(0).unwrap() && !store.has_round(1).unwrap());
         assert_eq!(store.read_round(0).unwrap(), (round.clone(), collection.clone()));
         let again = store.write_round(&round, &collection);
         assert!(again.unwrap_err().to_string().contains("exists already"));
@@ -204,11 +238,17 @@ mod tests {
         let path = |name: &str| store.round_folder(0).join(name);
         let whole = fs::read(path("labels.npy")).unwrap();
         ndarray_npy::write_npy(path("labels.npy"), &Array2::<f32>::zeros([4, 3])).unwrap();
+        assert!(error().contains("labels.npy") && error().contains("SHA-256"), "{}", error());
+        let listed = || sums::list_all(&store.round_folder(0)).unwrap();
+        listed();
         assert!(error().contains("labels.npy") && error().contains("[5, 3]"), "{}", error());
         fs::write(path("labels.npy"), whole).unwrap();
+        listed();
         Tick::write_all(&collected(4, 0).0.ticks, &store.round_folder(0)).unwrap();
+        listed();
         assert!(error().contains("ticks.npz") && error().contains("shape [4] instead of [5]"), "{}", error());
         fs::write(path("round.toml"), "schema = 2\nwho = 1").unwrap();
+        listed();
         assert!(error().contains("round.toml") && error().contains("who"), "{}", error());
         fs::remove_dir_all(store.folder()).unwrap();
     }
@@ -230,6 +270,7 @@ mod tests {
         ndarray_npy::write_npy(path("grids.npy"), &Array3::<u8>::zeros([5, 25, 25])).unwrap();
         let record = fs::read_to_string(path("round.toml")).unwrap();
         fs::write(path("round.toml"), record.replace("schema = 2", "schema = 1")).unwrap();
+        sums::list_all(&store.round_folder(0)).unwrap();
         for error in [store.read_round(0).unwrap_err(), store.read_samples(0).unwrap_err()] {
             let error = error.to_string();
             assert!(error.contains("round.toml") && error.contains("schema 1"), "{error}");

@@ -36,6 +36,15 @@ pub struct Validation {
     pub rmse_m: f32,
 }
 
+/// One step of a training.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Its learning rate.
+    pub learning_rate: f32,
+    /// The loss of its batch.
+    pub loss: LossParts,
+}
+
 /// One point of the loss curve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -79,11 +88,11 @@ impl Format for FitReport {
 }
 
 impl FitReport {
-    /// Reads `fit.toml` of a folder; `None` if there is none.
+    /// Reads `fit.toml` of a folder; `None` if no training is finished there.
     ///
     /// # Errors
-    /// If the file is of another schema, or is not what it should be.
+    /// If the file is missing, damaged or of another schema.
     pub fn read(folder: &Path) -> Result<Option<Self>, FileError> {
-        files::read_if_there(folder)
+        files::read_if_finished(folder)
     }
 }

@@ -5,7 +5,7 @@ use crate::dataset::{Dataset, Sample, ValidationSplit};
 use crate::fit::batch_sampler::BatchSampler;
 use crate::loss::LossSettings;
 use crate::network::{ConvLayer, DeviceChoice, InferenceSettings, NetworkArchitecture, Weights};
-use crate::test_data::round;
+use crate::test_data::{round, scratch};
 use sim::seed::RootSeed;
 use sim::sensing::GridGeometry;
 use std::ops::ControlFlow;
@@ -39,7 +39,7 @@ fn settings(steps: u32) -> FitSettings {
 fn train(dataset: &Dataset, settings: &FitSettings, device: DeviceChoice) -> FitOutcome {
     let start = Weights::init(tiny(), RootSeed(1), 0);
     let mut progress = |_: &FitProgress| ControlFlow::Continue(());
-    fit(start, dataset, settings, context(device), &mut progress).unwrap()
+    fit(start, dataset, settings, context(device), None, &mut progress).unwrap()
 }
 
 fn context(device: DeviceChoice) -> FitContext {
@@ -81,10 +81,57 @@ fn a_stop_keeps_what_was_learned() {
         seen.push((now.step, now.samples_done));
         if now.step == 7 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let outcome = fit(start, &dataset, &settings(50), context(DeviceChoice::Cpu), &mut progress).unwrap();
+    let outcome = fit(start, &dataset, &settings(50), context(DeviceChoice::Cpu), None, &mut progress).unwrap();
     assert!(outcome.report.stopped);
     assert_eq!((outcome.report.steps, outcome.report.kept_step), (7, 7));
     assert_eq!(seen.last(), Some(&(7, 7 * 33)));
+}
+
+/// Killed and continued at any step, before and after validations: the same bits as at once.
+#[test]
+fn an_interrupted_training_goes_on_to_the_same_bits() {
+    let dataset = dataset(400);
+    let settings = FitSettings { gradient_norm_max: 0.5, ..settings(70) };
+    let whole = train(&dataset, &settings, DeviceChoice::Cpu);
+    let path = scratch("unfinished");
+    for stops in [&[1][..], &[19, 20, 21], &[33, 69]] {
+        let mut stops = stops.to_vec();
+        let outcome = loop {
+            let stop = if stops.is_empty() { 0 } else { stops.remove(0) };
+            let mut progress = |now: &FitProgress| {
+                if now.step == stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            let start = Weights::init(tiny(), RootSeed(1), 0);
+            let outcome =
+                fit(start, &dataset, &settings, context(DeviceChoice::Cpu), Some(&path), &mut progress).unwrap();
+            if !outcome.report.stopped {
+                break outcome;
+            }
+        };
+        assert_eq!(outcome.weights, whole.weights);
+        assert_eq!(outcome.report, whole.report);
+        assert_eq!(outcome.steps, whole.steps);
+        std::fs::remove_file(&path).unwrap();
+    }
+}
+
+/// Trained on, it would be another network under the same name.
+#[test]
+fn a_damaged_state_of_a_training_is_refused() {
+    let (dataset, path) = (dataset(200), scratch("damaged-state"));
+    let mut stop = |_: &FitProgress| ControlFlow::Break(());
+    let mut train = || {
+        let start = Weights::init(tiny(), RootSeed(1), 0);
+        fit(start, &dataset, &settings(9), context(DeviceChoice::Cpu), Some(&path), &mut stop)
+    };
+    train().unwrap();
+    let mut bytes = std::fs::read(&path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(&path, bytes).unwrap();
+    let error = train().unwrap_err().to_string();
+    assert!(error.contains("damaged-state") && error.contains("SHA-256"), "{error}");
+    std::fs::remove_file(path).unwrap();
 }
 
 /// While training, a few samples are validated on; the report is on all of them.
@@ -116,7 +163,7 @@ fn nothing_to_learn_from_is_an_error() {
     let start = Weights::init(tiny(), RootSeed(1), 0);
     let mut progress = |_: &FitProgress| ControlFlow::Continue(());
     let empty = Dataset::default();
-    let error = fit(start, &empty, &settings(1), context(DeviceChoice::Cpu), &mut progress);
+    let error = fit(start, &empty, &settings(1), context(DeviceChoice::Cpu), None, &mut progress);
     assert!(matches!(error, Err(FitError::NoTrainingSamples { samples: 0, .. })));
 }
 

@@ -1,19 +1,23 @@
 //! One training: steps, validation, and which weights are kept.
 
 use crate::dataset::{Dataset, Sample};
+use crate::files::FileError;
 use crate::fit::batch_sampler::BatchSampler;
-use crate::fit::report::{CurvePoint, FitProgress, FitReport, Validation};
+use crate::fit::report::{CurvePoint, FitProgress, FitReport, Step, Validation};
 use crate::fit::settings::{FitSettings, KeepWeights};
+use crate::fit::unfinished::Unfinished;
 use crate::loss::{self, BatchLoss, LossParts, LossSettings};
 use crate::network::{
     DeviceChoice, DropoutFactors, InferenceSettings, LookAheadNet, OUTPUTS, Predictor, Weights, occupied_tensor,
 };
 use burn::optim::GradientsParams;
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Bytes, Device, Tensor, TensorData};
 use sim::seed::RootSeed;
 use sim::sensing::GridGeometry;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::{Duration, Instant};
 
 /// Trained weights and the report of their training.
 #[derive(Debug, Clone)]
@@ -22,6 +26,8 @@ pub struct FitOutcome {
     pub weights: Weights,
     /// What the training did.
     pub report: FitReport,
+    /// Every step.
+    pub steps: Vec<Step>,
 }
 
 /// Why a training cannot start, or go on.
@@ -52,6 +58,9 @@ pub enum FitError {
         /// What is wrong.
         problem: String,
     },
+    /// What an interrupted training left cannot be read, or what this one leaves cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
 }
 
 /// What a training needs besides weights, data and settings.
@@ -67,15 +76,23 @@ pub struct FitContext {
     pub seed: RootSeed,
 }
 
-/// Trains `start` on a data set. `progress` is called after every step and may stop it.
+/// Seconds of training between two copies of its state on disk: what a killed process loses at most.
+const KEEP_EVERY_S: u64 = 60;
+
+/// Trains `start` on a data set. `progress` is called after every step and may stop it. An interrupted training is kept in
+/// the file `unfinished`, if one is named, and goes on from there to the same result; who named it deletes it when it is
+/// needed no more.
 ///
 /// # Errors
-/// If there is nothing to train on, the learning rate is impossible, or the loss or a weight is no finite number.
+/// If there is nothing to train on, the learning rate is impossible, the loss or a weight is no finite number, or
+/// `unfinished` cannot be read or written.
+#[expect(clippy::disallowed_methods, reason = "when the state is copied to disk changes no result")]
 pub fn fit(
     start: Weights,
     dataset: &Dataset,
     settings: &FitSettings,
     context: FitContext,
+    unfinished: Option<&Path>,
     progress: &mut dyn FnMut(&FitProgress) -> ControlFlow<()>,
 ) -> Result<FitOutcome, FitError> {
     if settings.batch == 0 {
@@ -93,53 +110,74 @@ pub fn fit(
 
     let architecture = start.architecture();
     let device = context.device.device().autodiff();
-    let mut net = LookAheadNet::from_weights(&start, &device);
     let mut optimizer = settings.adam.optimizer(settings.gradient_norm_max);
     let mut scheduler =
         settings.learning_rate.scheduler(steps).map_err(|problem| FitError::LearningRate { problem })?;
     let mut sampler = BatchSampler::new(&split.training, settings.mirror, context.seed);
     let mut batch = Vec::with_capacity(settings.batch);
-    let mut curve = Vec::new();
-    let mut since_point = MeanLoss::default();
-    let mut best = Best::new(start);
-    let mut latest = None;
-    let mut done = 0;
+    let mut course = Course::new(&start);
+    let mut net = LookAheadNet::from_weights(&start, &device);
+    let left = unfinished.map(|path| Unfinished::read(path, architecture)).transpose()?.flatten();
+    if let Some(left) = left {
+        net = LookAheadNet::from_weights(&left.weights, &device);
+        optimizer = optimizer.from_bytes(Bytes::from_bytes_vec(left.optimizer.clone())).map_err(|error| {
+            FileError::new(unfinished.unwrap_or(Path::new("")), error, "delete it to begin this training again")
+        })?;
+        for _ in &left.steps {
+            scheduler.step();
+            sampler.draw(settings.batch, &mut batch);
+        }
+        course.replay(left, settings.keep);
+    }
+    let mut kept_at = Instant::now();
     let mut stopped = false;
-    while done < steps && !stopped {
+    while course.done() < steps && !stopped && !course.is_out_of_patience(settings) {
         sampler.draw(settings.batch, &mut batch);
-        let dropout = DropoutFactors::draw(&architecture, batch.len(), context.seed, u64::from(done), &device);
+        let dropout = DropoutFactors::draw(&architecture, batch.len(), context.seed, u64::from(course.done()), &device);
         let outputs = net.forward(occupied(&batch, &device), Some(dropout));
         let BatchLoss { misfit, log_variance } = batch_loss(&settings.loss, outputs, &batch, &device);
         let (misfit, log_variance) = (misfit.mean(), log_variance.mean());
         let gradients = (misfit.clone() + log_variance.clone()).backward();
         let loss = LossParts::new(misfit.into_scalar(), log_variance.into_scalar());
         if !loss.total.is_finite() {
-            return Err(FitError::NotFinite { step: done + 1, what: "the loss" });
+            return Err(FitError::NotFinite { step: course.done() + 1, what: "the loss" });
         }
         let gradients = GradientsParams::from_grads(gradients, &net);
         let learning_rate = scheduler.step();
         net = optimizer.step(learning_rate.clone(), net, gradients);
-        done += 1;
-        since_point.add(loss);
-
-        let samples_done = u64::from(done) * settings.batch as u64;
         let learning_rate = learning_rate.base() as f32;
-        let now = FitProgress { step: done, steps, samples_done, learning_rate, loss, validation: latest };
-        stopped = progress(&now).is_break();
-        let is_last = done == steps || stopped;
-        if is_last || settings.validate_every > 0 && done % settings.validate_every == 0 {
+        course.step(Step { learning_rate, loss });
+
+        let done = course.done();
+        let samples_done = u64::from(done) * settings.batch as u64;
+        let validation = course.latest();
+        stopped =
+            progress(&FitProgress { step: done, steps, samples_done, learning_rate, loss, validation }).is_break();
+        if done == steps || settings.validate_every > 0 && done % settings.validate_every == 0 {
             let weights = net.to_weights(architecture);
             if !weights.values().iter().all(|value| value.is_finite()) {
                 return Err(FitError::NotFinite { step: done, what: "a weight" });
             }
-            latest = validate(&weights, &validated);
-            curve.push(CurvePoint { step: done, learning_rate, training: since_point.take(), validation: latest });
-            best.offer(weights, done, latest, settings.keep);
-            if settings.patience > 0 && best.offers_since >= settings.patience {
-                break;
-            }
+            let validation = validate(&weights, &validated);
+            course.validated(weights, validation, settings.keep);
+        }
+        if let Some(path) = unfinished
+            && (stopped || kept_at.elapsed() >= Duration::from_secs(KEEP_EVERY_S))
+            && done < steps
+        {
+            let optimizer = optimizer.into_bytes().expect("the state of an optimiser can be serialised").to_vec();
+            course.keep(net.to_weights(architecture), optimizer).write(path)?;
+            kept_at = Instant::now();
         }
     }
+    // Stopped between two validations.
+    if course.curve.last().map_or(0, |point| point.step) < course.done() {
+        let weights = net.to_weights(architecture);
+        let validation = validate(&weights, &validated);
+        course.validated(weights, validation, settings.keep);
+    }
+    let Course { steps: taken, curve, best, .. } = course;
+    let done = taken.len() as u32;
     let is_validated_on_all = validated.len() == split.validation.len();
     let validation = if is_validated_on_all { best.validation } else { validate(&best.weights, &split.validation) };
     let report = FitReport {
@@ -151,7 +189,7 @@ pub fn fit(
         validation,
         curve,
     };
-    Ok(FitOutcome { weights: best.weights, report })
+    Ok(FitOutcome { weights: best.weights, report, steps: taken })
 }
 
 /// At most so many of the samples, evenly spread; 0 = all.
@@ -199,6 +237,65 @@ pub fn evaluate(weights: &Weights, samples: &[Sample], loss: &LossSettings, cont
     }
 }
 
+/// What a training has done so far.
+struct Course {
+    steps: Vec<Step>,
+    curve: Vec<CurvePoint>,
+    since_point: MeanLoss,
+    best: Best,
+}
+
+impl Course {
+    fn new(start: &Weights) -> Self {
+        let (steps, curve) = (Vec::new(), Vec::new());
+        Self { steps, curve, since_point: MeanLoss::default(), best: Best::new(start.clone()) }
+    }
+
+    /// Steps done.
+    fn done(&self) -> u32 {
+        self.steps.len() as u32
+    }
+
+    fn latest(&self) -> Option<Validation> {
+        self.curve.last().and_then(|point| point.validation)
+    }
+
+    fn is_out_of_patience(&self, settings: &FitSettings) -> bool {
+        settings.patience > 0 && self.best.offers_since >= settings.patience
+    }
+
+    fn step(&mut self, step: Step) {
+        self.since_point.add(step.loss);
+        self.steps.push(step);
+    }
+
+    fn validated(&mut self, weights: Weights, validation: Option<Validation>, keep: KeepWeights) {
+        let step = self.done();
+        let learning_rate = self.steps.last().map_or(0.0, |step| step.learning_rate);
+        self.curve.push(CurvePoint { step, learning_rate, training: self.since_point.take(), validation });
+        if self.best.is_better(step, validation, keep) {
+            self.best.weights = weights;
+        }
+    }
+
+    /// Everything so far, to be written.
+    fn keep(&self, weights: Weights, optimizer: Vec<u8>) -> Unfinished {
+        let Self { steps, curve, best, .. } = self;
+        Unfinished { weights, best: best.weights.clone(), optimizer, steps: steps.clone(), curve: curve.clone() }
+    }
+
+    /// Goes through everything that was kept once more.
+    fn replay(&mut self, left: Unfinished, keep: KeepWeights) {
+        let last_point = left.curve.last().map_or(0, |point| point.step);
+        for point in &left.curve {
+            self.best.is_better(point.step, point.validation, keep);
+        }
+        left.steps.iter().skip(last_point as usize).for_each(|step| self.since_point.add(step.loss));
+        self.best.weights = left.best;
+        (self.steps, self.curve) = (left.steps, left.curve);
+    }
+}
+
 /// The weights to return.
 struct Best {
     weights: Weights,
@@ -214,7 +311,8 @@ impl Best {
         Self { weights, step: 0, validation: None, offers_since: 0, lowest: f32::INFINITY }
     }
 
-    fn offer(&mut self, weights: Weights, step: u32, found: Option<Validation>, keep: KeepWeights) {
+    /// Whether weights with this validation are to be kept in place of those here.
+    fn is_better(&mut self, step: u32, found: Option<Validation>, keep: KeepWeights) -> bool {
         let is_lowest = found.is_some_and(|found| found.loss < self.lowest);
         if let Some(found) = found {
             self.lowest = self.lowest.min(found.loss);
@@ -225,10 +323,10 @@ impl Best {
             (KeepWeights::BestByValidation, Some(_)) => is_lowest,
         };
         if is_kept {
-            self.weights = weights;
             self.step = step;
             self.validation = found;
         }
+        is_kept
     }
 }
 

@@ -4,7 +4,7 @@ use crate::network::architecture::{ConvLayer, NetworkArchitecture, OUTPUTS};
 use crate::network::dropout::DropoutFactors;
 use crate::network::operations::{dense, encode};
 use crate::network::weights::Weights;
-use burn::module::{Module, Param};
+use burn::module::{Module, Param, ParamId};
 use burn::nn::conv::{Conv2d, Conv2dConfig};
 use burn::nn::{Linear, LinearConfig, PaddingConfig2d};
 use burn::tensor::activation::relu;
@@ -25,26 +25,26 @@ impl LookAheadNet {
     pub fn from_weights(weights: &Weights, device: &Device) -> Self {
         let architecture = weights.architecture();
         let parts = weights.parts();
-        let conv = |inputs: usize, conv: ConvLayer, weight: &[f32], bias: &[f32]| {
+        let conv = |id: u64, inputs: usize, conv: ConvLayer, weight: &[f32], bias: &[f32]| {
             let (before, after) = conv.padding();
             let mut layer = Conv2dConfig::new([inputs, conv.channels], [conv.kernel, conv.kernel])
                 .with_padding(PaddingConfig2d::Explicit(before, before, after, after))
                 .init(device);
-            layer.weight = param(weight, [conv.channels, inputs, conv.kernel, conv.kernel], device);
-            layer.bias = Some(param(bias, [conv.channels], device));
+            layer.weight = param(id, weight, [conv.channels, inputs, conv.kernel, conv.kernel], device);
+            layer.bias = Some(param(id + 1, bias, [conv.channels], device));
             layer
         };
-        let linear = |inputs: usize, outputs: usize, weight: &[f32], bias: &[f32]| {
+        let linear = |id: u64, inputs: usize, outputs: usize, weight: &[f32], bias: &[f32]| {
             let mut layer = LinearConfig::new(inputs, outputs).init(device);
-            layer.weight = param(weight, [inputs, outputs], device);
-            layer.bias = Some(param(bias, [outputs], device));
+            layer.weight = param(id, weight, [inputs, outputs], device);
+            layer.bias = Some(param(id + 1, bias, [outputs], device));
             layer
         };
         Self {
-            conv1: conv(1, architecture.conv1, parts.conv1_weight, parts.conv1_bias),
-            conv2: conv(architecture.conv1.channels, architecture.conv2, parts.conv2_weight, parts.conv2_bias),
-            fc1: linear(architecture.features(), architecture.hidden, parts.fc1_weight, parts.fc1_bias),
-            fc2: linear(architecture.hidden, OUTPUTS, parts.fc2_weight, parts.fc2_bias),
+            conv1: conv(0, 1, architecture.conv1, parts.conv1_weight, parts.conv1_bias),
+            conv2: conv(2, architecture.conv1.channels, architecture.conv2, parts.conv2_weight, parts.conv2_bias),
+            fc1: linear(4, architecture.features(), architecture.hidden, parts.fc1_weight, parts.fc1_bias),
+            fc2: linear(6, architecture.hidden, OUTPUTS, parts.fc2_weight, parts.fc2_bias),
         }
     }
 
@@ -110,8 +110,11 @@ pub(crate) fn occupied_tensor<'a>(
     Tensor::from_data(TensorData::new(cells, [batch, GRID_CELLS, GRID_CELLS]), device)
 }
 
-fn param<const D: usize>(values: &[f32], shape: [usize; D], device: &Device) -> Param<Tensor<D>> {
-    Param::from_tensor(Tensor::from_data(TensorData::new(values.to_vec(), shape), device))
+/// A parameter with a number of its own in the network, by which the optimiser's state on disk finds it again.
+fn param<const D: usize>(id: u64, values: &[f32], shape: [usize; D], device: &Device) -> Param<Tensor<D>> {
+    let param = Param::from_tensor(Tensor::from_data(TensorData::new(values.to_vec(), shape), device));
+    let (_, tensor, mapper) = param.consume();
+    Param::from_mapped_value(ParamId::from(id), tensor, mapper)
 }
 
 fn times(layer: Tensor<2>, factors: Option<Tensor<2>>) -> Tensor<2> {

@@ -1,6 +1,6 @@
 use super::*;
 use evaluation::calibration::AxisCalibration;
-use experiment::learning::LearningCurve;
+use policy::fit::learning::LearningCurve;
 use roxmltree::{Document, Node};
 
 /// Every text of a picture with its place.

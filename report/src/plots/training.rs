@@ -1,8 +1,8 @@
 //! How a training went.
 
 use super::style::{self, Axis, Figure, Key, Labels, Look, colour};
-use experiment::learning::LearningCurve;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use policy::fit::learning::LearningCurve;
 
 /// Optimiser steps of a fit.
 fn steps(curve: &LearningCurve) -> u32 {

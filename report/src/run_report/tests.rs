@@ -4,6 +4,7 @@ use experiment::drive::Replay;
 use experiment::run_dir::MANIFEST_SCHEMA;
 use sim::frame::Event;
 use sim::scenario::Direction;
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 fn failure(driver: &str, lot: &str, speed_mps: f32) -> FailureRecord {
@@ -49,6 +50,7 @@ fn commands_can_be_pasted_into_a_shell() {
     let manifest = Manifest {
         schema: MANIFEST_SCHEMA,
         program: "lotpilot".to_owned(),
+        command: "evaluate".to_owned(),
         command_line: words.map(str::to_owned).to_vec(),
         preset: "smoke".to_owned(),
         root_seed: 1,
@@ -59,6 +61,8 @@ fn commands_can_be_pasted_into_a_shell() {
         threads: 1,
         target: String::new(),
         processor: None,
+        arguments: toml::Table::new(),
+        inputs: BTreeMap::new(),
     };
     let expected = r#"cargo xtask evaluate --set 'training.lots=["lot-a"]' --out 'my runs/it'\''s'"#;
     assert_eq!(command_line(&manifest), expected);

@@ -2,6 +2,7 @@
 
 use crate::args::{Directions, JsonArgs, LayerArgs, OutArgs, noise_levels};
 use crate::console::Console;
+use crate::interrupt;
 use crate::notes;
 use crate::output::Output;
 use crate::record::{self, RecordArgs};
@@ -11,25 +12,31 @@ use evaluation::estimate;
 use evaluation::plan::Plan;
 use evaluation::summary::Summary;
 use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress};
-use experiment::run_dir::{self, Outcome, RunDir};
+use experiment::run_dir::{self, Outcome, Request, RunDir};
 use experiment::settings::{Layers, Settings, Smoothing};
 use scenarios::LoadError;
+use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
+use std::path::PathBuf;
+
+const COMMAND: &str = "evaluate";
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask evaluate --driver expert --lots lot-a --trials 2
   cargo xtask evaluate --driver run:runs/train-dagger-default-s1/bc --driver run:runs/train-dagger-default-s1
   cargo xtask evaluate --driver net:runs/train-dagger-default-s1/round-03 --lots lot-b --noise hard --out runs/hard
-  cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1 --noise sweep --lots test:100";
+  cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1 --noise sweep --lots test:100
+  cargo xtask evaluate --resume runs/hard";
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EvaluateArgs {
     /// Who drives; may be repeated. See `cargo xtask drivers`. The settings of the first `run:DIR` are used unless
     /// `--config` or `--preset` names others.
-    #[arg(long = "driver", value_name = "SPEC", required = true, num_args = 1..)]
+    #[arg(long = "driver", value_name = "SPEC", required_unless_present = "resume", num_args = 1..)]
     drivers: Vec<String>,
     /// Lots to drive; see `cargo xtask lots` [default: the setting evaluation.lots].
     #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',')]
@@ -60,27 +67,61 @@ pub(crate) struct EvaluateArgs {
     layers: LayerArgs,
     #[command(flatten)]
     out: OutArgs,
+    /// Continues an interrupted evaluation with its own drivers and settings, to the same result.
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all = [
+            "drivers", "lots", "trials", "directions", "noise", "compare_with", "seed", "preset", "config", "overrides", "out"
+        ]
+    )]
+    resume: Option<PathBuf>,
     #[command(flatten)]
     record: RecordArgs,
 }
 
+/// What an evaluation was asked for beside its settings.
+#[derive(Debug, Serialize, Deserialize)]
+struct Asked {
+    drivers: Vec<String>,
+    /// An index of the drivers.
+    compare_with: usize,
+}
+
 pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
-    let specs = DriverSpec::parse_all(&args.drivers)?;
-    let compare_with = compare_with(args, &specs)?;
-    let (mut settings, preset) = settings_for(&specs, &Layers::from(&args.layers), output)?;
-    override_trials(&mut settings, args)?;
-    let load = |spec: DriverSpec| spec.load(&settings);
-    let drivers: Vec<NamedDriver> = specs.into_iter().map(load).collect::<anyhow::Result<_>>()?;
+    let (settings, asked, begun) = if let Some(path) = &args.resume {
+        let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
+        let asked: Asked = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
+        (settings, asked, Ok((run, manifest)))
+    } else {
+        let specs = DriverSpec::parse_all(&args.drivers)?;
+        let asked = Asked { drivers: args.drivers.clone(), compare_with: compare_with(args, &specs)? };
+        let (mut settings, preset) = settings_for(&specs, &Layers::from(&args.layers), output)?;
+        override_trials(&mut settings, args)?;
+        (settings, asked, Err(preset))
+    };
+    let drivers = NamedDriver::load_all(&asked.drivers, &settings)?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     notes::say(&lots, &settings.evaluation.noise, output);
-    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with };
+    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: asked.compare_with };
     check(&plan)?;
-    let run = RunDir::create(&args.out.place("evaluate", &preset, settings.evaluation.seed.0), &settings)?;
+    let inputs = inputs::of(&lots, &drivers);
+    let run = match begun {
+        Ok((run, manifest)) => {
+            manifest.check_inputs(&inputs)?;
+            run
+        }
+        Err(preset) => {
+            let request = Request { arguments: toml::Table::try_from(&asked)?, inputs };
+            RunDir::create(&args.out.place(COMMAND, &preset, settings.evaluation.seed.0), &settings, &request)?
+        }
+    };
+    interrupt::can_resume(COMMAND, run.path());
     let console = Console::new(output);
     console.plan(tasks(&settings, drivers.len()));
     measure(&plan, &run, &console, output)?;
     report::run_report::write(run.path(), &console)?;
-    run.finish(Outcome::Evaluation { drivers: args.drivers.clone() })?;
+    run.finish(Outcome::Evaluation { drivers: asked.drivers })?;
     output.note(format_args!(
         "written: {}/report.html, summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl",
         run.path().display()
@@ -93,18 +134,16 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
 /// Drives the plan, writes and prints the tables.
 ///
 /// # Errors
-/// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is written.
+/// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is kept.
 pub(crate) fn measure(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress, output: &Output) -> anyhow::Result<()> {
-    let evaluated = evaluation::evaluate::evaluate(plan, run, progress)?;
-    let summary = Summary::new(plan, &evaluated.results);
+    let Some(results) = evaluation::evaluate::evaluate(plan, run, progress)? else {
+        return Err(Interrupted { kept: format!("what was driven so far is in {}", run.path().display()) }.into());
+    };
+    let summary = Summary::new(plan, &results);
     summary.write(run)?;
     report::failures::write(run)?;
     let text = report::summary::write(&summary, run)?;
-    output.table(|| format!("\n{text}"), &summary.tables())?;
-    if evaluated.is_complete {
-        return Ok(());
-    }
-    Err(Interrupted { kept: format!("the runs driven so far are in {}", run.path().display()) }.into())
+    output.table(|| format!("\n{text}"), &summary.tables())
 }
 
 /// The tasks of an evaluation with their estimated seconds.

@@ -3,6 +3,7 @@
 use super::{train, within};
 use crate::args::OutArgs;
 use crate::console::Console;
+use crate::interrupt;
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::Args;
@@ -11,9 +12,12 @@ use evaluation::format::exact_rate;
 use evaluation::totals::Totals;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::progress::Interrupted;
-use experiment::run_dir::RunDir;
+use experiment::run_dir::{Request, RunDir};
 use experiment::settings::{EvaluationSettings, Settings};
 use serde::Deserialize;
+use std::path::PathBuf;
+
+const COMMAND: &str = "guard";
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -27,6 +31,9 @@ const RECORD: &str = include_str!("guard.toml");
 pub(crate) struct GuardArgs {
     #[command(flatten)]
     out: OutArgs,
+    /// Continues an interrupted run.
+    #[arg(long, value_name = "DIR", conflicts_with = "out")]
+    resume: Option<PathBuf>,
 }
 
 /// `guard.toml`: places with what the policy did there.
@@ -66,7 +73,14 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     let console = Console::new(output);
     let driving = record.place.iter().map(|place| estimate::evaluation(&place.settings(&settings), 1));
     console.plan(estimate::training(&settings, true).into_iter().chain(driving).collect());
-    let run = RunDir::create(&args.out.place("guard", "default", settings.seed.0), &settings)?;
+    let run = if let Some(path) = &args.resume {
+        let (run, begun_with, _) = RunDir::resume(path, COMMAND)?;
+        ensure!(begun_with == settings, "{}: the default settings have changed since; begin anew", path.display());
+        run
+    } else {
+        RunDir::create(&args.out.place(COMMAND, "default", settings.seed.0), &settings, &Request::default())?
+    };
+    interrupt::can_resume(COMMAND, run.path());
     output.note(format_args!("run: {}", run.path().display()));
     let interrupted = || Interrupted { kept: format!("what was done is in {}", run.path().display()) };
     let Ok((policy, outcome)) = train::tabulated(&settings, &run, &console, output)? else {

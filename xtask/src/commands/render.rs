@@ -341,7 +341,7 @@ fn render_samples(args: &SamplesArgs, folder: &Folder<'_>) -> anyhow::Result<()>
     let kept = Store::open(run)?.read_samples(index)?;
     let settings = run_dir::settings_of(run)?;
     let net = args.net.as_deref().unwrap_or(&args.round);
-    let checkpoint = (args.net.is_some() || Checkpoint::exists(net)).then(|| Checkpoint::load(net)).transpose()?;
+    let checkpoint = (args.net.is_some() || Checkpoint::exists(net)?).then(|| Checkpoint::load(net)).transpose()?;
     let count = args.count.min(kept.len());
     let chosen: Vec<usize> = (0..count).map(|i| (2 * i + 1) * kept.len() / (2 * count)).collect();
     let grids: Vec<_> = chosen.iter().map(|&i| &kept[i].grid).collect();
@@ -385,7 +385,7 @@ fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<(
 
 fn render_results(args: &RenderResultsArgs, output: &Output) -> anyhow::Result<()> {
     ensure!(
-        run_dir::is_finished(&args.run),
+        run_dir::is_finished(&args.run)?,
         "{}: this is no finished run; make one with cargo xtask reproduce",
         args.run.display()
     );
@@ -395,11 +395,6 @@ fn render_results(args: &RenderResultsArgs, output: &Output) -> anyhow::Result<(
 }
 
 fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyhow::Result<()> {
-    ensure!(
-        run.join("settings.toml").is_file(),
-        "{}: this is no run; name a folder that train-dagger, train-bc or evaluate made",
-        run.display()
-    );
     let owned = RunDir::reopen(run, "render report")?;
     let report = owned.path().join(run_report::FILE);
     let copy = copy.map(|folder| (folder, folder.path.join(run_report::FILE)));
@@ -407,6 +402,7 @@ fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyh
         folder.check_file(path)?;
     }
     run_report::write(run, &Console::new(output))?;
+    owned.list_in_parents()?;
     output.print(report.display());
     if let Some((folder, path)) = copy {
         let content = storage::read::bytes(&report, RUN_TEXT_BYTES_MAX)

@@ -5,6 +5,7 @@ use super::{evaluate, train};
 use crate::args::{LayerArgs, OutArgs};
 use crate::build_info;
 use crate::console::Console;
+use crate::interrupt;
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::Args;
@@ -12,15 +13,16 @@ use evaluation::conclusions;
 use evaluation::on_policy;
 use evaluation::plan::Plan;
 use evaluation::stages::{self, Extent, Stage, Step};
-use experiment::drivers::{self, DriverSpec};
+use experiment::drivers::{self, DriverSpec, NamedDriver};
+use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress as _};
-use experiment::run_dir::{self, Outcome, Place, RunDir};
+use experiment::run_dir::{self, Manifest, Outcome, Place, Request, RunDir};
 use experiment::settings::{Layers, Settings};
+use policy::dataset::store::Store;
 use report::reproduction::{self, Recipe};
-use sim::limits::RUN_TOML_BYTES_MAX;
-use std::fs;
 use std::path::{Path, PathBuf};
+use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -56,7 +58,7 @@ pub(crate) struct ReproduceArgs {
     resume: Option<PathBuf>,
 }
 
-const EXTENT: &str = "reproduce.toml";
+const COMMAND: &str = "reproduce";
 /// Trainings of `--full`.
 const SEEDS_FULL: u64 = 5;
 
@@ -65,7 +67,7 @@ pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
     let stages = stages::all(&settings, &extent, run.path());
     let recipe = Recipe { settings, extent, stages };
     let console = Console::new(output);
-    perform_all("reproduce", &recipe.stages, &run, &console, output)?;
+    perform_all(COMMAND, &recipe.stages, &run, &console, output)?;
     let conclusions = reproduction::write(&recipe, &run)?;
     output.table(|| format!("\nWhat holds here\n\n{conclusions}"), &())?;
     run.finish(Outcome::Reproduction { stages: recipe.stages.len() })?;
@@ -83,27 +85,31 @@ pub(crate) fn perform_all(
     output: &Output,
 ) -> anyhow::Result<()> {
     output.note(format_args!("run: {}", run.path().display()));
-    announce(stages, run.path(), output);
-    let is_to_do = |stage: &&Stage| !run_dir::is_finished(&run.path().join(&stage.folder));
-    console.plan(stages.iter().filter(is_to_do).flat_map(Stage::tasks).collect());
+    interrupt::can_resume(command, run.path());
+    announce(stages, run.path(), output)?;
+    let mut tasks = Vec::new();
+    for stage in stages {
+        if !run_dir::is_finished(&run.path().join(&stage.folder))? {
+            tasks.extend(stage.tasks());
+        }
+    }
+    console.plan(tasks);
     for (index, stage) in stages.iter().enumerate() {
         let (place, of) = (index + 1, stages.len());
         output.note(format_args!("\n{place} of {of}: {} ({})", stage.about, stage.folder));
-        let is_done = if console.is_cancelled() { Ok(false) } else { perform(stage, run.path(), console, output) };
+        let is_done = if console.is_cancelled() { Ok(false) } else { perform(command, stage, run, console, output) };
         match is_done {
             Ok(true) => {}
-            Ok(false) => return Err(cut_short(command, run.path(), index)),
-            Err(error) if error.is::<Interrupted>() => return Err(cut_short(command, run.path(), index)),
+            Ok(false) => return Err(cut_short(run.path(), index)),
+            Err(error) if error.is::<Interrupted>() => return Err(cut_short(run.path(), index)),
             Err(error) => return Err(error.context(format!("stage {}", stage.folder))),
         }
     }
     Ok(())
 }
 
-fn cut_short(command: &str, root: &Path, finished: usize) -> anyhow::Error {
-    let root = root.display();
-    let kept = format!("{finished} finished stages are in {root}; go on with: cargo xtask {command} --resume {root}");
-    Interrupted { kept }.into()
+fn cut_short(root: &Path, finished: usize) -> anyhow::Error {
+    Interrupted { kept: format!("{finished} finished stages are in {}", root.display()) }.into()
 }
 
 fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
@@ -140,31 +146,39 @@ fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
         settings.seed.0,
         extent.seeds
     );
-    let command = if args.full { "reproduce-full" } else { "reproduce" };
-    let place = args.out.place(command, layers.preset_name(), settings.seed.0);
-    let run = RunDir::create(&place, &settings)?;
-    run.write(EXTENT, toml::to_string(&extent)?.as_bytes())?;
+    let preset = format!("{}{}", if args.full { "full-" } else { "" }, layers.preset_name());
+    let place = args.out.place(COMMAND, &preset, settings.seed.0);
+    let request = Request { arguments: toml::Table::try_from(&extent)?, inputs: inputs(&settings, &extent)? };
+    let run = RunDir::create(&place, &settings, &request)?;
     Ok((run, settings, extent))
 }
 
 /// What a run did, by the files that it left.
 pub(crate) fn recipe_of(path: &Path) -> anyhow::Result<Recipe> {
-    let (settings, extent) = (run_dir::settings_of(path)?, extent_of(path)?);
+    let (settings, extent) = (run_dir::settings_of(path)?, extent_of(path, &Manifest::read(path)?)?);
     let stages = stages::all(&settings, &extent, path);
     Ok(Recipe { settings, extent, stages })
 }
 
-fn extent_of(path: &Path) -> anyhow::Result<Extent> {
-    let file = path.join(EXTENT);
-    let text = storage::read::text(&file, RUN_TOML_BYTES_MAX)
-        .with_context(|| format!("{}: cannot be read; this is no folder of cargo xtask reproduce", file.display()))?;
-    toml::from_str(&text).with_context(|| file.display().to_string())
+fn extent_of(path: &Path, manifest: &Manifest) -> anyhow::Result<Extent> {
+    let arguments = manifest.arguments.clone();
+    arguments.try_into().with_context(|| format!("{}: this is no folder of cargo xtask reproduce", path.display()))
 }
 
 fn resume(path: &Path) -> anyhow::Result<(RunDir, Settings, Extent)> {
-    let (run, settings) = RunDir::resume(path, "reproduce")?;
-    let extent = extent_of(path)?;
+    let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
+    let extent = extent_of(path, &manifest)?;
+    manifest.check_inputs(&inputs(&settings, &extent)?)?;
     Ok((run, settings, extent))
+}
+
+/// The lots and parameters from files that are read.
+fn inputs(settings: &Settings, extent: &Extent) -> anyhow::Result<Inputs> {
+    let mut found = train::inputs(settings)?;
+    let unseen = Lot::parse_all(&extent.unseen, &settings.episode.vehicle)?;
+    let tuned = NamedDriver::load_all(&extent.tuned, settings)?;
+    found.extend(inputs::of(&unseen, &tuned));
+    Ok(found)
 }
 
 /// Planners with tuned parameters: those of a folder that `tune` wrote, else those that ship with the program.
@@ -184,34 +198,33 @@ fn tuned(folder: Option<&Path>) -> anyhow::Result<Vec<String>> {
 }
 
 /// What will be done, with a guess at how long it takes.
-fn announce(stages: &[Stage], root: &Path, output: &Output) {
+fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<()> {
     let mut left_s = 0.0;
     output.note("stages, with the minutes they take on two quiet cores:");
     for (index, stage) in stages.iter().enumerate() {
-        let is_finished = run_dir::is_finished(&root.join(&stage.folder));
+        let is_finished = run_dir::is_finished(&root.join(&stage.folder))?;
         let estimate_s = if is_finished { 0.0 } else { stage.estimate_s() };
         left_s += estimate_s;
         let minutes = if is_finished { "done".to_owned() } else { format!("{:.1}", estimate_s / 60.0) };
         output.note(format_args!("{:>3}. {minutes:>6}  {} ({})", index + 1, stage.about, stage.folder));
     }
     output.note(format_args!("about {:.0} minutes in all", (left_s / 60.0).ceil()));
+    Ok(())
 }
 
 /// Does a stage unless it is done; `false` if cut short by Ctrl-C.
-fn perform(stage: &Stage, root: &Path, console: &Console, output: &Output) -> anyhow::Result<bool> {
-    let path = root.join(&stage.folder);
+fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, output: &Output) -> anyhow::Result<bool> {
     let settings = &stage.settings;
     let build = build_info::get();
-    let place =
-        Place { build, out: None, overwrite: false, command: "reproduce", preset: "reproduce", seed: settings.seed.0 };
-    let Some(run) = RunDir::stage(&path, &place, settings)? else {
+    let place = Place { build, out: None, overwrite: false, command, preset: command, seed: settings.seed.0 };
+    let Some(run) = root.stage(&stage.folder, &place, settings)? else {
         output.note("done before");
         return Ok(true);
     };
     match &stage.step {
         Step::Train { cloning_of } => {
             if let Some(chain) = cloning_of {
-                take_over_cloning(&root.join(chain), &path)?;
+                take_over_cloning(&root.path().join(chain), &run)?;
             }
             let Ok((_, outcome)) = train::tabulated(settings, &run, console, output)? else { return Ok(false) };
             run.finish(outcome)?;
@@ -229,7 +242,7 @@ fn perform(stage: &Stage, root: &Path, console: &Console, output: &Output) -> an
             run.finish(Outcome::Evaluation { drivers: specs })?;
         }
         Step::OnPolicy => {
-            if !on_policy::run(settings, root, &run, console)? {
+            if !on_policy::run(settings, root.path(), &run, console)? {
                 return Ok(false);
             }
             run.finish(Outcome::Evaluation { drivers: Vec::new() })?;
@@ -239,23 +252,18 @@ fn perform(stage: &Stage, root: &Path, console: &Console, output: &Output) -> an
 }
 
 /// Copies behaviour cloning from a finished chain: complete or not at all.
-fn take_over_cloning(from: &Path, to: &Path) -> anyhow::Result<()> {
+fn take_over_cloning(from: &Path, run: &RunDir) -> anyhow::Result<()> {
     const ROUND: &str = "round-00";
-    let (source, target) = (from.join(ROUND), to.join(ROUND));
-    if target.exists() {
+    let (from, to) = (Store::open(from)?, Store::open(run.path())?);
+    let source = from.round_folder(0);
+    if to.is_finished(&to.round_folder(0))? {
         return Ok(());
     }
-    let partial: PathBuf = to.join("round-00.partial");
-    let copy = || {
-        if partial.exists() {
-            fs::remove_dir_all(&partial)?;
-        }
-        fs::create_dir_all(&partial)?;
-        for entry in fs::read_dir(&source)? {
-            let entry = entry?;
-            fs::copy(entry.path(), partial.join(entry.file_name()))?;
-        }
-        fs::rename(&partial, &target)
-    };
-    copy().with_context(|| format!("{}: cannot be copied to {}", source.display(), target.display()))
+    ensure!(from.is_finished(&source)?, "{}: behaviour cloning is not finished there", source.display());
+    let files = sums::names(&source)?.into_iter().map(|name| {
+        // Its size was checked by nobody, its digest is.
+        let content = sums::read_listed(&source, &name, u64::MAX)?;
+        Ok::<_, anyhow::Error>((name, content))
+    });
+    Ok(sums::write_folder(run.path(), ROUND, files.collect::<anyhow::Result<Vec<_>>>()?)?)
 }

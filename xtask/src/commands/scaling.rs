@@ -1,16 +1,16 @@
 //! `scaling`: how much more different lots buy.
 
-use super::reproduce;
+use super::{reproduce, train};
 use crate::args::{LayerArgs, OutArgs};
 use crate::console::Console;
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::Args;
 use evaluation::scaling::{self, Extent};
+use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
-use experiment::run_dir::{Outcome, RunDir};
+use experiment::run_dir::{Outcome, Request, RunDir};
 use experiment::settings::{Layers, Settings};
-use std::fs;
 use std::path::PathBuf;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -43,23 +43,22 @@ pub(crate) struct ScalingArgs {
     resume: Option<PathBuf>,
 }
 
-const EXTENT: &str = "scaling.toml";
+const COMMAND: &str = "scaling";
 /// Sixteen lots of each family in every round, as much as the default trains on; no lot that is there in every training.
 const LOTS: &str = "train:144:all";
 
 pub(crate) fn run(args: &ScalingArgs, output: &Output) -> anyhow::Result<()> {
     let (run, settings, extent) = if let Some(path) = &args.resume {
-        let (run, settings) = RunDir::resume(path, "scaling")?;
-        let file = path.join(EXTENT);
-        let text = fs::read_to_string(&file)
-            .with_context(|| format!("{}: cannot be read; this is no folder of cargo xtask scaling", file.display()))?;
-        (run, settings, toml::from_str(&text).with_context(|| file.display().to_string())?)
+        let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
+        let extent: Extent = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
+        manifest.check_inputs(&inputs(&settings, &extent)?)?;
+        (run, settings, extent)
     } else {
         begin(args)?
     };
     let stages = scaling::stages(&settings, &extent, run.path());
     let console = Console::new(output);
-    reproduce::perform_all("scaling", &stages, &run, &console, output)?;
+    reproduce::perform_all(COMMAND, &stages, &run, &console, output)?;
     let table = report::scaling::write(&settings, &extent, &stages, &run)?;
     output.table(|| format!("\nNear-collisions against different lots\n\n{table}"), &())?;
     run.finish(Outcome::Reproduction { stages: stages.len() })?;
@@ -86,7 +85,14 @@ fn begin(args: &ScalingArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
     for lot in Lot::parse_all(&extent.unseen, &settings.episode.vehicle)? {
         ensure!(!lot.is_for_training(), "--unseen {}: policies are trained on it; name others", lot.name());
     }
-    let run = RunDir::create(&args.out.place("scaling", layers.preset_name(), settings.seed.0), &settings)?;
-    run.write(EXTENT, toml::to_string(&extent)?.as_bytes())?;
+    let request = Request { arguments: toml::Table::try_from(&extent)?, inputs: inputs(&settings, &extent)? };
+    let run = RunDir::create(&args.out.place(COMMAND, layers.preset_name(), settings.seed.0), &settings, &request)?;
     Ok((run, settings, extent))
+}
+
+/// The lots from files that are read.
+fn inputs(settings: &Settings, extent: &Extent) -> anyhow::Result<Inputs> {
+    let mut found = train::inputs(settings)?;
+    found.extend(inputs::of(&Lot::parse_all(&extent.unseen, &settings.episode.vehicle)?, &[]));
+    Ok(found)
 }

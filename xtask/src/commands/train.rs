@@ -3,6 +3,7 @@
 use super::{evaluate, within};
 use crate::args::{JsonArgs, LayerArgs, OutArgs};
 use crate::console::Console;
+use crate::interrupt;
 use crate::notes;
 use crate::output::Output;
 use crate::record::{self, RecordArgs};
@@ -12,14 +13,16 @@ use evaluation::estimate;
 use evaluation::plan::Plan;
 use evaluation::table1::Table1;
 use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress};
-use experiment::run_dir::{Outcome, RunDir};
+use experiment::run_dir::{Outcome, Request, RunDir};
 use experiment::settings::{EvaluationSettings, Layers, Settings};
 use experiment::training;
 use experiment::view_request::Show;
 use policy::checkpoint::Checkpoint;
 use policy::dagger::Stop;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 pub(crate) const DAGGER_EXAMPLES: &str = "\
@@ -70,7 +73,9 @@ pub(crate) fn dagger(args: &TrainArgs, output: &Output) -> anyhow::Result<()> {
 
 fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&mut Settings)) -> anyhow::Result<()> {
     let (run, settings) = if let Some(path) = &args.resume {
-        RunDir::resume(path, command)?
+        let (run, settings, manifest) = RunDir::resume(path, command)?;
+        manifest.check_inputs(&inputs(&settings)?)?;
+        (run, settings)
     } else {
         let layers = Layers::from(&args.layers);
         let mut settings = Settings::resolve(&layers, args.seed)?;
@@ -78,8 +83,10 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         // Before the folder is claimed: a misspelt lot should not leave one behind.
         check_lots(&settings, output)?;
         let place = args.out.place(command, layers.preset_name(), settings.seed.0);
-        (RunDir::create(&place, &settings)?, settings)
+        let request = Request { inputs: inputs(&settings)?, ..Request::default() };
+        (RunDir::create(&place, &settings, &request)?, settings)
     };
+    interrupt::can_resume(command, run.path());
     output.note(format_args!("run: {}", run.path().display()));
 
     let console = Console::new(output);
@@ -145,6 +152,18 @@ fn check_elsewhere(
     output.table(text, &rows)
 }
 
+/// The lots from files that a training reads.
+pub(crate) fn inputs(settings: &Settings) -> anyhow::Result<Inputs> {
+    let Settings { training, evaluation, .. } = settings;
+    let specs: BTreeSet<&String> =
+        [&training.lots, &evaluation.lots, &evaluation.elsewhere].into_iter().flatten().collect();
+    let mut found = Inputs::new();
+    for spec in specs {
+        found.extend(inputs::of(&Lot::parse_all(&[spec], &settings.episode.vehicle)?, &[]));
+    }
+    Ok(found)
+}
+
 /// Lots that do not exist, or cannot be driven as the settings ask.
 fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result<()> {
     let Settings { training, evaluation, episode, .. } = settings;
@@ -186,9 +205,7 @@ pub(crate) fn tabulated(
 }
 
 fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
-    let path = path.display();
-    let kept = format!("{rounds} finished rounds are in {path}; go on with: cargo xtask train-dagger --resume {path}");
-    Interrupted { kept }.into()
+    Interrupted { kept: format!("{rounds} finished rounds are in {}", path.display()) }.into()
 }
 
 /// Expert, behaviour cloning and what became of it.

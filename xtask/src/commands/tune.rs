@@ -2,21 +2,27 @@
 
 use crate::args::{LayerArgs, OutArgs};
 use crate::console::Console;
+use crate::interrupt;
 use crate::output::Output;
-use anyhow::ensure;
+use anyhow::{Context as _, ensure};
 use clap::Args;
 use evaluation::tune;
 use experiment::lots::Lot;
 use experiment::progress::Interrupted;
-use experiment::run_dir::{Outcome, RunDir};
+use experiment::run_dir::{Outcome, Request, RunDir};
 use experiment::settings::{Layers, NoiseChoice, Settings};
+use serde::{Deserialize, Serialize};
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
+use std::path::PathBuf;
+
+const COMMAND: &str = "tune";
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask tune
   cargo xtask tune --planner vvf --budget 128 --out runs/tune-vvf
+  cargo xtask tune --resume runs/tune-vvf
   cargo xtask evaluate --driver vvf --driver vvf:runs/tune-default-s1/vvf.toml";
 
 #[derive(Debug, Clone, Args)]
@@ -43,26 +49,38 @@ pub(crate) struct TuneArgs {
     layers: LayerArgs,
     #[command(flatten)]
     out: OutArgs,
+    /// Continues an interrupted search with its own settings, to the same result.
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all = [
+            "planners", "lots", "budget", "trials", "seed", "noise", "preset", "config", "overrides", "out"
+        ]
+    )]
+    resume: Option<PathBuf>,
+}
+
+/// What a search was asked for beside its settings.
+#[derive(Debug, Serialize, Deserialize)]
+struct Asked {
+    planners: Vec<String>,
+    budget: u32,
 }
 
 pub(crate) fn run(args: &TuneArgs, output: &Output) -> anyhow::Result<()> {
-    let layers = Layers::from(&args.layers);
-    let mut settings = Settings::resolve(&layers, None)?;
-    // Written into the folder, so that it says what was driven.
-    settings.evaluation.seed = RootSeed(args.seed);
-    settings.evaluation.lots.clone_from(&args.lots);
-    settings.evaluation.trials = args.trials;
-    settings.evaluation.directions = Direction::BOTH.to_vec();
-    settings.evaluation.noise = vec![args.noise];
-    settings.check()?;
-    ensure!(args.budget > 0, "--budget is 0; at least the starting point must be driven");
-    let planners = tune::planners_named(&args.planners)?;
-    tune::check(&Lot::parse_all(&args.lots, &settings.episode.vehicle)?)?;
-    let run = RunDir::create(&args.out.place("tune", layers.preset_name(), args.seed), &settings)?;
+    let (run, settings, asked) = if let Some(path) = &args.resume {
+        let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
+        let asked: Asked = manifest.arguments.try_into().with_context(|| path.display().to_string())?;
+        (run, settings, asked)
+    } else {
+        begin(args)?
+    };
+    interrupt::can_resume(COMMAND, run.path());
+    let planners = tune::planners_named(&asked.planners)?;
     let console = Console::new(output);
     // Planners take about as long as each other.
     console.plan([("lots", 1.0)].into_iter().chain(planners.iter().map(|_| ("tuning", 120.0))).collect());
-    let tuned = tune::tune(&settings, &planners, args.budget as usize, &run, &console)?;
+    let tuned = tune::tune(&settings, &planners, asked.budget as usize, &run, &console)?;
     if tuned.len() < planners.len() {
         let kept = format!("{} of {} planners are tuned in {}", tuned.len(), planners.len(), run.path().display());
         return Err(Interrupted { kept }.into());
@@ -74,4 +92,23 @@ pub(crate) fn run(args: &TuneArgs, output: &Output) -> anyhow::Result<()> {
     output.note(format_args!("written: {}/*.toml; drive one with --driver NAME:{0}/NAME.toml", run.path().display()));
     console.report_time();
     Ok(())
+}
+
+fn begin(args: &TuneArgs) -> anyhow::Result<(RunDir, Settings, Asked)> {
+    let layers = Layers::from(&args.layers);
+    let mut settings = Settings::resolve(&layers, None)?;
+    // Written into the folder, so that it says what was driven.
+    settings.evaluation.seed = RootSeed(args.seed);
+    settings.evaluation.lots.clone_from(&args.lots);
+    settings.evaluation.trials = args.trials;
+    settings.evaluation.directions = Direction::BOTH.to_vec();
+    settings.evaluation.noise = vec![args.noise];
+    settings.check()?;
+    ensure!(args.budget > 0, "--budget is 0; at least the starting point must be driven");
+    tune::planners_named(&args.planners)?;
+    tune::check(&Lot::parse_all(&args.lots, &settings.episode.vehicle)?)?;
+    let asked = Asked { planners: args.planners.clone(), budget: args.budget };
+    let request = Request { arguments: toml::Table::try_from(&asked)?, ..Request::default() };
+    let run = RunDir::create(&args.out.place(COMMAND, layers.preset_name(), args.seed), &settings, &request)?;
+    Ok((run, settings, asked))
 }

@@ -9,10 +9,10 @@ use experiment::progress::{Interrupted, Progress};
 use experiment::run_dir::{Outcome, Place, RunDir};
 use experiment::settings::Settings;
 
-/// Drives drivers over the lots of some settings into a folder within a run.
+/// Drives drivers over the lots of some settings into a folder within a run, or goes on with what is there.
 ///
 /// # Errors
-/// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is written.
+/// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is kept.
 pub(crate) fn evaluate(
     run: &RunDir,
     folder: &str,
@@ -23,20 +23,20 @@ pub(crate) fn evaluate(
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     ensure!(!drivers.is_empty(), "nobody drives");
     let plan = Plan { settings, drivers, lots: &lots, compare_with: drivers.len() - 1 };
-    let path = run.path().join(folder);
     let place = Place {
         build: crate::build_info::get(),
-        out: Some(&path),
-        overwrite: true,
+        out: None,
+        overwrite: false,
         command: "evaluate",
         preset: "run",
         seed: settings.evaluation.seed.0,
     };
-    let stage = RunDir::create(&place, settings)?;
-    let evaluated = evaluation::evaluate::evaluate(&plan, &stage, progress)?;
-    if !evaluated.is_complete {
+    let Some(stage) = run.stage(folder, &place, settings)? else {
+        return EvaluationResults::read(&plan, &run.path().join(folder));
+    };
+    let Some(results) = evaluation::evaluate::evaluate(&plan, &stage, progress)? else {
         return Err(Interrupted { kept: format!("what was done is in {}", run.path().display()) }.into());
-    }
+    };
     stage.finish(Outcome::Evaluation { drivers: drivers.iter().map(|driver| driver.spec.to_string()).collect() })?;
-    Ok(evaluated.results)
+    Ok(results)
 }

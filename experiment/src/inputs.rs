@@ -1,0 +1,13 @@
+//! What a run reads from elsewhere, by digest: lots, parameters and networks from files.
+
+use crate::drivers::NamedDriver;
+use crate::lots::Lot;
+
+pub use crate::run_dir::Inputs;
+
+/// Those of some lots and drivers; what ships with the program is not among them.
+pub fn of(lots: &[Lot], drivers: &[NamedDriver]) -> Inputs {
+    let lots = lots.iter().filter_map(|lot| Some((lot.spec(), lot.digest()?)));
+    let drivers = drivers.iter().filter_map(|driver| Some((driver.spec.to_string(), driver.digest()?)));
+    lots.chain(drivers).collect()
+}

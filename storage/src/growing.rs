@@ -1,0 +1,169 @@
+//! Files that grow line by line, several of them together, and go on after the process has been killed.
+
+use crate::error::FileError;
+use crate::sums;
+use crate::{sealed, whole};
+use sha2::{Digest as _, Sha256};
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::io::{Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+
+const REMEDY: &str = "restore it from a copy; or delete it and the file that ends in .unfinished to begin this again";
+
+/// Files that grow part by part: a part is added to all of them, or to none. The file `NAME.unfinished` says how far they
+/// are whole.
+#[derive(Debug)]
+pub struct Growing {
+    folder: PathBuf,
+    mark: PathBuf,
+    files: Vec<GrowingFile>,
+    parts: usize,
+}
+
+#[derive(Debug)]
+struct GrowingFile {
+    name: String,
+    file: File,
+    bytes: usize,
+    sha256: Sha256,
+}
+
+impl Growing {
+    /// Opens files of a folder as an interrupted process left them, without what it was adding, or creates them. `name`:
+    /// what is done there. Returns the contents as well.
+    ///
+    /// # Errors
+    /// If a file cannot be read or written, or is not what was written into it.
+    pub fn open(folder: &Path, name: &str, files: &[&str]) -> Result<(Self, Vec<Vec<u8>>), FileError> {
+        let mark = folder.join(format!("{name}.unfinished"));
+        let left = sealed::read(&mark)?.map(|text| Mark::parse(&mark, &text, files)).transpose()?;
+        let mut growing = Self { folder: folder.to_owned(), mark, files: Vec::new(), parts: 0 };
+        let mut contents = Vec::new();
+        for (index, &name) in files.iter().enumerate() {
+            let path = folder.join(name);
+            let failed = |error: std::io::Error| FileError::new(&path, error, whole::WRITE_REMEDY);
+            let content = left.as_ref().map(|left| left.content(index, &path)).transpose()?.unwrap_or_default();
+            let mut file = File::options().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+            file.set_len(content.len() as u64).map_err(failed)?;
+            file.seek(SeekFrom::End(0)).map_err(failed)?;
+            let sha256 = Sha256::new_with_prefix(&content);
+            growing.files.push(GrowingFile { name: name.to_owned(), file, bytes: content.len(), sha256 });
+            contents.push(content);
+        }
+        growing.parts = left.map_or(0, |left| left.parts);
+        Ok((growing, contents))
+    }
+
+    /// Parts that are there.
+    pub fn parts(&self) -> usize {
+        self.parts
+    }
+
+    /// Adds a part: its text for each file, in their order.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn add(&mut self, texts: &[Vec<u8>]) -> Result<(), FileError> {
+        for (file, text) in self.files.iter_mut().zip(texts) {
+            let added = file.file.write_all(text).and_then(|()| file.file.sync_data());
+            added.map_err(|error| {
+                FileError::new(
+                    &self.folder.join(&file.name),
+                    format_args!("cannot be written: {error}"),
+                    whole::WRITE_REMEDY,
+                )
+            })?;
+            file.bytes += text.len();
+            file.sha256.update(text);
+        }
+        self.parts += 1;
+        let mut mark = format!("{}\n", self.parts);
+        for GrowingFile { name, bytes, sha256, .. } in &self.files {
+            let _ = writeln!(mark, "{bytes} {} {name}", sums::hex(&sha256.clone().finalize()));
+        }
+        sealed::write(&self.mark, mark.as_bytes())
+    }
+
+    /// Lists the files as finished.
+    ///
+    /// # Errors
+    /// If the list cannot be written.
+    pub fn finish(self) -> Result<(), FileError> {
+        let names: Vec<&str> = self.files.iter().map(|file| file.name.as_str()).collect();
+        sums::list(&self.folder, &names)?;
+        whole::remove(&self.mark)
+    }
+}
+
+/// How far files are whole.
+struct Mark {
+    parts: usize,
+    /// Bytes and digest of each.
+    files: Vec<(usize, String)>,
+}
+
+impl Mark {
+    fn parse(path: &Path, text: &[u8], names: &[&str]) -> Result<Self, FileError> {
+        let text = String::from_utf8_lossy(text);
+        let mut lines = text.lines();
+        let mut mark = || {
+            let parts = lines.next()?.parse().ok()?;
+            let files = names.iter().map(|&name| {
+                let (bytes, rest) = lines.next()?.split_once(' ')?;
+                let (sum, of) = rest.split_once(' ')?;
+                (of == name).then_some((bytes.parse().ok()?, sum.to_owned()))
+            });
+            Some(Self { parts, files: files.collect::<Option<_>>()? })
+        };
+        mark().ok_or_else(|| FileError::new(path, "is of other files", REMEDY))
+    }
+
+    /// What is whole of a file.
+    fn content(&self, index: usize, path: &Path) -> Result<Vec<u8>, FileError> {
+        let (bytes, sum) = &self.files[index];
+        let mut content =
+            fs::read(path).map_err(|error| FileError::new(path, format_args!("cannot be read: {error}"), REMEDY))?;
+        content.truncate(*bytes);
+        if content.len() < *bytes || sums::digest(&content) != *sum {
+            return Err(FileError::new(path, "is damaged: it is not what was written into it", REMEDY));
+        }
+        Ok(content)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_go_on_after_the_last_whole_part_and_damage_is_noticed() {
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-growing", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        let names = ["runs", "failures"];
+        let open = || Growing::open(&folder, "driving", &names);
+        let part = |n: u8| [vec![n, b'\n'], vec![]];
+        let (mut growing, contents) = open().unwrap();
+        assert_eq!((growing.parts(), contents), (0, vec![vec![], vec![]]));
+        growing.add(&part(b'1')).unwrap();
+        growing.add(&part(b'2')).unwrap();
+        drop(growing);
+        // Killed in the middle of the third.
+        fs::write(folder.join("runs"), "1\n2\n3").unwrap();
+        let (mut growing, contents) = open().unwrap();
+        assert_eq!((growing.parts(), contents), (2, vec![b"1\n2\n".to_vec(), vec![]]));
+        growing.add(&part(b'3')).unwrap();
+        drop(growing);
+        let whole = fs::read(folder.join("runs")).unwrap();
+        for damaged in ["1\n2\n4\n", "1\n2\n", ""] {
+            fs::write(folder.join("runs"), damaged).unwrap();
+            assert!(open().unwrap_err().to_string().contains("damaged"), "{damaged:?}");
+        }
+        fs::write(folder.join("runs"), whole).unwrap();
+        open().unwrap().0.finish().unwrap();
+        assert_eq!(sums::read(&folder.join("runs"), 100).unwrap(), b"1\n2\n3\n");
+        assert!(sums::verify(&folder).faults.is_empty());
+        fs::remove_dir_all(folder).unwrap();
+    }
+}

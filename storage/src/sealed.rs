@@ -1,0 +1,61 @@
+//! Files of unfinished work: replaced again and again, each with its own SHA-256 in the first line.
+
+use crate::error::FileError;
+use crate::sums::digest;
+use crate::whole;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::Path;
+
+const REMEDY: &str = "delete it to begin this piece of work again";
+
+/// The first line: a comment in TOML.
+fn header(content: &[u8]) -> String {
+    format!("# sha256 {}\n", digest(content))
+}
+
+/// Writes a file whole, in place of what is there.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write(path: &Path, content: &[u8]) -> Result<(), FileError> {
+    whole::write(path, &[header(content).as_bytes(), content].concat())
+}
+
+/// Reads a file; `None` if there is none.
+///
+/// # Errors
+/// If it cannot be read, or is not what was written.
+pub fn read(path: &Path) -> Result<Option<Vec<u8>>, FileError> {
+    let mut bytes = match fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(FileError::new(path, format_args!("cannot be read: {error}"), REMEDY)),
+    };
+    let length = header(&[]).len();
+    if bytes.len() < length || bytes[..length] != *header(&bytes[length..]).as_bytes() {
+        return Err(FileError::new(path, "is damaged: its SHA-256 is not that in its first line", REMEDY));
+    }
+    bytes.drain(..length);
+    Ok(Some(bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn damage_is_noticed_and_absence_is_no_damage() {
+        let path = std::env::temp_dir().join(format!("storage-test-{}-sealed", std::process::id()));
+        assert_eq!(read(&path).unwrap(), None);
+        write(&path, b"half of it").unwrap();
+        assert_eq!(read(&path).unwrap().as_deref(), Some(&b"half of it"[..]));
+        let whole = fs::read(&path).unwrap();
+        for length in [0, 10, whole.len() - 1] {
+            fs::write(&path, &whole[..length]).unwrap();
+            assert!(read(&path).unwrap_err().to_string().contains("damaged"), "{length}");
+        }
+        whole::remove(&path).unwrap();
+        whole::remove(&path).unwrap();
+    }
+}

@@ -1,0 +1,408 @@
+//! The SHA-256 of every finished file of a folder, in the format of `sha256sum`: `sha256sum -c sha256sums` checks it, too.
+//!
+//! The list is the record of what is finished. A file is written under its name first and listed then, so that a file that
+//! is not listed is what an interrupted command left: it is written again, and never read. A folder within a run is
+//! finished when the folder above lists its list.
+
+use crate::error::FileError;
+use crate::lock;
+use crate::read;
+use crate::whole;
+use sha2::{Digest as _, Sha256};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+/// Name of the list.
+pub const FILE: &str = "sha256sums";
+/// Bytes of a list: a hundred thousand files with long names.
+pub const LIST_BYTES_MAX: u64 = 32 << 20;
+
+const RESTORE: &str = "restore it from a copy, or begin the run again";
+const LIST_REMEDY: &str =
+    "restore it from a copy; if every file of the folder is known to be whole: sha256sum * > sha256sums";
+
+/// The SHA-256 of some bytes in hexadecimal digits.
+pub fn digest(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
+}
+
+/// Digests by path within a folder.
+type Sums = BTreeMap<String, String>;
+
+/// The list of a folder; `None` if there is none.
+fn list_of(folder: &Path) -> Result<Option<Sums>, FileError> {
+    let path = folder.join(FILE);
+    let text = match read::bytes(&path, LIST_BYTES_MAX) {
+        Ok(bytes) => bytes,
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(FileError::new(&path, format_args!("cannot be read: {error}"), LIST_REMEDY)),
+    };
+    let damaged = |line: usize| FileError::new(&path, format_args!("line {line} is damaged"), LIST_REMEDY);
+    let text = String::from_utf8(text).map_err(|_| damaged(1))?;
+    // The last line is whole only with its end.
+    let lines = text.strip_suffix('\n').ok_or_else(|| damaged(text.lines().count().max(1)))?;
+    let mut sums = Sums::new();
+    for (index, line) in lines.split('\n').enumerate() {
+        let parts = line.split_once("  ").filter(|(sum, name)| {
+            sum.len() == 64 && sum.bytes().all(|byte| byte.is_ascii_hexdigit()) && !name.is_empty()
+        });
+        let (sum, name) = parts.ok_or_else(|| damaged(index + 1))?;
+        sums.insert(name.to_owned(), sum.to_owned());
+    }
+    Ok(Some(sums))
+}
+
+fn write_list(folder: &Path, sums: &Sums) -> Result<(), FileError> {
+    let path = folder.join(FILE);
+    if sums.is_empty() {
+        return whole::remove(&path);
+    }
+    let mut text = String::new();
+    for (name, sum) in sums {
+        let _ = writeln!(text, "{sum}  {name}");
+    }
+    whole::write(&path, text.as_bytes())
+}
+
+/// Whether a folder has a list: whether anything is finished there.
+pub fn exists(folder: &Path) -> bool {
+    folder.join(FILE).is_file()
+}
+
+/// Whether a file of a folder is finished.
+///
+/// # Errors
+/// If the list cannot be read or is damaged.
+pub fn is_listed(folder: &Path, name: &str) -> Result<bool, FileError> {
+    Ok(list_of(folder)?.is_some_and(|sums| sums.contains_key(name)))
+}
+
+/// The names of the finished files of a folder, in order; empty if it has no list.
+///
+/// # Errors
+/// If the list cannot be read or is damaged.
+pub fn names(folder: &Path) -> Result<Vec<String>, FileError> {
+    Ok(list_of(folder)?.unwrap_or_default().into_keys().collect())
+}
+
+/// Lists files of a folder that are there and will not change: all at once.
+///
+/// # Errors
+/// If one of them cannot be read, or the list not be written.
+pub fn list(folder: &Path, names: &[&str]) -> Result<(), FileError> {
+    let mut sums = list_of(folder)?.unwrap_or_default();
+    for &name in names {
+        let path = folder.join(name);
+        let bytes =
+            fs::read(&path).map_err(|error| FileError::new(&path, format_args!("cannot be read: {error}"), RESTORE))?;
+        sums.insert(name.to_owned(), digest(&bytes));
+    }
+    write_list(folder, &sums)
+}
+
+/// Lists every file of a folder, as it is before anybody else knows of it.
+///
+/// # Errors
+/// See [`list`].
+pub fn list_all(folder: &Path) -> Result<(), FileError> {
+    let failed = |error: std::io::Error| FileError::new(folder, format_args!("cannot be read: {error}"), RESTORE);
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if is_content(&name) && entry.file_type().map_err(failed)?.is_file() {
+            names.push(name);
+        }
+    }
+    list(folder, &names.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+/// Takes files off the list of a folder, before they are written anew.
+///
+/// # Errors
+/// If the list cannot be read or written.
+pub fn unlist(folder: &Path, names: &[&str]) -> Result<(), FileError> {
+    let Some(mut sums) = list_of(folder)? else { return Ok(()) };
+    let count = sums.len();
+    sums.retain(|name, _| !names.contains(&name.as_str()));
+    if sums.len() == count { Ok(()) } else { write_list(folder, &sums) }
+}
+
+/// Writes a file of a folder and lists it.
+///
+/// # Errors
+/// If it cannot be written, or the list is damaged.
+pub fn write(folder: &Path, name: &str, content: &[u8]) -> Result<(), FileError> {
+    let sum = digest(content);
+    let mut sums = list_of(folder)?.unwrap_or_default();
+    match sums.get(name) {
+        Some(listed) if *listed == sum && fs::read(folder.join(name)).is_ok_and(|found| found == content) => {
+            return Ok(());
+        }
+        // Never listed with a digest that is not its own, whenever the process dies.
+        Some(_) => unlist(folder, &[name])?,
+        None => {}
+    }
+    whole::write(&folder.join(name), content)?;
+    sums.insert(name.to_owned(), sum);
+    write_list(folder, &sums)
+}
+
+/// Writes a folder with its list within another, in place of one that is there, and lists it; without files, there is no
+/// such folder afterwards.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write_folder(
+    folder: &Path,
+    name: &str,
+    files: impl IntoIterator<Item = (String, Vec<u8>)>,
+) -> Result<(), FileError> {
+    let (path, partial, list_name) =
+        (folder.join(name), folder.join(format!("{name}.partial")), format!("{name}/{FILE}"));
+    let failed =
+        |error: std::io::Error| FileError::new(&path, format_args!("cannot be written: {error}"), whole::WRITE_REMEDY);
+    unlist(folder, &[&list_name])?;
+    for old in [&path, &partial] {
+        if old.exists() {
+            fs::remove_dir_all(old).map_err(failed)?;
+        }
+    }
+    fs::create_dir_all(&partial).map_err(failed)?;
+    for (name, content) in files {
+        whole::write(&partial.join(name), &content)?;
+    }
+    list_all(&partial)?;
+    if !exists(&partial) {
+        return fs::remove_dir(&partial).map_err(failed);
+    }
+    fs::rename(&partial, &path).map_err(failed)?;
+    list(folder, &[&list_name])
+}
+
+/// Reads a finished file of at most so many bytes.
+///
+/// # Errors
+/// If it is missing, larger, no regular file, not listed in its folder, or not what it was when it was listed.
+pub fn read(path: &Path, bytes_max: u64) -> Result<Vec<u8>, FileError> {
+    let (folder, name) = (path.parent().unwrap_or(Path::new("")), path.file_name().unwrap_or_default());
+    read_listed(folder, &name.to_string_lossy(), bytes_max)
+}
+
+/// Reads a finished file by the name under which a folder lists it: `a.csv` or `figures/sha256sums`.
+///
+/// # Errors
+/// See [`read`].
+pub fn read_listed(folder: &Path, name: &str, bytes_max: u64) -> Result<Vec<u8>, FileError> {
+    let (path, list) = (&folder.join(name), folder.join(FILE));
+    let bytes = read::bytes(path, bytes_max)
+        .map_err(|error| FileError::new(path, format_args!("cannot be read: {error}"), RESTORE))?;
+    let Some(sums) = list_of(folder)? else {
+        return Err(FileError::new(
+            &list,
+            format_args!("is missing, so nothing says whether {} is whole", path.display()),
+            LIST_REMEDY,
+        ));
+    };
+    match sums.get(name) {
+        Some(sum) if *sum == digest(&bytes) => Ok(bytes),
+        Some(_) => Err(FileError::new(path, DAMAGED, RESTORE)),
+        None => Err(FileError::new(path, UNLISTED, RESTORE)),
+    }
+}
+
+/// Reads a finished text file.
+///
+/// # Errors
+/// See [`read`]; or if it is no UTF-8.
+pub fn read_to_string(path: &Path, bytes_max: u64) -> Result<String, FileError> {
+    String::from_utf8(read(path, bytes_max)?).map_err(|error| FileError::new(path, error, RESTORE))
+}
+
+/// Reads a file if its folder lists it; `None` if it is not finished.
+///
+/// # Errors
+/// If it is listed, but missing or damaged.
+pub fn read_if_listed(path: &Path, bytes_max: u64) -> Result<Option<Vec<u8>>, FileError> {
+    let (folder, name) = (path.parent().unwrap_or(Path::new("")), path.file_name().unwrap_or_default());
+    is_listed(folder, &name.to_string_lossy())?.then(|| read(path, bytes_max)).transpose()
+}
+
+/// What [`verify`] found.
+#[derive(Debug, Default)]
+pub struct Verified {
+    /// Files whose digests are right.
+    pub files: usize,
+    /// Their bytes.
+    pub bytes: u64,
+    /// What is wrong, in the order of the paths.
+    pub faults: Vec<FileError>,
+}
+
+/// Compares every file below a folder with the lists: nothing may be missing, changed or additional. Recordings are not
+/// looked at: another program adds them.
+pub fn verify(folder: &Path) -> Verified {
+    let mut verified = Verified::default();
+    verify_into(folder, &mut verified);
+    verified
+}
+
+fn verify_into(folder: &Path, verified: &mut Verified) {
+    let list = folder.join(FILE);
+    let sums = match list_of(folder) {
+        Ok(Some(sums)) => sums,
+        Ok(None) => return verified.faults.push(FileError::new(&list, "is missing", LIST_REMEDY)),
+        Err(error) => return verified.faults.push(error),
+    };
+    for (name, sum) in &sums {
+        let path = folder.join(name);
+        match fs::read(&path) {
+            Ok(bytes) if digest(&bytes) == *sum => {
+                verified.files += 1;
+                verified.bytes += bytes.len() as u64;
+            }
+            Ok(_) => verified.faults.push(FileError::new(&path, DAMAGED, RESTORE)),
+            Err(error) => verified.faults.push(FileError::new(&path, format_args!("cannot be read: {error}"), RESTORE)),
+        }
+    }
+    look_for_others(folder, "", &sums, verified);
+}
+
+/// What is there and not listed, in a folder or in folders within it that have no list of their own.
+fn look_for_others(folder: &Path, prefix: &str, sums: &Sums, verified: &mut Verified) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    let mut entries: Vec<_> = entries.flatten().collect();
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let (path, name) = (entry.path(), format!("{prefix}{}", entry.file_name().to_string_lossy()));
+        if !entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            if is_content(&name) && !sums.contains_key(&name) {
+                verified.faults.push(FileError::new(&path, UNLISTED, UNLISTED_REMEDY));
+            }
+        } else if name == RECORDINGS || is_partial(&name) {
+            // Another program's; or what was being written when a command was killed.
+        } else if exists(&path) || sums.contains_key(&format!("{name}/{FILE}")) {
+            if !sums.contains_key(&format!("{name}/{FILE}")) {
+                verified.faults.push(FileError::new(&path, UNLISTED, UNLISTED_REMEDY));
+            }
+            verify_into(&path, verified);
+        } else {
+            look_for_others(&path, &format!("{name}/"), sums, verified);
+        }
+    }
+}
+
+const DAMAGED: &str = "is damaged: its SHA-256 is not that in sha256sums";
+const UNLISTED: &str = "is not listed in sha256sums: it was never finished, or the list is damaged";
+const UNLISTED_REMEDY: &str = "go on with the run, or restore the list; delete what does not belong there";
+
+/// The folder that the viewer program adds to a run.
+const RECORDINGS: &str = "recordings";
+
+/// Whether a file of this name is content: neither a list, nor a lock, nor half-written.
+fn is_content(name: &str) -> bool {
+    let name = name.rsplit('/').next().unwrap_or(name);
+    name != FILE && name != lock::FILE && !is_partial(name)
+}
+
+/// Whether a name is that of something half-written.
+fn is_partial(name: &str) -> bool {
+    Path::new(name).extension().is_some_and(|extension| extension == "partial")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::PathBuf;
+
+    fn scratch(name: &str) -> PathBuf {
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-{name}", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        folder
+    }
+
+    fn faults(folder: &Path) -> Vec<String> {
+        verify(folder).faults.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn what_is_written_is_listed_as_sha256sum_lists_it_and_read_back() {
+        let folder = scratch("written");
+        write(&folder, "b", b"").unwrap();
+        write(&folder, "a", b"hello\n").unwrap();
+        let expected = "5891b5b522d5df086d0ff0b110fbd9d21bb4fc7163af34d08286a2e846f6be03  a\n\
+                        e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855  b\n";
+        assert_eq!(fs::read_to_string(folder.join(FILE)).unwrap(), expected);
+        assert_eq!(read_to_string(&folder.join("a"), 100).unwrap(), "hello\n");
+        write(&folder, "a", b"hello again\n").unwrap();
+        assert_eq!(read(&folder.join("a")).unwrap(), b"hello again\n");
+        assert!(verify(&folder).faults.is_empty());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn damage_of_a_file_or_of_the_list_is_noticed_by_who_reads_and_by_verify() {
+        let folder = scratch("damaged");
+        let inner = folder.join("stages/one");
+        fs::create_dir_all(&inner).unwrap();
+        write(&inner, "data", b"12345").unwrap();
+        write(&folder, "about", b"one stage").unwrap();
+        list(&folder, &["stages/one/sha256sums"]).unwrap();
+        assert_eq!(verify(&folder).files, 3);
+        for path in ["about", "stages/one/data", "sha256sums", "stages/one/sha256sums"] {
+            let path = folder.join(path);
+            let whole = fs::read(&path).unwrap();
+            let mut flipped = whole.clone();
+            flipped[whole.len() / 2] ^= 1;
+            for damaged in [Some(flipped), Some(whole[..whole.len() - 1].to_vec()), Some(Vec::new()), None] {
+                match &damaged {
+                    Some(bytes) => fs::write(&path, bytes).unwrap(),
+                    None => fs::remove_file(&path).unwrap(),
+                }
+                assert!(!faults(&folder).is_empty(), "{path:?} as {damaged:?}");
+                let stage = read_listed(&folder, "stages/one/sha256sums", 1000);
+                let reads = [read(&folder.join("about")), read(&inner.join("data")), stage];
+                assert!(reads.iter().any(Result::is_err), "{path:?} as {damaged:?}");
+            }
+            fs::write(&path, whole).unwrap();
+        }
+        assert_eq!(faults(&folder), [""; 0]);
+        fs::write(inner.join("more"), "").unwrap();
+        fs::write(folder.join("stages/note"), "").unwrap();
+        assert_eq!(faults(&folder).len(), 2, "{:?}", faults(&folder));
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_folder_that_is_written_again_holds_what_was_written_last() {
+        let folder = scratch("folder");
+        write_folder(&folder, "figures", [("a.svg".to_owned(), b"a".to_vec()), ("b.svg".to_owned(), b"b".to_vec())])
+            .unwrap();
+        write_folder(&folder, "figures", [("b.svg".to_owned(), b"B".to_vec())]).unwrap();
+        assert_eq!(names(&folder.join("figures")).unwrap(), ["b.svg"]);
+        assert!(faults(&folder).is_empty());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn what_is_not_finished_is_not_read() {
+        let folder = scratch("unfinished");
+        write(&folder, "a", b"a").unwrap();
+        fs::write(folder.join("b"), "b").unwrap();
+        assert!(read(&folder.join("b")).unwrap_err().to_string().contains("not listed"));
+        assert_eq!(read_if_listed(&folder.join("b"), 100).unwrap(), None);
+        unlist(&folder, &["a"]).unwrap();
+        assert!(!exists(&folder));
+        fs::remove_dir_all(folder).unwrap();
+    }
+}

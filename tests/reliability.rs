@@ -1,0 +1,230 @@
+//! What docs/reliability.md promises of runs: one owner, nothing lost, no damage unnoticed.
+
+use crate::bench::{scratch, succeed, text, xtask};
+use crate::determinism::files;
+use policy::checkpoint::Checkpoint;
+use policy::dataset::store::Store;
+use policy::fit::{FitReport, learning};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+use storage::sums;
+
+/// A command under way, killed with the test.
+struct Running(Child);
+
+impl Running {
+    fn start(arguments: &[&str], out: &Path) -> Self {
+        let mut command = xtask();
+        command.args(arguments).arg("--out").arg(out).stdout(Stdio::null()).stderr(Stdio::null());
+        Self(command.spawn().unwrap())
+    }
+
+    /// Waits until a file of the run is there; false if the command ended before.
+    fn wait_for(&mut self, file: &Path) -> bool {
+        while !file.exists() {
+            if self.0.try_wait().unwrap().is_some() {
+                return file.exists();
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        true
+    }
+
+    fn kill(mut self) {
+        self.0.kill().unwrap();
+        self.0.wait().unwrap();
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn resume(command: &str, run: &Path) {
+    succeed(xtask().args([command, "--resume"]).arg(run));
+}
+
+/// Kills a command when a file of its run appears, goes on, and compares every file with those of a run that was left
+/// alone. Both use the same folder, which replay keys name.
+fn killed_and_resumed(name: &str, arguments: &[&str], appears: &[&str]) {
+    let run = scratch(name).join("run");
+    succeed(xtask().args(arguments).arg("--out").arg(&run));
+    let whole = files(&run);
+    for file in appears {
+        std::fs::remove_dir_all(&run).unwrap();
+        let mut running = Running::start(arguments, &run);
+        assert!(running.wait_for(&run.join(file)), "{file} never appears");
+        running.kill();
+        resume(arguments[0], &run);
+        let resumed = files(&run);
+        assert_eq!(whole.keys().collect::<Vec<_>>(), resumed.keys().collect::<Vec<_>>(), "killed at {file}");
+        for (name, bytes) in &whole {
+            assert!(*bytes == resumed[name], "{name} differs, killed at {file}");
+        }
+        let faults = sums::verify(&run).faults;
+        assert!(faults.is_empty(), "killed at {file}: {faults:?}");
+    }
+}
+
+#[test]
+fn a_killed_training_goes_on_to_the_same_bytes() {
+    let appears = ["sha256sums", "round-00/sha256sums", "round-01/fit.toml", "summary.json", "figures"];
+    killed_and_resumed("killed-training", &["train-dagger", "--preset", "smoke"], &appears);
+}
+
+#[test]
+fn a_killed_evaluation_goes_on_to_the_same_bytes() {
+    let arguments = ["evaluate", "--driver", "expert", "--driver", "tentacle", "--lots", "lot-b,test:2:easy"];
+    let arguments = [&arguments[..], &["--trials", "1", "--noise", "clean,paper"]].concat();
+    killed_and_resumed("killed-evaluation", &arguments, &["runs.jsonl", "driving.unfinished", "summary.json"]);
+}
+
+#[test]
+fn a_killed_search_goes_on_to_the_same_bytes() {
+    let arguments = ["tune", "--planner", "cvm", "--lots", "train:1:easy", "--budget", "12"];
+    killed_and_resumed("killed-search", &arguments, &["cvm.candidates.toml", "cvm.toml"]);
+}
+
+/// Two commands wrote into one folder, and what came out was of neither.
+#[test]
+fn a_run_under_way_is_refused_by_name_and_process() {
+    let run = scratch("owner").join("run");
+    let mut running = Running::start(&["train-dagger", "--preset", "smoke", "--no-eval"], &run);
+    assert!(running.wait_for(&run.join("sha256sums")));
+    let owner = format!("in use by train-dagger, process {}", running.0.id());
+    let out = run.to_string_lossy().into_owned();
+    for arguments in [
+        &["train-bc", "--preset", "smoke", "--seed", "9", "--overwrite", "--out", &out] as &[&str],
+        &["evaluate", "--driver", "expert", "--out", &out],
+        &["train-dagger", "--resume", &out],
+        &["render", "report", &out],
+    ] {
+        let output = xtask().args(arguments).output().unwrap();
+        let (_, stderr) = text(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+        assert!(stderr.contains(&owner), "{arguments:?}: {stderr}");
+    }
+    running.kill();
+    resume("train-dagger", &run);
+}
+
+/// Whatever signal comes, and whenever: 130, nothing half-done is called finished, and the run goes on.
+#[cfg(unix)]
+#[test]
+fn signals_end_a_command_with_130_and_lose_nothing() {
+    for (signal, file) in [("INT", "sha256sums"), ("TERM", "dagger.toml"), ("HUP", "round-00/fit.toml")] {
+        let run = scratch("signals").join(signal);
+        let mut running = Running::start(&["train-dagger", "--preset", "smoke", "--no-eval"], &run);
+        assert!(running.wait_for(&run.join(file)), "{file} never appears");
+        let sent = Command::new("kill").args(["-s", signal, &running.0.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        assert_eq!(running.0.wait().unwrap().code(), Some(130), "after {signal}");
+        assert!(!run.join("finished.toml").exists(), "after {signal}");
+        resume("train-dagger", &run);
+    }
+}
+
+/// Damage as disks, copies and people make it.
+const DAMAGES: [&str; 5] = ["a bit flipped", "truncated", "emptied", "a line or byte added", "removed"];
+
+fn damage(path: &Path, how: &str) {
+    let mut bytes = std::fs::read(path).unwrap();
+    match how {
+        "a bit flipped" if !bytes.is_empty() => {
+            let middle = bytes.len() / 2;
+            bytes[middle] ^= 4;
+        }
+        "truncated" => bytes.truncate(bytes.len() / 2),
+        "emptied" => bytes.clear(),
+        "removed" => return std::fs::remove_file(path).unwrap(),
+        _ => bytes.push(b'\n'),
+    }
+    std::fs::write(path, bytes).unwrap();
+}
+
+/// Reads what a training left, as drivers, resumed trainings and reports do.
+fn read_training(run: &Path) -> Result<(), String> {
+    let round = run.join("round-00");
+    let store = Store::open(run).map_err(|error| error.to_string())?;
+    store.is_finished(&round).map_err(|error| error.to_string())?;
+    store.read_round(0).map_err(|error| error.to_string())?;
+    Checkpoint::load(&round).map_err(|error| error.to_string())?;
+    learning::read(&round, "BC").map_err(|error| error.to_string())?;
+    FitReport::read(&round).map_err(|error| error.to_string()).map(drop)
+}
+
+/// 31 of 243 damaged files changed a result without a word.
+#[test]
+fn every_damage_of_every_file_is_noticed_by_who_reads_it_and_by_verify() {
+    let run = scratch("damage").join("run");
+    succeed(xtask().args(["train-bc", "--preset", "smoke", "--out"]).arg(&run));
+    assert!(sums::verify(&run).faults.is_empty());
+    read_training(&run).unwrap();
+    let files = content_of(&run);
+    assert!(files.len() > 25, "{files:?}");
+    let mut count = 0;
+    for file in &files {
+        let whole = std::fs::read(run.join(file)).unwrap();
+        for how in DAMAGES {
+            damage(&run.join(file), how);
+            if std::fs::read(run.join(file)).is_ok_and(|bytes| bytes == whole) {
+                continue;
+            }
+            assert!(!sums::verify(&run).faults.is_empty(), "{} {how}: verify says nothing", file.display());
+            if file.starts_with("round-00") {
+                assert!(read_training(&run).is_err(), "{} {how}: it is read", file.display());
+            }
+            std::fs::write(run.join(file), &whole).unwrap();
+            count += 1;
+        }
+    }
+    assert!(count > 100, "only {count} damages");
+    assert!(sums::verify(&run).faults.is_empty(), "restored");
+
+    let driver = format!("run:{}", run.display());
+    let evaluate = ["evaluate", "--driver", &driver, "--lots", "lot-b", "--trials", "1"];
+    let report = ["render", "report", run.to_str().unwrap()];
+    let verify = ["verify", run.to_str().unwrap()];
+    for (file, command) in [
+        ("round-00/model.safetensors", &evaluate[..]),
+        ("round-00/sha256sums", &evaluate),
+        ("settings.toml", &evaluate),
+        ("table1.json", &report),
+        ("summary.json", &report),
+        ("runs.jsonl", &report),
+        ("round-00/learning.csv", &report),
+        ("figures/learning.svg", &verify),
+    ] {
+        let whole = std::fs::read(run.join(file)).unwrap();
+        damage(&run.join(file), "a bit flipped");
+        let output = xtask().args(command).output().unwrap();
+        let (_, stderr) = text(&output);
+        assert_eq!(output.status.code(), Some(2), "{command:?} with {file}: {stderr}");
+        assert!(stderr.contains(file), "{command:?} does not name {file}: {stderr}");
+        std::fs::write(run.join(file), whole).unwrap();
+    }
+    let printed = succeed(xtask().args(verify));
+    assert!(printed.contains("all as they were written"), "{printed}");
+}
+
+/// Every file of a run but its lock, relative to it.
+fn content_of(run: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![run.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.file_name().unwrap() != ".lock" {
+                found.push(path.strip_prefix(run).unwrap().to_owned());
+            }
+        }
+    }
+    found.sort();
+    found
+}

@@ -1,0 +1,33 @@
+//! `verify`: whether the files of a run are what was written.
+
+use crate::args::JsonArgs;
+use crate::output::{Output, note};
+use anyhow::ensure;
+use clap::Args;
+use std::path::PathBuf;
+use storage::sums::{self, Verified};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask verify runs/train-dagger-default-s1
+  (cd runs/train-dagger-default-s1/round-00 && sha256sum -c sha256sums)     the same of one folder, without lotpilot";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct VerifyArgs {
+    /// Folder of a run, or of a round.
+    #[arg(value_name = "RUN")]
+    run: PathBuf,
+    #[command(flatten)]
+    pub(crate) json: JsonArgs,
+}
+
+pub(crate) fn run(args: &VerifyArgs, output: &Output) -> anyhow::Result<()> {
+    let Verified { files, bytes, faults } = sums::verify(&args.run);
+    for fault in &faults {
+        note(fault);
+    }
+    ensure!(faults.is_empty(), "{}: {} of its files are not what was written", args.run.display(), faults.len());
+    let text =
+        || format!("{}: {files} files, {:.1} MB, all as they were written", args.run.display(), bytes as f64 / 1e6);
+    output.table(text, &serde_json::json!({ "files": files, "bytes": bytes }))
+}
