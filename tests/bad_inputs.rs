@@ -2,23 +2,26 @@
 //! anything is written and without time or memory worth mentioning. Most are given to the functions that read them;
 //! [`whole_commands_refuse_within_their_means_and_leave_nothing`] gives some to commands.
 
+#![expect(clippy::too_many_lines, clippy::format_collect, reason = "tables of cases, and files made up for them")]
+
 use crate::bench::{scratch, text, xtask};
 use experiment::drivers::DriverSpec;
 use experiment::replay_key::ReplayKey;
 use experiment::settings::{Layers, Settings, reference};
 use expert::ScriptedExpert;
 use policy::checkpoint::Checkpoint;
+use policy::conditions::Conditions;
 use policy::network::{InferenceSettings, NetworkArchitecture, Weights};
 use sim::driver::Driver as _;
 use sim::episode::Episode;
 use sim::map::Map;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
-use sim::sensing::GridGeometry;
 use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+use storage::sums;
 
 /// Longest error, bytes: no file is quoted at length.
 const ERROR_MAX: usize = 3000;
@@ -359,13 +362,13 @@ fn names_of_lots_drivers_and_moments_that_are_refused() {
         ("run:no/such/run", "this is no run"),
         ("run:", "this is no run"),
         ("run:no/such/run/bc", "this is no run"),
-        ("net:no/such/net", "holds no model.safetensors"),
-        ("net:", "holds no model.safetensors"),
+        ("net:no/such/net", "lists no finished model.safetensors"),
+        ("net:", "lists no finished model.safetensors"),
         ("vvf:no/such.toml", "no/such.toml: cannot be read"),
         ("vvf:", ": cannot be read"),
         ("vvf:/", "it is a folder"),
     ] {
-        let load = || driver.parse::<DriverSpec>()?.load(&settings.expert, settings.dagger.device);
+        let load = || driver.parse::<DriverSpec>()?.load(&settings);
         cases.refuse(driver, load(), expected);
     }
     for (key, expected) in [
@@ -584,7 +587,7 @@ fn files_of_planners_and_networks_that_are_refused() {
     let sound = std::fs::read_to_string(crate::bench::root().join("planners/tuned/dwa.toml")).unwrap();
     let load = |text: &str| {
         std::fs::write(&file, text).unwrap();
-        format!("dwa:{}", file.display()).parse::<DriverSpec>()?.load(&settings.expert, settings.dagger.device)
+        format!("dwa:{}", file.display()).parse::<DriverSpec>()?.load(&settings)
     };
     load(&sound).unwrap();
     let mut cases = Table::default();
@@ -604,13 +607,15 @@ fn files_of_planners_and_networks_that_are_refused() {
     }
     let network = NetworkArchitecture::compact();
     let (weights, inference) = (Weights::init(network, RootSeed(1), 0), InferenceSettings::plain());
-    let checkpoint = Checkpoint { weights, geometry: GridGeometry::paper(), inference };
+    let checkpoint = Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference };
     checkpoint.save(&folder).unwrap();
+    // Damage is another test's: here files are whole, but wrong.
+    let listed = || sums::list_all(&folder).unwrap();
     let (model, numbers) = (folder.join("model.toml"), folder.join("model.safetensors"));
     let (about, bytes) = (std::fs::read_to_string(&model).unwrap(), std::fs::read(&numbers).unwrap());
     for (from, to, expected) in [
-        ("schema = 2", "schema = 1", "schema 1; this program reads schema 2"),
-        ("schema = 2\n", "", "no schema number"),
+        ("schema = 3", "schema = 1", "schema 1; this program reads schema 3"),
+        ("schema = 3\n", "", "no schema number"),
         ("hidden = 256", "hidden = 1000000000000", "hidden units; at most 65536 are possible"),
         ("hidden = 256", "hidden = 0", "at least one unit"),
         ("hidden = 256", "hidden = 60000", "parameters; at most 64000000 are possible"),
@@ -625,6 +630,7 @@ fn files_of_planners_and_networks_that_are_refused() {
     ] {
         assert!(about.contains(from), "{from:?} is not in\n{about}");
         std::fs::write(&model, about.replacen(from, to, 1)).unwrap();
+        listed();
         cases.refuse(&format!("{from:?} → {to:?}"), Checkpoint::load(&folder), expected);
     }
     std::fs::write(&model, &about).unwrap();
@@ -632,7 +638,7 @@ fn files_of_planners_and_networks_that_are_refused() {
     let end = not_finite.len();
     not_finite[end - 4..].copy_from_slice(&f32::NAN.to_le_bytes());
     let forged = [&u64::MAX.to_le_bytes()[..], &bytes[8..]].concat();
-    let larger = [&bytes[..], &[0; 70_000]].concat();
+    let larger = [&bytes[..], &vec![0; 70_000]].concat();
     for (content, expected) in [
         (&b""[..], "model.safetensors"),
         (&bytes[..100], "model.safetensors"),
@@ -642,6 +648,7 @@ fn files_of_planners_and_networks_that_are_refused() {
         (&not_finite, "is not finite"),
     ] {
         std::fs::write(&numbers, content).unwrap();
+        listed();
         cases.refuse(expected, Checkpoint::load(&folder), expected);
     }
     std::fs::remove_file(&numbers).unwrap();

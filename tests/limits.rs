@@ -1,6 +1,7 @@
 //! The table of limits in docs/formats.md is made of `sim/src/limits.rs`.
 
 use crate::bench::root;
+use std::fmt::Write as _;
 
 /// A row per constant: what it limits, the number, its name.
 fn table() -> String {
@@ -16,7 +17,7 @@ fn table() -> String {
         let value = rest.split_once('=').unwrap().1.trim().trim_end_matches(';');
         let value = value.split("..=").map(|number| number.replace('_', " ").trim_end_matches(".0").to_owned());
         let value = value.collect::<Vec<_>>().join(" to ");
-        table += &format!("| {} | {value} | `{name}` |\n", about.trim_end_matches('.'));
+        let _ = writeln!(table, "| {} | {value} | `{name}` |", about.trim_end_matches('.'));
     }
     table
 }

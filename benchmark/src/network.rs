@@ -106,7 +106,7 @@ fn trained(effort: Effort, name: &str, architecture: NetworkArchitecture, batch:
         }
         ControlFlow::Continue(())
     };
-    fit(Weights::init(architecture, RootSeed(1), 0), dataset, &settings, context, None, &mut progress)
+    fit(&Weights::init(architecture, RootSeed(1), 0), dataset, &settings, context, None, &mut progress)
         .expect("there are samples to train on");
     figure(&format!("training, {name} network, batch {batch}, {steps} steps, two threads"), "samples/s", None, rates)
 }

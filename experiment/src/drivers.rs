@@ -76,9 +76,9 @@ pub fn specs() -> Vec<(String, String)> {
         ("run:DIR", "the final policy of a training run"),
         ("run:DIR/bc", "its policy after behaviour cloning"),
         ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
+        ("ensemble:DRIVER,DRIVER", "run: and net: drivers whose answers are taken together"),
     ];
     let of_files = [
-        ("ensemble:DRIVER,DRIVER", "run: and net: drivers whose answers are taken together"),
         ("tuned:NAME", "one of these planners with parameters found by cargo xtask tune (planners/tuned/)"),
         ("NAME:FILE", "one of these planners with parameters from a TOML file (cargo xtask tune writes them)"),
     ];
@@ -288,7 +288,9 @@ impl NamedDriver {
         if let Smoothing::Ticks(ticks) = smoothing {
             match &mut self.model {
                 Model::Network(networks, _) => {
-                    networks.iter_mut().for_each(|network| network.inference.smoothing_ticks = ticks);
+                    for network in networks {
+                        network.inference.smoothing_ticks = ticks;
+                    }
                 }
                 Model::Expert(_) | Model::Planner(_) => self.smoothing_ticks = ticks,
             }
@@ -548,7 +550,7 @@ mod tests {
         let checkpoint = Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference };
         let network = NamedDriver::network("network", DriverSpec::Expert, checkpoint, DeviceChoice::Cpu);
         let ticks = |driver: &NamedDriver| match &driver.model {
-            Model::Network(checkpoint, _) => checkpoint.inference.smoothing_ticks,
+            Model::Network(networks, _) => networks[0].inference.smoothing_ticks,
             Model::Expert(_) | Model::Planner(_) => driver.smoothing_ticks,
         };
         for (smoothing, of_planner, of_network) in [

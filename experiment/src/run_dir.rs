@@ -648,7 +648,9 @@ mod tests {
             checkpoint.save(&path.join(folder)).unwrap();
             sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
         };
-        ["round-00", "round-01", "round-10"].iter().for_each(|folder| save(folder));
+        for folder in ["round-00", "round-01", "round-10"] {
+            save(folder);
+        }
         fs::create_dir_all(path.join("round-11")).unwrap(); // collected, not trained yet
         assert_eq!(policy_folder(&path).unwrap(), path.join("round-10"));
         assert_eq!(policy_folder(&path.join("bc")).unwrap(), path.join("round-00"));

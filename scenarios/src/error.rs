@@ -69,8 +69,8 @@ impl std::fmt::Display for Location {
 
 impl LoadError {
     /// A fault at a byte offset of a file's text.
-    pub(crate) fn faulty(file: &str, text: &str, offset: usize, problem: String, remedy: String) -> Self {
-        Self::Faulty { file: file.to_owned(), line: line_at(text, offset), problem: shortened(&problem), remedy }
+    pub(crate) fn faulty(file: &str, text: &str, offset: usize, problem: &str, remedy: String) -> Self {
+        Self::Faulty { file: file.to_owned(), line: line_at(text, offset), problem: shortened(problem), remedy }
     }
 }
 

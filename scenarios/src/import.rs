@@ -161,7 +161,7 @@ impl MapLot {
             let offset = error.span().map_or(0, |span| span.start);
             let problem = error.message().trim().to_owned();
             let remedy = "scenarios/examples/car-park.lot.toml shows every key".to_owned();
-            LoadError::faulty(&path.display().to_string(), text, offset, problem, remedy)
+            LoadError::faulty(&path.display().to_string(), text, offset, &problem, remedy)
         })?;
         let folder = path.parent().unwrap_or(Path::new(""));
         lot.map = folder.join(&lot.map);

@@ -92,7 +92,7 @@ fn parse_toml<'a>(text: &'a str, file: &str) -> Result<Document<&'a str>, LoadEr
     Document::parse(text).map_err(|error| {
         let offset = error.span().map_or(0, |span| span.start);
         let problem = format!("not TOML: {}", error.message().trim());
-        LoadError::faulty(file, text, offset, problem, "fix the syntax there".to_owned())
+        LoadError::faulty(file, text, offset, &problem, "fix the syntax there".to_owned())
     })
 }
 
@@ -103,7 +103,7 @@ fn scenario_of(
     vehicle: &VehicleSettings,
 ) -> Result<Scenario, LoadError> {
     let faulty =
-        |offset: usize, problem: String, remedy: String| LoadError::faulty(file, text, offset, problem, remedy);
+        |offset: usize, problem: String, remedy: String| LoadError::faulty(file, text, offset, &problem, remedy);
     let scenario = Scenario::deserialize(Deserializer::from(document.clone())).map_err(|error| {
         let offset = error.span().map_or(0, |span| span.start);
         let problem = error.message().trim().to_owned();

@@ -345,7 +345,7 @@ mod tests {
         assert_eq!(fs::read_to_string(folder.join(FILE)).unwrap(), expected);
         assert_eq!(read_to_string(&folder.join("a"), 100).unwrap(), "hello\n");
         write(&folder, "a", b"hello again\n").unwrap();
-        assert_eq!(read(&folder.join("a")).unwrap(), b"hello again\n");
+        assert_eq!(read(&folder.join("a"), 100).unwrap(), b"hello again\n");
         assert!(verify(&folder).faults.is_empty());
         fs::remove_dir_all(folder).unwrap();
     }
@@ -371,7 +371,7 @@ mod tests {
                 }
                 assert!(!faults(&folder).is_empty(), "{path:?} as {damaged:?}");
                 let stage = read_listed(&folder, "stages/one/sha256sums", 1000);
-                let reads = [read(&folder.join("about")), read(&inner.join("data")), stage];
+                let reads = [read(&folder.join("about"), 100), read(&inner.join("data"), 100), stage];
                 assert!(reads.iter().any(Result::is_err), "{path:?} as {damaged:?}");
             }
             fs::write(&path, whole).unwrap();
@@ -399,7 +399,7 @@ mod tests {
         let folder = scratch("unfinished");
         write(&folder, "a", b"a").unwrap();
         fs::write(folder.join("b"), "b").unwrap();
-        assert!(read(&folder.join("b")).unwrap_err().to_string().contains("not listed"));
+        assert!(read(&folder.join("b"), 100).unwrap_err().to_string().contains("not listed"));
         assert_eq!(read_if_listed(&folder.join("b"), 100).unwrap(), None);
         unlist(&folder, &["a"]).unwrap();
         assert!(!exists(&folder));

@@ -32,9 +32,7 @@ impl FromStr for Smoothing {
             return Ok(Self::Own);
         }
         let ticks = text.parse().ok().filter(|ticks: &f32| ticks.is_finite() && *ticks >= 0.0);
-        ticks
-            .map(Self::Ticks)
-            .ok_or_else(|| format!("no smoothing {text:?}; there are own, or control ticks from 0 on"))
+        ticks.map(Self::Ticks).ok_or_else(|| format!("no smoothing {text:?}; it is own, or control ticks from 0 on"))
     }
 }
 

@@ -171,5 +171,5 @@ fn errors_in_files_name_the_line() {
 #[test]
 fn unknown_presets_list_the_known() {
     let error = Settings::preset("papper").unwrap_err().to_string();
-    assert!(error.contains("papper") && error.contains("default, paper, smoke"), "{error}");
+    assert!(error.contains("papper") && error.contains("default, strong, paper, smoke"), "{error}");
 }

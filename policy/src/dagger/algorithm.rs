@@ -134,7 +134,7 @@ impl Run<'_, '_> {
             (StartFrom::Previous, Some(weights)) => weights.clone(),
             _ => Weights::init(settings.network, self.seed, u64::from(round)),
         };
-        let trained = self.trained_in(&folder, start, d, &settings.fit_of_round(round), Some(round))?;
+        let trained = self.trained_in(&folder, &start, d, &settings.fit_of_round(round), Some(round))?;
         let Some((weights, fit)) = trained else {
             return Err(Halt::Interrupted(previous));
         };
@@ -153,7 +153,7 @@ impl Run<'_, '_> {
             StartFrom::Previous => policy.clone(),
             StartFrom::Scratch => Weights::init(self.settings.network, self.seed, FINAL),
         };
-        let trained = self.trained_in(&self.store.final_folder(), start, d, &settings, None)?;
+        let trained = self.trained_in(&self.store.final_folder(), &start, d, &settings, None)?;
         trained.map(|(weights, _)| weights).ok_or(Halt::Interrupted(Some(policy)))
     }
 
@@ -161,7 +161,7 @@ impl Run<'_, '_> {
     fn trained_in(
         &mut self,
         folder: &Path,
-        start: Weights,
+        start: &Weights,
         d: &Dataset,
         settings: &FitSettings,
         round: Option<u32>,

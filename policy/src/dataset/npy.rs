@@ -122,7 +122,9 @@ mod tests {
         let folder = scratch("forged");
         files::create_folder(&folder).unwrap();
         let path = folder.join("grids.npy");
+        let listed = || storage::sums::list_all(&folder).unwrap();
         ndarray_npy::write_npy(&path, &Array2::<u8>::zeros([5, 79])).unwrap();
+        listed();
         assert_eq!(read::<u8, Ix2>(&path, &[5, 79]).unwrap().dim(), (5, 79));
         assert!(refused(&path, &[4, 79]).contains("shape [5, 79] instead of [4, 79]"));
         let whole = std::fs::read(&path).unwrap();
@@ -133,16 +135,20 @@ mod tests {
             let mut bytes = whole.clone();
             bytes[at..at + forged.len()].copy_from_slice(forged.as_bytes());
             std::fs::write(&path, bytes).unwrap();
+            listed();
             assert!(refused(&path, &[5, 79]).contains(part), "{forged}: {}", refused(&path, &[5, 79]));
         }
         // The record of the round may be forged as well.
         let mut bytes = whole.clone();
         bytes[at..at + 17].copy_from_slice(b"(5000000000000,) ");
         std::fs::write(&path, bytes).unwrap();
+        listed();
         assert!(refused(&path, &[5_000_000_000_000]).contains("too few"), "{}", refused(&path, &[5_000_000_000_000]));
         std::fs::write(&path, [&b"\x93NUMPY\x02\0"[..], &[0xff; 4]].concat()).unwrap();
+        listed();
         assert!(refused(&path, &[5, 79]).contains("4294967295 bytes"), "{}", refused(&path, &[5, 79]));
         std::fs::write(&path, vec![0; 70_000]).unwrap();
+        listed();
         assert!(refused(&path, &[5, 79]).contains("at most 67"), "{}", refused(&path, &[5, 79]));
         std::fs::remove_dir_all(folder).unwrap();
     }
@@ -153,9 +159,10 @@ mod tests {
         let folder = scratch("bomb");
         files::create_folder(&folder).unwrap();
         let path = folder.join("noise_augmentations.npz");
-        let mut archive = NpzWriter::new_compressed(File::create(&path).unwrap());
+        let mut archive = NpzWriter::new_compressed(std::fs::File::create(&path).unwrap());
         archive.add_array("noise_augmentations", &Array3::<u8>::zeros([1000, 20, 79])).unwrap();
         archive.finish().unwrap();
+        storage::sums::list_all(&folder).unwrap();
         let read = |expected: [usize; 3]| {
             let mut archive = Archive::open(&path, &[&expected])?;
             archive.read::<u8, ndarray::Ix3>("noise_augmentations", &expected)

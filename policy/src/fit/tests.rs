@@ -39,7 +39,7 @@ fn settings(steps: u32) -> FitSettings {
 fn train(dataset: &Dataset, settings: &FitSettings, device: DeviceChoice) -> FitOutcome {
     let start = Weights::init(tiny(), RootSeed(1), 0);
     let mut progress = |_: &FitProgress| ControlFlow::Continue(());
-    fit(start, dataset, settings, context(device), None, &mut progress).unwrap()
+    fit(&start, dataset, settings, context(device), None, &mut progress).unwrap()
 }
 
 fn context(device: DeviceChoice) -> FitContext {
@@ -81,7 +81,7 @@ fn a_stop_keeps_what_was_learned() {
         seen.push((now.step, now.samples_done));
         if now.step == 7 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let outcome = fit(start, &dataset, &settings(50), context(DeviceChoice::Cpu), None, &mut progress).unwrap();
+    let outcome = fit(&start, &dataset, &settings(50), context(DeviceChoice::Cpu), None, &mut progress).unwrap();
     assert!(outcome.report.stopped);
     assert_eq!((outcome.report.steps, outcome.report.kept_step), (7, 7));
     assert_eq!(seen.last(), Some(&(7, 7 * 33)));
@@ -103,7 +103,7 @@ fn an_interrupted_training_goes_on_to_the_same_bits() {
             };
             let start = Weights::init(tiny(), RootSeed(1), 0);
             let outcome =
-                fit(start, &dataset, &settings, context(DeviceChoice::Cpu), Some(&path), &mut progress).unwrap();
+                fit(&start, &dataset, &settings, context(DeviceChoice::Cpu), Some(&path), &mut progress).unwrap();
             if !outcome.report.stopped {
                 break outcome;
             }
@@ -122,7 +122,7 @@ fn a_damaged_state_of_a_training_is_refused() {
     let mut stop = |_: &FitProgress| ControlFlow::Break(());
     let mut train = || {
         let start = Weights::init(tiny(), RootSeed(1), 0);
-        fit(start, &dataset, &settings(9), context(DeviceChoice::Cpu), Some(&path), &mut stop)
+        fit(&start, &dataset, &settings(9), context(DeviceChoice::Cpu), Some(&path), &mut stop)
     };
     train().unwrap();
     let mut bytes = std::fs::read(&path).unwrap();
@@ -163,7 +163,7 @@ fn nothing_to_learn_from_is_an_error() {
     let start = Weights::init(tiny(), RootSeed(1), 0);
     let mut progress = |_: &FitProgress| ControlFlow::Continue(());
     let empty = Dataset::default();
-    let error = fit(start, &empty, &settings(1), context(DeviceChoice::Cpu), None, &mut progress);
+    let error = fit(&start, &empty, &settings(1), context(DeviceChoice::Cpu), None, &mut progress);
     assert!(matches!(error, Err(FitError::NoTrainingSamples { samples: 0, .. })));
 }
 
@@ -218,6 +218,6 @@ fn a_loss_that_is_no_number_ends_the_training_with_its_step() {
     let start = Weights::init(tiny(), RootSeed(1), 0);
     let mut progress = |_: &FitProgress| ControlFlow::Continue(());
     let settings = FitSettings { batch: 200, ..settings(3) };
-    let error = fit(start, &dataset, &settings, context(DeviceChoice::Cpu), &mut progress).unwrap_err();
+    let error = fit(&start, &dataset, &settings, context(DeviceChoice::Cpu), None, &mut progress).unwrap_err();
     assert_eq!(error, FitError::NotFinite { step: 1, what: "the loss" });
 }

@@ -88,7 +88,7 @@ const KEEP_EVERY_S: u64 = 60;
 /// `unfinished` cannot be read or written.
 #[expect(clippy::disallowed_methods, reason = "when the state is copied to disk changes no result")]
 pub fn fit(
-    start: Weights,
+    start: &Weights,
     dataset: &Dataset,
     settings: &FitSettings,
     context: FitContext,
@@ -115,8 +115,8 @@ pub fn fit(
         settings.learning_rate.scheduler(steps).map_err(|problem| FitError::LearningRate { problem })?;
     let mut sampler = BatchSampler::new(&split.training, settings.mirror, context.seed);
     let mut batch = Vec::with_capacity(settings.batch);
-    let mut course = Course::new(&start);
-    let mut net = LookAheadNet::from_weights(&start, &device);
+    let mut course = Course::new(start);
+    let mut net = LookAheadNet::from_weights(start, &device);
     let left = unfinished.map(|path| Unfinished::read(path, architecture)).transpose()?.flatten();
     if let Some(left) = left {
         net = LookAheadNet::from_weights(&left.weights, &device);
@@ -153,7 +153,7 @@ pub fn fit(
         let validation = course.latest();
         stopped =
             progress(&FitProgress { step: done, steps, samples_done, learning_rate, loss, validation }).is_break();
-        if done == steps || settings.validate_every > 0 && done % settings.validate_every == 0 {
+        if done == steps || settings.validate_every > 0 && done.is_multiple_of(settings.validate_every) {
             let weights = net.to_weights(architecture);
             if !weights.values().iter().all(|value| value.is_finite()) {
                 return Err(FitError::NotFinite { step: done, what: "a weight" });

@@ -259,6 +259,7 @@ impl Header {
 
 /// Keys that mean nothing here, as a misspelt one does.
 fn unknown_keys(text: &str) -> Vec<Note> {
+    #[expect(clippy::zero_sized_map_values, reason = "keys and values are read together")]
     let keys: BTreeMap<String, IgnoredAny> = serde_saphyr::from_str(text).unwrap_or_default();
     let is_unknown = |key: &String| !KEYS.contains(&key.as_str());
     let keys: Vec<String> = keys.into_keys().filter(is_unknown).map(|key| shortened(&key)).collect();

@@ -21,15 +21,11 @@ pub(crate) struct DriversArgs {
 }
 
 pub(crate) fn run(args: &DriversArgs, output: &Output) -> anyhow::Result<()> {
-    match &args.planner {
-        Some(name) => {
-            output.print(PlannerFile::text_of(name)?.trim_end());
-            Ok(())
-        }
-        None => {
-            let specs = drivers::specs();
-            let names: Vec<(&str, &str)> = specs.iter().map(|(spec, about)| (spec.as_str(), about.as_str())).collect();
-            output.names(&names)
-        }
+    if let Some(name) = &args.planner {
+        output.print(PlannerFile::text_of(name)?.trim_end());
+        return Ok(());
     }
+    let specs = drivers::specs();
+    let names: Vec<(&str, &str)> = specs.iter().map(|(spec, about)| (spec.as_str(), about.as_str())).collect();
+    output.names(&names)
 }
