@@ -146,14 +146,14 @@ fn lots_that_are_refused() {
         ("corner_radius_m", "corner_radius", "unknown field `corner_radius`"),
         ("\"paper\"", "\"papr\"", "unknown variant `papr`"),
         ("\"paper\"", "2", "lot.toml:8"),
-        ("level", "levle", "unknown field `levle`"),
+        ("level", "grade", "unknown field `grade`"),
         ("[[20, 20], [24, 20], [24, 24]]", "[[20, 20], [24, 20]]", "island 1: 2 vertices"),
         ("[[20, 20], [24, 20], [24, 24]]", "[[20, 20], [24, 20], [24, 40]]", "lies outside the boundary"),
         ("[[20, 20], [24, 20], [24, 24]]", "[[20, 20], [20.01, 20], [20, 20.01]]", "spread the vertices out"),
         ("[[20, 20], [24, 20], [24, 24]]", "[[20, 20], [nan, 20], [24, 24]]", "island 1: x is NaN"),
         ("[[20, 20], [24, 20], [24, 24]]", "[[20, 20], [24], [24, 24]]", "write points as [x, y]"),
         ("height_m = 0.15", "height_m = 0", "island 1: height_m is 0"),
-        ("height_m = 0.15", "hieght_m = 1", "unknown field `hieght_m`"),
+        ("height_m = 0.15", "high_m = 1", "unknown field `high_m`"),
         ("\"sedan\"", "\"tank\"", "unknown variant `tank`, expected one of `sedan`"),
         ("\"sedan\"", &format!("\"{}\"", "c".repeat(100_000)), "unknown variant `ccc"),
         ("class = \"sedan\"\n", "", "missing field `class`"),
@@ -800,7 +800,7 @@ fn outputs_that_are_full_or_closed_lose_no_result() {
 #[test]
 fn a_folder_whose_name_is_no_text_is_written_into() {
     use std::os::unix::ffi::OsStrExt as _;
-    let out = scratch("no-text").join(std::ffi::OsStr::from_bytes(b"caf\xe9"));
+    let out = scratch("no-text").join(std::ffi::OsStr::from_bytes(b"bar\xe9"));
     let output = xtask().args(["generate", "--lots", "lot-b", "--out"]).arg(&out).output().unwrap();
     assert!(output.status.success(), "{}", text(&output).1);
     assert!(out.join("lot-b-s1.toml").is_file());

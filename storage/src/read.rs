@@ -64,7 +64,7 @@ mod tests {
         std::fs::write(&file, "seven\n\n").unwrap();
         assert_eq!(text(&file, 7).unwrap(), "seven\n\n");
         assert!(refused(file.to_str().unwrap(), 6).contains("7 bytes or more; at most 6"));
-        std::fs::write(&file, b"caf\xe9").unwrap();
+        std::fs::write(&file, b"bar\xe9").unwrap();
         assert!(refused(file.to_str().unwrap(), 7).contains("byte 3 is not UTF-8"));
         std::fs::remove_file(&file).unwrap();
         assert!(refused(std::env::temp_dir().to_str().unwrap(), 7).contains("it is a folder"));
