@@ -105,7 +105,7 @@ fn lots_that_are_refused() {
         ("\"lane\"", "\"a\\u202Eb\"", "contains '\\u{202e}'"),
         ("\"lane\"", "\"a\\u200Bb\"", "contains '\\u{200b}'"),
         ("\"lane\"", &format!("\"{long}\""), "has 101 characters; shorten it: 100 are possible"),
-        ("name =", "nmae =", "unknown field `nmae`"),
+        ("name =", "title =", "unknown field `title`"),
         ("[[0, 0], [60, 0], [60, 30], [0, 30]]", "7", "invalid type"),
         ("[[0, 0], [60, 0], [60, 30], [0, 30]]", "[]", "0 vertices enclose no ground"),
         ("[[0, 0], [60, 0], [60, 30], [0, 30]]", "[[0, 0], [60, 0]]", "2 vertices enclose no ground"),

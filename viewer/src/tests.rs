@@ -392,7 +392,10 @@ fn what_cannot_be_shown_is_named() {
     };
     let key = "expert@lot-b@forward@0@paper@1@0";
     assert!(message(key, Path::new("/proc/no-such-folder")).contains("/proc/no-such-folder"));
-    assert!(message("net:/no/such@lot-b@forward@0@paper@1@0", Path::new("/tmp")).contains("/no/such lists no finished model"));
+    assert!(
+        message("net:/no/such@lot-b@forward@0@paper@1@0", Path::new("/tmp"))
+            .contains("/no/such lists no finished model")
+    );
     assert!(message("expert@reference@forward@0@paper@1@0", Path::new("/tmp")).contains("3 lots"));
     let mut two_runs = request(key, Path::new("/tmp"));
     let Show::Drives { drives, .. } = &mut two_runs.show[0] else { unreachable!("a drive was asked for") };
