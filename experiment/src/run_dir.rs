@@ -192,12 +192,13 @@ impl RunDir {
     /// If there is none, another command made it, it is finished, its settings were changed, or another process is at it.
     pub fn resume(path: &Path, command: &str) -> anyhow::Result<(Self, Settings, Manifest)> {
         ensure!(path.is_dir(), "{}: there is no such run to resume", path.display());
-        let run = Self::locked(path.to_path_buf(), command)?;
+        // Before the lock, which would leave its file in a folder that is no run.
         ensure!(
             sums::exists(path),
             "{0}: nothing was begun there; begin it anew with --out {0}, with --overwrite if it is not empty",
             path.display()
         );
+        let run = Self::locked(path.to_path_buf(), command)?;
         let manifest = Manifest::read(path)?;
         ensure!(
             manifest.command == command,
@@ -585,6 +586,16 @@ mod tests {
                 RunDir::resume(&path, "train-dagger").unwrap();
             }
         }
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// A refused `--resume` left a `.lock` in any folder that was named.
+    #[test]
+    fn a_folder_that_is_no_run_stays_as_it_was() {
+        let path = scratch("no-run");
+        fs::create_dir_all(&path).unwrap();
+        assert!(message(RunDir::resume(&path, "train-dagger")).contains("nothing was begun there"));
+        assert_eq!(fs::read_dir(&path).unwrap().count(), 0);
         fs::remove_dir_all(path).unwrap();
     }
 
