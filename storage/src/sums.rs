@@ -201,7 +201,7 @@ pub fn read(path: &Path, bytes_max: u64) -> Result<Vec<u8>, FileError> {
 /// Reads a finished file by the name under which a folder lists it: `a.csv` or `figures/sha256sums`.
 ///
 /// # Errors
-/// See [`read`].
+/// See [`read()`].
 pub fn read_listed(folder: &Path, name: &str, bytes_max: u64) -> Result<Vec<u8>, FileError> {
     let (path, list) = (&folder.join(name), folder.join(FILE));
     let bytes = read::bytes(path, bytes_max)
@@ -223,7 +223,7 @@ pub fn read_listed(folder: &Path, name: &str, bytes_max: u64) -> Result<Vec<u8>,
 /// Reads a finished text file.
 ///
 /// # Errors
-/// See [`read`]; or if it is no UTF-8.
+/// See [`read()`]; or if it is no UTF-8.
 pub fn read_to_string(path: &Path, bytes_max: u64) -> Result<String, FileError> {
     String::from_utf8(read(path, bytes_max)?).map_err(|error| FileError::new(path, error, RESTORE))
 }
