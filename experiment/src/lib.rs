@@ -7,7 +7,7 @@
 //! | [`trials`] | seeds of trials: their obstacles and their noise |
 //! | [`drive`] | the one loop: a driver on a batch of trials, with an observer of every frame |
 //! | [`replay_key`] | a short text that identifies one run and a tick in it |
-//! | [`training`], [`learning`] | behaviour cloning and DAgger into a run folder |
+//! | [`training`] | behaviour cloning and DAgger into a run folder |
 //! | [`run_dir`] | the run folder, its manifest, and how it is claimed |
 //! | [`view_request`] | what the viewer program is asked to record |
 //! | [`progress`] | how long tasks report progress and are cancelled |

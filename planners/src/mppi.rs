@@ -4,7 +4,7 @@
 //!
 //! Many sequences of controls, drawn around the last answer, are rolled out with the car's own model over the grid; each is
 //! rated, and the next answer is their mean, weighted by exp(−cost/λ). Steering and speed are chosen together, so it can slow
-//! down. nav2 follows a global path; here is none, and how far the way still goes ([`WayField`]) takes its place.
+//! down. nav2 follows a global path; here is none, and how far the way still goes (`WayField`) takes its place.
 
 use crate::context::{PlannerContext, WheelEstimate, steer_along_at};
 use crate::method::{Method, within};
