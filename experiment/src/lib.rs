@@ -8,6 +8,7 @@
 //! | [`drive`] | the one loop: a driver on a batch of trials, with an observer of every frame |
 //! | [`replay_key`] | a short text that identifies one run and a tick in it |
 //! | [`training`] | behaviour cloning and DAgger into a run folder |
+//! | [`inputs`] | digests of the files that a run reads, so that it goes on with the same |
 //! | [`run_dir`] | the run folder, its manifest, and how it is claimed |
 //! | [`view_request`] | what the viewer program is asked to record |
 //! | [`progress`] | how long tasks report progress and are cancelled |
