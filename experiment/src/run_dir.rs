@@ -431,6 +431,12 @@ fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
         _ => (spec, false),
     };
     ensure!(
+        sums::exists(run) || !run.join(SETTINGS).is_file(),
+        "{}: this run has no sha256sums: an earlier version made it, or the list is lost; train again into another folder, \
+         or restore the list from a copy",
+        run.display()
+    );
+    ensure!(
         sums::exists(run),
         "{}: this is no run; train one with cargo xtask train-dagger, or list the folders in runs/",
         run.display()
@@ -596,6 +602,10 @@ mod tests {
         fs::create_dir_all(&path).unwrap();
         assert!(message(RunDir::resume(&path, "train-dagger")).contains("nothing was begun there"));
         assert_eq!(fs::read_dir(&path).unwrap().count(), 0);
+        assert!(message(policy_folder(&path)).contains("this is no run"));
+        // A run of an earlier version was called no run at all.
+        fs::write(path.join(SETTINGS), "").unwrap();
+        assert!(message(policy_folder(&path)).contains("an earlier version made it"));
         fs::remove_dir_all(path).unwrap();
     }
 
