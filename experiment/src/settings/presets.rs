@@ -54,7 +54,7 @@ fn default() -> Settings {
     let base = paper();
     Settings {
         training: TrainingSettings { lots: lots_of_every_family(1), trials: 8, ..base.training },
-        evaluation: EvaluationSettings { elsewhere: vec!["validation:4:all".to_owned()], ..base.evaluation },
+        evaluation: EvaluationSettings { elsewhere: vec!["validation:44:all".to_owned()], ..base.evaluation },
         dagger: DaggerSettings::quick(),
         ..base
     }
@@ -64,14 +64,16 @@ fn default() -> Settings {
 fn lots_of_every_family(times: u32) -> Vec<String> {
     let generated = [
         ("easy", 4),
-        ("medium", 12),
+        ("medium", 10),
         ("hard", 20),
         ("lane", 16),
         ("rooms", 14),
-        ("street", 14),
-        ("aisles", 12),
-        ("track", 6),
-        ("open", 14),
+        ("street", 16),
+        ("aisles", 14),
+        ("track", 4),
+        ("open", 12),
+        ("halls", 12),
+        ("yards", 10),
     ];
     let of_family = |(family, count)| format!("train:{}:{family}", times * count);
     std::iter::once("lot-a".to_owned()).chain(generated.map(of_family)).collect()
