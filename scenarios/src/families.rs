@@ -114,7 +114,7 @@ mod tests {
                     assert!(stray.is_none(), "{family:?} {index}: a way out at {:?}", stray.map(|&cell| place(cell)));
                 }
                 for mouth in mouths {
-                    let at_its_end = mouth.centre() + (mouth.depth_m - 1.4) * mouth.outward();
+                    let at_its_end = mouth.a.midpoint(mouth.b) + (mouth.depth_m - 1.4) * mouth.outward();
                     let cell = (at_its_end / CELL_M).round().as_ivec2().into();
                     assert!(!reached.contains(&cell), "{family:?} {index}: the way at {mouth:?} is open");
                 }

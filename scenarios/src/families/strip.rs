@@ -100,10 +100,6 @@ impl Mouth {
     pub(super) fn outward(&self) -> Vec2 {
         -(self.b - self.a).normalize().perp()
     }
-
-    pub(super) fn centre(&self) -> Vec2 {
-        0.5 * (self.a + self.b)
-    }
 }
 
 /// A piece in the world.
