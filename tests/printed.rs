@@ -17,6 +17,7 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         "train-bc",
         "train-dagger",
         "evaluate",
+        "merge",
         "reproduce",
         "scaling",
         "guard",

@@ -64,7 +64,8 @@ impl<'a> Drive<'a> {
 
     pub(crate) fn plan(&self) -> Plan<'_> {
         let compare_with = conclusions::compare_with(&self.drivers);
-        Plan { settings: &self.stage.settings, drivers: &self.drivers, lots: &self.lots, compare_with }
+        let (settings, drivers, lots) = (&self.stage.settings, &self.drivers, &self.lots);
+        Plan { settings, drivers, lots, compare_with, shard: None }
     }
 }
 

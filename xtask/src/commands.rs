@@ -7,6 +7,7 @@ pub(crate) mod evaluate;
 pub(crate) mod generate;
 pub(crate) mod guard;
 pub(crate) mod lots;
+pub(crate) mod merge;
 pub(crate) mod pixel_accuracy;
 pub(crate) mod render;
 mod render_animation;

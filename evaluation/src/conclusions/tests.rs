@@ -26,7 +26,7 @@ fn statements(names: &[&str], of: impl Fn(&str, &Trial<'_>) -> Run) -> Vec<State
     let settings = Settings::preset("default").unwrap();
     let drivers: Vec<NamedDriver> = names.iter().map(|name| driver(name)).collect();
     let lots = Lot::parse_all(&["reference"], &settings.episode.vehicle).unwrap();
-    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0 };
+    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0, shard: None };
     let mut results = EvaluationResults::new(&plan);
     for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 5, &Direction::BOTH).enumerate() {
         for (driver, name) in names.iter().enumerate() {
@@ -125,7 +125,7 @@ fn none_in_a_few_metres_is_no_proof() {
     let settings = Settings::preset("default").unwrap();
     let drivers = [driver(DAGGER)];
     let lots = Lot::parse_all(&["lot-b"], &settings.episode.vehicle).unwrap();
-    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0 };
+    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0, shard: None };
     let driven_m = |reference_m| {
         let mut results = EvaluationResults::new(&plan);
         let metrics = EpisodeMetrics { reference_m, driven_m: reference_m, ..EpisodeMetrics::default() };
