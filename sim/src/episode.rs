@@ -13,7 +13,7 @@
 
 use crate::collision::BodyBox;
 use crate::controller::{self, ControllerSettings};
-use crate::driver::{Decision, Driver, GroundTruth, Seat, Situation};
+use crate::driver::{Decision, Driver, GroundTruth, Seat, Situation, Source};
 use crate::frame::{Ending, Event, Frame, FrameSink};
 use crate::geometry::Pose;
 use crate::map::Map;
@@ -247,9 +247,31 @@ impl Episode {
             self.tick,
             self.map.scenario().name
         );
-        let settings = Arc::clone(&self.settings);
+        let settings = &self.settings;
         let command =
             controller::pursue(&settings.controller, &settings.vehicle, &settings.sensing.geometry, &decision);
+        self.drive(decision, command)
+    }
+
+    /// Drives one control tick as [`Self::apply`] does, but past the controller. The frame's decision is a point on the
+    /// circle that the command steers; the vehicle obeys within its limits.
+    ///
+    /// # Panics
+    /// If the episode has ended, or the command is not finite.
+    pub fn apply_command(&mut self, command: VehicleCommand, source: Source) -> Frame {
+        assert!(self.ending.is_none(), "the episode has ended");
+        assert!(
+            command.steering_rad.is_finite() && command.speed_mps.is_finite(),
+            "the command is finite, not {command:?} (tick {}, map {:?})",
+            self.tick,
+            self.map.scenario().name
+        );
+        let look_ahead = controller::point_of(&self.settings.vehicle, command.steering_rad);
+        self.drive(Decision { look_ahead, source, spread: None, speed_limit_mps: None }, command)
+    }
+
+    fn drive(&mut self, decision: Decision, command: VehicleCommand) -> Frame {
+        let settings = Arc::clone(&self.settings);
         let holds_from = self.physics_step + settings.physics_steps(settings.vehicle.dead_time_s);
         self.in_flight.push_back((holds_from, command));
         self.was_reset = false;
@@ -296,11 +318,16 @@ impl Episode {
         frame
     }
 
+    /// What was measured so far.
+    pub fn metrics(&self) -> EpisodeMetrics {
+        self.metrics.metrics()
+    }
+
     /// The result so far; final once [`Self::ending`] is set.
     pub fn report(&self) -> EpisodeReport {
         EpisodeReport {
             ending: self.ending.unwrap_or(Ending::TimedOut),
-            metrics: self.metrics.metrics(),
+            metrics: self.metrics(),
             events: self.events.clone(),
         }
     }
