@@ -8,9 +8,10 @@ Prints near-collisions per 100 m on lots that were not trained on, after every r
 
 import argparse
 
-import lotpilot
 import numpy as np
 import torch
+
+import lotpilot
 from lotpilot.gym import LotVectorEnv
 
 

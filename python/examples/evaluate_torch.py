@@ -1,14 +1,15 @@
 """A policy in PyTorch gets the tables of the command line, beside the expert and a planner.
 
-    pip install ./python torch
-    python python/examples/evaluate_torch.py dagger-lotpilot.pt
+pip install ./python torch
+python python/examples/evaluate_torch.py dagger-lotpilot.pt
 """
 
 import argparse
 
-import lotpilot
 import torch
 from dagger import Net
+
+import lotpilot
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

@@ -8,11 +8,12 @@ Prints near-collisions per 100 m on lots that were not trained on, before and af
 
 import argparse
 
-import lotpilot
 import numpy as np
-from lotpilot.sb3 import LotVecEnv
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
+
+import lotpilot
+from lotpilot.sb3 import LotVecEnv
 
 UNSEEN = ["test:6", "lot-b"]
 

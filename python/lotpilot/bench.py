@@ -1,7 +1,7 @@
 """How many control steps per second: ``python -m lotpilot.bench``.
 
-Every row names what a step includes. Rows take turns, so that other load of the machine meets all of them alike, and the
-median of the rounds is shown.
+Every row names what a step includes. Rows take turns, so that other load of the machine meets all of them alike, and
+the median of the rounds is shown.
 """
 
 from __future__ import annotations
@@ -90,7 +90,10 @@ def peers() -> Iterable[tuple[str, Rate]]:
                         "grid_step": [3, 3], "as_image": False, "align_to_vehicle_axes": True},
         "policy_frequency": 5, "simulation_frequency": 15,
     }  # fmt: skip
-    yield "HighwayEnv racetrack, one env: 12×12 grid, other cars, 3 physics steps", one_by_one("racetrack-v0", config=grid)
+    yield (
+        "HighwayEnv racetrack, one env: 12×12 grid, other cars, 3 physics steps",
+        one_by_one("racetrack-v0", config=grid),
+    )
 
 
 def rows(cars: int, threads: int) -> list[tuple[str, Rate]]:
@@ -98,7 +101,10 @@ def rows(cars: int, threads: int) -> list[tuple[str, Rate]]:
     return [
         (f"Rust alone, {cars} cars in lock-step: noisy grid, 5 physics steps, metrics", in_rust(cars, threads)),
         (f"VectorEnv, {cars} cars, the same driver and resets", vectorised(cars, threads)),
-        (f"VectorEnv, {cars} cars, one point straight ahead: mostly near-collisions", vectorised(cars, threads, steered=False)),
+        (
+            f"VectorEnv, {cars} cars, one point straight ahead: mostly near-collisions",
+            vectorised(cars, threads, steered=False),
+        ),
         (f"VectorEnv, {cars} cars, the same driver, clean grid", vectorised(cars, threads, noise="clean")),
         ("Env, one car, a point straight ahead", one_by_one("lotpilot/Lot-v0", lots=LOTS, trials=TRIALS)),
         *peers(),
@@ -133,8 +139,8 @@ def main() -> None:
     rust = statistics.median(next(iter(measured.values())))
     print("\n|  steps/s | of Rust | a step |\n|---:|---:|:---|")
     for name, rates in measured.items():
-        rate = statistics.median(rates)
-        print(f"| {rate:8.0f} | {100 * rate / rust:5.0f} % | {name} |")
+        median = statistics.median(rates)
+        print(f"| {median:8.0f} | {100 * median / rust:5.0f} % | {name} |")
 
 
 if __name__ == "__main__":

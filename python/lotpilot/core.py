@@ -158,7 +158,7 @@ class Arrays:
         return observed
 
 
-COUNTS = ("near_collisions", "contacts", "stuck", "event", "episode")
+COUNTS = ("near_collisions", "contacts", "stuck", "event", "episode_number")
 """What is counted, of what environments tell beside their observation."""
 
 
@@ -245,7 +245,7 @@ class Core:
         """
         answers = self.cars.expert_actions()
         if self.options.normalise:
-            answers = 2.0 * (answers - self.low) / (self.high - self.low) - 1.0
+            answers = (2.0 * (answers - self.low) / (self.high - self.low) - 1.0).astype(np.float32)
         return answers
 
     def infos(self, seen: Arrays) -> dict[str, npt.NDArray[Any]]:

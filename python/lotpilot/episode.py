@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -79,7 +79,7 @@ class Episode:
     @property
     def observation(self) -> Grids:
         """The noisy grid, uint8 [25, 25]: 1 is non-drivable, row 0 farthest ahead, column 0 leftmost."""
-        return self._seen.grids[0]
+        return cast(Grids, self._seen.grids[0])
 
     @property
     def info(self) -> dict[str, Any]:
@@ -88,7 +88,7 @@ class Episode:
 
     def expert_action(self) -> Floats:
         """What the expert would do now, float32 [2]; NaN after the end. See ``Core.expert_actions``."""
-        return self._core.expert_actions()[0]
+        return cast(Floats, self._core.expert_actions()[0])
 
     def step(self, action: npt.ArrayLike) -> Grids:
         """Drives one control tick and returns the next observation.

@@ -6,7 +6,7 @@ Actions, observations, rewards and what is told beside them: ``lotpilot.EnvOptio
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
@@ -27,12 +27,12 @@ class LotEnv(gymnasium.Env[Any, Floats]):
     """One car on a parking lot.
 
     An episode is terminated at the end of the route, or after too many near-collisions
-    (``episode.metrics.events_max``), and truncated after too long (``episode.metrics.timeout_s``). A near-collision stops
-    the car and puts it back on the route within the step that it happens in.
+    (``episode.metrics.events_max``), and truncated after too long (``episode.metrics.timeout_s``). A near-collision
+    stops the car and puts it back on the route within the step that it happens in.
 
-    ``reset(seed=s)`` starts the first episode of seed s; further resets go on from there. ``reset(options={"episode": k})``
-    starts the k-th (``EnvOptions``). ``info`` holds the car and the metrics so far, and after ``reset`` also the names of
-    lot, direction, trial and seed.
+    ``reset(seed=s)`` starts the first episode of seed s; further resets go on from there.
+    ``reset(options={"episode": k})`` starts the k-th (``EnvOptions``). ``info`` holds the car and the metrics so far,
+    and after ``reset`` also the names of lot, direction, trial and seed.
 
     Args:
         render_mode: None, ``"rgb_array"`` or ``"human"`` (needs pygame).
@@ -43,27 +43,23 @@ class LotEnv(gymnasium.Env[Any, Floats]):
         ValueError: If something is not known by its name, or a lot cannot be driven.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": FRAMES_PER_S}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": FRAMES_PER_S}
 
     def __init__(self, render_mode: str | None = None, **options: Any) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"no render mode {render_mode!r}; there are {self.metadata['render_modes']}")
         self.core = Core(1, EnvOptions.of({"threads": 1, **options}), "disabled")
-        self.action_space = self.core.action_space()
+        self.action_space = cast(gymnasium.Space[Floats], self.core.action_space())
         self.observation_space = self.core.observation_space()
         self.render_mode = render_mode
         self._window: Any = None
         self._is_started = False
 
-    def reset(
-        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Starts the next episode, or the first one of a seed."""
         super().reset(seed=seed)
         episode = (options or {}).get("episode")
-        seen = self.core.reset(
-            seeds=None if seed is None else [seed], episodes=None if episode is None else [episode]
-        )
+        seen = self.core.reset(seeds=None if seed is None else [seed], episodes=None if episode is None else [episode])
         self._is_started = True
         if self.render_mode == "human":
             self.render()
@@ -87,7 +83,7 @@ class LotEnv(gymnasium.Env[Any, Floats]):
 
     def expert_action(self) -> Floats:
         """What the expert would do now, float32 [2], see ``Core.expert_actions``."""
-        return self.core.expert_actions()[0]
+        return cast(Floats, self.core.expert_actions()[0])
 
     def render(self) -> Any:
         """The lot around the car and the grid that it sees: uint8 [500, 1000, 3], or a window."""
@@ -113,9 +109,9 @@ class LotEnv(gymnasium.Env[Any, Floats]):
 class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
     """Many cars, stepped natively and in parallel.
 
-    Environment i of n drives the episodes i, i + n, … (``EnvOptions``). ``reset(seed=s)`` gives all of them the seed s: they
-    share its trials and drive none twice. ``reset(seed=[…])`` gives each its own. ``reset(options={"reset_mask": mask})``
-    resets some. ``infos`` holds an array per name; under ``SAME_STEP`` also ``final_obs`` and ``final_info``.
+    Environment i of n drives the episodes i, i + n, … (``EnvOptions``). ``reset(seed=s)`` gives all of them the seed s:
+    they share its trials and drive none twice. ``reset(seed=[…])`` gives each its own.
+    ``reset(options={"reset_mask": mask})`` resets some. ``infos`` holds an array per name; under ``SAME_STEP`` also ``final_obs`` and ``final_info``.
 
     Args:
         num_envs: How many.
@@ -161,9 +157,11 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
         """Starts the next episodes, or the first ones of a seed."""
         super().reset(seed=seed if isinstance(seed, int) else None)
         mask = (options or {}).get("reset_mask")
-        seeds = [seed] * self.num_envs if isinstance(seed, (int, np.integer)) else seed
-        if seeds is not None and any(one is None for one in seeds):
-            raise ValueError("seed: either every environment is given one, or none is")
+        seeds: list[int] | None = None
+        if isinstance(seed, (int, np.integer)):
+            seeds = [int(seed)] * self.num_envs
+        elif seed is not None:
+            seeds = [one for one in seed if one is not None]
         seen = self.core.reset(mask, seeds=seeds, episodes=(options or {}).get("episodes"))
         return seen.observation(), self._infos(seen)
 
@@ -183,7 +181,7 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
             if ended.any():
                 final = np.full(self.num_envs, None, object)
                 for index in np.flatnonzero(ended):
-                    final[index] = _row(last.observation(), index)
+                    final[index] = _row(last.observation(), int(index))
                 infos.update(final_obs=final, _final_obs=ended, final_info=self._infos(last, ended), _final_info=ended)
         return seen.observation(), rewards, terminated, truncated, infos
 

@@ -15,8 +15,8 @@ from .core import Core, EnvOptions, Floats, Grids
 class LotVecEnv(VecEnv):
     """Many cars, stepped natively and in parallel; an episode that has ended is followed by the next at once.
 
-    ``infos`` is a dict per environment: the car and the metrics so far; at an episode's end they are those of its end, with
-    ``terminal_observation`` and ``TimeLimit.truncated``.
+    ``infos`` is a dict per environment: the car and the metrics so far; at an episode's end they are those of its end,
+    with ``terminal_observation`` and ``TimeLimit.truncated``.
 
     Args:
         num_envs: How many.
@@ -68,7 +68,7 @@ class LotVecEnv(VecEnv):
         dones = terminated | truncated
         infos = [self.core.info(last if dones[index] else seen, index) for index in range(self.num_envs)]
         for index in np.flatnonzero(dones):
-            infos[index]["terminal_observation"] = _row(last.observation(), index)
+            infos[index]["terminal_observation"] = _row(last.observation(), int(index))
             infos[index]["TimeLimit.truncated"] = bool(truncated[index])
         return seen.observation(), rewards.astype(np.float32), dones, infos
 

@@ -20,9 +20,10 @@ Table = dict[str, list[Any]]
 """Columns of one length: what ``pandas.DataFrame`` and ``pyarrow.table`` take."""
 
 Driver = str | Callable[[Grids], npt.ArrayLike]
-"""A name as on the command line, or a function of grids: uint8 [n, 25, 25] → [n, 2], ahead and left in metres. An
-object with a method ``drive(grids, cars, was_reset)`` is told also which cars they are, int64 [n], and which were put back
-on the route since, bool [n]: for drivers that remember."""
+"""A name as on the command line, or a function of grids: uint8 [n, 25, 25] → [n, 2], ahead and left in metres.
+
+An object with a method ``drive(grids, cars, was_reset)`` is told also which cars they are, int64 [n], and which were put
+back on the route since, bool [n]: for drivers that remember."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,9 @@ def evaluate(
         ValueError: If something is not known by its name, or a function answers with anything but finite points.
         Exception: What a function raises.
     """
-    loaded = [(name, driver if isinstance(driver, str) else _function(name, driver)) for name, driver in _named(drivers)]
+    loaded = [
+        (name, driver if isinstance(driver, str) else _function(name, driver)) for name, driver in _named(drivers)
+    ]
     levels = None if noise is None else [noise] if isinstance(noise, (str, int, float)) else list(noise)
     which = {
         "lots": None if lots is None else names(lots, "lots"),

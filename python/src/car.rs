@@ -40,7 +40,7 @@ pub(crate) const INFO: [&str; 17] = [
     "speed_mps",
     "steering_rad",
     "event",
-    "episode",
+    "episode_number",
 ];
 
 /// What the two numbers of an action are.
@@ -218,8 +218,11 @@ impl Car {
     pub(crate) fn write(&self, seen: &mut Seen<'_>) {
         let Some(Drive { number, episode, last, .. }) = &self.drive else { return };
         let (grid, vehicle) = (&episode.situation().observation.grid, episode.vehicle());
-        for (to, cell) in seen.grid.iter_mut().zip(grid.cells()) {
-            *to = cell;
+        for (row, cells) in seen.grid.chunks_exact_mut(GRID_CELLS).enumerate() {
+            let bits = grid.row(row);
+            for (col, cell) in cells.iter_mut().enumerate() {
+                *cell = (bits >> col & 1) as u8;
+            }
         }
         if let Some(state) = &mut seen.state {
             state.copy_from_slice(&[vehicle.speed_mps, vehicle.steering_rad]);

@@ -1,7 +1,6 @@
 //! What environments drive: lots × directions × trials, by the names, settings and seeds of the command line.
 
 use anyhow::ensure;
-use experiment::drive;
 use experiment::lots::Lot;
 use experiment::settings::{Layers, NoiseChoice, Settings};
 use experiment::trials::{self, Trial};
@@ -13,7 +12,7 @@ use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Maps that are kept; a map takes up to a few megabytes.
 const MAPS_KEPT: usize = 512;
@@ -65,6 +64,8 @@ pub(crate) struct Course {
     trials: Option<u32>,
     noise: NoiseChoice,
     maps: Mutex<BTreeMap<MapKey, Arc<Map>>>,
+    /// An episode that others share their car with.
+    first: OnceLock<Episode>,
 }
 
 impl Course {
@@ -88,7 +89,15 @@ impl Course {
         for lot in &lots {
             directions.iter().try_for_each(|&direction| lot.check_direction(direction, vehicle))?;
         }
-        Ok(Self { lots, directions, trials, noise: noise(level)?, maps: Mutex::default(), settings })
+        Ok(Self {
+            lots,
+            directions,
+            trials,
+            noise: noise(level)?,
+            maps: Mutex::default(),
+            first: OnceLock::new(),
+            settings,
+        })
     }
 
     /// Number of lots × directions: a trial of each is driven before the next trial.
@@ -115,7 +124,9 @@ impl Course {
     /// If its lot cannot be driven.
     pub(crate) fn start(&self, seed: RootSeed, number: u64) -> anyhow::Result<Episode> {
         let (trial, map) = (self.trial(seed, number), self.map(seed, number)?);
-        Ok(drive::start(&[trial], &[map], &self.settings.episode, self.noise).remove(0))
+        let settings = trials::episode_settings(&self.settings.episode, self.noise, &map);
+        let start = || Episode::new(Arc::new(settings.clone()), Arc::clone(&map), trial.episode_seed());
+        Ok(self.first.get_or_init(start).another(&settings, Arc::clone(&map), trial.episode_seed()))
     }
 
     /// The map of an episode. Those that come again are kept.

@@ -3,11 +3,12 @@
 import warnings
 
 import gymnasium
-import lotpilot
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
+
+import lotpilot
 from lotpilot.gym import LotVectorEnv
 
 SHORT = {"lots": ["lot-b"], "overrides": ["episode.metrics.timeout_s=2.0"]}
@@ -44,7 +45,7 @@ def test_a_seed_names_the_episode_and_the_command_line_knows_it():
         "seed": 5,
     }
     _, info = env.reset()
-    assert (info["lot"], info["direction"], info["episode"]) == ("lot-a", "reverse", 1)
+    assert (info["lot"], info["direction"], info["episode_number"]) == ("lot-a", "reverse", 1)
     _, info = env.reset(options={"episode": 11})
     assert (info["lot"], info["direction"], info["trial"]) == ("lot-b", "reverse", 2)
     again, _ = env.reset(seed=5)
@@ -130,12 +131,12 @@ def test_the_next_episode_begins_when_the_mode_says():
 
     later = driven(AutoresetMode.NEXT_STEP)
     assert [index for index, step in enumerate(later) if step[3].any()] == [39, 80]
-    assert later[39][4]["episode"].tolist() == [0, 1] and later[40][4]["episode"].tolist() == [2, 3]
+    assert later[39][4]["episode_number"].tolist() == [0, 1] and later[40][4]["episode_number"].tolist() == [2, 3]
     assert later[40][1].tolist() == [0.0, 0.0] and not later[40][3].any()
     at_once = driven(AutoresetMode.SAME_STEP)
     assert [index for index, step in enumerate(at_once) if step[3].any()] == [39, 79]
     infos = at_once[39][4]
-    assert infos["episode"].tolist() == [2, 3] and infos["final_info"]["episode"].tolist() == [0, 1]
+    assert infos["episode_number"].tolist() == [2, 3] and infos["final_info"]["episode_number"].tolist() == [0, 1]
     np.testing.assert_array_equal(infos["final_obs"][0], later[39][0][0])
     np.testing.assert_array_equal(at_once[39][0], later[40][0])
     with pytest.raises(lotpilot.EpisodeEnded):
@@ -144,7 +145,7 @@ def test_the_next_episode_begins_when_the_mode_says():
     envs.reset(seed=1)
     envs.step(np.tile(STRAIGHT, (2, 1)))
     _, infos = envs.reset(options={"reset_mask": np.array([False, True])})
-    assert infos["episode"].tolist() == [0, 3] and infos["time_s"].tolist() == [pytest.approx(0.05), 0.0]
+    assert infos["episode_number"].tolist() == [0, 3] and infos["time_s"].tolist() == [pytest.approx(0.05), 0.0]
 
 
 def test_the_expert_labels_what_anyone_drives():
@@ -157,10 +158,11 @@ def test_the_expert_labels_what_anyone_drives():
 
 def test_stable_baselines_finds_nothing_wrong():
     pytest.importorskip("stable_baselines3")
-    from lotpilot.sb3 import LotVecEnv
     from stable_baselines3 import PPO
     from stable_baselines3.common.env_checker import check_env as check
     from stable_baselines3.common.vec_env import VecMonitor
+
+    from lotpilot.sb3 import LotVecEnv
 
     check(gymnasium.make("lotpilot/Lot-v0", **SHORT, normalise=True), skip_render_check=True)
     envs = LotVecEnv(4, **SHORT)

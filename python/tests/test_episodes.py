@@ -1,12 +1,14 @@
 """The same episodes as on the command line, and what happens to bad input."""
 
 import multiprocessing
-import tomllib
+from itertools import pairwise
 from pathlib import Path
 
-import lotpilot
 import numpy as np
 import pytest
+import tomllib
+
+import lotpilot
 from lotpilot import _native
 from lotpilot.core import Core, EnvOptions, settings_from
 
@@ -21,7 +23,11 @@ def digest_in_rust(driver, lot, direction="forward", noise="paper", seed=1, tria
 
 @pytest.mark.parametrize(
     ("lot", "direction", "noise", "seed", "trial"),
-    [("lot-b", "forward", "paper", 1, 0), ("lot-a", "reverse", "hard", 7, 3), ("test-hard-7", "forward", "clean", 1, 1)],
+    [
+        ("lot-b", "forward", "paper", 1, 0),
+        ("lot-a", "reverse", "hard", 7, 3),
+        ("test-hard-7", "forward", "clean", 1, 1),
+    ],
 )
 def test_the_expert_driven_from_python_is_the_same_bytes_as_in_rust(lot, direction, noise, seed, trial):
     overrides = ("episode.metrics.timeout_s=15.0",)
@@ -138,7 +144,7 @@ def test_the_reward_is_the_sum_of_its_terms():
     rewards, infos = total(near_collision=1.0)
     assert rewards == -infos[-1]["near_collisions"] < 0
     rewards, infos = total(progress=1.0)
-    jumps = [b["progress_m"] - a["progress_m"] for a, b in zip(infos, infos[1:], strict=False) if b["event"] in (1, 2)]
+    jumps = [b["progress_m"] - a["progress_m"] for a, b in pairwise(infos) if b["event"] in (1, 2)]
     assert rewards == pytest.approx(infos[-1]["progress_m"] - sum(jumps), abs=1e-4)
     steered, _ = total(smoothness=1.0)
     near, infos = total(clearance=1.0)

@@ -131,11 +131,33 @@ impl Episode {
             settings.physics_step_ms > 0 && settings.control_period_ms.is_multiple_of(settings.physics_step_ms),
             "the control period is a multiple of the physics step"
         );
-        let sensor = Sensor::new(&map, settings.sensing.clone(), &settings.noise, seed);
+        let body = Arc::new(BodyBox::new(&settings.vehicle));
         let pixel_m = settings.sensing.geometry.pixel_m();
+        let ring = Arc::new(SafeRing::new(&settings.vehicle, &settings.metrics, pixel_m));
+        Self::of_car(settings, map, seed, body, ring)
+    }
+
+    /// The same as [`Self::new`], but shares with this episode what depends on the settings only, if they are equal: many
+    /// cars that are driven in turn then find it in the cache.
+    #[must_use]
+    pub fn another(&self, settings: &EpisodeSettings, map: Arc<Map>, seed: RootSeed) -> Self {
+        if *settings != *self.settings {
+            return Self::new(Arc::new(settings.clone()), map, seed);
+        }
+        Self::of_car(Arc::clone(&self.settings), map, seed, Arc::clone(&self.body), Arc::clone(&self.ring))
+    }
+
+    fn of_car(
+        settings: Arc<EpisodeSettings>,
+        map: Arc<Map>,
+        seed: RootSeed,
+        body: Arc<BodyBox>,
+        ring: Arc<SafeRing>,
+    ) -> Self {
+        let sensor = Sensor::new(&map, settings.sensing.clone(), &settings.noise, seed);
         Self {
-            body: Arc::new(BodyBox::new(&settings.vehicle)),
-            ring: Arc::new(SafeRing::new(&settings.vehicle, &settings.metrics, pixel_m)),
+            body,
+            ring,
             sensor,
             vehicle: VehicleState::at_rest(map.start()),
             phase: Phase::Driving,
