@@ -10,7 +10,7 @@ use std::fmt::Display;
 use std::path::Path;
 
 /// Folders whose paths are checked when the docs name them.
-const FOLDERS: [&str; 14] = [
+const FOLDERS: [&str; 15] = [
     "sim/",
     "scenarios/",
     "expert/",
@@ -20,6 +20,7 @@ const FOLDERS: [&str; 14] = [
     "evaluation/",
     "report/",
     "viewer/",
+    "python/",
     "xtask/",
     "tests/",
     "docs/",

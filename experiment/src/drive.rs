@@ -77,10 +77,11 @@ impl TrialBatch<'_> {
 
 /// A car at the start of every trial, in order, on maps that several drivers may share.
 pub fn start(trials: &[Trial<'_>], maps: &[Arc<Map>], episode: &EpisodeSettings, noise: NoiseChoice) -> Vec<Episode> {
-    let start = |(trial, map): (&Trial<'_>, &Arc<Map>)| {
-        let settings = Arc::new(trials::episode_settings(episode, noise, map));
-        Episode::new(settings, Arc::clone(map), trial.episode_seed())
-    };
+    let settings = |map: &Map| trials::episode_settings(episode, noise, map);
+    let Some((trial, map)) = trials.iter().zip(maps).next() else { return Vec::new() };
+    let first = Episode::new(Arc::new(settings(map)), Arc::clone(map), trial.episode_seed());
+    let start =
+        |(trial, map): (&Trial<'_>, &Arc<Map>)| first.another(&settings(map), Arc::clone(map), trial.episode_seed());
     trials.par_iter().zip(maps).map(start).collect()
 }
 

@@ -17,6 +17,7 @@ use sim::limits::PLANNER_BYTES_MAX;
 use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::Arc;
 use storage::sums;
 
 /// Parameters that ship: the planner, and the file that `cargo xtask tune` wrote.
@@ -55,6 +56,11 @@ pub enum DriverSpec {
         name: String,
         /// Its parameters.
         parameters: Parameters,
+    },
+    /// `python:NAME`: a function of the program that calls this library; it cannot be named on the command line.
+    Callback {
+        /// Its name.
+        name: String,
     },
 }
 
@@ -108,6 +114,9 @@ impl FromStr for DriverSpec {
             Some(("run", folder)) => Ok(Self::Run { folder: folder.into() }),
             Some(("net", folder)) => Ok(Self::Checkpoint { folder: folder.into() }),
             Some(("ensemble", members)) => Self::ensemble(members),
+            Some(("python", name)) => {
+                bail!("{text:?} is a function in Python; only lotpilot.evaluate there can drive {name:?}")
+            }
             Some(("tuned", name)) if is_planner(name) => planner(name, Parameters::Tuned),
             Some((name, file)) if is_planner(name) => planner(name, Parameters::File(file.into())),
             _ => {
@@ -142,6 +151,7 @@ impl fmt::Display for DriverSpec {
             Self::Planner { name, parameters: Parameters::Published } => f.write_str(name),
             Self::Planner { name, parameters: Parameters::Tuned } => write!(f, "tuned:{name}"),
             Self::Planner { name, parameters: Parameters::File(path) } => write!(f, "{name}:{}", path.display()),
+            Self::Callback { name } => write!(f, "python:{name}"),
         }
     }
 }
@@ -171,7 +181,7 @@ impl DriverSpec {
         match self {
             Self::Run { folder } => Some(folder),
             Self::Ensemble { members } => members.iter().find_map(Self::run),
-            Self::Expert | Self::Checkpoint { .. } | Self::Planner { .. } => None,
+            Self::Expert | Self::Checkpoint { .. } | Self::Planner { .. } | Self::Callback { .. } => None,
         }
     }
 
@@ -213,7 +223,7 @@ impl DriverSpec {
                 }
                 Ok(networks)
             }
-            Self::Expert | Self::Planner { .. } => Ok(Vec::new()),
+            Self::Expert | Self::Planner { .. } | Self::Callback { .. } => Ok(Vec::new()),
         }
     }
 
@@ -230,13 +240,14 @@ impl DriverSpec {
                 Model::Network(networks, settings.dagger.device)
             }
             Self::Planner { name, parameters } => Model::Planner(planner(name, parameters)?),
+            Self::Callback { .. } => bail!("driver {name:?} is a function of another program"),
         };
         Ok(NamedDriver { name, spec: self, model, smoothing_ticks: 0.0 }.smoothed(settings.evaluation.smoothing))
     }
 }
 
 /// A driver that can take the wheel.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct NamedDriver {
     /// In tables.
     pub name: String,
@@ -247,12 +258,25 @@ pub struct NamedDriver {
     smoothing_ticks: f32,
 }
 
-#[derive(Debug, Clone)]
+/// Makes fleets of a driver that this crate does not know: a function of the program that calls this library.
+pub trait Callback: Send + Sync {
+    /// Seats it in this many cars.
+    fn fleet(&self, cars: usize) -> Box<dyn Fleet + Send>;
+}
+
+#[derive(Clone)]
 enum Model {
     Expert(ExpertSettings),
     /// One network, or the members of an ensemble, which share geometry and settings of inference.
     Network(Vec<Checkpoint>, DeviceChoice),
     Planner(PlannerSpec),
+    Callback(Arc<dyn Callback>),
+}
+
+impl fmt::Debug for NamedDriver {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "NamedDriver({})", self.spec)
+    }
 }
 
 impl NamedDriver {
@@ -283,6 +307,12 @@ impl NamedDriver {
         Self { name, spec, model: Model::Planner(planner), smoothing_ticks: 0.0 }
     }
 
+    /// A function of the calling program, which sees the grid only and is asked for all cars of a batch at once.
+    pub fn callback(name: &str, callback: Arc<dyn Callback>) -> Self {
+        let spec = DriverSpec::Callback { name: name.to_owned() };
+        Self { name: name.to_owned(), spec, model: Model::Callback(callback), smoothing_ticks: 0.0 }
+    }
+
     /// The same with other action smoothing. Networks smooth by themselves, as they were trained to.
     fn smoothed(mut self, smoothing: Smoothing) -> Self {
         if let Smoothing::Ticks(ticks) = smoothing {
@@ -292,7 +322,7 @@ impl NamedDriver {
                         network.inference.smoothing_ticks = ticks;
                     }
                 }
-                Model::Expert(_) | Model::Planner(_) => self.smoothing_ticks = ticks,
+                Model::Expert(_) | Model::Planner(_) | Model::Callback(_) => self.smoothing_ticks = ticks,
             }
         }
         self
@@ -318,7 +348,7 @@ impl NamedDriver {
             (Model::Planner(planner), DriverSpec::Planner { parameters: Parameters::File(_), .. }) => {
                 Some(sums::digest(planner.parameters().to_string().as_bytes()))
             }
-            (Model::Expert(_) | Model::Planner(_), _) => None,
+            (Model::Expert(_) | Model::Planner(_) | Model::Callback(_), _) => None,
         }
     }
 
@@ -326,7 +356,7 @@ impl NamedDriver {
     pub fn source(&self) -> Source {
         match &self.model {
             Model::Expert(_) => Source::Expert,
-            Model::Network(..) => Source::Novice,
+            Model::Network(..) | Model::Callback(_) => Source::Novice,
             Model::Planner(_) => Source::Planner,
         }
     }
@@ -361,16 +391,17 @@ impl NamedDriver {
     pub fn to_planner(&self, episode: &EpisodeSettings) -> Option<Planner> {
         match &self.model {
             Model::Planner(planner) => Some(planner.planner(&PlannerContext::of(episode))),
-            Model::Expert(_) | Model::Network(..) => None,
+            Model::Expert(_) | Model::Network(..) | Model::Callback(_) => None,
         }
     }
 
     /// How many of some cars, which are driven in lock-step, one fleet drives best: on CPUs a network answers for a thread's
     /// share of them in one call, on a GPU for all; others answer for each car alone.
     pub fn cars_per_fleet(&self, cars: usize) -> usize {
-        match self.model {
-            Model::Network(_, device) if device != DeviceChoice::default() => cars.max(1),
+        match &self.model {
+            Model::Network(_, device) if *device != DeviceChoice::default() => cars.max(1),
             Model::Network(..) => cars.div_ceil(rayon::current_num_threads()).max(1),
+            Model::Callback(_) => cars.max(1),
             Model::Expert(_) | Model::Planner(_) => 1,
         }
     }
@@ -387,6 +418,7 @@ impl NamedDriver {
                 let planner = planner.planner(&PlannerContext::of(episode));
                 smoothed(OneDriverEach(vec![SensorsOnly(planner); cars]), ticks)
             }
+            Model::Callback(callback) => smoothed(callback.fleet(cars), ticks),
         }
     }
 }
@@ -501,6 +533,7 @@ mod tests {
             ("ensemble:run:runs/a,expert", "expert cannot be part of an ensemble"),
             ("ensemble:run:runs/a,run:runs/a", "named twice"),
             ("ensemble:", "there are expert, run:DIR"),
+            ("python:mine", "lotpilot.evaluate"),
             ("tuned:tentacles", "there are tuned:tentacle, tuned:vvf"),
         ] {
             let error = wrong.parse::<DriverSpec>().unwrap_err().to_string();
@@ -551,7 +584,7 @@ mod tests {
         let network = NamedDriver::network("network", DriverSpec::Expert, checkpoint, DeviceChoice::Cpu);
         let ticks = |driver: &NamedDriver| match &driver.model {
             Model::Network(networks, _) => networks[0].inference.smoothing_ticks,
-            Model::Expert(_) | Model::Planner(_) => driver.smoothing_ticks,
+            Model::Expert(_) | Model::Planner(_) | Model::Callback(_) => driver.smoothing_ticks,
         };
         for (smoothing, of_planner, of_network) in [
             (Smoothing::Own, 0.0, inference.smoothing_ticks),

@@ -121,6 +121,19 @@ pub fn steering(law: PursuitLaw, vehicle: &VehicleSettings, geometry: &GridGeome
     steering_rad.clamp(-vehicle.steering_max_rad, vehicle.steering_max_rad)
 }
 
+/// Longest chord from the rear axle to [`point_of`], metres.
+const CHORD_M: f32 = 4.0;
+
+/// A point on the circle that the rear axle drives with a road-wheel angle: [`PursuitLaw::Paper`] steers it again.
+pub fn point_of(vehicle: &VehicleSettings, steering_rad: f32) -> LookAheadPoint {
+    let steering_rad = steering_rad.clamp(-vehicle.steering_max_rad, vehicle.steering_max_rad);
+    let curvature_per_m = steering_rad.tan() / vehicle.wheelbase_m;
+    // A chord as long as the radius spans 60° and ends ahead, however tight the circle.
+    let chord_m = CHORD_M.min(1.0 / curvature_per_m.abs());
+    let sine = 0.5 * chord_m * curvature_per_m;
+    LookAheadPoint { ahead_m: chord_m * (1.0 - sine * sine).sqrt(), left_m: chord_m * sine }
+}
+
 fn speed(
     law: SpeedLaw,
     settings: &ControllerSettings,
@@ -159,6 +172,20 @@ mod tests {
             let travel_m = if half_turn == 0.0 { chord_m } else { chord_m * half_turn / half_turn.sin() };
             let end = crate::geometry::Pose::default().advanced_along_arc(curvature, travel_m);
             assert!(end.position().distance(glam::Vec2::new(ahead_m, left_m)) < 1e-3);
+        }
+    }
+
+    #[test]
+    fn pursuing_the_point_of_an_angle_steers_that_angle() {
+        let (vehicle, geometry) = (VehicleSettings::hyundai_hg300(), GridGeometry::paper());
+        for degrees in [-60.0_f32, -35.5, -10.0, 0.0, 0.5, 20.0, 35.5] {
+            let steering_rad = degrees.to_radians().clamp(-vehicle.steering_max_rad, vehicle.steering_max_rad);
+            let point = point_of(&vehicle, degrees.to_radians());
+            assert!(point.ahead_m > 2.0, "{point:?}");
+            assert!(
+                (steering(PursuitLaw::Paper, &vehicle, &geometry, point) - steering_rad).abs() < 1e-5,
+                "{degrees}°"
+            );
         }
     }
 

@@ -142,6 +142,12 @@ pub trait Fleet {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>);
 }
 
+impl<F: Fleet + ?Sized> Fleet for Box<F> {
+    fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
+        (**self).decide(seats, decisions);
+    }
+}
+
 /// A fleet with one independent driver per episode, asked one after another.
 pub struct OneDriverEach<D>(pub Vec<D>);
 

@@ -13,7 +13,7 @@
 
 use crate::collision::BodyBox;
 use crate::controller::{self, ControllerSettings};
-use crate::driver::{Decision, Driver, GroundTruth, Seat, Situation};
+use crate::driver::{Decision, Driver, GroundTruth, Seat, Situation, Source};
 use crate::frame::{Ending, Event, Frame, FrameSink};
 use crate::geometry::Pose;
 use crate::map::Map;
@@ -131,11 +131,33 @@ impl Episode {
             settings.physics_step_ms > 0 && settings.control_period_ms.is_multiple_of(settings.physics_step_ms),
             "the control period is a multiple of the physics step"
         );
-        let sensor = Sensor::new(&map, settings.sensing.clone(), &settings.noise, seed);
+        let body = Arc::new(BodyBox::new(&settings.vehicle));
         let pixel_m = settings.sensing.geometry.pixel_m();
+        let ring = Arc::new(SafeRing::new(&settings.vehicle, &settings.metrics, pixel_m));
+        Self::of_car(settings, map, seed, body, ring)
+    }
+
+    /// The same as [`Self::new`], but shares with this episode what depends on the settings only, if they are equal: many
+    /// cars that are driven in turn then find it in the cache.
+    #[must_use]
+    pub fn another(&self, settings: &EpisodeSettings, map: Arc<Map>, seed: RootSeed) -> Self {
+        if *settings != *self.settings {
+            return Self::new(Arc::new(settings.clone()), map, seed);
+        }
+        Self::of_car(Arc::clone(&self.settings), map, seed, Arc::clone(&self.body), Arc::clone(&self.ring))
+    }
+
+    fn of_car(
+        settings: Arc<EpisodeSettings>,
+        map: Arc<Map>,
+        seed: RootSeed,
+        body: Arc<BodyBox>,
+        ring: Arc<SafeRing>,
+    ) -> Self {
+        let sensor = Sensor::new(&map, settings.sensing.clone(), &settings.noise, seed);
         Self {
-            body: Arc::new(BodyBox::new(&settings.vehicle)),
-            ring: Arc::new(SafeRing::new(&settings.vehicle, &settings.metrics, pixel_m)),
+            body,
+            ring,
             sensor,
             vehicle: VehicleState::at_rest(map.start()),
             phase: Phase::Driving,
@@ -247,9 +269,31 @@ impl Episode {
             self.tick,
             self.map.scenario().name
         );
-        let settings = Arc::clone(&self.settings);
+        let settings = &self.settings;
         let command =
             controller::pursue(&settings.controller, &settings.vehicle, &settings.sensing.geometry, &decision);
+        self.drive(decision, command)
+    }
+
+    /// Drives one control tick as [`Self::apply`] does, but past the controller. The frame's decision is a point on the
+    /// circle that the command steers; the vehicle obeys within its limits.
+    ///
+    /// # Panics
+    /// If the episode has ended, or the command is not finite.
+    pub fn apply_command(&mut self, command: VehicleCommand, source: Source) -> Frame {
+        assert!(self.ending.is_none(), "the episode has ended");
+        assert!(
+            command.steering_rad.is_finite() && command.speed_mps.is_finite(),
+            "the command is finite, not {command:?} (tick {}, map {:?})",
+            self.tick,
+            self.map.scenario().name
+        );
+        let look_ahead = controller::point_of(&self.settings.vehicle, command.steering_rad);
+        self.drive(Decision { look_ahead, source, spread: None, speed_limit_mps: None }, command)
+    }
+
+    fn drive(&mut self, decision: Decision, command: VehicleCommand) -> Frame {
+        let settings = Arc::clone(&self.settings);
         let holds_from = self.physics_step + settings.physics_steps(settings.vehicle.dead_time_s);
         self.in_flight.push_back((holds_from, command));
         self.was_reset = false;
@@ -296,11 +340,16 @@ impl Episode {
         frame
     }
 
+    /// What was measured so far.
+    pub fn metrics(&self) -> EpisodeMetrics {
+        self.metrics.metrics()
+    }
+
     /// The result so far; final once [`Self::ending`] is set.
     pub fn report(&self) -> EpisodeReport {
         EpisodeReport {
             ending: self.ending.unwrap_or(Ending::TimedOut),
-            metrics: self.metrics.metrics(),
+            metrics: self.metrics(),
             events: self.events.clone(),
         }
     }

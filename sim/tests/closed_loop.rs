@@ -312,3 +312,19 @@ fn an_episode_under_way_goes_on_from_its_state() {
     }
     assert_eq!(positions.len(), frames.len() - met.tick as usize);
 }
+
+/// Past the controller with what the controller said: the same trajectory, and a point that steers the same way.
+#[test]
+fn commands_drive_as_the_points_that_they_come_from() {
+    let map = lane(60.0, Vec::new());
+    let (_, by_points) = run(Arc::clone(&map), (7.0, 0.4), settings());
+    let mut episode = Episode::new(settings(), map, RootSeed(1));
+    for by_point in by_points {
+        episode.observe();
+        let by_command = episode.apply_command(by_point.command, Source::Planner);
+        assert_eq!((by_command.vehicle, by_command.event), (by_point.vehicle, by_point.event));
+        let [a, b] = [by_command, by_point].map(|frame| frame.decision.look_ahead.curvature_per_m());
+        assert!((a - b).abs() < 1e-5, "{a} and {b} 1/m");
+    }
+    assert!(episode.ending().is_some());
+}

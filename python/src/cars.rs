@@ -1,0 +1,344 @@
+//! Many environments, stepped in parallel without the interpreter's lock.
+
+use crate::arrays::{SeenArrays, Target, pairs, points};
+use crate::car::{ACTION, ActionKind, Car, INFO, Outcome, Seen};
+use crate::course::{Course, SettingsFrom};
+use crate::guard::{EpisodeEnded, detached, input};
+use crate::reward::Reward;
+use numpy::{Ix2, PyArray, PyArray3, PyArrayMethods as _};
+use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use report::pictures::drawing::Drawing;
+use report::pictures::grids;
+use report::pictures::lot::{self, View};
+use sim::episode::Episode;
+use sim::geometry::Vec2;
+use sim::limits::THREADS_MAX;
+use sim::seed::RootSeed;
+use sim::sensing::GRID_CELLS;
+use std::collections::BTreeMap;
+
+/// When an episode that has ended is followed by the next (gymnasium's `AutoresetMode`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Autoreset {
+    /// In the next step, whose action is ignored.
+    NextStep,
+    /// In the same step.
+    SameStep,
+    /// When it is reset.
+    Disabled,
+}
+
+/// Environments on the lots, noise and settings of the command line.
+///
+/// Car i of n drives the episodes i, i + n, i + 2n, … of its seed; episode k is trial k // (lots * directions).
+#[pyclass(module = "lotpilot._native")]
+pub(crate) struct Cars {
+    course: Course,
+    cars: Vec<Car>,
+    kind: ActionKind,
+    autoreset: Autoreset,
+    reward: Reward,
+    threads: Threads,
+}
+
+/// Who steps the cars.
+enum Threads {
+    /// The caller's thread.
+    Caller,
+    /// One per core, shared with everything else in this process.
+    AllCores,
+    /// So many of their own.
+    Own(ThreadPool),
+}
+
+impl Threads {
+    fn new(count: usize, threads: Option<usize>) -> PyResult<Self> {
+        match threads {
+            Some(threads) if threads == 0 || threads > usize::from(THREADS_MAX) => {
+                let problem = format!("threads: {threads} is not within 1 … {THREADS_MAX}");
+                Err(PyValueError::new_err(problem))
+            }
+            Some(threads) if threads > 1 && count > 1 => {
+                let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+                Ok(Self::Own(pool.map_err(|error| PyRuntimeError::new_err(error.to_string()))?))
+            }
+            None if count > 1 => Ok(Self::AllCores),
+            _ => Ok(Self::Caller),
+        }
+    }
+
+    /// Does something to each, without the interpreter's lock; results come in order.
+    fn each<T: Send, R: Send>(
+        &self,
+        py: Python<'_>,
+        all: impl Iterator<Item = T>,
+        work: impl Fn(T) -> PyResult<R> + Sync + Send,
+    ) -> PyResult<Vec<R>> {
+        let all: Vec<T> = all.collect();
+        detached(py, || match self {
+            Self::Caller => all.into_iter().map(work).collect(),
+            Self::AllCores => all.into_par_iter().map(work).collect(),
+            Self::Own(pool) => pool.install(|| all.into_par_iter().map(work).collect()),
+        })
+    }
+}
+
+#[pymethods]
+impl Cars {
+    #[new]
+    #[pyo3(signature = (count, *, lots, directions, trials, noise, settings, seed, action, autoreset, reward, threads, digests))]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+    fn new(
+        count: usize,
+        lots: Vec<String>,
+        directions: &str,
+        trials: Option<u32>,
+        noise: &str,
+        settings: SettingsFrom,
+        seed: u64,
+        action: &str,
+        autoreset: &str,
+        reward: BTreeMap<String, f64>,
+        threads: Option<usize>,
+        digests: bool,
+    ) -> PyResult<Self> {
+        let wrong = |problem: String| Err(PyValueError::new_err(problem));
+        if count == 0 {
+            return wrong("0 environments are none".to_owned());
+        }
+        let kind = match action {
+            "look_ahead" => ActionKind::LookAhead,
+            "steering" => ActionKind::Steering,
+            _ => return wrong(format!("no action {action:?}; there are look_ahead and steering")),
+        };
+        let autoreset = match autoreset {
+            "next_step" => Autoreset::NextStep,
+            "same_step" => Autoreset::SameStep,
+            "disabled" => Autoreset::Disabled,
+            _ => return wrong(format!("no autoreset {autoreset:?}; there are next_step, same_step and disabled")),
+        };
+        let cars = (0..count as u64).map(|index| Car::new(RootSeed(seed), index, count as u64, digests)).collect();
+        Ok(Self {
+            course: Course::new(settings, &lots, directions, trials, noise).map_err(input)?,
+            cars,
+            kind,
+            autoreset,
+            reward: Reward::of(reward).map_err(input)?,
+            threads: Threads::new(count, threads)?,
+        })
+    }
+
+    /// Names of the columns of `info`.
+    #[classattr]
+    #[pyo3(name = "INFO")]
+    fn info() -> Vec<&'static str> {
+        INFO.to_vec()
+    }
+
+    /// Lowest and highest useful action: ((a, b), (a, b)).
+    fn action_bounds(&self) -> [[f32; ACTION]; 2] {
+        let episode = &self.course.settings.episode;
+        match self.kind {
+            ActionKind::LookAhead => {
+                let geometry = &episode.sensing.geometry;
+                let aside_m = 0.5 * geometry.side_m;
+                [[geometry.near_edge_ahead_m, -aside_m], [geometry.far_edge_ahead_m(), aside_m]]
+            }
+            ActionKind::Steering => {
+                let steering_rad = episode.vehicle.steering_max_rad;
+                [[-steering_rad, 0.0], [steering_rad, episode.controller.speed_max_mps]]
+            }
+        }
+    }
+
+    /// Lowest and highest state: ((speed, steering), (speed, steering)).
+    fn state_bounds(&self) -> [[f32; 2]; 2] {
+        let episode = &self.course.settings.episode;
+        // The speed loop overshoots its fastest command a little.
+        let (fastest_mps, steering_rad) = (2.0 * episode.controller.speed_max_mps, episode.vehicle.steering_max_rad);
+        [[0.0, -steering_rad], [fastest_mps, steering_rad]]
+    }
+
+    /// Control period, seconds.
+    fn control_period_s(&self) -> f32 {
+        self.course.settings.episode.control_period_s()
+    }
+
+    /// Starts the next episodes of the cars in `mask` and writes what they see into `seen`. `seeds` and `numbers` say
+    /// which episodes come first.
+    fn reset(
+        &mut self,
+        py: Python<'_>,
+        mask: Vec<bool>,
+        seeds: Option<Vec<u64>>,
+        numbers: Option<Vec<u64>>,
+        seen: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let n = self.cars.len();
+        for (name, found) in [
+            ("reset_mask", Some(mask.len())),
+            ("seed", seeds.as_ref().map(Vec::len)),
+            ("episode", numbers.as_ref().map(Vec::len)),
+        ] {
+            if let Some(found) = found.filter(|&found| found != n) {
+                return Err(PyValueError::new_err(format!("{name}: {found} values for {n} environments")));
+            }
+        }
+        let mut arrays = SeenArrays::of(seen, n)?;
+        let rows = arrays.rows()?;
+        for (index, car) in self.cars.iter_mut().enumerate().filter(|(index, _)| mask[*index]) {
+            if let Some(seeds) = &seeds {
+                (car.seed, car.next) = (RootSeed(seeds[index]), index as u64);
+            }
+            if let Some(numbers) = &numbers {
+                car.next = numbers[index];
+            }
+        }
+        let Self { course, cars, threads, .. } = self;
+        let reset = |((car, mut seen), mask): ((&mut Car, Seen<'_>), bool)| {
+            if mask {
+                car.reset(course).map_err(input)?;
+            }
+            car.write(&mut seen);
+            Ok(())
+        };
+        threads.each(py, cars.iter_mut().zip(rows).zip(mask), reset)?;
+        Ok(())
+    }
+
+    /// Drives one control tick with every car. Writes what they see then into `seen`; under `same_step`, what ended
+    /// episodes saw last goes into `last`.
+    #[expect(clippy::too_many_arguments, reason = "one array each")]
+    fn step(
+        &mut self,
+        py: Python<'_>,
+        actions: &Bound<'_, PyAny>,
+        seen: &Bound<'_, PyAny>,
+        rewards: &Bound<'_, PyAny>,
+        terminated: &Bound<'_, PyAny>,
+        truncated: &Bound<'_, PyAny>,
+        last: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let n = self.cars.len();
+        if let Some(index) = self.cars.iter().position(|car| car.episode().is_none()) {
+            return Err(EpisodeEnded::new_err(format!("environment {index} was never reset; call reset first")));
+        }
+        let waiting = self.cars.iter().position(|car| !car.is_driving());
+        if let (Autoreset::Disabled, Some(index)) = (self.autoreset, waiting) {
+            let problem = format!("the episode of environment {index} has ended; reset it before the next step");
+            return Err(EpisodeEnded::new_err(problem));
+        }
+        let actions = pairs(actions, n, |index| self.cars[index].is_driving())?;
+        let mut arrays = SeenArrays::of(seen, n)?;
+        let rows = arrays.rows()?;
+        let mut last = last.map(|last| SeenArrays::of(last, n)).transpose()?;
+        let last: Vec<Option<Seen<'_>>> = match &mut last {
+            Some(last) => last.rows()?.into_iter().map(Some).collect(),
+            None => std::iter::repeat_with(|| None).take(n).collect(),
+        };
+        let mut rewards = Target::<f64>::of(rewards, "rewards", &[n])?;
+        let mut terminated = Target::<bool>::of(terminated, "terminated", &[n])?;
+        let mut truncated = Target::<bool>::of(truncated, "truncated", &[n])?;
+        let outcomes = (rewards.values()?, terminated.values()?, truncated.values()?);
+
+        let Self { course, cars, kind, autoreset, reward, threads } = self;
+        let (kind, autoreset, reward) = (*kind, *autoreset, *reward);
+        let step = |(((car, action), mut seen), last): (((&mut Car, [f32; ACTION]), Seen<'_>), Option<Seen<'_>>)| {
+            let mut outcome = Outcome::default();
+            if car.is_driving() {
+                outcome = car.step(kind, action, &reward);
+                if autoreset == Autoreset::SameStep && !car.is_driving() {
+                    if let Some(mut last) = last {
+                        car.write(&mut last);
+                    }
+                    car.reset(course).map_err(input)?;
+                }
+            } else {
+                car.reset(course).map_err(input)?;
+            }
+            car.write(&mut seen);
+            Ok(outcome)
+        };
+        let stepped = threads.each(py, cars.iter_mut().zip(actions).zip(rows).zip(last), step)?;
+        for (index, outcome) in stepped.into_iter().enumerate() {
+            outcomes.0[index] = outcome.reward;
+            outcomes.1[index] = outcome.terminated;
+            outcomes.2[index] = outcome.truncated;
+        }
+        Ok(())
+    }
+
+    /// The expert's actions now, float32 [n, 2]; NaN where the episode has ended.
+    fn expert_actions<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray<f32, Ix2>>> {
+        let Self { cars, kind, threads, .. } = self;
+        let kind = *kind;
+        let label = |car: &mut Car| Ok(car.label(kind).unwrap_or([f32::NAN; ACTION]));
+        points(py, threads.each(py, cars.iter_mut(), label)?)
+    }
+
+    /// Where the route is `ahead_m` further on, in the frame of the rear axle, float32 [n, 2]: ahead and left, metres.
+    fn route_points<'py>(&self, py: Python<'py>, ahead_m: f32) -> PyResult<Bound<'py, PyArray<f32, Ix2>>> {
+        points(py, self.cars.iter().map(|car| car.route_point(ahead_m).unwrap_or([f32::NAN; 2])))
+    }
+
+    /// Lot, direction, trial and seed of every car's episode: what the command line names it by.
+    fn places(&self) -> Vec<(String, &'static str, u32, u64)> {
+        let place = |car: &Car| {
+            let trial = self.course.trial(car.seed, car.number().unwrap_or(car.next));
+            (trial.lot.spec(), trial.direction.name(), trial.index, car.seed.0)
+        };
+        self.cars.iter().map(place).collect()
+    }
+
+    /// What was measured on a car's episode so far, as JSON.
+    fn report(&self, index: usize) -> PyResult<String> {
+        serde_json::to_string(&self.episode(index)?.report()).map_err(input)
+    }
+
+    /// SHA-256 of a car's episode so far, if digests are kept.
+    fn digest(&self, index: usize) -> PyResult<Option<String>> {
+        self.episode(index)?;
+        Ok(self.cars[index].digest())
+    }
+
+    /// The lot around a car and the grid that it sees, uint8 [side_px, 2 * side_px, 3].
+    fn picture<'py>(&self, py: Python<'py>, index: usize, side_px: u16) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        let episode = self.episode(index)?;
+        let point = self.cars[index].last().map(|frame| frame.decision.look_ahead);
+        let side_px = f32::from(side_px);
+        let drawn = detached(py, || {
+            let (vehicle, geometry) = (&episode.settings().vehicle, &episode.settings().sensing.geometry);
+            let (map, pose) = (episode.map(), episode.vehicle().pose);
+            let view = View::around(pose.position() + 4.0 * pose.ahead(), 40.0, side_px);
+            let mut picture = Drawing::new(Vec2::new(2.0 * side_px, side_px), lot::GROUND).map_err(input)?;
+            let mut above = Drawing::new(Vec2::splat(side_px), lot::GROUND).map_err(input)?;
+            lot::draw_ground(&mut above, &view, map);
+            lot::draw_obstacles(&mut above, &view, map);
+            lot::draw_finish(&mut above, &view, map);
+            lot::draw_car(&mut above, &view, vehicle, pose, lot::ROUTE, 3.0);
+            picture.inset(above, Vec2::ZERO);
+            let cell_px = (side_px / GRID_CELLS as f32).floor();
+            let grid = &episode.situation().observation.grid;
+            let mut grid = grids::grid(grid, cell_px, |_, _| None).map_err(input)?;
+            if let Some(point) = point {
+                grids::draw_prediction(&mut grid, point, None, geometry);
+            }
+            picture.inset(grid, Vec2::new(side_px, 0.0));
+            Ok(picture.pixmap())
+        })?;
+        let rgb: Vec<u8> = drawn.data().chunks_exact(4).flat_map(|rgba| [rgba[0], rgba[1], rgba[2]]).collect();
+        PyArray::from_vec(py, rgb).reshape([drawn.height() as usize, drawn.width() as usize, 3])
+    }
+}
+
+impl Cars {
+    fn episode(&self, index: usize) -> PyResult<&Episode> {
+        let car = self.cars.get(index);
+        let car = car.ok_or_else(|| PyIndexError::new_err(format!("no environment {index} of {}", self.cars.len())))?;
+        car.episode()
+            .ok_or_else(|| EpisodeEnded::new_err(format!("environment {index} was never reset; call reset first")))
+    }
+}

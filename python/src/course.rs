@@ -1,0 +1,162 @@
+//! What environments drive: lots × directions × trials, by the names, settings and seeds of the command line.
+
+use anyhow::ensure;
+use experiment::lots::Lot;
+use experiment::settings::{Layers, NoiseChoice, Settings};
+use experiment::trials::{self, Trial};
+use pyo3::prelude::*;
+use sim::episode::Episode;
+use sim::limits::TRIAL_MAX;
+use sim::map::Map;
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+/// Maps that are kept; a map takes up to a few megabytes.
+const MAPS_KEPT: usize = 512;
+
+/// Where settings come from, as on the command line: preset, then file, then single changes.
+#[derive(Debug, Clone, Default, FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct SettingsFrom {
+    preset: Option<String>,
+    config: Option<PathBuf>,
+    overrides: Vec<String>,
+}
+
+impl From<SettingsFrom> for Layers {
+    fn from(from: SettingsFrom) -> Self {
+        Self { preset: from.preset, file: from.config, overrides: from.overrides }
+    }
+}
+
+/// The directions that a name stands for.
+///
+/// # Errors
+/// If it stands for none.
+pub(crate) fn directions(name: &str) -> anyhow::Result<Vec<Direction>> {
+    let named: Vec<Direction> =
+        Direction::BOTH.into_iter().filter(|way| name == "both" || way.name() == name).collect();
+    ensure!(!named.is_empty(), "no directions {name:?}; there are both, forward and reverse");
+    Ok(named)
+}
+
+/// Noise by name.
+///
+/// # Errors
+/// If there is none of this name.
+pub(crate) fn noise(name: &str) -> anyhow::Result<NoiseChoice> {
+    name.parse().map_err(anyhow::Error::msg)
+}
+
+/// Lot and direction by index; of a lot whose obstacles are drawn for every trial, also root seed and trial.
+type MapKey = (usize, usize, Option<(RootSeed, u32)>);
+
+/// Episodes by number: trial by trial, lot by lot, direction by direction.
+#[derive(Debug)]
+pub(crate) struct Course {
+    pub(crate) settings: Settings,
+    lots: Vec<Lot>,
+    directions: Vec<Direction>,
+    /// Trials of each lot and direction before they come again.
+    trials: Option<u32>,
+    noise: NoiseChoice,
+    maps: Mutex<BTreeMap<MapKey, Arc<Map>>>,
+    /// An episode that others share their car with.
+    first: OnceLock<Episode>,
+}
+
+impl Course {
+    /// Reads settings and lots.
+    ///
+    /// # Errors
+    /// If something is not known by its name, or a lot cannot be driven in a direction.
+    pub(crate) fn new(
+        from: SettingsFrom,
+        lots: &[String],
+        way: &str,
+        trials: Option<u32>,
+        level: &str,
+    ) -> anyhow::Result<Self> {
+        let settings = Settings::resolve(&from.into(), None)?;
+        let vehicle = &settings.episode.vehicle;
+        let lots = Lot::parse_all(lots, vehicle)?;
+        ensure!(!lots.is_empty(), "no lots are named; name at least one, as in lots=[\"lot-a\"]");
+        ensure!(trials != Some(0), "trials: 0 trials are none; None never repeats one");
+        let directions = directions(way)?;
+        for lot in &lots {
+            directions.iter().try_for_each(|&direction| lot.check_direction(direction, vehicle))?;
+        }
+        Ok(Self {
+            lots,
+            directions,
+            trials,
+            noise: noise(level)?,
+            maps: Mutex::default(),
+            first: OnceLock::new(),
+            settings,
+        })
+    }
+
+    /// Number of lots × directions: a trial of each is driven before the next trial.
+    fn rows(&self) -> u64 {
+        (self.lots.len() * self.directions.len()) as u64
+    }
+
+    /// The trial of an episode.
+    pub(crate) fn trial(&self, seed: RootSeed, number: u64) -> Trial<'_> {
+        let (lot, direction) = self.row(number);
+        let trials = self.trials.unwrap_or(TRIAL_MAX).min(TRIAL_MAX);
+        let index = (number / self.rows() % u64::from(trials)) as u32;
+        Trial::of_evaluation(seed, &self.lots[lot], self.directions[direction], index)
+    }
+
+    fn row(&self, number: u64) -> (usize, usize) {
+        let row = (number % self.rows()) as usize;
+        (row / self.directions.len(), row % self.directions.len())
+    }
+
+    /// A car at the start of an episode.
+    ///
+    /// # Errors
+    /// If its lot cannot be driven.
+    pub(crate) fn start(&self, seed: RootSeed, number: u64) -> anyhow::Result<Episode> {
+        let (trial, map) = (self.trial(seed, number), self.map(seed, number)?);
+        let settings = trials::episode_settings(&self.settings.episode, self.noise, &map);
+        let start = || Episode::new(Arc::new(settings.clone()), Arc::clone(&map), trial.episode_seed());
+        Ok(self.first.get_or_init(start).another(&settings, Arc::clone(&map), trial.episode_seed()))
+    }
+
+    /// The map of an episode. Those that come again are kept.
+    ///
+    /// # Errors
+    /// If its lot cannot be driven.
+    pub(crate) fn map(&self, seed: RootSeed, number: u64) -> anyhow::Result<Arc<Map>> {
+        let trial = self.trial(seed, number);
+        let ((lot, way), drawn) = (self.row(number), trial.lot.is_drawn_per_trial());
+        let key = |way: usize| (lot, way, drawn.then_some((seed, trial.index)));
+        if let Some(map) = self.kept().get(&key(way)) {
+            return Ok(Arc::clone(map));
+        }
+        if drawn && self.trials.is_none() {
+            return Ok(Arc::new(trial.map(&self.settings.episode)?));
+        }
+        // A lot that is found by a search is found once for both ways.
+        let ways: Vec<Trial<'_>> = self.directions.iter().map(|&direction| Trial { direction, ..trial }).collect();
+        let maps = trials::maps(&ways, &self.settings.episode)?;
+        let mut kept = self.kept();
+        for (way, map) in maps.iter().enumerate() {
+            kept.insert(key(way), Arc::clone(map));
+        }
+        while kept.len() > MAPS_KEPT {
+            kept.pop_first();
+        }
+        Ok(Arc::clone(&maps[way]))
+    }
+
+    fn kept(&self) -> std::sync::MutexGuard<'_, BTreeMap<MapKey, Arc<Map>>> {
+        self.maps.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

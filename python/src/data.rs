@@ -1,0 +1,68 @@
+//! Rounds of training data as arrays.
+
+use crate::arrays::points;
+use crate::guard::{detached, input};
+use experiment::run_dir;
+use numpy::{PyArray, PyArrayMethods as _};
+use policy::dataset::Tick;
+use policy::dataset::store::Store;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use sim::driver::{LookAheadPoint, Source};
+use sim::sensing::{GRID_CELLS, OccupancyGrid};
+use std::path::PathBuf;
+
+/// Reads a number of every tick.
+type Column = fn(&Tick) -> f32;
+
+/// The columns of a round of a run; see `lotpilot.load_round`.
+#[pyfunction]
+pub(crate) fn read_round(py: Python<'_>, run: PathBuf, round: u32) -> PyResult<Bound<'_, PyDict>> {
+    if !run.is_dir() {
+        return Err(PyValueError::new_err(format!("{}: there is no such run", run.display())));
+    }
+    let (data, collection, geometry) = detached(py, || {
+        let settings = run_dir::settings_of(&run).map_err(input)?;
+        let (data, collection) = Store::open(&run).and_then(|store| store.read_round(round)).map_err(input)?;
+        Ok((data, collection, settings.episode.sensing.geometry))
+    })?;
+    let n = data.samples.len();
+    let grids =
+        |grids: &mut dyn Iterator<Item = &OccupancyGrid>| -> Vec<u8> { grids.flat_map(OccupancyGrid::cells).collect() };
+    let columns = PyDict::new(py);
+    let shown = grids(&mut data.samples.iter().map(|sample| &sample.grid));
+    columns.set_item("grids", PyArray::from_vec(py, shown).reshape([n, GRID_CELLS, GRID_CELLS])?)?;
+    let label = |label| LookAheadPoint::from_image_fraction(label, &geometry);
+    let labels = data.samples.iter().map(|sample| label(sample.label)).map(|point| [point.ahead_m, point.left_m]);
+    columns.set_item("points", points(py, labels)?)?;
+    columns.set_item("image_fractions", points(py, data.samples.iter().map(|sample| sample.label))?)?;
+    let tau_hat = data.samples.iter().map(|sample| sample.tau_hat).collect();
+    columns.set_item("tau_hat", PyArray::from_vec(py, tau_hat))?;
+    let augmentations = grids(&mut data.noise_augmentations.iter());
+    let shape = [n, data.augmentations_each(), GRID_CELLS, GRID_CELLS];
+    columns.set_item("noise_augmentations", PyArray::from_vec(py, augmentations).reshape(shape)?)?;
+    let ticks = &data.ticks;
+    columns.set_item("episode", PyArray::from_vec(py, ticks.iter().map(|tick| i64::from(tick.episode)).collect()))?;
+    columns.set_item("tick", PyArray::from_vec(py, ticks.iter().map(|tick| i64::from(tick.tick)).collect()))?;
+    let floats: [(&str, Column); 8] = [
+        ("time_s", |tick| tick.time_s),
+        ("x_m", |tick| tick.x_m),
+        ("y_m", |tick| tick.y_m),
+        ("heading_rad", |tick| tick.heading_rad),
+        ("speed_mps", |tick| tick.speed_mps),
+        ("steering_rad", |tick| tick.steering_rad),
+        ("command_steering_rad", |tick| tick.command_steering_rad),
+        ("command_speed_mps", |tick| tick.command_speed_mps),
+    ];
+    for (name, of) in floats {
+        columns.set_item(name, PyArray::from_vec(py, ticks.iter().map(of).collect()))?;
+    }
+    let is_novice = ticks.iter().map(|tick| tick.driver == Source::Novice).collect();
+    columns.set_item("is_novice", PyArray::from_vec(py, is_novice))?;
+    let lots: Vec<&str> = collection.episodes.iter().map(|episode| episode.lot.as_str()).collect();
+    columns.set_item("lots", lots)?;
+    let directions: Vec<&str> = collection.episodes.iter().map(|episode| episode.direction.name()).collect();
+    columns.set_item("directions", directions)?;
+    Ok(columns)
+}

@@ -1,0 +1,41 @@
+//! No panic leaves this library, nothing waits for threads that are not there, and errors are Python's.
+
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::prelude::*;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::OnceLock;
+
+pyo3::create_exception!(
+    lotpilot,
+    EpisodeEnded,
+    PyRuntimeError,
+    "An environment was stepped after its episode had ended."
+);
+
+/// Bad input.
+pub(crate) fn input(error: impl Into<anyhow::Error>) -> PyErr {
+    PyValueError::new_err(format!("{:#}", error.into()))
+}
+
+/// Works without the interpreter's lock.
+///
+/// # Errors
+/// Those of the work; a panic, which is a bug of lotpilot; a process that was forked after the threads had started: they
+/// are not in the child, and it would wait for them forever.
+pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> PyResult<T> + Send) -> PyResult<T> {
+    static PROCESS: OnceLock<u32> = OnceLock::new();
+    if *PROCESS.get_or_init(std::process::id) != std::process::id() {
+        return Err(PyRuntimeError::new_err(
+            "this process was forked after lotpilot had started its threads, which are not in the child; start \
+             processes with multiprocessing's method \"spawn\" or \"forkserver\"",
+        ));
+    }
+    py.detach(|| catch_unwind(AssertUnwindSafe(work))).unwrap_or_else(|panic| Err(bug(&*panic)))
+}
+
+fn bug(panic: &(dyn Any + Send)) -> PyErr {
+    let said = panic.downcast_ref::<String>().map(String::as_str);
+    let said = said.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message");
+    PyRuntimeError::new_err(format!("a bug in lotpilot, please report it: {said}"))
+}

@@ -1,0 +1,51 @@
+//! The native half of the Python package `lotpilot`: many episodes stepped at once into arrays of the caller.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`course`] | lots × directions × trials: episodes by number, their maps |
+//! | [`car`] | one environment: its episode, its expert, its reward |
+//! | [`cars`] | many of them, stepped in parallel without the interpreter's lock |
+//! | [`arrays`] | numpy arrays as what cars write into |
+//! | [`reward`] | the terms of the reward and their weights |
+//! | [`lot`] | a lot with the obstacles of a trial, for looking at |
+//! | [`evaluate`], [`callback`] | evaluations, with functions in Python as drivers |
+//! | [`data`] | rounds of training data |
+//! | [`rate`] | how fast the same episodes are in Rust alone |
+//! | [`digest`] | SHA-256 of a drive |
+//! | [`guard`] | no panic leaves this library |
+//!
+//! Every episode here is driven by [`sim::episode::Episode`], tick by tick, as everywhere in lotpilot.
+
+mod arrays;
+mod callback;
+mod car;
+mod cars;
+mod course;
+mod data;
+mod digest;
+mod evaluate;
+mod guard;
+mod lot;
+mod rate;
+mod reward;
+
+/// As in the command line: allocation is hot where lots are drawn.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
+/// The native half of the package; see `lotpilot` for what is meant to be used.
+#[pyo3::pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::cars::Cars;
+    #[pymodule_export]
+    use crate::data::read_round;
+    #[pymodule_export]
+    use crate::evaluate::evaluate;
+    #[pymodule_export]
+    use crate::guard::EpisodeEnded;
+    #[pymodule_export]
+    use crate::lot::{Lot, drivers, generate, lots, settings};
+    #[pymodule_export]
+    use crate::rate::{drive_digest, rust_rate};
+}

@@ -1,0 +1,216 @@
+//! Lots, drivers and settings by name, for looking at.
+
+use crate::arrays::points;
+use crate::course::{SettingsFrom, directions};
+use crate::guard::{detached, input};
+use experiment::settings::Settings;
+use experiment::trials::{Purpose, Trial};
+use numpy::{Ix2, PyArray, PyArray1, PyArray3, PyArrayMethods as _, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use report::pictures::{self, lot};
+use sim::geometry::Vec2;
+use sim::map::Map;
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+use sim::vehicle::VehicleSettings;
+use std::path::PathBuf;
+
+/// A lot with the obstacles of one trial, in one direction.
+///
+/// Lengths are metres in the world frame of the lot, angles radians counter-clockwise from x.
+///
+/// Args:
+///     name: A lot as on the command line: ``"lot-a"``, ``"test-hard-7"``, ``"my-map.toml"``.
+///     direction: ``"forward"`` or ``"reverse"``.
+///     trial: Which obstacles, of lots that draw them anew for every trial.
+///     seed: Seed of the obstacles, as in ``evaluate``.
+///
+/// Raises:
+///     ValueError: If there is no such lot, or it cannot be driven in this direction.
+#[pyclass(frozen, module = "lotpilot")]
+pub(crate) struct Lot {
+    map: Map,
+    vehicle: VehicleSettings,
+}
+
+#[pymethods]
+impl Lot {
+    #[new]
+    #[pyo3(signature = (name, *, direction="forward", trial=0, seed=1))]
+    fn new(py: Python<'_>, name: &str, direction: &str, trial: u32, seed: u64) -> PyResult<Self> {
+        let settings = Settings::preset("default").map_err(input)?;
+        detached(py, || {
+            let vehicle = settings.episode.vehicle.clone();
+            let lots = experiment::lots::Lot::parse_all(&[name], &vehicle).map_err(input)?;
+            let [lot] = lots.as_slice() else {
+                let problem = format!("{name:?} stands for {} lots; lotpilot.lots names them", lots.len());
+                return Err(PyValueError::new_err(problem));
+            };
+            let direction = directions(direction).map_err(input)?[0];
+            lot.check_direction(direction, &vehicle).map_err(input)?;
+            let trial = Trial::of_evaluation(RootSeed(seed), lot, direction, trial);
+            Ok(Self { map: trial.map(&settings.episode).map_err(input)?, vehicle })
+        })
+    }
+
+    /// Name in tables.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.map.scenario().name
+    }
+
+    /// Length of the route, metres.
+    #[getter]
+    fn length_m(&self) -> f32 {
+        self.map.path().length_m()
+    }
+
+    /// Route of the rear axle, float32 [n, 3]: x and y in metres, heading in radians.
+    #[getter]
+    fn route<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray<f32, Ix2>>> {
+        points(py, self.map.path().poses().iter().map(|pose| [pose.x_m, pose.y_m, pose.heading_rad]))
+    }
+
+    /// Outline of the drivable ground, float32 [n, 2], metres.
+    #[getter]
+    fn boundary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray<f32, Ix2>>> {
+        points(py, self.map.scenario().boundary.iter().map(Vec2::to_array))
+    }
+
+    /// Outlines of the islands, each float32 [n, 2], metres.
+    #[getter]
+    fn islands<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray<f32, Ix2>>>> {
+        let islands = self.map.scenario().islands.iter();
+        islands.map(|island| points(py, island.polygon.iter().map(Vec2::to_array))).collect()
+    }
+
+    /// Outlines of the obstacles, each float32 [n, 2], metres.
+    #[getter]
+    fn obstacles<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray<f32, Ix2>>>> {
+        let obstacles = self.map.scenario().obstacles.iter();
+        obstacles.map(|obstacle| points(py, obstacle.outline().iter().map(Vec2::to_array))).collect()
+    }
+
+    /// Signed distances of points to the nearest non-drivable ground, float32 [n], metres: positive on drivable ground,
+    /// at most 3 m.
+    ///
+    /// Args:
+    ///     points: float32 [n, 2], metres.
+    fn distances_m<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f32>,
+    ) -> PyResult<Bound<'py, PyArray1<f32>>> {
+        let points = points.as_array();
+        if points.ncols() != 2 {
+            return Err(PyValueError::new_err(format!("points: the shape is {:?}, [n, 2] is needed", points.shape())));
+        }
+        let distances = points.outer_iter().map(|point| self.map.signed_distance_m(Vec2::new(point[0], point[1])));
+        Ok(PyArray::from_vec(py, distances.collect()))
+    }
+
+    /// The lot as TOML, as ``cargo xtask generate`` writes it.
+    fn to_toml(&self) -> String {
+        scenarios::load::to_toml(self.map.scenario())
+    }
+
+    /// The lot from above, uint8 [height, width, 3].
+    ///
+    /// Args:
+    ///     pixels_per_metre: Scale; by default it fits 1600 pixels.
+    #[pyo3(signature = (pixels_per_metre=None))]
+    fn picture<'py>(&self, py: Python<'py>, pixels_per_metre: Option<f32>) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        if pixels_per_metre.is_some_and(|scale| !(0.1..=1000.0).contains(&scale)) {
+            return Err(PyValueError::new_err("pixels_per_metre is not within 0.1 … 1000"));
+        }
+        let drawn =
+            detached(py, || Ok(lot::top_view(&self.map, &self.vehicle, pixels_per_metre).map_err(input)?.pixmap()))?;
+        let rgb: Vec<u8> = drawn.data().chunks_exact(4).flat_map(|rgba| [rgba[0], rgba[1], rgba[2]]).collect();
+        PyArray::from_vec(py, rgb).reshape([drawn.height() as usize, drawn.width() as usize, 3])
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<lotpilot.Lot {:?}, route {:.1} m>", self.name(), self.length_m())
+    }
+}
+
+/// The single lots that names stand for: ``lots(["test:3"])`` is ``["test-medium-0", "test-medium-1", "test-medium-2"]``.
+///
+/// Raises:
+///     ValueError: If nothing is named so.
+#[pyfunction]
+#[pyo3(signature = (names))]
+pub(crate) fn lots(py: Python<'_>, names: Vec<String>) -> PyResult<Vec<String>> {
+    let settings = Settings::preset("default").map_err(input)?;
+    detached(py, || {
+        let lots = experiment::lots::Lot::parse_all(&names, &settings.episode.vehicle).map_err(input)?;
+        Ok(lots.iter().map(experiment::lots::Lot::spec).collect())
+    })
+}
+
+/// Ways to name a driver, each with what it means.
+#[pyfunction]
+pub(crate) fn drivers() -> Vec<(String, String)> {
+    experiment::drivers::specs()
+}
+
+/// Settings as TOML: preset, then file, then single changes.
+#[pyfunction]
+pub(crate) fn settings(from: SettingsFrom) -> PyResult<String> {
+    Ok(Settings::resolve(&from.into(), None).map_err(input)?.to_toml())
+}
+
+/// Draws lots: name, TOML and PNG of each, route in metres and number of obstacles. With `out`, TOML and PNG are files
+/// there, and what is returned instead of their content are their paths.
+#[pyfunction]
+#[expect(clippy::type_complexity, reason = "columns of a table in Python")]
+pub(crate) fn generate(
+    py: Python<'_>,
+    names: Vec<String>,
+    seed: u64,
+    count: u32,
+    out: Option<PathBuf>,
+    overwrite: bool,
+) -> PyResult<Vec<(String, String, String, f32, usize)>> {
+    let settings = Settings::preset("default").map_err(input)?;
+    let vehicle = &settings.episode.vehicle;
+    let draw = |trial: &Trial<'_>| {
+        let name = match (trial.lot.is_drawn_per_trial(), count) {
+            (false, _) => trial.lot.name().to_owned(),
+            (true, 1) => format!("{}-s{seed}", trial.lot.name()),
+            (true, _) => format!("{}-s{seed}-{}", trial.lot.name(), trial.index + 1),
+        };
+        let name = pictures::file_name(&name);
+        let mut scenario = trial.lot.draw(trial.seed).scenario;
+        scenario.name.clone_from(&name);
+        let text = scenarios::load::to_toml(&scenario);
+        let map = Map::build(scenario, vehicle)?;
+        let (length_m, obstacles) = (map.path().length_m(), map.scenario().obstacles.len());
+        let place = match &out {
+            Some(out) => {
+                let [toml, png] = ["toml", "png"].map(|extension| out.join(format!("{name}.{extension}")));
+                for path in [&toml, &png] {
+                    anyhow::ensure!(overwrite || !path.exists(), "{}: exists already", path.display());
+                }
+                storage::whole::write(&png, &lot::top_view(&map, vehicle, None)?.to_png()?)?;
+                storage::whole::write(&toml, text.as_bytes())?;
+                toml.display().to_string()
+            }
+            None => String::new(),
+        };
+        Ok::<_, anyhow::Error>((name, text, place, length_m, obstacles))
+    };
+    detached(py, || {
+        let lots = experiment::lots::Lot::parse_all(&names, vehicle).map_err(input)?;
+        if let Some(fixed) = lots.iter().find(|lot| count != 1 && !lot.is_drawn_per_trial()) {
+            let problem = format!("count: {:?} has the same obstacles in every drawing", fixed.name());
+            return Err(PyValueError::new_err(problem));
+        }
+        if let Some(out) = &out {
+            std::fs::create_dir_all(out)?;
+        }
+        let trials = Trial::all(RootSeed(seed), Purpose::Pictures, &lots, count, &[Direction::Forward]);
+        trials.map(|trial| draw(&trial).map_err(input)).collect()
+    })
+}

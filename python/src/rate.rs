@@ -1,0 +1,100 @@
+//! The same episodes in Rust alone: how fast they are, and what they come to.
+
+use crate::course::{Course, SettingsFrom};
+use crate::digest::DriveDigest;
+use crate::guard::{detached, input};
+use experiment::drive::TrialBatch;
+use experiment::drivers::{DriverSpec, NamedDriver};
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use rayon::ThreadPoolBuilder;
+use sim::batch::{SeatedFleet, run_fleets_until};
+use sim::driver::{Decision, Driver, LookAheadPoint, OneDriverEach, Situation, Source};
+use sim::episode::Episode;
+use sim::seed::RootSeed;
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+/// Steers at the middle of the lane: as cheap as a driver can be that gets there. The Python side of the benchmark does
+/// the same with `Cars.route_points`.
+#[derive(Debug, Clone, Copy)]
+struct Centred {
+    ahead_m: f32,
+}
+
+impl Driver for Centred {
+    fn decide(&mut self, situation: &Situation<'_>) -> Decision {
+        let truth = &situation.truth;
+        let ahead = truth.map.path().pose_at(truth.progress_m + self.ahead_m).position();
+        let in_ego = truth.vehicle.pose.world_from_ego().inverse_point(ahead);
+        let look_ahead = LookAheadPoint { ahead_m: in_ego.x, left_m: in_ego.y };
+        Decision { look_ahead, source: Source::Novice, spread: None, speed_limit_mps: None }
+    }
+}
+
+/// Control steps per second of the closed loop in Rust: the first `count` episodes again and again, in lock-step, steered
+/// at the route `ahead_m` further on.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+#[expect(clippy::disallowed_methods, reason = "a benchmark; nothing computed depends on it")]
+pub(crate) fn rust_rate(
+    py: Python<'_>,
+    count: u64,
+    lots: Vec<String>,
+    noise: &str,
+    settings: SettingsFrom,
+    ahead_m: f32,
+    threads: usize,
+    seconds: f64,
+) -> PyResult<f64> {
+    let course = Course::new(settings, &lots, "both", Some(8), noise).map_err(input)?;
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
+    detached(py, || {
+        pool.install(|| {
+            let episodes = (0..count).map(|number| course.start(RootSeed(1), number));
+            let episodes = episodes.collect::<anyhow::Result<Vec<Episode>>>().map_err(input)?;
+            let (started, limit) = (Instant::now(), Duration::from_secs_f64(seconds));
+            let mut steps = 0_u64;
+            while started.elapsed() < limit {
+                let fleet = |cars| Box::new(OneDriverEach(vec![Centred { ahead_m }; cars])) as Box<_>;
+                let fleets = SeatedFleet::in_all(episodes.clone(), 1, fleet);
+                run_fleets_until(fleets, &mut |_, _| {
+                    steps += 1;
+                    let is_over = steps.is_multiple_of(4096) && started.elapsed() >= limit;
+                    if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+                });
+            }
+            Ok(steps as f64 / started.elapsed().as_secs_f64())
+        })
+    })
+}
+
+/// SHA-256 of an episode as `cargo xtask evaluate` drives it with a named driver.
+#[pyfunction]
+pub(crate) fn drive_digest(
+    py: Python<'_>,
+    driver: &str,
+    lots: Vec<String>,
+    directions: &str,
+    noise: &str,
+    settings: SettingsFrom,
+    seed: u64,
+    number: u64,
+) -> PyResult<String> {
+    let course = Course::new(settings, &lots, directions, None, noise).map_err(input)?;
+    detached(py, || {
+        let driver: NamedDriver =
+            driver.parse::<DriverSpec>().and_then(|spec| spec.load(&course.settings)).map_err(input)?;
+        let (trial, map) = (course.trial(RootSeed(seed), number), course.map(RootSeed(seed), number).map_err(input)?);
+        let noise = crate::course::noise(noise).map_err(input)?;
+        let episode = &course.settings.episode;
+        let batch = TrialBatch { episode, driver: &driver, trials: &[trial], maps: &[map], noise };
+        let mut digest = DriveDigest::default();
+        batch.drive(&mut |_, frame| {
+            digest.frame(frame);
+            ControlFlow::Continue(())
+        });
+        Ok(digest.hex())
+    })
+}

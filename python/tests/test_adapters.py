@@ -1,0 +1,178 @@
+"""Gymnasium's own checks, its vector environments, and Stable-Baselines3 where it is installed."""
+
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+import lotpilot
+from lotpilot.gym import LotVectorEnv
+
+SHORT = {"lots": ["lot-b"], "overrides": ["episode.metrics.timeout_s=2.0"]}
+STRAIGHT = np.array([8.0, 0.0], np.float32)
+
+
+@pytest.mark.parametrize("options", [{}, {"state": True, "view": True, "action": "steering"}, {"normalise": True}])
+def test_gymnasium_finds_nothing_wrong(options):
+    env = gymnasium.make("lotpilot/Lot-v0", **SHORT, **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        if not options:
+            # Box bounds in metres, not -1 … 1, are what is asked for.
+            warnings.filterwarnings("ignore", message=".*action space.*")
+        warnings.filterwarnings("ignore", message=".*normalized space.*")
+        check_env(env.unwrapped, skip_render_check=True)
+
+
+def test_spaces_are_in_metres():
+    env = gymnasium.make("lotpilot/Lot-v0")
+    np.testing.assert_allclose(env.action_space.low, [4.3, -6.0], atol=1e-6)
+    np.testing.assert_allclose(env.action_space.high, [16.3, 6.0], atol=1e-6)
+    steering = gymnasium.make("lotpilot/Lot-v0", action="steering")
+    np.testing.assert_allclose(steering.action_space.high, [np.radians(35.5), 2.2], atol=1e-6)
+
+
+def test_a_seed_names_the_episode_and_the_command_line_knows_it():
+    env = gymnasium.make("lotpilot/Lot-v0", lots=["lot-a", "lot-b"])
+    first, info = env.reset(seed=5)
+    assert {name: info[name] for name in ("lot", "direction", "trial", "seed")} == {
+        "lot": "lot-a",
+        "direction": "forward",
+        "trial": 0,
+        "seed": 5,
+    }
+    _, info = env.reset()
+    assert (info["lot"], info["direction"], info["episode_number"]) == ("lot-a", "reverse", 1)
+    _, info = env.reset(options={"episode": 11})
+    assert (info["lot"], info["direction"], info["trial"]) == ("lot-b", "reverse", 2)
+    again, _ = env.reset(seed=5)
+    np.testing.assert_array_equal(first, again)
+
+
+def test_what_is_observed_stays_what_it_was():
+    env = gymnasium.make("lotpilot/Lot-v0", **SHORT)
+    first, _ = env.reset(seed=1)
+    kept = first.copy()
+    for _ in range(20):
+        env.step(STRAIGHT)
+    np.testing.assert_array_equal(first, kept)
+
+
+def test_the_view_is_what_the_grid_is_made_of():
+    env = gymnasium.make("lotpilot/Lot-v0", lots=["lot-b"], noise="clean", view=True, state=True)
+    observed, _ = env.reset(seed=1)
+    for _ in range(5):
+        pooled = observed["view"].reshape(25, 8, 25, 8).max(axis=(1, 3))
+        np.testing.assert_array_equal(pooled, observed["grid"])
+        observed, *_ = env.step(STRAIGHT)
+    assert observed["state"][0] > 0
+
+
+def test_an_episode_ends_where_the_settings_say():
+    env = gymnasium.make("lotpilot/Lot-v0", **SHORT)
+    env.reset(seed=1)
+    ends = [env.step(STRAIGHT)[2:4] for _ in range(40)]
+    assert ends[-1] == (False, True) and set(ends[:-1]) == {(False, False)}, "40 ticks of 50 ms"
+    with pytest.raises(lotpilot.EpisodeEnded):
+        env.step(STRAIGHT)
+    first = gymnasium.make("lotpilot/Lot-v0", lots=["lot-b"], overrides=["episode.metrics.events_max=1"])
+    first.reset(seed=1)
+    while True:
+        *_, terminated, truncated, info = first.step(STRAIGHT)
+        if terminated or truncated:
+            break
+    assert terminated and info["near_collisions"] == 1 and info["event"] == 1
+
+
+def test_pictures_show_the_lot_and_the_grid():
+    env = gymnasium.make("lotpilot/Lot-v0", **SHORT, render_mode="rgb_array")
+    env.reset(seed=1)
+    before = env.render()
+    for _ in range(30):
+        env.step(STRAIGHT)
+    after = env.render()
+    assert before.shape == after.shape == (500, 1000, 3) and before.dtype == np.uint8
+    assert (before != after).mean() > 0.01
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_many_environments_drive_as_each_alone(threads):
+    """Vector environments, whatever the threads, have the observations and rewards of single ones."""
+    count = 5
+    envs = gymnasium.make_vec(
+        "lotpilot/Lot-v0", count, vectorization_mode="vector_entry_point", **SHORT, state=True, threads=threads
+    )
+    singles = [gymnasium.make("lotpilot/Lot-v0", **SHORT, state=True) for _ in range(count)]
+    observed, _ = envs.reset(seed=3)
+    for index, single in enumerate(singles):
+        single.reset(seed=3, options={"episode": index})
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        actions = np.stack([rng.uniform(5, 9, count), rng.uniform(-2, 2, count)], axis=1)
+        observed, rewards, terminated, truncated, infos = envs.step(actions)
+        for index, single in enumerate(singles):
+            alone, reward, *ended, info = single.step(actions[index])
+            np.testing.assert_array_equal(observed["grid"][index], alone["grid"])
+            np.testing.assert_array_equal(observed["state"][index], alone["state"])
+            assert rewards[index] == reward and [terminated[index], truncated[index]] == ended
+            assert infos["safe_ratio"][index] == info["safe_ratio"]
+    assert truncated.all()
+
+
+def test_the_next_episode_begins_when_the_mode_says():
+    def driven(mode, steps=90):
+        envs = LotVectorEnv(2, autoreset_mode=mode, **SHORT)
+        assert envs.metadata["autoreset_mode"] == mode
+        envs.reset(seed=1)
+        return [envs.step(np.tile(STRAIGHT, (2, 1))) for _ in range(steps)]
+
+    later = driven(AutoresetMode.NEXT_STEP)
+    assert [index for index, step in enumerate(later) if step[3].any()] == [39, 80]
+    assert later[39][4]["episode_number"].tolist() == [0, 1] and later[40][4]["episode_number"].tolist() == [2, 3]
+    assert later[40][1].tolist() == [0.0, 0.0] and not later[40][3].any()
+    at_once = driven(AutoresetMode.SAME_STEP)
+    assert [index for index, step in enumerate(at_once) if step[3].any()] == [39, 79]
+    infos = at_once[39][4]
+    assert infos["episode_number"].tolist() == [2, 3] and infos["final_info"]["episode_number"].tolist() == [0, 1]
+    np.testing.assert_array_equal(infos["final_obs"][0], later[39][0][0])
+    np.testing.assert_array_equal(at_once[39][0], later[40][0])
+    with pytest.raises(lotpilot.EpisodeEnded):
+        driven(AutoresetMode.DISABLED)
+    envs = LotVectorEnv(2, autoreset_mode="Disabled", **SHORT)
+    envs.reset(seed=1)
+    envs.step(np.tile(STRAIGHT, (2, 1)))
+    _, infos = envs.reset(options={"reset_mask": np.array([False, True])})
+    assert infos["episode_number"].tolist() == [0, 3] and infos["time_s"].tolist() == [pytest.approx(0.05), 0.0]
+
+
+def test_the_expert_labels_what_anyone_drives():
+    envs = LotVectorEnv(3, lots=["lot-b", "lot-c"], normalise=True)
+    envs.reset(seed=1)
+    labels = envs.expert_actions()
+    assert labels.shape == (3, 2) and (np.abs(labels) <= 1.5).all()
+    assert (envs.route_points(6.0)[:, 0] > 4).all()
+
+
+def test_stable_baselines_finds_nothing_wrong():
+    pytest.importorskip("stable_baselines3")
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.env_checker import check_env as check
+    from stable_baselines3.common.vec_env import VecMonitor
+
+    from lotpilot.sb3 import LotVecEnv
+
+    check(gymnasium.make("lotpilot/Lot-v0", **SHORT, normalise=True), skip_render_check=True)
+    envs = LotVecEnv(4, **SHORT)
+    envs.seed(2)
+    envs.reset()
+    assert envs.env_method("expert_action", indices=[1])[0].shape == (2,)
+    ended = []
+    for _ in range(45):
+        _, _, dones, infos = envs.step(np.zeros((4, 2)))
+        ended += [info for info, done in zip(infos, dones, strict=True) if done]
+    assert len(ended) == 4
+    assert all(info["TimeLimit.truncated"] and info["terminal_observation"].shape == (25, 25) for info in ended)
+    PPO("MlpPolicy", VecMonitor(envs), n_steps=64, batch_size=64, n_epochs=1).learn(256)

@@ -1,0 +1,300 @@
+"""The same episodes as on the command line, and what happens to bad input."""
+
+import multiprocessing
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomllib
+
+import lotpilot
+from lotpilot import _native
+from lotpilot.core import Core, EnvOptions, settings_from
+
+ROOT = Path(__file__).resolve().parents[2]
+SHORT = ("episode.metrics.timeout_s=4.0",)
+
+
+def digest_in_rust(driver, lot, direction="forward", noise="paper", seed=1, trial=0, overrides=()):
+    where = settings_from(None, None, overrides)
+    return _native.drive_digest(driver, [lot], direction, noise, where, seed, trial)
+
+
+@pytest.mark.parametrize(
+    ("lot", "direction", "noise", "seed", "trial"),
+    [
+        ("lot-b", "forward", "paper", 1, 0),
+        ("lot-a", "reverse", "hard", 7, 3),
+        ("test-hard-7", "forward", "clean", 1, 1),
+    ],
+)
+def test_the_expert_driven_from_python_is_the_same_bytes_as_in_rust(lot, direction, noise, seed, trial):
+    overrides = ("episode.metrics.timeout_s=15.0",)
+    place = {"direction": direction, "noise": noise, "seed": seed, "trial": trial}
+    episode = lotpilot.Episode(lot, overrides=overrides, **place)
+    while not episode.is_over:
+        episode.step(episode.expert_action())
+    assert episode.digest() == digest_in_rust("expert", lot, overrides=overrides, **place)
+    assert episode.report()["metrics"]["ticks"] == 300
+
+
+def test_an_episode_steered_otherwise_has_another_digest():
+    episode = lotpilot.Episode("lot-b", overrides=SHORT)
+    while not episode.is_over:
+        episode.step([8.0, 0.0])
+    assert episode.digest() != digest_in_rust("expert", "lot-b", overrides=SHORT)
+
+
+def test_a_function_in_python_has_the_runs_of_the_same_driver_in_rust():
+    """A car that always heads straight on, as a function and as steps of episodes: the same metrics, run by run."""
+    asked = []
+
+    def straight(grids):
+        asked.append(len(grids))
+        return np.tile(np.array([8.0, 0.0]), (len(grids), 1))
+
+    where = {"noise": "paper", "overrides": SHORT}
+    tables = lotpilot.evaluate({"straight": straight, "scripted": "expert"}, ["lot-b", "lot-c"], trials=2, **where)
+    runs = tables.runs
+    assert runs["driver"].count("straight") == runs["driver"].count("scripted") == 8
+    assert max(asked) == 8, "all cars in one call"
+    for index in [0, 5]:
+        place = {"direction": runs["direction"][index], "trial": runs["trial"][index]}
+        episode = lotpilot.Episode(runs["lot"][index], **place, **where)
+        while not episode.is_over:
+            episode.step([8.0, 0.0])
+        metrics = episode.report()["metrics"]
+        assert metrics == {name: runs[name][index] for name in metrics}
+    assert tables.summary["driver"][0] == "straight"
+    assert runs["replay"][0].startswith("python:straight@")
+
+
+def test_a_driver_that_remembers_is_told_which_car_it_drives():
+    class Remembers:
+        def __init__(self):
+            self.cars, self.resets = set(), 0
+
+        def drive(self, grids, cars, was_reset):
+            self.cars.update(cars.tolist())
+            self.resets += int(was_reset.sum())
+            return np.full((len(grids), 2), [8.0, 0.0])
+
+    driver = Remembers()
+    lotpilot.evaluate({"remembers": driver}, "lot-b", trials=1, overrides=SHORT)
+    assert driver.cars == {0, 1} and driver.resets >= 2
+
+
+def test_an_evaluation_leaves_the_files_of_the_command_line(tmp_path):
+    folder = tmp_path / "straight"
+    tables = lotpilot.evaluate("expert", "lot-b", trials=1, directions="forward", overrides=SHORT, out=folder)
+    assert {"manifest.toml", "settings.toml", "runs.jsonl", "summary.json", "sha256sums"} <= {
+        path.name for path in folder.iterdir()
+    }
+    assert tables.runs["reference_m"][0] == pytest.approx(139, abs=1)
+    with pytest.raises(ValueError, match="straight"):
+        lotpilot.evaluate("expert", "lot-b", overrides=SHORT, out=folder)
+
+
+def test_the_expert_asked_twice_in_a_tick_answers_once():
+    once, twice = (lotpilot.Episode("lot-b", overrides=SHORT) for _ in range(2))
+    while not once.is_over:
+        once.step(once.expert_action())
+        assert np.array_equal(twice.expert_action(), twice.expert_action())
+        twice.step(twice.expert_action())
+    assert once.digest() == twice.digest()
+    assert np.isnan(once.expert_action()).all()
+
+
+def test_steering_as_the_controller_does_drives_the_same_way():
+    points, commands = (lotpilot.Episode("lot-b", action=kind, overrides=SHORT) for kind in ("look_ahead", "steering"))
+    while not points.is_over:
+        points.step(points.expert_action())
+        commands.step(commands.expert_action())
+    ours, theirs = points.table(), commands.table()
+    for column in ("x_m", "y_m", "heading_rad", "speed_mps", "progress_m"):
+        np.testing.assert_array_equal(ours[column], theirs[column])
+
+
+def test_environments_that_share_a_seed_never_drive_a_trial_twice():
+    core = Core(4, EnvOptions(lots=["lot-a", "test:2"], overrides=("episode.metrics.timeout_s=0.1",)), "same_step")
+    driven = set()
+    core.reset()
+    for _ in range(6):
+        driven.update(core.cars.places())
+        for _ in range(2):
+            core.step(np.full((4, 2), [8.0, 0.0]))
+    assert len(driven) == 24
+    assert {place[0] for place in driven} == {"lot-a", "test-medium-0", "test-medium-1"}
+    assert {place[2] for place in driven} == {0, 1, 2, 3}
+
+
+def test_the_reward_is_the_sum_of_its_terms():
+    def total(**weights):
+        zero = dict.fromkeys(("progress", "near_collision", "stuck", "contact", "clearance", "smoothness"), 0.0)
+        core = Core(1, EnvOptions(lots=["lot-b"], directions="forward", reward={**zero, **weights}), "disabled")
+        core.reset()
+        rewards, infos = 0.0, []
+        for tick in range(300):
+            seen, reward, *_ = core.step([[8.0, 1.0 + tick % 2]])
+            rewards += reward[0]
+            infos.append(core.info(seen, 0))
+        return rewards, infos
+
+    rewards, infos = total(near_collision=1.0)
+    assert rewards == -infos[-1]["near_collisions"] < 0
+    rewards, infos = total(progress=1.0)
+    jumps = [b["progress_m"] - a["progress_m"] for a, b in pairwise(infos) if b["event"] in (1, 2)]
+    assert rewards == pytest.approx(infos[-1]["progress_m"] - sum(jumps), abs=1e-4)
+    steered, _ = total(smoothness=1.0)
+    near, infos = total(clearance=1.0)
+    assert steered < 0
+    assert near == pytest.approx(-sum(max(0.0, 0.5 - info["clearance_m"]) for info in infos), rel=1e-5)
+
+
+def test_lots_are_drawn_as_on_the_command_line(tmp_path):
+    assert lotpilot.lots(["lot-b", "test:2:aisles"]) == ["lot-b", "test-aisles-0", "test-aisles-1"]
+    drawn = lotpilot.generate("lot-b", seed=3, out=tmp_path)
+    assert Path(drawn["path"][0]).read_text() == drawn["toml"][0]
+    lot = lotpilot.Lot(drawn["path"][0])
+    assert lot.length_m == drawn["route_m"][0] and len(lot.obstacles) == drawn["obstacles"][0]
+    assert lot.route.shape[1] == 3 and lot.boundary.shape[1] == 2
+    assert (lot.distances_m(lot.route[:, :2].copy()) > 0).all(), "the route is free"
+    assert lot.picture(4.0).shape[2] == 3
+    with pytest.raises(ValueError, match="exists already"):
+        lotpilot.generate("lot-b", seed=3, out=tmp_path)
+
+
+def test_settings_are_those_of_the_command_line():
+    text = lotpilot.settings("smoke", overrides=["dagger.eta=0.8"])
+    assert tomllib.loads(text)["dagger"]["eta"] == 0.8
+    with pytest.raises(ValueError, match="did you mean"):
+        lotpilot.settings(overrides=["dagger.etta=0.8"])
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "part"),
+    [
+        (lambda: lotpilot.Episode("lot-d"), ValueError, "there are lot-a, lot-b"),
+        (lambda: lotpilot.Episode("test:3"), ValueError, "several lots"),
+        (lambda: lotpilot.Episode(direction="sideways"), ValueError, "forward and reverse"),
+        (lambda: lotpilot.Episode(noise="papr"), ValueError, "clean, paper, hard"),
+        (lambda: lotpilot.Episode(action="gas"), ValueError, "look_ahead and steering"),
+        (lambda: lotpilot.Episode(overrides=["episode.nothing=1"]), ValueError, "no key"),
+        (lambda: lotpilot.Lot("no/such.toml"), ValueError, "no/such.toml"),
+        (lambda: lotpilot.evaluate("exprt", "lot-b"), ValueError, "there are expert"),
+        (lambda: lotpilot.evaluate(["expert", "expert"], "lot-b"), ValueError, "named twice"),
+        (lambda: lotpilot.evaluate({"odd": 3}, "lot-b"), TypeError, "neither a name nor a function"),
+        (lambda: lotpilot.load_round("no/such/run"), ValueError, "no such run"),
+        (lambda: lotpilot.Dataset("no/such/run"), ValueError, "no round"),
+        (lambda: EnvOptions(reward={"speed": 1.0}).weights(), ValueError, "there are progress"),
+        (lambda: EnvOptions.of({"lot": "lot-a"}), TypeError, "there are lots"),
+        (lambda: Core(0, EnvOptions(), "disabled"), ValueError, "0 environments"),
+        (lambda: Core(1, EnvOptions(trials=0), "disabled"), ValueError, "trials"),
+        (lambda: Core(1, EnvOptions(lots=[]), "disabled"), ValueError, "no lots"),
+        (lambda: Core(1, EnvOptions(threads=0), "disabled"), ValueError, "threads"),
+    ],
+)
+def test_bad_input_is_one_clear_exception(make, error, part):
+    with pytest.raises(error, match=part):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("actions", "part"),
+    [
+        ([[8.0, 0.0]], r"\(1, 2\), \(2, 2\) is needed"),
+        ([8.0, 0.0], r"\(2,\), \(2, 2\) is needed"),
+        ([[8.0, 0.0], [np.nan, 0.0]], "row 1 is .* not finite"),
+        ([[np.inf, 0.0], [8.0, 0.0]], "row 0 is .* not finite"),
+    ],
+)
+def test_wrong_actions_move_no_car(actions, part):
+    core = Core(2, EnvOptions(lots=["lot-b"]), "next_step")
+    before = core.reset().info.copy()
+    with pytest.raises(ValueError, match=part):
+        core.step(actions)
+    after = core.reset(np.zeros(2, bool)).info
+    np.testing.assert_array_equal(before, after)
+
+
+def test_wrong_answers_of_a_function_are_raised_and_so_is_what_it_raises():
+    def broken(grids):
+        raise KeyError("weights")
+
+    for driver, error, part in [
+        (broken, KeyError, "weights"),
+        (lambda grids: np.zeros((1, 3)), ValueError, "shape"),
+        (lambda grids: np.full((len(grids), 2), np.nan), ValueError, "no finite point"),
+    ]:
+        with pytest.raises(error, match=part):
+            lotpilot.evaluate({"driver": driver}, "lot-b", trials=1)
+
+
+def test_an_episode_is_neither_stepped_before_its_start_nor_after_its_end():
+    episode = lotpilot.Episode("lot-b", overrides=SHORT)
+    while not episode.is_over:
+        episode.step([8.0, 0.0])
+    with pytest.raises(lotpilot.EpisodeEnded, match="has ended"):
+        episode.step([8.0, 0.0])
+    core = Core(1, EnvOptions(), "next_step")
+    with pytest.raises(lotpilot.EpisodeEnded, match="never reset"):
+        core.step([[8.0, 0.0]])
+
+
+def test_arrays_of_another_shape_or_type_are_refused():
+    core = Core(2, EnvOptions(lots=["lot-b"]), "next_step")
+    seen = core.reset()
+    flags = np.zeros(2, bool)
+    for broken, part in [
+        ({"grids": np.zeros((2, 25, 24), np.uint8)}, "grids: the shape"),
+        ({"grids": np.zeros((2, 25, 25), np.int64)}, "grids: not a numpy array of dtype uint8"),
+        ({"info": seen.info[:, ::-1]}, "info: the array is not C-contiguous"),
+    ]:
+        wrong = type("Wrong", (), {**vars(seen), **broken})()
+        with pytest.raises(ValueError, match=part):
+            core.cars.step(np.zeros((2, 2), np.float32), wrong, np.zeros(2), flags, flags.copy(), None)
+
+
+def _in_child(queue):
+    try:
+        Core(4, EnvOptions(lots=["lot-b"]), "next_step").reset()
+        queue.put("drove")
+    except RuntimeError as error:
+        queue.put(str(error))
+
+
+def test_a_forked_process_is_told_so_instead_of_waiting_forever():
+    Core(4, EnvOptions(lots=["lot-b"]), "next_step").reset()
+    for method, part in [("fork", "was forked"), ("spawn", "drove")]:
+        context = multiprocessing.get_context(method)
+        queue = context.Queue()
+        child = context.Process(target=_in_child, args=(queue,))
+        child.start()
+        assert part in queue.get(timeout=60)
+        child.join()
+
+
+def test_a_round_of_training_data_is_read_as_rust_wrote_it():
+    """The run of a test of the workspace, if one is there; reading is tested in Rust as well."""
+    runs = sorted(ROOT.glob("runs/*/round-00/round.toml"))
+    if not runs:
+        pytest.skip("no run of a training here")
+    data = lotpilot.load_round(runs[0].parents[1])
+    n = len(data["grids"])
+    assert data["grids"].shape == (n, 25, 25) and data["points"].shape == (n, 2) and data["tick"].shape == (n,)
+    assert len(lotpilot.Dataset(runs[0].parents[1]).columns()["tick"]) >= n
+
+
+def test_both_workspaces_have_the_same_profile_and_lints():
+    own, root = (tomllib.loads((ROOT / path).read_text()) for path in ("python/Cargo.toml", "Cargo.toml"))
+    assert own["lints"] == root["workspace"]["lints"]
+    ours, theirs = own["profile"]["dev"], root["profile"]["dev"]
+    packages, all_packages = ours.pop("package"), theirs.pop("package")
+    assert ours == theirs
+    members = [path.split("/")[-1] for path in root["workspace"]["members"]]
+    for name, profile in packages.items():
+        expected = all_packages.get(name, {})
+        if name in members:
+            expected = {"opt-level": theirs["opt-level"], "debug": theirs["debug"], **expected}
+        assert profile == expected, name
