@@ -10,7 +10,7 @@ use sim::scenario::Direction;
 use sim::seed::RootSeed;
 
 fn driver(name: &str) -> NamedDriver {
-    NamedDriver::expert(&expert::ExpertSettings::paper()).renamed(name)
+    NamedDriver::expert(&expert::ExpertSettings::half_points()).renamed(name)
 }
 
 /// What a driver did in a run.
