@@ -18,6 +18,7 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         "train-dagger",
         "evaluate",
         "reproduce",
+        "rules",
         "scaling",
         "guard",
         "generate",

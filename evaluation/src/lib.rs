@@ -28,6 +28,7 @@ pub mod plan;
 pub mod read;
 pub mod records;
 pub mod results;
+pub mod rules;
 pub mod scaling;
 pub mod slices;
 pub mod stages;

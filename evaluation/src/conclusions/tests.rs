@@ -147,6 +147,9 @@ fn shares_and_effects() {
             eta_hat: Some(*share),
             tau_hat_per_s: None,
             near_collisions: 0,
+            effort: None,
+            agreement: None,
+            mean_weight: None,
             validation_nll: None,
             validation_rmse_m: None,
         };

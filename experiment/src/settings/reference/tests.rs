@@ -34,6 +34,12 @@ fn every_setting_is_described_and_every_description_has_a_setting() {
         "dagger.rule=any_below_literal",
         "dagger.rule=tau_only",
         "dagger.rule=expert_only",
+        "dagger.rule=vanilla",
+        "dagger.rule=safe_dagger",
+        "dagger.rule=ensemble_dagger",
+        "dagger.rule=hg_dagger",
+        "dagger.rule=lazy_dagger",
+        "dagger.rule=thrifty_dagger",
         "dagger.fit.loss.weight=linear",
         "dagger.fit.budget.epochs=1",
         "dagger.cloning_budget.epochs=1",
@@ -157,7 +163,7 @@ fn every_old_key_leads_to_a_new_one() {
 
 /// Key, value in preset `paper`, where it is from. "Silent": the paper does not mention such a thing, so it is off.
 #[rustfmt::skip]
-const OF_THE_PAPER: [(&str, &str, &str); 46] = [
+const OF_THE_PAPER: [(&str, &str, &str); 47] = [
     ("training.lots", "[\"lot-a\"]", "Driving Policy Network Training: one parking lot"),
     ("training.directions", "[\"forward\", \"reverse\"]", "… there and back, 460 m"),
     ("training.trials", "1", "… once"),
@@ -171,6 +177,7 @@ const OF_THE_PAPER: [(&str, &str, &str); 46] = [
     ("dagger.iterations_min", "1", "Algorithm 1: while η̂ ≤ η"),
     ("dagger.keep", "\"expert_ticks\"", "Algorithm 2, line 15"),
     ("dagger.noise_augmentations", "0", "silent"),
+    ("dagger.samples_per_round", "0", "silent: all"),
     ("dagger.start", "\"scratch\"", "authors' code"),
     ("dagger.rule.all_below.tau", "0.07", "Driving Policy Network Training"),
     ("dagger.rule.all_below.chi", "0.1", "Driving Policy Network Training"),
