@@ -19,6 +19,7 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         "evaluate",
         "merge",
         "reproduce",
+        "rules",
         "scaling",
         "guard",
         "generate",

@@ -29,6 +29,7 @@ pub mod plan;
 pub mod read;
 pub mod records;
 pub mod results;
+pub mod rules;
 pub mod scaling;
 pub mod shards;
 pub mod slices;

@@ -1,7 +1,7 @@
 //! The command line: which commands there are.
 
 use crate::commands::{
-    bench, completions, drivers, evaluate, generate, guard, lots, merge, pixel_accuracy, render, reproduce,
+    bench, completions, drivers, evaluate, generate, guard, lots, merge, pixel_accuracy, render, reproduce, rules,
     sample_size, scaling, settings, train, tune, verify, visualise,
 };
 use crate::output::{Color, Output};
@@ -66,6 +66,9 @@ enum Command {
     /// The paper in a box: trains, drives and writes one report with the paper's tables beside ours.
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(reproduce::ReproduceArgs),
+    /// Trains under every decision rule of the DAgger family at equal samples, and compares effort and safety.
+    #[command(after_help = rules::EXAMPLES)]
+    Rules(rules::RulesArgs),
     /// Trains on few and on many different lots, and shows how near-collisions fall.
     #[command(after_help = scaling::EXAMPLES)]
     Scaling(scaling::ScalingArgs),
@@ -131,6 +134,7 @@ impl Cli {
             Command::Evaluate(args) => evaluate::run(args, output),
             Command::Merge(args) => merge::run(args, output),
             Command::Reproduce(args) => reproduce::run(args, output),
+            Command::Rules(args) => rules::run(args, output),
             Command::Scaling(args) => scaling::run(args, output),
             Command::Guard(args) => guard::run(args, output),
             Command::Generate(args) => generate::run(args, output),
@@ -165,6 +169,7 @@ impl Command {
             | Self::Drivers(drivers::DriversArgs { json, .. })
             | Self::Verify(verify::VerifyArgs { json, .. }) => json.json,
             Self::Reproduce(_)
+            | Self::Rules(_)
             | Self::Scaling(_)
             | Self::Guard(_)
             | Self::Generate(_)

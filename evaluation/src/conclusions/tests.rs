@@ -10,7 +10,7 @@ use sim::scenario::Direction;
 use sim::seed::RootSeed;
 
 fn driver(name: &str) -> NamedDriver {
-    NamedDriver::expert(&expert::ExpertSettings::paper()).renamed(name)
+    NamedDriver::expert(&expert::ExpertSettings::half_points()).renamed(name)
 }
 
 /// What a driver did in a run.
@@ -147,6 +147,9 @@ fn shares_and_effects() {
             eta_hat: Some(*share),
             tau_hat_per_s: None,
             near_collisions: 0,
+            effort: None,
+            agreement: None,
+            mean_weight: None,
             validation_nll: None,
             validation_rmse_m: None,
         };

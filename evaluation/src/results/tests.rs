@@ -13,7 +13,7 @@ fn report(near_collisions: u32, reference_m: f32, safe_ratio: f32) -> EpisodeRep
 }
 
 fn drivers_named(n: usize) -> Vec<NamedDriver> {
-    let expert = expert::ExpertSettings::paper();
+    let expert = expert::ExpertSettings::half_points();
     (0..n).map(|i| NamedDriver::expert(&expert).renamed(&format!("driver {i}"))).collect()
 }
 
