@@ -15,8 +15,11 @@ pub fn write(table1: &Table1, run: &RunDir) -> anyhow::Result<String> {
     Ok(text)
 }
 
-/// What η̂ is to be read with, per round: name of the row, value.
-pub(crate) const AGREEMENT: [(&str, fn(&IterationRow) -> Option<String>); 5] = [
+/// A cell of a column.
+type Cell = fn(&IterationRow) -> Option<String>;
+
+/// What η̂ is to be read with, per round: name of the row, its cells.
+pub(crate) const AGREEMENT: [(&str, Cell); 5] = [
     ("τ̂ < τ, whoever drove", |row| row.agreement.map(|found| format!("{:.3}", found.within_tau))),
     ("  best constant answer", |row| row.agreement.map(|found| format!("{:.3}", found.constant_within_tau))),
     ("τ̂ < τ scaled as the labels", |row| {
