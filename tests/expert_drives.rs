@@ -17,7 +17,7 @@ fn the_expert_drives_every_reference_lot_both_ways_without_a_near_collision() {
         for direction in Direction::BOTH {
             let seed = RootSeed(4);
             let map = Arc::new(Map::build(direction.of(lot(which, seed)), &settings.vehicle).unwrap());
-            let mut expert = ScriptedExpert::new(ExpertSettings::paper(), &settings);
+            let mut expert = ScriptedExpert::new(ExpertSettings::half_points(), &settings);
             let report = episode::run(Episode::new(Arc::clone(&settings), map, seed), &mut expert, &mut ());
             let metrics = &report.metrics;
             assert_eq!(report.ending, Ending::ReachedEnd, "{which:?} {direction:?}");
@@ -56,7 +56,7 @@ fn the_expert_drives_the_example_maps_without_a_near_collision() {
             scenarios::load::load(&examples.join(file), &settings.vehicle).unwrap_or_else(|error| panic!("{error}"));
         for &direction in directions {
             let map = Arc::new(Map::build(direction.of(scenario.clone()), &settings.vehicle).unwrap());
-            let mut expert = ScriptedExpert::new(ExpertSettings::paper(), &settings);
+            let mut expert = ScriptedExpert::new(ExpertSettings::half_points(), &settings);
             let report = episode::run(Episode::new(Arc::clone(&settings), map, RootSeed(4)), &mut expert, &mut ());
             assert_eq!(report.ending, Ending::ReachedEnd, "{file} {direction:?}");
             let metrics = &report.metrics;

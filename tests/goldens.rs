@@ -175,7 +175,7 @@ fn drivers(settings: &EpisodeSettings) -> Vec<(&'static str, Box<dyn Driver>)> {
     let untrained = Untrained(Predictor::new(&weights, InferenceSettings::plain(), DeviceChoice::Cpu), geometry);
     vec![
         ("middle of the row", Box::new(SensorsOnly(MiddleOfTheRow(geometry)))),
-        ("expert", Box::new(ScriptedExpert::new(ExpertSettings::paper(), settings))),
+        ("expert", Box::new(ScriptedExpert::new(ExpertSettings::half_points(), settings))),
         ("tentacle", Box::new(SensorsOnly(tentacle.planner(&PlannerContext::of(settings))))),
         ("network", Box::new(SensorsOnly(untrained))),
     ]

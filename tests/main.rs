@@ -16,6 +16,7 @@
 //! | [`reliability`] | one owner per run, nothing lost to kills and signals, every damage noticed |
 //! | [`printed`] | every `--help` and every printed table, as people read them |
 //! | [`python`] | the Python of docs/formats.md answers as Rust does |
+//! | [`shards`] | an evaluation in parts, on several machines, is the same as on one |
 //! | [`words`] | words that were replaced do not come back |
 //! | [`reproduce`] | the paper in a box: its report, resumed to the same bytes |
 #![allow(clippy::unwrap_used, reason = "tests")]
@@ -36,5 +37,6 @@ mod python;
 mod regressions;
 mod reliability;
 mod reproduce;
+mod shards;
 mod tidy;
 mod words;

@@ -87,7 +87,7 @@ fn errors_show_no_rounding_noise() {
 /// The expert took every tick for 50 ms.
 #[test]
 fn the_reaction_delay_is_the_same_time_at_any_control_period() {
-    let settings = ExpertSettings { reaction_delay_s: 0.2, ..ExpertSettings::paper() };
+    let settings = ExpertSettings { reaction_delay_s: 0.2, ..ExpertSettings::half_points() };
     let poses: Vec<Pose> = (0..8).map(|i| Pose::new(Vec2::new(0.0, 0.08 * i as f32), 0.0)).collect();
     for (control_period_ms, delay_ticks) in [(50, 4), (100, 2), (200, 1)] {
         let episode = EpisodeSettings { control_period_ms, ..EpisodeSettings::paper() };
@@ -105,6 +105,6 @@ fn the_expert_knows_the_slowest_speed() {
     fast.controller.speed_min_mps = 2.0;
     let car_ahead = Obstacle::new(ObstacleClass::Sedan, Pose::new(Vec2::new(9.0, 0.4), 0.0));
     let lane = Scenario::lane(-20.0..=80.0, 7.0, 0.0..=5.0).with_obstacles([car_ahead]);
-    let answer = |episode| answers(&ExpertSettings::paper(), episode, lane.clone(), &[Pose::default()])[0];
+    let answer = |episode| answers(&ExpertSettings::half_points(), episode, lane.clone(), &[Pose::default()])[0];
     assert_ne!(answer(&slow), answer(&fast), "wheels that turn at 2 m/s bend the way less");
 }

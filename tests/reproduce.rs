@@ -141,3 +141,44 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
         assert!(text(&refused).1.contains(part), "{arguments:?}: {}", text(&refused).1);
     }
 }
+
+#[test]
+fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
+    let folder = scratch("rules");
+    let out = folder.join("out");
+    let run = |arguments: &[&str]| {
+        xtask()
+            .args(["rules", "--preset", "smoke", "--set", "dagger.cloning_budget.steps=20"])
+            .args(["--set", "training.lots=[\"train:1:lane\"]", "--set", "dagger.fit.budget.steps=20"])
+            .args(arguments)
+            .output()
+            .unwrap()
+    };
+    let out_name = out.to_string_lossy().into_owned();
+    let first = run(&[
+        "--rule",
+        "expert_only,ensemble_dagger,lazy_dagger",
+        "--iterations=1",
+        "--samples=200",
+        "--unseen=validation:1:lane",
+        "--out",
+        &out_name,
+    ]);
+    assert!(first.status.success(), "{}", text(&first).1);
+    let table = std::fs::read_to_string(out.join("rules.md")).unwrap();
+    let rows: Vec<&str> = table.lines().skip(2).collect();
+    assert_eq!(rows.len(), 4, "behaviour cloning and three rules:\n{table}");
+    assert!(rows[1].starts_with("| expert only") && rows[1].contains("100.0 %"), "{table}");
+    assert!(rows[2].starts_with("| EnsembleDAgger") && rows[2].contains("| 400 "), "{table}");
+    assert!(std::fs::read_to_string(out.join("rules.csv")).unwrap().contains("LazyDAgger"));
+    assert!(std::fs::read_to_string(out.join("rules.svg")).unwrap().contains("expert is asked"));
+    for (arguments, part) in [
+        (["--rule", "anybody"], "there are expert_only"),
+        (["--rule", "vanilla,vanilla"], "named twice"),
+        (["--unseen", "train:2"], "trained on it"),
+    ] {
+        let refused = run(&arguments);
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(text(&refused).1.contains(part), "{}", text(&refused).1);
+    }
+}

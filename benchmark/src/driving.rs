@@ -121,7 +121,7 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
         course.lock_step(network.cars_per_fleet(FLEET), |cars| network.fleet(&settings.episode, cars))
     }));
     report(steps("one car with the expert", 1, None, &mut || {
-        let expert = || ScriptedExpert::new(ExpertSettings::paper(), &settings.episode);
+        let expert = || ScriptedExpert::new(ExpertSettings::half_points(), &settings.episode);
         let mut steps = 0_u64;
         let episode = course.episodes().swap_remove(0);
         episode::run(episode, &mut expert(), &mut |_: &sim::frame::Frame| steps += 1);

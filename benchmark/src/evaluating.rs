@@ -33,7 +33,7 @@ fn measure(effort: Effort, report: Report<'_>, folder: &Path) -> anyhow::Result<
     let network =
         NamedDriver::network("network", spec, trained(&settings, &folder.join("trained"))?, settings.dagger.device);
     let lots = Lot::parse_all(&["lot-a", "lot-b", "lot-c"], &settings.episode.vehicle)?;
-    let plan = Plan { settings: &settings, drivers: &[network], lots: &lots, compare_with: 0 };
+    let plan = Plan { settings: &settings, drivers: &[network], lots: &lots, compare_with: 0, shard: None };
     let once = || {
         let run = create(&folder.join("evaluated"), &settings)?;
         let results = evaluate(&plan, &run, &Silent)?.context("nothing cancels it")?;

@@ -25,10 +25,10 @@ use storage::growing::Growing;
 use storage::sums;
 
 /// Trials driven at a time. A constant: neither memory nor results depend on how many runs or threads there are.
-const BATCH: usize = 16;
+pub(crate) const BATCH: usize = 16;
 
 /// Files that are written line by line.
-const FILES: [&str; 3] = [records::RUNS, records::FAILURES, records::WALL_TIME];
+pub(crate) const FILES: [&str; 3] = [records::RUNS, records::FAILURES, records::WALL_TIME];
 
 /// Drives the plan, and writes one line per run and near-collision as they come. Goes on with what an interrupted
 /// evaluation left in the folder, to the same result; a finished one is read back. `None` if cancelled.

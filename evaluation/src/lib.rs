@@ -3,6 +3,7 @@
 //! | module | what |
 //! |---|---|
 //! | [`plan`], [`mod@evaluate`] | drivers × lots × directions × trials × noise levels, driven and written down |
+//! | [`shards`] | an evaluation driven in parts on several machines, put together again |
 //! | [`records`] | the lines of `runs.jsonl`, `failures.jsonl`, `wall_time.jsonl` |
 //! | [`incidents`] | near-collisions one by one, and why they happened |
 //! | [`totals`], [`slices`], [`results`], [`judge`] | runs added up, pooled and compared |
@@ -28,7 +29,9 @@ pub mod plan;
 pub mod read;
 pub mod records;
 pub mod results;
+pub mod rules;
 pub mod scaling;
+pub mod shards;
 pub mod slices;
 pub mod stages;
 pub mod statistics;

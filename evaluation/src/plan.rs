@@ -3,6 +3,7 @@
 use experiment::drivers::NamedDriver;
 use experiment::lots::Lot;
 use experiment::settings::Settings;
+use experiment::shard::Shard;
 use experiment::trials::{Purpose, Trial};
 
 /// Drivers × lots × directions × trials × noise levels.
@@ -16,13 +17,19 @@ pub struct Plan<'a> {
     pub lots: &'a [Lot],
     /// The driver the others are compared with, an index of `drivers`.
     pub compare_with: usize,
+    /// The share of the trials that is driven; `None`: all.
+    pub shard: Option<Shard>,
 }
 
 impl<'a> Plan<'a> {
-    /// Every trial, in order.
+    /// Every trial that is driven, in order. Both ways of a trial are in the same shard: they share its obstacles.
     pub fn trials(&self) -> impl Iterator<Item = Trial<'a>> + Clone + use<'a> {
-        let evaluation = &self.settings.evaluation;
+        let (evaluation, shard) = (&self.settings.evaluation, self.shard);
+        let ways = evaluation.directions.len();
         Trial::all(evaluation.seed, Purpose::Evaluation, self.lots, evaluation.trials, &evaluation.directions)
+            .enumerate()
+            .filter(move |(index, _)| shard.is_none_or(|shard| shard.takes(index / ways)))
+            .map(|(_, trial)| trial)
     }
 
     /// What can be known to go wrong before the first step.

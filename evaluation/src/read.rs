@@ -2,11 +2,12 @@
 
 use crate::incidents;
 use crate::plan::Plan;
-use crate::records::{self, FailureRecord, RunRecord};
+use crate::records::{self, Driven, FailureRecord, RunRecord};
 use crate::results::EvaluationResults;
 use anyhow::Context as _;
 use experiment::trials::Trial;
 use sim::limits::RUN_TEXT_BYTES_MAX;
+use sim::scenario::Direction;
 use std::collections::BTreeMap;
 use std::path::Path;
 use storage::sums;
@@ -28,29 +29,60 @@ impl EvaluationResults {
     /// If they were not written by this plan.
     pub(crate) fn of_lines(plan: &Plan<'_>, folder: &Path, runs: &str, failures: &str) -> anyhow::Result<Self> {
         let mut results = Self::new(plan);
-        let evaluation = &plan.settings.evaluation;
-        let trials: Vec<Trial<'_>> = plan.trials().collect();
-        let key = |trial: &Trial<'_>| (trial.lot.name().to_owned(), trial.direction, trial.index);
-        let index_of: BTreeMap<_, usize> = trials.iter().map(key).zip(0..).collect();
-        let level_of = |noise| evaluation.noise.iter().position(|&level| level == noise).context("another noise level");
-        let driver_of = |name: &str| {
-            let mut names = plan.drivers.iter().map(|driver| &driver.name);
-            names.position(|known| known == name).with_context(|| format!("another driver, {name:?}"))
-        };
+        let places = Places::new(plan);
         records::each_line_of(&folder.join(records::RUNS), runs, |run: RunRecord| {
-            let driven = run.driven;
-            let index = index_of.get(&(driven.lot, driven.direction, driven.trial)).copied().context("another run")?;
-            results.add(level_of(driven.noise)?, driver_of(&driven.driver)?, index, &trials[index], &run.report);
+            let Place { level, driver, trial } = places.of(&run.driven)?;
+            results.add(level, driver, trial, &places.trials[trial], &run.report);
             Ok(())
         })?;
         records::each_line_of(&folder.join(records::FAILURES), failures, |failure: FailureRecord| {
-            let driven = failure.driven;
-            let lot = plan.lots.iter().find(|lot| lot.name() == driven.lot).context("another lot")?;
-            let (level, driver) = (level_of(driven.noise)?, driver_of(&driven.driver)?);
+            let Place { level, driver, trial } = places.of(&failure.driven)?;
             let is_again = incidents::is_again(failure.findings.since_resume_m);
-            results.add_cause(level, driver, lot, failure.cause, is_again);
+            results.add_cause(level, driver, places.trials[trial].lot, failure.cause, is_again);
             Ok(())
         })?;
         Ok(results)
+    }
+}
+
+/// Where a line belongs: indices of the noise level, the driver and the trial in a plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Place {
+    pub(crate) level: usize,
+    pub(crate) driver: usize,
+    pub(crate) trial: usize,
+}
+
+/// Finds the places of lines in a plan.
+pub(crate) struct Places<'a> {
+    plan: &'a Plan<'a>,
+    /// Of the plan, in order.
+    pub(crate) trials: Vec<Trial<'a>>,
+    index_of: BTreeMap<(String, Direction, u32), usize>,
+}
+
+impl<'a> Places<'a> {
+    pub(crate) fn new(plan: &'a Plan<'a>) -> Self {
+        let trials: Vec<Trial<'a>> = plan.trials().collect();
+        let key = |trial: &Trial<'_>| (trial.lot.name().to_owned(), trial.direction, trial.index);
+        let index_of = trials.iter().map(key).zip(0..).collect();
+        Self { plan, trials, index_of }
+    }
+
+    /// Where a line belongs.
+    ///
+    /// # Errors
+    /// If it is of another plan.
+    pub(crate) fn of(&self, driven: &Driven) -> anyhow::Result<Place> {
+        let key = (driven.lot.clone(), driven.direction, driven.trial);
+        let levels = &self.plan.settings.evaluation.noise;
+        let mut names = self.plan.drivers.iter().map(|driver| &driver.name);
+        Ok(Place {
+            level: levels.iter().position(|&level| level == driven.noise).context("another noise level")?,
+            driver: names
+                .position(|name| *name == driven.driver)
+                .with_context(|| format!("another driver, {:?}", driven.driver))?,
+            trial: self.index_of.get(&key).copied().context("another run")?,
+        })
     }
 }

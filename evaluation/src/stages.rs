@@ -102,13 +102,14 @@ impl Chain {
     fn stage(self, settings: &Settings, extent: &Extent) -> Stage {
         let mut settings = settings.clone();
         let dagger = &mut settings.dagger;
-        let [tau, chi] = thresholds(&dagger.rule);
+        let tau = dagger.rule.tau().unwrap_or(TAU);
+        let (chi, chi_on) = dagger.rule.chi().unwrap_or((CHI, ChiOn::default()));
         match self {
             Self::Weighted => {}
             Self::Unweighted => {
                 dagger.fit.loss.alpha = 0.0;
             }
-            Self::AnyBelow => dagger.rule = DecisionRule::AnyBelowLiteral { tau, chi, chi_on: chi_on(&dagger.rule) },
+            Self::AnyBelow => dagger.rule = DecisionRule::AnyBelowLiteral { tau, chi, chi_on },
             Self::TauOnly => dagger.rule = DecisionRule::TauOnly { tau },
         }
         if matches!(self, Self::AnyBelow | Self::TauOnly) {
@@ -125,21 +126,10 @@ impl Chain {
     }
 }
 
-/// τ and χ of a rule; χ = 0.1 (paper) where it has none.
-fn thresholds(rule: &DecisionRule) -> [f32; 2] {
-    match *rule {
-        DecisionRule::AllBelow { tau, chi, .. } | DecisionRule::AnyBelowLiteral { tau, chi, .. } => [tau, chi],
-        DecisionRule::TauOnly { tau } => [tau, 0.1],
-        DecisionRule::ExpertOnly => [0.07, 0.1],
-    }
-}
-
-fn chi_on(rule: &DecisionRule) -> ChiOn {
-    match *rule {
-        DecisionRule::AllBelow { chi_on, .. } | DecisionRule::AnyBelowLiteral { chi_on, .. } => chi_on,
-        DecisionRule::TauOnly { .. } | DecisionRule::ExpertOnly => ChiOn::default(),
-    }
-}
+/// The paper's τ and χ, for chains whose rule has none.
+const TAU: f32 = 0.07;
+/// See [`TAU`].
+const CHI: f32 = 0.1;
 
 /// Root seeds of the trainings.
 pub fn seeds(settings: &Settings, extent: &Extent) -> Vec<RootSeed> {

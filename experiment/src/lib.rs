@@ -5,6 +5,7 @@
 //! | [`settings`] | preset → file → overrides, into one checked [`settings::Settings`] |
 //! | [`lots`], [`drivers`] | names of lots and drivers, and what they stand for |
 //! | [`trials`] | seeds of trials: their obstacles and their noise |
+//! | [`shard`] | a machine's share of the trials |
 //! | [`drive`] | the one loop: a driver on a batch of trials, with an observer of every frame |
 //! | [`replay_key`] | a short text that identifies one run and a tick in it |
 //! | [`training`] | behaviour cloning and DAgger into a run folder |
@@ -23,6 +24,7 @@ pub mod progress;
 pub mod replay_key;
 pub mod run_dir;
 pub mod settings;
+pub mod shard;
 pub mod training;
 pub mod trials;
 pub mod view_request;

@@ -398,7 +398,9 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
     let (run, is_bc) = run_of(spec)?;
     let names = sums::names(run)?;
     let folders = names.iter().filter_map(|name| name.strip_suffix(&format!("/{}", sums::FILE)));
-    let mut folders: Vec<&str> = folders.filter(|folder| *folder == "final" || folder.starts_with("round-")).collect();
+    // Not `round-01-critic`: what is trained beside the network of a round.
+    let is_round = |folder: &str| folder.strip_prefix("round-").is_some_and(|number| number.parse::<u32>().is_ok());
+    let mut folders: Vec<&str> = folders.filter(|folder| *folder == "final" || is_round(folder)).collect();
     let rounds = folders.iter().filter(|folder| **folder != "final").count();
     if let Some(Finished { outcome: Outcome::Training { rounds: expected, .. }, .. }) = finished(run)? {
         ensure!(
@@ -672,6 +674,7 @@ mod tests {
         for folder in ["round-00", "round-01", "round-10"] {
             save(folder);
         }
+        save("round-10-critic"); // trained beside the network
         fs::create_dir_all(path.join("round-11")).unwrap(); // collected, not trained yet
         assert_eq!(policy_folder(&path).unwrap(), path.join("round-10"));
         assert_eq!(policy_folder(&path.join("bc")).unwrap(), path.join("round-00"));

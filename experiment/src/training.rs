@@ -8,9 +8,9 @@ use crate::run_dir::{self, RunDir};
 use crate::settings::Settings;
 use crate::trials::{self, Purpose, Trial};
 use anyhow::ensure;
-use policy::checkpoint::Checkpoint;
+use policy::agreement::Agreement;
 use policy::conditions::Conditions;
-use policy::dagger::{Hooks, Outcome, Progress as DaggerProgress, Rollouts, RoundEpisode};
+use policy::dagger::{Hooks, Learned, Outcome, Progress as DaggerProgress, Rollouts, RoundEpisode};
 use policy::dataset::store::Store;
 use policy::fit::FitProgress;
 use sim::driver::Source;
@@ -88,8 +88,8 @@ pub fn drive_again(run: &Path, round: u32, drive: u32) -> anyhow::Result<(Arc<Ma
     ensure!(round <= TRIAL_MAX, "round {round}: there are 0 to {TRIAL_MAX}");
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     // First, because it says whether there is such a round.
-    let novice = round.checked_sub(1).map(|before| run.join(format!("round-{before:02}")));
-    let novice = novice.map(|folder| Checkpoint::load(&folder)).transpose()?;
+    let store = Store::open(run)?;
+    let novice = (round > 0).then(|| Learned::of_round(&settings.dagger, &store, round)).transpose()?;
     let mut episodes = episodes_of(&settings, &lots, round)?;
     let count = episodes.len();
     ensure!((drive as usize) < count, "drive {drive} of round {round}: it has {count} drives, counted from 0");
@@ -155,7 +155,16 @@ impl<'a> Monitor<'a> {
                 self.begin(Task::Collecting, &format!("round {round}: collecting"));
             }
             DaggerProgress::Collected { round, collection, dataset } => {
-                let eta = if round > 0 { format!(", η̂ {:.3}", collection.eta_hat()) } else { String::new() };
+                let read_with = collection.agreement.map_or_else(String::new, |found| {
+                    let Agreement { constant_within_tau, tau_scaled, within_tau_scaled, tau_hat_quantiles, .. } = found;
+                    let [_, median, _, most, _] = tau_hat_quantiles;
+                    format!(
+                        " (a constant answer {constant_within_tau:.3}; {within_tau_scaled:.3} at τ {tau_scaled:.3}, scaled \
+                         as the labels; τ̂ {median:.3} in half of the ticks, {most:.3} in 90 %)"
+                    )
+                });
+                let eta =
+                    if round > 0 { format!(", η̂ {:.3}{read_with}", collection.eta_hat()) } else { String::new() };
                 self.end(&format!("{} samples, {dataset} in all{eta}", collection.samples));
             }
             DaggerProgress::Fitting { round, fit } => self.fitting(round, fit),

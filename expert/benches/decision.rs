@@ -39,7 +39,7 @@ struct Drive {
 /// Decides every tick of the drives again, each drive with the memory of an expert that drives it.
 fn bench(bencher: divan::Bencher<'_, '_>, lots: &str, sees: Sees) {
     let settings = Arc::new(EpisodeSettings::paper());
-    let expert = ScriptedExpert::new(ExpertSettings { sees, ..ExpertSettings::paper() }, &settings);
+    let expert = ScriptedExpert::new(ExpertSettings { sees, ..ExpertSettings::half_points() }, &settings);
     let mut drives = Vec::new();
     for lot in scenarios::suite(lots).expect("there are such lots") {
         for direction in Direction::BOTH {

@@ -43,8 +43,10 @@ struct Args {
 
 fn main() {
     let args = Args::parse();
-    let expert =
-        args.overrides.iter().fold(ExpertSettings::paper(), |settings, text| overrides::overridden(&settings, text));
+    let expert = args
+        .overrides
+        .iter()
+        .fold(ExpertSettings::half_points(), |settings, text| overrides::overridden(&settings, text));
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header([
         "lot",

@@ -67,8 +67,10 @@ fn shift(asked: &mut Asked, in_ego: Vec2, turn_rad: f32) {
 
 fn main() {
     let args = Args::parse();
-    let expert =
-        args.overrides.iter().fold(ExpertSettings::paper(), |settings, text| overrides::overridden(&settings, text));
+    let expert = args
+        .overrides
+        .iter()
+        .fold(ExpertSettings::half_points(), |settings, text| overrides::overridden(&settings, text));
     let lots: Vec<_> = ReferenceLot::ALL.into_iter().filter(|lot| args.lots.contains(&lot.name()[4..])).collect();
     let trials: Vec<_> = lots
         .iter()

@@ -189,7 +189,7 @@ mod tests {
         field.carve_disc(Vec2::new(11.0, -1.2), 0.6);
         for (rounds, stiffness_m) in [(0, 0.6), (1, 0.6), (7, 1.2), (60, 0.6), (60, 3.0), (5, 9.0)] {
             let settings =
-                ElasticBandSettings { iterations: rounds, stiffness_m, ..ExpertSettings::paper().elastic_band };
+                ElasticBandSettings { iterations: rounds, stiffness_m, ..ExpertSettings::half_points().elastic_band };
             let way = (0..20).map(|i| Vec2::new(0.6 * i as f32, 0.02 * (i * i % 17) as f32));
             let (mut band, mut expected) = (ElasticBand::along(way.clone(), Vec2::X), ElasticBand::along(way, Vec2::X));
             band.relax(&field, &settings);

@@ -202,7 +202,7 @@ mod tests {
 
     #[test]
     fn labels_move_within_the_limits_of_a_tick() {
-        let settings = ExpertSettings::paper();
+        let settings = ExpertSettings::half_points();
         let last = Label { curvature_per_m: 0.0, arc_length_m: 6.0 };
         let wanted = Label { curvature_per_m: 0.2, arc_length_m: 14.0 };
         let smoothed = wanted.smoothed(last, &settings);
@@ -218,7 +218,7 @@ mod tests {
     /// on the far side of it.
     #[test]
     fn a_label_whose_nearest_station_is_blocked_is_turned_onto_drivable_ground() {
-        let (episode, settings) = (EpisodeSettings::paper(), ExpertSettings::paper());
+        let (episode, settings) = (EpisodeSettings::paper(), ExpertSettings::half_points());
         let context = ExpertContext::of(&episode);
         let map = Map::build(Scenario::lane(-20.0..=60.0, 6.0, -5.0..=50.0), &episode.vehicle).unwrap();
         let pose = Pose::new(Vec2::new(0.0, 1.0), 0.5);
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn the_index_undoes_the_spacing_of_the_arcs() {
-        let settings = ExpertSettings::paper();
+        let settings = ExpertSettings::half_points();
         for index in [-1.0_f32, -0.3, 0.0, 0.5] {
             let curvature_per_m = settings.curvature_max_per_m * index.abs().powf(1.5).copysign(index);
             assert!((Label { curvature_per_m, arc_length_m: 5.0 }.index(&settings) - index).abs() < 1e-5);

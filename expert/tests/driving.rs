@@ -33,7 +33,7 @@ fn map(scenario: Scenario) -> Map {
 }
 
 fn expert(sees: Sees) -> ScriptedExpert {
-    let settings = ExpertSettings { sees, ..ExpertSettings::paper() };
+    let settings = ExpertSettings { sees, ..ExpertSettings::half_points() };
     ScriptedExpert::new(settings, &EpisodeSettings::paper())
 }
 
@@ -60,7 +60,7 @@ fn drive(scenario: Scenario, sees: Sees) -> (EpisodeReport, Vec<LookAheadPoint>,
 
 #[test]
 fn an_open_lane_is_looked_down_in_the_middle() {
-    let far_m = ExpertSettings::paper().elastic_band.reach_max_m + VehicleSettings::hyundai_hg300().front_m();
+    let far_m = ExpertSettings::half_points().elastic_band.reach_max_m + VehicleSettings::hyundai_hg300().front_m();
     for width_m in [2.8, 3.4, 5.0] {
         let point = answer(&map(lane(width_m, Vec::new())), Pose::default(), 1.5);
         assert!((point.ahead_m - far_m).abs() < 0.1 && point.left_m.abs() < 0.1, "{width_m} m: {point:?}");
@@ -73,7 +73,7 @@ fn from_beside_the_middle_the_car_is_steered_back_to_it() {
     let pose = Pose::new(Vec2::new(0.0, 0.3), 0.02);
     let map = map(lane(3.4, Vec::new()));
     let point = answer(&map, pose, 1.5);
-    let steer_m = ExpertSettings::paper().elastic_band.steer_m;
+    let steer_m = ExpertSettings::half_points().elastic_band.steer_m;
     let met = pose.advanced_along_arc(point.curvature_per_m(), steer_m).position();
     assert!(met.y.abs() < 0.1, "{point:?} leads through {met}");
 }

@@ -10,7 +10,7 @@ pub mod store;
 mod tick;
 
 pub use aggregate::{Dataset, Split, ValidationSplit};
-pub use collection::{Collection, EpisodeRecord};
+pub use collection::{Collection, Effort, EpisodeRecord};
 pub use round::Round;
 pub use sample::Sample;
 pub use tick::Tick;

@@ -1,25 +1,31 @@
-//! May the network drive this tick? Algorithm 2, line 9, in the readings that make sense (docs/methods.md 4.3, 4.4).
+//! May the network drive this tick? Algorithm 2, line 9, in the readings that make sense (docs/methods.md 4.3, 4.4), and
+//! the rules of other methods of the `DAgger` family (docs/methods.md 5), a file each.
 
-use crate::network::Prediction;
+mod ensemble_dagger;
+mod evidence;
+mod gate;
+mod hg_dagger;
+mod lazy_dagger;
+mod safe_dagger;
+mod thrifty_dagger;
+mod vanilla;
+
+pub use ensemble_dagger::EnsembleDaggerSettings;
+pub use evidence::Evidence;
+pub(crate) use gate::{Gate, GateTick};
+pub use hg_dagger::HgDaggerSettings;
+pub use lazy_dagger::LazyDaggerSettings;
+pub use safe_dagger::SafeDaggerSettings;
+pub(crate) use thrifty_dagger::Thresholds;
+pub use thrifty_dagger::ThriftyDaggerSettings;
+pub use vanilla::VanillaSettings;
+
+use crate::string_or_table::string_or_table;
 use serde::{Deserialize, Serialize};
-
-/// What the decision rests on.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Evidence {
-    /// τ̂: distance between the network's clipped mean and the expert's answer, image fractions.
-    pub discrepancy: f32,
-    /// χ̂: standard deviation of the network's answer, (u, w), image fractions.
-    pub doubt: [f32; 2],
-}
-
-impl Evidence {
-    /// Algorithm 2, lines 7 and 8. Both answers are clipped to the image, as they would be driven.
-    pub fn new(predicted: &Prediction, expert: [f32; 2]) -> Self {
-        let novice = predicted.clipped_mean();
-        let expert = expert.map(|fraction| fraction.clamp(0.0, 1.0));
-        Self { discrepancy: (novice[0] - expert[0]).hypot(novice[1] - expert[1]), doubt: predicted.sigma }
-    }
-}
+use sim::episode::EpisodeSettings;
+use sim::seed::Rng;
+use thrifty_dagger::ThriftyDaggerGate;
+use toml::Value;
 
 /// When the network may drive. All comparisons are strict, as printed. Thresholds that are not given are the paper's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -55,12 +61,27 @@ pub enum DecisionRule {
         #[serde(default = "paper_tau")]
         tau: f32,
     },
-    /// Never: the expert drives, as in behaviour cloning.
+    /// Never: the expert drives, as in behaviour cloning. The control experiment at equal samples.
     ExpertOnly,
+    /// Vanilla `DAgger`: by chance, ever more often.
+    Vanilla(VanillaSettings),
+    /// `SafeDAgger`: unless a critic predicts that it is off.
+    SafeDagger(SafeDaggerSettings),
+    /// `EnsembleDAgger`: while it is near the expert's answer and its members agree.
+    EnsembleDagger(EnsembleDaggerSettings),
+    /// `HG-DAgger`: until the expert, who watches the road, takes over.
+    HgDagger(HgDaggerSettings),
+    /// `LazyDAgger`: as `SafeDagger`, but the expert keeps the wheel until the network is near its answer.
+    LazyDagger(LazyDaggerSettings),
+    /// `ThriftyDAgger`: unless the state is novel or risky.
+    ThriftyDagger(ThriftyDaggerSettings),
 }
 
+/// τ of the paper, image fractions.
+pub(crate) const PAPER_TAU: f32 = 0.07;
+
 fn paper_tau() -> f32 {
-    0.07
+    PAPER_TAU
 }
 
 fn paper_chi() -> f32 {
@@ -86,8 +107,114 @@ impl DecisionRule {
         Self::AllBelow { tau: paper_tau(), chi: paper_chi(), chi_on: ChiOn::StdPerAxis }
     }
 
-    /// Whether the network drives.
-    pub fn trusts_novice(&self, evidence: &Evidence) -> bool {
+    /// Who drives one car under this rule, with what it draws at random.
+    pub(crate) fn gate(&self, context: GateContext<'_>) -> Box<dyn Gate> {
+        let GateContext { round, episode, thresholds, rng } = context;
+        match *self {
+            Self::Vanilla(settings) => Box::new(settings.gate(round, rng)),
+            Self::HgDagger(settings) => Box::new(settings.gate(episode)),
+            Self::LazyDagger(settings) => Box::new(settings.gate()),
+            Self::ThriftyDagger(_) => Box::new(ThriftyDaggerGate::new(thresholds)),
+            rule => Box::new(Memoryless(rule)),
+        }
+    }
+
+    /// The rule of a name, as in the settings, with its own thresholds.
+    pub fn named(name: &str) -> Option<Self> {
+        let by_name = Value::String(name.to_owned());
+        string_or_table(by_name).ok()
+    }
+
+    /// Networks trained per round: those that drive together, and a critic.
+    pub fn networks(&self) -> usize {
+        self.members() + usize::from(self.critic().is_some())
+    }
+
+    /// τ, if it has one.
+    pub fn tau(&self) -> Option<f32> {
+        match *self {
+            Self::AllBelow { tau, .. }
+            | Self::AnyBelowLiteral { tau, .. }
+            | Self::TauOnly { tau }
+            | Self::SafeDagger(SafeDaggerSettings { tau })
+            | Self::LazyDagger(LazyDaggerSettings { tau, .. })
+            | Self::EnsembleDagger(EnsembleDaggerSettings { tau, .. }) => Some(tau),
+            Self::ExpertOnly | Self::Vanilla(_) | Self::HgDagger(_) | Self::ThriftyDagger(_) => None,
+        }
+    }
+
+    /// χ on the predicted spread of a single network, if it has one, and what it is compared with.
+    pub fn chi(&self) -> Option<(f32, ChiOn)> {
+        match *self {
+            Self::AllBelow { chi, chi_on, .. } | Self::AnyBelowLiteral { chi, chi_on, .. } => Some((chi, chi_on)),
+            _ => None,
+        }
+    }
+
+    /// Networks that drive together.
+    pub fn members(&self) -> usize {
+        match *self {
+            Self::EnsembleDagger(EnsembleDaggerSettings { members, .. })
+            | Self::ThriftyDagger(ThriftyDaggerSettings { members, .. }) => usize::from(members),
+            _ => 1,
+        }
+    }
+
+    /// What a critic learns for it, if it needs one.
+    pub(crate) fn critic(&self) -> Option<CriticTarget> {
+        match *self {
+            Self::SafeDagger(SafeDaggerSettings { tau }) | Self::LazyDagger(LazyDaggerSettings { tau, .. }) => {
+                Some(CriticTarget::IsOff { tau })
+            }
+            Self::ThriftyDagger(ThriftyDaggerSettings { discount, .. }) => Some(CriticTarget::Risk { discount }),
+            _ => None,
+        }
+    }
+
+    /// Whether the method asks the expert at every tick, to decide or to label; else only while the expert drives.
+    pub(crate) fn asks_at_every_tick(&self) -> bool {
+        match self {
+            Self::AllBelow { .. }
+            | Self::AnyBelowLiteral { .. }
+            | Self::TauOnly { .. }
+            | Self::ExpertOnly
+            | Self::Vanilla(_)
+            | Self::EnsembleDagger(_) => true,
+            Self::SafeDagger(_) | Self::HgDagger(_) | Self::LazyDagger(_) | Self::ThriftyDagger(_) => false,
+        }
+    }
+}
+
+/// What rules with a memory, or that look at the road, are made of.
+pub(crate) struct GateContext<'a> {
+    /// 0 = behaviour cloning.
+    pub(crate) round: u32,
+    pub(crate) episode: &'a EpisodeSettings,
+    pub(crate) thresholds: Thresholds,
+    pub(crate) rng: Rng,
+}
+
+/// What a critic learns to predict from a grid, 0…1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum CriticTarget {
+    /// Whether the network's τ̂ is above τ.
+    IsOff { tau: f32 },
+    /// `discount` to the power of the ticks until the next near-collision; 0 if none follows.
+    Risk { discount: f32 },
+}
+
+/// A rule that needs nothing but the evidence of the tick.
+struct Memoryless(DecisionRule);
+
+impl Gate for Memoryless {
+    fn trusts_novice(&mut self, tick: &GateTick<'_>) -> bool {
+        self.0.trusts_novice(&tick.evidence)
+    }
+}
+
+impl DecisionRule {
+    /// Whether the network drives, by the evidence of the tick alone.
+    fn trusts_novice(&self, evidence: &Evidence) -> bool {
         match *self {
             Self::AllBelow { tau, chi, chi_on } => {
                 evidence.discrepancy < tau && chi_on.of(evidence.doubt).into_iter().all(|doubt| doubt < chi)
@@ -96,7 +223,11 @@ impl DecisionRule {
                 evidence.discrepancy < tau || chi_on.of(evidence.doubt).into_iter().any(|doubt| doubt < chi)
             }
             Self::TauOnly { tau } => evidence.discrepancy < tau,
-            Self::ExpertOnly => false,
+            Self::SafeDagger(_) => safe_dagger::trusts_novice(evidence),
+            Self::EnsembleDagger(settings) => settings.trusts_novice(evidence),
+            Self::ExpertOnly | Self::Vanilla(_) | Self::HgDagger(_) | Self::LazyDagger(_) | Self::ThriftyDagger(_) => {
+                false
+            }
         }
     }
 }
@@ -113,14 +244,19 @@ impl ChiOn {
 }
 
 #[cfg(test)]
+mod test_ticks;
+
+#[cfg(test)]
 mod tests {
     use super::*;
+    use crate::network::Prediction;
 
     #[test]
     fn rules_by_table() {
         let all = |chi_on| DecisionRule::AllBelow { tau: 0.07, chi: 0.1, chi_on };
         let any = |chi_on| DecisionRule::AnyBelowLiteral { tau: 0.07, chi: 0.1, chi_on };
         let tau = DecisionRule::TauOnly { tau: 0.07 };
+        let ensemble = DecisionRule::EnsembleDagger(EnsembleDaggerSettings::default());
         let (novice, expert) = (true, false);
         #[rustfmt::skip]
         let table = [
@@ -140,11 +276,24 @@ mod tests {
             (tau,                             0.05, 0.90, 0.90, novice),
             (tau,                             0.08, 0.01, 0.01, expert),
             (DecisionRule::ExpertOnly,        0.00, 0.00, 0.00, expert),
+            (ensemble,                        0.05, 0.90, 0.90, novice), // its own spread does not count
+            (ensemble,                        0.08, 0.01, 0.01, expert),
         ];
         for (rule, discrepancy, u, w, expected) in table {
-            let evidence = Evidence { discrepancy, doubt: [u, w] };
+            let evidence = Evidence { discrepancy, doubt: [u, w], disagreement: 0.0, alarm: 0.0 };
             assert_eq!(rule.trusts_novice(&evidence), expected, "{rule:?} on {evidence:?}");
         }
+    }
+
+    #[test]
+    fn disagreement_and_a_critics_alarm_hand_over() {
+        let calm = Evidence { discrepancy: 0.01, doubt: [0.01; 2], disagreement: 0.01, alarm: 0.1 };
+        let ensemble = DecisionRule::EnsembleDagger(EnsembleDaggerSettings::default());
+        let safe = DecisionRule::SafeDagger(SafeDaggerSettings::default());
+        assert!(ensemble.trusts_novice(&calm) && safe.trusts_novice(&calm));
+        assert!(!ensemble.trusts_novice(&Evidence { disagreement: 0.04, ..calm }));
+        assert!(!safe.trusts_novice(&Evidence { alarm: 0.5, ..calm }));
+        assert!(safe.trusts_novice(&Evidence { discrepancy: 0.5, ..calm }), "it is not asked how far off it is");
     }
 
     #[test]
@@ -167,6 +316,9 @@ mod tests {
         assert_eq!(read("rule = 'tau_only'"), Ok(DecisionRule::TauOnly { tau: 0.07 }));
         assert_eq!(read("rule = 'all_below'"), Ok(DecisionRule::paper()));
         assert_eq!(read("rule = 'expert_only'"), Ok(DecisionRule::ExpertOnly));
+        let lazy = DecisionRule::LazyDagger(LazyDaggerSettings { tau: 0.05, release_share: 0.5 });
+        assert_eq!(read("rule = { lazy_dagger = { tau = 0.05 } }"), Ok(lazy));
+        assert_eq!(read("rule = 'hg_dagger'"), Ok(DecisionRule::HgDagger(HgDaggerSettings::default())));
         assert_eq!(read("rule = { tau_only = {} }"), Ok(DecisionRule::TauOnly { tau: 0.07 }));
         assert_eq!(read("rule = { tau_only = { tau = 0.2 } }"), Ok(DecisionRule::TauOnly { tau: 0.2 }));
         for (text, part) in [("rule = 'tau_onli'", "all_below"), ("rule = { tau_only = { chi = 1 } }", "chi")] {

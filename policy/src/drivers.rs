@@ -29,7 +29,7 @@ impl NetFleet {
 
 impl Fleet for NetFleet {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
-        let answers = self.novice.answers(seats);
+        let (answers, _) = self.novice.answers(seats);
         decisions.extend(answers.iter().map(|prediction| novice_decision(prediction, self.geometry)));
     }
 }
@@ -49,12 +49,12 @@ impl Novice {
         Self { ensemble: Ensemble::new(first.predictor(device), others), geometry: first.geometry(), smoothing }
     }
 
-    /// What it answers at every seat, smoothed.
-    pub(crate) fn answers(&mut self, seats: &[Seat<'_>]) -> Vec<Prediction> {
+    /// What it answers at every seat, smoothed, and how far the members of an ensemble disagree.
+    pub(crate) fn answers(&mut self, seats: &[Seat<'_>]) -> (Vec<Prediction>, Vec<f32>) {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
-        let mut answers = self.ensemble.predict(&grids);
+        let (mut answers, disagreement) = self.ensemble.predict_with_disagreement(&grids);
         action_smoothing::smooth_all(&mut self.smoothing, seats, &mut answers, self.geometry);
-        answers
+        (answers, disagreement)
     }
 }
 

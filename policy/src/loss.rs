@@ -4,6 +4,7 @@
 //!
 //! `L = ½ · mean_j[ W · e_j² · exp(−s_j) + s_j ]`, `W = (1 + α τ̂)²`
 
+use crate::dataset::Sample;
 use crate::network::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN};
 use crate::string_or_table::string_or_table;
 use burn::tensor::Tensor;
@@ -57,6 +58,14 @@ impl LossSettings {
             WeightForm::ResidualSq => (1.0 + self.alpha * tau_hat).powi(2),
             WeightForm::Linear { gain } => 1.0 + gain * tau_hat,
         }
+    }
+}
+
+impl LossSettings {
+    /// Mean weight of the squared error of samples; 1 of none.
+    pub(crate) fn mean_weight(&self, samples: &[Sample]) -> f32 {
+        let sum: f64 = samples.iter().map(|sample| f64::from(self.weight_of_squared_error(sample.tau_hat))).sum();
+        if samples.is_empty() { 1.0 } else { (sum / samples.len() as f64) as f32 }
     }
 }
 
@@ -184,6 +193,11 @@ mod tests {
         let settings = LossSettings::paper();
         assert_eq!(settings.weight_of_squared_error(0.0), 1.0);
         assert_eq!(settings.weight_of_squared_error(1.0), 6.25);
+        // Half of the samples at τ̂ = 1: (1 + 6.25) / 2. With α = 15: (1 + 256) / 2.
+        let grid = sim::sensing::OccupancyGrid::free();
+        let samples = [0.0, 1.0].map(|tau_hat| Sample { grid, label: [0.5; 2], tau_hat });
+        assert_eq!((settings.mean_weight(&samples), settings.mean_weight(&[])), (3.625, 1.0));
+        assert_eq!(LossSettings { alpha: 15.0, ..settings }.mean_weight(&samples), 128.5);
         let linear = LossSettings { weight: WeightForm::Linear { gain: 10.0 }, ..settings };
         assert_eq!(linear.weight_of_squared_error(0.5), 6.0);
     }

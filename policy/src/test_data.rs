@@ -93,6 +93,8 @@ pub(crate) fn collected(samples: usize, each: usize) -> (Round, Collection) {
         driven_s: 2.5,
         near_collisions: 1,
         driven_m: 30.0,
+        effort: None,
+        agreement: None,
         episodes: vec![record],
     };
     (round, collection)

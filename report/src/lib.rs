@@ -20,6 +20,7 @@ pub mod pictures;
 pub mod pixel_accuracy;
 pub mod plots;
 pub mod reproduction;
+pub mod rules;
 pub mod run_report;
 pub mod scaling;
 pub mod summary;

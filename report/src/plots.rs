@@ -23,7 +23,8 @@ mod training;
 pub use bars::{Bar, BarGroup, bars};
 pub use calibration::calibration;
 pub use driving::{
-    Distribution, RatePoint, RateRow, RateSeries, rates, rates_against_lots, rates_against_noise, safe_ratios,
+    Distribution, RatePoint, RateRow, RateSeries, rates, rates_against_effort, rates_against_lots, rates_against_noise,
+    safe_ratios,
 };
 pub use training::{EtaSeries, eta, learning};
 

@@ -4,6 +4,7 @@ use crate::command_line::command_line;
 use crate::markdown::{table_of, with_header};
 use crate::page::{Image, Page};
 use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
+use crate::table1::{AGREEMENT, READ_ETA_HAT};
 use anyhow::Context as _;
 use evaluation::calibration::AxisCalibration;
 use evaluation::conclusions::{self, Against, Driven, Statement, Verdict};
@@ -64,7 +65,8 @@ impl<'a> Drive<'a> {
 
     pub(crate) fn plan(&self) -> Plan<'_> {
         let compare_with = conclusions::compare_with(&self.drivers);
-        Plan { settings: &self.stage.settings, drivers: &self.drivers, lots: &self.lots, compare_with }
+        let (settings, drivers, lots) = (&self.stage.settings, &self.drivers, &self.lots);
+        Plan { settings, drivers, lots, compare_with, shard: None }
     }
 }
 
@@ -326,6 +328,10 @@ fn table_1(page: &mut Page, eta: f64, weighted: &[IterationRow], unweighted: &[I
     add("η̂ = network / total", &|i| eta_of(weighted, i));
     add("  with α = 0", &|i| eta_of(unweighted, i));
     add("  paper", &|i| of_paper(&paper::TABLE_1.eta_hat, i));
+    for (name, value) in AGREEMENT {
+        add(name, &|i| weighted.get(i).and_then(value));
+    }
+    add("mean weight of τ̂", &|i| weighted.get(i)?.mean_weight.map(|weight| format!("{weight:.3}")));
     add("effect of the weight, held-back samples", &|i| {
         let interval = effect_of(i)?.held_back?;
         Some(format!("{:.2} [{:.2}, {:.2}]", interval.estimate, interval.lower, interval.upper))
@@ -341,7 +347,7 @@ fn table_1(page: &mut Page, eta: f64, weighted: &[IterationRow], unweighted: &[I
             "{table}\n\nη̂ of a column is of the policy trained in the column before. The effect compares the two policies \
              trained in a column, with α = 1.5 and with α = 0 on the same data seeds: Σ τ̂ with the weight over Σ τ̂ \
              without, smaller is better. *Held-back samples*: of both data sets so far, resampled in stretches. \
-             *Driving*: per second at the wheel of one trial of every lot, the expert watching."
+             *Driving*: per second at the wheel of one trial of every lot, the expert watching. {READ_ETA_HAT}"
         ),
     );
     let points = |rows: &[IterationRow]| {

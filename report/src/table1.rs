@@ -15,6 +15,29 @@ pub fn write(table1: &Table1, run: &RunDir) -> anyhow::Result<String> {
     Ok(text)
 }
 
+/// What η̂ is to be read with, per round: name of the row, value.
+pub(crate) const AGREEMENT: [(&str, fn(&IterationRow) -> Option<String>); 5] = [
+    ("τ̂ < τ, whoever drove", |row| row.agreement.map(|found| format!("{:.3}", found.within_tau))),
+    ("  best constant answer", |row| row.agreement.map(|found| format!("{:.3}", found.constant_within_tau))),
+    ("τ̂ < τ scaled as the labels", |row| {
+        row.agreement.map(|found| format!("{:.3} (τ {:.3})", found.within_tau_scaled, found.tau_scaled))
+    }),
+    ("  best constant answer, too", |row| {
+        row.agreement.map(|found| format!("{:.3}", found.constant_within_tau_scaled))
+    }),
+    ("τ̂: quartiles; 90, 99 %", |row| {
+        let [low, middle, high, most, nearly_all] =
+            row.agreement?.tau_hat_quantiles.map(|tau_hat| format!("{tau_hat:.3}"));
+        Some(format!("{low} {middle} {high}; {most} {nearly_all}"))
+    }),
+];
+
+/// How to read it.
+pub(crate) const READ_ETA_HAT: &str = "The best constant answer is the point that is within τ of the most labels: what is \
+    learned is what lies above it. Nearer labels have smaller errors at the same τ; scaled as the labels, τ · mean range of \
+    the labels / 6.4 m, the range of the paper's points (460 m in 6425 samples of 0.05 s, v = a_y/4.48). Shares compare \
+    with the paper's η̂ only where labels and τ are the paper's.";
+
 /// A column per round.
 pub fn to_markdown(table1: &Table1) -> String {
     let columns = table1.rows.len().max(table1.paper.dataset.len());
@@ -30,11 +53,17 @@ pub fn to_markdown(table1: &Table1) -> String {
     add("  paper", &|i| table1.paper.dataset.get(i).map(ToString::to_string));
     add("η̂ = network / total", &ours(|row| row.eta_hat.map(|eta| format!("{eta:.3}"))));
     add("  paper", &|i| table1.paper.eta_hat.get(i).copied().flatten().map(|eta| format!("{eta:.2}")));
+    for (name, value) in AGREEMENT {
+        add(name, &ours(value));
+    }
     add("samples in all", &ours(|row| Some(row.dataset.to_string())));
+    add("mean weight of τ̂", &ours(|row| row.mean_weight.map(|weight| format!("{weight:.3}"))));
     add("validation NLL", &ours(|row| row.validation_nll.map(|nll| format!("{nll:.3}"))));
     add("validation error, m", &ours(|row| row.validation_rmse_m.map(|error| format!("{error:.3}"))));
     add("Σ τ̂ per second", &ours(|row| row.tau_hat_per_s.map(|sum| format!("{sum:.3}"))));
     add("near-collisions", &ours(|row| Some(row.near_collisions.to_string())));
+    add("contacts", &ours(|row| row.effort.map(|effort| effort.contacts.to_string())));
+    add("interventions", &ours(|row| row.effort.map(|effort| effort.interventions.to_string())));
     let why = match table1.stop {
         Stop::EtaReached => "η̂ passed the threshold η",
         Stop::IterationCap => "the cap on iterations was reached",
@@ -42,14 +71,14 @@ pub fn to_markdown(table1: &Table1) -> String {
     };
     format!(
         "{table}\n\nEnded: {why}. η̂ and near-collisions of a column are of the policy trained in the column before; \
-         the validation is of the policy trained in this one."
+         the validation is of the policy trained in this one. {READ_ETA_HAT}"
     )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use policy::dagger::IterationRow;
+    use policy::agreement::Agreement;
 
     #[test]
     fn shorter_and_longer_runs_than_the_papers_fill_up_with_dashes() {
@@ -60,6 +89,18 @@ mod tests {
             eta_hat: (round > 0).then_some(0.5),
             tau_hat_per_s: None,
             near_collisions: 0,
+            effort: None,
+            agreement: (round > 0).then_some(Agreement {
+                tau: 0.07,
+                tau_scaled: 0.035,
+                label_ahead_m: 3.2,
+                within_tau: 0.886,
+                within_tau_scaled: 0.64,
+                constant_within_tau: 0.5,
+                constant_within_tau_scaled: 0.2,
+                tau_hat_quantiles: [0.01, 0.02, 0.04, 0.075, 0.2],
+            }),
+            mean_weight: None,
             validation_nll: Some(-2.0),
             validation_rmse_m: None,
         };
@@ -69,6 +110,7 @@ mod tests {
             let lines: Vec<&str> = text.lines().take_while(|line| line.starts_with('|')).collect();
             assert!(lines.iter().all(|line| line.matches('|').count() == columns + 2), "{text}");
             assert!(text.contains("6425") && text.contains("101"), "{text}");
+            assert!(text.contains("0.640 (τ 0.035)") && text.contains("0.010 0.020 0.040; 0.075 0.200"), "{text}");
         }
     }
 }

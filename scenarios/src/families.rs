@@ -9,6 +9,8 @@
 //! | [`aisles`] | parallel aisles of a car park |
 //! | [`track`] | closed bands |
 //! | [`open`] | open ground on which things leave one way |
+//! | [`halls`] | aisles between racks, other aisles closed |
+//! | [`yards`] | wide ground on which things stand apart |
 //! | [`strip`] | the ground: a centre line of straight pieces, arcs and corners, its edges and their notches |
 //! | [`course`] | how centre lines are drawn |
 //! | [`walls`] | walls and kerbs along outlines, with free ground behind |
@@ -19,6 +21,7 @@
 mod aisles;
 mod corridor;
 mod course;
+mod halls;
 mod lane;
 mod open;
 mod parts;
@@ -29,6 +32,7 @@ mod strip;
 mod things;
 mod track;
 mod walls;
+mod yards;
 
 use crate::split::Family;
 use corridor::DifficultySettings;
@@ -47,6 +51,8 @@ pub(crate) fn draw(family: Family, layout: &mut Rng, obstacles: &mut Rng) -> Opt
         Family::Aisles => aisles::draw(layout, obstacles),
         Family::Track => track::draw(layout, obstacles),
         Family::Open => open::draw(layout, obstacles),
+        Family::Halls => halls::draw(layout, obstacles),
+        Family::Yards => yards::draw(layout, obstacles),
     };
     on_strip.map(|(scenario, _)| scenario)
 }
@@ -62,8 +68,9 @@ pub(crate) fn clearance_m(family: Family) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::strip::{Mouth, Strip};
+    use super::strip::Strip;
     use super::*;
+    use crate::corridor::STALL_DEPTH_M;
     use crate::split::Split;
     use sim::geometry::{Vec2, polygon_contains};
     use sim::map::Map;
@@ -74,13 +81,15 @@ mod tests {
 
     type Is<'a> = dyn Fn(&Scenario, &Strip) -> bool + 'a;
     type Draw = fn(&mut Rng, &mut Rng) -> Option<(Scenario, Strip)>;
-    const DRAWS: [(Family, Draw); 6] = [
+    const DRAWS: [(Family, Draw); 8] = [
         (Family::Lane, lane::draw),
         (Family::Rooms, rooms::draw),
         (Family::Street, street::draw),
         (Family::Aisles, aisles::draw),
         (Family::Track, track::draw),
         (Family::Open, open::draw),
+        (Family::Halls, halls::draw),
+        (Family::Yards, yards::draw),
     ];
 
     /// A car that does not know the route must not find another way. Ground that a disc a little wider than the car can
@@ -94,23 +103,20 @@ mod tests {
                 let Some((scenario, strip)) = drawn else { continue };
                 let scenario = Scenario { name: family.name().to_owned(), ..scenario };
                 let outline = strip.outline(0.0);
-                let is_closed = |&(_, depth_m): &(Mouth, f32)| depth_m >= 3.0;
+                // What is no deeper than a stall is no way.
+                let sides = strip.notches.iter().map(|notch| strip.mouth(notch));
                 let mouths: Vec<_> =
-                    strip.stub_mouths().into_iter().filter(is_closed).map(|(mouth, _)| mouth).collect();
+                    sides.chain(strip.stub_mouths()).filter(|mouth| mouth.depth_m > STALL_DEPTH_M).collect();
                 let Ok(map) = Map::build(scenario, &VehicleSettings::hyundai_hg300()) else { continue };
                 let reached = flooded(&map);
                 if family != Family::Track {
                     let stray = reached.iter().find(|&&cell| !polygon_contains(&outline, place(cell)));
                     assert!(stray.is_none(), "{family:?} {index}: a way out at {:?}", stray.map(|&cell| place(cell)));
                 }
-                for (a, b) in mouths {
-                    let aside = (b - a).normalize().perp() * 1.6;
-                    let is_reached = |at: Vec2| reached.contains(&((at / CELL_M).round().as_ivec2().into()));
-                    let [one, other] = [0.5 * (a + b) + aside, 0.5 * (a + b) - aside];
-                    assert!(
-                        !is_reached(one) || !is_reached(other),
-                        "{family:?} {index}: the way at {a} to {b} is open"
-                    );
+                for mouth in mouths {
+                    let at_its_end = mouth.a.midpoint(mouth.b) + (mouth.depth_m - 1.4) * mouth.outward();
+                    let cell = (at_its_end / CELL_M).round().as_ivec2().into();
+                    assert!(!reached.contains(&cell), "{family:?} {index}: the way at {mouth:?} is open");
                 }
             }
         }
@@ -138,7 +144,7 @@ mod tests {
             scenario.obstacles.iter().filter(is_such).count() > 20
         };
         // Family, what, share of its lots: at least and at most.
-        let all: [(Family, &str, &Is<'_>, f32, f32); 14] = [
+        let all: [(Family, &str, &Is<'_>, f32, f32); 19] = [
             (Family::Lane, "narrower than 3.8 m", &|_, strip| strip.half_width_m(0.0) < 1.9, 0.35, 0.65),
             (Family::Lane, "narrower than 3.0 m", &|_, strip| strip.half_width_m(0.0) < 1.5, 0.03, 0.3),
             (Family::Lane, "wider than 6 m", &|_, strip| strip.half_width_m(0.0) > 3.0, 0.05, 0.4),
@@ -153,6 +159,11 @@ mod tests {
             (Family::Track, "around an island", &|lot, _| !lot.islands.is_empty(), 0.3, 0.7),
             (Family::Track, "between walls", &|lot, _| is_walled(lot, 0.3..=3.0), 0.3, 0.7),
             (Family::Open, "with planters", &|lot, _| lot.islands.len() > 3, 0.6, 1.0),
+            (Family::Street, "with pavements built out or refuges", &|lot, _| !lot.islands.is_empty(), 0.3, 0.7),
+            (Family::Aisles, "between hidden rows", &|lot, _| lot.boundary_height_m > 1.0, 0.15, 0.5),
+            (Family::Halls, "that hide what is behind", &|lot, _| lot.boundary_height_m > 1.0, 0.4, 0.8),
+            (Family::Halls, "narrower than 4.4 m", &|_, strip| strip.half_width_m(0.0) < 2.2, 0.3, 0.7),
+            (Family::Yards, "with fountains", &|lot, _| !lot.islands.is_empty(), 0.6, 1.0),
         ];
         for (family, what, is, least, most) in all {
             let share = share(&lots(family), is);

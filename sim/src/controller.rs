@@ -73,7 +73,7 @@ const LOOK_AHEAD_MIN_M: f32 = 1.0;
 /// From the front bumper to the lower edge of the patch, metres: 0.5 m for the paper's car and patch (docs/methods.md 2.5).
 ///
 /// In whole millimetres: single precision makes 0.500_000_5 m of 4.30 m − (4.91 m − 1.11 m).
-fn bumper_to_patch_m(vehicle: &VehicleSettings, geometry: &GridGeometry) -> f32 {
+pub fn bumper_to_patch_m(vehicle: &VehicleSettings, geometry: &GridGeometry) -> f32 {
     ((geometry.near_edge_ahead_m - vehicle.front_m()) * 1000.0).round() / 1000.0
 }
 

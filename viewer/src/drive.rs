@@ -334,7 +334,7 @@ impl<'a> Drive<'a> {
         let predicted = Prediction { mean: learner.look_ahead.to_image_fraction(geometry), sigma: [0.0; 2] };
         let evidence = Evidence::new(&predicted, expert.to_image_fraction(geometry));
         self.signal("discrepancy/tau_hat", f64::from(evidence.discrepancy));
-        if let Some(tau) = self.tau() {
+        if let Some(tau) = self.rule.tau() {
             self.signal("discrepancy/threshold", f64::from(tau));
         }
     }
@@ -349,25 +349,12 @@ impl<'a> Drive<'a> {
         }
         let side_m = self.episode.sensing.geometry.side_m;
         let sigma = [spread.left_m, spread.ahead_m].map(|metres| metres / side_m);
-        let (doubt, chi) = match self.rule {
-            DecisionRule::AllBelow { chi, chi_on, .. } | DecisionRule::AnyBelowLiteral { chi, chi_on, .. } => {
-                (chi_on.of(sigma), Some(chi))
-            }
-            DecisionRule::TauOnly { .. } | DecisionRule::ExpertOnly => (sigma, None),
-        };
+        let chi = self.rule.chi();
+        let doubt = chi.map_or(sigma, |(_, chi_on)| chi_on.of(sigma));
         self.signal("doubt/across", f64::from(doubt[0]));
         self.signal("doubt/ahead", f64::from(doubt[1]));
-        if let Some(chi) = chi {
+        if let Some((chi, _)) = chi {
             self.signal("doubt/threshold", f64::from(chi));
-        }
-    }
-
-    fn tau(&self) -> Option<f32> {
-        match self.rule {
-            DecisionRule::AllBelow { tau, .. }
-            | DecisionRule::AnyBelowLiteral { tau, .. }
-            | DecisionRule::TauOnly { tau } => Some(tau),
-            DecisionRule::ExpertOnly => None,
         }
     }
 

@@ -1,8 +1,8 @@
 //! The command line: which commands there are.
 
 use crate::commands::{
-    bench, completions, drivers, evaluate, generate, guard, lots, pixel_accuracy, render, reproduce, sample_size,
-    scaling, settings, train, tune, verify, visualise,
+    bench, completions, drivers, evaluate, generate, guard, lots, merge, pixel_accuracy, render, reproduce, rules,
+    sample_size, scaling, settings, train, tune, verify, visualise,
 };
 use crate::output::{Color, Output};
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -60,9 +60,15 @@ enum Command {
     /// Drives drivers over lots and counts near-collisions and the safe ratio.
     #[command(after_help = evaluate::EXAMPLES)]
     Evaluate(evaluate::EvaluateArgs),
+    /// Puts the shards of an evaluation together, as if one machine had driven all of it.
+    #[command(after_help = merge::EXAMPLES)]
+    Merge(merge::MergeArgs),
     /// The paper in a box: trains, drives and writes one report with the paper's tables beside ours.
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(reproduce::ReproduceArgs),
+    /// Trains under every decision rule of the DAgger family at equal samples, and compares effort and safety.
+    #[command(after_help = rules::EXAMPLES)]
+    Rules(rules::RulesArgs),
     /// Trains on few and on many different lots, and shows how near-collisions fall.
     #[command(after_help = scaling::EXAMPLES)]
     Scaling(scaling::ScalingArgs),
@@ -126,7 +132,9 @@ impl Cli {
             Command::TrainBc(args) => train::bc(args, output),
             Command::TrainDagger(args) => train::dagger(args, output),
             Command::Evaluate(args) => evaluate::run(args, output),
+            Command::Merge(args) => merge::run(args, output),
             Command::Reproduce(args) => reproduce::run(args, output),
+            Command::Rules(args) => rules::run(args, output),
             Command::Scaling(args) => scaling::run(args, output),
             Command::Guard(args) => guard::run(args, output),
             Command::Generate(args) => generate::run(args, output),
@@ -154,12 +162,14 @@ impl Command {
             Self::TrainBc(train::TrainArgs { json, .. })
             | Self::TrainDagger(train::TrainArgs { json, .. })
             | Self::Evaluate(evaluate::EvaluateArgs { json, .. })
+            | Self::Merge(merge::MergeArgs { json, .. })
             | Self::PixelAccuracy(pixel_accuracy::PixelAccuracyArgs { json, .. })
             | Self::SampleSize(sample_size::SampleSizeArgs { json, .. })
             | Self::Lots(lots::LotsArgs { json })
             | Self::Drivers(drivers::DriversArgs { json, .. })
             | Self::Verify(verify::VerifyArgs { json, .. }) => json.json,
             Self::Reproduce(_)
+            | Self::Rules(_)
             | Self::Scaling(_)
             | Self::Guard(_)
             | Self::Generate(_)

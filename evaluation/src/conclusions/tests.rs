@@ -10,7 +10,7 @@ use sim::scenario::Direction;
 use sim::seed::RootSeed;
 
 fn driver(name: &str) -> NamedDriver {
-    NamedDriver::expert(&expert::ExpertSettings::paper()).renamed(name)
+    NamedDriver::expert(&expert::ExpertSettings::half_points()).renamed(name)
 }
 
 /// What a driver did in a run.
@@ -26,7 +26,7 @@ fn statements(names: &[&str], of: impl Fn(&str, &Trial<'_>) -> Run) -> Vec<State
     let settings = Settings::preset("default").unwrap();
     let drivers: Vec<NamedDriver> = names.iter().map(|name| driver(name)).collect();
     let lots = Lot::parse_all(&["reference"], &settings.episode.vehicle).unwrap();
-    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0 };
+    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0, shard: None };
     let mut results = EvaluationResults::new(&plan);
     for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 5, &Direction::BOTH).enumerate() {
         for (driver, name) in names.iter().enumerate() {
@@ -125,7 +125,7 @@ fn none_in_a_few_metres_is_no_proof() {
     let settings = Settings::preset("default").unwrap();
     let drivers = [driver(DAGGER)];
     let lots = Lot::parse_all(&["lot-b"], &settings.episode.vehicle).unwrap();
-    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0 };
+    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0, shard: None };
     let driven_m = |reference_m| {
         let mut results = EvaluationResults::new(&plan);
         let metrics = EpisodeMetrics { reference_m, driven_m: reference_m, ..EpisodeMetrics::default() };
@@ -147,6 +147,9 @@ fn shares_and_effects() {
             eta_hat: Some(*share),
             tau_hat_per_s: None,
             near_collisions: 0,
+            effort: None,
+            agreement: None,
+            mean_weight: None,
             validation_nll: None,
             validation_rmse_m: None,
         };

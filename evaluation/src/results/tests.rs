@@ -13,7 +13,7 @@ fn report(near_collisions: u32, reference_m: f32, safe_ratio: f32) -> EpisodeRep
 }
 
 fn drivers_named(n: usize) -> Vec<NamedDriver> {
-    let expert = expert::ExpertSettings::paper();
+    let expert = expert::ExpertSettings::half_points();
     (0..n).map(|i| NamedDriver::expert(&expert).renamed(&format!("driver {i}"))).collect()
 }
 
@@ -22,7 +22,7 @@ fn results(drivers: usize, of: impl Fn(usize, &Trial<'_>) -> Option<EpisodeRepor
     let settings = Settings::preset("default").unwrap();
     let lots = Lot::parse_all(&["lot-a", "lot-b", "test:2"], &settings.episode.vehicle).unwrap();
     let named = drivers_named(drivers);
-    let plan = Plan { settings: &settings, drivers: &named, lots: &lots, compare_with: 0 };
+    let plan = Plan { settings: &settings, drivers: &named, lots: &lots, compare_with: 0, shard: None };
     let mut results = EvaluationResults::new(&plan);
     let trials = Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 3, &Direction::BOTH);
     for (index, trial) in trials.enumerate() {

@@ -36,14 +36,6 @@ fn every_preset_is_sound_and_survives_toml() {
 }
 
 #[test]
-fn the_paper_preset_is_the_papers() {
-    use policy::fit::{Budget, Mirror};
-    let fit = Settings::preset("paper").unwrap().dagger.fit;
-    assert_eq!((fit.learning_rate.peak, fit.batch, fit.budget), (1e-5, 512, Budget::Steps(100_000)));
-    assert_eq!(fit.mirror, Mirror::Off);
-}
-
-#[test]
 fn later_layers_win() {
     let text = "seed = 5\n[dagger]\neta = 0.7\niterations_max = 3\n[evaluation]\ntrials = 2\n";
     let path = std::env::temp_dir().join(format!("xtask-test-{}-layers.toml", std::process::id()));

@@ -114,7 +114,7 @@ proptest! {
         let map = crowded_lane(&cars);
         prop_assume!(map.is_some());
         let map = map.unwrap();
-        let settings = ExpertSettings { sees, ..ExpertSettings::paper() };
+        let settings = ExpertSettings { sees, ..ExpertSettings::half_points() };
         let episode = sim::episode::EpisodeSettings::paper();
         let context = ExpertContext::of(&episode);
         let footprint = Footprint::new(&episode.vehicle, settings.nose_margin_m, settings.disc_relief_m);

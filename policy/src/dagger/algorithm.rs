@@ -2,7 +2,9 @@
 
 use crate::checkpoint::Checkpoint;
 use crate::conditions::Conditions;
+use crate::dagger::critic;
 use crate::dagger::iteration_row::IterationRow;
+use crate::dagger::learned::{self, Learned};
 use crate::dagger::progress::{DaggerError, Hooks, Outcome, Progress, Stop};
 use crate::dagger::rollouts::Rollouts;
 use crate::dagger::run_file::RunFile;
@@ -80,7 +82,7 @@ impl Run<'_, '_> {
             if i > self.settings.iterations_max {
                 return Ok((self.finish(policy, &d)?, Stop::IterationCap));
             }
-            let (d_i, collected) = self.data_sampling_function(Some(&policy), i)?; // line 6
+            let (d_i, collected) = self.data_sampling_function(Some((&policy, &d)), i)?; // line 6
             eta_hat = collected.eta_hat();
             self.aggregate(&mut d, d_i, i, &collected, Some(&policy))?; // line 7
             policy = self.train(Some(policy), &d, i, &collected)?; // line 8
@@ -91,17 +93,26 @@ impl Run<'_, '_> {
 
     /// Algorithm 2 over the episodes of a round, or what an earlier run found there. Behaviour cloning (`policy` =
     /// `None`) is the same with the expert at the wheel and every tick kept.
-    fn data_sampling_function(&mut self, policy: Option<&Weights>, round: u32) -> Result<(Round, Collection), Halt> {
+    fn data_sampling_function(
+        &mut self,
+        trained: Option<(&Weights, &Dataset)>,
+        round: u32,
+    ) -> Result<(Round, Collection), Halt> {
         if self.store.has_round(round)? {
             return Ok(self.store.read_round(round)?);
         }
         let episodes = (self.hooks.episodes)(round);
+        let policy = trained.map(|(policy, _)| policy);
         self.report(&Progress::Collecting { round, episodes: episodes.len() }, policy)?;
-        let novice = policy.map(|weights| self.checkpoint(weights.clone()));
+        let novice = trained.map(|(policy, d)| {
+            Learned::with_parts(self.settings, self.store, round - 1, self.checkpoint(policy.clone()), d)
+        });
+        let novice = novice.transpose()?;
         let rollouts = Rollouts::of_round(self.settings, self.seed, novice.as_ref(), episodes);
         let on_frame = &mut *self.hooks.on_frame;
         let collected = rollouts.drive(&mut |episode, frame| on_frame(round, episode, frame));
         check_finite(round, &collected.round)?;
+        let collected = collected.thinned(self.settings.samples_per_round as usize);
         let collection = collected.record(round);
         self.store.write_round(&collected.round, &collection)?;
         Ok((collected.round, collection))
@@ -134,14 +145,44 @@ impl Run<'_, '_> {
             (StartFrom::Previous, Some(weights)) => weights.clone(),
             _ => Weights::init(settings.network, self.seed, u64::from(round)),
         };
-        let trained = self.trained_in(&folder, &start, d, &settings.fit_of_round(round), Some(round))?;
+        let fit = settings.fit_of_round(round);
+        let trained = self.trained_in(&folder, &start, d, &fit, Some(round), 0)?;
         let Some((weights, fit)) = trained else {
             return Err(Halt::Interrupted(previous));
         };
+        if !self.train_beside(&weights, d, round)? {
+            return Err(Halt::Interrupted(previous));
+        }
         let row = IterationRow::new(collection, d.len(), &fit);
         self.report(&Progress::Finished { row: &row, fit: &fit }, Some(&weights))?;
         self.rows.push(row);
         Ok(weights)
+    }
+
+    /// What the decision rule needs besides the network: an ensemble's other members, then a critic. `false` if
+    /// interrupted.
+    fn train_beside(&mut self, policy: &Weights, d: &Dataset, round: u32) -> Result<bool, Halt> {
+        let (settings, store) = (self.settings, self.store);
+        let fit = settings.fit_of_round(round);
+        for member in 1..settings.rule.members() {
+            let start = match (settings.start, round.checked_sub(1)) {
+                (StartFrom::Previous, Some(before)) => {
+                    Checkpoint::load(&learned::member_folder(store, before, member))?.weights
+                }
+                _ => Weights::init(settings.network, self.seed, index_of(Some(round), member)),
+            };
+            let folder = learned::member_folder(store, round, member);
+            if self.trained_in(&folder, &start, d, &fit, Some(round), member)?.is_none() {
+                return Ok(false);
+            }
+        }
+        let Some(target) = settings.rule.critic() else { return Ok(true) };
+        let novice = Learned::uncritical(settings, store, round, self.checkpoint(policy.clone()))?;
+        let control_period_s = 1e-3 * self.conditions.control_period_ms as f32;
+        let d = critic::dataset(target, d, &mut novice.ensemble(settings.device), control_period_s);
+        let start = Weights::init(settings.network, self.seed, index_of(Some(round), CRITIC));
+        let folder = learned::critic_folder(store, round);
+        Ok(self.trained_in(&folder, &start, &d, &critic::fit_settings(&fit), Some(round), CRITIC)?.is_some())
     }
 
     /// The optional longer training at the end.
@@ -153,11 +194,12 @@ impl Run<'_, '_> {
             StartFrom::Previous => policy.clone(),
             StartFrom::Scratch => Weights::init(self.settings.network, self.seed, FINAL),
         };
-        let trained = self.trained_in(&self.store.final_folder(), &start, d, &settings, None)?;
+        let trained = self.trained_in(&self.store.final_folder(), &start, d, &settings, None, 0)?;
         trained.map(|(weights, _)| weights).ok_or(Halt::Interrupted(Some(policy)))
     }
 
-    /// Trains into a folder, unless that was done before. `None` if interrupted.
+    /// Trains into a folder, unless that was done before. `None` if interrupted. `part`: 0 = the network, then what is
+    /// trained beside it.
     fn trained_in(
         &mut self,
         folder: &Path,
@@ -165,6 +207,7 @@ impl Run<'_, '_> {
         d: &Dataset,
         settings: &FitSettings,
         round: Option<u32>,
+        part: usize,
     ) -> Result<Option<(Weights, FitReport)>, Halt> {
         let unfinished = folder.join(fit::UNFINISHED);
         if Checkpoint::exists(folder)? {
@@ -173,8 +216,7 @@ impl Run<'_, '_> {
             return Ok(Some((Checkpoint::load(folder)?.weights, files::read(folder)?)));
         }
         files::create_folder(folder)?;
-        let index = round.map_or(FINAL, u64::from);
-        let seed = self.seed.child(Stream::Shuffle, index);
+        let seed = self.seed.child(Stream::Shuffle, index_of(round, part));
         let progress = &mut *self.hooks.progress;
         let mut on_step = |fit: &FitProgress| progress(&Progress::Fitting { round, fit });
         let DaggerSettings { inference, device, .. } = *self.settings;
@@ -225,3 +267,10 @@ fn check_finite(round: u32, collected: &Round) -> Result<(), DaggerError> {
 
 /// Index of the final training among the seeds of the rounds.
 const FINAL: u64 = 0xFFFF;
+/// Number of a critic among the parts of a round; the members of an ensemble come before it.
+const CRITIC: usize = 0x100;
+
+/// Index of a training among the seeds of all.
+fn index_of(round: Option<u32>, part: usize) -> u64 {
+    ((part as u64) << 16) | round.map_or(FINAL, u64::from)
+}

@@ -1,9 +1,11 @@
 //! Algorithm 2, the data-sampling function: who drives this tick, and which ticks are kept.
 
+use crate::dagger::critic;
 use crate::dagger::disturbance::Disturbance;
 use crate::dataset::Sample;
-use crate::decision_rule::{DecisionRule, Evidence};
+use crate::decision_rule::{Evidence, Gate, GateTick};
 use crate::drivers::{Novice, novice_decision};
+use crate::network::{Prediction, Predictor};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Driver, Fleet, GroundTruth, Seat};
@@ -23,7 +25,8 @@ pub enum Keep {
 /// behaviour cloning.
 pub(crate) struct GatedCollector {
     pub(crate) novice: Option<Novice>,
-    pub(crate) rule: DecisionRule,
+    /// Warns of states that the network does not master.
+    pub(crate) critic: Option<Predictor>,
     pub(crate) keep: Keep,
     pub(crate) geometry: GridGeometry,
     /// By episode.
@@ -34,17 +37,25 @@ pub(crate) struct GatedCollector {
     pub(crate) n_net: u64,
     /// Sum of τ̂ over all ticks, kept or not.
     pub(crate) tau_hat_sum: f64,
+    /// Times the expert took the wheel.
+    pub(crate) interventions: u64,
 }
 
 /// What belongs to one episode.
 pub(crate) struct CollectorSeat {
     pub(crate) expert: Box<dyn Driver + Send>,
+    /// Decides who drives.
+    pub(crate) gate: Box<dyn Gate>,
     /// Each observes the scene of every sample with noise of its own.
     pub(crate) augmenting_sensors: Vec<Sensor>,
     /// Disturbs whoever drives.
     pub(crate) disturbance: Option<Disturbance>,
     /// What was kept so far: `D_i` of this seat.
     pub(crate) kept: Kept,
+    /// τ̂ and the label of every tick, kept or not; nothing in behaviour cloning.
+    pub(crate) answers: Vec<(f32, [f32; 2])>,
+    /// The expert drove the last tick.
+    is_experts: bool,
     /// Decisions so far.
     ticks: u32,
 }
@@ -61,10 +72,12 @@ pub(crate) struct Kept {
 impl CollectorSeat {
     pub(crate) fn new(
         expert: Box<dyn Driver + Send>,
+        gate: Box<dyn Gate>,
         augmenting_sensors: Vec<Sensor>,
         disturbance: Option<Disturbance>,
     ) -> Self {
-        Self { expert, augmenting_sensors, disturbance, kept: Kept::default(), ticks: 0 } // line 2: D_i ← ∅
+        let (kept, answers) = (Kept::default(), Vec::new()); // line 2: D_i ← ∅
+        Self { expert, gate, augmenting_sensors, disturbance, kept, answers, is_experts: false, ticks: 0 }
     }
 
     /// Line 15, with the noise augmentations of the sample.
@@ -82,12 +95,13 @@ impl CollectorSeat {
 impl GatedCollector {
     pub(crate) fn new(
         novice: Option<Novice>,
-        rule: DecisionRule,
+        critic: Option<Predictor>,
         keep: Keep,
         geometry: GridGeometry,
         seats: Vec<CollectorSeat>,
     ) -> Self {
-        Self { novice, rule, keep, geometry, seats, n_tot: 0, n_net: 0, tau_hat_sum: 0.0 } // line 3
+        let (n_tot, n_net, interventions) = (0, 0, 0); // line 3
+        Self { novice, critic, keep, geometry, seats, n_tot, n_net, tau_hat_sum: 0.0, interventions }
     }
 
     /// Line 6, for all seats at once; each expert sees only its own seat.
@@ -101,6 +115,26 @@ impl GatedCollector {
                 expert.decide(&seat.situation)
             })
             .collect()
+    }
+
+    /// What a critic warns of at every seat, 0…1: the ahead axis of its answers, which mirror images share.
+    fn alarms(&mut self, seats: &[Seat<'_>]) -> Vec<f32> {
+        let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
+        let answers = self.critic.as_mut().map(|critic| critic.predict(&grids));
+        answers.map_or_else(|| vec![0.0; seats.len()], |answers| answers.iter().map(critic::alarm).collect())
+    }
+
+    /// Lines 7 to 9: who drives a seat, and with which τ̂.
+    fn ask_gate(&mut self, seat: &Seat<'_>, predicted: &Prediction, evidence: Evidence) -> bool {
+        let collector = &mut self.seats[seat.episode];
+        if seat.was_reset {
+            collector.gate.reset();
+        }
+        let novice = predicted.look_ahead(self.geometry);
+        let trusts_novice = collector.gate.trusts_novice(&GateTick { evidence, novice, situation: &seat.situation });
+        self.interventions += u64::from(!trusts_novice && !collector.is_experts);
+        collector.is_experts = !trusts_novice;
+        trusts_novice
     }
 
     /// Line 15 for all seats at once.
@@ -130,20 +164,25 @@ impl Fleet for GatedCollector {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
         let first = decisions.len();
         let predictions = self.novice.as_mut().map(|novice| novice.answers(seats)); // line 5
+        let alarms = self.alarms(seats);
         let expert_decisions = self.ask_experts(seats); // line 6
         let mut kept: Vec<Option<Sample>> = Vec::with_capacity(seats.len());
         for (index, (seat, expert)) in seats.iter().zip(expert_decisions).enumerate() {
             let a_exp = expert.look_ahead.to_image_fraction(&self.geometry).map(|fraction| fraction.clamp(0.0, 1.0));
             let grid = seat.situation.observation.grid;
             self.n_tot += 1; // line 17
-            let Some(predicted) = predictions.as_ref().map(|predictions| predictions[index]) else {
+            let Some((predicted, disagreement)) =
+                predictions.as_ref().map(|(means, spread)| (means[index], spread[index]))
+            else {
                 kept.push(Some(Sample { grid, label: a_exp, tau_hat: 0.0 }));
                 decisions.push(expert);
                 continue;
             };
-            let evidence = Evidence::new(&predicted, a_exp); // lines 7 and 8
+            // Lines 7 and 8.
+            let evidence = Evidence { disagreement, alarm: alarms[index], ..Evidence::new(&predicted, a_exp) };
             self.tau_hat_sum += f64::from(evidence.discrepancy);
-            let trusts_novice = self.rule.trusts_novice(&evidence); // line 9
+            self.seats[seat.episode].answers.push((evidence.discrepancy, a_exp));
+            let trusts_novice = self.ask_gate(seat, &predicted, evidence); // line 9
             if trusts_novice {
                 decisions.push(novice_decision(&predicted, self.geometry)); // line 10
                 self.n_net += 1; // line 11

@@ -1,15 +1,18 @@
 //! The one place where the drives of a round are set up, in a training and when a round is driven again.
 
+use crate::agreement::Agreement;
 use crate::checkpoint::Checkpoint;
 use crate::dagger::disturbance::Disturbance;
 use crate::dagger::gated_collector::{CollectorSeat, GatedCollector, Keep};
+use crate::dagger::learned::Learned;
 use crate::dagger::settings::DaggerSettings;
-use crate::dataset::{Collection, EpisodeRecord, Round, Tick};
-use crate::decision_rule::DecisionRule;
-use crate::drivers::Novice;
+use crate::dataset::{Collection, Effort, EpisodeRecord, Round, Tick};
+use crate::decision_rule::PAPER_TAU;
+use crate::decision_rule::{DecisionRule, GateContext};
 use crate::network::DeviceChoice;
 use rayon::prelude::*;
 use sim::batch::run_lockstep;
+use sim::controller::bumper_to_patch_m;
 use sim::driver::Driver;
 use sim::episode::{Episode, EpisodeReport};
 use sim::frame::Frame;
@@ -32,6 +35,7 @@ pub struct RoundEpisode {
 /// Drives that samples are collected from, at their start.
 pub struct Rollouts {
     collector: GatedCollector,
+    rule: DecisionRule,
     episodes: Vec<Episode>,
     origins: Vec<(EpisodeIndex, Direction)>,
 }
@@ -51,6 +55,10 @@ pub struct Collected {
     pub n_net: u64,
     /// Sum of τ̂ over all ticks, stored or not.
     pub tau_hat_sum: f64,
+    /// What it cost.
+    pub effort: Effort,
+    /// How network and expert agree; `None` in behaviour cloning.
+    pub agreement: Option<Agreement>,
     /// Executed actions in seconds.
     pub driven_s: f64,
 }
@@ -62,10 +70,9 @@ impl Rollouts {
     pub fn of_round(
         settings: &DaggerSettings,
         seed: RootSeed,
-        novice: Option<&Checkpoint>,
+        novice: Option<&Learned>,
         episodes: Vec<RoundEpisode>,
     ) -> Self {
-        let novice = novice.map(|checkpoint| Novice::new(checkpoint, &[], settings.device));
         let augmenting_sensors = |index: EpisodeIndex, episode: &Episode| -> Vec<Sensor> {
             let sensor = |part| episode.another_sensor(seed.child(Stream::NoiseAugmentation, index.part(part)));
             (0..settings.noise_augmentations).map(sensor).collect()
@@ -74,21 +81,23 @@ impl Rollouts {
             let is_disturbed = settings.disturbance.enabled && index.round() > 0;
             is_disturbed.then(|| Disturbance::new(settings.disturbance, seed.rng(Stream::Disturbance, index.stream())))
         };
-        Self::new(novice, settings.rule, settings.keep, episodes, &augmenting_sensors, &disturbance)
+        let DaggerSettings { rule, keep, device, .. } = *settings;
+        Self::new(novice, device, seed, (rule, keep), episodes, &augmenting_sensors, &disturbance)
     }
 
     /// On-policy labelled rollouts: the network alone drives, undisturbed, and the expert labels every tick.
     pub fn on_policy(novice: &Checkpoint, device: DeviceChoice, episodes: Vec<RoundEpisode>) -> Self {
-        let novice = Novice::new(novice, &[], device);
-        // Every discrepancy is below infinity: the network always drives.
-        let rule = DecisionRule::TauOnly { tau: f32::INFINITY };
-        Self::new(Some(novice), rule, Keep::EveryTick, episodes, &|_, _| Vec::new(), &|_| None)
+        // Every discrepancy is below infinity: the network always drives. Nothing is drawn at random.
+        let how = (DecisionRule::TauOnly { tau: f32::INFINITY }, Keep::EveryTick);
+        let novice = Learned::alone(novice.clone());
+        Self::new(Some(&novice), device, RootSeed(0), how, episodes, &|_, _| Vec::new(), &|_| None)
     }
 
     fn new(
-        novice: Option<Novice>,
-        rule: DecisionRule,
-        keep: Keep,
+        novice: Option<&Learned>,
+        device: DeviceChoice,
+        seed: RootSeed,
+        (rule, keep): (DecisionRule, Keep),
         episodes: Vec<RoundEpisode>,
         augmenting_sensors: &(dyn Fn(EpisodeIndex, &Episode) -> Vec<Sensor> + Sync),
         disturbance: &dyn Fn(EpisodeIndex) -> Option<Disturbance>,
@@ -104,20 +113,33 @@ impl Rollouts {
             .into_par_iter()
             .map(|(&(index, _), episode)| augmenting_sensors(index, episode))
             .collect();
+        let thresholds = novice.map(|novice| novice.thresholds).unwrap_or_default();
+        let gate = |index: EpisodeIndex, episode: &Episode| {
+            let rng = seed.rng(Stream::DecisionRule, index.stream());
+            rule.gate(GateContext { round: index.round(), episode: episode.settings(), thresholds, rng })
+        };
         let seats = experts
             .into_iter()
             .zip(sensors)
-            .zip(&origins)
-            .map(|((expert, sensors), &(index, _))| CollectorSeat::new(expert, sensors, disturbance(index)))
+            .zip(origins.iter().zip(&starts))
+            .map(|((expert, sensors), (&(index, _), episode))| {
+                CollectorSeat::new(expert, gate(index, episode), sensors, disturbance(index))
+            })
             .collect();
         let geometry = starts.first().map_or_else(GridGeometry::paper, |start| start.settings().sensing.geometry);
-        let collector = GatedCollector::new(novice, rule, keep, geometry, seats);
-        Self { collector, episodes: starts, origins }
+        let critic = novice.and_then(|novice| novice.critic(device));
+        let novice = novice.map(|novice| novice.novice(device));
+        let collector = GatedCollector::new(novice, critic, keep, geometry, seats);
+        Self { collector, rule, episodes: starts, origins }
     }
 
     /// Drives all episodes to their ends. `on_frame` is called with the place of the episode among those given, from 0.
     pub fn drive(self, on_frame: &mut dyn FnMut(usize, &Frame)) -> Collected {
-        let Self { mut collector, episodes, origins } = self;
+        let Self { mut collector, rule, episodes, origins } = self;
+        let bumper_to_patch_m = episodes.first().map_or(0.0, |episode| {
+            let settings = episode.settings();
+            bumper_to_patch_m(&settings.vehicle, &settings.sensing.geometry)
+        });
         let lots: Vec<String> = episodes.iter().map(|episode| episode.map().scenario().name.clone()).collect();
         let control_period_s = episodes.first().map_or(0.0, |episode| episode.settings().control_period_s());
         let mut ticks: Vec<Vec<Tick>> = vec![Vec::new(); episodes.len()];
@@ -128,7 +150,19 @@ impl Rollouts {
             on_frame(place, frame);
         });
 
-        let GatedCollector { seats, n_tot, n_net, tau_hat_sum, .. } = collector;
+        let GatedCollector { seats, n_tot, n_net, tau_hat_sum, interventions, geometry, .. } = collector;
+        let (tau_hats, labels): (Vec<f32>, Vec<[f32; 2]>) =
+            seats.iter().flat_map(|seat| seat.answers.iter().copied()).unzip();
+        let agreement =
+            Agreement::new(rule.tau().unwrap_or(PAPER_TAU), &tau_hats, &labels, &geometry, bumper_to_patch_m);
+        let expert_ticks = n_tot - n_net;
+        let effort = Effort {
+            // Behaviour cloning labels everything.
+            queries: if tau_hats.is_empty() || rule.asks_at_every_tick() { n_tot } else { expert_ticks },
+            interventions,
+            expert_ticks,
+            contacts: reports.iter().map(|report| report.metrics.contacts).sum(),
+        };
         let mut round = Round::default(); // line 20
         let mut records = Vec::with_capacity(seats.len());
         for (place, seat) in seats.into_iter().enumerate() {
@@ -146,11 +180,21 @@ impl Rollouts {
             round.noise_augmentations.extend(kept.noise_augmentations);
         }
         let driven_s = n_tot as f64 * f64::from(control_period_s);
-        Collected { round, episodes: records, reports, n_tot, n_net, tau_hat_sum, driven_s }
+        Collected { round, episodes: records, reports, n_tot, n_net, tau_hat_sum, effort, agreement, driven_s }
     }
 }
 
 impl Collected {
+    /// The same with at most so many samples, spread evenly over all of them; 0 = all.
+    #[must_use]
+    pub(crate) fn thinned(self, at_most: usize) -> Self {
+        let round = self.round.thinned(at_most);
+        let of = |episode: u32| round.ticks.iter().filter(|tick| tick.episode == episode).count();
+        let episodes = (0..).zip(self.episodes);
+        let episodes = episodes.map(|(index, record)| EpisodeRecord { samples: of(index), ..record }).collect();
+        Self { round, episodes, ..self }
+    }
+
     /// The record of these drives as those of a round.
     pub(crate) fn record(&self, round: u32) -> Collection {
         Collection {
@@ -163,6 +207,8 @@ impl Collected {
             driven_s: self.driven_s,
             near_collisions: self.reports.iter().map(|report| report.metrics.near_collisions).sum(),
             driven_m: self.reports.iter().map(|report| f64::from(report.metrics.driven_m)).sum(),
+            effort: Some(self.effort),
+            agreement: self.agreement,
             episodes: self.episodes.clone(),
         }
     }

@@ -23,6 +23,10 @@ pub struct DaggerSettings {
     /// Noise augmentations of every kept tick, 0 to 255: the same scene with other draws of the sensor noise, trained on
     /// with the same label. Cheaper than driving more, and teaches what is noise.
     pub noise_augmentations: u8,
+    /// Samples of a round that are learned from, spread evenly over those that are kept; 0 = all. Makes rules compare at
+    /// equal samples.
+    #[serde(default)]
+    pub samples_per_round: u32,
     /// Where each iteration's training starts.
     pub start: StartFrom,
     /// Where the network is computed.
@@ -63,6 +67,7 @@ impl DaggerSettings {
             iterations_max: 8,
             keep: Keep::ExpertTicks,
             noise_augmentations: 0,
+            samples_per_round: 0,
             start: StartFrom::Scratch,
             device: DeviceChoice::Cpu,
             rule: DecisionRule::paper(),

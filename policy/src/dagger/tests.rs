@@ -257,7 +257,7 @@ fn one_episode_of_a_round_driven_again_is_the_same() {
     let store = Store::open(&folder).unwrap();
     for round in 0..2 {
         let (stored, _) = store.read_round(round).unwrap();
-        let novice = round.checked_sub(1).map(|before| Checkpoint::load(&store.round_folder(before)).unwrap());
+        let novice = (round > 0).then(|| Learned::of_round(&settings, &store, round).unwrap());
         let second = of_round(round, 2).pop().into_iter().collect();
         let again = Rollouts::of_round(&settings, RootSeed(6), novice.as_ref(), second).drive(&mut |_, _| {}).round;
         let first = stored.ticks.iter().position(|tick| tick.episode == 1).unwrap();
@@ -276,7 +276,7 @@ fn ticks_say_where_and_when_samples_were_taken() {
     let weights = Weights::init(settings.network, RootSeed(3), 0);
     let checkpoint = Checkpoint { weights, conditions: conditions(), inference: settings.inference };
     let mut frames: Vec<Vec<Frame>> = vec![Vec::new(); 2];
-    let rollouts = Rollouts::of_round(&settings, RootSeed(6), Some(&checkpoint), of_round(1, 2));
+    let rollouts = Rollouts::of_round(&settings, RootSeed(6), Some(&Learned::alone(checkpoint)), of_round(1, 2));
     let collected = rollouts.drive(&mut |episode, frame| frames[episode].push(*frame));
     let Collected { round, episodes: records, reports, .. } = collected;
     assert_eq!(round.ticks.len(), round.samples.len());
@@ -305,4 +305,45 @@ fn ticks_say_where_and_when_samples_were_taken() {
             (report.metrics.near_collisions, report.metrics.driven_m)
         );
     }
+}
+
+/// Whatever a rule needs besides the network is trained, written and read back; rounds are thinned to equal samples.
+#[test]
+fn every_rule_of_the_family_trains_and_its_round_is_driven_again_as_it_was() {
+    for name in ["vanilla", "safe_dagger", "ensemble_dagger", "hg_dagger", "lazy_dagger", "thrifty_dagger"] {
+        let folder = scratch(name);
+        let rule = DecisionRule::named(name).unwrap();
+        let keep = Keep::EveryTick;
+        let settings = DaggerSettings { rule, keep, iterations_max: 1, samples_per_round: 150, ..settings() };
+        let outcome = run_in(&folder, &settings, &mut go_on).unwrap();
+        let store = Store::open(&folder).unwrap();
+        let (stored, about) = store.read_round(1).unwrap();
+        let in_episodes: usize = about.episodes.iter().map(|episode| episode.samples).sum();
+        assert_eq!((stored.samples.len(), in_episodes, outcome.rows[1].samples), (150, 150, 150), "{name}");
+        let effort = about.effort.unwrap();
+        assert_eq!(effort.expert_ticks, about.ticks - about.novice_ticks, "{name}");
+        assert!(effort.interventions <= effort.expert_ticks && effort.queries <= about.ticks, "{name}: {effort:?}");
+        assert!(about.agreement.unwrap().within_tau <= 1.0);
+        let parts = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name());
+        let parts = parts.filter(|part| part.to_string_lossy().starts_with("round-01-")).count();
+        assert_eq!(parts + 1, rule.networks(), "{name}");
+        let novice = Learned::of_round(&settings, &store, 1).unwrap();
+        let again = Rollouts::of_round(&settings, RootSeed(6), Some(&novice), of_round(1, 2)).drive(&mut |_, _| {});
+        assert_eq!((again.n_net, again.effort), (about.novice_ticks, effort), "{name}");
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}
+
+/// The control: the expert drives on, and nothing but the amount of data differs from behaviour cloning.
+#[test]
+fn without_control_by_the_network_the_expert_is_never_interrupted() {
+    let folder = scratch("control");
+    let settings = DaggerSettings { rule: DecisionRule::ExpertOnly, iterations_max: 1, ..settings() };
+    let outcome = run_in(&folder, &settings, &mut go_on).unwrap();
+    let row = &outcome.rows[1];
+    let effort = row.effort.unwrap();
+    assert_eq!((row.eta_hat, effort.interventions), (Some(0.0), 2), "one per drive");
+    assert_eq!((effort.queries, effort.expert_ticks), (row.samples as u64, row.samples as u64));
+    assert!(row.agreement.is_some(), "the network answers, though nobody follows it");
+    std::fs::remove_dir_all(folder).unwrap();
 }

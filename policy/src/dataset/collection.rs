@@ -1,5 +1,6 @@
 //! How a round was collected: `round.toml`.
 
+use crate::agreement::Agreement;
 use crate::files::{self, FileError, Format};
 use serde::{Deserialize, Serialize};
 use sim::scenario::Direction;
@@ -27,8 +28,28 @@ pub struct Collection {
     pub near_collisions: u32,
     /// Metres driven.
     pub driven_m: f64,
+    /// What it cost the expert and the car; `None` in rounds of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub effort: Option<Effort>,
+    /// How network and expert agree; `None` in behaviour cloning and in rounds of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub agreement: Option<Agreement>,
     /// Episodes driven, in the order that `ticks.npz` numbers them.
     pub episodes: Vec<EpisodeRecord>,
+}
+
+/// What a collection costs: the expert's time, and the car.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Effort {
+    /// Ticks at which the method asks the expert, to decide who drives or to label. The simulator's expert answers all.
+    pub queries: u64,
+    /// Times the expert takes the wheel.
+    pub interventions: u64,
+    /// Ticks the expert drives.
+    pub expert_ticks: u64,
+    /// Contacts: the body touches something.
+    pub contacts: u32,
 }
 
 /// One episode of a round.

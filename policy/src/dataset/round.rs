@@ -29,9 +29,42 @@ impl Round {
         self.noise_augmentations.len() / self.samples.len().max(1)
     }
 
+    /// At most so many of the samples, spread evenly over all of them; 0 = all.
+    #[must_use]
+    pub(crate) fn thinned(&self, at_most: usize) -> Self {
+        let count = self.samples.len();
+        if at_most == 0 || count <= at_most {
+            return self.clone();
+        }
+        let places = || (0..at_most).map(|i| i * count / at_most);
+        Self {
+            samples: places().map(|place| self.samples[place]).collect(),
+            ticks: places().filter_map(|place| self.ticks.get(place).copied()).collect(),
+            noise_augmentations: places().flat_map(|place| self.augmentations_of(place).iter().copied()).collect(),
+        }
+    }
+
     /// Noise augmentations of a sample.
     pub(crate) fn augmentations_of(&self, sample: usize) -> &[OccupancyGrid] {
         let each = self.augmentations_each();
         &self.noise_augmentations[sample * each..(sample + 1) * each]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::test_data::collected;
+
+    #[test]
+    fn thinned_rounds_keep_samples_with_their_ticks_and_augmentations() {
+        let (round, _) = collected(30, 2);
+        let thinned = round.thinned(7);
+        assert_eq!((thinned.samples.len(), thinned.ticks.len(), thinned.noise_augmentations.len()), (7, 7, 14));
+        for (at, place) in [(0, 0), (1, 4), (6, 25)] {
+            assert_eq!(thinned.samples[at], round.samples[place]);
+            assert_eq!(thinned.ticks[at], round.ticks[place]);
+            assert_eq!(thinned.augmentations_of(at), round.augmentations_of(place));
+        }
+        assert_eq!((round.thinned(0), round.thinned(30)), (round.clone(), round));
     }
 }

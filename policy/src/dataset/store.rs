@@ -10,6 +10,8 @@
 //! round-01/…
 //!          learning.csv    how it was trained, step by step
 //!          sha256sums       what of this is finished
+//! round-01-member-1/…       another member of an ensemble, for rules that drive with one
+//! round-01-critic/…         what warns of states that the network does not master, for rules that need it
 //! final/                    an optional longer fit on everything
 //! ```
 //!
@@ -56,6 +58,11 @@ impl Store {
     /// The folder of a round.
     pub fn round_folder(&self, round: u32) -> PathBuf {
         self.folder.join(format!("round-{round:02}"))
+    }
+
+    /// The folder of what is trained beside the network of a round.
+    pub(crate) fn part_folder(&self, round: u32, part: &str) -> PathBuf {
+        self.folder.join(format!("round-{round:02}-{part}"))
     }
 
     /// The folder of the final fit.

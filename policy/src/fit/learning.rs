@@ -100,6 +100,7 @@ mod tests {
         let report = FitReport {
             training_samples: 40,
             validation_samples: 9,
+            mean_weight: None,
             steps: 4,
             kept_step: 4,
             stopped: false,

@@ -68,6 +68,10 @@ pub struct FitReport {
     pub training_samples: usize,
     /// Samples held back.
     pub validation_samples: usize,
+    /// Mean weight of the squared error over the samples trained on: 1 = the weight of τ̂ does nothing. `None` in fits of
+    /// earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_weight: Option<f32>,
     /// Steps done.
     pub steps: u32,
     /// The step whose weights are returned.

@@ -78,14 +78,15 @@ pub enum KeepWeights {
 }
 
 impl FitSettings {
-    /// Paper, policy network training: Adam 1e-5, batch 512, "100k epochs" read as steps (docs/methods.md 4.2).
+    /// Paper, policy network training: Adam 1e-5, batch 512, "100k epochs" read as steps, no clipping of gradients
+    /// (docs/methods.md 4.2).
     pub fn paper() -> Self {
         Self {
             budget: Budget::Steps(100_000),
             batch: 512,
             learning_rate: LearningRate::constant(1e-5),
             adam: AdamSettings::paper(),
-            gradient_norm_max: 5.0,
+            gradient_norm_max: 0.0,
             loss: LossSettings::paper(),
             mirror: Mirror::Off,
             validation: ValidationSplit::paper(),
@@ -104,6 +105,7 @@ impl FitSettings {
             budget: Budget::Steps(steps),
             batch: 128,
             learning_rate: LearningRate { peak: 1e-3, floor: 1e-5, warm_up_steps: 50, shape: ScheduleShape::Cosine },
+            gradient_norm_max: 5.0,
             mirror: Mirror::Half,
             loss: LossSettings { beta: 0.5, ..LossSettings::paper() },
             validate_every: 250,

@@ -183,6 +183,7 @@ pub fn fit(
     let report = FitReport {
         training_samples: split.training.len(),
         validation_samples: split.validation.len(),
+        mean_weight: Some(settings.loss.mean_weight(&split.training)),
         steps: done,
         kept_step: best.step,
         stopped,

@@ -20,16 +20,33 @@ impl Ensemble {
 
     /// Answers every grid, in order.
     pub fn predict(&mut self, grids: &[&OccupancyGrid]) -> Vec<Prediction> {
+        self.predict_with_disagreement(grids).0
+    }
+
+    /// The same, and how far the members' means are spread about their mean, root mean square, image fractions: 0 of a
+    /// single network.
+    pub fn predict_with_disagreement(&mut self, grids: &[&OccupancyGrid]) -> (Vec<Prediction>, Vec<f32>) {
         let mut answers = self.first.predict(grids);
+        let mut disagreement = vec![0.0; answers.len()];
         if self.others.is_empty() {
-            return answers;
+            return (answers, disagreement);
         }
         let others: Vec<Vec<Prediction>> = self.others.iter_mut().map(|member| member.predict(grids)).collect();
-        for (at, answer) in answers.iter_mut().enumerate() {
-            *answer = mixture(*answer, || others.iter().map(|answers| answers[at]));
+        for (at, (answer, disagreement)) in answers.iter_mut().zip(&mut disagreement).enumerate() {
+            let first = *answer;
+            *answer = mixture(first, || others.iter().map(|answers| answers[at]));
+            let members = std::iter::once(first).chain(others.iter().map(|answers| answers[at]));
+            *disagreement = spread(answer.mean, members);
         }
-        answers
+        (answers, disagreement)
     }
+}
+
+/// Root mean square distance of the members' means from `mean`.
+fn spread(mean: [f32; 2], members: impl Iterator<Item = Prediction> + Clone) -> f32 {
+    let count = members.clone().count() as f32;
+    let squared = |answer: Prediction| (answer.mean[0] - mean[0]).powi(2) + (answer.mean[1] - mean[1]).powi(2);
+    (members.map(squared).sum::<f32>() / count).sqrt()
 }
 
 /// Mean and standard deviation of a mixture with equal weights.
@@ -77,6 +94,10 @@ mod tests {
                 assert!((both.sigma[axis] - variance.sqrt()).abs() < 1e-6 * variance.sqrt().max(1.0));
             }
         }
+        // Two members 0.2 apart on either axis are 0.1 · √2 from their mean, however sure each is.
+        let apart = |mean, sigma| Prediction { mean: [mean; 2], sigma: [sigma; 2] };
+        let members = [apart(0.4, 0.01), apart(0.6, 0.3)];
+        assert!((spread([0.5; 2], members.into_iter()) - 0.02f32.sqrt()).abs() < 1e-6);
         let narrow = |mean| Prediction { mean: [mean; 2], sigma: [0.01; 2] };
         let apart = mixture(narrow(0.4), || std::iter::once(narrow(0.6)));
         assert!((apart.sigma[0] - 0.1f32.hypot(0.01)).abs() < 1e-6 && (apart.mean[0] - 0.5).abs() < 1e-6);

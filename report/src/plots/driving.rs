@@ -86,6 +86,17 @@ pub fn rates_against_lots(title: &str, counts: &[String], drivers: &[RateSeries]
     rates_against(title, x, drivers)
 }
 
+/// Rates against the share of the ticks at which the expert is asked while data are collected, percent.
+pub fn rates_against_effort(title: &str, rules: &[RateSeries]) -> String {
+    let x = Axis {
+        label: "ticks at which the expert is asked while collecting, %",
+        range: -4.0..104.0,
+        ticks: 6,
+        labels: Labels::Numbers(0),
+    };
+    rates_against(title, x, rules)
+}
+
 /// A line with whiskers per driver. Drivers are set a little apart, so that whiskers do not hide each other.
 fn rates_against(title: &str, x: Axis<'_>, drivers: &[RateSeries]) -> String {
     let points = || drivers.iter().flat_map(|driver| &driver.points);

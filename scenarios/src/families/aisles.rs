@@ -1,9 +1,9 @@
-//! Car parks with several parallel aisles: rows of stalls, many of them empty, on both sides; the way goes round the row
-//! ends from aisle to aisle; side aisles are closed or dead ends.
+//! Car parks with several parallel aisles: rows of stalls, many of them empty, on both sides and across the ends; the way
+//! goes round the row ends from aisle to aisle; side aisles are closed or dead ends.
 
 use super::course::{Course, first_apart};
-use super::parts::{RUN_OUT_M, close, lot, things_on};
-use super::strip::{Notch, Strip, Stub};
+use super::parts::{RUN_OUT_M, close, lot, solid_height_m, things_on};
+use super::strip::{Mouth, Notch, Strip, Stub};
 use super::things::{self, Rules, Things, facing, side, yaw_rad};
 use super::walls::{Wall, yard};
 use crate::clutter::draw_car;
@@ -25,7 +25,7 @@ const MEDIAN_M: Range<f32> = 0.5..2.5;
 const ROW_END_M: Range<f32> = 1.0..3.0;
 const SIDE_AISLE_M: Range<f32> = 4.5..6.0;
 /// How far the ends of aisles go on behind what closes them, metres.
-const DEAD_END_M: Range<f32> = 5.0..10.0;
+const DEAD_END_M: Range<f32> = STALL_DEPTH_M + 0.5..10.0;
 /// The centre line at most, run-outs included, metres.
 const LENGTH_MAX_M: f32 = 225.0;
 
@@ -38,32 +38,34 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
         return None;
     }
     let mut things = things_on(&strip);
-    let mouths: Vec<_> = side_aisles
-        .iter()
-        .map(|aisle| strip.mouth(aisle))
-        .chain(strip.stub_mouths().into_iter().map(|(mouth, _)| mouth))
-        .collect();
-    for mouth in mouths {
-        close(&mut things, mouth, obstacles);
-    }
     let occupancy = obstacles.random_range(0.25..0.9);
+    let side_mouths = side_aisles.iter().map(|aisle| (strip.mouth(aisle), false));
+    let is_row = |mouth: &Mouth| mouth.depth_m <= STALL_DEPTH_M;
+    let end_mouths = strip.stub_mouths().into_iter().map(|mouth| (mouth, is_row(&mouth)));
+    for (mouth, has_stalls) in side_mouths.chain(end_mouths) {
+        if has_stalls {
+            park_across(&mut things, &mouth, stall_m, occupancy, obstacles);
+        } else {
+            close(&mut things, &mouth, obstacles);
+        }
+    }
     for row in &rows {
         park(&mut things, &strip, row, stall_m, occupancy, obstacles);
     }
     in_the_aisle(&mut things, &strip, obstacles);
-    let boundary = enclose(&mut things, strip.outline(0.0), layout);
-    Some((lot(&strip, boundary, things), strip))
+    let (boundary, boundary_height_m) = enclose(&mut things, strip.outline(0.0), layout);
+    Some((Scenario { boundary_height_m, ..lot(&strip, boundary, things) }, strip))
 }
 
 /// The ground beside is solid, or lies behind a kerb or a low wall.
-fn enclose(things: &mut Things<'_>, outline: Vec<Vec2>, rng: &mut Rng) -> Vec<Vec2> {
+fn enclose(things: &mut Things<'_>, outline: Vec<Vec2>, rng: &mut Rng) -> (Vec<Vec2>, f32) {
     let wall = match rng.random_range(0..10) {
-        0..5 => return outline,
+        0..5 => return (outline, solid_height_m(rng)),
         5..8 => Wall::kerb(),
         _ => Wall::low(rng),
     };
     things.obstacles.extend(wall.around(&outline, &[]));
-    yard(&outline, 2.0..8.0, rng)
+    (yard(&outline, 2.0..8.0, rng), 0.0)
 }
 
 /// Up and down, from aisle to aisle.
@@ -82,20 +84,25 @@ fn course(rng: &mut Rng) -> Course {
             break;
         }
         let chamfer_m = rng.random_range(0.0..1.0);
-        let stub = |rng: &mut Rng, is_first: bool| {
-            let depth_m = rng.random_range(DEAD_END_M);
-            let ahead = if is_first { Stub::Ahead(depth_m) } else { Stub::Behind(depth_m) };
-            rng.random_bool(0.5).then_some(ahead)
-        };
-        course.corner(turn_rad, chamfer_m, stub(rng, true));
+        course.corner(turn_rad, chamfer_m, row_or_dead_end(rng));
         course.widen(cross_m);
         course.straight(pitch_m);
-        course.corner(turn_rad, chamfer_m, stub(rng, false));
+        course.corner(turn_rad, chamfer_m, row_or_dead_end(rng));
         course.widen(aisle_m);
         course.straight(if k == aisles - 1 { leg_m * rng.random_range(0.4..1.0) + RUN_OUT_M } else { leg_m });
         turn_rad = -turn_rad;
     }
     course
+}
+
+/// What a driver sees where the way turns off: a row of stalls across the end of the aisle, or ground that goes on.
+fn row_or_dead_end(rng: &mut Rng) -> Option<Stub> {
+    let depth_m = if rng.random_bool(0.4) { STALL_DEPTH_M } else { rng.random_range(DEAD_END_M) };
+    match rng.random_range(0..10) {
+        0..4 => Some(Stub::Ahead(depth_m)),
+        4..8 => Some(Stub::Behind(depth_m)),
+        _ => None,
+    }
 }
 
 /// Rows of stalls along the aisles, and side aisles through them.
@@ -150,6 +157,25 @@ fn park(things: &mut Things<'_>, strip: &Strip, row: &Notch, stall_m: f32, occup
             continue;
         };
         things.stand(things::obstacle(class, strip.point(s_m, row.side.sign() * d_m), heading));
+    }
+}
+
+/// Cars in some of the stalls across the end of an aisle, wheel stops in others.
+fn park_across(things: &mut Things<'_>, mouth: &Mouth, stall_m: f32, occupancy: f64, rng: &mut Rng) {
+    let stalls = (mouth.a.distance(mouth.b) / stall_m).floor().max(1.0);
+    for k in 0..stalls as usize {
+        let class = draw_car(rng);
+        let into_rad = mouth.outward().to_angle();
+        let (class, depth_m, heading_rad) = if rng.random_bool(occupancy) {
+            let depth_m = rng.random_range(0.1..0.4) + 0.5 * class.default_size_m()[0];
+            (class, depth_m, into_rad + yaw_rad(rng, 3.0) + facing(rng))
+        } else if rng.random_bool(0.5) {
+            (ObstacleClass::WheelStop, STALL_DEPTH_M - 0.6, into_rad + std::f32::consts::FRAC_PI_2)
+        } else {
+            continue;
+        };
+        let at = mouth.a.lerp(mouth.b, (k as f32 + 0.5) / stalls) + mouth.outward() * depth_m;
+        things.stand(things::obstacle(class, at, heading_rad));
     }
 }
 

@@ -1,7 +1,7 @@
 //! Lanes of one width all along: bends that are not widened, S-curves, chicanes, offset gaps beside double-parked cars.
 
 use super::course::{Course, first_apart};
-use super::parts::{RUN_OUT_M, lot, things_on};
+use super::parts::{RUN_OUT_M, lot, solid_height_m, things_on};
 use super::strip::Strip;
 use super::things::{Rules, Things, facing, side, yaw_rad};
 use super::walls::{self, Wall};
@@ -53,20 +53,20 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
         Obstruction::DoubleParked => double_parked(&mut things, strip.length_m(), width_m, gap_m, obstacles),
     }
     let outline = strip.outline(0.0);
-    let boundary = enclose(&mut things, outline, layout);
-    Some((lot(&strip, boundary, things), strip))
+    let (boundary, boundary_height_m) = enclose(&mut things, outline, layout);
+    Some((Scenario { boundary_height_m, ..lot(&strip, boundary, things) }, strip))
 }
 
 /// Solid ground beside the lane, or a wall or a kerb with free ground behind.
-fn enclose(things: &mut Things<'_>, outline: Vec<Vec2>, rng: &mut Rng) -> Vec<Vec2> {
+fn enclose(things: &mut Things<'_>, outline: Vec<Vec2>, rng: &mut Rng) -> (Vec<Vec2>, f32) {
     let wall = match rng.random_range(0..100) {
-        0..50 => return outline,
+        0..50 => return (outline, solid_height_m(rng)),
         50..70 => Wall::tall(rng),
         70..90 => Wall::low(rng),
         _ => Wall::kerb(),
     };
     things.obstacles.extend(wall.around(&outline, &[]));
-    walls::yard(&outline, YARD_M, rng)
+    (walls::yard(&outline, YARD_M, rng), 0.0)
 }
 
 fn course(width_m: f32, rng: &mut Rng) -> Course {

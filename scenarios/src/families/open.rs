@@ -71,7 +71,6 @@ impl Item {
 /// An area beside the way, in which planters are raised.
 struct Ground<'a> {
     things: Things<'a>,
-    planters: Vec<Island>,
     wall: Wall,
 }
 
@@ -80,14 +79,13 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
     let outline = strip.outline(0.0);
     let boundary = yard(&outline, AROUND_M, layout);
     let wall = if layout.random_bool(0.6) { Wall::tall(layout) } else { Wall::low(layout) };
-    let mut ground = Ground { things: things_on(&strip), planters: Vec::new(), wall };
+    let mut ground = Ground { things: things_on(&strip), wall };
     for stretch in stretches(&outline) {
         ground.line(&stretch, obstacles);
     }
     on_the_way(&mut ground.things, &strip, obstacles);
     ground.scatter(&outline, &boundary, obstacles);
-    let Ground { things, planters, .. } = ground;
-    Some((Scenario { islands: planters, ..lot(&strip, boundary, things) }, strip))
+    Some((lot(&strip, boundary, ground.things), strip))
 }
 
 fn course(rng: &mut Rng) -> Course {
@@ -199,7 +197,7 @@ impl Ground<'_> {
         let has_tree = rng.random_bool(0.4);
         let is_free = self.things.reserve(polygon.clone());
         if is_free {
-            self.planters.push(Island { polygon, height_m: 0.15 });
+            self.things.islands.push(Island { polygon, height_m: 0.15 });
             if has_tree {
                 let trunk = things::obstacle(ObstacleClass::Pillar, pose.position(), 0.0);
                 let size_m = Some(0.3);

@@ -4,6 +4,7 @@ use super::route;
 use super::strip::{Mouth, Strip};
 use super::things::{self, Things};
 use super::walls::Wall;
+use crate::corridor::to_millimetres;
 use rand::RngExt as _;
 use sim::geometry::Vec2;
 use sim::scenario::{LotNoise, ObstacleClass, Scenario};
@@ -25,15 +26,24 @@ pub(super) fn things_on(strip: &Strip) -> Things<'_> {
     Things::new(strip, (from_m + END_CLEAR_M, to_m - END_CLEAR_M))
 }
 
-/// Closes the mouth of a side road by a row of cones or bollards, or by a barrier.
-pub(super) fn close(things: &mut Things<'_>, (a, b): Mouth, rng: &mut Rng) {
+/// Closes a side road at its mouth or some way behind it: by a row of cones or bollards, a barrier or a kerb.
+pub(super) fn close(things: &mut Things<'_>, mouth: &Mouth, rng: &mut Rng) {
     /// The car is 1.86 m wide.
     const SPACING_M: f32 = 1.2;
-    let class = match rng.random_range(0..4) {
+    /// Left open behind what closes it, metres.
+    const BEHIND_M: f32 = 3.0;
+    let behind_m: f32 = if rng.random_bool(0.5) { 0.0 } else { rng.random_range(0.0..4.0) };
+    let shift = mouth.outward() * behind_m.min(mouth.depth_m - BEHIND_M).max(0.0);
+    let (a, b) = (to_millimetres(mouth.a + shift), to_millimetres(mouth.b + shift));
+    let class = match rng.random_range(0..6) {
         0 | 1 => ObstacleClass::Cone,
         2 => ObstacleClass::Bollard,
-        _ => {
+        3 => {
             things.obstacles.extend(Wall::low(rng).straight(a, b));
+            return;
+        }
+        _ => {
+            things.obstacles.extend(Wall::kerb().straight(a, b));
             return;
         }
     };
@@ -41,6 +51,11 @@ pub(super) fn close(things: &mut Things<'_>, (a, b): Mouth, rng: &mut Rng) {
     for k in 0..count as usize {
         things.stand(things::obstacle(class, a.lerp(b, (k as f32 + 0.5) / count), 0.0));
     }
+}
+
+/// How high solid ground beside the way is, metres: 0 hides nothing, more hides the ground behind corners.
+pub(super) fn solid_height_m(rng: &mut Rng) -> f32 {
+    if rng.random_bool(0.4) { 0.0 } else { (rng.random_range(1.5_f32..4.0) * 10.0).round() / 10.0 }
 }
 
 /// Puts a lot together.
@@ -51,7 +66,7 @@ pub(super) fn lot(strip: &Strip, boundary: Vec<Vec2>, things: Things<'_>) -> Sce
         boundary_height_m: 0.0,
         reference_path: route::along(strip, driven_m(strip), &things.narrowings),
         noise: LotNoise::default(),
-        islands: Vec::new(),
+        islands: things.islands,
         obstacles: things.obstacles,
         speed_bumps: Vec::new(),
     }

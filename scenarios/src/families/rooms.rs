@@ -43,8 +43,8 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
     let boundary = yard(&outline, ROOM_M, layout);
     let mut walls = wall.around(&outline, &doors);
     walls.extend(partitions(&outline, &boundary, &wall, layout));
-    for (mouth, _) in strip.stub_mouths().into_iter().filter(|(_, depth_m)| *depth_m >= BEHIND_DOOR_M.start) {
-        walls.extend(wall_with_door(mouth, &wall, layout));
+    for mouth in strip.stub_mouths().into_iter().filter(|mouth| mouth.depth_m >= BEHIND_DOOR_M.start) {
+        walls.extend(wall_with_door(&mouth, &wall, layout));
     }
     let mut things = things_on(&strip);
     pillars(&mut things, &strip, obstacles);
@@ -108,7 +108,7 @@ fn cut_walls(strip: &mut Strip, rng: &mut Rng) -> Vec<Opening> {
 }
 
 /// Across a mouth.
-fn wall_with_door((a, b): Mouth, wall: &Wall, rng: &mut Rng) -> Vec<Obstacle> {
+fn wall_with_door(&Mouth { a, b, .. }: &Mouth, wall: &Wall, rng: &mut Rng) -> Vec<Obstacle> {
     let half_door_m = 0.5 * rng.random_range(DOOR_M);
     let along = (b - a).normalize();
     let door = a.lerp(b, rng.random_range(0.35..0.65));

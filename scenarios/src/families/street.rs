@@ -1,15 +1,16 @@
-//! Streets: kerbs with a pavement behind, parked cars on both sides that leave offset gaps and chicanes, trees and posts,
-//! side roads closed by cones or barriers.
+//! Streets: kerbs with a pavement behind, parked cars on both sides that leave offset gaps and chicanes, pavements built out
+//! into the street, refuges in its middle, trees and posts, side roads that are closed.
 
 use super::course::{Course, first_apart};
 use super::parts::{RUN_OUT_M, close, lot, things_on};
 use super::strip::{Notch, Strip, Stub};
-use super::things::{self, Rules, Things, facing, yaw_rad};
+use super::things::{self, Rules, Things, facing, side, yaw_rad};
 use super::walls::Wall;
 use crate::clutter::draw_car;
-use crate::corridor::Side;
+use crate::corridor::{Side, to_millimetres};
 use rand::RngExt as _;
-use sim::scenario::{Obstacle, ObstacleClass, Scenario};
+use sim::geometry::Vec2;
+use sim::scenario::{Island, Obstacle, ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::ops::Range;
 
@@ -36,14 +37,12 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
         strip.notches.clear();
     }
     let mut things = things_on(&strip);
-    let mouths: Vec<_> = strip
-        .notches
-        .iter()
-        .map(|notch| strip.mouth(notch))
-        .chain(strip.stub_mouths().into_iter().map(|(mouth, _)| mouth))
-        .collect();
-    for mouth in mouths {
+    let mouths: Vec<_> = strip.notches.iter().map(|notch| strip.mouth(notch)).chain(strip.stub_mouths()).collect();
+    for mouth in &mouths {
         close(&mut things, mouth, obstacles);
+    }
+    if obstacles.random_bool(0.6) {
+        built_out(&mut things, &strip, obstacles);
     }
     parked_cars(&mut things, &strip, obstacles);
     on_the_pavement(&mut things, &strip, pavement_m, obstacles);
@@ -92,6 +91,61 @@ fn side_roads(strip: &Strip, pavement_m: f32, rng: &mut Rng) -> Vec<Notch> {
         }
     }
     roads
+}
+
+/// Pavements built out from either side, and refuges that the way passes on their wider side.
+fn built_out(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
+    /// Between a refuge and the kerb on its narrower side, metres: far too narrow for the car, or wide enough.
+    const NARROW_SIDE_M: [Range<f32>; 2] = [0.6..1.5, 2.8..4.0];
+    let rules = Rules { gap_m: rng.random_range(2.9..4.2), apart_m: 8.0, corner_clear_m: 7.0 };
+    for _ in 0..rng.random_range(1..10) {
+        let side = side(rng);
+        let (from_m, length_m) = (rng.random_range(0.0..strip.length_m()), rng.random_range(2.0..12.0));
+        let half_m = strip.half_width_m(from_m);
+        let (from_kerb_m, depth_m) = if rng.random_bool(0.5) {
+            (0.03, rng.random_range(0.8..4.0))
+        } else {
+            let passable = usize::from(rng.random_bool(0.5));
+            (rng.random_range(NARROW_SIDE_M[passable].clone()), rng.random_range(0.5..2.0))
+        };
+        let height_m = if rng.random_bool(0.8) { 0.15 } else { 1.0 };
+        let taper_m = (depth_m * rng.random::<f32>()).min(0.4 * length_m);
+        let across_m = (half_m - from_kerb_m - depth_m, half_m - from_kerb_m);
+        let polygon = rounded_off(strip, side, (from_m, from_m + length_m), across_m, taper_m);
+        let is_on_one_width = (strip.half_width_m(from_m + length_m) - half_m).abs() < 0.01;
+        let meets_notch = strip
+            .notches
+            .iter()
+            .any(|notch| notch.side == side && notch.from_m < from_m + length_m + 1.0 && from_m < notch.to_m + 1.0);
+        if is_on_one_width && !meets_notch {
+            things.narrow_by_island(Island { polygon, height_m }, side, from_m + 0.5 * length_m, &rules);
+        }
+    }
+}
+
+/// Ground along the strip whose inner corners are cut off; `across_m` is measured from the axis to the side.
+fn rounded_off(
+    strip: &Strip,
+    side: Side,
+    (from_m, to_m): (f32, f32),
+    (inner_m, outer_m): (f32, f32),
+    taper_m: f32,
+) -> Vec<Vec2> {
+    const STEPS: u8 = 4;
+    let at = |s_m: f32, across_m: f32| to_millimetres(strip.point(s_m, side.sign() * across_m));
+    let along = |k: u8, from_m: f32, to_m: f32| from_m + (to_m - from_m) * f32::from(k) / f32::from(STEPS);
+    let inner = (0..=STEPS).map(|k| at(along(k, from_m + taper_m, to_m - taper_m), inner_m));
+    // A quarter of the depth is upright.
+    let shoulder_m = inner_m + 0.75 * (outer_m - inner_m);
+    let mut polygon: Vec<Vec2> = std::iter::once(at(from_m, shoulder_m)).chain(inner).collect();
+    polygon.push(at(to_m, shoulder_m));
+    polygon.extend((0..=STEPS).rev().map(|k| at(along(k, from_m, to_m), outer_m)));
+    if side == Side::Right {
+        // Counter-clockwise, as all outlines are.
+        polygon.reverse();
+    }
+    polygon.dedup_by(|b, a| a.distance(*b) < 0.02);
+    polygon
 }
 
 /// Rows of cars at both kerbs with gaps between the rows; what would leave too little stays empty.

@@ -84,8 +84,23 @@ pub(super) struct Notch {
     pub(super) depth_m: f32,
 }
 
-/// Where a deep notch or a stub leaves the strip: the two ends of its mouth.
-pub(super) type Mouth = (Vec2, Vec2);
+/// Where a deep notch or a stub leaves the strip.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mouth {
+    /// One end; out of the strip is to the right of the way from here to the other.
+    pub(super) a: Vec2,
+    /// The other end.
+    pub(super) b: Vec2,
+    /// How far the ground goes on behind it, metres.
+    pub(super) depth_m: f32,
+}
+
+impl Mouth {
+    /// Of unit length, out of the strip.
+    pub(super) fn outward(&self) -> Vec2 {
+        -(self.b - self.a).normalize().perp()
+    }
+}
 
 /// A piece in the world.
 #[derive(Debug, Clone)]
@@ -300,11 +315,13 @@ impl Strip {
     /// Mouth of a notch.
     pub(super) fn mouth(&self, notch: &Notch) -> Mouth {
         let d_m = notch.side.sign() * self.half_width_m(0.5 * (notch.from_m + notch.to_m));
-        (self.point(notch.from_m, d_m), self.point(notch.to_m, d_m))
+        let (from, to) = (self.point(notch.from_m, d_m), self.point(notch.to_m, d_m));
+        let (a, b) = if notch.side == Side::Left { (to, from) } else { (from, to) };
+        Mouth { a, b, depth_m: notch.depth_m }
     }
 
-    /// Mouths of the stubs, and how deep they are, metres.
-    pub(super) fn stub_mouths(&self) -> Vec<(Mouth, f32)> {
+    /// Mouths of the stubs.
+    pub(super) fn stub_mouths(&self) -> Vec<Mouth> {
         let pairs = self.legs.iter().zip(self.legs.iter().skip(1));
         let mouth = |(leg, next): (&Leg, &Leg)| {
             let corner = leg.corner_after?;
@@ -312,11 +329,14 @@ impl Strip {
             let d_m = corner.outer_side().sign() * half_m;
             let (depth_m, ends) = match corner.stub? {
                 Stub::Ahead(depth_m) => (depth_m, [(next_half_m, -half_m), (next_half_m, half_m)]),
-                Stub::Behind(depth_m) => (depth_m, [(-next_half_m, d_m), (next_half_m, d_m)]),
+                // Its left and right end as seen from the strip.
+                Stub::Behind(depth_m) => {
+                    (depth_m, [(next_half_m.copysign(d_m), d_m), (-next_half_m.copysign(d_m), d_m)])
+                }
             };
             let frame = leg.start.world_from_ego();
             let [a, b] = ends.map(|(x_m, y_m)| frame.point(Vec2::new(leg.length_m + x_m, y_m)));
-            Some(((a, b), depth_m))
+            Some(Mouth { a, b, depth_m })
         };
         pairs.filter_map(mouth).collect()
     }

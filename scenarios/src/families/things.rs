@@ -4,7 +4,7 @@ use super::strip::Strip;
 use crate::corridor::{Side, overlap, to_millimetres};
 use rand::RngExt as _;
 use sim::geometry::{Pose, Vec2, wrap_angle};
-use sim::scenario::{Obstacle, ObstacleClass};
+use sim::scenario::{Island, Obstacle, ObstacleClass};
 use sim::seed::Rng;
 
 /// A stretch of the strip that is narrowed from one side.
@@ -37,14 +37,22 @@ pub(super) struct Things<'a> {
     /// Of the axis on which things may stand in the way, metres.
     usable_m: (f32, f32),
     pub(super) obstacles: Vec<Obstacle>,
-    outlines: Vec<Vec<Vec2>>,
+    pub(super) islands: Vec<Island>,
+    pub(super) outlines: Vec<Vec<Vec2>>,
     pub(super) narrowings: Vec<Narrowing>,
 }
 
 impl<'a> Things<'a> {
     /// Nothing may stand in the strip outside of the stretch.
     pub(super) fn new(strip: &'a Strip, usable_m: (f32, f32)) -> Self {
-        Self { strip, usable_m, obstacles: Vec::new(), outlines: Vec::new(), narrowings: Vec::new() }
+        Self {
+            strip,
+            usable_m,
+            obstacles: Vec::new(),
+            islands: Vec::new(),
+            outlines: Vec::new(),
+            narrowings: Vec::new(),
+        }
     }
 
     /// Puts something where nothing else stands; it is not looked at whether it stands in the way.
@@ -69,6 +77,16 @@ impl<'a> Things<'a> {
     pub(super) fn narrow(&mut self, obstacle: Obstacle, side: Side, near_m: f32, rules: &Rules) -> bool {
         let narrowing = self.narrowing_by(&obstacle.outline(), side, near_m);
         self.allows(&narrowing, rules) && self.stand(obstacle) && {
+            self.narrowings.push(narrowing);
+            true
+        }
+    }
+
+    /// The same for an island. On its way around the island the route keeps to the other side.
+    pub(super) fn narrow_by_island(&mut self, island: Island, side: Side, near_m: f32, rules: &Rules) -> bool {
+        let narrowing = self.narrowing_by(&island.polygon, side, near_m);
+        self.allows(&narrowing, rules) && self.reserve(island.polygon.clone()) && {
+            self.islands.push(island);
             self.narrowings.push(narrowing);
             true
         }

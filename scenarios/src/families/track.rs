@@ -2,7 +2,7 @@
 
 use super::course::Course;
 use super::parts::{close, driven_m, lot, things_on};
-use super::strip::{Strip, is_simple};
+use super::strip::{Mouth, Strip, is_simple};
 use super::things::{Rules, Things, side};
 use super::walls::{Wall, yard};
 use crate::corridor::Side;
@@ -28,7 +28,8 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
     let strip = (0..TRIES).find_map(|_| ring(width_m, layout))?;
     let mut things = things_on(&strip);
     let half_m = 0.5 * width_m;
-    close(&mut things, (strip.point(0.0, half_m), strip.point(0.0, -half_m)), obstacles);
+    let barrier = Mouth { a: strip.point(0.0, half_m), b: strip.point(0.0, -half_m), depth_m: 0.0 };
+    close(&mut things, &barrier, obstacles);
     cones(&mut things, &strip, obstacles);
     let (outer, inner) = (strip.edge(Side::Right, 0.0), strip.edge(Side::Left, 0.0));
     let wall = match layout.random_range(0..10) {

@@ -10,6 +10,8 @@ use anyhow::{Context as _, anyhow, ensure};
 use clap::Args;
 use evaluation::estimate;
 use evaluation::plan::Plan;
+use evaluation::results::EvaluationResults;
+use evaluation::shards::ShardRecord;
 use evaluation::summary::Summary;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs;
@@ -17,12 +19,13 @@ use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress};
 use experiment::run_dir::{self, Outcome, Request, RunDir};
 use experiment::settings::{Layers, Settings, Smoothing};
+use experiment::shard::Shard;
 use scenarios::LoadError;
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
 use std::path::PathBuf;
 
-const COMMAND: &str = "evaluate";
+pub(crate) const COMMAND: &str = "evaluate";
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -30,6 +33,7 @@ Examples:
   cargo xtask evaluate --driver run:runs/train-dagger-default-s1/bc --driver run:runs/train-dagger-default-s1
   cargo xtask evaluate --driver net:runs/train-dagger-default-s1/round-03 --lots lot-b --noise hard --out runs/hard
   cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1 --noise sweep --lots test:100
+  cargo xtask evaluate --driver run:runs/train-dagger-default-s1 --lots sealed:mine:1000 --shard 2/16 --out shards/2
   cargo xtask evaluate --resume runs/hard";
 
 #[derive(Debug, Clone, Args)]
@@ -61,6 +65,9 @@ pub(crate) struct EvaluateArgs {
     /// Seed of obstacles and noise of the trials.
     #[arg(long)]
     seed: Option<u64>,
+    /// Drives a share of the trials only, one of several machines' (docs/cluster.md); `merge` puts the shares together.
+    #[arg(long, value_name = "NUMBER/OF", conflicts_with = "record")]
+    shard: Option<Shard>,
     #[command(flatten)]
     pub(crate) json: JsonArgs,
     #[command(flatten)]
@@ -72,7 +79,7 @@ pub(crate) struct EvaluateArgs {
         long,
         value_name = "DIR",
         conflicts_with_all = [
-            "drivers", "lots", "trials", "directions", "noise", "compare_with", "seed", "preset", "config", "overrides", "out"
+            "drivers", "lots", "trials", "directions", "noise", "compare_with", "seed", "shard", "preset", "config", "overrides", "out"
         ]
     )]
     resume: Option<PathBuf>,
@@ -82,20 +89,23 @@ pub(crate) struct EvaluateArgs {
 
 /// What an evaluation was asked for beside its settings.
 #[derive(Debug, Serialize, Deserialize)]
-struct Asked {
-    drivers: Vec<String>,
+#[serde(deny_unknown_fields)]
+pub(crate) struct Asked {
+    pub(crate) drivers: Vec<String>,
     /// An index of the drivers.
-    compare_with: usize,
+    pub(crate) compare_with: usize,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) shard: Option<ShardRecord>,
 }
 
 pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
-    let (settings, asked, begun) = if let Some(path) = &args.resume {
+    let (settings, mut asked, begun) = if let Some(path) = &args.resume {
         let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
         let asked: Asked = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
         (settings, asked, Ok((run, manifest)))
     } else {
         let specs = DriverSpec::parse_all(&args.drivers)?;
-        let asked = Asked { drivers: args.drivers.clone(), compare_with: compare_with(args, &specs)? };
+        let asked = Asked { drivers: args.drivers.clone(), compare_with: compare_with(args, &specs)?, shard: None };
         let (mut settings, preset) = settings_for(&specs, &Layers::from(&args.layers), output)?;
         override_trials(&mut settings, args)?;
         (settings, asked, Err(preset))
@@ -103,7 +113,8 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     let drivers = NamedDriver::load_all(&asked.drivers, &settings)?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     notes::say(&lots, &settings.evaluation.noise, output);
-    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: asked.compare_with };
+    let shard = args.shard.or(asked.shard.as_ref().map(|record| record.number));
+    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: asked.compare_with, shard };
     check(&plan)?;
     let inputs = inputs::of(&lots, &drivers);
     let run = match begun {
@@ -112,6 +123,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
             run
         }
         Err(preset) => {
+            asked.shard = ShardRecord::of(&plan);
             let request = Request { arguments: toml::Table::try_from(&asked)?, inputs };
             RunDir::create(&args.out.place(COMMAND, &preset, settings.evaluation.seed.0), &settings, &request)?
         }
@@ -119,16 +131,32 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     interrupt::can_resume(COMMAND, run.path());
     let console = Console::new(output);
     console.plan(tasks(&settings, drivers.len()));
-    measure(&plan, &run, &console, output)?;
-    report::run_report::write(run.path(), &console)?;
-    run.finish(Outcome::Evaluation { drivers: asked.drivers })?;
+    if let Some(shard) = shard {
+        drive(&plan, &run, &console)?;
+        run.finish(Outcome::Evaluation { drivers: asked.drivers })?;
+        let folder = run.path().display();
+        output.note(format_args!("written: {folder}: shard {shard}; put all together with cargo xtask merge DIR..."));
+        return Ok(());
+    }
+    finish(&plan, &run, &console, output)?;
+    console.report_time();
+    let runs = args.record.record;
+    runs.map_or(Ok(()), |runs| record::record(run.path(), vec![record::first_runs(&plan, runs)], output))
+}
+
+/// Drives what is not driven yet of a run, and writes everything that it leaves.
+///
+/// # Errors
+/// See [`measure`].
+pub(crate) fn finish(plan: &Plan<'_>, run: &RunDir, console: &Console, output: &Output) -> anyhow::Result<()> {
+    measure(plan, run, console, output)?;
+    report::run_report::write(run.path(), console)?;
+    run.finish(Outcome::Evaluation { drivers: plan.drivers.iter().map(|driver| driver.spec.to_string()).collect() })?;
     output.note(format_args!(
         "written: {}/report.html, summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl",
         run.path().display()
     ));
-    console.report_time();
-    let runs = args.record.record;
-    runs.map_or(Ok(()), |runs| record::record(run.path(), vec![record::first_runs(&plan, runs)], output))
+    Ok(())
 }
 
 /// Drives the plan, writes and prints the tables.
@@ -136,14 +164,17 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
 /// # Errors
 /// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is kept.
 pub(crate) fn measure(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress, output: &Output) -> anyhow::Result<()> {
-    let Some(results) = evaluation::evaluate::evaluate(plan, run, progress)? else {
-        return Err(Interrupted { kept: format!("what was driven so far is in {}", run.path().display()) }.into());
-    };
+    let results = drive(plan, run, progress)?;
     let summary = Summary::new(plan, &results);
     summary.write(run)?;
     report::failures::write(run)?;
     let text = report::summary::write(&summary, run)?;
     output.table(|| format!("\n{text}"), &summary.tables())
+}
+
+fn drive(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<EvaluationResults> {
+    let interrupted = || Interrupted { kept: format!("what was driven so far is in {}", run.path().display()) };
+    Ok(evaluation::evaluate::evaluate(plan, run, progress)?.ok_or_else(interrupted)?)
 }
 
 /// The tasks of an evaluation with their estimated seconds.

@@ -9,6 +9,7 @@ use clap::Args;
 use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::settings::NoiseChoice;
+use experiment::shard::Shard;
 use experiment::trials::{Purpose, Trial};
 use rayon::prelude::*;
 use report::pictures::{self, lot};
@@ -24,6 +25,7 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask generate --lots lot-a,lot-b,lot-c --out lots
   cargo xtask generate --lots lot-a --seed 7 --count 5 --out lots
+  cargo xtask generate --lots train:1000 --shard 2/16 --out lots
   cargo xtask generate --lots my-map.yaml --scale 20 --start 0.4,1.2,90 --goal 3.1,0.5,-90 --out lots
   cargo xtask generate --lots my-map.yaml --start 4,2,0 --loop --out lots";
 
@@ -47,6 +49,9 @@ pub(crate) struct GenerateArgs {
     /// Replaces files of the same name.
     #[arg(long)]
     overwrite: bool,
+    /// Writes a share of the lots only, one of several machines' (docs/cluster.md); all may write into one folder.
+    #[arg(long, value_name = "NUMBER/OF")]
+    shard: Option<Shard>,
     /// Where to drive on a map.
     #[command(flatten)]
     map: MapArgs,
@@ -110,7 +115,11 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{}: cannot be created; choose another --out", args.out.display()))?;
     let trials: Vec<Trial<'_>> =
-        Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, args.count, &[Direction::Forward]).collect();
+        Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, args.count, &[Direction::Forward])
+            .enumerate()
+            .filter(|(index, _)| args.shard.is_none_or(|shard| shard.takes(*index)))
+            .map(|(_, trial)| trial)
+            .collect();
     let console = Console::new(output);
     console.begin("generating", "generating");
     let mut made = Vec::new();

@@ -236,7 +236,7 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
                 Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?,
             );
             let compare_with = conclusions::compare_with(&drivers);
-            let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with };
+            let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with, shard: None };
             evaluate::check(&plan)?;
             evaluate::measure(&plan, &run, console, output)?;
             run.finish(Outcome::Evaluation { drivers: specs })?;

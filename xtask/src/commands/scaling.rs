@@ -1,15 +1,12 @@
 //! `scaling`: how much more different lots buy.
 
-use super::{reproduce, train};
+use super::trainings::{Begun, Trainings};
 use crate::args::{LayerArgs, OutArgs};
-use crate::console::Console;
 use crate::output::Output;
-use anyhow::{Context as _, ensure};
+use anyhow::ensure;
 use clap::Args;
 use evaluation::scaling::{self, Extent};
-use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
-use experiment::run_dir::{Outcome, Request, RunDir};
 use experiment::settings::{Layers, Settings};
 use std::path::PathBuf;
 
@@ -43,31 +40,22 @@ pub(crate) struct ScalingArgs {
     resume: Option<PathBuf>,
 }
 
-const COMMAND: &str = "scaling";
 /// Sixteen lots of each family in every round, as much as the default trains on; no lot that is there in every training.
 const LOTS: &str = "train:144:all";
 
+const SCALING: Trainings<Extent> = Trainings {
+    command: "scaling",
+    title: "Near-collisions against different lots",
+    stages: scaling::stages,
+    write: report::scaling::write,
+    unseen: |extent| &extent.unseen,
+};
+
 pub(crate) fn run(args: &ScalingArgs, output: &Output) -> anyhow::Result<()> {
-    let (run, settings, extent) = if let Some(path) = &args.resume {
-        let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
-        let extent: Extent = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
-        manifest.check_inputs(&inputs(&settings, &extent)?)?;
-        (run, settings, extent)
-    } else {
-        begin(args)?
-    };
-    let stages = scaling::stages(&settings, &extent, run.path());
-    let console = Console::new(output);
-    reproduce::perform_all(COMMAND, &stages, &run, &console, output)?;
-    let table = report::scaling::write(&settings, &extent, &stages, &run)?;
-    output.table(|| format!("\nNear-collisions against different lots\n\n{table}"), &())?;
-    run.finish(Outcome::Reproduction { stages: stages.len() })?;
-    output.note(format_args!("written: {}/scaling.md, scaling.csv and scaling.svg", run.path().display()));
-    console.report_time();
-    Ok(())
+    SCALING.run(args.resume.as_deref(), &args.out, || begin(args), output)
 }
 
-fn begin(args: &ScalingArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
+fn begin(args: &ScalingArgs) -> anyhow::Result<Begun<Extent>> {
     let mut layers = Layers::from(&args.layers);
     let is_default = layers.preset_name() == "default";
     // What the user sets comes later and counts.
@@ -82,17 +70,5 @@ fn begin(args: &ScalingArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
     }
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     ensure!(lots.iter().any(Lot::is_generated), "training.lots names no generated lots, of which there could be more");
-    for lot in Lot::parse_all(&extent.unseen, &settings.episode.vehicle)? {
-        ensure!(!lot.is_for_training(), "--unseen {}: policies are trained on it; name others", lot.name());
-    }
-    let request = Request { arguments: toml::Table::try_from(&extent)?, inputs: inputs(&settings, &extent)? };
-    let run = RunDir::create(&args.out.place(COMMAND, layers.preset_name(), settings.seed.0), &settings, &request)?;
-    Ok((run, settings, extent))
-}
-
-/// The lots from files that are read.
-fn inputs(settings: &Settings, extent: &Extent) -> anyhow::Result<Inputs> {
-    let mut found = train::inputs(settings)?;
-    found.extend(inputs::of(&Lot::parse_all(&extent.unseen, &settings.episode.vehicle)?, &[]));
-    Ok(found)
+    Ok(Begun { preset: layers.preset_name().to_owned(), settings, extent })
 }

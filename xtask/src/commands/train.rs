@@ -107,7 +107,8 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
     if !args.no_eval {
         let drivers = drivers(&settings, &run, policy)?;
         let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
-        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: drivers.len() - 1 };
+        let plan =
+            Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: drivers.len() - 1, shard: None };
         evaluate::check(&plan)?;
         evaluate::measure(&plan, &run, &console, output)?;
         check_elsewhere(&settings, &run, &drivers, &console, output)?;

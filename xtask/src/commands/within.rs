@@ -22,7 +22,7 @@ pub(crate) fn evaluate(
 ) -> anyhow::Result<EvaluationResults> {
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     ensure!(!drivers.is_empty(), "nobody drives");
-    let plan = Plan { settings, drivers, lots: &lots, compare_with: drivers.len() - 1 };
+    let plan = Plan { settings, drivers, lots: &lots, compare_with: drivers.len() - 1, shard: None };
     let place = Place {
         build: crate::build_info::get(),
         out: None,

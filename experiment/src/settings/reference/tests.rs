@@ -34,6 +34,12 @@ fn every_setting_is_described_and_every_description_has_a_setting() {
         "dagger.rule=any_below_literal",
         "dagger.rule=tau_only",
         "dagger.rule=expert_only",
+        "dagger.rule=vanilla",
+        "dagger.rule=safe_dagger",
+        "dagger.rule=ensemble_dagger",
+        "dagger.rule=hg_dagger",
+        "dagger.rule=lazy_dagger",
+        "dagger.rule=thrifty_dagger",
         "dagger.fit.loss.weight=linear",
         "dagger.fit.budget.epochs=1",
         "dagger.cloning_budget.epochs=1",
@@ -152,5 +158,77 @@ fn every_old_key_leads_to_a_new_one() {
     }
     for (old, _) in renamed::REMOVED {
         assert!(!exists(old), "{old}");
+    }
+}
+
+/// Key, value in preset `paper`, where it is from. "Silent": the paper does not mention such a thing, so it is off.
+#[rustfmt::skip]
+const OF_THE_PAPER: [(&str, &str, &str); 47] = [
+    ("training.lots", "[\"lot-a\"]", "Driving Policy Network Training: one parking lot"),
+    ("training.directions", "[\"forward\", \"reverse\"]", "… there and back, 460 m"),
+    ("training.trials", "1", "… once"),
+    ("training.different_lots", "0", "silent"),
+    ("evaluation.lots", "[\"lot-a\", \"lot-b\", \"lot-c\"]", "Results: three parking lots"),
+    ("evaluation.elsewhere", "[]", "silent"),
+    ("evaluation.directions", "[\"forward\", \"reverse\"]", "Results"),
+    ("evaluation.trials", "5", "Results"),
+    ("evaluation.smoothing", "\"own\"", "silent"),
+    ("dagger.eta", "0.9", "Driving Policy Network Training"),
+    ("dagger.iterations_min", "1", "Algorithm 1: while η̂ ≤ η"),
+    ("dagger.keep", "\"expert_ticks\"", "Algorithm 2, line 15"),
+    ("dagger.noise_augmentations", "0", "silent"),
+    ("dagger.samples_per_round", "0", "silent: all"),
+    ("dagger.start", "\"scratch\"", "authors' code"),
+    ("dagger.rule.all_below.tau", "0.07", "Driving Policy Network Training"),
+    ("dagger.rule.all_below.chi", "0.1", "Driving Policy Network Training"),
+    ("dagger.inference.mirror_averaging", "false", "silent"),
+    ("dagger.inference.smoothing_ticks", "0.0", "silent"),
+    ("dagger.disturbance.enabled", "false", "silent"),
+    ("dagger.final_budget.steps", "0", "silent"),
+    ("dagger.network.conv1.channels", "32", "authors' code"),
+    ("dagger.network.conv1.kernel", "5", "authors' code"),
+    ("dagger.network.conv2.channels", "64", "authors' code"),
+    ("dagger.network.conv2.kernel", "2", "authors' code"),
+    ("dagger.network.hidden", "1000", "Driving Policy Network"),
+    ("dagger.network.dropout_features", "0.25", "authors' code"),
+    ("dagger.network.dropout_hidden", "0.5", "authors' code"),
+    ("dagger.fit.budget.steps", "100000", "Driving Policy Network Training: epochs 100k"),
+    ("dagger.cloning_budget.steps", "100000", "Driving Policy Network Training: epochs 100k"),
+    ("dagger.fit.batch", "512", "Driving Policy Network Training"),
+    ("dagger.fit.learning_rate.peak", "1e-5", "Driving Policy Network Training"),
+    ("dagger.fit.learning_rate.floor", "1e-5", "silent: constant"),
+    ("dagger.fit.learning_rate.shape", "\"constant\"", "silent: constant"),
+    ("dagger.fit.learning_rate.warm_up_steps", "0", "silent"),
+    ("dagger.fit.gradient_norm_max", "0.0", "silent"),
+    ("dagger.fit.adam.weight_decay", "0.0", "silent: it has one for perception only"),
+    ("dagger.fit.loss.alpha", "1.5", "Driving Policy Network Training"),
+    ("dagger.fit.loss.weight", "\"residual_sq\"", "equation of the loss"),
+    ("dagger.fit.loss.beta", "0.0", "equation of the loss"),
+    ("dagger.fit.mirror", "\"off\"", "silent"),
+    ("expert.elastic_band.reach_share", "1.0", "rule three: as far as possible"),
+    ("expert.reaction_delay_s", "0.0", "silent"),
+    ("expert.label_jitter", "0.0", "silent"),
+    ("episode.controller.speed_law", "\"halved\"", "Vehicle and Hardware: a_y/2.24, the final v half"),
+    ("episode.controller.speed_max_mps", "2.2", "Vehicle and Hardware"),
+    ("episode.control_period_ms", "50", "Driving Policy Network Training: 0.05 s"),
+];
+
+#[test]
+fn the_paper_preset_is_the_paper_and_nothing_else() {
+    let settings = Value::try_from(Settings::preset("paper").unwrap()).unwrap();
+    for (key, expected, place) in OF_THE_PAPER {
+        let found = key.split('.').try_fold(&settings, |value, part| value.get(part)).cloned();
+        let expected: Table = format!("value = {expected}").parse().unwrap();
+        let is_same = match (&found, &expected["value"]) {
+            (Some(Value::Float(found)), Value::Float(expected)) => {
+                (found / expected - 1.0).abs() < 1e-6 || found == expected
+            }
+            (found, expected) => found.as_ref() == Some(expected),
+        };
+        assert!(is_same, "{key} = {found:?}; the paper ({place}) has {}", expected["value"]);
+    }
+    // What only this preset has from the paper is held against it here.
+    for entry in entries().iter().filter(|entry| entry.source.contains("in preset paper")) {
+        assert!(OF_THE_PAPER.iter().any(|(key, ..)| *key == entry.key), "{} is held against nothing", entry.key);
     }
 }

@@ -1,0 +1,157 @@
+//! The `DAgger` family in one trainer: a training per decision rule and seed, at equal samples, lots and optimiser steps,
+//! then one evaluation of all policies on lots that none was trained on (docs/methods.md 5).
+//!
+//! Rules differ in who drives while data are collected, and in nothing else. Behaviour cloning is the same for all rules of
+//! a seed and is trained once.
+
+use crate::stages::{Stage, Step};
+use experiment::settings::Settings;
+use policy::decision_rule::DecisionRule;
+use serde::{Deserialize, Serialize};
+use sim::seed::RootSeed;
+use std::path::Path;
+
+/// How much is done, besides what the settings say: the arguments in the manifest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Extent {
+    /// Rules by name, one training of each per seed.
+    pub rules: Vec<String>,
+    /// Root seeds: the settings' first, then the next.
+    pub seeds: u64,
+    /// Iterations of every training.
+    pub iterations: u32,
+    /// Samples of a round that are learned from.
+    pub samples: u32,
+    /// Lots that all are driven on, once each way.
+    pub unseen: Vec<String>,
+}
+
+/// Folder of the stage that drives.
+pub const DRIVES: &str = "drives";
+
+/// Name in tables of what every training begins with.
+pub const CLONED: &str = "behaviour cloning";
+
+/// Rules by the name of their setting, each with its name in tables.
+pub fn all() -> [(&'static str, &'static str); 10] {
+    [
+        ("expert_only", "expert only"),
+        ("vanilla", "vanilla DAgger"),
+        ("safe_dagger", "SafeDAgger"),
+        ("ensemble_dagger", "EnsembleDAgger"),
+        ("hg_dagger", "HG-DAgger"),
+        ("lazy_dagger", "LazyDAgger"),
+        ("thrifty_dagger", "ThriftyDAgger"),
+        ("all_below", "paper, all below"),
+        ("any_below_literal", "paper, any below"),
+        ("tau_only", "paper, τ̂ alone"),
+    ]
+}
+
+/// Name in tables of a rule.
+pub fn title(rule: &str) -> &str {
+    all().into_iter().find(|(name, _)| *name == rule).map_or(rule, |(_, title)| title)
+}
+
+/// Root seeds of the trainings.
+pub fn seeds(settings: &Settings, extent: &Extent) -> Vec<RootSeed> {
+    (0..extent.seeds).map(|index| RootSeed(settings.seed.0 + index)).collect()
+}
+
+/// Folder of a training.
+pub fn folder(rule: &str, seed: RootSeed) -> String {
+    format!("s{}-{rule}", seed.0)
+}
+
+/// Drivers of the last stage: behaviour cloning of each seed, then each rule of each seed, with the rule's name.
+pub fn policies<'e>(settings: &Settings, extent: &'e Extent) -> Vec<(RootSeed, Option<&'e str>)> {
+    let of_seed = |seed| {
+        let rules = extent.rules.iter().map(move |rule| (seed, Some(rule.as_str())));
+        std::iter::once((seed, None)).chain(rules)
+    };
+    seeds(settings, extent).into_iter().flat_map(of_seed).collect()
+}
+
+/// The trainings, then the evaluation. `root`: the folder of the whole run.
+pub fn stages(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
+    let mut stages = Vec::new();
+    for seed in seeds(settings, extent) {
+        for rule in &extent.rules {
+            stages.push(Stage {
+                folder: folder(rule, seed),
+                about: format!("{}, seed {}", title(rule), seed.0),
+                settings: of_rule(settings, extent, rule, seed),
+                step: Step::Train {
+                    cloning_of: extent.rules.first().filter(|first| *first != rule).map(|first| folder(first, seed)),
+                },
+            });
+        }
+    }
+    let driver = |(seed, rule): (RootSeed, Option<&str>)| {
+        let first = extent.rules.first().map_or("", String::as_str);
+        let run = root.join(folder(rule.unwrap_or(first), seed));
+        let name = format!("{} (seed {})", rule.map_or(CLONED, title), seed.0);
+        let Some(rule) = rule else { return (name, format!("run:{}/bc", run.display())) };
+        let members = DecisionRule::named(rule).map_or(1, |rule| rule.members());
+        let others =
+            (1..members).map(|member| format!(",net:{}/round-{:02}-member-{member}", run.display(), extent.iterations));
+        let others: String = others.collect();
+        let kind = if members > 1 { "ensemble:" } else { "" };
+        (name, format!("{kind}run:{}{others}", run.display()))
+    };
+    let mut settings = settings.clone();
+    (settings.evaluation.lots, settings.evaluation.trials) = (extent.unseen.clone(), 1);
+    let drivers = policies(&settings, extent).into_iter().map(driver).collect();
+    stages.push(Stage {
+        folder: DRIVES.to_owned(),
+        about: "all policies on lots that none was trained on".to_owned(),
+        settings,
+        step: Step::Drive { drivers },
+    });
+    stages
+}
+
+/// The settings of a training: all rules make as many iterations and learn from as many samples.
+fn of_rule(settings: &Settings, extent: &Extent, rule: &str, seed: RootSeed) -> Settings {
+    let mut settings = Settings { seed, ..settings.clone() };
+    let dagger = &mut settings.dagger;
+    dagger.rule = DecisionRule::named(rule).unwrap_or(dagger.rule);
+    (dagger.iterations_min, dagger.iterations_max) = (extent.iterations, extent.iterations);
+    dagger.samples_per_round = extent.samples;
+    settings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn trainings_differ_in_rule_and_seed_alone_and_all_are_driven() {
+        let settings = Settings::preset("default").unwrap();
+        let rules = ["expert_only", "ensemble_dagger"].map(str::to_owned).to_vec();
+        let extent =
+            Extent { rules, seeds: 2, iterations: 1, samples: 500, unseen: vec!["validation:9:all".to_owned()] };
+        let stages = stages(&settings, &extent, Path::new("R"));
+        assert_eq!(stages.len(), 5);
+        let (control, ensemble) = (&stages[0], &stages[1]);
+        let mut alike = control.settings.clone();
+        alike.dagger.rule = ensemble.settings.dagger.rule;
+        assert_eq!(alike, ensemble.settings);
+        assert_eq!(control.settings.dagger.samples_per_round, 500);
+        assert_eq!(ensemble.step, Step::Train { cloning_of: Some("s1-expert_only".to_owned()) });
+        let Step::Drive { drivers } = &stages[4].step else { panic!("the last stage drives") };
+        assert_eq!(drivers[0], ("behaviour cloning (seed 1)".to_owned(), "run:R/s1-expert_only/bc".to_owned()));
+        let members = "ensemble:run:R/s2-ensemble_dagger,net:R/s2-ensemble_dagger/round-01-member-1,\
+                       net:R/s2-ensemble_dagger/round-01-member-2";
+        assert_eq!(drivers[5], ("EnsembleDAgger (seed 2)".to_owned(), members.to_owned()));
+    }
+
+    #[test]
+    fn every_rule_has_a_title_and_is_a_setting() {
+        for (name, _) in all() {
+            assert!(DecisionRule::named(name).is_some(), "{name}");
+        }
+        assert!(DecisionRule::named("anybody").is_none());
+    }
+}

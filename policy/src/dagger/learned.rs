@@ -1,0 +1,117 @@
+//! Everything that drives while a round is collected, as it was learned in the rounds before.
+
+use crate::checkpoint::Checkpoint;
+use crate::dagger::critic;
+use crate::dagger::settings::DaggerSettings;
+use crate::dataset::Dataset;
+use crate::dataset::store::Store;
+use crate::decision_rule::{DecisionRule, Thresholds};
+use crate::drivers::Novice;
+use crate::files::FileError;
+use crate::network::{DeviceChoice, Ensemble, Predictor};
+use sim::sensing::OccupancyGrid;
+use std::path::PathBuf;
+
+/// The network, and what its decision rule needs besides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Learned {
+    policy: Checkpoint,
+    /// The ensemble's other members.
+    members: Vec<Checkpoint>,
+    critic: Option<Checkpoint>,
+    pub(crate) thresholds: Thresholds,
+}
+
+impl Learned {
+    /// A network of a rule that needs nothing else.
+    pub fn alone(policy: Checkpoint) -> Self {
+        Self { policy, members: Vec::new(), critic: None, thresholds: Thresholds::default() }
+    }
+
+    /// What collected a round after behaviour cloning, read from the folder of its run.
+    ///
+    /// # Errors
+    /// If a file is missing or not what it should be.
+    pub fn of_round(settings: &DaggerSettings, store: &Store, round: u32) -> Result<Self, FileError> {
+        let before = round.saturating_sub(1);
+        let policy = Checkpoint::load(&store.round_folder(before))?;
+        let mut d = Dataset::default();
+        // What was trained on sets the thresholds of one rule.
+        if matches!(settings.rule, DecisionRule::ThriftyDagger(_)) {
+            for earlier in 0..=before {
+                d.push(store.read_round(earlier)?.0);
+            }
+        }
+        Self::with_parts(settings, store, before, policy, &d)
+    }
+
+    /// With what was trained beside the network of a round, which was trained on `d`.
+    pub(crate) fn with_parts(
+        settings: &DaggerSettings,
+        store: &Store,
+        round: u32,
+        policy: Checkpoint,
+        d: &Dataset,
+    ) -> Result<Self, FileError> {
+        let members = members_of(settings, store, round)?;
+        let critic = settings.rule.critic().map(|_| Checkpoint::load(&critic_folder(store, round))).transpose()?;
+        let mut learned = Self { members, critic, ..Self::alone(policy) };
+        if let DecisionRule::ThriftyDagger(thrifty) = settings.rule {
+            learned.thresholds = learned.thresholds(thrifty.rate, d, settings.device);
+        }
+        Ok(learned)
+    }
+
+    /// Without a critic: to train one.
+    pub(crate) fn uncritical(
+        settings: &DaggerSettings,
+        store: &Store,
+        round: u32,
+        policy: Checkpoint,
+    ) -> Result<Self, FileError> {
+        Ok(Self { members: members_of(settings, store, round)?, ..Self::alone(policy) })
+    }
+
+    /// Of the answers to everything that was trained on.
+    fn thresholds(&self, rate: f32, d: &Dataset, device: DeviceChoice) -> Thresholds {
+        let (mut ensemble, mut critic) = (self.ensemble(device), self.critic(device));
+        let (mut disagreement, mut risk, mut discrepancy) = (Vec::new(), Vec::new(), Vec::new());
+        for round in d.rounds() {
+            let grids: Vec<&OccupancyGrid> = round.samples.iter().map(|sample| &sample.grid).collect();
+            disagreement.extend(ensemble.predict_with_disagreement(&grids).1);
+            discrepancy.extend(critic::discrepancies(&round.samples, &mut ensemble));
+            risk.extend(
+                critic.iter_mut().flat_map(|critic| critic.predict(&grids)).map(|answer| critic::alarm(&answer)),
+            );
+        }
+        Thresholds::new(rate, disagreement, risk, &discrepancy)
+    }
+
+    pub(crate) fn novice(&self, device: DeviceChoice) -> Novice {
+        Novice::new(&self.policy, &self.members, device)
+    }
+
+    pub(crate) fn critic(&self, device: DeviceChoice) -> Option<Predictor> {
+        self.critic.as_ref().map(|critic| critic.predictor(device))
+    }
+
+    /// The networks as they answer single grids, unsmoothed.
+    pub(crate) fn ensemble(&self, device: DeviceChoice) -> Ensemble {
+        let others = self.members.iter().map(|member| member.predictor(device)).collect();
+        Ensemble::new(self.policy.predictor(device), others)
+    }
+}
+
+fn members_of(settings: &DaggerSettings, store: &Store, round: u32) -> Result<Vec<Checkpoint>, FileError> {
+    (1..settings.rule.members()).map(|member| Checkpoint::load(&member_folder(store, round, member))).collect()
+}
+
+/// Where another member of the ensemble of a round is; the first one is in the folder of the round.
+pub(crate) fn member_folder(store: &Store, round: u32, member: usize) -> PathBuf {
+    store.part_folder(round, &format!("member-{member}"))
+}
+
+/// Where the critic of the network of a round is.
+pub(crate) fn critic_folder(store: &Store, round: u32) -> PathBuf {
+    store.part_folder(round, "critic")
+}

@@ -1,0 +1,209 @@
+//! The `DAgger` family at equal samples: what collecting cost, and how the policies drive: `rules.md`, `.csv` and `.svg`.
+
+use crate::markdown::table_of;
+use crate::plots::{self, RatePoint, RateSeries};
+use crate::reproduction::Drive;
+use anyhow::Context as _;
+use evaluation::format::exact_rate;
+use evaluation::results::EvaluationResults;
+use evaluation::rules::{self, Extent};
+use evaluation::stages::Stage;
+use evaluation::statistics::poisson::Rate;
+use evaluation::summary::csv_of;
+use experiment::run_dir::RunDir;
+use experiment::settings::Settings;
+use policy::dataset::Collection;
+use policy::decision_rule::DecisionRule;
+use serde::Serialize;
+use std::path::Path;
+
+/// A training, or all seeds of a rule together.
+#[derive(Debug, Clone, Default, Serialize)]
+struct Row {
+    rule: String,
+    /// Root seed of the training; empty: all together.
+    seed: Option<u64>,
+    /// Labelled ticks that were learned from.
+    samples: usize,
+    /// Networks trained per round, critics included.
+    networks: usize,
+    /// Ticks driven in the iterations, by whomever.
+    ticks: u64,
+    /// … by the network.
+    novice_ticks: u64,
+    /// Ticks at which the method asks the expert.
+    queries: u64,
+    /// Times the expert took the wheel.
+    interventions: u64,
+    /// Mean length of an intervention, seconds.
+    intervention_s: f64,
+    /// Sum of the ways driven while collecting, metres.
+    collected_m: f64,
+    near_collisions_collecting: u32,
+    contacts_collecting: u32,
+    /// Sum of the routes on unseen lots, metres.
+    route_m: f64,
+    near_collisions: u32,
+    contacts: u32,
+    per_100m: f64,
+    lower: f64,
+    upper: f64,
+}
+
+/// Writes the table, its rows as CSV and the plot; returns the table.
+///
+/// # Errors
+/// If what a stage wrote cannot be read, or a file cannot be written.
+pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<String> {
+    let drive = Drive::of(stages.last().context("the last stage drives")?)?;
+    let results = EvaluationResults::read(&drive.plan(), &run.path().join(rules::DRIVES))?;
+    let everywhere = results.slices().pop().context("lots were driven on")?;
+    let control_period_s = f64::from(settings.episode.control_period_s());
+    let mut rows = Vec::new();
+    for (driver, (seed, rule)) in rules::policies(settings, extent).into_iter().enumerate() {
+        let mut row = Row { rule: rule.map_or(rules::CLONED, rules::title).to_owned(), ..Row::default() };
+        row.seed = Some(seed.0);
+        let first = extent.rules.first().context("there is a rule")?;
+        add_rounds(&mut row, &run.path().join(rules::folder(rule.unwrap_or(first), seed)), rule, extent)?;
+        let totals = results.totals(0, driver, &everywhere, None);
+        (row.route_m, row.near_collisions, row.contacts) =
+            (totals.reference_m, totals.near_collisions, totals.contacts);
+        rows.push(row);
+    }
+    let titles = std::iter::once(rules::CLONED).chain(extent.rules.iter().map(|rule| rules::title(rule)));
+    let mut pooled: Vec<Row> = titles.map(|title| pool(&rows, title)).collect();
+    for row in rows.iter_mut().chain(&mut pooled) {
+        let rate = Rate::new(row.near_collisions, row.route_m / 100.0);
+        (row.per_100m, row.lower, row.upper) = (rate.per_unit, rate.lower, rate.upper);
+        let expert_s = (row.ticks - row.novice_ticks) as f64 * control_period_s;
+        row.intervention_s = if row.interventions > 0 { expert_s / row.interventions as f64 } else { 0.0 };
+    }
+    let table = to_markdown(&pooled);
+    run.write("rules.md", format!("{table}\n").as_bytes())?;
+    run.write("rules.csv", &csv_of(&[pooled.clone(), rows].concat())?)?;
+    run.write("rules.svg", plot(&pooled).as_bytes())?;
+    Ok(table)
+}
+
+/// Adds what collecting gave and cost. Behaviour cloning (`rule` = `None`) is round 0, a rule's are the rounds after it.
+fn add_rounds(row: &mut Row, folder: &Path, rule: Option<&str>, extent: &Extent) -> anyhow::Result<()> {
+    let last = if rule.is_some() { extent.iterations } else { 0 };
+    row.networks = rule.and_then(DecisionRule::named).map_or(1, |rule| rule.networks());
+    for round in 0..=last {
+        let folder = folder.join(format!("round-{round:02}"));
+        let collection = Collection::read(&folder)?.with_context(|| format!("{}: no round.toml", folder.display()))?;
+        row.samples += collection.samples;
+        if rule.is_some() && round == 0 {
+            continue;
+        }
+        let effort = collection.effort.with_context(|| format!("{}: of an earlier version", folder.display()))?;
+        row.ticks += collection.ticks;
+        row.novice_ticks += collection.novice_ticks;
+        row.queries += effort.queries;
+        row.interventions += effort.interventions;
+        row.collected_m += collection.driven_m;
+        row.near_collisions_collecting += collection.near_collisions;
+        row.contacts_collecting += effort.contacts;
+    }
+    Ok(())
+}
+
+/// All seeds of a rule together.
+fn pool(rows: &[Row], title: &str) -> Row {
+    let mut all = Row { rule: title.to_owned(), ..Row::default() };
+    for row in rows.iter().filter(|row| row.rule == title) {
+        all.samples += row.samples;
+        all.networks = row.networks;
+        all.ticks += row.ticks;
+        all.novice_ticks += row.novice_ticks;
+        all.queries += row.queries;
+        all.interventions += row.interventions;
+        all.collected_m += row.collected_m;
+        all.near_collisions_collecting += row.near_collisions_collecting;
+        all.contacts_collecting += row.contacts_collecting;
+        all.route_m += row.route_m;
+        all.near_collisions += row.near_collisions;
+        all.contacts += row.contacts;
+    }
+    all
+}
+
+/// Share of the ticks, percent.
+fn percent(part: u64, ticks: u64) -> f64 {
+    100.0 * part as f64 / ticks.max(1) as f64
+}
+
+fn to_markdown(rows: &[Row]) -> String {
+    let mut table = table_of(&[
+        "rule",
+        "samples",
+        "networks",
+        "the expert is asked in",
+        "drives",
+        "interventions (mean length)",
+        "collecting: near-collisions (contacts) in",
+        "unseen lots: near-collisions (contacts) in",
+        "per 100 m [95 %]",
+    ]);
+    for row in rows {
+        table.add_row(vec![
+            row.rule.clone(),
+            row.samples.to_string(),
+            row.networks.to_string(),
+            format!("{:.1} %", percent(row.queries, row.ticks)),
+            format!("{:.1} %", percent(row.ticks - row.novice_ticks, row.ticks)),
+            format!("{} ({:.1} s)", row.interventions, row.intervention_s),
+            format!(
+                "{} ({}) in {:.1} km",
+                row.near_collisions_collecting,
+                row.contacts_collecting,
+                row.collected_m / 1000.0
+            ),
+            format!("{} ({}) in {:.1} km", row.near_collisions, row.contacts, row.route_m / 1000.0),
+            exact_rate(row.near_collisions, row.route_m),
+        ]);
+    }
+    table.to_string()
+}
+
+/// Safety against expert effort: a point per rule.
+fn plot(rows: &[Row]) -> String {
+    let series: Vec<RateSeries> = rows
+        .iter()
+        .map(|row| {
+            let x = percent(row.queries, row.ticks);
+            let point = RatePoint { x, per_100m: row.per_100m, interval: [row.lower, row.upper] };
+            RateSeries { name: row.rule.clone(), points: vec![point] }
+        })
+        .collect();
+    plots::rates_against_effort("Near-collisions on unseen lots", &series)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(seed: u64, near_collisions: u32) -> Row {
+        Row {
+            rule: "SafeDAgger".to_owned(),
+            seed: Some(seed),
+            ticks: 1000,
+            novice_ticks: 900,
+            queries: 100,
+            interventions: 4,
+            route_m: 500.0,
+            near_collisions,
+            ..Row::default()
+        }
+    }
+
+    #[test]
+    fn seeds_are_pooled_by_counts_and_lengths() {
+        let other = Row { rule: "vanilla DAgger".to_owned(), ..row(1, 9) };
+        let pooled = pool(&[row(1, 2), row(2, 3), other], "SafeDAgger");
+        assert_eq!((pooled.near_collisions, pooled.route_m, pooled.seed), (5, 1000.0, None));
+        let table = to_markdown(&[pooled.clone()]);
+        assert!(table.contains("| 10.0 %") && table.contains("5 (0) in 1.0 km"), "{table}");
+        assert!(plot(&[pooled]).contains("SafeDAgger"));
+    }
+}

@@ -1,0 +1,144 @@
+//! Yards and squares: wide ground on which trees, fountains, benches, huts and cars stand apart, so that there is a choice of
+//! ways past them; no gap leaves it open whether the car fits.
+
+use super::course::{Course, first_apart};
+use super::parts::{RUN_OUT_M, lot, solid_height_m, things_on};
+use super::strip::Strip;
+use super::things::{self, Rules, Things, side};
+use super::walls::{Wall, yard};
+use crate::clutter::draw_car;
+use crate::corridor::to_millimetres;
+use rand::RngExt as _;
+use sim::geometry::{Vec2, distance_to_segment, edges};
+use sim::scenario::{Island, Obstacle, ObstacleClass, Scenario};
+use sim::seed::Rng;
+use std::f32::consts::{PI, TAU};
+use std::ops::Range;
+
+const LENGTH_M: Range<f32> = 85.0..170.0;
+const WIDTH_M: Range<f32> = 11.0..22.0;
+const RADIUS_M: Range<f32> = 18.0..40.0;
+/// No two things are so far from each other, or from the edge, metres: the car is 1.86 m wide, and anything within 0.5 m
+/// of it is a near-collision.
+const DOUBTFUL_M: Range<f32> = 1.4..3.0;
+/// One thing is tried per so much ground, m².
+const GROUND_M2: Range<f32> = 15.0..70.0;
+
+/// Something with the ground that it takes.
+enum Thing {
+    Obstacle(Obstacle),
+    Island(Island),
+}
+
+pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
+    let strip = first_apart(layout, 1.0, course)?;
+    let mut things = things_on(&strip);
+    scatter(&mut things, &strip, obstacles);
+    let outline = strip.outline(0.0);
+    let wall = match layout.random_range(0..10) {
+        0..5 => None,
+        5..7 => Some(Wall::kerb()),
+        7..9 => Some(Wall::tall(layout)),
+        _ => Some(Wall::low(layout)),
+    };
+    let (boundary, boundary_height_m) = match wall {
+        None => (outline, solid_height_m(layout)),
+        Some(wall) => {
+            things.obstacles.extend(wall.around(&outline, &[]));
+            (yard(&outline, 2.0..10.0, layout), 0.0)
+        }
+    };
+    Some((Scenario { boundary_height_m, ..lot(&strip, boundary, things) }, strip))
+}
+
+fn course(rng: &mut Rng) -> Course {
+    let mut course = Course::new(rng.random_range(WIDTH_M));
+    let until_m = RUN_OUT_M + rng.random_range(LENGTH_M);
+    course.straight(RUN_OUT_M + rng.random_range(10.0..40.0));
+    while course.length_m() < until_m {
+        if rng.random_bool(0.6) {
+            let turn_rad = course.turn_rad(rng, 15.0..90.0, 100.0);
+            course.bend(rng.random_range(RADIUS_M), turn_rad);
+        }
+        course.straight(rng.random_range(15.0..60.0));
+    }
+    course.straight(RUN_OUT_M);
+    course
+}
+
+/// Things anywhere, as many as stand clear of each other.
+fn scatter(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
+    let rules = Rules { gap_m: rng.random_range(3.0..4.5), apart_m: 7.0, corner_clear_m: 0.0 };
+    let width_m = 2.0 * strip.half_width_m(0.0);
+    let tries = strip.length_m() * width_m / rng.random_range(GROUND_M2);
+    for _ in 0..tries as usize {
+        let (s_m, side) = (rng.random_range(0.0..strip.length_m()), side(rng));
+        let d_m = side.sign() * rng.random_range(0.0..0.5 * width_m);
+        let thing = thing_at(strip.point(s_m, d_m), rng);
+        let outline = match &thing {
+            Thing::Obstacle(obstacle) => obstacle.outline().clone(),
+            Thing::Island(island) => island.polygon.clone(),
+        };
+        let to_edge_m = outline
+            .iter()
+            .map(|&corner| 0.5 * width_m - side.sign() * strip.local(corner, s_m).y)
+            .fold(f32::INFINITY, f32::min);
+        let is_clear = things.outlines.iter().all(|other| !DOUBTFUL_M.contains(&apart_m(other, &outline)));
+        if to_edge_m > 0.1 && !DOUBTFUL_M.contains(&to_edge_m) && is_clear {
+            match thing {
+                Thing::Obstacle(obstacle) => things.narrow(obstacle, side, s_m, &rules),
+                Thing::Island(island) => things.narrow_by_island(island, side, s_m, &rules),
+            };
+        }
+    }
+}
+
+fn thing_at(at: Vec2, rng: &mut Rng) -> Thing {
+    let heading_rad = rng.random_range(-PI..PI);
+    let sized = |class, length_m: f32, width_m: f32, height_m: f32| {
+        let round = |value: f32| Some((value * 100.0).round() / 100.0);
+        let plain = things::obstacle(class, at, heading_rad);
+        Thing::Obstacle(Obstacle {
+            length_m: round(length_m),
+            width_m: round(width_m),
+            height_m: round(height_m),
+            ..plain
+        })
+    };
+    match rng.random_range(0..10) {
+        // Trees.
+        0..4 => {
+            let trunk_m = rng.random_range(0.25..0.9);
+            sized(ObstacleClass::Pillar, trunk_m, trunk_m, 4.0)
+        }
+        // A bench, a hedge, a piece of wall.
+        4..6 => sized(
+            ObstacleClass::Wall,
+            rng.random_range(1.5..8.0),
+            rng.random_range(0.3..1.4),
+            rng.random_range(0.4..2.5),
+        ),
+        // A hut.
+        6 => sized(ObstacleClass::Wall, rng.random_range(2.0..5.0), rng.random_range(2.0..4.0), 2.5),
+        7 => Thing::Obstacle(things::obstacle(draw_car(rng), at, heading_rad)),
+        // A fountain, a flower bed.
+        _ => {
+            const CORNERS: u8 = 12;
+            let radius_m = rng.random_range(0.8..3.0);
+            let corner = |k: u8| at + radius_m * Vec2::from_angle(TAU * f32::from(k) / f32::from(CORNERS));
+            let height_m = if rng.random_bool(0.7) { 0.15 } else { 0.8 };
+            Thing::Island(Island { polygon: (0..CORNERS).map(|k| to_millimetres(corner(k))).collect(), height_m })
+        }
+    }
+}
+
+/// Between two outlines that do not overlap, metres.
+fn apart_m(one: &[Vec2], other: &[Vec2]) -> f32 {
+    let from = |points: &[Vec2], outline: &[Vec2]| {
+        points
+            .iter()
+            .flat_map(|&point| edges(outline).map(move |(a, b)| distance_to_segment(point, a, b)).collect::<Vec<_>>())
+            .fold(f32::INFINITY, f32::min)
+    };
+    from(one, other).min(from(other, one))
+}

@@ -1,0 +1,88 @@
+//! `rules`: the `DAgger` family at equal samples.
+
+use super::trainings::{Begun, Trainings};
+use crate::args::{LayerArgs, OutArgs};
+use crate::output::Output;
+use anyhow::ensure;
+use clap::Args;
+use evaluation::rules::{self, Extent};
+use experiment::settings::{Layers, Settings};
+use std::path::PathBuf;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask rules                                   every rule, one seed, few lots
+  cargo xtask rules --rule expert_only,all_below,hg_dagger --seeds 5 --unseen sealed:my-phrase:90:all
+  cargo xtask rules --resume runs/rules-default-s1";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct RulesArgs {
+    #[command(flatten)]
+    layers: LayerArgs,
+    /// Root seed of the first training; the next seeds follow it.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Trainings of each rule.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
+    seeds: u64,
+    /// Rules by the name of their setting (dagger.rule); all of them if none is named.
+    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
+    rule: Vec<String>,
+    /// Iterations of every training, after behaviour cloning.
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=50))]
+    iterations: u32,
+    /// Samples that a round adds to the data set, for every rule.
+    #[arg(long, value_name = "N", default_value_t = 6000, value_parser = clap::value_parser!(u32).range(1..))]
+    samples: u32,
+    /// Lots that all policies are driven on, once each way.
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "validation:90:all")]
+    unseen: Vec<String>,
+    #[command(flatten)]
+    out: OutArgs,
+    /// Continues an interrupted run with its own settings, to the same result; finished trainings are skipped.
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all =
+            ["preset", "config", "overrides", "seed", "out", "seeds", "rule", "iterations", "samples", "unseen"]
+    )]
+    resume: Option<PathBuf>,
+}
+
+/// Few lots: two of each family and one round trip of lot a in every round.
+const LOTS: &str = r#"training.lots=["lot-a", "train:18:all"]"#;
+
+const RULES: Trainings<Extent> = Trainings {
+    command: "rules",
+    title: "Decision rules at equal samples",
+    stages: rules::stages,
+    write: report::rules::write,
+    unseen: |extent| &extent.unseen,
+};
+
+pub(crate) fn run(args: &RulesArgs, output: &Output) -> anyhow::Result<()> {
+    RULES.run(args.resume.as_deref(), &args.out, || begin(args), output)
+}
+
+fn begin(args: &RulesArgs) -> anyhow::Result<Begun<Extent>> {
+    let mut layers = Layers::from(&args.layers);
+    // What the user sets comes later and counts.
+    if layers.preset_name() == "default" {
+        layers.overrides.splice(0..0, [LOTS.to_owned(), "training.trials=1".to_owned()]);
+    }
+    let settings = Settings::resolve(&layers, args.seed)?;
+    let known = rules::all().map(|(name, _)| name.to_owned());
+    let named = if args.rule.is_empty() { known.to_vec() } else { args.rule.clone() };
+    for (at, rule) in named.iter().enumerate() {
+        ensure!(known.contains(rule), "--rule {rule}: there are {}", known.join(", "));
+        ensure!(!named[..at].contains(rule), "--rule {rule} is named twice");
+    }
+    let RulesArgs { seeds, iterations, samples, .. } = *args;
+    let extent = Extent { rules: named, seeds, iterations, samples, unseen: args.unseen.clone() };
+    ensure!(
+        settings.seed.0.checked_add(seeds).is_some_and(|last| i64::try_from(last).is_ok()),
+        "seed {} leaves no room for {seeds} trainings; choose a smaller one",
+        settings.seed.0
+    );
+    Ok(Begun { preset: layers.preset_name().to_owned(), settings, extent })
+}

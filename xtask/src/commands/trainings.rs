@@ -1,0 +1,79 @@
+//! What commands of several trainings and one drive of all their policies have in common: they are begun, resumed, done
+//! and reported in the same way.
+
+use super::{reproduce, train};
+use crate::args::OutArgs;
+use crate::console::Console;
+use crate::output::Output;
+use anyhow::{Context as _, ensure};
+use evaluation::stages::Stage;
+use experiment::inputs::{self, Inputs};
+use experiment::lots::Lot;
+use experiment::run_dir::{Outcome, Request, RunDir};
+use experiment::settings::Settings;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::path::Path;
+
+/// A command of this kind; `E`: how much is done, besides what the settings say.
+pub(crate) struct Trainings<E> {
+    pub(crate) command: &'static str,
+    /// Above its table.
+    pub(crate) title: &'static str,
+    pub(crate) stages: fn(&Settings, &E, &Path) -> Vec<Stage>,
+    /// Writes `COMMAND.md`, `.csv` and `.svg`; returns the table.
+    pub(crate) write: fn(&Settings, &E, &[Stage], &RunDir) -> anyhow::Result<String>,
+    /// Lots that nothing is trained on.
+    pub(crate) unseen: fn(&E) -> &[String],
+}
+
+/// What a run is begun with.
+pub(crate) struct Begun<E> {
+    pub(crate) preset: String,
+    pub(crate) settings: Settings,
+    pub(crate) extent: E,
+}
+
+impl<E: Serialize + DeserializeOwned> Trainings<E> {
+    /// Goes on with the run at `resume`, or begins one.
+    pub(crate) fn run(
+        &self,
+        resume: Option<&Path>,
+        out: &OutArgs,
+        begin: impl FnOnce() -> anyhow::Result<Begun<E>>,
+        output: &Output,
+    ) -> anyhow::Result<()> {
+        let (run, settings, extent) = if let Some(path) = resume {
+            let (run, settings, manifest) = RunDir::resume(path, self.command)?;
+            let extent: E = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
+            manifest.check_inputs(&self.inputs(&settings, &extent)?)?;
+            (run, settings, extent)
+        } else {
+            let Begun { preset, settings, extent } = begin()?;
+            for lot in Lot::parse_all((self.unseen)(&extent), &settings.episode.vehicle)? {
+                ensure!(!lot.is_for_training(), "--unseen {}: policies are trained on it; name others", lot.name());
+            }
+            let arguments = toml::Table::try_from(&extent)?;
+            let request = Request { arguments, inputs: self.inputs(&settings, &extent)? };
+            let run = RunDir::create(&out.place(self.command, &preset, settings.seed.0), &settings, &request)?;
+            (run, settings, extent)
+        };
+        let stages = (self.stages)(&settings, &extent, run.path());
+        let console = Console::new(output);
+        reproduce::perform_all(self.command, &stages, &run, &console, output)?;
+        let table = (self.write)(&settings, &extent, &stages, &run)?;
+        output.table(|| format!("\n{}\n\n{table}", self.title), &())?;
+        run.finish(Outcome::Reproduction { stages: stages.len() })?;
+        let name = self.command;
+        output.note(format_args!("written: {}/{name}.md, {name}.csv and {name}.svg", run.path().display()));
+        console.report_time();
+        Ok(())
+    }
+
+    /// The lots from files that are read.
+    fn inputs(&self, settings: &Settings, extent: &E) -> anyhow::Result<Inputs> {
+        let mut found = train::inputs(settings)?;
+        found.extend(inputs::of(&Lot::parse_all((self.unseen)(extent), &settings.episode.vehicle)?, &[]));
+        Ok(found)
+    }
+}
