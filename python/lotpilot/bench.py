@@ -120,7 +120,7 @@ def main() -> None:
     """Prints the table."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     parser = argparse.ArgumentParser(prog="python -m lotpilot.bench", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--cars", type=int, default=64, help="environments stepped together [default: 64]")
+    parser.add_argument("--cars", type=int, default=128, help="environments stepped together [default: 128]")
     parser.add_argument("--threads", type=int, default=cores, help="threads to step with [default: all cores]")
     parser.add_argument("--seconds", type=float, default=1.0, help="of each measurement [default: 1]")
     parser.add_argument("--rounds", type=int, default=5, help="measurements of each row [default: 5]")
