@@ -81,15 +81,21 @@ def evaluate(
     overwrite: bool,
 ) -> None: ...
 def read_round(run: PathLike[str], round: int) -> dict[str, Any]: ...
-def rust_rate(
-    count: int,
-    lots: Sequence[str],
-    noise: str,
-    settings: Mapping[str, Any],
-    ahead_m: float,
-    threads: int,
-    seconds: float,
-) -> float: ...
+
+class RustLoop:
+    def __init__(
+        self,
+        count: int,
+        lots: Sequence[str],
+        trials: int,
+        noise: str,
+        settings: Mapping[str, Any],
+        ahead_m: float,
+        threads: int,
+        tick_by_tick: bool,
+    ) -> None: ...
+    def drive(self, seconds: float) -> int: ...
+
 def drive_digest(
     driver: str, lots: Sequence[str], directions: str, noise: str, settings: Mapping[str, Any], seed: int, number: int
 ) -> str: ...

@@ -76,7 +76,7 @@ class EnvOptions:
     state: bool = False
     """Whether speed (m/s) and road-wheel angle (radians, positive to the left) are observed as well."""
     view: bool = False
-    """Whether the bird's-eye view in full resolution is observed as well; costs ten times the step itself."""
+    """Whether the bird's-eye view in full resolution is observed as well; costs thirty times the step itself."""
     reward: Reward | Mapping[str, float] = field(default_factory=Reward)
     """Weights of the reward; a mapping changes some of the default ones."""
     threads: int | None = None

@@ -45,7 +45,9 @@ class Dataset:
 
     def __init__(self, run: str | os.PathLike[str]) -> None:
         folder = Path(run)
-        count = len([path for path in folder.glob("round-*") if (path / "round.toml").is_file()])
+        # Not what is trained beside a round's network, as round-01-critic.
+        rounds = [path for path in folder.glob("round-*") if path.name.removeprefix("round-").isdigit()]
+        count = len([path for path in rounds if (path / "round.toml").is_file()])
         if count == 0:
             raise ValueError(f"{folder}: there is no round of training data")
         self.rounds: list[dict[str, Any]] = [load_round(folder, index) for index in range(count)]

@@ -111,7 +111,8 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
 
     Environment i of n drives the episodes i, i + n, … (``EnvOptions``). ``reset(seed=s)`` gives all of them the seed s:
     they share its trials and drive none twice. ``reset(seed=[…])`` gives each its own.
-    ``reset(options={"reset_mask": mask})`` resets some. ``infos`` holds an array per name; under ``SAME_STEP`` also ``final_obs`` and ``final_info``.
+    ``reset(options={"reset_mask": mask})`` resets some. ``infos`` holds an array per name; under
+    ``SAME_STEP`` also ``final_obs`` and ``final_info``.
 
     Args:
         num_envs: How many.

@@ -22,8 +22,8 @@ Table = dict[str, list[Any]]
 Driver = str | Callable[[Grids], npt.ArrayLike]
 """A name as on the command line, or a function of grids: uint8 [n, 25, 25] → [n, 2], ahead and left in metres.
 
-An object with a method ``drive(grids, cars, was_reset)`` is told also which cars they are, int64 [n], and which were put
-back on the route since, bool [n]: for drivers that remember."""
+An object with a method ``drive(grids, cars, was_reset)`` is told also which cars they are, int64 [n], and which were
+put back on the route since, bool [n]: for drivers that remember."""
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,8 @@ pub(crate) struct Car {
 struct Drive {
     number: u64,
     episode: Episode,
-    expert: ScriptedExpert,
+    /// Made when it is first asked.
+    expert: Option<ScriptedExpert>,
     /// The expert's answer, and the tick that it is for.
     label: Option<(u32, LookAheadPoint)>,
     last: Option<Frame>,
@@ -109,7 +110,7 @@ impl Car {
         self.next += self.stride;
         self.drive = Some(Drive {
             number,
-            expert: drivers::expert(&course.settings.expert, &course.settings.episode),
+            expert: None,
             label: None,
             last: None,
             digest: self.digests.then(DriveDigest::default),
@@ -177,7 +178,7 @@ impl Car {
 
     /// The expert's answer to what is observed now, as an action. Asked at every tick, it is what the driver `expert`
     /// would answer. `None` after the end.
-    pub(crate) fn label(&mut self, kind: ActionKind) -> Option<[f32; ACTION]> {
+    pub(crate) fn label(&mut self, kind: ActionKind, course: &Course) -> Option<[f32; ACTION]> {
         let Drive { episode, expert, label, .. } = self.drive.as_mut()?;
         if episode.ending().is_some() {
             return None;
@@ -186,6 +187,8 @@ impl Car {
         let point = match *label {
             Some((of, point)) if of == tick => point,
             _ => {
+                let settings = &course.settings;
+                let expert = expert.get_or_insert_with(|| drivers::expert(&settings.expert, &settings.episode));
                 if episode.was_reset() {
                     expert.reset();
                 }

@@ -273,9 +273,9 @@ impl Cars {
 
     /// The expert's actions now, float32 [n, 2]; NaN where the episode has ended.
     fn expert_actions<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyArray<f32, Ix2>>> {
-        let Self { cars, kind, threads, .. } = self;
-        let kind = *kind;
-        let label = |car: &mut Car| Ok(car.label(kind).unwrap_or([f32::NAN; ACTION]));
+        let Self { course, cars, kind, threads, .. } = self;
+        let (kind, course) = (*kind, &*course);
+        let label = |car: &mut Car| Ok(car.label(kind, course).unwrap_or([f32::NAN; ACTION]));
         points(py, threads.each(py, cars.iter_mut(), label)?)
     }
 

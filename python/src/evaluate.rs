@@ -63,7 +63,7 @@ pub(crate) fn evaluate(
             None => Some(0),
         };
         let compare_with = compare_with.context("compare_with: name one of the drivers")?;
-        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with };
+        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with, shard: None };
         plan.check()?;
         let build = Build {
             program: concat!("lotpilot ", env!("CARGO_PKG_VERSION"), ", Python").to_owned(),

@@ -47,5 +47,5 @@ mod _native {
     #[pymodule_export]
     use crate::lot::{Lot, drivers, generate, lots, settings};
     #[pymodule_export]
-    use crate::rate::{drive_digest, rust_rate};
+    use crate::rate::{RustLoop, drive_digest};
 }

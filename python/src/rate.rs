@@ -7,7 +7,7 @@ use experiment::drive::TrialBatch;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use rayon::ThreadPoolBuilder;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use sim::batch::{SeatedFleet, run_fleets_until};
 use sim::driver::{Decision, Driver, LookAheadPoint, OneDriverEach, Situation, Source};
 use sim::episode::Episode;
@@ -32,46 +32,67 @@ impl Driver for Centred {
     }
 }
 
-/// Control steps per second of the closed loop in Rust: the first `count` episodes again and again, in lock-step, steered
-/// at the route `ahead_m` further on.
-#[pyfunction]
-#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
-#[expect(clippy::disallowed_methods, reason = "a benchmark; nothing computed depends on it")]
-pub(crate) fn rust_rate(
-    py: Python<'_>,
-    count: u64,
-    lots: Vec<String>,
-    noise: &str,
-    settings: SettingsFrom,
+/// The closed loop in Rust alone: the first `count` episodes again and again, steered at the route `ahead_m` further on.
+///
+/// Tick by tick, all cars of a thread have one driver, as those of a network: each tick is driven with every car before the
+/// next. Otherwise each car has its own, as those of planners, and drives several ticks before the next car.
+#[pyclass(module = "lotpilot._native")]
+pub(crate) struct RustLoop {
+    episodes: Vec<Episode>,
     ahead_m: f32,
-    threads: usize,
-    seconds: f64,
-) -> PyResult<f64> {
-    let course = Course::new(settings, &lots, "both", Some(8), noise).map_err(input)?;
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
-    detached(py, || {
-        pool.install(|| {
-            let episodes = (0..count).map(|number| course.start(RootSeed(1), number));
-            let episodes = episodes.collect::<anyhow::Result<Vec<Episode>>>().map_err(input)?;
+    cars_each: usize,
+    pool: ThreadPool,
+}
+
+#[pymethods]
+impl RustLoop {
+    #[new]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+    fn new(
+        py: Python<'_>,
+        count: u64,
+        lots: Vec<String>,
+        trials: u32,
+        noise: &str,
+        settings: SettingsFrom,
+        ahead_m: f32,
+        threads: usize,
+        tick_by_tick: bool,
+    ) -> PyResult<Self> {
+        let course = Course::new(settings, &lots, "both", Some(trials), noise).map_err(input)?;
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
+        let start = |number| course.start(RootSeed(1), number).map_err(input);
+        let episodes = detached(py, || (0..count).map(start).collect::<PyResult<Vec<_>>>())?;
+        let cars_each = if tick_by_tick { episodes.len().div_ceil(threads) } else { 1 };
+        Ok(Self { episodes, ahead_m, cars_each, pool })
+    }
+
+    /// Drives for some seconds; returns the number of control steps.
+    #[expect(clippy::disallowed_methods, reason = "a benchmark; nothing computed depends on it")]
+    fn drive(&self, py: Python<'_>, seconds: f64) -> PyResult<u64> {
+        let Self { episodes, ahead_m, cars_each, pool } = self;
+        let drive = || {
             let (started, limit) = (Instant::now(), Duration::from_secs_f64(seconds));
             let mut steps = 0_u64;
             while started.elapsed() < limit {
-                let fleet = |cars| Box::new(OneDriverEach(vec![Centred { ahead_m }; cars])) as Box<_>;
-                let fleets = SeatedFleet::in_all(episodes.clone(), 1, fleet);
+                let fleet = |cars| Box::new(OneDriverEach(vec![Centred { ahead_m: *ahead_m }; cars])) as Box<_>;
+                let fleets = SeatedFleet::in_all(episodes.clone(), *cars_each, fleet);
                 run_fleets_until(fleets, &mut |_, _| {
                     steps += 1;
-                    let is_over = steps.is_multiple_of(4096) && started.elapsed() >= limit;
+                    let is_over = steps.is_multiple_of(1024) && started.elapsed() >= limit;
                     if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
                 });
             }
-            Ok(steps as f64 / started.elapsed().as_secs_f64())
-        })
-    })
+            Ok(steps)
+        };
+        detached(py, || pool.install(drive))
+    }
 }
 
 /// SHA-256 of an episode as `cargo xtask evaluate` drives it with a named driver.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 pub(crate) fn drive_digest(
     py: Python<'_>,
     driver: &str,

@@ -1,5 +1,6 @@
 """The same episodes as on the command line, and what happens to bad input."""
 
+import hashlib
 import multiprocessing
 from itertools import pairwise
 from pathlib import Path
@@ -275,15 +276,48 @@ def test_a_forked_process_is_told_so_instead_of_waiting_forever():
         child.join()
 
 
-def test_a_round_of_training_data_is_read_as_rust_wrote_it():
-    """The run of a test of the workspace, if one is there; reading is tested in Rust as well."""
-    runs = sorted(ROOT.glob("runs/*/round-00/round.toml"))
-    if not runs:
-        pytest.skip("no run of a training here")
-    data = lotpilot.load_round(runs[0].parents[1])
-    n = len(data["grids"])
-    assert data["grids"].shape == (n, 25, 25) and data["points"].shape == (n, 2) and data["tick"].shape == (n,)
-    assert len(lotpilot.Dataset(runs[0].parents[1]).columns()["tick"]) >= n
+def write_sums(folder):
+    """Lists the files of a folder as storage does."""
+    names = sorted(path.name for path in folder.iterdir() if path.is_file())
+    lines = [f"{hashlib.sha256((folder / name).read_bytes()).hexdigest()}  {name}\n" for name in names]
+    (folder / "sha256sums").write_text("".join(lines))
+
+
+def write_round(run, number, grids, fractions):
+    """A round of a run, as docs/formats.md describes it."""
+    n, folder = len(grids), run / f"round-{number:02}"
+    folder.mkdir()
+    np.save(folder / "grids.npy", np.packbits(grids.reshape(n, -1), axis=1))
+    np.save(folder / "labels.npy", np.column_stack([fractions, np.zeros(n)]).astype(np.float32))
+    floats = ("time_s", "x_m", "y_m", "heading_rad", "speed_mps", "steering_rad", "command_steering_rad")
+    columns = {name: np.arange(n, dtype=np.float32) for name in (*floats, "command_speed_mps")}
+    ids = {"episode": np.zeros(n, np.uint32), "tick": np.arange(n, dtype=np.uint32)}
+    np.savez(folder / "ticks.npz", **columns, **ids, driver=np.ones(n, np.uint8))
+    (folder / "round.toml").write_text(
+        f"schema = 2\nround = {number}\nsamples = {n}\nnoise_augmentations = 0\nticks = {n}\nnovice_ticks = 0\n"
+        "tau_hat_sum = 0.0\ndriven_s = 0.1\nnear_collisions = 0\ndriven_m = 0.1\n"
+        f'[[episodes]]\nlot = "lot-a"\ndirection = "forward"\nsamples = {n}\nnear_collisions = 0\ndriven_m = 0.1\n'
+    )
+    write_sums(folder)
+
+
+def test_rounds_of_training_data_are_read_and_damage_is_noticed(tmp_path):
+    grids = np.random.default_rng(0).integers(0, 2, (3, 25, 25)).astype(np.uint8)
+    fractions = np.array([[0.5, 1.0], [0.5, 0.0], [0.0, 0.5]], np.float32)
+    (tmp_path / "settings.toml").write_text(lotpilot.settings("smoke"))
+    write_sums(tmp_path)
+    for number in (0, 1):
+        write_round(tmp_path, number, grids, fractions)
+    data = lotpilot.load_round(tmp_path, 1)
+    np.testing.assert_array_equal(data["grids"], grids)
+    np.testing.assert_allclose(data["points"], [[4.3, 0.0], [16.3, 0.0], [10.3, 6.0]], atol=1e-5)
+    assert data["lots"] == ["lot-a"] and data["is_novice"].all() and data["tick"].tolist() == [0, 1, 2]
+    dataset = lotpilot.Dataset(tmp_path)
+    assert len(dataset) == 6 and dataset.columns()["round"].tolist() == [0, 0, 0, 1, 1, 1]
+    damaged = tmp_path / "round-01" / "labels.npy"
+    damaged.write_bytes(damaged.read_bytes()[:-1] + b"\x01")
+    with pytest.raises(ValueError, match=r"labels\.npy"):
+        lotpilot.Dataset(tmp_path)
 
 
 def test_both_workspaces_have_the_same_profile_and_lints():
