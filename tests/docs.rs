@@ -10,12 +10,13 @@ use std::fmt::Display;
 use std::path::Path;
 
 /// Folders whose paths are checked when the docs name them.
-const FOLDERS: [&str; 14] = [
+const FOLDERS: [&str; 15] = [
     "sim/",
     "scenarios/",
     "expert/",
     "planners/",
     "policy/",
+    "onnx/",
     "experiment/",
     "evaluation/",
     "report/",
