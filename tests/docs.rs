@@ -16,6 +16,7 @@ const FOLDERS: [&str; 15] = [
     "expert/",
     "planners/",
     "policy/",
+    "onnx/",
     "experiment/",
     "evaluation/",
     "report/",

@@ -23,6 +23,7 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         "scaling",
         "guard",
         "generate",
+        "export",
         "pixel-accuracy",
         "sample-size",
         "bench",

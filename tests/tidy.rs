@@ -23,20 +23,32 @@ fn dependencies() -> BTreeMap<String, Vec<String>> {
 }
 
 /// Each crate with the siblings that it may use: the data flows from left to right, never back.
-const LAYERS: [(&str, &[&str]); 11] = [
+const LAYERS: [(&str, &[&str]); 12] = [
     ("sim", &[]),
     ("storage", &[]),
     ("scenarios", &["sim", "storage"]),
     ("expert", &["sim"]),
     ("planners", &["sim"]),
     ("policy", &["sim", "storage"]),
-    ("experiment", &["sim", "storage", "scenarios", "expert", "planners", "policy"]),
+    ("onnx", &["sim", "storage", "policy"]),
+    ("experiment", &["sim", "storage", "scenarios", "expert", "planners", "policy", "onnx"]),
     ("evaluation", &["sim", "storage", "planners", "policy", "experiment"]),
     ("report", &["sim", "storage", "policy", "experiment", "evaluation"]),
     ("benchmark", &["sim", "scenarios", "expert", "policy", "experiment", "evaluation"]),
     (
         "xtask",
-        &["sim", "storage", "scenarios", "planners", "policy", "experiment", "evaluation", "report", "benchmark"],
+        &[
+            "sim",
+            "storage",
+            "scenarios",
+            "planners",
+            "policy",
+            "onnx",
+            "experiment",
+            "evaluation",
+            "report",
+            "benchmark",
+        ],
     ),
 ];
 

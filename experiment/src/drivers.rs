@@ -4,11 +4,13 @@ use crate::run_dir;
 use crate::settings::{Settings, Smoothing};
 use anyhow::{Context as _, bail, ensure};
 use expert::{ExpertSettings, ScriptedExpert};
+use onnx::fleet::OnnxFleet;
+use onnx::network::OnnxNetwork;
 use planners::{Planner, PlannerContext, PlannerSpec};
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
 use policy::drivers::NetFleet;
-use policy::network::DeviceChoice;
+use policy::network::{DeviceChoice, InferenceSettings};
 use serde::{Deserialize, Serialize};
 use sim::action_smoothing::SmoothedFleet;
 use sim::driver::{Fleet, OneDriverEach, SensorsOnly, Source};
@@ -50,6 +52,11 @@ pub enum DriverSpec {
         /// `run:` and `net:` drivers, at least one.
         members: Vec<DriverSpec>,
     },
+    /// `onnx:FILE`: a network from an ONNX file, trained anywhere.
+    Onnx {
+        /// The file.
+        file: PathBuf,
+    },
     /// `NAME`, `tuned:NAME` or `NAME:FILE`: a model-based planner.
     Planner {
         /// Its name, with the reading if it is not the paper's: `dwa/fox`.
@@ -83,6 +90,7 @@ pub fn specs() -> Vec<(String, String)> {
         ("run:DIR/bc", "its policy after behaviour cloning"),
         ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
         ("ensemble:DRIVER,DRIVER", "run: and net: drivers whose answers are taken together"),
+        ("onnx:FILE", "a network from an ONNX file, trained anywhere (docs/formats.md)"),
     ];
     let of_files = [
         ("tuned:NAME", "one of these planners with parameters found by cargo xtask tune (planners/tuned/)"),
@@ -117,6 +125,7 @@ impl FromStr for DriverSpec {
             Some(("python", name)) => {
                 bail!("{text:?} is a function in Python; only lotpilot.evaluate there can drive {name:?}")
             }
+            Some(("onnx", file)) => Ok(Self::Onnx { file: file.into() }),
             Some(("tuned", name)) if is_planner(name) => planner(name, Parameters::Tuned),
             Some((name, file)) if is_planner(name) => planner(name, Parameters::File(file.into())),
             _ => {
@@ -148,6 +157,7 @@ impl fmt::Display for DriverSpec {
                 let members: Vec<String> = members.iter().map(Self::to_string).collect();
                 write!(f, "ensemble:{}", members.join(","))
             }
+            Self::Onnx { file } => write!(f, "onnx:{}", file.display()),
             Self::Planner { name, parameters: Parameters::Published } => f.write_str(name),
             Self::Planner { name, parameters: Parameters::Tuned } => write!(f, "tuned:{name}"),
             Self::Planner { name, parameters: Parameters::File(path) } => write!(f, "{name}:{}", path.display()),
@@ -173,7 +183,7 @@ impl DriverSpec {
 
     /// Whether it is a learned policy.
     pub fn is_network(&self) -> bool {
-        matches!(self, Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. })
+        matches!(self, Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. } | Self::Onnx { .. })
     }
 
     /// The training run it comes from, of an ensemble the first one; `/bc` is part of it.
@@ -181,7 +191,11 @@ impl DriverSpec {
         match self {
             Self::Run { folder } => Some(folder),
             Self::Ensemble { members } => members.iter().find_map(Self::run),
-            Self::Expert | Self::Checkpoint { .. } | Self::Planner { .. } | Self::Callback { .. } => None,
+            Self::Expert
+            | Self::Checkpoint { .. }
+            | Self::Onnx { .. }
+            | Self::Planner { .. }
+            | Self::Callback { .. } => None,
         }
     }
 
@@ -223,7 +237,7 @@ impl DriverSpec {
                 }
                 Ok(networks)
             }
-            Self::Expert | Self::Planner { .. } | Self::Callback { .. } => Ok(Vec::new()),
+            Self::Expert | Self::Onnx { .. } | Self::Planner { .. } | Self::Callback { .. } => Ok(Vec::new()),
         }
     }
 
@@ -238,6 +252,11 @@ impl DriverSpec {
             Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. } => {
                 let networks = self.checkpoints().with_context(|| format!("driver {name:?}"))?;
                 Model::Network(networks, settings.dagger.device)
+            }
+            Self::Onnx { file } => {
+                let network = OnnxNetwork::load(file).with_context(|| format!("driver {name:?}"))?;
+                let inference = network.about().map_or(settings.dagger.inference, |about| about.inference);
+                Model::Onnx(network, inference)
             }
             Self::Planner { name, parameters } => Model::Planner(planner(name, parameters)?),
             Self::Callback { .. } => bail!("driver {name:?} is a function of another program"),
@@ -269,6 +288,8 @@ enum Model {
     Expert(ExpertSettings),
     /// One network, or the members of an ensemble, which share geometry and settings of inference.
     Network(Vec<Checkpoint>, DeviceChoice),
+    /// A network from an ONNX file, and how its answers are used.
+    Onnx(OnnxNetwork, InferenceSettings),
     Planner(PlannerSpec),
     Callback(Arc<dyn Callback>),
 }
@@ -322,6 +343,7 @@ impl NamedDriver {
                         network.inference.smoothing_ticks = ticks;
                     }
                 }
+                Model::Onnx(_, inference) => inference.smoothing_ticks = ticks,
                 Model::Expert(_) | Model::Planner(_) | Model::Callback(_) => self.smoothing_ticks = ticks,
             }
         }
@@ -345,6 +367,9 @@ impl NamedDriver {
                 }
                 Some(sums::digest(&bytes))
             }
+            (Model::Onnx(network, inference), _) => {
+                Some(sums::digest(format!("{inference:?} {}", network.sha256()).as_bytes()))
+            }
             (Model::Planner(planner), DriverSpec::Planner { parameters: Parameters::File(_), .. }) => {
                 Some(sums::digest(planner.parameters().to_string().as_bytes()))
             }
@@ -356,7 +381,7 @@ impl NamedDriver {
     pub fn source(&self) -> Source {
         match &self.model {
             Model::Expert(_) => Source::Expert,
-            Model::Network(..) | Model::Callback(_) => Source::Novice,
+            Model::Network(..) | Model::Onnx(..) | Model::Callback(_) => Source::Novice,
             Model::Planner(_) => Source::Planner,
         }
     }
@@ -367,14 +392,19 @@ impl NamedDriver {
     /// If it was trained for another patch of ground; or with another controller, sensor or control period, unless
     /// `evaluation.untrained_conditions` allows that.
     pub fn check(&self, settings: &Settings) -> anyhow::Result<()> {
-        let Model::Network(networks, _) = &self.model else { return Ok(()) };
-        let checkpoint = &networks[0];
+        let trained = match &self.model {
+            Model::Network(networks, _) => Some(&networks[0].conditions),
+            // Of a network from elsewhere nobody knows.
+            Model::Onnx(network, _) => network.about().map(|about| &about.conditions),
+            Model::Expert(_) | Model::Planner(_) => None,
+        };
+        let Some(trained) = trained else { return Ok(()) };
         let here = Conditions::of(&settings.episode);
-        let is_same_patch = checkpoint.geometry() == here.geometry();
+        let is_same_patch = trained.geometry() == here.geometry();
         if is_same_patch && settings.evaluation.untrained_conditions {
             return Ok(());
         }
-        let differences = checkpoint.conditions.differences(&here);
+        let differences = trained.differences(&here);
         let listed: Vec<String> =
             differences.iter().map(|(trained, here)| format!("{trained} (here {here})")).collect();
         let allow = if is_same_patch { ", or allow it with --set evaluation.untrained_conditions=true" } else { "" };
@@ -391,7 +421,7 @@ impl NamedDriver {
     pub fn to_planner(&self, episode: &EpisodeSettings) -> Option<Planner> {
         match &self.model {
             Model::Planner(planner) => Some(planner.planner(&PlannerContext::of(episode))),
-            Model::Expert(_) | Model::Network(..) | Model::Callback(_) => None,
+            Model::Expert(_) | Model::Network(..) | Model::Onnx(..) | Model::Callback(_) => None,
         }
     }
 
@@ -400,7 +430,7 @@ impl NamedDriver {
     pub fn cars_per_fleet(&self, cars: usize) -> usize {
         match &self.model {
             Model::Network(_, device) if *device != DeviceChoice::default() => cars.max(1),
-            Model::Network(..) => cars.div_ceil(rayon::current_num_threads()).max(1),
+            Model::Network(..) | Model::Onnx(..) => cars.div_ceil(rayon::current_num_threads()).max(1),
             Model::Callback(_) => cars.max(1),
             Model::Expert(_) | Model::Planner(_) => 1,
         }
@@ -414,6 +444,7 @@ impl NamedDriver {
                 smoothed(OneDriverEach((0..cars).map(|_| expert(settings, episode)).collect()), ticks)
             }
             Model::Network(networks, device) => Box::new(NetFleet::ensemble(&networks[0], &networks[1..], *device)),
+            Model::Onnx(network, inference) => Box::new(OnnxFleet::new(network, *inference, episode.sensing.geometry)),
             Model::Planner(planner) => {
                 let planner = planner.planner(&PlannerContext::of(episode));
                 smoothed(OneDriverEach(vec![SensorsOnly(planner); cars]), ticks)
@@ -519,6 +550,7 @@ mod tests {
             "run:runs/mine/bc",
             "net:runs/mine/round-03",
             "ensemble:run:runs/a,net:runs/b/round-02",
+            "onnx:policies/mine.onnx",
             "tentacle",
             "tuned:vvf",
             "dwa/fox",
@@ -584,6 +616,7 @@ mod tests {
         let network = NamedDriver::network("network", DriverSpec::Expert, checkpoint, DeviceChoice::Cpu);
         let ticks = |driver: &NamedDriver| match &driver.model {
             Model::Network(networks, _) => networks[0].inference.smoothing_ticks,
+            Model::Onnx(_, inference) => inference.smoothing_ticks,
             Model::Expert(_) | Model::Planner(_) | Model::Callback(_) => driver.smoothing_ticks,
         };
         for (smoothing, of_planner, of_network) in [

@@ -15,7 +15,7 @@ pub(crate) fn smoothed(smoothing: &mut ActionSmoothing, answer: Prediction, geom
 }
 
 /// Smooths the answer at every seat.
-pub(crate) fn smooth_all(
+pub fn smooth_all(
     smoothing: &mut FleetSmoothing,
     seats: &[Seat<'_>],
     answers: &mut [Prediction],

@@ -129,7 +129,7 @@ impl Checkpoint {
         files::write(folder, &about)?;
 
         let path = folder.join(NUMBERS);
-        let tensors: Vec<Tensor> = to_pytorch(&self.weights);
+        let tensors = self.tensors();
         let views = tensors.iter().map(|tensor| {
             let view = TensorView::new(Dtype::F32, tensor.shape.clone(), &tensor.bytes).expect("bytes fit the shape");
             (tensor.name, view)
@@ -190,6 +190,11 @@ impl Checkpoint {
         self.conditions.geometry()
     }
 
+    /// The numbers, layer by layer.
+    pub fn tensors(&self) -> Vec<Tensor> {
+        to_pytorch(&self.weights)
+    }
+
     /// The network ready to answer, without action smoothing.
     pub fn predictor(&self, device: DeviceChoice) -> Predictor {
         Predictor::new(&self.weights, self.inference, device)
@@ -218,11 +223,15 @@ fn layers(architecture: &NetworkArchitecture) -> Vec<Layer> {
         .collect()
 }
 
-/// One tensor as it is stored.
-struct Tensor {
-    name: &'static str,
-    shape: Vec<usize>,
-    bytes: Vec<u8>,
+/// One tensor as it is stored, in the layout of PyTorch.
+#[derive(Debug, Clone)]
+pub struct Tensor {
+    /// `LAYER.weight` or `LAYER.bias`.
+    pub name: &'static str,
+    /// Its lengths.
+    pub shape: Vec<usize>,
+    /// float32, little-endian.
+    pub bytes: Vec<u8>,
 }
 
 /// Names and shapes in the order of [`crate::network::Parts`].

@@ -87,7 +87,7 @@ impl Policy for NetPolicy {
 }
 
 /// What the network's answer means to the controller.
-pub(crate) fn novice_decision(prediction: &Prediction, geometry: GridGeometry) -> Decision {
+pub fn novice_decision(prediction: &Prediction, geometry: GridGeometry) -> Decision {
     Decision {
         look_ahead: prediction.look_ahead(geometry),
         source: Source::Novice,

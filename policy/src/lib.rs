@@ -9,14 +9,14 @@
 //! | [`decision_rule`] | Algorithm 2, line 9: may the network drive this tick? And the rules of other methods |
 //! | [`agreement`] | what η̂ is to be read with: a constant answer, τ scaled as the labels are, quantiles of τ̂ |
 //! | [`dagger`] | Algorithms 1 and 2, top to bottom |
-//! | [`drivers`] | the trained network at the wheel, with action smoothing |
+//! | [`drivers`], [`action_smoothing`] | the trained network at the wheel, its answers smoothed |
 //! | [`checkpoint`] | a trained network on disk |
 //! | [`conditions`] | controller and sensor that it was trained with |
 //! | [`files`] | files of a run: errors, schema versions |
 //!
 //! Images: u = column fraction (0 = left, 1 = right), w = row fraction (0 = far, 1 = near), as in docs/methods.md 0.
 
-mod action_smoothing;
+pub mod action_smoothing;
 pub mod agreement;
 pub mod checkpoint;
 pub mod conditions;

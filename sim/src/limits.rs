@@ -64,6 +64,10 @@ pub const HIDDEN_MAX: usize = 65_536;
 pub const PARAMETERS_MAX: usize = 64_000_000;
 /// Header of a safetensors or NPY file, bytes.
 pub const HEADER_BYTES_MAX: u64 = 65_536;
+/// ONNX file, bytes.
+pub const ONNX_BYTES_MAX: u64 = 100_000_000;
+/// Grids that a network from an ONNX file answers in one call.
+pub const ONNX_BATCH_MAX: usize = 1024;
 
 /// Number of a trial, a drive or a round, from 0: each has random streams of its own.
 pub const TRIAL_MAX: u32 = 1_048_575;

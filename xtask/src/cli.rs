@@ -1,8 +1,8 @@
 //! The command line: which commands there are.
 
 use crate::commands::{
-    bench, completions, drivers, evaluate, generate, guard, lots, merge, pixel_accuracy, render, reproduce, rules,
-    sample_size, scaling, settings, train, tune, verify, visualise,
+    bench, completions, drivers, evaluate, export, generate, guard, lots, merge, pixel_accuracy, render, reproduce,
+    rules, sample_size, scaling, settings, train, tune, verify, visualise,
 };
 use crate::output::{Color, Output};
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -78,6 +78,9 @@ enum Command {
     /// Writes lots as TOML plus a top-view PNG.
     #[command(after_help = generate::EXAMPLES)]
     Generate(generate::GenerateArgs),
+    /// Writes a trained network as an ONNX file.
+    #[command(after_help = export::EXAMPLES)]
+    Export(export::ExportArgs),
     /// How many pixels of the noisy bird's-eye view are right.
     #[command(after_help = pixel_accuracy::EXAMPLES)]
     PixelAccuracy(pixel_accuracy::PixelAccuracyArgs),
@@ -138,6 +141,7 @@ impl Cli {
             Command::Scaling(args) => scaling::run(args, output),
             Command::Guard(args) => guard::run(args, output),
             Command::Generate(args) => generate::run(args, output),
+            Command::Export(args) => export::run(args, output),
             Command::PixelAccuracy(args) => pixel_accuracy::run(args, output),
             Command::SampleSize(args) => sample_size::run(args, output),
             Command::Bench(args) => bench::run(args, output),
@@ -173,6 +177,7 @@ impl Command {
             | Self::Scaling(_)
             | Self::Guard(_)
             | Self::Generate(_)
+            | Self::Export(_)
             | Self::Bench(_)
             | Self::Settings(_)
             | Self::Tune(_)

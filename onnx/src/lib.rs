@@ -1,0 +1,22 @@
+//! Networks in ONNX files: any framework's at the wheel, and ours for any framework.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`network`] | reads a file, checks it, and answers grids |
+//! | [`fleet`] | such a network at the wheel |
+//! | [`mod@export`] | writes a trained network of ours |
+//!
+//! The format is in docs/formats.md, "Networks of others: ONNX". rten runs the networks: it is Rust all through, needs a
+//! twelfth of the time that tract takes to compile, and writes the files as well.
+
+mod about;
+pub mod export;
+pub mod fleet;
+pub mod network;
+
+pub use about::About;
+
+/// Name of the only input: occupied cells, float32 `[batch, 1, 25, 25]`.
+pub const INPUT: &str = "grid";
+/// Name of the output: float32 `[batch, 4]` or `[batch, 2]`.
+pub const OUTPUT: &str = "point";

@@ -1,0 +1,130 @@
+use super::*;
+use crate::export::export;
+use policy::checkpoint::Checkpoint;
+use policy::conditions::Conditions;
+use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Weights};
+use sim::episode::EpisodeSettings;
+use sim::seed::RootSeed;
+use std::path::PathBuf;
+
+/// Free ground with blocks here and there.
+fn grids(count: usize) -> Vec<OccupancyGrid> {
+    let grid = |index: usize| {
+        let mut grid = OccupancyGrid::free();
+        for row in 0..25 {
+            let blocks = 0x1F0_003F_u32.rotate_left((7 * index) as u32) ^ (0x0030_0C00 >> (index % 5));
+            grid.occupy_row(row, if (row + index) % 9 < 6 { blocks & 0x1FF_FFFF } else { 0 });
+        }
+        grid
+    };
+    (0..count).map(grid).collect()
+}
+
+/// Both presets' networks, one with an even kernel, with and without mirror averaging.
+fn checkpoints() -> [Checkpoint; 2] {
+    let of = |architecture, inference| Checkpoint {
+        weights: Weights::init(architecture, RootSeed(8), 0),
+        conditions: Conditions::of(&EpisodeSettings::paper()),
+        inference,
+    };
+    [
+        of(NetworkArchitecture::paper(), InferenceSettings::plain()),
+        of(NetworkArchitecture::compact(), InferenceSettings::smoothed()),
+    ]
+}
+
+fn pool(threads: usize) -> Arc<ThreadPool> {
+    Arc::new(ThreadPool::with_num_threads(threads))
+}
+
+fn file(name: &str, bytes: &[u8]) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("onnx-test-{}-{name}", std::process::id()));
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+fn load(name: &str, bytes: &[u8]) -> Result<OnnxNetwork, String> {
+    let path = file(name, bytes);
+    let network = OnnxNetwork::load(&path).map_err(|error| error.to_string());
+    std::fs::remove_file(path).unwrap();
+    network
+}
+
+#[test]
+fn what_is_exported_answers_as_the_network_itself() {
+    let grids = grids(40);
+    let grids: Vec<_> = grids.iter().collect();
+    for checkpoint in checkpoints() {
+        let network = load("exported", &export(&checkpoint)).unwrap();
+        assert_eq!(network.about(), Some(&About::new(checkpoint.inference, checkpoint.conditions.clone())));
+        let expected = checkpoint.predictor(DeviceChoice::Cpu).predict(&grids);
+        let found = network.predict(&grids, checkpoint.inference.mirror_averaging, &pool(1));
+        let mut farthest = 0.0_f32;
+        for (found, expected) in found.into_iter().map(Option::unwrap).zip(&expected) {
+            for (found, expected) in
+                [found.mean, found.sigma].iter().flatten().zip([expected.mean, expected.sigma].iter().flatten())
+            {
+                farthest = farthest.max((found - expected).abs());
+            }
+        }
+        assert!(farthest < 1e-5, "{farthest}");
+        assert!(expected.windows(2).any(|pair| (pair[0].mean[0] - pair[1].mean[0]).abs() > 1e-3), "one answer for all");
+    }
+}
+
+/// The property that makes closed-loop results independent of how many cars are still on the road, and of threads.
+#[test]
+fn an_answer_does_not_depend_on_the_other_grids_or_on_threads() {
+    let grids = grids(37);
+    let grids: Vec<_> = grids.iter().collect();
+    let network = load("alone", &export(&checkpoints()[0])).unwrap();
+    let together = network.raw(&grids, &pool(1));
+    assert_eq!(together, network.raw(&grids, &pool(2)));
+    for start in [1, 7, 15, 36] {
+        assert_eq!(network.raw(&grids[start..], &pool(1))[..], together[start..], "from {start}");
+    }
+}
+
+#[test]
+fn what_is_no_such_network_is_refused_with_what_it_is_instead() {
+    let exported = export(&checkpoints()[1]);
+    // Names and numbers of the same length, so that the file stays well-formed.
+    let with = |from: &[u8], to: &[u8]| {
+        assert_eq!(from.len(), to.len());
+        let mut bytes = exported.clone();
+        let places: Vec<usize> = (0..bytes.len() - from.len()).filter(|&at| bytes[at..].starts_with(from)).collect();
+        assert!(!places.is_empty(), "{from:?}");
+        for at in places {
+            bytes[at..at + from.len()].copy_from_slice(to);
+        }
+        bytes
+    };
+    for (what, bytes, part) in [
+        ("nothing", Vec::new(), "no network"),
+        ("text", b"hello".to_vec(), "no network"),
+        ("half", exported[..exported.len() / 2].to_vec(), "no network"),
+        ("input", with(b"grid", b"gird"), "input \"gird\", not \"grid\""),
+        ("output", with(b"point", b"pt_uw"), "outputs pt_uw, not point"),
+        ("operator", with(b"Flatten", b"Fluffen"), "no network"),
+        ("metadata", with(b"schema = 1", b"schema = 7"), "schema 7"),
+        ("smoothing", with(b"smoothing_ticks = 8.0", b"smoothing_ticks = -80"), "smoothing_ticks"),
+    ] {
+        let error = load(what, &bytes).unwrap_err();
+        assert!(error.contains(part) && error.contains(what) && error.contains("docs/formats.md"), "{what}: {error}");
+    }
+}
+
+/// A file from elsewhere ends in an error or in a network, never in a panic.
+#[test]
+fn a_damaged_file_is_refused_or_answers() {
+    let exported = export(&checkpoints()[1]);
+    // The graph is before and after the tensors; they alone are large.
+    let places = (0..600).chain((exported.len() - 1500)..exported.len()).step_by(19);
+    for at in places {
+        let mut bytes = exported.clone();
+        bytes[at] ^= 1 << (at % 8);
+        if let Ok(network) = load("damaged", &bytes) {
+            network.predict(&grids(3).iter().collect::<Vec<_>>(), true, &pool(1));
+        }
+    }
+}

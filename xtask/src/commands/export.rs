@@ -1,0 +1,55 @@
+//! `export`: a trained network in a format of others.
+
+use crate::output::Output;
+use anyhow::{Context as _, ensure};
+use clap::{Args, Subcommand};
+use experiment::run_dir;
+use policy::checkpoint::Checkpoint;
+use std::path::PathBuf;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask export onnx runs/train-dagger-default-s1 --out policy.onnx
+  cargo xtask export onnx runs/train-dagger-default-s1/round-03 --out round-03.onnx
+  cargo xtask evaluate --driver onnx:policy.onnx --lots lot-b";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ExportArgs {
+    #[command(subcommand)]
+    format: Format,
+}
+
+#[derive(Debug, Clone, Subcommand)]
+enum Format {
+    /// As an ONNX file, which any framework reads, and `--driver onnx:FILE` (docs/formats.md).
+    #[command(after_help = EXAMPLES)]
+    Onnx(OnnxArgs),
+}
+
+#[derive(Debug, Clone, Args)]
+struct OnnxArgs {
+    /// Folder of a training run (its final policy), `RUN/bc` (after behaviour cloning), or the folder of a round.
+    #[arg(value_name = "RUN")]
+    run: PathBuf,
+    /// File to write.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Replaces a file of the same name.
+    #[arg(long)]
+    overwrite: bool,
+}
+
+pub(crate) fn run(args: &ExportArgs, output: &Output) -> anyhow::Result<()> {
+    let Format::Onnx(OnnxArgs { run, out, overwrite }) = &args.format;
+    let folder = if Checkpoint::exists(run)? { run.clone() } else { run_dir::policy_folder(run)? };
+    let checkpoint = Checkpoint::load(&folder)?;
+    ensure!(
+        *overwrite || !out.exists(),
+        "{}: exists already; choose another --out, or replace it with --overwrite",
+        out.display()
+    );
+    let bytes = onnx::export::export(&checkpoint);
+    storage::whole::write(out, &bytes).with_context(|| format!("--out {}", out.display()))?;
+    output.print(format_args!("{}: {}, {} bytes", out.display(), folder.display(), bytes.len()));
+    Ok(())
+}
