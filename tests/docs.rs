@@ -10,7 +10,7 @@ use std::fmt::Display;
 use std::path::Path;
 
 /// Folders whose paths are checked when the docs name them.
-const FOLDERS: [&str; 15] = [
+const FOLDERS: [&str; 16] = [
     "sim/",
     "scenarios/",
     "expert/",
