@@ -396,7 +396,7 @@ impl NamedDriver {
             Model::Network(networks, _) => Some(&networks[0].conditions),
             // Of a network from elsewhere nobody knows.
             Model::Onnx(network, _) => network.about().map(|about| &about.conditions),
-            Model::Expert(_) | Model::Planner(_) => None,
+            Model::Expert(_) | Model::Planner(_) | Model::Callback(_) => None,
         };
         let Some(trained) = trained else { return Ok(()) };
         let here = Conditions::of(&settings.episode);
