@@ -1,6 +1,8 @@
 //! Layers and the sentences that errors are made of.
 
 use super::*;
+use scenarios::LotSpec;
+use scenarios::split::Family;
 use sim::seed::RootSeed;
 
 fn layers(overrides: &[&str]) -> Layers {
@@ -32,6 +34,19 @@ fn every_preset_is_sound_and_survives_toml() {
         assert_eq!(toml::from_str::<Settings>(&settings.to_toml()).unwrap(), settings, "{}", preset.name);
         let untouched = layers::apply(&settings, None, &[]).unwrap();
         assert_eq!(untouched, settings, "no change is no change");
+    }
+}
+
+/// `validation:4:all` are four lots of the first four families.
+#[test]
+fn trainings_end_with_lots_of_every_family() {
+    for preset in ["default", "strong"] {
+        let elsewhere = Settings::preset(preset).unwrap().evaluation.elsewhere;
+        let lots: Vec<LotSpec> = elsewhere.iter().flat_map(|name| scenarios::suite(name).unwrap()).collect();
+        for family in Family::ALL {
+            let is_of_family = |lot: &&LotSpec| matches!(lot, LotSpec::Generated { family: other, .. } if *other == family);
+            assert_eq!(lots.iter().filter(is_of_family).count(), 4, "{preset}: {family:?}");
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Twelve maps. Where trained drivers failed on them, the families of generated lots were widened: they are development maps.
 
-use super::{Drawing, FREE, OCCUPIED, UNKNOWN, area, band, car, disc, turned};
+use super::drawing::{Drawing, FREE, OCCUPIED, UNKNOWN, area, band, car, disc, turned};
 use sim::geometry::{Pose, Vec2};
 use sim::scenario::ReferencePath;
 

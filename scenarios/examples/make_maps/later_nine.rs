@@ -1,6 +1,6 @@
 //! Nine more, drawn after the families were widened, and first driven by policies trained on those.
 
-use super::{Drawing, FREE, OCCUPIED, Shape, UNKNOWN, area, band, car, disc, turned};
+use super::drawing::{Drawing, FREE, OCCUPIED, Shape, UNKNOWN, area, band, car, disc, turned};
 
 pub(super) fn drawings() -> Vec<Drawing> {
     vec![

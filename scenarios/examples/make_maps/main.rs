@@ -1,119 +1,13 @@
 //! Draws the maps in `examples/maps`: `cargo run -p scenarios --example make_maps`. Kinds of ground that the generator
 //! does not make, as image files, scaled to the car. The same bytes every time.
-//!
-//! A map is a list of shapes painted one over the other. Metres; x to the right, y up, (0, 0) the lower left corner.
 #![allow(clippy::unwrap_used, missing_docs, reason = "an example that a person runs")]
 
+mod drawing;
 mod first_twelve;
 mod later_nine;
 
-use image::{GrayImage, Luma};
-use sim::geometry::{Pose, Vec2, distance_to_segment};
-use sim::scenario::ReferencePath;
+use drawing::Drawing;
 use std::path::{Path, PathBuf};
-
-/// Grey values of `map_saver`.
-const FREE: u8 = 254;
-const OCCUPIED: u8 = 0;
-const UNKNOWN: u8 = 205;
-
-struct Drawing {
-    name: &'static str,
-    about: &'static str,
-    size_m: (f32, f32),
-    pixel_m: f32,
-    /// Of the lower left corner: x, y, yaw.
-    origin: &'static str,
-    background: u8,
-    shapes: Vec<(Shape, u8)>,
-    /// Where to drive: the keys of the lot file, in the map's frame.
-    lot: &'static str,
-    /// The route, in the map's frame.
-    centre_line: Option<Vec<Vec2>>,
-}
-
-enum Shape {
-    /// Along a line with rounded corners.
-    Band {
-        line: Vec<Vec2>,
-        width_m: f32,
-    },
-    Box {
-        pose: Pose,
-        length_m: f32,
-        width_m: f32,
-    },
-    Disc {
-        centre: Vec2,
-        radius_m: f32,
-    },
-}
-
-fn band(points: &[(f32, f32)], radius_m: f32, width_m: f32) -> Shape {
-    let points = points.iter().map(|&point| Vec2::from(point)).collect();
-    let path = sim::path::Path::new(&ReferencePath { points, corner_radius_m: radius_m });
-    Shape::Band { line: path.poses().iter().step_by(4).map(|pose| pose.position()).collect(), width_m }
-}
-
-/// From lower left to upper right corner.
-fn area(x: f32, y: f32, to_x: f32, to_y: f32) -> Shape {
-    turned(0.5 * (x + to_x), 0.5 * (y + to_y), to_x - x, to_y - y, 0.0)
-}
-
-fn turned(x: f32, y: f32, length_m: f32, width_m: f32, heading_deg: f32) -> Shape {
-    Shape::Box { pose: Pose::new(Vec2::new(x, y), heading_deg.to_radians()), length_m, width_m }
-}
-
-fn car(x: f32, y: f32, heading_deg: f32) -> (Shape, u8) {
-    (turned(x, y, 4.6, 1.85, heading_deg), OCCUPIED)
-}
-
-fn disc(x: f32, y: f32, radius_m: f32) -> Shape {
-    Shape::Disc { centre: Vec2::new(x, y), radius_m }
-}
-
-impl Shape {
-    fn holds(&self, point: Vec2) -> bool {
-        match self {
-            Self::Band { line, width_m } => {
-                line.windows(2).any(|ends| distance_to_segment(point, ends[0], ends[1]) < 0.5 * width_m)
-            }
-            Self::Box { pose, length_m, width_m } => {
-                let within = pose.world_from_ego().inverse_point(point).abs();
-                within.x < 0.5 * length_m && within.y < 0.5 * width_m
-            }
-            Self::Disc { centre, radius_m } => centre.distance(point) < *radius_m,
-        }
-    }
-}
-
-impl Drawing {
-    fn image(&self) -> GrayImage {
-        let (cols, rows) = (self.size_m.0 / self.pixel_m, self.size_m.1 / self.pixel_m);
-        GrayImage::from_fn(cols as u32, rows as u32, |col, row| {
-            let up = rows as u32 - 1 - row;
-            let point = Vec2::new(col as f32 + 0.5, up as f32 + 0.5) * self.pixel_m;
-            let last = self.shapes.iter().rev().find(|(shape, _)| shape.holds(point));
-            Luma([last.map_or(self.background, |&(_, value)| value)])
-        })
-    }
-
-    /// Names and texts of its files but the image.
-    fn texts(&self) -> Vec<(String, String)> {
-        let Self { name, about, pixel_m, origin, lot, centre_line, .. } = self;
-        let yaml = format!(
-            "# {about}\nimage: {name}.png\nmode: trinary\nresolution: {pixel_m}\norigin: {origin}\nnegate: 0\n\
-             occupied_thresh: 0.65\nfree_thresh: 0.196\n"
-        );
-        let lot = format!("# {about} Drawn by examples/make_maps.\nmap = \"{name}.yaml\"\n{lot}");
-        let mut texts = vec![(format!("{name}.yaml"), yaml), (format!("{name}.lot.toml"), lot)];
-        if let Some(line) = centre_line {
-            let points: Vec<String> = line.iter().map(|point| format!("{:.2},{:.2}", point.x, point.y)).collect();
-            texts.push((format!("{name}.csv"), format!("x,y\n{}\n", points.join("\n"))));
-        }
-        texts
-    }
-}
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/maps")
