@@ -202,7 +202,7 @@ mod tests {
         let other = Row { rule: "vanilla DAgger".to_owned(), ..row(1, 9) };
         let pooled = pool(&[row(1, 2), row(2, 3), other], "SafeDAgger");
         assert_eq!((pooled.near_collisions, pooled.route_m, pooled.seed), (5, 1000.0, None));
-        let table = to_markdown(&[pooled.clone()]);
+        let table = to_markdown(std::slice::from_ref(&pooled));
         assert!(table.contains("| 10.0 %") && table.contains("5 (0) in 1.0 km"), "{table}");
         assert!(plot(&[pooled]).contains("SafeDAgger"));
     }
