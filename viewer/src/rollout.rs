@@ -8,8 +8,7 @@ use experiment::lots::Lot;
 use experiment::run_dir;
 use experiment::settings::Settings;
 use experiment::training::episodes_of;
-use policy::checkpoint::Checkpoint;
-use policy::dagger::{Rollouts, RoundEpisode};
+use policy::dagger::{Learned, Rollouts, RoundEpisode};
 use policy::dataset::store::Store;
 use policy::drivers::NetPolicy;
 use std::path::Path;
@@ -27,11 +26,11 @@ pub(crate) fn show(run: &Path, episodes: usize, context: &mut Context<'_>) -> an
         if !store.has_round(round)? {
             break;
         }
-        let before = round.checked_sub(1).map(|before| Checkpoint::load(&store.round_folder(before)));
-        let policy = before.transpose().with_context(|| format!("the policy that collected round {round}"))?;
+        let before = (round > 0).then(|| Learned::of_round(&settings.dagger, &store, round));
+        let learned = before.transpose().with_context(|| format!("the policy that collected round {round}"))?;
         let mut first = episodes_of(&settings, &lots, round)?;
         first.truncate(episodes);
-        Round { settings: &settings, number: round, policy }.record(first, context)?;
+        Round { settings: &settings, number: round, learned }.record(first, context)?;
     }
     Ok(())
 }
@@ -41,8 +40,8 @@ struct Round<'a> {
     settings: &'a Settings,
     /// 0 = behaviour cloning.
     number: u32,
-    /// The policy that collects; `None` while the expert drives alone.
-    policy: Option<Checkpoint>,
+    /// What collects beside the expert; `None` while the expert drives alone.
+    learned: Option<Learned>,
 }
 
 impl Round<'_> {
@@ -62,7 +61,8 @@ impl Round<'_> {
         };
         let recordings = episodes.iter().map(begin).collect::<anyhow::Result<Vec<Recording>>>()?;
         let watched = |(recording, start): (_, &RoundEpisode)| {
-            let novice = self.policy.as_ref().map(|policy| NetPolicy::new(policy, self.settings.dagger.device));
+            let learned = self.learned.as_ref();
+            let novice = learned.map(|learned| NetPolicy::new(learned.policy(), self.settings.dagger.device));
             let drive = Drive::new(recording, ROOT, &start.episode, self.settings).with_novice(novice);
             drive.show_static();
             drive
@@ -72,7 +72,7 @@ impl Round<'_> {
         let mut progress_m = vec![0.0; episodes.len()];
         context.progress.begin("recording", &format!("recording: round {}", self.number));
         let Settings { dagger, seed, .. } = self.settings;
-        let rollouts = Rollouts::of_round(dagger, *seed, self.policy.as_ref(), episodes);
+        let rollouts = Rollouts::of_round(dagger, *seed, self.learned.as_ref(), episodes);
         let collected = rollouts.drive(&mut |place, frame| {
             // Drives that are cancelled are driven on: recording takes nearly all of their time.
             if !context.progress.is_cancelled() {

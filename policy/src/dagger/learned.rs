@@ -28,6 +28,11 @@ impl Learned {
         Self { policy, members: Vec::new(), critic: None, thresholds: Thresholds::default() }
     }
 
+    /// The network that drives, or the first member of an ensemble.
+    pub fn policy(&self) -> &Checkpoint {
+        &self.policy
+    }
+
     /// What collected a round after behaviour cloning, read from the folder of its run.
     ///
     /// # Errors
