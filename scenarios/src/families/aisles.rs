@@ -1,8 +1,8 @@
 //! Car parks with several parallel aisles: rows of stalls, many of them empty, on both sides and across the ends; the way
 //! goes round the row ends from aisle to aisle; side aisles are closed or dead ends.
 
-use super::course::{Course, first_apart};
-use super::parts::{RUN_OUT_M, close, lot, solid_height_m, things_on};
+use super::course::{Aisles, Course, first_apart};
+use super::parts::{close, lot, solid_height_m, things_on};
 use super::strip::{Mouth, Notch, Strip, Stub};
 use super::things::{self, Rules, Things, facing, side, yaw_rad};
 use super::walls::{Wall, yard};
@@ -74,25 +74,8 @@ fn course(rng: &mut Rng) -> Course {
     let cross_m = rng.random_range(AISLE_M);
     let pitch_m = aisle_m + 2.0 * STALL_DEPTH_M + rng.random_range(MEDIAN_M);
     let leg_m = rng.random_range(LEG_M);
-    let mut turn_rad = if rng.random_bool(0.5) { 1.0 } else { -1.0 } * std::f32::consts::FRAC_PI_2;
-    let mut course = Course::new(aisle_m);
-    course.straight(RUN_OUT_M + leg_m * rng.random_range(0.4..1.0));
-    let aisles = rng.random_range(2..=4);
-    for k in 1..aisles {
-        let needs_m = pitch_m + if k == aisles - 1 { 0.0 } else { leg_m };
-        if course.length_m() + needs_m > LENGTH_MAX_M {
-            break;
-        }
-        let chamfer_m = rng.random_range(0.0..1.0);
-        course.corner(turn_rad, chamfer_m, row_or_dead_end(rng));
-        course.widen(cross_m);
-        course.straight(pitch_m);
-        course.corner(turn_rad, chamfer_m, row_or_dead_end(rng));
-        course.widen(aisle_m);
-        course.straight(if k == aisles - 1 { leg_m * rng.random_range(0.4..1.0) + RUN_OUT_M } else { leg_m });
-        turn_rad = -turn_rad;
-    }
-    course
+    let aisles = Aisles { aisle_m, cross_m, leg_m, length_max_m: LENGTH_MAX_M };
+    aisles.up_and_down(rng, |_| pitch_m, |rng| rng.random_range(0.0..1.0), row_or_dead_end)
 }
 
 /// What a driver sees where the way turns off: a row of stalls across the end of the aisle, or ground that goes on.

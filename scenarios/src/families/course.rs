@@ -1,5 +1,6 @@
 //! How centre lines are drawn.
 
+use super::parts::RUN_OUT_M;
 use super::strip::{Corner, Piece, Strip, Stub};
 use rand::RngExt as _;
 use sim::geometry::Pose;
@@ -60,6 +61,58 @@ impl Course {
     pub(super) fn strip(&self) -> Option<Strip> {
         Strip::new(Pose::default(), &self.pieces)
     }
+}
+
+/// Parallel aisles, joined by cross aisles at their ends.
+#[allow(clippy::struct_field_names, reason = "the postfix is the unit")]
+pub(super) struct Aisles {
+    pub(super) aisle_m: f32,
+    pub(super) cross_m: f32,
+    /// The piece of an aisle that is driven, corner to corner, metres.
+    pub(super) leg_m: f32,
+    /// The centre line at most, run-outs included, metres.
+    pub(super) length_max_m: f32,
+}
+
+impl Aisles {
+    /// Up and down two to four of them. To each next one: how far it is, what is cut off the corners there, metres, and what
+    /// is beside the way at either corner.
+    pub(super) fn up_and_down(
+        &self,
+        rng: &mut Rng,
+        mut pitch_m: impl FnMut(&mut Rng) -> f32,
+        mut chamfer_m: impl FnMut(&mut Rng) -> f32,
+        beside: fn(&mut Rng) -> Option<Stub>,
+    ) -> Course {
+        let Self { aisle_m, cross_m, leg_m, length_max_m } = *self;
+        let mut turn_rad = if rng.random_bool(0.5) { 1.0 } else { -1.0 } * std::f32::consts::FRAC_PI_2;
+        let mut course = Course::new(aisle_m);
+        course.straight(RUN_OUT_M + leg_m * rng.random_range(0.4..1.0));
+        let aisles = rng.random_range(2..=4);
+        for k in 1..aisles {
+            let pitch_m = pitch_m(rng);
+            let needs_m = pitch_m + if k == aisles - 1 { 0.0 } else { leg_m };
+            if course.length_m() + needs_m > length_max_m {
+                break;
+            }
+            let chamfer_m = chamfer_m(rng);
+            course.corner(turn_rad, chamfer_m, beside(rng));
+            course.widen(cross_m);
+            course.straight(pitch_m);
+            course.corner(turn_rad, chamfer_m, beside(rng));
+            course.widen(aisle_m);
+            course.straight(if k == aisles - 1 { leg_m * rng.random_range(0.4..1.0) + RUN_OUT_M } else { leg_m });
+            turn_rad = -turn_rad;
+        }
+        course
+    }
+}
+
+/// What two corridors lack to what is comfortable at a sharp corner between them, metres (docs/methods.md 11 has the
+/// least); so much of the inner corner is to be cut off, and more. The narrower one counts more.
+pub(super) fn lacking_at_corner_m(before_m: f32, after_m: f32) -> f32 {
+    const COMFORTABLE_M: f32 = 5.8;
+    (COMFORTABLE_M - 0.65 * before_m.min(after_m) - 0.35 * before_m.max(after_m)).max(0.0)
 }
 
 /// Of centre lines, run-outs included, metres.

@@ -1,8 +1,8 @@
 //! Halls with rows of racks: aisles hardly wider than the car needs between solid rows that hide what is behind, wide cross
 //! aisles at their ends; the way turns off where others go on, which a kerb, cones or a barrier close.
 
-use super::course::{Course, first_apart};
-use super::parts::{RUN_OUT_M, close, lot, solid_height_m, things_on};
+use super::course::{Aisles, Course, first_apart, lacking_at_corner_m};
+use super::parts::{close, lot, solid_height_m, things_on};
 use super::strip::{Notch, Strip, Stub};
 use super::things::{Rules, Things, side, yaw_rad};
 use crate::corridor::Side;
@@ -25,8 +25,6 @@ const GAP_M: Range<f32> = 2.0..3.6;
 const DEPTH_M: Range<f32> = 5.5..11.0;
 /// The centre line at most, run-outs included, metres.
 const LENGTH_MAX_M: f32 = 225.0;
-/// A corner between two aisles of this width needs nothing cut off, metres (as in [`super::rooms`]).
-const SHARP_CORNER_M: f32 = 5.8;
 
 pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
     let mut strip = first_apart(layout, 0.2, course)?;
@@ -52,28 +50,13 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
 fn course(rng: &mut Rng) -> Course {
     let (aisle_m, cross_m) = (rng.random_range(AISLE_M), rng.random_range(CROSS_M));
     let leg_m = rng.random_range(LEG_M);
-    let lacking_m = (SHARP_CORNER_M - 0.65 * aisle_m.min(cross_m) - 0.35 * aisle_m.max(cross_m)).max(0.0);
-    let chamfer_m = lacking_m * rng.random_range(1.3..1.8);
-    let mut turn_rad = if rng.random_bool(0.5) { 1.0 } else { -1.0 } * std::f32::consts::FRAC_PI_2;
-    let mut course = Course::new(aisle_m);
-    course.straight(RUN_OUT_M + leg_m * rng.random_range(0.4..1.0));
-    let aisles = rng.random_range(2..=4);
-    for k in 1..aisles {
+    let chamfer_m = lacking_at_corner_m(aisle_m, cross_m) * rng.random_range(1.3..1.8);
+    let pitch_m = |rng: &mut Rng| {
         let rows = rng.random_range(1..=2) as f32;
-        let pitch_m = (rows * (aisle_m + rng.random_range(RACK_M))).max(10.5);
-        let needs_m = pitch_m + if k == aisles - 1 { 0.0 } else { leg_m };
-        if course.length_m() + needs_m > LENGTH_MAX_M {
-            break;
-        }
-        course.corner(turn_rad, chamfer_m, goes_on(rng));
-        course.widen(cross_m);
-        course.straight(pitch_m);
-        course.corner(turn_rad, chamfer_m, goes_on(rng));
-        course.widen(aisle_m);
-        course.straight(if k == aisles - 1 { leg_m * rng.random_range(0.4..1.0) + RUN_OUT_M } else { leg_m });
-        turn_rad = -turn_rad;
-    }
-    course
+        (rows * (aisle_m + rng.random_range(RACK_M))).max(10.5)
+    };
+    let aisles = Aisles { aisle_m, cross_m, leg_m, length_max_m: LENGTH_MAX_M };
+    aisles.up_and_down(rng, pitch_m, |_| chamfer_m, goes_on)
 }
 
 /// The way that is not taken at a corner.

@@ -1,7 +1,7 @@
 //! Corridors of a building: thin walls with other rooms behind them, right-angled corners, doors and niches too narrow for
 //! the car, pillars, dead ends beside the way.
 
-use super::course::{Course, first_apart};
+use super::course::{Course, first_apart, lacking_at_corner_m};
 use super::parts::{RUN_OUT_M, lot, things_on};
 use super::strip::{Mouth, Notch, Strip, Stub};
 use super::things::{Rules, Things, side};
@@ -17,9 +17,6 @@ use std::ops::Range;
 const LENGTH_M: Range<f32> = 90.0..180.0;
 const LEG_M: Range<f32> = 14.0..45.0;
 const WIDTH_M: Range<f32> = 3.2..6.5;
-/// What is comfortable at a sharp corner between two corridors, metres (docs/methods.md 11 has the least); narrower ones
-/// have their inner corner cut off.
-const SHARP_CORNER_M: f32 = 5.8;
 /// The car is 1.86 m wide.
 const DOOR_M: Range<f32> = 0.8..1.6;
 const NICHE_WIDTH_M: Range<f32> = 0.8..1.7;
@@ -60,8 +57,7 @@ fn course(rng: &mut Rng) -> Course {
         let before_m = course.width_m();
         let after_m = if rng.random_bool(0.5) { before_m } else { rng.random_range(WIDTH_M) };
         let turn_rad = course.turn_rad(rng, 90.0..90.1, 100.0).signum() * std::f32::consts::FRAC_PI_2;
-        // The narrower one counts more.
-        let lacking_m = (SHARP_CORNER_M - 0.65 * before_m.min(after_m) - 0.35 * before_m.max(after_m)).max(0.0);
+        let lacking_m = lacking_at_corner_m(before_m, after_m);
         let is_recess = rng.random_bool(0.4);
         let depth_m = rng.random_range(if is_recess { CORNER_RECESS_M } else { BEHIND_DOOR_M });
         let stub = match rng.random_range(0..10) {
