@@ -75,6 +75,7 @@ fn lots_of_every_family(times: u32) -> Vec<String> {
         ("open", 12),
         ("halls", 12),
         ("yards", 10),
+        ("chicanes", 12),
     ];
     let of_family = |(family, count)| format!("train:{}:{family}", times * count);
     std::iter::once("lot-a".to_owned()).chain(generated.map(of_family)).collect()
