@@ -93,6 +93,7 @@ fn strong() -> Settings {
                 conv1: ConvLayer { channels: 32, kernel: 5 },
                 conv2: ConvLayer { channels: 64, kernel: 3 },
                 hidden: 512,
+                modes: 1,
                 ..base.dagger.network
             },
             fit: FitSettings { budget: Budget::Steps(20_000), validate_every: 1000, ..base.dagger.fit },
@@ -173,6 +174,7 @@ fn smoke() -> Settings {
                 conv1: ConvLayer { channels: 16, kernel: 3 },
                 conv2: ConvLayer { channels: 16, kernel: 2 },
                 hidden: 64,
+                modes: 1,
                 dropout_features: 0.0,
                 dropout_hidden: 0.1,
             },
