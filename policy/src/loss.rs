@@ -5,7 +5,7 @@
 //! `L = ½ · mean_j[ W · e_j² · exp(−s_j) + s_j ]`, `W = (1 + α τ̂)²`
 
 use crate::dataset::Sample;
-use crate::network::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN};
+use crate::network::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, operations};
 use crate::string_or_table::string_or_table;
 use burn::tensor::Tensor;
 use serde::{Deserialize, Serialize};
@@ -55,7 +55,10 @@ impl LossSettings {
     /// Weight of the squared error of a sample with discrepancy `tau_hat`.
     pub fn weight_of_squared_error(&self, tau_hat: f32) -> f32 {
         match self.weight {
-            WeightForm::ResidualSq => (1.0 + self.alpha * tau_hat).powi(2),
+            WeightForm::ResidualSq => {
+                let gain = 1.0 + self.alpha * tau_hat;
+                gain * gain
+            }
             WeightForm::Linear { gain } => 1.0 + gain * tau_hat,
         }
     }
@@ -103,14 +106,14 @@ pub fn of_batch(settings: &LossSettings, outputs: Tensor<2>, labels: Tensor<2>, 
     let mid = 0.5 * (LOG_VARIANCE_MAX + LOG_VARIANCE_MIN);
     let means = outputs.clone().narrow(1, 0, 2); // [batch, 2]
     let raw = outputs.narrow(1, 2, 2); // [batch, 2]
-    let log_variance = ((raw - mid) / half).tanh() * half + mid;
+    let log_variance = operations::tanh((raw - mid) / half) * half + mid;
     let error = labels - means;
-    let misfit = weights * error.square() * log_variance.clone().neg().exp();
+    let misfit = weights * error.square() * operations::exp(log_variance.clone().neg());
     if settings.beta == 0.0 {
         return BatchLoss { misfit: misfit * 0.5, log_variance: log_variance * 0.5 };
     }
     // σ^2β is a constant of the sample: no gradient flows through it.
-    let factor = (log_variance.clone().detach() * settings.beta).exp() * 0.5;
+    let factor = operations::exp(log_variance.clone().detach() * settings.beta) * 0.5;
     BatchLoss { misfit: misfit * factor.clone(), log_variance: log_variance * factor }
 }
 
@@ -142,9 +145,10 @@ mod tests {
         (0..2)
             .map(|j| {
                 let s = f64::from(soft_clamp_log_variance(raw[2 + j]));
-                let factor = (f64::from(settings.beta) * f64::from(soft_clamp_log_variance(constant_at[2 + j]))).exp();
+                let factor =
+                    libm::exp(f64::from(settings.beta) * f64::from(soft_clamp_log_variance(constant_at[2 + j])));
                 let e = f64::from(LABEL[j] - raw[j]);
-                0.25 * factor * (weight * e * e / s.exp() + s)
+                0.25 * factor * (weight * e * e / libm::exp(s) + s)
             })
             .sum()
     }

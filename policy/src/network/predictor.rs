@@ -8,6 +8,7 @@ use crate::network::look_ahead_net::{LookAheadNet, occupied_tensor};
 use crate::network::weights::Weights;
 use burn::tensor::Device;
 use sim::driver::{LookAheadPoint, Spread};
+use sim::maths;
 use sim::sensing::{GridGeometry, OccupancyGrid};
 
 /// What the network answers to one grid, in image fractions.
@@ -26,7 +27,7 @@ impl Prediction {
     /// If the network answered with something that is not a number.
     pub fn from_raw(raw: [f32; OUTPUTS]) -> Self {
         assert!(raw.iter().all(|value| value.is_finite()), "the network answered {raw:?}");
-        let sigma = |raw| (0.5 * soft_clamp_log_variance(raw)).exp();
+        let sigma = |raw| maths::exp(0.5 * soft_clamp_log_variance(raw));
         Self { mean: [raw[0], raw[1]], sigma: [sigma(raw[2]), sigma(raw[3])] }
     }
 
