@@ -7,7 +7,7 @@
 //! Of a network with several modes k of weight π_k, with `L_k` the loss of each: `−½ log Σ_k π_k exp(−2 L_k)`.
 
 use crate::dataset::Sample;
-use crate::network::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, OUTPUTS};
+use crate::network::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, OUTPUTS, operations};
 use crate::string_or_table::string_or_table;
 use burn::tensor::Tensor;
 use burn::tensor::activation::log_softmax;
@@ -58,7 +58,10 @@ impl LossSettings {
     /// Weight of the squared error of a sample with discrepancy `tau_hat`.
     pub fn weight_of_squared_error(&self, tau_hat: f32) -> f32 {
         match self.weight {
-            WeightForm::ResidualSq => (1.0 + self.alpha * tau_hat).powi(2),
+            WeightForm::ResidualSq => {
+                let gain = 1.0 + self.alpha * tau_hat;
+                gain * gain
+            }
             WeightForm::Linear { gain } => 1.0 + gain * tau_hat,
         }
     }
@@ -128,7 +131,7 @@ fn of_mixture(
     });
     let energies = Tensor::cat(energies.collect(), 1); // [batch, modes]
     let log_shares = log_softmax(log_weights.clone() - energies, 1).detach();
-    let shares = log_shares.clone().exp();
+    let shares = operations::exp(log_shares.clone());
     // Half for each of the two axes.
     let choice = (shares.clone() * (log_shares - log_weights)).sum_dim(1) * 0.5; // [batch, 1]
     let of_modes = (0..modes).map(|mode| {
@@ -150,14 +153,14 @@ fn of_one(settings: &LossSettings, outputs: Tensor<2>, labels: Tensor<2>, weight
     let mid = 0.5 * (LOG_VARIANCE_MAX + LOG_VARIANCE_MIN);
     let means = outputs.clone().narrow(1, 0, 2); // [batch, 2]
     let raw = outputs.narrow(1, 2, 2); // [batch, 2]
-    let log_variance = ((raw - mid) / half).tanh() * half + mid;
+    let log_variance = operations::tanh((raw - mid) / half) * half + mid;
     let error = labels - means;
-    let misfit = weights * error.square() * log_variance.clone().neg().exp();
+    let misfit = weights * error.square() * operations::exp(log_variance.clone().neg());
     if settings.beta == 0.0 {
         return BatchLoss { misfit: misfit * 0.5, log_variance: log_variance * 0.5 };
     }
     // σ^2β is a constant of the sample: no gradient flows through it.
-    let factor = (log_variance.clone().detach() * settings.beta).exp() * 0.5;
+    let factor = operations::exp(log_variance.clone().detach() * settings.beta) * 0.5;
     BatchLoss { misfit: misfit * factor.clone(), log_variance: log_variance * factor }
 }
 
@@ -189,9 +192,10 @@ mod tests {
         (0..2)
             .map(|j| {
                 let s = f64::from(soft_clamp_log_variance(raw[2 + j]));
-                let factor = (f64::from(settings.beta) * f64::from(soft_clamp_log_variance(constant_at[2 + j]))).exp();
+                let factor =
+                    libm::exp(f64::from(settings.beta) * f64::from(soft_clamp_log_variance(constant_at[2 + j])));
                 let e = f64::from(LABEL[j] - raw[j]);
-                0.25 * factor * (weight * e * e / s.exp() + s)
+                0.25 * factor * (weight * e * e / libm::exp(s) + s)
             })
             .sum()
     }
@@ -244,10 +248,10 @@ mod tests {
             let (modes, logits) = raw.split_at(2 * OUTPUTS);
             let of_mode = |mode: usize| {
                 let raw: [f32; OUTPUTS] = modes[mode * OUTPUTS..][..OUTPUTS].try_into().unwrap();
-                (f64::from(logits[mode]) - 2.0 * formula(&settings, raw, raw)).exp()
+                libm::exp(f64::from(logits[mode]) - 2.0 * formula(&settings, raw, raw))
             };
-            let weights: f64 = logits.iter().map(|&logit| f64::from(logit).exp()).sum();
-            -0.5 * ((of_mode(0) + of_mode(1)) / weights).ln()
+            let weights: f64 = logits.iter().map(|&logit| libm::exp(f64::from(logit))).sum();
+            -0.5 * libm::log((of_mode(0) + of_mode(1)) / weights)
         };
         let raw: Vec<f32> = RAW.into_iter().chain(other).chain([0.3, -0.8]).collect();
         let (loss, gradient) = loss_and_gradient(&settings, &raw);
@@ -259,7 +263,10 @@ mod tests {
                 mixture(&raw)
             };
             let difference = (at(1e-3) - at(-1e-3)) / 2e-3;
-            assert!((difference - f64::from(slope)).abs() < 2e-3 * (1.0 + f64::from(slope.abs())), "[{index}]: {difference} {slope}");
+            assert!(
+                (difference - f64::from(slope)).abs() < 2e-3 * (1.0 + f64::from(slope.abs())),
+                "[{index}]: {difference} {slope}"
+            );
         }
     }
 

@@ -55,7 +55,7 @@ fn default() -> Settings {
     let base = with_half_points();
     Settings {
         training: TrainingSettings { lots: lots_of_every_family(1), trials: 8, ..base.training },
-        evaluation: EvaluationSettings { elsewhere: vec!["validation:44:all".to_owned()], ..base.evaluation },
+        evaluation: EvaluationSettings { elsewhere: vec!["validation:48:all".to_owned()], ..base.evaluation },
         dagger: DaggerSettings::quick(),
         ..base
     }

@@ -10,6 +10,7 @@
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
 use sim::driver::{GroundTruth, LookAheadPoint};
+use sim::maths;
 use sim::seed::Rng;
 
 /// How often, how long and how hard the steering is disturbed.
@@ -105,7 +106,7 @@ fn towards_danger(curvature_per_m: f32, point: LookAheadPoint, truth: &GroundTru
 
 /// The point at the same distance on an arc whose curvature is larger by `curvature_per_m`.
 fn turned(point: LookAheadPoint, curvature_per_m: f32) -> LookAheadPoint {
-    let range_m = point.ahead_m.hypot(point.left_m);
+    let range_m = maths::hypot(point.ahead_m, point.left_m);
     // Pure pursuit: κ = 2 sin θ / L.
     let sin = (0.5 * range_m * (point.curvature_per_m() + curvature_per_m)).clamp(-0.95, 0.95);
     LookAheadPoint { ahead_m: range_m * (1.0 - sin * sin).sqrt(), left_m: range_m * sin }
@@ -125,7 +126,7 @@ mod tests {
         let point = LookAheadPoint { ahead_m: 8.0, left_m: 1.0 };
         let disturbed = turned(point, 0.05);
         assert!((disturbed.curvature_per_m() - point.curvature_per_m() - 0.05).abs() < 1e-6, "{disturbed:?}");
-        assert!((disturbed.ahead_m.hypot(disturbed.left_m) - 65.0_f32.sqrt()).abs() < 1e-5, "{disturbed:?}");
+        assert!((maths::hypot(disturbed.ahead_m, disturbed.left_m) - 65.0_f32.sqrt()).abs() < 1e-5, "{disturbed:?}");
         assert!(turned(point, 9.0).ahead_m > 0.0, "never behind the car");
     }
 

@@ -222,7 +222,8 @@ pub fn evaluate(weights: &Weights, samples: &[Sample], loss: &LossSettings, cont
     let squared_error: f64 = answers
         .iter()
         .zip(samples)
-        .flat_map(|(raw, sample)| (0..2).map(|axis| f64::from(sample.label[axis] - raw[axis]).powi(2)))
+        .flat_map(|(raw, sample)| (0..2).map(|axis| f64::from(sample.label[axis] - raw[axis])))
+        .map(|error| error * error)
         .sum();
     let device = DeviceChoice::Cpu.device();
     let mean_loss = |settings: &LossSettings| {

@@ -8,6 +8,7 @@ use crate::network::look_ahead_net::{LookAheadNet, occupied_tensor};
 use crate::network::weights::Weights;
 use burn::tensor::Device;
 use sim::driver::{LookAheadPoint, Spread};
+use sim::maths;
 use sim::sensing::{GridGeometry, OccupancyGrid};
 
 /// What the network answers to one grid, in image fractions.
@@ -26,7 +27,7 @@ impl Prediction {
     /// If the network answered with something that is not a number.
     pub fn from_raw(raw: [f32; OUTPUTS]) -> Self {
         assert!(raw.iter().all(|value| value.is_finite()), "the network answered {raw:?}");
-        let sigma = |raw| (0.5 * soft_clamp_log_variance(raw)).exp();
+        let sigma = |raw| maths::exp(0.5 * soft_clamp_log_variance(raw));
         Self { mean: [raw[0], raw[1]], sigma: [sigma(raw[2]), sigma(raw[3])] }
     }
 
@@ -145,7 +146,7 @@ impl Mode {
 fn modes(row: &[f32], count: usize) -> impl Iterator<Item = Mode> + Clone {
     let (raws, logits) = row.split_at(count * OUTPUTS);
     let highest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    let log_sum = logits.iter().map(|logit| (logit - highest).exp()).sum::<f32>().ln();
+    let log_sum = maths::ln(logits.iter().map(|logit| maths::exp(logit - highest)).sum());
     let log_weight = move |mode: usize| logits.get(mode).map_or(0.0, |logit| logit - highest - log_sum);
     let raws = raws.as_chunks::<OUTPUTS>().0.iter();
     raws.enumerate().map(move |(mode, &raw)| Mode { raw, log_weight: log_weight(mode) })
@@ -170,7 +171,7 @@ fn averaged(
 }
 
 fn nearest(to: Mode, modes: impl Iterator<Item = Mode>) -> Mode {
-    let apart = |mode: &Mode| (mode.raw[0] - to.raw[0]).powi(2) + (mode.raw[1] - to.raw[1]).powi(2);
+    let apart = |mode: &Mode| maths::hypot(mode.raw[0] - to.raw[0], mode.raw[1] - to.raw[1]);
     modes.min_by(|a, b| apart(a).total_cmp(&apart(b))).expect("at least one mode")
 }
 

@@ -150,8 +150,8 @@ impl Normal {
             return spare;
         }
         // 1 − x lies in (0, 1]: its logarithm is finite.
-        let radius = (-2.0 * (1.0 - self.rng.random::<f64>()).ln()).sqrt();
-        let (sin, cos) = (std::f64::consts::TAU * self.rng.random::<f64>()).sin_cos();
+        let radius = (-2.0 * libm::log(1.0 - self.rng.random::<f64>())).sqrt();
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * self.rng.random::<f64>());
         self.spare = Some((radius * sin) as f32);
         (radius * cos) as f32
     }
