@@ -4,7 +4,7 @@ use super::*;
 use crate::dataset::{Dataset, Sample, ValidationSplit};
 use crate::fit::batch_sampler::BatchSampler;
 use crate::loss::LossSettings;
-use crate::network::{ConvLayer, DeviceChoice, InferenceSettings, NetworkArchitecture, Weights};
+use crate::network::{ConvLayer, DeviceChoice, InferenceSettings, NetworkArchitecture, Predictor, Weights};
 use crate::test_data::{round, scratch};
 use sim::seed::RootSeed;
 use sim::sensing::GridGeometry;
@@ -58,6 +58,27 @@ fn a_readable_rule_is_learned() {
     assert!(after.rmse_m < 0.4 * before.rmse_m, "{before:?} {:?}", outcome.report);
     assert!(after.nll < before.nll - 0.5, "{before:?} {:?}", outcome.report);
     assert_eq!(outcome.report.curve.len(), 20);
+}
+
+/// Labels to the left and to the right of a tree, whatever the grid: one Gaussian answers with their mean.
+#[test]
+fn two_modes_learn_two_ways() {
+    let samples: Vec<Sample> = (round(600).samples.iter().enumerate())
+        .map(|(index, sample)| Sample { label: [if index % 2 == 0 { 0.3 } else { 0.7 }, 0.4], tau_hat: 0.0, ..*sample })
+        .collect();
+    let grids: Vec<_> = samples.iter().map(|sample| sample.grid).collect();
+    let mut dataset = Dataset::default();
+    dataset.push(samples.into());
+    let from_the_mean = |modes| {
+        let start = Weights::init(NetworkArchitecture { modes, ..tiny() }, RootSeed(1), 0);
+        let mut progress = |_: &FitProgress| ControlFlow::Continue(());
+        let fitted = fit(&start, &dataset, &settings(200), context(DeviceChoice::Cpu), None, &mut progress).unwrap();
+        let mut predictor = Predictor::new(&fitted.weights, InferenceSettings::plain(), DeviceChoice::Cpu);
+        let answers = predictor.predict(&grids.iter().collect::<Vec<_>>());
+        answers.iter().map(|answer| (answer.mean[0] - 0.5).abs()).sum::<f32>() / answers.len() as f32
+    };
+    let [one, two] = [1, 2].map(from_the_mean);
+    assert!(one < 0.08 && two > 0.15, "{one} {two}");
 }
 
 #[test]

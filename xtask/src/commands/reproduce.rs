@@ -28,7 +28,7 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask reproduce                               half an hour on two cores
   cargo xtask reproduce --preset smoke --out runs/try   every stage within a minute
-  cargo xtask reproduce --full --unseen test:50
+  cargo xtask reproduce --full --unseen sealed:my-phrase:120:all
   cargo xtask reproduce --resume runs/reproduce-default-s1";
 
 #[derive(Debug, Clone, Args)]
@@ -41,7 +41,8 @@ pub(crate) struct ReproduceArgs {
     /// Five training seeds, twice the trials, more unseen lots, longer ablations.
     #[arg(long)]
     full: bool,
-    /// Lots that no driver has met; see `cargo xtask lots` [default: test:20; test:100 with --full].
+    /// Lots that no driver has met; see `cargo xtask lots`. A phrase of your own draws lots that nobody has seen [default:
+    /// sealed:reproduce:24:all; sealed:reproduce:120:all with --full].
     #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',')]
     unseen: Vec<String>,
     /// Folder of `cargo xtask tune`: planners also drive with the parameters found there [default: those in planners/tuned].
@@ -120,9 +121,9 @@ fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
         settings.evaluation.trials *= 2;
     }
     let unseen = match &args.unseen[..] {
-        [] if args.full => vec!["test:100".to_owned()],
+        [] if args.full => vec!["sealed:reproduce:120:all".to_owned()],
         [] if is_smoke => vec!["test:1:easy".to_owned()],
-        [] => vec!["test:20".to_owned()],
+        [] => vec!["sealed:reproduce:24:all".to_owned()],
         named => named.to_vec(),
     };
     let extent = Extent {
@@ -138,7 +139,7 @@ fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
     let trained_on = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     for lot in Lot::parse_all(&extent.unseen, &settings.episode.vehicle)? {
         let is_unseen = !lot.is_for_training() && trained_on.iter().all(|known| known.name() != lot.name());
-        ensure!(is_unseen, "--unseen {}: drivers are trained or tuned on it; name others, e.g. test:20", lot.name());
+        ensure!(is_unseen, "--unseen {}: drivers are trained or tuned on it; name others, e.g. sealed:PHRASE:24:all", lot.name());
     }
     ensure!(
         settings.seed.0.checked_add(extent.seeds).is_some_and(|last| i64::try_from(last).is_ok()),
