@@ -7,6 +7,7 @@
 use crate::open_list::Open;
 use sim::geometry::{Vec2, distance_to_segment};
 use sim::map::Map;
+use sim::maths;
 use sim::scenario::{Island, KERB_MAX_M, Scenario};
 use sim::vehicle::VehicleSettings;
 use std::collections::BinaryHeap;
@@ -118,7 +119,7 @@ fn kerbs(map: &Map, branch: &Branch) -> Vec<Scenario> {
 /// From wall to wall through a point.
 fn chord(map: &Map, point: Vec2, direction: u8) -> Option<(Vec2, Vec2)> {
     const STEP_M: f32 = 0.1;
-    let along = Vec2::from_angle(std::f32::consts::PI * f32::from(direction) / f32::from(KERB_DIRECTIONS));
+    let along = maths::unit(std::f32::consts::PI * f32::from(direction) / f32::from(KERB_DIRECTIONS));
     let steps = (KERB_LENGTH_MAX_M / STEP_M) as usize;
     let wall = |along: Vec2| {
         let points = (0..steps).map(|k| point + k as f32 * STEP_M * along);

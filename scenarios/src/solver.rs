@@ -67,7 +67,7 @@ pub fn solve(scenario: &Scenario, vehicle: &VehicleSettings, clearance_m: f32) -
 
 fn start_pose(scenario: &Scenario) -> Pose {
     let points = &scenario.reference_path.points;
-    Pose::new(points[0], (points[1] - points[0]).to_angle())
+    Pose::new(points[0], maths::angle_rad(points[1] - points[0]))
 }
 
 /// The finish line.

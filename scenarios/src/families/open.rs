@@ -10,6 +10,7 @@ use crate::clutter::draw_car;
 use crate::corridor::to_millimetres;
 use rand::RngExt as _;
 use sim::geometry::{Pose, Vec2, edges, polygon_contains, rectangle};
+use sim::maths;
 use sim::scenario::{Island, Obstacle, ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::ops::Range;
@@ -173,7 +174,7 @@ impl Ground<'_> {
     fn put(&mut self, item: &Item, a: Vec2, b: Vec2, set_back_m: f32, rng: &mut Rng) -> bool {
         let along = (b - a).normalize();
         let centre = 0.5 * (a + b) - along.perp() * (set_back_m + 0.5 * item.depth_m);
-        let heading_rad = along.to_angle();
+        let heading_rad = maths::angle_rad(along);
         match item.kind {
             Kind::ParkedAlong | Kind::ParkedAcross => {
                 let is_across = matches!(item.kind, Kind::ParkedAcross);
@@ -216,11 +217,11 @@ impl Ground<'_> {
             let kind = [ParkedAlong, ParkedAcross, Planter, Wall, Pillar, Cone][rng.random_range(0..6)];
             let item = Item::draw(kind, rng);
             let at = Vec2::new(rng.random_range(low.x..high.x), rng.random_range(low.y..high.y));
-            let along = Vec2::from_angle(rng.random_range(-std::f32::consts::PI..std::f32::consts::PI));
+            let along = maths::unit(rng.random_range(-std::f32::consts::PI..std::f32::consts::PI));
             let (a, b) = (at - 0.5 * item.length_m * along, at + 0.5 * item.length_m * along);
             // A little larger than the thing.
             let centre = at - along.perp() * 0.5 * item.depth_m;
-            let reach = rectangle(Pose::new(centre, along.to_angle()), item.length_m + 1.0, item.depth_m + 1.0);
+            let reach = rectangle(Pose::new(centre, maths::angle_rad(along)), item.length_m + 1.0, item.depth_m + 1.0);
             let is_on_way = edges(outline)
                 .any(|(c, d)| edges(&reach).any(|(e, f)| crate::corridor::segments_cross(c, d, e, f)))
                 || polygon_contains(outline, at);

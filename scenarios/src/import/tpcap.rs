@@ -12,6 +12,7 @@ use super::ground::Ground;
 use crate::error::{LoadError, read_text, shortened};
 use sim::geometry::{Pose, Vec2, wrap_angle};
 use sim::limits::{CSV_BYTES_MAX, MAP_COORDINATE_MAX_M};
+use sim::maths;
 use sim::scenario::{Obstacle, ObstacleClass};
 use std::path::Path;
 
@@ -103,7 +104,7 @@ fn car_of(outline: &[Vec2]) -> Option<Obstacle> {
     (is_rectangle && (3.0..=6.5).contains(&length_m) && (1.3..=2.6).contains(&width_m)).then(|| Obstacle {
         length_m: Some(length_m),
         width_m: Some(width_m),
-        ..Obstacle::new(ObstacleClass::Sedan, Pose::new(0.25 * (a + b + c + d), along.to_angle()))
+        ..Obstacle::new(ObstacleClass::Sedan, Pose::new(0.25 * (a + b + c + d), maths::angle_rad(along)))
     })
 }
 
