@@ -234,7 +234,7 @@ fn settings_that_are_refused() {
         ("dagger.fit.validation.every=1", "nothing is left to train on"),
         ("dagger.network.hidden=1000000000000", "dagger.network.hidden = 1000000000000 is out of range"),
         (
-            "dagger.network={conv1={channels=1024,kernel=7},conv2={channels=1024,kernel=7},hidden=65536,dropout_features=0.0,dropout_hidden=0.0}",
+            "dagger.network={conv1={channels=1024,kernel=7},conv2={channels=1024,kernel=7},hidden=65536,modes=1,dropout_features=0.0,dropout_hidden=0.0}",
             "parameters; at most 64000000 are possible",
         ),
         ("expert.elastic_band.reach_share=nan", "expert.elastic_band.reach_share = NaN is out of range"),

@@ -114,7 +114,7 @@ fn onnxruntime_answers_as_rust_does() {
     for checkpoint in checkpoints() {
         let plain = Checkpoint { inference: InferenceSettings::plain(), ..checkpoint };
         let expected = plain.predictor(DeviceChoice::Cpu).raw(&grids.iter().collect::<Vec<_>>());
-        std::fs::write(folder.join("policy.onnx"), onnx::export::export(&plain)).unwrap();
+        std::fs::write(folder.join("policy.onnx"), onnx::export::export(&plain).unwrap()).unwrap();
         assert_near(&answers("onnx_answers.py", &plain, &grids, &folder), &expected, "onnxruntime");
     }
 }

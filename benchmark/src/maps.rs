@@ -5,6 +5,7 @@ use scenarios::reference::{ReferenceLot, lot};
 use sim::episode::{Episode, EpisodeSettings};
 use sim::geometry::Vec2;
 use sim::map::Map;
+use sim::maths;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
 use std::hint::black_box;
@@ -19,7 +20,7 @@ const MS: (&str, f64) = ("ms", 1e-3);
 pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     let settings = EpisodeSettings::paper();
     for degrees in [0.0_f32, 45.0] {
-        let turned = |(x, y): (f32, f32)| Vec2::from_angle(degrees.to_radians()).rotate(Vec2::new(x, y));
+        let turned = |(x, y): (f32, f32)| maths::unit(degrees.to_radians()).rotate(Vec2::new(x, y));
         let boundary = [(-20.0, -1.6), (220.0, -1.6), (220.0, 1.6), (-20.0, 1.6)].map(turned);
         let scenario = Scenario::new("lane", boundary, [(0.0, 0.0), (200.0, 0.0)].map(turned));
         Map::build(scenario.clone(), &settings.vehicle)?;

@@ -8,6 +8,7 @@ use scenarios::reference::{ReferenceLot, lot};
 use sim::episode::EpisodeSettings;
 use sim::geometry::Pose;
 use sim::map::Map;
+use sim::maths;
 use sim::scenario::NoiseLevel;
 use sim::seed::RootSeed;
 use sim::sensing::noise::NoiseSettings;
@@ -34,7 +35,7 @@ fn grids(count: usize) -> anyhow::Result<Vec<OccupancyGrid>> {
     Ok((0..count as u32)
         .map(|tick| {
             let on_path = map.path().pose_at((tick as f32 * 0.37) % length_m);
-            let turned = Pose::new(on_path.position(), on_path.heading_rad + 0.2 * (tick as f32 * 0.7).sin());
+            let turned = Pose::new(on_path.position(), on_path.heading_rad + 0.2 * maths::sin(tick as f32 * 0.7));
             sensor.observe(&map, turned, tick).grid
         })
         .collect())

@@ -2,6 +2,7 @@
 
 use crate::rollout::{HalfTurn, Motion};
 use sim::geometry::{Pose, Vec2, WorldFromEgo};
+use sim::maths;
 use sim::vectors::{FourPoints, f32x4};
 
 /// Points per arc at which its forecast can be probed, in fours.
@@ -51,7 +52,7 @@ impl<const N: usize> Fan<N> {
         let arcs = std::array::from_fn(|i: usize| {
             let side = if i.is_multiple_of(2) { -1.0 } else { 1.0 };
             let index = i.div_ceil(2) as f32 / (N / 2) as f32;
-            let curvature_per_m = side * max_per_m * index.powf(exponent);
+            let curvature_per_m = side * max_per_m * maths::pow(index, exponent);
             let half_turn = HalfTurn::new(curvature_per_m + curvature_per_m, step_m);
             let mut motion = Motion::new(Pose::default(), curvature_per_m);
             let probes = std::array::from_fn(|_| {

@@ -6,6 +6,7 @@ use crate::line_of_sight::LineOfSight;
 use crate::settings::ExpertSettings;
 use sim::driver::{GroundTruth, LookAheadPoint};
 use sim::geometry::{Pose, Vec2};
+use sim::maths;
 
 /// Step along a label's arc, metres.
 const MARCH_M: f32 = 0.2;
@@ -25,9 +26,9 @@ impl Label {
     /// The label through a point ahead in the ego frame.
     fn through(in_ego: Vec2) -> Self {
         let curvature_per_m = LookAheadPoint { ahead_m: in_ego.x, left_m: in_ego.y }.curvature_per_m();
-        let half_turn = in_ego.y.atan2(in_ego.x);
+        let half_turn = maths::angle_rad(in_ego);
         let chord_m = in_ego.length();
-        let arc_length_m = if half_turn.abs() < 1e-3 { chord_m } else { chord_m * half_turn / half_turn.sin() };
+        let arc_length_m = if half_turn.abs() < 1e-3 { chord_m } else { chord_m * half_turn / maths::sin(half_turn) };
         Self { curvature_per_m, arc_length_m }
     }
 
@@ -40,7 +41,7 @@ impl Label {
     /// Curvature index of the label, −1…1, on the scale of the first arcs.
     pub(crate) fn index(self, settings: &ExpertSettings) -> f32 {
         let share = (self.curvature_per_m / settings.curvature_max_per_m).clamp(-1.0, 1.0);
-        share.abs().powf(1.0 / 1.5).copysign(share)
+        maths::pow(share.abs(), 1.0 / 1.5).copysign(share)
     }
 
     /// Moves from the last label towards this one, within the limits of a tick. The steering rate limits the car anyway;
@@ -172,8 +173,8 @@ impl Ground<'_> {
         let geometry = self.context.geometry();
         let (near_x, far_x) = (geometry.near_edge_ahead_m + 1e-3, geometry.far_edge_ahead_m() - 1e-3);
         let half_y = 0.5 * geometry.side_m - 1e-3;
-        let arc_length_at_x = |x_m: f32| (kappa * x_m).min(1.0).asin() / kappa;
-        let arc_length_at_y = |y_m: f32| (1.0 - kappa * y_m).max(-1.0).acos() / kappa;
+        let arc_length_at_x = |x_m: f32| maths::asin((kappa * x_m).min(1.0)) / kappa;
+        let arc_length_at_y = |y_m: f32| maths::acos((1.0 - kappa * y_m).max(-1.0)) / kappa;
         let near_m = arc_length_at_x(near_x);
         let far_m = arc_length_at_x(far_x).min(arc_length_at_y(half_y)).min(self.settings.label_turn_max_rad / kappa);
         (near_m, far_m.max(near_m))
@@ -247,7 +248,7 @@ mod tests {
     fn the_index_undoes_the_spacing_of_the_arcs() {
         let settings = ExpertSettings::half_points();
         for index in [-1.0_f32, -0.3, 0.0, 0.5] {
-            let curvature_per_m = settings.curvature_max_per_m * index.abs().powf(1.5).copysign(index);
+            let curvature_per_m = settings.curvature_max_per_m * maths::pow(index.abs(), 1.5).copysign(index);
             assert!((Label { curvature_per_m, arc_length_m: 5.0 }.index(&settings) - index).abs() < 1e-5);
         }
     }

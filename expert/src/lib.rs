@@ -30,6 +30,7 @@ mod stats;
 
 pub use search::Candidate;
 pub use settings::{ExpertSettings, PlanWeights, Sees};
+use sim::maths;
 pub use stats::{ExpertStats, Rule};
 
 use context::ExpertContext;
@@ -301,7 +302,7 @@ impl Inspection {
 }
 
 fn distance_m(a: LookAheadPoint, b: LookAheadPoint) -> f32 {
-    (a.ahead_m - b.ahead_m).hypot(a.left_m - b.left_m)
+    maths::hypot(a.ahead_m - b.ahead_m, a.left_m - b.left_m)
 }
 
 /// Irwin–Hall: twelve uniform draws have variance 1. Its tails end at 6σ, which suits a hand.

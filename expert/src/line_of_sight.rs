@@ -3,6 +3,7 @@
 use crate::settings::Sees;
 use sim::geometry::{Pose, Vec2, WorldFromEgo};
 use sim::map::{Map, Occluder};
+use sim::maths;
 use sim::sensing::{GridGeometry, SensingSettings};
 
 /// Bearings into which the half plane ahead of the camera is divided.
@@ -63,7 +64,7 @@ impl VisiblePatch {
             return patch;
         }
         let tall_m = sensing.camera_height_m * (1.0 - 1.0 / OCCLUSION_FACTOR_MIN);
-        let reach_m = geometry.far_edge_ahead_m().hypot(0.5 * geometry.side_m);
+        let reach_m = maths::hypot(geometry.far_edge_ahead_m(), 0.5 * geometry.side_m);
         for occluder in map.occluders() {
             let is_near = occluder.centre.distance(pose.position()) < reach_m + occluder.radius_m;
             if is_near && occluder.height_m >= tall_m {

@@ -2,6 +2,7 @@
 
 use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
+use sim::maths;
 use sim::vectors::{FourPoints, f32x4};
 use sim::vehicle::VehicleSettings;
 
@@ -103,7 +104,7 @@ pub(crate) struct Footprint {
 impl Footprint {
     pub(crate) fn new(vehicle: &VehicleSettings, nose_margin_m: f32, disc_relief_m: f32) -> Self {
         let segment_m = (vehicle.length_m + nose_margin_m) / DISCS as f32;
-        let radius_m = (0.5 * segment_m).hypot(0.5 * vehicle.width_m);
+        let radius_m = maths::hypot(0.5 * segment_m, 0.5 * vehicle.width_m);
         let centre_m = |disc: usize| (disc as f32 + 0.5) * segment_m - vehicle.rear_overhang_m;
         let four_m = |of_lane: [usize; 4]| f32x4::from(of_lane.map(centre_m));
         let [nose, middle, rear] = COARSE_DISCS;

@@ -17,10 +17,21 @@ const OPERATORS: i64 = 17;
 /// Version of the format that came with them.
 const FORMAT: i64 = 8;
 
+/// What cannot be written as ONNX.
+#[derive(Debug, Clone, Copy, thiserror::Error)]
+#[error("the network answers with {0} modes; only networks with one (dagger.network.modes = 1) can be written as ONNX")]
+pub struct SeveralModes(usize);
+
 /// The file: the network's own outputs for `[batch, 1, 25, 25]`. How they are used is written beside the graph ([`About`]) and
 /// is no part of it.
-pub fn export(checkpoint: &Checkpoint) -> Vec<u8> {
+///
+/// # Errors
+/// If the network answers with several modes: none of the drivers that read such files weighs them.
+pub fn export(checkpoint: &Checkpoint) -> Result<Vec<u8>, SeveralModes> {
     let architecture = checkpoint.weights.architecture();
+    if architecture.modes != 1 {
+        return Err(SeveralModes(architecture.modes));
+    }
     let nodes = vec![
         convolution("conv1", INPUT, architecture.conv1),
         max_pool("conv1", "pool1"),
@@ -53,7 +64,7 @@ pub fn export(checkpoint: &Checkpoint) -> Vec<u8> {
     };
     let mut bytes = Vec::new();
     model.encode(ValueWriter::new(&mut bytes)).expect("memory takes every byte");
-    bytes
+    Ok(bytes)
 }
 
 fn node(operator: &str, inputs: &[&str], output: &str, attribute: Vec<AttributeProto>) -> NodeProto {

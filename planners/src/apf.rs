@@ -14,6 +14,7 @@ use crate::search::{Dimension, Span};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
+use sim::maths;
 use sim::sensing::{Observation, OccupancyGrid};
 use std::sync::Arc;
 
@@ -41,9 +42,9 @@ impl Params {
         };
         let distance_m = distance_m.max(DISTANCE_FLOOR_M);
         let goal_m = to_goal.length().max(DISTANCE_FLOOR_M);
-        let off = khatib_repulsion(distance_m, self.range_m) * goal_m.powf(self.goal_power);
+        let off = khatib_repulsion(distance_m, self.range_m) * maths::pow(goal_m, self.goal_power);
         let gap = (1.0 / distance_m - 1.0 / self.range_m).max(0.0);
-        let on = 0.5 * self.goal_power * gap * gap * goal_m.powf(self.goal_power - 1.0);
+        let on = 0.5 * self.goal_power * gap * gap * maths::pow(goal_m, self.goal_power - 1.0);
         self.repulsion_gain * (off * away + on * to_goal / goal_m) + to_goal
     }
 }
@@ -143,7 +144,8 @@ mod tests {
         let goal = Vec2::new(5.0, -2.0);
         let potential = |point: Vec2| {
             let (gap, goal_m) = (1.0 / point.length() - 1.0 / params.range_m, point.distance(goal));
-            0.5 * params.repulsion_gain * gap.max(0.0).powi(2) * goal_m.powf(params.goal_power) + 0.5 * goal_m * goal_m
+            0.5 * params.repulsion_gain * maths::pow(gap.max(0.0), 2.0) * maths::pow(goal_m, params.goal_power)
+                + 0.5 * goal_m * goal_m
         };
         for point in [Vec2::new(1.0, 0.5), Vec2::new(-0.4, 1.1), Vec2::new(0.3, -1.9)] {
             let slope = |step: Vec2| (potential(point - step) - potential(point + step)) / 0.02;

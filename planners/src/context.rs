@@ -4,6 +4,7 @@ use sim::controller::{self, ControllerSettings};
 use sim::driver::{Decision, LookAheadPoint, Source};
 use sim::episode::EpisodeSettings;
 use sim::geometry::{Pose, Vec2};
+use sim::maths;
 use sim::sensing::GridGeometry;
 use sim::vehicle::VehicleSettings;
 
@@ -38,12 +39,12 @@ impl PlannerContext {
 
     /// Road-wheel angle of an arc of the rear axle, radians.
     pub(crate) fn steering_rad(&self, curvature_per_m: f32) -> f32 {
-        (curvature_per_m * self.vehicle.wheelbase_m).atan()
+        maths::atan(curvature_per_m * self.vehicle.wheelbase_m)
     }
 
     /// Arc of the rear axle of a road-wheel angle, 1/m.
     pub(crate) fn curvature_per_m(&self, steering_rad: f32) -> f32 {
-        steering_rad.tan() / self.vehicle.wheelbase_m
+        maths::tan(steering_rad) / self.vehicle.wheelbase_m
     }
 
     /// What the controller would drive an arc with, m/s.

@@ -297,6 +297,7 @@ fn contacts(
 mod tests {
     use super::*;
     use crate::test_scenes::{context, grid_with};
+    use sim::maths;
 
     fn planner() -> DynamicWindow {
         Params::paper().planner(&context())
@@ -365,7 +366,7 @@ mod tests {
         assert!(curvature > 0.01, "{curvature}");
         // Half a second allows 9.9° from straight: 11 of the steps of 0.8875°.
         let mut narrow = Params { window_s: 0.5, heading_weight: 0.0, ..Params::paper() }.planner(&context());
-        let steering = (narrow.act(&Observation { grid }).look_ahead.curvature_per_m() * 2.845).atan().to_degrees();
+        let steering = maths::atan(narrow.act(&Observation { grid }).look_ahead.curvature_per_m() * 2.845).to_degrees();
         assert!(steering > 0.0 && steering < 11.5 * 0.8875, "{steering}");
     }
 }

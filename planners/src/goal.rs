@@ -3,6 +3,7 @@
 use crate::context::PlannerContext;
 use serde::{Deserialize, Serialize};
 use sim::geometry::Vec2;
+use sim::maths;
 use sim::sensing::{GRID_CELLS, GridGeometry, OccupancyGrid};
 
 /// Where a method that wants a goal is told to go. There is no global path.
@@ -47,7 +48,7 @@ impl LinesOfSight {
     pub(crate) fn new(context: &PlannerContext) -> Self {
         let geometry = &context.geometry;
         let ray = |bearing_rad: f32| {
-            let direction = Vec2::from_angle(bearing_rad);
+            let direction = maths::unit(bearing_rad);
             let points = (1..)
                 .map(|step| context.bumper() + step as f32 * RAY_STEP_M * direction)
                 .skip_while(|point| point.x < geometry.near_edge_ahead_m && point.y.abs() <= 0.5 * geometry.side_m)

@@ -13,6 +13,7 @@ use crate::way_field::WayField;
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
+use sim::maths;
 use sim::seed::{RootSeed, Stream};
 use sim::sensing::Observation;
 use std::sync::Arc;
@@ -270,7 +271,7 @@ impl Tables {
             now.steering_rad += (asked.steering_rad - now.steering_rad).clamp(-turn_max_rad, turn_max_rad);
             now.speed_mps += (asked.speed_mps - now.speed_mps).clamp(-slower_mps, faster_mps);
             let travel_m = now.speed_mps * STEP_S;
-            let turn_rad = travel_m * now.steering_rad.tan() / vehicle.wheelbase_m;
+            let turn_rad = travel_m * maths::tan(now.steering_rad) / vehicle.wheelbase_m;
             // Of a turn of a few degrees; |ahead| stays 1 to 1e-6 over a rollout.
             let turned = Vec2::new(1.0 - 0.5 * turn_rad * turn_rad, turn_rad - turn_rad * turn_rad * turn_rad / 6.0);
             let before = ahead;
@@ -282,7 +283,8 @@ impl Tables {
             let scales = (-clearance_m / params.clearance_scale_m).min(SCALES_MAX);
             let change_rad = asked.steering_rad - last_rad;
             last_rad = asked.steering_rad;
-            cost += params.obstacle_weight * STEP_S * scales.exp() + params.change_weight * change_rad * change_rad;
+            cost +=
+                params.obstacle_weight * STEP_S * maths::exp(scales) + params.change_weight * change_rad * change_rad;
             cost += self.departure(controls[step], self.noise[sample * self.steps + step]);
             if clearance_m < params.collision_from_m {
                 cost += params.collision_weight * (self.steps - step) as f32 / self.steps as f32;
@@ -340,7 +342,7 @@ impl PathIntegral {
         let least = costs.iter().copied().fold(f32::INFINITY, f32::min);
         let mut sum = 0.0;
         for cost in costs.iter_mut() {
-            *cost = ((least - *cost) / tables.params.temperature).exp();
+            *cost = maths::exp((least - *cost) / tables.params.temperature);
             sum += *cost;
         }
         for step in 0..tables.steps {
@@ -405,7 +407,7 @@ mod tests {
         }
         // At a knot, where nothing is interpolated.
         let at_knot = noise.iter().skip(4).step_by(steps);
-        let squared: f32 = at_knot.map(|control| control.steering_rad.powi(2)).sum();
+        let squared: f32 = at_knot.map(|control| control.steering_rad * control.steering_rad).sum();
         assert!(((squared / 2000.0).sqrt() - 0.15).abs() < 0.01, "{}", (squared / 2000.0).sqrt());
         assert_ne!(draw_noise(&Params { seed: 2, ..params.clone() }, 28), noise);
         assert_eq!(draw_noise(&params, 28), noise);

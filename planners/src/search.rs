@@ -5,6 +5,7 @@
 //! generation to generation. The search has no settings of its own.
 
 use rand::RngExt as _;
+use sim::maths;
 use sim::seed::{Rng, RootSeed, Stream};
 
 /// Candidates asked for at a time. A constant: results do not depend on the number of threads.
@@ -42,7 +43,7 @@ impl Span {
         let unit = unit.clamp(0.0, 1.0);
         match self {
             Self::Linear(low, high) => (low + unit * (high - low)).clamp(low, high),
-            Self::Log(low, high) => (low * (high / low).powf(unit)).clamp(low, high),
+            Self::Log(low, high) => (low * maths::pow(high / low, unit)).clamp(low, high),
             Self::Choice(options) => (unit * f32::from(options)).floor().min(f32::from(options) - 1.0),
         }
     }
@@ -51,7 +52,7 @@ impl Span {
     pub fn to_unit(self, value: f32) -> f32 {
         let unit = match self {
             Self::Linear(low, high) => (value - low) / (high - low),
-            Self::Log(low, high) => (value.max(f32::MIN_POSITIVE) / low).ln() / (high / low).ln(),
+            Self::Log(low, high) => maths::ln(value.max(f32::MIN_POSITIVE) / low) / maths::ln(high / low),
             Self::Choice(options) => (value + 0.5) / f32::from(options),
         };
         unit.clamp(0.0, 1.0)
@@ -103,7 +104,7 @@ impl Search {
             _ if self.asked == 0 => self.start.clone(),
             Some(best) if self.asked >= half => {
                 let share = (self.asked - half) as f32 / (self.budget - half) as f32;
-                let spread = SPREAD[0] * (SPREAD[1] / SPREAD[0]).powf(share);
+                let spread = SPREAD[0] * maths::pow(SPREAD[1] / SPREAD[0], share);
                 best.iter().map(|unit| reflect(unit + spread * normal(&mut self.rng))).collect()
             }
             _ => self.start.iter().map(|_| self.rng.random()).collect(),
@@ -120,7 +121,7 @@ fn reflect(unit: f32) -> f32 {
 /// A standard normal draw (Box–Muller).
 pub(crate) fn normal(rng: &mut Rng) -> f32 {
     let (radius, angle): (f32, f32) = (rng.random(), rng.random());
-    (-2.0 * (1.0 - radius).ln()).sqrt() * (std::f32::consts::TAU * angle).cos()
+    (-2.0 * maths::ln(1.0 - radius)).sqrt() * maths::cos(std::f32::consts::TAU * angle)
 }
 
 #[cfg(test)]
@@ -144,7 +145,7 @@ mod tests {
     /// comes nearer than the first.
     #[test]
     fn the_search_closes_in_on_the_best() {
-        let cost = |point: &[f32]| point.iter().map(|unit| (unit - 0.7).powi(2)).sum::<f32>();
+        let cost = |point: &[f32]| point.iter().map(|unit| (unit - 0.7) * (unit - 0.7)).sum::<f32>();
         let run = |seed| {
             let mut search = Search::new(vec![0.0; 3], 96, RootSeed(seed), 0);
             let (mut all, mut best): (Vec<Vec<f32>>, Option<Vec<f32>>) = (Vec::new(), None);

@@ -18,6 +18,7 @@ use crate::search::{Dimension, Span};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::{Pose, Vec2};
+use sim::maths;
 use sim::sensing::{GRID_CELLS, OccupancyGrid};
 use sim::sensing::{GridGeometry, Observation};
 use std::sync::Arc;
@@ -116,11 +117,11 @@ impl Params {
                 .collect(),
             TentacleSet::Arc2008(j) => {
                 let q = f32::from(j) / 15.0;
-                let outermost_m = 8.0 + 33.5 * q.powf(1.2); // l_j
-                let curvature_max = 1.2 * std::f32::consts::FRAC_PI_2 * (1.0 - q.powf(0.9)) / outermost_m; // 1/R_j
+                let outermost_m = 8.0 + 33.5 * maths::pow(q, 1.2); // l_j
+                let curvature_max = 1.2 * std::f32::consts::FRAC_PI_2 * (1.0 - maths::pow(q, 0.9)) / outermost_m; // 1/R_j
                 // k = 0 is the outermost and shortest, k = 40 straight.
                 let path = |k: usize| {
-                    let curvature = if k == SIDE { 0.0 } else { curvature_max / 1.15_f32.powi(k as i32) };
+                    let curvature = if k == SIDE { 0.0 } else { curvature_max / maths::pow(1.15, k as f32) };
                     (curvature, outermost_m + 20.0 * (k as f32 / SIDE as f32).sqrt())
                 };
                 let left = (0..SIDE).rev().map(path);
@@ -403,7 +404,7 @@ impl<'a> Marks<'a> {
 
 /// Curvatures from −max to max, `2 · side + 1` of them, dense near zero: κ_k = κ_max·sgn(k)(|k|/side)^power.
 fn spread_curvatures(side: i32, max_per_m: f32, power: f32) -> Vec<f32> {
-    let share = |k: i32| (k.abs() as f32 / side as f32).powf(power);
+    let share = |k: i32| maths::pow(k.abs() as f32 / side as f32, power);
     (-side..=side).map(|k| k.signum() as f32 * max_per_m * share(k)).collect()
 }
 

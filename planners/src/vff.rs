@@ -12,6 +12,7 @@ use crate::search::{Dimension, Span};
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
 use sim::geometry::Vec2;
+use sim::maths;
 use sim::sensing::{GRID_CELLS, Observation};
 use std::f32::consts::FRAC_PI_2;
 use std::sync::Arc;
@@ -103,7 +104,7 @@ impl Method for Params {
             let offset = bumper - context.geometry.cell_in_ego(index / GRID_CELLS, index % GRID_CELLS);
             let is_active = offset.abs().max_element() <= self.window_m;
             let strength =
-                self.repulsion_gain / offset.length().max(context.geometry.cell_m()).powf(self.distance_power);
+                self.repulsion_gain / maths::pow(offset.length().max(context.geometry.cell_m()), self.distance_power);
             if is_active { strength * offset.normalize_or_zero() } else { Vec2::ZERO }
         };
         let pushes: Vec<Vec2> = (0..GRID_CELLS * GRID_CELLS).map(push).collect();
@@ -161,9 +162,9 @@ impl Policy for VirtualForceField {
     fn act(&mut self, observation: &Observation) -> Decision {
         let force = self.force(observation);
         // A car cannot turn on the spot: backward forces steer as far as sideward ones.
-        let wanted_rad = force.y.atan2(force.x).clamp(-FRAC_PI_2, FRAC_PI_2);
+        let wanted_rad = maths::angle_rad(force).clamp(-FRAC_PI_2, FRAC_PI_2);
         self.bearing_rad = wanted_rad + self.params.smoothing * (self.bearing_rad - wanted_rad);
-        head_for(self.bumper + self.params.look_ahead_m * Vec2::from_angle(self.bearing_rad))
+        head_for(self.bumper + self.params.look_ahead_m * maths::unit(self.bearing_rad))
     }
 
     fn reset(&mut self) {

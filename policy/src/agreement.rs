@@ -5,6 +5,7 @@
 //! share at a τ that is scaled as the labels are.
 
 use serde::{Deserialize, Serialize};
+use sim::maths;
 use sim::sensing::GridGeometry;
 use std::cmp::Reverse;
 
@@ -87,7 +88,7 @@ fn best_constant(labels: &[[f32; 2]], radius: f32) -> f64 {
     }
     let filled: Vec<(usize, u32)> = counts.iter().copied().enumerate().filter(|&(_, count)| count > 0).collect();
     let centre = |cell: usize| [cell % CELLS, cell / CELLS].map(|index| (index as f32 + 0.5) / CELLS as f32);
-    let is_within = |[u, w]: [f32; 2], [u_label, w_label]: [f32; 2]| (u - u_label).hypot(w - w_label) < radius;
+    let is_within = |[u, w]: [f32; 2], [u_label, w_label]: [f32; 2]| maths::hypot(u - u_label, w - w_label) < radius;
     let about = |cell: usize| -> u32 {
         let point = centre(cell);
         filled.iter().filter(|&&(of, _)| is_within(point, centre(of))).map(|(_, count)| count).sum()

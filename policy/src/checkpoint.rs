@@ -244,8 +244,8 @@ fn shapes(architecture: &NetworkArchitecture) -> [(&'static str, Vec<usize>); 8]
         ("conv2.bias", vec![conv2.channels]),
         ("fc1.weight", vec![hidden, architecture.features()]),
         ("fc1.bias", vec![hidden]),
-        ("fc2.weight", vec![OUTPUTS, hidden]),
-        ("fc2.bias", vec![OUTPUTS]),
+        ("fc2.weight", vec![architecture.outputs(), hidden]),
+        ("fc2.bias", vec![architecture.outputs()]),
     ]
 }
 
@@ -311,7 +311,7 @@ fn fc1_index(architecture: &NetworkArchitecture, stored: usize) -> usize {
 
 /// Ours is `[hidden, output]`, stored is `[output, hidden]`.
 fn fc2_index(architecture: &NetworkArchitecture, stored: usize) -> usize {
-    stored % architecture.hidden * OUTPUTS + stored / architecture.hidden
+    stored % architecture.hidden * architecture.outputs() + stored / architecture.hidden
 }
 
 #[cfg(test)]

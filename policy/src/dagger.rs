@@ -21,7 +21,7 @@ mod run_file;
 mod settings;
 
 pub use algorithm::run;
-pub use disturbance::DisturbanceSettings;
+pub use disturbance::{Aim, DisturbanceSettings};
 pub use gated_collector::Keep;
 pub use iteration_row::IterationRow;
 pub use learned::Learned;

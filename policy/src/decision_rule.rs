@@ -16,6 +16,7 @@ pub(crate) use gate::{Gate, GateTick};
 pub use hg_dagger::HgDaggerSettings;
 pub use lazy_dagger::LazyDaggerSettings;
 pub use safe_dagger::SafeDaggerSettings;
+use sim::maths;
 pub(crate) use thrifty_dagger::Thresholds;
 pub use thrifty_dagger::ThriftyDaggerSettings;
 pub use vanilla::VanillaSettings;
@@ -237,7 +238,7 @@ impl ChiOn {
     pub fn of(self, [u, w]: [f32; 2]) -> [f32; 2] {
         match self {
             Self::StdPerAxis => [u, w],
-            Self::StdNorm => [u.hypot(w); 2],
+            Self::StdNorm => [maths::hypot(u, w); 2],
             Self::Variance => [u * u, w * w],
         }
     }

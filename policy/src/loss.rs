@@ -3,11 +3,14 @@
 //! Per sample, with s = log σ² and e = label − mean, both axes j averaged:
 //!
 //! `L = ½ · mean_j[ W · e_j² · exp(−s_j) + s_j ]`, `W = (1 + α τ̂)²`
+//!
+//! Of a network with several modes k of weight π_k, with `L_k` the loss of each: `−½ log Σ_k π_k exp(−2 L_k)`.
 
 use crate::dataset::Sample;
-use crate::network::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN};
+use crate::network::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, OUTPUTS, operations};
 use crate::string_or_table::string_or_table;
 use burn::tensor::Tensor;
+use burn::tensor::activation::log_softmax;
 use serde::{Deserialize, Serialize};
 
 /// How the loss is weighted.
@@ -55,7 +58,10 @@ impl LossSettings {
     /// Weight of the squared error of a sample with discrepancy `tau_hat`.
     pub fn weight_of_squared_error(&self, tau_hat: f32) -> f32 {
         match self.weight {
-            WeightForm::ResidualSq => (1.0 + self.alpha * tau_hat).powi(2),
+            WeightForm::ResidualSq => {
+                let gain = 1.0 + self.alpha * tau_hat;
+                gain * gain
+            }
             WeightForm::Linear { gain } => 1.0 + gain * tau_hat,
         }
     }
@@ -92,32 +98,76 @@ impl LossParts {
 pub struct BatchLoss {
     /// First term.
     pub misfit: Tensor<2>,
-    /// Second term.
+    /// Second term; with several modes, and what it costs to choose between them.
     pub log_variance: Tensor<2>,
 }
 
-/// The loss of a batch: outputs `[batch, 4]` as they left the network, labels `[batch, 2]`, weights of the squared error
-/// `[batch, 1]`.
+/// The loss of a batch: outputs `[batch, 4]` or, with m modes, `[batch, 5 m]` as they left the network, labels `[batch, 2]`,
+/// weights of the squared error `[batch, 1]`.
 pub fn of_batch(settings: &LossSettings, outputs: Tensor<2>, labels: Tensor<2>, weights: Tensor<2>) -> BatchLoss {
+    match outputs.dims()[1] {
+        OUTPUTS => of_one(settings, outputs, labels, weights),
+        width => of_mixture(settings, outputs, width / (OUTPUTS + 1), labels, weights),
+    }
+}
+
+/// Expectation and maximisation: with the share that each mode has in a sample held constant, the sum of their losses by
+/// these shares has the value and the gradient of the mixture's.
+fn of_mixture(
+    settings: &LossSettings,
+    outputs: Tensor<2>,
+    modes: usize,
+    labels: Tensor<2>,
+    weights: Tensor<2>,
+) -> BatchLoss {
+    let log_weights = log_softmax(outputs.clone().narrow(1, modes * OUTPUTS, modes), 1); // [batch, modes]
+    let of_mode = |settings: &LossSettings, mode| {
+        of_one(settings, outputs.clone().narrow(1, mode * OUTPUTS, OUTPUTS), labels.clone(), weights.clone())
+    };
+    let plain = LossSettings { beta: 0.0, ..*settings };
+    let energies = (0..modes).map(|mode| {
+        let BatchLoss { misfit, log_variance } = of_mode(&plain, mode);
+        (misfit + log_variance).sum_dim(1)
+    });
+    let energies = Tensor::cat(energies.collect(), 1); // [batch, modes]
+    let log_shares = log_softmax(log_weights.clone() - energies, 1).detach();
+    let shares = operations::exp(log_shares.clone());
+    // Half for each of the two axes.
+    let choice = (shares.clone() * (log_shares - log_weights)).sum_dim(1) * 0.5; // [batch, 1]
+    let of_modes = (0..modes).map(|mode| {
+        let share = shares.clone().narrow(1, mode, 1);
+        let BatchLoss { misfit, log_variance } = of_mode(settings, mode);
+        BatchLoss { misfit: misfit * share.clone(), log_variance: log_variance * share }
+    });
+    let sum = |a: BatchLoss, b: BatchLoss| BatchLoss {
+        misfit: a.misfit + b.misfit,
+        log_variance: a.log_variance + b.log_variance,
+    };
+    let BatchLoss { misfit, log_variance } = of_modes.reduce(sum).expect("at least one mode");
+    BatchLoss { misfit, log_variance: log_variance + choice }
+}
+
+/// The loss of one Gaussian.
+fn of_one(settings: &LossSettings, outputs: Tensor<2>, labels: Tensor<2>, weights: Tensor<2>) -> BatchLoss {
     let half = 0.5 * (LOG_VARIANCE_MAX - LOG_VARIANCE_MIN);
     let mid = 0.5 * (LOG_VARIANCE_MAX + LOG_VARIANCE_MIN);
     let means = outputs.clone().narrow(1, 0, 2); // [batch, 2]
     let raw = outputs.narrow(1, 2, 2); // [batch, 2]
-    let log_variance = ((raw - mid) / half).tanh() * half + mid;
+    let log_variance = operations::tanh((raw - mid) / half) * half + mid;
     let error = labels - means;
-    let misfit = weights * error.square() * log_variance.clone().neg().exp();
+    let misfit = weights * error.square() * operations::exp(log_variance.clone().neg());
     if settings.beta == 0.0 {
         return BatchLoss { misfit: misfit * 0.5, log_variance: log_variance * 0.5 };
     }
     // σ^2β is a constant of the sample: no gradient flows through it.
-    let factor = (log_variance.clone().detach() * settings.beta).exp() * 0.5;
+    let factor = operations::exp(log_variance.clone().detach() * settings.beta) * 0.5;
     BatchLoss { misfit: misfit * factor.clone(), log_variance: log_variance * factor }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::{OUTPUTS, soft_clamp_log_variance};
+    use crate::network::soft_clamp_log_variance;
     use burn::tensor::{Device, TensorData};
 
     const RAW: [f32; OUTPUTS] = [0.43, 0.61, -3.1, -5.2];
@@ -125,11 +175,11 @@ mod tests {
     const TAU_HAT: f32 = 0.27;
 
     /// Loss of one sample, and its gradient by the raw outputs.
-    fn loss_and_gradient(settings: &LossSettings, raw: [f32; OUTPUTS]) -> (f32, Vec<f32>) {
+    fn loss_and_gradient(settings: &LossSettings, raw: &[f32]) -> (f32, Vec<f32>) {
         let device = Device::flex().autodiff();
         let tensor =
             |values: &[f32]| Tensor::<2>::from_data(TensorData::new(values.to_vec(), [1, values.len()]), &device);
-        let outputs = tensor(&raw).require_grad();
+        let outputs = tensor(raw).require_grad();
         let weight = tensor(&[settings.weight_of_squared_error(TAU_HAT)]);
         let loss = of_batch(settings, outputs.clone(), tensor(&LABEL), weight);
         let total = (loss.misfit + loss.log_variance).mean();
@@ -142,9 +192,10 @@ mod tests {
         (0..2)
             .map(|j| {
                 let s = f64::from(soft_clamp_log_variance(raw[2 + j]));
-                let factor = (f64::from(settings.beta) * f64::from(soft_clamp_log_variance(constant_at[2 + j]))).exp();
+                let factor =
+                    libm::exp(f64::from(settings.beta) * f64::from(soft_clamp_log_variance(constant_at[2 + j])));
                 let e = f64::from(LABEL[j] - raw[j]);
-                0.25 * factor * (weight * e * e / s.exp() + s)
+                0.25 * factor * (weight * e * e / libm::exp(s) + s)
             })
             .sum()
     }
@@ -161,7 +212,7 @@ mod tests {
     #[test]
     fn the_value_matches_the_formula_written_out() {
         for settings in readings() {
-            let (loss, _) = loss_and_gradient(&settings, RAW);
+            let (loss, _) = loss_and_gradient(&settings, &RAW);
             let expected = formula(&settings, RAW, RAW);
             assert!((f64::from(loss) - expected).abs() < 1e-5, "{settings:?}: {loss} against {expected}");
         }
@@ -171,7 +222,7 @@ mod tests {
     #[test]
     fn the_gradient_matches_finite_differences() {
         for settings in readings() {
-            let (_, gradient) = loss_and_gradient(&settings, RAW);
+            let (_, gradient) = loss_and_gradient(&settings, &RAW);
             for (index, slope) in gradient.into_iter().enumerate() {
                 let at = |delta: f32| {
                     let mut raw = RAW;
@@ -185,6 +236,37 @@ mod tests {
                     "{settings:?} [{index}]: {difference} {slope}"
                 );
             }
+        }
+    }
+
+    /// Two modes in closed form; the gradient by finite differences.
+    #[test]
+    fn a_mixture_is_the_likelihood_of_all_its_modes() {
+        let settings = LossSettings::paper();
+        let other = [0.48, 0.33, -4.4, -2.9];
+        let mixture = |raw: &[f32]| {
+            let (modes, logits) = raw.split_at(2 * OUTPUTS);
+            let of_mode = |mode: usize| {
+                let raw: [f32; OUTPUTS] = modes[mode * OUTPUTS..][..OUTPUTS].try_into().unwrap();
+                libm::exp(f64::from(logits[mode]) - 2.0 * formula(&settings, raw, raw))
+            };
+            let weights: f64 = logits.iter().map(|&logit| libm::exp(f64::from(logit))).sum();
+            -0.5 * libm::log((of_mode(0) + of_mode(1)) / weights)
+        };
+        let raw: Vec<f32> = RAW.into_iter().chain(other).chain([0.3, -0.8]).collect();
+        let (loss, gradient) = loss_and_gradient(&settings, &raw);
+        assert!((f64::from(loss) - mixture(&raw)).abs() < 1e-5, "{loss} against {}", mixture(&raw));
+        for (index, slope) in gradient.into_iter().enumerate() {
+            let at = |delta: f32| {
+                let mut raw = raw.clone();
+                raw[index] += delta;
+                mixture(&raw)
+            };
+            let difference = (at(1e-3) - at(-1e-3)) / 2e-3;
+            assert!(
+                (difference - f64::from(slope)).abs() < 2e-3 * (1.0 + f64::from(slope.abs())),
+                "[{index}]: {difference} {slope}"
+            );
         }
     }
 

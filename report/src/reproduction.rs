@@ -584,7 +584,7 @@ fn calibration(page: &mut Page, found: &[Calibration]) {
             States::OnPolicy => "driving, expert watching",
         };
         // Bins hold as many samples each, the last one fewer: close enough for a ratio of two digits.
-        let mean_square = |which: usize| bins.iter().map(|bin| bin[which].powi(2)).sum::<f64>();
+        let mean_square = |which: usize| bins.iter().map(|bin| bin[which] * bin[which]).sum::<f64>();
         let ratio = (mean_square(1) / mean_square(0).max(f64::MIN_POSITIVE)).sqrt();
         table.add_row([
             policy.clone(),

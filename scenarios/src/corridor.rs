@@ -5,6 +5,7 @@
 //! gaps are answered from the same breakpoints, so they cannot disagree.
 
 use sim::geometry::{Pose, Vec2, edges, polygon_contains, rectangle};
+use sim::maths;
 use sim::scenario::ReferencePath;
 
 /// Longest piece of a curve that is drawn as a straight line, metres.
@@ -143,7 +144,7 @@ impl CornerPlan {
 
     /// From the vertex to the foot of the inner rounding, metres.
     fn inner_reach_m(&self) -> f32 {
-        (0.5 * self.width_m + self.inner_radius_m) * (0.5 * self.turn_rad.abs()).tan()
+        (0.5 * self.width_m + self.inner_radius_m) * maths::tan(0.5 * self.turn_rad.abs())
     }
 
     /// From the vertex to where the lane has its own width again, on either side, metres.
@@ -319,7 +320,7 @@ pub fn rounded_length_m(path: &ReferencePath) -> f32 {
         .windows(3)
         .map(|three| {
             let turn_rad = (three[1] - three[0]).angle_to(three[2] - three[1]).abs();
-            path.corner_radius_m * (2.0 * (0.5 * turn_rad).tan() - turn_rad)
+            path.corner_radius_m * (2.0 * maths::tan(0.5 * turn_rad) - turn_rad)
         })
         .sum();
     straight_m - saved_m
@@ -375,7 +376,7 @@ fn corner_edge(corner: &CornerPlan, side: Side) -> [(f32, f32); 2] {
         // A wide piece that ends before the rounding's foot would be a notch; it is never shorter than 1 cm.
         [(foot_m, half_m), (corner.reach_m.max(foot_m + 0.01), half_m)]
     } else {
-        [(-half_m * (0.5 * corner.turn_rad.abs()).tan(), half_m), (corner.reach_m, half_m)]
+        [(-half_m * maths::tan(0.5 * corner.turn_rad.abs()), half_m), (corner.reach_m, half_m)]
     }
 }
 
@@ -400,7 +401,7 @@ fn lane_breakpoints(plan: &LegPlan, from_m: f32, to_m: f32) -> Vec<f32> {
 fn bow_m(bulge: Option<Bulge>, s_m: f32) -> f32 {
     bulge.map_or(0.0, |bulge| {
         let phase = ((s_m - bulge.centre_m) / bulge.length_m).clamp(-0.5, 0.5);
-        0.5 * bulge.offset_m * (1.0 + (std::f32::consts::TAU * phase).cos())
+        0.5 * bulge.offset_m * (1.0 + maths::cos(std::f32::consts::TAU * phase))
     })
 }
 

@@ -11,6 +11,7 @@
 //! | [`open`] | open ground on which things leave one way |
 //! | [`halls`] | aisles between racks, other aisles closed |
 //! | [`yards`] | wide ground on which things stand apart |
+//! | [`chicanes`] | roads with barriers from either side in turn |
 //! | [`strip`] | the ground: a centre line of straight pieces, arcs and corners, its edges and their notches |
 //! | [`course`] | how centre lines are drawn |
 //! | [`walls`] | walls and kerbs along outlines, with free ground behind |
@@ -19,6 +20,7 @@
 //! | [`parts`] | what lots on strips share: run-outs, closed mouths, the lot as a whole |
 
 mod aisles;
+mod chicanes;
 mod corridor;
 mod course;
 mod halls;
@@ -53,6 +55,7 @@ pub(crate) fn draw(family: Family, layout: &mut Rng, obstacles: &mut Rng) -> Opt
         Family::Open => open::draw(layout, obstacles),
         Family::Halls => halls::draw(layout, obstacles),
         Family::Yards => yards::draw(layout, obstacles),
+        Family::Chicanes => chicanes::draw(layout, obstacles),
     };
     on_strip.map(|(scenario, _)| scenario)
 }
@@ -81,7 +84,7 @@ mod tests {
 
     type Is<'a> = dyn Fn(&Scenario, &Strip) -> bool + 'a;
     type Draw = fn(&mut Rng, &mut Rng) -> Option<(Scenario, Strip)>;
-    const DRAWS: [(Family, Draw); 8] = [
+    const DRAWS: [(Family, Draw); 9] = [
         (Family::Lane, lane::draw),
         (Family::Rooms, rooms::draw),
         (Family::Street, street::draw),
@@ -90,6 +93,7 @@ mod tests {
         (Family::Open, open::draw),
         (Family::Halls, halls::draw),
         (Family::Yards, yards::draw),
+        (Family::Chicanes, chicanes::draw),
     ];
 
     /// A car that does not know the route must not find another way. Ground that a disc a little wider than the car can
@@ -144,7 +148,7 @@ mod tests {
             scenario.obstacles.iter().filter(is_such).count() > 20
         };
         // Family, what, share of its lots: at least and at most.
-        let all: [(Family, &str, &Is<'_>, f32, f32); 19] = [
+        let all: [(Family, &str, &Is<'_>, f32, f32); 21] = [
             (Family::Lane, "narrower than 3.8 m", &|_, strip| strip.half_width_m(0.0) < 1.9, 0.35, 0.65),
             (Family::Lane, "narrower than 3.0 m", &|_, strip| strip.half_width_m(0.0) < 1.5, 0.03, 0.3),
             (Family::Lane, "wider than 6 m", &|_, strip| strip.half_width_m(0.0) > 3.0, 0.05, 0.4),
@@ -163,6 +167,8 @@ mod tests {
             (Family::Aisles, "between hidden rows", &|lot, _| lot.boundary_height_m > 1.0, 0.15, 0.5),
             (Family::Halls, "that hide what is behind", &|lot, _| lot.boundary_height_m > 1.0, 0.4, 0.8),
             (Family::Halls, "narrower than 4.4 m", &|_, strip| strip.half_width_m(0.0) < 2.2, 0.3, 0.7),
+            (Family::Chicanes, "with planters", &|lot, _| !lot.islands.is_empty(), 0.2, 0.6),
+            (Family::Chicanes, "narrower than 8 m", &|_, strip| strip.half_width_m(0.0) < 4.0, 0.2, 0.6),
             (Family::Yards, "with fountains", &|lot, _| !lot.islands.is_empty(), 0.6, 1.0),
         ];
         for (family, what, is, least, most) in all {

@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn lots_are_pinned_by_their_names() {
-        const GOLDENS: [(Family, u64); 9] = [
+        const GOLDENS: [(Family, u64); 10] = [
             (Family::Hard, 0x3fd6_8fa8_99fe_f9dd),
             (Family::Lane, 0xec3e_f3d8_87c7_1aca),
             (Family::Rooms, 0x1e96_069f_81a6_9e3e),
@@ -139,6 +139,7 @@ mod tests {
             (Family::Track, 0x4d3a_ebf9_0c4a_9f48),
             (Family::Open, 0x26fc_9b9c_1f17_f76f),
             (Family::Halls, 0x18e3_c5d3_12d4_a4b2),
+            (Family::Chicanes, 0),
             (Family::Yards, 0x9894_4e05_dcbb_f870),
         ];
         let hashed = GOLDENS.map(|(family, _)| {

@@ -425,7 +425,7 @@ impl MapLot {
                     if points.len() == ROUTE_POINTS_MAX {
                         return Err(faulty(line, format!("the line has more than {ROUTE_POINTS_MAX} points")));
                     }
-                    let is_far = |&[a, b]: &[f64; 2]| self.scale * (a - x).hypot(b - y) > SAME_POINT_M;
+                    let is_far = |&[a, b]: &[f64; 2]| self.scale * libm::hypot(a - x, b - y) > SAME_POINT_M;
                     if points.last().is_none_or(is_far) {
                         points.push([x, y]);
                     }

@@ -6,6 +6,7 @@
 
 use crate::open_list::Open;
 use sim::geometry::{Pose, Vec2, distance_to_segment, edges};
+use sim::maths;
 use sim::scenario::Scenario;
 use sim::vehicle::VehicleSettings;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -194,8 +195,8 @@ impl<'a> Search<'a> {
     /// Levels are equally spaced in the steering angle.
     fn curvature(&self, level: f32) -> f32 {
         let wheelbase_m = self.vehicle.wheelbase_m;
-        let largest_rad = (CURVATURE_SHARE * self.vehicle.curvature_max_per_m() * wheelbase_m).atan();
-        (largest_rad * level / f32::from(STEERING_LEVELS)).tan() / wheelbase_m
+        let largest_rad = maths::atan(CURVATURE_SHARE * self.vehicle.curvature_max_per_m() * wheelbase_m);
+        maths::tan(largest_rad * level / f32::from(STEERING_LEVELS)) / wheelbase_m
     }
 
     fn is_free(&self, pose: Pose, curvature_per_m: f32) -> bool {
@@ -273,7 +274,7 @@ impl Footprint {
             front_m,
             half_width_m,
             disc_centres_m: std::array::from_fn(|i| rear_m + (i as f32 + 0.5) * piece_m),
-            disc_radius_m: (0.5 * piece_m).hypot(half_width_m),
+            disc_radius_m: maths::hypot(0.5 * piece_m, half_width_m),
         }
     }
 
@@ -357,7 +358,7 @@ impl Scene {
         for obstacle in &scenario.obstacles {
             let [length_m, width_m, _] = obstacle.size_m();
             // The circumscribed octagon of a round thing reaches 8 % farther than its radius.
-            let reach_m = 0.55 * length_m.hypot(width_m) + Self::SLACK_M;
+            let reach_m = 0.55 * maths::hypot(length_m, width_m) + Self::SLACK_M;
             let centre = obstacle.centre().position();
             let is_within = centre.cmpge(low).all() && centre.cmple(high).all();
             // Wholly behind the boundary: the boundary's edges come first.
@@ -633,7 +634,7 @@ mod tests {
             length_m += WAYPOINT_M;
         }
         // Steering changes at half steps of 0.5 m by at most one level of four.
-        let steering = |waypoint: &Waypoint| (waypoint.curvature_per_m * car().wheelbase_m).atan();
+        let steering = |waypoint: &Waypoint| maths::atan(waypoint.curvature_per_m * car().wheelbase_m);
         let largest =
             solution.waypoints.windows(2).map(|w| (steering(&w[1]) - steering(&w[0])).abs()).fold(0.0, f32::max);
         assert!(largest < 0.15, "the wheels turn by {largest} rad within half a metre");

@@ -8,6 +8,7 @@ use sim::driver::{Decision, Driver, Fleet, GroundTruth, LookAheadPoint, OneDrive
 use sim::episode::{self, Episode, EpisodeSettings};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
+use sim::maths;
 use sim::scenario::{Island, NoiseLevel, Obstacle, ObstacleClass, Scenario, SpeedBump};
 use sim::seed::RootSeed;
 use sim::sensing::noise::NoiseSettings;
@@ -50,7 +51,7 @@ fn observation(bencher: Bencher<'_, '_>, (level, occlusion): (NoiseLevel, bool))
     let mut tick = 0;
     bencher.bench_local(|| {
         tick += 1;
-        let pose = Pose::new(Vec2::new((tick % 1900) as f32 * 0.1, 0.1), 0.05 * (tick as f32 * 0.1).sin());
+        let pose = Pose::new(Vec2::new((tick % 1900) as f32 * 0.1, 0.1), 0.05 * maths::sin(tick as f32 * 0.1));
         sensor.observe(&map, pose, tick)
     });
 }
@@ -71,7 +72,7 @@ fn observation_between_walls(bencher: Bencher<'_, '_>, wall_height_m: f32) {
     let mut tick = 0;
     bencher.bench_local(|| {
         tick += 1;
-        let pose = Pose::new(Vec2::new((tick % 1900) as f32 * 0.1, 0.1), 0.05 * (tick as f32 * 0.1).sin());
+        let pose = Pose::new(Vec2::new((tick % 1900) as f32 * 0.1, 0.1), 0.05 * maths::sin(tick as f32 * 0.1));
         sensor.observe(&map, pose, tick)
     });
 }

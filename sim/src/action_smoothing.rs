@@ -4,6 +4,7 @@
 //! weaving. A mean over some ticks damps it.
 
 use crate::driver::{Decision, Fleet, LookAheadPoint, Seat};
+use crate::maths;
 
 /// The smoothing of one car.
 #[derive(Debug, Clone)]
@@ -24,7 +25,7 @@ impl ActionSmoothing {
     /// With a time constant in control ticks, 0 or more; 0 drives at the last answer alone.
     pub fn new(ticks: f32) -> Self {
         // The response to a step is 1 − exp(−t / time constant).
-        let gain = if ticks > 0.0 { 1.0 - (-1.0 / ticks).exp() } else { 1.0 };
+        let gain = if ticks > 0.0 { 1.0 - maths::exp(-1.0 / ticks) } else { 1.0 };
         Self { gain, mean: None }
     }
 
@@ -102,7 +103,7 @@ impl<F: Fleet> Fleet for SmoothedFleet<F> {
 
 impl Aim {
     fn at(point: LookAheadPoint) -> Self {
-        Self { curvature_per_m: point.curvature_per_m(), range_m: point.ahead_m.hypot(point.left_m) }
+        Self { curvature_per_m: point.curvature_per_m(), range_m: maths::hypot(point.ahead_m, point.left_m) }
     }
 
     fn towards(self, other: Self, share: f32) -> Self {

@@ -5,12 +5,13 @@
 
 use crate::distance_field::DistanceField;
 use crate::geometry::{Pose, Vec2, edges};
+use crate::maths;
 use crate::scenario::Scenario;
 use crate::vectors::{FourPoints, f32x4, lowest};
 use crate::vehicle::{VehicleSettings, VehicleState};
 use parry2d::shape::Cuboid;
 use rapier2d::geometry::{ColliderBuilder, Group, InteractionGroups, InteractionTestMode};
-use rapier2d::math::Pose as Isometry;
+use rapier2d::math::{Pose as Isometry, Rotation};
 use rapier2d::pipeline::{PhysicsWorld, QueryFilter};
 use serde::{Deserialize, Serialize};
 
@@ -102,7 +103,7 @@ impl BodyBox {
         let segment_m = vehicle.length_m / BODY_DISCS as f32;
         let discs = (0..BODY_DISCS).map(|i| Vec2::new((i as f32 + 0.5) * segment_m - vehicle.rear_overhang_m, 0.0));
         let discs: Vec<Vec2> = discs.collect();
-        let disc_radius_m = (0.5 * segment_m).hypot(0.5 * vehicle.width_m);
+        let disc_radius_m = maths::hypot(0.5 * segment_m, 0.5 * vehicle.width_m);
         let corners = vehicle.body_in_ego();
         let outline: Vec<Vec2> = edges(&corners)
             .flat_map(|(a, b)| {
@@ -157,7 +158,7 @@ impl BodyBox {
         let driven_m = (state.speed_mps + accel_mps2 * duration_s) * duration_s;
         let curvature_per_m = state.curvature_per_m(vehicle);
         let steered_rad = state.steering_rad.abs() + vehicle.steering_rate_max_radps * duration_s;
-        let curvature_max_per_m = steered_rad.tan() / vehicle.wheelbase_m;
+        let curvature_max_per_m = maths::tan(steered_rad) / vehicle.wheelbase_m;
         // Driving on before the sweep changes heading and position of its poses, and so does another curvature.
         let bent_per_m = curvature_max_per_m - curvature_per_m.abs();
         let turned_rad = curvature_max_per_m * driven_m + bent_per_m * (driven_m + travel_m);
@@ -197,7 +198,9 @@ fn sweep_steps(travel_m: f32) -> usize {
 }
 
 fn isometry(pose: Pose) -> Isometry {
-    Isometry::new(pose.position(), pose.heading_rad)
+    // Its own `new` asks the platform for sine and cosine.
+    let (sin, cos) = maths::sin_cos(pose.heading_rad);
+    Isometry::from_parts(pose.position(), Rotation::from_cos_sin_unchecked(cos, sin))
 }
 
 #[cfg(test)]

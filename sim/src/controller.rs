@@ -1,6 +1,7 @@
 //! From a look-ahead point to a vehicle command: pure pursuit and the speed law (docs/methods.md 2.4, 2.5).
 
 use crate::driver::{Decision, LookAheadPoint, Source};
+use crate::maths;
 use crate::sensing::GridGeometry;
 use crate::vehicle::{VehicleCommand, VehicleSettings};
 use serde::{Deserialize, Serialize};
@@ -106,16 +107,17 @@ pub fn steering(law: PursuitLaw, vehicle: &VehicleSettings, geometry: &GridGeome
                 // Beside or behind the axle: no forward circle reaches it, turn as hard as possible.
                 vehicle.steering_max_rad * left_m.signum()
             } else {
-                let distance_m = ahead_m.hypot(left_m).max(LOOK_AHEAD_MIN_M); // L_f
-                let bearing_rad = left_m.atan2(ahead_m); // θ_l
-                (2.0 * vehicle.wheelbase_m * bearing_rad.sin() / distance_m).atan()
+                let distance_m = maths::hypot(ahead_m, left_m).max(LOOK_AHEAD_MIN_M); // L_f
+                let bearing_rad = maths::atan2(left_m, ahead_m); // θ_l
+                maths::atan(2.0 * vehicle.wheelbase_m * maths::sin(bearing_rad) / distance_m)
             }
         }
         PursuitLaw::AuthorsCode => {
             let ahead_m = ahead_of_bumper_m(vehicle, geometry, target);
-            let distance_m = ahead_m.hypot(left_m).max(LOOK_AHEAD_MIN_M);
-            let bearing_rad = left_m.atan2(ahead_m);
-            (vehicle.wheelbase_m * bearing_rad.sin() / (0.75 * distance_m + 0.3 * bearing_rad.cos())).atan()
+            let distance_m = maths::hypot(ahead_m, left_m).max(LOOK_AHEAD_MIN_M);
+            let bearing_rad = maths::atan2(left_m, ahead_m);
+            let (sin, cos) = maths::sin_cos(bearing_rad);
+            maths::atan(vehicle.wheelbase_m * sin / (0.75 * distance_m + 0.3 * cos))
         }
     };
     steering_rad.clamp(-vehicle.steering_max_rad, vehicle.steering_max_rad)
@@ -127,7 +129,7 @@ const CHORD_M: f32 = 4.0;
 /// A point on the circle that the rear axle drives with a road-wheel angle: [`PursuitLaw::Paper`] steers it again.
 pub fn point_of(vehicle: &VehicleSettings, steering_rad: f32) -> LookAheadPoint {
     let steering_rad = steering_rad.clamp(-vehicle.steering_max_rad, vehicle.steering_max_rad);
-    let curvature_per_m = steering_rad.tan() / vehicle.wheelbase_m;
+    let curvature_per_m = maths::tan(steering_rad) / vehicle.wheelbase_m;
     // A chord as long as the radius spans 60° and ends ahead, however tight the circle.
     let chord_m = CHORD_M.min(1.0 / curvature_per_m.abs());
     let sine = 0.5 * chord_m * curvature_per_m;
@@ -164,12 +166,12 @@ mod tests {
         let (vehicle, geometry) = (VehicleSettings::hyundai_hg300(), GridGeometry::paper());
         for (ahead_m, left_m) in [(8.0, 1.0), (5.0, -2.0), (12.0, 4.0), (16.0, 0.0)] {
             let target = LookAheadPoint { ahead_m, left_m };
-            let curvature = steering(PursuitLaw::Paper, &vehicle, &geometry, target).tan() / vehicle.wheelbase_m;
+            let curvature = maths::tan(steering(PursuitLaw::Paper, &vehicle, &geometry, target)) / vehicle.wheelbase_m;
             assert!((curvature - target.curvature_per_m()).abs() < 1e-5);
             // Rolling along that arc arrives at the point.
-            let chord_m = ahead_m.hypot(left_m);
-            let half_turn = left_m.atan2(ahead_m);
-            let travel_m = if half_turn == 0.0 { chord_m } else { chord_m * half_turn / half_turn.sin() };
+            let chord_m = maths::hypot(ahead_m, left_m);
+            let half_turn = maths::atan2(left_m, ahead_m);
+            let travel_m = if half_turn == 0.0 { chord_m } else { chord_m * half_turn / maths::sin(half_turn) };
             let end = crate::geometry::Pose::default().advanced_along_arc(curvature, travel_m);
             assert!(end.position().distance(glam::Vec2::new(ahead_m, left_m)) < 1e-3);
         }

@@ -4,6 +4,7 @@
 //! beside straight edges, within 3 cm beside corners, and up to 5 cm too small half-way between two things.
 
 use crate::geometry::{Vec2, edges};
+use crate::maths;
 use crate::vectors::{FourPoints, LANES, bounded, coordinate, counted_from, f32x4, indices, whole_and_part};
 use std::ops::Range;
 
@@ -21,7 +22,7 @@ pub const CAP_M: f32 = 3.0;
 #[must_use]
 pub fn change_max_m(radius_m: f32) -> f32 {
     let to_node_m = std::f32::consts::FRAC_1_SQRT_2 * NODE_M;
-    (radius_m + to_node_m).hypot(std::f32::consts::FRAC_1_SQRT_2 * NODE_M) + ROUNDING_M
+    maths::hypot(radius_m + to_node_m, std::f32::consts::FRAC_1_SQRT_2 * NODE_M) + ROUNDING_M
 }
 
 /// How much [`DistanceField::at`] may differ between two places that are `apart_m` apart, metres.
@@ -455,7 +456,7 @@ mod tests {
             let corner = |i: usize| {
                 let radius_m = if i.is_multiple_of(2) { 9.0 } else { 6.3 };
                 Vec2::new(14.0, 13.0)
-                    + radius_m * Vec2::from_angle(turned_rad + i as f32 * std::f32::consts::PI / arms as f32)
+                    + radius_m * maths::unit(turned_rad + i as f32 * std::f32::consts::PI / arms as f32)
             };
             (0..2 * arms).map(corner).collect()
         };

@@ -7,6 +7,7 @@
 //!
 //! Transforms are named `target_from_source`, so that adjacent names match when they are chained.
 
+use crate::maths;
 use crate::vectors::{FourPoints, LANES, f32x4, highest, lowest};
 pub use glam::Vec2;
 use serde::{Deserialize, Serialize};
@@ -36,12 +37,12 @@ impl Pose {
 
     /// Unit vector pointing ahead, world frame.
     pub fn ahead(self) -> Vec2 {
-        Vec2::from_angle(self.heading_rad)
+        maths::unit(self.heading_rad)
     }
 
     /// The transform that takes ego coordinates (ahead, left) to world coordinates.
     pub fn world_from_ego(self) -> WorldFromEgo {
-        WorldFromEgo { rotation: Vec2::from_angle(self.heading_rad), translation: self.position() }
+        WorldFromEgo { rotation: maths::unit(self.heading_rad), translation: self.position() }
     }
 
     /// The pose after `travel_m` along an arc of curvature `curvature_per_m` (exact; negative travel drives back).
@@ -52,8 +53,8 @@ impl Pose {
     pub fn advanced_along_arc(self, curvature_per_m: f32, travel_m: f32) -> Self {
         let half_turn = 0.5 * curvature_per_m * travel_m;
         // chord = travel · sin(Δθ/2)/(Δθ/2), along the mean heading.
-        let chord_m = if half_turn.abs() < 1e-4 { travel_m } else { travel_m * half_turn.sin() / half_turn };
-        let direction = Vec2::from_angle(self.heading_rad + half_turn);
+        let chord_m = if half_turn.abs() < 1e-4 { travel_m } else { travel_m * maths::sin(half_turn) / half_turn };
+        let direction = maths::unit(self.heading_rad + half_turn);
         Self::new(self.position() + direction * chord_m, wrap_angle(self.heading_rad + 2.0 * half_turn))
     }
 }
@@ -336,7 +337,7 @@ mod tests {
         let world_from_ego = Pose::new(Vec2::new(-1.5, 2.0), 2.1).world_from_ego();
         for n_corners in 3..=8 {
             let angle_rad = |i: usize| std::f32::consts::TAU * i as f32 / n_corners as f32;
-            let corners = (0..n_corners).map(|i| Vec2::new(3.0, -7.0) + 2.3 * Vec2::from_angle(angle_rad(i)));
+            let corners = (0..n_corners).map(|i| Vec2::new(3.0, -7.0) + 2.3 * maths::unit(angle_rad(i)));
             let in_ego = world_from_ego.inverse_outline(&corners.clone().collect());
             let expected: Vec<Vec2> = corners.map(|corner| world_from_ego.inverse_point(corner)).collect();
             assert_eq!((0..in_ego.n_corners()).map(|i| in_ego.corner(i)).collect::<Vec<_>>(), expected);

@@ -18,6 +18,7 @@ pub mod frame;
 pub mod geometry;
 pub mod limits;
 pub mod map;
+pub mod maths;
 pub mod metrics;
 pub mod path;
 pub mod scenario;

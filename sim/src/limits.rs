@@ -65,6 +65,8 @@ pub const VIEW_REQUEST_BYTES_MAX: u64 = 1_000_000;
 pub const CHANNELS_MAX: usize = 1024;
 /// Units of the fully connected layer.
 pub const HIDDEN_MAX: usize = 65_536;
+/// Components of the mixture that a network answers with.
+pub const MODES_MAX: usize = 8;
 /// Trainable values of a network: 256 MB.
 pub const PARAMETERS_MAX: usize = 64_000_000;
 /// Header of a safetensors or NPY file, bytes.

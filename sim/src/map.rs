@@ -5,6 +5,7 @@
 use crate::collision::CollisionWorld;
 use crate::distance_field::DistanceField;
 use crate::geometry::{Circles, Outline, Pose, Vec2, edges};
+use crate::maths;
 use crate::path::Path;
 use crate::scenario::{KERB_MAX_M, Obstacle, Scenario, ScenarioError};
 use crate::validate::validate;
@@ -52,7 +53,7 @@ impl Occluder {
         let centre = obstacle.centre().position();
         let outline = obstacle.outline();
         let corners = outline.iter().copied().collect();
-        Self { outline, corners, centre, radius_m: 0.5 * length_m.hypot(width_m), height_m }
+        Self { outline, corners, centre, radius_m: 0.5 * maths::hypot(length_m, width_m), height_m }
     }
 
     fn of_wall(from: Vec2, to: Vec2, height_m: f32) -> Self {
@@ -94,7 +95,7 @@ impl Map {
         for obstacle in &scenario.obstacles {
             let [length_m, width_m, _] = obstacle.size_m();
             let centre = obstacle.centre().position();
-            let reach_m = 0.5 * length_m.hypot(width_m);
+            let reach_m = 0.5 * maths::hypot(length_m, width_m);
             // Wholly outside the drivable space: carving it would change nothing a car can reach.
             if distance.at(centre) < -reach_m {
                 continue;

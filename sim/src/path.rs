@@ -1,6 +1,7 @@
 //! The reference path: an arc-length parametrised route of the rear axle. Metrics and resets use it; policies never.
 
 use crate::geometry::{Pose, Vec2, wrap_angle};
+use crate::maths;
 use crate::scenario::ReferencePath;
 
 /// Spacing of the samples, metres. Chords of a 5 m corner deviate from the arc by 0.4 mm.
@@ -103,10 +104,10 @@ fn rounded(points: &[Vec2], radius_m: f32) -> Vec<Piece> {
     let mut cursor = points[0];
     for i in 1..points.len() {
         let direction = (points[i] - points[i - 1]).normalize();
-        let heading_rad = direction.to_angle();
+        let heading_rad = maths::angle_rad(direction);
         let next = points.get(i + 1).map(|&next| next - points[i]);
-        let turn_rad = next.map_or(0.0, |next| wrap_angle(next.to_angle() - heading_rad));
-        let half_tan = (0.5 * turn_rad.abs()).tan();
+        let turn_rad = next.map_or(0.0, |next| wrap_angle(maths::angle_rad(next) - heading_rad));
+        let half_tan = maths::tan(0.5 * turn_rad.abs());
         let room_m = 0.5 * (points[i] - points[i - 1]).length().min(next.map_or(f32::INFINITY, Vec2::length));
         let tangent_m = if next.is_some() { (radius_m * half_tan).min(room_m) } else { 0.0 };
         let line_end = points[i] - direction * tangent_m;

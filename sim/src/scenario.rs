@@ -4,6 +4,7 @@
 //! radians. Unknown keys are refused.
 
 use crate::geometry::{Pose, Vec2};
+use crate::maths;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
@@ -126,11 +127,11 @@ impl Obstacle {
         let [length, width, _] = self.size_m();
         let centre = self.centre();
         if self.class.is_round() {
-            let radius_m = 0.5 * length / (std::f32::consts::PI / 8.0).cos();
+            let radius_m = 0.5 * length / maths::cos(std::f32::consts::PI / 8.0);
             return (0..8)
                 .map(|k| {
                     centre.position()
-                        + radius_m * Vec2::from_angle(centre.heading_rad + k as f32 * std::f32::consts::FRAC_PI_4)
+                        + radius_m * maths::unit(centre.heading_rad + k as f32 * std::f32::consts::FRAC_PI_4)
                 })
                 .collect();
         }

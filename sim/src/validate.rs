@@ -7,6 +7,7 @@ use crate::limits::{
     COORDINATE_MAX_M, ISLANDS_MAX, LOT_EXTENT_MAX_M, NAME_CHARS_MAX, OBSTACLES_MAX, ROUTE_MAX_M, ROUTE_POINTS_MAX,
     SPEED_BUMPS_MAX, VERTICES_MAX,
 };
+use crate::maths;
 use crate::path::Path;
 use crate::scenario::{Island, Obstacle, Place, ReferencePath, Scenario, ScenarioError};
 use crate::vehicle::VehicleSettings;
@@ -324,7 +325,7 @@ fn check_route(scenario: &Scenario, route: &Route) -> Result<(), ScenarioError> 
     }
     for (i, obstacle) in scenario.obstacles.iter().enumerate() {
         let [length_m, width_m, _] = obstacle.size_m();
-        let (centre, reach) = (obstacle.centre().position(), Vec2::splat(0.5 * length_m.hypot(width_m)));
+        let (centre, reach) = (obstacle.centre().position(), Vec2::splat(0.5 * maths::hypot(length_m, width_m)));
         let meets_obstacle = |c: Vec2, d: Vec2| {
             if obstacle.class.is_round() {
                 return distance_to_segment(centre, c, d) < 0.5 * length_m;

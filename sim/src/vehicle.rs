@@ -4,6 +4,7 @@
 //! (docs/methods.md 2.1–2.3).
 
 use crate::geometry::{Pose, Vec2};
+use crate::maths;
 use serde::{Deserialize, Serialize};
 
 /// Dimensions and limits of the vehicle.
@@ -72,7 +73,7 @@ impl VehicleSettings {
 
     /// Tightest curvature at the rear axle, 1/m.
     pub fn curvature_max_per_m(&self) -> f32 {
-        self.steering_max_rad.tan() / self.wheelbase_m
+        maths::tan(self.steering_max_rad) / self.wheelbase_m
     }
 
     /// Corners of the body in the ego frame, counter-clockwise from the front left.
@@ -114,7 +115,7 @@ impl VehicleState {
 
     /// Curvature of the present arc of the rear axle, 1/m, positive to the left.
     pub fn curvature_per_m(&self, settings: &VehicleSettings) -> f32 {
-        self.steering_rad.tan() / settings.wheelbase_m
+        maths::tan(self.steering_rad) / settings.wheelbase_m
     }
 }
 
@@ -159,7 +160,7 @@ fn roll(
         .clamp(state.steering_rad - rate_step, state.steering_rad + rate_step);
     let speed_mps = (state.speed_mps + accel_mps2 * dt_s).max(0.0);
     let travel_m = 0.5 * (state.speed_mps + speed_mps) * dt_s;
-    let curvature_per_m = steering_rad.tan() / settings.wheelbase_m;
+    let curvature_per_m = maths::tan(steering_rad) / settings.wheelbase_m;
     let pose = state.pose.advanced_along_arc(curvature_per_m, travel_m);
     VehicleState { pose, speed_mps, steering_rad, accel_mps2, ..state }
 }

@@ -7,6 +7,7 @@ use sim::episode::{self, Episode, EpisodeSettings};
 use sim::frame::{Ending, Event, Frame};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
+use sim::maths;
 use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, Scenario};
 use sim::seed::RootSeed;
 use sim::sensing::noise::NoiseSettings;
@@ -26,7 +27,7 @@ fn constant_steering_drives_a_circle_of_radius_l_over_tan_delta() {
     let vehicle = VehicleSettings::hyundai_hg300();
     for steering_rad in [0.1_f32, -0.3, 0.6] {
         let start = VehicleState { steering_rad, speed_mps: 1.5, ..VehicleState::at_rest(Pose::default()) };
-        let radius_m = vehicle.wheelbase_m / steering_rad.tan();
+        let radius_m = vehicle.wheelbase_m / maths::tan(steering_rad);
         let mut state = start;
         for _ in 0..2000 {
             state = step(&vehicle, state, VehicleCommand { steering_rad, speed_mps: 1.5 }, 0.01);

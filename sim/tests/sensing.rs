@@ -3,6 +3,7 @@
 
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
+use sim::maths;
 use sim::scenario::{Island, NoiseLevel, Obstacle, ObstacleClass, Scenario, SpeedBump};
 use sim::seed::RootSeed;
 use sim::sensing::noise::{Layer, NoiseSettings};
@@ -58,7 +59,8 @@ fn the_fast_grid_is_the_max_pool_of_the_brute_force_view() {
     ] {
         let mut sensor = sensor(map, level, seed);
         for i in 0..120_u32 {
-            let pose = Pose::new(Vec2::new(i as f32 * 0.5, (i as f32 * 0.37).sin()), (i as f32 * 0.21).sin() * 0.9);
+            let pose =
+                Pose::new(Vec2::new(i as f32 * 0.5, maths::sin(i as f32 * 0.37)), maths::sin(i as f32 * 0.21) * 0.9);
             let tick = 7 * i;
             let fast = sensor.observe(map, pose, tick).grid;
             let brute = sensor.perceived_view(map, pose, tick).to_grid();
@@ -76,7 +78,8 @@ fn the_fast_grid_is_the_max_pool_where_openings_overlap() {
         let noise = NoiseSettings { false_free: 8.0, dropout: 0.0, ..NoiseSettings::of(NoiseLevel::Paper) };
         let mut sensor = Sensor::new(&map, SensingSettings::paper(), &noise, RootSeed(seed));
         for i in 0..120_u32 {
-            let pose = Pose::new(Vec2::new(i as f32 * 0.5, (i as f32 * 0.37).sin()), (i as f32 * 0.21).sin() * 0.9);
+            let pose =
+                Pose::new(Vec2::new(i as f32 * 0.5, maths::sin(i as f32 * 0.37)), maths::sin(i as f32 * 0.21) * 0.9);
             let fast = sensor.observe(&map, pose, i).grid;
             let brute = sensor.perceived_view(&map, pose, i).to_grid();
             assert_eq!(fast, brute, "seed {seed}, tick {i}\n{fast}\n{brute}");
@@ -139,7 +142,8 @@ fn high_walls_hide_what_no_line_of_sight_reaches_and_low_ones_nothing() {
     let geometry = settings.geometry;
     let (mut wrong, mut hidden) = (0, 0);
     for i in 0..40_u32 {
-        let pose = Pose::new(Vec2::new(1.5 * i as f32, 0.3 * (i as f32 * 0.37).sin()), 0.5 * (i as f32 * 0.7).sin());
+        let pose =
+            Pose::new(Vec2::new(1.5 * i as f32, 0.3 * maths::sin(i as f32 * 0.37)), 0.5 * maths::sin(i as f32 * 0.7));
         let camera = pose.position() + pose.ahead() * settings.camera_ahead_m;
         let view = sensor(&map, NoiseLevel::Clean, 0).clean_view(&map, pose);
         let low_view = sensor(&low, NoiseLevel::Clean, 0).clean_view(&low, pose);
@@ -311,7 +315,7 @@ fn an_inspection_explains_every_wrong_pixel_and_cell() {
     let map = lane();
     let mut sensor = Sensor::new(&map, SensingSettings::paper(), &NoiseSettings::of(NoiseLevel::Hard), RootSeed(3));
     for tick in 0..60_u32 {
-        let pose = Pose::new(Vec2::new(0.7 * tick as f32, 0.2), (0.3 * tick as f32).sin() * 0.4);
+        let pose = Pose::new(Vec2::new(0.7 * tick as f32, 0.2), maths::sin(0.3 * tick as f32) * 0.4);
         let shown = sensor.observe(&map, pose, tick);
         let inspection = sensor.inspect(&map, pose, tick, &shown);
         assert_eq!(inspection.shown_grid, shown.grid);

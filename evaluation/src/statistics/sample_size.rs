@@ -59,7 +59,8 @@ impl Question {
     fn hundred_metres_by_square_roots(&self) -> f64 {
         let z = |probability| Normal::standard().inverse_cdf(probability);
         let [a, b] = self.per_100m;
-        (z(1.0 - 0.5 * self.alpha) + z(self.power)).powi(2) / (2.0 * (a.sqrt() - b.sqrt()).powi(2))
+        let (sum, gap) = (z(1.0 - 0.5 * self.alpha) + z(self.power), a.sqrt() - b.sqrt());
+        sum * sum / (2.0 * gap * gap)
     }
 }
 

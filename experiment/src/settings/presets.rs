@@ -55,7 +55,7 @@ fn default() -> Settings {
     let base = with_half_points();
     Settings {
         training: TrainingSettings { lots: lots_of_every_family(1), trials: 8, ..base.training },
-        evaluation: EvaluationSettings { elsewhere: vec!["validation:44:all".to_owned()], ..base.evaluation },
+        evaluation: EvaluationSettings { elsewhere: vec!["validation:48:all".to_owned()], ..base.evaluation },
         dagger: DaggerSettings::quick(),
         ..base
     }
@@ -75,6 +75,7 @@ fn lots_of_every_family(times: u32) -> Vec<String> {
         ("open", 12),
         ("halls", 12),
         ("yards", 10),
+        ("chicanes", 12),
     ];
     let of_family = |(family, count)| format!("train:{}:{family}", times * count);
     std::iter::once("lot-a".to_owned()).chain(generated.map(of_family)).collect()
@@ -92,6 +93,7 @@ fn strong() -> Settings {
                 conv1: ConvLayer { channels: 32, kernel: 5 },
                 conv2: ConvLayer { channels: 64, kernel: 3 },
                 hidden: 512,
+                modes: 1,
                 ..base.dagger.network
             },
             fit: FitSettings { budget: Budget::Steps(20_000), validate_every: 1000, ..base.dagger.fit },
@@ -172,6 +174,7 @@ fn smoke() -> Settings {
                 conv1: ConvLayer { channels: 16, kernel: 3 },
                 conv2: ConvLayer { channels: 16, kernel: 2 },
                 hidden: 64,
+                modes: 1,
                 dropout_features: 0.0,
                 dropout_hidden: 0.1,
             },

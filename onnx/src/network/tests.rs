@@ -55,7 +55,7 @@ fn what_is_exported_answers_as_the_network_itself() {
     let grids = grids(40);
     let grids: Vec<_> = grids.iter().collect();
     for checkpoint in checkpoints() {
-        let network = load("exported", &export(&checkpoint)).unwrap();
+        let network = load("exported", &export(&checkpoint).unwrap()).unwrap();
         assert_eq!(network.about(), Some(&About::new(checkpoint.inference, checkpoint.conditions.clone())));
         let expected = checkpoint.predictor(DeviceChoice::Cpu).predict(&grids);
         let found = network.predict(&grids, checkpoint.inference.mirror_averaging, &pool(1));
@@ -77,7 +77,7 @@ fn what_is_exported_answers_as_the_network_itself() {
 fn an_answer_does_not_depend_on_the_other_grids_or_on_threads() {
     let grids = grids(37);
     let grids: Vec<_> = grids.iter().collect();
-    let network = load("alone", &export(&checkpoints()[0])).unwrap();
+    let network = load("alone", &export(&checkpoints()[0]).unwrap()).unwrap();
     let together = network.raw(&grids, &pool(1));
     assert_eq!(together, network.raw(&grids, &pool(2)));
     for start in [1, 7, 15, 36] {
@@ -87,7 +87,7 @@ fn an_answer_does_not_depend_on_the_other_grids_or_on_threads() {
 
 #[test]
 fn what_is_no_such_network_is_refused_with_what_it_is_instead() {
-    let exported = export(&checkpoints()[1]);
+    let exported = export(&checkpoints()[1]).unwrap();
     // Names and numbers of the same length, so that the file stays well-formed.
     let with = |from: &[u8], to: &[u8]| {
         assert_eq!(from.len(), to.len());
@@ -117,7 +117,7 @@ fn what_is_no_such_network_is_refused_with_what_it_is_instead() {
 /// A file from elsewhere ends in an error or in a network, never in a panic.
 #[test]
 fn a_damaged_file_is_refused_or_answers() {
-    let exported = export(&checkpoints()[1]);
+    let exported = export(&checkpoints()[1]).unwrap();
     // The graph is before and after the tensors; they alone are large.
     let places = (0..600).chain((exported.len() - 1500)..exported.len()).step_by(19);
     for at in places {

@@ -9,6 +9,7 @@ use crate::decision_rule::{CriticTarget, Evidence};
 use crate::fit::{Budget, FitSettings};
 use crate::loss::LossSettings;
 use crate::network::{Ensemble, Prediction};
+use sim::maths;
 use sim::sensing::OccupancyGrid;
 
 /// What a critic's answer warns of.
@@ -66,7 +67,7 @@ fn risks(ticks: &[Tick], discount: f32, control_period_s: f32) -> Vec<f32> {
         if let Some((episode, stop)) = next_stop
             && episode == tick.episode
         {
-            risks[at] = discount.powi((stop - tick.tick) as i32);
+            risks[at] = maths::pow(discount, (stop - tick.tick) as f32);
         }
     }
     risks

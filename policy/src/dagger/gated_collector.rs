@@ -197,7 +197,7 @@ impl Fleet for GatedCollector {
         self.store(seats, &kept);
         for (seat, decision) in seats.iter().zip(&mut decisions[first..]) {
             if let Some(disturbance) = &mut self.seats[seat.episode].disturbance {
-                decision.look_ahead = disturbance.disturb(decision.look_ahead);
+                decision.look_ahead = disturbance.disturb(decision.look_ahead, &seat.situation.truth);
             }
         }
     }

@@ -96,6 +96,7 @@ impl DaggerSettings {
             start: StartFrom::Previous,
             network: NetworkArchitecture::compact(),
             inference: InferenceSettings::smoothed(),
+            disturbance: DisturbanceSettings::aimed(),
             fit: FitSettings::quick(9000),
             cloning_budget: Budget::Steps(7000),
             ..Self::paper()

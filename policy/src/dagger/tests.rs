@@ -81,6 +81,7 @@ fn settings() -> DaggerSettings {
             conv1: ConvLayer { channels: 16, kernel: 3 },
             conv2: ConvLayer { channels: 16, kernel: 2 },
             hidden: 32,
+            modes: 1,
             dropout_features: 0.0,
             dropout_hidden: 0.1,
         },

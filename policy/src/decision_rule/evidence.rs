@@ -2,6 +2,7 @@
 
 use crate::network::Prediction;
 use serde::{Deserialize, Serialize};
+use sim::maths;
 
 /// What the decision rests on.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -21,7 +22,7 @@ impl Evidence {
     pub fn new(predicted: &Prediction, expert: [f32; 2]) -> Self {
         let novice = predicted.clipped_mean();
         let expert = expert.map(|fraction| fraction.clamp(0.0, 1.0));
-        let discrepancy = (novice[0] - expert[0]).hypot(novice[1] - expert[1]);
+        let discrepancy = maths::hypot(novice[0] - expert[0], novice[1] - expert[1]);
         Self { discrepancy, doubt: predicted.sigma, disagreement: 0.0, alarm: 0.0 }
     }
 }

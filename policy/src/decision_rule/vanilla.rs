@@ -4,6 +4,7 @@
 use crate::decision_rule::gate::{Gate, GateTick};
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
+use sim::maths;
 use sim::seed::Rng;
 
 /// Settings of vanilla `DAgger`.
@@ -22,7 +23,7 @@ impl Default for VanillaSettings {
 
 impl VanillaSettings {
     pub(crate) fn gate(self, round: u32, rng: Rng) -> VanillaGate {
-        VanillaGate { beta: self.beta.powi(round as i32), rng }
+        VanillaGate { beta: maths::pow(self.beta, round as f32), rng }
     }
 }
 

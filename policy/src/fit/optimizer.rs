@@ -83,11 +83,12 @@ mod tests {
     use burn::nn::{Linear, LinearConfig};
     use burn::optim::{AdamWConfig, GradientsParams};
     use burn::tensor::TensorData;
+    use sim::maths;
 
     /// Ten steps of a layer towards the same answers; its weights.
     fn stepped(mut optimizer: ModuleOptimizer) -> Vec<f32> {
         let device = Device::flex().autodiff();
-        let values = |n: usize, factor: f32| (0..n).map(|i| (factor * i as f32).sin()).collect::<Vec<f32>>();
+        let values = |n: usize, factor: f32| (0..n).map(|i| maths::sin(factor * i as f32)).collect::<Vec<f32>>();
         let tensor = |rows: usize, columns: usize, factor| {
             Tensor::<2>::from_data(TensorData::new(values(rows * columns, factor), [rows, columns]), &device)
         };

@@ -15,6 +15,7 @@ fn tiny() -> NetworkArchitecture {
         conv1: ConvLayer { channels: 16, kernel: 3 },
         conv2: ConvLayer { channels: 16, kernel: 2 },
         hidden: 40,
+        modes: 1,
         dropout_features: 0.1,
         dropout_hidden: 0.2,
     }

@@ -8,7 +8,7 @@ use crate::fit::settings::{FitSettings, KeepWeights};
 use crate::fit::unfinished::Unfinished;
 use crate::loss::{self, BatchLoss, LossParts, LossSettings};
 use crate::network::{
-    DeviceChoice, DropoutFactors, InferenceSettings, LookAheadNet, OUTPUTS, Predictor, Weights, occupied_tensor,
+    DeviceChoice, DropoutFactors, InferenceSettings, LookAheadNet, Predictor, Weights, occupied_tensor,
 };
 use burn::optim::GradientsParams;
 use burn::tensor::{Bytes, Device, Tensor, TensorData};
@@ -216,15 +216,18 @@ fn batch_loss(settings: &LossSettings, outputs: Tensor<2>, samples: &[Sample], d
 /// Compares the answers to samples with their labels.
 pub fn evaluate(weights: &Weights, samples: &[Sample], loss: &LossSettings, context: FitContext) -> Validation {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
-    let outputs = Predictor::new(weights, context.inference, context.device).raw(&grids);
-    let squared_error: f64 = outputs
+    let mut predictor = Predictor::new(weights, context.inference, context.device);
+    let answers = predictor.raw(&grids);
+    let outputs = predictor.for_loss(&grids, &answers);
+    let squared_error: f64 = answers
         .iter()
         .zip(samples)
-        .flat_map(|(raw, sample)| (0..2).map(|axis| f64::from(sample.label[axis] - raw[axis]).powi(2)))
+        .flat_map(|(raw, sample)| (0..2).map(|axis| f64::from(sample.label[axis] - raw[axis])))
+        .map(|error| error * error)
         .sum();
     let device = DeviceChoice::Cpu.device();
     let mean_loss = |settings: &LossSettings| {
-        let raw = TensorData::new(outputs.as_flattened().to_vec(), [samples.len(), OUTPUTS]);
+        let raw = TensorData::new(outputs.clone(), [samples.len(), weights.architecture().outputs()]);
         let loss = batch_loss(settings, Tensor::from_data(raw, &device), samples, &device);
         let values: Vec<f32> = (loss.misfit + loss.log_variance).into_data().try_into_vec().expect("losses are f32");
         let sum: f64 = values.iter().map(|value| f64::from(*value)).sum();

@@ -2,14 +2,14 @@
 
 use crate::network::error::NetworkError;
 use serde::{Deserialize, Serialize};
-use sim::limits::{CHANNELS_MAX, HIDDEN_MAX, PARAMETERS_MAX};
+use sim::limits::{CHANNELS_MAX, HIDDEN_MAX, MODES_MAX, PARAMETERS_MAX};
 use sim::sensing::GRID_CELLS;
 
 /// Cells per side after the first and after the second max-pool of 2: 25 → 12 → 6.
 pub const POOLED_1: usize = GRID_CELLS / 2;
 /// See [`POOLED_1`].
 pub const POOLED_2: usize = POOLED_1 / 2;
-/// Values the network answers: means of u and w, then the raw log-variances of both.
+/// Values of one answer: means of u and w, then the raw log-variances of both.
 pub const OUTPUTS: usize = 4;
 
 /// Channels are computed in groups of this many.
@@ -42,6 +42,8 @@ pub struct NetworkArchitecture {
     pub conv2: ConvLayer,
     /// Units of the fully connected layer.
     pub hidden: usize,
+    /// Answers that are weighed against each other, 1 to 8: the components of a mixture of Gaussians. 1 = one Gaussian.
+    pub modes: usize,
     /// Dropout after the second pool, 0…1; applied in steps of 1/256.
     pub dropout_features: f32,
     /// Dropout after the fully connected layer, 0…1; applied in steps of 1/256.
@@ -55,6 +57,7 @@ impl NetworkArchitecture {
             conv1: ConvLayer { channels: 32, kernel: 5 },
             conv2: ConvLayer { channels: 64, kernel: 2 },
             hidden: 1000,
+            modes: 1,
             dropout_features: 0.25,
             dropout_hidden: 0.5,
         }
@@ -68,6 +71,7 @@ impl NetworkArchitecture {
             conv1: ConvLayer { channels: 16, kernel: 3 },
             conv2: ConvLayer { channels: 32, kernel: 3 },
             hidden: 256,
+            modes: 1,
             dropout_features: 0.0,
             dropout_hidden: 0.2,
         }
@@ -76,6 +80,14 @@ impl NetworkArchitecture {
     /// Inputs of the fully connected layer.
     pub fn features(&self) -> usize {
         POOLED_2 * POOLED_2 * self.conv2.channels
+    }
+
+    /// Values that leave the network: one answer per mode, then, if there are several, the logit of each.
+    pub fn outputs(&self) -> usize {
+        match self.modes {
+            1 => OUTPUTS,
+            modes => modes * (OUTPUTS + 1),
+        }
     }
 
     /// Number of trainable values.
@@ -93,8 +105,8 @@ impl NetworkArchitecture {
             conv2.channels,
             self.features() * hidden,
             hidden,
-            hidden * OUTPUTS,
-            OUTPUTS,
+            hidden * self.outputs(),
+            self.outputs(),
         ]
     }
 
@@ -120,6 +132,9 @@ impl NetworkArchitecture {
         }
         if self.hidden > HIDDEN_MAX {
             return Err(NetworkError::TooLarge { what: format!("{} hidden units", self.hidden), max: HIDDEN_MAX });
+        }
+        if !(1..=MODES_MAX).contains(&self.modes) {
+            return Err(NetworkError::Modes { modes: self.modes, max: MODES_MAX });
         }
         let parameters = self.parameter_count();
         if parameters > PARAMETERS_MAX {

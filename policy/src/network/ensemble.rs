@@ -42,11 +42,15 @@ impl Ensemble {
     }
 }
 
+fn squared(value: f32) -> f32 {
+    value * value
+}
+
 /// Root mean square distance of the members' means from `mean`.
 fn spread(mean: [f32; 2], members: impl Iterator<Item = Prediction> + Clone) -> f32 {
     let count = members.clone().count() as f32;
-    let squared = |answer: Prediction| (answer.mean[0] - mean[0]).powi(2) + (answer.mean[1] - mean[1]).powi(2);
-    (members.map(squared).sum::<f32>() / count).sqrt()
+    let apart = |answer: Prediction| squared(answer.mean[0] - mean[0]) + squared(answer.mean[1] - mean[1]);
+    (members.map(apart).sum::<f32>() / count).sqrt()
 }
 
 /// Mean and standard deviation of a mixture with equal weights.
@@ -55,7 +59,7 @@ fn mixture<I: Iterator<Item = Prediction>>(first: Prediction, others: impl Fn() 
     let count = members().count() as f32;
     let mean: [f32; 2] = std::array::from_fn(|axis| members().map(|answer| answer.mean[axis]).sum::<f32>() / count);
     let sigma = std::array::from_fn(|axis| {
-        let spread_sq = |answer: Prediction| answer.sigma[axis].powi(2) + (answer.mean[axis] - mean[axis]).powi(2);
+        let spread_sq = |answer: Prediction| squared(answer.sigma[axis]) + squared(answer.mean[axis] - mean[axis]);
         (members().map(spread_sq).sum::<f32>() / count).sqrt()
     });
     Prediction { mean, sigma }
@@ -66,6 +70,7 @@ mod tests {
     use super::*;
     use crate::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Weights};
     use crate::test_data::lots;
+    use sim::maths;
     use sim::seed::RootSeed;
 
     fn member(index: u64) -> Predictor {
@@ -90,7 +95,7 @@ mod tests {
             for axis in 0..2 {
                 assert!((both.mean[axis] - 0.5 * (one.mean[axis] + two.mean[axis])).abs() < 1e-6);
                 let half_gap = 0.5 * (one.mean[axis] - two.mean[axis]);
-                let variance = 0.5 * (one.sigma[axis].powi(2) + two.sigma[axis].powi(2)) + half_gap * half_gap;
+                let variance = 0.5 * (squared(one.sigma[axis]) + squared(two.sigma[axis])) + half_gap * half_gap;
                 assert!((both.sigma[axis] - variance.sqrt()).abs() < 1e-6 * variance.sqrt().max(1.0));
             }
         }
@@ -100,6 +105,6 @@ mod tests {
         assert!((spread([0.5; 2], members.into_iter()) - 0.02f32.sqrt()).abs() < 1e-6);
         let narrow = |mean| Prediction { mean: [mean; 2], sigma: [0.01; 2] };
         let apart = mixture(narrow(0.4), || std::iter::once(narrow(0.6)));
-        assert!((apart.sigma[0] - 0.1f32.hypot(0.01)).abs() < 1e-6 && (apart.mean[0] - 0.5).abs() < 1e-6);
+        assert!((apart.sigma[0] - maths::hypot(0.1, 0.01)).abs() < 1e-6 && (apart.mean[0] - 0.5).abs() < 1e-6);
     }
 }

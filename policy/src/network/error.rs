@@ -24,6 +24,14 @@ pub enum NetworkError {
     /// A fully connected layer without units.
     #[error("the fully connected layer needs at least one unit")]
     NoHiddenUnits,
+    /// No mode or too many.
+    #[error("the network cannot answer with {modes} modes; 1 to {max} are possible")]
+    Modes {
+        /// How many there would be.
+        modes: usize,
+        /// What is possible.
+        max: usize,
+    },
     /// More than the arithmetic has room for.
     #[error("the network would have {what}; at most {max} are possible")]
     TooLarge {

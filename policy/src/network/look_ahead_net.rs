@@ -1,6 +1,6 @@
 //! The network as a module of burn.
 
-use crate::network::architecture::{ConvLayer, NetworkArchitecture, OUTPUTS};
+use crate::network::architecture::{ConvLayer, NetworkArchitecture};
 use crate::network::dropout::DropoutFactors;
 use crate::network::operations::{dense, encode};
 use crate::network::weights::Weights;
@@ -44,12 +44,13 @@ impl LookAheadNet {
             conv1: conv(0, 1, architecture.conv1, parts.conv1_weight, parts.conv1_bias),
             conv2: conv(2, architecture.conv1.channels, architecture.conv2, parts.conv2_weight, parts.conv2_bias),
             fc1: linear(4, architecture.features(), architecture.hidden, parts.fc1_weight, parts.fc1_bias),
-            fc2: linear(6, architecture.hidden, OUTPUTS, parts.fc2_weight, parts.fc2_bias),
+            fc2: linear(6, architecture.hidden, architecture.outputs(), parts.fc2_weight, parts.fc2_bias),
         }
     }
 
     /// Occupied cells `[batch, 25, 25]` to raw outputs `[batch, 4]`: means of u and w, then both raw log-variances,
-    /// before [`soft_clamp_log_variance`](crate::network::soft_clamp_log_variance).
+    /// before [`soft_clamp_log_variance`](crate::network::soft_clamp_log_variance). With m modes `[batch, 5 m]`: these four
+    /// of every mode, then their logits.
     pub fn forward(&self, occupied: Tensor<3, Bool>, dropout: Option<DropoutFactors>) -> Tensor<2> {
         let (on_features, on_hidden) = dropout.map(|factors| (factors.features, factors.hidden)).unzip();
         let features = encode(

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | [`encode`]: both convolutions with pools and `ReLU`s | table look-up, sparse backward pass | a fraction of the speed |
 //! | [`dense`]: x · weight + bias | one chain of multiply-adds per output | its sums depend on the machine's caches |
+//! | [`tanh`], [`exp`] | one value after the other | they are the platform's, which rounds as it likes |
 //! | [`adam_step`]: Adam and the clipping of its gradient | two passes over the values | a dozen, and denormal numbers |
 //!
 //! They are registered through burn's backend extension (the burn book, chapter "Backend Extension"). On every other
@@ -47,6 +48,16 @@ pub fn encode(
 pub fn dense(x: Tensor<2>, weight: Tensor<2>, bias: Tensor<1>) -> Tensor<2> {
     let (x, weight, bias) = (x.into_dispatch(), weight.into_dispatch(), bias.into_dispatch());
     Tensor::from_dispatch(<Dispatch as NetworkOps>::dense(x, weight, bias))
+}
+
+/// Hyperbolic tangent of every value.
+pub fn tanh(x: Tensor<2>) -> Tensor<2> {
+    Tensor::from_dispatch(<Dispatch as NetworkOps>::tanh(x.into_dispatch()))
+}
+
+/// e to the power of every value.
+pub fn exp(x: Tensor<2>) -> Tensor<2> {
+    Tensor::from_dispatch(<Dispatch as NetworkOps>::exp(x.into_dispatch()))
 }
 
 /// One step of Adam for one parameter: weights, running mean of the gradient and of its square, each of one shape.

@@ -8,6 +8,7 @@ use crate::network::look_ahead_net::{LookAheadNet, occupied_tensor};
 use crate::network::weights::Weights;
 use burn::tensor::Device;
 use sim::driver::{LookAheadPoint, Spread};
+use sim::maths;
 use sim::sensing::{GridGeometry, OccupancyGrid};
 
 /// What the network answers to one grid, in image fractions.
@@ -26,7 +27,7 @@ impl Prediction {
     /// If the network answered with something that is not a number.
     pub fn from_raw(raw: [f32; OUTPUTS]) -> Self {
         assert!(raw.iter().all(|value| value.is_finite()), "the network answered {raw:?}");
-        let sigma = |raw| (0.5 * soft_clamp_log_variance(raw)).exp();
+        let sigma = |raw| maths::exp(0.5 * soft_clamp_log_variance(raw));
         Self { mean: [raw[0], raw[1]], sigma: [sigma(raw[2]), sigma(raw[3])] }
     }
 
@@ -56,6 +57,7 @@ const GPU_ROWS: usize = 64;
 #[derive(Debug, Clone)]
 pub struct Predictor {
     mirror_averaging: bool,
+    modes: usize,
     net: LookAheadNet,
     choice: DeviceChoice,
     device: Device,
@@ -66,7 +68,7 @@ impl Predictor {
     pub fn new(weights: &Weights, inference: InferenceSettings, choice: DeviceChoice) -> Self {
         let device = choice.device();
         let net = LookAheadNet::from_weights(weights, &device);
-        Self { mirror_averaging: inference.mirror_averaging, net, choice, device }
+        Self { mirror_averaging: inference.mirror_averaging, modes: weights.architecture().modes, net, choice, device }
     }
 
     /// Answers every grid, in order.
@@ -74,27 +76,44 @@ impl Predictor {
         self.raw(grids).into_iter().map(Prediction::from_raw).collect()
     }
 
-    /// Raw outputs per grid: means of u and w, raw log-variances of both.
+    /// One answer per grid: means of u and w, raw log-variances of both. Of several modes, the one that is likeliest.
     pub fn raw(&mut self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
+        let width = self.width();
         if !self.mirror_averaging {
-            return self.one_sided(grids.iter().copied(), grids.len());
+            let outputs = self.outputs(grids.iter().copied(), grids.len());
+            return outputs.chunks_exact(width).map(|row| likeliest(modes(row, self.modes)).raw).collect();
         }
         // The images in the same call: two small calls cost more than one of twice the size.
         let images: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
-        let mut outputs = self.one_sided(grids.iter().copied().chain(&images), 2 * grids.len());
-        let of_images = outputs.split_off(grids.len());
-        for (output, [u, w, raw_u, raw_w]) in outputs.iter_mut().zip(of_images) {
-            let image = [1.0 - u, w, raw_u, raw_w];
-            *output = std::array::from_fn(|i| 0.5 * (output[i] + image[i]));
-        }
-        outputs
+        let outputs = self.outputs(grids.iter().copied().chain(&images), 2 * grids.len());
+        let (of_grids, of_images) = outputs.split_at(grids.len() * width);
+        let rows = of_grids.chunks_exact(width).zip(of_images.chunks_exact(width));
+        rows.map(|(of_grid, of_image)| {
+            averaged(modes(of_grid, self.modes), modes(of_image, self.modes).map(|mode| mode.mirrored()))
+        })
+        .collect()
     }
 
-    /// The outputs of the network itself.
-    fn one_sided<'a>(&self, mut grids: impl Iterator<Item = &'a OccupancyGrid>, count: usize) -> Vec<[f32; OUTPUTS]> {
-        let mut outputs = Vec::with_capacity(count);
-        while outputs.len() < count {
-            let left = count - outputs.len();
+    /// Values that leave the network for one grid.
+    fn width(&self) -> usize {
+        if self.modes == 1 { OUTPUTS } else { self.modes * (OUTPUTS + 1) }
+    }
+
+    /// What the loss of grids is computed from, `[grids, width]`: of one Gaussian its answers, else all modes as they leave the
+    /// network.
+    pub(crate) fn for_loss(&self, grids: &[&OccupancyGrid], answers: &[[f32; OUTPUTS]]) -> Vec<f32> {
+        match self.modes {
+            1 => answers.as_flattened().to_vec(),
+            _ => self.outputs(grids.iter().copied(), grids.len()),
+        }
+    }
+
+    /// The outputs of the network itself, one row per grid.
+    fn outputs<'a>(&self, mut grids: impl Iterator<Item = &'a OccupancyGrid>, count: usize) -> Vec<f32> {
+        let width = self.width();
+        let mut outputs = Vec::with_capacity(count * width);
+        while outputs.len() < count * width {
+            let left = count - outputs.len() / width;
             let (taken, rows) = match self.choice {
                 DeviceChoice::Cpu => (left.min(ROWS_MAX), left.min(ROWS_MAX)),
                 #[cfg(any(feature = "cuda", feature = "vulkan", feature = "wgpu"))]
@@ -102,10 +121,62 @@ impl Predictor {
             };
             let occupied = occupied_tensor(grids.by_ref().take(taken), rows, &self.device);
             let answers: Vec<f32> = self.net.forward(occupied, None).into_data().try_into_vec().expect("f32");
-            outputs.extend_from_slice(&answers.as_chunks::<OUTPUTS>().0[..taken]);
+            outputs.extend_from_slice(&answers[..taken * width]);
         }
         outputs
     }
+}
+
+/// One answer among several.
+#[derive(Debug, Clone, Copy)]
+struct Mode {
+    raw: [f32; OUTPUTS],
+    /// Larger is likelier; comparable between a grid and its mirror image.
+    log_weight: f32,
+}
+
+impl Mode {
+    fn mirrored(&self) -> Self {
+        let [u, w, raw_u, raw_w] = self.raw;
+        Self { raw: [1.0 - u, w, raw_u, raw_w], ..*self }
+    }
+}
+
+/// The modes of one row of outputs.
+fn modes(row: &[f32], count: usize) -> impl Iterator<Item = Mode> + Clone {
+    let (raws, logits) = row.split_at(count * OUTPUTS);
+    let highest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let log_sum = maths::ln(logits.iter().map(|logit| maths::exp(logit - highest)).sum());
+    let log_weight = move |mode: usize| logits.get(mode).map_or(0.0, |logit| logit - highest - log_sum);
+    let raws = raws.as_chunks::<OUTPUTS>().0.iter();
+    raws.enumerate().map(move |(mode, &raw)| Mode { raw, log_weight: log_weight(mode) })
+}
+
+fn likeliest(modes: impl Iterator<Item = Mode>) -> Mode {
+    modes.max_by(|a, b| a.log_weight.total_cmp(&b.log_weight)).expect("at least one mode")
+}
+
+/// The mean of the likeliest mode of a grid or of its mirror image, whichever is likelier, and the other's that is nearest
+/// to it.
+fn averaged(
+    of_grid: impl Iterator<Item = Mode> + Clone,
+    of_image: impl Iterator<Item = Mode> + Clone,
+) -> [f32; OUTPUTS] {
+    let (one, other) = (likeliest(of_grid.clone()), likeliest(of_image.clone()));
+    if one.log_weight >= other.log_weight {
+        mean(one, nearest(one, of_image))
+    } else {
+        mean(other, nearest(other, of_grid))
+    }
+}
+
+fn nearest(to: Mode, modes: impl Iterator<Item = Mode>) -> Mode {
+    let apart = |mode: &Mode| maths::hypot(mode.raw[0] - to.raw[0], mode.raw[1] - to.raw[1]);
+    modes.min_by(|a, b| apart(a).total_cmp(&apart(b))).expect("at least one mode")
+}
+
+fn mean(one: Mode, other: Mode) -> [f32; OUTPUTS] {
+    std::array::from_fn(|i| 0.5 * (one.raw[i] + other.raw[i]))
 }
 
 #[cfg(test)]
@@ -122,6 +193,7 @@ mod tests {
         for (architecture, inference) in [
             (NetworkArchitecture::paper(), InferenceSettings::plain()),
             (NetworkArchitecture::compact(), InferenceSettings::smoothed()),
+            (NetworkArchitecture { modes: 3, ..NetworkArchitecture::compact() }, InferenceSettings::smoothed()),
         ] {
             let weights = Weights::init(architecture, RootSeed(1), 0);
             let mut predictor = Predictor::new(&weights, inference, DeviceChoice::Cpu);
@@ -142,14 +214,29 @@ mod tests {
     fn mirror_averaging_answers_mirror_images_alike() {
         let grids = lots(20);
         let mirrored: Vec<OccupancyGrid> = grids.iter().map(OccupancyGrid::mirrored).collect();
-        let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
-        let mut predictor = Predictor::new(&weights, InferenceSettings::smoothed(), DeviceChoice::Cpu);
-        let answers = predictor.predict(&grids.iter().collect::<Vec<_>>());
-        let images = predictor.predict(&mirrored.iter().collect::<Vec<_>>());
-        for (answer, image) in answers.iter().zip(&images) {
-            assert!((answer.mean[0] - (1.0 - image.mean[0])).abs() < 1e-6, "{answer:?} {image:?}");
-            assert_eq!((answer.mean[1], answer.sigma), (image.mean[1], image.sigma));
+        for modes in [1, 2] {
+            let architecture = NetworkArchitecture { modes, ..NetworkArchitecture::compact() };
+            let weights = Weights::init(architecture, RootSeed(1), 0);
+            let mut predictor = Predictor::new(&weights, InferenceSettings::smoothed(), DeviceChoice::Cpu);
+            let answers = predictor.predict(&grids.iter().collect::<Vec<_>>());
+            let images = predictor.predict(&mirrored.iter().collect::<Vec<_>>());
+            for (answer, image) in answers.iter().zip(&images) {
+                assert!((answer.mean[0] - (1.0 - image.mean[0])).abs() < 1e-6, "{answer:?} {image:?}");
+                assert_eq!((answer.mean[1], answer.sigma), (image.mean[1], image.sigma));
+            }
         }
+    }
+
+    /// Two ways past a tree: the answer is one of them, not their mean.
+    #[test]
+    fn of_several_modes_the_likeliest_drives() {
+        let [left, right] = [[0.3, 0.4, -3.0, -3.0], [0.7, 0.4, -3.0, -3.0]];
+        let row: Vec<f32> = left.into_iter().chain(right).chain([0.2, 0.1]).collect();
+        assert_eq!(likeliest(modes(&row, 2)).raw, left);
+        // Its mirror image prefers the same side, so both agree on one.
+        let image: Vec<f32> = left.into_iter().chain(right).chain([0.1, 0.5]).collect();
+        let answer = averaged(modes(&row, 2), modes(&image, 2).map(|mode| mode.mirrored()));
+        assert!((answer[0] - 0.3).abs() < 1e-6, "{answer:?}");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The weights of a network on the host: one flat vector, cut into eight named parts.
 
-use crate::network::architecture::NetworkArchitecture;
+use crate::network::architecture::{NetworkArchitecture, OUTPUTS};
 use crate::network::log_variance::soft_clamp_inverse;
 use sim::seed::{RootSeed, Stream};
 
@@ -18,7 +18,7 @@ pub struct Weights {
 /// | `conv1_weight` | `[conv1, 1, kernel, kernel]` |
 /// | `conv2_weight` | `[conv2, conv1, kernel, kernel]` |
 /// | `fc1_weight` | `[6·6·conv2, hidden]`; inputs are ordered row, column, channel |
-/// | `fc2_weight` | `[hidden, 4]`; outputs are u, w, raw log-variance of u, of w |
+/// | `fc2_weight` | `[hidden, outputs]`; outputs are u, w, raw log-variance of u, of w, and the same and logits for each of several modes |
 #[derive(Debug)]
 #[expect(missing_docs, reason = "the table above says it once")]
 pub struct Parts<T> {
@@ -51,6 +51,8 @@ impl<T> Parts<T> {
 const LAST_LAYER_STD: f32 = 0.01;
 /// First answer for (u, w): straight ahead, a little beyond the middle of the patch.
 const INITIAL_MEAN: [f32; 2] = [0.5, 0.4];
+/// Between the first answers of neighbouring modes, in u.
+const INITIAL_APART: f32 = 0.1;
 /// First answer for log σ: σ = 0.15 image fractions, 1.8 m.
 const INITIAL_LOG_SIGMA: f32 = -1.9;
 
@@ -72,7 +74,12 @@ impl Weights {
         normal.fill(parts.fc1_weight, he_std(architecture.features()));
         normal.fill(parts.fc2_weight, LAST_LAYER_STD);
         let raw_log_variance = soft_clamp_inverse(2.0 * INITIAL_LOG_SIGMA);
-        parts.fc2_bias.copy_from_slice(&[INITIAL_MEAN[0], INITIAL_MEAN[1], raw_log_variance, raw_log_variance]);
+        for mode in 0..architecture.modes {
+            // Side by side, so that modes have something to divide between them.
+            let aside = (mode as f32 - 0.5 * (architecture.modes - 1) as f32) * INITIAL_APART;
+            let first = [INITIAL_MEAN[0] + aside, INITIAL_MEAN[1], raw_log_variance, raw_log_variance];
+            parts.fc2_bias[mode * OUTPUTS..][..OUTPUTS].copy_from_slice(&first);
+        }
         weights
     }
 
@@ -143,8 +150,8 @@ impl Normal {
             return spare;
         }
         // 1 − x lies in (0, 1]: its logarithm is finite.
-        let radius = (-2.0 * (1.0 - self.rng.random::<f64>()).ln()).sqrt();
-        let (sin, cos) = (std::f64::consts::TAU * self.rng.random::<f64>()).sin_cos();
+        let radius = (-2.0 * libm::log(1.0 - self.rng.random::<f64>())).sqrt();
+        let (sin, cos) = libm::sincos(std::f64::consts::TAU * self.rng.random::<f64>());
         self.spare = Some((radius * sin) as f32);
         (radius * cos) as f32
     }

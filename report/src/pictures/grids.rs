@@ -5,6 +5,7 @@ use super::lot::{INK, LegendEntry};
 use super::trajectories::rgb;
 use sim::driver::{LookAheadPoint, Spread};
 use sim::geometry::Vec2;
+use sim::maths;
 use sim::sensing::noise::Layer;
 use sim::sensing::{BEV_PIXELS, GRID_CELLS, GridGeometry, Inspection, OccupancyGrid};
 
@@ -103,7 +104,7 @@ pub fn draw_prediction(drawing: &mut Drawing, point: LookAheadPoint, spread: Opt
     if let Some(spread) = spread {
         for k in [1.0, 2.0] {
             let radii = k * px_per_m * Vec2::new(spread.left_m, spread.ahead_m);
-            let corner = |i: u8| at + radii * Vec2::from_angle(f32::from(i) / 36.0 * std::f32::consts::TAU);
+            let corner = |i: u8| at + radii * maths::unit(f32::from(i) / 36.0 * std::f32::consts::TAU);
             drawing.outline((0..36).map(corner).collect(), PREDICTION, 1.5);
         }
     }

@@ -7,6 +7,7 @@ use policy::dataset::Sample;
 use policy::network::Prediction;
 use sim::driver::LookAheadPoint;
 use sim::geometry::Vec2;
+use sim::maths;
 use sim::sensing::{GRID_CELLS, GridGeometry};
 
 const CELL_PX: f32 = 9.0;
@@ -43,7 +44,7 @@ pub fn picture(
         sheet.text(format!("#{index}  tau {:.2}", sample.tau_hat), below, FONT, INK);
         if let Some(prediction) = prediction {
             let answer = prediction.look_ahead(*geometry);
-            let off_m = (answer.ahead_m - label.ahead_m).hypot(answer.left_m - label.left_m);
+            let off_m = maths::hypot(answer.ahead_m - label.ahead_m, answer.left_m - label.left_m);
             sheet.text(format!("off by {off_m:.2} m"), below + Vec2::new(0.0, FONT.height_px()), FONT, INK);
         }
     }

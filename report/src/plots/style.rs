@@ -230,7 +230,7 @@ pub(super) fn line(chart: &mut Chart<'_, '_>, points: Vec<(f64, f64)>, colour: R
 pub(super) fn dashes(chart: &mut Chart<'_, '_>, from: (f64, f64), to: (f64, f64), colour: RGBColor) -> Drawn {
     let pixel = |at: &(f64, f64)| chart.plotting_area().map_coordinate(at);
     let ((x0, y0), (x1, y1)) = (pixel(&from), pixel(&to));
-    let dashes = (f64::from(x1 - x0).hypot(f64::from(y1 - y0)) / DASH_PX).ceil().max(1.0);
+    let dashes = (libm::hypot(f64::from(x1 - x0), f64::from(y1 - y0)) / DASH_PX).ceil().max(1.0);
     let at = |share: f64| (from.0 + share * (to.0 - from.0), from.1 + share * (to.1 - from.1));
     let dash = |i: u32| {
         let share = f64::from(i) / dashes;
@@ -305,7 +305,7 @@ pub(super) fn round_up(value: f64) -> f64 {
     if value <= 0.0 {
         return 1.0;
     }
-    let power = 10.0_f64.powf(value.log10().floor());
+    let power = libm::pow(10.0, libm::log10(value).floor());
     let steps = [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0];
     power * steps.into_iter().find(|step| step * power >= value * (1.0 - 1e-9)).unwrap_or(10.0)
 }

@@ -47,12 +47,12 @@ fn ratios() -> Vec<Distribution> {
 
 fn rounds() -> Vec<LearningCurve> {
     let round = |name: &str, steps: u32, floor: f64| LearningCurve {
-        validation_rmse_m: (1..=steps / 250).map(|k| (250 * k, 0.3 + (-f64::from(k) / 3.0).exp())).collect(),
+        validation_rmse_m: (1..=steps / 250).map(|k| (250 * k, 0.3 + libm::exp(-f64::from(k) / 3.0))).collect(),
         name: name.to_owned(),
         training: (1..=steps)
-            .map(|s| (s, floor + 3.0 * (-f64::from(s) / 300.0).exp() + 0.1 * f64::from(s * 7919 % 13) / 13.0))
+            .map(|s| (s, floor + 3.0 * libm::exp(-f64::from(s) / 300.0) + 0.1 * f64::from(s * 7919 % 13) / 13.0))
             .collect(),
-        validation: (1..=steps / 250).map(|k| (250 * k, floor + 0.2 + 2.0 * (-f64::from(k) / 2.0).exp())).collect(),
+        validation: (1..=steps / 250).map(|k| (250 * k, floor + 0.2 + 2.0 * libm::exp(-f64::from(k) / 2.0))).collect(),
     };
     vec![round("BC", 7000, -4.1), round("i = 1", 4000, -3.6), round("i = 2", 4000, -3.4)]
 }

@@ -4,6 +4,7 @@
 
 mod drawing;
 mod first_twelve;
+mod last_eight;
 mod later_nine;
 
 use drawing::Drawing;
@@ -24,7 +25,7 @@ fn main() {
 }
 
 fn drawings() -> Vec<Drawing> {
-    first_twelve::drawings().into_iter().chain(later_nine::drawings()).collect()
+    first_twelve::drawings().into_iter().chain(later_nine::drawings()).chain(last_eight::drawings()).collect()
 }
 
 #[cfg(test)]

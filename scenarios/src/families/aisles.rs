@@ -10,6 +10,7 @@ use crate::clutter::draw_car;
 use crate::corridor::{STALL_DEPTH_M, Side};
 use rand::RngExt as _;
 use sim::geometry::Vec2;
+use sim::maths;
 use sim::scenario::{ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::ops::Range;
@@ -148,7 +149,7 @@ fn park_across(things: &mut Things<'_>, mouth: &Mouth, stall_m: f32, occupancy: 
     let stalls = (mouth.a.distance(mouth.b) / stall_m).floor().max(1.0);
     for k in 0..stalls as usize {
         let class = draw_car(rng);
-        let into_rad = mouth.outward().to_angle();
+        let into_rad = maths::angle_rad(mouth.outward());
         let (class, depth_m, heading_rad) = if rng.random_bool(occupancy) {
             let depth_m = rng.random_range(0.1..0.4) + 0.5 * class.default_size_m()[0];
             (class, depth_m, into_rad + yaw_rad(rng, 3.0) + facing(rng))

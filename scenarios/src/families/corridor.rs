@@ -4,6 +4,7 @@ use super::route::smoothest_within;
 use crate::clutter::{self, ClutterPlan, Furniture, LaneEncroachment};
 use crate::corridor::{Blueprint, Branch, Bulge, CornerPlan, Corridor, Leg, LegPlan, Side, WidthStep, to_millimetres};
 use rand::RngExt as _;
+use sim::maths;
 use sim::scenario::{Island, LotNoise, Obstacle, ObstacleClass, ReferencePath, Scenario};
 use sim::seed::Rng;
 use std::ops::Range;
@@ -321,7 +322,7 @@ fn route_around(corridor: &Corridor, encroachments: &[LaneEncroachment]) -> Refe
     for (index, leg) in corridor.legs.iter().enumerate() {
         // A rounded corner takes at most half of the segments beside it.
         let straight_m = |corner: Option<&CornerPlan>| {
-            corner.map_or(0.0, |corner| 2.0 * PATH_RADIUS_M * (0.5 * corner.turn_rad.abs()).tan() + 0.5)
+            corner.map_or(0.0, |corner| 2.0 * PATH_RADIUS_M * maths::tan(0.5 * corner.turn_rad.abs()) + 0.5)
         };
         let from_m = straight_m(index.checked_sub(1).map(|before| &corridor.corners[before]));
         let to_m = leg.length_m - straight_m(corridor.corners.get(index));

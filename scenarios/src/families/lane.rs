@@ -7,6 +7,7 @@ use super::things::{Rules, Things, facing, side, yaw_rad};
 use super::walls::{self, Wall};
 use rand::RngExt as _;
 use sim::geometry::Vec2;
+use sim::maths;
 use sim::scenario::{ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::ops::Range;
@@ -124,7 +125,7 @@ fn tightest_radius_m(width_m: f32) -> f32 {
     const CLEAR_M: f32 = 0.25;
     let fits = |radius_m: f32| {
         let axle_m = radius_m - 0.5 * width_m + CLEAR_M + HALF_M;
-        (axle_m + HALF_M).hypot(NOSE_M) + CLEAR_M <= radius_m + 0.5 * width_m && axle_m > 5.0
+        maths::hypot(axle_m + HALF_M, NOSE_M) + CLEAR_M <= radius_m + 0.5 * width_m && axle_m > 5.0
     };
     let mut radius_m = RADIUS_M.start;
     while !fits(radius_m) && radius_m < RADIUS_M.end {

@@ -5,6 +5,7 @@
 
 use crate::corridor::{Side, bounds, segments_cross, to_millimetres};
 use sim::geometry::{Pose, Vec2, edges, wrap_angle};
+use sim::maths;
 
 /// Radius with which the axis rounds a sharp corner, metres.
 const CORNER_RADIUS_M: f32 = 5.0;
@@ -49,7 +50,7 @@ impl Corner {
 
     /// What the rounding of the axis takes from each of the two pieces, metres.
     fn tangent_m(&self) -> f32 {
-        CORNER_RADIUS_M * (0.5 * self.turn_rad.abs()).tan()
+        CORNER_RADIUS_M * maths::tan(0.5 * self.turn_rad.abs())
     }
 
     /// Where an edge leaves the piece before and where it joins the piece behind, metres from the corner along each.
@@ -58,12 +59,12 @@ impl Corner {
             Some(Stub::Ahead(depth_m)) => (after_half_m + depth_m, before_half_m),
             Some(Stub::Behind(depth_m)) => (-after_half_m, -before_half_m - depth_m),
             None => {
-                let (sin, cos) = self.turn_rad.sin_cos();
+                let (sin, cos) = maths::sin_cos(self.turn_rad);
                 let x_m = side.sign() * (cos * before_half_m - after_half_m) / sin;
                 let along_after_m = x_m * cos + side.sign() * before_half_m * sin;
-                let half_tan = (0.5 * self.turn_rad.abs()).tan();
+                let half_tan = maths::tan(0.5 * self.turn_rad.abs());
                 // Edges that are moved outward by `extra_m` cut off less.
-                let spared_m = extra_m * (half_tan - (0.25 * self.turn_rad.abs()).tan());
+                let spared_m = extra_m * (half_tan - maths::tan(0.25 * self.turn_rad.abs()));
                 let chamfer_m = if side == self.outer_side() { 0.0 } else { (self.chamfer_m - spared_m).max(0.0) };
                 (x_m - chamfer_m, along_after_m + chamfer_m)
             }

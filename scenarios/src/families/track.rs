@@ -8,6 +8,7 @@ use super::walls::{Wall, yard};
 use crate::corridor::Side;
 use rand::RngExt as _;
 use sim::geometry::{Vec2, edges};
+use sim::maths;
 use sim::scenario::{Island, Obstacle, ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::f32::consts::TAU;
@@ -54,7 +55,7 @@ fn ring(width_m: f32, rng: &mut Rng) -> Option<Strip> {
     let mut polygon: Vec<Vec2> = (0..corners)
         .map(|k| {
             let bearing_rad = TAU * (k as f32 + rng.random_range(-0.3..0.3)) / corners as f32;
-            Vec2::from_angle(bearing_rad) * rng.random_range(0.4..1.0) * Vec2::new(1.0, 0.75)
+            maths::unit(bearing_rad) * rng.random_range(0.4..1.0) * Vec2::new(1.0, 0.75)
         })
         .collect();
     let around: f32 = edges(&polygon).map(|(a, b)| a.distance(b)).sum();
@@ -72,8 +73,11 @@ fn ring(width_m: f32, rng: &mut Rng) -> Option<Strip> {
     // Tight ones more often than gentle ones.
     let radius_m = |share: f32| RADIUS_M.start + share * share * (RADIUS_M.end - RADIUS_M.start);
     let radii_m: Vec<f32> = (0..corners).map(|_| radius_m(rng.random())).collect();
-    let tangents_m: Vec<f32> =
-        turns_rad.iter().zip(&radii_m).map(|(turn_rad, radius_m)| radius_m * (0.5 * turn_rad.abs()).tan()).collect();
+    let tangents_m: Vec<f32> = turns_rad
+        .iter()
+        .zip(&radii_m)
+        .map(|(turn_rad, radius_m)| radius_m * maths::tan(0.5 * turn_rad.abs()))
+        .collect();
     let straight_m = |k: usize| side_m(k).length() - tangents_m[k % corners] - tangents_m[(k + corners - 1) % corners];
     if (0..corners).any(|k| straight_m(k) < 1.0) || straight_m(0) < STRAIGHT_MIN_M {
         return None;

@@ -3,6 +3,7 @@
 use crate::corridor::{bounds, to_millimetres};
 use rand::RngExt as _;
 use sim::geometry::{Pose, Vec2, distance_to_segment, edges};
+use sim::maths;
 use sim::scenario::{Obstacle, ObstacleClass};
 use sim::seed::Rng;
 
@@ -52,7 +53,7 @@ impl Wall {
             let along = (b - a).normalize();
             // Outward corners are filled; where the wall bends inward its pieces overlap by themselves.
             let beyond_m = |turn_rad: f32| {
-                if turn_rad > 0.0 { self.thickness_m * (0.5 * turn_rad).tan().min(2.0) + OVERLAP_M } else { 0.0 }
+                if turn_rad > 0.0 { self.thickness_m * maths::tan(0.5 * turn_rad).min(2.0) + OVERLAP_M } else { 0.0 }
             };
             let from_m = -beyond_m((before.1 - before.0).angle_to(b - a));
             let to_m = a.distance(b) + beyond_m((b - a).angle_to(after.1 - after.0));
@@ -76,7 +77,7 @@ impl Wall {
                     length_m: Some(round(along.length() / pieces)),
                     width_m: Some(round(self.thickness_m)),
                     height_m: Some(self.height_m),
-                    heading_deg: round(along.to_angle().to_degrees()),
+                    heading_deg: round(maths::angle_rad(along).to_degrees()),
                     ..Obstacle::new(self.class, Pose::new(centre, 0.0))
                 }
             })

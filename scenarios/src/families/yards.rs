@@ -10,6 +10,7 @@ use crate::clutter::draw_car;
 use crate::corridor::to_millimetres;
 use rand::RngExt as _;
 use sim::geometry::{Vec2, distance_to_segment, edges};
+use sim::maths;
 use sim::scenario::{Island, Obstacle, ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::f32::consts::{PI, TAU};
@@ -125,7 +126,7 @@ fn thing_at(at: Vec2, rng: &mut Rng) -> Thing {
         _ => {
             const CORNERS: u8 = 12;
             let radius_m = rng.random_range(0.8..3.0);
-            let corner = |k: u8| at + radius_m * Vec2::from_angle(TAU * f32::from(k) / f32::from(CORNERS));
+            let corner = |k: u8| at + radius_m * maths::unit(TAU * f32::from(k) / f32::from(CORNERS));
             let height_m = if rng.random_bool(0.7) { 0.15 } else { 0.8 };
             Thing::Island(Island { polygon: (0..CORNERS).map(|k| to_millimetres(corner(k))).collect(), height_m })
         }

@@ -316,8 +316,9 @@ mod tests {
     #[test]
     fn simplification_moves_nothing_by_a_pixel() {
         let size = 60;
-        let is_free =
-            (0..size * size).map(|i| (f64::from(i % size) - 29.3).hypot(f64::from(i / size) - 30.1) < 25.0).collect();
+        let is_free = (0..size * size)
+            .map(|i| libm::hypot(f64::from(i % size) - 29.3, f64::from(i / size) - 30.1) < 25.0)
+            .collect();
         let ring = Mask { cols: size as usize, is_free }.outlines().remove(0);
         let short = simplified(&ring, TOLERANCES_PX[0]);
         assert!(short.len() * 2 < ring.len(), "{} of {} corners are left", short.len(), ring.len());

@@ -227,7 +227,7 @@ impl Header {
             drivable: Mask { cols, is_free },
             resolution_m: self.resolution,
             origin_m: [self.origin[0], self.origin[1]],
-            yaw: [self.origin[2].cos(), self.origin[2].sin()],
+            yaw: [libm::cos(self.origin[2]), libm::sin(self.origin[2])],
         }
     }
 

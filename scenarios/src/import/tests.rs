@@ -498,9 +498,9 @@ fn blocked_ground_stays_blocked_to_a_fifth_of_a_metre() {
         let size = 60;
         // A disc with a crooked island and a slanted wall.
         let is_free = |x: f64, y: f64| {
-            let island = (x - 22.0).hypot(y - 31.0) < 7.0 + 2.0 * (0.9 * x).sin();
+            let island = libm::hypot(x - 22.0, y - 31.0) < 7.0 + 2.0 * libm::sin(0.9 * x);
             let wall = (y - 0.31 * x - 29.0).abs() < 1.2 && x > 33.0;
-            (x - 30.0).hypot(y - 30.0) < 27.0 && !island && !wall
+            libm::hypot(x - 30.0, y - 30.0) < 27.0 && !island && !wall
         };
         let rows: Vec<String> = (0..size)
             .rev()

@@ -6,6 +6,7 @@ use super::{CURVATURE_SHARE, DistanceToGo, Goal, NONE, Scene, Search, Waypoint};
 use crate::open_list::Open;
 use geo::{Coord, LineString, Simplify as _};
 use sim::geometry::{Pose, Vec2};
+use sim::maths;
 use sim::scenario::{ReferencePath, Scenario};
 use sim::vehicle::VehicleSettings;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -122,7 +123,7 @@ pub fn find(
     }
     let at_goal = search.nodes.iter().filter(|node| goal.is_in_reach(node.pose));
     if let Some(best) = at_goal.max_by(|a, b| goal.heading_cos_of(a.pose).total_cmp(&goal.heading_cos_of(b.pose))) {
-        let off_deg = goal.heading_cos_of(best.pose).clamp(-1.0, 1.0).acos().to_degrees();
+        let off_deg = maths::acos(goal.heading_cos_of(best.pose).clamp(-1.0, 1.0)).to_degrees();
         return Err(NoRoute::Askew { at: best.pose.position(), off_deg });
     }
     let from_front = |node: &super::Node| (to_go.at(front(node.pose)), front(node.pose));

@@ -8,6 +8,7 @@
 
 use crate::geometry::{Circles, Pose, Vec2};
 use crate::map::Map;
+use crate::maths;
 use crate::scenario::NoiseLevel;
 use crate::seed::{Rng, RootSeed, Stream};
 use crate::vectors::{FourPoints, LANES, bounded, f32x4, whole_and_part};
@@ -412,7 +413,7 @@ impl NoiseField {
     /// Shadows of things beside the lane (cars, trees, buildings), 1.5–3 object heights long, along the sun.
     fn cast_shadows(&mut self, map: &Map, amount: f32, cell_radius_m: f32, rng: &mut Rng) {
         let sun_azimuth_rad = rng.random_range(-std::f32::consts::PI..std::f32::consts::PI);
-        let away_from_sun = Vec2::from_angle(sun_azimuth_rad);
+        let away_from_sun = maths::unit(sun_azimuth_rad);
         along_route(map, SHADOW_SPACING_M, amount, rng, |place, rng| {
             let width_m = rng.random_range(1.5..4.0);
             let height_m: f32 = rng.random_range(1.4..2.5);
@@ -486,7 +487,7 @@ impl NoiseField {
             let turn = rng.random::<f32>();
             let polygon = (0..corners)
                 .map(|k| std::f32::consts::TAU * (k as f32 + turn) / corners as f32)
-                .map(|angle_rad| centre + 0.5 * size_m * Vec2::from_angle(angle_rad))
+                .map(|angle_rad| centre + 0.5 * size_m * maths::unit(angle_rad))
                 .collect();
             let is_occupied = rng.random::<f32>() < 0.8;
             let life_ticks = rng.random_range(40..80);
@@ -854,7 +855,7 @@ mod tests {
             let centre = Vec2::new((view / 7) as f32 * 1.1 - 3.0, (view / 11) as f32 * 0.9);
             let time = (view / 2) as f32 / 3.0;
             lattice.look_at(centre, radius_m, time);
-            let place = |i: usize| centre + 0.25 * i as f32 * Vec2::from_angle(2.4 * i as f32);
+            let place = |i: usize| centre + 0.25 * i as f32 * maths::unit(2.4 * i as f32);
             for i in 0..32 {
                 let value = lattice.at_four(FourPoints::splat(place(i))).to_array()[i % 4];
                 let expected = amplitude * value_noise(5, place(i) / spacing_m, time);
@@ -892,7 +893,7 @@ mod tests {
         let place = |i: usize| Vec2::new((i % 200) as f32, (i / 200) as f32) * 0.237;
         let samples: Vec<f32> = (0..40_000).map(|i| value_noise(3, place(i), 0.0)).collect();
         let mean = samples.iter().sum::<f32>() / samples.len() as f32;
-        let variance = samples.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / samples.len() as f32;
+        let variance = samples.iter().map(|v| (v - mean) * (v - mean)).sum::<f32>() / samples.len() as f32;
         assert!(mean.abs() < 0.1 && (0.8..1.2).contains(&variance), "mean {mean}, variance {variance}");
         assert!(samples.iter().all(|v| v.abs() <= VALUE_NOISE_MAX));
     }

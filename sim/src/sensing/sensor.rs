@@ -459,7 +459,8 @@ impl EgoView {
     }
 
     fn may_see(&self, centre: Vec2, radius_m: f32) -> bool {
-        centre.distance_squared(self.patch_centre) < (self.patch_radius_m + radius_m).powi(2)
+        let reach_m = self.patch_radius_m + radius_m;
+        centre.distance_squared(self.patch_centre) < reach_m * reach_m
     }
 
     fn polygon(&self, region: &Region) -> ConvexInEgo {

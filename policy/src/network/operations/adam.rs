@@ -2,6 +2,7 @@
 
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, ExtensionType};
+use sim::maths;
 
 /// What a step of Adam reads and renews.
 #[derive(ExtensionType)]
@@ -45,12 +46,12 @@ impl AdamStep {
 
     /// Factor of the mean: learning rate and bias correction.
     pub(crate) fn step_size(self) -> f32 {
-        self.learning_rate / (1.0 - self.beta_1.powi(self.number as i32))
+        self.learning_rate / (1.0 - maths::pow(self.beta_1, self.number as f32))
     }
 
     /// Bias correction of the root of the mean square.
     pub(crate) fn root_correction(self) -> f32 {
-        (1.0 - self.beta_2.powi(self.number as i32)).sqrt().recip()
+        (1.0 - maths::pow(self.beta_2, self.number as f32)).sqrt().recip()
     }
 
     /// What weight decay leaves of a weight.

@@ -49,6 +49,24 @@ impl<C: CheckpointStrategy> NetworkOps for Autodiff<Flex, C> {
             }
         }
     }
+
+    fn tanh(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        let node = x.node();
+        let y = Flex::tanh(x.into_primitive());
+        match Tanh.prepare::<C>([node]).compute_bound().stateful() {
+            OpsKind::UnTracked(prepared) => prepared.finish(y),
+            OpsKind::Tracked(prepared) => prepared.finish(y.clone(), y),
+        }
+    }
+
+    fn exp(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        let node = x.node();
+        let y = Flex::exp(x.into_primitive());
+        match Exp.prepare::<C>([node]).compute_bound().stateful() {
+            OpsKind::UnTracked(prepared) => prepared.finish(y),
+            OpsKind::Tracked(prepared) => prepared.finish(y.clone(), y),
+        }
+    }
 }
 
 /// Backward pass of the encoder. Its parents are the weights; cells have no gradient.
@@ -102,5 +120,39 @@ impl Backward<Flex, 3> for Dense {
             let gradient = dense::d_bias(values(&d_y), outputs);
             grads.register::<Flex>(node.id, from_vec(gradient, [outputs]));
         }
+    }
+}
+
+/// Backward pass of the hyperbolic tangent; keeps what it answered.
+#[derive(Debug)]
+struct Tanh;
+
+impl Backward<Flex, 1> for Tanh {
+    type State = FlexTensor;
+
+    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
+        pass_back(ops, grads, |y| 1.0 - y * y);
+    }
+}
+
+/// Backward pass of the exponential function; keeps what it answered.
+#[derive(Debug)]
+struct Exp;
+
+impl Backward<Flex, 1> for Exp {
+    type State = FlexTensor;
+
+    fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
+        pass_back(ops, grads, |y| y);
+    }
+}
+
+/// Gradients of a function of every value, from its slope where it answered `y`.
+fn pass_back(ops: Ops<FlexTensor, 1>, grads: &mut Gradients, slope_at: impl Fn(f32) -> f32) {
+    let d_y = contiguous(grads.consume::<Flex>(&ops.node));
+    let y = contiguous(ops.state);
+    if let [Some(node)] = ops.parents {
+        let gradient = values(&d_y).iter().zip(values(&y)).map(|(d_y, y)| d_y * slope_at(*y)).collect();
+        grads.register::<Flex>(node.id, from_vec(gradient, y.shape()));
     }
 }

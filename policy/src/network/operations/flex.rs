@@ -8,6 +8,7 @@ use crate::network::architecture::ConvLayer;
 use burn::backend::flex::FlexTensor;
 use burn::backend::{Flex, TensorMetadata as _};
 use burn::tensor::TensorData;
+use sim::maths;
 
 impl NetworkOps for Flex {
     fn encode(
@@ -28,6 +29,14 @@ impl NetworkOps for Flex {
         let [x, weight, bias] = [x, weight, bias].map(contiguous);
         let y = dense::forward(values(&x), values(&weight), values(&bias));
         from_vec(y, [x.shape()[0], bias.shape()[0]])
+    }
+
+    fn tanh(x: FlexTensor) -> FlexTensor {
+        of_each(x, maths::tanh)
+    }
+
+    fn exp(x: FlexTensor) -> FlexTensor {
+        of_each(x, maths::exp)
     }
 }
 
@@ -88,6 +97,13 @@ pub(super) fn contiguous(tensor: FlexTensor) -> FlexTensor {
         && tensor.layout().start_offset() == 0
         && tensor.bytes().len() == tensor.layout().num_elements() * tensor.dtype().size();
     if is_whole { tensor } else { tensor.to_contiguous() }
+}
+
+/// A function of every value.
+fn of_each(tensor: FlexTensor, function: impl Fn(f32) -> f32) -> FlexTensor {
+    let tensor = contiguous(tensor);
+    let values = values(&tensor).iter().copied().map(function).collect();
+    from_vec(values, tensor.shape())
 }
 
 /// The values of a contiguous tensor.

@@ -23,6 +23,16 @@ pub trait NetworkOps: Backend {
     fn dense(x: FloatTensor<Self>, weight: FloatTensor<Self>, bias: FloatTensor<Self>) -> FloatTensor<Self> {
         plain::dense::<Self>(x, weight, bias)
     }
+
+    /// See [`tanh`](super::tanh).
+    fn tanh(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        Self::float_tanh(x)
+    }
+
+    /// See [`exp`](super::exp).
+    fn exp(x: FloatTensor<Self>) -> FloatTensor<Self> {
+        Self::float_exp(x)
+    }
 }
 
 /// The operation of the optimiser.

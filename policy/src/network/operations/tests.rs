@@ -17,6 +17,7 @@ fn shapes() -> [NetworkArchitecture; 3] {
         conv1: ConvLayer { channels: 16, kernel: 4 },
         conv2: ConvLayer { channels: 48, kernel: 5 },
         hidden: 70,
+        modes: 1,
         ..NetworkArchitecture::paper()
     };
     [NetworkArchitecture::paper(), NetworkArchitecture::compact(), odd]

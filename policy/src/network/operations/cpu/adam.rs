@@ -53,7 +53,10 @@ impl WithSimd for SumOfSquares<'_> {
                 *sum = simd.mul_add_f32s(*values, *values, *sum);
             }
         }
-        sums.iter().map(|sum| f64::from(*sum)).chain(rest.iter().map(|value| f64::from(*value).powi(2))).sum()
+        sums.iter()
+            .map(|sum| f64::from(*sum))
+            .chain(rest.iter().map(|value| f64::from(*value) * f64::from(*value)))
+            .sum()
     }
 }
 
