@@ -84,6 +84,7 @@ fn lots_that_are_refused() {
     let parse = |text: &str| scenarios::load::parse(text, "lot.toml", &VehicleSettings::hyundai_hg300());
     parse(LOT).unwrap();
     let (many, long) = ("[[obstacle]]\nclass = \"cone\"\nx_m = 9\ny_m = 28\n".repeat(10_001), "n".repeat(101));
+    let islands = "[[island]]\npolygon = [[20, 20], [24, 20], [24, 24]]\nheight_m = 1\n".repeat(5000);
     let bumps = "[[speed_bump]]\nx_m = 9\ny_m = 28\nlength_m = 1\nwidth_m = 1\n".repeat(1001);
     let points = |count: usize| (0..count).map(|i| format!("[{i}, 1],")).collect::<String>();
     let winding: String = (0..51)
@@ -176,6 +177,7 @@ fn lots_that_are_refused() {
         ("width_m = 6", "width_m = 31", "speed_bump 1: width_m is 31"),
         ("x_m = 15", "x_m = -99", "speed_bump 1: it stands at"),
         ("x_m = 15", "x_m = nan", "speed_bump 1: x_m is NaN"),
+        ("[[island]]", &format!("{islands}[[island]]"), "there are 5001 islands; leave some out: 5000 are possible"),
         ("[[speed_bump]]", "[speed_bump]", "invalid type: map, expected a sequence"),
         ("[[speed_bump]]", &format!("{bumps}[[speed_bump]]"), "there are 1002 speed bumps"),
         ("[[obstacle]]", &format!("{many}[[obstacle]]"), "there are 10002 obstacles"),
@@ -699,6 +701,10 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         if mixed >> 30 == 0 && !is_near { 0 } else { 255 }
     });
     write("noise.pgm", &[&b"P5\n4096 4096\n255\n"[..], &noise.collect::<Vec<u8>>()].concat());
+    // Pillars of a pixel each.
+    let pillars = (0..4096_u32 * 4096).map(|i| if i % 8 == 4 && i / 4096 % 32 == 4 { 0 } else { 255 });
+    write("pillars.pgm", &[&b"P5\n4096 4096\n255\n"[..], &pillars.collect::<Vec<u8>>()].concat());
+    write("pillars.yaml", sound.yaml.replace("map.pgm", "pillars.pgm").as_bytes());
     write("bomb.yaml", sound.yaml.replace("map.pgm", "bomb.pgm").as_bytes());
     write("bomb.pgm", b"P5\n60000 60000\n255\n\xff");
     write("zero.yaml", sound.yaml.replace("map.pgm", "/dev/zero").as_bytes());
@@ -737,6 +743,10 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (
             &["generate", "--lots", "map.yaml", "--scale", "0.1", "--start", "205,205,0", "--loop"],
             "corners; smooth the image",
+        ),
+        (
+            &["generate", "--lots", "pillars.yaml", "--scale", "0.1", "--start", "205,205,0", "--loop"],
+            "islands; smooth",
         ),
         (&["generate", "--lots", "lot-a", "--count", "0"], "--count"),
         (&["generate", "--lots", "lot-a", "--count", "2000000"], "--count"),

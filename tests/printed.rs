@@ -31,6 +31,7 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         "lots",
         "drivers",
         "tune",
+        "torture",
         "verify",
         "render",
         "visualise",

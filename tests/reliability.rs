@@ -48,15 +48,17 @@ fn resume(command: &str, run: &Path) {
     succeed(xtask().args([command, "--resume"]).arg(run));
 }
 
-/// Kills a command when a file of its run appears, goes on, and compares every file with those of a run that was left
+/// Kills a training when a file of its run appears, goes on, and compares every file with those of a run that was left
 /// alone. Both use the same folder, which replay keys name.
-fn killed_and_resumed(name: &str, arguments: &[&str], appears: &[&str]) {
-    let run = scratch(name).join("run");
+#[test]
+fn a_killed_training_goes_on_to_the_same_bytes() {
+    let run = scratch("killed-training").join("run");
+    let arguments = ["train-dagger", "--preset", "smoke"];
     succeed(xtask().args(arguments).arg("--out").arg(&run));
     let whole = files(&run);
-    for file in appears {
+    for file in ["sha256sums", "round-00/sha256sums", "round-01/fit.toml", "summary.json", "figures"] {
         std::fs::remove_dir_all(&run).unwrap();
-        let mut running = Running::start(arguments, &run);
+        let mut running = Running::start(&arguments, &run);
         assert!(running.wait_for(&run.join(file)), "{file} never appears");
         running.kill();
         resume(arguments[0], &run);
@@ -70,23 +72,25 @@ fn killed_and_resumed(name: &str, arguments: &[&str], appears: &[&str]) {
     }
 }
 
+/// At a few operations on files of a few commands; without limits, `cargo xtask torture` strikes each of every command.
+#[cfg(target_os = "linux")]
 #[test]
-fn a_killed_training_goes_on_to_the_same_bytes() {
-    let appears = ["sha256sums", "round-00/sha256sums", "round-01/fit.toml", "summary.json", "figures"];
-    killed_and_resumed("killed-training", &["train-dagger", "--preset", "smoke"], &appears);
+fn deaths_full_disks_and_errors_of_the_disk_lose_nothing() {
+    let printed =
+        succeed(xtask().args(["torture", "--only", "evaluate,tune,generate", "--strikes", "2", "--kills", "1"]));
+    assert_eq!(printed.lines().filter(|line| line.ends_with("| 0 |")).count(), 3, "{printed}");
 }
 
+/// `--resume` drove, although `--no-eval` had been asked for.
 #[test]
-fn a_killed_evaluation_goes_on_to_the_same_bytes() {
-    let arguments = ["evaluate", "--driver", "expert", "--driver", "tentacle", "--lots", "lot-b,test:2:easy"];
-    let arguments = [&arguments[..], &["--trials", "1", "--noise", "clean,paper"]].concat();
-    killed_and_resumed("killed-evaluation", &arguments, &["runs.jsonl", "driving.unfinished", "summary.json"]);
-}
-
-#[test]
-fn a_killed_search_goes_on_to_the_same_bytes() {
-    let arguments = ["tune", "--planner", "cvm", "--lots", "train:1:easy", "--budget", "12"];
-    killed_and_resumed("killed-search", &arguments, &["cvm.candidates.toml", "cvm.toml"]);
+fn a_training_without_an_evaluation_goes_on_without_one() {
+    let run = scratch("no-evaluation").join("run");
+    let arguments = ["train-bc", "--preset", "smoke", "--no-eval"];
+    let mut running = Running::start(&arguments, &run);
+    assert!(running.wait_for(&run.join("sha256sums")));
+    running.kill();
+    resume(arguments[0], &run);
+    assert!(run.join("finished.toml").is_file() && !run.join("runs.jsonl").exists());
 }
 
 /// Two commands wrote into one folder, and what came out was of neither.

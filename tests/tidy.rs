@@ -23,7 +23,7 @@ fn dependencies() -> BTreeMap<String, Vec<String>> {
 }
 
 /// Each crate with the siblings that it may use: the data flows from left to right, never back.
-const LAYERS: [(&str, &[&str]); 12] = [
+const LAYERS: [(&str, &[&str]); 13] = [
     ("sim", &[]),
     ("storage", &[]),
     ("scenarios", &["sim", "storage"]),
@@ -35,6 +35,7 @@ const LAYERS: [(&str, &[&str]); 12] = [
     ("evaluation", &["sim", "storage", "planners", "policy", "experiment"]),
     ("report", &["sim", "storage", "policy", "experiment", "evaluation"]),
     ("benchmark", &["sim", "scenarios", "expert", "policy", "experiment", "evaluation"]),
+    ("torture", &["storage"]),
     (
         "xtask",
         &[
@@ -48,6 +49,7 @@ const LAYERS: [(&str, &[&str]); 12] = [
             "evaluation",
             "report",
             "benchmark",
+            "torture",
         ],
     ),
 ];

@@ -59,7 +59,7 @@ struct ShardRun {
 impl ShardRun {
     fn read(folder: &Path) -> anyhow::Result<Self> {
         let name = folder.display();
-        ensure!(sums::exists(folder), "{name}: this is no run; name the folders that evaluate --shard wrote");
+        ensure!(sums::exists(folder)?, "{name}: this is no run; name the folders that evaluate --shard wrote");
         let mut manifest = Manifest::read(folder)?;
         let record = manifest.arguments.remove(ARGUMENT).filter(|_| manifest.command == "evaluate");
         let record = record

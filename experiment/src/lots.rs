@@ -11,6 +11,7 @@ use sim::scenario::{Direction, NoiseLevel, Scenario};
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A lot, before a trial has drawn its obstacles.
 #[derive(Debug, Clone)]
@@ -18,7 +19,7 @@ pub struct Lot {
     name: String,
     spec: LotSpec,
     /// Of a file: read once, so that its errors come before any work.
-    from_file: Option<Loaded>,
+    from_file: Option<Arc<Loaded>>,
 }
 
 /// A lot as it stands in one trial.
@@ -69,7 +70,7 @@ impl Lot {
 
     fn new(spec: LotSpec, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
         let from_file = match &spec {
-            LotSpec::File(path) => Some(scenarios::load::load_with_notes(path, vehicle)?),
+            LotSpec::File(path) => Some(Arc::new(scenarios::load::load_with_notes(path, vehicle)?)),
             LotSpec::Reference(_) | LotSpec::Generated { .. } => None,
         };
         let name = from_file.as_ref().map_or_else(|| spec.to_string(), |loaded| loaded.scenario.name.clone());
@@ -82,7 +83,11 @@ impl Lot {
     /// If no lot can be made of it.
     pub fn of_map(path: &Path, lot: &MapLot, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
         let loaded = lot.scenario(vehicle)?;
-        Ok(Self { name: loaded.scenario.name.clone(), spec: LotSpec::File(path.to_owned()), from_file: Some(loaded) })
+        Ok(Self {
+            name: loaded.scenario.name.clone(),
+            spec: LotSpec::File(path.to_owned()),
+            from_file: Some(Arc::new(loaded)),
+        })
     }
 
     /// What is to be said about a lot from a file.
@@ -131,8 +136,8 @@ impl Lot {
     /// [`scenarios::LoadError::ForwardOnly`], with file and line.
     pub fn check_direction(&self, direction: Direction, vehicle: &VehicleSettings) -> anyhow::Result<()> {
         match (&self.spec, &self.from_file) {
-            (LotSpec::File(path), Some(Loaded { scenario, .. })) => {
-                Ok(scenarios::load::check_direction(path, scenario, direction, vehicle)?)
+            (LotSpec::File(path), Some(loaded)) => {
+                Ok(scenarios::load::check_direction(path, &loaded.scenario, direction, vehicle)?)
             }
             _ => Ok(()),
         }
@@ -175,8 +180,8 @@ impl Lot {
                 Drawn { scenario: generated.scenario, attempts: Some(generated.attempts) }
             }
             LotSpec::File(_) => {
-                let loaded = self.from_file.clone().expect("files are read when they are named");
-                Drawn { scenario: loaded.scenario, attempts: None }
+                let loaded = self.from_file.as_ref().expect("files are read when they are named");
+                Drawn { scenario: loaded.scenario.clone(), attempts: None }
             }
         }
     }

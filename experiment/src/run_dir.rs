@@ -194,7 +194,7 @@ impl RunDir {
         ensure!(path.is_dir(), "{}: there is no such run to resume", path.display());
         // Before the lock, which would leave its file in a folder that is no run.
         ensure!(
-            sums::exists(path),
+            sums::exists(path)?,
             "{0}: nothing was begun there; begin it anew with --out {0}, with --overwrite if it is not empty",
             path.display()
         );
@@ -215,7 +215,7 @@ impl RunDir {
     /// # Errors
     /// If there is none, or another process is at it.
     pub fn reopen(path: &Path, command: &str) -> anyhow::Result<Self> {
-        ensure!(sums::exists(path), "{}: this is no run; list the folders in runs/", path.display());
+        ensure!(sums::exists(path)?, "{}: this is no run; list the folders in runs/", path.display());
         Self::locked(path.to_path_buf(), command)
     }
 
@@ -235,7 +235,7 @@ impl RunDir {
             sums::list(&self.path, &[&list])?;
             return Ok(None);
         }
-        let stage = if sums::exists(&path) {
+        let stage = if sums::exists(&path)? {
             let (stage, found, _) = Self::resume(&path, place.command)?;
             ensure!(
                 found == *settings,
@@ -267,7 +267,7 @@ impl RunDir {
             name == lock::FILE || name == SETTINGS || name == MANIFEST || name.to_string_lossy().ends_with(".partial")
         }) && (names.is_empty() || names.iter().any(|name| name == lock::FILE));
         // A run of an earlier version has no list.
-        let is_run = sums::exists(path) || path.join(SETTINGS).is_file();
+        let is_run = sums::exists(path)? || path.join(SETTINGS).is_file();
         // Before the lock is taken: nothing is written into a folder that is no run.
         if !is_free && !is_run {
             let way_out =
@@ -433,13 +433,13 @@ fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
         _ => (spec, false),
     };
     ensure!(
-        sums::exists(run) || !run.join(SETTINGS).is_file(),
+        sums::exists(run)? || !run.join(SETTINGS).is_file(),
         "{}: this run has no sha256sums: an earlier version made it, or the list is lost; train again into another folder, \
          or restore the list from a copy",
         run.display()
     );
     ensure!(
-        sums::exists(run),
+        sums::exists(run)?,
         "{}: this is no run; train one with cargo xtask train-dagger, or list the folders in runs/",
         run.display()
     );

@@ -21,14 +21,15 @@ use serde::Deserialize;
 use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
 use sim::limits::{
-    CSV_BYTES_MAX, LOT_BYTES_MAX, MAP_COORDINATE_MAX_M, MAP_PIXEL_M, MAP_SCALE, OUTLINE_CORNERS_MAX, ROUTE_MAX_M,
-    ROUTE_POINTS_MAX,
+    CSV_BYTES_MAX, ISLANDS_MAX, LOT_BYTES_MAX, MAP_COORDINATE_MAX_M, MAP_PIXEL_M, MAP_SCALE, OUTLINE_CORNERS_MAX,
+    ROUTE_MAX_M, ROUTE_POINTS_MAX,
 };
 use sim::map::Map;
 use sim::scenario::{Island, LotNoise, Place, ReferencePath, Scenario, ScenarioError};
-use sim::validate::validate;
+use sim::validate::{check_island, validate};
 use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
+use storage::read;
 
 /// Corners of a centre line are rounded with this radius, metres, as those of the reference lots (docs/methods.md 11).
 const CENTRE_LINE_RADIUS_M: f32 = 5.0;
@@ -48,7 +49,7 @@ const SAME_POINT_M: f64 = 0.01;
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MapLot {
-    /// ROS map (`.yaml`) or TPCAP case (`.csv`), relative to this file.
+    /// ROS map (`.yaml`) or TPCAP case (`.csv`), relative to this file; beside or below it.
     pub map: PathBuf,
     /// Name of the lot; by default that of the file.
     #[serde(default)]
@@ -65,7 +66,8 @@ pub struct MapLot {
     /// Instead of a goal: round a loop, back to the start.
     #[serde(default, rename = "loop")]
     pub is_loop: bool,
-    /// Instead of all three: a CSV file with the route of the rear axle, x and y in metres, relative to this file.
+    /// Instead of all three: a CSV file with the route of the rear axle, x and y in metres, relative to this file;
+    /// beside or below it.
     #[serde(default)]
     pub centre_line: Option<PathBuf>,
     /// Clearance that a route found automatically keeps around the body, metres in the lot.
@@ -167,6 +169,14 @@ impl MapLot {
         lot.map = folder.join(&lot.map);
         lot.centre_line = lot.centre_line.map(|file| folder.join(file));
         path.clone_into(&mut lot.file);
+        for (key, file) in [("map", Some(&lot.map)), ("centre_line", lot.centre_line.as_ref())] {
+            // What is missing is an error when it is read.
+            if file.is_some_and(|file| read::is_below(folder, file).is_ok_and(|is_below| !is_below)) {
+                let problem = "it is neither beside this file nor in a folder below".to_owned();
+                let remedy = "put it there, or name the map itself with --lots of cargo xtask generate";
+                return Err(lot.fault(key, problem, remedy));
+            }
+        }
         Ok(lot)
     }
 
@@ -309,6 +319,13 @@ impl MapLot {
             return Err(self.fault("map", problem, &remedy));
         }
         let (region, dropped) = region.without_specks(in_px2(self.drop_specks_m2));
+        let islands = region.islands();
+        if islands > ISLANDS_MAX {
+            let problem = format!("what is drivable encloses {islands} islands");
+            let remedy =
+                format!("smooth the image, or leave specks out with drop_specks_m2: {ISLANDS_MAX} are possible");
+            return Err(self.fault("map", problem, &remedy));
+        }
         let (region, padded) = region.with_large_specks(pixel, in_px2(ISLAND_MIN_M2));
         let up_to_m2 = self.drop_specks_m2;
         notes.extend((dropped > 0).then_some(Note::Dropped { specks: dropped, up_to_m2 }));
@@ -325,43 +342,61 @@ impl MapLot {
             unreachable!("a region has an outline");
         };
         let tolerances_px = contour::TOLERANCES_PX.map(|tolerance_px| tolerance_px.min(SIMPLIFIED_M / pixel_m));
-        let mut steps = vec![0; 1 + inner.len()];
+        let outline = |ring: &contour::Ring, step: usize| -> Vec<Vec2> {
+            contour::simplified(ring, tolerances_px[step]).into_iter().map(in_lot).collect()
+        };
+        // An outline at fault is followed more closely; if an island's is exact already, so is the boundary.
+        let mut steps = vec![0; inner.len()];
+        let mut fault = None;
+        for step in 0..tolerances_px.len() {
+            let boundary = outline(outer, step);
+            let ground = Ground { boundary, is_walled: true, islands: Vec::new(), obstacles: Vec::new() };
+            let islands = validate_ground(&self.outlines(&ground), vehicle).and_then(|()| {
+                let rings = inner.iter().zip(&mut steps).enumerate();
+                rings
+                    .map(|(i, (ring, step))| self.sound_island(i, &ground.boundary, step, |step| outline(ring, step)))
+                    .collect()
+            });
+            match islands {
+                Ok(islands) => return Ok(Ground { islands, ..ground }),
+                Err(error) => fault = Some(error),
+            }
+        }
+        Err(self.in_lot(fault.expect("there is a tolerance")))
+    }
+
+    /// An island with an outline as simple as it can be. `step`: how closely it is followed, and has to be.
+    fn sound_island(
+        &self,
+        index: usize,
+        boundary: &[Vec2],
+        step: &mut usize,
+        outline: impl Fn(usize) -> Vec<Vec2>,
+    ) -> Result<Vec<Vec2>, ScenarioError> {
         loop {
-            let outline = |ring: &contour::Ring, step: usize| -> Vec<Vec2> {
-                contour::simplified(ring, tolerances_px[step]).into_iter().map(in_lot).collect()
-            };
-            let ground = Ground {
-                boundary: outline(outer, steps[0]),
-                is_walled: true,
-                islands: inner.iter().zip(&steps[1..]).map(|(ring, &step)| outline(ring, step)).collect(),
-                obstacles: Vec::new(),
-            };
-            let Err(error) = validate_ground(&self.outlines(&ground), vehicle) else {
-                return Ok(ground);
-            };
-            // The outline at fault is followed more closely; if it is exact already, so is the boundary.
-            let at_fault = match error.place {
-                Place::Island(i) if steps[i + 1] + 1 < tolerances_px.len() => i + 1,
-                _ => 0,
-            };
-            steps[at_fault] += 1;
-            if steps[at_fault] == tolerances_px.len() {
-                return Err(self.in_lot(error));
+            let island = self.island(outline(*step));
+            match check_island(index, &island, boundary) {
+                Ok(()) => return Ok(island.polygon),
+                Err(error) if *step + 1 == contour::TOLERANCES_PX.len() => return Err(error),
+                Err(_) => *step += 1,
             }
         }
     }
 
     /// Boundary and islands of a lot that has no route yet.
     fn outlines(&self, ground: &Ground) -> Scenario {
-        // What has no height of its own is painted: as low as the lowest kerb.
-        let height_m = self.wall_height_m.max(PAINT_M);
-        let islands = ground.islands.iter().cloned().map(|polygon| Island { polygon, height_m }).collect();
+        let islands = ground.islands.iter().cloned().map(|polygon| self.island(polygon)).collect();
         let boundary_height_m = if ground.is_walled { self.wall_height_m } else { 0.0 };
         Scenario {
             islands,
             boundary_height_m,
             ..Scenario::new(self.name(), ground.boundary.iter().copied(), [Vec2::ZERO; 0])
         }
+    }
+
+    fn island(&self, polygon: Vec<Vec2>) -> Island {
+        // What has no height of its own is painted: as low as the lowest kerb.
+        Island { polygon, height_m: self.wall_height_m.max(PAINT_M) }
     }
 
     /// The points of a CSV file, in the map's frame.

@@ -17,6 +17,8 @@ pub const ROUTE_MAX_M: f32 = 20_000.0;
 pub const ROUTE_POINTS_MAX: usize = 10_000;
 /// Vertices of the boundary and all islands of a lot.
 pub const VERTICES_MAX: usize = 20_000;
+/// Islands of a lot.
+pub const ISLANDS_MAX: usize = 5_000;
 /// Obstacles of a lot.
 pub const OBSTACLES_MAX: usize = 10_000;
 /// Speed bumps of a lot.
@@ -55,6 +57,9 @@ pub const RUN_TOML_BYTES_MAX: u64 = 16_000_000;
 pub const RUN_TEXT_BYTES_MAX: u64 = 256_000_000;
 /// Line of a JSONL file of a run, bytes.
 pub const RECORD_BYTES_MAX: u64 = 4_000_000;
+
+/// Request to the viewer, bytes.
+pub const VIEW_REQUEST_BYTES_MAX: u64 = 1_000_000;
 
 /// Channels of a convolution.
 pub const CHANNELS_MAX: usize = 1024;

@@ -4,12 +4,12 @@
 
 use crate::geometry::{Pose, Vec2, distance_to_segment, edges, polygon_contains};
 use crate::limits::{
-    COORDINATE_MAX_M, LOT_EXTENT_MAX_M, NAME_CHARS_MAX, OBSTACLES_MAX, ROUTE_MAX_M, ROUTE_POINTS_MAX, SPEED_BUMPS_MAX,
-    VERTICES_MAX,
+    COORDINATE_MAX_M, ISLANDS_MAX, LOT_EXTENT_MAX_M, NAME_CHARS_MAX, OBSTACLES_MAX, ROUTE_MAX_M, ROUTE_POINTS_MAX,
+    SPEED_BUMPS_MAX, VERTICES_MAX,
 };
 use crate::maths;
 use crate::path::Path;
-use crate::scenario::{Obstacle, Place, ReferencePath, Scenario, ScenarioError};
+use crate::scenario::{Island, Obstacle, Place, ReferencePath, Scenario, ScenarioError};
 use crate::vehicle::VehicleSettings;
 
 /// An object farther than this from the lot is a typing error, metres.
@@ -38,9 +38,7 @@ pub fn validate(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), Sc
     }
     let lot = bounds(&scenario.boundary);
     for (i, island) in scenario.islands.iter().enumerate() {
-        check_polygon(&island.polygon, |_| Place::Island(i))?;
-        check_size(Place::Island(i), "height_m", island.height_m, 5.0)?;
-        check_island_inside(i, &island.polygon, &scenario.boundary)?;
+        check_island(i, island, &scenario.boundary)?;
     }
     for (i, obstacle) in scenario.obstacles.iter().enumerate() {
         check_obstacle(Place::Obstacle(i), obstacle)?;
@@ -66,6 +64,16 @@ pub fn validate(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), Sc
     }
     check_start(scenario, vehicle, path.pose_at(0.0))?;
     check_route(scenario, &Route::new(&path))
+}
+
+/// Refuses an island that is no sound outline within the boundary. `index`: its number, from 0.
+///
+/// # Errors
+/// The first problem found, with a remedy.
+pub fn check_island(index: usize, island: &Island, boundary: &[Vec2]) -> Result<(), ScenarioError> {
+    check_polygon(&island.polygon, |_| Place::Island(index))?;
+    check_size(Place::Island(index), "height_m", island.height_m, 5.0)?;
+    check_island_inside(index, &island.polygon, boundary)
 }
 
 fn fault<T>(place: Place, problem: impl Into<String>, remedy: impl Into<String>) -> Result<T, ScenarioError> {
@@ -100,6 +108,7 @@ fn check_counts(scenario: &Scenario) -> Result<(), ScenarioError> {
     let vertices = boundary.len() + islands.iter().map(|island| island.polygon.len()).sum::<usize>();
     let counts = [
         (Place::Boundary(None), "vertices, islands included", vertices, VERTICES_MAX),
+        (Place::Island(ISLANDS_MAX), "islands", islands.len(), ISLANDS_MAX),
         (Place::Obstacle(OBSTACLES_MAX), "obstacles", obstacles.len(), OBSTACLES_MAX),
         (Place::SpeedBump(SPEED_BUMPS_MAX), "speed bumps", speed_bumps.len(), SPEED_BUMPS_MAX),
         (Place::ReferencePath(None), "points", reference_path.points.len(), ROUTE_POINTS_MAX),
@@ -206,11 +215,16 @@ fn check_near_origin(boundary: &[Vec2]) -> Result<(), ScenarioError> {
 
 fn check_island_inside(index: usize, island: &[Vec2], boundary: &[Vec2]) -> Result<(), ScenarioError> {
     let remedy = "move it inside the boundary, or cut the boundary there instead";
-    if let Some(i) = island.iter().position(|&vertex| !polygon_contains(boundary, vertex)) {
+    let (low, high) = bounds(island);
+    let is_near = |(a, b): &(Vec2, Vec2)| boxes_meet((a.min(*b), a.max(*b)), (low, high));
+    let near: Vec<(usize, (Vec2, Vec2))> = edges(boundary).enumerate().filter(|(_, edge)| is_near(edge)).collect();
+    // Where no edge of the boundary is near, one vertex speaks for all: there may be thousands of islands.
+    let vertices = if near.is_empty() { &island[..1] } else { island };
+    if let Some(i) = vertices.iter().position(|&vertex| !polygon_contains(boundary, vertex)) {
         let problem = format!("its vertex {}, {}, lies outside the boundary", i + 1, at(island[i]));
         return fault(Place::Island(index), problem, remedy);
     }
-    for (i, (a, b)) in edges(boundary).enumerate() {
+    for (i, (a, b)) in near {
         if edges(island).any(|(c, d)| segments_meet(a, b, c, d)) {
             let problem = format!("it crosses the boundary's edge from vertex {}", i + 1);
             return fault(Place::Island(index), problem, remedy);

@@ -23,6 +23,15 @@ pub fn open(path: &Path, bytes_max: u64) -> io::Result<File> {
     File::open(path)
 }
 
+/// Whether a file is in a folder or in one below, links followed: a file that comes from elsewhere must not make this program
+/// read whatever its author names.
+///
+/// # Errors
+/// If one of them is not there.
+pub fn is_below(folder: &Path, file: &Path) -> io::Result<bool> {
+    Ok(file.canonicalize()?.starts_with(Path::new(".").join(folder).canonicalize()?))
+}
+
 /// The content of a regular file of at most so many bytes.
 ///
 /// # Errors

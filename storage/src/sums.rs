@@ -74,8 +74,12 @@ fn write_list(folder: &Path, sums: &Sums) -> Result<(), FileError> {
 }
 
 /// Whether a folder has a list: whether anything is finished there.
-pub fn exists(folder: &Path) -> bool {
-    folder.join(FILE).is_file()
+///
+/// # Errors
+/// If the system does not say: a folder whose work is taken for none is deleted.
+pub fn exists(folder: &Path) -> Result<bool, FileError> {
+    let path = folder.join(FILE);
+    path.try_exists().map_err(|error| FileError::new(&path, format_args!("cannot be read: {error}"), LIST_REMEDY))
 }
 
 /// Whether a file of a folder is finished.
@@ -182,7 +186,7 @@ pub fn write_folder(
         whole::write(&partial.join(name), &content)?;
     }
     list_all(&partial)?;
-    if !exists(&partial) {
+    if !exists(&partial)? {
         return fs::remove_dir(&partial).map_err(failed);
     }
     fs::rename(&partial, &path).map_err(failed)?;
@@ -290,7 +294,7 @@ fn look_for_others(folder: &Path, prefix: &str, sums: &Sums, verified: &mut Veri
             }
         } else if name == RECORDINGS || is_partial(&name) {
             // Another program's; or what was being written when a command was killed.
-        } else if exists(&path) || sums.contains_key(&format!("{name}/{FILE}")) {
+        } else if exists(&path).unwrap_or(true) || sums.contains_key(&format!("{name}/{FILE}")) {
             if !sums.contains_key(&format!("{name}/{FILE}")) {
                 verified.faults.push(FileError::new(&path, UNLISTED, UNLISTED_REMEDY));
             }
@@ -402,7 +406,7 @@ mod tests {
         assert!(read(&folder.join("b"), 100).unwrap_err().to_string().contains("not listed"));
         assert_eq!(read_if_listed(&folder.join("b"), 100).unwrap(), None);
         unlist(&folder, &["a"]).unwrap();
-        assert!(!exists(&folder));
+        assert!(!exists(&folder).unwrap());
         fs::remove_dir_all(folder).unwrap();
     }
 }

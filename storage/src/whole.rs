@@ -1,8 +1,9 @@
 //! Files that exist under their name only when they are whole.
 
 use crate::error::FileError;
+use std::fmt::Display;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write as _};
+use std::io::{self, Cursor, Write as _};
 use std::path::Path;
 
 /// What helps against most errors of writing.
@@ -13,43 +14,66 @@ pub const WRITE_REMEDY: &str = "check that the folder exists, is writable and ha
 /// # Errors
 /// If it cannot be written.
 pub fn write(path: &Path, content: &[u8]) -> Result<(), FileError> {
-    write_with(path, |file| file.write_all(content).map_err(|error| error.to_string()))
+    let partial = path.with_added_extension("partial");
+    let write = || {
+        // Never through a link that somebody put there.
+        if fs::symlink_metadata(&partial).is_ok() {
+            fs::remove_file(&partial)?;
+        }
+        let mut file = File::create_new(&partial)?;
+        file.write_all(content)?;
+        // The name must not be on disk before the content is.
+        file.sync_all()?;
+        fs::rename(&partial, path)
+    };
+    write().map_err(|error: io::Error| failed(path, &error))
 }
 
-/// Like [`write()`], with a function that writes.
+/// Like [`write()`], with a function that writes, into memory at first.
 ///
 /// # Errors
 /// If it cannot be written, or the function fails.
 pub fn write_with(
     path: &Path,
-    content: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
+    content: impl FnOnce(&mut Cursor<Vec<u8>>) -> Result<(), String>,
 ) -> Result<(), FileError> {
-    let partial = path.with_added_extension("partial");
-    let said = |error: io::Error| error.to_string();
-    let write = || {
-        // Never through a link that somebody put there.
-        if fs::symlink_metadata(&partial).is_ok() {
-            fs::remove_file(&partial).map_err(said)?;
-        }
-        let mut file = BufWriter::new(File::create_new(&partial).map_err(said)?);
-        content(&mut file)?;
-        let file = file.into_inner().map_err(|error| error.to_string())?;
-        // The name must not be on disk before the content is.
-        file.sync_all().map_err(said)?;
-        fs::rename(&partial, path).map_err(said)
-    };
-    write().map_err(|problem| FileError::new(path, format_args!("cannot be written: {problem}"), WRITE_REMEDY))
+    let mut buffer = Cursor::new(Vec::new());
+    content(&mut buffer).map_err(|problem| failed(path, &problem))?;
+    write(path, buffer.get_ref())
 }
 
-/// Deletes a file, if it is there.
+fn failed(path: &Path, problem: &dyn Display) -> FileError {
+    FileError::new(path, format_args!("cannot be written: {problem}"), WRITE_REMEDY)
+}
+
+/// Deletes a file, and what a process that died was writing in its place, if they are there.
 ///
 /// # Errors
-/// If it cannot be deleted.
+/// If one cannot be deleted.
 pub fn remove(path: &Path) -> Result<(), FileError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => {
-            Err(FileError::new(path, format_args!("cannot be deleted: {error}"), WRITE_REMEDY))
+    for path in [&path.with_added_extension("partial"), path] {
+        match fs::remove_file(path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => {
+                return Err(FileError::new(path, format_args!("cannot be deleted: {error}"), WRITE_REMEDY));
+            }
+            _ => {}
         }
-        _ => Ok(()),
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_dead_process_was_writing_goes_with_the_file() {
+        let path = std::env::temp_dir().join(format!("storage-test-{}-whole", std::process::id()));
+        write(&path, b"whole").unwrap();
+        let partial = path.with_added_extension("partial");
+        fs::write(&partial, "ha").unwrap();
+        remove(&path).unwrap();
+        remove(&path).unwrap();
+        assert!(!path.exists() && !partial.exists());
     }
 }

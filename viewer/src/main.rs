@@ -7,6 +7,7 @@
 use anyhow::Context as _;
 use experiment::progress::{Elapsed, Interrupted, Progress};
 use experiment::view_request::ViewRequest;
+use sim::limits::VIEW_REQUEST_BYTES_MAX;
 use std::cell::RefCell;
 use std::io::{IsTerminal as _, Read as _, Write as _};
 use std::path::{Path, PathBuf};
@@ -57,15 +58,13 @@ fn run() -> anyhow::Result<()> {
 }
 
 fn read_request() -> anyhow::Result<ViewRequest> {
-    let mut text = String::new();
-    match std::env::args_os().nth(1) {
+    let text = match std::env::args_os().nth(1) {
         Some(path) => {
-            text = std::fs::read_to_string(&path).with_context(|| Path::new(&path).display().to_string())?;
+            let path = Path::new(&path);
+            storage::read::text(path, VIEW_REQUEST_BYTES_MAX).with_context(|| path.display().to_string())?
         }
-        None => {
-            std::io::stdin().read_to_string(&mut text).context("standard input")?;
-        }
-    }
+        None => std::io::read_to_string(std::io::stdin().take(VIEW_REQUEST_BYTES_MAX)).context("standard input")?,
+    };
     serde_json::from_str(&text).context("the request; cargo xtask visualise writes one")
 }
 

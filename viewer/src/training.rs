@@ -8,7 +8,9 @@ use anyhow::ensure;
 use policy::dataset::Collection;
 use policy::fit::FitReport;
 use rerun::{SeriesLines, SeriesPoints, TextDocument};
+use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::path::Path;
+use storage::sums;
 
 /// Signals of a training: entity, name, colour.
 const CURVES: [(&str, &str, Colour); 6] = [
@@ -55,7 +57,11 @@ pub(crate) fn show(run: &Path, recording: &Recording) -> anyhow::Result<()> {
     }
     ensure!(rounds > 0, "{}: no round is finished there; runs of train-bc and train-dagger have rounds", run.display());
     for (entity, name) in layout::TABLES {
-        let text = std::fs::read_to_string(run.join(name)).unwrap_or_else(|_| format!("This run has no `{name}` yet."));
+        let table = sums::read_if_listed(&run.join(name), RUN_TEXT_BYTES_MAX)?;
+        let text = table.map_or_else(
+            || format!("This run has no `{name}` yet."),
+            |table| String::from_utf8_lossy(&table).into_owned(),
+        );
         recording.log_static(entity, &TextDocument::from_markdown(text));
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use crate::commands::{
     bench, completions, drivers, evaluate, export, generate, guard, lots, merge, pixel_accuracy, render, reproduce,
-    rules, sample_size, scaling, settings, train, tune, verify, visualise,
+    rules, sample_size, scaling, settings, torture, train, tune, verify, visualise,
 };
 use crate::output::{Color, Output};
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -105,6 +105,9 @@ enum Command {
     /// Checks that every file of a run is what was written, by its SHA-256.
     #[command(after_help = verify::EXAMPLES)]
     Verify(verify::VerifyArgs),
+    /// Kills commands and fails their file operations, goes on, and compares every byte.
+    #[command(after_help = torture::EXAMPLES)]
+    Torture(torture::TortureArgs),
     /// Draws lots, drives, samples and noise as PNG and SVG.
     #[command(after_help = render::EXAMPLES)]
     Render(render::RenderArgs),
@@ -150,6 +153,7 @@ impl Cli {
             Command::Drivers(args) => drivers::run(args, output),
             Command::Tune(args) => tune::run(args, output),
             Command::Verify(args) => verify::run(args, output),
+            Command::Torture(args) => torture::run(args, output),
             Command::Render(args) => render::run(args, output),
             Command::Visualise(args) => visualise::run(args, output),
             Command::Completions(args) => completions::run(args, Self::command(), output),
@@ -181,6 +185,7 @@ impl Command {
             | Self::Bench(_)
             | Self::Settings(_)
             | Self::Tune(_)
+            | Self::Torture(_)
             | Self::Render(_)
             | Self::Visualise(_)
             | Self::Completions(_)

@@ -17,6 +17,7 @@ pub(crate) mod rules;
 pub(crate) mod sample_size;
 pub(crate) mod scaling;
 pub(crate) mod settings;
+pub(crate) mod torture;
 pub(crate) mod train;
 mod trainings;
 pub(crate) mod tune;

@@ -77,6 +77,11 @@ impl Mask {
         (0..=rows).flat_map(|y| (0..=cols).map(move |x| [x, y])).map(turns_at).sum()
     }
 
+    /// How many islands a region encloses.
+    pub(super) fn islands(&self) -> usize {
+        self.specks(|_| true).len()
+    }
+
     /// A region with the specks that it encloses taken for free, up to an area, and how many.
     pub(super) fn without_specks(mut self, up_to_px2: f64) -> (Self, usize) {
         let specks = self.specks(|area_px2| area_px2 <= up_to_px2);

@@ -14,6 +14,7 @@ use sim::limits::{IMAGE_BYTES_MAX, IMAGE_SIDE_MAX_PX, MAP_COORDINATE_MAX_M, MAP_
 use std::collections::BTreeMap;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use storage::read;
 
 /// Modes `scale` and `raw`: drivable below this occupancy, per cent.
 const DRIVABLE_BELOW_PERCENT: f64 = 50.0;
@@ -110,17 +111,12 @@ impl Map {
         let unreadable = |error: std::io::Error| {
             fault(format!("cannot be read: {error}"), "check the key image; paths start at the YAML file")
         };
-        // A map from elsewhere must not make this program read what its author names.
-        let is_below = match (Path::new(".").join(folder).canonicalize(), file.canonicalize()) {
-            (Ok(folder), Ok(file)) => file.starts_with(folder),
-            (Err(error), _) | (_, Err(error)) => return Err(unreadable(error)),
-        };
-        if !is_below && !is_image_anywhere {
+        if !read::is_below(folder, &file).map_err(unreadable)? && !is_image_anywhere {
             let problem = "it is neither beside the YAML file nor in a folder below".to_owned();
             let remedy = "put it there, or import the map with cargo xtask generate --image-anywhere";
             return Err(fault(problem, remedy));
         }
-        let content = BufReader::new(storage::read::open(&file, IMAGE_BYTES_MAX).map_err(unreadable)?);
+        let content = BufReader::new(read::open(&file, IMAGE_BYTES_MAX).map_err(unreadable)?);
         let mut reader = image::ImageReader::new(content).with_guessed_format().map_err(unreadable)?;
         let mut limits = image::Limits::default();
         (limits.max_image_width, limits.max_image_height) = (Some(IMAGE_SIDE_MAX_PX), Some(IMAGE_SIDE_MAX_PX));

@@ -571,6 +571,27 @@ fn an_image_that_is_not_beside_its_map_is_refused_unless_it_may_be_anywhere() {
     }
 }
 
+#[test]
+fn a_map_or_centre_line_that_is_not_beside_its_lot_file_is_refused() {
+    let outer = folder("lot-elsewhere", &[("secret.yaml", ""), ("secret.csv", "")]);
+    std::fs::create_dir(outer.join("lots")).unwrap();
+    std::fs::write(outer.join("lots/map.yaml"), "").unwrap();
+    let file = outer.join("lots/map.lot.toml");
+    for (text, place) in [
+        ("map = '../secret.yaml'\n", "map: it is neither beside this file nor"),
+        ("map = '/dev/null/../../etc/hostname.yaml'\n", "map: "),
+        ("map = 'map.yaml'\ncentre_line = '../secret.csv'\n", "centre_line: it is neither beside this file nor"),
+    ] {
+        std::fs::write(&file, text).unwrap();
+        let error = load(&file, &car()).unwrap_err().to_string();
+        assert!(error.contains(place), "{text}: {error}");
+    }
+    // Whoever names the file on the command line may name any.
+    let mut lot = MapLot::of_map(&outer.join("lots/map.yaml"));
+    lot.centre_line = Some(outer.join("secret.csv"));
+    assert!(!lot.scenario(&car()).unwrap_err().to_string().contains("neither beside"));
+}
+
 /// `negat: 1` was read as a map that is not negated.
 #[test]
 fn keys_that_mean_nothing_are_named_in_a_note() {

@@ -22,6 +22,7 @@ use experiment::training;
 use experiment::view_request::Show;
 use policy::checkpoint::Checkpoint;
 use policy::dagger::Stop;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -59,6 +60,13 @@ pub(crate) struct TrainArgs {
     record: RecordArgs,
 }
 
+/// What a training was asked for beside its settings.
+#[derive(Debug, Serialize, Deserialize)]
+struct Asked {
+    #[serde(default)]
+    no_eval: bool,
+}
+
 /// Behaviour cloning alone: DAgger without an iteration.
 pub(crate) fn bc(args: &TrainArgs, output: &Output) -> anyhow::Result<()> {
     train(args, "train-bc", output, |settings| {
@@ -72,10 +80,11 @@ pub(crate) fn dagger(args: &TrainArgs, output: &Output) -> anyhow::Result<()> {
 }
 
 fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&mut Settings)) -> anyhow::Result<()> {
-    let (run, settings) = if let Some(path) = &args.resume {
+    let (run, settings, asked) = if let Some(path) = &args.resume {
         let (run, settings, manifest) = RunDir::resume(path, command)?;
         manifest.check_inputs(&inputs(&settings)?)?;
-        (run, settings)
+        let asked: Asked = manifest.arguments.try_into().with_context(|| path.display().to_string())?;
+        (run, settings, Asked { no_eval: asked.no_eval || args.no_eval })
     } else {
         let layers = Layers::from(&args.layers);
         let mut settings = Settings::resolve(&layers, args.seed)?;
@@ -83,15 +92,16 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         // Before the folder is claimed: a misspelt lot should not leave one behind.
         check_lots(&settings, output)?;
         let place = args.out.place(command, layers.preset_name(), settings.seed.0);
-        let request = Request { inputs: inputs(&settings)?, ..Request::default() };
-        (RunDir::create(&place, &settings, &request)?, settings)
+        let asked = Asked { no_eval: args.no_eval };
+        let request = Request { arguments: toml::Table::try_from(&asked)?, inputs: inputs(&settings)? };
+        (RunDir::create(&place, &settings, &request)?, settings, asked)
     };
     interrupt::can_resume(command, run.path());
     output.note(format_args!("run: {}", run.path().display()));
 
     let console = Console::new(output);
     let mut tasks = estimate::training(&settings, true);
-    if !args.no_eval {
+    if !asked.no_eval {
         // The expert, behaviour cloning and what became of it.
         let drivers = if settings.dagger.iterations_max > 0 { 3 } else { 2 };
         tasks.extend(evaluate::tasks(&settings, drivers));
@@ -104,7 +114,7 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         let folder = || run.path().to_owned();
         vec![Show::Training { run: folder() }, Show::Rollouts { run: folder(), episodes }]
     });
-    if !args.no_eval {
+    if !asked.no_eval {
         let drivers = drivers(&settings, &run, policy)?;
         let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
         let plan =
@@ -218,7 +228,7 @@ fn drivers(settings: &Settings, run: &RunDir, policy: Checkpoint) -> anyhow::Res
         NamedDriver::expert(&settings.expert),
         NamedDriver::network("BC", spec(run.path().join("bc")), cloned, device),
     ];
-    if run.path().join("round-01").is_dir() {
+    if run.path().join("round-01").try_exists().with_context(|| run.path().display().to_string())? {
         drivers.push(NamedDriver::network("DAgger", spec(run.path().to_owned()), policy, device));
     }
     Ok(drivers)

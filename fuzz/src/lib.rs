@@ -1,0 +1,155 @@
+//! What the fuzz targets share: a folder in memory, and files that are sound but for the one that is made up.
+
+use policy::checkpoint::Checkpoint;
+use policy::conditions::Conditions;
+use policy::dataset::store::Store;
+use policy::dataset::{Collection, EpisodeRecord, Round, Sample, Tick};
+use policy::network::{ConvLayer, InferenceSettings, NetworkArchitecture, Weights};
+use sim::driver::Source;
+use sim::episode::EpisodeSettings;
+use sim::scenario::Direction;
+use sim::seed::RootSeed;
+use sim::sensing::OccupancyGrid;
+use sim::vehicle::VehicleSettings;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+use storage::sums;
+
+/// Planners that have parameters.
+pub const PLANNERS: [&str; 7] = ["tentacle", "vvf", "dwa", "cvm", "apf", "vff", "mppi"];
+
+/// A folder of this process in memory.
+pub fn folder() -> &'static Path {
+    static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
+        let memory = Path::new("/dev/shm");
+        let base = if memory.is_dir() { memory.to_owned() } else { std::env::temp_dir() };
+        let folder = base.join(format!("lotpilot-fuzz-{}", std::process::id()));
+        fs::create_dir_all(&folder).expect("a folder in memory");
+        folder
+    });
+    &FOLDER
+}
+
+/// Writes a file into [`folder()`].
+pub fn write(name: &str, content: &[u8]) -> PathBuf {
+    let path = folder().join(name);
+    fs::write(&path, content).expect("there is memory left");
+    path
+}
+
+/// Loads a lot, whatever comes of it.
+pub fn load_lot(path: &Path) {
+    drop(scenarios::load::load(path, &VehicleSettings::hyundai_hg300()));
+}
+
+/// The YAML file of a map.
+pub const MAP: &[u8] = b"image: map.pgm\nresolution: 1.0\norigin: [0.0, 0.0, 0.0]\nmode: trinary\n";
+/// A centre line on it.
+pub const LINE: &[u8] = b"8,12\n40,12\n";
+
+/// Its image: 60 × 30 m of free ground.
+pub fn image() -> Vec<u8> {
+    [&b"P5\n60 30\n255\n"[..], &[254; 1800]].concat()
+}
+
+/// Loads a map that is sound but for what is given.
+pub fn load_map(yaml: Option<&[u8]>, image: Option<&[u8]>, line: Option<&[u8]>) {
+    write("map.yaml", yaml.unwrap_or(MAP));
+    write("map.pgm", image.unwrap_or(&self::image()));
+    write("line.csv", line.unwrap_or(LINE));
+    load_lot(&write("map.lot.toml", b"map = \"map.yaml\"\ncentre_line = \"line.csv\"\n"));
+}
+
+/// The files of a folder that is sound.
+pub type Files = Vec<(String, Vec<u8>)>;
+
+/// A small network, untrained.
+pub fn checkpoint() -> Checkpoint {
+    let conv = ConvLayer { channels: 2, kernel: 3 };
+    let network = NetworkArchitecture { conv1: conv, conv2: conv, hidden: 3, ..NetworkArchitecture::compact() };
+    Checkpoint {
+        weights: Weights::init(network, RootSeed(1), 0),
+        conditions: Conditions::of(&EpisodeSettings::paper()),
+        inference: InferenceSettings::plain(),
+    }
+}
+
+/// The files of a network.
+pub fn network_files() -> Files {
+    let folder = folder().join("sound-network");
+    fs::create_dir_all(&folder).expect("there is memory left");
+    checkpoint().save(&folder).expect("there is memory left");
+    files_in(&folder)
+}
+
+/// The files of a round of three samples, with two noise augmentations each.
+pub fn round_files() -> Files {
+    let mut round: Round = vec![Sample { grid: OccupancyGrid::free(), label: [0.5, 0.4], tau_hat: 0.1 }; 3].into();
+    let tick = |tick: u32| Tick {
+        episode: 0,
+        tick,
+        time_s: 0.05 * tick as f32,
+        x_m: 1.0,
+        y_m: 2.0,
+        heading_rad: 0.1,
+        speed_mps: 1.5,
+        steering_rad: 0.02,
+        command_steering_rad: 0.03,
+        command_speed_mps: 1.6,
+        driver: Source::Expert,
+    };
+    round.ticks = (0..3).map(tick).collect();
+    round.noise_augmentations = vec![OccupancyGrid::free(); 6];
+    let episode = EpisodeRecord {
+        lot: "lane".to_owned(),
+        direction: Direction::Forward,
+        samples: 3,
+        near_collisions: 0,
+        driven_m: 30.0,
+    };
+    let collection = Collection {
+        round: 0,
+        samples: 3,
+        noise_augmentations: 2,
+        ticks: 3,
+        novice_ticks: 0,
+        tau_hat_sum: 0.3,
+        driven_s: 0.15,
+        near_collisions: 0,
+        driven_m: 30.0,
+        effort: None,
+        agreement: None,
+        episodes: vec![episode],
+    };
+    let store = Store::open(&folder().join("sound-run")).expect("there is memory left");
+    if !store.round_folder(0).exists() {
+        store.write_round(&round, &collection).expect("there is memory left");
+    }
+    files_in(&store.round_folder(0))
+}
+
+fn files_in(folder: &Path) -> Files {
+    let mut files: Files = fs::read_dir(folder)
+        .expect("it is there")
+        .map(|entry| entry.expect("it is there"))
+        .map(|entry| (entry.file_name().to_string_lossy().into_owned(), fs::read(entry.path()).expect("it is there")))
+        .filter(|(name, _)| name != sums::FILE)
+        .collect();
+    files.sort();
+    files
+}
+
+/// Writes files into a folder within [`folder()`], one of them made up, and lists them as whole: damage is another test's.
+/// The first byte says which, the rest is its content.
+pub fn with_one_made_up(name: &str, sound: &Files, data: &[u8]) -> PathBuf {
+    let folder = folder().join(name);
+    fs::create_dir_all(&folder).expect("there is memory left");
+    let (which, made_up) = data.split_first().unwrap_or((&0, &[]));
+    for (index, (file, content)) in sound.iter().enumerate() {
+        let is_made_up = index == usize::from(*which) % sound.len();
+        write(&format!("{name}/{file}"), if is_made_up { made_up } else { content });
+    }
+    sums::list_all(&folder).expect("they are there");
+    folder
+}

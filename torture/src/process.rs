@@ -1,0 +1,59 @@
+//! One process of a command.
+
+use anyhow::Context as _;
+use std::fs::{self, File};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A command that takes longer hangs.
+const LIMIT: Duration = Duration::from_mins(10);
+const LOOK_EVERY: Duration = Duration::from_millis(1);
+
+/// How a process ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Ended {
+    /// The exit code; `None` if it was killed.
+    pub code: Option<i32>,
+    /// What it said.
+    pub stderr: String,
+    /// How long it took.
+    pub took: Duration,
+}
+
+impl Ended {
+    /// Whether it did all of its work.
+    pub fn is_done(&self) -> bool {
+        self.code == Some(0)
+    }
+
+    /// Whether it refused to go on with one error that says why.
+    pub fn is_refusal(&self) -> bool {
+        self.code == Some(2) && self.stderr.matches("error: ").count() == 1 && !self.stderr.contains("panicked")
+    }
+}
+
+/// Runs a command to its end, or kills it after some time. `said`: a file for what it says.
+///
+/// # Errors
+/// If it cannot be run, or hangs.
+pub fn run(command: &mut Command, said: &Path, kill_after: Option<Duration>) -> anyhow::Result<Ended> {
+    let stderr = File::create(said).with_context(|| said.display().to_string())?;
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
+    let began = Instant::now();
+    let mut process = command.spawn()?;
+    let status = loop {
+        if let Some(status) = process.try_wait()? {
+            break status;
+        }
+        if began.elapsed() > kill_after.unwrap_or(LIMIT) {
+            process.kill()?;
+            let status = process.wait()?;
+            anyhow::ensure!(kill_after.is_some(), "{command:?}: hangs");
+            break status;
+        }
+        std::thread::sleep(LOOK_EVERY);
+    };
+    let stderr = String::from_utf8_lossy(&fs::read(said)?).into_owned();
+    Ok(Ended { code: status.code(), stderr, took: began.elapsed() })
+}

@@ -1,0 +1,243 @@
+//! A command disturbed in every way, and what came of it.
+
+use crate::cases::{Case, EMPTY, PREPARED, SMALL};
+use crate::content::Content;
+use crate::faults::{Fault, Library};
+use crate::process::{self, Ended};
+use anyhow::{Context as _, ensure};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+use storage::sums;
+
+/// Times that a command is killed before it is let go on to its end.
+const KILLS_IN_A_ROW: usize = 3;
+/// After so many failures, nobody reads on.
+const FAILURES_MAX: usize = 10;
+
+/// How much is done to a command.
+#[derive(Debug, Clone, Copy)]
+pub struct Extent {
+    /// Operations that each fault strikes, evenly spaced; all of them if there are no more.
+    pub strikes: usize,
+    /// Deaths at random times.
+    pub kills: usize,
+    /// Seed of these times.
+    pub seed: u64,
+}
+
+/// What came of it.
+#[derive(Debug, Clone, Default)]
+pub struct Outcome {
+    /// Files compared every time.
+    pub files: usize,
+    /// Their bytes.
+    pub bytes: usize,
+    /// Of each fault: operations struck, and operations that the command comes to.
+    pub struck: [(usize, usize); Fault::ALL.len()],
+    /// Deaths at random times.
+    pub kills: usize,
+    /// What was lost, or was not the same, and where.
+    pub failures: Vec<String>,
+}
+
+/// A folder to work in, with the program under test and all that it needs.
+#[derive(Debug)]
+pub struct Workplace {
+    program: PathBuf,
+    folder: PathBuf,
+    run: PathBuf,
+    library: Library,
+}
+
+impl Workplace {
+    /// An empty one.
+    ///
+    /// # Errors
+    /// If something cannot be compiled or written.
+    pub fn new(program: PathBuf, folder: &Path) -> anyhow::Result<Self> {
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        let (folder, library) = (folder.to_owned(), Library::compile(folder)?);
+        Ok(Self { program, run: folder.join("run"), folder, library })
+    }
+
+    /// Disturbs a command in every way. `progress` is called with the share that is done.
+    ///
+    /// # Errors
+    /// If a file cannot be read or written here, the command hangs, or fails without being disturbed.
+    pub fn torture(&self, case: &Case, extent: &Extent, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Outcome> {
+        self.prepare(case)?;
+        let (right, took) = self.undisturbed(case, None)?;
+        let mut outcome = Outcome { files: right.files(), bytes: right.bytes(), ..Outcome::default() };
+        for (kind, fault) in Fault::ALL.into_iter().enumerate() {
+            let (again, _) = self.undisturbed(case, Some(fault))?;
+            if let Some(difference) = again.difference(&right) {
+                outcome.failures.push(format!("not disturbed at all: {difference}"));
+            }
+            let operations = self.library.operations()?;
+            let strikes = extent.strikes.min(operations.len());
+            for strike in 0..strikes {
+                let at = (2 * strike + 1) * operations.len() / (2 * strikes);
+                let operation = &operations[at];
+                let what = format!("{} at {} of {}, {operation}", fault.name(), at + 1, operations.len());
+                let came = self.strike(case, fault, at + 1).and_then(|()| self.compare(&right));
+                self.note(&mut outcome, &what, came)?;
+                progress((kind as f64 + strike as f64 / strikes as f64) / (Fault::ALL.len() + 1) as f64);
+            }
+            outcome.struck[kind] = (strikes, operations.len());
+        }
+        let mut rng = ChaCha8Rng::seed_from_u64(extent.seed);
+        while outcome.kills < extent.kills {
+            let mut at = Vec::new();
+            let mut words = case.command;
+            self.begin(case)?;
+            while at.len() < KILLS_IN_A_ROW {
+                let after = took.mul_f64(rng.random_range(0.0..1.0));
+                let mut command = self.command(words);
+                if process::run(&mut command, &self.folder.join("said"), Some(after))?.code.is_some() {
+                    break;
+                }
+                at.push(after);
+                words = case.go_on;
+            }
+            let came = self.go_on(case).and_then(|()| self.compare(&right));
+            self.note(&mut outcome, &format!("killed after {at:.3?}"), came)?;
+            outcome.kills += at.len();
+            let share = outcome.kills as f64 / extent.kills as f64;
+            progress((Fault::ALL.len() as f64 + share) / (Fault::ALL.len() + 1) as f64);
+        }
+        Ok(outcome)
+    }
+
+    /// Makes what a command reads.
+    fn prepare(&self, case: &Case) -> anyhow::Result<()> {
+        fs::create_dir_all(self.place(EMPTY))?;
+        fs::write(self.place(SMALL.0), SMALL.1)?;
+        let is_read = |name: &str| case.copy_of == Some(name) || case.command.contains(name);
+        for (name, command) in PREPARED.iter().filter(|(name, _)| is_read(name)) {
+            if !self.place(name).exists() {
+                self.complete(command)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What a command writes that is left alone, and how long it takes; counts the operations that a fault could strike.
+    fn undisturbed(&self, case: &Case, fault: Option<Fault>) -> anyhow::Result<(Content, Duration)> {
+        self.begin(case)?;
+        let mut command = self.command(case.command);
+        if let Some(fault) = fault {
+            self.library.load_into(&mut command, &self.run, fault, 0)?;
+        }
+        let ended = process::run(&mut command, &self.folder.join("said"), None)?;
+        ensure!(ended.is_done(), "{}: {}", case.command, ended.stderr);
+        Ok((Content::read(&self.run)?, ended.took))
+    }
+
+    /// Runs a command with one fault, and goes on if it does not do its work all the same.
+    fn strike(&self, case: &Case, fault: Fault, at: usize) -> anyhow::Result<()> {
+        self.begin(case)?;
+        let mut command = self.command(case.command);
+        self.library.load_into(&mut command, &self.run, fault, at)?;
+        let ended = process::run(&mut command, &self.folder.join("said"), None)?;
+        let is_dead = fault == Fault::Kill && ended.code.is_none();
+        ensure!(is_dead || ended.is_done() || ended.is_refusal(), "{}", said(&ended));
+        if ended.is_done() { Ok(()) } else { self.go_on(case) }
+    }
+
+    /// Goes on as a user does who reads what is said.
+    fn go_on(&self, case: &Case) -> anyhow::Result<()> {
+        let ended = self.ended(case.go_on)?;
+        if ended.is_done() || ended.stderr.contains("this run is finished") {
+            return Ok(());
+        }
+        let is_nothing = ["nothing was begun there", "there is no such run"].iter().any(|it| ended.stderr.contains(it));
+        ensure!(ended.is_refusal() && is_nothing, "going on: {}", said(&ended));
+        self.complete(case.command).context("beginning anew")
+    }
+
+    /// Compares what is there with what is right.
+    fn compare(&self, right: &Content) -> anyhow::Result<()> {
+        if let Some(difference) = Content::read(&self.run)?.difference(right) {
+            anyhow::bail!("{difference}");
+        }
+        let faults = if sums::exists(&self.run)? { sums::verify(&self.run).faults } else { Vec::new() };
+        ensure!(faults.is_empty(), "{faults:?}");
+        Ok(())
+    }
+
+    /// Keeps the folder of a failure, for whoever looks for its cause.
+    fn note(&self, outcome: &mut Outcome, what: &str, came: anyhow::Result<()>) -> anyhow::Result<()> {
+        let Err(error) = came else { return Ok(()) };
+        let kept = self.folder.join(format!("failure-{}", outcome.failures.len() + 1));
+        clear(&kept)?;
+        if self.run.exists() {
+            fs::rename(&self.run, &kept)?;
+        }
+        outcome.failures.push(format!("{what}: {error:#}; see {}", kept.display()));
+        ensure!(outcome.failures.len() < FAILURES_MAX, "{}", outcome.failures.join("\n"));
+        Ok(())
+    }
+
+    /// The folder of the run as the command finds it.
+    fn begin(&self, case: &Case) -> anyhow::Result<()> {
+        clear(&self.run)?;
+        case.copy_of.map_or(Ok(()), |name| copy(&self.place(name), &self.run))
+    }
+
+    fn complete(&self, words: &str) -> anyhow::Result<()> {
+        let ended = self.ended(words)?;
+        ensure!(ended.is_done(), "{words}: {}", said(&ended));
+        Ok(())
+    }
+
+    fn ended(&self, words: &str) -> anyhow::Result<Ended> {
+        process::run(&mut self.command(words), &self.folder.join("said"), None)
+    }
+
+    /// A command in words, with the folders that they name.
+    fn command(&self, words: &str) -> Command {
+        let names = || PREPARED.iter().map(|(name, _)| *name).chain([SMALL.0, "RUN"]);
+        let with_folder = |word: &str| {
+            let named = names().find_map(|name| Some((name, word.strip_prefix(name)?)));
+            named.map_or_else(|| word.to_owned(), |(name, rest)| format!("{}{rest}", self.place(name).display()))
+        };
+        let mut command = Command::new(&self.program);
+        command.current_dir(&self.folder).args(words.split_whitespace().map(with_folder));
+        command
+    }
+
+    fn place(&self, name: &str) -> PathBuf {
+        self.folder.join(name.to_lowercase())
+    }
+}
+
+fn said(ended: &Ended) -> String {
+    format!("exit code {:?}: {}", ended.code, ended.stderr.trim_end())
+}
+
+fn clear(folder: &Path) -> anyhow::Result<()> {
+    match fs::remove_dir_all(folder) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error).with_context(|| folder.display().to_string())
+        }
+        _ => Ok(()),
+    }
+}
+
+fn copy(from: &Path, to: &Path) -> anyhow::Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from).with_context(|| from.display().to_string())? {
+        let entry = entry?;
+        let to = to.join(entry.file_name());
+        if entry.file_type()?.is_dir() {
+            copy(&entry.path(), &to)?;
+        } else {
+            fs::copy(entry.path(), to)?;
+        }
+    }
+    Ok(())
+}
