@@ -1,166 +1,171 @@
-"""Evaluations and lots on a Ray cluster: the command line's shards as tasks.
+"""Evaluations and lots on a Ray cluster, shard by shard: ``pip install "lotpilot[ray]"``.
 
     import lotpilot.ray
-    lotpilot.ray.evaluate(["--driver", "run:runs/mine", "--lots", "test:1000"], shards=64, out="runs/on-ray",
-                          address="auto")
+    tables = lotpilot.ray.evaluate({"mine": my_policy, "expert": "expert"}, "test:1000", shards=64, out="runs/on-ray",
+                                   address="auto")
 
-A task drives one shard with the program ``xtask`` and hands back its files, which are written at once into ``OUT.shards/``;
-no file system has to be shared for that. A node that dies costs what it was driving: Ray starts its tasks elsewhere. What is in
-``OUT.shards/`` is not driven again by a later call with the same arguments. When all shards are there, ``xtask merge``
-puts them together: the same bytes as one machine writes.
+A task drives one shard and hands back its files, which are written at once into ``OUT.shards/``: nodes need no file
+system in common. A node that dies costs what it was driving; Ray begins those tasks elsewhere. Shards that are in
+``OUT.shards/`` are not driven again by a later call with the same arguments. When all are there they are merged into
+``OUT``: the same rows and tables as ``lotpilot.evaluate`` writes on one machine, byte for byte.
 
-Every node needs the program, built from the same revision, and the files that the arguments name, under the same paths.
+Every node needs the same wheel of lotpilot, and the files that drivers and lots name under the same paths.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import ray
 
+from . import _native, tables
+from .core import names
+from .tables import Driver, Evaluation, Table
+
 __all__ = ["ShardError", "evaluate", "generate"]
+
+Files = dict[str, bytes]
+"""The content of files by their paths within a folder."""
 
 
 class ShardError(RuntimeError):
-    """A shard that cannot be driven, with what the program said. Trying again would not help."""
-
-
-class _Killed(RuntimeError):
-    """The program was killed, for its memory perhaps: another attempt may succeed."""
+    """Shards that could not be driven, with the first reason; the others are kept."""
 
 
 def evaluate(
-    arguments: Sequence[str],
+    drivers: Driver | Sequence[Driver] | Mapping[str, Driver],
+    lots: str | Sequence[str] | None = None,
     *,
     shards: int,
     out: str | os.PathLike[str],
     address: str | None = None,
-    program: str | os.PathLike[str] | None = None,
     cpus: int = 1,
     retries: int = 3,
     progress: bool = True,
-) -> Path:
-    """Drives an evaluation on a Ray cluster and returns its folder.
+    **options: Any,
+) -> Evaluation:
+    """Does what ``lotpilot.evaluate`` does, on a Ray cluster.
 
-    arguments: those of ``cargo xtask evaluate``, without ``--out``, ``--shard`` and ``--resume``.
-    shards: how many tasks; several times as many as there are CPUs keep all of them busy to the end.
-    out: folder of the evaluation. It must not exist; the shards are kept in ``OUT.shards/`` beside it.
-    address: of the cluster, as ``ray.init`` takes it; ``None`` starts one on this machine, or uses the one in use.
-    program: path of ``xtask`` on every node; ``None``: ``$LOTPILOT_PROGRAM``, or ``target/debug/xtask``.
-    cpus: CPUs, and so threads, of a task.
-    retries: how often a shard is begun again whose node or process died.
-    progress: whether to count finished shards on stderr.
+    Args:
+        drivers: As there; functions are pickled, and called on the nodes.
+        lots: As there.
+        shards: How many tasks; several times as many as there are CPUs keep all of them busy to the end.
+        out: Folder for the files of the evaluation. The shards are kept in ``OUT.shards/`` beside it.
+        address: Of the cluster, as ``ray.init`` takes it; None uses the one in use, or starts one on this machine.
+        cpus: CPUs of a task, and its threads.
+        retries: How often a shard is begun again whose node or process died.
+        progress: Whether to count finished shards on stderr.
+        **options: The other keywords of ``lotpilot.evaluate``, but for ``overwrite``.
 
-    Raises ValueError if an argument is not possible, FileExistsError if ``out`` is there, or shards of other arguments are,
-    and ShardError with the message of the program if a shard or the merge fails; what was driven by then is kept.
+    Raises:
+        ValueError: If a number is out of range.
+        FileExistsError: If ``out`` is there, or ``OUT.shards/`` holds shards of other arguments.
+        ShardError: If shards cannot be driven; what was driven is kept, the reasons are in ``OUT.shards/failures.txt``.
     """
-    out, folder, program = _places(out, program)
+    request = tables.Request.of(drivers, lots, **options)
+    out = Path(out)
+    folder = out.with_name(out.name + ".shards")
     if out.exists():
         raise FileExistsError(f"{out}: exists already; choose another folder, or delete it")
-    _refuse(arguments, ("--out", "--overwrite", "--shard", "--resume", "--record"))
-    command = ["evaluate", *arguments]
-
-    def keep(number: int, files: dict[str, bytes]) -> None:
-        shard = folder / str(number)
-        partial = shard.with_name(f"{number}.partial")
-        shutil.rmtree(partial, ignore_errors=True)
-        _write(partial, files)
-        # A folder under its own name is whole.
-        shutil.rmtree(shard, ignore_errors=True)
-        partial.rename(shard)
-
-    _check_same(folder, command, shards)
-    missing = [number for number in range(1, shards + 1) if not (folder / str(number) / "finished.toml").exists()]
-    _drive(program, command, missing, shards, keep, folder, address, cpus, retries, progress)
-    parts = [str(folder / str(number)) for number in range(1, shards + 1)]
-    merged = subprocess.run([program, "--quiet", "merge", *parts, "--out", str(out)], capture_output=True, text=True)
-    if merged.returncode != 0:
-        raise ShardError(_said(merged.stderr))
-    return out
+    _claim(folder, {"evaluate": request.described(), "shards": shards, "lotpilot": _digest()})
+    parts = [folder / str(number) for number in range(1, shards + 1)]
+    missing = {part: (request, f"{part.name}/{shards}") for part in parts if not part.exists()}
+    _drive(_evaluate, missing, _keep, folder, len(parts), address, cpus, retries, progress)
+    return request.merge(parts, out)
 
 
 def generate(
-    arguments: Sequence[str],
+    lots: str | Sequence[str],
     *,
     shards: int,
     out: str | os.PathLike[str],
+    seed: int = 1,
+    count: int = 1,
     address: str | None = None,
-    program: str | os.PathLike[str] | None = None,
     cpus: int = 1,
     retries: int = 3,
     progress: bool = True,
-) -> Path:
-    """Writes lots, as ``cargo xtask generate`` does, with tasks on a Ray cluster, and returns their folder.
+) -> Table:
+    """Draws lots as ``lotpilot.generate`` does, on a Ray cluster. Files of the same name in ``out`` are replaced.
 
-    Files of the same name in ``out`` are replaced. Arguments and errors are those of :func:`evaluate`.
+    Args:
+        lots: As there.
+        seed: As there.
+        count: As there.
+        shards: As in ``evaluate``.
+        out: Folder for TOML and PNG files.
+        address: As in ``evaluate``.
+        cpus: As in ``evaluate``.
+        retries: As in ``evaluate``.
+        progress: As in ``evaluate``.
+
+    Returns:
+        Columns ``name``, ``path``, ``route_m`` and ``obstacles``, in the order of ``lotpilot.generate``.
+
+    Raises:
+        ValueError: If nothing is named so, or a number is out of range.
+        ShardError: As ``evaluate``.
     """
-    out, folder, program = _places(out, program)
-    _refuse(arguments, ("--out", "--overwrite", "--shard"))
-    _drive(program, ["generate", *arguments], list(range(1, shards + 1)), shards, lambda _, files: _write(out, files),
-           folder, address, cpus, retries, progress)
-    return out
+    out = Path(out)
+    single = _native.lots(names(lots, "lots"))
+    jobs = {f"{number}/{shards}": (single[number - 1 :: shards], seed, count) for number in range(1, shards + 1)}
+    jobs = {number: job for number, job in jobs.items() if job[0]}
+    drawn: dict[str, list[dict[str, Any]]] = {}
 
+    def keep(_: str, answer: tuple[list[dict[str, Any]], Files]) -> None:
+        rows, files = answer
+        _write(out, files)
+        for row in rows:
+            drawn.setdefault(row.pop("lot"), []).append({**row, "path": str(out / row["path"])})
 
-def _places(out: str | os.PathLike[str], program: str | os.PathLike[str] | None) -> tuple[Path, Path, str]:
-    out = Path(out).absolute()
-    program = Path(program or os.environ.get("LOTPILOT_PROGRAM") or "target/debug/xtask").absolute()
-    return out, out.with_name(out.name + ".shards"), str(program)
-
-
-def _refuse(arguments: Sequence[str], flags: Sequence[str]) -> None:
-    for argument in arguments:
-        if argument.split("=")[0] in flags:
-            raise ValueError(f"{argument} is not for shards; leave it out")
-
-
-def _check_same(folder: Path, command: list[str], shards: int) -> None:
-    """Refuses a folder with the shards of another evaluation."""
-    folder.mkdir(parents=True, exist_ok=True)
-    about, file = {"command": command, "shards": shards}, folder / "shards.json"
-    if not file.exists():
-        file.write_text(json.dumps(about), encoding="utf-8")
-    elif json.loads(file.read_text(encoding="utf-8")) != about:
-        raise FileExistsError(f"{folder}: holds shards of other arguments; delete it, or choose another out")
+    _drive(_generate, jobs, keep, out, len(jobs), address, cpus, retries, progress)
+    rows = [row for lot in single for row in drawn[lot]]
+    return {column: [row[column] for row in rows] for column in ("name", "path", "route_m", "obstacles")}
 
 
 def _drive(
-    program: str,
-    command: list[str],
-    numbers: list[int],
-    of: int,
-    keep: Callable[[int, dict[str, bytes]], None],
+    work: Callable[..., Any],
+    jobs: Mapping[Any, tuple[Any, ...]],
+    keep: Callable[[Any, Any], None],
     folder: Path,
+    of: int,
     address: str | None,
     cpus: int,
     retries: int,
     progress: bool,
 ) -> None:
-    """Runs the shards as tasks and keeps the files of each as it comes."""
+    """Does each job as a task, and keeps the answers as they come."""
     if of < 1 or cpus < 1 or retries < 0:
         raise ValueError("shards and cpus are 1 or more, retries 0 or more")
     if not ray.is_initialized():
         ray.init(address=address, log_to_driver=False)
-    task = ray.remote(_shard).options(num_cpus=cpus, max_retries=retries, retry_exceptions=[_Killed])
-    number_of = {task.remote(program, command, f"{number}/{of}", cpus, os.getcwd()): number for number in numbers}
-    pending, failed = list(number_of), []
+    task = ray.remote(_guarded(work.__name__, _digest())).options(
+        num_cpus=cpus, max_retries=retries, runtime_env={"env_vars": _environment(cpus)}
+    )
+    job_of = {task.remote(os.getcwd(), *arguments): job for job, arguments in jobs.items()}
+    pending, failed = list(job_of), []
     while pending:
         (ready,), pending = ray.wait(pending)
-        number = number_of[ready]
+        job = job_of[ready]
         try:
-            keep(number, ray.get(ready))
-        except (ShardError, _Killed, ray.exceptions.RayError) as error:
-            error = getattr(error, "cause", None) or error
-            failed.append(f"shard {number}/{of}: {error}")
+            answer = ray.get(ready)
+        except ray.exceptions.RayError as error:
+            answer = str(error).strip().splitlines()[-1]
+        if isinstance(answer, str):
+            failed.append(f"shard {getattr(job, 'name', job)}: {answer}")
             folder.mkdir(parents=True, exist_ok=True)
             with open(folder / "failures.txt", "a", encoding="utf-8") as file:
                 file.write(failed[-1] + "\n")
+        else:
+            keep(job, answer)
         if progress:
             done = of - len(pending) - len(failed)
             print(f"\r{done} of {of} shards, {len(failed)} failed", end="" if pending else "\n", file=sys.stderr)
@@ -168,29 +173,91 @@ def _drive(
         raise ShardError(f"{len(failed)} of {of} shards failed, the others are kept; {failed[0]}")
 
 
-def _shard(program: str, command: list[str], shard: str, threads: int, folder: str) -> dict[str, bytes]:
-    """The files that a shard comes to, by name. Runs on any node."""
-    if not Path(program).is_file():
-        raise ShardError(f"{program}: there is no such program on {os.uname().nodename}; build it there, or set program")
+def _environment(cpus: int) -> dict[str, str]:
+    """Of a task: as many threads as CPUs."""
+    return {"RAYON_NUM_THREADS": str(cpus)}
+
+
+def _guarded(name: str, digest: str) -> Callable[..., Any]:
+    """A function of this module as a task: what it returns, or as text why there is nothing to return.
+
+    Ray pickles it whole, as it is no part of a module: so a node without lotpilot can say so.
+    """
+
+    def task(folder: str, *arguments: Any) -> Any:
+        import os
+
+        where = f"node {os.uname().nodename}"
+        try:
+            from lotpilot import ray as here
+        except ImportError as error:
+            return f"{where} has no lotpilot ({error}); install the same wheel on every node"
+        if here._digest() != digest:
+            return f"{where} has another lotpilot than the caller; install the same wheel on every node"
+        try:
+            os.chdir(folder)
+            return getattr(here, name)(*arguments)
+        except Exception as error:
+            return f"{type(error).__name__}: {error}"
+
+    return task
+
+
+def _evaluate(request: tables.Request, shard: str) -> Files:
     with tempfile.TemporaryDirectory(prefix="lotpilot-") as scratch:
-        out = Path(scratch) / "shard"
-        line = [program, "--quiet", "--threads", str(threads), *command, "--shard", shard, "--out", str(out)]
-        ran = subprocess.run(line, cwd=folder, capture_output=True, text=True)
-        if ran.returncode < 0:
-            raise _Killed(f"the program was ended by signal {-ran.returncode}")
-        if ran.returncode != 0:
-            raise ShardError(_said(ran.stderr))
-        return {str(file.relative_to(out)): file.read_bytes() for file in sorted(out.rglob("*")) if file.is_file()}
+        out = Path(scratch, "shard")
+        request.drive(out, shard=shard)
+        return _files(out)
 
 
-def _write(folder: Path, files: dict[str, bytes]) -> None:
+def _generate(lots: list[str], seed: int, count: int) -> tuple[list[dict[str, Any]], Files]:
+    with tempfile.TemporaryDirectory(prefix="lotpilot-") as scratch:
+        rows = []
+        for lot in lots:
+            drawn = tables.generate(lot, seed=seed, count=count, out=scratch)
+            for name, path, route_m, obstacles in zip(
+                *(drawn[column] for column in ("name", "path", "route_m", "obstacles")), strict=True
+            ):
+                rows.append(
+                    {"lot": lot, "name": name, "path": Path(path).name, "route_m": route_m, "obstacles": obstacles}
+                )
+        return rows, _files(Path(scratch))
+
+
+def _digest() -> str:
+    """Of the native half: what tells one build of lotpilot from another."""
+    file = _native.__file__
+    assert file is not None
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+
+
+def _claim(folder: Path, about: dict[str, Any]) -> None:
+    """Refuses a folder with the shards of another evaluation."""
+    folder.mkdir(parents=True, exist_ok=True)
+    file, text = folder / "shards.json", json.dumps(about, default=str)
+    if not file.exists():
+        file.write_text(text, encoding="utf-8")
+    elif file.read_text(encoding="utf-8") != text:
+        raise FileExistsError(
+            f"{folder}: holds shards of other arguments or another lotpilot; delete it, or choose another out"
+        )
+
+
+def _keep(shard: Path, files: Files) -> None:
+    partial = shard.with_name(f"{shard.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    _write(partial, files)
+    # A folder under its own name is whole.
+    partial.rename(shard)
+
+
+def _files(folder: Path) -> Files:
+    found = (file for file in sorted(folder.rglob("*")) if file.is_file())
+    return {str(file.relative_to(folder)): file.read_bytes() for file in found}
+
+
+def _write(folder: Path, files: Files) -> None:
     for name, content in files.items():
         file = folder / name
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(content)
-
-
-def _said(stderr: str) -> str:
-    """What the program gave as its error."""
-    lines = [line for line in stderr.splitlines() if line.startswith("error: ")]
-    return (lines[-1] if lines else stderr.strip()[-1000:]).removeprefix("error: ")

@@ -1,26 +1,23 @@
 """lotpilot.ray on a local cluster: the bytes of one process, though a node dies half-way."""
 
 import os
-import subprocess
 import threading
 import time
-from pathlib import Path
 
+import numpy as np
 import pytest
+
+import lotpilot
 
 ray = pytest.importorskip("ray")
 from ray.cluster_utils import Cluster  # noqa: E402
 
 import lotpilot.ray  # noqa: E402
 
-ROOT = Path(__file__).parents[2]
-PROGRAM = Path(os.environ.get("LOTPILOT_PROGRAM") or ROOT / "target/debug/xtask")
 LOTS = os.environ.get("LOTPILOT_RAY_LOTS", "test:24:easy")
 SHARDS = int(os.environ.get("LOTPILOT_RAY_SHARDS", "12"))
 # These say who wrote the run, and when.
-DIFFER = {"manifest.toml", "report.html", "report.md", "sha256sums", "wall_time.jsonl", ".lock"}
-
-pytestmark = pytest.mark.skipif(not PROGRAM.is_file(), reason=f"{PROGRAM} is not built")
+DIFFER = {"manifest.toml", "sha256sums", "wall_time.jsonl", ".lock"}
 
 
 def files(folder):
@@ -39,60 +36,85 @@ def cluster():
     cluster.shutdown()
 
 
+def straight(grids):
+    return np.tile([8.0, 0.0], (len(grids), 1))
+
+
 def test_a_node_dies_and_the_tables_are_those_of_one_process(cluster, tmp_path):
     cluster, nodes = cluster
-    arguments = ["--driver", "tentacle", "cvm", "--lots", LOTS, "--noise", "clean,1.5"]
-    # Into the same folder one after the other: reports name it.
-    out = tmp_path / "run"
+    drivers = {"tentacle": "tentacle", "straight": straight}
+    options = {"trials": 1, "noise": ["clean", 1.5], "overrides": ["episode.metrics.events_max=10"]}
     one = time.monotonic()
-    subprocess.run([PROGRAM, "--quiet", "evaluate", *arguments, "--out", out], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
+    tables = lotpilot.evaluate(drivers, LOTS, out=tmp_path / "one", **options)
     one = time.monotonic() - one
-    expected = files(out)
-    out.rename(tmp_path / "one")
+    expected = files(tmp_path / "one")
+    out, folder = tmp_path / "ray", tmp_path / "ray.shards"
     killed = []
 
+    def done():
+        return sum(path.name.isdigit() for path in folder.glob("*"))
+
     def kill():
-        folder = tmp_path / "run.shards"
-        while sum(path.suffix == "" for path in folder.glob("[0-9]*")) < SHARDS // 2:
+        while done() < SHARDS // 2:
             time.sleep(0.02)
         cluster.remove_node(nodes[1], allow_graceful=False)
-        killed.append(len(list(folder.glob("[0-9]*"))))
+        killed.append(done())
 
     killer = threading.Thread(target=kill)
     killer.start()
     began = time.monotonic()
-    found = lotpilot.ray.evaluate(arguments, shards=SHARDS, out=out, program=PROGRAM)
-    print(f"one process {one:.1f} s, three nodes of which one died after {SHARDS // 2} of {SHARDS} shards {time.monotonic() - began:.1f} s")
+    found = lotpilot.ray.evaluate(drivers, LOTS, shards=SHARDS, out=out, **options)
+    took = time.monotonic() - began
     killer.join()
-    assert killed and killed[0] < SHARDS
-    assert files(found) == expected
+    assert killed[0] < SHARDS
+    print(f"one process {one:.1f} s; three nodes, of which one died after {killed[0]} of {SHARDS} shards, {took:.1f} s")
+    assert found == tables
+    assert files(out) == expected
     assert sum(node["Alive"] for node in ray.nodes()) == 2
 
     # Shards that are there are not driven again.
     out.rename(tmp_path / "first")
-    shard = tmp_path / "run.shards/3/runs.jsonl"
-    before = shard.stat().st_mtime_ns
-    lotpilot.ray.evaluate(arguments, shards=SHARDS, out=out, program=PROGRAM)
-    assert files(out) == expected and shard.stat().st_mtime_ns == before
+    before = (folder / "3/runs.jsonl").stat().st_mtime_ns
+    lotpilot.ray.evaluate(drivers, LOTS, shards=SHARDS, out=out, **options)
+    assert files(out) == expected and (folder / "3/runs.jsonl").stat().st_mtime_ns == before
     with pytest.raises(FileExistsError, match="exists already"):
-        lotpilot.ray.evaluate(arguments, shards=SHARDS, out=out, program=PROGRAM)
+        lotpilot.ray.evaluate(drivers, LOTS, shards=SHARDS, out=out, **options)
     out.rename(tmp_path / "second")
     with pytest.raises(FileExistsError, match="other arguments"):
-        lotpilot.ray.evaluate(["--driver", "expert"], shards=SHARDS, out=out, program=PROGRAM)
+        lotpilot.ray.evaluate("expert", shards=SHARDS, out=out)
 
 
-def test_what_cannot_be_driven_is_one_clear_error(cluster, tmp_path):
-    with pytest.raises(lotpilot.ray.ShardError, match='no lot "lot-z"'):
-        lotpilot.ray.evaluate(["--driver", "expert", "--lots", "lot-z"], shards=2, out=tmp_path / "a", program=PROGRAM)
-    assert 'no lot "lot-z"' in (tmp_path / "a.shards/failures.txt").read_text(encoding="utf-8")
-    with pytest.raises(lotpilot.ray.ShardError, match="there is no such program"):
-        lotpilot.ray.evaluate(["--driver", "expert"], shards=2, out=tmp_path / "b", program=tmp_path / "nothing")
-    with pytest.raises(ValueError, match="--shard is not for shards"):
-        lotpilot.ray.evaluate(["--shard", "1/2"], shards=2, out=tmp_path / "c", program=PROGRAM)
+def test_what_cannot_be_driven_is_one_clear_error(cluster, tmp_path, monkeypatch):
+    def broken(grids):
+        raise KeyError("weights")
+
+    def drive(driver, out, lots="lot-b", **options):
+        return lotpilot.ray.evaluate(driver, lots, trials=1, shards=2, out=tmp_path / out, **options)
+
+    with pytest.raises(lotpilot.ray.ShardError, match='"lot-z" is no lot'):
+        drive("expert", "a", lots="lot-z")
+    assert '"lot-z" is no lot' in (tmp_path / "a.shards/failures.txt").read_text(encoding="utf-8")
+    with pytest.raises(lotpilot.ray.ShardError, match="KeyError: 'weights'"):
+        drive({"broken": broken}, "b")
+    with pytest.raises(ValueError, match="1 or more"):
+        drive("expert", "c", cpus=0)
+    with pytest.raises(TypeError, match="overwrite"):
+        drive("expert", "d", overwrite=True)
+    # A node without the wheel, and one with another.
+    with monkeypatch.context() as other:
+        other.setattr(lotpilot.ray, "_digest", lambda: "another")
+        with pytest.raises(lotpilot.ray.ShardError, match="another lotpilot than the caller; install the same wheel"):
+            drive("expert", "e")
+    (tmp_path / "lotpilot.py").write_text("raise ImportError('not installed')")
+    monkeypatch.setattr(lotpilot.ray, "_environment", lambda cpus: {"PYTHONPATH": str(tmp_path)})
+    with pytest.raises(lotpilot.ray.ShardError, match=r"has no lotpilot .*; install the same wheel on every node"):
+        drive("expert", "f")
 
 
 def test_generate_writes_the_files_of_one_process(cluster, tmp_path):
-    arguments = ["--lots", "train:6:easy"]
-    subprocess.run([PROGRAM, "--quiet", "generate", *arguments, "--out", tmp_path / "one"], check=True, cwd=ROOT, stdout=subprocess.DEVNULL)
-    lotpilot.ray.generate(arguments, shards=3, out=tmp_path / "ray", program=PROGRAM)
+    one = lotpilot.generate("train:6:easy", out=tmp_path / "one")
+    found = lotpilot.ray.generate("train:6:easy", shards=4, out=tmp_path / "ray")
     assert files(tmp_path / "ray") == files(tmp_path / "one") != {}
+    assert {name: found[name] for name in ("name", "route_m", "obstacles")} == {
+        name: one[name] for name in ("name", "route_m", "obstacles")
+    }
