@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import ray
+from ray import cloudpickle
 
 from . import _native, tables
 from .core import names
@@ -150,7 +151,8 @@ def _drive(
     task = ray.remote(_guarded(work.__name__, _digest())).options(
         num_cpus=cpus, max_retries=retries, runtime_env={"env_vars": _environment(cpus)}
     )
-    job_of = {task.remote(os.getcwd(), *arguments): job for job, arguments in jobs.items()}
+    # Pickled here, so that a node without lotpilot can take them and say so.
+    job_of = {task.remote(os.getcwd(), cloudpickle.dumps(arguments)): job for job, arguments in jobs.items()}
     pending, failed = list(job_of), []
     while pending:
         (ready,), pending = ray.wait(pending)
@@ -184,8 +186,9 @@ def _guarded(name: str, digest: str) -> Callable[..., Any]:
     Ray pickles it whole, as it is no part of a module: so a node without lotpilot can say so.
     """
 
-    def task(folder: str, *arguments: Any) -> Any:
+    def task(folder: str, arguments: bytes) -> Any:
         import os
+        import pickle
 
         where = f"node {os.uname().nodename}"
         try:
@@ -196,7 +199,7 @@ def _guarded(name: str, digest: str) -> Callable[..., Any]:
             return f"{where} has another lotpilot than the caller; install the same wheel on every node"
         try:
             os.chdir(folder)
-            return getattr(here, name)(*arguments)
+            return getattr(here, name)(*pickle.loads(arguments))
         except Exception as error:
             return f"{type(error).__name__}: {error}"
 
