@@ -61,7 +61,7 @@ impl ShardRun {
         let name = folder.display();
         ensure!(sums::exists(folder)?, "{name}: this is no run; name the folders that evaluate --shard wrote");
         let mut manifest = Manifest::read(folder)?;
-        let record = manifest.arguments.remove(ARGUMENT).filter(|_| manifest.command == "evaluate");
+        let record = manifest.arguments.remove(ARGUMENT);
         let record = record
             .with_context(|| format!("{name}: this is no shard; name the folders that evaluate --shard wrote"))?;
         let record: ShardRecord = record.try_into().with_context(|| format!("{name}: manifest.toml"))?;

@@ -15,8 +15,9 @@ use storage::{FileError, read, sums};
 const EXPORT: &str = "write it again, as docs/formats.md shows under \"Networks of others: ONNX\"";
 
 /// Grids that are answered in one call where the file leaves that open. Always as many: with another number, a runtime may add
-/// in another order, and the answer for one car would depend on how many others are still driving.
-const BATCH: usize = 16;
+/// in another order, and the answer for one car would depend on how many others are still driving. One: nothing is computed
+/// in vain when few cars are left, and rten takes hardly longer for each grid than in larger batches.
+const BATCH: usize = 1;
 
 /// Cells of a grid.
 const CELLS: usize = GRID_CELLS * GRID_CELLS;
@@ -119,32 +120,34 @@ impl OnnxNetwork {
         mirror_averaging: bool,
         pool: &Arc<ThreadPool>,
     ) -> Vec<Option<Prediction>> {
-        let mut answers = self.raw(grids, pool);
-        if mirror_averaging {
+        let answers = if mirror_averaging {
             let mirrored: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
-            let of_images = self.raw(&mirrored.iter().collect::<Vec<_>>(), pool);
+            let both: Vec<_> = grids.iter().copied().chain(&mirrored).collect();
+            let mut answers = self.raw(&both, pool);
+            let of_images = answers.split_off(grids.len());
             for (answer, [u, w, raw_u, raw_w]) in answers.iter_mut().zip(of_images) {
                 let image = [1.0 - u, w, raw_u, raw_w];
                 *answer = std::array::from_fn(|i| 0.5 * (answer[i] + image[i]));
             }
-        }
+            answers
+        } else {
+            self.raw(grids, pool)
+        };
         let is_finite = |raw: &[f32; OUTPUTS]| raw.iter().all(|value| value.is_finite());
         answers.into_iter().map(|raw| is_finite(&raw).then(|| Prediction::from_raw(raw))).collect()
     }
 
     /// Raw outputs per grid; those that the network does not have are 0, and what fails is no number.
     fn raw(&self, grids: &[&OccupancyGrid], pool: &Arc<ThreadPool>) -> Vec<[f32; OUTPUTS]> {
-        let mut answers = Vec::with_capacity(grids.len());
-        for grids in grids.chunks(self.batch) {
-            let ran = self.run(grids, pool).ok().filter(|(numbers, _)| *numbers == self.numbers);
-            answers.extend((0..grids.len()).map(|row| {
-                let Some((numbers, values)) = &ran else { return [f32::NAN; OUTPUTS] };
-                let mut raw = [0.0; OUTPUTS];
-                raw[..*numbers].copy_from_slice(&values[row * numbers..(row + 1) * numbers]);
-                raw
-            }));
-        }
-        answers
+        let answer = |grids: &[&OccupancyGrid]| match self.run(grids, pool) {
+            Ok((numbers, values)) if numbers == self.numbers => {
+                let raw = |row: &[f32]| std::array::from_fn(|i| row.get(i).copied().unwrap_or(0.0));
+                values.chunks_exact(numbers).take(grids.len()).map(raw).collect()
+            }
+            _ => vec![[f32::NAN; OUTPUTS]; grids.len()],
+        };
+        // Within the pool, its thread is not woken for every batch.
+        pool.run(|| grids.chunks(self.batch).flat_map(answer).collect())
     }
 
     /// Runs a whole batch whose last rows are free ground: how many numbers each row has, and all of them.

@@ -7,6 +7,7 @@ Prints near-collisions per 100 m on lots that were not trained on, after every r
 """
 
 import argparse
+import time
 
 import numpy as np
 import torch
@@ -60,6 +61,11 @@ if __name__ == "__main__":
     envs = LotVectorEnv(asked.cars, lots=["lot-a", "train:20"])
     net, seen, labels = Net(), [], []
     observed, _ = envs.reset(seed=1)
+    began = time.monotonic()
+
+    def say(what: str) -> None:
+        print(f"{time.monotonic() - began:4.0f} s: {what}", flush=True)
+
     for round in range(asked.rounds + 1):
         for _ in range(asked.ticks):
             expert = envs.expert_actions()
@@ -69,7 +75,9 @@ if __name__ == "__main__":
             labels.append(expert[driving])
             # Behaviour cloning first: there the expert drives.
             observed, *_ = envs.step(expert if round == 0 else net.drive(observed))
+        say(f"round {round}: driven, {sum(map(len, seen))} samples")
         fit(net, np.concatenate(seen), np.concatenate(labels), asked.fit)
+        say(f"round {round}: learned")
         table = lotpilot.evaluate({f"round {round}": net}, ["test:6"], trials=1, seed=7).summary
-        print(f"round {round}: {sum(map(len, seen))} samples, {table['per_100m'][0]:.2f} near-collisions per 100 m")
+        say(f"round {round}: {table['per_100m'][0]:.2f} near-collisions per 100 m")
     torch.save(net.state_dict(), "dagger-lotpilot.pt")

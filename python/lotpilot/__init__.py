@@ -8,6 +8,9 @@
 ``EnvOptions``, ``Reward``        what the environments are made of
 ``lotpilot.gym``                  ``gymnasium.make("lotpilot/Lot-v0")`` and a native ``VectorEnv``
 ``lotpilot.sb3``                  a ``VecEnv`` for Stable-Baselines3 and imitation
+``lotpilot.puffer``               a ``PufferEnv`` for PufferLib
+``lotpilot.exports``              what a training collected, for imitation and LeRobot
+``lotpilot.ray``                  evaluations and lots on a Ray cluster
 ``python -m lotpilot.bench``      how fast it is on this machine
 ================================  ==============================================================
 

@@ -79,6 +79,15 @@ def evaluate(
     settings: Mapping[str, Any],
     out: PathLike[str],
     overwrite: bool,
+    shard: str | None,
+) -> None: ...
+def merge(
+    drivers: Sequence[tuple[str, str | Callable[..., npt.NDArray[np.float32]]]],
+    trials: Mapping[str, Any],
+    settings: Mapping[str, Any],
+    out: PathLike[str],
+    overwrite: bool,
+    shards: Sequence[PathLike[str]],
 ) -> None: ...
 def read_round(run: PathLike[str], round: int) -> dict[str, Any]: ...
 

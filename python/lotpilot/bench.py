@@ -8,12 +8,17 @@ on a quiet machine, steps/s is that times the threads in use.
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import os
 import platform
 import statistics
+import sys
+import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -66,12 +71,10 @@ def one_by_one(name: str, action: Callable[[gymnasium.Env[object, object]], obje
     return lambda seconds: until(seconds, step)
 
 
-def peers() -> Iterable[tuple[str, Drive]]:
-    """Other simulators, where they are installed."""
-    try:
-        import highway_env
-    except ImportError:
-        return
+def highway_env() -> Drive:
+    """The racetrack of HighwayEnv, observed as an occupancy grid of as many cells of the same size."""
+    import highway_env
+
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         if hasattr(highway_env, "_register_highway_envs"):
@@ -79,13 +82,64 @@ def peers() -> Iterable[tuple[str, Drive]]:
         grid = {
             "type": "OccupancyGrid",
             "features": ["presence", "on_road"],
-            "grid_size": [[-18, 18], [-18, 18]],
-            "grid_step": [3, 3],
+            "grid_size": [[-6, 6], [-6, 6]],
+            "grid_step": [0.48, 0.48],
             "align_to_vehicle_axes": True,
         }
         config = {"observation": grid, "policy_frequency": 5, "simulation_frequency": 15}
-        drive = one_by_one("racetrack-v0", lambda env: np.zeros(env.action_space.shape or ()), config=config)
-    yield "HighwayEnv racetrack, one env: clean 12×12 grid, other cars, 3 physics steps", drive
+        return one_by_one("racetrack-v0", lambda env: np.zeros(env.action_space.shape or ()), config=config)
+
+
+PARKED = "".join(
+    f"  - {{shape: {{name: rectangle, length: 2.0, width: 4.6}}, state: [{2.4 * i}, {y}, 0]}}\n"
+    for i in range(20)
+    for y in (4.2, -4.2)
+)
+IR_SIM = f"""
+world: {{height: 60, width: 60, step_time: 0.05, sample_time: 0.05, offset: [0, -30], collision_mode: unobstructed}}
+robot:
+  - kinematics: {{name: acker}}
+    shape: {{name: rectangle, length: 4.6, width: 1.8, wheelbase: 2.8}}
+    state: [2, 0, 0, 0]
+    goal: [50, 0, 0]
+    behavior: {{name: dash}}
+    vel_max: [1.5, 0.5]
+    sensors:
+      - {{type: lidar2d, range_min: 0, range_max: 16, angle_range: 3.14, number: 180, noise: false}}
+obstacle:
+{PARKED}"""
+
+
+def ir_sim() -> Drive:
+    """A car that heads for a goal between two rows of parked cars in IR-SIM."""
+    with tempfile.TemporaryDirectory(prefix="lotpilot-") as scratch, contextlib.redirect_stdout(io.StringIO()):
+        # It lists the windows that it cannot open and the packages that it does without.
+        os.environ.setdefault("MPLBACKEND", "Agg")
+        import irsim
+
+        world = Path(scratch, "world.yaml")
+        world.write_text(IR_SIM, encoding="utf-8")
+        env = irsim.make(str(world), display=False, log_level="ERROR")
+
+    def step() -> int:
+        env.step()
+        if env.done():
+            env.reset()
+        return 1
+
+    return lambda seconds: until(seconds, step)
+
+
+def peers() -> Iterable[tuple[str, Drive]]:
+    """Other simulators, where they are installed."""
+    for name, make in [
+        ("HighwayEnv racetrack, one env: clean 25×25 grid, other cars, 3 physics steps", highway_env),
+        ("IR-SIM, one car between 40 parked: scan of 180 rays, collisions, 1 physics step", ir_sim),
+    ]:
+        try:
+            yield name, make()
+        except ImportError:
+            print(f"not installed: {name.partition(',')[0]}", file=sys.stderr)
 
 
 def rows(cars: int, threads: int) -> list[tuple[str, Drive]]:

@@ -25,7 +25,8 @@ def load_round(run: str | os.PathLike[str], round: int = 0) -> dict[str, Any]:
         ahead and left in metres; ``image_fractions`` float32 [n, 2], the same as the network learns it; ``tau_hat``
         float32 [n]; ``noise_augmentations`` uint8 [n, k, 25, 25]; ``is_novice`` bool [n]; and of every sample
         ``episode``, ``tick``, ``time_s``, ``x_m``, ``y_m``, ``heading_rad``, ``speed_mps``, ``steering_rad``,
-        ``command_steering_rad``, ``command_speed_mps``. Beside them, ``lots`` and ``directions`` of every episode.
+        ``command_steering_rad``, ``command_speed_mps``. Beside them, ``lots`` and ``directions`` of every episode, and
+        ``control_period_s``, a number: the time from tick to tick.
 
     Raises:
         ValueError: If there is no such round, or one of its files is damaged.

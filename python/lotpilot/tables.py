@@ -81,31 +81,88 @@ def evaluate(
         ValueError: If something is not known by its name, or a function answers with anything but finite points.
         Exception: What a function raises.
     """
-    loaded = [
-        (name, driver if isinstance(driver, str) else _function(name, driver)) for name, driver in _named(drivers)
-    ]
-    levels = None if noise is None else [noise] if isinstance(noise, (str, int, float)) else list(noise)
-    which = {
-        "lots": None if lots is None else names(lots, "lots"),
-        "trials": trials,
-        "directions": directions,
-        "noise": None if levels is None else [str(level) for level in levels],
-        "seed": seed,
-        "smoothing": None if smoothing is None else str(smoothing),
-        "compare_with": compare_with,
-    }
-    settings = settings_from(preset, config, overrides)
+    request = Request.of(
+        drivers,
+        lots,
+        trials=trials,
+        directions=directions,
+        noise=noise,
+        seed=seed,
+        smoothing=smoothing,
+        compare_with=compare_with,
+        preset=preset,
+        config=config,
+        overrides=overrides,
+    )
     with tempfile.TemporaryDirectory(prefix="lotpilot-") as scratch:
         folder = Path(scratch, "evaluation") if out is None else Path(out)
-        _native.evaluate(loaded, which, settings, folder, overwrite)
-        tables = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-        return Evaluation(
-            summary=_table(tables["rows"]),
-            comparisons=_table(tables["comparisons"]),
-            causes=_table(tables["causes"]),
-            runs=_table([_flat(line) for line in _lines(folder / "runs.jsonl")]),
-            failures=_table(_lines(folder / "failures.jsonl")),
-        )
+        request.drive(folder, overwrite=overwrite)
+        return _read(folder)
+
+
+@dataclass(frozen=True)
+class Request:
+    """An evaluation as it is asked for, here or on another machine: what ``evaluate`` takes, but for its folder."""
+
+    drivers: Sequence[tuple[str, Driver]]
+    which: Mapping[str, Any]
+    settings: Mapping[str, Any]
+
+    @staticmethod
+    def of(
+        drivers: Driver | Sequence[Driver] | Mapping[str, Driver],
+        lots: str | Sequence[str] | None = None,
+        *,
+        trials: int | None = None,
+        directions: str | None = None,
+        noise: str | float | Sequence[str | float] | None = None,
+        seed: int | None = None,
+        smoothing: str | float | None = None,
+        compare_with: str | None = None,
+        preset: str | None = None,
+        config: str | os.PathLike[str] | None = None,
+        overrides: Sequence[str] = (),
+    ) -> Request:
+        """See ``evaluate``."""
+        levels = None if noise is None else [noise] if isinstance(noise, (str, int, float)) else list(noise)
+        which = {
+            "lots": None if lots is None else names(lots, "lots"),
+            "trials": trials,
+            "directions": directions,
+            "noise": None if levels is None else [str(level) for level in levels],
+            "seed": seed,
+            "smoothing": None if smoothing is None else str(smoothing),
+            "compare_with": compare_with,
+        }
+        return Request(_named(drivers), which, settings_from(preset, config, overrides))
+
+    def described(self) -> dict[str, Any]:
+        """What it asks for, as plain values; functions by name."""
+        drivers = [[name, driver if isinstance(driver, str) else "function"] for name, driver in self.drivers]
+        return {"drivers": drivers, **self.which, **self.settings}
+
+    def drive(self, folder: Path, *, overwrite: bool = False, shard: str | None = None) -> None:
+        """Writes the files of the evaluation, or of a shard of it."""
+        _native.evaluate(self._loaded(), self.which, self.settings, folder, overwrite, shard)
+
+    def merge(self, shards: Sequence[Path], folder: Path) -> Evaluation:
+        """Puts shards together."""
+        _native.merge(self._loaded(), self.which, self.settings, folder, False, shards)
+        return _read(folder)
+
+    def _loaded(self) -> list[tuple[str, Any]]:
+        return [(name, one if isinstance(one, str) else _function(name, one)) for name, one in self.drivers]
+
+
+def _read(folder: Path) -> Evaluation:
+    tables = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    return Evaluation(
+        summary=_table(tables["rows"]),
+        comparisons=_table(tables["comparisons"]),
+        causes=_table(tables["causes"]),
+        runs=_table([_flat(line) for line in _lines(folder / "runs.jsonl")]),
+        failures=_table(_lines(folder / "failures.jsonl")),
+    )
 
 
 def generate(

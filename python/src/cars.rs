@@ -3,7 +3,7 @@
 use crate::arrays::{SeenArrays, Target, pairs, points};
 use crate::car::{ACTION, ActionKind, Car, INFO, Outcome, Seen};
 use crate::course::{Course, SettingsFrom};
-use crate::guard::{EpisodeEnded, detached, input};
+use crate::guard::{EpisodeEnded, caught, detached, input};
 use crate::reward::Reward;
 use numpy::{Ix2, PyArray, PyArray3, PyArrayMethods as _};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
@@ -19,6 +19,9 @@ use sim::limits::THREADS_MAX;
 use sim::seed::RootSeed;
 use sim::sensing::GRID_CELLS;
 use std::collections::BTreeMap;
+
+/// Environments that step together at most; a car takes some kilobytes, and its lot more.
+const COUNT_MAX: usize = 65_536;
 
 /// When an episode that has ended is followed by the next (gymnasium's `AutoresetMode`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,8 +109,8 @@ impl Cars {
         digests: bool,
     ) -> PyResult<Self> {
         let wrong = |problem: String| Err(PyValueError::new_err(problem));
-        if count == 0 {
-            return wrong("0 environments are none".to_owned());
+        if !(1..=COUNT_MAX).contains(&count) {
+            return wrong(format!("{count} environments are not within 1 … {COUNT_MAX}"));
         }
         let kind = match action {
             "look_ahead" => ActionKind::LookAhead,
@@ -122,7 +125,7 @@ impl Cars {
         };
         let cars = (0..count as u64).map(|index| Car::new(RootSeed(seed), index, count as u64, digests)).collect();
         Ok(Self {
-            course: Course::new(settings, &lots, directions, trials, noise).map_err(input)?,
+            course: caught(|| Course::new(settings, &lots, directions, trials, noise).map_err(input))?,
             cars,
             kind,
             autoreset,

@@ -13,27 +13,25 @@ use sim::driver::{LookAheadPoint, Source};
 use sim::sensing::{GRID_CELLS, OccupancyGrid};
 use std::path::PathBuf;
 
-/// Reads a number of every tick.
-type Column = fn(&Tick) -> f32;
-
 /// The columns of a round of a run; see `lotpilot.load_round`.
 #[pyfunction]
 pub(crate) fn read_round(py: Python<'_>, run: PathBuf, round: u32) -> PyResult<Bound<'_, PyDict>> {
     if !run.is_dir() {
         return Err(PyValueError::new_err(format!("{}: there is no such run", run.display())));
     }
-    let (data, collection, geometry) = detached(py, || {
+    let (data, collection, episode) = detached(py, || {
         let settings = run_dir::settings_of(&run).map_err(input)?;
         let (data, collection) = Store::open(&run).and_then(|store| store.read_round(round)).map_err(input)?;
-        Ok((data, collection, settings.episode.sensing.geometry))
+        Ok((data, collection, settings.episode))
     })?;
+    let geometry = &episode.sensing.geometry;
     let n = data.samples.len();
     let grids =
         |grids: &mut dyn Iterator<Item = &OccupancyGrid>| -> Vec<u8> { grids.flat_map(OccupancyGrid::cells).collect() };
     let columns = PyDict::new(py);
     let shown = grids(&mut data.samples.iter().map(|sample| &sample.grid));
     columns.set_item("grids", PyArray::from_vec(py, shown).reshape([n, GRID_CELLS, GRID_CELLS])?)?;
-    let label = |label| LookAheadPoint::from_image_fraction(label, &geometry);
+    let label = |label| LookAheadPoint::from_image_fraction(label, geometry);
     let labels = data.samples.iter().map(|sample| label(sample.label)).map(|point| [point.ahead_m, point.left_m]);
     columns.set_item("points", points(py, labels)?)?;
     columns.set_item("image_fractions", points(py, data.samples.iter().map(|sample| sample.label))?)?;
@@ -45,17 +43,7 @@ pub(crate) fn read_round(py: Python<'_>, run: PathBuf, round: u32) -> PyResult<B
     let ticks = &data.ticks;
     columns.set_item("episode", PyArray::from_vec(py, ticks.iter().map(|tick| i64::from(tick.episode)).collect()))?;
     columns.set_item("tick", PyArray::from_vec(py, ticks.iter().map(|tick| i64::from(tick.tick)).collect()))?;
-    let floats: [(&str, Column); 8] = [
-        ("time_s", |tick| tick.time_s),
-        ("x_m", |tick| tick.x_m),
-        ("y_m", |tick| tick.y_m),
-        ("heading_rad", |tick| tick.heading_rad),
-        ("speed_mps", |tick| tick.speed_mps),
-        ("steering_rad", |tick| tick.steering_rad),
-        ("command_steering_rad", |tick| tick.command_steering_rad),
-        ("command_speed_mps", |tick| tick.command_speed_mps),
-    ];
-    for (name, of) in floats {
+    for (name, of) in Tick::FLOATS {
         columns.set_item(name, PyArray::from_vec(py, ticks.iter().map(of).collect()))?;
     }
     let is_novice = ticks.iter().map(|tick| tick.driver == Source::Novice).collect();
@@ -64,5 +52,6 @@ pub(crate) fn read_round(py: Python<'_>, run: PathBuf, round: u32) -> PyResult<B
     columns.set_item("lots", lots)?;
     let directions: Vec<&str> = collection.episodes.iter().map(|episode| episode.direction.name()).collect();
     columns.set_item("directions", directions)?;
+    columns.set_item("control_period_s", episode.control_period_s())?;
     Ok(columns)
 }

@@ -3,17 +3,20 @@
 use crate::callback::{Failure, Function, Watch};
 use crate::course::{SettingsFrom, directions, noise};
 use crate::guard::{detached, input};
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use evaluation::plan::Plan;
+use evaluation::shards::{ShardRecord, Shards};
 use evaluation::summary::Summary;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::run_dir::{self, Build, Outcome, Place, Request, RunDir};
 use experiment::settings::{Layers, Settings};
+use experiment::shard::Shard;
 use pyo3::prelude::*;
+use serde::Serialize;
 use sim::seed::RootSeed;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Which trials; what is `None` is as in the settings.
@@ -36,7 +39,8 @@ pub(crate) enum Named {
     Function(Py<PyAny>),
 }
 
-/// Drives named drivers and functions on the same trials and writes the files of `cargo xtask evaluate` into `out`.
+/// Drives named drivers and functions on the same trials and writes the files of `cargo xtask evaluate` into `out`; of a
+/// shard, as `"2/16"`, only what [`merge`] needs.
 #[pyfunction]
 pub(crate) fn evaluate(
     py: Python<'_>,
@@ -45,11 +49,67 @@ pub(crate) fn evaluate(
     settings: SettingsFrom,
     out: PathBuf,
     overwrite: bool,
+    shard: Option<String>,
 ) -> PyResult<()> {
     let failure = Failure::default();
     let watch = Watch { failure: failure.clone() };
     let work = || {
-        let settings = settings_of(&drivers, settings.into(), &trials)?;
+        let shard = shard.map(|shard| shard.parse::<Shard>()).transpose().map_err(anyhow::Error::msg)?;
+        let asked = Asked::new(drivers, &trials, settings, &failure)?;
+        let plan = asked.plan(shard);
+        plan.check()?;
+        let run = asked.begin(&plan, &out, overwrite)?;
+        asked.finish(&plan, &run, &watch)
+    };
+    let done = detached(py, || work().map_err(input));
+    failure.take().map_or(done, Err)
+}
+
+/// Puts the shards of an evaluation together: what [`evaluate`] writes without one. Drives nothing.
+#[pyfunction]
+pub(crate) fn merge(
+    py: Python<'_>,
+    drivers: Vec<(String, Named)>,
+    trials: Trials,
+    settings: SettingsFrom,
+    out: PathBuf,
+    overwrite: bool,
+    shards: Vec<PathBuf>,
+) -> PyResult<()> {
+    let failure = Failure::default();
+    let watch = Watch { failure: failure.clone() };
+    let work = || {
+        let asked = Asked::new(drivers, &trials, settings, &failure)?;
+        let shards = Shards::read(&shards)?;
+        let is_asked_for =
+            *shards.settings() == asked.settings && shards.manifest().arguments == asked.arguments(None)?;
+        ensure!(is_asked_for, "the shards are of other drivers or settings than are asked for; drive them again");
+        shards.manifest().check_inputs(&inputs::of(&asked.lots, &asked.drivers))?;
+        let plan = asked.plan(None);
+        let rows = shards.rows(&plan)?;
+        let run = asked.begin(&plan, &out, overwrite)?;
+        rows.write(&run)?;
+        asked.finish(&plan, &run, &watch)
+    };
+    detached(py, || work().map_err(input))
+}
+
+/// What is to be driven, loaded.
+struct Asked {
+    settings: Settings,
+    drivers: Vec<NamedDriver>,
+    lots: Vec<Lot>,
+    compare_with: usize,
+}
+
+impl Asked {
+    fn new(
+        drivers: Vec<(String, Named)>,
+        trials: &Trials,
+        settings: SettingsFrom,
+        failure: &Failure,
+    ) -> anyhow::Result<Self> {
+        let settings = settings_of(&drivers, settings.into(), trials)?;
         let loaded = drivers.into_iter().map(|(name, driver)| match driver {
             Named::Spec(spec) => Ok(spec.parse::<DriverSpec>()?.load(&settings)?.renamed(&name)),
             Named::Function(function) => {
@@ -63,28 +123,59 @@ pub(crate) fn evaluate(
             None => Some(0),
         };
         let compare_with = compare_with.context("compare_with: name one of the drivers")?;
-        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with, shard: None };
-        plan.check()?;
+        Ok(Self { settings, drivers, lots, compare_with })
+    }
+
+    fn plan(&self, shard: Option<Shard>) -> Plan<'_> {
+        let Self { settings, drivers, lots, compare_with } = self;
+        Plan { settings, drivers, lots, compare_with: *compare_with, shard }
+    }
+
+    /// What the manifest says beside the settings.
+    fn arguments(&self, shard: Option<ShardRecord>) -> anyhow::Result<toml::Table> {
+        #[derive(Serialize)]
+        struct Arguments {
+            drivers: Vec<String>,
+            names: Vec<String>,
+            compare_with: usize,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            shard: Option<ShardRecord>,
+        }
+        let names = self.drivers.iter().map(|driver| driver.name.clone()).collect();
+        let arguments = Arguments { drivers: self.specs(), names, compare_with: self.compare_with, shard };
+        Ok(toml::Table::try_from(arguments)?)
+    }
+
+    fn specs(&self) -> Vec<String> {
+        self.drivers.iter().map(|driver| driver.spec.to_string()).collect()
+    }
+
+    /// Claims the folder.
+    fn begin(&self, plan: &Plan<'_>, out: &Path, overwrite: bool) -> anyhow::Result<RunDir> {
         let build = Build {
             program: concat!("lotpilot ", env!("CARGO_PKG_VERSION"), ", Python").to_owned(),
             ..Build::default()
         };
         let place = Place {
             build: &build,
-            out: Some(&out),
+            out: Some(out),
             overwrite,
             command: "lotpilot.evaluate",
             preset: "python",
-            seed: settings.evaluation.seed.0,
+            seed: self.settings.evaluation.seed.0,
         };
-        let request = Request { inputs: inputs::of(&lots, &drivers), ..Request::default() };
-        let run = RunDir::create(&place, &settings, &request)?;
-        let Some(results) = evaluation::evaluate::evaluate(&plan, &run, &watch)? else { return Ok(()) };
-        Summary::new(&plan, &results).write(&run)?;
-        run.finish(Outcome::Evaluation { drivers: drivers.iter().map(|driver| driver.spec.to_string()).collect() })
-    };
-    let done = detached(py, || work().map_err(input));
-    failure.take().map_or(done, Err)
+        let arguments = self.arguments(ShardRecord::of(plan))?;
+        RunDir::create(&place, &self.settings, &Request { arguments, inputs: inputs::of(&self.lots, &self.drivers) })
+    }
+
+    /// Drives what is not driven yet, and writes the tables unless it is a shard.
+    fn finish(&self, plan: &Plan<'_>, run: &RunDir, watch: &Watch) -> anyhow::Result<()> {
+        let Some(results) = evaluation::evaluate::evaluate(plan, run, watch)? else { return Ok(()) };
+        if plan.shard.is_none() {
+            Summary::new(plan, &results).write(run)?;
+        }
+        run.finish(Outcome::Evaluation { drivers: self.specs() })
+    }
 }
 
 /// The settings of the first run that drives, unless others are named, with the trials laid over them.

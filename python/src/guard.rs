@@ -31,7 +31,15 @@ pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> PyResult<
              processes with multiprocessing's method \"spawn\" or \"forkserver\"",
         ));
     }
-    py.detach(|| catch_unwind(AssertUnwindSafe(work))).unwrap_or_else(|panic| Err(bug(&*panic)))
+    py.detach(|| caught(work))
+}
+
+/// Works without threads.
+///
+/// # Errors
+/// Those of the work, and a panic, which is a bug of lotpilot.
+pub(crate) fn caught<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(bug(&*panic)))
 }
 
 fn bug(panic: &(dyn Any + Send)) -> PyErr {

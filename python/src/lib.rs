@@ -41,7 +41,7 @@ mod _native {
     #[pymodule_export]
     use crate::data::read_round;
     #[pymodule_export]
-    use crate::evaluate::evaluate;
+    use crate::evaluate::{evaluate, merge};
     #[pymodule_export]
     use crate::guard::EpisodeEnded;
     #[pymodule_export]

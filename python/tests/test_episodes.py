@@ -12,6 +12,7 @@ import tomllib
 import lotpilot
 from lotpilot import _native
 from lotpilot.core import Core, EnvOptions, settings_from
+from lotpilot.tables import Request
 
 ROOT = Path(__file__).resolve().parents[2]
 SHORT = ("episode.metrics.timeout_s=4.0",)
@@ -95,6 +96,32 @@ def test_an_evaluation_leaves_the_files_of_the_command_line(tmp_path):
     assert tables.runs["reference_m"][0] == pytest.approx(139, abs=1)
     with pytest.raises(ValueError, match="straight"):
         lotpilot.evaluate("expert", "lot-b", overrides=SHORT, out=folder)
+
+
+def test_shards_merge_to_the_bytes_of_one_process(tmp_path):
+    """What lotpilot.ray does, without Ray."""
+
+    def straight(grids):
+        return np.tile([8.0, 0.0], (len(grids), 1))
+
+    request = Request.of({"straight": straight, "cvm": "cvm"}, ["lot-b", "test:2:easy"], trials=2, overrides=SHORT)
+    request.drive(tmp_path / "one")
+    shards = [tmp_path / str(number) for number in (1, 2, 3)]
+    for shard in shards:
+        request.drive(shard, shard=f"{shard.name}/3")
+        assert not (shard / "summary.json").exists(), "no table of a part"
+    tables = request.merge(shards[::-1], tmp_path / "merged")
+    assert len(tables.runs["driver"]) == 2 * 3 * 2 * 2
+    for name in ("runs.jsonl", "failures.jsonl", "summary.json", "settings.toml"):
+        assert (tmp_path / "merged" / name).read_bytes() == (tmp_path / "one" / name).read_bytes(), name
+    with pytest.raises(ValueError, match="missing: shard 2/3"):
+        request.merge([shards[0], shards[2]], tmp_path / "part")
+    other = Request.of({"straight": straight}, ["lot-b", "test:2:easy"], trials=2, overrides=SHORT)
+    with pytest.raises(ValueError, match="other drivers or settings"):
+        other.merge(shards, tmp_path / "other")
+    with pytest.raises(ValueError, match="no shard"):
+        request.drive(tmp_path / "none", shard="4/3")
+    assert not (tmp_path / "part").exists() and not (tmp_path / "other").exists()
 
 
 def test_the_expert_asked_twice_in_a_tick_answers_once():
@@ -191,6 +218,7 @@ def test_settings_are_those_of_the_command_line():
         (lambda: EnvOptions(reward={"speed": 1.0}).weights(), ValueError, "there are progress"),
         (lambda: EnvOptions.of({"lot": "lot-a"}), TypeError, "there are lots"),
         (lambda: Core(0, EnvOptions(), "disabled"), ValueError, "0 environments"),
+        (lambda: Core(10**9, EnvOptions(), "disabled"), ValueError, "environments are not within"),
         (lambda: Core(1, EnvOptions(trials=0), "disabled"), ValueError, "trials"),
         (lambda: Core(1, EnvOptions(lots=[]), "disabled"), ValueError, "no lots"),
         (lambda: Core(1, EnvOptions(threads=0), "disabled"), ValueError, "threads"),

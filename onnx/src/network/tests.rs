@@ -77,11 +77,15 @@ fn what_is_exported_answers_as_the_network_itself() {
 fn an_answer_does_not_depend_on_the_other_grids_or_on_threads() {
     let grids = grids(37);
     let grids: Vec<_> = grids.iter().collect();
-    let network = load("alone", &export(&checkpoints()[0]).unwrap()).unwrap();
-    let together = network.raw(&grids, &pool(1));
-    assert_eq!(together, network.raw(&grids, &pool(2)));
-    for start in [1, 7, 15, 36] {
-        assert_eq!(network.raw(&grids[start..], &pool(1))[..], together[start..], "from {start}");
+    let mut network = load("alone", &export(&checkpoints()[0]).unwrap()).unwrap();
+    // As the file leaves it open, and as if it asked for as many.
+    for batch in [BATCH, 16] {
+        network.batch = batch;
+        let together = network.raw(&grids, &pool(1));
+        assert_eq!(together, network.raw(&grids, &pool(2)));
+        for start in [1, 7, 15, 36] {
+            assert_eq!(network.raw(&grids[start..], &pool(1))[..], together[start..], "from {start}, {batch} at once");
+        }
     }
 }
 

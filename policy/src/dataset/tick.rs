@@ -39,10 +39,19 @@ const NAME: &str = "ticks.npz";
 /// Arrays of the file.
 const COLUMNS: usize = 11;
 
-/// Reads a column of a tick.
-type Column = fn(&Tick) -> f32;
-
 impl Tick {
+    /// The columns of single precision: their names in the file, and how to read them.
+    pub const FLOATS: [(&'static str, fn(&Self) -> f32); 8] = [
+        ("time_s", |tick| tick.time_s),
+        ("x_m", |tick| tick.x_m),
+        ("y_m", |tick| tick.y_m),
+        ("heading_rad", |tick| tick.heading_rad),
+        ("speed_mps", |tick| tick.speed_mps),
+        ("steering_rad", |tick| tick.steering_rad),
+        ("command_steering_rad", |tick| tick.command_steering_rad),
+        ("command_speed_mps", |tick| tick.command_speed_mps),
+    ];
+
     /// Of a frame of an episode, which was observed at `time_s`.
     pub(crate) fn new(episode: u32, time_s: f32, frame: &Frame) -> Self {
         let (pose, command) = (frame.vehicle.pose, frame.command);
@@ -66,19 +75,9 @@ impl Tick {
         files::write_atomically(&folder.join(NAME), |file| {
             let mut archive = NpzWriter::new_compressed(file);
             let fail = |error: ndarray_npy::WriteNpzError| error.to_string();
-            let floats: [(&str, Column); 8] = [
-                ("time_s", |tick| tick.time_s),
-                ("x_m", |tick| tick.x_m),
-                ("y_m", |tick| tick.y_m),
-                ("heading_rad", |tick| tick.heading_rad),
-                ("speed_mps", |tick| tick.speed_mps),
-                ("steering_rad", |tick| tick.steering_rad),
-                ("command_steering_rad", |tick| tick.command_steering_rad),
-                ("command_speed_mps", |tick| tick.command_speed_mps),
-            ];
             archive.add_array("episode", &column(ticks, |tick| tick.episode)).map_err(fail)?;
             archive.add_array("tick", &column(ticks, |tick| tick.tick)).map_err(fail)?;
-            for (name, of) in floats {
+            for (name, of) in Self::FLOATS {
                 archive.add_array(name, &column(ticks, of)).map_err(fail)?;
             }
             archive.add_array("driver", &column(ticks, |tick| code(tick.driver))).map_err(fail)?;

@@ -1,0 +1,266 @@
+"""Evaluations and lots on a Ray cluster, shard by shard: ``pip install "lotpilot[ray]"``.
+
+    import lotpilot.ray
+    tables = lotpilot.ray.evaluate({"mine": my_policy, "expert": "expert"}, "test:1000", shards=64, out="runs/on-ray",
+                                   address="auto")
+
+A task drives one shard and hands back its files, which are written at once into ``OUT.shards/``: nodes need no file
+system in common. A node that dies costs what it was driving; Ray begins those tasks elsewhere. Shards that are in
+``OUT.shards/`` are not driven again by a later call with the same arguments. When all are there they are merged into
+``OUT``: the same rows and tables as ``lotpilot.evaluate`` writes on one machine, byte for byte.
+
+Every node needs the same wheel of lotpilot, and the files that drivers and lots name under the same paths.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import ray
+from ray import cloudpickle
+
+from . import _native, tables
+from .core import names
+from .tables import Driver, Evaluation, Table
+
+__all__ = ["ShardError", "evaluate", "generate"]
+
+Files = dict[str, bytes]
+"""The content of files by their paths within a folder."""
+
+
+class ShardError(RuntimeError):
+    """Shards that could not be driven, with the first reason; the others are kept."""
+
+
+def evaluate(
+    drivers: Driver | Sequence[Driver] | Mapping[str, Driver],
+    lots: str | Sequence[str] | None = None,
+    *,
+    shards: int,
+    out: str | os.PathLike[str],
+    address: str | None = None,
+    cpus: int = 1,
+    retries: int = 3,
+    progress: bool = True,
+    **options: Any,
+) -> Evaluation:
+    """Does what ``lotpilot.evaluate`` does, on a Ray cluster.
+
+    Args:
+        drivers: As there; functions are pickled, and called on the nodes.
+        lots: As there.
+        shards: How many tasks; several times as many as there are CPUs keep all of them busy to the end.
+        out: Folder for the files of the evaluation. The shards are kept in ``OUT.shards/`` beside it.
+        address: Of the cluster, as ``ray.init`` takes it; None uses the one in use, or starts one on this machine.
+        cpus: CPUs of a task, and its threads.
+        retries: How often a shard is begun again whose node or process died.
+        progress: Whether to count finished shards on stderr.
+        **options: The other keywords of ``lotpilot.evaluate``, but for ``overwrite``.
+
+    Raises:
+        ValueError: If a number is out of range.
+        FileExistsError: If ``out`` is there, or ``OUT.shards/`` holds shards of other arguments.
+        ShardError: If shards cannot be driven; what was driven is kept, the reasons are in ``OUT.shards/failures.txt``.
+    """
+    request = tables.Request.of(drivers, lots, **options)
+    out = Path(out)
+    folder = out.with_name(out.name + ".shards")
+    if out.exists():
+        raise FileExistsError(f"{out}: exists already; choose another folder, or delete it")
+    _claim(folder, {"evaluate": request.described(), "shards": shards, "lotpilot": _digest()})
+    parts = [folder / str(number) for number in range(1, shards + 1)]
+    missing = {part: (request, f"{part.name}/{shards}") for part in parts if not part.exists()}
+    _drive(_evaluate, missing, _keep, folder, len(parts), address, cpus, retries, progress)
+    return request.merge(parts, out)
+
+
+def generate(
+    lots: str | Sequence[str],
+    *,
+    shards: int,
+    out: str | os.PathLike[str],
+    seed: int = 1,
+    count: int = 1,
+    address: str | None = None,
+    cpus: int = 1,
+    retries: int = 3,
+    progress: bool = True,
+) -> Table:
+    """Draws lots as ``lotpilot.generate`` does, on a Ray cluster. Files of the same name in ``out`` are replaced.
+
+    Args:
+        lots: As there.
+        seed: As there.
+        count: As there.
+        shards: As in ``evaluate``.
+        out: Folder for TOML and PNG files.
+        address: As in ``evaluate``.
+        cpus: As in ``evaluate``.
+        retries: As in ``evaluate``.
+        progress: As in ``evaluate``.
+
+    Returns:
+        Columns ``name``, ``path``, ``route_m`` and ``obstacles``, in the order of ``lotpilot.generate``.
+
+    Raises:
+        ValueError: If nothing is named so, or a number is out of range.
+        ShardError: As ``evaluate``.
+    """
+    out = Path(out)
+    single = _native.lots(names(lots, "lots"))
+    jobs = {f"{number}/{shards}": (single[number - 1 :: shards], seed, count) for number in range(1, shards + 1)}
+    jobs = {number: job for number, job in jobs.items() if job[0]}
+    drawn: dict[str, list[dict[str, Any]]] = {}
+
+    def keep(_: str, answer: tuple[list[dict[str, Any]], Files]) -> None:
+        rows, files = answer
+        _write(out, files)
+        for row in rows:
+            drawn.setdefault(row.pop("lot"), []).append({**row, "path": str(out / row["path"])})
+
+    _drive(_generate, jobs, keep, out, len(jobs), address, cpus, retries, progress)
+    rows = [row for lot in single for row in drawn[lot]]
+    return {column: [row[column] for row in rows] for column in ("name", "path", "route_m", "obstacles")}
+
+
+def _drive(
+    work: Callable[..., Any],
+    jobs: Mapping[Any, tuple[Any, ...]],
+    keep: Callable[[Any, Any], None],
+    folder: Path,
+    of: int,
+    address: str | None,
+    cpus: int,
+    retries: int,
+    progress: bool,
+) -> None:
+    """Does each job as a task, and keeps the answers as they come."""
+    if of < 1 or cpus < 1 or retries < 0:
+        raise ValueError("shards and cpus are 1 or more, retries 0 or more")
+    if not ray.is_initialized():
+        ray.init(address=address, log_to_driver=False)
+    task = ray.remote(_guarded(work.__name__, _digest())).options(
+        num_cpus=cpus, max_retries=retries, runtime_env={"env_vars": _environment(cpus)}
+    )
+    # Pickled here, so that a node without lotpilot can take them and say so.
+    job_of = {task.remote(os.getcwd(), cloudpickle.dumps(arguments)): job for job, arguments in jobs.items()}
+    pending, failed = list(job_of), []
+    while pending:
+        (ready,), pending = ray.wait(pending)
+        job = job_of[ready]
+        try:
+            answer = ray.get(ready)
+        except ray.exceptions.RayError as error:
+            answer = str(error).strip().splitlines()[-1]
+        if isinstance(answer, str):
+            failed.append(f"shard {getattr(job, 'name', job)}: {answer}")
+            folder.mkdir(parents=True, exist_ok=True)
+            with open(folder / "failures.txt", "a", encoding="utf-8") as file:
+                file.write(failed[-1] + "\n")
+        else:
+            keep(job, answer)
+        if progress:
+            done = of - len(pending) - len(failed)
+            print(f"\r{done} of {of} shards, {len(failed)} failed", end="" if pending else "\n", file=sys.stderr)
+    if failed:
+        raise ShardError(f"{len(failed)} of {of} shards failed, the others are kept; {failed[0]}")
+
+
+def _environment(cpus: int) -> dict[str, str]:
+    """Of a task: as many threads as CPUs."""
+    return {"RAYON_NUM_THREADS": str(cpus)}
+
+
+def _guarded(name: str, digest: str) -> Callable[..., Any]:
+    """A function of this module as a task: what it returns, or as text why there is nothing to return.
+
+    Ray pickles it whole, as it is no part of a module: so a node without lotpilot can say so.
+    """
+
+    def task(folder: str, arguments: bytes) -> Any:
+        import os
+        import pickle
+
+        where = f"node {os.uname().nodename}"
+        try:
+            from lotpilot import ray as here
+        except ImportError as error:
+            return f"{where} has no lotpilot ({error}); install the same wheel on every node"
+        if here._digest() != digest:
+            return f"{where} has another lotpilot than the caller; install the same wheel on every node"
+        try:
+            os.chdir(folder)
+            return getattr(here, name)(*pickle.loads(arguments))
+        except Exception as error:
+            return f"{type(error).__name__}: {error}"
+
+    return task
+
+
+def _evaluate(request: tables.Request, shard: str) -> Files:
+    with tempfile.TemporaryDirectory(prefix="lotpilot-") as scratch:
+        out = Path(scratch, "shard")
+        request.drive(out, shard=shard)
+        return _files(out)
+
+
+def _generate(lots: list[str], seed: int, count: int) -> tuple[list[dict[str, Any]], Files]:
+    with tempfile.TemporaryDirectory(prefix="lotpilot-") as scratch:
+        rows = []
+        for lot in lots:
+            drawn = tables.generate(lot, seed=seed, count=count, out=scratch)
+            for name, path, route_m, obstacles in zip(
+                *(drawn[column] for column in ("name", "path", "route_m", "obstacles")), strict=True
+            ):
+                rows.append(
+                    {"lot": lot, "name": name, "path": Path(path).name, "route_m": route_m, "obstacles": obstacles}
+                )
+        return rows, _files(Path(scratch))
+
+
+def _digest() -> str:
+    """Of the native half: what tells one build of lotpilot from another."""
+    file = _native.__file__
+    assert file is not None
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+
+
+def _claim(folder: Path, about: dict[str, Any]) -> None:
+    """Refuses a folder with the shards of another evaluation."""
+    folder.mkdir(parents=True, exist_ok=True)
+    file, text = folder / "shards.json", json.dumps(about, default=str)
+    if not file.exists():
+        file.write_text(text, encoding="utf-8")
+    elif file.read_text(encoding="utf-8") != text:
+        raise FileExistsError(
+            f"{folder}: holds shards of other arguments or another lotpilot; delete it, or choose another out"
+        )
+
+
+def _keep(shard: Path, files: Files) -> None:
+    partial = shard.with_name(f"{shard.name}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    _write(partial, files)
+    # A folder under its own name is whole.
+    partial.rename(shard)
+
+
+def _files(folder: Path) -> Files:
+    found = (file for file in sorted(folder.rglob("*")) if file.is_file())
+    return {str(file.relative_to(folder)): file.read_bytes() for file in found}
+
+
+def _write(folder: Path, files: Files) -> None:
+    for name, content in files.items():
+        file = folder / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)

@@ -1,0 +1,120 @@
+"""lotpilot.ray on a local cluster: the bytes of one process, though a node dies half-way."""
+
+import os
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import lotpilot
+
+ray = pytest.importorskip("ray")
+from ray.cluster_utils import Cluster  # noqa: E402
+
+import lotpilot.ray  # noqa: E402
+
+LOTS = os.environ.get("LOTPILOT_RAY_LOTS", "test:24:easy")
+SHARDS = int(os.environ.get("LOTPILOT_RAY_SHARDS", "12"))
+# These say who wrote the run, and when.
+DIFFER = {"manifest.toml", "sha256sums", "wall_time.jsonl", ".lock"}
+
+
+def files(folder):
+    found = (path for path in folder.rglob("*") if path.is_file() and path.name not in DIFFER)
+    return {str(path.relative_to(folder)): path.read_bytes() for path in found}
+
+
+@pytest.fixture
+def cluster():
+    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    nodes = [cluster.add_node(num_cpus=1) for _ in range(2)]
+    cluster.wait_for_nodes()
+    ray.init(address=cluster.address, log_to_driver=False)
+    yield cluster, nodes
+    ray.shutdown()
+    cluster.shutdown()
+
+
+def straight(grids):
+    return np.tile([8.0, 0.0], (len(grids), 1))
+
+
+def test_a_node_dies_and_the_tables_are_those_of_one_process(cluster, tmp_path):
+    cluster, nodes = cluster
+    drivers = {"tentacle": "tentacle", "straight": straight}
+    options = {"trials": 1, "noise": ["clean", 1.5], "overrides": ["episode.metrics.events_max=10"]}
+    one = time.monotonic()
+    tables = lotpilot.evaluate(drivers, LOTS, out=tmp_path / "one", **options)
+    one = time.monotonic() - one
+    expected = files(tmp_path / "one")
+    out, folder = tmp_path / "ray", tmp_path / "ray.shards"
+    killed = []
+
+    def done():
+        return sum(path.name.isdigit() for path in folder.glob("*"))
+
+    def kill():
+        while done() < SHARDS // 2:
+            time.sleep(0.02)
+        cluster.remove_node(nodes[1], allow_graceful=False)
+        killed.append(done())
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    began = time.monotonic()
+    found = lotpilot.ray.evaluate(drivers, LOTS, shards=SHARDS, out=out, **options)
+    took = time.monotonic() - began
+    killer.join()
+    assert killed[0] < SHARDS
+    print(f"one process {one:.1f} s; three nodes, of which one died after {killed[0]} of {SHARDS} shards, {took:.1f} s")
+    assert found == tables
+    assert files(out) == expected
+    assert sum(node["Alive"] for node in ray.nodes()) == 2
+
+    # Shards that are there are not driven again.
+    out.rename(tmp_path / "first")
+    before = (folder / "3/runs.jsonl").stat().st_mtime_ns
+    lotpilot.ray.evaluate(drivers, LOTS, shards=SHARDS, out=out, **options)
+    assert files(out) == expected and (folder / "3/runs.jsonl").stat().st_mtime_ns == before
+    with pytest.raises(FileExistsError, match="exists already"):
+        lotpilot.ray.evaluate(drivers, LOTS, shards=SHARDS, out=out, **options)
+    out.rename(tmp_path / "second")
+    with pytest.raises(FileExistsError, match="other arguments"):
+        lotpilot.ray.evaluate("expert", shards=SHARDS, out=out)
+
+
+def test_what_cannot_be_driven_is_one_clear_error(cluster, tmp_path, monkeypatch):
+    def broken(grids):
+        raise KeyError("weights")
+
+    def drive(driver, out, lots="lot-b", **options):
+        return lotpilot.ray.evaluate(driver, lots, trials=1, shards=2, out=tmp_path / out, **options)
+
+    with pytest.raises(lotpilot.ray.ShardError, match='"lot-z" is no lot'):
+        drive("expert", "a", lots="lot-z")
+    assert '"lot-z" is no lot' in (tmp_path / "a.shards/failures.txt").read_text(encoding="utf-8")
+    with pytest.raises(lotpilot.ray.ShardError, match="KeyError: 'weights'"):
+        drive({"broken": broken}, "b")
+    with pytest.raises(ValueError, match="1 or more"):
+        drive("expert", "c", cpus=0)
+    with pytest.raises(TypeError, match="overwrite"):
+        drive("expert", "d", overwrite=True)
+    # A node without the wheel, and one with another.
+    with monkeypatch.context() as other:
+        other.setattr(lotpilot.ray, "_digest", lambda: "another")
+        with pytest.raises(lotpilot.ray.ShardError, match="another lotpilot than the caller; install the same wheel"):
+            drive("expert", "e")
+    (tmp_path / "lotpilot.py").write_text("raise ImportError('not installed')")
+    monkeypatch.setattr(lotpilot.ray, "_environment", lambda cpus: {"PYTHONPATH": str(tmp_path)})
+    with pytest.raises(lotpilot.ray.ShardError, match=r"has no lotpilot .*; install the same wheel on every node"):
+        drive("expert", "f")
+
+
+def test_generate_writes_the_files_of_one_process(cluster, tmp_path):
+    one = lotpilot.generate("train:6:easy", out=tmp_path / "one")
+    found = lotpilot.ray.generate("train:6:easy", shards=4, out=tmp_path / "ray")
+    assert files(tmp_path / "ray") == files(tmp_path / "one") != {}
+    assert {name: found[name] for name in ("name", "route_m", "obstacles")} == {
+        name: one[name] for name in ("name", "route_m", "obstacles")
+    }
