@@ -6,7 +6,7 @@
 use crate::conditions::Conditions;
 use crate::files::{self, FileError, Format, SCHEMA_REMEDY, write_atomically};
 use crate::network::{
-    ConvLayer, DeviceChoice, InferenceSettings, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture, OUTPUTS,
+    ConvLayer, DeviceChoice, InferenceSettings, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture,
     POOLED_2, Predictor, Weights,
 };
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -317,6 +317,7 @@ fn fc2_index(architecture: &NetworkArchitecture, stored: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::network::OUTPUTS;
     use crate::test_data::scratch;
     use sim::episode::EpisodeSettings;
     use sim::seed::RootSeed;
