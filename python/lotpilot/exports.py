@@ -176,7 +176,7 @@ class _Statistics:
             "mean": rows.mean(0, dtype=np.float64),
             "std": rows.std(0, dtype=np.float64),
             "count": np.array([len(rows)]),
-            **dict(zip(quantiles, np.quantile(rows, list(quantiles.values()), axis=0), strict=True)),
+            **dict(zip(quantiles, np.quantile(rows, list(quantiles.values()), axis=0, method="nearest"), strict=True)),
         }
         return {name: value.tolist() for name, value in found.items()}
 
