@@ -416,7 +416,7 @@ fn every_setting_exists() {
         for code in &page.inline {
             let key = code.text.split(['=', ' ']).next().unwrap();
             let Some((section, rest)) = key.split_once('.') else { continue };
-            let is_file = ["toml", "rs", "md", "csv", "json"].contains(&rest);
+            let is_file = ["toml", "rs", "md", "csv", "json", "py"].contains(&rest);
             let is_settings = ["training", "evaluation", "dagger", "expert", "episode"].contains(&section) && !is_file;
             if is_settings && !is_placeholder(rest) {
                 let problem = || format!("there is no setting {key}");

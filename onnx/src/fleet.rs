@@ -35,6 +35,7 @@ impl OnnxFleet {
             mirror_averaging: inference.mirror_averaging,
             geometry,
             smoothing: FleetSmoothing::new(inference.smoothing_ticks),
+            // With more threads sums are taken in another order, and other bits come out.
             pool: Arc::new(ThreadPool::with_num_threads(1)),
         }
     }

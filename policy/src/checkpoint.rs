@@ -6,8 +6,8 @@
 use crate::conditions::Conditions;
 use crate::files::{self, FileError, Format, SCHEMA_REMEDY, write_atomically};
 use crate::network::{
-    ConvLayer, DeviceChoice, InferenceSettings, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture,
-    POOLED_2, Predictor, Weights,
+    ConvLayer, DeviceChoice, InferenceSettings, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture, POOLED_2,
+    Predictor, Weights,
 };
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};

@@ -286,7 +286,7 @@ mod tests {
         let mut files: Vec<_> = folder.read_dir().expect("maps").map(|entry| entry.expect("entry").path()).collect();
         files.retain(|file| file.extension().is_some_and(|extension| extension == "yaml"));
         files.sort();
-        assert!(files.len() >= 21, "{files:?}");
+        assert!(files.len() >= 29, "{files:?}");
         for file in files {
             let Loaded { scenario, notes } = load_with_notes(&file, &car).unwrap_or_else(|error| panic!("{error}"));
             let is_open = |note: &Note| matches!(note, Note::Open { .. });

@@ -5,7 +5,7 @@
 //! exact everywhere (`+ − × ÷`, square root, rounding, remainder) is used as it comes. Clippy refuses the others
 //! (`disallowed-methods` in `.clippy.toml`); for 64 bits, call `libm`.
 
-use crate::geometry::Vec2;
+use glam::Vec2;
 
 /// Sine of an angle in radians.
 #[inline]

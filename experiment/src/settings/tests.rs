@@ -100,7 +100,7 @@ fn enums_are_named_by_their_variant_alone() {
 /// What is switched off is printed, too: a key that is not seen is not found.
 #[test]
 fn printed_settings_show_what_is_switched_off() {
-    let text = Settings::preset("default").unwrap().to_toml();
+    let text = Settings::preset("paper").unwrap().to_toml();
     for part in ["[dagger.disturbance]\nenabled = false", "[dagger.final_budget]\nsteps = 0", "patience = 0"] {
         assert!(text.contains(part), "{part:?} is missing in:\n{text}");
     }

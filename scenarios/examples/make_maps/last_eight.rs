@@ -112,7 +112,7 @@ fn drive_through() -> Drawing {
     }
 }
 
-/// Booths on islands; any lane between them may be taken.
+/// Booths on islands; the lanes beside the route are closed when it is read.
 fn toll_plaza() -> Drawing {
     let mut shapes = vec![(area(1.0, 12.0, 149.0, 20.0), FREE), (area(50.0, 3.0, 100.0, 29.0), FREE)];
     for k in 0..8 {
@@ -127,8 +127,12 @@ fn toll_plaza() -> Drawing {
     }
     Drawing {
         shapes,
-        lot: "start = [20.0, 16.0, 0.0]\ngoal = [130.0, 16.0, 0.0]\nwall_height_m = 1.0\n",
-        ..plain("toll-plaza", "A toll plaza: six lanes of 3 to 4 m between booths, all open.", (150.0, 32.0))
+        lot: "start = [20.0, 16.0, 0.0]\ngoal = [130.0, 16.0, 0.0]\nwall_height_m = 1.0\nclose_branches = true\n",
+        ..plain(
+            "toll-plaza",
+            "A toll plaza: lanes of 3 to 4 m between booths; those beside the route are closed when it is read.",
+            (150.0, 32.0),
+        )
     }
 }
 

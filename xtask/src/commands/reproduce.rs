@@ -139,7 +139,11 @@ fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
     let trained_on = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     for lot in Lot::parse_all(&extent.unseen, &settings.episode.vehicle)? {
         let is_unseen = !lot.is_for_training() && trained_on.iter().all(|known| known.name() != lot.name());
-        ensure!(is_unseen, "--unseen {}: drivers are trained or tuned on it; name others, e.g. sealed:PHRASE:24:all", lot.name());
+        ensure!(
+            is_unseen,
+            "--unseen {}: drivers are trained or tuned on it; name others, e.g. sealed:PHRASE:24:all",
+            lot.name()
+        );
     }
     ensure!(
         settings.seed.0.checked_add(extent.seeds).is_some_and(|last| i64::try_from(last).is_ok()),

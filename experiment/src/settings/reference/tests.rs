@@ -163,7 +163,7 @@ fn every_old_key_leads_to_a_new_one() {
 
 /// Key, value in preset `paper`, where it is from. "Silent": the paper does not mention such a thing, so it is off.
 #[rustfmt::skip]
-const OF_THE_PAPER: [(&str, &str, &str); 47] = [
+const OF_THE_PAPER: [(&str, &str, &str); 49] = [
     ("training.lots", "[\"lot-a\"]", "Driving Policy Network Training: one parking lot"),
     ("training.directions", "[\"forward\", \"reverse\"]", "… there and back, 460 m"),
     ("training.trials", "1", "… once"),
@@ -184,7 +184,7 @@ const OF_THE_PAPER: [(&str, &str, &str); 47] = [
     ("dagger.inference.mirror_averaging", "false", "silent"),
     ("dagger.inference.smoothing_ticks", "0.0", "silent"),
     ("dagger.disturbance.enabled", "false", "silent"),
-    ("dagger.disturbance.aim", "random", "silent"),
+    ("dagger.disturbance.aim", "'random'", "silent"),
     ("dagger.final_budget.steps", "0", "silent"),
     ("dagger.network.conv1.channels", "32", "authors' code"),
     ("dagger.network.conv1.kernel", "5", "authors' code"),
