@@ -107,7 +107,7 @@ pub struct BatchLoss {
 pub fn of_batch(settings: &LossSettings, outputs: Tensor<2>, labels: Tensor<2>, weights: Tensor<2>) -> BatchLoss {
     match outputs.dims()[1] {
         OUTPUTS => of_one(settings, outputs, labels, weights),
-        width => of_mixture(settings, outputs, width / (OUTPUTS + 1), labels, weights),
+        width => of_mixture(settings, &outputs, width / (OUTPUTS + 1), &labels, &weights),
     }
 }
 
@@ -115,10 +115,10 @@ pub fn of_batch(settings: &LossSettings, outputs: Tensor<2>, labels: Tensor<2>, 
 /// these shares has the value and the gradient of the mixture's.
 fn of_mixture(
     settings: &LossSettings,
-    outputs: Tensor<2>,
+    outputs: &Tensor<2>,
     modes: usize,
-    labels: Tensor<2>,
-    weights: Tensor<2>,
+    labels: &Tensor<2>,
+    weights: &Tensor<2>,
 ) -> BatchLoss {
     let log_weights = log_softmax(outputs.clone().narrow(1, modes * OUTPUTS, modes), 1); // [batch, modes]
     let of_mode = |settings: &LossSettings, mode| {

@@ -59,6 +59,9 @@ impl Library {
     }
 
     /// Has a fault happen to a command at the n-th operation on files below a folder, counted from 1; 0: to none.
+    ///
+    /// # Errors
+    /// If the log of the operations before cannot be removed.
     pub fn load_into(&self, command: &mut Command, below: &Path, fault: Fault, n: usize) -> anyhow::Result<()> {
         match fs::remove_file(&self.log) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error.into()),

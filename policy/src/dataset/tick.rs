@@ -39,9 +39,12 @@ const NAME: &str = "ticks.npz";
 /// Arrays of the file.
 const COLUMNS: usize = 11;
 
+/// Name of a column in the file, and how to read it.
+type Column = (&'static str, fn(&Tick) -> f32);
+
 impl Tick {
     /// The columns of single precision: their names in the file, and how to read them.
-    pub const FLOATS: [(&'static str, fn(&Self) -> f32); 8] = [
+    pub const FLOATS: [Column; 8] = [
         ("time_s", |tick| tick.time_s),
         ("x_m", |tick| tick.x_m),
         ("y_m", |tick| tick.y_m),

@@ -34,7 +34,7 @@ fn ferry_deck() -> Drawing {
         let x = 27.0 + 13.0 * i as f32;
         let length_m = 7.0 + 5.0 * scatter(i, 1);
         shapes.push((turned(x, 2.6, length_m, 2.5, 0.0), OCCUPIED));
-        if x < 40.0 || x > 104.0 {
+        if !(40.0..=104.0).contains(&x) {
             shapes.push((turned(x, 15.8 + 0.8 * scatter(i, 2), length_m, 2.5, 0.0), OCCUPIED));
         }
     }

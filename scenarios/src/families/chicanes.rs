@@ -96,7 +96,7 @@ fn barriers(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
             Cones => 0.4,
             Planter => rng.random_range(1.0..5.0),
         };
-        stand(things, strip, Stand { kind, side, from_m: at_m, along_m, protrusion_m: width_m - gap_m }, rng);
+        stand(things, strip, &Stand { kind, side, from_m: at_m, along_m, protrusion_m: width_m - gap_m }, rng);
         if rng.random_bool(0.85) {
             side = side.opposite();
         }
@@ -121,11 +121,11 @@ struct Stand {
 }
 
 /// Puts a barrier up if it leaves a way.
-fn stand(things: &mut Things<'_>, strip: &Strip, stand: Stand, rng: &mut Rng) {
+fn stand(things: &mut Things<'_>, strip: &Strip, stand: &Stand, rng: &mut Rng) {
     /// Too narrow to be a way between barrier and edge, metres.
     const BESIDE_M: Range<f32> = 0.0..0.6;
     const CONES_APART_M: f32 = 1.2;
-    let Stand { kind, side, from_m, along_m, protrusion_m } = stand;
+    let Stand { kind, side, from_m, along_m, protrusion_m } = *stand;
     let rules = Rules { gap_m: NARROW_M.start - 0.1, apart_m: 5.0, corner_clear_m: 0.0 };
     let at_m = from_m + 0.5 * along_m;
     let beside_m: f32 = if rng.random_bool(0.6) { 0.0 } else { rng.random_range(BESIDE_M) };
