@@ -702,8 +702,8 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
     });
     write("noise.pgm", &[&b"P5\n4096 4096\n255\n"[..], &noise.collect::<Vec<u8>>()].concat());
     // Pillars of a pixel each.
-    let pillars = (0..3072_u32 * 3072).map(|i| if i % 8 == 4 && i / 3072 % 32 == 4 { 0 } else { 255 });
-    write("pillars.pgm", &[&b"P5\n3072 3072\n255\n"[..], &pillars.collect::<Vec<u8>>()].concat());
+    let pillars = (0..4096_u32 * 4096).map(|i| if i % 8 == 4 && i / 4096 % 32 == 4 { 0 } else { 255 });
+    write("pillars.pgm", &[&b"P5\n4096 4096\n255\n"[..], &pillars.collect::<Vec<u8>>()].concat());
     write("pillars.yaml", sound.yaml.replace("map.pgm", "pillars.pgm").as_bytes());
     write("bomb.yaml", sound.yaml.replace("map.pgm", "bomb.pgm").as_bytes());
     write("bomb.pgm", b"P5\n60000 60000\n255\n\xff");

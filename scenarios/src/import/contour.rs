@@ -46,18 +46,22 @@ impl Mask {
     #[must_use]
     pub(super) fn region_of(&self, seed: [i32; 2]) -> Self {
         let mut region = Self { cols: self.cols, is_free: vec![false; self.is_free.len()] };
-        let mut open = Vec::new();
-        let mut reach = |pixel: [i32; 2], open: &mut Vec<[i32; 2]>| {
+        let mut reach = |pixel: [i32; 2], reached: &mut Vec<[i32; 2]>| {
             if let Some(index) = self.index(pixel).filter(|&index| self.is_free[index] && !region.is_free[index]) {
                 region.is_free[index] = true;
-                open.push(pixel);
+                reached.push(pixel);
             }
         };
-        reach(seed, &mut open);
-        while let Some(pixel) = open.pop() {
-            for step in ALONG {
-                reach(ahead(pixel, step), &mut open);
+        // Nearest first: the front is hardly longer than the map is wide, where a stack would hold most of its pixels.
+        let (mut front, mut next) = (Vec::new(), Vec::new());
+        reach(seed, &mut front);
+        while !front.is_empty() {
+            for pixel in front.drain(..) {
+                for step in ALONG {
+                    reach(ahead(pixel, step), &mut next);
+                }
             }
+            std::mem::swap(&mut front, &mut next);
         }
         region
     }
