@@ -435,7 +435,7 @@ fn a_training_is_read_from_its_folder() {
         sums::write(&folder, "fit.toml", format!("{head}{}{}", point(50), point(100)).as_bytes()).unwrap();
     }
     sums::write(&run, "settings.toml", settings.to_toml().as_bytes()).unwrap();
-    std::fs::write(run.join("table1.md"), "| the table |").unwrap();
+    sums::write(&run, "table1.md", b"| the table |").unwrap();
 
     let shown = Shown::of(|recording| training::show(&run, recording).unwrap());
     std::fs::remove_dir_all(&run).unwrap();
