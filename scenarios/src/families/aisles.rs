@@ -2,14 +2,13 @@
 //! goes round the row ends from aisle to aisle; side aisles are closed or dead ends.
 
 use super::course::{Aisles, Course, first_apart};
-use super::parts::{close, lot, solid_height_m, things_on};
+use super::parts::{close, enclosed, things_on};
 use super::strip::{Mouth, Notch, Strip, Stub};
 use super::things::{self, Rules, Things, facing, side, yaw_rad};
-use super::walls::{Wall, yard};
+use super::walls::Wall;
 use crate::clutter::draw_car;
 use crate::corridor::{STALL_DEPTH_M, Side};
 use rand::RngExt as _;
-use sim::geometry::Vec2;
 use sim::maths;
 use sim::scenario::{ObstacleClass, Scenario};
 use sim::seed::Rng;
@@ -27,6 +26,8 @@ const ROW_END_M: Range<f32> = 1.0..3.0;
 const SIDE_AISLE_M: Range<f32> = 4.5..6.0;
 /// How far the ends of aisles go on behind what closes them, metres.
 const DEAD_END_M: Range<f32> = STALL_DEPTH_M + 0.5..10.0;
+/// Ground is free so far behind a wall, metres.
+const BEHIND_WALL_M: Range<f32> = 2.0..8.0;
 /// The centre line at most, run-outs included, metres.
 const LENGTH_MAX_M: f32 = 225.0;
 
@@ -54,19 +55,13 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
         park(&mut things, &strip, row, stall_m, occupancy, obstacles);
     }
     in_the_aisle(&mut things, &strip, obstacles);
-    let (boundary, boundary_height_m) = enclose(&mut things, strip.outline(0.0), layout);
-    Some((Scenario { boundary_height_m, ..lot(&strip, boundary, things) }, strip))
-}
-
-/// The ground beside is solid, or lies behind a kerb or a low wall.
-fn enclose(things: &mut Things<'_>, outline: Vec<Vec2>, rng: &mut Rng) -> (Vec<Vec2>, f32) {
-    let wall = match rng.random_range(0..10) {
-        0..5 => return (outline, solid_height_m(rng)),
-        5..8 => Wall::kerb(),
-        _ => Wall::low(rng),
+    let wall = match layout.random_range(0..10) {
+        0..5 => None,
+        5..8 => Some(Wall::kerb()),
+        _ => Some(Wall::low(layout)),
     };
-    things.obstacles.extend(wall.around(&outline, &[]));
-    (yard(&outline, 2.0..8.0, rng), 0.0)
+    let lot = enclosed(&strip, things, wall, BEHIND_WALL_M, layout);
+    Some((lot, strip))
 }
 
 /// Up and down, from aisle to aisle.

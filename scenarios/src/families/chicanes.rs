@@ -2,10 +2,10 @@
 //! cones, planters; at check points, on building sites, in streets where traffic is calmed.
 
 use super::course::{Course, first_apart};
-use super::parts::{RUN_OUT_M, driven_m, lot, solid_height_m, things_on};
+use super::parts::{RUN_OUT_M, driven_m, enclosed, things_on};
 use super::strip::Strip;
 use super::things::{self, Rules, Things, side, yaw_rad};
-use super::walls::{Wall, yard};
+use super::walls::Wall;
 use crate::clutter::draw_car;
 use crate::corridor::{Side, to_millimetres};
 use rand::RngExt as _;
@@ -17,6 +17,8 @@ use std::ops::Range;
 
 const LENGTH_M: Range<f32> = 85.0..170.0;
 const WIDTH_M: Range<f32> = 5.5..12.0;
+/// Ground is free so far behind a wall, metres.
+const BEHIND_WALL_M: Range<f32> = 2.0..10.0;
 const RADIUS_M: Range<f32> = 25.0..80.0;
 /// What barriers leave free on a road of barriers that leave little, and of others, metres.
 const NARROW_M: Range<f32> = 3.0..3.8;
@@ -40,21 +42,14 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
     let strip = first_apart(layout, 1.0, course)?;
     let mut things = things_on(&strip);
     barriers(&mut things, &strip, obstacles);
-    let outline = strip.outline(0.0);
     let wall = match layout.random_range(0..10) {
         0..4 => None,
         4..6 => Some(Wall::kerb()),
         6..8 => Some(Wall::tall(layout)),
         _ => Some(Wall::low(layout)),
     };
-    let (boundary, boundary_height_m) = match wall {
-        None => (outline, solid_height_m(layout)),
-        Some(wall) => {
-            things.obstacles.extend(wall.around(&outline, &[]));
-            (yard(&outline, 2.0..10.0, layout), 0.0)
-        }
-    };
-    Some((Scenario { boundary_height_m, ..lot(&strip, boundary, things) }, strip))
+    let lot = enclosed(&strip, things, wall, BEHIND_WALL_M, layout);
+    Some((lot, strip))
 }
 
 fn course(rng: &mut Rng) -> Course {

@@ -1,12 +1,11 @@
 //! Lanes of one width all along: bends that are not widened, S-curves, chicanes, offset gaps beside double-parked cars.
 
 use super::course::{Course, first_apart};
-use super::parts::{RUN_OUT_M, lot, solid_height_m, things_on};
+use super::parts::{RUN_OUT_M, enclosed, things_on};
 use super::strip::Strip;
 use super::things::{Rules, Things, facing, side, yaw_rad};
-use super::walls::{self, Wall};
+use super::walls::Wall;
 use rand::RngExt as _;
-use sim::geometry::Vec2;
 use sim::maths;
 use sim::scenario::{ObstacleClass, Scenario};
 use sim::seed::Rng;
@@ -22,8 +21,8 @@ const RADIUS_M: Range<f32> = 8.0..30.0;
 const LENGTH_M: Range<f32> = 85.0..190.0;
 /// Free beside double-parked cars, metres.
 const GAP_M: Range<f32> = 2.7..2.9;
-/// Ground is free so far from walls, metres.
-const YARD_M: Range<f32> = 2.0..8.0;
+/// Ground is free so far behind a wall, metres.
+const BEHIND_WALL_M: Range<f32> = 2.0..8.0;
 
 /// What stands in the lane.
 #[derive(Clone, Copy, PartialEq)]
@@ -53,21 +52,14 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
         Obstruction::Small => small_things(&mut things, strip.length_m(), width_m, obstacles),
         Obstruction::DoubleParked => double_parked(&mut things, strip.length_m(), width_m, gap_m, obstacles),
     }
-    let outline = strip.outline(0.0);
-    let (boundary, boundary_height_m) = enclose(&mut things, outline, layout);
-    Some((Scenario { boundary_height_m, ..lot(&strip, boundary, things) }, strip))
-}
-
-/// Solid ground beside the lane, or a wall or a kerb with free ground behind.
-fn enclose(things: &mut Things<'_>, outline: Vec<Vec2>, rng: &mut Rng) -> (Vec<Vec2>, f32) {
-    let wall = match rng.random_range(0..100) {
-        0..50 => return (outline, solid_height_m(rng)),
-        50..70 => Wall::tall(rng),
-        70..90 => Wall::low(rng),
-        _ => Wall::kerb(),
+    let wall = match layout.random_range(0..100) {
+        0..50 => None,
+        50..70 => Some(Wall::tall(layout)),
+        70..90 => Some(Wall::low(layout)),
+        _ => Some(Wall::kerb()),
     };
-    things.obstacles.extend(wall.around(&outline, &[]));
-    (walls::yard(&outline, YARD_M, rng), 0.0)
+    let lot = enclosed(&strip, things, wall, BEHIND_WALL_M, layout);
+    Some((lot, strip))
 }
 
 fn course(width_m: f32, rng: &mut Rng) -> Course {

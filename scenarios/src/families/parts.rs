@@ -3,12 +3,13 @@
 use super::route;
 use super::strip::{Mouth, Strip};
 use super::things::{self, Things};
-use super::walls::Wall;
+use super::walls::{Wall, yard};
 use crate::corridor::to_millimetres;
 use rand::RngExt as _;
 use sim::geometry::Vec2;
 use sim::scenario::{LotNoise, ObstacleClass, Scenario};
 use sim::seed::Rng;
+use std::ops::Range;
 
 /// Straight ground before the start and behind the finish, metres, so that no wall is close there.
 pub(super) const RUN_OUT_M: f32 = 18.0;
@@ -56,6 +57,25 @@ pub(super) fn close(things: &mut Things<'_>, mouth: &Mouth, rng: &mut Rng) {
 /// How high solid ground beside the way is, metres: 0 hides nothing, more hides the ground behind corners.
 pub(super) fn solid_height_m(rng: &mut Rng) -> f32 {
     if rng.random_bool(0.4) { 0.0 } else { (rng.random_range(1.5_f32..4.0) * 10.0).round() / 10.0 }
+}
+
+/// Puts a lot together whose way ends at a wall with free ground behind, of so many metres, or else at solid ground.
+pub(super) fn enclosed(
+    strip: &Strip,
+    mut things: Things<'_>,
+    wall: Option<Wall>,
+    behind_m: Range<f32>,
+    rng: &mut Rng,
+) -> Scenario {
+    let outline = strip.outline(0.0);
+    let (boundary, boundary_height_m) = match wall {
+        None => (outline, solid_height_m(rng)),
+        Some(wall) => {
+            things.obstacles.extend(wall.around(&outline, &[]));
+            (yard(&outline, behind_m, rng), 0.0)
+        }
+    };
+    Scenario { boundary_height_m, ..lot(strip, boundary, things) }
 }
 
 /// Puts a lot together.

@@ -2,10 +2,10 @@
 //! ways past them; no gap leaves it open whether the car fits.
 
 use super::course::{Course, first_apart};
-use super::parts::{RUN_OUT_M, lot, solid_height_m, things_on};
+use super::parts::{RUN_OUT_M, enclosed, things_on};
 use super::strip::Strip;
 use super::things::{self, Rules, Things, side};
-use super::walls::{Wall, yard};
+use super::walls::Wall;
 use crate::clutter::draw_car;
 use crate::corridor::to_millimetres;
 use rand::RngExt as _;
@@ -18,6 +18,8 @@ use std::ops::Range;
 
 const LENGTH_M: Range<f32> = 85.0..170.0;
 const WIDTH_M: Range<f32> = 11.0..22.0;
+/// Ground is free so far behind a wall, metres.
+const BEHIND_WALL_M: Range<f32> = 2.0..10.0;
 const RADIUS_M: Range<f32> = 18.0..40.0;
 /// No two things are so far from each other, or from the edge, metres: the car is 1.86 m wide, and anything within 0.5 m
 /// of it is a near-collision.
@@ -35,21 +37,14 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
     let strip = first_apart(layout, 1.0, course)?;
     let mut things = things_on(&strip);
     scatter(&mut things, &strip, obstacles);
-    let outline = strip.outline(0.0);
     let wall = match layout.random_range(0..10) {
         0..5 => None,
         5..7 => Some(Wall::kerb()),
         7..9 => Some(Wall::tall(layout)),
         _ => Some(Wall::low(layout)),
     };
-    let (boundary, boundary_height_m) = match wall {
-        None => (outline, solid_height_m(layout)),
-        Some(wall) => {
-            things.obstacles.extend(wall.around(&outline, &[]));
-            (yard(&outline, 2.0..10.0, layout), 0.0)
-        }
-    };
-    Some((Scenario { boundary_height_m, ..lot(&strip, boundary, things) }, strip))
+    let lot = enclosed(&strip, things, wall, BEHIND_WALL_M, layout);
+    Some((lot, strip))
 }
 
 fn course(rng: &mut Rng) -> Course {
