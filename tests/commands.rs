@@ -2,6 +2,7 @@
 
 use crate::bench::{scratch, succeed, text, xtask};
 use std::path::Path;
+use storage::sums;
 
 /// Bad input: exit code 2, one error that names what is wrong, and nothing written.
 fn refuses(arguments: &[&str], expected: &[&str]) {
@@ -220,7 +221,18 @@ fn a_run_can_be_evaluated_later_and_generated_lots_can_be_driven() {
     let mut near_collisions = 0;
     for line in lines.lines() {
         let run: serde_json::Value = serde_json::from_str(line).unwrap();
-        for key in ["driver", "lot", "direction", "trial", "noise", "replay", "timed_out", "mean_speed_mps", "ending"] {
+        for key in [
+            "driver",
+            "lot",
+            "direction",
+            "trial",
+            "noise",
+            "replay",
+            "sha256",
+            "timed_out",
+            "mean_speed_mps",
+            "ending",
+        ] {
             assert!(!run[key].is_null(), "{key} is missing in {line}");
         }
         for key in ["near_collisions", "contacts", "stuck", "driven_m", "reference_m", "safe_ratio", "clearance_min_m"]
@@ -231,10 +243,32 @@ fn a_run_can_be_evaluated_later_and_generated_lots_can_be_driven() {
     }
     assert_eq!(read("failures.jsonl").lines().count() as u64, near_collisions);
     assert_eq!(read("wall_time.jsonl").lines().count(), 2);
+    runs_are_replayed(&results);
     is_a_report(&read("report.html"), &["Near-collisions, noise paper", "Safe ratio on ", "Configuration"]);
     let html = std::fs::read_to_string(run.join("report.html")).unwrap();
     is_a_report(&html, &["Validation error of the look-ahead point", "predicted σ", "Configuration"]);
     assert!(run.join("round-00/learning.csv").is_file());
+}
+
+/// Every run of an evaluation comes to the same bits when it is driven alone, and a difference is not passed over.
+fn runs_are_replayed(results: &Path) {
+    let replay = ["replay", "--json", "--of", results.to_str().unwrap()];
+    let rows = |printed: &str| serde_json::from_str::<Vec<serde_json::Value>>(printed).unwrap();
+    let all = rows(&succeed(xtask().args(replay)));
+    assert!(all.len() == 2 && all.iter().all(|row| row["same"] == true), "{all:?}");
+    let key = all[1]["key"].as_str().unwrap();
+    let one =
+        rows(&succeed(xtask().args(["replay", "--json", "--config"]).arg(results.join("settings.toml")).arg(key)));
+    assert!(one[0]["same"].is_null() && one[0]["sha256"] == all[1]["sha256"], "{one:?}");
+    let (runs, digest) = (results.join("runs.jsonl"), all[1]["sha256"].as_str().unwrap());
+    let recorded = std::fs::read_to_string(&runs).unwrap();
+    sums::write(results, "runs.jsonl", recorded.replace(digest, &"0".repeat(64)).as_bytes()).unwrap();
+    let output = xtask().args(replay).output().unwrap();
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains(key) && stderr.contains("1 of 2 runs are not what was recorded"), "{stderr}");
+    assert_eq!(rows(&String::from_utf8_lossy(&output.stdout))[1]["same"], false);
+    sums::write(results, "runs.jsonl", recorded.as_bytes()).unwrap();
 }
 
 /// One page that says what it should and loads nothing from anywhere.

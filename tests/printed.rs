@@ -32,6 +32,7 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         "drivers",
         "tune",
         "torture",
+        "replay",
         "verify",
         "render",
         "visualise",

@@ -10,6 +10,7 @@ use crate::plan::Plan;
 use crate::records::{self, Driven, FailureRecord, RunRecord, WallTimeRecord};
 use crate::results::EvaluationResults;
 use experiment::drive::TrialBatch;
+use experiment::drive_digest::DriveDigest;
 use experiment::progress::Progress;
 use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
@@ -123,6 +124,8 @@ impl<'a> Driving<'a> {
 /// What one driver drove of a batch at one noise level.
 struct DrivenBatch {
     reports: Vec<EpisodeReport>,
+    /// Of each run, as in `runs.jsonl`.
+    sha256: Vec<String>,
     incidents: Vec<Incident>,
     wall_s: f64,
 }
@@ -165,10 +168,12 @@ fn failures(batch: &TrialBatch<'_>, seed: RootSeed, driven: &DrivenBatch) -> Vec
 fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> Option<DrivenBatch> {
     let started = Instant::now();
     let mut monitor = IncidentMonitor::new(batch.trials.len(), batch.episode);
+    let mut digests = vec![DriveDigest::default(); batch.trials.len()];
     let mut shares = vec![0.0_f32; batch.trials.len()];
     let mut frames = 0_u32;
     let reports = batch.drive(&mut |index, frame| {
         monitor.frame(index, frame);
+        digests[index].frame(frame);
         track.near_collisions += u32::from(matches!(frame.event, Event::NearCollision { .. }));
         shares[index] = frame.progress_m / batch.maps[index].path().length_m();
         frames += 1;
@@ -183,7 +188,12 @@ fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> Option<DrivenBatch> {
     });
     let reports: Vec<EpisodeReport> = reports.into_iter().collect::<Option<_>>()?;
     track.done += reports.len();
-    Some(DrivenBatch { reports, incidents: monitor.into_incidents(), wall_s: started.elapsed().as_secs_f64() })
+    Some(DrivenBatch {
+        reports,
+        sha256: digests.iter().map(DriveDigest::hex).collect(),
+        incidents: monitor.into_incidents(),
+        wall_s: started.elapsed().as_secs_f64(),
+    })
 }
 
 /// Progress of the whole evaluation.
@@ -212,9 +222,9 @@ fn lines(
 ) -> anyhow::Result<[Vec<u8>; 3]> {
     let [mut runs, mut failed, mut wall_time] = [const { Vec::new() }; 3];
     let ticks: u32 = driven.reports.iter().map(|report| report.metrics.ticks).sum();
-    for (trial, report) in batch.trials.iter().zip(&driven.reports) {
+    for ((trial, report), sha256) in batch.trials.iter().zip(&driven.reports).zip(&driven.sha256) {
         let key = batch.replay_key(trial, seed, 0);
-        line(&mut runs, &RunRecord::new(driven_by(batch, trial), &key, report))?;
+        line(&mut runs, &RunRecord::new(driven_by(batch, trial), &key, sha256, report))?;
         // Runs of a batch are driven at once; each has its share by the number of its decisions.
         let wall_s = driven.wall_s * f64::from(report.metrics.ticks) / f64::from(ticks.max(1));
         line(&mut wall_time, &WallTimeRecord { driven: driven_by(batch, trial), wall_s })?;

@@ -14,7 +14,7 @@ use std::path::Path;
 use storage::sums;
 
 /// The version of `runs.jsonl`, `failures.jsonl` and `wall_time.jsonl` that this program writes.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 /// Names of the files.
 pub const RUNS: &str = "runs.jsonl";
 /// See [`RUNS`].
@@ -51,6 +51,8 @@ pub struct RunRecord {
     pub mean_speed_mps: f32,
     /// Replays it: [`ReplayKey`].
     pub replay: String,
+    /// Of everything seen, decided and driven: [`DriveDigest`](experiment::drive_digest::DriveDigest).
+    pub sha256: String,
     /// How it ended, its metrics and its events.
     #[serde(flatten)]
     pub report: EpisodeReport,
@@ -58,12 +60,13 @@ pub struct RunRecord {
 
 impl RunRecord {
     /// Of a finished run.
-    pub fn new(driven: Driven, replay: &ReplayKey, report: &EpisodeReport) -> Self {
+    pub fn new(driven: Driven, replay: &ReplayKey, sha256: &str, report: &EpisodeReport) -> Self {
         Self {
             driven,
             timed_out: report.ending == Ending::TimedOut,
             mean_speed_mps: report.metrics.mean_speed_mps(),
             replay: replay.to_string(),
+            sha256: sha256.to_owned(),
             report: report.clone(),
         }
     }

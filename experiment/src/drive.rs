@@ -3,6 +3,7 @@
 //! Evaluation, tuning, replays, pictures and recordings all drive with [`TrialBatch::drive`]; training drives the same
 //! episodes with a collector at the wheel ([`crate::training`]). They differ only in what the observer does.
 
+use crate::drive_digest::DriveDigest;
 use crate::drivers::NamedDriver;
 use crate::lots::Lot;
 use crate::replay_key::ReplayKey;
@@ -135,6 +136,16 @@ impl Replay {
     /// A car at its start.
     pub fn episode(&self, episode: &EpisodeSettings) -> Episode {
         start(&[self.trial()], std::slice::from_ref(&self.map), episode, self.key.noise).remove(0)
+    }
+
+    /// Drives it again to its end: what it came to, and its digest.
+    pub fn again(&self, episode: &EpisodeSettings, driver: &NamedDriver) -> (EpisodeReport, String) {
+        let mut digest = DriveDigest::default();
+        let report = self.drive(episode, driver, |frame| {
+            digest.frame(frame);
+            ControlFlow::Continue(())
+        });
+        (report.expect("driven to its end"), digest.hex())
     }
 
     /// Drives it again, until the observer breaks.

@@ -83,6 +83,12 @@ pub struct Manifest {
     /// The processor, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub processor: Option<String>,
+    /// Its instructions that sums of networks may depend on: `avx2`, `fma`, …
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub processor_features: Vec<String>,
+    /// The libraries that compute, with their versions: `libm 0.2.16`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub libraries: Vec<String>,
     /// What was asked for beside the settings.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     pub arguments: toml::Table,
@@ -92,7 +98,7 @@ pub struct Manifest {
 }
 
 /// The version of `manifest.toml` that this program writes.
-pub const MANIFEST_SCHEMA: u32 = 2;
+pub const MANIFEST_SCHEMA: u32 = 3;
 
 /// What a run came to, written last: `finished.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -100,12 +106,14 @@ pub const MANIFEST_SCHEMA: u32 = 2;
 pub struct Finished {
     /// Version of this format: [`FINISHED_SCHEMA`].
     pub schema: u32,
+    /// Of all that was written: [`digest`].
+    pub sha256: String,
     /// What was done.
     pub outcome: Outcome,
 }
 
 /// The version of `finished.toml` that this program writes.
-pub const FINISHED_SCHEMA: u32 = 1;
+pub const FINISHED_SCHEMA: u32 = 2;
 
 /// What was done in a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -150,6 +158,10 @@ pub struct Build {
     pub rustc_version: String,
     /// The processor that it runs on, if known.
     pub processor: Option<String>,
+    /// Its instructions that sums of networks may depend on.
+    pub processor_features: Vec<String>,
+    /// The libraries that compute, with their versions.
+    pub libraries: Vec<String>,
 }
 
 /// Where a run goes.
@@ -362,13 +374,23 @@ impl RunDir {
     /// # Errors
     /// If it cannot be written.
     pub fn finish(&self, outcome: Outcome) -> anyhow::Result<()> {
-        let finished = Finished { schema: FINISHED_SCHEMA, outcome };
+        let finished = Finished { schema: FINISHED_SCHEMA, sha256: digest(&self.path)?, outcome };
         self.write(FINISHED, toml::to_string(&finished)?.as_bytes())?;
         if let Some((run, list)) = &self.within {
             sums::list(run, &[list])?;
         }
         Ok(())
     }
+}
+
+/// One SHA-256 of all that a run wrote, but for what differs from one repetition to the next: wall times, the manifest, and
+/// the reports that show it. The same for the same command on another machine, if it computed the same.
+///
+/// # Errors
+/// If a list is missing or damaged.
+pub fn digest(path: &Path) -> anyhow::Result<String> {
+    const DIFFERENT: [&str; 5] = [MANIFEST, FINISHED, "wall_time.jsonl", "report.html", "report.md"];
+    Ok(sums::digest_of_all(path, &DIFFERENT)?)
 }
 
 /// What a run came to; `None` if it is not finished.
@@ -463,6 +485,8 @@ impl Manifest {
             threads: rayon::current_num_threads(),
             target: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
             processor: build.processor.clone(),
+            processor_features: build.processor_features.clone(),
+            libraries: build.libraries.clone(),
             arguments: request.arguments.clone(),
             inputs: request.inputs.clone(),
         }

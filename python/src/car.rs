@@ -1,8 +1,8 @@
 //! One environment: the episode that it drives, its expert and its reward.
 
 use crate::course::Course;
-use crate::digest::DriveDigest;
 use crate::reward::Reward;
+use experiment::drive_digest::DriveDigest;
 use experiment::drivers;
 use expert::ScriptedExpert;
 use sim::controller;

@@ -22,7 +22,6 @@ mod car;
 mod cars;
 mod course;
 mod data;
-mod digest;
 mod evaluate;
 mod guard;
 mod lot;

@@ -1,9 +1,9 @@
 //! The same episodes in Rust alone: how fast they are, and what they come to.
 
 use crate::course::{Course, SettingsFrom};
-use crate::digest::DriveDigest;
 use crate::guard::{detached, input};
 use experiment::drive::TrialBatch;
+use experiment::drive_digest::DriveDigest;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;

@@ -2,7 +2,7 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`markdown`], [`summary`], [`table1`], [`failures`], [`tuning`], [`pixel_accuracy`] | tables as Markdown |
+//! | [`markdown`], [`summary`], [`table1`], [`failures`], [`tuning`], [`pixel_accuracy`], [`replays`] | tables as Markdown |
 //! | [`plots`] | plots as SVG |
 //! | [`pictures`] | lots, drives, samples and noise as PNG and SVG |
 //! | [`page`], [`glossary`] | one HTML page that loads nothing, and what its words mean |
@@ -19,6 +19,7 @@ pub mod page;
 pub mod pictures;
 pub mod pixel_accuracy;
 pub mod plots;
+pub mod replays;
 pub mod reproduction;
 pub mod rules;
 pub mod run_report;

@@ -28,7 +28,8 @@ pub fn digest(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-pub(crate) fn hex(bytes: &[u8]) -> String {
+/// Bytes in hexadecimal digits.
+pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
         let _ = write!(text, "{byte:02x}");
         text
@@ -241,6 +242,31 @@ pub fn read_if_listed(path: &Path, bytes_max: u64) -> Result<Option<Vec<u8>>, Fi
     is_listed(folder, &name.to_string_lossy())?.then(|| read(path, bytes_max)).transpose()
 }
 
+/// One SHA-256 of every finished file below a folder but those with some names: two folders with the same hold the same.
+///
+/// It is that of the lines of `sha256sum` with paths from the folder, in order, without the lists themselves.
+///
+/// # Errors
+/// If a list is missing or damaged.
+pub fn digest_of_all(folder: &Path, but: &[&str]) -> Result<String, FileError> {
+    let mut sha256 = Sha256::new();
+    add_all(folder, "", but, &mut sha256)?;
+    Ok(hex(&sha256.finalize()))
+}
+
+fn add_all(folder: &Path, prefix: &str, but: &[&str], sha256: &mut Sha256) -> Result<(), FileError> {
+    let sums = list_of(folder)?.ok_or_else(|| FileError::new(&folder.join(FILE), "is missing", LIST_REMEDY))?;
+    for (path, sum) in sums {
+        let name = path.rsplit('/').next().unwrap_or(&path);
+        if let Some(inner) = path.strip_suffix(FILE) {
+            add_all(&folder.join(inner), &format!("{prefix}{inner}"), but, sha256)?;
+        } else if !but.contains(&name) {
+            sha256.update(format!("{sum}  {prefix}{path}\n"));
+        }
+    }
+    Ok(())
+}
+
 /// What [`verify`] found.
 #[derive(Debug, Default)]
 pub struct Verified {
@@ -384,6 +410,33 @@ mod tests {
         fs::write(inner.join("more"), "").unwrap();
         fs::write(folder.join("stages/note"), "").unwrap();
         assert_eq!(faults(&folder).len(), 2, "{:?}", faults(&folder));
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// Two runs of one command on two machines differ in these alone.
+    #[test]
+    fn the_digest_of_a_folder_is_of_all_content_but_what_is_left_out() {
+        let folder = scratch("digest");
+        let begin = |time: &[u8]| {
+            let _ = fs::remove_dir_all(&folder);
+            fs::create_dir_all(folder.join("round")).unwrap();
+            write(&folder, "data", b"1").unwrap();
+            write(&folder, "time", time).unwrap();
+            write(&folder.join("round"), "weights", b"2").unwrap();
+            write(&folder.join("round"), "time", time).unwrap();
+            list(&folder, &["round/sha256sums"]).unwrap();
+        };
+        let digest_now = || digest_of_all(&folder, &["time"]).unwrap();
+        begin(b"10:00");
+        let first = digest_now();
+        begin(b"10:01");
+        assert_eq!(digest_now(), first);
+        let lines = format!("{}  data\n{}  round/weights\n", digest(b"1"), digest(b"2"));
+        assert_eq!(first, digest(lines.as_bytes()), "anybody can compute it");
+        write(&folder.join("round"), "weights", b"3").unwrap();
+        assert_ne!(digest_now(), first);
+        fs::remove_file(folder.join("round").join(FILE)).unwrap();
+        assert!(digest_of_all(&folder, &["time"]).is_err());
         fs::remove_dir_all(folder).unwrap();
     }
 

@@ -1,6 +1,7 @@
 //! Which program this is, for the manifest of every run.
 
 use experiment::run_dir::Build;
+use serde::Deserialize;
 use std::path::Path;
 use std::process::Command;
 use std::sync::OnceLock;
@@ -20,8 +21,41 @@ pub(crate) fn get() -> &'static Build {
             git_dirty: status.map(|changes| !changes.is_empty()),
             rustc_version: env!("XTASK_RUSTC").to_owned(),
             processor: processor(),
+            processor_features: processor_features(),
+            libraries: libraries(),
         }
     })
+}
+
+/// The libraries whose arithmetic results depend on, in every version that was linked.
+fn libraries() -> Vec<String> {
+    const COMPUTING: [&str; 12] = [
+        "burn",
+        "burn-flex",
+        "faer",
+        "gemm-f32",
+        "geo",
+        "glam",
+        "libm",
+        "ndarray",
+        "parry2d",
+        "rand",
+        "rapier2d",
+        "rten",
+    ];
+    /// What is read of `Cargo.lock`.
+    #[derive(Deserialize)]
+    struct Lock {
+        package: Vec<Package>,
+    }
+    #[derive(Deserialize)]
+    struct Package {
+        name: String,
+        version: String,
+    }
+    let lock: Lock = toml::from_str(include_str!("../../Cargo.lock")).expect("cargo wrote it");
+    let computing = lock.package.into_iter().filter(|package| COMPUTING.contains(&package.name.as_str()));
+    computing.map(|Package { name, version }| format!("{name} {version}")).collect()
 }
 
 /// What git says about the checkout that this program lies in; `None` without git or checkout.
@@ -37,4 +71,17 @@ fn processor() -> Option<String> {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let name = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'))?.1;
     Some(name.trim().to_owned())
+}
+
+/// The instructions that products and sums of networks are computed with, where there is a choice.
+fn processor_features() -> Vec<String> {
+    #[cfg(target_arch = "x86_64")]
+    let features = [
+        ("avx2", std::arch::is_x86_feature_detected!("avx2")),
+        ("fma", std::arch::is_x86_feature_detected!("fma")),
+        ("avx512f", std::arch::is_x86_feature_detected!("avx512f")),
+    ];
+    #[cfg(not(target_arch = "x86_64"))]
+    let features: [(&str, bool); 0] = [];
+    features.into_iter().filter(|(_, has)| *has).map(|(name, _)| name.to_owned()).collect()
 }

@@ -1,8 +1,8 @@
 //! The command line: which commands there are.
 
 use crate::commands::{
-    bench, completions, drivers, evaluate, export, generate, guard, lots, merge, pixel_accuracy, render, reproduce,
-    rules, sample_size, scaling, settings, torture, train, tune, verify, visualise,
+    bench, completions, drivers, evaluate, export, generate, guard, lots, merge, pixel_accuracy, render, replay,
+    reproduce, rules, sample_size, scaling, settings, torture, train, tune, verify, visualise,
 };
 use crate::output::{Color, Output};
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -102,6 +102,9 @@ enum Command {
     /// Searches parameters of the model-based planners on lot a and training lots, the same way for each.
     #[command(after_help = tune::EXAMPLES)]
     Tune(tune::TuneArgs),
+    /// Drives runs again by their replay keys, and says whether they are the same as recorded, bit by bit.
+    #[command(after_help = replay::EXAMPLES)]
+    Replay(replay::ReplayArgs),
     /// Checks that every file of a run is what was written, by its SHA-256.
     #[command(after_help = verify::EXAMPLES)]
     Verify(verify::VerifyArgs),
@@ -152,6 +155,7 @@ impl Cli {
             Command::Lots(args) => lots::run(args, output),
             Command::Drivers(args) => drivers::run(args, output),
             Command::Tune(args) => tune::run(args, output),
+            Command::Replay(args) => replay::run(args, output),
             Command::Verify(args) => verify::run(args, output),
             Command::Torture(args) => torture::run(args, output),
             Command::Render(args) => render::run(args, output),
@@ -175,6 +179,7 @@ impl Command {
             | Self::SampleSize(sample_size::SampleSizeArgs { json, .. })
             | Self::Lots(lots::LotsArgs { json })
             | Self::Drivers(drivers::DriversArgs { json, .. })
+            | Self::Replay(replay::ReplayArgs { json, .. })
             | Self::Verify(verify::VerifyArgs { json, .. }) => json.json,
             Self::Reproduce(_)
             | Self::Rules(_)

@@ -12,6 +12,7 @@ pub(crate) mod merge;
 pub(crate) mod pixel_accuracy;
 pub(crate) mod render;
 mod render_animation;
+pub(crate) mod replay;
 pub(crate) mod reproduce;
 pub(crate) mod rules;
 pub(crate) mod sample_size;

@@ -61,6 +61,8 @@ fn commands_can_be_pasted_into_a_shell() {
         threads: 1,
         target: String::new(),
         processor: None,
+        processor_features: Vec::new(),
+        libraries: Vec::new(),
         arguments: toml::Table::new(),
         inputs: BTreeMap::new(),
     };

@@ -1,9 +1,10 @@
-//! `verify`: whether the files of a run are what was written.
+//! `verify`: whether the files of a run are what was written, and one digest of them all.
 
 use crate::args::JsonArgs;
 use crate::output::{Output, note};
 use anyhow::ensure;
 use clap::Args;
+use experiment::run_dir;
 use std::path::PathBuf;
 use storage::sums::{self, Verified};
 
@@ -27,7 +28,13 @@ pub(crate) fn run(args: &VerifyArgs, output: &Output) -> anyhow::Result<()> {
         note(fault);
     }
     ensure!(faults.is_empty(), "{}: {} of its files are not what was written", args.run.display(), faults.len());
-    let text =
-        || format!("{}: {files} files, {:.1} MB, all as they were written", args.run.display(), bytes as f64 / 1e6);
-    output.table(text, &serde_json::json!({ "files": files, "bytes": bytes }))
+    let sha256 = run_dir::digest(&args.run)?;
+    let text = || {
+        let (run, megabytes) = (args.run.display(), bytes as f64 / 1e6);
+        format!(
+            "{run}: {files} files, {megabytes:.1} MB, all as they were written\n\
+             SHA-256 of what does not differ from one repetition to the next: {sha256}"
+        )
+    };
+    output.table(text, &serde_json::json!({ "files": files, "bytes": bytes, "sha256": sha256 }))
 }

@@ -4,16 +4,18 @@ use sha2::{Digest as _, Sha256};
 use sim::frame::{Event, Frame};
 use sim::geometry::Pose;
 use sim::sensing::GRID_CELLS;
-use std::fmt::Write as _;
+use storage::sums;
 
-/// Takes frames in.
+/// Takes the frames of one drive in, from the first on.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct DriveDigest(Sha256);
+pub struct DriveDigest(Sha256);
 
 impl DriveDigest {
     /// Takes one frame in: what was seen, decided, commanded, driven and measured, but not who decided.
-    pub(crate) fn frame(&mut self, frame: &Frame) {
-        (0..GRID_CELLS).for_each(|row| self.0.update(frame.observation.grid.row(row).to_le_bytes()));
+    pub fn frame(&mut self, frame: &Frame) {
+        for row in 0..GRID_CELLS {
+            self.0.update(frame.observation.grid.row(row).to_le_bytes());
+        }
         let (point, command, vehicle) = (frame.decision.look_ahead, frame.command, &frame.vehicle);
         self.floats(&[point.ahead_m, point.left_m, command.steering_rad, command.speed_mps]);
         self.pose(vehicle.pose);
@@ -34,16 +36,15 @@ impl DriveDigest {
         }
     }
 
-    /// Of the frames so far, in hexadecimal digits.
-    pub(crate) fn hex(&self) -> String {
-        self.0.clone().finalize().iter().fold(String::new(), |mut hex, byte| {
-            let _ = write!(hex, "{byte:02x}");
-            hex
-        })
+    /// Of the frames so far, 64 hexadecimal digits.
+    pub fn hex(&self) -> String {
+        sums::hex(&self.0.clone().finalize())
     }
 
     fn floats(&mut self, values: &[f32]) {
-        values.iter().for_each(|value| self.0.update(value.to_bits().to_le_bytes()));
+        for value in values {
+            self.0.update(value.to_bits().to_le_bytes());
+        }
     }
 
     fn pose(&mut self, pose: Pose) {

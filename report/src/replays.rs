@@ -1,0 +1,42 @@
+//! Runs that were driven again, as a table.
+
+use crate::markdown::table_of;
+use comfy_table::Table;
+use serde::Serialize;
+use sim::metrics::EpisodeMetrics;
+
+/// A run that was driven again.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Its replay key.
+    pub key: String,
+    /// What it came to.
+    pub metrics: EpisodeMetrics,
+    /// Of everything seen, decided and driven.
+    pub sha256: String,
+    /// Whether it was the same when it was recorded; `None` if it is not known.
+    #[serde(rename = "same")]
+    pub is_same: Option<bool>,
+}
+
+/// The table of all runs; a digest is shown by its first digits.
+pub fn table(rows: &[Row]) -> Table {
+    let mut table = table_of(&["run", "route m", "near-collisions", "contacts", "safe ratio", "digest", "as recorded"]);
+    for Row { key, metrics, sha256, is_same } in rows {
+        table.add_row([
+            key.clone(),
+            format!("{:.1}", metrics.reference_m),
+            metrics.near_collisions.to_string(),
+            metrics.contacts.to_string(),
+            format!("{:.3}", metrics.safe_ratio),
+            sha256[..16].to_owned(),
+            match is_same {
+                Some(true) => "the same",
+                Some(false) => "NO",
+                None => "–",
+            }
+            .to_owned(),
+        ]);
+    }
+    table
+}

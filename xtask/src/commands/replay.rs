@@ -1,0 +1,125 @@
+//! `replay`: drives runs again, and says whether they are the same.
+
+use super::evaluate;
+use crate::args::{JsonArgs, LayerArgs};
+use crate::console::Console;
+use crate::output::{Output, note};
+use anyhow::{Context as _, ensure};
+use clap::Args;
+use evaluation::records::{self, RunRecord};
+use experiment::drive::Replay;
+use experiment::drivers::NamedDriver;
+use experiment::progress::{Interrupted, Progress as _};
+use experiment::replay_key::ReplayKey;
+use experiment::run_dir;
+use experiment::settings::{Layers, Settings};
+use report::replays::{self, Row};
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::path::{Path, PathBuf};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask replay expert@lot-b@reverse@3@paper@1@0                what a run comes to, and its digest
+  cargo xtask replay --of runs/evaluate-default-s1                   16 of its runs: whether each is the same here, bit by bit
+  cargo xtask replay --of runs/evaluate-default-s1 expert@lot-b@reverse@3@paper@1@842
+
+To look at a run: cargo xtask visualise replay KEY, or cargo xtask render animation KEY";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct ReplayArgs {
+    /// From `runs.jsonl`, `failures.jsonl` or `failures.md`; the whole run is driven, whatever its tick.
+    #[arg(value_name = "KEY", required_unless_present = "of")]
+    keys: Vec<ReplayKey>,
+    /// Folder of the evaluation that the keys come from: its settings are used, and its digests compared.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "config", "overrides"])]
+    of: Option<PathBuf>,
+    /// How many runs of `--of` are driven, spread over all of them, unless keys are named.
+    #[arg(long, value_name = "N", default_value_t = 16, conflicts_with = "keys", requires = "of")]
+    sample: usize,
+    #[command(flatten)]
+    pub(crate) json: JsonArgs,
+    #[command(flatten)]
+    layers: LayerArgs,
+}
+
+/// A run as an evaluation recorded it.
+struct Recorded {
+    sha256: String,
+    near_collisions: u32,
+    driven_m: f32,
+}
+
+pub(crate) fn run(args: &ReplayArgs, output: &Output) -> anyhow::Result<()> {
+    let (settings, keys, recorded) = if let Some(folder) = &args.of {
+        of_evaluation(folder, args)?
+    } else {
+        let specs: Vec<_> = args.keys.iter().map(|key| key.driver.clone()).collect();
+        let (settings, _) = evaluate::settings_for(&specs, &Layers::from(&args.layers), output)?;
+        (settings, args.keys.clone(), BTreeMap::new())
+    };
+    let mut drivers: BTreeMap<String, NamedDriver> = BTreeMap::new();
+    for key in &keys {
+        if let Entry::Vacant(entry) = drivers.entry(key.driver.to_string()) {
+            entry.insert(key.driver.clone().load(&settings)?).check(&settings)?;
+        }
+    }
+    let console = Console::new(output);
+    console.begin("replay", "driving again");
+    let (mut rows, mut differing) = (Vec::new(), 0);
+    for (index, key) in keys.iter().enumerate() {
+        if console.is_cancelled() {
+            return Err(Interrupted { kept: "nothing is written".to_owned() }.into());
+        }
+        console.at(index as f64 / keys.len() as f64, &mut |_| key.to_string());
+        let (report, sha256) =
+            Replay::new(key, &settings.episode)?.again(&settings.episode, &drivers[&key.driver.to_string()]);
+        let recorded = recorded.get(&key.to_string());
+        if let Some(recorded) = recorded.filter(|recorded| recorded.sha256 != sha256) {
+            differing += 1;
+            note(format_args!(
+                "{key}: {} near-collisions in {:.3} m were recorded, with digest {}",
+                recorded.near_collisions, recorded.driven_m, recorded.sha256
+            ));
+        }
+        let is_same = recorded.map(|recorded| recorded.sha256 == sha256);
+        rows.push(Row { key: key.to_string(), metrics: report.metrics, sha256, is_same });
+    }
+    console.end(&format!("{} runs", rows.len()));
+    output.table(|| replays::table(&rows).to_string(), &rows)?;
+    ensure!(
+        differing == 0,
+        "{differing} of {} runs are not what was recorded: this program, its machine or a file that it read differs from \
+         those of manifest.toml",
+        rows.len()
+    );
+    Ok(())
+}
+
+/// The settings of an evaluation, the keys to drive, and what it recorded by key.
+fn of_evaluation(
+    folder: &Path,
+    args: &ReplayArgs,
+) -> anyhow::Result<(Settings, Vec<ReplayKey>, BTreeMap<String, Recorded>)> {
+    let settings = run_dir::settings_of(folder)?;
+    let file = folder.join(records::RUNS);
+    let (mut all, mut recorded) = (Vec::new(), BTreeMap::new());
+    records::each_line(&file, |run: RunRecord| {
+        let metrics = &run.report.metrics;
+        let of_run =
+            Recorded { sha256: run.sha256, near_collisions: metrics.near_collisions, driven_m: metrics.driven_m };
+        all.push(run.replay.clone());
+        recorded.insert(run.replay, of_run);
+        Ok(())
+    })?;
+    let keys = if args.keys.is_empty() {
+        let count = args.sample.min(all.len());
+        (0..count).map(|index| all[index * all.len() / count].parse()).collect::<anyhow::Result<Vec<_>>>()?
+    } else {
+        args.keys.iter().map(|key| ReplayKey { tick: 0, ..key.clone() }).collect()
+    };
+    for key in &keys {
+        recorded.get(&key.to_string()).with_context(|| format!("{key}: {} has no such run", file.display()))?;
+    }
+    Ok((settings, keys, recorded))
+}
