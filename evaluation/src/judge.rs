@@ -7,6 +7,7 @@ use crate::statistics::comparison::{RateRatio, holm};
 use crate::statistics::poisson::Dispersion;
 use serde::Serialize;
 use sim::seed::RootSeed;
+use std::collections::BTreeMap;
 
 /// A driver in a slice, judged by resampling.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -43,7 +44,8 @@ pub struct Comparison {
 impl EvaluationResults {
     /// How the drivers stand in a slice at a noise level, and how they compare with one of them. Resampled is what is
     /// independent (docs/methods.md 8.3): of fixed lots whole trials, both ways, for they share their obstacles; of generated
-    /// lots, which are a sample themselves, whole lots within their kind (chosen). Only runs that all drivers have driven count.
+    /// lots, which are a sample themselves, whole lots within their kind, and so of six or more lots from files where they are
+    /// pooled (chosen). Only runs that all drivers have driven count.
     pub fn judge(
         &self,
         level: usize,
@@ -57,11 +59,12 @@ impl EvaluationResults {
         if pairs.is_empty() {
             return (estimates, Vec::new());
         }
+        let strata = strata(&pairs, slice.is_pooled());
         for (driver, estimate) in estimates.iter_mut().enumerate() {
-            estimate.dispersion = dispersion(&pairs, driver);
+            estimate.dispersion = dispersion(&strata, driver);
         }
         let others: Vec<usize> = (0..drivers).filter(|&driver| driver != with).collect();
-        let intervals = bootstrap(&pairs, &others, with, seed);
+        let intervals = bootstrap(&strata, &others, with, seed);
         let interval = |index: usize| intervals.as_ref().map(|intervals| intervals[index]);
         for (driver, estimate) in estimates.iter_mut().enumerate() {
             estimate.per_100m = interval(STATISTICS * driver);
@@ -105,28 +108,33 @@ impl EvaluationResults {
     }
 }
 
-fn dispersion(pairs: &[Vec<RunSummary>], driver: usize) -> Option<Dispersion> {
-    let strata: Vec<Vec<(u32, f64)>> = strata(pairs)
+fn dispersion(strata: &[Stratum<'_>], driver: usize) -> Option<Dispersion> {
+    let strata: Vec<Vec<(u32, f64)>> = strata
+        .iter()
         .map(|clusters| {
             let cluster = |rows: &[Vec<RunSummary>]| {
                 let units = rows.iter().map(|row| row[driver]);
                 units.fold((0, 0.0), |(n, m), unit| (n + unit.near_collisions, m + f64::from(unit.reference_m)))
             };
-            clusters.into_iter().map(cluster).collect()
+            clusters.iter().map(|rows| cluster(rows)).collect()
         })
         .collect();
     Dispersion::within(strata.iter().map(Vec::as_slice))
 }
 
-/// Stratum by stratum its clusters. Trials are ordered lot by lot, so clusters lie together; groups need not.
-fn strata(pairs: &[Vec<RunSummary>]) -> impl Iterator<Item = Vec<&[Vec<RunSummary>]>> {
-    let mut groups: Vec<u32> = pairs.iter().map(|row| row[0].group).collect();
-    groups.sort_unstable();
-    groups.dedup();
-    groups.into_iter().map(|group| {
-        let clusters = pairs.chunk_by(|a, b| a[0].cluster == b[0].cluster);
-        clusters.filter(|rows| rows[0][0].group == group).collect()
-    })
+/// Clusters of runs, resampled among each other: of each its runs, and of each run all drivers.
+type Stratum<'a> = Vec<&'a [Vec<RunSummary>]>;
+
+/// Trials are ordered lot by lot, so clusters lie together; the lots of a stratum need not.
+fn strata(pairs: &[Vec<RunSummary>], is_pooled: bool) -> Vec<Stratum<'_>> {
+    let is_of_sample = |row: &[RunSummary]| is_pooled && row[0].is_of_sample;
+    let cluster = |row: &[RunSummary]| if is_of_sample(row) { (true, row[0].group) } else { (false, row[0].cluster) };
+    let mut strata: BTreeMap<Option<u32>, Stratum<'_>> = BTreeMap::new();
+    for rows in pairs.chunk_by(|a, b| cluster(a) == cluster(b)) {
+        let group = (!is_of_sample(&rows[0])).then_some(rows[0][0].group);
+        strata.entry(group).or_default().push(rows);
+    }
+    strata.into_values().collect()
 }
 
 /// Resampled of every driver: near-collisions per 100 m, safe ratio, steering reversals per 100 m driven.
@@ -137,15 +145,15 @@ const SHARED: usize = 2;
 
 /// The statistics of every driver, then their differences of every other driver from `with`. `None` if nothing varies
 /// because every stratum has a single cluster.
-fn bootstrap(pairs: &[Vec<RunSummary>], others: &[usize], with: usize, seed: RootSeed) -> Option<Vec<Interval>> {
-    let drivers = pairs[0].len();
+fn bootstrap(strata: &[Stratum<'_>], others: &[usize], with: usize, seed: RootSeed) -> Option<Vec<Interval>> {
+    let drivers = strata[0][0][0].len();
     let columns = SHARED + COLUMNS * drivers;
     let mut units = Units::new(columns);
     let mut largest = 0;
-    for clusters in strata(pairs) {
+    for clusters in strata {
         units.begin_stratum();
         largest = largest.max(clusters.len());
-        for rows in clusters {
+        for &rows in clusters {
             let mut sums = vec![0.0; columns];
             for row in rows {
                 sums[0] += 1.0;

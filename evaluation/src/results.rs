@@ -17,6 +17,8 @@ pub(crate) struct RunSummary {
     pub(crate) group: u32,
     /// Runs that share obstacles: they are resampled together.
     pub(crate) cluster: u32,
+    /// Whether its lot is one of several from files: where they are pooled, they are the sample.
+    pub(crate) is_of_sample: bool,
     pub(crate) near_collisions: u32,
     pub(crate) reference_m: f32,
     pub(crate) safe_ratio: f32,
@@ -37,14 +39,25 @@ pub(crate) struct DriverResults {
     again: BTreeMap<u32, u32>,
 }
 
-/// Everything that is kept of an evaluation: sums, and 32 bytes per run.
+/// Everything that is kept of an evaluation: sums, and 36 bytes per run.
 #[derive(Debug)]
 pub struct EvaluationResults {
     groups: Vec<LotGroup>,
-    /// Group of a lot by name, and how its runs cluster.
-    lots: BTreeMap<String, (u32, Clusters)>,
+    /// By name.
+    lots: BTreeMap<String, Place>,
     /// By noise level, then by driver.
     pub(crate) drivers: Vec<Vec<DriverResults>>,
+}
+
+/// So many lots from files are a sample of their kind (chosen: as many units as an interval needs to exclude zero).
+const SAMPLE_MIN: usize = 6;
+
+/// How the runs of a lot are counted.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    group: u32,
+    clusters: Clusters,
+    is_of_sample: bool,
 }
 
 /// Which runs of a lot share obstacles.
@@ -83,6 +96,7 @@ impl EvaluationResults {
             lots: BTreeMap::new(),
             drivers: vec![vec![DriverResults::default(); plan.drivers.len()]; plan.settings.evaluation.noise.len()],
         };
+        let are_sample = plan.lots.iter().filter(|lot| lot.is_from_file()).count() >= SAMPLE_MIN;
         let mut free_cluster = 0;
         for lot in plan.lots {
             let name = lot.group();
@@ -98,14 +112,15 @@ impl EvaluationResults {
                 (Clusters::Trials(free_cluster), plan.settings.evaluation.trials)
             };
             free_cluster += count;
-            results.lots.insert(lot.name().to_owned(), (group as u32, clusters));
+            let is_of_sample = are_sample && lot.is_from_file();
+            results.lots.insert(lot.name().to_owned(), Place { group: group as u32, clusters, is_of_sample });
         }
         results
     }
 
     /// Adds a run of a noise level, driver and trial of the plan. Trials come in order.
     pub fn add(&mut self, level: usize, driver: usize, trial_index: usize, trial: &Trial<'_>, report: &EpisodeReport) {
-        let (group, clusters) = self.lots[trial.lot.name()];
+        let Place { group, clusters, is_of_sample } = self.lots[trial.lot.name()];
         let driver_results = &mut self.drivers[level][driver];
         driver_results.totals.entry((group, trial.direction)).or_default().add(report);
         let metrics = &report.metrics;
@@ -113,6 +128,7 @@ impl EvaluationResults {
             trial: trial_index as u32,
             group,
             cluster: clusters.of(trial),
+            is_of_sample,
             near_collisions: metrics.near_collisions,
             reference_m: metrics.reference_m,
             safe_ratio: metrics.safe_ratio,
@@ -123,7 +139,7 @@ impl EvaluationResults {
 
     /// Adds the cause of a near-collision, and whether it happened at the place of the one before.
     pub fn add_cause(&mut self, level: usize, driver: usize, lot: &Lot, cause: Cause, is_again: bool) {
-        let (group, _) = self.lots[lot.name()];
+        let group = self.lots[lot.name()].group;
         let driver_results = &mut self.drivers[level][driver];
         *driver_results.causes.entry((group, cause)).or_default() += 1;
         *driver_results.again.entry(group).or_default() += u32::from(is_again);

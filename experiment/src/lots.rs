@@ -129,6 +129,11 @@ impl Lot {
         matches!(self.spec, LotSpec::Generated { .. })
     }
 
+    /// Whether it is the user's: read from a file.
+    pub fn is_from_file(&self) -> bool {
+        self.from_file.is_some()
+    }
+
     /// Checks that it can be driven in a direction. Generated lots can; one written by hand may leave no room to start
     /// back from its finish.
     ///

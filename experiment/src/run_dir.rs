@@ -106,8 +106,9 @@ pub const MANIFEST_SCHEMA: u32 = 3;
 pub struct Finished {
     /// Version of this format: [`FINISHED_SCHEMA`].
     pub schema: u32,
-    /// Of all that was written: [`digest`].
-    pub sha256: String,
+    /// Of all that was written: [`digest`]; `None` in runs of the version before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sha256: Option<String>,
     /// What was done.
     pub outcome: Outcome,
 }
@@ -374,7 +375,7 @@ impl RunDir {
     /// # Errors
     /// If it cannot be written.
     pub fn finish(&self, outcome: Outcome) -> anyhow::Result<()> {
-        let finished = Finished { schema: FINISHED_SCHEMA, sha256: digest(&self.path)?, outcome };
+        let finished = Finished { schema: FINISHED_SCHEMA, sha256: Some(digest(&self.path)?), outcome };
         self.write(FINISHED, toml::to_string(&finished)?.as_bytes())?;
         if let Some((run, list)) = &self.within {
             sums::list(run, &[list])?;

@@ -131,3 +131,28 @@ fn oscillation_is_per_driven_way() {
     twice.merge(&totals);
     assert_eq!((twice.runs, twice.steering_reversals), (4, 16));
 }
+
+/// 29 maps were 29 strata: the interval of the pooled rate said how sure it was on these very maps, and was quoted for others.
+#[test]
+fn pooled_lots_from_files_are_a_sample_of_their_kind_from_six_on() {
+    const MAPS: [&str; 6] = ["alley", "avenue", "office", "quay", "ramps", "warehouse"];
+    let judged = |maps: &[&str], label: &str| {
+        let settings = Settings::preset("default").unwrap();
+        let paths: Vec<String> = maps.iter().map(|map| format!("../scenarios/examples/maps/{map}.yaml")).collect();
+        let lots = Lot::parse_all(&paths, &settings.episode.vehicle).unwrap();
+        let drivers = drivers_named(1);
+        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0, shard: None };
+        let mut results = EvaluationResults::new(&plan);
+        for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 3, &Direction::BOTH).enumerate() {
+            // Always at the same place.
+            let near_collisions = 2 * u32::from(trial.lot.name() == "office");
+            results.add(0, 0, index, &trial, &report(near_collisions, 100.0, 0.9));
+        }
+        let interval = results.judge(0, &slice(&results, label), 0, RootSeed(1)).0[0].per_100m.unwrap();
+        (interval.lower, interval.estimate, interval.upper)
+    };
+    let (lower, rate, upper) = judged(&MAPS, "all");
+    assert!(lower == 0.0 && upper > 2.0 * rate, "without the one map there is none: {rate} [{lower}, {upper}]");
+    assert_eq!(judged(&MAPS, "office"), (2.0, 2.0, 2.0), "a lot by itself: its trials");
+    assert_eq!(judged(&MAPS[..5], "all"), (0.4, 0.4, 0.4), "five are too few to speak for others");
+}
