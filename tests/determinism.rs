@@ -38,11 +38,12 @@ fn one_and_two_threads_write_the_same_bytes() {
             xtask().args(["--threads", threads, "train-dagger", "--preset", "smoke", "--seed", "7", "--out"]).arg(&out),
         );
         let files = files(&out);
+        let digest = digest_of(&out);
         std::fs::remove_dir_all(&out).unwrap();
-        (files, printed)
+        (files, printed, digest)
     };
-    let (one, printed_by_one) = train("1");
-    let (two, printed_by_two) = train("2");
+    let (one, printed_by_one, digest_by_one) = train("1");
+    let (two, printed_by_two, digest_by_two) = train("2");
     for needed in
         ["settings.toml", "round-00/grids.npy", "round-00/learning.csv", "round-01/model.safetensors", "table1.json"]
     {
@@ -54,6 +55,14 @@ fn one_and_two_threads_write_the_same_bytes() {
         assert!(*bytes == two[name], "{name} differs between 1 and 2 threads");
     }
     assert_eq!(printed_by_one, printed_by_two, "what is printed differs between 1 and 2 threads");
+    assert_eq!(digest_by_one, digest_by_two);
+}
+
+/// The digest of a whole run, as `verify` prints it.
+fn digest_of(run: &Path) -> String {
+    let verified: serde_json::Value =
+        serde_json::from_str(&succeed(xtask().args(["verify", "--json"]).arg(run))).unwrap();
+    verified["sha256"].as_str().unwrap().to_owned()
 }
 
 #[test]

@@ -106,15 +106,12 @@ pub const MANIFEST_SCHEMA: u32 = 3;
 pub struct Finished {
     /// Version of this format: [`FINISHED_SCHEMA`].
     pub schema: u32,
-    /// Of all that was written: [`digest`]; `None` in runs of the version before.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sha256: Option<String>,
     /// What was done.
     pub outcome: Outcome,
 }
 
 /// The version of `finished.toml` that this program writes.
-pub const FINISHED_SCHEMA: u32 = 2;
+pub const FINISHED_SCHEMA: u32 = 1;
 
 /// What was done in a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -375,7 +372,7 @@ impl RunDir {
     /// # Errors
     /// If it cannot be written.
     pub fn finish(&self, outcome: Outcome) -> anyhow::Result<()> {
-        let finished = Finished { schema: FINISHED_SCHEMA, sha256: Some(digest(&self.path)?), outcome };
+        let finished = Finished { schema: FINISHED_SCHEMA, outcome };
         self.write(FINISHED, toml::to_string(&finished)?.as_bytes())?;
         if let Some((run, list)) = &self.within {
             sums::list(run, &[list])?;

@@ -2,14 +2,17 @@
 
 use crate::markdown::table_of;
 use comfy_table::Table;
+use experiment::replay_key::ReplayKey;
 use serde::Serialize;
 use sim::metrics::EpisodeMetrics;
 
 /// A run that was driven again.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// Its replay key.
-    pub key: String,
+    /// What was driven again.
+    pub key: ReplayKey,
+    /// The name of its lot.
+    pub lot: String,
     /// What it came to.
     pub metrics: EpisodeMetrics,
     /// Of everything seen, decided and driven.
@@ -21,11 +24,14 @@ pub struct Row {
 
 /// The table of all runs; a digest is shown by its first digits.
 pub fn table(rows: &[Row]) -> Table {
-    let mut table = table_of(&["run", "route m", "near-collisions", "contacts", "safe ratio", "digest", "as recorded"]);
-    for Row { key, metrics, sha256, is_same } in rows {
+    let mut table =
+        table_of(&["driver", "lot", "way", "trial", "near-coll.", "contacts", "safe ratio", "digest", "as recorded"]);
+    for Row { key, lot, metrics, sha256, is_same } in rows {
         table.add_row([
-            key.clone(),
-            format!("{:.1}", metrics.reference_m),
+            key.driver.to_string(),
+            lot.clone(),
+            key.direction.name().to_owned(),
+            key.trial.to_string(),
             metrics.near_collisions.to_string(),
             metrics.contacts.to_string(),
             format!("{:.3}", metrics.safe_ratio),

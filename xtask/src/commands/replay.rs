@@ -72,8 +72,8 @@ pub(crate) fn run(args: &ReplayArgs, output: &Output) -> anyhow::Result<()> {
             return Err(Interrupted { kept: "nothing is written".to_owned() }.into());
         }
         console.at(index as f64 / keys.len() as f64, &mut |_| key.to_string());
-        let (report, sha256) =
-            Replay::new(key, &settings.episode)?.again(&settings.episode, &drivers[&key.driver.to_string()]);
+        let replay = Replay::new(key, &settings.episode)?;
+        let (report, sha256) = replay.again(&settings.episode, &drivers[&key.driver.to_string()]);
         let recorded = recorded.get(&key.to_string());
         if let Some(recorded) = recorded.filter(|recorded| recorded.sha256 != sha256) {
             differing += 1;
@@ -83,7 +83,8 @@ pub(crate) fn run(args: &ReplayArgs, output: &Output) -> anyhow::Result<()> {
             ));
         }
         let is_same = recorded.map(|recorded| recorded.sha256 == sha256);
-        rows.push(Row { key: key.to_string(), metrics: report.metrics, sha256, is_same });
+        let (key, lot) = (key.clone(), replay.lot.name().to_owned());
+        rows.push(Row { key, lot, metrics: report.metrics, sha256, is_same });
     }
     console.end(&format!("{} runs", rows.len()));
     output.table(|| replays::table(&rows).to_string(), &rows)?;
