@@ -461,14 +461,7 @@ fn episodes_of_a_training_are_driven_again_as_they_were() {
     let _ = std::fs::remove_dir_all(&run);
     let mut settings = Settings::preset("smoke").unwrap();
     settings.training.lots = vec!["lot-b".to_owned()];
-    let build = Build {
-        program: "test".to_owned(),
-        command_line: Vec::new(),
-        git_revision: None,
-        git_dirty: None,
-        rustc_version: String::new(),
-        processor: None,
-    };
+    let build = Build { program: "test".to_owned(), ..Build::default() };
     let place = Place { build: &build, out: Some(&run), overwrite: false, command: "test", preset: "smoke", seed: 1 };
     let folder = RunDir::create(&place, &settings, &Request::default()).unwrap();
     let outcome = training_run::train(&settings, &folder, &Silent).unwrap();
