@@ -142,7 +142,8 @@ proptest! {
                 // How rare that is, `a_planner_that_ignores_its_grid_is_no_mirror_image_of_itself` says.
                 let is_tie = point == image;
                 // MPPI weighs rollouts by exponentials of their costs: a rounding of these is millimetres of the answer.
-                prop_assert!(turned < 1e-2 || is_tie, "{}: {:?} and {:?}", name, point, image);
+                let allowed_m = if *name == "mppi" { 1e-2 } else { 2e-3 };
+                prop_assert!(turned < allowed_m || is_tie, "{}: {:?} and {:?}", name, point, image);
                 if is_tie {
                     break; // From here on the two have different pasts.
                 }

@@ -48,7 +48,8 @@ pub fn to_markdown(summary: &Summary<'_>) -> String {
     let _ = write!(
         text,
         "Trials per lot and direction: {trials}, seed: {}. Intervals of 95 %: exact Poisson, or (b) paired bootstrap \
-         ({DRAWS} draws of whole trials, both ways together; of whole lots where these are a sample: generated, or six or more from files) where the dispersion exceeds {DISPERSION_MAX} and events cannot be \
+         ({DRAWS} draws of whole trials, both ways together; of whole lots where these are a sample: generated, or six or more \
+         from files) where the dispersion exceeds {DISPERSION_MAX} and events cannot be \
          taken for independent; safe ratios and differences: bootstrap; * = excludes zero, by six trials or more; p: exact test of equal \
          rates, and after Holm. Rates are per length of the route: for runs given up early they are too low.",
         seed.0

@@ -35,8 +35,15 @@ pub(crate) struct ReplayArgs {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "config", "overrides"])]
     of: Option<PathBuf>,
     /// How many runs of `--of` are driven, spread over all of them, unless keys are named.
-    #[arg(long, value_name = "N", default_value_t = 16, conflicts_with = "keys", requires = "of")]
-    sample: usize,
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 16,
+        value_parser = clap::value_parser!(u32).range(1..),
+        conflicts_with = "keys",
+        requires = "of"
+    )]
+    sample: u32,
     #[command(flatten)]
     pub(crate) json: JsonArgs,
     #[command(flatten)]
@@ -114,7 +121,7 @@ fn of_evaluation(
         Ok(())
     })?;
     let keys = if args.keys.is_empty() {
-        let count = args.sample.min(all.len());
+        let count = all.len().min(args.sample as usize);
         (0..count).map(|index| all[index * all.len() / count].parse()).collect::<anyhow::Result<Vec<_>>>()?
     } else {
         args.keys.iter().map(|key| ReplayKey { tick: 0, ..key.clone() }).collect()
