@@ -6,7 +6,7 @@ use scenarios::generator;
 use scenarios::import::MapLot;
 use scenarios::note::{Loaded, Note};
 use scenarios::reference::{self, ReferenceLot};
-use scenarios::split::Split;
+use scenarios::split::{Family, Split};
 use sim::scenario::{Direction, NoiseLevel, Scenario};
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
@@ -32,22 +32,30 @@ pub struct Drawn {
 }
 
 /// Ways to name lots: how it is written, what it means.
-pub const SPECS: [(&str, &str); 11] = [
-    ("lot-a", "the paper's training lot rebuilt: 231 m; obstacles drawn anew for every trial"),
-    ("lot-b", "139 m, the narrowest, never trained on"),
-    ("lot-c", "149 m, the widest, never trained on"),
-    ("reference", "all three"),
-    ("test:N", "the first N generated lots of a split: train, validation or test; medium, unless a family follows"),
-    ("test:N:FAMILY", "easy, medium, hard, lane, rooms, street, aisles, track or open; all: one of each in turn"),
-    (
-        "sealed:PHRASE:N",
-        "N lots that nobody has tuned on, drawn from a phrase: easy, medium, hard in turn, or a family",
-    ),
-    ("test-hard-7", "one of them"),
-    ("PATH.toml", "a lot written by hand (cargo xtask generate writes examples), or the route on a map, PATH.lot.toml"),
-    ("PATH.yaml", "a ROS map, driven as PATH.lot.toml beside it says (see scenarios/examples/car-park.lot.toml)"),
-    ("PATH.csv", "a TPCAP case with a drive forwards; PATH.lot.toml may change it"),
-];
+pub fn specs() -> Vec<(&'static str, String)> {
+    let families = format!("{}; all: one of each in turn", Family::list(""));
+    [
+        ("lot-a", "the paper's training lot rebuilt: 231 m; obstacles drawn anew for every trial"),
+        ("lot-b", "139 m, the narrowest, never trained on"),
+        ("lot-c", "149 m, the widest, never trained on"),
+        ("reference", "all three"),
+        ("test:N", "the first N generated lots of a split: train, validation or test; medium, unless a family follows"),
+        ("test:N:FAMILY", families.as_str()),
+        (
+            "sealed:PHRASE:N",
+            "N lots that nobody has tuned on, drawn from a phrase: easy, medium, hard in turn, or a family",
+        ),
+        ("test-hard-7", "one of them"),
+        (
+            "PATH.toml",
+            "a lot written by hand (cargo xtask generate writes examples), or the route on a map, PATH.lot.toml",
+        ),
+        ("PATH.yaml", "a ROS map, driven as PATH.lot.toml beside it says (see scenarios/examples/car-park.lot.toml)"),
+        ("PATH.csv", "a TPCAP case with a drive forwards; PATH.lot.toml may change it"),
+    ]
+    .map(|(spec, about)| (spec, about.to_owned()))
+    .to_vec()
+}
 
 impl Lot {
     /// The lots that specs stand for. Files are checked with the car that is to drive there.

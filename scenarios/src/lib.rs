@@ -122,8 +122,9 @@ impl std::str::FromStr for LotSpec {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "{name:?} {problem}; there are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N, test:N and \
-     sealed:PHRASE:N (N generated lots; add :all, :easy, :medium, :hard, :lane, :rooms, :street, :aisles, :track or \
-     :open), single ones such as test-hard-7, and paths ending in .toml, .yaml (ROS map) or .csv (TPCAP case)"
+     sealed:PHRASE:N (N generated lots; add :all, {families}), single ones such as test-hard-7, and paths ending in .toml, \
+     .yaml (ROS map) or .csv (TPCAP case)",
+    families = Family::list(":")
 )]
 pub struct SpecError {
     name: String,
@@ -257,6 +258,7 @@ mod tests {
     fn other_names_are_refused_with_what_there_is() {
         let table = [
             ("lot-d", "\"lot-d\" is no lot; there are lot-a, lot-b"),
+            ("lot-d", ":open, :halls, :yards or :chicanes)"),
             ("", "\"\" is no lot; there are"),
             ("lot-a,", "\"\" is no lot; there are"),
             ("train", "\"train\" does not say how many lots; there are"),

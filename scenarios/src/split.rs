@@ -142,6 +142,13 @@ impl Family {
     /// The corridor between parked cars in its three difficulties, easiest first.
     pub const CORRIDORS: [Self; 3] = [Self::Easy, Self::Medium, Self::Hard];
 
+    /// All names, each with something before it: `a, b or c`.
+    pub fn list(before: &str) -> String {
+        let names = Self::ALL.map(|family| format!("{before}{}", family.name()));
+        let (last, others) = names.split_last().expect("there are families");
+        format!("{} or {last}", others.join(", "))
+    }
+
     /// Name on the command line.
     pub fn name(self) -> &'static str {
         match self {

@@ -18,5 +18,7 @@ pub(crate) struct LotsArgs {
 }
 
 pub(crate) fn run(_: &LotsArgs, output: &Output) -> anyhow::Result<()> {
-    output.names(&lots::SPECS)
+    let specs = lots::specs();
+    let names: Vec<(&str, &str)> = specs.iter().map(|(spec, about)| (*spec, about.as_str())).collect();
+    output.names(&names)
 }
