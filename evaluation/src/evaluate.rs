@@ -7,6 +7,7 @@
 
 use crate::incidents::{self, Incident, IncidentMonitor};
 use crate::plan::Plan;
+use crate::read::Places;
 use crate::records::{self, Driven, FailureRecord, RunRecord, WallTimeRecord};
 use crate::results::EvaluationResults;
 use experiment::drive::TrialBatch;
@@ -67,13 +68,20 @@ struct Driving<'a> {
 
 impl<'a> Driving<'a> {
     fn open(plan: &'a Plan<'a>, folder: &Path, progress: &'a dyn Progress) -> anyhow::Result<Self> {
-        let (lines, left) = Growing::open(folder, "driving", &FILES)?;
-        let [runs, failures] = [0, 1].map(|file: usize| str::from_utf8(&left[file]));
-        let (runs, failures) = (runs?, failures?);
-        let results = EvaluationResults::of_lines(plan, folder, runs, failures)?;
+        let lines = Growing::open(folder, "driving", &FILES)?;
+        let mut results = EvaluationResults::new(plan);
+        let places = Places::new(plan);
+        let (mut done, mut near_collisions) = (0, 0);
+        records::each_line_of(&folder.join(records::RUNS), lines.reader(0)?, |run| {
+            done += 1;
+            results.take_run(&places, &run)
+        })?;
+        records::each_line_of(&folder.join(records::FAILURES), lines.reader(1)?, |failure| {
+            near_collisions += 1;
+            results.take_failure(&places, &failure)
+        })?;
         progress.begin("evaluation", "driving");
-        let all = plan.trials().count() * plan.drivers.len() * plan.settings.evaluation.noise.len();
-        let (done, near_collisions) = (runs.lines().count(), failures.lines().count() as u32);
+        let all = places.trials.len() * plan.drivers.len() * plan.settings.evaluation.noise.len();
         let track = Track { progress, runs: all, done, near_collisions };
         Ok(Self { plan, lines, results, track, parts: 0, trials: 0 })
     }

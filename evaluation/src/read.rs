@@ -6,11 +6,9 @@ use crate::records::{self, Driven, FailureRecord, RunRecord};
 use crate::results::EvaluationResults;
 use anyhow::Context as _;
 use experiment::trials::Trial;
-use sim::limits::RUN_TEXT_BYTES_MAX;
 use sim::scenario::Direction;
 use std::collections::BTreeMap;
 use std::path::Path;
-use storage::sums;
 
 impl EvaluationResults {
     /// Reads `runs.jsonl` and `failures.jsonl` of a folder: the same results as after driving the plan.
@@ -18,30 +16,32 @@ impl EvaluationResults {
     /// # Errors
     /// If a file is missing or damaged, or was not written by this plan.
     pub fn read(plan: &Plan<'_>, folder: &Path) -> anyhow::Result<Self> {
-        let [runs, failures] =
-            [records::RUNS, records::FAILURES].map(|name| sums::read_to_string(&folder.join(name), RUN_TEXT_BYTES_MAX));
-        Self::of_lines(plan, folder, &runs?, &failures?)
-    }
-
-    /// Of the lines of both files, as far as they are written.
-    ///
-    /// # Errors
-    /// If they were not written by this plan.
-    pub(crate) fn of_lines(plan: &Plan<'_>, folder: &Path, runs: &str, failures: &str) -> anyhow::Result<Self> {
         let mut results = Self::new(plan);
         let places = Places::new(plan);
-        records::each_line_of(&folder.join(records::RUNS), runs, |run: RunRecord| {
-            let Place { level, driver, trial } = places.of(&run.driven)?;
-            results.add(level, driver, trial, &places.trials[trial], &run.report);
-            Ok(())
-        })?;
-        records::each_line_of(&folder.join(records::FAILURES), failures, |failure: FailureRecord| {
-            let Place { level, driver, trial } = places.of(&failure.driven)?;
-            let is_again = incidents::is_again(failure.findings.since_resume_m);
-            results.add_cause(level, driver, places.trials[trial].lot, failure.cause, is_again);
-            Ok(())
-        })?;
+        records::each_line(&folder.join(records::RUNS), |run| results.take_run(&places, &run))?;
+        records::each_line(&folder.join(records::FAILURES), |failure| results.take_failure(&places, &failure))?;
         Ok(results)
+    }
+
+    /// Adds a line of `runs.jsonl`.
+    ///
+    /// # Errors
+    /// If it was not written by this plan.
+    pub(crate) fn take_run(&mut self, places: &Places<'_>, run: &RunRecord) -> anyhow::Result<()> {
+        let Place { level, driver, trial } = places.of(&run.driven)?;
+        self.add(level, driver, trial, &places.trials[trial], &run.report);
+        Ok(())
+    }
+
+    /// Adds a line of `failures.jsonl`.
+    ///
+    /// # Errors
+    /// If it was not written by this plan.
+    pub(crate) fn take_failure(&mut self, places: &Places<'_>, failure: &FailureRecord) -> anyhow::Result<()> {
+        let Place { level, driver, trial } = places.of(&failure.driven)?;
+        let is_again = incidents::is_again(failure.findings.since_resume_m);
+        self.add_cause(level, driver, places.trials[trial].lot, failure.cause, is_again);
+        Ok(())
     }
 }
 

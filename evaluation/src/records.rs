@@ -8,8 +8,9 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sim::episode::EpisodeReport;
 use sim::frame::Ending;
-use sim::limits::{RECORD_BYTES_MAX, RUN_TEXT_BYTES_MAX};
+use sim::limits::{RECORD_BYTES_MAX, RUN_LINES_BYTES_MAX};
 use sim::scenario::Direction;
+use std::io::{BufRead as _, BufReader, Read};
 use std::path::Path;
 use storage::sums;
 
@@ -109,12 +110,12 @@ pub struct WallTimeRecord {
     pub wall_s: f64,
 }
 
-/// Reads a finished file line by line.
+/// Reads a finished file line by line; no more than a line is held.
 ///
 /// # Errors
 /// If it is missing, damaged or of another version, or `take` refuses a line.
 pub fn each_line<T: DeserializeOwned>(path: &Path, take: impl FnMut(T) -> anyhow::Result<()>) -> anyhow::Result<()> {
-    each_line_of(path, &sums::read_to_string(path, RUN_TEXT_BYTES_MAX)?, take)
+    each_line_of(path, sums::open(path, RUN_LINES_BYTES_MAX)?, take)
 }
 
 /// Reads the lines of a file; `path` is for errors.
@@ -123,39 +124,32 @@ pub fn each_line<T: DeserializeOwned>(path: &Path, take: impl FnMut(T) -> anyhow
 /// If it is of another version, or `take` refuses a line.
 pub fn each_line_of<T: DeserializeOwned>(
     path: &Path,
-    text: &str,
+    lines: impl Read,
     mut take: impl FnMut(T) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
-    for (index, line) in text.lines().enumerate() {
-        let taken = parse(line).and_then(&mut take);
-        taken.with_context(|| {
-            format!("{}:{}: not of this evaluation; drive it again into another folder", path.display(), index + 1)
+    let mut lines = BufReader::new(lines);
+    let mut line = Vec::new();
+    for number in 1.. {
+        line.clear();
+        let read = lines.by_ref().take(RECORD_BYTES_MAX + 1).read_until(b'\n', &mut line);
+        if read.with_context(|| path.display().to_string())? == 0 {
+            break;
+        }
+        parse(&line).and_then(&mut take).with_context(|| {
+            format!("{}:{number}: not of this evaluation; drive it again into another folder", path.display())
         })?;
     }
     Ok(())
 }
 
-/// All lines of a file.
-///
-/// # Errors
-/// See [`each_line`].
-pub fn read<T: DeserializeOwned>(path: &Path) -> anyhow::Result<Vec<T>> {
-    let mut records = Vec::new();
-    each_line(path, |record| {
-        records.push(record);
-        Ok(())
-    })?;
-    Ok(records)
-}
-
-fn parse<T: DeserializeOwned>(line: &str) -> anyhow::Result<T> {
+fn parse<T: DeserializeOwned>(line: &[u8]) -> anyhow::Result<T> {
     #[derive(Deserialize)]
     struct Version {
         #[serde(default)]
         schema: u32,
     }
-    ensure!(line.len() as u64 <= RECORD_BYTES_MAX, "the line has {} bytes", line.len());
-    let Version { schema } = serde_json::from_str(line)?;
+    ensure!(line.len() as u64 <= RECORD_BYTES_MAX, "the line has more than {RECORD_BYTES_MAX} bytes");
+    let Version { schema } = serde_json::from_slice(line)?;
     ensure!(schema == SCHEMA, "written by another version of lotpilot (schema {schema}, this one reads {SCHEMA})");
-    Ok(serde_json::from_str(line)?)
+    Ok(serde_json::from_slice(line)?)
 }

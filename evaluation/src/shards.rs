@@ -191,7 +191,7 @@ impl ShardRun {
         let mut lines = text.lines();
         let mut rows = Vec::new();
         let mut seen = BTreeSet::new();
-        records::each_line_of(&path, &text, |driven: Driven| {
+        records::each_line_of(&path, text.as_bytes(), |driven: Driven| {
             let is_new = seen.insert(own.of(&driven)?);
             ensure!(is_new || name == records::FAILURES, "there twice");
             rows.push((places.of(&driven)?, lines.next().unwrap_or_default().to_owned()));

@@ -25,6 +25,7 @@ use policy::dataset::Dataset;
 use policy::dataset::store::Store;
 use policy::fit::learning::{self, LearningCurve};
 use sim::limits::RUN_TEXT_BYTES_MAX;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 use storage::sums;
@@ -61,8 +62,12 @@ struct Training {
 struct Evaluation {
     text: String,
     tables: Tables,
-    runs: Vec<RunRecord>,
-    failures: Vec<FailureRecord>,
+    /// Of the runs by noise level, driver and lot.
+    safe_ratios: BTreeMap<(String, String), BTreeMap<String, Vec<f32>>>,
+    /// Near-collisions in all.
+    near_collisions: usize,
+    /// The worst of them.
+    worst: Worst,
 }
 
 impl Sources {
@@ -92,12 +97,21 @@ impl Training {
 impl Evaluation {
     fn read(folder: &Path) -> anyhow::Result<Option<Self>> {
         let Some(tables) = Tables::read(folder)? else { return Ok(None) };
-        Ok(Some(Self {
-            text: text(&folder.join("summary.md"))?,
-            tables,
-            runs: records::read(&folder.join(records::RUNS))?,
-            failures: records::read(&folder.join(records::FAILURES))?,
-        }))
+        let text = text(&folder.join("summary.md"))?;
+        let mut evaluation =
+            Self { text, tables, safe_ratios: BTreeMap::new(), near_collisions: 0, worst: Worst::default() };
+        records::each_line(&folder.join(records::RUNS), |run: RunRecord| {
+            let Driven { driver, lot, noise, .. } = run.driven;
+            let by_lot = evaluation.safe_ratios.entry((noise.to_string(), driver)).or_default();
+            by_lot.entry(lot).or_default().push(run.report.metrics.safe_ratio);
+            Ok(())
+        })?;
+        records::each_line(&folder.join(records::FAILURES), |failure| {
+            evaluation.near_collisions += 1;
+            evaluation.worst.add(failure);
+            Ok(())
+        })?;
+        Ok(Some(evaluation))
     }
 
     /// The lots that stand for all: pooled where there are several.
@@ -326,7 +340,7 @@ fn add_evaluation(page: &mut Page, evaluation: &Evaluation) {
             };
             let rows: Vec<Distribution> = drivers.iter().enumerate().map(row).collect();
             let title = format!("Safe ratio on {lots}, noise {noise}");
-            let caption = "One dot per run. Box: quartiles; bar: median.";
+            let caption = "One dot per run, of many runs some. Box: quartiles; bar: median.";
             let name = format!("safe-ratio-{index}-{place}");
             page.figure(name, caption, Image::Svg(plots::safe_ratios(&title, &rows)));
         }
@@ -337,7 +351,8 @@ fn add_evaluation(page: &mut Page, evaluation: &Evaluation) {
 /// Lots, or generated lots of one kind, that have rows of their own: safe ratios of different lots do not compare,
 /// because lanes differ in width.
 fn single_lots(evaluation: &Evaluation) -> Vec<&str> {
-    let is_of = |lots: &str| evaluation.runs.iter().any(|run| is_in(&run.driven.lot, lots));
+    let driven: BTreeSet<&String> = evaluation.safe_ratios.values().flat_map(BTreeMap::keys).collect();
+    let is_of = |lots: &str| driven.iter().any(|lot| is_in(lot, lots));
     first_seen(evaluation.tables.rows.iter().map(|row| row.lots.as_str()).filter(|lots| is_of(lots)))
 }
 
@@ -390,25 +405,31 @@ fn noise_series(evaluation: &Evaluation, drivers: &[&str]) -> Vec<RateSeries> {
 }
 
 fn safe_ratios(evaluation: &Evaluation, noise: NoiseChoice, driver: &str, lots: &str) -> Vec<f64> {
-    let runs = evaluation.runs.iter().filter(|run| run.driven.noise == noise && run.driven.driver == driver);
-    runs.filter(|run| is_in(&run.driven.lot, lots)).map(|run| f64::from(run.report.metrics.safe_ratio)).collect()
+    let Some(by_lot) = evaluation.safe_ratios.get(&(noise.to_string(), driver.to_owned())) else { return Vec::new() };
+    by_lot.iter().filter(|(lot, _)| is_in(lot, lots)).flat_map(|(_, of_lot)| of_lot).copied().map(f64::from).collect()
 }
 
 /// The fastest near-collisions: how fast the car still was is how far the driver was from seeing it come.
-fn worst(failures: &[FailureRecord]) -> Vec<&FailureRecord> {
-    let mut fastest: Vec<&FailureRecord> = failures.iter().collect();
-    fastest.sort_by(|a, b| b.speed_mps.total_cmp(&a.speed_mps));
-    let mut chosen: Vec<&FailureRecord> = Vec::new();
-    for failure in fastest {
-        let alike = chosen
-            .iter()
-            .filter(|other| other.driven.driver == failure.driven.driver && other.driven.lot == failure.driven.lot)
-            .count();
-        if chosen.len() < MOMENTS && alike < MOMENTS_OF_A_KIND {
-            chosen.push(failure);
+#[derive(Debug, Default)]
+struct Worst(Vec<FailureRecord>);
+
+impl Worst {
+    /// Adds a near-collision if it is among the fastest so far. What is chosen in the end is what would be chosen of all at
+    /// once: who is not among the fastest of some is not among those of more.
+    fn add(&mut self, failure: FailureRecord) {
+        let at = self.0.partition_point(|other| other.speed_mps >= failure.speed_mps);
+        self.0.insert(at, failure);
+        let mut chosen: Vec<FailureRecord> = Vec::new();
+        for failure in self.0.drain(..) {
+            let is_alike = |other: &&FailureRecord| {
+                (&other.driven.driver, &other.driven.lot) == (&failure.driven.driver, &failure.driven.lot)
+            };
+            if chosen.len() < MOMENTS && chosen.iter().filter(is_alike).count() < MOMENTS_OF_A_KIND {
+                chosen.push(failure);
+            }
         }
+        self.0 = chosen;
     }
-    chosen
 }
 
 fn add_moments(
@@ -418,12 +439,12 @@ fn add_moments(
     evaluation: &Evaluation,
     progress: &dyn Progress,
 ) -> anyhow::Result<()> {
-    let count = evaluation.failures.len();
+    let count = evaluation.near_collisions;
     if count == 0 {
         page.section("Near-collisions", "There were none.");
         return Ok(());
     }
-    let worst = worst(&evaluation.failures);
+    let worst = &evaluation.worst.0;
     let (listed, shown) = match (count, worst.len()) {
         (1, _) => ("`failures.md` lists the only near-collision with its cause.".to_owned(), String::new()),
         (_, all) if all == count => (format!("`failures.md` lists all {count} with their causes."), String::new()),

@@ -5,8 +5,8 @@ use crate::sums;
 use crate::{sealed, whole};
 use sha2::{Digest as _, Sha256};
 use std::fmt::Write as _;
-use std::fs::{self, File};
-use std::io::{Seek as _, SeekFrom, Write as _};
+use std::fs::File;
+use std::io::{self, Read, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 const REMEDY: &str = "restore it from a copy; or delete it and the file that ends in .unfinished to begin this again";
@@ -25,34 +25,44 @@ pub struct Growing {
 struct GrowingFile {
     name: String,
     file: File,
-    bytes: usize,
+    bytes: u64,
     sha256: Sha256,
 }
 
 impl Growing {
     /// Opens files of a folder as an interrupted process left them, without what it was adding, or creates them. `name`:
-    /// what is done there. Returns the contents as well.
+    /// what is done there.
     ///
     /// # Errors
     /// If a file cannot be read or written, or is not what was written into it.
-    pub fn open(folder: &Path, name: &str, files: &[&str]) -> Result<(Self, Vec<Vec<u8>>), FileError> {
+    pub fn open(folder: &Path, name: &str, files: &[&str]) -> Result<Self, FileError> {
         let mark = folder.join(format!("{name}.unfinished"));
         let left = sealed::read(&mark)?.map(|text| Mark::parse(&mark, &text, files)).transpose()?;
         let mut growing = Self { folder: folder.to_owned(), mark, files: Vec::new(), parts: 0 };
-        let mut contents = Vec::new();
         for (index, &name) in files.iter().enumerate() {
             let path = folder.join(name);
             let failed = |error: std::io::Error| FileError::new(&path, error, whole::WRITE_REMEDY);
-            let content = left.as_ref().map(|left| left.content(index, &path)).transpose()?.unwrap_or_default();
+            let (bytes, sha256) =
+                left.as_ref().map_or_else(|| Ok((0, Sha256::new())), |left| left.check(index, &path))?;
             let mut file = File::options().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
-            file.set_len(content.len() as u64).map_err(failed)?;
+            file.set_len(bytes).map_err(failed)?;
             file.seek(SeekFrom::End(0)).map_err(failed)?;
-            let sha256 = Sha256::new_with_prefix(&content);
-            growing.files.push(GrowingFile { name: name.to_owned(), file, bytes: content.len(), sha256 });
-            contents.push(content);
+            growing.files.push(GrowingFile { name: name.to_owned(), file, bytes, sha256 });
         }
         growing.parts = left.map_or(0, |left| left.parts);
-        Ok((growing, contents))
+        Ok(growing)
+    }
+
+    /// What is whole of a file, by its index, to be read from its beginning.
+    ///
+    /// # Errors
+    /// If it cannot be opened.
+    pub fn reader(&self, index: usize) -> Result<impl Read + use<>, FileError> {
+        let GrowingFile { name, bytes, .. } = &self.files[index];
+        let path = self.folder.join(name);
+        let file = File::open(&path)
+            .map_err(|error| FileError::new(&path, format_args!("cannot be read: {error}"), REMEDY))?;
+        Ok(file.take(*bytes))
     }
 
     /// Parts that are there.
@@ -74,7 +84,7 @@ impl Growing {
                     whole::WRITE_REMEDY,
                 )
             })?;
-            file.bytes += text.len();
+            file.bytes += text.len() as u64;
             file.sha256.update(text);
         }
         self.parts += 1;
@@ -100,7 +110,7 @@ impl Growing {
 struct Mark {
     parts: usize,
     /// Bytes and digest of each.
-    files: Vec<(usize, String)>,
+    files: Vec<(u64, String)>,
 }
 
 impl Mark {
@@ -119,22 +129,24 @@ impl Mark {
         mark().ok_or_else(|| FileError::new(path, "is of other files", REMEDY))
     }
 
-    /// What is whole of a file.
-    fn content(&self, index: usize, path: &Path) -> Result<Vec<u8>, FileError> {
+    /// How much of a file is whole, and the digest of that, to go on with.
+    fn check(&self, index: usize, path: &Path) -> Result<(u64, Sha256), FileError> {
         let (bytes, sum) = &self.files[index];
-        let mut content =
-            fs::read(path).map_err(|error| FileError::new(path, format_args!("cannot be read: {error}"), REMEDY))?;
-        content.truncate(*bytes);
-        if content.len() < *bytes || sums::digest(&content) != *sum {
+        let unreadable = |error| FileError::new(path, format_args!("cannot be read: {error}"), REMEDY);
+        let mut sha256 = Sha256::new();
+        let mut whole = File::open(path).map_err(unreadable)?.take(*bytes);
+        let found = io::copy(&mut whole, &mut sha256).map_err(unreadable)?;
+        if found < *bytes || sums::hex(&sha256.clone().finalize()) != *sum {
             return Err(FileError::new(path, "is damaged: it is not what was written into it", REMEDY));
         }
-        Ok(content)
+        Ok((*bytes, sha256))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn files_go_on_after_the_last_whole_part_and_damage_is_noticed() {
@@ -143,16 +155,18 @@ mod tests {
         fs::create_dir_all(&folder).unwrap();
         let names = ["runs", "failures"];
         let open = || Growing::open(&folder, "driving", &names);
+        let contents =
+            |growing: &Growing| [0, 1].map(|index| io::read_to_string(growing.reader(index).unwrap()).unwrap());
         let part = |n: u8| [vec![n, b'\n'], vec![]];
-        let (mut growing, contents) = open().unwrap();
-        assert_eq!((growing.parts(), contents), (0, vec![vec![], vec![]]));
+        let mut growing = open().unwrap();
+        assert_eq!((growing.parts(), contents(&growing)), (0, [String::new(), String::new()]));
         growing.add(&part(b'1')).unwrap();
         growing.add(&part(b'2')).unwrap();
         drop(growing);
         // Killed in the middle of the third.
         fs::write(folder.join("runs"), "1\n2\n3").unwrap();
-        let (mut growing, contents) = open().unwrap();
-        assert_eq!((growing.parts(), contents), (2, vec![b"1\n2\n".to_vec(), vec![]]));
+        let mut growing = open().unwrap();
+        assert_eq!((growing.parts(), contents(&growing)), (2, ["1\n2\n".to_owned(), String::new()]));
         growing.add(&part(b'3')).unwrap();
         drop(growing);
         let whole = fs::read(folder.join("runs")).unwrap();
@@ -161,7 +175,7 @@ mod tests {
             assert!(open().unwrap_err().to_string().contains("damaged"), "{damaged:?}");
         }
         fs::write(folder.join("runs"), whole).unwrap();
-        open().unwrap().0.finish().unwrap();
+        open().unwrap().finish().unwrap();
         assert_eq!(sums::read(&folder.join("runs"), 100).unwrap(), b"1\n2\n3\n");
         assert!(sums::verify(&folder).faults.is_empty());
         fs::remove_dir_all(folder).unwrap();

@@ -11,7 +11,8 @@ use crate::whole;
 use sha2::{Digest as _, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::fs;
+use std::fs::{self, File};
+use std::io::Seek as _;
 use std::path::Path;
 
 /// Name of the list.
@@ -208,18 +209,49 @@ pub fn read(path: &Path, bytes_max: u64) -> Result<Vec<u8>, FileError> {
 /// # Errors
 /// See [`read()`].
 pub fn read_listed(folder: &Path, name: &str, bytes_max: u64) -> Result<Vec<u8>, FileError> {
-    let (path, list) = (&folder.join(name), folder.join(FILE));
-    let bytes = read::bytes(path, bytes_max)
-        .map_err(|error| FileError::new(path, format_args!("cannot be read: {error}"), RESTORE))?;
+    let path = &folder.join(name);
+    let bytes = read::bytes(path, bytes_max).map_err(|error| unreadable(path, &error))?;
+    compare(folder, name, &digest(&bytes))?;
+    Ok(bytes)
+}
+
+/// Opens a finished file that is too large to be held, to be read from its beginning. Compared with the list is all of it
+/// before that; whoever has the folder's lock, or reads a finished one, reads the same afterwards.
+///
+/// # Errors
+/// See [`read()`].
+pub fn open(path: &Path, bytes_max: u64) -> Result<File, FileError> {
+    let (folder, name) = (path.parent().unwrap_or(Path::new("")), path.file_name().unwrap_or_default());
+    let mut file = read::open(path, bytes_max).map_err(|error| unreadable(path, &error))?;
+    let sum = digest_of(&mut file).map_err(|error| unreadable(path, &error))?;
+    compare(folder, &name.to_string_lossy(), &sum)?;
+    Ok(file)
+}
+
+/// The SHA-256 of a file, part by part; it is at its beginning afterwards.
+fn digest_of(file: &mut File) -> std::io::Result<String> {
+    let mut sha256 = Sha256::new();
+    std::io::copy(file, &mut sha256)?;
+    file.rewind()?;
+    Ok(hex(&sha256.finalize()))
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> FileError {
+    FileError::new(path, format_args!("cannot be read: {error}"), RESTORE)
+}
+
+/// Holds the digest of a file against the list of its folder.
+fn compare(folder: &Path, name: &str, found: &str) -> Result<(), FileError> {
+    let path = &folder.join(name);
     let Some(sums) = list_of(folder)? else {
         return Err(FileError::new(
-            &list,
+            &folder.join(FILE),
             format_args!("is missing, so nothing says whether {} is whole", path.display()),
             LIST_REMEDY,
         ));
     };
     match sums.get(name) {
-        Some(sum) if *sum == digest(&bytes) => Ok(bytes),
+        Some(sum) if sum == found => Ok(()),
         Some(_) => Err(FileError::new(path, DAMAGED, RESTORE)),
         None => Err(FileError::new(path, UNLISTED, RESTORE)),
     }
@@ -295,13 +327,15 @@ fn verify_into(folder: &Path, verified: &mut Verified) {
     };
     for (name, sum) in &sums {
         let path = folder.join(name);
-        match fs::read(&path) {
-            Ok(bytes) if digest(&bytes) == *sum => {
+        let found =
+            read::open(&path, u64::MAX).and_then(|mut file| Ok((file.metadata()?.len(), digest_of(&mut file)?)));
+        match found {
+            Ok((bytes, found)) if found == *sum => {
                 verified.files += 1;
-                verified.bytes += bytes.len() as u64;
+                verified.bytes += bytes;
             }
             Ok(_) => verified.faults.push(FileError::new(&path, DAMAGED, RESTORE)),
-            Err(error) => verified.faults.push(FileError::new(&path, format_args!("cannot be read: {error}"), RESTORE)),
+            Err(error) => verified.faults.push(unreadable(&path, &error)),
         }
     }
     look_for_others(folder, "", &sums, verified);

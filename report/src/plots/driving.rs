@@ -169,12 +169,16 @@ pub fn safe_ratios(title: &str, rows: &[Distribution]) -> String {
             // Dots lie on three lines in turn: neighbours in value do not hide each other.
             let dot =
                 |(i, value): (usize, f64)| Circle::new((value, y + 0.15 * ((i % 3) as f64 - 1.0)), 2, colour.filled());
-            chart.draw_series(sorted.iter().copied().enumerate().map(dot))?;
+            let dots = sorted.iter().copied().step_by(sorted.len().div_ceil(DOTS_MAX));
+            chart.draw_series(dots.enumerate().map(dot))?;
             style::line(chart, vec![(median, y - 0.36), (median, y + 0.36)], style::INK, 3)?;
         }
         Ok(())
     })
 }
+
+/// Dots of a row at most (chosen: more cannot be told apart).
+const DOTS_MAX: usize = 500;
 
 /// Linear interpolation between order statistics, as numpy's `percentile`.
 fn quartiles(sorted: &[f64]) -> Option<[f64; 3]> {

@@ -4,7 +4,6 @@ use experiment::drive::Replay;
 use experiment::run_dir::MANIFEST_SCHEMA;
 use sim::frame::Event;
 use sim::scenario::Direction;
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 fn failure(driver: &str, lot: &str, speed_mps: f32) -> FailureRecord {
@@ -40,8 +39,10 @@ fn the_fastest_are_the_worst_and_no_driver_fills_the_list() {
     let mut failures: Vec<FailureRecord> = (0..9).map(|i| failure("tentacle", "lot-a", 1.0 + 0.1 * i as f32)).collect();
     failures.push(failure("run:x", "lot-a", 0.4));
     failures.push(failure("tentacle", "lot-b", 0.3));
-    let worst: Vec<f32> = worst(&failures).iter().map(|failure| failure.speed_mps).collect();
-    assert_eq!(worst, [1.8, 1.7, 0.4, 0.3]);
+    let mut worst = Worst::default();
+    failures.into_iter().for_each(|failure| worst.add(failure));
+    let speeds: Vec<f32> = worst.0.iter().map(|failure| failure.speed_mps).collect();
+    assert_eq!(speeds, [1.8, 1.7, 0.4, 0.3]);
 }
 
 #[test]

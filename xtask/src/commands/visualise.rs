@@ -194,19 +194,21 @@ fn replay_of(key: &ReplayKey, layers: &LayerArgs, output: &Output) -> anyhow::Re
 /// Near-collisions of an evaluation, a recording each, of the seconds around it.
 fn failures_of(args: &FailuresArgs, output: &Output) -> anyhow::Result<Show> {
     let list = args.run.join("failures.jsonl");
-    let failures: Vec<FailureRecord> = records::read(&list)?;
-    ensure!(!failures.is_empty(), "{}: there is no near-collision in it, so there is nothing to see", list.display());
-    if failures.len() > args.limit {
-        let left = failures.len() - args.limit;
-        let (list, all) = (list.display(), failures.len());
+    let (mut drives, mut all) = (Vec::new(), 0);
+    records::each_line(&list, |failure: FailureRecord| {
+        all += 1;
+        if drives.len() < args.limit {
+            let key: ReplayKey = failure.replay.parse()?;
+            let cause = failure.cause.name();
+            let file = format!("failure-{all:03}-{}-{}", file_name(&key.lot), file_name(cause));
+            drives.push(DriveRequest { file, title: format!("{cause}: {key}"), keys: vec![key] });
+        }
+        Ok(())
+    })?;
+    ensure!(all > 0, "{}: there is no near-collision in it, so there is nothing to see", list.display());
+    if all > drives.len() {
+        let (left, list) = (all - drives.len(), list.display());
         output.note(format_args!("{left} more near-collisions are in {list}; see them with --limit {all}"));
     }
-    let drive = |(index, failure): (usize, &FailureRecord)| {
-        let key: ReplayKey = failure.replay.parse()?;
-        let cause = failure.cause.name();
-        let file = format!("failure-{:03}-{}-{}", index + 1, file_name(&key.lot), file_name(cause));
-        Ok(DriveRequest { file, title: format!("{cause}: {key}"), keys: vec![key] })
-    };
-    let drives = failures.iter().take(args.limit).enumerate().map(drive).collect::<anyhow::Result<_>>()?;
     Ok(Show::Drives { settings: Box::new(run_dir::settings_of(&args.run)?), drives })
 }
