@@ -5,10 +5,15 @@ use crate::statistics::bootstrap::Interval;
 use crate::statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
 use crate::totals::Totals;
 
+/// The bootstrap's interval of a rate, where events cluster and no other may be quoted (docs/methods.md 8.3).
+pub fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
+    let is_clustered = estimate.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
+    estimate.per_100m.filter(|_| is_clustered)
+}
+
 /// The rate with the interval that may be quoted (docs/methods.md 8.3).
 pub fn quoted_rate(totals: &Totals, estimate: &DriverEstimate) -> String {
-    let is_clustered = estimate.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
-    match estimate.per_100m.filter(|_| is_clustered) {
+    match clustered(estimate) {
         Some(Interval { lower, upper, .. }) => {
             format!("{:.2} [{lower:.2}, {upper:.2}] (b)", totals.rate().per_unit)
         }

@@ -95,7 +95,7 @@ impl EvaluationResults {
     }
 
     /// Per trial of the slice that every driver has finished, the units of all drivers.
-    fn common_runs(&self, level: usize, slice: &Slice) -> Vec<Vec<RunSummary>> {
+    pub(crate) fn common_runs(&self, level: usize, slice: &Slice) -> Vec<Vec<RunSummary>> {
         let Some((first, rest)) = self.drivers[level].split_first() else { return Vec::new() };
         let of_trial = |units: &[RunSummary], trial: u32| {
             units.binary_search_by_key(&trial, |unit| unit.trial).ok().map(|index| units[index])
@@ -123,10 +123,10 @@ fn dispersion(strata: &[Stratum<'_>], driver: usize) -> Option<Dispersion> {
 }
 
 /// Clusters of runs, resampled among each other: of each its runs, and of each run all drivers.
-type Stratum<'a> = Vec<&'a [Vec<RunSummary>]>;
+pub(crate) type Stratum<'a> = Vec<&'a [Vec<RunSummary>]>;
 
 /// Trials are ordered lot by lot, so clusters lie together; the lots of a stratum need not.
-fn strata(pairs: &[Vec<RunSummary>], is_pooled: bool) -> Vec<Stratum<'_>> {
+pub(crate) fn strata(pairs: &[Vec<RunSummary>], is_pooled: bool) -> Vec<Stratum<'_>> {
     let is_of_sample = |row: &[RunSummary]| is_pooled && row[0].is_of_sample;
     let cluster = |row: &[RunSummary]| if is_of_sample(row) { (true, row[0].group) } else { (false, row[0].cluster) };
     let mut strata: BTreeMap<Option<u32>, Stratum<'_>> = BTreeMap::new();

@@ -6,7 +6,7 @@
 //! | [`shards`] | an evaluation driven in parts on several machines, put together again |
 //! | [`records`] | the lines of `runs.jsonl`, `failures.jsonl`, `wall_time.jsonl` |
 //! | [`incidents`] | near-collisions one by one, and why they happened |
-//! | [`totals`], [`slices`], [`results`], [`judge`] | runs added up, pooled and compared |
+//! | [`totals`], [`slices`], [`results`], [`judge`], [`trainings`] | runs added up, pooled and compared |
 //! | [`statistics`] | exact intervals, comparisons, paired bootstrap, sample sizes |
 //! | [`summary`], [`table1`] | the tables as data |
 //! | [`calibration`], [`on_policy`] | whether the predicted variance is right, on held-back and on driven states |
@@ -38,4 +38,5 @@ pub mod statistics;
 pub mod summary;
 pub mod table1;
 pub mod totals;
+pub mod trainings;
 pub mod tune;

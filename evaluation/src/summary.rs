@@ -8,6 +8,7 @@ use crate::plan::Plan;
 use crate::results::EvaluationResults;
 use crate::slices::Slice;
 use crate::totals::Totals;
+use crate::trainings::{self, Team, TeamEstimate};
 use experiment::run_dir::RunDir;
 use experiment::settings::{EvaluationSettings, NoiseChoice};
 use serde::{Deserialize, Serialize};
@@ -15,7 +16,7 @@ use sim::scenario::Direction;
 use std::path::Path;
 
 /// The version of `summary.json` that this program writes.
-pub const SCHEMA: u32 = 1;
+pub const SCHEMA: u32 = 2;
 const FILE: &str = "summary.json";
 
 /// All tables of an evaluation; `summary.json`.
@@ -30,6 +31,8 @@ pub struct Tables {
     pub rows: Vec<Row>,
     /// Every other driver against one.
     pub comparisons: Vec<ComparisonRow>,
+    /// What was trained several times, as one; empty if nothing was.
+    pub trainings: Vec<TrainingsRow>,
     /// Near-collisions by cause.
     pub causes: Vec<CauseRow>,
     /// Drivers against noise.
@@ -148,6 +151,38 @@ pub struct ComparisonRow {
     pub difference_safe_ratio_upper: Option<f64>,
 }
 
+/// A row of `trainings.csv`: several trainings that differ by their seeds, as one, or another driver beside them. Intervals
+/// of 95 % are for other lots and other trainings. Differences are team − `compared_with`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TrainingsRow {
+    /// The first of the team.
+    pub driver: String,
+    /// How many trainings it has; 1: no training, or one of its own kind.
+    pub trainings: usize,
+    /// The first of the team it is compared with.
+    pub compared_with: String,
+    /// Sensor noise.
+    pub noise: NoiseChoice,
+    /// Where: the label of a slice.
+    pub lots: String,
+    /// Near-collisions of each, by seed, with spaces between them.
+    pub near_collisions: String,
+    /// Contacts of each, by seed, with spaces between them.
+    pub contacts: String,
+    /// Near-collisions per 100 m of route, mean.
+    pub per_100m: f64,
+    /// See `per_100m`.
+    pub per_100m_lower: f64,
+    /// See `per_100m`.
+    pub per_100m_upper: f64,
+    /// Near-collisions per 100 m of route, team − other.
+    pub difference_per_100m: f64,
+    /// See `difference_per_100m`.
+    pub difference_lower: f64,
+    /// See `difference_per_100m`.
+    pub difference_upper: f64,
+}
+
 /// A row of `noise_sweep.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SweepRow {
@@ -199,6 +234,8 @@ pub struct Judged {
     pub estimates: Vec<DriverEstimate>,
     /// Every other driver against `compare_with`.
     pub comparisons: Vec<Comparison>,
+    /// By team.
+    pub teams: Vec<TeamEstimate>,
 }
 
 /// An evaluation, counted and judged.
@@ -208,6 +245,8 @@ pub struct Summary<'a> {
     pub plan: &'a Plan<'a>,
     /// Its results.
     pub results: &'a EvaluationResults,
+    /// What was trained several times; empty if nothing was.
+    pub teams: Vec<Team>,
     /// Level by level, slice by slice.
     judged: Vec<Judged>,
 }
@@ -218,11 +257,36 @@ impl<'a> Summary<'a> {
         let evaluation = &plan.settings.evaluation;
         let slices = results.slices();
         let both = (0..evaluation.noise.len()).flat_map(|level| slices.iter().map(move |slice| (level, slice.clone())));
+        let teams = trainings::teams(plan.drivers);
+        let with = team_of(&teams, plan.compare_with);
         let judge = |(level, slice)| {
             let (estimates, comparisons) = results.judge(level, &slice, plan.compare_with, evaluation.seed);
-            Judged { level, slice, estimates, comparisons }
+            let of_teams = (!teams.is_empty())
+                .then(|| results.judge_teams(level, &slice, &teams, with, evaluation.seed))
+                .flatten()
+                .unwrap_or_default();
+            Judged { level, slice, estimates, comparisons, teams: of_teams }
         };
-        Self { plan, results, judged: both.map(judge).collect() }
+        let judged = both.map(judge).collect();
+        Self { plan, results, teams, judged }
+    }
+
+    /// The team that the others are compared with: that of `compare_with`, else the first.
+    pub fn team_compared_with(&self) -> &Team {
+        &self.teams[team_of(&self.teams, self.plan.compare_with)]
+    }
+
+    /// The teams at a noise level, team by team, slice by slice.
+    pub fn team_estimates(&self, level: usize) -> impl Iterator<Item = (&Team, &Judged, &TeamEstimate)> {
+        let of_team = move |(index, team)| {
+            self.at_level(level).filter_map(move |judged| Some((team, judged, judged.teams.get(index)?)))
+        };
+        self.teams.iter().enumerate().flat_map(of_team)
+    }
+
+    /// What each training of a team comes to in a slice.
+    pub fn of_team(&self, team: &Team, judged: &Judged) -> Vec<Totals> {
+        team.drivers.iter().map(|&driver| self.results.totals(judged.level, driver, &judged.slice, None)).collect()
     }
 
     /// Everything that the tables hold.
@@ -232,12 +296,14 @@ impl<'a> Summary<'a> {
             settings: self.plan.settings.evaluation.clone(),
             rows: self.rows(),
             comparisons: self.comparison_rows(),
+            trainings: self.training_rows(),
             causes: self.cause_rows(),
             noise_sweep: self.sweep_rows(),
         }
     }
 
-    /// Writes `summary.json`, `summary.csv`, `comparisons.csv`, and `noise_sweep.csv` if there are several levels.
+    /// Writes `summary.json`, `summary.csv`, `comparisons.csv`, `trainings.csv` if something was trained several times, and
+    /// `noise_sweep.csv` if there are several levels.
     ///
     /// # Errors
     /// If a file cannot be written.
@@ -247,6 +313,9 @@ impl<'a> Summary<'a> {
         run.write("summary.csv", &csv_of(&tables.rows)?)?;
         if !tables.comparisons.is_empty() {
             run.write("comparisons.csv", &csv_of(&tables.comparisons)?)?;
+        }
+        if !tables.trainings.is_empty() {
+            run.write("trainings.csv", &csv_of(&tables.trainings)?)?;
         }
         if self.levels().len() > 1 {
             run.write("noise_sweep.csv", &csv_of(&tables.noise_sweep)?)?;
@@ -359,6 +428,32 @@ impl<'a> Summary<'a> {
         rows.map(|(judged, comparison)| row(judged, comparison)).collect()
     }
 
+    fn training_rows(&self) -> Vec<TrainingsRow> {
+        let row = |level: usize, (team, judged, estimate): (&Team, &Judged, &TeamEstimate)| {
+            let each = self.of_team(team, judged);
+            let join = |count: fn(&Totals) -> u32| {
+                each.iter().map(|totals| count(totals).to_string()).collect::<Vec<_>>().join(" ")
+            };
+            TrainingsRow {
+                driver: team.name.clone(),
+                trainings: team.drivers.len(),
+                compared_with: self.team_compared_with().name.clone(),
+                noise: self.levels()[level],
+                lots: judged.slice.label.clone(),
+                near_collisions: join(|totals| totals.near_collisions),
+                contacts: join(|totals| totals.contacts),
+                per_100m: estimate.per_100m.estimate,
+                per_100m_lower: estimate.per_100m.lower,
+                per_100m_upper: estimate.per_100m.upper,
+                difference_per_100m: estimate.difference_per_100m.estimate,
+                difference_lower: estimate.difference_per_100m.lower,
+                difference_upper: estimate.difference_per_100m.upper,
+            }
+        };
+        let levels = 0..self.levels().len();
+        levels.flat_map(|level| self.team_estimates(level).map(move |of_team| row(level, of_team))).collect()
+    }
+
     fn sweep_rows(&self) -> Vec<SweepRow> {
         let mut rows = Vec::new();
         for (level, &noise) in self.levels().iter().enumerate() {
@@ -396,6 +491,11 @@ impl<'a> Summary<'a> {
         }
         rows
     }
+}
+
+/// The index of the team of a driver, else the first.
+fn team_of(teams: &[Team], driver: usize) -> usize {
+    teams.iter().position(|team| team.drivers.contains(&driver)).unwrap_or(0)
 }
 
 /// Rows as CSV with a header.

@@ -1,6 +1,6 @@
 //! Drivers: how they are named, and how they get to the wheel.
 
-use crate::run_dir;
+use crate::run_dir::{self, Training};
 use crate::settings::{Settings, Smoothing};
 use anyhow::{Context as _, bail, ensure};
 use expert::{ExpertSettings, ScriptedExpert};
@@ -261,7 +261,13 @@ impl DriverSpec {
             Self::Planner { name, parameters } => Model::Planner(planner(name, parameters)?),
             Self::Callback { .. } => bail!("driver {name:?} is a function of another program"),
         };
-        Ok(NamedDriver { name, spec: self, model, smoothing_ticks: 0.0 }.smoothed(settings.evaluation.smoothing))
+        let training = match &self {
+            // Of a run whose settings this version cannot read, the network alone can be used.
+            Self::Run { folder } => run_dir::training_of(folder).ok(),
+            _ => None,
+        };
+        let driver = NamedDriver { name, spec: self, training, model, smoothing_ticks: 0.0 };
+        Ok(driver.smoothed(settings.evaluation.smoothing))
     }
 }
 
@@ -272,6 +278,8 @@ pub struct NamedDriver {
     pub name: String,
     /// As named on the command line, for replay keys.
     pub spec: DriverSpec,
+    /// The training of a whole run that it comes from; `None` for any other driver.
+    pub training: Option<Training>,
     model: Model,
     /// Time constant of the action smoothing of who does not smooth by itself, control ticks; 0 = off.
     smoothing_ticks: f32,
@@ -312,26 +320,26 @@ impl NamedDriver {
     /// The scripted expert.
     pub fn expert(settings: &ExpertSettings) -> Self {
         let model = Model::Expert(settings.clone());
-        Self { name: "expert".to_owned(), spec: DriverSpec::Expert, model, smoothing_ticks: 0.0 }
+        Self { name: "expert".to_owned(), spec: DriverSpec::Expert, training: None, model, smoothing_ticks: 0.0 }
     }
 
     /// A network that is loaded already.
     pub fn network(name: &str, spec: DriverSpec, checkpoint: Checkpoint, device: DeviceChoice) -> Self {
         let model = Model::Network(vec![checkpoint], device);
-        Self { name: name.to_owned(), spec, model, smoothing_ticks: 0.0 }
+        Self { name: name.to_owned(), spec, training: None, model, smoothing_ticks: 0.0 }
     }
 
     /// A planner with parameters of the caller's.
     pub fn planner(planner: PlannerSpec) -> Self {
         let name = planner.name().to_owned();
         let spec = DriverSpec::Planner { name: name.clone(), parameters: Parameters::Published };
-        Self { name, spec, model: Model::Planner(planner), smoothing_ticks: 0.0 }
+        Self { name, spec, training: None, model: Model::Planner(planner), smoothing_ticks: 0.0 }
     }
 
     /// A function of the calling program, which sees the grid only and is asked for all cars of a batch at once.
     pub fn callback(name: &str, callback: Arc<dyn Callback>) -> Self {
         let spec = DriverSpec::Callback { name: name.to_owned() };
-        Self { name: name.to_owned(), spec, model: Model::Callback(callback), smoothing_ticks: 0.0 }
+        Self { name: name.to_owned(), spec, training: None, model: Model::Callback(callback), smoothing_ticks: 0.0 }
     }
 
     /// The same with other action smoothing. Networks smooth by themselves, as they were trained to.

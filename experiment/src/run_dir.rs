@@ -18,6 +18,7 @@ use anyhow::{Context as _, bail, ensure};
 use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
 use sim::limits::RUN_TOML_BYTES_MAX;
+use sim::seed::RootSeed;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -48,6 +49,15 @@ pub struct Request {
     pub arguments: toml::Table,
     /// Lots, parameters and networks from files.
     pub inputs: Inputs,
+}
+
+/// A training that may have been done several times, with other seeds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Training {
+    /// What all of them have in common: SHA-256 of the settings but seed and evaluation, and which policy of the run it is.
+    pub recipe: String,
+    /// Its root seed.
+    pub seed: RootSeed,
 }
 
 /// What made a run: `manifest.toml`.
@@ -444,6 +454,18 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
 /// If there is no run, or its settings are not of this program.
 pub fn settings_of(spec: &Path) -> anyhow::Result<Settings> {
     Settings::read(&run_of(spec)?.0.join(SETTINGS))
+}
+
+/// What a policy `DIR` or `DIR/bc` was trained by.
+///
+/// # Errors
+/// See [`settings_of`].
+pub fn training_of(spec: &Path) -> anyhow::Result<Training> {
+    let mut settings = settings_of(spec)?;
+    let seed = std::mem::replace(&mut settings.seed, RootSeed(0));
+    settings.evaluation = Settings::preset("default")?.evaluation;
+    let policy = if run_of(spec)?.1 { "bc" } else { "final" };
+    Ok(Training { recipe: sums::digest(format!("{policy}\n{}", settings.to_toml()).as_bytes()), seed })
 }
 
 /// The folder of the run, and whether its policy after behaviour cloning is meant.

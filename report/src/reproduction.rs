@@ -63,6 +63,10 @@ impl<'a> Drive<'a> {
         Ok(Self { stage, drivers, lots })
     }
 
+    pub(crate) fn settings(&self) -> &Settings {
+        &self.stage.settings
+    }
+
     pub(crate) fn plan(&self) -> Plan<'_> {
         let compare_with = conclusions::compare_with(&self.drivers);
         let (settings, drivers, lots) = (&self.stage.settings, &self.drivers, &self.lots);

@@ -4,12 +4,13 @@ use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
 use crate::reproduction::Drive;
 use anyhow::Context as _;
-use evaluation::format::exact_rate;
+use evaluation::format::clustered;
 use evaluation::results::EvaluationResults;
 use evaluation::rules::{self, Extent};
 use evaluation::stages::Stage;
 use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
+use evaluation::trainings::Team;
 use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
 use policy::dataset::Collection;
@@ -72,9 +73,22 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
     }
     let titles = std::iter::once(rules::CLONED).chain(extent.rules.iter().map(|rule| rules::title(rule)));
     let mut pooled: Vec<Row> = titles.map(|title| pool(&rows, title)).collect();
+    let seed_of_trials = drive.settings().evaluation.seed;
+    let (estimates, _) = results.judge(0, &everywhere, 0, seed_of_trials);
+    for (row, estimate) in rows.iter_mut().zip(&estimates) {
+        let clustered = clustered(estimate).map(|interval| [interval.lower, interval.upper]);
+        set_rate(row, clustered);
+    }
+    // Networks that drove the same lots are no independent evidence: lots and seeds are drawn.
+    let drivers = |title: &str| (0..rows.len()).filter(|&driver| rows[driver].rule == title).collect();
+    let teams: Vec<Team> =
+        pooled.iter().map(|row| Team { name: row.rule.clone(), drivers: drivers(&row.rule) }).collect();
+    let of_teams = results.judge_teams(0, &everywhere, &teams, 0, seed_of_trials);
+    for (at, row) in pooled.iter_mut().enumerate() {
+        let interval = of_teams.as_ref().map(|estimates| estimates[at].per_100m);
+        set_rate(row, interval.filter(|_| row.near_collisions > 0).map(|interval| [interval.lower, interval.upper]));
+    }
     for row in rows.iter_mut().chain(&mut pooled) {
-        let rate = Rate::new(row.near_collisions, row.route_m / 100.0);
-        (row.per_100m, row.lower, row.upper) = (rate.per_unit, rate.lower, rate.upper);
         let expert_s = (row.ticks - row.novice_ticks) as f64 * control_period_s;
         row.intervention_s = if row.interventions > 0 { expert_s / row.interventions as f64 } else { 0.0 };
     }
@@ -106,6 +120,13 @@ fn add_rounds(row: &mut Row, folder: &Path, rule: Option<&str>, extent: &Extent)
         row.contacts_collecting += effort.contacts;
     }
     Ok(())
+}
+
+/// Sets the rate, with this interval or else the exact one.
+fn set_rate(row: &mut Row, interval: Option<[f64; 2]>) {
+    let rate = Rate::new(row.near_collisions, row.route_m / 100.0);
+    row.per_100m = rate.per_unit;
+    [row.lower, row.upper] = interval.unwrap_or([rate.lower, rate.upper]);
 }
 
 /// All seeds of a rule together.
@@ -160,7 +181,7 @@ fn to_markdown(rows: &[Row]) -> String {
                 row.collected_m / 1000.0
             ),
             format!("{} ({}) in {:.1} km", row.near_collisions, row.contacts, row.route_m / 1000.0),
-            exact_rate(row.near_collisions, row.route_m),
+            format!("{:.2} [{:.2}, {:.2}]", row.per_100m, row.lower, row.upper),
         ]);
     }
     table.to_string()

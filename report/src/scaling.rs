@@ -4,7 +4,7 @@ use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
 use crate::reproduction::Drive;
 use anyhow::Context as _;
-use evaluation::format::exact_rate;
+use evaluation::format::{clustered, quoted_rate};
 use evaluation::results::EvaluationResults;
 use evaluation::scaling::{self, Extent};
 use evaluation::stages::Stage;
@@ -35,6 +35,8 @@ struct Row {
     per_100m: f64,
     lower: f64,
     upper: f64,
+    #[serde(skip)]
+    quoted: String,
 }
 
 /// Writes the table, its rows as CSV and the plot; returns the table.
@@ -53,7 +55,7 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
             row.samples.to_string(),
             format!("{:.1} km", row.route_m / 1000.0),
             format!("{} ({})", row.near_collisions, row.contacts),
-            exact_rate(row.near_collisions, row.route_m),
+            row.quoted.clone(),
         ]);
     }
     run.write("scaling.md", format!("{table}\n").as_bytes())?;
@@ -67,15 +69,22 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
     let results = EvaluationResults::read(&drive.plan(), &run.path().join(scaling::DRIVES))?;
     let kinds = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     let kinds: BTreeSet<String> = kinds.iter().filter(|lot| lot.is_generated()).map(Lot::group).collect();
+    let judge = |slice| {
+        let (estimates, _) = results.judge(0, &slice, 0, drive.settings().evaluation.seed);
+        (slice, estimates)
+    };
+    let judged: Vec<_> = results.slices().into_iter().map(judge).collect();
     let mut rows = Vec::new();
     for (at, &different) in extent.different_lots.iter().enumerate() {
         let folder = run.path().join(scaling::folder(different));
         let table1 = Table1::read(&folder)?.with_context(|| format!("{}: no table1.json", folder.display()))?;
         let samples = [table1.rows.first(), table1.rows.last()].map(|row| row.map_or(0, |row| row.dataset));
         for (part, method) in ["BC", "DAgger"].into_iter().enumerate() {
-            for slice in results.slices() {
-                let totals = results.totals(0, 2 * at + part, &slice, None);
+            for (slice, estimates) in &judged {
+                let totals = results.totals(0, 2 * at + part, slice, None);
                 let rate = Rate::new(totals.near_collisions, totals.reference_m / 100.0);
+                let estimate = &estimates[2 * at + part];
+                let (lower, upper) = clustered(estimate).map_or((rate.lower, rate.upper), |i| (i.lower, i.upper));
                 rows.push(Row {
                     different_lots: different as usize * kinds.len(),
                     method,
@@ -85,8 +94,9 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
                     near_collisions: totals.near_collisions,
                     contacts: totals.contacts,
                     per_100m: rate.per_unit,
-                    lower: rate.lower,
-                    upper: rate.upper,
+                    lower,
+                    upper,
+                    quoted: quoted_rate(&totals, estimate),
                 });
             }
         }

@@ -6,9 +6,10 @@ use evaluation::format::{difference, exact_rate, p_value, quoted_rate};
 use evaluation::incidents::Cause;
 use evaluation::paper::{self, PaperLot, PaperResult};
 use evaluation::slices::Slice;
-use evaluation::statistics::bootstrap::DRAWS;
+use evaluation::statistics::bootstrap::{DRAWS, Interval};
 use evaluation::statistics::poisson::DISPERSION_MAX;
 use evaluation::summary::Summary;
+use evaluation::totals::Totals;
 use experiment::run_dir::RunDir;
 use experiment::settings::{EvaluationSettings, NoiseChoice};
 use sim::scenario::Direction;
@@ -36,6 +37,15 @@ pub fn to_markdown(summary: &Summary<'_>) -> String {
             let with = summary.driver(summary.plan.compare_with);
             let table = comparison_table(summary, level);
             let _ = write!(text, "Compared with {with} (others − {with}), noise {noise}\n\n{table}\n\n");
+        }
+        if !summary.teams.is_empty() {
+            let with = &summary.team_compared_with().name;
+            let table = trainings_table(summary, level);
+            let _ = write!(
+                text,
+                "Trainings that differ by their seeds, as one; intervals are for other lots and other seeds (Δ: others − \
+                 {with}), noise {noise}\n\n{table}\n\n"
+            );
         }
         if let Some(table) = causes_table(summary, level) {
             let _ = write!(text, "Causes of near-collisions, noise {noise}\n\n{table}\n\n");
@@ -197,6 +207,41 @@ fn comparison_table(summary: &Summary<'_>, level: usize) -> Table {
                 ]);
             }
         }
+    }
+    table
+}
+
+fn trainings_table(summary: &Summary<'_>, level: usize) -> Table {
+    let mut table = table_of(&[
+        "driver",
+        "trainings",
+        "lots",
+        "near-collisions, by seed",
+        "contacts",
+        "per 100 m [95 %]",
+        "Δ per 100 m [95 %]",
+    ]);
+    for (team, judged, estimate) in summary.team_estimates(level) {
+        let each = summary.of_team(team, judged);
+        let list = |count: fn(&Totals) -> u32| {
+            each.iter().map(|totals| count(totals).to_string()).collect::<Vec<_>>().join(", ")
+        };
+        let Interval { estimate: rate, lower, upper, .. } = estimate.per_100m;
+        let difference = estimate.difference_per_100m;
+        let is_other = *team != *summary.team_compared_with();
+        table.add_row([
+            team.name.clone(),
+            team.drivers.len().to_string(),
+            judged.slice.label.clone(),
+            list(|totals| totals.near_collisions),
+            list(|totals| totals.contacts),
+            format!("{rate:.3} [{lower:.3}, {upper:.3}]"),
+            if is_other {
+                format!("{:+.3} [{:+.3}, {:+.3}]", difference.estimate, difference.lower, difference.upper)
+            } else {
+                "–".to_owned()
+            },
+        ]);
     }
     table
 }

@@ -1,4 +1,6 @@
 use super::*;
+use crate::statistics::bootstrap::Interval;
+use crate::trainings::Team;
 use experiment::drivers::NamedDriver;
 use experiment::settings::Settings;
 use experiment::trials::Purpose;
@@ -155,4 +157,26 @@ fn pooled_lots_from_files_are_a_sample_of_their_kind_from_six_on() {
     assert!(lower == 0.0 && upper > 2.0 * rate, "without the one map there is none: {rate} [{lower}, {upper}]");
     assert_eq!(judged(&MAPS, "office"), (2.0, 2.0, 2.0), "a lot by itself: its trials");
     assert_eq!(judged(&MAPS[..5], "all"), (0.4, 0.4, 0.4), "five are too few to speak for others");
+}
+
+/// The intervals of five networks said how sure each was; that of "the default" came from a script beside the program.
+#[test]
+fn trainings_of_a_team_are_drawn_with_the_lots() {
+    // Everywhere: 0, 0 and 3 events by seed; the other team has one more of each; the last driver 2.
+    let events = [0, 0, 3, 1, 1, 4, 2];
+    let results = results(7, |driver, _| Some(report(events[driver], 100.0, 0.5)));
+    let team = |drivers: &[usize]| Team { name: String::new(), drivers: drivers.to_vec() };
+    let teams = [team(&[0, 1, 2]), team(&[3, 4, 5]), team(&[6])];
+    let slice = slice(&results, "all");
+    let found = results.judge_teams(0, &slice, &teams, 0, RootSeed(1)).unwrap();
+    let rounded =
+        |interval: Interval| [interval.lower, interval.estimate, interval.upper].map(|x| (x * 1e9).round() / 1e9);
+    // All three draws are the worst with probability 1/27 > .025, all three without events with 8/27.
+    assert_eq!(rounded(found[0].per_100m), [0.0, 1.0, 3.0]);
+    assert_eq!(rounded(found[1].per_100m), [1.0, 2.0, 4.0]);
+    assert_eq!(rounded(found[1].difference_per_100m), [1.0, 1.0, 1.0], "the same seeds are drawn of both");
+    assert_eq!(rounded(found[2].per_100m), [2.0, 2.0, 2.0]);
+    assert_eq!(rounded(found[2].difference_per_100m), [-1.0, 1.0, 2.0], "the seeds of the other vary");
+    let alone = results.judge(0, &slice, 0, RootSeed(1)).0[2].per_100m.unwrap();
+    assert_eq!(rounded(alone), [3.0, 3.0, 3.0], "one network by itself varies with the lots alone");
 }

@@ -7,7 +7,7 @@ use super::poisson::CONFIDENCE;
 use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sim::seed::{RootSeed, Stream};
+use sim::seed::{Rng, RootSeed, Stream};
 
 /// Draws of the bootstrap (docs/methods.md 8.3).
 pub const DRAWS: u64 = 10_000;
@@ -76,17 +76,30 @@ impl Units {
         statistics: usize,
         of_sums: &(dyn Fn(&[f64], &mut [f64]) + Sync),
     ) -> Vec<Interval> {
+        self.percentile_intervals_drawing(seed, draws, statistics, &|sums, _, out| of_sums(sums, out))
+    }
+
+    /// As [`Self::percentile_intervals`], of statistics that draw something themselves: `of_sums` gets the generator of
+    /// the draw, and none for the units as they are.
+    pub fn percentile_intervals_drawing(
+        &self,
+        seed: RootSeed,
+        draws: u64,
+        statistics: usize,
+        of_sums: &(dyn Fn(&[f64], Option<&mut Rng>, &mut [f64]) + Sync),
+    ) -> Vec<Interval> {
         let mut estimates = vec![0.0; statistics];
         let mut sums = vec![0.0; self.columns];
         self.values.chunks_exact(self.columns).for_each(|unit| add(&mut sums, unit));
-        of_sums(&sums, &mut estimates);
+        of_sums(&sums, None, &mut estimates);
 
         let mut drawn = vec![0.0; draws as usize * statistics];
         drawn.par_chunks_exact_mut(statistics).enumerate().for_each_init(
             || vec![0.0; self.columns],
             |sums, (draw, statistics)| {
-                self.resample(seed, draw as u64, sums);
-                of_sums(sums, statistics);
+                let mut rng = seed.rng(Stream::Bootstrap, draw as u64);
+                self.resample(&mut rng, sums);
+                of_sums(sums, Some(&mut rng), statistics);
             },
         );
         let tail = 0.5 * (1.0 - CONFIDENCE);
@@ -99,8 +112,7 @@ impl Units {
         estimates.par_iter().enumerate().map(interval).collect()
     }
 
-    fn resample(&self, seed: RootSeed, draw: u64, sums: &mut [f64]) {
-        let mut rng = seed.rng(Stream::Bootstrap, draw);
+    fn resample(&self, rng: &mut Rng, sums: &mut [f64]) {
         sums.fill(0.0);
         let mut first = 0;
         for &rows in &self.strata {

@@ -1,0 +1,151 @@
+//! Several trainings of one recipe, judged together: what another training would do, on other lots (docs/methods.md 8.3).
+//!
+//! An interval of one network says how sure the rate of that network is. Here trainings are drawn with replacement as lots
+//! are, so that the interval is for other lots *and* other seeds.
+
+use crate::judge::{Stratum, strata};
+use crate::results::{EvaluationResults, RunSummary};
+use crate::slices::Slice;
+use crate::statistics::bootstrap::{DRAWS, Interval, Units};
+use experiment::drivers::NamedDriver;
+use rand::RngExt as _;
+use sim::seed::{Rng, RootSeed};
+
+/// Fewer trainings say nothing about others (chosen).
+pub const TRAININGS_MIN: usize = 3;
+
+/// Drivers that were trained alike but for the seed, or a single other one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Team {
+    /// The name of the first.
+    pub name: String,
+    /// Indices of the plan's drivers, by seed.
+    pub drivers: Vec<usize>,
+}
+
+/// Every driver in a team, in the order of the first of each; none if no team has [`TRAININGS_MIN`] members.
+pub fn teams(drivers: &[NamedDriver]) -> Vec<Team> {
+    let mut teams: Vec<Team> = Vec::new();
+    for (index, driver) in drivers.iter().enumerate() {
+        let recipe = |index: usize| drivers[index].training.as_ref().map(|training| &training.recipe);
+        let is_alike = |team: &&mut Team| recipe(index).is_some() && recipe(team.drivers[0]) == recipe(index);
+        match teams.iter_mut().find(is_alike) {
+            Some(team) => team.drivers.push(index),
+            None => teams.push(Team { name: driver.name.clone(), drivers: vec![index] }),
+        }
+    }
+    for team in &mut teams {
+        team.drivers.sort_by_key(|&index| drivers[index].training.as_ref().map(|training| training.seed.0));
+    }
+    teams.retain(|team| team.drivers.len() == 1 || team.drivers.len() >= TRAININGS_MIN);
+    if teams.iter().any(|team| team.drivers.len() > 1) { teams } else { Vec::new() }
+}
+
+/// A team in a slice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TeamEstimate {
+    /// Near-collisions per 100 m, mean over its trainings.
+    pub per_100m: Interval,
+    /// The same less that of the team it is compared with.
+    pub difference_per_100m: Interval,
+}
+
+impl EvaluationResults {
+    /// How teams stand in a slice at a noise level, and how they differ from one of them, `with`. Drawn are lots as in
+    /// [`judge`](Self::judge), and with every draw of lots as many trainings of each team as it has; of teams of the same
+    /// size the same, because trainings of one seed begin alike. `None` if nothing varies.
+    pub fn judge_teams(
+        &self,
+        level: usize,
+        slice: &Slice,
+        teams: &[Team],
+        with: usize,
+        seed: RootSeed,
+    ) -> Option<Vec<TeamEstimate>> {
+        let pairs = self.common_runs(level, slice);
+        let strata = strata(&pairs, slice.is_pooled());
+        if strata.iter().all(|clusters| clusters.len() < 2) {
+            return None;
+        }
+        let drivers = pairs[0].len();
+        let of_sums = |sums: &[f64], rng: Option<&mut Rng>, out: &mut [f64]| {
+            let (events, hundreds_of_metres) = (&sums[..drivers], sums[drivers]);
+            let (rates, differences) = out.split_at_mut(teams.len());
+            match rng {
+                None => {
+                    for (rate, team) in rates.iter_mut().zip(teams) {
+                        let sum: f64 = team.drivers.iter().map(|&driver| events[driver]).sum();
+                        *rate = sum / team.drivers.len() as f64 / hundreds_of_metres;
+                    }
+                }
+                Some(rng) => {
+                    let largest = teams.iter().map(|team| team.drivers.len()).max().unwrap_or(0);
+                    rates.fill(0.0);
+                    for nth in 0..largest {
+                        let drawn: f64 = rng.random();
+                        for (rate, team) in rates.iter_mut().zip(teams).filter(|(_, team)| nth < team.drivers.len()) {
+                            let size = team.drivers.len() as f64;
+                            *rate += events[team.drivers[(drawn * size) as usize]] / size / hundreds_of_metres;
+                        }
+                    }
+                }
+            }
+            for (difference, rate) in differences.iter_mut().zip(&*rates) {
+                *difference = rate - rates[with];
+            }
+        };
+        let intervals = units(&strata, drivers).percentile_intervals_drawing(seed, DRAWS, 2 * teams.len(), &of_sums);
+        let (rates, differences) = intervals.split_at(teams.len());
+        let estimates = rates.iter().zip(differences);
+        Some(
+            estimates.map(|(&per_100m, &difference_per_100m)| TeamEstimate { per_100m, difference_per_100m }).collect(),
+        )
+    }
+}
+
+/// Of every cluster the near-collisions of each driver, and the hundreds of metres that all share.
+fn units(strata: &[Stratum<'_>], drivers: usize) -> Units {
+    let mut units = Units::new(drivers + 1);
+    let mut sums = vec![0.0; drivers + 1];
+    for clusters in strata {
+        units.begin_stratum();
+        for rows in clusters {
+            sums.fill(0.0);
+            for row in *rows {
+                add(&mut sums, row);
+            }
+            units.push(&sums);
+        }
+    }
+    units
+}
+
+fn add(sums: &mut [f64], row: &[RunSummary]) {
+    for (sum, unit) in sums.iter_mut().zip(row) {
+        *sum += f64::from(unit.near_collisions);
+    }
+    sums[row.len()] += f64::from(row[0].reference_m) / 100.0;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use experiment::run_dir::Training;
+
+    fn trained(recipe: &str, seed: u64) -> NamedDriver {
+        let mut driver =
+            NamedDriver::expert(&expert::ExpertSettings::half_points()).renamed(&format!("{recipe}{seed}"));
+        driver.training = Some(Training { recipe: recipe.to_owned(), seed: RootSeed(seed) });
+        driver
+    }
+
+    #[test]
+    fn trainings_of_a_recipe_are_a_team_and_every_other_driver_is_one_by_itself() {
+        let expert = NamedDriver::expert(&expert::ExpertSettings::half_points());
+        let drivers = [trained("a", 2), trained("bc", 1), expert, trained("a", 1), trained("a", 3), trained("bc", 2)];
+        let found = teams(&drivers);
+        let found: Vec<(&str, &[usize])> = found.iter().map(|team| (team.name.as_str(), &*team.drivers)).collect();
+        assert_eq!(found, [("a2", &[3, 0, 4][..]), ("expert", &[2])], "two of bc say nothing about others");
+        assert_eq!(teams(&drivers[..4]), [], "nothing was trained often enough");
+    }
+}
