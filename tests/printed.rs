@@ -21,6 +21,7 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         "reproduce",
         "rules",
         "scaling",
+        "deviations",
         "guard",
         "generate",
         "export",

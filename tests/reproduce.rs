@@ -111,6 +111,30 @@ fn what_cannot_be_reproduced_is_refused_before_anything_is_written() {
 }
 
 #[test]
+fn each_deviation_from_the_paper_is_trained_and_driven() {
+    let folder = scratch("deviations");
+    let out = folder.join("out").to_string_lossy().into_owned();
+    let short = ["dagger.fit.budget.steps=20", "dagger.cloning_budget.steps=20", "training.lots=[\"train:1:easy\"]"];
+    let run = |arguments: &[&str]| {
+        let mut command = xtask();
+        command.args(["deviations", "--preset", "smoke"]).args(short.iter().flat_map(|change| ["--set", change]));
+        command.args(arguments).output().unwrap()
+    };
+    let made = run(&["--of", "points,network", "--unseen", "validation:1:lane", "--out", &out]);
+    assert!(made.status.success(), "{}", text(&made).1);
+    let csv = std::fs::read_to_string(folder.join("out/deviations.csv")).unwrap();
+    let count = |part: &str| csv.lines().filter(|line| line.contains(part)).count();
+    assert_eq!((count("as-it-is"), count("points"), count("network,")), (2, 2, 2), "{csv}");
+    for (of, part) in
+        [("pints", "there are points"), ("network,network", "named twice"), ("ticks", "as in the paper there")]
+    {
+        let refused = run(&["--of", of]);
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(text(&refused).1.contains(part), "{}", text(&refused).1);
+    }
+}
+
+#[test]
 fn trainings_on_few_and_many_lots_end_in_one_table() {
     let folder = scratch("scaling");
     let out = folder.join("out");

@@ -10,12 +10,13 @@
 //! | [`statistics`] | exact intervals, comparisons, paired bootstrap, sample sizes |
 //! | [`summary`], [`table1`] | the tables as data |
 //! | [`calibration`], [`on_policy`] | whether the predicted variance is right, on held-back and on driven states |
-//! | [`paper`], [`conclusions`], [`stages`], [`estimate`] | the paper's figures, which of its conclusions hold here, and what is done to find out, in what time |
+//! | [`paper`], [`conclusions`], [`stages`], [`rules`], [`scaling`], [`deviations`], [`estimate`] | the paper's figures, which of its conclusions hold here, and what is done to find out, in what time |
 //! | [`tune`] | parameters of planners, searched alike for each |
 //! | [`pixel_accuracy`] | how wrong the noisy view is |
 
 pub mod calibration;
 pub mod conclusions;
+pub mod deviations;
 pub mod estimate;
 pub mod evaluate;
 pub mod format;

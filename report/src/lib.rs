@@ -10,6 +10,7 @@
 //! | [`reproduction`] | the report of `reproduce` |
 
 mod command_line;
+pub mod deviations;
 pub mod elsewhere;
 pub mod failures;
 pub mod glossary;

@@ -1,8 +1,8 @@
 //! The command line: which commands there are.
 
 use crate::commands::{
-    bench, completions, drivers, evaluate, export, generate, guard, lots, merge, pixel_accuracy, render, replay,
-    reproduce, rules, sample_size, scaling, settings, torture, train, tune, verify, visualise,
+    bench, completions, deviations, drivers, evaluate, export, generate, guard, lots, merge, pixel_accuracy, render,
+    replay, reproduce, rules, sample_size, scaling, settings, torture, train, tune, verify, visualise,
 };
 use crate::output::{Color, Output};
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -69,6 +69,9 @@ enum Command {
     /// Trains under every decision rule of the DAgger family at equal samples, and compares effort and safety.
     #[command(after_help = rules::EXAMPLES)]
     Rules(rules::RulesArgs),
+    /// Trains with one thing at a time as in the paper, and shows what each deviation from it does.
+    #[command(after_help = deviations::EXAMPLES)]
+    Deviations(deviations::DeviationsArgs),
     /// Trains on few and on many different lots, and shows how near-collisions fall.
     #[command(after_help = scaling::EXAMPLES)]
     Scaling(scaling::ScalingArgs),
@@ -144,6 +147,7 @@ impl Cli {
             Command::Merge(args) => merge::run(args, output),
             Command::Reproduce(args) => reproduce::run(args, output),
             Command::Rules(args) => rules::run(args, output),
+            Command::Deviations(args) => deviations::run(args, output),
             Command::Scaling(args) => scaling::run(args, output),
             Command::Guard(args) => guard::run(args, output),
             Command::Generate(args) => generate::run(args, output),
@@ -183,6 +187,7 @@ impl Command {
             | Self::Verify(verify::VerifyArgs { json, .. }) => json.json,
             Self::Reproduce(_)
             | Self::Rules(_)
+            | Self::Deviations(_)
             | Self::Scaling(_)
             | Self::Guard(_)
             | Self::Generate(_)

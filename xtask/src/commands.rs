@@ -2,6 +2,7 @@
 
 pub(crate) mod bench;
 pub(crate) mod completions;
+pub(crate) mod deviations;
 pub(crate) mod drivers;
 pub(crate) mod evaluate;
 pub(crate) mod export;

@@ -55,7 +55,7 @@ const LOTS: &str = r#"training.lots=["lot-a", "train:18:all"]"#;
 const RULES: Trainings<Extent> = Trainings {
     command: "rules",
     title: "Decision rules at equal samples",
-    stages: rules::stages,
+    stages: |settings, extent, root| Ok(rules::stages(settings, extent, root)),
     write: report::rules::write,
     unseen: |extent| &extent.unseen,
 };

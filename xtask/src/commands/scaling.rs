@@ -46,7 +46,7 @@ const LOTS: &str = "train:144:all";
 const SCALING: Trainings<Extent> = Trainings {
     command: "scaling",
     title: "Near-collisions against different lots",
-    stages: scaling::stages,
+    stages: |settings, extent, root| Ok(scaling::stages(settings, extent, root)),
     write: report::scaling::write,
     unseen: |extent| &extent.unseen,
 };

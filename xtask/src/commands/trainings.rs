@@ -20,7 +20,7 @@ pub(crate) struct Trainings<E> {
     pub(crate) command: &'static str,
     /// Above its table.
     pub(crate) title: &'static str,
-    pub(crate) stages: fn(&Settings, &E, &Path) -> Vec<Stage>,
+    pub(crate) stages: fn(&Settings, &E, &Path) -> anyhow::Result<Vec<Stage>>,
     /// Writes `COMMAND.md`, `.csv` and `.svg`; returns the table.
     pub(crate) write: fn(&Settings, &E, &[Stage], &RunDir) -> anyhow::Result<String>,
     /// Lots that nothing is trained on.
@@ -58,7 +58,7 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
             let run = RunDir::create(&out.place(self.command, &preset, settings.seed.0), &settings, &request)?;
             (run, settings, extent)
         };
-        let stages = (self.stages)(&settings, &extent, run.path());
+        let stages = (self.stages)(&settings, &extent, run.path())?;
         let console = Console::new(output);
         reproduce::perform_all(self.command, &stages, &run, &console, output)?;
         let table = (self.write)(&settings, &extent, &stages, &run)?;

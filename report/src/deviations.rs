@@ -1,0 +1,138 @@
+//! What each deviation from the paper does: `deviations.md`, `.csv` and `.svg`.
+
+use crate::markdown::table_of;
+use crate::plots::{self, RateRow};
+use crate::reproduction::Drive;
+use anyhow::Context as _;
+use evaluation::deviations::{self, BASE, Extent};
+use evaluation::format::{clustered, difference, quoted_rate};
+use evaluation::results::EvaluationResults;
+use evaluation::stages::{Stage, Step};
+use evaluation::statistics::bootstrap::Interval;
+use evaluation::statistics::poisson::Rate;
+use evaluation::summary::csv_of;
+use evaluation::table1::Table1;
+use experiment::run_dir::RunDir;
+use experiment::settings::Settings;
+use serde::Serialize;
+
+/// A policy of a training.
+#[derive(Debug, Clone, Serialize)]
+struct Row {
+    /// The one thing that is as in the paper.
+    deviation: String,
+    of_paper: String,
+    /// `BC` or `DAgger`.
+    method: &'static str,
+    /// Sum of the routes, metres.
+    route_m: f64,
+    near_collisions: u32,
+    contacts: u32,
+    per_100m: f64,
+    lower: f64,
+    upper: f64,
+    /// Near-collisions per 100 m, this less that of the same method with everything as it is; empty where the car is
+    /// another, and so the runs are no pairs.
+    difference_per_100m: Option<f64>,
+    difference_lower: Option<f64>,
+    difference_upper: Option<f64>,
+    /// Labelled ticks that were learned from.
+    samples: usize,
+    /// η̂ of the last iteration; empty for behaviour cloning.
+    eta_hat: Option<f64>,
+    #[serde(skip)]
+    quoted: String,
+    #[serde(skip)]
+    difference: Option<Interval>,
+}
+
+/// Writes the table, its rows as CSV and the plot; returns the table.
+///
+/// # Errors
+/// If what a stage wrote cannot be read, or a file cannot be written.
+pub fn write(_: &Settings, _: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<String> {
+    let mut rows = Vec::new();
+    for stage in stages.iter().filter(|stage| matches!(stage.step, Step::Drive { .. })) {
+        rows.extend(rows_of(stage, stages, run)?);
+    }
+    let mut table = table_of(&[
+        "as in the paper",
+        "method",
+        "samples",
+        "last η̂",
+        "near-collisions (contacts)",
+        "per 100 m [95 %]",
+        "Δ to everything as it is",
+    ]);
+    for row in &rows {
+        table.add_row([
+            row.of_paper.clone(),
+            row.method.to_owned(),
+            row.samples.to_string(),
+            row.eta_hat.map_or_else(|| "–".to_owned(), |eta_hat| format!("{eta_hat:.3}")),
+            format!("{} ({}) in {:.1} km", row.near_collisions, row.contacts, row.route_m / 1000.0),
+            row.quoted.clone(),
+            difference(row.difference, 2),
+        ]);
+    }
+    run.write("deviations.md", format!("{table}\n").as_bytes())?;
+    run.write("deviations.csv", &csv_of(&rows)?)?;
+    run.write("deviations.svg", plot(&rows).as_bytes())?;
+    Ok(table.to_string())
+}
+
+fn rows_of(stage: &Stage, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<Row>> {
+    let drive = Drive::of(stage)?;
+    let plan = drive.plan();
+    let results = EvaluationResults::read(&plan, &run.path().join(&stage.folder))?;
+    let everywhere = results.slices().pop().context("lots were driven on")?;
+    let index_of = |name: &str| plan.drivers.iter().position(|driver| driver.name == name);
+    let mut rows = Vec::new();
+    for (which, method) in ["BC", "DAgger"].into_iter().enumerate() {
+        let base = index_of(&deviations::names(BASE)[which]);
+        let (estimates, comparisons) =
+            results.judge(0, &everywhere, base.unwrap_or(0), drive.settings().evaluation.seed);
+        for training in stages {
+            let Some(driver) = index_of(&deviations::names(&training.folder)[which]) else { continue };
+            let folder = run.path().join(&training.folder);
+            let table1 = Table1::read(&folder)?.with_context(|| format!("{}: no table1.json", folder.display()))?;
+            let round = if which == 0 { table1.rows.first() } else { table1.rows.last() };
+            let totals = results.totals(0, driver, &everywhere, None);
+            let rate = Rate::new(totals.near_collisions, totals.reference_m / 100.0);
+            let estimate = &estimates[driver];
+            let (lower, upper) = clustered(estimate).map_or((rate.lower, rate.upper), |i| (i.lower, i.upper));
+            let comparison = comparisons.iter().find(|comparison| comparison.driver == driver);
+            let difference = comparison.filter(|_| base.is_some()).and_then(|found| found.difference_per_100m);
+            let of_paper = deviations::called(&training.folder).map_or("nothing", |deviation| deviation.of_paper);
+            rows.push(Row {
+                deviation: training.folder.clone(),
+                of_paper: of_paper.to_owned(),
+                method,
+                route_m: totals.reference_m,
+                near_collisions: totals.near_collisions,
+                contacts: totals.contacts,
+                per_100m: rate.per_unit,
+                lower,
+                upper,
+                difference_per_100m: difference.map(|interval| interval.estimate),
+                difference_lower: difference.map(|interval| interval.lower),
+                difference_upper: difference.map(|interval| interval.upper),
+                samples: round.map_or(0, |round| round.dataset),
+                eta_hat: round.and_then(|round| round.eta_hat),
+                quoted: quoted_rate(&totals, estimate),
+                difference,
+            });
+        }
+    }
+    Ok(rows)
+}
+
+fn plot(rows: &[Row]) -> String {
+    let row = |row: &Row| RateRow {
+        name: format!("{}, {}", row.method, row.deviation),
+        per_100m: row.per_100m,
+        interval: [row.lower, row.upper],
+        group: usize::from(row.method == "DAgger"),
+    };
+    plots::rates("One thing as in the paper", &rows.iter().map(row).collect::<Vec<_>>())
+}

@@ -1,0 +1,78 @@
+//! `deviations`: what it does that a preset deviates from the paper.
+
+use super::trainings::{Begun, Trainings};
+use crate::args::{LayerArgs, OutArgs};
+use crate::output::Output;
+use anyhow::ensure;
+use clap::Args;
+use evaluation::deviations::{self, DEVIATIONS, Extent};
+use experiment::settings::{Layers, Settings};
+use std::path::PathBuf;
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  cargo xtask deviations                              a training per thing that is not as in the paper: two hours
+  cargo xtask deviations --of smoothing,mirror --unseen sealed:my-phrase:90:all
+  cargo xtask deviations --resume runs/deviations-default-s1";
+
+#[derive(Debug, Clone, Args)]
+pub(crate) struct DeviationsArgs {
+    #[command(flatten)]
+    layers: LayerArgs,
+    /// Root seed of the trainings.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Things that are done as in the paper, one at a time, by name [default: all but `steps`, which takes hours].
+    #[arg(long = "of", value_name = "NAME", num_args = 1.., value_delimiter = ',')]
+    of: Vec<String>,
+    /// Lots that all policies are driven on, once each way.
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "validation:180:all")]
+    unseen: Vec<String>,
+    #[command(flatten)]
+    out: OutArgs,
+    /// Continues an interrupted run with its own settings, to the same result; finished trainings are skipped.
+    #[arg(
+        long,
+        value_name = "DIR",
+        conflicts_with_all = ["preset", "config", "overrides", "seed", "out", "of", "unseen"]
+    )]
+    resume: Option<PathBuf>,
+}
+
+const RUN: Trainings<Extent> = Trainings {
+    command: "deviations",
+    title: "One thing at a time as in the paper",
+    stages: deviations::stages,
+    write: report::deviations::write,
+    unseen: |extent| &extent.unseen,
+};
+
+/// Not done unless it is asked for.
+const TOO_LONG: &str = "steps";
+
+pub(crate) fn run(args: &DeviationsArgs, output: &Output) -> anyhow::Result<()> {
+    RUN.run(args.resume.as_deref(), &args.out, || begin(args), output)
+}
+
+fn begin(args: &DeviationsArgs) -> anyhow::Result<Begun<Extent>> {
+    let layers = Layers::from(&args.layers);
+    let settings = Settings::resolve(&layers, args.seed)?;
+    let known = DEVIATIONS.map(|deviation| deviation.name);
+    for (at, name) in args.of.iter().enumerate() {
+        ensure!(known.contains(&name.as_str()), "--of {name}: there are {}", known.join(", "));
+        ensure!(!args.of[..at].contains(name), "--of {name} is named twice");
+    }
+    let is_asked_for =
+        |name: &str| if args.of.is_empty() { name != TOO_LONG } else { args.of.iter().any(|of| of == name) };
+    let mut names = Vec::new();
+    for deviation in DEVIATIONS.iter().filter(|deviation| is_asked_for(deviation.name)) {
+        let is_other = deviations::as_in_the_paper(&settings, deviation)? != settings;
+        ensure!(is_other || args.of.is_empty(), "--of {}: these settings are as in the paper there", deviation.name);
+        if is_other {
+            names.push(deviation.name.to_owned());
+        }
+    }
+    ensure!(!names.is_empty(), "these settings are as in the paper in all of that, so there is nothing to compare");
+    let extent = Extent { deviations: names, unseen: args.unseen.clone() };
+    Ok(Begun { preset: layers.preset_name().to_owned(), settings, extent })
+}
