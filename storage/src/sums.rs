@@ -108,9 +108,8 @@ pub fn list(folder: &Path, names: &[&str]) -> Result<(), FileError> {
     let mut sums = list_of(folder)?.unwrap_or_default();
     for &name in names {
         let path = folder.join(name);
-        let bytes =
-            fs::read(&path).map_err(|error| FileError::new(&path, format_args!("cannot be read: {error}"), RESTORE))?;
-        sums.insert(name.to_owned(), digest(&bytes));
+        let sum = read::open(&path, u64::MAX).and_then(|mut file| digest_of(&mut file));
+        sums.insert(name.to_owned(), sum.map_err(|error| unreadable(&path, &error))?);
     }
     write_list(folder, &sums)
 }
