@@ -36,7 +36,7 @@ fn the_expert_drives_every_reference_lot_both_ways_without_a_near_collision() {
     }
 }
 
-/// ROS maps and TPCAP cases become lots like any other.
+/// ROS maps, TPCAP cases and lots written by hand are lots like any other.
 #[test]
 fn the_expert_drives_the_example_maps_without_a_near_collision() {
     let settings = Arc::new(EpisodeSettings::paper());
@@ -52,6 +52,11 @@ fn the_expert_drives_the_example_maps_without_a_near_collision() {
         ("car-park-loop.lot.toml", &Direction::BOTH),
         ("car-park-centre.lot.toml", &Direction::BOTH),
         ("open-lot.csv", &[Direction::Forward]),
+        ("lanes/lane-r10-w2.8.toml", &Direction::BOTH),
+        ("lanes/lane-r10-w3.0.toml", &Direction::BOTH),
+        ("lanes/lane-r10-w3.4.toml", &Direction::BOTH),
+        ("lanes/lane-r10-w4.0.toml", &Direction::BOTH),
+        ("lanes/lane-r10-w5.0.toml", &Direction::BOTH),
     ]
     .into_iter()
     .chain(maps.iter().map(|file| (file.as_str(), &Direction::BOTH[..])))
