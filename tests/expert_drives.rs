@@ -6,6 +6,7 @@ use scenarios::reference::{ReferenceLot, lot};
 use sim::episode::{self, Episode, EpisodeSettings};
 use sim::frame::Ending;
 use sim::map::Map;
+use sim::maths;
 use sim::metrics::EpisodeMetrics;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -84,7 +85,8 @@ fn hairpin(inner_m: f32, outer_m: f32) -> String {
     let half_ring = |radius_m: f32, parts: u32| {
         (0..=parts).map(move |part| {
             let angle = PI * (part as f32 / parts as f32 - 0.5);
-            (radius_m * angle.cos(), radius_m * angle.sin())
+            let (sine, cosine) = maths::sin_cos(angle);
+            (radius_m * cosine, radius_m * sine)
         })
     };
     let list = |points: Vec<(f32, f32)>| {

@@ -204,18 +204,18 @@ pub fn stages(settings: &Settings, extent: &Extent, root: &Path) -> anyhow::Resu
         let [cloned, dagger] = names(&training.folder);
         let folder = drives_of(settings, &training.settings, &training.folder);
         let named = [(dagger, run.clone()), (cloned, format!("{run}/bc"))];
-        match drives.iter_mut().find(|stage| stage.folder == folder).map(|stage| &mut stage.step) {
-            Some(Step::Drive { drivers }) => drivers.extend(named),
-            _ => {
-                let mut settings = training.settings.clone();
-                (settings.evaluation.lots, settings.evaluation.trials) = (extent.unseen.clone(), 1);
-                drives.push(Stage {
-                    folder,
-                    about: "policies on lots that none was trained on".to_owned(),
-                    settings,
-                    step: Step::Drive { drivers: named.to_vec() },
-                });
-            }
+        let found = drives.iter_mut().find(|stage| stage.folder == folder).map(|stage| &mut stage.step);
+        if let Some(Step::Drive { drivers }) = found {
+            drivers.extend(named);
+        } else {
+            let mut settings = training.settings.clone();
+            (settings.evaluation.lots, settings.evaluation.trials) = (extent.unseen.clone(), 1);
+            drives.push(Stage {
+                folder,
+                about: "policies on lots that none was trained on".to_owned(),
+                settings,
+                step: Step::Drive { drivers: named.to_vec() },
+            });
         }
     }
     stages.extend(drives);

@@ -36,6 +36,9 @@ impl Interval {
     }
 }
 
+/// From the sums of all columns, and the generator of the draw or none for the units as they are, to the statistics.
+pub type StatisticsOfDraw<'a> = dyn Fn(&[f64], Option<&mut Rng>, &mut [f64]) + Sync + 'a;
+
 /// Units to resample.
 #[derive(Debug, Clone, Default)]
 pub struct Units {
@@ -86,7 +89,7 @@ impl Units {
         seed: RootSeed,
         draws: u64,
         statistics: usize,
-        of_sums: &(dyn Fn(&[f64], Option<&mut Rng>, &mut [f64]) + Sync),
+        of_sums: &StatisticsOfDraw<'_>,
     ) -> Vec<Interval> {
         let mut estimates = vec![0.0; statistics];
         let mut sums = vec![0.0; self.columns];

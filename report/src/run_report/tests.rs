@@ -40,7 +40,9 @@ fn the_fastest_are_the_worst_and_no_driver_fills_the_list() {
     failures.push(failure("run:x", "lot-a", 0.4));
     failures.push(failure("tentacle", "lot-b", 0.3));
     let mut worst = Worst::default();
-    failures.into_iter().for_each(|failure| worst.add(failure));
+    for failure in failures {
+        worst.add(failure);
+    }
     let speeds: Vec<f32> = worst.0.iter().map(|failure| failure.speed_mps).collect();
     assert_eq!(speeds, [1.8, 1.7, 0.4, 0.3]);
 }
