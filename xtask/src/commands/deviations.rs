@@ -11,7 +11,7 @@ use std::path::PathBuf;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask deviations                              a training per thing that is not as in the paper: two hours
+  cargo xtask deviations                              a training per thing that is not as in the paper: hours
   cargo xtask deviations --of smoothing,mirror --unseen sealed:my-phrase:90:all
   cargo xtask deviations --resume runs/deviations-default-s1";
 
