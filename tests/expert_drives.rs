@@ -3,11 +3,10 @@
 
 use expert::{ExpertSettings, ScriptedExpert};
 use scenarios::reference::{ReferenceLot, lot};
-use sim::episode::{self, Episode, EpisodeSettings};
+use sim::episode::{self, Episode, EpisodeReport, EpisodeSettings};
 use sim::frame::Ending;
 use sim::map::Map;
 use sim::maths;
-use sim::metrics::EpisodeMetrics;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::f32::consts::PI;
@@ -108,14 +107,14 @@ fn hairpin(inner_m: f32, outer_m: f32) -> String {
     )
 }
 
-fn drive_hairpin(inner_m: f32, width_m: f32, curvature_max_per_m: f32) -> [EpisodeMetrics; 2] {
+fn drive_hairpin(inner_m: f32, width_m: f32, curvature_max_per_m: f32) -> [EpisodeReport; 2] {
     let settings = Arc::new(EpisodeSettings::paper());
     let lot = scenarios::load::parse(&hairpin(inner_m, inner_m + width_m), "hairpin.toml", &settings.vehicle).unwrap();
     Direction::BOTH.map(|direction| {
         let map = Arc::new(Map::build(direction.of(lot.clone()), &settings.vehicle).unwrap());
         let expert = ExpertSettings { curvature_max_per_m, ..ExpertSettings::half_points() };
         let mut expert = ScriptedExpert::new(expert, &settings);
-        episode::run(Episode::new(Arc::clone(&settings), map, RootSeed(4)), &mut expert, &mut ()).metrics
+        episode::run(Episode::new(Arc::clone(&settings), map, RootSeed(4)), &mut expert, &mut ())
     })
 }
 
@@ -133,10 +132,11 @@ fn hairpins_near_the_turning_limit_are_driven() {
         (3.2, 3.6, 0.225),
         (3.5, 3.4, 0.225),
     ] {
-        for metrics in drive_hairpin(inner_m, width_m, curvature_max_per_m) {
-            assert_eq!((metrics.near_collisions, metrics.contacts), (0, 0), "{inner_m} m inside, {width_m} m wide");
+        for EpisodeReport { ending, metrics, .. } in drive_hairpin(inner_m, width_m, curvature_max_per_m) {
+            let failures = (metrics.near_collisions, metrics.contacts, metrics.stuck);
+            assert_eq!((ending, failures), (Ending::ReachedEnd, (0, 0, 0)), "{inner_m} m inside, {width_m} m wide");
         }
     }
     let [too_tight, _] = drive_hairpin(2.8, 3.4, default_per_m);
-    assert!(too_tight.near_collisions > 0, "no circle of a label fits in there");
+    assert!(too_tight.metrics.near_collisions > 0, "no circle of a label fits in there");
 }

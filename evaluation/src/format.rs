@@ -6,19 +6,25 @@ use crate::statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
 use crate::totals::Totals;
 
 /// The bootstrap's interval of a rate, where events cluster and no other may be quoted (docs/methods.md 8.3).
-pub fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
+fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
     let is_clustered = estimate.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
     estimate.per_100m.filter(|_| is_clustered)
 }
 
+/// The interval that may be quoted (docs/methods.md 8.3), near-collisions per 100 m: the exact one, or the bootstrap's where
+/// events cluster.
+pub fn quoted_interval(totals: &Totals, estimate: &DriverEstimate) -> [f64; 2] {
+    let rate = totals.rate();
+    clustered(estimate).map_or([rate.lower, rate.upper], |interval| [interval.lower, interval.upper])
+}
+
 /// The rate with the interval that may be quoted (docs/methods.md 8.3).
 pub fn quoted_rate(totals: &Totals, estimate: &DriverEstimate) -> String {
-    match clustered(estimate) {
-        Some(Interval { lower, upper, .. }) => {
-            format!("{:.2} [{lower:.2}, {upper:.2}] (b)", totals.rate().per_unit)
-        }
-        None => exact_rate(totals.near_collisions, totals.reference_m),
+    if clustered(estimate).is_none() {
+        return exact_rate(totals.near_collisions, totals.reference_m);
     }
+    let [lower, upper] = quoted_interval(totals, estimate);
+    format!("{:.2} [{lower:.2}, {upper:.2}] (b)", totals.rate().per_unit)
 }
 
 /// The rate with its exact interval; for a count of zero the bound it really supports.
@@ -72,6 +78,7 @@ mod tests {
         assert_eq!(quoted_rate(&totals, &estimate(1.5)), "1.37 [1.07, 1.73]");
         assert_eq!(quoted_rate(&totals, &estimate(1.6)), "1.37 [0.90, 2.00] (b)");
         assert_eq!(difference(Some(interval), 1), "+1.4 [+0.9, +2.0] *");
+        assert_eq!(quoted_interval(&totals, &estimate(1.6)), [0.9, 2.0]);
         let around_zero = Interval { lower: -0.1, ..interval };
         assert_eq!(difference(Some(around_zero), 1), "+1.4 [-0.1, +2.0]");
     }

@@ -5,11 +5,10 @@ use crate::plots::{self, RateRow};
 use crate::reproduction::Drive;
 use anyhow::Context as _;
 use evaluation::deviations::{self, BASE, Extent};
-use evaluation::format::{clustered, difference, quoted_rate};
+use evaluation::format::{difference, quoted_interval, quoted_rate};
 use evaluation::results::EvaluationResults;
 use evaluation::stages::{Stage, Step};
 use evaluation::statistics::bootstrap::Interval;
-use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
 use evaluation::table1::Table1;
 use experiment::run_dir::RunDir;
@@ -98,9 +97,8 @@ fn rows_of(stage: &Stage, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<
             let table1 = Table1::read(&folder)?.with_context(|| format!("{}: no table1.json", folder.display()))?;
             let round = if which == 0 { table1.rows.first() } else { table1.rows.last() };
             let totals = results.totals(0, driver, &everywhere, None);
-            let rate = Rate::new(totals.near_collisions, totals.reference_m / 100.0);
             let estimate = &estimates[driver];
-            let (lower, upper) = clustered(estimate).map_or((rate.lower, rate.upper), |i| (i.lower, i.upper));
+            let [lower, upper] = quoted_interval(&totals, estimate);
             let comparison = comparisons.iter().find(|comparison| comparison.driver == driver);
             let difference = comparison.filter(|_| base.is_some()).and_then(|found| found.difference_per_100m);
             let of_paper = deviations::called(&training.folder).map_or("nothing", |deviation| deviation.of_paper);
@@ -111,7 +109,7 @@ fn rows_of(stage: &Stage, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<
                 route_m: totals.reference_m,
                 near_collisions: totals.near_collisions,
                 contacts: totals.contacts,
-                per_100m: rate.per_unit,
+                per_100m: totals.rate().per_unit,
                 lower,
                 upper,
                 difference_per_100m: difference.map(|interval| interval.estimate),

@@ -8,6 +8,7 @@
 //! | [`page`], [`glossary`] | one HTML page that loads nothing, and what its words mean |
 //! | [`run_report`], [`moments`] | `report.html` of a run, with its worst near-collisions |
 //! | [`reproduction`] | the report of `reproduce` |
+//! | [`rules`], [`scaling`], [`deviations`] | those of the commands of these names: many trainings, one table, one plot |
 
 mod command_line;
 pub mod deviations;

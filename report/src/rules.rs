@@ -4,7 +4,7 @@ use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
 use crate::reproduction::Drive;
 use anyhow::Context as _;
-use evaluation::format::clustered;
+use evaluation::format::quoted_interval;
 use evaluation::results::EvaluationResults;
 use evaluation::rules::{self, Extent};
 use evaluation::stages::Stage;
@@ -60,6 +60,8 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
     let results = EvaluationResults::read(&drive.plan(), &run.path().join(rules::DRIVES))?;
     let everywhere = results.slices().pop().context("lots were driven on")?;
     let control_period_s = f64::from(settings.episode.control_period_s());
+    let seed_of_trials = drive.settings().evaluation.seed;
+    let (estimates, _) = results.judge(0, &everywhere, 0, seed_of_trials);
     let mut rows = Vec::new();
     for (driver, (seed, rule)) in rules::policies(settings, extent).into_iter().enumerate() {
         let mut row = Row { rule: rule.map_or(rules::CLONED, rules::title).to_owned(), ..Row::default() };
@@ -69,24 +71,21 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
         let totals = results.totals(0, driver, &everywhere, None);
         (row.route_m, row.near_collisions, row.contacts) =
             (totals.reference_m, totals.near_collisions, totals.contacts);
+        (row.per_100m, [row.lower, row.upper]) = (totals.rate().per_unit, quoted_interval(&totals, &estimates[driver]));
         rows.push(row);
     }
     let titles = std::iter::once(rules::CLONED).chain(extent.rules.iter().map(|rule| rules::title(rule)));
     let mut pooled: Vec<Row> = titles.map(|title| pool(&rows, title)).collect();
-    let seed_of_trials = drive.settings().evaluation.seed;
-    let (estimates, _) = results.judge(0, &everywhere, 0, seed_of_trials);
-    for (row, estimate) in rows.iter_mut().zip(&estimates) {
-        let clustered = clustered(estimate).map(|interval| [interval.lower, interval.upper]);
-        set_rate(row, clustered);
-    }
     // Networks that drove the same lots are no independent evidence: lots and seeds are drawn.
     let drivers = |title: &str| (0..rows.len()).filter(|&driver| rows[driver].rule == title).collect();
     let teams: Vec<Team> =
         pooled.iter().map(|row| Team { name: row.rule.clone(), drivers: drivers(&row.rule) }).collect();
     let of_teams = results.judge_teams(0, &everywhere, &teams, 0, seed_of_trials);
     for (at, row) in pooled.iter_mut().enumerate() {
-        let interval = of_teams.as_ref().map(|estimates| estimates[at].per_100m);
-        set_rate(row, interval.filter(|_| row.near_collisions > 0).map(|interval| [interval.lower, interval.upper]));
+        let rate = Rate::new(row.near_collisions, row.route_m / 100.0);
+        let drawn = of_teams.as_ref().map(|estimates| estimates[at].per_100m).filter(|_| row.near_collisions > 0);
+        [row.lower, row.upper] = drawn.map_or([rate.lower, rate.upper], |interval| [interval.lower, interval.upper]);
+        row.per_100m = rate.per_unit;
     }
     for row in rows.iter_mut().chain(&mut pooled) {
         let expert_s = (row.ticks - row.novice_ticks) as f64 * control_period_s;
@@ -120,13 +119,6 @@ fn add_rounds(row: &mut Row, folder: &Path, rule: Option<&str>, extent: &Extent)
         row.contacts_collecting += effort.contacts;
     }
     Ok(())
-}
-
-/// Sets the rate, with this interval or else the exact one.
-fn set_rate(row: &mut Row, interval: Option<[f64; 2]>) {
-    let rate = Rate::new(row.near_collisions, row.route_m / 100.0);
-    row.per_100m = rate.per_unit;
-    [row.lower, row.upper] = interval.unwrap_or([rate.lower, rate.upper]);
 }
 
 /// All seeds of a rule together.

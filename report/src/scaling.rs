@@ -4,11 +4,10 @@ use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
 use crate::reproduction::Drive;
 use anyhow::Context as _;
-use evaluation::format::{clustered, quoted_rate};
+use evaluation::format::{quoted_interval, quoted_rate};
 use evaluation::results::EvaluationResults;
 use evaluation::scaling::{self, Extent};
 use evaluation::stages::Stage;
-use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
 use evaluation::table1::Table1;
 use experiment::lots::Lot;
@@ -82,9 +81,8 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
         for (part, method) in ["BC", "DAgger"].into_iter().enumerate() {
             for (slice, estimates) in &judged {
                 let totals = results.totals(0, 2 * at + part, slice, None);
-                let rate = Rate::new(totals.near_collisions, totals.reference_m / 100.0);
                 let estimate = &estimates[2 * at + part];
-                let (lower, upper) = clustered(estimate).map_or((rate.lower, rate.upper), |i| (i.lower, i.upper));
+                let [lower, upper] = quoted_interval(&totals, estimate);
                 rows.push(Row {
                     different_lots: different as usize * kinds.len(),
                     method,
@@ -93,7 +91,7 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
                     route_m: totals.reference_m,
                     near_collisions: totals.near_collisions,
                     contacts: totals.contacts,
-                    per_100m: rate.per_unit,
+                    per_100m: totals.rate().per_unit,
                     lower,
                     upper,
                     quoted: quoted_rate(&totals, estimate),

@@ -1,13 +1,11 @@
 //! `deviations`: what it does that a preset deviates from the paper.
 
-use super::trainings::{Begun, Trainings};
-use crate::args::{LayerArgs, OutArgs};
+use super::trainings::{Begun, Trainings, TrainingsArgs, ensure_distinct};
 use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
 use evaluation::deviations::{self, DEVIATIONS, Extent};
-use experiment::settings::{Layers, Settings};
-use std::path::PathBuf;
+use experiment::settings::Settings;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -18,25 +16,17 @@ Examples:
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DeviationsArgs {
     #[command(flatten)]
-    layers: LayerArgs,
-    /// Root seed of the trainings.
-    #[arg(long)]
-    seed: Option<u64>,
+    common: TrainingsArgs,
     /// Things that are done as in the paper, one at a time, by name [default: all but `steps`, which takes hours].
-    #[arg(long = "of", value_name = "NAME", num_args = 1.., value_delimiter = ',')]
+    #[arg(long = "of", value_name = "NAME", num_args = 1.., value_delimiter = ',', conflicts_with = "resume")]
     of: Vec<String>,
     /// Lots that all policies are driven on, once each way.
-    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "validation:180:all")]
-    unseen: Vec<String>,
-    #[command(flatten)]
-    out: OutArgs,
-    /// Continues an interrupted run with its own settings, to the same result; finished trainings are skipped.
     #[arg(
-        long,
-        value_name = "DIR",
-        conflicts_with_all = ["preset", "config", "overrides", "seed", "out", "of", "unseen"]
+        long, value_name = "SPEC", num_args = 1.., value_delimiter = ',',
+        default_value = "validation:180:all",
+        conflicts_with = "resume"
     )]
-    resume: Option<PathBuf>,
+    unseen: Vec<String>,
 }
 
 const RUN: Trainings<Extent> = Trainings {
@@ -51,17 +41,17 @@ const RUN: Trainings<Extent> = Trainings {
 const TOO_LONG: &str = "steps";
 
 pub(crate) fn run(args: &DeviationsArgs, output: &Output) -> anyhow::Result<()> {
-    RUN.run(args.resume.as_deref(), &args.out, || begin(args), output)
+    RUN.run(&args.common, || begin(args), output)
 }
 
 fn begin(args: &DeviationsArgs) -> anyhow::Result<Begun<Extent>> {
-    let layers = Layers::from(&args.layers);
-    let settings = Settings::resolve(&layers, args.seed)?;
+    let layers = args.common.layers();
+    let settings = Settings::resolve(&layers, args.common.seed)?;
     let known = DEVIATIONS.map(|deviation| deviation.name);
-    for (at, name) in args.of.iter().enumerate() {
+    for name in &args.of {
         ensure!(known.contains(&name.as_str()), "--of {name}: there are {}", known.join(", "));
-        ensure!(!args.of[..at].contains(name), "--of {name} is named twice");
     }
+    ensure_distinct("--of", &args.of)?;
     let is_asked_for =
         |name: &str| if args.of.is_empty() { name != TOO_LONG } else { args.of.iter().any(|of| of == name) };
     let mut names = Vec::new();

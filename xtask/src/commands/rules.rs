@@ -1,13 +1,11 @@
 //! `rules`: the `DAgger` family at equal samples.
 
-use super::trainings::{Begun, Trainings};
-use crate::args::{LayerArgs, OutArgs};
+use super::trainings::{Begun, Trainings, TrainingsArgs, ensure_distinct};
 use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
 use evaluation::rules::{self, Extent};
-use experiment::settings::{Layers, Settings};
-use std::path::PathBuf;
+use experiment::settings::Settings;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -18,35 +16,34 @@ Examples:
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RulesArgs {
     #[command(flatten)]
-    layers: LayerArgs,
-    /// Root seed of the first training; the next seeds follow it.
-    #[arg(long)]
-    seed: Option<u64>,
-    /// Trainings of each rule.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
+    common: TrainingsArgs,
+    /// Trainings of each rule: with the root seed, and with those that follow it.
+    #[arg(
+        long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100),
+        conflicts_with = "resume"
+    )]
     seeds: u64,
     /// Rules by the name of their setting (dagger.rule); all of them if none is named.
-    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',')]
+    #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',', conflicts_with = "resume")]
     rule: Vec<String>,
     /// Iterations of every training, after behaviour cloning.
-    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=50))]
+    #[arg(
+        long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=50),
+        conflicts_with = "resume"
+    )]
     iterations: u32,
     /// Samples that a round adds to the data set, for every rule.
-    #[arg(long, value_name = "N", default_value_t = 6000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(
+        long, value_name = "N", default_value_t = 6000, value_parser = clap::value_parser!(u32).range(1..),
+        conflicts_with = "resume"
+    )]
     samples: u32,
     /// Lots that all policies are driven on, once each way.
-    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "validation:90:all")]
-    unseen: Vec<String>,
-    #[command(flatten)]
-    out: OutArgs,
-    /// Continues an interrupted run with its own settings, to the same result; finished trainings are skipped.
     #[arg(
-        long,
-        value_name = "DIR",
-        conflicts_with_all =
-            ["preset", "config", "overrides", "seed", "out", "seeds", "rule", "iterations", "samples", "unseen"]
+        long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "validation:90:all",
+        conflicts_with = "resume"
     )]
-    resume: Option<PathBuf>,
+    unseen: Vec<String>,
 }
 
 /// Few lots: two of each family and one round trip of lot a in every round.
@@ -61,22 +58,22 @@ const RULES: Trainings<Extent> = Trainings {
 };
 
 pub(crate) fn run(args: &RulesArgs, output: &Output) -> anyhow::Result<()> {
-    RULES.run(args.resume.as_deref(), &args.out, || begin(args), output)
+    RULES.run(&args.common, || begin(args), output)
 }
 
 fn begin(args: &RulesArgs) -> anyhow::Result<Begun<Extent>> {
-    let mut layers = Layers::from(&args.layers);
+    let mut layers = args.common.layers();
     // What the user sets comes later and counts.
     if layers.preset_name() == "default" {
         layers.overrides.splice(0..0, [LOTS.to_owned(), "training.trials=1".to_owned()]);
     }
-    let settings = Settings::resolve(&layers, args.seed)?;
+    let settings = Settings::resolve(&layers, args.common.seed)?;
     let known = rules::all().map(|(name, _)| name.to_owned());
     let named = if args.rule.is_empty() { known.to_vec() } else { args.rule.clone() };
-    for (at, rule) in named.iter().enumerate() {
+    for rule in &named {
         ensure!(known.contains(rule), "--rule {rule}: there are {}", known.join(", "));
-        ensure!(!named[..at].contains(rule), "--rule {rule} is named twice");
     }
+    ensure_distinct("--rule", &named)?;
     let RulesArgs { seeds, iterations, samples, .. } = *args;
     let extent = Extent { rules: named, seeds, iterations, samples, unseen: args.unseen.clone() };
     ensure!(

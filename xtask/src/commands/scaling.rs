@@ -1,14 +1,12 @@
 //! `scaling`: how much more different lots buy.
 
-use super::trainings::{Begun, Trainings};
-use crate::args::{LayerArgs, OutArgs};
+use super::trainings::{Begun, Trainings, TrainingsArgs, ensure_distinct};
 use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
 use evaluation::scaling::{self, Extent};
 use experiment::lots::Lot;
-use experiment::settings::{Layers, Settings};
-use std::path::PathBuf;
+use experiment::settings::Settings;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -19,25 +17,17 @@ Examples:
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ScalingArgs {
     #[command(flatten)]
-    layers: LayerArgs,
-    /// Root seed of the trainings.
-    #[arg(long)]
-    seed: Option<u64>,
+    common: TrainingsArgs,
     /// Different lots of each kind that is trained on; one training each.
     #[arg(long, value_name = "N", num_args = 1.., value_delimiter = ',', default_values_t = [1, 4, 16, 64])]
     different: Vec<u32>,
     /// Lots that all policies are driven on, once each way.
-    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "validation:180:all")]
-    unseen: Vec<String>,
-    #[command(flatten)]
-    out: OutArgs,
-    /// Continues an interrupted run with its own settings, to the same result; finished trainings are skipped.
     #[arg(
-        long,
-        value_name = "DIR",
-        conflicts_with_all = ["preset", "config", "overrides", "seed", "out", "different", "unseen"]
+        long, value_name = "SPEC", num_args = 1.., value_delimiter = ',',
+        default_value = "validation:180:all",
+        conflicts_with = "resume"
     )]
-    resume: Option<PathBuf>,
+    unseen: Vec<String>,
 }
 
 /// Sixteen lots of each family in every round, as much as the default trains on; no lot that is there in every training.
@@ -52,22 +42,20 @@ const SCALING: Trainings<Extent> = Trainings {
 };
 
 pub(crate) fn run(args: &ScalingArgs, output: &Output) -> anyhow::Result<()> {
-    SCALING.run(args.resume.as_deref(), &args.out, || begin(args), output)
+    SCALING.run(&args.common, || begin(args), output)
 }
 
 fn begin(args: &ScalingArgs) -> anyhow::Result<Begun<Extent>> {
-    let mut layers = Layers::from(&args.layers);
+    let mut layers = args.common.layers();
     let is_default = layers.preset_name() == "default";
     // What the user sets comes later and counts.
     if is_default {
         layers.overrides.insert(0, format!("training.lots=[\"{LOTS}\"]"));
     }
-    let settings = Settings::resolve(&layers, args.seed)?;
+    let settings = Settings::resolve(&layers, args.common.seed)?;
     let extent = Extent { different_lots: args.different.clone(), unseen: args.unseen.clone() };
     ensure!(!extent.different_lots.contains(&0), "--different 0: name at least one lot");
-    for (at, different) in extent.different_lots.iter().enumerate() {
-        ensure!(!extent.different_lots[..at].contains(different), "--different {different} is named twice");
-    }
+    ensure_distinct("--different", &extent.different_lots)?;
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     ensure!(lots.iter().any(Lot::is_generated), "training.lots names no generated lots, of which there could be more");
     Ok(Begun { preset: layers.preset_name().to_owned(), settings, extent })

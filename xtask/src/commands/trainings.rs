@@ -2,18 +2,49 @@
 //! and reported in the same way.
 
 use super::{reproduce, train};
-use crate::args::OutArgs;
+use crate::args::{LayerArgs, OutArgs};
 use crate::console::Console;
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
+use clap::Args;
 use evaluation::stages::Stage;
 use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
 use experiment::run_dir::{Outcome, Request, RunDir};
-use experiment::settings::Settings;
+use experiment::settings::{Layers, Settings};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::path::Path;
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+
+/// Options of every such command.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct TrainingsArgs {
+    #[command(flatten)]
+    layers: LayerArgs,
+    /// Root seed of the trainings.
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
+    #[command(flatten)]
+    out: OutArgs,
+    /// Continues an interrupted run with its own settings, to the same result; finished trainings are skipped.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "config", "overrides", "seed", "out"])]
+    resume: Option<PathBuf>,
+}
+
+impl TrainingsArgs {
+    pub(crate) fn layers(&self) -> Layers {
+        Layers::from(&self.layers)
+    }
+}
+
+/// Refuses what `option` names a second time: folders and rows are called so.
+pub(crate) fn ensure_distinct<T: PartialEq + Display>(option: &str, named: &[T]) -> anyhow::Result<()> {
+    for (at, name) in named.iter().enumerate() {
+        ensure!(!named[..at].contains(name), "{option} {name} is named twice");
+    }
+    Ok(())
+}
 
 /// A command of this kind; `E`: how much is done, besides what the settings say.
 pub(crate) struct Trainings<E> {
@@ -35,15 +66,14 @@ pub(crate) struct Begun<E> {
 }
 
 impl<E: Serialize + DeserializeOwned> Trainings<E> {
-    /// Goes on with the run at `resume`, or begins one.
+    /// Goes on with the run at `--resume`, or begins one.
     pub(crate) fn run(
         &self,
-        resume: Option<&Path>,
-        out: &OutArgs,
+        args: &TrainingsArgs,
         begin: impl FnOnce() -> anyhow::Result<Begun<E>>,
         output: &Output,
     ) -> anyhow::Result<()> {
-        let (run, settings, extent) = if let Some(path) = resume {
+        let (run, settings, extent) = if let Some(path) = &args.resume {
             let (run, settings, manifest) = RunDir::resume(path, self.command)?;
             let extent: E = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
             manifest.check_inputs(&self.inputs(&settings, &extent)?)?;
@@ -55,7 +85,7 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
             }
             let arguments = toml::Table::try_from(&extent)?;
             let request = Request { arguments, inputs: self.inputs(&settings, &extent)? };
-            let run = RunDir::create(&out.place(self.command, &preset, settings.seed.0), &settings, &request)?;
+            let run = RunDir::create(&args.out.place(self.command, &preset, settings.seed.0), &settings, &request)?;
             (run, settings, extent)
         };
         let stages = (self.stages)(&settings, &extent, run.path())?;
