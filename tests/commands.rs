@@ -1,6 +1,11 @@
 //! Whole commands, run from outside: what they leave behind, and how they refuse bad input.
 
 use crate::bench::{scratch, succeed, text, xtask};
+use policy::checkpoint::Checkpoint;
+use policy::conditions::Conditions;
+use policy::network::{InferenceSettings, NetworkArchitecture, Weights};
+use sim::episode::EpisodeSettings;
+use sim::seed::RootSeed;
 use std::path::Path;
 use storage::sums;
 
@@ -33,6 +38,28 @@ fn bad_input_gets_one_clear_error() {
     refuses(&["sample-size", "--below", "0"], &["--below 0"]);
     refuses(&["sample-size", "--between", "1,1"], &["equal rates"]);
     refuses(&["sample-size", "--between", "1,2", "--power", "1.5"], &["--power 1.5"]);
+}
+
+/// It drove to the edge of the image, or stood still, and the table said nothing of it.
+#[test]
+fn a_network_that_answers_with_no_number_ends_the_command_with_the_key_to_replay() {
+    let folder = scratch("overflowing");
+    let mut weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
+    weights.parts_mut().fc2_weight.iter_mut().for_each(|weight| *weight = 3e38);
+    let conditions = Conditions::of(&EpisodeSettings::paper());
+    let checkpoint = Checkpoint { weights, conditions, inference: InferenceSettings::plain() };
+    let [net, file] = ["net", "policy.onnx"].map(|name| folder.join(name));
+    checkpoint.save(&net).unwrap();
+    std::fs::write(&file, onnx::export::export(&checkpoint).unwrap()).unwrap();
+    for driver in [format!("net:{}", net.display()), format!("onnx:{}", file.display())] {
+        let key = format!("{driver}@lot-b@forward@0@paper@1@0");
+        let expected = format!("{key}: the driver's answer is no finite number");
+        let out = folder.join("evaluation").display().to_string();
+        let evaluate =
+            ["evaluate", "--driver", &driver, "--lots", "lot-b", "--trials", "1", "--overwrite", "--out", &out];
+        refuses(&evaluate, &[&expected]);
+        refuses(&["replay", &key], &[&expected]);
+    }
 }
 
 #[test]

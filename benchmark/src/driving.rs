@@ -22,6 +22,9 @@ use std::sync::Arc;
 /// Cars of a fleet.
 const FLEET: usize = 32;
 
+/// What every driver here does.
+const NUMBERS: &str = "it answers with finite numbers";
+
 /// Steers at the middle of the lane: as cheap as a driver can be that gets there.
 #[derive(Debug, Clone, Copy)]
 struct Centred;
@@ -66,7 +69,7 @@ impl Course {
     /// Control steps in lock-step, all together: of fleets of up to `cars_each` cars, as trials are driven.
     fn lock_step(&self, cars_each: usize, fleet: impl FnMut(usize) -> Box<dyn Fleet + Send>) -> f64 {
         let mut steps = 0_u64;
-        run_fleets(SeatedFleet::in_all(self.episodes(), cars_each, fleet), &mut |_, _| steps += 1);
+        run_fleets(SeatedFleet::in_all(self.episodes(), cars_each, fleet), &mut |_, _| steps += 1).expect(NUMBERS);
         steps as f64
     }
 
@@ -114,7 +117,7 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     report(steps("one car with the network", 1, Some(Goal::AtLeast(15_000.0)), &mut || {
         let episodes = course.episodes().into_iter().take(1).collect();
         let mut steps = 0_u64;
-        run_lockstep(episodes, &mut *network.fleet(&settings.episode, 1), &mut |_, _| steps += 1);
+        run_lockstep(episodes, &mut *network.fleet(&settings.episode, 1), &mut |_, _| steps += 1).expect(NUMBERS);
         steps as f64
     }));
     report(steps("fleet of 32 with the network, two cores", 2, Some(Goal::AtLeast(60_000.0)), &mut || {

@@ -19,7 +19,6 @@ use experiment::trials::{self, Trial};
 use serde::Serialize;
 use sim::episode::EpisodeReport;
 use sim::frame::Event;
-use sim::seed::RootSeed;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
@@ -102,10 +101,10 @@ impl<'a> Driving<'a> {
         let parts = levels.flat_map(|level| plan.drivers.iter().enumerate().map(move |driver| (level, driver)));
         let parts: Vec<_> = parts.skip(self.lines.parts() - before).collect();
         for ((level, &noise), (index, driver)) in parts {
-            let batch = TrialBatch { episode, driver, trials, maps: &maps, noise };
-            let Some(driven) = drive(&batch, &mut self.track) else { return Ok(false) };
-            let failures = failures(&batch, evaluation.seed, &driven);
-            self.lines.add(&lines(&batch, evaluation.seed, &driven, &failures)?)?;
+            let batch = TrialBatch { episode, driver, trials, maps: &maps, noise, seed: evaluation.seed };
+            let Some(driven) = drive(&batch, &mut self.track)? else { return Ok(false) };
+            let failures = failures(&batch, &driven)?;
+            self.lines.add(&lines(&batch, &driven, &failures)?)?;
             for (i, (trial, report)) in trials.iter().zip(&driven.reports).enumerate() {
                 self.results.add(level, index, first_trial + i, trial, report);
             }
@@ -150,8 +149,8 @@ fn driven_by(batch: &TrialBatch<'_>, trial: &Trial<'_>) -> Driven {
 }
 
 /// The near-collisions, each with the index of its run within the batch.
-fn failures(batch: &TrialBatch<'_>, seed: RootSeed, driven: &DrivenBatch) -> Vec<(usize, FailureRecord)> {
-    let explained = incidents::explain(batch, &driven.incidents);
+fn failures(batch: &TrialBatch<'_>, driven: &DrivenBatch) -> anyhow::Result<Vec<(usize, FailureRecord)>> {
+    let explained = incidents::explain(batch, &driven.incidents)?;
     let failure = |(incident, (cause, findings)): (&Incident, _)| {
         let trial = &batch.trials[incident.episode];
         let failure = FailureRecord {
@@ -164,16 +163,16 @@ fn failures(batch: &TrialBatch<'_>, seed: RootSeed, driven: &DrivenBatch) -> Vec
             speed_mps: incident.speed_mps,
             cause,
             findings,
-            replay: batch.replay_key(trial, seed, incident.tick).to_string(),
+            replay: batch.replay_key(trial, incident.tick).to_string(),
         };
         (incident.episode, failure)
     };
-    driven.incidents.iter().zip(explained).map(failure).collect()
+    Ok(driven.incidents.iter().zip(explained).map(failure).collect())
 }
 
 #[expect(clippy::disallowed_methods, reason = "wall_time.jsonl is for people; nothing computed depends on it")]
 /// `None` if cancelled.
-fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> Option<DrivenBatch> {
+fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> anyhow::Result<Option<DrivenBatch>> {
     let started = Instant::now();
     let mut monitor = IncidentMonitor::new(batch.trials.len(), batch.episode);
     let mut digests = vec![DriveDigest::default(); batch.trials.len()];
@@ -193,15 +192,15 @@ fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> Option<DrivenBatch> {
             }
         }
         ControlFlow::Continue(())
-    });
-    let reports: Vec<EpisodeReport> = reports.into_iter().collect::<Option<_>>()?;
+    })?;
+    let Some(reports) = reports.into_iter().collect::<Option<Vec<EpisodeReport>>>() else { return Ok(None) };
     track.done += reports.len();
-    Some(DrivenBatch {
+    Ok(Some(DrivenBatch {
         reports,
         sha256: digests.iter().map(DriveDigest::hex).collect(),
         incidents: monitor.into_incidents(),
         wall_s: started.elapsed().as_secs_f64(),
-    })
+    }))
 }
 
 /// Progress of the whole evaluation.
@@ -224,14 +223,13 @@ impl Track<'_> {
 /// The text of a part for each of the [`FILES`].
 fn lines(
     batch: &TrialBatch<'_>,
-    seed: RootSeed,
     driven: &DrivenBatch,
     failures: &[(usize, FailureRecord)],
 ) -> anyhow::Result<[Vec<u8>; 3]> {
     let [mut runs, mut failed, mut wall_time] = [const { Vec::new() }; 3];
     let ticks: u32 = driven.reports.iter().map(|report| report.metrics.ticks).sum();
     for ((trial, report), sha256) in batch.trials.iter().zip(&driven.reports).zip(&driven.sha256) {
-        let key = batch.replay_key(trial, seed, 0);
+        let key = batch.replay_key(trial, 0);
         line(&mut runs, &RunRecord::new(driven_by(batch, trial), &key, sha256, report))?;
         // Runs of a batch are driven at once; each has its share by the number of its decisions.
         let wall_s = driven.wall_s * f64::from(report.metrics.ticks) / f64::from(ticks.max(1));

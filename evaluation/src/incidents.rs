@@ -13,6 +13,7 @@
 //! Apart from its cause, a near-collision within [`NEAR_M`] of route after a resume is marked as one more at the same
 //! place: the car was put back where it had failed, and failed again.
 
+use anyhow::anyhow;
 use experiment::drive::TrialBatch;
 use experiment::settings::NoiseChoice;
 use experiment::trials;
@@ -197,13 +198,13 @@ impl IncidentMonitor {
 }
 
 /// Cause and findings of every incident of a batch.
-pub fn explain(batch: &TrialBatch<'_>, incidents: &[Incident]) -> Vec<(Cause, Findings)> {
+pub fn explain(batch: &TrialBatch<'_>, incidents: &[Incident]) -> anyhow::Result<Vec<(Cause, Findings)>> {
     let is_noisy = |incident: &Incident| {
         let map = &batch.maps[incident.episode];
         trials::episode_settings(batch.episode, batch.noise, map).noise.intensity > 0.0
     };
     let noisy: Vec<Incident> = incidents.iter().copied().filter(is_noisy).collect();
-    let mut passes = passes_on_clean_grid(batch, &noisy).into_iter();
+    let mut passes = passes_on_clean_grid(batch, &noisy)?.into_iter();
     let explain = |incident: &Incident| {
         let noisy = is_noisy(incident);
         let map = &batch.maps[incident.episode];
@@ -216,16 +217,17 @@ pub fn explain(batch: &TrialBatch<'_>, incidents: &[Incident]) -> Vec<(Cause, Fi
         };
         (findings.cause(noisy, batch.episode), findings)
     };
-    incidents.iter().map(explain).collect()
+    Ok(incidents.iter().map(explain).collect())
 }
 
 /// Drives on from the state before each incident on the clean grid.
-fn passes_on_clean_grid(batch: &TrialBatch<'_>, incidents: &[Incident]) -> Vec<bool> {
+fn passes_on_clean_grid(batch: &TrialBatch<'_>, incidents: &[Incident]) -> anyhow::Result<Vec<bool>> {
     // As many at a time as in the evaluation itself: memory does not depend on how often a driver fails.
-    incidents.chunks(batch.trials.len()).flat_map(|incidents| passes_at_once(batch, incidents)).collect()
+    let passes = incidents.chunks(batch.trials.len()).map(|incidents| passes_at_once(batch, incidents));
+    Ok(passes.collect::<anyhow::Result<Vec<_>>>()?.concat())
 }
 
-fn passes_at_once(batch: &TrialBatch<'_>, incidents: &[Incident]) -> Vec<bool> {
+fn passes_at_once(batch: &TrialBatch<'_>, incidents: &[Incident]) -> anyhow::Result<Vec<bool>> {
     let start = |incident: &Incident| {
         let (map, trial) = (&batch.maps[incident.episode], &batch.trials[incident.episode]);
         let mut episode = trials::episode_settings(batch.episode, NoiseChoice::Clean, map);
@@ -236,7 +238,7 @@ fn passes_at_once(batch: &TrialBatch<'_>, incidents: &[Incident]) -> Vec<bool> {
     };
     let episodes: Vec<Episode> = incidents.iter().map(start).collect();
     let mut verdicts: Vec<Option<bool>> = vec![None; episodes.len()];
-    batch.drive_from(episodes, &mut |episode, frame| {
+    let driven = batch.drive_from(episodes, &mut |episode, frame| {
         let verdict = match frame.event {
             Event::NearCollision { .. } | Event::Stuck { .. } => Some(false),
             Event::ReachedEnd => Some(true),
@@ -245,7 +247,12 @@ fn passes_at_once(batch: &TrialBatch<'_>, incidents: &[Incident]) -> Vec<bool> {
         verdicts[episode] = verdicts[episode].or(verdict);
         if verdicts.iter().all(Option::is_some) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
-    verdicts.into_iter().map(|verdict| verdict == Some(true)).collect()
+    driven.map_err(|found| {
+        let incident = &incidents[found.episode];
+        let key = batch.replay_key(&batch.trials[incident.episode], incident.tick);
+        anyhow!("{key}: on a clean grid from before that, {} is no finite number", found.what)
+    })?;
+    Ok(verdicts.into_iter().map(|verdict| verdict == Some(true)).collect())
 }
 
 /// Places along the route near a place, metres.

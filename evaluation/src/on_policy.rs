@@ -210,7 +210,7 @@ fn rollout(settings: &Settings, policy: &Checkpoint) -> anyhow::Result<Collected
         RoundEpisode { index, direction: trial.direction, episode, expert }
     };
     let episodes = EpisodeIndex::of_round(0, trials.len()).zip(&trials).zip(episodes).map(seated).collect();
-    Ok(Rollouts::on_policy(policy, settings.dagger.device, episodes).drive(&mut |_, _| {}))
+    Ok(Rollouts::on_policy(policy, settings.dagger.device, episodes).drive(&mut |_, _| {})?)
 }
 
 fn tau_hat_per_s(collected: &Collected) -> f64 {

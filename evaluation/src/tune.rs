@@ -122,6 +122,7 @@ struct Stretch<'a> {
 struct Course<'a> {
     episode: &'a EpisodeSettings,
     noise: NoiseChoice,
+    seed: RootSeed,
     /// Every candidate's.
     search: Stretch<'a>,
     /// The finalists'.
@@ -140,7 +141,7 @@ impl<'a> Course<'a> {
             let maps = trials::maps(&trials, episode)?;
             Ok::<_, anyhow::Error>(Stretch { trials, maps })
         };
-        Ok(Self { episode, noise, search: stretch(search)?, fresh: stretch(fresh)? })
+        Ok(Self { episode, noise, seed: evaluation.seed, search: stretch(search)?, fresh: stretch(fresh)? })
     }
 
     /// Drives a stretch with every candidate, in parallel; sums come in the order of the candidates.
@@ -149,13 +150,14 @@ impl<'a> Course<'a> {
         let drive = |candidate: &PlannerSpec| {
             let driver = &NamedDriver::planner(candidate.clone());
             let (trials, maps) = (&stretch.trials, &stretch.maps);
-            let batch = TrialBatch { episode: self.episode, driver, trials, maps, noise: self.noise };
+            let batch = TrialBatch { episode: self.episode, driver, trials, maps, noise: self.noise, seed: self.seed };
             let reports = batch.drive_from(starts.clone(), &mut |_, frame| {
                 if frame.event == Event::ReachedEnd {
                     on_run();
                 }
                 ControlFlow::Continue(())
             });
+            let reports = reports.unwrap_or_else(|error| panic!("{}: {error}", driver.spec));
             let mut totals = Totals::default();
             reports.iter().flatten().for_each(|report| totals.add(report));
             totals

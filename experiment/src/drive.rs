@@ -9,9 +9,9 @@ use crate::lots::Lot;
 use crate::replay_key::ReplayKey;
 use crate::settings::NoiseChoice;
 use crate::trials::{self, Trial};
-use anyhow::ensure;
+use anyhow::{anyhow, ensure};
 use rayon::prelude::*;
-use sim::batch::{SeatedFleet, run_fleets_until};
+use sim::batch::{NotFinite, SeatedFleet, run_fleets_until};
 use sim::episode::{Episode, EpisodeReport, EpisodeSettings};
 use sim::frame::Frame;
 use sim::map::Map;
@@ -35,6 +35,8 @@ pub struct TrialBatch<'a> {
     pub maps: &'a [Arc<Map>],
     /// Sensor noise.
     pub noise: NoiseChoice,
+    /// Root seed of the trials.
+    pub seed: RootSeed,
 }
 
 impl TrialBatch<'_> {
@@ -44,35 +46,37 @@ impl TrialBatch<'_> {
     }
 
     /// Drives every trial to its end, or until the observer breaks; `None` marks trials that had not ended by then.
-    pub fn drive(&self, observer: Observer<'_>) -> Vec<Option<EpisodeReport>> {
-        self.drive_from(self.episodes(), &mut |index, frame| {
-            let at = frame.vehicle;
-            let state = [at.pose.x_m, at.pose.y_m, at.pose.heading_rad, at.speed_mps, at.steering_rad];
-            assert!(
-                state.iter().all(|value| value.is_finite()),
-                "tick {} of {} on {}, {}, trial {}, noise {}: the state of the car is no finite number",
-                frame.tick,
-                self.driver.spec,
-                self.trials[index].lot.spec(),
-                self.trials[index].direction.name(),
-                self.trials[index].index,
-                self.noise
-            );
-            observer(index, frame)
-        })
+    ///
+    /// # Errors
+    /// Where the driver answers with what is no finite number: names the key to replay.
+    pub fn drive(&self, observer: Observer<'_>) -> anyhow::Result<Vec<Option<EpisodeReport>>> {
+        self.drive_from(self.episodes(), observer)
+            .map_err(|found| anyhow!("{}: {} is no finite number", self.key_of(&found), found.what))
     }
 
     /// Like [`Self::drive`], starting from the given episodes.
-    pub fn drive_from(&self, episodes: Vec<Episode>, observer: Observer<'_>) -> Vec<Option<EpisodeReport>> {
+    ///
+    /// # Errors
+    /// Where the driver answers with what is no finite number.
+    pub fn drive_from(
+        &self,
+        episodes: Vec<Episode>,
+        observer: Observer<'_>,
+    ) -> Result<Vec<Option<EpisodeReport>>, NotFinite> {
         let cars_each = self.driver.cars_per_fleet(episodes.len());
         let fleets = SeatedFleet::in_all(episodes, cars_each, |cars| self.driver.fleet(self.episode, cars));
         run_fleets_until(fleets, observer)
     }
 
-    /// The key that replays a trial of the batch. `seed` is that of the evaluation.
-    pub fn replay_key(&self, trial: &Trial<'_>, seed: RootSeed, tick: u32) -> ReplayKey {
+    fn key_of(&self, found: &NotFinite) -> ReplayKey {
+        self.replay_key(&self.trials[found.episode], found.tick)
+    }
+
+    /// The key that replays a trial of the batch.
+    pub fn replay_key(&self, trial: &Trial<'_>, tick: u32) -> ReplayKey {
         let (driver, lot) = (self.driver.spec.clone(), trial.lot.spec());
-        ReplayKey { driver, lot, direction: trial.direction, trial: trial.index, noise: self.noise, seed, tick }
+        let Self { noise, seed, .. } = *self;
+        ReplayKey { driver, lot, direction: trial.direction, trial: trial.index, noise, seed, tick }
     }
 }
 
@@ -117,13 +121,13 @@ impl Replay {
     /// Refuses a key whose moment is after the end of the run. Drives up to it.
     ///
     /// # Errors
-    /// Naming the last tick.
+    /// Naming the last tick; as [`TrialBatch::drive`].
     pub fn check_tick(&self, episode: &EpisodeSettings, driver: &NamedDriver) -> anyhow::Result<()> {
         let (wanted, mut last) = (self.key.tick, 0);
         self.drive(episode, driver, |frame| {
             last = frame.tick;
             if last < wanted { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
-        });
+        })?;
         ensure!(last >= wanted, "{}: this run ends with tick {last}; name one up to that", self.key);
         Ok(())
     }
@@ -139,25 +143,31 @@ impl Replay {
     }
 
     /// Drives it again to its end: what it came to, and its digest.
-    pub fn again(&self, episode: &EpisodeSettings, driver: &NamedDriver) -> (EpisodeReport, String) {
+    ///
+    /// # Errors
+    /// As [`TrialBatch::drive`].
+    pub fn again(&self, episode: &EpisodeSettings, driver: &NamedDriver) -> anyhow::Result<(EpisodeReport, String)> {
         let mut digest = DriveDigest::default();
         let report = self.drive(episode, driver, |frame| {
             digest.frame(frame);
             ControlFlow::Continue(())
-        });
-        (report.expect("driven to its end"), digest.hex())
+        })?;
+        Ok((report.expect("driven to its end"), digest.hex()))
     }
 
     /// Drives it again, until the observer breaks.
+    ///
+    /// # Errors
+    /// As [`TrialBatch::drive`].
     pub fn drive(
         &self,
         episode: &EpisodeSettings,
         driver: &NamedDriver,
         mut observer: impl FnMut(&Frame) -> ControlFlow<()>,
-    ) -> Option<EpisodeReport> {
+    ) -> anyhow::Result<Option<EpisodeReport>> {
         let trials = [self.trial()];
         let maps = std::slice::from_ref(&self.map);
-        let batch = TrialBatch { episode, driver, trials: &trials, maps, noise: self.key.noise };
-        batch.drive(&mut |_, frame| observer(frame)).remove(0)
+        let batch = TrialBatch { episode, driver, trials: &trials, maps, noise: self.key.noise, seed: self.key.seed };
+        Ok(batch.drive(&mut |_, frame| observer(frame))?.remove(0))
     }
 }

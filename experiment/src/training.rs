@@ -236,7 +236,7 @@ mod tests {
             assert_eq!(collection.episodes.len(), 2);
             let (map, rollouts) = drive_again(&run, round, 1).unwrap();
             assert_eq!(map.scenario().name, collection.episodes[1].lot);
-            let again = rollouts.drive(&mut |_, _| {}).round;
+            let again = rollouts.drive(&mut |_, _| {}).unwrap().round;
             let first = collection.episodes[0].samples;
             assert_eq!(again.samples, stored.samples[first..], "round {round}");
             assert_eq!(again.ticks, stored.ticks[first..], "round {round}");

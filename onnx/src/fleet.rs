@@ -3,7 +3,7 @@
 use crate::network::OnnxNetwork;
 use policy::action_smoothing;
 use policy::drivers::novice_decision;
-use policy::network::{InferenceSettings, Prediction};
+use policy::network::InferenceSettings;
 use rten::ThreadPool;
 use sim::action_smoothing::FleetSmoothing;
 use sim::driver::{Decision, Fleet, Seat};
@@ -41,22 +41,14 @@ impl OnnxFleet {
     }
 }
 
-/// Where an answer is no number: straight ahead, at a standstill.
-const NOWHERE: Prediction = Prediction { mean: [0.5, 0.5], sigma: [1.0, 1.0] };
-
 impl Fleet for OnnxFleet {
     fn decide(&mut self, seats: &[Seat<'_>], decisions: &mut Vec<Decision>) {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
-        let found = self.network.predict(&grids, self.mirror_averaging, &self.pool);
-        let mut answers: Vec<Prediction> = found.iter().map(|answer| answer.unwrap_or(NOWHERE)).collect();
+        let mut answers = self.network.predict(&grids, self.mirror_averaging, &self.pool);
         action_smoothing::smooth_all(&mut self.smoothing, seats, &mut answers, self.geometry);
-        decisions.extend(answers.iter().zip(found).map(|(answer, found)| {
+        decisions.extend(answers.iter().map(|answer| {
             let decision = novice_decision(answer, self.geometry);
-            Decision {
-                spread: decision.spread.filter(|_| self.network.has_spread()),
-                speed_limit_mps: found.is_none().then_some(0.0),
-                ..decision
-            }
+            Decision { spread: decision.spread.filter(|_| self.network.has_spread()), ..decision }
         }));
     }
 }

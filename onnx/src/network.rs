@@ -113,13 +113,13 @@ impl OnnxNetwork {
         self.numbers == OUTPUTS
     }
 
-    /// Answers every grid, in order; `None` where it answers with what is no number.
+    /// Answers every grid, in order; with NaN where the network fails.
     pub(crate) fn predict(
         &self,
         grids: &[&OccupancyGrid],
         mirror_averaging: bool,
         pool: &Arc<ThreadPool>,
-    ) -> Vec<Option<Prediction>> {
+    ) -> Vec<Prediction> {
         let answers = if mirror_averaging {
             let mirrored: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
             let both: Vec<_> = grids.iter().copied().chain(&mirrored).collect();
@@ -133,8 +133,7 @@ impl OnnxNetwork {
         } else {
             self.raw(grids, pool)
         };
-        let is_finite = |raw: &[f32; OUTPUTS]| raw.iter().all(|value| value.is_finite());
-        answers.into_iter().map(|raw| is_finite(&raw).then(|| Prediction::from_raw(raw))).collect()
+        answers.into_iter().map(Prediction::from_raw).collect()
     }
 
     /// Raw outputs per grid; those that the network does not have are 0, and what fails is no number.

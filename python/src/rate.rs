@@ -78,11 +78,12 @@ impl RustLoop {
             while started.elapsed() < limit {
                 let fleet = |cars| Box::new(OneDriverEach(vec![Centred { ahead_m: *ahead_m }; cars])) as Box<_>;
                 let fleets = SeatedFleet::in_all(episodes.clone(), *cars_each, fleet);
-                run_fleets_until(fleets, &mut |_, _| {
+                let driven = run_fleets_until(fleets, &mut |_, _| {
                     steps += 1;
                     let is_over = steps.is_multiple_of(1024) && started.elapsed() >= limit;
                     if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
                 });
+                driven.map_err(input)?;
             }
             Ok(steps)
         };
@@ -110,12 +111,15 @@ pub(crate) fn drive_digest(
         let (trial, map) = (course.trial(RootSeed(seed), number), course.map(RootSeed(seed), number).map_err(input)?);
         let noise = crate::course::noise(noise).map_err(input)?;
         let episode = &course.settings.episode;
-        let batch = TrialBatch { episode, driver: &driver, trials: &[trial], maps: &[map], noise };
+        let batch =
+            TrialBatch { episode, driver: &driver, trials: &[trial], maps: &[map], noise, seed: RootSeed(seed) };
         let mut digest = DriveDigest::default();
-        batch.drive(&mut |_, frame| {
-            digest.frame(frame);
-            ControlFlow::Continue(())
-        });
+        batch
+            .drive(&mut |_, frame| {
+                digest.frame(frame);
+                ControlFlow::Continue(())
+            })
+            .map_err(input)?;
         Ok(digest.hex())
     })
 }

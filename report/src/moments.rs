@@ -24,7 +24,7 @@ pub fn player(key: &str, settings: &Settings) -> anyhow::Result<Player> {
     let driver = key.driver.clone().load(settings)?;
     let period_s = replay.episode_settings(&settings.episode).control_period_s();
     let last_tick = key.tick + (AFTER_S / period_s).ceil() as u32;
-    let take = Take::of(&replay, &settings.episode, &driver, Some(last_tick), |_| {});
+    let take = Take::of(&replay, &settings.episode, &driver, Some(last_tick), |_| {})?;
     let found = take.frames.get(key.tick as usize).and_then(|frame| match frame.event {
         Event::NearCollision { at, .. } => Some(at),
         Event::Drove | Event::Stuck { .. } | Event::ReachedEnd => None,

@@ -130,6 +130,7 @@ fn closed_loop_in_lockstep(bencher: Bencher<'_, '_>, (threads, is_parted): (usiz
             } else {
                 run_lockstep(episodes, &mut fleet, &mut |_, _| ())
             }
+            .expect("it answers with numbers")
         })
     };
     let n_steps: u32 = drive(episodes()).iter().map(|report| report.metrics.ticks).sum();

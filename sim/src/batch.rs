@@ -9,28 +9,50 @@ use crate::frame::Frame;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
+/// What is no finite number, and would have been driven with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("episode {episode}, tick {tick}: {what} is no finite number")]
+pub struct NotFinite {
+    /// Index of the episode among those of all fleets.
+    pub episode: usize,
+    /// Control tick of it, from 0.
+    pub tick: u32,
+    /// The driver's answer, or the state of the car.
+    pub what: &'static str,
+}
+
 /// Drives episodes in lock-step until all have ended. Each tick is one call of the fleet for all that still run.
 ///
 /// Reports come in the order of the episodes. `on_frame(episode, frame)` is called in that order within a tick.
+///
+/// # Errors
+/// If the fleet answers with what is no finite number.
 pub fn run_lockstep(
     episodes: Vec<Episode>,
     fleet: &mut dyn Fleet,
     on_frame: &mut dyn FnMut(usize, &Frame),
-) -> Vec<EpisodeReport> {
+) -> Result<Vec<EpisodeReport>, NotFinite> {
     let reports = run_lockstep_until(episodes, fleet, &mut |episode, frame| {
         on_frame(episode, frame);
         ControlFlow::Continue(())
-    });
+    })?;
+    Ok(all_of(reports))
+}
+
+fn all_of(reports: Vec<Option<EpisodeReport>>) -> Vec<EpisodeReport> {
     reports.into_iter().map(|report| report.expect("nothing stopped them")).collect()
 }
 
 /// Like [`run_lockstep`], but stops all episodes after the tick in which `on_frame` breaks. `None` stands for an episode
 /// that had not ended by then.
+///
+/// # Errors
+/// As [`run_lockstep`].
 pub fn run_lockstep_until(
     mut episodes: Vec<Episode>,
     fleet: &mut dyn Fleet,
     on_frame: &mut dyn FnMut(usize, &Frame) -> ControlFlow<()>,
-) -> Vec<Option<EpisodeReport>> {
+) -> Result<Vec<Option<EpisodeReport>>, NotFinite> {
     let mut decisions: Vec<Decision> = Vec::with_capacity(episodes.len());
     let mut frames: Vec<(usize, Frame)> = Vec::with_capacity(episodes.len());
     episodes.par_iter_mut().filter(|episode| episode.ending().is_none()).for_each(Episode::observe);
@@ -39,7 +61,7 @@ pub fn run_lockstep_until(
         if running.is_empty() {
             break;
         }
-        decide(&running, fleet, &mut decisions);
+        decide(&running, fleet, &mut decisions)?;
         // Each car takes its next observation at once, so that threads meet once per tick.
         running
             .par_iter_mut()
@@ -52,12 +74,13 @@ pub fn run_lockstep_until(
                 (*index, frame)
             })
             .collect_into_vec(&mut frames);
+        frames.iter().try_for_each(|(index, frame)| check_state(*index, frame))?;
         // Every frame of the tick is passed on, even after a break: callers never see half a tick.
         if frames.iter().filter(|(index, frame)| on_frame(*index, frame).is_break()).count() > 0 {
             break;
         }
     }
-    episodes.iter().map(|episode| episode.ending().map(|_| episode.report())).collect()
+    Ok(episodes.iter().map(|episode| episode.ending().map(|_| episode.report())).collect())
 }
 
 /// Cars and the fleet that drives them, and them only.
@@ -103,7 +126,7 @@ impl SeatedFleet {
     }
 
     /// Drives on for [`TICKS_AT_ONCE`], or until all have ended.
-    fn drive(&mut self) {
+    fn drive(&mut self) -> Result<(), NotFinite> {
         let mut decisions: Vec<Decision> = Vec::with_capacity(self.episodes.len());
         self.frames.clear();
         for _ in 0..TICKS_AT_ONCE {
@@ -111,37 +134,52 @@ impl SeatedFleet {
             for (_, episode) in &mut running {
                 episode.observe();
             }
-            decide(&running, &mut *self.fleet, &mut decisions);
+            let among_all = |found: NotFinite| NotFinite { episode: self.indices[found.episode], ..found };
+            decide(&running, &mut *self.fleet, &mut decisions).map_err(among_all)?;
             let drive = |((car, episode), &decision): ((usize, &mut Episode), &Decision)| {
-                (self.indices[car], episode.apply(decision))
+                let frame = episode.apply(decision);
+                check_state(self.indices[car], &frame)?;
+                Ok((self.indices[car], frame))
             };
-            self.frames.push(running.into_iter().zip(&decisions).map(drive).collect());
+            self.frames.push(running.into_iter().zip(&decisions).map(drive).collect::<Result<_, _>>()?);
         }
+        Ok(())
     }
 }
 
 /// Drives fleets in lock-step until all episodes have ended. Episodes are ordered by their index among those of all
 /// fleets; otherwise as [`run_lockstep`].
-pub fn run_fleets(fleets: Vec<SeatedFleet>, on_frame: &mut dyn FnMut(usize, &Frame)) -> Vec<EpisodeReport> {
+///
+/// # Errors
+/// As [`run_lockstep`].
+pub fn run_fleets(
+    fleets: Vec<SeatedFleet>,
+    on_frame: &mut dyn FnMut(usize, &Frame),
+) -> Result<Vec<EpisodeReport>, NotFinite> {
     let reports = run_fleets_until(fleets, &mut |episode, frame| {
         on_frame(episode, frame);
         ControlFlow::Continue(())
-    });
-    reports.into_iter().map(|report| report.expect("nothing stopped them")).collect()
+    })?;
+    Ok(all_of(reports))
 }
 
 /// Like [`run_fleets`], but stops as [`run_lockstep_until`] does.
+///
+/// # Errors
+/// As [`run_lockstep`].
 pub fn run_fleets_until(
     mut fleets: Vec<SeatedFleet>,
     on_frame: &mut dyn FnMut(usize, &Frame) -> ControlFlow<()>,
-) -> Vec<Option<EpisodeReport>> {
+) -> Result<Vec<Option<EpisodeReport>>, NotFinite> {
     // Fleets may drive on beyond the tick in which `on_frame` breaks; only frames that were passed on count.
     let mut passed_on: Vec<u32> = vec![0; fleets.iter().map(|fleet| fleet.episodes.len()).sum()];
     for (&index, episode) in fleets.iter().flat_map(SeatedFleet::cars) {
         passed_on[index] = episode.tick();
     }
     'driving: loop {
-        fleets.par_iter_mut().for_each(SeatedFleet::drive);
+        // The first of several, whatever the order in which threads found them.
+        let refused = fleets.par_iter_mut().filter_map(|fleet| fleet.drive().err());
+        refused.min_by_key(|found| (found.tick, found.episode)).map_or(Ok(()), Err)?;
         for tick in 0..TICKS_AT_ONCE {
             let mut frames: Vec<&(usize, Frame)> = fleets.iter().flat_map(|fleet| &fleet.frames[tick]).collect();
             frames.sort_by_key(|(index, _)| *index);
@@ -160,7 +198,7 @@ pub fn run_fleets_until(
         let has_ended = episode.ending().is_some() && episode.tick() == passed_on[index];
         reports[index] = has_ended.then(|| episode.report());
     }
-    reports
+    Ok(reports)
 }
 
 /// The episodes that have not ended, with their indices.
@@ -169,11 +207,32 @@ fn running(episodes: &mut [Episode]) -> Vec<(usize, &mut Episode)> {
 }
 
 /// Asks a fleet for the decisions of cars that have observed.
-fn decide(cars: &[(usize, &mut Episode)], fleet: &mut dyn Fleet, decisions: &mut Vec<Decision>) {
+fn decide(
+    cars: &[(usize, &mut Episode)],
+    fleet: &mut dyn Fleet,
+    decisions: &mut Vec<Decision>,
+) -> Result<(), NotFinite> {
     let seats: Vec<_> = cars.iter().map(|(index, episode)| episode.seat(*index)).collect();
     decisions.clear();
     if !seats.is_empty() {
         fleet.decide(&seats, decisions);
     }
     assert_eq!(decisions.len(), seats.len(), "a fleet answers every seat");
+    match decisions.iter().position(|decision| !decision.is_finite()) {
+        Some(at) => {
+            let (index, episode) = &cars[at];
+            Err(NotFinite { episode: *index, tick: episode.tick(), what: "the driver's answer" })
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses a frame after which the car is nowhere.
+fn check_state(episode: usize, frame: &Frame) -> Result<(), NotFinite> {
+    let at = frame.vehicle;
+    let state = [at.pose.x_m, at.pose.y_m, at.pose.heading_rad, at.speed_mps, at.steering_rad];
+    if state.iter().all(|value| value.is_finite()) {
+        return Ok(());
+    }
+    Err(NotFinite { episode, tick: frame.tick, what: "the state of the car" })
 }

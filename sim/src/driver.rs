@@ -70,6 +70,16 @@ pub struct Decision {
     pub speed_limit_mps: Option<f32>,
 }
 
+impl Decision {
+    /// Whether it can be driven by.
+    pub fn is_finite(&self) -> bool {
+        let spread = self.spread.map_or([0.0; 2], |spread| [spread.ahead_m, spread.left_m]);
+        let [ahead_m, left_m] = [self.look_ahead.ahead_m, self.look_ahead.left_m];
+        let numbers = [ahead_m, left_m, spread[0], spread[1], self.speed_limit_mps.unwrap_or(0.0)];
+        numbers.iter().all(|value| value.is_finite())
+    }
+}
+
 /// Noise-free surroundings, for the expert, the metrics and the collision check only.
 #[derive(Debug, Clone, Copy)]
 pub struct GroundTruth<'a> {

@@ -1,7 +1,7 @@
 //! The vehicle against closed forms, and stop–count–resume against a hand-computed scene.
 #![allow(missing_docs, clippy::unwrap_used, reason = "tests")]
 
-use sim::batch::{SeatedFleet, run_fleets_until, run_lockstep_until};
+use sim::batch::{NotFinite, SeatedFleet, run_fleets_until, run_lockstep_until};
 use sim::driver::{Decision, Driver, LookAheadPoint, OneDriverEach, Situation, Source};
 use sim::episode::{self, Episode, EpisodeSettings};
 use sim::frame::{Ending, Event, Frame};
@@ -254,7 +254,8 @@ fn a_batch_can_be_stopped_and_keeps_what_has_ended() {
     let reports = run_lockstep_until(vec![start(20.0), start(60.0)], &mut fleet, &mut |episode, frame| {
         has_short_one_ended |= episode == 0 && frame.event == Event::ReachedEnd;
         if has_short_one_ended { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
+    })
+    .unwrap();
     assert!(reports[0].as_ref().is_some_and(|report| report.ending == Ending::ReachedEnd));
     assert_eq!(reports[1], None);
 }
@@ -288,13 +289,48 @@ fn fleets_of_their_own_drive_as_one_fleet() {
                 };
                 run_fleets_until((0..fleets).map(seated).collect(), &mut on_frame)
             };
-            drives.push((reports, seen));
+            drives.push((reports.unwrap(), seen));
         }
         assert_eq!(drives[0].0.iter().any(Option::is_none), stops_after != u32::MAX);
         assert!(drives[0].0.iter().any(Option::is_some) || stops_after == 7);
         assert_eq!(drives[0], drives[1], "stopped after {stops_after} frames, a car each");
         assert_eq!(drives[0], drives[2], "stopped after {stops_after} frames, two cars each");
     }
+}
+
+/// Answers with no number from a tick on.
+struct BreaksAt {
+    tick: u32,
+    answered: u32,
+}
+
+impl Driver for BreaksAt {
+    fn decide(&mut self, situation: &Situation<'_>) -> Decision {
+        let left_m = if self.answered < self.tick { 0.0 } else { f32::NAN };
+        self.answered += 1;
+        Fixed(LookAheadPoint { ahead_m: 16.3, left_m }).decide(situation)
+    }
+}
+
+/// The first tick of the first episode counts, however cars are parted, so that the key to replay is always the same.
+#[test]
+fn an_answer_that_is_no_number_is_refused_where_it_is_given_first() {
+    let episodes = || (1..=4).map(|seed| Episode::new(settings(), lane(60.0, vec![]), RootSeed(seed))).collect();
+    let driver = |tick: u32| BreaksAt { tick, answered: 0 };
+    let drivers = || [90, 37, 37, 40].map(driver);
+    let expected = NotFinite { episode: 1, tick: 37, what: "the driver's answer" };
+    let mut fleet = OneDriverEach(drivers().into());
+    assert_eq!(run_lockstep_until(episodes(), &mut fleet, &mut |_, _| ControlFlow::Continue(())), Err(expected));
+    let mut seats = drivers().into_iter();
+    let parted = SeatedFleet::in_all(episodes(), 1, |_| Box::new(OneDriverEach(vec![seats.next().unwrap()])));
+    let mut frames = 0;
+    let driven = run_fleets_until(parted, &mut |_, frame| {
+        frames += 1;
+        assert!(frame.tick < 37, "nothing is passed on that was driven after it");
+        ControlFlow::Continue(())
+    });
+    assert_eq!(driven, Err(expected));
+    assert!(frames >= 4 * 32);
 }
 
 /// From a state met at 20 m the rest is driven as by the car that was met.

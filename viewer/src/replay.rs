@@ -71,7 +71,7 @@ impl<'a> Replay<'a> {
         show_map(map, legend::DRIVE, &recording);
         for (index, root) in roots.iter().enumerate() {
             if !context.progress.is_cancelled() {
-                self.drive(index, root, &recording, context);
+                self.drive(index, root, &recording, context)?;
             }
         }
         context.end(recording)
@@ -84,7 +84,7 @@ impl<'a> Replay<'a> {
         self.focus_tick.map_or([0, u32::MAX], |tick| [tick.saturating_sub(before), tick.saturating_add(after)])
     }
 
-    fn drive(&self, index: usize, root: &str, recording: &Recording, context: &Context<'_>) {
+    fn drive(&self, index: usize, root: &str, recording: &Recording, context: &Context<'_>) -> anyhow::Result<()> {
         let (driver, episode) = (&self.drivers[index], &self.settings.episode);
         let [first, last] = self.ticks();
         let mut drive = Drive::new(recording, root, &self.run.episode(episode), self.settings)
@@ -106,8 +106,9 @@ impl<'a> Replay<'a> {
             context.progress.at(f64::from(frame.progress_m / length_m), status);
             let is_over = frame.tick >= last || context.progress.is_cancelled();
             if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
+        })?;
         context.progress.end(&report.map_or_else(|| "done".to_owned(), |report| result_of(&report.metrics)));
+        Ok(())
     }
 }
 

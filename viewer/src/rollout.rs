@@ -82,7 +82,7 @@ impl Round<'_> {
                 let status = &mut |_| format!("{driven_m:.0} of {length_m:.0} m");
                 context.progress.at(f64::from(driven_m / length_m), status);
             }
-        });
+        })?;
         drop(drives);
         let results: Vec<String> = collected.reports.iter().map(|report| result_of(&report.metrics)).collect();
         context.progress.end(&results.join("; "));

@@ -61,7 +61,7 @@ fn what_is_exported_answers_as_the_network_itself() {
         let expected = checkpoint.predictor(DeviceChoice::Cpu).predict(&grids);
         let found = network.predict(&grids, checkpoint.inference.mirror_averaging, &pool());
         let mut farthest = 0.0_f32;
-        for (found, expected) in found.into_iter().map(Option::unwrap).zip(&expected) {
+        for (found, expected) in found.into_iter().zip(&expected) {
             for (found, expected) in
                 [found.mean, found.sigma].iter().flatten().zip([expected.mean, expected.sigma].iter().flatten())
             {

@@ -111,6 +111,7 @@ impl Run<'_, '_> {
         let rollouts = Rollouts::of_round(self.settings, self.seed, novice.as_ref(), episodes);
         let on_frame = &mut *self.hooks.on_frame;
         let collected = rollouts.drive(&mut |episode, frame| on_frame(round, episode, frame));
+        let collected = collected.map_err(|source| DaggerError::Driving { round, source })?;
         check_finite(round, &collected.round)?;
         let collected = collected.thinned(self.settings.samples_per_round as usize);
         let collection = collected.record(round);

@@ -182,9 +182,11 @@ impl Fleet for GatedCollector {
             let evidence = Evidence { disagreement, alarm: alarms[index], ..Evidence::new(&predicted, a_exp) };
             self.tau_hat_sum += f64::from(evidence.discrepancy);
             self.seats[seat.episode].answers.push((evidence.discrepancy, a_exp));
-            let trusts_novice = self.ask_gate(seat, &predicted, evidence); // line 9
+            let novice = novice_decision(&predicted, self.geometry);
+            // A gate would compare with what is no number and call the expert; the loop that drives refuses it.
+            let trusts_novice = self.ask_gate(seat, &predicted, evidence) || !novice.is_finite(); // line 9
             if trusts_novice {
-                decisions.push(novice_decision(&predicted, self.geometry)); // line 10
+                decisions.push(novice); // line 10
                 self.n_net += 1; // line 11
             } else {
                 decisions.push(expert); // line 14

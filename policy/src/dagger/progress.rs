@@ -8,6 +8,7 @@ use crate::files::FileError;
 use crate::fit::{FitError, FitProgress, FitReport};
 use crate::network::NetworkError;
 use serde::{Deserialize, Serialize};
+use sim::batch::NotFinite;
 use sim::frame::Frame;
 use std::ops::ControlFlow;
 
@@ -92,6 +93,14 @@ pub enum DaggerError {
         round: Option<u32>,
         /// Why.
         source: FitError,
+    },
+    /// A network that answers with what is no finite number.
+    #[error("round {round}: {source}; see it with cargo xtask render trajectories --run RUN --round {round} --trial {}", source.episode)]
+    Driving {
+        /// Which round.
+        round: u32,
+        /// Where.
+        source: NotFinite,
     },
     /// Driving that ran out of numbers.
     #[error(

@@ -11,7 +11,7 @@ use crate::decision_rule::PAPER_TAU;
 use crate::decision_rule::{DecisionRule, GateContext};
 use crate::network::DeviceChoice;
 use rayon::prelude::*;
-use sim::batch::run_lockstep;
+use sim::batch::{NotFinite, run_lockstep};
 use sim::controller::bumper_to_patch_m;
 use sim::driver::Driver;
 use sim::episode::{Episode, EpisodeReport};
@@ -134,7 +134,10 @@ impl Rollouts {
     }
 
     /// Drives all episodes to their ends. `on_frame` is called with the place of the episode among those given, from 0.
-    pub fn drive(self, on_frame: &mut dyn FnMut(usize, &Frame)) -> Collected {
+    ///
+    /// # Errors
+    /// If the network answers with what is no finite number.
+    pub fn drive(self, on_frame: &mut dyn FnMut(usize, &Frame)) -> Result<Collected, NotFinite> {
         let Self { mut collector, rule, episodes, origins } = self;
         let bumper_to_patch_m = episodes.first().map_or(0.0, |episode| {
             let settings = episode.settings();
@@ -148,7 +151,7 @@ impl Rollouts {
             ticks[place].push(Tick::new(origins[place].0.episode(), time_s[place], frame));
             time_s[place] = frame.time_s;
             on_frame(place, frame);
-        });
+        })?;
 
         let GatedCollector { seats, n_tot, n_net, tau_hat_sum, interventions, geometry, .. } = collector;
         let (tau_hats, labels): (Vec<f32>, Vec<[f32; 2]>) =
@@ -180,7 +183,7 @@ impl Rollouts {
             round.noise_augmentations.extend(kept.noise_augmentations);
         }
         let driven_s = n_tot as f64 * f64::from(control_period_s);
-        Collected { round, episodes: records, reports, n_tot, n_net, tau_hat_sum, effort, agreement, driven_s }
+        Ok(Collected { round, episodes: records, reports, n_tot, n_net, tau_hat_sum, effort, agreement, driven_s })
     }
 }
 

@@ -10,7 +10,7 @@ use crate::drivers::{NetFleet, NetPolicy};
 use crate::fit::{Budget, FitSettings};
 use crate::network::{ConvLayer, DeviceChoice, InferenceSettings, NetworkArchitecture, Weights};
 use crate::test_data::scratch;
-use sim::batch::run_lockstep;
+use sim::batch::{NotFinite, run_lockstep};
 use sim::driver::{Decision, Driver, Fleet, LookAheadPoint, OneDriverEach, SensorsOnly, Situation, Source};
 use sim::episode::{Episode, EpisodeSettings};
 use sim::frame::Frame;
@@ -228,6 +228,7 @@ fn the_network_drives_the_same_whoever_seats_it() {
     let drive = |fleet: &mut dyn Fleet| {
         let mut driven = Vec::new();
         let reports = run_lockstep(episodes(2), fleet, &mut |episode, frame| driven.push((episode, frame.decision)));
+        let reports = reports.unwrap();
         (driven, reports)
     };
     let device = DeviceChoice::Cpu;
@@ -236,9 +237,13 @@ fn the_network_drives_the_same_whoever_seats_it() {
     assert!(put_back > 0, "nothing was reset: {reports:?}");
     let alone = |_| SensorsOnly(NetPolicy::new(&checkpoint, device));
     assert_eq!(drive(&mut OneDriverEach((0..2).map(alone).collect())).0, in_fleet);
+    let mut overflowing = checkpoint.clone();
+    overflowing.weights.parts_mut().fc2_weight.fill(f32::MAX);
+    let refused = Rollouts::on_policy(&overflowing, device, of_round(0, 2)).drive(&mut |_, _| {}).err();
+    assert_eq!(refused, Some(NotFinite { episode: 0, tick: 0, what: "the driver's answer" }));
     let mut driven = Vec::new();
     let rollouts = Rollouts::on_policy(&checkpoint, device, of_round(0, 2));
-    let collected = rollouts.drive(&mut |episode, frame| driven.push((episode, frame.decision)));
+    let collected = rollouts.drive(&mut |episode, frame| driven.push((episode, frame.decision))).unwrap();
     assert_eq!(driven, in_fleet);
     assert_eq!(
         (collected.n_net, collected.round.samples.len()),
@@ -260,7 +265,8 @@ fn one_episode_of_a_round_driven_again_is_the_same() {
         let (stored, _) = store.read_round(round).unwrap();
         let novice = (round > 0).then(|| Learned::of_round(&settings, &store, round).unwrap());
         let second = of_round(round, 2).pop().into_iter().collect();
-        let again = Rollouts::of_round(&settings, RootSeed(6), novice.as_ref(), second).drive(&mut |_, _| {}).round;
+        let again =
+            Rollouts::of_round(&settings, RootSeed(6), novice.as_ref(), second).drive(&mut |_, _| {}).unwrap().round;
         let first = stored.ticks.iter().position(|tick| tick.episode == 1).unwrap();
         assert!(first > 0 && again.samples.len() > 50, "{first}");
         assert_eq!(again.samples, stored.samples[first..], "round {round}");
@@ -278,7 +284,7 @@ fn ticks_say_where_and_when_samples_were_taken() {
     let checkpoint = Checkpoint { weights, conditions: conditions(), inference: settings.inference };
     let mut frames: Vec<Vec<Frame>> = vec![Vec::new(); 2];
     let rollouts = Rollouts::of_round(&settings, RootSeed(6), Some(&Learned::alone(checkpoint)), of_round(1, 2));
-    let collected = rollouts.drive(&mut |episode, frame| frames[episode].push(*frame));
+    let collected = rollouts.drive(&mut |episode, frame| frames[episode].push(*frame)).unwrap();
     let Collected { round, episodes: records, reports, .. } = collected;
     assert_eq!(round.ticks.len(), round.samples.len());
     assert!(round.ticks.is_sorted_by_key(|tick| (tick.episode, tick.tick)));
@@ -329,7 +335,8 @@ fn every_rule_of_the_family_trains_and_its_round_is_driven_again_as_it_was() {
         let parts = parts.filter(|part| part.to_string_lossy().starts_with("round-01-")).count();
         assert_eq!(parts + 1, rule.networks(), "{name}");
         let novice = Learned::of_round(&settings, &store, 1).unwrap();
-        let again = Rollouts::of_round(&settings, RootSeed(6), Some(&novice), of_round(1, 2)).drive(&mut |_, _| {});
+        let again =
+            Rollouts::of_round(&settings, RootSeed(6), Some(&novice), of_round(1, 2)).drive(&mut |_, _| {}).unwrap();
         assert_eq!((again.n_net, again.effort), (about.novice_ticks, effort), "{name}");
         std::fs::remove_dir_all(folder).unwrap();
     }

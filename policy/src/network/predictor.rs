@@ -21,12 +21,12 @@ pub struct Prediction {
 }
 
 impl Prediction {
-    /// From raw outputs.
-    ///
-    /// # Panics
-    /// If the network answered with something that is not a number.
+    /// From raw outputs; NaN throughout if one of them is not finite, which the loop that drives refuses
+    /// ([`sim::batch::NotFinite`]).
     pub fn from_raw(raw: [f32; OUTPUTS]) -> Self {
-        assert!(raw.iter().all(|value| value.is_finite()), "the network answered {raw:?}");
+        if !raw.iter().all(|value| value.is_finite()) {
+            return Self { mean: [f32::NAN; 2], sigma: [f32::NAN; 2] };
+        }
         let sigma = |raw| maths::exp(0.5 * soft_clamp_log_variance(raw));
         Self { mean: [raw[0], raw[1]], sigma: [sigma(raw[2]), sigma(raw[3])] }
     }

@@ -94,20 +94,23 @@ struct Shown {
 
 impl Take {
     /// Drives the trial again, up to and including a tick; `seen` is told of every frame.
+    ///
+    /// # Errors
+    /// As [`Replay::drive`].
     pub fn of(
         replay: &Replay,
         episode: &EpisodeSettings,
         driver: &NamedDriver,
         last_tick: Option<u32>,
         mut seen: impl FnMut(&Frame),
-    ) -> Self {
+    ) -> anyhow::Result<Self> {
         let mut frames = Vec::new();
         replay.drive(episode, driver, |frame| {
             frames.push(*frame);
             seen(frame);
             if last_tick == Some(frame.tick) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
-        Self { name: driver.name.clone(), frames }
+        })?;
+        Ok(Self { name: driver.name.clone(), frames })
     }
 }
 

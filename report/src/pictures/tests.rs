@@ -187,7 +187,7 @@ fn an_animation_shows_every_driver_and_has_the_same_bytes_twice() {
     let replay = Replay::new(&key, &settings.episode).unwrap();
     let take = |spec: &str| {
         let driver = spec.parse::<DriverSpec>().unwrap().load(&settings).unwrap();
-        Take::of(&replay, &settings.episode, &driver, Some(100), |_| {})
+        Take::of(&replay, &settings.episode, &driver, Some(100), |_| {}).unwrap()
     };
     let takes = [take("expert"), take("vvf")];
     assert_eq!(takes[0].frames.len(), 101);

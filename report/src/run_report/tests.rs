@@ -87,10 +87,11 @@ fn a_near_collision_plays_and_stands_still_at_its_moment() {
     let replay = Replay::new(&key, &settings.episode).unwrap();
     let driver = key.driver.clone().load(&settings).unwrap();
     let mut tick = None;
-    replay.drive(&settings.episode, &driver, |frame| {
+    let driven = replay.drive(&settings.episode, &driver, |frame| {
         tick = matches!(frame.event, Event::NearCollision { .. }).then_some(frame.tick);
         if tick.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
+    driven.unwrap();
     let key = ReplayKey { tick: tick.unwrap(), ..key }.to_string();
     let player = moments::player(&key, &settings).unwrap();
     let shows = |frame: &(String, String)| frame.1.contains(">1 near-collision</text>");

@@ -300,7 +300,7 @@ fn driven_anew(args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<D
             points.push(Point::of(frame));
             console.at(f64::from(frame.progress_m / length_m), &mut |_| format!("{} ticks", points.len()));
             ControlFlow::Continue(())
-        });
+        })?;
         let near_collisions = report.map_or(0, |report| report.metrics.near_collisions);
         console.end(&format!("near-collisions: {near_collisions} in {length_m:.0} m"));
         driven.push(Trajectory { name: driver.name, points });
@@ -322,7 +322,7 @@ fn driven_in_training(run: &Path, args: &TrajectoriesArgs, folder: &Folder<'_>) 
     let collected = rollouts.drive(&mut |_, frame| {
         points.push(Point::of(frame));
         console.at(f64::from(frame.progress_m / length_m), &mut |_| format!("{} ticks", points.len()));
-    });
+    })?;
     let near_collisions = collected.reports[0].metrics.near_collisions;
     console.end(&format!("near-collisions: {near_collisions} in {length_m:.0} m"));
     let driven = vec![Trajectory { name: "training".to_owned(), points }];

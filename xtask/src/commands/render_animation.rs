@@ -203,7 +203,7 @@ fn drive(
         console.begin("driving", &driver.name);
         let take = Take::of(replay, &settings.episode, &driver, last_tick, |frame| {
             console.at(f64::from(frame.progress_m / length_m), &mut |_| format!("{} ticks", frame.tick));
-        });
+        })?;
         if console.is_cancelled() {
             return Err(Interrupted { kept: "nothing was written".to_owned() }.into());
         }

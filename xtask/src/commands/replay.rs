@@ -80,7 +80,7 @@ pub(crate) fn run(args: &ReplayArgs, output: &Output) -> anyhow::Result<()> {
         }
         console.at(index as f64 / keys.len() as f64, &mut |_| key.to_string());
         let replay = Replay::new(key, &settings.episode)?;
-        let (report, sha256) = replay.again(&settings.episode, &drivers[&key.driver.to_string()]);
+        let (report, sha256) = replay.again(&settings.episode, &drivers[&key.driver.to_string()])?;
         let recorded = recorded.get(&key.to_string());
         if let Some(recorded) = recorded.filter(|recorded| recorded.sha256 != sha256) {
             differing += 1;
