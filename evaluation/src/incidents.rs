@@ -198,6 +198,9 @@ impl IncidentMonitor {
 }
 
 /// Cause and findings of every incident of a batch.
+///
+/// # Errors
+/// Where the driver answers with what is no finite number on the way: names the key to replay.
 pub fn explain(batch: &TrialBatch<'_>, incidents: &[Incident]) -> anyhow::Result<Vec<(Cause, Findings)>> {
     let is_noisy = |incident: &Incident| {
         let map = &batch.maps[incident.episode];

@@ -1,6 +1,7 @@
 //! Draws the lots in `examples/lanes`: `cargo run -p scenarios --example make_lanes`. Lanes of constant width with five bends
 //! of one radius and nothing in them, solid ground on both sides. The same bytes every time.
 #![allow(clippy::unwrap_used, missing_docs, reason = "an example that a person runs")]
+#![allow(clippy::disallowed_methods, reason = "written to millimetres, which the last bit does not change")]
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use std::path::{Path, PathBuf};
