@@ -310,7 +310,7 @@ fn a_replayed_drive_is_whole_small_and_on_both_time_lines() {
     let Show::Drives { settings, drives } = &request.show[0] else { unreachable!("a drive was asked for") };
     let replay = Replay::new(&drives[0].keys[0], &settings.episode).unwrap();
     let driver = drives[0].keys[0].driver.clone().load(settings).unwrap();
-    let report = replay.drive(&settings.episode, &driver, |_| ControlFlow::Continue(())).unwrap();
+    let report = replay.drive(&settings.episode, &driver, |_| ControlFlow::Continue(())).unwrap().unwrap();
     let (ticks, near_collisions) = (i64::from(report.metrics.ticks), report.metrics.near_collisions);
     let (file, bytes) = (folder.join("a.rrd"), std::fs::metadata(folder.join("a.rrd")).unwrap().len());
     let shown = Shown::of_file(&file);

@@ -1,12 +1,17 @@
-//! Writes a corpus to begin with: sound inputs of every target, into `corpus/`.
+//! No target: before it begins, writes a corpus for the others, sound inputs of each, into `corpus/`. It is built as one
+//! because what is instrumented links with libFuzzer only.
+#![no_main]
 
 use experiment::settings::Settings;
 use fuzz::{Files, LINE, MAP, PLANNERS};
+use libfuzzer_sys::fuzz_target;
 use scenarios::reference::{self, ReferenceLot};
 use sim::seed::RootSeed;
 use std::path::Path;
 
-fn main() -> std::io::Result<()> {
+fuzz_target!(init: write().expect("the corpus can be written"), |_bytes: &[u8]| {});
+
+fn write() -> std::io::Result<()> {
     let lots = ReferenceLot::ALL.map(|lot| scenarios::load::to_toml(&reference::lot(lot, RootSeed(1))).into_bytes());
     let settings = ["default", "paper", "smoke"].map(|name| Settings::preset(name).expect("a preset").to_toml().into());
     let planner = |(index, name): (usize, &&str)| {
@@ -37,7 +42,7 @@ fn main() -> std::io::Result<()> {
         ("checkpoint", one_of(network)),
         ("round", one_of(fuzz::round_files())),
         ("list", vec![list.into_bytes()]),
-        ("onnx", vec![onnx::export::export(&fuzz::checkpoint())]),
+        ("onnx", vec![onnx::export::export(&fuzz::checkpoint()).expect("one mode")]),
     ];
     for (target, seeds) in targets {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
