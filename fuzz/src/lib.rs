@@ -66,7 +66,7 @@ pub type Files = Vec<(String, Vec<u8>)>;
 
 /// A small network, untrained.
 pub fn checkpoint() -> Checkpoint {
-    let conv = ConvLayer { channels: 2, kernel: 3 };
+    let conv = ConvLayer { channels: 16, kernel: 3 };
     let network = NetworkArchitecture { conv1: conv, conv2: conv, hidden: 3, ..NetworkArchitecture::compact() };
     Checkpoint {
         weights: Weights::init(network, RootSeed(1), 0),

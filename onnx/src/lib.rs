@@ -13,6 +13,7 @@ mod about;
 pub mod export;
 pub mod fleet;
 pub mod network;
+mod wire;
 
 pub use about::About;
 

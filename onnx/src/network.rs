@@ -1,7 +1,7 @@
 //! A network from a file that anybody may have written.
 
 use crate::about::{self, About};
-use crate::{INPUT, OUTPUT};
+use crate::{INPUT, OUTPUT, wire};
 use policy::network::{OUTPUTS, Prediction};
 use rten::{DataType, Dimension, Model, NodeId, RunOptions, ThreadPool, Value, ValueType};
 use sim::limits::{ONNX_BATCH_MAX, ONNX_BYTES_MAX};
@@ -58,6 +58,7 @@ impl OnnxNetwork {
     }
 
     fn from_bytes(bytes: Vec<u8>) -> Result<Self, String> {
+        wire::check(&bytes)?;
         let sha256 = sums::digest(&bytes);
         let model = Model::load(bytes).map_err(|error| format!("is no network that can be run: {error}"))?;
         let name = |id: &NodeId| model.node_info(*id).and_then(|node| node.name()).unwrap_or("(no name)").to_owned();

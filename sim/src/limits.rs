@@ -77,6 +77,10 @@ pub const HEADER_BYTES_MAX: u64 = 65_536;
 pub const ONNX_BYTES_MAX: u64 = 100_000_000;
 /// Grids that a network from an ONNX file answers in one call.
 pub const ONNX_BATCH_MAX: usize = 1024;
+/// Fields of an ONNX file.
+pub const ONNX_FIELDS_MAX: usize = 1_000_000;
+/// Messages within messages of an ONNX file.
+pub const ONNX_NESTING_MAX: usize = 100;
 
 /// Number of a trial, a drive or a round, from 0: each has random streams of its own.
 pub const TRIAL_MAX: u32 = 1_048_575;
