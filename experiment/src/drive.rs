@@ -50,8 +50,10 @@ impl TrialBatch<'_> {
     /// # Errors
     /// Where the driver answers with what is no finite number: names the key to replay.
     pub fn drive(&self, observer: Observer<'_>) -> anyhow::Result<Vec<Option<EpisodeReport>>> {
-        self.drive_from(self.episodes(), observer)
-            .map_err(|found| anyhow!("{}: {} is no finite number", self.key_of(&found), found.what))
+        self.drive_from(self.episodes(), observer).map_err(|found| {
+            let key = self.replay_key(&self.trials[found.episode], found.tick);
+            anyhow!("{key}: {} is no finite number", found.what)
+        })
     }
 
     /// Like [`Self::drive`], starting from the given episodes.
@@ -66,10 +68,6 @@ impl TrialBatch<'_> {
         let cars_each = self.driver.cars_per_fleet(episodes.len());
         let fleets = SeatedFleet::in_all(episodes, cars_each, |cars| self.driver.fleet(self.episode, cars));
         run_fleets_until(fleets, observer)
-    }
-
-    fn key_of(&self, found: &NotFinite) -> ReplayKey {
-        self.replay_key(&self.trials[found.episode], found.tick)
     }
 
     /// The key that replays a trial of the batch.

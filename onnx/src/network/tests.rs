@@ -103,7 +103,10 @@ fn what_is_no_such_network_is_refused_with_what_it_is_instead() {
         }
         bytes
     };
+    // A field that nobody knows, skipped backwards by 12 bytes: read for ever, if anybody reads it.
+    let backwards = [&exported[..], &[0x7A, 0xF4], &[0xFF; 8], &[0x01]].concat();
     for (what, bytes, part) in [
+        ("backwards", backwards, "longer than what holds it"),
         ("nothing", Vec::new(), "no network"),
         ("text", b"hello".to_vec(), "no network"),
         ("half", exported[..exported.len() / 2].to_vec(), "no network"),

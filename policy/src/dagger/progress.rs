@@ -95,7 +95,10 @@ pub enum DaggerError {
         source: FitError,
     },
     /// A network that answers with what is no finite number.
-    #[error("round {round}: {source}; see it with cargo xtask render trajectories --run RUN --round {round} --trial {}", source.episode)]
+    #[error(
+        "round {round}: {source}; it comes again with cargo xtask render trajectories --run RUN --round {round} --trial {}",
+        source.episode
+    )]
     Driving {
         /// Which round.
         round: u32,
