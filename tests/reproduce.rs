@@ -7,14 +7,19 @@ use std::path::Path;
 use std::time::Duration;
 
 /// Stages of a smoke run, in their order.
-const STAGES: [&str; 8] = [
+const STAGES: [&str; 13] = [
     "chains/s1-weighted",
     "chains/s1-unweighted",
     "chains/s1-any-below",
     "chains/s1-tau-only",
+    "chains/s1-expert-only",
+    "chains/s1-alpha-15",
     "drives/reference",
     "drives/unseen",
     "drives/rules",
+    "drives/controls",
+    "drives/unsmoothed",
+    "drives/smoothed",
     "on-policy",
 ];
 
@@ -49,6 +54,9 @@ fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
         "paper: tentacle",
         "### Decision rule",
         "any below",
+        "### Controls",
+        "expert's data alone",
+        "### Action smoothing",
         "### Calibration",
         "within 1 σ",
         "](figures/rates-beside-paper.svg)",

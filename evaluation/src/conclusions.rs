@@ -21,6 +21,8 @@ use serde::Serialize;
 
 /// The paper's driver.
 pub const DAGGER: &str = "DAgger";
+/// Name of behaviour cloning in tables.
+pub const BC: &str = "BC";
 /// No near-collision supports "none" from the metres on that bound the rate here, one-sided, near-collisions per 100 m:
 /// 3 km.
 const NONE_PER_100M: f64 = 0.1;
@@ -144,7 +146,7 @@ pub fn on_reference_lots(driven: &Driven<'_>) -> Vec<Statement> {
         statements.extend([all.keeps_further_away(other), all.steers_calmer(other), all.minds_noise_less(other)]);
         statements.extend(all.fails_as_in_the_paper(other));
     }
-    statements.extend(driven.driver("BC").map(|bc| all.fails_less(bc)));
+    statements.extend(driven.driver(BC).map(|bc| all.fails_less(bc)));
     statements
 }
 
@@ -152,7 +154,7 @@ impl Against<'_> {
     /// What should hold beyond the paper's own comparison: against all planners, of their kin and tuned ones included.
     pub fn planners(&self) -> Vec<Statement> {
         let is_planner =
-            |&other: &usize| !["expert", "BC", DAGGER].iter().any(|known| self.name(other).starts_with(known));
+            |&other: &usize| !["expert", BC, DAGGER].iter().any(|known| self.name(other).starts_with(known));
         (0..self.driven.plan.drivers.len()).filter(is_planner).map(|other| self.fails_less(other)).collect()
     }
 

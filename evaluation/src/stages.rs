@@ -5,16 +5,19 @@
 //! | `chains/sN-weighted` | behaviour cloning and `DAgger` with the paper's weight α on τ̂: Table 1, the driver of every table |
 //! | `chains/sN-unweighted` | the same with α = 0: Table 1's effect of the weight |
 //! | `chains/s1-any-below`, `-tau-only` | the other two readings of Algorithm 2, line 9, for a few iterations |
+//! | `chains/s1-expert-only`, `-alpha-15` | controls: as much data that the expert alone drove, ten times the weight |
 //! | `drives/reference` | the paper's tables: every driver on its lots |
 //! | `drives/unseen` | generated lots that nothing was trained or tuned on |
 //! | `drives/rules` | the policies after the first iterations under each decision rule |
+//! | `drives/controls` | the controls beside what they are compared with, on the unseen lots |
+//! | `drives/unsmoothed`, `drives/smoothed` | the same lots, every driver without and with action smoothing |
 //! | `on-policy` | on-policy labelled rollouts: calibration of the variance, Σ τ̂ with and without the weight |
 //!
 //! Behaviour cloning has no τ̂, so that neither α nor the rule changes a bit of it: it is trained once per seed.
 
 use crate::estimate::{self, Task};
 use experiment::drivers::{DriverSpec, NamedDriver};
-use experiment::settings::Settings;
+use experiment::settings::{Settings, Smoothing};
 use planners::PlannerSpec;
 use policy::decision_rule::{ChiOn, DecisionRule};
 use serde::{Deserialize, Serialize};
@@ -76,6 +79,10 @@ pub enum Chain {
     AnyBelow,
     /// Without χ.
     TauOnly,
+    /// The expert drives alone, in as many rounds of as many lots and optimiser steps.
+    ExpertOnly,
+    /// α = 15.
+    Alpha15,
 }
 
 impl Chain {
@@ -86,6 +93,8 @@ impl Chain {
             Self::Unweighted => "unweighted",
             Self::AnyBelow => "any-below",
             Self::TauOnly => "tau-only",
+            Self::ExpertOnly => "expert-only",
+            Self::Alpha15 => "alpha-15",
         };
         format!("chains/s{}-{name}", seed.0)
     }
@@ -96,6 +105,8 @@ impl Chain {
             Self::Unweighted => "DAgger with α = 0",
             Self::AnyBelow => "DAgger under \"any below\", Algorithm 2 as printed",
             Self::TauOnly => "DAgger under \"τ̂ alone\"",
+            Self::ExpertOnly => "as many rounds as DAgger, the expert drives alone",
+            Self::Alpha15 => "DAgger with α = 15",
         }
     }
 
@@ -111,6 +122,8 @@ impl Chain {
             }
             Self::AnyBelow => dagger.rule = DecisionRule::AnyBelowLiteral { tau, chi, chi_on },
             Self::TauOnly => dagger.rule = DecisionRule::TauOnly { tau },
+            Self::ExpertOnly => dagger.rule = DecisionRule::ExpertOnly,
+            Self::Alpha15 => dagger.fit.loss.alpha = 15.0,
         }
         if matches!(self, Self::AnyBelow | Self::TauOnly) {
             dagger.iterations_max = dagger.iterations_max.min(extent.rule_iterations);
@@ -148,63 +161,107 @@ pub const UNSEEN: &str = "drives/unseen";
 /// See [`REFERENCE`].
 pub const RULES: &str = "drives/rules";
 /// See [`REFERENCE`].
+pub const CONTROLS: &str = "drives/controls";
+/// See [`REFERENCE`].
+pub const UNSMOOTHED: &str = "drives/unsmoothed";
+/// See [`REFERENCE`].
+pub const SMOOTHED: &str = "drives/smoothed";
+/// See [`REFERENCE`].
 pub const ON_POLICY: &str = "on-policy";
+
+/// Names in tables of what only [`CONTROLS`] drives.
+pub const EXPERT_ONLY: &str = "expert's data alone";
+/// See [`EXPERT_ONLY`].
+pub const ALPHA_15: &str = "DAgger, α = 15";
+
+/// Action smoothing of [`SMOOTHED`] where the settings' networks have none, control ticks.
+const SMOOTHING_TICKS: f32 = 8.0;
 
 /// Everything, in the order in which it is done. `root`: the folder of the whole run.
 pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
-    let mut stages = Vec::new();
-    for seed in seeds(settings, extent) {
-        let of_seed = Settings { seed, ..settings.clone() };
-        stages.extend([Chain::Weighted, Chain::Unweighted].map(|chain| chain.stage(&of_seed, extent)));
-    }
-    stages.extend([Chain::AnyBelow, Chain::TauOnly].map(|chain| chain.stage(settings, extent)));
-    let spec = |chain: Chain, seed, rest: &str| format!("run:{}/{}{rest}", root.display(), chain.folder(seed));
-
-    let mut networks = Vec::new();
-    for seed in seeds(settings, extent) {
-        networks.push((named("BC", seed, settings), spec(Chain::Weighted, seed, "/bc")));
-        networks.push((named("DAgger", seed, settings), spec(Chain::Weighted, seed, "")));
-        networks.push((named("DAgger, α = 0", seed, settings), spec(Chain::Unweighted, seed, "")));
-    }
-    let own = |name: &str| (name.to_owned(), name.to_owned());
-    let tuned: Vec<_> = extent.tuned.iter().map(|spec| (tuned_name(spec), spec.clone())).collect();
-    let planners: Vec<_> = PlannerSpec::all().iter().map(|planner| own(planner.name())).collect();
-    // Where a planner has been tuned, only the paper's two take part as they are, too: the others stand for nothing.
-    let is_tuned = |name: &str| tuned.iter().any(|(tuned, _)| *tuned == tuned_name(name));
-    let enough = planners.iter().filter(|(name, _)| name == "tentacle" || name == "vvf" || !is_tuned(name)).cloned();
-    let join =
-        |planners: Vec<(String, String)>| [vec![own("expert")], networks.clone(), planners, tuned.clone()].concat();
-    let drive = |folder: &str, about: &str, lots: &[String], trials: u32, drivers: Vec<(String, String)>| {
-        let mut settings = settings.clone();
-        (settings.evaluation.lots, settings.evaluation.trials) = (lots.to_vec(), trials);
-        let step = Step::Drive { drivers };
-        Stage { folder: folder.to_owned(), about: about.to_owned(), settings, step }
-    };
-    let evaluation = &settings.evaluation;
-    let (lots, trials) = (&evaluation.lots, evaluation.trials);
-    stages.push(drive(REFERENCE, "every driver on the paper's lots", lots, trials, join(planners.clone())));
-    stages.push(drive(UNSEEN, "drivers on generated lots", &extent.unseen, 1, join(enough.collect())));
-    let after = |name: &str, chain: Chain| {
-        let round = extent.rule_iterations.min(settings.dagger.iterations_max);
-        let folder = chain.folder(settings.seed);
-        // The other chains end there, or earlier: their last network is meant.
-        let spec = match chain {
-            Chain::Weighted if round < settings.dagger.iterations_max => {
-                format!("net:{}/{folder}/round-{round:02}", root.display())
-            }
-            _ => spec(chain, settings.seed, ""),
-        };
-        (name.to_owned(), spec)
-    };
-    let rules =
-        [after("all below", Chain::Weighted), after("any below", Chain::AnyBelow), after("τ̂ alone", Chain::TauOnly)];
-    stages.push(drive(RULES, "policies under each decision rule", lots, trials, rules.to_vec()));
+    let mut stages = trainings(settings, extent);
+    stages.extend(drives(settings, extent, root));
     stages.push(Stage {
         folder: ON_POLICY.to_owned(),
         about: "on-policy labelled rollouts: networks drive, the expert labels".to_owned(),
         settings: settings.clone(),
         step: Step::OnPolicy,
     });
+    stages
+}
+
+fn trainings(settings: &Settings, extent: &Extent) -> Vec<Stage> {
+    let mut stages = Vec::new();
+    for seed in seeds(settings, extent) {
+        let of_seed = Settings { seed, ..settings.clone() };
+        stages.extend([Chain::Weighted, Chain::Unweighted].map(|chain| chain.stage(&of_seed, extent)));
+    }
+    let of_first_seed = [Chain::AnyBelow, Chain::TauOnly, Chain::ExpertOnly, Chain::Alpha15];
+    stages.extend(of_first_seed.map(|chain| chain.stage(settings, extent)));
+    stages
+}
+
+/// Drivers by their names in tables.
+type Drivers = Vec<(String, String)>;
+
+fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
+    let spec = |chain: Chain, seed, rest: &str| format!("run:{}/{}{rest}", root.display(), chain.folder(seed));
+    let of_seed = |seed| {
+        [("BC", Chain::Weighted, "/bc"), ("DAgger", Chain::Weighted, ""), ("DAgger, α = 0", Chain::Unweighted, "")]
+            .map(|(name, chain, rest)| (named(name, seed, settings), spec(chain, seed, rest)))
+    };
+    let networks: Drivers = seeds(settings, extent).into_iter().flat_map(of_seed).collect();
+    let of_first_seed = |name: &str, chain| (name.to_owned(), spec(chain, settings.seed, ""));
+
+    let own = |name: &str| (name.to_owned(), name.to_owned());
+    let expert = vec![own("expert")];
+    let tuned: Drivers = extent.tuned.iter().map(|spec| (tuned_name(spec), spec.clone())).collect();
+    let planners: Drivers = PlannerSpec::all().iter().map(|planner| own(planner.name())).collect();
+    // Where a planner has been tuned, only the paper's two take part as they are, too: the others stand for nothing.
+    let is_tuned = |name: &str| tuned.iter().any(|(tuned, _)| *tuned == tuned_name(name));
+    let stands_for_itself = |name: &str| name == "tentacle" || name == "vvf" || !is_tuned(name);
+    let enough: Drivers = planners.iter().filter(|(name, _)| stands_for_itself(name)).cloned().collect();
+
+    let evaluation = &settings.evaluation;
+    let drive = |folder: &str, about: &str, (lots, trials): (&[String], u32), drivers: Drivers| {
+        let mut settings = settings.clone();
+        (settings.evaluation.lots, settings.evaluation.trials) = (lots.to_vec(), trials);
+        Stage { folder: folder.to_owned(), about: about.to_owned(), settings, step: Step::Drive { drivers } }
+    };
+    let (of_paper, unseen) = ((&evaluation.lots[..], evaluation.trials), (&extent.unseen[..], 1));
+    let everyone = |planners: &Drivers| [&expert, &networks, planners, &tuned].map(Clone::clone).concat();
+    let mut stages = vec![
+        drive(REFERENCE, "every driver on the paper's lots", of_paper, everyone(&planners)),
+        drive(UNSEEN, "drivers on generated lots", unseen, everyone(&enough)),
+    ];
+
+    let rule_iterations = extent.rule_iterations.min(settings.dagger.iterations_max);
+    // The other chains end there, or earlier: their last network is meant.
+    let all_below = if rule_iterations < settings.dagger.iterations_max {
+        let folder = Chain::Weighted.folder(settings.seed);
+        ("all below".to_owned(), format!("net:{}/{folder}/round-{rule_iterations:02}", root.display()))
+    } else {
+        of_first_seed("all below", Chain::Weighted)
+    };
+    let rules = vec![all_below, of_first_seed("any below", Chain::AnyBelow), of_first_seed("τ̂ alone", Chain::TauOnly)];
+    stages.push(drive(RULES, "policies under each decision rule", of_paper, rules));
+
+    let mut controls = networks[..3].to_vec();
+    controls.push(of_first_seed(EXPERT_ONLY, Chain::ExpertOnly));
+    controls.push(of_first_seed(ALPHA_15, Chain::Alpha15));
+    stages.push(drive(CONTROLS, "controls on generated lots", unseen, controls));
+
+    let own_ticks = settings.dagger.inference.smoothing_ticks;
+    let ticks = if own_ticks > 0.0 { own_ticks } else { SMOOTHING_TICKS };
+    for (folder, about, ticks) in [
+        (UNSMOOTHED, "every driver without action smoothing", 0.0),
+        (SMOOTHED, "every driver with action smoothing", ticks),
+    ] {
+        let drivers = [&expert, &networks[..2].to_vec(), &enough, &tuned].map(Clone::clone).concat();
+        let mut stage = drive(folder, about, unseen, drivers);
+        stage.settings.evaluation.smoothing = Smoothing::Ticks(ticks);
+        stages.push(stage);
+    }
     stages
 }
 
@@ -261,6 +318,14 @@ mod tests {
         assert_eq!(any.rule, DecisionRule::AnyBelowLiteral { tau: 0.07, chi: 0.1, chi_on: ChiOn::StdPerAxis });
         assert_eq!((any.iterations_max, any.fit), (1, settings.dagger.fit.clone()));
         assert_eq!(of("chains/s1-tau-only").rule, DecisionRule::TauOnly { tau: 0.07 });
+        let mut control = of("chains/s1-expert-only");
+        assert_eq!(control.rule, DecisionRule::ExpertOnly);
+        control.rule = settings.dagger.rule;
+        assert_eq!(control, settings.dagger);
+        let mut heavy = of("chains/s1-alpha-15");
+        assert_eq!(heavy.fit.loss.alpha, 15.0);
+        heavy.fit.loss.alpha = 1.5;
+        assert_eq!(heavy, settings.dagger);
     }
 
     #[test]
@@ -283,5 +348,21 @@ mod tests {
             assert!(!names(UNSEEN).contains(&name.to_owned()), "its tuned variant stands for {name}");
         }
         assert!(names(UNSEEN).contains(&"vvf".to_owned()) && names(UNSEEN).contains(&"cvm".to_owned()));
+        assert_eq!(names(CONTROLS), ["BC", "DAgger", "DAgger, α = 0", EXPERT_ONLY, ALPHA_15]);
+        assert_eq!(names(SMOOTHED), names(UNSMOOTHED));
+        assert!(names(SMOOTHED).contains(&"tentacle".to_owned()) && names(SMOOTHED).contains(&"DAgger".to_owned()));
+    }
+
+    #[test]
+    fn smoothing_is_that_of_the_networks_or_that_of_the_default() {
+        let smoothing = |preset: &str, folder: &str| {
+            let stages = all(&Settings::preset(preset).unwrap(), &extent(), Path::new("R"));
+            stages.into_iter().find(|stage| stage.folder == folder).unwrap().settings.evaluation.smoothing
+        };
+        let own = Settings::preset("default").unwrap().dagger.inference.smoothing_ticks;
+        assert_eq!(smoothing("default", SMOOTHED), Smoothing::Ticks(own));
+        assert_eq!(smoothing("paper", SMOOTHED), Smoothing::Ticks(SMOOTHING_TICKS));
+        assert_eq!(smoothing("paper", UNSMOOTHED), Smoothing::Ticks(0.0));
+        assert_eq!(smoothing("default", UNSEEN), Smoothing::Own);
     }
 }

@@ -267,7 +267,9 @@ impl RunDir {
             if path.exists() {
                 Self::locked(path.clone(), place.command)?.clear()?;
             }
-            Self::create(&Place { out: Some(&path), ..*place }, settings, &Request::default())?
+            // Whoever goes on with the run makes the same of it as the command that began it.
+            let build = Build { command_line: Manifest::read(&self.path)?.command_line, ..place.build.clone() };
+            Self::create(&Place { build: &build, out: Some(&path), ..*place }, settings, &Request::default())?
         };
         Ok(Some(Self { within: Some((self.path.clone(), list)), ..stage }))
     }
@@ -688,6 +690,9 @@ mod tests {
         assert!(stage().unwrap().is_none());
         fs::remove_file(path.join("chains/one/sha256sums")).unwrap();
         assert!(message(stage()).contains("chains/one/sha256sums"), "listed as finished, but incomplete");
+        let resumed = Build { command_line: vec!["--resume".to_owned()], ..build().clone() };
+        run.stage("chains/two", &Place { build: &resumed, ..place(&path, false) }, &settings).unwrap().unwrap();
+        assert_eq!(Manifest::read(&path.join("chains/two")).unwrap().command_line, build().command_line);
         fs::remove_dir_all(path).unwrap();
     }
 

@@ -1,8 +1,8 @@
 //! What each deviation from the paper does: `deviations.md`, `.csv` and `.svg`.
 
+use crate::drive::Drive;
 use crate::markdown::table_of;
 use crate::plots::{self, RateRow};
-use crate::reproduction::Drive;
 use anyhow::Context as _;
 use evaluation::deviations::{self, BASE, Extent};
 use evaluation::format::{difference, quoted_interval, quoted_rate};

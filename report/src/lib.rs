@@ -11,7 +11,9 @@
 //! | [`rules`], [`scaling`], [`deviations`] | those of the commands of these names: many trainings, one table, one plot |
 
 mod command_line;
+mod controls;
 pub mod deviations;
+mod drive;
 pub mod elsewhere;
 pub mod failures;
 pub mod glossary;

@@ -1,25 +1,22 @@
 //! The one report: what holds, the paper's tables beside ours, ablations. Made from what the stages wrote.
 
 use crate::command_line::command_line;
+use crate::controls;
+use crate::drive::{rows_of, with_drives};
 use crate::markdown::{table_of, with_header};
 use crate::page::{Image, Page};
 use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
 use crate::table1::{AGREEMENT, READ_ETA_HAT};
-use anyhow::Context as _;
 use evaluation::calibration::AxisCalibration;
 use evaluation::conclusions::{self, Against, Driven, Statement, Verdict};
 use evaluation::format::{difference, exact_rate, quoted_rate};
 use evaluation::on_policy::{Calibration, Effect, OnPolicy, States};
 use evaluation::paper::{self, PaperLot};
-use evaluation::plan::Plan;
-use evaluation::results::EvaluationResults;
 use evaluation::slices::Slice;
-use evaluation::stages::{self, Chain, Extent, Stage, Step, named};
+use evaluation::stages::{self, Chain, Extent, Stage, named};
 use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
-use evaluation::table1::Table1;
 use experiment::drivers::NamedDriver;
-use experiment::lots::Lot;
 use experiment::run_dir::{Manifest, RunDir};
 use experiment::settings::Settings;
 use policy::dagger::IterationRow;
@@ -36,42 +33,6 @@ pub struct Recipe {
     pub extent: Extent,
     /// What is done, in order.
     pub stages: Vec<Stage>,
-}
-
-fn rows_of(root: &Path, chain: Chain, seed: RootSeed) -> anyhow::Result<Vec<IterationRow>> {
-    let folder = root.join(chain.folder(seed));
-    let table1 = Table1::read(&folder)?;
-    Ok(table1.with_context(|| format!("{}: table1.json is missing", folder.display()))?.rows)
-}
-
-/// A stage that drove, read back.
-pub(crate) struct Drive<'a> {
-    stage: &'a Stage,
-    drivers: Vec<NamedDriver>,
-    lots: Vec<Lot>,
-}
-
-impl<'a> Drive<'a> {
-    fn open(recipe: &'a Recipe, folder: &str) -> anyhow::Result<Self> {
-        Self::of(recipe.stages.iter().find(|stage| stage.folder == folder).context("every report has this stage")?)
-    }
-
-    pub(crate) fn of(stage: &'a Stage) -> anyhow::Result<Self> {
-        let Step::Drive { drivers } = &stage.step else { anyhow::bail!("{} drives", stage.folder) };
-        let drivers = stages::load(drivers, &stage.settings)?;
-        let lots = Lot::parse_all(&stage.settings.evaluation.lots, &stage.settings.episode.vehicle)?;
-        Ok(Self { stage, drivers, lots })
-    }
-
-    pub(crate) fn settings(&self) -> &Settings {
-        &self.stage.settings
-    }
-
-    pub(crate) fn plan(&self) -> Plan<'_> {
-        let compare_with = conclusions::compare_with(&self.drivers);
-        let (settings, drivers, lots) = (&self.stage.settings, &self.drivers, &self.lots);
-        Plan { settings, drivers, lots, compare_with, shard: None }
-    }
 }
 
 /// Writes `report.md`, `report.html`, `conclusions.csv` and the figures; returns the conclusions as printed.
@@ -142,51 +103,52 @@ struct Found {
     on_policy: OnPolicy,
 }
 
-/// Calls with what was driven in the three stages that drive: the paper's lots, unseen lots, decision rules.
-fn with_drives<T>(
-    recipe: &Recipe,
-    root: &Path,
-    then: impl FnOnce(&Driven<'_>, &Driven<'_>, &Driven<'_>) -> anyhow::Result<T>,
-) -> anyhow::Result<T> {
-    let folders = [stages::REFERENCE, stages::UNSEEN, stages::RULES];
-    let [reference, unseen, rules] = folders.map(|folder| Drive::open(recipe, folder));
-    let drives = [reference?, unseen?, rules?];
-    let plans = [0, 1, 2].map(|i: usize| drives[i].plan());
-    let [reference, unseen, rules] = [0, 1, 2].map(|i| EvaluationResults::read(&plans[i], &root.join(folders[i])));
-    let results = [reference?, unseen?, rules?];
-    let [reference, unseen, rules] = [0, 1, 2].map(|i| Driven { plan: &plans[i], results: &results[i] });
-    then(&reference, &unseen, &rules)
-}
-
 impl Found {
     fn read(recipe: &Recipe, root: &Path) -> anyhow::Result<Self> {
         let settings = &recipe.settings;
         let rows = |chain| rows_of(root, chain, settings.seed);
         let (weighted, unweighted) = (rows(Chain::Weighted)?, rows(Chain::Unweighted)?);
         let on_policy = OnPolicy::read(&root.join(stages::ON_POLICY))?;
-        let statements = with_drives(recipe, root, |reference, unseen, _| {
-            Ok(statements(settings.dagger.eta, reference, unseen, &weighted, &on_policy.effect))
+        let folders = [stages::REFERENCE, stages::UNSEEN];
+        let statements = with_drives(&recipe.stages, root, folders, |[reference, unseen]| {
+            Ok(statements(settings.dagger.eta, &reference, &unseen, &weighted, &on_policy.effect))
         })?;
         Ok(Self { statements, weighted, unweighted, on_policy })
     }
 
     fn add_to(&self, page: &mut Page, recipe: &Recipe, root: &Path) -> anyhow::Result<()> {
         let settings = &recipe.settings;
-        with_drives(recipe, root, |reference, unseen, rules| {
-            headline(page, reference, unseen);
+        with_drives(&recipe.stages, root, [stages::REFERENCE, stages::UNSEEN], |[reference, unseen]| {
+            headline(page, &reference, &unseen);
             page.section("What holds here", verdicts(&self.statements));
             table_1(page, settings.dagger.eta, &self.weighted, &self.unweighted, &self.on_policy.effect);
-            collision_rates(page, reference);
-            safe_ratios(page, reference);
-            unseen_lots(page, unseen);
-            page.section("How they drove", how_they_drove(reference, unseen));
+            collision_rates(page, &reference);
+            safe_ratios(page, &reference);
+            unseen_lots(page, &unseen);
+            page.section("How they drove", how_they_drove(&reference, &unseen));
             page.section("Ablations", "");
-            page.text(decision_rules(root, settings.seed, rules)?);
-            page.text(weight_and_cloning(reference));
-            calibration(page, &self.on_policy.calibration);
+            self.add_ablations_to(page, recipe, root, &reference)?;
             if recipe.extent.seeds > 1 {
-                page.section("Training seeds", training_seeds(recipe, reference, unseen));
+                page.section("Training seeds", training_seeds(recipe, &reference, &unseen));
             }
+            Ok(())
+        })
+    }
+
+    fn add_ablations_to(
+        &self,
+        page: &mut Page,
+        recipe: &Recipe,
+        root: &Path,
+        reference: &Driven<'_>,
+    ) -> anyhow::Result<()> {
+        let folders = [stages::RULES, stages::CONTROLS, stages::UNSMOOTHED, stages::SMOOTHED];
+        with_drives(&recipe.stages, root, folders, |[rules, controls, unsmoothed, smoothed]| {
+            page.text(decision_rules(root, recipe.settings.seed, &rules)?);
+            page.text(weight_and_cloning(reference));
+            page.text(controls::controls(root, recipe.settings.seed, &controls)?);
+            page.text(controls::action_smoothing(&unsmoothed, &smoothed));
+            calibration(page, &self.on_policy.calibration);
             Ok(())
         })
     }

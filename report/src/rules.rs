@@ -1,8 +1,8 @@
 //! The `DAgger` family at equal samples: what collecting cost, and how the policies drive: `rules.md`, `.csv` and `.svg`.
 
+use crate::drive::Drive;
 use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
-use crate::reproduction::Drive;
 use anyhow::Context as _;
 use evaluation::format::quoted_interval;
 use evaluation::results::EvaluationResults;

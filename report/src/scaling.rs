@@ -1,8 +1,8 @@
 //! Near-collisions against the number of different lots that were trained on: `scaling.md`, `.csv` and `.svg`.
 
+use crate::drive::Drive;
 use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
-use crate::reproduction::Drive;
 use anyhow::Context as _;
 use evaluation::format::{quoted_interval, quoted_rate};
 use evaluation::results::EvaluationResults;

@@ -26,7 +26,7 @@ use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask reproduce                               half an hour on two cores
+  cargo xtask reproduce                               an hour on two cores
   cargo xtask reproduce --preset smoke --out runs/try   every stage within a minute
   cargo xtask reproduce --full --unseen sealed:my-phrase:120:all
   cargo xtask reproduce --resume runs/reproduce-default-s1";

@@ -1,0 +1,77 @@
+//! Controls of the report of `reproduce`: what else could explain that `DAgger` drives better.
+
+use crate::drive::rows_of;
+use crate::markdown::table_of;
+use evaluation::conclusions::{BC, DAGGER, Driven};
+use evaluation::format::{difference, quoted_rate};
+use evaluation::stages::{ALPHA_15, Chain, EXPERT_ONLY};
+use sim::seed::RootSeed;
+use std::path::Path;
+
+/// Policies that differ from `DAgger` in one thing, on unseen lots.
+pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::Result<String> {
+    let mut table = table_of(&[
+        "policy",
+        "rounds",
+        "samples",
+        "mean weight of τ̂",
+        "near-collisions (contacts)",
+        "per 100 m [95 %]",
+        "− DAgger's [95 %]",
+    ]);
+    let everywhere = driven.all();
+    let with = driven.driver(DAGGER).unwrap_or(0);
+    let (estimates, comparisons) = driven.results.judge(0, &everywhere, with, driven.plan.settings.evaluation.seed);
+    for (driver, named) in driven.plan.drivers.iter().enumerate() {
+        let chain = match named.name.as_str() {
+            EXPERT_ONLY => Chain::ExpertOnly,
+            ALPHA_15 => Chain::Alpha15,
+            BC | DAGGER => Chain::Weighted,
+            _ => Chain::Unweighted,
+        };
+        let mut rows = rows_of(root, chain, seed)?;
+        if named.name == BC {
+            rows.truncate(1);
+        }
+        let last = rows.last();
+        let totals = driven.results.totals(0, driver, &everywhere, None);
+        let found = comparisons.iter().find(|comparison| comparison.driver == driver);
+        let weight = last.and_then(|row| row.mean_weight);
+        table.add_row([
+            named.name.clone(),
+            rows.len().to_string(),
+            last.map_or(0, |row| row.dataset).to_string(),
+            weight.map_or_else(|| "–".to_owned(), |weight| format!("{weight:.2}")),
+            format!("{} ({})", totals.near_collisions, totals.contacts),
+            quoted_rate(&totals, &estimates[driver]),
+            found.map_or_else(|| "–".to_owned(), |found| difference(found.difference_per_100m, 2)),
+        ]);
+    }
+    Ok(format!(
+        "### Controls\n\nOn the unseen lots. *{EXPERT_ONLY}*: as many rounds on the same lots as DAgger with as many \
+         optimiser steps, but the expert drives throughout; where it is no worse than DAgger, more data is what helps and \
+         not who drove. α is the weight on τ̂; its mean weight is 1 where nothing is weighted.\n\n{table}"
+    ))
+}
+
+/// Every driver without action smoothing and with it, on unseen lots.
+pub(crate) fn action_smoothing(without: &Driven<'_>, with: &Driven<'_>) -> String {
+    let mut table = table_of(&["driver", "without", "per 100 m [95 %]", "with", "per 100 m [95 %]"]);
+    let judged = [without, with].map(|driven| {
+        let everywhere = driven.all();
+        let (estimates, _) = driven.results.judge(0, &everywhere, 0, driven.plan.settings.evaluation.seed);
+        (driven, everywhere, estimates)
+    });
+    for (driver, named) in without.plan.drivers.iter().enumerate() {
+        let cells = judged.iter().flat_map(|(driven, everywhere, estimates)| {
+            let totals = driven.results.totals(0, driver, everywhere, None);
+            let count = format!("{} ({})", totals.near_collisions, totals.contacts);
+            [count, quoted_rate(&totals, &estimates[driver])]
+        });
+        table.add_row(std::iter::once(named.name.clone()).chain(cells));
+    }
+    format!(
+        "### Action smoothing\n\nNear-collisions (contacts) on the unseen lots. Elsewhere in this report networks are \
+         smoothed as they were trained to be, and nobody else is.\n\n{table}"
+    )
+}
