@@ -3,7 +3,7 @@
 use crate::arrays::{SeenArrays, Target, pairs, points};
 use crate::car::{ACTION, ActionKind, Car, INFO, Outcome, Seen};
 use crate::course::{Course, SettingsFrom};
-use crate::guard::{EpisodeEnded, caught, detached, input};
+use crate::guard::{EpisodeEnded, alone, caught, detached, input};
 use crate::reward::Reward;
 use numpy::{Ix2, PyArray, PyArray3, PyArrayMethods as _};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
@@ -81,11 +81,11 @@ impl Threads {
         work: impl Fn(T) -> PyResult<R> + Sync + Send,
     ) -> PyResult<Vec<R>> {
         let all: Vec<T> = all.collect();
-        detached(py, || match self {
-            Self::Caller => all.into_iter().map(work).collect(),
-            Self::AllCores => all.into_par_iter().map(work).collect(),
-            Self::Own(pool) => pool.install(|| all.into_par_iter().map(work).collect()),
-        })
+        match self {
+            Self::Caller => alone(py, || all.into_iter().map(work).collect()),
+            Self::AllCores => detached(py, || all.into_par_iter().map(work).collect()),
+            Self::Own(pool) => detached(py, || pool.install(|| all.into_par_iter().map(work).collect())),
+        }
     }
 }
 
@@ -312,7 +312,7 @@ impl Cars {
         let episode = self.episode(index)?;
         let point = self.cars[index].last().map(|frame| frame.decision.look_ahead);
         let side_px = f32::from(side_px);
-        let drawn = detached(py, || {
+        let drawn = alone(py, || {
             let (vehicle, geometry) = (&episode.settings().vehicle, &episode.settings().sensing.geometry);
             let (map, pose) = (episode.map(), episode.vehicle().pose);
             let view = View::around(pose.position() + 4.0 * pose.ahead(), 40.0, side_px);

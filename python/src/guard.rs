@@ -18,7 +18,7 @@ pub(crate) fn input(error: impl Into<anyhow::Error>) -> PyErr {
     PyValueError::new_err(format!("{:#}", error.into()))
 }
 
-/// Works without the interpreter's lock.
+/// Works without the interpreter's lock, in threads.
 ///
 /// # Errors
 /// Those of the work; a panic, which is a bug of lotpilot; a process that was forked after the threads had started: they
@@ -31,6 +31,14 @@ pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> PyResult<
              processes with multiprocessing's method \"spawn\" or \"forkserver\"",
         ));
     }
+    alone(py, work)
+}
+
+/// Works without the interpreter's lock, in the thread that calls.
+///
+/// # Errors
+/// Those of the work; a panic, which is a bug of lotpilot.
+pub(crate) fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> PyResult<T> + Send) -> PyResult<T> {
     py.detach(|| caught(work))
 }
 

@@ -1,6 +1,7 @@
 """Gymnasium's own checks, its vector environments, and Stable-Baselines3 where it is installed."""
 
 import warnings
+from importlib.metadata import entry_points
 
 import gymnasium
 import numpy as np
@@ -25,6 +26,12 @@ def test_gymnasium_finds_nothing_wrong(options):
             warnings.filterwarnings("ignore", message=".*action space.*")
         warnings.filterwarnings("ignore", message=".*normalized space.*")
         check_env(env.unwrapped, skip_render_check=True)
+
+
+def test_gymnasium_before_1_0_can_be_imported_first():
+    # It imports what is named here while it is itself half imported.
+    plugins = entry_points(group="gymnasium.envs")
+    assert [plugin.value for plugin in plugins if plugin.value.startswith("lotpilot")] == []
 
 
 def test_spaces_are_in_metres():

@@ -285,9 +285,9 @@ def test_arrays_of_another_shape_or_type_are_refused():
             core.cars.step(np.zeros((2, 2), np.float32), wrong, np.zeros(2), flags, flags.copy(), None)
 
 
-def _in_child(queue):
+def _in_child(queue, threads):
     try:
-        Core(4, EnvOptions(lots=["lot-b"]), "next_step").reset()
+        Core(4, EnvOptions(lots=["lot-b"], threads=threads), "next_step").reset()
         queue.put("drove")
     except RuntimeError as error:
         queue.put(str(error))
@@ -295,10 +295,11 @@ def _in_child(queue):
 
 def test_a_forked_process_is_told_so_instead_of_waiting_forever():
     Core(4, EnvOptions(lots=["lot-b"]), "next_step").reset()
-    for method, part in [("fork", "was forked"), ("spawn", "drove")]:
+    # Whoever needs no threads but the caller's misses none, as PufferLib's processes, which are forked.
+    for method, threads, part in [("fork", None, "was forked"), ("fork", 1, "drove"), ("spawn", None, "drove")]:
         context = multiprocessing.get_context(method)
         queue = context.Queue()
-        child = context.Process(target=_in_child, args=(queue,))
+        child = context.Process(target=_in_child, args=(queue, threads))
         child.start()
         assert part in queue.get(timeout=60)
         child.join()

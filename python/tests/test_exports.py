@@ -69,3 +69,16 @@ def test_lerobot_finds_every_frame_where_the_format_says(dataset, tmp_path):
     assert stats["action"]["count"] == [8]
     with pytest.raises(FileExistsError):
         exports.to_lerobot(dataset, root)
+
+
+def test_lerobot_reads_it(dataset, tmp_path, monkeypatch):
+    monkeypatch.setenv("HF_HUB_OFFLINE", "1")
+    reader = pytest.importorskip("lerobot.datasets.lerobot_dataset")
+    exports.to_lerobot(dataset, tmp_path / "lerobot")
+    found = reader.LeRobotDataset("lotpilot/run", root=tmp_path / "lerobot")
+    assert (found.num_episodes, found.num_frames, found.fps) == (2, 8, 20)
+    for index, (grid, point) in enumerate(zip(dataset.grids, dataset.points, strict=True)):
+        frame = found[index]
+        np.testing.assert_array_equal(frame["observation.environment_state"].reshape(25, 25), grid)
+        np.testing.assert_allclose(frame["action"], point)
+        assert frame["episode_index"] == int(index >= 5)

@@ -36,12 +36,12 @@ def cluster():
     cluster.shutdown()
 
 
-def straight(grids):
-    return np.tile([8.0, 0.0], (len(grids), 1))
-
-
 def test_a_node_dies_and_the_tables_are_those_of_one_process(cluster, tmp_path):
     cluster, nodes = cluster
+
+    def straight(grids):  # in here, as the nodes know nothing of this file
+        return np.tile([8.0, 0.0], (len(grids), 1))
+
     drivers = {"tentacle": "tentacle", "straight": straight}
     options = {"trials": 1, "noise": ["clean", 1.5], "overrides": ["episode.metrics.events_max=10"]}
     one = time.monotonic()
