@@ -1,8 +1,9 @@
 //! What docs/cluster.md promises: shards of an evaluation come to the same bytes as one machine, or to one clear error.
 
-use crate::bench::{scratch, succeed, text, xtask};
+use crate::bench::{root, scratch, succeed, text, xtask};
 use crate::determinism::files;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use storage::sums;
 
 /// Two drivers that fail now and then, 18 trials: more than are driven at a time.
@@ -92,4 +93,65 @@ fn three_shards_merge_to_the_bytes_of_one_machine_and_nothing_else_merges() {
     // It goes on as any evaluation does.
     succeed(xtask().args(["evaluate", "--resume"]).arg(&other));
     refused(&[one, two, two, &other], "are both shard 2/3");
+}
+
+/// The text between two marks of docs/cluster.md, with what users fill in filled in, small.
+fn documented(after: &str, until: &str) -> String {
+    let docs = std::fs::read_to_string(root().join("docs/cluster.md")).unwrap();
+    let (_, rest) = docs.split_once(after).unwrap_or_else(|| panic!("docs/cluster.md has no {after:?}"));
+    let (text, _) = rest.split_once(until).unwrap_or_else(|| panic!("docs/cluster.md has no {until:?}"));
+    let mut text = text.to_owned();
+    for (users, ours) in [("run:runs/NAME", "tentacle"), ("sealed:mine:1000", "test:2:easy"), ("/16", "/2")] {
+        assert!(text.contains(users), "{users} is missing in {text}");
+        text = text.replace(users, ours);
+    }
+    text
+}
+
+/// Runs a script of bash in a folder where the program and what starts jobs are as on a cluster.
+fn job(folder: &Path, script: &str, variables: &[(&str, &str)]) {
+    let mut bash = Command::new("bash");
+    bash.args(["-ec", script]).current_dir(folder).envs(variables.iter().copied());
+    let path = std::env::var("PATH").unwrap();
+    succeed(bash.env("PATH", format!("{}:{path}", folder.join("bin").display())));
+}
+
+#[cfg(unix)]
+#[test]
+fn the_scripts_for_slurm_and_kubernetes_drive_their_shards_and_go_on() {
+    let folder = scratch("cluster");
+    std::fs::create_dir_all(folder.join("target/debug")).unwrap();
+    std::fs::create_dir_all(folder.join("bin")).unwrap();
+    std::os::unix::fs::symlink(xtask().get_program(), folder.join("target/debug/xtask")).unwrap();
+    std::fs::write(folder.join("bin/srun"), "#!/bin/sh\nexec \"$@\"\n").unwrap();
+    std::fs::set_permissions(folder.join("bin/srun"), std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+
+    let slurm = documented("```bash\n", "```");
+    let kubernetes = documented("args:\n            - |\n", "          resources:")
+        .replace("              ", "")
+        .replace("/lotpilot/xtask", "target/debug/xtask");
+    let one_machine = ["evaluate", "--driver", "tentacle", "--lots", "test:2:easy"];
+    succeed(xtask().args(one_machine).arg("--out").arg(folder.join("one")));
+    let one = files(&folder.join("one"));
+    for (name, script, variable, from) in
+        [("slurm", slurm, "SLURM_ARRAY_TASK_ID", 1), ("kubernetes", kubernetes, "JOB_COMPLETION_INDEX", 0)]
+    {
+        let shard = |number: u32| {
+            job(&folder, &script, &[(variable, &(from + number).to_string()), ("SLURM_CPUS_PER_TASK", "1")]);
+        };
+        shard(0);
+        shard(1);
+        // Begun again: a shard that was stopped goes on, and one that is done is left alone.
+        sums::unlist(&folder.join("shards/1"), &["finished.toml"]).unwrap();
+        std::fs::remove_file(folder.join("shards/1/finished.toml")).unwrap();
+        shard(0);
+        shard(1);
+        let merge = ["merge", "shards/1", "shards/2", "--out", name];
+        succeed(xtask().args(merge).current_dir(&folder));
+        let merged = files(&folder.join(name));
+        for table in ["runs.jsonl", "failures.jsonl", "summary.json"] {
+            assert!(merged[table] == one[table], "{table} of {name}");
+        }
+        std::fs::remove_dir_all(folder.join("shards")).unwrap();
+    }
 }
