@@ -89,7 +89,8 @@ def test_more_than_one_array_is_refused(puffer):
         puffer.LotPufferEnv(2, state=True, **SHORT)
 
 
-def test_pufferlib_steps_it_in_processes():
+def test_pufferlib_steps_what_the_environments_step_alone():
+    # As PufferLib holds its own environments to its backends (test_puffer_vectorization).
     pufferlib = pytest.importorskip("pufferlib")
     vector = pytest.importorskip("pufferlib.vector")
     from lotpilot.puffer import LotPufferEnv
@@ -97,8 +98,14 @@ def test_pufferlib_steps_it_in_processes():
     for backend, options in [(vector.Serial, {}), (vector.Multiprocessing, {"num_workers": 2})]:
         envs = vector.make(LotPufferEnv, env_kwargs={"num_envs": 3, **SHORT}, num_envs=2, backend=backend, **options)
         assert isinstance(envs.driver_env, pufferlib.PufferEnv)
-        envs.reset(seed=1)
+        alone = [LotPufferEnv(3, buf=buffers(3), **SHORT) for _ in range(2)]
+        found, _ = envs.reset(seed=1)
+        expected = [env.reset(seed=1 + index)[0] for index, env in enumerate(alone)]
+        np.testing.assert_array_equal(found, np.concatenate(expected))
+        rng = np.random.default_rng(0)
         for _ in range(45):
-            observations, rewards, *_ = envs.step(np.zeros((6, 2), np.float32))
-        assert observations.shape == (6, 25, 25) and rewards.shape == (6,)
+            actions = rng.uniform(-1, 1, (6, 2)).astype(np.float32)
+            stepped = [env.step(half)[:4] for env, half in zip(alone, np.split(actions, 2), strict=True)]
+            for ours, theirs in zip(zip(*stepped, strict=True), envs.step(actions)[:4], strict=True):
+                np.testing.assert_array_equal(theirs, np.concatenate(ours))
         envs.close()
