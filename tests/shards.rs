@@ -90,8 +90,10 @@ fn three_shards_merge_to_the_bytes_of_one_machine_and_nothing_else_merges() {
     copy(three, &other);
     sums::unlist(&other, &["finished.toml"]).unwrap();
     refused(&[one, two, &other], "shard 3/3 is not finished");
-    // It goes on as any evaluation does.
+    // It goes on as any evaluation does, and what a process left that died just before is gone.
+    std::fs::write(other.join("driving.unfinished"), "").unwrap();
     succeed(xtask().args(["evaluate", "--resume"]).arg(&other));
+    assert!(!other.join("driving.unfinished").exists());
     refused(&[one, two, two, &other], "are both shard 2/3");
 }
 

@@ -22,7 +22,7 @@ use sim::frame::Event;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
-use storage::growing::Growing;
+use storage::growing::{self, Growing};
 use storage::sums;
 
 /// Trials driven at a time. A constant: neither memory nor results depend on how many runs or threads there are.
@@ -31,6 +31,9 @@ pub(crate) const BATCH: usize = 16;
 /// Files that are written line by line.
 pub(crate) const FILES: [&str; 3] = [records::RUNS, records::FAILURES, records::WALL_TIME];
 
+/// What is done there, in the name of the file that says how far it is.
+const DRIVING: &str = "driving";
+
 /// Drives the plan, and writes one line per run and near-collision as they come. Goes on with what an interrupted
 /// evaluation left in the folder, to the same result; a finished one is read back. `None` if cancelled.
 ///
@@ -38,6 +41,7 @@ pub(crate) const FILES: [&str; 3] = [records::RUNS, records::FAILURES, records::
 /// If a lot cannot be built or a file cannot be read or written.
 pub fn evaluate(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<Option<EvaluationResults>> {
     if sums::is_listed(run.path(), records::RUNS)? {
+        growing::clear(run.path(), DRIVING)?;
         return EvaluationResults::read(plan, run.path()).map(Some);
     }
     let mut driving = Driving::open(plan, run.path(), progress)?;
@@ -67,7 +71,7 @@ struct Driving<'a> {
 
 impl<'a> Driving<'a> {
     fn open(plan: &'a Plan<'a>, folder: &Path, progress: &'a dyn Progress) -> anyhow::Result<Self> {
-        let lines = Growing::open(folder, "driving", &FILES)?;
+        let lines = Growing::open(folder, DRIVING, &FILES)?;
         let mut results = EvaluationResults::new(plan);
         let places = Places::new(plan);
         let (mut done, mut near_collisions) = (0, 0);

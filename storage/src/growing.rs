@@ -36,7 +36,7 @@ impl Growing {
     /// # Errors
     /// If a file cannot be read or written, or is not what was written into it.
     pub fn open(folder: &Path, name: &str, files: &[&str]) -> Result<Self, FileError> {
-        let mark = folder.join(format!("{name}.unfinished"));
+        let mark = mark_of(folder, name);
         let left = sealed::read(&mark)?.map(|text| Mark::parse(&mark, &text, files)).transpose()?;
         let mut growing = Self { folder: folder.to_owned(), mark, files: Vec::new(), parts: 0 };
         for (index, &name) in files.iter().enumerate() {
@@ -95,7 +95,7 @@ impl Growing {
         sealed::write(&self.mark, mark.as_bytes())
     }
 
-    /// Lists the files as finished.
+    /// Lists the files as finished. A process that dies meanwhile leaves the list, and what [`clear()`] deletes.
     ///
     /// # Errors
     /// If the list cannot be written.
@@ -104,6 +104,18 @@ impl Growing {
         sums::list(&self.folder, &names)?;
         whole::remove(&self.mark)
     }
+}
+
+/// Deletes what a process that died in [`Growing::finish`] left beside files that are listed.
+///
+/// # Errors
+/// If it cannot be deleted.
+pub fn clear(folder: &Path, name: &str) -> Result<(), FileError> {
+    whole::remove(&mark_of(folder, name))
+}
+
+fn mark_of(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{name}.unfinished"))
 }
 
 /// How far files are whole.
