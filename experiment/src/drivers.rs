@@ -23,13 +23,14 @@ use std::sync::Arc;
 use storage::sums;
 
 /// Parameters that ship: the planner, and the file that `cargo xtask tune` wrote.
-const TUNED: [(&str, &str); 6] = [
+const TUNED: [(&str, &str); 7] = [
     ("tentacle", include_str!("../../planners/tuned/tentacle.toml")),
     ("vvf", include_str!("../../planners/tuned/vvf.toml")),
     ("dwa", include_str!("../../planners/tuned/dwa.toml")),
     ("cvm", include_str!("../../planners/tuned/cvm.toml")),
     ("apf", include_str!("../../planners/tuned/apf.toml")),
     ("vff", include_str!("../../planners/tuned/vff.toml")),
+    ("mppi", include_str!("../../planners/tuned/mppi.toml")),
 ];
 
 /// A driver as named on the command line; nothing is loaded yet.
