@@ -1,10 +1,12 @@
-//! The paper in a box, end to end: one report that loads nothing, resumed to the same bytes, and refusals.
+//! The paper in a box, end to end: one report that loads nothing, resumed and shared out to the same bytes, and refusals.
 
 use crate::bench::{scratch, succeed, text, xtask};
 use crate::determinism::files;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 use std::time::Duration;
+use storage::sums;
 
 /// Stages of a smoke run, in their order.
 const STAGES: [&str; 13] = [
@@ -30,15 +32,35 @@ fn contents(run: &Path) -> BTreeMap<String, Vec<u8>> {
         Ok(text) => text.replace(&path, "RUN").into_bytes(),
         Err(binary) => binary.into_bytes(),
     };
-    let is_kept = |name: &str| !name.ends_with("manifest.toml") && !name.ends_with("wall_time.jsonl");
+    let is_kept = |name: &str| ["manifest.toml", "wall_time.jsonl", ".lock"].iter().all(|other| !name.ends_with(other));
     files(run).into_iter().filter(|(name, _)| is_kept(name)).map(|(name, bytes)| (name, normal(bytes))).collect()
+}
+
+/// A run on one machine, and what it printed.
+static WHOLE: LazyLock<(PathBuf, String)> = LazyLock::new(|| {
+    let folder = scratch("reproduce-whole").join("run");
+    let printed = succeed(xtask().args(["reproduce", "--preset", "smoke", "--out"]).arg(&folder));
+    (folder, printed)
+});
+
+/// Holds a run against that on one machine, byte for byte.
+fn assert_same_as_whole(run: &Path, when: &str) {
+    let (expected, found) = (contents(&WHOLE.0), contents(run));
+    assert_eq!(expected.keys().collect::<Vec<_>>(), found.keys().collect::<Vec<_>>(), "{when}");
+    for (name, bytes) in &expected {
+        assert!(*bytes == found[name], "{name} differs {when}");
+    }
+    for name in ["report.md", "report.html"] {
+        let [expected, found] = [&*WHOLE.0, run].map(|run| std::fs::read(run.join(name)).unwrap());
+        assert!(expected == found, "{name} differs {when}");
+    }
+    assert!(sums::verify(run).faults.is_empty());
 }
 
 #[test]
 fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
-    let folder = scratch("reproduce");
-    let (whole, resumed) = (folder.join("whole"), folder.join("resumed"));
-    let printed = succeed(xtask().args(["reproduce", "--preset", "smoke", "--out"]).arg(&whole));
+    let resumed = scratch("reproduce").join("resumed");
+    let (whole, printed) = &*WHOLE;
     assert!(printed.contains("Cannot be told") && printed.contains("DAgger has fewer near-collisions"), "{printed}");
     for stage in STAGES {
         assert!(whole.join(stage).join("finished.toml").is_file(), "{stage}");
@@ -81,21 +103,62 @@ fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
     killed.wait().unwrap();
     let printed_again = succeed(xtask().args(["--threads", "1", "reproduce", "--resume"]).arg(&resumed));
     assert!(printed_again.contains("DAgger has fewer near-collisions"), "{printed_again}");
-    let (expected, found) = (contents(&whole), contents(&resumed));
-    assert_eq!(expected.keys().collect::<Vec<_>>(), found.keys().collect::<Vec<_>>());
-    for name in ["report.md", "report.html"] {
-        assert!(
-            std::fs::read(whole.join(name)).unwrap() == std::fs::read(resumed.join(name)).unwrap(),
-            "{name} differs"
-        );
-    }
-    for (name, bytes) in &expected {
-        assert!(*bytes == found[name], "{name} differs after resuming");
-    }
+    assert_same_as_whole(&resumed, "after resuming");
 
     let again = xtask().args(["reproduce", "--resume"]).arg(&resumed).output().unwrap();
     assert_eq!(again.status.code(), Some(2));
     assert!(text(&again).1.contains("finished"), "{}", text(&again).1);
+}
+
+fn refused(arguments: &[&str], folders: &[&Path], part: &str) {
+    let output = xtask().args(arguments).args(folders).output().unwrap();
+    let (_, stderr) = text(&output);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
+    assert!(stderr.contains(part) && stderr.lines().count() == 1, "{part:?} is missing in: {stderr}");
+}
+
+/// Its chains could not be trained, nor its lots be driven, on several machines.
+#[test]
+fn shards_of_trainings_and_of_drives_come_to_the_bytes_of_one_machine() {
+    let folder = scratch("reproduce-shards");
+    let run = folder.join("run");
+    let shards = |part: &str, of: usize| (1..=of).map(|i| folder.join(part).join(i.to_string())).collect::<Vec<_>>();
+    let shard = |first: &[&str], number: usize, out: &[PathBuf]| {
+        let share = format!("{number}/{}", out.len());
+        succeed(xtask().args(first).args(["--shard", &share, "--out"]).arg(&out[number - 1]));
+    };
+    let trained = shards("trained", 2);
+    let train = ["reproduce", "--preset", "smoke"];
+    shard(&train, 1, &trained);
+    let one = trained[0].as_path();
+    refused(&["merge", "--out", "nowhere"], &[one], "missing: shard 2/2");
+    refused(&["render", "results"], &[one], "this is a shard");
+    refused(&["reproduce", "--shard", "1/2", "--networks"], &[one], "this is a shard");
+    shard(&train, 2, &trained);
+    let damaged = trained[1].join("chains/s1-unweighted/round-01/model.safetensors");
+    let content = std::fs::read(&damaged).unwrap();
+    std::fs::write(&damaged, &content[1..]).unwrap();
+    let out = run.to_string_lossy();
+    refused(&["merge", "--out", &out], &[one, &trained[1]], "model.safetensors: is damaged");
+    assert!(!run.exists());
+    std::fs::write(&damaged, content).unwrap();
+    succeed(xtask().arg("merge").args(&trained).arg("--out").arg(&run));
+    assert!(!run.join("drives").exists() && run.join("chains/s1-alpha-15/finished.toml").is_file());
+
+    // Three shards of two trials per lot: one has nothing to do in some stages.
+    let driven = shards("driven", 3);
+    let networks = out.clone() + "/";
+    let drive = ["reproduce", "--networks", &networks];
+    (1..=3).for_each(|number| shard(&drive, number, &driven));
+    let [first, second, third] = [0, 1, 2].map(|i| driven[i].as_path());
+    refused(&["merge"], &[first, third], "missing: shard 2/3");
+    refused(&["merge"], &[first, second, third, one], "made with another");
+    refused(&["merge", "--out", "nowhere"], &[first, second, third], "--out: these shards drove networks of");
+    let printed = succeed(xtask().arg("merge").args([third, first, second]));
+    assert!(printed.contains("DAgger has fewer near-collisions"), "{printed}");
+    assert_same_as_whole(&run, "after merging");
+    refused(&["merge"], &[first, second, third], "this run is finished");
+    refused(&["reproduce", "--shard", "1/3", "--networks"], &[&run], "this run is finished");
 }
 
 #[test]

@@ -1,9 +1,10 @@
-//! An evaluation that was driven in shards, on several machines, put together again: the same bytes as on one.
+//! Work that was shared out to several machines, put together again: the same bytes as from one.
 
 use crate::evaluate::{BATCH, FILES};
 use crate::plan::Plan;
 use crate::read::{Place, Places};
 use crate::records::{self, Driven};
+use crate::stages::{self, Part, Stage};
 use anyhow::{Context as _, ensure};
 use experiment::run_dir::{self, Manifest, RunDir};
 use experiment::settings::Settings;
@@ -18,7 +19,7 @@ use storage::sums;
 /// The argument of the manifest that says what a shard is to drive.
 const ARGUMENT: &str = "shard";
 
-/// What a shard is to drive, as its manifest says it.
+/// What a shard is to do, as its manifest says it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShardRecord {
@@ -26,15 +27,47 @@ pub struct ShardRecord {
     pub number: Shard,
     /// SHA-256 of the settings.
     pub settings_sha256: String,
-    /// The trials, `LOT@DIRECTION@TRIAL`: every driver drives each of them at every noise level.
+    /// Of an evaluation the trials, `LOT@DIRECTION@TRIAL`: every driver drives each of them at every noise level. Of a
+    /// reproduction the folders of its stages.
     pub keys: Vec<String>,
+    /// Of a reproduction whose networks are trained: its folder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub networks: Option<PathBuf>,
 }
 
 impl ShardRecord {
     /// Of a plan; `None` if it is to be driven whole.
     pub fn of(plan: &Plan<'_>) -> Option<Self> {
         let keys = || plan.trials().map(|trial| key(&trial)).collect();
-        plan.shard.map(|number| Self { number, settings_sha256: digest(plan.settings), keys: keys() })
+        let settings_sha256 = || digest(plan.settings);
+        plan.shard.map(|number| Self { number, settings_sha256: settings_sha256(), keys: keys(), networks: None })
+    }
+
+    /// Of a reproduction: of its trainings, or of what the networks in a folder drive.
+    pub fn of_stages(number: Shard, networks: Option<PathBuf>, settings: &Settings, stages: Vec<Stage>) -> Self {
+        let mut record = Self { number, settings_sha256: digest(settings), keys: Vec::new(), networks };
+        record.keys = record.share_of(stages).into_iter().map(|stage| stage.folder).collect();
+        record
+    }
+
+    /// Those of the stages of a reproduction that the shard does.
+    pub fn share_of(&self, stages: Vec<Stage>) -> Vec<Stage> {
+        let part = if self.networks.is_some() { Part::Drives } else { Part::Trainings };
+        stages::share(stages, part, self.number)
+    }
+
+    /// Takes the record of a shard out of the arguments of a manifest; `None` if it is of no shard.
+    ///
+    /// # Errors
+    /// If it is of another version.
+    pub fn take_from(manifest: &mut Manifest) -> anyhow::Result<Option<Self>> {
+        let record = manifest.arguments.remove(ARGUMENT);
+        record.map(|record| record.try_into().context("manifest.toml")).transpose()
+    }
+
+    /// Adds the record to the arguments of a manifest.
+    pub fn add_to(&self, arguments: &mut toml::Table) {
+        arguments.insert(ARGUMENT.to_owned(), toml::Value::try_from(self).expect("a record is plain values"));
     }
 }
 
@@ -59,42 +92,40 @@ struct ShardRun {
 impl ShardRun {
     fn read(folder: &Path) -> anyhow::Result<Self> {
         let name = folder.display();
-        ensure!(sums::exists(folder)?, "{name}: this is no run; name the folders that evaluate --shard wrote");
+        ensure!(sums::exists(folder)?, "{name}: this is no run; name the folders that a command with --shard wrote");
         let mut manifest = Manifest::read(folder)?;
-        let record = manifest.arguments.remove(ARGUMENT);
+        let record = ShardRecord::take_from(&mut manifest).with_context(|| name.to_string())?;
         let record = record
-            .with_context(|| format!("{name}: this is no shard; name the folders that evaluate --shard wrote"))?;
-        let record: ShardRecord = record.try_into().with_context(|| format!("{name}: manifest.toml"))?;
+            .with_context(|| format!("{name}: this is no shard; name the folders that a command with --shard wrote"))?;
         ensure!(
             run_dir::is_finished(folder)?,
-            "{name}: shard {} is not finished; go on with: cargo xtask evaluate --resume {name}",
-            record.number
+            "{name}: shard {} is not finished; go on with: cargo xtask {} --resume {name}",
+            record.number,
+            manifest.command
         );
         let settings = run_dir::settings_of(folder)?;
         ensure!(
             digest(&settings) == record.settings_sha256,
-            "{name}: its settings.toml is not the one that it was begun with; restore it, or drive the shard again"
+            "{name}: its settings.toml is not the one that it was begun with; restore it, or make the shard again"
         );
         Ok(Self { folder: folder.to_owned(), record, manifest, settings })
     }
 
-    /// Refuses what does not belong to the same evaluation.
+    /// Refuses what does not belong to the same whole.
     fn check_belongs_to(&self, first: &Self) -> anyhow::Result<()> {
-        let version = |run: &Self| {
-            let Manifest { program, git_revision, git_dirty, .. } = &run.manifest;
-            (program.clone(), git_revision.clone(), *git_dirty)
-        };
         let differs = [
+            ("command", self.manifest.command != first.manifest.command),
             ("number of shards", self.record.number.of() != first.record.number.of()),
-            ("version of lotpilot", version(self) != version(first)),
+            ("version of lotpilot", version(&self.manifest) != version(&first.manifest)),
             ("architecture or system", self.manifest.target != first.manifest.target),
-            ("drivers", self.manifest.arguments != first.manifest.arguments),
-            ("settings", self.settings != first.settings),
-            ("files of lots or drivers", self.manifest.inputs != first.manifest.inputs),
+            ("folder of networks", self.record.networks != first.record.networks),
+            ("choice of drivers or lots", self.manifest.arguments != first.manifest.arguments),
+            ("set of settings", self.settings != first.settings),
+            ("content of files of lots or drivers", self.manifest.inputs != first.manifest.inputs),
         ];
         if let Some((what, _)) = differs.into_iter().find(|(_, differs)| *differs) {
             anyhow::bail!(
-                "{}: driven with another {what} than {}, so they are of different evaluations; drive one of them again",
+                "{}: made with another {what} than {}, so they are not shards of one whole; make one of them again",
                 self.folder.display(),
                 first.folder.display()
             );
@@ -103,7 +134,12 @@ impl ShardRun {
     }
 }
 
-/// All shards of an evaluation, finished.
+/// Which program made a run.
+fn version(manifest: &Manifest) -> (&str, Option<&str>, Option<bool>) {
+    (&manifest.program, manifest.git_revision.as_deref(), manifest.git_dirty)
+}
+
+/// All shards of a whole, finished.
 #[derive(Debug)]
 pub struct Shards {
     runs: Vec<ShardRun>,
@@ -113,7 +149,7 @@ impl Shards {
     /// Reads the manifests of some folders.
     ///
     /// # Errors
-    /// If one is no finished shard, they are of different evaluations, or a shard is missing or there twice.
+    /// If one is no finished shard, they are not of one whole, or a shard is missing or there twice.
     pub fn read(folders: &[PathBuf]) -> anyhow::Result<Self> {
         let mut runs = folders.iter().map(|folder| ShardRun::read(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         runs.sort_by_key(|run| run.record.number);
@@ -133,7 +169,7 @@ impl Shards {
         let missing: Vec<String> = missing.map(|number| number.to_string()).collect();
         ensure!(
             missing.is_empty(),
-            "missing: shard {}; name its folder as well, or drive it with --shard",
+            "missing: shard {}; name its folder as well, or make it with --shard",
             missing.join(", shard ")
         );
         Ok(Self { runs })
@@ -147,6 +183,59 @@ impl Shards {
     /// The manifest of all of them, but for what tells them apart.
     pub fn manifest(&self) -> &Manifest {
         &self.runs[0].manifest
+    }
+
+    /// The reproduction whose networks they drove.
+    pub fn networks(&self) -> Option<&Path> {
+        self.runs[0].record.networks.as_deref()
+    }
+
+    /// Refuses another run than theirs: what they did would not be part of it.
+    ///
+    /// # Errors
+    /// Naming what differs.
+    pub fn check_are_of(&self, run: &Path, settings: &Settings, manifest: &Manifest) -> anyhow::Result<()> {
+        let own = self.manifest();
+        let is_theirs = *settings == *self.settings()
+            && manifest.arguments == own.arguments
+            && manifest.target == own.target
+            && version(manifest) == version(own);
+        ensure!(
+            is_theirs,
+            "{}: its settings, lots or version of lotpilot are not those of the shards, so that they are no part of it;              make them again with --networks {0}",
+            run.display()
+        );
+        Ok(())
+    }
+
+    /// Folders of the shards of a stage, that of the first shard first.
+    pub fn folders_of(&self, stage: &str) -> Vec<PathBuf> {
+        self.runs.iter().map(|run| run.folder.join(stage)).collect()
+    }
+
+    /// The stages of a reproduction that they did, each with the folder that it is in.
+    ///
+    /// # Errors
+    /// If a manifest lists others than the shard was to do, or a file in one of them is missing or damaged.
+    pub fn stages(&self, all: &[Stage]) -> anyhow::Result<Vec<(String, PathBuf)>> {
+        let mut found = Vec::new();
+        for run in &self.runs {
+            let share = run.record.share_of(all.to_vec());
+            ensure!(
+                share.iter().map(|stage| &stage.folder).eq(&run.record.keys),
+                "{}: its manifest lists other stages than its settings stand for; make the shard again",
+                run.folder.display()
+            );
+            for Stage { folder, .. } in share {
+                let path = run.folder.join(&folder);
+                sums::read_listed(&run.folder, &format!("{folder}/{}", sums::FILE), sums::LIST_BYTES_MAX)?;
+                if let Some(fault) = sums::verify(&path).faults.into_iter().next() {
+                    return Err(fault.into());
+                }
+                found.push((folder, path));
+            }
+        }
+        Ok(found)
     }
 
     /// Puts their rows in the order of the whole plan.

@@ -15,9 +15,11 @@
 //!
 //! Behaviour cloning has no τ̂, so that neither α nor the rule changes a bit of it: it is trained once per seed.
 
+use crate::conclusions::{BC, DAGGER};
 use crate::estimate::{self, Task};
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::settings::{Settings, Smoothing};
+use experiment::shard::Shard;
 use planners::PlannerSpec;
 use policy::decision_rule::{ChiOn, DecisionRule};
 use serde::{Deserialize, Serialize};
@@ -63,6 +65,13 @@ pub enum Step {
     Drive {
         /// Names in tables, specs of the command line.
         drivers: Vec<(String, String)>,
+    },
+    /// Drives a share of the trials of such a step.
+    DriveShard {
+        /// Names in tables, specs of the command line.
+        drivers: Vec<(String, String)>,
+        /// Which share.
+        shard: Shard,
     },
     /// Networks drive, the expert labels every tick.
     OnPolicy,
@@ -169,6 +178,8 @@ pub const SMOOTHED: &str = "drives/smoothed";
 /// See [`REFERENCE`].
 pub const ON_POLICY: &str = "on-policy";
 
+/// Name in tables of [`Chain::Unweighted`].
+pub const UNWEIGHTED: &str = "DAgger, α = 0";
 /// Names in tables of what only [`CONTROLS`] drives.
 pub const EXPERT_ONLY: &str = "expert's data alone";
 /// See [`EXPERT_ONLY`].
@@ -190,6 +201,42 @@ pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     stages
 }
 
+/// What shards share out. What drives needs every network: trainings are put together first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Whole trainings.
+    Trainings,
+    /// The trials of everything that drives.
+    Drives,
+}
+
+/// The share of a part that a shard does.
+pub fn share(stages: Vec<Stage>, part: Part, shard: Shard) -> Vec<Stage> {
+    match part {
+        Part::Trainings => {
+            let trainings = stages.into_iter().filter(|stage| matches!(stage.step, Step::Train { .. })).enumerate();
+            let taken: Vec<Stage> =
+                trainings.filter(|(index, _)| shard.takes(*index)).map(|(_, stage)| stage).collect();
+            let folders: Vec<String> = taken.iter().map(|stage| stage.folder.clone()).collect();
+            let with_its_cloning = |mut stage: Stage| {
+                if let Step::Train { cloning_of } = &mut stage.step {
+                    // It comes to the same weights wherever it is trained.
+                    cloning_of.take_if(|chain| !folders.contains(chain));
+                }
+                stage
+            };
+            taken.into_iter().map(with_its_cloning).collect()
+        }
+        Part::Drives => {
+            let shared_out = |stage: Stage| match stage.step {
+                Step::Drive { drivers } => Some(Stage { step: Step::DriveShard { drivers, shard }, ..stage }),
+                _ => None,
+            };
+            stages.into_iter().filter_map(shared_out).collect()
+        }
+    }
+}
+
 fn trainings(settings: &Settings, extent: &Extent) -> Vec<Stage> {
     let mut stages = Vec::new();
     for seed in seeds(settings, extent) {
@@ -207,7 +254,7 @@ type Drivers = Vec<(String, String)>;
 fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     let spec = |chain: Chain, seed, rest: &str| format!("run:{}/{}{rest}", root.display(), chain.folder(seed));
     let of_seed = |seed| {
-        [("BC", Chain::Weighted, "/bc"), ("DAgger", Chain::Weighted, ""), ("DAgger, α = 0", Chain::Unweighted, "")]
+        [(BC, Chain::Weighted, "/bc"), (DAGGER, Chain::Weighted, ""), (UNWEIGHTED, Chain::Unweighted, "")]
             .map(|(name, chain, rest)| (named(name, seed, settings), spec(chain, seed, rest)))
     };
     let networks: Drivers = seeds(settings, extent).into_iter().flat_map(of_seed).collect();
@@ -286,6 +333,10 @@ impl Stage {
         match &self.step {
             Step::Train { cloning_of } => estimate::training(&self.settings, cloning_of.is_none()),
             Step::Drive { drivers } => vec![estimate::evaluation(&self.settings, drivers.len())],
+            Step::DriveShard { drivers, shard } => {
+                let (name, all_s) = estimate::evaluation(&self.settings, drivers.len());
+                vec![(name, all_s / f64::from(shard.of()))]
+            }
             Step::OnPolicy => vec![estimate::on_policy(&self.settings)],
         }
     }
@@ -326,6 +377,29 @@ mod tests {
         assert_eq!(heavy.fit.loss.alpha, 15.0);
         heavy.fit.loss.alpha = 1.5;
         assert_eq!(heavy, settings.dagger);
+    }
+
+    #[test]
+    fn shards_have_every_training_once_and_all_of_them_drive() {
+        let (settings, extent) = (Settings::preset("default").unwrap(), extent());
+        let stages = all(&settings, &extent, Path::new("R"));
+        let of = |part| "1/4".parse::<Shard>().unwrap().all().map(move |shard| (part, shard));
+        let shares = |part| of(part).map(|(part, shard)| share(stages.clone(), part, shard)).collect::<Vec<_>>();
+        let trained = shares(Part::Trainings);
+        let mut folders: Vec<&str> = trained.iter().flatten().map(|stage| stage.folder.as_str()).collect();
+        folders.sort_unstable();
+        let mut expected: Vec<&str> =
+            stages.iter().map(|stage| stage.folder.as_str()).filter(|folder| folder.starts_with("chains")).collect();
+        expected.sort_unstable();
+        assert_eq!(folders, expected);
+        // The first shard has the chain whose behaviour cloning the fifth takes over; the second has not.
+        let weighted = Chain::Weighted.folder(settings.seed);
+        assert_eq!(trained[0][1].step, Step::Train { cloning_of: Some(weighted) });
+        assert_eq!(trained[1][0].step, Step::Train { cloning_of: None });
+        for driven in shares(Part::Drives) {
+            assert_eq!(driven.len(), 6);
+            assert!(driven.iter().all(|stage| stage.folder.starts_with("drives") && stage.estimate_s() > 0.0));
+        }
     }
 
     #[test]

@@ -246,6 +246,20 @@ impl RunDir {
     /// If it is listed as finished but is not, was begun with other settings, is in use by another process, or cannot be
     /// written.
     pub fn stage(&self, folder: &str, place: &Place<'_>, settings: &Settings) -> anyhow::Result<Option<Self>> {
+        self.stage_for(folder, place, settings, || Ok(Request::default()))
+    }
+
+    /// Like [`stage`](Self::stage), with what a new one was asked for beside its settings.
+    ///
+    /// # Errors
+    /// See [`stage`](Self::stage); or if `request` fails.
+    pub fn stage_for(
+        &self,
+        folder: &str,
+        place: &Place<'_>,
+        settings: &Settings,
+        request: impl FnOnce() -> anyhow::Result<Request>,
+    ) -> anyhow::Result<Option<Self>> {
         let (path, list) = (self.path.join(folder), format!("{folder}/{}", sums::FILE));
         if sums::is_listed(&self.path, &list)? {
             sums::read_listed(&self.path, &list, sums::LIST_BYTES_MAX)?;
@@ -269,7 +283,7 @@ impl RunDir {
             }
             // Whoever goes on with the run makes the same of it as the command that began it.
             let build = Build { command_line: Manifest::read(&self.path)?.command_line, ..place.build.clone() };
-            Self::create(&Place { build: &build, out: Some(&path), ..*place }, settings, &Request::default())?
+            Self::create(&Place { build: &build, out: Some(&path), ..*place }, settings, &request()?)?
         };
         Ok(Some(Self { within: Some((self.path.clone(), list)), ..stage }))
     }

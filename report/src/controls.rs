@@ -4,7 +4,7 @@ use crate::drive::rows_of;
 use crate::markdown::table_of;
 use evaluation::conclusions::{BC, DAGGER, Driven};
 use evaluation::format::{difference, quoted_rate};
-use evaluation::stages::{ALPHA_15, Chain, EXPERT_ONLY};
+use evaluation::stages::{ALPHA_15, Chain, EXPERT_ONLY, UNWEIGHTED};
 use sim::seed::RootSeed;
 use std::path::Path;
 
@@ -27,7 +27,8 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
             EXPERT_ONLY => Chain::ExpertOnly,
             ALPHA_15 => Chain::Alpha15,
             BC | DAGGER => Chain::Weighted,
-            _ => Chain::Unweighted,
+            UNWEIGHTED => Chain::Unweighted,
+            other => anyhow::bail!("{other}: no training of this report"),
         };
         let mut rows = rows_of(root, chain, seed)?;
         if named.name == BC {

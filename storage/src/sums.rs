@@ -194,6 +194,26 @@ pub fn write_folder(
     list(folder, &[&list_name])
 }
 
+/// Copies every finished file of a folder, and of finished folders within it, into a new folder; its list comes last.
+///
+/// # Errors
+/// If a file is missing or damaged, or cannot be written.
+pub fn copy(from: &Path, to: &Path) -> Result<(), FileError> {
+    let failed =
+        |error: std::io::Error| FileError::new(to, format_args!("cannot be written: {error}"), whole::WRITE_REMEDY);
+    fs::create_dir_all(to).map_err(failed)?;
+    let sums = list_of(from)?.ok_or_else(|| FileError::new(&from.join(FILE), "is missing", LIST_REMEDY))?;
+    for name in sums.keys() {
+        // Without a limit: what is listed was written by a run, and its digest is compared.
+        let content = read_listed(from, name, u64::MAX)?;
+        match name.strip_suffix(FILE) {
+            Some(inner) => copy(&from.join(inner), &to.join(inner))?,
+            None => whole::write(&to.join(name), &content)?,
+        }
+    }
+    write_list(to, &sums)
+}
+
 /// Reads a finished file of at most so many bytes.
 ///
 /// # Errors
@@ -443,6 +463,26 @@ mod tests {
         fs::write(inner.join("more"), "").unwrap();
         fs::write(folder.join("stages/note"), "").unwrap();
         assert_eq!(faults(&folder).len(), 2, "{:?}", faults(&folder));
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_copy_holds_what_is_finished_and_a_damaged_file_ends_it_before_its_list() {
+        let folder = scratch("copy");
+        let (from, to) = (folder.join("from"), folder.join("to"));
+        fs::create_dir_all(from.join("stages/one")).unwrap();
+        write(&from, "about", b"one stage").unwrap();
+        write(&from.join("stages/one"), "data", b"12345").unwrap();
+        list(&from, &["stages/one/sha256sums"]).unwrap();
+        fs::write(from.join("half"), "never finished").unwrap();
+        copy(&from, &to).unwrap();
+        assert_eq!((verify(&to).files, verify(&to).faults.len()), (3, 0));
+        assert_eq!(digest_of_all(&to, &[]).unwrap(), digest_of_all(&from, &[]).unwrap());
+        assert!(!to.join("half").exists());
+        fs::remove_dir_all(&to).unwrap();
+        fs::write(from.join("stages/one/data"), "54321").unwrap();
+        assert!(copy(&from, &to).unwrap_err().to_string().contains("stages/one/data"));
+        assert!(!exists(&to).unwrap() && !exists(&to.join("stages/one")).unwrap());
         fs::remove_dir_all(folder).unwrap();
     }
 

@@ -60,7 +60,7 @@ enum Command {
     /// Drives drivers over lots and counts near-collisions and the safe ratio.
     #[command(after_help = evaluate::EXAMPLES)]
     Evaluate(evaluate::EvaluateArgs),
-    /// Puts the shards of an evaluation together, as if one machine had driven all of it.
+    /// Puts the shards of an evaluation or a reproduction together, as if one machine had done all of it.
     #[command(after_help = merge::EXAMPLES)]
     Merge(merge::MergeArgs),
     /// The paper in a box: trains, drives and writes one report with the paper's tables beside ours.

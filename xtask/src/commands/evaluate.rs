@@ -172,7 +172,8 @@ pub(crate) fn measure(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress, ou
     output.table(|| format!("\n{text}"), &summary.tables())
 }
 
-fn drive(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<EvaluationResults> {
+/// Drives the plan; see [`measure`].
+pub(crate) fn drive(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<EvaluationResults> {
     let interrupted = || Interrupted { kept: format!("what was driven so far is in {}", run.path().display()) };
     Ok(evaluation::evaluate::evaluate(plan, run, progress)?.ok_or_else(interrupted)?)
 }

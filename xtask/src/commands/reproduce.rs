@@ -12,6 +12,7 @@ use clap::Args;
 use evaluation::conclusions;
 use evaluation::on_policy;
 use evaluation::plan::Plan;
+use evaluation::shards::ShardRecord;
 use evaluation::stages::{self, Extent, Stage, Step};
 use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs::{self, Inputs};
@@ -19,6 +20,7 @@ use experiment::lots::Lot;
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::run_dir::{self, Manifest, Outcome, Place, Request, RunDir};
 use experiment::settings::{Layers, Settings};
+use experiment::shard::Shard;
 use policy::dataset::store::Store;
 use report::reproduction::{self, Recipe};
 use std::path::{Path, PathBuf};
@@ -29,7 +31,11 @@ Examples:
   cargo xtask reproduce                               an hour on two cores
   cargo xtask reproduce --preset smoke --out runs/try   every stage within a minute
   cargo xtask reproduce --full --unseen sealed:my-phrase:120:all
-  cargo xtask reproduce --resume runs/reproduce-default-s1";
+  cargo xtask reproduce --resume runs/reproduce-default-s1
+  cargo xtask reproduce --full --shard 3/14 --out trained/3
+  cargo xtask merge trained/* --out runs/full
+  cargo xtask reproduce --networks runs/full --shard 3/14 --out driven/3
+  cargo xtask merge driven/*";
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct ReproduceArgs {
@@ -48,28 +54,59 @@ pub(crate) struct ReproduceArgs {
     /// Folder of `cargo xtask tune`: planners also drive with the parameters found there [default: those in planners/tuned].
     #[arg(long, value_name = "DIR")]
     tuned: Option<PathBuf>,
+    /// Does a share of the trainings only, one of several machines' (docs/cluster.md); `merge` puts the shares together.
+    #[arg(long, value_name = "NUMBER/OF")]
+    shard: Option<Shard>,
+    /// A run whose networks are all trained: the shard is of what they drive, with the settings of that run.
+    #[arg(
+        long,
+        value_name = "DIR",
+        requires = "shard",
+        conflicts_with_all = ["preset", "config", "overrides", "seed", "full", "unseen", "tuned"]
+    )]
+    networks: Option<PathBuf>,
     #[command(flatten)]
     out: OutArgs,
     /// Continues an interrupted run with its own settings, to the same result; finished stages are skipped.
     #[arg(
         long,
         value_name = "DIR",
-        conflicts_with_all = ["preset", "config", "overrides", "seed", "out", "full", "unseen", "tuned"]
+        conflicts_with_all = [
+            "preset", "config", "overrides", "seed", "out", "full", "unseen", "tuned", "shard", "networks"
+        ]
     )]
     resume: Option<PathBuf>,
 }
 
-const COMMAND: &str = "reproduce";
+pub(crate) const COMMAND: &str = "reproduce";
 /// Trainings of `--full`.
 const SEEDS_FULL: u64 = 5;
 
 pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
-    let (run, settings, extent) = if let Some(path) = &args.resume { resume(path)? } else { begin(args)? };
+    let (run, settings, Arguments { extent, shard }) = match args {
+        ReproduceArgs { resume: Some(path), .. } => resume(path)?,
+        ReproduceArgs { networks: Some(networks), .. } => begin_drives(args, networks)?,
+        _ => begin(args)?,
+    };
+    let Some(record) = shard else { return finish(&run, settings, extent, output) };
+    let root = record.networks.as_deref().unwrap_or(run.path());
+    let stages = record.share_of(stages::all(&settings, &extent, root));
+    let console = Console::new(output);
+    perform_all(COMMAND, &stages, &run, &console, output)?;
+    run.finish(Outcome::Reproduction { stages: stages.len() })?;
+    let (folder, number) = (run.path().display(), record.number);
+    output.note(format_args!("written: {folder}: shard {number}; put all together with cargo xtask merge DIR..."));
+    console.report_time();
+    Ok(())
+}
+
+/// Does what is left of a run, and writes its report.
+pub(crate) fn finish(run: &RunDir, settings: Settings, extent: Extent, output: &Output) -> anyhow::Result<()> {
     let stages = stages::all(&settings, &extent, run.path());
     let recipe = Recipe { settings, extent, stages };
     let console = Console::new(output);
-    perform_all(COMMAND, &recipe.stages, &run, &console, output)?;
-    let conclusions = reproduction::write(&recipe, &run)?;
+    perform_all(COMMAND, &recipe.stages, run, &console, output)?;
+    let conclusions = reproduction::write(&recipe, run)?;
     output.table(|| format!("\nWhat holds here\n\n{conclusions}"), &())?;
     run.finish(Outcome::Reproduction { stages: recipe.stages.len() })?;
     output.note(format_args!("written: {}/report.html, report.md, conclusions.csv and figures/", run.path().display()));
@@ -113,7 +150,29 @@ fn cut_short(root: &Path, finished: usize) -> anyhow::Error {
     Interrupted { kept: format!("{finished} finished stages are in {}", root.display()) }.into()
 }
 
-fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
+/// What a run was asked for, besides what its settings say.
+struct Arguments {
+    extent: Extent,
+    /// Which share of it is done.
+    shard: Option<ShardRecord>,
+}
+
+impl Arguments {
+    fn read(path: &Path, mut manifest: Manifest) -> anyhow::Result<Self> {
+        let shard = ShardRecord::take_from(&mut manifest).with_context(|| path.display().to_string())?;
+        Ok(Self { extent: extent_of(path, &manifest)?, shard })
+    }
+
+    fn to_table(&self) -> anyhow::Result<toml::Table> {
+        let mut table = toml::Table::try_from(&self.extent)?;
+        if let Some(shard) = &self.shard {
+            shard.add_to(&mut table);
+        }
+        Ok(table)
+    }
+}
+
+fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Arguments)> {
     let layers = Layers::from(&args.layers);
     let mut settings = Settings::resolve(&layers, args.seed)?;
     let is_smoke = layers.preset_name() == "smoke";
@@ -152,33 +211,94 @@ fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Extent)> {
         extent.seeds
     );
     let preset = format!("{}{}", if args.full { "full-" } else { "" }, layers.preset_name());
-    let place = args.out.place(COMMAND, &preset, settings.seed.0);
-    let request = Request { arguments: toml::Table::try_from(&extent)?, inputs: inputs(&settings, &extent)? };
-    let run = RunDir::create(&place, &settings, &request)?;
-    Ok((run, settings, extent))
+    // Only the names of the folders are asked for: the run has no place yet.
+    let record =
+        |number| ShardRecord::of_stages(number, None, &settings, stages::all(&settings, &extent, Path::new("")));
+    let shard = args.shard.map(record);
+    let inputs = inputs(&settings, &extent)?;
+    create(args, &preset, settings, Arguments { extent, shard }, inputs)
+}
+
+/// Begins a share of what the networks of a run drive.
+fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir, Settings, Arguments)> {
+    // Without a slash at its end: drivers are named after it.
+    let networks: PathBuf = networks.components().collect();
+    let name = networks.display();
+    ensure!(sums::exists(&networks)?, "--networks {name}: this is no run; cargo xtask reproduce makes one");
+    let manifest = Manifest::read(&networks)?;
+    let (settings, preset) = (run_dir::settings_of(&networks)?, manifest.preset.clone());
+    ensure!(manifest.command == COMMAND, "--networks {name}: this is a run of {}", manifest.command);
+    let Arguments { extent, shard } = Arguments::read(&networks, manifest)?;
+    ensure!(
+        shard.is_none(),
+        "--networks {name}: this is a shard; put all of them together first with cargo xtask merge DIR..."
+    );
+    ensure!(!run_dir::is_finished(&networks)?, "--networks {name}: this run is finished; nothing is left to drive");
+    let stages = stages::all(&settings, &extent, &networks);
+    for stage in stages.iter().filter(|stage| matches!(stage.step, Step::Train { .. })) {
+        ensure!(
+            run_dir::is_finished(&networks.join(&stage.folder))?,
+            "--networks {name}: {} is not trained yet; train it with --shard and merge, or with --resume {name}",
+            stage.folder
+        );
+    }
+    let inputs = inputs_of_drives(&settings, &extent, &stages)?;
+    let shard = args.shard.map(|number| ShardRecord::of_stages(number, Some(networks), &settings, stages));
+    create(args, &preset, settings, Arguments { extent, shard }, inputs)
+}
+
+fn create(
+    args: &ReproduceArgs,
+    preset: &str,
+    settings: Settings,
+    arguments: Arguments,
+    inputs: Inputs,
+) -> anyhow::Result<(RunDir, Settings, Arguments)> {
+    let place = args.out.place(COMMAND, preset, settings.seed.0);
+    let run = RunDir::create(&place, &settings, &Request { arguments: arguments.to_table()?, inputs })?;
+    Ok((run, settings, arguments))
 }
 
 /// What a run did, by the files that it left.
 pub(crate) fn recipe_of(path: &Path) -> anyhow::Result<Recipe> {
-    let (settings, extent) = (run_dir::settings_of(path)?, extent_of(path, &Manifest::read(path)?)?);
+    let settings = run_dir::settings_of(path)?;
+    let Arguments { extent, shard } = Arguments::read(path, Manifest::read(path)?)?;
+    ensure!(shard.is_none(), "{}: this is a shard, which has no report; put all together with merge", path.display());
     let stages = stages::all(&settings, &extent, path);
     Ok(Recipe { settings, extent, stages })
 }
 
-fn extent_of(path: &Path, manifest: &Manifest) -> anyhow::Result<Extent> {
+/// How much a run does, by a manifest without the record of a shard.
+pub(crate) fn extent_of(path: &Path, manifest: &Manifest) -> anyhow::Result<Extent> {
     let arguments = manifest.arguments.clone();
     arguments.try_into().with_context(|| format!("{}: this is no folder of cargo xtask reproduce", path.display()))
 }
 
-fn resume(path: &Path) -> anyhow::Result<(RunDir, Settings, Extent)> {
+fn resume(path: &Path) -> anyhow::Result<(RunDir, Settings, Arguments)> {
     let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
-    let extent = extent_of(path, &manifest)?;
-    manifest.check_inputs(&inputs(&settings, &extent)?)?;
-    Ok((run, settings, extent))
+    let arguments = Arguments::read(path, manifest.clone())?;
+    let Arguments { extent, shard } = &arguments;
+    let found = match shard.as_ref().and_then(|shard| shard.networks.as_deref()) {
+        Some(networks) => inputs_of_drives(&settings, extent, &stages::all(&settings, extent, networks))?,
+        None => inputs(&settings, extent)?,
+    };
+    manifest.check_inputs(&found)?;
+    Ok((run, settings, arguments))
+}
+
+/// The lots, parameters and networks from files that a share of the drives reads.
+pub(crate) fn inputs_of_drives(settings: &Settings, extent: &Extent, stages: &[Stage]) -> anyhow::Result<Inputs> {
+    let mut found = inputs(settings, extent)?;
+    for stage in stages {
+        if let Step::Drive { drivers } = &stage.step {
+            found.extend(inputs::of(&[], &stages::load(drivers, settings)?));
+        }
+    }
+    Ok(found)
 }
 
 /// The lots and parameters from files that are read.
-fn inputs(settings: &Settings, extent: &Extent) -> anyhow::Result<Inputs> {
+pub(crate) fn inputs(settings: &Settings, extent: &Extent) -> anyhow::Result<Inputs> {
     let mut found = train::inputs(settings)?;
     let unseen = Lot::parse_all(&extent.unseen, &settings.episode.vehicle)?;
     let tuned = NamedDriver::load_all(&extent.tuned, settings)?;
@@ -220,9 +340,11 @@ fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<()
 /// Does a stage unless it is done; `false` if cut short by Ctrl-C.
 fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, output: &Output) -> anyhow::Result<bool> {
     let settings = &stage.settings;
-    let build = build_info::get();
-    let place = Place { build, out: None, overwrite: false, command, preset: command, seed: settings.seed.0 };
-    let Some(run) = root.stage(&stage.folder, &place, settings)? else {
+    let shard_of = || match &stage.step {
+        Step::DriveShard { drivers, shard } => Ok(Drive::load(stage, drivers)?.request(*shard)),
+        _ => Ok(Request::default()),
+    };
+    let Some(run) = root.stage_for(&stage.folder, &place_of(command, settings), settings, shard_of)? else {
         output.note("done before");
         return Ok(true);
     };
@@ -235,16 +357,16 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
             run.finish(outcome)?;
         }
         Step::Drive { drivers } => {
-            let specs = drivers.iter().map(|(_, spec)| spec.clone()).collect();
-            let (drivers, lots) = (
-                stages::load(drivers, settings)?,
-                Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?,
-            );
-            let compare_with = conclusions::compare_with(&drivers);
-            let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with, shard: None };
-            evaluate::check(&plan)?;
-            evaluate::measure(&plan, &run, console, output)?;
-            run.finish(Outcome::Evaluation { drivers: specs })?;
+            let drive = Drive::load(stage, drivers)?;
+            evaluate::check(&drive.plan(None))?;
+            evaluate::measure(&drive.plan(None), &run, console, output)?;
+            run.finish(outcome_of(drivers))?;
+        }
+        Step::DriveShard { drivers, shard } => {
+            let drive = Drive::load(stage, drivers)?;
+            evaluate::check(&drive.plan(Some(*shard)))?;
+            evaluate::drive(&drive.plan(Some(*shard)), &run, console)?;
+            run.finish(outcome_of(drivers))?;
         }
         Step::OnPolicy => {
             if !on_policy::run(settings, root.path(), &run, console)? {
@@ -254,6 +376,46 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
         }
     }
     Ok(true)
+}
+
+fn outcome_of(drivers: &[(String, String)]) -> Outcome {
+    Outcome::Evaluation { drivers: drivers.iter().map(|(_, spec)| spec.clone()).collect() }
+}
+
+/// The place of a stage, but for its folder.
+pub(crate) fn place_of<'a>(command: &'a str, settings: &Settings) -> Place<'a> {
+    let build = build_info::get();
+    Place { build, out: None, overwrite: false, command, preset: command, seed: settings.seed.0 }
+}
+
+/// Who drives in a stage, and where.
+pub(crate) struct Drive<'a> {
+    settings: &'a Settings,
+    drivers: Vec<NamedDriver>,
+    lots: Vec<Lot>,
+}
+
+impl<'a> Drive<'a> {
+    pub(crate) fn load(stage: &'a Stage, drivers: &[(String, String)]) -> anyhow::Result<Self> {
+        let settings = &stage.settings;
+        let drivers = stages::load(drivers, settings)?;
+        let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
+        Ok(Self { settings, drivers, lots })
+    }
+
+    pub(crate) fn plan(&self, shard: Option<Shard>) -> Plan<'_> {
+        let Self { settings, drivers, lots } = self;
+        Plan { settings, drivers, lots, compare_with: conclusions::compare_with(drivers), shard }
+    }
+
+    /// What the stage of a shard is asked for, beside its settings.
+    fn request(&self, shard: Shard) -> Request {
+        let mut arguments = toml::Table::new();
+        if let Some(record) = ShardRecord::of(&self.plan(Some(shard))) {
+            record.add_to(&mut arguments);
+        }
+        Request { arguments, ..Request::default() }
+    }
 }
 
 /// Copies behaviour cloning from a finished chain: complete or not at all.
