@@ -199,10 +199,13 @@ impl Shards {
         let is_theirs = *settings == *self.settings()
             && manifest.arguments == own.arguments
             && manifest.target == own.target
-            && version(manifest) == version(own);
+            && manifest.program == own.program
+            // A program outside of its checkout, as nodes of a cluster are sent it, does not know its revision.
+            && manifest.git_revision.iter().all(|revision| own.git_revision.iter().all(|other| revision == other));
         ensure!(
             is_theirs,
-            "{}: its settings, lots or version of lotpilot are not those of the shards, so that they are no part of it;              make them again with --networks {0}",
+            "{}: its settings, lots or version of lotpilot are not those of the shards, so that they are no part of it; \
+             make them again with --networks {0}",
             run.display()
         );
         Ok(())

@@ -1,4 +1,4 @@
-"""Evaluations and lots on a Ray cluster, shard by shard: ``pip install "lotpilot[ray]"``.
+"""Evaluations, reproductions and lots on a Ray cluster, shard by shard: ``pip install "lotpilot[ray]"``.
 
     import lotpilot.ray
     tables = lotpilot.ray.evaluate({"mine": my_policy, "expert": "expert"}, "test:1000", shards=64, out="runs/on-ray",
@@ -18,6 +18,7 @@ import hashlib
 import json
 import os
 import shutil
+import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
@@ -31,7 +32,7 @@ from . import _native, tables
 from .core import names
 from .tables import Driver, Evaluation, Table
 
-__all__ = ["ShardError", "evaluate", "generate"]
+__all__ = ["ShardError", "evaluate", "generate", "reproduce"]
 
 Files = dict[str, bytes]
 """The content of files by their paths within a folder."""
@@ -77,10 +78,67 @@ def evaluate(
     if out.exists():
         raise FileExistsError(f"{out}: exists already; choose another folder, or delete it")
     _claim(folder, {"evaluate": request.described(), "shards": shards, "lotpilot": _digest()})
-    parts = [folder / str(number) for number in range(1, shards + 1)]
+    parts = _parts(folder, shards)
     missing = {part: (request, f"{part.name}/{shards}") for part in parts if not part.exists()}
     _drive(_evaluate, missing, _keep, folder, len(parts), address, cpus, retries, progress)
     return request.merge(parts, out)
+
+
+def reproduce(
+    *arguments: str,
+    shards: int,
+    out: str | os.PathLike[str],
+    program: str | os.PathLike[str] = "target/debug/xtask",
+    address: str | None = None,
+    cpus: int = 1,
+    retries: int = 3,
+    progress: bool = True,
+) -> str:
+    """Does what ``cargo xtask reproduce`` does, on a Ray cluster: its trainings first, then what all networks drive.
+
+    Args:
+        *arguments: Those of the command, but for ``--out``, ``--overwrite`` and ``--resume``: ``"--full"``.
+        shards: How many tasks there are of each half. A training is done by one task; more tasks than trainings have
+            nothing to train.
+        out: Folder of the run, below the working folder. Shards are kept in ``OUT.trained/`` and ``OUT.driven/``.
+        program: What ``cargo xtask`` runs, as ``cargo build -p xtask`` makes it here; nodes are sent this file.
+        address: As in ``evaluate``.
+        cpus: As in ``evaluate``.
+        retries: As in ``evaluate``.
+        progress: As in ``evaluate``.
+
+    Returns:
+        What the command prints: what holds.
+
+    Raises:
+        ValueError: If a number is out of range, or ``out`` does not lie below the working folder.
+        FileExistsError: If the run is finished, or shards are there of other arguments.
+        ShardError: As ``evaluate``.
+    """
+    program, out = Path(program).resolve(), Path(os.path.relpath(out))
+    if ".." in out.parts:
+        raise ValueError(f"{out}: name a folder below the working folder, which nodes can have, too")
+    if (out / "finished.toml").exists():
+        raise FileExistsError(f"{out}: is finished already; choose another folder, or delete it")
+    content = program.read_bytes()
+    about = {"reproduce": arguments, "shards": shards, "program": hashlib.sha256(content).hexdigest()}
+
+    def share(half: str, command: tuple[str, ...], read: Files) -> list[Path]:
+        folder = out.with_name(f"{out.name}.{half}")
+        _claim(folder, about)
+        parts = _parts(folder, shards)
+        missing = [part for part in parts if not part.exists()]
+        jobs = {part: (command, f"{part.name}/{shards}", cpus) for part in missing}
+        _drive(_reproduce, jobs, _keep, folder, len(parts), address, cpus, retries, progress, (content, read))
+        return parts
+
+    trained = share("trained", ("reproduce", *arguments), {})
+    if not (out / "sha256sums").exists():
+        _call(program, "merge", *trained, "--out", out)
+    # What drives reads networks, not what they were trained on.
+    read = {str(out / name): file for name, file in _files(out).items() if not name.endswith((".npy", ".npz"))}
+    driven = share("driven", ("reproduce", "--networks", str(out)), read)
+    return _call(program, "merge", *driven)
 
 
 def generate(
@@ -142,8 +200,9 @@ def _drive(
     cpus: int,
     retries: int,
     progress: bool,
+    shared: Sequence[Any] = (),
 ) -> None:
-    """Does each job as a task, and keeps the answers as they come."""
+    """Does each job as a task, with what all of them share as its last arguments, and keeps the answers as they come."""
     if of < 1 or cpus < 1 or retries < 0:
         raise ValueError("shards and cpus are 1 or more, retries 0 or more")
     if not ray.is_initialized():
@@ -151,8 +210,12 @@ def _drive(
     task = ray.remote(_guarded(work.__name__, _digest())).options(
         num_cpus=cpus, max_retries=retries, runtime_env={"env_vars": _environment(cpus)}
     )
+    # Sent once to every node.
+    references = [ray.put(value) for value in shared]
     # Pickled here, so that a node without lotpilot can take them and say so.
-    job_of = {task.remote(os.getcwd(), cloudpickle.dumps(arguments)): job for job, arguments in jobs.items()}
+    job_of = {
+        task.remote(os.getcwd(), cloudpickle.dumps(arguments), *references): job for job, arguments in jobs.items()
+    }
     pending, failed = list(job_of), []
     while pending:
         (ready,), pending = ray.wait(pending)
@@ -186,7 +249,7 @@ def _guarded(name: str, digest: str) -> Callable[..., Any]:
     Ray pickles it whole, as it is no part of a module: so a node without lotpilot can say so.
     """
 
-    def task(folder: str, arguments: bytes) -> Any:
+    def task(folder: str, arguments: bytes, *shared: Any) -> Any:
         import os
         import pickle
 
@@ -199,11 +262,31 @@ def _guarded(name: str, digest: str) -> Callable[..., Any]:
             return f"{where} has another lotpilot than the caller; install the same wheel on every node"
         try:
             os.chdir(folder)
-            return getattr(here, name)(*pickle.loads(arguments))
+            return getattr(here, name)(*pickle.loads(arguments), *shared)
         except Exception as error:
             return f"{type(error).__name__}: {error}"
 
     return task
+
+
+def _reproduce(command: tuple[str, ...], shard: str, cpus: int, program: bytes, read: Files) -> Files:
+    with tempfile.TemporaryDirectory(prefix="lotpilot-") as scratch:
+        _write(Path(scratch), {"xtask": program, **read})
+        Path(scratch, "xtask").chmod(0o755)
+        _call("./xtask", "--quiet", "--threads", cpus, *command, "--shard", shard, "--out", "shard", folder=scratch)
+        return _files(Path(scratch, "shard"))
+
+
+def _call(program: str | Path, *arguments: object, folder: str | None = None) -> str:
+    """What a command prints; its last line on stderr as an error."""
+    done = subprocess.run([program, *map(str, arguments)], cwd=folder, capture_output=True, encoding="utf-8")
+    if done.returncode:
+        raise ShardError((done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1])
+    return done.stdout
+
+
+def _parts(folder: Path, shards: int) -> list[Path]:
+    return [folder / str(number) for number in range(1, shards + 1)]
 
 
 def _evaluate(request: tables.Request, shard: str) -> Files:

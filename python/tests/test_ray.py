@@ -1,8 +1,10 @@
 """lotpilot.ray on a local cluster: the bytes of one process, though a node dies half-way."""
 
 import os
+import subprocess
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -118,3 +120,27 @@ def test_generate_writes_the_files_of_one_process(cluster, tmp_path):
     assert {name: found[name] for name in ("name", "route_m", "obstacles")} == {
         name: one[name] for name in ("name", "route_m", "obstacles")
     }
+
+
+def test_a_reproduction_comes_to_the_files_of_one_process(cluster, tmp_path, monkeypatch):
+    program = Path(__file__).parents[2] / "target/debug/xtask"
+    if not program.exists():
+        pytest.skip("cargo build -p xtask makes the program that nodes are sent")
+    monkeypatch.chdir(tmp_path)
+    command = [program, "--quiet", "reproduce", "--preset", "smoke", "--out"]
+    subprocess.run([*command, "run"], check=True, capture_output=True)
+    expected = files(tmp_path / "run")
+    Path("run").rename("one")
+    found = lotpilot.ray.reproduce("--preset", "smoke", shards=3, out="run", program=program)
+    assert "DAgger has fewer near-collisions" in found
+    assert files(tmp_path / "run") == expected
+    assert len(expected) > 200
+    with pytest.raises(FileExistsError, match="is finished already"):
+        lotpilot.ray.reproduce("--preset", "smoke", shards=3, out="run", program=program)
+    with pytest.raises(FileExistsError, match="other arguments"):
+        Path("run").rename("ray")
+        lotpilot.ray.reproduce("--preset", "paper", shards=3, out="run", program=program)
+    with pytest.raises(lotpilot.ray.ShardError, match="papier"):
+        lotpilot.ray.reproduce("--preset", "papier", shards=2, out="wrong", program=program)
+    with pytest.raises(ValueError, match="below the working folder"):
+        lotpilot.ray.reproduce(shards=2, out=tmp_path.parent / "elsewhere", program=program)
