@@ -202,7 +202,7 @@ def _drive(
     progress: bool,
     shared: Sequence[Any] = (),
 ) -> None:
-    """Does each job as a task, with what all of them share as its last arguments, and keeps the answers as they come."""
+    """Does each job as a task, its last arguments what all of them share, and keeps the answers as they come."""
     if of < 1 or cpus < 1 or retries < 0:
         raise ValueError("shards and cpus are 1 or more, retries 0 or more")
     if not ray.is_initialized():
