@@ -57,6 +57,16 @@ fn assert_same_as_whole(run: &Path, when: &str) {
     assert!(sums::verify(run).faults.is_empty());
 }
 
+/// Near-collisions (contacts) of a driver, summed over the runs of a stage.
+fn counted(run: &Path, stage: &str, driver: &str) -> String {
+    let text = std::fs::read_to_string(run.join("drives").join(stage).join("runs.jsonl")).unwrap();
+    let runs = text.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let metrics: Vec<_> = runs.filter(|run| run["driver"] == driver).map(|run| run["metrics"].clone()).collect();
+    assert!(!metrics.is_empty(), "{driver} did not drive in {stage}");
+    let sum = |name: &str| metrics.iter().map(|of_run| of_run[name].as_u64().unwrap()).sum::<u64>();
+    format!("{} ({})", sum("near_collisions"), sum("contacts"))
+}
+
 #[test]
 fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
     let resumed = scratch("reproduce").join("resumed");
@@ -86,6 +96,22 @@ fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
     ] {
         assert!(report.contains(part), "{part} is missing from {report}");
     }
+    // What the tables of the ablations count is what the drives wrote.
+    let row = |table: &str, name: &str| {
+        let (_, rest) = report.split_once(table).unwrap();
+        let cells = rest.lines().map(|line| line.split('|').map(str::trim).collect::<Vec<_>>());
+        cells.into_iter().find(|cells| cells.get(1) == Some(&name)).unwrap_or_else(|| panic!("{table}: {name}"))
+    };
+    for name in ["BC", "DAgger", "DAgger, α = 0", "expert's data alone", "DAgger, α = 15"] {
+        assert_eq!(row("### Controls", name)[5], counted(whole, "controls", name), "{name}");
+    }
+    for name in ["expert", "BC", "DAgger", "tentacle", "vvf", "mppi, tuned"] {
+        let row = row("### Action smoothing", name);
+        assert_eq!(row[2], counted(whole, "unsmoothed", name), "{name}");
+        assert_eq!(row[4], counted(whole, "smoothed", name), "{name}");
+    }
+    assert_ne!(counted(whole, "smoothed", "vvf"), "0 (0)", "or the tables could be empty");
+
     let html = std::fs::read_to_string(whole.join("report.html")).unwrap();
     for foreign in ["<script", "<link", "<iframe", "@import", "src=\"http", "href=\"http", "url(http", "src=\"figures"]
     {

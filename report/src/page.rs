@@ -119,7 +119,8 @@ impl Page {
     /// Adds a heading, which the table of contents lists, with Markdown under it.
     pub fn section(&mut self, title: impl Into<String>, markdown: impl Into<String>) -> &mut Self {
         self.parts.push(Part::Heading(title.into()));
-        self.text(markdown)
+        let markdown = markdown.into();
+        if markdown.is_empty() { self } else { self.text(markdown) }
     }
 
     /// Adds a picture. `name`: its file without ending; `caption`: Markdown.
