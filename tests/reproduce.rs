@@ -252,6 +252,22 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
     assert!(rows[0].starts_with("| 2 ") && rows[3].starts_with("| 1 "), "{table}");
     assert!(std::fs::read_to_string(out.join("scaling.svg")).unwrap().contains("different lots"));
     assert!(std::fs::read_to_string(out.join("scaling.csv")).unwrap().contains("validation-lane"));
+
+    // The table in the page of all results.
+    let page = folder.join("results.md");
+    let render = |other: &str| {
+        let mut render = xtask();
+        render.args(["render", "results"]).arg(&WHOLE.0).args(["--with", other, "--to"]).arg(&page);
+        render.output().unwrap()
+    };
+    let unknown = render(&WHOLE.0.to_string_lossy());
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(text(&unknown).1.contains("a run of reproduce has no table of its own"), "{}", text(&unknown).1);
+    assert!(render(&format!("Few lots={out_name}")).status.success());
+    let results = std::fs::read_to_string(&page).unwrap();
+    let (_, last) = results.split_once("\n## Few lots\n").unwrap();
+    assert!(last.contains("Made by `cargo xtask scaling --preset smoke") && last.contains(&table), "{last}");
+    assert!(folder.join("pictures/results/scaling.svg").is_file());
     for (arguments, part) in [
         (["--different", "0"], "name at least one lot"),
         (["--different", "4,4"], "named twice"),

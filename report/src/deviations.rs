@@ -45,6 +45,9 @@ struct Row {
     difference: Option<Interval>,
 }
 
+/// Above the table.
+pub const TITLE: &str = "One thing at a time as in the paper";
+
 /// Writes the table, its rows as CSV and the plot; returns the table.
 ///
 /// # Errors

@@ -8,6 +8,7 @@
 //! | [`page`], [`glossary`] | one HTML page that loads nothing, and what its words mean |
 //! | [`run_report`], [`moments`] | `report.html` of a run, with its worst near-collisions |
 //! | [`reproduction`] | the report of `reproduce` |
+//! | [`other_run`] | the table of another run in that report |
 //! | [`rules`], [`scaling`], [`deviations`] | those of the commands of these names: many trainings, one table, one plot |
 
 mod command_line;
@@ -19,6 +20,7 @@ pub mod failures;
 pub mod glossary;
 pub mod markdown;
 pub mod moments;
+pub mod other_run;
 pub mod page;
 pub mod pictures;
 pub mod pixel_accuracy;

@@ -1,9 +1,10 @@
 //! The one report: what holds, the paper's tables beside ours, ablations. Made from what the stages wrote.
 
-use crate::command_line::command_line;
+use crate::command_line::{command_line, quoted};
 use crate::controls;
 use crate::drive::{rows_of, with_drives};
 use crate::markdown::{table_of, with_header};
+use crate::other_run::OtherRun;
 use crate::page::{Image, Page};
 use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
 use crate::table1::{AGREEMENT, READ_ETA_HAT};
@@ -50,19 +51,20 @@ pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
     Ok(verdicts(&found.statements))
 }
 
-/// Writes the same as a page of the documentation, with what made it in its head; figures go to `pictures/results` beside
-/// it.
+/// Writes the same as a page of the documentation, with what made it in its head and the tables of other runs at its end;
+/// figures go to `pictures/results` beside it.
 ///
 /// # Errors
 /// If what a stage wrote cannot be read, or a file cannot be written.
-pub fn write_docs(recipe: &Recipe, run: &Path, to: &Path) -> anyhow::Result<()> {
+pub fn write_docs(recipe: &Recipe, run: &Path, others: &[OtherRun], to: &Path) -> anyhow::Result<()> {
     let manifest = Manifest::read(run)?;
     let unknown = || "unknown".to_owned();
-    let mut head = "Written by a command from one run; nothing here is typed by hand.\n\n| | |\n|---|---|\n".to_owned();
+    let mut head =
+        "Written by a command from its runs; nothing here is typed by hand.\n\n| | |\n|---|---|\n".to_owned();
     let changes = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };
     for (name, value) in [
         ("command", format!("`{}`", command_line(&manifest))),
-        ("written by", format!("`cargo xtask render results {}`", run.display())),
+        ("written by", format!("`{}`", written_by(run, others))),
         ("commit", format!("`{}`{changes}", manifest.git_revision.clone().unwrap_or_else(unknown))),
         ("program", manifest.program.clone()),
         ("machine", format!("{}, {} threads", manifest.processor.clone().unwrap_or_else(unknown), manifest.threads)),
@@ -79,7 +81,15 @@ pub fn write_docs(recipe: &Recipe, run: &Path, to: &Path) -> anyhow::Result<()> 
     page.text(introduction(recipe));
     page.text(CAUTIONS);
     Found::read(recipe, run)?.add_to(&mut page, recipe, run)?;
+    others.iter().try_for_each(|other| other.add_to(&mut page))?;
     page.write_markdown(to, "pictures/results")
+}
+
+fn written_by(run: &Path, others: &[OtherRun]) -> String {
+    let words = others.iter().map(|other| quoted(&other.to_string()));
+    let with = if others.is_empty() { None } else { Some("--with".to_owned()) };
+    let command = ["cargo xtask render results".to_owned(), run.display().to_string()];
+    command.into_iter().chain(with).chain(words).collect::<Vec<_>>().join(" ")
 }
 
 /// What a reader must know before quoting a figure.

@@ -51,6 +51,9 @@ struct Row {
     upper: f64,
 }
 
+/// Above the table.
+pub const TITLE: &str = "Decision rules at equal samples";
+
 /// Writes the table, its rows as CSV and the plot; returns the table.
 ///
 /// # Errors

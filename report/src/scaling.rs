@@ -38,6 +38,9 @@ struct Row {
     quoted: String,
 }
 
+/// Above the table.
+pub const TITLE: &str = "Near-collisions against different lots";
+
 /// Writes the table, its rows as CSV and the plot; returns the table.
 ///
 /// # Errors

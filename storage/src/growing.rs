@@ -42,6 +42,8 @@ impl Growing {
         for (index, &name) in files.iter().enumerate() {
             let path = folder.join(name);
             let failed = |error: std::io::Error| FileError::new(&path, error, whole::WRITE_REMEDY);
+            // Who puts shards together writes the file at once, and may have died meanwhile.
+            whole::remove_partial(&path)?;
             let (bytes, sha256) =
                 left.as_ref().map_or_else(|| Ok((0, Sha256::new())), |left| left.check(index, &path))?;
             let mut file = File::options().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
@@ -159,6 +161,19 @@ impl Mark {
 mod tests {
     use super::*;
     use std::fs;
+
+    /// A merge that died left it, and the evaluation that went on left it there for good.
+    #[test]
+    fn what_was_being_written_in_the_place_of_a_file_is_gone() {
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-growing-partial", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        fs::write(folder.join("runs.partial"), "1\n").unwrap();
+        Growing::open(&folder, "driving", &["runs"]).unwrap().finish().unwrap();
+        assert_eq!(sums::verify(&folder).files, 1);
+        assert!(!folder.join("runs.partial").exists());
+        fs::remove_dir_all(folder).unwrap();
+    }
 
     #[test]
     fn files_go_on_after_the_last_whole_part_and_damage_is_noticed() {

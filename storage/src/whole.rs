@@ -51,15 +51,25 @@ fn failed(path: &Path, problem: &dyn Display) -> FileError {
 /// # Errors
 /// If one cannot be deleted.
 pub fn remove(path: &Path) -> Result<(), FileError> {
-    for path in [&path.with_added_extension("partial"), path] {
-        match fs::remove_file(path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                return Err(FileError::new(path, format_args!("cannot be deleted: {error}"), WRITE_REMEDY));
-            }
-            _ => {}
+    remove_partial(path)?;
+    remove_file(path)
+}
+
+/// Deletes what a process that died was writing in the place of a file, if it is there.
+///
+/// # Errors
+/// If it cannot be deleted.
+pub fn remove_partial(path: &Path) -> Result<(), FileError> {
+    remove_file(&path.with_added_extension("partial"))
+}
+
+fn remove_file(path: &Path) -> Result<(), FileError> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+            Err(FileError::new(path, format_args!("cannot be deleted: {error}"), WRITE_REMEDY))
         }
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 #[cfg(test)]

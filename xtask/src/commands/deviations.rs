@@ -31,7 +31,7 @@ pub(crate) struct DeviationsArgs {
 
 const RUN: Trainings<Extent> = Trainings {
     command: "deviations",
-    title: "One thing at a time as in the paper",
+    title: report::deviations::TITLE,
     stages: deviations::stages,
     write: report::deviations::write,
     unseen: |extent| &extent.unseen,

@@ -20,6 +20,7 @@ use experiment::trials::{Purpose, Trial};
 use policy::checkpoint::Checkpoint;
 use policy::dataset::store::Store;
 use rayon::prelude::*;
+use report::other_run::OtherRun;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
 use report::pictures::{contact_sheet, lot, noise, samples};
 use report::{reproduction, run_report};
@@ -91,6 +92,9 @@ pub(crate) struct RenderResultsArgs {
     /// Folder of a finished `reproduce`.
     #[arg(value_name = "RUN")]
     run: PathBuf,
+    /// Finished runs whose tables are added at the end: of `deviations`, `rules`, `scaling`, `evaluate` or a training.
+    #[arg(long, value_name = "[TITLE=]DIR", num_args = 1..)]
+    with: Vec<OtherRun>,
     /// File to write; figures go to `pictures/results` beside it.
     #[arg(long, value_name = "FILE.md", default_value = "docs/results.md")]
     to: PathBuf,
@@ -389,7 +393,7 @@ fn render_results(args: &RenderResultsArgs, output: &Output) -> anyhow::Result<(
         "{}: this is no finished run; make one with cargo xtask reproduce",
         args.run.display()
     );
-    reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.to)?;
+    reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.with, &args.to)?;
     output.print(args.to.display());
     Ok(())
 }

@@ -51,7 +51,7 @@ const LOTS: &str = r#"training.lots=["lot-a", "train:18:all"]"#;
 
 const RULES: Trainings<Extent> = Trainings {
     command: "rules",
-    title: "Decision rules at equal samples",
+    title: report::rules::TITLE,
     stages: |settings, extent, root| Ok(rules::stages(settings, extent, root)),
     write: report::rules::write,
     unseen: |extent| &extent.unseen,

@@ -35,7 +35,7 @@ const LOTS: &str = "train:144:all";
 
 const SCALING: Trainings<Extent> = Trainings {
     command: "scaling",
-    title: "Near-collisions against different lots",
+    title: report::scaling::TITLE,
     stages: |settings, extent, root| Ok(scaling::stages(settings, extent, root)),
     write: report::scaling::write,
     unseen: |extent| &extent.unseen,

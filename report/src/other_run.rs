@@ -1,0 +1,84 @@
+//! The table of another run in a page: of one that trained several times, of an evaluation or of a training.
+
+use crate::command_line::command_line;
+use crate::page::{Image, Page};
+use crate::{deviations, rules, scaling};
+use anyhow::{bail, ensure};
+use experiment::run_dir::{self, Manifest};
+use sim::limits::RUN_TEXT_BYTES_MAX;
+use std::convert::Infallible;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use storage::sums;
+
+/// A run, and what stands above its table: `DIR` or `TITLE=DIR`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OtherRun {
+    title: Option<String>,
+    folder: PathBuf,
+}
+
+impl FromStr for OtherRun {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(match text.split_once('=') {
+            Some((title, folder)) => Self { title: Some(title.to_owned()), folder: folder.into() },
+            None => Self { title: None, folder: text.into() },
+        })
+    }
+}
+
+impl fmt::Display for OtherRun {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.title.iter().try_for_each(|title| write!(f, "{title}="))?;
+        write!(f, "{}", self.folder.display())
+    }
+}
+
+impl OtherRun {
+    pub(crate) fn add_to(&self, page: &mut Page) -> anyhow::Result<()> {
+        let folder = &self.folder;
+        let name = folder.display();
+        ensure!(folder.is_dir() && run_dir::is_finished(folder)?, "{name}: this is no finished run");
+        let manifest = Manifest::read(folder)?;
+        let (title, table) = match manifest.command.as_str() {
+            "deviations" => (deviations::TITLE, "deviations.md"),
+            "rules" => (rules::TITLE, "rules.md"),
+            "scaling" => (scaling::TITLE, "scaling.md"),
+            "evaluate" => ("An evaluation", "summary.md"),
+            "train-bc" | "train-dagger" => ("A training", "table1.md"),
+            other => bail!(
+                "{name}: a run of {other} has no table of its own; name runs of deviations, rules, scaling, \
+                            evaluate, train-bc or train-dagger"
+            ),
+        };
+        let revision = manifest.git_revision.as_deref().unwrap_or("unknown");
+        let made_by = format!("Made by `{}` at commit `{revision}`.", command_line(&manifest));
+        let text = sums::read_to_string(&folder.join(table), RUN_TEXT_BYTES_MAX)?;
+        page.section(self.title.as_deref().unwrap_or(title), format!("{made_by}\n\n{text}"));
+        let plot = Path::new(table).with_extension("svg");
+        if let Some(svg) = sums::read_if_listed(&folder.join(&plot), RUN_TEXT_BYTES_MAX)? {
+            let stem = manifest.command;
+            page.figure(stem, "The same as a plot.", Image::Svg(String::from_utf8(svg)?));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_is_named_by_its_folder_with_or_without_a_title() {
+        let of = |text: &str| text.parse::<OtherRun>().unwrap();
+        assert_eq!(of("runs/rules"), OtherRun { title: None, folder: "runs/rules".into() });
+        let titled = OtherRun { title: Some("The paper's regime".to_owned()), folder: "runs/paper".into() };
+        assert_eq!(of("The paper's regime=runs/paper"), titled);
+        assert_eq!(titled.to_string(), "The paper's regime=runs/paper");
+        let error = of("no/such/run").add_to(&mut Page::new("Results")).unwrap_err().to_string();
+        assert!(error.contains("no/such/run: this is no finished run"), "{error}");
+    }
+}
