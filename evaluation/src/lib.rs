@@ -3,20 +3,21 @@
 //! | module | what |
 //! |---|---|
 //! | [`plan`], [`mod@evaluate`] | drivers × lots × directions × trials × noise levels, driven and written down |
-//! | [`shards`] | an evaluation driven in parts on several machines, put together again |
+//! | [`shards`] | what several machines did a share of each, put together again |
 //! | [`records`] | the lines of `runs.jsonl`, `failures.jsonl`, `wall_time.jsonl` |
 //! | [`incidents`] | near-collisions one by one, and why they happened |
 //! | [`totals`], [`slices`], [`results`], [`judge`], [`trainings`] | runs added up, pooled and compared |
 //! | [`statistics`] | exact intervals, comparisons, paired bootstrap, sample sizes |
 //! | [`summary`], [`table1`] | the tables as data |
 //! | [`calibration`], [`on_policy`] | whether the predicted variance is right, on held-back and on driven states |
-//! | [`paper`], [`conclusions`], [`stages`], [`rules`], [`scaling`], [`deviations`], [`estimate`] | the paper's figures, which of its conclusions hold here, and what is done to find out, in what time |
+//! | [`paper`], [`conclusions`], [`stages`], [`drive_stage`], [`rules`], [`scaling`], [`deviations`], [`estimate`] | the paper's figures, which of its conclusions hold here, and what is done to find out, in what time |
 //! | [`tune`] | parameters of planners, searched alike for each |
 //! | [`pixel_accuracy`] | how wrong the noisy view is |
 
 pub mod calibration;
 pub mod conclusions;
 pub mod deviations;
+pub mod drive_stage;
 pub mod estimate;
 pub mod evaluate;
 pub mod format;

@@ -1,10 +1,10 @@
 //! What each deviation from the paper does: `deviations.md`, `.csv` and `.svg`.
 
-use crate::drive::Drive;
 use crate::markdown::table_of;
 use crate::plots::{self, RateRow};
 use anyhow::Context as _;
 use evaluation::deviations::{self, BASE, Extent};
+use evaluation::drive_stage::DriveStage;
 use evaluation::format::{difference, quoted_interval, quoted_rate};
 use evaluation::results::EvaluationResults;
 use evaluation::stages::{Stage, Step};
@@ -84,7 +84,7 @@ pub fn write(_: &Settings, _: &Extent, stages: &[Stage], run: &RunDir) -> anyhow
 }
 
 fn rows_of(stage: &Stage, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<Row>> {
-    let drive = Drive::of(stage)?;
+    let drive = DriveStage::load(stage)?;
     let plan = drive.plan();
     let results = EvaluationResults::read(&plan, &run.path().join(&stage.folder))?;
     let everywhere = results.slices().pop().context("lots were driven on")?;

@@ -1,43 +1,15 @@
 //! What stages wrote, read back.
 
 use anyhow::Context as _;
-use evaluation::conclusions::{self, Driven};
+use evaluation::conclusions::Driven;
+use evaluation::drive_stage::DriveStage;
 use evaluation::plan::Plan;
 use evaluation::results::EvaluationResults;
-use evaluation::stages::{self, Chain, Stage, Step};
+use evaluation::stages::{Chain, Stage};
 use evaluation::table1::Table1;
-use experiment::drivers::NamedDriver;
-use experiment::lots::Lot;
-use experiment::settings::Settings;
 use policy::dagger::IterationRow;
 use sim::seed::RootSeed;
 use std::path::Path;
-
-/// A stage that drove.
-pub(crate) struct Drive<'a> {
-    stage: &'a Stage,
-    drivers: Vec<NamedDriver>,
-    lots: Vec<Lot>,
-}
-
-impl<'a> Drive<'a> {
-    pub(crate) fn of(stage: &'a Stage) -> anyhow::Result<Self> {
-        let Step::Drive { drivers } = &stage.step else { anyhow::bail!("{} drives", stage.folder) };
-        let drivers = stages::load(drivers, &stage.settings)?;
-        let lots = Lot::parse_all(&stage.settings.evaluation.lots, &stage.settings.episode.vehicle)?;
-        Ok(Self { stage, drivers, lots })
-    }
-
-    pub(crate) fn settings(&self) -> &Settings {
-        &self.stage.settings
-    }
-
-    pub(crate) fn plan(&self) -> Plan<'_> {
-        let compare_with = conclusions::compare_with(&self.drivers);
-        let (settings, drivers, lots) = (&self.stage.settings, &self.drivers, &self.lots);
-        Plan { settings, drivers, lots, compare_with, shard: None }
-    }
-}
 
 /// Calls with what was driven in the stages of these folders within the run at `root`.
 pub(crate) fn with_drives<const N: usize, T>(
@@ -47,10 +19,10 @@ pub(crate) fn with_drives<const N: usize, T>(
     then: impl FnOnce([Driven<'_>; N]) -> anyhow::Result<T>,
 ) -> anyhow::Result<T> {
     let open = |folder: &str| {
-        Drive::of(stages.iter().find(|stage| stage.folder == folder).context("every report has this stage")?)
+        DriveStage::load(stages.iter().find(|stage| stage.folder == folder).context("every report has this stage")?)
     };
     let drives = folders.iter().map(|folder| open(folder)).collect::<anyhow::Result<Vec<_>>>()?;
-    let plans: Vec<Plan<'_>> = drives.iter().map(Drive::plan).collect();
+    let plans: Vec<Plan<'_>> = drives.iter().map(DriveStage::plan).collect();
     let read = |(plan, folder): (&Plan<'_>, &str)| EvaluationResults::read(plan, &root.join(folder));
     let results = plans.iter().zip(folders).map(read).collect::<anyhow::Result<Vec<_>>>()?;
     then(std::array::from_fn(|i| Driven { plan: &plans[i], results: &results[i] }))

@@ -1,9 +1,9 @@
 //! The `DAgger` family at equal samples: what collecting cost, and how the policies drive: `rules.md`, `.csv` and `.svg`.
 
-use crate::drive::Drive;
 use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
 use anyhow::Context as _;
+use evaluation::drive_stage::DriveStage;
 use evaluation::format::quoted_interval;
 use evaluation::results::EvaluationResults;
 use evaluation::rules::{self, Extent};
@@ -59,7 +59,7 @@ pub const TITLE: &str = "Decision rules at equal samples";
 /// # Errors
 /// If what a stage wrote cannot be read, or a file cannot be written.
 pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<String> {
-    let drive = Drive::of(stages.last().context("the last stage drives")?)?;
+    let drive = DriveStage::load(stages.last().context("the last stage drives")?)?;
     let results = EvaluationResults::read(&drive.plan(), &run.path().join(rules::DRIVES))?;
     let everywhere = results.slices().pop().context("lots were driven on")?;
     let control_period_s = f64::from(settings.episode.control_period_s());

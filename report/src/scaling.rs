@@ -1,9 +1,9 @@
 //! Near-collisions against the number of different lots that were trained on: `scaling.md`, `.csv` and `.svg`.
 
-use crate::drive::Drive;
 use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
 use anyhow::Context as _;
+use evaluation::drive_stage::DriveStage;
 use evaluation::format::{quoted_interval, quoted_rate};
 use evaluation::results::EvaluationResults;
 use evaluation::scaling::{self, Extent};
@@ -67,7 +67,7 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
 }
 
 fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<Row>> {
-    let drive = Drive::of(stages.last().context("the last stage drives")?)?;
+    let drive = DriveStage::load(stages.last().context("the last stage drives")?)?;
     let results = EvaluationResults::read(&drive.plan(), &run.path().join(scaling::DRIVES))?;
     let kinds = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     let kinds: BTreeSet<String> = kinds.iter().filter(|lot| lot.is_generated()).map(Lot::group).collect();

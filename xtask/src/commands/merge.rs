@@ -2,12 +2,13 @@
 
 use crate::args::{JsonArgs, OutArgs};
 use crate::commands::evaluate::{self, Asked};
-use crate::commands::reproduce::{self, Drive};
+use crate::commands::reproduce;
 use crate::console::Console;
 use crate::interrupt;
 use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
+use evaluation::drive_stage::DriveStage;
 use evaluation::plan::Plan;
 use evaluation::shards::Shards;
 use evaluation::stages::{self, Step};
@@ -103,9 +104,10 @@ fn drives(shards: &Shards, networks: &Path, output: &Output) -> anyhow::Result<(
     shards.stages(&all)?;
     let mut merged = Vec::new();
     for stage in &all {
-        let Step::Drive { drivers } = &stage.step else { continue };
-        let parts = Shards::read(&shards.folders_of(&stage.folder))?;
-        merged.push((stage, parts.rows(&Drive::load(stage, drivers)?.plan(None))?));
+        if matches!(stage.step, Step::Drive { .. }) {
+            let parts = Shards::read(&shards.folders_of(&stage.folder))?;
+            merged.push((stage, parts.rows(&DriveStage::load(stage)?.plan())?));
+        }
     }
     interrupt::can_resume(reproduce::COMMAND, run.path());
     for (stage, rows) in merged {

@@ -9,9 +9,8 @@ use crate::interrupt;
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::Args;
-use evaluation::conclusions;
+use evaluation::drive_stage::DriveStage;
 use evaluation::on_policy;
-use evaluation::plan::Plan;
 use evaluation::shards::ShardRecord;
 use evaluation::stages::{self, Extent, Stage, Step};
 use experiment::drivers::{self, DriverSpec, NamedDriver};
@@ -340,11 +339,8 @@ fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<()
 /// Does a stage unless it is done; `false` if cut short by Ctrl-C.
 fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, output: &Output) -> anyhow::Result<bool> {
     let settings = &stage.settings;
-    let shard_of = || match &stage.step {
-        Step::DriveShard { drivers, shard } => Ok(Drive::load(stage, drivers)?.request(*shard)),
-        _ => Ok(Request::default()),
-    };
-    let Some(run) = root.stage_for(&stage.folder, &place_of(command, settings), settings, shard_of)? else {
+    let request = || request_of(stage);
+    let Some(run) = root.stage_for(&stage.folder, &place_of(command, settings), settings, request)? else {
         output.note("done before");
         return Ok(true);
     };
@@ -357,15 +353,15 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
             run.finish(outcome)?;
         }
         Step::Drive { drivers } => {
-            let drive = Drive::load(stage, drivers)?;
-            evaluate::check(&drive.plan(None))?;
-            evaluate::measure(&drive.plan(None), &run, console, output)?;
+            let drive = DriveStage::load(stage)?;
+            evaluate::check(&drive.plan())?;
+            evaluate::measure(&drive.plan(), &run, console, output)?;
             run.finish(outcome_of(drivers))?;
         }
-        Step::DriveShard { drivers, shard } => {
-            let drive = Drive::load(stage, drivers)?;
-            evaluate::check(&drive.plan(Some(*shard)))?;
-            evaluate::drive(&drive.plan(Some(*shard)), &run, console)?;
+        Step::DriveShard { drivers, .. } => {
+            let drive = DriveStage::load(stage)?;
+            evaluate::check(&drive.plan())?;
+            evaluate::drive(&drive.plan(), &run, console)?;
             run.finish(outcome_of(drivers))?;
         }
         Step::OnPolicy => {
@@ -388,34 +384,15 @@ pub(crate) fn place_of<'a>(command: &'a str, settings: &Settings) -> Place<'a> {
     Place { build, out: None, overwrite: false, command, preset: command, seed: settings.seed.0 }
 }
 
-/// Who drives in a stage, and where.
-pub(crate) struct Drive<'a> {
-    settings: &'a Settings,
-    drivers: Vec<NamedDriver>,
-    lots: Vec<Lot>,
-}
-
-impl<'a> Drive<'a> {
-    pub(crate) fn load(stage: &'a Stage, drivers: &[(String, String)]) -> anyhow::Result<Self> {
-        let settings = &stage.settings;
-        let drivers = stages::load(drivers, settings)?;
-        let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
-        Ok(Self { settings, drivers, lots })
+/// What a stage is asked for beside its settings: its share, if it has one.
+fn request_of(stage: &Stage) -> anyhow::Result<Request> {
+    let mut arguments = toml::Table::new();
+    if matches!(stage.step, Step::DriveShard { .. })
+        && let Some(record) = ShardRecord::of(&DriveStage::load(stage)?.plan())
+    {
+        record.add_to(&mut arguments);
     }
-
-    pub(crate) fn plan(&self, shard: Option<Shard>) -> Plan<'_> {
-        let Self { settings, drivers, lots } = self;
-        Plan { settings, drivers, lots, compare_with: conclusions::compare_with(drivers), shard }
-    }
-
-    /// What the stage of a shard is asked for, beside its settings.
-    fn request(&self, shard: Shard) -> Request {
-        let mut arguments = toml::Table::new();
-        if let Some(record) = ShardRecord::of(&self.plan(Some(shard))) {
-            record.add_to(&mut arguments);
-        }
-        Request { arguments, ..Request::default() }
-    }
+    Ok(Request { arguments, ..Request::default() })
 }
 
 /// Copies behaviour cloning from a finished chain: complete or not at all.
