@@ -2,7 +2,7 @@
 
 use crate::args::{JsonArgs, OutArgs};
 use crate::commands::evaluate::{self, Asked};
-use crate::commands::reproduce;
+use crate::commands::{perform, reproduce};
 use crate::console::Console;
 use crate::interrupt;
 use crate::output::Output;
@@ -111,7 +111,7 @@ fn drives(shards: &Shards, networks: &Path, output: &Output) -> anyhow::Result<(
     }
     interrupt::can_resume(reproduce::COMMAND, run.path());
     for (stage, rows) in merged {
-        let place = reproduce::place_of(reproduce::COMMAND, &stage.settings);
+        let place = perform::place_of(reproduce::COMMAND, &stage.settings);
         if let Some(driven) = run.stage(&stage.folder, &place, &stage.settings)? {
             rows.write(&driven)?;
         }

@@ -1,26 +1,20 @@
 //! `reproduce`: the paper in a box. Trains, drives and writes one report; every stage has a folder of its own and is
 //! skipped where it is finished already.
 
-use super::{evaluate, train};
+use super::{perform, train};
 use crate::args::{LayerArgs, OutArgs};
-use crate::build_info;
 use crate::console::Console;
-use crate::interrupt;
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::Args;
-use evaluation::drive_stage::DriveStage;
-use evaluation::on_policy;
 use evaluation::shards::ShardRecord;
 use evaluation::stages::{self, Extent, Stage, Step};
 use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
-use experiment::progress::{Interrupted, Progress as _};
-use experiment::run_dir::{self, Manifest, Outcome, Place, Request, RunDir};
+use experiment::run_dir::{self, Manifest, Outcome, Request, RunDir};
 use experiment::settings::{Layers, Settings};
 use experiment::shard::Shard;
-use policy::dataset::store::Store;
 use report::reproduction::{self, Recipe};
 use std::path::{Path, PathBuf};
 use storage::sums;
@@ -91,7 +85,7 @@ pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
     let root = record.networks.as_deref().unwrap_or(run.path());
     let stages = record.share_of(stages::all(&settings, &extent, root));
     let console = Console::new(output);
-    perform_all(COMMAND, &stages, &run, &console, output)?;
+    perform::all(COMMAND, &stages, &run, &console, output)?;
     run.finish(Outcome::Reproduction { stages: stages.len() })?;
     let (folder, number) = (run.path().display(), record.number);
     output.note(format_args!("written: {folder}: shard {number}; put all together with cargo xtask merge DIR..."));
@@ -104,49 +98,13 @@ pub(crate) fn finish(run: &RunDir, settings: Settings, extent: Extent, output: &
     let stages = stages::all(&settings, &extent, run.path());
     let recipe = Recipe { settings, extent, stages };
     let console = Console::new(output);
-    perform_all(COMMAND, &recipe.stages, run, &console, output)?;
+    perform::all(COMMAND, &recipe.stages, run, &console, output)?;
     let conclusions = reproduction::write(&recipe, run)?;
     output.table(|| format!("\nWhat holds here\n\n{conclusions}"), &())?;
     run.finish(Outcome::Reproduction { stages: recipe.stages.len() })?;
     output.note(format_args!("written: {}/report.html, report.md, conclusions.csv and figures/", run.path().display()));
     console.report_time();
     Ok(())
-}
-
-/// Does every stage of a run that is not done yet.
-pub(crate) fn perform_all(
-    command: &str,
-    stages: &[Stage],
-    run: &RunDir,
-    console: &Console,
-    output: &Output,
-) -> anyhow::Result<()> {
-    output.note(format_args!("run: {}", run.path().display()));
-    interrupt::can_resume(command, run.path());
-    announce(stages, run.path(), output)?;
-    let mut tasks = Vec::new();
-    for stage in stages {
-        if !run_dir::is_finished(&run.path().join(&stage.folder))? {
-            tasks.extend(stage.tasks());
-        }
-    }
-    console.plan(tasks);
-    for (index, stage) in stages.iter().enumerate() {
-        let (place, of) = (index + 1, stages.len());
-        output.note(format_args!("\n{place} of {of}: {} ({})", stage.about, stage.folder));
-        let is_done = if console.is_cancelled() { Ok(false) } else { perform(command, stage, run, console, output) };
-        match is_done {
-            Ok(true) => {}
-            Ok(false) => return Err(cut_short(run.path(), index)),
-            Err(error) if error.is::<Interrupted>() => return Err(cut_short(run.path(), index)),
-            Err(error) => return Err(error.context(format!("stage {}", stage.folder))),
-        }
-    }
-    Ok(())
-}
-
-fn cut_short(root: &Path, finished: usize) -> anyhow::Error {
-    Interrupted { kept: format!("{finished} finished stages are in {}", root.display()) }.into()
 }
 
 /// What a run was asked for, besides what its settings say.
@@ -319,95 +277,4 @@ fn tuned(folder: Option<&Path>) -> anyhow::Result<Vec<String>> {
     ensure!(!specs.is_empty(), "--tuned {}: no parameters are there; cargo xtask tune writes them", folder.display());
     DriverSpec::parse_all(&specs)?;
     Ok(specs)
-}
-
-/// What will be done, with a guess at how long it takes.
-fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<()> {
-    let mut left_s = 0.0;
-    output.note("stages, with the minutes they take on two quiet cores:");
-    for (index, stage) in stages.iter().enumerate() {
-        let is_finished = run_dir::is_finished(&root.join(&stage.folder))?;
-        let estimate_s = if is_finished { 0.0 } else { stage.estimate_s() };
-        left_s += estimate_s;
-        let minutes = if is_finished { "done".to_owned() } else { format!("{:.1}", estimate_s / 60.0) };
-        output.note(format_args!("{:>3}. {minutes:>6}  {} ({})", index + 1, stage.about, stage.folder));
-    }
-    output.note(format_args!("about {:.0} minutes in all", (left_s / 60.0).ceil()));
-    Ok(())
-}
-
-/// Does a stage unless it is done; `false` if cut short by Ctrl-C.
-fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, output: &Output) -> anyhow::Result<bool> {
-    let settings = &stage.settings;
-    let request = || request_of(stage);
-    let Some(run) = root.stage_for(&stage.folder, &place_of(command, settings), settings, request)? else {
-        output.note("done before");
-        return Ok(true);
-    };
-    match &stage.step {
-        Step::Train { cloning_of } => {
-            if let Some(chain) = cloning_of {
-                take_over_cloning(&root.path().join(chain), &run)?;
-            }
-            let Ok((_, outcome)) = train::tabulated(settings, &run, console, output)? else { return Ok(false) };
-            run.finish(outcome)?;
-        }
-        Step::Drive { drivers } => {
-            let drive = DriveStage::load(stage)?;
-            evaluate::check(&drive.plan())?;
-            evaluate::measure(&drive.plan(), &run, console, output)?;
-            run.finish(outcome_of(drivers))?;
-        }
-        Step::DriveShard { drivers, .. } => {
-            let drive = DriveStage::load(stage)?;
-            evaluate::check(&drive.plan())?;
-            evaluate::drive(&drive.plan(), &run, console)?;
-            run.finish(outcome_of(drivers))?;
-        }
-        Step::OnPolicy => {
-            if !on_policy::run(settings, root.path(), &run, console)? {
-                return Ok(false);
-            }
-            run.finish(Outcome::Evaluation { drivers: Vec::new() })?;
-        }
-    }
-    Ok(true)
-}
-
-fn outcome_of(drivers: &[(String, String)]) -> Outcome {
-    Outcome::Evaluation { drivers: drivers.iter().map(|(_, spec)| spec.clone()).collect() }
-}
-
-/// The place of a stage, but for its folder.
-pub(crate) fn place_of<'a>(command: &'a str, settings: &Settings) -> Place<'a> {
-    let build = build_info::get();
-    Place { build, out: None, overwrite: false, command, preset: command, seed: settings.seed.0 }
-}
-
-/// What a stage is asked for beside its settings: its share, if it has one.
-fn request_of(stage: &Stage) -> anyhow::Result<Request> {
-    let mut arguments = toml::Table::new();
-    if matches!(stage.step, Step::DriveShard { .. })
-        && let Some(record) = ShardRecord::of(&DriveStage::load(stage)?.plan())
-    {
-        record.add_to(&mut arguments);
-    }
-    Ok(Request { arguments, ..Request::default() })
-}
-
-/// Copies behaviour cloning from a finished chain: complete or not at all.
-fn take_over_cloning(from: &Path, run: &RunDir) -> anyhow::Result<()> {
-    const ROUND: &str = "round-00";
-    let (from, to) = (Store::open(from)?, Store::open(run.path())?);
-    let source = from.round_folder(0);
-    if to.is_finished(&to.round_folder(0))? {
-        return Ok(());
-    }
-    ensure!(from.is_finished(&source)?, "{}: behaviour cloning is not finished there", source.display());
-    let files = sums::names(&source)?.into_iter().map(|name| {
-        // Its size was checked by nobody, its digest is.
-        let content = sums::read_listed(&source, &name, u64::MAX)?;
-        Ok::<_, anyhow::Error>((name, content))
-    });
-    Ok(sums::write_folder(run.path(), ROUND, files.collect::<anyhow::Result<Vec<_>>>()?)?)
 }

@@ -1,7 +1,7 @@
 //! What commands of several trainings and one drive of all their policies have in common: they are begun, resumed, done
 //! and reported in the same way.
 
-use super::{reproduce, train};
+use super::{perform, train};
 use crate::args::{LayerArgs, OutArgs};
 use crate::console::Console;
 use crate::output::Output;
@@ -90,7 +90,7 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
         };
         let stages = (self.stages)(&settings, &extent, run.path())?;
         let console = Console::new(output);
-        reproduce::perform_all(self.command, &stages, &run, &console, output)?;
+        perform::all(self.command, &stages, &run, &console, output)?;
         let table = (self.write)(&settings, &extent, &stages, &run)?;
         output.table(|| format!("\n{}\n\n{table}", self.title), &())?;
         run.finish(Outcome::Reproduction { stages: stages.len() })?;
