@@ -165,10 +165,20 @@ fn shards_of_trainings_and_of_drives_come_to_the_bytes_of_one_machine() {
     let content = std::fs::read(&damaged).unwrap();
     std::fs::write(&damaged, &content[1..]).unwrap();
     let out = run.to_string_lossy();
+    refused(&["merge", "--overwrite", "--out", &one.to_string_lossy()], &[one, &trained[1]], "what is read lies there");
+    refused(&["merge", "--out", &out], &[&one.join("chains/s1-weighted")], "this is no shard");
     refused(&["merge", "--out", &out], &[one, &trained[1]], "model.safetensors: is damaged");
     assert!(!run.exists());
     std::fs::write(&damaged, content).unwrap();
     succeed(xtask().arg("merge").args(&trained).arg("--out").arg(&run));
+    // A merge that died goes on, and does nothing again.
+    std::fs::rename(run.join("chains/s1-alpha-15"), run.join("chains/s1-alpha-15.partial")).unwrap();
+    std::fs::remove_file(run.join("chains/s1-alpha-15.partial/sha256sums")).unwrap();
+    sums::unlist(&run, &["chains/s1-alpha-15/sha256sums"]).unwrap();
+    succeed(xtask().arg("merge").args(&trained).arg("--out").arg(&run));
+    assert!(sums::verify(&run).faults.is_empty() && !run.join("chains/s1-alpha-15.partial").exists());
+    let manifest = std::fs::read_to_string(run.join("manifest.toml")).unwrap();
+    assert!(manifest.contains(r#"command_line = ["reproduce", "--preset", "smoke"]"#), "{manifest}");
     assert!(!run.join("drives").exists() && run.join("chains/s1-alpha-15/finished.toml").is_file());
 
     // Three shards of two trials per lot: one has nothing to do in some stages.
@@ -177,6 +187,22 @@ fn shards_of_trainings_and_of_drives_come_to_the_bytes_of_one_machine() {
     let drive = ["reproduce", "--networks", &networks];
     (1..=3).for_each(|number| shard(&drive, number, &driven));
     let [first, second, third] = [0, 1, 2].map(|i| driven[i].as_path());
+    let stages = [first, second, third].map(|shard| shard.join("drives/unseen"));
+    refused(&["merge"], &stages.each_ref().map(PathBuf::as_path), "this is a stage of a shard");
+    refused(&["reproduce", "--shard", "1/3", "--overwrite", "--out", &out, "--networks"], &[&run], "lies there");
+    // Stopped before its end, it goes on.
+    sums::unlist(second, &["finished.toml", "drives/smoothed/sha256sums"]).unwrap();
+    std::fs::remove_dir_all(second.join("drives/smoothed")).unwrap();
+    refused(&["merge"], &[first, second, third], "shard 2/3 is not finished");
+    succeed(xtask().args(["reproduce", "--resume"]).arg(second));
+    // One machine began to drive; what the shards drove takes its place.
+    let mut alone = xtask().args(["reproduce", "--resume"]).arg(&run).spawn().unwrap();
+    while !run.join("drives/reference/driving.unfinished").exists() {
+        assert!(alone.try_wait().unwrap().is_none(), "it ended before it was killed");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    alone.kill().unwrap();
+    alone.wait().unwrap();
     refused(&["merge"], &[first, third], "missing: shard 2/3");
     refused(&["merge"], &[first, second, third, one], "made with another");
     refused(&["merge", "--out", "nowhere"], &[first, second, third], "--out: these shards drove networks of");

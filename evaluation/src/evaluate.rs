@@ -32,7 +32,7 @@ pub(crate) const BATCH: usize = 16;
 pub(crate) const FILES: [&str; 3] = [records::RUNS, records::FAILURES, records::WALL_TIME];
 
 /// What is done there, in the name of the file that says how far it is.
-const DRIVING: &str = "driving";
+pub(crate) const DRIVING: &str = "driving";
 
 /// Drives the plan, and writes one line per run and near-collision as they come. Goes on with what an interrupted
 /// evaluation left in the folder, to the same result; a finished one is read back. `None` if cancelled.

@@ -1,6 +1,6 @@
 //! Work that was shared out to several machines, put together again: the same bytes as from one.
 
-use crate::evaluate::{BATCH, FILES};
+use crate::evaluate::{BATCH, DRIVING, FILES};
 use crate::plan::Plan;
 use crate::read::{Place, Places};
 use crate::records::{self, Driven};
@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use storage::sums;
+use storage::{growing, sums};
 
 /// The argument of the manifest that says what a shard is to drive.
 const ARGUMENT: &str = "shard";
@@ -134,6 +134,9 @@ impl ShardRun {
     }
 }
 
+/// Missing shards that are named.
+const MISSING_NAMED_MAX: usize = 10;
+
 /// Which program made a run.
 fn version(manifest: &Manifest) -> (&str, Option<&str>, Option<bool>) {
     (&manifest.program, manifest.git_revision.as_deref(), manifest.git_dirty)
@@ -165,12 +168,16 @@ impl Shards {
                 one.record.number
             );
         }
-        let missing = first.record.number.all().filter(|number| runs.iter().all(|run| run.record.number != *number));
-        let missing: Vec<String> = missing.map(|number| number.to_string()).collect();
+        let number = first.record.number;
+        let missing = number.all().filter(|number| runs.iter().all(|run| run.record.number != *number));
+        // There may be as many as somebody cared to write behind the slash.
+        let named: Vec<String> = missing.take(MISSING_NAMED_MAX).map(|number| number.to_string()).collect();
+        let others = (number.of() as usize - runs.len()).saturating_sub(named.len());
         ensure!(
-            missing.is_empty(),
-            "missing: shard {}; name its folder as well, or make it with --shard",
-            missing.join(", shard ")
+            named.is_empty(),
+            "missing: shard {}{}; name its folder as well, or make it with --shard",
+            named.join(", shard "),
+            if others > 0 { format!(" and {others} more") } else { String::new() }
         );
         Ok(Self { runs })
     }
@@ -190,11 +197,17 @@ impl Shards {
         self.runs[0].record.networks.as_deref()
     }
 
-    /// Refuses another run than theirs: what they did would not be part of it.
+    /// Refuses another run than theirs: what they did would not be part of it. `remedy`: what to do then.
     ///
     /// # Errors
-    /// Naming what differs.
-    pub fn check_are_of(&self, run: &Path, settings: &Settings, manifest: &Manifest) -> anyhow::Result<()> {
+    /// If settings, lots or the version of lotpilot are others.
+    pub fn check_are_of(
+        &self,
+        run: &Path,
+        settings: &Settings,
+        manifest: &Manifest,
+        remedy: &str,
+    ) -> anyhow::Result<()> {
         let own = self.manifest();
         let is_theirs = *settings == *self.settings()
             && manifest.arguments == own.arguments
@@ -205,7 +218,7 @@ impl Shards {
         ensure!(
             is_theirs,
             "{}: its settings, lots or version of lotpilot are not those of the shards, so that they are no part of it; \
-             make them again with --networks {0}",
+             {remedy}",
             run.display()
         );
         Ok(())
@@ -319,6 +332,8 @@ impl Rows {
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, run: &RunDir) -> anyhow::Result<()> {
+        // An evaluation under way would be gone on with, in files that are others now.
+        growing::clear(run.path(), DRIVING)?;
         // That of the runs is listed last: with it, the evaluation counts as driven.
         FILES.into_iter().zip(&self.0).rev().try_for_each(|(name, lines)| run.write(name, lines))
     }

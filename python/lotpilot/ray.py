@@ -72,6 +72,7 @@ def evaluate(
         FileExistsError: If ``out`` is there, or ``OUT.shards/`` holds shards of other arguments.
         ShardError: If shards cannot be driven; what was driven is kept, the reasons are in ``OUT.shards/failures.txt``.
     """
+    _check(shards, cpus, retries)
     request = tables.Request.of(drivers, lots, **options)
     out = Path(out)
     folder = out.with_name(out.name + ".shards")
@@ -97,7 +98,8 @@ def reproduce(
     """Does what ``cargo xtask reproduce`` does, on a Ray cluster: its trainings first, then what all networks drive.
 
     Args:
-        *arguments: Those of the command, but for ``--out``, ``--overwrite`` and ``--resume``: ``"--full"``.
+        *arguments: Those of the command, but for ``--out``, ``--overwrite`` and ``--resume``: ``"--full"``. Files that
+            they name are looked for on the nodes, from this working folder.
         shards: How many tasks there are of each half. A training is done by one task; more tasks than trainings have
             nothing to train.
         out: Folder of the run, below the working folder. Shards are kept in ``OUT.trained/`` and ``OUT.driven/``.
@@ -112,32 +114,35 @@ def reproduce(
 
     Raises:
         ValueError: If a number is out of range, or ``out`` does not lie below the working folder.
-        FileExistsError: If the run is finished, or shards are there of other arguments.
+        FileNotFoundError: If there is no ``program``.
+        FileExistsError: If ``out`` is there and not what an earlier call left, or shards are there of other arguments.
         ShardError: As ``evaluate``.
     """
+    _check(shards, cpus, retries)
     program, out = Path(program).resolve(), Path(os.path.relpath(out))
     if ".." in out.parts:
         raise ValueError(f"{out}: name a folder below the working folder, which nodes can have, too")
-    if (out / "finished.toml").exists():
-        raise FileExistsError(f"{out}: is finished already; choose another folder, or delete it")
+    # Only trainings that an earlier call merged: others would be taken for those of this one.
+    if out.exists() and ((out / "finished.toml").exists() or not _is_claimed(_trained(out))):
+        raise FileExistsError(f"{out}: exists already; choose another folder, or delete it")
+    if not program.is_file():
+        raise FileNotFoundError(f"{program}: is missing; make it with cargo build -p xtask")
     content = program.read_bytes()
     about = {"reproduce": arguments, "shards": shards, "program": hashlib.sha256(content).hexdigest()}
 
-    def share(half: str, command: tuple[str, ...], read: Files) -> list[Path]:
-        folder = out.with_name(f"{out.name}.{half}")
+    def share(folder: Path, command: tuple[str, ...], read: Files) -> list[Path]:
         _claim(folder, about)
         parts = _parts(folder, shards)
         missing = [part for part in parts if not part.exists()]
-        jobs = {part: (command, f"{part.name}/{shards}", cpus) for part in missing}
+        jobs = {part: (str(out), command, f"{part.name}/{shards}", cpus) for part in missing}
         _drive(_reproduce, jobs, _keep, folder, len(parts), address, cpus, retries, progress, (content, read))
         return parts
 
-    trained = share("trained", ("reproduce", *arguments), {})
-    if not (out / "sha256sums").exists():
-        _call(program, "merge", *trained, "--out", out)
+    trained = share(_trained(out), ("reproduce", *arguments), {})
+    _call(program, "merge", *trained, "--out", out)
     # What drives reads networks, not what they were trained on.
     read = {str(out / name): file for name, file in _files(out).items() if not name.endswith((".npy", ".npz"))}
-    driven = share("driven", ("reproduce", "--networks", str(out)), read)
+    driven = share(out.with_name(f"{out.name}.driven"), ("reproduce", "--networks", str(out)), read)
     return _call(program, "merge", *driven)
 
 
@@ -173,6 +178,7 @@ def generate(
         ValueError: If nothing is named so, or a number is out of range.
         ShardError: As ``evaluate``.
     """
+    _check(shards, cpus, retries)
     out = Path(out)
     single = _native.lots(names(lots, "lots"))
     jobs = {f"{number}/{shards}": (single[number - 1 :: shards], seed, count) for number in range(1, shards + 1)}
@@ -203,8 +209,6 @@ def _drive(
     shared: Sequence[Any] = (),
 ) -> None:
     """Does each job as a task, its last arguments what all of them share, and keeps the answers as they come."""
-    if of < 1 or cpus < 1 or retries < 0:
-        raise ValueError("shards and cpus are 1 or more, retries 0 or more")
     if not ray.is_initialized():
         ray.init(address=address, log_to_driver=False)
     task = ray.remote(_guarded(work.__name__, _digest())).options(
@@ -261,7 +265,8 @@ def _guarded(name: str, digest: str) -> Callable[..., Any]:
         if here._digest() != digest:
             return f"{where} has another lotpilot than the caller; install the same wheel on every node"
         try:
-            os.chdir(folder)
+            if os.path.isdir(folder):
+                os.chdir(folder)
             return getattr(here, name)(*pickle.loads(arguments), *shared)
         except Exception as error:
             return f"{type(error).__name__}: {error}"
@@ -269,20 +274,47 @@ def _guarded(name: str, digest: str) -> Callable[..., Any]:
     return task
 
 
-def _reproduce(command: tuple[str, ...], shard: str, cpus: int, program: bytes, read: Files) -> Files:
+def _reproduce(run: str, command: tuple[str, ...], shard: str, cpus: int, program: bytes, read: Files) -> Files:
     with tempfile.TemporaryDirectory(prefix="lotpilot-") as scratch:
-        _write(Path(scratch), {"xtask": program, **read})
-        Path(scratch, "xtask").chmod(0o755)
-        _call("./xtask", "--quiet", "--threads", cpus, *command, "--shard", shard, "--out", "shard", folder=scratch)
-        return _files(Path(scratch, "shard"))
+        file, out, folder = Path(scratch, "xtask"), Path(scratch, "shard"), Path.cwd()
+        file.write_bytes(program)
+        file.chmod(0o755)
+        if read:
+            # The networks under the name that they have at the caller's, beside what the node has of that folder.
+            beside = Path(scratch, "folder")
+            _link(folder, beside, Path(run))
+            _write(beside, read)
+            folder = beside
+        _call(file, "--quiet", "--threads", cpus, *command, "--shard", shard, "--out", out, folder=folder)
+        return _files(out)
 
 
-def _call(program: str | Path, *arguments: object, folder: str | None = None) -> str:
+def _link(folder: Path, to: Path, but: Path) -> None:
+    """Makes a folder with links to what is in another one, but for what lies at ``but`` there, which is empty."""
+    to.mkdir()
+    name, *rest = but.parts
+    for entry in folder.iterdir() if folder.is_dir() else ():
+        if entry.name != name:
+            (to / entry.name).symlink_to(entry)
+    if rest:
+        _link(folder / name, to / name, Path(*rest))
+
+
+def _call(program: Path, *arguments: object, folder: Path | None = None) -> str:
     """What a command prints; its last line on stderr as an error."""
     done = subprocess.run([program, *map(str, arguments)], cwd=folder, capture_output=True, encoding="utf-8")
     if done.returncode:
         raise ShardError((done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1])
     return done.stdout
+
+
+def _check(shards: int, cpus: int, retries: int) -> None:
+    if shards < 1 or cpus < 1 or retries < 0:
+        raise ValueError("shards and cpus are 1 or more, retries 0 or more")
+
+
+def _trained(out: Path) -> Path:
+    return out.with_name(f"{out.name}.trained")
 
 
 def _parts(folder: Path, shards: int) -> list[Path]:
@@ -318,15 +350,24 @@ def _digest() -> str:
 
 
 def _claim(folder: Path, about: dict[str, Any]) -> None:
-    """Refuses a folder with the shards of another evaluation."""
+    """Refuses a folder with shards of something else."""
     folder.mkdir(parents=True, exist_ok=True)
-    file, text = folder / "shards.json", json.dumps(about, default=str)
-    if not file.exists():
+    file, text = folder / _ABOUT, json.dumps(about, default=str)
+    if not _is_claimed(folder):
         file.write_text(text, encoding="utf-8")
     elif file.read_text(encoding="utf-8") != text:
         raise FileExistsError(
             f"{folder}: holds shards of other arguments or another lotpilot; delete it, or choose another out"
         )
+
+
+_ABOUT = "shards.json"
+"""What shards are of, in the folder that they are kept in."""
+
+
+def _is_claimed(folder: Path) -> bool:
+    """Whether shards are kept there: before the first one, another call may have the folder."""
+    return (folder / _ABOUT).exists() and any(path.name.isdigit() for path in folder.iterdir())
 
 
 def _keep(shard: Path, files: Files) -> None:

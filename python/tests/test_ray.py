@@ -135,12 +135,21 @@ def test_a_reproduction_comes_to_the_files_of_one_process(cluster, tmp_path, mon
     assert "DAgger has fewer near-collisions" in found
     assert files(tmp_path / "run") == expected
     assert len(expected) > 200
-    with pytest.raises(FileExistsError, match="is finished already"):
+    with pytest.raises(FileExistsError, match="exists already"):
         lotpilot.ray.reproduce("--preset", "smoke", shards=3, out="run", program=program)
     with pytest.raises(FileExistsError, match="other arguments"):
         Path("run").rename("ray")
         lotpilot.ray.reproduce("--preset", "paper", shards=3, out="run", program=program)
+    # What was misspelt may be called right; files are looked for from here.
     with pytest.raises(lotpilot.ray.ShardError, match="papier"):
         lotpilot.ray.reproduce("--preset", "papier", shards=2, out="wrong", program=program)
+    Path("mine.toml").write_text("dagger.eta = 7.0\n")
+    with pytest.raises(lotpilot.ray.ShardError, match=r"dagger\.eta"):
+        lotpilot.ray.reproduce("--config", "mine.toml", shards=2, out="wrong", program=program)
+    Path("other").mkdir()
+    with pytest.raises(FileExistsError, match="exists already"):
+        lotpilot.ray.reproduce(shards=2, out="other", program=program)
+    with pytest.raises(FileNotFoundError, match="cargo build -p xtask"):
+        lotpilot.ray.reproduce(shards=2, out="new", program="no/xtask")
     with pytest.raises(ValueError, match="below the working folder"):
         lotpilot.ray.reproduce(shards=2, out=tmp_path.parent / "elsewhere", program=program)

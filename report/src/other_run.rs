@@ -55,12 +55,15 @@ impl OtherRun {
             ),
         };
         let revision = manifest.git_revision.as_deref().unwrap_or("unknown");
-        let made_by = format!("Made by `{}` at commit `{revision}`.", command_line(&manifest));
+        let changes = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };
+        let made_by = format!("Made by `{}` at commit `{revision}`{changes}.", command_line(&manifest));
         let text = sums::read_to_string(&folder.join(table), RUN_TEXT_BYTES_MAX)?;
         page.section(self.title.as_deref().unwrap_or(title), format!("{made_by}\n\n{text}"));
         let plot = Path::new(table).with_extension("svg");
         if let Some(svg) = sums::read_if_listed(&folder.join(&plot), RUN_TEXT_BYTES_MAX)? {
-            let stem = manifest.command;
+            let stems =
+                (1..).map(|n| if n == 1 { manifest.command.clone() } else { format!("{}-{n}", manifest.command) });
+            let stem = stems.into_iter().find(|stem| !page.has_figure(stem)).expect("numbers do not end");
             page.figure(stem, "The same as a plot.", Image::Svg(String::from_utf8(svg)?));
         }
         Ok(())

@@ -123,6 +123,11 @@ impl Page {
         if markdown.is_empty() { self } else { self.text(markdown) }
     }
 
+    /// Whether there is a picture of this name.
+    pub fn has_figure(&self, wanted: &str) -> bool {
+        self.parts.iter().any(|part| matches!(part, Part::Figure { name, .. } if name == wanted))
+    }
+
     /// Adds a picture. `name`: its file without ending; `caption`: Markdown.
     pub fn figure(&mut self, name: impl Into<String>, caption: impl Into<String>, image: Image) -> &mut Self {
         self.parts.push(Part::Figure { name: name.into(), caption: caption.into(), image });

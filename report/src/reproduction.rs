@@ -88,7 +88,7 @@ pub fn write_docs(recipe: &Recipe, run: &Path, others: &[OtherRun], to: &Path) -
 fn written_by(run: &Path, others: &[OtherRun]) -> String {
     let words = others.iter().map(|other| quoted(&other.to_string()));
     let with = if others.is_empty() { None } else { Some("--with".to_owned()) };
-    let command = ["cargo xtask render results".to_owned(), run.display().to_string()];
+    let command = ["cargo xtask render results".to_owned(), quoted(&run.display().to_string())];
     command.into_iter().chain(with).chain(words).collect::<Vec<_>>().join(" ")
 }
 

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::Seek as _;
-use std::path::Path;
+use std::path::{Component, Path};
 
 /// Name of the list.
 pub const FILE: &str = "sha256sums";
@@ -55,12 +55,22 @@ fn list_of(folder: &Path) -> Result<Option<Sums>, FileError> {
     let mut sums = Sums::new();
     for (index, line) in lines.split('\n').enumerate() {
         let parts = line.split_once("  ").filter(|(sum, name)| {
-            sum.len() == 64 && sum.bytes().all(|byte| byte.is_ascii_hexdigit()) && !name.is_empty()
+            sum.len() == 64 && sum.bytes().all(|byte| byte.is_ascii_hexdigit()) && lies_within(name)
         });
         let (sum, name) = parts.ok_or_else(|| damaged(index + 1))?;
         sums.insert(name.to_owned(), sum.to_owned());
     }
     Ok(Some(sums))
+}
+
+/// Whether a name is of a file in a folder, or below it, and not elsewhere.
+fn lies_within(name: &str) -> bool {
+    !name.is_empty() && Path::new(name).components().all(|component| matches!(component, Component::Normal(_)))
+}
+
+/// The folder, with a slash at its end, whose list has this name.
+fn listed_folder(name: &str) -> Option<&str> {
+    name.strip_suffix(FILE).filter(|folder| folder.ends_with('/'))
 }
 
 fn write_list(folder: &Path, sums: &Sums) -> Result<(), FileError> {
@@ -194,21 +204,39 @@ pub fn write_folder(
     list(folder, &[&list_name])
 }
 
-/// Copies every finished file of a folder, and of finished folders within it, into a new folder; its list comes last.
+/// Copies a finished folder, with finished folders within it, into another one under a name, in place of one that is there,
+/// and lists it: it is there whole or not at all.
 ///
 /// # Errors
 /// If a file is missing or damaged, or cannot be written.
-pub fn copy(from: &Path, to: &Path) -> Result<(), FileError> {
+pub fn copy_folder(from: &Path, folder: &Path, name: &str) -> Result<(), FileError> {
+    let (path, partial, list_name) =
+        (folder.join(name), folder.join(format!("{name}.partial")), format!("{name}/{FILE}"));
     let failed =
-        |error: std::io::Error| FileError::new(to, format_args!("cannot be written: {error}"), whole::WRITE_REMEDY);
-    fs::create_dir_all(to).map_err(failed)?;
+        |error: std::io::Error| FileError::new(&path, format_args!("cannot be written: {error}"), whole::WRITE_REMEDY);
+    unlist(folder, &[&list_name])?;
+    for old in [&path, &partial] {
+        if old.exists() {
+            fs::remove_dir_all(old).map_err(failed)?;
+        }
+    }
+    copy_files(from, &partial)?;
+    fs::rename(&partial, &path).map_err(failed)?;
+    list(folder, &[&list_name])
+}
+
+fn copy_files(from: &Path, to: &Path) -> Result<(), FileError> {
     let sums = list_of(from)?.ok_or_else(|| FileError::new(&from.join(FILE), "is missing", LIST_REMEDY))?;
     for name in sums.keys() {
+        let path = to.join(name);
+        let folder = path.parent().unwrap_or(to);
+        fs::create_dir_all(folder)
+            .map_err(|error| FileError::new(folder, format_args!("cannot be written: {error}"), whole::WRITE_REMEDY))?;
         // Without a limit: what is listed was written by a run, and its digest is compared.
         let content = read_listed(from, name, u64::MAX)?;
-        match name.strip_suffix(FILE) {
-            Some(inner) => copy(&from.join(inner), &to.join(inner))?,
-            None => whole::write(&to.join(name), &content)?,
+        match listed_folder(name) {
+            Some(inner) => copy_files(&from.join(inner), &to.join(inner))?,
+            None => whole::write(&path, &content)?,
         }
     }
     write_list(to, &sums)
@@ -309,7 +337,7 @@ fn add_all(folder: &Path, prefix: &str, but: &[&str], sha256: &mut Sha256) -> Re
     let sums = list_of(folder)?.ok_or_else(|| FileError::new(&folder.join(FILE), "is missing", LIST_REMEDY))?;
     for (path, sum) in sums {
         let name = path.rsplit('/').next().unwrap_or(&path);
-        if let Some(inner) = path.strip_suffix(FILE) {
+        if let Some(inner) = listed_folder(&path) {
             add_all(&folder.join(inner), &format!("{prefix}{inner}"), but, sha256)?;
         } else if !but.contains(&name) {
             sha256.update(format!("{sum}  {prefix}{path}\n"));
@@ -467,22 +495,37 @@ mod tests {
     }
 
     #[test]
-    fn a_copy_holds_what_is_finished_and_a_damaged_file_ends_it_before_its_list() {
+    fn a_copy_holds_what_is_finished_and_of_a_damaged_folder_there_is_none() {
         let folder = scratch("copy");
         let (from, to) = (folder.join("from"), folder.join("to"));
         fs::create_dir_all(from.join("stages/one")).unwrap();
+        fs::create_dir_all(&to).unwrap();
         write(&from, "about", b"one stage").unwrap();
         write(&from.join("stages/one"), "data", b"12345").unwrap();
+        write(&from.join("stages/one"), "old-sha256sums", b"a file like any other").unwrap();
         list(&from, &["stages/one/sha256sums"]).unwrap();
         fs::write(from.join("half"), "never finished").unwrap();
-        copy(&from, &to).unwrap();
-        assert_eq!((verify(&to).files, verify(&to).faults.len()), (3, 0));
-        assert_eq!(digest_of_all(&to, &[]).unwrap(), digest_of_all(&from, &[]).unwrap());
-        assert!(!to.join("half").exists());
-        fs::remove_dir_all(&to).unwrap();
+        for _ in 0..2 {
+            copy_folder(&from, &to, "runs/copy").unwrap();
+            let verified = verify(&to);
+            assert_eq!((verified.files, verified.faults.len()), (5, 0), "{:?}", verified.faults);
+            assert_eq!(digest_of_all(&to.join("runs/copy"), &[]).unwrap(), digest_of_all(&from, &[]).unwrap());
+            assert!(!to.join("runs/copy/half").exists());
+        }
         fs::write(from.join("stages/one/data"), "54321").unwrap();
-        assert!(copy(&from, &to).unwrap_err().to_string().contains("stages/one/data"));
-        assert!(!exists(&to).unwrap() && !exists(&to.join("stages/one")).unwrap());
+        assert!(copy_folder(&from, &to, "runs/copy").unwrap_err().to_string().contains("stages/one/data"));
+        assert!(!to.join("runs/copy").exists());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// A list from elsewhere could name files of somebody else, to be read, compared or, in a copy, written.
+    #[test]
+    fn a_list_names_files_of_its_own_folder_only() {
+        let folder = scratch("elsewhere");
+        for name in ["../x", "/etc/passwd", "a/../../x", "."] {
+            fs::write(folder.join(FILE), format!("{}  {name}\n", digest(b""))).unwrap();
+            assert!(names(&folder).unwrap_err().to_string().contains("line 1 is damaged"), "{name}");
+        }
         fs::remove_dir_all(folder).unwrap();
     }
 

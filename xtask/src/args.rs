@@ -1,10 +1,11 @@
 //! Arguments that several commands share.
 
+use anyhow::ensure;
 use clap::{Args, ValueEnum};
 use experiment::run_dir::Place;
 use experiment::settings::{Layers, NoiseChoice};
 use sim::scenario::Direction;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What `--noise sweep` stands for, in multiples of the level `paper`: clean to hard.
 const SWEEP: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
@@ -50,6 +51,23 @@ pub(crate) struct OutArgs {
 }
 
 impl OutArgs {
+    /// Refuses an `--out` that is, holds or lies within a folder that is read: `--overwrite` would delete what is needed.
+    pub(crate) fn ensure_apart_from(&self, folders: &[PathBuf]) -> anyhow::Result<()> {
+        let Some(out) = &self.out else { return Ok(()) };
+        let place_of = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path));
+        let place = place_of(out)?;
+        for folder in folders {
+            let other = place_of(folder)?;
+            ensure!(
+                !place.starts_with(&other) && !other.starts_with(&place),
+                "--out {}: what is read lies there, or around it: {}; choose another --out",
+                out.display(),
+                folder.display()
+            );
+        }
+        Ok(())
+    }
+
     /// The folder that is asked for.
     pub(crate) fn place<'a>(&'a self, command: &'a str, preset: &'a str, seed: u64) -> Place<'a> {
         Place {

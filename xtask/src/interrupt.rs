@@ -67,8 +67,13 @@ fn watch() {
 
 /// Notes which command goes on with which run.
 pub(crate) fn can_resume(command: &str, run: &Path) {
+    goes_on_with(&format!("{command} --resume {}", run.display()));
+}
+
+/// Notes the arguments of the command that goes on with what is under way.
+pub(crate) fn goes_on_with(arguments: &str) {
     if let Ok(mut way_on) = WAY_ON.lock() {
-        *way_on = Some(format!("; go on with: cargo xtask {command} --resume {}", run.display()));
+        *way_on = Some(format!("; go on with: cargo xtask {arguments}"));
     }
 }
 

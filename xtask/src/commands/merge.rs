@@ -1,6 +1,7 @@
 //! `merge`: the shards of an evaluation or a reproduction, made on several machines, as if one had done all of it.
 
 use crate::args::{JsonArgs, OutArgs};
+use crate::build_info;
 use crate::commands::evaluate::{self, Asked};
 use crate::commands::{perform, reproduce};
 use crate::console::Console;
@@ -15,7 +16,7 @@ use evaluation::stages::{self, Step};
 use experiment::drivers::NamedDriver;
 use experiment::inputs;
 use experiment::lots::Lot;
-use experiment::run_dir::{Request, RunDir};
+use experiment::run_dir::{Build, Place, Request, RunDir};
 use std::path::{Path, PathBuf};
 use storage::sums;
 
@@ -39,18 +40,28 @@ pub(crate) struct MergeArgs {
 
 pub(crate) fn run(args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let shards = Shards::read(&args.shards)?;
-    match (shards.manifest().command.as_str(), shards.networks()) {
-        (reproduce::COMMAND, Some(networks)) => {
-            ensure!(
-                args.out.out.is_none(),
-                "--out: these shards drove networks of {0}, and go into {0}; leave it out",
-                networks.display()
-            );
-            drives(&shards, networks, output)
-        }
-        (reproduce::COMMAND, None) => trainings(&shards, args, output),
-        _ => evaluation(&shards, args, output),
+    args.out.ensure_apart_from(&args.shards)?;
+    if shards.manifest().command != reproduce::COMMAND {
+        return evaluation(&shards, args, output);
     }
+    ensure!(
+        !shards.manifest().arguments.is_empty(),
+        "{}: this is a stage of a shard; name the folder of the shard",
+        args.shards[0].display()
+    );
+    let Some(networks) = shards.networks() else { return trainings(&shards, args, output) };
+    ensure!(
+        args.out.out.is_none(),
+        "--out: these shards drove networks of {0}, and go into {0}; leave it out",
+        networks.display()
+    );
+    ensure!(
+        networks.is_dir(),
+        "{}: these shards drove the networks of {}, which is not here; run merge where that path leads to it",
+        args.shards[0].display(),
+        networks.display()
+    );
+    drives(&shards, networks, output)
 }
 
 fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
@@ -76,14 +87,27 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
     let extent = reproduce::extent_of(&args.shards[0], manifest)?;
     manifest.check_inputs(&reproduce::inputs(settings, &extent)?)?;
     let trained = shards.stages(&stages::all(settings, &extent, Path::new("")))?;
-    let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
-    // Trainings that are not there yet if this is interrupted are done by `reproduce --resume`, to the same bytes.
-    let run =
-        RunDir::create(&args.out.place(reproduce::COMMAND, &manifest.preset, settings.seed.0), settings, &request)?;
-    interrupt::can_resume(reproduce::COMMAND, run.path());
+    let run = match &args.out.out {
+        // An earlier merge of them was interrupted.
+        Some(out) if !args.out.overwrite && sums::exists(out)? => {
+            let (run, found, made) = RunDir::resume(out, reproduce::COMMAND)?;
+            shards.check_are_of(out, &found, &made, "choose another --out, or delete it with --overwrite")?;
+            run
+        }
+        _ => {
+            let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
+            // It is made as its shards are, but for the share: so a report says what was asked for.
+            let build = Build { command_line: whole_command(&manifest.command_line), ..build_info::get().clone() };
+            let place = args.out.place(reproduce::COMMAND, &manifest.preset, settings.seed.0);
+            RunDir::create(&Place { build: &build, ..place }, settings, &request)?
+        }
+    };
+    let named: Vec<String> = args.shards.iter().map(|shard| shard.display().to_string()).collect();
+    interrupt::goes_on_with(&format!("merge {} --out {}", named.join(" "), run.path().display()));
     for (folder, path) in &trained {
-        sums::copy(path, &run.path().join(folder))?;
-        sums::list(run.path(), &[&format!("{folder}/{}", sums::FILE)])?;
+        if !sums::is_listed(run.path(), &format!("{folder}/{}", sums::FILE))? {
+            sums::copy_folder(path, run.path(), folder)?;
+        }
     }
     let name = run.path().display();
     output.note(format_args!(
@@ -97,7 +121,8 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
 /// Adds what the shards drove to the run whose networks drove, and finishes it.
 fn drives(shards: &Shards, networks: &Path, output: &Output) -> anyhow::Result<()> {
     let (run, settings, manifest) = RunDir::resume(networks, reproduce::COMMAND)?;
-    shards.check_are_of(networks, &settings, &manifest)?;
+    let remedy = format!("make them again with --networks {}", networks.display());
+    shards.check_are_of(networks, &settings, &manifest, &remedy)?;
     let extent = reproduce::extent_of(networks, &manifest)?;
     let all = stages::all(&settings, &extent, networks);
     shards.manifest().check_inputs(&reproduce::inputs_of_drives(&settings, &extent, &all)?)?;
@@ -118,4 +143,31 @@ fn drives(shards: &Shards, networks: &Path, output: &Output) -> anyhow::Result<(
     }
     // They count as driven now; tables and the rest of the run are made as on one machine.
     reproduce::finish(&run, settings, extent, output)
+}
+
+/// The command line of a shard without what is of the shard alone.
+fn whole_command(words: &[String]) -> Vec<String> {
+    const OF_SHARD: [&str; 2] = ["--shard", "--out"];
+    let mut kept = Vec::new();
+    let mut words = words.iter();
+    while let Some(word) = words.next() {
+        if OF_SHARD.contains(&word.as_str()) {
+            words.next();
+        } else if word != "--overwrite" && !OF_SHARD.iter().any(|option| word.starts_with(&format!("{option}="))) {
+            kept.push(word.clone());
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::whole_command;
+
+    #[test]
+    fn the_command_of_a_whole_is_that_of_a_shard_without_its_share() {
+        let words = |text: &str| text.split(' ').map(str::to_owned).collect::<Vec<_>>();
+        let shard = words("reproduce --full --shard 1/2 --seed 3 --out=trained/1 --overwrite");
+        assert_eq!(whole_command(&shard), words("reproduce --full --seed 3"));
+    }
 }

@@ -3,6 +3,7 @@
 
 use super::{perform, train};
 use crate::args::{LayerArgs, OutArgs};
+use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
@@ -182,6 +183,7 @@ fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir
     let networks: PathBuf = networks.components().collect();
     let name = networks.display();
     ensure!(sums::exists(&networks)?, "--networks {name}: this is no run; cargo xtask reproduce makes one");
+    args.out.ensure_apart_from(std::slice::from_ref(&networks))?;
     let manifest = Manifest::read(&networks)?;
     let (settings, preset) = (run_dir::settings_of(&networks)?, manifest.preset.clone());
     ensure!(manifest.command == COMMAND, "--networks {name}: this is a run of {}", manifest.command);
@@ -235,6 +237,12 @@ fn resume(path: &Path) -> anyhow::Result<(RunDir, Settings, Arguments)> {
     let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
     let arguments = Arguments::read(path, manifest.clone())?;
     let Arguments { extent, shard } = &arguments;
+    let build = build_info::get();
+    ensure!(
+        shard.is_none() || (&manifest.git_revision, manifest.git_dirty) == (&build.git_revision, build.git_dirty),
+        "{}: this shard was begun with another version of lotpilot; go on with that one, or make the shard again",
+        path.display()
+    );
     let found = match shard.as_ref().and_then(|shard| shard.networks.as_deref()) {
         Some(networks) => inputs_of_drives(&settings, extent, &stages::all(&settings, extent, networks))?,
         None => inputs(&settings, extent)?,
