@@ -521,9 +521,10 @@ mod tests {
     #[test]
     fn longer_reports_have_a_table_of_contents() {
         let mut page = Page::new("x");
-        page.section("One", "").section("Two", "");
+        page.section("One", "1").section("Two", "2");
         assert!(!page.to_html().contains("<nav>"));
         page.section("Three & more", "");
+        assert!(!page.to_markdown().contains("\n\n\n"), "a heading without text leaves no gap");
         assert!(page.to_html().contains("<a href=\"#part-4\">Three &amp; more</a>"), "{}", page.to_html());
         assert!(page.to_html().contains("<h2 id=\"part-4\">"));
     }
