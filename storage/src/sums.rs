@@ -182,6 +182,30 @@ pub fn write_folder(
     name: &str,
     files: impl IntoIterator<Item = (String, Vec<u8>)>,
 ) -> Result<(), FileError> {
+    replace_folder(folder, name, |partial| {
+        for (name, content) in files {
+            whole::write(&partial.join(name), &content)?;
+        }
+        list_all(partial)
+    })
+}
+
+/// Copies a finished folder, with finished folders within it, into another one under a name, in place of one that is there,
+/// and lists it: it is there whole or not at all.
+///
+/// # Errors
+/// If a file is missing or damaged, or cannot be written.
+pub fn copy_folder(from: &Path, folder: &Path, name: &str) -> Result<(), FileError> {
+    replace_folder(folder, name, |partial| copy_files(from, partial))
+}
+
+/// Fills a folder under another name, then puts it in place of one that is there, and lists it; one in which nothing is
+/// listed is not there afterwards.
+fn replace_folder(
+    folder: &Path,
+    name: &str,
+    fill: impl FnOnce(&Path) -> Result<(), FileError>,
+) -> Result<(), FileError> {
     let (path, partial, list_name) =
         (folder.join(name), folder.join(format!("{name}.partial")), format!("{name}/{FILE}"));
     let failed =
@@ -193,34 +217,10 @@ pub fn write_folder(
         }
     }
     fs::create_dir_all(&partial).map_err(failed)?;
-    for (name, content) in files {
-        whole::write(&partial.join(name), &content)?;
-    }
-    list_all(&partial)?;
+    fill(&partial)?;
     if !exists(&partial)? {
         return fs::remove_dir(&partial).map_err(failed);
     }
-    fs::rename(&partial, &path).map_err(failed)?;
-    list(folder, &[&list_name])
-}
-
-/// Copies a finished folder, with finished folders within it, into another one under a name, in place of one that is there,
-/// and lists it: it is there whole or not at all.
-///
-/// # Errors
-/// If a file is missing or damaged, or cannot be written.
-pub fn copy_folder(from: &Path, folder: &Path, name: &str) -> Result<(), FileError> {
-    let (path, partial, list_name) =
-        (folder.join(name), folder.join(format!("{name}.partial")), format!("{name}/{FILE}"));
-    let failed =
-        |error: std::io::Error| FileError::new(&path, format_args!("cannot be written: {error}"), whole::WRITE_REMEDY);
-    unlist(folder, &[&list_name])?;
-    for old in [&path, &partial] {
-        if old.exists() {
-            fs::remove_dir_all(old).map_err(failed)?;
-        }
-    }
-    copy_files(from, &partial)?;
     fs::rename(&partial, &path).map_err(failed)?;
     list(folder, &[&list_name])
 }
