@@ -161,6 +161,10 @@ fn shards_of_trainings_and_of_drives_come_to_the_bytes_of_one_machine() {
     refused(&["render", "results"], &[one], "this is a shard");
     refused(&["reproduce", "--shard", "1/2", "--networks"], &[one], "this is a shard");
     shard(&train, 2, &trained);
+    // There are more shards than trainings.
+    let idle = folder.join("idle");
+    succeed(xtask().args(train).args(["--shard", "7/1000000", "--out"]).arg(&idle));
+    refused(&["merge", "--out", "nowhere"], &[&idle], "shard 11/1000000 and 999989 more");
     let damaged = trained[1].join("chains/s1-unweighted/round-01/model.safetensors");
     let content = std::fs::read(&damaged).unwrap();
     std::fs::write(&damaged, &content[1..]).unwrap();
@@ -194,6 +198,10 @@ fn shards_of_trainings_and_of_drives_come_to_the_bytes_of_one_machine() {
     sums::unlist(second, &["finished.toml", "drives/smoothed/sha256sums"]).unwrap();
     std::fs::remove_dir_all(second.join("drives/smoothed")).unwrap();
     refused(&["merge"], &[first, second, third], "shard 2/3 is not finished");
+    let manifest = std::fs::read_to_string(second.join("manifest.toml")).unwrap();
+    sums::write(second, "manifest.toml", manifest.replacen("\"lotpilot", "\"old lotpilot", 1).as_bytes()).unwrap();
+    refused(&["reproduce", "--resume"], &[second], "begun with another version of lotpilot");
+    sums::write(second, "manifest.toml", manifest.as_bytes()).unwrap();
     succeed(xtask().args(["reproduce", "--resume"]).arg(second));
     // One machine began to drive; what the shards drove takes its place.
     let mut alone = xtask().args(["reproduce", "--resume"]).arg(&run).spawn().unwrap();
@@ -281,19 +289,20 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
 
     // The table in the page of all results.
     let page = folder.join("results.md");
-    let render = |other: &str| {
+    let render = |others: &[&str]| {
         let mut render = xtask();
-        render.args(["render", "results"]).arg(&WHOLE.0).args(["--with", other, "--to"]).arg(&page);
+        render.args(["render", "results"]).arg(&WHOLE.0).arg("--with").args(others).arg("--to").arg(&page);
         render.output().unwrap()
     };
-    let unknown = render(&WHOLE.0.to_string_lossy());
+    let unknown = render(&[&WHOLE.0.to_string_lossy()]);
     assert_eq!(unknown.status.code(), Some(2));
     assert!(text(&unknown).1.contains("a run of reproduce has no table of its own"), "{}", text(&unknown).1);
-    assert!(render(&format!("Few lots={out_name}")).status.success());
+    assert!(render(&[&out_name, &format!("Few lots={out_name}")]).status.success());
     let results = std::fs::read_to_string(&page).unwrap();
     let (_, last) = results.split_once("\n## Few lots\n").unwrap();
     assert!(last.contains("Made by `cargo xtask scaling --preset smoke") && last.contains(&table), "{last}");
-    assert!(folder.join("pictures/results/scaling.svg").is_file());
+    assert!(last.contains("](pictures/results/scaling-2.svg)"), "each plot has a file of its own: {last}");
+    assert!(["scaling.svg", "scaling-2.svg"].iter().all(|plot| folder.join("pictures/results").join(plot).is_file()));
     for (arguments, part) in [
         (["--different", "0"], "name at least one lot"),
         (["--different", "4,4"], "named twice"),

@@ -126,6 +126,7 @@ fn drives(shards: &Shards, networks: &Path, output: &Output) -> anyhow::Result<(
     let extent = reproduce::extent_of(networks, &manifest)?;
     let all = stages::all(&settings, &extent, networks);
     shards.manifest().check_inputs(&reproduce::inputs_of_drives(&settings, &extent, &all)?)?;
+    // Nothing is written before all of it is known to be whole.
     shards.stages(&all)?;
     let mut merged = Vec::new();
     for stage in &all {

@@ -13,7 +13,7 @@ use evaluation::stages::{self, Extent, Stage, Step};
 use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
-use experiment::run_dir::{self, Manifest, Outcome, Request, RunDir};
+use experiment::run_dir::{self, Build, Manifest, Outcome, Request, RunDir};
 use experiment::settings::{Layers, Settings};
 use experiment::shard::Shard;
 use report::reproduction::{self, Recipe};
@@ -101,7 +101,7 @@ pub(crate) fn finish(run: &RunDir, settings: Settings, extent: Extent, output: &
     let console = Console::new(output);
     perform::all(COMMAND, &recipe.stages, run, &console, output)?;
     let conclusions = reproduction::write(&recipe, run)?;
-    output.table(|| format!("\nWhat holds here\n\n{conclusions}"), &())?;
+    output.table(|| format!("\nWhat holds here\n\n{conclusions}"), &conclusions)?;
     run.finish(Outcome::Reproduction { stages: recipe.stages.len() })?;
     output.note(format_args!("written: {}/report.html, report.md, conclusions.csv and figures/", run.path().display()));
     console.report_time();
@@ -237,9 +237,12 @@ fn resume(path: &Path) -> anyhow::Result<(RunDir, Settings, Arguments)> {
     let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
     let arguments = Arguments::read(path, manifest.clone())?;
     let Arguments { extent, shard } = &arguments;
-    let build = build_info::get();
+    let Build { program, git_revision, git_dirty, .. } = build_info::get();
+    let is_same =
+        (&manifest.program, &manifest.git_revision, &manifest.git_dirty) == (program, git_revision, git_dirty);
+    // Its stages would be of two versions, and `merge` would refuse them after all the work.
     ensure!(
-        shard.is_none() || (&manifest.git_revision, manifest.git_dirty) == (&build.git_revision, build.git_dirty),
+        shard.is_none() || is_same,
         "{}: this shard was begun with another version of lotpilot; go on with that one, or make the shard again",
         path.display()
     );
