@@ -23,7 +23,7 @@ pub struct Deviation {
 }
 
 /// Every one, in the order of a training.
-pub const DEVIATIONS: [Deviation; 14] = [
+pub const DEVIATIONS: [Deviation; 12] = [
     Deviation {
         name: "points",
         of_paper: "points as far as the way is open, at v = a_y/4.48",
@@ -47,18 +47,6 @@ pub const DEVIATIONS: [Deviation; 14] = [
         of_paper: "no disturbances while collecting",
         keys: &["dagger.disturbance"],
         changes_cloning: true,
-    },
-    Deviation {
-        name: "noise-augmentation",
-        of_paper: "each tick with one draw of noise",
-        keys: &["dagger.noise_augmentations"],
-        changes_cloning: true,
-    },
-    Deviation {
-        name: "ticks",
-        of_paper: "only the expert's ticks are kept",
-        keys: &["dagger.keep"],
-        changes_cloning: false,
     },
     Deviation { name: "network", of_paper: "the paper's network", keys: &["dagger.network"], changes_cloning: true },
     Deviation {
@@ -255,11 +243,11 @@ mod tests {
     #[test]
     fn another_controller_is_driven_by_itself_and_the_same_cloning_is_trained_once() {
         let settings = Settings::preset("default").unwrap();
-        let deviations = ["points", "ticks", "mirror"].map(str::to_owned).to_vec();
+        let deviations = ["points", "start", "mirror"].map(str::to_owned).to_vec();
         let extent = Extent { deviations, unseen: vec!["validation:9:all".to_owned()] };
         let stages = stages(&settings, &extent, Path::new("R")).unwrap();
         let folders: Vec<&str> = stages.iter().map(|stage| stage.folder.as_str()).collect();
-        assert_eq!(folders, [BASE, "points", "ticks", "mirror", "drives", "drives-points"]);
+        assert_eq!(folders, [BASE, "points", "start", "mirror", "drives", "drives-points"]);
         assert_eq!(stages[2].step, Step::Train { cloning_of: Some(BASE.to_owned()) });
         assert_eq!(stages[3].step, Step::Train { cloning_of: None });
         let Step::Drive { drivers } = &stages[4].step else { panic!("{:?}", stages[4]) };
