@@ -83,9 +83,7 @@ impl DaggerSettings {
     /// The same on a budget of minutes: the compact network, warm starts, some ten thousand quick steps in all.
     ///
     /// At least two iterations, because η̂ may pass η narrowly in the first; at most three, for
-    /// the time. Disturbances stay off: they cost .05 of η̂ and show no clear gain (42 km of development lots, lot a with
-    /// seed 77 and validation lots: 11, 12 and 10 near-collisions with them, 14, 12 and 11 without, for 26 to 42
-    /// generated lots per round and fits of 5000 to 11 000 steps).
+    /// the time. Disturbances are aimed at danger (docs/elsewhere.md, "Aimed disturbances").
     pub fn quick() -> Self {
         Self {
             iterations_min: 2,

@@ -66,9 +66,12 @@ pub(crate) fn run(args: &RulesArgs, output: &Output) -> anyhow::Result<()> {
 fn begin(args: &RulesArgs) -> anyhow::Result<Begun<Extent>> {
     let mut layers = args.common.layers();
     // What the user sets comes later and counts.
-    if layers.preset_name() == "default" {
-        layers.overrides.splice(0..0, DEFAULTS.map(str::to_owned));
-    }
+    let defaults = match layers.preset_name() {
+        "default" => &DEFAULTS[..],
+        "strong" => &DEFAULTS[2..],
+        _ => &[],
+    };
+    layers.overrides.splice(0..0, defaults.iter().map(|&text| text.to_owned()));
     let settings = Settings::resolve(&layers, args.common.seed)?;
     let known = rules::all().map(|(name, _)| name.to_owned());
     let named = if args.rule.is_empty() { known.to_vec() } else { args.rule.clone() };
