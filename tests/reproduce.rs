@@ -318,6 +318,23 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
 }
 
 #[test]
+fn rules_keep_every_tick_with_the_presets_that_train_on_many_lots() {
+    for (preset, keep) in [("default", "every_tick"), ("strong", "every_tick"), ("paper", "expert_ticks")] {
+        let out = scratch(&format!("rules-keep-{preset}")).join("out");
+        let mut killed = xtask().args(["rules", "--preset", preset, "--out"]).arg(&out).spawn().unwrap();
+        let settings = (0..6000).find_map(|_| {
+            std::thread::sleep(Duration::from_millis(20));
+            std::fs::read_to_string(out.join("settings.toml")).ok()
+        });
+        killed.kill().unwrap();
+        killed.wait().unwrap();
+        let settings = settings.expect("settings within two minutes");
+        let line = format!("keep = \"{keep}\"");
+        assert!(settings.lines().any(|found| found == line), "{preset}: {settings}");
+    }
+}
+
+#[test]
 fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
     let folder = scratch("rules");
     let out = folder.join("out");

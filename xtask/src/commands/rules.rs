@@ -48,8 +48,8 @@ pub(crate) struct RulesArgs {
 
 /// Few lots: two of each family and one round trip of lot a in every round. Every tick is learned from: rules that let the
 /// network drive on would leave the expert's ticks of its worst moments alone, and too few of them for equal samples.
-const DEFAULTS: [&str; 3] =
-    [r#"training.lots=["lot-a", "train:18:all"]"#, "training.trials=1", r#"dagger.keep="every_tick""#];
+const DEFAULTS: [&str; 3] = [r#"training.lots=["lot-a", "train:18:all"]"#, "training.trials=1", EVERY_TICK];
+const EVERY_TICK: &str = r#"dagger.keep="every_tick""#;
 
 const RULES: Trainings<Extent> = Trainings {
     command: "rules",
@@ -66,9 +66,9 @@ pub(crate) fn run(args: &RulesArgs, output: &Output) -> anyhow::Result<()> {
 fn begin(args: &RulesArgs) -> anyhow::Result<Begun<Extent>> {
     let mut layers = args.common.layers();
     // What the user sets comes later and counts.
-    let defaults = match layers.preset_name() {
-        "default" => &DEFAULTS[..],
-        "strong" => &DEFAULTS[2..],
+    let defaults: &[&str] = match layers.preset_name() {
+        "default" => &DEFAULTS,
+        "strong" => &[EVERY_TICK],
         _ => &[],
     };
     layers.overrides.splice(0..0, defaults.iter().map(|&text| text.to_owned()));
