@@ -36,6 +36,10 @@ fn copy(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
     for entry in std::fs::read_dir(from).unwrap() {
         let entry = entry.unwrap();
+        // Pictures are in folders, and read by nobody.
+        if entry.file_type().unwrap().is_dir() {
+            continue;
+        }
         std::fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
     }
 }
@@ -95,6 +99,74 @@ fn three_shards_merge_to_the_bytes_of_one_machine_and_nothing_else_merges() {
     succeed(xtask().args(["evaluate", "--resume"]).arg(&other));
     assert!(!other.join("driving.unfinished").exists());
     refused(&[one, two, two, &other], "are both shard 2/3");
+}
+
+#[test]
+fn evaluations_of_two_drivers_merge_to_the_bytes_of_one_and_others_do_not() {
+    let folder = scratch("by-driver");
+    let run = folder.join("run");
+    let of = |driver: &str| -> PathBuf {
+        let out = folder.join(driver);
+        let trials = ["--lots", "lot-b,test:8:easy", "--trials", "1", "--noise", "clean,1.5"];
+        succeed(xtask().args(["evaluate", "--driver", driver]).args(trials).arg("--out").arg(&out));
+        out
+    };
+    let printed = succeed(xtask().args(EVALUATE).arg("--out").arg(&run));
+    let whole = files(&run);
+    std::fs::remove_dir_all(&run).unwrap();
+    let (tentacle, cvm) = (of("tentacle"), of("cvm"));
+    let merged = succeed(xtask().arg("merge").args([&tentacle, &cvm]).arg("--out").arg(&run));
+    let together = files(&run);
+    assert_eq!(whole.keys().collect::<Vec<_>>(), together.keys().collect::<Vec<_>>());
+    for (name, bytes) in &whole {
+        assert!(*bytes == together[name], "{name} differs between one evaluation and two");
+    }
+    assert_eq!(printed, merged);
+    assert!(sums::verify(&run).faults.is_empty());
+    refused(&[&run, &cvm], "both have driver cvm");
+    let other = folder.join("other");
+    copy(&cvm, &other);
+    forge(&other, "manifest.toml", |text| text.replacen("program = \"", "program = \"old ", 1));
+    refused(&[&tentacle, &other], "another version of lotpilot");
+    copy(&cvm, &other);
+    forge(&other, "runs.jsonl", |text| text.lines().skip(1).flat_map(|line| [line, "\n"]).collect());
+    refused(&[&tentacle, &other], "runs.jsonl: lacks");
+    copy(&cvm, &other);
+    std::fs::write(other.join("runs.jsonl"), "{}").unwrap();
+    refused(&[&tentacle, &other], "runs.jsonl");
+    copy(&cvm, &other);
+    sums::unlist(&other, &["finished.toml"]).unwrap();
+    refused(&[&tentacle, &other], "not finished; go on with: cargo xtask evaluate --resume");
+}
+
+#[test]
+fn what_was_merged_merges_again_and_is_compared_with_whom_one_likes() {
+    let folder = scratch("merged-again");
+    let of = |driver: &str, words: &[&str], name: &str| -> PathBuf {
+        let out = folder.join(name);
+        let lane =
+            ["evaluate", "--driver", driver, "--lots", "test:1:easy", "--trials", "1", "--directions", "forward"];
+        succeed(xtask().args(lane).args(words).arg("--out").arg(&out));
+        out
+    };
+    let [tentacle, cvm, vvf] = ["tentacle", "cvm", "vvf"].map(|driver| of(driver, &[], driver));
+    let merge = |folders: [&Path; 2], with: &str, out: &Path| {
+        let with = ["--compare-with", with, "--out"];
+        xtask().arg("merge").args(folders).args(with).arg(out).output().unwrap()
+    };
+    let (two, three) = (folder.join("two"), folder.join("three"));
+    assert!(merge([&tentacle, &cvm], "tentacle", &two).status.success());
+    let printed = text(&merge([&two, &vvf], "vvf", &three)).0;
+    assert!(printed.contains("Compared with vvf") && printed.contains("tentacle"), "{printed}");
+    let (_, error) = text(&merge([&tentacle, &cvm], "expert", &folder.join("none")));
+    assert!(error.contains("--compare-with expert: name one of the drivers"), "{error}");
+
+    refused(&[&tentacle, &of("vvf", &["--seed", "2"], "seed")], "another choice of lots, trials or noise");
+    let other_car = ["--set", "episode.vehicle.dead_time_s=0.5"];
+    refused(&[&tentacle, &of("vvf", &other_car, "car")], "another car, sensor or metrics");
+    let shard = of("vvf", &["--shard", "1/2"], "shard");
+    refused(&[&tentacle, &shard], "a shard among whole evaluations");
+    refused(&[&shard, &tentacle], "this is no shard");
 }
 
 /// The text between two marks of docs/cluster.md, with what users fill in filled in, small.

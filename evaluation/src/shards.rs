@@ -1,20 +1,15 @@
 //! Work that was shared out to several machines, put together again: the same bytes as from one.
 
-use crate::evaluate::{BATCH, DRIVING, FILES};
+use crate::parts::{self, Part, Rows};
 use crate::plan::Plan;
-use crate::read::{Place, Places};
-use crate::records::{self, Driven};
-use crate::stages::{self, Part, Stage};
+use crate::stages::{self, Stage};
 use anyhow::{Context as _, ensure};
-use experiment::run_dir::{self, Manifest, RunDir};
+use experiment::run_dir::{self, Manifest};
 use experiment::settings::Settings;
 use experiment::shard::Shard;
-use experiment::trials::Trial;
 use serde::{Deserialize, Serialize};
-use sim::limits::RUN_TEXT_BYTES_MAX;
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use storage::{growing, sums};
+use storage::sums;
 
 /// The argument of the manifest that says what a shard is to drive.
 const ARGUMENT: &str = "shard";
@@ -38,7 +33,7 @@ pub struct ShardRecord {
 impl ShardRecord {
     /// Of a plan; `None` if it is to be driven whole.
     pub fn of(plan: &Plan<'_>) -> Option<Self> {
-        let keys = || plan.trials().map(|trial| key(&trial)).collect();
+        let keys = || plan.trials().map(|trial| parts::key(&trial)).collect();
         let settings_sha256 = || digest(plan.settings);
         plan.shard.map(|number| Self { number, settings_sha256: settings_sha256(), keys: keys(), networks: None })
     }
@@ -52,7 +47,7 @@ impl ShardRecord {
 
     /// Those of the stages of a reproduction that the shard does.
     pub fn share_of(&self, stages: Vec<Stage>) -> Vec<Stage> {
-        let part = if self.networks.is_some() { Part::Drives } else { Part::Trainings };
+        let part = if self.networks.is_some() { stages::Part::Drives } else { stages::Part::Trainings };
         stages::share(stages, part, self.number)
     }
 
@@ -71,12 +66,26 @@ impl ShardRecord {
     }
 }
 
-fn key(trial: &Trial<'_>) -> String {
-    format!("{}@{}@{}", trial.lot.name(), trial.direction.name(), trial.index)
-}
-
 fn digest(settings: &Settings) -> String {
     sums::digest(settings.to_toml().as_bytes())
+}
+
+/// Whether a folder is that of a shard, finished or not.
+///
+/// # Errors
+/// If it is no run, or its manifest is damaged.
+pub fn is_shard(folder: &Path) -> anyhow::Result<bool> {
+    ensure_is_run(folder)?;
+    Ok(Manifest::read(folder)?.arguments.contains_key(ARGUMENT))
+}
+
+pub(crate) fn ensure_is_run(folder: &Path) -> anyhow::Result<()> {
+    let name = folder.display();
+    ensure!(
+        sums::exists(folder)?,
+        "{name}: this is no run; name the folders that evaluate, or a command with --shard, wrote"
+    );
+    Ok(())
 }
 
 /// A finished shard.
@@ -92,7 +101,7 @@ struct ShardRun {
 impl ShardRun {
     fn read(folder: &Path) -> anyhow::Result<Self> {
         let name = folder.display();
-        ensure!(sums::exists(folder)?, "{name}: this is no run; name the folders that a command with --shard wrote");
+        ensure_is_run(folder)?;
         let mut manifest = Manifest::read(folder)?;
         let record = ShardRecord::take_from(&mut manifest).with_context(|| name.to_string())?;
         let record = record
@@ -116,7 +125,7 @@ impl ShardRun {
         let differs = [
             ("command", self.manifest.command != first.manifest.command),
             ("number of shards", self.record.number.of() != first.record.number.of()),
-            ("version of lotpilot", version(&self.manifest) != version(&first.manifest)),
+            ("version of lotpilot", !self.manifest.is_of_version_of(&first.manifest)),
             ("architecture or system", self.manifest.target != first.manifest.target),
             ("folder of networks", self.record.networks != first.record.networks),
             ("choice of drivers or lots", self.manifest.arguments != first.manifest.arguments),
@@ -136,11 +145,6 @@ impl ShardRun {
 
 /// Missing shards that are named.
 const MISSING_NAMED_MAX: usize = 10;
-
-/// Which program made a run.
-fn version(manifest: &Manifest) -> (&str, Option<&str>, Option<bool>) {
-    (&manifest.program, manifest.git_revision.as_deref(), manifest.git_dirty)
-}
 
 /// All shards of a whole, finished.
 #[derive(Debug)]
@@ -259,82 +263,16 @@ impl Shards {
     /// # Errors
     /// If a file is missing or damaged, or a row is missing, there twice, or of another shard or evaluation.
     pub fn rows(&self, plan: &Plan<'_>) -> anyhow::Result<Rows> {
-        let places = Places::new(plan);
-        let parts: Vec<Plan<'_>> =
-            self.runs.iter().map(|run| Plan { shard: Some(run.record.number), ..*plan }).collect();
+        let part = |run: &ShardRun| Plan { shard: Some(run.record.number), ..*plan };
+        let parts: Vec<Part<'_>> = self.runs.iter().map(|run| Part { folder: &run.folder, plan: part(run) }).collect();
         for (run, part) in self.runs.iter().zip(&parts) {
-            let expected = part.trials().map(|trial| key(&trial));
+            let expected = part.plan.trials().map(|trial| parts::key(&trial));
             ensure!(
                 expected.eq(run.record.keys.iter().cloned()),
                 "{}: its manifest lists other trials than its settings stand for; drive the shard again",
                 run.folder.display()
             );
         }
-        let mut files = FILES.map(|_| Vec::new());
-        for (name, file) in FILES.into_iter().zip(&mut files) {
-            let mut rows = Vec::new();
-            for (run, part) in self.runs.iter().zip(&parts) {
-                rows.extend(run.rows(name, part, &places)?);
-            }
-            // Stable: the near-collisions of a run stay in their order.
-            rows.sort_by_key(|(place, _)| (place.trial / BATCH, *place));
-            for (_, line) in rows {
-                file.extend(line.into_bytes());
-                file.push(b'\n');
-            }
-        }
-        Ok(Rows(files))
-    }
-}
-
-impl ShardRun {
-    /// The lines of a file with their places in the whole plan.
-    fn rows(&self, name: &str, part: &Plan<'_>, places: &Places<'_>) -> anyhow::Result<Vec<(Place, String)>> {
-        let path = self.folder.join(name);
-        let text = sums::read_to_string(&path, RUN_TEXT_BYTES_MAX)?;
-        let own = Places::new(part);
-        let mut lines = text.lines();
-        let mut rows = Vec::new();
-        let mut seen = BTreeSet::new();
-        records::each_line_of(&path, text.as_bytes(), |driven: Driven| {
-            let is_new = seen.insert(own.of(&driven)?);
-            ensure!(is_new || name == records::FAILURES, "there twice");
-            rows.push((places.of(&driven)?, lines.next().unwrap_or_default().to_owned()));
-            Ok(())
-        })?;
-        if name != records::FAILURES {
-            let levels = part.settings.evaluation.noise.iter().enumerate();
-            for (level, noise) in levels {
-                for (driver, named) in part.drivers.iter().enumerate() {
-                    let missing = (0..own.trials.len()).find(|&trial| !seen.contains(&Place { level, driver, trial }));
-                    if let Some(trial) = missing {
-                        anyhow::bail!(
-                            "{}: lacks {} by {} at noise {noise}; drive the shard again into another folder",
-                            path.display(),
-                            key(&own.trials[trial]),
-                            named.name
-                        );
-                    }
-                }
-            }
-        }
-        Ok(rows)
-    }
-}
-
-/// The lines of an evaluation, as one machine would have written them.
-#[derive(Debug)]
-pub struct Rows([Vec<u8>; FILES.len()]);
-
-impl Rows {
-    /// Writes them into the folder of a run.
-    ///
-    /// # Errors
-    /// If a file cannot be written.
-    pub fn write(&self, run: &RunDir) -> anyhow::Result<()> {
-        // An evaluation under way would be gone on with, in files that are others now.
-        growing::clear(run.path(), DRIVING)?;
-        // That of the runs is listed last: with it, the evaluation counts as driven.
-        FILES.into_iter().zip(&self.0).rev().try_for_each(|(name, lines)| run.write(name, lines))
+        Rows::of(&parts, plan)
     }
 }

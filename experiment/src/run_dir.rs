@@ -543,6 +543,12 @@ impl Manifest {
         Ok(())
     }
 
+    /// Whether the same program made another run: by name, version and revision.
+    pub fn is_of_version_of(&self, other: &Self) -> bool {
+        let version = |of: &Self| (of.program.clone(), of.git_revision.clone(), of.git_dirty);
+        version(self) == version(other)
+    }
+
     /// Reads the manifest of a run.
     ///
     /// # Errors

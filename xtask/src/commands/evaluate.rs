@@ -105,7 +105,11 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
         (settings, asked, Ok((run, manifest)))
     } else {
         let specs = DriverSpec::parse_all(&args.drivers)?;
-        let asked = Asked { drivers: args.drivers.clone(), compare_with: compare_with(args, &specs)?, shard: None };
+        let asked = Asked {
+            drivers: args.drivers.clone(),
+            compare_with: compare_with(args.compare_with.as_deref(), &specs)?,
+            shard: None,
+        };
         let (mut settings, preset) = settings_for(&specs, &Layers::from(&args.layers), output)?;
         override_trials(&mut settings, args)?;
         (settings, asked, Err(preset))
@@ -200,13 +204,13 @@ pub(crate) fn or_forward(error: anyhow::Error, flag: &str) -> anyhow::Error {
 }
 
 /// `--compare-with`, else the last network, else the first driver.
-fn compare_with(args: &EvaluateArgs, specs: &[DriverSpec]) -> anyhow::Result<usize> {
-    let Some(wanted) = &args.compare_with else {
+pub(crate) fn compare_with(wanted: Option<&str>, specs: &[DriverSpec]) -> anyhow::Result<usize> {
+    let Some(wanted) = wanted else {
         return Ok(specs.iter().rposition(DriverSpec::is_network).unwrap_or(0));
     };
     let spec = wanted.parse::<DriverSpec>().ok();
     let found = specs.iter().position(|given| Some(given) == spec.as_ref());
-    found.with_context(|| format!("--compare-with {wanted}: name one of the drivers given with --driver"))
+    found.with_context(|| format!("--compare-with {wanted}: name one of the drivers"))
 }
 
 /// The settings, and the name of what they start from: `--preset` or `--config` if given, else the first run that is

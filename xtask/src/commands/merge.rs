@@ -1,4 +1,5 @@
-//! `merge`: the shards of an evaluation or a reproduction, made on several machines, as if one had done all of it.
+//! `merge`: the shards of an evaluation or a reproduction, made on several machines, as if one had done all of it; or
+//! evaluations by different drivers, as if one had named all of them.
 
 use crate::args::{JsonArgs, OutArgs};
 use crate::build_info;
@@ -10,10 +11,12 @@ use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
 use evaluation::drive_stage::DriveStage;
+use evaluation::evaluations::Evaluations;
+use evaluation::parts::Rows;
 use evaluation::plan::Plan;
-use evaluation::shards::Shards;
+use evaluation::shards::{self, Shards};
 use evaluation::stages::{self, Step};
-use experiment::drivers::NamedDriver;
+use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::run_dir::{Build, Place, Request, RunDir};
@@ -25,13 +28,18 @@ Examples:
   for i in 1 2 3; do cargo xtask evaluate --driver expert --lots test:30 --shard $i/3 --out shards/$i; done
   cargo xtask merge shards/* --out runs/merged
   cargo xtask merge trained/* --out runs/full         the networks of a reproduction; then --networks runs/full
-  cargo xtask merge driven/*                          what they drove, into runs/full, and its report";
+  cargo xtask merge driven/*                          what they drove, into runs/full, and its report
+  cargo xtask merge runs/mine runs/planners --out runs/all     other drivers of the same trials, in one table";
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct MergeArgs {
-    /// Folders that `evaluate --shard` or `reproduce --shard` wrote: every shard once, in any order.
+    /// Folders that `evaluate --shard` or `reproduce --shard` wrote: every shard once, in any order. Or whole evaluations of
+    /// the same trials by different drivers.
     #[arg(value_name = "DIR", required = true)]
-    shards: Vec<PathBuf>,
+    folders: Vec<PathBuf>,
+    /// Of whole evaluations: the driver the others are compared with [default: the last network, else the first driver].
+    #[arg(long, value_name = "SPEC")]
+    compare_with: Option<String>,
     #[command(flatten)]
     pub(crate) json: JsonArgs,
     #[command(flatten)]
@@ -39,15 +47,19 @@ pub(crate) struct MergeArgs {
 }
 
 pub(crate) fn run(args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
-    let shards = Shards::read(&args.shards)?;
-    args.out.ensure_apart_from(&args.shards)?;
+    args.out.ensure_apart_from(&args.folders)?;
+    if !shards::is_shard(&args.folders[0])? {
+        return evaluations(&Evaluations::read(&args.folders)?, args, output);
+    }
+    let shards = Shards::read(&args.folders)?;
+    ensure!(args.compare_with.is_none(), "--compare-with: shards are compared as they were driven; leave it out");
     if shards.manifest().command != reproduce::COMMAND {
         return evaluation(&shards, args, output);
     }
     ensure!(
         !shards.manifest().arguments.is_empty(),
         "{}: this is a stage of a shard; name the folder of the shard",
-        args.shards[0].display()
+        args.folders[0].display()
     );
     let Some(networks) = shards.networks() else { return trainings(&shards, args, output) };
     ensure!(
@@ -58,7 +70,7 @@ pub(crate) fn run(args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     ensure!(
         networks.is_dir(),
         "{}: these shards drove the networks of {}, which is not here; run merge where that path leads to it",
-        args.shards[0].display(),
+        args.folders[0].display(),
         networks.display()
     );
     drives(&shards, networks, output)
@@ -74,17 +86,38 @@ fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Res
     let rows = shards.rows(&plan)?;
     let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
     let seed = settings.evaluation.seed.0;
-    // From here on it is an evaluation like any other, which `evaluate --resume` finishes if this is interrupted.
     let run = RunDir::create(&args.out.place(evaluate::COMMAND, &manifest.preset, seed), settings, &request)?;
+    put_together(&plan, &rows, &run, output)
+}
+
+fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
+    let (settings, named) = (evaluations.settings(), evaluations.drivers());
+    let compare_with = evaluate::compare_with(args.compare_with.as_deref(), &DriverSpec::parse_all(&named)?)?;
+    let drivers = NamedDriver::load_all(&named, settings)?;
+    let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
+    let inputs = inputs::of(&lots, &drivers);
+    evaluations.check_inputs(&inputs)?;
+    let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with, shard: None };
+    evaluate::check(&plan)?;
+    let rows = evaluations.rows(&plan)?;
+    let asked = Asked { drivers: named, compare_with, shard: None };
+    let request = Request { arguments: toml::Table::try_from(&asked)?, inputs };
+    let place = args.out.place(evaluate::COMMAND, evaluations.preset(), settings.evaluation.seed.0);
+    put_together(&plan, &rows, &RunDir::create(&place, settings, &request)?, output)
+}
+
+/// Finishes an evaluation whose rows are known. From here on it is one like any other, which `evaluate --resume` finishes if
+/// this is interrupted.
+fn put_together(plan: &Plan<'_>, rows: &Rows, run: &RunDir, output: &Output) -> anyhow::Result<()> {
     interrupt::can_resume(evaluate::COMMAND, run.path());
-    rows.write(&run)?;
-    evaluate::finish(&plan, &run, &Console::new(output), output)
+    rows.write(run)?;
+    evaluate::finish(plan, run, &Console::new(output), output)
 }
 
 /// Begins a reproduction with the trainings that the shards did.
 fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, manifest) = (shards.settings(), shards.manifest());
-    let extent = reproduce::extent_of(&args.shards[0], manifest)?;
+    let extent = reproduce::extent_of(&args.folders[0], manifest)?;
     manifest.check_inputs(&reproduce::inputs(settings, &extent)?)?;
     let trained = shards.stages(&stages::all(settings, &extent, Path::new("")))?;
     let run = match &args.out.out {
@@ -102,7 +135,7 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
             RunDir::create(&Place { build: &build, ..place }, settings, &request)?
         }
     };
-    let named: Vec<String> = args.shards.iter().map(|shard| shard.display().to_string()).collect();
+    let named: Vec<String> = args.folders.iter().map(|shard| shard.display().to_string()).collect();
     interrupt::goes_on_with(&format!("merge {} --out {}", named.join(" "), run.path().display()));
     for (folder, path) in &trained {
         if !sums::is_listed(run.path(), &format!("{folder}/{}", sums::FILE))? {

@@ -1,0 +1,149 @@
+//! Evaluations of the same trials by different drivers, put together: the same bytes as from one that names all of them.
+
+use crate::parts::{Part, Rows};
+use crate::plan::Plan;
+use crate::shards::{self, ShardRecord};
+use anyhow::{Context as _, ensure};
+use experiment::run_dir::{self, Inputs, Manifest};
+use experiment::settings::Settings;
+use serde::Deserialize as _;
+use std::path::{Path, PathBuf};
+
+/// The command that makes them.
+const COMMAND: &str = "evaluate";
+
+/// A finished evaluation.
+#[derive(Debug)]
+struct EvaluationRun {
+    folder: PathBuf,
+    manifest: Manifest,
+    settings: Settings,
+    /// As they were named.
+    drivers: Vec<String>,
+}
+
+impl EvaluationRun {
+    fn read(folder: &Path) -> anyhow::Result<Self> {
+        let name = folder.display();
+        shards::ensure_is_run(folder)?;
+        let mut manifest = Manifest::read(folder)?;
+        ensure!(
+            manifest.command == COMMAND,
+            "{name}: a run of {}, not of evaluate; name the folders that evaluate wrote",
+            manifest.command
+        );
+        ensure!(
+            ShardRecord::take_from(&mut manifest)?.is_none(),
+            "{name}: a shard among whole evaluations; merge the shards first, then their evaluation with the others"
+        );
+        ensure!(
+            run_dir::is_finished(folder)?,
+            "{name}: not finished; go on with: cargo xtask {COMMAND} --resume {name}"
+        );
+        let drivers = manifest.arguments.get("drivers").cloned();
+        let drivers = drivers.with_context(|| format!("{name}/manifest.toml: names no drivers"))?;
+        let drivers = Vec::deserialize(drivers).with_context(|| format!("{name}/manifest.toml: drivers"))?;
+        Ok(Self { folder: folder.to_owned(), settings: run_dir::settings_of(folder)?, manifest, drivers })
+    }
+
+    /// Refuses what was driven otherwise.
+    fn check_is_comparable_with(&self, first: &Self) -> anyhow::Result<()> {
+        let (own, others) = (&self.settings, &first.settings);
+        let differs = [
+            ("version of lotpilot", !self.manifest.is_of_version_of(&first.manifest)),
+            ("architecture or system", self.manifest.target != first.manifest.target),
+            ("choice of lots, trials or noise ([evaluation])", own.evaluation != others.evaluation),
+            ("car, sensor or metrics ([episode])", own.episode != others.episode),
+            ("expert ([expert])", own.expert != others.expert),
+            ("use of what networks answer ([dagger.inference])", own.dagger.inference != others.dagger.inference),
+        ];
+        if let Some((what, _)) = differs.into_iter().find(|(_, differs)| *differs) {
+            anyhow::bail!(
+                "{}: made with another {what} than {}, so that their drivers cannot be compared; drive one of them again",
+                self.folder.display(),
+                first.folder.display()
+            );
+        }
+        for driver in &self.drivers {
+            ensure!(
+                !first.drivers.contains(driver),
+                "{} and {} both have driver {driver}; name one of them",
+                first.folder.display(),
+                self.folder.display()
+            );
+        }
+        Ok(())
+    }
+}
+
+/// Finished evaluations of the same trials by different drivers.
+#[derive(Debug)]
+pub struct Evaluations {
+    runs: Vec<EvaluationRun>,
+}
+
+impl Evaluations {
+    /// Reads the manifests of some folders.
+    ///
+    /// # Errors
+    /// If one is no finished evaluation or a shard, two have other trials, settings of driving or versions, or a driver is
+    /// in two of them.
+    pub fn read(folders: &[PathBuf]) -> anyhow::Result<Self> {
+        let runs = folders.iter().map(|folder| EvaluationRun::read(folder)).collect::<anyhow::Result<Vec<_>>>()?;
+        ensure!(!runs.is_empty(), "no evaluation is named");
+        for (at, run) in runs.iter().enumerate() {
+            runs[..at].iter().try_for_each(|earlier| run.check_is_comparable_with(earlier))?;
+        }
+        Ok(Self { runs })
+    }
+
+    /// The settings of the first: what the others were driven with is the same.
+    pub fn settings(&self) -> &Settings {
+        &self.runs[0].settings
+    }
+
+    /// What the settings of the first started from.
+    pub fn preset(&self) -> &str {
+        &self.runs[0].manifest.preset
+    }
+
+    /// The drivers of all, as they were named, those of the first folder first.
+    pub fn drivers(&self) -> Vec<String> {
+        self.runs.iter().flat_map(|run| run.drivers.iter().cloned()).collect()
+    }
+
+    /// Refuses files of lots or drivers that have changed since.
+    ///
+    /// # Errors
+    /// The first of them.
+    pub fn check_inputs(&self, found: &Inputs) -> anyhow::Result<()> {
+        for run in &self.runs {
+            for (name, digest) in &run.manifest.inputs {
+                ensure!(
+                    found.get(name) == Some(digest),
+                    "{name}: changed since {} was driven; restore it, or drive again",
+                    run.folder.display()
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts their rows in the order of the whole plan, which has their drivers in order.
+    ///
+    /// # Errors
+    /// If a file is missing or damaged, or a row is missing, there twice, or of another evaluation.
+    pub fn rows(&self, plan: &Plan<'_>) -> anyhow::Result<Rows> {
+        let mut others = plan.drivers;
+        let parts: Vec<Part<'_>> = self
+            .runs
+            .iter()
+            .map(|run| {
+                let (own, rest) = others.split_at(run.drivers.len());
+                others = rest;
+                Part { folder: &run.folder, plan: Plan { drivers: own, compare_with: 0, ..*plan } }
+            })
+            .collect();
+        Rows::of(&parts, plan)
+    }
+}
