@@ -45,7 +45,7 @@ impl DisturbanceSettings {
         Self { enabled: false, ..Self::quick() }
     }
 
-    /// As [`Self::quick`], towards danger: 706 near-collisions on development lots became 649 (docs/elsewhere.md).
+    /// As [`Self::quick`], towards danger: 706 near-collisions on development lots became 649 (docs/earlier.md).
     pub fn aimed() -> Self {
         Self { aim: Aim::Danger, ..Self::quick() }
     }
