@@ -23,10 +23,21 @@ const FAILURES_MAX: usize = 10;
 pub struct Extent {
     /// Operations that each fault strikes, evenly spaced; all of them if there are no more.
     pub strikes: usize,
+    /// Which of them.
+    pub share: Share,
     /// Deaths at random times.
     pub kills: usize,
     /// Seed of these times.
     pub seed: u64,
+}
+
+/// One of some shares of the operations that are struck, dealt out in turn: hours of them are struck in parts.
+#[derive(Debug, Clone, Copy)]
+pub struct Share {
+    /// Which, from 0.
+    pub index: usize,
+    /// How many there are, at least 1.
+    pub of: usize,
 }
 
 /// What came of it.
@@ -79,15 +90,17 @@ impl Workplace {
             }
             let operations = self.library.operations()?;
             let strikes = extent.strikes.min(operations.len());
-            for strike in 0..strikes {
+            let share = extent.share;
+            for strike in (share.index..strikes).step_by(share.of) {
                 let at = (2 * strike + 1) * operations.len() / (2 * strikes);
                 let operation = &operations[at];
                 let what = format!("{} at {} of {}, {operation}", fault.name(), at + 1, operations.len());
                 let came = self.strike(case, fault, at + 1).and_then(|()| self.compare(&right));
                 self.note(&mut outcome, &what, came)?;
+                outcome.struck[kind].0 += 1;
                 progress((kind as f64 + strike as f64 / strikes as f64) / (Fault::ALL.len() + 1) as f64);
             }
-            outcome.struck[kind] = (strikes, operations.len());
+            outcome.struck[kind].1 = operations.len();
         }
         let mut rng = ChaCha8Rng::seed_from_u64(extent.seed);
         while outcome.kills < extent.kills {

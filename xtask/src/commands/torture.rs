@@ -5,12 +5,14 @@ use crate::output::{Output, note};
 use anyhow::{Context as _, ensure};
 use clap::Args;
 use experiment::progress::Progress as _;
+use experiment::shard::Shard;
 use torture::cases::{CASES, Case};
-use torture::trial::{Extent, Outcome, Workplace};
+use torture::trial::{Extent, Outcome, Share, Workplace};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask torture --only evaluate --strikes 10
+  cargo xtask torture --only train-dagger --kills 1 --shard 1/8
   cargo xtask torture --kills 100               every operation of every command: many hours";
 
 #[derive(Debug, Clone, Args)]
@@ -21,6 +23,9 @@ pub(crate) struct TortureArgs {
     /// Operations on files that each fault strikes, evenly spaced over those of a command [default: all].
     #[arg(long, value_name = "N")]
     strikes: Option<u16>,
+    /// Strikes a share of these operations only: hours of them go in parts, or to several machines.
+    #[arg(long, value_name = "NUMBER/OF")]
+    shard: Option<Shard>,
     /// Kills of each command at random times.
     #[arg(long, value_name = "N", default_value_t = 30)]
     kills: u16,
@@ -43,7 +48,7 @@ pub(crate) fn run(args: &TortureArgs, output: &Output) -> anyhow::Result<()> {
     for case in cases {
         console.begin("torture", case.name);
         let strikes = args.strikes.map_or(usize::MAX, usize::from);
-        let extent = Extent { strikes, kills: args.kills.into(), seed: args.seed };
+        let extent = Extent { strikes, share: share(args.shard), kills: args.kills.into(), seed: args.seed };
         let outcome = workplace.torture(case, &extent, &mut |share| console.at(share, &mut |_| String::new()))?;
         console.end("compared");
         outcome.failures.iter().for_each(|failure| note(format_args!("{}: {failure}", case.name)));
@@ -64,6 +69,13 @@ fn cases(only: &[String]) -> anyhow::Result<Vec<&'static Case>> {
         anyhow::bail!("--only {unknown}: there are {}", names().collect::<Vec<_>>().join(", "));
     }
     Ok(CASES.iter().filter(|case| only.is_empty() || only.iter().any(|name| name == case.name)).collect())
+}
+
+fn share(shard: Option<Shard>) -> Share {
+    shard.map_or(Share { index: 0, of: 1 }, |shard| Share {
+        index: shard.number() as usize - 1,
+        of: shard.of() as usize,
+    })
 }
 
 fn row(case: &Case, outcome: &Outcome) -> String {
