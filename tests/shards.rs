@@ -161,12 +161,27 @@ fn what_was_merged_merges_again_and_is_compared_with_whom_one_likes() {
     let (_, error) = text(&merge([&tentacle, &cvm], "expert", &folder.join("none")));
     assert!(error.contains("--compare-with expert: name one of the drivers"), "{error}");
 
-    refused(&[&tentacle, &of("vvf", &["--seed", "2"], "seed")], "another choice of lots, trials or noise");
+    refused(&[&tentacle, &of("vvf", &["--seed", "2"], "seed")], "another choice of lots, trials, noise or smoothing");
     let other_car = ["--set", "episode.vehicle.dead_time_s=0.5"];
     refused(&[&tentacle, &of("vvf", &other_car, "car")], "another car, sensor or metrics");
     let shard = of("vvf", &["--shard", "1/2"], "shard");
     refused(&[&tentacle, &shard], "a shard among whole evaluations");
     refused(&[&shard, &tentacle], "this is no shard");
+    let other_expert = ["--set", "expert.horizon_m=10"];
+    refused(&[&of("expert", &[], "expert"), &of("dwa", &other_expert, "dwa")], "another expert");
+    let merged = merge([&tentacle, &of("apf", &other_expert, "apf")], "apf", &folder.join("no-expert"));
+    assert!(merged.status.success(), "nobody drives by it: {}", text(&merged).1);
+
+    // The version is of who drove, not of who merges.
+    let old = [&tentacle, &cvm].map(|run| {
+        let old = run.with_extension("old");
+        copy(run, &old);
+        forge(&old, "manifest.toml", |text| text.replacen("program = \"", "program = \"old ", 1));
+        old
+    });
+    let both = folder.join("both-old");
+    assert!(merge([&old[0], &old[1]], "cvm", &both).status.success());
+    refused(&[&both, &vvf], "another version of lotpilot");
 }
 
 /// The text between two marks of docs/cluster.md, with what users fill in filled in, small.

@@ -5,7 +5,7 @@ use crate::plan::Plan;
 use crate::shards::{self, ShardRecord};
 use anyhow::{Context as _, ensure};
 use experiment::run_dir::{self, Inputs, Manifest};
-use experiment::settings::Settings;
+use experiment::settings::{EvaluationSettings, Settings};
 use serde::Deserialize as _;
 use std::path::{Path, PathBuf};
 
@@ -49,13 +49,19 @@ impl EvaluationRun {
     /// Refuses what was driven otherwise.
     fn check_is_comparable_with(&self, first: &Self) -> anyhow::Result<()> {
         let (own, others) = (&self.settings, &first.settings);
+        let is_any = |kind: &str| [self, first].iter().any(|run| run.drivers.iter().any(|driver| is_of(driver, kind)));
+        let trials = |of: &Settings| EvaluationSettings { elsewhere: Vec::new(), ..of.evaluation.clone() };
         let differs = [
             ("version of lotpilot", !self.manifest.is_of_version_of(&first.manifest)),
             ("architecture or system", self.manifest.target != first.manifest.target),
-            ("choice of lots, trials or noise ([evaluation])", own.evaluation != others.evaluation),
+            ("choice of lots, trials, noise or smoothing ([evaluation])", trials(own) != trials(others)),
             ("car, sensor or metrics ([episode])", own.episode != others.episode),
-            ("expert ([expert])", own.expert != others.expert),
-            ("use of what networks answer ([dagger.inference])", own.dagger.inference != others.dagger.inference),
+            ("expert ([expert])", is_any("expert") && own.expert != others.expert),
+            (
+                "use of what networks answer ([dagger.inference])",
+                is_any("onnx") && own.dagger.inference != others.dagger.inference,
+            ),
+            ("device of networks (dagger.device)", own.dagger.device != others.dagger.device),
         ];
         if let Some((what, _)) = differs.into_iter().find(|(_, differs)| *differs) {
             anyhow::bail!(
@@ -67,13 +73,18 @@ impl EvaluationRun {
         for driver in &self.drivers {
             ensure!(
                 !first.drivers.contains(driver),
-                "{} and {} both have driver {driver}; name one of them",
+                "{} and {} both have driver {driver}; leave one of the folders out",
                 first.folder.display(),
                 self.folder.display()
             );
         }
         Ok(())
     }
+}
+
+/// Whether a driver is named `KIND` or `KIND:…`.
+fn is_of(driver: &str, kind: &str) -> bool {
+    driver.split(':').next() == Some(kind)
 }
 
 /// Finished evaluations of the same trials by different drivers.
@@ -83,28 +94,34 @@ pub struct Evaluations {
 }
 
 impl Evaluations {
-    /// Reads the manifests of some folders.
+    /// Reads the manifests of some folders, at least one.
     ///
     /// # Errors
     /// If one is no finished evaluation or a shard, two have other trials, settings of driving or versions, or a driver is
     /// in two of them.
     pub fn read(folders: &[PathBuf]) -> anyhow::Result<Self> {
         let runs = folders.iter().map(|folder| EvaluationRun::read(folder)).collect::<anyhow::Result<Vec<_>>>()?;
-        ensure!(!runs.is_empty(), "no evaluation is named");
         for (at, run) in runs.iter().enumerate() {
             runs[..at].iter().try_for_each(|earlier| run.check_is_comparable_with(earlier))?;
         }
         Ok(Self { runs })
     }
 
-    /// The settings of the first: what the others were driven with is the same.
-    pub fn settings(&self) -> &Settings {
-        &self.runs[0].settings
+    /// The first that names a run, else the first: its `[training]` says which lots count as trained on, as in one
+    /// evaluation that names all drivers.
+    fn leading(&self) -> &EvaluationRun {
+        let names_run = |run: &&EvaluationRun| run.drivers.iter().any(|driver| is_of(driver, "run"));
+        self.runs.iter().find(names_run).unwrap_or(&self.runs[0])
     }
 
-    /// What the settings of the first started from.
-    pub fn preset(&self) -> &str {
-        &self.runs[0].manifest.preset
+    /// Those of the first that names a run, else of the first: what the others were driven with is the same.
+    pub fn settings(&self) -> &Settings {
+        &self.leading().settings
+    }
+
+    /// The manifest of the same, and so the version that drove all of them.
+    pub fn manifest(&self) -> &Manifest {
+        &self.leading().manifest
     }
 
     /// The drivers of all, as they were named, those of the first folder first.

@@ -504,6 +504,11 @@ fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
     Ok((run, is_bc))
 }
 
+/// Architecture and operating system.
+fn target() -> String {
+    format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS)
+}
+
 impl Manifest {
     fn new(place: &Place<'_>, settings: &Settings, request: &Request) -> Self {
         let Place { build, command, preset, .. } = *place;
@@ -519,7 +524,7 @@ impl Manifest {
             git_dirty: build.git_dirty,
             rustc_version: build.rustc_version.clone(),
             threads: rayon::current_num_threads(),
-            target: format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS),
+            target: target(),
             processor: build.processor.clone(),
             processor_features: build.processor_features.clone(),
             libraries: build.libraries.clone(),
@@ -541,6 +546,11 @@ impl Manifest {
         }
         ensure!(found.len() == self.inputs.len(), "this run was begun with other lots or drivers; begin again");
         Ok(())
+    }
+
+    /// Whether the run was made on this architecture and system.
+    pub fn is_of_this_target(&self) -> bool {
+        self.target == target()
     }
 
     /// Whether the same program made another run: by name, version and revision.

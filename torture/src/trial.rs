@@ -31,7 +31,7 @@ pub struct Extent {
     pub seed: u64,
 }
 
-/// One of some shares of the operations that are struck, dealt out in turn: hours of them are struck in parts.
+/// One of some shares of the operations that are struck, dealt out in turn.
 #[derive(Debug, Clone, Copy)]
 pub struct Share {
     /// Which, from 0.

@@ -92,6 +92,12 @@ fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Res
 
 fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, named) = (evaluations.settings(), evaluations.drivers());
+    ensure!(
+        evaluations.manifest().is_of_this_target(),
+        "{}: made on {}; merge on such a machine",
+        args.folders[0].display(),
+        evaluations.manifest().target
+    );
     let compare_with = evaluate::compare_with(args.compare_with.as_deref(), &DriverSpec::parse_all(&named)?)?;
     let drivers = NamedDriver::load_all(&named, settings)?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
@@ -102,8 +108,22 @@ fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> 
     let rows = evaluations.rows(&plan)?;
     let asked = Asked { drivers: named, compare_with, shard: None };
     let request = Request { arguments: toml::Table::try_from(&asked)?, inputs };
-    let place = args.out.place(evaluate::COMMAND, evaluations.preset(), settings.evaluation.seed.0);
-    put_together(&plan, &rows, &RunDir::create(&place, settings, &request)?, output)
+    let made = evaluations.manifest();
+    // The manifest says who drove, not who merged: what comes out is merged with others in its turn.
+    let build = Build {
+        program: made.program.clone(),
+        git_revision: made.git_revision.clone(),
+        git_dirty: made.git_dirty,
+        rustc_version: made.rustc_version.clone(),
+        libraries: made.libraries.clone(),
+        ..build_info::get().clone()
+    };
+    if made.git_dirty == Some(true) {
+        output.note("note: made with uncommitted changes, which merge cannot compare");
+    }
+    let place = args.out.place(evaluate::COMMAND, &made.preset, settings.evaluation.seed.0);
+    let run = RunDir::create(&Place { build: &build, ..place }, settings, &request)?;
+    put_together(&plan, &rows, &run, output)
 }
 
 /// Finishes an evaluation whose rows are known. From here on it is one like any other, which `evaluate --resume` finishes if

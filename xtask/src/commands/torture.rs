@@ -23,7 +23,8 @@ pub(crate) struct TortureArgs {
     /// Operations on files that each fault strikes, evenly spaced over those of a command [default: all].
     #[arg(long, value_name = "N")]
     strikes: Option<u16>,
-    /// Strikes a share of these operations only: hours of them go in parts, or to several machines.
+    /// Strikes only this share of these operations. Kills are not shared out: give each shard another `--seed`, or few
+    /// `--kills`.
     #[arg(long, value_name = "NUMBER/OF")]
     shard: Option<Shard>,
     /// Kills of each command at random times.
