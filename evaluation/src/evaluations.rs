@@ -29,7 +29,7 @@ impl EvaluationRun {
         let mut manifest = Manifest::read(folder)?;
         ensure!(
             manifest.command == COMMAND,
-            "{name}: a run of {}, not of evaluate; name the folders that evaluate wrote",
+            "{name}: this is no shard and no evaluation, but of {}; name the folders that they wrote",
             manifest.command
         );
         ensure!(

@@ -210,7 +210,7 @@ pub(crate) fn compare_with(wanted: Option<&str>, specs: &[DriverSpec]) -> anyhow
     };
     let spec = wanted.parse::<DriverSpec>().ok();
     let found = specs.iter().position(|given| Some(given) == spec.as_ref());
-    found.with_context(|| format!("--compare-with {wanted}: name one of the drivers"))
+    found.with_context(|| format!("--compare-with {wanted}: name one of the drivers (--driver)"))
 }
 
 /// The settings, and the name of what they start from: `--preset` or `--config` if given, else the first run that is
