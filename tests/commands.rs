@@ -32,7 +32,7 @@ fn bad_input_gets_one_clear_error() {
     refuses(&["train-dagger", "--config", "no-such.toml"], &["no-such.toml"]);
     refuses(&["evaluate", "--driver", "expert", "--noise", "loud"], &["loud", "clean, paper, hard"]);
     refuses(&["evaluate", "--driver", "expert", "--noise", "paper,paper"], &["paper", "twice"]);
-    refuses(&["evaluate", "--driver", "expert", "--compare-with", "nobody"], &["nobody", "--driver"]);
+    refuses(&["evaluate", "--driver", "expert", "--compare-with", "nobody"], &["nobody", "name one of expert"]);
     refuses(&["evaluate", "--driver", "expert", "--driver", "expert"], &["expert", "twice"]);
     refuses(&["metres"], &["sample-size"]);
     refuses(&["sample-size", "--below", "0"], &["--below 0"]);

@@ -159,7 +159,7 @@ fn what_was_merged_merges_again_and_is_compared_with_whom_one_likes() {
     let printed = text(&merge([&two, &vvf], "vvf", &three)).0;
     assert!(printed.contains("Compared with vvf") && printed.contains("tentacle"), "{printed}");
     let (_, error) = text(&merge([&tentacle, &cvm], "expert", &folder.join("none")));
-    assert!(error.contains("--compare-with expert: name one of the drivers"), "{error}");
+    assert!(error.contains("--compare-with expert: is none of the drivers; name one of tentacle, cvm"), "{error}");
 
     refused(&[&tentacle, &of("vvf", &["--seed", "2"], "seed")], "another choice of lots, trials, noise or smoothing");
     let other_car = ["--set", "episode.vehicle.dead_time_s=0.5"];
@@ -171,6 +171,20 @@ fn what_was_merged_merges_again_and_is_compared_with_whom_one_likes() {
     refused(&[&of("expert", &[], "expert"), &of("dwa", &other_expert, "dwa")], "another expert");
     let merged = merge([&tentacle, &of("apf", &other_expert, "apf")], "apf", &folder.join("no-expert"));
     assert!(merged.status.success(), "nobody drives by it: {}", text(&merged).1);
+
+    // Which lots count as trained on, the run says, not whoever is named first.
+    let trained = folder.join("trained");
+    let small = ["--set", "training.lots=[\"train:1:lane\"]", "--set", "dagger.cloning_budget.steps=20"];
+    succeed(xtask().args(["train-bc", "--preset", "smoke", "--no-eval"]).args(small).arg("--out").arg(&trained));
+    let run = of(&format!("run:{}", trained.display()), &[], "network");
+    let config = trained.join("settings.toml").to_string_lossy().into_owned();
+    let planner = of("cvm", &["--config", &config, "--set", "training.lots=[\"lot-a\"]"], "planner");
+    let first_named = folder.join("first-named");
+    let merged = merge([&planner, &run], "cvm", &first_named);
+    assert!(merged.status.success(), "{}", text(&merged).1);
+    let settings = |run: &Path| std::fs::read_to_string(run.join("settings.toml")).unwrap();
+    assert_ne!(settings(&planner), settings(&run));
+    assert_eq!(settings(&first_named), settings(&run));
 
     // The version is of who drove, not of who merges.
     let old = [&tentacle, &cvm].map(|run| {

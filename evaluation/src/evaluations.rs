@@ -4,6 +4,7 @@ use crate::parts::{Part, Rows};
 use crate::plan::Plan;
 use crate::shards::{self, ShardRecord};
 use anyhow::{Context as _, ensure};
+use experiment::drivers::DriverSpec;
 use experiment::run_dir::{self, Inputs, Manifest};
 use experiment::settings::{EvaluationSettings, Settings};
 use serde::Deserialize as _;
@@ -18,8 +19,7 @@ struct EvaluationRun {
     folder: PathBuf,
     manifest: Manifest,
     settings: Settings,
-    /// As they were named.
-    drivers: Vec<String>,
+    drivers: Vec<DriverSpec>,
 }
 
 impl EvaluationRun {
@@ -42,24 +42,27 @@ impl EvaluationRun {
         );
         let drivers = manifest.arguments.get("drivers").cloned();
         let drivers = drivers.with_context(|| format!("{name}/manifest.toml: names no drivers"))?;
-        let drivers = Vec::deserialize(drivers).with_context(|| format!("{name}/manifest.toml: drivers"))?;
+        let drivers = Vec::<String>::deserialize(drivers).with_context(|| format!("{name}/manifest.toml: drivers"))?;
+        let drivers = DriverSpec::parse_all(&drivers).with_context(|| format!("{name}/manifest.toml"))?;
         Ok(Self { folder: folder.to_owned(), settings: run_dir::settings_of(folder)?, manifest, drivers })
     }
 
     /// Refuses what was driven otherwise.
     fn check_is_comparable_with(&self, first: &Self) -> anyhow::Result<()> {
         let (own, others) = (&self.settings, &first.settings);
-        let is_any = |kind: &str| [self, first].iter().any(|run| run.drivers.iter().any(|driver| is_of(driver, kind)));
+        let has_expert = |run: &Self| run.drivers.contains(&DriverSpec::Expert);
+        let has_onnx = |run: &Self| run.drivers.iter().any(|driver| matches!(driver, DriverSpec::Onnx { .. }));
+        let any = |has: &dyn Fn(&Self) -> bool| has(self) || has(first);
         let trials = |of: &Settings| EvaluationSettings { elsewhere: Vec::new(), ..of.evaluation.clone() };
         let differs = [
             ("version of lotpilot", !self.manifest.is_of_version_of(&first.manifest)),
             ("architecture or system", self.manifest.target != first.manifest.target),
             ("choice of lots, trials, noise or smoothing ([evaluation])", trials(own) != trials(others)),
             ("car, sensor or metrics ([episode])", own.episode != others.episode),
-            ("expert ([expert])", is_any("expert") && own.expert != others.expert),
+            ("expert ([expert])", any(&has_expert) && own.expert != others.expert),
             (
                 "use of what networks answer ([dagger.inference])",
-                is_any("onnx") && own.dagger.inference != others.dagger.inference,
+                any(&has_onnx) && own.dagger.inference != others.dagger.inference,
             ),
             ("device of networks (dagger.device)", own.dagger.device != others.dagger.device),
         ];
@@ -80,11 +83,6 @@ impl EvaluationRun {
         }
         Ok(())
     }
-}
-
-/// Whether a driver is named `KIND` or `KIND:…`.
-fn is_of(driver: &str, kind: &str) -> bool {
-    driver.split(':').next() == Some(kind)
 }
 
 /// Finished evaluations of the same trials by different drivers.
@@ -110,7 +108,7 @@ impl Evaluations {
     /// The first that names a run, else the first: its `[training]` says which lots count as trained on, as in one
     /// evaluation that names all drivers.
     fn leading(&self) -> &EvaluationRun {
-        let names_run = |run: &&EvaluationRun| run.drivers.iter().any(|driver| is_of(driver, "run"));
+        let names_run = |run: &&EvaluationRun| run.drivers.iter().any(|driver| driver.run().is_some());
         self.runs.iter().find(names_run).unwrap_or(&self.runs[0])
     }
 
@@ -124,8 +122,8 @@ impl Evaluations {
         &self.leading().manifest
     }
 
-    /// The drivers of all, as they were named, those of the first folder first.
-    pub fn drivers(&self) -> Vec<String> {
+    /// The drivers of all, those of the first folder first.
+    pub fn drivers(&self) -> Vec<DriverSpec> {
         self.runs.iter().flat_map(|run| run.drivers.iter().cloned()).collect()
     }
 

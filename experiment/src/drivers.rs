@@ -263,8 +263,12 @@ impl DriverSpec {
             Self::Callback { .. } => bail!("driver {name:?} is a function of another program"),
         };
         let training = match &self {
-            // Of a run whose settings this version cannot read, the network alone can be used.
-            Self::Run { folder } => run_dir::training_of(folder).ok(),
+            Self::Run { folder } => match run_dir::training_of(folder) {
+                Ok(training) => Some(training),
+                Err(error) if storage::is_of_disk(error.as_ref()) => return Err(error),
+                // Of a run whose settings this version cannot read, the network alone can be used.
+                Err(_) => None,
+            },
             _ => None,
         };
         let driver = NamedDriver { name, spec: self, training, model, smoothing_ticks: 0.0 };

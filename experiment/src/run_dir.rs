@@ -297,7 +297,8 @@ impl RunDir {
     fn claim_named(path: &Path, place: &Place<'_>) -> anyhow::Result<Self> {
         fs::create_dir_all(path)
             .with_context(|| format!("{}: cannot be created; choose another --out", path.display()))?;
-        let names: Vec<_> = fs::read_dir(path)?.filter_map(|entry| Some(entry.ok()?.file_name())).collect();
+        let names = fs::read_dir(path)?.map(|entry| Ok(entry?.file_name()));
+        let names = names.collect::<std::io::Result<Vec<_>>>().with_context(|| path.display().to_string())?;
         // What a process leaves that dies before its claim: nothing but this, and never without the lock.
         let is_free = names.iter().all(|name| {
             name == lock::FILE || name == SETTINGS || name == MANIFEST || name.to_string_lossy().ends_with(".partial")
@@ -555,8 +556,7 @@ impl Manifest {
 
     /// Whether the same program made another run: by name, version and revision.
     pub fn is_of_version_of(&self, other: &Self) -> bool {
-        let version = |of: &Self| (of.program.clone(), of.git_revision.clone(), of.git_dirty);
-        version(self) == version(other)
+        (&self.program, &self.git_revision, self.git_dirty) == (&other.program, &other.git_revision, other.git_dirty)
     }
 
     /// Reads the manifest of a run.

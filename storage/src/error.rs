@@ -1,6 +1,8 @@
 //! The error of everything here.
 
+use std::error::Error;
 use std::fmt::Display;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// What is wrong with a file or folder, and what to do about it.
@@ -13,11 +15,53 @@ pub struct FileError {
     pub problem: String,
     /// What helps.
     pub remedy: &'static str,
+    is_of_disk: bool,
 }
 
 impl FileError {
     /// Of a file or folder.
     pub fn new(path: &Path, problem: impl Display, remedy: &'static str) -> Self {
-        Self { path: path.to_path_buf(), problem: problem.to_string(), remedy }
+        Self { path: path.to_path_buf(), problem: problem.to_string(), remedy, is_of_disk: false }
+    }
+
+    /// Of what the system does not let be read.
+    pub fn unreadable(path: &Path, error: &io::Error, remedy: &'static str) -> Self {
+        let is_of_disk = fails_by_disk(error);
+        Self { is_of_disk, ..Self::new(path, format_args!("cannot be read: {error}"), remedy) }
+    }
+}
+
+/// Whether an error, or one that caused it, is of a disk that failed: what was to be read may be whole, so that nobody may
+/// go on as if it were not there.
+pub fn is_of_disk(error: &(dyn Error + 'static)) -> bool {
+    let is_itself = error.downcast_ref::<FileError>().is_some_and(|error| error.is_of_disk)
+        || error.downcast_ref::<io::Error>().is_some_and(fails_by_disk);
+    is_itself || error.source().is_some_and(is_of_disk)
+}
+
+/// Whether the system failed, and not because nothing is there or it is somebody else's.
+fn fails_by_disk(error: &io::Error) -> bool {
+    use io::ErrorKind::{IsADirectory, NotADirectory, NotFound, PermissionDenied};
+    let is_answer = matches!(error.kind(), NotFound | NotADirectory | IsADirectory | PermissionDenied);
+    error.raw_os_error().is_some() && !is_answer
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, thiserror::Error)]
+    #[error("driver")]
+    struct Caused(#[source] FileError);
+
+    #[cfg(unix)]
+    #[test]
+    fn a_disk_that_fails_is_told_from_a_file_that_is_not_there() {
+        let [eio, enoent] = [5, 2];
+        let unreadable = |code| FileError::unreadable(Path::new("a"), &io::Error::from_raw_os_error(code), "try again");
+        assert!(is_of_disk(&unreadable(eio)) && !is_of_disk(&unreadable(enoent)));
+        assert!(is_of_disk(&Caused(unreadable(eio))) && !is_of_disk(&Caused(unreadable(enoent))));
+        assert!(!is_of_disk(&io::Error::other("it is a folder")));
+        assert!(!is_of_disk(&FileError::new(Path::new("a"), "is damaged", "restore it")));
     }
 }

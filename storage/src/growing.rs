@@ -62,8 +62,7 @@ impl Growing {
     pub fn reader(&self, index: usize) -> Result<impl Read + use<>, FileError> {
         let GrowingFile { name, bytes, .. } = &self.files[index];
         let path = self.folder.join(name);
-        let file = File::open(&path)
-            .map_err(|error| FileError::new(&path, format_args!("cannot be read: {error}"), REMEDY))?;
+        let file = File::open(&path).map_err(|error| FileError::unreadable(&path, &error, REMEDY))?;
         Ok(file.take(*bytes))
     }
 
@@ -146,7 +145,7 @@ impl Mark {
     /// How much of a file is whole, and the digest of that, to go on with.
     fn check(&self, index: usize, path: &Path) -> Result<(u64, Sha256), FileError> {
         let (bytes, sum) = &self.files[index];
-        let unreadable = |error| FileError::new(path, format_args!("cannot be read: {error}"), REMEDY);
+        let unreadable = |error: io::Error| FileError::unreadable(path, &error, REMEDY);
         let mut sha256 = Sha256::new();
         let mut whole = File::open(path).map_err(unreadable)?.take(*bytes);
         let found = io::copy(&mut whole, &mut sha256).map_err(unreadable)?;

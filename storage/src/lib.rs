@@ -8,4 +8,4 @@ pub mod sealed;
 pub mod sums;
 pub mod whole;
 
-pub use error::FileError;
+pub use error::{FileError, is_of_disk};

@@ -30,7 +30,7 @@ pub fn read(path: &Path) -> Result<Option<Vec<u8>>, FileError> {
     let mut bytes = match fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(FileError::new(path, format_args!("cannot be read: {error}"), REMEDY)),
+        Err(error) => return Err(FileError::unreadable(path, &error, REMEDY)),
     };
     let length = header(&[]).len();
     if bytes.len() < length || bytes[..length] != *header(&bytes[length..]).as_bytes() {

@@ -46,7 +46,7 @@ fn list_of(folder: &Path) -> Result<Option<Sums>, FileError> {
     let text = match read::bytes(&path, LIST_BYTES_MAX) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(FileError::new(&path, format_args!("cannot be read: {error}"), LIST_REMEDY)),
+        Err(error) => return Err(FileError::unreadable(&path, &error, LIST_REMEDY)),
     };
     let damaged = |line: usize| FileError::new(&path, format_args!("line {line} is damaged"), LIST_REMEDY);
     let text = String::from_utf8(text).map_err(|_| damaged(1))?;
@@ -91,7 +91,7 @@ fn write_list(folder: &Path, sums: &Sums) -> Result<(), FileError> {
 /// If the system does not say: a folder whose work is taken for none is deleted.
 pub fn exists(folder: &Path) -> Result<bool, FileError> {
     let path = folder.join(FILE);
-    path.try_exists().map_err(|error| FileError::new(&path, format_args!("cannot be read: {error}"), LIST_REMEDY))
+    path.try_exists().map_err(|error| FileError::unreadable(&path, &error, LIST_REMEDY))
 }
 
 /// Whether a file of a folder is finished.
@@ -129,7 +129,7 @@ pub fn list(folder: &Path, names: &[&str]) -> Result<(), FileError> {
 /// # Errors
 /// See [`list`].
 pub fn list_all(folder: &Path) -> Result<(), FileError> {
-    let failed = |error: std::io::Error| FileError::new(folder, format_args!("cannot be read: {error}"), RESTORE);
+    let failed = |error: std::io::Error| FileError::unreadable(folder, &error, RESTORE);
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
         let entry = entry.map_err(failed)?;
@@ -284,7 +284,7 @@ fn digest_of(file: &mut File) -> std::io::Result<String> {
 }
 
 fn unreadable(path: &Path, error: &std::io::Error) -> FileError {
-    FileError::new(path, format_args!("cannot be read: {error}"), RESTORE)
+    FileError::unreadable(path, error, RESTORE)
 }
 
 /// Holds the digest of a file against the list of its folder.

@@ -210,7 +210,10 @@ pub(crate) fn compare_with(wanted: Option<&str>, specs: &[DriverSpec]) -> anyhow
     };
     let spec = wanted.parse::<DriverSpec>().ok();
     let found = specs.iter().position(|given| Some(given) == spec.as_ref());
-    found.with_context(|| format!("--compare-with {wanted}: name one of the drivers (--driver)"))
+    found.with_context(|| {
+        let named: Vec<String> = specs.iter().map(DriverSpec::to_string).collect();
+        format!("--compare-with {wanted}: is none of the drivers; name one of {}", named.join(", "))
+    })
 }
 
 /// The settings, and the name of what they start from: `--preset` or `--config` if given, else the first run that is

@@ -91,14 +91,15 @@ fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Res
 }
 
 fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
-    let (settings, named) = (evaluations.settings(), evaluations.drivers());
+    let (settings, specs) = (evaluations.settings(), evaluations.drivers());
+    let named: Vec<String> = specs.iter().map(DriverSpec::to_string).collect();
     ensure!(
         evaluations.manifest().is_of_this_target(),
         "{}: made on {}; merge on such a machine",
         args.folders[0].display(),
         evaluations.manifest().target
     );
-    let compare_with = evaluate::compare_with(args.compare_with.as_deref(), &DriverSpec::parse_all(&named)?)?;
+    let compare_with = evaluate::compare_with(args.compare_with.as_deref(), &specs)?;
     let drivers = NamedDriver::load_all(&named, settings)?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     let inputs = inputs::of(&lots, &drivers);
