@@ -306,6 +306,13 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
     assert!(last.contains("Made by `cargo xtask scaling --preset smoke") && last.contains(&table), "{last}");
     assert!(last.contains("](pictures/results/scaling-2.svg)"), "each plot has a file of its own: {last}");
     assert!(["scaling.svg", "scaling-2.svg"].iter().all(|plot| folder.join("pictures/results").join(plot).is_file()));
+    // And as a page of its own.
+    let own = folder.join("results-scaling.md");
+    succeed(xtask().args(["render", "results", &out_name, "--to"]).arg(&own));
+    let own = std::fs::read_to_string(own).unwrap();
+    assert!(own.starts_with("# Near-collisions against different lots\n") && own.contains(&table), "{own}");
+    assert!(own.contains("| command | `cargo xtask scaling --preset smoke"), "{own}");
+    assert!(own.contains("](pictures/results/scaling.svg)"), "{own}");
     for (arguments, part) in [
         (["--different", "0"], "name at least one lot"),
         (["--different", "4,4"], "named twice"),

@@ -172,6 +172,26 @@ fn what_was_merged_merges_again_and_is_compared_with_whom_one_likes() {
     let merged = merge([&tentacle, &of("apf", &other_expert, "apf")], "apf", &folder.join("no-expert"));
     assert!(merged.status.success(), "nobody drives by it: {}", text(&merged).1);
 
+    // Files whose content is not as it was driven.
+    let (parameters, lot) = (folder.join("mine.toml"), folder.join("lane.toml"));
+    std::fs::copy(root().join("planners/tuned/tentacle.toml"), &parameters).unwrap();
+    std::fs::copy(root().join("scenarios/examples/lanes/lane-r10-w5.0.toml"), &lot).unwrap();
+    let mine = of(&format!("tentacle:{}", parameters.display()), &[], "mine");
+    let lot_name = lot.to_string_lossy().into_owned();
+    let [first, second] =
+        ["tentacle", "cvm"].map(|driver| of(driver, &["--lots", &lot_name], &format!("{driver}-lane")));
+    for (file, from, to, folders) in [
+        (&parameters, "speed_mps = 0.7739902", "speed_mps = 0.9", [&mine, &vvf]),
+        (&lot, "[17.000, 2.500]", "[17.000, 2.600]", [&first, &second]),
+    ] {
+        let sound = std::fs::read_to_string(file).unwrap();
+        let changed = sound.replacen(from, to, 1);
+        assert_ne!(changed, sound, "{}", file.display());
+        std::fs::write(file, changed).unwrap();
+        refused(&folders.map(PathBuf::as_path), &format!("{}: changed since", file.display()));
+        std::fs::write(file, sound).unwrap();
+    }
+
     // Which lots count as trained on, the run says, not whoever is named first.
     let trained = folder.join("trained");
     let small = ["--set", "training.lots=[\"train:1:lane\"]", "--set", "dagger.cloning_budget.steps=20"];

@@ -1,9 +1,10 @@
 //! Which of the paper's conclusions hold here: decided by rule, from paired intervals, one sentence each.
 //!
 //! A comparison holds where the interval of 95 % of the paired difference lies on the paper's side of zero, does not hold
-//! where it lies on the other, and cannot be told where it contains zero.
+//! where it lies on the other, and cannot be told where it contains zero. Where there are several trainings of a recipe, the
+//! difference in near-collisions is that of their means, and its interval is for other lots and other seeds.
 
-use crate::format::{difference, exact_rate};
+use crate::format::{difference, exact_rate, interval};
 use crate::incidents::Cause;
 use crate::judge::Comparison;
 use crate::paper;
@@ -15,6 +16,7 @@ use crate::statistics::comparison::RateRatio;
 use crate::statistics::poisson::{CONFIDENCE, upper_bound};
 use crate::statistics::sample_size::Question;
 use crate::totals::Totals;
+use crate::trainings::{JudgedTeams, TeamEstimate};
 use experiment::drivers::NamedDriver;
 use policy::dagger::IterationRow;
 use serde::Serialize;
@@ -117,7 +119,14 @@ impl Driven<'_> {
     pub fn against_dagger(&self, slice: Slice, place: &str) -> Option<Against<'_>> {
         let dagger = self.driver(DAGGER)?;
         let (_, comparisons) = self.results.judge(0, &slice, dagger, self.plan.settings.evaluation.seed);
-        Some(Against { driven: *self, dagger, slice, place: place.to_owned(), comparisons })
+        let trainings = self.judge_trainings(&slice);
+        Some(Against { driven: *self, dagger, slice, place: place.to_owned(), comparisons, trainings })
+    }
+
+    /// How the drivers compare with DAgger over all their trainings; `None` if there are too few of them.
+    pub fn judge_trainings(&self, slice: &Slice) -> Option<JudgedTeams> {
+        let Plan { settings, drivers, .. } = self.plan;
+        self.results.judge_trainings(0, slice, drivers, self.driver(DAGGER)?, settings.evaluation.seed)
     }
 }
 
@@ -131,6 +140,8 @@ pub struct Against<'a> {
     place: String,
     /// Differences are theirs − DAgger's.
     comparisons: Vec<Comparison>,
+    /// The same over all trainings of each, where there are several.
+    trainings: Option<JudgedTeams>,
 }
 
 /// What the paper concludes from its drives on its lots.
@@ -151,11 +162,14 @@ pub fn on_reference_lots(driven: &Driven<'_>) -> Vec<Statement> {
 }
 
 impl Against<'_> {
-    /// What should hold beyond the paper's own comparison: against all planners, of their kin and tuned ones included.
-    pub fn planners(&self) -> Vec<Statement> {
-        let is_planner =
-            |&other: &usize| !["expert", BC, DAGGER].iter().any(|known| self.name(other).starts_with(known));
-        (0..self.driven.plan.drivers.len()).filter(is_planner).map(|other| self.fails_less(other)).collect()
+    /// What should hold beyond the paper's own comparison: against behaviour cloning and all planners, of their kin and
+    /// tuned ones included.
+    pub fn others(&self) -> Vec<Statement> {
+        let is_other = |&other: &usize| {
+            let name = self.name(other);
+            name == BC || !["expert", BC, DAGGER].iter().any(|known| name.starts_with(known))
+        };
+        (0..self.driven.plan.drivers.len()).filter(is_other).map(|other| self.fails_less(other)).collect()
     }
 
     fn name(&self, driver: usize) -> &str {
@@ -174,14 +188,28 @@ impl Against<'_> {
 
     fn rate(&self, driver: usize) -> String {
         let Totals { near_collisions, reference_m, .. } = self.totals(driver);
-        let rate = exact_rate(near_collisions, reference_m);
-        format!("{} {near_collisions} in {reference_m:.0} m, {rate} per 100 m", self.name(driver))
+        let name = self.name(driver);
+        match self.trainings.as_ref().and_then(|trainings| trainings.of(driver)) {
+            Some((team, TeamEstimate { per_100m, .. })) if team.drivers.len() > 1 => {
+                let counts = team.drivers.iter().map(|&driver| self.totals(driver).near_collisions.to_string());
+                let counts = counts.collect::<Vec<_>>().join(", ");
+                format!("{name} {counts} in {reference_m:.0} m each, {} per 100 m", interval(*per_100m, 2))
+            }
+            _ => {
+                let rate = exact_rate(near_collisions, reference_m);
+                format!("{name} {near_collisions} in {reference_m:.0} m, {rate} per 100 m")
+            }
+        }
     }
 
     fn no_near_collision(&self) -> Statement {
-        let totals = self.totals(self.dagger);
-        let bound = 100.0 * upper_bound(totals.near_collisions, CONFIDENCE) / totals.reference_m.max(f64::MIN_POSITIVE);
-        let verdict = match totals.near_collisions {
+        let Totals { reference_m, .. } = self.totals(self.dagger);
+        let team = self.trainings.as_ref().and_then(|trainings| trainings.of(self.dagger));
+        let drivers = team.map_or(std::slice::from_ref(&self.dagger), |(team, _)| &team.drivers);
+        let near_collisions: u32 = drivers.iter().map(|&driver| self.totals(driver).near_collisions).sum();
+        // Trainings that drove the same lots are no further metres.
+        let bound = 100.0 * upper_bound(near_collisions, CONFIDENCE) / reference_m.max(f64::MIN_POSITIVE);
+        let verdict = match near_collisions {
             0 if bound <= NONE_PER_100M => Verdict::Holds,
             0 => Verdict::CannotBeTold,
             _ => Verdict::DoesNotHold,
@@ -194,11 +222,16 @@ impl Against<'_> {
     }
 
     fn fails_less(&self, other: usize) -> Statement {
-        let found = self.comparison(other).and_then(|comparison| comparison.difference_per_100m);
+        let comparison = self.comparison(other);
+        let trainings = self.trainings.as_ref().filter(|_| comparison.is_some());
+        let found = match trainings.and_then(|trainings| trainings.of(other)) {
+            Some((_, estimate)) => Some(estimate.difference_per_100m),
+            None => comparison.and_then(|comparison| comparison.difference_per_100m),
+        };
         let verdict = Verdict::of(found);
         let (ours, theirs) = (self.rate(self.dagger), self.rate(other));
         let mut figures = format!("{ours}; {theirs}; difference {}", difference(found, 2));
-        if verdict == Verdict::CannotBeTold {
+        if verdict == Verdict::CannotBeTold && trainings.is_none() {
             figures += &metres_needed([other, self.dagger].map(|driver| self.totals(driver).rate().per_unit));
         }
         let claim = format!("DAgger has fewer near-collisions than {} {}", self.name(other), self.place);
@@ -250,7 +283,7 @@ impl Against<'_> {
             "noise-induced near-collisions: DAgger {}, {name} {}; rate ratio {}",
             ours.0,
             theirs.0,
-            interval_of(&ratio)
+            ratio_text(&ratio)
         );
         Statement { claim: format!("DAgger is more robust against noise than {name}"), verdict, figures }
     }
@@ -279,7 +312,7 @@ impl Against<'_> {
                 "{}; paper {events} in {metres:.0} m, {} per 100 m; rate ratio {}",
                 self.rate(planner),
                 exact_rate(events, metres),
-                interval_of(&ratio)
+                ratio_text(&ratio)
             ),
         })
     }
@@ -298,7 +331,7 @@ fn metres_needed(per_100m: [f64; 2]) -> String {
     format!("; if these are the rates, about {:.0} km each would tell", (question.metres_each() / 1000.0).ceil())
 }
 
-fn interval_of(ratio: &RateRatio) -> String {
+fn ratio_text(ratio: &RateRatio) -> String {
     let number = |value: Option<f64>| value.map_or_else(|| "∞".to_owned(), |value| format!("{value:.2}"));
     let estimate = ratio.ratio.map_or_else(|| "–".to_owned(), |value| format!("{value:.2}"));
     format!("{estimate} [{:.2}, {}]", ratio.lower, number(ratio.upper))

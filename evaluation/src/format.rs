@@ -42,6 +42,12 @@ pub fn bound_per_100m(near_collisions: u32, reference_m: f64) -> f64 {
     100.0 * upper_bound(near_collisions, CONFIDENCE) / reference_m
 }
 
+/// An estimate with its interval.
+pub fn interval(of: Interval, digits: usize) -> String {
+    let Interval { estimate, lower, upper, .. } = of;
+    format!("{estimate:.digits$} [{lower:.digits$}, {upper:.digits$}]")
+}
+
 /// A difference with its interval; `*` if that excludes zero, by enough units.
 pub fn difference(interval: Option<Interval>, digits: usize) -> String {
     interval.map_or_else(

@@ -7,6 +7,7 @@ use crate::judge::{Stratum, strata};
 use crate::results::{EvaluationResults, RunSummary};
 use crate::slices::Slice;
 use crate::statistics::bootstrap::{DRAWS, Interval, Units};
+use crate::statistics::poisson::Rate;
 use experiment::drivers::NamedDriver;
 use rand::RngExt as _;
 use sim::seed::{Rng, RootSeed};
@@ -50,10 +51,41 @@ pub struct TeamEstimate {
     pub difference_per_100m: Interval,
 }
 
+/// Every team of an evaluation in a slice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JudgedTeams {
+    /// The teams, and how each stands.
+    pub teams: Vec<(Team, TeamEstimate)>,
+}
+
+impl JudgedTeams {
+    /// The team of a driver; `None` if it was trained too seldom to speak for others.
+    pub fn of(&self, driver: usize) -> Option<&(Team, TeamEstimate)> {
+        self.teams.iter().find(|(team, _)| team.drivers.contains(&driver))
+    }
+}
+
 impl EvaluationResults {
+    /// How drivers stand in a slice with the clean or noisy grids of a level, and how they differ from one of them, where
+    /// they were trained often enough; `None` if no recipe was, or nothing varies.
+    pub fn judge_trainings(
+        &self,
+        level: usize,
+        slice: &Slice,
+        drivers: &[NamedDriver],
+        with: usize,
+        seed: RootSeed,
+    ) -> Option<JudgedTeams> {
+        let teams = teams(drivers);
+        let with = teams.iter().position(|team| team.drivers.contains(&with))?;
+        let estimates = self.judge_teams(level, slice, &teams, with, seed)?;
+        Some(JudgedTeams { teams: teams.into_iter().zip(estimates).collect() })
+    }
+
     /// How teams stand in a slice at a noise level, and how they differ from one of them, `with`. Drawn are lots as in
     /// [`judge`](Self::judge), and with every draw of lots as many trainings of each team as it has; of teams of the same
-    /// size the same, because trainings of one seed begin alike. `None` if nothing varies.
+    /// size the same, because trainings of one seed begin alike. The interval of none is the exact one of a single training.
+    /// `None` if nothing varies.
     pub fn judge_teams(
         &self,
         level: usize,
@@ -96,10 +128,13 @@ impl EvaluationResults {
         };
         let intervals = units(&strata, drivers).percentile_intervals_drawing(seed, DRAWS, 2 * teams.len(), &of_sums);
         let (rates, differences) = intervals.split_at(teams.len());
-        let estimates = rates.iter().zip(differences);
-        Some(
-            estimates.map(|(&per_100m, &difference_per_100m)| TeamEstimate { per_100m, difference_per_100m }).collect(),
-        )
+        let hundreds_of_metres: f64 = pairs.iter().map(|row| f64::from(row[0].reference_m) / 100.0).sum();
+        let estimate = |(&rate, &difference_per_100m): (&Interval, &Interval)| {
+            // No draw of none is anything but none. Trainings that drove the same lots are no further metres.
+            let upper = if rate.estimate > 0.0 { rate.upper } else { Rate::new(0, hundreds_of_metres).upper };
+            TeamEstimate { per_100m: Interval { upper, ..rate }, difference_per_100m }
+        };
+        Some(rates.iter().zip(differences).map(estimate).collect())
     }
 }
 

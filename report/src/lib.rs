@@ -8,12 +8,13 @@
 //! | [`page`], [`glossary`] | one HTML page that loads nothing, and what its words mean |
 //! | [`run_report`], [`moments`] | `report.html` of a run, with its worst near-collisions |
 //! | [`reproduction`] | the report of `reproduce` |
-//! | [`other_run`] | the table of another run in that report |
+//! | [`other_run`] | the table of another run in that report, or on a page of its own |
 //! | [`rules`], [`scaling`], [`deviations`] | those of the commands of these names: many trainings, one table, one plot |
 
 mod command_line;
 mod controls;
 pub mod deviations;
+mod docs_page;
 mod drive;
 pub mod elsewhere;
 pub mod failures;
@@ -32,4 +33,5 @@ pub mod run_report;
 pub mod scaling;
 pub mod summary;
 pub mod table1;
+mod trainings;
 pub mod tuning;

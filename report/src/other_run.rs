@@ -1,6 +1,8 @@
-//! The table of another run in a page: of one that trained several times, of an evaluation or of a training.
+//! The table of another run in a page, or on a page of its own: of one that trained several times, of an evaluation or of a
+//! training.
 
 use crate::command_line::command_line;
+use crate::docs_page;
 use crate::page::{Image, Page};
 use crate::{deviations, rules, scaling};
 use anyhow::{bail, ensure};
@@ -30,6 +32,12 @@ impl FromStr for OtherRun {
     }
 }
 
+impl From<PathBuf> for OtherRun {
+    fn from(folder: PathBuf) -> Self {
+        Self { title: None, folder }
+    }
+}
+
 impl fmt::Display for OtherRun {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.title.iter().try_for_each(|title| write!(f, "{title}="))?;
@@ -38,7 +46,34 @@ impl fmt::Display for OtherRun {
 }
 
 impl OtherRun {
+    /// Adds its table as a section.
     pub(crate) fn add_to(&self, page: &mut Page) -> anyhow::Result<()> {
+        let Found { manifest, title, table, plot } = self.read()?;
+        let revision = manifest.git_revision.as_deref().unwrap_or("unknown");
+        let changes = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };
+        let made_by = format!("Made by `{}` at commit `{revision}`{changes}.", command_line(&manifest));
+        page.section(title, format!("{made_by}\n\n{table}"));
+        add_plot(page, &manifest.command, plot);
+        Ok(())
+    }
+
+    /// Writes its table as a page of the documentation, with what made it in its head and the tables of other runs at its
+    /// end; figures go to `pictures/results` beside it.
+    ///
+    /// # Errors
+    /// If it is not finished or has no table, what it wrote cannot be read, or a file cannot be written.
+    pub fn write_docs(&self, others: &[Self], to: &Path) -> anyhow::Result<()> {
+        let Found { manifest, title, table, plot } = self.read()?;
+        let named: Vec<String> = others.iter().map(Self::to_string).collect();
+        let mut page = Page::new(title);
+        page.text(docs_page::head(&self.to_string(), &named, &manifest, &[]));
+        page.text(table);
+        add_plot(&mut page, &manifest.command, plot);
+        others.iter().try_for_each(|other| other.add_to(&mut page))?;
+        page.write_markdown(to, docs_page::FIGURES)
+    }
+
+    fn read(&self) -> anyhow::Result<Found> {
         let folder = &self.folder;
         let name = folder.display();
         ensure!(folder.is_dir() && run_dir::is_finished(folder)?, "{name}: this is no finished run");
@@ -54,20 +89,31 @@ impl OtherRun {
                             evaluate, train-bc or train-dagger"
             ),
         };
-        let revision = manifest.git_revision.as_deref().unwrap_or("unknown");
-        let changes = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };
-        let made_by = format!("Made by `{}` at commit `{revision}`{changes}.", command_line(&manifest));
-        let text = sums::read_to_string(&folder.join(table), RUN_TEXT_BYTES_MAX)?;
-        page.section(self.title.as_deref().unwrap_or(title), format!("{made_by}\n\n{text}"));
-        let plot = Path::new(table).with_extension("svg");
-        if let Some(svg) = sums::read_if_listed(&folder.join(&plot), RUN_TEXT_BYTES_MAX)? {
-            let stems =
-                (1..).map(|n| if n == 1 { manifest.command.clone() } else { format!("{}-{n}", manifest.command) });
-            let stem = stems.into_iter().find(|stem| !page.has_figure(stem)).expect("numbers do not end");
-            page.figure(stem, "The same as a plot.", Image::Svg(String::from_utf8(svg)?));
-        }
-        Ok(())
+        let plot = sums::read_if_listed(&folder.join(table).with_extension("svg"), RUN_TEXT_BYTES_MAX)?;
+        Ok(Found {
+            title: self.title.clone().unwrap_or_else(|| title.to_owned()),
+            table: sums::read_to_string(&folder.join(table), RUN_TEXT_BYTES_MAX)?,
+            plot: plot.map(String::from_utf8).transpose()?,
+            manifest,
+        })
     }
+}
+
+/// What a run left that a page shows.
+struct Found {
+    manifest: Manifest,
+    title: String,
+    /// As Markdown.
+    table: String,
+    /// As SVG.
+    plot: Option<String>,
+}
+
+fn add_plot(page: &mut Page, command: &str, plot: Option<String>) {
+    let Some(svg) = plot else { return };
+    let mut stems = (1..).map(|n| if n == 1 { command.to_owned() } else { format!("{command}-{n}") });
+    let stem = stems.find(|stem| !page.has_figure(stem)).expect("numbers do not end");
+    page.figure(stem, "The same as a plot.", Image::Svg(svg));
 }
 
 #[cfg(test)]

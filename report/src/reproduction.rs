@@ -1,22 +1,24 @@
 //! The one report: what holds, the paper's tables beside ours, ablations. Made from what the stages wrote.
 
-use crate::command_line::{command_line, quoted};
 use crate::controls;
+use crate::docs_page;
 use crate::drive::{rows_of, with_drives};
 use crate::markdown::{table_of, with_header};
 use crate::other_run::OtherRun;
 use crate::page::{Image, Page};
 use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
 use crate::table1::{AGREEMENT, READ_ETA_HAT};
+use crate::trainings;
 use evaluation::calibration::AxisCalibration;
-use evaluation::conclusions::{self, Against, Driven, Statement, Verdict};
+use evaluation::conclusions::{self, Against, BC, DAGGER, Driven, Statement, Verdict};
 use evaluation::format::{difference, exact_rate, quoted_rate};
 use evaluation::on_policy::{Calibration, Effect, OnPolicy, States};
 use evaluation::paper::{self, PaperLot};
 use evaluation::slices::Slice;
-use evaluation::stages::{self, Chain, Extent, Stage, named};
+use evaluation::stages::{self, Chain, Extent, Stage, UNWEIGHTED};
 use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
+use evaluation::trainings::TRAININGS_MIN;
 use experiment::drivers::NamedDriver;
 use experiment::run_dir::{Manifest, RunDir};
 use experiment::settings::Settings;
@@ -48,7 +50,7 @@ pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
     page.section("Where to look further", further());
     page.write(run.path(), "report")?;
     run.write("conclusions.csv", &csv_of(&found.statements)?)?;
-    Ok(verdicts(&found.statements))
+    Ok(verdicts(&found.statements, &recipe.extent))
 }
 
 /// Writes the same as a page of the documentation, with what made it in its head and the tables of other runs at its end;
@@ -57,39 +59,16 @@ pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
 /// # Errors
 /// If what a stage wrote cannot be read, or a file cannot be written.
 pub fn write_docs(recipe: &Recipe, run: &Path, others: &[OtherRun], to: &Path) -> anyhow::Result<()> {
-    let manifest = Manifest::read(run)?;
-    let unknown = || "unknown".to_owned();
-    let mut head =
-        "Written by a command from its runs; nothing here is typed by hand.\n\n| | |\n|---|---|\n".to_owned();
-    let changes = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };
-    for (name, value) in [
-        ("command", format!("`{}`", command_line(&manifest))),
-        ("written by", format!("`{}`", written_by(run, others))),
-        ("commit", format!("`{}`{changes}", manifest.git_revision.clone().unwrap_or_else(unknown))),
-        ("program", manifest.program.clone()),
-        ("machine", format!("{}, {} threads", manifest.processor.clone().unwrap_or_else(unknown), manifest.threads)),
-        ("system", manifest.target.clone()),
-        ("compiler", manifest.rustc_version.clone()),
-        ("preset", format!("`{}`", manifest.preset)),
-        ("training seeds", seeds_of(recipe)),
-        ("seed of the trials", manifest.evaluation_seed.to_string()),
-    ] {
-        let _ = writeln!(head, "| {name} | {value} |");
-    }
+    let seeds = stages::seeds(&recipe.settings, &recipe.extent);
+    let seeds = seeds.iter().map(|seed| seed.0.to_string()).collect::<Vec<_>>().join(", ");
+    let named: Vec<String> = others.iter().map(OtherRun::to_string).collect();
     let mut page = Page::new("Results");
-    page.text(head);
+    page.text(docs_page::head(&run.display().to_string(), &named, &Manifest::read(run)?, &[("training seeds", seeds)]));
     page.text(introduction(recipe));
     page.text(CAUTIONS);
     Found::read(recipe, run)?.add_to(&mut page, recipe, run)?;
     others.iter().try_for_each(|other| other.add_to(&mut page))?;
-    page.write_markdown(to, "pictures/results")
-}
-
-fn written_by(run: &Path, others: &[OtherRun]) -> String {
-    let words = others.iter().map(|other| quoted(&other.to_string()));
-    let with = if others.is_empty() { None } else { Some("--with".to_owned()) };
-    let command = ["cargo xtask render results".to_owned(), quoted(&run.display().to_string())];
-    command.into_iter().chain(with).chain(words).collect::<Vec<_>>().join(" ")
+    page.write_markdown(to, docs_page::FIGURES)
 }
 
 /// What a reader must know before quoting a figure.
@@ -97,13 +76,8 @@ const CAUTIONS: &str = "\
 Before quoting a figure: the widths of the three reference lots were chosen so that the expert meets the paper's safe \
 ratios ([methods](methods.md#11-lots)). The expert's points lie at half of the open way, which is our reading of the \
 paper ([paper](paper.md)); it raises η̂ at an unchanged τ, so that η̂ is not comparable with the paper's. Forward and reverse \
-drives of a trial share their obstacles. One training is one sample: intervals say how sure the rate of *this* network is, \
-not what another training would give.";
-
-fn seeds_of(recipe: &Recipe) -> String {
-    let seeds = stages::seeds(&recipe.settings, &recipe.extent);
-    seeds.iter().map(|seed| seed.0.to_string()).collect::<Vec<_>>().join(", ")
-}
+drives of a trial share their obstacles. One training is one sample: its interval says how sure the rate of *this* network \
+is, not what another training would give; an interval over several trainings is for other seeds, too.";
 
 /// What the stages found.
 struct Found {
@@ -130,7 +104,7 @@ impl Found {
         let settings = &recipe.settings;
         with_drives(&recipe.stages, root, [stages::REFERENCE, stages::UNSEEN], |[reference, unseen]| {
             headline(page, &reference, &unseen);
-            page.section("What holds here", verdicts(&self.statements));
+            page.section("What holds here", verdicts(&self.statements, &recipe.extent));
             table_1(page, settings.dagger.eta, &self.weighted, &self.unweighted, &self.on_policy.effect);
             collision_rates(page, &reference);
             safe_ratios(page, &reference);
@@ -139,7 +113,10 @@ impl Found {
             page.section("Ablations", "");
             self.add_ablations_to(page, recipe, root, &reference)?;
             if recipe.extent.seeds > 1 {
-                page.section("Training seeds", training_seeds(recipe, &reference, &unseen));
+                page.section(
+                    "Training seeds",
+                    trainings::by_seed(settings, &recipe.extent, root, &reference, &unseen)?,
+                );
             }
             Ok(())
         })
@@ -170,18 +147,10 @@ fn headline(page: &mut Page, reference: &Driven<'_>, unseen: &Driven<'_>) {
         table_of(&["driver", "lots", "route", "near-collisions", "per 100 m [95 %]", "contacts", "least clearance"]);
     for (driven, label) in [(reference, "the paper's three"), (unseen, "unseen, generated")] {
         let slice = driven.all();
-        for name in ["expert", "DAgger", "BC", "tentacle, tuned"] {
+        let judged = driven.judge_trainings(&slice);
+        for name in ["expert", DAGGER, BC, "tentacle, tuned"] {
             let Some(driver) = driven.driver(name) else { continue };
-            let totals = driven.results.totals(0, driver, &slice, None);
-            table.add_row([
-                name.to_owned(),
-                label.to_owned(),
-                format!("{:.0} m", totals.reference_m),
-                totals.near_collisions.to_string(),
-                exact_rate(totals.near_collisions, totals.reference_m),
-                totals.contacts.to_string(),
-                totals.clearance_min_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2} m")),
-            ]);
+            table.add_row(trainings::headline_row(driven, &slice, driver, label, judged.as_ref()));
         }
     }
     page.section(
@@ -189,7 +158,8 @@ fn headline(page: &mut Page, reference: &Driven<'_>, unseen: &Driven<'_>) {
         format!(
             "{table}\n\nA *near-collision*: something lies within 0.5 m in the direction of travel; the car is stopped, put \
              back on the route, and drives on. A *contact*: the body touches something. *Least clearance*: the smallest \
-             distance of the body to anything in any run."
+             distance of the body to anything in any run. Where there are several trainings, the route is that of each, and \
+             the rate is their mean, with an interval for other trials or lots and other seeds."
         ),
     );
 }
@@ -239,7 +209,7 @@ fn statements(
     let unseen_lots =
         reference.unseen().and_then(|it| reference.against_dagger(it, "on the lots it was not trained on"));
     let generated = unseen.against_dagger(unseen.all(), "on unseen generated lots");
-    for others in [unseen_lots, generated].iter().flatten().map(Against::planners) {
+    for others in [unseen_lots, generated].iter().flatten().map(Against::others) {
         let is_new = |other: &Statement| statements.iter().all(|known| known.claim != other.claim);
         statements.extend(others.into_iter().filter(is_new).collect::<Vec<_>>());
     }
@@ -268,12 +238,20 @@ fn introduction(recipe: &Recipe) -> String {
 }
 
 /// A list under each verdict.
-fn verdicts(statements: &[Statement]) -> String {
+fn verdicts(statements: &[Statement], extent: &Extent) -> String {
     let mut text = "Decided from the runs of this report: a comparison *holds* where the paired interval of 95 % lies on the \
                     paper's side of zero, *does not hold* where it lies on the other, and *cannot be told* where it contains \
                     zero (differences are the other driver's − DAgger's in near-collisions and reversals, DAgger's − the \
                     other driver's in safe ratios; * = excludes zero, by six trials or more).\n"
         .to_owned();
+    if extent.seeds >= TRAININGS_MIN as u64 {
+        let _ = writeln!(
+            text,
+            "\nWith {} trainings of each recipe, near-collisions are compared by the mean over them, with an interval for other \
+             trials or lots and other seeds. Safe ratios, reversals, η̂ and what noise induces are of the first training.",
+            extent.seeds
+        );
+    }
     for verdict in [Verdict::Holds, Verdict::DoesNotHold, Verdict::CannotBeTold] {
         let found: Vec<&Statement> = statements.iter().filter(|statement| statement.verdict == verdict).collect();
         let _ = write!(text, "\n### {}: {} of {}\n\n", verdict.title(), found.len(), statements.len());
@@ -532,23 +510,28 @@ fn decision_rules(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::R
 fn weight_and_cloning(driven: &Driven<'_>) -> String {
     let mut table = table_of(&["", "lots", "Δ near-collisions per 100 m [95 %]", "Δ safe ratio [95 %]"]);
     let seed = driven.plan.settings.evaluation.seed;
-    let pairs = [("BC", "DAgger"), ("DAgger, α = 0", "DAgger")];
+    let pairs = [(BC, DAGGER), (UNWEIGHTED, DAGGER)];
     for (name, with) in pairs {
         let (Some(driver), Some(with_index)) = (driven.driver(name), driven.driver(with)) else { continue };
         for slice in driven.results.slices() {
             let (_, comparisons) = driven.results.judge(0, &slice, with_index, seed);
             let Some(found) = comparisons.into_iter().find(|comparison| comparison.driver == driver) else { continue };
+            let trainings = driven.judge_trainings(&slice);
+            let of_team = trainings.as_ref().and_then(|trainings| trainings.of(driver));
+            let near_collisions =
+                of_team.map_or(found.difference_per_100m, |(_, estimate)| Some(estimate.difference_per_100m));
             table.add_row([
                 format!("{name} − {with}"),
                 slice.label.clone(),
-                difference(found.difference_per_100m, 2),
+                difference(near_collisions, 2),
                 difference(found.difference_safe_ratio, 3),
             ]);
         }
     }
     format!(
         "### α, and behaviour cloning against DAgger\n\nPaired differences on the paper's lots; a positive one in \
-         near-collisions speaks for DAgger with the weight (*: excludes zero).\n\n{table}"
+         near-collisions speaks for DAgger with the weight (*: excludes zero). Of several trainings the means are compared, safe \
+         ratios of the first.\n\n{table}"
     )
 }
 
@@ -593,34 +576,6 @@ fn calibration(page: &mut Page, found: &[Calibration]) {
     ] {
         page.figure(name, caption, Image::Svg(plots::calibration(&of(states))));
     }
-}
-
-fn training_seeds(recipe: &Recipe, reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
-    let mut table =
-        table_of(&["policy", "seed", "the paper's lots", "of them not trained on", "unseen generated lots"]);
-    for base in ["BC", "DAgger", "DAgger, α = 0"] {
-        for seed in stages::seeds(&recipe.settings, &recipe.extent) {
-            let name = named(base, seed, &recipe.settings);
-            let cell = |driven: &Driven<'_>, slice: Option<Slice>| {
-                let found = driven.driver(&name).zip(slice);
-                found.map_or_else(String::new, |(driver, slice)| {
-                    let totals = driven.results.totals(0, driver, &slice, None);
-                    format!("{}: {}", totals.near_collisions, exact_rate(totals.near_collisions, totals.reference_m))
-                })
-            };
-            table.add_row([
-                base.to_owned(),
-                seed.0.to_string(),
-                cell(reference, Some(reference.all())),
-                cell(reference, reference.unseen()),
-                cell(unseen, Some(unseen.all())),
-            ]);
-        }
-    }
-    format!(
-        "Trainings that differ in nothing but their root seed. Conclusions above are of the first one; an interval does \
-         not cover what another training would have given, these rows do.\n\n{table}"
-    )
 }
 
 fn further() -> String {

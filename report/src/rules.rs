@@ -86,7 +86,7 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
     let of_teams = results.judge_teams(0, &everywhere, &teams, 0, seed_of_trials);
     for (at, row) in pooled.iter_mut().enumerate() {
         let rate = Rate::new(row.near_collisions, row.route_m / 100.0);
-        let drawn = of_teams.as_ref().map(|estimates| estimates[at].per_100m).filter(|_| row.near_collisions > 0);
+        let drawn = of_teams.as_ref().map(|estimates| estimates[at].per_100m);
         [row.lower, row.upper] = drawn.map_or([rate.lower, rate.upper], |interval| [interval.lower, interval.upper]);
         row.per_100m = rate.per_unit;
     }

@@ -1,15 +1,15 @@
 //! Tables of an evaluation as Markdown, which is readable in a terminal, too.
 
 use crate::markdown::{table_of, with_header};
+use crate::trainings::{self, HEADER};
 use comfy_table::Table;
 use evaluation::format::{difference, exact_rate, p_value, quoted_rate};
 use evaluation::incidents::Cause;
 use evaluation::paper::{self, PaperLot, PaperResult};
 use evaluation::slices::Slice;
-use evaluation::statistics::bootstrap::{DRAWS, Interval};
+use evaluation::statistics::bootstrap::DRAWS;
 use evaluation::statistics::poisson::DISPERSION_MAX;
 use evaluation::summary::Summary;
-use evaluation::totals::Totals;
 use experiment::run_dir::RunDir;
 use experiment::settings::{EvaluationSettings, NoiseChoice};
 use sim::scenario::Direction;
@@ -212,36 +212,11 @@ fn comparison_table(summary: &Summary<'_>, level: usize) -> Table {
 }
 
 fn trainings_table(summary: &Summary<'_>, level: usize) -> Table {
-    let mut table = table_of(&[
-        "driver",
-        "trainings",
-        "lots",
-        "near-collisions, by seed",
-        "contacts",
-        "per 100 m [95 %]",
-        "Δ per 100 m [95 %]",
-    ]);
+    let mut table = table_of(&HEADER);
     for (team, judged, estimate) in summary.team_estimates(level) {
-        let each = summary.of_team(team, judged);
-        let list = |count: fn(&Totals) -> u32| {
-            each.iter().map(|totals| count(totals).to_string()).collect::<Vec<_>>().join(", ")
-        };
-        let Interval { estimate: rate, lower, upper, .. } = estimate.per_100m;
-        let difference = estimate.difference_per_100m;
         let is_other = *team != *summary.team_compared_with();
-        table.add_row([
-            team.name.clone(),
-            team.drivers.len().to_string(),
-            judged.slice.label.clone(),
-            list(|totals| totals.near_collisions),
-            list(|totals| totals.contacts),
-            format!("{rate:.3} [{lower:.3}, {upper:.3}]"),
-            if is_other {
-                format!("{:+.3} [{:+.3}, {:+.3}]", difference.estimate, difference.lower, difference.upper)
-            } else {
-                "–".to_owned()
-            },
-        ]);
+        let each = summary.of_team(team, judged);
+        table.add_row(trainings::row(team, &judged.slice.label, &each, estimate, is_other));
     }
     table
 }

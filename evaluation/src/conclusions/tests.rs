@@ -1,6 +1,7 @@
 use super::*;
 use experiment::drivers::NamedDriver;
 use experiment::lots::Lot;
+use experiment::run_dir::Training;
 use experiment::settings::Settings;
 use experiment::trials::{Purpose, Trial};
 use sim::episode::EpisodeReport;
@@ -23,13 +24,16 @@ struct Run {
 
 /// Statements about made-up runs of 1 km on the paper's lots: five trials, both ways.
 fn statements(names: &[&str], of: impl Fn(&str, &Trial<'_>) -> Run) -> Vec<Statement> {
+    statements_of(&names.iter().map(|name| driver(name)).collect::<Vec<_>>(), of)
+}
+
+fn statements_of(drivers: &[NamedDriver], of: impl Fn(&str, &Trial<'_>) -> Run) -> Vec<Statement> {
     let settings = Settings::preset("default").unwrap();
-    let drivers: Vec<NamedDriver> = names.iter().map(|name| driver(name)).collect();
     let lots = Lot::parse_all(&["reference"], &settings.episode.vehicle).unwrap();
-    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0, shard: None };
+    let plan = Plan { settings: &settings, drivers, lots: &lots, compare_with: 0, shard: None };
     let mut results = EvaluationResults::new(&plan);
     for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 5, &Direction::BOTH).enumerate() {
-        for (driver, name) in names.iter().enumerate() {
+        for (driver, NamedDriver { name, .. }) in drivers.iter().enumerate() {
             let Run { near_collisions, safe_ratio, steering_reversals } = of(name, &trial);
             let metrics = EpisodeMetrics {
                 near_collisions,
@@ -82,6 +86,40 @@ fn where_the_paper_is_right_everything_holds() {
     let figures =
         &found.iter().find(|statement| statement.claim.contains("than tentacle on the paper's")).unwrap().figures;
     assert!(figures.contains("DAgger 0 in 30000 m, 0.00 [0.00, 0.01]") && figures.contains('*'), "{figures}");
+}
+
+/// The verdicts of five trainings were those of the first.
+#[test]
+fn several_trainings_are_compared_by_their_mean() {
+    let trained = |seed: u64| {
+        let mut driver = driver(&if seed == 1 { DAGGER.to_owned() } else { format!("{DAGGER} (seed {seed})") });
+        driver.training = Some(Training { recipe: DAGGER.to_owned(), seed: RootSeed(seed) });
+        driver
+    };
+    let of_dagger = |events_by_seed: [u32; 3]| {
+        let drivers = [trained(1), trained(2), driver("vvf"), trained(3)];
+        statements_of(&drivers, |name, trial| {
+            let near_collisions = match name {
+                DAGGER => events_by_seed[0],
+                "DAgger (seed 2)" => events_by_seed[1],
+                "DAgger (seed 3)" => events_by_seed[2],
+                _ => 13 + trial.index % 3,
+            };
+            Run { near_collisions, safe_ratio: 0.8, steering_reversals: 10 }
+        })
+    };
+    let fewer = "fewer near-collisions than vvf on the paper's";
+    let found = of_dagger([0, 20, 20]);
+    assert_eq!(verdict(&found, fewer), Verdict::CannotBeTold, "the first alone has fewer: {found:#?}");
+    assert_eq!(verdict(&found, "paper's lots without a near-collision"), Verdict::DoesNotHold);
+    let figures = &found.iter().find(|statement| statement.claim.contains(fewer)).unwrap().figures;
+    assert!(figures.contains("DAgger 0, 600, 600 in 30000 m each, 1.33 [0.00, 2.00] per 100 m"), "{figures}");
+    assert!(figures.contains("difference +0.0"), "14 less 13.3 in 10 km: {figures}");
+
+    let found = of_dagger([0, 1, 2]);
+    assert_eq!(verdict(&found, fewer), Verdict::Holds, "{found:#?}");
+    let none = of_dagger([0, 0, 0]);
+    assert_eq!(verdict(&none, "paper's lots without a near-collision"), Verdict::Holds);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 use super::*;
 use crate::statistics::bootstrap::Interval;
+use crate::statistics::poisson::Rate;
 use crate::trainings::Team;
 use experiment::drivers::NamedDriver;
 use experiment::settings::Settings;
@@ -177,6 +178,10 @@ fn trainings_of_a_team_are_drawn_with_the_lots() {
     assert_eq!(rounded(found[1].difference_per_100m), [1.0, 1.0, 1.0], "the same seeds are drawn of both");
     assert_eq!(rounded(found[2].per_100m), [2.0, 2.0, 2.0]);
     assert_eq!(rounded(found[2].difference_per_100m), [-1.0, 1.0, 2.0], "the seeds of the other vary");
+    // No draw of lots without events has any; the metres say what that supports.
+    let none = results.judge_teams(0, &slice, &[team(&[0, 1])], 0, RootSeed(1)).unwrap()[0].per_100m;
+    let metres = results.totals(0, 0, &slice, None).reference_m;
+    assert_eq!([none.estimate, none.lower, none.upper], [0.0, 0.0, Rate::new(0, metres / 100.0).upper]);
     let alone = results.judge(0, &slice, 0, RootSeed(1)).0[2].per_100m.unwrap();
     assert_eq!(rounded(alone), [3.0, 3.0, 3.0], "one network by itself varies with the lots alone");
 }

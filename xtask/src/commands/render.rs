@@ -13,7 +13,7 @@ use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
 use experiment::progress::Progress as _;
 use experiment::replay_key::ReplayKey;
-use experiment::run_dir::{self, RunDir};
+use experiment::run_dir::{self, Manifest, RunDir};
 use experiment::settings::{Layers, NoiseChoice, Settings};
 use experiment::training;
 use experiment::trials::{Purpose, Trial};
@@ -76,7 +76,7 @@ pub(crate) enum RenderWhat {
     Noise(RenderNoiseArgs),
     /// The report of a run anew, into its folder and that of `--out`.
     Report(RenderReportArgs),
-    /// docs/results.md and its figures from a finished `reproduce`.
+    /// A page of docs/ and its figures from a finished `reproduce`, `deviations`, `rules` or `scaling`.
     Results(RenderResultsArgs),
 }
 
@@ -89,15 +89,16 @@ pub(crate) struct RenderReportArgs {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RenderResultsArgs {
-    /// Folder of a finished `reproduce`.
+    /// Folder of a finished `reproduce`, or of another run that has a table.
     #[arg(value_name = "RUN")]
     run: PathBuf,
     /// Finished runs whose tables are added at the end: of `deviations`, `rules`, `scaling`, `evaluate` or a training.
     #[arg(long, value_name = "[TITLE=]DIR", num_args = 1..)]
     with: Vec<OtherRun>,
-    /// File to write; figures go to `pictures/results` beside it.
-    #[arg(long, value_name = "FILE.md", default_value = "docs/results.md")]
-    to: PathBuf,
+    /// File to write; figures go to `pictures/results` beside it [default: docs/results.md; of another command
+    /// docs/results-COMMAND.md].
+    #[arg(long, value_name = "FILE.md")]
+    to: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -393,8 +394,15 @@ fn render_results(args: &RenderResultsArgs, output: &Output) -> anyhow::Result<(
         "{}: this is no finished run; make one with cargo xtask reproduce",
         args.run.display()
     );
-    reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.with, &args.to)?;
-    output.print(args.to.display());
+    let command = Manifest::read(&args.run)?.command;
+    let page = if command == reproduce::COMMAND { String::new() } else { format!("-{command}") };
+    let to = args.to.clone().unwrap_or_else(|| format!("docs/results{page}.md").into());
+    if command == reproduce::COMMAND {
+        reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.with, &to)?;
+    } else {
+        OtherRun::from(args.run.clone()).write_docs(&args.with, &to)?;
+    }
+    output.print(to.display());
     Ok(())
 }
 

@@ -1,0 +1,38 @@
+//! What the pages of the documentation that a command makes of runs have in common.
+
+use crate::command_line::{command_line, quoted};
+use experiment::run_dir::Manifest;
+use std::fmt::Write as _;
+
+/// Where their figures go, relative to the page.
+pub(crate) const FIGURES: &str = "pictures/results";
+
+/// The head of a page: which command made the run, and which made the page of it and of other runs.
+pub(crate) fn head(run: &str, others: &[String], manifest: &Manifest, more: &[(&str, String)]) -> String {
+    let unknown = || "unknown".to_owned();
+    let changes = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };
+    let rows = [
+        ("command", format!("`{}`", command_line(manifest))),
+        ("written by", format!("`{}`", written_by(run, others))),
+        ("commit", format!("`{}`{changes}", manifest.git_revision.clone().unwrap_or_else(unknown))),
+        ("program", manifest.program.clone()),
+        ("machine", format!("{}, {} threads", manifest.processor.clone().unwrap_or_else(unknown), manifest.threads)),
+        ("system", manifest.target.clone()),
+        ("compiler", manifest.rustc_version.clone()),
+        ("preset", format!("`{}`", manifest.preset)),
+        ("seed of the trials", manifest.evaluation_seed.to_string()),
+    ];
+    let mut head =
+        "Written by a command from its runs; nothing here is typed by hand.\n\n| | |\n|---|---|\n".to_owned();
+    for (name, value) in rows.iter().chain(more) {
+        let _ = writeln!(head, "| {name} | {value} |");
+    }
+    head
+}
+
+fn written_by(run: &str, others: &[String]) -> String {
+    let words = others.iter().map(|other| quoted(other));
+    let with = (!others.is_empty()).then(|| "--with".to_owned());
+    let command = ["cargo xtask render results".to_owned(), quoted(run)];
+    command.into_iter().chain(with).chain(words).collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,187 @@
+//! Several trainings that differ by their seed: what each came to, and the mean over them.
+
+use crate::drive::rows_of;
+use crate::markdown::table_of;
+use evaluation::conclusions::{BC, DAGGER, Driven};
+use evaluation::format::{exact_rate, interval};
+use evaluation::slices::Slice;
+use evaluation::stages::{self, Chain, Extent, UNWEIGHTED, named};
+use evaluation::statistics::bootstrap::Interval;
+use evaluation::totals::Totals;
+use evaluation::trainings::{JudgedTeams, Team, TeamEstimate};
+use experiment::settings::Settings;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Heads of [`row`].
+pub(crate) const HEADER: [&str; 7] =
+    ["driver", "trainings", "lots", "near-collisions, by seed", "contacts", "per 100 m [95 %]", "Δ per 100 m [95 %]"];
+
+/// A team on some lots: what each of its trainings came to, their mean and, for another than all are compared with, the
+/// difference.
+pub(crate) fn row(team: &Team, lots: &str, each: &[Totals], estimate: &TeamEstimate, is_other: bool) -> [String; 7] {
+    let Interval { estimate: difference, lower, upper, .. } = estimate.difference_per_100m;
+    [
+        team.name.clone(),
+        team.drivers.len().to_string(),
+        lots.to_owned(),
+        list(each, |totals| totals.near_collisions),
+        list(each, |totals| totals.contacts),
+        interval(estimate.per_100m, 3),
+        if is_other { format!("{difference:+.3} [{lower:+.3}, {upper:+.3}]") } else { "–".to_owned() },
+    ]
+}
+
+fn list(each: &[Totals], count: fn(&Totals) -> u32) -> String {
+    each.iter().map(|totals| count(totals).to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// Near-collisions, contacts and least clearance of a driver, of all its trainings where there are several.
+pub(crate) fn headline_row(
+    driven: &Driven<'_>,
+    slice: &Slice,
+    driver: usize,
+    lots: &str,
+    judged: Option<&JudgedTeams>,
+) -> [String; 7] {
+    let of_team = judged.and_then(|judged| judged.of(driver)).filter(|(team, _)| team.drivers.len() > 1);
+    let drivers = of_team.map_or(std::slice::from_ref(&driver), |(team, _)| &team.drivers);
+    let totals = |&driver: &usize| driven.results.totals(0, driver, slice, None);
+    let each: Vec<Totals> = drivers.iter().map(totals).collect();
+    let name = &driven.plan.drivers[driver].name;
+    let reference_m = each[0].reference_m;
+    let clearance_m = each.iter().filter_map(|totals| totals.clearance_min_m).reduce(f32::min);
+    [
+        if each.len() > 1 { format!("{name}, {} trainings", each.len()) } else { name.clone() },
+        lots.to_owned(),
+        format!("{reference_m:.0} m"),
+        list(&each, |totals| totals.near_collisions),
+        of_team.map_or_else(
+            || exact_rate(each[0].near_collisions, reference_m),
+            |(_, estimate)| interval(estimate.per_100m, 2),
+        ),
+        list(&each, |totals| totals.contacts),
+        clearance_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2} m")),
+    ]
+}
+
+/// Every training by itself, then the means over the seeds.
+pub(crate) fn by_seed(
+    settings: &Settings,
+    extent: &Extent,
+    root: &Path,
+    reference: &Driven<'_>,
+    unseen: &Driven<'_>,
+) -> anyhow::Result<String> {
+    let mut table =
+        table_of(&["policy", "seed", "η̂", "the paper's lots", "of them not trained on", "unseen generated lots"]);
+    for (base, chain) in [(BC, None), (DAGGER, Some(Chain::Weighted)), (UNWEIGHTED, Some(Chain::Unweighted))] {
+        for seed in stages::seeds(settings, extent) {
+            let name = named(base, seed, settings);
+            let cell = |driven: &Driven<'_>, slice: Option<Slice>| {
+                let found = driven.driver(&name).zip(slice);
+                found.map_or_else(String::new, |(driver, slice)| {
+                    let totals = driven.results.totals(0, driver, &slice, None);
+                    format!("{}: {}", totals.near_collisions, exact_rate(totals.near_collisions, totals.reference_m))
+                })
+            };
+            let rows = chain.map_or_else(|| Ok(Vec::new()), |chain| rows_of(root, chain, seed))?;
+            let shares = rows.iter().filter_map(|row| row.eta_hat).map(|share| format!("{share:.3}"));
+            table.add_row([
+                base.to_owned(),
+                seed.0.to_string(),
+                shares.collect::<Vec<_>>().join(", "),
+                cell(reference, Some(reference.all())),
+                cell(reference, reference.unseen()),
+                cell(unseen, Some(unseen.all())),
+            ]);
+        }
+    }
+    let mut over_seeds = table_of(&HEADER);
+    for (driven, slice, lots) in [
+        (reference, Some(reference.all()), "the paper's"),
+        (reference, reference.unseen(), "of them not trained on"),
+        (unseen, Some(unseen.all()), "unseen, generated"),
+    ] {
+        let Some(slice) = slice else { continue };
+        let judged = driven.judge_trainings(&slice);
+        for (team, estimate) in judged.iter().flat_map(|judged| &judged.teams) {
+            let totals = |&driver: &usize| driven.results.totals(0, driver, &slice, None);
+            let each: Vec<Totals> = team.drivers.iter().map(totals).collect();
+            over_seeds.add_row(row(team, lots, &each, estimate, team.name != DAGGER));
+        }
+    }
+    let mut text = format!(
+        "Trainings that differ in nothing but their root seed; η̂ of each iteration. Intervals here are of one network each \
+         and do not cover what another training would have given.\n\n{table}"
+    );
+    if over_seeds.row_count() > 0 {
+        let _ = write!(
+            text,
+            "\n\nTheir means, with intervals for other trials or lots and other seeds; the difference is to DAgger (others − \
+             DAgger).\n\n{over_seeds}"
+        );
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use evaluation::plan::Plan;
+    use evaluation::results::EvaluationResults;
+    use experiment::drivers::NamedDriver;
+    use experiment::lots::Lot;
+    use experiment::run_dir::Training;
+    use experiment::trials::{Purpose, Trial};
+    use sim::episode::EpisodeReport;
+    use sim::frame::Ending;
+    use sim::metrics::EpisodeMetrics;
+    use sim::scenario::Direction;
+    use sim::seed::RootSeed;
+
+    /// "In short" had the first training alone.
+    #[test]
+    fn all_trainings_of_a_driver_are_in_its_row() {
+        let settings = Settings::preset("default").unwrap();
+        let driver = |name: &str| NamedDriver::expert(&settings.expert).renamed(name);
+        let trained = |seed: u64| {
+            let mut driver = driver(&named(DAGGER, RootSeed(seed), &settings));
+            driver.training = Some(Training { recipe: DAGGER.to_owned(), seed: RootSeed(seed) });
+            driver
+        };
+        let drivers = [driver("expert"), trained(1), trained(2), trained(3)];
+        let lots = Lot::parse_all(&["reference"], &settings.episode.vehicle).unwrap();
+        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 1, shard: None };
+        let mut results = EvaluationResults::new(&plan);
+        for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 5, &Direction::BOTH).enumerate() {
+            for (driver, near_collisions) in [0, 1, 2, 3].into_iter().enumerate() {
+                let metrics = EpisodeMetrics {
+                    near_collisions,
+                    reference_m: 100.0,
+                    driven_m: 100.0,
+                    clearance_min_m: 1.0 - 0.1 * near_collisions as f32,
+                    ..EpisodeMetrics::default()
+                };
+                let report = EpisodeReport { ending: Ending::ReachedEnd, metrics, events: vec![] };
+                results.add(0, driver, index, &trial, &report);
+            }
+        }
+        let driven = Driven { plan: &plan, results: &results };
+        let slice = driven.all();
+        let judged = driven.judge_trainings(&slice);
+        let row = |driver| headline_row(&driven, &slice, driver, "lots", judged.as_ref());
+        let expected =
+            ["DAgger, 3 trainings", "lots", "3000 m", "30, 60, 90", "2.00 [1.00, 3.00]", "0, 0, 0", "0.70 m"];
+        assert_eq!(row(1), expected);
+        assert_eq!(row(0)[..4], ["expert", "lots", "3000 m", "0"]);
+        assert!(row(0)[4].contains("one-sided"), "{:?}", row(0));
+        let (team, estimate) = judged.as_ref().unwrap().of(0).unwrap();
+        let totals = driven.results.totals(0, 0, &slice, None);
+        assert_eq!(row_of_others(team, totals, estimate), "-2.000 [-3.000, -1.000]");
+    }
+
+    fn row_of_others(team: &Team, totals: Totals, estimate: &TeamEstimate) -> String {
+        super::row(team, "lots", &[totals], estimate, true)[6].clone()
+    }
+}
