@@ -16,7 +16,7 @@ use crate::statistics::comparison::RateRatio;
 use crate::statistics::poisson::{CONFIDENCE, upper_bound};
 use crate::statistics::sample_size::Question;
 use crate::totals::Totals;
-use crate::trainings::{JudgedTeams, TeamEstimate};
+use crate::trainings::{self, JudgedTeams, Team, TeamEstimate};
 use experiment::drivers::NamedDriver;
 use policy::dagger::IterationRow;
 use serde::Serialize;
@@ -46,7 +46,7 @@ pub enum Verdict {
     Holds,
     /// The opposite holds here.
     DoesNotHold,
-    /// It cannot be told from this many metres.
+    /// It cannot be told from this many metres and trainings.
     CannotBeTold,
 }
 
@@ -56,7 +56,7 @@ impl Verdict {
         match self {
             Self::Holds => "Holds",
             Self::DoesNotHold => "Does not hold",
-            Self::CannotBeTold => "Cannot be told with this many metres",
+            Self::CannotBeTold => "Cannot be told",
         }
     }
 
@@ -120,7 +120,8 @@ impl Driven<'_> {
         let dagger = self.driver(DAGGER)?;
         let (_, comparisons) = self.results.judge(0, &slice, dagger, self.plan.settings.evaluation.seed);
         let trainings = self.judge_trainings(&slice);
-        Some(Against { driven: *self, dagger, slice, place: place.to_owned(), comparisons, trainings })
+        let teams = trainings::teams(self.plan.drivers);
+        Some(Against { driven: *self, dagger, slice, place: place.to_owned(), comparisons, teams, trainings })
     }
 
     /// How the drivers compare with DAgger over all their trainings; `None` if there are too few of them.
@@ -140,7 +141,9 @@ pub struct Against<'a> {
     place: String,
     /// Differences are theirs − DAgger's.
     comparisons: Vec<Comparison>,
-    /// The same over all trainings of each, where there are several.
+    /// Trainings that differ by their seed; none if nothing was trained often enough.
+    teams: Vec<Team>,
+    /// The same over all of them; `None` also if nothing varies.
     trainings: Option<JudgedTeams>,
 }
 
@@ -186,27 +189,41 @@ impl Against<'_> {
         found.filter(|comparison| comparison.pairs >= PAIRS_MIN)
     }
 
+    /// Every training of a driver's recipe.
+    fn trainings_of<'a>(&'a self, driver: &'a usize) -> &'a [usize] {
+        let team = self.teams.iter().find(|team| team.drivers.contains(driver));
+        team.map_or(std::slice::from_ref(driver), |team| &team.drivers)
+    }
+
+    /// Near-collisions of a driver and their rate; of all its trainings where they can be judged together.
     fn rate(&self, driver: usize) -> String {
         let Totals { near_collisions, reference_m, .. } = self.totals(driver);
         let name = self.name(driver);
-        match self.trainings.as_ref().and_then(|trainings| trainings.of(driver)) {
-            Some((team, TeamEstimate { per_100m, .. })) if team.drivers.len() > 1 => {
-                let counts = team.drivers.iter().map(|&driver| self.totals(driver).near_collisions.to_string());
-                let counts = counts.collect::<Vec<_>>().join(", ");
-                format!("{name} {counts} in {reference_m:.0} m each, {} per 100 m", interval(*per_100m, 2))
+        let all = self.trainings_of(&driver);
+        let judged = self.trainings.as_ref().and_then(|trainings| trainings.of(driver));
+        match judged.filter(|_| all.len() > 1) {
+            Some((_, TeamEstimate { per_100m, .. })) => {
+                let counts: Vec<u32> = all.iter().map(|&driver| self.totals(driver).near_collisions).collect();
+                let rate = if counts.iter().all(|&count| count == 0) {
+                    exact_rate(0, reference_m)
+                } else {
+                    interval(*per_100m, 2)
+                };
+                let counts = counts.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+                format!("{name} {counts} in {reference_m:.0} m each, {rate} per 100 m")
             }
-            _ => {
+            None => {
+                let which = if all.len() > 1 { format!(" (first of {})", all.len()) } else { String::new() };
                 let rate = exact_rate(near_collisions, reference_m);
-                format!("{name} {near_collisions} in {reference_m:.0} m, {rate} per 100 m")
+                format!("{name}{which} {near_collisions} in {reference_m:.0} m, {rate} per 100 m")
             }
         }
     }
 
     fn no_near_collision(&self) -> Statement {
         let Totals { reference_m, .. } = self.totals(self.dagger);
-        let team = self.trainings.as_ref().and_then(|trainings| trainings.of(self.dagger));
-        let drivers = team.map_or(std::slice::from_ref(&self.dagger), |(team, _)| &team.drivers);
-        let near_collisions: u32 = drivers.iter().map(|&driver| self.totals(driver).near_collisions).sum();
+        let all = self.trainings_of(&self.dagger);
+        let near_collisions: u32 = all.iter().map(|&driver| self.totals(driver).near_collisions).sum();
         // Trainings that drove the same lots are no further metres.
         let bound = 100.0 * upper_bound(near_collisions, CONFIDENCE) / reference_m.max(f64::MIN_POSITIVE);
         let verdict = match near_collisions {

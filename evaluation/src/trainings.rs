@@ -1,16 +1,15 @@
 //! Several trainings of one recipe, judged together: what another training would do, on other lots (docs/methods.md 8.3).
 //!
-//! An interval of one network says how sure the rate of that network is. Here trainings are drawn with replacement as lots
-//! are, so that the interval is for other lots *and* other seeds.
+//! An interval of one network says how sure the rate of that network is. Here it is for other lots *and* other seeds.
 
 use crate::judge::{Stratum, strata};
 use crate::results::{EvaluationResults, RunSummary};
 use crate::slices::Slice;
 use crate::statistics::bootstrap::{DRAWS, Interval, Units};
 use crate::statistics::poisson::Rate;
+use crate::statistics::student::{half_width_of_mean, widened};
 use experiment::drivers::NamedDriver;
-use rand::RngExt as _;
-use sim::seed::{Rng, RootSeed};
+use sim::seed::RootSeed;
 
 /// Fewer trainings say nothing about others (chosen).
 pub const TRAININGS_MIN: usize = 3;
@@ -66,8 +65,8 @@ impl JudgedTeams {
 }
 
 impl EvaluationResults {
-    /// How drivers stand in a slice with the clean or noisy grids of a level, and how they differ from one of them, where
-    /// they were trained often enough; `None` if no recipe was, or nothing varies.
+    /// How drivers stand in a slice at a noise level, and how they differ from one of them, where they were trained often
+    /// enough; `None` if no recipe was, or nothing varies.
     pub fn judge_trainings(
         &self,
         level: usize,
@@ -82,10 +81,9 @@ impl EvaluationResults {
         Some(JudgedTeams { teams: teams.into_iter().zip(estimates).collect() })
     }
 
-    /// How teams stand in a slice at a noise level, and how they differ from one of them, `with`. Drawn are lots as in
-    /// [`judge`](Self::judge), and with every draw of lots as many trainings of each team as it has; of teams of the same
-    /// size the same, because trainings of one seed begin alike. The interval of none is the exact one of a single training.
-    /// `None` if nothing varies.
+    /// How teams stand in a slice at a noise level, and how they differ from one of them, `with`. Lots are drawn as in
+    /// [`judge`](Self::judge), for the means over trainings; Student's interval of these means adds what other seeds bring.
+    /// Trainings of one seed begin alike, so teams of the same size differ by pairs. `None` if nothing varies.
     pub fn judge_teams(
         &self,
         level: usize,
@@ -100,41 +98,40 @@ impl EvaluationResults {
             return None;
         }
         let drivers = pairs[0].len();
-        let of_sums = |sums: &[f64], rng: Option<&mut Rng>, out: &mut [f64]| {
-            let (events, hundreds_of_metres) = (&sums[..drivers], sums[drivers]);
+        let per_100m = |sums: &[f64], driver: usize| sums[driver] / sums[drivers];
+        let of_sums = |sums: &[f64], out: &mut [f64]| {
             let (rates, differences) = out.split_at_mut(teams.len());
-            match rng {
-                None => {
-                    for (rate, team) in rates.iter_mut().zip(teams) {
-                        let sum: f64 = team.drivers.iter().map(|&driver| events[driver]).sum();
-                        *rate = sum / team.drivers.len() as f64 / hundreds_of_metres;
-                    }
-                }
-                Some(rng) => {
-                    let largest = teams.iter().map(|team| team.drivers.len()).max().unwrap_or(0);
-                    rates.fill(0.0);
-                    for nth in 0..largest {
-                        let drawn: f64 = rng.random();
-                        for (rate, team) in rates.iter_mut().zip(teams).filter(|(_, team)| nth < team.drivers.len()) {
-                            let size = team.drivers.len() as f64;
-                            *rate += events[team.drivers[(drawn * size) as usize]] / size / hundreds_of_metres;
-                        }
-                    }
-                }
+            for (rate, Team { drivers, .. }) in rates.iter_mut().zip(teams) {
+                *rate = drivers.iter().map(|&driver| per_100m(sums, driver)).sum::<f64>() / drivers.len() as f64;
             }
             for (difference, rate) in differences.iter_mut().zip(&*rates) {
                 *difference = rate - rates[with];
             }
         };
-        let intervals = units(&strata, drivers).percentile_intervals_drawing(seed, DRAWS, 2 * teams.len(), &of_sums);
+        let intervals = units(&strata, drivers).percentile_intervals(seed, DRAWS, 2 * teams.len(), &of_sums);
         let (rates, differences) = intervals.split_at(teams.len());
-        let hundreds_of_metres: f64 = pairs.iter().map(|row| f64::from(row[0].reference_m) / 100.0).sum();
-        let estimate = |(&rate, &difference_per_100m): (&Interval, &Interval)| {
-            // No draw of none is anything but none. Trainings that drove the same lots are no further metres.
-            let upper = if rate.estimate > 0.0 { rate.upper } else { Rate::new(0, hundreds_of_metres).upper };
-            TeamEstimate { per_100m: Interval { upper, ..rate }, difference_per_100m }
+
+        let mut all = vec![0.0; drivers + 1];
+        pairs.iter().for_each(|row| add(&mut all, row));
+        let by_seed = |team: &Team| -> Vec<f64> { team.drivers.iter().map(|&driver| per_100m(&all, driver)).collect() };
+        let of_with = by_seed(&teams[with]);
+        // No draw of lots without events has any. Trainings that drove the same lots are no further metres.
+        let supported = Rate::new(0, all[drivers]).upper;
+        let estimate = |(team, (&rate, &difference)): (&Team, (&Interval, &Interval))| {
+            let own = by_seed(team);
+            let half_width = half_width_of_mean(&own);
+            let per_100m = widened(rate, half_width);
+            let half_width = if own.len() == of_with.len() {
+                half_width_of_mean(&own.iter().zip(&of_with).map(|(own, with)| own - with).collect::<Vec<_>>())
+            } else {
+                half_width.hypot(half_width_of_mean(&of_with))
+            };
+            TeamEstimate {
+                per_100m: Interval { lower: per_100m.lower.max(0.0), upper: per_100m.upper.max(supported), ..per_100m },
+                difference_per_100m: widened(difference, half_width),
+            }
         };
-        Some(rates.iter().zip(differences).map(estimate).collect())
+        Some(teams.iter().zip(rates.iter().zip(differences)).map(estimate).collect())
     }
 }
 

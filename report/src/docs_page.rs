@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 /// Where their figures go, relative to the page.
 pub(crate) const FIGURES: &str = "pictures/results";
 
-/// The head of a page: which command made the run, and which made the page of it and of other runs.
+/// The head of a page: which command made the run, and which one made the page.
 pub(crate) fn head(run: &str, others: &[String], manifest: &Manifest, more: &[(&str, String)]) -> String {
     let unknown = || "unknown".to_owned();
     let changes = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };

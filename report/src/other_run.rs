@@ -66,7 +66,8 @@ impl OtherRun {
         let Found { manifest, title, table, plot } = self.read()?;
         let named: Vec<String> = others.iter().map(Self::to_string).collect();
         let mut page = Page::new(title);
-        page.text(docs_page::head(&self.to_string(), &named, &manifest, &[]));
+        let seed = [("root seed", manifest.root_seed.to_string())];
+        page.text(docs_page::head(&self.to_string(), &named, &manifest, &seed));
         page.text(table);
         add_plot(&mut page, &manifest.command, plot);
         others.iter().try_for_each(|other| other.add_to(&mut page))?;

@@ -158,8 +158,9 @@ fn headline(page: &mut Page, reference: &Driven<'_>, unseen: &Driven<'_>) {
         format!(
             "{table}\n\nA *near-collision*: something lies within 0.5 m in the direction of travel; the car is stopped, put \
              back on the route, and drives on. A *contact*: the body touches something. *Least clearance*: the smallest \
-             distance of the body to anything in any run. Where there are several trainings, the route is that of each, and \
-             the rate is their mean, with an interval for other trials or lots and other seeds."
+             distance of the body to anything in any run. Where there are several trainings, the route is that of each, \
+             the rate is their mean, with an interval for other trials or lots and other seeds, and the clearance is the least \
+             of all."
         ),
     );
 }
@@ -226,7 +227,7 @@ fn introduction(recipe: &Recipe) -> String {
          this report; the same command gives the same bytes.\n\n\
          Intervals are of 95 %: exact Poisson intervals (Garwood) for rates, or (b) a paired bootstrap of \
          whole trials, both ways together, where events come in clusters; bootstrap for safe ratios and differences. All drivers met \
-         the same obstacles and the same noise.",
+         the same obstacles and the same noise.{}",
         settings.training.lots.join(", "),
         evaluation.lots.join(", "),
         evaluation.trials,
@@ -234,6 +235,12 @@ fn introduction(recipe: &Recipe) -> String {
         settings.seed.0,
         if extent.seeds > 1 { format!(" and {} more", extent.seeds - 1) } else { String::new() },
         evaluation.seed.0,
+        if extent.seeds > 1 {
+            " What names no training and is not of several is of the first: Table 1, what stands beside the paper's figures, \
+             the ablations."
+        } else {
+            ""
+        },
     )
 }
 
@@ -245,12 +252,9 @@ fn verdicts(statements: &[Statement], extent: &Extent) -> String {
                     other driver's in safe ratios; * = excludes zero, by six trials or more).\n"
         .to_owned();
     if extent.seeds >= TRAININGS_MIN as u64 {
-        let _ = writeln!(
-            text,
-            "\nWith {} trainings of each recipe, near-collisions are compared by the mean over them, with an interval for other \
-             trials or lots and other seeds. Safe ratios, reversals, η̂ and what noise induces are of the first training.",
-            extent.seeds
-        );
+        text += "\nWhere several counts are named, they are of trainings that differ by their seed: their means are compared, \
+                 with an interval for other trials or lots and other seeds, and none of them may have a near-collision where \
+                 there should be none. Everything else is of the first training.\n";
     }
     for verdict in [Verdict::Holds, Verdict::DoesNotHold, Verdict::CannotBeTold] {
         let found: Vec<&Statement> = statements.iter().filter(|statement| statement.verdict == verdict).collect();

@@ -79,16 +79,18 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
     }
     let titles = std::iter::once(rules::CLONED).chain(extent.rules.iter().map(|rule| rules::title(rule)));
     let mut pooled: Vec<Row> = titles.map(|title| pool(&rows, title)).collect();
-    // Networks that drove the same lots are no independent evidence: lots and seeds are drawn.
+    // Networks that drove the same lots are no independent evidence: the metres are those of one.
     let drivers = |title: &str| (0..rows.len()).filter(|&driver| rows[driver].rule == title).collect();
     let teams: Vec<Team> =
         pooled.iter().map(|row| Team { name: row.rule.clone(), drivers: drivers(&row.rule) }).collect();
     let of_teams = results.judge_teams(0, &everywhere, &teams, 0, seed_of_trials);
     for (at, row) in pooled.iter_mut().enumerate() {
-        let rate = Rate::new(row.near_collisions, row.route_m / 100.0);
-        let drawn = of_teams.as_ref().map(|estimates| estimates[at].per_100m);
-        [row.lower, row.upper] = drawn.map_or([rate.lower, rate.upper], |interval| [interval.lower, interval.upper]);
-        row.per_100m = rate.per_unit;
+        let judged = of_teams.as_ref().map(|estimates| estimates[at].per_100m);
+        let seeds = teams[at].drivers.len() as f64;
+        let of_one = (f64::from(row.near_collisions) / seeds).round() as u32;
+        let rate = Rate::new(of_one, row.route_m / seeds / 100.0);
+        [row.lower, row.upper] = judged.map_or([rate.lower, rate.upper], |interval| [interval.lower, interval.upper]);
+        row.per_100m = f64::from(row.near_collisions) / (row.route_m / 100.0);
     }
     for row in rows.iter_mut().chain(&mut pooled) {
         let expert_s = (row.ticks - row.novice_ticks) as f64 * control_period_s;

@@ -56,10 +56,12 @@ pub(crate) fn headline_row(
         lots.to_owned(),
         format!("{reference_m:.0} m"),
         list(&each, |totals| totals.near_collisions),
-        of_team.map_or_else(
-            || exact_rate(each[0].near_collisions, reference_m),
-            |(_, estimate)| interval(estimate.per_100m, 2),
-        ),
+        match of_team {
+            Some((_, estimate)) if each.iter().any(|totals| totals.near_collisions > 0) => {
+                interval(estimate.per_100m, 2)
+            }
+            _ => exact_rate(each[0].near_collisions, reference_m),
+        },
         list(&each, |totals| totals.contacts),
         clearance_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2} m")),
     ]
@@ -118,8 +120,8 @@ pub(crate) fn by_seed(
     if over_seeds.row_count() > 0 {
         let _ = write!(
             text,
-            "\n\nTheir means, with intervals for other trials or lots and other seeds; the difference is to DAgger (others − \
-             DAgger).\n\n{over_seeds}"
+            "\n\nTheir means beside the other drivers, with intervals for other trials or lots and other seeds; the difference is \
+             to DAgger (others − DAgger).\n\n{over_seeds}"
         );
     }
     Ok(text)
@@ -172,13 +174,13 @@ mod tests {
         let judged = driven.judge_trainings(&slice);
         let row = |driver| headline_row(&driven, &slice, driver, "lots", judged.as_ref());
         let expected =
-            ["DAgger, 3 trainings", "lots", "3000 m", "30, 60, 90", "2.00 [1.00, 3.00]", "0, 0, 0", "0.70 m"];
+            ["DAgger, 3 trainings", "lots", "3000 m", "30, 60, 90", "2.00 [0.00, 4.48]", "0, 0, 0", "0.70 m"];
         assert_eq!(row(1), expected);
         assert_eq!(row(0)[..4], ["expert", "lots", "3000 m", "0"]);
         assert!(row(0)[4].contains("one-sided"), "{:?}", row(0));
         let (team, estimate) = judged.as_ref().unwrap().of(0).unwrap();
         let totals = driven.results.totals(0, 0, &slice, None);
-        assert_eq!(row_of_others(team, totals, estimate), "-2.000 [-3.000, -1.000]");
+        assert_eq!(row_of_others(team, totals, estimate), "-2.000 [-4.484, +0.484]");
     }
 
     fn row_of_others(team: &Team, totals: Totals, estimate: &TeamEstimate) -> String {

@@ -55,7 +55,7 @@ pub const PLANNER_BYTES_MAX: u64 = 65_536;
 pub const RUN_TOML_BYTES_MAX: u64 = 16_000_000;
 /// JSON, CSV or Markdown file of a run, bytes.
 pub const RUN_TEXT_BYTES_MAX: u64 = 256_000_000;
-/// JSONL file of a run, bytes; of an evaluation or shard that is merged as any text.
+/// JSONL file of a run, bytes; where `merge` reads it, that of a text file holds.
 pub const RUN_LINES_BYTES_MAX: u64 = 100_000_000_000;
 /// Line of a JSONL file of a run, bytes.
 pub const RECORD_BYTES_MAX: u64 = 4_000_000;

@@ -88,6 +88,31 @@ fn where_the_paper_is_right_everything_holds() {
     assert!(figures.contains("DAgger 0 in 30000 m, 0.00 [0.00, 0.01]") && figures.contains('*'), "{figures}");
 }
 
+#[test]
+fn behaviour_cloning_and_planners_are_compared_and_other_trainings_are_not() {
+    let names = ["expert", "BC", DAGGER, "DAgger, α = 0", "BC (seed 2)", "DAgger (seed 2)", "vvf", "vvf, tuned"];
+    let drivers = names.map(driver);
+    let settings = Settings::preset("default").unwrap();
+    let lots = Lot::parse_all(&["lot-b"], &settings.episode.vehicle).unwrap();
+    let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 2, shard: None };
+    let mut results = EvaluationResults::new(&plan);
+    let trial = Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 1, &[Direction::Forward]).next().unwrap();
+    for driver in 0..drivers.len() {
+        let metrics = EpisodeMetrics { reference_m: 100.0, driven_m: 100.0, ..EpisodeMetrics::default() };
+        results.add(0, driver, 0, &trial, &EpisodeReport { ending: Ending::ReachedEnd, metrics, events: vec![] });
+    }
+    let driven = Driven { plan: &plan, results: &results };
+    let claims: Vec<String> = driven
+        .against_dagger(driven.all(), "here")
+        .unwrap()
+        .others()
+        .into_iter()
+        .map(|statement| statement.claim)
+        .collect();
+    let expected = ["BC", "vvf", "vvf, tuned"].map(|name| format!("DAgger has fewer near-collisions than {name} here"));
+    assert_eq!(claims, expected);
+}
+
 /// The verdicts of five trainings were those of the first.
 #[test]
 fn several_trainings_are_compared_by_their_mean() {
@@ -113,8 +138,9 @@ fn several_trainings_are_compared_by_their_mean() {
     assert_eq!(verdict(&found, fewer), Verdict::CannotBeTold, "the first alone has fewer: {found:#?}");
     assert_eq!(verdict(&found, "paper's lots without a near-collision"), Verdict::DoesNotHold);
     let figures = &found.iter().find(|statement| statement.claim.contains(fewer)).unwrap().figures;
-    assert!(figures.contains("DAgger 0, 600, 600 in 30000 m each, 1.33 [0.00, 2.00] per 100 m"), "{figures}");
-    assert!(figures.contains("difference +0.0"), "14 less 13.3 in 10 km: {figures}");
+    // Student's interval of 0, 2 and 2 per 100 m: 1.33 ± 4.30 · 1.15 / √3.
+    assert!(figures.contains("DAgger 0, 600, 600 in 30000 m each, 1.33 [0.00, 4.20] per 100 m"), "{figures}");
+    assert!(figures.contains("difference +0.05 ["), "13.8 per km less 13.3: {figures}");
 
     let found = of_dagger([0, 1, 2]);
     assert_eq!(verdict(&found, fewer), Verdict::Holds, "{found:#?}");

@@ -162,7 +162,7 @@ fn pooled_lots_from_files_are_a_sample_of_their_kind_from_six_on() {
 
 /// The intervals of five networks said how sure each was; that of "the default" came from a script beside the program.
 #[test]
-fn trainings_of_a_team_are_drawn_with_the_lots() {
+fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     // Everywhere: 0, 0 and 3 events by seed; the other team has one more of each; the last driver 2.
     let events = [0, 0, 3, 1, 1, 4, 2];
     let results = results(7, |driver, _| Some(report(events[driver], 100.0, 0.5)));
@@ -172,16 +172,21 @@ fn trainings_of_a_team_are_drawn_with_the_lots() {
     let found = results.judge_teams(0, &slice, &teams, 0, RootSeed(1)).unwrap();
     let rounded =
         |interval: Interval| [interval.lower, interval.estimate, interval.upper].map(|x| (x * 1e9).round() / 1e9);
-    // All three draws are the worst with probability 1/27 > .025, all three without events with 8/27.
-    assert_eq!(rounded(found[0].per_100m), [0.0, 1.0, 3.0]);
-    assert_eq!(rounded(found[1].per_100m), [1.0, 2.0, 4.0]);
-    assert_eq!(rounded(found[1].difference_per_100m), [1.0, 1.0, 1.0], "the same seeds are drawn of both");
+    // Every lot is alike, so only the seeds vary: 1 ± t·s/√n = 1 ± 4.3027 · √3/√3, and never below none.
+    assert_eq!(rounded(found[0].per_100m), [0.0, 1.0, 5.302_652_73]);
+    assert_eq!(rounded(found[1].per_100m), [0.0, 2.0, 6.302_652_73]);
+    assert_eq!(rounded(found[1].difference_per_100m), [1.0, 1.0, 1.0], "trainings of a seed are compared");
     assert_eq!(rounded(found[2].per_100m), [2.0, 2.0, 2.0]);
-    assert_eq!(rounded(found[2].difference_per_100m), [-1.0, 1.0, 2.0], "the seeds of the other vary");
+    assert_eq!(rounded(found[2].difference_per_100m), [-3.302_652_73, 1.0, 5.302_652_73], "the other's seeds vary");
     // No draw of lots without events has any; the metres say what that supports.
     let none = results.judge_teams(0, &slice, &[team(&[0, 1])], 0, RootSeed(1)).unwrap()[0].per_100m;
     let metres = results.totals(0, 0, &slice, None).reference_m;
     assert_eq!([none.estimate, none.lower, none.upper], [0.0, 0.0, Rate::new(0, metres / 100.0).upper]);
+    let first =
+        |trial: &Trial<'_>| (trial.lot.name(), trial.index, trial.direction) == ("lot-a", 0, Direction::Forward);
+    let one = self::results(5, |driver, trial| Some(report(u32::from(driver == 4 && first(trial)), 100.0, 0.5)));
+    let one = one.judge_teams(0, &slice, &[team(&[0, 1, 2, 3, 4])], 0, RootSeed(1)).unwrap()[0].per_100m;
+    assert!(one.estimate > 0.0 && one.upper == none.upper, "one event is not surer than none: {one:?}");
     let alone = results.judge(0, &slice, 0, RootSeed(1)).0[2].per_100m.unwrap();
     assert_eq!(rounded(alone), [3.0, 3.0, 3.0], "one network by itself varies with the lots alone");
 }

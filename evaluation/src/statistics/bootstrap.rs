@@ -36,9 +36,6 @@ impl Interval {
     }
 }
 
-/// From the sums of all columns, and the generator of the draw or none for the units as they are, to the statistics.
-pub type StatisticsOfDraw<'a> = dyn Fn(&[f64], Option<&mut Rng>, &mut [f64]) + Sync + 'a;
-
 /// Units to resample.
 #[derive(Debug, Clone, Default)]
 pub struct Units {
@@ -79,22 +76,10 @@ impl Units {
         statistics: usize,
         of_sums: &(dyn Fn(&[f64], &mut [f64]) + Sync),
     ) -> Vec<Interval> {
-        self.percentile_intervals_drawing(seed, draws, statistics, &|sums, _, out| of_sums(sums, out))
-    }
-
-    /// As [`Self::percentile_intervals`], of statistics that draw something themselves: `of_sums` gets the generator of
-    /// the draw, and none for the units as they are.
-    pub fn percentile_intervals_drawing(
-        &self,
-        seed: RootSeed,
-        draws: u64,
-        statistics: usize,
-        of_sums: &StatisticsOfDraw<'_>,
-    ) -> Vec<Interval> {
         let mut estimates = vec![0.0; statistics];
         let mut sums = vec![0.0; self.columns];
         self.values.chunks_exact(self.columns).for_each(|unit| add(&mut sums, unit));
-        of_sums(&sums, None, &mut estimates);
+        of_sums(&sums, &mut estimates);
 
         let mut drawn = vec![0.0; draws as usize * statistics];
         drawn.par_chunks_exact_mut(statistics).enumerate().for_each_init(
@@ -102,7 +87,7 @@ impl Units {
             |sums, (draw, statistics)| {
                 let mut rng = seed.rng(Stream::Bootstrap, draw as u64);
                 self.resample(&mut rng, sums);
-                of_sums(sums, Some(&mut rng), statistics);
+                of_sums(sums, statistics);
             },
         );
         let tail = 0.5 * (1.0 - CONFIDENCE);
