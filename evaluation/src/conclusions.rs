@@ -201,23 +201,16 @@ impl Against<'_> {
         let name = self.name(driver);
         let all = self.trainings_of(&driver);
         let judged = self.trainings.as_ref().and_then(|trainings| trainings.of(driver));
-        match judged.filter(|_| all.len() > 1) {
-            Some((_, TeamEstimate { per_100m, .. })) => {
-                let counts: Vec<u32> = all.iter().map(|&driver| self.totals(driver).near_collisions).collect();
-                let rate = if counts.iter().all(|&count| count == 0) {
-                    exact_rate(0, reference_m)
-                } else {
-                    interval(*per_100m, 2)
-                };
-                let counts = counts.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
-                format!("{name} {counts} in {reference_m:.0} m each, {rate} per 100 m")
-            }
-            None => {
-                let which = if all.len() > 1 { format!(" (first of {})", all.len()) } else { String::new() };
-                let rate = exact_rate(near_collisions, reference_m);
-                format!("{name}{which} {near_collisions} in {reference_m:.0} m, {rate} per 100 m")
-            }
+        if let Some((_, TeamEstimate { per_100m, .. })) = judged.filter(|_| all.len() > 1) {
+            let counts: Vec<u32> = all.iter().map(|&driver| self.totals(driver).near_collisions).collect();
+            let has_none = counts.iter().all(|&count| count == 0);
+            let rate = if has_none { exact_rate(0, reference_m) } else { interval(*per_100m, 2) };
+            let counts = counts.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+            return format!("{name} {counts} in {reference_m:.0} m each, {rate} per 100 m");
         }
+        let which = if all.len() > 1 { format!(" (first of {})", all.len()) } else { String::new() };
+        let rate = exact_rate(near_collisions, reference_m);
+        format!("{name}{which} {near_collisions} in {reference_m:.0} m, {rate} per 100 m")
     }
 
     fn no_near_collision(&self) -> Statement {

@@ -7,7 +7,7 @@ use crate::results::{EvaluationResults, RunSummary};
 use crate::slices::Slice;
 use crate::statistics::bootstrap::{DRAWS, Interval, Units};
 use crate::statistics::poisson::Rate;
-use crate::statistics::student::{half_width_of_mean, widened};
+use crate::statistics::student::{half_width_of_mean, together, widened};
 use experiment::drivers::NamedDriver;
 use sim::seed::RootSeed;
 
@@ -112,7 +112,9 @@ impl EvaluationResults {
         let (rates, differences) = intervals.split_at(teams.len());
 
         let mut all = vec![0.0; drivers + 1];
-        pairs.iter().for_each(|row| add(&mut all, row));
+        for row in &pairs {
+            add(&mut all, row);
+        }
         let by_seed = |team: &Team| -> Vec<f64> { team.drivers.iter().map(|&driver| per_100m(&all, driver)).collect() };
         let of_with = by_seed(&teams[with]);
         // No draw of lots without events has any. Trainings that drove the same lots are no further metres.
@@ -124,7 +126,7 @@ impl EvaluationResults {
             let half_width = if own.len() == of_with.len() {
                 half_width_of_mean(&own.iter().zip(&of_with).map(|(own, with)| own - with).collect::<Vec<_>>())
             } else {
-                half_width.hypot(half_width_of_mean(&of_with))
+                together(half_width, half_width_of_mean(&of_with))
             };
             TeamEstimate {
                 per_100m: Interval { lower: per_100m.lower.max(0.0), upper: per_100m.upper.max(supported), ..per_100m },

@@ -3,6 +3,7 @@
 use super::bootstrap::Interval;
 use super::poisson::CONFIDENCE;
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
+use statrs::statistics::Statistics as _;
 
 /// Half of the 95 % interval of the mean of a normal population from which `values` were drawn: t·s/√n. 0 of fewer than
 /// two, which say nothing about others.
@@ -13,10 +14,8 @@ pub fn half_width_of_mean(values: &[f64]) -> f64 {
         return 0.0;
     }
     let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (n - 1.0);
     let t = StudentsT::new(0.0, 1.0, n - 1.0).expect("at least one degree of freedom");
-    t.inverse_cdf(0.5 * (1.0 + CONFIDENCE)) * (variance / n).sqrt()
+    t.inverse_cdf(0.5 * (1.0 + CONFIDENCE)) * (values.variance() / n).sqrt()
 }
 
 /// The interval of an estimate that errs by two independent parts: by one as `interval` says, by the other up to ±
@@ -27,10 +26,15 @@ pub fn widened(interval: Interval, half_width: f64) -> Interval {
     let Interval { estimate, lower, upper, units } = interval;
     Interval {
         estimate,
-        lower: estimate - (estimate - lower).hypot(half_width),
-        upper: estimate + (upper - estimate).hypot(half_width),
+        lower: estimate - together(estimate - lower, half_width),
+        upper: estimate + together(upper - estimate, half_width),
         units,
     }
+}
+
+/// How far two independent parts err together.
+pub fn together(a: f64, b: f64) -> f64 {
+    (a * a + b * b).sqrt()
 }
 
 #[cfg(test)]
