@@ -515,12 +515,13 @@ fn weight_and_cloning(driven: &Driven<'_>) -> String {
     let mut table = table_of(&["", "lots", "Δ near-collisions per 100 m [95 %]", "Δ safe ratio [95 %]"]);
     let seed = driven.plan.settings.evaluation.seed;
     let pairs = [(BC, DAGGER), (UNWEIGHTED, DAGGER)];
+    let slices: Vec<_> =
+        driven.results.slices().into_iter().map(|slice| (driven.judge_trainings(&slice), slice)).collect();
     for (name, with) in pairs {
         let (Some(driver), Some(with_index)) = (driven.driver(name), driven.driver(with)) else { continue };
-        for slice in driven.results.slices() {
-            let (_, comparisons) = driven.results.judge(0, &slice, with_index, seed);
+        for (trainings, slice) in &slices {
+            let (_, comparisons) = driven.results.judge(0, slice, with_index, seed);
             let Some(found) = comparisons.into_iter().find(|comparison| comparison.driver == driver) else { continue };
-            let trainings = driven.judge_trainings(&slice);
             let of_team = trainings.as_ref().and_then(|trainings| trainings.of(driver));
             let near_collisions =
                 of_team.map_or(found.difference_per_100m, |(_, estimate)| Some(estimate.difference_per_100m));

@@ -391,7 +391,7 @@ fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<(
 fn render_results(args: &RenderResultsArgs, output: &Output) -> anyhow::Result<()> {
     ensure!(
         run_dir::is_finished(&args.run)?,
-        "{}: this is no finished run; make one with cargo xtask reproduce",
+        "{}: this is no finished run of reproduce or of another command that ends in a table",
         args.run.display()
     );
     let command = Manifest::read(&args.run)?.command;
