@@ -306,6 +306,7 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
     assert!(last.contains("Made by `cargo xtask scaling --preset smoke") && last.contains(&table), "{last}");
     assert!(last.contains("](pictures/results/scaling-2.svg)"), "each plot has a file of its own: {last}");
     assert!(["scaling.svg", "scaling-2.svg"].iter().all(|plot| folder.join("pictures/results").join(plot).is_file()));
+    refused(&["render", "results"], &[&folder.join("nowhere")], "nowhere: this is no finished run of reproduce or of");
     // And as a page of its own.
     let own = folder.join("results-scaling.md");
     succeed(xtask().args(["render", "results", &out_name, "--to"]).arg(&own));

@@ -1,6 +1,7 @@
 use super::*;
 use crate::statistics::bootstrap::Interval;
 use crate::statistics::poisson::Rate;
+use crate::statistics::student::{half_width_of_mean, together};
 use crate::trainings::Team;
 use experiment::drivers::NamedDriver;
 use experiment::settings::Settings;
@@ -187,6 +188,17 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     let one = self::results(5, |driver, trial| Some(report(u32::from(driver == 4 && first(trial)), 100.0, 0.5)));
     let one = one.judge_teams(0, &slice, &[team(&[0, 1, 2, 3, 4])], 0, RootSeed(1)).unwrap()[0].per_100m;
     assert!(one.estimate > 0.0 && one.upper == none.upper, "one event is not surer than none: {one:?}");
+    // Lots and seeds that both vary: the first team's trainings are alike, the other's have 0, 1 and 2 events more.
+    let both = self::results(6, |driver, trial| {
+        let of_seed = if driver < 3 { 0 } else { driver as u32 - 3 };
+        Some(report(3 + trial.index + of_seed, 100.0, 0.5))
+    });
+    let both = both.judge_teams(0, &slice, &teams[..2], 0, RootSeed(1)).unwrap();
+    let [lots, both] = [both[0].per_100m, both[1].per_100m];
+    assert!(lots.lower < lots.estimate && (both.estimate - lots.estimate - 1.0).abs() < 1e-9, "{lots:?} {both:?}");
+    let half_width = half_width_of_mean(&[0.0, 1.0, 2.0]);
+    let expected = both.estimate - together(lots.estimate - lots.lower, half_width);
+    assert!((both.lower - expected).abs() < 1e-9, "{both:?} {expected}");
     let alone = results.judge(0, &slice, 0, RootSeed(1)).0[2].per_100m.unwrap();
     assert_eq!(rounded(alone), [3.0, 3.0, 3.0], "one network by itself varies with the lots alone");
 }
