@@ -111,10 +111,26 @@ fn settings_and_folders_that_cannot_be_used_leave_nothing() {
         }
     }
     refuses(&["tune", "--planner", "nobody", "--out", &out], &["nobody", "tentacle"]);
-    refuses(&["tune", "--budget", "0", "--out", &out], &["--budget is 0"]);
+    refuses(&["tune", "--budget", "0", "--out", &out], &["--budget", "0 is not in 1..=1000000"]);
     refuses(&["evaluate", "--driver", "tuned:nobody", "--out", &out], &["tuned:nobody", "tuned:vvf"]);
     refuses(&["evaluate", "--driver", "expert", "--lots", "test:0", "--out", &out], &["test:0", "1 to 1000000"]);
     refuses(&["drivers", "nobody"], &["nobody", "tentacle"]);
+    for twice in ["evaluation", "training"] {
+        let setting = format!("{twice}.directions=[\"forward\", \"forward\"]");
+        refuses(&["train-bc", "--set", &setting, "--out", &out], &["names forward twice"]);
+    }
+    refuses(&["scaling", "--resume", &out, "--different", "2"], &["--resume", "--different", "cannot be used with"]);
+    refuses(&["evaluate", "--resume", &out, "--smoothing", "8"], &["--resume", "--smoothing", "cannot be used with"]);
+    let mine = "scenarios/examples/slalom.toml";
+    let trained = format!("training.lots=[{mine:?}]");
+    for command in ["rules", "deviations", "reproduce"] {
+        let arguments = ["--preset", "smoke", "--set", &trained, "--unseen", mine, "--out", &out];
+        refuses(&[&[command], &arguments[..]].concat(), &["--unseen", "trained or tuned on it"]);
+    }
+    let around = ["evaluate", "--driver", "expert", "--lots", mine, "--out", "scenarios", "--overwrite"];
+    refuses(&around, &["--out scenarios", "scenarios/examples/slalom.toml", "choose another --out"]);
+    let long = ["render", "animation", "--driver", "expert", "--lots", "lot-b", "--speed", "0.1", "--fps", "50"];
+    refuses(&[&long[..], &["--out", &out]].concat(), &["pictures", "--from and --to", "--speed"]);
     assert!(!Path::new(&out).exists());
 }
 
@@ -415,6 +431,11 @@ fn a_lot_that_can_only_be_driven_forward_is_refused_with_its_line_and_the_flag()
     );
     let lots = format!("training.lots=[\"{lot}\"]");
     refuses(&["train-bc", "--set", &lots, "--out", &out], &["lot.toml:5", "training.directions='[\"forward\"]'"]);
+    // All trainings were done when this was found, and no --resume could go on.
+    for command in ["rules", "reproduce"] {
+        let expected = &["lot.toml:5", "evaluation.directions='[\"forward\"]'"];
+        refuses(&[command, "--unseen", &lot, "--out", &out], expected);
+    }
     assert!(!Path::new(&out).exists());
 }
 

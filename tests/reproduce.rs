@@ -317,7 +317,7 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
     for (arguments, part) in [
         (["--different", "0"], "name at least one lot"),
         (["--different", "4,4"], "named twice"),
-        (["--unseen", "train:2"], "trained on it"),
+        (["--unseen", "train:2"], "trained or tuned on it"),
     ] {
         let refused = run(&arguments).unwrap();
         assert_eq!(refused.status.code(), Some(2));
@@ -375,7 +375,7 @@ fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
     for (arguments, part) in [
         (["--rule", "anybody"], "there are expert_only"),
         (["--rule", "vanilla,vanilla"], "named twice"),
-        (["--unseen", "train:2"], "trained on it"),
+        (["--unseen", "train:2"], "trained or tuned on it"),
     ] {
         let refused = run(&arguments);
         assert_eq!(refused.status.code(), Some(2));

@@ -4,22 +4,24 @@
 //! where it lies on the other, and cannot be told where it contains zero. Where there are several trainings of a recipe, the
 //! difference in near-collisions is that of their means, and its interval is for other lots and other seeds.
 
-use crate::format::{difference, exact_rate, interval};
+use crate::format::{clustered, difference, exact_rate, interval, quoted_rate};
 use crate::incidents::Cause;
-use crate::judge::Comparison;
+use crate::judge::{Comparison, DriverEstimate};
 use crate::paper;
 use crate::plan::Plan;
 use crate::results::EvaluationResults;
 use crate::slices::Slice;
 use crate::statistics::bootstrap::Interval;
-use crate::statistics::comparison::RateRatio;
-use crate::statistics::poisson::{CONFIDENCE, upper_bound};
+use crate::statistics::comparison::{RateRatio, ratio_of_intervals};
+use crate::statistics::poisson::{CONFIDENCE, Rate, upper_bound};
 use crate::statistics::sample_size::Question;
+use crate::statistics::student::half_width_of_mean;
 use crate::totals::Totals;
-use crate::trainings::{self, JudgedTeams, Team, TeamEstimate};
+use crate::trainings::{self, JudgedTeams, TRAININGS_MIN, Team, TeamEstimate};
 use experiment::drivers::NamedDriver;
 use policy::dagger::IterationRow;
 use serde::Serialize;
+use statrs::statistics::Statistics as _;
 
 /// The paper's driver.
 pub const DAGGER: &str = "DAgger";
@@ -118,10 +120,19 @@ impl Driven<'_> {
     /// How all drivers compare with DAgger in a slice; `None` where it did not drive.
     pub fn against_dagger(&self, slice: Slice, place: &str) -> Option<Against<'_>> {
         let dagger = self.driver(DAGGER)?;
-        let (_, comparisons) = self.results.judge(0, &slice, dagger, self.plan.settings.evaluation.seed);
+        let (estimates, comparisons) = self.results.judge(0, &slice, dagger, self.plan.settings.evaluation.seed);
         let trainings = self.judge_trainings(&slice);
         let teams = trainings::teams(self.plan.drivers);
-        Some(Against { driven: *self, dagger, slice, place: place.to_owned(), comparisons, teams, trainings })
+        Some(Against {
+            driven: *self,
+            dagger,
+            slice,
+            place: place.to_owned(),
+            estimates,
+            comparisons,
+            teams,
+            trainings,
+        })
     }
 
     /// How the drivers compare with DAgger over all their trainings; `None` if there are too few of them.
@@ -139,6 +150,8 @@ pub struct Against<'a> {
     slice: Slice,
     /// The lots, as in "on the paper's lots".
     place: String,
+    /// How each driver stands.
+    estimates: Vec<DriverEstimate>,
     /// Differences are theirs − DAgger's.
     comparisons: Vec<Comparison>,
     /// Trainings that differ by their seed; none if nothing was trained often enough.
@@ -197,7 +210,8 @@ impl Against<'_> {
 
     /// Near-collisions of a driver and their rate; of all its trainings where they can be judged together.
     fn rate(&self, driver: usize) -> String {
-        let Totals { near_collisions, reference_m, .. } = self.totals(driver);
+        let totals = self.totals(driver);
+        let Totals { near_collisions, reference_m, .. } = totals;
         let name = self.name(driver);
         let all = self.trainings_of(&driver);
         let judged = self.trainings.as_ref().and_then(|trainings| trainings.of(driver));
@@ -209,7 +223,7 @@ impl Against<'_> {
             return format!("{name} {counts} in {reference_m:.0} m each, {rate} per 100 m");
         }
         let which = if all.len() > 1 { format!(" (first of {})", all.len()) } else { String::new() };
-        let rate = exact_rate(near_collisions, reference_m);
+        let rate = quoted_rate(&totals, &self.estimates[driver]);
         format!("{name}{which} {near_collisions} in {reference_m:.0} m, {rate} per 100 m")
     }
 
@@ -306,7 +320,16 @@ impl Against<'_> {
         let groups = self.driven.results.groups();
         let has_all = paper::LOTS.iter().all(|lot| groups.iter().any(|group| group.name == lot.lot));
         let ours = (has_all && groups.len() == paper::LOTS.len()).then(|| self.totals(planner))?;
-        let ratio = RateRatio::new((ours.near_collisions, ours.reference_m / 100.0), (events, metres / 100.0));
+        let exact = RateRatio::new((ours.near_collisions, ours.reference_m / 100.0), (events, metres / 100.0));
+        let ratio = match clustered(&self.estimates[planner]) {
+            // Of the paper's events nothing is known but their number.
+            Some(of_ours) => {
+                let of_paper = Rate::new(events, metres / 100.0);
+                let [lower, upper] = ratio_of_intervals(of_ours, (of_paper.per_unit, [of_paper.lower, of_paper.upper]));
+                RateRatio { lower, upper: Some(upper), ..exact }
+            }
+            None => exact,
+        };
         let upper = ratio.upper.unwrap_or(f64::INFINITY);
         let verdict = if 1.0 / AS_IN_THE_PAPER <= ratio.lower && upper <= AS_IN_THE_PAPER {
             Verdict::Holds
@@ -372,25 +395,36 @@ pub fn share_of_the_network(rows: &[IterationRow], eta: f64) -> Statement {
     }
 }
 
-/// The weight α τ̂ makes Σ τ̂ smaller: the ratio of an iteration lies below one.
-pub fn effect_of_the_weight(iteration: u32, ratio: Option<Interval>) -> Statement {
-    let below_one = ratio.map(|ratio| Interval {
-        estimate: 1.0 - ratio.estimate,
-        lower: 1.0 - ratio.upper,
-        upper: 1.0 - ratio.lower,
-        ..ratio
+/// The weight α τ̂ makes Σ τ̂ smaller: the ratio of an iteration lies below one. Decided by pairs of trainings; one pair,
+/// whose interval is for other samples, says nothing of another seed's.
+pub fn effect_of_the_weight(iteration: u32, of_samples: Option<Interval>, by_seed: &[f64]) -> Statement {
+    let of_seeds = (by_seed.len() >= TRAININGS_MIN).then(|| {
+        let (mean, half_width) = (by_seed.mean(), half_width_of_mean(by_seed));
+        Interval { estimate: mean, lower: mean - half_width, upper: mean + half_width, units: by_seed.len() as u32 }
     });
-    let figures = ratio.map_or_else(
-        || "too few held-back samples".to_owned(),
-        |Interval { estimate, lower, upper, .. }| {
-            format!("Σ τ̂ with the weight over without: {estimate:.3} [{lower:.3}, {upper:.3}]; paper .62 … .91")
-        },
-    );
-    Statement {
-        claim: format!("the weight on τ̂ lowers the network's error (iteration {iteration})"),
-        verdict: Verdict::of(below_one),
-        figures,
-    }
+    // Student's interval holds for few values, other than the bootstrap's.
+    let verdict = match of_seeds {
+        Some(ratio) if ratio.upper < 1.0 => Verdict::Holds,
+        Some(ratio) if ratio.lower > 1.0 => Verdict::DoesNotHold,
+        _ => Verdict::CannotBeTold,
+    };
+    let figures = match (of_seeds, of_samples) {
+        (Some(ratio), _) => {
+            let each: Vec<String> = by_seed.iter().map(|ratio| format!("{ratio:.3}")).collect();
+            format!(
+                "Σ τ̂ with the weight over without, by seed: {}; mean {}; paper .62 … .91",
+                each.join(", "),
+                interval(ratio, 3)
+            )
+        }
+        (None, Some(ratio)) => format!(
+            "Σ τ̂ with the weight over without: {}, for other samples, not for other seeds; paper .62 … .91",
+            interval(ratio, 3)
+        ),
+        (None, None) => "too few held-back samples".to_owned(),
+    };
+    let claim = format!("the weight on τ̂ lowers the network's error (iteration {iteration})");
+    Statement { claim, verdict, figures }
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ impl<'a> DriveStage<'a> {
         let (drivers, shard) = match &stage.step {
             Step::Drive { drivers } => (drivers, None),
             Step::DriveShard { drivers, shard } => (drivers, Some(*shard)),
-            Step::Train { .. } | Step::OnPolicy => anyhow::bail!("{} does not drive", stage.folder),
+            Step::Train { .. } | Step::OnPolicy { .. } => anyhow::bail!("{} does not drive", stage.folder),
         };
         let settings = &stage.settings;
         let drivers = stages::load(drivers, settings)?;

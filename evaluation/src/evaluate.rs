@@ -73,18 +73,20 @@ impl<'a> Driving<'a> {
     fn open(plan: &'a Plan<'a>, folder: &Path, progress: &'a dyn Progress) -> anyhow::Result<Self> {
         let lines = Growing::open(folder, DRIVING, &FILES)?;
         let mut results = EvaluationResults::new(plan);
-        let places = Places::new(plan);
         let (mut done, mut near_collisions) = (0, 0);
-        records::each_line_of(&folder.join(records::RUNS), lines.reader(0)?, |run| {
-            done += 1;
-            results.take_run(&places, &run)
-        })?;
-        records::each_line_of(&folder.join(records::FAILURES), lines.reader(1)?, |failure| {
-            near_collisions += 1;
-            results.take_failure(&places, &failure)
-        })?;
+        if lines.parts() > 0 {
+            let places = Places::new(plan);
+            records::each_line_of(&folder.join(records::RUNS), lines.reader(0)?, |run| {
+                done += 1;
+                results.take_run(&places, &run)
+            })?;
+            records::each_line_of(&folder.join(records::FAILURES), lines.reader(1)?, |failure| {
+                near_collisions += 1;
+                results.take_failure(&places, &failure)
+            })?;
+        }
         progress.begin("evaluation", "driving");
-        let all = places.trials.len() * plan.drivers.len() * plan.settings.evaluation.noise.len();
+        let all = plan.trials().count() * plan.drivers.len() * plan.settings.evaluation.noise.len();
         let track = Track { progress, runs: all, done, near_collisions };
         Ok(Self { plan, lines, results, track, parts: 0, trials: 0 })
     }

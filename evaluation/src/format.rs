@@ -6,7 +6,7 @@ use crate::statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
 use crate::totals::Totals;
 
 /// The bootstrap's interval of a rate, where events cluster and no other may be quoted (docs/methods.md 8.3).
-fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
+pub(crate) fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
     let is_clustered = estimate.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
     estimate.per_100m.filter(|_| is_clustered)
 }

@@ -66,13 +66,17 @@ pub enum States {
 }
 
 /// Σ τ̂ of two policies of the same iteration, trained with and without the weight α τ̂.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Effect {
     /// Which.
     pub iteration: u32,
-    /// Ratio on the held-back samples of both data sets so far; resampled in stretches of a validation block.
+    /// Ratio on the held-back samples of both data sets so far; resampled in stretches of a validation block. Of the first
+    /// seed.
     pub held_back: Option<Interval>,
-    /// Σ τ̂ per second while driving, with the weight and without.
+    /// The same ratio of every seed, the first included.
+    #[serde(default)]
+    pub held_back_by_seed: Vec<f64>,
+    /// Σ τ̂ per second while driving, with the weight and without. Of the first seed.
     pub driving_per_s: [f64; 2],
 }
 
@@ -122,22 +126,59 @@ impl Trained {
     }
 }
 
-/// Drives, compares and writes; `false` if it was cancelled.
+/// A training with the weight α τ̂ and one without, from one seed.
+struct Pair {
+    weighted: Trained,
+    unweighted: Trained,
+}
+
+impl Pair {
+    fn open(root: &Path, seed: RootSeed) -> anyhow::Result<Self> {
+        let open = |chain: Chain| Trained::open(&root.join(chain.folder(seed)));
+        Ok(Self { weighted: open(Chain::Weighted)?, unweighted: open(Chain::Unweighted)? })
+    }
+
+    fn iterations(&self) -> u32 {
+        self.weighted.iterations().min(self.unweighted.iterations())
+    }
+
+    /// τ̂ of both policies of an iteration on the held-back samples of both data sets so far.
+    fn tau_hats(&self, iteration: u32, settings: &Settings) -> anyhow::Result<[Vec<f64>; 2]> {
+        let by = settings.dagger.fit.validation;
+        let mut samples = self.weighted.held_back(0, iteration, by)?;
+        samples.extend(self.unweighted.held_back(1, iteration, by)?);
+        let of = |trained: &Trained| {
+            let policy = Checkpoint::load(&trained.store.round_folder(iteration))?;
+            Ok::<_, anyhow::Error>(tau_hats(settings, &policy, &samples))
+        };
+        Ok([of(&self.weighted)?, of(&self.unweighted)?])
+    }
+}
+
+/// Drives, compares and writes; `false` if it was cancelled. The first of the seeds alone drives.
 ///
 /// # Errors
 /// If a chain is incomplete or a file cannot be read or written.
-pub fn run(settings: &Settings, root: &Path, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<bool> {
+pub fn run(
+    settings: &Settings,
+    seeds: &[RootSeed],
+    root: &Path,
+    run: &RunDir,
+    progress: &dyn Progress,
+) -> anyhow::Result<bool> {
     let folder = |chain: Chain| root.join(chain.folder(settings.seed));
-    let weighted = Trained::open(&folder(Chain::Weighted))?;
-    let unweighted = Trained::open(&folder(Chain::Unweighted))?;
-    let iterations = weighted.iterations().min(unweighted.iterations());
+    let pair = Pair::open(root, settings.seed)?;
+    let iterations = pair.iterations();
+    let Pair { weighted, unweighted } = &pair;
+    let others = seeds.iter().filter(|&&seed| seed != settings.seed);
+    let others = others.map(|&seed| Pair::open(root, seed)).collect::<anyhow::Result<Vec<_>>>()?;
     let by = settings.dagger.fit.validation;
     let mut drives = Drives::new(settings, 3 + 2 * iterations, progress);
     let mut calibration = Vec::new();
     for (name, path, chain, rounds) in [
-        ("BC", weighted.store.round_folder(0), &weighted, 0),
-        ("DAgger", run_dir::policy_folder(&folder(Chain::Weighted))?, &weighted, weighted.iterations()),
-        ("DAgger, α = 0", run_dir::policy_folder(&folder(Chain::Unweighted))?, &unweighted, unweighted.iterations()),
+        ("BC", weighted.store.round_folder(0), weighted, 0),
+        ("DAgger", run_dir::policy_folder(&folder(Chain::Weighted))?, weighted, weighted.iterations()),
+        ("DAgger, α = 0", run_dir::policy_folder(&folder(Chain::Unweighted))?, unweighted, unweighted.iterations()),
     ] {
         let Some(driven) = drives.of(&path)? else { return Ok(false) };
         let policy = Checkpoint::load(&path)?;
@@ -147,17 +188,21 @@ pub fn run(settings: &Settings, root: &Path, run: &RunDir, progress: &dyn Progre
     }
     let mut effect = Vec::new();
     for iteration in 1..=iterations {
-        let mut samples = weighted.held_back(0, iteration, by)?;
-        samples.extend(unweighted.held_back(1, iteration, by)?);
-        let (mut driving_per_s, mut sums) = ([0.0; 2], [Vec::new(), Vec::new()]);
-        for (index, chain) in [&weighted, &unweighted].into_iter().enumerate() {
-            let path = chain.store.round_folder(iteration);
-            let Some(driven) = drives.of(&path)? else { return Ok(false) };
+        let mut driving_per_s = [0.0; 2];
+        for (index, chain) in [weighted, unweighted].into_iter().enumerate() {
+            let Some(driven) = drives.of(&chain.store.round_folder(iteration))? else { return Ok(false) };
             driving_per_s[index] = tau_hat_per_s(driven);
-            sums[index] = tau_hats(settings, &Checkpoint::load(&path)?, &samples);
         }
+        let sums = pair.tau_hats(iteration, settings)?;
         let held_back = ratio(&sums, by.block, settings.evaluation.seed);
-        effect.push(Effect { iteration, held_back, driving_per_s });
+        let mut held_back_by_seed = vec![ratio_of_sums(&sums)];
+        for other in others.iter().filter(|other| other.iterations() >= iteration) {
+            if progress.is_cancelled() {
+                return Ok(false);
+            }
+            held_back_by_seed.push(ratio_of_sums(&other.tau_hats(iteration, settings)?));
+        }
+        effect.push(Effect { iteration, held_back, held_back_by_seed, driving_per_s });
     }
     drives.end();
     run.write(FILE, json::to_text(&OnPolicy { schema: SCHEMA, calibration, effect })?.as_bytes())?;
@@ -223,6 +268,11 @@ fn tau_hats(settings: &Settings, policy: &Checkpoint, samples: &[Sample]) -> Vec
     let predictions = policy.predictor(settings.dagger.device).predict(&grids);
     let of = |(sample, prediction): (&Sample, _)| f64::from(Evidence::new(prediction, sample.label).discrepancy);
     samples.iter().zip(&predictions).map(of).collect()
+}
+
+/// First sum over second.
+fn ratio_of_sums([first, second]: &[Vec<f64>; 2]) -> f64 {
+    first.iter().sum::<f64>() / second.iter().sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
 /// First sum over second, with its interval; `None` for fewer than two stretches. Neighbouring samples look alike, so

@@ -8,7 +8,7 @@ use experiment::lots::Lot;
 use experiment::trials::Trial;
 use sim::episode::EpisodeReport;
 use sim::scenario::Direction;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What is kept of one run: the bootstrap needs every one of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,12 +81,12 @@ impl Clusters {
 impl EvaluationResults {
     /// Nothing driven yet.
     pub fn new(plan: &Plan<'_>) -> Self {
-        // Specs that no longer stand for anything (a file that moved) were trained on by nobody here.
-        let trained_on: Vec<String> = plan
-            .settings
-            .training
-            .lots
-            .iter()
+        // Every driver's, and those of the settings. Specs that no longer stand for anything (a file that moved) were trained on
+        // by nobody here.
+        let of_drivers = plan.drivers.iter().filter_map(|driver| driver.training.as_ref()).flat_map(|of| &of.lots);
+        let named: BTreeSet<&String> = plan.settings.training.lots.iter().chain(of_drivers).collect();
+        let trained_on: BTreeSet<String> = named
+            .into_iter()
             .filter_map(|spec| Lot::parse_all(&[spec], &plan.settings.episode.vehicle).ok())
             .flatten()
             .map(|lot| lot.group())

@@ -74,7 +74,10 @@ pub enum Step {
         shard: Shard,
     },
     /// Networks drive, the expert labels every tick.
-    OnPolicy,
+    OnPolicy {
+        /// Whose trainings with and without the weight are compared; the first drives.
+        seeds: Vec<RootSeed>,
+    },
 }
 
 /// A training chain.
@@ -196,7 +199,7 @@ pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
         folder: ON_POLICY.to_owned(),
         about: "on-policy labelled rollouts: networks drive, the expert labels".to_owned(),
         settings: settings.clone(),
-        step: Step::OnPolicy,
+        step: Step::OnPolicy { seeds: seeds(settings, extent) },
     });
     stages
 }
@@ -337,7 +340,7 @@ impl Stage {
                 let (name, all_s) = estimate::evaluation(&self.settings, drivers.len());
                 vec![(name, all_s / f64::from(shard.of()))]
             }
-            Step::OnPolicy => vec![estimate::on_policy(&self.settings)],
+            Step::OnPolicy { .. } => vec![estimate::on_policy(&self.settings)],
         }
     }
 

@@ -152,7 +152,7 @@ pub struct ComparisonRow {
 }
 
 /// A row of `trainings.csv`: several trainings that differ by their seeds, as one, or another driver beside them. Intervals
-/// of 95 % are for other lots and other trainings. Differences are team − `compared_with`.
+/// of 95 % are for other lots and, where there are several, other trainings. Differences are team − `compared_with`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrainingsRow {
     /// The first of the team.

@@ -21,21 +21,30 @@ pub struct Team {
     pub name: String,
     /// Indices of the plan's drivers, by seed.
     pub drivers: Vec<usize>,
+    /// The root seed of each; none of a driver that was not trained.
+    pub seeds: Vec<u64>,
 }
 
-/// Every driver in a team, in the order of the first of each; none if no team has [`TRAININGS_MIN`] members.
+/// Every driver in a team, in the order of the first of each; none if no team has [`TRAININGS_MIN`] members. The same seed
+/// again is the same network, and counts once.
 pub fn teams(drivers: &[NamedDriver]) -> Vec<Team> {
     let mut teams: Vec<Team> = Vec::new();
     for (index, driver) in drivers.iter().enumerate() {
         let recipe = |index: usize| drivers[index].training.as_ref().map(|training| &training.recipe);
         let is_alike = |team: &&mut Team| recipe(index).is_some() && recipe(team.drivers[0]) == recipe(index);
         match teams.iter_mut().find(is_alike) {
-            Some(team) => team.drivers.push(index),
-            None => teams.push(Team { name: driver.name.clone(), drivers: vec![index] }),
+            Some(team) if driver.training.as_ref().is_some_and(|of| team.seeds.contains(&of.seed.0)) => {}
+            Some(team) => {
+                let seed = driver.training.as_ref().map_or(0, |of| of.seed.0);
+                let place = team.seeds.partition_point(|&other| other < seed);
+                team.seeds.insert(place, seed);
+                team.drivers.insert(place, index);
+            }
+            None => {
+                let seeds = driver.training.iter().map(|of| of.seed.0).collect();
+                teams.push(Team { name: driver.name.clone(), drivers: vec![index], seeds });
+            }
         }
-    }
-    for team in &mut teams {
-        team.drivers.sort_by_key(|&index| drivers[index].training.as_ref().map(|training| training.seed.0));
     }
     teams.retain(|team| team.drivers.len() == 1 || team.drivers.len() >= TRAININGS_MIN);
     if teams.iter().any(|team| team.drivers.len() > 1) { teams } else { Vec::new() }
@@ -83,7 +92,7 @@ impl EvaluationResults {
 
     /// How teams stand in a slice at a noise level, and how they differ from one of them, `with`. Lots are drawn as in
     /// [`judge`](Self::judge), for the means over trainings; Student's interval of these means adds what other seeds bring.
-    /// Trainings of one seed begin alike, so teams of the same size differ by pairs. `None` if nothing varies.
+    /// Trainings of one seed begin alike, so teams of the same seeds differ by pairs. `None` if nothing varies.
     pub fn judge_teams(
         &self,
         level: usize,
@@ -123,7 +132,7 @@ impl EvaluationResults {
             let own = by_seed(team);
             let half_width = half_width_of_mean(&own);
             let per_100m = widened(rate, half_width);
-            let half_width = if own.len() == of_with.len() {
+            let half_width = if team.seeds == teams[with].seeds {
                 half_width_of_mean(&own.iter().zip(&of_with).map(|(own, with)| own - with).collect::<Vec<_>>())
             } else {
                 together(half_width, half_width_of_mean(&of_with))
@@ -169,7 +178,7 @@ mod tests {
     fn trained(recipe: &str, seed: u64) -> NamedDriver {
         let mut driver =
             NamedDriver::expert(&expert::ExpertSettings::half_points()).renamed(&format!("{recipe}{seed}"));
-        driver.training = Some(Training { recipe: recipe.to_owned(), seed: RootSeed(seed) });
+        driver.training = Some(Training { recipe: recipe.to_owned(), seed: RootSeed(seed), lots: Vec::new() });
         driver
     }
 
@@ -181,5 +190,14 @@ mod tests {
         let found: Vec<(&str, &[usize])> = found.iter().map(|team| (team.name.as_str(), &*team.drivers)).collect();
         assert_eq!(found, [("a2", &[3, 0, 4][..]), ("expert", &[2])], "two of bc say nothing about others");
         assert_eq!(teams(&drivers[..4]), [], "nothing was trained often enough");
+    }
+
+    /// Three runs with `--seed 1` were three trainings that agree to the last digit.
+    #[test]
+    fn the_same_seed_again_is_no_further_training() {
+        let twice = [trained("a", 1), trained("a", 2), trained("a", 1), trained("a", 3), trained("a", 3)];
+        let found = teams(&twice);
+        assert_eq!((&*found[0].drivers, &*found[0].seeds), (&[0, 1, 3][..], &[1, 2, 3][..]));
+        assert_eq!(teams(&[trained("a", 1), trained("a", 1), trained("a", 1)]), []);
     }
 }

@@ -200,6 +200,18 @@ impl DriverSpec {
         }
     }
 
+    /// The files and folders that it is read from.
+    pub fn places(&self) -> Vec<&Path> {
+        match self {
+            // A policy of a run is read from the run.
+            Self::Run { folder } if folder.ends_with("bc") && !folder.is_dir() => folder.parent().into_iter().collect(),
+            Self::Run { folder } | Self::Checkpoint { folder } => vec![folder],
+            Self::Ensemble { members } => members.iter().flat_map(Self::places).collect(),
+            Self::Onnx { file } | Self::Planner { parameters: Parameters::File(file), .. } => vec![file],
+            Self::Expert | Self::Planner { .. } | Self::Callback { .. } => Vec::new(),
+        }
+    }
+
     fn ensemble(members: &str) -> anyhow::Result<Self> {
         let members: Vec<Self> = members.split(',').map(str::parse).collect::<anyhow::Result<_>>()?;
         for (at, member) in members.iter().enumerate() {

@@ -114,6 +114,14 @@ impl Lot {
         Some(storage::sums::digest(scenarios::load::to_toml(&loaded.scenario).as_bytes()))
     }
 
+    /// The file that it is read from.
+    pub fn file(&self) -> Option<&Path> {
+        match &self.spec {
+            LotSpec::File(path) => Some(path),
+            LotSpec::Reference(_) | LotSpec::Generated { .. } => None,
+        }
+    }
+
     /// Name in tables.
     pub fn name(&self) -> &str {
         &self.name

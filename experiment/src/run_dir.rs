@@ -37,6 +37,8 @@ pub struct RunDir {
     /// The run that this is a folder of, and its path there.
     within: Option<(PathBuf, String)>,
     _lock: Arc<Lock>,
+    /// Of that run, where this folder was reopened by itself.
+    _lock_of_run: Option<Arc<Lock>>,
 }
 
 /// SHA-256 of what is read from elsewhere by name, as on the command line: see [`inputs`](crate::inputs).
@@ -54,10 +56,13 @@ pub struct Request {
 /// A training that may have been done several times, with other seeds.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Training {
-    /// What all of them have in common: SHA-256 of the settings but seed and evaluation, and which policy of the run it is.
+    /// What all of them have in common: SHA-256 of the program's version, the settings but seed and evaluation, the lots from
+    /// files, and which policy of the run it is.
     pub recipe: String,
     /// Its root seed.
     pub seed: RootSeed,
+    /// Lots that it was trained on, as in its settings.
+    pub lots: Vec<String>,
 }
 
 /// What made a run: `manifest.toml`.
@@ -230,13 +235,16 @@ impl RunDir {
         Ok((run, settings_of(path)?, manifest))
     }
 
-    /// Reopens the folder of a run to write into it, whether it is finished or not.
+    /// Reopens the folder of a run, or of a finished stage of one, to write into it, whether it is finished or not.
     ///
     /// # Errors
     /// If there is none, or another process is at it.
     pub fn reopen(path: &Path, command: &str) -> anyhow::Result<Self> {
         ensure!(sums::exists(path)?, "{}: this is no run; list the folders in runs/", path.display());
-        Self::locked(path.to_path_buf(), command)
+        let own = Self::locked(path.to_path_buf(), command)?;
+        let Some((run, list)) = run_around(path)? else { return Ok(own) };
+        let lock = Arc::new(Lock::take(&run, command)?);
+        Ok(Self { within: Some((run, list)), _lock_of_run: Some(lock), ..own })
     }
 
     /// Claims a folder within this run: `None` if it is finished, else as an interrupted command left it or new. It
@@ -291,7 +299,7 @@ impl RunDir {
     /// Takes the lock of a folder that is there.
     fn locked(path: PathBuf, command: &str) -> anyhow::Result<Self> {
         let lock = Arc::new(Lock::take(&path, command)?);
-        Ok(Self { path, within: None, _lock: lock })
+        Ok(Self { path, within: None, _lock: lock, _lock_of_run: None })
     }
 
     fn claim_named(path: &Path, place: &Place<'_>) -> anyhow::Result<Self> {
@@ -303,8 +311,7 @@ impl RunDir {
         let is_free = names.iter().all(|name| {
             name == lock::FILE || name == SETTINGS || name == MANIFEST || name.to_string_lossy().ends_with(".partial")
         }) && (names.is_empty() || names.iter().any(|name| name == lock::FILE));
-        // A run of an earlier version has no list.
-        let is_run = sums::exists(path)? || path.join(SETTINGS).is_file();
+        let is_run = Manifest::is_in(path);
         // Before the lock is taken: nothing is written into a folder that is no run.
         if !is_free && !is_run {
             let way_out =
@@ -346,11 +353,11 @@ impl RunDir {
         }
     }
 
-    /// Deletes everything but the lock. List and settings go last: until then the folder is known as a run.
+    /// Deletes everything but the lock. The manifest goes last: until then the folder is known as a run.
     fn clear(&self) -> anyhow::Result<()> {
         let delete = || {
             let mut entries = fs::read_dir(&self.path)?.collect::<Result<Vec<_>, _>>()?;
-            entries.sort_by_key(|entry| (entry.file_name() == SETTINGS, entry.file_name() == sums::FILE));
+            entries.sort_by_key(|entry| (entry.file_name() == MANIFEST, entry.file_name() == sums::FILE));
             for entry in entries {
                 if entry.file_type()?.is_dir() {
                     fs::remove_dir_all(entry.path())?;
@@ -367,18 +374,9 @@ impl RunDir {
     ///
     /// # Errors
     /// If a list cannot be read or written.
-    pub fn list_in_parents(&self) -> anyhow::Result<()> {
-        let mut list = PathBuf::from(sums::FILE);
-        let mut folder = self.path.as_path();
-        while let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) {
-            list = Path::new(name).join(list);
-            let listed = list.to_string_lossy();
-            if sums::is_listed(parent, &listed)? {
-                return Ok(sums::list(parent, &[&listed])?);
-            }
-            folder = parent;
-        }
-        Ok(())
+    pub fn list_again(&self) -> anyhow::Result<()> {
+        let listed = self.within.as_ref().map(|(run, list)| sums::list(run, &[list]));
+        Ok(listed.unwrap_or(Ok(()))?)
     }
 
     /// The folder.
@@ -408,6 +406,22 @@ impl RunDir {
     }
 }
 
+/// The run that lists a folder within it, and the name of the folder's list there.
+fn run_around(folder: &Path) -> anyhow::Result<Option<(PathBuf, String)>> {
+    let mut list = PathBuf::from(sums::FILE);
+    let mut folder = folder;
+    while let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) {
+        list = Path::new(name).join(list);
+        let listed = list.to_string_lossy();
+        // Lists that other programs left are not read.
+        if Manifest::is_in(parent) && sums::is_listed(parent, &listed)? {
+            return Ok(Some((parent.to_owned(), listed.into_owned())));
+        }
+        folder = parent;
+    }
+    Ok(None)
+}
+
 /// One SHA-256 of all that a run wrote, but for what differs from one repetition to the next: wall times, the manifest, and
 /// the reports that show it. The same for the same command on another machine, if it computed the same.
 ///
@@ -426,7 +440,14 @@ pub fn finished(path: &Path) -> anyhow::Result<Option<Finished>> {
     let file = path.join(FINISHED);
     let Some(text) = sums::read_if_listed(&file, RUN_TOML_BYTES_MAX)? else { return Ok(None) };
     let text = String::from_utf8(text).with_context(|| file.display().to_string())?;
-    Ok(Some(toml::from_str(&text).with_context(|| file.display().to_string())?))
+    let finished: Finished = toml::from_str(&text).with_context(|| file.display().to_string())?;
+    ensure!(
+        finished.schema == FINISHED_SCHEMA,
+        "{}: written by another version of lotpilot (schema {}, this one reads {FINISHED_SCHEMA})",
+        file.display(),
+        finished.schema
+    );
+    Ok(Some(finished))
 }
 
 /// Whether a run is finished.
@@ -446,8 +467,8 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
     let names = sums::names(run)?;
     let folders = names.iter().filter_map(|name| name.strip_suffix(&format!("/{}", sums::FILE)));
     // Not `round-01-critic`: what is trained beside the network of a round.
-    let is_round = |folder: &str| folder.strip_prefix("round-").is_some_and(|number| number.parse::<u32>().is_ok());
-    let mut folders: Vec<&str> = folders.filter(|folder| *folder == "final" || is_round(folder)).collect();
+    let round_of = |folder: &str| folder.strip_prefix("round-")?.parse::<u32>().ok();
+    let mut folders: Vec<&str> = folders.filter(|folder| *folder == "final" || round_of(folder).is_some()).collect();
     let rounds = folders.iter().filter(|folder| **folder != "final").count();
     if let Some(Finished { outcome: Outcome::Training { rounds: expected, .. }, .. }) = finished(run)? {
         ensure!(
@@ -457,7 +478,7 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
             run.display()
         );
     }
-    folders.sort_by_key(|folder| (*folder == "final", *folder));
+    folders.sort_by_key(|folder| (*folder == "final", round_of(folder)));
     let folder = if is_bc { folders.first() } else { folders.last() };
     let folder = folder
         .with_context(|| format!("{}: no network is trained there yet; finish it with --resume {0}", run.display()))?;
@@ -482,7 +503,10 @@ pub fn training_of(spec: &Path) -> anyhow::Result<Training> {
     let seed = std::mem::replace(&mut settings.seed, RootSeed(0));
     settings.evaluation = Settings::preset("default")?.evaluation;
     let policy = if run_of(spec)?.1 { "bc" } else { "final" };
-    Ok(Training { recipe: sums::digest(format!("{policy}\n{}", settings.to_toml()).as_bytes()), seed })
+    let Manifest { program, inputs, .. } = Manifest::read(run_of(spec)?.0)?;
+    let digests: Vec<_> = settings.training.lots.iter().map(|lots| inputs.get(lots)).collect();
+    let recipe = format!("{policy}\n{program}\n{digests:?}\n{}", settings.to_toml());
+    Ok(Training { recipe: sums::digest(recipe.as_bytes()), seed, lots: settings.training.lots })
 }
 
 /// The folder of the run, and whether its policy after behaviour cloning is meant.
@@ -557,6 +581,14 @@ impl Manifest {
     /// Whether the same program made another run: by name, version and revision.
     pub fn is_of_version_of(&self, other: &Self) -> bool {
         (&self.program, &self.git_revision, self.git_dirty) == (&other.program, &other.git_revision, other.git_dirty)
+    }
+
+    /// Whether a folder holds a manifest, of whatever version: the folder is a run then, and not something else with files
+    /// of the same names.
+    fn is_in(folder: &Path) -> bool {
+        let text = storage::read::text(&folder.join(MANIFEST), RUN_TOML_BYTES_MAX).unwrap_or_default();
+        let table: toml::Table = text.parse().unwrap_or_default();
+        ["schema", "program", "command", "preset", "root_seed"].iter().all(|key| table.contains_key(*key))
     }
 
     /// Reads the manifest of a run.
@@ -732,6 +764,11 @@ mod tests {
         fs::create_dir_all(&path).unwrap();
         fs::write(path.join("thesis.txt"), "years of work").unwrap();
         assert!(message(create(&path, true)).contains("not a run"));
+        // Files that are called like those of a run do not make one.
+        fs::write(path.join(SETTINGS), Settings::preset("smoke").unwrap().to_toml()).unwrap();
+        fs::write(path.join(sums::FILE), "").unwrap();
+        fs::write(path.join(MANIFEST), "program = \"another 1.0\"\ncommand = \"build\"\n").unwrap();
+        assert!(message(create(&path, true)).contains("not a run"));
         assert!(path.join("thesis.txt").exists());
         fs::remove_dir_all(path).unwrap();
     }
@@ -750,12 +787,12 @@ mod tests {
             checkpoint.save(&path.join(folder)).unwrap();
             sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
         };
-        for folder in ["round-00", "round-01", "round-10"] {
+        for folder in ["round-00", "round-01", "round-99", "round-100"] {
             save(folder);
         }
-        save("round-10-critic"); // trained beside the network
-        fs::create_dir_all(path.join("round-11")).unwrap(); // collected, not trained yet
-        assert_eq!(policy_folder(&path).unwrap(), path.join("round-10"));
+        save("round-100-critic"); // trained beside the network
+        fs::create_dir_all(path.join("round-101")).unwrap(); // collected, not trained yet
+        assert_eq!(policy_folder(&path).unwrap(), path.join("round-100"), "of 101 rounds the last but one drove");
         assert_eq!(policy_folder(&path.join("bc")).unwrap(), path.join("round-00"));
         save("final");
         assert_eq!(policy_folder(&path).unwrap(), path.join("final"));

@@ -2,12 +2,14 @@
 
 use crate::markdown::with_header;
 use comfy_table::Table;
-use evaluation::format::exact_rate;
+use evaluation::format::quoted_rate;
+use evaluation::judge::DriverEstimate;
 use evaluation::results::EvaluationResults;
 use evaluation::slices::Slice;
 use evaluation::totals::Totals;
 use experiment::run_dir::RunDir;
 use serde::Serialize;
+use sim::seed::RootSeed;
 
 /// One driver on one kind of lot.
 #[derive(Debug, Clone, Serialize)]
@@ -26,14 +28,16 @@ pub struct Row {
     pub stuck: u32,
     /// Least clearance, metres; below 0 the body overlapped something.
     pub least_clearance_m: Option<f32>,
+    /// Near-collisions per 100 m with the interval that may be quoted.
+    #[serde(skip)]
+    quoted: String,
 }
 
-/// The rows of an evaluation at its first noise level, kind by kind, driver by driver.
-pub fn rows(results: &EvaluationResults, drivers: &[&str]) -> Vec<Row> {
-    let slices = results.slices();
-    let row = |slice: &Slice, driver: usize| {
-        let Totals { reference_m, near_collisions, contacts, stuck, clearance_min_m, .. } =
-            results.totals(0, driver, slice, None);
+/// The rows of an evaluation at its first noise level, kind by kind, driver by driver; `seed` is that of its trials.
+pub fn rows(results: &EvaluationResults, drivers: &[&str], seed: RootSeed) -> Vec<Row> {
+    let row = |slice: &Slice, driver: usize, estimate: &DriverEstimate| {
+        let totals = results.totals(0, driver, slice, None);
+        let Totals { reference_m, near_collisions, contacts, stuck, clearance_min_m, .. } = totals;
         Row {
             lots: slice.label.clone(),
             driver: drivers[driver].to_owned(),
@@ -42,13 +46,14 @@ pub fn rows(results: &EvaluationResults, drivers: &[&str]) -> Vec<Row> {
             contacts,
             stuck,
             least_clearance_m: clearance_min_m,
+            quoted: quoted_rate(&totals, estimate),
         }
     };
-    slices
-        .iter()
-        .flat_map(|slice| (0..drivers.len()).map(move |driver| (slice, driver)))
-        .map(|(s, d)| row(s, d))
-        .collect()
+    let of_slice = |slice: Slice| {
+        let (estimates, _) = results.judge(0, &slice, 0, seed);
+        estimates.iter().enumerate().map(|(driver, estimate)| row(&slice, driver, estimate)).collect::<Vec<_>>()
+    };
+    results.slices().into_iter().flat_map(of_slice).collect()
 }
 
 /// Writes `elsewhere.md`; returns its text.
@@ -73,7 +78,7 @@ fn table(rows: &[Row], drivers: &[&str]) -> Table {
             let least = row.least_clearance_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2}"));
             format!("{} ({}; {least})", row.near_collisions, row.contacts)
         }));
-        cells.extend(of_lots.last().map(|row| exact_rate(row.near_collisions, row.route_m)));
+        cells.extend(of_lots.last().map(|row| row.quoted.clone()));
         table.add_row(cells);
     }
     table

@@ -11,7 +11,7 @@ use crate::table1::{AGREEMENT, READ_ETA_HAT};
 use crate::trainings;
 use evaluation::calibration::AxisCalibration;
 use evaluation::conclusions::{self, Against, BC, DAGGER, Driven, Statement, Verdict};
-use evaluation::format::{difference, exact_rate, quoted_rate};
+use evaluation::format::{difference, exact_rate, quoted_interval, quoted_rate};
 use evaluation::on_policy::{Calibration, Effect, OnPolicy, States};
 use evaluation::paper::{self, PaperLot};
 use evaluation::slices::Slice;
@@ -148,9 +148,11 @@ fn headline(page: &mut Page, reference: &Driven<'_>, unseen: &Driven<'_>) {
     for (driven, label) in [(reference, "the paper's three"), (unseen, "unseen, generated")] {
         let slice = driven.all();
         let judged = driven.judge_trainings(&slice);
+        let (estimates, _) = driven.results.judge(0, &slice, 0, driven.plan.settings.evaluation.seed);
         for name in ["expert", DAGGER, BC, "tentacle, tuned"] {
             let Some(driver) = driven.driver(name) else { continue };
-            table.add_row(trainings::headline_row(driven, &slice, driver, label, judged.as_ref()));
+            let judged = (estimates.as_slice(), judged.as_ref());
+            table.add_row(trainings::headline_row(driven, &slice, driver, label, judged));
         }
     }
     page.section(
@@ -205,8 +207,9 @@ fn statements(
 ) -> Vec<Statement> {
     let mut statements = conclusions::on_reference_lots(reference);
     statements.push(conclusions::share_of_the_network(weighted, eta));
-    statements
-        .extend(effect.iter().map(|effect| conclusions::effect_of_the_weight(effect.iteration, effect.held_back)));
+    statements.extend(effect.iter().map(|Effect { iteration, held_back, held_back_by_seed, .. }| {
+        conclusions::effect_of_the_weight(*iteration, *held_back, held_back_by_seed)
+    }));
     let unseen_lots =
         reference.unseen().and_then(|it| reference.against_dagger(it, "on the lots it was not trained on"));
     let generated = unseen.against_dagger(unseen.all(), "on unseen generated lots");
@@ -254,7 +257,7 @@ fn verdicts(statements: &[Statement], extent: &Extent) -> String {
     if extent.seeds >= TRAININGS_MIN as u64 {
         text += "\nWhere several counts are named, they are of trainings that differ by their seed: their means are compared, \
                  with an interval for other trials or lots and other seeds, and none of them may have a near-collision where \
-                 there should be none. Everything else is of the first training.\n";
+                 there should be none. So is the weight on τ̂, by pairs of trainings. Everything else is of the first training.\n";
     }
     for verdict in [Verdict::Holds, Verdict::DoesNotHold, Verdict::CannotBeTold] {
         let found: Vec<&Statement> = statements.iter().filter(|statement| statement.verdict == verdict).collect();
@@ -419,9 +422,9 @@ fn bars_beside_paper(
 /// A row per driver, its lots together.
 fn rates_of_all(driven: &Driven<'_>) -> String {
     let slice = driven.all();
+    let (estimates, _) = driven.results.judge(0, &slice, 0, driven.plan.settings.evaluation.seed);
     let row = |(driver, entry): (usize, &NamedDriver)| {
         let totals = driven.results.totals(0, driver, &slice, None);
-        let rate = totals.rate();
         let name = entry.name.clone();
         let group = match name.as_str() {
             "expert" => 0,
@@ -429,7 +432,8 @@ fn rates_of_all(driven: &Driven<'_>) -> String {
             name if name.ends_with("tuned") => 3,
             _ => 2,
         };
-        RateRow { name, per_100m: rate.per_unit, interval: [rate.lower, rate.upper], group }
+        let interval = quoted_interval(&totals, &estimates[driver]);
+        RateRow { name, per_100m: totals.rate().per_unit, interval, group }
     };
     let rows: Vec<RateRow> = driven.plan.drivers.iter().enumerate().map(row).collect();
     plots::rates(&format!("Near-collisions, {}", slice.label), &rows)
@@ -488,6 +492,7 @@ fn decision_rules(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::R
         "safe ratio",
     ]);
     let slice = driven.all();
+    let (estimates, _) = driven.results.judge(0, &slice, 0, driven.plan.settings.evaluation.seed);
     let chains = [Chain::Weighted, Chain::AnyBelow, Chain::TauOnly];
     for (driver, chain) in chains.into_iter().enumerate() {
         let rows = rows_of(root, chain, seed)?;
@@ -499,7 +504,7 @@ fn decision_rules(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::R
             cell(|row| Some(row.samples.to_string())),
             cell(|row| row.eta_hat.map(|eta| format!("{eta:.3}"))),
             cell(|row| Some(row.near_collisions.to_string())),
-            format!("{}: {}", totals.near_collisions, exact_rate(totals.near_collisions, totals.reference_m)),
+            format!("{}: {}", totals.near_collisions, quoted_rate(&totals, &estimates[driver])),
             format!("{:.3}", totals.safe_ratio()),
         ]);
     }

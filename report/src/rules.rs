@@ -80,9 +80,12 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
     let titles = std::iter::once(rules::CLONED).chain(extent.rules.iter().map(|rule| rules::title(rule)));
     let mut pooled: Vec<Row> = titles.map(|title| pool(&rows, title)).collect();
     // Networks that drove the same lots are no independent evidence: the metres are those of one.
-    let drivers = |title: &str| (0..rows.len()).filter(|&driver| rows[driver].rule == title).collect();
-    let teams: Vec<Team> =
-        pooled.iter().map(|row| Team { name: row.rule.clone(), drivers: drivers(&row.rule) }).collect();
+    let team = |title: &str| {
+        let drivers: Vec<usize> = (0..rows.len()).filter(|&driver| rows[driver].rule == title).collect();
+        let seeds = drivers.iter().filter_map(|&driver| rows[driver].seed).collect();
+        Team { name: title.to_owned(), drivers, seeds }
+    };
+    let teams: Vec<Team> = pooled.iter().map(|row| team(&row.rule)).collect();
     let of_teams = results.judge_teams(0, &everywhere, &teams, 0, seed_of_trials);
     for (at, row) in pooled.iter_mut().enumerate() {
         let judged = of_teams.as_ref().map(|estimates| estimates[at].per_100m);

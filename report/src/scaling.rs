@@ -14,7 +14,7 @@ use experiment::lots::Lot;
 use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
 use serde::Serialize;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What was trained on so many lots, on lots of one kind or on all of them.
 #[derive(Debug, Clone, Serialize)]
@@ -70,7 +70,10 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
     let drive = DriveStage::load(stages.last().context("the last stage drives")?)?;
     let results = EvaluationResults::read(&drive.plan(), &run.path().join(scaling::DRIVES))?;
     let kinds = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
-    let kinds: BTreeSet<String> = kinds.iter().filter(|lot| lot.is_generated()).map(Lot::group).collect();
+    let mut of_kind: BTreeMap<String, usize> = BTreeMap::new();
+    for lot in kinds.iter().filter(|lot| lot.is_generated()) {
+        *of_kind.entry(lot.group()).or_default() += 1;
+    }
     let judge = |slice| {
         let (estimates, _) = results.judge(0, &slice, 0, drive.settings().evaluation.seed);
         (slice, estimates)
@@ -81,13 +84,21 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
         let folder = run.path().join(scaling::folder(different));
         let table1 = Table1::read(&folder)?.with_context(|| format!("{}: no table1.json", folder.display()))?;
         let samples = [table1.rows.first(), table1.rows.last()].map(|row| row.map_or(0, |row| row.dataset));
+        // A round drives no more lots of a kind than are listed.
+        let met = |rounds: usize| of_kind.values().map(|&listed| (different as usize).min(rounds * listed)).sum();
+        let lots_met = [met(1), met(table1.rows.len())];
         for (part, method) in ["BC", "DAgger"].into_iter().enumerate() {
+            // Behaviour cloning has one round: it may be the same network again.
+            let is_known = |row: &Row| row.method == method && row.different_lots == lots_met[part];
+            if rows.iter().any(is_known) {
+                continue;
+            }
             for (slice, estimates) in &judged {
                 let totals = results.totals(0, 2 * at + part, slice, None);
                 let estimate = &estimates[2 * at + part];
                 let [lower, upper] = quoted_interval(&totals, estimate);
                 rows.push(Row {
-                    different_lots: different as usize * kinds.len(),
+                    different_lots: lots_met[part],
                     method,
                     samples: samples[part],
                     lots: slice.label.clone(),
@@ -107,13 +118,14 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
 
 fn plot(rows: &[&Row]) -> String {
     let of = |method: &'static str| rows.iter().filter(move |row| row.method == method);
-    let counts: Vec<String> = of("BC").map(|row| row.different_lots.to_string()).collect();
-    let series = ["BC", "DAgger"].map(|method| RateSeries {
-        name: method.to_owned(),
-        points: of(method)
-            .enumerate()
-            .map(|(x, row)| RatePoint { x: x as f64, per_100m: row.per_100m, interval: [row.lower, row.upper] })
-            .collect(),
-    });
+    let counts: BTreeSet<usize> = rows.iter().map(|row| row.different_lots).collect();
+    let point = |row: &Row| RatePoint {
+        x: counts.range(..row.different_lots).count() as f64,
+        per_100m: row.per_100m,
+        interval: [row.lower, row.upper],
+    };
+    let series = ["BC", "DAgger"]
+        .map(|method| RateSeries { name: method.to_owned(), points: of(method).map(|row| point(row)).collect() });
+    let counts: Vec<String> = counts.iter().map(ToString::to_string).collect();
     plots::rates_against_lots("Near-collisions on unseen lots", &counts, &series)
 }

@@ -43,8 +43,8 @@ pub fn to_markdown(summary: &Summary<'_>) -> String {
             let table = trainings_table(summary, level);
             let _ = write!(
                 text,
-                "Trainings that differ by their seeds, as one; intervals are for other lots and other seeds (Δ: others − \
-                 {with}), noise {noise}\n\n{table}\n\n"
+                "Trainings that differ by their seeds, as one; intervals are for other lots and, where there are several, \
+                 other seeds (Δ: others − {with}), noise {noise}\n\n{table}\n\n"
             );
         }
         if let Some(table) = causes_table(summary, level) {
@@ -247,7 +247,9 @@ fn sweep_table(summary: &Summary<'_>) -> Table {
         for slice in summary.results.slices() {
             let rate = |level| {
                 let totals = summary.results.totals(level, driver, &slice, None);
-                if totals.runs == 0 { "–".to_owned() } else { exact_rate(totals.near_collisions, totals.reference_m) }
+                let judged = summary.at_level(level).find(|judged| judged.slice == slice);
+                let of_driven = judged.filter(|_| totals.runs > 0);
+                of_driven.map_or_else(|| "–".to_owned(), |judged| quoted_rate(&totals, &judged.estimates[driver]))
             };
             let mut row = vec![summary.driver(driver).to_owned(), slice.label.clone()];
             row.extend((0..summary.levels().len()).map(rate));

@@ -3,7 +3,8 @@
 use crate::drive::rows_of;
 use crate::markdown::table_of;
 use evaluation::conclusions::{BC, DAGGER, Driven};
-use evaluation::format::{exact_rate, interval};
+use evaluation::format::{interval, quoted_rate};
+use evaluation::judge::DriverEstimate;
 use evaluation::slices::Slice;
 use evaluation::stages::{self, Chain, Extent, UNWEIGHTED, named};
 use evaluation::statistics::bootstrap::Interval;
@@ -36,13 +37,14 @@ fn list(each: &[Totals], count: fn(&Totals) -> u32) -> String {
     each.iter().map(|totals| count(totals).to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// Near-collisions, contacts and least clearance of a driver, of all its trainings where there are several.
+/// Near-collisions, contacts and least clearance of a driver, of all its trainings where there are several. `estimates` are
+/// of every driver in the slice.
 pub(crate) fn headline_row(
     driven: &Driven<'_>,
     slice: &Slice,
     driver: usize,
     lots: &str,
-    judged: Option<&JudgedTeams>,
+    (estimates, judged): (&[DriverEstimate], Option<&JudgedTeams>),
 ) -> [String; 7] {
     let of_team = judged.and_then(|judged| judged.of(driver)).filter(|(team, _)| team.drivers.len() > 1);
     let drivers = of_team.map_or(std::slice::from_ref(&driver), |(team, _)| &team.drivers);
@@ -60,11 +62,28 @@ pub(crate) fn headline_row(
             Some((_, estimate)) if each.iter().any(|totals| totals.near_collisions > 0) => {
                 interval(estimate.per_100m, 2)
             }
-            _ => exact_rate(each[0].near_collisions, reference_m),
+            _ => quoted_rate(&each[0], &estimates[driver]),
         },
         list(&each, |totals| totals.contacts),
         clearance_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2} m")),
     ]
+}
+
+/// Lots that every training drove, and how all drivers stand there; `None` where there are none.
+struct Place<'a> {
+    lots: &'static str,
+    driven: &'a Driven<'a>,
+    judged: Option<(Slice, Vec<DriverEstimate>)>,
+}
+
+impl<'a> Place<'a> {
+    fn new(lots: &'static str, driven: &'a Driven<'a>, slice: Option<Slice>) -> Self {
+        let judged = slice.map(|slice| {
+            let (estimates, _) = driven.results.judge(0, &slice, 0, driven.plan.settings.evaluation.seed);
+            (slice, estimates)
+        });
+        Self { lots, driven, judged }
+    }
 }
 
 /// Every training by itself, then the means over the seeds.
@@ -75,16 +94,21 @@ pub(crate) fn by_seed(
     reference: &Driven<'_>,
     unseen: &Driven<'_>,
 ) -> anyhow::Result<String> {
+    let places = [
+        Place::new("the paper's", reference, Some(reference.all())),
+        Place::new("of them not trained on", reference, reference.unseen()),
+        Place::new("unseen, generated", unseen, Some(unseen.all())),
+    ];
     let mut table =
         table_of(&["policy", "seed", "η̂", "the paper's lots", "of them not trained on", "unseen generated lots"]);
     for (base, chain) in [(BC, None), (DAGGER, Some(Chain::Weighted)), (UNWEIGHTED, Some(Chain::Unweighted))] {
         for seed in stages::seeds(settings, extent) {
             let name = named(base, seed, settings);
-            let cell = |driven: &Driven<'_>, slice: Option<Slice>| {
-                let found = driven.driver(&name).zip(slice);
-                found.map_or_else(String::new, |(driver, slice)| {
-                    let totals = driven.results.totals(0, driver, &slice, None);
-                    format!("{}: {}", totals.near_collisions, exact_rate(totals.near_collisions, totals.reference_m))
+            let cell = |Place { driven, judged, .. }: &Place<'_>| {
+                let found = driven.driver(&name).zip(judged.as_ref());
+                found.map_or_else(String::new, |(driver, (slice, estimates))| {
+                    let totals = driven.results.totals(0, driver, slice, None);
+                    format!("{}: {}", totals.near_collisions, quoted_rate(&totals, &estimates[driver]))
                 })
             };
             let rows = chain.map_or_else(|| Ok(Vec::new()), |chain| rows_of(root, chain, seed))?;
@@ -93,22 +117,18 @@ pub(crate) fn by_seed(
                 base.to_owned(),
                 seed.0.to_string(),
                 shares.collect::<Vec<_>>().join(", "),
-                cell(reference, Some(reference.all())),
-                cell(reference, reference.unseen()),
-                cell(unseen, Some(unseen.all())),
+                cell(&places[0]),
+                cell(&places[1]),
+                cell(&places[2]),
             ]);
         }
     }
     let mut over_seeds = table_of(&HEADER);
-    for (driven, slice, lots) in [
-        (reference, Some(reference.all()), "the paper's"),
-        (reference, reference.unseen(), "of them not trained on"),
-        (unseen, Some(unseen.all()), "unseen, generated"),
-    ] {
-        let Some(slice) = slice else { continue };
-        let judged = driven.judge_trainings(&slice);
+    for Place { lots, driven, judged } in &places {
+        let Some((slice, _)) = judged else { continue };
+        let judged = driven.judge_trainings(slice);
         for (team, estimate) in judged.iter().flat_map(|judged| &judged.teams) {
-            let totals = |&driver: &usize| driven.results.totals(0, driver, &slice, None);
+            let totals = |&driver: &usize| driven.results.totals(0, driver, slice, None);
             let each: Vec<Totals> = team.drivers.iter().map(totals).collect();
             over_seeds.add_row(row(team, lots, &each, estimate, team.name != DAGGER));
         }
@@ -149,7 +169,7 @@ mod tests {
         let driver = |name: &str| NamedDriver::expert(&settings.expert).renamed(name);
         let trained = |seed: u64| {
             let mut driver = driver(&named(DAGGER, RootSeed(seed), &settings));
-            driver.training = Some(Training { recipe: DAGGER.to_owned(), seed: RootSeed(seed) });
+            driver.training = Some(Training { recipe: DAGGER.to_owned(), seed: RootSeed(seed), lots: Vec::new() });
             driver
         };
         let drivers = [driver("expert"), trained(1), trained(2), trained(3)];
@@ -172,7 +192,8 @@ mod tests {
         let driven = Driven { plan: &plan, results: &results };
         let slice = driven.all();
         let judged = driven.judge_trainings(&slice);
-        let row = |driver| headline_row(&driven, &slice, driver, "lots", judged.as_ref());
+        let (estimates, _) = driven.results.judge(0, &slice, 0, RootSeed(1));
+        let row = |driver| headline_row(&driven, &slice, driver, "lots", (&estimates, judged.as_ref()));
         let expected =
             ["DAgger, 3 trainings", "lots", "3000 m", "30, 60, 90", "2.00 [0.00, 4.48]", "0, 0, 0", "0.70 m"];
         assert_eq!(row(1), expected);

@@ -3,10 +3,12 @@
 use crate::error::FileError;
 use crate::sums::digest;
 use crate::whole;
-use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 
+/// The largest that is kept, bytes: the weights of the largest network with what the optimiser knows of them, four times
+/// 256 MB, and room.
+const BYTES_MAX: u64 = 2_000_000_000;
 const REMEDY: &str = "delete it to begin this piece of work again";
 
 /// The first line: a comment in TOML.
@@ -25,9 +27,9 @@ pub fn write(path: &Path, content: &[u8]) -> Result<(), FileError> {
 /// Reads a file; `None` if there is none.
 ///
 /// # Errors
-/// If it cannot be read, or is not what was written.
+/// If it cannot be read, is no regular file or too large, or is not what was written.
 pub fn read(path: &Path) -> Result<Option<Vec<u8>>, FileError> {
-    let mut bytes = match fs::read(path) {
+    let mut bytes = match crate::read::bytes(path, BYTES_MAX) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(FileError::unreadable(path, &error, REMEDY)),
@@ -43,6 +45,7 @@ pub fn read(path: &Path) -> Result<Option<Vec<u8>>, FileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn damage_is_noticed_and_absence_is_no_damage() {

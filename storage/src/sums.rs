@@ -390,7 +390,10 @@ fn verify_into(folder: &Path, verified: &mut Verified) {
 
 /// What is there and not listed, in a folder or in folders within it that have no list of their own.
 fn look_for_others(folder: &Path, prefix: &str, sums: &Sums, verified: &mut Verified) {
-    let Ok(entries) = fs::read_dir(folder) else { return };
+    let entries = match fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) => return verified.faults.push(unreadable(folder, &error)),
+    };
     let mut entries: Vec<_> = entries.flatten().collect();
     entries.sort_by_key(fs::DirEntry::file_name);
     for entry in entries {

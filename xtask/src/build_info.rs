@@ -1,6 +1,8 @@
 //! Which program this is, for the manifest of every run.
 
-use experiment::run_dir::Build;
+use crate::output::Output;
+use anyhow::ensure;
+use experiment::run_dir::{Build, Manifest};
 use serde::Deserialize;
 use std::path::Path;
 use std::process::Command;
@@ -25,6 +27,31 @@ pub(crate) fn get() -> &'static Build {
             libraries: libraries(),
         }
     })
+}
+
+/// Whether this program may go on with a run: results of two versions would stand under the name of one. Another commit of
+/// the same version, which may differ in nothing but its documents, is said.
+///
+/// # Errors
+/// If the run was begun by another version, or with other libraries.
+pub(crate) fn check_can_go_on(run: &Path, manifest: &Manifest, output: &Output) -> anyhow::Result<()> {
+    let Build { program, libraries, git_revision, .. } = get();
+    ensure!(
+        manifest.program == *program && manifest.libraries == *libraries,
+        "{0}: begun with another version of lotpilot ({1}; {0}/manifest.toml lists its libraries); go on with that one, or \
+         begin again into another folder",
+        run.display(),
+        manifest.program
+    );
+    if let (Some(begun), Some(now)) = (&manifest.git_revision, git_revision)
+        && begun != now
+    {
+        output.note(format_args!(
+            "{}: begun at commit {begun}, which its manifest names; this program lies at commit {now}",
+            run.display()
+        ));
+    }
+    Ok(())
 }
 
 /// The libraries whose arithmetic results depend on, in every version that was linked.

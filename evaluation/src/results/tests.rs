@@ -167,7 +167,12 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     // Everywhere: 0, 0 and 3 events by seed; the other team has one more of each; the last driver 2.
     let events = [0, 0, 3, 1, 1, 4, 2];
     let results = results(7, |driver, _| Some(report(events[driver], 100.0, 0.5)));
-    let team = |drivers: &[usize]| Team { name: String::new(), drivers: drivers.to_vec() };
+    let of_seeds = |drivers: &[usize], seeds: &[u64]| Team {
+        name: String::new(),
+        drivers: drivers.to_vec(),
+        seeds: seeds.to_vec(),
+    };
+    let team = |drivers: &[usize]| of_seeds(drivers, &[1, 2, 3, 4, 5][..drivers.len()]);
     let teams = [team(&[0, 1, 2]), team(&[3, 4, 5]), team(&[6])];
     let slice = slice(&results, "all");
     let found = results.judge_teams(0, &slice, &teams, 0, RootSeed(1)).unwrap();
@@ -179,6 +184,11 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     assert_eq!(rounded(found[1].difference_per_100m), [1.0, 1.0, 1.0], "trainings of a seed are compared");
     assert_eq!(rounded(found[2].per_100m), [2.0, 2.0, 2.0]);
     assert_eq!(rounded(found[2].difference_per_100m), [-3.302_652_73, 1.0, 5.302_652_73], "the other's seeds vary");
+    // Seeds 2 to 4 are no pairs of seeds 1 to 3: both means are uncertain by 3 · 4.3027 · 1/√3 / √3.
+    let others = [team(&[0, 1, 2]), of_seeds(&[3, 4, 5], &[2, 3, 4])];
+    let apart = results.judge_teams(0, &slice, &others, 0, RootSeed(1)).unwrap()[1].difference_per_100m;
+    let half_width = together(4.302_652_73, 4.302_652_73);
+    assert!((apart.upper - 1.0 - half_width).abs() < 1e-7, "{apart:?}");
     // No draw of lots without events has any; the metres say what that supports.
     let none = results.judge_teams(0, &slice, &[team(&[0, 1])], 0, RootSeed(1)).unwrap()[0].per_100m;
     let metres = results.totals(0, 0, &slice, None).reference_m;

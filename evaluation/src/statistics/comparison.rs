@@ -1,5 +1,6 @@
 //! Two rates compared exactly, as if every event were independent of the others.
 
+use super::bootstrap::Interval;
 use super::poisson::CONFIDENCE;
 use serde::Serialize;
 use statrs::distribution::{Beta, Binomial, ContinuousCDF as _, Discrete as _};
@@ -57,6 +58,22 @@ impl RateRatio {
             p_value: binomial_test(events_1, both, exposure_1 / (exposure_1 + exposure_2)),
         }
     }
+}
+
+/// The interval of a rate over another, from the intervals of both, where events of the first cluster. The second is a rate
+/// and its interval, whose upper end must be less than twice the rate.
+///
+/// Source: Donner and Zou, Closed-form confidence intervals for functions of the normal mean and standard deviation,
+/// Statistical Methods in Medical Research 21 (2012).
+pub fn ratio_of_intervals(first: Interval, (second, [second_lower, second_upper]): (f64, [f64; 2])) -> [f64; 2] {
+    let Interval { estimate, lower, upper, .. } = first;
+    let both = estimate * second;
+    let end = |first_end: f64, second_end: f64, sign: f64| {
+        let below = second_end * (2.0 * second - second_end);
+        let under_root = both * both - first_end * (2.0 * estimate - first_end) * below;
+        (both + sign * under_root.max(0.0).sqrt()) / below
+    };
+    [end(lower, second_upper, -1.0), end(upper, second_lower, 1.0)]
 }
 
 /// p-values adjusted for their number, in their order.
@@ -127,6 +144,24 @@ mod tests {
         assert_near(found.p_value, 0.079_67, 5e-6);
         assert_near(found.lower, 0.858_426_4, 5e-7);
         assert_near(found.upper.unwrap(), 4.277_265_9, 5e-7);
+    }
+
+    /// A rate that is known makes the ratio as uncertain as the other is; where both are not, by hand.
+    #[test]
+    fn intervals_of_two_rates_make_that_of_their_ratio() {
+        let first = Interval { estimate: 4.0, lower: 4.0, upper: 4.0, units: 1 };
+        let [lower, upper] = ratio_of_intervals(first, (2.0, [1.6, 2.5]));
+        assert_near(lower, 4.0 / 2.5, 1e-12);
+        assert_near(upper, 4.0 / 1.6, 1e-12);
+        let [lower, upper] = ratio_of_intervals(Interval { lower: 3.0, upper: 6.0, ..first }, (2.0, [2.0, 2.0]));
+        assert_near(lower, 1.5, 1e-12);
+        assert_near(upper, 3.0, 1e-12);
+        // (8 − √(64 − 3·5·2.5·1.5)) / 3.75 and (8 + √(64 − 6·2·1.6·2.4)) / 3.84
+        let [lower, upper] = ratio_of_intervals(Interval { lower: 3.0, upper: 6.0, ..first }, (2.0, [1.6, 2.5]));
+        assert_near(lower, (8.0 - 7.75_f64.sqrt()) / 3.75, 1e-12);
+        assert_near(upper, (8.0 + 17.92_f64.sqrt()) / 3.84, 1e-12);
+        let none = Interval { estimate: 0.0, lower: 0.0, upper: 0.5, units: 1 };
+        assert_near(ratio_of_intervals(none, (2.0, [1.6, 2.5]))[0], 0.0, 1e-12);
     }
 
     #[test]

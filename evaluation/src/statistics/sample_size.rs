@@ -7,6 +7,9 @@ use statrs::distribution::{Binomial, ContinuousCDF as _, Discrete as _, Discrete
 /// within a per cent.
 const EXACT_UP_TO: f64 = 3000.0;
 
+/// Where the search for the length of a drive begins, hundreds of metres.
+const SHORTEST: f64 = 0.01;
+
 /// Metres without an event that show, one-sided, a rate below `per_100m` (docs/methods.md 8.3: 0.1 → 3 km at 95 %).
 pub fn to_bound(per_100m: f64, confidence: f64) -> f64 {
     100.0 * poisson::upper_bound(0, confidence) / per_100m
@@ -35,7 +38,8 @@ impl Question {
         } else {
             let enough =
                 |hundred_metres: f64| power([a * hundred_metres, b * hundred_metres], self.alpha) >= self.power;
-            let (mut low, mut high) = (0.0, approximate);
+            // Where little power is asked for, the approximation may be no metre at all.
+            let (mut low, mut high) = (0.0, approximate.max(SHORTEST));
             while !enough(high) {
                 (low, high) = (high, 2.0 * high);
             }
@@ -118,6 +122,13 @@ mod tests {
         assert!((power([6.0, 0.0], 0.05) - 0.5543).abs() < 5e-5);
         assert_eq!(power([0.0, 0.0], 0.05), 0.0);
         assert!(power([50.0, 50.0], 0.05) <= 0.05, "an exact test keeps its level");
+    }
+
+    /// Here the approximation is no metre at all, and twice nothing is nothing: the search never ended.
+    #[test]
+    fn less_power_than_chance_is_answered() {
+        let question = Question { per_100m: [1.0, 2.0], power: 0.25, alpha: 0.5, dispersion: 1.0 };
+        assert!((0.0..1000.0).contains(&question.metres_each()), "{}", question.metres_each());
     }
 
     #[test]

@@ -26,6 +26,13 @@ impl Settings {
         ] {
             ensure!(!lots.is_empty(), "{section}.lots is empty; name at least one lot (cargo xtask lots)");
             ensure!(!directions.is_empty(), "{section}.directions is empty; name \"forward\", \"reverse\" or both");
+            for (i, direction) in directions.iter().enumerate() {
+                ensure!(
+                    !directions[..i].contains(direction),
+                    "{section}.directions names {} twice; the same drive again is no further one",
+                    direction.name()
+                );
+            }
         }
         let noise = &self.evaluation.noise;
         ensure!(

@@ -1,6 +1,7 @@
 //! `evaluate`: drivers × lots × directions × trials × noise levels.
 
 use crate::args::{Directions, JsonArgs, LayerArgs, OutArgs, noise_levels};
+use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
 use crate::notes;
@@ -79,7 +80,8 @@ pub(crate) struct EvaluateArgs {
         long,
         value_name = "DIR",
         conflicts_with_all = [
-            "drivers", "lots", "trials", "directions", "noise", "compare_with", "seed", "shard", "preset", "config", "overrides", "out"
+            "drivers", "lots", "trials", "directions", "noise", "compare_with", "seed", "shard", "preset", "config", "overrides", "out",
+            "smoothing"
         ]
     )]
     resume: Option<PathBuf>,
@@ -101,6 +103,7 @@ pub(crate) struct Asked {
 pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, mut asked, begun) = if let Some(path) = &args.resume {
         let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
+        build_info::check_can_go_on(path, &manifest, output)?;
         let asked: Asked = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
         (settings, asked, Ok((run, manifest)))
     } else {
@@ -121,6 +124,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: asked.compare_with, shard };
     check(&plan)?;
     let inputs = inputs::of(&lots, &drivers);
+    args.out.ensure_apart_from(&inputs::places(&lots, &drivers))?;
     let run = match begun {
         Ok((run, manifest)) => {
             manifest.check_inputs(&inputs)?;

@@ -2,6 +2,7 @@
 
 use super::{train, within};
 use crate::args::OutArgs;
+use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
 use crate::output::Output;
@@ -74,7 +75,8 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     let driving = record.place.iter().map(|place| estimate::evaluation(&place.settings(&settings), 1));
     console.plan(estimate::training(&settings, true).into_iter().chain(driving).collect());
     let run = if let Some(path) = &args.resume {
-        let (run, begun_with, _) = RunDir::resume(path, COMMAND)?;
+        let (run, begun_with, manifest) = RunDir::resume(path, COMMAND)?;
+        build_info::check_can_go_on(path, &manifest, output)?;
         ensure!(begun_with == settings, "{}: the default settings have changed since; begin anew", path.display());
         run
     } else {

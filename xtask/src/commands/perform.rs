@@ -96,8 +96,8 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
             evaluate::drive(&drive.plan(), &run, console)?;
             run.finish(outcome_of(drivers))?;
         }
-        Step::OnPolicy => {
-            if !on_policy::run(settings, root.path(), &run, console)? {
+        Step::OnPolicy { seeds } => {
+            if !on_policy::run(settings, seeds, root.path(), &run, console)? {
                 return Ok(false);
             }
             run.finish(Outcome::Evaluation { drivers: Vec::new() })?;

@@ -414,7 +414,7 @@ fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyh
         folder.check_file(path)?;
     }
     run_report::write(run, &Console::new(output))?;
-    owned.list_in_parents()?;
+    owned.list_again()?;
     output.print(report.display());
     if let Some((folder, path)) = copy {
         let content = storage::read::bytes(&report, RUN_TEXT_BYTES_MAX)

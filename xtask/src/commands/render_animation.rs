@@ -24,6 +24,8 @@ const AROUND_S: [f32; 2] = [8.0, 3.0];
 const SPEEDS: RangeInclusive<f32> = 0.1..=1000.0;
 /// What a README or a report may carry.
 const LIMIT_BYTES: usize = 3_000_000;
+/// Pictures that are drawn before they are put together: half a megabyte each.
+const PICTURES_MAX: u32 = 3000;
 /// Frames of a whole drive that play faster than life.
 const FRAMES_WANTED: f32 = 320.0;
 
@@ -130,7 +132,13 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
     let whole = ((to_s - from_s) * fps / FRAMES_WANTED).ceil().max(1.0);
     let speed = args.speed.unwrap_or(if ticks.is_empty() { whole } else { 1.0 });
     let step_s = speed / fps;
-    let times: Vec<f32> = (0..=((to_s - from_s) / step_s) as u32).map(|i| from_s + i as f32 * step_s).collect();
+    let count = ((to_s - from_s) / step_s) as u32;
+    ensure!(
+        count < PICTURES_MAX,
+        "this comes to {count} pictures, and at most {PICTURES_MAX} are drawn; show less with --from and --to, fewer with \
+         --fps, or faster with --speed"
+    );
+    let times: Vec<f32> = (0..=count).map(|i| from_s + i as f32 * step_s).collect();
 
     let camera = match (args.view, earliest_s) {
         (Some(ViewChoice::Follow), _) => Camera::Follow,

@@ -78,9 +78,9 @@ const SEEDS_FULL: u64 = 5;
 
 pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
     let (run, settings, Arguments { extent, shard }) = match args {
-        ReproduceArgs { resume: Some(path), .. } => resume(path)?,
+        ReproduceArgs { resume: Some(path), .. } => resume(path, output)?,
         ReproduceArgs { networks: Some(networks), .. } => begin_drives(args, networks)?,
-        _ => begin(args)?,
+        _ => begin(args, output)?,
     };
     let Some(record) = shard else { return finish(&run, settings, extent, output) };
     let root = record.networks.as_deref().unwrap_or(run.path());
@@ -130,7 +130,7 @@ impl Arguments {
     }
 }
 
-fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Arguments)> {
+fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Settings, Arguments)> {
     let layers = Layers::from(&args.layers);
     let mut settings = Settings::resolve(&layers, args.seed)?;
     let is_smoke = layers.preset_name() == "smoke";
@@ -150,18 +150,10 @@ fn begin(args: &ReproduceArgs) -> anyhow::Result<(RunDir, Settings, Arguments)> 
         tuned: tuned(args.tuned.as_deref())?,
     };
     // Before the folder is claimed: a misspelt lot should not leave one behind.
-    for lots in [&settings.training.lots, &settings.evaluation.lots, &extent.unseen] {
-        Lot::parse_all(lots, &settings.episode.vehicle)?;
-    }
-    let trained_on = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
-    for lot in Lot::parse_all(&extent.unseen, &settings.episode.vehicle)? {
-        let is_unseen = !lot.is_for_training() && trained_on.iter().all(|known| known.name() != lot.name());
-        ensure!(
-            is_unseen,
-            "--unseen {}: drivers are trained or tuned on it; name others, e.g. sealed:PHRASE:24:all",
-            lot.name()
-        );
-    }
+    train::check_lots(&settings, output)?;
+    let mut places = train::check_unseen(&settings, &extent.unseen)?;
+    places.extend(args.tuned.clone());
+    args.out.ensure_apart_from(&places)?;
     ensure!(
         settings.seed.0.checked_add(extent.seeds).is_some_and(|last| i64::try_from(last).is_ok()),
         "seed {} leaves no room for {} trainings; choose a smaller one",
@@ -233,8 +225,9 @@ pub(crate) fn extent_of(path: &Path, manifest: &Manifest) -> anyhow::Result<Exte
     arguments.try_into().with_context(|| format!("{}: this is no folder of cargo xtask reproduce", path.display()))
 }
 
-fn resume(path: &Path) -> anyhow::Result<(RunDir, Settings, Arguments)> {
+fn resume(path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, Arguments)> {
     let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
+    build_info::check_can_go_on(path, &manifest, output)?;
     let arguments = Arguments::read(path, manifest.clone())?;
     let Arguments { extent, shard } = &arguments;
     let Build { program, git_revision, git_dirty, .. } = build_info::get();

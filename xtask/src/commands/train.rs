@@ -2,12 +2,13 @@
 
 use super::{evaluate, within};
 use crate::args::{JsonArgs, LayerArgs, OutArgs};
+use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
 use crate::notes;
 use crate::output::Output;
 use crate::record::{self, RecordArgs};
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use clap::Args;
 use evaluation::estimate;
 use evaluation::plan::Plan;
@@ -82,6 +83,7 @@ pub(crate) fn dagger(args: &TrainArgs, output: &Output) -> anyhow::Result<()> {
 fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&mut Settings)) -> anyhow::Result<()> {
     let (run, settings, asked) = if let Some(path) = &args.resume {
         let (run, settings, manifest) = RunDir::resume(path, command)?;
+        build_info::check_can_go_on(path, &manifest, output)?;
         manifest.check_inputs(&inputs(&settings)?)?;
         let asked: Asked = manifest.arguments.try_into().with_context(|| path.display().to_string())?;
         (run, settings, Asked { no_eval: asked.no_eval || args.no_eval })
@@ -156,7 +158,7 @@ fn check_elsewhere(
     }
     let results = within::evaluate(run, "elsewhere", &settings, drivers, progress)?;
     let names: Vec<&str> = drivers.iter().map(|driver| driver.name.as_str()).collect();
-    let rows = report::elsewhere::rows(&results, &names);
+    let rows = report::elsewhere::rows(&results, &names, settings.evaluation.seed);
     let table = report::elsewhere::write(&rows, &names, run)?;
     let noise = &settings.evaluation.noise[0];
     let text = || format!("\nElsewhere: lots that nobody trained on, noise {noise}\n\n{table}");
@@ -175,8 +177,29 @@ pub(crate) fn inputs(settings: &Settings) -> anyhow::Result<Inputs> {
     Ok(found)
 }
 
+/// Lots to judge by that policies were or may be trained or tuned on, or that cannot be driven as the settings ask; the
+/// files and folders of all lots that are read.
+pub(crate) fn check_unseen(settings: &Settings, unseen: &[String]) -> anyhow::Result<Vec<PathBuf>> {
+    let Settings { training, evaluation, episode, .. } = settings;
+    let trained_on = Lot::parse_all(&training.lots, &episode.vehicle)?;
+    let unseen = Lot::parse_all(unseen, &episode.vehicle)?;
+    for lot in &unseen {
+        // Every round takes the next ones of a kind.
+        let is_unseen = !lot.is_for_training() && trained_on.iter().all(|known| known.group() != lot.group());
+        let name = lot.name();
+        ensure!(
+            is_unseen,
+            "--unseen {name}: drivers are trained or tuned on it; name others, e.g. sealed:PHRASE:24:all"
+        );
+        let check = |&direction| lot.check_direction(direction, &episode.vehicle);
+        let flag = "--set evaluation.directions='[\"forward\"]'";
+        evaluation.directions.iter().try_for_each(check).map_err(|error| evaluate::or_forward(error, flag))?;
+    }
+    Ok(inputs::places(&[trained_on, unseen].concat(), &[]))
+}
+
 /// Lots that do not exist, or cannot be driven as the settings ask.
-fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result<()> {
+pub(crate) fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result<()> {
     let Settings { training, evaluation, episode, .. } = settings;
     let noise = std::slice::from_ref(&training.noise);
     for (section, lots, directions, noise) in [

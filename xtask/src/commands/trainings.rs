@@ -3,6 +3,7 @@
 
 use super::{perform, train};
 use crate::args::{LayerArgs, OutArgs};
+use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
@@ -75,14 +76,15 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
     ) -> anyhow::Result<()> {
         let (run, settings, extent) = if let Some(path) = &args.resume {
             let (run, settings, manifest) = RunDir::resume(path, self.command)?;
+            build_info::check_can_go_on(path, &manifest, output)?;
             let extent: E = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
             manifest.check_inputs(&self.inputs(&settings, &extent)?)?;
             (run, settings, extent)
         } else {
             let Begun { preset, settings, extent } = begin()?;
-            for lot in Lot::parse_all((self.unseen)(&extent), &settings.episode.vehicle)? {
-                ensure!(!lot.is_for_training(), "--unseen {}: policies are trained on it; name others", lot.name());
-            }
+            train::check_lots(&settings, output)?;
+            let places = train::check_unseen(&settings, (self.unseen)(&extent))?;
+            args.out.ensure_apart_from(&places)?;
             let arguments = toml::Table::try_from(&extent)?;
             let request = Request { arguments, inputs: self.inputs(&settings, &extent)? };
             let run = RunDir::create(&args.out.place(self.command, &preset, settings.seed.0), &settings, &request)?;

@@ -1,12 +1,14 @@
 //! `tune`: parameters of the model-based planners.
 
 use crate::args::{LayerArgs, OutArgs};
+use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
 use crate::output::Output;
-use anyhow::{Context as _, ensure};
+use anyhow::Context as _;
 use clap::Args;
 use evaluation::tune;
+use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::progress::Interrupted;
 use experiment::run_dir::{Outcome, Request, RunDir};
@@ -34,7 +36,7 @@ pub(crate) struct TuneArgs {
     #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "lot-a,train:4")]
     lots: Vec<String>,
     /// Candidates per planner, its own parameters included.
-    #[arg(long, value_name = "N", default_value_t = 48)]
+    #[arg(long, value_name = "N", default_value_t = 48, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     budget: u32,
     /// Trials per lot and direction that every candidate drives; the best few drive as many fresh ones again.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -70,6 +72,7 @@ struct Asked {
 pub(crate) fn run(args: &TuneArgs, output: &Output) -> anyhow::Result<()> {
     let (run, settings, asked) = if let Some(path) = &args.resume {
         let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
+        build_info::check_can_go_on(path, &manifest, output)?;
         let asked: Asked = manifest.arguments.try_into().with_context(|| path.display().to_string())?;
         (run, settings, asked)
     } else {
@@ -104,9 +107,10 @@ fn begin(args: &TuneArgs) -> anyhow::Result<(RunDir, Settings, Asked)> {
     settings.evaluation.directions = Direction::BOTH.to_vec();
     settings.evaluation.noise = vec![args.noise];
     settings.check()?;
-    ensure!(args.budget > 0, "--budget is 0; at least the starting point must be driven");
     tune::planners_named(&args.planners)?;
-    tune::check(&Lot::parse_all(&args.lots, &settings.episode.vehicle)?)?;
+    let lots = Lot::parse_all(&args.lots, &settings.episode.vehicle)?;
+    tune::check(&lots)?;
+    args.out.ensure_apart_from(&inputs::places(&lots, &[]))?;
     let asked = Asked { planners: args.planners.clone(), budget: args.budget };
     let request = Request { arguments: toml::Table::try_from(&asked)?, ..Request::default() };
     let run = RunDir::create(&args.out.place(COMMAND, layers.preset_name(), args.seed), &settings, &request)?;
