@@ -10,6 +10,7 @@ pub(crate) mod generate;
 pub(crate) mod guard;
 pub(crate) mod lots;
 pub(crate) mod merge;
+mod one_trial;
 mod perform;
 pub(crate) mod pixel_accuracy;
 pub(crate) mod render;

@@ -1,8 +1,9 @@
 //! `render`: pictures of lots, drives, samples and noise.
 
+use super::one_trial::TrialArgs;
 use super::render_animation::{self, AnimationArgs};
-use super::{evaluate, reproduce};
-use crate::args::{LayerArgs, OneDirection, noise_levels};
+use super::reproduce;
+use crate::args::LayerArgs;
 use crate::console::Console;
 use crate::output::Output;
 use crate::picture_folder::Folder;
@@ -14,7 +15,7 @@ use experiment::lots::Lot;
 use experiment::progress::Progress as _;
 use experiment::replay_key::ReplayKey;
 use experiment::run_dir::{self, Manifest, RunDir};
-use experiment::settings::{Layers, NoiseChoice, Settings};
+use experiment::settings::{NoiseChoice, Settings};
 use experiment::training;
 use experiment::trials::{Purpose, Trial};
 use policy::checkpoint::Checkpoint;
@@ -130,27 +131,14 @@ pub(crate) struct TrajectoriesArgs {
     /// Who drives, as in an evaluation; may be repeated. See `cargo xtask drivers`.
     #[arg(long = "driver", value_name = "SPEC", num_args = 1.., required_unless_present = "run")]
     drivers: Vec<String>,
-    /// Instead: a drive of a training run, network and expert in turn as the decision rule chose.
+    /// Instead: a drive of a training run, network and expert in turn as the decision rule chose; `--trial` says which.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["drivers", "lot", "direction", "noise", "seed", "preset", "config", "overrides"])]
     run: Option<PathBuf>,
     /// Round of the training run; 0 = behaviour cloning.
     #[arg(long, default_value_t = 1, requires = "run", value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX)))]
     round: u32,
-    /// Lot to drive; see `cargo xtask lots`.
-    #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
-    lot: String,
-    /// Which way.
-    #[arg(long = "directions", alias = "direction", value_name = "WAY", default_value = "forward")]
-    direction: OneDirection,
-    /// Which trial: obstacles and noise; of a training run, which of its drives.
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX)))]
-    trial: u32,
-    /// What is seen wrongly: clean, paper, hard, lot or a multiple of paper.
-    #[arg(long, alias = "level", value_name = "LEVEL", default_value = "paper")]
-    noise: String,
-    /// Seed of obstacles and noise of the trials.
-    #[arg(long)]
-    seed: Option<u64>,
+    #[command(flatten)]
+    trial: TrialArgs,
     /// What colours mean [default: driver; of a training run, who].
     #[arg(long)]
     by: Option<ColourChoice>,
@@ -266,22 +254,10 @@ struct Drives {
 /// One drive per driver, all on the same obstacles and noise as in an evaluation.
 fn driven_anew(args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<Drives> {
     let specs = DriverSpec::parse_all(&args.drivers)?;
-    let (mut settings, _) = evaluate::settings_for(&specs, &Layers::from(&args.layers), folder.output)?;
-    settings.evaluation.seed = args.seed.map_or(settings.evaluation.seed, RootSeed);
-    let levels = noise_levels(std::slice::from_ref(&args.noise))?;
-    let [noise] = levels[..] else { anyhow::bail!("--noise {}: name one level", args.noise) };
-    let direction = Direction::from(args.direction);
-    let key = |driver: &DriverSpec| ReplayKey {
-        driver: driver.clone(),
-        lot: args.lot.clone(),
-        direction,
-        trial: args.trial,
-        noise,
-        seed: settings.evaluation.seed,
-        tick: 0,
-    };
-    let replay = Replay::new(&key(&specs[0]), &settings.episode)?;
-    let title = format!("{} {} trial {}", replay.lot.name(), direction.name(), args.trial);
+    let (settings, lot, keys) = args.trial.keys(&specs, &args.layers, folder.output)?;
+    let ReplayKey { direction, trial, noise, .. } = keys[0];
+    let replay = Replay::new(&keys[0], &settings.episode)?;
+    let title = format!("{} {} trial {trial}", lot.name(), direction.name());
     let noise = if noise == NoiseChoice::Paper { String::new() } else { format!(" noise {noise}") };
     let names: Vec<String> = specs.iter().map(ToString::to_string).collect();
     let file = format!("drive {title}{noise} {}", names.join(" "));
@@ -315,8 +291,8 @@ fn driven_anew(args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<D
 
 /// A drive of a training round: the network of the round before and the expert, as in the training itself.
 fn driven_in_training(run: &Path, args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<Drives> {
-    let (map, rollouts) = training::drive_again(run, args.round, args.trial)?;
-    let title = format!("{} round {} drive {}", map.scenario().name, args.round, args.trial);
+    let (map, rollouts) = training::drive_again(run, args.round, args.trial.trial)?;
+    let title = format!("{} round {} drive {}", map.scenario().name, args.round, args.trial.trial);
     let name = run.file_name().unwrap_or_default().to_string_lossy();
     let file = format!("drive {title} {name}");
     folder.check(&file, true)?;

@@ -1,7 +1,8 @@
 //! `render animation`: drives that move, as GIF or APNG.
 
 use super::evaluate;
-use crate::args::{LayerArgs, OneDirection, noise_levels};
+use super::one_trial::TrialArgs;
+use crate::args::LayerArgs;
 use crate::console::Console;
 use crate::output::Output;
 use crate::picture_folder::Folder;
@@ -14,8 +15,6 @@ use experiment::replay_key::ReplayKey;
 use experiment::settings::{Layers, Settings};
 use report::pictures::animation::{Camera, Layout, Scene, Take};
 use report::pictures::encode::Format;
-use sim::limits::TRIAL_MAX;
-use sim::seed::RootSeed;
 use std::ops::RangeInclusive;
 
 /// Before and after the tick of a replay key, seconds.
@@ -32,31 +31,13 @@ const FRAMES_WANTED: f32 = 320.0;
 #[derive(Debug, Clone, Args)]
 pub(crate) struct AnimationArgs {
     /// Replay keys of one trial, as a report or failures.md lists them: the seconds around their ticks.
-    #[arg(value_name = "KEY", required_unless_present = "drivers")]
+    #[arg(value_name = "KEY", required_unless_present = "drivers", conflicts_with_all = TrialArgs::FLAGS)]
     keys: Vec<String>,
     /// Instead: who drives, as in an evaluation; may be repeated. See `cargo xtask drivers`.
     #[arg(long = "driver", value_name = "SPEC", num_args = 1.., conflicts_with = "keys")]
     drivers: Vec<String>,
-    /// Lot to drive; see `cargo xtask lots`.
-    #[arg(long, value_name = "SPEC", default_value = "lot-a", conflicts_with = "keys")]
-    lots: String,
-    /// Which way.
-    #[arg(long, default_value = "forward", conflicts_with = "keys")]
-    directions: OneDirection,
-    /// Which trial: obstacles and noise.
-    #[arg(
-        long,
-        default_value_t = 0,
-        conflicts_with = "keys",
-        value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX))
-    )]
-    trial: u32,
-    /// What is seen wrongly: clean, paper, hard, lot or a multiple of paper.
-    #[arg(long, value_name = "LEVEL", default_value = "paper", conflicts_with = "keys")]
-    noise: String,
-    /// Seed of obstacles and noise of the trials.
-    #[arg(long, conflicts_with = "keys")]
-    seed: Option<u64>,
+    #[command(flatten)]
+    trial: TrialArgs,
     /// Start of what is shown, seconds [default: 8 s before the tick of a key, else 0].
     #[arg(long, value_name = "SECONDS")]
     from: Option<f32>,
@@ -164,35 +145,20 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
 /// What is to be driven: a key per driver.
 fn resolve(args: &AnimationArgs, output: &Output) -> anyhow::Result<(Settings, Vec<ReplayKey>)> {
     let keys: Vec<ReplayKey> = args.keys.iter().map(|key| key.parse()).collect::<anyhow::Result<_>>()?;
-    let drivers = if keys.is_empty() {
-        DriverSpec::parse_all(&args.drivers)?
-    } else {
-        keys.iter().map(|key| key.driver.clone()).collect()
-    };
-    let (settings, _) = evaluate::settings_for(&drivers, &Layers::from(&args.layers), output)?;
-    if let Some(first) = keys.first() {
-        let trial = |key: &ReplayKey| (key.lot.clone(), key.direction, key.trial, key.noise, key.seed);
-        for key in &keys {
-            ensure!(
-                trial(key) == trial(first),
-                "{key} is of another trial than {first}; one animation shows one lot, direction, trial, noise and seed"
-            );
-        }
+    let Some(first) = keys.first() else {
+        let (settings, _, keys) = args.trial.keys(&DriverSpec::parse_all(&args.drivers)?, &args.layers, output)?;
         return Ok((settings, keys));
-    }
-    let levels = noise_levels(std::slice::from_ref(&args.noise))?;
-    let [noise] = levels[..] else { anyhow::bail!("--noise {}: name one level", args.noise) };
-    let seed = args.seed.map_or(settings.evaluation.seed, RootSeed);
-    let key = |driver: DriverSpec| ReplayKey {
-        driver,
-        lot: args.lots.clone(),
-        direction: args.directions.into(),
-        trial: args.trial,
-        noise,
-        seed,
-        tick: 0,
     };
-    Ok((settings, drivers.into_iter().map(key).collect()))
+    let drivers: Vec<DriverSpec> = keys.iter().map(|key| key.driver.clone()).collect();
+    let (settings, _) = evaluate::settings_for(&drivers, &Layers::from(&args.layers), output)?;
+    let trial = |key: &ReplayKey| (key.lot.clone(), key.direction, key.trial, key.noise, key.seed);
+    for key in &keys {
+        ensure!(
+            trial(key) == trial(first),
+            "{key} is of another trial than {first}; one animation shows one lot, direction, trial, noise and seed"
+        );
+    }
+    Ok((settings, keys))
 }
 
 fn drive(

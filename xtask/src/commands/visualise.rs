@@ -1,22 +1,20 @@
 //! `visualise`: requests to the viewer program.
 
 use super::evaluate;
-use crate::args::{LayerArgs, OneDirection};
+use super::one_trial::TrialArgs;
+use crate::args::LayerArgs;
 use crate::output::Output;
 use crate::record::recordings_of;
 use crate::viewer;
-use anyhow::{bail, ensure};
+use anyhow::ensure;
 use clap::{Args, Subcommand};
 use evaluation::records::{self, FailureRecord};
 use experiment::drivers::DriverSpec;
-use experiment::lots::Lot;
 use experiment::replay_key::ReplayKey;
 use experiment::run_dir;
-use experiment::settings::{Layers, NoiseChoice};
+use experiment::settings::Layers;
 use experiment::view_request::{DriveRequest, Show, Sink, ViewRequest};
 use report::pictures::file_name;
-use sim::limits::TRIAL_MAX;
-use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::path::{Path, PathBuf};
 
@@ -85,21 +83,8 @@ struct EpisodeArgs {
     /// Who drives; may be repeated. See `cargo xtask drivers`.
     #[arg(long = "driver", value_name = "SPEC", required = true, num_args = 1..)]
     drivers: Vec<String>,
-    /// The lot; see `cargo xtask lots`.
-    #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
-    lot: String,
-    /// Which trial.
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX)))]
-    trial: u32,
-    /// Which way it is driven.
-    #[arg(long = "directions", alias = "direction", value_name = "WAY", default_value = "forward")]
-    direction: OneDirection,
-    /// What is seen wrongly: clean, paper, hard, lot or multiples of paper [default: the first of evaluation.noise].
-    #[arg(long, alias = "level", value_name = "LEVEL")]
-    noise: Option<NoiseChoice>,
-    /// Seed of the evaluation.
-    #[arg(long)]
-    seed: Option<u64>,
+    #[command(flatten)]
+    trial: TrialArgs,
     #[command(flatten)]
     layers: LayerArgs,
 }
@@ -167,19 +152,12 @@ fn sink_of(args: &SinkArgs, otherwise: Sink) -> Sink {
 /// A run by several drivers, and the name of its file.
 fn episode_of(args: &EpisodeArgs, output: &Output) -> anyhow::Result<(Show, String)> {
     let drivers = DriverSpec::parse_all(&args.drivers)?;
-    let (settings, _) = evaluate::settings_for(&drivers, &Layers::from(&args.layers), output)?;
-    let lots = Lot::parse_all(std::slice::from_ref(&args.lot), &settings.episode.vehicle)?;
-    let [lot] = lots.as_slice() else {
-        bail!("--lots {}: {} lots are named so; name one, as in test-hard-7", args.lot, lots.len())
-    };
-    let evaluation = &settings.evaluation;
-    let (direction, trial) = (Direction::from(args.direction), args.trial);
-    let (noise, seed) = (args.noise.unwrap_or(evaluation.noise[0]), args.seed.map_or(evaluation.seed, RootSeed));
-    let key = |driver: DriverSpec| ReplayKey { driver, lot: lot.spec(), direction, trial, noise, seed, tick: 0 };
+    let (settings, lot, keys) = args.trial.keys(&drivers, &args.layers, output)?;
+    let ReplayKey { direction, trial, noise, .. } = keys[0];
     let way = direction.name();
     let file = format!("{}-{way}-t{trial}", lot.name());
     let title = format!("{}, {way}, trial {trial}, {noise}: {}", lot.name(), args.drivers.join(", "));
-    let drive = DriveRequest { file: file.clone(), title, keys: drivers.into_iter().map(key).collect() };
+    let drive = DriveRequest { file: file.clone(), title, keys };
     Ok((Show::Drives { settings: Box::new(settings), drives: vec![drive] }, file))
 }
 

@@ -1,0 +1,71 @@
+//! One trial of one lot, driven by one driver or several: what is shown of an episode.
+
+use super::evaluate;
+use crate::args::{LayerArgs, OneDirection};
+use crate::output::Output;
+use anyhow::ensure;
+use clap::Args;
+use experiment::drivers::DriverSpec;
+use experiment::lots::Lot;
+use experiment::replay_key::ReplayKey;
+use experiment::settings::{Layers, NoiseChoice, Settings};
+use sim::limits::TRIAL_MAX;
+use sim::seed::RootSeed;
+
+/// Which trial, by the flags of an evaluation.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct TrialArgs {
+    /// Lot to drive; see `cargo xtask lots`.
+    #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
+    lot: String,
+    /// Which way.
+    #[arg(long = "directions", alias = "direction", value_name = "WAY", default_value = "forward")]
+    direction: OneDirection,
+    /// Which trial: obstacles and noise.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX))
+    )]
+    pub(crate) trial: u32,
+    /// What is seen wrongly: clean, paper, hard, lot or a multiple of paper [default: the first of evaluation.noise].
+    #[arg(long, alias = "level", value_name = "LEVEL")]
+    noise: Option<NoiseChoice>,
+    /// Seed of obstacles and noise of the trials [default: the setting evaluation.seed].
+    #[arg(long)]
+    seed: Option<u64>,
+}
+
+impl TrialArgs {
+    /// The names of the flags but the settings', which a drive that is named otherwise leaves no room for.
+    pub(crate) const FLAGS: [&str; 4] = ["lot", "direction", "noise", "seed"];
+
+    /// The settings, and a key for each of the drivers.
+    ///
+    /// # Errors
+    /// If something named does not exist, or the name of the lot stands for several.
+    pub(crate) fn keys(
+        &self,
+        drivers: &[DriverSpec],
+        layers: &LayerArgs,
+        output: &Output,
+    ) -> anyhow::Result<(Settings, Lot, Vec<ReplayKey>)> {
+        let (settings, _) = evaluate::settings_for(drivers, &Layers::from(layers), output)?;
+        let mut lots = Lot::parse_all(std::slice::from_ref(&self.lot), &settings.episode.vehicle)?;
+        ensure!(lots.len() == 1, "--lots {}: {} lots are named so; name one, as in test-hard-7", self.lot, lots.len());
+        let lot = lots.remove(0);
+        let evaluation = &settings.evaluation;
+        let key = |driver: &DriverSpec| ReplayKey {
+            driver: driver.clone(),
+            lot: lot.spec(),
+            direction: self.direction.into(),
+            trial: self.trial,
+            noise: self.noise.unwrap_or(evaluation.noise[0]),
+            seed: self.seed.map_or(evaluation.seed, RootSeed),
+            tick: 0,
+        };
+        let keys = drivers.iter().map(key).collect();
+        Ok((settings, lot, keys))
+    }
+}
