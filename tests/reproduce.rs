@@ -375,6 +375,7 @@ fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
     for (arguments, part) in [
         (["--rule", "anybody"], "there are expert_only"),
         (["--rule", "vanilla,vanilla"], "named twice"),
+        (["--samples", "2000000000"], "out of range"),
         (["--unseen", "train:2"], "trained or tuned on it"),
     ] {
         let refused = run(&arguments);

@@ -43,7 +43,7 @@ impl AxisCalibration {
 }
 
 /// Both axes of a policy on labelled samples: across and along the car, metres.
-pub fn of_policy(policy: &Checkpoint, samples: &[Sample], device: DeviceChoice) -> [AxisCalibration; 2] {
+pub fn of_policy(policy: &Checkpoint, samples: &[&Sample], device: DeviceChoice) -> [AxisCalibration; 2] {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
     let predictions = policy.predictor(device).predict(&grids);
     let side_m = f64::from(policy.geometry().side_m);

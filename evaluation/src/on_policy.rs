@@ -94,35 +94,34 @@ impl OnPolicy {
 /// A finished training.
 struct Trained {
     store: Store,
-    rounds: Vec<u32>,
+    /// The samples that were held back, round by round.
+    held_back: Vec<Vec<Sample>>,
 }
 
 impl Trained {
-    fn open(folder: &Path) -> anyhow::Result<Self> {
+    fn open(folder: &Path, by: ValidationSplit) -> anyhow::Result<Self> {
         let store = Store::open(folder)?;
-        let mut rounds = Vec::new();
-        while store.is_finished(&store.round_folder(rounds.len() as u32))? {
-            rounds.push(rounds.len() as u32);
+        let mut dataset = Dataset::default();
+        let mut held_back = Vec::new();
+        let mut known = 0;
+        while store.is_finished(&store.round_folder(held_back.len() as u32))? {
+            dataset.push(store.read_samples(held_back.len() as u32)?.into());
+            // What is held back of a round does not depend on the rounds after it.
+            let Split { mut validation, .. } = dataset.split(by);
+            let of_round = validation.split_off(known);
+            known += of_round.len();
+            held_back.push(of_round);
         }
-        Ok(Self { store, rounds })
+        Ok(Self { store, held_back })
     }
 
     fn iterations(&self) -> u32 {
-        self.rounds.last().copied().unwrap_or(0)
+        self.held_back.len().saturating_sub(1) as u32
     }
 
     /// Samples held back of the rounds from one to another.
-    fn held_back(&self, from: u32, to: u32, by: ValidationSplit) -> anyhow::Result<Vec<Sample>> {
-        let mut dataset = Dataset::default();
-        let mut skipped = 0;
-        for round in 0..=to {
-            if round == from {
-                skipped = dataset.split(by).validation.len();
-            }
-            dataset.push(self.store.read_samples(round)?.into());
-        }
-        let Split { mut validation, .. } = dataset.split(by);
-        Ok(validation.split_off(skipped))
+    fn held_back(&self, from: u32, to: u32) -> impl Iterator<Item = &Sample> {
+        self.held_back[from as usize..=to as usize].iter().flatten()
     }
 }
 
@@ -133,8 +132,8 @@ struct Pair {
 }
 
 impl Pair {
-    fn open(root: &Path, seed: RootSeed) -> anyhow::Result<Self> {
-        let open = |chain: Chain| Trained::open(&root.join(chain.folder(seed)));
+    fn open(root: &Path, seed: RootSeed, by: ValidationSplit) -> anyhow::Result<Self> {
+        let open = |chain: Chain| Trained::open(&root.join(chain.folder(seed)), by);
         Ok(Self { weighted: open(Chain::Weighted)?, unweighted: open(Chain::Unweighted)? })
     }
 
@@ -144,9 +143,8 @@ impl Pair {
 
     /// τ̂ of both policies of an iteration on the held-back samples of both data sets so far.
     fn tau_hats(&self, iteration: u32, settings: &Settings) -> anyhow::Result<[Vec<f64>; 2]> {
-        let by = settings.dagger.fit.validation;
-        let mut samples = self.weighted.held_back(0, iteration, by)?;
-        samples.extend(self.unweighted.held_back(1, iteration, by)?);
+        let samples: Vec<&Sample> =
+            self.weighted.held_back(0, iteration).chain(self.unweighted.held_back(1, iteration)).collect();
         let of = |trained: &Trained| {
             let policy = Checkpoint::load(&trained.store.round_folder(iteration))?;
             Ok::<_, anyhow::Error>(tau_hats(settings, &policy, &samples))
@@ -167,12 +165,20 @@ pub fn run(
     progress: &dyn Progress,
 ) -> anyhow::Result<bool> {
     let folder = |chain: Chain| root.join(chain.folder(settings.seed));
-    let pair = Pair::open(root, settings.seed)?;
+    let by = settings.dagger.fit.validation;
+    let mut ratios_of_others: Vec<Vec<f64>> = Vec::new();
+    // One after another: their samples take hundreds of megabytes.
+    for &seed in seeds.iter().filter(|&&seed| seed != settings.seed) {
+        if progress.is_cancelled() {
+            return Ok(false);
+        }
+        let other = Pair::open(root, seed, by)?;
+        let ratio = |iteration| Ok(ratio_of_sums(&other.tau_hats(iteration, settings)?));
+        ratios_of_others.push((1..=other.iterations()).map(ratio).collect::<anyhow::Result<_>>()?);
+    }
+    let pair = Pair::open(root, settings.seed, by)?;
     let iterations = pair.iterations();
     let Pair { weighted, unweighted } = &pair;
-    let others = seeds.iter().filter(|&&seed| seed != settings.seed);
-    let others = others.map(|&seed| Pair::open(root, seed)).collect::<anyhow::Result<Vec<_>>>()?;
-    let by = settings.dagger.fit.validation;
     let mut drives = Drives::new(settings, 3 + 2 * iterations, progress);
     let mut calibration = Vec::new();
     for (name, path, chain, rounds) in [
@@ -182,9 +188,10 @@ pub fn run(
     ] {
         let Some(driven) = drives.of(&path)? else { return Ok(false) };
         let policy = Checkpoint::load(&path)?;
-        let held_back = chain.held_back(0, rounds, by)?;
+        let held_back: Vec<&Sample> = chain.held_back(0, rounds).collect();
         calibration.extend(calibrations(name, States::HeldBack, settings, &policy, &held_back));
-        calibration.extend(calibrations(name, States::OnPolicy, settings, &policy, &driven.round.samples));
+        let driven: Vec<&Sample> = driven.round.samples.iter().collect();
+        calibration.extend(calibrations(name, States::OnPolicy, settings, &policy, &driven));
     }
     let mut effect = Vec::new();
     for iteration in 1..=iterations {
@@ -195,13 +202,8 @@ pub fn run(
         }
         let sums = pair.tau_hats(iteration, settings)?;
         let held_back = ratio(&sums, by.block, settings.evaluation.seed);
-        let mut held_back_by_seed = vec![ratio_of_sums(&sums)];
-        for other in others.iter().filter(|other| other.iterations() >= iteration) {
-            if progress.is_cancelled() {
-                return Ok(false);
-            }
-            held_back_by_seed.push(ratio_of_sums(&other.tau_hats(iteration, settings)?));
-        }
+        let of_others = ratios_of_others.iter().filter_map(|ratios| ratios.get(iteration as usize - 1));
+        let held_back_by_seed = std::iter::once(ratio_of_sums(&sums)).chain(of_others.copied()).collect();
         effect.push(Effect { iteration, held_back, held_back_by_seed, driving_per_s });
     }
     drives.end();
@@ -263,10 +265,10 @@ fn tau_hat_per_s(collected: &Collected) -> f64 {
 }
 
 /// τ̂ of a policy on samples.
-fn tau_hats(settings: &Settings, policy: &Checkpoint, samples: &[Sample]) -> Vec<f64> {
+fn tau_hats(settings: &Settings, policy: &Checkpoint, samples: &[&Sample]) -> Vec<f64> {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
     let predictions = policy.predictor(settings.dagger.device).predict(&grids);
-    let of = |(sample, prediction): (&Sample, _)| f64::from(Evidence::new(prediction, sample.label).discrepancy);
+    let of = |(sample, prediction): (&&Sample, _)| f64::from(Evidence::new(prediction, sample.label).discrepancy);
     samples.iter().zip(&predictions).map(of).collect()
 }
 
@@ -297,7 +299,7 @@ fn calibrations(
     states: States,
     settings: &Settings,
     policy: &Checkpoint,
-    samples: &[Sample],
+    samples: &[&Sample],
 ) -> impl Iterator<Item = Calibration> {
     let axes = calibration::of_policy(policy, samples, settings.dagger.device);
     axes.into_iter().map(move |AxisCalibration { name: axis, samples, coverage, bins }| Calibration {

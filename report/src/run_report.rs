@@ -287,6 +287,7 @@ fn held_back_calibration(
         return Ok(None);
     }
     let policy = Checkpoint::load(&network)?;
+    let held_back: Vec<_> = held_back.iter().collect();
     Ok(Some(calibration::of_policy(&policy, &held_back, settings.dagger.device)))
 }
 

@@ -101,8 +101,8 @@ impl Growing {
     /// # Errors
     /// If the list cannot be written.
     pub fn finish(self) -> Result<(), FileError> {
-        let names: Vec<&str> = self.files.iter().map(|file| file.name.as_str()).collect();
-        sums::list(&self.folder, &names)?;
+        let digests = self.files.into_iter().map(|file| (file.name, sums::hex(&file.sha256.finalize())));
+        sums::list_as(&self.folder, digests)?;
         whole::remove(&self.mark)
     }
 }
@@ -160,6 +160,20 @@ impl Mark {
 mod tests {
     use super::*;
     use std::fs;
+
+    /// The digest was taken of what lay on the disk at the end, so that damage until then became what is right.
+    #[test]
+    fn what_the_disk_lost_before_the_end_is_damage() {
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-growing-damage", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        let mut growing = Growing::open(&folder, "driving", &["runs"]).unwrap();
+        growing.add(&[b"1\n".to_vec()]).unwrap();
+        fs::write(folder.join("runs"), "2\n").unwrap();
+        growing.finish().unwrap();
+        assert_eq!(sums::verify(&folder).faults.len(), 1);
+        fs::remove_dir_all(folder).unwrap();
+    }
 
     /// A merge that died left it, and the evaluation that went on left it there for good.
     #[test]

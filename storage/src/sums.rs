@@ -124,6 +124,16 @@ pub fn list(folder: &Path, names: &[&str]) -> Result<(), FileError> {
     write_list(folder, &sums)
 }
 
+/// Lists files of a folder that were written with these digests, in hex: what the disk made of them since is damage.
+///
+/// # Errors
+/// If the list cannot be read or written.
+pub fn list_as(folder: &Path, digests: impl IntoIterator<Item = (String, String)>) -> Result<(), FileError> {
+    let mut sums = list_of(folder)?.unwrap_or_default();
+    sums.extend(digests);
+    write_list(folder, &sums)
+}
+
 /// Lists every file of a folder, as it is before anybody else knows of it.
 ///
 /// # Errors

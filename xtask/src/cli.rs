@@ -44,7 +44,7 @@ pub struct Cli {
 const EXAMPLES: &str = "\
 Examples:
   cargo xtask train-dagger                       train, print the paper's table, check on three lots
-  cargo xtask train-dagger --preset smoke        the same line end to end in seconds
+  cargo xtask train-dagger --preset smoke        every step of it in seconds
   cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1
   cargo xtask settings --explain dagger.eta      what a setting means
   cargo xtask generate --lots lot-a --out lots   TOML and a picture";

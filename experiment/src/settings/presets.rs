@@ -26,7 +26,7 @@ pub struct Preset {
 
 /// Every preset.
 pub const PRESETS: [Preset; 4] = [
-    Preset { name: "default", about: "the whole line within minutes on two cores", make: default },
+    Preset { name: "default", about: "trains and checks within minutes on two cores", make: default },
     Preset { name: "strong", about: "thrice the lots and a larger network; several times as long", make: strong },
     Preset { name: "paper", about: "the paper's regime and nothing else; many hours", make: paper },
     Preset { name: "smoke", about: "every step, as short as possible: for tests", make: smoke },

@@ -14,8 +14,8 @@ use experiment::replay_key::ReplayKey;
 use experiment::run_dir;
 use experiment::settings::{Layers, Settings};
 use report::replays::{self, Row};
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -111,21 +111,33 @@ fn of_evaluation(
 ) -> anyhow::Result<(Settings, Vec<ReplayKey>, BTreeMap<String, Recorded>)> {
     let settings = run_dir::settings_of(folder)?;
     let file = folder.join(records::RUNS);
-    let (mut all, mut recorded) = (Vec::new(), BTreeMap::new());
+    // Twice through the file: it may be longer than memory is large.
+    let mut runs = 0;
+    if args.keys.is_empty() {
+        records::each_line(&file, |_: RunRecord| {
+            runs += 1;
+            Ok(())
+        })?;
+    }
+    let count = runs.min(args.sample as usize);
+    let sample: BTreeSet<usize> = (0..count).map(|index| index * runs / count).collect();
+    let named: Vec<ReplayKey> = args.keys.iter().map(|key| ReplayKey { tick: 0, ..key.clone() }).collect();
+    let names: BTreeSet<String> = named.iter().map(ReplayKey::to_string).collect();
+    let (mut index, mut sampled, mut recorded) = (0, Vec::new(), BTreeMap::new());
     records::each_line(&file, |run: RunRecord| {
-        let metrics = &run.report.metrics;
-        let of_run =
-            Recorded { sha256: run.sha256, near_collisions: metrics.near_collisions, driven_m: metrics.driven_m };
-        all.push(run.replay.clone());
-        recorded.insert(run.replay, of_run);
+        if sample.contains(&index) {
+            sampled.push(run.replay.parse()?);
+        }
+        if sample.contains(&index) || names.contains(&run.replay) {
+            let metrics = &run.report.metrics;
+            let of_run =
+                Recorded { sha256: run.sha256, near_collisions: metrics.near_collisions, driven_m: metrics.driven_m };
+            recorded.insert(run.replay, of_run);
+        }
+        index += 1;
         Ok(())
     })?;
-    let keys = if args.keys.is_empty() {
-        let count = all.len().min(args.sample as usize);
-        (0..count).map(|index| all[index * all.len() / count].parse()).collect::<anyhow::Result<Vec<_>>>()?
-    } else {
-        args.keys.iter().map(|key| ReplayKey { tick: 0, ..key.clone() }).collect()
-    };
+    let keys = if named.is_empty() { sampled } else { named };
     for key in &keys {
         recorded.get(&key.to_string()).with_context(|| format!("{key}: {} has no such run", file.display()))?;
     }

@@ -85,6 +85,9 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
             train::check_lots(&settings, output)?;
             let places = train::check_unseen(&settings, (self.unseen)(&extent))?;
             args.out.ensure_apart_from(&places)?;
+            for stage in (self.stages)(&settings, &extent, Path::new(""))? {
+                stage.settings.check().with_context(|| stage.folder.clone())?;
+            }
             let arguments = toml::Table::try_from(&extent)?;
             let request = Request { arguments, inputs: self.inputs(&settings, &extent)? };
             let run = RunDir::create(&args.out.place(self.command, &preset, settings.seed.0), &settings, &request)?;

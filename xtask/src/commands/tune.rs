@@ -12,7 +12,7 @@ use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::progress::Interrupted;
 use experiment::run_dir::{Outcome, Request, RunDir};
-use experiment::settings::{Layers, NoiseChoice, Settings};
+use experiment::settings::{Layers, NoiseChoice, Settings, Smoothing};
 use serde::{Deserialize, Serialize};
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
@@ -32,7 +32,8 @@ pub(crate) struct TuneArgs {
     /// Planners to tune, or readings of them, as in dwa/fox [default: all, each as published].
     #[arg(long = "planner", value_name = "NAME", num_args = 1.., value_delimiter = ',')]
     planners: Vec<String>,
-    /// Lots to tune on: lot-a and generated training lots only.
+    /// Lots to tune on: lot-a and generated training lots only. What is driven is said by these flags alone, not by the settings
+    /// of `evaluation`.
     #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "lot-a,train:4")]
     lots: Vec<String>,
     /// Candidates per planner, its own parameters included.
@@ -106,6 +107,7 @@ fn begin(args: &TuneArgs) -> anyhow::Result<(RunDir, Settings, Asked)> {
     settings.evaluation.trials = args.trials;
     settings.evaluation.directions = Direction::BOTH.to_vec();
     settings.evaluation.noise = vec![args.noise];
+    settings.evaluation.smoothing = Smoothing::Own;
     settings.check()?;
     tune::planners_named(&args.planners)?;
     let lots = Lot::parse_all(&args.lots, &settings.episode.vehicle)?;
