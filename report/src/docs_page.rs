@@ -7,14 +7,21 @@ use std::fmt::Write as _;
 /// Where their figures go, relative to the page.
 pub(crate) const FIGURES: &str = "pictures/results";
 
-/// The head of a page: which command made the run, and which one made the page.
-pub(crate) fn head(run: &str, others: &[String], manifest: &Manifest, more: &[(&str, String)]) -> String {
+/// The head of a page: which command made the run, and which one made the page, at which `revision` of the repository.
+pub(crate) fn head(
+    run: &str,
+    others: &[String],
+    manifest: &Manifest,
+    revision: Option<&str>,
+    more: &[(&str, String)],
+) -> String {
     let unknown = || "unknown".to_owned();
     let changes = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };
     let rows = [
         ("command", format!("`{}`", command_line(manifest))),
-        ("written by", format!("`{}`", written_by(run, others))),
         ("commit", format!("`{}`{changes}", manifest.git_revision.clone().unwrap_or_else(unknown))),
+        ("judged and written by", format!("`{}`", written_by(run, others))),
+        ("at commit", format!("`{}`", revision.unwrap_or("unknown"))),
         ("program", manifest.program.clone()),
         ("machine", format!("{}, {} threads", manifest.processor.clone().unwrap_or_else(unknown), manifest.threads)),
         ("system", manifest.target.clone()),

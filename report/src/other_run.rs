@@ -62,12 +62,12 @@ impl OtherRun {
     ///
     /// # Errors
     /// If it is not finished or has no table, what it wrote cannot be read, or a file cannot be written.
-    pub fn write_docs(&self, others: &[Self], to: &Path) -> anyhow::Result<()> {
+    pub fn write_docs(&self, others: &[Self], to: &Path, revision: Option<&str>) -> anyhow::Result<()> {
         let Found { manifest, title, table, plot } = self.read()?;
         let named: Vec<String> = others.iter().map(Self::to_string).collect();
         let mut page = Page::new(title);
         let seed = [("root seed", manifest.root_seed.to_string())];
-        page.text(docs_page::head(&self.to_string(), &named, &manifest, &seed));
+        page.text(docs_page::head(&self.to_string(), &named, &manifest, revision, &seed));
         page.text(table);
         add_plot(&mut page, &manifest.command, plot);
         others.iter().try_for_each(|other| other.add_to(&mut page))?;

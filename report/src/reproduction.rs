@@ -53,17 +53,25 @@ pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
     Ok(verdicts(&found.statements, &recipe.extent))
 }
 
-/// Writes the same as a page of the documentation, with what made it in its head and the tables of other runs at its end;
+/// Writes the same as a page of the documentation, with what made it in its head (this program lies at `revision`), and the
+/// tables of other runs at its end;
 /// figures go to `pictures/results` beside it.
 ///
 /// # Errors
 /// If what a stage wrote cannot be read, or a file cannot be written.
-pub fn write_docs(recipe: &Recipe, run: &Path, others: &[OtherRun], to: &Path) -> anyhow::Result<()> {
+pub fn write_docs(
+    recipe: &Recipe,
+    run: &Path,
+    others: &[OtherRun],
+    to: &Path,
+    revision: Option<&str>,
+) -> anyhow::Result<()> {
     let seeds = stages::seeds(&recipe.settings, &recipe.extent);
     let seeds = seeds.iter().map(|seed| seed.0.to_string()).collect::<Vec<_>>().join(", ");
     let named: Vec<String> = others.iter().map(OtherRun::to_string).collect();
     let mut page = Page::new("Results");
-    page.text(docs_page::head(&run.display().to_string(), &named, &Manifest::read(run)?, &[("training seeds", seeds)]));
+    let more = [("training seeds", seeds)];
+    page.text(docs_page::head(&run.display().to_string(), &named, &Manifest::read(run)?, revision, &more));
     page.text(introduction(recipe));
     page.text(CAUTIONS);
     Found::read(recipe, run)?.add_to(&mut page, recipe, run)?;

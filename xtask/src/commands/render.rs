@@ -4,6 +4,7 @@ use super::one_trial::TrialArgs;
 use super::render_animation::{self, AnimationArgs};
 use super::reproduce;
 use crate::args::LayerArgs;
+use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
 use crate::picture_folder::Folder;
@@ -373,10 +374,11 @@ fn render_results(args: &RenderResultsArgs, output: &Output) -> anyhow::Result<(
     let command = Manifest::read(&args.run)?.command;
     let page = if command == reproduce::COMMAND { String::new() } else { format!("-{command}") };
     let to = args.to.clone().unwrap_or_else(|| format!("docs/results{page}.md").into());
+    let revision = build_info::get().git_revision.as_deref();
     if command == reproduce::COMMAND {
-        reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.with, &to)?;
+        reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.with, &to, revision)?;
     } else {
-        OtherRun::from(args.run.clone()).write_docs(&args.with, &to)?;
+        OtherRun::from(args.run.clone()).write_docs(&args.with, &to, revision)?;
     }
     output.print(to.display());
     Ok(())
