@@ -200,6 +200,10 @@ fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> anyhow::Result<Option
         ControlFlow::Continue(())
     })?;
     let Some(reports) = reports.into_iter().collect::<Option<Vec<EpisodeReport>>>() else { return Ok(None) };
+    // What a driver answered after it had failed is no result.
+    if track.progress.is_cancelled() {
+        return Ok(None);
+    }
     track.done += reports.len();
     Ok(Some(DrivenBatch {
         reports,

@@ -125,7 +125,8 @@ impl<'a> Trial<'a> {
     }
 }
 
-/// The map of every trial, in order. Neighbours that share obstacles draw them once: a generated lot is found by a search.
+/// The map of every trial, in order. Neighbours that share obstacles draw them once, as a generated lot is found by a search,
+/// and drive on one map each way: that of a large lot takes 100 MB.
 ///
 /// # Errors
 /// If a lot cannot be driven.
@@ -135,7 +136,17 @@ pub fn maps(trials: &[Trial<'_>], episode: &EpisodeSettings) -> anyhow::Result<V
         .par_iter()
         .map(|trials| {
             let drawn = trials[0].lot.draw(trials[0].seed).scenario;
-            trials.par_iter().map(|trial| Ok(Arc::new(trial.map_of(drawn.clone(), episode)?))).collect()
+            let first_of = |way: Direction| trials.iter().find(|trial| trial.direction == way);
+            let ways: Vec<&Trial<'_>> = Direction::BOTH.into_iter().filter_map(first_of).collect();
+            let maps: Vec<Arc<Map>> = ways
+                .par_iter()
+                .map(|trial| Ok(Arc::new(trial.map_of(drawn.clone(), episode)?)))
+                .collect::<anyhow::Result<_>>()?;
+            let map_of = |trial: &Trial<'_>| {
+                let way = ways.iter().position(|first| first.direction == trial.direction).expect("it is one of them");
+                Arc::clone(&maps[way])
+            };
+            Ok(trials.iter().map(map_of).collect())
         })
         .collect::<anyhow::Result<Vec<Vec<Arc<Map>>>>>()?;
     Ok(maps.into_iter().flatten().collect())

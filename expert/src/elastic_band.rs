@@ -13,7 +13,7 @@ use sim::vectors::{FourPoints, f32x4};
 /// Points of a band: 15 m.
 pub(crate) const POINTS: usize = 26;
 /// Distance between the points of a band, metres.
-pub(crate) const SPACING_M: f32 = 0.6;
+pub const SPACING_M: f32 = 0.6;
 /// Reach of the central difference that finds the middle, metres: wide enough to round off the ridge of the distances.
 const PROBE_M: f32 = 0.4;
 

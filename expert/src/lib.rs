@@ -28,6 +28,7 @@ mod search;
 mod settings;
 mod stats;
 
+pub use elastic_band::SPACING_M as WAY_SPACING_M;
 pub use search::Candidate;
 pub use settings::{ExpertSettings, PlanWeights, Sees};
 use sim::maths;

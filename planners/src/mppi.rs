@@ -151,7 +151,7 @@ impl Method for Params {
         within("margin_m", self.margin_m, -0.9, 2.0)?;
         within("nose_m", self.nose_m, 0.0, 5.0)?;
         within("collision_from_m", self.collision_from_m, -2.0, 2.0)?;
-        within("passable_from_m", self.passable_from_m, 0.1, 5.0)
+        within("passable_from_m", self.passable_from_m, 0.1, 3.0)
     }
 
     fn planner(&self, context: &PlannerContext) -> PathIntegral {

@@ -273,7 +273,9 @@ impl Tentacles {
     /// Index of the tabulated starting angle nearest to a steering angle.
     fn start(&self, steering_rad: f32) -> usize {
         let straight = (self.around.len() / 2) as f32;
-        (straight + (steering_rad / self.context.vehicle.steering_max_rad * straight).round()) as usize
+        // The wheel is commanded by the curvature of a path, which may ask for more than the car can.
+        let share = (steering_rad / self.context.vehicle.steering_max_rad).clamp(-1.0, 1.0);
+        (straight + (share * straight).round()) as usize
     }
 
     /// J of every candidate from a starting angle.

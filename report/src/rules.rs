@@ -4,10 +4,11 @@ use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
 use anyhow::Context as _;
 use evaluation::drive_stage::DriveStage;
-use evaluation::format::quoted_interval;
+use evaluation::format::{difference, quoted_interval};
 use evaluation::results::EvaluationResults;
 use evaluation::rules::{self, Extent};
 use evaluation::stages::Stage;
+use evaluation::statistics::bootstrap::Interval;
 use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
 use evaluation::trainings::Team;
@@ -49,7 +50,17 @@ struct Row {
     per_100m: f64,
     lower: f64,
     upper: f64,
+    /// Near-collisions per 100 m, of all seeds together less those of the paper's rule; empty of one seed, and where the
+    /// paper's rule was not trained.
+    difference_per_100m: Option<f64>,
+    difference_lower: Option<f64>,
+    difference_upper: Option<f64>,
+    #[serde(skip)]
+    difference: Option<Interval>,
 }
+
+/// The rule that others are compared with.
+const OF_PAPER: &str = "all_below";
 
 /// Above the table.
 pub const TITLE: &str = "Decision rules at equal samples";
@@ -86,9 +97,17 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
         Team { name: title.to_owned(), drivers, seeds }
     };
     let teams: Vec<Team> = pooled.iter().map(|row| team(&row.rule)).collect();
-    let of_teams = results.judge_teams(0, &everywhere, &teams, 0, seed_of_trials);
+    let of_paper = teams.iter().position(|team| team.name == rules::title(OF_PAPER));
+    let of_teams = results.judge_teams(0, &everywhere, &teams, of_paper.unwrap_or(0), seed_of_trials);
     for (at, row) in pooled.iter_mut().enumerate() {
         let judged = of_teams.as_ref().map(|estimates| estimates[at].per_100m);
+        let is_other = of_paper.is_some_and(|of_paper| of_paper != at);
+        row.difference = of_teams.as_ref().map(|estimates| estimates[at].difference_per_100m).filter(|_| is_other);
+        (row.difference_per_100m, row.difference_lower, row.difference_upper) = (
+            row.difference.map(|interval| interval.estimate),
+            row.difference.map(|interval| interval.lower),
+            row.difference.map(|interval| interval.upper),
+        );
         let seeds = teams[at].drivers.len() as f64;
         let of_one = (f64::from(row.near_collisions) / seeds).round() as u32;
         let rate = Rate::new(of_one, row.route_m / seeds / 100.0);
@@ -165,6 +184,7 @@ fn to_markdown(rows: &[Row]) -> String {
         "collecting: near-collisions (contacts) in",
         "unseen lots: near-collisions (contacts) in",
         "per 100 m [95 %]",
+        "less the paper's, all below",
     ]);
     for row in rows {
         table.add_row(vec![
@@ -182,6 +202,7 @@ fn to_markdown(rows: &[Row]) -> String {
             ),
             format!("{} ({}) in {:.1} km", row.near_collisions, row.contacts, row.route_m / 1000.0),
             format!("{:.2} [{:.2}, {:.2}]", row.per_100m, row.lower, row.upper),
+            difference(row.difference, 2),
         ]);
     }
     table.to_string()

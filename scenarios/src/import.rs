@@ -131,7 +131,8 @@ impl MapLot {
             return Ok(Self::of_map(path));
         }
         let lot = Self::read(&beside)?;
-        if lot.map.file_name() != path.file_name() {
+        let place = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        if place(&lot.map) != place(path) {
             let problem = format!("it names the map {}, not {}", lot.map.display(), path.display());
             return Err(lot.fault("map", problem, "name the file that is meant with --lots"));
         }
@@ -272,6 +273,10 @@ impl MapLot {
         let given: Vec<&str> = also.into_iter().filter_map(|(name, is_given)| is_given.then_some(name)).collect();
         if let [first, second, ..] = given[..] {
             return Err(self.fault(second, format!("{first} is given too"), "keep one of them"));
+        }
+        if self.centre_line.is_some() && self.start.is_some() {
+            let remedy = "leave it out: the route starts at the first point of the centre line";
+            return Err(self.fault("start", "centre_line is given too".to_owned(), remedy));
         }
         Ok(())
     }
@@ -430,8 +435,8 @@ impl MapLot {
                         points.push([x, y]);
                     }
                 }
-                // A first line of words is a header.
-                [None, ..] if i == 0 => {}
+                // A first line of words is a header; one with a number is a point that is written wrongly.
+                [None] | [None, None] if i == 0 => {}
                 _ => {
                     let cells = record.iter().collect::<Vec<_>>().join(",");
                     return Err(faulty(line, format!("{:?} is no point", shortened(&cells))));

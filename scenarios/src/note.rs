@@ -36,6 +36,11 @@ pub enum Note {
         /// Which.
         keys: Vec<String>,
     },
+    /// Grey pixels that map savers write for unknown ground count as free.
+    UnknownIsFree {
+        /// The map's threshold.
+        free_thresh: f64,
+    },
     /// Ways that leave the route were closed, because the lot asks for it.
     Closed {
         /// Where they leave it.
@@ -75,6 +80,11 @@ impl std::fmt::Display for Note {
                 "the map's YAML file has {}, which mean nothing here; known are image, resolution, origin, negate, \
                  occupied_thresh, free_thresh and mode",
                 keys.iter().take(PLACES_MAX).map(|key| format!("{key:?}")).collect::<Vec<_>>().join(", ")
+            ),
+            Self::UnknownIsFree { free_thresh } => write!(
+                f,
+                "pixels of grey 205, which map savers write for unknown ground, count as free under free_thresh {free_thresh}, \
+                 as in map_server; write free_thresh: 0.196 into the YAML file if they are unknown"
             ),
             Self::Closed { mouths } => {
                 write!(f, "{} closed with kerbs, near {}", are(mouths.len(), "branch", "branches"), listed(mouths))

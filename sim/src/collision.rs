@@ -157,7 +157,9 @@ impl BodyBox {
         let accel_mps2 = state.accel_mps2.max(vehicle.accel_max_mps2);
         let driven_m = (state.speed_mps + accel_mps2 * duration_s) * duration_s;
         let curvature_per_m = state.curvature_per_m(vehicle);
-        let steered_rad = state.steering_rad.abs() + vehicle.steering_rate_max_radps * duration_s;
+        let steering_rad = state.steering_rad.abs();
+        let steered_rad = (steering_rad + vehicle.steering_rate_max_radps * duration_s)
+            .min(vehicle.steering_max_rad.max(steering_rad));
         let curvature_max_per_m = maths::tan(steered_rad) / vehicle.wheelbase_m;
         // Driving on before the sweep changes heading and position of its poses, and so does another curvature.
         let bent_per_m = curvature_max_per_m - curvature_per_m.abs();

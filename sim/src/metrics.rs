@@ -161,7 +161,7 @@ impl SafeRing {
         self.n_pixels
     }
 
-    /// Share of the range that is drivable, 0…1: N_dri / N_ran.
+    /// Share of the range that is drivable, 0…1: N_dri / N_ran; 1 of a range that holds no pixel.
     pub fn safe_ratio(&self, distance: &DistanceField, pose: Pose, pixel_m: f32) -> f32 {
         let world_from_ego = pose.world_from_ego();
         // Where the centre is farther from a boundary than the pixels are from it, one look-up decides.
@@ -189,7 +189,7 @@ impl SafeRing {
             let distances_m = distance.at_four(world_from_ego.four_points(centres));
             n_drivable += distances_m.simd_gt(f32x4::ZERO) & n_pixels;
         }
-        n_drivable.reduce_add() / self.n_pixels as f32
+        if self.n_pixels == 0 { 1.0 } else { n_drivable.reduce_add() / self.n_pixels as f32 }
     }
 }
 

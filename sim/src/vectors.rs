@@ -86,19 +86,19 @@ impl Mul<f32x4> for FourPoints {
 /// Numbers of lanes that are picked without branching.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Picked {
-    numbers: Vec<i16>,
+    numbers: Vec<i32>,
     n_picked: usize,
 }
 
 /// The set bits of every mask, lowest first, and how many there are.
-const SET_LANES: [([i16; 2 * LANES], usize); 1 << LANES] = {
-    let mut table = [([0; 2 * LANES], 0); 1 << LANES];
+const SET_LANES: [([i32; LANES], usize); 1 << LANES] = {
+    let mut table = [([0; LANES], 0); 1 << LANES];
     let mut i = 0;
     while i < LANES << LANES {
         let (mask, lane) = (i / LANES, i % LANES);
         if mask >> lane & 1 == 1 {
             let (lanes, n_set) = &mut table[mask];
-            lanes[*n_set] = lane as i16;
+            lanes[*n_set] = lane as i32;
             *n_set += 1;
         }
         i += 1;
@@ -109,7 +109,7 @@ const SET_LANES: [([i16; 2 * LANES], usize); 1 << LANES] = {
 impl Picked {
     /// Nothing picked, with room for what may be.
     pub(crate) fn up_to(n_lanes: usize) -> Self {
-        Self { numbers: vec![0; n_lanes + 2 * LANES], n_picked: 0 }
+        Self { numbers: vec![0; n_lanes + LANES], n_picked: 0 }
     }
 
     /// Forgets what was picked.
@@ -121,16 +121,16 @@ impl Picked {
     #[inline]
     pub(crate) fn pick(&mut self, first: usize, lanes: u32) {
         let (set_lanes, n_set) = SET_LANES[(lanes & ALL_LANES) as usize];
-        let numbers = i16x8::splat(first as i16) + i16x8::from(set_lanes);
+        let numbers = i32x4::splat(first as i32) + i32x4::from(set_lanes);
         // More are written than are picked: they are overwritten next.
-        self.numbers[self.n_picked..self.n_picked + 2 * LANES].copy_from_slice(numbers.as_array());
+        self.numbers[self.n_picked..self.n_picked + LANES].copy_from_slice(numbers.as_array());
         self.n_picked += n_set;
     }
 
     /// Picks a number, or not.
     #[inline]
     pub(crate) fn pick_if(&mut self, is_picked: bool, number: usize) {
-        self.numbers[self.n_picked] = number as i16;
+        self.numbers[self.n_picked] = number as i32;
         self.n_picked += usize::from(is_picked);
     }
 

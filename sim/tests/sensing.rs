@@ -69,6 +69,23 @@ fn the_fast_grid_is_the_max_pool_of_the_brute_force_view() {
     }
 }
 
+/// Beyond 13 m the bound of the wobble was none: the lattice of the wobble had been made for 12 m.
+#[test]
+fn the_fast_grid_is_the_max_pool_on_wide_patches_as_well() {
+    let map = lane();
+    for side_m in [16.0, 24.0, 40.0] {
+        let mut settings = SensingSettings::paper();
+        settings.geometry.side_m = side_m;
+        let mut sensor = Sensor::new(&map, settings, &NoiseSettings::of(NoiseLevel::Paper), RootSeed(3));
+        for i in 0..40_u32 {
+            let pose = Pose::new(Vec2::new(i as f32 * 0.5, 0.0), maths::sin(i as f32 * 0.21) * 0.9);
+            let fast = sensor.observe(&map, pose, i).grid;
+            let view = sensor.perceived_view(&map, pose, i).to_grid();
+            assert_eq!(fast, view, "side {side_m} m, tick {i}\n{fast}\n{view}");
+        }
+    }
+}
+
 /// Cells may be open altogether through several openings that overlap.
 #[test]
 fn the_fast_grid_is_the_max_pool_where_openings_overlap() {

@@ -69,6 +69,27 @@ impl Settings {
         );
         let travels = &self.expert.branch_travels_m;
         ensure!(travels.is_sorted_by(|a, b| a < b), "expert.branch_travels_m = {travels:?} is not increasing");
+        let clearances = &self.expert.clearances_m;
+        ensure!(
+            clearances.is_sorted_by(|a, b| a >= b),
+            "expert.clearances_m = {clearances:?} increases: it is relaxed"
+        );
+        let band = &self.expert.elastic_band;
+        for (key, from, to) in [
+            ("trust", band.trust_from_m, band.trust_to_m),
+            ("aside", band.aside_from_m, band.aside_to_m),
+            ("gap", band.gap_from_m, band.gap_to_m),
+            ("bend", band.bend_from_rad, band.bend_to_rad),
+        ] {
+            ensure!(from < to, "expert.elastic_band.{key}_from = {from} is not less than {key}_to = {to}");
+        }
+        let step_m = self.expert.first_step_m;
+        let steps = (expert::WAY_SPACING_M / step_m).round();
+        ensure!(
+            steps >= 1.0 && (steps * step_m - expert::WAY_SPACING_M).abs() < 1e-3,
+            "expert.first_step_m = {step_m} does not divide {} m, at which a plan's way is sampled",
+            expert::WAY_SPACING_M
+        );
         self.check_lots()
     }
 

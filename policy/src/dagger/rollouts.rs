@@ -191,10 +191,17 @@ impl Collected {
     /// The same with at most so many samples, spread evenly over all of them; 0 = all.
     #[must_use]
     pub(crate) fn thinned(self, at_most: usize) -> Self {
+        if at_most == 0 || self.round.samples.len() <= at_most {
+            return self;
+        }
         let round = self.round.thinned(at_most);
-        let of = |episode: u32| round.ticks.iter().filter(|tick| tick.episode == episode).count();
-        let episodes = (0..).zip(self.episodes);
-        let episodes = episodes.map(|(index, record)| EpisodeRecord { samples: of(index), ..record }).collect();
+        let mut episodes = self.episodes;
+        for record in &mut episodes {
+            record.samples = 0;
+        }
+        for tick in &round.ticks {
+            episodes[tick.episode as usize].samples += 1;
+        }
         Self { round, episodes, ..self }
     }
 

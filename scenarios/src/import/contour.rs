@@ -6,7 +6,7 @@
 //!
 //! Coordinates are pixels: x to the right, y up, (0, 0) the lower left corner of the map.
 
-use geo::{Contains as _, Coord, LineString, Point, Polygon, Simplify as _};
+use geo::{LineString, Polygon, Simplify as _};
 
 /// Steps of simplification, pixels: the first that leaves sound polygons is taken. A staircase of 45° deviates from its
 /// line by 0.71.
@@ -89,16 +89,9 @@ impl Mask {
     /// A region with the specks that it encloses taken for free, up to an area, and how many.
     pub(super) fn without_specks(mut self, up_to_px2: f64) -> (Self, usize) {
         let specks = self.specks(|area_px2| area_px2 <= up_to_px2);
-        for speck in &specks {
-            let outline = speck.iter().map(|&[x, y]| Coord { x, y }).collect();
-            let inside = Polygon::new(LineString::new(outline), Vec::new());
-            let (cols, rows) = box_around(speck);
-            for pixel in (rows.0..rows.1).flat_map(|row| (cols.0..cols.1).map(move |col| [col, row])) {
-                let [x, y] = pixel.map(|index| f64::from(index) + 0.5);
-                let middle = Point::new(x, y);
-                if let Some(index) = self.index(pixel).filter(|_| inside.contains(&middle)) {
-                    self.is_free[index] = true;
-                }
+        for pixel in specks.iter().flat_map(pixels_within) {
+            if let Some(index) = self.index(pixel) {
+                self.is_free[index] = true;
             }
         }
         (self, specks.len())
@@ -217,6 +210,25 @@ fn box_around(ring: &Ring) -> ((i32, i32), (i32, i32)) {
     (side(0), side(1))
 }
 
+/// The pixels whose middles a ring encloses, row by row: as many steps as it has corners and pixels.
+fn pixels_within(ring: &Ring) -> Vec<[i32; 2]> {
+    let first_middle_from = |at: f64| (at - 0.5).ceil() as i32;
+    let mut crossings: Vec<(i32, f64)> = Vec::new();
+    for (&[x, y], &[next_x, next_y]) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+        let (low, high) = (y.min(next_y), y.max(next_y));
+        crossings.extend((first_middle_from(low)..first_middle_from(high)).map(|row| {
+            let share = (f64::from(row) + 0.5 - y) / (next_y - y);
+            (row, x + share * (next_x - x))
+        }));
+    }
+    crossings.sort_unstable_by(|(row, x), (other_row, other_x)| row.cmp(other_row).then(x.total_cmp(other_x)));
+    let spans =
+        crossings.chunk_by(|(row, _), (other_row, _)| row == other_row).flat_map(|of_row| of_row.chunks_exact(2));
+    spans
+        .flat_map(|span| (first_middle_from(span[0].1)..first_middle_from(span[1].1)).map(|col| [col, span[0].0]))
+        .collect()
+}
+
 fn ahead([col, row]: [i32; 2], [dx, dy]: [i32; 2]) -> [i32; 2] {
     [col + dx, row + dy]
 }
@@ -260,6 +272,34 @@ pub(super) fn simplified(ring: &[[f64; 2]], tolerance_px: f64) -> Ring {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use geo::{Contains as _, Point};
+
+    /// Every pixel was held against the whole ring: a fence across a map took minutes.
+    #[test]
+    fn pixels_within_a_ring_are_those_whose_middles_it_contains() {
+        // A diagonal fence with bays, and pillars at its corners.
+        let fence = mask(&[
+            "##########",
+            "##....####",
+            "#.##...###",
+            "#..##.#..#",
+            "##.###.#.#",
+            "#.#.###..#",
+            "#..#..##.#",
+            "#...##..##",
+            "#........#",
+            "##########",
+        ]);
+        for ring in fence.outlines() {
+            let points: Vec<(f64, f64)> = ring.iter().map(|&[x, y]| (x, y)).collect();
+            let polygon = Polygon::new(LineString::from(points), Vec::new());
+            let contained = (0..10).flat_map(|row| (0..10).map(move |col| [col, row])).filter(|pixel| {
+                let [x, y] = pixel.map(|index| f64::from(index) + 0.5);
+                polygon.contains(&Point::new(x, y))
+            });
+            assert_eq!(pixels_within(&ring), contained.collect::<Vec<_>>(), "{ring:?}");
+        }
+    }
 
     /// A mask drawn as text, top row first; `.` is drivable.
     fn mask(rows: &[&str]) -> Mask {

@@ -57,6 +57,9 @@ enum Flag {
     Number(i64),
 }
 
+/// Unknown ground, as `map_saver` of ROS 1 and 2 writes it.
+const UNKNOWN_GREY: u8 = 205;
+
 impl Default for Flag {
     fn default() -> Self {
         Self::Word(false)
@@ -132,7 +135,9 @@ impl Map {
         if image.width() == 0 || image.height() == 0 {
             return Err(fault("it has no pixels".to_owned(), "save the map again"));
         }
-        Ok((header.map(&image), unknown_keys(&text)))
+        let mut notes = unknown_keys(&text);
+        notes.extend(header.is_unknown_free(&image).then_some(Note::UnknownIsFree { free_thresh: header.free_thresh }));
+        Ok((header.map(&image), notes))
     }
 
     /// The pixel at a point of the map's frame, metres, counted from the lower left.
@@ -229,6 +234,17 @@ impl Header {
             origin_m: [self.origin[0], self.origin[1]],
             yaw: [libm::cos(self.origin[2]), libm::sin(self.origin[2])],
         }
+    }
+
+    /// Whether the image has pixels of the grey that savers of ROS 1 and 2 write for unknown, and they count as free: with
+    /// the thresholds that the saver of ROS 2 writes they do.
+    fn is_unknown_free(&self, image: &DynamicImage) -> bool {
+        let grey = [UNKNOWN_GREY, UNKNOWN_GREY, UNKNOWN_GREY, u8::MAX];
+        let is_there = || match image {
+            DynamicImage::ImageLuma8(pixels) => pixels.as_raw().contains(&UNKNOWN_GREY),
+            other => other.to_rgba8().pixels().any(|pixel| pixel.0 == grey),
+        };
+        self.mode == Mode::Trinary && !self.negate.is_set() && self.is_drivable(grey) && is_there()
     }
 
     /// Red, green, blue, alpha.

@@ -603,3 +603,41 @@ fn keys_that_mean_nothing_are_named_in_a_note() {
     assert_eq!(notes, [Note::Unused { keys: vec!["Z".to_owned(), "negat".to_owned()] }]);
     assert!(notes[0].to_string().contains("\"negat\""), "{}", notes[0]);
 }
+
+/// The saver of ROS 2 writes `free_thresh: 0.25`, with which its own grey for unknown ground is free: nothing said so.
+#[test]
+fn unknown_ground_that_counts_as_free_is_named_in_a_note() {
+    let lot = small_map("unknown-free", "[0, 0, 0]");
+    let notes = || ros::Map::read(&lot.map, false).unwrap().1;
+    assert_eq!(notes(), []);
+    let text = yaml("0.5", "[0, 0, 0]").replace("free_thresh: 0.196", "free_thresh: 0.25");
+    std::fs::write(&lot.map, &text).unwrap();
+    assert_eq!(notes(), [Note::UnknownIsFree { free_thresh: 0.25 }]);
+    assert!(notes()[0].to_string().contains("write free_thresh: 0.196"), "{}", notes()[0]);
+    // Nothing is unknown in a map without that grey.
+    std::fs::write(lot.map.with_extension("pgm"), pgm(&["....", "....", "...."].map(str::to_owned))).unwrap();
+    assert_eq!(notes(), []);
+}
+
+/// A first point with a letter in it was taken for a header, and the route began at the second.
+#[test]
+fn a_first_line_with_a_number_in_it_is_no_header() {
+    let file = folder("header", &[]).join("line.csv");
+    let lot = small_map("header-map", "[0, 0, 0]");
+    let points_of = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        lot.read_centre_line(&file).map(|points| points.len())
+    };
+    assert_eq!(points_of("x,y\n1,2\n3,4\n").unwrap(), 2);
+    for text in ["-15.O,-13.2\n1,2\n3,4\n", "1,y\n1,2\n3,4\n"] {
+        assert!(points_of(text).unwrap_err().to_string().contains("is no point"), "{text}");
+    }
+}
+
+#[test]
+fn a_start_beside_a_centre_line_is_refused() {
+    let mut lot = small_map("start-and-line", "[0, 0, 0]");
+    (lot.start, lot.centre_line) = (Some([1.0, 1.0, 0.0]), Some(lot.map.with_file_name("line.csv")));
+    let error = lot.scenario(&car()).unwrap_err().to_string();
+    assert!(error.contains("start") && error.contains("centre_line is given too"), "{error}");
+}

@@ -557,12 +557,6 @@ pub(super) fn wobble_growth(ahead_of_patch_m: f32) -> f32 {
     1.0 + ahead_of_patch_m / WOBBLE_RANGE_M
 }
 
-/// Nodes per side of a [`Lattice`]: the patch's diagonal at 1 m spacing and one more on either side.
-const LATTICE_NODES: usize = 20;
-
-/// Nodes of a [`Lattice`], and what is read beyond the last when four neighbours are.
-const LATTICE_STORED: usize = LATTICE_NODES * LATTICE_NODES + LANES;
-
 /// Value noise around a place at one instant.
 #[derive(Debug, Clone)]
 struct Lattice {
@@ -571,11 +565,13 @@ struct Lattice {
     per_m: f32,
     amplitude: f32,
     view: LatticeView,
+    /// Nodes per side.
+    n_nodes: usize,
     /// World position of the first node.
     origin: Vec2,
     /// Of the even and of the odd ticks of the noise, one of them the last and one the next.
     draws: [LatticeDraws; 2],
-    /// Values at the nodes, row by row.
+    /// Values at the nodes, row by row, and what is read beyond the last when four neighbours are.
     nodes: Vec<f32>,
 }
 
@@ -600,23 +596,32 @@ impl Lattice {
             origin: Vec2::NAN,
             // Equal to none.
             view: LatticeView { first: Vec2::NAN, tick: 0, phase: 0.0 },
-            draws: std::array::from_fn(|_| LatticeDraws::new()),
-            nodes: vec![0.0; LATTICE_STORED],
+            n_nodes: 0,
+            draws: std::array::from_fn(|_| LatticeDraws::new(0)),
+            nodes: Vec::new(),
         }
     }
 
     /// Turns to a circle of the world at a time, in ticks of the noise; what is drawn stays if it is the same as before.
     fn look_at(&mut self, centre: Vec2, radius_m: f32, time: f32) {
         let first = ((centre - Vec2::splat(radius_m)) / self.spacing_m).floor();
+        // From the node before the circle to the one after it.
+        let n_nodes = (2.0 * radius_m * self.per_m).ceil() as usize + 3;
+        if n_nodes != self.n_nodes {
+            self.n_nodes = n_nodes;
+            self.nodes = vec![0.0; (n_nodes * n_nodes + LANES).next_multiple_of(LANES)];
+            self.draws = std::array::from_fn(|_| LatticeDraws::new(self.nodes.len()));
+            self.view = LatticeView { first: Vec2::NAN, ..self.view };
+        }
         let view = LatticeView { first, tick: time as i32, phase: fade(time.fract()) };
         if view == self.view || self.amplitude == 0.0 {
             return;
         }
         (self.view, self.origin) = (view, first * self.spacing_m);
         let LatticeView { tick, phase, .. } = view;
-        self.draws[parity(tick)].look_at(first, key(self.seed, tick));
+        self.draws[parity(tick)].look_at(first, n_nodes, key(self.seed, tick));
         if phase != 0.0 {
-            self.draws[parity(tick + 1)].look_at(first, key(self.seed, tick + 1));
+            self.draws[parity(tick + 1)].look_at(first, n_nodes, key(self.seed, tick + 1));
         }
         let [last, next] = [tick, tick + 1].map(|tick| self.draws[parity(tick)].nodes.as_chunks::<LANES>().0);
         for ((nodes, &last), &next) in self.nodes.as_chunks_mut::<LANES>().0.iter_mut().zip(last).zip(next) {
@@ -635,14 +640,11 @@ impl Lattice {
             return f32x4::ZERO;
         }
         let nodes = (places - FourPoints::splat(self.origin)) * f32x4::splat(self.per_m);
-        let ((cols, into_x), (rows, into_y)) = (lattice_cells(nodes.x), lattice_cells(nodes.y));
-        let firsts = (rows * f32x4::splat(LATTICE_NODES as f32) + cols).fast_trunc_int().to_array();
+        let last = (self.n_nodes - 2) as f32;
+        let ((cols, into_x), (rows, into_y)) = (lattice_cells(nodes.x, last), lattice_cells(nodes.y, last));
+        let firsts = (rows * f32x4::splat(self.n_nodes as f32) + cols).fast_trunc_int().to_array();
         // Of each place the near nodes and the far ones, and what lies between.
-        let around = firsts.map(|first| {
-            let nodes: &[f32; LATTICE_NODES + LANES] =
-                self.nodes[first as u32 as usize..].first_chunk().expect("spare");
-            nodes
-        });
+        let around = firsts.map(|first| &self.nodes[first as u32 as usize..][..self.n_nodes + LANES]);
         let across = |nodes: [f32x4; LANES]| {
             let [left, right, ..] = f32x4::transpose(nodes);
             left + into_x * (right - left)
@@ -670,17 +672,17 @@ struct LatticeDraws {
 }
 
 impl LatticeDraws {
-    fn new() -> Self {
-        Self { first: Vec2::NAN, key: 0, nodes: vec![0.0; LATTICE_STORED] }
+    fn new(n_stored: usize) -> Self {
+        Self { first: Vec2::NAN, key: 0, nodes: vec![0.0; n_stored] }
     }
 
-    /// Turns to a place and a tick; what is drawn stays if they are the same as before.
-    fn look_at(&mut self, first: Vec2, key: u64) {
+    /// Turns to so many nodes a side at a place and a tick; what is drawn stays if they are the same as before.
+    fn look_at(&mut self, first: Vec2, n_nodes: usize, key: u64) {
         if (first, key) == (self.first, self.key) {
             return;
         }
         (self.first, self.key) = (first, key);
-        for (y, row) in (first.y as i32..).zip(self.nodes[..LATTICE_NODES * LATTICE_NODES].chunks_mut(LATTICE_NODES)) {
+        for (y, row) in (first.y as i32..).zip(self.nodes[..n_nodes * n_nodes].chunks_mut(n_nodes)) {
             for (x, node) in (first.x as i32..).zip(row) {
                 *node = unit(mix(key, x, y));
             }
@@ -688,12 +690,12 @@ impl LatticeDraws {
     }
 }
 
-/// The cells of a [`Lattice`] that hold coordinates, whole numbers, and the faded progress through them, 0…1.
+/// The cells of a [`Lattice`], up to the `last`, that hold coordinates, whole numbers, and the faded progress through them,
+/// 0…1.
 #[inline]
-fn lattice_cells(nodes: f32x4) -> (f32x4, f32x4) {
-    const LAST: f32 = (LATTICE_NODES - 2) as f32;
-    let nodes = nodes.fast_max(f32x4::ZERO);
-    let cells = f32x4::from_i32x4(nodes.fast_trunc_int()).fast_min(f32x4::splat(LAST));
+fn lattice_cells(nodes: f32x4, last: f32) -> (f32x4, f32x4) {
+    let nodes = nodes.fast_max(f32x4::ZERO).fast_min(f32x4::splat(last + 1.0));
+    let cells = f32x4::from_i32x4(nodes.fast_trunc_int()).fast_min(f32x4::splat(last));
     let progress = nodes - cells;
     (cells, progress * progress * (f32x4::splat(3.0) - f32x4::splat(2.0) * progress))
 }
@@ -848,14 +850,15 @@ mod tests {
     /// Also of what a lattice keeps from the views before.
     #[test]
     fn a_lattice_is_value_noise() {
-        let (spacing_m, amplitude, radius_m) = (1.5, 0.4, 8.0);
+        let (spacing_m, amplitude) = (1.5, 0.4);
         let mut lattice = Lattice::new(5, spacing_m, amplitude);
-        for view in 0..60_u32 {
+        // On wide patches it grew with the cube of the distance: by metres at 16 m, kilometres at 20 m.
+        for (view, radius_m) in (0..60_u32).zip([8.0, 8.0, 8.0, 24.0, 24.0, 60.0].into_iter().cycle()) {
             // Standing still now and then, both in time and in place.
             let centre = Vec2::new((view / 7) as f32 * 1.1 - 3.0, (view / 11) as f32 * 0.9);
             let time = (view / 2) as f32 / 3.0;
             lattice.look_at(centre, radius_m, time);
-            let place = |i: usize| centre + 0.25 * i as f32 * maths::unit(2.4 * i as f32);
+            let place = |i: usize| centre + radius_m * i as f32 / 32.0 * maths::unit(2.4 * i as f32);
             for i in 0..32 {
                 let value = lattice.at_four(FourPoints::splat(place(i))).to_array()[i % 4];
                 let expected = amplitude * value_noise(5, place(i) / spacing_m, time);

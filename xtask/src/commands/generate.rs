@@ -166,10 +166,12 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
     lot.is_image_anywhere = *image_anywhere;
     lot.clearance_m = clearance.unwrap_or(lot.clearance_m);
     lot.close_branches |= close_branches;
-    lot.start = start.or(lot.start);
+    // Where it goes, by the flags, or by the file.
     if goal.is_some() || *is_loop || centre_line.is_some() {
         (lot.goal, lot.is_loop, lot.centre_line) = (*goal, *is_loop, centre_line.clone());
+        lot.start = lot.start.filter(|_| centre_line.is_none());
     }
+    lot.start = start.or(lot.start);
     Ok(vec![Lot::of_map(path, &lot, vehicle)?])
 }
 
