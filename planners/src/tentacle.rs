@@ -432,6 +432,22 @@ mod tests {
         assert_eq!(cost_of_straight(&OccupancyGrid::occupied()), 125.0 / 138.0);
     }
 
+    /// Paths may be tighter than the car can drive; to the left the table of starting angles ended before them.
+    #[test]
+    fn a_wheel_beyond_its_limit_starts_at_the_last_angle() {
+        let planner = paper();
+        let limit_rad = context().vehicle.steering_max_rad;
+        assert_eq!(
+            [-2.0, -1.0, 0.0, 1.0, 2.0].map(|share| planner.start(share * limit_rad)),
+            [0, 0, STARTS, 2 * STARTS, 2 * STARTS]
+        );
+        let mut tight = Params { curvature_max_per_m: 0.5, ..Params::paper() }.planner(&context());
+        let observation = Observation { grid: grid_with(&[(20, 12), (20, 13), (20, 14), (20, 15)]) };
+        for _ in 0..200 {
+            assert!(tight.act(&observation).look_ahead.ahead_m.is_finite());
+        }
+    }
+
     #[test]
     fn forward_is_the_share_of_the_largest_curvature() {
         let planner = paper();

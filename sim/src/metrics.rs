@@ -379,8 +379,12 @@ mod tests {
     fn skipping_blocks_changes_no_pixel() {
         let lane = [Vec2::new(-9.0, -1.3), Vec2::new(9.0, -1.6), Vec2::new(8.0, 1.7), Vec2::new(-9.0, 1.4)];
         let distance = DistanceField::of_boundary(&lane);
-        let ring = ring();
-        for i in 0..40 {
+        // Small pixels make more than ten thousand blocks; from 8192 on others were looked at.
+        let of_pixels =
+            |pixel_m| (SafeRing::new(&VehicleSettings::hyundai_hg300(), &MetricsSettings::paper(), pixel_m), pixel_m);
+        let rings = [of_pixels(0.06), of_pixels(0.01)];
+        assert!(rings[1].0.quarters.len() > 8192, "{} blocks", rings[1].0.quarters.len());
+        for (i, (ring, pixel_m)) in (0..40).zip(rings.iter().cycle()) {
             let pose = Pose::new(Vec2::new(-4.0 + 0.2 * i as f32, 0.1), 0.02 * i as f32);
             let world_from_ego = pose.world_from_ego();
             let pixels = ring.pixels.iter().flat_map(|FourSquares { centres, n_pixels }| {
@@ -388,8 +392,17 @@ mod tests {
                 (0..LANES).filter(move |&i| n_pixels[i] == 1.0).map(move |i| Vec2::new(xs[i], ys[i]))
             });
             let brute = pixels.filter(|&pixel| distance.at(world_from_ego.point(pixel)) > 0.0).count();
-            assert_eq!(ring.safe_ratio(&distance, pose, 0.06), brute as f32 / ring.n_pixels() as f32);
+            assert_eq!(ring.safe_ratio(&distance, pose, *pixel_m), brute as f32 / ring.n_pixels() as f32);
         }
+    }
+
+    #[test]
+    fn a_range_without_a_pixel_is_wholly_drivable_and_no_nan() {
+        let settings = MetricsSettings { safe_range_m: 0.001, ..MetricsSettings::paper() };
+        let ring = SafeRing::new(&VehicleSettings::hyundai_hg300(), &settings, 0.06);
+        let lane = [Vec2::new(-9.0, -1.3), Vec2::new(9.0, -1.3), Vec2::new(9.0, 1.3), Vec2::new(-9.0, 1.3)];
+        assert_eq!(ring.n_pixels(), 0);
+        assert_eq!(ring.safe_ratio(&DistanceField::of_boundary(&lane), Pose::default(), 0.06), 1.0);
     }
 
     #[test]
