@@ -135,6 +135,11 @@ impl Driven<'_> {
         })
     }
 
+    /// How every driver stands in a slice.
+    pub fn estimates(&self, slice: &Slice) -> Vec<DriverEstimate> {
+        self.results.judge(0, slice, 0, self.plan.settings.evaluation.seed).0
+    }
+
     /// How the drivers compare with DAgger over all their trainings; `None` if there are too few of them.
     pub fn judge_trainings(&self, slice: &Slice) -> Option<JudgedTeams> {
         let Plan { settings, drivers, .. } = self.plan;

@@ -166,20 +166,20 @@ pub fn run(
 ) -> anyhow::Result<bool> {
     let folder = |chain: Chain| root.join(chain.folder(settings.seed));
     let by = settings.dagger.fit.validation;
+    let pair = Pair::open(root, settings.seed, by)?;
+    let iterations = pair.iterations();
+    let Pair { weighted, unweighted } = &pair;
+    let others: Vec<RootSeed> = seeds.iter().copied().filter(|&seed| seed != settings.seed).collect();
+    let mut drives = Drives::new(settings, 3 + 2 * iterations, others.len() as u32, progress);
     let mut ratios_of_others: Vec<Vec<f64>> = Vec::new();
-    // One after another: their samples take hundreds of megabytes.
-    for &seed in seeds.iter().filter(|&&seed| seed != settings.seed) {
-        if progress.is_cancelled() {
+    for seed in others {
+        if !drives.begin_other(&format!("seed {}", seed.0)) {
             return Ok(false);
         }
         let other = Pair::open(root, seed, by)?;
         let ratio = |iteration| Ok(ratio_of_sums(&other.tau_hats(iteration, settings)?));
         ratios_of_others.push((1..=other.iterations()).map(ratio).collect::<anyhow::Result<_>>()?);
     }
-    let pair = Pair::open(root, settings.seed, by)?;
-    let iterations = pair.iterations();
-    let Pair { weighted, unweighted } = &pair;
-    let mut drives = Drives::new(settings, 3 + 2 * iterations, progress);
     let mut calibration = Vec::new();
     for (name, path, chain, rounds) in [
         ("BC", weighted.store.round_folder(0), weighted, 0),
@@ -216,23 +216,37 @@ struct Drives<'a> {
     settings: &'a Settings,
     by_folder: BTreeMap<PathBuf, Collected>,
     progress: &'a dyn Progress,
+    /// Policies that drive at most, and pairs of trainings that are compared without driving: they take about as long.
     at_most: u32,
+    others_begun: u32,
 }
 
 impl<'a> Drives<'a> {
-    fn new(settings: &'a Settings, at_most: u32, progress: &'a dyn Progress) -> Self {
+    fn new(settings: &'a Settings, policies: u32, others: u32, progress: &'a dyn Progress) -> Self {
         progress.begin("on-policy rollouts", "on-policy rollouts");
-        Self { settings, by_folder: BTreeMap::new(), progress, at_most }
+        Self { settings, by_folder: BTreeMap::new(), progress, at_most: policies + others, others_begun: 0 }
+    }
+
+    /// Says what is done next; `false` if cancelled.
+    fn says(&self, what: &str) -> bool {
+        let done = self.by_folder.len() as f64 + f64::from(self.others_begun);
+        self.progress.at(done / f64::from(self.at_most), &mut |_| what.to_owned());
+        !self.progress.is_cancelled()
+    }
+
+    /// Another pair of trainings is compared, without driving; `false` if cancelled.
+    fn begin_other(&mut self, name: &str) -> bool {
+        let goes_on = self.says(name);
+        self.others_begun += 1;
+        goes_on
     }
 
     /// Of the policy in a folder; `None` if cancelled.
     fn of(&mut self, folder: &Path) -> anyhow::Result<Option<&Collected>> {
-        if self.progress.is_cancelled() {
+        if !self.says(&folder.display().to_string()) {
             return Ok(None);
         }
         if !self.by_folder.contains_key(folder) {
-            let done = self.by_folder.len();
-            self.progress.at(done as f64 / f64::from(self.at_most), &mut |_| folder.display().to_string());
             let collected = rollout(self.settings, &Checkpoint::load(folder)?)?;
             self.by_folder.insert(folder.to_owned(), collected);
         }

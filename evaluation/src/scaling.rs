@@ -26,6 +26,11 @@ pub fn folder(different_lots: u32) -> String {
     format!("lots-{different_lots:04}")
 }
 
+/// Different lots that a training met in so many rounds: a round drives no more of a kind than are listed of it.
+pub fn lots_met(listed_of_kinds: impl IntoIterator<Item = usize>, different_lots: u32, rounds: usize) -> usize {
+    listed_of_kinds.into_iter().map(|listed| (different_lots as usize).min(rounds * listed)).sum()
+}
+
 /// Names in tables of what was trained on so many lots of a kind: behaviour cloning, `DAgger`.
 pub fn names(different_lots: u32) -> [String; 2] {
     ["BC", "DAgger"].map(|name| format!("{name}, {different_lots} of a kind"))
@@ -63,6 +68,13 @@ pub fn stages(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Behaviour cloning, which has one round, was said to have met four times the lots that it had.
+    #[test]
+    fn a_round_meets_no_more_lots_than_are_listed() {
+        let met = |different, rounds| lots_met([16, 16, 4], different, rounds);
+        assert_eq!([met(1, 1), met(16, 1), met(64, 1), met(64, 4)], [3, 36, 36, 144]);
+    }
 
     #[test]
     fn trainings_differ_in_the_number_of_lots_alone_and_all_are_driven() {

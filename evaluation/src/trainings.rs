@@ -29,21 +29,22 @@ pub struct Team {
 /// again is the same network, and counts once.
 pub fn teams(drivers: &[NamedDriver]) -> Vec<Team> {
     let mut teams: Vec<Team> = Vec::new();
+    let recipe = |index: usize| drivers[index].training.as_ref().map(|training| &training.recipe);
     for (index, driver) in drivers.iter().enumerate() {
-        let recipe = |index: usize| drivers[index].training.as_ref().map(|training| &training.recipe);
-        let is_alike = |team: &&mut Team| recipe(index).is_some() && recipe(team.drivers[0]) == recipe(index);
-        match teams.iter_mut().find(is_alike) {
-            Some(team) if driver.training.as_ref().is_some_and(|of| team.seeds.contains(&of.seed.0)) => {}
+        let alone = |seeds| Team { name: driver.name.clone(), drivers: vec![index], seeds };
+        let Some(training) = &driver.training else {
+            teams.push(alone(Vec::new()));
+            continue;
+        };
+        let seed = training.seed.0;
+        match teams.iter_mut().find(|team| recipe(team.drivers[0]) == Some(&training.recipe)) {
             Some(team) => {
-                let seed = driver.training.as_ref().map_or(0, |of| of.seed.0);
-                let place = team.seeds.partition_point(|&other| other < seed);
-                team.seeds.insert(place, seed);
-                team.drivers.insert(place, index);
+                if let Err(place) = team.seeds.binary_search(&seed) {
+                    team.seeds.insert(place, seed);
+                    team.drivers.insert(place, index);
+                }
             }
-            None => {
-                let seeds = driver.training.iter().map(|of| of.seed.0).collect();
-                teams.push(Team { name: driver.name.clone(), drivers: vec![index], seeds });
-            }
+            None => teams.push(alone(vec![seed])),
         }
     }
     teams.retain(|team| team.drivers.len() == 1 || team.drivers.len() >= TRAININGS_MIN);

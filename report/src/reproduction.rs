@@ -8,7 +8,7 @@ use crate::other_run::OtherRun;
 use crate::page::{Image, Page};
 use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
 use crate::table1::{AGREEMENT, READ_ETA_HAT};
-use crate::trainings;
+use crate::trainings::{self, Place};
 use evaluation::calibration::AxisCalibration;
 use evaluation::conclusions::{self, Against, BC, DAGGER, Driven, Statement, Verdict};
 use evaluation::format::{difference, exact_rate, quoted_interval, quoted_rate};
@@ -54,8 +54,7 @@ pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
 }
 
 /// Writes the same as a page of the documentation, with what made it in its head (this program lies at `revision`), and the
-/// tables of other runs at its end;
-/// figures go to `pictures/results` beside it.
+/// tables of other runs at its end; figures go to `pictures/results` beside it.
 ///
 /// # Errors
 /// If what a stage wrote cannot be read, or a file cannot be written.
@@ -154,13 +153,10 @@ fn headline(page: &mut Page, reference: &Driven<'_>, unseen: &Driven<'_>) {
     let mut table =
         table_of(&["driver", "lots", "route", "near-collisions", "per 100 m [95 %]", "contacts", "least clearance"]);
     for (driven, label) in [(reference, "the paper's three"), (unseen, "unseen, generated")] {
-        let slice = driven.all();
-        let judged = driven.judge_trainings(&slice);
-        let (estimates, _) = driven.results.judge(0, &slice, 0, driven.plan.settings.evaluation.seed);
+        let place = Place::new(label, driven, driven.all());
         for name in ["expert", DAGGER, BC, "tentacle, tuned"] {
             let Some(driver) = driven.driver(name) else { continue };
-            let judged = (estimates.as_slice(), judged.as_ref());
-            table.add_row(trainings::headline_row(driven, &slice, driver, label, judged));
+            table.add_row(trainings::headline_row(&place, driver));
         }
     }
     page.section(
@@ -362,9 +358,8 @@ fn count_of_paper(driver: usize, label: &str) -> Option<(u32, f64)> {
 }
 
 fn rates_table(driven: &Driven<'_>, with_paper: bool) -> String {
-    let judged = |slice: &Slice| driven.results.judge(0, slice, 0, driven.plan.settings.evaluation.seed).0;
-    let estimates: Vec<_> = driven.results.slices().iter().map(judged).collect();
     let slices = driven.results.slices();
+    let estimates: Vec<_> = slices.iter().map(|slice| driven.estimates(slice)).collect();
     let cell = |driver: usize, slice: &Slice| {
         let totals = driven.results.totals(0, driver, slice, None);
         let index = slices.iter().position(|known| known == slice).expect("one of them");
@@ -430,7 +425,7 @@ fn bars_beside_paper(
 /// A row per driver, its lots together.
 fn rates_of_all(driven: &Driven<'_>) -> String {
     let slice = driven.all();
-    let (estimates, _) = driven.results.judge(0, &slice, 0, driven.plan.settings.evaluation.seed);
+    let estimates = driven.estimates(&slice);
     let row = |(driver, entry): (usize, &NamedDriver)| {
         let totals = driven.results.totals(0, driver, &slice, None);
         let name = entry.name.clone();
@@ -449,8 +444,7 @@ fn rates_of_all(driven: &Driven<'_>) -> String {
 
 fn safe_ratios(page: &mut Page, driven: &Driven<'_>) {
     let slices = driven.results.slices();
-    let seed = driven.plan.settings.evaluation.seed;
-    let estimates: Vec<_> = slices.iter().map(|slice| driven.results.judge(0, slice, 0, seed).0).collect();
+    let estimates: Vec<_> = slices.iter().map(|slice| driven.estimates(slice)).collect();
     let cell = |driver: usize, slice: &Slice| {
         let index = slices.iter().position(|known| known == slice).expect("one of them");
         let interval = estimates[index][driver].safe_ratio;
@@ -500,7 +494,7 @@ fn decision_rules(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::R
         "safe ratio",
     ]);
     let slice = driven.all();
-    let (estimates, _) = driven.results.judge(0, &slice, 0, driven.plan.settings.evaluation.seed);
+    let estimates = driven.estimates(&slice);
     let chains = [Chain::Weighted, Chain::AnyBelow, Chain::TauOnly];
     for (driver, chain) in chains.into_iter().enumerate() {
         let rows = rows_of(root, chain, seed)?;

@@ -118,11 +118,11 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
         let expert_s = (row.ticks - row.novice_ticks) as f64 * control_period_s;
         row.intervention_s = if row.interventions > 0 { expert_s / row.interventions as f64 } else { 0.0 };
     }
-    let table = to_markdown(&pooled);
-    run.write("rules.md", format!("{table}\n").as_bytes())?;
+    let text = format!("{}\n\n{}", to_markdown(&pooled), legend(extent));
+    run.write("rules.md", format!("{text}\n").as_bytes())?;
     run.write("rules.csv", &csv_of(&[pooled.clone(), rows].concat())?)?;
     run.write("rules.svg", plot(&pooled).as_bytes())?;
-    Ok(table)
+    Ok(text)
 }
 
 /// Adds what collecting gave and cost. Behaviour cloning (`rule` = `None`) is round 0, a rule's are the rounds after it.
@@ -171,6 +171,18 @@ fn pool(rows: &[Row], title: &str) -> Row {
 /// Share of the ticks, percent.
 fn percent(part: u64, ticks: u64) -> f64 {
     100.0 * part as f64 / ticks.max(1) as f64
+}
+
+/// How the table is read.
+fn legend(extent: &Extent) -> String {
+    let (trainings, intervals) = match extent.seeds {
+        1 => ("one training of each rule".to_owned(), "other lots"),
+        seeds => (format!("{seeds} trainings of each rule, summed up; rates are means"), "other lots and other seeds"),
+    };
+    format!(
+        "Of {trainings}. Intervals of 95 % are for {intervals}; a difference that excludes zero (*) is one of several \
+         comparisons, and no adjustment is made for their number."
+    )
 }
 
 fn to_markdown(rows: &[Row]) -> String {

@@ -84,9 +84,8 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
         let folder = run.path().join(scaling::folder(different));
         let table1 = Table1::read(&folder)?.with_context(|| format!("{}: no table1.json", folder.display()))?;
         let samples = [table1.rows.first(), table1.rows.last()].map(|row| row.map_or(0, |row| row.dataset));
-        // A round drives no more lots of a kind than are listed.
-        let met = |rounds: usize| of_kind.values().map(|&listed| (different as usize).min(rounds * listed)).sum();
-        let lots_met = [met(1), met(table1.rows.len())];
+        let lots_met =
+            [1, table1.rows.len()].map(|rounds| scaling::lots_met(of_kind.values().copied(), different, rounds));
         for (part, method) in ["BC", "DAgger"].into_iter().enumerate() {
             // Behaviour cloning has one round: it may be the same network again.
             let is_known = |row: &Row| row.method == method && row.different_lots == lots_met[part];

@@ -37,53 +37,49 @@ fn list(each: &[Totals], count: fn(&Totals) -> u32) -> String {
     each.iter().map(|totals| count(totals).to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// Near-collisions, contacts and least clearance of a driver, of all its trainings where there are several. `estimates` are
-/// of every driver in the slice.
-pub(crate) fn headline_row(
-    driven: &Driven<'_>,
-    slice: &Slice,
-    driver: usize,
-    lots: &str,
-    (estimates, judged): (&[DriverEstimate], Option<&JudgedTeams>),
-) -> [String; 7] {
+/// Lots that were driven, and how all drivers and teams of trainings stand there.
+pub(crate) struct Place<'a> {
+    lots: &'static str,
+    driven: &'a Driven<'a>,
+    slice: Slice,
+    estimates: Vec<DriverEstimate>,
+    trainings: Option<JudgedTeams>,
+}
+
+impl<'a> Place<'a> {
+    pub(crate) fn new(lots: &'static str, driven: &'a Driven<'a>, slice: Slice) -> Self {
+        let (estimates, trainings) = (driven.estimates(&slice), driven.judge_trainings(&slice));
+        Self { lots, driven, slice, estimates, trainings }
+    }
+
+    fn totals(&self, driver: usize) -> Totals {
+        self.driven.results.totals(0, driver, &self.slice, None)
+    }
+}
+
+/// Near-collisions, contacts and least clearance of a driver, of all its trainings where there are several.
+pub(crate) fn headline_row(place: &Place<'_>, driver: usize) -> [String; 7] {
+    let judged = place.trainings.as_ref();
     let of_team = judged.and_then(|judged| judged.of(driver)).filter(|(team, _)| team.drivers.len() > 1);
     let drivers = of_team.map_or(std::slice::from_ref(&driver), |(team, _)| &team.drivers);
-    let totals = |&driver: &usize| driven.results.totals(0, driver, slice, None);
-    let each: Vec<Totals> = drivers.iter().map(totals).collect();
-    let name = &driven.plan.drivers[driver].name;
+    let each: Vec<Totals> = drivers.iter().map(|&driver| place.totals(driver)).collect();
+    let name = &place.driven.plan.drivers[driver].name;
     let reference_m = each[0].reference_m;
     let clearance_m = each.iter().filter_map(|totals| totals.clearance_min_m).reduce(f32::min);
     [
         if each.len() > 1 { format!("{name}, {} trainings", each.len()) } else { name.clone() },
-        lots.to_owned(),
+        place.lots.to_owned(),
         format!("{reference_m:.0} m"),
         list(&each, |totals| totals.near_collisions),
         match of_team {
             Some((_, estimate)) if each.iter().any(|totals| totals.near_collisions > 0) => {
                 interval(estimate.per_100m, 2)
             }
-            _ => quoted_rate(&each[0], &estimates[driver]),
+            _ => quoted_rate(&each[0], &place.estimates[driver]),
         },
         list(&each, |totals| totals.contacts),
         clearance_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2} m")),
     ]
-}
-
-/// Lots that every training drove, and how all drivers stand there; `None` where there are none.
-struct Place<'a> {
-    lots: &'static str,
-    driven: &'a Driven<'a>,
-    judged: Option<(Slice, Vec<DriverEstimate>)>,
-}
-
-impl<'a> Place<'a> {
-    fn new(lots: &'static str, driven: &'a Driven<'a>, slice: Option<Slice>) -> Self {
-        let judged = slice.map(|slice| {
-            let (estimates, _) = driven.results.judge(0, &slice, 0, driven.plan.settings.evaluation.seed);
-            (slice, estimates)
-        });
-        Self { lots, driven, judged }
-    }
 }
 
 /// Every training by itself, then the means over the seeds.
@@ -94,43 +90,38 @@ pub(crate) fn by_seed(
     reference: &Driven<'_>,
     unseen: &Driven<'_>,
 ) -> anyhow::Result<String> {
+    let place = |lots, driven, slice: Option<Slice>| slice.map(|slice| Place::new(lots, driven, slice));
     let places = [
-        Place::new("the paper's", reference, Some(reference.all())),
-        Place::new("of them not trained on", reference, reference.unseen()),
-        Place::new("unseen, generated", unseen, Some(unseen.all())),
+        place("the paper's", reference, Some(reference.all())),
+        place("of them not trained on", reference, reference.unseen()),
+        place("unseen, generated", unseen, Some(unseen.all())),
     ];
     let mut table =
         table_of(&["policy", "seed", "η̂", "the paper's lots", "of them not trained on", "unseen generated lots"]);
     for (base, chain) in [(BC, None), (DAGGER, Some(Chain::Weighted)), (UNWEIGHTED, Some(Chain::Unweighted))] {
         for seed in stages::seeds(settings, extent) {
             let name = named(base, seed, settings);
-            let cell = |Place { driven, judged, .. }: &Place<'_>| {
-                let found = driven.driver(&name).zip(judged.as_ref());
-                found.map_or_else(String::new, |(driver, (slice, estimates))| {
-                    let totals = driven.results.totals(0, driver, slice, None);
-                    format!("{}: {}", totals.near_collisions, quoted_rate(&totals, &estimates[driver]))
+            let cell = |place: &Option<Place<'_>>| {
+                let found = place.as_ref().and_then(|place| Some((place, place.driven.driver(&name)?)));
+                found.map_or_else(String::new, |(place, driver)| {
+                    let totals = place.totals(driver);
+                    format!("{}: {}", totals.near_collisions, quoted_rate(&totals, &place.estimates[driver]))
                 })
             };
             let rows = chain.map_or_else(|| Ok(Vec::new()), |chain| rows_of(root, chain, seed))?;
             let shares = rows.iter().filter_map(|row| row.eta_hat).map(|share| format!("{share:.3}"));
-            table.add_row([
-                base.to_owned(),
-                seed.0.to_string(),
-                shares.collect::<Vec<_>>().join(", "),
-                cell(&places[0]),
-                cell(&places[1]),
-                cell(&places[2]),
-            ]);
+            table.add_row(
+                [base.to_owned(), seed.0.to_string(), shares.collect::<Vec<_>>().join(", ")]
+                    .into_iter()
+                    .chain(places.iter().map(cell)),
+            );
         }
     }
     let mut over_seeds = table_of(&HEADER);
-    for Place { lots, driven, judged } in &places {
-        let Some((slice, _)) = judged else { continue };
-        let judged = driven.judge_trainings(slice);
-        for (team, estimate) in judged.iter().flat_map(|judged| &judged.teams) {
-            let totals = |&driver: &usize| driven.results.totals(0, driver, slice, None);
-            let each: Vec<Totals> = team.drivers.iter().map(totals).collect();
-            over_seeds.add_row(row(team, lots, &each, estimate, team.name != DAGGER));
+    for place in places.iter().flatten() {
+        for (team, estimate) in place.trainings.iter().flat_map(|judged| &judged.teams) {
+            let each: Vec<Totals> = team.drivers.iter().map(|&driver| place.totals(driver)).collect();
+            over_seeds.add_row(row(team, place.lots, &each, estimate, team.name != DAGGER));
         }
     }
     let mut text = format!(
@@ -190,18 +181,15 @@ mod tests {
             }
         }
         let driven = Driven { plan: &plan, results: &results };
-        let slice = driven.all();
-        let judged = driven.judge_trainings(&slice);
-        let (estimates, _) = driven.results.judge(0, &slice, 0, RootSeed(1));
-        let row = |driver| headline_row(&driven, &slice, driver, "lots", (&estimates, judged.as_ref()));
+        let place = Place::new("lots", &driven, driven.all());
+        let row = |driver| headline_row(&place, driver);
         let expected =
             ["DAgger, 3 trainings", "lots", "3000 m", "30, 60, 90", "2.00 [0.00, 4.48]", "0, 0, 0", "0.70 m"];
         assert_eq!(row(1), expected);
         assert_eq!(row(0)[..4], ["expert", "lots", "3000 m", "0"]);
         assert!(row(0)[4].contains("one-sided"), "{:?}", row(0));
-        let (team, estimate) = judged.as_ref().unwrap().of(0).unwrap();
-        let totals = driven.results.totals(0, 0, &slice, None);
-        assert_eq!(row_of_others(team, totals, estimate), "-2.000 [-4.484, +0.484]");
+        let (team, estimate) = place.trainings.as_ref().unwrap().of(0).unwrap();
+        assert_eq!(row_of_others(team, place.totals(0), estimate), "-2.000 [-4.484, +0.484]");
     }
 
     fn row_of_others(team: &Team, totals: Totals, estimate: &TeamEstimate) -> String {

@@ -4,6 +4,7 @@ use crate::statistics::poisson::Rate;
 use crate::statistics::student::{half_width_of_mean, together};
 use crate::trainings::Team;
 use experiment::drivers::NamedDriver;
+use experiment::run_dir::Training;
 use experiment::settings::Settings;
 use experiment::trials::Purpose;
 use sim::frame::Ending;
@@ -41,6 +42,20 @@ fn results(drivers: usize, of: impl Fn(usize, &Trial<'_>) -> Option<EpisodeRepor
 
 fn slice(results: &EvaluationResults, label: &str) -> Slice {
     results.slices().into_iter().find(|slice| slice.label == label).unwrap()
+}
+
+/// Of two networks the second was trained on lot b, and lot b was "unseen" all the same.
+#[test]
+fn what_any_driver_was_trained_on_is_not_unseen() {
+    let settings = Settings::preset("default").unwrap();
+    let lots = Lot::parse_all(&["reference"], &settings.episode.vehicle).unwrap();
+    let mut named = drivers_named(2);
+    let lots_of_second = vec!["lot-b".to_owned(), "no/such/lot.toml".to_owned()];
+    named[1].training = Some(Training { recipe: String::new(), seed: RootSeed(1), lots: lots_of_second });
+    let plan = Plan { settings: &settings, drivers: &named, lots: &lots, compare_with: 0, shard: None };
+    let results = EvaluationResults::new(&plan);
+    let unseen = results.groups().iter().filter(|group| !group.is_trained_on).map(|group| group.name.as_str());
+    assert_eq!(unseen.collect::<Vec<_>>(), ["lot-c"]);
 }
 
 #[test]
