@@ -129,6 +129,11 @@ fn settings_and_folders_that_cannot_be_used_leave_nothing() {
     }
     let around = ["evaluate", "--driver", "expert", "--lots", mine, "--out", "scenarios", "--overwrite"];
     refuses(&around, &["--out scenarios", "scenarios/examples/slalom.toml", "choose another --out"]);
+    let key = "expert@lot-b@forward@0@paper@1@9";
+    for (flag, value) in [("--trial", "3"), ("--lots", "lot-a"), ("--noise", "clean"), ("--seed", "2")] {
+        let both = ["render", "animation", key, flag, value, "--out", &out];
+        refuses(&both, &[flag, "cannot be used with"]);
+    }
     let long = ["render", "animation", "--driver", "expert", "--lots", "lot-b", "--speed", "0.1", "--fps", "50"];
     refuses(&[&long[..], &["--out", &out]].concat(), &["pictures", "--from and --to", "--speed"]);
     assert!(!Path::new(&out).exists());

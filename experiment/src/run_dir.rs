@@ -677,7 +677,16 @@ mod tests {
         let stage = || run.stage("elsewhere", &place(&path, false), &settings);
         let first = stage().unwrap();
         assert!(message(stage()).contains(&owner), "a folder within a run has an owner, too");
-        drop((first, run));
+        // A finished stage is free, but its list stands in that of the run.
+        first.unwrap().finish(Outcome::Reproduction { stages: 1 }).unwrap();
+        assert!(message(RunDir::reopen(&path.join("elsewhere"), "render")).contains(&owner));
+        drop(run);
+        let stage = RunDir::reopen(&path.join("elsewhere"), "render").unwrap();
+        assert!(message(RunDir::reopen(&path, "render")).contains("in use by render"), "until the stage is written");
+        stage.write("report.html", b"anew").unwrap();
+        stage.list_again().unwrap();
+        assert_eq!(sums::verify(&path).faults, []);
+        drop(stage);
         create(&path, true).unwrap();
         fs::remove_dir_all(path).unwrap();
     }

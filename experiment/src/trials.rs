@@ -164,6 +164,25 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
+    /// Sixteen trials of a lot from a file held sixteen times its raster.
+    #[test]
+    fn trials_of_a_lot_share_a_map_each_way_and_drawn_ones_do_not() {
+        let settings = EpisodeSettings::paper();
+        let lots = Lot::parse_all(&["lot-b", "test:1:easy"], &settings.vehicle).unwrap();
+        let trials: Vec<_> = Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 2, &Direction::BOTH).collect();
+        let maps = maps(&trials, &settings).unwrap();
+        for (trial, map) in trials.iter().zip(&maps) {
+            assert_eq!(map.scenario(), trial.map(&settings).unwrap().scenario());
+        }
+        let of = |lot: &str, way| {
+            let maps = trials.iter().zip(&maps).filter(|(trial, _)| trial.lot.name() == lot && trial.direction == way);
+            let maps: Vec<_> = maps.map(|(_, map)| map).collect();
+            Arc::ptr_eq(maps[0], maps[1])
+        };
+        assert_eq!(Direction::BOTH.map(|way| of("test-easy-0", way)), [true, true]);
+        assert_eq!(Direction::BOTH.map(|way| of("lot-b", way)), [false, false]);
+    }
+
     #[test]
     fn no_two_trials_share_a_seed_even_under_one_root() {
         let root = RootSeed(1);

@@ -72,16 +72,16 @@ impl Settings {
         let clearances = &self.expert.clearances_m;
         ensure!(
             clearances.is_sorted_by(|a, b| a >= b),
-            "expert.clearances_m = {clearances:?} increases: it is relaxed"
+            "expert.clearances_m = {clearances:?} increases; write the comfortable one first"
         );
         let band = &self.expert.elastic_band;
-        for (key, from, to) in [
-            ("trust", band.trust_from_m, band.trust_to_m),
-            ("aside", band.aside_from_m, band.aside_to_m),
-            ("gap", band.gap_from_m, band.gap_to_m),
-            ("bend", band.bend_from_rad, band.bend_to_rad),
+        for (from_key, from, to_key, to) in [
+            ("trust_from_m", band.trust_from_m, "trust_to_m", band.trust_to_m),
+            ("aside_from_m", band.aside_from_m, "aside_to_m", band.aside_to_m),
+            ("gap_from_m", band.gap_from_m, "gap_to_m", band.gap_to_m),
+            ("bend_from_rad", band.bend_from_rad, "bend_to_rad", band.bend_to_rad),
         ] {
-            ensure!(from < to, "expert.elastic_band.{key}_from = {from} is not less than {key}_to = {to}");
+            ensure!(from < to, "expert.elastic_band.{from_key} = {from} is not less than {to_key} = {to}");
         }
         let step_m = self.expert.first_step_m;
         let steps = (expert::WAY_SPACING_M / step_m).round();

@@ -38,8 +38,8 @@ pub(crate) struct TrialArgs {
 }
 
 impl TrialArgs {
-    /// The names of the flags but the settings', which a drive that is named otherwise leaves no room for.
-    pub(crate) const FLAGS: [&str; 4] = ["lot", "direction", "noise", "seed"];
+    /// The names of the flags, which a drive that is named otherwise leaves no room for.
+    pub(crate) const FLAGS: [&str; 5] = ["lot", "direction", "trial", "noise", "seed"];
 
     /// The settings, and a key for each of the drivers.
     ///

@@ -19,7 +19,10 @@ pub(crate) struct ScalingArgs {
     #[command(flatten)]
     common: TrainingsArgs,
     /// Different lots of each kind that is trained on; one training each.
-    #[arg(long, value_name = "N", num_args = 1.., value_delimiter = ',', default_values_t = [1, 4, 16, 64], conflicts_with = "resume")]
+    #[arg(
+        long, value_name = "N", num_args = 1.., value_delimiter = ',', default_values_t = [1, 4, 16, 64],
+        conflicts_with = "resume"
+    )]
     different: Vec<u32>,
     /// Lots that all policies are driven on, once each way.
     #[arg(
