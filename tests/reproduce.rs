@@ -9,17 +9,21 @@ use std::time::Duration;
 use storage::sums;
 
 /// Stages of a smoke run, in their order.
-const STAGES: [&str; 13] = [
+const STAGES: [&str; 17] = [
     "chains/s1-weighted",
     "chains/s1-unweighted",
     "chains/s1-any-below",
     "chains/s1-tau-only",
     "chains/s1-expert-only",
     "chains/s1-alpha-15",
+    "chains/s1-far-points",
     "drives/reference",
     "drives/unseen",
     "drives/rules",
     "drives/controls",
+    "drives/far-points",
+    "drives/readings",
+    "drives/readings-unseen",
     "drives/unsmoothed",
     "drives/smoothed",
     "on-policy",
@@ -88,7 +92,9 @@ fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
         "any below",
         "### Controls",
         "expert's data alone",
+        "### Half and far points",
         "### Action smoothing",
+        "### Readings of the planners",
         "### Calibration",
         "within 1 σ",
         "](figures/rates-beside-paper.svg)",
@@ -109,6 +115,11 @@ fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
         let row = row("### Action smoothing", name);
         assert_eq!(row[2], counted(whole, "unsmoothed", name), "{name}");
         assert_eq!(row[4], counted(whole, "smoothed", name), "{name}");
+    }
+    for name in ["DAgger", "tentacle/short", "dwa/fox", "cvm", "cvm/simmons"] {
+        let row = row("### Readings of the planners", name);
+        assert_eq!(row[2], counted(whole, "readings", name), "{name}");
+        assert_eq!(row[5], counted(whole, "readings-unseen", name), "{name}");
     }
     assert_ne!(counted(whole, "smoothed", "vvf"), "0 (0)", "or the tables could be empty");
 
@@ -368,7 +379,9 @@ fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
     let table = std::fs::read_to_string(out.join("rules.md")).unwrap();
     let rows: Vec<&str> = table.lines().filter(|line| line.starts_with("| ")).skip(1).collect();
     assert_eq!(rows.len(), 4, "behaviour cloning and three rules:\n{table}");
-    assert!(table.contains("Of one training of each rule. Intervals of 95 % are for other lots;"), "{table}");
+    for part in ["Of one training of each rule;", "Intervals of 95 % are for other lots;"] {
+        assert!(table.contains(part), "{part} is missing in {table}");
+    }
     assert!(rows[1].starts_with("| expert only") && rows[1].contains("100.0 %"), "{table}");
     assert!(rows[2].starts_with("| EnsembleDAgger") && rows[2].contains("| 400 "), "{table}");
     assert!(std::fs::read_to_string(out.join("rules.csv")).unwrap().contains("LazyDAgger"));

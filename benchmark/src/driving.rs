@@ -67,7 +67,7 @@ impl Course {
     }
 
     /// Control steps in lock-step, all together: of fleets of up to `cars_each` cars, as trials are driven.
-    fn lock_step(&self, cars_each: usize, fleet: impl FnMut(usize) -> Box<dyn Fleet + Send>) -> f64 {
+    fn lock_step(&self, cars_each: usize, fleet: impl FnMut(&[usize]) -> Box<dyn Fleet + Send>) -> f64 {
         let mut steps = 0_u64;
         run_fleets(SeatedFleet::in_all(self.episodes(), cars_each, fleet), &mut |_, _| steps += 1).expect(NUMBERS);
         steps as f64
@@ -101,7 +101,7 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     report(ratio("two cores over one, by episodes", &two, &one, Goal::AtLeast(1.9)));
     report(two);
     let two = steps("the same on two cores, in lock-step", 2, None, &mut || {
-        course.lock_step(1, |cars| Box::new(OneDriverEach(vec![Centred; cars])))
+        course.lock_step(1, |cars| Box::new(OneDriverEach(vec![Centred; cars.len()])))
     });
     report(ratio("two cores over one, in lock-step", &two, &one, Goal::AtLeast(1.9)));
     report(two);
@@ -117,11 +117,13 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     report(steps("one car with the network", 1, Some(Goal::AtLeast(15_000.0)), &mut || {
         let episodes = course.episodes().into_iter().take(1).collect();
         let mut steps = 0_u64;
-        run_lockstep(episodes, &mut *network.fleet(&settings.episode, 1), &mut |_, _| steps += 1).expect(NUMBERS);
+        let mut fleet = network.seating(&settings.episode)(&[RootSeed(1)]);
+        run_lockstep(episodes, &mut *fleet, &mut |_, _| steps += 1).expect(NUMBERS);
         steps as f64
     }));
     report(steps("fleet of 32 with the network, two cores", 2, Some(Goal::AtLeast(60_000.0)), &mut || {
-        course.lock_step(network.cars_per_fleet(FLEET), |cars| network.fleet(&settings.episode, cars))
+        let seat = network.seating(&settings.episode);
+        course.lock_step(network.cars_per_fleet(FLEET), |cars| seat(&vec![RootSeed(1); cars.len()]))
     }));
     report(steps("one car with the expert", 1, None, &mut || {
         let expert = || ScriptedExpert::new(ExpertSettings::half_points(), &settings.episode);

@@ -213,23 +213,24 @@ impl Against<'_> {
         team.map_or(std::slice::from_ref(driver), |team| &team.drivers)
     }
 
-    /// Near-collisions of a driver and their rate; of all its trainings where they can be judged together.
+    /// Near-collisions (contacts) of a driver and their rate; of all its trainings where they can be judged together.
     fn rate(&self, driver: usize) -> String {
         let totals = self.totals(driver);
-        let Totals { near_collisions, reference_m, .. } = totals;
+        let Totals { near_collisions, contacts, reference_m, .. } = totals;
         let name = self.name(driver);
         let all = self.trainings_of(&driver);
         let judged = self.trainings.as_ref().and_then(|trainings| trainings.of(driver));
         if let Some((_, TeamEstimate { per_100m, .. })) = judged.filter(|_| all.len() > 1) {
-            let counts: Vec<u32> = all.iter().map(|&driver| self.totals(driver).near_collisions).collect();
-            let has_none = counts.iter().all(|&count| count == 0);
+            let each: Vec<Totals> = all.iter().map(|&driver| self.totals(driver)).collect();
+            let has_none = each.iter().all(|totals| totals.near_collisions == 0);
             let rate = if has_none { exact_rate(0, reference_m) } else { interval(*per_100m, 2) };
-            let counts = counts.iter().map(u32::to_string).collect::<Vec<_>>().join(", ");
+            let counts = each.iter().map(|totals| format!("{} ({})", totals.near_collisions, totals.contacts));
+            let counts = counts.collect::<Vec<_>>().join(", ");
             return format!("{name} {counts} in {reference_m:.0} m each, {rate} per 100 m");
         }
         let which = if all.len() > 1 { format!(" (first of {})", all.len()) } else { String::new() };
         let rate = quoted_rate(&totals, &self.estimates[driver]);
-        format!("{name}{which} {near_collisions} in {reference_m:.0} m, {rate} per 100 m")
+        format!("{name}{which} {near_collisions} ({contacts}) in {reference_m:.0} m, {rate} per 100 m")
     }
 
     fn no_near_collision(&self) -> Statement {

@@ -213,6 +213,7 @@ pub fn stages(settings: &Settings, extent: &Extent, root: &Path) -> anyhow::Resu
 #[cfg(test)]
 mod tests {
     use super::*;
+    use experiment::settings::with_points_of_paper;
 
     #[test]
     fn every_deviation_of_the_default_is_listed() {
@@ -226,6 +227,14 @@ mod tests {
             assert!(of_paper == Some(value) || listed(key) == 1, "{key}: {value} here, {of_paper:?} in the paper");
         }
         assert!(paper.iter().all(|(key, _)| default.iter().any(|(other, _)| other == key)));
+    }
+
+    /// `reproduce` has a control with the paper's points.
+    #[test]
+    fn the_points_of_the_paper_are_the_same_everywhere() {
+        let settings = Settings::preset("default").unwrap();
+        let points = as_in_the_paper(&settings, called("points").unwrap()).unwrap();
+        assert_eq!(with_points_of_paper(&settings), points);
     }
 
     #[test]

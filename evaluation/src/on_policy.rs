@@ -267,7 +267,7 @@ fn rollout(settings: &Settings, policy: &Checkpoint) -> anyhow::Result<Collected
     let maps = trials::maps(&trials, &settings.episode)?;
     let episodes = drive::start(&trials, &maps, &settings.episode, settings.training.noise);
     let seated = |((index, trial), episode): ((EpisodeIndex, &Trial<'_>), Episode)| {
-        let expert = Box::new(drivers::expert(&settings.expert, &settings.episode));
+        let expert = Box::new(drivers::expert(&settings.expert, &settings.episode, trial.episode_seed()));
         RoundEpisode { index, direction: trial.direction, episode, expert }
     };
     let episodes = EpisodeIndex::of_round(0, trials.len()).zip(&trials).zip(episodes).map(seated).collect();

@@ -92,13 +92,8 @@ pub fn stages(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
         let first = extent.rules.first().map_or("", String::as_str);
         let run = root.join(folder(rule.unwrap_or(first), seed));
         let name = format!("{} (seed {})", rule.map_or(CLONED, title), seed.0);
-        let Some(rule) = rule else { return (name, format!("run:{}/bc", run.display())) };
-        let members = DecisionRule::named(rule).map_or(1, |rule| rule.members());
-        let others =
-            (1..members).map(|member| format!(",net:{}/round-{:02}-member-{member}", run.display(), extent.iterations));
-        let others: String = others.collect();
-        let kind = if members > 1 { "ensemble:" } else { "" };
-        (name, format!("{kind}run:{}{others}", run.display()))
+        let bc = if rule.is_none() { "/bc" } else { "" };
+        (name, format!("run:{}{bc}", run.display()))
     };
     let mut settings = settings.clone();
     (settings.evaluation.lots, settings.evaluation.trials) = (extent.unseen.clone(), 1);
@@ -142,9 +137,7 @@ mod tests {
         assert_eq!(ensemble.step, Step::Train { cloning_of: Some("s1-expert_only".to_owned()) });
         let Step::Drive { drivers } = &stages[4].step else { panic!("the last stage drives") };
         assert_eq!(drivers[0], ("behaviour cloning (seed 1)".to_owned(), "run:R/s1-expert_only/bc".to_owned()));
-        let members = "ensemble:run:R/s2-ensemble_dagger,net:R/s2-ensemble_dagger/round-01-member-1,\
-                       net:R/s2-ensemble_dagger/round-01-member-2";
-        assert_eq!(drivers[5], ("EnsembleDAgger (seed 2)".to_owned(), members.to_owned()));
+        assert_eq!(drivers[5], ("EnsembleDAgger (seed 2)".to_owned(), "run:R/s2-ensemble_dagger".to_owned()));
     }
 
     #[test]

@@ -5,11 +5,14 @@
 //! | `chains/sN-weighted` | behaviour cloning and `DAgger` with the paper's weight α on τ̂: Table 1, the driver of every table |
 //! | `chains/sN-unweighted` | the same with α = 0: Table 1's effect of the weight |
 //! | `chains/s1-any-below`, `-tau-only` | the other two readings of Algorithm 2, line 9, for a few iterations |
-//! | `chains/s1-expert-only`, `-alpha-15` | controls: as much data that the expert alone drove, ten times the weight |
+//! | `chains/s1-expert-only`, `-alpha-15` | controls: as many rounds that the expert alone drove, ten times the weight |
+//! | `chains/s1-far-points` | control: points as far as the way is open, as in the paper; none where they are so anyway |
 //! | `drives/reference` | the paper's tables: every driver on its lots |
 //! | `drives/unseen` | generated lots that nothing was trained or tuned on |
 //! | `drives/rules` | the policies after the first iterations under each decision rule |
 //! | `drives/controls` | the controls beside what they are compared with, on the unseen lots |
+//! | `drives/far-points` | the control with far points, which has another speed law, on the same lots |
+//! | `drives/readings`, `drives/readings-unseen` | every planner in every reading of what its publication leaves open |
 //! | `drives/unsmoothed`, `drives/smoothed` | the same lots, every driver without and with action smoothing |
 //! | `on-policy` | on-policy labelled rollouts: calibration of the variance, Σ τ̂ with and without the weight |
 //!
@@ -18,7 +21,7 @@
 use crate::conclusions::{BC, DAGGER};
 use crate::estimate::{self, Task};
 use experiment::drivers::{DriverSpec, NamedDriver};
-use experiment::settings::{Settings, Smoothing};
+use experiment::settings::{Settings, Smoothing, with_points_of_paper};
 use experiment::shard::Shard;
 use planners::PlannerSpec;
 use policy::decision_rule::{ChiOn, DecisionRule};
@@ -95,6 +98,8 @@ pub enum Chain {
     ExpertOnly,
     /// α = 15.
     Alpha15,
+    /// Points as far as the way is open, as the paper has them.
+    FarPoints,
 }
 
 impl Chain {
@@ -107,6 +112,7 @@ impl Chain {
             Self::TauOnly => "tau-only",
             Self::ExpertOnly => "expert-only",
             Self::Alpha15 => "alpha-15",
+            Self::FarPoints => "far-points",
         };
         format!("chains/s{}-{name}", seed.0)
     }
@@ -119,16 +125,17 @@ impl Chain {
             Self::TauOnly => "DAgger under \"τ̂ alone\"",
             Self::ExpertOnly => "as many rounds as DAgger, the expert drives alone",
             Self::Alpha15 => "DAgger with α = 15",
+            Self::FarPoints => "behaviour cloning, DAgger with points as far as the way is open",
         }
     }
 
     fn stage(self, settings: &Settings, extent: &Extent) -> Stage {
-        let mut settings = settings.clone();
+        let mut settings = if self == Self::FarPoints { with_points_of_paper(settings) } else { settings.clone() };
         let dagger = &mut settings.dagger;
         let tau = dagger.rule.tau().unwrap_or(TAU);
         let (chi, chi_on) = dagger.rule.chi().unwrap_or((CHI, ChiOn::default()));
         match self {
-            Self::Weighted => {}
+            Self::Weighted | Self::FarPoints => {}
             Self::Unweighted => {
                 dagger.fit.loss.alpha = 0.0;
             }
@@ -141,7 +148,9 @@ impl Chain {
             dagger.iterations_max = dagger.iterations_max.min(extent.rule_iterations);
             dagger.iterations_min = dagger.iterations_min.min(extent.rule_iterations);
         }
-        let cloning_of = (self != Self::Weighted).then(|| Self::Weighted.folder(settings.seed));
+        // Other points are other labels.
+        let has_cloning = matches!(self, Self::Weighted | Self::FarPoints);
+        let cloning_of = (!has_cloning).then(|| Self::Weighted.folder(settings.seed));
         Stage {
             folder: self.folder(settings.seed),
             about: self.about().to_owned(),
@@ -174,6 +183,12 @@ pub const UNSEEN: &str = "drives/unseen";
 pub const RULES: &str = "drives/rules";
 /// See [`REFERENCE`].
 pub const CONTROLS: &str = "drives/controls";
+/// See [`REFERENCE`].
+pub const FAR_POINTS: &str = "drives/far-points";
+/// See [`REFERENCE`].
+pub const READINGS: &str = "drives/readings";
+/// See [`REFERENCE`].
+pub const READINGS_UNSEEN: &str = "drives/readings-unseen";
 /// See [`REFERENCE`].
 pub const UNSMOOTHED: &str = "drives/unsmoothed";
 /// See [`REFERENCE`].
@@ -248,7 +263,15 @@ fn trainings(settings: &Settings, extent: &Extent) -> Vec<Stage> {
     }
     let of_first_seed = [Chain::AnyBelow, Chain::TauOnly, Chain::ExpertOnly, Chain::Alpha15];
     stages.extend(of_first_seed.map(|chain| chain.stage(settings, extent)));
+    if !has_points_of_paper(settings) {
+        stages.push(Chain::FarPoints.stage(settings, extent));
+    }
     stages
+}
+
+/// Whether the expert's points lie as far as the way is open anyway.
+fn has_points_of_paper(settings: &Settings) -> bool {
+    with_points_of_paper(settings) == *settings
 }
 
 /// Drivers by their names in tables.
@@ -267,6 +290,11 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     let expert = vec![own("expert")];
     let tuned: Drivers = extent.tuned.iter().map(|spec| (tuned_name(spec), spec.clone())).collect();
     let planners: Drivers = PlannerSpec::all().iter().map(|planner| own(planner.name())).collect();
+    let readings = |planner: &PlannerSpec| {
+        let read = planner.readings().into_iter().map(|(reading, ..)| own(&format!("{}/{reading}", planner.name())));
+        std::iter::once(own(planner.name())).chain(read).collect::<Drivers>()
+    };
+    let readings: Drivers = PlannerSpec::all().iter().flat_map(readings).collect();
     // Where a planner has been tuned, only the paper's two take part as they are, too: the others stand for nothing.
     let is_tuned = |name: &str| tuned.iter().any(|(tuned, _)| *tuned == tuned_name(name));
     let stands_for_itself = |name: &str| name == "tentacle" || name == "vvf" || !is_tuned(name);
@@ -300,6 +328,20 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     controls.push(of_first_seed(EXPERT_ONLY, Chain::ExpertOnly));
     controls.push(of_first_seed(ALPHA_15, Chain::Alpha15));
     stages.push(drive(CONTROLS, "controls on generated lots", unseen, controls));
+
+    if !has_points_of_paper(settings) {
+        let far = Chain::FarPoints.stage(settings, extent).settings;
+        let policies = [(BC, "/bc"), (DAGGER, "")]
+            .map(|(name, rest)| (name.to_owned(), spec(Chain::FarPoints, settings.seed, rest)))
+            .to_vec();
+        let mut stage = drive(FAR_POINTS, "policies with far points on generated lots", unseen, policies);
+        (stage.settings.episode, stage.settings.expert) = (far.episode, far.expert);
+        stages.push(stage);
+    }
+
+    let beside_dagger = [networks[1..2].to_vec(), readings].concat();
+    stages.push(drive(READINGS, "every reading of the planners on the paper's lots", of_paper, beside_dagger.clone()));
+    stages.push(drive(READINGS_UNSEEN, "every reading of the planners on generated lots", unseen, beside_dagger));
 
     let own_ticks = settings.dagger.inference.smoothing_ticks;
     let ticks = if own_ticks > 0.0 { own_ticks } else { SMOOTHING_TICKS };
@@ -380,6 +422,11 @@ mod tests {
         assert_eq!(heavy.fit.loss.alpha, 15.0);
         heavy.fit.loss.alpha = 1.5;
         assert_eq!(heavy, settings.dagger);
+        let far = stages.iter().find(|stage| stage.folder == "chains/s1-far-points").unwrap();
+        assert_eq!(far.step, Step::Train { cloning_of: None });
+        assert_eq!(far.settings, with_points_of_paper(&settings));
+        let of_paper = all(&Settings::preset("paper").unwrap(), &extent(), Path::new("R"));
+        assert!(of_paper.iter().all(|stage| !stage.folder.contains("far-points")), "its points are far anyway");
     }
 
     #[test]
@@ -400,7 +447,7 @@ mod tests {
         assert_eq!(trained[0][1].step, Step::Train { cloning_of: Some(weighted) });
         assert_eq!(trained[1][0].step, Step::Train { cloning_of: None });
         for driven in shares(Part::Drives) {
-            assert_eq!(driven.len(), 6);
+            assert_eq!(driven.len(), 9);
             assert!(driven.iter().all(|stage| stage.folder.starts_with("drives") && stage.estimate_s() > 0.0));
         }
     }
@@ -427,6 +474,10 @@ mod tests {
         assert!(names(UNSEEN).contains(&"vvf".to_owned()) && names(UNSEEN).contains(&"cvm".to_owned()));
         assert_eq!(names(CONTROLS), ["BC", "DAgger", "DAgger, α = 0", EXPERT_ONLY, ALPHA_15]);
         assert_eq!(names(SMOOTHED), names(UNSMOOTHED));
+        assert_eq!(names(READINGS), names(READINGS_UNSEEN));
+        for name in ["DAgger", "dwa", "dwa/fox", "cvm/simmons", "tentacle/short", "vff"] {
+            assert!(names(READINGS).contains(&name.to_owned()), "{name} is missing");
+        }
         assert!(names(SMOOTHED).contains(&"tentacle".to_owned()) && names(SMOOTHED).contains(&"DAgger".to_owned()));
     }
 

@@ -66,7 +66,12 @@ impl TrialBatch<'_> {
         observer: Observer<'_>,
     ) -> Result<Vec<Option<EpisodeReport>>, NotFinite> {
         let cars_each = self.driver.cars_per_fleet(episodes.len());
-        let fleets = SeatedFleet::in_all(episodes, cars_each, |cars| self.driver.fleet(self.episode, cars));
+        let seat = self.driver.seating(self.episode);
+        let seed_of = |&car: &usize| self.trials[car].episode_seed();
+        let fleets = SeatedFleet::in_all(episodes, cars_each, |cars| {
+            let seeds: Vec<RootSeed> = cars.iter().map(seed_of).collect();
+            seat(&seeds)
+        });
         run_fleets_until(fleets, observer)
     }
 

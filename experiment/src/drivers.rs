@@ -1,7 +1,7 @@
 //! Drivers: how they are named, and how they get to the wheel.
 
 use crate::run_dir::{self, Training};
-use crate::settings::{Settings, Smoothing};
+use crate::settings::{Layers, Settings, Smoothing};
 use anyhow::{Context as _, bail, ensure};
 use expert::{ExpertSettings, ScriptedExpert};
 use onnx::fleet::OnnxFleet;
@@ -16,6 +16,8 @@ use sim::action_smoothing::SmoothedFleet;
 use sim::driver::{Fleet, OneDriverEach, SensorsOnly, Source};
 use sim::episode::EpisodeSettings;
 use sim::limits::PLANNER_BYTES_MAX;
+use sim::seed::RootSeed;
+use std::cell::OnceCell;
 use std::fmt::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -87,8 +89,8 @@ pub enum Parameters {
 pub fn specs() -> Vec<(String, String)> {
     let own = [
         ("expert", "the scripted expert; sees the truth"),
-        ("run:DIR", "the final policy of a training run"),
-        ("run:DIR/bc", "its policy after behaviour cloning"),
+        ("run:DIR", "the final policy of a training run; if an ensemble was trained, all of its networks"),
+        ("run:DIR/bc", "its policy after behaviour cloning, one network"),
         ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
         ("ensemble:DRIVER,DRIVER", "run: and net: drivers whose answers are taken together"),
         ("onnx:FILE", "a network from an ONNX file, trained anywhere (docs/formats.md)"),
@@ -227,7 +229,9 @@ impl DriverSpec {
     /// The networks it names, read from their files.
     fn checkpoints(&self) -> anyhow::Result<Vec<Checkpoint>> {
         match self {
-            Self::Run { folder } => Ok(vec![Checkpoint::load(&run_dir::policy_folder(folder)?)?]),
+            Self::Run { folder } => {
+                run_dir::driving_folders(folder)?.iter().map(|folder| Ok(Checkpoint::load(folder)?)).collect()
+            }
             Self::Checkpoint { folder } => {
                 ensure!(
                     Checkpoint::exists(folder)?,
@@ -238,17 +242,17 @@ impl DriverSpec {
                 Ok(vec![Checkpoint::load(folder)?])
             }
             Self::Ensemble { members } => {
-                let networks: Vec<Checkpoint> =
-                    members.iter().map(Self::checkpoints).collect::<anyhow::Result<Vec<_>>>()?.concat();
+                let networks = members.iter().map(Self::checkpoints).collect::<anyhow::Result<Vec<_>>>()?;
+                let first = &networks[0][0];
                 for (member, network) in members.iter().zip(&networks) {
                     ensure!(
-                        (&network.conditions, network.inference) == (&networks[0].conditions, networks[0].inference),
+                        (&network[0].conditions, network[0].inference) == (&first.conditions, first.inference),
                         "{member} was trained or drives with other settings than {}; members of an ensemble must agree \
                          (compare their model.toml)",
                         members[0]
                     );
                 }
-                Ok(networks)
+                Ok(networks.concat())
             }
             Self::Expert | Self::Onnx { .. } | Self::Planner { .. } | Self::Callback { .. } => Ok(Vec::new()),
         }
@@ -286,6 +290,26 @@ impl DriverSpec {
         let driver = NamedDriver { name, spec: self, training, model, smoothing_ticks: 0.0 };
         Ok(driver.smoothed(settings.evaluation.smoothing))
     }
+}
+
+/// The settings that a comparison of drivers begins with, unless the layers name others: those of the first training run
+/// among them, with its folder. `None` if there is no run.
+///
+/// # Errors
+/// If a run's settings cannot be read, or runs were trained with another car, sensor or metrics.
+pub fn settings_of_runs<'s>(specs: &'s [DriverSpec], layers: &Layers) -> anyhow::Result<Option<(Settings, &'s Path)>> {
+    let mut runs = specs.iter().filter_map(|spec| Some((spec, spec.run()?)));
+    let Some((spec, path)) = runs.next().filter(|_| !layers.names_a_base()) else { return Ok(None) };
+    let of_run = run_dir::settings_of(path).with_context(|| format!("driver {spec}"))?;
+    for (other, path) in runs {
+        let of_other = run_dir::settings_of(path).with_context(|| format!("driver {other}"))?;
+        ensure!(
+            of_other.episode == of_run.episode,
+            "drivers {spec} and {other} were trained with different settings of episode (car, sensor, metrics), so neither \
+             run's settings are fair to both; choose other settings (--config or --preset)"
+        );
+    }
+    Ok(Some((of_run, path)))
 }
 
 /// A driver that can take the wheel.
@@ -461,20 +485,27 @@ impl NamedDriver {
         }
     }
 
-    /// Seats it in this many cars, which are driven in lock-step.
-    pub fn fleet(&self, episode: &EpisodeSettings, cars: usize) -> Box<dyn Fleet + Send> {
-        let ticks = self.smoothing_ticks;
-        match &self.model {
-            Model::Expert(settings) => {
-                smoothed(OneDriverEach((0..cars).map(|_| expert(settings, episode)).collect()), ticks)
+    /// Seats it in cars that are driven in lock-step, of which each has the seed of its episode. What all fleets share,
+    /// such as the tables of a planner, is computed once.
+    pub fn seating<'a>(&'a self, episode: &'a EpisodeSettings) -> impl Fn(&[RootSeed]) -> Box<dyn Fleet + Send> + 'a {
+        let shared = OnceCell::new();
+        move |seeds| {
+            let (cars, ticks) = (seeds.len(), self.smoothing_ticks);
+            match &self.model {
+                Model::Expert(settings) => {
+                    let drivers = seeds.iter().map(|&seed| expert(settings, episode, seed)).collect();
+                    smoothed(OneDriverEach(drivers), ticks)
+                }
+                Model::Network(networks, device) => Box::new(NetFleet::ensemble(&networks[0], &networks[1..], *device)),
+                Model::Onnx(network, inference) => {
+                    Box::new(OnnxFleet::new(network, *inference, episode.sensing.geometry))
+                }
+                Model::Planner(planner) => {
+                    let planner = shared.get_or_init(|| planner.planner(&PlannerContext::of(episode)));
+                    smoothed(OneDriverEach(vec![SensorsOnly(planner.clone()); cars]), ticks)
+                }
+                Model::Callback(callback) => smoothed(callback.fleet(cars), ticks),
             }
-            Model::Network(networks, device) => Box::new(NetFleet::ensemble(&networks[0], &networks[1..], *device)),
-            Model::Onnx(network, inference) => Box::new(OnnxFleet::new(network, *inference, episode.sensing.geometry)),
-            Model::Planner(planner) => {
-                let planner = planner.planner(&PlannerContext::of(episode));
-                smoothed(OneDriverEach(vec![SensorsOnly(planner); cars]), ticks)
-            }
-            Model::Callback(callback) => smoothed(callback.fleet(cars), ticks),
         }
     }
 }
@@ -483,9 +514,9 @@ fn smoothed(fleet: impl Fleet + Send + 'static, ticks: f32) -> Box<dyn Fleet + S
     if ticks > 0.0 { Box::new(SmoothedFleet::new(fleet, ticks)) } else { Box::new(fleet) }
 }
 
-/// A fresh expert.
-pub fn expert(settings: &ExpertSettings, episode: &EpisodeSettings) -> ScriptedExpert {
-    ScriptedExpert::new(settings.clone(), episode)
+/// A fresh expert, whose unsteadiness is drawn from the seed of its episode.
+pub fn expert(settings: &ExpertSettings, episode: &EpisodeSettings, seed: RootSeed) -> ScriptedExpert {
+    ScriptedExpert::new(settings.clone(), episode).with_jitter_seed(seed, 0)
 }
 
 /// Parameters of a planner on disk.
@@ -662,7 +693,8 @@ mod tests {
         let map = Map::build(Scenario::lane(-20.0..=60.0, 9.0, -5.0..=50.0), &settings.episode.vehicle).unwrap();
         let planner = NamedDriver::planner(PlannerSpec::named("tentacle").unwrap());
         let left_m = |smoothing: Smoothing| {
-            let mut fleet = planner.clone().smoothed(smoothing).fleet(&settings.episode, 1);
+            let smoothed = planner.clone().smoothed(smoothing);
+            let mut fleet = smoothed.seating(&settings.episode)(&[RootSeed(1)]);
             let truth = GroundTruth { map: &map, vehicle: VehicleState::at_rest(map.start()), progress_m: 0.0 };
             let masks = [!0 << 13, (1 << 12) - 1];
             masks.map(|mask| {

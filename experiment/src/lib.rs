@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`settings`] | preset → file → overrides, into one checked [`settings::Settings`] |
 //! | [`lots`], [`drivers`] | names of lots and drivers, and what they stand for |
+//! | [`notes`] | what is to be said about lots from files |
 //! | [`trials`] | seeds of trials: their obstacles and their noise |
 //! | [`shard`] | a machine's share of the trials |
 //! | [`drive`] | the one loop: a driver on a batch of trials, with an observer of every frame |
@@ -22,6 +23,7 @@ pub mod drive_digest;
 pub mod drivers;
 pub mod inputs;
 pub mod lots;
+pub mod notes;
 pub mod progress;
 pub mod replay_key;
 pub mod run_dir;

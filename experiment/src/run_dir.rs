@@ -486,6 +486,31 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
     Ok(run.join(folder))
 }
 
+/// The folders with the checkpoints that drive as `run:DIR` or `run:DIR/bc`: the policy and, if the decision rule
+/// has an ensemble drive, its other members. A final fit, and `bc`, are one network.
+///
+/// # Errors
+/// See [`policy_folder`].
+pub fn driving_folders(spec: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let policy = policy_folder(spec)?;
+    let (run, is_bc) = run_of(spec)?;
+    let members = match settings_of(spec) {
+        Ok(settings) => settings.dagger.rule.members(),
+        Err(error) if storage::is_of_disk(error.as_ref()) => return Err(error),
+        // Of a run whose settings this version cannot read, the network alone can be used.
+        Err(_) => 1,
+    };
+    let round = policy.file_name().and_then(|name| name.to_str()).filter(|name| !is_bc && name.starts_with("round-"));
+    let others = round.into_iter().flat_map(|round| (1..members).map(move |member| format!("{round}-member-{member}")));
+    let others: Vec<PathBuf> = others
+        .map(|member| {
+            sums::read_listed(run, &format!("{member}/{}", sums::FILE), sums::LIST_BYTES_MAX)?;
+            Ok(run.join(member))
+        })
+        .collect::<anyhow::Result<_>>()?;
+    Ok(std::iter::once(policy).chain(others).collect())
+}
+
 /// The settings of the run that `run:DIR` or `run:DIR/bc` names.
 ///
 /// # Errors
@@ -615,6 +640,7 @@ mod tests {
     use super::*;
     use policy::checkpoint::Checkpoint;
     use policy::conditions::Conditions;
+    use policy::decision_rule::DecisionRule;
     use policy::network::Weights;
     use sim::seed::RootSeed;
     use std::sync::LazyLock;
@@ -779,6 +805,30 @@ mod tests {
         fs::write(path.join(MANIFEST), "program = \"another 1.0\"\ncommand = \"build\"\n").unwrap();
         assert!(message(create(&path, true)).contains("not a run"));
         assert!(path.join("thesis.txt").exists());
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// `evaluate` drove with the first network of an ensemble alone.
+    #[test]
+    fn a_run_whose_rule_has_an_ensemble_drives_with_all_of_it() {
+        let path = scratch("members");
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.dagger.rule = DecisionRule::named("ensemble_dagger").unwrap();
+        RunDir::create(&place(&path, false), &settings, &Request::default()).unwrap();
+        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
+        let checkpoint =
+            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
+        let rounds = ["round-00", "round-01"].into_iter();
+        let folders = rounds.flat_map(|round| ["", "-member-1", "-member-2"].map(|part| format!("{round}{part}")));
+        for folder in folders {
+            checkpoint.save(&path.join(&folder)).unwrap();
+            sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
+        }
+        let of_last = ["round-01", "round-01-member-1", "round-01-member-2"].map(|folder| path.join(folder));
+        assert_eq!(driving_folders(&path).unwrap(), of_last);
+        assert_eq!(driving_folders(&path.join("bc")).unwrap(), [path.join("round-00")]);
+        fs::remove_dir_all(&of_last[2]).unwrap();
+        assert!(message(driving_folders(&path)).contains("round-01-member-2/sha256sums"));
         fs::remove_dir_all(path).unwrap();
     }
 

@@ -1,13 +1,13 @@
 //! Behaviour cloning and DAgger into a run folder: Algorithm 1 with its files, its progress and its learning curves.
 
 use crate::drive;
-use crate::drivers;
 use crate::lots::Lot;
 use crate::progress::{Elapsed, Progress};
 use crate::run_dir::{self, RunDir};
 use crate::settings::Settings;
 use crate::trials::{self, Purpose, Trial};
 use anyhow::ensure;
+use expert::ScriptedExpert;
 use policy::agreement::Agreement;
 use policy::conditions::Conditions;
 use policy::dagger::{Hooks, Learned, Outcome, Progress as DaggerProgress, Rollouts, RoundEpisode};
@@ -71,7 +71,7 @@ pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Res
     let trials: Vec<_> = all(&others, training.trials).chain(all(&generated, 1)).collect();
     let starts = drive::start(&trials, &trials::maps(&trials, &settings.episode)?, &settings.episode, training.noise);
     let seated = |((index, trial), episode): ((EpisodeIndex, &Trial<'_>), Episode)| {
-        let expert = drivers::expert(&settings.expert, &settings.episode);
+        let expert = ScriptedExpert::new(settings.expert.clone(), &settings.episode);
         let expert = Box::new(expert.with_jitter_seed(settings.seed, index.stream()));
         RoundEpisode { index, direction: trial.direction, episode, expert }
     };

@@ -107,7 +107,7 @@ impl<'a> Trial<'a> {
     ///
     /// # Errors
     /// If the lot cannot be driven.
-    fn map_of(&self, drawn: Scenario, episode: &EpisodeSettings) -> anyhow::Result<Map> {
+    pub fn map_of(&self, drawn: Scenario, episode: &EpisodeSettings) -> anyhow::Result<Map> {
         Map::build(self.direction.of(drawn), &episode.vehicle).with_context(|| self.lot.name().to_owned())
     }
 

@@ -219,9 +219,9 @@ pub struct CurvatureVelocity {
 }
 
 impl CurvatureVelocity {
-    /// d of every candidate, metres.
+    /// Free travel along every candidate, metres; infinite where nothing is met.
     fn distances_m(&self, grid: &OccupancyGrid) -> [f32; CURVATURES] {
-        let mut distances_m = [self.params.distance_max_m; CURVATURES];
+        let mut distances_m = [f32::INFINITY; CURVATURES];
         for row in 0..GRID_CELLS {
             let mut cells = grid.row(row);
             while cells != 0 {
@@ -241,7 +241,7 @@ impl CurvatureVelocity {
     /// The best speed of a candidate, m/s, and what it is worth; speeds that would meet something too soon come last, by
     /// distance.
     fn best_speed(&self, candidate: usize, distance_m: f32) -> (f32, f32) {
-        let far = self.params.distance_weight * distance_m / self.params.distance_max_m;
+        let far = self.params.distance_weight * (distance_m / self.params.distance_max_m).min(1.0);
         let objective = |rated: &Rated| match self.params.speeds {
             Speeds::Searched { impact_s } if rated.speed_mps * impact_s > distance_m => distance_m - 1e3,
             _ => rated.worth + far,
@@ -308,10 +308,18 @@ mod tests {
         let distances_m = planner.distances_m(&grid_with(&[(20, 12)]));
         assert!((distances_m[SIDE] - 1.58).abs() < 1e-4);
         assert!((planner.best_speed(SIDE, distances_m[SIDE]).1 - (0.3 + 0.7 * 1.58 / 3.0)).abs() < 1e-5);
-        assert_eq!(distances_m[2 * SIDE], 3.0, "full lock passes it");
+        assert_eq!(distances_m[2 * SIDE], f32::INFINITY, "full lock passes it");
         // Full lock: .5 m/s, turn .2507·.5 = .1254 rad.
         let full_lock = 0.1 * 0.5 / 2.2 + 0.2 * (1.0 - 0.125_36 / std::f32::consts::PI) + 0.7;
-        assert!((planner.best_speed(2 * SIDE, 3.0).1 - full_lock).abs() < 1e-4);
+        assert!((planner.best_speed(2 * SIDE, f32::INFINITY).1 - full_lock).abs() < 1e-4);
+    }
+
+    /// It took the end of what it rates, 3 m, for an obstacle, and drove no faster than 1.5 m/s anywhere.
+    #[test]
+    fn where_nothing_is_met_the_speed_is_that_of_the_law() {
+        let mut planner = Params::simmons().planner(&context());
+        let decision = planner.act(&Observation { grid: OccupancyGrid::free() });
+        assert_eq!(decision.speed_limit_mps, Some(context().speed_mps(0.0)));
     }
 
     /// A wall from X = 6.22 m on, across the patch: d = 6.46 − 1.08 − 3.80 = 1.58 m straight ahead, so 0.79 m/s at most for

@@ -214,13 +214,20 @@ class Core:
         self,
         mask: npt.NDArray[np.bool_] | None = None,
         *,
-        seeds: Sequence[int] | None = None,
+        seeds: Sequence[int | None] | None = None,
         episodes: Sequence[int] | None = None,
     ) -> Arrays:
-        """Starts the next episodes of the environments in ``mask``, of all if it is None."""
+        """Starts the next episodes of the environments in ``mask``, of all if it is None: where ``seeds`` has one, the first
+        episode of that seed."""
         chosen = np.ones(self.count, bool) if mask is None else np.asarray(mask, bool)
         seen = self._arrays()[0]
-        self.cars.reset(chosen.tolist(), _numbers("seed", seeds), _numbers("episode", episodes), seen)
+        if seeds is not None:
+            _check("seed", [seed for seed in seeds if seed is not None])
+            seeds = [None if seed is None else int(seed) for seed in seeds]
+        if episodes is not None:
+            _check("episode", episodes)
+            episodes = [int(episode) for episode in episodes]
+        self.cars.reset(chosen.tolist(), seeds, episodes, seen)
         return seen
 
     def step(
@@ -287,10 +294,7 @@ class Core:
         return seen, np.zeros(self.count), np.zeros(self.count, bool), np.zeros(self.count, bool), last
 
 
-def _numbers(what: str, given: Sequence[int] | None) -> list[int] | None:
-    if given is None:
-        return None
-    for number in given:
+def _check(what: str, numbers: Sequence[int]) -> None:
+    for number in numbers:
         if not isinstance(number, (int, np.integer)) or not 0 <= number < 2**63:
             raise ValueError(f"{what}: {number!r} is not within 0 … 2**63 - 1")
-    return [int(number) for number in given]

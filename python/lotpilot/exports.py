@@ -86,6 +86,7 @@ def to_lerobot(dataset: Dataset, folder: str | os.PathLike[str]) -> None:
     from pyarrow import parquet
 
     root = Path(folder)
+    root.mkdir(parents=True)
     (root / "meta/episodes/chunk-000").mkdir(parents=True)
     (root / "data/chunk-000").mkdir(parents=True)
     frames_per_s = round(1.0 / dataset.rounds[0]["control_period_s"])

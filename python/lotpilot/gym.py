@@ -110,7 +110,7 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
     """Many cars, stepped natively and in parallel.
 
     Environment i of n drives the episodes i, i + n, … (``EnvOptions``). ``reset(seed=s)`` gives all of them the seed s:
-    they share its trials and drive none twice. ``reset(seed=[…])`` gives each its own.
+    they share its trials and drive none twice. ``reset(seed=[…])`` gives each its own; where it is None they go on.
     ``reset(options={"reset_mask": mask})`` resets some. ``infos`` holds an array per name; under
     ``SAME_STEP`` also ``final_obs`` and ``final_info``.
 
@@ -158,11 +158,7 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
         """Starts the next episodes, or the first ones of a seed."""
         super().reset(seed=seed if isinstance(seed, int) else None)
         mask = (options or {}).get("reset_mask")
-        seeds: list[int] | None = None
-        if isinstance(seed, (int, np.integer)):
-            seeds = [int(seed)] * self.num_envs
-        elif seed is not None:
-            seeds = [one for one in seed if one is not None]
+        seeds = [seed] * self.num_envs if isinstance(seed, (int, np.integer)) else seed
         seen = self.core.reset(mask, seeds=seeds, episodes=(options or {}).get("episodes"))
         return seen.observation(), self._infos(seen)
 

@@ -6,8 +6,9 @@
 
 A task drives one shard and hands back its files, which are written at once into ``OUT.shards/``: nodes need no file
 system in common. A node that dies costs what it was driving; Ray begins those tasks elsewhere. Shards that are in
-``OUT.shards/`` are not driven again by a later call with the same arguments. When all are there they are merged into
-``OUT``: the same rows and tables as ``lotpilot.evaluate`` writes on one machine, byte for byte.
+``OUT.shards/`` are not driven again by a later call with the same arguments. Functions are known by their names: if one is
+pickled otherwise than before, a warning says so, and it is up to you whether it has changed. When all shards are there they
+are merged into ``OUT``: the same rows and tables as ``lotpilot.evaluate`` writes on one machine, byte for byte.
 
 Every node needs the same wheel of lotpilot, and the files that drivers and lots name under the same paths.
 """
@@ -21,6 +22,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -79,6 +81,7 @@ def evaluate(
     if out.exists():
         raise FileExistsError(f"{out}: exists already; choose another folder, or delete it")
     _claim(folder, {"evaluate": request.described(), "shards": shards, "lotpilot": _digest()})
+    _warn_of_other_functions(folder, request)
     parts = _parts(folder, shards)
     missing = {part: (request, f"{part.name}/{shards}") for part in parts if not part.exists()}
     _drive(_evaluate, missing, _keep, folder, len(parts), address, cpus, retries, progress)
@@ -347,6 +350,33 @@ def _digest() -> str:
     file = _native.__file__
     assert file is not None
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
+
+
+def _warn_of_other_functions(folder: Path, request: tables.Request) -> None:
+    """Says so if shards are there of functions that were pickled otherwise: most have changed then. Not all, as what is
+    pickled of one function may differ from process to process."""
+    content = hashlib.sha256()
+    for _, driver in request.drivers:
+        if isinstance(driver, str):
+            continue
+        content.update(cloudpickle.dumps(driver))
+        # Of what an installed module defines only the name is pickled.
+        module = getattr(driver, "__module__", None)
+        source = getattr(sys.modules.get(module or ""), "__file__", None)
+        if source is not None and module != "__main__":
+            content.update(Path(source).read_bytes())
+    file = folder / _FUNCTIONS
+    if _is_claimed(folder) and file.exists() and file.read_text(encoding="utf-8") != content.hexdigest():
+        warnings.warn(
+            f"{folder}: holds shards of functions that were pickled otherwise; if one has changed, delete the folder or "
+            "choose another out",
+            stacklevel=3,
+        )
+    file.write_text(content.hexdigest(), encoding="utf-8")
+
+
+_FUNCTIONS = "functions.sha256"
+"""Of the functions that shards were last driven by."""
 
 
 def _claim(folder: Path, about: dict[str, Any]) -> None:

@@ -43,8 +43,7 @@ class LotVecEnv(VecEnv):
 
     def reset(self) -> Any:
         """Starts the next episode of every car."""
-        seeds = [seed for seed in self._seeds if seed is not None]
-        seen = self.core.reset(seeds=seeds or None)
+        seen = self.core.reset(seeds=self._seeds)
         self._reset_seeds()
         self._reset_options()
         self.reset_infos = [self.core.info(seen, index) for index in range(self.num_envs)]

@@ -34,8 +34,12 @@ class Evaluation:
     """Drivers by lots, noise and direction: rates with intervals."""
     comparisons: Table
     """Every other driver against one."""
+    trainings: Table
+    """Trainings that differ by their seeds, as one; empty if none do."""
     causes: Table
     """Near-collisions by cause."""
+    noise_sweep: Table
+    """Drivers against noise; empty for one level."""
     runs: Table
     """Every run."""
     failures: Table
@@ -159,7 +163,9 @@ def _read(folder: Path) -> Evaluation:
     return Evaluation(
         summary=_table(tables["rows"]),
         comparisons=_table(tables["comparisons"]),
+        trainings=_table(tables["trainings"]),
         causes=_table(tables["causes"]),
+        noise_sweep=_table(tables["noise_sweep"]),
         runs=_table([_flat(line) for line in _lines(folder / "runs.jsonl")]),
         failures=_table(_lines(folder / "failures.jsonl")),
     )

@@ -149,7 +149,7 @@ impl Car {
     /// # Panics
     /// If no episode is under way, or the action is not finite.
     pub(crate) fn step(&mut self, kind: ActionKind, action: [f32; ACTION], reward: &Reward) -> Outcome {
-        let Drive { episode, last, digest, .. } = self.drive.as_mut().expect("an episode is under way");
+        let Drive { episode, expert, last, digest, .. } = self.drive.as_mut().expect("an episode is under way");
         let (before, from_m) = (episode.metrics(), episode.progress_m());
         let frame = match kind {
             ActionKind::LookAhead => {
@@ -163,6 +163,10 @@ impl Car {
                 episode.apply_command(VehicleCommand { steering_rad, speed_mps }, Source::Novice)
             }
         };
+        // Whoever asks for labels now and then may not ask at this very tick.
+        if let Some(expert) = expert.as_mut().filter(|_| episode.was_reset()) {
+            expert.reset();
+        }
         // What is seen after the last tick is part of no drive; learners that bootstrap from it ask for it.
         episode.observe();
         if let Some(digest) = digest {
@@ -179,7 +183,7 @@ impl Car {
     /// The expert's answer to what is observed now, as an action. Asked at every tick, it is what the driver `expert`
     /// would answer. `None` after the end.
     pub(crate) fn label(&mut self, kind: ActionKind, course: &Course) -> Option<[f32; ACTION]> {
-        let Drive { episode, expert, label, .. } = self.drive.as_mut()?;
+        let Drive { number, episode, expert, label, .. } = self.drive.as_mut()?;
         if episode.ending().is_some() {
             return None;
         }
@@ -188,10 +192,8 @@ impl Car {
             Some((of, point)) if of == tick => point,
             _ => {
                 let settings = &course.settings;
-                let expert = expert.get_or_insert_with(|| drivers::expert(&settings.expert, &settings.episode));
-                if episode.was_reset() {
-                    expert.reset();
-                }
+                let seed = || course.trial(self.seed, *number).episode_seed();
+                let expert = expert.get_or_insert_with(|| drivers::expert(&settings.expert, &settings.episode, seed()));
                 expert.decide(&episode.situation()).look_ahead
             }
         };

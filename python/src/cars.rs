@@ -3,7 +3,7 @@
 use crate::arrays::{SeenArrays, Target, pairs, points};
 use crate::car::{ACTION, ActionKind, Car, INFO, Outcome, Seen};
 use crate::course::{Course, SettingsFrom};
-use crate::guard::{EpisodeEnded, alone, caught, detached, input};
+use crate::guard::{EpisodeEnded, alone, detached, input, warn};
 use crate::reward::Reward;
 use numpy::{Ix2, PyArray, PyArray3, PyArrayMethods as _};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
@@ -95,6 +95,7 @@ impl Cars {
     #[pyo3(signature = (count, *, lots, directions, trials, noise, settings, seed, action, autoreset, reward, threads, digests))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn new(
+        py: Python<'_>,
         count: usize,
         lots: Vec<String>,
         directions: &str,
@@ -123,9 +124,11 @@ impl Cars {
             "disabled" => Autoreset::Disabled,
             _ => return wrong(format!("no autoreset {autoreset:?}; there are next_step, same_step and disabled")),
         };
+        let course = alone(py, || Course::new(settings, &lots, directions, trials, noise).map_err(input))?;
+        warn(py, &course.notes())?;
         let cars = (0..count as u64).map(|index| Car::new(RootSeed(seed), index, count as u64, digests)).collect();
         Ok(Self {
-            course: caught(|| Course::new(settings, &lots, directions, trials, noise).map_err(input))?,
+            course,
             cars,
             kind,
             autoreset,
@@ -171,12 +174,12 @@ impl Cars {
     }
 
     /// Starts the next episodes of the cars in `mask` and writes what they see into `seen`. `seeds` and `numbers` say
-    /// which episodes come first.
+    /// which episodes come first; cars without one go on.
     fn reset(
         &mut self,
         py: Python<'_>,
         mask: Vec<bool>,
-        seeds: Option<Vec<u64>>,
+        seeds: Option<Vec<Option<u64>>>,
         numbers: Option<Vec<u64>>,
         seen: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
@@ -193,8 +196,8 @@ impl Cars {
         let mut arrays = SeenArrays::of(seen, n)?;
         let rows = arrays.rows()?;
         for (index, car) in self.cars.iter_mut().enumerate().filter(|(index, _)| mask[*index]) {
-            if let Some(seeds) = &seeds {
-                (car.seed, car.next) = (RootSeed(seeds[index]), index as u64);
+            if let Some(seed) = seeds.as_ref().and_then(|seeds| seeds[index]) {
+                (car.seed, car.next) = (RootSeed(seed), index as u64);
             }
             if let Some(numbers) = &numbers {
                 car.next = numbers[index];

@@ -2,6 +2,7 @@
 
 use anyhow::ensure;
 use experiment::lots::Lot;
+use experiment::notes;
 use experiment::settings::{Layers, NoiseChoice, Settings};
 use experiment::trials::{self, Trial};
 use pyo3::prelude::*;
@@ -100,6 +101,11 @@ impl Course {
         })
     }
 
+    /// What is to be said about its lots.
+    pub(crate) fn notes(&self) -> Vec<String> {
+        notes::of(&self.lots, &[self.noise])
+    }
+
     /// Number of lots × directions: a trial of each is driven before the next trial.
     fn rows(&self) -> u64 {
         (self.lots.len() * self.directions.len()) as u64
@@ -143,9 +149,14 @@ impl Course {
         if drawn && self.trials.is_none() {
             return Ok(Arc::new(trial.map(&self.settings.episode)?));
         }
-        // A lot that is found by a search is found once for both ways.
-        let ways: Vec<Trial<'_>> = self.directions.iter().map(|&direction| Trial { direction, ..trial }).collect();
-        let maps = trials::maps(&ways, &self.settings.episode)?;
+        // A lot that is found by a search is found once for both ways, in this thread: cars are what is shared out, and a
+        // forked process has no other threads.
+        let drawn = trial.lot.draw(trial.seed).scenario;
+        let map_of = |&direction: &Direction| {
+            let map = Trial { direction, ..trial }.map_of(drawn.clone(), &self.settings.episode)?;
+            Ok(Arc::new(map))
+        };
+        let maps = self.directions.iter().map(map_of).collect::<anyhow::Result<Vec<Arc<Map>>>>()?;
         let mut kept = self.kept();
         for (way, map) in maps.iter().enumerate() {
             kept.insert(key(way), Arc::clone(map));

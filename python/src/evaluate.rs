@@ -2,15 +2,16 @@
 
 use crate::callback::{Failure, Function, Watch};
 use crate::course::{SettingsFrom, directions, noise};
-use crate::guard::{detached, input};
-use anyhow::{Context as _, ensure};
+use crate::guard::{detached, input, warn};
+use anyhow::{Context as _, bail, ensure};
 use evaluation::plan::Plan;
 use evaluation::shards::{ShardRecord, Shards};
 use evaluation::summary::Summary;
-use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
-use experiment::run_dir::{self, Build, Outcome, Place, Request, RunDir};
+use experiment::notes;
+use experiment::run_dir::{Build, Outcome, Place, Request, RunDir};
 use experiment::settings::{Layers, Settings};
 use experiment::shard::Shard;
 use pyo3::prelude::*;
@@ -58,6 +59,7 @@ pub(crate) fn evaluate(
         let asked = Asked::new(drivers, &trials, settings, &failure)?;
         let plan = asked.plan(shard);
         plan.check()?;
+        asked.say_notes(&failure)?;
         let run = asked.begin(&plan, &out, overwrite)?;
         asked.finish(&plan, &run, &watch)
     };
@@ -87,11 +89,13 @@ pub(crate) fn merge(
         shards.manifest().check_inputs(&inputs::of(&asked.lots, &asked.drivers))?;
         let plan = asked.plan(None);
         let rows = shards.rows(&plan)?;
+        asked.say_notes(&failure)?;
         let run = asked.begin(&plan, &out, overwrite)?;
         rows.write(&run)?;
         asked.finish(&plan, &run, &watch)
     };
-    detached(py, || work().map_err(input))
+    let done = detached(py, || work().map_err(input));
+    failure.take().map_or(done, Err)
 }
 
 /// What is to be driven, loaded.
@@ -124,6 +128,16 @@ impl Asked {
         };
         let compare_with = compare_with.context("compare_with: name one of the drivers")?;
         Ok(Self { settings, drivers, lots, compare_with })
+    }
+
+    /// Warns of what is to be said about the lots.
+    fn say_notes(&self, failure: &Failure) -> anyhow::Result<()> {
+        let notes = notes::of(&self.lots, &self.settings.evaluation.noise);
+        if let Err(error) = Python::attach(|py| warn(py, &notes)) {
+            failure.note(error);
+            bail!("the caller takes warnings for errors");
+        }
+        Ok(())
     }
 
     fn plan(&self, shard: Option<Shard>) -> Plan<'_> {
@@ -185,9 +199,8 @@ fn settings_of(drivers: &[(String, Named)], layers: Layers, trials: &Trials) -> 
         Named::Function(_) => None,
     });
     let specs = specs.collect::<anyhow::Result<Vec<DriverSpec>>>()?;
-    let run = specs.iter().find_map(DriverSpec::run).filter(|_| !layers.names_a_base());
-    let mut settings = match run {
-        Some(run) => Settings::resolve_over(&run_dir::settings_of(run)?, &layers, None)?,
+    let mut settings = match drivers::settings_of_runs(&specs, &layers)? {
+        Some((of_run, _)) => Settings::resolve_over(&of_run, &layers, None)?,
         None => Settings::resolve(&layers, None)?,
     };
     let evaluation = &mut settings.evaluation;

@@ -1,8 +1,9 @@
 //! No panic leaves this library, nothing waits for threads that are not there, and errors are Python's.
 
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use std::any::Any;
+use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::OnceLock;
 
@@ -18,6 +19,18 @@ pub(crate) fn input(error: impl Into<anyhow::Error>) -> PyErr {
     PyValueError::new_err(format!("{:#}", error.into()))
 }
 
+/// Says notes as warnings of the caller in Python.
+///
+/// # Errors
+/// If the caller turns warnings into errors.
+pub(crate) fn warn(py: Python<'_>, notes: &[String]) -> PyResult<()> {
+    for note in notes {
+        let note = CString::new(note.as_str())?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &note, 1)?;
+    }
+    Ok(())
+}
+
 /// Works without the interpreter's lock, in threads.
 ///
 /// # Errors
@@ -28,7 +41,7 @@ pub(crate) fn detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> PyResult<
     if *PROCESS.get_or_init(std::process::id) != std::process::id() {
         return Err(PyRuntimeError::new_err(
             "this process was forked after lotpilot had started its threads, which are not in the child; start \
-             processes with multiprocessing's method \"spawn\" or \"forkserver\"",
+             processes with multiprocessing's method \"spawn\" or \"forkserver\", or step with threads=1",
         ));
     }
     alone(py, work)

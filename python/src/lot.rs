@@ -2,8 +2,9 @@
 
 use crate::arrays::points;
 use crate::course::{SettingsFrom, directions};
-use crate::guard::{detached, input};
-use experiment::settings::Settings;
+use crate::guard::{alone, input, warn};
+use experiment::notes;
+use experiment::settings::{NoiseChoice, Settings};
 use experiment::trials::{Purpose, Trial};
 use numpy::{Ix2, PyArray, PyArray1, PyArray3, PyArrayMethods as _, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -31,6 +32,7 @@ use std::path::PathBuf;
 #[pyclass(frozen, module = "lotpilot")]
 pub(crate) struct Lot {
     map: Map,
+    notes: Vec<String>,
     vehicle: VehicleSettings,
 }
 
@@ -40,7 +42,7 @@ impl Lot {
     #[pyo3(signature = (name, *, direction="forward", trial=0, seed=1))]
     fn new(py: Python<'_>, name: &str, direction: &str, trial: u32, seed: u64) -> PyResult<Self> {
         let settings = Settings::preset("default").map_err(input)?;
-        detached(py, || {
+        alone(py, || {
             let vehicle = settings.episode.vehicle.clone();
             let lots = experiment::lots::Lot::parse_all(&[name], &vehicle).map_err(input)?;
             let [lot] = lots.as_slice() else {
@@ -50,7 +52,8 @@ impl Lot {
             let direction = directions(direction).map_err(input)?[0];
             lot.check_direction(direction, &vehicle).map_err(input)?;
             let trial = Trial::of_evaluation(RootSeed(seed), lot, direction, trial);
-            Ok(Self { map: trial.map(&settings.episode).map_err(input)?, vehicle })
+            let notes = notes::of(&lots, &[NoiseChoice::Lot]);
+            Ok(Self { map: trial.map(&settings.episode).map_err(input)?, notes, vehicle })
         })
     }
 
@@ -58,6 +61,12 @@ impl Lot {
     #[getter]
     fn name(&self) -> &str {
         &self.map.scenario().name
+    }
+
+    /// What the import of a map did and found, as ``cargo xtask generate`` says it; nothing for other lots.
+    #[getter]
+    fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// Length of the route, metres.
@@ -125,7 +134,7 @@ impl Lot {
             return Err(PyValueError::new_err("pixels_per_metre is not within 0.1 … 1000"));
         }
         let drawn =
-            detached(py, || Ok(lot::top_view(&self.map, &self.vehicle, pixels_per_metre).map_err(input)?.pixmap()))?;
+            alone(py, || Ok(lot::top_view(&self.map, &self.vehicle, pixels_per_metre).map_err(input)?.pixmap()))?;
         let rgb: Vec<u8> = drawn.data().chunks_exact(4).flat_map(|rgba| [rgba[0], rgba[1], rgba[2]]).collect();
         PyArray::from_vec(py, rgb).reshape([drawn.height() as usize, drawn.width() as usize, 3])
     }
@@ -143,7 +152,7 @@ impl Lot {
 #[pyo3(signature = (names))]
 pub(crate) fn lots(py: Python<'_>, names: Vec<String>) -> PyResult<Vec<String>> {
     let settings = Settings::preset("default").map_err(input)?;
-    detached(py, || {
+    alone(py, || {
         let lots = experiment::lots::Lot::parse_all(&names, &settings.episode.vehicle).map_err(input)?;
         Ok(lots.iter().map(experiment::lots::Lot::spec).collect())
     })
@@ -201,8 +210,9 @@ pub(crate) fn generate(
         };
         Ok::<_, anyhow::Error>((name, text, place, length_m, obstacles))
     };
-    detached(py, || {
-        let lots = experiment::lots::Lot::parse_all(&names, vehicle).map_err(input)?;
+    let lots = alone(py, || experiment::lots::Lot::parse_all(&names, vehicle).map_err(input))?;
+    warn(py, &notes::of(&lots, &[NoiseChoice::Lot]))?;
+    alone(py, || {
         if let Some(fixed) = lots.iter().find(|lot| count != 1 && !lot.is_drawn_per_trial()) {
             let problem = format!("count: {:?} has the same obstacles in every drawing", fixed.name());
             return Err(PyValueError::new_err(problem));

@@ -76,7 +76,8 @@ impl RustLoop {
             let (started, limit) = (Instant::now(), Duration::from_secs_f64(seconds));
             let mut steps = 0_u64;
             while started.elapsed() < limit {
-                let fleet = |cars| Box::new(OneDriverEach(vec![Centred { ahead_m: *ahead_m }; cars])) as Box<_>;
+                let seat = |cars: &[usize]| OneDriverEach(vec![Centred { ahead_m: *ahead_m }; cars.len()]);
+                let fleet = |cars: &[usize]| Box::new(seat(cars)) as Box<_>;
                 let fleets = SeatedFleet::in_all(episodes.clone(), *cars_each, fleet);
                 let driven = run_fleets_until(fleets, &mut |_, _| {
                     steps += 1;

@@ -155,6 +155,16 @@ def test_the_next_episode_begins_when_the_mode_says():
     assert infos["episode_number"].tolist() == [0, 3] and infos["time_s"].tolist() == [pytest.approx(0.05), 0.0]
 
 
+def test_environments_without_a_seed_go_on():
+    envs = LotVectorEnv(2, **SHORT)
+    envs.reset(seed=1)
+    _, infos = envs.reset(seed=[None, 5])
+    assert infos["episode_number"].tolist() == [2, 1]
+    assert [envs.core.place(index)["seed"] for index in range(2)] == [1, 5]
+    with pytest.raises(ValueError, match="3 values for 2"):
+        envs.reset(seed=[None, 5, 6])
+
+
 def test_the_expert_labels_what_anyone_drives():
     envs = LotVectorEnv(3, lots=["lot-b", "lot-c"], normalise=True)
     envs.reset(seed=1)

@@ -2,6 +2,7 @@
 
 import hashlib
 import multiprocessing
+import shutil
 from itertools import pairwise
 from pathlib import Path
 
@@ -122,6 +123,36 @@ def test_shards_merge_to_the_bytes_of_one_process(tmp_path):
     with pytest.raises(ValueError, match="no shard"):
         request.drive(tmp_path / "none", shard="4/3")
     assert not (tmp_path / "part").exists() and not (tmp_path / "other").exists()
+
+
+def test_an_expert_asked_now_and_then_forgets_what_it_planned_before_it_was_put_back():
+    short = ("episode.metrics.timeout_s=40.0",)
+    asked, anew = (lotpilot.Episode("lot-b", overrides=short) for _ in range(2))
+    asked.expert_action()
+    ticks_since = None
+    while not asked.is_over and ticks_since != 5:
+        resets = asked.report()["metrics"]["near_collisions"]
+        asked.step([8.0, 0.0]), anew.step([8.0, 0.0])
+        if asked.report()["metrics"]["near_collisions"] > resets:
+            ticks_since = 0
+        elif ticks_since is not None:
+            ticks_since += 1
+    assert ticks_since == 5, "it was put back"
+    np.testing.assert_array_equal(asked.expert_action(), anew.expert_action())
+
+
+def test_what_an_import_found_is_said(tmp_path):
+    for part in ("car-park.pgm", "car-park.lot.toml"):
+        shutil.copy(ROOT / "scenarios/examples" / part, tmp_path)
+    text = (ROOT / "scenarios/examples/car-park.yaml").read_text()
+    (tmp_path / "car-park.yaml").write_text(text + "colour: green\n")
+    lot = str(tmp_path / "car-park.yaml")
+    assert any('"colour"' in note for note in lotpilot.Lot(lot).notes)
+    assert lotpilot.Lot("lot-b").notes == []
+    with pytest.warns(UserWarning, match='"colour"'):
+        Core(1, EnvOptions(lots=[lot]), "next_step")
+    with pytest.warns(UserWarning, match='"colour"'):
+        lotpilot.evaluate("expert", lot, trials=1, directions="forward", overrides=("episode.metrics.timeout_s=1.0",))
 
 
 def test_the_expert_asked_twice_in_a_tick_answers_once():
@@ -287,7 +318,8 @@ def test_arrays_of_another_shape_or_type_are_refused():
 
 def _in_child(queue, threads):
     try:
-        Core(4, EnvOptions(lots=["lot-b"], threads=threads), "next_step").reset()
+        lots = ["lot-b", "test:1:lane", str(ROOT / "scenarios/examples/slalom.toml")]
+        Core(6, EnvOptions(lots=lots, threads=threads), "next_step").reset()
         queue.put("drove")
     except RuntimeError as error:
         queue.put(str(error))

@@ -69,6 +69,9 @@ def test_lerobot_finds_every_frame_where_the_format_says(dataset, tmp_path):
     assert stats["action"]["count"] == [8]
     with pytest.raises(FileExistsError):
         exports.to_lerobot(dataset, root)
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(FileExistsError):
+        exports.to_lerobot(dataset, tmp_path / "mine")
 
 
 def test_lerobot_reads_it(dataset, tmp_path, monkeypatch):

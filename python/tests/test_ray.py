@@ -89,6 +89,12 @@ def test_a_node_dies_and_the_tables_are_those_of_one_process(cluster, tmp_path):
     with pytest.raises(FileExistsError, match="other arguments"):
         lotpilot.ray.evaluate("expert", shards=SHARDS, out=out)
 
+    def straight(grids):
+        return np.tile([7.0, 0.0], (len(grids), 1))
+
+    with pytest.warns(UserWarning, match="pickled otherwise"):
+        lotpilot.ray.evaluate({**drivers, "straight": straight}, LOTS, shards=SHARDS, out=out, **options)
+
 
 def test_what_cannot_be_driven_is_one_clear_error(cluster, tmp_path, monkeypatch):
     def broken(grids):

@@ -50,9 +50,72 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
     }
     Ok(format!(
         "### Controls\n\nOn the unseen lots. *{EXPERT_ONLY}*: as many rounds on the same lots as DAgger with as many \
-         optimiser steps, but the expert drives throughout; where it is no worse than DAgger, more data is what helps and \
-         not who drove. α is the weight on τ̂; its mean weight is 1 where nothing is weighted.\n\n{table}"
+         optimiser steps, but the expert drives throughout, so that every tick is the expert's and there are more samples; where it \
+         is no worse than DAgger, more data is what helps and not who drove. α is the weight on τ̂; its mean weight is 1 where nothing is weighted.\n\n{table}"
     ))
+}
+
+/// Points at half of the open way beside points as far as it is open, on unseen lots.
+pub(crate) fn points(root: &Path, seed: RootSeed, half: &Driven<'_>, far: &Driven<'_>) -> anyhow::Result<String> {
+    let mut table = table_of(&["points", "policy", "last η̂", "near-collisions (contacts)", "per 100 m [95 %]", "m/s"]);
+    for (name, driven, chain) in [("half", half, Chain::Weighted), ("far", far, Chain::FarPoints)] {
+        let everywhere = driven.all();
+        let (estimates, _) = driven.results.judge(0, &everywhere, 0, driven.plan.settings.evaluation.seed);
+        let rows = rows_of(root, chain, seed)?;
+        for policy in [BC, DAGGER] {
+            let Some(driver) = driven.driver(policy) else { continue };
+            let totals = driven.results.totals(0, driver, &everywhere, None);
+            let eta_hat = rows.iter().rev().find_map(|row| row.eta_hat).filter(|_| policy == DAGGER);
+            table.add_row([
+                name.to_owned(),
+                policy.to_owned(),
+                eta_hat.map_or_else(|| "–".to_owned(), |eta_hat| format!("{eta_hat:.3}")),
+                format!("{} ({})", totals.near_collisions, totals.contacts),
+                quoted_rate(&totals, &estimates[driver]),
+                format!("{:.2}", totals.mean_speed_mps()),
+            ]);
+        }
+    }
+    Ok(format!(
+        "### Half and far points\n\nOn the unseen lots. *Half*: the expert's points lie at half of the open way, our reading; \
+         *far*: as far as the way is open, as the paper's rule three says, driven at half as fast. One training each, at another \
+         speed, so that there are no pairs.\n\n{table}"
+    ))
+}
+
+/// Planners in every reading, beside `DAgger`: on the paper's lots and on unseen ones.
+pub(crate) fn readings(reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
+    let mut table = table_of(&[
+        "driver",
+        "the paper's lots",
+        "per 100 m [95 %]",
+        "− DAgger's [95 %]",
+        "unseen",
+        "per 100 m [95 %]",
+        "− DAgger's [95 %]",
+    ]);
+    let judged = [reference, unseen].map(|driven| {
+        let everywhere = driven.all();
+        let judged = driven.results.judge(0, &everywhere, 0, driven.plan.settings.evaluation.seed);
+        (driven, everywhere, judged)
+    });
+    for (driver, named) in reference.plan.drivers.iter().enumerate() {
+        let cells = judged.iter().flat_map(|(driven, everywhere, (estimates, comparisons))| {
+            let totals = driven.results.totals(0, driver, everywhere, None);
+            let found = comparisons.iter().find(|comparison| comparison.driver == driver);
+            [
+                format!("{} ({})", totals.near_collisions, totals.contacts),
+                quoted_rate(&totals, &estimates[driver]),
+                found.map_or_else(|| "–".to_owned(), |found| difference(found.difference_per_100m, 2)),
+            ]
+        });
+        table.add_row(std::iter::once(named.name.clone()).chain(cells));
+    }
+    format!(
+        "### Readings of the planners\n\nNear-collisions (contacts) of every planner at its publication's parameters, and in \
+         every other reading of what the publication leaves open (`NAME/READING`); \
+         tuned ones are in the tables above. DAgger is the first training.\n\n{table}"
+    )
 }
 
 /// Every driver without action smoothing and with it, on unseen lots.

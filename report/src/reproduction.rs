@@ -18,11 +18,13 @@ use evaluation::slices::Slice;
 use evaluation::stages::{self, Chain, Extent, Stage, UNWEIGHTED};
 use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
+use evaluation::totals::Totals;
 use evaluation::trainings::TRAININGS_MIN;
 use experiment::drivers::NamedDriver;
 use experiment::run_dir::{Manifest, RunDir};
-use experiment::settings::Settings;
+use experiment::settings::{Settings, with_points_of_paper};
 use policy::dagger::IterationRow;
+use policy::decision_rule::DecisionRule;
 use sim::seed::RootSeed;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -102,7 +104,7 @@ impl Found {
         let on_policy = OnPolicy::read(&root.join(stages::ON_POLICY))?;
         let folders = [stages::REFERENCE, stages::UNSEEN];
         let statements = with_drives(&recipe.stages, root, folders, |[reference, unseen]| {
-            Ok(statements(settings.dagger.eta, &reference, &unseen, &weighted, &on_policy.effect))
+            Ok(statements(settings, &reference, &unseen, &weighted, &on_policy.effect))
         })?;
         Ok(Self { statements, weighted, unweighted, on_policy })
     }
@@ -136,15 +138,28 @@ impl Found {
         root: &Path,
         reference: &Driven<'_>,
     ) -> anyhow::Result<()> {
-        let folders = [stages::RULES, stages::CONTROLS, stages::UNSMOOTHED, stages::SMOOTHED];
-        with_drives(&recipe.stages, root, folders, |[rules, controls, unsmoothed, smoothed]| {
-            page.text(decision_rules(root, recipe.settings.seed, &rules)?);
+        let seed = recipe.settings.seed;
+        let folders = [stages::RULES, stages::CONTROLS];
+        with_drives(&recipe.stages, root, folders, |[rules, controls]| {
+            page.text(decision_rules(root, seed, &rules)?);
             page.text(weight_and_cloning(reference));
-            page.text(controls::controls(root, recipe.settings.seed, &controls)?);
-            page.text(controls::action_smoothing(&unsmoothed, &smoothed));
-            calibration(page, &self.on_policy.calibration);
+            page.text(controls::controls(root, seed, &controls)?);
             Ok(())
-        })
+        })?;
+        if recipe.stages.iter().any(|stage| stage.folder == stages::FAR_POINTS) {
+            with_drives(&recipe.stages, root, [stages::UNSEEN, stages::FAR_POINTS], |[half, far]| {
+                page.text(controls::points(root, seed, &half, &far)?);
+                Ok(())
+            })?;
+        }
+        let folders = [stages::UNSMOOTHED, stages::SMOOTHED, stages::READINGS, stages::READINGS_UNSEEN];
+        with_drives(&recipe.stages, root, folders, |[unsmoothed, smoothed, readings, readings_unseen]| {
+            page.text(controls::action_smoothing(&unsmoothed, &smoothed));
+            page.text(controls::readings(&readings, &readings_unseen));
+            Ok(())
+        })?;
+        calibration(page, &self.on_policy.calibration);
+        Ok(())
     }
 }
 
@@ -203,14 +218,18 @@ fn how_they_drove(reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
 }
 
 fn statements(
-    eta: f64,
+    settings: &Settings,
     reference: &Driven<'_>,
     unseen: &Driven<'_>,
     weighted: &[IterationRow],
     effect: &[Effect],
 ) -> Vec<Statement> {
     let mut statements = conclusions::on_reference_lots(reference);
-    statements.push(conclusions::share_of_the_network(weighted, eta));
+    // With nearer labels η̂ is another quantity, and is not held against the paper's.
+    let has_labels_of_paper = with_points_of_paper(settings) == *settings;
+    if has_labels_of_paper && settings.dagger.rule.tau() == DecisionRule::paper().tau() {
+        statements.push(conclusions::share_of_the_network(weighted, settings.dagger.eta));
+    }
     statements.extend(effect.iter().map(|Effect { iteration, held_back, held_back_by_seed, .. }| {
         conclusions::effect_of_the_weight(*iteration, *held_back, held_back_by_seed)
     }));
@@ -256,7 +275,8 @@ fn verdicts(statements: &[Statement], extent: &Extent) -> String {
     let mut text = "Decided from the runs of this report: a comparison *holds* where the paired interval of 95 % lies on the \
                     paper's side of zero, *does not hold* where it lies on the other, and *cannot be told* where it contains \
                     zero (differences are the other driver's − DAgger's in near-collisions and reversals, DAgger's − the \
-                    other driver's in safe ratios; * = excludes zero, by six trials or more).\n"
+                    other driver's in safe ratios; * = excludes zero, by six trials or more). Beside near-collisions, contacts \
+                    in brackets.\n"
         .to_owned();
     if extent.seeds >= TRAININGS_MIN as u64 {
         text += "\nWhere several counts are named, they are of trainings that differ by their seed: their means are compared, \
@@ -363,7 +383,8 @@ fn rates_table(driven: &Driven<'_>, with_paper: bool) -> String {
     let cell = |driver: usize, slice: &Slice| {
         let totals = driven.results.totals(0, driver, slice, None);
         let index = slices.iter().position(|known| known == slice).expect("one of them");
-        format!("{}: {}", totals.near_collisions, quoted_rate(&totals, &estimates[index][driver]))
+        let Totals { near_collisions, contacts, .. } = totals;
+        format!("{near_collisions} ({contacts}): {}", quoted_rate(&totals, &estimates[index][driver]))
     };
     let of_paper = |driver: usize, label: &str| {
         let count = count_of_paper(driver, label).filter(|_| with_paper);
@@ -376,7 +397,8 @@ fn collision_rates(page: &mut Page, driven: &Driven<'_>) {
     page.section(
         "Collision rates on the paper's lots",
         format!(
-            "Near-collisions, and per 100 m of the route [95 %]. The paper's counts are recovered from its rates.\n\n{}",
+            "Near-collisions (contacts), and near-collisions per 100 m of the route [95 %]. The paper's counts are recovered from \
+             its rates.\n\n{}",
             rates_table(driven, true)
         ),
     );
@@ -455,7 +477,8 @@ fn safe_ratios(page: &mut Page, driven: &Driven<'_>) {
         let lot = paper::LOTS.iter().find(|lot| lot.lot == label);
         lot.map_or_else(String::new, |lot| format!("{:.2}", lot.results[driver].safe_ratio))
     };
-    let text = "Drivable share of the metre around the body, mean over runs [95 %].";
+    let text = "Drivable share of the metre around the body, mean over runs [95 %]. The widths of these lots were chosen so that \
+                the expert meets the paper's safe ratios: the expert's, and those of who imitates it well, are fitted, not found.";
     page.section("Safe ratios on the paper's lots", format!("{text}\n\n{}", by_lot(driven, &cell, &of_paper)));
     let ratios = bars_beside_paper(
         driven,
@@ -477,7 +500,8 @@ fn unseen_lots(page: &mut Page, driven: &Driven<'_>) {
     page.section(
         "Unseen generated lots",
         format!(
-            "Near-collisions, and per 100 m of the route [95 %]; nothing was trained or tuned on these lots.\n\n{}",
+            "Near-collisions (contacts), and near-collisions per 100 m of the route [95 %]; nothing was trained or tuned on these \
+             lots.\n\n{}",
             rates_table(driven, false)
         ),
     );
@@ -490,7 +514,7 @@ fn decision_rules(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::R
         "samples, i = 1",
         "η̂, i = 1",
         "near-collisions while collecting, i = 1",
-        "then driving: near-collisions",
+        "then driving: near-collisions (contacts)",
         "safe ratio",
     ]);
     let slice = driven.all();
@@ -506,7 +530,7 @@ fn decision_rules(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::R
             cell(|row| Some(row.samples.to_string())),
             cell(|row| row.eta_hat.map(|eta| format!("{eta:.3}"))),
             cell(|row| Some(row.near_collisions.to_string())),
-            format!("{}: {}", totals.near_collisions, quoted_rate(&totals, &estimates[driver])),
+            format!("{} ({}): {}", totals.near_collisions, totals.contacts, quoted_rate(&totals, &estimates[driver])),
             format!("{:.3}", totals.safe_ratio()),
         ]);
     }

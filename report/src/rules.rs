@@ -14,6 +14,7 @@ use evaluation::summary::csv_of;
 use evaluation::trainings::Team;
 use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
+use policy::dagger::Keep;
 use policy::dataset::Collection;
 use policy::decision_rule::DecisionRule;
 use serde::Serialize;
@@ -118,7 +119,7 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
         let expert_s = (row.ticks - row.novice_ticks) as f64 * control_period_s;
         row.intervention_s = if row.interventions > 0 { expert_s / row.interventions as f64 } else { 0.0 };
     }
-    let text = format!("{}\n\n{}", to_markdown(&pooled), legend(extent));
+    let text = format!("{}\n\n{}", to_markdown(&pooled), legend(settings, extent));
     run.write("rules.md", format!("{text}\n").as_bytes())?;
     run.write("rules.csv", &csv_of(&[pooled.clone(), rows].concat())?)?;
     run.write("rules.svg", plot(&pooled).as_bytes())?;
@@ -174,14 +175,23 @@ fn percent(part: u64, ticks: u64) -> f64 {
 }
 
 /// How the table is read.
-fn legend(extent: &Extent) -> String {
+fn legend(settings: &Settings, extent: &Extent) -> String {
     let (trainings, intervals) = match extent.seeds {
         1 => ("one training of each rule".to_owned(), "other lots"),
         seeds => (format!("{seeds} trainings of each rule, summed up; rates are means"), "other lots and other seeds"),
     };
+    // What a method would ask for is not what it learned from then.
+    let learned = match settings.dagger.keep {
+        Keep::EveryTick => {
+            " Every rule learned from the expert's labels of all ticks, also of those at which its method would not have asked: \
+             what the network would come to on the labels that were asked for is not shown."
+        }
+        Keep::ExpertTicks => "",
+    };
     format!(
-        "Of {trainings}. Intervals of 95 % are for {intervals}; a difference that excludes zero (*) is one of several \
-         comparisons, and no adjustment is made for their number."
+        "Of {trainings}; behaviour cloning has the samples of the first round alone.{learned} Intervals of 95 % are for \
+         {intervals}; a difference that excludes zero (*) is one of several comparisons, and no adjustment is made for their \
+         number."
     )
 }
 

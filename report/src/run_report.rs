@@ -406,8 +406,16 @@ fn noise_series(evaluation: &Evaluation, drivers: &[&str]) -> Vec<RateSeries> {
 }
 
 fn safe_ratios(evaluation: &Evaluation, noise: NoiseChoice, driver: &str, lots: &str) -> Vec<f64> {
-    let Some(by_lot) = evaluation.safe_ratios.get(&(noise.to_string(), driver.to_owned())) else { return Vec::new() };
-    by_lot.iter().filter(|(lot, _)| is_in(lot, lots)).flat_map(|(_, of_lot)| of_lot).copied().map(f64::from).collect()
+    let by_lot = evaluation.safe_ratios.get(&(noise.to_string(), driver.to_owned()));
+    by_lot.map_or_else(Vec::new, |by_lot| of_row(by_lot, lots))
+}
+
+/// The values of the lots that a row is about.
+fn of_row(by_lot: &BTreeMap<String, Vec<f32>>, lots: &str) -> Vec<f64> {
+    // A lot by this very name is not of a kind: the row `garage` is not about `garage-2`.
+    let is_one = by_lot.contains_key(lots);
+    let of_row = by_lot.iter().filter(|(lot, _)| if is_one { *lot == lots } else { is_in(lot, lots) });
+    of_row.flat_map(|(_, of_lot)| of_lot).copied().map(f64::from).collect()
 }
 
 /// The fastest near-collisions: how fast the car still was is how far the driver was from seeing it come.

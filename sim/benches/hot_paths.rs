@@ -125,7 +125,8 @@ fn closed_loop_in_lockstep(bencher: Bencher<'_, '_>, (threads, is_parted): (usiz
         let mut fleet = OneDriverEach(vec![AlongRoute; episodes.len()]);
         pool.install(|| {
             if is_parted {
-                let fleet = |cars| -> Box<dyn Fleet + Send> { Box::new(OneDriverEach(vec![AlongRoute; cars])) };
+                let fleet =
+                    |cars: &[usize]| -> Box<dyn Fleet + Send> { Box::new(OneDriverEach(vec![AlongRoute; cars.len()])) };
                 run_fleets(SeatedFleet::in_all(episodes, 1, fleet), &mut |_, _| ())
             } else {
                 run_lockstep(episodes, &mut fleet, &mut |_, _| ())

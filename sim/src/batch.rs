@@ -104,20 +104,24 @@ impl SeatedFleet {
         Self { fleet, episodes, indices, frames: Vec::new() }
     }
 
-    /// Seats fleets in all cars, each in up to `cars_each` of them. `fleet` is called with the number of its cars.
+    /// Seats fleets in all cars, each in up to `cars_each` of them. `fleet` is called with the indices of its cars.
     ///
     /// Cars are dealt out one by one: neighbours are often of the same lot, and so the fleets end at about the same time.
     pub fn in_all(
         episodes: Vec<Episode>,
         cars_each: usize,
-        mut fleet: impl FnMut(usize) -> Box<dyn Fleet + Send>,
+        mut fleet: impl FnMut(&[usize]) -> Box<dyn Fleet + Send>,
     ) -> Vec<Self> {
         let fleets = episodes.len().div_ceil(cars_each);
         let mut dealt: Vec<Vec<(usize, Episode)>> = (0..fleets).map(|_| Vec::with_capacity(cars_each)).collect();
         for (index, episode) in episodes.into_iter().enumerate() {
             dealt[index % fleets].push((index, episode));
         }
-        dealt.into_iter().map(|episodes| Self::new(fleet(episodes.len()), episodes)).collect()
+        let seated = |episodes: Vec<(usize, Episode)>| {
+            let cars: Vec<usize> = episodes.iter().map(|(index, _)| *index).collect();
+            Self::new(fleet(&cars), episodes)
+        };
+        dealt.into_iter().map(seated).collect()
     }
 
     /// The cars with their indices among those of all fleets.

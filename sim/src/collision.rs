@@ -22,7 +22,7 @@ pub enum ObstacleSet {
     /// Everything that is not drivable: the outside of the boundary, islands and solid objects.
     #[default]
     NonDrivable,
-    /// Solid objects only: painted lines and curbs may be crossed.
+    /// Obstacles alone: the boundary and islands, whatever their height, may be crossed.
     Solid,
 }
 

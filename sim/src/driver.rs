@@ -56,6 +56,20 @@ pub enum Source {
     Planner,
 }
 
+impl Source {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Expert, Self::Novice, Self::Planner];
+
+    /// In legends.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Expert => "expert",
+            Self::Novice => "network",
+            Self::Planner => "planner",
+        }
+    }
+}
+
 /// What a driver answers at one control tick.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Decision {

@@ -9,7 +9,6 @@ use crate::lot::{LINE_Z_M, outline, raised};
 use crate::recording::Recording;
 use crate::sensors::Sensors;
 use crate::shapes::{self, Arrow, Block, Dot, Strip};
-use experiment::drivers;
 use experiment::settings::Settings;
 use expert::{Inspection, Rule, ScriptedExpert};
 use planners::Planner;
@@ -35,8 +34,6 @@ const FIELD_M: f32 = 0.96;
 /// Diameter and width of a wheel, metres.
 const WHEEL_M: [f32; 2] = [0.66, 0.22];
 
-/// Who may be at the wheel.
-const DRIVERS: [Source; 3] = [Source::Expert, Source::Novice, Source::Planner];
 /// The expert's rules.
 const RULES: [(Rule, Colour); 4] = [
     (Rule::Far, colours::PLANNER),
@@ -81,7 +78,7 @@ impl<'a> Drive<'a> {
             map: Arc::clone(episode.map()),
             episode: episode.settings().clone(),
             rule: settings.dagger.rule,
-            expert: drivers::expert(&settings.expert, &settings.episode),
+            expert: ScriptedExpert::new(settings.expert.clone(), &settings.episode),
             novice: None,
             planner: None,
             sensors: Sensors::new(root, episode),
@@ -148,7 +145,7 @@ impl<'a> Drive<'a> {
         }
         self.log_static("car/safe_ring", &shapes::strips(&[self.safe_ring()]));
         self.log_static("car/seen_patch", &shapes::strips(&[self.seen_patch()]));
-        self.log_static("driver", &states(DRIVERS.map(|source| (driver_name(source), colours::of_source(source)))));
+        self.log_static("driver", &states(Source::ALL.map(|source| (source.name(), colours::of_source(source)))));
         self.log_static("expert_rule", &states(RULES.map(|(rule, colour)| (rule_name(rule), colour))));
         self.show_signals();
     }
@@ -237,7 +234,7 @@ impl<'a> Drive<'a> {
         }
         if self.driver != Some(frame.decision.source) {
             self.driver = Some(frame.decision.source);
-            self.log("driver", &StateChange::single(driver_name(frame.decision.source)));
+            self.log("driver", &StateChange::single(frame.decision.source.name()));
         }
     }
 
@@ -482,14 +479,6 @@ fn arc(curvature_per_m: f32, length_m: f32) -> Vec<[f32; 3]> {
 fn circle(radius: f32) -> Strip {
     let points = (0..=32).map(|i| raised(radius * Vec2::from_angle(i as f32 * TAU / 32.0), 0.0)).collect();
     Strip { points, radius_pt: if radius == 1.0 { 1.2 } else { 0.7 }, colour: colours::NOVICE }
-}
-
-fn driver_name(source: Source) -> &'static str {
-    match source {
-        Source::Expert => "expert",
-        Source::Novice => "network",
-        Source::Planner => "planner",
-    }
 }
 
 /// Names and colours of states.

@@ -52,7 +52,26 @@ pub(crate) struct Recording {
     /// The first thing that could not be logged.
     failed: RefCell<Option<anyhow::Error>>,
     /// Where it goes, if that is a file.
-    file: Option<PathBuf>,
+    file: Option<Partial>,
+}
+
+/// A file under another name until it is whole. What is not, is deleted.
+struct Partial {
+    whole: PathBuf,
+    partial: PathBuf,
+}
+
+impl Partial {
+    fn of(whole: PathBuf) -> Self {
+        Self { partial: whole.with_added_extension("partial"), whole }
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        // Of a whole one nothing is there any more; of another, the error that ended it is what is said.
+        let _ = std::fs::remove_file(&self.partial);
+    }
 }
 
 impl Recording {
@@ -63,11 +82,8 @@ impl Recording {
     pub(crate) fn begin(sink: &Sink, name: &str, header: &Header) -> anyhow::Result<Self> {
         let builder = RecordingStreamBuilder::new(application(header)?);
         let (stream, file) = match sink {
-            Sink::File(path) => (save(builder, path)?, Some(path.clone())),
-            Sink::Folder(folder) => {
-                let path = folder.join(format!("{name}.rrd"));
-                (save(builder, &path)?, Some(path))
-            }
+            Sink::File(path) => save(builder, path.clone())?,
+            Sink::Folder(folder) => save(builder, folder.join(format!("{name}.rrd")))?,
             Sink::Connect(Some(url)) => (builder.connect_grpc_opts(url.as_str()).with_context(|| url.clone())?, None),
             Sink::Connect(None) => (builder.connect_grpc().context("the viewer of this machine")?, None),
             Sink::Spawn => (spawn(builder)?, None),
@@ -75,7 +91,7 @@ impl Recording {
         Self::with_layout(stream, file, header)
     }
 
-    fn with_layout(stream: RecordingStream, file: Option<PathBuf>, header: &Header) -> anyhow::Result<Self> {
+    fn with_layout(stream: RecordingStream, file: Option<Partial>, header: &Header) -> anyhow::Result<Self> {
         // A wall clock means nothing in a simulation, and would make every file differ.
         stream.set_log_time_enabled(false);
         stream.send_recording_name(header.title.as_str())?;
@@ -135,7 +151,7 @@ impl Recording {
     /// # Errors
     /// If something could not be logged or written.
     pub(crate) fn end(self) -> anyhow::Result<Option<PathBuf>> {
-        let place = self.file.as_ref().map_or_else(|| "the viewer".to_owned(), |file| file.display().to_string());
+        let place = self.file.as_ref().map_or_else(|| "the viewer".to_owned(), |file| file.whole.display().to_string());
         if let Some(error) = self.failed.into_inner() {
             return Err(error.context(place));
         }
@@ -143,7 +159,9 @@ impl Recording {
             .flush_blocking()
             .with_context(|| format!("{place}: cannot be written; is the disk full, or the viewer gone?"))?;
         self.stream.disconnect();
-        Ok(self.file)
+        let Some(file) = self.file else { return Ok(None) };
+        std::fs::rename(&file.partial, &file.whole).with_context(|| format!("{place}: cannot be written"))?;
+        Ok(Some(file.whole.clone()))
     }
 
     /// A recording that stays in memory.
@@ -158,13 +176,20 @@ fn application(header: &Header) -> anyhow::Result<ApplicationId> {
     Ok(ApplicationId::try_from(format!("lotpilot-{}", header.application))?)
 }
 
-fn save(builder: RecordingStreamBuilder, path: &Path) -> anyhow::Result<RecordingStream> {
+fn save(builder: RecordingStreamBuilder, path: PathBuf) -> anyhow::Result<(RecordingStream, Option<Partial>)> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder)
         .with_context(|| format!("{}: cannot be created; choose a file with --out", folder.display()))?;
     let batches =
         ChunkBatcherConfig { flush_tick: Duration::MAX, flush_num_bytes: BATCH_BYTES, ..ChunkBatcherConfig::DEFAULT };
-    builder.batcher_config(batches).save(path).with_context(|| path.display().to_string())
+    let file = Partial::of(path);
+    // Never through a link that somebody put there.
+    if std::fs::symlink_metadata(&file.partial).is_ok() {
+        std::fs::remove_file(&file.partial).with_context(|| file.partial.display().to_string())?;
+    }
+    let stream =
+        builder.batcher_config(batches).save(&file.partial).with_context(|| file.whole.display().to_string())?;
+    Ok((stream, Some(file)))
 }
 
 /// A viewer of this machine that nobody else can reach.
@@ -178,6 +203,25 @@ fn spawn(builder: RecordingStreamBuilder) -> anyhow::Result<RecordingStream> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What an error or a kill cut short stood in the place of an earlier recording.
+    #[test]
+    fn a_recording_takes_the_place_of_another_when_it_is_whole() {
+        let folder = std::env::temp_dir().join(format!("lotpilot-partial-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = folder.join("a.rrd");
+        std::fs::write(&file, "earlier").unwrap();
+        let begin = || Recording::begin(&Sink::File(file.clone()), "a", &crate::tests::header(None)).unwrap();
+        let files = || std::fs::read_dir(&folder).unwrap().count();
+        let failed = begin();
+        assert_eq!(files(), 2);
+        drop(failed);
+        assert_eq!((files(), std::fs::read(&file).unwrap()), (1, b"earlier".to_vec()));
+        assert_eq!(begin().end().unwrap(), Some(file.clone()));
+        assert_eq!(files(), 1);
+        assert_ne!(std::fs::read(&file).unwrap(), b"earlier");
+        std::fs::remove_dir_all(folder).unwrap();
+    }
 
     #[test]
     fn the_viewer_that_is_named_is_the_one_that_opens_these_recordings() {

@@ -5,7 +5,7 @@ use crate::layout::{self, Layout, View};
 use crate::recording::{EVENT_TIME, Header, Moment, Recording};
 use crate::{colours, legend, show_map, training};
 use experiment::drive::Replay;
-use experiment::drivers::{self, NamedDriver};
+use experiment::drivers::NamedDriver;
 use experiment::lots::Lot;
 use experiment::progress::{Elapsed, Interrupted, Progress, Silent};
 use experiment::run_dir::{Build, Place, Request, RunDir};
@@ -175,7 +175,7 @@ fn drive(ticks: usize, driver: &mut dyn Driver) -> (Vec<Frame>, Shown) {
 #[test]
 fn every_frame_is_shown_as_it_was() {
     let settings = Settings::preset("smoke").unwrap();
-    let (frames, shown) = drive(60, &mut drivers::expert(&settings.expert, &settings.episode));
+    let (frames, shown) = drive(60, &mut ScriptedExpert::new(settings.expert.clone(), &settings.episode));
     let cars = shown.points("me/car", &Transform3D::descriptor_translation());
     let look_ahead = shown.points("me/car/look_ahead", &Points3D::descriptor_positions());
     let signal = |name: &str| shown.signal(&format!("me/signals/{name}"), "tick");
@@ -307,6 +307,8 @@ fn a_replayed_drive_is_whole_small_and_on_both_time_lines() {
     let mut files = Vec::new();
     crate::show(&request, &Silent, &mut files).unwrap();
     assert_eq!(files, [folder.join("a.rrd")]);
+    let found = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name());
+    assert_eq!(found.collect::<Vec<_>>(), ["a.rrd"]);
     let Show::Drives { settings, drives } = &request.show[0] else { unreachable!("a drive was asked for") };
     let replay = Replay::new(&drives[0].keys[0], &settings.episode).unwrap();
     let driver = drives[0].keys[0].driver.clone().load(settings).unwrap();

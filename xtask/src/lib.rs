@@ -8,7 +8,6 @@ pub mod cli;
 mod commands;
 mod console;
 mod interrupt;
-mod notes;
 mod output;
 mod picture_folder;
 mod record;

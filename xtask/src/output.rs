@@ -127,6 +127,13 @@ impl Output {
         }
     }
 
+    /// Notes, each on a line of its own.
+    pub(crate) fn notes(&self, notes: &[String]) {
+        for text in notes {
+            self.note(text);
+        }
+    }
+
     pub(crate) fn is_quiet(&self) -> bool {
         self.is_quiet
     }

@@ -13,6 +13,8 @@ use std::time::Duration;
 const EXIT_INTERRUPTED: i32 = interrupt::EXIT as i32;
 /// Between two looks at whether it has ended.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
+/// Looks that it is given after Ctrl-C to end what it writes.
+const LOOKS_TO_END: u32 = 12;
 /// Backends of the network that this program has: a run may ask for one.
 const BACKENDS: &[&str] = &[
     #[cfg(feature = "cuda")]
@@ -50,13 +52,17 @@ pub(crate) fn ask(request: &ViewRequest, output: &Output) -> anyhow::Result<()> 
     let mut child = command.spawn().context("cargo, which builds the viewer program, cannot be started")?;
     // If it ends before it has read everything, its status says why.
     let _ = serde_json::to_writer(child.stdin.take().context("the pipe to the viewer program")?, request);
+    let mut looks = 0;
     let status = loop {
         if let Some(status) = child.try_wait().context("the viewer program")? {
             break status;
         }
         if interrupt::is_requested() {
             // A terminal tells it as well; whoever sends a signal to this process alone does not.
-            child.kill().context("the viewer program")?;
+            if looks == LOOKS_TO_END {
+                child.kill().context("the viewer program")?;
+            }
+            looks += 1;
         }
         std::thread::sleep(LOOK_EVERY);
     };

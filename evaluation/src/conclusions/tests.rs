@@ -85,7 +85,7 @@ fn where_the_paper_is_right_everything_holds() {
     assert_eq!(verdict(&found, "robust against noise than vvf"), Verdict::CannotBeTold);
     let figures =
         &found.iter().find(|statement| statement.claim.contains("than tentacle on the paper's")).unwrap().figures;
-    assert!(figures.contains("DAgger 0 in 30000 m, 0.00 [0.00, 0.01]") && figures.contains('*'), "{figures}");
+    assert!(figures.contains("DAgger 0 (0) in 30000 m, 0.00 [0.00, 0.01]") && figures.contains('*'), "{figures}");
 }
 
 #[test]
@@ -154,7 +154,10 @@ fn several_trainings_are_compared_by_their_mean() {
     assert_eq!(verdict(&found, "paper's lots without a near-collision"), Verdict::DoesNotHold);
     let figures = &found.iter().find(|statement| statement.claim.contains(fewer)).unwrap().figures;
     // Student's interval of 0, 2 and 2 per 100 m: 1.33 ± 4.30 · 1.15 / √3.
-    assert!(figures.contains("DAgger 0, 600, 600 in 30000 m each, 1.33 [0.00, 4.20] per 100 m"), "{figures}");
+    assert!(
+        figures.contains("DAgger 0 (0), 600 (0), 600 (0) in 30000 m each, 1.33 [0.00, 4.20] per 100 m"),
+        "{figures}"
+    );
     assert!(figures.contains("difference +0.05 ["), "13.8 per km less 13.3: {figures}");
 
     let found = of_dagger([0, 1, 2]);

@@ -138,6 +138,19 @@ fn paper() -> Settings {
     }
 }
 
+/// The settings with the expert's points as in the paper, as far as the way is open, and driven at half as fast (docs/paper.md,
+/// "Points at half of the open way").
+#[must_use]
+pub fn with_points_of_paper(settings: &Settings) -> Settings {
+    let (paper, mut changed) = (paper(), settings.clone());
+    changed.episode.controller.speed_law = paper.episode.controller.speed_law;
+    changed.expert.elastic_band.reach_share = paper.expert.elastic_band.reach_share;
+    changed.expert.elastic_band.reach_max_m = paper.expert.elastic_band.reach_max_m;
+    changed.expert.label_advance_step_m = paper.expert.label_advance_step_m;
+    changed.expert.label_retreat_step_m = paper.expert.label_retreat_step_m;
+    changed
+}
+
 /// The paper's experiment in the reading of every preset but `paper`: points at half of the open way, driven at by
 /// v = a_y/2.24 (docs/paper.md, "Points at half of the open way").
 fn with_half_points() -> Settings {

@@ -130,7 +130,7 @@ fn code(driver: Source) -> u8 {
 }
 
 fn driver_of(code: u8) -> Option<Source> {
-    [Source::Expert, Source::Novice, Source::Planner].get(usize::from(code)).copied()
+    Source::ALL.into_iter().find(|&driver| self::code(driver) == code)
 }
 
 fn column<T: WritableElement>(ticks: &[Tick], of: impl Fn(&Tick) -> T) -> Array1<T> {

@@ -193,12 +193,12 @@ fn legend(trajectories: &[Trajectory], by: ColourBy) -> Vec<LegendEntry> {
             let name = |t: &Trajectory| format!("{}: {} near-collision{}", t.name, near(t), plural(near(t)));
             trajectories.iter().enumerate().map(|(i, trajectory)| (rgb(i), name(trajectory))).collect()
         }
-        ColourBy::Source => [(Source::Expert, "expert"), (Source::Novice, "network"), (Source::Planner, "planner")]
+        ColourBy::Source => Source::ALL
             .into_iter()
-            .filter_map(|(source, name)| {
+            .filter_map(|source| {
                 let ticks = points().filter(|point| point.source == source).count();
                 let share = 100.0 * ticks as f32 / points().count().max(1) as f32;
-                (ticks > 0).then(|| (of_source(source), format!("{name} {share:.0} %")))
+                (ticks > 0).then(|| (of_source(source), format!("{} {share:.0} %", source.name())))
             })
             .collect(),
     };

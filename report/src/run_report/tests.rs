@@ -114,4 +114,8 @@ fn runs_are_of_their_lot_or_of_its_kind() {
     for (lot, lots) in [("lot-b", "all"), ("test-hard-0", "test-hard-1"), ("test-hardest-0", "test-hard (2 lots)")] {
         assert!(!is_in(lot, lots), "{lot} {lots}");
     }
+    let by_lot = [("garage", 0.5), ("garage-2", 0.75), ("test-hard-0", 0.25)];
+    let by_lot = by_lot.map(|(lot, ratio)| (lot.to_owned(), vec![ratio])).into();
+    assert_eq!(of_row(&by_lot, "garage"), [0.5], "not of garage-2");
+    assert_eq!(of_row(&by_lot, "test-hard"), [0.25]);
 }

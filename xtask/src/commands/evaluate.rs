@@ -4,21 +4,21 @@ use crate::args::{Directions, JsonArgs, LayerArgs, OutArgs, noise_levels};
 use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
-use crate::notes;
 use crate::output::Output;
 use crate::record::{self, RecordArgs};
-use anyhow::{Context as _, anyhow, ensure};
+use anyhow::{Context as _, anyhow};
 use clap::Args;
 use evaluation::estimate;
 use evaluation::plan::Plan;
 use evaluation::results::EvaluationResults;
 use evaluation::shards::ShardRecord;
 use evaluation::summary::Summary;
-use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
+use experiment::notes;
 use experiment::progress::{Interrupted, Progress};
-use experiment::run_dir::{self, Outcome, Request, RunDir};
+use experiment::run_dir::{Outcome, Request, RunDir};
 use experiment::settings::{Layers, Settings, Smoothing};
 use experiment::shard::Shard;
 use scenarios::LoadError;
@@ -119,7 +119,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     };
     let drivers = NamedDriver::load_all(&asked.drivers, &settings)?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
-    notes::say(&lots, &settings.evaluation.noise, output);
+    output.notes(&notes::of(&lots, &settings.evaluation.noise));
     let shard = args.shard.or(asked.shard.as_ref().map(|record| record.number));
     let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: asked.compare_with, shard };
     check(&plan)?;
@@ -230,19 +230,9 @@ pub(crate) fn settings_for(
     layers: &Layers,
     output: &Output,
 ) -> anyhow::Result<(Settings, String)> {
-    let mut runs = specs.iter().filter_map(|spec| Some((spec, spec.run()?)));
-    let Some((spec, path)) = runs.next().filter(|_| !layers.names_a_base()) else {
+    let Some((of_run, path)) = drivers::settings_of_runs(specs, layers)? else {
         return Ok((Settings::resolve(layers, None)?, layers.preset_name().to_owned()));
     };
-    let of_run = run_dir::settings_of(path).with_context(|| format!("driver {spec}"))?;
-    for (other, path) in runs {
-        let of_other = run_dir::settings_of(path).with_context(|| format!("driver {other}"))?;
-        ensure!(
-            of_other.episode == of_run.episode,
-            "drivers {spec} and {other} were trained with different settings of episode (car, sensor, metrics), so \
-             neither run's settings are fair to both; choose with --config or --preset"
-        );
-    }
     output.note(format_args!("settings: those of {} (others: --config or --preset)", path.display()));
     Ok((Settings::resolve_over(&of_run, layers, None)?, "run".to_owned()))
 }

@@ -28,7 +28,8 @@ enum Format {
 
 #[derive(Debug, Clone, Args)]
 struct OnnxArgs {
-    /// Folder of a training run (its final policy), `RUN/bc` (after behaviour cloning), or the folder of a round.
+    /// Folder of a training run (its final policy, of an ensemble the first network), `RUN/bc` (after behaviour cloning),
+    /// or the folder of a network.
     #[arg(value_name = "RUN")]
     run: PathBuf,
     /// File to write.

@@ -2,11 +2,11 @@
 
 use super::render::check_scale;
 use crate::console::Console;
-use crate::notes;
 use crate::output::Output;
 use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 use experiment::lots::Lot;
+use experiment::notes;
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::settings::NoiseChoice;
 use experiment::shard::Shard;
@@ -57,18 +57,18 @@ pub(crate) struct GenerateArgs {
     map: MapArgs,
 }
 
-/// Where to drive on a ROS map (`--lots MAP.yaml`) or TPCAP case (`--lots CASE.csv`). Coordinates are those of the map;
-/// `MAP.lot.toml` can hold the same and is read first.
+/// Where to drive on a ROS map (`--lots MAP.yaml`) or TPCAP case (`--lots CASE.csv`).
 #[derive(Debug, Clone, Default, PartialEq, Args)]
 #[command(next_help_heading = "Maps")]
 pub(crate) struct MapArgs {
     /// Makes the lot this many times as large as the map.
     #[arg(long, value_name = "FACTOR", allow_negative_numbers = true)]
     scale: Option<f64>,
-    /// Where the rear axle starts: metres, metres, degrees counter-clockwise from x.
+    /// Where the rear axle starts on a map: metres, metres (of the map, before --scale), degrees counter-clockwise from x.
+    /// What is not given is read from MAP.lot.toml.
     #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
     start: Option<[f64; 3]>,
-    /// Where it is to arrive; the route there is found automatically.
+    /// Where it is to arrive, likewise; the route there is found automatically.
     #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
     goal: Option<[f64; 3]>,
     /// Instead of a goal: a route round a loop, back to the start.
@@ -103,7 +103,7 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
     check_scale(args.pixels_per_metre)?;
     let vehicle = VehicleSettings::hyundai_hg300();
     let lots = lots(args, &vehicle)?;
-    notes::say(&lots, &[NoiseChoice::Lot], output);
+    output.notes(&notes::of(&lots, &[NoiseChoice::Lot]));
     let fixed = lots.iter().find(|lot| !lot.is_drawn_per_trial());
     ensure!(
         args.count == 1 || fixed.is_none(),

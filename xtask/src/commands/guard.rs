@@ -11,7 +11,7 @@ use clap::Args;
 use evaluation::estimate;
 use evaluation::format::exact_rate;
 use evaluation::totals::Totals;
-use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::drivers::DriverSpec;
 use experiment::progress::Interrupted;
 use experiment::run_dir::{Request, RunDir};
 use experiment::settings::{EvaluationSettings, Settings};
@@ -85,16 +85,10 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     interrupt::can_resume(COMMAND, run.path());
     output.note(format_args!("run: {}", run.path().display()));
     let interrupted = || Interrupted { kept: format!("what was done is in {}", run.path().display()) };
-    let Ok((policy, outcome)) = train::tabulated(&settings, &run, &console, output)? else {
+    let Ok(outcome) = train::tabulated(&settings, &run, &console, output)? else {
         return Err(interrupted().into());
     };
-    let driver = NamedDriver::network(
-        "DAgger",
-        DriverSpec::Run { folder: run.path().to_owned() },
-        policy,
-        settings.dagger.device,
-    );
-    let drivers = [driver];
+    let drivers = [DriverSpec::Run { folder: run.path().to_owned() }.load(&settings)?.renamed("DAgger")];
     let mut worse = Vec::new();
     for place in &record.place {
         let results = within::evaluate(&run, &place.name, &place.settings(&settings), &drivers, &console)?;

@@ -81,7 +81,7 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
             if let Some(chain) = cloning_of {
                 take_over_cloning(&root.path().join(chain), &run)?;
             }
-            let Ok((_, outcome)) = train::tabulated(settings, &run, console, output)? else { return Ok(false) };
+            let Ok(outcome) = train::tabulated(settings, &run, console, output)? else { return Ok(false) };
             run.finish(outcome)?;
         }
         Step::Drive { drivers } => {

@@ -26,9 +26,9 @@ Examples:
   cargo xtask reproduce --preset smoke --out runs/try   every stage within a minute
   cargo xtask reproduce --full --unseen sealed:my-phrase:120:all
   cargo xtask reproduce --resume runs/reproduce-default-s1
-  cargo xtask reproduce --full --shard 3/14 --out trained/3
+  cargo xtask reproduce --full --shard 3/15 --out trained/3
   cargo xtask merge trained/* --out runs/full
-  cargo xtask reproduce --networks runs/full --shard 3/14 --out driven/3
+  cargo xtask reproduce --networks runs/full --shard 3/15 --out driven/3
   cargo xtask merge driven/*";
 
 #[derive(Debug, Clone, Args)]

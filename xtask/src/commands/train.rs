@@ -5,7 +5,6 @@ use crate::args::{JsonArgs, LayerArgs, OutArgs};
 use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
-use crate::notes;
 use crate::output::Output;
 use crate::record::{self, RecordArgs};
 use anyhow::{Context as _, ensure};
@@ -16,12 +15,12 @@ use evaluation::table1::Table1;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
+use experiment::notes;
 use experiment::progress::{Interrupted, Progress};
 use experiment::run_dir::{Outcome, Request, RunDir};
 use experiment::settings::{EvaluationSettings, Layers, Settings};
 use experiment::training;
 use experiment::view_request::Show;
-use policy::checkpoint::Checkpoint;
 use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -31,7 +30,7 @@ pub(crate) const DAGGER_EXAMPLES: &str = "\
 Examples:
   cargo xtask train-dagger --seed 2
   cargo xtask train-dagger --set dagger.eta=0.85 --set dagger.fit.budget.steps=2000
-  cargo xtask train-dagger --set training.lots='[\"lot-a\", \"lot-c\"]' --no-eval
+  cargo xtask train-dagger --also lots/my-map.toml
   cargo xtask train-dagger --resume runs/train-dagger-default-s1";
 
 pub(crate) const BC_EXAMPLES: &str = "\
@@ -47,10 +46,13 @@ pub(crate) struct TrainArgs {
     /// Root seed of training data, weights and shuffling.
     #[arg(long)]
     seed: Option<u64>,
+    /// Lots that are driven in every round as well, beside those of the settings: your own map, for example.
+    #[arg(long, value_name = "LOT", num_args = 1.., value_delimiter = ',')]
+    also: Vec<String>,
     #[command(flatten)]
     out: OutArgs,
     /// Continues an interrupted run with its own settings, to the same result.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "config", "overrides", "seed", "out"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "config", "overrides", "seed", "also", "out"])]
     resume: Option<PathBuf>,
     /// Trains only: no closed-loop check at the end.
     #[arg(long)]
@@ -90,6 +92,7 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
     } else {
         let layers = Layers::from(&args.layers);
         let mut settings = Settings::resolve(&layers, args.seed)?;
+        settings.training.lots.extend_from_slice(&args.also);
         adjust(&mut settings);
         // Before the folder is claimed: a misspelt lot should not leave one behind.
         check_lots(&settings, output)?;
@@ -110,14 +113,13 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         tasks.push(estimate::evaluation(&elsewhere(&settings), drivers));
     }
     console.plan(tasks);
-    let (policy, outcome) =
-        tabulated(&settings, &run, &console, output)?.map_err(|rounds| cut_short(run.path(), rounds))?;
+    let outcome = tabulated(&settings, &run, &console, output)?.map_err(|rounds| cut_short(run.path(), rounds))?;
     let mut to_record = args.record.record.map_or_else(Vec::new, |episodes| {
         let folder = || run.path().to_owned();
         vec![Show::Training { run: folder() }, Show::Rollouts { run: folder(), episodes }]
     });
     if !asked.no_eval {
-        let drivers = drivers(&settings, &run, policy)?;
+        let drivers = drivers(&settings, run.path())?;
         let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
         let plan =
             Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: drivers.len() - 1, shard: None };
@@ -208,7 +210,7 @@ pub(crate) fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result
         ("evaluation", &evaluation.elsewhere, &evaluation.directions, &evaluation.noise),
     ] {
         let lots = Lot::parse_all(lots, &episode.vehicle)?;
-        notes::say(&lots, noise, output);
+        output.notes(&notes::of(&lots, noise));
         for lot in lots {
             let flag = format!("--set {section}.directions='[\"forward\"]'");
             let check = |&direction| lot.check_direction(direction, &episode.vehicle);
@@ -225,17 +227,15 @@ pub(crate) fn tabulated(
     run: &RunDir,
     progress: &dyn Progress,
     output: &Output,
-) -> anyhow::Result<Result<(Checkpoint, Outcome), usize>> {
+) -> anyhow::Result<Result<Outcome, usize>> {
     let outcome = training::train(settings, run, progress)?;
     let table1 = Table1::new(outcome.rows, outcome.stop);
     table1.write(run)?;
     let text = report::table1::write(&table1, run)?;
     output.table(|| format!("\nDAgger iterations\n\n{text}"), &table1)?;
     let rounds = table1.rows.len();
-    let (Stop::EtaReached | Stop::IterationCap, Some(policy)) = (outcome.stop, outcome.policy) else {
-        return Ok(Err(rounds));
-    };
-    Ok(Ok((policy, Outcome::Training { stop: outcome.stop, rounds })))
+    let is_whole = matches!(outcome.stop, Stop::EtaReached | Stop::IterationCap);
+    Ok(if is_whole { Ok(Outcome::Training { stop: outcome.stop, rounds }) } else { Err(rounds) })
 }
 
 fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
@@ -243,16 +243,11 @@ fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
 }
 
 /// Expert, behaviour cloning and what became of it.
-fn drivers(settings: &Settings, run: &RunDir, policy: Checkpoint) -> anyhow::Result<Vec<NamedDriver>> {
-    let device = settings.dagger.device;
-    let cloned = Checkpoint::load(&run.path().join("round-00")).context("behaviour cloning of this run")?;
-    let spec = |folder: PathBuf| DriverSpec::Run { folder };
-    let mut drivers = vec![
-        NamedDriver::expert(&settings.expert),
-        NamedDriver::network("BC", spec(run.path().join("bc")), cloned, device),
-    ];
-    if run.path().join("round-01").try_exists().with_context(|| run.path().display().to_string())? {
-        drivers.push(NamedDriver::network("DAgger", spec(run.path().to_owned()), policy, device));
+fn drivers(settings: &Settings, run: &Path) -> anyhow::Result<Vec<NamedDriver>> {
+    let of_run = |folder: PathBuf| DriverSpec::Run { folder }.load(settings);
+    let mut drivers = vec![DriverSpec::Expert.load(settings)?, of_run(run.join("bc"))?.renamed("BC")];
+    if run.join("round-01").try_exists().with_context(|| run.display().to_string())? {
+        drivers.push(of_run(run.to_owned())?.renamed("DAgger"));
     }
     Ok(drivers)
 }

@@ -1,26 +1,26 @@
-//! What is to be said about lots from files before anything is driven: once per lot.
+//! What is to be said about lots from files before anything is driven.
 
-use crate::output::Output;
-use experiment::lots::Lot;
-use experiment::settings::NoiseChoice;
+use crate::lots::Lot;
+use crate::settings::NoiseChoice;
 use sim::scenario::NoiseLevel;
 
-/// Says what imports did and found, and which lots ask for noise that they are not driven with.
-pub(crate) fn say(lots: &[Lot], noise: &[NoiseChoice], output: &Output) {
-    for lot in lots {
-        for note in lot.notes() {
-            output.note(format_args!("{}: {note}", lot.name()));
-        }
-        if let Some(level) = lot.asks_for_noise().filter(|&level| is_ignored(level, noise)) {
-            let driven_with: Vec<String> = noise.iter().map(|choice| choice.name()).collect();
-            output.note(format_args!(
-                "{}: the lot asks for noise {}, but is driven with {}; noise lot is what each lot asks for",
-                lot.name(),
-                as_choice(level),
-                driven_with.join(", ")
-            ));
-        }
-    }
+/// What imports did and found, and which lots ask for noise that they are not driven with. A note begins with the name
+/// of its lot.
+pub fn of(lots: &[Lot], noise: &[NoiseChoice]) -> Vec<String> {
+    lots.iter().flat_map(|lot| of_lot(lot, noise)).collect()
+}
+
+fn of_lot(lot: &Lot, noise: &[NoiseChoice]) -> Vec<String> {
+    let ignored = lot.asks_for_noise().filter(|&level| is_ignored(level, noise)).map(|level| {
+        let driven_with: Vec<String> = noise.iter().map(|choice| choice.name()).collect();
+        format!(
+            "the lot asks for noise {}, but is driven with {}; noise lot is what each lot asks for",
+            as_choice(level),
+            driven_with.join(", ")
+        )
+    });
+    let notes = lot.notes().iter().map(ToString::to_string).chain(ignored);
+    notes.map(|note| format!("{}: {note}", lot.name())).collect()
 }
 
 /// Whether a lot asks for another level than it is driven with. A lot that says nothing asks for `paper`.
