@@ -275,7 +275,10 @@ impl Against<'_> {
         Statement {
             claim: format!("DAgger has a larger safe ratio than {name}"),
             verdict: Verdict::of(found),
-            figures: format!("DAgger {ours:.3}, {name} {theirs:.3}; difference {}", difference(found, 3)),
+            figures: format!(
+                "DAgger {ours:.3}, {name} {theirs:.3}; difference {}; on lots whose widths were fitted to the expert's",
+                difference(found, 3)
+            ),
         }
     }
 

@@ -11,8 +11,8 @@ pub type Task = (&'static str, f64);
 
 /// Measured on two cores of an AMD EPYC (Zen 3): seconds per run that is collected from, with noise augmentations.
 const COLLECTED_RUN_S: f64 = 0.25;
-/// The same per run driven; networks take longer, planners less.
-const DRIVEN_RUN_S: f64 = 0.25;
+/// The same per run driven; networks take longer, planners less (beside a compilation, with AVX-512: 0.16).
+const DRIVEN_RUN_S: f64 = 0.15;
 /// The same per labelled rollout, with the answers on held-back samples.
 const ON_POLICY_RUN_S: f64 = 2.5;
 /// Multiply-adds of a network's answer that training gets through per second, both directions counted as one.

@@ -10,6 +10,7 @@ use evaluation::slices::Slice;
 use evaluation::statistics::bootstrap::DRAWS;
 use evaluation::statistics::poisson::DISPERSION_MAX;
 use evaluation::summary::Summary;
+use experiment::lots::Lot;
 use experiment::run_dir::RunDir;
 use experiment::settings::{EvaluationSettings, NoiseChoice};
 use sim::scenario::Direction;
@@ -31,7 +32,13 @@ pub fn to_markdown(summary: &Summary<'_>) -> String {
     for (level, noise) in summary.levels().iter().enumerate() {
         let has_paper = *noise == NoiseChoice::Paper;
         let _ = write!(text, "Near-collisions, noise {noise}\n\n{}\n\n", rates_table(summary, level, has_paper));
-        let _ = write!(text, "Safe ratio, noise {noise}\n\n{}\n\n", safe_ratio_table(summary, level, has_paper));
+        // Only those lots draw their obstacles anew.
+        let fitted = if summary.plan.lots.iter().any(Lot::is_drawn_per_trial) {
+            " (lots a, b and c are as wide as the expert needs for the paper's)"
+        } else {
+            ""
+        };
+        let _ = write!(text, "Safe ratio, noise {noise}{fitted}\n\n{}\n\n", safe_ratio_table(summary, level, has_paper));
         let _ = write!(text, "How they drove, noise {noise}\n\n{}\n\n", driving_table(summary, level));
         if summary.plan.drivers.len() > 1 {
             let with = summary.driver(summary.plan.compare_with);
