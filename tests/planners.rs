@@ -53,7 +53,7 @@ fn tuned_planners_ship_with_what_found_them() {
     let listed = succeed(xtask().arg("drivers"));
     assert!(listed.lines().any(|line| line.starts_with("tuned:NAME")), "{listed}");
     let mut budgets = Vec::new();
-    for name in ["tentacle", "vvf", "dwa", "cvm", "apf", "vff"] {
+    for name in ["tentacle", "vvf", "dwa", "cvm", "apf", "vff", "mppi"] {
         let spec = format!("tuned:{name}");
         assert!(listed.lines().any(|line| line.starts_with(name)), "{name} is not listed:\n{listed}");
         let file: toml::Table = succeed(xtask().args(["drivers", &spec])).parse().unwrap();

@@ -568,7 +568,7 @@ fn planner(name: &str, parameters: &Parameters) -> anyhow::Result<PlannerSpec> {
             with_parameters(&planner, text).with_context(|| format!("planners/tuned/{name}.toml"))
         }
         Parameters::File(path) => {
-            let text = storage::read::text(path, PLANNER_BYTES_MAX).with_context(|| {
+            let text = sums::read_text(path, PLANNER_BYTES_MAX).with_context(|| {
                 format!("{}: cannot be read; cargo xtask drivers {name} prints such a file", path.display())
             })?;
             with_parameters(&planner, &text)

@@ -17,7 +17,7 @@ use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
 use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
-use sim::limits::RUN_TOML_BYTES_MAX;
+use sim::limits::{RUN_TOML_BYTES_MAX, SETTINGS_BYTES_MAX};
 use sim::seed::RootSeed;
 use std::collections::BTreeMap;
 use std::fs;
@@ -494,12 +494,9 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
 pub fn driving_folders(spec: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let policy = policy_folder(spec)?;
     let (run, is_bc) = run_of(spec)?;
-    let members = match settings_of(spec) {
-        Ok(settings) => settings.dagger.rule.members(),
-        Err(error) if storage::is_of_disk(error.as_ref()) => return Err(error),
-        // Of a run whose settings this version cannot read, the network alone can be used.
-        Err(_) => 1,
-    };
+    // Damage is an error. Settings that are whole may be of another version: the network alone can be used then.
+    sums::read(&run.join(SETTINGS), SETTINGS_BYTES_MAX)?;
+    let members = settings_of(spec).map_or(1, |settings| settings.dagger.rule.members());
     let round = policy.file_name().and_then(|name| name.to_str()).filter(|name| !is_bc && name.starts_with("round-"));
     let others = round.into_iter().flat_map(|round| (1..members).map(move |member| format!("{round}-member-{member}")));
     let others: Vec<PathBuf> = others
@@ -827,6 +824,10 @@ mod tests {
         let of_last = ["round-01", "round-01-member-1", "round-01-member-2"].map(|folder| path.join(folder));
         assert_eq!(driving_folders(&path).unwrap(), of_last);
         assert_eq!(driving_folders(&path.join("bc")).unwrap(), [path.join("round-00")]);
+        let whole = fs::read(path.join(SETTINGS)).unwrap();
+        fs::write(path.join(SETTINGS), &whole[1..]).unwrap();
+        assert!(message(driving_folders(&path)).contains("settings.toml"), "damage does not make one network of it");
+        fs::write(path.join(SETTINGS), whole).unwrap();
         fs::remove_dir_all(&of_last[2]).unwrap();
         assert!(message(driving_folders(&path)).contains("round-01-member-2/sha256sums"));
         fs::remove_dir_all(path).unwrap();

@@ -1,5 +1,6 @@
 //! `failures.md`: near-collisions one by one.
 
+use crate::markdown::escaped;
 use evaluation::records::{self, FailureRecord};
 use experiment::run_dir::RunDir;
 use std::fmt::Write as _;
@@ -27,7 +28,10 @@ pub fn write(run: &RunDir) -> anyhow::Result<()> {
             text,
             "| {} | {} | {way} | {} | {} | {tick} | {route_m:.1} | {x_m:.2} | {y_m:.2} | {speed_mps:.2} | {cause} | \
              `{replay}` |",
-            driven.driver, driven.lot, driven.trial, driven.noise
+            escaped(&driven.driver),
+            escaped(&driven.lot),
+            driven.trial,
+            driven.noise
         );
         Ok(())
     })?;

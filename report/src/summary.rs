@@ -38,7 +38,8 @@ pub fn to_markdown(summary: &Summary<'_>) -> String {
         } else {
             ""
         };
-        let _ = write!(text, "Safe ratio, noise {noise}{fitted}\n\n{}\n\n", safe_ratio_table(summary, level, has_paper));
+        let _ =
+            write!(text, "Safe ratio, noise {noise}{fitted}\n\n{}\n\n", safe_ratio_table(summary, level, has_paper));
         let _ = write!(text, "How they drove, noise {noise}\n\n{}\n\n", driving_table(summary, level));
         if summary.plan.drivers.len() > 1 {
             let with = summary.driver(summary.plan.compare_with);

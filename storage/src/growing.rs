@@ -46,6 +46,10 @@ impl Growing {
             whole::remove_partial(&path)?;
             let (bytes, sha256) =
                 left.as_ref().map_or_else(|| Ok((0, Sha256::new())), |left| left.check(index, &path))?;
+            // Never through a link that somebody put there.
+            if std::fs::symlink_metadata(&path).is_ok_and(|found| !found.is_file()) {
+                return Err(FileError::new(&path, "is no regular file", "remove it"));
+            }
             let mut file = File::options().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
             file.set_len(bytes).map_err(failed)?;
             file.seek(SeekFrom::End(0)).map_err(failed)?;

@@ -12,7 +12,7 @@ use sha2::{Digest as _, Sha256};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::{self, File};
-use std::io::Seek as _;
+use std::io::{self, Seek as _};
 use std::path::{Component, Path};
 
 /// Name of the list.
@@ -331,6 +331,18 @@ pub fn read_if_listed(path: &Path, bytes_max: u64) -> Result<Option<Vec<u8>>, Fi
     is_listed(folder, &name.to_string_lossy())?.then(|| read(path, bytes_max)).transpose()
 }
 
+/// Reads a text file that may be anybody's: if its folder lists it, it is what was written.
+///
+/// # Errors
+/// If it cannot be read, is too long or no UTF-8; if it is listed, but missing or damaged.
+pub fn read_text(path: &Path, bytes_max: u64) -> io::Result<String> {
+    let (folder, name) = (path.parent().unwrap_or(Path::new("")), path.file_name().unwrap_or_default());
+    if is_listed(folder, &name.to_string_lossy()).map_err(io::Error::other)? {
+        return read_to_string(path, bytes_max).map_err(io::Error::other);
+    }
+    crate::read::text(path, bytes_max)
+}
+
 /// One SHA-256 of every finished file below a folder but those with some names: two folders with the same hold the same.
 ///
 /// It is that of the lines of `sha256sum` with paths from the folder, in order, without the lists themselves.
@@ -470,6 +482,13 @@ mod tests {
         assert_eq!(read_to_string(&folder.join("a"), 100).unwrap(), "hello\n");
         write(&folder, "a", b"hello again\n").unwrap();
         assert_eq!(read(&folder.join("a"), 100).unwrap(), b"hello again\n");
+        // What the folder lists is compared, what it does not is anybody's.
+        fs::write(folder.join("c"), "mine").unwrap();
+        assert_eq!(["a", "c"].map(|name| read_text(&folder.join(name), 100).unwrap()), ["hello again\n", "mine"]);
+        fs::write(folder.join("a"), "hello again!").unwrap();
+        assert!(read_text(&folder.join("a"), 100).is_err());
+        fs::write(folder.join("a"), "hello again\n").unwrap();
+        fs::remove_file(folder.join("c")).unwrap();
         assert!(verify(&folder).faults.is_empty());
         fs::remove_dir_all(folder).unwrap();
     }

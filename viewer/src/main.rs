@@ -1,7 +1,6 @@
 //! Reads one [`ViewRequest`] as JSON, from the file that is named or from standard input, and shows what it asks for.
 //!
 //! `cargo xtask visualise` and `--record` build and start it.
-#![allow(clippy::print_stdout, reason = "printing is what a program does")]
 #![allow(clippy::disallowed_methods, reason = "wall time only limits how often progress is said")]
 
 use anyhow::Context as _;
@@ -31,7 +30,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if error.is::<Interrupted>() => ExitCode::from(EXIT_INTERRUPTED),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            say(format_args!("error: {error:#}\n"));
             ExitCode::from(EXIT_REFUSED)
         }
     }
@@ -49,12 +48,19 @@ fn run() -> anyhow::Result<()> {
     let shown = viewer::show(&request, &Console::default(), &mut files);
     for file in &files {
         let megabytes = std::fs::metadata(file).map_or(0.0, |metadata| metadata.len() as f64 / 1e6);
-        println!("written: {} ({megabytes:.1} MB)", file.display());
+        let _ = writeln!(std::io::stdout(), "written: {} ({megabytes:.1} MB)", file.display());
     }
     if let Some(files) = on_command_line(&files) {
-        println!("open: {}", viewer_command(&files));
+        let _ = writeln!(std::io::stdout(), "open: {}", viewer_command(&files));
     }
     shown
+}
+
+/// Says something on stderr; nobody can be told if that is closed.
+fn say(text: std::fmt::Arguments<'_>) {
+    let mut stderr = std::io::stderr().lock();
+    let _ = stderr.write_fmt(text);
+    let _ = stderr.flush();
 }
 
 fn read_request() -> anyhow::Result<ViewRequest> {
@@ -92,16 +98,15 @@ impl Progress for Console {
         *last = Instant::now();
         let line = format!("{}: {:.0} %, {}", self.label.borrow(), 100.0 * share, status(Elapsed { seconds }));
         if is_terminal {
-            eprint!("\r\x1b[K{line}");
-            let _ = std::io::stderr().flush();
+            say(format_args!("\r\x1b[K{line}"));
         } else {
-            eprintln!("{line}");
+            say(format_args!("{line}\n"));
         }
     }
 
     fn end(&self, result: &str) {
         let start = if std::io::stderr().is_terminal() { "\r\x1b[K" } else { "" };
-        eprintln!("{start}{}: {result}", self.label.borrow());
+        say(format_args!("{start}{}: {result}\n", self.label.borrow()));
     }
 
     fn is_cancelled(&self) -> bool {

@@ -48,12 +48,11 @@ pub fn main() -> ExitCode {
 
 fn run(cli: &cli::Cli) -> anyhow::Result<()> {
     interrupt::install()?;
-    // What rayon reads where no number is given.
-    let asked_for = std::env::var("RAYON_NUM_THREADS").ok().and_then(|number| number.parse::<u64>().ok());
-    ensure!(
-        asked_for.is_none_or(|threads| threads <= u64::from(THREADS_MAX)),
-        "RAYON_NUM_THREADS is more than {THREADS_MAX}"
-    );
+    // What rayon reads where no number is given; the second is its old name.
+    for name in ["RAYON_NUM_THREADS", "RAYON_RS_NUM_CPUS"] {
+        let asked_for = std::env::var(name).ok().and_then(|number| number.parse::<u64>().ok());
+        ensure!(asked_for.is_none_or(|threads| threads <= u64::from(THREADS_MAX)), "{name} is more than {THREADS_MAX}");
+    }
     rayon::ThreadPoolBuilder::new().num_threads(cli.threads()).stack_size(STACK_BYTES).build_global()?;
     // Within the pool: a thread outside it goes to sleep and is woken up at every parallel step, three times per control
     // tick. On a busy machine that costs more than the driving.

@@ -72,7 +72,7 @@ impl Settings {
 pub(super) fn apply(base: &Settings, file: Option<&Path>, overrides: &[String]) -> anyhow::Result<Settings> {
     let mut tree = Table::try_from(base).expect("settings are plain values");
     if let Some(path) = file {
-        let text = storage::read::text(path, SETTINGS_BYTES_MAX)
+        let text = storage::sums::read_text(path, SETTINGS_BYTES_MAX)
             .with_context(|| format!("{}: cannot be read; name a TOML file with settings", path.display()))?;
         merge(&mut tree, parse(path, &text)?);
         settings_from(&tree).map_err(|fault| fault.in_file(path, &text))?;

@@ -51,7 +51,9 @@ impl Archive {
             // As numpy names them.
             let mut member = self.zip.by_name(&format!("{name}.npy")).map_err(|error| error.to_string())?;
             let header = checked_header(&mut member, expected)?;
-            Array::read_npy(header.as_slice().chain(member)).map_err(|error| error.to_string())
+            // What reads the array would read all that follows it, to complain of it.
+            let rest = member.take(bytes_max(expected));
+            Array::read_npy(header.as_slice().chain(rest)).map_err(|error| error.to_string())
         };
         read().map_err(|problem| FileError::new(&self.path, format!("{name}: {problem}"), RESTORE_REMEDY))
     }

@@ -136,6 +136,7 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
     let is_smoke = layers.preset_name() == "smoke";
     if args.full {
         settings.evaluation.trials *= 2;
+        settings.check().context("twice evaluation.trials")?;
     }
     let unseen = match &args.unseen[..] {
         [] if args.full => vec!["sealed:reproduce:120:all".to_owned()],
@@ -150,8 +151,8 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
         tuned: tuned(args.tuned.as_deref())?,
     };
     // Before the folder is claimed: a misspelt lot should not leave one behind.
-    train::check_lots(&settings, output)?;
-    let mut places = train::check_unseen(&settings, &extent.unseen)?;
+    let mut places = train::check_lots(&settings, output)?;
+    places.extend(train::check_unseen(&settings, &extent.unseen)?);
     places.extend(args.tuned.clone());
     args.out.ensure_apart_from(&places)?;
     ensure!(

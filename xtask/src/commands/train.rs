@@ -95,7 +95,7 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         settings.training.lots.extend_from_slice(&args.also);
         adjust(&mut settings);
         // Before the folder is claimed: a misspelt lot should not leave one behind.
-        check_lots(&settings, output)?;
+        args.out.ensure_apart_from(&check_lots(&settings, output)?)?;
         let place = args.out.place(command, layers.preset_name(), settings.seed.0);
         let asked = Asked { no_eval: args.no_eval };
         let request = Request { arguments: toml::Table::try_from(&asked)?, inputs: inputs(&settings)? };
@@ -200,8 +200,9 @@ pub(crate) fn check_unseen(settings: &Settings, unseen: &[String]) -> anyhow::Re
     Ok(inputs::places(&[trained_on, unseen].concat(), &[]))
 }
 
-/// Lots that do not exist, or cannot be driven as the settings ask.
-pub(crate) fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result<()> {
+/// Refuses lots that do not exist, or cannot be driven as the settings ask; the files that lots are read from.
+pub(crate) fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result<Vec<PathBuf>> {
+    let mut places = Vec::new();
     let Settings { training, evaluation, episode, .. } = settings;
     let noise = std::slice::from_ref(&training.noise);
     for (section, lots, directions, noise) in [
@@ -211,13 +212,14 @@ pub(crate) fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result
     ] {
         let lots = Lot::parse_all(lots, &episode.vehicle)?;
         output.notes(&notes::of(&lots, noise));
+        places.extend(inputs::places(&lots, &[]));
         for lot in lots {
             let flag = format!("--set {section}.directions='[\"forward\"]'");
             let check = |&direction| lot.check_direction(direction, &episode.vehicle);
             directions.iter().try_for_each(check).map_err(|error| evaluate::or_forward(error, &flag))?;
         }
     }
-    Ok(())
+    Ok(places)
 }
 
 /// Trains, prints and writes the paper's table. The inner error of a training cut short is the number of rounds that

@@ -82,8 +82,8 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
             (run, settings, extent)
         } else {
             let Begun { preset, settings, extent } = begin()?;
-            train::check_lots(&settings, output)?;
-            let places = train::check_unseen(&settings, (self.unseen)(&extent))?;
+            let mut places = train::check_lots(&settings, output)?;
+            places.extend(train::check_unseen(&settings, (self.unseen)(&extent))?);
             args.out.ensure_apart_from(&places)?;
             for stage in (self.stages)(&settings, &extent, Path::new(""))? {
                 stage.settings.check().with_context(|| stage.folder.clone())?;
