@@ -12,6 +12,7 @@ use experiment::run_dir::{Build, Place, Request, RunDir};
 use experiment::settings::Settings;
 use experiment::training as training_run;
 use experiment::view_request::{DriveRequest, Show, Sink, ViewRequest};
+use expert::ScriptedExpert;
 use planners::explanation::Explanation;
 use policy::dataset::Collection;
 use rerun::external::re_log_encoding::DecoderApp;
