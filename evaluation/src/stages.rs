@@ -290,11 +290,7 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     let expert = vec![own("expert")];
     let tuned: Drivers = extent.tuned.iter().map(|spec| (tuned_name(spec), spec.clone())).collect();
     let planners: Drivers = PlannerSpec::all().iter().map(|planner| own(planner.name())).collect();
-    let readings = |planner: &PlannerSpec| {
-        let read = planner.readings().into_iter().map(|(reading, ..)| own(&format!("{}/{reading}", planner.name())));
-        std::iter::once(own(planner.name())).chain(read).collect::<Drivers>()
-    };
-    let readings: Drivers = PlannerSpec::all().iter().flat_map(readings).collect();
+    let readings: Drivers = PlannerSpec::in_every_reading().iter().map(|(name, _)| own(name)).collect();
     // Where a planner has been tuned, only the paper's two take part as they are, too: the others stand for nothing.
     let is_tuned = |name: &str| tuned.iter().any(|(tuned, _)| *tuned == tuned_name(name));
     let stands_for_itself = |name: &str| name == "tentacle" || name == "vvf" || !is_tuned(name);

@@ -37,6 +37,17 @@ macro_rules! planners {
                 vec![$(Self::$variant($module::Params::paper()),)*]
             }
 
+            /// Every method, and after it every other reading of it, as named on the command line.
+            pub fn in_every_reading() -> Vec<(String, Self)> {
+                let readings = |spec: Self| {
+                    let others = spec.readings().into_iter();
+                    let others = others.map(|(reading, _, read)| (format!("{}/{reading}", spec.name()), read));
+                    let others: Vec<(String, Self)> = others.collect();
+                    std::iter::once((spec.name().to_owned(), spec)).chain(others)
+                };
+                Self::all().into_iter().flat_map(readings).collect()
+            }
+
             /// A method by its name, or another reading of it as `NAME/READING`.
             pub fn named(name: &str) -> Option<Self> {
                 let (method, reading) = name.split_once('/').map_or((name, None), |(of, reading)| (of, Some(reading)));

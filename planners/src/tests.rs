@@ -79,16 +79,6 @@ fn search_spaces_hold_the_starting_point() {
     }
 }
 
-/// Every planner in every reading.
-fn all_readings() -> Vec<(String, PlannerSpec)> {
-    let readings = |spec: PlannerSpec| {
-        let named = |(reading, _, read): (&str, &str, PlannerSpec)| (format!("{}/{reading}", spec.name()), read);
-        let others: Vec<_> = spec.readings().into_iter().map(named).collect();
-        std::iter::once((spec.name().to_owned(), spec)).chain(others).collect::<Vec<_>>()
-    };
-    PlannerSpec::all().into_iter().flat_map(readings).collect()
-}
-
 /// Two grids after each other: state included.
 fn answers<P: Policy + Clone>(planner: &P, grids: [OccupancyGrid; 2]) -> [LookAheadPoint; 2] {
     let mut planner = planner.clone();
@@ -121,7 +111,7 @@ fn a_planner_that_ignores_its_grid_is_no_mirror_image_of_itself() {
     let mut runner = TestRunner::deterministic();
     let grids: Vec<OccupancyGrid> = (0..48).map(|_| grids().new_tree(&mut runner).unwrap().current()).collect();
     assert_eq!(share_of_ties(&BlindPlanner, &grids), 1.0);
-    for (name, spec) in all_readings() {
+    for (name, spec) in PlannerSpec::in_every_reading() {
         let planner = spec.planner(&context());
         let share = share_of_ties(&planner, &grids);
         assert!(share < 0.4, "{name}: ties on {share} of the grids");
@@ -139,7 +129,7 @@ proptest! {
     fn answers_are_finite_repeatable_and_mirror_images(first in grids(), second in grids()) {
         use std::sync::LazyLock;
         static PLANNERS: LazyLock<Vec<(String, Planner)>> = LazyLock::new(|| {
-            all_readings().into_iter().map(|(name, spec)| (name, spec.planner(&context()))).collect()
+            PlannerSpec::in_every_reading().into_iter().map(|(name, spec)| (name, spec.planner(&context()))).collect()
         });
         for (name, planner) in PLANNERS.iter() {
             let found = answers(planner, [first, second]);
