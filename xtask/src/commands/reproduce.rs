@@ -25,6 +25,7 @@ Examples:
   cargo xtask reproduce                               an hour on two cores
   cargo xtask reproduce --preset smoke --out runs/try   every stage within a minute
   cargo xtask reproduce --full --unseen sealed:my-phrase:120:all
+  cargo xtask reproduce --preset paper --seeds 3        the paper's own regime: days
   cargo xtask reproduce --resume runs/reproduce-default-s1
   cargo xtask reproduce --full --shard 3/15 --out trained/3
   cargo xtask merge trained/* --out runs/full
@@ -41,6 +42,10 @@ pub(crate) struct ReproduceArgs {
     /// Five training seeds, twice the trials, more unseen lots, longer ablations.
     #[arg(long)]
     full: bool,
+    /// Trainings of DAgger with its weight on τ̂, and as many without: with the root seed, and with those that follow it
+    /// [default: 1; 5 with --full].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100))]
+    seeds: Option<u64>,
     /// Lots that no driver has met; see `cargo xtask lots`. A phrase of your own draws lots that nobody has seen [default:
     /// sealed:reproduce:24:all; sealed:reproduce:120:all with --full].
     #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',')]
@@ -56,7 +61,7 @@ pub(crate) struct ReproduceArgs {
         long,
         value_name = "DIR",
         requires = "shard",
-        conflicts_with_all = ["preset", "config", "overrides", "seed", "full", "unseen", "tuned"]
+        conflicts_with_all = ["preset", "config", "overrides", "seed", "full", "seeds", "unseen", "tuned"]
     )]
     networks: Option<PathBuf>,
     #[command(flatten)]
@@ -66,7 +71,7 @@ pub(crate) struct ReproduceArgs {
         long,
         value_name = "DIR",
         conflicts_with_all = [
-            "preset", "config", "overrides", "seed", "out", "full", "unseen", "tuned", "shard", "networks"
+            "preset", "config", "overrides", "seed", "out", "full", "seeds", "unseen", "tuned", "shard", "networks"
         ]
     )]
     resume: Option<PathBuf>,
@@ -145,7 +150,7 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
         named => named.to_vec(),
     };
     let extent = Extent {
-        seeds: if args.full { SEEDS_FULL } else { 1 },
+        seeds: args.seeds.unwrap_or(if args.full { SEEDS_FULL } else { 1 }),
         unseen,
         rule_iterations: if args.full { settings.dagger.iterations_max } else { 1 },
         tuned: tuned(args.tuned.as_deref())?,
