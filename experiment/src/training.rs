@@ -1,6 +1,7 @@
 //! Behaviour cloning and DAgger into a run folder: Algorithm 1 with its files, its progress and its learning curves.
 
 use crate::drive;
+use crate::inputs;
 use crate::lots::Lot;
 use crate::progress::{Elapsed, Progress};
 use crate::run_dir::{self, RunDir};
@@ -30,6 +31,7 @@ use std::sync::Arc;
 /// If a lot cannot be driven, or a file cannot be read or written. Cancelling is no error: the outcome says so.
 pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<Outcome> {
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
+    run.ensure_unchanged(&inputs::of(&lots, &[]))?;
     // A lot that cannot be driven is found here, with its error, not in the middle of a round.
     episodes_of(settings, &lots, 0)?;
     let store = Store::open(run.path())?;
@@ -37,10 +39,9 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
     let conditions = Conditions::of(&settings.episode);
     let mut hooks = Hooks {
         episodes: &mut |round| {
-            let episodes = episodes_of(settings, &lots, round)
-                .unwrap_or_else(|error| panic!("round {round} of seed {:?}: {error:#}", settings.seed));
+            let episodes = episodes_of(settings, &lots, round)?;
             monitor.borrow_mut().collection = Collection::of(&episodes);
-            episodes
+            Ok(episodes)
         },
         on_frame: &mut |_, episode, frame| monitor.borrow_mut().frame(episode, frame),
         progress: &mut |report| {
@@ -225,7 +226,7 @@ mod tests {
         let store = Store::open(&run).unwrap();
         storage::sums::write(&run, "settings.toml", settings.to_toml().as_bytes()).unwrap();
         let mut hooks = Hooks {
-            episodes: &mut |round| episodes_of(&settings, &lots, round).unwrap(),
+            episodes: &mut |round| Ok(episodes_of(&settings, &lots, round)?),
             on_frame: &mut |_, _, _| {},
             progress: &mut |_| ControlFlow::Continue(()),
         };

@@ -25,7 +25,7 @@ pub use disturbance::{Aim, DisturbanceSettings};
 pub use gated_collector::Keep;
 pub use iteration_row::IterationRow;
 pub use learned::Learned;
-pub use progress::{DaggerError, Hooks, Outcome, Progress, Stop};
+pub use progress::{DaggerError, EpisodesError, Hooks, Outcome, Progress, Stop};
 pub use rollouts::{Collected, Rollouts, RoundEpisode};
 pub use settings::{DaggerSettings, StartFrom};
 

@@ -101,7 +101,7 @@ impl Run<'_, '_> {
         if self.store.has_round(round)? {
             return Ok(self.store.read_round(round)?);
         }
-        let episodes = (self.hooks.episodes)(round);
+        let episodes = (self.hooks.episodes)(round).map_err(|source| DaggerError::Episodes { round, source })?;
         let policy = trained.map(|(policy, _)| policy);
         self.report(&Progress::Collecting { round, episodes: episodes.len() }, policy)?;
         let novice = trained.map(|(policy, d)| {

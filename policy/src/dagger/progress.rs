@@ -12,10 +12,13 @@ use sim::batch::NotFinite;
 use sim::frame::Frame;
 use std::ops::ControlFlow;
 
+/// Why a round has no episodes.
+pub type EpisodesError = Box<dyn std::error::Error + Send + Sync>;
+
 /// Callbacks of `run`.
 pub struct Hooks<'a> {
     /// The episodes of a round with their experts: 0 = behaviour cloning, then the iterations.
-    pub episodes: &'a mut dyn FnMut(u32) -> Vec<RoundEpisode>,
+    pub episodes: &'a mut dyn FnMut(u32) -> Result<Vec<RoundEpisode>, EpisodesError>,
     /// Every frame while collecting: round, episode, frame.
     pub on_frame: &'a mut dyn FnMut(u32, usize, &Frame),
     /// Called often; a break ends the run at the next safe point. What was finished stays on disk.
@@ -93,6 +96,14 @@ pub enum DaggerError {
         round: Option<u32>,
         /// Why.
         source: FitError,
+    },
+    /// A round whose lots cannot be driven.
+    #[error("round {round} cannot be driven")]
+    Episodes {
+        /// Which round.
+        round: u32,
+        /// Why.
+        source: EpisodesError,
     },
     /// A network that answers with what is no finite number.
     #[error(

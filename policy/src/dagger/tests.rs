@@ -100,7 +100,7 @@ fn run_in(
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Outcome, DaggerError> {
     let store = Store::open(folder).unwrap();
-    let mut hooks = Hooks { episodes: &mut |round| of_round(round, 2), on_frame: &mut |_, _, _| {}, progress };
+    let mut hooks = Hooks { episodes: &mut |round| Ok(of_round(round, 2)), on_frame: &mut |_, _, _| {}, progress };
     run(settings, &conditions(), &store, RootSeed(6), &mut hooks)
 }
 
@@ -178,6 +178,22 @@ fn an_interrupted_run_continues_to_the_same_end() {
     assert_eq!(second.policy, at_once.policy);
     std::fs::remove_dir_all(whole).unwrap();
     std::fs::remove_dir_all(parts).unwrap();
+}
+
+/// The process was aborted; rounds before it stay, and go on.
+#[test]
+fn a_round_that_cannot_be_driven_is_an_error() {
+    let folder = scratch("no-round");
+    let store = Store::open(&folder).unwrap();
+    let mut hooks = Hooks {
+        episodes: &mut |round| if round == 0 { Ok(of_round(round, 2)) } else { Err("too narrow".into()) },
+        on_frame: &mut |_, _, _| {},
+        progress: &mut go_on,
+    };
+    let refused = run(&settings(), &conditions(), &store, RootSeed(6), &mut hooks).unwrap_err();
+    assert!(matches!(&refused, DaggerError::Episodes { round: 1, source } if source.to_string() == "too narrow"));
+    assert_eq!(run_in(&folder, &settings(), &mut go_on).unwrap().rows.len(), 3);
+    std::fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]

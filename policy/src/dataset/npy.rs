@@ -49,14 +49,19 @@ impl Archive {
     ) -> Result<Array<T, D>, FileError> {
         let mut read = || {
             // As numpy names them.
-            let mut member = self.zip.by_name(&format!("{name}.npy")).map_err(|error| error.to_string())?;
-            let header = checked_header(&mut member, expected)?;
-            // What reads the array would read all that follows it, to complain of it.
-            let rest = member.take(bytes_max(expected));
-            Array::read_npy(header.as_slice().chain(rest)).map_err(|error| error.to_string())
+            let member = self.zip.by_name(&format!("{name}.npy")).map_err(|error| error.to_string())?;
+            unpack(member, expected)
         };
         read().map_err(|problem| FileError::new(&self.path, format!("{name}: {problem}"), RESTORE_REMEDY))
     }
+}
+
+/// The array of a source that may go on for much longer than it.
+fn unpack<T: ReadableElement, D: Dimension>(mut source: impl Read, expected: &[usize]) -> Result<Array<T, D>, String> {
+    let header = checked_header(&mut source, expected)?;
+    // What reads the array would read all that follows it, to complain of it.
+    let rest = source.take(bytes_max(expected));
+    Array::read_npy(header.as_slice().chain(rest)).map_err(|error| error.to_string())
 }
 
 fn elements(shape: &[usize]) -> u64 {
@@ -112,7 +117,7 @@ mod tests {
     use super::*;
     use crate::test_data::scratch;
     use ndarray::{Array2, Array3, Ix2};
-    use ndarray_npy::NpzWriter;
+    use ndarray_npy::{NpzWriter, WriteNpyExt as _};
 
     fn refused(path: &Path, expected: &[usize]) -> String {
         read::<u8, Ix2>(path, expected).unwrap_err().to_string()
@@ -153,6 +158,25 @@ mod tests {
         listed();
         assert!(refused(&path, &[5, 79]).contains("at most 67"), "{}", refused(&path, &[5, 79]));
         std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// Gigabytes of zeros behind an array of the right shape, which pack well, were unpacked.
+    #[test]
+    fn what_follows_an_array_is_not_read_to_its_end() {
+        /// Zeros, of which more are asked for than anybody needs.
+        struct Endless(usize);
+        impl Read for Endless {
+            fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+                self.0 += buffer.len();
+                assert!(self.0 < 1 << 20, "{} bytes were asked for", self.0);
+                buffer.fill(0);
+                Ok(buffer.len())
+            }
+        }
+        let mut array = Vec::new();
+        Array2::<u8>::ones([5, 79]).write_npy(&mut array).unwrap();
+        assert_eq!(unpack::<u8, Ix2>(array.as_slice(), &[5, 79]).unwrap(), Array2::<u8>::ones([5, 79]));
+        assert!(unpack::<u8, Ix2>(array.chain(Endless(0)), &[5, 79]).is_err());
     }
 
     /// 18 MB of them became 5 GB.
