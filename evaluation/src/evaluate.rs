@@ -12,6 +12,7 @@ use crate::records::{self, Driven, FailureRecord, RunRecord, WallTimeRecord};
 use crate::results::EvaluationResults;
 use experiment::drive::TrialBatch;
 use experiment::drive_digest::DriveDigest;
+use experiment::inputs;
 use experiment::progress::Progress;
 use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
@@ -44,6 +45,7 @@ pub fn evaluate(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyho
         growing::clear(run.path(), DRIVING)?;
         return EvaluationResults::read(plan, run.path()).map(Some);
     }
+    run.ensure_unchanged(&inputs::of(plan.lots, plan.drivers))?;
     let mut driving = Driving::open(plan, run.path(), progress)?;
     let mut trials = plan.trials();
     loop {

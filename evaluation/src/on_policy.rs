@@ -6,6 +6,7 @@ use crate::json;
 use crate::stages::Chain;
 use crate::statistics::bootstrap::{DRAWS, Interval, Units};
 use anyhow::Context as _;
+use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::progress::Progress;
 use experiment::run_dir::{self, RunDir};
@@ -170,7 +171,9 @@ pub fn run(
     let iterations = pair.iterations();
     let Pair { weighted, unweighted } = &pair;
     let others: Vec<RootSeed> = seeds.iter().copied().filter(|&seed| seed != settings.seed).collect();
-    let mut drives = Drives::new(settings, 3 + 2 * iterations, others.len() as u32, progress);
+    let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
+    run.ensure_unchanged(&inputs::of(&lots, &[]))?;
+    let mut drives = Drives::new((settings, &lots), 3 + 2 * iterations, others.len() as u32, progress);
     let mut ratios_of_others: Vec<Vec<f64>> = Vec::new();
     for seed in others {
         if !drives.begin_other(&format!("seed {}", seed.0)) {
@@ -214,6 +217,7 @@ pub fn run(
 /// What policies collected at the wheel; each drives once, however often it is asked for.
 struct Drives<'a> {
     settings: &'a Settings,
+    lots: &'a [Lot],
     by_folder: BTreeMap<PathBuf, Collected>,
     progress: &'a dyn Progress,
     /// Policies that drive at most, and pairs of trainings that are compared without driving: they take about as long.
@@ -222,9 +226,14 @@ struct Drives<'a> {
 }
 
 impl<'a> Drives<'a> {
-    fn new(settings: &'a Settings, policies: u32, others: u32, progress: &'a dyn Progress) -> Self {
+    fn new(
+        (settings, lots): (&'a Settings, &'a [Lot]),
+        policies: u32,
+        others: u32,
+        progress: &'a dyn Progress,
+    ) -> Self {
         progress.begin("on-policy rollouts", "on-policy rollouts");
-        Self { settings, by_folder: BTreeMap::new(), progress, at_most: policies + others, others_begun: 0 }
+        Self { settings, lots, by_folder: BTreeMap::new(), progress, at_most: policies + others, others_begun: 0 }
     }
 
     /// Says what is done next; `false` if cancelled.
@@ -247,7 +256,7 @@ impl<'a> Drives<'a> {
             return Ok(None);
         }
         if !self.by_folder.contains_key(folder) {
-            let collected = rollout(self.settings, &Checkpoint::load(folder)?)?;
+            let collected = rollout(self.settings, self.lots, &Checkpoint::load(folder)?)?;
             self.by_folder.insert(folder.to_owned(), collected);
         }
         Ok(self.by_folder.get(folder))
@@ -259,11 +268,10 @@ impl<'a> Drives<'a> {
 }
 
 /// The network alone drives one trial of every lot of the evaluation; the expert labels every tick.
-fn rollout(settings: &Settings, policy: &Checkpoint) -> anyhow::Result<Collected> {
+fn rollout(settings: &Settings, lots: &[Lot], policy: &Checkpoint) -> anyhow::Result<Collected> {
     let evaluation = &settings.evaluation;
-    let lots = Lot::parse_all(&evaluation.lots, &settings.episode.vehicle)?;
     let trials: Vec<Trial<'_>> =
-        Trial::all(evaluation.seed, Purpose::Evaluation, &lots, 1, &evaluation.directions).collect();
+        Trial::all(evaluation.seed, Purpose::Evaluation, lots, 1, &evaluation.directions).collect();
     let maps = trials::maps(&trials, &settings.episode)?;
     let episodes = drive::start(&trials, &maps, &settings.episode, settings.training.noise);
     let seated = |((index, trial), episode): ((EpisodeIndex, &Trial<'_>), Episode)| {

@@ -81,9 +81,10 @@ impl Clusters {
 impl EvaluationResults {
     /// Nothing driven yet.
     pub fn new(plan: &Plan<'_>) -> Self {
-        // Every driver's, and those of the settings. Specs that no longer stand for anything (a file that moved) were trained on
-        // by nobody here.
-        let of_drivers = plan.drivers.iter().filter_map(|driver| driver.training.as_ref()).flat_map(|of| &of.lots);
+        // Every driver's, and those of the settings. A file that moved, or is not the same any more, is known by its digest.
+        let trainings = || plan.drivers.iter().filter_map(|driver| driver.training.as_ref());
+        let digests: BTreeSet<&String> = trainings().flat_map(|training| &training.digests).collect();
+        let of_drivers = trainings().flat_map(|training| &training.lots);
         let named: BTreeSet<&String> = plan.settings.training.lots.iter().chain(of_drivers).collect();
         let trained_on: BTreeSet<String> = named
             .into_iter()
@@ -101,7 +102,8 @@ impl EvaluationResults {
         for lot in plan.lots {
             let name = lot.group();
             let group = results.groups.iter().position(|group| group.name == name).unwrap_or_else(|| {
-                let is_trained_on = trained_on.contains(&name);
+                let is_trained_on =
+                    trained_on.contains(&name) || lot.digest().is_some_and(|digest| digests.contains(&digest));
                 results.groups.push(LotGroup { name, lots: 0, is_trained_on });
                 results.groups.len() - 1
             });

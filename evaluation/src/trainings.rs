@@ -175,11 +175,17 @@ fn add(sums: &mut [f64], row: &[RunSummary]) {
 mod tests {
     use super::*;
     use experiment::run_dir::Training;
+    use std::collections::BTreeSet;
 
     fn trained(recipe: &str, seed: u64) -> NamedDriver {
         let mut driver =
             NamedDriver::expert(&expert::ExpertSettings::half_points()).renamed(&format!("{recipe}{seed}"));
-        driver.training = Some(Training { recipe: recipe.to_owned(), seed: RootSeed(seed), lots: Vec::new() });
+        driver.training = Some(Training {
+            recipe: recipe.to_owned(),
+            seed: RootSeed(seed),
+            lots: Vec::new(),
+            digests: BTreeSet::new(),
+        });
         driver
     }
 

@@ -10,6 +10,7 @@ use crate::totals::Totals;
 use anyhow::{Context as _, ensure};
 use experiment::drive::{self, TrialBatch};
 use experiment::drivers::{NamedDriver, PlannerFile};
+use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::progress::Progress;
 use experiment::run_dir::RunDir;
@@ -48,6 +49,7 @@ pub fn tune(
     let evaluation = &settings.evaluation;
     let lots = Lot::parse_all(&evaluation.lots, &settings.episode.vehicle)?;
     check(&lots)?;
+    run.ensure_unchanged(&inputs::of(&lots, &[]))?;
     progress.begin("lots", "drawing lots");
     let course = Course::new(settings, &lots, evaluation.noise[0])?;
     progress.end(&format!("{} runs per candidate", course.search.trials.len()));
@@ -145,7 +147,12 @@ impl<'a> Course<'a> {
     }
 
     /// Drives a stretch with every candidate, in parallel; sums come in the order of the candidates.
-    fn drive(&self, candidates: &[PlannerSpec], stretch: &Stretch<'_>, on_run: &(dyn Fn() + Sync)) -> Vec<Totals> {
+    fn drive(
+        &self,
+        candidates: &[PlannerSpec],
+        stretch: &Stretch<'_>,
+        on_run: &(dyn Fn() + Sync),
+    ) -> anyhow::Result<Vec<Totals>> {
         let starts: Vec<Episode> = drive::start(&stretch.trials, &stretch.maps, self.episode, self.noise);
         let drive = |candidate: &PlannerSpec| {
             let driver = &NamedDriver::planner(candidate.clone());
@@ -157,10 +164,13 @@ impl<'a> Course<'a> {
                 }
                 ControlFlow::Continue(())
             });
-            let reports = reports.unwrap_or_else(|error| panic!("{}: {error}", driver.spec));
+            let reports = reports.with_context(|| {
+                let parameters = candidate.parameters().to_string();
+                format!("{} with {}", driver.spec, parameters.trim_end().replace('\n', ", "))
+            })?;
             let mut totals = Totals::default();
             reports.iter().flatten().for_each(|report| totals.add(report));
-            totals
+            Ok(totals)
         };
         candidates.par_iter().map(drive).collect()
     }
@@ -188,10 +198,14 @@ impl Driven {
     }
 
     /// What the next candidates did, driven unless they were before.
-    fn next(&mut self, count: usize, drive: impl FnOnce() -> Vec<Totals>) -> anyhow::Result<Vec<Totals>> {
+    fn next(
+        &mut self,
+        count: usize,
+        drive: impl FnOnce() -> anyhow::Result<Vec<Totals>>,
+    ) -> anyhow::Result<Vec<Totals>> {
         if self.told + count > self.totals.len() {
             self.totals.truncate(self.told);
-            self.totals.extend(drive());
+            self.totals.extend(drive()?);
             let candidates = Candidates { candidate: self.totals.clone() };
             sealed::write(&self.path, toml::to_string(&candidates)?.as_bytes())?;
         }

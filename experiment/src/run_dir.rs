@@ -14,12 +14,13 @@
 //! ```
 
 use crate::settings::Settings;
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{Context as _, anyhow, bail, ensure};
 use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
 use sim::limits::{RUN_TOML_BYTES_MAX, SETTINGS_BYTES_MAX};
 use sim::seed::RootSeed;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -36,7 +37,9 @@ pub struct RunDir {
     path: PathBuf,
     /// The run that this is a folder of, and its path there.
     within: Option<(PathBuf, String)>,
-    _lock: Arc<Lock>,
+    lock: Arc<Lock>,
+    /// What the run, and the one that it is within, were begun with.
+    inputs: Arc<Inputs>,
     /// Of that run, where this folder was reopened by itself.
     _lock_of_run: Option<Arc<Lock>>,
 }
@@ -63,6 +66,8 @@ pub struct Training {
     pub seed: RootSeed,
     /// Lots that it was trained on, as in its settings.
     pub lots: Vec<String>,
+    /// SHA-256 of those from files: they are known by it wherever they lie now.
+    pub digests: BTreeSet<String>,
 }
 
 /// What made a run: `manifest.toml`.
@@ -208,7 +213,7 @@ impl RunDir {
         whole::write(&run.path.join(SETTINGS), settings.to_toml().as_bytes())?;
         whole::write(&run.path.join(MANIFEST), manifest.as_bytes())?;
         sums::list(&run.path, &[SETTINGS, MANIFEST])?;
-        Ok(run)
+        Ok(Self { inputs: Arc::new(request.inputs.clone()), ..run })
     }
 
     /// Reopens the folder of an interrupted run.
@@ -232,6 +237,7 @@ impl RunDir {
             manifest.command
         );
         ensure!(!is_finished(path)?, "{}: this run is finished; nothing is left to resume", path.display());
+        let run = Self { inputs: Arc::new(manifest.inputs.clone()), ..run };
         Ok((run, settings_of(path)?, manifest))
     }
 
@@ -268,6 +274,7 @@ impl RunDir {
         settings: &Settings,
         request: impl FnOnce() -> anyhow::Result<Request>,
     ) -> anyhow::Result<Option<Self>> {
+        self.lock.ensure_held()?;
         let (path, list) = (self.path.join(folder), format!("{folder}/{}", sums::FILE));
         if sums::is_listed(&self.path, &list)? {
             sums::read_listed(&self.path, &list, sums::LIST_BYTES_MAX)?;
@@ -293,33 +300,38 @@ impl RunDir {
             let build = Build { command_line: Manifest::read(&self.path)?.command_line, ..place.build.clone() };
             Self::create(&Place { build: &build, out: Some(&path), ..*place }, settings, &request()?)?
         };
-        Ok(Some(Self { within: Some((self.path.clone(), list)), ..stage }))
+        let inputs = self.inputs.iter().chain(stage.inputs.iter()).map(|(name, of)| (name.clone(), of.clone()));
+        Ok(Some(Self { inputs: Arc::new(inputs.collect()), within: Some((self.path.clone(), list)), ..stage }))
+    }
+
+    /// Refuses lots, parameters and networks that are not what the run was begun with: they may have changed since they were
+    /// read for the first time. Networks that the run itself makes are not among them.
+    ///
+    /// # Errors
+    /// Naming what differs.
+    pub fn ensure_unchanged(&self, found: &Inputs) -> anyhow::Result<()> {
+        let changed = found.iter().find(|(name, digest)| self.inputs.get(*name).is_some_and(|begun| begun != *digest));
+        changed.map_or(Ok(()), |(name, _)| Err(has_changed(name)))
     }
 
     /// Takes the lock of a folder that is there.
     fn locked(path: PathBuf, command: &str) -> anyhow::Result<Self> {
         let lock = Arc::new(Lock::take(&path, command)?);
-        Ok(Self { path, within: None, _lock: lock, _lock_of_run: None })
+        Ok(Self { path, within: None, lock, inputs: Arc::default(), _lock_of_run: None })
     }
 
     fn claim_named(path: &Path, place: &Place<'_>) -> anyhow::Result<Self> {
         fs::create_dir_all(path)
             .with_context(|| format!("{}: cannot be created; choose another --out", path.display()))?;
-        let names = fs::read_dir(path)?.map(|entry| Ok(entry?.file_name()));
-        let names = names.collect::<std::io::Result<Vec<_>>>().with_context(|| path.display().to_string())?;
-        // What a process leaves that dies before its claim: nothing but this, and never without the lock.
-        let is_free = names.iter().all(|name| {
-            name == lock::FILE || name == SETTINGS || name == MANIFEST || name.to_string_lossy().ends_with(".partial")
-        }) && (names.is_empty() || names.iter().any(|name| name == lock::FILE));
-        let is_run = Manifest::is_in(path);
         // Before the lock is taken: nothing is written into a folder that is no run.
-        if !is_free && !is_run {
+        if !is_free(path)? && !Manifest::is_in(path) {
             let way_out =
                 if place.overwrite { "so --overwrite will not delete it; choose" } else { "and not empty; choose" };
             bail!("{}: this folder is not a run, {way_out} another --out", path.display());
         }
         let run = Self::locked(path.to_path_buf(), place.command)?;
-        if !is_free {
+        // Whoever had the lock before may have made a run of it.
+        if !is_free(path)? {
             let name = path.display();
             ensure!(
                 place.overwrite || path.join(FINISHED).is_file(),
@@ -375,6 +387,7 @@ impl RunDir {
     /// # Errors
     /// If a list cannot be read or written.
     pub fn list_again(&self) -> anyhow::Result<()> {
+        self.lock.ensure_held()?;
         let listed = self.within.as_ref().map(|(run, list)| sums::list(run, &[list]));
         Ok(listed.unwrap_or(Ok(()))?)
     }
@@ -387,8 +400,9 @@ impl RunDir {
     /// Writes a file and lists it: it is there whole or not at all.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If it cannot be written, or the folder was deleted or moved meanwhile.
     pub fn write(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
+        self.lock.ensure_held()?;
         Ok(sums::write(&self.path, name, content)?)
     }
 
@@ -404,6 +418,21 @@ impl RunDir {
         }
         Ok(())
     }
+}
+
+fn has_changed(name: &str) -> anyhow::Error {
+    anyhow!("{name}: changed since this run was begun; restore it, or begin again into another folder")
+}
+
+/// Whether a folder can be claimed as it is: there is nothing, or what a process leaves that dies before its claim, which is
+/// never without the lock.
+fn is_free(path: &Path) -> anyhow::Result<bool> {
+    let names = fs::read_dir(path).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
+    let names: Vec<_> = names.with_context(|| path.display().to_string())?;
+    let is_of_claim =
+        |name: &OsString| name == SETTINGS || name == MANIFEST || name.to_string_lossy().ends_with(".partial");
+    let is_locked = names.iter().any(|name| name == lock::FILE);
+    Ok(names.iter().all(|name| name == lock::FILE || is_of_claim(name)) && (names.is_empty() || is_locked))
 }
 
 /// The run that lists a folder within it, and the name of the folder's list there.
@@ -527,8 +556,9 @@ pub fn training_of(spec: &Path) -> anyhow::Result<Training> {
     let policy = if run_of(spec)?.1 { "bc" } else { "final" };
     let Manifest { program, inputs, .. } = Manifest::read(run_of(spec)?.0)?;
     let digests: Vec<_> = settings.training.lots.iter().map(|lots| inputs.get(lots)).collect();
-    let recipe = format!("{policy}\n{program}\n{digests:?}\n{}", settings.to_toml());
-    Ok(Training { recipe: sums::digest(recipe.as_bytes()), seed, lots: settings.training.lots })
+    let recipe = sums::digest(format!("{policy}\n{program}\n{digests:?}\n{}", settings.to_toml()).as_bytes());
+    let digests = digests.into_iter().flatten().cloned().collect();
+    Ok(Training { recipe, seed, lots: settings.training.lots, digests })
 }
 
 /// The folder of the run, and whether its policy after behaviour cloning is meant.
@@ -586,10 +616,9 @@ impl Manifest {
     /// Naming what differs.
     pub fn check_inputs(&self, found: &Inputs) -> anyhow::Result<()> {
         for (name, digest) in &self.inputs {
-            ensure!(
-                found.get(name) == Some(digest),
-                "{name}: changed since this run was begun; restore it, or begin again into another folder"
-            );
+            if found.get(name) != Some(digest) {
+                return Err(has_changed(name));
+            }
         }
         ensure!(found.len() == self.inputs.len(), "this run was begun with other lots or drivers; begin again");
         Ok(())
@@ -768,6 +797,40 @@ mod tests {
         begun.check_inputs(&begun.inputs).unwrap();
         let changed = Inputs::from([("lots/x.toml".to_owned(), "2".to_owned())]);
         assert!(message(begun.check_inputs(&changed)).contains("lots/x.toml: changed"));
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// A lot was read when the run was begun, and again hours later by a stage of it.
+    #[test]
+    fn a_lot_that_changes_under_a_run_is_refused_by_its_stages() {
+        let path = scratch("under-a-run");
+        let settings = Settings::preset("smoke").unwrap();
+        let of = |digest: &str| Inputs::from([("lots/x.toml".to_owned(), digest.to_owned())]);
+        let request = Request { inputs: of("1"), ..Request::default() };
+        let run = RunDir::create(&place(&path, false), &settings, &request).unwrap();
+        let stage = run.stage("drives", &place(&path, false), &settings).unwrap().unwrap();
+        for run in [&run, &stage] {
+            run.ensure_unchanged(&of("1")).unwrap();
+            run.ensure_unchanged(&Inputs::from([("run:R/chains/one".to_owned(), "1".to_owned())])).unwrap();
+            assert!(message(run.ensure_unchanged(&of("2"))).contains("lots/x.toml: changed"));
+        }
+        drop((stage, run));
+        let (run, ..) = RunDir::resume(&path, "train-dagger").unwrap();
+        assert!(run.ensure_unchanged(&of("2")).is_err());
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// What was written went into whatever lay at the place by then.
+    #[cfg(unix)]
+    #[test]
+    fn a_run_whose_folder_was_deleted_writes_no_more() {
+        let path = scratch("deleted");
+        let run = create(&path, false).unwrap();
+        fs::remove_dir_all(&path).unwrap();
+        let other = create(&path, false).unwrap();
+        assert!(message(run.write("table1.md", b"of the first")).contains("was deleted or moved"));
+        assert!(message(run.finish(Outcome::Reproduction { stages: 1 })).contains("was deleted or moved"));
+        other.write("table1.md", b"of the second").unwrap();
         fs::remove_dir_all(path).unwrap();
     }
 

@@ -152,6 +152,7 @@ mod tests {
     use sim::metrics::EpisodeMetrics;
     use sim::scenario::Direction;
     use sim::seed::RootSeed;
+    use std::collections::BTreeSet;
 
     /// "In short" had the first training alone.
     #[test]
@@ -160,7 +161,12 @@ mod tests {
         let driver = |name: &str| NamedDriver::expert(&settings.expert).renamed(name);
         let trained = |seed: u64| {
             let mut driver = driver(&named(DAGGER, RootSeed(seed), &settings));
-            driver.training = Some(Training { recipe: DAGGER.to_owned(), seed: RootSeed(seed), lots: Vec::new() });
+            driver.training = Some(Training {
+                recipe: DAGGER.to_owned(),
+                seed: RootSeed(seed),
+                lots: Vec::new(),
+                digests: BTreeSet::new(),
+            });
             driver
         };
         let drivers = [driver("expert"), trained(1), trained(2), trained(3)];

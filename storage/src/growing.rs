@@ -192,6 +192,22 @@ mod tests {
         fs::remove_dir_all(folder).unwrap();
     }
 
+    #[cfg(unix)]
+    #[test]
+    fn a_link_in_place_of_a_file_is_not_written_through() {
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-growing-link", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        let diary = folder.join("diary");
+        fs::write(&diary, "dear").unwrap();
+        std::os::unix::fs::symlink(&diary, folder.join("runs")).unwrap();
+        assert!(
+            Growing::open(&folder, "driving", &["runs"]).is_err_and(|error| error.to_string().contains("no regular"))
+        );
+        assert_eq!(fs::read(&diary).unwrap(), b"dear");
+        fs::remove_dir_all(folder).unwrap();
+    }
+
     #[test]
     fn files_go_on_after_the_last_whole_part_and_damage_is_noticed() {
         let folder = std::env::temp_dir().join(format!("storage-test-{}-growing", std::process::id()));

@@ -1,10 +1,10 @@
 //! One owner per folder.
 
 use crate::error::FileError;
-use crate::whole::WRITE_REMEDY;
+use crate::whole::{WRITE_REMEDY, is_at};
 use std::fs::{self, File, TryLockError};
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The file in the folder that is locked. It says who holds it, and is empty when nobody does.
 pub const FILE: &str = ".lock";
@@ -14,6 +14,7 @@ const REMEDY: &str = "wait until it has ended, stop it, or choose another folder
 /// The right to write into a folder, until it is dropped or the process ends, however it ends.
 #[derive(Debug)]
 pub struct Lock {
+    path: PathBuf,
     file: File,
 }
 
@@ -31,22 +32,44 @@ impl Lock {
         if fs::symlink_metadata(&path).is_ok_and(|about| !about.is_file()) {
             return Err(FileError::new(&path, "is no file", "choose another folder"));
         }
-        let file = File::options().read(true).write(true).create(true).truncate(false).open(&path).map_err(failed)?;
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::Error(error)) => return Err(failed(error)),
-            Err(TryLockError::WouldBlock) => {
-                let holder = fs::read_to_string(&path).unwrap_or_default();
-                let holder = holder.lines().next().unwrap_or("another process").to_owned();
-                return Err(FileError::new(folder, format_args!("in use by {holder}"), REMEDY));
+        let file = loop {
+            let file =
+                File::options().read(true).write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+            match file.try_lock() {
+                // Not one that was deleted between both.
+                Ok(()) if !is_at(&file, &path).map_err(failed)? => {}
+                Ok(()) => break file,
+                Err(TryLockError::Error(error)) => return Err(failed(error)),
+                Err(TryLockError::WouldBlock) => {
+                    let holder = fs::read_to_string(&path).unwrap_or_default();
+                    let holder = holder.lines().next().unwrap_or("another process").to_owned();
+                    return Err(FileError::new(folder, format_args!("in use by {holder}"), REMEDY));
+                }
             }
-        }
-        let lock = Self { file };
+        };
+        let lock = Self { path, file };
         lock.file
             .set_len(0)
             .and_then(|()| writeln!(&lock.file, "{owner}, process {}", std::process::id()))
-            .map_err(failed)?;
+            .map_err(|error| FileError::new(&lock.path, format_args!("cannot be locked: {error}"), WRITE_REMEDY))?;
         Ok(lock)
+    }
+
+    /// Refuses to go on where the folder is another one now: who deleted or moved it may have begun a run of their own there.
+    ///
+    /// # Errors
+    /// If the lock at its place is not this one.
+    pub fn ensure_held(&self) -> Result<(), FileError> {
+        let folder = self.path.parent().unwrap_or(&self.path);
+        match is_at(&self.file, &self.path) {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(FileError::new(
+                folder,
+                "was deleted or moved while it was being written",
+                "nothing more is written there; begin again, or go on with --resume where it is now",
+            )),
+            Err(error) => Err(FileError::unreadable(&self.path, &error, WRITE_REMEDY)),
+        }
     }
 }
 
@@ -73,6 +96,25 @@ mod tests {
         drop(lock);
         assert_eq!(fs::read(folder.join(FILE)).unwrap(), b"");
         Lock::take(&folder, "train-bc").unwrap();
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// Somebody deleted the folder of a run under way, and began another there: both wrote into it.
+    #[cfg(unix)]
+    #[test]
+    fn the_lock_of_a_folder_that_was_deleted_holds_no_more() {
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-deleted", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let first = Lock::take(&folder, "train-dagger").unwrap();
+        first.ensure_held().unwrap();
+        fs::remove_dir_all(&folder).unwrap();
+        assert!(first.ensure_held().is_err_and(|error| error.to_string().contains("was deleted or moved")));
+        fs::create_dir_all(&folder).unwrap();
+        let second = Lock::take(&folder, "train-bc").unwrap();
+        assert!(first.ensure_held().is_err());
+        second.ensure_held().unwrap();
+        drop(first);
+        assert!(fs::read_to_string(folder.join(FILE)).unwrap().starts_with("train-bc"));
         fs::remove_dir_all(folder).unwrap();
     }
 

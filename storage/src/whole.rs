@@ -3,30 +3,93 @@
 use crate::error::FileError;
 use std::fmt::Display;
 use std::fs::{self, File};
-use std::io::{self, Cursor, Write as _};
+use std::io::{self, Cursor, ErrorKind, Write as _};
 use std::path::Path;
 
 /// What helps against most errors of writing.
 pub const WRITE_REMEDY: &str = "check that the folder exists, is writable and has space";
 
-/// Writes a file beside its place, then renames it.
+/// Writes a file beside its place, then renames it. Of several that write the same file at once, each waits for the one
+/// before it: what is under the name was written by one of them.
 ///
 /// # Errors
 /// If it cannot be written.
 pub fn write(path: &Path, content: &[u8]) -> Result<(), FileError> {
     let partial = path.with_added_extension("partial");
     let write = || {
-        // Never through a link that somebody put there.
-        if fs::symlink_metadata(&partial).is_ok() {
-            fs::remove_file(&partial)?;
-        }
-        let mut file = File::create_new(&partial)?;
+        let mut file = create_own(&partial)?;
         file.write_all(content)?;
         // The name must not be on disk before the content is.
         file.sync_all()?;
         fs::rename(&partial, path)
     };
     write().map_err(|error: io::Error| failed(path, &error))
+}
+
+/// A new file that this process alone writes; what a dead one left in its place is deleted.
+fn create_own(partial: &Path) -> io::Result<File> {
+    loop {
+        let file = match File::create_new(partial) {
+            Ok(file) => file,
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                make_way(partial)?;
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        lock(&file)?;
+        // Before the lock, others take it for what a dead process left.
+        if is_at(&file, partial)? {
+            return Ok(file);
+        }
+    }
+}
+
+/// Deletes what is in the way, once nobody writes it any more.
+fn make_way(partial: &Path) -> io::Result<()> {
+    let found = match fs::symlink_metadata(partial) {
+        // A link that somebody put there is neither followed nor waited for.
+        Ok(about) if about.is_file() => File::open(partial).map(Some),
+        other => other.map(|_| None),
+    };
+    let found = match found {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        found => found?,
+    };
+    if let Some(file) = &found {
+        lock(file)?;
+        // Its writer was done meanwhile, and it has its name.
+        if !is_at(file, partial)? {
+            return Ok(());
+        }
+    }
+    fs::remove_file(partial)
+}
+
+/// Waits for a lock, where the file system has any.
+fn lock(file: &File) -> io::Result<()> {
+    match file.lock() {
+        Err(error) if error.kind() != ErrorKind::Unsupported => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Whether an open file is the one at a path still.
+#[cfg(unix)]
+pub(crate) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
+    use std::os::unix::fs::MetadataExt as _;
+    let opened = file.metadata()?;
+    match fs::symlink_metadata(path) {
+        Ok(found) => Ok((found.dev(), found.ino()) == (opened.dev(), opened.ino())),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether an open file is the one at a path still: there it can be neither renamed nor deleted while it is open.
+#[cfg(not(unix))]
+pub(crate) fn is_at(_: &File, path: &Path) -> io::Result<bool> {
+    path.try_exists()
 }
 
 /// Like [`write()`], with a function that writes, into memory at first.
@@ -65,7 +128,7 @@ pub fn remove_partial(path: &Path) -> Result<(), FileError> {
 
 fn remove_file(path: &Path) -> Result<(), FileError> {
     match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
             Err(FileError::new(path, format_args!("cannot be deleted: {error}"), WRITE_REMEDY))
         }
         _ => Ok(()),
@@ -75,6 +138,40 @@ fn remove_file(path: &Path) -> Result<(), FileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What one had half written was put in place by the other.
+    #[test]
+    fn of_two_that_write_the_same_file_one_is_read_whole() {
+        let path = std::env::temp_dir().join(format!("storage-test-{}-both", std::process::id()));
+        let contents = [b'a', b'b'].map(|letter| vec![letter; 1 << 20]);
+        write(&path, &contents[0]).unwrap();
+        std::thread::scope(|scope| {
+            let writers =
+                contents.each_ref().map(|content| scope.spawn(|| (0..20).for_each(|_| write(&path, content).unwrap())));
+            while writers.iter().any(|writer| !writer.is_finished()) {
+                let found = fs::read(&path).unwrap();
+                assert!(contents.contains(&found), "{} bytes", found.len());
+            }
+        });
+        assert!(!path.with_added_extension("partial").exists());
+        fs::remove_file(path).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_in_the_way_are_not_written_through() {
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-in-the-way", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let (diary, path) = (folder.join("diary"), folder.join("report"));
+        fs::write(&diary, "dear").unwrap();
+        let partial = path.with_added_extension("partial");
+        std::os::unix::fs::symlink(&diary, &partial).unwrap();
+        write(&path, b"first").unwrap();
+        fs::hard_link(&diary, &partial).unwrap();
+        write(&path, b"second").unwrap();
+        assert_eq!((fs::read(&diary).unwrap(), fs::read(&path).unwrap()), (b"dear".to_vec(), b"second".to_vec()));
+        fs::remove_dir_all(folder).unwrap();
+    }
 
     #[test]
     fn what_a_dead_process_was_writing_goes_with_the_file() {

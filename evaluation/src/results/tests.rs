@@ -48,10 +48,13 @@ fn slice(results: &EvaluationResults, label: &str) -> Slice {
 #[test]
 fn what_any_driver_was_trained_on_is_not_unseen() {
     let settings = Settings::preset("default").unwrap();
-    let lots = Lot::parse_all(&["reference"], &settings.episode.vehicle).unwrap();
+    let car_park = "../scenarios/examples/car-park.lot.toml";
+    let lots = Lot::parse_all(&["reference", car_park], &settings.episode.vehicle).unwrap();
     let mut named = drivers_named(2);
+    // The car park was trained on where it lay before.
     let lots_of_second = vec!["lot-b".to_owned(), "no/such/lot.toml".to_owned()];
-    named[1].training = Some(Training { recipe: String::new(), seed: RootSeed(1), lots: lots_of_second });
+    let digests = lots.iter().filter_map(Lot::digest).collect();
+    named[1].training = Some(Training { recipe: String::new(), seed: RootSeed(1), lots: lots_of_second, digests });
     let plan = Plan { settings: &settings, drivers: &named, lots: &lots, compare_with: 0, shard: None };
     let results = EvaluationResults::new(&plan);
     let unseen = results.groups().iter().filter(|group| !group.is_trained_on).map(|group| group.name.as_str());

@@ -10,6 +10,7 @@ use evaluation::drive_stage::DriveStage;
 use evaluation::on_policy;
 use evaluation::shards::ShardRecord;
 use evaluation::stages::{Stage, Step};
+use experiment::inputs::Inputs;
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::run_dir::{self, Outcome, Place, Request, RunDir};
 use experiment::settings::Settings;
@@ -116,15 +117,17 @@ pub(crate) fn place_of<'a>(command: &'a str, settings: &Settings) -> Place<'a> {
     Place { build, out: None, overwrite: false, command, preset: command, seed: settings.seed.0 }
 }
 
-/// What a stage is asked for beside its settings: its share, if it has one.
+/// What a stage is asked for beside its settings: its share, if it has one, and the lots from files that a training reads.
 fn request_of(stage: &Stage) -> anyhow::Result<Request> {
     let mut arguments = toml::Table::new();
+    let is_training = matches!(stage.step, Step::Train { .. });
+    let inputs = if is_training { train::inputs(&stage.settings)? } else { Inputs::default() };
     if matches!(stage.step, Step::DriveShard { .. })
         && let Some(record) = ShardRecord::of(&DriveStage::load(stage)?.plan())
     {
         record.add_to(&mut arguments);
     }
-    Ok(Request { arguments, ..Request::default() })
+    Ok(Request { arguments, inputs })
 }
 
 /// Copies behaviour cloning from a finished chain: complete or not at all.
