@@ -5,9 +5,10 @@ use crate::determinism::files;
 use policy::checkpoint::Checkpoint;
 use policy::dataset::store::Store;
 use policy::fit::{FitReport, learning};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use storage::sums;
 
 /// A command under way, killed with the test.
@@ -135,6 +136,29 @@ fn signals_end_a_command_with_130_and_lose_nothing() {
         assert!(!run.join("finished.toml").exists(), "after {signal}");
         resume("train-dagger", &run);
     }
+}
+
+/// Whoever read stderr stands still, with the pipe full: the process could be killed only.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_signal_ends_a_command_that_nobody_listens_to() {
+    let run = scratch("nobody-listens").join("run");
+    let (reader, mut writer) = std::io::pipe().unwrap();
+    // As much as a pipe holds.
+    writer.write_all(&[b'\n'; 1 << 16]).unwrap();
+    let mut command = xtask();
+    command.args(["train-dagger", "--preset", "smoke", "--no-eval", "--out"]).arg(&run);
+    let mut running = Running(command.stdout(Stdio::null()).stderr(writer).spawn().unwrap());
+    assert!(running.wait_for(&run.join("sha256sums")));
+    let asked = Instant::now();
+    let sent = Command::new("kill").args(["-s", "INT", &running.0.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    while asked.elapsed() < Duration::from_secs(30) && running.0.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    assert_eq!(running.0.try_wait().unwrap().and_then(|status| status.code()), Some(130));
+    drop(reader);
+    resume("train-dagger", &run);
 }
 
 /// Damage as disks, copies and people make it.

@@ -9,13 +9,15 @@ use signal_hook::{
 };
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock, Mutex};
+use std::sync::{Arc, LazyLock, Mutex, mpsc};
 use std::time::{Duration, Instant};
 
 /// Exit status after a signal, whichever: 128 + SIGINT, as shells have it.
 pub(crate) const EXIT: u8 = 130;
 /// What work has to stop by itself.
 const GRACE: Duration = Duration::from_millis(600);
+/// What saying so may take.
+const LAST_WORDS: Duration = Duration::from_millis(200);
 /// Between two looks at the flag.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
@@ -61,7 +63,15 @@ fn watch() {
     while asked.elapsed() < GRACE {
         std::thread::sleep(LOOK_EVERY);
     }
-    note(said("what is finished is on disk"));
+    // Where nobody reads stderr, writing to it never ends.
+    let (told, is_told) = mpsc::channel();
+    let last_words = move || {
+        note(said("what is finished is on disk"));
+        let _ = told.send(());
+    };
+    if std::thread::Builder::new().name("last words".to_owned()).spawn(last_words).is_ok() {
+        let _ = is_told.recv_timeout(LAST_WORDS);
+    }
     std::process::exit(EXIT.into());
 }
 
