@@ -129,6 +129,14 @@ fn settings_and_folders_that_cannot_be_used_leave_nothing() {
     }
     let around = ["evaluate", "--driver", "expert", "--lots", mine, "--out", "scenarios", "--overwrite"];
     refuses(&around, &["--out scenarios", "scenarios/examples/slalom.toml", "choose another --out"]);
+    let around = ["train-dagger", "--preset", "smoke", "--also", mine, "--out", "scenarios", "--overwrite"];
+    refuses(&around, &["--out scenarios", "scenarios/examples/slalom.toml", "choose another --out"]);
+    for name in ["RAYON_NUM_THREADS", "RAYON_RS_NUM_CPUS"] {
+        let output = xtask().arg("drivers").env(name, "1000000").output().unwrap();
+        let (_, stderr) = text(&output);
+        assert_eq!(output.status.code(), Some(2), "{name}: {stderr}");
+        assert!(stderr.contains(&format!("{name} is more than")), "{stderr}");
+    }
     let key = "expert@lot-b@forward@0@paper@1@9";
     for (flag, value) in [("--trial", "3"), ("--lots", "lot-a"), ("--noise", "clean"), ("--seed", "2")] {
         let both = ["render", "animation", key, flag, value, "--out", &out];

@@ -16,8 +16,9 @@ pub struct Case {
 }
 
 /// What cases read, with the commands that make it.
-pub const PREPARED: [(&str, &str); 3] = [
+pub const PREPARED: [(&str, &str); 4] = [
     ("TRAINED", "train-bc --preset smoke --config SMALL --out TRAINED"),
+    ("COMPARED", "deviations --preset smoke --config SMALL --of start --unseen validation:1:lane --out COMPARED"),
     (
         "SHARD-1",
         "evaluate --driver tentacle cvm --lots test:1:lane --trials 1 --noise clean,paper --shard 1/2 --out SHARD-1",
@@ -43,7 +44,7 @@ dagger = { cloning_budget = { steps = 20 }, fit = { budget = { steps = 20 } } }
 
 /// Every command that writes, as small as it can be; but `guard`, which trains the default and is made of a training and
 /// evaluations within it as `scaling` is, and those that write single files as `export` does.
-pub const CASES: [Case; 11] = [
+pub const CASES: [Case; 13] = [
     Case {
         name: "train-bc",
         command: "train-bc --preset smoke --config SMALL --no-eval --out RUN",
@@ -90,12 +91,24 @@ pub const CASES: [Case; 11] = [
         copy_of: None,
     },
     Case {
+        name: "deviations",
+        command: "deviations --preset smoke --config SMALL --of start --unseen validation:1:lane --out RUN",
+        go_on: "deviations --resume RUN",
+        copy_of: None,
+    },
+    Case {
         name: "generate",
         command: "generate --lots lot-b,test:2:easy --out RUN",
         go_on: "generate --lots lot-b,test:2:easy --out RUN --overwrite",
         copy_of: None,
     },
     Case { name: "render report", command: "render report RUN", go_on: "render report RUN", copy_of: Some("TRAINED") },
+    Case {
+        name: "render results",
+        command: "render results COMPARED --to RUN/page.md",
+        go_on: "render results COMPARED --to RUN/page.md",
+        copy_of: Some(EMPTY),
+    },
     Case {
         name: "export",
         command: "export onnx TRAINED --out RUN/policy.onnx",

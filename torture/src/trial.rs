@@ -156,7 +156,9 @@ impl Workplace {
         let mut command = self.command(case.command);
         self.library.load_into(&mut command, &self.run, fault, at)?;
         let ended = process::run(&mut command, &self.folder.join("said"), None)?;
-        let is_dead = fault == Fault::Kill && ended.code.is_none();
+        let is_dead = ended.code.is_none();
+        // A death that did not come proves nothing.
+        ensure!(is_dead == (fault == Fault::Kill), "{}", said(&ended));
         ensure!(is_dead || ended.is_done() || ended.is_refusal(), "{}", said(&ended));
         if ended.is_done() { Ok(()) } else { self.go_on(case) }
     }
