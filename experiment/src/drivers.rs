@@ -287,7 +287,7 @@ impl DriverSpec {
             },
             _ => None,
         };
-        let driver = NamedDriver { name, spec: self, training, model, smoothing_ticks: 0.0 };
+        let driver = NamedDriver { name, spec: self, training, model, smoothing_ticks: 0.0, digest_of_files: None };
         Ok(driver.smoothed(settings.evaluation.smoothing))
     }
 }
@@ -324,6 +324,8 @@ pub struct NamedDriver {
     model: Model,
     /// Time constant of the action smoothing of who does not smooth by itself, control ticks; 0 = off.
     smoothing_ticks: f32,
+    /// What its files say, where it drives with other action smoothing than that.
+    digest_of_files: Option<String>,
 }
 
 /// Makes fleets of a driver that this crate does not know: a function of the program that calls this library.
@@ -361,31 +363,46 @@ impl NamedDriver {
     /// The scripted expert.
     pub fn expert(settings: &ExpertSettings) -> Self {
         let model = Model::Expert(settings.clone());
-        Self { name: "expert".to_owned(), spec: DriverSpec::Expert, training: None, model, smoothing_ticks: 0.0 }
+        Self {
+            name: "expert".to_owned(),
+            spec: DriverSpec::Expert,
+            training: None,
+            model,
+            smoothing_ticks: 0.0,
+            digest_of_files: None,
+        }
     }
 
     /// A network that is loaded already.
     pub fn network(name: &str, spec: DriverSpec, checkpoint: Checkpoint, device: DeviceChoice) -> Self {
         let model = Model::Network(vec![checkpoint], device);
-        Self { name: name.to_owned(), spec, training: None, model, smoothing_ticks: 0.0 }
+        Self { name: name.to_owned(), spec, training: None, model, smoothing_ticks: 0.0, digest_of_files: None }
     }
 
     /// A planner with parameters of the caller's.
     pub fn planner(planner: PlannerSpec) -> Self {
         let name = planner.name().to_owned();
         let spec = DriverSpec::Planner { name: name.clone(), parameters: Parameters::Published };
-        Self { name, spec, training: None, model: Model::Planner(planner), smoothing_ticks: 0.0 }
+        Self { name, spec, training: None, model: Model::Planner(planner), smoothing_ticks: 0.0, digest_of_files: None }
     }
 
     /// A function of the calling program, which sees the grid only and is asked for all cars of a batch at once.
     pub fn callback(name: &str, callback: Arc<dyn Callback>) -> Self {
         let spec = DriverSpec::Callback { name: name.to_owned() };
-        Self { name: name.to_owned(), spec, training: None, model: Model::Callback(callback), smoothing_ticks: 0.0 }
+        Self {
+            name: name.to_owned(),
+            spec,
+            training: None,
+            model: Model::Callback(callback),
+            smoothing_ticks: 0.0,
+            digest_of_files: None,
+        }
     }
 
     /// The same with other action smoothing. Networks smooth by themselves, as they were trained to.
     fn smoothed(mut self, smoothing: Smoothing) -> Self {
         if let Smoothing::Ticks(ticks) = smoothing {
+            self.digest_of_files = self.digest();
             match &mut self.model {
                 Model::Network(networks, _) => {
                     for network in networks {
@@ -407,6 +424,9 @@ impl NamedDriver {
 
     /// SHA-256 of what its files say; `None` for one that ships.
     pub fn digest(&self) -> Option<String> {
+        if self.digest_of_files.is_some() {
+            return self.digest_of_files.clone();
+        }
         match (&self.model, &self.spec) {
             (Model::Network(networks, _), _) => {
                 let mut bytes = Vec::new();
@@ -682,7 +702,9 @@ mod tests {
         ] {
             settings.evaluation.smoothing = smoothing;
             let planner = "vvf".parse::<DriverSpec>().unwrap().load(&settings).unwrap();
-            assert_eq!((ticks(&planner), ticks(&network.clone().smoothed(smoothing))), (of_planner, of_network));
+            let smoothed = network.clone().smoothed(smoothing);
+            assert_eq!((ticks(&planner), ticks(&smoothed)), (of_planner, of_network));
+            assert_eq!(smoothed.digest(), network.digest(), "its files are the same");
         }
     }
 
