@@ -150,6 +150,23 @@ pub fn as_in_the_paper(settings: &Settings, deviation: &Deviation) -> anyhow::Re
     Settings::resolve_over(settings, &Layers { overrides, ..Layers::default() }, None)
 }
 
+/// Settings of trainings that are not those of the preset `paper`, each with its own value and the paper's.
+///
+/// # Errors
+/// If the preset cannot be read.
+pub fn unlike_the_paper(settings: &Settings) -> anyhow::Result<Vec<String>> {
+    let paper = leaves(&Settings::preset("paper")?);
+    let of_paper = |key: &str| paper.iter().find(|(known, _)| known == key).map(|(_, value)| value);
+    let is_of_training = |key: &str| !is_within(key, "evaluation") && key != "seed";
+    let unlike =
+        leaves(settings).into_iter().filter(|(key, value)| is_of_training(key) && of_paper(key) != Some(value));
+    let said = |(key, value): (String, Value)| {
+        let of_paper = of_paper(&key).map_or_else(|| "none".to_owned(), Value::to_string);
+        format!("{key} = {value} (paper: {of_paper})")
+    };
+    Ok(unlike.map(said).collect())
+}
+
 fn is_within(key: &str, of: &str) -> bool {
     key.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
 }
@@ -178,7 +195,7 @@ pub fn stages(settings: &Settings, extent: &Extent, root: &Path) -> anyhow::Resu
         folder: name.to_owned(),
         about,
         settings,
-        step: Step::Train { cloning_of: (!changes_cloning).then(|| BASE.to_owned()) },
+        step: Step::Train { cloning_of: (!changes_cloning).then(|| BASE.to_owned()), samples_of: None },
     };
     let mut stages = vec![train(BASE, "everything as it is".to_owned(), settings.clone(), true)];
     for deviation in extent.deviations.iter().filter_map(|name| called(name)) {
@@ -250,6 +267,15 @@ mod tests {
     }
 
     #[test]
+    fn what_is_unlike_the_paper_is_named_with_both_values() {
+        let mut settings = Settings::preset("paper").unwrap();
+        settings.evaluation.trials = 77;
+        assert!(unlike_the_paper(&settings).unwrap().is_empty());
+        settings.dagger.iterations_max = 5;
+        assert_eq!(unlike_the_paper(&settings).unwrap(), ["dagger.iterations_max = 5 (paper: 8)"]);
+    }
+
+    #[test]
     fn another_controller_is_driven_by_itself_and_the_same_cloning_is_trained_once() {
         let settings = Settings::preset("default").unwrap();
         let deviations = ["points", "start", "mirror"].map(str::to_owned).to_vec();
@@ -257,8 +283,8 @@ mod tests {
         let stages = stages(&settings, &extent, Path::new("R")).unwrap();
         let folders: Vec<&str> = stages.iter().map(|stage| stage.folder.as_str()).collect();
         assert_eq!(folders, [BASE, "points", "start", "mirror", "drives", "drives-points"]);
-        assert_eq!(stages[2].step, Step::Train { cloning_of: Some(BASE.to_owned()) });
-        assert_eq!(stages[3].step, Step::Train { cloning_of: None });
+        assert_eq!(stages[2].step, Step::Train { cloning_of: Some(BASE.to_owned()), samples_of: None });
+        assert_eq!(stages[3].step, Step::Train { cloning_of: None, samples_of: None });
         let Step::Drive { drivers } = &stages[4].step else { panic!("{:?}", stages[4]) };
         assert_eq!(drivers.len(), 6);
         assert_eq!(drivers[0], ("DAgger".to_owned(), format!("run:R/{BASE}")));

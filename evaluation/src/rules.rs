@@ -84,6 +84,7 @@ pub fn stages(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
                 settings: of_rule(settings, extent, rule, seed),
                 step: Step::Train {
                     cloning_of: extent.rules.first().filter(|first| *first != rule).map(|first| folder(first, seed)),
+                    samples_of: None,
                 },
             });
         }
@@ -134,7 +135,8 @@ mod tests {
         alike.dagger.rule = ensemble.settings.dagger.rule;
         assert_eq!(alike, ensemble.settings);
         assert_eq!(control.settings.dagger.samples_per_round, 500);
-        assert_eq!(ensemble.step, Step::Train { cloning_of: Some("s1-expert_only".to_owned()) });
+        let cloning_of = Some("s1-expert_only".to_owned());
+        assert_eq!(ensemble.step, Step::Train { cloning_of, samples_of: None });
         let Step::Drive { drivers } = &stages[4].step else { panic!("the last stage drives") };
         assert_eq!(drivers[0], ("behaviour cloning (seed 1)".to_owned(), "run:R/s1-expert_only/bc".to_owned()));
         assert_eq!(drivers[5], ("EnsembleDAgger (seed 2)".to_owned(), "run:R/s2-ensemble_dagger".to_owned()));

@@ -45,7 +45,7 @@ pub fn stages(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
             folder: folder(different_lots),
             about: format!("training on {different_lots} different lots of a kind"),
             settings,
-            step: Step::Train { cloning_of: None },
+            step: Step::Train { cloning_of: None, samples_of: None },
         }
     };
     let mut stages: Vec<Stage> = extent.different_lots.iter().map(training).collect();

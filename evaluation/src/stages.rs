@@ -5,7 +5,8 @@
 //! | `chains/sN-weighted` | behaviour cloning and `DAgger` with the paper's weight α on τ̂: Table 1, the driver of every table |
 //! | `chains/sN-unweighted` | the same with α = 0: Table 1's effect of the weight |
 //! | `chains/s1-any-below`, `-tau-only` | the other two readings of Algorithm 2, line 9, for a few iterations |
-//! | `chains/s1-expert-only`, `-alpha-15` | controls: as many rounds that the expert alone drove, ten times the weight |
+//! | `chains/s1-expert-only`, `-expert-equal` | controls: as many rounds that the expert alone drove, with all of its samples and with as many as `DAgger` has |
+//! | `chains/s1-alpha-15` | control: ten times the weight |
 //! | `chains/s1-far-points` | control: points as far as the way is open, as in the paper; none where they are so anyway |
 //! | `drives/reference` | the paper's tables: every driver on its lots |
 //! | `drives/unseen` | generated lots that nothing was trained or tuned on |
@@ -24,6 +25,7 @@ use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::settings::{Settings, Smoothing, with_points_of_paper};
 use experiment::shard::Shard;
 use planners::PlannerSpec;
+use policy::dagger::IterationRow;
 use policy::decision_rule::{ChiOn, DecisionRule};
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
@@ -63,6 +65,8 @@ pub enum Step {
     Train {
         /// Folder of the chain whose behaviour cloning is taken over.
         cloning_of: Option<String>,
+        /// Folder of the chain that decides how many samples an iteration keeps: as many as it has, on average.
+        samples_of: Option<String>,
     },
     /// Drives `(name, spec)`, all compared with the driver of this name.
     Drive {
@@ -96,6 +100,8 @@ pub enum Chain {
     TauOnly,
     /// The expert drives alone, in as many rounds of as many lots and optimiser steps.
     ExpertOnly,
+    /// The same with as many samples as [`Self::Weighted`] has.
+    ExpertEqual,
     /// α = 15.
     Alpha15,
     /// Points as far as the way is open, as the paper has them.
@@ -111,6 +117,7 @@ impl Chain {
             Self::AnyBelow => "any-below",
             Self::TauOnly => "tau-only",
             Self::ExpertOnly => "expert-only",
+            Self::ExpertEqual => "expert-equal",
             Self::Alpha15 => "alpha-15",
             Self::FarPoints => "far-points",
         };
@@ -124,6 +131,7 @@ impl Chain {
             Self::AnyBelow => "DAgger under \"any below\", Algorithm 2 as printed",
             Self::TauOnly => "DAgger under \"τ̂ alone\"",
             Self::ExpertOnly => "as many rounds as DAgger, the expert drives alone",
+            Self::ExpertEqual => "the same with as many samples as DAgger",
             Self::Alpha15 => "DAgger with α = 15",
             Self::FarPoints => "behaviour cloning, DAgger with points as far as the way is open",
         }
@@ -141,7 +149,7 @@ impl Chain {
             }
             Self::AnyBelow => dagger.rule = DecisionRule::AnyBelowLiteral { tau, chi, chi_on },
             Self::TauOnly => dagger.rule = DecisionRule::TauOnly { tau },
-            Self::ExpertOnly => dagger.rule = DecisionRule::ExpertOnly,
+            Self::ExpertOnly | Self::ExpertEqual => dagger.rule = DecisionRule::ExpertOnly,
             Self::Alpha15 => dagger.fit.loss.alpha = 15.0,
         }
         if matches!(self, Self::AnyBelow | Self::TauOnly) {
@@ -150,14 +158,25 @@ impl Chain {
         }
         // Other points are other labels.
         let has_cloning = matches!(self, Self::Weighted | Self::FarPoints);
-        let cloning_of = (!has_cloning).then(|| Self::Weighted.folder(settings.seed));
+        let weighted = || Self::Weighted.folder(settings.seed);
+        let cloning_of = (!has_cloning).then(weighted);
+        let samples_of = (self == Self::ExpertEqual).then(weighted);
         Stage {
             folder: self.folder(settings.seed),
             about: self.about().to_owned(),
             settings,
-            step: Step::Train { cloning_of },
+            step: Step::Train { cloning_of, samples_of },
         }
     }
+}
+
+/// Settings of a training that keeps as many samples of an iteration as another did: `rows` are those of the other.
+pub fn with_as_many_samples(settings: &Settings, rows: &[IterationRow]) -> Settings {
+    let mut settings = settings.clone();
+    let iterations = rows.get(1..).unwrap_or_default();
+    let samples: usize = iterations.iter().map(|row| row.samples).sum();
+    settings.dagger.samples_per_round = samples.div_ceil(iterations.len().max(1)) as u32;
+    settings
 }
 
 /// The paper's τ and χ, for chains whose rule has none.
@@ -201,6 +220,8 @@ pub const UNWEIGHTED: &str = "DAgger, α = 0";
 /// Names in tables of what only [`CONTROLS`] drives.
 pub const EXPERT_ONLY: &str = "expert's data alone";
 /// See [`EXPERT_ONLY`].
+pub const EXPERT_EQUAL: &str = "expert's data alone, as many samples";
+/// See [`EXPERT_ONLY`].
 pub const ALPHA_15: &str = "DAgger, α = 15";
 
 /// Action smoothing of [`SMOOTHED`] where the settings' networks have none, control ticks.
@@ -232,12 +253,21 @@ pub enum Part {
 pub fn share(stages: Vec<Stage>, part: Part, shard: Shard) -> Vec<Stage> {
     match part {
         Part::Trainings => {
-            let trainings = stages.into_iter().filter(|stage| matches!(stage.step, Step::Train { .. })).enumerate();
-            let taken: Vec<Stage> =
-                trainings.filter(|(index, _)| shard.takes(*index)).map(|(_, stage)| stage).collect();
+            // What is dealt out, by folder: a training that needs the samples of another goes with it.
+            let mut units: Vec<String> = Vec::new();
+            let mut is_taken = |stage: &Stage| {
+                let Step::Train { samples_of, .. } = &stage.step else { return false };
+                let unit = samples_of.as_ref().unwrap_or(&stage.folder);
+                let index = units.iter().position(|known| known == unit).unwrap_or_else(|| {
+                    units.push(unit.clone());
+                    units.len() - 1
+                });
+                shard.takes(index)
+            };
+            let taken: Vec<Stage> = stages.into_iter().filter(|stage| is_taken(stage)).collect();
             let folders: Vec<String> = taken.iter().map(|stage| stage.folder.clone()).collect();
             let with_its_cloning = |mut stage: Stage| {
-                if let Step::Train { cloning_of } = &mut stage.step {
+                if let Step::Train { cloning_of, .. } = &mut stage.step {
                     // It comes to the same weights wherever it is trained.
                     cloning_of.take_if(|chain| !folders.contains(chain));
                 }
@@ -261,7 +291,7 @@ fn trainings(settings: &Settings, extent: &Extent) -> Vec<Stage> {
         let of_seed = Settings { seed, ..settings.clone() };
         stages.extend([Chain::Weighted, Chain::Unweighted].map(|chain| chain.stage(&of_seed, extent)));
     }
-    let of_first_seed = [Chain::AnyBelow, Chain::TauOnly, Chain::ExpertOnly, Chain::Alpha15];
+    let of_first_seed = [Chain::AnyBelow, Chain::TauOnly, Chain::ExpertOnly, Chain::ExpertEqual, Chain::Alpha15];
     stages.extend(of_first_seed.map(|chain| chain.stage(settings, extent)));
     if !has_points_of_paper(settings) {
         stages.push(Chain::FarPoints.stage(settings, extent));
@@ -322,6 +352,7 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
 
     let mut controls = networks[..3].to_vec();
     controls.push(of_first_seed(EXPERT_ONLY, Chain::ExpertOnly));
+    controls.push(of_first_seed(EXPERT_EQUAL, Chain::ExpertEqual));
     controls.push(of_first_seed(ALPHA_15, Chain::Alpha15));
     stages.push(drive(CONTROLS, "controls on generated lots", unseen, controls));
 
@@ -372,7 +403,7 @@ impl Stage {
     /// What it does, with estimated seconds.
     pub fn tasks(&self) -> Vec<Task> {
         match &self.step {
-            Step::Train { cloning_of } => estimate::training(&self.settings, cloning_of.is_none()),
+            Step::Train { cloning_of, .. } => estimate::training(&self.settings, cloning_of.is_none()),
             Step::Drive { drivers } => vec![estimate::evaluation(&self.settings, drivers.len())],
             Step::DriveShard { drivers, shard } => {
                 let (name, all_s) = estimate::evaluation(&self.settings, drivers.len());
@@ -412,6 +443,7 @@ mod tests {
         assert_eq!(of("chains/s1-tau-only").rule, DecisionRule::TauOnly { tau: 0.07 });
         let mut control = of("chains/s1-expert-only");
         assert_eq!(control.rule, DecisionRule::ExpertOnly);
+        assert_eq!(of("chains/s1-expert-equal"), control);
         control.rule = settings.dagger.rule;
         assert_eq!(control, settings.dagger);
         let mut heavy = of("chains/s1-alpha-15");
@@ -419,7 +451,7 @@ mod tests {
         heavy.fit.loss.alpha = 1.5;
         assert_eq!(heavy, settings.dagger);
         let far = stages.iter().find(|stage| stage.folder == "chains/s1-far-points").unwrap();
-        assert_eq!(far.step, Step::Train { cloning_of: None });
+        assert_eq!(far.step, Step::Train { cloning_of: None, samples_of: None });
         assert_eq!(far.settings, with_points_of_paper(&settings));
         let of_paper = all(&Settings::preset("paper").unwrap(), &extent(), Path::new("R"));
         assert!(of_paper.iter().all(|stage| !stage.folder.contains("far-points")), "its points are far anyway");
@@ -440,8 +472,14 @@ mod tests {
         assert_eq!(folders, expected);
         // The first shard has the chain whose behaviour cloning the fifth takes over; the second has not.
         let weighted = Chain::Weighted.folder(settings.seed);
-        assert_eq!(trained[0][1].step, Step::Train { cloning_of: Some(weighted) });
-        assert_eq!(trained[1][0].step, Step::Train { cloning_of: None });
+        assert_eq!(trained[0][1].step, Step::Train { cloning_of: Some(weighted.clone()), samples_of: None });
+        assert_eq!(trained[1][0].step, Step::Train { cloning_of: None, samples_of: None });
+        // What needs the samples of another is trained where that one is.
+        let equal = Step::Train { cloning_of: Some(weighted.clone()), samples_of: Some(weighted.clone()) };
+        for shard in trained {
+            let has = |folder: &str| shard.iter().any(|stage| stage.folder == folder);
+            assert_eq!(has(&weighted), shard.iter().any(|stage| stage.step == equal));
+        }
         for driven in shares(Part::Drives) {
             assert_eq!(driven.len(), 9);
             assert!(driven.iter().all(|stage| stage.folder.starts_with("drives") && stage.estimate_s() > 0.0));
@@ -468,7 +506,7 @@ mod tests {
             assert!(!names(UNSEEN).contains(&name.to_owned()), "its tuned variant stands for {name}");
         }
         assert!(names(UNSEEN).contains(&"vvf".to_owned()) && names(UNSEEN).contains(&"cvm".to_owned()));
-        assert_eq!(names(CONTROLS), ["BC", "DAgger", "DAgger, α = 0", EXPERT_ONLY, ALPHA_15]);
+        assert_eq!(names(CONTROLS), ["BC", "DAgger", "DAgger, α = 0", EXPERT_ONLY, EXPERT_EQUAL, ALPHA_15]);
         assert_eq!(names(SMOOTHED), names(UNSMOOTHED));
         assert_eq!(names(READINGS), names(READINGS_UNSEEN));
         for name in ["DAgger", "dwa", "dwa/fox", "cvm/simmons", "tentacle/short", "vff"] {

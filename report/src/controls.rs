@@ -4,7 +4,7 @@ use crate::drive::rows_of;
 use crate::markdown::table_of;
 use evaluation::conclusions::{BC, DAGGER, Driven};
 use evaluation::format::{difference, quoted_rate};
-use evaluation::stages::{ALPHA_15, Chain, EXPERT_ONLY, UNWEIGHTED};
+use evaluation::stages::{ALPHA_15, Chain, EXPERT_EQUAL, EXPERT_ONLY, UNWEIGHTED};
 use sim::seed::RootSeed;
 use std::path::Path;
 
@@ -25,6 +25,7 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
     for (driver, named) in driven.plan.drivers.iter().enumerate() {
         let chain = match named.name.as_str() {
             EXPERT_ONLY => Chain::ExpertOnly,
+            EXPERT_EQUAL => Chain::ExpertEqual,
             ALPHA_15 => Chain::Alpha15,
             BC | DAGGER => Chain::Weighted,
             UNWEIGHTED => Chain::Unweighted,
@@ -50,8 +51,9 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
     }
     Ok(format!(
         "### Controls\n\nOn the unseen lots. *{EXPERT_ONLY}*: as many rounds on the same lots as DAgger with as many \
-         optimiser steps, but the expert drives throughout, so that every tick is the expert's and there are more samples; where it \
-         is no worse than DAgger, more data is what helps and not who drove. α is the weight on τ̂; its mean weight is 1 where nothing is weighted.\n\n{table}"
+         optimiser steps, but the expert drives throughout, so that every tick is the expert's and there are more samples; *as many samples*: \
+         thinned evenly to as many of an iteration as DAgger has. Where they are no worse than DAgger, more data is what \
+         helps and not who drove. α is the weight on τ̂; its mean weight is 1 where nothing is weighted.\n\n{table}"
     ))
 }
 

@@ -5,11 +5,12 @@ use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
 use crate::output::Output;
-use anyhow::ensure;
+use anyhow::{Context as _, ensure};
 use evaluation::drive_stage::DriveStage;
 use evaluation::on_policy;
 use evaluation::shards::ShardRecord;
-use evaluation::stages::{Stage, Step};
+use evaluation::stages::{self, Stage, Step};
+use evaluation::table1::Table1;
 use experiment::inputs::Inputs;
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::run_dir::{self, Outcome, Place, Request, RunDir};
@@ -71,14 +72,14 @@ fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<()
 
 /// Does a stage unless it is done; `false` if cut short by Ctrl-C.
 fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, output: &Output) -> anyhow::Result<bool> {
-    let settings = &stage.settings;
+    let settings = &settings_of(stage, root)?;
     let request = || request_of(stage);
     let Some(run) = root.stage_for(&stage.folder, &place_of(command, settings), settings, request)? else {
         output.note("done before");
         return Ok(true);
     };
     match &stage.step {
-        Step::Train { cloning_of } => {
+        Step::Train { cloning_of, .. } => {
             if let Some(chain) = cloning_of {
                 take_over_cloning(&root.path().join(chain), &run)?;
             }
@@ -105,6 +106,14 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
         }
     }
     Ok(true)
+}
+
+/// The settings of a stage, with what other stages decide of them.
+fn settings_of(stage: &Stage, root: &RunDir) -> anyhow::Result<Settings> {
+    let Step::Train { samples_of: Some(chain), .. } = &stage.step else { return Ok(stage.settings.clone()) };
+    let table1 = Table1::read(&root.path().join(chain))?;
+    let table1 = table1.with_context(|| format!("{chain}: is not trained yet"))?;
+    Ok(stages::with_as_many_samples(&stage.settings, &table1.rows))
 }
 
 fn outcome_of(drivers: &[(String, String)]) -> Outcome {
