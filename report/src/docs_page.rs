@@ -4,9 +4,6 @@ use crate::command_line::{command_line, quoted};
 use experiment::run_dir::Manifest;
 use std::fmt::Write as _;
 
-/// Where their figures go, relative to the page.
-pub(crate) const FIGURES: &str = "pictures/results";
-
 /// The head of a page: which command made the run, and which one made the page, at which `revision` of the repository.
 pub(crate) fn head(
     run: &str,

@@ -58,7 +58,7 @@ impl OtherRun {
     }
 
     /// Writes its table as a page of the documentation, with what made it in its head and the tables of other runs at its
-    /// end; figures go to `pictures/results` beside it.
+    /// end; figures go to `pictures` beside it.
     ///
     /// # Errors
     /// If it is not finished or has no table, what it wrote cannot be read, or a file cannot be written.
@@ -71,7 +71,7 @@ impl OtherRun {
         page.text(table);
         add_plot(&mut page, &manifest.command, plot);
         others.iter().try_for_each(|other| other.add_to(&mut page))?;
-        page.write_markdown(to, docs_page::FIGURES)
+        page.write_markdown(to)
     }
 
     fn read(&self) -> anyhow::Result<Found> {

@@ -148,20 +148,21 @@ impl Page {
         Ok(sums::write(folder, &format!("{stem}.html"), self.to_html().as_bytes())?)
     }
 
-    /// Writes Markdown alone, as a file of a repository: `figures` is a folder relative to its own.
+    /// Writes Markdown alone, as a file of a repository; figures go to `pictures` beside it, into a folder called as the page.
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub fn write_markdown(&self, path: &Path, figures: &str) -> anyhow::Result<()> {
+    pub fn write_markdown(&self, path: &Path) -> anyhow::Result<()> {
         let folder = path.parent().unwrap_or(Path::new("."));
-        let into = folder.join(figures);
+        let figures = format!("pictures/{}", path.file_stem().unwrap_or_default().to_string_lossy());
+        let into = folder.join(&figures);
         std::fs::create_dir_all(&into).with_context(|| format!("{}: cannot be created", into.display()))?;
         for part in &self.parts {
             if let Part::Figure { name, image, .. } = part {
                 storage::whole::write(&into.join(image.file(name)), &image.bytes())?;
             }
         }
-        Ok(storage::whole::write(path, self.markdown_with(figures).as_bytes())?)
+        Ok(storage::whole::write(path, self.markdown_with(&figures).as_bytes())?)
     }
 
     /// Markdown that names the figures as files beside it.

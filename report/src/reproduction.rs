@@ -11,6 +11,7 @@ use crate::table1::{AGREEMENT, READ_ETA_HAT};
 use crate::trainings::{self, Place};
 use evaluation::calibration::AxisCalibration;
 use evaluation::conclusions::{self, Against, BC, DAGGER, Driven, Statement, Verdict};
+use evaluation::deviations;
 use evaluation::format::{difference, exact_rate, quoted_interval, quoted_rate};
 use evaluation::on_policy::{Calibration, Effect, OnPolicy, States};
 use evaluation::paper::{self, PaperLot};
@@ -56,7 +57,7 @@ pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
 }
 
 /// Writes the same as a page of the documentation, with what made it in its head (this program lies at `revision`), and the
-/// tables of other runs at its end; figures go to `pictures/results` beside it.
+/// tables of other runs at its end; figures go to `pictures` beside it.
 ///
 /// # Errors
 /// If what a stage wrote cannot be read, or a file cannot be written.
@@ -70,23 +71,45 @@ pub fn write_docs(
     let seeds = stages::seeds(&recipe.settings, &recipe.extent);
     let seeds = seeds.iter().map(|seed| seed.0.to_string()).collect::<Vec<_>>().join(", ");
     let named: Vec<String> = others.iter().map(OtherRun::to_string).collect();
-    let mut page = Page::new("Results");
+    let manifest = Manifest::read(run)?;
+    let preset = manifest.preset.strip_prefix("full-").unwrap_or(&manifest.preset);
+    let of_preset = if preset == "default" { String::new() } else { format!(", preset {preset}") };
+    let mut page = Page::new(format!("Results{of_preset}"));
     let more = [("training seeds", seeds)];
-    page.text(docs_page::head(&run.display().to_string(), &named, &Manifest::read(run)?, revision, &more));
+    page.text(docs_page::head(&run.display().to_string(), &named, &manifest, revision, &more));
     page.text(introduction(recipe));
-    page.text(CAUTIONS);
+    page.text(cautions(&recipe.settings)?);
     Found::read(recipe, run)?.add_to(&mut page, recipe, run)?;
     others.iter().try_for_each(|other| other.add_to(&mut page))?;
-    page.write_markdown(to, docs_page::FIGURES)
+    page.write_markdown(to)
 }
 
 /// What a reader must know before quoting a figure.
-const CAUTIONS: &str = "\
-Before quoting a figure: the widths of the three reference lots were chosen so that the expert meets the paper's safe \
-ratios ([methods](methods.md#11-lots)). The expert's points lie at half of the open way, which is our reading of the \
-paper ([paper](paper.md)); it raises η̂ at an unchanged τ, so that η̂ is not comparable with the paper's. Forward and reverse \
-drives of a trial share their obstacles. One training is one sample: its interval says how sure the rate of *this* network \
-is, not what another training would give; an interval over several trainings is for other seeds, too.";
+fn cautions(settings: &Settings) -> anyhow::Result<String> {
+    let points = if has_points_of_paper(settings) {
+        let unlike = deviations::unlike_the_paper(settings)?;
+        let unlike = if unlike.is_empty() { "nothing".to_owned() } else { format!("`{}`", unlike.join("`, `")) };
+        format!(
+            "The expert's points lie as far as the way is open, as the paper says. What else the trainings do not have as the \
+             preset `paper` has it: {unlike}."
+        )
+    } else {
+        "The expert's points lie at half of the open way, which is our reading of the paper ([paper](paper.md)); it raises η̂ at \
+         an unchanged τ, so that η̂ is not comparable with the paper's."
+            .to_owned()
+    };
+    Ok(format!(
+        "Before quoting a figure: the widths of the three reference lots were chosen so that the expert meets the paper's safe \
+         ratios ([methods](methods.md#11-lots)). {points} Forward and reverse drives of a trial share their obstacles. One \
+         training is one sample: its interval says how sure the rate of *this* network is, not what another training would \
+         give; an interval over several trainings is for other seeds, too."
+    ))
+}
+
+/// Whether the expert's points are the paper's.
+fn has_points_of_paper(settings: &Settings) -> bool {
+    with_points_of_paper(settings) == *settings
+}
 
 /// What the stages found.
 struct Found {
@@ -226,8 +249,7 @@ fn statements(
 ) -> Vec<Statement> {
     let mut statements = conclusions::on_reference_lots(reference);
     // With nearer labels η̂ is another quantity, and is not held against the paper's.
-    let has_labels_of_paper = with_points_of_paper(settings) == *settings;
-    if has_labels_of_paper && settings.dagger.rule.tau() == DecisionRule::paper().tau() {
+    if has_points_of_paper(settings) && settings.dagger.rule.tau() == DecisionRule::paper().tau() {
         statements.push(conclusions::share_of_the_network(weighted, settings.dagger.eta));
     }
     statements.extend(effect.iter().map(|Effect { iteration, held_back, held_back_by_seed, .. }| {

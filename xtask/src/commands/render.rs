@@ -97,7 +97,7 @@ pub(crate) struct RenderResultsArgs {
     /// Finished runs whose tables are added at the end: of `deviations`, `rules`, `scaling`, `evaluate` or a training.
     #[arg(long, value_name = "[TITLE=]DIR", num_args = 1..)]
     with: Vec<OtherRun>,
-    /// File to write; figures go to `pictures/results` beside it [default: docs/results.md; of another command
+    /// File to write; figures go to `pictures/NAME` beside it [default: docs/results.md; of another command
     /// docs/results-COMMAND.md].
     #[arg(long, value_name = "FILE.md")]
     to: Option<PathBuf>,
