@@ -13,7 +13,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use experiment::drive::Replay;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
-use experiment::progress::Progress as _;
+use experiment::progress::{Interrupted, Progress as _};
 use experiment::replay_key::ReplayKey;
 use experiment::run_dir::{self, Manifest, RunDir};
 use experiment::settings::{NoiseChoice, Settings};
@@ -26,6 +26,7 @@ use report::other_run::OtherRun;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
 use report::pictures::{contact_sheet, lot, noise, samples};
 use report::{reproduction, run_report};
+use sim::episode::EpisodeSettings;
 use sim::limits::{PIXELS_PER_METRE_MAX, RUN_TEXT_BYTES_MAX, TRIAL_MAX};
 use sim::map::Map;
 use sim::scenario::Direction;
@@ -204,29 +205,47 @@ pub(super) fn check_scale(pixels_per_metre: Option<f32>) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn maps(args: &RenderLotArgs, output: &Output) -> anyhow::Result<Vec<Map>> {
-    let episode = Settings::preset("default")?.episode;
-    let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
-    let trials: Vec<Trial<'_>> =
-        Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).collect();
-    let console = Console::new(output);
-    console.begin("lots", "drawing lots");
-    let maps = trials.par_iter().map(|trial| trial.map(&episode)).collect::<anyhow::Result<Vec<Map>>>()?;
-    console.end(&format!("{} lots", maps.len()));
-    Ok(maps)
-}
+/// Lots whose maps are in memory at a time.
+const LOTS_AT_A_TIME: usize = 32;
 
 fn render_lots(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
     check_scale(args.pixels_per_metre)?;
-    let vehicle = Settings::preset("default")?.episode.vehicle;
-    for map in maps(args, folder.output)? {
-        folder.write(&map.scenario().name, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?, true)?;
+    let episode = Settings::preset("default")?.episode;
+    let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
+    lots.iter().try_for_each(|lot| folder.check(lot.name(), true))?;
+    let console = Console::new(folder.output);
+    console.begin("lots", "drawing lots");
+    let mut drawn = 0;
+    for some in lots.chunks(LOTS_AT_A_TIME) {
+        for map in maps(some, args.seed, &episode)? {
+            console.at(drawn as f64 / lots.len() as f64, &mut |_| format!("{drawn} of {} lots", lots.len()));
+            if console.is_cancelled() {
+                return Err(Interrupted { kept: format!("{drawn} lots were drawn") }.into());
+            }
+            let picture = lot::top_view(&map, &episode.vehicle, args.pixels_per_metre)?;
+            folder.write(&map.scenario().name, &picture, true)?;
+            drawn += 1;
+        }
     }
+    console.end(&format!("{drawn} lots"));
     Ok(())
 }
 
 fn contact_sheet(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
-    folder.write("contact-sheet", &contact_sheet::picture(&maps(args, folder.output)?)?, true)
+    const NAME: &str = "contact-sheet";
+    folder.check(NAME, true)?;
+    let episode = Settings::preset("default")?.episode;
+    let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
+    let console = Console::new(folder.output);
+    console.begin("lots", "drawing lots");
+    let maps = maps(&lots, args.seed, &episode)?;
+    console.end(&format!("{} lots", maps.len()));
+    folder.write(NAME, &contact_sheet::picture(&maps)?, true)
+}
+
+fn maps(lots: &[Lot], seed: u64, episode: &EpisodeSettings) -> anyhow::Result<Vec<Map>> {
+    let trials = Trial::all(RootSeed(seed), Purpose::Pictures, lots, 1, &[Direction::Forward]);
+    trials.collect::<Vec<_>>().par_iter().map(|trial| trial.map(episode)).collect()
 }
 
 fn render_trajectories(args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
