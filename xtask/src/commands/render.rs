@@ -215,7 +215,7 @@ fn render_lots(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> 
     lots.iter().try_for_each(|lot| folder.check(lot.name(), true))?;
     let console = Console::new(folder.output);
     console.begin("lots", "drawing lots");
-    let mut drawn = 0;
+    let mut drawn = 0_usize;
     for some in lots.chunks(LOTS_AT_A_TIME) {
         for map in maps(some, args.seed, &episode)? {
             console.at(drawn as f64 / lots.len() as f64, &mut |_| format!("{drawn} of {} lots", lots.len()));
