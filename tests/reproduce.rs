@@ -109,9 +109,13 @@ fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
         let cells = rest.lines().map(|line| line.split('|').map(str::trim).collect::<Vec<_>>());
         cells.into_iter().find(|cells| cells.get(1) == Some(&name)).unwrap_or_else(|| panic!("{table}: {name}"))
     };
-    for name in ["BC", "DAgger", "DAgger, α = 0", "expert's data alone", "DAgger, α = 15"] {
+    let equal = "expert's data alone, as many samples";
+    for name in ["BC", "DAgger", "DAgger, α = 0", "expert's data alone", equal, "DAgger, α = 15"] {
         assert_eq!(row("### Controls", name)[5], counted(whole, "controls", name), "{name}");
     }
+    let samples = |name: &str| row("### Controls", name)[3].parse::<u32>().unwrap();
+    assert_eq!(samples(equal), samples("DAgger"));
+    assert!(samples(equal) < samples("expert's data alone"), "or it were the same control");
     for name in ["expert", "BC", "DAgger", "tentacle", "vvf", "mppi, tuned"] {
         let row = row("### Action smoothing", name);
         assert_eq!(row[2], counted(whole, "unsmoothed", name), "{name}");

@@ -50,6 +50,7 @@ pub fn evaluate(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyho
     let mut trials = plan.trials();
     loop {
         let batch: Vec<Trial<'_>> = trials.by_ref().take(BATCH).collect();
+        run.ensure_held()?;
         if batch.is_empty() {
             return driving.finish().map(Some);
         }

@@ -170,12 +170,15 @@ impl Chain {
     }
 }
 
-/// Settings of a training that keeps as many samples of an iteration as another did: `rows` are those of the other.
+/// Settings of a training with as many iterations as another, of as many samples on average: `rows` are those of the other.
 pub fn with_as_many_samples(settings: &Settings, rows: &[IterationRow]) -> Settings {
     let mut settings = settings.clone();
+    let dagger = &mut settings.dagger;
     let iterations = rows.get(1..).unwrap_or_default();
     let samples: usize = iterations.iter().map(|row| row.samples).sum();
-    settings.dagger.samples_per_round = samples.div_ceil(iterations.len().max(1)) as u32;
+    (dagger.iterations_min, dagger.iterations_max) = (iterations.len() as u32, iterations.len() as u32);
+    // None at all would stand for all of them.
+    dagger.samples_per_round = samples.div_ceil(iterations.len().max(1)).max(1) as u32;
     settings
 }
 
@@ -238,6 +241,21 @@ pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
         step: Step::OnPolicy { seeds: seeds(settings, extent) },
     });
     stages
+}
+
+/// The stages without the trainings whose folders are not there, and without who would drive as one of them: an earlier
+/// version did not do all of what this one does.
+pub fn without_trainings(stages: Vec<Stage>, is_there: impl Fn(&str) -> bool) -> Vec<Stage> {
+    let is_missing = |stage: &&Stage| matches!(stage.step, Step::Train { .. }) && !is_there(&stage.folder);
+    let missing: Vec<String> = stages.iter().filter(is_missing).map(|stage| stage.folder.clone()).collect();
+    let drives = |spec: &str, folder: &String| Path::new(spec).ancestors().any(|part| part.ends_with(folder));
+    let left = stages.into_iter().filter(|stage| !missing.contains(&stage.folder)).map(|mut stage| {
+        if let Step::Drive { drivers } = &mut stage.step {
+            drivers.retain(|(_, spec)| !missing.iter().any(|folder| drives(spec, folder)));
+        }
+        stage
+    });
+    left.filter(|stage| !matches!(&stage.step, Step::Drive { drivers } if drivers.is_empty())).collect()
 }
 
 /// What shards share out. What drives needs every network: trainings are put together first.
@@ -455,6 +473,50 @@ mod tests {
         assert_eq!(far.settings, with_points_of_paper(&settings));
         let of_paper = all(&Settings::preset("paper").unwrap(), &extent(), Path::new("R"));
         assert!(of_paper.iter().all(|stage| !stage.folder.contains("far-points")), "its points are far anyway");
+    }
+
+    /// `render results` of a run that an earlier version finished said that a chain of it is no run.
+    #[test]
+    fn what_an_earlier_version_did_not_train_is_left_out() {
+        let settings = Settings::preset("default").unwrap();
+        let stages = all(&settings, &extent(), Path::new("R"));
+        let missing = ["chains/s1-expert-equal", "chains/s1-far-points"];
+        let left = without_trainings(stages.clone(), |folder| !missing.contains(&folder));
+        let gone = ["chains/s1-expert-equal", "chains/s1-far-points", FAR_POINTS];
+        assert_eq!(left.len(), stages.len() - gone.len());
+        assert!(left.iter().all(|stage| !gone.contains(&stage.folder.as_str())));
+        let controls = left.iter().find(|stage| stage.folder == CONTROLS).unwrap();
+        let Step::Drive { drivers } = &controls.step else { panic!("{controls:?}") };
+        let names: Vec<&str> = drivers.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["BC", "DAgger", "DAgger, α = 0", EXPERT_ONLY, ALPHA_15]);
+        assert_eq!(without_trainings(stages.clone(), |_| true), stages);
+    }
+
+    #[test]
+    fn the_control_has_the_iterations_and_samples_of_the_other() {
+        let settings = Settings::preset("default").unwrap();
+        let row = |round, samples| IterationRow {
+            round,
+            samples,
+            dataset: 0,
+            eta_hat: None,
+            tau_hat_per_s: None,
+            near_collisions: 0,
+            effort: None,
+            agreement: None,
+            mean_weight: None,
+            validation_nll: None,
+            validation_rmse_m: None,
+        };
+        let of = |samples: &[usize]| {
+            let rows: Vec<_> = (0..).zip(samples).map(|(round, &samples)| row(round, samples)).collect();
+            let dagger = with_as_many_samples(&settings, &rows).dagger;
+            assert_eq!(dagger.iterations_min, dagger.iterations_max);
+            (dagger.iterations_max, dagger.samples_per_round)
+        };
+        assert_eq!(of(&[900, 100, 301]), (2, 201), "the other stopped early");
+        assert_eq!(of(&[900, 0]), (1, 1), "no samples are not all samples");
+        assert_eq!(of(&[900]), (0, 1));
     }
 
     #[test]

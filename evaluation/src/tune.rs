@@ -10,7 +10,6 @@ use crate::totals::Totals;
 use anyhow::{Context as _, ensure};
 use experiment::drive::{self, TrialBatch};
 use experiment::drivers::{NamedDriver, PlannerFile};
-use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::progress::Progress;
 use experiment::run_dir::RunDir;
@@ -49,7 +48,6 @@ pub fn tune(
     let evaluation = &settings.evaluation;
     let lots = Lot::parse_all(&evaluation.lots, &settings.episode.vehicle)?;
     check(&lots)?;
-    run.ensure_unchanged(&inputs::of(&lots, &[]))?;
     progress.begin("lots", "drawing lots");
     let course = Course::new(settings, &lots, evaluation.noise[0])?;
     progress.end(&format!("{} runs per candidate", course.search.trials.len()));

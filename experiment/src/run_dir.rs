@@ -274,7 +274,7 @@ impl RunDir {
         settings: &Settings,
         request: impl FnOnce() -> anyhow::Result<Request>,
     ) -> anyhow::Result<Option<Self>> {
-        self.lock.ensure_held()?;
+        self.ensure_held()?;
         let (path, list) = (self.path.join(folder), format!("{folder}/{}", sums::FILE));
         if sums::is_listed(&self.path, &list)? {
             sums::read_listed(&self.path, &list, sums::LIST_BYTES_MAX)?;
@@ -298,10 +298,21 @@ impl RunDir {
             }
             // Whoever goes on with the run makes the same of it as the command that began it.
             let build = Build { command_line: Manifest::read(&self.path)?.command_line, ..place.build.clone() };
-            Self::create(&Place { build: &build, out: Some(&path), ..*place }, settings, &request()?)?
+            let request = request()?;
+            self.ensure_unchanged(&request.inputs)?;
+            Self::create(&Place { build: &build, out: Some(&path), ..*place }, settings, &request)?
         };
-        let inputs = self.inputs.iter().chain(stage.inputs.iter()).map(|(name, of)| (name.clone(), of.clone()));
+        // What the run was begun with counts.
+        let inputs = stage.inputs.iter().chain(self.inputs.iter()).map(|(name, of)| (name.clone(), of.clone()));
         Ok(Some(Self { inputs: Arc::new(inputs.collect()), within: Some((self.path.clone(), list)), ..stage }))
+    }
+
+    /// Refuses to write on where the folder is another one now.
+    ///
+    /// # Errors
+    /// If it was deleted or moved since it was claimed.
+    pub fn ensure_held(&self) -> anyhow::Result<()> {
+        Ok(self.lock.ensure_held()?)
     }
 
     /// Refuses lots, parameters and networks that are not what the run was begun with: they may have changed since they were
@@ -324,13 +335,10 @@ impl RunDir {
         fs::create_dir_all(path)
             .with_context(|| format!("{}: cannot be created; choose another --out", path.display()))?;
         // Before the lock is taken: nothing is written into a folder that is no run.
-        if !is_free(path)? && !Manifest::is_in(path) {
-            let way_out =
-                if place.overwrite { "so --overwrite will not delete it; choose" } else { "and not empty; choose" };
-            bail!("{}: this folder is not a run, {way_out} another --out", path.display());
-        }
+        ensure_free_or_run(path, place.overwrite)?;
         let run = Self::locked(path.to_path_buf(), place.command)?;
         // Whoever had the lock before may have made a run of it.
+        ensure_free_or_run(path, place.overwrite)?;
         if !is_free(path)? {
             let name = path.display();
             ensure!(
@@ -387,7 +395,7 @@ impl RunDir {
     /// # Errors
     /// If a list cannot be read or written.
     pub fn list_again(&self) -> anyhow::Result<()> {
-        self.lock.ensure_held()?;
+        self.ensure_held()?;
         let listed = self.within.as_ref().map(|(run, list)| sums::list(run, &[list]));
         Ok(listed.unwrap_or(Ok(()))?)
     }
@@ -402,7 +410,7 @@ impl RunDir {
     /// # Errors
     /// If it cannot be written, or the folder was deleted or moved meanwhile.
     pub fn write(&self, name: &str, content: &[u8]) -> anyhow::Result<()> {
-        self.lock.ensure_held()?;
+        self.ensure_held()?;
         Ok(sums::write(&self.path, name, content)?)
     }
 
@@ -422,6 +430,15 @@ impl RunDir {
 
 fn has_changed(name: &str) -> anyhow::Error {
     anyhow!("{name}: changed since this run was begun; restore it, or begin again into another folder")
+}
+
+/// Refuses a folder with anything in it but a run.
+fn ensure_free_or_run(path: &Path, overwrite: bool) -> anyhow::Result<()> {
+    if !is_free(path)? && !Manifest::is_in(path) {
+        let way_out = if overwrite { "so --overwrite will not delete it; choose" } else { "and not empty; choose" };
+        bail!("{}: this folder is not a run, {way_out} another --out", path.display());
+    }
+    Ok(())
 }
 
 /// Whether a folder can be claimed as it is: there is nothing, or what a process leaves that dies before its claim, which is
@@ -814,6 +831,10 @@ mod tests {
             run.ensure_unchanged(&Inputs::from([("run:R/chains/one".to_owned(), "1".to_owned())])).unwrap();
             assert!(message(run.ensure_unchanged(&of("2"))).contains("lots/x.toml: changed"));
         }
+        // Read anew for a stage that begins, it was right by definition.
+        let begin = || Ok(Request { inputs: of("2"), ..Request::default() });
+        let refused = message(run.stage_for("chains/two", &place(&path, false), &settings, begin));
+        assert!(refused.contains("lots/x.toml: changed") && !path.join("chains/two").exists(), "{refused}");
         drop((stage, run));
         let (run, ..) = RunDir::resume(&path, "train-dagger").unwrap();
         assert!(run.ensure_unchanged(&of("2")).is_err());

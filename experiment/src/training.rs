@@ -39,6 +39,7 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
     let conditions = Conditions::of(&settings.episode);
     let mut hooks = Hooks {
         episodes: &mut |round| {
+            run.ensure_held()?;
             let episodes = episodes_of(settings, &lots, round)?;
             monitor.borrow_mut().collection = Collection::of(&episodes);
             Ok(episodes)

@@ -51,9 +51,9 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
     }
     Ok(format!(
         "### Controls\n\nOn the unseen lots. *{EXPERT_ONLY}*: as many rounds on the same lots as DAgger with as many \
-         optimiser steps, but the expert drives throughout, so that every tick is the expert's and there are more samples; *as many samples*: \
-         thinned evenly to as many of an iteration as DAgger has. Where they are no worse than DAgger, more data is what \
-         helps and not who drove. α is the weight on τ̂; its mean weight is 1 where nothing is weighted.\n\n{table}"
+         optimiser steps, but the expert drives throughout, so that every tick is the expert's and there are more samples. *{EXPERT_EQUAL}*: \
+         the same, each iteration thinned evenly to DAgger's mean number of samples. If the first is no worse than DAgger, more of \
+         the expert's data does as well; if the second is not, either, it does not matter who drove. α is the weight on τ̂; its mean weight is 1 where nothing is weighted.\n\n{table}"
     ))
 }
 

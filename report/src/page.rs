@@ -12,6 +12,7 @@
 //! ```
 
 use crate::markdown::escaped as escaped_markdown;
+use crate::pictures::file_name;
 use anyhow::Context as _;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
@@ -154,7 +155,7 @@ impl Page {
     /// If a file cannot be written.
     pub fn write_markdown(&self, path: &Path) -> anyhow::Result<()> {
         let folder = path.parent().unwrap_or(Path::new("."));
-        let figures = format!("pictures/{}", path.file_stem().unwrap_or_default().to_string_lossy());
+        let figures = format!("pictures/{}", file_name(&path.file_stem().unwrap_or_default().to_string_lossy()));
         let into = folder.join(&figures);
         std::fs::create_dir_all(&into).with_context(|| format!("{}: cannot be created", into.display()))?;
         for part in &self.parts {

@@ -88,11 +88,12 @@ pub fn write_docs(
 fn cautions(settings: &Settings) -> anyhow::Result<String> {
     let points = if has_points_of_paper(settings) {
         let unlike = deviations::unlike_the_paper(settings)?;
-        let unlike = if unlike.is_empty() { "nothing".to_owned() } else { format!("`{}`", unlike.join("`, `")) };
-        format!(
-            "The expert's points lie as far as the way is open, as the paper says. What else the trainings do not have as the \
-             preset `paper` has it: {unlike}."
-        )
+        let unlike = if unlike.is_empty() {
+            "Otherwise, too, the trainings are those of the preset `paper`.".to_owned()
+        } else {
+            format!("The trainings differ from the preset `paper` in: `{}`.", unlike.join("`, `"))
+        };
+        format!("The expert's points lie as far as the way is open, as the paper says. {unlike}")
     } else {
         "The expert's points lie at half of the open way, which is our reading of the paper ([paper](paper.md)); it raises η̂ at \
          an unchanged τ, so that η̂ is not comparable with the paper's."

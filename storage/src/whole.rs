@@ -49,7 +49,8 @@ fn create_own(partial: &Path) -> io::Result<File> {
 fn make_way(partial: &Path) -> io::Result<()> {
     let found = match fs::symlink_metadata(partial) {
         // A link that somebody put there is neither followed nor waited for.
-        Ok(about) if about.is_file() => File::open(partial).map(Some),
+        // To be locked on network file systems, it must be open for writing.
+        Ok(about) if about.is_file() => File::options().write(true).open(partial).map(Some),
         other => other.map(|_| None),
     };
     let found = match found {
@@ -63,7 +64,10 @@ fn make_way(partial: &Path) -> io::Result<()> {
             return Ok(());
         }
     }
-    fs::remove_file(partial)
+    match fs::remove_file(partial) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+        removed => removed,
+    }
 }
 
 /// Waits for a lock, where the file system has any.
@@ -86,7 +90,7 @@ pub(crate) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-/// Whether an open file is the one at a path still: there it can be neither renamed nor deleted while it is open.
+/// Whether there is a file at a path still; whether it is the open one is not told here.
 #[cfg(not(unix))]
 pub(crate) fn is_at(_: &File, path: &Path) -> io::Result<bool> {
     path.try_exists()
@@ -115,7 +119,10 @@ fn failed(path: &Path, problem: &dyn Display) -> FileError {
 /// If one cannot be deleted.
 pub fn remove(path: &Path) -> Result<(), FileError> {
     remove_partial(path)?;
-    remove_file(path)
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(not_deleted(path, &error)),
+        _ => Ok(()),
+    }
 }
 
 /// Deletes what a process that died was writing in the place of a file, if it is there.
@@ -123,16 +130,12 @@ pub fn remove(path: &Path) -> Result<(), FileError> {
 /// # Errors
 /// If it cannot be deleted.
 pub fn remove_partial(path: &Path) -> Result<(), FileError> {
-    remove_file(&path.with_added_extension("partial"))
+    let partial = path.with_added_extension("partial");
+    make_way(&partial).map_err(|error| not_deleted(&partial, &error))
 }
 
-fn remove_file(path: &Path) -> Result<(), FileError> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != ErrorKind::NotFound => {
-            Err(FileError::new(path, format_args!("cannot be deleted: {error}"), WRITE_REMEDY))
-        }
-        _ => Ok(()),
-    }
+fn not_deleted(path: &Path, error: &io::Error) -> FileError {
+    FileError::new(path, format_args!("cannot be deleted: {error}"), WRITE_REMEDY)
 }
 
 #[cfg(test)]

@@ -75,6 +75,7 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
     let settings = &settings_of(stage, root)?;
     let request = || request_of(stage);
     let Some(run) = root.stage_for(&stage.folder, &place_of(command, settings), settings, request)? else {
+        ensure_driven_by(stage, root)?;
         output.note("done before");
         return Ok(true);
     };
@@ -106,6 +107,19 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
         }
     }
     Ok(true)
+}
+
+/// Refuses a finished stage that others drove than this version has drive there: its report would lack them.
+fn ensure_driven_by(stage: &Stage, root: &RunDir) -> anyhow::Result<()> {
+    let Step::Drive { drivers } = &stage.step else { return Ok(()) };
+    let found = run_dir::finished(&root.path().join(&stage.folder))?.map(|finished| finished.outcome);
+    ensure!(
+        found == Some(outcome_of(drivers)),
+        "{}: another version of lotpilot drove other drivers there; finish the run with the one that began it, or begin again \
+         with another --out",
+        stage.folder
+    );
+    Ok(())
 }
 
 /// The settings of a stage, with what other stages decide of them.

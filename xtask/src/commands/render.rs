@@ -98,8 +98,8 @@ pub(crate) struct RenderResultsArgs {
     /// Finished runs whose tables are added at the end: of `deviations`, `rules`, `scaling`, `evaluate` or a training.
     #[arg(long, value_name = "[TITLE=]DIR", num_args = 1..)]
     with: Vec<OtherRun>,
-    /// File to write; figures go to `pictures/NAME` beside it [default: docs/results.md; of another command
-    /// docs/results-COMMAND.md].
+    /// File to write; figures go to `pictures/NAME` beside it [default: docs/results.md; of another preset
+    /// docs/results-PRESET.md, of another command docs/results-COMMAND.md].
     #[arg(long, value_name = "FILE.md")]
     to: Option<PathBuf>,
 }
@@ -390,8 +390,12 @@ fn render_results(args: &RenderResultsArgs, output: &Output) -> anyhow::Result<(
         "{}: this is no finished run of reproduce or of another command that ends in a table",
         args.run.display()
     );
-    let command = Manifest::read(&args.run)?.command;
-    let page = if command == reproduce::COMMAND { String::new() } else { format!("-{command}") };
+    let Manifest { command, preset, .. } = Manifest::read(&args.run)?;
+    let page = match (command.as_str(), preset.strip_prefix("full-").unwrap_or(&preset)) {
+        (reproduce::COMMAND, "default") => String::new(),
+        (reproduce::COMMAND, preset) => format!("-{preset}"),
+        (command, _) => format!("-{command}"),
+    };
     let to = args.to.clone().unwrap_or_else(|| format!("docs/results{page}.md").into());
     let revision = build_info::get().git_revision.as_deref();
     if command == reproduce::COMMAND {

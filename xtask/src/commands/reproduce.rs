@@ -17,6 +17,7 @@ use experiment::run_dir::{self, Build, Manifest, Outcome, Request, RunDir};
 use experiment::settings::{Layers, Settings};
 use experiment::shard::Shard;
 use report::reproduction::{self, Recipe};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use storage::sums;
 
@@ -221,7 +222,9 @@ pub(crate) fn recipe_of(path: &Path) -> anyhow::Result<Recipe> {
     let settings = run_dir::settings_of(path)?;
     let Arguments { extent, shard } = Arguments::read(path, Manifest::read(path)?)?;
     ensure!(shard.is_none(), "{}: this is a shard, which has no report; put all together with merge", path.display());
-    let stages = stages::all(&settings, &extent, path);
+    let trained: BTreeSet<String> = sums::names(path)?.into_iter().collect();
+    let is_there = |folder: &str| trained.contains(&format!("{folder}/{}", sums::FILE));
+    let stages = stages::without_trainings(stages::all(&settings, &extent, path), is_there);
     Ok(Recipe { settings, extent, stages })
 }
 
