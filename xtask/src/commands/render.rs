@@ -98,8 +98,8 @@ pub(crate) struct RenderResultsArgs {
     /// Finished runs whose tables are added at the end: of `deviations`, `rules`, `scaling`, `evaluate` or a training.
     #[arg(long, value_name = "[TITLE=]DIR", num_args = 1..)]
     with: Vec<OtherRun>,
-    /// File to write; figures go to `pictures/NAME` beside it [default: docs/results.md; of another preset
-    /// docs/results-PRESET.md, of another command docs/results-COMMAND.md].
+    /// File to write; figures go to `pictures/NAME` beside it [default: docs/results.md; of another command
+    /// docs/results-COMMAND.md, of another preset its name instead].
     #[arg(long, value_name = "FILE.md")]
     to: Option<PathBuf>,
 }
