@@ -173,7 +173,7 @@ pub fn run(
     let others: Vec<RootSeed> = seeds.iter().copied().filter(|&seed| seed != settings.seed).collect();
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     run.ensure_unchanged(&inputs::of(&lots, &[]))?;
-    let mut drives = Drives::new((settings, &lots), 3 + 2 * iterations, others.len() as u32, progress);
+    let mut drives = Drives::new(settings, &lots, 3 + 2 * iterations, others.len() as u32, progress);
     let mut ratios_of_others: Vec<Vec<f64>> = Vec::new();
     for seed in others {
         if !drives.begin_other(&format!("seed {}", seed.0)) {
@@ -226,12 +226,7 @@ struct Drives<'a> {
 }
 
 impl<'a> Drives<'a> {
-    fn new(
-        (settings, lots): (&'a Settings, &'a [Lot]),
-        policies: u32,
-        others: u32,
-        progress: &'a dyn Progress,
-    ) -> Self {
+    fn new(settings: &'a Settings, lots: &'a [Lot], policies: u32, others: u32, progress: &'a dyn Progress) -> Self {
         progress.begin("on-policy rollouts", "on-policy rollouts");
         Self { settings, lots, by_folder: BTreeMap::new(), progress, at_most: policies + others, others_begun: 0 }
     }

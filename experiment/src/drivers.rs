@@ -287,7 +287,7 @@ impl DriverSpec {
             },
             _ => None,
         };
-        let driver = NamedDriver { name, spec: self, training, model, smoothing_ticks: 0.0, digest_of_files: None };
+        let driver = NamedDriver { training, ..NamedDriver::new(name, self, model) };
         Ok(driver.smoothed(settings.evaluation.smoothing))
     }
 }
@@ -363,40 +363,31 @@ impl NamedDriver {
     /// The scripted expert.
     pub fn expert(settings: &ExpertSettings) -> Self {
         let model = Model::Expert(settings.clone());
-        Self {
-            name: "expert".to_owned(),
-            spec: DriverSpec::Expert,
-            training: None,
-            model,
-            smoothing_ticks: 0.0,
-            digest_of_files: None,
-        }
+        Self::new("expert".to_owned(), DriverSpec::Expert, model)
     }
 
     /// A network that is loaded already.
     pub fn network(name: &str, spec: DriverSpec, checkpoint: Checkpoint, device: DeviceChoice) -> Self {
         let model = Model::Network(vec![checkpoint], device);
-        Self { name: name.to_owned(), spec, training: None, model, smoothing_ticks: 0.0, digest_of_files: None }
+        Self::new(name.to_owned(), spec, model)
     }
 
     /// A planner with parameters of the caller's.
     pub fn planner(planner: PlannerSpec) -> Self {
         let name = planner.name().to_owned();
         let spec = DriverSpec::Planner { name: name.clone(), parameters: Parameters::Published };
-        Self { name, spec, training: None, model: Model::Planner(planner), smoothing_ticks: 0.0, digest_of_files: None }
+        Self::new(name, spec, Model::Planner(planner))
     }
 
     /// A function of the calling program, which sees the grid only and is asked for all cars of a batch at once.
     pub fn callback(name: &str, callback: Arc<dyn Callback>) -> Self {
         let spec = DriverSpec::Callback { name: name.to_owned() };
-        Self {
-            name: name.to_owned(),
-            spec,
-            training: None,
-            model: Model::Callback(callback),
-            smoothing_ticks: 0.0,
-            digest_of_files: None,
-        }
+        Self::new(name.to_owned(), spec, Model::Callback(callback))
+    }
+
+    /// As its files have it, of no training.
+    fn new(name: String, spec: DriverSpec, model: Model) -> Self {
+        Self { name, spec, training: None, model, smoothing_ticks: 0.0, digest_of_files: None }
     }
 
     /// The same with other action smoothing. Networks smooth by themselves, as they were trained to.
