@@ -1,7 +1,10 @@
 //! Intervals that hold however events cluster: resampling whole units.
 //!
 //! A unit is a row of sums (events, metres, … of every driver in the same place), so that resampling rows is paired: all
-//! drivers get the same units in every draw. Rows are drawn with replacement within their stratum.
+//! drivers get the same units in every draw. Rows are drawn with replacement within their stratum: of n rows n − 1, which
+//! count n / (n − 1) times, because n of n would spread by (n − 1) / n too little, and strata are often of five.
+//!
+//! Source: Rao and Wu, Resampling inference with complex survey data, JASA 83 (1988).
 
 use super::poisson::CONFIDENCE;
 use rand::RngExt as _;
@@ -78,7 +81,7 @@ impl Units {
     ) -> Vec<Interval> {
         let mut estimates = vec![0.0; statistics];
         let mut sums = vec![0.0; self.columns];
-        self.values.chunks_exact(self.columns).for_each(|unit| add(&mut sums, unit));
+        self.values.chunks_exact(self.columns).for_each(|unit| add(&mut sums, unit, 1.0));
         of_sums(&sums, &mut estimates);
 
         let mut drawn = vec![0.0; draws as usize * statistics];
@@ -104,18 +107,22 @@ impl Units {
         sums.fill(0.0);
         let mut first = 0;
         for &rows in &self.strata {
-            for _ in 0..rows {
-                let row = first + rng.random_range(0..rows) as usize;
-                add(sums, &self.values[row * self.columns..(row + 1) * self.columns]);
+            let row = |row: usize| &self.values[row * self.columns..(row + 1) * self.columns];
+            if rows == 1 {
+                add(sums, row(first), 1.0);
+            }
+            for _ in 1..rows {
+                let drawn = first + rng.random_range(0..rows) as usize;
+                add(sums, row(drawn), f64::from(rows) / f64::from(rows - 1));
             }
             first += rows as usize;
         }
     }
 }
 
-fn add(sums: &mut [f64], unit: &[f64]) {
+fn add(sums: &mut [f64], unit: &[f64], times: f64) {
     for (sum, value) in sums.iter_mut().zip(unit) {
-        *sum += value;
+        *sum += times * value;
     }
 }
 
@@ -159,6 +166,28 @@ mod tests {
         assert!((interval.lower - 0.21).abs() < 0.0101 && (interval.upper - 0.39).abs() < 0.0101, "{interval:?}");
     }
 
+    /// Twelve families of three lots each: intervals of 95 % hold the truth of such skewed counts in 90
+    /// of 100 repetitions. When three of three were drawn, they held it in 85.
+    #[test]
+    fn intervals_of_many_small_strata_hold_the_truth_as_often_as_they_say() {
+        // Events come in clusters; the mean is 1.
+        const EVENTS: [f64; 10] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 6.0];
+        const REPETITIONS: u64 = 400;
+        let holds = (0..REPETITIONS).filter(|&repetition| {
+            let mut rng = RootSeed(7).rng(Stream::Bootstrap, repetition);
+            let mut units = Units::new(2);
+            for _ in 0..12 {
+                units.begin_stratum();
+                (0..3).for_each(|_| units.push(&[EVENTS[rng.random_range(0..EVENTS.len())], 1.0]));
+            }
+            let interval =
+                units.percentile_intervals(RootSeed(repetition), 400, 1, &|sums, out| out[0] = sums[0] / sums[1])[0];
+            interval.lower <= 1.0 && 1.0 <= interval.upper
+        });
+        let share = holds.count() as f64 / REPETITIONS as f64;
+        assert!((0.885..0.98).contains(&share), "{share}");
+    }
+
     /// Pairing removes what both drivers share, strata what lies between lots.
     #[test]
     fn shared_difficulty_and_strata_do_not_widen_a_difference() {
@@ -174,9 +203,11 @@ mod tests {
             out[0] = (sums[0] - sums[1]) / sums[2];
             out[1] = sums[2];
         });
-        assert_eq!((intervals[0].lower, intervals[0].upper), (1.0, 1.0));
-        assert!(intervals[0].excludes_zero());
-        assert_eq!((intervals[1].lower, intervals[1].upper), (20.0, 20.0), "every draw has as many units");
+        let is_alone = |interval: Interval, value: f64| {
+            (interval.lower - value).abs() < 1e-9 && (interval.upper - value).abs() < 1e-9
+        };
+        assert!(is_alone(intervals[0], 1.0) && intervals[0].excludes_zero(), "{intervals:?}");
+        assert!(is_alone(intervals[1], 20.0), "every draw counts as many units: {intervals:?}");
     }
 
     #[test]
