@@ -59,7 +59,8 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
 }
 
 /// The episodes of a round with their experts. Lots that draw their obstacles are driven `training.trials` times. A
-/// generated lot looks the same every time: it is driven once, and the next round has other ones.
+/// generated lot looks the same every time: it is driven once, and the next round has other ones. Where `different_lots`
+/// brings one back within a round, each time is a trial of its own, with other noise.
 ///
 /// # Errors
 /// If a lot cannot be driven.
@@ -69,8 +70,13 @@ pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Res
     let of_a_kind = |lot: &Lot| generated.iter().filter(|other| other.group() == lot.group()).count() as u64;
     let generated: Vec<Lot> =
         generated.iter().map(|lot| lot.in_round(round, of_a_kind(lot), training.different_lots)).collect();
-    let all = |lots, trials| Trial::all(settings.seed, Purpose::Training { round }, lots, trials, &training.directions);
-    let trials: Vec<_> = all(&others, training.trials).chain(all(&generated, 1)).collect();
+    let purpose = Purpose::Training { round };
+    let drawn = Trial::all(settings.seed, purpose, &others, training.trials, &training.directions);
+    let again = generated.iter().enumerate().flat_map(|(at, lot)| {
+        let before = generated[..at].iter().filter(|other| other.name() == lot.name()).count() as u32;
+        Trial::both_ways(settings.seed, purpose, lot, before, &training.directions)
+    });
+    let trials: Vec<_> = drawn.chain(again).collect();
     let starts = drive::start(&trials, &trials::maps(&trials, &settings.episode)?, &settings.episode, training.noise);
     let seated = |((index, trial), episode): ((EpisodeIndex, &Trial<'_>), Episode)| {
         let expert = ScriptedExpert::new(settings.expert.clone(), &settings.episode);
@@ -211,6 +217,45 @@ impl<'a> Monitor<'a> {
 mod tests {
     use super::*;
     use policy::fit::Budget;
+    use sim::driver::Source;
+    use sim::vehicle::VehicleCommand;
+
+    /// Lots that came back within a round were driven with the same noise to the bit: copies, of which some were held back
+    /// from the training and others not.
+    #[test]
+    fn no_two_drives_of_a_round_see_the_same_even_on_the_same_lot() {
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.training.lots = vec!["lot-a".to_owned(), "train:3:easy".to_owned()];
+        settings.training.trials = 2;
+        settings.training.different_lots = 1;
+        let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle).unwrap();
+        let mut seen = Vec::new();
+        for RoundEpisode { direction, mut episode, .. } in episodes_of(&settings, &lots, 1).unwrap() {
+            // A look a second for ten seconds: the car stands, the noise comes and goes.
+            let looks: Vec<_> = (0..10)
+                .map(|_| {
+                    episode.observe();
+                    let look = *episode.situation().observation;
+                    for _ in 0..20 {
+                        episode.apply_command(VehicleCommand::default(), Source::Expert);
+                    }
+                    look
+                })
+                .collect();
+            seen.push((episode.map().scenario().name.clone(), direction, looks));
+        }
+        let drives = settings.training.directions.len() * 5;
+        assert_eq!(seen.len(), drives);
+        let names: Vec<_> = seen.iter().map(|(name, ..)| name.as_str()).collect();
+        assert_eq!(
+            names.iter().filter(|&&name| name == "train-easy-0").count(),
+            drives / 5 * 3,
+            "one lot, thrice: {names:?}"
+        );
+        for (at, drive) in seen.iter().enumerate() {
+            assert!(!seen[..at].contains(drive), "drive {at} of {names:?}");
+        }
+    }
 
     /// A drive of a training that is driven again is the drive that was trained on: its expert, noise, disturbances and
     /// network.

@@ -86,11 +86,20 @@ impl<'a> Trial<'a> {
         directions: &'a [Direction],
     ) -> impl Iterator<Item = Self> + Clone {
         lots.iter().flat_map(move |lot| {
-            (0..trials).flat_map(move |trial| {
-                let seed = trial_seed(root, purpose, trial);
-                directions.iter().map(move |&direction| Self { lot, direction, index: trial, seed })
-            })
+            (0..trials).flat_map(move |trial| Self::both_ways(root, purpose, lot, trial, directions))
         })
+    }
+
+    /// One trial of a lot, direction by direction.
+    pub fn both_ways(
+        root: RootSeed,
+        purpose: Purpose,
+        lot: &'a Lot,
+        trial: u32,
+        directions: &'a [Direction],
+    ) -> impl Iterator<Item = Self> + Clone {
+        let seed = trial_seed(root, purpose, trial);
+        directions.iter().map(move |&direction| Self { lot, direction, index: trial, seed })
     }
 
     /// Whether another trial drives through the same obstacles: they are drawn once for both.

@@ -7,6 +7,7 @@ use clap::Args;
 use evaluation::scaling::{self, Extent};
 use experiment::lots::Lot;
 use experiment::settings::Settings;
+use scenarios::split::Family;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -33,8 +34,8 @@ pub(crate) struct ScalingArgs {
     unseen: Vec<String>,
 }
 
-/// Sixteen lots of each family in every round, as much as the default trains on; no lot that is there in every training.
-const LOTS: &str = "train:144:all";
+/// Lots of each family in every round: about as much as the default trains on; no lot that is there in every training.
+const LOTS_OF_A_FAMILY: usize = 16;
 
 const SCALING: Trainings<Extent> = Trainings {
     command: "scaling",
@@ -53,7 +54,8 @@ fn begin(args: &ScalingArgs) -> anyhow::Result<Begun<Extent>> {
     let is_default = layers.preset_name() == "default";
     // What the user sets comes later and counts.
     if is_default {
-        layers.overrides.insert(0, format!("training.lots=[\"{LOTS}\"]"));
+        let lots = LOTS_OF_A_FAMILY * Family::ALL.len();
+        layers.overrides.insert(0, format!("training.lots=[\"train:{lots}:all\"]"));
     }
     let settings = Settings::resolve(&layers, args.common.seed)?;
     let extent = Extent { different_lots: args.different.clone(), unseen: args.unseen.clone() };
