@@ -54,3 +54,11 @@ pub(crate) fn succeed(command: &mut Command) -> String {
     assert!(output.status.success(), "{command:?} failed:\n{stdout}\n{stderr}");
     stdout
 }
+
+/// Runs a command that must refuse what it is given, with exit code 2; returns what it says.
+pub(crate) fn refuse(command: &mut Command) -> String {
+    let output = command.output().unwrap();
+    let (stdout, stderr) = text(&output);
+    assert_eq!(output.status.code(), Some(2), "{command:?}\n{stdout}\n{stderr}");
+    stderr
+}

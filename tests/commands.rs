@@ -1,6 +1,6 @@
 //! Whole commands, run from outside: what they leave behind, and how they refuse bad input.
 
-use crate::bench::{scratch, succeed, text, xtask};
+use crate::bench::{refuse, scratch, succeed, text, xtask};
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
 use policy::network::{InferenceSettings, NetworkArchitecture, Weights};
@@ -325,6 +325,34 @@ fn runs_are_replayed(results: &Path) {
     assert!(stderr.contains(key) && stderr.contains("1 of 2 runs are not what was recorded"), "{stderr}");
     assert_eq!(rows(&String::from_utf8_lossy(&output.stdout))[1]["same"], false);
     sums::write(results, "runs.jsonl", recorded.as_bytes()).unwrap();
+}
+
+/// The near-collisions of a planner are counted again by who drives on, and a run that went otherwise is no ground for it.
+#[test]
+fn what_would_have_avoided_near_collisions_is_counted_by_lot() {
+    let folder = scratch("what-if");
+    let run = folder.join("run");
+    let evaluate =
+        ["evaluate", "--driver", "tentacle", "--driver", "expert", "--lots", "lot-b", "test:2:lane", "--trials", "1"];
+    succeed(xtask().args(evaluate).arg("--out").arg(&run));
+    let failures = std::fs::read_to_string(run.join("failures.jsonl")).unwrap();
+    let on_lot_b = failures.lines().filter(|line| line.contains("\"lot\":\"lot-b\"")).count();
+    assert!(on_lot_b > 0 && !failures.contains("\"driver\":\"expert\""), "{failures}");
+
+    let printed = succeed(xtask().args(["what-if", "--json"]).arg(&run));
+    let rows = serde_json::from_str::<Vec<serde_json::Value>>(&printed).unwrap();
+    let of_lot_b: Vec<_> = rows.iter().filter(|row| row["group"] == "lot-b").collect();
+    assert!(of_lot_b.iter().all(|row| row["near_collisions"] == on_lot_b), "{rows:?}");
+    let passed =
+        |replaced: &str| of_lot_b.iter().find(|row| row["replaced"] == replaced).unwrap()["passed"].as_u64().unwrap();
+    assert!(passed("expert, 6 s") > passed("nothing"), "the expert gets by where the planner does not: {rows:?}");
+
+    let error = refuse(xtask().args(["what-if", "--driver", "expert", "--"]).arg(&run));
+    assert!(error.contains("no near-collision of [\"expert\"]"), "{error}");
+    let moved = failures.replacen("\"tick\":", "\"tick\":1", 1);
+    sums::write(&run, "failures.jsonl", moved.as_bytes()).unwrap();
+    let error = refuse(xtask().arg("what-if").arg(&run));
+    assert!(error.contains("near-collisions were recorded at the ticks"), "{error}");
 }
 
 /// One page that says what it should and loads nothing from anywhere.

@@ -262,7 +262,10 @@ impl Against<'_> {
         let (ours, theirs) = (self.rate(self.dagger), self.rate(other));
         let mut figures = format!("{ours}; {theirs}; difference {}", difference(found, 2));
         if verdict == Verdict::CannotBeTold && trainings.is_none() {
-            figures += &metres_needed([other, self.dagger].map(|driver| self.totals(driver).rate().per_unit));
+            let both = [other, self.dagger];
+            let clustered = both.map(|driver| self.estimates[driver].dispersion.map_or(1.0, |found| found.index));
+            let rates = both.map(|driver| self.totals(driver).rate().per_unit);
+            figures += &metres_needed(rates, clustered.into_iter().fold(1.0, f64::max));
         }
         let claim = format!("DAgger has fewer near-collisions than {} {}", self.name(other), self.place);
         Statement { claim, verdict, figures }
@@ -296,7 +299,8 @@ impl Against<'_> {
         }
     }
 
-    /// Near-collisions that the same driver avoids on the clean grid. They are few: compared exactly, without pairs.
+    /// Near-collisions that the same driver avoids on the clean grid. They are few: compared exactly, without pairs, as if each
+    /// came by itself.
     fn minds_noise_less(&self, other: usize) -> Statement {
         let count = |driver| {
             let noisy = self.driven.results.count_of_cause(0, driver, &self.slice, Cause::NoiseInduced);
@@ -313,7 +317,7 @@ impl Against<'_> {
             Verdict::CannotBeTold
         };
         let figures = format!(
-            "noise-induced near-collisions: DAgger {}, {name} {}; rate ratio {}",
+            "noise-induced near-collisions: DAgger {}, {name} {}; rate ratio {}, if each came by itself",
             ours.0,
             theirs.0,
             ratio_text(&ratio)
@@ -364,12 +368,12 @@ fn negated(interval: Interval) -> Interval {
     Interval { estimate: -interval.estimate, lower: -interval.upper, upper: -interval.lower, ..interval }
 }
 
-/// What it would take to tell two rates apart, if they are what was seen.
-fn metres_needed(per_100m: [f64; 2]) -> String {
+/// What it would take to tell two rates apart, if they are what was seen and events cluster as much.
+fn metres_needed(per_100m: [f64; 2], dispersion: f64) -> String {
     if per_100m[0] == per_100m[1] {
         return String::new();
     }
-    let question = Question { per_100m, power: 0.8, alpha: 1.0 - CONFIDENCE, dispersion: 1.0 };
+    let question = Question { per_100m, power: 0.8, alpha: 1.0 - CONFIDENCE, dispersion };
     format!("; if these are the rates, about {:.0} km each would tell", (question.metres_each() / 1000.0).ceil())
 }
 

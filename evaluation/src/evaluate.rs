@@ -5,7 +5,8 @@
 //! depend on how many lots there are. What one driver drove of a batch is written at once; an interrupted evaluation goes
 //! on after that.
 
-use crate::incidents::{self, Incident, IncidentMonitor};
+use crate::incidents;
+use crate::monitor::{Incident, IncidentMonitor};
 use crate::plan::Plan;
 use crate::read::Places;
 use crate::records::{self, Driven, FailureRecord, RunRecord, WallTimeRecord};

@@ -4,8 +4,8 @@
 //!
 //! | cause | rule |
 //! |---|---|
-//! | `noise_induced` | put into the same state up to [`LOOK_BACK_S`] earlier (not before the last resume) and shown the clean grid, the same driver gets [`PASS_M`] beyond the place without an event |
-//! | `oscillation` | [`OSCILLATION_REVERSALS`] or more steering reversals in the [`OSCILLATION_S`] before (not before the last resume) |
+//! | `noise_induced` | put into the state of [`LOOK_BACK`] (not before the last resume) and shown the clean grid, the same driver [passes](what_if::passes), and with the noise it does not |
+//! | `oscillation` | [`OSCILLATION_REVERSALS`] or more steering reversals in the [`OSCILLATION_S`](crate::monitor::OSCILLATION_S) before (not before the last resume) |
 //! | `narrow_passage` | within [`NEAR_M`] along the route the free width across it is less than the body and the near-collision distance on both sides |
 //! | `corner` | the route turns by [`CORNER_DEG`] or more within [`NEAR_M`] of the place |
 //! | `other` | none of these |
@@ -13,32 +13,18 @@
 //! Apart from its cause, a near-collision within [`NEAR_M`] of route after a resume is marked as one more at the same
 //! place: the car was put back where it had failed, and failed again.
 
-use anyhow::anyhow;
+use crate::monitor::{Incident, LOOK_BACK};
+use crate::what_if;
 use experiment::drive::TrialBatch;
 use experiment::settings::NoiseChoice;
 use experiment::trials;
 use serde::{Deserialize, Serialize};
-use sim::episode::{Episode, EpisodeSettings};
-use sim::frame::{Event, Frame};
-use sim::geometry::{Pose, wrap_angle};
+use sim::episode::EpisodeSettings;
+use sim::geometry::wrap_angle;
 use sim::map::Map;
-use sim::metrics::steering_reversals;
-use sim::vehicle::VehicleState;
-use std::collections::VecDeque;
-use std::ops::ControlFlow;
-use std::sync::Arc;
 
-/// How long before the incident the driver is shown the clean grid, seconds: about the 8 m in which the place comes into
-/// view.
-pub const LOOK_BACK_S: f32 = 6.0;
-/// How far it must get beyond the place, metres: the length of the car.
-pub const PASS_M: f32 = 5.0;
-/// In which time beyond the look-back, seconds.
-const PASS_WITHIN_S: f32 = 10.0;
 /// Steering reversals that make an oscillation: the expert, on its way round corners and past parked cars, makes two.
 pub const OSCILLATION_REVERSALS: u32 = 5;
-/// In the last seconds.
-pub const OSCILLATION_S: f32 = 5.0;
 /// What is near, metres along the route: the length of the car.
 pub const NEAR_M: f32 = 5.0;
 /// What is a corner, degrees.
@@ -83,6 +69,10 @@ impl Cause {
 pub struct Findings {
     /// Whether the driver would have passed on the clean grid; `None` in files of earlier versions, if that was not tried.
     pub passes_on_clean_grid: Option<bool>,
+    /// If so, whether it would have passed as well with the noise, driven on from the same state; else `None`, and in files of
+    /// earlier versions.
+    #[serde(default)]
+    pub passes_again: Option<bool>,
     /// Steering reversals just before.
     pub reversals_before: u32,
     /// Smallest free width across the route nearby, metres, up to 10.
@@ -103,7 +93,7 @@ impl Findings {
     /// The first rule that holds. `noisy`: whether there was any noise to blame.
     fn cause(&self, noisy: bool, episode: &EpisodeSettings) -> Cause {
         let narrow_m = episode.vehicle.width_m + 2.0 * episode.metrics.near_collision_m;
-        if noisy && self.passes_on_clean_grid == Some(true) {
+        if noisy && self.passes_on_clean_grid == Some(true) && self.passes_again != Some(true) {
             Cause::NoiseInduced
         } else if self.reversals_before >= OSCILLATION_REVERSALS {
             Cause::Oscillation
@@ -117,86 +107,6 @@ impl Findings {
     }
 }
 
-/// A near-collision when it happened.
-#[derive(Debug, Clone, Copy)]
-pub struct Incident {
-    /// Index of the episode within its group.
-    pub episode: usize,
-    /// Control tick.
-    pub tick: u32,
-    /// Rear-axle pose when it was counted.
-    pub at: Pose,
-    /// Along the route, metres.
-    pub route_m: f32,
-    /// Speed at the last observation, m/s.
-    pub speed_mps: f32,
-    reversals_before: u32,
-    since_resume_m: Option<f32>,
-    /// State and progress from which the clean grid is tried, and how long before.
-    earlier: (VehicleState, f32),
-    earlier_s: f32,
-}
-
-/// Remembers the last seconds of every episode of a group; its size does not depend on how long they last.
-#[derive(Debug)]
-pub struct IncidentMonitor {
-    control_period_s: f32,
-    recent: Vec<VecDeque<(VehicleState, f32)>>,
-    /// Where along the route the car was last put back, metres.
-    resumed_at_m: Vec<Option<f32>>,
-    incidents: Vec<Incident>,
-}
-
-impl IncidentMonitor {
-    /// Over so many episodes.
-    pub fn new(episodes: usize, episode: &EpisodeSettings) -> Self {
-        let control_period_s = episode.control_period_s();
-        let ticks = (LOOK_BACK_S / control_period_s) as usize + 1;
-        Self {
-            control_period_s,
-            recent: vec![VecDeque::with_capacity(ticks); episodes],
-            resumed_at_m: vec![None; episodes],
-            incidents: Vec::new(),
-        }
-    }
-
-    /// Adds one frame.
-    pub fn frame(&mut self, episode: usize, frame: &Frame) {
-        let recent = &mut self.recent[episode];
-        if recent.is_empty() && frame.tick > 0 {
-            self.resumed_at_m[episode] = Some(frame.progress_m);
-        }
-        if recent.len() > (LOOK_BACK_S / self.control_period_s) as usize {
-            recent.pop_front();
-        }
-        recent.push_back((frame.vehicle, frame.progress_m));
-        if let Event::NearCollision { at, progress_m } = frame.event {
-            let ticks = (OSCILLATION_S / self.control_period_s) as usize;
-            let last = recent.iter().skip(recent.len().saturating_sub(ticks));
-            self.incidents.push(Incident {
-                episode,
-                tick: frame.tick,
-                at,
-                route_m: progress_m,
-                speed_mps: frame.vehicle.speed_mps,
-                reversals_before: steering_reversals(last.map(|(vehicle, _)| vehicle.steering_rad)),
-                since_resume_m: self.resumed_at_m[episode].map(|resumed_at_m| progress_m - resumed_at_m),
-                earlier: recent[0],
-                earlier_s: recent.len() as f32 * self.control_period_s,
-            });
-        }
-        if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
-            recent.clear();
-        }
-    }
-
-    /// The near-collisions seen, episode by episode.
-    pub fn into_incidents(mut self) -> Vec<Incident> {
-        self.incidents.sort_by_key(|incident| (incident.episode, incident.tick));
-        self.incidents
-    }
-}
-
 /// Cause and findings of every incident of a batch.
 ///
 /// # Errors
@@ -207,12 +117,19 @@ pub fn explain(batch: &TrialBatch<'_>, incidents: &[Incident]) -> anyhow::Result
         trials::episode_settings(batch.episode, batch.noise, map).noise.intensity > 0.0
     };
     let noisy: Vec<Incident> = incidents.iter().copied().filter(is_noisy).collect();
-    let mut passes = passes_on_clean_grid(batch, &noisy)?.into_iter();
+    let clean = TrialBatch { noise: NoiseChoice::Clean, ..*batch };
+    let passes = what_if::passes(&clean, &noisy, LOOK_BACK)?;
+    let passing: Vec<Incident> =
+        noisy.iter().zip(&passes).filter_map(|(&incident, &passes)| passes.then_some(incident)).collect();
+    let mut again = what_if::passes(batch, &passing, LOOK_BACK)?.into_iter();
+    let mut passes = passes.into_iter();
     let explain = |incident: &Incident| {
         let noisy = is_noisy(incident);
         let map = &batch.maps[incident.episode];
+        let passes_on_clean_grid = if noisy { passes.next() } else { Some(false) };
         let findings = Findings {
-            passes_on_clean_grid: if noisy { passes.next() } else { Some(false) },
+            passes_on_clean_grid,
+            passes_again: if passes_on_clean_grid == Some(true) { again.next() } else { None },
             reversals_before: incident.reversals_before,
             free_width_m: free_width_m(map, incident.route_m),
             turn_deg: turn_deg(map, incident.route_m),
@@ -221,41 +138,6 @@ pub fn explain(batch: &TrialBatch<'_>, incidents: &[Incident]) -> anyhow::Result
         (findings.cause(noisy, batch.episode), findings)
     };
     Ok(incidents.iter().map(explain).collect())
-}
-
-/// Drives on from the state before each incident on the clean grid.
-fn passes_on_clean_grid(batch: &TrialBatch<'_>, incidents: &[Incident]) -> anyhow::Result<Vec<bool>> {
-    // As many at a time as in the evaluation itself: memory does not depend on how often a driver fails.
-    let passes = incidents.chunks(batch.trials.len()).map(|incidents| passes_at_once(batch, incidents));
-    Ok(passes.collect::<anyhow::Result<Vec<_>>>()?.concat())
-}
-
-fn passes_at_once(batch: &TrialBatch<'_>, incidents: &[Incident]) -> anyhow::Result<Vec<bool>> {
-    let start = |incident: &Incident| {
-        let (map, trial) = (&batch.maps[incident.episode], &batch.trials[incident.episode]);
-        let mut episode = trials::episode_settings(batch.episode, NoiseChoice::Clean, map);
-        episode.metrics.events_max = 1;
-        episode.metrics.timeout_s = incident.earlier_s + PASS_WITHIN_S;
-        let (vehicle, progress_m) = incident.earlier;
-        Episode::under_way(Arc::new(episode), Arc::clone(map), trial.episode_seed(), vehicle, progress_m)
-    };
-    let episodes: Vec<Episode> = incidents.iter().map(start).collect();
-    let mut verdicts: Vec<Option<bool>> = vec![None; episodes.len()];
-    let driven = batch.drive_from(episodes, &mut |episode, frame| {
-        let verdict = match frame.event {
-            Event::NearCollision { .. } | Event::Stuck { .. } => Some(false),
-            Event::ReachedEnd => Some(true),
-            Event::Drove => (frame.progress_m > incidents[episode].route_m + PASS_M).then_some(true),
-        };
-        verdicts[episode] = verdicts[episode].or(verdict);
-        if verdicts.iter().all(Option::is_some) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
-    driven.map_err(|found| {
-        let incident = &incidents[found.episode];
-        let key = batch.replay_key(&batch.trials[incident.episode], incident.tick);
-        anyhow!("{key}: on a clean grid from before that, {} is no finite number", found.what)
-    })?;
-    Ok(verdicts.into_iter().map(|verdict| verdict == Some(true)).collect())
 }
 
 /// Places along the route near a place, metres.

@@ -5,7 +5,7 @@
 //! | [`plan`], [`mod@evaluate`] | drivers × lots × directions × trials × noise levels, driven and written down |
 //! | [`shards`] | what several machines did a share of each, put together again |
 //! | [`records`] | the lines of `runs.jsonl`, `failures.jsonl`, `wall_time.jsonl` |
-//! | [`incidents`] | near-collisions one by one, and why they happened |
+//! | [`monitor`], [`incidents`], [`what_if`], [`avoidable`] | near-collisions one by one, why they happened, and what would have avoided them |
 //! | [`totals`], [`slices`], [`results`], [`judge`], [`trainings`] | runs added up, pooled and compared |
 //! | [`statistics`] | exact intervals, comparisons, paired bootstrap, sample sizes |
 //! | [`summary`], [`table1`] | the tables as data |
@@ -14,6 +14,7 @@
 //! | [`tune`] | parameters of planners, searched alike for each |
 //! | [`pixel_accuracy`] | how wrong the noisy view is |
 
+pub mod avoidable;
 pub mod calibration;
 pub mod conclusions;
 pub mod deviations;
@@ -25,6 +26,7 @@ pub mod format;
 pub mod incidents;
 pub mod json;
 pub mod judge;
+pub mod monitor;
 pub mod on_policy;
 pub mod paper;
 pub mod parts;
@@ -44,3 +46,4 @@ pub mod table1;
 pub mod totals;
 pub mod trainings;
 pub mod tune;
+pub mod what_if;

@@ -156,7 +156,7 @@ impl<'a> Course<'a> {
             let driver = &NamedDriver::planner(candidate.clone());
             let (trials, maps) = (&stretch.trials, &stretch.maps);
             let batch = TrialBatch { episode: self.episode, driver, trials, maps, noise: self.noise, seed: self.seed };
-            let reports = batch.drive_from(starts.clone(), &mut |_, frame| {
+            let reports = batch.drive_from(starts.iter().cloned().enumerate().collect(), &mut |_, frame| {
                 if frame.event == Event::ReachedEnd {
                     on_run();
                 }

@@ -50,24 +50,26 @@ impl TrialBatch<'_> {
     /// # Errors
     /// Where the driver answers with what is no finite number: names the key to replay.
     pub fn drive(&self, observer: Observer<'_>) -> anyhow::Result<Vec<Option<EpisodeReport>>> {
-        self.drive_from(self.episodes(), observer).map_err(|found| {
+        self.drive_from(self.episodes().into_iter().enumerate().collect(), observer).map_err(|found| {
             let key = self.replay_key(&self.trials[found.episode], found.tick);
             anyhow!("{key}: {} is no finite number", found.what)
         })
     }
 
-    /// Like [`Self::drive`], starting from the given episodes.
+    /// Like [`Self::drive`], from given episodes, each with the index of its trial within the batch. The observer is
+    /// called with the index of the episode.
     ///
     /// # Errors
     /// Where the driver answers with what is no finite number.
     pub fn drive_from(
         &self,
-        episodes: Vec<Episode>,
+        episodes: Vec<(usize, Episode)>,
         observer: Observer<'_>,
     ) -> Result<Vec<Option<EpisodeReport>>, NotFinite> {
         let cars_each = self.driver.cars_per_fleet(episodes.len());
         let seat = self.driver.seating(self.episode);
-        let seed_of = |&car: &usize| self.trials[car].episode_seed();
+        let (trials, episodes): (Vec<usize>, Vec<Episode>) = episodes.into_iter().unzip();
+        let seed_of = |&car: &usize| self.trials[trials[car]].episode_seed();
         let fleets = SeatedFleet::in_all(episodes, cars_each, |cars| {
             let seeds: Vec<RootSeed> = cars.iter().map(seed_of).collect();
             seat(&seeds)

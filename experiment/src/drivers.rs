@@ -3,7 +3,7 @@
 use crate::run_dir::{self, Training};
 use crate::settings::{Layers, Settings, Smoothing};
 use anyhow::{Context as _, bail, ensure};
-use expert::{ExpertSettings, ScriptedExpert};
+use expert::{ExpertSettings, ScriptedExpert, Sees};
 use onnx::fleet::OnnxFleet;
 use onnx::network::OnnxNetwork;
 use planners::{Planner, PlannerContext, PlannerSpec};
@@ -364,6 +364,11 @@ impl NamedDriver {
     pub fn expert(settings: &ExpertSettings) -> Self {
         let model = Model::Expert(settings.clone());
         Self::new("expert".to_owned(), DriverSpec::Expert, model)
+    }
+
+    /// The same expert, but it may plan over no more ground than the camera sees of the clean patch.
+    pub fn expert_of_patch(settings: &ExpertSettings) -> Self {
+        Self::expert(&ExpertSettings { sees: Sees::PatchOnly, ..settings.clone() })
     }
 
     /// A network that is loaded already.

@@ -2,7 +2,7 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`markdown`], [`summary`], [`table1`], [`failures`], [`tuning`], [`pixel_accuracy`], [`replays`] | tables as Markdown |
+//! | [`markdown`], [`summary`], [`table1`], [`failures`], [`tuning`], [`pixel_accuracy`], [`replays`], [`what_if`] | tables as Markdown |
 //! | [`plots`] | plots as SVG |
 //! | [`pictures`] | lots, drives, samples and noise as PNG and SVG |
 //! | [`page`], [`glossary`] | one HTML page that loads nothing, and what its words mean |
@@ -35,3 +35,4 @@ pub mod summary;
 pub mod table1;
 mod trainings;
 pub mod tuning;
+pub mod what_if;

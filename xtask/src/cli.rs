@@ -2,7 +2,7 @@
 
 use crate::commands::{
     bench, completions, deviations, drivers, evaluate, export, generate, guard, lots, merge, pixel_accuracy, render,
-    replay, reproduce, rules, sample_size, scaling, settings, torture, train, tune, verify, visualise,
+    replay, reproduce, rules, sample_size, scaling, settings, torture, train, tune, verify, visualise, what_if,
 };
 use crate::output::{Color, Output};
 use clap::{CommandFactory as _, Parser, Subcommand};
@@ -108,6 +108,9 @@ enum Command {
     /// Drives runs again by their replay keys, and says whether they are the same as recorded, bit by bit.
     #[command(after_help = replay::EXAMPLES)]
     Replay(replay::ReplayArgs),
+    /// What would have avoided the near-collisions of an evaluation: replaces one thing at a time by the truth.
+    #[command(after_help = what_if::EXAMPLES)]
+    WhatIf(what_if::WhatIfArgs),
     /// Checks that every file of a run is what was written, by its SHA-256.
     #[command(after_help = verify::EXAMPLES)]
     Verify(verify::VerifyArgs),
@@ -160,6 +163,7 @@ impl Cli {
             Command::Drivers(args) => drivers::run(args, output),
             Command::Tune(args) => tune::run(args, output),
             Command::Replay(args) => replay::run(args, output),
+            Command::WhatIf(args) => what_if::run(args, output),
             Command::Verify(args) => verify::run(args, output),
             Command::Torture(args) => torture::run(args, output),
             Command::Render(args) => render::run(args, output),
@@ -184,6 +188,7 @@ impl Command {
             | Self::Lots(lots::LotsArgs { json })
             | Self::Drivers(drivers::DriversArgs { json, .. })
             | Self::Replay(replay::ReplayArgs { json, .. })
+            | Self::WhatIf(what_if::WhatIfArgs { json, .. })
             | Self::Verify(verify::VerifyArgs { json, .. }) => json.json,
             Self::Reproduce(_)
             | Self::Rules(_)

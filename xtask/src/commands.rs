@@ -27,4 +27,5 @@ mod trainings;
 pub(crate) mod tune;
 pub(crate) mod verify;
 pub(crate) mod visualise;
+pub(crate) mod what_if;
 mod within;

@@ -25,6 +25,7 @@ fn failure(driver: &str, lot: &str, speed_mps: f32) -> FailureRecord {
         cause: Cause::Corner,
         findings: Findings {
             passes_on_clean_grid: None,
+            passes_again: None,
             reversals_before: 0,
             free_width_m: 4.0,
             turn_deg: 90.0,

@@ -1,0 +1,120 @@
+//! Watches episodes as they are driven, and keeps what is needed to explain a near-collision: how the car came to it.
+
+use sim::episode::EpisodeSettings;
+use sim::frame::{Event, Frame};
+use sim::geometry::Pose;
+use sim::metrics::steering_reversals;
+use sim::vehicle::VehicleState;
+use std::collections::VecDeque;
+
+/// From how long before a near-collision it can be driven on differently, seconds, the longest first [chosen].
+pub const LOOK_BACKS_S: [f32; 7] = [24.0, 12.0, 6.0, 3.0, 2.0, 1.0, 0.5];
+/// The one of [`LOOK_BACKS_S`] that decides what a near-collision hangs on: 6 s are about the 8 m in which the place comes
+/// into view.
+pub const LOOK_BACK: usize = 2;
+/// Steering reversals are counted over the last seconds [chosen].
+pub const OSCILLATION_S: f32 = 5.0;
+
+/// Where the car was before a near-collision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Before {
+    /// The car.
+    pub vehicle: VehicleState,
+    /// Along the route, metres.
+    pub progress_m: f32,
+    /// How long before, seconds.
+    pub before_s: f32,
+}
+
+/// A near-collision when it happened.
+#[derive(Debug, Clone, Copy)]
+pub struct Incident {
+    /// Index of the episode within its group.
+    pub episode: usize,
+    /// Control tick.
+    pub tick: u32,
+    /// Rear-axle pose when it was counted.
+    pub at: Pose,
+    /// Along the route, metres.
+    pub route_m: f32,
+    /// Speed at the last observation, m/s.
+    pub speed_mps: f32,
+    /// Steering reversals in the last [`OSCILLATION_S`], but not before the last resume.
+    pub reversals_before: u32,
+    /// Route since the car was last put back on it, metres; `None` before the first time.
+    pub since_resume_m: Option<f32>,
+    /// At each of [`LOOK_BACKS_S`], but not before the last resume or the start: then it is that.
+    pub before: [Before; LOOK_BACKS_S.len()],
+}
+
+/// Remembers the last seconds of every episode of a group; its size does not depend on how long they last.
+#[derive(Debug)]
+pub struct IncidentMonitor {
+    control_period_s: f32,
+    recent: Vec<VecDeque<(VehicleState, f32)>>,
+    /// Where along the route the car was last put back, metres.
+    resumed_at_m: Vec<Option<f32>>,
+    incidents: Vec<Incident>,
+}
+
+impl IncidentMonitor {
+    /// Over so many episodes.
+    pub fn new(episodes: usize, episode: &EpisodeSettings) -> Self {
+        let control_period_s = episode.control_period_s();
+        let kept = ticks(LOOK_BACKS_S[0], control_period_s) + 1;
+        Self {
+            control_period_s,
+            recent: vec![VecDeque::with_capacity(kept); episodes],
+            resumed_at_m: vec![None; episodes],
+            incidents: Vec::new(),
+        }
+    }
+
+    /// Adds one frame.
+    pub fn frame(&mut self, episode: usize, frame: &Frame) {
+        let recent = &mut self.recent[episode];
+        if recent.is_empty() && frame.tick > 0 {
+            self.resumed_at_m[episode] = Some(frame.progress_m);
+        }
+        if recent.len() > ticks(LOOK_BACKS_S[0], self.control_period_s) {
+            recent.pop_front();
+        }
+        recent.push_back((frame.vehicle, frame.progress_m));
+        if let Event::NearCollision { at, progress_m } = frame.event {
+            let last = recent.iter().skip(recent.len().saturating_sub(ticks(OSCILLATION_S, self.control_period_s)));
+            self.incidents.push(Incident {
+                episode,
+                tick: frame.tick,
+                at,
+                route_m: progress_m,
+                speed_mps: frame.vehicle.speed_mps,
+                reversals_before: steering_reversals(last.map(|(vehicle, _)| vehicle.steering_rad)),
+                since_resume_m: self.resumed_at_m[episode].map(|resumed_at_m| progress_m - resumed_at_m),
+                before: LOOK_BACKS_S.map(|look_back_s| before(recent, look_back_s, self.control_period_s)),
+            });
+        }
+        if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
+            recent.clear();
+        }
+    }
+
+    /// The near-collisions seen, episode by episode.
+    pub fn into_incidents(mut self) -> Vec<Incident> {
+        self.incidents.sort_by_key(|incident| (incident.episode, incident.tick));
+        self.incidents
+    }
+}
+
+fn ticks(seconds: f32, control_period_s: f32) -> usize {
+    (seconds / control_period_s) as usize
+}
+
+/// The state so long before the last one, or the first.
+fn before(recent: &VecDeque<(VehicleState, f32)>, look_back_s: f32, control_period_s: f32) -> Before {
+    let index = recent.len().saturating_sub(ticks(look_back_s, control_period_s) + 1);
+    let (vehicle, progress_m) = recent[index];
+    Before { vehicle, progress_m, before_s: (recent.len() - index) as f32 * control_period_s }
+}
+
+#[cfg(test)]
+mod tests;

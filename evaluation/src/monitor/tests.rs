@@ -1,0 +1,50 @@
+use super::*;
+use sim::driver::{Decision, LookAheadPoint, Source};
+use sim::geometry::Vec2;
+use sim::sensing::Observation;
+use sim::vehicle::VehicleCommand;
+
+fn frame(tick: u32, steering_deg: f32, event: Event) -> Frame {
+    let pose = Pose::new(Vec2::new(0.1 * tick as f32, 0.0), 0.0);
+    let vehicle = VehicleState { steering_rad: steering_deg.to_radians(), ..VehicleState::at_rest(pose) };
+    let look_ahead = LookAheadPoint { ahead_m: 8.0, left_m: 0.0 };
+    Frame {
+        tick,
+        time_s: 0.05 * (tick + 1) as f32,
+        vehicle,
+        observation: Observation::default(),
+        decision: Decision { look_ahead, source: Source::Planner, spread: None, speed_limit_mps: None },
+        command: VehicleCommand::default(),
+        progress_m: 0.1 * tick as f32,
+        safe_ratio: 1.0,
+        clearance_m: 1.0,
+        driven_m: 0.1,
+        contacts: 0,
+        event,
+    }
+}
+
+#[test]
+fn the_monitor_looks_back_six_seconds_and_not_beyond_a_resume() {
+    let near = Event::NearCollision { at: Pose::default(), progress_m: 1.0 };
+    let mut monitor = IncidentMonitor::new(2, &EpisodeSettings::paper());
+    // 200 ticks of weaving with a period of 40 ticks = 2 s: two reversals in each.
+    for tick in 0..200 {
+        let steering_deg = if tick / 20 % 2 == 0 { 5.0 } else { -5.0 };
+        monitor.frame(1, &frame(tick, steering_deg, if tick == 199 { near } else { Event::Drove }));
+    }
+    monitor.frame(1, &frame(200, 0.0, Event::Drove));
+    monitor.frame(1, &frame(201, 0.0, near));
+    let incidents = monitor.into_incidents();
+    assert_eq!(incidents.iter().map(|incident| incident.tick).collect::<Vec<_>>(), [199, 201]);
+    // 6 s are 120 ticks before the last one.
+    assert!((incidents[0].before[LOOK_BACK].progress_m - 0.1 * 79.0).abs() < 1e-4, "{:?}", incidents[0]);
+    // There are 10 s of frames; 2 s are 40, and the second one has but two ticks behind it.
+    assert!((incidents[0].before[4].progress_m - 0.1 * 159.0).abs() < 1e-4, "{:?}", incidents[0]);
+    assert_eq!(incidents[1].before.map(|before| before.before_s), [0.1; 7]);
+    // The last 100 ticks hold five half-periods; the first change of direction is where the count starts.
+    assert_eq!(incidents[0].reversals_before, 3);
+    assert_eq!((incidents[1].before[LOOK_BACK].progress_m, incidents[1].reversals_before), (20.0, 0));
+    // Put back at 20.0 m of route, the second one happens at 1.0 m (as written above).
+    assert_eq!((incidents[0].since_resume_m, incidents[1].since_resume_m), (None, Some(-19.0)));
+}
