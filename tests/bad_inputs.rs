@@ -717,6 +717,13 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
     write("aliases.yaml", ("a0: &a0 [x]\n".to_owned() + &aliases.collect::<String>()).as_bytes());
     write("far.csv", b"8,12\n2e9,12\n");
     write("far.lot.toml", b"map = \"map.yaml\"\ncentre_line = \"far.csv\"\n");
+    write("back.csv", b"8,12\n40,12\n8,12\n");
+    write("small.yaml", sound.yaml.as_bytes());
+    write("map.pgm", &sound.image);
+    write("back.lot.toml", b"map = \"small.yaml\"\ncentre_line = \"back.csv\"\n");
+    for (name, lot) in [("stars.toml", "a*b"), ("bars.toml", "a|b")] {
+        write(name, LOT.replace("\"lane\"", &format!("{lot:?}")).as_bytes());
+    }
     write("deep.toml", "[".repeat(250_000).as_bytes());
     assert!(Command::new("mkfifo").arg(folder.join("pipe.toml")).status().unwrap().success());
     let before = names_in(&folder);
@@ -730,7 +737,20 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["evaluate", "--driver", "expert", "--lots", "huge.toml"], "200000000000 bytes or more"),
         (&["evaluate", "--driver", "expert", "--lots", "pipe.toml"], "it is no regular file"),
         (&["evaluate", "--driver", "expert", "--lots", "far.lot.toml"], "far.csv:2"),
+        (
+            &["evaluate", "--driver", "expert", "--lots", "back.lot.toml"],
+            "centre_line: it turns back at (40.00, 12.00)",
+        ),
         (&["evaluate", "--driver", "expert", "--lots", "lane.toml", "--trials", "0"], "evaluation.trials = 0"),
+        (
+            &["evaluate", "--driver", "expert", "--lots", "lot-b", "--set", "episode.vehicle.length_m=30"],
+            "does not fit at the start",
+        ),
+        (
+            &["evaluate", "--driver", "expert", "--set", "episode.vehicle.emergency_brake_mps2=1e-5"],
+            "episode.vehicle.emergency_brake_mps2",
+        ),
+        (&["generate", "--lots", "stars.toml", "bars.toml", "--out", "."], "would both be a-b.toml"),
         (&["evaluate", "--driver", "expert", "--lots", "test:1000001"], "from 1 to 1000000"),
         (&["evaluate", "--driver", "dwa:pipe.toml"], "it is no regular file"),
         (&["evaluate", "--driver", "dwa:huge.toml"], "200000000000 bytes or more"),

@@ -1,6 +1,6 @@
 //! What docs/reliability.md promises of runs: one owner, nothing lost, no damage unnoticed.
 
-use crate::bench::{scratch, succeed, text, xtask};
+use crate::bench::{refuse, scratch, succeed, text, xtask};
 use crate::determinism::files;
 use policy::checkpoint::Checkpoint;
 use policy::dataset::store::Store;
@@ -97,6 +97,106 @@ fn a_training_without_an_evaluation_goes_on_without_one() {
     running.kill();
     resume(arguments[0], &run);
     assert!(run.join("finished.toml").is_file() && !run.join("runs.jsonl").exists());
+}
+
+/// A folder that is not there yet, with `..` behind it, hid that the run lay there that was read: it was deleted.
+#[test]
+fn what_is_read_is_never_deleted_or_written_into_however_it_is_named() {
+    let folder = scratch("what-is-read");
+    succeed(xtask().current_dir(&folder).args(["train-bc", "--preset", "smoke", "--no-eval", "--out", "run"]));
+    std::fs::write(folder.join("mine.toml"), "seed = 4\n").unwrap();
+    let in_run = |command: &mut Command| succeed(command.current_dir(folder.join("run")));
+    let evaluate = ["evaluate", "--driver", "expert", "--lots", "lot-b", "--trials", "1", "--directions", "forward"];
+    let of_run = [&evaluate[..2], &["run:run"], &evaluate[3..]].concat();
+    std::fs::create_dir(folder.join("other")).unwrap();
+    std::fs::copy(folder.join("mine.toml"), folder.join("other/mine.toml")).unwrap();
+    let before = files(&folder);
+    let refuses = |arguments: &[&str], part: &str| {
+        let error = refuse(xtask().current_dir(&folder).args(arguments));
+        assert!(error.contains(part), "{arguments:?}: {error}");
+        assert_eq!(files(&folder).keys().collect::<Vec<_>>(), before.keys().collect::<Vec<_>>(), "{arguments:?}");
+        assert!(files(&folder) == before, "{arguments:?} writes");
+    };
+    refuses(&[&of_run[..], &["--out", "none/../run", "--overwrite"]].concat(), "leads back up");
+    refuses(&[&of_run[..], &["--out", "run", "--overwrite"]].concat(), "what is read lies there");
+    refuses(&[&evaluate[..], &["--out", "run/elsewhere"]].concat(), "lies within the run");
+    refuses(
+        &["train-bc", "--preset", "smoke", "--no-eval", "--config", "other/mine.toml", "--out", "other", "--overwrite"],
+        "what is read lies there",
+    );
+    for file in ["run/sha256sums", "run/round-00/model.safetensors", "run/new.onnx"] {
+        refuses(&["export", "onnx", "run", "--out", file, "--overwrite"], "lies within the run");
+    }
+    refuses(&["render", "results", "run", "--to", "mine.toml"], "is no page of results");
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("run", folder.join("link")).unwrap();
+        let error = refuse(xtask().current_dir(&folder).args(evaluate).args(["--out", "link/new"]));
+        assert!(error.contains("lies within the run"), "{error}");
+    }
+    // Beside it, by whatever name.
+    in_run(xtask().args(evaluate).args(["--driver", "run:.", "--out", "../beside"]));
+    in_run(xtask().args(evaluate).args(["--driver", "run:bc", "--out", "../beside-2"]));
+    let faults = sums::verify(&folder.join("run")).faults;
+    assert!(faults.is_empty(), "{faults:?}");
+}
+
+/// A report that was written anew under another name of its folder was not listed in its run, which was damaged then.
+#[test]
+fn a_report_of_a_stage_is_listed_in_its_run_by_whatever_name() {
+    let run = scratch("report-of-stage").join("run");
+    succeed(
+        xtask()
+            .args(["train-bc", "--preset", "smoke", "--set", "evaluation.elsewhere=[\"test:1\"]", "--out"])
+            .arg(&run),
+    );
+    succeed(xtask().current_dir(run.join("elsewhere")).args(["render", "report", "."]));
+    let faults = sums::verify(&run).faults;
+    assert!(faults.is_empty(), "{faults:?}");
+}
+
+/// Keys in files named the run as whoever resumed it did.
+#[test]
+fn a_run_is_resumed_by_whatever_name_to_the_same_bytes() {
+    let folder = scratch("other-name");
+    let whole = folder.join("run");
+    let arguments = ["train-bc", "--preset", "smoke", "--set", "evaluation.elsewhere=[]", "--out"];
+    succeed(xtask().current_dir(&folder).args(arguments).arg("run"));
+    let expected = files(&whole);
+    std::fs::remove_dir_all(&whole).unwrap();
+    let mut begun = xtask();
+    begun.current_dir(&folder).args(arguments).arg("./run/").stdout(Stdio::null()).stderr(Stdio::null());
+    let mut running = Running(begun.spawn().unwrap());
+    assert!(running.wait_for(&whole.join("round-00/sha256sums")));
+    running.kill();
+    succeed(xtask().current_dir(&folder).args(["train-bc", "--resume"]).arg(&whole));
+    let resumed = files(&whole);
+    for (name, bytes) in &expected {
+        assert!(resumed.get(name) == Some(bytes), "{name} differs");
+    }
+}
+
+/// A file beyond `ulimit -f` killed the command without a word; and git in a hook named another repository's commit.
+#[cfg(target_os = "linux")]
+#[test]
+fn limits_and_variables_of_the_shell_are_taken_for_what_they_are() {
+    let folder = scratch("shell");
+    let evaluate = "evaluate --driver tentacle --lots lot-b --trials 1 --out run";
+    let xtask_path = xtask().get_program().to_string_lossy().into_owned();
+    let mut limited = Command::new("sh");
+    limited.current_dir(&folder).args(["-c", &format!("ulimit -f 32; exec {xtask_path} {evaluate}")]);
+    let error = refuse(&mut limited);
+    assert!(error.contains("too large"), "{error}");
+    succeed(xtask().current_dir(&folder).env("GIT_DIR", "/none").args(["evaluate", "--resume", "run"]));
+    let manifest = |out: &str, git_dir: Option<&str>| {
+        let mut command = xtask();
+        command.current_dir(&folder).args(evaluate.split(' ').take(7)).args(["--directions", "forward", "--out", out]);
+        git_dir.map(|folder| command.env("GIT_DIR", folder));
+        succeed(&mut command);
+        let text = std::fs::read_to_string(folder.join(out).join("manifest.toml")).unwrap();
+        text.lines().filter(|line| line.starts_with("git_")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(manifest("hook", Some("/none")), manifest("none", None));
 }
 
 /// Two commands wrote into one folder, and what came out was of neither.

@@ -391,6 +391,16 @@ fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
     assert!(rows[2].starts_with("| EnsembleDAgger") && rows[2].contains("| 400 "), "{table}");
     assert!(std::fs::read_to_string(out.join("rules.csv")).unwrap().contains("LazyDAgger"));
     assert!(std::fs::read_to_string(out.join("rules.svg")).unwrap().contains("expert is asked"));
+    // A run that was moved before its end: its networks are known by where they lie in it.
+    let moved = folder.join("moved");
+    std::fs::rename(&out, &moved).unwrap();
+    let listed = std::fs::read_to_string(moved.join("sha256sums")).unwrap();
+    let unfinished: String =
+        listed.lines().filter(|line| !line.ends_with("  finished.toml")).map(|line| format!("{line}\n")).collect();
+    std::fs::write(moved.join("sha256sums"), unfinished).unwrap();
+    std::fs::remove_file(moved.join("finished.toml")).unwrap();
+    succeed(xtask().args(["rules", "--resume"]).arg(&moved));
+    assert_eq!(std::fs::read_to_string(moved.join("rules.md")).unwrap(), table);
     for (arguments, part) in [
         (["--rule", "anybody"], "there are expert_only"),
         (["--rule", "vanilla,vanilla"], "named twice"),

@@ -1,15 +1,17 @@
 //! Lots that can be named on the command line: [`scenarios::suite`], checked before anything is driven.
 
-use anyhow::ensure;
+use anyhow::{Context as _, ensure};
 use scenarios::LotSpec;
 use scenarios::generator;
 use scenarios::import::MapLot;
 use scenarios::note::{Loaded, Note};
 use scenarios::reference::{self, ReferenceLot};
 use scenarios::split::{Family, Split};
+use sim::map::Map;
 use sim::scenario::{Direction, NoiseLevel, Scenario};
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -72,7 +74,10 @@ impl Lot {
         let mut names: Vec<&str> = lots.iter().map(Self::name).collect();
         names.sort_unstable();
         let twice = names.windows(2).find(|pair| pair[0] == pair[1]);
-        ensure!(twice.is_none(), "lot {:?} is named twice; results are told apart by name", twice.unwrap_or(&[""])[0]);
+        ensure!(twice.is_none(), "lot {:?} is named twice; name it once", twice.unwrap_or(&[""])[0]);
+        if *vehicle != VehicleSettings::hyundai_hg300() {
+            ensure_wide_enough(&lots, vehicle)?;
+        }
         Ok(lots)
     }
 
@@ -206,6 +211,17 @@ impl Lot {
             }
         }
     }
+}
+
+/// Refuses another car than ours that does not fit where it starts, before anything is driven: of each kind of lot one is
+/// tried, and those from files were when they were read.
+fn ensure_wide_enough(lots: &[Lot], vehicle: &VehicleSettings) -> anyhow::Result<()> {
+    let mut kinds = BTreeSet::new();
+    for lot in lots.iter().filter(|lot| !lot.is_from_file() && kinds.insert(lot.group())) {
+        let scenario = lot.draw(RootSeed(0)).scenario;
+        Map::build(scenario, vehicle).with_context(|| format!("lot {:?} and the car of episode.vehicle", lot.name))?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -205,6 +205,14 @@ impl RunDir {
     /// # Errors
     /// If the folder is taken, in use by another process, or cannot be written.
     pub fn create(place: &Place<'_>, settings: &Settings, request: &Request) -> anyhow::Result<Self> {
+        if let Some(out) = place.out {
+            ensure_outside_of_runs(out)?;
+        }
+        Self::create_anywhere(place, settings, request)
+    }
+
+    /// Like [`create`](Self::create), within a run as well.
+    fn create_anywhere(place: &Place<'_>, settings: &Settings, request: &Request) -> anyhow::Result<Self> {
         let run = match place.out {
             Some(out) => Self::claim_named(out, place)?,
             None => Self::claim_next_free(place)?,
@@ -281,6 +289,14 @@ impl RunDir {
             return Ok(None);
         }
         if is_finished(&path)? {
+            // A death between the two, or another run that somebody put there.
+            let Manifest { command, inputs, .. } = Manifest::read(&path)?;
+            let is_ours = command == place.command && settings_of(&path)? == *settings && inputs == request()?.inputs;
+            ensure!(
+                is_ours,
+                "{}: this is another run, not a stage of this one; move it elsewhere, and go on with --resume",
+                path.display()
+            );
             sums::list(&self.path, &[&list])?;
             return Ok(None);
         }
@@ -300,7 +316,7 @@ impl RunDir {
             let build = Build { command_line: Manifest::read(&self.path)?.command_line, ..place.build.clone() };
             let request = request()?;
             self.ensure_unchanged(&request.inputs)?;
-            Self::create(&Place { build: &build, out: Some(&path), ..*place }, settings, &request)?
+            Self::create_anywhere(&Place { build: &build, out: Some(&path), ..*place }, settings, &request)?
         };
         // What the run was begun with counts.
         let inputs = stage.inputs.iter().chain(self.inputs.iter()).map(|(name, of)| (name.clone(), of.clone()));
@@ -432,6 +448,18 @@ fn has_changed(name: &str) -> anyhow::Error {
     anyhow!("{name}: changed since this run was begun; restore it, or begin again into another folder")
 }
 
+/// Refuses a folder or file within a run: what that run comes to would not be its own.
+///
+/// # Errors
+/// Naming the run.
+pub fn ensure_outside_of_runs(folder: &Path) -> anyhow::Result<()> {
+    let place = storage::place_of(folder).with_context(|| folder.display().to_string())?;
+    if let Some(run) = place.ancestors().skip(1).find(|around| Manifest::is_in(around)) {
+        bail!("{}: lies within the run {}; choose a place outside of it", folder.display(), run.display());
+    }
+    Ok(())
+}
+
 /// Refuses a folder with anything in it but a run.
 fn ensure_free_or_run(path: &Path, overwrite: bool) -> anyhow::Result<()> {
     if !is_free(path)? && !Manifest::is_in(path) {
@@ -455,7 +483,9 @@ fn is_free(path: &Path) -> anyhow::Result<bool> {
 /// The run that lists a folder within it, and the name of the folder's list there.
 fn run_around(folder: &Path) -> anyhow::Result<Option<(PathBuf, String)>> {
     let mut list = PathBuf::from(sums::FILE);
-    let mut folder = folder;
+    // It may be named by a link, or as `.`.
+    let folder = folder.canonicalize().with_context(|| folder.display().to_string())?;
+    let mut folder = folder.as_path();
     while let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) {
         list = Path::new(name).join(list);
         let listed = list.to_string_lossy();
@@ -757,6 +787,35 @@ mod tests {
         assert_eq!(sums::verify(&path).faults, []);
         drop(stage);
         create(&path, true).unwrap();
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// A finished run that somebody put in the place of a stage was taken for it, whatever its seed.
+    #[test]
+    fn another_run_in_the_place_of_a_stage_is_refused() {
+        let (path, other) = (scratch("stages"), scratch("other-run"));
+        let run = create(&path, false).unwrap();
+        create(&other, false).unwrap().finish(Outcome::Reproduction { stages: 1 }).unwrap();
+        fs::rename(&other, path.join("own")).unwrap();
+        let mut settings = Settings::preset("smoke").unwrap();
+        assert!(run.stage("own", &place(&path, false), &settings).unwrap().is_none(), "what a death left unlisted");
+        fs::rename(path.join("own"), path.join("foreign")).unwrap();
+        settings.seed = RootSeed(77);
+        assert!(message(run.stage("foreign", &place(&path, false), &settings)).contains("this is another run"));
+        let of_another_command = Place { command: "train-bc", ..place(&path, false) };
+        let settings = Settings::preset("smoke").unwrap();
+        assert!(message(run.stage("foreign", &of_another_command, &settings)).contains("this is another run"));
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn no_run_is_begun_within_another() {
+        let path = scratch("within");
+        let run = create(&path, false).unwrap();
+        assert!(message(create(&path.join("elsewhere"), false)).contains("lies within the run"));
+        assert!(message(create(&path.join("none/new"), true)).contains("lies within the run"));
+        assert!(!path.join("none").exists());
+        drop(run);
         fs::remove_dir_all(path).unwrap();
     }
 

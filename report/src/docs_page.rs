@@ -2,7 +2,17 @@
 
 use crate::command_line::{command_line, quoted};
 use experiment::run_dir::Manifest;
+use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::fmt::Write as _;
+use std::path::Path;
+
+/// How every page says what it is.
+const WRITTEN: &str = "Written by a command from its runs; nothing here is typed by hand.";
+
+/// Whether a file is such a page, which may be written anew.
+pub fn is_page_of_results(path: &Path) -> bool {
+    storage::read::text(path, RUN_TEXT_BYTES_MAX).is_ok_and(|text| text.contains(WRITTEN))
+}
 
 /// The head of a page: which command made the run, and which one made the page, at which `revision` of the repository.
 pub(crate) fn head(
@@ -26,8 +36,7 @@ pub(crate) fn head(
         ("preset", format!("`{}`", manifest.preset)),
         ("seed of the trials", manifest.evaluation_seed.to_string()),
     ];
-    let mut head =
-        "Written by a command from its runs; nothing here is typed by hand.\n\n| | |\n|---|---|\n".to_owned();
+    let mut head = format!("{WRITTEN}\n\n| | |\n|---|---|\n");
     for (name, value) in rows.iter().chain(more) {
         let _ = writeln!(head, "| {name} | {value} |");
     }

@@ -14,7 +14,7 @@
 mod command_line;
 mod controls;
 pub mod deviations;
-mod docs_page;
+pub mod docs_page;
 mod drive;
 pub mod elsewhere;
 pub mod failures;

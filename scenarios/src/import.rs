@@ -31,6 +31,8 @@ use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
 use storage::read;
 
+/// A centre line turns by less than this at each of its points, radians: 170°, as a route may.
+const TURN_MAX_RAD: f32 = 2.967;
 /// Corners of a centre line are rounded with this radius, metres, as those of the reference lots (docs/methods.md 11).
 const CENTRE_LINE_RADIUS_M: f32 = 5.0;
 /// Height of what a map says is not drivable, metres: a lidar that saw it looks over kerbs, and most of what it sees, walls
@@ -475,6 +477,18 @@ impl MapLot {
         if length_m > ROUTE_MAX_M {
             let problem = format!("it is {:.0} km long in the lot", length_m / 1000.0);
             return Err(self.fault("centre_line", problem, &format!("shorten it: {ROUTE_MAX_M} m are possible")));
+        }
+        let back = points.windows(3).find(|three| {
+            let turn_rad = (three[1] - three[0]).angle_to(three[2] - three[1]);
+            !(turn_rad.abs() < TURN_MAX_RAD)
+        });
+        if let Some(three) = back {
+            let problem = format!("it turns back at {}", frame.said(three[1]));
+            return Err(self.fault(
+                "centre_line",
+                problem,
+                "cars here do not reverse; leave out the points of the turn",
+            ));
         }
         let line = ReferencePath { points, corner_radius_m: CENTRE_LINE_RADIUS_M };
         let path = sim::path::Path::new(&line);

@@ -3,9 +3,11 @@
 mod error;
 pub mod growing;
 pub mod lock;
+mod place;
 pub mod read;
 pub mod sealed;
 pub mod sums;
 pub mod whole;
 
 pub use error::{FileError, is_of_disk};
+pub use place::place_of;

@@ -1,11 +1,12 @@
 //! Arguments that several commands share.
 
-use anyhow::ensure;
+use anyhow::{Context as _, ensure};
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use experiment::run_dir::Place;
 use experiment::settings::{Layers, NoiseChoice};
 use sim::scenario::Direction;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// What `--noise sweep` stands for, in multiples of the level `paper`: clean to hard.
 const SWEEP: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
@@ -25,6 +26,13 @@ pub(crate) struct LayerArgs {
     overrides: Vec<String>,
 }
 
+impl LayerArgs {
+    /// The file that is read.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        self.config.as_deref()
+    }
+}
+
 impl From<&LayerArgs> for Layers {
     fn from(args: &LayerArgs) -> Self {
         Self { preset: args.preset.clone(), file: args.config.clone(), overrides: args.overrides.clone() }
@@ -39,11 +47,28 @@ pub(crate) struct JsonArgs {
     pub(crate) json: bool,
 }
 
+/// Reads the folder of a run: as it is named in replay keys, relative to the present folder where it lies below that.
+/// However a run is named that is resumed, the same keys are written.
+pub(crate) fn run_folder() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| {
+        if path.to_str().is_none() {
+            return Err("replay keys name it, so its name is UTF-8; choose another".to_owned());
+        }
+        // Links stay as they are named, but for those that `..` would leave by another way.
+        let leads_up = path.components().any(|part| part == Component::ParentDir);
+        let full = if leads_up { storage::place_of(&path) } else { std::path::absolute(&path) };
+        let full = full.map_err(|error| error.to_string())?;
+        let here = std::env::current_dir().map_err(|error| error.to_string())?;
+        let short: PathBuf = full.strip_prefix(here).unwrap_or(&full).components().collect();
+        Ok(if short.as_os_str().is_empty() { ".".into() } else { short })
+    })
+}
+
 /// Where a run goes.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct OutArgs {
     /// Folder of the run [default: runs/COMMAND-PRESET-sSEED, the next free one].
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = run_folder())]
     pub(crate) out: Option<PathBuf>,
     /// Deletes what an earlier run left in `--out`.
     #[arg(long, requires = "out")]
@@ -51,12 +76,14 @@ pub(crate) struct OutArgs {
 }
 
 impl OutArgs {
-    /// Refuses an `--out` that is, holds or lies within a folder that is read: `--overwrite` would delete what is needed.
-    pub(crate) fn ensure_apart_from(&self, folders: &[PathBuf]) -> anyhow::Result<()> {
+    /// Refuses an `--out` that is, holds or lies within a folder or file that is read: `--overwrite` would delete what is
+    /// needed.
+    pub(crate) fn ensure_apart_from<P: AsRef<Path>>(&self, read: impl IntoIterator<Item = P>) -> anyhow::Result<()> {
         let Some(out) = &self.out else { return Ok(()) };
-        let place_of = |path: &Path| path.canonicalize().or_else(|_| std::path::absolute(path));
-        let place = place_of(out)?;
-        for folder in folders {
+        let place_of = |path: &Path| storage::place_of(path).with_context(|| path.display().to_string());
+        let place = place_of(out).context("--out")?;
+        for folder in read {
+            let folder = folder.as_ref();
             let other = place_of(folder)?;
             ensure!(
                 !place.starts_with(&other) && !other.starts_with(&place),

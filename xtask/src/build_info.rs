@@ -89,7 +89,12 @@ fn libraries() -> Vec<String> {
 fn git(args: &[&str]) -> Option<String> {
     let program = std::env::current_exe().ok()?;
     let folder = program.parent().unwrap_or(Path::new("."));
-    let output = Command::new("git").arg("-C").arg(folder).args(args).output().ok()?;
+    let mut git = Command::new("git");
+    // Set where git runs a hook: they name another checkout.
+    for name in ["GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_COMMON_DIR", "GIT_OBJECT_DIRECTORY"] {
+        git.env_remove(name);
+    }
+    let output = git.arg("--no-optional-locks").arg("-C").arg(folder).args(args).output().ok()?;
     output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 

@@ -4,7 +4,7 @@
 use crate::output::note;
 #[cfg(unix)]
 use signal_hook::{
-    consts::{SIGHUP, SIGTERM},
+    consts::{SIGHUP, SIGTERM, SIGXFSZ},
     flag,
 };
 use std::path::Path;
@@ -41,6 +41,9 @@ pub(crate) fn install() -> anyhow::Result<()> {
         flag::register_conditional_shutdown(signal, EXIT.into(), Arc::clone(&REQUESTED))?;
         flag::register(signal, Arc::clone(&REQUESTED))?;
     }
+    // A file that grows beyond `ulimit -f` is an error of writing then, as a full disk is.
+    #[cfg(unix)]
+    flag::register(SIGXFSZ, Arc::default())?;
     std::thread::Builder::new().name("signals".to_owned()).spawn(watch)?;
     Ok(())
 }

@@ -26,6 +26,11 @@ const EXIT_REFUSED: u8 = 2;
 
 /// Parses the command line, runs the command, and says what went wrong.
 pub fn main() -> ExitCode {
+    // First of all: a signal before ends the process as signals do.
+    if let Err(error) = interrupt::install() {
+        output::error(format_args!("{error:#}"));
+        return ExitCode::from(EXIT_REFUSED);
+    }
     let command = cli::Cli::command().color(output::Color::from_args().of_clap());
     let cli = match cli::Cli::from_arg_matches(&command.get_matches()) {
         Ok(cli) => cli,
@@ -47,7 +52,6 @@ pub fn main() -> ExitCode {
 }
 
 fn run(cli: &cli::Cli) -> anyhow::Result<()> {
-    interrupt::install()?;
     // What rayon reads where no number is given; the second is its old name.
     for name in ["RAYON_NUM_THREADS", "RAYON_RS_NUM_CPUS"] {
         let asked_for = std::env::var(name).ok().and_then(|number| number.parse::<u64>().ok());

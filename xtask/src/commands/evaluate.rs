@@ -1,6 +1,6 @@
 //! `evaluate`: drivers × lots × directions × trials × noise levels.
 
-use crate::args::{Directions, JsonArgs, LayerArgs, OutArgs, noise_levels};
+use crate::args::{Directions, JsonArgs, LayerArgs, OutArgs, noise_levels, run_folder};
 use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
@@ -78,7 +78,7 @@ pub(crate) struct EvaluateArgs {
     /// Continues an interrupted evaluation with its own drivers and settings, to the same result.
     #[arg(
         long,
-        value_name = "DIR",
+        value_name = "DIR", value_parser = run_folder(),
         conflicts_with_all = [
             "drivers", "lots", "trials", "directions", "noise", "compare_with", "seed", "shard", "preset", "config", "overrides", "out",
             "smoothing"
@@ -124,7 +124,8 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: asked.compare_with, shard };
     check(&plan)?;
     let inputs = inputs::of(&lots, &drivers);
-    args.out.ensure_apart_from(&inputs::places(&lots, &drivers))?;
+    let places = inputs::places(&lots, &drivers);
+    args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
     let run = match begun {
         Ok((run, manifest)) => {
             manifest.check_inputs(&inputs)?;

@@ -44,6 +44,7 @@ pub(crate) fn run(args: &ExportArgs, output: &Output) -> anyhow::Result<()> {
     let Format::Onnx(OnnxArgs { run, out, overwrite }) = &args.format;
     let folder = if Checkpoint::exists(run)? { run.clone() } else { run_dir::policy_folder(run)? };
     let checkpoint = Checkpoint::load(&folder)?;
+    run_dir::ensure_outside_of_runs(out).context("--out")?;
     ensure!(
         *overwrite || !out.exists(),
         "{}: exists already; choose another --out, or replace it with --overwrite",

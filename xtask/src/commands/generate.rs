@@ -19,6 +19,7 @@ use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -120,6 +121,7 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
             .filter(|(index, _)| args.shard.is_none_or(|shard| shard.takes(*index)))
             .map(|(_, trial)| trial)
             .collect();
+    ensure_free(args, &trials)?;
     let console = Console::new(output);
     console.begin("generating", "generating");
     let mut made = Vec::new();
@@ -175,26 +177,51 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
     Ok(vec![Lot::of_map(path, &lot, vehicle)?])
 }
 
+/// Of the files of a lot, without an extension.
+fn file_name(args: &GenerateArgs, trial: &Trial<'_>) -> String {
+    let name = match (trial.lot.is_drawn_per_trial(), args.count) {
+        (false, _) => trial.lot.name().to_owned(),
+        (true, 1) => format!("{}-s{}", trial.lot.name(), args.seed),
+        (true, _) => format!("{}-s{}-{}", trial.lot.name(), args.seed, trial.index + 1),
+    };
+    pictures::file_name(&name)
+}
+
+fn files(args: &GenerateArgs, name: &str) -> [PathBuf; 2] {
+    ["toml", "png"].map(|extension| args.out.join(format!("{name}.{extension}")))
+}
+
+/// Refuses lots whose files are there, or would be those of another one, before the first is written.
+fn ensure_free(args: &GenerateArgs, trials: &[Trial<'_>]) -> anyhow::Result<()> {
+    let mut taken = BTreeMap::new();
+    for trial in trials {
+        let name = file_name(args, trial);
+        // Some file systems take no notice of capitals.
+        if let Some(other) = taken.insert(name.to_lowercase(), trial.lot.name()) {
+            bail!(
+                "lots {other:?} and {:?} would both be {name}.toml; generate them into two folders",
+                trial.lot.name()
+            );
+        }
+        for path in files(args, &name) {
+            ensure!(
+                args.overwrite || !path.exists(),
+                "{}: exists already; choose another --out or --seed, or replace it with --overwrite",
+                path.display()
+            );
+        }
+    }
+    Ok(())
+}
+
 struct Made {
     attempts: Option<u32>,
     line: String,
 }
 
 fn write(args: &GenerateArgs, trial: &Trial<'_>) -> anyhow::Result<Made> {
-    let name = match (trial.lot.is_drawn_per_trial(), args.count) {
-        (false, _) => trial.lot.name().to_owned(),
-        (true, 1) => format!("{}-s{}", trial.lot.name(), args.seed),
-        (true, _) => format!("{}-s{}-{}", trial.lot.name(), args.seed, trial.index + 1),
-    };
-    let name = pictures::file_name(&name);
-    let [toml, png] = ["toml", "png"].map(|extension| args.out.join(format!("{name}.{extension}")));
-    for path in [&toml, &png] {
-        ensure!(
-            args.overwrite || !path.exists(),
-            "{}: exists already; choose another --out or --seed, or replace it with --overwrite",
-            path.display()
-        );
-    }
+    let name = file_name(args, trial);
+    let [toml, png] = files(args, &name);
     let mut drawn = trial.lot.draw(trial.seed);
     // The file is a lot of its own, told apart from its siblings in tables.
     drawn.scenario.name.clone_from(&name);

@@ -1,7 +1,7 @@
 //! `guard`: does the claim still hold? Trains the default and fails if its policy has become worse. For a nightly run.
 
 use super::{train, within};
-use crate::args::OutArgs;
+use crate::args::{OutArgs, run_folder};
 use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
@@ -33,7 +33,7 @@ pub(crate) struct GuardArgs {
     #[command(flatten)]
     out: OutArgs,
     /// Continues an interrupted run.
-    #[arg(long, value_name = "DIR", conflicts_with = "out")]
+    #[arg(long, value_name = "DIR", value_parser = run_folder(), conflicts_with = "out")]
     resume: Option<PathBuf>,
 }
 

@@ -5,7 +5,7 @@ use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
 use crate::output::Output;
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use evaluation::drive_stage::DriveStage;
 use evaluation::on_policy;
 use evaluation::shards::ShardRecord;
@@ -16,7 +16,7 @@ use experiment::progress::{Interrupted, Progress as _};
 use experiment::run_dir::{self, Outcome, Place, Request, RunDir};
 use experiment::settings::Settings;
 use policy::dataset::store::Store;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use storage::sums;
 
 /// Does every stage of a run that is not done yet.
@@ -113,8 +113,15 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
 fn ensure_driven_by(stage: &Stage, root: &RunDir) -> anyhow::Result<()> {
     let Step::Drive { drivers } = &stage.step else { return Ok(()) };
     let found = run_dir::finished(&root.path().join(&stage.folder))?.map(|finished| finished.outcome);
+    let Some(Outcome::Evaluation { drivers: found }) = found else { bail!("{}: this is no evaluation", stage.folder) };
+    // The run may have been moved since: its own networks are known by where they lie in it.
+    let is_same = |(found, (_, wanted)): (&String, &(String, String))| {
+        let path_of = |spec: &str| spec.strip_prefix("run:").map(PathBuf::from);
+        let own = path_of(wanted).and_then(|path| path.strip_prefix(root.path()).ok().map(Path::to_path_buf));
+        found == wanted || own.zip(path_of(found)).is_some_and(|(own, found)| found.ends_with(own))
+    };
     ensure!(
-        found == Some(outcome_of(drivers)),
+        found.len() == drivers.len() && found.iter().zip(drivers).all(is_same),
         "{}: another version of lotpilot drove other drivers there; finish the run with the one that began it, or begin again \
          with another --out",
         stage.folder

@@ -25,7 +25,7 @@ use rayon::prelude::*;
 use report::other_run::OtherRun;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
 use report::pictures::{contact_sheet, lot, noise, samples};
-use report::{reproduction, run_report};
+use report::{docs_page, reproduction, run_report};
 use sim::episode::EpisodeSettings;
 use sim::limits::{PIXELS_PER_METRE_MAX, RUN_TEXT_BYTES_MAX, TRIAL_MAX};
 use sim::map::Map;
@@ -191,7 +191,7 @@ pub(crate) fn run(args: &RenderArgs, output: &Output) -> anyhow::Result<()> {
         RenderWhat::Samples(what) => render_samples(what, &folder),
         RenderWhat::Noise(what) => render_noise(what, &folder),
         RenderWhat::Report(what) => render_report(&what.run, args.out.is_some().then_some(&folder), output),
-        RenderWhat::Results(what) => render_results(what, output),
+        RenderWhat::Results(what) => render_results(what, args.overwrite, output),
     }
 }
 
@@ -384,7 +384,7 @@ fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<(
     folder.write(&format!("noise-{}", trial.lot.name()), &noise::picture(&title, &levels)?, false)
 }
 
-fn render_results(args: &RenderResultsArgs, output: &Output) -> anyhow::Result<()> {
+fn render_results(args: &RenderResultsArgs, overwrite: bool, output: &Output) -> anyhow::Result<()> {
     ensure!(
         run_dir::is_finished(&args.run)?,
         "{}: this is no finished run of reproduce or of another command that ends in a table",
@@ -397,6 +397,12 @@ fn render_results(args: &RenderResultsArgs, output: &Output) -> anyhow::Result<(
         (command, _) => format!("-{command}"),
     };
     let to = args.to.clone().unwrap_or_else(|| format!("docs/results{page}.md").into());
+    run_dir::ensure_outside_of_runs(&to).context("--to")?;
+    ensure!(
+        overwrite || !to.exists() || docs_page::is_page_of_results(&to),
+        "{}: exists already, and is no page of results; choose another --to, or replace it with --overwrite",
+        to.display()
+    );
     let revision = build_info::get().git_revision.as_deref();
     if command == reproduce::COMMAND {
         reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.with, &to, revision)?;

@@ -2,7 +2,7 @@
 //! skipped where it is finished already.
 
 use super::{perform, train};
-use crate::args::{LayerArgs, OutArgs};
+use crate::args::{LayerArgs, OutArgs, run_folder};
 use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
@@ -70,7 +70,7 @@ pub(crate) struct ReproduceArgs {
     /// Continues an interrupted run with its own settings, to the same result; finished stages are skipped.
     #[arg(
         long,
-        value_name = "DIR",
+        value_name = "DIR", value_parser = run_folder(),
         conflicts_with_all = [
             "preset", "config", "overrides", "seed", "out", "full", "seeds", "unseen", "tuned", "shard", "networks"
         ]
@@ -160,7 +160,7 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
     let mut places = train::check_lots(&settings, output)?;
     places.extend(train::check_unseen(&settings, &extent.unseen)?);
     places.extend(args.tuned.clone());
-    args.out.ensure_apart_from(&places)?;
+    args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
     ensure!(
         settings.seed.0.checked_add(extent.seeds).is_some_and(|last| i64::try_from(last).is_ok()),
         "seed {} leaves no room for {} trainings; choose a smaller one",
@@ -182,7 +182,7 @@ fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir
     let networks: PathBuf = networks.components().collect();
     let name = networks.display();
     ensure!(sums::exists(&networks)?, "--networks {name}: this is no run; cargo xtask reproduce makes one");
-    args.out.ensure_apart_from(std::slice::from_ref(&networks))?;
+    args.out.ensure_apart_from([&networks])?;
     let manifest = Manifest::read(&networks)?;
     let (settings, preset) = (run_dir::settings_of(&networks)?, manifest.preset.clone());
     ensure!(manifest.command == COMMAND, "--networks {name}: this is a run of {}", manifest.command);

@@ -1,7 +1,7 @@
 //! `train-bc` and `train-dagger`.
 
 use super::{evaluate, within};
-use crate::args::{JsonArgs, LayerArgs, OutArgs};
+use crate::args::{JsonArgs, LayerArgs, OutArgs, run_folder};
 use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
@@ -52,7 +52,7 @@ pub(crate) struct TrainArgs {
     #[command(flatten)]
     out: OutArgs,
     /// Continues an interrupted run with its own settings, to the same result.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "config", "overrides", "seed", "also", "out"])]
+    #[arg(long, value_name = "DIR", value_parser = run_folder(), conflicts_with_all = ["preset", "config", "overrides", "seed", "also", "out"])]
     resume: Option<PathBuf>,
     /// Trains only: no closed-loop check at the end.
     #[arg(long)]
@@ -95,7 +95,8 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         settings.training.lots.extend_from_slice(&args.also);
         adjust(&mut settings);
         // Before the folder is claimed: a misspelt lot should not leave one behind.
-        args.out.ensure_apart_from(&check_lots(&settings, output)?)?;
+        let places = check_lots(&settings, output)?;
+        args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
         let place = args.out.place(command, layers.preset_name(), settings.seed.0);
         let asked = Asked { no_eval: args.no_eval };
         let request = Request { arguments: toml::Table::try_from(&asked)?, inputs: inputs(&settings)? };

@@ -2,7 +2,7 @@
 //! and reported in the same way.
 
 use super::{perform, train};
-use crate::args::{LayerArgs, OutArgs};
+use crate::args::{LayerArgs, OutArgs, run_folder};
 use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
@@ -29,7 +29,7 @@ pub(crate) struct TrainingsArgs {
     #[command(flatten)]
     out: OutArgs,
     /// Continues an interrupted run with its own settings, to the same result; finished trainings are skipped.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "config", "overrides", "seed", "out"])]
+    #[arg(long, value_name = "DIR", value_parser = run_folder(), conflicts_with_all = ["preset", "config", "overrides", "seed", "out"])]
     resume: Option<PathBuf>,
 }
 
@@ -84,7 +84,7 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
             let Begun { preset, settings, extent } = begin()?;
             let mut places = train::check_lots(&settings, output)?;
             places.extend(train::check_unseen(&settings, (self.unseen)(&extent))?);
-            args.out.ensure_apart_from(&places)?;
+            args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
             for stage in (self.stages)(&settings, &extent, Path::new(""))? {
                 stage.settings.check().with_context(|| stage.folder.clone())?;
             }

@@ -1,6 +1,6 @@
 //! `tune`: parameters of the model-based planners.
 
-use crate::args::{LayerArgs, OutArgs};
+use crate::args::{LayerArgs, OutArgs, run_folder};
 use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
@@ -55,7 +55,7 @@ pub(crate) struct TuneArgs {
     /// Continues an interrupted search with its own settings, to the same result.
     #[arg(
         long,
-        value_name = "DIR",
+        value_name = "DIR", value_parser = run_folder(),
         conflicts_with_all = [
             "planners", "lots", "budget", "trials", "seed", "noise", "preset", "config", "overrides", "out"
         ]
@@ -112,7 +112,8 @@ fn begin(args: &TuneArgs) -> anyhow::Result<(RunDir, Settings, Asked)> {
     tune::planners_named(&args.planners)?;
     let lots = Lot::parse_all(&args.lots, &settings.episode.vehicle)?;
     tune::check(&lots)?;
-    args.out.ensure_apart_from(&inputs::places(&lots, &[]))?;
+    let places = inputs::places(&lots, &[]);
+    args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
     let asked = Asked { planners: args.planners.clone(), budget: args.budget };
     let request = Request { arguments: toml::Table::try_from(&asked)?, ..Request::default() };
     let run = RunDir::create(&args.out.place(COMMAND, layers.preset_name(), args.seed), &settings, &request)?;
