@@ -49,7 +49,8 @@ class EnvOptions:
 
     Environment i of n drives the episodes i, i + n, i + 2n, … of its seed. Episode k is trial
     ``k // (lots * directions)`` of each lot in each direction in turn, the very trials of ``cargo xtask evaluate`` with
-    that seed. So environments that share a seed go through the trials together and never drive one twice.
+    that seed: train with another seed than you judge by. Environments that share a seed go through the trials together and
+    never drive one twice.
     """
 
     lots: Sequence[str] = ("lot-a",)

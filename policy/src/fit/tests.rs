@@ -137,6 +137,16 @@ fn an_interrupted_training_goes_on_to_the_same_bits() {
     }
 }
 
+/// It was thrown away: a training stopped, with nothing left to do and nothing on disk.
+#[test]
+fn a_stop_at_the_last_step_comes_after_the_training() {
+    let (dataset, path) = (dataset(200), scratch("last-step"));
+    let mut stop = |now: &FitProgress| if now.step == 9 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+    let start = Weights::init(tiny(), RootSeed(1), 0);
+    let outcome = fit(&start, &dataset, &settings(9), context(DeviceChoice::Cpu), Some(&path), &mut stop).unwrap();
+    assert_eq!((outcome.report.stopped, outcome.report.steps, path.exists()), (false, 9, false));
+}
+
 /// Trained on, it would be another network under the same name.
 #[test]
 fn a_damaged_state_of_a_training_is_refused() {

@@ -151,8 +151,9 @@ pub fn fit(
         let done = course.done();
         let samples_done = u64::from(done) * settings.batch as u64;
         let validation = course.latest();
-        stopped =
-            progress(&FitProgress { step: done, steps, samples_done, learning_rate, loss, validation }).is_break();
+        let report = FitProgress { step: done, steps, samples_done, learning_rate, loss, validation };
+        // What was asked for in the last step comes after the training.
+        stopped = progress(&report).is_break() && done < steps;
         if done == steps || settings.validate_every > 0 && done.is_multiple_of(settings.validate_every) {
             let weights = net.to_weights(architecture);
             if !weights.values().iter().all(|value| value.is_finite()) {
@@ -162,8 +163,7 @@ pub fn fit(
             course.validated(weights, validation, settings.keep);
         }
         if let Some(path) = unfinished
-            && (stopped || kept_at.elapsed() >= Duration::from_secs(KEEP_EVERY_S))
-            && done < steps
+            && (stopped || done < steps && kept_at.elapsed() >= Duration::from_secs(KEEP_EVERY_S))
         {
             let optimizer = optimizer.into_bytes().expect("the state of an optimiser can be serialised").to_vec();
             course.keep(net.to_weights(architecture), optimizer).write(path)?;
