@@ -366,12 +366,12 @@ fn names_of_lots_drivers_and_moments_that_are_refused() {
     let settings = Settings::preset("smoke").unwrap();
     for (driver, expected) in [
         ("run:no/such/run", "this is no run"),
-        ("run:", "this is no run"),
+        ("run:", "names no folder or file"),
         ("run:no/such/run/bc", "this is no run"),
         ("net:no/such/net", "lists no finished model.safetensors"),
-        ("net:", "lists no finished model.safetensors"),
+        ("net:", "names no folder or file"),
         ("vvf:no/such.toml", "no/such.toml: cannot be read"),
-        ("vvf:", ": cannot be read"),
+        ("vvf:", "names no folder or file"),
         ("vvf:/", "it is a folder"),
     ] {
         let load = || driver.parse::<DriverSpec>()?.load(&settings);

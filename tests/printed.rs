@@ -35,6 +35,7 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         "torture",
         "replay",
         "verify",
+        "what-if",
         "render",
         "visualise",
         "completions",
@@ -46,7 +47,13 @@ fn every_help_has_examples_and_ends_with_what_holds_everywhere() {
         insta::assert_snapshot!(format!("help-{command}"), help);
     }
     for what in ["lot", "trajectories", "contact-sheet", "samples", "noise", "report", "results", "animation"] {
-        insta::assert_snapshot!(format!("help-render-{what}"), printed(&["render", what, "--help"]));
+        let help = printed(&["render", what, "--help"]);
+        assert!(help.contains(&format!("cargo xtask render {what} ")), "render {what} has no example");
+        insta::assert_snapshot!(format!("help-render-{what}"), help);
+    }
+    for what in ["lot", "episode", "replay", "run", "failures"] {
+        let help = printed(&["visualise", what, "--help"]);
+        assert!(help.contains(&format!("cargo xtask visualise {what} ")), "visualise {what} has no example");
     }
 }
 

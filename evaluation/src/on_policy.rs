@@ -60,7 +60,7 @@ pub struct Calibration {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum States {
-    /// Samples of its data set that it was not trained on.
+    /// Samples of its data set that it was not trained on; the best weights were chosen by some of them.
     HeldBack,
     /// Those it came into by driving.
     OnPolicy,

@@ -120,6 +120,9 @@ impl FromStr for DriverSpec {
         let is_planner = |name: &str| PlannerSpec::named(name).is_some();
         let planner = |name: &str, parameters| Ok(Self::Planner { name: name.to_owned(), parameters });
         match text.split_once(':') {
+            Some((kind, "")) if ["run", "net", "onnx"].contains(&kind) || is_planner(kind) => {
+                bail!("driver {text:?} names no folder or file; write it behind the colon, as in run:runs/NAME")
+            }
             None if text == "expert" => Ok(Self::Expert),
             None if is_planner(text) => planner(text, Parameters::Published),
             Some(("run", folder)) => Ok(Self::Run { folder: folder.into() }),
@@ -144,7 +147,12 @@ impl FromStr for DriverSpec {
                 } else {
                     specs().into_iter().map(|(spec, _)| spec).collect()
                 };
-                bail!("no driver {text:?}; there are {}", known.join(", "))
+                ensure!(!text.contains(','), "no driver {text:?}; name several with spaces between them");
+                let likeness = |name: &String| strsim::jaro_winkler(&text.to_lowercase(), name);
+                let nearest = known.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+                let nearest = nearest.filter(|name| likeness(name) > 0.85);
+                let hint = nearest.map(|name| format!("; did you mean {name}?")).unwrap_or_default();
+                bail!("no driver {text:?}{hint}; there are {}", known.join(", "))
             }
         }
     }
@@ -631,7 +639,11 @@ mod tests {
             assert_eq!(text.parse::<DriverSpec>().unwrap().to_string(), text);
         }
         for (wrong, known) in [
-            ("exprt", "there are expert, run:DIR"),
+            ("exprt", "did you mean expert?; there are expert, run:DIR"),
+            ("Tentacle", "did you mean tentacle?"),
+            ("expert,tentacle", "with spaces between them"),
+            ("run:", "names no folder or file"),
+            ("dwa:", "names no folder or file"),
             ("", "there are expert, run:DIR"),
             ("runs/mine", "there are expert, run:DIR"),
             ("ensemble:run:runs/a,expert", "expert cannot be part of an ensemble"),

@@ -556,8 +556,14 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
     }
     folders.sort_by_key(|folder| (*folder == "final", round_of(folder)));
     let folder = if is_bc { folders.first() } else { folders.last() };
-    let folder = folder
-        .with_context(|| format!("{}: no network is trained there yet; finish it with --resume {0}", run.display()))?;
+    let folder = folder.with_context(|| {
+        let command = Manifest::read(run).map_or_else(|_| "another command".to_owned(), |manifest| manifest.command);
+        if command.starts_with("train-") {
+            format!("{}: no network is trained there yet; finish it with --resume {0}", run.display())
+        } else {
+            format!("{}: this is a run of {command}, which has no network of its own; name a training", run.display())
+        }
+    })?;
     sums::read_listed(run, &format!("{folder}/{}", sums::FILE), sums::LIST_BYTES_MAX)?;
     Ok(run.join(folder))
 }

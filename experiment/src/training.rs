@@ -164,15 +164,11 @@ impl<'a> Monitor<'a> {
             }
             DaggerProgress::Collected { round, collection, dataset } => {
                 let read_with = collection.agreement.map_or_else(String::new, |found| {
-                    let Agreement { constant_within_tau, tau_scaled, within_tau_scaled, tau_hat_quantiles, .. } = found;
-                    let [_, median, _, most, _] = tau_hat_quantiles;
-                    format!(
-                        " (a constant answer {constant_within_tau:.3}; {within_tau_scaled:.3} at τ {tau_scaled:.3}, scaled \
-                         as the labels; τ̂ {median:.3} in half of the ticks, {most:.3} in 90 %)"
-                    )
+                    let Agreement { constant_within_tau, .. } = found;
+                    format!(" (η̂; a constant answer: {:.1} %)", 100.0 * constant_within_tau)
                 });
-                let eta =
-                    if round > 0 { format!(", η̂ {:.3}{read_with}", collection.eta_hat()) } else { String::new() };
+                let network = || format!(", the network drove {:.1} %{read_with}", 100.0 * collection.eta_hat());
+                let eta = if round > 0 { network() } else { String::new() };
                 self.end(&format!("{} samples, {dataset} in all{eta}", collection.samples));
             }
             DaggerProgress::Fitting { round, fit } => self.fitting(round, fit),

@@ -21,10 +21,8 @@ pub enum PursuitLaw {
 /// How fast to drive at a look-ahead point. The paper says v = a_y/2.24 "where the final v was set to half of a_y for
 /// safety reasons"; docs/methods.md 2.5 lists the readings. Distances are measured from the front bumper.
 ///
-/// Law B goes with points as far as the way is open. The car is steered at a point 7 m ahead, so a farther point lies on
-/// the circle through that one: moving the car by 20 cm moves it by 1.5 m, and η̂ stays below .8. Law A with points half
-/// as far (`ElasticBandSettings::reach_share` in `expert`) drives the same circle at about the same speed, the point
-/// lies near the one that is steered at, and η̂ exceeds .9. So the formula is the paper's, and so is the half.
+/// Law B goes with points as far as the way is open, as the paper prints them. Law A with points half as far drives the same
+/// circles at about the same speed (docs/paper.md says what that changes).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SpeedLaw {
@@ -56,7 +54,7 @@ pub struct ControllerSettings {
 }
 
 impl ControllerSettings {
-    /// Experimental Setup: 0.5 to 2.2 m/s.
+    /// Experimental Setup: 0.5 to 2.2 m/s, with law A; preset `paper` has law B.
     pub fn paper() -> Self {
         Self {
             pursuit: PursuitLaw::Paper,

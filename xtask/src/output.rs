@@ -104,8 +104,9 @@ impl Output {
             about: &'a str,
         }
         if !self.is_json {
+            let width = names.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
             for (name, about) in names {
-                self.print(format_args!("{name:15} {about}"));
+                self.print(format_args!("{name:width$}  {about}"));
             }
             return Ok(());
         }

@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 /// `--record`.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct RecordArgs {
-    /// When all is done, records the first N runs of every driver at every noise level for Rerun's viewer, into the folder
-    /// of the run; of a training also its learning curves and the first N episodes of every round.
+    /// When all is done, records the first N runs of every driver and noise level for Rerun, of a training its learning
+    /// curves and the first N episodes of every round as well. The first time it builds the recorder (8 minutes).
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1")]
     pub(crate) record: Option<usize>,
 }

@@ -195,7 +195,10 @@ pub fn explain(key: &str) -> anyhow::Result<String> {
         let last = |key: &str| key.rsplit('.').next().unwrap_or_default().to_owned();
         strsim::jaro_winkler(key, &entry.key).max(strsim::jaro_winkler(&last(key), &last(&entry.key)))
     };
-    let nearest = entries().iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b))).filter(|e| likeness(e) > 0.8);
+    // Of equals, one that the default has.
+    let is_used = |entry: &Entry| preset_value("default", &entry.key) != NOT_IN_USE;
+    let order = |a: &&Entry, b: &&Entry| likeness(a).total_cmp(&likeness(b)).then_with(|| is_used(a).cmp(&is_used(b)));
+    let nearest = entries().iter().max_by(order).filter(|entry| likeness(entry) > 0.8);
     let hint = nearest.map(|entry| format!("; did you mean {:?}?", entry.key)).unwrap_or_default();
     bail!("no setting {key:?}{hint}; cargo xtask settings --all lists them")
 }
@@ -216,6 +219,9 @@ fn explain_entry(entry: &Entry) -> String {
     text
 }
 
+/// Of a setting that a preset has no use for.
+const NOT_IN_USE: &str = "not in use";
+
 /// The value in every preset; one, if they agree.
 fn defaults(key: &str) -> String {
     let values: Vec<(&str, String)> =
@@ -235,7 +241,7 @@ fn preset_value(preset: &str, key: &str) -> String {
     for part in key.split('.') {
         match item.get(part) {
             Some(inner) => item = inner,
-            None => return "not in use".to_owned(),
+            None => return NOT_IN_USE.to_owned(),
         }
     }
     // An enum with fields: its variant.

@@ -39,21 +39,21 @@ Examples:
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EvaluateArgs {
-    /// Who drives; may be repeated. See `cargo xtask drivers`. The settings of the first `run:DIR` are used unless
+    /// Who drives, one or more; may be repeated. See `cargo xtask drivers`. The settings of the first `run:DIR` are used unless
     /// `--config` or `--preset` names others.
     #[arg(long = "driver", value_name = "SPEC", required_unless_present = "resume", num_args = 1..)]
     drivers: Vec<String>,
     /// Lots to drive; see `cargo xtask lots` [default: the setting evaluation.lots].
     #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',')]
     lots: Vec<String>,
-    /// Trials per lot and direction; each draws its own obstacles and noise.
+    /// Trials per lot and direction; each draws its own obstacles and noise [default: the setting evaluation.trials].
     #[arg(long, value_name = "N")]
     trials: Option<u32>,
-    /// Which ways the lots are driven.
+    /// Which ways the lots are driven [default: the setting evaluation.directions].
     #[arg(long, alias = "direction", value_name = "WAY")]
     directions: Option<Directions>,
     /// What is seen wrongly: clean, paper, hard, lot (as the lot asks for) or multiples of paper; several are compared,
-    /// `sweep` stands for 0,0.5,1,1.5,2.
+    /// `sweep` stands for 0,0.5,1,1.5,2 [default: the setting evaluation.noise].
     #[arg(long, alias = "level", value_name = "LEVEL", num_args = 1.., value_delimiter = ',')]
     noise: Vec<String>,
     /// Action smoothing of every driver: `own` (networks as they were trained, planners none), or a time constant in
@@ -63,7 +63,7 @@ pub(crate) struct EvaluateArgs {
     /// Driver the others are compared with [default: the last network, else the first driver].
     #[arg(long, value_name = "SPEC")]
     compare_with: Option<String>,
-    /// Seed of obstacles and noise of the trials.
+    /// Seed of obstacles and noise of the trials, not of a training [default: the setting evaluation.seed].
     #[arg(long)]
     seed: Option<u64>,
     /// Drives a share of the trials only, one of several machines' (docs/cluster.md); `merge` puts the shares together.

@@ -66,20 +66,32 @@ pub(crate) struct RenderArgs {
 #[derive(Debug, Clone, Subcommand)]
 pub(crate) enum RenderWhat {
     /// Lots from above, PNG and SVG.
+    #[command(after_help = "Example: cargo xtask render lot --lots lot-a,test:2")]
     Lot(RenderLotArgs),
     /// The lines drivers drove over a lot, PNG and SVG.
+    #[command(
+        after_help = "Examples:\n  cargo xtask render trajectories --driver expert --driver run:runs/NAME --lots lot-b\n  cargo xtask render trajectories --run runs/NAME --round 1"
+    )]
     Trajectories(TrajectoriesArgs),
     /// Drives that move: lot and grids side by side, GIF or APNG.
+    #[command(
+        after_help = "Examples:\n  cargo xtask render animation --driver expert --driver run:runs/NAME --lots lot-b\n  cargo xtask render animation 'tentacle@lot-b@forward@0@paper@1@842'"
+    )]
     Animation(AnimationArgs),
     /// Many lots on one page, PNG and SVG.
+    #[command(after_help = "Example: cargo xtask render contact-sheet --lots train:6:easy,train:6,train:6:hard")]
     ContactSheet(RenderLotArgs),
     /// Samples of a round's data set with labels and predictions, PNG.
+    #[command(after_help = "Example: cargo xtask render samples runs/NAME/round-01 --count 8")]
     Samples(SamplesArgs),
     /// What each noise layer makes wrong in one view, PNG.
+    #[command(after_help = "Example: cargo xtask render noise --lots lot-a --noise paper,hard")]
     Noise(RenderNoiseArgs),
     /// The report of a run anew, into its folder and that of `--out`.
+    #[command(after_help = "Example: cargo xtask render report runs/NAME")]
     Report(RenderReportArgs),
     /// A page of docs/ and its figures from a finished `reproduce`, `deviations`, `rules` or `scaling`.
+    #[command(after_help = "Example: cargo xtask render results runs/NAME --to docs/results.md")]
     Results(RenderResultsArgs),
 }
 
@@ -130,7 +142,7 @@ pub(crate) enum ColourChoice {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct TrajectoriesArgs {
-    /// Who drives, as in an evaluation; may be repeated. See `cargo xtask drivers`.
+    /// Who drives, one or more, as in an evaluation; may be repeated. See `cargo xtask drivers`.
     #[arg(long = "driver", value_name = "SPEC", num_args = 1.., required_unless_present = "run")]
     drivers: Vec<String>,
     /// Instead: a drive of a training run, network and expert in turn as the decision rule chose; `--trial` says which.

@@ -23,6 +23,7 @@ pub(crate) struct VerifyArgs {
 }
 
 pub(crate) fn run(args: &VerifyArgs, output: &Output) -> anyhow::Result<()> {
+    ensure!(args.run.is_dir(), "{}: there is no such folder; list those in runs/", args.run.display());
     let Verified { files, bytes, faults } = sums::verify(&args.run);
     for fault in &faults {
         note(fault);

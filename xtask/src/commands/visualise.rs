@@ -56,14 +56,21 @@ struct SinkArgs {
 #[derive(Debug, Clone, Subcommand)]
 enum What {
     /// A lot.
+    #[command(after_help = "Example: cargo xtask visualise lot lot-b")]
     Lot(LotArgs),
     /// An episode of an evaluation, driven by one driver, or by several side by side.
+    #[command(
+        after_help = "Example: cargo xtask visualise episode --driver expert --driver run:runs/NAME --lots lot-b"
+    )]
     Episode(EpisodeArgs),
     /// The run of a replay key, around its moment.
+    #[command(after_help = "Example: cargo xtask visualise replay run:runs/NAME@lot-b@reverse@3@paper@1@842")]
     Replay(ReplayArgs),
     /// A training: loss, validation, learning rate, and what every round collected.
+    #[command(after_help = "Example: cargo xtask visualise run runs/NAME")]
     Run(RunArgs),
     /// Near-collisions of an evaluation, a recording each.
+    #[command(after_help = "Example: cargo xtask visualise failures runs/NAME --limit 5")]
     Failures(FailuresArgs),
 }
 
@@ -80,7 +87,7 @@ struct LotArgs {
 /// Obstacles and noise are those of the same trial in `evaluate`.
 #[derive(Debug, Clone, Args)]
 struct EpisodeArgs {
-    /// Who drives; may be repeated. See `cargo xtask drivers`.
+    /// Who drives, one or more; may be repeated. See `cargo xtask drivers`.
     #[arg(long = "driver", value_name = "SPEC", required = true, num_args = 1..)]
     drivers: Vec<String>,
     #[command(flatten)]

@@ -127,6 +127,8 @@ fn a_key_is_explained_with_its_value_in_every_preset() {
     assert!(explain("dagger.fit").unwrap().contains("dagger.fit.adam.beta1"), "a section");
     let error = explain("dagger.etta").unwrap_err().to_string();
     assert!(error.contains("did you mean \"dagger.eta\"?"), "{error}");
+    let error = explain("dagger.rule.tau").unwrap_err().to_string();
+    assert!(error.contains("did you mean \"dagger.rule.all_below.tau\"?"), "of many τ the default's: {error}");
     assert!(explain("dagger.relooks").unwrap_err().to_string().contains("dagger.noise_augmentations"));
 }
 
