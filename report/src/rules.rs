@@ -189,7 +189,8 @@ fn legend(settings: &Settings, extent: &Extent) -> String {
         Keep::ExpertTicks => "",
     };
     format!(
-        "Of {trainings}; behaviour cloning has the samples of the first round alone.{learned} Intervals of 95 % are for \
+        "Of {trainings}; behaviour cloning has the samples of the first round alone. EnsembleDAgger and ThriftyDAgger train three \
+         networks and drive with their mean.{learned} Intervals of 95 % are for \
          {intervals}; a difference that excludes zero (*) is one of several comparisons, and no adjustment is made for their \
          number."
     )
