@@ -186,10 +186,22 @@ impl DriverSpec {
         let mut specs: Vec<Self> = Vec::new();
         for text in texts {
             let spec: Self = text.as_ref().parse()?;
-            ensure!(!specs.contains(&spec), "driver {spec} is named twice; results are told apart by name");
+            let same = specs.iter().find(|other| other.is_same_as(&spec));
+            ensure!(same.is_none(), "driver {spec} is named twice; name it once");
             specs.push(spec);
         }
         Ok(specs)
+    }
+
+    /// Whether two name the same, whatever they call the folder.
+    fn is_same_as(&self, other: &Self) -> bool {
+        let place_of = |path: &Path| storage::place_of(path).ok();
+        match (self, other) {
+            (Self::Run { folder: a }, Self::Run { folder: b })
+            | (Self::Checkpoint { folder: a }, Self::Checkpoint { folder: b })
+            | (Self::Onnx { file: a }, Self::Onnx { file: b }) => place_of(a).is_some() && place_of(a) == place_of(b),
+            _ => self == other,
+        }
     }
 
     /// Whether it is a learned policy.

@@ -18,10 +18,13 @@ pub fn write(path: &Path, content: &[u8]) -> Result<(), FileError> {
     let partial = path.with_added_extension("partial");
     let write = || {
         let mut file = create_own(&partial)?;
-        file.write_all(content)?;
         // The name must not be on disk before the content is.
-        file.sync_all()?;
-        fs::rename(&partial, path)
+        let written = file.write_all(content).and_then(|()| file.sync_all()).and_then(|()| fs::rename(&partial, path));
+        if written.is_err() {
+            // It is this process's still, which has its lock. Where that fails as well, whoever writes next deletes it.
+            let _ = fs::remove_file(&partial);
+        }
+        written
     };
     write().map_err(|error: io::Error| failed(path, &error))
 }
