@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use sim::driver::{GroundTruth, LookAheadPoint};
 use sim::maths;
 use sim::seed::Rng;
+use sim::vehicle::VehicleSettings;
 
 /// How often, how long and how hard the steering is disturbed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -60,14 +61,18 @@ impl DisturbanceSettings {
 #[derive(Debug)]
 pub(crate) struct Disturbance {
     settings: DisturbanceSettings,
+    /// From the rear axle to the bumper, metres.
+    nose_m: f32,
     rng: Rng,
     ticks_left: u32,
     curvature_per_m: f32,
 }
 
 impl Disturbance {
-    pub(crate) fn new(settings: DisturbanceSettings, rng: Rng) -> Self {
-        Self { settings, rng, ticks_left: 0, curvature_per_m: 0.0 }
+    pub(crate) fn new(settings: DisturbanceSettings, vehicle: &VehicleSettings, rng: Rng) -> Self {
+        // To the centimetre: that of the paper's car is 3.8 m then, and not a rounding beside it.
+        let nose_m = (100.0 * vehicle.front_m()).round() / 100.0;
+        Self { settings, nose_m, rng, ticks_left: 0, curvature_per_m: 0.0 }
     }
 
     /// The point that is driven at instead in this tick.
@@ -81,7 +86,7 @@ impl Disturbance {
             let drawn_per_m = self.rng.random_range(-max_per_m..=max_per_m);
             self.curvature_per_m = match self.settings.aim {
                 Aim::Random => drawn_per_m,
-                Aim::Danger => towards_danger(drawn_per_m, point, truth),
+                Aim::Danger => towards_danger(drawn_per_m, point, self.nose_m, truth),
             };
             self.ticks_left = self.settings.duration_ticks.max(1);
         }
@@ -91,16 +96,14 @@ impl Disturbance {
 }
 
 /// The curvature or its opposite, whichever leaves less room around the nose on an arc to the point.
-fn towards_danger(curvature_per_m: f32, point: LookAheadPoint, truth: &GroundTruth<'_>) -> f32 {
-    /// From the rear axle to the bumper, metres.
-    const NOSE_M: f32 = 3.8;
+fn towards_danger(curvature_per_m: f32, point: LookAheadPoint, nose_m: f32, truth: &GroundTruth<'_>) -> f32 {
     /// Farther than a disturbance lasts, so that what comes next counts, metres.
     const AHEAD_M: f32 = 4.0;
     const STEPS: u8 = 8;
     let room_m = |added_per_m: f32| {
         let arc_per_m = point.curvature_per_m() + added_per_m;
         (1..=STEPS)
-            .map(|k| NOSE_M + AHEAD_M * f32::from(k) / f32::from(STEPS))
+            .map(|k| nose_m + AHEAD_M * f32::from(k) / f32::from(STEPS))
             .map(|travel_m| {
                 truth.map.signed_distance_m(truth.vehicle.pose.advanced_along_arc(arc_per_m, travel_m).position())
             })
@@ -124,7 +127,7 @@ mod tests {
     use sim::map::Map;
     use sim::scenario::{LotNoise, ReferencePath, Scenario};
     use sim::seed::{RootSeed, Stream};
-    use sim::vehicle::{VehicleSettings, VehicleState};
+    use sim::vehicle::VehicleState;
 
     #[test]
     fn a_disturbance_adds_its_curvature_and_keeps_the_range() {
@@ -153,7 +156,9 @@ mod tests {
         let pose = Pose::new(map.start().position() + Vec2::new(10.0, left_m), 0.0);
         let truth = GroundTruth { map: &map, vehicle: VehicleState::at_rest(pose), progress_m: 10.0 };
         let straight = LookAheadPoint { ahead_m: 10.0, left_m: 0.0 };
-        let mut disturbance = Disturbance::new(settings, RootSeed(1).rng(Stream::Disturbance, 0));
+        let rng = RootSeed(1).rng(Stream::Disturbance, 0);
+        let mut disturbance = Disturbance::new(settings, &VehicleSettings::hyundai_hg300(), rng);
+        assert_eq!(disturbance.nose_m, 3.8, "what trainings of before had");
         (0..100_000).map(|_| disturbance.disturb(straight, &truth).left_m).collect()
     }
 

@@ -77,9 +77,12 @@ impl Rollouts {
             let sensor = |part| episode.another_sensor(seed.child(Stream::NoiseAugmentation, index.part(part)));
             (0..settings.noise_augmentations).map(sensor).collect()
         };
-        let disturbance = |index: EpisodeIndex| {
+        let disturbance = |index: EpisodeIndex, episode: &Episode| {
             let is_disturbed = settings.disturbance.enabled && index.round() > 0;
-            is_disturbed.then(|| Disturbance::new(settings.disturbance, seed.rng(Stream::Disturbance, index.stream())))
+            is_disturbed.then(|| {
+                let rng = seed.rng(Stream::Disturbance, index.stream());
+                Disturbance::new(settings.disturbance, &episode.settings().vehicle, rng)
+            })
         };
         let DaggerSettings { rule, keep, device, .. } = *settings;
         Self::new(novice, device, seed, (rule, keep), episodes, &augmenting_sensors, &disturbance)
@@ -90,7 +93,7 @@ impl Rollouts {
         // Every discrepancy is below infinity: the network always drives. Nothing is drawn at random.
         let how = (DecisionRule::TauOnly { tau: f32::INFINITY }, Keep::EveryTick);
         let novice = Learned::alone(novice.clone());
-        Self::new(Some(&novice), device, RootSeed(0), how, episodes, &|_, _| Vec::new(), &|_| None)
+        Self::new(Some(&novice), device, RootSeed(0), how, episodes, &|_, _| Vec::new(), &|_, _| None)
     }
 
     fn new(
@@ -100,7 +103,7 @@ impl Rollouts {
         (rule, keep): (DecisionRule, Keep),
         episodes: Vec<RoundEpisode>,
         augmenting_sensors: &(dyn Fn(EpisodeIndex, &Episode) -> Vec<Sensor> + Sync),
-        disturbance: &dyn Fn(EpisodeIndex) -> Option<Disturbance>,
+        disturbance: &dyn Fn(EpisodeIndex, &Episode) -> Option<Disturbance>,
     ) -> Self {
         let (mut origins, mut starts, mut experts) = (Vec::new(), Vec::new(), Vec::new());
         for RoundEpisode { index, direction, episode, expert } in episodes {
@@ -123,7 +126,7 @@ impl Rollouts {
             .zip(sensors)
             .zip(origins.iter().zip(&starts))
             .map(|((expert, sensors), (&(index, _), episode))| {
-                CollectorSeat::new(expert, gate(index, episode), sensors, disturbance(index))
+                CollectorSeat::new(expert, gate(index, episode), sensors, disturbance(index, episode))
             })
             .collect();
         let geometry = starts.first().map_or_else(GridGeometry::paper, |start| start.settings().sensing.geometry);
