@@ -590,7 +590,7 @@ fn files_of_planners_and_networks_that_are_refused() {
     let folder = scratch("bad-files");
     let settings = Settings::preset("smoke").unwrap();
     let file = folder.join("dwa.toml");
-    let sound = std::fs::read_to_string(crate::bench::root().join("planners/tuned/dwa.toml")).unwrap();
+    let sound = std::fs::read_to_string(crate::bench::root().join("planners/tuned/corridors/dwa.toml")).unwrap();
     let load = |text: &str| {
         std::fs::write(&file, text).unwrap();
         format!("dwa:{}", file.display()).parse::<DriverSpec>()?.load(&settings)

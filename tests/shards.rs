@@ -181,7 +181,7 @@ fn what_was_merged_merges_again_and_is_compared_with_whom_one_likes() {
     let [first, second] =
         ["tentacle", "cvm"].map(|driver| of(driver, &["--lots", &lot_name], &format!("{driver}-lane")));
     for (file, from, to, folders) in [
-        (&parameters, "speed_mps = 0.7739902", "speed_mps = 0.9", [&mine, &vvf]),
+        (&parameters, "speed_mps = 0.", "speed_mps = 0.8", [&mine, &vvf]),
         (&lot, "[17.000, 2.500]", "[17.000, 2.600]", [&first, &second]),
     ] {
         let sound = std::fs::read_to_string(file).unwrap();
