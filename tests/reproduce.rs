@@ -395,9 +395,8 @@ fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
     let moved = folder.join("moved");
     std::fs::rename(&out, &moved).unwrap();
     let listed = std::fs::read_to_string(moved.join("sha256sums")).unwrap();
-    let unfinished: String =
-        listed.lines().filter(|line| !line.ends_with("  finished.toml")).map(|line| format!("{line}\n")).collect();
-    std::fs::write(moved.join("sha256sums"), unfinished).unwrap();
+    let unfinished: Vec<&str> = listed.lines().filter(|line| !line.ends_with("  finished.toml")).collect();
+    std::fs::write(moved.join("sha256sums"), unfinished.join("\n") + "\n").unwrap();
     std::fs::remove_file(moved.join("finished.toml")).unwrap();
     succeed(xtask().args(["rules", "--resume"]).arg(&moved));
     assert_eq!(std::fs::read_to_string(moved.join("rules.md")).unwrap(), table);

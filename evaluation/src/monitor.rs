@@ -7,12 +7,12 @@ use sim::metrics::steering_reversals;
 use sim::vehicle::VehicleState;
 use std::collections::VecDeque;
 
-/// From how long before a near-collision it can be driven on differently, seconds, the longest first [chosen].
+/// From how long before a near-collision it can be driven on differently, seconds, the longest first (chosen).
 pub const LOOK_BACKS_S: [f32; 7] = [24.0, 12.0, 6.0, 3.0, 2.0, 1.0, 0.5];
 /// The one of [`LOOK_BACKS_S`] that decides what a near-collision hangs on: 6 s are about the 8 m in which the place comes
 /// into view.
 pub const LOOK_BACK: usize = 2;
-/// Steering reversals are counted over the last seconds [chosen].
+/// Steering reversals are counted over the last seconds (chosen).
 pub const OSCILLATION_S: f32 = 5.0;
 
 /// Where the car was before a near-collision.

@@ -16,9 +16,9 @@ use sim::frame::Event;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// How far the car must get beyond the place, metres: its own length [chosen].
+/// How far the car must get beyond the place, metres: its own length (chosen).
 pub const PASS_M: f32 = 5.0;
-/// In which time beyond the look-back, seconds [chosen].
+/// In which time beyond the look-back, seconds (chosen).
 const PASS_WITHIN_S: f32 = 10.0;
 
 /// What is replaced by the truth.

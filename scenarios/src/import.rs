@@ -480,7 +480,7 @@ impl MapLot {
         }
         let back = points.windows(3).find(|three| {
             let turn_rad = (three[1] - three[0]).angle_to(three[2] - three[1]);
-            !(turn_rad.abs() < TURN_MAX_RAD)
+            turn_rad.abs() >= TURN_MAX_RAD
         });
         if let Some(three) = back {
             let problem = format!("it turns back at {}", frame.said(three[1]));
