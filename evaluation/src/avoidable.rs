@@ -52,7 +52,7 @@ struct Failing {
 /// drivers named, or of all. Rows are in the order of the evaluation. `None` if cancelled.
 ///
 /// # Errors
-/// If the folder holds no finished evaluation, a driver is not one of it, or a run is not what was recorded.
+/// If the folder holds no finished evaluation, or a run is not what was recorded.
 pub fn of_evaluation(
     folder: &Path,
     settings: &Settings,

@@ -24,7 +24,8 @@ const PASS_WITHIN_S: f32 = 10.0;
 /// What is replaced by the truth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Substitution {
-    /// Nothing: the same driver from there on, with other draws of the noise that comes and goes.
+    /// Nothing: the same driver from there on, with other draws of the noise that comes and goes; where the car had just
+    /// started, the same drive.
     Nothing,
     /// The grid, by the clean one.
     CleanGrid,

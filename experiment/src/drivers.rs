@@ -195,11 +195,16 @@ impl DriverSpec {
 
     /// Whether two name the same, whatever they call the folder.
     fn is_same_as(&self, other: &Self) -> bool {
-        let place_of = |path: &Path| storage::place_of(path).ok();
+        let is_one =
+            |a: &Path, b: &Path| storage::place_of(a).is_ok_and(|a| storage::place_of(b).is_ok_and(|b| a == b));
         match (self, other) {
             (Self::Run { folder: a }, Self::Run { folder: b })
             | (Self::Checkpoint { folder: a }, Self::Checkpoint { folder: b })
-            | (Self::Onnx { file: a }, Self::Onnx { file: b }) => place_of(a).is_some() && place_of(a) == place_of(b),
+            | (Self::Onnx { file: a }, Self::Onnx { file: b }) => self == other || is_one(a, b),
+            (
+                Self::Planner { name, parameters: Parameters::File(a) },
+                Self::Planner { name: other_name, parameters: Parameters::File(b) },
+            ) => self == other || name == other_name && is_one(a, b),
             _ => self == other,
         }
     }

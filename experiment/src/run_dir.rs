@@ -291,12 +291,14 @@ impl RunDir {
         if is_finished(&path)? {
             // A death between the two, or another run that somebody put there.
             let Manifest { command, inputs, .. } = Manifest::read(&path)?;
-            let is_ours = command == place.command && settings_of(&path)? == *settings && inputs == request()?.inputs;
             ensure!(
-                is_ours,
+                command == place.command && settings_of(&path)? == *settings,
                 "{}: this is another run, not a stage of this one; move it elsewhere, and go on with --resume",
                 path.display()
             );
+            let now = request()?.inputs;
+            let changed = inputs.iter().find(|(name, digest)| now.get(*name) != Some(*digest));
+            changed.map_or(Ok(()), |(name, _)| Err(has_changed(name)))?;
             sums::list(&self.path, &[&list])?;
             return Ok(None);
         }
@@ -448,7 +450,7 @@ fn has_changed(name: &str) -> anyhow::Error {
     anyhow!("{name}: changed since this run was begun; restore it, or begin again into another folder")
 }
 
-/// Refuses a folder or file within a run: what that run comes to would not be its own.
+/// Refuses a folder or file within a run, whose files would no longer be its own alone.
 ///
 /// # Errors
 /// Naming the run.

@@ -1,18 +1,20 @@
 //! What would have avoided the near-collisions of an evaluation, as a table.
 
-use crate::markdown::table_of;
+use crate::markdown::with_header;
 use comfy_table::Table;
 use evaluation::avoidable::Row;
 
-/// A row for each driver and group of lots: how many near-collisions there are, then how many of them are passed with each
+/// A row for each driver and group of lots: how many near-collisions (events) there are, then how many of them are passed with each
 /// thing replaced.
 pub fn table(rows: &[Row]) -> Table {
     let drivers = distinct(rows.iter().map(|row| (row.driver.as_str(), row.noise.as_str())));
     let replaced = distinct(rows.iter().map(|row| row.replaced.as_str()));
     // One driver is named by who asked.
     let who = if drivers.len() > 1 { &["driver", "noise"][..] } else { &[] };
-    let header: Vec<&str> = who.iter().chain(&["lots", "near-collisions"]).chain(&replaced).copied().collect();
-    let mut table = table_of(&header);
+    // Short, for there are a dozen beside each other.
+    let short = |replaced: &str| replaced.replace("no smoothing", "no smooth.").replace("expert, ", "exp. ");
+    let titles = who.iter().chain(&["lots", "events"]).map(|&title| title.to_owned());
+    let mut table = with_header(titles.chain(replaced.iter().map(|replaced| short(replaced))).collect());
     let mut add = |driver: &str, noise: &str, lots: &str, rows: &[&Row]| {
         let sum = |replaced: &str, count: fn(&Row) -> u32| -> u32 {
             rows.iter().filter(|row| row.replaced == replaced).map(|row| count(row)).sum()
@@ -74,7 +76,7 @@ mod tests {
         let text = table(&rows).to_string();
         let cells: Vec<Vec<&str>> =
             text.lines().map(|line| line.split('|').map(str::trim).filter(|cell| !cell.is_empty()).collect()).collect();
-        assert_eq!(cells[0], ["lots", "near-collisions", "clean grid", "no dead time"]);
+        assert_eq!(cells[0], ["lots", "events", "clean grid", "no dead time"]);
         assert_eq!(cells[2], ["hall", "4", "3", "1"]);
         assert_eq!(cells[3], ["yard", "2", "0", "2"]);
         assert_eq!(cells[4], ["all", "6", "3", "3"]);

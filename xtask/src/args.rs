@@ -58,7 +58,9 @@ pub(crate) fn run_folder() -> impl TypedValueParser<Value = PathBuf> {
         let leads_up = path.components().any(|part| part == Component::ParentDir);
         let full = if leads_up { storage::place_of(&path) } else { std::path::absolute(&path) };
         let full = full.map_err(|error| error.to_string())?;
-        let here = std::env::current_dir().map_err(|error| error.to_string())?;
+        // A folder that was deleted meanwhile is below no other.
+        let Ok(here) = std::env::current_dir() else { return Ok(full) };
+        let here = if leads_up { storage::place_of(&here).unwrap_or(here) } else { here };
         let short: PathBuf = full.strip_prefix(here).unwrap_or(&full).components().collect();
         Ok(if short.as_os_str().is_empty() { ".".into() } else { short })
     })

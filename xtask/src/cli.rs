@@ -108,7 +108,7 @@ enum Command {
     /// Drives runs again by their replay keys, and says whether they are the same as recorded, bit by bit.
     #[command(after_help = replay::EXAMPLES)]
     Replay(replay::ReplayArgs),
-    /// What would have avoided the near-collisions of an evaluation: replaces one thing at a time by the truth.
+    /// What would have avoided the near-collisions of an evaluation: replaces one thing at a time with the truth.
     #[command(after_help = what_if::EXAMPLES)]
     WhatIf(what_if::WhatIfArgs),
     /// Checks that every file of a run is what was written, by its SHA-256.

@@ -118,6 +118,7 @@ fn ensure_driven_by(stage: &Stage, root: &RunDir) -> anyhow::Result<()> {
     let is_same = |(found, (_, wanted)): (&String, &(String, String))| {
         let path_of = |spec: &str| spec.strip_prefix("run:").map(PathBuf::from);
         let own = path_of(wanted).and_then(|path| path.strip_prefix(root.path()).ok().map(Path::to_path_buf));
+        let own = own.filter(|own| !own.as_os_str().is_empty());
         found == wanted || own.zip(path_of(found)).is_some_and(|(own, found)| found.ends_with(own))
     };
     ensure!(

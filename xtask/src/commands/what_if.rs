@@ -3,7 +3,7 @@
 use crate::args::JsonArgs;
 use crate::console::Console;
 use crate::output::Output;
-use anyhow::ensure;
+use anyhow::bail;
 use clap::Args;
 use evaluation::avoidable;
 use experiment::progress::Interrupted;
@@ -17,8 +17,8 @@ Examples:
   cargo xtask what-if runs/evaluate-default-s1 --driver run:runs/train-dagger-default-s1
 
 From 6 s before each near-collision the car is driven on: with nothing changed, on the clean grid, without dead time, without
-action smoothing, by an expert that sees the clean patch alone; and by the expert, from 24 s to 0.5 s before. Counted is how many
-places are passed.";
+action smoothing, by an expert that sees the clean patch alone; and by the expert, from 24 s to 0.5 s before. The table counts the
+places that are passed.";
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct WhatIfArgs {
@@ -38,9 +38,10 @@ pub(crate) fn run(args: &WhatIfArgs, output: &Output) -> anyhow::Result<()> {
     let Some(rows) = avoidable::of_evaluation(&args.folder, &settings, &args.drivers, &console)? else {
         return Err(Interrupted { kept: "nothing is written".to_owned() }.into());
     };
-    let has_some = |driver: &&String| !rows.iter().any(|row| row.driver == **driver);
-    let without: Vec<&String> = args.drivers.iter().filter(has_some).collect();
-    ensure!(without.is_empty(), "{}: no near-collision of {without:?} in it", args.folder.display());
+    let fails_nowhere = |driver: &&String| !rows.iter().any(|row| row.driver == **driver);
+    if let Some(driver) = args.drivers.iter().find(fails_nowhere) {
+        bail!("{}: no near-collision of a driver {driver:?} is in it; its tables name them", args.folder.display());
+    }
     if rows.is_empty() {
         output.print("no near-collisions");
         return Ok(());
