@@ -349,6 +349,14 @@ fn what_would_have_avoided_near_collisions_is_counted_by_lot() {
 
     let error = refuse(xtask().args(["what-if", "--driver", "expert", "--"]).arg(&run));
     assert!(error.contains("no near-collision of a driver \"expert\""), "{error}");
+    let without = folder.join("without");
+    succeed(
+        xtask().args(["evaluate", "--driver", "expert", "--lots", "lot-c", "--trials", "1", "--out"]).arg(&without),
+    );
+    assert_eq!(succeed(xtask().args(["what-if", "--json"]).arg(&without)).trim(), "[]");
+    assert_eq!(succeed(xtask().arg("what-if").arg(&without)).trim(), "no near-collisions");
+    let error = refuse(xtask().arg("what-if").arg(folder.join("none")));
+    assert!(error.contains("this is no run"), "{error}");
     let moved = failures.replacen("\"tick\":", "\"tick\":1", 1);
     sums::write(&run, "failures.jsonl", moved.as_bytes()).unwrap();
     let error = refuse(xtask().arg("what-if").arg(&run));

@@ -68,7 +68,7 @@ pub fn of_evaluation(
     for Failing { driver: name, noise, spec, runs } in &failing {
         let driver = spec.clone().load(settings)?;
         driver.check(settings)?;
-        let substitutes = Substitutes::new(spec, settings)?;
+        let substitutes = Substitutes::new(&driver, settings);
         let seed = settings.evaluation.seed;
         let runs: Vec<_> = runs.iter().collect();
         let mut tally = Tally::new(name, *noise);

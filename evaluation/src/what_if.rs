@@ -1,14 +1,14 @@
 //! What would have happened if one thing had been otherwise: from a state before a near-collision it is driven on, and the
 //! place is passed or not.
 //!
-//! What is replaced by the truth, one thing at a time [`Substitution`], says what a near-collision hangs on. The car is put
+//! What is replaced by the truth, one thing at a time ([`Substitution`]), says what a near-collision hangs on. The car is put
 //! into the state that it had; commands on their way to the actuators, smoothed answers and noise that comes and goes are
 //! not those of then, which is why [`Substitution::Nothing`] is tried as well.
 
 use crate::monitor::{Incident, LOOK_BACK, LOOK_BACKS_S};
 use anyhow::anyhow;
 use experiment::drive::TrialBatch;
-use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::drivers::NamedDriver;
 use experiment::settings::{NoiseChoice, Settings, Smoothing};
 use experiment::trials;
 use sim::episode::{Episode, EpisodeSettings};
@@ -77,20 +77,15 @@ pub struct Substitutes {
 
 impl Substitutes {
     /// Of a driver, under the settings of its evaluation.
-    ///
-    /// # Errors
-    /// As [`DriverSpec::load`].
-    pub fn new(driver: &DriverSpec, settings: &Settings) -> anyhow::Result<Self> {
+    pub fn new(driver: &NamedDriver, settings: &Settings) -> Self {
         let mut no_dead_time = settings.episode.clone();
         no_dead_time.vehicle.dead_time_s = 0.0;
-        let mut unsmoothed = settings.clone();
-        unsmoothed.evaluation.smoothing = Smoothing::Ticks(0.0);
-        Ok(Self {
+        Self {
             no_dead_time,
-            no_smoothing: driver.clone().load(&unsmoothed)?,
+            no_smoothing: driver.clone().smoothed(Smoothing::Ticks(0.0)),
             expert: NamedDriver::expert(&settings.expert),
             expert_of_patch: NamedDriver::expert_of_patch(&settings.expert),
-        })
+        }
     }
 
     /// Whether each incident of a batch is passed with this replaced.

@@ -421,7 +421,8 @@ impl NamedDriver {
     }
 
     /// The same with other action smoothing. Networks smooth by themselves, as they were trained to.
-    fn smoothed(mut self, smoothing: Smoothing) -> Self {
+    #[must_use]
+    pub fn smoothed(mut self, smoothing: Smoothing) -> Self {
         if let Smoothing::Ticks(ticks) = smoothing {
             self.digest_of_files = self.digest();
             match &mut self.model {

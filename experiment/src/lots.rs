@@ -7,9 +7,9 @@ use scenarios::import::MapLot;
 use scenarios::note::{Loaded, Note};
 use scenarios::reference::{self, ReferenceLot};
 use scenarios::split::{Family, Split};
-use sim::map::Map;
 use sim::scenario::{Direction, NoiseLevel, Scenario};
 use sim::seed::RootSeed;
+use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -76,7 +76,7 @@ impl Lot {
         let twice = names.windows(2).find(|pair| pair[0] == pair[1]);
         ensure!(twice.is_none(), "lot {:?} is named twice; name it once", twice.unwrap_or(&[""])[0]);
         if *vehicle != VehicleSettings::hyundai_hg300() {
-            ensure_wide_enough(&lots, vehicle)?;
+            ensure_it_fits(&lots, vehicle)?;
         }
         Ok(lots)
     }
@@ -215,11 +215,11 @@ impl Lot {
 
 /// Refuses another car than ours that does not fit where it starts, before anything is driven: of each kind of lot one is
 /// tried, and those from files were when they were read.
-fn ensure_wide_enough(lots: &[Lot], vehicle: &VehicleSettings) -> anyhow::Result<()> {
+fn ensure_it_fits(lots: &[Lot], vehicle: &VehicleSettings) -> anyhow::Result<()> {
     let mut kinds = BTreeSet::new();
     for lot in lots.iter().filter(|lot| !lot.is_from_file() && kinds.insert(lot.group())) {
         let scenario = lot.draw(RootSeed(0)).scenario;
-        Map::build(scenario, vehicle).with_context(|| format!("lot {:?} and the car of episode.vehicle", lot.name))?;
+        validate(&scenario, vehicle).with_context(|| format!("lot {:?} and the car of episode.vehicle", lot.name))?;
     }
     Ok(())
 }

@@ -11,17 +11,14 @@ use std::path::{Component, Path, PathBuf};
 pub fn place_of(path: &Path) -> io::Result<PathBuf> {
     let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
     let path = std::path::absolute(path)?;
-    let mut found = Err(io::Error::from(ErrorKind::NotFound));
-    let there = path.ancestors().find(|ancestor| {
-        found = ancestor.canonicalize();
-        found.is_ok()
-    });
-    let found = found?;
-    let rest = path.strip_prefix(there.unwrap_or(&path)).unwrap_or(Path::new(""));
+    let resolved = |ancestor: &Path| ancestor.canonicalize().ok().map(|place| (place, ancestor.to_owned()));
+    let (place, there) = path.ancestors().find_map(resolved).ok_or(ErrorKind::NotFound)?;
+    let rest = path.strip_prefix(there).unwrap_or(Path::new(""));
     if rest.components().any(|part| !matches!(part, Component::Normal(_))) {
         return Err(io::Error::new(ErrorKind::NotFound, "it leads back up (..) from a folder that is not there"));
     }
-    Ok(found.join(rest))
+    // Joined with nothing it would end in a slash.
+    Ok(if rest.as_os_str().is_empty() { place } else { place.join(rest) })
 }
 
 #[cfg(test)]

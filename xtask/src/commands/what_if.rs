@@ -3,13 +3,14 @@
 use crate::args::JsonArgs;
 use crate::console::Console;
 use crate::output::Output;
-use anyhow::bail;
+use anyhow::{bail, ensure};
 use clap::Args;
-use evaluation::avoidable;
+use evaluation::{avoidable, records};
 use experiment::progress::Interrupted;
 use experiment::run_dir;
 use report::what_if;
 use std::path::PathBuf;
+use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -34,6 +35,11 @@ pub(crate) struct WhatIfArgs {
 
 pub(crate) fn run(args: &WhatIfArgs, output: &Output) -> anyhow::Result<()> {
     let settings = run_dir::settings_of(&args.folder)?;
+    ensure!(
+        sums::is_listed(&args.folder, records::FAILURES)?,
+        "{}: holds no finished evaluation; name the folder of one (cargo xtask evaluate)",
+        args.folder.display()
+    );
     let console = Console::new(output);
     let Some(rows) = avoidable::of_evaluation(&args.folder, &settings, &args.drivers, &console)? else {
         return Err(Interrupted { kept: "nothing is written".to_owned() }.into());
@@ -42,9 +48,6 @@ pub(crate) fn run(args: &WhatIfArgs, output: &Output) -> anyhow::Result<()> {
     if let Some(driver) = args.drivers.iter().find(fails_nowhere) {
         bail!("{}: no near-collision of a driver {driver:?} is in it; its tables name them", args.folder.display());
     }
-    if rows.is_empty() {
-        output.print("no near-collisions");
-        return Ok(());
-    }
-    output.table(|| what_if::table(&rows).to_string(), &rows)
+    let text = || if rows.is_empty() { "no near-collisions".to_owned() } else { what_if::table(&rows).to_string() };
+    output.table(text, &rows)
 }
