@@ -38,27 +38,63 @@ pub fn write(name: &str, content: &[u8]) -> PathBuf {
     path
 }
 
-/// Loads a lot, whatever comes of it.
-pub fn load_lot(path: &Path) {
-    drop(scenarios::load::load(path, &VehicleSettings::hyundai_hg300()));
-}
-
 /// The YAML file of a map.
-pub const MAP: &[u8] = b"image: map.pgm\nresolution: 1.0\norigin: [0.0, 0.0, 0.0]\nmode: trinary\n";
+pub const MAP: &str = "image: map.pgm\nresolution: 1.0\norigin: [0.0, 0.0, 0.0]\nmode: trinary\n";
 /// A centre line on it.
-pub const LINE: &[u8] = b"8,12\n40,12\n";
+pub const LINE: &str = "8,12\n40,12\n";
+/// A lot on both.
+pub const LOT: &str = "map = \"map.yaml\"\ncentre_line = \"line.csv\"\n";
+/// A TPCAP case.
+pub const CASE: &str = "8,12,0,40,12,0,1,4,20,20,24,20,24,24,20,24";
 
-/// Its image: 60 × 30 m of free ground.
+/// The image of the map: 60 × 30 m of free ground.
 pub fn image() -> Vec<u8> {
     [&b"P5\n60 30\n255\n"[..], &[254; 1800]].concat()
 }
 
-/// Loads a map that is sound but for what is given.
-pub fn load_map(yaml: Option<&[u8]>, image: Option<&[u8]>, line: Option<&[u8]>) {
-    write("map.yaml", yaml.unwrap_or(MAP));
-    write("map.pgm", image.unwrap_or(&self::image()));
-    write("line.csv", line.unwrap_or(LINE));
-    load_lot(&write("map.lot.toml", b"map = \"map.yaml\"\ncentre_line = \"line.csv\"\n"));
+/// A file of an import.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Imported {
+    /// [`MAP`]
+    Map,
+    /// [`image`]
+    Image,
+    /// [`LINE`]
+    Line,
+    /// [`LOT`]
+    Lot,
+    /// [`CASE`]
+    Case,
+}
+
+impl Imported {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Map, Self::Image, Self::Line, Self::Lot, Self::Case];
+
+    /// The file, sound.
+    pub fn sound(self) -> Vec<u8> {
+        match self {
+            Self::Map => MAP.into(),
+            Self::Image => image(),
+            Self::Line => LINE.into(),
+            Self::Lot => LOT.into(),
+            Self::Case => CASE.into(),
+        }
+    }
+}
+
+/// Imports a lot that is sound but for one file, whatever comes of it.
+pub fn import(made_up: Imported, content: &[u8]) {
+    let put = |name: &str, file: Imported| write(name, &if file == made_up { content.to_vec() } else { file.sound() });
+    let lot = if made_up == Imported::Case {
+        put("case.csv", Imported::Case)
+    } else {
+        put("map.yaml", Imported::Map);
+        put("map.pgm", Imported::Image);
+        put("line.csv", Imported::Line);
+        put("map.lot.toml", Imported::Lot)
+    };
+    drop(scenarios::load::load(&lot, &VehicleSettings::hyundai_hg300()));
 }
 
 /// The files of a folder that is sound.
@@ -140,16 +176,52 @@ fn files_in(folder: &Path) -> Files {
     files
 }
 
-/// Writes files into a folder within [`folder()`], one of them made up, and lists them as whole: damage is another test's.
-/// The first byte says which, the rest is its content.
-pub fn with_one_made_up(name: &str, sound: &Files, data: &[u8]) -> PathBuf {
-    let folder = folder().join(name);
-    fs::create_dir_all(&folder).expect("there is memory left");
-    let (which, made_up) = data.split_first().unwrap_or((&0, &[]));
-    for (index, (file, content)) in sound.iter().enumerate() {
-        let is_made_up = index == usize::from(*which) % sound.len();
-        write(&format!("{name}/{file}"), if is_made_up { made_up } else { content });
+/// A folder within [`folder()`] whose files are sound but for one.
+#[derive(Debug)]
+pub struct Sound {
+    folder: PathBuf,
+    files: Files,
+    digests: Vec<String>,
+    made_up: Option<usize>,
+}
+
+impl Sound {
+    /// The folder with all files sound, and listed.
+    pub fn new(name: &str, files: Files) -> Self {
+        let folder = folder().join(name);
+        fs::create_dir_all(&folder).expect("there is memory left");
+        let digests = files.iter().map(|(_, content)| sums::digest(content)).collect();
+        let sound = Self { folder, files, digests, made_up: None };
+        sound.files.iter().for_each(|(name, content)| sound.write(name, content));
+        sound.list(|index| &sound.digests[index]);
+        sound
     }
-    sums::list_all(&folder).expect("they are there");
-    folder
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Makes up one file, and lists it as whole: damage is another test's. The first byte says which, the rest is its content.
+    /// The one that was made up before is sound again.
+    pub fn make_up(&mut self, data: &[u8]) {
+        let (which, content) = data.split_first().unwrap_or((&0, &[]));
+        let which = usize::from(*which) % self.files.len();
+        if let Some(before) = self.made_up.replace(which).filter(|before| *before != which) {
+            let (name, content) = &self.files[before];
+            self.write(name, content);
+        }
+        self.write(&self.files[which].0, content);
+        let made_up = sums::digest(content);
+        self.list(|index| if index == which { &made_up } else { &self.digests[index] });
+    }
+
+    fn list<'a>(&'a self, digest: impl Fn(usize) -> &'a String) {
+        let line = |(index, (name, _)): (usize, &(String, Vec<u8>))| format!("{}  {name}\n", digest(index));
+        self.write(sums::FILE, self.files.iter().enumerate().map(line).collect::<String>().as_bytes());
+    }
+
+    fn write(&self, name: &str, content: &[u8]) {
+        fs::write(self.folder.join(name), content).expect("there is memory left");
+    }
 }

@@ -2,5 +2,6 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use scenarios::import::parsers;
 
-fuzz_target!(|line: &[u8]| fuzz::load_map(None, None, Some(line)));
+fuzz_target!(|line: &str| drop(parsers::centre_line(line)));

@@ -2,5 +2,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use scenarios::import::parsers;
 
-fuzz_target!(|yaml: &[u8]| fuzz::load_map(Some(yaml), None, None));
+/// One pixel.
+const IMAGE: &[u8] = b"P5\n1 1\n255\n\xcd";
+
+fuzz_target!(|yaml: &str| drop(parsers::ros_map(yaml, IMAGE)));

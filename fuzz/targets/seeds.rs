@@ -3,17 +3,27 @@
 #![no_main]
 
 use experiment::settings::Settings;
-use fuzz::{Files, LINE, MAP, PLANNERS};
+use fuzz::{CASE, Files, Imported, LINE, MAP, PLANNERS};
 use libfuzzer_sys::fuzz_target;
-use scenarios::reference::{self, ReferenceLot};
-use sim::seed::RootSeed;
 use std::path::Path;
+
+/// Two by two pixels in every format that is read.
+const IMAGES: [&[u8]; 6] = [
+    b"P5\n2 2\n255\n\x00\xfe\xcd\xfe",
+    b"P2\n2 2\n255\n0 254\n205 254\n",
+    b"P1\n2 2\n0 1\n1 0\n",
+    b"P6\n2 2\n255\n\x00\x00\x00\xfe\xfe\xfe\xcd\xcd\xcd\xfe\xfe\xfe",
+    b"P7\nWIDTH 2\nHEIGHT 2\nDEPTH 1\nMAXVAL 255\nTUPLTYPE GRAYSCALE\nENDHDR\n\x00\xfe\xcd\xfe",
+    b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x02\0\0\0\x02\x08\0\0\0\0W\xddR\xf8\0\0\0\x0eIDATx\x9cc\xf8\xc7\xc0p\xf6\x1f\0\x07\x94\x02\xca\
+      \xe1\x95\xf5A\0\0\0\0IEND\xaeB`\x82",
+];
 
 fuzz_target!(init: write().expect("the corpus can be written"), |_bytes: &[u8]| {});
 
 fn write() -> std::io::Result<()> {
-    let lots = ReferenceLot::ALL.map(|lot| scenarios::load::to_toml(&reference::lot(lot, RootSeed(1))).into_bytes());
-    let settings = ["default", "paper", "smoke"].map(|name| Settings::preset(name).expect("a preset").to_toml().into());
+    // By tables: what is read in a tenth of the time is tried ten times as often.
+    let settings = Settings::preset("default").expect("a preset").to_toml();
+    let tables = settings.split_inclusive("\n\n").map(|table| table.as_bytes().to_vec()).collect();
     let planner = |(index, name): (usize, &&str)| {
         let text = experiment::drivers::PlannerFile::text_of(name).expect("it has parameters");
         [&[index as u8][..], text.as_bytes()].concat()
@@ -25,14 +35,16 @@ fn write() -> std::io::Result<()> {
     let network = fuzz::network_files();
     let list: String =
         network.iter().map(|(name, content)| format!("{}  {name}\n", storage::sums::digest(content))).collect();
-    let targets: [(&str, Vec<Vec<u8>>); 14] = [
-        ("scenario", lots.to_vec()),
-        ("settings", settings.to_vec()),
+    let imported = |(index, file): (usize, Imported)| [&[index as u8][..], &file.sound()].concat();
+    let targets: [(&str, Vec<Vec<u8>>); 15] = [
+        ("scenario", words(&[include_str!("../../scenarios/examples/slalom.toml")])),
+        ("settings", tables),
         ("set", words(&["seed=2", "dagger.eta=0.8", "training.lots=[\"lot-a\"]", "dagger.rule.tau_only.tau=0.1"])),
-        ("map", vec![MAP.to_vec()]),
-        ("image", vec![fuzz::image()]),
-        ("centre_line", vec![LINE.to_vec()]),
-        ("tpcap", words(&["8,12,0,40,12,0,1,4,20,20,24,20,24,24,20,24"])),
+        ("map", words(&[MAP])),
+        ("image", IMAGES.map(<[u8]>::to_vec).to_vec()),
+        ("centre_line", words(&[LINE])),
+        ("tpcap", words(&[CASE])),
+        ("import", Imported::ALL.into_iter().enumerate().map(imported).collect()),
         ("planner", PLANNERS.iter().enumerate().map(planner).collect()),
         (
             "names",

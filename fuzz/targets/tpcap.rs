@@ -2,5 +2,6 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use scenarios::import::parsers;
 
-fuzz_target!(|case: &[u8]| fuzz::load_lot(&fuzz::write("case.csv", case)));
+fuzz_target!(|case: &str| drop(parsers::tpcap_case(case)));

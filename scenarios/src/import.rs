@@ -4,14 +4,16 @@
 //! `NAME.lot.toml`; `examples/` has annotated ones. All of its coordinates are metres in the map's own frame, as RViz
 //! shows them; `scale` then enlarges the whole about (0, 0), so that a map of a small robot's world fits a car.
 
+mod centre_line;
 mod contour;
 mod frame;
 mod ground;
+pub mod parsers;
 mod ros;
 mod tpcap;
 
 use crate::branches;
-use crate::error::{LoadError, read_text, shortened};
+use crate::error::{LoadError, read_text};
 use crate::note::{Loaded, Note};
 use crate::solver;
 use crate::solver::route::{self, Finish, NoRoute};
@@ -21,8 +23,7 @@ use serde::Deserialize;
 use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
 use sim::limits::{
-    CSV_BYTES_MAX, ISLANDS_MAX, LOT_BYTES_MAX, MAP_COORDINATE_MAX_M, MAP_PIXEL_M, MAP_SCALE, OUTLINE_CORNERS_MAX,
-    ROUTE_MAX_M, ROUTE_POINTS_MAX,
+    ISLANDS_MAX, LOT_BYTES_MAX, MAP_COORDINATE_MAX_M, MAP_PIXEL_M, MAP_SCALE, OUTLINE_CORNERS_MAX, ROUTE_MAX_M,
 };
 use sim::map::Map;
 use sim::scenario::{Island, LotNoise, Place, ReferencePath, Scenario, ScenarioError};
@@ -44,8 +45,6 @@ const PAINT_M: f32 = 0.01;
 const ISLAND_MIN_M2: f64 = 0.0105;
 /// How far simplification may move an outline, metres in the lot: less than the clearance that routes keep.
 const SIMPLIFIED_M: f64 = 0.2;
-/// Points of a centre line nearer than this count as one, metres in the lot.
-const SAME_POINT_M: f64 = 0.01;
 
 /// A map and the route on it: the content of a `NAME.lot.toml`.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -203,7 +202,7 @@ impl MapLot {
             Source::Map(_) => (self.start, self.goal),
         };
         let goal = goal.filter(|_| !self.is_loop);
-        let centre_line = self.centre_line.as_deref().map(|file| self.read_centre_line(file)).transpose()?;
+        let centre_line = self.centre_line.as_deref().map(|file| centre_line::read(file, self.scale)).transpose()?;
         let seed = match (&centre_line, start, goal, self.is_loop) {
             (Some(points), ..) => points[0],
             (None, Some([x, y, _]), Some(_), false) | (None, Some([x, y, _]), None, true) => [x, y],
@@ -404,57 +403,6 @@ impl MapLot {
     fn island(&self, polygon: Vec<Vec2>) -> Island {
         // What has no height of its own is painted: as low as the lowest kerb.
         Island { polygon, height_m: self.wall_height_m.max(PAINT_M) }
-    }
-
-    /// The points of a CSV file, in the map's frame.
-    fn read_centre_line(&self, file: &Path) -> Result<Vec<[f64; 2]>, LoadError> {
-        let name = file.display().to_string();
-        let text = read_text(file, CSV_BYTES_MAX)?;
-        let mut reader = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .comment(Some(b'#'))
-            .trim(csv::Trim::All)
-            .from_reader(text.as_bytes());
-        let mut points: Vec<[f64; 2]> = Vec::new();
-        for (i, record) in reader.records().enumerate() {
-            let faulty = |line: usize, problem: String| LoadError::Faulty {
-                file: name.clone(),
-                line,
-                problem,
-                remedy: "write one point per line: x,y in metres of the map's frame".to_owned(),
-            };
-            let record = record.map_err(|error| faulty(i + 1, format!("not CSV: {error}")))?;
-            let line = record.position().map_or(i + 1, |position| position.line() as usize);
-            let numbers: Vec<Option<f64>> = record.iter().take(2).map(|cell| cell.parse().ok()).collect();
-            match numbers[..] {
-                [Some(x), Some(y)] if x.abs() <= MAP_COORDINATE_MAX_M && y.abs() <= MAP_COORDINATE_MAX_M => {
-                    if points.len() == ROUTE_POINTS_MAX {
-                        return Err(faulty(line, format!("the line has more than {ROUTE_POINTS_MAX} points")));
-                    }
-                    let is_far = |&[a, b]: &[f64; 2]| self.scale * libm::hypot(a - x, b - y) > SAME_POINT_M;
-                    if points.last().is_none_or(is_far) {
-                        points.push([x, y]);
-                    }
-                }
-                // A first line of words is a header; one with a number is a point that is written wrongly.
-                [None] | [None, None] if i == 0 => {}
-                _ => {
-                    let cells = record.iter().collect::<Vec<_>>().join(",");
-                    return Err(faulty(line, format!("{:?} is no point", shortened(&cells))));
-                }
-            }
-        }
-        if points.len() < 2 {
-            let problem = format!("the line has {} points", points.len());
-            return Err(LoadError::Map {
-                file: name,
-                place: "centre line".to_owned(),
-                problem,
-                remedy: "give at least a start and a finish".to_owned(),
-            });
-        }
-        Ok(points)
     }
 
     /// The car must find room along the whole line: half its width to either side.

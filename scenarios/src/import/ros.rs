@@ -7,12 +7,13 @@
 use super::contour::Mask;
 use crate::error::{LoadError, read_text, shortened};
 use crate::note::Note;
-use image::DynamicImage;
+use image::{DynamicImage, ImageError, ImageReader};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use sim::limits::{IMAGE_BYTES_MAX, IMAGE_SIDE_MAX_PX, MAP_COORDINATE_MAX_M, MAP_RESOLUTION_M, MAP_YAML_BYTES_MAX};
 use std::collections::BTreeMap;
-use std::io::BufReader;
+use std::fmt::Display;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use storage::read;
 
@@ -119,25 +120,22 @@ impl Map {
             let remedy = "put it there, or import the map with cargo xtask generate --image-anywhere";
             return Err(fault(problem, remedy));
         }
-        let content = BufReader::new(read::open(&file, IMAGE_BYTES_MAX).map_err(unreadable)?);
-        let mut reader = image::ImageReader::new(content).with_guessed_format().map_err(unreadable)?;
-        let mut limits = image::Limits::default();
-        (limits.max_image_width, limits.max_image_height) = (Some(IMAGE_SIDE_MAX_PX), Some(IMAGE_SIDE_MAX_PX));
-        reader.limits(limits);
-        let image = reader.decode().map_err(|error| match error {
-            image::ImageError::Limits(_) => {
-                let remedy =
-                    format!("crop it, or halve its resolution: {IMAGE_SIDE_MAX_PX} pixels a side are possible");
-                fault("it is too large".to_owned(), &remedy)
-            }
-            error => fault(format!("no readable image: {error}"), "save the map as PGM or PNG"),
-        })?;
-        if image.width() == 0 || image.height() == 0 {
-            return Err(fault("it has no pixels".to_owned(), "save the map again"));
-        }
-        let mut notes = unknown_keys(&text);
-        notes.extend(header.is_unknown_free(&image).then_some(Note::UnknownIsFree { free_thresh: header.free_thresh }));
-        Ok((header.map(&image), notes))
+        let image = read::bytes(&file, IMAGE_BYTES_MAX).map_err(unreadable)?;
+        header.map_of(&text, &image).map_err(|(problem, remedy)| fault(problem, &remedy))
+    }
+
+    /// [`read`](Self::read), of the text of a YAML file and the bytes of its image.
+    ///
+    /// # Errors
+    /// What is wrong with either.
+    pub(super) fn parse(yaml: &str, image: &[u8]) -> Result<(Self, Vec<Note>), LoadError> {
+        let file = "map.yaml";
+        Header::parse(yaml, Path::new(file))?.map_of(yaml, image).map_err(|(problem, remedy)| LoadError::Map {
+            file: file.to_owned(),
+            place: "image".to_owned(),
+            problem,
+            remedy,
+        })
     }
 
     /// The pixel at a point of the map's frame, metres, counted from the lower left.
@@ -214,6 +212,14 @@ impl Header {
         Ok(header)
     }
 
+    /// The map, and what is to be said about it; or what is wrong with its image, and the remedy.
+    fn map_of(&self, text: &str, image: &[u8]) -> Result<(Map, Vec<Note>), (String, String)> {
+        let image = decode(image)?;
+        let mut notes = unknown_keys(text);
+        notes.extend(self.is_unknown_free(&image).then_some(Note::UnknownIsFree { free_thresh: self.free_thresh }));
+        Ok((self.map(&image), notes))
+    }
+
     fn map(&self, image: &DynamicImage) -> Map {
         let (cols, rows) = (image.width() as usize, image.height() as usize);
         // Row 0 of an image is its top, of a mask its bottom.
@@ -267,6 +273,27 @@ impl Header {
             Mode::Raw => value < DRIVABLE_BELOW_PERCENT,
         }
     }
+}
+
+/// The image in the bytes of a file, or what is wrong with it, and the remedy.
+fn decode(file: &[u8]) -> Result<DynamicImage, (String, String)> {
+    let no_image =
+        |error: &dyn Display| (format!("no readable image: {error}"), "save the map as PGM or PNG".to_owned());
+    let mut reader = ImageReader::new(Cursor::new(file)).with_guessed_format().map_err(|error| no_image(&error))?;
+    let mut limits = image::Limits::default();
+    (limits.max_image_width, limits.max_image_height) = (Some(IMAGE_SIDE_MAX_PX), Some(IMAGE_SIDE_MAX_PX));
+    reader.limits(limits);
+    let image = reader.decode().map_err(|error| match error {
+        ImageError::Limits(_) => {
+            let remedy = format!("crop it, or halve its resolution: {IMAGE_SIDE_MAX_PX} pixels a side are possible");
+            ("it is too large".to_owned(), remedy)
+        }
+        error => no_image(&error),
+    })?;
+    if image.width() == 0 || image.height() == 0 {
+        return Err(("it has no pixels".to_owned(), "save the map again".to_owned()));
+    }
+    Ok(image)
 }
 
 /// Keys that mean nothing here, as a misspelt one does.

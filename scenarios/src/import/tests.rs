@@ -622,12 +622,7 @@ fn unknown_ground_that_counts_as_free_is_named_in_a_note() {
 /// A first point with a letter in it was taken for a header, and the route began at the second.
 #[test]
 fn a_first_line_with_a_number_in_it_is_no_header() {
-    let file = folder("header", &[]).join("line.csv");
-    let lot = small_map("header-map", "[0, 0, 0]");
-    let points_of = |text: &str| {
-        std::fs::write(&file, text).unwrap();
-        lot.read_centre_line(&file).map(|points| points.len())
-    };
+    let points_of = |text: &str| centre_line::parse(text, "line.csv", 1.0).map(|points| points.len());
     assert_eq!(points_of("x,y\n1,2\n3,4\n").unwrap(), 2);
     for text in ["-15.O,-13.2\n1,2\n3,4\n", "1,y\n1,2\n3,4\n"] {
         assert!(points_of(text).unwrap_err().to_string().contains("is no point"), "{text}");

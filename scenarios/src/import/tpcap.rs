@@ -40,7 +40,8 @@ impl Case {
         Self::parse(&read_text(path, CSV_BYTES_MAX)?, &path.display().to_string())
     }
 
-    fn parse(text: &str, file: &str) -> Result<Self, LoadError> {
+    /// [`read`](Self::read), of the text of a file; `file` is its name in errors.
+    pub(super) fn parse(text: &str, file: &str) -> Result<Self, LoadError> {
         let mut numbers = Numbers::of(text, file)?;
         let mut pose = |what: &str| -> Result<[f64; 3], LoadError> {
             let [x, y, theta_rad] = [numbers.next(what)?, numbers.next(what)?, numbers.next(what)?];

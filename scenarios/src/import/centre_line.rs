@@ -1,0 +1,64 @@
+//! A centre line: a CSV file with a point per line, x and y in metres of the map's frame.
+
+use crate::error::{LoadError, read_text, shortened};
+use sim::limits::{CSV_BYTES_MAX, MAP_COORDINATE_MAX_M, ROUTE_POINTS_MAX};
+use std::path::Path;
+
+/// Points nearer than this count as one, metres in the lot.
+const SAME_POINT_M: f64 = 0.01;
+
+/// Reads the points of a line, two at least, for a lot that is so many times as large as the map.
+///
+/// # Errors
+/// What is wrong with it, with file, line and remedy.
+pub(super) fn read(path: &Path, scale: f64) -> Result<Vec<[f64; 2]>, LoadError> {
+    parse(&read_text(path, CSV_BYTES_MAX)?, &path.display().to_string(), scale)
+}
+
+/// [`read`], of the text of a file; `file` is its name in errors.
+pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>, LoadError> {
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    for (i, record) in reader.records().enumerate() {
+        let faulty = |line: usize, problem: String| LoadError::Faulty {
+            file: file.to_owned(),
+            line,
+            problem,
+            remedy: "write one point per line: x,y in metres of the map's frame".to_owned(),
+        };
+        let record = record.map_err(|error| faulty(i + 1, format!("not CSV: {error}")))?;
+        let line = record.position().map_or(i + 1, |position| position.line() as usize);
+        let numbers: Vec<Option<f64>> = record.iter().take(2).map(|cell| cell.parse().ok()).collect();
+        match numbers[..] {
+            [Some(x), Some(y)] if x.abs() <= MAP_COORDINATE_MAX_M && y.abs() <= MAP_COORDINATE_MAX_M => {
+                if points.len() == ROUTE_POINTS_MAX {
+                    return Err(faulty(line, format!("the line has more than {ROUTE_POINTS_MAX} points")));
+                }
+                let is_far = |&[a, b]: &[f64; 2]| scale * libm::hypot(a - x, b - y) > SAME_POINT_M;
+                if points.last().is_none_or(is_far) {
+                    points.push([x, y]);
+                }
+            }
+            // A first line of words is a header; one with a number is a point that is written wrongly.
+            [None] | [None, None] if i == 0 => {}
+            _ => {
+                let cells = record.iter().collect::<Vec<_>>().join(",");
+                return Err(faulty(line, format!("{:?} is no point", shortened(&cells))));
+            }
+        }
+    }
+    if points.len() < 2 {
+        return Err(LoadError::Map {
+            file: file.to_owned(),
+            place: "centre line".to_owned(),
+            problem: format!("the line has {} points", points.len()),
+            remedy: "give at least a start and a finish".to_owned(),
+        });
+    }
+    Ok(points)
+}
