@@ -80,10 +80,13 @@ fn deaths_full_disks_and_errors_of_the_disk_lose_nothing() {
     let printed =
         succeed(xtask().args(["torture", "--only", "evaluate,tune,generate", "--strikes", "2", "--kills", "1"]));
     assert_eq!(printed.lines().filter(|line| line.ends_with("| 0 |")).count(), 3, "{printed}");
-    let of_three = ["torture", "--only", "export", "--strikes", "3", "--kills", "1", "--shard"];
-    for (shard, struck) in [("1/2", "| 2 of"), ("2/2", "| 1 of")] {
-        let printed = succeed(xtask().args(of_three).arg(shard));
-        assert_eq!(printed.matches(struck).count(), 3, "one for each fault: {printed}");
+    // Three of four operations for two of the faults, and of eight for the third.
+    let of_three = ["torture", "--only", "export", "--strikes", "3", "--kills", "1"];
+    let parts =
+        [(["--shard", "1/2"], "| 2 of", 3), (["--shard", "2/2"], "| 1 of", 3), (["--from", "4"], "| 1 of 4", 2)];
+    for (part, struck, faults) in parts {
+        let printed = succeed(xtask().args(of_three).args(part));
+        assert_eq!(printed.matches(struck).count(), faults, "{part:?}: {printed}");
     }
 }
 

@@ -23,6 +23,8 @@ const FAILURES_MAX: usize = 10;
 pub struct Extent {
     /// Operations that each fault strikes, evenly spaced; all of them if there are no more.
     pub strikes: usize,
+    /// The first of them, counted from 1 among all operations: those before it were struck by a run that was stopped.
+    pub from: usize,
     /// Which of them.
     pub share: Share,
     /// Deaths at random times.
@@ -90,15 +92,15 @@ impl Workplace {
             }
             let operations = self.library.operations()?;
             let strikes = extent.strikes.min(operations.len());
-            let share = extent.share;
-            for strike in (share.index..strikes).step_by(share.of) {
-                let at = (2 * strike + 1) * operations.len() / (2 * strikes);
+            let evenly_spaced = (0..strikes).map(|strike| (2 * strike + 1) * operations.len() / (2 * strikes));
+            let to_strike = evenly_spaced.filter(|at| at + 1 >= extent.from);
+            for at in to_strike.skip(extent.share.index).step_by(extent.share.of) {
                 let operation = &operations[at];
                 let what = format!("{} at {} of {}, {operation}", fault.name(), at + 1, operations.len());
                 let came = self.strike(case, fault, at + 1).and_then(|()| self.compare(&right));
                 self.note(&mut outcome, &what, came)?;
                 outcome.struck[kind].0 += 1;
-                progress((kind as f64 + strike as f64 / strikes as f64) / (Fault::ALL.len() + 1) as f64);
+                progress((kind as f64 + at as f64 / operations.len() as f64) / (Fault::ALL.len() + 1) as f64);
             }
             outcome.struck[kind].1 = operations.len();
         }

@@ -12,7 +12,8 @@ use torture::trial::{Extent, Outcome, Share, Workplace};
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask torture --only evaluate --strikes 10
-  cargo xtask torture --only train-dagger --kills 1 --shard 1/8
+  cargo xtask torture --only train-dagger --kills 1 --shard 1/8      the other seven elsewhere
+  cargo xtask torture --only train-dagger --kills 1 --from 1228      what is left of one that was stopped
   cargo xtask torture --kills 100               every operation of every command: many hours";
 
 #[derive(Debug, Clone, Args)]
@@ -23,6 +24,9 @@ pub(crate) struct TortureArgs {
     /// Operations on files that each fault strikes, evenly spaced over those of a command [default: all].
     #[arg(long, value_name = "N")]
     strikes: Option<u16>,
+    /// Begins with this operation of each fault, to go on where a run was stopped.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    from: u16,
     /// Strikes only this share of these operations. Kills are not shared out: give each shard another `--seed`, or few
     /// `--kills`.
     #[arg(long, value_name = "NUMBER/OF")]
@@ -49,7 +53,13 @@ pub(crate) fn run(args: &TortureArgs, output: &Output) -> anyhow::Result<()> {
     for case in cases {
         console.begin("torture", case.name);
         let strikes = args.strikes.map_or(usize::MAX, usize::from);
-        let extent = Extent { strikes, share: share(args.shard), kills: args.kills.into(), seed: args.seed };
+        let extent = Extent {
+            strikes,
+            from: args.from.into(),
+            share: share(args.shard),
+            kills: args.kills.into(),
+            seed: args.seed,
+        };
         let outcome = workplace.torture(case, &extent, &mut |share| console.at(share, &mut |_| String::new()))?;
         console.end("compared");
         outcome.failures.iter().for_each(|failure| note(format_args!("{}: {failure}", case.name)));
