@@ -11,6 +11,7 @@ use crate::plan::Plan;
 use crate::read::Places;
 use crate::records::{self, Driven, FailureRecord, RunRecord, WallTimeRecord};
 use crate::results::EvaluationResults;
+use anyhow::ensure;
 use experiment::drive::TrialBatch;
 use experiment::drive_digest::DriveDigest;
 use experiment::inputs;
@@ -27,8 +28,9 @@ use std::time::Instant;
 use storage::growing::{self, Growing};
 use storage::sums;
 
-/// Trials driven at a time. A constant: neither memory nor results depend on how many runs or threads there are.
-pub(crate) const BATCH: usize = 16;
+/// Trials driven at a time, and so threads that one driver keeps busy. A constant: neither memory nor results depend on how
+/// many runs or threads there are.
+pub(crate) const BATCH: usize = 32;
 
 /// Files that are written line by line.
 pub(crate) const FILES: [&str; 3] = [records::RUNS, records::FAILURES, records::WALL_TIME];
@@ -61,6 +63,17 @@ pub fn evaluate(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyho
     }
 }
 
+/// Runs in the first parts of a plan.
+fn runs_in(plan: &Plan<'_>, parts: usize) -> usize {
+    let trials = plan.trials().count();
+    let parts_of_batch = plan.drivers.len() * plan.settings.evaluation.noise.len();
+    let batches = trials.div_ceil(BATCH);
+    let parts = parts.min(batches * parts_of_batch);
+    let (whole, begun) = (parts / parts_of_batch, parts % parts_of_batch);
+    let trials_of = |batches: usize| trials.min(batches * BATCH);
+    trials_of(whole) * parts_of_batch + (trials_of(whole + 1) - trials_of(whole)) * begun
+}
+
 /// An evaluation under way. Its parts are what one driver drives of a batch at one noise level.
 struct Driving<'a> {
     plan: &'a Plan<'a>,
@@ -89,8 +102,15 @@ impl<'a> Driving<'a> {
                 results.take_failure(&places, &failure)
             })?;
         }
+        ensure!(
+            done == runs_in(plan, lines.parts()),
+            "{}: {done} runs in {} parts, which are not the parts of this version; finish it with the one that began it, \
+             or begin again with another --out",
+            folder.join(records::RUNS).display(),
+            lines.parts()
+        );
         progress.begin("evaluation", "driving");
-        let all = plan.trials().count() * plan.drivers.len() * plan.settings.evaluation.noise.len();
+        let all = runs_in(plan, usize::MAX);
         let track = Track { progress, runs: all, done, near_collisions };
         Ok(Self { plan, lines, results, track, parts: 0, trials: 0 })
     }
@@ -257,4 +277,34 @@ fn line(text: &mut Vec<u8>, value: &impl Serialize) -> anyhow::Result<()> {
     serde_json::to_writer(&mut *text, value)?;
     text.push(b'\n');
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use experiment::drivers::NamedDriver;
+    use experiment::lots::Lot;
+    use experiment::progress::Silent;
+    use expert::ExpertSettings;
+
+    /// Parts are skipped by their number: those of other batches would have been taken for ours, without a word.
+    #[test]
+    fn parts_of_other_batches_are_refused() {
+        let mut settings = Settings::preset("default").unwrap();
+        // Both ways: a whole batch, and one of ten.
+        settings.evaluation.trials = BATCH as u32 / 2 + 5;
+        let lots = Lot::parse_all(&["lot-a"], &settings.episode.vehicle).unwrap();
+        let drivers = ["a", "b"].map(|name| NamedDriver::expert(&ExpertSettings::half_points()).renamed(name)).to_vec();
+        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0, shard: None };
+        let all = 2 * BATCH + 20;
+        assert_eq!([0, 1, 2, 3, 4, 5].map(|parts| runs_in(&plan, parts)), [0, BATCH, 2 * BATCH, all - 10, all, all]);
+
+        let folder = std::env::temp_dir().join(format!("evaluation-test-{}-parts", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let mut lines = Growing::open(&folder, DRIVING, &FILES).unwrap();
+        lines.add(&[const { Vec::new() }; 3]).unwrap();
+        let error = Driving::open(&plan, &folder, &Silent).err().unwrap().to_string();
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert!(error.contains("runs.jsonl: 0 runs in 1 parts"), "{error}");
+    }
 }
