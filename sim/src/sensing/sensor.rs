@@ -7,7 +7,9 @@ pub use inspect::Inspection;
 
 use openings::Openings;
 
-use super::noise::{BoundaryShift, NoiseField, NoiseSettings, Patch, Reads, Region, Shadow, wobble_growth};
+use super::noise::patch::{Patch, Reads, Region};
+use super::noise::shadow::Shadow;
+use super::noise::{BoundaryShift, NoiseField, NoiseSettings, wobble_growth};
 use super::occlusion::{Camera, CellBox, ConvexInEgo, TallObject};
 use super::quadtree::{BLOCK_CELLS, BLOCKS, PixelLattice, pixels_of, to_corner_m};
 use super::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, GridGeometry, Observation, OccupancyGrid};

@@ -3,7 +3,8 @@
 use super::{EgoView, Sensor};
 use crate::geometry::Pose;
 use crate::map::Map;
-use crate::sensing::noise::{Layer, Reads};
+use crate::sensing::noise::Layer;
+use crate::sensing::noise::patch::Reads;
 use crate::sensing::{BEV_PIXELS, BirdsEyeView, CELL_PIXELS, GRID_CELLS, Observation, OccupancyGrid};
 
 /// One observation, explained pixel by pixel and cell by cell: row 0 = far, column 0 = left.
