@@ -5,8 +5,9 @@ use crate::plan::Plan;
 use crate::shards::{self, ShardRecord};
 use anyhow::{Context as _, ensure};
 use experiment::drivers::DriverSpec;
-use experiment::run_dir::{self, Inputs, Manifest};
+use experiment::manifest::{self, Inputs, Manifest};
 use experiment::settings::{EvaluationSettings, Settings};
+use experiment::trained;
 use serde::Deserialize as _;
 use std::path::{Path, PathBuf};
 
@@ -37,14 +38,14 @@ impl EvaluationRun {
             "{name}: a shard among whole evaluations; merge the shards first, then their evaluation with the others"
         );
         ensure!(
-            run_dir::is_finished(folder)?,
+            manifest::is_finished(folder)?,
             "{name}: not finished; go on with: cargo xtask {COMMAND} --resume {name}"
         );
         let drivers = manifest.arguments.get("drivers").cloned();
         let drivers = drivers.with_context(|| format!("{name}/manifest.toml: names no drivers"))?;
         let drivers = Vec::<String>::deserialize(drivers).with_context(|| format!("{name}/manifest.toml: drivers"))?;
         let drivers = DriverSpec::parse_all(&drivers).with_context(|| format!("{name}/manifest.toml"))?;
-        Ok(Self { folder: folder.to_owned(), settings: run_dir::settings_of(folder)?, manifest, drivers })
+        Ok(Self { folder: folder.to_owned(), settings: trained::settings_of(folder)?, manifest, drivers })
     }
 
     /// Refuses what was driven otherwise.

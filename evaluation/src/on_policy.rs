@@ -9,8 +9,9 @@ use anyhow::Context as _;
 use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::progress::Progress;
-use experiment::run_dir::{self, RunDir};
+use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
+use experiment::trained;
 use experiment::trials::{self, Purpose, Trial};
 use experiment::{drive, drivers};
 use policy::checkpoint::Checkpoint;
@@ -186,8 +187,8 @@ pub fn run(
     let mut calibration = Vec::new();
     for (name, path, chain, rounds) in [
         ("BC", weighted.store.round_folder(0), weighted, 0),
-        ("DAgger", run_dir::policy_folder(&folder(Chain::Weighted))?, weighted, weighted.iterations()),
-        ("DAgger, α = 0", run_dir::policy_folder(&folder(Chain::Unweighted))?, unweighted, unweighted.iterations()),
+        ("DAgger", trained::policy_folder(&folder(Chain::Weighted))?, weighted, weighted.iterations()),
+        ("DAgger, α = 0", trained::policy_folder(&folder(Chain::Unweighted))?, unweighted, unweighted.iterations()),
     ] {
         let Some(driven) = drives.of(&path)? else { return Ok(false) };
         let policy = Checkpoint::load(&path)?;

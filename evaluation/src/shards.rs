@@ -4,9 +4,10 @@ use crate::parts::{self, Part, Rows};
 use crate::plan::Plan;
 use crate::stages::{self, Stage};
 use anyhow::{Context as _, ensure};
-use experiment::run_dir::{self, Manifest};
+use experiment::manifest::{self, Manifest};
 use experiment::settings::Settings;
 use experiment::shard::Shard;
+use experiment::trained;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use storage::sums;
@@ -107,12 +108,12 @@ impl ShardRun {
         let record = record
             .with_context(|| format!("{name}: this is no shard; name the folders that a command with --shard wrote"))?;
         ensure!(
-            run_dir::is_finished(folder)?,
+            manifest::is_finished(folder)?,
             "{name}: shard {} is not finished; go on with: cargo xtask {} --resume {name}",
             record.number,
             manifest.command
         );
-        let settings = run_dir::settings_of(folder)?;
+        let settings = trained::settings_of(folder)?;
         ensure!(
             digest(&settings) == record.settings_sha256,
             "{name}: its settings.toml is not the one that it was begun with; restore it, or make the shard again"

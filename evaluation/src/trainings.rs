@@ -174,7 +174,7 @@ fn add(sums: &mut [f64], row: &[RunSummary]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use experiment::run_dir::Training;
+    use experiment::trained::Training;
     use std::collections::BTreeSet;
 
     fn trained(recipe: &str, seed: u64) -> NamedDriver {

@@ -1,7 +1,7 @@
 //! Drivers: how they are named, and how they get to the wheel.
 
-use crate::run_dir::{self, Training};
 use crate::settings::{Layers, Settings, Smoothing};
+use crate::trained::{self, Training};
 use anyhow::{Context as _, bail, ensure};
 use expert::{ExpertSettings, ScriptedExpert, Sees};
 use onnx::fleet::OnnxFleet;
@@ -255,7 +255,7 @@ impl DriverSpec {
     fn checkpoints(&self) -> anyhow::Result<Vec<Checkpoint>> {
         match self {
             Self::Run { folder } => {
-                run_dir::driving_folders(folder)?.iter().map(|folder| Ok(Checkpoint::load(folder)?)).collect()
+                trained::driving_folders(folder)?.iter().map(|folder| Ok(Checkpoint::load(folder)?)).collect()
             }
             Self::Checkpoint { folder } => {
                 ensure!(
@@ -304,7 +304,7 @@ impl DriverSpec {
             Self::Callback { .. } => bail!("driver {name:?} is a function of another program"),
         };
         let training = match &self {
-            Self::Run { folder } => match run_dir::training_of(folder) {
+            Self::Run { folder } => match trained::training_of(folder) {
                 Ok(training) => Some(training),
                 Err(error) if storage::is_of_disk(error.as_ref()) => return Err(error),
                 // Of a run whose settings this version cannot read, the network alone can be used.
@@ -325,9 +325,9 @@ impl DriverSpec {
 pub fn settings_of_runs<'s>(specs: &'s [DriverSpec], layers: &Layers) -> anyhow::Result<Option<(Settings, &'s Path)>> {
     let mut runs = specs.iter().filter_map(|spec| Some((spec, spec.run()?)));
     let Some((spec, path)) = runs.next().filter(|_| !layers.names_a_base()) else { return Ok(None) };
-    let of_run = run_dir::settings_of(path).with_context(|| format!("driver {spec}"))?;
+    let of_run = trained::settings_of(path).with_context(|| format!("driver {spec}"))?;
     for (other, path) in runs {
-        let of_other = run_dir::settings_of(path).with_context(|| format!("driver {other}"))?;
+        let of_other = trained::settings_of(path).with_context(|| format!("driver {other}"))?;
         ensure!(
             of_other.episode == of_run.episode,
             "drivers {spec} and {other} were trained with different settings of episode (car, sensor, metrics), so neither \

@@ -4,7 +4,7 @@ use crate::drivers::NamedDriver;
 use crate::lots::Lot;
 use std::path::PathBuf;
 
-pub use crate::run_dir::Inputs;
+pub use crate::manifest::Inputs;
 
 /// Those of some lots and drivers; what ships with the program is not among them.
 pub fn of(lots: &[Lot], drivers: &[NamedDriver]) -> Inputs {

@@ -12,7 +12,9 @@
 //! | [`replay_key`] | a short text that identifies one run and a tick in it |
 //! | [`training`] | behaviour cloning and DAgger into a run folder |
 //! | [`inputs`] | digests of the files that a run reads, so that it goes on with the same |
-//! | [`run_dir`] | the run folder, its manifest, and how it is claimed |
+//! | [`run_dir`] | the run folder, and how it is claimed |
+//! | [`manifest`] | what a run says of itself: who made it of what, and what it came to |
+//! | [`trained`] | the networks that runs have trained |
 //! | [`view_request`] | what the viewer program is asked to record |
 //! | [`progress`] | how long tasks report progress and are cancelled |
 //!
@@ -23,12 +25,16 @@ pub mod drive_digest;
 pub mod drivers;
 pub mod inputs;
 pub mod lots;
+pub mod manifest;
 pub mod notes;
 pub mod progress;
 pub mod replay_key;
 pub mod run_dir;
 pub mod settings;
 pub mod shard;
+#[cfg(test)]
+mod test_runs;
+pub mod trained;
 pub mod training;
 pub mod trials;
 pub mod view_request;

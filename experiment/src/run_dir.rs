@@ -13,23 +13,18 @@
 //!   .lock              who writes here
 //! ```
 
+use crate::manifest::{
+    Build, FINISHED, FINISHED_SCHEMA, Finished, Inputs, MANIFEST, Manifest, Outcome, Request, SETTINGS, has_changed,
+    is_finished,
+};
 use crate::settings::Settings;
-use anyhow::{Context as _, anyhow, bail, ensure};
-use policy::dagger::Stop;
-use serde::{Deserialize, Serialize};
-use sim::limits::{RUN_TOML_BYTES_MAX, SETTINGS_BYTES_MAX};
-use sim::seed::RootSeed;
-use std::collections::{BTreeMap, BTreeSet};
+use anyhow::{Context as _, bail, ensure};
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use storage::lock::{self, Lock};
 use storage::{sums, whole};
-
-const MANIFEST: &str = "manifest.toml";
-const SETTINGS: &str = "settings.toml";
-const FINISHED: &str = "finished.toml";
 
 /// A claimed folder: nobody else writes into it until the last clone is dropped, or the process ends.
 #[derive(Debug, Clone)]
@@ -42,144 +37,6 @@ pub struct RunDir {
     inputs: Arc<Inputs>,
     /// Of that run, where this folder was reopened by itself.
     _lock_of_run: Option<Arc<Lock>>,
-}
-
-/// SHA-256 of what is read from elsewhere by name, as on the command line: see [`inputs`](crate::inputs).
-pub type Inputs = BTreeMap<String, String>;
-
-/// What a run was asked for beside its settings, and what it reads from elsewhere.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Request {
-    /// Arguments of the command.
-    pub arguments: toml::Table,
-    /// Lots, parameters and networks from files.
-    pub inputs: Inputs,
-}
-
-/// A training that may have been done several times, with other seeds.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Training {
-    /// What all of them have in common: SHA-256 of the program's version, the settings but seed and evaluation, the lots from
-    /// files, and which policy of the run it is.
-    pub recipe: String,
-    /// Its root seed.
-    pub seed: RootSeed,
-    /// Lots that it was trained on, as in its settings.
-    pub lots: Vec<String>,
-    /// SHA-256 of those from files: they are known by it wherever they lie now.
-    pub digests: BTreeSet<String>,
-}
-
-/// What made a run: `manifest.toml`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Manifest {
-    /// Version of this format: [`MANIFEST_SCHEMA`].
-    pub schema: u32,
-    /// The name and version of the program.
-    pub program: String,
-    /// The command that made it, and alone can go on with it.
-    pub command: String,
-    /// The command line, without the name of the program.
-    pub command_line: Vec<String>,
-    /// What the settings started from.
-    pub preset: String,
-    /// Root seed of the training.
-    pub root_seed: u64,
-    /// Root seed of the trials of the evaluation.
-    pub evaluation_seed: u64,
-    /// Revision of the repository that the program was built from, if known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub git_revision: Option<String>,
-    /// Whether files of the repository differed from that revision.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub git_dirty: Option<bool>,
-    /// The compiler that built the program.
-    pub rustc_version: String,
-    /// Threads it computed with; results do not depend on it.
-    pub threads: usize,
-    /// Architecture and operating system.
-    pub target: String,
-    /// The processor, if known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub processor: Option<String>,
-    /// Its instructions that sums of networks may depend on: `avx2`, `fma`, …
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub processor_features: Vec<String>,
-    /// The libraries that compute, with their versions: `libm 0.2.16`.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub libraries: Vec<String>,
-    /// What was asked for beside the settings.
-    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
-    pub arguments: toml::Table,
-    /// SHA-256 of what was read from elsewhere.
-    #[serde(default, skip_serializing_if = "Inputs::is_empty")]
-    pub inputs: Inputs,
-}
-
-/// The version of `manifest.toml` that this program writes.
-pub const MANIFEST_SCHEMA: u32 = 3;
-
-/// What a run came to, written last: `finished.toml`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Finished {
-    /// Version of this format: [`FINISHED_SCHEMA`].
-    pub schema: u32,
-    /// What was done.
-    pub outcome: Outcome,
-}
-
-/// The version of `finished.toml` that this program writes.
-pub const FINISHED_SCHEMA: u32 = 1;
-
-/// What was done in a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case", tag = "kind", deny_unknown_fields)]
-pub enum Outcome {
-    /// Behaviour cloning, or DAgger.
-    Training {
-        /// Why it ended.
-        stop: Stop,
-        /// Rounds, behaviour cloning included.
-        rounds: usize,
-    },
-    /// Drivers were driven.
-    Evaluation {
-        /// Who, as named on the command line.
-        drivers: Vec<String>,
-    },
-    /// Parameters of planners were searched.
-    Tuning {
-        /// Which.
-        planners: Vec<String>,
-    },
-    /// The paper was reproduced.
-    Reproduction {
-        /// Stages that were done.
-        stages: usize,
-    },
-}
-
-/// The program that makes a run, as its manifest describes it.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Build {
-    /// Name and version.
-    pub program: String,
-    /// The command line, without the name of the program.
-    pub command_line: Vec<String>,
-    /// Revision of the repository, if known.
-    pub git_revision: Option<String>,
-    /// Whether files of the repository differ from that revision.
-    pub git_dirty: Option<bool>,
-    /// The compiler.
-    pub rustc_version: String,
-    /// The processor that it runs on, if known.
-    pub processor: Option<String>,
-    /// Its instructions that sums of networks may depend on.
-    pub processor_features: Vec<String>,
-    /// The libraries that compute, with their versions.
-    pub libraries: Vec<String>,
 }
 
 /// Where a run goes.
@@ -217,7 +74,8 @@ impl RunDir {
             Some(out) => Self::claim_named(out, place)?,
             None => Self::claim_next_free(place)?,
         };
-        let manifest = toml::to_string(&Manifest::new(place, settings, request)).expect("a manifest is plain values");
+        let manifest = toml::to_string(&Manifest::new(place.build, [place.command, place.preset], settings, request))
+            .expect("a manifest is plain values");
         whole::write(&run.path.join(SETTINGS), settings.to_toml().as_bytes())?;
         whole::write(&run.path.join(MANIFEST), manifest.as_bytes())?;
         sums::list(&run.path, &[SETTINGS, MANIFEST])?;
@@ -246,7 +104,7 @@ impl RunDir {
         );
         ensure!(!is_finished(path)?, "{}: this run is finished; nothing is left to resume", path.display());
         let run = Self { inputs: Arc::new(manifest.inputs.clone()), ..run };
-        Ok((run, settings_of(path)?, manifest))
+        Ok((run, Settings::read(&path.join(SETTINGS))?, manifest))
     }
 
     /// Reopens the folder of a run, or of a finished stage of one, to write into it, whether it is finished or not.
@@ -292,7 +150,7 @@ impl RunDir {
             // A death between the two, or another run that somebody put there.
             let Manifest { command, inputs, .. } = Manifest::read(&path)?;
             ensure!(
-                command == place.command && settings_of(&path)? == *settings,
+                command == place.command && Settings::read(&path.join(SETTINGS))? == *settings,
                 "{}: this is another run, not a stage of this one; move it elsewhere, and go on with --resume",
                 path.display()
             );
@@ -446,10 +304,6 @@ impl RunDir {
     }
 }
 
-fn has_changed(name: &str) -> anyhow::Error {
-    anyhow!("{name}: changed since this run was begun; restore it, or begin again into another folder")
-}
-
 /// Refuses a folder or file within a run, whose files would no longer be its own alone.
 ///
 /// # Errors
@@ -510,244 +364,11 @@ pub fn digest(path: &Path) -> anyhow::Result<String> {
     Ok(sums::digest_of_all(path, &DIFFERENT)?)
 }
 
-/// What a run came to; `None` if it is not finished.
-///
-/// # Errors
-/// If the file is missing, damaged or of another version.
-pub fn finished(path: &Path) -> anyhow::Result<Option<Finished>> {
-    let file = path.join(FINISHED);
-    let Some(text) = sums::read_if_listed(&file, RUN_TOML_BYTES_MAX)? else { return Ok(None) };
-    let text = String::from_utf8(text).with_context(|| file.display().to_string())?;
-    let finished: Finished = toml::from_str(&text).with_context(|| file.display().to_string())?;
-    ensure!(
-        finished.schema == FINISHED_SCHEMA,
-        "{}: written by another version of lotpilot (schema {}, this one reads {FINISHED_SCHEMA})",
-        file.display(),
-        finished.schema
-    );
-    Ok(Some(finished))
-}
-
-/// Whether a run is finished.
-///
-/// # Errors
-/// See [`finished`].
-pub fn is_finished(path: &Path) -> anyhow::Result<bool> {
-    Ok(finished(path)?.is_some())
-}
-
-/// The folder with the checkpoint that `run:DIR` or `run:DIR/bc` names.
-///
-/// # Errors
-/// If there is no run, no network in it yet, or one of its rounds is missing or incomplete.
-pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
-    let (run, is_bc) = run_of(spec)?;
-    let names = sums::names(run)?;
-    let folders = names.iter().filter_map(|name| name.strip_suffix(&format!("/{}", sums::FILE)));
-    // Not `round-01-critic`: what is trained beside the network of a round.
-    let round_of = |folder: &str| folder.strip_prefix("round-")?.parse::<u32>().ok();
-    let mut folders: Vec<&str> = folders.filter(|folder| *folder == "final" || round_of(folder).is_some()).collect();
-    let rounds = folders.iter().filter(|folder| **folder != "final").count();
-    if let Some(Finished { outcome: Outcome::Training { rounds: expected, .. }, .. }) = finished(run)? {
-        ensure!(
-            rounds == expected,
-            "{}: {rounds} rounds are listed of {expected} that were finished; restore sha256sums from a copy, or train \
-             again into another folder",
-            run.display()
-        );
-    }
-    folders.sort_by_key(|folder| (*folder == "final", round_of(folder)));
-    let folder = if is_bc { folders.first() } else { folders.last() };
-    let folder = folder.with_context(|| {
-        let command = Manifest::read(run).map_or_else(|_| "another command".to_owned(), |manifest| manifest.command);
-        if command.starts_with("train-") {
-            format!("{}: no network is trained there yet; finish it with --resume {0}", run.display())
-        } else {
-            format!("{}: this is a run of {command}, which has no network of its own; name a training", run.display())
-        }
-    })?;
-    sums::read_listed(run, &format!("{folder}/{}", sums::FILE), sums::LIST_BYTES_MAX)?;
-    Ok(run.join(folder))
-}
-
-/// The folders with the checkpoints that drive as `run:DIR` or `run:DIR/bc`: the policy and, if the decision rule
-/// has an ensemble drive, its other members. A final fit, and `bc`, are one network.
-///
-/// # Errors
-/// See [`policy_folder`].
-pub fn driving_folders(spec: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let policy = policy_folder(spec)?;
-    let (run, is_bc) = run_of(spec)?;
-    // Damage is an error. Settings that are whole may be of another version: the network alone can be used then.
-    sums::read(&run.join(SETTINGS), SETTINGS_BYTES_MAX)?;
-    let members = settings_of(spec).map_or(1, |settings| settings.dagger.rule.members());
-    let round = policy.file_name().and_then(|name| name.to_str()).filter(|name| !is_bc && name.starts_with("round-"));
-    let others = round.into_iter().flat_map(|round| (1..members).map(move |member| format!("{round}-member-{member}")));
-    let others: Vec<PathBuf> = others
-        .map(|member| {
-            sums::read_listed(run, &format!("{member}/{}", sums::FILE), sums::LIST_BYTES_MAX)?;
-            Ok(run.join(member))
-        })
-        .collect::<anyhow::Result<_>>()?;
-    Ok(std::iter::once(policy).chain(others).collect())
-}
-
-/// The settings of the run that `run:DIR` or `run:DIR/bc` names.
-///
-/// # Errors
-/// If there is no run, or its settings are not of this program.
-pub fn settings_of(spec: &Path) -> anyhow::Result<Settings> {
-    Settings::read(&run_of(spec)?.0.join(SETTINGS))
-}
-
-/// What a policy `DIR` or `DIR/bc` was trained by.
-///
-/// # Errors
-/// See [`settings_of`].
-pub fn training_of(spec: &Path) -> anyhow::Result<Training> {
-    let mut settings = settings_of(spec)?;
-    let seed = std::mem::replace(&mut settings.seed, RootSeed(0));
-    settings.evaluation = Settings::preset("default")?.evaluation;
-    let policy = if run_of(spec)?.1 { "bc" } else { "final" };
-    let Manifest { program, inputs, .. } = Manifest::read(run_of(spec)?.0)?;
-    let digests: Vec<_> = settings.training.lots.iter().map(|lots| inputs.get(lots)).collect();
-    let recipe = sums::digest(format!("{policy}\n{program}\n{digests:?}\n{}", settings.to_toml()).as_bytes());
-    let digests = digests.into_iter().flatten().cloned().collect();
-    Ok(Training { recipe, seed, lots: settings.training.lots, digests })
-}
-
-/// The folder of the run, and whether its policy after behaviour cloning is meant.
-fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
-    let (run, is_bc) = match (spec.file_name(), spec.parent()) {
-        (Some(name), Some(run)) if name == "bc" && !spec.is_dir() => (run, true),
-        _ => (spec, false),
-    };
-    ensure!(
-        sums::exists(run)? || !run.join(SETTINGS).is_file(),
-        "{}: this run has no sha256sums: an earlier version made it, or the list is lost; train again into another folder, \
-         or restore the list from a copy",
-        run.display()
-    );
-    ensure!(
-        sums::exists(run)?,
-        "{}: this is no run; train one with cargo xtask train-dagger, or list the folders in runs/",
-        run.display()
-    );
-    Ok((run, is_bc))
-}
-
-/// Architecture and operating system.
-fn target() -> String {
-    format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS)
-}
-
-impl Manifest {
-    fn new(place: &Place<'_>, settings: &Settings, request: &Request) -> Self {
-        let Place { build, command, preset, .. } = *place;
-        Self {
-            schema: MANIFEST_SCHEMA,
-            program: build.program.clone(),
-            command: command.to_owned(),
-            command_line: build.command_line.clone(),
-            preset: preset.to_owned(),
-            root_seed: settings.seed.0,
-            evaluation_seed: settings.evaluation.seed.0,
-            git_revision: build.git_revision.clone(),
-            git_dirty: build.git_dirty,
-            rustc_version: build.rustc_version.clone(),
-            threads: rayon::current_num_threads(),
-            target: target(),
-            processor: build.processor.clone(),
-            processor_features: build.processor_features.clone(),
-            libraries: build.libraries.clone(),
-            arguments: request.arguments.clone(),
-            inputs: request.inputs.clone(),
-        }
-    }
-
-    /// Whether what is read from elsewhere is what the run was begun with.
-    ///
-    /// # Errors
-    /// Naming what differs.
-    pub fn check_inputs(&self, found: &Inputs) -> anyhow::Result<()> {
-        for (name, digest) in &self.inputs {
-            if found.get(name) != Some(digest) {
-                return Err(has_changed(name));
-            }
-        }
-        ensure!(found.len() == self.inputs.len(), "this run was begun with other lots or drivers; begin again");
-        Ok(())
-    }
-
-    /// Whether the run was made on this architecture and system.
-    pub fn is_of_this_target(&self) -> bool {
-        self.target == target()
-    }
-
-    /// Whether the same program made another run: by name, version and revision.
-    pub fn is_of_version_of(&self, other: &Self) -> bool {
-        (&self.program, &self.git_revision, self.git_dirty) == (&other.program, &other.git_revision, other.git_dirty)
-    }
-
-    /// Whether a folder holds a manifest, of whatever version: the folder is a run then, and not something else with files
-    /// of the same names.
-    fn is_in(folder: &Path) -> bool {
-        let text = storage::read::text(&folder.join(MANIFEST), RUN_TOML_BYTES_MAX).unwrap_or_default();
-        let table: toml::Table = text.parse().unwrap_or_default();
-        ["schema", "program", "command", "preset", "root_seed"].iter().all(|key| table.contains_key(*key))
-    }
-
-    /// Reads the manifest of a run.
-    ///
-    /// # Errors
-    /// If it is missing, damaged or of another version.
-    pub fn read(run: &Path) -> anyhow::Result<Self> {
-        let path = run.join(MANIFEST);
-        let text = sums::read_to_string(&path, RUN_TOML_BYTES_MAX)?;
-        let table: toml::Table = text.parse().with_context(|| path.display().to_string())?;
-        let schema = table.get("schema").and_then(toml::Value::as_integer).unwrap_or(0);
-        ensure!(
-            schema == i64::from(MANIFEST_SCHEMA),
-            "{}: written by another version of lotpilot (schema {schema}, this one reads {MANIFEST_SCHEMA}); make the \
-             run again, or use the revision it names",
-            path.display()
-        );
-        table.try_into().with_context(|| path.display().to_string())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use policy::checkpoint::Checkpoint;
-    use policy::conditions::Conditions;
-    use policy::decision_rule::DecisionRule;
-    use policy::network::Weights;
+    use crate::test_runs::{build, create, message, place, scratch};
     use sim::seed::RootSeed;
-    use std::sync::LazyLock;
-
-    fn scratch(name: &str) -> PathBuf {
-        let path = std::env::temp_dir().join(format!("xtask-test-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&path);
-        path
-    }
-
-    fn build() -> &'static Build {
-        static BUILD: LazyLock<Build> = LazyLock::new(Build::default);
-        &BUILD
-    }
-
-    fn place(out: &Path, overwrite: bool) -> Place<'_> {
-        Place { build: build(), out: Some(out), overwrite, command: "train-dagger", preset: "smoke", seed: 1 }
-    }
-
-    fn create(out: &Path, overwrite: bool) -> anyhow::Result<RunDir> {
-        RunDir::create(&place(out, overwrite), &Settings::preset("smoke")?, &Request::default())
-    }
-
-    fn message<T: std::fmt::Debug>(result: anyhow::Result<T>) -> String {
-        format!("{:#}", result.unwrap_err())
-    }
 
     #[test]
     fn a_run_is_resumed_until_finished_and_overwritten_only_when_told() {
@@ -857,10 +478,6 @@ mod tests {
         fs::create_dir_all(&path).unwrap();
         assert!(message(RunDir::resume(&path, "train-dagger")).contains("nothing was begun there"));
         assert_eq!(fs::read_dir(&path).unwrap().count(), 0);
-        assert!(message(policy_folder(&path)).contains("this is no run"));
-        // A run of an earlier version was called no run at all.
-        fs::write(path.join(SETTINGS), "").unwrap();
-        assert!(message(policy_folder(&path)).contains("an earlier version made it"));
         fs::remove_dir_all(path).unwrap();
     }
 
@@ -953,63 +570,6 @@ mod tests {
         fs::write(path.join(MANIFEST), "program = \"another 1.0\"\ncommand = \"build\"\n").unwrap();
         assert!(message(create(&path, true)).contains("not a run"));
         assert!(path.join("thesis.txt").exists());
-        fs::remove_dir_all(path).unwrap();
-    }
-
-    /// `evaluate` drove with the first network of an ensemble alone.
-    #[test]
-    fn a_run_whose_rule_has_an_ensemble_drives_with_all_of_it() {
-        let path = scratch("members");
-        let mut settings = Settings::preset("smoke").unwrap();
-        settings.dagger.rule = DecisionRule::named("ensemble_dagger").unwrap();
-        RunDir::create(&place(&path, false), &settings, &Request::default()).unwrap();
-        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
-        let checkpoint =
-            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
-        let rounds = ["round-00", "round-01"].into_iter();
-        let folders = rounds.flat_map(|round| ["", "-member-1", "-member-2"].map(|part| format!("{round}{part}")));
-        for folder in folders {
-            checkpoint.save(&path.join(&folder)).unwrap();
-            sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
-        }
-        let of_last = ["round-01", "round-01-member-1", "round-01-member-2"].map(|folder| path.join(folder));
-        assert_eq!(driving_folders(&path).unwrap(), of_last);
-        assert_eq!(driving_folders(&path.join("bc")).unwrap(), [path.join("round-00")]);
-        let whole = fs::read(path.join(SETTINGS)).unwrap();
-        fs::write(path.join(SETTINGS), &whole[1..]).unwrap();
-        assert!(message(driving_folders(&path)).contains("settings.toml"), "damage does not make one network of it");
-        fs::write(path.join(SETTINGS), whole).unwrap();
-        fs::remove_dir_all(&of_last[2]).unwrap();
-        assert!(message(driving_folders(&path)).contains("round-01-member-2/sha256sums"));
-        fs::remove_dir_all(path).unwrap();
-    }
-
-    #[test]
-    fn the_policy_of_a_run_is_its_last_network() {
-        let path = scratch("policy");
-        assert!(message(policy_folder(&path)).contains("this is no run"));
-        create(&path, false).unwrap();
-        assert!(message(policy_folder(&path)).contains("no network"));
-        let settings = Settings::preset("smoke").unwrap();
-        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
-        let checkpoint =
-            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
-        let save = |folder: &str| {
-            checkpoint.save(&path.join(folder)).unwrap();
-            sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
-        };
-        for folder in ["round-00", "round-01", "round-99", "round-100"] {
-            save(folder);
-        }
-        save("round-100-critic"); // trained beside the network
-        fs::create_dir_all(path.join("round-101")).unwrap(); // collected, not trained yet
-        assert_eq!(policy_folder(&path).unwrap(), path.join("round-100"), "of 101 rounds the last but one drove");
-        assert_eq!(policy_folder(&path.join("bc")).unwrap(), path.join("round-00"));
-        save("final");
-        assert_eq!(policy_folder(&path).unwrap(), path.join("final"));
-        // A round that was lost is an error: another would drive under its name.
-        fs::remove_dir_all(path.join("final")).unwrap();
-        assert!(message(policy_folder(&path)).contains("final/sha256sums"));
         fs::remove_dir_all(path).unwrap();
     }
 }

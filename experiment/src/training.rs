@@ -4,8 +4,9 @@ use crate::drive;
 use crate::inputs;
 use crate::lots::Lot;
 use crate::progress::{Elapsed, Progress};
-use crate::run_dir::{self, RunDir};
+use crate::run_dir::RunDir;
 use crate::settings::Settings;
+use crate::trained;
 use crate::trials::{self, Purpose, Trial};
 use anyhow::ensure;
 use expert::ScriptedExpert;
@@ -92,7 +93,7 @@ pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Res
 /// # Errors
 /// If there is no such run, round or drive, or a file of it cannot be read.
 pub fn drive_again(run: &Path, round: u32, drive: u32) -> anyhow::Result<(Arc<Map>, Rollouts)> {
-    let settings = run_dir::settings_of(run)?;
+    let settings = trained::settings_of(run)?;
     ensure!(round <= TRIAL_MAX, "round {round}: there are 0 to {TRIAL_MAX}");
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     // First, because it says whether there is such a round.

@@ -2,7 +2,7 @@
 
 use crate::arrays::points;
 use crate::guard::{detached, input};
-use experiment::run_dir;
+use experiment::trained;
 use numpy::{PyArray, PyArrayMethods as _};
 use policy::dataset::Tick;
 use policy::dataset::store::Store;
@@ -20,7 +20,7 @@ pub(crate) fn read_round(py: Python<'_>, run: PathBuf, round: u32) -> PyResult<B
         return Err(PyValueError::new_err(format!("{}: there is no such run", run.display())));
     }
     let (data, collection, episode) = detached(py, || {
-        let settings = run_dir::settings_of(&run).map_err(input)?;
+        let settings = trained::settings_of(&run).map_err(input)?;
         let (data, collection) = Store::open(&run).and_then(|store| store.read_round(round)).map_err(input)?;
         Ok((data, collection, settings.episode))
     })?;

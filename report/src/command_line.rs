@@ -1,6 +1,6 @@
 //! The command that made a run, as text.
 
-use experiment::run_dir::Manifest;
+use experiment::manifest::Manifest;
 
 /// A word of a command line.
 pub(crate) fn quoted(word: &str) -> String {

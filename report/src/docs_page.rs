@@ -1,7 +1,7 @@
 //! What the pages of the documentation that a command makes of runs have in common.
 
 use crate::command_line::{command_line, quoted};
-use experiment::run_dir::Manifest;
+use experiment::manifest::Manifest;
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::fmt::Write as _;
 use std::path::Path;

@@ -6,7 +6,7 @@ use crate::docs_page;
 use crate::page::{Image, Page};
 use crate::{deviations, rules, scaling};
 use anyhow::{bail, ensure};
-use experiment::run_dir::{self, Manifest};
+use experiment::manifest::{self, Manifest};
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::convert::Infallible;
 use std::fmt;
@@ -77,7 +77,7 @@ impl OtherRun {
     fn read(&self) -> anyhow::Result<Found> {
         let folder = &self.folder;
         let name = folder.display();
-        ensure!(folder.is_dir() && run_dir::is_finished(folder)?, "{name}: this is no finished run");
+        ensure!(folder.is_dir() && manifest::is_finished(folder)?, "{name}: this is no finished run");
         let manifest = Manifest::read(folder)?;
         let (title, table) = match manifest.command.as_str() {
             "deviations" => (deviations::TITLE, "deviations.md"),

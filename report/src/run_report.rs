@@ -16,10 +16,11 @@ use evaluation::records::{self, Driven, FailureRecord, RunRecord};
 use evaluation::statistics::poisson::DISPERSION_MAX;
 use evaluation::summary::{Row, SweepRow, Tables};
 use evaluation::table1::Table1;
+use experiment::manifest::Manifest;
 use experiment::progress::{Interrupted, Progress};
 use experiment::replay_key::ReplayKey;
-use experiment::run_dir::{self, Manifest};
 use experiment::settings::{NoiseChoice, Settings};
+use experiment::trained;
 use policy::checkpoint::Checkpoint;
 use policy::dataset::Dataset;
 use policy::dataset::store::Store;
@@ -73,7 +74,7 @@ struct Evaluation {
 impl Sources {
     fn read(folder: &Path) -> anyhow::Result<Self> {
         Ok(Self {
-            settings: run_dir::settings_of(folder)?,
+            settings: trained::settings_of(folder)?,
             manifest: Manifest::read(folder)?,
             training: Training::read(folder)?,
             evaluation: Evaluation::read(folder)?,
@@ -281,7 +282,7 @@ fn held_back_calibration(
     for round in 0..rounds {
         dataset.push(store.read_samples(round)?.into());
     }
-    let network = run_dir::policy_folder(folder)?;
+    let network = trained::policy_folder(folder)?;
     let held_back = dataset.split(settings.dagger.fit.validation).validation;
     if held_back.is_empty() {
         return Ok(None);

@@ -145,7 +145,7 @@ mod tests {
     use evaluation::results::EvaluationResults;
     use experiment::drivers::NamedDriver;
     use experiment::lots::Lot;
-    use experiment::run_dir::Training;
+    use experiment::trained::Training;
     use experiment::trials::{Purpose, Trial};
     use sim::episode::EpisodeReport;
     use sim::frame::Ending;

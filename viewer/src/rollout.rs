@@ -5,8 +5,8 @@ use crate::recording::{Header, Recording};
 use crate::{Context, layout, legend, result_of, show_map};
 use anyhow::{Context as _, ensure};
 use experiment::lots::Lot;
-use experiment::run_dir;
 use experiment::settings::Settings;
+use experiment::trained;
 use experiment::training::episodes_of;
 use policy::dagger::{Learned, Rollouts, RoundEpisode};
 use policy::dataset::store::Store;
@@ -18,7 +18,7 @@ const ROOT: &str = "dagger";
 
 /// Records the first episodes of every round that is finished.
 pub(crate) fn show(run: &Path, episodes: usize, context: &mut Context<'_>) -> anyhow::Result<()> {
-    let settings = run_dir::settings_of(run)?;
+    let settings = trained::settings_of(run)?;
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     let store = Store::open(run)?;
     ensure!(store.has_round(0)?, "{}: no round is collected there yet", run.display());

@@ -2,7 +2,7 @@
 
 use crate::output::Output;
 use anyhow::ensure;
-use experiment::run_dir::{Build, Manifest};
+use experiment::manifest::{Build, Manifest};
 use serde::Deserialize;
 use std::path::Path;
 use std::process::Command;

@@ -1,8 +1,8 @@
 use super::*;
 use experiment::drivers::NamedDriver;
 use experiment::lots::Lot;
-use experiment::run_dir::Training;
 use experiment::settings::Settings;
+use experiment::trained::Training;
 use experiment::trials::{Purpose, Trial};
 use sim::episode::EpisodeReport;
 use sim::frame::Ending;

@@ -1,7 +1,7 @@
 use super::*;
 use evaluation::incidents::{Cause, Findings};
 use experiment::drive::Replay;
-use experiment::run_dir::MANIFEST_SCHEMA;
+use experiment::manifest::MANIFEST_SCHEMA;
 use sim::frame::Event;
 use sim::scenario::Direction;
 use std::ops::ControlFlow;

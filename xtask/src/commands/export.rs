@@ -4,6 +4,7 @@ use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::{Args, Subcommand};
 use experiment::run_dir;
+use experiment::trained;
 use policy::checkpoint::Checkpoint;
 use std::path::PathBuf;
 
@@ -42,7 +43,7 @@ struct OnnxArgs {
 
 pub(crate) fn run(args: &ExportArgs, output: &Output) -> anyhow::Result<()> {
     let Format::Onnx(OnnxArgs { run, out, overwrite }) = &args.format;
-    let folder = if Checkpoint::exists(run)? { run.clone() } else { run_dir::policy_folder(run)? };
+    let folder = if Checkpoint::exists(run)? { run.clone() } else { trained::policy_folder(run)? };
     let checkpoint = Checkpoint::load(&folder)?;
     run_dir::ensure_outside_of_runs(out).context("--out")?;
     ensure!(

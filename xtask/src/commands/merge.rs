@@ -19,7 +19,8 @@ use evaluation::stages::{self, Step};
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
-use experiment::run_dir::{Build, Place, Request, RunDir};
+use experiment::manifest::{Build, Request};
+use experiment::run_dir::{Place, RunDir};
 use std::path::{Path, PathBuf};
 use storage::sums;
 

@@ -12,8 +12,9 @@ use evaluation::shards::ShardRecord;
 use evaluation::stages::{self, Stage, Step};
 use evaluation::table1::Table1;
 use experiment::inputs::Inputs;
+use experiment::manifest::{self, Outcome, Request};
 use experiment::progress::{Interrupted, Progress as _};
-use experiment::run_dir::{self, Outcome, Place, Request, RunDir};
+use experiment::run_dir::{Place, RunDir};
 use experiment::settings::Settings;
 use policy::dataset::store::Store;
 use std::path::{Path, PathBuf};
@@ -32,7 +33,7 @@ pub(crate) fn all(
     announce(stages, run.path(), output)?;
     let mut tasks = Vec::new();
     for stage in stages {
-        if !run_dir::is_finished(&run.path().join(&stage.folder))? {
+        if !manifest::is_finished(&run.path().join(&stage.folder))? {
             tasks.extend(stage.tasks());
         }
     }
@@ -60,7 +61,7 @@ fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<()
     let mut left_s = 0.0;
     output.note("stages, with the minutes they take on two quiet cores:");
     for (index, stage) in stages.iter().enumerate() {
-        let is_finished = run_dir::is_finished(&root.join(&stage.folder))?;
+        let is_finished = manifest::is_finished(&root.join(&stage.folder))?;
         let estimate_s = if is_finished { 0.0 } else { stage.estimate_s() };
         left_s += estimate_s;
         let minutes = if is_finished { "done".to_owned() } else { format!("{:.1}", estimate_s / 60.0) };
@@ -112,7 +113,7 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
 /// Refuses a finished stage that others drove than this version has drive there: its report would lack them.
 fn ensure_driven_by(stage: &Stage, root: &RunDir) -> anyhow::Result<()> {
     let Step::Drive { drivers } = &stage.step else { return Ok(()) };
-    let found = run_dir::finished(&root.path().join(&stage.folder))?.map(|finished| finished.outcome);
+    let found = manifest::finished(&root.path().join(&stage.folder))?.map(|finished| finished.outcome);
     let Some(Outcome::Evaluation { drivers: found }) = found else { bail!("{}: this is no evaluation", stage.folder) };
     // The run may have been moved since: its own networks are known by where they lie in it.
     let is_same = |(found, (_, wanted)): (&String, &(String, String))| {

@@ -13,10 +13,12 @@ use clap::{Args, Subcommand, ValueEnum};
 use experiment::drive::Replay;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
+use experiment::manifest::{self, Manifest};
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::replay_key::ReplayKey;
-use experiment::run_dir::{self, Manifest, RunDir};
+use experiment::run_dir::{self, RunDir};
 use experiment::settings::{NoiseChoice, Settings};
+use experiment::trained;
 use experiment::training;
 use experiment::trials::{Purpose, Trial};
 use policy::checkpoint::Checkpoint;
@@ -352,7 +354,7 @@ fn render_samples(args: &SamplesArgs, folder: &Folder<'_>) -> anyhow::Result<()>
     // Opening a store creates its folder.
     ensure!(args.round.is_dir(), "{}: there is no such round", args.round.display());
     let kept = Store::open(run)?.read_samples(index)?;
-    let settings = run_dir::settings_of(run)?;
+    let settings = trained::settings_of(run)?;
     let net = args.net.as_deref().unwrap_or(&args.round);
     let checkpoint = (args.net.is_some() || Checkpoint::exists(net)?).then(|| Checkpoint::load(net)).transpose()?;
     let count = args.count.min(kept.len());
@@ -398,7 +400,7 @@ fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<(
 
 fn render_results(args: &RenderResultsArgs, overwrite: bool, output: &Output) -> anyhow::Result<()> {
     ensure!(
-        run_dir::is_finished(&args.run)?,
+        manifest::is_finished(&args.run)?,
         "{}: this is no finished run of reproduce or of another command that ends in a table",
         args.run.display()
     );

@@ -11,8 +11,8 @@ use experiment::drive::Replay;
 use experiment::drivers::NamedDriver;
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::replay_key::ReplayKey;
-use experiment::run_dir;
 use experiment::settings::{Layers, Settings};
+use experiment::trained;
 use report::replays::{self, Row};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -109,7 +109,7 @@ fn of_evaluation(
     folder: &Path,
     args: &ReplayArgs,
 ) -> anyhow::Result<(Settings, Vec<ReplayKey>, BTreeMap<String, Recorded>)> {
-    let settings = run_dir::settings_of(folder)?;
+    let settings = trained::settings_of(folder)?;
     let file = folder.join(records::RUNS);
     // Twice through the file: it may be longer than memory is large.
     let mut runs = 0;

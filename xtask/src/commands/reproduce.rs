@@ -13,9 +13,11 @@ use evaluation::stages::{self, Extent, Stage, Step};
 use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
-use experiment::run_dir::{self, Build, Manifest, Outcome, Request, RunDir};
+use experiment::manifest::{self, Build, Manifest, Outcome, Request};
+use experiment::run_dir::RunDir;
 use experiment::settings::{Layers, Settings};
 use experiment::shard::Shard;
+use experiment::trained;
 use report::reproduction::{self, Recipe};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -184,18 +186,18 @@ fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir
     ensure!(sums::exists(&networks)?, "--networks {name}: this is no run; cargo xtask reproduce makes one");
     args.out.ensure_apart_from([&networks])?;
     let manifest = Manifest::read(&networks)?;
-    let (settings, preset) = (run_dir::settings_of(&networks)?, manifest.preset.clone());
+    let (settings, preset) = (trained::settings_of(&networks)?, manifest.preset.clone());
     ensure!(manifest.command == COMMAND, "--networks {name}: this is a run of {}", manifest.command);
     let Arguments { extent, shard } = Arguments::read(&networks, manifest)?;
     ensure!(
         shard.is_none(),
         "--networks {name}: this is a shard; put all of them together first with cargo xtask merge DIR..."
     );
-    ensure!(!run_dir::is_finished(&networks)?, "--networks {name}: this run is finished; nothing is left to drive");
+    ensure!(!manifest::is_finished(&networks)?, "--networks {name}: this run is finished; nothing is left to drive");
     let stages = stages::all(&settings, &extent, &networks);
     for stage in stages.iter().filter(|stage| matches!(stage.step, Step::Train { .. })) {
         ensure!(
-            run_dir::is_finished(&networks.join(&stage.folder))?,
+            manifest::is_finished(&networks.join(&stage.folder))?,
             "--networks {name}: {} is not trained yet; train it with --shard and merge, or with --resume {name}",
             stage.folder
         );
@@ -219,7 +221,7 @@ fn create(
 
 /// What a run did, by the files that it left.
 pub(crate) fn recipe_of(path: &Path) -> anyhow::Result<Recipe> {
-    let settings = run_dir::settings_of(path)?;
+    let settings = trained::settings_of(path)?;
     let Arguments { extent, shard } = Arguments::read(path, Manifest::read(path)?)?;
     ensure!(shard.is_none(), "{}: this is a shard, which has no report; put all together with merge", path.display());
     let trained: BTreeSet<String> = sums::names(path)?.into_iter().collect();

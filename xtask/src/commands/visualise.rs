@@ -11,8 +11,8 @@ use clap::{Args, Subcommand};
 use evaluation::records::{self, FailureRecord};
 use experiment::drivers::DriverSpec;
 use experiment::replay_key::ReplayKey;
-use experiment::run_dir;
 use experiment::settings::Layers;
+use experiment::trained;
 use experiment::view_request::{DriveRequest, Show, Sink, ViewRequest};
 use report::pictures::file_name;
 use sim::seed::RootSeed;
@@ -195,5 +195,5 @@ fn failures_of(args: &FailuresArgs, output: &Output) -> anyhow::Result<Show> {
         let (left, list) = (all - drives.len(), list.display());
         output.note(format_args!("{left} more near-collisions are in {list}; see them with --limit {all}"));
     }
-    Ok(Show::Drives { settings: Box::new(run_dir::settings_of(&args.run)?), drives })
+    Ok(Show::Drives { settings: Box::new(trained::settings_of(&args.run)?), drives })
 }

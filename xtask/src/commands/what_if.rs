@@ -7,7 +7,7 @@ use anyhow::{bail, ensure};
 use clap::Args;
 use evaluation::{avoidable, records};
 use experiment::progress::Interrupted;
-use experiment::run_dir;
+use experiment::trained;
 use report::what_if;
 use std::path::PathBuf;
 use storage::sums;
@@ -34,7 +34,7 @@ pub(crate) struct WhatIfArgs {
 }
 
 pub(crate) fn run(args: &WhatIfArgs, output: &Output) -> anyhow::Result<()> {
-    let settings = run_dir::settings_of(&args.folder)?;
+    let settings = trained::settings_of(&args.folder)?;
     ensure!(
         sums::is_listed(&args.folder, records::FAILURES)?,
         "{}: holds no finished evaluation; name the folder of one (cargo xtask evaluate)",

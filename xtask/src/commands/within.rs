@@ -5,8 +5,9 @@ use evaluation::plan::Plan;
 use evaluation::results::EvaluationResults;
 use experiment::drivers::NamedDriver;
 use experiment::lots::Lot;
+use experiment::manifest::Outcome;
 use experiment::progress::{Interrupted, Progress};
-use experiment::run_dir::{Outcome, Place, RunDir};
+use experiment::run_dir::{Place, RunDir};
 use experiment::settings::Settings;
 
 /// Drives drivers over the lots of some settings into a folder within a run, or goes on with what is there.

@@ -1,0 +1,252 @@
+//! What a run says of itself in its folder: who made it of what, and what it came to.
+
+use crate::settings::Settings;
+use anyhow::{Context as _, anyhow, ensure};
+use policy::dagger::Stop;
+use serde::{Deserialize, Serialize};
+use sim::limits::RUN_TOML_BYTES_MAX;
+use std::collections::BTreeMap;
+use std::path::Path;
+use storage::sums;
+
+/// The file of a [`Manifest`].
+pub(crate) const MANIFEST: &str = "manifest.toml";
+/// The file of all settings of a run.
+pub(crate) const SETTINGS: &str = "settings.toml";
+/// The file of [`Finished`].
+pub(crate) const FINISHED: &str = "finished.toml";
+
+/// SHA-256 of what is read from elsewhere by name, as on the command line: see [`inputs`](crate::inputs).
+pub type Inputs = BTreeMap<String, String>;
+
+/// What a run was asked for beside its settings, and what it reads from elsewhere.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Request {
+    /// Arguments of the command.
+    pub arguments: toml::Table,
+    /// Lots, parameters and networks from files.
+    pub inputs: Inputs,
+}
+
+/// What made a run: `manifest.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Version of this format: [`MANIFEST_SCHEMA`].
+    pub schema: u32,
+    /// The name and version of the program.
+    pub program: String,
+    /// The command that made it, and alone can go on with it.
+    pub command: String,
+    /// The command line, without the name of the program.
+    pub command_line: Vec<String>,
+    /// What the settings started from.
+    pub preset: String,
+    /// Root seed of the training.
+    pub root_seed: u64,
+    /// Root seed of the trials of the evaluation.
+    pub evaluation_seed: u64,
+    /// Revision of the repository that the program was built from, if known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub git_revision: Option<String>,
+    /// Whether files of the repository differed from that revision.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub git_dirty: Option<bool>,
+    /// The compiler that built the program.
+    pub rustc_version: String,
+    /// Threads it computed with; results do not depend on it.
+    pub threads: usize,
+    /// Architecture and operating system.
+    pub target: String,
+    /// The processor, if known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub processor: Option<String>,
+    /// Its instructions that sums of networks may depend on: `avx2`, `fma`, …
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub processor_features: Vec<String>,
+    /// The libraries that compute, with their versions: `libm 0.2.16`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub libraries: Vec<String>,
+    /// What was asked for beside the settings.
+    #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
+    pub arguments: toml::Table,
+    /// SHA-256 of what was read from elsewhere.
+    #[serde(default, skip_serializing_if = "Inputs::is_empty")]
+    pub inputs: Inputs,
+}
+
+/// The version of `manifest.toml` that this program writes.
+pub const MANIFEST_SCHEMA: u32 = 3;
+
+/// What a run came to, written last: `finished.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Finished {
+    /// Version of this format: [`FINISHED_SCHEMA`].
+    pub schema: u32,
+    /// What was done.
+    pub outcome: Outcome,
+}
+
+/// The version of `finished.toml` that this program writes.
+pub const FINISHED_SCHEMA: u32 = 1;
+
+/// What was done in a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "kind", deny_unknown_fields)]
+pub enum Outcome {
+    /// Behaviour cloning, or DAgger.
+    Training {
+        /// Why it ended.
+        stop: Stop,
+        /// Rounds, behaviour cloning included.
+        rounds: usize,
+    },
+    /// Drivers were driven.
+    Evaluation {
+        /// Who, as named on the command line.
+        drivers: Vec<String>,
+    },
+    /// Parameters of planners were searched.
+    Tuning {
+        /// Which.
+        planners: Vec<String>,
+    },
+    /// The paper was reproduced.
+    Reproduction {
+        /// Stages that were done.
+        stages: usize,
+    },
+}
+
+/// The program that makes a run, as its manifest describes it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Build {
+    /// Name and version.
+    pub program: String,
+    /// The command line, without the name of the program.
+    pub command_line: Vec<String>,
+    /// Revision of the repository, if known.
+    pub git_revision: Option<String>,
+    /// Whether files of the repository differ from that revision.
+    pub git_dirty: Option<bool>,
+    /// The compiler.
+    pub rustc_version: String,
+    /// The processor that it runs on, if known.
+    pub processor: Option<String>,
+    /// Its instructions that sums of networks may depend on.
+    pub processor_features: Vec<String>,
+    /// The libraries that compute, with their versions.
+    pub libraries: Vec<String>,
+}
+
+/// Architecture and operating system.
+fn target() -> String {
+    format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS)
+}
+
+impl Manifest {
+    /// That of a run which begins.
+    pub(crate) fn new(build: &Build, [command, preset]: [&str; 2], settings: &Settings, request: &Request) -> Self {
+        Self {
+            schema: MANIFEST_SCHEMA,
+            program: build.program.clone(),
+            command: command.to_owned(),
+            command_line: build.command_line.clone(),
+            preset: preset.to_owned(),
+            root_seed: settings.seed.0,
+            evaluation_seed: settings.evaluation.seed.0,
+            git_revision: build.git_revision.clone(),
+            git_dirty: build.git_dirty,
+            rustc_version: build.rustc_version.clone(),
+            threads: rayon::current_num_threads(),
+            target: target(),
+            processor: build.processor.clone(),
+            processor_features: build.processor_features.clone(),
+            libraries: build.libraries.clone(),
+            arguments: request.arguments.clone(),
+            inputs: request.inputs.clone(),
+        }
+    }
+
+    /// Whether what is read from elsewhere is what the run was begun with.
+    ///
+    /// # Errors
+    /// Naming what differs.
+    pub fn check_inputs(&self, found: &Inputs) -> anyhow::Result<()> {
+        for (name, digest) in &self.inputs {
+            if found.get(name) != Some(digest) {
+                return Err(has_changed(name));
+            }
+        }
+        ensure!(found.len() == self.inputs.len(), "this run was begun with other lots or drivers; begin again");
+        Ok(())
+    }
+
+    /// Whether the run was made on this architecture and system.
+    pub fn is_of_this_target(&self) -> bool {
+        self.target == target()
+    }
+
+    /// Whether the same program made another run: by name, version and revision.
+    pub fn is_of_version_of(&self, other: &Self) -> bool {
+        (&self.program, &self.git_revision, self.git_dirty) == (&other.program, &other.git_revision, other.git_dirty)
+    }
+
+    /// Whether a folder holds a manifest, of whatever version: the folder is a run then, and not something else with files
+    /// of the same names.
+    pub(crate) fn is_in(folder: &Path) -> bool {
+        let text = storage::read::text(&folder.join(MANIFEST), RUN_TOML_BYTES_MAX).unwrap_or_default();
+        let table: toml::Table = text.parse().unwrap_or_default();
+        ["schema", "program", "command", "preset", "root_seed"].iter().all(|key| table.contains_key(*key))
+    }
+
+    /// Reads the manifest of a run.
+    ///
+    /// # Errors
+    /// If it is missing, damaged or of another version.
+    pub fn read(run: &Path) -> anyhow::Result<Self> {
+        let path = run.join(MANIFEST);
+        let text = sums::read_to_string(&path, RUN_TOML_BYTES_MAX)?;
+        let table: toml::Table = text.parse().with_context(|| path.display().to_string())?;
+        let schema = table.get("schema").and_then(toml::Value::as_integer).unwrap_or(0);
+        ensure!(
+            schema == i64::from(MANIFEST_SCHEMA),
+            "{}: written by another version of lotpilot (schema {schema}, this one reads {MANIFEST_SCHEMA}); make the \
+             run again, or use the revision it names",
+            path.display()
+        );
+        table.try_into().with_context(|| path.display().to_string())
+    }
+}
+
+/// What a run came to; `None` if it is not finished.
+///
+/// # Errors
+/// If the file is missing, damaged or of another version.
+pub fn finished(path: &Path) -> anyhow::Result<Option<Finished>> {
+    let file = path.join(FINISHED);
+    let Some(text) = sums::read_if_listed(&file, RUN_TOML_BYTES_MAX)? else { return Ok(None) };
+    let text = String::from_utf8(text).with_context(|| file.display().to_string())?;
+    let finished: Finished = toml::from_str(&text).with_context(|| file.display().to_string())?;
+    ensure!(
+        finished.schema == FINISHED_SCHEMA,
+        "{}: written by another version of lotpilot (schema {}, this one reads {FINISHED_SCHEMA})",
+        file.display(),
+        finished.schema
+    );
+    Ok(Some(finished))
+}
+
+/// Whether a run is finished.
+///
+/// # Errors
+/// See [`finished`].
+pub fn is_finished(path: &Path) -> anyhow::Result<bool> {
+    Ok(finished(path)?.is_some())
+}
+
+/// What is said of an input that is not what a run was begun with.
+pub(crate) fn has_changed(name: &str) -> anyhow::Error {
+    anyhow!("{name}: changed since this run was begun; restore it, or begin again into another folder")
+}

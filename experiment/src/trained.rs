@@ -1,0 +1,205 @@
+//! The networks that runs have trained, as `run:DIR` and `run:DIR/bc` name them.
+
+use crate::manifest::{Finished, Manifest, Outcome, SETTINGS, finished};
+use crate::settings::Settings;
+use anyhow::{Context as _, ensure};
+use sim::limits::SETTINGS_BYTES_MAX;
+use sim::seed::RootSeed;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use storage::sums;
+
+/// A training that may have been done several times, with other seeds.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Training {
+    /// What all of them have in common: SHA-256 of the program's version, the settings but seed and evaluation, the lots from
+    /// files, and which policy of the run it is.
+    pub recipe: String,
+    /// Its root seed.
+    pub seed: RootSeed,
+    /// Lots that it was trained on, as in its settings.
+    pub lots: Vec<String>,
+    /// SHA-256 of those from files: they are known by it wherever they lie now.
+    pub digests: BTreeSet<String>,
+}
+
+/// The folder with the checkpoint that `run:DIR` or `run:DIR/bc` names.
+///
+/// # Errors
+/// If there is no run, no network in it yet, or one of its rounds is missing or incomplete.
+pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
+    let (run, is_bc) = run_of(spec)?;
+    let names = sums::names(run)?;
+    let folders = names.iter().filter_map(|name| name.strip_suffix(&format!("/{}", sums::FILE)));
+    // Not `round-01-critic`: what is trained beside the network of a round.
+    let round_of = |folder: &str| folder.strip_prefix("round-")?.parse::<u32>().ok();
+    let mut folders: Vec<&str> = folders.filter(|folder| *folder == "final" || round_of(folder).is_some()).collect();
+    let rounds = folders.iter().filter(|folder| **folder != "final").count();
+    if let Some(Finished { outcome: Outcome::Training { rounds: expected, .. }, .. }) = finished(run)? {
+        ensure!(
+            rounds == expected,
+            "{}: {rounds} rounds are listed of {expected} that were finished; restore sha256sums from a copy, or train \
+             again into another folder",
+            run.display()
+        );
+    }
+    folders.sort_by_key(|folder| (*folder == "final", round_of(folder)));
+    let folder = if is_bc { folders.first() } else { folders.last() };
+    let folder = folder.with_context(|| {
+        let command = Manifest::read(run).map_or_else(|_| "another command".to_owned(), |manifest| manifest.command);
+        if command.starts_with("train-") {
+            format!("{}: no network is trained there yet; finish it with --resume {0}", run.display())
+        } else {
+            format!("{}: this is a run of {command}, which has no network of its own; name a training", run.display())
+        }
+    })?;
+    sums::read_listed(run, &format!("{folder}/{}", sums::FILE), sums::LIST_BYTES_MAX)?;
+    Ok(run.join(folder))
+}
+
+/// The folders with the checkpoints that drive as `run:DIR` or `run:DIR/bc`: the policy and, if the decision rule
+/// has an ensemble drive, its other members. A final fit, and `bc`, are one network.
+///
+/// # Errors
+/// See [`policy_folder`].
+pub fn driving_folders(spec: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let policy = policy_folder(spec)?;
+    let (run, is_bc) = run_of(spec)?;
+    // Damage is an error. Settings that are whole may be of another version: the network alone can be used then.
+    sums::read(&run.join(SETTINGS), SETTINGS_BYTES_MAX)?;
+    let members = settings_of(spec).map_or(1, |settings| settings.dagger.rule.members());
+    let round = policy.file_name().and_then(|name| name.to_str()).filter(|name| !is_bc && name.starts_with("round-"));
+    let others = round.into_iter().flat_map(|round| (1..members).map(move |member| format!("{round}-member-{member}")));
+    let others: Vec<PathBuf> = others
+        .map(|member| {
+            sums::read_listed(run, &format!("{member}/{}", sums::FILE), sums::LIST_BYTES_MAX)?;
+            Ok(run.join(member))
+        })
+        .collect::<anyhow::Result<_>>()?;
+    Ok(std::iter::once(policy).chain(others).collect())
+}
+
+/// The settings of the run that `run:DIR` or `run:DIR/bc` names.
+///
+/// # Errors
+/// If there is no run, or its settings are not of this program.
+pub fn settings_of(spec: &Path) -> anyhow::Result<Settings> {
+    Settings::read(&run_of(spec)?.0.join(SETTINGS))
+}
+
+/// What a policy `DIR` or `DIR/bc` was trained by.
+///
+/// # Errors
+/// See [`settings_of`].
+pub fn training_of(spec: &Path) -> anyhow::Result<Training> {
+    let mut settings = settings_of(spec)?;
+    let seed = std::mem::replace(&mut settings.seed, RootSeed(0));
+    settings.evaluation = Settings::preset("default")?.evaluation;
+    let policy = if run_of(spec)?.1 { "bc" } else { "final" };
+    let Manifest { program, inputs, .. } = Manifest::read(run_of(spec)?.0)?;
+    let digests: Vec<_> = settings.training.lots.iter().map(|lots| inputs.get(lots)).collect();
+    let recipe = sums::digest(format!("{policy}\n{program}\n{digests:?}\n{}", settings.to_toml()).as_bytes());
+    let digests = digests.into_iter().flatten().cloned().collect();
+    Ok(Training { recipe, seed, lots: settings.training.lots, digests })
+}
+
+/// The folder of the run, and whether its policy after behaviour cloning is meant.
+fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
+    let (run, is_bc) = match (spec.file_name(), spec.parent()) {
+        (Some(name), Some(run)) if name == "bc" && !spec.is_dir() => (run, true),
+        _ => (spec, false),
+    };
+    ensure!(
+        sums::exists(run)? || !run.join(SETTINGS).is_file(),
+        "{}: this run has no sha256sums: an earlier version made it, or the list is lost; train again into another folder, \
+         or restore the list from a copy",
+        run.display()
+    );
+    ensure!(
+        sums::exists(run)?,
+        "{}: this is no run; train one with cargo xtask train-dagger, or list the folders in runs/",
+        run.display()
+    );
+    Ok((run, is_bc))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::manifest::Request;
+    use crate::run_dir::RunDir;
+    use crate::test_runs::{create, message, place, scratch};
+    use policy::checkpoint::Checkpoint;
+    use policy::conditions::Conditions;
+    use policy::decision_rule::DecisionRule;
+    use policy::network::Weights;
+    use std::fs;
+
+    /// `evaluate` drove with the first network of an ensemble alone.
+    #[test]
+    fn a_run_whose_rule_has_an_ensemble_drives_with_all_of_it() {
+        let path = scratch("members");
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.dagger.rule = DecisionRule::named("ensemble_dagger").unwrap();
+        RunDir::create(&place(&path, false), &settings, &Request::default()).unwrap();
+        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
+        let checkpoint =
+            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
+        let rounds = ["round-00", "round-01"].into_iter();
+        let folders = rounds.flat_map(|round| ["", "-member-1", "-member-2"].map(|part| format!("{round}{part}")));
+        for folder in folders {
+            checkpoint.save(&path.join(&folder)).unwrap();
+            sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
+        }
+        let of_last = ["round-01", "round-01-member-1", "round-01-member-2"].map(|folder| path.join(folder));
+        assert_eq!(driving_folders(&path).unwrap(), of_last);
+        assert_eq!(driving_folders(&path.join("bc")).unwrap(), [path.join("round-00")]);
+        let whole = fs::read(path.join(SETTINGS)).unwrap();
+        fs::write(path.join(SETTINGS), &whole[1..]).unwrap();
+        assert!(message(driving_folders(&path)).contains("settings.toml"), "damage does not make one network of it");
+        fs::write(path.join(SETTINGS), whole).unwrap();
+        fs::remove_dir_all(&of_last[2]).unwrap();
+        assert!(message(driving_folders(&path)).contains("round-01-member-2/sha256sums"));
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// A run of an earlier version was called no run at all.
+    #[test]
+    fn what_has_no_list_has_no_policy() {
+        let path = scratch("no-policy");
+        fs::create_dir_all(&path).unwrap();
+        assert!(message(policy_folder(&path)).contains("this is no run"));
+        fs::write(path.join(SETTINGS), "").unwrap();
+        assert!(message(policy_folder(&path)).contains("an earlier version made it"));
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn the_policy_of_a_run_is_its_last_network() {
+        let path = scratch("policy");
+        assert!(message(policy_folder(&path)).contains("this is no run"));
+        create(&path, false).unwrap();
+        assert!(message(policy_folder(&path)).contains("no network"));
+        let settings = Settings::preset("smoke").unwrap();
+        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
+        let checkpoint =
+            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
+        let save = |folder: &str| {
+            checkpoint.save(&path.join(folder)).unwrap();
+            sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
+        };
+        for folder in ["round-00", "round-01", "round-99", "round-100"] {
+            save(folder);
+        }
+        save("round-100-critic"); // trained beside the network
+        fs::create_dir_all(path.join("round-101")).unwrap(); // collected, not trained yet
+        assert_eq!(policy_folder(&path).unwrap(), path.join("round-100"), "of 101 rounds the last but one drove");
+        assert_eq!(policy_folder(&path.join("bc")).unwrap(), path.join("round-00"));
+        save("final");
+        assert_eq!(policy_folder(&path).unwrap(), path.join("final"));
+        // A round that was lost is an error: another would drive under its name.
+        fs::remove_dir_all(path.join("final")).unwrap();
+        assert!(message(policy_folder(&path)).contains("final/sha256sums"));
+        fs::remove_dir_all(path).unwrap();
+    }
+}
