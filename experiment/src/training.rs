@@ -112,6 +112,8 @@ struct Monitor<'a> {
     progress: &'a dyn Progress,
     task: Option<Task>,
     collection: Collection,
+    /// Samples that the running training had trained on when it was begun here, or gone on with.
+    samples_before: u64,
 }
 
 /// What is being done at present.
@@ -143,7 +145,7 @@ impl Collection {
 
 impl<'a> Monitor<'a> {
     fn new(progress: &'a dyn Progress) -> Self {
-        Self { progress, task: None, collection: Collection::default() }
+        Self { progress, task: None, collection: Collection::default(), samples_before: 0 }
     }
 
     fn frame(&mut self, episode: usize, frame: &Frame) {
@@ -184,9 +186,11 @@ impl<'a> Monitor<'a> {
         if self.task.is_none() {
             let label = round.map_or_else(|| "final training".to_owned(), |round| format!("round {round}: training"));
             self.begin(Task::Fitting, &label);
+            self.samples_before = fit.samples_done;
         }
+        let samples_before = self.samples_before;
         self.progress.at(f64::from(fit.step) / f64::from(fit.steps), &mut |Elapsed { seconds }| {
-            let per_s = fit.samples_done as f64 / seconds;
+            let per_s = (fit.samples_done - samples_before) as f64 / seconds;
             let validation = fit.validation.map_or_else(String::new, |at| format!(", validation {:.3} m", at.rmse_m));
             let (loss, learning_rate) = (fit.loss.total, fit.learning_rate);
             format!("loss {loss:.3}{validation}, learning rate {learning_rate:.1e}, {per_s:.0} samples/s")

@@ -35,6 +35,31 @@ struct Task {
     last_shown: Instant,
     /// Estimated seconds; `None` if it is not in the plan.
     planned_s: Option<f64>,
+    /// The share that was done when it was begun: by a command that was interrupted.
+    done_before: Option<f64>,
+}
+
+/// How far the running task is.
+#[derive(Debug, Clone, Copy)]
+struct Done {
+    /// The share that is done.
+    share: f64,
+    /// That of a command before.
+    before: f64,
+    /// Since it was begun or gone on with.
+    seconds: f64,
+}
+
+impl Done {
+    /// The share that was done in these seconds.
+    fn now(self) -> f64 {
+        self.share - self.before
+    }
+
+    /// Seconds left of the task, if it goes on like this.
+    fn left_s(self) -> f64 {
+        self.seconds * (1.0 - self.share) / self.now().max(1e-3)
+    }
 }
 
 /// Tasks to come with estimated seconds, and how the estimates of those that are done compare with the time they took.
@@ -53,15 +78,14 @@ impl Plan {
     }
 
     /// Seconds left of the whole command, given how much of the running task is done.
-    fn left_s(&self, planned_s: f64, share: f64, seconds: f64) -> f64 {
-        let estimated_s = self.estimated_s + planned_s * share;
-        let pace = (self.taken_s + seconds + ESTIMATE_S) / (estimated_s + ESTIMATE_S);
+    fn left_s(&self, planned_s: f64, done: Done) -> f64 {
+        let estimated_s = self.estimated_s + planned_s * done.now();
+        let pace = (self.taken_s + done.seconds + ESTIMATE_S) / (estimated_s + ESTIMATE_S);
         let to_come_s: f64 = self.to_come.iter().map(|(_, seconds)| seconds).sum();
         // A task that has begun is its own best estimate, once there is something to see of it.
-        let alone_s = seconds * (1.0 - share) / share.max(1e-3);
-        let planned_left_s = pace * planned_s * (1.0 - share);
-        let trust = share.clamp(0.0, 1.0);
-        trust * alone_s + (1.0 - trust) * planned_left_s + pace * to_come_s
+        let planned_left_s = pace * planned_s * (1.0 - done.share);
+        let trust = done.now().clamp(0.0, 1.0);
+        trust * done.left_s() + (1.0 - trust) * planned_left_s + pace * to_come_s
     }
 }
 
@@ -102,7 +126,7 @@ impl Console {
         }
         if let Some(planned_s) = task.planned_s {
             let mut plan = self.plan.borrow_mut();
-            plan.estimated_s += planned_s;
+            plan.estimated_s += planned_s * (1.0 - task.done_before.unwrap_or(0.0));
             plan.taken_s += seconds;
         }
         let mut stages = self.stages.borrow_mut();
@@ -124,13 +148,15 @@ impl Progress for Console {
         });
         let (now, planned_s) = (Instant::now(), self.plan.borrow_mut().begin(stage));
         let label = label.to_owned();
-        *self.task.borrow_mut() = Some(Task { stage, label, bar, started: now, last_shown: now, planned_s });
+        *self.task.borrow_mut() =
+            Some(Task { stage, label, bar, started: now, last_shown: now, planned_s, done_before: None });
     }
 
     fn at(&self, share: f64, status: &mut dyn FnMut(Elapsed) -> String) {
         let mut task = self.task.borrow_mut();
         let Some(task) = task.as_mut().filter(|_| !self.is_quiet) else { return };
         let share = share.clamp(0.0, 1.0);
+        let before = *task.done_before.get_or_insert(share);
         // Faster than eyes, and building messages is not free.
         let every = if task.bar.is_some() { Duration::from_millis(80) } else { LINE_EVERY };
         if task.last_shown.elapsed() < every {
@@ -138,11 +164,10 @@ impl Progress for Console {
         }
         task.last_shown = Instant::now();
         let seconds = task.started.elapsed().as_secs_f64().max(1e-9);
+        let done = Done { share, before, seconds };
         // A task that nobody planned is all there is.
-        let left_s = match task.planned_s {
-            Some(planned_s) => self.plan.borrow().left_s(planned_s, share, seconds),
-            None => seconds * (1.0 - share) / share.max(1e-3),
-        };
+        let left_s =
+            task.planned_s.map_or_else(|| done.left_s(), |planned_s| self.plan.borrow().left_s(planned_s, done));
         let status = status(Elapsed { seconds });
         let mut line = format!("about {} left", duration(left_s));
         if !status.is_empty() {
@@ -182,18 +207,28 @@ mod tests {
     #[test]
     fn the_time_left_is_that_of_the_whole_command() {
         let mut plan = Plan { to_come: vec![("a", 100.0), ("b", 50.0), ("c", 50.0)], ..Plan::default() };
+        let at = |share, seconds| Done { share, before: 0.0, seconds };
         let planned_s = plan.begin("a").unwrap();
-        assert!((plan.left_s(planned_s, 0.0, 0.0) - 200.0).abs() < 1e-9, "the estimate, before anything is seen");
+        assert!((plan.left_s(planned_s, at(0.0, 0.0)) - 200.0).abs() < 1e-9, "the estimate, before anything is seen");
         // Twice as slow as estimated, half of the first task in.
-        let left_s = plan.left_s(planned_s, 0.5, 100.0);
+        let left_s = plan.left_s(planned_s, at(0.5, 100.0));
         assert!((250.0..400.0).contains(&left_s), "{left_s}");
         plan.estimated_s += 100.0;
         plan.taken_s += 200.0;
         // A task that is skipped is not waited for.
         let planned_s = plan.begin("c").unwrap();
-        let left_s = plan.left_s(planned_s, 0.0, 0.0);
+        let left_s = plan.left_s(planned_s, at(0.0, 0.0));
         assert!((90.0..101.0).contains(&left_s), "{left_s}");
         assert_eq!(plan.begin("b"), None);
         assert_eq!([45.0, 600.0, 7500.0].map(duration), ["45 s", "10 min", "2 h 5 min"]);
+    }
+    /// What was done before counted as done at once: a tenth that takes ten minutes was "about 7 s left".
+    #[test]
+    fn the_time_left_after_an_interruption_is_that_of_what_is_left() {
+        let done = Done { share: 0.95, before: 0.9, seconds: 300.0 };
+        assert!((done.left_s() - 300.0).abs() < 1e-6);
+        let plan = Plan::default();
+        let left_s = plan.left_s(6000.0, done);
+        assert!((250.0..350.0).contains(&left_s), "{left_s}");
     }
 }
