@@ -3,7 +3,7 @@
 use crate::about::{self, About};
 use crate::{INPUT, OUTPUT};
 use policy::checkpoint::Checkpoint;
-use policy::network::{ConvLayer, OUTPUTS};
+use policy::network::{ConvLayer, NetworkArchitecture, OUTPUTS};
 use rten_onnx::onnx::{
     AttributeProto, AttributeType, DataType, Dimension, NodeProto, OperatorSetIdProto, StringStringEntryProto,
     TensorProto, TensorShapeProto, TypeProto, TypeProtoTensor, ValueInfoProto,
@@ -32,7 +32,12 @@ pub fn export(checkpoint: &Checkpoint) -> Result<Vec<u8>, SeveralModes> {
     if architecture.modes != 1 {
         return Err(SeveralModes(architecture.modes));
     }
-    let nodes = vec![
+    Ok(file(checkpoint, layers(architecture)))
+}
+
+/// The network's layers.
+pub(crate) fn layers(architecture: NetworkArchitecture) -> Vec<NodeProto> {
+    vec![
         convolution("conv1", INPUT, architecture.conv1),
         max_pool("conv1", "pool1"),
         node("Relu", &["pool1"], "features1", Vec::new()),
@@ -43,7 +48,11 @@ pub fn export(checkpoint: &Checkpoint) -> Result<Vec<u8>, SeveralModes> {
         dense("fc1", "features", "fc1"),
         node("Relu", &["fc1"], "hidden", Vec::new()),
         dense("fc2", "hidden", OUTPUT),
-    ];
+    ]
+}
+
+/// The file with these layers and the network's weights.
+pub(crate) fn file(checkpoint: &Checkpoint, nodes: Vec<NodeProto>) -> Vec<u8> {
     let tensors = checkpoint.tensors().into_iter().map(|tensor| TensorProto {
         dims: tensor.shape.iter().map(|&length| length as i64).collect(),
         data_type: Some(DataType::FLOAT),
@@ -64,10 +73,10 @@ pub fn export(checkpoint: &Checkpoint) -> Result<Vec<u8>, SeveralModes> {
     };
     let mut bytes = Vec::new();
     model.encode(ValueWriter::new(&mut bytes)).expect("memory takes every byte");
-    Ok(bytes)
+    bytes
 }
 
-fn node(operator: &str, inputs: &[&str], output: &str, attribute: Vec<AttributeProto>) -> NodeProto {
+pub(crate) fn node(operator: &str, inputs: &[&str], output: &str, attribute: Vec<AttributeProto>) -> NodeProto {
     NodeProto {
         domain: None,
         name: Some(output.to_owned()),
@@ -103,7 +112,7 @@ fn bias(layer: &str) -> String {
     format!("{layer}.bias")
 }
 
-fn integer(name: &str, i: i64) -> AttributeProto {
+pub(crate) fn integer(name: &str, i: i64) -> AttributeProto {
     let r#type = Some(AttributeType::INT);
     AttributeProto { name: Some(name.to_owned()), i: Some(i), r#type, ..AttributeProto::default() }
 }

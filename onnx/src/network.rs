@@ -96,7 +96,27 @@ impl OnnxNetwork {
             return Err(format!("answers {numbers} numbers per grid, not (u, w) or (u, w, raw_u, raw_w)"));
         }
         network.numbers = numbers;
+        network.check_independence(&pool)?;
         Ok(network)
+    }
+
+    /// Refuses a network whose answer to a grid depends on the other grids of its batch: which cars share a batch depends on
+    /// the number of threads.
+    fn check_independence(&self, pool: &Arc<ThreadPool>) -> Result<(), String> {
+        let (free, mut striped) = (OccupancyGrid::free(), OccupancyGrid::free());
+        (0..GRID_CELLS).step_by(2).for_each(|row| striped.occupy_row(row, u32::MAX >> (32 - GRID_CELLS)));
+        let first = |others: &OccupancyGrid| {
+            let grids: Vec<&OccupancyGrid> =
+                std::iter::once(&free).chain(std::iter::repeat_n(others, self.batch - 1)).collect();
+            let (numbers, values) = self.run(&grids, pool)?;
+            Ok::<_, String>(values[..numbers].iter().map(|value| value.to_bits()).collect::<Vec<_>>())
+        };
+        if first(&free)? == first(&striped)? {
+            return Ok(());
+        }
+        Err("answers one grid differently when others stand beside it in the batch, as batch normalisation does in training \
+             mode; export it in evaluation mode"
+            .to_owned())
     }
 
     /// What lotpilot wrote into the file; `None` if another program made it.

@@ -1,5 +1,5 @@
 use super::*;
-use crate::export::export;
+use crate::export::{self, export};
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
 use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Weights};
@@ -87,6 +87,22 @@ fn an_answer_does_not_depend_on_the_other_grids() {
             assert_eq!(network.raw(&grids[start..], &pool())[..], together[start..], "from {start}, {batch} at once");
         }
     }
+}
+
+/// Which cars shared a call depended on the number of threads, and with it what was driven.
+#[test]
+fn a_network_that_mixes_the_grids_of_a_batch_is_refused() {
+    let [checkpoint, _] = checkpoints();
+    let mut nodes = export::layers(checkpoint.weights.architecture());
+    let answer = nodes.last_mut().unwrap();
+    answer.output = vec!["alone".to_owned()];
+    nodes.push(export::node("Softmax", &["alone"], OUTPUT, vec![export::integer("axis", 0)]));
+    let mut network = load("mixing", &export::file(&checkpoint, nodes)).unwrap();
+    assert_eq!(network.batch, 1, "alone, a grid has nothing to be mixed with");
+    // As if the file asked for as many.
+    network.batch = 16;
+    let error = network.check_independence(&pool()).unwrap_err();
+    assert!(error.contains("when others stand beside it in the batch"), "{error}");
 }
 
 #[test]
