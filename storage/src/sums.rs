@@ -220,15 +220,18 @@ fn replace_folder(
         (folder.join(name), folder.join(format!("{name}.partial")), format!("{name}/{FILE}"));
     let failed =
         |error: std::io::Error| FileError::new(&path, format_args!("cannot be written: {error}"), whole::WRITE_REMEDY);
-    unlist(folder, &[&list_name])?;
-    for old in [&path, &partial] {
-        if old.exists() {
-            fs::remove_dir_all(old).map_err(failed)?;
-        }
-    }
+    let remove = |old: &Path| if old.exists() { fs::remove_dir_all(old).map_err(failed) } else { Ok(()) };
+    remove(&partial)?;
     fs::create_dir_all(&partial).map_err(failed)?;
-    fill(&partial)?;
-    if !exists(&partial)? {
+    // The old one stays, and stays listed, until the new one is whole.
+    if let Err(error) = fill(&partial) {
+        remove(&partial)?;
+        return Err(error);
+    }
+    let is_empty = !exists(&partial)?;
+    unlist(folder, &[&list_name])?;
+    remove(&path)?;
+    if is_empty {
         return fs::remove_dir(&partial).map_err(failed);
     }
     fs::rename(&partial, &path).map_err(failed)?;
@@ -527,7 +530,7 @@ mod tests {
     }
 
     #[test]
-    fn a_copy_holds_what_is_finished_and_of_a_damaged_folder_there_is_none() {
+    fn a_copy_holds_what_is_finished_and_one_of_a_damaged_folder_replaces_nothing() {
         let folder = scratch("copy");
         let (from, to) = (folder.join("from"), folder.join("to"));
         fs::create_dir_all(from.join("stages/one")).unwrap();
@@ -546,7 +549,10 @@ mod tests {
         }
         fs::write(from.join("stages/one/data"), "54321").unwrap();
         assert!(copy_folder(&from, &to, "runs/copy").unwrap_err().to_string().contains("stages/one/data"));
-        assert!(!to.join("runs/copy").exists());
+        let verified = verify(&to);
+        assert_eq!((verified.files, verified.faults.len()), (5, 0), "the old copy is left as it was");
+        copy_folder(&from, &to, "runs/other").unwrap_err();
+        assert!(!to.join("runs/other").exists() && !to.join("runs/other.partial").exists());
         fs::remove_dir_all(folder).unwrap();
     }
 
