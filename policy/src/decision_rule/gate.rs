@@ -27,8 +27,9 @@ pub(crate) struct Wheel {
 }
 
 impl Wheel {
-    /// Whether the network drives: the expert `takes` the wheel from it, or `returns` it.
-    pub(crate) fn is_novices(&mut self, takes: bool, returns: bool) -> bool {
+    /// Goes on by a tick in which the expert `takes` the wheel from the network, or `returns` it; says whether the network
+    /// drives then.
+    pub(crate) fn turn(&mut self, takes: bool, returns: bool) -> bool {
         self.is_experts = if self.is_experts { !returns } else { takes };
         !self.is_experts
     }
@@ -43,7 +44,7 @@ mod tests {
         let mut wheel = Wheel::default();
         let steps = [(false, false, true), (true, false, false), (false, false, false), (true, true, true)];
         for (takes, returns, is_novices) in steps {
-            assert_eq!(wheel.is_novices(takes, returns), is_novices, "{takes} {returns}");
+            assert_eq!(wheel.turn(takes, returns), is_novices, "{takes} {returns}");
         }
     }
 }

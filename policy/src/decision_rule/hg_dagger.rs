@@ -78,7 +78,7 @@ impl Gate for HgDaggerGate {
         // In whole ticks: sums of 0.05 s are not exact.
         let is_over = |duration_s: f32, limit_s: f32| duration_s > limit_s - 0.5 * self.episode.control_period_s();
         let takes = critical_s > 0.0 && is_over(critical_s, reaction_s);
-        self.wheel.is_novices(takes, free_s > 0.0 && is_over(free_s, hold_s))
+        self.wheel.turn(takes, free_s > 0.0 && is_over(free_s, hold_s))
     }
 
     fn reset(&mut self) {

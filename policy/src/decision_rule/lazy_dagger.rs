@@ -37,7 +37,7 @@ impl Gate for LazyDaggerGate {
     fn trusts_novice(&mut self, tick: &GateTick<'_>) -> bool {
         let LazyDaggerSettings { tau, release_share } = self.settings;
         let is_near = tick.evidence.discrepancy < release_share * tau;
-        self.wheel.is_novices(tick.evidence.alarm >= UNSAFE, is_near)
+        self.wheel.turn(tick.evidence.alarm >= UNSAFE, is_near)
     }
 
     fn reset(&mut self) {

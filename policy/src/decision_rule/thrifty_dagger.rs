@@ -80,7 +80,7 @@ impl Gate for ThriftyDaggerGate {
         let (found, limits) = (&tick.evidence, &self.thresholds);
         let takes = found.disagreement > limits.novelty || found.alarm > limits.risk;
         let returns = found.discrepancy < limits.discrepancy_release && found.alarm < limits.risk_release;
-        self.wheel.is_novices(takes, returns)
+        self.wheel.turn(takes, returns)
     }
 
     fn reset(&mut self) {

@@ -8,9 +8,11 @@ use crate::fit::settings::{FitSettings, KeepWeights};
 use crate::fit::unfinished::Unfinished;
 use crate::loss::{self, BatchLoss, LossParts, LossSettings};
 use crate::network::{
-    DeviceChoice, DropoutFactors, InferenceSettings, LookAheadNet, Predictor, Weights, occupied_tensor,
+    DeviceChoice, DropoutFactors, InferenceSettings, LookAheadNet, NetworkArchitecture, Predictor, Weights,
+    occupied_tensor,
 };
-use burn::optim::GradientsParams;
+use burn::lr_scheduler::module_lr_scheduler::ModuleLrScheduler;
+use burn::optim::{GradientsParams, ModuleOptimizer};
 use burn::tensor::{Bytes, Device, Tensor, TensorData};
 use sim::seed::RootSeed;
 use sim::sensing::GridGeometry;
@@ -107,55 +109,33 @@ pub fn fit(
     let validate = |weights: &Weights, samples: &[Sample]| {
         (!samples.is_empty()).then(|| evaluate(weights, samples, &settings.loss, context))
     };
-
-    let architecture = start.architecture();
-    let device = context.device.device().autodiff();
-    let mut optimizer = settings.adam.optimizer(settings.gradient_norm_max);
-    let mut scheduler =
-        settings.learning_rate.scheduler(steps).map_err(|problem| FitError::LearningRate { problem })?;
-    let mut sampler = BatchSampler::new(&split.training, settings.mirror, context.seed);
-    let mut batch = Vec::with_capacity(settings.batch);
+    let mut learner = Learner::new(start, &split.training, settings, context, steps)?;
     let mut course = Course::new(start);
-    let mut net = LookAheadNet::from_weights(start, &device);
-    let left = unfinished.map(|path| Unfinished::read(path, architecture)).transpose()?.flatten();
-    if let Some(left) = left {
-        net = LookAheadNet::from_weights(&left.weights, &device);
-        optimizer = optimizer.from_bytes(Bytes::from_bytes_vec(left.optimizer.clone())).map_err(|error| {
-            FileError::new(unfinished.unwrap_or(Path::new("")), error, "delete it to begin this training again")
-        })?;
-        for _ in &left.steps {
-            scheduler.step();
-            sampler.draw(settings.batch, &mut batch);
-        }
+    if let Some(path) = unfinished
+        && let Some(left) = Unfinished::read(path, start.architecture())?
+    {
+        learner.restore(&left, path)?;
         course.replay(left, settings.keep);
     }
     let mut kept_at = Instant::now();
     let mut stopped = false;
     while course.done() < steps && !stopped && !course.is_out_of_patience(settings) {
-        sampler.draw(settings.batch, &mut batch);
-        let dropout = DropoutFactors::draw(&architecture, batch.len(), context.seed, u64::from(course.done()), &device);
-        let outputs = net.forward(occupied(&batch, &device), Some(dropout));
-        let BatchLoss { misfit, log_variance } = batch_loss(&settings.loss, outputs, &batch, &device);
-        let (misfit, log_variance) = (misfit.mean(), log_variance.mean());
-        let gradients = (misfit.clone() + log_variance.clone()).backward();
-        let loss = LossParts::new(misfit.into_scalar(), log_variance.into_scalar());
-        if !loss.total.is_finite() {
-            return Err(FitError::NotFinite { step: course.done() + 1, what: "the loss" });
-        }
-        let gradients = GradientsParams::from_grads(gradients, &net);
-        let learning_rate = scheduler.step();
-        net = optimizer.step(learning_rate.clone(), net, gradients);
-        let learning_rate = learning_rate.base() as f32;
-        course.step(Step { learning_rate, loss });
-
+        let step;
+        (learner, step) = learner.step(course.done())?;
+        course.step(step);
         let done = course.done();
-        let samples_done = u64::from(done) * settings.batch as u64;
-        let validation = course.latest();
-        let report = FitProgress { step: done, steps, samples_done, learning_rate, loss, validation };
+        let report = FitProgress {
+            step: done,
+            steps,
+            samples_done: u64::from(done) * settings.batch as u64,
+            learning_rate: step.learning_rate,
+            loss: step.loss,
+            validation: course.latest(),
+        };
         // What was asked for in the last step comes after the training.
         stopped = progress(&report).is_break() && done < steps;
         if done == steps || settings.validate_every > 0 && done.is_multiple_of(settings.validate_every) {
-            let weights = net.to_weights(architecture);
+            let weights = learner.weights();
             if !weights.values().iter().all(|value| value.is_finite()) {
                 return Err(FitError::NotFinite { step: done, what: "a weight" });
             }
@@ -165,14 +145,13 @@ pub fn fit(
         if let Some(path) = unfinished
             && (stopped || done < steps && kept_at.elapsed() >= Duration::from_secs(KEEP_EVERY_S))
         {
-            let optimizer = optimizer.into_bytes().expect("the state of an optimiser can be serialised").to_vec();
-            course.keep(net.to_weights(architecture), optimizer).write(path)?;
+            course.keep(learner.weights(), learner.optimizer_state()).write(path)?;
             kept_at = Instant::now();
         }
     }
     // Stopped between two validations.
     if course.curve.last().map_or(0, |point| point.step) < course.done() {
-        let weights = net.to_weights(architecture);
+        let weights = learner.weights();
         let validation = validate(&weights, &validated);
         course.validated(weights, validation, settings.keep);
     }
@@ -191,6 +170,85 @@ pub fn fit(
         curve,
     };
     Ok(FitOutcome { weights: best.weights, report, steps: taken })
+}
+
+/// The network in training, and what trains it.
+struct Learner<'a> {
+    net: LookAheadNet,
+    optimizer: ModuleOptimizer,
+    scheduler: ModuleLrScheduler,
+    sampler: BatchSampler<'a>,
+    batch: Vec<Sample>,
+    settings: &'a FitSettings,
+    architecture: NetworkArchitecture,
+    device: Device,
+    seed: RootSeed,
+}
+
+impl<'a> Learner<'a> {
+    fn new(
+        start: &Weights,
+        samples: &'a [Sample],
+        settings: &'a FitSettings,
+        context: FitContext,
+        steps: u32,
+    ) -> Result<Self, FitError> {
+        let device = context.device.device().autodiff();
+        let scheduler = settings.learning_rate.scheduler(steps);
+        Ok(Self {
+            net: LookAheadNet::from_weights(start, &device),
+            optimizer: settings.adam.optimizer(settings.gradient_norm_max),
+            scheduler: scheduler.map_err(|problem| FitError::LearningRate { problem })?,
+            sampler: BatchSampler::new(samples, settings.mirror, context.seed),
+            batch: Vec::with_capacity(settings.batch),
+            settings,
+            architecture: start.architecture(),
+            device,
+            seed: context.seed,
+        })
+    }
+
+    /// Puts it where an interrupted training stopped: its weights, its optimiser, and as many draws and rates passed by.
+    fn restore(&mut self, left: &Unfinished, path: &Path) -> Result<(), FitError> {
+        let remedy = "delete it to begin this training again";
+        self.net = LookAheadNet::from_weights(&left.weights, &self.device);
+        let optimizer = self.settings.adam.optimizer(self.settings.gradient_norm_max);
+        self.optimizer = optimizer
+            .from_bytes(Bytes::from_bytes_vec(left.optimizer.clone()))
+            .map_err(|error| FileError::new(path, error, remedy))?;
+        for _ in &left.steps {
+            self.scheduler.step();
+            self.sampler.draw(self.settings.batch, &mut self.batch);
+        }
+        Ok(())
+    }
+
+    /// One step of the optimiser, after `done` others. By value: the optimiser writes into weights that nobody else holds.
+    fn step(mut self, done: u32) -> Result<(Self, Step), FitError> {
+        self.sampler.draw(self.settings.batch, &mut self.batch);
+        let (batch, device, loss) = (&self.batch, &self.device, &self.settings.loss);
+        let dropout = DropoutFactors::draw(&self.architecture, batch.len(), self.seed, u64::from(done), device);
+        let outputs = self.net.forward(occupied(batch, device), Some(dropout));
+        let BatchLoss { misfit, log_variance } = batch_loss(loss, outputs, batch, device);
+        let (misfit, log_variance) = (misfit.mean(), log_variance.mean());
+        let gradients = (misfit.clone() + log_variance.clone()).backward();
+        let loss = LossParts::new(misfit.into_scalar(), log_variance.into_scalar());
+        if !loss.total.is_finite() {
+            return Err(FitError::NotFinite { step: done + 1, what: "the loss" });
+        }
+        let gradients = GradientsParams::from_grads(gradients, &self.net);
+        let learning_rate = self.scheduler.step();
+        let net = self.optimizer.step(learning_rate.clone(), self.net, gradients);
+        Ok((Self { net, ..self }, Step { learning_rate: learning_rate.base() as f32, loss }))
+    }
+
+    fn weights(&self) -> Weights {
+        self.net.to_weights(self.architecture)
+    }
+
+    fn optimizer_state(&self) -> Vec<u8> {
+        self.optimizer.into_bytes().expect("the state of an optimiser can be serialised").to_vec()
+    }
 }
 
 /// At most so many of the samples, evenly spread; 0 = all.
@@ -277,7 +335,7 @@ impl Course {
         let step = self.done();
         let learning_rate = self.steps.last().map_or(0.0, |step| step.learning_rate);
         self.curve.push(CurvePoint { step, learning_rate, training: self.since_point.take(), validation });
-        if self.best.is_better(step, validation, keep) {
+        if self.best.offer(step, validation, keep) {
             self.best.weights = weights;
         }
     }
@@ -292,7 +350,7 @@ impl Course {
     fn replay(&mut self, left: Unfinished, keep: KeepWeights) {
         let last_point = left.curve.last().map_or(0, |point| point.step);
         for point in &left.curve {
-            self.best.is_better(point.step, point.validation, keep);
+            self.best.offer(point.step, point.validation, keep);
         }
         left.steps.iter().skip(last_point as usize).for_each(|step| self.since_point.add(step.loss));
         self.best.weights = left.best;
@@ -315,8 +373,8 @@ impl Best {
         Self { weights, step: 0, validation: None, offers_since: 0, lowest: f32::INFINITY }
     }
 
-    /// Whether weights with this validation are to be kept in place of those here.
-    fn is_better(&mut self, step: u32, found: Option<Validation>, keep: KeepWeights) -> bool {
+    /// Offers weights with this validation; says whether they are to be kept in place of those here.
+    fn offer(&mut self, step: u32, found: Option<Validation>, keep: KeepWeights) -> bool {
         let is_lowest = found.is_some_and(|found| found.loss < self.lowest);
         if let Some(found) = found {
             self.lowest = self.lowest.min(found.loss);
