@@ -8,7 +8,7 @@ use sim::frame::Ending;
 use sim::map::Map;
 use sim::maths;
 use sim::scenario::Direction;
-use sim::seed::RootSeed;
+use sim::seed::{RootSeed, Stream};
 use std::f32::consts::PI;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,8 @@ fn the_expert_drives_every_reference_lot_both_ways_without_a_near_collision() {
         for direction in Direction::BOTH {
             let seed = RootSeed(4);
             let map = Arc::new(Map::build(direction.of(lot(which, seed)), &settings.vehicle).unwrap());
-            let mut expert = ScriptedExpert::new(ExpertSettings::half_points(), &settings);
+            let mut expert =
+                ScriptedExpert::new(ExpertSettings::half_points(), &settings, RootSeed(1).rng(Stream::Expert, 0));
             let report = episode::run(Episode::new(Arc::clone(&settings), map, seed), &mut expert, &mut ());
             let metrics = &report.metrics;
             assert_eq!(report.ending, Ending::ReachedEnd, "{which:?} {direction:?}");
@@ -61,7 +62,8 @@ fn the_expert_drives_the_example_maps_without_a_near_collision() {
         let scenario = scenarios::load::load(&path, &settings.vehicle).unwrap_or_else(|error| panic!("{error}"));
         for &direction in directions {
             let map = Arc::new(Map::build(direction.of(scenario.clone()), &settings.vehicle).unwrap());
-            let mut expert = ScriptedExpert::new(ExpertSettings::half_points(), &settings);
+            let mut expert =
+                ScriptedExpert::new(ExpertSettings::half_points(), &settings, RootSeed(1).rng(Stream::Expert, 0));
             let report = episode::run(Episode::new(Arc::clone(&settings), map, RootSeed(4)), &mut expert, &mut ());
             assert_eq!(report.ending, Ending::ReachedEnd, "{} {direction:?}", path.display());
             let metrics = &report.metrics;
@@ -110,7 +112,7 @@ fn drive_hairpin(inner_m: f32, width_m: f32, curvature_max_per_m: f32) -> [Episo
     Direction::BOTH.map(|direction| {
         let map = Arc::new(Map::build(direction.of(lot.clone()), &settings.vehicle).unwrap());
         let expert = ExpertSettings { curvature_max_per_m, ..ExpertSettings::half_points() };
-        let mut expert = ScriptedExpert::new(expert, &settings);
+        let mut expert = ScriptedExpert::new(expert, &settings, RootSeed(1).rng(Stream::Expert, 0));
         episode::run(Episode::new(Arc::clone(&settings), map, RootSeed(4)), &mut expert, &mut ())
     })
 }

@@ -10,6 +10,7 @@ use sim::episode::EpisodeSettings;
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::scenario::{Direction, Obstacle, ObstacleClass, Scenario};
+use sim::seed::{RootSeed, Stream};
 use sim::sensing::{GridGeometry, Observation};
 use sim::vehicle::{VehicleSettings, VehicleState};
 
@@ -20,7 +21,7 @@ fn car() -> VehicleSettings {
 /// A fresh expert's answers at rest at the start of a lot, one per tick.
 fn answers(settings: &ExpertSettings, episode: &EpisodeSettings, lot: Scenario, poses: &[Pose]) -> Vec<LookAheadPoint> {
     let map = Map::build(lot, &episode.vehicle).unwrap();
-    let mut expert = ScriptedExpert::new(settings.clone(), episode);
+    let mut expert = ScriptedExpert::new(settings.clone(), episode, RootSeed(1).rng(Stream::Expert, 0));
     let observation = Observation::default();
     let answer = |&pose: &Pose| {
         let truth = GroundTruth { map: &map, vehicle: VehicleState::at_rest(pose), progress_m: 0.0 };

@@ -16,7 +16,7 @@ use sim::driver::{Decision, Driver, Fleet, LookAheadPoint, OneDriverEach, Situat
 use sim::episode::{self, Episode};
 use sim::map::Map;
 use sim::scenario::Direction;
-use sim::seed::RootSeed;
+use sim::seed::{RootSeed, Stream};
 use std::sync::Arc;
 
 /// Cars of a fleet.
@@ -126,7 +126,9 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
         course.lock_step(network.cars_per_fleet(FLEET), |cars| seat(&vec![RootSeed(1); cars.len()]))
     }));
     report(steps("one car with the expert", 1, None, &mut || {
-        let expert = || ScriptedExpert::new(ExpertSettings::half_points(), &settings.episode);
+        let expert = || {
+            ScriptedExpert::new(ExpertSettings::half_points(), &settings.episode, RootSeed(1).rng(Stream::Expert, 0))
+        };
         let mut steps = 0_u64;
         let episode = course.episodes().swap_remove(0);
         episode::run(episode, &mut expert(), &mut |_: &sim::frame::Frame| steps += 1);

@@ -11,7 +11,7 @@ use sim::driver::{Decision, Driver, LookAheadPoint, Policy, SensorsOnly, Source}
 use sim::episode::EpisodeSettings;
 use sim::map::Map;
 use sim::scenario::{Direction, NoiseLevel, Scenario};
-use sim::seed::RootSeed;
+use sim::seed::{RootSeed, Stream};
 use sim::sensing::noise::NoiseSettings;
 use sim::sensing::{GRID_CELLS, GridGeometry, Observation};
 use std::sync::Arc;
@@ -109,7 +109,7 @@ fn on_generated(lot: &Scenario) -> [Case; 2] {
 }
 
 fn expert(settings: &EpisodeSettings) -> ScriptedExpert {
-    ScriptedExpert::new(ExpertSettings::half_points(), settings)
+    ScriptedExpert::new(ExpertSettings::half_points(), settings, RootSeed(1).rng(Stream::Expert, 0))
 }
 
 fn digest(text: &str) -> String {

@@ -3,10 +3,11 @@
 use crate::Golden;
 use sha2::{Digest as _, Sha256};
 use sim::driver::{Decision, Driver};
-use sim::episode::{Episode, EpisodeReport, EpisodeSettings};
+use sim::episode::{Episode, EpisodeSettings};
 use sim::frame::{Event, Frame};
 use sim::geometry::Pose;
 use sim::map::Map;
+use sim::metrics::EpisodeMetrics;
 use sim::seed::RootSeed;
 use sim::sensing::GRID_CELLS;
 use std::sync::Arc;
@@ -25,7 +26,7 @@ pub fn drive(settings: &Arc<EpisodeSettings>, map: Arc<Map>, driver: &mut dyn Dr
         }
         let decision = driver.decide(&episode.situation());
         let frame = episode.apply(decision);
-        recorder.frame(&frame, &episode.report());
+        recorder.frame(&frame, &episode.metrics());
     }
     if !recorder.ticks.is_power_of_two() {
         recorder.end_stretch();
@@ -42,7 +43,7 @@ struct Recorder {
 }
 
 impl Recorder {
-    fn frame(&mut self, frame: &Frame, report: &EpisodeReport) {
+    fn frame(&mut self, frame: &Frame, so_far: &EpisodeMetrics) {
         let [observations, decisions, trajectory, metrics] = &mut self.layers;
         (0..GRID_CELLS).for_each(|row| observations.update(frame.observation.grid.row(row).to_le_bytes()));
         let Decision { look_ahead, source, spread, speed_limit_mps } = frame.decision;
@@ -70,7 +71,6 @@ impl Recorder {
                 floats(metrics, &[-progress_m]);
             }
         }
-        let so_far = &report.metrics;
         metrics.update(so_far.steering_reversals.to_le_bytes());
         floats(metrics, &[so_far.driven_m, so_far.safe_ratio, so_far.clearance_min_m, so_far.steering_effort_rad]);
         self.ticks += 1;

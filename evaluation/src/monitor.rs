@@ -106,7 +106,7 @@ impl IncidentMonitor {
 }
 
 fn ticks(seconds: f32, control_period_s: f32) -> usize {
-    (seconds / control_period_s) as usize
+    (seconds / control_period_s).round() as usize
 }
 
 /// The state so long before the last one, or the first.

@@ -81,17 +81,19 @@ impl Clusters {
 impl EvaluationResults {
     /// Nothing driven yet.
     pub fn new(plan: &Plan<'_>) -> Self {
-        // Every driver's, and those of the settings. A file that moved, or is not the same any more, is known by its digest.
+        // Every driver's, and those of the settings. A lot from a file is known by its digest, wherever the file is now.
         let trainings = || plan.drivers.iter().filter_map(|driver| driver.training.as_ref());
-        let digests: BTreeSet<&String> = trainings().flat_map(|training| &training.digests).collect();
         let of_drivers = trainings().flat_map(|training| &training.lots);
         let named: BTreeSet<&String> = plan.settings.training.lots.iter().chain(of_drivers).collect();
-        let trained_on: BTreeSet<String> = named
+        let known: Vec<Lot> = named
             .into_iter()
             .filter_map(|spec| Lot::parse_all(&[spec], &plan.settings.episode.vehicle).ok())
             .flatten()
-            .map(|lot| lot.group())
             .collect();
+        // Two files may give one name to different ground, and two names to the same.
+        let trained_on: BTreeSet<String> = known.iter().filter(|lot| !lot.is_from_file()).map(Lot::group).collect();
+        let of_trainings = trainings().flat_map(|training| training.digests.iter().cloned());
+        let digests: BTreeSet<String> = of_trainings.chain(known.iter().filter_map(Lot::digest)).collect();
         let mut results = Self {
             groups: Vec::new(),
             lots: BTreeMap::new(),

@@ -20,13 +20,11 @@ use planners::search::{GENERATION, Search};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim::episode::{Episode, EpisodeSettings};
-use sim::frame::Event;
 use sim::map::Map;
 use sim::seed::RootSeed;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use storage::{sealed, sums};
 
 /// Candidates that drive fresh trials besides the starting point.
@@ -145,23 +143,14 @@ impl<'a> Course<'a> {
     }
 
     /// Drives a stretch with every candidate, in parallel; sums come in the order of the candidates.
-    fn drive(
-        &self,
-        candidates: &[PlannerSpec],
-        stretch: &Stretch<'_>,
-        on_run: &(dyn Fn() + Sync),
-    ) -> anyhow::Result<Vec<Totals>> {
+    fn drive(&self, candidates: &[PlannerSpec], stretch: &Stretch<'_>) -> anyhow::Result<Vec<Totals>> {
         let starts: Vec<Episode> = drive::start(&stretch.trials, &stretch.maps, self.episode, self.noise);
         let drive = |candidate: &PlannerSpec| {
             let driver = &NamedDriver::planner(candidate.clone());
             let (trials, maps) = (&stretch.trials, &stretch.maps);
             let batch = TrialBatch { episode: self.episode, driver, trials, maps, noise: self.noise, seed: self.seed };
-            let reports = batch.drive_from(starts.iter().cloned().enumerate().collect(), &mut |_, frame| {
-                if frame.event == Event::ReachedEnd {
-                    on_run();
-                }
-                ControlFlow::Continue(())
-            });
+            let episodes = starts.iter().cloned().enumerate().collect();
+            let reports = batch.drive_from(episodes, &mut |_, _| ControlFlow::Continue(()));
             let reports = reports.with_context(|| {
                 let parameters = candidate.parameters().to_string();
                 format!("{} with {}", driver.spec, parameters.trim_end().replace('\n', ", "))
@@ -289,16 +278,12 @@ fn search(
 ) -> anyhow::Result<Option<Found>> {
     let finalists_max = FINALISTS.min(budget - 1) + 1;
     let runs_all = budget * course.search.trials.len() + finalists_max * course.fresh.trials.len();
-    let runs_done = AtomicUsize::new(0);
-    let on_run = || {
-        runs_done.fetch_add(1, Ordering::Relaxed);
-    };
     // The same draws for every planner, as far as their dimensions allow.
     let mut search = Search::new(start.to_unit_cube(), budget, seed, 0);
     let mut tried: Vec<(Vec<f32>, PlannerSpec, Totals)> = Vec::with_capacity(budget);
     loop {
         let best = tried.iter().min_by_key(|(_, _, totals)| rank(totals));
-        let share = runs_done.load(Ordering::Relaxed) as f64 / runs_all as f64;
+        let share = (tried.len() * course.search.trials.len()) as f64 / runs_all as f64;
         let status = || best.map_or_else(String::new, |(_, _, totals)| format!("{} failures", rank(totals).1));
         progress.at(share, &mut |_| status());
         let generation = search.ask(best.map(|(point, ..)| point.as_slice()));
@@ -314,7 +299,7 @@ fn search(
         if tried.is_empty() {
             candidates[0] = start.clone();
         }
-        let totals = driven.next(candidates.len(), || course.drive(&candidates, &course.search, &on_run))?;
+        let totals = driven.next(candidates.len(), || course.drive(&candidates, &course.search))?;
         tried.extend(
             generation.into_iter().zip(candidates).zip(totals).map(|((point, of), totals)| (point, of, totals)),
         );
@@ -324,7 +309,7 @@ fn search(
     order.truncate(finalists_max - 1);
     order.insert(0, 0);
     let finalists: Vec<PlannerSpec> = order.iter().map(|&index| tried[index].1.clone()).collect();
-    let fresh = driven.next(finalists.len(), || course.drive(&finalists, &course.fresh, &on_run))?;
+    let fresh = driven.next(finalists.len(), || course.drive(&finalists, &course.fresh))?;
     let together: Vec<Totals> = order
         .iter()
         .zip(&fresh)

@@ -4,7 +4,7 @@
 //! episodes with a collector at the wheel ([`crate::training`]). They differ only in what the observer does.
 
 use crate::drive_digest::DriveDigest;
-use crate::drivers::NamedDriver;
+use crate::drivers::{self, NamedDriver};
 use crate::lots::Lot;
 use crate::replay_key::ReplayKey;
 use crate::settings::NoiseChoice;
@@ -15,7 +15,7 @@ use sim::batch::{NotFinite, SeatedFleet, run_fleets_until};
 use sim::episode::{Episode, EpisodeReport, EpisodeSettings};
 use sim::frame::Frame;
 use sim::map::Map;
-use sim::seed::RootSeed;
+use sim::seed::{Rng, RootSeed};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -145,6 +145,11 @@ impl Replay {
     /// A car at its start.
     pub fn episode(&self, episode: &EpisodeSettings) -> Episode {
         start(&[self.trial()], std::slice::from_ref(&self.map), episode, self.key.noise).remove(0)
+    }
+
+    /// The stream of the expert's label jitter in its episode.
+    pub fn hand(&self) -> Rng {
+        drivers::hand(self.trial().episode_seed())
     }
 
     /// Drives it again to its end: what it came to, and its digest.

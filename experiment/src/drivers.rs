@@ -1,256 +1,34 @@
 //! Drivers: how they are named, and how they get to the wheel.
 
+mod planner_file;
+mod spec;
+
+pub use planner_file::{Parameters, PlannerFile, tuned_specs};
+pub use spec::{DriverSpec, specs};
+
 use crate::settings::{Layers, Settings, Smoothing};
 use crate::trained::{self, Training};
 use anyhow::{Context as _, bail, ensure};
 use expert::{ExpertSettings, ScriptedExpert, Sees};
 use onnx::fleet::OnnxFleet;
 use onnx::network::OnnxNetwork;
+use planner_file::planner;
 use planners::{Planner, PlannerContext, PlannerSpec};
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
 use policy::drivers::NetFleet;
 use policy::network::{DeviceChoice, InferenceSettings};
-use serde::{Deserialize, Serialize};
 use sim::action_smoothing::SmoothedFleet;
 use sim::driver::{Fleet, OneDriverEach, SensorsOnly, Source};
 use sim::episode::EpisodeSettings;
-use sim::limits::PLANNER_BYTES_MAX;
-use sim::seed::RootSeed;
+use sim::seed::{Rng, RootSeed, Stream};
 use std::cell::OnceCell;
-use std::fmt::{self, Write as _};
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
+use std::fmt;
+use std::path::Path;
 use std::sync::Arc;
 use storage::sums;
 
-/// Parameters that ship: the planner, and the file that `cargo xtask tune` wrote.
-const TUNED: [(&str, &str); 7] = [
-    ("tentacle", include_str!("../../planners/tuned/tentacle.toml")),
-    ("vvf", include_str!("../../planners/tuned/vvf.toml")),
-    ("dwa", include_str!("../../planners/tuned/dwa.toml")),
-    ("cvm", include_str!("../../planners/tuned/cvm.toml")),
-    ("apf", include_str!("../../planners/tuned/apf.toml")),
-    ("vff", include_str!("../../planners/tuned/vff.toml")),
-    ("mppi", include_str!("../../planners/tuned/mppi.toml")),
-];
-
-/// A driver as named on the command line; nothing is loaded yet.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum DriverSpec {
-    /// `expert`: the scripted expert, which sees the truth.
-    Expert,
-    /// `run:DIR` and `run:DIR/bc`: a policy of a training run.
-    Run {
-        /// The folder as written, `/bc` included.
-        folder: PathBuf,
-    },
-    /// `net:DIR`: a network by the folder of its checkpoint.
-    Checkpoint {
-        /// The folder.
-        folder: PathBuf,
-    },
-    /// `ensemble:DRIVER,DRIVER`: networks whose answers are taken together.
-    Ensemble {
-        /// `run:` and `net:` drivers, at least one.
-        members: Vec<DriverSpec>,
-    },
-    /// `onnx:FILE`: a network from an ONNX file, trained anywhere.
-    Onnx {
-        /// The file.
-        file: PathBuf,
-    },
-    /// `NAME`, `tuned:NAME` or `NAME:FILE`: a model-based planner.
-    Planner {
-        /// Its name, with the reading if it is not the paper's: `dwa/fox`.
-        name: String,
-        /// Its parameters.
-        parameters: Parameters,
-    },
-    /// `python:NAME`: a function of the program that calls this library; it cannot be named on the command line.
-    Callback {
-        /// Its name.
-        name: String,
-    },
-}
-
-/// Where a planner's parameters come from.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Parameters {
-    /// The paper's or the literature's.
-    Published,
-    /// Those that ship, found by `cargo xtask tune`.
-    Tuned,
-    /// A TOML file.
-    File(PathBuf),
-}
-
-/// Ways to name a driver: how it is written, what it means.
-pub fn specs() -> Vec<(String, String)> {
-    let own = [
-        ("expert", "the scripted expert; sees the truth"),
-        ("run:DIR", "the final policy of a training run; if an ensemble was trained, all of its networks"),
-        ("run:DIR/bc", "its policy after behaviour cloning, one network"),
-        ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
-        ("ensemble:DRIVER,DRIVER", "run: and net: drivers whose answers are taken together"),
-        ("onnx:FILE", "a network from an ONNX file, trained anywhere (docs/formats.md)"),
-    ];
-    let of_files = [
-        ("tuned:NAME", "one of these planners with parameters found by cargo xtask tune (planners/tuned/)"),
-        ("NAME:FILE", "one of these planners with parameters from a TOML file (cargo xtask tune writes them)"),
-    ];
-    let planners = PlannerSpec::all().into_iter().flat_map(|planner| {
-        let of_reading = |(reading, about, _)| (format!("{}/{reading}", planner.name()), format!("reading: {about}"));
-        let readings = planner.readings().into_iter().map(of_reading);
-        std::iter::once((planner.name().to_owned(), planner.about().to_owned())).chain(readings).collect::<Vec<_>>()
-    });
-    let owned = |(spec, about): (&str, &str)| (spec.to_owned(), about.to_owned());
-    own.map(owned).into_iter().chain(planners).chain(of_files.map(owned)).collect()
-}
-
-/// The planners with parameters that ship.
-pub fn tuned_specs() -> Vec<String> {
-    TUNED.iter().map(|(name, _)| format!("tuned:{name}")).collect()
-}
-
-impl FromStr for DriverSpec {
-    type Err = anyhow::Error;
-
-    fn from_str(text: &str) -> anyhow::Result<Self> {
-        let is_planner = |name: &str| PlannerSpec::named(name).is_some();
-        let planner = |name: &str, parameters| Ok(Self::Planner { name: name.to_owned(), parameters });
-        match text.split_once(':') {
-            Some((kind, "")) if ["run", "net", "onnx"].contains(&kind) || is_planner(kind) => {
-                bail!("driver {text:?} names no folder or file; write it behind the colon, as in run:runs/NAME")
-            }
-            None if text == "expert" => Ok(Self::Expert),
-            None if is_planner(text) => planner(text, Parameters::Published),
-            Some(("run", folder)) => Ok(Self::Run { folder: folder.into() }),
-            Some(("net", folder)) => Ok(Self::Checkpoint { folder: folder.into() }),
-            Some(("ensemble", members)) => Self::ensemble(members),
-            Some(("python", name)) => {
-                bail!("{text:?} is a function in Python; only lotpilot.evaluate there can drive {name:?}")
-            }
-            Some(("onnx", file)) => Ok(Self::Onnx { file: file.into() }),
-            Some(("tuned", name)) if is_planner(name) => planner(name, Parameters::Tuned),
-            Some((name, file)) if is_planner(name) => planner(name, Parameters::File(file.into())),
-            _ => {
-                let path = Path::new(text);
-                if path.join("settings.toml").is_file() {
-                    bail!("no driver {text:?}; did you mean run:{text}?");
-                }
-                if Checkpoint::exists(path).is_ok_and(|exists| exists) {
-                    bail!("no driver {text:?}; did you mean net:{text}?");
-                }
-                let known = if text.starts_with("tuned:") {
-                    tuned_specs()
-                } else {
-                    specs().into_iter().map(|(spec, _)| spec).collect()
-                };
-                ensure!(!text.contains(','), "no driver {text:?}; name several with spaces between them");
-                let likeness = |name: &String| strsim::jaro_winkler(&text.to_lowercase(), name);
-                let nearest = known.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
-                let nearest = nearest.filter(|name| likeness(name) > 0.85);
-                let hint = nearest.map(|name| format!("; did you mean {name}?")).unwrap_or_default();
-                bail!("no driver {text:?}{hint}; there are {}", known.join(", "))
-            }
-        }
-    }
-}
-
-impl fmt::Display for DriverSpec {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Expert => f.write_str("expert"),
-            Self::Run { folder } => write!(f, "run:{}", folder.display()),
-            Self::Checkpoint { folder } => write!(f, "net:{}", folder.display()),
-            Self::Ensemble { members } => {
-                let members: Vec<String> = members.iter().map(Self::to_string).collect();
-                write!(f, "ensemble:{}", members.join(","))
-            }
-            Self::Onnx { file } => write!(f, "onnx:{}", file.display()),
-            Self::Planner { name, parameters: Parameters::Published } => f.write_str(name),
-            Self::Planner { name, parameters: Parameters::Tuned } => write!(f, "tuned:{name}"),
-            Self::Planner { name, parameters: Parameters::File(path) } => write!(f, "{name}:{}", path.display()),
-            Self::Callback { name } => write!(f, "python:{name}"),
-        }
-    }
-}
-
 impl DriverSpec {
-    /// Reads several.
-    ///
-    /// # Errors
-    /// If nothing is named so, or one is named twice.
-    pub fn parse_all<S: AsRef<str>>(texts: &[S]) -> anyhow::Result<Vec<Self>> {
-        let mut specs: Vec<Self> = Vec::new();
-        for text in texts {
-            let spec: Self = text.as_ref().parse()?;
-            let same = specs.iter().find(|other| other.is_same_as(&spec));
-            ensure!(same.is_none(), "driver {spec} is named twice; name it once");
-            specs.push(spec);
-        }
-        Ok(specs)
-    }
-
-    /// Whether two name the same, whatever they call the folder.
-    fn is_same_as(&self, other: &Self) -> bool {
-        let is_one =
-            |a: &Path, b: &Path| storage::place_of(a).is_ok_and(|a| storage::place_of(b).is_ok_and(|b| a == b));
-        match (self, other) {
-            (Self::Run { folder: a }, Self::Run { folder: b })
-            | (Self::Checkpoint { folder: a }, Self::Checkpoint { folder: b })
-            | (Self::Onnx { file: a }, Self::Onnx { file: b }) => self == other || is_one(a, b),
-            (
-                Self::Planner { name, parameters: Parameters::File(a) },
-                Self::Planner { name: other_name, parameters: Parameters::File(b) },
-            ) => self == other || name == other_name && is_one(a, b),
-            _ => self == other,
-        }
-    }
-
-    /// Whether it is a learned policy.
-    pub fn is_network(&self) -> bool {
-        matches!(self, Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. } | Self::Onnx { .. })
-    }
-
-    /// The training run it comes from, of an ensemble the first one; `/bc` is part of it.
-    pub fn run(&self) -> Option<&Path> {
-        match self {
-            Self::Run { folder } => Some(folder),
-            Self::Ensemble { members } => members.iter().find_map(Self::run),
-            Self::Expert
-            | Self::Checkpoint { .. }
-            | Self::Onnx { .. }
-            | Self::Planner { .. }
-            | Self::Callback { .. } => None,
-        }
-    }
-
-    /// The files and folders that it is read from.
-    pub fn places(&self) -> Vec<&Path> {
-        match self {
-            // A policy of a run is read from the run.
-            Self::Run { folder } if folder.ends_with("bc") && !folder.is_dir() => folder.parent().into_iter().collect(),
-            Self::Run { folder } | Self::Checkpoint { folder } => vec![folder],
-            Self::Ensemble { members } => members.iter().flat_map(Self::places).collect(),
-            Self::Onnx { file } | Self::Planner { parameters: Parameters::File(file), .. } => vec![file],
-            Self::Expert | Self::Planner { .. } | Self::Callback { .. } => Vec::new(),
-        }
-    }
-
-    fn ensemble(members: &str) -> anyhow::Result<Self> {
-        let members: Vec<Self> = members.split(',').map(str::parse).collect::<anyhow::Result<_>>()?;
-        for (at, member) in members.iter().enumerate() {
-            ensure!(
-                matches!(member, Self::Run { .. } | Self::Checkpoint { .. }),
-                "{member} cannot be part of an ensemble; its members are networks, as in ensemble:run:A,net:B/round-03"
-            );
-            ensure!(!members[..at].contains(member), "{member} is named twice in an ensemble");
-        }
-        Ok(Self::Ensemble { members })
-    }
-
     /// The networks it names, read from their files.
     fn checkpoints(&self) -> anyhow::Result<Vec<Checkpoint>> {
         match self {
@@ -380,9 +158,15 @@ impl NamedDriver {
     /// Reads several; each is named as it is written.
     ///
     /// # Errors
-    /// If nothing is named so, its files are not what they should be, or one is named twice.
+    /// If nothing is named so, its files are not what they should be, a training is not finished, or one is named twice.
     pub fn load_all<S: AsRef<str>>(texts: &[S], settings: &Settings) -> anyhow::Result<Vec<Self>> {
-        DriverSpec::parse_all(texts)?.into_iter().map(|spec| spec.load(settings)).collect()
+        let load = |spec: DriverSpec| {
+            if let DriverSpec::Run { folder } = &spec {
+                trained::ensure_whole(folder).with_context(|| format!("driver {:?}", spec.to_string()))?;
+            }
+            spec.load(settings)
+        };
+        DriverSpec::parse_all(texts)?.into_iter().map(load).collect()
     }
 
     /// The scripted expert.
@@ -556,77 +340,14 @@ fn smoothed(fleet: impl Fleet + Send + 'static, ticks: f32) -> Box<dyn Fleet + S
     if ticks > 0.0 { Box::new(SmoothedFleet::new(fleet, ticks)) } else { Box::new(fleet) }
 }
 
-/// A fresh expert, whose unsteadiness is drawn from the seed of its episode.
+/// A fresh expert for an episode with this seed.
 pub fn expert(settings: &ExpertSettings, episode: &EpisodeSettings, seed: RootSeed) -> ScriptedExpert {
-    ScriptedExpert::new(settings.clone(), episode).with_jitter_seed(seed, 0)
+    ScriptedExpert::new(settings.clone(), episode, hand(seed))
 }
 
-/// Parameters of a planner on disk.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PlannerFile {
-    /// Which planner they are for.
-    pub planner: String,
-    /// All of its parameters.
-    pub parameters: toml::Table,
-    /// How they were found; not read.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub search: Option<toml::Table>,
-}
-
-impl PlannerFile {
-    /// The text of the file for a spec, as `cargo xtask drivers SPEC` prints it.
-    ///
-    /// # Errors
-    /// If no planner is named so.
-    pub fn text_of(spec: &str) -> anyhow::Result<String> {
-        if let Some((_, text)) = spec.strip_prefix("tuned:").and_then(|name| TUNED.iter().find(|(of, _)| *of == name)) {
-            return Ok((*text).to_owned());
-        }
-        let planner = published(spec)?;
-        let mut text = format!("# {}\n", planner.about());
-        for (parameter, span) in planner.search_space() {
-            let _ = writeln!(text, "# cargo xtask tune searches {parameter}: {span}");
-        }
-        let file = Self { planner: planner.name().to_owned(), parameters: planner.parameters(), search: None };
-        Ok(text + "\n" + &toml::to_string(&file)?)
-    }
-}
-
-fn published(name: &str) -> anyhow::Result<PlannerSpec> {
-    PlannerSpec::named(name).with_context(|| {
-        let names: Vec<&str> = PlannerSpec::all().iter().map(PlannerSpec::name).collect();
-        format!("no planner {name:?}; there are {}", names.join(", "))
-    })
-}
-
-fn planner(name: &str, parameters: &Parameters) -> anyhow::Result<PlannerSpec> {
-    let planner = published(name)?;
-    match parameters {
-        Parameters::Published => Ok(planner),
-        Parameters::Tuned => {
-            let text = TUNED.iter().find(|(of, _)| *of == name).map(|(_, text)| *text);
-            let text = text.with_context(|| format!("no tuned parameters ship for {name:?}"))?;
-            with_parameters(&planner, text).with_context(|| format!("planners/tuned/{name}.toml"))
-        }
-        Parameters::File(path) => {
-            let text = sums::read_text(path, PLANNER_BYTES_MAX).with_context(|| {
-                format!("{}: cannot be read; cargo xtask drivers {name} prints such a file", path.display())
-            })?;
-            with_parameters(&planner, &text)
-                .with_context(|| format!("{}: cargo xtask drivers {name} prints a complete file", path.display()))
-        }
-    }
-}
-
-/// A planner with the parameters in the text of a [`PlannerFile`].
-fn with_parameters(planner: &PlannerSpec, text: &str) -> anyhow::Result<PlannerSpec> {
-    let file: PlannerFile = toml::from_str(text)?;
-    let name = planner.name();
-    ensure!(file.planner == name, "these are parameters of {:?}, but {name:?} is asked for", file.planner);
-    let changed = planner.with_parameters(file.parameters).context("parameters")?;
-    changed.check().map_err(anyhow::Error::msg).context("parameters")?;
-    Ok(changed)
+/// The stream of the expert's label jitter in an episode of an evaluation with this seed.
+pub fn hand(seed: RootSeed) -> Rng {
+    seed.rng(Stream::Expert, 0)
 }
 
 #[cfg(test)]
@@ -640,51 +361,6 @@ mod tests {
     use sim::seed::RootSeed;
     use sim::sensing::Observation;
     use sim::vehicle::VehicleState;
-
-    #[test]
-    fn every_spec_is_read_back() {
-        for text in [
-            "expert",
-            "run:runs/mine/bc",
-            "net:runs/mine/round-03",
-            "ensemble:run:runs/a,net:runs/b/round-02",
-            "onnx:policies/mine.onnx",
-            "tentacle",
-            "tuned:vvf",
-            "dwa/fox",
-            "dwa:my/dwa.toml",
-        ] {
-            assert_eq!(text.parse::<DriverSpec>().unwrap().to_string(), text);
-        }
-        for (wrong, known) in [
-            ("exprt", "did you mean expert?; there are expert, run:DIR"),
-            ("Tentacle", "did you mean tentacle?"),
-            ("expert,tentacle", "with spaces between them"),
-            ("run:", "names no folder or file"),
-            ("dwa:", "names no folder or file"),
-            ("", "there are expert, run:DIR"),
-            ("runs/mine", "there are expert, run:DIR"),
-            ("ensemble:run:runs/a,expert", "expert cannot be part of an ensemble"),
-            ("ensemble:run:runs/a,run:runs/a", "named twice"),
-            ("ensemble:", "there are expert, run:DIR"),
-            ("python:mine", "lotpilot.evaluate"),
-            ("tuned:tentacles", "there are tuned:tentacle, tuned:vvf"),
-        ] {
-            let error = wrong.parse::<DriverSpec>().unwrap_err().to_string();
-            assert!(error.contains(known), "{wrong:?}: {error}");
-        }
-    }
-
-    #[test]
-    fn a_run_folder_alone_is_no_driver_but_says_which_one() {
-        let folder = std::env::temp_dir().join(format!("lotpilot-spec-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        std::fs::write(folder.join("settings.toml"), "").unwrap();
-        let spec = folder.display().to_string();
-        let error = spec.parse::<DriverSpec>().unwrap_err().to_string();
-        assert!(error.contains(&format!("did you mean run:{spec}?")), "{error}");
-        std::fs::remove_dir_all(folder).unwrap();
-    }
 
     /// `net:DIR` has no run whose settings could be taken: the default preset's must not drive it at another speed.
     #[test]
@@ -758,12 +434,5 @@ mod tests {
         let (plain, smoothed) = (left_m(Smoothing::Own), left_m(Smoothing::Ticks(8.0)));
         assert!((plain[0] - smoothed[0]).abs() < 1e-4, "the first answer is taken at once");
         assert!(plain[1] < smoothed[1] && smoothed[1] < smoothed[0], "{plain:?} and {smoothed:?}");
-    }
-
-    #[test]
-    fn parameters_that_ship_fit_their_planners() {
-        for (name, _) in TUNED {
-            planner(name, &Parameters::Tuned).unwrap();
-        }
     }
 }

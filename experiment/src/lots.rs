@@ -45,9 +45,9 @@ pub fn specs() -> Vec<(&'static str, String)> {
         ("test:N:FAMILY", families.as_str()),
         (
             "sealed:PHRASE:N",
-            "N lots that nobody has tuned on, drawn from a phrase: easy, medium, hard in turn, or a family",
+            "N lots that nobody has tuned on, drawn from a phrase of a-z, 0-9 and -: easy, medium, hard in turn, or a family",
         ),
-        ("test-hard-7", "one of them"),
+        ("test-hard-7", "one of these: SPLIT-FAMILY-NUMBER, from 0; or sealed-PHRASE-hard-7"),
         (
             "PATH.toml",
             "a lot written by hand (cargo xtask generate writes examples), or the route on a map, PATH.lot.toml",
@@ -57,6 +57,21 @@ pub fn specs() -> Vec<(&'static str, String)> {
     ]
     .map(|(spec, about)| (spec, about.to_owned()))
     .to_vec()
+}
+
+/// Names of rows of tables that are not lots.
+const ROWS: [&str; 2] = ["all", "unseen"];
+
+/// The name of a lot from a file. One that is the name of other lots, or of another row of a table, is marked: it would be
+/// counted among those, or be compared with the paper's.
+fn name_of_file(scenario: &Scenario) -> String {
+    let name = &scenario.name;
+    // `test-medium`, the row of `test-medium-0` and its kin.
+    let is_taken = |name: &str| scenarios::suite(name).is_ok_and(|lots| !lots.iter().any(LotSpec::is_file));
+    if ROWS.contains(&name.as_str()) || is_taken(name) || is_taken(&format!("{name}-0")) {
+        return format!("{name} (file)");
+    }
+    name.clone()
 }
 
 impl Lot {
@@ -86,7 +101,7 @@ impl Lot {
             LotSpec::File(path) => Some(Arc::new(scenarios::load::load_with_notes(path, vehicle)?)),
             LotSpec::Reference(_) | LotSpec::Generated { .. } => None,
         };
-        let name = from_file.as_ref().map_or_else(|| spec.to_string(), |loaded| loaded.scenario.name.clone());
+        let name = from_file.as_ref().map_or_else(|| spec.to_string(), |loaded| name_of_file(&loaded.scenario));
         Ok(Self { name, spec, from_file })
     }
 
@@ -97,7 +112,7 @@ impl Lot {
     pub fn of_map(path: &Path, lot: &MapLot, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
         let loaded = lot.scenario(vehicle)?;
         Ok(Self {
-            name: loaded.scenario.name.clone(),
+            name: name_of_file(&loaded.scenario),
             spec: LotSpec::File(path.to_owned()),
             from_file: Some(Arc::new(loaded)),
         })
@@ -113,10 +128,10 @@ impl Lot {
         self.from_file.as_ref().map(|loaded| loaded.scenario.noise.level)
     }
 
-    /// SHA-256 of a lot from a file, as it was read; `None` for one that ships or is generated.
+    /// SHA-256 of a lot from a file, as it was read, whatever its name; `None` for one that ships or is generated.
     pub fn digest(&self) -> Option<String> {
-        let loaded = self.from_file.as_ref()?;
-        Some(storage::sums::digest(scenarios::load::to_toml(&loaded.scenario).as_bytes()))
+        let nameless = Scenario { name: String::new(), ..self.from_file.as_ref()?.scenario.clone() };
+        Some(storage::sums::digest(scenarios::load::to_toml(&nameless).as_bytes()))
     }
 
     /// The file that it is read from.

@@ -56,15 +56,16 @@ pub struct Place<'a> {
     pub seed: u64,
 }
 
+/// Where runs go that are not told where.
+const RUNS: &str = "runs";
+
 impl RunDir {
     /// Claims a folder with settings and manifest: it is a run from the moment in which both are listed.
     ///
     /// # Errors
     /// If the folder is taken, in use by another process, or cannot be written.
     pub fn create(place: &Place<'_>, settings: &Settings, request: &Request) -> anyhow::Result<Self> {
-        if let Some(out) = place.out {
-            ensure_outside_of_runs(out)?;
-        }
+        ensure_outside_of_runs(place.out.unwrap_or(Path::new(RUNS)))?;
         Self::create_anywhere(place, settings, request)
     }
 
@@ -234,7 +235,7 @@ impl RunDir {
     /// `runs/NAME`, or with the next free number. Creating the folder is the claim: two commands started at once get two.
     fn claim_next_free(place: &Place<'_>) -> anyhow::Result<Self> {
         let name = format!("{}-{}-s{}", place.command, place.preset, place.seed);
-        let runs = Path::new("runs");
+        let runs = Path::new(RUNS);
         fs::create_dir_all(runs).context("runs: cannot be created here; choose a folder with --out")?;
         let mut n = 1;
         loop {

@@ -2,7 +2,7 @@
 
 use crate::manifest::{Finished, Manifest, Outcome, SETTINGS, finished};
 use crate::settings::Settings;
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use sim::limits::SETTINGS_BYTES_MAX;
 use sim::seed::RootSeed;
 use std::collections::BTreeSet;
@@ -57,6 +57,24 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
     Ok(run.join(folder))
 }
 
+/// Refuses the policy of a training that was interrupted: it would be taken for what the whole training makes. Behaviour
+/// cloning, `DIR/bc`, is whole as soon as it is there.
+///
+/// # Errors
+/// If it is not finished, or there is no run.
+pub fn ensure_whole(spec: &Path) -> anyhow::Result<()> {
+    let (run, is_bc) = run_of(spec)?;
+    if is_bc || finished(run)?.is_some() {
+        return Ok(());
+    }
+    let round = policy_folder(spec)?;
+    bail!(
+        "{}: this training is not finished; continue it with --resume {0}, or drive as it is now with net:{}",
+        run.display(),
+        round.display()
+    )
+}
+
 /// The folders with the checkpoints that drive as `run:DIR` or `run:DIR/bc`: the policy and, if the decision rule
 /// has an ensemble drive, its other members. A final fit, and `bc`, are one network.
 ///
@@ -103,6 +121,13 @@ pub fn training_of(spec: &Path) -> anyhow::Result<Training> {
     Ok(Training { recipe, seed, lots: settings.training.lots, digests })
 }
 
+/// A hint at the run of that name, if there is one.
+fn in_runs(run: &Path) -> String {
+    let meant = Path::new("runs").join(run);
+    let hint = || format!("; did you mean {}?", meant.display());
+    sums::exists(&meant).is_ok_and(|exists| exists).then(hint).unwrap_or_default()
+}
+
 /// The folder of the run, and whether its policy after behaviour cloning is meant.
 fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
     let (run, is_bc) = match (spec.file_name(), spec.parent()) {
@@ -117,8 +142,9 @@ fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
     );
     ensure!(
         sums::exists(run)?,
-        "{}: this is no run; train one with cargo xtask train-dagger, or list the folders in runs/",
-        run.display()
+        "{}: this is no run{}; cargo xtask train-dagger and evaluate make runs, and runs/ holds them unless --out says otherwise",
+        run.display(),
+        in_runs(run)
     );
     Ok((run, is_bc))
 }

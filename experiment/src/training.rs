@@ -20,8 +20,9 @@ use sim::episode::Episode;
 use sim::frame::Frame;
 use sim::limits::TRIAL_MAX;
 use sim::map::Map;
-use sim::seed::EpisodeIndex;
+use sim::seed::{EpisodeIndex, Rng, RootSeed, Stream};
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -68,23 +69,33 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
 pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<RoundEpisode>> {
     let training = &settings.training;
     let (generated, others): (Vec<Lot>, Vec<Lot>) = lots.iter().cloned().partition(Lot::is_generated);
-    let of_a_kind = |lot: &Lot| generated.iter().filter(|other| other.group() == lot.group()).count() as u64;
+    let mut of_a_kind: BTreeMap<String, u64> = BTreeMap::new();
+    for lot in &generated {
+        *of_a_kind.entry(lot.group()).or_default() += 1;
+    }
     let generated: Vec<Lot> =
-        generated.iter().map(|lot| lot.in_round(round, of_a_kind(lot), training.different_lots)).collect();
+        generated.iter().map(|lot| lot.in_round(round, of_a_kind[&lot.group()], training.different_lots)).collect();
     let purpose = Purpose::Training { round };
     let drawn = Trial::all(settings.seed, purpose, &others, training.trials, &training.directions);
-    let again = generated.iter().enumerate().flat_map(|(at, lot)| {
-        let before = generated[..at].iter().filter(|other| other.name() == lot.name()).count() as u32;
-        Trial::both_ways(settings.seed, purpose, lot, before, &training.directions)
+    let mut driven_before: BTreeMap<&str, u32> = BTreeMap::new();
+    let again = generated.iter().flat_map(|lot| {
+        let times = driven_before.entry(lot.name()).or_default();
+        let trial = *times;
+        *times += 1;
+        Trial::both_ways(settings.seed, purpose, lot, trial, &training.directions)
     });
     let trials: Vec<_> = drawn.chain(again).collect();
     let starts = drive::start(&trials, &trials::maps(&trials, &settings.episode)?, &settings.episode, training.noise);
     let seated = |((index, trial), episode): ((EpisodeIndex, &Trial<'_>), Episode)| {
-        let expert = ScriptedExpert::new(settings.expert.clone(), &settings.episode);
-        let expert = Box::new(expert.with_jitter_seed(settings.seed, index.stream()));
-        RoundEpisode { index, direction: trial.direction, episode, expert }
+        let expert = ScriptedExpert::new(settings.expert.clone(), &settings.episode, hand(settings.seed, index));
+        RoundEpisode { index, direction: trial.direction, episode, expert: Box::new(expert) }
     };
     Ok(EpisodeIndex::of_round(round, trials.len()).zip(&trials).zip(starts).map(seated).collect())
+}
+
+/// The stream of the expert's label jitter in an episode of a training with this seed.
+pub fn hand(seed: RootSeed, index: EpisodeIndex) -> Rng {
+    seed.rng(Stream::Expert, index.stream())
 }
 
 /// One drive of a round of a finished training at its start, to be driven as it was: with its noise, its disturbances and
@@ -95,10 +106,13 @@ pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Res
 pub fn drive_again(run: &Path, round: u32, drive: u32) -> anyhow::Result<(Arc<Map>, Rollouts)> {
     let settings = trained::settings_of(run)?;
     ensure!(round <= TRIAL_MAX, "round {round}: there are 0 to {TRIAL_MAX}");
-    let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
-    // First, because it says whether there is such a round.
+    // First, because they say whether it is a training, and whether there is such a round.
+    trained::policy_folder(run)?;
     let store = Store::open(run)?;
+    let is_there = store.is_finished(&store.round_folder(round))?;
+    ensure!(is_there, "round {round}: {} has no such round", run.display());
     let novice = (round > 0).then(|| Learned::of_round(&settings.dagger, &store, round)).transpose()?;
+    let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     let mut episodes = episodes_of(&settings, &lots, round)?;
     let count = episodes.len();
     ensure!((drive as usize) < count, "drive {drive} of round {round}: it has {count} drives, counted from 0");

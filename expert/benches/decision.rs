@@ -9,7 +9,7 @@ use sim::driver::{Driver, GroundTruth, Situation};
 use sim::episode::{Episode, EpisodeSettings};
 use sim::map::Map;
 use sim::scenario::Direction;
-use sim::seed::RootSeed;
+use sim::seed::{RootSeed, Stream};
 use sim::sensing::Observation;
 use sim::vehicle::VehicleState;
 use std::sync::Arc;
@@ -39,7 +39,11 @@ struct Drive {
 /// Decides every tick of the drives again, each drive with the memory of an expert that drives it.
 fn bench(bencher: divan::Bencher<'_, '_>, lots: &str, sees: Sees) {
     let settings = Arc::new(EpisodeSettings::paper());
-    let expert = ScriptedExpert::new(ExpertSettings { sees, ..ExpertSettings::half_points() }, &settings);
+    let expert = ScriptedExpert::new(
+        ExpertSettings { sees, ..ExpertSettings::half_points() },
+        &settings,
+        RootSeed(1).rng(Stream::Expert, 0),
+    );
     let mut drives = Vec::new();
     for lot in scenarios::suite(lots).expect("there are such lots") {
         for direction in Direction::BOTH {

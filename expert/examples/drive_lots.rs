@@ -17,7 +17,7 @@ use sim::episode::{Episode, EpisodeReport, EpisodeSettings};
 use sim::frame::{Event, Frame};
 use sim::map::Map;
 use sim::scenario::Direction;
-use sim::seed::RootSeed;
+use sim::seed::{RootSeed, Stream};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -97,7 +97,7 @@ fn drive(expert: &ExpertSettings, which: ReferenceLot, direction: Direction, see
     let settings = Arc::new(EpisodeSettings::paper());
     let scenario = direction.of(lot(which, RootSeed(seed)));
     let map = Arc::new(Map::build(scenario, &settings.vehicle).expect("reference lots are valid"));
-    let mut driver = ScriptedExpert::new(expert.clone(), &settings);
+    let mut driver = ScriptedExpert::new(expert.clone(), &settings, RootSeed(1).rng(Stream::Expert, 0));
     let mut episode = Episode::new(Arc::clone(&settings), map, RootSeed(seed));
     let mut seconds = 0.0;
     let mut incidents = Vec::new();
@@ -122,7 +122,7 @@ fn drive(expert: &ExpertSettings, which: ReferenceLot, direction: Direction, see
             incidents.push(format!("{name} {direction:?} seed {seed}: {:?}\n{}", frame.event, thinned.join("\n")));
         }
     }
-    Run { report: episode.report(), stats: *driver.stats(), seconds, incidents, tight_ticks }
+    Run { report: episode.report().expect("it has ended"), stats: *driver.stats(), seconds, incidents, tight_ticks }
 }
 
 fn line(frame: &Frame, rule: Rule) -> String {

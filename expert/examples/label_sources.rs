@@ -16,7 +16,7 @@ use sim::episode::{Episode, EpisodeSettings};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::scenario::Direction;
-use sim::seed::RootSeed;
+use sim::seed::{RootSeed, Stream};
 use sim::sensing::Observation;
 use sim::vehicle::VehicleState;
 use std::sync::Arc;
@@ -94,7 +94,7 @@ fn drive(expert: &ExpertSettings, which: ReferenceLot, direction: Direction, see
     let settings = Arc::new(EpisodeSettings::paper());
     let scenario = direction.of(lot(which, RootSeed(seed)));
     let map = Arc::new(Map::build(scenario, &settings.vehicle).expect("reference lots are valid"));
-    let mut driver = ScriptedExpert::new(expert.clone(), &settings);
+    let mut driver = ScriptedExpert::new(expert.clone(), &settings, RootSeed(1).rng(Stream::Expert, 0));
     let mut episode = Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(seed));
     let mut moves = Vec::new();
     while episode.ending().is_none() {
@@ -117,7 +117,7 @@ fn drive(expert: &ExpertSettings, which: ReferenceLot, direction: Direction, see
 }
 
 fn fresh_answer(asked: Asked, settings: &EpisodeSettings, map: &Map, progress_m: f32) -> LookAheadPoint {
-    let mut driver = ScriptedExpert::new(asked.settings, settings);
+    let mut driver = ScriptedExpert::new(asked.settings, settings, RootSeed(1).rng(Stream::Expert, 0));
     let truth = GroundTruth { map, vehicle: asked.vehicle, progress_m };
     driver.decide(&Situation { observation: &Observation::default(), truth }).look_ahead
 }

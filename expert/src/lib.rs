@@ -44,7 +44,7 @@ use search::{Arcs, Plan, Search};
 use sim::driver::{Decision, Driver, GroundTruth, LookAheadPoint, Situation, Source};
 use sim::episode::EpisodeSettings;
 use sim::geometry::Vec2;
-use sim::seed::{Rng, RootSeed, Stream};
+use sim::seed::Rng;
 use std::cell::OnceCell;
 use std::collections::VecDeque;
 
@@ -64,7 +64,7 @@ pub struct ScriptedExpert {
     last: Option<Label>,
     /// Points decided but not yet answered (reaction delay).
     delayed: VecDeque<LookAheadPoint>,
-    jitter: Rng,
+    hand: Rng,
     stats: ExpertStats,
     inspection: Option<Inspection>,
 }
@@ -97,8 +97,9 @@ struct Wish {
 }
 
 impl ScriptedExpert {
-    /// An expert for the vehicle, camera and controller of an episode.
-    pub fn new(settings: ExpertSettings, episode: &EpisodeSettings) -> Self {
+    /// An expert for the vehicle, camera and controller of an episode. `hand` is the stream its label jitter is drawn from,
+    /// of [`Stream::Expert`](sim::seed::Stream::Expert); nothing is drawn while the jitter is off.
+    pub fn new(settings: ExpertSettings, episode: &EpisodeSettings, hand: Rng) -> Self {
         let footprint = Footprint::new(&episode.vehicle, settings.nose_margin_m, settings.disc_relief_m);
         Self {
             arcs: Arcs::new(&settings, footprint.nose_m()),
@@ -106,18 +107,11 @@ impl ScriptedExpert {
             context: ExpertContext::of(episode),
             last: None,
             delayed: VecDeque::new(),
-            jitter: RootSeed(0).rng(Stream::Expert, 0),
+            hand,
             stats: ExpertStats::default(),
             inspection: None,
             settings,
         }
-    }
-
-    /// Draws label jitter from a run's seed.
-    #[must_use]
-    pub fn with_jitter_seed(mut self, seed: RootSeed, episode: u64) -> Self {
-        self.jitter = seed.rng(Stream::Expert, episode);
-        self
     }
 
     /// Counts since the expert was made.
@@ -251,7 +245,7 @@ impl ScriptedExpert {
         }
         let [u, w] = point.to_image_fraction(self.context.geometry());
         let sigma = self.settings.label_jitter;
-        let [u, w] = [u, w].map(|fraction| (fraction + sigma * standard_normal(&mut self.jitter)).clamp(0.0, 1.0));
+        let [u, w] = [u, w].map(|fraction| (fraction + sigma * standard_normal(&mut self.hand)).clamp(0.0, 1.0));
         LookAheadPoint::from_image_fraction([u, w], self.context.geometry())
     }
 }

@@ -109,7 +109,7 @@ class Episode:
         return self.observation
 
     def report(self) -> dict[str, Any]:
-        """How the run ended, its metrics and its near-collisions, as in a line of ``runs.jsonl``."""
+        """How the run ended (``None`` while it is under way), its metrics and its near-collisions, as in a line of ``runs.jsonl``."""
         report: dict[str, Any] = json.loads(self._core.cars.report(0))
         return report
 

@@ -299,9 +299,11 @@ impl Cars {
         self.cars.iter().map(place).collect()
     }
 
-    /// What was measured on a car's episode so far, as JSON.
+    /// What was measured on a car's episode so far, as JSON; `ending` is null while it is under way.
     fn report(&self, index: usize) -> PyResult<String> {
-        serde_json::to_string(&self.episode(index)?.report()).map_err(input)
+        let episode = self.episode(index)?;
+        let (ending, metrics, events) = (episode.ending(), episode.metrics(), episode.events());
+        Ok(serde_json::json!({ "ending": ending, "metrics": metrics, "events": events }).to_string())
     }
 
     /// SHA-256 of a car's episode so far, if digests are kept.

@@ -150,7 +150,7 @@ struct Cell {
 
 impl GroundFromRoute {
     fn measure(map: &Map, vehicle: &VehicleSettings) -> Self {
-        let (low, high) = crate::corridor::bounds(&map.scenario().boundary);
+        let (low, high) = sim::geometry::bounds(&map.scenario().boundary);
         let size = ((high - low) / CELL_M).ceil();
         let (cols, rows) = (size.x as usize + 1, size.y as usize + 1);
         let path = map.path();

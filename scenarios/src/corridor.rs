@@ -4,7 +4,7 @@
 //! its axis. The lane's two edges are piecewise linear functions of `s`; the boundary polygon and every question about
 //! gaps are answered from the same breakpoints, so they cannot disagree.
 
-use sim::geometry::{Pose, Vec2, edges, polygon_contains, rectangle};
+use sim::geometry::{Pose, Vec2, bounds, edges, polygon_contains, rectangle};
 use sim::maths;
 use sim::scenario::ReferencePath;
 
@@ -500,11 +500,6 @@ impl EdgeList {
                 && (contains_convex(outline, a) || edges(outline).any(|(c, d)| segments_cross(a, b, c, d)))
         })
     }
-}
-
-/// Smallest and largest coordinates.
-pub fn bounds(points: &[Vec2]) -> (Vec2, Vec2) {
-    points.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)))
 }
 
 /// Whether two convex outlines share ground (separating axes; touching does not count).

@@ -483,6 +483,10 @@ impl MapLot {
     }
 
     fn nothing_to_drive(&self) -> LoadError {
+        if self.start.is_some() {
+            let remedy = "add goal (or --goal x,y,deg), or for a round tour loop = true (or --loop)";
+            return self.fault("route", "a start is given, but not where to drive from there".to_owned(), remedy);
+        }
         let name = self.map.with_extension("lot.toml");
         let remedy = format!(
             "write start and goal, start and loop, or centre_line into {}, or give --start x,y,deg with --goal x,y,deg \

@@ -80,6 +80,11 @@ pub enum LotSpec {
 }
 
 impl LotSpec {
+    /// Whether it names a file.
+    pub fn is_file(&self) -> bool {
+        matches!(self, Self::File(_))
+    }
+
     /// The lot in one trial. Methods that are compared get the same trial seeds, hence the same lots.
     ///
     /// Generated lots do not depend on the vehicle: their rules are made for the paper's.
@@ -121,9 +126,10 @@ impl std::str::FromStr for LotSpec {
 /// A name that means no lot.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{name:?} {problem}; there are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N, test:N and \
+    "{name:?} {problem}{hint}; there are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N, test:N and \
      sealed:PHRASE:N (N generated lots; add :all, {families}), single ones such as test-hard-7, and paths ending in .toml, \
      .yaml (ROS map) or .csv (TPCAP case)",
+    hint = meant(name).map(|meant| format!("; did you mean {meant}?")).unwrap_or_default(),
     families = Family::list(":")
 )]
 pub struct SpecError {
@@ -135,6 +141,22 @@ impl SpecError {
     fn new(name: &str, problem: impl Into<String>) -> Self {
         Self { name: name.to_owned(), problem: problem.into() }
     }
+}
+
+/// The name that a wrong one is likely to stand for.
+fn meant(name: &str) -> Option<String> {
+    let name = name.to_lowercase();
+    // `test-20` for `test:20`.
+    let suite = name.replace(['-', '_', '/'], ":");
+    if generated_suite(&suite).is_ok() {
+        return Some(suite);
+    }
+    let known = ReferenceLot::ALL.into_iter().map(ReferenceLot::name).chain(["reference"]);
+    let mut known: Vec<(f64, &str)> = known.map(|known| (strsim::jaro_winkler(&name, known), known)).collect();
+    known.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+    // Of `lot-d` nobody can say which.
+    let [(likeness, nearest), (next, _), ..] = known[..] else { return None };
+    (likeness > 0.85 && likeness > next).then(|| nearest.to_owned())
 }
 
 fn lots_of(name: &str) -> Result<Vec<LotSpec>, SpecError> {
@@ -265,7 +287,10 @@ mod tests {
             ("test:0", "\"test:0\" asks for \"0\" lots"),
             ("test:5:brutal", "\"test:5:brutal\" has no family \"brutal\"; there are"),
             ("test:5:hard:1", "\"test:5:hard:1\" has \"1\" too much"),
-            ("test-hard-x", "\"test-hard-x\" is no lot"),
+            ("test-hard-x", "\"test-hard-x\" is no lot; there are"),
+            ("lotb", "\"lotb\" is no lot; did you mean lot-b?; there are"),
+            ("Lot-B", "\"Lot-B\" is no lot; did you mean lot-b?; there are"),
+            ("test-20", "\"test-20\" is no lot; did you mean test:20?; there are"),
             ("sealed", "\"sealed\" does not say which phrase; there are"),
             ("sealed:spring", "\"sealed:spring\" does not say how many lots; there are"),
             (

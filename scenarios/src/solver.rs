@@ -340,7 +340,7 @@ impl Scene {
     const BUCKET_M: f32 = 2.0;
 
     fn new(scenario: &Scenario) -> Self {
-        let (low, high) = crate::corridor::bounds(&scenario.boundary);
+        let (low, high) = sim::geometry::bounds(&scenario.boundary);
         let margin = Vec2::splat(1.0);
         let (low, high) = (low - margin, high + margin);
         let mut scene = Self {
@@ -392,7 +392,7 @@ impl Scene {
     }
 
     fn any_edge_near(&self, corners: &[Vec2; 4], test: impl Fn(Vec2, Vec2) -> bool) -> bool {
-        let (low, high) = crate::corridor::bounds(corners);
+        let (low, high) = sim::geometry::bounds(corners);
         self.buckets.any_within(low, high, |bucket| {
             bucket.iter().any(|&index| {
                 let (a, b) = self.edges[index as usize];

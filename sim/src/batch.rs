@@ -55,12 +55,9 @@ pub fn run_lockstep_until(
 ) -> Result<Vec<Option<EpisodeReport>>, NotFinite> {
     let mut decisions: Vec<Decision> = Vec::with_capacity(episodes.len());
     let mut frames: Vec<(usize, Frame)> = Vec::with_capacity(episodes.len());
-    episodes.par_iter_mut().filter(|episode| episode.ending().is_none()).for_each(Episode::observe);
-    loop {
-        let mut running: Vec<(usize, &mut Episode)> = running(&mut episodes);
-        if running.is_empty() {
-            break;
-        }
+    let mut running = running(&mut episodes);
+    running.par_iter_mut().for_each(|(_, episode)| episode.observe());
+    while !running.is_empty() {
         decide(&running, fleet, &mut decisions)?;
         // Each car takes its next observation at once, so that threads meet once per tick.
         running
@@ -79,8 +76,9 @@ pub fn run_lockstep_until(
         if frames.iter().filter(|(index, frame)| on_frame(*index, frame).is_break()).count() > 0 {
             break;
         }
+        running.retain(|(_, episode)| episode.ending().is_none());
     }
-    Ok(episodes.iter().map(|episode| episode.ending().map(|_| episode.report())).collect())
+    Ok(episodes.iter().map(Episode::report).collect())
 }
 
 /// Cars and the fleet that drives them, and them only.
@@ -90,7 +88,9 @@ pub struct SeatedFleet {
     /// The index of each of them among the episodes of all fleets.
     indices: Vec<usize>,
     /// Of each tick since they were last passed on, a frame of each car that drove, with its index among all.
-    frames: Vec<Vec<(usize, Frame)>>,
+    frames: [Vec<(usize, Frame)>; TICKS_AT_ONCE],
+    /// What ended its drive, and the place of its tick among those of `frames`.
+    refused: Option<(usize, NotFinite)>,
 }
 
 /// Ticks that a fleet drives before its frames are passed on.
@@ -101,7 +101,7 @@ impl SeatedFleet {
     /// place among its own.
     pub fn new(fleet: Box<dyn Fleet + Send>, episodes: Vec<(usize, Episode)>) -> Self {
         let (indices, episodes) = episodes.into_iter().unzip();
-        Self { fleet, episodes, indices, frames: Vec::new() }
+        Self { fleet, episodes, indices, frames: Default::default(), refused: None }
     }
 
     /// Seats fleets in all cars, each in up to `cars_each` of them. `fleet` is called with the indices of its cars.
@@ -129,25 +129,30 @@ impl SeatedFleet {
         self.indices.iter().zip(&self.episodes)
     }
 
-    /// Drives on for [`TICKS_AT_ONCE`], or until all have ended.
-    fn drive(&mut self) -> Result<(), NotFinite> {
-        let mut decisions: Vec<Decision> = Vec::with_capacity(self.episodes.len());
-        self.frames.clear();
-        for _ in 0..TICKS_AT_ONCE {
-            let mut running = running(&mut self.episodes);
+    /// Drives on for [`TICKS_AT_ONCE`], or until all have ended or something is refused.
+    fn drive(&mut self) {
+        let Self { fleet, episodes, indices, frames, refused } = self;
+        let mut decisions: Vec<Decision> = Vec::with_capacity(episodes.len());
+        let mut running = running(episodes);
+        frames.iter_mut().for_each(Vec::clear);
+        for (place, of_tick) in frames.iter_mut().enumerate() {
             for (_, episode) in &mut running {
                 episode.observe();
             }
-            let among_all = |found: NotFinite| NotFinite { episode: self.indices[found.episode], ..found };
-            decide(&running, &mut *self.fleet, &mut decisions).map_err(among_all)?;
-            let drive = |((car, episode), &decision): ((usize, &mut Episode), &Decision)| {
+            if let Err(found) = decide(&running, &mut **fleet, &mut decisions) {
+                *refused = Some((place, NotFinite { episode: indices[found.episode], ..found }));
+                return;
+            }
+            for ((car, episode), &decision) in running.iter_mut().zip(&decisions) {
                 let frame = episode.apply(decision);
-                check_state(self.indices[car], &frame)?;
-                Ok((self.indices[car], frame))
-            };
-            self.frames.push(running.into_iter().zip(&decisions).map(drive).collect::<Result<_, _>>()?);
+                if let Err(found) = check_state(indices[*car], &frame) {
+                    *refused = Some((place, found));
+                    return;
+                }
+                of_tick.push((indices[*car], frame));
+            }
+            running.retain(|(_, episode)| episode.ending().is_none());
         }
-        Ok(())
     }
 }
 
@@ -181,14 +186,19 @@ pub fn run_fleets_until(
         passed_on[index] = episode.tick();
     }
     'driving: loop {
-        // The first of several, whatever the order in which threads found them.
-        let refused = fleets.par_iter_mut().filter_map(|fleet| fleet.drive().err());
-        refused.min_by_key(|found| (found.tick, found.episode)).map_or(Ok(()), Err)?;
-        for tick in 0..TICKS_AT_ONCE {
-            let mut frames: Vec<&(usize, Frame)> = fleets.iter().flat_map(|fleet| &fleet.frames[tick]).collect();
-            frames.sort_by_key(|(index, _)| *index);
-            let mut is_over = frames.is_empty();
-            for (index, frame) in frames {
+        fleets.par_iter_mut().for_each(SeatedFleet::drive);
+        let mut of_tick: Vec<&(usize, Frame)> = Vec::with_capacity(passed_on.len());
+        for place in 0..TICKS_AT_ONCE {
+            // A fleet may have driven into it beyond the tick in which `on_frame` breaks: it counts when its tick has come.
+            let refused = fleets.iter().filter_map(|fleet| fleet.refused.filter(|(at, _)| *at == place));
+            if let Some((_, first)) = refused.min_by_key(|(_, found)| (found.tick, found.episode)) {
+                return Err(first);
+            }
+            of_tick.clear();
+            of_tick.extend(fleets.iter().flat_map(|fleet| &fleet.frames[place]));
+            of_tick.sort_by_key(|(index, _)| *index);
+            let mut is_over = of_tick.is_empty();
+            for (index, frame) in &of_tick {
                 is_over |= on_frame(*index, frame).is_break();
                 passed_on[*index] += 1;
             }
@@ -199,8 +209,7 @@ pub fn run_fleets_until(
     }
     let mut reports: Vec<Option<EpisodeReport>> = vec![None; passed_on.len()];
     for (&index, episode) in fleets.iter().flat_map(SeatedFleet::cars) {
-        let has_ended = episode.ending().is_some() && episode.tick() == passed_on[index];
-        reports[index] = has_ended.then(|| episode.report());
+        reports[index] = episode.report().filter(|_| episode.tick() == passed_on[index]);
     }
     Ok(reports)
 }

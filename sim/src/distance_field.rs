@@ -3,7 +3,7 @@
 //! Node values are distances to the exact polygons; between nodes they are interpolated bilinearly. That is exact
 //! beside straight edges, within 3 cm beside corners, and up to 5 cm too small half-way between two things.
 
-use crate::geometry::{Vec2, edges};
+use crate::geometry::{Vec2, bounds, edges};
 use crate::maths;
 use crate::vectors::{FourPoints, LANES, bounded, coordinate, counted_from, f32x4, indices, whole_and_part};
 use std::ops::Range;
@@ -168,19 +168,6 @@ impl DistanceField {
         let (cols, _) = whole_and_part(bounded(node.x, coordinate(self.cols - 1)));
         let (rows, _) = whole_and_part(bounded(node.y, coordinate(self.rows - 1)));
         from_stored(as_lanes(&indices(rows, cols, self.n_cols()).map(|index| self.nodes[index])))
-    }
-
-    /// [`Self::at`] at the points (`xs[i]`, `ys[i]`), to the bit.
-    #[inline]
-    pub fn at_each<const N: usize>(&self, xs: &[f32; N], ys: &[f32; N]) -> [f32; N] {
-        let mut distances_m = [0.0; N];
-        let points = xs.chunks(LANES).zip(ys.chunks(LANES));
-        for ((xs, ys), distances_m) in points.zip(distances_m.chunks_mut(LANES)) {
-            let four = |values: &[f32]| f32x4::from(std::array::from_fn(|i| values[i.min(values.len() - 1)]));
-            let of_four_m = self.at_four(FourPoints { x: four(xs), y: four(ys) }).to_array();
-            distances_m.copy_from_slice(&of_four_m[..distances_m.len()]);
-        }
-        distances_m
     }
 
     /// A lower bound of [`Self::at`] in a box of at most 0.6 m by 0.6 m, but for rounding. Minus infinity if the box is
@@ -374,11 +361,6 @@ fn as_lanes(nodes: &[u32; LANES]) -> f32x4 {
 #[inline]
 fn from_stored(nodes: f32x4) -> f32x4 {
     nodes ^ f32x4::splat(-CAP_M)
-}
-
-/// Smallest axis-aligned box around points.
-pub fn bounds(points: &[Vec2]) -> (Vec2, Vec2) {
-    points.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, high), &point| (low.min(point), high.max(point)))
 }
 
 #[cfg(test)]

@@ -85,6 +85,16 @@ pub struct EpisodeReport {
     pub events: Vec<(u32, Event)>,
 }
 
+/// The last time that a car got on: how far along the route, and at which physics step.
+#[derive(Debug, Clone, Copy, Default)]
+struct Advance {
+    progress_m: f32,
+    physics_step: u32,
+}
+
+/// How far back and ahead of its progress a car is looked for along the route, metres: it cannot be farther from there.
+const PROJECTED_M: f32 = 5.0;
+
 /// State of stop–count–resume.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
@@ -110,8 +120,8 @@ pub struct Episode {
     physics_step: u32,
     tick: u32,
     progress_m: f32,
-    /// Progress and physics step of the last half metre gained.
-    advance: (f32, u32),
+    /// The last time that progress was made.
+    advance: Advance,
     /// No near-collision is counted before this physics step.
     counts_from_step: u32,
     touches: bool,
@@ -166,7 +176,7 @@ impl Episode {
             physics_step: 0,
             tick: 0,
             progress_m: 0.0,
-            advance: (0.0, 0),
+            advance: Advance::default(),
             counts_from_step: 0,
             touches: false,
             is_clear: false,
@@ -196,7 +206,13 @@ impl Episode {
         progress_m: f32,
     ) -> Self {
         let command = VehicleCommand { steering_rad: vehicle.steering_rad, speed_mps: vehicle.speed_mps };
-        Self { vehicle, command, progress_m, advance: (progress_m, 0), ..Self::new(settings, map, seed) }
+        Self {
+            vehicle,
+            command,
+            progress_m,
+            advance: Advance { progress_m, physics_step: 0 },
+            ..Self::new(settings, map, seed)
+        }
     }
 
     /// Takes an observation. Call once before each decision.
@@ -308,7 +324,7 @@ impl Episode {
             decision,
             command,
             progress_m: self.progress_m,
-            safe_ratio: self.ring.safe_ratio(distance, seen_from.pose, settings.sensing.geometry.pixel_m()),
+            safe_ratio: self.ring.safe_ratio(distance, seen_from.pose),
             clearance_m: self.body.clearance_m(distance, seen_from.pose),
             driven_m: 0.0,
             contacts: 0,
@@ -329,7 +345,8 @@ impl Episode {
             steps += 1;
         }
         self.tick += 1;
-        self.progress_m = self.map.path().project_near(self.vehicle.pose.position(), self.progress_m, 5.0, 5.0);
+        self.progress_m =
+            self.map.path().project_near(self.vehicle.pose.position(), self.progress_m, PROJECTED_M, PROJECTED_M);
         self.judge_progress(&mut frame);
         frame.time_s = self.physics_step as f32 * settings.physics_step_s();
         self.metrics.frame(&frame);
@@ -345,13 +362,15 @@ impl Episode {
         self.metrics.metrics()
     }
 
-    /// The result so far; final once [`Self::ending`] is set.
-    pub fn report(&self) -> EpisodeReport {
-        EpisodeReport {
-            ending: self.ending.unwrap_or(Ending::TimedOut),
-            metrics: self.metrics(),
-            events: self.events.clone(),
-        }
+    /// Near-collisions and stuck events so far, in order, with the tick they happened at.
+    pub fn events(&self) -> &[(u32, Event)] {
+        &self.events
+    }
+
+    /// The result; `None` while it is under way.
+    pub fn report(&self) -> Option<EpisodeReport> {
+        let ending = self.ending?;
+        Some(EpisodeReport { ending, metrics: self.metrics(), events: self.events.clone() })
     }
 
     fn step_physics(&mut self, frame: &mut Frame) {
@@ -386,7 +405,7 @@ impl Episode {
         let counts = self.physics_step >= self.counts_from_step;
         match self.phase {
             Phase::Driving if sweeps_into_something && self.vehicle.speed_mps > 0.05 && counts => {
-                let at_m = self.map.path().project_near(pose.position(), self.progress_m, 5.0, 5.0);
+                let at_m = self.map.path().project_near(pose.position(), self.progress_m, PROJECTED_M, PROJECTED_M);
                 frame.event = Event::NearCollision { at: pose, progress_m: at_m };
                 self.phase = Phase::Braking;
             }
@@ -401,7 +420,7 @@ impl Episode {
     /// Puts the car at rest on the nearest point of the path from which it can drive.
     fn resume_on_path(&mut self) {
         let path = self.map.path();
-        let mut s_m = path.project_near(self.vehicle.pose.position(), self.progress_m, 5.0, 5.0);
+        let mut s_m = path.project_near(self.vehicle.pose.position(), self.progress_m, PROJECTED_M, PROJECTED_M);
         while s_m < path.length_m() && !self.is_free_from(s_m) {
             s_m += 0.5;
         }
@@ -410,7 +429,7 @@ impl Episode {
         self.in_flight.clear();
         self.command = VehicleCommand::default();
         self.progress_m = s_m;
-        self.advance = (s_m, self.physics_step);
+        self.advance = Advance { progress_m: s_m, physics_step: self.physics_step };
         self.counts_from_step = self.physics_step + self.settings.physics_steps(self.settings.metrics.refractory_s);
         self.touches = false;
         self.was_reset = true;
@@ -430,10 +449,10 @@ impl Episode {
 
     /// Detects a stuck car and the finish.
     fn judge_progress(&mut self, frame: &mut Frame) {
-        let (best_m, since_step) = self.advance;
+        let Advance { progress_m: best_m, physics_step: since_step } = self.advance;
         let metrics = &self.settings.metrics;
         if self.progress_m >= best_m + metrics.stuck_progress_m {
-            self.advance = (self.progress_m, self.physics_step);
+            self.advance = Advance { progress_m: self.progress_m, physics_step: self.physics_step };
         } else if self.physics_step - since_step >= self.settings.physics_steps(metrics.stuck_after_s) {
             frame.event = Event::Stuck { at: self.vehicle.pose, progress_m: self.progress_m };
             self.resume_on_path();
@@ -468,5 +487,5 @@ pub fn run(mut episode: Episode, driver: &mut dyn Driver, sink: &mut dyn FrameSi
         let decision = driver.decide(&episode.situation());
         sink.frame(&episode.apply(decision));
     }
-    episode.report()
+    episode.report().expect("it has ended")
 }

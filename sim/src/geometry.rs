@@ -249,6 +249,11 @@ pub fn polygon_contains(polygon: &[Vec2], point: Vec2) -> bool {
     inside
 }
 
+/// Smallest axis-aligned box around points: its lower left and upper right corners.
+pub fn bounds(points: &[Vec2]) -> (Vec2, Vec2) {
+    points.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, high), &point| (low.min(point), high.max(point)))
+}
+
 /// The edges of a closed polygon, the last joining its last vertex to its first.
 pub fn edges(polygon: &[Vec2]) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
     (0..polygon.len()).map(|i| (polygon[i], polygon[(i + 1) % polygon.len()]))
@@ -341,7 +346,7 @@ mod tests {
             let in_ego = world_from_ego.inverse_outline(&corners.clone().collect());
             let expected: Vec<Vec2> = corners.map(|corner| world_from_ego.inverse_point(corner)).collect();
             assert_eq!((0..in_ego.n_corners()).map(|i| in_ego.corner(i)).collect::<Vec<_>>(), expected);
-            assert_eq!(in_ego.bounds(), crate::distance_field::bounds(&expected));
+            assert_eq!(in_ego.bounds(), bounds(&expected));
         }
     }
 

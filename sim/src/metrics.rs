@@ -1,10 +1,10 @@
 //! What is measured on a run (docs/methods.md 8): always on the clean map.
 
 use crate::collision::ObstacleSet;
-use crate::distance_field::{DistanceField, bounds, change_max_m, interpolated_change_max_m};
+use crate::distance_field::{DistanceField, change_max_m, interpolated_change_max_m};
 use crate::driver::Source;
 use crate::frame::{Event, Frame};
-use crate::geometry::{Pose, Vec2, edges};
+use crate::geometry::{Pose, Vec2, bounds, edges};
 use crate::vectors::{FourPoints, LANES, Picked, f32x4};
 use crate::vehicle::VehicleSettings;
 use serde::{Deserialize, Serialize};
@@ -77,6 +77,7 @@ pub struct SafeRing {
     /// Of each quarter, its pixels.
     pixels: Vec<FourSquares>,
     n_pixels: u32,
+    pixel_m: f32,
 }
 
 /// Four squares of pixels, of which only those in the range count.
@@ -117,7 +118,7 @@ impl SafeRing {
         let reach = Vec2::splat(settings.safe_range_m);
         let first = ((low - reach) / block_m).floor().as_ivec2() - 1;
         let last = ((high + reach) / block_m).floor().as_ivec2();
-        let mut ring = Self { blocks: Vec::new(), quarters: Vec::new(), pixels: Vec::new(), n_pixels: 0 };
+        let mut ring = Self { blocks: Vec::new(), quarters: Vec::new(), pixels: Vec::new(), n_pixels: 0, pixel_m };
         let mut blocks = Vec::new();
         for (row, col) in (first.x..=last.x).flat_map(|row| (first.y..=last.y).map(move |col| (row, col))) {
             // A pixel centre lies on the axle, so that neither the body's sides nor the ring's fall on centres.
@@ -162,8 +163,8 @@ impl SafeRing {
     }
 
     /// Share of the range that is drivable, 0…1: N_dri / N_ran; 1 of a range that holds no pixel.
-    pub fn safe_ratio(&self, distance: &DistanceField, pose: Pose, pixel_m: f32) -> f32 {
-        let world_from_ego = pose.world_from_ego();
+    pub fn safe_ratio(&self, distance: &DistanceField, pose: Pose) -> f32 {
+        let (world_from_ego, pixel_m) = (pose.world_from_ego(), self.pixel_m);
         // Where the centre is farther from a boundary than the pixels are from it, one look-up decides.
         let to_corner_m = |side: u8| std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (f32::from(side) - 1.0);
         let block_m = f32x4::splat(change_max_m(to_corner_m(BLOCK)));
@@ -370,7 +371,7 @@ mod tests {
             let half = 0.5 * width_m;
             let lane = [Vec2::new(-30.0, -half), Vec2::new(30.0, -half), Vec2::new(30.0, half), Vec2::new(-30.0, half)];
             let distance = DistanceField::of_boundary(&lane);
-            let ratio = ring().safe_ratio(&distance, Pose::default(), 0.06);
+            let ratio = ring().safe_ratio(&distance, Pose::default());
             assert!((ratio - expected).abs() < 0.02, "{width_m} m: {ratio}, expected {expected}");
         }
     }
@@ -380,11 +381,10 @@ mod tests {
         let lane = [Vec2::new(-9.0, -1.3), Vec2::new(9.0, -1.6), Vec2::new(8.0, 1.7), Vec2::new(-9.0, 1.4)];
         let distance = DistanceField::of_boundary(&lane);
         // Small pixels make more than ten thousand blocks; from 8192 on others were looked at.
-        let of_pixels =
-            |pixel_m| (SafeRing::new(&VehicleSettings::hyundai_hg300(), &MetricsSettings::paper(), pixel_m), pixel_m);
+        let of_pixels = |pixel_m| SafeRing::new(&VehicleSettings::hyundai_hg300(), &MetricsSettings::paper(), pixel_m);
         let rings = [of_pixels(0.06), of_pixels(0.01)];
-        assert!(rings[1].0.quarters.len() > 8192, "{} blocks", rings[1].0.quarters.len());
-        for (i, (ring, pixel_m)) in (0..40).zip(rings.iter().cycle()) {
+        assert!(rings[1].quarters.len() > 8192, "{} blocks", rings[1].quarters.len());
+        for (i, ring) in (0..40).zip(rings.iter().cycle()) {
             let pose = Pose::new(Vec2::new(-4.0 + 0.2 * i as f32, 0.1), 0.02 * i as f32);
             let world_from_ego = pose.world_from_ego();
             let pixels = ring.pixels.iter().flat_map(|FourSquares { centres, n_pixels }| {
@@ -392,7 +392,7 @@ mod tests {
                 (0..LANES).filter(move |&i| n_pixels[i] == 1.0).map(move |i| Vec2::new(xs[i], ys[i]))
             });
             let brute = pixels.filter(|&pixel| distance.at(world_from_ego.point(pixel)) > 0.0).count();
-            assert_eq!(ring.safe_ratio(&distance, pose, *pixel_m), brute as f32 / ring.n_pixels() as f32);
+            assert_eq!(ring.safe_ratio(&distance, pose), brute as f32 / ring.n_pixels() as f32);
         }
     }
 
@@ -402,7 +402,7 @@ mod tests {
         let ring = SafeRing::new(&VehicleSettings::hyundai_hg300(), &settings, 0.06);
         let lane = [Vec2::new(-9.0, -1.3), Vec2::new(9.0, -1.3), Vec2::new(9.0, 1.3), Vec2::new(-9.0, 1.3)];
         assert_eq!(ring.n_pixels(), 0);
-        assert_eq!(ring.safe_ratio(&DistanceField::of_boundary(&lane), Pose::default(), 0.06), 1.0);
+        assert_eq!(ring.safe_ratio(&DistanceField::of_boundary(&lane), Pose::default()), 1.0);
     }
 
     #[test]

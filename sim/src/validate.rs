@@ -2,7 +2,7 @@
 //!
 //! The order is from plain numbers to relations between things: later checks rely on earlier ones.
 
-use crate::geometry::{Pose, Vec2, distance_to_segment, edges, polygon_contains};
+use crate::geometry::{Pose, Vec2, bounds, distance_to_segment, edges, polygon_contains};
 use crate::limits::{
     COORDINATE_MAX_M, ISLANDS_MAX, LOT_EXTENT_MAX_M, NAME_CHARS_MAX, OBSTACLES_MAX, ROUTE_MAX_M, ROUTE_POINTS_MAX,
     SPEED_BUMPS_MAX, VERTICES_MAX,
@@ -437,10 +437,6 @@ fn orientation(a: Vec2, b: Vec2, c: Vec2) -> f64 {
 
 fn boxes_meet(a: (Vec2, Vec2), b: (Vec2, Vec2)) -> bool {
     a.0.cmple(b.1).all() && b.0.cmple(a.1).all()
-}
-
-fn bounds(points: &[Vec2]) -> (Vec2, Vec2) {
-    points.iter().fold((Vec2::INFINITY, Vec2::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)))
 }
 
 /// Whether an obstacle and a convex counter-clockwise body share ground.

@@ -319,18 +319,23 @@ fn an_answer_that_is_no_number_is_refused_where_it_is_given_first() {
     let driver = |tick: u32| BreaksAt { tick, answered: 0 };
     let drivers = || [90, 37, 37, 40].map(driver);
     let expected = NotFinite { episode: 1, tick: 37, what: "the driver's answer" };
-    let mut fleet = OneDriverEach(drivers().into());
-    assert_eq!(run_lockstep_until(episodes(), &mut fleet, &mut |_, _| ControlFlow::Continue(())), Err(expected));
-    let mut seats = drivers().into_iter();
-    let parted = SeatedFleet::in_all(episodes(), 1, |_| Box::new(OneDriverEach(vec![seats.next().unwrap()])));
-    let mut frames = 0;
-    let driven = run_fleets_until(parted, &mut |_, frame| {
-        frames += 1;
-        assert!(frame.tick < 37, "nothing is passed on that was driven after it");
-        ControlFlow::Continue(())
-    });
-    assert_eq!(driven, Err(expected));
-    assert!(frames >= 4 * 32);
+    for (stops_after, result) in [(u32::MAX, Err(expected)), (35, Ok(vec![None; 4]))] {
+        let [mut in_lock_step, mut in_fleets] = [Vec::new(), Vec::new()];
+        let seeing = |seen: &mut Vec<(usize, u32)>, episode, frame: &Frame| {
+            seen.push((episode, frame.tick));
+            if frame.tick < stops_after { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        };
+        let mut fleet = OneDriverEach(drivers().into());
+        let driven =
+            run_lockstep_until(episodes(), &mut fleet, &mut |episode, frame| seeing(&mut in_lock_step, episode, frame));
+        assert_eq!(driven, result, "stops after {stops_after}");
+        let mut seats = drivers().into_iter();
+        let parted = SeatedFleet::in_all(episodes(), 1, |_| Box::new(OneDriverEach(vec![seats.next().unwrap()])));
+        let driven = run_fleets_until(parted, &mut |episode, frame| seeing(&mut in_fleets, episode, frame));
+        assert_eq!(driven, result, "stops after {stops_after}");
+        assert_eq!(in_lock_step, in_fleets, "every frame before it is passed on, and none after it");
+        assert_eq!(in_lock_step.len(), 4 * if stops_after < 37 { 36 } else { 37 });
+    }
 }
 
 /// From a state met at 20 m the rest is driven as by the car that was met.

@@ -22,6 +22,7 @@ use sim::episode::{Episode, EpisodeSettings};
 use sim::frame::{Event, Frame};
 use sim::geometry::Vec2;
 use sim::map::Map;
+use sim::seed::Rng;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 
@@ -70,15 +71,15 @@ pub(crate) struct Drive<'a> {
 }
 
 impl<'a> Drive<'a> {
-    /// A drive that is about to begin. `root`: entity under which it is found.
-    pub(crate) fn new(recording: &'a Recording, root: &str, episode: &Episode, settings: &Settings) -> Self {
+    /// A drive that is about to begin. `root`: entity under which it is found; `hand`: the stream of the expert's jitter.
+    pub(crate) fn new(recording: &'a Recording, root: &str, episode: &Episode, settings: &Settings, hand: Rng) -> Self {
         Self {
             recording,
             root: root.to_owned(),
             map: Arc::clone(episode.map()),
             episode: episode.settings().clone(),
             rule: settings.dagger.rule,
-            expert: ScriptedExpert::new(settings.expert.clone(), &settings.episode),
+            expert: ScriptedExpert::new(settings.expert.clone(), &settings.episode, hand),
             novice: None,
             planner: None,
             sensors: Sensors::new(root, episode),

@@ -87,7 +87,7 @@ impl<'a> Replay<'a> {
     fn drive(&self, index: usize, root: &str, recording: &Recording, context: &Context<'_>) -> anyhow::Result<()> {
         let (driver, episode) = (&self.drivers[index], &self.settings.episode);
         let [first, last] = self.ticks();
-        let mut drive = Drive::new(recording, root, &self.run.episode(episode), self.settings)
+        let mut drive = Drive::new(recording, root, &self.run.episode(episode), self.settings, self.run.hand())
             .with_planner(driver.to_planner(episode));
         if self.drivers.len() > 1 {
             let sources: Vec<Source> = self.drivers.iter().map(NamedDriver::source).collect();

@@ -7,7 +7,7 @@ use anyhow::{Context as _, ensure};
 use experiment::lots::Lot;
 use experiment::settings::Settings;
 use experiment::trained;
-use experiment::training::episodes_of;
+use experiment::training::{episodes_of, hand};
 use policy::dagger::{Learned, Rollouts, RoundEpisode};
 use policy::dataset::store::Store;
 use policy::drivers::NetPolicy;
@@ -63,7 +63,7 @@ impl Round<'_> {
         let watched = |(recording, start): (_, &RoundEpisode)| {
             let learned = self.learned.as_ref();
             let novice = learned.map(|learned| NetPolicy::new(learned.policy(), self.settings.dagger.device));
-            let drive = Drive::new(recording, ROOT, &start.episode, self.settings).with_novice(novice);
+            let drive = Drive::new(recording, ROOT, &start.episode, self.settings, hand(self.settings.seed, start.index)).with_novice(novice);
             drive.show_static();
             drive
         };

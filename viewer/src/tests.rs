@@ -26,7 +26,7 @@ use sim::driver::{Decision, Driver, LookAheadPoint, Policy as _, Situation, Sour
 use sim::episode::Episode;
 use sim::frame::{Event, Frame};
 use sim::map::Map;
-use sim::seed::RootSeed;
+use sim::seed::{Rng, RootSeed, Stream};
 use sim::vehicle::VehicleSettings;
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -155,13 +155,17 @@ fn indices(png: &[u8]) -> Vec<u8> {
     packed.chunks_exact(row_bytes).flat_map(pixels).collect()
 }
 
+fn hand() -> Rng {
+    RootSeed(1).rng(Stream::Expert, 0)
+}
+
 /// The first ticks of a drive by whoever answers, with everything that is shown of it.
 fn drive(ticks: usize, driver: &mut dyn Driver) -> (Vec<Frame>, Shown) {
     let settings = Settings::preset("smoke").unwrap();
     let mut episode = Episode::new(Arc::new(settings.episode.clone()), Arc::new(map()), RootSeed(2));
     let mut frames = Vec::new();
     let shown = Shown::of(|recording| {
-        let mut drive = Drive::new(recording, "me", &episode, &settings);
+        let mut drive = Drive::new(recording, "me", &episode, &settings, hand());
         drive.show_static();
         while frames.len() < ticks && episode.ending().is_none() {
             episode.observe();
@@ -177,7 +181,7 @@ fn drive(ticks: usize, driver: &mut dyn Driver) -> (Vec<Frame>, Shown) {
 #[test]
 fn every_frame_is_shown_as_it_was() {
     let settings = Settings::preset("smoke").unwrap();
-    let (frames, shown) = drive(60, &mut ScriptedExpert::new(settings.expert.clone(), &settings.episode));
+    let (frames, shown) = drive(60, &mut ScriptedExpert::new(settings.expert.clone(), &settings.episode, hand()));
     let cars = shown.points("me/car", &Transform3D::descriptor_translation());
     let look_ahead = shown.points("me/car/look_ahead", &Points3D::descriptor_positions());
     let signal = |name: &str| shown.signal(&format!("me/signals/{name}"), "tick");

@@ -3,8 +3,8 @@
 //! Its axis is the centre line with the corners rounded, for a car has to round them: `s` metres along the axis, `d` metres
 //! to the left of it. Edges are those of the centre line as it is, sharp corners included.
 
-use crate::corridor::{Side, bounds, segments_cross, to_millimetres};
-use sim::geometry::{Pose, Vec2, edges, wrap_angle};
+use crate::corridor::{Side, segments_cross, to_millimetres};
+use sim::geometry::{Pose, Vec2, bounds, edges, wrap_angle};
 use sim::maths;
 
 /// Radius with which the axis rounds a sharp corner, metres.

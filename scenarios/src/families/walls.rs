@@ -1,8 +1,8 @@
 //! Walls and kerbs along outlines, with free ground behind them.
 
-use crate::corridor::{bounds, to_millimetres};
+use crate::corridor::to_millimetres;
 use rand::RngExt as _;
-use sim::geometry::{Pose, Vec2, distance_to_segment, edges};
+use sim::geometry::{Pose, Vec2, bounds, distance_to_segment, edges};
 use sim::maths;
 use sim::scenario::{Obstacle, ObstacleClass};
 use sim::seed::Rng;

@@ -44,8 +44,8 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
                     points.push([x, y]);
                 }
             }
-            // A first line of words is a header; one with a number is a point that is written wrongly.
-            [None] | [None, None] if i == 0 => {}
+            // A first line of words is a header; one that begins like a number is a point that is written wrongly.
+            [None] | [None, None] if i == 0 && !record[0].starts_with(is_of_number) => {}
             _ => {
                 let cells = record.iter().collect::<Vec<_>>().join(",");
                 return Err(faulty(line, format!("{:?} is no point", shortened(&cells))));
@@ -61,4 +61,9 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
         });
     }
     Ok(points)
+}
+
+/// Whether numbers begin with it.
+fn is_of_number(first: char) -> bool {
+    first.is_ascii_digit() || "+-.".contains(first)
 }

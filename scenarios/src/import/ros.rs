@@ -13,7 +13,7 @@ use serde::de::IgnoredAny;
 use sim::limits::{IMAGE_BYTES_MAX, IMAGE_SIDE_MAX_PX, MAP_COORDINATE_MAX_M, MAP_RESOLUTION_M, MAP_YAML_BYTES_MAX};
 use std::collections::BTreeMap;
 use std::fmt::Display;
-use std::io::Cursor;
+use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 use storage::read;
 
@@ -275,12 +275,54 @@ impl Header {
     }
 }
 
+/// Bytes of a pixel of the deepest kind: four channels of 16 bits.
+const PIXEL_BYTES_MAX: u64 = 8;
+/// Bytes that an image may unpack to beside its pixels.
+const OTHER_BYTES_MAX: u64 = 4 << 20;
+
+/// Whether the header of a binary PGM or PPM ends with CRLF, of which a reader takes LF for the first byte of the raster.
+fn has_shifted_raster(file: &[u8]) -> bool {
+    let channels = match file {
+        [b'P', b'5', ..] => 1,
+        [b'P', b'6', ..] => 3,
+        _ => return false,
+    };
+    let mut at = 2;
+    let mut numbers = [0_usize; 3];
+    for number in &mut numbers {
+        loop {
+            match file.get(at) {
+                Some(b'#') => at += file[at..].iter().take_while(|byte| **byte != b'\n').count(),
+                Some(byte) if byte.is_ascii_whitespace() => at += 1,
+                _ => break,
+            }
+        }
+        let digits = file[at..].iter().take_while(|byte| byte.is_ascii_digit()).count();
+        *number = std::str::from_utf8(&file[at..at + digits]).ok().and_then(|text| text.parse().ok()).unwrap_or(0);
+        at += digits;
+    }
+    let [width, height, brightest] = numbers;
+    let bytes = if brightest > 255 { 2 } else { 1 };
+    let raster = width.saturating_mul(height).saturating_mul(bytes * channels);
+    file[at.min(file.len())..].starts_with(b"\r\n") && file.len() - at == raster.saturating_add(2)
+}
+
 /// The image in the bytes of a file, or what is wrong with it, and the remedy.
 fn decode(file: &[u8]) -> Result<DynamicImage, (String, String)> {
     let no_image =
         |error: &dyn Display| (format!("no readable image: {error}"), "save the map as PGM or PNG".to_owned());
-    let mut reader = ImageReader::new(Cursor::new(file)).with_guessed_format().map_err(|error| no_image(&error))?;
+    if has_shifted_raster(file) {
+        let remedy = "save it with LF in place of CRLF".to_owned();
+        return Err(("its header ends with CRLF, which shifts every pixel by one".to_owned(), remedy));
+    }
+    let reader = || ImageReader::new(Cursor::new(file)).with_guessed_format();
+    let (width, height) =
+        reader().and_then(|reader| reader.into_dimensions().map_err(io::Error::other)).unwrap_or((0, 0));
+    let mut reader = reader().map_err(|error| no_image(&error))?;
     let mut limits = image::Limits::default();
+    // No more than the pixels need: what else a file holds, such as colour profiles, may unpack to gigabytes.
+    let pixels_bytes = u64::from(width) * u64::from(height) * PIXEL_BYTES_MAX;
+    limits.max_alloc = Some(pixels_bytes + OTHER_BYTES_MAX);
     (limits.max_image_width, limits.max_image_height) = (Some(IMAGE_SIDE_MAX_PX), Some(IMAGE_SIDE_MAX_PX));
     reader.limits(limits);
     let image = reader.decode().map_err(|error| match error {
@@ -352,6 +394,17 @@ mod tests {
         assert!(header.is_drivable([255, 255, 108, 255]));
         assert!(!header.is_drivable([255, 255, 105, 255]));
         assert!(!header.is_drivable([255, 255, 255, 254]));
+    }
+
+    /// LF of a header that ends with CRLF was read as the first pixel, and every other one lay one further on.
+    #[test]
+    fn a_header_that_ends_with_crlf_is_refused() {
+        let image = |header: &str| [header.as_bytes(), &[0, 255, 255, 0]].concat();
+        assert_eq!(decode(&image("P5\n# by hand\n2 2\n255\n")).unwrap().to_luma8().into_raw(), [0, 255, 255, 0]);
+        // As a single white space, CR is as good as LF.
+        assert_eq!(decode(&image("P5 2 2 255\r")).unwrap().to_luma8().into_raw(), [0, 255, 255, 0]);
+        let (problem, _) = decode(&image("P5\r\n# by hand\r\n2 2\r\n255\r\n")).unwrap_err();
+        assert!(problem.contains("CRLF"), "{problem}");
     }
 
     /// Rows run down in the image and up in the mask; pixels and points are each other's inverse.

@@ -291,8 +291,9 @@ fn faults_of_the_lot_file_are_named() {
     for (text, expected) in [
         (
             "map = 'map.yaml'\nstart = [5, 3.5, 0]\n",
-            "map.lot.toml: route: the map does not say where to drive; write start",
+            "map.lot.toml: route: a start is given, but not where to drive from there; add goal",
         ),
+        ("map = 'map.yaml'\n", "map.lot.toml: route: the map does not say where to drive; write start"),
         ("map = 'map.yaml'\nstart = [5, 3.5]\n", "map.lot.toml:2: invalid length 2"),
         ("map = 'map.yaml'\nstrat = [5, 3.5, 0]\n", "map.lot.toml:2: unknown field `strat`"),
         ("map = 'map.jpg'\n", "map.lot.toml: map: "),
@@ -624,7 +625,7 @@ fn unknown_ground_that_counts_as_free_is_named_in_a_note() {
 fn a_first_line_with_a_number_in_it_is_no_header() {
     let points_of = |text: &str| centre_line::parse(text, "line.csv", 1.0).map(|points| points.len());
     assert_eq!(points_of("x,y\n1,2\n3,4\n").unwrap(), 2);
-    for text in ["-15.O,-13.2\n1,2\n3,4\n", "1,y\n1,2\n3,4\n"] {
+    for text in ["-15.O,-13.2\n1,2\n3,4\n", "1,y\n1,2\n3,4\n", "8;12\n20,12\n40,12\n", "8 12\n1,2\n3,4\n"] {
         assert!(points_of(text).unwrap_err().to_string().contains("is no point"), "{text}");
     }
 }

@@ -86,7 +86,7 @@ impl Case {
                 None => islands.push(outline),
             }
         }
-        let (low, high) = crate::corridor::bounds(&everything);
+        let (low, high) = sim::geometry::bounds(&everything);
         let (low, high) = (low - MARGIN_M, high + MARGIN_M);
         let boundary = vec![low, Vec2::new(high.x, low.y), high, Vec2::new(low.x, high.y)];
         Ground { boundary, is_walled: false, islands, obstacles }

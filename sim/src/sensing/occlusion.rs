@@ -69,7 +69,7 @@ impl ConvexInEgo {
     }
 
     fn bounds(&self) -> (Vec2, Vec2) {
-        crate::distance_field::bounds(&self.corners[..self.n_corners])
+        crate::geometry::bounds(&self.corners[..self.n_corners])
     }
 
     /// The pixels whose centres lie inside the polygon, in some of the rows; `None` if it is out of view.

@@ -34,7 +34,7 @@ struct Ranks {
 
 impl Shadow {
     pub(super) fn new(polygon: Vec<Vec2>, seed: u64, cell_radius_m: f32) -> Self {
-        let (low, high) = crate::distance_field::bounds(&polygon);
+        let (low, high) = crate::geometry::bounds(&polygon);
         let size = ((high - low) / SHADOW_CELL_M).ceil();
         let (cols, rows) = (size.x as usize + 1, size.y as usize + 1);
         let ranks = OnceLock::new();
