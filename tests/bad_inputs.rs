@@ -16,7 +16,7 @@ use sim::driver::Driver as _;
 use sim::episode::Episode;
 use sim::map::Map;
 use sim::scenario::Scenario;
-use sim::seed::RootSeed;
+use sim::seed::{RootSeed, Stream};
 use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -301,7 +301,7 @@ fn drive(settings: &Settings) -> bool {
     let lane = Scenario::lane(-100.0..=200.0, 60.0, 0.0..=100.0);
     let episode = Arc::new(settings.episode.clone());
     let Ok(map) = Map::build(lane, &episode.vehicle) else { return true };
-    let mut expert = ScriptedExpert::new(settings.expert.clone(), &episode);
+    let mut expert = ScriptedExpert::new(settings.expert.clone(), &episode, RootSeed(1).rng(Stream::Expert, 0));
     let mut episode = Episode::new(episode, Arc::new(map), RootSeed(1));
     for _ in 0..20 {
         if episode.ending().is_some() {
@@ -378,9 +378,9 @@ fn names_of_lots_drivers_and_moments_that_are_refused() {
         cases.refuse(driver, load(), expected);
     }
     for (key, expected) in [
-        ("", "1 parts, not 7"),
-        ("expert@lot-b", "2 parts, not 7"),
-        ("expert@lot-b@forward@0@paper@1@0@", "8 parts, not 7"),
+        ("", "1 parts, not the 7"),
+        ("expert@lot-b", "2 parts, not the 7"),
+        ("expert@lot-b@forward@0@paper@1@0@", "8 parts, not the 7"),
         ("@lot-b@forward@0@paper@1@0", "driver and lot have names"),
         ("expert@@forward@0@paper@1@0", "driver and lot have names"),
         ("nobody@lot-b@forward@0@paper@1@0", "no driver \"nobody\""),
@@ -503,7 +503,7 @@ fn maps_that_are_refused() {
         ("centre_line = \"line.csv\"", "centre_line = \"none.csv\"", "none.csv: cannot be read"),
         ("centre_line = \"line.csv\"", "centre_line = \".\"", "it is a folder"),
         ("centre_line = \"line.csv\"", "", "the map does not say where to drive"),
-        ("centre_line = \"line.csv\"", "start = [8, 12, 0]", "the map does not say where to drive"),
+        ("centre_line = \"line.csv\"", "start = [8, 12, 0]", "a start is given, but not where to drive"),
         ("centre_line = \"line.csv\"", "start = [8, 12]\nloop = true", "map.lot.toml:3"),
         ("centre_line = \"line.csv\"", "start = [nan, 12, 0]\nloop = true", "start: a number is NaN"),
         ("centre_line = \"line.csv\"", "start = [1e30, 12, 0]\nloop = true", "start: a number is 1000000"),
@@ -783,7 +783,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["render", "animation", "--driver", "expert", "--to", "nan"], "--from and --to"),
         (&["render", "report", "."], "this is no run"),
         (&["render", "samples", "round-01"], "there is no such round"),
-        (&["replay"], "<KEY>"),
+        (&["replay"], "<KEY|--of"),
         (&["replay", "expert@lot-b@forward@1048576@paper@1@9"], "0 to 1048575"),
         (&["replay", "expert@lot-z@forward@0@paper@1@9"], "\"lot-z\" is no lot"),
         (&["replay", "--of", "."], "this is no run"),

@@ -414,6 +414,21 @@ fn pictures_are_drawn_and_never_replaced_unasked() {
     refuses(&["render", "samples", &out, "--out", &out], &["no round", "round-01"]);
     refuses(&["render", "report", &out], &["this is no run"]);
     refuses(&["render", "trajectories", "--run", "no/such/run"], &["no/such/run"]);
+    refuses(&["visualise", "lot", "--lots", "test:2"], &["2 lots are named so"]);
+    refuses(&["visualise", "run", &out], &["this is no run"]);
+}
+
+/// The remedy, `--overwrite`, destroyed the map.
+#[test]
+fn a_lot_is_not_generated_over_what_it_is_made_of() {
+    let folder = scratch("over-itself");
+    for name in ["car-park.yaml", "car-park.pgm", "car-park.lot.toml"] {
+        std::fs::copy(Path::new("../scenarios/examples").join(name), folder.join(name)).unwrap();
+    }
+    let [map, out] = [folder.join("car-park.yaml"), folder.clone()].map(|path| path.display().to_string());
+    let before = std::fs::read(folder.join("car-park.pgm")).unwrap();
+    refuses(&["generate", "--lots", &map, "--out", &out, "--overwrite"], &["what the lot is made of", "another --out"]);
+    assert_eq!(std::fs::read(folder.join("car-park.pgm")).unwrap(), before);
 }
 
 #[test]

@@ -5,6 +5,7 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use experiment::run_dir::Place;
 use experiment::settings::{Layers, NoiseChoice};
+use scenarios::SpecError;
 use sim::scenario::Direction;
 use std::path::{Component, Path, PathBuf};
 
@@ -45,6 +46,11 @@ pub(crate) struct JsonArgs {
     /// Prints tables as JSON, one line each.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// Reads a name of lots, and refuses what names none before anything else is looked at.
+pub(crate) fn lot_name(name: &str) -> Result<String, SpecError> {
+    scenarios::suite(name).map(|_| name.to_owned())
 }
 
 /// Reads the folder of a run: as it is named in replay keys, relative to the present folder where it lies below that.

@@ -43,7 +43,7 @@ pub struct Cli {
 
 const EXAMPLES: &str = "\
 Examples:
-  cargo xtask train-dagger                       train, print the paper's table, check on three lots
+  cargo xtask train-dagger                       train, print the paper's table, drive three lots and others
   cargo xtask train-dagger --preset smoke        every step of it in seconds
   cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1
   cargo xtask settings --explain dagger.eta      what a setting means
@@ -51,18 +51,42 @@ Examples:
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Behaviour cloning, then DAgger; ends with the paper's table, and drives the three lots and others it has not seen.
+    #[command(after_help = train::DAGGER_EXAMPLES)]
+    TrainDagger(train::TrainArgs),
     /// Behaviour cloning: the expert drives once, a network learns from it.
     #[command(after_help = train::BC_EXAMPLES)]
     TrainBc(train::TrainArgs),
-    /// Behaviour cloning, then DAgger; ends with the paper's table and a closed-loop check on three lots.
-    #[command(after_help = train::DAGGER_EXAMPLES)]
-    TrainDagger(train::TrainArgs),
     /// Drives drivers over lots and counts near-collisions and the safe ratio.
     #[command(after_help = evaluate::EXAMPLES)]
     Evaluate(evaluate::EvaluateArgs),
-    /// Puts the shards of an evaluation or a reproduction together, as if one machine had done all of it.
-    #[command(after_help = merge::EXAMPLES)]
-    Merge(merge::MergeArgs),
+    /// What would have avoided the near-collisions of an evaluation: replaces one thing at a time with the truth.
+    #[command(after_help = what_if::EXAMPLES)]
+    WhatIf(what_if::WhatIfArgs),
+    /// Draws lots, drives, samples and noise as PNG and SVG.
+    #[command(after_help = render::EXAMPLES)]
+    Render(render::RenderArgs),
+    /// Records lots, drives and near-collisions, to be looked at in Rerun's viewer.
+    #[command(after_help = visualise::EXAMPLES)]
+    Visualise(visualise::VisualiseArgs),
+    /// Writes lots as TOML plus a top-view PNG.
+    #[command(after_help = generate::EXAMPLES)]
+    Generate(generate::GenerateArgs),
+    /// Lists the lots that can be named.
+    #[command(after_help = lots::EXAMPLES)]
+    Lots(lots::LotsArgs),
+    /// Lists the drivers that can be named, or prints the parameters of one planner as a file.
+    #[command(after_help = drivers::EXAMPLES)]
+    Drivers(drivers::DriversArgs),
+    /// Prints settings as TOML that `--config` reads, or explains one.
+    #[command(after_help = settings::EXAMPLES)]
+    Settings(settings::SettingsArgs),
+    /// Searches parameters of the model-based planners on lot a and training lots, the same way for each.
+    #[command(after_help = tune::EXAMPLES)]
+    Tune(tune::TuneArgs),
+    /// Writes a trained network as an ONNX file.
+    #[command(after_help = export::EXAMPLES)]
+    Export(export::ExportArgs),
     /// The paper in a box: trains, drives and writes one report with the paper's tables beside ours.
     #[command(after_help = reproduce::EXAMPLES)]
     Reproduce(reproduce::ReproduceArgs),
@@ -75,54 +99,30 @@ enum Command {
     /// Trains on few and on many different lots, and shows how near-collisions fall.
     #[command(after_help = scaling::EXAMPLES)]
     Scaling(scaling::ScalingArgs),
-    /// Trains the default and fails if its policy has become worse: for a nightly run.
-    #[command(after_help = guard::EXAMPLES)]
-    Guard(guard::GuardArgs),
-    /// Writes lots as TOML plus a top-view PNG.
-    #[command(after_help = generate::EXAMPLES)]
-    Generate(generate::GenerateArgs),
-    /// Writes a trained network as an ONNX file.
-    #[command(after_help = export::EXAMPLES)]
-    Export(export::ExportArgs),
-    /// How many pixels of the noisy bird's-eye view are right.
-    #[command(after_help = pixel_accuracy::EXAMPLES)]
-    PixelAccuracy(pixel_accuracy::PixelAccuracyArgs),
-    /// How far must be driven to see a difference in near-collisions, or to bound their rate.
-    #[command(after_help = sample_size::EXAMPLES)]
-    SampleSize(sample_size::SampleSizeArgs),
-    /// How fast this is on this machine, beside other simulators and libraries if asked.
-    #[command(after_help = bench::EXAMPLES)]
-    Bench(bench::BenchArgs),
-    /// Prints settings as TOML that `--config` reads, or explains one.
-    #[command(after_help = settings::EXAMPLES)]
-    Settings(settings::SettingsArgs),
-    /// Lists the lots that can be named.
-    #[command(after_help = lots::EXAMPLES)]
-    Lots(lots::LotsArgs),
-    /// Lists the drivers that can be named, or prints the parameters of one planner as a file.
-    #[command(after_help = drivers::EXAMPLES)]
-    Drivers(drivers::DriversArgs),
-    /// Searches parameters of the model-based planners on lot a and training lots, the same way for each.
-    #[command(after_help = tune::EXAMPLES)]
-    Tune(tune::TuneArgs),
-    /// Drives runs again by their replay keys, and says whether they are the same as recorded, bit by bit.
-    #[command(after_help = replay::EXAMPLES)]
-    Replay(replay::ReplayArgs),
-    /// What would have avoided the near-collisions of an evaluation: replaces one thing at a time with the truth.
-    #[command(after_help = what_if::EXAMPLES)]
-    WhatIf(what_if::WhatIfArgs),
+    /// Puts the shards of an evaluation or a reproduction together, as if one machine had done all of it.
+    #[command(after_help = merge::EXAMPLES)]
+    Merge(merge::MergeArgs),
     /// Checks that every file of a run is what was written, by its SHA-256.
     #[command(after_help = verify::EXAMPLES)]
     Verify(verify::VerifyArgs),
+    /// Drives runs again by their replay keys, and says whether they are the same as recorded, bit by bit.
+    #[command(after_help = replay::EXAMPLES)]
+    Replay(replay::ReplayArgs),
+    /// How far must be driven to see a difference in near-collisions, or to bound their rate.
+    #[command(after_help = sample_size::EXAMPLES)]
+    SampleSize(sample_size::SampleSizeArgs),
+    /// How many pixels of the noisy bird's-eye view are right.
+    #[command(after_help = pixel_accuracy::EXAMPLES)]
+    PixelAccuracy(pixel_accuracy::PixelAccuracyArgs),
+    /// How fast this is on this machine, beside other simulators and libraries if asked.
+    #[command(after_help = bench::EXAMPLES)]
+    Bench(bench::BenchArgs),
+    /// Trains the default and fails if its policy has become worse: for a nightly run.
+    #[command(after_help = guard::EXAMPLES)]
+    Guard(guard::GuardArgs),
     /// Kills commands and fails their file operations, goes on, and compares every byte.
     #[command(after_help = torture::EXAMPLES)]
     Torture(torture::TortureArgs),
-    /// Draws lots, drives, samples and noise as PNG and SVG.
-    #[command(after_help = render::EXAMPLES)]
-    Render(render::RenderArgs),
-    /// Records lots, drives and near-collisions, to be looked at in Rerun's viewer.
-    #[command(after_help = visualise::EXAMPLES)]
-    Visualise(visualise::VisualiseArgs),
     /// Prints a script that completes commands and flags in a shell.
     #[command(after_help = completions::EXAMPLES)]
     Completions(completions::CompletionsArgs),
@@ -144,30 +144,30 @@ impl Cli {
     pub fn run(&self) -> anyhow::Result<()> {
         let output = &Output::new(self.quiet, self.command.is_json());
         match &self.command {
-            Command::TrainBc(args) => train::bc(args, output),
             Command::TrainDagger(args) => train::dagger(args, output),
+            Command::TrainBc(args) => train::bc(args, output),
             Command::Evaluate(args) => evaluate::run(args, output),
-            Command::Merge(args) => merge::run(args, output),
+            Command::WhatIf(args) => what_if::run(args, output),
+            Command::Render(args) => render::run(args, output),
+            Command::Visualise(args) => visualise::run(args, output),
+            Command::Generate(args) => generate::run(args, output),
+            Command::Lots(args) => lots::run(args, output),
+            Command::Drivers(args) => drivers::run(args, output),
+            Command::Settings(args) => settings::run(args, output),
+            Command::Tune(args) => tune::run(args, output),
+            Command::Export(args) => export::run(args, output),
             Command::Reproduce(args) => reproduce::run(args, output),
             Command::Rules(args) => rules::run(args, output),
             Command::Deviations(args) => deviations::run(args, output),
             Command::Scaling(args) => scaling::run(args, output),
-            Command::Guard(args) => guard::run(args, output),
-            Command::Generate(args) => generate::run(args, output),
-            Command::Export(args) => export::run(args, output),
-            Command::PixelAccuracy(args) => pixel_accuracy::run(args, output),
-            Command::SampleSize(args) => sample_size::run(args, output),
-            Command::Bench(args) => bench::run(args, output),
-            Command::Settings(args) => settings::run(args, output),
-            Command::Lots(args) => lots::run(args, output),
-            Command::Drivers(args) => drivers::run(args, output),
-            Command::Tune(args) => tune::run(args, output),
-            Command::Replay(args) => replay::run(args, output),
-            Command::WhatIf(args) => what_if::run(args, output),
+            Command::Merge(args) => merge::run(args, output),
             Command::Verify(args) => verify::run(args, output),
+            Command::Replay(args) => replay::run(args, output),
+            Command::SampleSize(args) => sample_size::run(args, output),
+            Command::PixelAccuracy(args) => pixel_accuracy::run(args, output),
+            Command::Bench(args) => bench::run(args, output),
+            Command::Guard(args) => guard::run(args, output),
             Command::Torture(args) => torture::run(args, output),
-            Command::Render(args) => render::run(args, output),
-            Command::Visualise(args) => visualise::run(args, output),
             Command::Completions(args) => completions::run(args, Self::command(), output),
             Command::Metres => anyhow::bail!("the command metres is named sample-size now"),
         }?;

@@ -57,7 +57,11 @@ fn run(cli: &cli::Cli) -> anyhow::Result<()> {
         let asked_for = std::env::var(name).ok().and_then(|number| number.parse::<u64>().ok());
         ensure!(asked_for.is_none_or(|threads| threads <= u64::from(THREADS_MAX)), "{name} is more than {THREADS_MAX}");
     }
-    rayon::ThreadPoolBuilder::new().num_threads(cli.threads()).stack_size(STACK_BYTES).build_global()?;
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(cli.threads())
+        .stack_size(STACK_BYTES)
+        .build_global()
+        .map_err(|error| anyhow::anyhow!("threads cannot be started ({error}); ask for fewer with --threads"))?;
     // Within the pool: a thread outside it goes to sleep and is woken up at every parallel step, three times per control
     // tick. On a busy machine that costs more than the driving.
     rayon::scope(|_| cli.run())

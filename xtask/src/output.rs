@@ -155,8 +155,30 @@ pub(crate) fn note(text: impl Display) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
+/// What an error may be long, characters: names and values in it are the user's.
+const ERROR_CHARS_MAX: usize = 3000;
+
+/// Text that may quote a file: without characters that a terminal obeys, on as many lines as it has, and no longer than an
+/// error is read.
+fn printable(text: &str) -> String {
+    let mut printable = String::with_capacity(text.len());
+    for (index, character) in text.chars().enumerate() {
+        match character {
+            _ if index == ERROR_CHARS_MAX => {
+                printable.push('…');
+                break;
+            }
+            '\n' => printable.push('\n'),
+            _ if character.is_control() => printable.extend(character.escape_default()),
+            _ => printable.push(character),
+        }
+    }
+    printable
+}
+
 /// An error on stderr.
 pub(crate) fn error(text: impl Display) {
+    let text = printable(&text.to_string());
     if Color::from_args().on_stderr() {
         note(format_args!("\x1b[1;31merror:\x1b[0m {text}"));
     } else {

@@ -1,6 +1,7 @@
 //! `deviations`: what it does that a preset deviates from the paper.
 
 use super::trainings::{Begun, Trainings, TrainingsArgs, ensure_distinct};
+use crate::args::lot_name;
 use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
@@ -10,7 +11,7 @@ use experiment::settings::Settings;
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask deviations                              a training per thing that is not as in the paper: hours
-  cargo xtask deviations --of smoothing,mirror --unseen sealed:my-phrase:90:all
+  cargo xtask deviations --only smoothing,mirror --unseen sealed:my-phrase:90:all
   cargo xtask deviations --resume runs/deviations-default-s1";
 
 #[derive(Debug, Clone, Args)]
@@ -18,11 +19,11 @@ pub(crate) struct DeviationsArgs {
     #[command(flatten)]
     common: TrainingsArgs,
     /// Things that are done as in the paper, one at a time, by name [default: all but `steps`, which takes hours].
-    #[arg(long = "of", value_name = "NAME", num_args = 1.., value_delimiter = ',', conflicts_with = "resume")]
-    of: Vec<String>,
+    #[arg(long, visible_alias = "of", value_name = "NAME", num_args = 1.., value_delimiter = ',', conflicts_with = "resume")]
+    only: Vec<String>,
     /// Lots that all policies are driven on, once each way.
     #[arg(
-        long, value_name = "SPEC", num_args = 1.., value_delimiter = ',',
+        long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name,
         default_value = "validation:180:all",
         conflicts_with = "resume"
     )]
@@ -48,16 +49,24 @@ fn begin(args: &DeviationsArgs) -> anyhow::Result<Begun<Extent>> {
     let layers = args.common.layers();
     let settings = Settings::resolve(&layers, args.common.seed)?;
     let known = DEVIATIONS.map(|deviation| deviation.name);
-    for name in &args.of {
-        ensure!(known.contains(&name.as_str()), "--of {name}: there are {}", known.join(", "));
+    for name in &args.only {
+        ensure!(
+            known.contains(&name.as_str()),
+            "--only {name}: no deviation is named so; there are {}",
+            known.join(", ")
+        );
     }
-    ensure_distinct("--of", &args.of)?;
+    ensure_distinct("--only", &args.only)?;
     let is_asked_for =
-        |name: &str| if args.of.is_empty() { name != TOO_LONG } else { args.of.iter().any(|of| of == name) };
+        |name: &str| if args.only.is_empty() { name != TOO_LONG } else { args.only.iter().any(|only| only == name) };
     let mut names = Vec::new();
     for deviation in DEVIATIONS.iter().filter(|deviation| is_asked_for(deviation.name)) {
         let is_other = deviations::as_in_the_paper(&settings, deviation)? != settings;
-        ensure!(is_other || args.of.is_empty(), "--of {}: these settings are as in the paper there", deviation.name);
+        ensure!(
+            is_other || args.only.is_empty(),
+            "--only {}: these settings are as in the paper there",
+            deviation.name
+        );
         if is_other {
             names.push(deviation.name.to_owned());
         }

@@ -1,6 +1,6 @@
 //! `evaluate`: drivers × lots × directions × trials × noise levels.
 
-use crate::args::{Directions, JsonArgs, LayerArgs, OutArgs, noise_levels, run_folder};
+use crate::args::{Directions, JsonArgs, LayerArgs, OutArgs, lot_name, noise_levels, run_folder};
 use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
@@ -45,7 +45,7 @@ pub(crate) struct EvaluateArgs {
     #[arg(long = "driver", value_name = "SPEC", required_unless_present = "resume", num_args = 1..)]
     drivers: Vec<String>,
     /// Lots to drive; see `cargo xtask lots` [default: the setting evaluation.lots].
-    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',')]
+    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name)]
     lots: Vec<String>,
     /// Trials per lot and direction; each draws its own obstacles and noise [default: the setting evaluation.trials].
     #[arg(long, value_name = "N")]
@@ -79,7 +79,7 @@ pub(crate) struct EvaluateArgs {
     /// Continues an interrupted evaluation with its own drivers and settings, to the same result.
     #[arg(
         long,
-        value_name = "DIR", value_parser = run_folder(),
+        value_name = "RUN", value_parser = run_folder(),
         conflicts_with_all = [
             "drivers", "lots", "trials", "directions", "noise", "compare_with", "seed", "shard", "preset", "config", "overrides", "out",
             "smoothing"

@@ -1,6 +1,7 @@
 //! `generate`: lots as TOML plus a top-view PNG.
 
 use super::render::check_scale;
+use crate::args::lot_name;
 use crate::console::Console;
 use crate::output::Output;
 use anyhow::{Context as _, bail, ensure};
@@ -33,7 +34,7 @@ Examples:
 #[derive(Debug, Clone, Args)]
 pub(crate) struct GenerateArgs {
     /// Lots to write; see `cargo xtask lots`.
-    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', required = true)]
+    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name, required = true)]
     lots: Vec<String>,
     /// Seed of the obstacles.
     #[arg(long, default_value_t = 1)]
@@ -174,7 +175,20 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
         lot.start = lot.start.filter(|_| centre_line.is_none());
     }
     lot.start = start.or(lot.start);
-    Ok(vec![Lot::of_map(path, &lot, vehicle)?])
+    // An error names the file, which may say something else than the flags.
+    let given = |flag, is_given: bool| is_given.then_some(flag);
+    let flags = [
+        given("--scale", scale.is_some()),
+        given("--start", start.is_some()),
+        given("--goal", goal.is_some()),
+        given("--loop", *is_loop),
+        given("--centre-line", centre_line.is_some()),
+        given("--clearance", clearance.is_some()),
+    ];
+    let flags: Vec<&str> = flags.into_iter().flatten().collect();
+    let with_flags = || format!("with {} as given", flags.join(", "));
+    let made = Lot::of_map(path, &lot, vehicle);
+    Ok(vec![if flags.is_empty() { made? } else { made.with_context(with_flags)? }])
 }
 
 /// Of the files of a lot, without an extension.
@@ -204,6 +218,13 @@ fn ensure_free(args: &GenerateArgs, trials: &[Trial<'_>]) -> anyhow::Result<()> 
             );
         }
         for path in files(args, &name) {
+            // Beside a map lie its image and its route under the same name.
+            let source = trial.lot.file().map(|file| file.with_extension("")).map(|stem| storage::place_of(&stem));
+            ensure!(
+                source.transpose()? != Some(storage::place_of(&path.with_extension(""))?),
+                "{}: what the lot is made of lies there under that name; choose another --out",
+                path.display()
+            );
             ensure!(
                 args.overwrite || !path.exists(),
                 "{}: exists already; choose another --out or --seed, or replace it with --overwrite",

@@ -34,7 +34,7 @@ pub(crate) struct GuardArgs {
     #[command(flatten)]
     out: OutArgs,
     /// Continues an interrupted run.
-    #[arg(long, value_name = "DIR", value_parser = run_folder(), conflicts_with = "out")]
+    #[arg(long, value_name = "RUN", value_parser = run_folder(), conflicts_with = "out")]
     resume: Option<PathBuf>,
 }
 

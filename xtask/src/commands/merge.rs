@@ -36,7 +36,7 @@ Examples:
 pub(crate) struct MergeArgs {
     /// Folders that `evaluate --shard` or `reproduce --shard` wrote: every shard once, in any order. Or whole evaluations of
     /// the same trials by different drivers.
-    #[arg(value_name = "DIR", required = true)]
+    #[arg(value_name = "RUN", required = true)]
     folders: Vec<PathBuf>,
     /// Of whole evaluations: the driver the others are compared with [default: the last network, else the first driver].
     #[arg(long, value_name = "SPEC")]

@@ -1,7 +1,7 @@
 //! One trial of one lot, driven by one driver or several: what is shown of an episode.
 
 use super::evaluate;
-use crate::args::{LayerArgs, OneDirection};
+use crate::args::{LayerArgs, OneDirection, lot_name};
 use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
@@ -15,13 +15,13 @@ use sim::seed::RootSeed;
 /// Which trial, by the flags of an evaluation.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct TrialArgs {
-    /// Lot to drive; see `cargo xtask lots`.
-    #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
+    /// Lot to drive, one; see `cargo xtask lots`.
+    #[arg(long = "lots", alias = "lot", value_name = "SPEC", value_parser = lot_name, default_value = "lot-a")]
     lot: String,
     /// Which way.
     #[arg(long = "directions", alias = "direction", value_name = "WAY", default_value = "forward")]
     direction: OneDirection,
-    /// Which trial: obstacles and noise.
+    /// Which trial, from 0: it decides obstacles and noise.
     #[arg(
         long,
         value_name = "N",
@@ -29,7 +29,7 @@ pub(crate) struct TrialArgs {
         value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX))
     )]
     pub(crate) trial: u32,
-    /// What is seen wrongly: clean, paper, hard, lot or a multiple of paper [default: the first of evaluation.noise].
+    /// Sensor noise: clean, paper, hard, lot or a multiple of paper, 0 to 10 [default: the first of evaluation.noise].
     #[arg(long, alias = "level", value_name = "LEVEL")]
     noise: Option<NoiseChoice>,
     /// Seed of obstacles and noise of the trials [default: the setting evaluation.seed].

@@ -1,6 +1,6 @@
 //! `pixel-accuracy`: how many pixels of the noisy bird's-eye view are right.
 
-use crate::args::{JsonArgs, LayerArgs};
+use crate::args::{JsonArgs, LayerArgs, lot_name};
 use crate::console::Console;
 use crate::output::Output;
 use clap::Args;
@@ -19,9 +19,9 @@ Examples:
 #[derive(Debug, Clone, Args)]
 pub(crate) struct PixelAccuracyArgs {
     /// Lots to look at; see `cargo xtask lots`.
-    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "lot-a,lot-b,lot-c")]
+    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name, default_value = "lot-a,lot-b,lot-c")]
     lots: Vec<String>,
-    /// Noise levels.
+    /// Sensor noise, one level or several: clean, paper, hard or multiples of paper, 0 to 10.
     #[arg(long, alias = "level", value_name = "LEVEL", num_args = 1.., value_delimiter = ',', default_value = "paper")]
     noise: Vec<NoiseChoice>,
     /// Trials per lot and direction.

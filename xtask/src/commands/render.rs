@@ -3,13 +3,13 @@
 use super::one_trial::TrialArgs;
 use super::render_animation::{self, AnimationArgs};
 use super::reproduce;
-use crate::args::LayerArgs;
+use crate::args::{LayerArgs, lot_name};
 use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
 use crate::picture_folder::Folder;
 use anyhow::{Context as _, ensure};
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, Subcommand, ValueEnum};
 use experiment::drive::Replay;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
@@ -56,7 +56,7 @@ pub(crate) struct RenderArgs {
     /// What is drawn.
     #[command(subcommand)]
     what: RenderWhat,
-    /// Folder to write into [default: pictures; of a report, its run].
+    /// Folder to write into [default: pictures; of `report`, its run].
     #[arg(long, global = true, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Replaces files of the same name.
@@ -110,7 +110,7 @@ pub(crate) struct RenderResultsArgs {
     #[arg(value_name = "RUN")]
     run: PathBuf,
     /// Finished runs whose tables are added at the end: of `deviations`, `rules`, `scaling`, `evaluate` or a training.
-    #[arg(long, value_name = "[TITLE=]DIR", num_args = 1..)]
+    #[arg(long, value_name = "[TITLE=]RUN", num_args = 1..)]
     with: Vec<OtherRun>,
     /// File to write; figures go to `pictures/NAME` beside it [default: docs/results.md; of another command
     /// docs/results-COMMAND.md, of another preset its name instead].
@@ -121,7 +121,7 @@ pub(crate) struct RenderResultsArgs {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RenderLotArgs {
     /// Lots to draw; see `cargo xtask lots`.
-    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', required = true)]
+    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name, required = true)]
     lots: Vec<String>,
     /// Seed of the obstacles.
     #[arg(long, default_value_t = 1)]
@@ -143,12 +143,13 @@ pub(crate) enum ColourChoice {
 }
 
 #[derive(Debug, Clone, Args)]
+#[command(group = ArgGroup::new("who").args(["drivers", "run"]).required(true))]
 pub(crate) struct TrajectoriesArgs {
     /// Who drives, one or more, as in an evaluation; may be repeated. See `cargo xtask drivers`.
-    #[arg(long = "driver", value_name = "SPEC", num_args = 1.., required_unless_present = "run")]
+    #[arg(long = "driver", value_name = "SPEC", num_args = 1..)]
     drivers: Vec<String>,
     /// Instead: a drive of a training run, network and expert in turn as the decision rule chose; `--trial` says which.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["drivers", "lot", "direction", "noise", "seed", "preset", "config", "overrides"])]
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["lot", "direction", "noise", "seed", "preset", "config", "overrides"])]
     run: Option<PathBuf>,
     /// Round of the training run; 0 = behaviour cloning.
     #[arg(long, default_value_t = 1, requires = "run", value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX)))]
@@ -180,8 +181,8 @@ pub(crate) struct SamplesArgs {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RenderNoiseArgs {
-    /// Lot to look at; see `cargo xtask lots`.
-    #[arg(long = "lots", alias = "lot", value_name = "SPEC", default_value = "lot-a")]
+    /// Lot to look at, one; see `cargo xtask lots`.
+    #[arg(long = "lots", alias = "lot", value_name = "SPEC", value_parser = lot_name, default_value = "lot-a")]
     lot: String,
     /// Noise levels: paper, hard or multiples of paper.
     #[arg(long, alias = "level", value_name = "LEVEL", num_args = 1.., value_delimiter = ',', default_value = "paper,hard")]

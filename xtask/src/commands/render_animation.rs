@@ -7,7 +7,7 @@ use crate::console::Console;
 use crate::output::Output;
 use crate::picture_folder::Folder;
 use anyhow::{Context as _, ensure};
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use experiment::drive::Replay;
 use experiment::drivers::DriverSpec;
 use experiment::progress::{Interrupted, Progress as _};
@@ -29,12 +29,13 @@ const PICTURES_MAX: u32 = 3000;
 const FRAMES_WANTED: f32 = 320.0;
 
 #[derive(Debug, Clone, Args)]
+#[command(group = ArgGroup::new("who").args(["keys", "drivers"]).required(true))]
 pub(crate) struct AnimationArgs {
     /// Replay keys of one trial, as a report or failures.md lists them: the seconds around their ticks.
-    #[arg(value_name = "KEY", required_unless_present = "drivers", conflicts_with_all = TrialArgs::FLAGS)]
+    #[arg(value_name = "KEY", conflicts_with_all = TrialArgs::FLAGS)]
     keys: Vec<String>,
     /// Instead: who drives, as in an evaluation; may be repeated. See `cargo xtask drivers`.
-    #[arg(long = "driver", value_name = "SPEC", num_args = 1.., conflicts_with = "keys")]
+    #[arg(long = "driver", value_name = "SPEC", num_args = 1..)]
     drivers: Vec<String>,
     #[command(flatten)]
     trial: TrialArgs,

@@ -5,7 +5,7 @@ use crate::args::{JsonArgs, LayerArgs};
 use crate::console::Console;
 use crate::output::{Output, note};
 use anyhow::{Context as _, ensure};
-use clap::Args;
+use clap::{ArgGroup, Args};
 use evaluation::records::{self, RunRecord};
 use experiment::drive::Replay;
 use experiment::drivers::NamedDriver;
@@ -27,12 +27,14 @@ Examples:
 To look at a run: cargo xtask visualise replay KEY, or cargo xtask render animation KEY";
 
 #[derive(Debug, Clone, Args)]
+#[command(group = ArgGroup::new("runs").args(["keys", "of"]).required(true).multiple(true))]
 pub(crate) struct ReplayArgs {
-    /// From `runs.jsonl`, `failures.jsonl` or `failures.md`; the whole run is driven, whatever its tick.
-    #[arg(value_name = "KEY", required_unless_present = "of")]
+    /// `DRIVER@LOT@WAY@TRIAL@NOISE@SEED@TICK`, from `runs.jsonl`, `failures.jsonl` or `failures.md`; the whole run is driven,
+    /// whatever its tick.
+    #[arg(value_name = "KEY")]
     keys: Vec<ReplayKey>,
     /// Folder of the evaluation that the keys come from: its settings are used, and its digests compared.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["preset", "config", "overrides"])]
+    #[arg(long, alias = "run", value_name = "RUN", conflicts_with_all = ["preset", "config", "overrides"])]
     of: Option<PathBuf>,
     /// How many runs of `--of` are driven, spread over all of them, unless keys are named.
     #[arg(

@@ -2,7 +2,7 @@
 //! skipped where it is finished already.
 
 use super::{perform, train};
-use crate::args::{LayerArgs, OutArgs, run_folder};
+use crate::args::{LayerArgs, OutArgs, lot_name, run_folder};
 use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
@@ -51,7 +51,7 @@ pub(crate) struct ReproduceArgs {
     seeds: Option<u64>,
     /// Lots that no driver has met; see `cargo xtask lots`. A phrase of your own draws lots that nobody has seen [default:
     /// sealed:reproduce:24:all; sealed:reproduce:120:all with --full].
-    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',')]
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name)]
     unseen: Vec<String>,
     /// Folder of `cargo xtask tune`: planners also drive with the parameters found there [default: those in planners/tuned].
     #[arg(long, value_name = "DIR")]
@@ -62,7 +62,7 @@ pub(crate) struct ReproduceArgs {
     /// A run whose networks are all trained: the shard is of what they drive, with the settings of that run.
     #[arg(
         long,
-        value_name = "DIR",
+        value_name = "RUN",
         requires = "shard",
         conflicts_with_all = ["preset", "config", "overrides", "seed", "full", "seeds", "unseen", "tuned"]
     )]
@@ -72,7 +72,7 @@ pub(crate) struct ReproduceArgs {
     /// Continues an interrupted run with its own settings, to the same result; finished stages are skipped.
     #[arg(
         long,
-        value_name = "DIR", value_parser = run_folder(),
+        value_name = "RUN", value_parser = run_folder(),
         conflicts_with_all = [
             "preset", "config", "overrides", "seed", "out", "full", "seeds", "unseen", "tuned", "shard", "networks"
         ]
@@ -97,7 +97,7 @@ pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
     perform::all(COMMAND, &stages, &run, &console, output)?;
     run.finish(Outcome::Reproduction { stages: stages.len() })?;
     let (folder, number) = (run.path().display(), record.number);
-    output.note(format_args!("written: {folder}: shard {number}; put all together with cargo xtask merge DIR..."));
+    output.note(format_args!("written: {folder}: shard {number}; put all together with cargo xtask merge RUN..."));
     console.report_time();
     Ok(())
 }
@@ -191,7 +191,7 @@ fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir
     let Arguments { extent, shard } = Arguments::read(&networks, manifest)?;
     ensure!(
         shard.is_none(),
-        "--networks {name}: this is a shard; put all of them together first with cargo xtask merge DIR..."
+        "--networks {name}: this is a shard; put all of them together first with cargo xtask merge RUN..."
     );
     ensure!(!manifest::is_finished(&networks)?, "--networks {name}: this run is finished; nothing is left to drive");
     let stages = stages::all(&settings, &extent, &networks);

@@ -1,6 +1,7 @@
 //! `rules`: the `DAgger` family at equal samples.
 
 use super::trainings::{Begun, Trainings, TrainingsArgs, ensure_distinct};
+use crate::args::lot_name;
 use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
@@ -40,7 +41,7 @@ pub(crate) struct RulesArgs {
     samples: u32,
     /// Lots that all policies are driven on, once each way.
     #[arg(
-        long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "validation:90:all",
+        long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name, default_value = "validation:90:all",
         conflicts_with = "resume"
     )]
     unseen: Vec<String>,
@@ -76,7 +77,7 @@ fn begin(args: &RulesArgs) -> anyhow::Result<Begun<Extent>> {
     let known = rules::all().map(|(name, _)| name.to_owned());
     let named = if args.rule.is_empty() { known.to_vec() } else { args.rule.clone() };
     for rule in &named {
-        ensure!(known.contains(rule), "--rule {rule}: there are {}", known.join(", "));
+        ensure!(known.contains(rule), "--rule {rule}: no rule is named so; there are {}", known.join(", "));
     }
     ensure_distinct("--rule", &named)?;
     let RulesArgs { seeds, iterations, samples, .. } = *args;

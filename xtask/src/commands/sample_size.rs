@@ -3,7 +3,7 @@
 use crate::args::JsonArgs;
 use crate::output::Output;
 use anyhow::ensure;
-use clap::Args;
+use clap::{ArgGroup, Args};
 use evaluation::statistics::sample_size::{Question, to_bound};
 use serde::Serialize;
 
@@ -15,11 +15,12 @@ Examples:
 
 /// Rates are near-collisions per 100 m.
 #[derive(Debug, Clone, Args)]
+#[command(group = ArgGroup::new("question").args(["below", "between"]).required(true).multiple(true))]
 pub(crate) struct SampleSizeArgs {
-    /// A rate to be shown as not reached, by a run without an event.
-    #[arg(long, value_name = "RATE", required_unless_present = "between")]
+    /// A rate per 100 m to be shown as not reached, by a run without an event.
+    #[arg(long, value_name = "RATE")]
     below: Option<f64>,
-    /// Two rates to be told apart.
+    /// Two rates per 100 m to be told apart.
     #[arg(long, value_name = "RATE,RATE", value_parser = two_rates)]
     between: Option<[f64; 2]>,
     /// Probability of seeing a difference that is there.
@@ -52,7 +53,10 @@ fn two_rates(text: &str) -> Result<[f64; 2], String> {
 
 pub(crate) fn run(args: &SampleSizeArgs, output: &Output) -> anyhow::Result<()> {
     for (flag, probability) in [("--power", args.power), ("--confidence", args.confidence)] {
-        ensure!(probability > 0.0 && probability < 1.0, "{flag} {probability} is no probability between 0 and 1");
+        ensure!(
+            (1e-9..=1.0 - 1e-9).contains(&probability),
+            "{flag} {probability} is not a probability between 0 and 1"
+        );
     }
     let dispersion = args.dispersion;
     ensure!((1.0..=1e3).contains(&dispersion), "--dispersion {dispersion} is not within 1 (independent events) … 1000");

@@ -1,6 +1,7 @@
 //! `scaling`: how much more different lots buy.
 
 use super::trainings::{Begun, Trainings, TrainingsArgs, ensure_distinct};
+use crate::args::lot_name;
 use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
@@ -27,7 +28,7 @@ pub(crate) struct ScalingArgs {
     different: Vec<u32>,
     /// Lots that all policies are driven on, once each way.
     #[arg(
-        long, value_name = "SPEC", num_args = 1.., value_delimiter = ',',
+        long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name,
         default_value = "validation:180:all",
         conflicts_with = "resume"
     )]

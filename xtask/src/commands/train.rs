@@ -1,7 +1,7 @@
 //! `train-bc` and `train-dagger`.
 
 use super::{evaluate, within};
-use crate::args::{JsonArgs, LayerArgs, OutArgs, run_folder};
+use crate::args::{JsonArgs, LayerArgs, OutArgs, lot_name, run_folder};
 use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
@@ -47,13 +47,14 @@ pub(crate) struct TrainArgs {
     /// Root seed of training data, weights and shuffling.
     #[arg(long)]
     seed: Option<u64>,
-    /// Lots that are driven in every round as well, beside those of the settings: your own map, for example.
-    #[arg(long, value_name = "LOT", num_args = 1.., value_delimiter = ',')]
+    /// Lots that are driven in every round as well, beside those of the settings: your own map, for example. See `cargo
+    /// xtask lots`.
+    #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name)]
     also: Vec<String>,
     #[command(flatten)]
     out: OutArgs,
     /// Continues an interrupted run with its own settings, to the same result.
-    #[arg(long, value_name = "DIR", value_parser = run_folder(), conflicts_with_all = ["preset", "config", "overrides", "seed", "also", "out"])]
+    #[arg(long, value_name = "RUN", value_parser = run_folder(), conflicts_with_all = ["preset", "config", "overrides", "seed", "also", "out"])]
     resume: Option<PathBuf>,
     /// Trains only: no closed-loop check at the end.
     #[arg(long)]
@@ -189,7 +190,11 @@ pub(crate) fn check_unseen(settings: &Settings, unseen: &[String]) -> anyhow::Re
     let unseen = Lot::parse_all(unseen, &episode.vehicle)?;
     for lot in &unseen {
         // Every round takes the next ones of a kind.
-        let is_unseen = !lot.is_for_training() && trained_on.iter().all(|known| known.group() != lot.group());
+        let is_same = |known: &Lot| match (known.digest(), lot.digest()) {
+            (None, None) => known.group() == lot.group(),
+            (known, lot) => known == lot,
+        };
+        let is_unseen = !lot.is_for_training() && !trained_on.iter().any(is_same);
         let name = lot.name();
         ensure!(
             is_unseen,

@@ -30,7 +30,7 @@ pub(crate) struct TrainingsArgs {
     #[command(flatten)]
     out: OutArgs,
     /// Continues an interrupted run with its own settings, to the same result; finished trainings are skipped.
-    #[arg(long, value_name = "DIR", value_parser = run_folder(), conflicts_with_all = ["preset", "config", "overrides", "seed", "out"])]
+    #[arg(long, value_name = "RUN", value_parser = run_folder(), conflicts_with_all = ["preset", "config", "overrides", "seed", "out"])]
     resume: Option<PathBuf>,
 }
 

@@ -1,6 +1,6 @@
 //! `tune`: parameters of the model-based planners.
 
-use crate::args::{LayerArgs, OutArgs, run_folder};
+use crate::args::{LayerArgs, OutArgs, lot_name, run_folder};
 use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
@@ -35,7 +35,7 @@ pub(crate) struct TuneArgs {
     planners: Vec<String>,
     /// Lots to tune on: lot-a and generated training lots only. What is driven is said by these flags alone, not by the settings
     /// of `evaluation`.
-    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', default_value = "lot-a,train:4")]
+    #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name, default_value = "lot-a,train:4")]
     lots: Vec<String>,
     /// Candidates per planner, its own parameters included.
     #[arg(long, value_name = "N", default_value_t = 48, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -56,7 +56,7 @@ pub(crate) struct TuneArgs {
     /// Continues an interrupted search with its own settings, to the same result.
     #[arg(
         long,
-        value_name = "DIR", value_parser = run_folder(),
+        value_name = "RUN", value_parser = run_folder(),
         conflicts_with_all = [
             "planners", "lots", "budget", "trials", "seed", "noise", "preset", "config", "overrides", "out"
         ]

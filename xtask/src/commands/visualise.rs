@@ -2,7 +2,7 @@
 
 use super::evaluate;
 use super::one_trial::TrialArgs;
-use crate::args::LayerArgs;
+use crate::args::{LayerArgs, lot_name};
 use crate::output::Output;
 use crate::record::recordings_of;
 use crate::viewer;
@@ -10,17 +10,19 @@ use anyhow::ensure;
 use clap::{Args, Subcommand};
 use evaluation::records::{self, FailureRecord};
 use experiment::drivers::DriverSpec;
+use experiment::lots::Lot;
 use experiment::replay_key::ReplayKey;
 use experiment::settings::Layers;
 use experiment::trained;
 use experiment::view_request::{DriveRequest, Show, Sink, ViewRequest};
 use report::pictures::file_name;
 use sim::seed::RootSeed;
+use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask visualise lot lot-b
+  cargo xtask visualise lot --lots lot-b
   cargo xtask visualise episode --driver expert --driver run:runs/train-dagger-default-s1 --lots lot-b
   cargo xtask visualise replay run:runs/train-dagger-default-s1@lot-b@reverse@3@paper@1@842
   cargo xtask visualise run runs/train-dagger-default-s1
@@ -56,7 +58,7 @@ struct SinkArgs {
 #[derive(Debug, Clone, Subcommand)]
 enum What {
     /// A lot.
-    #[command(after_help = "Example: cargo xtask visualise lot lot-b")]
+    #[command(after_help = "Example: cargo xtask visualise lot --lots lot-b")]
     Lot(LotArgs),
     /// An episode of an evaluation, driven by one driver, or by several side by side.
     #[command(
@@ -77,7 +79,7 @@ enum What {
 #[derive(Debug, Clone, Args)]
 struct LotArgs {
     /// The lot; see `cargo xtask lots`.
-    #[arg(value_name = "SPEC")]
+    #[arg(long = "lots", alias = "lot", value_name = "SPEC", value_parser = lot_name, default_value = "lot-a")]
     lot: String,
     /// Seed of the obstacles, as in `generate`.
     #[arg(long, default_value_t = 1)]
@@ -109,29 +111,38 @@ struct ReplayArgs {
 #[derive(Debug, Clone, Args)]
 struct RunArgs {
     /// Folder of a training.
-    #[arg(value_name = "DIR")]
+    #[arg(value_name = "RUN")]
     run: PathBuf,
 }
 
 #[derive(Debug, Clone, Args)]
 struct FailuresArgs {
     /// Folder of an evaluation, or of a training with one.
-    #[arg(value_name = "DIR")]
+    #[arg(value_name = "RUN")]
     run: PathBuf,
     /// Near-collisions to record, from the top of the list.
-    #[arg(long, value_name = "N", default_value_t = 12)]
-    limit: usize,
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(1..))]
+    limit: u32,
 }
 
 pub(crate) fn run(args: &VisualiseArgs, output: &Output) -> anyhow::Result<()> {
     let (show, file) = match &args.what {
         What::Lot(lot) => {
+            // Before the program that records is built.
+            let lots = Lot::parse_all(std::slice::from_ref(&lot.lot), &VehicleSettings::hyundai_hg300())?;
+            ensure!(
+                lots.len() == 1,
+                "--lots {}: {} lots are named so; name one, as in test-hard-7",
+                lot.lot,
+                lots.len()
+            );
             let show = Show::Lot { lot: lot.lot.clone(), seed: RootSeed(lot.seed) };
             (show, format!("lot-{}-s{}", file_name(&lot.lot), lot.seed))
         }
         What::Episode(episode) => episode_of(episode, output)?,
         What::Replay(replay) => replay_of(&replay.key, &replay.layers, output)?,
         What::Run(run) => {
+            trained::policy_folder(&run.run)?;
             let name = run.run.file_name().map_or_else(|| "training".into(), |name| name.to_string_lossy());
             (Show::Training { run: run.run.clone() }, format!("run-{}", file_name(&name)))
         }
@@ -182,7 +193,7 @@ fn failures_of(args: &FailuresArgs, output: &Output) -> anyhow::Result<Show> {
     let (mut drives, mut all) = (Vec::new(), 0);
     records::each_line(&list, |failure: FailureRecord| {
         all += 1;
-        if drives.len() < args.limit {
+        if drives.len() < args.limit as usize {
             let key: ReplayKey = failure.replay.parse()?;
             let cause = failure.cause.name();
             let file = format!("failure-{all:03}-{}-{}", file_name(&key.lot), file_name(cause));

@@ -24,7 +24,7 @@ places that are passed.";
 #[derive(Debug, Clone, Args)]
 pub(crate) struct WhatIfArgs {
     /// Folder of a finished evaluation; its settings are used.
-    #[arg(value_name = "DIR")]
+    #[arg(value_name = "RUN")]
     folder: PathBuf,
     /// Drivers of it, as named in its tables [default: all].
     #[arg(long = "driver", value_name = "NAME", num_args = 1..)]
