@@ -105,7 +105,7 @@ fn lots_that_are_refused() {
         ("\"lane\"", "\"a\\u0000\"", "contains '\\0'"),
         ("\"lane\"", "\"a\\u202Eb\"", "contains '\\u{202e}'"),
         ("\"lane\"", "\"a\\u200Bb\"", "contains '\\u{200b}'"),
-        ("\"lane\"", &format!("\"{long}\""), "has 101 characters; shorten it: 100 are possible"),
+        ("\"lane\"", &format!("\"{long}\""), "has 101 characters; shorten it to at most 100"),
         ("name =", "title =", "unknown field `title`"),
         ("[[0, 0], [60, 0], [60, 30], [0, 30]]", "7", "invalid type"),
         ("[[0, 0], [60, 0], [60, 30], [0, 30]]", "[]", "0 vertices enclose no ground"),
@@ -177,7 +177,7 @@ fn lots_that_are_refused() {
         ("width_m = 6", "width_m = 31", "speed_bump 1: width_m is 31"),
         ("x_m = 15", "x_m = -99", "speed_bump 1: it stands at"),
         ("x_m = 15", "x_m = nan", "speed_bump 1: x_m is NaN"),
-        ("[[island]]", &format!("{islands}[[island]]"), "there are 5001 islands; leave some out: 5000 are possible"),
+        ("[[island]]", &format!("{islands}[[island]]"), "there are 5001 islands; leave some out: at most 5000 fit"),
         ("[[speed_bump]]", "[speed_bump]", "invalid type: map, expected a sequence"),
         ("[[speed_bump]]", &format!("{bumps}[[speed_bump]]"), "there are 1002 speed bumps"),
         ("[[obstacle]]", &format!("{many}[[obstacle]]"), "there are 10002 obstacles"),
@@ -198,11 +198,11 @@ fn lots_that_are_refused() {
     let large = LOT
         .replace("[60, 0], [60, 30], [0, 30]", "[500, 0], [500, 500], [0, 500]")
         .replace("[[5, 12], [40, 12]]", &format!("[{winding}]"));
-    cases.refuse("a route of 25 km", parse(&large), "the route is 25 km long; end it earlier: 20000 m are possible");
+    cases.refuse("a route of 25 km", parse(&large), "the route is 25 km long; end it within 20000 m");
     cases.finish(90);
 }
 
-/// Every setting with a range, and every one with choices, refuses what is no such value.
+/// Every setting with a range, and every one with choices, refuses any other value.
 #[test]
 fn settings_that_are_refused() {
     let resolve = |change: &str| {
@@ -244,11 +244,11 @@ fn settings_that_are_refused() {
         ("expert.elastic_band.trust_from_m=0.5", "trust_from_m = 0.5 is not less than trust_to_m = 0.4"),
         ("expert.elastic_band.bend_to_rad=0.6", "bend_from_rad = 0.6 is not less than bend_to_rad = 0.6"),
         ("training.lots=[]", "training.lots is empty"),
-        ("training.lots=[\"lot-z\"]", "training.lots: \"lot-z\" is no lot"),
+        ("training.lots=[\"lot-z\"]", "training.lots: \"lot-z\" is not a lot"),
         ("training.lots=[\"train:1000000\"]", "drives a round; at most 100000 are possible"),
         ("evaluation.lots=[\"test:0\"]", "evaluation.lots: \"test:0\" asks for \"0\" lots"),
         ("evaluation.lots=[\"test:1000000:all\", \"train:1000000\"]", "runs; at most 10000000 are possible"),
-        ("evaluation.elsewhere=[\"\"]", "evaluation.elsewhere: \"\" is no lot"),
+        ("evaluation.elsewhere=[\"\"]", "evaluation.elsewhere: \"\" is not a lot"),
         ("evaluation.noise=[]", "evaluation.noise is empty"),
         ("evaluation.noise=[1, 1.0]", "evaluation.noise names 1 twice"),
         ("training.noise=11", "not within 0 (clean) … 10"),
@@ -256,21 +256,21 @@ fn settings_that_are_refused() {
         ("seed=-1", "seed"),
         ("seed=9223372036854775808", "--set seed=9223372036854775808"),
         ("=1", "--set =1"),
-        ("", "a key and a value are needed"),
-        ("seed", "a key and a value are needed"),
+        ("", "write a key and a value"),
+        ("seed", "write a key and a value"),
         ("seed.=1", "seed"),
         ("a=1", "no key \"a\""),
-        ("seed==1", "is no TOML value"),
-        ("seed=1\nseed=2", "is no TOML value"),
+        ("seed==1", "is not a TOML value"),
+        ("seed=1\nseed=2", "is not a TOML value"),
         (&format!("{}b=1", "a.".repeat(20_000)), "a key of 20001 parts"),
-        (&format!("seed={}", "[".repeat(20_000)), "is no TOML value"),
+        (&format!("seed={}", "[".repeat(20_000)), "is not a TOML value"),
     ] {
         cases.refuse(&change[..change.len().min(60)], resolve(change), expected);
     }
     cases.finish(1000);
 }
 
-/// Whatever a range holds can be driven with: no panic, no number that is none.
+/// Whatever a range holds can be driven with: no panic, nothing that is not finite.
 #[test]
 fn every_setting_drives_at_either_end_of_its_range() {
     let whole = ["episode.physics_step_ms", "episode.control_period_ms"];
@@ -296,7 +296,7 @@ fn every_setting_drives_at_either_end_of_its_range() {
     assert!(failed.is_empty(), "these do not drive: {failed:#?}");
 }
 
-/// Whether a second of driving by the expert stay finite; a lot that the car does not fit is no matter.
+/// Whether a second of driving by the expert stays finite; a lot that the car does not fit does not matter.
 fn drive(settings: &Settings) -> bool {
     let lane = Scenario::lane(-100.0..=200.0, 60.0, 0.0..=100.0);
     let episode = Arc::new(settings.episode.clone());
@@ -335,8 +335,8 @@ fn names_of_lots_drivers_and_moments_that_are_refused() {
         ("test:3:", "has no family \"\""),
         ("test:3:brutal", "has no family \"brutal\""),
         ("test:3:hard:1", "has \"1\" too much"),
-        ("test-hard--1", "is no lot"),
-        ("test-hard-18446744073709551616", "is no lot"),
+        ("test-hard--1", "is not a lot"),
+        ("test-hard-18446744073709551616", "is not a lot"),
         ("sealed", "does not say which phrase"),
         ("sealed:", "has the phrase \"\""),
         ("sealed:a", "does not say how many lots"),
@@ -365,9 +365,9 @@ fn names_of_lots_drivers_and_moments_that_are_refused() {
     }
     let settings = Settings::preset("smoke").unwrap();
     for (driver, expected) in [
-        ("run:no/such/run", "this is no run"),
+        ("run:no/such/run", "this is not a run"),
         ("run:", "names no folder or file"),
-        ("run:no/such/run/bc", "this is no run"),
+        ("run:no/such/run/bc", "this is not a run"),
         ("net:no/such/net", "lists no finished model.safetensors"),
         ("net:", "names no folder or file"),
         ("vvf:no/such.toml", "no/such.toml: cannot be read"),
@@ -452,9 +452,9 @@ fn maps_that_are_refused() {
         ("image: map.pgm\n", "", "missing field `image`"),
         ("image: map.pgm", "image: none.pgm", "none.pgm: cannot be read"),
         ("image: map.pgm", "image: .", "it is a folder"),
-        ("image: map.pgm", "image: map.yaml", "no readable image"),
-        ("image: map.pgm", "image: /dev/zero", "neither beside the YAML file nor in a folder below"),
-        ("image: map.pgm", "image: /etc/passwd", "neither beside the YAML file nor in a folder below"),
+        ("image: map.pgm", "image: map.yaml", "not a readable image"),
+        ("image: map.pgm", "image: /dev/zero", "neither next to the YAML file nor in a folder below"),
+        ("image: map.pgm", "image: /etc/passwd", "neither next to the YAML file nor in a folder below"),
         ("image: map.pgm", "image: ../../../../etc/hostname", "image"),
         ("image: map.pgm", "image: [map.pgm]", "map.yaml:1"),
         ("resolution: 1.0\n", "", "missing field `resolution`"),
@@ -530,12 +530,12 @@ fn maps_that_are_refused() {
         ("8,12\n", "the line has 1 points"),
         ("8,12\n8,12\n", "the line has 1 points"),
         ("8,12\nx,12\n", "line.csv:2"),
-        ("8,12\n9\n", "line.csv:2: \"9\" is no point"),
-        ("8,12\nnan,12\n", "line.csv:2: \"nan,12\" is no point"),
-        ("8,12\ninf,12\n", "line.csv:2: \"inf,12\" is no point"),
-        ("8,12\n2e9,12\n", "line.csv:2: \"2e9,12\" is no point"),
-        ("8,12\n1e30,12\n", "line.csv:2: \"1e30,12\" is no point"),
-        ("8,12\n9e7,12\n", "is 90000 km long in the lot; shorten it: 20000 m are possible"),
+        ("8,12\n9\n", "line.csv:2: \"9\" is not a point"),
+        ("8,12\nnan,12\n", "line.csv:2: \"nan,12\" is not a point"),
+        ("8,12\ninf,12\n", "line.csv:2: \"inf,12\" is not a point"),
+        ("8,12\n2e9,12\n", "line.csv:2: \"2e9,12\" is not a point"),
+        ("8,12\n1e30,12\n", "line.csv:2: \"1e30,12\" is not a point"),
+        ("8,12\n9e7,12\n", "is 90000 km long in the lot; shorten it to at most 20000 m"),
         ("8,12\n70,12\n", "too narrow"),
         ("8,12\n40,1.2\n", "too narrow"),
         (&wiggle, "the line has more than 10000 points"),
@@ -544,9 +544,9 @@ fn maps_that_are_refused() {
         cases.refuse(&line[..line.len().min(40)], map.load(&folder), expected);
     }
     for (image, expected) in [
-        (&b""[..], "no readable image"),
-        (b"P5", "no readable image"),
-        (b"P5\n60 30\n255\n", "no readable image"),
+        (&b""[..], "not a readable image"),
+        (b"P5", "not a readable image"),
+        (b"P5\n60 30\n255\n", "not a readable image"),
         (b"P5\n0 30\n255\n", "image"),
         (b"P5\n60 0\n255\n", "image"),
         (b"P2\n0 0\n255\n", "image"),
@@ -555,11 +555,11 @@ fn maps_that_are_refused() {
         (b"P7\nWIDTH 0\nHEIGHT 1\nDEPTH 1\nMAXVAL 255\nENDHDR\n", "image"),
         (b"P5\n60000 60000\n255\n", "it is too large"),
         (b"P5\n4294967295 4294967295\n255\n", "it is too large"),
-        (b"P5\n99999999999 1\n255\n", "no readable image"),
-        (b"P5\n-1 1\n255\n", "no readable image"),
-        (b"P5\n60 30\n0\n", "no readable image"),
-        (b"P5\n4096 4096\n255\n\0\0", "no readable image"),
-        (b"\x89PNG\r\n\x1a\n", "no readable image"),
+        (b"P5\n99999999999 1\n255\n", "not a readable image"),
+        (b"P5\n-1 1\n255\n", "not a readable image"),
+        (b"P5\n60 30\n0\n", "not a readable image"),
+        (b"P5\n4096 4096\n255\n\0\0", "not a readable image"),
+        (b"\x89PNG\r\n\x1a\n", "not a readable image"),
         (b"GIF89a", "image"),
     ] {
         let map = MapFiles { image: image.to_vec(), ..MapFiles::sound() };
@@ -569,9 +569,9 @@ fn maps_that_are_refused() {
     for (text, expected) in [
         ("", "the file ends after 0 numbers"),
         ("1,2", "the file ends after 2 numbers"),
-        ("x,y", "\"x\" is no number of metres"),
-        ("nan,2,0,9,2,0,0", "\"nan\" is no number of metres"),
-        ("1e30,2,0,9,2,0,0", "\"1e30\" is no number of metres"),
+        ("x,y", "\"x\" is not a number of metres"),
+        ("nan,2,0,9,2,0,0", "\"nan\" is not a number of metres"),
+        ("1e30,2,0,9,2,0,0", "\"1e30\" is not a number of metres"),
         ("1,2,0,9,2,0,-1", "number 7, the number of obstacles, is -1"),
         ("1,2,0,9,2,0,1.5", "number 7, the number of obstacles, is 1.5"),
         ("1,2,0,9,2,0,20000", "number 7, the number of obstacles, is 20000"),
@@ -735,7 +735,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["evaluate", "--driver", "expert", "--lots", "keys.toml"], "unknown field `a0`"),
         (&["evaluate", "--driver", "expert", "--lots", "name.toml"], "900000 characters"),
         (&["evaluate", "--driver", "expert", "--lots", "huge.toml"], "200000000000 bytes or more"),
-        (&["evaluate", "--driver", "expert", "--lots", "pipe.toml"], "it is no regular file"),
+        (&["evaluate", "--driver", "expert", "--lots", "pipe.toml"], "it is not a regular file"),
         (&["evaluate", "--driver", "expert", "--lots", "far.lot.toml"], "far.csv:2"),
         (
             &["evaluate", "--driver", "expert", "--lots", "back.lot.toml"],
@@ -752,17 +752,17 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         ),
         (&["generate", "--lots", "stars.toml", "bars.toml", "--out", "."], "would both be a-b.toml"),
         (&["evaluate", "--driver", "expert", "--lots", "test:1000001"], "from 1 to 1000000"),
-        (&["evaluate", "--driver", "dwa:pipe.toml"], "it is no regular file"),
+        (&["evaluate", "--driver", "dwa:pipe.toml"], "it is not a regular file"),
         (&["evaluate", "--driver", "dwa:huge.toml"], "200000000000 bytes or more"),
         (&["evaluate", "--driver", "dwa:deep.toml"], "at most 65536 are read"),
         (&["evaluate", "--driver", "expert", "--threads", "1000000"], "--threads"),
         (&["evaluate", "--driver", "expert", "--threads", "0"], "--threads"),
         (&["evaluate", "--driver", "expert", "--noise", "nan"], "nan"),
         (&["generate", "--lots", "bomb.yaml", route[0], route[1], route[2], route[3]], "it is too large"),
-        (&["generate", "--lots", "zero.yaml", route[0], route[1], route[2], route[3]], "neither beside the YAML file"),
+        (&["generate", "--lots", "zero.yaml", route[0], route[1], route[2], route[3]], "neither next to the YAML file"),
         (
             &["generate", "--lots", "zero.yaml", "--image-anywhere", route[0], route[1], route[2], route[3]],
-            "it is no regular file",
+            "it is not a regular file",
         ),
         (&["generate", "--lots", "aliases.yaml", route[0], route[1], route[2], route[3]], "aliases.yaml"),
         (
@@ -781,25 +781,25 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["render", "animation", "expert@lot-b@forward@1048576@paper@1@9"], "0 to 1048575"),
         (&["render", "animation", "--driver", "expert", "--speed", "1e-30"], "--speed must be"),
         (&["render", "animation", "--driver", "expert", "--to", "nan"], "--from and --to"),
-        (&["render", "report", "."], "this is no run"),
+        (&["render", "report", "."], "this is not a run"),
         (&["render", "samples", "round-01"], "there is no such round"),
         (&["replay"], "<KEY|--of"),
         (&["replay", "expert@lot-b@forward@1048576@paper@1@9"], "0 to 1048575"),
-        (&["replay", "expert@lot-z@forward@0@paper@1@9"], "\"lot-z\" is no lot"),
-        (&["replay", "--of", "."], "this is no run"),
+        (&["replay", "expert@lot-z@forward@0@paper@1@9"], "\"lot-z\" is not a lot"),
+        (&["replay", "--of", "."], "this is not a run"),
         (&["replay", "--of", ".", "--sample", "0"], "--sample"),
         (&["visualise", "episode", "--driver", "expert", "--trial", "4000000000"], "--trial"),
         (&["settings", "--config", "deep.toml"], "deep.toml:1"),
-        (&["settings", "--config", "pipe.toml"], "it is no regular file"),
-        (&["settings", "--config", "/dev/zero"], "it is no regular file"),
+        (&["settings", "--config", "pipe.toml"], "it is not a regular file"),
+        (&["settings", "--config", "/dev/zero"], "it is not a regular file"),
         (&["settings", "--config", "huge.toml"], "200000000000 bytes or more"),
         (&["settings", "--set", &deep_key], "a key of 20001 parts"),
-        (&["settings", "--set", "training.lots=[\"lot-z\"]"], "training.lots: \"lot-z\" is no lot"),
+        (&["settings", "--set", "training.lots=[\"lot-z\"]"], "training.lots: \"lot-z\" is not a lot"),
         (&["train-dagger", "--set", "dagger.fit.batch=0"], "dagger.fit.batch = 0"),
         (&["train-dagger", "--set", "dagger.fit.learning_rate.floor=1"], "is more than"),
         (&["train-dagger", "--resume", "no/such/run"], "no such run"),
         (&["tune", "--trials", "0"], "evaluation.trials = 0"),
-        (&["reproduce", "--unseen", "lot-z"], "\"lot-z\" is no lot"),
+        (&["reproduce", "--unseen", "lot-z"], "\"lot-z\" is not a lot"),
         (&["pixel-accuracy", "--trials", "0"], "--trials"),
         (&["sample-size", "--between", "nan,1"], "nan"),
     ];
@@ -835,7 +835,7 @@ fn outputs_that_are_full_or_closed_lose_no_result() {
     assert_eq!(run("head", "2>&1 | head -1"), Some(0));
 }
 
-/// The command line was read as text, and a name that is none was a panic.
+/// The command line was read as text, and a name that is not text was a panic.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_folder_whose_name_is_no_text_is_written_into() {

@@ -53,7 +53,7 @@ fn a_network_that_answers_with_no_number_ends_the_command_with_the_key_to_replay
     std::fs::write(&file, onnx::export::export(&checkpoint).unwrap()).unwrap();
     for driver in [format!("net:{}", net.display()), format!("onnx:{}", file.display())] {
         let key = format!("{driver}@lot-b@forward@0@paper@1@0");
-        let expected = format!("{key}: the driver's answer is no finite number");
+        let expected = format!("{key}: the driver's answer is not a finite number");
         let out = folder.join("evaluation").display().to_string();
         let evaluate =
             ["evaluate", "--driver", &driver, "--lots", "lot-b", "--trials", "1", "--overwrite", "--out", &out];
@@ -83,8 +83,8 @@ fn a_refused_evaluation_writes_nothing() {
     }
 }
 
-/// Settings that do not exist or make no sense, and folders that cannot be made: named with their place, and nothing is
-/// left behind.
+/// Settings that do not exist or make no sense, and folders that cannot be made, are named with their place, and
+/// nothing is left behind.
 #[test]
 fn settings_and_folders_that_cannot_be_used_leave_nothing() {
     let folder = scratch("bad-settings");
@@ -306,7 +306,7 @@ fn a_run_can_be_evaluated_later_and_generated_lots_can_be_driven() {
     assert!(run.join("round-00/learning.csv").is_file());
 }
 
-/// Every run of an evaluation comes to the same bits when it is driven alone, and a difference is not passed over.
+/// Every run of an evaluation gives the same bits when it is driven alone, and a difference is reported.
 fn runs_are_replayed(results: &Path) {
     let replay = ["replay", "--json", "--of", results.to_str().unwrap()];
     let rows = |printed: &str| serde_json::from_str::<Vec<serde_json::Value>>(printed).unwrap();
@@ -327,7 +327,8 @@ fn runs_are_replayed(results: &Path) {
     sums::write(results, "runs.jsonl", recorded.as_bytes()).unwrap();
 }
 
-/// The near-collisions of a planner are counted again by who drives on, and a run that went otherwise is no ground for it.
+/// The near-collisions of a planner are tried again with each substitution, and a run that differs from the recorded
+/// one is refused.
 #[test]
 fn what_would_have_avoided_near_collisions_is_counted_by_lot() {
     let folder = scratch("what-if");
@@ -356,7 +357,7 @@ fn what_would_have_avoided_near_collisions_is_counted_by_lot() {
     assert_eq!(succeed(xtask().args(["what-if", "--json"]).arg(&without)).trim(), "[]");
     assert_eq!(succeed(xtask().arg("what-if").arg(&without)).trim(), "no near-collisions");
     let error = refuse(xtask().arg("what-if").arg(folder.join("none")));
-    assert!(error.contains("this is no run"), "{error}");
+    assert!(error.contains("this is not a run"), "{error}");
     let moved = failures.replacen("\"tick\":", "\"tick\":1", 1);
     sums::write(&run, "failures.jsonl", moved.as_bytes()).unwrap();
     let error = refuse(xtask().arg("what-if").arg(&run));
@@ -411,11 +412,11 @@ fn pictures_are_drawn_and_never_replaced_unasked() {
     refuses(&["render", "noise", "--lots", "lot-b", "--at", "1000", "--out", &out], &["--at 1000", "139"]);
     refuses(&["render", "noise", "--lots", "test:2", "--out", &out], &["test:2", "2 lots"]);
     refuses(&["render", "samples", "no/such/round-01", "--out", &out], &["no/such/round-01", "no such round"]);
-    refuses(&["render", "samples", &out, "--out", &out], &["no round", "round-01"]);
-    refuses(&["render", "report", &out], &["this is no run"]);
+    refuses(&["render", "samples", &out, "--out", &out], &["not a round", "round-01"]);
+    refuses(&["render", "report", &out], &["this is not a run"]);
     refuses(&["render", "trajectories", "--run", "no/such/run"], &["no/such/run"]);
     refuses(&["visualise", "lot", "--lots", "test:2"], &["2 lots are named so"]);
-    refuses(&["visualise", "run", &out], &["this is no run"]);
+    refuses(&["visualise", "run", &out], &["this is not a run"]);
 }
 
 /// The remedy, `--overwrite`, destroyed the map.
@@ -495,7 +496,7 @@ fn a_lot_that_can_only_be_driven_forward_is_refused_with_its_line_and_the_flag()
     );
     let lots = format!("training.lots=[\"{lot}\"]");
     refuses(&["train-bc", "--set", &lots, "--out", &out], &["lot.toml:5", "training.directions='[\"forward\"]'"]);
-    // All trainings were done when this was found, and no --resume could go on.
+    // All trainings were done when this was found, and no --resume could continue.
     for command in ["rules", "reproduce"] {
         let expected = &["lot.toml:5", "evaluation.directions='[\"forward\"]'"];
         refuses(&[command, "--unseen", &lot, "--out", &out], expected);

@@ -4,8 +4,8 @@ use crate::bench::{scratch, succeed, xtask};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Every file of a run by name, but for the manifest (it names the command line), the report (it shows the manifest),
-/// the wall time, and the lists of their digests.
+/// Every file of a run by name, except for the manifest (it names the command line), the report (it shows the
+/// manifest), the wall time, and the lists of their digests.
 pub(crate) fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![folder.to_owned()];

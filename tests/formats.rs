@@ -14,7 +14,7 @@ fn data_sets_are_npy_and_weights_are_safetensors() {
     assert_eq!(bytes, 79, "625 bits");
     assert_eq!(labels.dim(), (n, 3));
     assert!(n > 500, "one way round lot a takes more than {n} ticks");
-    assert!(grids.column(78).iter().all(|&last| last.trailing_zeros() >= 7), "7 bits of the last byte are no cells");
+    assert!(grids.column(78).iter().all(|&last| last.trailing_zeros() >= 7), "7 bits of the last byte are not cells");
     assert!(labels.iter().all(|value| (0.0..=1.0).contains(value)), "labels are image fractions");
     assert!(labels.column(2).iter().all(|&tau_hat| tau_hat == 0.0), "behaviour cloning has no τ̂");
 

@@ -1,9 +1,9 @@
 //! What people read: every `--help`, and the tables that commands print. The texts are in `snapshots/`; after a change that
-//! is meant, `INSTA_UPDATE=always cargo test -p tests printed` writes them anew, and `git diff` shows what changed.
+//! is meant, `INSTA_UPDATE=always cargo test -p tests printed` writes them again, and `git diff` shows what changed.
 
 use crate::bench::{scratch, succeed, xtask};
 
-/// Of a printed table; help may be wider, as examples are.
+/// Width of a printed table; help may be wider, as examples are.
 const COLUMNS: usize = 100;
 
 fn printed(arguments: &[&str]) -> String {

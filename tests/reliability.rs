@@ -49,8 +49,8 @@ fn resume(command: &str, run: &Path) {
     succeed(xtask().args([command, "--resume"]).arg(run));
 }
 
-/// Kills a training when a file of its run appears, goes on, and compares every file with those of a run that was left
-/// alone. Both use the same folder, which replay keys name.
+/// Kills a training when a file of its run appears, continues it, and compares every file with those of a run that was
+/// left alone. Both use the same folder, which replay keys name.
 #[test]
 fn a_killed_training_goes_on_to_the_same_bytes() {
     let run = scratch("killed-training").join("run");
@@ -137,7 +137,7 @@ fn what_is_read_is_never_deleted_or_written_into_however_it_is_named() {
     for file in ["run/sha256sums", "run/round-00/model.safetensors", "run/new.onnx"] {
         refuses(&["export", "onnx", "run", "--out", file, "--overwrite"], "lies within the run");
     }
-    refuses(&["render", "results", "run", "--to", "mine.toml"], "is no page of results");
+    refuses(&["render", "results", "run", "--to", "mine.toml"], "is not a page of results");
     #[cfg(unix)]
     {
         std::os::unix::fs::symlink("run", folder.join("link")).unwrap();
@@ -151,7 +151,7 @@ fn what_is_read_is_never_deleted_or_written_into_however_it_is_named() {
     assert!(faults.is_empty(), "{faults:?}");
 }
 
-/// A report that was written anew under another name of its folder was not listed in its run, which was damaged then.
+/// A report that was written again under another name of its folder was not listed in its run, which was then damaged.
 #[test]
 fn a_report_of_a_stage_is_listed_in_its_run_by_whatever_name() {
     let run = scratch("report-of-stage").join("run");
@@ -215,7 +215,7 @@ fn limits_and_variables_of_the_shell_are_taken_for_what_they_are() {
     assert_eq!(manifest("hook", Some("/none")), manifest("none", None));
 }
 
-/// Two commands wrote into one folder, and what came out was of neither.
+/// Two commands wrote into one folder, and the result belonged to neither.
 #[test]
 fn a_run_under_way_is_refused_by_name_and_process() {
     let run = scratch("owner").join("run");
@@ -238,7 +238,7 @@ fn a_run_under_way_is_refused_by_name_and_process() {
     resume("train-dagger", &run);
 }
 
-/// Whatever signal comes, and whenever: 130, nothing half-done is called finished, and the run goes on.
+/// Whatever signal comes, and whenever: 130, nothing half-done is called finished, and the run can be continued.
 #[cfg(unix)]
 #[test]
 fn signals_end_a_command_with_130_and_lose_nothing() {

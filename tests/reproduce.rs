@@ -186,12 +186,12 @@ fn shards_of_trainings_and_of_drives_come_to_the_bytes_of_one_machine() {
     std::fs::write(&damaged, &content[1..]).unwrap();
     let out = run.to_string_lossy();
     refused(&["merge", "--overwrite", "--out", &one.to_string_lossy()], &[one, &trained[1]], "what is read lies there");
-    refused(&["merge", "--out", &out], &[&one.join("chains/s1-weighted")], "this is no shard");
+    refused(&["merge", "--out", &out], &[&one.join("chains/s1-weighted")], "this is not a shard");
     refused(&["merge", "--out", &out], &[one, &trained[1]], "model.safetensors: is damaged");
     assert!(!run.exists());
     std::fs::write(&damaged, content).unwrap();
     succeed(xtask().arg("merge").args(&trained).arg("--out").arg(&run));
-    // A merge that died goes on, and does nothing again.
+    // A merge that died continues, and does nothing twice.
     std::fs::rename(run.join("chains/s1-alpha-15"), run.join("chains/s1-alpha-15.partial")).unwrap();
     std::fs::remove_file(run.join("chains/s1-alpha-15.partial/sha256sums")).unwrap();
     sums::unlist(&run, &["chains/s1-alpha-15/sha256sums"]).unwrap();
@@ -210,7 +210,7 @@ fn shards_of_trainings_and_of_drives_come_to_the_bytes_of_one_machine() {
     let stages = [first, second, third].map(|shard| shard.join("drives/unseen"));
     refused(&["merge"], &stages.each_ref().map(PathBuf::as_path), "this is a stage of a shard");
     refused(&["reproduce", "--shard", "1/3", "--overwrite", "--out", &out, "--networks"], &[&run], "lies there");
-    // Stopped before its end, it goes on.
+    // Stopped before its end, it continues.
     sums::unlist(second, &["finished.toml", "drives/smoothed/sha256sums"]).unwrap();
     std::fs::remove_dir_all(second.join("drives/smoothed")).unwrap();
     refused(&["merge"], &[first, second, third], "shard 2/3 is not finished");
@@ -322,7 +322,7 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
     assert!(last.contains("Made by `cargo xtask scaling --preset smoke") && last.contains(&table), "{last}");
     assert!(last.contains("](pictures/results/scaling-2.svg)"), "each plot has a file of its own: {last}");
     assert!(["scaling.svg", "scaling-2.svg"].iter().all(|plot| folder.join("pictures/results").join(plot).is_file()));
-    refused(&["render", "results"], &[&folder.join("nowhere")], "nowhere: this is no finished run of reproduce or of");
+    refused(&["render", "results"], &[&folder.join("nowhere")], "nowhere: this is not a finished run of reproduce or");
     // And as a page of its own.
     let own = folder.join("results-scaling.md");
     succeed(xtask().args(["render", "results", &out_name, "--to"]).arg(&own));

@@ -1,4 +1,4 @@
-//! What docs/cluster.md promises: shards of an evaluation come to the same bytes as one machine, or to one clear error.
+//! What docs/cluster.md promises: shards of an evaluation give the same bytes as one machine, or one clear error.
 
 use crate::bench::{root, scratch, succeed, text, xtask};
 use crate::determinism::files;
@@ -23,7 +23,7 @@ fn refused(shards: &[&Path], part: &str) {
     assert!(!folder.exists(), "a refused merge leaves {}", folder.display());
 }
 
-/// Writes a file of a run anew, and its digest as well.
+/// Writes a file of a run again, and its digest as well.
 fn forge(run: &Path, name: &str, change: impl Fn(&str) -> String) {
     let content = std::fs::read_to_string(run.join(name)).unwrap();
     let changed = change(&content);
@@ -70,8 +70,8 @@ fn three_shards_merge_to_the_bytes_of_one_machine_and_nothing_else_merges() {
 
     refused(&[one, three], "missing: shard 2/3");
     refused(&[one, two, two, three], "are both shard 2/3");
-    refused(&[one, two, &run], "this is no shard");
-    refused(&[one, two, &folder], "this is no run");
+    refused(&[one, two, &run], "this is not a shard");
+    refused(&[one, two, &folder], "this is not a run");
 
     let other = folder.join("other");
     copy(three, &other);
@@ -94,7 +94,7 @@ fn three_shards_merge_to_the_bytes_of_one_machine_and_nothing_else_merges() {
     copy(three, &other);
     sums::unlist(&other, &["finished.toml"]).unwrap();
     refused(&[one, two, &other], "shard 3/3 is not finished");
-    // It goes on as any evaluation does, and what a process left that died just before is gone.
+    // It continues as any evaluation does, and what a process that died just before left is gone.
     std::fs::write(other.join("driving.unfinished"), "").unwrap();
     succeed(xtask().args(["evaluate", "--resume"]).arg(&other));
     assert!(!other.join("driving.unfinished").exists());
@@ -136,7 +136,7 @@ fn evaluations_of_two_drivers_merge_to_the_bytes_of_one_and_others_do_not() {
     refused(&[&tentacle, &other], "runs.jsonl");
     copy(&cvm, &other);
     sums::unlist(&other, &["finished.toml"]).unwrap();
-    refused(&[&tentacle, &other], "not finished; go on with: cargo xtask evaluate --resume");
+    refused(&[&tentacle, &other], "not finished; continue with: cargo xtask evaluate --resume");
 }
 
 #[test]
@@ -159,14 +159,14 @@ fn what_was_merged_merges_again_and_is_compared_with_whom_one_likes() {
     let printed = text(&merge([&two, &vvf], "vvf", &three)).0;
     assert!(printed.contains("Compared with vvf") && printed.contains("tentacle"), "{printed}");
     let (_, error) = text(&merge([&tentacle, &cvm], "expert", &folder.join("none")));
-    assert!(error.contains("--compare-with expert: is none of the drivers; name one of tentacle, cvm"), "{error}");
+    assert!(error.contains("--compare-with expert: is not one of the drivers; name one of tentacle, cvm"), "{error}");
 
     refused(&[&tentacle, &of("vvf", &["--seed", "2"], "seed")], "another choice of lots, trials, noise or smoothing");
     let other_car = ["--set", "episode.vehicle.dead_time_s=0.5"];
     refused(&[&tentacle, &of("vvf", &other_car, "car")], "another car, sensor or metrics");
     let shard = of("vvf", &["--shard", "1/2"], "shard");
     refused(&[&tentacle, &shard], "a shard among whole evaluations");
-    refused(&[&shard, &tentacle], "this is no shard");
+    refused(&[&shard, &tentacle], "this is not a shard");
     let other_expert = ["--set", "expert.horizon_m=10"];
     refused(&[&of("expert", &[], "expert"), &of("dwa", &other_expert, "dwa")], "another expert");
     let merged = merge([&tentacle, &of("apf", &other_expert, "apf")], "apf", &folder.join("no-expert"));
@@ -264,7 +264,7 @@ fn the_scripts_for_slurm_and_kubernetes_drive_their_shards_and_go_on() {
         };
         shard(0);
         shard(1);
-        // Begun again: a shard that was stopped goes on, and one that is done is left alone.
+        // Begun again: a shard that was stopped continues, and one that is done is left alone.
         sums::unlist(&folder.join("shards/1"), &["finished.toml"]).unwrap();
         std::fs::remove_file(folder.join("shards/1/finished.toml")).unwrap();
         shard(0);

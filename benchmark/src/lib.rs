@@ -28,7 +28,7 @@ pub struct Figure {
     pub median: f64,
     /// The least and the largest measurement.
     pub range: (f64, f64),
-    /// Of all three.
+    /// The unit of all three.
     pub unit: &'static str,
     /// What it should be.
     pub goal: Option<Goal>,
@@ -65,12 +65,12 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// For docs/performance.md: about twenty minutes on two cores.
+    /// The effort for docs/performance.md: about twenty minutes on two cores.
     pub fn full() -> Self {
         Self { repeats: 5, at_least: Duration::from_secs(2), training_steps: 5000 }
     }
 
-    /// For a look: about two minutes.
+    /// The effort for a quick look: about two minutes.
     pub fn quick() -> Self {
         Self { repeats: 3, at_least: Duration::from_millis(500), training_steps: 500 }
     }
@@ -127,7 +127,7 @@ fn now() -> Instant {
     Instant::now()
 }
 
-/// Runs on a pool of so many threads.
+/// Runs on a pool of this many threads.
 fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
     pool.install(work)

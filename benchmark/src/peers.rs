@@ -7,7 +7,7 @@ use std::process::Command;
 /// A program in `peers/`, what it needs and how it is called.
 #[derive(Debug, Clone, Copy)]
 pub struct Peer {
-    /// In tables.
+    /// Its name in tables.
     pub name: &'static str,
     /// Packages of PyPI.
     pub packages: &'static [&'static str],

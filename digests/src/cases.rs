@@ -19,11 +19,11 @@ use std::sync::Arc;
 /// Lots of every family whose files are digested; the first is driven.
 const LOTS_PER_FAMILY: u64 = 3;
 
-/// Where and how is driven.
+/// Where and how to drive.
 #[derive(Debug, Clone)]
 pub struct Scene {
     name: String,
-    /// With its noise.
+    /// Its settings, noise included.
     pub settings: Arc<EpisodeSettings>,
     map: Arc<Map>,
 }

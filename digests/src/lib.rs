@@ -20,9 +20,9 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Goldens {
-    /// Of the files of generated lots, by name.
+    /// Digests of the files of generated lots, by name.
     pub lots: BTreeMap<String, String>,
-    /// Of episodes, by case.
+    /// Digests of episodes, by case.
     pub episodes: BTreeMap<String, Golden>,
 }
 
@@ -44,7 +44,7 @@ impl Goldens {
     /// Those of `tests/goldens.toml`, as they were when this was compiled.
     ///
     /// # Errors
-    /// If that is no file of goldens.
+    /// If that is not a file of goldens.
     pub fn kept() -> Result<Self, toml::de::Error> {
         toml::from_str(include_str!("../../tests/goldens.toml"))
     }
@@ -69,7 +69,7 @@ impl Goldens {
 }
 
 impl Golden {
-    /// In the order of the loop: what changes first is the cause.
+    /// The layers in the order of the loop: the one that changes first is the cause.
     fn layers(&self) -> [(&'static str, &str); 4] {
         [
             ("observations", &self.observations),

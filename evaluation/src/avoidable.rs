@@ -1,5 +1,5 @@
 //! How many near-collisions of an evaluation are avoided if one thing is replaced by the truth: its runs with a
-//! near-collision are driven again, and from before each one it is driven on with every [`Substitution`].
+//! near-collision are driven again, and from before each one the car is driven on with every [`Substitution`].
 
 use crate::evaluate::BATCH;
 use crate::monitor::{Incident, IncidentMonitor};
@@ -32,7 +32,7 @@ pub struct Row {
     pub replaced: String,
     /// Near-collisions that were tried.
     pub near_collisions: u32,
-    /// Of these, how many places are passed then.
+    /// How many of their places are passed then.
     pub passed: u32,
 }
 
@@ -113,7 +113,7 @@ fn read(folder: &Path, lots: &[Lot], drivers: &[String]) -> anyhow::Result<Vec<F
         if !drivers.is_empty() && !drivers.contains(&driver) {
             return Ok(());
         }
-        let &lot = index.get(lot.as_str()).with_context(|| format!("lot {lot:?} is none of evaluation.lots"))?;
+        let &lot = index.get(lot.as_str()).with_context(|| format!("lot {lot:?} is not in evaluation.lots"))?;
         let known = all.iter().position(|failing| failing.driver == driver && failing.noise == noise);
         let at = if let Some(at) = known {
             at

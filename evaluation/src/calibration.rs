@@ -21,7 +21,7 @@ pub struct AxisCalibration {
 }
 
 impl AxisCalibration {
-    /// Of `(error, predicted σ)` per sample, metres.
+    /// The calibration of `(error, predicted σ)` per sample, metres.
     pub fn of(name: &str, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
         let mut samples: Vec<(f64, f64)> = samples.into_iter().collect();
         samples.sort_by(|a, b| a.1.total_cmp(&b.1));

@@ -62,7 +62,7 @@ impl Verdict {
         }
     }
 
-    /// Of an interval that lies above zero if the paper is right.
+    /// The verdict of an interval that lies above zero if the paper is right.
     fn of(interval: Option<Interval>) -> Self {
         match interval {
             Some(interval) if interval.excludes_zero() && interval.lower > 0.0 => Self::Holds,
@@ -72,7 +72,7 @@ impl Verdict {
     }
 }
 
-/// A conclusion and what became of it.
+/// A conclusion and its verdict.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Statement {
     /// The conclusion, in our words.
@@ -86,7 +86,7 @@ pub struct Statement {
 /// An evaluation that has been driven.
 #[derive(Debug, Clone, Copy)]
 pub struct Driven<'a> {
-    /// What.
+    /// The plan.
     pub plan: &'a Plan<'a>,
     /// Its results.
     pub results: &'a EvaluationResults,
@@ -237,7 +237,7 @@ impl Against<'_> {
         let Totals { reference_m, .. } = self.totals(self.dagger);
         let all = self.trainings_of(&self.dagger);
         let near_collisions: u32 = all.iter().map(|&driver| self.totals(driver).near_collisions).sum();
-        // Trainings that drove the same lots are no further metres.
+        // Trainings that drove the same lots add no metres.
         let bound = 100.0 * upper_bound(near_collisions, CONFIDENCE) / reference_m.max(f64::MIN_POSITIVE);
         let verdict = match near_collisions {
             0 if bound <= NONE_PER_100M => Verdict::Holds,

@@ -1,5 +1,5 @@
-//! What it does that a preset deviates from the paper: a training per deviation, with that one thing as in the paper and
-//! everything else as it is, then the policies of all on lots that none was trained on.
+//! What the deviations of a preset from the paper do: one training per deviation, with that one thing as in the paper
+//! and everything else as it is, then the policies of all on lots that none was trained on.
 //!
 //! The test `every_deviation_of_the_default_is_listed` holds [`DEVIATIONS`] against both presets.
 

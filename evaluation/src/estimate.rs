@@ -42,7 +42,7 @@ pub fn training(settings: &Settings, has_cloning: bool) -> Vec<Task> {
     tasks
 }
 
-/// An evaluation of so many drivers.
+/// An evaluation of this many drivers.
 pub fn evaluation(settings: &Settings, drivers: usize) -> Task {
     let evaluation = &settings.evaluation;
     let runs = runs(settings, evaluation.trials) * (drivers * evaluation.noise.len()) as f64;

@@ -1,9 +1,9 @@
 //! Drives a plan and writes one line per run and near-collision.
 //!
 //! Runs are driven batch by batch. In a batch every driver meets the same maps, obstacles, noise and starts, one driver
-//! after the other at every noise level; then only a few numbers per run are kept. So memory does not
-//! depend on how many lots there are. What one driver drove of a batch is written at once; an interrupted evaluation goes
-//! on after that.
+//! after the other at every noise level; then only a few numbers per run are kept. So memory does not depend on how
+//! many lots there are. What one driver drove of a batch is written at once; an interrupted evaluation continues after
+//! that.
 
 use crate::incidents;
 use crate::monitor::{Incident, IncidentMonitor};
@@ -35,10 +35,10 @@ pub(crate) const BATCH: usize = 32;
 /// Files that are written line by line.
 pub(crate) const FILES: [&str; 3] = [records::RUNS, records::FAILURES, records::WALL_TIME];
 
-/// What is done there, in the name of the file that says how far it is.
+/// What is done there, as named in the file that says how far it is.
 pub(crate) const DRIVING: &str = "driving";
 
-/// Drives the plan, and writes one line per run and near-collision as they come. Goes on with what an interrupted
+/// Drives the plan, and writes one line per run and near-collision as they come. Continues what an interrupted
 /// evaluation left in the folder, to the same result; a finished one is read back. `None` if cancelled.
 ///
 /// # Errors
@@ -115,7 +115,7 @@ impl<'a> Driving<'a> {
         Ok(Self { plan, lines, results, track, parts: 0, trials: 0 })
     }
 
-    /// Drives a batch, but for what was driven before; `false` if cancelled.
+    /// Drives a batch, except for what was driven before; `false` if cancelled.
     fn drive(&mut self, trials: &[Trial<'_>]) -> anyhow::Result<bool> {
         let plan = self.plan;
         let Settings { evaluation, episode, .. } = plan.settings;
@@ -161,7 +161,7 @@ impl<'a> Driving<'a> {
 /// What one driver drove of a batch at one noise level.
 struct DrivenBatch {
     reports: Vec<EpisodeReport>,
-    /// Of each run, as in `runs.jsonl`.
+    /// The digest of each run, as in `runs.jsonl`.
     sha256: Vec<String>,
     incidents: Vec<Incident>,
     wall_s: f64,
@@ -224,7 +224,7 @@ fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> anyhow::Result<Option
         ControlFlow::Continue(())
     })?;
     let Some(reports) = reports.into_iter().collect::<Option<Vec<EpisodeReport>>>() else { return Ok(None) };
-    // What a driver answered after it had failed is no result.
+    // What a driver answered after it had failed is not a result.
     if track.progress.is_cancelled() {
         return Ok(None);
     }

@@ -30,7 +30,7 @@ impl EvaluationRun {
         let mut manifest = Manifest::read(folder)?;
         ensure!(
             manifest.command == COMMAND,
-            "{name}: this is no shard and no evaluation, but of {}; name the folders that they wrote",
+            "{name}: this is not a shard or an evaluation, but a run of {}; name folders of shards or evaluations",
             manifest.command
         );
         ensure!(
@@ -39,7 +39,7 @@ impl EvaluationRun {
         );
         ensure!(
             manifest::is_finished(folder)?,
-            "{name}: not finished; go on with: cargo xtask {COMMAND} --resume {name}"
+            "{name}: not finished; continue with: cargo xtask {COMMAND} --resume {name}"
         );
         let drivers = manifest.arguments.get("drivers").cloned();
         let drivers = drivers.with_context(|| format!("{name}/manifest.toml: names no drivers"))?;
@@ -48,7 +48,7 @@ impl EvaluationRun {
         Ok(Self { folder: folder.to_owned(), settings: trained::settings_of(folder)?, manifest, drivers })
     }
 
-    /// Refuses what was driven otherwise.
+    /// Refuses what was driven differently.
     fn check_is_comparable_with(&self, first: &Self) -> anyhow::Result<()> {
         let (own, others) = (&self.settings, &first.settings);
         let has_expert = |run: &Self| run.drivers.contains(&DriverSpec::Expert);
@@ -96,8 +96,8 @@ impl Evaluations {
     /// Reads the manifests of some folders, at least one.
     ///
     /// # Errors
-    /// If one is no finished evaluation or a shard, two have other trials, settings of driving or versions, or a driver is
-    /// in two of them.
+    /// If one is a shard or not a finished evaluation, two differ in trials, settings of driving or versions, or a
+    /// driver is in two of them.
     pub fn read(folders: &[PathBuf]) -> anyhow::Result<Self> {
         let runs = folders.iter().map(|folder| EvaluationRun::read(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         for (at, run) in runs.iter().enumerate() {

@@ -32,7 +32,7 @@ pub const CORNER_DEG: f32 = 30.0;
 /// Free width is measured up to here on either side, metres.
 const WIDTH_MAX_M: f32 = 5.0;
 
-/// Why.
+/// Why a near-collision happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
@@ -110,7 +110,7 @@ impl Findings {
 /// Cause and findings of every incident of a batch.
 ///
 /// # Errors
-/// Where the driver answers with what is no finite number on the way: names the key to replay.
+/// If an answer of the driver on the way is not finite; the error names the key to replay.
 pub fn explain(batch: &TrialBatch<'_>, incidents: &[Incident]) -> anyhow::Result<Vec<(Cause, Findings)>> {
     let is_noisy = |incident: &Incident| {
         let map = &batch.maps[incident.episode];

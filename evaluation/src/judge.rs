@@ -42,10 +42,10 @@ pub struct Comparison {
 }
 
 impl EvaluationResults {
-    /// How the drivers stand in a slice at a noise level, and how they compare with one of them. Resampled is what is
-    /// independent (docs/methods.md 8.3): of fixed lots whole trials, both ways, for they share their obstacles; of generated
-    /// lots, which are a sample themselves, whole lots within their kind, and so of six or more lots from files where they are
-    /// pooled (chosen). Only runs that all drivers have driven count.
+    /// How the drivers stand in a slice at a noise level, and how they compare with one of them. What is independent is
+    /// resampled (docs/methods.md 8.3): whole trials of fixed lots, both ways, because they share their obstacles;
+    /// whole lots within their kind of generated lots, which are a sample themselves, and also of six or more lots from
+    /// files where they are pooled (chosen). Only runs that all drivers have driven count.
     pub fn judge(
         &self,
         level: usize,
@@ -137,13 +137,14 @@ pub(crate) fn strata(pairs: &[Vec<RunSummary>], is_pooled: bool) -> Vec<Stratum<
     strata.into_values().collect()
 }
 
-/// Resampled of every driver: near-collisions per 100 m, safe ratio, steering reversals per 100 m driven.
+/// Statistics that are resampled for every driver: near-collisions per 100 m, safe ratio, steering reversals per 100 m
+/// driven.
 const STATISTICS: usize = 3;
 /// Sums per driver that they are made of, behind the runs and the hundreds of metres that all share.
 const COLUMNS: usize = 4;
 const SHARED: usize = 2;
 
-/// The statistics of every driver, then their differences of every other driver from `with`. `None` if nothing varies
+/// The statistics of every driver, then the differences of every other driver from `with`. `None` if nothing varies
 /// because every stratum has a single cluster.
 fn bootstrap(strata: &[Stratum<'_>], others: &[usize], with: usize, seed: RootSeed) -> Option<Vec<Interval>> {
     let drivers = strata[0][0][0].len();

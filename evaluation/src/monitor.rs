@@ -1,4 +1,4 @@
-//! Watches episodes as they are driven, and keeps what is needed to explain a near-collision: how the car came to it.
+//! Watches episodes as they are driven, and keeps what is needed to explain a near-collision: how the car got there.
 
 use sim::episode::EpisodeSettings;
 use sim::frame::{Event, Frame};
@@ -7,7 +7,7 @@ use sim::metrics::steering_reversals;
 use sim::vehicle::VehicleState;
 use std::collections::VecDeque;
 
-/// From how long before a near-collision it can be driven on differently, seconds, the longest first (chosen).
+/// How long before a near-collision the driving can be changed, seconds, the longest first (chosen).
 pub const LOOK_BACKS_S: [f32; 7] = [24.0, 12.0, 6.0, 3.0, 2.0, 1.0, 0.5];
 /// The one of [`LOOK_BACKS_S`] that decides what a near-collision hangs on: 6 s are about the 8 m in which the place comes
 /// into view.
@@ -43,7 +43,7 @@ pub struct Incident {
     pub reversals_before: u32,
     /// Route since the car was last put back on it, metres; `None` before the first time.
     pub since_resume_m: Option<f32>,
-    /// At each of [`LOOK_BACKS_S`], but not before the last resume or the start: then it is that.
+    /// The state at each of [`LOOK_BACKS_S`], but no earlier than the last resume or the start.
     pub before: [Before; LOOK_BACKS_S.len()],
 }
 
@@ -58,7 +58,7 @@ pub struct IncidentMonitor {
 }
 
 impl IncidentMonitor {
-    /// Over so many episodes.
+    /// A monitor of this many episodes.
     pub fn new(episodes: usize, episode: &EpisodeSettings) -> Self {
         let control_period_s = episode.control_period_s();
         let kept = ticks(LOOK_BACKS_S[0], control_period_s) + 1;

@@ -43,9 +43,9 @@ pub struct OnPolicy {
 /// How large errors are where the network says how large they will be.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
-    /// Whose.
+    /// Name of the policy.
     pub policy: String,
-    /// In which states.
+    /// The kind of states.
     pub states: States,
     /// `across` or `along`.
     pub axis: String,
@@ -70,7 +70,7 @@ pub enum States {
 /// Σ τ̂ of two policies of the same iteration, trained with and without the weight α τ̂.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Effect {
-    /// Which.
+    /// The iteration.
     pub iteration: u32,
     /// Ratio on the held-back samples of both data sets so far; resampled in stretches of a validation block. Of the first
     /// seed.
@@ -83,7 +83,7 @@ pub struct Effect {
 }
 
 impl OnPolicy {
-    /// Of a finished stage.
+    /// Reads what a finished stage found.
     ///
     /// # Errors
     /// If its file cannot be read.
@@ -246,7 +246,7 @@ impl<'a> Drives<'a> {
         goes_on
     }
 
-    /// Of the policy in a folder; `None` if cancelled.
+    /// What the policy in a folder collected; `None` if cancelled.
     fn of(&mut self, folder: &Path) -> anyhow::Result<Option<&Collected>> {
         if !self.says(&folder.display().to_string()) {
             return Ok(None);

@@ -75,7 +75,7 @@ pub const LOTS: [PaperLot; 3] = [
         is_trained_on: false,
         results: [
             result([0.0, 0.0], [0, 0], 0.91),
-            // 1.15 is no multiple of 1/7.45: 8 or 9.
+            // 1.15 is not a multiple of 1/7.45: 8 or 9.
             result([1.47, 1.15], [11, 9], 0.81),
             result([1.07, 0.93], [8, 7], 0.85),
         ],

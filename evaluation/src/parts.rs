@@ -90,7 +90,7 @@ impl Rows {
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, run: &RunDir) -> anyhow::Result<()> {
-        // An evaluation under way would be gone on with, in files that are others now.
+        // An evaluation under way would be continued, in files that have been replaced.
         growing::clear(run.path(), DRIVING)?;
         // That of the runs is listed last: with it, the evaluation counts as driven.
         FILES.into_iter().zip(&self.0).rev().try_for_each(|(name, lines)| run.write(name, lines))

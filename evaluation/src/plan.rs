@@ -11,9 +11,9 @@ use experiment::trials::{Purpose, Trial};
 pub struct Plan<'a> {
     /// The section `evaluation` says which trials; `episode` and `training` what is driven with, and what was trained on.
     pub settings: &'a Settings,
-    /// By whom.
+    /// The drivers.
     pub drivers: &'a [NamedDriver],
-    /// Where.
+    /// The lots.
     pub lots: &'a [Lot],
     /// The driver the others are compared with, an index of `drivers`.
     pub compare_with: usize,

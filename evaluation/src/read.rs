@@ -56,7 +56,7 @@ pub(crate) struct Place {
 /// Finds the places of lines in a plan.
 pub(crate) struct Places<'a> {
     plan: &'a Plan<'a>,
-    /// Of the plan, in order.
+    /// The trials of the plan, in order.
     pub(crate) trials: Vec<Trial<'a>>,
     index_of: BTreeMap<(String, Direction, u32), usize>,
 }

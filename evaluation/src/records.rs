@@ -30,9 +30,9 @@ pub struct Driven {
     pub schema: u32,
     /// Who drove, as named in tables.
     pub driver: String,
-    /// Where.
+    /// The lot.
     pub lot: String,
-    /// Which way.
+    /// The direction of the drive.
     pub direction: Direction,
     /// Which trial of the lot, from 0.
     pub trial: u32,
@@ -52,7 +52,7 @@ pub struct RunRecord {
     pub mean_speed_mps: f32,
     /// Replays it: [`ReplayKey`].
     pub replay: String,
-    /// Of everything seen, decided and driven: [`DriveDigest`](experiment::drive_digest::DriveDigest).
+    /// Digest of everything seen, decided and driven: [`DriveDigest`](experiment::drive_digest::DriveDigest).
     pub sha256: String,
     /// How it ended, its metrics and its events.
     #[serde(flatten)]
@@ -60,7 +60,7 @@ pub struct RunRecord {
 }
 
 impl RunRecord {
-    /// Of a finished run.
+    /// The line of a finished run.
     pub fn new(driven: Driven, replay: &ReplayKey, sha256: &str, report: &EpisodeReport) -> Self {
         Self {
             driven,
@@ -79,7 +79,7 @@ pub struct FailureRecord {
     /// Who drove where.
     #[serde(flatten)]
     pub driven: Driven,
-    /// When: the control tick, from 0.
+    /// The control tick, from 0.
     pub tick: u32,
     /// Where along the route, metres.
     pub route_m: f32,
@@ -91,7 +91,7 @@ pub struct FailureRecord {
     pub heading_deg: f32,
     /// Speed at the last observation, m/s.
     pub speed_mps: f32,
-    /// Why.
+    /// Its cause.
     pub cause: Cause,
     /// What the rules found.
     #[serde(flatten)]

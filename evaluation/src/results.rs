@@ -29,13 +29,13 @@ pub(crate) struct RunSummary {
 /// One driver at one noise level.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct DriverResults {
-    /// In the order of the trials.
+    /// The runs in the order of the trials.
     pub(crate) runs: Vec<RunSummary>,
-    /// By group and direction.
+    /// Sums by group and direction.
     totals: BTreeMap<(u32, Direction), Totals>,
-    /// By group.
+    /// Near-collisions by group and cause.
     causes: BTreeMap<(u32, Cause), u32>,
-    /// By group: near-collisions at the place of the one before.
+    /// Near-collisions at the place of the one before, by group.
     again: BTreeMap<u32, u32>,
 }
 
@@ -43,9 +43,9 @@ pub(crate) struct DriverResults {
 #[derive(Debug)]
 pub struct EvaluationResults {
     groups: Vec<LotGroup>,
-    /// By name.
+    /// The lots by name.
     lots: BTreeMap<String, Place>,
-    /// By noise level, then by driver.
+    /// Results by noise level, then by driver.
     pub(crate) drivers: Vec<Vec<DriverResults>>,
 }
 

@@ -1,8 +1,9 @@
 //! The `DAgger` family in one trainer: a training per decision rule and seed, at equal samples, lots and optimiser steps,
 //! then one evaluation of all policies on lots that none was trained on (docs/methods.md 5).
 //!
-//! Rules differ in who drives while data are collected, and in nothing else, but for those of an ensemble: that trains three
-//! networks and drives with their mean. Behaviour cloning is the same for all rules of a seed and is trained once.
+//! Rules differ in who drives while data are collected, and in nothing else, except for those of an ensemble: that
+//! trains three networks and drives with their mean. Behaviour cloning is the same for all rules of a seed and is
+//! trained once.
 
 use crate::stages::{Stage, Step};
 use experiment::settings::Settings;

@@ -23,30 +23,30 @@ pub struct ShardRecord {
     pub number: Shard,
     /// SHA-256 of the settings.
     pub settings_sha256: String,
-    /// Of an evaluation the trials, `LOT@DIRECTION@TRIAL`: every driver drives each of them at every noise level. Of a
-    /// reproduction the folders of its stages.
+    /// The trials of an evaluation, `LOT@DIRECTION@TRIAL`: every driver drives each of them at every noise level. The
+    /// folders of the stages of a reproduction.
     pub keys: Vec<String>,
-    /// Of a reproduction whose networks are trained: its folder.
+    /// The folder of a reproduction whose networks are trained.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub networks: Option<PathBuf>,
 }
 
 impl ShardRecord {
-    /// Of a plan; `None` if it is to be driven whole.
+    /// The record of a plan; `None` if it is to be driven whole.
     pub fn of(plan: &Plan<'_>) -> Option<Self> {
         let keys = || plan.trials().map(|trial| parts::key(&trial)).collect();
         let settings_sha256 = || digest(plan.settings);
         plan.shard.map(|number| Self { number, settings_sha256: settings_sha256(), keys: keys(), networks: None })
     }
 
-    /// Of a reproduction: of its trainings, or of what the networks in a folder drive.
+    /// The record of a reproduction: of its trainings, or of what the networks in a folder drive.
     pub fn of_stages(number: Shard, networks: Option<PathBuf>, settings: &Settings, stages: Vec<Stage>) -> Self {
         let mut record = Self { number, settings_sha256: digest(settings), keys: Vec::new(), networks };
         record.keys = record.share_of(stages).into_iter().map(|stage| stage.folder).collect();
         record
     }
 
-    /// Those of the stages of a reproduction that the shard does.
+    /// The stages of a reproduction that the shard does.
     pub fn share_of(&self, stages: Vec<Stage>) -> Vec<Stage> {
         let part = if self.networks.is_some() { stages::Part::Drives } else { stages::Part::Trainings };
         stages::share(stages, part, self.number)
@@ -74,7 +74,7 @@ fn digest(settings: &Settings) -> String {
 /// Whether a folder is that of a shard, finished or not.
 ///
 /// # Errors
-/// If it is no run, or its manifest is damaged.
+/// If it is not a run, or its manifest is damaged.
 pub fn is_shard(folder: &Path) -> anyhow::Result<bool> {
     ensure_is_run(folder)?;
     Ok(Manifest::read(folder)?.arguments.contains_key(ARGUMENT))
@@ -84,7 +84,7 @@ pub(crate) fn ensure_is_run(folder: &Path) -> anyhow::Result<()> {
     let name = folder.display();
     ensure!(
         sums::exists(folder)?,
-        "{name}: this is no run; name the folders that evaluate, or a command with --shard, wrote"
+        "{name}: this is not a run; name the folders that evaluate, or a command with --shard, wrote"
     );
     Ok(())
 }
@@ -106,10 +106,10 @@ impl ShardRun {
         let mut manifest = Manifest::read(folder)?;
         let record = ShardRecord::take_from(&mut manifest).with_context(|| name.to_string())?;
         let record = record
-            .with_context(|| format!("{name}: this is no shard; name the folders that a command with --shard wrote"))?;
+            .with_context(|| format!("{name}: this is not a shard; name folders that a command with --shard wrote"))?;
         ensure!(
             manifest::is_finished(folder)?,
-            "{name}: shard {} is not finished; go on with: cargo xtask {} --resume {name}",
+            "{name}: shard {} is not finished; continue with: cargo xtask {} --resume {name}",
             record.number,
             manifest.command
         );
@@ -157,7 +157,7 @@ impl Shards {
     /// Reads the manifests of some folders.
     ///
     /// # Errors
-    /// If one is no finished shard, they are not of one whole, or a shard is missing or there twice.
+    /// If one is not a finished shard, they are not of one whole, or a shard is missing or there twice.
     pub fn read(folders: &[PathBuf]) -> anyhow::Result<Self> {
         let mut runs = folders.iter().map(|folder| ShardRun::read(folder)).collect::<anyhow::Result<Vec<_>>>()?;
         runs.sort_by_key(|run| run.record.number);
@@ -192,7 +192,7 @@ impl Shards {
         &self.runs[0].settings
     }
 
-    /// The manifest of all of them, but for what tells them apart.
+    /// The manifest of all of them, except for what tells them apart.
     pub fn manifest(&self) -> &Manifest {
         &self.runs[0].manifest
     }
@@ -222,7 +222,7 @@ impl Shards {
             && manifest.git_revision.iter().all(|revision| own.git_revision.iter().all(|other| revision == other));
         ensure!(
             is_theirs,
-            "{}: its settings, lots or version of lotpilot are not those of the shards, so that they are no part of it; \
+            "{}: its settings, lots or version of lotpilot are not those of the shards, so they are not part of it; \
              {remedy}",
             run.display()
         );

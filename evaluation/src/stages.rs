@@ -52,7 +52,7 @@ pub struct Stage {
     pub folder: String,
     /// What it does, for people.
     pub about: String,
-    /// With which settings.
+    /// Its settings.
     pub settings: Settings,
     /// The step itself.
     pub step: Step,
@@ -243,8 +243,8 @@ pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     stages
 }
 
-/// The stages without the trainings whose folders are not there, and without who would drive as one of them: an earlier
-/// version did not do all of what this one does.
+/// The stages without the trainings whose folders are missing, and without the drivers that depend on them: an earlier
+/// version did not do all that this one does.
 pub fn without_trainings(stages: Vec<Stage>, is_there: impl Fn(&str) -> bool) -> Vec<Stage> {
     let is_missing = |stage: &&Stage| matches!(stage.step, Step::Train { .. }) && !is_there(&stage.folder);
     let missing: Vec<String> = stages.iter().filter(is_missing).map(|stage| stage.folder.clone()).collect();
@@ -286,7 +286,7 @@ pub fn share(stages: Vec<Stage>, part: Part, shard: Shard) -> Vec<Stage> {
             let folders: Vec<String> = taken.iter().map(|stage| stage.folder.clone()).collect();
             let with_its_cloning = |mut stage: Stage| {
                 if let Step::Train { cloning_of, .. } = &mut stage.step {
-                    // It comes to the same weights wherever it is trained.
+                    // Its weights are the same wherever it is trained.
                     cloning_of.take_if(|chain| !folders.contains(chain));
                 }
                 stage
@@ -475,7 +475,7 @@ mod tests {
         assert!(of_paper.iter().all(|stage| !stage.folder.contains("far-points")), "its points are far anyway");
     }
 
-    /// `render results` of a run that an earlier version finished said that a chain of it is no run.
+    /// `render results` of a run that an earlier version finished said that one of its chains is not a run.
     #[test]
     fn what_an_earlier_version_did_not_train_is_left_out() {
         let settings = Settings::preset("default").unwrap();

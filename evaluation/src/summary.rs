@@ -217,7 +217,7 @@ pub struct CauseRow {
     pub noise: NoiseChoice,
     /// Where: the label of a slice.
     pub lots: String,
-    /// Why.
+    /// Its cause.
     pub cause: Cause,
     /// Near-collisions.
     pub near_collisions: u32,
@@ -230,11 +230,11 @@ pub struct Judged {
     pub level: usize,
     /// The lots.
     pub slice: Slice,
-    /// By driver.
+    /// Estimates by driver.
     pub estimates: Vec<DriverEstimate>,
     /// Every other driver against `compare_with`.
     pub comparisons: Vec<Comparison>,
-    /// By team.
+    /// Estimates by team.
     pub teams: Vec<TeamEstimate>,
 }
 
@@ -284,7 +284,7 @@ impl<'a> Summary<'a> {
         self.teams.iter().enumerate().flat_map(of_team)
     }
 
-    /// What each training of a team comes to in a slice.
+    /// The result of each training of a team in a slice.
     pub fn of_team(&self, team: &Team, judged: &Judged) -> Vec<Totals> {
         team.drivers.iter().map(|&driver| self.results.totals(judged.level, driver, &judged.slice, None)).collect()
     }
@@ -366,7 +366,7 @@ impl<'a> Summary<'a> {
 
     fn row(&self, driver: usize, judged: &Judged, direction: &str, totals: &Totals) -> Row {
         let rate = totals.rate();
-        // Resampled and weighed is only the whole.
+        // Only the whole is resampled and weighed.
         let is_whole = direction == "both";
         let estimate = if is_whole { judged.estimates[driver].clone() } else { DriverEstimate::default() };
         let unweighted = (is_whole && judged.slice.is_pooled())

@@ -21,12 +21,12 @@ pub struct Table1 {
     pub rows: Vec<IterationRow>,
     /// Why it ended.
     pub stop: Stop,
-    /// The paper's.
+    /// The paper's table.
     pub paper: IterationsOfPaper,
 }
 
 impl Table1 {
-    /// Of finished rounds.
+    /// The table of finished rounds.
     pub fn new(rows: Vec<IterationRow>, stop: Stop) -> Self {
         Self { schema: SCHEMA, rows, stop, paper: TABLE_1 }
     }

@@ -14,7 +14,7 @@ use sim::seed::RootSeed;
 /// Fewer trainings say nothing about others (chosen).
 pub const TRAININGS_MIN: usize = 3;
 
-/// Drivers that were trained alike but for the seed, or a single other one.
+/// Drivers that were trained alike except for the seed, or a single other one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Team {
     /// The name of the first.
@@ -127,7 +127,7 @@ impl EvaluationResults {
         }
         let by_seed = |team: &Team| -> Vec<f64> { team.drivers.iter().map(|&driver| per_100m(&all, driver)).collect() };
         let of_with = by_seed(&teams[with]);
-        // No draw of lots without events has any. Trainings that drove the same lots are no further metres.
+        // No draw of lots without events has any. Trainings that drove the same lots add no metres.
         let supported = Rate::new(0, all[drivers]).upper;
         let estimate = |(team, (&rate, &difference)): (&Team, (&Interval, &Interval))| {
             let own = by_seed(team);
@@ -147,7 +147,7 @@ impl EvaluationResults {
     }
 }
 
-/// Of every cluster the near-collisions of each driver, and the hundreds of metres that all share.
+/// The near-collisions of each driver in every cluster, and the hundreds of metres that all share.
 fn units(strata: &[Stratum<'_>], drivers: usize) -> Units {
     let mut units = Units::new(drivers + 1);
     let mut sums = vec![0.0; drivers + 1];

@@ -32,7 +32,8 @@ const FINALISTS: usize = 4;
 
 /// Tunes planners one after another and writes `NAME.toml` for each as it is found. Lots, trials, directions, noise and
 /// seed are those of the section `evaluation`. Ends early if cancelled: what is returned is what was found by then. What
-/// every candidate did is kept in `NAME.candidates.toml`: an interrupted search goes on from there, to the same result.
+/// every candidate did is kept in `NAME.candidates.toml`: an interrupted search continues from there, to the same
+/// result.
 ///
 /// # Errors
 /// If a lot is not for training or cannot be driven, or a file cannot be written.
@@ -121,9 +122,9 @@ struct Course<'a> {
     episode: &'a EpisodeSettings,
     noise: NoiseChoice,
     seed: RootSeed,
-    /// Every candidate's.
+    /// What every candidate drives.
     search: Stretch<'a>,
-    /// The finalists'.
+    /// What the finalists drive.
     fresh: Stretch<'a>,
 }
 
@@ -262,7 +263,7 @@ impl Score {
     }
 }
 
-/// To four decimals, for people.
+/// Rounds to four decimals, for people.
 fn round(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }

@@ -1,9 +1,9 @@
-//! What would have happened if one thing had been otherwise: from a state before a near-collision it is driven on, and the
-//! place is passed or not.
+//! What would have happened if one thing had been different: the car is driven on from a state before a near-collision,
+//! and passes the place or does not.
 //!
-//! What is replaced by the truth, one thing at a time ([`Substitution`]), says what a near-collision hangs on. The car is put
-//! into the state that it had; commands on their way to the actuators, smoothed answers and noise that comes and goes are
-//! not those of then, which is why [`Substitution::Nothing`] is tried as well.
+//! What is replaced by the truth, one thing at a time ([`Substitution`]), says what a near-collision hangs on. The car
+//! is put into the state that it had; commands on their way to the actuators, smoothed answers and noise that comes and
+//! goes are not those of that moment, which is why [`Substitution::Nothing`] is tried as well.
 
 use crate::monitor::{Incident, LOOK_BACK, LOOK_BACKS_S};
 use anyhow::anyhow;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 /// How far the car must get beyond the place, metres: its own length (chosen).
 pub const PASS_M: f32 = 5.0;
-/// In which time beyond the look-back, seconds (chosen).
+/// The time that it has for that beyond the look-back, seconds (chosen).
 const PASS_WITHIN_S: f32 = 10.0;
 
 /// What is replaced by the truth.
@@ -46,7 +46,7 @@ impl Substitution {
         fixed.into_iter().chain((0..LOOK_BACKS_S.len()).map(Self::Expert)).collect()
     }
 
-    /// In tables.
+    /// Its name in tables.
     pub fn name(self) -> String {
         match self {
             Self::Nothing => "nothing".to_owned(),
@@ -76,7 +76,7 @@ pub struct Substitutes {
 }
 
 impl Substitutes {
-    /// Of a driver, under the settings of its evaluation.
+    /// The substitutes for a driver, under the settings of its evaluation.
     pub fn new(driver: &NamedDriver, settings: &Settings) -> Self {
         let mut no_dead_time = settings.episode.clone();
         no_dead_time.vehicle.dead_time_s = 0.0;
@@ -91,7 +91,7 @@ impl Substitutes {
     /// Whether each incident of a batch is passed with this replaced.
     ///
     /// # Errors
-    /// As [`passes`].
+    /// See [`passes`].
     pub fn passes(
         &self,
         batch: &TrialBatch<'_>,
@@ -116,7 +116,7 @@ impl Substitutes {
 /// gets [`PASS_M`] beyond the place without a near-collision and without getting stuck.
 ///
 /// # Errors
-/// Where the driver answers with what is no finite number on the way: names the key of the near-collision.
+/// If an answer of the driver on the way is not finite; the error names the key of the near-collision.
 pub fn passes(batch: &TrialBatch<'_>, incidents: &[Incident], look_back: usize) -> anyhow::Result<Vec<bool>> {
     // As many at a time as in the evaluation itself: memory does not depend on how often a driver fails.
     let at_once = incidents.chunks(batch.trials.len()).map(|incidents| passes_at_once(batch, incidents, look_back));
@@ -147,7 +147,7 @@ fn passes_at_once(batch: &TrialBatch<'_>, incidents: &[Incident], look_back: usi
     driven.map_err(|found| {
         let incident = &incidents[found.episode];
         let key = batch.replay_key(&batch.trials[incident.episode], incident.tick);
-        anyhow!("{key}: driven on from before that, {} is no finite number", found.what)
+        anyhow!("{key}: driven on from before that, {} is not a finite number", found.what)
     })?;
     Ok(verdicts.into_iter().map(|verdict| verdict == Some(true)).collect())
 }

@@ -48,11 +48,11 @@ impl TrialBatch<'_> {
     /// Drives every trial to its end, or until the observer breaks; `None` marks trials that had not ended by then.
     ///
     /// # Errors
-    /// Where the driver answers with what is no finite number: names the key to replay.
+    /// If an answer of the driver is not finite; the error names the key to replay.
     pub fn drive(&self, observer: Observer<'_>) -> anyhow::Result<Vec<Option<EpisodeReport>>> {
         self.drive_from(self.episodes().into_iter().enumerate().collect(), observer).map_err(|found| {
             let key = self.replay_key(&self.trials[found.episode], found.tick);
-            anyhow!("{key}: {} is no finite number", found.what)
+            anyhow!("{key}: {} is not a finite number", found.what)
         })
     }
 
@@ -60,7 +60,7 @@ impl TrialBatch<'_> {
     /// called with the index of the episode.
     ///
     /// # Errors
-    /// Where the driver answers with what is no finite number.
+    /// If an answer of the driver is not finite.
     pub fn drive_from(
         &self,
         episodes: Vec<(usize, Episode)>,
@@ -152,10 +152,10 @@ impl Replay {
         drivers::hand(self.trial().episode_seed())
     }
 
-    /// Drives it again to its end: what it came to, and its digest.
+    /// Drives it again to its end; returns its report and its digest.
     ///
     /// # Errors
-    /// As [`TrialBatch::drive`].
+    /// See [`TrialBatch::drive`].
     pub fn again(&self, episode: &EpisodeSettings, driver: &NamedDriver) -> anyhow::Result<(EpisodeReport, String)> {
         let mut digest = DriveDigest::default();
         let report = self.drive(episode, driver, |frame| {
@@ -168,7 +168,7 @@ impl Replay {
     /// Drives it again, until the observer breaks.
     ///
     /// # Errors
-    /// As [`TrialBatch::drive`].
+    /// See [`TrialBatch::drive`].
     pub fn drive(
         &self,
         episode: &EpisodeSettings,

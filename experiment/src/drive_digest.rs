@@ -36,7 +36,7 @@ impl DriveDigest {
         }
     }
 
-    /// Of the frames so far, 64 hexadecimal digits.
+    /// The digest of the frames so far, 64 hexadecimal digits.
     pub fn hex(&self) -> String {
         sums::hex(&self.0.clone().finalize())
     }

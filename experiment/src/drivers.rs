@@ -118,14 +118,14 @@ pub fn settings_of_runs<'s>(specs: &'s [DriverSpec], layers: &Layers) -> anyhow:
 /// A driver that can take the wheel.
 #[derive(Clone)]
 pub struct NamedDriver {
-    /// In tables.
+    /// Its name in tables.
     pub name: String,
     /// As named on the command line, for replay keys.
     pub spec: DriverSpec,
     /// The training of a whole run that it comes from; `None` for any other driver.
     pub training: Option<Training>,
     model: Model,
-    /// Time constant of the action smoothing of who does not smooth by itself, control ticks; 0 = off.
+    /// Time constant of the action smoothing of drivers that do not smooth by themselves, control ticks; 0 = off.
     smoothing_ticks: f32,
     /// What its files say, where it drives with other action smoothing than that.
     digest_of_files: Option<String>,
@@ -292,7 +292,7 @@ impl NamedDriver {
         Ok(())
     }
 
-    /// A planner of its own that can be asked what it weighed; `None` for who is no planner.
+    /// A separate planner that can be asked what it weighed; `None` for drivers that are not planners.
     pub fn to_planner(&self, episode: &EpisodeSettings) -> Option<Planner> {
         match &self.model {
             Model::Planner(planner) => Some(planner.planner(&PlannerContext::of(episode))),

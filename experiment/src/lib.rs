@@ -4,16 +4,16 @@
 //! |---|---|
 //! | [`settings`] | preset → file → overrides, into one checked [`settings::Settings`] |
 //! | [`lots`], [`drivers`] | names of lots and drivers, and what they stand for |
-//! | [`notes`] | what is to be said about lots from files |
+//! | [`notes`] | notes about lots from files |
 //! | [`trials`] | seeds of trials: their obstacles and their noise |
 //! | [`shard`] | a machine's share of the trials |
 //! | [`drive`] | the one loop: a driver on a batch of trials, with an observer of every frame |
 //! | [`drive_digest`] | SHA-256 of a drive: whether two are the same, bit by bit |
 //! | [`replay_key`] | a short text that identifies one run and a tick in it |
 //! | [`training`] | behaviour cloning and DAgger into a run folder |
-//! | [`inputs`] | digests of the files that a run reads, so that it goes on with the same |
+//! | [`inputs`] | digests of the files that a run reads, so that it continues with the same |
 //! | [`run_dir`] | the run folder, and how it is claimed |
-//! | [`manifest`] | what a run says of itself: who made it of what, and what it came to |
+//! | [`manifest`] | what a run says of itself: what made it, from which inputs, and its outcome |
 //! | [`trained`] | the networks that runs have trained |
 //! | [`view_request`] | what the viewer program is asked to record |
 //! | [`progress`] | how long tasks report progress and are cancelled |

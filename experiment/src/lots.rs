@@ -20,7 +20,7 @@ use std::sync::Arc;
 pub struct Lot {
     name: String,
     spec: LotSpec,
-    /// Of a file: read once, so that its errors come before any work.
+    /// The content of a file, read once so that its errors come before any work.
     from_file: Option<Arc<Loaded>>,
 }
 
@@ -37,7 +37,7 @@ pub struct Drawn {
 pub fn specs() -> Vec<(&'static str, String)> {
     let families = format!("{}; all: one of each in turn", Family::list(""));
     [
-        ("lot-a", "the paper's training lot rebuilt: 231 m; obstacles drawn anew for every trial"),
+        ("lot-a", "the paper's training lot rebuilt: 231 m; new obstacles in every trial"),
         ("lot-b", "139 m, the narrowest, never trained on"),
         ("lot-c", "149 m, the widest, never trained on"),
         ("reference", "all three"),
@@ -118,7 +118,7 @@ impl Lot {
         })
     }
 
-    /// What is to be said about a lot from a file.
+    /// Notes about a lot from a file.
     pub fn notes(&self) -> &[Note] {
         self.from_file.as_ref().map_or(&[], |loaded| &loaded.notes)
     }

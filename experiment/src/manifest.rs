@@ -1,4 +1,4 @@
-//! What a run says of itself in its folder: who made it of what, and what it came to.
+//! What a run says of itself in its folder: what made it, from which inputs, and its outcome.
 
 use crate::settings::Settings;
 use anyhow::{Context as _, anyhow, ensure};
@@ -19,7 +19,7 @@ pub(crate) const FINISHED: &str = "finished.toml";
 /// SHA-256 of what is read from elsewhere by name, as on the command line: see [`inputs`](crate::inputs).
 pub type Inputs = BTreeMap<String, String>;
 
-/// What a run was asked for beside its settings, and what it reads from elsewhere.
+/// What a run was asked for besides its settings, and what it reads from elsewhere.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Request {
     /// Arguments of the command.
@@ -36,7 +36,7 @@ pub struct Manifest {
     pub schema: u32,
     /// The name and version of the program.
     pub program: String,
-    /// The command that made it, and alone can go on with it.
+    /// The command that made it, the only one that can continue it.
     pub command: String,
     /// The command line, without the name of the program.
     pub command_line: Vec<String>,
@@ -67,7 +67,7 @@ pub struct Manifest {
     /// The libraries that compute, with their versions: `libm 0.2.16`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub libraries: Vec<String>,
-    /// What was asked for beside the settings.
+    /// What was asked for besides the settings.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     pub arguments: toml::Table,
     /// SHA-256 of what was read from elsewhere.
@@ -78,7 +78,7 @@ pub struct Manifest {
 /// The version of `manifest.toml` that this program writes.
 pub const MANIFEST_SCHEMA: u32 = 3;
 
-/// What a run came to, written last: `finished.toml`.
+/// The outcome of a run, written last: `finished.toml`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Finished {
@@ -220,7 +220,7 @@ impl Manifest {
     }
 }
 
-/// What a run came to; `None` if it is not finished.
+/// The outcome of a run; `None` if it is not finished.
 ///
 /// # Errors
 /// If the file is missing, damaged or of another version.

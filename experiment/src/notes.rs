@@ -1,4 +1,4 @@
-//! What is to be said about lots from files before anything is driven.
+//! Notes about lots from files, to be shown before anything is driven.
 
 use crate::lots::Lot;
 use crate::settings::NoiseChoice;

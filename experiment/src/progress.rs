@@ -1,6 +1,6 @@
 //! How long tasks report progress and are cancelled.
 
-/// Receives progress and says whether to go on. Shared between threads: implementations use interior mutability.
+/// Receives progress and says whether to continue. Shared between threads: implementations use interior mutability.
 ///
 /// Work is a sequence of tasks, one at a time: `begin`, any number of `at`, `end`. A task that is begun while another
 /// runs ends that one without a result.
@@ -29,7 +29,7 @@ pub struct Elapsed {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted: {kept}")]
 pub struct Interrupted {
-    /// What is on disk and how to go on, one sentence.
+    /// What is on disk and how to continue, in one sentence.
     pub kept: String,
 }
 

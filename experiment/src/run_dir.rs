@@ -7,7 +7,7 @@
 //!   round-00/ …        data, network and loss curve of each round (policy::dataset::store)
 //!   table1.md .json    the paper's table from this run
 //!   summary.md .json .csv, comparisons.csv, noise_sweep.csv, runs.jsonl, failures.md .jsonl     (evaluate)
-//!   wall_time.jsonl    the only file that differs from one repetition to the next, but for the manifest
+//!   wall_time.jsonl    the only file that differs from one repetition to the next, except for the manifest
 //!   finished.toml      written last
 //!   sha256sums         the digest of every finished file; it appears with the claim
 //!   .lock              who writes here
@@ -30,12 +30,12 @@ use storage::{sums, whole};
 #[derive(Debug, Clone)]
 pub struct RunDir {
     path: PathBuf,
-    /// The run that this is a folder of, and its path there.
+    /// The run that this folder belongs to, and its path there.
     within: Option<(PathBuf, String)>,
     lock: Arc<Lock>,
     /// What the run, and the one that it is within, were begun with.
     inputs: Arc<Inputs>,
-    /// Of that run, where this folder was reopened by itself.
+    /// The lock of that run, where this folder was reopened by itself.
     _lock_of_run: Option<Arc<Lock>>,
 }
 
@@ -86,20 +86,21 @@ impl RunDir {
     /// Reopens the folder of an interrupted run.
     ///
     /// # Errors
-    /// If there is none, another command made it, it is finished, its settings were changed, or another process is at it.
+    /// If there is none, another command made it, it is finished, its settings were changed, or another process is
+    /// using it.
     pub fn resume(path: &Path, command: &str) -> anyhow::Result<(Self, Settings, Manifest)> {
         ensure!(path.is_dir(), "{}: there is no such run to resume", path.display());
-        // Before the lock, which would leave its file in a folder that is no run.
+        // Before the lock, which would leave its file in a folder that is not a run.
         ensure!(
             sums::exists(path)?,
-            "{0}: nothing was begun there; begin it anew with --out {0}, with --overwrite if it is not empty",
+            "{0}: nothing was begun there; begin it with --out {0}, and with --overwrite if it is not empty",
             path.display()
         );
         let run = Self::locked(path.to_path_buf(), command)?;
         let manifest = Manifest::read(path)?;
         ensure!(
             manifest.command == command,
-            "{}: this is a run of {}; go on with: cargo xtask {1} --resume {0}",
+            "{}: this is a run of {}; continue with: cargo xtask {1} --resume {0}",
             path.display(),
             manifest.command
         );
@@ -111,9 +112,9 @@ impl RunDir {
     /// Reopens the folder of a run, or of a finished stage of one, to write into it, whether it is finished or not.
     ///
     /// # Errors
-    /// If there is none, or another process is at it.
+    /// If there is none, or another process is using it.
     pub fn reopen(path: &Path, command: &str) -> anyhow::Result<Self> {
-        ensure!(sums::exists(path)?, "{}: this is no run; list the folders in runs/", path.display());
+        ensure!(sums::exists(path)?, "{}: this is not a run; list the folders in runs/", path.display());
         let own = Self::locked(path.to_path_buf(), command)?;
         let Some((run, list)) = run_around(path)? else { return Ok(own) };
         let lock = Arc::new(Lock::take(&run, command)?);
@@ -130,7 +131,7 @@ impl RunDir {
         self.stage_for(folder, place, settings, || Ok(Request::default()))
     }
 
-    /// Like [`stage`](Self::stage), with what a new one was asked for beside its settings.
+    /// Like [`stage`](Self::stage), with what a new one was asked for besides its settings.
     ///
     /// # Errors
     /// See [`stage`](Self::stage); or if `request` fails.
@@ -152,7 +153,7 @@ impl RunDir {
             let Manifest { command, inputs, .. } = Manifest::read(&path)?;
             ensure!(
                 command == place.command && Settings::read(&path.join(SETTINGS))? == *settings,
-                "{}: this is another run, not a stage of this one; move it elsewhere, and go on with --resume",
+                "{}: this is another run, not a stage of this one; move it elsewhere, and continue with --resume",
                 path.display()
             );
             let now = request()?.inputs;
@@ -173,7 +174,7 @@ impl RunDir {
             if path.exists() {
                 Self::locked(path.clone(), place.command)?.clear()?;
             }
-            // Whoever goes on with the run makes the same of it as the command that began it.
+            // Whoever continues the run gets the same from it as the command that began it.
             let build = Build { command_line: Manifest::read(&self.path)?.command_line, ..place.build.clone() };
             let request = request()?;
             self.ensure_unchanged(&request.inputs)?;
@@ -184,7 +185,7 @@ impl RunDir {
         Ok(Some(Self { inputs: Arc::new(inputs.collect()), within: Some((self.path.clone(), list)), ..stage }))
     }
 
-    /// Refuses to write on where the folder is another one now.
+    /// Refuses to continue writing if the folder has been replaced.
     ///
     /// # Errors
     /// If it was deleted or moved since it was claimed.
@@ -211,7 +212,7 @@ impl RunDir {
     fn claim_named(path: &Path, place: &Place<'_>) -> anyhow::Result<Self> {
         fs::create_dir_all(path)
             .with_context(|| format!("{}: cannot be created; choose another --out", path.display()))?;
-        // Before the lock is taken: nothing is written into a folder that is no run.
+        // Before the lock is taken: nothing is written into a folder that is not a run.
         ensure_free_or_run(path, place.overwrite)?;
         let run = Self::locked(path.to_path_buf(), place.command)?;
         // Whoever had the lock before may have made a run of it.
@@ -267,7 +268,7 @@ impl RunDir {
         delete().with_context(|| format!("{}: cannot be deleted", self.path.display()))
     }
 
-    /// Lists this folder anew in the run that it is a finished folder of, after something was written into it.
+    /// Updates the digest of this finished folder in its run, after something was written into it.
     ///
     /// # Errors
     /// If a list cannot be read or written.
@@ -291,7 +292,7 @@ impl RunDir {
         Ok(sums::write(&self.path, name, content)?)
     }
 
-    /// Marks the run as finished, in the run that it is a folder of as well.
+    /// Marks the run as finished, also in the run that it belongs to.
     ///
     /// # Errors
     /// If it cannot be written.
@@ -305,7 +306,7 @@ impl RunDir {
     }
 }
 
-/// Refuses a folder or file within a run, whose files would no longer be its own alone.
+/// Refuses a folder or file within a run: the run would no longer hold only its own files.
 ///
 /// # Errors
 /// Naming the run.
@@ -326,8 +327,8 @@ fn ensure_free_or_run(path: &Path, overwrite: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Whether a folder can be claimed as it is: there is nothing, or what a process leaves that dies before its claim, which is
-/// never without the lock.
+/// Whether a folder can be claimed as it is: it is empty, or holds what a process leaves if it dies before its claim,
+/// which always includes the lock.
 fn is_free(path: &Path) -> anyhow::Result<bool> {
     let names = fs::read_dir(path).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
     let names: Vec<_> = names.with_context(|| path.display().to_string())?;
@@ -355,8 +356,8 @@ fn run_around(folder: &Path) -> anyhow::Result<Option<(PathBuf, String)>> {
     Ok(None)
 }
 
-/// One SHA-256 of all that a run wrote, but for what differs from one repetition to the next: wall times, the manifest, and
-/// the reports that show it. The same for the same command on another machine, if it computed the same.
+/// One SHA-256 of all that a run wrote, except for what differs from one repetition to the next: wall times, the
+/// manifest, and the reports that show it. The same for the same command on another machine, if it computed the same.
 ///
 /// # Errors
 /// If a list is missing or damaged.
@@ -387,7 +388,7 @@ mod tests {
         fs::remove_dir_all(path).unwrap();
     }
 
-    /// Both wrote into it, and what came out was of neither.
+    /// Both wrote into it, and the result belonged to neither.
     #[test]
     fn a_run_has_one_owner_at_a_time() {
         let path = scratch("owner");
@@ -449,7 +450,7 @@ mod tests {
         fs::remove_dir_all(path).unwrap();
     }
 
-    /// Whatever is there when a process dies while it claims a folder: the folder can be used.
+    /// Whatever a process leaves if it dies while it claims a folder, the folder can be used.
     #[test]
     fn a_death_in_the_first_moments_leaves_a_folder_that_can_be_begun_again() {
         let path = scratch("first-moments");
@@ -516,7 +517,7 @@ mod tests {
             run.ensure_unchanged(&Inputs::from([("run:R/chains/one".to_owned(), "1".to_owned())])).unwrap();
             assert!(message(run.ensure_unchanged(&of("2"))).contains("lots/x.toml: changed"));
         }
-        // Read anew for a stage that begins, it was right by definition.
+        // Read again for a stage that begins, it was right by definition.
         let begin = || Ok(Request { inputs: of("2"), ..Request::default() });
         let refused = message(run.stage_for("chains/two", &place(&path, false), &settings, begin));
         assert!(refused.contains("lots/x.toml: changed") && !path.join("chains/two").exists(), "{refused}");
@@ -526,7 +527,7 @@ mod tests {
         fs::remove_dir_all(path).unwrap();
     }
 
-    /// What was written went into whatever lay at the place by then.
+    /// What was written went into whatever was there by then.
     #[cfg(unix)]
     #[test]
     fn a_run_whose_folder_was_deleted_writes_no_more() {

@@ -142,7 +142,7 @@ fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
     );
     ensure!(
         sums::exists(run)?,
-        "{}: this is no run{}; cargo xtask train-dagger and evaluate make runs, and runs/ holds them unless --out says otherwise",
+        "{}: this is not a run{}; cargo xtask train-dagger and evaluate make them, in runs/ unless --out says otherwise",
         run.display(),
         in_runs(run)
     );
@@ -194,7 +194,7 @@ mod tests {
     fn what_has_no_list_has_no_policy() {
         let path = scratch("no-policy");
         fs::create_dir_all(&path).unwrap();
-        assert!(message(policy_folder(&path)).contains("this is no run"));
+        assert!(message(policy_folder(&path)).contains("this is not a run"));
         fs::write(path.join(SETTINGS), "").unwrap();
         assert!(message(policy_folder(&path)).contains("an earlier version made it"));
         fs::remove_dir_all(path).unwrap();
@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn the_policy_of_a_run_is_its_last_network() {
         let path = scratch("policy");
-        assert!(message(policy_folder(&path)).contains("this is no run"));
+        assert!(message(policy_folder(&path)).contains("this is not a run"));
         create(&path, false).unwrap();
         assert!(message(policy_folder(&path)).contains("no network"));
         let settings = Settings::preset("smoke").unwrap();

@@ -27,10 +27,10 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Trains, or goes on with what an interrupted training left in the folder, to the same result.
+/// Trains, or continues what an interrupted training left in the folder, to the same result.
 ///
 /// # Errors
-/// If a lot cannot be driven, or a file cannot be read or written. Cancelling is no error: the outcome says so.
+/// If a lot cannot be driven, or a file cannot be read or written. Cancelling is not an error: the outcome says so.
 pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<Outcome> {
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     run.ensure_unchanged(&inputs::of(&lots, &[]))?;
@@ -126,7 +126,7 @@ struct Monitor<'a> {
     progress: &'a dyn Progress,
     task: Option<Task>,
     collection: Collection,
-    /// Samples that the running training had trained on when it was begun here, or gone on with.
+    /// Samples that the running training had trained on when it was begun or continued here.
     samples_before: u64,
 }
 

@@ -45,7 +45,7 @@ pub enum Show {
     },
     /// Drives, a recording each.
     Drives {
-        /// Of the evaluation that the keys come from.
+        /// The settings of the evaluation that the keys come from.
         settings: Box<Settings>,
         /// What to record.
         drives: Vec<DriveRequest>,

@@ -1,4 +1,4 @@
-//! Drives the scripted expert over the reference lots and prints what came of it.
+//! Drives the scripted expert over the reference lots and prints the results.
 //!
 //! `cargo run -p expert --example drive_lots -- --seeds 20 --lots a --set point_clearance_m=0.2`
 #![allow(clippy::print_stdout, reason = "a tool that prints")]

@@ -26,7 +26,7 @@ pub(crate) struct Arc {
     pub(crate) curvature_per_m: f32,
     /// Index relative to the tightest arc, −1…1.
     pub(crate) index: f32,
-    /// Of one step along the arc.
+    /// The half turn of one step along the arc.
     half_turn: HalfTurn,
     /// Where the nose gets to every [`PROBE_STEPS`] after the arc was entered, ego frame then.
     probes: [FourPoints; PROBE_FOURS],
@@ -42,7 +42,7 @@ pub(crate) trait Forecast: Copy {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Entry<F> {
     pub(crate) forecast: F,
-    /// Whether it can go on.
+    /// Whether it can continue.
     pub(crate) is_free: bool,
 }
 

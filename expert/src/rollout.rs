@@ -78,7 +78,7 @@ impl Motion {
 pub(crate) struct HalfTurn(Vec2);
 
 impl HalfTurn {
-    /// Of a step at whose ends the curvatures have this sum.
+    /// The half turn of a step at whose ends the curvatures have this sum.
     #[inline]
     pub(crate) fn new(sum_per_m: f32, travel_m: f32) -> Self {
         let half_turn = 0.25 * sum_per_m * travel_m;
@@ -94,7 +94,7 @@ impl HalfTurn {
 pub(crate) struct Footprint {
     /// Centres of the discs, metres ahead of the rear axle; the last one is repeated.
     disc_centres_m: [f32x4; 2],
-    /// And of the coarse ones.
+    /// The same of the coarse discs.
     coarse_disc_centres_m: f32x4,
     nose_m: f32,
     /// Distance of a disc's centre to the nearest non-drivable point at which the clearance is 0, metres.

@@ -112,7 +112,7 @@ struct Rollout {
 /// A first arc, as far as it is forecast.
 #[derive(Debug, Clone, Copy)]
 struct FirstArc {
-    /// While it can go on, it is not yet followed farther than the ramp.
+    /// While it can continue, it is not yet followed farther than the ramp.
     entry: Entry<FirstRollout>,
     /// What a plan that begins with it scores without travel and load, at most.
     offset: f32,

@@ -22,13 +22,13 @@ pub enum Rule {
 pub struct ExpertStats {
     /// Decisions in all.
     pub decisions: u64,
-    /// By [`Rule::Far`].
+    /// Decisions by [`Rule::Far`].
     pub far: u64,
-    /// By [`Rule::Avoid`].
+    /// Decisions by [`Rule::Avoid`].
     pub avoid: u64,
-    /// By [`Rule::Relaxed`].
+    /// Decisions by [`Rule::Relaxed`].
     pub relaxed: u64,
-    /// By [`Rule::LastResort`].
+    /// Decisions by [`Rule::LastResort`].
     pub last_resort: u64,
     /// Last resorts in which every arc touches something.
     pub failed: u64,

@@ -1,4 +1,4 @@
-//! What the fuzz targets share: a folder in memory, and files that are sound but for the one that is made up.
+//! What the fuzz targets share: a folder in memory, and files that are sound except for the one that is made up.
 
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
@@ -83,7 +83,7 @@ impl Imported {
     }
 }
 
-/// Imports a lot that is sound but for one file, whatever comes of it.
+/// Imports a lot that is sound except for one file, whatever the outcome.
 pub fn import(made_up: Imported, content: &[u8]) {
     let put = |name: &str, file: Imported| write(name, &if file == made_up { content.to_vec() } else { file.sound() });
     let lot = if made_up == Imported::Case {
@@ -176,7 +176,7 @@ fn files_in(folder: &Path) -> Files {
     files
 }
 
-/// A folder within [`folder()`] whose files are sound but for one.
+/// A folder within [`folder()`] whose files are sound except for one.
 #[derive(Debug)]
 pub struct Sound {
     folder: PathBuf,

@@ -23,7 +23,7 @@ const FORMAT: i64 = 8;
 pub struct SeveralModes(usize);
 
 /// The file: the network's own outputs for `[batch, 1, 25, 25]`. How they are used is written beside the graph ([`About`]) and
-/// is no part of it.
+/// is not part of it.
 ///
 /// # Errors
 /// If the network answers with several modes: none of the drivers that read such files weighs them.

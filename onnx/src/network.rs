@@ -46,8 +46,8 @@ impl OnnxNetwork {
     /// Reads a file and lets it answer once.
     ///
     /// # Errors
-    /// If it cannot be read, is larger than [`ONNX_BYTES_MAX`], no ONNX file, uses what the runtime does not know, or its
-    /// input or output is not what docs/formats.md says.
+    /// If it cannot be read, is larger than [`ONNX_BYTES_MAX`], is not an ONNX file, uses what the runtime does not
+    /// know, or its input or output is not what docs/formats.md says.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let bytes = read::bytes(path, ONNX_BYTES_MAX)
             .map_err(|error| FileError::new(path, format_args!("cannot be read: {error}"), "name an ONNX file"))?;
@@ -60,7 +60,7 @@ impl OnnxNetwork {
     fn from_bytes(bytes: Vec<u8>) -> Result<Self, String> {
         wire::check(&bytes)?;
         let sha256 = sums::digest(&bytes);
-        let model = Model::load(bytes).map_err(|error| format!("is no network that can be run: {error}"))?;
+        let model = Model::load(bytes).map_err(|error| format!("is not a network that can be run: {error}"))?;
         let name = |id: &NodeId| model.node_info(*id).and_then(|node| node.name()).unwrap_or("(no name)").to_owned();
         let names = |ids: &[NodeId]| ids.iter().map(name).collect::<Vec<_>>().join(", ");
         let &[input] = model.input_ids() else {
@@ -157,7 +157,7 @@ impl OnnxNetwork {
         answers.into_iter().map(Prediction::from_raw).collect()
     }
 
-    /// Raw outputs per grid; those that the network does not have are 0, and what fails is no number.
+    /// Raw outputs per grid; those that the network does not have are 0, and all are NaN if it fails.
     fn raw(&self, grids: &[&OccupancyGrid], pool: &Arc<ThreadPool>) -> Vec<[f32; OUTPUTS]> {
         let answer = |grids: &[&OccupancyGrid]| match self.run(grids, pool) {
             Ok((numbers, values)) if numbers == self.numbers => {

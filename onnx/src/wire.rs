@@ -19,9 +19,9 @@ enum Message {
     SequenceType,
     TensorType,
     Shape,
-    /// Of numbers and texts only.
+    /// A message of numbers and texts only.
     Plain,
-    /// No message, but whole numbers one after the other.
+    /// Not a message, but whole numbers one after the other.
     Numbers,
 }
 
@@ -62,7 +62,7 @@ pub(crate) fn check(file: &[u8]) -> Result<(), String> {
             return Err(format!("has more than {ONNX_FIELDS_MAX} fields"));
         }
         let found = if *message == Message::Numbers { varint(rest).map(|_| (0, &[][..])) } else { next(rest) };
-        let (field, content) = found.ok_or("is no network that can be run: a part is longer than what holds it")?;
+        let (field, content) = found.ok_or("is not a network that can be run: a part is longer than what holds it")?;
         if let Some(inner) = message.within(field) {
             if open.len() == ONNX_NESTING_MAX {
                 return Err(format!("is nested more than {ONNX_NESTING_MAX} deep"));

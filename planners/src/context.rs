@@ -15,7 +15,7 @@ pub struct PlannerContext {
     pub vehicle: VehicleSettings,
     /// Where the grid lies.
     pub geometry: GridGeometry,
-    /// What becomes of an answer.
+    /// How an answer is turned into a command.
     pub controller: ControllerSettings,
     /// Between two answers, seconds.
     pub control_period_s: f32,

@@ -2,8 +2,8 @@
 //!
 //! Obstacles are discs around occupied cells, grown by half the body width. Each disc blocks one interval of curvatures,
 //! κ = 2(y ± r)/(x² + y² − r²), and over the whole interval the distance to it counts as constant: its chord less the
-//! radius and the nose of the car. Maximised is 0.1·v/v_max + 0.7·d/d_max + 0.2·(1 − |θ|/π) (weights *recalled*) over the
-//! curvatures that the wheels can reach.
+//! radius and the nose of the car. It maximises 0.1·v/v_max + 0.7·d/d_max + 0.2·(1 − |θ|/π) (weights *recalled*) over
+//! the curvatures that the wheels can reach.
 //!
 //! Two readings ([`Speeds`]): the controller slows down with steering (paper), so that a curvature fixes its speed; or speeds
 //! are searched together with the curvatures, as in 1996, none faster than d/T_impact.
@@ -213,7 +213,7 @@ pub struct CurvatureVelocity {
     params: Params,
     context: Arc<PlannerContext>,
     candidates: Arc<Vec<Candidate>>,
-    /// Of every cell, row-major.
+    /// The disc of every cell, row-major.
     discs: Arc<Vec<Disc>>,
     wheel: WheelEstimate,
 }

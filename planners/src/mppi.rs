@@ -34,8 +34,8 @@ const SCALES_MAX: f32 = 3.0;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Params {
-    /// Pairs of sequences rolled out per decision, beside the last answer itself: 128 (*chosen*; nav2: 1000 sequences, which
-    /// take four times as long).
+    /// Pairs of sequences rolled out per decision, besides the last answer itself: 128 (*chosen*; nav2: 1000 sequences,
+    /// which take four times as long).
     pub pairs: u32,
     /// How far ahead, seconds: 2.8 (*cited*: nav2, 56 steps of 0.05 s).
     pub horizon_s: f32,
@@ -311,7 +311,7 @@ pub struct PathIntegral {
     field: WayField,
     /// The last answer, by step: where the next draws begin.
     controls: Vec<Control>,
-    /// Of every sample.
+    /// The cost of every sample.
     costs: Vec<f32>,
     wheel: WheelEstimate,
     /// Where the speed probably is; like the wheel angle, it is not shown.

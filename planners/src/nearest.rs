@@ -6,7 +6,7 @@ use sim::sensing::{GRID_CELLS, GridGeometry, OccupancyGrid};
 /// The nearest occupied cell as seen from a point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Nearest {
-    /// From the point to the square of the cell, metres; 0 inside.
+    /// Distance from the point to the square of the cell, metres; 0 inside.
     pub(crate) distance_m: f32,
     /// Unit vector from the cell to the point: the gradient of the distance. Between two cells equally near it is their
     /// mean, so that opposite sides cancel; zero inside a cell.

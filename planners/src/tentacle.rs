@@ -92,7 +92,7 @@ impl PathOrigin {
 }
 
 impl Params {
-    /// The paper's parameters but for its detection range, which is taken literally.
+    /// The paper's parameters except for its detection range, which is taken literally.
     fn literal_range() -> Self {
         Self { detection_range_m: DETECTION_RANGE_LITERAL_M, ..Self::paper() }
     }

@@ -12,7 +12,7 @@ use sim::driver::{Decision, LookAheadPoint, Policy};
 use sim::geometry::Vec2;
 use sim::sensing::{GRID_CELLS, Observation, OccupancyGrid};
 
-/// A grid, every row of which is like the last one but for a few cells.
+/// A grid, every row of which is like the last one except for a few cells.
 fn grids() -> impl Strategy<Value = OccupancyGrid> {
     (any::<u32>(), any::<u32>(), proptest::collection::vec((any::<u32>(), any::<u32>(), any::<u32>()), GRID_CELLS))
         .prop_map(|(left, right, rows)| {
@@ -74,7 +74,7 @@ fn search_spaces_hold_the_starting_point() {
             spec.at(&unit).check().unwrap();
         }
         for (name, _) in spec.search_space() {
-            assert!(spec.parameters().contains_key(name), "{name} is no parameter of {}", spec.name());
+            assert!(spec.parameters().contains_key(name), "{name} is not a parameter of {}", spec.name());
         }
     }
 }

@@ -135,7 +135,7 @@ pub struct VirtualForceField {
     /// Cells within the window; bit = column.
     active_rows: Arc<Vec<u32>>,
     sight: Arc<LinesOfSight>,
-    /// Of the last answer.
+    /// The bearing of the last answer.
     bearing_rad: f32,
 }
 

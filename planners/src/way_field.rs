@@ -31,7 +31,7 @@ pub(crate) struct WayField {
     start: usize,
     /// Whether a cell is ground that the car covers or sees; waves do not go round beside it.
     is_known: Vec<bool>,
-    /// To the nearest occupied square, metres, by cell; negative inside.
+    /// Distance to the nearest occupied square, metres, by cell; negative inside.
     distance_m: Vec<f32>,
     /// How far the way still goes, metres, by cell; up to a constant.
     way_left_m: Vec<f32>,
@@ -129,7 +129,7 @@ impl WayField {
         }
     }
 
-    /// To the nearest occupied square, metres, bilinear between centres of cells.
+    /// Distance to the nearest occupied square, metres, bilinear between centres of cells.
     pub(crate) fn distance_m(&self, in_ego: Vec2) -> f32 {
         self.between(&self.distance_m, in_ego)
     }

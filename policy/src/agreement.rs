@@ -38,8 +38,8 @@ pub struct Agreement {
 }
 
 impl Agreement {
-    /// Of the discrepancy τ̂ and the label of every tick; `None` of no tick. `bumper_to_patch_m`: from the front bumper to
-    /// the lower edge of the patch, metres.
+    /// The agreement, from the discrepancy τ̂ and the label of every tick; `None` without ticks. `bumper_to_patch_m`:
+    /// from the front bumper to the lower edge of the patch, metres.
     pub(crate) fn new(
         tau: f32,
         tau_hats: &[f32],

@@ -41,7 +41,7 @@ struct ModelFile {
     conditions: Conditions,
     inference: InferenceSettings,
     network: NetworkArchitecture,
-    /// In the order in which they are computed. Follows from `network`; for readers in other languages.
+    /// The layers in the order in which they are computed. Follows from `network`; for readers in other languages.
     layers: Vec<Layer>,
 }
 
@@ -51,7 +51,7 @@ struct ModelFile {
 struct Layer {
     name: String,
     kind: LayerKind,
-    /// Of `NAME.weight`; that of `NAME.bias` is its first number.
+    /// The shape of `NAME.weight`; that of `NAME.bias` is its first number.
     weight_shape: Vec<usize>,
     /// Zeros around the input: cells at the top and at the left, then at the bottom and at the right. Convolutions only.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -13,13 +13,13 @@ use toml::{Table, Value};
 pub struct Conditions {
     /// Between two answers, milliseconds: action smoothing counts in them.
     pub control_period_ms: u32,
-    /// What becomes of an answer.
+    /// How an answer is turned into a command.
     pub controller: ControllerSettings,
     /// What the grids show.
     pub sensing: SensingSettings,
 }
 
-/// Of no matter to a network.
+/// The setting that does not matter to a network.
 const OTHERS_LAW: &str = "episode.controller.planner_speed_law";
 
 impl Conditions {

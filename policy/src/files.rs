@@ -17,9 +17,9 @@ pub(crate) const SCHEMA_REMEDY: &str = "train again into another folder, or use 
 
 /// A TOML file with one name and a schema version, which is its first key.
 pub(crate) trait Format: Serialize + DeserializeOwned {
-    /// Within its folder.
+    /// Its name within its folder.
     const NAME: &'static str;
-    /// To be raised whenever an older reader would misread the file.
+    /// The version of the format: raise it whenever an older reader would misread the file.
     const SCHEMA: u32;
 }
 
@@ -63,7 +63,7 @@ pub(crate) fn create_folder(folder: &Path) -> Result<(), FileError> {
     }
 }
 
-/// The content of a finished file of at most so many bytes.
+/// The content of a finished file of at most this many bytes.
 pub(crate) fn open(path: &Path, bytes_max: u64) -> Result<Cursor<Vec<u8>>, FileError> {
     sums::read(path, bytes_max).map(Cursor::new)
 }

@@ -4,7 +4,7 @@
 //!
 //! `L = ½ · mean_j[ W · e_j² · exp(−s_j) + s_j ]`, `W = (1 + α τ̂)²`
 //!
-//! Of a network with several modes k of weight π_k, with `L_k` the loss of each: `−½ log Σ_k π_k exp(−2 L_k)`.
+//! For a network with several modes k of weight π_k, with `L_k` the loss of each: `−½ log Σ_k π_k exp(−2 L_k)`.
 
 use crate::dataset::Sample;
 use crate::network::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, OUTPUTS, operations};
@@ -87,7 +87,7 @@ pub struct LossParts {
 }
 
 impl LossParts {
-    /// From its two terms.
+    /// The loss from its two terms.
     pub(crate) fn new(misfit: f32, log_variance: f32) -> Self {
         Self { misfit, log_variance, total: misfit + log_variance }
     }

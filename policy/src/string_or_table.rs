@@ -10,7 +10,7 @@ use toml::{Table, Value};
 /// Reads a variant with fields from its name, too: its fields then have their defaults.
 ///
 /// # Errors
-/// As the enum's own, for a name that is no variant or a field without a default.
+/// Those of the enum, if the name is not a variant or a field has no default.
 pub(crate) fn string_or_table<'de, D: Deserializer<'de>, T: Deserialize<'de>>(deserializer: D) -> Result<T, D::Error> {
     deserializer.deserialize_any(StringOrTable(PhantomData))
 }

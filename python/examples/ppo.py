@@ -34,7 +34,7 @@ class Repeat(VecEnvWrapper):
         for _ in range(REPEAT - 1):
             self.venv.step_async(self.actions)
             seen, rewards, now, later = self.venv.step_wait()
-            # What an episode that has begun since is rewarded for is no part of the one that ended.
+            # Rewards of an episode that has begun since are not part of the one that ended.
             total += np.where(dones, 0.0, rewards)
             infos = [old if ended else new for old, new, ended in zip(infos, later, dones, strict=True)]
             dones = dones | now

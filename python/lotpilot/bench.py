@@ -32,7 +32,7 @@ TRIALS = 8
 AHEAD_M = 6.0
 
 Drive = Callable[[float], int]
-"""Drives for so many seconds and returns the number of steps."""
+"""Drives for this many seconds and returns the number of steps."""
 
 
 def until(seconds: float, step: Callable[[], int]) -> int:

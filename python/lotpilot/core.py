@@ -130,7 +130,7 @@ def names(given: str | Sequence[str], what: str) -> list[str]:
     several = [given] if isinstance(given, str) else list(given)
     for name in several:
         if not isinstance(name, str):
-            raise TypeError(f"{what}: {name!r} is no text")
+            raise TypeError(f"{what}: {name!r} is not a string")
     return several
 
 
@@ -160,7 +160,7 @@ class Arrays:
 
 
 COUNTS = ("near_collisions", "contacts", "stuck", "event", "episode_number")
-"""What is counted, of what environments tell beside their observation."""
+"""Which of the values that environments tell besides their observation are counts."""
 
 
 class Core:
@@ -193,13 +193,13 @@ class Core:
         return self.cars.control_period_s()
 
     def action_space(self) -> spaces.Box:
-        """Of one environment: metres, or radians and m/s, or -1 … 1."""
+        """The action space of one environment: metres, or radians and m/s, or -1 … 1."""
         if self.options.normalise:
             return spaces.Box(-1.0, 1.0, (2,), np.float32)
         return spaces.Box(self.low, self.high, dtype=np.float32)
 
     def observation_space(self) -> spaces.Space[Any]:
-        """Of one environment."""
+        """The observation space of one environment."""
         grid = spaces.Box(0, 1, (GRID_CELLS, GRID_CELLS), np.uint8)
         if not (self.options.state or self.options.view):
             return grid
@@ -257,7 +257,7 @@ class Core:
         return answers
 
     def infos(self, seen: Arrays) -> dict[str, npt.NDArray[Any]]:
-        """What is told beside the observation, by name: arrays [n]."""
+        """What is told besides the observation, by name: arrays [n]."""
         columns = dict(zip(Cars.INFO, seen.info.T.copy(), strict=True))
         for name in COUNTS:
             columns[name] = columns[name].astype(np.int64)

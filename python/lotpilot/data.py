@@ -41,7 +41,7 @@ class Dataset:
         run: Folder of the run.
 
     Raises:
-        ValueError: If it is no run, holds no round, or a file is damaged.
+        ValueError: If it is not a run, holds no round, or a file is damaged.
     """
 
     def __init__(self, run: str | os.PathLike[str]) -> None:

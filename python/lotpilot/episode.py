@@ -20,7 +20,7 @@ class Episode:
     Args:
         lot: A lot as on the command line, which stands for one: ``"lot-b"``, ``"test-hard-7"``.
         direction: ``"forward"`` or ``"reverse"``.
-        trial: Which trial of the lot: its obstacles, where they are drawn anew, and its noise.
+        trial: Which trial of the lot: its obstacles, where trials draw them, and its noise.
         seed: Root of obstacles and noise.
         noise: See ``EnvOptions.noise``.
         action: See ``EnvOptions.action``.

@@ -30,7 +30,7 @@ class LotEnv(gymnasium.Env[Any, Floats]):
     (``episode.metrics.events_max``), and truncated after too long (``episode.metrics.timeout_s``). A near-collision
     stops the car and puts it back on the route within the step that it happens in.
 
-    ``reset(seed=s)`` starts the first episode of seed s; further resets go on from there.
+    ``reset(seed=s)`` starts the first episode of seed s; further resets continue from there.
     ``reset(options={"episode": k})`` starts the k-th (``EnvOptions``). ``info`` holds the car and the metrics so far,
     and after ``reset`` also the names of lot, direction, trial and seed.
 
@@ -110,7 +110,7 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
     """Many cars, stepped natively and in parallel.
 
     Environment i of n drives the episodes i, i + n, … (``EnvOptions``). ``reset(seed=s)`` gives all of them the seed s:
-    they share its trials and drive none twice. ``reset(seed=[…])`` gives each its own; where it is None they go on.
+    they share its trials and drive none twice. ``reset(seed=[…])`` gives each its own; where it is None they continue.
     ``reset(options={"reset_mask": mask})`` resets some. ``infos`` holds an array per name; under
     ``SAME_STEP`` also ``final_obs`` and ``final_info``.
 

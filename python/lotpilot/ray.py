@@ -67,7 +67,7 @@ def evaluate(
         cpus: CPUs of a task, and its threads.
         retries: How often a shard is begun again whose node or process died.
         progress: Whether to count finished shards on stderr.
-        **options: The other keywords of ``lotpilot.evaluate``, but for ``overwrite``.
+        **options: The other keywords of ``lotpilot.evaluate``, except for ``overwrite``.
 
     Raises:
         ValueError: If a number is out of range.
@@ -101,8 +101,8 @@ def reproduce(
     """Does what ``cargo xtask reproduce`` does, on a Ray cluster: its trainings first, then what all networks drive.
 
     Args:
-        *arguments: Those of the command, but for ``--out``, ``--overwrite`` and ``--resume``: ``"--full"``. Files that
-            they name are looked for on the nodes, from this working folder.
+        *arguments: Those of the command, except for ``--out``, ``--overwrite`` and ``--resume``: ``"--full"``. Files
+            that they name are looked for on the nodes, from this working folder.
         shards: How many tasks there are of each half. A training is done by one task; more tasks than trainings have
             nothing to train.
         out: Folder of the run, below the working folder. Shards are kept in ``OUT.trained/`` and ``OUT.driven/``.
@@ -246,14 +246,14 @@ def _drive(
 
 
 def _environment(cpus: int) -> dict[str, str]:
-    """Of a task: as many threads as CPUs."""
+    """The environment of a task: as many threads as CPUs."""
     return {"RAYON_NUM_THREADS": str(cpus)}
 
 
 def _guarded(name: str, digest: str) -> Callable[..., Any]:
     """A function of this module as a task: what it returns, or as text why there is nothing to return.
 
-    Ray pickles it whole, as it is no part of a module: so a node without lotpilot can say so.
+    Ray pickles it whole, because it is not part of a module; so a node without lotpilot can say so.
     """
 
     def task(folder: str, arguments: bytes, *shared: Any) -> Any:
@@ -293,7 +293,7 @@ def _reproduce(run: str, command: tuple[str, ...], shard: str, cpus: int, progra
 
 
 def _link(folder: Path, to: Path, but: Path) -> None:
-    """Makes a folder with links to what is in another one, but for what lies at ``but`` there, which is empty."""
+    """Makes a folder with links to what is in another one, except for what lies at ``but`` there, which is empty."""
     to.mkdir()
     name, *rest = but.parts
     for entry in folder.iterdir() if folder.is_dir() else ():
@@ -346,15 +346,15 @@ def _generate(lots: list[str], seed: int, count: int) -> tuple[list[dict[str, An
 
 
 def _digest() -> str:
-    """Of the native half: what tells one build of lotpilot from another."""
+    """The digest of the native half, which tells one build of lotpilot from another."""
     file = _native.__file__
     assert file is not None
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()
 
 
 def _warn_of_other_functions(folder: Path, request: tables.Request) -> None:
-    """Says so if shards are there of functions that were pickled otherwise: most have changed then. Not all, as what is
-    pickled of one function may differ from process to process."""
+    """Says so if shards are there of functions that were pickled differently: most have changed then. Not all, as what
+    is pickled of one function may differ from process to process."""
     content = hashlib.sha256()
     for _, driver in request.drivers:
         if isinstance(driver, str):
@@ -368,7 +368,7 @@ def _warn_of_other_functions(folder: Path, request: tables.Request) -> None:
     file = folder / _FUNCTIONS
     if _is_claimed(folder) and file.exists() and file.read_text(encoding="utf-8") != content.hexdigest():
         warnings.warn(
-            f"{folder}: holds shards of functions that were pickled otherwise; if one has changed, delete the folder or "
+            f"{folder}: holds shards of functions pickled differently; if one has changed, delete the folder or "
             "choose another out",
             stacklevel=3,
         )
@@ -376,7 +376,7 @@ def _warn_of_other_functions(folder: Path, request: tables.Request) -> None:
 
 
 _FUNCTIONS = "functions.sha256"
-"""Of the functions that shards were last driven by."""
+"""File with the digest of the functions that shards were last driven by."""
 
 
 def _claim(folder: Path, about: dict[str, Any]) -> None:

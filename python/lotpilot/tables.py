@@ -28,7 +28,7 @@ put back on the route since, bool [n]: for drivers that remember."""
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What drivers came to: the tables of ``cargo xtask evaluate``."""
+    """Results of drivers: the tables of ``cargo xtask evaluate``."""
 
     summary: Table
     """Drivers by lots, noise and direction: rates with intervals."""
@@ -106,7 +106,7 @@ def evaluate(
 
 @dataclass(frozen=True)
 class Request:
-    """An evaluation as it is asked for, here or on another machine: what ``evaluate`` takes, but for its folder."""
+    """An evaluation as it is asked for, here or on another machine: what ``evaluate`` takes, except for its folder."""
 
     drivers: Sequence[tuple[str, Driver]]
     which: Mapping[str, Any]
@@ -244,7 +244,7 @@ def _function(name: str, driver: Any) -> Callable[..., Floats]:
         if points.shape != (len(grids), 2):
             raise ValueError(f"driver {name!r}: answers of shape {points.shape}, {(len(grids), 2)} is needed")
         if not np.isfinite(points).all():
-            raise ValueError(f"driver {name!r}: {points[~np.isfinite(points).all(1)][0]} is no finite point")
+            raise ValueError(f"driver {name!r}: {points[~np.isfinite(points).all(1)][0]} is not a finite point")
         return points
 
     return drive

@@ -81,7 +81,7 @@ impl<'py> SeenArrays<'py> {
 /// Pairs of numbers, one per car: actions or points.
 ///
 /// # Errors
-/// If it is no array of float32 of shape `[n, 2]`, or a number in a row that counts is not finite.
+/// If it is not an array of float32 of shape `[n, 2]`, or a number in a row that counts is not finite.
 pub(crate) fn pairs(object: &Bound<'_, PyAny>, n: usize, counts: impl Fn(usize) -> bool) -> PyResult<Vec<[f32; 2]>> {
     let array: PyReadonlyArray2<'_, f32> = object
         .extract()

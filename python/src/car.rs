@@ -22,7 +22,7 @@ pub(crate) const STATE: usize = 2;
 /// Values of an action.
 pub(crate) const ACTION: usize = 2;
 
-/// What a driver is told beside its observation, value by value.
+/// What a driver is told besides its observation, value by value.
 pub(crate) const INFO: [&str; 17] = [
     "near_collisions",
     "contacts",
@@ -60,7 +60,7 @@ pub(crate) struct Seen<'a> {
     pub(crate) info: &'a mut [f64],
 }
 
-/// What came of an action.
+/// The result of an action.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Outcome {
     pub(crate) reward: f64,
@@ -139,7 +139,7 @@ impl Car {
         self.drive.as_ref().and_then(|drive| drive.last.as_ref())
     }
 
-    /// Of the ticks of [`Self::episode`], if cars were to keep one.
+    /// The digest of the ticks of [`Self::episode`], if cars were to keep one.
     pub(crate) fn digest(&self) -> Option<String> {
         self.drive.as_ref()?.digest.as_ref().map(DriveDigest::hex)
     }

@@ -174,7 +174,7 @@ impl Cars {
     }
 
     /// Starts the next episodes of the cars in `mask` and writes what they see into `seen`. `seeds` and `numbers` say
-    /// which episodes come first; cars without one go on.
+    /// which episodes come first; cars without one continue.
     fn reset(
         &mut self,
         py: Python<'_>,

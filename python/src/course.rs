@@ -85,7 +85,7 @@ impl Course {
         let vehicle = &settings.episode.vehicle;
         let lots = Lot::parse_all(lots, vehicle)?;
         ensure!(!lots.is_empty(), "no lots are named; name at least one, as in lots=[\"lot-a\"]");
-        ensure!(trials != Some(0), "trials: 0 trials are none; None never repeats one");
+        ensure!(trials != Some(0), "trials: must be 1 or more; None never repeats one");
         let directions = directions(way)?;
         for lot in &lots {
             directions.iter().try_for_each(|&direction| lot.check_direction(direction, vehicle))?;
@@ -101,7 +101,7 @@ impl Course {
         })
     }
 
-    /// What is to be said about its lots.
+    /// Notes about its lots.
     pub(crate) fn notes(&self) -> Vec<String> {
         notes::of(&self.lots, &[self.noise])
     }

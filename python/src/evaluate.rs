@@ -131,7 +131,7 @@ impl Asked {
         Ok(Self { settings, drivers, lots, compare_with })
     }
 
-    /// Warns of what is to be said about the lots.
+    /// Warns with the notes about the lots.
     fn say_notes(&self, failure: &Failure) -> anyhow::Result<()> {
         let notes = notes::of(&self.lots, &self.settings.evaluation.noise);
         if let Err(error) = Python::attach(|py| warn(py, &notes)) {
@@ -146,7 +146,7 @@ impl Asked {
         Plan { settings, drivers, lots, compare_with: *compare_with, shard }
     }
 
-    /// What the manifest says beside the settings.
+    /// What the manifest says besides the settings.
     fn arguments(&self, shard: Option<ShardRecord>) -> anyhow::Result<toml::Table> {
         #[derive(Serialize)]
         struct Arguments {

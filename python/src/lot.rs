@@ -24,7 +24,7 @@ use std::path::PathBuf;
 /// Args:
 ///     name: A lot as on the command line: ``"lot-a"``, ``"test-hard-7"``, ``"my-map.toml"``.
 ///     direction: ``"forward"`` or ``"reverse"``.
-///     trial: Which obstacles, of lots that draw them anew for every trial.
+///     trial: Which obstacles, for lots that draw them in every trial.
 ///     seed: Seed of the obstacles, as in ``evaluate``.
 ///
 /// Raises:

@@ -1,4 +1,4 @@
-//! The same episodes in Rust alone: how fast they are, and what they come to.
+//! The same episodes in Rust alone: how fast they are, and their results.
 
 use crate::course::{Course, SettingsFrom};
 use crate::guard::{detached, input};

@@ -28,7 +28,7 @@ impl Reward {
     /// Weights by name.
     ///
     /// # Errors
-    /// If there is no such term, or a weight is missing or no finite number.
+    /// If there is no such term, or a weight is missing or not a finite number.
     pub(crate) fn of(mut weights: BTreeMap<String, f64>) -> anyhow::Result<Self> {
         let mut weight = |term: &str| {
             let weight =

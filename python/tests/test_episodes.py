@@ -285,7 +285,7 @@ def test_wrong_answers_of_a_function_are_raised_and_so_is_what_it_raises():
     for driver, error, part in [
         (broken, KeyError, "weights"),
         (lambda grids: np.zeros((1, 3)), ValueError, "shape"),
-        (lambda grids: np.full((len(grids), 2), np.nan), ValueError, "no finite point"),
+        (lambda grids: np.full((len(grids), 2), np.nan), ValueError, "not a finite point"),
     ]:
         with pytest.raises(error, match=part):
             lotpilot.evaluate({"driver": driver}, "lot-b", trials=1)

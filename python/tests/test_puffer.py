@@ -62,7 +62,7 @@ def test_a_puffer_environment_writes_into_the_buffers_that_it_is_given(puffer):
     own = zip([observations, rewards, terminals, truncations], given.values(), strict=False)
     assert all(ours is theirs for ours, theirs in own)
     assert (given["observations"] != first).any() and given["rewards"].any()
-    # All four run out of time at the 40th tick, and begin anew in it.
+    # All four run out of time at the 40th tick, and begin again in it.
     assert len(ended) == 4 and all(info["time_s"] == pytest.approx(2.0) for info in ended)
     envs.close()
 

@@ -103,9 +103,9 @@ def test_what_cannot_be_driven_is_one_clear_error(cluster, tmp_path, monkeypatch
     def drive(driver, out, lots="lot-b", **options):
         return lotpilot.ray.evaluate(driver, lots, trials=1, shards=2, out=tmp_path / out, **options)
 
-    with pytest.raises(lotpilot.ray.ShardError, match='"lot-z" is no lot'):
+    with pytest.raises(lotpilot.ray.ShardError, match='"lot-z" is not a lot'):
         drive("expert", "a", lots="lot-z")
-    assert '"lot-z" is no lot' in (tmp_path / "a.shards/failures.txt").read_text(encoding="utf-8")
+    assert '"lot-z" is not a lot' in (tmp_path / "a.shards/failures.txt").read_text(encoding="utf-8")
     with pytest.raises(lotpilot.ray.ShardError, match="KeyError: 'weights'"):
         drive({"broken": broken}, "b")
     with pytest.raises(ValueError, match="1 or more"):

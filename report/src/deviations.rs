@@ -30,8 +30,8 @@ struct Row {
     per_100m: f64,
     lower: f64,
     upper: f64,
-    /// Near-collisions per 100 m, this less that of the same method with everything as it is; empty where the car is
-    /// another, and so the runs are no pairs.
+    /// Near-collisions per 100 m, this less that of the same method with everything as it is; empty where the car
+    /// differs, so that the runs are not pairs.
     difference_per_100m: Option<f64>,
     difference_lower: Option<f64>,
     difference_upper: Option<f64>,

@@ -9,7 +9,7 @@ use std::path::Path;
 /// How every page says what it is.
 const WRITTEN: &str = "Written by a command from its runs; nothing here is typed by hand.";
 
-/// Whether a file is such a page, which may be written anew.
+/// Whether a file is such a page, which may be overwritten.
 pub fn is_page_of_results(path: &Path) -> bool {
     storage::read::text(path, RUN_TEXT_BYTES_MAX).is_ok_and(|text| text.contains(WRITTEN))
 }

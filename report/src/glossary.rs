@@ -75,7 +75,7 @@ pub const DISCREPANCY: Term = term(
     "Discrepancy τ̂",
     "The distance between the look-ahead points of network and expert, in fractions of the side of the grid.",
 );
-/// From where on the expert takes over.
+/// The threshold beyond which the expert takes over.
 pub const TAU: Term = term("tau", "τ", "The threshold of the discrepancy: above it, the expert drives.");
 /// How unsure the network is.
 pub const DOUBT: Term = term(
@@ -91,7 +91,7 @@ pub const NOISE: Term = term(
      level paper imitates the errors in the figures of the paper; clean has none; other levels are multiples of paper.",
 );
 
-/// In the order of a glossary.
+/// Every term, in the order of a glossary.
 pub const ALL: [Term; 12] = [
     NEAR_COLLISION,
     CONTACT,

@@ -29,7 +29,7 @@ pub fn player(key: &str, settings: &Settings) -> anyhow::Result<Player> {
         Event::NearCollision { at, .. } => Some(at),
         Event::Drove | Event::Stuck { .. } | Event::ReachedEnd => None,
     });
-    let at = found.context("driven again, it does not happen: was the network trained anew since?")?;
+    let at = found.context("driven again, it does not happen: has the network been trained again since?")?;
 
     // Counted from the tick, so that one picture shows it.
     let at_s = key.tick as f32 * period_s;

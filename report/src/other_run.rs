@@ -77,7 +77,7 @@ impl OtherRun {
     fn read(&self) -> anyhow::Result<Found> {
         let folder = &self.folder;
         let name = folder.display();
-        ensure!(folder.is_dir() && manifest::is_finished(folder)?, "{name}: this is no finished run");
+        ensure!(folder.is_dir() && manifest::is_finished(folder)?, "{name}: this is not a finished run");
         let manifest = Manifest::read(folder)?;
         let (title, table) = match manifest.command.as_str() {
             "deviations" => (deviations::TITLE, "deviations.md"),
@@ -129,6 +129,6 @@ mod tests {
         assert_eq!(of("The paper's regime=runs/paper"), titled);
         assert_eq!(titled.to_string(), "The paper's regime=runs/paper");
         let error = of("no/such/run").add_to(&mut Page::new("Results")).unwrap_err().to_string();
-        assert!(error.contains("no/such/run: this is no finished run"), "{error}");
+        assert!(error.contains("no/such/run: this is not a finished run"), "{error}");
     }
 }

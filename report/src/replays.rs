@@ -13,9 +13,9 @@ pub struct Row {
     pub key: ReplayKey,
     /// The name of its lot.
     pub lot: String,
-    /// What it came to.
+    /// Its result.
     pub metrics: EpisodeMetrics,
-    /// Of everything seen, decided and driven.
+    /// The digest of everything seen, decided and driven.
     pub sha256: String,
     /// Whether it was the same when it was recorded; `None` if it is not known.
     #[serde(rename = "same")]

@@ -91,7 +91,7 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
     }
     let titles = std::iter::once(rules::CLONED).chain(extent.rules.iter().map(|rule| rules::title(rule)));
     let mut pooled: Vec<Row> = titles.map(|title| pool(&rows, title)).collect();
-    // Networks that drove the same lots are no independent evidence: the metres are those of one.
+    // Networks that drove the same lots are not independent evidence: the metres are those of one.
     let team = |title: &str| {
         let drivers: Vec<usize> = (0..rows.len()).filter(|&driver| rows[driver].rule == title).collect();
         let seeds = drivers.iter().filter_map(|&driver| rows[driver].seed).collect();

@@ -36,7 +36,7 @@ pub const FILE: &str = "report.html";
 const STEM: &str = "report";
 /// Near-collisions that are shown.
 const MOMENTS: usize = 6;
-/// Of these at most so many of one driver on one lot.
+/// At most this many of them are of one driver on one lot.
 const MOMENTS_OF_A_KIND: usize = 2;
 /// Rows of one plot; with more only the pooled lots are drawn.
 const ROWS_MAX: usize = 18;
@@ -63,7 +63,7 @@ struct Training {
 struct Evaluation {
     text: String,
     tables: Tables,
-    /// Of the runs by noise level, driver and lot.
+    /// Safe ratios of the runs, by noise level and driver, then by lot.
     safe_ratios: BTreeMap<(String, String), BTreeMap<String, Vec<f32>>>,
     /// Near-collisions in all.
     near_collisions: usize,
@@ -130,12 +130,12 @@ impl Evaluation {
         self.rows(noise).filter(|row| row.lots == self.pooled())
     }
 
-    /// In the order of the tables.
+    /// The drivers in the order of the tables.
     fn drivers(&self) -> Vec<&str> {
         first_seen(self.tables.rows.iter().map(|row| row.driver.as_str()))
     }
 
-    /// In the order of the tables.
+    /// The noise levels in the order of the tables.
     fn levels(&self) -> Vec<NoiseChoice> {
         self.tables.rows.iter().fold(Vec::new(), |mut levels, row| {
             if !levels.contains(&row.noise) {
@@ -461,7 +461,7 @@ fn add_moments(
         (_, some) => (
             format!("`failures.md` lists all {count} with their causes."),
             format!(
-                " Shown are the {some} in which the car was fastest, at most {MOMENTS_OF_A_KIND} per driver and lot."
+                " The {some} in which the car was fastest are shown, at most {MOMENTS_OF_A_KIND} per driver and lot."
             ),
         ),
     };
@@ -501,7 +501,7 @@ fn add_moments(
     Ok(())
 }
 
-/// The command that shows a near-collision again. Drivers that are no runs do not bring their settings along.
+/// The command that shows a near-collision again. Drivers that are not runs do not bring their settings along.
 fn visualise(key: &str, folder: &Path) -> String {
     let brings_settings = key.parse::<ReplayKey>().is_ok_and(|key| key.driver.run().is_some());
     if brings_settings {

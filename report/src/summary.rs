@@ -32,7 +32,7 @@ pub fn to_markdown(summary: &Summary<'_>) -> String {
     for (level, noise) in summary.levels().iter().enumerate() {
         let has_paper = *noise == NoiseChoice::Paper;
         let _ = write!(text, "Near-collisions, noise {noise}\n\n{}\n\n", rates_table(summary, level, has_paper));
-        // Only those lots draw their obstacles anew.
+        // Only those lots draw new obstacles in every trial.
         let fitted = if summary.plan.lots.iter().any(Lot::is_drawn_per_trial) {
             " (lots a, b and c are as wide as the expert needs for the paper's)"
         } else {

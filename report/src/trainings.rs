@@ -1,4 +1,4 @@
-//! Several trainings that differ by their seed: what each came to, and the mean over them.
+//! Several trainings that differ by their seed: the result of each, and the mean over them.
 
 use crate::drive::rows_of;
 use crate::markdown::table_of;
@@ -18,8 +18,8 @@ use std::path::Path;
 pub(crate) const HEADER: [&str; 7] =
     ["driver", "trainings", "lots", "near-collisions, by seed", "contacts", "per 100 m [95 %]", "Δ per 100 m [95 %]"];
 
-/// A team on some lots: what each of its trainings came to, their mean and, for another than all are compared with, the
-/// difference.
+/// A team on some lots: the result of each of its trainings, their mean and, unless it is the team that all are
+/// compared with, the difference.
 pub(crate) fn row(team: &Team, lots: &str, each: &[Totals], estimate: &TeamEstimate, is_other: bool) -> [String; 7] {
     let Interval { estimate: difference, lower, upper, .. } = estimate.difference_per_100m;
     [

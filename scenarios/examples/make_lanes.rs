@@ -10,7 +10,7 @@ const RADII_M: [f64; 5] = [8.0, 10.0, 15.0, 20.0, 30.0];
 const WIDTHS_M: [f64; 7] = [2.8, 3.0, 3.4, 4.0, 5.0, 6.5, 8.0];
 /// Pieces of a bend.
 const PIECES: u32 = 24;
-/// From the ends of the lane to those of the route, metres: room for the car, and for what it looks at.
+/// Distance from the ends of the lane to those of the route, metres: room for the car, and for what it looks at.
 const ENDS_M: f64 = 17.0;
 
 fn folder() -> PathBuf {

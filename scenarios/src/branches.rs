@@ -116,7 +116,7 @@ fn kerbs(map: &Map, branch: &Branch) -> Vec<Scenario> {
     chords.into_iter().map(with_kerb).collect()
 }
 
-/// From wall to wall through a point.
+/// The chord from wall to wall through a point.
 fn chord(map: &Map, point: Vec2, direction: u8) -> Option<(Vec2, Vec2)> {
     const STEP_M: f32 = 0.1;
     let along = maths::unit(std::f32::consts::PI * f32::from(direction) / f32::from(KERB_DIRECTIONS));
@@ -273,7 +273,7 @@ mod tests {
         assert!(mouth.distance(Vec2::new(30.0, 4.0)) < 2.5, "{mouth}");
     }
 
-    /// The way through the next aisle begins and ends at the route; a thin wall between the two is no way.
+    /// The way through the next aisle begins and ends at the route; a thin wall between the two is not a way.
     #[test]
     fn both_mouths_of_a_way_round_are_found() {
         let mut lot = Scenario::new(

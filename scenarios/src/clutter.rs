@@ -85,7 +85,7 @@ pub struct LaneEncroachment {
 /// The obstacles of a lot.
 #[derive(Debug, Clone)]
 pub struct Clutter {
-    /// In the lane and outside.
+    /// The obstacles, in the lane and outside.
     pub obstacles: Vec<Obstacle>,
     /// The stretches they narrow, reserved ones included.
     pub encroachments: Vec<LaneEncroachment>,

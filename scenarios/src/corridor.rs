@@ -67,7 +67,7 @@ pub struct Blueprint {
 /// One straight piece.
 #[derive(Debug, Clone)]
 pub struct LegPlan {
-    /// From vertex to vertex (start and finish count as vertices), metres.
+    /// Length from vertex to vertex (start and finish count as vertices), metres.
     pub length_m: f32,
     /// Lane widths, each valid from its `from_m` on; the first one also before it. Ascending.
     pub widths: Vec<WidthStep>,
@@ -142,12 +142,12 @@ impl CornerPlan {
         if self.turn_rad > 0.0 { Side::Left } else { Side::Right }
     }
 
-    /// From the vertex to the foot of the inner rounding, metres.
+    /// Distance from the vertex to the foot of the inner rounding, metres.
     fn inner_reach_m(&self) -> f32 {
         (0.5 * self.width_m + self.inner_radius_m) * maths::tan(0.5 * self.turn_rad.abs())
     }
 
-    /// From the vertex to where the lane has its own width again, on either side, metres.
+    /// Distance from the vertex to where the lane has its own width again, on either side, metres.
     pub fn extent_m(&self) -> f32 {
         self.reach_m.max(self.inner_reach_m()) + self.taper_m
     }
@@ -158,7 +158,7 @@ impl CornerPlan {
 pub struct Leg {
     /// First vertex, heading along the leg.
     pub origin: Pose,
-    /// From vertex to vertex, metres.
+    /// Length from vertex to vertex, metres.
     pub length_m: f32,
     /// Where the straight lane begins and ends behind corner widenings, metres along the leg (includes the run-outs).
     pub lane_from_m: f32,
@@ -213,9 +213,9 @@ impl Leg {
 /// A lot: legs in the world, boundary and route.
 #[derive(Debug, Clone)]
 pub struct Corridor {
-    /// In driving order.
+    /// The legs in driving order.
     pub legs: Vec<Leg>,
-    /// Between them.
+    /// The corners between them.
     pub corners: Vec<CornerPlan>,
     /// Outline of the drivable ground, counter-clockwise.
     pub boundary: Vec<Vec2>,

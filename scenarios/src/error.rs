@@ -90,7 +90,7 @@ pub(crate) fn line_at(text: &str, offset: usize) -> usize {
     1 + text.get(..offset).unwrap_or(text).matches('\n').count()
 }
 
-/// The text of a file of at most so many bytes.
+/// The text of a file of at most this many bytes.
 pub(crate) fn read_text(path: &Path, bytes_max: u64) -> Result<String, LoadError> {
     storage::read::text(path, bytes_max)
         .map_err(|error| LoadError::Unreadable { file: path.display().to_string(), problem: error.to_string() })

@@ -41,7 +41,7 @@ use corridor::DifficultySettings;
 use sim::scenario::Scenario;
 use sim::seed::Rng;
 
-/// Draws a lot without a name; `None` if the draw came to nothing.
+/// Draws a lot without a name; `None` if the draw failed.
 pub(crate) fn draw(family: Family, layout: &mut Rng, obstacles: &mut Rng) -> Option<Scenario> {
     let on_strip = match family {
         Family::Easy => return Some(corridor::draw(&DifficultySettings::easy(), layout, obstacles)),
@@ -107,7 +107,7 @@ mod tests {
                 let Some((scenario, strip)) = drawn else { continue };
                 let scenario = Scenario { name: family.name().to_owned(), ..scenario };
                 let outline = strip.outline(0.0);
-                // What is no deeper than a stall is no way.
+                // Anything no deeper than a stall is not a way.
                 let sides = strip.notches.iter().map(|notch| strip.mouth(notch));
                 let mouths: Vec<_> =
                     sides.chain(strip.stub_mouths()).filter(|mouth| mouth.depth_m > STALL_DEPTH_M).collect();

@@ -58,7 +58,7 @@ mod tests {
     use sim::map::Map;
     use sim::path::Path;
 
-    /// Of every family in every split.
+    /// Number of lots of every family in every split.
     const LOTS: u64 = 6;
 
     fn of_every_family() -> impl Iterator<Item = (Family, u64, Generated)> {

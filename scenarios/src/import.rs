@@ -174,7 +174,7 @@ impl MapLot {
         for (key, file) in [("map", Some(&lot.map)), ("centre_line", lot.centre_line.as_ref())] {
             // What is missing is an error when it is read.
             if file.is_some_and(|file| read::is_below(folder, file).is_ok_and(|is_below| !is_below)) {
-                let problem = "it is neither beside this file nor in a folder below".to_owned();
+                let problem = "it is neither next to this file nor in a folder below".to_owned();
                 let remedy = "put it there, or name the map itself with --lots of cargo xtask generate";
                 return Err(lot.fault(key, problem, remedy));
             }
@@ -321,15 +321,14 @@ impl MapLot {
         let corners = region.corners();
         if corners > OUTLINE_CORNERS_MAX {
             let problem = format!("the outlines of what is drivable have {corners} corners");
-            let remedy = format!("smooth the image, or crop it: {OUTLINE_CORNERS_MAX} are possible");
+            let remedy = format!("smooth the image, or crop it, to at most {OUTLINE_CORNERS_MAX}");
             return Err(self.fault("map", problem, &remedy));
         }
         let (region, dropped) = region.without_specks(in_px2(self.drop_specks_m2));
         let islands = region.islands();
         if islands > ISLANDS_MAX {
             let problem = format!("what is drivable encloses {islands} islands");
-            let remedy =
-                format!("smooth the image, or leave specks out with drop_specks_m2: {ISLANDS_MAX} are possible");
+            let remedy = format!("smooth the image, or leave specks out with drop_specks_m2, to at most {ISLANDS_MAX}");
             return Err(self.fault("map", problem, &remedy));
         }
         let (region, padded) = region.with_large_specks(pixel, in_px2(ISLAND_MIN_M2));
@@ -424,7 +423,7 @@ impl MapLot {
         let length_m: f32 = points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
         if length_m > ROUTE_MAX_M {
             let problem = format!("it is {:.0} km long in the lot", length_m / 1000.0);
-            return Err(self.fault("centre_line", problem, &format!("shorten it: {ROUTE_MAX_M} m are possible")));
+            return Err(self.fault("centre_line", problem, &format!("shorten it to at most {ROUTE_MAX_M} m")));
         }
         let back = points.windows(3).find(|three| {
             let turn_rad = (three[1] - three[0]).angle_to(three[2] - three[1]);

@@ -64,7 +64,7 @@ pub fn suite(names: &str) -> Result<Vec<LotSpec>, SpecError> {
 /// One lot, by name.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LotSpec {
-    /// One of the paper's: fixed geometry, obstacles drawn anew for every trial.
+    /// One of the paper's: fixed geometry, new obstacles in every trial.
     Reference(ReferenceLot),
     /// A procedural one: geometry and obstacles are fixed by its name.
     Generated {
@@ -201,7 +201,7 @@ fn generated_suite(name: &str) -> Result<Vec<LotSpec>, SpecError> {
                 ))
             })?)
         }
-        other => other.and_then(split_called).ok_or_else(|| fault("is no lot".to_owned()))?,
+        other => other.and_then(split_called).ok_or_else(|| fault("is not a lot".to_owned()))?,
     };
     let count = parts.next().ok_or_else(|| fault("does not say how many lots".to_owned()))?;
     let count: u64 = count
@@ -279,27 +279,27 @@ mod tests {
     #[test]
     fn other_names_are_refused_with_what_there_is() {
         let table = [
-            ("lot-d", "\"lot-d\" is no lot; there are lot-a, lot-b"),
-            ("", "\"\" is no lot; there are"),
-            ("lot-a,", "\"\" is no lot; there are"),
+            ("lot-d", "\"lot-d\" is not a lot; there are lot-a, lot-b"),
+            ("", "\"\" is not a lot; there are"),
+            ("lot-a,", "\"\" is not a lot; there are"),
             ("train", "\"train\" does not say how many lots; there are"),
             ("train:x", "\"train:x\" asks for \"x\" lots, not for a number from 1 to"),
             ("test:0", "\"test:0\" asks for \"0\" lots"),
             ("test:5:brutal", "\"test:5:brutal\" has no family \"brutal\"; there are"),
             ("test:5:hard:1", "\"test:5:hard:1\" has \"1\" too much"),
-            ("test-hard-x", "\"test-hard-x\" is no lot; there are"),
-            ("lotb", "\"lotb\" is no lot; did you mean lot-b?; there are"),
-            ("Lot-B", "\"Lot-B\" is no lot; did you mean lot-b?; there are"),
-            ("test-20", "\"test-20\" is no lot; did you mean test:20?; there are"),
+            ("test-hard-x", "\"test-hard-x\" is not a lot; there are"),
+            ("lotb", "\"lotb\" is not a lot; did you mean lot-b?; there are"),
+            ("Lot-B", "\"Lot-B\" is not a lot; did you mean lot-b?; there are"),
+            ("test-20", "\"test-20\" is not a lot; did you mean test:20?; there are"),
             ("sealed", "\"sealed\" does not say which phrase; there are"),
             ("sealed:spring", "\"sealed:spring\" does not say how many lots; there are"),
             (
                 "sealed:Spring:3",
                 "\"sealed:Spring:3\" has the phrase \"Spring\"; write 1 to 40 of a-z, 0-9 and -, which",
             ),
-            ("sealed-spring-hard-1048576", "\"sealed-spring-hard-1048576\" is no lot"),
-            ("sealed-hard-7", "\"sealed-hard-7\" is no lot"),
-            ("test-hard-99999999999999999999", "\"test-hard-99999999999999999999\" is no lot"),
+            ("sealed-spring-hard-1048576", "\"sealed-spring-hard-1048576\" is not a lot"),
+            ("sealed-hard-7", "\"sealed-hard-7\" is not a lot"),
+            ("test-hard-99999999999999999999", "\"test-hard-99999999999999999999\" is not a lot"),
         ];
         for (name, expected) in table {
             let message = names(name).expect_err(name).to_string();

@@ -25,7 +25,7 @@ pub fn load(path: &Path, vehicle: &VehicleSettings) -> Result<Scenario, LoadErro
     load_with_notes(path, vehicle).map(|loaded| loaded.scenario)
 }
 
-/// [`load`], and what is to be said about the lot.
+/// [`load`], with notes about the lot.
 ///
 /// # Errors
 /// The first thing wrong with it, with its place.

@@ -2,12 +2,12 @@
 
 use sim::scenario::Scenario;
 
-/// A lot from a file, and what is to be said about it.
+/// A lot from a file, and notes about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loaded {
     /// The lot.
     pub scenario: Scenario,
-    /// What is to be said, in order of the work; of a lot written by hand, nothing.
+    /// Notes in order of the work; none for a lot written by hand.
     pub notes: Vec<Note>,
 }
 
@@ -16,7 +16,7 @@ pub struct Loaded {
 pub enum Note {
     /// The map is far from its origin, where single precision is too coarse: the lot's origin is this place.
     Recentred {
-        /// Of the lot's origin.
+        /// The place of the lot's origin.
         origin: [f64; 2],
     },
     /// Occupied specks smaller than the smallest island were made as large as it.

@@ -1,8 +1,8 @@
 //! The three lots of the paper, rebuilt: length, corners and difficulty are the paper's, everything else is chosen.
 //!
-//! The paper prints only lengths and pictures; turns and widths are such that a scripted expert reaches the
-//! paper's safe ratios .83/.72/.91 (docs/methods.md E3). A lot's geometry is fixed, its obstacles are drawn anew for
-//! every trial.
+//! The paper prints only lengths and pictures; turns and widths are such that a scripted expert reaches the paper's
+//! safe ratios .83/.72/.91 (docs/methods.md E3). A lot's geometry is fixed; its obstacles are drawn again for every
+//! trial.
 
 use crate::clutter::{self, ClutterPlan, Furniture};
 use crate::corridor::{Blueprint, Bulge, CornerPlan, Corridor, LegPlan, Side, WidthStep, rounded_length_m};
@@ -23,7 +23,7 @@ pub enum ReferenceLot {
 }
 
 impl ReferenceLot {
-    /// In the paper's order.
+    /// All three, in the paper's order.
     pub const ALL: [Self; 3] = [Self::A, Self::B, Self::C];
 
     /// Name on the command line and in tables.
@@ -87,13 +87,13 @@ const SPEED_BUMP_EVERY_M: f32 = 60.0;
 
 /// A row of the table in docs/methods.md E3.
 struct LotPlan {
-    /// Of the rounded route.
+    /// Length of the rounded route.
     length_m: f32,
     legs_m: &'static [f32],
     turns: &'static [Side],
     /// Free lane between corners, re-drawn every 9–18 m.
     lane_m: RangeInclusive<f32>,
-    /// Beside anything that narrows it.
+    /// Free gap beside anything that narrows it.
     free_gap_m: RangeInclusive<f32>,
     double_parked_share: f32,
 }

@@ -40,7 +40,7 @@ const WAYPOINT_M: f32 = 0.25;
 /// A drivable route.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// From start to finish, 0.25 m apart.
+    /// Waypoints from start to finish, 0.25 m apart.
     pub waypoints: Vec<Waypoint>,
     /// Search effort.
     pub expansions: usize,

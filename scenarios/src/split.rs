@@ -59,7 +59,7 @@ impl Split {
     /// The splits that everybody shares, in the order of use.
     pub const OPEN: [Self; 3] = [Self::Train, Self::Validation, Self::Test];
 
-    /// From 1, so that small seeds that people type never meet a generated lot's.
+    /// The number of the split, from 1, so that small seeds that people type never meet a generated lot's.
     fn number(&self) -> u64 {
         match self {
             Self::Train => 1,
@@ -81,7 +81,7 @@ impl Split {
     /// 2³⁶ draw the same lots.
     ///
     /// # Panics
-    /// On an index of [`Self::size`] or more.
+    /// If the index is [`Self::size`] or more.
     pub fn seed(&self, family: Family, index: u64) -> RootSeed {
         assert!(index < self.size(), "lot index {index} is too large");
         let index = match self {
@@ -123,7 +123,7 @@ impl Phrase {
 }
 
 impl Family {
-    /// In the order of their numbers, which are part of the seeds: append, never renumber.
+    /// Every family in the order of their numbers, which are part of the seeds: append, never renumber.
     pub const ALL: [Self; 12] = [
         Self::Easy,
         Self::Medium,

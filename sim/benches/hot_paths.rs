@@ -157,7 +157,7 @@ fn episode_new(bencher: Bencher<'_, '_>) {
     bencher.bench_local(|| Episode::new(Arc::clone(&settings), Arc::clone(&map), RootSeed(1)));
 }
 
-/// Of the lane turned by some degrees.
+/// Building the map of the lane, turned by some degrees.
 #[divan::bench(args = [0, 45])]
 fn map_build(bencher: Bencher<'_, '_>, turned_deg: i32) {
     let lane = turned(&scenario(WIDTH_M), (turned_deg as f32).to_radians());

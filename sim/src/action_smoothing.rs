@@ -22,7 +22,7 @@ struct Aim {
 }
 
 impl ActionSmoothing {
-    /// With a time constant in control ticks, 0 or more; 0 drives at the last answer alone.
+    /// A smoothing with a time constant in control ticks, 0 or more; 0 drives at the last answer alone.
     pub fn new(ticks: f32) -> Self {
         // The response to a step is 1 − exp(−t / time constant).
         let gain = if ticks > 0.0 { 1.0 - maths::exp(-1.0 / ticks) } else { 1.0 };
@@ -59,7 +59,7 @@ pub struct FleetSmoothing {
 }
 
 impl FleetSmoothing {
-    /// With a time constant in control ticks, as for [`ActionSmoothing::new`].
+    /// A smoothing with a time constant in control ticks, as for [`ActionSmoothing::new`].
     pub fn new(ticks: f32) -> Self {
         Self { fresh: ActionSmoothing::new(ticks), by_episode: Vec::new() }
     }
@@ -85,7 +85,7 @@ pub struct SmoothedFleet<F> {
 }
 
 impl<F: Fleet> SmoothedFleet<F> {
-    /// With a time constant in control ticks, as for [`ActionSmoothing::new`].
+    /// A fleet with a time constant in control ticks, as for [`ActionSmoothing::new`].
     pub fn new(fleet: F, ticks: f32) -> Self {
         Self { fleet, smoothing: FleetSmoothing::new(ticks) }
     }

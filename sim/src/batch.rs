@@ -9,13 +9,13 @@ use crate::frame::Frame;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// What is no finite number, and would have been driven with.
+/// A value that is not finite, and that would have been driven with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("episode {episode}, tick {tick}: {what} is no finite number")]
+#[error("episode {episode}, tick {tick}: {what} is not a finite number")]
 pub struct NotFinite {
     /// Index of the episode among those of all fleets.
     pub episode: usize,
-    /// Control tick of it, from 0.
+    /// Its control tick, from 0.
     pub tick: u32,
     /// The driver's answer, or the state of the car.
     pub what: &'static str,
@@ -26,7 +26,7 @@ pub struct NotFinite {
 /// Reports come in the order of the episodes. `on_frame(episode, frame)` is called in that order within a tick.
 ///
 /// # Errors
-/// If the fleet answers with what is no finite number.
+/// If an answer of the fleet is not finite.
 pub fn run_lockstep(
     episodes: Vec<Episode>,
     fleet: &mut dyn Fleet,
@@ -47,7 +47,7 @@ fn all_of(reports: Vec<Option<EpisodeReport>>) -> Vec<EpisodeReport> {
 /// that had not ended by then.
 ///
 /// # Errors
-/// As [`run_lockstep`].
+/// See [`run_lockstep`].
 pub fn run_lockstep_until(
     mut episodes: Vec<Episode>,
     fleet: &mut dyn Fleet,
@@ -87,7 +87,7 @@ pub struct SeatedFleet {
     episodes: Vec<Episode>,
     /// The index of each of them among the episodes of all fleets.
     indices: Vec<usize>,
-    /// Of each tick since they were last passed on, a frame of each car that drove, with its index among all.
+    /// For each tick since they were last passed on, a frame of each car that drove, with its index among all.
     frames: [Vec<(usize, Frame)>; TICKS_AT_ONCE],
     /// What ended its drive, and the place of its tick among those of `frames`.
     refused: Option<(usize, NotFinite)>,
@@ -160,7 +160,7 @@ impl SeatedFleet {
 /// fleets; otherwise as [`run_lockstep`].
 ///
 /// # Errors
-/// As [`run_lockstep`].
+/// See [`run_lockstep`].
 pub fn run_fleets(
     fleets: Vec<SeatedFleet>,
     on_frame: &mut dyn FnMut(usize, &Frame),
@@ -175,7 +175,7 @@ pub fn run_fleets(
 /// Like [`run_fleets`], but stops as [`run_lockstep_until`] does.
 ///
 /// # Errors
-/// As [`run_lockstep`].
+/// See [`run_lockstep`].
 pub fn run_fleets_until(
     mut fleets: Vec<SeatedFleet>,
     on_frame: &mut dyn FnMut(usize, &Frame) -> ControlFlow<()>,

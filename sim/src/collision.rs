@@ -91,7 +91,7 @@ pub struct BodyBox {
     centre_ahead_m: f32,
     discs_in_ego: Vec<FourPoints>,
     disc_radius_m: f32,
-    /// From the rear axle to the farthest centre of a disc, metres.
+    /// Distance from the rear axle to the farthest centre of a disc, metres.
     disc_reach_m: f32,
     outline_in_ego: Vec<FourPoints>,
 }
@@ -245,7 +245,8 @@ mod tests {
         assert!(clear[0].0 > 100 && clear.iter().all(|(_, n_hits)| *n_hits > 100), "{clear:?}");
     }
 
-    /// Of 600 states those that stay clear, and the steps from them that sweep into something: none of a clear one.
+    /// How many of 600 states stay clear, and how many steps from the others sweep into something; no step from a clear
+    /// one may.
     fn clear_and_hits(vehicle: &VehicleSettings) -> (u32, u32) {
         let pillar = |x, y| Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(x, y), 0.4));
         let scenario =

@@ -69,7 +69,8 @@ impl ControllerSettings {
 /// Shortest look-ahead distance, metres: below it the circle through the point is meaningless.
 const LOOK_AHEAD_MIN_M: f32 = 1.0;
 
-/// From the front bumper to the lower edge of the patch, metres: 0.5 m for the paper's car and patch (docs/methods.md 2.5).
+/// Distance from the front bumper to the lower edge of the patch, metres: 0.5 m for the paper's car and patch
+/// (docs/methods.md 2.5).
 ///
 /// In whole millimetres: single precision makes 0.500_000_5 m of 4.30 m − (4.91 m − 1.11 m).
 pub fn bumper_to_patch_m(vehicle: &VehicleSettings, geometry: &GridGeometry) -> f32 {

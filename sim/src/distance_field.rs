@@ -170,8 +170,8 @@ impl DistanceField {
         from_stored(as_lanes(&indices(rows, cols, self.n_cols()).map(|index| self.nodes[index])))
     }
 
-    /// A lower bound of [`Self::at`] in a box of at most 0.6 m by 0.6 m, but for rounding. Minus infinity if the box is
-    /// larger or at the very end of the raster.
+    /// A lower bound of [`Self::at`] in a box of at most 0.6 m by 0.6 m, except for rounding. Minus infinity if the box
+    /// is larger or at the very end of the raster.
     ///
     /// Between nodes the field is bilinear, so it is lowest on a grid of points: nodes inside the box, and where their
     /// rows and columns meet its sides.

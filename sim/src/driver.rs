@@ -60,7 +60,7 @@ impl Source {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Expert, Self::Novice, Self::Planner];
 
-    /// In legends.
+    /// Its name in legends.
     pub fn name(self) -> &'static str {
         match self {
             Self::Expert => "expert",

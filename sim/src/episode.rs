@@ -32,7 +32,7 @@ use std::sync::Arc;
 pub struct EpisodeSettings {
     /// The car.
     pub vehicle: VehicleSettings,
-    /// From look-ahead point to command.
+    /// How a look-ahead point becomes a command.
     pub controller: ControllerSettings,
     /// Camera and bird's-eye view.
     pub sensing: SensingSettings,

@@ -34,7 +34,7 @@ pub enum Event {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Ending {
-    /// At the finish.
+    /// The car reached the finish.
     ReachedEnd,
     /// Given up after too many near-collisions and stuck events.
     TooManyEvents,

@@ -72,9 +72,9 @@ pub enum SafeRange {
 pub struct SafeRing {
     /// Four by four, blocks of 4×4 pixels.
     blocks: Vec<FourSquares>,
-    /// Of each block, its quarters.
+    /// The quarters of each block.
     quarters: Vec<FourSquares>,
-    /// Of each quarter, its pixels.
+    /// The pixels of each quarter.
     pixels: Vec<FourSquares>,
     n_pixels: u32,
     pixel_m: f32,
@@ -342,7 +342,7 @@ mod tests {
 
     #[test]
     fn the_ring_has_the_area_of_methods_8_2() {
-        // 2·(4.91 + 1.86)·1 + π·1² = 16.68 m² = 4634 pixels of 0.06 m, but for whole pixels at its edges.
+        // 2·(4.91 + 1.86)·1 + π·1² = 16.68 m² = 4634 pixels of 0.06 m, except for whole pixels at its edges.
         let n = ring().n_pixels();
         assert!(n.abs_diff(4634) < 4634 / 50, "{n} pixels");
     }

@@ -19,7 +19,7 @@ impl Path {
     /// Rounds the interior vertices of a polyline and samples it.
     ///
     /// # Panics
-    /// On fewer than two points, or coincident ones: [`crate::validate::validate`] refuses those.
+    /// If there are fewer than two points, or coincident ones: [`crate::validate::validate`] refuses those.
     pub fn new(reference: &ReferencePath) -> Self {
         let pieces = rounded(&reference.points, reference.corner_radius_m);
         let length_m: f32 = pieces.iter().map(|piece| piece.length_m).sum();

@@ -279,21 +279,21 @@ impl Scenario {
         Self::new("lane", boundary, [(*route_m.start(), 0.0), (*route_m.end(), 0.0)])
     }
 
-    /// With the corners of the route rounded.
+    /// The same lot with the corners of the route rounded.
     #[must_use]
     pub fn with_corner_radius_m(mut self, corner_radius_m: f32) -> Self {
         self.reference_path.corner_radius_m = corner_radius_m;
         self
     }
 
-    /// With more obstacles.
+    /// The same lot with more obstacles.
     #[must_use]
     pub fn with_obstacles(mut self, obstacles: impl IntoIterator<Item = Obstacle>) -> Self {
         self.obstacles.extend(obstacles);
         self
     }
 
-    /// With more speed bumps.
+    /// The same lot with more speed bumps.
     #[must_use]
     pub fn with_speed_bumps(mut self, speed_bumps: impl IntoIterator<Item = SpeedBump>) -> Self {
         self.speed_bumps.extend(speed_bumps);

@@ -23,7 +23,7 @@ pub const BEV_PIXELS: usize = GRID_CELLS * CELL_PIXELS;
 pub struct GridGeometry {
     /// Side of the patch, metres (R in docs/methods.md; 12.0 m from the authors' constants).
     pub side_m: f32,
-    /// From the rear axle to the lower edge of the patch, metres.
+    /// Distance from the rear axle to the lower edge of the patch, metres.
     pub near_edge_ahead_m: f32,
 }
 

@@ -55,7 +55,7 @@ pub fn validate(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), Sc
     let length_m: f32 = scenario.reference_path.points.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
     if length_m > ROUTE_MAX_M {
         let problem = format!("the route is {:.0} km long", length_m / 1000.0);
-        return fault(Place::ReferencePath(None), problem, format!("end it earlier: {ROUTE_MAX_M} m are possible"));
+        return fault(Place::ReferencePath(None), problem, format!("end it within {ROUTE_MAX_M} m"));
     }
     let path = Path::new(&scenario.reference_path);
     if path.length_m() < PATH_MIN_M {
@@ -66,7 +66,7 @@ pub fn validate(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), Sc
     check_route(scenario, &Route::new(&path))
 }
 
-/// Refuses an island that is no sound outline within the boundary. `index`: its number, from 0.
+/// Refuses an island that is not a sound outline within the boundary. `index`: its number, from 0.
 ///
 /// # Errors
 /// The first problem found, with a remedy.
@@ -88,7 +88,7 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
     if length > NAME_CHARS_MAX {
         let start: String = name.chars().take(20).collect();
         let problem = format!("the name {start:?} … has {length} characters");
-        return fault(Place::Name, problem, format!("shorten it: {NAME_CHARS_MAX} are possible"));
+        return fault(Place::Name, problem, format!("shorten it to at most {NAME_CHARS_MAX}"));
     }
     if let Some(bad) = name.chars().find(|&c| c.is_control() || matches!(c, '/' | '\\') || is_invisible(c)) {
         let problem = format!("the name {name:?} contains {bad:?}");
@@ -115,7 +115,7 @@ fn check_counts(scenario: &Scenario) -> Result<(), ScenarioError> {
     ];
     match counts.into_iter().find(|(_, _, count, max)| count > max) {
         Some((place, what, count, max)) => {
-            fault(place, format!("there are {count} {what}"), format!("leave some out: {max} are possible"))
+            fault(place, format!("there are {count} {what}"), format!("leave some out: at most {max} fit"))
         }
         None => Ok(()),
     }
@@ -583,7 +583,7 @@ mod tests {
         }
     }
 
-    /// A car beside the path or behind the boundary is no fault: that is what lots are full of.
+    /// A car beside the path or behind the boundary is not a fault: lots are full of them.
     #[test]
     fn neighbours_of_the_route_are_accepted() {
         let mut scenario = lane();

@@ -17,7 +17,7 @@ pub struct VehicleSettings {
     pub length_m: f32,
     /// Without mirrors, metres.
     pub width_m: f32,
-    /// From the rear axle back to the rear bumper, metres.
+    /// Distance from the rear axle back to the rear bumper, metres.
     pub rear_overhang_m: f32,
     /// Largest road-wheel angle, radians.
     pub steering_max_rad: f32,
@@ -39,7 +39,7 @@ pub struct VehicleSettings {
     pub jerk_max_mps3: f32,
     /// Time constant of the drivetrain, seconds.
     pub drivetrain_lag_s: f32,
-    /// From the instant an observation is taken to the instant the car obeys the command, seconds.
+    /// Time from the instant an observation is taken to the instant the car obeys the command, seconds.
     pub dead_time_s: f32,
 }
 

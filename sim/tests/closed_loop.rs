@@ -298,7 +298,7 @@ fn fleets_of_their_own_drive_as_one_fleet() {
     }
 }
 
-/// Answers with no number from a tick on.
+/// Answers with NaN from a tick on.
 struct BreaksAt {
     tick: u32,
     answered: u32,

@@ -19,27 +19,27 @@ pub struct FileError {
 }
 
 impl FileError {
-    /// Of a file or folder.
+    /// An error of a file or folder.
     pub fn new(path: &Path, problem: impl Display, remedy: &'static str) -> Self {
         Self { path: path.to_path_buf(), problem: problem.to_string(), remedy, is_of_disk: false }
     }
 
-    /// Of what the system does not let be read.
+    /// An error of a file or folder that the system could not read.
     pub fn unreadable(path: &Path, error: &io::Error, remedy: &'static str) -> Self {
         let is_of_disk = fails_by_disk(error);
         Self { is_of_disk, ..Self::new(path, format_args!("cannot be read: {error}"), remedy) }
     }
 }
 
-/// Whether an error, or one that caused it, is of a disk that failed: what was to be read may be whole, so that nobody may
-/// go on as if it were not there.
+/// Whether an error, or one that caused it, comes from a failing disk: what was to be read may be whole, so it must not
+/// be treated as missing.
 pub fn is_of_disk(error: &(dyn Error + 'static)) -> bool {
     let is_itself = error.downcast_ref::<FileError>().is_some_and(|error| error.is_of_disk)
         || error.downcast_ref::<io::Error>().is_some_and(fails_by_disk);
     is_itself || error.source().is_some_and(is_of_disk)
 }
 
-/// Whether the system failed, and not because nothing is there or it is somebody else's.
+/// Whether the system failed, other than because nothing is there or access is denied.
 fn fails_by_disk(error: &io::Error) -> bool {
     use io::ErrorKind::{IsADirectory, NotADirectory, NotFound, PermissionDenied};
     let is_answer = matches!(error.kind(), NotFound | NotADirectory | IsADirectory | PermissionDenied);

@@ -1,4 +1,4 @@
-//! Files that grow line by line, several of them together, and go on after the process has been killed.
+//! Files that grow line by line, several of them together, and continue after the process has been killed.
 
 use crate::error::FileError;
 use crate::sums;
@@ -48,7 +48,7 @@ impl Growing {
                 left.as_ref().map_or_else(|| Ok((0, Sha256::new())), |left| left.check(index, &path))?;
             // Never through a link that somebody put there.
             if std::fs::symlink_metadata(&path).is_ok_and(|found| !found.is_file()) {
-                return Err(FileError::new(&path, "is no regular file", "remove it"));
+                return Err(FileError::new(&path, "is not a regular file", "remove it"));
             }
             let mut file = File::options().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
             file.set_len(bytes).map_err(failed)?;
@@ -146,7 +146,7 @@ impl Mark {
         mark().ok_or_else(|| FileError::new(path, "is of other files", REMEDY))
     }
 
-    /// How much of a file is whole, and the digest of that, to go on with.
+    /// How much of a file is whole, and the digest of that part, to continue from.
     fn check(&self, index: usize, path: &Path) -> Result<(u64, Sha256), FileError> {
         let (bytes, sum) = &self.files[index];
         let unreadable = |error: io::Error| FileError::unreadable(path, &error, REMEDY);
@@ -202,7 +202,7 @@ mod tests {
         fs::write(&diary, "dear").unwrap();
         std::os::unix::fs::symlink(&diary, folder.join("runs")).unwrap();
         assert!(
-            Growing::open(&folder, "driving", &["runs"]).is_err_and(|error| error.to_string().contains("no regular"))
+            Growing::open(&folder, "driving", &["runs"]).is_err_and(|error| error.to_string().contains("a regular"))
         );
         assert_eq!(fs::read(&diary).unwrap(), b"dear");
         fs::remove_dir_all(folder).unwrap();

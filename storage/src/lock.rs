@@ -30,7 +30,7 @@ impl Lock {
             |error: std::io::Error| FileError::new(&path, format_args!("cannot be locked: {error}"), WRITE_REMEDY);
         // Emptied below: not what a link that somebody put there points to.
         if fs::symlink_metadata(&path).is_ok_and(|about| !about.is_file()) {
-            return Err(FileError::new(&path, "is no file", "choose another folder"));
+            return Err(FileError::new(&path, "is not a file", "choose another folder"));
         }
         let file = loop {
             let file =
@@ -55,7 +55,8 @@ impl Lock {
         Ok(lock)
     }
 
-    /// Refuses to go on where the folder is another one now: who deleted or moved it may have begun a run of their own there.
+    /// Refuses to continue if the folder has been replaced: whoever deleted or moved it may have begun another run
+    /// there.
     ///
     /// # Errors
     /// If the lock at its place is not this one.
@@ -66,7 +67,7 @@ impl Lock {
             Ok(false) => Err(FileError::new(
                 folder,
                 "was deleted or moved while it was being written",
-                "nothing more is written there; begin again, or go on with --resume where it is now",
+                "nothing more is written there; begin again, or continue with --resume where it is now",
             )),
             Err(error) => Err(FileError::unreadable(&self.path, &error, WRITE_REMEDY)),
         }

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{self, Read as _};
 use std::path::Path;
 
-/// Opens a regular file of at most so many bytes.
+/// Opens a regular file of at most this many bytes.
 ///
 /// # Errors
 /// If it cannot be opened, is a device, a pipe or a folder, or is larger.
@@ -15,7 +15,7 @@ pub fn open(path: &Path, bytes_max: u64) -> io::Result<File> {
         return Err(io::Error::other("it is a folder"));
     }
     if !about.is_file() {
-        return Err(io::Error::other("it is no regular file"));
+        return Err(io::Error::other("it is not a regular file"));
     }
     if about.len() > bytes_max {
         return Err(too_large(about.len(), bytes_max));
@@ -32,10 +32,10 @@ pub fn is_below(folder: &Path, file: &Path) -> io::Result<bool> {
     Ok(file.canonicalize()?.starts_with(Path::new(".").join(folder).canonicalize()?))
 }
 
-/// The content of a regular file of at most so many bytes.
+/// The content of a regular file of at most this many bytes.
 ///
 /// # Errors
-/// As [`open`], or if it cannot be read.
+/// See [`open`]; or if it cannot be read.
 pub fn bytes(path: &Path, bytes_max: u64) -> io::Result<Vec<u8>> {
     let mut content = Vec::new();
     // A file can grow, and some of the system's say that they are empty.
@@ -43,14 +43,14 @@ pub fn bytes(path: &Path, bytes_max: u64) -> io::Result<Vec<u8>> {
     if read > bytes_max { Err(too_large(read, bytes_max)) } else { Ok(content) }
 }
 
-/// The text of a regular file of at most so many bytes.
+/// The text of a regular file of at most this many bytes.
 ///
 /// # Errors
-/// As [`bytes`], or if it is not UTF-8.
+/// See [`bytes`]; or if it is not UTF-8.
 pub fn text(path: &Path, bytes_max: u64) -> io::Result<String> {
     String::from_utf8(bytes(path, bytes_max)?).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
-        io::Error::new(io::ErrorKind::InvalidData, format!("it is no text: byte {at} is not UTF-8"))
+        io::Error::new(io::ErrorKind::InvalidData, format!("it is not text: byte {at} is not UTF-8"))
     })
 }
 
@@ -82,7 +82,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn devices_and_files_without_a_size_do_not_fill_the_memory() {
-        assert!(refused("/dev/zero", 100).contains("no regular file"));
+        assert!(refused("/dev/zero", 100).contains("not a regular file"));
         assert!(refused("/proc/self/maps", 100).contains("101 bytes or more"));
     }
 }

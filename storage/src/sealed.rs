@@ -27,7 +27,7 @@ pub fn write(path: &Path, content: &[u8]) -> Result<(), FileError> {
 /// Reads a file; `None` if there is none.
 ///
 /// # Errors
-/// If it cannot be read, is no regular file or too large, or is not what was written.
+/// If it cannot be read, is not a regular file, is too large, or is not what was written.
 pub fn read(path: &Path) -> Result<Option<Vec<u8>>, FileError> {
     let mut bytes = match crate::read::bytes(path, BYTES_MAX) {
         Ok(bytes) => bytes,

@@ -88,7 +88,7 @@ fn write_list(folder: &Path, sums: &Sums) -> Result<(), FileError> {
 /// Whether a folder has a list: whether anything is finished there.
 ///
 /// # Errors
-/// If the system does not say: a folder whose work is taken for none is deleted.
+/// If the system does not say: a folder that seems to hold no work would be deleted.
 pub fn exists(folder: &Path) -> Result<bool, FileError> {
     let path = folder.join(FILE);
     path.try_exists().map_err(|error| FileError::unreadable(&path, &error, LIST_REMEDY))
@@ -113,7 +113,7 @@ pub fn names(folder: &Path) -> Result<Vec<String>, FileError> {
 /// Lists files of a folder that are there and will not change: all at once.
 ///
 /// # Errors
-/// If one of them cannot be read, or the list not be written.
+/// If one of them cannot be read, or the list cannot be written.
 pub fn list(folder: &Path, names: &[&str]) -> Result<(), FileError> {
     let mut sums = list_of(folder)?.unwrap_or_default();
     for &name in names {
@@ -124,7 +124,7 @@ pub fn list(folder: &Path, names: &[&str]) -> Result<(), FileError> {
     write_list(folder, &sums)
 }
 
-/// Lists files of a folder that were written with these digests, in hex: what the disk made of them since is damage.
+/// Lists files of a folder that were written with these digests, in hex: whatever the disk has changed since is damage.
 ///
 /// # Errors
 /// If the list cannot be read or written.
@@ -151,7 +151,7 @@ pub fn list_all(folder: &Path) -> Result<(), FileError> {
     list(folder, &names.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-/// Takes files off the list of a folder, before they are written anew.
+/// Takes files off the list of a folder, before they are written again.
 ///
 /// # Errors
 /// If the list cannot be read or written.
@@ -255,10 +255,10 @@ fn copy_files(from: &Path, to: &Path) -> Result<(), FileError> {
     write_list(to, &sums)
 }
 
-/// Reads a finished file of at most so many bytes.
+/// Reads a finished file of at most this many bytes.
 ///
 /// # Errors
-/// If it is missing, larger, no regular file, not listed in its folder, or not what it was when it was listed.
+/// If it is missing, too large, not a regular file, not listed in its folder, or not what it was when it was listed.
 pub fn read(path: &Path, bytes_max: u64) -> Result<Vec<u8>, FileError> {
     let (folder, name) = (path.parent().unwrap_or(Path::new("")), path.file_name().unwrap_or_default());
     read_listed(folder, &name.to_string_lossy(), bytes_max)
@@ -275,8 +275,8 @@ pub fn read_listed(folder: &Path, name: &str, bytes_max: u64) -> Result<Vec<u8>,
     Ok(bytes)
 }
 
-/// Opens a finished file that is too large to be held, to be read from its beginning. Compared with the list is all of it
-/// before that; whoever has the folder's lock, or reads a finished one, reads the same afterwards.
+/// Opens a finished file that is too large to be held, to be read from its beginning. All of it is compared with the
+/// list first; whoever has the folder's lock, or reads a finished one, reads the same afterwards.
 ///
 /// # Errors
 /// See [`read()`].
@@ -320,7 +320,7 @@ fn compare(folder: &Path, name: &str, found: &str) -> Result<(), FileError> {
 /// Reads a finished text file.
 ///
 /// # Errors
-/// See [`read()`]; or if it is no UTF-8.
+/// See [`read()`]; or if it is not UTF-8.
 pub fn read_to_string(path: &Path, bytes_max: u64) -> Result<String, FileError> {
     String::from_utf8(read(path, bytes_max)?).map_err(|error| FileError::new(path, error, RESTORE))
 }
@@ -337,7 +337,7 @@ pub fn read_if_listed(path: &Path, bytes_max: u64) -> Result<Option<Vec<u8>>, Fi
 /// Reads a text file that may be anybody's: if its folder lists it, it is what was written.
 ///
 /// # Errors
-/// If it cannot be read, is too long or no UTF-8; if it is listed, but missing or damaged.
+/// If it cannot be read, is too long or not UTF-8; if it is listed, but missing or damaged.
 pub fn read_text(path: &Path, bytes_max: u64) -> io::Result<String> {
     let (folder, name) = (path.parent().unwrap_or(Path::new("")), path.file_name().unwrap_or_default());
     if is_listed(folder, &name.to_string_lossy()).map_err(io::Error::other)? {
@@ -442,7 +442,7 @@ fn look_for_others(folder: &Path, prefix: &str, sums: &Sums, verified: &mut Veri
 
 const DAMAGED: &str = "is damaged: its SHA-256 is not that in sha256sums";
 const UNLISTED: &str = "is not listed in sha256sums: it was never finished, or the list is damaged";
-const UNLISTED_REMEDY: &str = "go on with the run, or restore the list; delete what does not belong there";
+const UNLISTED_REMEDY: &str = "continue the run, or restore the list; delete what does not belong there";
 
 /// The folder that the viewer program adds to a run.
 const RECORDINGS: &str = "recordings";

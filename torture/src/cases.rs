@@ -1,4 +1,4 @@
-//! The commands that write, and how each goes on after it died.
+//! The commands that write, and how each is continued after it died.
 
 /// A command with the folder that it writes into.
 ///
@@ -9,7 +9,7 @@ pub struct Case {
     pub name: &'static str,
     /// Its words.
     pub command: &'static str,
-    /// What goes on with what is left of it.
+    /// The command that continues what is left of it.
     pub go_on: &'static str,
     /// A folder of which `RUN` is a copy at first.
     pub copy_of: Option<&'static str>,

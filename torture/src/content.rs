@@ -6,8 +6,8 @@ use std::fs;
 use std::path::Path;
 use storage::{lock, sums};
 
-/// Every file of a folder by its path there, but for the lock. Wall times, and the digests that depend on them, differ from
-/// one repetition to the next and are left out.
+/// Every file of a folder by its path there, except for the lock. Wall times, and the digests that depend on them,
+/// differ from one repetition to the next and are left out.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Content {
     files: BTreeMap<String, Vec<u8>>,

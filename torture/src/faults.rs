@@ -7,19 +7,19 @@ use std::process::Command;
 
 const SOURCE: &str = include_str!("faults.c");
 
-/// What becomes of an operation.
+/// What happens to an operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fault {
-    /// The process dies before it, or in the middle of a write. Counted is what changes the folder.
+    /// The process dies before it, or in the middle of a write. What changes the folder is counted.
     Kill,
-    /// It fails, and all after it: the disk is full. Counted is what needs space.
+    /// It fails, and all after it: the disk is full. What needs space is counted.
     DiskFull,
-    /// It fails, and no other. Counted is everything, reading too.
+    /// It fails, and no other. Everything is counted, reading too.
     InputOutput,
 }
 
 impl Fault {
-    /// Each.
+    /// Every fault.
     pub const ALL: [Self; 3] = [Self::Kill, Self::DiskFull, Self::InputOutput];
 
     /// As the library and people call it.
@@ -72,7 +72,7 @@ impl Library {
         Ok(())
     }
 
-    /// The operations that the last command came to, as in `rename round-00.partial`.
+    /// The operations that the last command performed, as in `rename round-00.partial`.
     ///
     /// # Errors
     /// If the list cannot be read.

@@ -27,7 +27,7 @@ impl Ended {
         self.code == Some(0)
     }
 
-    /// Whether it refused to go on with one error that says why.
+    /// Whether it refused to continue, with one error that says why.
     pub fn is_refusal(&self) -> bool {
         self.code == Some(2) && self.stderr.matches("error: ").count() == 1 && !self.stderr.contains("panicked")
     }

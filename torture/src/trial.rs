@@ -1,4 +1,4 @@
-//! A command disturbed in every way, and what came of it.
+//! A command disturbed in every way, and the outcome.
 
 use crate::cases::{Case, EMPTY, PREPARED, SMALL};
 use crate::content::Content;
@@ -13,9 +13,9 @@ use std::process::Command;
 use std::time::Duration;
 use storage::sums;
 
-/// Times that a command is killed before it is let go on to its end.
+/// Times that a command is killed before it is allowed to run to its end.
 const KILLS_IN_A_ROW: usize = 3;
-/// After so many failures, nobody reads on.
+/// After this many failures, nobody reads on.
 const FAILURES_MAX: usize = 10;
 
 /// How much is done to a command.
@@ -42,14 +42,14 @@ pub struct Share {
     pub of: usize,
 }
 
-/// What came of it.
+/// The outcome of disturbing a command.
 #[derive(Debug, Clone, Default)]
 pub struct Outcome {
     /// Files compared every time.
     pub files: usize,
     /// Their bytes.
     pub bytes: usize,
-    /// Of each fault: operations struck, and operations that the command comes to.
+    /// For each fault: operations struck, and operations that the command performs.
     pub struck: [(usize, usize); Fault::ALL.len()],
     /// Deaths at random times.
     pub kills: usize,
@@ -152,7 +152,7 @@ impl Workplace {
         Ok((Content::read(&self.run)?, ended.took))
     }
 
-    /// Runs a command with one fault, and goes on if it does not do its work all the same.
+    /// Runs a command with one fault, and continues it if it did not do its work all the same.
     fn strike(&self, case: &Case, fault: Fault, at: usize) -> anyhow::Result<()> {
         self.begin(case)?;
         let mut command = self.command(case.command);
@@ -165,15 +165,15 @@ impl Workplace {
         if ended.is_done() { Ok(()) } else { self.go_on(case) }
     }
 
-    /// Goes on as a user does who reads what is said.
+    /// Continues as a user would who reads the messages.
     fn go_on(&self, case: &Case) -> anyhow::Result<()> {
         let ended = self.ended(case.go_on)?;
         if ended.is_done() || ended.stderr.contains("this run is finished") {
             return Ok(());
         }
         let is_nothing = ["nothing was begun there", "there is no such run"].iter().any(|it| ended.stderr.contains(it));
-        ensure!(ended.is_refusal() && is_nothing, "going on: {}", said(&ended));
-        self.complete(case.command).context("beginning anew")
+        ensure!(ended.is_refusal() && is_nothing, "continuing: {}", said(&ended));
+        self.complete(case.command).context("beginning again")
     }
 
     /// Compares what is there with what is right.

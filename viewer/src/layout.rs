@@ -49,10 +49,10 @@ pub(crate) enum ViewKind {
     Document,
 }
 
-/// From where the scene is seen.
+/// The point from which the scene is seen.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Eye {
-    /// Of the eye; in the frame of `follows`, if set.
+    /// Position of the eye; in the frame of `follows`, if set.
     pub(crate) position: [f32; 3],
     /// What it looks at.
     pub(crate) target: [f32; 3],

@@ -1,6 +1,6 @@
 //! Lots, drives and trainings as recordings for Rerun's viewer.
 //!
-//! Nothing is recorded while a run goes on: replay keys and the folders of trainings are enough to simulate it again, bit
+//! Nothing is recorded during a run: replay keys and the folders of trainings are enough to simulate it again, bit
 //! for bit, and that is what happens here.
 //!
 //! | file | what |
@@ -79,7 +79,7 @@ impl Context<'_> {
         Recording::begin(self.sink, name, header)
     }
 
-    /// Waits until a recording is written; refuses to go on after it if the user asked to stop.
+    /// Waits until a recording is written; refuses to continue after it if the user asked to stop.
     fn end(&mut self, recording: Recording) -> anyhow::Result<()> {
         self.files.extend(recording.end()?);
         if self.progress.is_cancelled() {

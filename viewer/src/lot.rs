@@ -9,7 +9,7 @@ use sim::scenario::{Island, Obstacle, ObstacleClass};
 
 /// Pixel of the drivable area, metres.
 const AREA_STEP_M: f32 = 0.2;
-/// From an end of the route to its name, metres: more than the car extends beyond its rear axle.
+/// Distance from an end of the route to its name, metres: more than the car extends beyond its rear axle.
 const NAME_M: f32 = 5.5;
 /// Height of the ground, metres: low enough to stay below the lines on the screen.
 const GROUND_Z_M: f32 = -0.02;

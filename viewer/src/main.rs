@@ -19,7 +19,7 @@ use viewer::RERUN_VERSION;
 const EXIT_REFUSED: u8 = 2;
 /// Ended by Ctrl-C, as shells have it.
 const EXIT_INTERRUPTED: u8 = 130;
-/// Of every thread of the pool, bytes: as much as the main thread has on Linux.
+/// Stack size of every thread of the pool, bytes: as much as the main thread has on Linux.
 const STACK_BYTES: usize = 8 << 20;
 
 /// Whether Ctrl-C was pressed.

@@ -63,7 +63,9 @@ impl Round<'_> {
         let watched = |(recording, start): (_, &RoundEpisode)| {
             let learned = self.learned.as_ref();
             let novice = learned.map(|learned| NetPolicy::new(learned.policy(), self.settings.dagger.device));
-            let drive = Drive::new(recording, ROOT, &start.episode, self.settings, hand(self.settings.seed, start.index)).with_novice(novice);
+            let drive =
+                Drive::new(recording, ROOT, &start.episode, self.settings, hand(self.settings.seed, start.index))
+                    .with_novice(novice);
             drive.show_static();
             drive
         };

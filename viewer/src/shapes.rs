@@ -44,7 +44,7 @@ pub(crate) struct Strip {
 pub(crate) struct Arrow {
     /// Its foot.
     pub(crate) from: Point,
-    /// From foot to tip.
+    /// The vector from foot to tip.
     pub(crate) vector: Point,
     /// Its colour.
     pub(crate) colour: Colour,
@@ -57,7 +57,7 @@ pub(crate) struct Block {
     pub(crate) centre: Point,
     /// Length, width and height; the length of a cylinder is its diameter.
     pub(crate) size_m: Point,
-    /// Of the length axis.
+    /// Heading of the length axis.
     pub(crate) yaw_rad: f32,
     /// Its colour.
     pub(crate) colour: Colour,

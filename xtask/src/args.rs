@@ -60,7 +60,7 @@ pub(crate) fn run_folder() -> impl TypedValueParser<Value = PathBuf> {
         if path.to_str().is_none() {
             return Err("replay keys name it, so its name is UTF-8; choose another".to_owned());
         }
-        // Links stay as they are named, but for those that `..` would leave by another way.
+        // Links stay as they are named, except for those that `..` would leave by another way.
         let leads_up = path.components().any(|part| part == Component::ParentDir);
         let full = if leads_up { storage::place_of(&path) } else { std::path::absolute(&path) };
         let full = full.map_err(|error| error.to_string())?;

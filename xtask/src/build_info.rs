@@ -29,8 +29,8 @@ pub(crate) fn get() -> &'static Build {
     })
 }
 
-/// Whether this program may go on with a run: results of two versions would stand under the name of one. Another commit of
-/// the same version, which may differ in nothing but its documents, is said.
+/// Checks that this program may continue a run: otherwise results of two versions would stand under the name of one.
+/// Another commit of the same version, which may differ only in its documents, is reported.
 ///
 /// # Errors
 /// If the run was begun by another version, or with other libraries.
@@ -38,7 +38,7 @@ pub(crate) fn check_can_go_on(run: &Path, manifest: &Manifest, output: &Output) 
     let Build { program, libraries, git_revision, .. } = get();
     ensure!(
         manifest.program == *program && manifest.libraries == *libraries,
-        "{0}: begun with another version of lotpilot ({1}; {0}/manifest.toml lists its libraries); go on with that one, or \
+        "{0}: begun with another version of lotpilot ({1}; {0}/manifest.toml lists its libraries); use that one, or \
          begin again into another folder",
         run.display(),
         manifest.program

@@ -51,22 +51,24 @@ Examples:
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Behaviour cloning, then DAgger; ends with the paper's table, and drives the three lots and others it has not seen.
+    /// Trains by behaviour cloning, then DAgger; ends with the paper's table, and drives the three lots and others it
+    /// has not seen.
     #[command(after_help = train::DAGGER_EXAMPLES)]
     TrainDagger(train::TrainArgs),
-    /// Behaviour cloning: the expert drives once, a network learns from it.
+    /// Trains by behaviour cloning: the expert drives once, and a network learns from it.
     #[command(after_help = train::BC_EXAMPLES)]
     TrainBc(train::TrainArgs),
     /// Drives drivers over lots and counts near-collisions and the safe ratio.
     #[command(after_help = evaluate::EXAMPLES)]
     Evaluate(evaluate::EvaluateArgs),
-    /// What would have avoided the near-collisions of an evaluation: replaces one thing at a time with the truth.
+    /// Shows what would have avoided the near-collisions of an evaluation, by replacing one thing at a time with the
+    /// truth.
     #[command(after_help = what_if::EXAMPLES)]
     WhatIf(what_if::WhatIfArgs),
     /// Draws lots, drives, samples and noise as PNG and SVG.
     #[command(after_help = render::EXAMPLES)]
     Render(render::RenderArgs),
-    /// Records lots, drives and near-collisions, to be looked at in Rerun's viewer.
+    /// Records lots, drives and near-collisions for Rerun's viewer.
     #[command(after_help = visualise::EXAMPLES)]
     Visualise(visualise::VisualiseArgs),
     /// Writes lots as TOML plus a top-view PNG.
@@ -81,7 +83,7 @@ enum Command {
     /// Prints settings as TOML that `--config` reads, or explains one.
     #[command(after_help = settings::EXAMPLES)]
     Settings(settings::SettingsArgs),
-    /// Searches parameters of the model-based planners on lot a and training lots, the same way for each.
+    /// Searches for parameters of the model-based planners on lot a and training lots, in the same way for each.
     #[command(after_help = tune::EXAMPLES)]
     Tune(tune::TuneArgs),
     /// Writes a trained network as an ONNX file.
@@ -108,19 +110,19 @@ enum Command {
     /// Drives runs again by their replay keys, and says whether they are the same as recorded, bit by bit.
     #[command(after_help = replay::EXAMPLES)]
     Replay(replay::ReplayArgs),
-    /// How far must be driven to see a difference in near-collisions, or to bound their rate.
+    /// Computes how far to drive to see a difference in near-collisions, or to bound their rate.
     #[command(after_help = sample_size::EXAMPLES)]
     SampleSize(sample_size::SampleSizeArgs),
-    /// How many pixels of the noisy bird's-eye view are right.
+    /// Measures how many pixels of the noisy bird's-eye view are right.
     #[command(after_help = pixel_accuracy::EXAMPLES)]
     PixelAccuracy(pixel_accuracy::PixelAccuracyArgs),
-    /// How fast this is on this machine, beside other simulators and libraries if asked.
+    /// Measures how fast lotpilot is on this machine, next to other simulators and libraries if asked.
     #[command(after_help = bench::EXAMPLES)]
     Bench(bench::BenchArgs),
     /// Trains the default and fails if its policy has become worse: for a nightly run.
     #[command(after_help = guard::EXAMPLES)]
     Guard(guard::GuardArgs),
-    /// Kills commands and fails their file operations, goes on, and compares every byte.
+    /// Kills commands and makes their file operations fail, continues them, and compares every byte.
     #[command(after_help = torture::EXAMPLES)]
     Torture(torture::TortureArgs),
     /// Prints a script that completes commands and flags in a shell.
@@ -140,7 +142,7 @@ impl Cli {
     /// Runs the command.
     ///
     /// # Errors
-    /// If something named does not exist or cannot be read or written, or by Ctrl-C.
+    /// If something named does not exist or cannot be read or written, or on Ctrl-C.
     pub fn run(&self) -> anyhow::Result<()> {
         let output = &Output::new(self.quiet, self.command.is_json());
         match &self.command {

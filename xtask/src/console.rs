@@ -16,7 +16,7 @@ const LENGTH: u64 = 10_000;
 /// Seconds of work that an estimate is worth before there is anything to measure.
 const ESTIMATE_S: f64 = 10.0;
 
-/// Shows what is going on, when the whole command is done, and adds up where the time went.
+/// Shows what is going on and when the whole command will be done, and adds up where the time went.
 #[derive(Debug)]
 pub(crate) struct Console {
     is_quiet: bool,
@@ -46,7 +46,7 @@ struct Done {
     share: f64,
     /// That of a command before.
     before: f64,
-    /// Since it was begun or gone on with.
+    /// Since it was begun or continued.
     seconds: f64,
 }
 

@@ -22,7 +22,7 @@ const LAST_WORDS: Duration = Duration::from_millis(200);
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 static REQUESTED: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
-/// How to go on with the run under way.
+/// How to continue the run under way.
 static WAY_ON: Mutex<Option<String>> = Mutex::new(None);
 
 /// Listens for signals from now on.
@@ -78,15 +78,15 @@ fn watch() {
     std::process::exit(EXIT.into());
 }
 
-/// Notes which command goes on with which run.
+/// Notes which command continues which run.
 pub(crate) fn can_resume(command: &str, run: &Path) {
     goes_on_with(&format!("{command} --resume {}", run.display()));
 }
 
-/// Notes the arguments of the command that goes on with what is under way.
+/// Notes the arguments of the command that continues what is under way.
 pub(crate) fn goes_on_with(arguments: &str) {
     if let Ok(mut way_on) = WAY_ON.lock() {
-        *way_on = Some(format!("; go on with: cargo xtask {arguments}"));
+        *way_on = Some(format!("; continue with: cargo xtask {arguments}"));
     }
 }
 

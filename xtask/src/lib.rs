@@ -19,7 +19,7 @@ use experiment::progress::Interrupted;
 use sim::limits::THREADS_MAX;
 use std::process::ExitCode;
 
-/// Of every thread of the pool: as much as the main thread has on Linux.
+/// Stack size of every thread of the pool: as much as the main thread has on Linux.
 const STACK_BYTES: usize = 8 << 20;
 /// Bad input, or an environment in which the work cannot be done. Our own bugs panic (101).
 const EXIT_REFUSED: u8 = 2;

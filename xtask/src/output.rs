@@ -1,5 +1,5 @@
-//! What is printed: results on stdout, everything else on stderr. A closed pipe (`| head`) is no error: the work goes on,
-//! and its files are written.
+//! What is printed: results on stdout, everything else on stderr. A closed pipe (`| head`) is not an error: the work
+//! continues, and its files are written.
 
 use clap::{ColorChoice, ValueEnum};
 use serde::Serialize;
@@ -96,7 +96,7 @@ impl Output {
     /// Prints names and what they stand for.
     ///
     /// # Errors
-    /// As [`Self::table`].
+    /// See [`Self::table`].
     pub(crate) fn names(&self, names: &[(&str, &str)]) -> anyhow::Result<()> {
         #[derive(Serialize)]
         struct Name<'a> {
@@ -114,7 +114,7 @@ impl Output {
         self.table(String::new, &names)
     }
 
-    /// Prints a line for people that is no result: not with `--json`.
+    /// Prints a line for people that is not a result; nothing with `--json`.
     pub(crate) fn remark(&self, text: impl Display) {
         if !self.is_json {
             self.print(text);

@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 /// `--record`.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct RecordArgs {
-    /// When all is done, records the first N runs of every driver and noise level for Rerun, of a training its learning
-    /// curves and the first N episodes of every round as well. The first time it builds the recorder (8 minutes).
+    /// Records the first N runs of every driver and noise level for Rerun when all is done; for a training, also its
+    /// learning curves and the first N episodes of every round. Builds the recorder the first time (8 minutes).
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1")]
     pub(crate) record: Option<usize>,
 }
@@ -45,10 +45,10 @@ pub(crate) fn first_runs(plan: &Plan<'_>, runs: usize) -> Show {
     Show::Drives { settings: Box::new(plan.settings.clone()), drives }
 }
 
-/// Records into the folder of a run that is finished. What goes wrong is said and does the run no harm.
+/// Records into the folder of a run that is finished. Errors are reported and do the run no harm.
 ///
 /// # Errors
-/// By Ctrl-C.
+/// On Ctrl-C.
 pub(crate) fn record(run: &Path, show: Vec<Show>, output: &Output) -> anyhow::Result<()> {
     match viewer::ask(&ViewRequest { sink: Sink::Folder(recordings_of(run)), show }, output) {
         Err(error) if !error.is::<Interrupted>() => {

@@ -28,7 +28,7 @@ const BACKENDS: &[&str] = &[
 /// Builds the viewer program if necessary and runs it on a request.
 ///
 /// # Errors
-/// If it cannot be built, it failed (it has said why), or by Ctrl-C.
+/// If it cannot be built, it failed (it has said why), or on Ctrl-C.
 pub(crate) fn ask(request: &ViewRequest, output: &Output) -> anyhow::Result<()> {
     let manifest = manifest()?;
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());

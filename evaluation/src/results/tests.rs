@@ -44,7 +44,7 @@ fn slice(results: &EvaluationResults, label: &str) -> Slice {
     results.slices().into_iter().find(|slice| slice.label == label).unwrap()
 }
 
-/// Of two networks the second was trained on lot b, and lot b was "unseen" all the same.
+/// The second of two networks was trained on lot b, and lot b was "unseen" all the same.
 #[test]
 fn what_any_driver_was_trained_on_is_not_unseen() {
     let settings = Settings::preset("default").unwrap();
@@ -202,7 +202,7 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     assert_eq!(rounded(found[1].difference_per_100m), [1.0, 1.0, 1.0], "trainings of a seed are compared");
     assert_eq!(rounded(found[2].per_100m), [2.0, 2.0, 2.0]);
     assert_eq!(rounded(found[2].difference_per_100m), [-3.302_652_73, 1.0, 5.302_652_73], "the other's seeds vary");
-    // Seeds 2 to 4 are no pairs of seeds 1 to 3: both means are uncertain by 3 · 4.3027 · 1/√3 / √3.
+    // Seeds 2 to 4 are not paired with seeds 1 to 3: both means are uncertain by 3 · 4.3027 · 1/√3 / √3.
     let others = [team(&[0, 1, 2]), of_seeds(&[3, 4, 5], &[2, 3, 4])];
     let apart = results.judge_teams(0, &slice, &others, 0, RootSeed(1)).unwrap()[1].difference_per_100m;
     let half_width = together(4.302_652_73, 4.302_652_73);

@@ -22,7 +22,7 @@ pub const UNITS_MIN: u32 = 6;
 /// Percentile interval of a statistic.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
-    /// Of the units as they are.
+    /// The statistic of the units as they are.
     pub estimate: f64,
     /// 2.5 % of the draws are below.
     pub lower: f64,
@@ -126,7 +126,7 @@ fn add(sums: &mut [f64], unit: &[f64], times: f64) {
     }
 }
 
-/// Of sorted values, linear between order statistics (type 7 of Hyndman and Fan 1996, R's default).
+/// A quantile of sorted values, linear between order statistics (type 7 of Hyndman and Fan 1996, R's default).
 fn quantile(sorted: &[f64], probability: f64) -> f64 {
     let at = probability * (sorted.len() - 1) as f64;
     let (low, share) = (at as usize, at.fract());

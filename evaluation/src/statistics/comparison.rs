@@ -45,7 +45,7 @@ pub struct RateRatio {
 }
 
 impl RateRatio {
-    /// Of two `(events, exposure)` with exposures > 0.
+    /// The ratio of two `(events, exposure)` with exposures > 0.
     pub fn new((events_1, exposure_1): (u32, f64), (events_2, exposure_2): (u32, f64)) -> Self {
         let both = events_1 + events_2;
         // p / (1 − p) = ratio · E₁ / E₂

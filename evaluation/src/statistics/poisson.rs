@@ -62,8 +62,9 @@ pub struct Dispersion {
 }
 
 impl Dispersion {
-    /// Of `(events, exposure)` per unit, stratum by stratum: every stratum may have its own rate, so that a hard lot and
-    /// an easy one are not mistaken for clusters. `None` without two units in a stratum that saw an event.
+    /// The dispersion of `(events, exposure)` per unit, stratum by stratum: every stratum may have its own rate, so
+    /// that a hard lot and an easy one are not mistaken for clusters. `None` without two units in a stratum that saw an
+    /// event.
     pub fn within<'a>(strata: impl IntoIterator<Item = &'a [(u32, f64)]>) -> Option<Self> {
         let (mut x_squared, mut freedom) = (0.0, 0);
         for units in strata {

@@ -29,7 +29,7 @@ impl Settings {
             for (i, direction) in directions.iter().enumerate() {
                 ensure!(
                     !directions[..i].contains(direction),
-                    "{section}.directions names {} twice; the same drive again is no further one",
+                    "{section}.directions names {} twice; the same drive again adds nothing",
                     direction.name()
                 );
             }
@@ -93,7 +93,7 @@ impl Settings {
         self.check_lots()
     }
 
-    /// Names of lots, and how many drives they come to. Files are not looked at.
+    /// Checks names of lots, and counts the drives they make. Files are not looked at.
     fn check_lots(&self) -> anyhow::Result<()> {
         let Self { training, evaluation, .. } = self;
         let count = |key: &str, names: &[String]| {

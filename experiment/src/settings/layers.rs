@@ -173,7 +173,7 @@ fn parse_override(text: &str) -> anyhow::Result<(Vec<String>, Value)> {
     let said = shortened(text);
     let (key, value) = text
         .split_once('=')
-        .with_context(|| format!("--set {said}: a key and a value are needed, as in --set dagger.eta=0.8"))?;
+        .with_context(|| format!("--set {said}: write a key and a value, as in --set dagger.eta=0.8"))?;
     let key: Vec<String> = key.trim().split('.').map(str::to_owned).collect();
     ensure!(
         key.len() <= KEY_PARTS_MAX,
@@ -191,7 +191,7 @@ fn parse_override(text: &str) -> anyhow::Result<(Vec<String>, Value)> {
         // A bare word can only be meant as a string.
         None if is_word => Ok((key, Value::String(value.to_owned()))),
         None => {
-            bail!("--set {said}: this is no TOML value; texts and lists of texts need quotes, as in '[\"lot-a\"]'")
+            bail!("--set {said}: this is not a TOML value; strings and lists of them need quotes, as in '[\"lot-a\"]'")
         }
     }
 }

@@ -46,7 +46,7 @@ impl Settings {
     }
 }
 
-/// Eight round trips of lot a per round instead of one, and generated lots of every family beside it: here they cost
+/// Eight round trips of lot a per round instead of one, and generated lots of every family besides: here they cost
 /// seconds, not hours of a person's day. What is learned on lot a alone does not carry over to corridors, and what is
 /// learned on corridors (easy, medium, hard) does not carry over to other kinds of lots: on validation lots of all
 /// families the policy had 3.6 near-collisions per 100 m trained on corridors, .3 trained on all (docs/elsewhere.md).

@@ -89,7 +89,7 @@ impl FromStr for Range {
             let high = Bound { value: high.get(..end)?.trim().parse().ok()?, is_included: high.ends_with(']') };
             Some(Self { low, high })
         };
-        parse().ok_or_else(|| format!("{text:?} is no interval such as \"[0, 1)\""))
+        parse().ok_or_else(|| format!("{text:?} is not an interval such as \"[0, 1)\""))
     }
 }
 
@@ -219,7 +219,7 @@ fn explain_entry(entry: &Entry) -> String {
     text
 }
 
-/// Of a setting that a preset has no use for.
+/// The value of a setting that a preset has no use for.
 const NOT_IN_USE: &str = "not in use";
 
 /// The value in every preset; one, if they agree.

@@ -33,7 +33,7 @@ fn every_preset_is_sound_and_survives_toml() {
         settings.check().unwrap();
         assert_eq!(toml::from_str::<Settings>(&settings.to_toml()).unwrap(), settings, "{}", preset.name);
         let untouched = layers::apply(&settings, None, &[]).unwrap();
-        assert_eq!(untouched, settings, "no change is no change");
+        assert_eq!(untouched, settings, "an empty change changes nothing");
     }
 }
 
@@ -81,7 +81,7 @@ fn enums_change_their_variant_whole() {
     let weight = resolved(&["dagger.fit.loss.weight.linear.gain=8"]).dagger.fit.loss.weight;
     assert_eq!(weight, WeightForm::Linear { gain: 8.0 });
     let DecisionRule::AllBelow { tau, chi, .. } = resolved(&["dagger.rule.all_below.tau=0.06"]).dagger.rule else {
-        panic!("a changed value is no changed variant");
+        panic!("a changed value is not a changed variant");
     };
     assert_eq!((tau, chi), (0.06, 0.1));
 }

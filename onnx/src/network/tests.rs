@@ -123,12 +123,12 @@ fn what_is_no_such_network_is_refused_with_what_it_is_instead() {
     let backwards = [&exported[..], &[0x7A, 0xF4], &[0xFF; 8], &[0x01]].concat();
     for (what, bytes, part) in [
         ("backwards", backwards, "longer than what holds it"),
-        ("nothing", Vec::new(), "no network"),
-        ("text", b"hello".to_vec(), "no network"),
-        ("half", exported[..exported.len() / 2].to_vec(), "no network"),
+        ("nothing", Vec::new(), "not a network"),
+        ("text", b"hello".to_vec(), "not a network"),
+        ("half", exported[..exported.len() / 2].to_vec(), "not a network"),
         ("input", with(b"grid", b"gird"), "input \"gird\", not \"grid\""),
         ("output", with(b"point", b"pt_uw"), "outputs pt_uw, not point"),
-        ("operator", with(b"Flatten", b"Fluffen"), "no network"),
+        ("operator", with(b"Flatten", b"Fluffen"), "not a network"),
         ("metadata", with(b"schema = 1", b"schema = 7"), "schema 7"),
         ("smoothing", with(b"smoothing_ticks = 8.0", b"smoothing_ticks = -80"), "smoothing_ticks"),
     ] {

@@ -57,7 +57,7 @@ struct Run<'r, 'h> {
 
 /// Why the algorithm ended early.
 enum Halt {
-    /// With the policy finished last.
+    /// Interrupted, with the policy finished last.
     Interrupted(Option<Weights>),
     Failed(DaggerError),
 }
@@ -252,7 +252,7 @@ impl Run<'_, '_> {
     }
 }
 
-/// What is about to be learned from.
+/// Refuses values that are not finite in what is about to be learned from.
 fn check_finite(round: u32, collected: &Round) -> Result<(), DaggerError> {
     for (sample, at) in collected.samples.iter().zip(&collected.ticks) {
         let label = [sample.label[0], sample.label[1], sample.tau_hat];

@@ -26,11 +26,11 @@ pub struct DisturbanceSettings {
     pub duration_ticks: u32,
     /// Largest change of the steered curvature, 1/m. Each disturbance draws its own uniformly from minus this to this.
     pub curvature_max_per_m: f32,
-    /// To which side.
+    /// The side to which the steering is disturbed.
     pub aim: Aim,
 }
 
-/// To which side the steering is disturbed.
+/// The side to which the steering is disturbed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Aim {
@@ -61,7 +61,7 @@ impl DisturbanceSettings {
 #[derive(Debug)]
 pub(crate) struct Disturbance {
     settings: DisturbanceSettings,
-    /// From the rear axle to the bumper, metres.
+    /// Distance from the rear axle to the bumper, metres.
     nose_m: f32,
     rng: Rng,
     ticks_left: u32,

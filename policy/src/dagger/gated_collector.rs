@@ -29,7 +29,7 @@ pub(crate) struct GatedCollector {
     pub(crate) critic: Option<Predictor>,
     pub(crate) keep: Keep,
     pub(crate) geometry: GridGeometry,
-    /// By episode.
+    /// Seats by episode.
     pub(crate) seats: Vec<CollectorSeat>,
     /// Executed actions.
     pub(crate) n_tot: u64,
@@ -54,7 +54,7 @@ pub(crate) struct CollectorSeat {
     pub(crate) kept: Kept,
     /// τ̂ and the label of every tick, kept or not; nothing in behaviour cloning.
     pub(crate) answers: Vec<(f32, [f32; 2])>,
-    /// The expert drove the last tick.
+    /// Whether the expert drove the last tick.
     is_experts: bool,
     /// Decisions so far.
     ticks: u32,
@@ -183,7 +183,7 @@ impl Fleet for GatedCollector {
             self.tau_hat_sum += f64::from(evidence.discrepancy);
             self.seats[seat.episode].answers.push((evidence.discrepancy, a_exp));
             let novice = novice_decision(&predicted, self.geometry);
-            // A gate would compare with what is no number and call the expert; the loop that drives refuses it.
+            // Compared with NaN, a gate would call the expert; the loop that drives refuses such an answer.
             let trusts_novice = self.ask_gate(seat, &predicted, evidence) || !novice.is_finite(); // line 9
             if trusts_novice {
                 decisions.push(novice); // line 10

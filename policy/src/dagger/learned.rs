@@ -50,7 +50,7 @@ impl Learned {
         Self::with_parts(settings, store, before, policy, &d)
     }
 
-    /// With what was trained beside the network of a round, which was trained on `d`.
+    /// The network of a round, which was trained on `d`, with what was trained beside it.
     pub(crate) fn with_parts(
         settings: &DaggerSettings,
         store: &Store,
@@ -67,7 +67,7 @@ impl Learned {
         Ok(learned)
     }
 
-    /// Without a critic: to train one.
+    /// The network of a round without a critic: to train one.
     pub(crate) fn uncritical(
         settings: &DaggerSettings,
         store: &Store,
@@ -77,7 +77,7 @@ impl Learned {
         Ok(Self { members: members_of(settings, store, round)?, ..Self::alone(policy) })
     }
 
-    /// Of the answers to everything that was trained on.
+    /// The thresholds, from the answers to everything that was trained on.
     fn thresholds(&self, rate: f32, d: &Dataset, device: DeviceChoice) -> Thresholds {
         let (mut ensemble, mut critic) = (self.ensemble(device), self.critic(device));
         let (mut disagreement, mut risk, mut discrepancy) = (Vec::new(), Vec::new(), Vec::new());

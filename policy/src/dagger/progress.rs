@@ -89,8 +89,8 @@ pub enum DaggerError {
     /// A file cannot be read or written, or does not fit.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A training that cannot start or go on.
-    #[error("{}: {source}; resumed as it is, the run comes to the same", training_of(*round))]
+    /// A training that cannot start or continue.
+    #[error("{}: {source}; resumed unchanged, the run ends in the same error", training_of(*round))]
     Fit {
         /// Which round; `None`: the final training.
         round: Option<u32>,
@@ -105,9 +105,9 @@ pub enum DaggerError {
         /// Why.
         source: EpisodesError,
     },
-    /// A network that answers with what is no finite number.
+    /// A network whose answer is not finite.
     #[error(
-        "round {round}: {source}; it comes again with cargo xtask render trajectories --run RUN --round {round} --trial {}",
+        "round {round}: {source}; see it with cargo xtask render trajectories --run RUN --round {round} --trial {}",
         source.episode
     )]
     Driving {
@@ -116,9 +116,9 @@ pub enum DaggerError {
         /// Where.
         source: NotFinite,
     },
-    /// Driving that ran out of numbers.
+    /// Driving that left the finite numbers.
     #[error(
-        "round {round}, drive {drive}, tick {tick}: {what} is no finite number; see it with cargo xtask render \
+        "round {round}, drive {drive}, tick {tick}: {what} is not a finite number; see it with cargo xtask render \
          trajectories --run RUN --round {round} --trial {drive}"
     )]
     NotFinite {
@@ -126,7 +126,7 @@ pub enum DaggerError {
         round: u32,
         /// Which of its drives, from 0.
         drive: u32,
-        /// Which decision of it, from 0.
+        /// Which of its decisions, from 0.
         tick: u32,
         /// The label or the state of the car.
         what: &'static str,

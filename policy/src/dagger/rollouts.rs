@@ -139,7 +139,7 @@ impl Rollouts {
     /// Drives all episodes to their ends. `on_frame` is called with the place of the episode among those given, from 0.
     ///
     /// # Errors
-    /// If the network answers with what is no finite number.
+    /// If an answer of the network is not finite.
     pub fn drive(self, on_frame: &mut dyn FnMut(usize, &Frame)) -> Result<Collected, NotFinite> {
         let Self { mut collector, rule, episodes, origins } = self;
         let bumper_to_patch_m = episodes.first().map_or(0.0, |episode| {
@@ -191,7 +191,7 @@ impl Rollouts {
 }
 
 impl Collected {
-    /// The same with at most so many samples, spread evenly over all of them; 0 = all.
+    /// The same with at most this many samples, spread evenly over all of them; 0 = all.
     #[must_use]
     pub(crate) fn thinned(self, at_most: usize) -> Self {
         if at_most == 0 || self.round.samples.len() <= at_most {

@@ -76,7 +76,7 @@ fn bytes_max(shape: &[usize]) -> u64 {
 /// The header of an array that has the shape that is expected.
 fn checked_header(source: &mut impl Read, expected: &[usize]) -> Result<Vec<u8>, String> {
     let header = header(source)?;
-    let found = shape(&header).ok_or("it is no NPY array")?;
+    let found = shape(&header).ok_or("it is not an NPY array")?;
     if found == expected { Ok(header) } else { Err(format!("shape {found:?} instead of {expected:?}")) }
 }
 
@@ -92,7 +92,7 @@ fn header(source: &mut impl Read) -> Result<Vec<u8>, String> {
     let width = match (&header[..6], header[6]) {
         (b"\x93NUMPY", 1) => 2,
         (b"\x93NUMPY", 2 | 3) => 4,
-        _ => return Err("it is no NPY array".to_owned()),
+        _ => return Err("it is not an NPY array".to_owned()),
     };
     read(width, &mut header)?;
     let length = header[8..].iter().rev().fold(0, |length, &byte| length << 8 | u64::from(byte));
@@ -137,7 +137,7 @@ mod tests {
         let whole = std::fs::read(&path).unwrap();
         let at = whole.windows(7).position(|part| part == b"(5, 79)").unwrap();
         for (forged, part) in
-            [("(5000000000000, 7)", "shape [5000000000000, 7]"), ("(-1, 79)", "no NPY"), ("[", "no NPY")]
+            [("(5000000000000, 7)", "shape [5000000000000, 7]"), ("(-1, 79)", "not an NPY"), ("[", "not an NPY")]
         {
             let mut bytes = whole.clone();
             bytes[at..at + forged.len()].copy_from_slice(forged.as_bytes());

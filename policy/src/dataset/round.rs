@@ -9,7 +9,7 @@ use sim::sensing::OccupancyGrid;
 pub struct Round {
     /// The samples.
     pub samples: Vec<Sample>,
-    /// Where and when each sample was taken: one per sample, or none at all for samples that were made otherwise.
+    /// Where and when each sample was taken: one per sample, or none at all for samples that were made in another way.
     pub ticks: Vec<Tick>,
     /// Noise augmentations: the scenes of the samples seen with other draws of the sensor noise. The same number for
     /// every sample, those of one sample together. Trained on with the sample's label; never validated on.
@@ -29,7 +29,7 @@ impl Round {
         self.noise_augmentations.len() / self.samples.len().max(1)
     }
 
-    /// At most so many of the samples, spread evenly over all of them; 0 = all.
+    /// At most this many of the samples, spread evenly over all of them; 0 = all.
     #[must_use]
     pub(crate) fn thinned(&self, at_most: usize) -> Self {
         let count = self.samples.len();

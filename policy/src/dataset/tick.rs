@@ -55,7 +55,7 @@ impl Tick {
         ("command_speed_mps", |tick| tick.command_speed_mps),
     ];
 
-    /// Of a frame of an episode, which was observed at `time_s`.
+    /// The tick of a frame of an episode, which was observed at `time_s`.
     pub(crate) fn new(episode: u32, time_s: f32, frame: &Frame) -> Self {
         let (pose, command) = (frame.vehicle.pose, frame.command);
         Self {

@@ -51,7 +51,7 @@ pub(crate) struct HgDaggerGate {
     episode: EpisodeSettings,
     body: BodyBox,
     wheel: Wheel,
-    /// For how long the network's arc has been critical, and free.
+    /// How long the network's arc has been critical, and how long it has been free.
     critical_s: f32,
     free_s: f32,
 }

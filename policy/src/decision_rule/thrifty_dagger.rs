@@ -44,7 +44,7 @@ pub(crate) struct Thresholds {
 }
 
 impl Thresholds {
-    /// Of the disagreement, the risk and the discrepancy of every sample.
+    /// The thresholds, from the disagreement, the risk and the discrepancy of every sample.
     pub(crate) fn new(rate: f32, mut disagreement: Vec<f32>, mut risk: Vec<f32>, discrepancy: &[f32]) -> Self {
         let count = discrepancy.len().max(1) as f32;
         let risky = quantile(&mut risk, 1.0 - rate).max(RISK_MIN);

@@ -240,7 +240,7 @@ fn a_gpu_learns_as_a_cpu_does() {
     assert!((cpu.validation.unwrap().rmse_m - gpu.validation.unwrap().rmse_m).abs() < 1e-3, "{cpu:?} {gpu:?}");
 }
 
-/// It was a panic, without the round that it happened in.
+/// This was a panic that did not name the round.
 #[test]
 fn a_loss_that_is_no_number_ends_the_training_with_its_step() {
     let mut round = round(200);

@@ -32,7 +32,7 @@ pub struct FitOutcome {
     pub steps: Vec<Step>,
 }
 
-/// Why a training cannot start, or go on.
+/// Why a training cannot start or continue.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// The data set has no sample to train on.
@@ -40,14 +40,14 @@ pub enum FitError {
     NoTrainingSamples {
         /// Samples in the data set.
         samples: usize,
-        /// From the split.
+        /// `every` of the split.
         every: usize,
     },
     /// A batch without samples.
     #[error("a batch of 0 samples: it must be positive")]
     EmptyBatch,
-    /// Arithmetic that ran out of numbers.
-    #[error("step {step}: {what} is no finite number; lower the learning rate or the gains of the loss")]
+    /// Arithmetic that left the finite numbers.
+    #[error("step {step}: {what} is not a finite number; lower the learning rate or the gains of the loss")]
     NotFinite {
         /// The step, from 1.
         step: u32,
@@ -81,12 +81,12 @@ pub struct FitContext {
 /// Seconds of training between two copies of its state on disk: what a killed process loses at most.
 const KEEP_EVERY_S: u64 = 60;
 
-/// Trains `start` on a data set. `progress` is called after every step and may stop it. An interrupted training is kept in
-/// the file `unfinished`, if one is named, and goes on from there to the same result; who named it deletes it when it is
-/// needed no more.
+/// Trains `start` on a data set. `progress` is called after every step and may stop it. An interrupted training is kept
+/// in the file `unfinished`, if one is named, and continues from there to the same result; the caller deletes the file
+/// when it is no longer needed.
 ///
 /// # Errors
-/// If there is nothing to train on, the learning rate is impossible, the loss or a weight is no finite number, or
+/// If there is nothing to train on, the learning rate is impossible, the loss or a weight is not a finite number, or
 /// `unfinished` cannot be read or written.
 #[expect(clippy::disallowed_methods, reason = "when the state is copied to disk changes no result")]
 pub fn fit(
@@ -251,7 +251,7 @@ impl<'a> Learner<'a> {
     }
 }
 
-/// At most so many of the samples, evenly spread; 0 = all.
+/// At most this many of the samples, evenly spread; 0 = all.
 fn thinned(samples: &[Sample], at_most: usize) -> Cow<'_, [Sample]> {
     if at_most == 0 || at_most >= samples.len() {
         return Cow::Borrowed(samples);

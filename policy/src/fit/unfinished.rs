@@ -31,7 +31,7 @@ pub(crate) struct Unfinished {
     pub(crate) curve: Vec<CurvePoint>,
 }
 
-/// What is no array.
+/// What is not an array.
 #[derive(Serialize, Deserialize)]
 struct About {
     curve: Vec<CurvePoint>,

@@ -21,7 +21,7 @@ pub struct Prediction {
 }
 
 impl Prediction {
-    /// From raw outputs; NaN throughout if one of them is not finite, which the loop that drives refuses
+    /// The prediction from raw outputs; NaN throughout if one of them is not finite, which the loop that drives refuses
     /// ([`sim::batch::NotFinite`]).
     pub fn from_raw(raw: [f32; OUTPUTS]) -> Self {
         if !raw.iter().all(|value| value.is_finite()) {
@@ -209,7 +209,7 @@ mod tests {
         }
     }
 
-    /// To the bit, but for the rounding of 1 − u.
+    /// Equal to the bit, except for the rounding of 1 − u.
     #[test]
     fn mirror_averaging_answers_mirror_images_alike() {
         let grids = lots(20);

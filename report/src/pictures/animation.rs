@@ -96,7 +96,7 @@ impl Take {
     /// Drives the trial again, up to and including a tick; `seen` is told of every frame.
     ///
     /// # Errors
-    /// As [`Replay::drive`].
+    /// See [`Replay::drive`].
     pub fn of(
         replay: &Replay,
         episode: &EpisodeSettings,
@@ -436,7 +436,7 @@ struct Places {
 }
 
 impl Places {
-    /// Of the words beside a grid.
+    /// The corner of the words beside a grid.
     fn words(&self, panel: Vec2) -> Vec2 {
         panel + Vec2::new(self.cell_px * GRID_CELLS as f32 + GAP_PX, 0.0)
     }

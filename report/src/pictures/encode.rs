@@ -223,7 +223,7 @@ fn palette(samples: &[Pixmap]) -> Vec<u8> {
     palette
 }
 
-/// For every bin the nearest colour of the palette.
+/// The nearest colour of the palette for every bin.
 fn nearest(palette: &[u8]) -> Vec<u8> {
     let middle = |part: usize| ((part << (8 - BITS)) | (1 << (7 - BITS))) as i32;
     let mask = (1 << BITS) - 1;

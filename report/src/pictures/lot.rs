@@ -229,7 +229,7 @@ pub fn draw_caption(drawing: &mut Drawing, view: &View, text: &str, top_px: f32)
     drawing.line(vec![Vec2::new(from, middle), Vec2::new(to, middle)], INK, 3.0);
 }
 
-/// At most so many letters, the last two of them dots if any are missing.
+/// At most this many letters, the last two of them dots if any are missing.
 pub fn shortened(text: &str, letters: usize) -> String {
     if text.chars().count() <= letters {
         return text.to_owned();

@@ -24,7 +24,7 @@ pub struct Point {
 }
 
 impl Point {
-    /// Of a frame.
+    /// The point of a frame.
     pub fn of(frame: &Frame) -> Self {
         let near_collision = match frame.event {
             Event::NearCollision { at, .. } => Some(at.position()),
@@ -43,7 +43,7 @@ impl Point {
 /// One drive.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
-    /// In the legend.
+    /// Its name in the legend.
     pub name: String,
     /// Tick by tick.
     pub points: Vec<Point>,

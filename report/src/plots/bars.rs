@@ -21,7 +21,7 @@ pub struct Bar {
 pub struct BarGroup {
     /// Written under them.
     pub name: String,
-    /// From left to right.
+    /// Its bars from left to right.
     pub bars: Vec<Bar>,
 }
 

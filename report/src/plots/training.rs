@@ -84,7 +84,7 @@ fn means(points: &[(u32, f64)], stretch: u32) -> Vec<(u32, f64)> {
     points.chunk_by(same).filter_map(mean).collect()
 }
 
-/// From the lowest value to the 99th percentile: the first few steps are many times higher than all others.
+/// The range from the lowest value to the 99th percentile: the first few steps are many times higher than all others.
 fn range(curves: &[Vec<(u32, f64)>]) -> (f64, f64) {
     let mut values: Vec<f64> =
         curves.iter().flatten().map(|&(_, value)| value).filter(|value| value.is_finite()).collect();
@@ -100,7 +100,7 @@ fn range(curves: &[Vec<(u32, f64)>]) -> (f64, f64) {
 /// η̂ of one training.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct EtaSeries {
-    /// In the legend.
+    /// Its name in the legend.
     pub name: String,
     /// Iteration, from 1, and the share of ticks the network drove, 0…1.
     pub points: Vec<(u32, f64)>,

@@ -14,7 +14,7 @@ pub(super) struct Drawing {
     pub(super) about: &'static str,
     pub(super) size_m: (f32, f32),
     pub(super) pixel_m: f32,
-    /// Of the lower left corner: x, y, yaw.
+    /// Pose of the lower left corner: x, y, yaw.
     pub(super) origin: &'static str,
     pub(super) background: u8,
     pub(super) shapes: Vec<(Shape, u8)>,
@@ -47,7 +47,7 @@ pub(super) fn band(points: &[(f32, f32)], radius_m: f32, width_m: f32) -> Shape 
     Shape::Band { line: path.poses().iter().step_by(4).map(|pose| pose.position()).collect(), width_m }
 }
 
-/// From lower left to upper right corner.
+/// A rectangle from its lower left to its upper right corner.
 pub(super) fn area(x: f32, y: f32, to_x: f32, to_y: f32) -> Shape {
     turned(0.5 * (x + to_x), 0.5 * (y + to_y), to_x - x, to_y - y, 0.0)
 }

@@ -107,11 +107,11 @@ fn barriers(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
 struct Stand {
     kind: Barrier,
     side: Side,
-    /// Along the axis, metres.
+    /// Where it begins along the axis, metres.
     from_m: f32,
-    /// Along the axis, metres.
+    /// Its length along the axis, metres.
     along_m: f32,
-    /// From the edge into the road, metres.
+    /// How far it reaches from the edge into the road, metres.
     protrusion_m: f32,
 }
 

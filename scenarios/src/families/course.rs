@@ -115,7 +115,7 @@ pub(super) fn lacking_at_corner_m(before_m: f32, after_m: f32) -> f32 {
     (COMFORTABLE_M - 0.65 * before_m.min(after_m) - 0.35 * before_m.max(after_m)).max(0.0)
 }
 
-/// Of centre lines, run-outs included, metres.
+/// Lengths of centre lines, run-outs included, metres.
 const LENGTH_M: Range<f32> = 116.0..236.0;
 
 /// The first of some draws whose strip keeps apart from itself by twice a distance.

@@ -11,11 +11,11 @@ use sim::scenario::{ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::ops::Range;
 
-/// Between racks, metres.
+/// Width of the aisles between racks, metres.
 const AISLE_M: Range<f32> = 3.4..5.5;
-/// At the ends of the racks, metres.
+/// Width of the cross aisles at the ends of the racks, metres.
 const CROSS_M: Range<f32> = 5.5..11.0;
-/// Of a row of racks, metres.
+/// Width of a row of racks, metres.
 const RACK_M: Range<f32> = 1.6..4.0;
 /// The piece of an aisle that is driven, corner to corner, metres.
 const LEG_M: Range<f32> = 28.0..60.0;

@@ -13,9 +13,9 @@ use std::ops::Range;
 
 /// Half of all lanes are as narrow as this, metres.
 const NARROW_M: Range<f32> = 2.8..3.8;
-/// Of most others, metres.
+/// Widths of most others, metres.
 const WIDE_M: Range<f32> = 3.8..8.0;
-/// Of the centre line, metres.
+/// Radii of the centre line, metres.
 const RADIUS_M: Range<f32> = 8.0..30.0;
 /// The centre line between the run-outs, metres.
 const LENGTH_M: Range<f32> = 85.0..190.0;
@@ -111,7 +111,7 @@ const LIMIT_DEG: f32 = 170.0;
 fn tightest_radius_m(width_m: f32) -> f32 {
     /// Half of the car's width, metres.
     const HALF_M: f32 = 0.93;
-    /// From the rear axle to the nose, metres.
+    /// Distance from the rear axle to the nose, metres.
     const NOSE_M: f32 = 3.8;
     /// Left free on both sides, also for steering in and out, metres.
     const CLEAR_M: f32 = 0.25;

@@ -16,14 +16,14 @@ use std::ops::Range;
 
 /// The centre line between the run-outs, metres.
 const LENGTH_M: Range<f32> = 90.0..180.0;
-/// Between the kerbs, metres.
+/// Width between the kerbs, metres.
 const WIDTH_M: Range<f32> = 5.4..9.0;
 const RADIUS_M: Range<f32> = 10.0..30.0;
-/// Free between parked cars, metres.
+/// Free width between parked cars, metres.
 const GAP_M: Range<f32> = 2.7..3.6;
-/// From a parked car to the kerb, metres.
+/// Distance from a parked car to the kerb, metres.
 const FROM_KERB_M: Range<f32> = 0.1..0.4;
-/// Between bumpers, metres.
+/// Distance between bumpers, metres.
 const BUMPERS_M: Range<f32> = 0.6..2.0;
 const SIDE_ROAD_WIDTH_M: Range<f32> = 4.0..6.0;
 const SIDE_ROAD_DEPTH_M: Range<f32> = 6.0..12.0;

@@ -97,7 +97,7 @@ pub(super) struct Mouth {
 }
 
 impl Mouth {
-    /// Of unit length, out of the strip.
+    /// The direction out of the strip, of unit length.
     pub(super) fn outward(&self) -> Vec2 {
         -(self.b - self.a).normalize().perp()
     }
@@ -106,7 +106,7 @@ impl Mouth {
 /// A piece in the world.
 #[derive(Debug, Clone)]
 struct Leg {
-    /// Of the centre line, corners not rounded.
+    /// Start of the piece on the centre line, corners not rounded.
     start: Pose,
     length_m: f32,
     /// 0 if straight, 1/m, positive to the left.
@@ -133,7 +133,7 @@ pub(super) struct Strip {
     legs: Vec<Leg>,
     spans: Vec<Span>,
     length_m: f32,
-    /// Of both edges.
+    /// The notches of both edges.
     pub(super) notches: Vec<Notch>,
 }
 
@@ -210,7 +210,7 @@ impl Strip {
         self.spans.get(index + 1).map_or(self.length_m, |next| next.from_m)
     }
 
-    /// On the axis, headed along it.
+    /// The pose on the axis, headed along it.
     pub(super) fn pose(&self, s_m: f32) -> Pose {
         let span = self.spans[self.span(s_m)];
         span.start.advanced_along_arc(span.curvature_per_m, s_m - span.from_m)
@@ -304,7 +304,7 @@ impl Strip {
         without_doubles(points.into_iter().map(to_millimetres).collect())
     }
 
-    /// In the order of the edge.
+    /// The notches of a leg on one side, in the order of the edge.
     fn notches_of(&self, leg: &Leg, side: Side) -> impl Iterator<Item = Notch> {
         let on_axis = leg.axis_offset_m..leg.axis_offset_m + leg.length_m;
         let is_of = move |notch: &Notch| notch.side == side && on_axis.contains(&(0.5 * (notch.from_m + notch.to_m)));

@@ -15,7 +15,7 @@ pub(super) struct Narrowing {
     pub(super) from_m: f32,
     /// Along the axis, metres.
     pub(super) to_m: f32,
-    /// From the edge into the strip, metres.
+    /// How far it reaches from the edge into the strip, metres.
     pub(super) protrusion_m: f32,
 }
 
@@ -23,18 +23,18 @@ pub(super) struct Narrowing {
 #[derive(Debug, Clone, Copy)]
 #[allow(clippy::struct_field_names, reason = "the postfix is the unit")]
 pub(super) struct Rules {
-    /// Beside anything that stands in the strip, metres.
+    /// The free gap beside anything that stands in the strip, metres.
     pub(super) gap_m: f32,
-    /// Along the axis between things on opposite sides that leave less than the gap between them, metres.
+    /// Distance along the axis between things on opposite sides that leave less than the gap between them, metres.
     pub(super) apart_m: f32,
-    /// From sharp corners, metres.
+    /// Distance from sharp corners, metres.
     pub(super) corner_clear_m: f32,
 }
 
 /// Obstacles of a lot while it is drawn.
 pub(super) struct Things<'a> {
     strip: &'a Strip,
-    /// Of the axis on which things may stand in the way, metres.
+    /// The stretch of the axis on which things may stand in the way, metres.
     usable_m: (f32, f32),
     pub(super) obstacles: Vec<Obstacle>,
     pub(super) islands: Vec<Island>,
@@ -55,7 +55,7 @@ impl<'a> Things<'a> {
         }
     }
 
-    /// Puts something where nothing else stands; it is not looked at whether it stands in the way.
+    /// Puts something where nothing else stands, without checking whether it is in the way.
     pub(super) fn stand(&mut self, obstacle: Obstacle) -> bool {
         let is_free = self.reserve(obstacle.outline());
         if is_free {
@@ -138,7 +138,7 @@ impl<'a> Things<'a> {
     }
 }
 
-/// At a place rounded to millimetres and tenths of a degree.
+/// An obstacle at a place rounded to millimetres and tenths of a degree.
 pub(super) fn obstacle(class: ObstacleClass, at: Vec2, heading_rad: f32) -> Obstacle {
     let heading_deg = (wrap_angle(heading_rad).to_degrees() * 10.0).round() / 10.0;
     Obstacle { heading_deg, ..Obstacle::new(class, Pose::new(to_millimetres(at), 0.0)) }

@@ -65,7 +65,7 @@ impl Wall {
         walls
     }
 
-    /// From a point to another.
+    /// A straight wall from one point to another.
     pub(super) fn straight(&self, from: Vec2, to: Vec2) -> Vec<Obstacle> {
         let along = to - from;
         let pieces = (along.length() / LENGTH_MAX_M).ceil().max(1.0);

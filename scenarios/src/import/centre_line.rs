@@ -48,7 +48,7 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
             [None] | [None, None] if i == 0 && !record[0].starts_with(is_of_number) => {}
             _ => {
                 let cells = record.iter().collect::<Vec<_>>().join(",");
-                return Err(faulty(line, format!("{:?} is no point", shortened(&cells))));
+                return Err(faulty(line, format!("{:?} is not a point", shortened(&cells))));
             }
         }
     }

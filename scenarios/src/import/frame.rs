@@ -1,4 +1,4 @@
-//! From the frame of a map to that of the lot.
+//! The transform from the frame of a map to that of the lot.
 
 use sim::geometry::{Pose, Vec2, wrap_angle};
 
@@ -9,7 +9,7 @@ const FAR_M: f64 = 5000.0;
 /// The lot is the map, moved and enlarged: lot = scale · (map − origin).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Frame {
-    /// Of the lot, in the map's frame, metres: (0, 0) unless that is too far away.
+    /// Origin of the lot, in the map's frame, metres: (0, 0) unless that is too far away.
     pub(super) origin: [f64; 2],
     scale: f64,
 }

@@ -116,7 +116,7 @@ impl Map {
             fault(format!("cannot be read: {error}"), "check the key image; paths start at the YAML file")
         };
         if !read::is_below(folder, &file).map_err(unreadable)? && !is_image_anywhere {
-            let problem = "it is neither beside the YAML file nor in a folder below".to_owned();
+            let problem = "it is neither next to the YAML file nor in a folder below".to_owned();
             let remedy = "put it there, or import the map with cargo xtask generate --image-anywhere";
             return Err(fault(problem, remedy));
         }
@@ -212,7 +212,7 @@ impl Header {
         Ok(header)
     }
 
-    /// The map, and what is to be said about it; or what is wrong with its image, and the remedy.
+    /// The map, and notes about it; or what is wrong with its image, and the remedy.
     fn map_of(&self, text: &str, image: &[u8]) -> Result<(Map, Vec<Note>), (String, String)> {
         let image = decode(image)?;
         let mut notes = unknown_keys(text);
@@ -310,7 +310,7 @@ fn has_shifted_raster(file: &[u8]) -> bool {
 /// The image in the bytes of a file, or what is wrong with it, and the remedy.
 fn decode(file: &[u8]) -> Result<DynamicImage, (String, String)> {
     let no_image =
-        |error: &dyn Display| (format!("no readable image: {error}"), "save the map as PGM or PNG".to_owned());
+        |error: &dyn Display| (format!("not a readable image: {error}"), "save the map as PGM or PNG".to_owned());
     if has_shifted_raster(file) {
         let remedy = "save it with LF in place of CRLF".to_owned();
         return Err(("its header ends with CRLF, which shifts every pixel by one".to_owned(), remedy));
@@ -327,7 +327,7 @@ fn decode(file: &[u8]) -> Result<DynamicImage, (String, String)> {
     reader.limits(limits);
     let image = reader.decode().map_err(|error| match error {
         ImageError::Limits(_) => {
-            let remedy = format!("crop it, or halve its resolution: {IMAGE_SIDE_MAX_PX} pixels a side are possible");
+            let remedy = format!("crop it, or halve its resolution, to at most {IMAGE_SIDE_MAX_PX} pixels a side");
             ("it is too large".to_owned(), remedy)
         }
         error => no_image(&error),

@@ -212,8 +212,8 @@ fn a_centre_line_must_have_room_for_the_car() {
     assert!(skew.contains("centre_line, 35.") || skew.contains("centre_line, 34."), "{skew}");
     assert!(skew.contains("0.93 m to the side, and half of the car is 0.93 m"), "{skew}");
     for (line, expected) in [
-        ("5.0,3.5\n45.0;3.5\n", "line.csv:2: \"45.0;3.5\" is no point; write one point per line"),
-        ("5.0,3.5\n45.0,nan\n", "line.csv:2: \"45.0,nan\" is no point"),
+        ("5.0,3.5\n45.0;3.5\n", "line.csv:2: \"45.0;3.5\" is not a point; write one point per line"),
+        ("5.0,3.5\n45.0,nan\n", "line.csv:2: \"45.0,nan\" is not a point"),
         ("x,y\n5.0,3.5\n", "line.csv: centre line: the line has 1 points; give at least"),
     ] {
         let message = refusal(&with_line("line-faulty", 5, line));
@@ -257,7 +257,7 @@ fn faults_of_the_files_are_named() {
     );
     std::fs::write(&lot.map, &sound).unwrap();
     std::fs::write(lot.map.with_file_name("map.pgm"), "P2\n60 7\n255\n1 2 3\n").unwrap();
-    assert!(refusal(&lot).contains("map.pgm: no readable image: "), "{}", refusal(&lot));
+    assert!(refusal(&lot).contains("map.pgm: not a readable image: "), "{}", refusal(&lot));
 }
 
 /// A centre line may end where the car cannot turn round to drive back: a metre before a wall.
@@ -350,7 +350,7 @@ fn a_case_is_read_in_one_row_or_one_column() {
         ("0,0,0,30,0,0,1.5", "case.csv:1: number 7, the number of obstacles, is 1.5"),
         ("0,0,0\n30,0,0\n1\n3\n5,5,6,5,6", "case.csv:5: the file ends after 13 numbers, before a vertex of obstacle 1"),
         ("0,0,0,30,0,0,0\n7", "case.csv:2: 1 numbers are left over after the last obstacle"),
-        ("x,y\n1,2", "case.csv:1: \"x\" is no number of metres; a TPCAP case holds numbers only"),
+        ("x,y\n1,2", "case.csv:1: \"x\" is not a number of metres; a TPCAP case holds numbers only"),
         ("", "case.csv:1: the file ends after 0 numbers, before the start"),
     ] {
         let folder = folder("tpcap-faulty", &[("case.csv", text)]);
@@ -562,13 +562,13 @@ fn an_image_that_is_not_beside_its_map_is_refused_unless_it_may_be_anywhere() {
     let absolute = outer.join("secret.pgm").display().to_string();
     for image in ["../secret.pgm", "below/../../secret.pgm", &absolute] {
         let error = read(image, false).unwrap_err();
-        assert!(error.contains("neither beside the YAML file nor") && error.contains("--image-anywhere"), "{error}");
+        assert!(error.contains("neither next to the YAML file nor") && error.contains("--image-anywhere"), "{error}");
         assert_eq!(read(image, true), Ok(()), "{image}");
     }
     #[cfg(unix)]
     {
         std::os::unix::fs::symlink(outer.join("secret.pgm"), outer.join("map/link.pgm")).unwrap();
-        assert!(read("link.pgm", false).is_err_and(|error| error.contains("neither beside")), "a link leads out, too");
+        assert!(read("link.pgm", false).is_err_and(|error| error.contains("neither next to")), "a link leads out, too");
     }
 }
 
@@ -579,9 +579,9 @@ fn a_map_or_centre_line_that_is_not_beside_its_lot_file_is_refused() {
     std::fs::write(outer.join("lots/map.yaml"), "").unwrap();
     let file = outer.join("lots/map.lot.toml");
     for (text, place) in [
-        ("map = '../secret.yaml'\n", "map: it is neither beside this file nor"),
+        ("map = '../secret.yaml'\n", "map: it is neither next to this file nor"),
         ("map = '/etc/hostname.yaml'\n", "/etc/hostname.yaml: cannot be read"),
-        ("map = 'map.yaml'\ncentre_line = '../secret.csv'\n", "centre_line: it is neither beside this file nor"),
+        ("map = 'map.yaml'\ncentre_line = '../secret.csv'\n", "centre_line: it is neither next to this file nor"),
     ] {
         std::fs::write(&file, text).unwrap();
         let error = load(&file, &car()).unwrap_err().to_string();
@@ -590,7 +590,7 @@ fn a_map_or_centre_line_that_is_not_beside_its_lot_file_is_refused() {
     // Whoever names the file on the command line may name any.
     let mut lot = MapLot::of_map(&outer.join("lots/map.yaml"));
     lot.centre_line = Some(outer.join("secret.csv"));
-    assert!(!lot.scenario(&car()).unwrap_err().to_string().contains("neither beside"));
+    assert!(!lot.scenario(&car()).unwrap_err().to_string().contains("neither next to"));
 }
 
 /// `negat: 1` was read as a map that is not negated.
@@ -626,7 +626,7 @@ fn a_first_line_with_a_number_in_it_is_no_header() {
     let points_of = |text: &str| centre_line::parse(text, "line.csv", 1.0).map(|points| points.len());
     assert_eq!(points_of("x,y\n1,2\n3,4\n").unwrap(), 2);
     for text in ["-15.O,-13.2\n1,2\n3,4\n", "1,y\n1,2\n3,4\n", "8;12\n20,12\n40,12\n", "8 12\n1,2\n3,4\n"] {
-        assert!(points_of(text).unwrap_err().to_string().contains("is no point"), "{text}");
+        assert!(points_of(text).unwrap_err().to_string().contains("is not a point"), "{text}");
     }
 }
 

@@ -128,7 +128,7 @@ impl<'a> Numbers<'a> {
                     return Err(LoadError::Faulty {
                         file: file.to_owned(),
                         line: i + 1,
-                        problem: format!("{:?} is no number of metres", shortened(cell)),
+                        problem: format!("{:?} is not a number of metres", shortened(cell)),
                         remedy: "a TPCAP case holds numbers only; a centre line belongs to the key centre_line"
                             .to_owned(),
                     });

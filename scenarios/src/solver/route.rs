@@ -17,7 +17,7 @@ const EXPANSIONS_MAX: usize = 200_000;
 pub const GOAL_BESIDE_M: f32 = 1.0;
 /// Cosine of the largest angle between the end of the route and the goal: 20°.
 const GOAL_HEADING_COS: f32 = 0.94;
-/// How far behind its start a loop ends, metres: farther than the goal's depth, so that the start is no finish.
+/// How far behind its start a loop ends, metres: farther than the goal's depth, so that the start is not a finish.
 pub const LOOP_GAP_M: f32 = 2.5;
 /// The gate that makes a loop go round stands this far ahead of the start, metres: between rear and front axle.
 const GATE_AHEAD_M: f32 = 1.6;
@@ -60,14 +60,14 @@ pub enum NoRoute {
     Askew {
         /// Where.
         at: Vec2,
-        /// By how much it is off at best, degrees.
+        /// How far it is off at best, degrees.
         off_deg: f32,
     },
     /// Wide enough everywhere, but no drive forwards was found.
     Tight {
         /// The point of the search nearest the goal.
         reached: Vec2,
-        /// From there to the goal, about, metres.
+        /// Distance from there to the goal, roughly, metres.
         to_go_m: f32,
     },
 }

@@ -341,8 +341,8 @@ impl TallObject {
     }
 }
 
-/// Of a piece of a wall, relative to the camera, the part ahead of it: walls run on beside the camera, and what they
-/// hide begins there. A piece that is not ahead at all stays as it is.
+/// The part of a piece of a wall, relative to the camera, that is ahead of it: walls run on beside the camera, and what
+/// they hide begins there. A piece that is not ahead at all stays as it is.
 fn part_ahead(wall: &Outline) -> Outline {
     let ends = [wall.corner(0), wall.corner(1)];
     let [is_first_ahead, is_second_ahead] = ends.map(|end| end.x > AHEAD_MIN_M);

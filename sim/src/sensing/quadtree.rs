@@ -14,7 +14,7 @@ pub(super) struct PixelLattice {
     origin: Vec2,
     per_row: Vec2,
     per_col: Vec2,
-    /// From there to the centres of the columns of cells, by columns of blocks.
+    /// Offsets from there to the centres of the columns of cells, by columns of blocks.
     to_cols: [FourPoints; BLOCKS],
     /// How much the field may change from the centre of a cell to any of its pixels, metres.
     cell_within_m: f32,

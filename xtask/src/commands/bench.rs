@@ -19,16 +19,16 @@ Examples:
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct BenchArgs {
-    /// Shorter measurements.
+    /// Takes shorter measurements.
     #[arg(long)]
     quick: bool,
     /// Measures one area only; may be repeated.
     #[arg(long, value_enum, value_name = "AREA")]
     only: Vec<Area>,
-    /// Measures other simulators and libraries, too, in virtual environments made from PyPI (gigabytes).
+    /// Also measures other simulators and libraries, in virtual environments made from PyPI (gigabytes).
     #[arg(long)]
     peers: bool,
-    /// Where the environment is that most of them share; others have theirs beside it.
+    /// Folder of the environment that most of them share; the others have theirs next to it.
     #[arg(long, value_name = "DIR", default_value = "target/tools/peers", requires = "peers")]
     environment: PathBuf,
     /// Writes the table into this Markdown file, between its lines `<!-- bench -->` and `<!-- /bench -->`.

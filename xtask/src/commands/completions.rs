@@ -12,7 +12,7 @@ Shells complete the name of a program, so give it one:
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct CompletionsArgs {
-    /// For which shell.
+    /// Shell to print the script for.
     #[arg(value_name = "SHELL")]
     shell: Shell,
 }

@@ -1,4 +1,4 @@
-//! `deviations`: what it does that a preset deviates from the paper.
+//! `deviations`: what the deviations of a preset from the paper do.
 
 use super::trainings::{Begun, Trainings, TrainingsArgs, ensure_distinct};
 use crate::args::lot_name;
@@ -18,10 +18,10 @@ Examples:
 pub(crate) struct DeviationsArgs {
     #[command(flatten)]
     common: TrainingsArgs,
-    /// Things that are done as in the paper, one at a time, by name [default: all but `steps`, which takes hours].
+    /// Things to do as in the paper, one at a time, by name [default: all but `steps`, which takes hours].
     #[arg(long, visible_alias = "of", value_name = "NAME", num_args = 1.., value_delimiter = ',', conflicts_with = "resume")]
     only: Vec<String>,
-    /// Lots that all policies are driven on, once each way.
+    /// Lots to drive all policies on, once each way.
     #[arg(
         long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name,
         default_value = "validation:180:all",
@@ -52,7 +52,7 @@ fn begin(args: &DeviationsArgs) -> anyhow::Result<Begun<Extent>> {
     for name in &args.only {
         ensure!(
             known.contains(&name.as_str()),
-            "--only {name}: no deviation is named so; there are {}",
+            "--only {name}: no deviation has this name; there are {}",
             known.join(", ")
         );
     }

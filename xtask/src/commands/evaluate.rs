@@ -40,8 +40,8 @@ Examples:
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct EvaluateArgs {
-    /// Who drives, one or more; may be repeated. See `cargo xtask drivers`. The settings of the first `run:DIR` are used unless
-    /// `--config` or `--preset` names others.
+    /// Drivers, one or more; may be repeated. See `cargo xtask drivers`. The settings of the first `run:DIR` are used
+    /// unless `--config` or `--preset` names others.
     #[arg(long = "driver", value_name = "SPEC", required_unless_present = "resume", num_args = 1..)]
     drivers: Vec<String>,
     /// Lots to drive; see `cargo xtask lots` [default: the setting evaluation.lots].
@@ -50,10 +50,10 @@ pub(crate) struct EvaluateArgs {
     /// Trials per lot and direction; each draws its own obstacles and noise [default: the setting evaluation.trials].
     #[arg(long, value_name = "N")]
     trials: Option<u32>,
-    /// Which ways the lots are driven [default: the setting evaluation.directions].
+    /// Directions in which to drive the lots [default: the setting evaluation.directions].
     #[arg(long, alias = "direction", value_name = "WAY")]
     directions: Option<Directions>,
-    /// What is seen wrongly: clean, paper, hard, lot (as the lot asks for) or multiples of paper; several are compared,
+    /// Sensor noise: clean, paper, hard, lot (as the lot asks for) or multiples of paper; several are compared,
     /// `sweep` stands for 0,0.5,1,1.5,2 [default: the setting evaluation.noise].
     #[arg(long, alias = "level", value_name = "LEVEL", num_args = 1.., value_delimiter = ',')]
     noise: Vec<String>,
@@ -61,13 +61,14 @@ pub(crate) struct EvaluateArgs {
     /// control ticks for all, 0 = none [default: the setting evaluation.smoothing].
     #[arg(long, value_name = "TICKS")]
     smoothing: Option<Smoothing>,
-    /// Driver the others are compared with [default: the last network, else the first driver].
+    /// Driver to compare the others with [default: the last network, else the first driver].
     #[arg(long, value_name = "SPEC")]
     compare_with: Option<String>,
     /// Seed of obstacles and noise of the trials, not of a training [default: the setting evaluation.seed].
     #[arg(long)]
     seed: Option<u64>,
-    /// Drives a share of the trials only, one of several machines' (docs/cluster.md); `merge` puts the shares together.
+    /// Drives only a share of the trials, for one of several machines (docs/cluster.md); `merge` puts the shares
+    /// together.
     #[arg(long, value_name = "NUMBER/OF", conflicts_with = "record")]
     shard: Option<Shard>,
     #[command(flatten)]
@@ -90,7 +91,7 @@ pub(crate) struct EvaluateArgs {
     record: RecordArgs,
 }
 
-/// What an evaluation was asked for beside its settings.
+/// What an evaluation was asked for besides its settings.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Asked {
@@ -154,7 +155,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     runs.map_or(Ok(()), |runs| record::record(run.path(), vec![record::first_runs(&plan, runs)], output))
 }
 
-/// Drives what is not driven yet of a run, and writes everything that it leaves.
+/// Drives what a run has not driven yet, and writes all of its files.
 ///
 /// # Errors
 /// See [`measure`].
@@ -172,7 +173,7 @@ pub(crate) fn finish(plan: &Plan<'_>, run: &RunDir, console: &Console, output: &
 /// Drives the plan, writes and prints the tables.
 ///
 /// # Errors
-/// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is kept.
+/// If a lot cannot be built or a file cannot be written, or on Ctrl-C; what was driven by then is kept.
 pub(crate) fn measure(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress, output: &Output) -> anyhow::Result<()> {
     let results = drive(plan, run, progress)?;
     let summary = Summary::new(plan, &results);
@@ -184,7 +185,7 @@ pub(crate) fn measure(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress, ou
 
 /// Drives the plan; see [`measure`].
 pub(crate) fn drive(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<EvaluationResults> {
-    let interrupted = || Interrupted { kept: format!("what was driven so far is in {}", run.path().display()) };
+    let interrupted = || Interrupted { kept: format!("everything driven so far is in {}", run.path().display()) };
     Ok(evaluation::evaluate::evaluate(plan, run, progress)?.ok_or_else(interrupted)?)
 }
 
@@ -196,7 +197,7 @@ pub(crate) fn tasks(settings: &Settings, drivers: usize) -> Vec<estimate::Task> 
 /// What can be known to go wrong before the first step.
 ///
 /// # Errors
-/// Of a lot that can only be driven forward, with the flag that says so.
+/// If a lot can only be driven forward; the error names the flag that says so.
 pub(crate) fn check(plan: &Plan<'_>) -> anyhow::Result<()> {
     plan.check().map_err(|error| or_forward(error, "--directions forward"))
 }
@@ -218,7 +219,7 @@ pub(crate) fn compare_with(wanted: Option<&str>, specs: &[DriverSpec]) -> anyhow
     let found = specs.iter().position(|given| Some(given) == spec.as_ref());
     found.with_context(|| {
         let named: Vec<String> = specs.iter().map(DriverSpec::to_string).collect();
-        format!("--compare-with {wanted}: is none of the drivers; name one of {}", named.join(", "))
+        format!("--compare-with {wanted}: is not one of the drivers; name one of {}", named.join(", "))
     })
 }
 

@@ -22,7 +22,7 @@ pub(crate) struct ExportArgs {
 
 #[derive(Debug, Clone, Subcommand)]
 enum Format {
-    /// As an ONNX file, which any framework reads, and `--driver onnx:FILE` (docs/formats.md).
+    /// Writes an ONNX file, for any framework and for `--driver onnx:FILE` (docs/formats.md).
     #[command(after_help = EXAMPLES)]
     Onnx(OnnxArgs),
 }

@@ -51,7 +51,7 @@ pub(crate) struct GenerateArgs {
     /// Replaces files of the same name.
     #[arg(long)]
     overwrite: bool,
-    /// Writes a share of the lots only, one of several machines' (docs/cluster.md); all may write into one folder.
+    /// Writes only a share of the lots, for one of several machines (docs/cluster.md); all may write into one folder.
     #[arg(long, value_name = "NUMBER/OF")]
     shard: Option<Shard>,
     /// Where to drive on a map.
@@ -70,13 +70,13 @@ pub(crate) struct MapArgs {
     /// What is not given is read from MAP.lot.toml.
     #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
     start: Option<[f64; 3]>,
-    /// Where it is to arrive, likewise; the route there is found automatically.
+    /// Where the rear axle is to arrive, in the same form; the route there is found automatically.
     #[arg(long, value_name = "X,Y,DEG", value_parser = pose, allow_hyphen_values = true)]
     goal: Option<[f64; 3]>,
-    /// Instead of a goal: a route round a loop, back to the start.
+    /// Routes the car round a loop, back to the start, instead of to a goal.
     #[arg(long = "loop", conflicts_with = "goal")]
     is_loop: bool,
-    /// Instead of all three: CSV file with the route of the rear axle, x and y in metres.
+    /// CSV file with the route of the rear axle, x and y in metres, instead of all three.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["start", "goal", "is_loop"])]
     centre_line: Option<PathBuf>,
     /// Clearance that a route found automatically keeps around the body, metres in the lot [default: 0.25].
@@ -109,7 +109,7 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
     let fixed = lots.iter().find(|lot| !lot.is_drawn_per_trial());
     ensure!(
         args.count == 1 || fixed.is_none(),
-        "--count {}: only the reference lots have other obstacles in every trial, {:?} has not; for several generated \
+        "--count {}: only the reference lots have other obstacles in every trial, {:?} does not; for several generated \
          lots write --lots train:{0}",
         args.count,
         fixed.map_or("", Lot::name)
@@ -156,12 +156,12 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
         return Lot::parse_all(&args.lots, vehicle);
     }
     let [path] = args.lots.as_slice() else {
-        bail!("--scale, --start and the like are about one map, and {} lots are named; name one", args.lots.len());
+        bail!("--scale, --start and the like apply to one map, and {} lots are named; name one", args.lots.len());
     };
     let path = Path::new(path);
     ensure!(
         import::is_map(path),
-        "--scale, --start and the like are about maps, and {} is none; name a .yaml (ROS) or .csv (TPCAP) file",
+        "--scale, --start and the like apply to maps, and {} is not one; name a .yaml (ROS) or .csv (TPCAP) file",
         path.display()
     );
     let mut lot = MapLot::read(path)?;
@@ -191,7 +191,7 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
     Ok(vec![if flags.is_empty() { made? } else { made.with_context(with_flags)? }])
 }
 
-/// Of the files of a lot, without an extension.
+/// Name of the files of a lot, without an extension.
 fn file_name(args: &GenerateArgs, trial: &Trial<'_>) -> String {
     let name = match (trial.lot.is_drawn_per_trial(), args.count) {
         (false, _) => trial.lot.name().to_owned(),

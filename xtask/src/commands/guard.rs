@@ -48,7 +48,7 @@ struct Record {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RecordedPlace {
-    /// Of its folder within the run.
+    /// Name of its folder within the run.
     name: String,
     /// Lots that were not trained on, or obstacles that were not; no sealed ones.
     lots: Vec<String>,
@@ -78,7 +78,7 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     let run = if let Some(path) = &args.resume {
         let (run, begun_with, manifest) = RunDir::resume(path, COMMAND)?;
         build_info::check_can_go_on(path, &manifest, output)?;
-        ensure!(begun_with == settings, "{}: the default settings have changed since; begin anew", path.display());
+        ensure!(begun_with == settings, "{}: the default settings have changed since; begin again", path.display());
         run
     } else {
         RunDir::create(&args.out.place(COMMAND, "default", settings.seed.0), &settings, &Request::default())?

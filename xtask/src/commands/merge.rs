@@ -38,7 +38,7 @@ pub(crate) struct MergeArgs {
     /// the same trials by different drivers.
     #[arg(value_name = "RUN", required = true)]
     folders: Vec<PathBuf>,
-    /// Of whole evaluations: the driver the others are compared with [default: the last network, else the first driver].
+    /// Driver to compare the others with, for whole evaluations [default: the last network, else the first driver].
     #[arg(long, value_name = "SPEC")]
     compare_with: Option<String>,
     #[command(flatten)]
@@ -151,7 +151,7 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
         }
         _ => {
             let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
-            // It is made as its shards are, but for the share: so a report says what was asked for.
+            // It is made as its shards are, except for the share: so a report says what was asked for.
             let build = Build { command_line: whole_command(&manifest.command_line), ..build_info::get().clone() };
             let place = args.out.place(reproduce::COMMAND, &manifest.preset, settings.seed.0);
             RunDir::create(&Place { build: &build, ..place }, settings, &request)?
@@ -166,8 +166,8 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
     }
     let name = run.path().display();
     output.note(format_args!(
-        "written: {name}: {} trainings; go on with cargo xtask reproduce --resume {name}, or on several machines with \
-         cargo xtask reproduce --networks {name} --shard NUMBER/OF",
+        "written: {name}: {} trainings; continue with cargo xtask reproduce --resume {name}, or on several machines \
+         with cargo xtask reproduce --networks {name} --shard NUMBER/OF",
         trained.len()
     ));
     Ok(())
@@ -201,7 +201,7 @@ fn drives(shards: &Shards, networks: &Path, output: &Output) -> anyhow::Result<(
     reproduce::finish(&run, settings, extent, output)
 }
 
-/// The command line of a shard without what is of the shard alone.
+/// The command line of a shard without what concerns the shard alone.
 fn whole_command(words: &[String]) -> Vec<String> {
     const OF_SHARD: [&str; 2] = ["--shard", "--out"];
     let mut kept = Vec::new();

@@ -15,13 +15,13 @@ use sim::seed::RootSeed;
 /// Which trial, by the flags of an evaluation.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct TrialArgs {
-    /// Lot to drive, one; see `cargo xtask lots`.
+    /// Lot to drive, a single one; see `cargo xtask lots`.
     #[arg(long = "lots", alias = "lot", value_name = "SPEC", value_parser = lot_name, default_value = "lot-a")]
     lot: String,
-    /// Which way.
+    /// Direction to drive in.
     #[arg(long = "directions", alias = "direction", value_name = "WAY", default_value = "forward")]
     direction: OneDirection,
-    /// Which trial, from 0: it decides obstacles and noise.
+    /// Number of the trial, from 0: it decides obstacles and noise.
     #[arg(
         long,
         value_name = "N",
@@ -38,7 +38,7 @@ pub(crate) struct TrialArgs {
 }
 
 impl TrialArgs {
-    /// The names of the flags, which a drive that is named otherwise leaves no room for.
+    /// The names of the flags, which conflict with a drive that is named in another way.
     pub(crate) const FLAGS: [&str; 5] = ["lot", "direction", "trial", "noise", "seed"];
 
     /// The settings, and a key for each of the drivers.
@@ -53,7 +53,7 @@ impl TrialArgs {
     ) -> anyhow::Result<(Settings, Lot, Vec<ReplayKey>)> {
         let (settings, _) = evaluate::settings_for(drivers, &Layers::from(layers), output)?;
         let mut lots = Lot::parse_all(std::slice::from_ref(&self.lot), &settings.episode.vehicle)?;
-        ensure!(lots.len() == 1, "--lots {}: {} lots are named so; name one, as in test-hard-7", self.lot, lots.len());
+        ensure!(lots.len() == 1, "--lots {}: this names {} lots; name one, as in test-hard-7", self.lot, lots.len());
         let lot = lots.remove(0);
         let evaluation = &settings.evaluation;
         let key = |driver: &DriverSpec| ReplayKey {

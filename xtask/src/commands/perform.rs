@@ -114,7 +114,9 @@ fn perform(command: &str, stage: &Stage, root: &RunDir, console: &Console, outpu
 fn ensure_driven_by(stage: &Stage, root: &RunDir) -> anyhow::Result<()> {
     let Step::Drive { drivers } = &stage.step else { return Ok(()) };
     let found = manifest::finished(&root.path().join(&stage.folder))?.map(|finished| finished.outcome);
-    let Some(Outcome::Evaluation { drivers: found }) = found else { bail!("{}: this is no evaluation", stage.folder) };
+    let Some(Outcome::Evaluation { drivers: found }) = found else {
+        bail!("{}: this is not an evaluation", stage.folder)
+    };
     // The run may have been moved since: its own networks are known by where they lie in it.
     let is_same = |(found, (_, wanted)): (&String, &(String, String))| {
         let path_of = |spec: &str| spec.strip_prefix("run:").map(PathBuf::from);
@@ -143,13 +145,14 @@ fn outcome_of(drivers: &[(String, String)]) -> Outcome {
     Outcome::Evaluation { drivers: drivers.iter().map(|(_, spec)| spec.clone()).collect() }
 }
 
-/// The place of a stage, but for its folder.
+/// The place of a stage, except for its folder.
 pub(crate) fn place_of<'a>(command: &'a str, settings: &Settings) -> Place<'a> {
     let build = build_info::get();
     Place { build, out: None, overwrite: false, command, preset: command, seed: settings.seed.0 }
 }
 
-/// What a stage is asked for beside its settings: its share, if it has one, and the lots from files that a training reads.
+/// What a stage is asked for besides its settings: its share, if it has one, and the lots from files that a training
+/// reads.
 fn request_of(stage: &Stage) -> anyhow::Result<Request> {
     let mut arguments = toml::Table::new();
     let is_training = matches!(stage.step, Step::Train { .. });

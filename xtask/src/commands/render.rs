@@ -89,10 +89,10 @@ pub(crate) enum RenderWhat {
     /// What each noise layer makes wrong in one view, PNG.
     #[command(after_help = "Example: cargo xtask render noise --lots lot-a --noise paper,hard")]
     Noise(RenderNoiseArgs),
-    /// The report of a run anew, into its folder and that of `--out`.
+    /// Writes the report of a run again, into its folder and that of `--out`.
     #[command(after_help = "Example: cargo xtask render report runs/NAME")]
     Report(RenderReportArgs),
-    /// A page of docs/ and its figures from a finished `reproduce`, `deviations`, `rules` or `scaling`.
+    /// Writes a page of docs/ and its figures from a finished `reproduce`, `deviations`, `rules` or `scaling`.
     #[command(after_help = "Example: cargo xtask render results runs/NAME --to docs/results.md")]
     Results(RenderResultsArgs),
 }
@@ -145,10 +145,11 @@ pub(crate) enum ColourChoice {
 #[derive(Debug, Clone, Args)]
 #[command(group = ArgGroup::new("who").args(["drivers", "run"]).required(true))]
 pub(crate) struct TrajectoriesArgs {
-    /// Who drives, one or more, as in an evaluation; may be repeated. See `cargo xtask drivers`.
+    /// Drivers, one or more, as in an evaluation; may be repeated. See `cargo xtask drivers`.
     #[arg(long = "driver", value_name = "SPEC", num_args = 1..)]
     drivers: Vec<String>,
-    /// Instead: a drive of a training run, network and expert in turn as the decision rule chose; `--trial` says which.
+    /// Draws a drive of a training run instead, network and expert in turn as the decision rule chose; `--trial` says
+    /// which.
     #[arg(long, value_name = "RUN", conflicts_with_all = ["lot", "direction", "noise", "seed", "preset", "config", "overrides"])]
     run: Option<PathBuf>,
     /// Round of the training run; 0 = behaviour cloning.
@@ -156,7 +157,7 @@ pub(crate) struct TrajectoriesArgs {
     round: u32,
     #[command(flatten)]
     trial: TrialArgs,
-    /// What colours mean [default: driver; of a training run, who].
+    /// What the colours mean [default: driver; of a training run, who].
     #[arg(long)]
     by: Option<ColourChoice>,
     /// Pixels per metre [default: as fits 1600 pixels].
@@ -181,7 +182,7 @@ pub(crate) struct SamplesArgs {
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RenderNoiseArgs {
-    /// Lot to look at, one; see `cargo xtask lots`.
+    /// Lot to look at, a single one; see `cargo xtask lots`.
     #[arg(long = "lots", alias = "lot", value_name = "SPEC", value_parser = lot_name, default_value = "lot-a")]
     lot: String,
     /// Noise levels: paper, hard or multiples of paper.
@@ -350,7 +351,7 @@ fn render_samples(args: &SamplesArgs, folder: &Folder<'_>) -> anyhow::Result<()>
     let name = args.round.file_name().unwrap_or_default().to_string_lossy();
     let index = name.strip_prefix("round-").and_then(|index| index.parse().ok());
     let (Some(index), Some(run)) = (index, args.round.parent()) else {
-        anyhow::bail!("{}: this is no round; name one, as in runs/NAME/round-01", args.round.display());
+        anyhow::bail!("{}: this is not a round; name one, as in runs/NAME/round-01", args.round.display());
     };
     // Opening a store creates its folder.
     ensure!(args.round.is_dir(), "{}: there is no such round", args.round.display());
@@ -402,7 +403,7 @@ fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<(
 fn render_results(args: &RenderResultsArgs, overwrite: bool, output: &Output) -> anyhow::Result<()> {
     ensure!(
         manifest::is_finished(&args.run)?,
-        "{}: this is no finished run of reproduce or of another command that ends in a table",
+        "{}: this is not a finished run of reproduce or of another command that ends in a table",
         args.run.display()
     );
     let Manifest { command, preset, .. } = Manifest::read(&args.run)?;
@@ -415,7 +416,7 @@ fn render_results(args: &RenderResultsArgs, overwrite: bool, output: &Output) ->
     run_dir::ensure_outside_of_runs(&to).context("--to")?;
     ensure!(
         overwrite || !to.exists() || docs_page::is_page_of_results(&to),
-        "{}: exists already, and is no page of results; choose another --to, or replace it with --overwrite",
+        "{}: exists already, and is not a page of results; choose another --to, or replace it with --overwrite",
         to.display()
     );
     let revision = build_info::get().git_revision.as_deref();

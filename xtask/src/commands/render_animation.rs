@@ -34,7 +34,7 @@ pub(crate) struct AnimationArgs {
     /// Replay keys of one trial, as a report or failures.md lists them: the seconds around their ticks.
     #[arg(value_name = "KEY", conflicts_with_all = TrialArgs::FLAGS)]
     keys: Vec<String>,
-    /// Instead: who drives, as in an evaluation; may be repeated. See `cargo xtask drivers`.
+    /// Drivers, as in an evaluation, instead of keys; may be repeated. See `cargo xtask drivers`.
     #[arg(long = "driver", value_name = "SPEC", num_args = 1..)]
     drivers: Vec<String>,
     #[command(flatten)]
@@ -48,7 +48,7 @@ pub(crate) struct AnimationArgs {
     /// What the top view shows [default: the place around the tick of a key, else the lot].
     #[arg(long)]
     view: Option<ViewChoice>,
-    /// Times faster than life [default: 1 for keys, else so that it takes about half a minute].
+    /// Plays this many times faster than life [default: 1 for keys, else so that it takes about half a minute].
     #[arg(long, value_name = "FACTOR")]
     speed: Option<f32>,
     /// Frames per second; fewer are kept where the file would be larger than 3 MB.

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask replay expert@lot-b@reverse@3@paper@1@0                what a run comes to, and its digest
+  cargo xtask replay expert@lot-b@reverse@3@paper@1@0                the result of a run, and its digest
   cargo xtask replay --of runs/evaluate-default-s1                   16 of its runs: whether each is the same here, bit by bit
   cargo xtask replay --of runs/evaluate-default-s1 expert@lot-b@reverse@3@paper@1@842
 
@@ -36,7 +36,7 @@ pub(crate) struct ReplayArgs {
     /// Folder of the evaluation that the keys come from: its settings are used, and its digests compared.
     #[arg(long, alias = "run", value_name = "RUN", conflicts_with_all = ["preset", "config", "overrides"])]
     of: Option<PathBuf>,
-    /// How many runs of `--of` are driven, spread over all of them, unless keys are named.
+    /// Number of runs of `--of` to drive, spread over all of them, unless keys are named.
     #[arg(
         long,
         value_name = "N",

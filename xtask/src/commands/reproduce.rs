@@ -56,10 +56,12 @@ pub(crate) struct ReproduceArgs {
     /// Folder of `cargo xtask tune`: planners also drive with the parameters found there [default: those in planners/tuned].
     #[arg(long, value_name = "DIR")]
     tuned: Option<PathBuf>,
-    /// Does a share of the trainings only, one of several machines' (docs/cluster.md); `merge` puts the shares together.
+    /// Does only a share of the trainings, for one of several machines (docs/cluster.md); `merge` puts the shares
+    /// together.
     #[arg(long, value_name = "NUMBER/OF")]
     shard: Option<Shard>,
-    /// A run whose networks are all trained: the shard is of what they drive, with the settings of that run.
+    /// Folder of a run whose networks are all trained: the shard is a share of what they drive, with the settings of
+    /// that run.
     #[arg(
         long,
         value_name = "RUN",
@@ -183,7 +185,7 @@ fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir
     // Without a slash at its end: drivers are named after it.
     let networks: PathBuf = networks.components().collect();
     let name = networks.display();
-    ensure!(sums::exists(&networks)?, "--networks {name}: this is no run; cargo xtask reproduce makes one");
+    ensure!(sums::exists(&networks)?, "--networks {name}: this is not a run; cargo xtask reproduce makes one");
     args.out.ensure_apart_from([&networks])?;
     let manifest = Manifest::read(&networks)?;
     let (settings, preset) = (trained::settings_of(&networks)?, manifest.preset.clone());
@@ -233,7 +235,7 @@ pub(crate) fn recipe_of(path: &Path) -> anyhow::Result<Recipe> {
 /// How much a run does, by a manifest without the record of a shard.
 pub(crate) fn extent_of(path: &Path, manifest: &Manifest) -> anyhow::Result<Extent> {
     let arguments = manifest.arguments.clone();
-    arguments.try_into().with_context(|| format!("{}: this is no folder of cargo xtask reproduce", path.display()))
+    arguments.try_into().with_context(|| format!("{}: this is not a folder of cargo xtask reproduce", path.display()))
 }
 
 fn resume(path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, Arguments)> {
@@ -247,7 +249,7 @@ fn resume(path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, Arg
     // Its stages would be of two versions, and `merge` would refuse them after all the work.
     ensure!(
         shard.is_none() || is_same,
-        "{}: this shard was begun with another version of lotpilot; go on with that one, or make the shard again",
+        "{}: this shard was begun with another version of lotpilot; use that one, or make the shard again",
         path.display()
     );
     let found = match shard.as_ref().and_then(|shard| shard.networks.as_deref()) {
@@ -289,7 +291,7 @@ fn tuned(folder: Option<&Path>) -> anyhow::Result<Vec<String>> {
         .filter(|(_, file)| file.is_file())
         .map(|(name, file)| format!("{name}:{}", file.display()))
         .collect();
-    ensure!(!specs.is_empty(), "--tuned {}: no parameters are there; cargo xtask tune writes them", folder.display());
+    ensure!(!specs.is_empty(), "--tuned {}: holds no parameters; cargo xtask tune writes them", folder.display());
     DriverSpec::parse_all(&specs)?;
     Ok(specs)
 }

@@ -39,7 +39,7 @@ pub(crate) struct RulesArgs {
         conflicts_with = "resume"
     )]
     samples: u32,
-    /// Lots that all policies are driven on, once each way.
+    /// Lots to drive all policies on, once each way.
     #[arg(
         long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name, default_value = "validation:90:all",
         conflicts_with = "resume"
@@ -77,7 +77,7 @@ fn begin(args: &RulesArgs) -> anyhow::Result<Begun<Extent>> {
     let known = rules::all().map(|(name, _)| name.to_owned());
     let named = if args.rule.is_empty() { known.to_vec() } else { args.rule.clone() };
     for rule in &named {
-        ensure!(known.contains(rule), "--rule {rule}: no rule is named so; there are {}", known.join(", "));
+        ensure!(known.contains(rule), "--rule {rule}: no rule has this name; there are {}", known.join(", "));
     }
     ensure_distinct("--rule", &named)?;
     let RulesArgs { seeds, iterations, samples, .. } = *args;

@@ -17,10 +17,10 @@ Examples:
 #[derive(Debug, Clone, Args)]
 #[command(group = ArgGroup::new("question").args(["below", "between"]).required(true).multiple(true))]
 pub(crate) struct SampleSizeArgs {
-    /// A rate per 100 m to be shown as not reached, by a run without an event.
+    /// Rate per 100 m that a run without an event shows not to be reached.
     #[arg(long, value_name = "RATE")]
     below: Option<f64>,
-    /// Two rates per 100 m to be told apart.
+    /// Two rates per 100 m to tell apart.
     #[arg(long, value_name = "RATE,RATE", value_parser = two_rates)]
     between: Option<[f64; 2]>,
     /// Probability of seeing a difference that is there.
@@ -48,7 +48,7 @@ struct Answer {
 
 fn two_rates(text: &str) -> Result<[f64; 2], String> {
     let rates = text.split_once(',').and_then(|(a, b)| Some([a.trim().parse().ok()?, b.trim().parse().ok()?]));
-    rates.ok_or_else(|| "two numbers with a comma between them are needed, as in 1.4,0.5".to_owned())
+    rates.ok_or_else(|| "write two numbers with a comma between them, as in 1.4,0.5".to_owned())
 }
 
 pub(crate) fn run(args: &SampleSizeArgs, output: &Output) -> anyhow::Result<()> {

@@ -26,7 +26,7 @@ pub(crate) struct ScalingArgs {
         conflicts_with = "resume"
     )]
     different: Vec<u32>,
-    /// Lots that all policies are driven on, once each way.
+    /// Lots to drive all policies on, once each way.
     #[arg(
         long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name,
         default_value = "validation:180:all",

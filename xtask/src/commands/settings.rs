@@ -17,7 +17,7 @@ pub(crate) struct SettingsArgs {
     /// Explains a setting, or lists those of a section.
     #[arg(long, value_name = "KEY", conflicts_with_all = ["all", "seed", "preset", "config", "overrides"])]
     explain: Option<String>,
-    /// Every setting instead of those that most users need.
+    /// Prints every setting, not only those that most users need.
     #[arg(long)]
     all: bool,
     /// Root seed of training data, weights and shuffling.

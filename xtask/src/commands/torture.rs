@@ -24,7 +24,7 @@ pub(crate) struct TortureArgs {
     /// Operations on files that each fault strikes, evenly spaced over those of a command [default: all].
     #[arg(long, value_name = "N")]
     strikes: Option<u16>,
-    /// Begins with this operation of each fault, to go on where a run was stopped.
+    /// Begins with this operation of each fault, to continue where a run was stopped.
     #[arg(long, value_name = "N", default_value_t = 1)]
     from: u16,
     /// Strikes only this share of these operations. Kills are not shared out: give each shard another `--seed`, or few

@@ -47,7 +47,7 @@ pub(crate) struct TrainArgs {
     /// Root seed of training data, weights and shuffling.
     #[arg(long)]
     seed: Option<u64>,
-    /// Lots that are driven in every round as well, beside those of the settings: your own map, for example. See `cargo
+    /// Lots to drive in every round in addition to those of the settings: your own map, for example. See `cargo
     /// xtask lots`.
     #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name)]
     also: Vec<String>,
@@ -65,7 +65,7 @@ pub(crate) struct TrainArgs {
     record: RecordArgs,
 }
 
-/// What a training was asked for beside its settings.
+/// What a training was asked for besides its settings.
 #[derive(Debug, Serialize, Deserialize)]
 struct Asked {
     #[serde(default)]
@@ -110,7 +110,7 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
     let console = Console::new(output);
     let mut tasks = estimate::training(&settings, true);
     if !asked.no_eval {
-        // The expert, behaviour cloning and what became of it.
+        // The expert, the behaviour-cloned policy and the final one.
         let drivers = if settings.dagger.iterations_max > 0 { 3 } else { 2 };
         tasks.extend(evaluate::tasks(&settings, drivers));
         tasks.push(estimate::evaluation(&elsewhere(&settings), drivers));
@@ -251,7 +251,7 @@ fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
     Interrupted { kept: format!("{rounds} finished rounds are in {}", path.display()) }.into()
 }
 
-/// Expert, behaviour cloning and what became of it.
+/// The expert, the behaviour-cloned policy and the final one.
 fn drivers(settings: &Settings, run: &Path) -> anyhow::Result<Vec<NamedDriver>> {
     let of_run = |folder: PathBuf| DriverSpec::Run { folder }.load(settings);
     let mut drivers = vec![DriverSpec::Expert.load(settings)?, of_run(run.join("bc"))?.renamed("BC")];

@@ -68,7 +68,7 @@ pub(crate) struct Begun<E> {
 }
 
 impl<E: Serialize + DeserializeOwned> Trainings<E> {
-    /// Goes on with the run at `--resume`, or begins one.
+    /// Continues the run at `--resume`, or begins one.
     pub(crate) fn run(
         &self,
         args: &TrainingsArgs,

@@ -33,20 +33,20 @@ pub(crate) struct TuneArgs {
     /// Planners to tune, or readings of them, as in dwa/fox [default: all, each as published].
     #[arg(long = "planner", value_name = "NAME", num_args = 1.., value_delimiter = ',')]
     planners: Vec<String>,
-    /// Lots to tune on: lot-a and generated training lots only. What is driven is said by these flags alone, not by the settings
-    /// of `evaluation`.
+    /// Lots to tune on: lot-a and generated training lots only. Only these flags decide what is driven, not the
+    /// settings of `evaluation`.
     #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name, default_value = "lot-a,train:4")]
     lots: Vec<String>,
     /// Candidates per planner, its own parameters included.
     #[arg(long, value_name = "N", default_value_t = 48, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     budget: u32,
-    /// Trials per lot and direction that every candidate drives; the best few drive as many fresh ones again.
+    /// Trials per lot and direction that every candidate drives; the best few then drive as many fresh ones.
     #[arg(long, value_name = "N", default_value_t = 1)]
     trials: u32,
     /// Seed of candidates, obstacles and noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// What is seen wrongly.
+    /// Sensor noise.
     #[arg(long, alias = "level", value_name = "LEVEL", default_value = "paper")]
     noise: NoiseChoice,
     #[command(flatten)]
@@ -64,7 +64,7 @@ pub(crate) struct TuneArgs {
     resume: Option<PathBuf>,
 }
 
-/// What a search was asked for beside its settings.
+/// What a search was asked for besides its settings.
 #[derive(Debug, Serialize, Deserialize)]
 struct Asked {
     planners: Vec<String>,

@@ -89,7 +89,7 @@ struct LotArgs {
 /// Obstacles and noise are those of the same trial in `evaluate`.
 #[derive(Debug, Clone, Args)]
 struct EpisodeArgs {
-    /// Who drives, one or more; may be repeated. See `cargo xtask drivers`.
+    /// Drivers, one or more; may be repeated. See `cargo xtask drivers`.
     #[arg(long = "driver", value_name = "SPEC", required = true, num_args = 1..)]
     drivers: Vec<String>,
     #[command(flatten)]
@@ -100,8 +100,8 @@ struct EpisodeArgs {
 
 #[derive(Debug, Clone, Args)]
 struct ReplayArgs {
-    /// From `failures.md`, `failures.jsonl` or `runs.jsonl`. Unless a `run:` drives, name the settings it was driven
-    /// with: `--config RUN/settings.toml`.
+    /// Replay key from `failures.md`, `failures.jsonl` or `runs.jsonl`. Unless a `run:` drives, name the settings it
+    /// was driven with: `--config RUN/settings.toml`.
     #[arg(value_name = "KEY")]
     key: ReplayKey,
     #[command(flatten)]
@@ -130,12 +130,7 @@ pub(crate) fn run(args: &VisualiseArgs, output: &Output) -> anyhow::Result<()> {
         What::Lot(lot) => {
             // Before the program that records is built.
             let lots = Lot::parse_all(std::slice::from_ref(&lot.lot), &VehicleSettings::hyundai_hg300())?;
-            ensure!(
-                lots.len() == 1,
-                "--lots {}: {} lots are named so; name one, as in test-hard-7",
-                lot.lot,
-                lots.len()
-            );
+            ensure!(lots.len() == 1, "--lots {}: this names {} lots; name one, as in test-hard-7", lot.lot, lots.len());
             let show = Show::Lot { lot: lot.lot.clone(), seed: RootSeed(lot.seed) };
             (show, format!("lot-{}-s{}", file_name(&lot.lot), lot.seed))
         }

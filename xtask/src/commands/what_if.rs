@@ -26,7 +26,7 @@ pub(crate) struct WhatIfArgs {
     /// Folder of a finished evaluation; its settings are used.
     #[arg(value_name = "RUN")]
     folder: PathBuf,
-    /// Drivers of it, as named in its tables [default: all].
+    /// Its drivers, as named in its tables [default: all].
     #[arg(long = "driver", value_name = "NAME", num_args = 1..)]
     drivers: Vec<String>,
     #[command(flatten)]

@@ -10,10 +10,10 @@ use experiment::progress::{Interrupted, Progress};
 use experiment::run_dir::{Place, RunDir};
 use experiment::settings::Settings;
 
-/// Drives drivers over the lots of some settings into a folder within a run, or goes on with what is there.
+/// Drives drivers over the lots of some settings into a folder within a run, or continues what is there.
 ///
 /// # Errors
-/// If a lot cannot be built or a file cannot be written, or by Ctrl-C; what was driven by then is kept.
+/// If a lot cannot be built or a file cannot be written, or on Ctrl-C; what was driven by then is kept.
 pub(crate) fn evaluate(
     run: &RunDir,
     folder: &str,
@@ -22,7 +22,7 @@ pub(crate) fn evaluate(
     progress: &dyn Progress,
 ) -> anyhow::Result<EvaluationResults> {
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
-    ensure!(!drivers.is_empty(), "nobody drives");
+    ensure!(!drivers.is_empty(), "no driver is named");
     let plan = Plan { settings, drivers, lots: &lots, compare_with: drivers.len() - 1, shard: None };
     let place = Place {
         build: crate::build_info::get(),

@@ -103,7 +103,7 @@ fn encoding_and_its_gradients_equal_those_of_plain_operations() {
     }
 }
 
-/// Of a smooth function of one weight at a time, where no pool changes its winner.
+/// For a smooth function of one weight at a time, where no pool changes its winner.
 #[test]
 fn gradients_of_the_encoder_equal_finite_differences() {
     let device = Device::flex().autodiff();

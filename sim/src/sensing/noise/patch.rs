@@ -29,7 +29,7 @@ pub(in crate::sensing) struct Patches {
 }
 
 impl Patches {
-    /// To be called after the last patch is added.
+    /// Computes the circles; call this after the last patch is added.
     pub(super) fn arrange(&mut self) {
         self.circles = self.patches.iter().map(|patch| (patch.region.centre, patch.region.radius_m)).collect();
     }

@@ -14,7 +14,7 @@ const SHADOW_CELL_M: f32 = 0.12;
 pub(in crate::sensing) struct Shadow {
     pub(in crate::sensing) region: Region,
     seed: u64,
-    /// From the centre of a grid cell to its farthest pixel, metres.
+    /// Distance from the centre of a grid cell to its farthest pixel, metres.
     cell_radius_m: f32,
     origin: Vec2,
     cols: usize,

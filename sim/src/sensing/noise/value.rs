@@ -90,7 +90,7 @@ pub(super) struct Lattice {
     n_nodes: usize,
     /// World position of the first node.
     origin: Vec2,
-    /// Of the even and of the odd ticks of the noise, one of them the last and one the next.
+    /// What was drawn at an even and at an odd tick of the noise, one of them the last and one the next.
     draws: [LatticeDraws; 2],
     /// Values at the nodes, row by row, and what is read beyond the last when four neighbours are.
     nodes: Vec<f32>,
@@ -186,7 +186,7 @@ fn parity(tick: i32) -> usize {
 struct LatticeDraws {
     /// Indices of the first node, whole numbers.
     first: Vec2,
-    /// Of the seed and the tick.
+    /// The key of the seed and the tick.
     key: u64,
     /// Uniform numbers in [0, 1) at the nodes, row by row.
     nodes: Vec<f32>,

@@ -61,7 +61,7 @@ impl Sensor {
     /// Explains what was shown from a pose at a tick: `shown` is the answer of [`Sensor::observe`]. Any sensor with the
     /// same seed explains it, also later. Takes some milliseconds.
     ///
-    /// Ground hidden behind tall objects is no error: it is occupied in the clean view too.
+    /// Ground hidden behind tall objects is not an error: it is occupied in the clean view too.
     pub fn inspect(&self, map: &Map, pose: Pose, tick: u32, shown: &Observation) -> Inspection {
         let (clean, perceived) = (self.clean_view(map, pose), self.perceived_view(map, pose, tick));
         let claims = self.claims(pose, tick);

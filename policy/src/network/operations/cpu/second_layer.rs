@@ -32,9 +32,9 @@ struct Block<'a> {
 /// Memory for the products that a backward pass has to compute, by what they share.
 #[derive(Debug, Clone)]
 pub(super) struct Sparse {
-    /// Of one output channel: (start of the window, gradient).
+    /// Products of one output channel: (start of the window, gradient).
     of_channel: Vec<(usize, f32)>,
-    /// Of one cell of the convolution: (start of the output's weights, gradient).
+    /// Products of one cell of the convolution: (start of the output's weights, gradient).
     of_cell: Vec<(usize, f32)>,
 }
 

@@ -19,7 +19,7 @@ pub(super) fn run<K: WithSimd>(kernel: K) -> K::Output {
 #[inline(always)]
 pub(super) fn vectors<S: Simd>(values: &[f32]) -> &[S::f32s] {
     let (vectors, rest) = S::as_simd_f32s(values);
-    assert!(rest.is_empty(), "{} values are no whole vectors", values.len());
+    assert!(rest.is_empty(), "{} values are not whole vectors", values.len());
     vectors
 }
 
