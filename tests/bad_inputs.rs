@@ -725,6 +725,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         write(name, LOT.replace("\"lane\"", &format!("{lot:?}")).as_bytes());
     }
     write("deep.toml", "[".repeat(250_000).as_bytes());
+    write("eta.toml", b"[dagger]\neta = 7\n");
     assert!(Command::new("mkfifo").arg(folder.join("pipe.toml")).status().unwrap().success());
     let before = names_in(&folder);
     let route = ["--start", "8,12,0", "--goal", "40,12,0"];
@@ -802,6 +803,9 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["reproduce", "--unseen", "lot-z"], "\"lot-z\" is not a lot"),
         (&["pixel-accuracy", "--trials", "0"], "--trials"),
         (&["sample-size", "--between", "nan,1"], "nan"),
+        (&["evaluate", "--driver", "expert", "--seed", "-1"], "invalid value '-1' for '--seed"),
+        (&["settings", "--config", "eta.toml"], "eta.toml: dagger.eta = 7 is out of range"),
+        (&["verify", "."], "this is not a run"),
     ];
     for (arguments, expected) in cases {
         let output = within_means(&folder, arguments).stdin(Stdio::null()).output().unwrap();

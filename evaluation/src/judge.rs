@@ -20,8 +20,8 @@ pub struct DriverEstimate {
     pub safe_ratio: Option<Interval>,
 }
 
-/// A driver against the reference driver. Differences are driver − reference, so that a positive one favours
-/// the reference.
+/// A driver against the reference driver. Differences are driver − reference, so that a positive one of
+/// near-collisions, and a negative one of safe ratios, favours the reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// Index of the driver in the plan.

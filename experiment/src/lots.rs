@@ -260,6 +260,23 @@ mod tests {
         }
     }
 
+    /// A lot that was named so took the row of others, and ground under another name passed for unseen.
+    #[test]
+    fn a_lot_from_a_file_is_known_by_what_it_is_and_not_by_its_name() {
+        let text = std::fs::read_to_string("../scenarios/examples/slalom.toml").unwrap();
+        let file = std::env::temp_dir().join(format!("lotpilot-named-{}.toml", std::process::id()));
+        let named = |name: &str| {
+            std::fs::write(&file, text.replace("name = \"slalom\"", &format!("name = {name:?}"))).unwrap();
+            Lot::parse_all(&[file.display().to_string()], &VehicleSettings::hyundai_hg300()).unwrap().remove(0)
+        };
+        for name in ["lot-b", "reference", "all", "unseen", "test-medium", "test-medium-3", "sealed-spring-lane"] {
+            assert_eq!(named(name).group(), format!("{name} (file)"));
+            assert_eq!(named(name).digest(), named("mine").digest());
+        }
+        assert_eq!(named("mine").group(), "mine");
+        std::fs::remove_file(file).unwrap();
+    }
+
     /// Neither drivers nor planners ever learn from lots that figures are reported on.
     #[test]
     fn training_lots_are_lot_a_and_those_of_the_split_train() {

@@ -11,8 +11,8 @@
 //!   the best one says whether, where and with how much clearance what is ahead can be avoided (rule two);
 //! - `elastic_band`: the way of that plan, pulled into the middle of the free space, so that it no longer depends on
 //!   which plan it came from;
-//! - `label`: the point on that way, half as far as the way is open (rule three; the paper's half "for safety reasons",
-//!   see [`sim::controller::SpeedLaw`]) and drivable (rule one), and smoothed from tick to tick;
+//! - `label`: the point on that way, at a share of what is open of it (rule three; half where the paper's "half for safety
+//!   reasons" is one of the point and not of the speed, see [`sim::controller::SpeedLaw`]), drivable (rule one), and smoothed from tick to tick;
 //! - `stats`: which rule it was.
 //!
 //! Where the numbers come from is in docs/methods.md 3 and E5. The expert decides from the clean scene around the car.
@@ -187,7 +187,7 @@ impl ScriptedExpert {
         wish
     }
 
-    /// The label on the smoothed way: half as far ahead as that is open, steering at the farthest point that it is safe
+    /// The label on the smoothed way: at a share of what is open of it (`reach_share`), steering at the farthest point that it is safe
     /// to steer at; in corners, and where pursuing the way is never safe, the plan's own arc.
     ///
     /// Every share fades to 0 gradually, so a small change of the scene moves the label little.

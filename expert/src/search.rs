@@ -97,7 +97,7 @@ pub struct Candidate {
     pub curvature_per_m: f32,
     /// Free travel along it, metres.
     pub free_m: f32,
-    /// Best score of a plan that begins with it; `None` if it could not beat the winner.
+    /// Best score of a plan that begins with it; `None` if nothing of it is free, or it makes no progress.
     pub score: Option<f32>,
 }
 

@@ -12,14 +12,14 @@ use serde::{Deserialize, Serialize};
 pub enum Event {
     /// Nothing.
     Drove,
-    /// The car headed at something within 0.5 m; it was stopped and put back on the path.
+    /// The car headed at something within `near_collision_m` of the metrics; it was stopped and put back on the path.
     NearCollision {
         /// Rear-axle pose when it was counted.
         at: Pose,
         /// Progress along the reference path then, metres.
         progress_m: f32,
     },
-    /// No progress for ten seconds; the car was put back on the path.
+    /// No progress for `stuck_after_s` of the metrics; the car was put back on the path.
     Stuck {
         /// Rear-axle pose when it was counted.
         at: Pose,

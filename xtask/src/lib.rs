@@ -14,7 +14,7 @@ mod record;
 mod viewer;
 
 use anyhow::ensure;
-use clap::{CommandFactory as _, FromArgMatches as _};
+use clap::{Arg, Command, CommandFactory as _, FromArgMatches as _};
 use experiment::progress::Interrupted;
 use sim::limits::THREADS_MAX;
 use std::process::ExitCode;
@@ -31,7 +31,7 @@ pub fn main() -> ExitCode {
         output::error(format_args!("{error:#}"));
         return ExitCode::from(EXIT_REFUSED);
     }
-    let command = cli::Cli::command().color(output::Color::from_args().of_clap());
+    let command = with_negative_numbers(cli::Cli::command()).color(output::Color::from_args().of_clap());
     let cli = match cli::Cli::from_arg_matches(&command.get_matches()) {
         Ok(cli) => cli,
         Err(error) => error.exit(),
@@ -49,6 +49,15 @@ pub fn main() -> ExitCode {
             ExitCode::from(EXIT_REFUSED)
         }
     }
+}
+
+/// A command whose flags take `-1` for a value, so that their own errors say what they take, and not for another flag.
+fn with_negative_numbers(command: Command) -> Command {
+    let takes_values = |arg: Arg| {
+        let takes_values = arg.get_action().takes_values();
+        if takes_values { arg.allow_negative_numbers(true) } else { arg }
+    };
+    command.mut_args(takes_values).mut_subcommands(with_negative_numbers)
 }
 
 fn run(cli: &cli::Cli) -> anyhow::Result<()> {

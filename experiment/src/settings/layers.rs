@@ -51,7 +51,17 @@ impl Settings {
         if let Some(seed) = seed {
             settings.seed = RootSeed(seed);
         }
-        settings.check()?;
+        if let Err(error) = settings.check() {
+            // What is said on the command line is known; what a file says is looked for there.
+            let is_of_flag = layers
+                .overrides
+                .iter()
+                .any(|text| text.split_once('=').is_some_and(|(key, _)| error.to_string().contains(key.trim())));
+            return Err(match &layers.file {
+                Some(file) if !is_of_flag => error.context(file.display().to_string()),
+                _ => error,
+            });
+        }
         Ok(settings)
     }
 

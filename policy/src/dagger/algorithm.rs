@@ -273,5 +273,7 @@ const CRITIC: usize = 0x100;
 
 /// Index of a training among the seeds of all.
 fn index_of(round: Option<u32>, part: usize) -> u64 {
-    ((part as u64) << 16) | round.map_or(FINAL, u64::from)
+    let round = round.map_or(FINAL, u64::from);
+    assert!(round <= FINAL, "a training has fewer than {FINAL} rounds");
+    ((part as u64) << 16) | round
 }

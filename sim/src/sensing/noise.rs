@@ -4,7 +4,7 @@
 //! The paper names the types (shadows, ragged boundaries, misrecognition); sizes and rates are chosen, and calibrated
 //! so that about 98 % of the pixels are right (`cargo xtask pixel-accuracy`). Where docs/methods.md 10 asks for AR(1)
 //! processes per tick we use value noise in time with the same correlation time: it needs no state, so a frame can be
-//! recomputed alone and every driver meets the same noise.
+//! recomputed alone and every driver meets the same noise. (Only a dropped frame repeats the one before.)
 
 mod layer;
 pub(super) mod patch;

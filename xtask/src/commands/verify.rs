@@ -24,6 +24,11 @@ pub(crate) struct VerifyArgs {
 
 pub(crate) fn run(args: &VerifyArgs, output: &Output) -> anyhow::Result<()> {
     ensure!(args.run.is_dir(), "{}: there is no such folder; list those in runs/", args.run.display());
+    ensure!(
+        sums::exists(&args.run)?,
+        "{}: this is not a run, or its sha256sums are lost; list the folders in runs/",
+        args.run.display()
+    );
     let Verified { files, bytes, faults } = sums::verify(&args.run);
     for fault in &faults {
         note(fault);
