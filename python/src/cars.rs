@@ -13,9 +13,12 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use report::pictures::drawing::Drawing;
 use report::pictures::grids;
 use report::pictures::lot::{self, View};
+use serde::Serialize;
 use sim::episode::Episode;
+use sim::frame::{Ending, Event};
 use sim::geometry::Vec2;
 use sim::limits::THREADS_MAX;
+use sim::metrics::EpisodeMetrics;
 use sim::seed::RootSeed;
 use sim::sensing::GRID_CELLS;
 use std::collections::BTreeMap;
@@ -301,9 +304,16 @@ impl Cars {
 
     /// What was measured on a car's episode so far, as JSON; `ending` is null while it is under way.
     fn report(&self, index: usize) -> PyResult<String> {
+        /// As [`EpisodeReport`](sim::episode::EpisodeReport), before the end as well.
+        #[derive(Serialize)]
+        struct Report<'a> {
+            ending: Option<Ending>,
+            metrics: EpisodeMetrics,
+            events: &'a [(u32, Event)],
+        }
         let episode = self.episode(index)?;
         let (ending, metrics, events) = (episode.ending(), episode.metrics(), episode.events());
-        Ok(serde_json::json!({ "ending": ending, "metrics": metrics, "events": events }).to_string())
+        serde_json::to_string(&Report { ending, metrics, events }).map_err(input)
     }
 
     /// SHA-256 of a car's episode so far, if digests are kept.
