@@ -29,6 +29,22 @@ use std::sync::Arc;
 use storage::sums;
 
 impl DriverSpec {
+    /// Refuses a policy of a training that was interrupted, in an ensemble as well.
+    ///
+    /// # Errors
+    /// If there is one, or no run where one is named.
+    pub fn ensure_whole(&self) -> anyhow::Result<()> {
+        match self {
+            Self::Run { folder } => trained::ensure_whole(folder).with_context(|| format!("driver {self}")),
+            Self::Ensemble { members } => members.iter().try_for_each(Self::ensure_whole),
+            Self::Expert
+            | Self::Checkpoint { .. }
+            | Self::Onnx { .. }
+            | Self::Planner { .. }
+            | Self::Callback { .. } => Ok(()),
+        }
+    }
+
     /// The networks it names, read from their files.
     fn checkpoints(&self) -> anyhow::Result<Vec<Checkpoint>> {
         match self {
@@ -161,9 +177,7 @@ impl NamedDriver {
     /// If nothing is named so, its files are not what they should be, a training is not finished, or one is named twice.
     pub fn load_all<S: AsRef<str>>(texts: &[S], settings: &Settings) -> anyhow::Result<Vec<Self>> {
         let load = |spec: DriverSpec| {
-            if let DriverSpec::Run { folder } = &spec {
-                trained::ensure_whole(folder).with_context(|| format!("driver {:?}", spec.to_string()))?;
-            }
+            spec.ensure_whole()?;
             spec.load(settings)
         };
         DriverSpec::parse_all(texts)?.into_iter().map(load).collect()

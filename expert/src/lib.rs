@@ -12,7 +12,8 @@
 //! - `elastic_band`: the way of that plan, pulled into the middle of the free space, so that it no longer depends on
 //!   which plan it came from;
 //! - `label`: the point on that way, at a share of what is open of it (rule three; half where the paper's "half for safety
-//!   reasons" is one of the point and not of the speed, see [`sim::controller::SpeedLaw`]), drivable (rule one), and smoothed from tick to tick;
+//!   reasons" is one of the point and not of the speed, see [`sim::controller::SpeedLaw`]), drivable (rule one), and
+//!   smoothed from tick to tick;
 //! - `stats`: which rule it was.
 //!
 //! Where the numbers come from is in docs/methods.md 3 and E5. The expert decides from the clean scene around the car.
@@ -187,8 +188,8 @@ impl ScriptedExpert {
         wish
     }
 
-    /// The label on the smoothed way: at a share of what is open of it (`reach_share`), steering at the farthest point that it is safe
-    /// to steer at; in corners, and where pursuing the way is never safe, the plan's own arc.
+    /// The label on the smoothed way: at a share of what is open of it (`reach_share`), steering at the farthest
+    /// point that it is safe to steer at; in corners, and where pursuing the way is never safe, the plan's own arc.
     ///
     /// Every share fades to 0 gradually, so a small change of the scene moves the label little.
     fn smoothed(&self, search: &Search<'_>, ground: &Ground<'_>, plan: &Plan) -> Label {

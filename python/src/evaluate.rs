@@ -116,7 +116,11 @@ impl Asked {
     ) -> anyhow::Result<Self> {
         let settings = settings_of(&drivers, settings.into(), trials)?;
         let loaded = drivers.into_iter().map(|(name, driver)| match driver {
-            Named::Spec(spec) => Ok(spec.parse::<DriverSpec>()?.load(&settings)?.renamed(&name)),
+            Named::Spec(spec) => {
+                let spec: DriverSpec = spec.parse()?;
+                spec.ensure_whole()?;
+                Ok(spec.load(&settings)?.renamed(&name))
+            }
             Named::Function(function) => {
                 Ok(NamedDriver::callback(&name, Arc::new(Function { function, failure: failure.clone() })))
             }

@@ -51,17 +51,7 @@ impl Settings {
         if let Some(seed) = seed {
             settings.seed = RootSeed(seed);
         }
-        if let Err(error) = settings.check() {
-            // What is said on the command line is known; what a file says is looked for there.
-            let is_of_flag = layers
-                .overrides
-                .iter()
-                .any(|text| text.split_once('=').is_some_and(|(key, _)| error.to_string().contains(key.trim())));
-            return Err(match &layers.file {
-                Some(file) if !is_of_flag => error.context(file.display().to_string()),
-                _ => error,
-            });
-        }
+        settings.check()?;
         Ok(settings)
     }
 
@@ -84,8 +74,10 @@ pub(super) fn apply(base: &Settings, file: Option<&Path>, overrides: &[String]) 
     if let Some(path) = file {
         let text = storage::sums::read_text(path, SETTINGS_BYTES_MAX)
             .with_context(|| format!("{}: cannot be read; name a TOML file with settings", path.display()))?;
-        merge(&mut tree, parse(path, &text)?);
+        let of_file = parse(path, &text)?;
+        merge(&mut tree, of_file.clone());
         settings_from(&tree).map_err(|fault| fault.in_file(path, &text))?;
+        reference::check(&of_file, "").with_context(|| path.display().to_string())?;
     }
     for text in overrides {
         let (key, value) = parse_override(text)?;
