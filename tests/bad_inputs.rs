@@ -251,6 +251,8 @@ fn settings_that_are_refused() {
         ("evaluation.elsewhere=[\"\"]", "evaluation.elsewhere: \"\" is not a lot"),
         ("evaluation.noise=[]", "evaluation.noise is empty"),
         ("evaluation.noise=[1, 1.0]", "evaluation.noise names 1 twice"),
+        ("evaluation.noise=[\"paper\", 0.5, 1]", "evaluation.noise names paper and 1, which are the same"),
+        ("evaluation.noise=[2, \"hard\"]", "evaluation.noise names 2 and hard, which are the same"),
         ("training.noise=11", "not within 0 (clean) … 10"),
         ("training.directions=[]", "training.directions is empty"),
         ("seed=-1", "seed"),
@@ -680,6 +682,36 @@ fn names_in(folder: &Path) -> Vec<PathBuf> {
     names
 }
 
+/// A white PNG of 60 × 30 pixels whose colour profile unpacks to so many zeros, 258 times a whole number.
+#[cfg(unix)]
+fn png_with_profile(zeros: u32) -> Vec<u8> {
+    let crc = |bytes: &[u8]| {
+        let bit = |crc: u32| crc >> 1 ^ if crc & 1 == 1 { 0xEDB8_8320 } else { 0 };
+        !bytes.iter().fold(!0, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), |crc, _| bit(crc)))
+    };
+    let chunk = |name: &[u8; 4], content: &[u8]| {
+        let checked = [name, content].concat();
+        [&(content.len() as u32).to_be_bytes()[..], &checked, &crc(&checked).to_be_bytes()].concat()
+    };
+    // Deflated with fixed codes: a zero, copies of 258 bytes from one byte before, 257 copies of one byte less, the end.
+    let bits = |text: &str| text.bytes().map(|bit| bit == b'1').collect::<Vec<_>>();
+    let copies = bits("1100010100000").repeat((zeros / 258 - 1) as usize);
+    let stream = [bits("11000110000"), copies, bits("110001000111100000"), bits("0000000")].concat();
+    let byte = |bits: &[bool]| bits.iter().rev().fold(0, |byte, &bit| byte << 1 | u8::from(bit));
+    let deflated = stream.chunks(8).map(byte).collect::<Vec<_>>();
+    let adler = (zeros % 65521) << 16 | 1;
+    let profile = [&b"icc\0\0\x78\x01"[..], &deflated, &adler.to_be_bytes()].concat();
+    let rows = [&[0_u8][..], &[255; 60]].concat().repeat(30);
+    let sums =
+        rows.iter().fold((1, 0), |(a, b), &byte| ((a + u32::from(byte)) % 65521, (b + (a + u32::from(byte))) % 65521));
+    let length = rows.len() as u16;
+    let stored = [&[0x78, 1, 1][..], &length.to_le_bytes(), &(!length).to_le_bytes(), &rows].concat();
+    let pixels = [stored, (sums.1 << 16 | sums.0).to_be_bytes().to_vec()].concat();
+    let header = [0, 0, 0, 60, 0, 0, 0, 30, 8, 0, 0, 0, 0];
+    let chunks = [chunk(b"IHDR", &header), chunk(b"iCCP", &profile), chunk(b"IDAT", &pixels), chunk(b"IEND", &[])];
+    [b"\x89PNG\r\n\x1a\n".to_vec(), chunks.concat()].concat()
+}
+
 /// Exit code 2, one error, no panic, bounded time and memory, and the folder as it was. What is large stays below the
 /// limits of a file's size where these alone would refuse it.
 #[cfg(unix)]
@@ -712,6 +744,8 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
     write("pillars.yaml", sound.yaml.replace("map.pgm", "pillars.pgm").as_bytes());
     write("bomb.yaml", sound.yaml.replace("map.pgm", "bomb.pgm").as_bytes());
     write("bomb.pgm", b"P5\n60000 60000\n255\n\xff");
+    write("profile.yaml", sound.yaml.replace("map.pgm", "profile.png").as_bytes());
+    write("profile.png", &png_with_profile(258 * 2_600_000)); // more than the memory it is read in
     write("zero.yaml", sound.yaml.replace("map.pgm", "/dev/zero").as_bytes());
     let aliases = (1..30).map(|i| format!("a{i}: &a{i} [{}]\n", format!("*a{},", i - 1).repeat(9)));
     write("aliases.yaml", ("a0: &a0 [x]\n".to_owned() + &aliases.collect::<String>()).as_bytes());
@@ -760,6 +794,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["evaluate", "--driver", "expert", "--threads", "0"], "--threads"),
         (&["evaluate", "--driver", "expert", "--noise", "nan"], "nan"),
         (&["generate", "--lots", "bomb.yaml", route[0], route[1], route[2], route[3]], "it is too large"),
+        (&["generate", "--lots", "profile.yaml", "--start", "-500,12,0", "--loop"], "profile.yaml: start: "),
         (&["generate", "--lots", "zero.yaml", route[0], route[1], route[2], route[3]], "neither next to the YAML file"),
         (
             &["generate", "--lots", "zero.yaml", "--image-anywhere", route[0], route[1], route[2], route[3]],

@@ -64,10 +64,21 @@ fn a_killed_training_goes_on_to_the_same_bytes() {
         running.kill();
         if file == "round-01/fit.toml" {
             // Its present network would be taken for what the whole training makes.
-            let driver = format!("run:{}", run.display());
-            let refusal =
-                refuse(xtask().args(["evaluate", "--preset", "smoke", "--lots", "lot-b", "--driver", &driver]));
-            assert!(refusal.contains("not finished") && refusal.contains("net:"), "{refusal}");
+            let (path, driver) = (run.display().to_string(), format!("run:{}", run.display()));
+            let key = format!("{driver}@lot-b@forward@0@paper@1@0");
+            let onnx = run.with_extension("onnx").display().to_string();
+            for command in [
+                &["evaluate", "--lots", "lot-b", "--driver", &driver] as &[&str],
+                &["replay", &key],
+                &["render", "trajectories", "--driver", &driver],
+                &["render", "animation", &key],
+                &["visualise", "episode", "--driver", &driver],
+                &["visualise", "replay", &key],
+                &["export", "onnx", &path, "--out", &onnx],
+            ] {
+                let refusal = refuse(xtask().args(command));
+                assert!(refusal.contains("not finished") && refusal.contains("net:"), "{command:?}: {refusal}");
+            }
         }
         resume(arguments[0], &run);
         let resumed = files(&run);
@@ -130,6 +141,8 @@ fn what_is_read_is_never_deleted_or_written_into_however_it_is_named() {
     refuses(&[&of_run[..], &["--out", "none/../run", "--overwrite"]].concat(), "leads back up");
     refuses(&[&of_run[..], &["--out", "run", "--overwrite"]].concat(), "what is read lies there");
     refuses(&[&evaluate[..], &["--out", "run/elsewhere"]].concat(), "lies within the run");
+    let within = refuse(xtask().current_dir(folder.join("run")).args(evaluate));
+    assert!(within.contains("lies within the run"), "its next free folder would be run/runs/…: {within}");
     refuses(
         &["train-bc", "--preset", "smoke", "--no-eval", "--config", "other/mine.toml", "--out", "other", "--overwrite"],
         "what is read lies there",

@@ -7,10 +7,11 @@
 use crate::format::{clustered, difference, exact_rate, interval, quoted_rate};
 use crate::incidents::Cause;
 use crate::judge::{Comparison, DriverEstimate};
+use crate::names::{BC, DAGGER};
 use crate::paper;
 use crate::plan::Plan;
 use crate::results::EvaluationResults;
-use crate::slices::Slice;
+use crate::slices::{Slice, SliceKind};
 use crate::statistics::bootstrap::Interval;
 use crate::statistics::comparison::{RateRatio, ratio_of_intervals};
 use crate::statistics::poisson::{CONFIDENCE, Rate, upper_bound};
@@ -23,10 +24,6 @@ use policy::dagger::IterationRow;
 use serde::Serialize;
 use statrs::statistics::Statistics as _;
 
-/// The paper's driver.
-pub const DAGGER: &str = "DAgger";
-/// Name of behaviour cloning in tables.
-pub const BC: &str = "BC";
 /// No near-collision supports "none" from the metres on that bound the rate here, one-sided, near-collisions per 100 m:
 /// 3 km.
 const NONE_PER_100M: f64 = 0.1;
@@ -113,7 +110,7 @@ impl Driven<'_> {
         match unseen[..] {
             [] => None,
             [_] => (0..).zip(groups).find(|(_, f)| !f.is_trained_on).and_then(|(i, _)| slices.get(i as usize).cloned()),
-            _ => slices.into_iter().find(|slice| slice.label == "unseen"),
+            _ => slices.into_iter().find(|slice| slice.kind == SliceKind::Unseen),
         }
     }
 

@@ -3,6 +3,7 @@
 //!
 //! The test `every_deviation_of_the_default_is_listed` holds [`DEVIATIONS`] against both presets.
 
+use crate::names::{BC, DAGGER};
 use crate::stages::{Stage, Step};
 use experiment::settings::{Layers, Settings};
 use serde::{Deserialize, Serialize};
@@ -136,7 +137,7 @@ pub fn drives_of(settings: &Settings, of_training: &Settings, name: &str) -> Str
 
 /// Names in tables of the policies of a training: behaviour cloning, `DAgger`.
 pub fn names(name: &str) -> [String; 2] {
-    ["BC", "DAgger"].map(|method| if name == BASE { method.to_owned() } else { format!("{method}, {name}") })
+    [BC, DAGGER].map(|method| if name == BASE { method.to_owned() } else { format!("{method}, {name}") })
 }
 
 /// The settings with one thing as in the paper.

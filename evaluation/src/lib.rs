@@ -6,7 +6,7 @@
 //! | [`shards`] | what several machines did a share of each, put together again |
 //! | [`records`] | the lines of `runs.jsonl`, `failures.jsonl`, `wall_time.jsonl` |
 //! | [`monitor`], [`incidents`], [`what_if`], [`avoidable`] | near-collisions one by one, why they happened, and what would have avoided them |
-//! | [`totals`], [`slices`], [`results`], [`judge`], [`trainings`] | runs added up, pooled and compared |
+//! | [`totals`], [`slices`], [`names`], [`results`], [`judge`], [`trainings`] | runs added up, pooled and compared |
 //! | [`statistics`] | exact intervals, comparisons, paired bootstrap, sample sizes |
 //! | [`summary`], [`table1`] | the tables as data |
 //! | [`calibration`], [`on_policy`] | whether the predicted variance is right, on held-back and on driven states |
@@ -27,6 +27,7 @@ pub mod incidents;
 pub mod json;
 pub mod judge;
 pub mod monitor;
+pub mod names;
 pub mod on_policy;
 pub mod paper;
 pub mod parts;

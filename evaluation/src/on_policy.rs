@@ -3,6 +3,7 @@
 
 use crate::calibration::{self, AxisCalibration};
 use crate::json;
+use crate::names::{BC, DAGGER, UNWEIGHTED};
 use crate::stages::Chain;
 use crate::statistics::bootstrap::{DRAWS, Interval, Units};
 use anyhow::Context as _;
@@ -186,9 +187,9 @@ pub fn run(
     }
     let mut calibration = Vec::new();
     for (name, path, chain, rounds) in [
-        ("BC", weighted.store.round_folder(0), weighted, 0),
-        ("DAgger", trained::policy_folder(&folder(Chain::Weighted))?, weighted, weighted.iterations()),
-        ("DAgger, α = 0", trained::policy_folder(&folder(Chain::Unweighted))?, unweighted, unweighted.iterations()),
+        (BC, weighted.store.round_folder(0), weighted, 0),
+        (DAGGER, trained::policy_folder(&folder(Chain::Weighted))?, weighted, weighted.iterations()),
+        (UNWEIGHTED, trained::policy_folder(&folder(Chain::Unweighted))?, unweighted, unweighted.iterations()),
     ] {
         let Some(driven) = drives.of(&path)? else { return Ok(false) };
         let policy = Checkpoint::load(&path)?;

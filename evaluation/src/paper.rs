@@ -1,5 +1,6 @@
 //! The figures that the paper prints, and the counts recovered from them (docs/methods.md 0).
 
+use crate::names::DAGGER;
 use serde::{Deserialize, Serialize};
 
 /// A lot of the paper.
@@ -34,7 +35,7 @@ impl PaperLot {
 }
 
 /// Drivers of the paper, by the names of ours.
-pub const DRIVERS: [&str; 3] = ["DAgger", "tentacle", "vvf"];
+pub const DRIVERS: [&str; 3] = [DAGGER, "tentacle", "vvf"];
 
 /// Near-collisions of a driver and metres it drove on some of the lots.
 pub fn count(driver: usize, is_meant: impl Fn(&PaperLot) -> bool) -> (u32, f64) {

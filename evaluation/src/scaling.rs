@@ -3,6 +3,7 @@
 //!
 //! A training of few lots meets each more often, with other noise every time.
 
+use crate::names::{BC, DAGGER};
 use crate::stages::{Stage, Step};
 use experiment::settings::Settings;
 use serde::{Deserialize, Serialize};
@@ -33,7 +34,7 @@ pub fn lots_met(listed_of_kinds: impl IntoIterator<Item = usize>, different_lots
 
 /// Names in tables of what was trained on so many lots of a kind: behaviour cloning, `DAgger`.
 pub fn names(different_lots: u32) -> [String; 2] {
-    ["BC", "DAgger"].map(|name| format!("{name}, {different_lots} of a kind"))
+    [BC, DAGGER].map(|name| format!("{name}, {different_lots} of a kind"))
 }
 
 /// The trainings, then the evaluation. `root`: the folder of the whole run.

@@ -19,8 +19,8 @@
 //!
 //! Behaviour cloning has no τ̂, so that neither α nor the rule changes a bit of it: it is trained once per seed.
 
-use crate::conclusions::{BC, DAGGER};
 use crate::estimate::{self, Task};
+use crate::names::{ALPHA_15, BC, DAGGER, EXPERT_EQUAL, EXPERT_ONLY, UNWEIGHTED};
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::settings::{Settings, Smoothing, with_points_of_paper};
 use experiment::shard::Shard;
@@ -217,15 +217,6 @@ pub const UNSMOOTHED: &str = "drives/unsmoothed";
 pub const SMOOTHED: &str = "drives/smoothed";
 /// See [`REFERENCE`].
 pub const ON_POLICY: &str = "on-policy";
-
-/// Name in tables of [`Chain::Unweighted`].
-pub const UNWEIGHTED: &str = "DAgger, α = 0";
-/// Names in tables of what only [`CONTROLS`] drives.
-pub const EXPERT_ONLY: &str = "expert's data alone";
-/// See [`EXPERT_ONLY`].
-pub const EXPERT_EQUAL: &str = "expert's data alone, as many samples";
-/// See [`EXPERT_ONLY`].
-pub const ALPHA_15: &str = "DAgger, α = 15";
 
 /// Action smoothing of [`SMOOTHED`] where the settings' networks have none, control ticks.
 const SMOOTHING_TICKS: f32 = 8.0;

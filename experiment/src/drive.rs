@@ -111,9 +111,7 @@ impl Replay {
     /// # Errors
     /// If the key names several lots, or one that cannot be driven.
     pub fn new(key: &ReplayKey, episode: &EpisodeSettings) -> anyhow::Result<Self> {
-        let mut lots = Lot::parse_all(std::slice::from_ref(&key.lot), &episode.vehicle)?;
-        ensure!(lots.len() == 1, "{:?} stands for {} lots; name one, as in test-hard-7", key.lot, lots.len());
-        let lot = lots.remove(0);
+        let lot = Lot::parse_one(&key.lot, &episode.vehicle)?;
         let map = Arc::new(Trial::of_evaluation(key.seed, &lot, key.direction, key.trial).map(episode)?);
         Ok(Self { lot, map, key: key.clone() })
     }

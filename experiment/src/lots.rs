@@ -59,8 +59,10 @@ pub fn specs() -> Vec<(&'static str, String)> {
     .to_vec()
 }
 
-/// Names of rows of tables that are not lots.
-const ROWS: [&str; 2] = ["all", "unseen"];
+/// Row of a table for all lots.
+pub const ALL: &str = "all";
+/// Row of a table for the lots that no driver was trained on.
+pub const UNSEEN: &str = "unseen";
 
 /// The name of a lot from a file. One that is the name of other lots, or of another row of a table, is marked: it would be
 /// counted among those, or be compared with the paper's.
@@ -70,7 +72,7 @@ fn name_of_file(scenario: &Scenario) -> String {
     // (No row has the name of a suite, which may stand for a million lots.)
     let is_one = !name.contains([':', ',']);
     let is_taken = |name: &str| is_one && scenarios::suite(name).is_ok_and(|lots| !lots.iter().any(LotSpec::is_file));
-    if ROWS.contains(&name.as_str()) || is_taken(name) || is_taken(&format!("{name}-0")) {
+    if [ALL, UNSEEN].contains(&name.as_str()) || is_taken(name) || is_taken(&format!("{name}-0")) {
         return format!("{name} (file)");
     }
     name.clone()
@@ -96,6 +98,16 @@ impl Lot {
             ensure_it_fits(&lots, vehicle)?;
         }
         Ok(lots)
+    }
+
+    /// The one lot that a spec stands for.
+    ///
+    /// # Errors
+    /// As [`Self::parse_all`], and if it stands for several.
+    pub fn parse_one(spec: &str, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
+        let mut lots = Self::parse_all(&[spec], vehicle)?;
+        ensure!(lots.len() == 1, "{spec:?} stands for {} lots; name one, as in test-hard-7", lots.len());
+        Ok(lots.remove(0))
     }
 
     fn new(spec: LotSpec, vehicle: &VehicleSettings) -> anyhow::Result<Self> {

@@ -69,7 +69,8 @@ pub fn ensure_whole(spec: &Path) -> anyhow::Result<()> {
     }
     let round = policy_folder(spec)?;
     bail!(
-        "{}: this training is not finished; continue it with --resume {0}, or drive as it is now with net:{}",
+        "{}: this training is not finished; continue it with --resume {0}, or take the network that it has now, {} \
+         (as a driver: net:{1})",
         run.display(),
         round.display()
     )

@@ -304,6 +304,8 @@ mod tests {
             assert_eq!(again.ticks, stored.ticks[first..], "round {round}");
         }
         assert!(drive_again(&run, 1, 2).is_err_and(|error| error.to_string().contains("2 drives")));
+        // It was driven by the last network there is.
+        assert!(drive_again(&run, 2, 0).is_err_and(|error| error.to_string().contains("no such round")));
         std::fs::remove_dir_all(run).unwrap();
     }
 }

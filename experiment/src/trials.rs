@@ -107,9 +107,14 @@ impl<'a> Trial<'a> {
         self.lot.name() == other.lot.name() && (self.index == other.index || !self.lot.is_drawn_per_trial())
     }
 
-    /// One trial of an evaluation, named by its parts, as in a replay key.
+    /// A single one.
+    pub fn new(root: RootSeed, purpose: Purpose, lot: &'a Lot, direction: Direction, index: u32) -> Self {
+        Self { lot, direction, index, seed: trial_seed(root, purpose, index) }
+    }
+
+    /// One of an evaluation, named by its parts, as in a replay key.
     pub fn of_evaluation(root: RootSeed, lot: &'a Lot, direction: Direction, index: u32) -> Self {
-        Self { lot, direction, index, seed: trial_seed(root, Purpose::Evaluation, index) }
+        Self::new(root, Purpose::Evaluation, lot, direction, index)
     }
 
     /// Builds the map from its lot as drawn.

@@ -2,9 +2,11 @@
 
 use crate::drive::rows_of;
 use crate::markdown::table_of;
-use evaluation::conclusions::{BC, DAGGER, Driven};
+use evaluation::conclusions::Driven;
 use evaluation::format::{difference, quoted_rate};
-use evaluation::stages::{ALPHA_15, Chain, EXPERT_EQUAL, EXPERT_ONLY, UNWEIGHTED};
+use evaluation::names::{ALPHA_15, BC, DAGGER, EXPERT_EQUAL, EXPERT_ONLY, UNWEIGHTED};
+use evaluation::stages::Chain;
+use experiment::lots::UNSEEN;
 use sim::seed::RootSeed;
 use std::path::Path;
 
@@ -92,7 +94,7 @@ pub(crate) fn readings(reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
         "the paper's lots",
         "per 100 m [95 %]",
         "− DAgger's [95 %]",
-        "unseen",
+        UNSEEN,
         "per 100 m [95 %]",
         "− DAgger's [95 %]",
     ]);

@@ -6,6 +6,7 @@ use anyhow::Context as _;
 use evaluation::deviations::{self, BASE, Extent};
 use evaluation::drive_stage::DriveStage;
 use evaluation::format::{difference, quoted_interval, quoted_rate};
+use evaluation::names::{BC, DAGGER};
 use evaluation::results::EvaluationResults;
 use evaluation::stages::{Stage, Step};
 use evaluation::statistics::bootstrap::Interval;
@@ -90,7 +91,7 @@ fn rows_of(stage: &Stage, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<
     let everywhere = results.slices().pop().context("lots were driven on")?;
     let index_of = |name: &str| plan.drivers.iter().position(|driver| driver.name == name);
     let mut rows = Vec::new();
-    for (which, method) in ["BC", "DAgger"].into_iter().enumerate() {
+    for (which, method) in [BC, DAGGER].into_iter().enumerate() {
         let base = index_of(&deviations::names(BASE)[which]);
         let (estimates, comparisons) =
             results.judge(0, &everywhere, base.unwrap_or(0), drive.settings().evaluation.seed);
@@ -133,7 +134,7 @@ fn plot(rows: &[Row]) -> String {
         name: format!("{}, {}", row.method, row.deviation),
         per_100m: row.per_100m,
         interval: [row.lower, row.upper],
-        group: usize::from(row.method == "DAgger"),
+        group: usize::from(row.method == DAGGER),
     };
     plots::rates("One thing as in the paper", &rows.iter().map(row).collect::<Vec<_>>())
 }

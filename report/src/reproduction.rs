@@ -10,18 +10,20 @@ use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
 use crate::table1::{AGREEMENT, READ_ETA_HAT};
 use crate::trainings::{self, Place};
 use evaluation::calibration::AxisCalibration;
-use evaluation::conclusions::{self, Against, BC, DAGGER, Driven, Statement, Verdict};
+use evaluation::conclusions::{self, Against, Driven, Statement, Verdict};
 use evaluation::deviations;
 use evaluation::format::{difference, exact_rate, quoted_interval, quoted_rate};
+use evaluation::names::{BC, DAGGER, UNWEIGHTED};
 use evaluation::on_policy::{Calibration, Effect, OnPolicy, States};
 use evaluation::paper::{self, PaperLot};
 use evaluation::slices::Slice;
-use evaluation::stages::{self, Chain, Extent, Stage, UNWEIGHTED};
+use evaluation::stages::{self, Chain, Extent, Stage};
 use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
 use evaluation::totals::Totals;
 use evaluation::trainings::TRAININGS_MIN;
 use experiment::drivers::NamedDriver;
+use experiment::lots::{ALL, UNSEEN};
 use experiment::manifest::Manifest;
 use experiment::run_dir::RunDir;
 use experiment::settings::{Settings, with_points_of_paper};
@@ -223,7 +225,7 @@ fn how_they_drove(reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
         "m/s",
         "reversals per 100 m",
     ]);
-    for (driven, label) in [(reference, "the paper's"), (unseen, "unseen")] {
+    for (driven, label) in [(reference, "the paper's"), (unseen, UNSEEN)] {
         let slice = driven.all();
         for (driver, named) in driven.plan.drivers.iter().enumerate() {
             let totals = driven.results.totals(0, driver, &slice, None);
@@ -322,7 +324,7 @@ fn verdicts(statements: &[Statement], extent: &Extent) -> String {
 
 fn table_1(page: &mut Page, eta: f64, weighted: &[IterationRow], unweighted: &[IterationRow], effect: &[Effect]) {
     let columns = weighted.len().max(unweighted.len()).max(paper::TABLE_1.dataset.len());
-    let header: Vec<String> = (0..columns).map(|i| if i == 0 { "BC".to_owned() } else { format!("i = {i}") }).collect();
+    let header: Vec<String> = (0..columns).map(|i| if i == 0 { BC.to_owned() } else { format!("i = {i}") }).collect();
     let mut table = with_header(std::iter::once(String::new()).chain(header).collect());
     let mut add = |name: &str, value: &dyn Fn(usize) -> Option<String>| {
         let cells = (0..columns).map(|i| value(i).unwrap_or_else(|| "–".to_owned()));
@@ -394,8 +396,8 @@ fn by_lot(
 /// Near-collisions and metres of a driver of the paper on a lot, or on those that a pooled slice stands for.
 fn count_of_paper(driver: usize, label: &str) -> Option<(u32, f64)> {
     let count = paper::count(driver, |lot| match label {
-        "all" => true,
-        "unseen" => !lot.is_trained_on,
+        ALL => true,
+        UNSEEN => !lot.is_trained_on,
         label => lot.lot == label,
     });
     (count.1 > 0.0).then_some(count)
@@ -477,7 +479,7 @@ fn rates_of_all(driven: &Driven<'_>) -> String {
         let name = entry.name.clone();
         let group = match name.as_str() {
             "expert" => 0,
-            name if name.starts_with("BC") || name.starts_with("DAgger") => 1,
+            name if name.starts_with(BC) || name.starts_with(DAGGER) => 1,
             name if name.ends_with("tuned") => 3,
             _ => 2,
         };
@@ -620,7 +622,7 @@ fn calibration(page: &mut Page, found: &[Calibration]) {
          (normal errors with the right σ: 68.3 % and 95.4 %), and how large errors are against σ.\n\n{table}"
     ));
     let of = |states: States| -> Vec<AxisCalibration> {
-        let of_dagger = found.iter().filter(|row| row.states == states && row.policy == conclusions::DAGGER);
+        let of_dagger = found.iter().filter(|row| row.states == states && row.policy == DAGGER);
         of_dagger
             .map(|row| AxisCalibration {
                 name: row.axis.clone(),

@@ -12,10 +12,12 @@ use crate::page::{Image, Page};
 use crate::plots::{self, Distribution, EtaSeries, RatePoint, RateRow, RateSeries};
 use anyhow::Context as _;
 use evaluation::calibration::{self, AxisCalibration};
+use evaluation::names::BC;
 use evaluation::records::{self, Driven, FailureRecord, RunRecord};
 use evaluation::statistics::poisson::DISPERSION_MAX;
 use evaluation::summary::{Row, SweepRow, Tables};
 use evaluation::table1::Table1;
+use experiment::lots::ALL;
 use experiment::manifest::Manifest;
 use experiment::progress::{Interrupted, Progress};
 use experiment::replay_key::ReplayKey;
@@ -87,7 +89,7 @@ impl Training {
         let Some(table1) = Table1::read(folder)? else { return Ok(None) };
         let mut rounds = Vec::new();
         for row in &table1.rows {
-            let name = if row.round == 0 { "BC".to_owned() } else { format!("i = {}", row.round) };
+            let name = if row.round == 0 { BC.to_owned() } else { format!("i = {}", row.round) };
             rounds.extend(learning::read(&folder.join(format!("round-{:02}", row.round)), &name)?);
         }
         rounds.extend(learning::read(&folder.join("final"), "final")?);
@@ -117,7 +119,7 @@ impl Evaluation {
 
     /// The lots that stand for all: pooled where there are several.
     fn pooled(&self) -> &str {
-        self.tables.rows.last().map_or("all", |row| row.lots.as_str())
+        self.tables.rows.last().map_or(ALL, |row| row.lots.as_str())
     }
 
     /// Rows of both directions at a noise level.

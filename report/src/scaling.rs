@@ -5,6 +5,7 @@ use crate::plots::{self, RatePoint, RateSeries};
 use anyhow::Context as _;
 use evaluation::drive_stage::DriveStage;
 use evaluation::format::{quoted_interval, quoted_rate};
+use evaluation::names::{BC, DAGGER};
 use evaluation::results::EvaluationResults;
 use evaluation::scaling::{self, Extent};
 use evaluation::stages::Stage;
@@ -86,7 +87,7 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
         let samples = [table1.rows.first(), table1.rows.last()].map(|row| row.map_or(0, |row| row.dataset));
         let lots_met =
             [1, table1.rows.len()].map(|rounds| scaling::lots_met(of_kind.values().copied(), different, rounds));
-        for (part, method) in ["BC", "DAgger"].into_iter().enumerate() {
+        for (part, method) in [BC, DAGGER].into_iter().enumerate() {
             // Behaviour cloning has one round: it may be the same network again.
             let is_known = |row: &Row| row.method == method && row.different_lots == lots_met[part];
             if rows.iter().any(is_known) {
@@ -123,7 +124,7 @@ fn plot(rows: &[&Row]) -> String {
         per_100m: row.per_100m,
         interval: [row.lower, row.upper],
     };
-    let series = ["BC", "DAgger"]
+    let series = [BC, DAGGER]
         .map(|method| RateSeries { name: method.to_owned(), points: of(method).map(|row| point(row)).collect() });
     let counts: Vec<String> = counts.iter().map(ToString::to_string).collect();
     plots::rates_against_lots("Near-collisions on unseen lots", &counts, &series)

@@ -1,6 +1,7 @@
 //! The paper's table of DAgger iterations, from a run beside the paper's, as Markdown.
 
 use crate::markdown::with_header;
+use evaluation::names::BC;
 use evaluation::table1::Table1;
 use experiment::run_dir::RunDir;
 use policy::dagger::{IterationRow, Stop};
@@ -45,7 +46,7 @@ pub(crate) const READ_ETA_HAT: &str = "The best constant answer is the point tha
 pub fn to_markdown(table1: &Table1) -> String {
     let columns = table1.rows.len().max(table1.paper.dataset.len());
     let header = std::iter::once(String::new())
-        .chain((0..columns).map(|i| if i == 0 { "BC".to_owned() } else { format!("i = {i}") }));
+        .chain((0..columns).map(|i| if i == 0 { BC.to_owned() } else { format!("i = {i}") }));
     let mut table = with_header(header.collect());
     let mut add = |name: &str, value: &dyn Fn(usize) -> Option<String>| {
         let values = (0..columns).map(|i| value(i).unwrap_or_else(|| "–".to_owned()));

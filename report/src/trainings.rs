@@ -2,11 +2,12 @@
 
 use crate::drive::rows_of;
 use crate::markdown::table_of;
-use evaluation::conclusions::{BC, DAGGER, Driven};
+use evaluation::conclusions::Driven;
 use evaluation::format::{interval, quoted_rate};
 use evaluation::judge::DriverEstimate;
+use evaluation::names::{BC, DAGGER, UNWEIGHTED};
 use evaluation::slices::Slice;
-use evaluation::stages::{self, Chain, Extent, UNWEIGHTED, named};
+use evaluation::stages::{self, Chain, Extent, named};
 use evaluation::statistics::bootstrap::Interval;
 use evaluation::totals::Totals;
 use evaluation::trainings::{JudgedTeams, Team, TeamEstimate};

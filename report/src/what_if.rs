@@ -3,6 +3,7 @@
 use crate::markdown::with_header;
 use comfy_table::Table;
 use evaluation::avoidable::Row;
+use experiment::lots::ALL;
 
 /// A row for each driver and group of lots: how many near-collisions (events) there are, then how many of them are passed with each
 /// thing replaced.
@@ -33,11 +34,11 @@ pub fn table(rows: &[Row]) -> Table {
             add(driver, noise, group, &of_group);
         }
         if groups.len() > 1 {
-            add(driver, noise, "all", &of_driver);
+            add(driver, noise, ALL, &of_driver);
         }
     }
     if drivers.len() > 1 {
-        add("all", "", "all", &rows.iter().collect::<Vec<_>>());
+        add(ALL, "", ALL, &rows.iter().collect::<Vec<_>>());
     }
     table
 }

@@ -185,3 +185,16 @@ pub(crate) fn error(text: impl Display) {
         note(format_args!("error: {text}"));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file's name could clear the screen, and a file of one line filled it.
+    #[test]
+    fn an_error_quotes_no_character_that_a_terminal_obeys_and_has_an_end() {
+        assert_eq!(printable("lot \u{1b}[2J\u{9b}\r:\nτ\t2"), "lot \\u{1b}[2J\\u{9b}\\r:\nτ\\t2");
+        let long = printable(&"x".repeat(ERROR_CHARS_MAX + 1));
+        assert!(long.ends_with("x…") && long.chars().count() == ERROR_CHARS_MAX + 1, "{}", long.len());
+    }
+}

@@ -2,7 +2,7 @@
 
 use super::reference;
 use super::schema::Settings;
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use sim::limits::{DRIVES_PER_ROUND_MAX, RUNS_MAX};
 
 impl Settings {
@@ -40,10 +40,10 @@ impl Settings {
             "evaluation.noise is empty; name at least one level (clean, paper, hard, lot, 0.5 …)"
         );
         for (i, level) in noise.iter().enumerate() {
-            ensure!(
-                !noise[..i].contains(level),
-                "evaluation.noise names {level} twice; results are told apart by level"
-            );
+            if let Some(same) = noise[..i].iter().find(|other| level.is_same_as(**other)) {
+                ensure!(same != level, "evaluation.noise names {level} twice; results are told apart by level");
+                bail!("evaluation.noise names {same} and {level}, which are the same; name one of them");
+            }
         }
         let (physics, control) = (self.episode.physics_step_ms, self.episode.control_period_ms);
         ensure!(

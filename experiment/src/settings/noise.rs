@@ -50,6 +50,11 @@ impl NoiseChoice {
         (self != Self::Lot).then(|| f64::from(self.intensity(NoiseLevel::Clean)))
     }
 
+    /// Whether another is the same however it is named: `hard` is twice `paper`.
+    pub fn is_same_as(self, other: Self) -> bool {
+        self == other || self.times_paper().is_some_and(|times| other.times_paper() == Some(times))
+    }
+
     /// Its name in tables: [`Self::from_str`] reads it back.
     pub fn name(self) -> String {
         self.to_string()

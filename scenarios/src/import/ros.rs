@@ -191,7 +191,12 @@ impl Header {
                 remedy: remedy.to_owned(),
             }
         };
-        let Self { resolution, origin, occupied_thresh, free_thresh, .. } = header;
+        let Self { resolution, origin, negate, occupied_thresh, free_thresh, .. } = header;
+        if let Flag::Number(number) = negate
+            && !(0..=1).contains(&number)
+        {
+            return Err(fault("negate", format!("{number} is neither 0 nor 1"), "write 0, or 1 where dark is free"));
+        }
         if !MAP_RESOLUTION_M.contains(&resolution) {
             let remedy = format!("write metres per pixel, {} to {}", MAP_RESOLUTION_M.start(), MAP_RESOLUTION_M.end());
             return Err(fault("resolution", format!("it is {resolution}"), &remedy));

@@ -593,6 +593,15 @@ fn a_map_or_centre_line_that_is_not_beside_its_lot_file_is_refused() {
     assert!(!lot.scenario(&car()).unwrap_err().to_string().contains("neither next to"));
 }
 
+/// `negate: 7` was read as 1.
+#[test]
+fn negate_is_yes_or_no() {
+    let lot = small_map("negate", "[0, 0, 0]");
+    std::fs::write(&lot.map, yaml("0.5", "[0, 0, 0]").replace("negate: 0", "negate: 7")).unwrap();
+    let refusal = ros::Map::read(&lot.map, false).unwrap_err().to_string();
+    assert!(refusal.contains("negate: 7 is neither 0 nor 1"), "{refusal}");
+}
+
 /// `negat: 1` was read as a map that is not negated.
 #[test]
 fn keys_that_mean_nothing_are_named_in_a_note() {

@@ -227,12 +227,13 @@ pub(crate) fn compare_with(wanted: Option<&str>, specs: &[DriverSpec]) -> anyhow
 /// named as a driver, else the default preset.
 ///
 /// # Errors
-/// If something named does not exist, or runs were trained with settings that differ.
+/// If something named does not exist, a training is not finished, or runs were trained with settings that differ.
 pub(crate) fn settings_for(
     specs: &[DriverSpec],
     layers: &Layers,
     output: &Output,
 ) -> anyhow::Result<(Settings, String)> {
+    specs.iter().try_for_each(DriverSpec::ensure_whole)?;
     let Some((of_run, path)) = drivers::settings_of_runs(specs, layers)? else {
         return Ok((Settings::resolve(layers, None)?, layers.preset_name().to_owned()));
     };

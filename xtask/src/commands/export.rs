@@ -43,7 +43,12 @@ struct OnnxArgs {
 
 pub(crate) fn run(args: &ExportArgs, output: &Output) -> anyhow::Result<()> {
     let Format::Onnx(OnnxArgs { run, out, overwrite }) = &args.format;
-    let folder = if Checkpoint::exists(run)? { run.clone() } else { trained::policy_folder(run)? };
+    let folder = if Checkpoint::exists(run)? {
+        run.clone()
+    } else {
+        trained::ensure_whole(run)?;
+        trained::policy_folder(run)?
+    };
     let checkpoint = Checkpoint::load(&folder)?;
     run_dir::ensure_outside_of_runs(out).context("--out")?;
     ensure!(

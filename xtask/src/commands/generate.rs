@@ -175,20 +175,9 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
         lot.start = lot.start.filter(|_| centre_line.is_none());
     }
     lot.start = start.or(lot.start);
-    // An error names the file, which may say something else than the flags.
-    let given = |flag, is_given: bool| is_given.then_some(flag);
-    let flags = [
-        given("--scale", scale.is_some()),
-        given("--start", start.is_some()),
-        given("--goal", goal.is_some()),
-        given("--loop", *is_loop),
-        given("--centre-line", centre_line.is_some()),
-        given("--clearance", clearance.is_some()),
-    ];
-    let flags: Vec<&str> = flags.into_iter().flatten().collect();
-    let with_flags = || format!("with {} as given", flags.join(", "));
-    let made = Lot::of_map(path, &lot, vehicle);
-    Ok(vec![if flags.is_empty() { made? } else { made.with_context(with_flags)? }])
+    // An error names the file, which may say something else.
+    let lot = Lot::of_map(path, &lot, vehicle).context("with the flags of the command line instead of MAP.lot.toml")?;
+    Ok(vec![lot])
 }
 
 /// Name of the files of a lot, without an extension.

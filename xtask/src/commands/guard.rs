@@ -10,6 +10,7 @@ use anyhow::{Context as _, ensure};
 use clap::Args;
 use evaluation::estimate;
 use evaluation::format::exact_rate;
+use evaluation::names::DAGGER;
 use evaluation::totals::Totals;
 use experiment::drivers::DriverSpec;
 use experiment::manifest::Request;
@@ -89,7 +90,7 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     let Ok(outcome) = train::tabulated(&settings, &run, &console, output)? else {
         return Err(interrupted().into());
     };
-    let drivers = [DriverSpec::Run { folder: run.path().to_owned() }.load(&settings)?.renamed("DAgger")];
+    let drivers = [DriverSpec::Run { folder: run.path().to_owned() }.load(&settings)?.renamed(DAGGER)];
     let mut worse = Vec::new();
     for place in &record.place {
         let results = within::evaluate(&run, &place.name, &place.settings(&settings), &drivers, &console)?;

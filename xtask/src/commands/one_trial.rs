@@ -3,7 +3,7 @@
 use super::evaluate;
 use crate::args::{LayerArgs, OneDirection, lot_name};
 use crate::output::Output;
-use anyhow::ensure;
+use anyhow::Context as _;
 use clap::Args;
 use experiment::drivers::DriverSpec;
 use experiment::lots::Lot;
@@ -52,9 +52,7 @@ impl TrialArgs {
         output: &Output,
     ) -> anyhow::Result<(Settings, Lot, Vec<ReplayKey>)> {
         let (settings, _) = evaluate::settings_for(drivers, &Layers::from(layers), output)?;
-        let mut lots = Lot::parse_all(std::slice::from_ref(&self.lot), &settings.episode.vehicle)?;
-        ensure!(lots.len() == 1, "--lots {}: this names {} lots; name one, as in test-hard-7", self.lot, lots.len());
-        let lot = lots.remove(0);
+        let lot = Lot::parse_one(&self.lot, &settings.episode.vehicle).context("--lots")?;
         let evaluation = &settings.evaluation;
         let key = |driver: &DriverSpec| ReplayKey {
             driver: driver.clone(),

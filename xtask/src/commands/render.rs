@@ -378,16 +378,17 @@ fn render_samples(args: &SamplesArgs, folder: &Folder<'_>) -> anyhow::Result<()>
 
 fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
     let settings = Settings::preset("default")?;
-    let lots = Lot::parse_all(std::slice::from_ref(&args.lot), &settings.episode.vehicle)?;
-    let trial = Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, 1, &[Direction::Forward]).next();
-    let (Some(trial), 1, Some(&last)) = (trial, lots.len(), args.noise.last()) else {
-        anyhow::bail!("{:?} stands for {} lots; name one", args.lot, lots.len());
-    };
+    let lot = Lot::parse_one(&args.lot, &settings.episode.vehicle).context("--lots")?;
+    let trial = Trial::new(RootSeed(args.seed), Purpose::Pictures, &lot, Direction::Forward, 0);
     let map = trial.map(&settings.episode)?;
     let inspect = |level: NoiseChoice, at_m: f32| noise::inspect(&settings.episode, &trial, &map, level, at_m);
     let at_m = match args.at {
         Some(at_m) => at_m,
-        None => noise::richest_place(map.path().length_m(), |at_m| inspect(last, at_m)),
+        // One is named at least.
+        None => {
+            let last = args.noise[args.noise.len() - 1];
+            noise::richest_place(map.path().length_m(), |at_m| inspect(last, at_m))
+        }
     };
     ensure!(
         (0.0..=map.path().length_m()).contains(&at_m),

@@ -10,6 +10,7 @@ use crate::record::{self, RecordArgs};
 use anyhow::{Context as _, ensure};
 use clap::Args;
 use evaluation::estimate;
+use evaluation::names::{BC, DAGGER};
 use evaluation::plan::Plan;
 use evaluation::table1::Table1;
 use experiment::drivers::{DriverSpec, NamedDriver};
@@ -254,9 +255,9 @@ fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
 /// The expert, the behaviour-cloned policy and the final one.
 fn drivers(settings: &Settings, run: &Path) -> anyhow::Result<Vec<NamedDriver>> {
     let of_run = |folder: PathBuf| DriverSpec::Run { folder }.load(settings);
-    let mut drivers = vec![DriverSpec::Expert.load(settings)?, of_run(run.join("bc"))?.renamed("BC")];
+    let mut drivers = vec![DriverSpec::Expert.load(settings)?, of_run(run.join("bc"))?.renamed(BC)];
     if run.join("round-01").try_exists().with_context(|| run.display().to_string())? {
-        drivers.push(of_run(run.to_owned())?.renamed("DAgger"));
+        drivers.push(of_run(run.to_owned())?.renamed(DAGGER));
     }
     Ok(drivers)
 }

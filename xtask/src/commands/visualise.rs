@@ -6,7 +6,7 @@ use crate::args::{LayerArgs, lot_name};
 use crate::output::Output;
 use crate::record::recordings_of;
 use crate::viewer;
-use anyhow::ensure;
+use anyhow::{Context as _, ensure};
 use clap::{Args, Subcommand};
 use evaluation::records::{self, FailureRecord};
 use experiment::drivers::DriverSpec;
@@ -129,8 +129,7 @@ pub(crate) fn run(args: &VisualiseArgs, output: &Output) -> anyhow::Result<()> {
     let (show, file) = match &args.what {
         What::Lot(lot) => {
             // Before the program that records is built.
-            let lots = Lot::parse_all(std::slice::from_ref(&lot.lot), &VehicleSettings::hyundai_hg300())?;
-            ensure!(lots.len() == 1, "--lots {}: this names {} lots; name one, as in test-hard-7", lot.lot, lots.len());
+            Lot::parse_one(&lot.lot, &VehicleSettings::hyundai_hg300()).context("--lots")?;
             let show = Show::Lot { lot: lot.lot.clone(), seed: RootSeed(lot.seed) };
             (show, format!("lot-{}-s{}", file_name(&lot.lot), lot.seed))
         }

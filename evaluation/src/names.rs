@@ -1,0 +1,14 @@
+//! Names of policies in tables, by which they are found there.
+
+/// The paper's driver.
+pub const DAGGER: &str = "DAgger";
+/// Behaviour cloning.
+pub const BC: &str = "BC";
+/// [`Chain::Unweighted`](crate::stages::Chain::Unweighted).
+pub const UNWEIGHTED: &str = "DAgger, α = 0";
+/// [`Chain::ExpertOnly`](crate::stages::Chain::ExpertOnly).
+pub const EXPERT_ONLY: &str = "expert's data alone";
+/// [`Chain::ExpertEqual`](crate::stages::Chain::ExpertEqual).
+pub const EXPERT_EQUAL: &str = "expert's data alone, as many samples";
+/// [`Chain::Alpha15`](crate::stages::Chain::Alpha15).
+pub const ALPHA_15: &str = "DAgger, α = 15";
