@@ -299,13 +299,11 @@ impl Against<'_> {
     /// Near-collisions that the same driver avoids on the clean grid. They are few: compared exactly, without pairs, as if each
     /// came by itself.
     fn minds_noise_less(&self, other: usize) -> Statement {
-        let count = |driver| {
-            let noisy = self.driven.results.count_of_cause(0, driver, &self.slice, Cause::NoiseInduced);
-            (noisy, self.totals(driver).reference_m / 100.0)
-        };
+        let noisy = |driver| self.driven.results.count_of_cause(0, driver, &self.slice, Cause::NoiseInduced);
         let name = self.name(other);
-        let [ours, theirs] = [self.dagger, other].map(count);
-        let ratio = RateRatio::new(theirs, ours);
+        let [ours, theirs] = [self.dagger, other].map(|driver| (noisy(driver), self.totals(driver)));
+        let of = |(noisy, totals): &(u32, Totals)| (*noisy, totals.reference_m / 100.0);
+        let ratio = RateRatio::new(of(&theirs), of(&ours));
         let verdict = if ratio.lower > 1.0 {
             Verdict::Holds
         } else if ratio.upper.is_some_and(|upper| upper < 1.0) {
@@ -314,12 +312,14 @@ impl Against<'_> {
             Verdict::CannotBeTold
         };
         let figures = format!(
-            "noise-induced near-collisions: DAgger {}, {name} {}; rate ratio {}, if each came by itself",
+            "DAgger {} of {}, {name} {} of {}; rate ratio {}, if each came by itself; the first training",
             ours.0,
+            ours.1.near_collisions,
             theirs.0,
+            theirs.1.near_collisions,
             ratio_text(&ratio)
         );
-        Statement { claim: format!("DAgger is more robust against noise than {name}"), verdict, figures }
+        Statement { claim: format!("DAgger has fewer noise-induced near-collisions than {name}"), verdict, figures }
     }
 
     /// Whether a planner of the paper fails about as often here; `None` where the paper did not drive.

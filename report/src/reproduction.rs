@@ -103,8 +103,8 @@ fn cautions(settings: &Settings) -> anyhow::Result<String> {
             .to_owned()
     };
     Ok(format!(
-        "Before quoting a figure: the widths of the three reference lots were chosen so that the expert meets the paper's safe \
-         ratios ([methods](methods.md#11-lots)). {points} Forward and reverse drives of a trial share their obstacles. One \
+        "Before quoting a figure: the widths of the three reference lots were chosen so that a prototype's expert came near the \
+         paper's safe ratios ([methods](methods.md#11-lots)). {points} Forward and reverse drives of a trial share their obstacles. One \
          training is one sample: its interval says how sure the rate of *this* network is, not what another training would \
          give; an interval over several trainings is for other seeds, too."
     ))
@@ -302,7 +302,7 @@ fn verdicts(statements: &[Statement], extent: &Extent) -> String {
                     paper's side of zero, *does not hold* where it lies on the other, and *cannot be told* where it contains \
                     zero (differences are the other driver's − DAgger's in near-collisions and reversals, DAgger's − the \
                     other driver's in safe ratios; * = excludes zero, by six trials or more). Beside near-collisions, contacts \
-                    in brackets.\n"
+                    in brackets. Nothing is adjusted for the number of statements.\n"
         .to_owned();
     if extent.seeds >= TRAININGS_MIN as u64 {
         text += "\nWhere several counts are named, they are of trainings that differ by their seed: their means are compared, \
@@ -504,7 +504,7 @@ fn safe_ratios(page: &mut Page, driven: &Driven<'_>) {
         lot.map_or_else(String::new, |lot| format!("{:.2}", lot.results[driver].safe_ratio))
     };
     let text = "Drivable share of the metre around the body, mean over runs [95 %]. The widths of these lots were chosen so that \
-                the expert meets the paper's safe ratios: the expert's, and those of who imitates it well, are fitted, not found.";
+                a prototype's expert came near the paper's safe ratios: the expert's, and those of who imitates it well, are fitted, not found.";
     page.section("Safe ratios on the paper's lots", format!("{text}\n\n{}", by_lot(driven, &cell, &of_paper)));
     let ratios = bars_beside_paper(
         driven,

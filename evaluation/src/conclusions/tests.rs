@@ -83,7 +83,7 @@ fn where_the_paper_is_right_everything_holds() {
         assert_eq!(verdict(&found, claim), Verdict::Holds, "{claim}: {found:#?}");
     }
     // No cause was found for any of them.
-    assert_eq!(verdict(&found, "robust against noise than vvf"), Verdict::CannotBeTold);
+    assert_eq!(verdict(&found, "noise-induced near-collisions than vvf"), Verdict::CannotBeTold);
     let figures =
         &found.iter().find(|statement| statement.claim.contains("than tentacle on the paper's")).unwrap().figures;
     assert!(figures.contains("DAgger 0 (0) in 30000 m, 0.00 [0.00, 0.01]") && figures.contains('*'), "{figures}");
