@@ -306,6 +306,21 @@ fn a_run_can_be_evaluated_later_and_generated_lots_can_be_driven() {
     assert!(run.join("round-00/learning.csv").is_file());
 }
 
+/// 29 maps and four drivers filled 3000 lines of a terminal.
+#[test]
+fn of_many_lots_a_terminal_shows_those_of_all_and_the_file_has_each() {
+    let out = scratch("many-lots").join("run");
+    let lots = ["test:12:all", "validation:12:all"];
+    let once = ["--trials", "1", "--directions", "forward"];
+    let printed = succeed(
+        xtask().args(["evaluate", "--driver", "tentacle", "--lots"]).args(lots).args(once).arg("--out").arg(&out),
+    );
+    assert!(printed.contains("| all ") && !printed.contains("test-rooms"), "{printed}");
+    assert!(printed.contains("The rows of the 24 lots or kinds of lots are in"), "{printed}");
+    let summary = std::fs::read_to_string(out.join("summary.md")).unwrap();
+    assert!(summary.contains("test-rooms") && summary.contains("validation-lane") && summary.contains("| all "));
+}
+
 /// Every run of an evaluation gives the same bits when it is driven alone, and a difference is reported.
 fn runs_are_replayed(results: &Path) {
     let replay = ["replay", "--json", "--of", results.to_str().unwrap()];

@@ -1,6 +1,7 @@
 //! Tables that are both readable in a terminal and Markdown.
 
 use comfy_table::{Table, presets};
+use std::collections::BTreeSet;
 
 /// A table with this header.
 pub fn with_header(header: Vec<String>) -> Table {
@@ -44,8 +45,15 @@ fn fit_table(rows: &[&str], width: usize) -> Vec<String> {
     let columns = rows.iter().map(Vec::len).min().unwrap_or(0);
     let is_used = |&column: &usize| rows.iter().skip(1).any(|row| !row[column].is_empty());
     let used: Vec<usize> = (0..columns).filter(is_used).collect();
+    let columns: Vec<Vec<String>> = used
+        .iter()
+        .map(|&column| {
+            let cells: Vec<&str> = rows.iter().map(|row| row[column].as_str()).collect();
+            with_short_paths(&cells)
+        })
+        .collect();
     let rows: Vec<Vec<String>> =
-        rows.iter().map(|row| used.iter().map(|&column| row[column].clone()).collect()).collect();
+        (0..rows.len()).map(|row| columns.iter().map(|column| column[row].clone()).collect()).collect();
     let widths = widths(&rows, width);
     let mut lines = Vec::new();
     for (index, row) in rows.iter().enumerate() {
@@ -63,6 +71,27 @@ fn fit_table(rows: &[&str], width: usize) -> Vec<String> {
         }
     }
     lines
+}
+
+/// The cells of a column without the first folders of paths, as in `run:…/mine/bc`; cells that differ still do.
+fn with_short_paths(cells: &[&str]) -> Vec<String> {
+    let different = |cells: &mut dyn Iterator<Item = String>| cells.collect::<BTreeSet<_>>().len();
+    let all = different(&mut cells.iter().map(|&cell| cell.to_owned()));
+    let longest = cells.iter().map(|cell| cell.split('/').count()).max().unwrap_or(0);
+    let short = |folders: usize| cells.iter().map(move |cell| with_short_path(cell, folders));
+    let folders = (2..longest).find(|&folders| different(&mut short(folders)) == all);
+    short(folders.unwrap_or(longest)).collect()
+}
+
+/// A path with no more than its last parts; other text as it is.
+fn with_short_path(cell: &str, parts: usize) -> String {
+    let (kind, path) = cell.split_once(':').unwrap_or(("", cell));
+    let names: Vec<&str> = path.split('/').collect();
+    if names.len() <= parts || cell.contains([' ', ',']) {
+        return cell.to_owned();
+    }
+    let separator = if kind.is_empty() { "" } else { ":" };
+    format!("{kind}{separator}…/{}", names[names.len() - parts..].join("/"))
 }
 
 /// Widths of the columns that make a table `width` wide: the widest become narrower first, none narrower than its longest
@@ -179,6 +208,17 @@ here.";
         assert_eq!(fit(&text, 39), expected);
         let broken = fit("| header |\n|--------|\n| run:runs/a-long-name |", 12);
         assert_eq!(broken, "| header   |\n|----------|\n| run:runs |\n| /a-long- |\n| name     |");
+    }
+
+    #[test]
+    fn long_paths_are_shown_by_their_ends_as_long_as_these_differ() {
+        let short = |cells: &[&str]| with_short_paths(cells).join(" ");
+        assert_eq!(
+            short(&["run:/work/runs/a", "run:/work/runs/a/bc", "dwa:/work/tuned/dwa.toml", "dwa/fox", "run:runs/b"]),
+            "run:…/runs/a run:…/a/bc dwa:…/tuned/dwa.toml dwa/fox run:runs/b"
+        );
+        assert_eq!(short(&["run:/x/1/runs/a", "run:/x/2/runs/a"]), "run:…/1/runs/a run:…/2/runs/a");
+        assert_eq!(short(&["steering rad/100 m of a/b/c", "a/b,c/d/e"]), "steering rad/100 m of a/b/c a/b,c/d/e");
     }
 
     #[test]

@@ -9,67 +9,99 @@ use evaluation::paper::{self, PaperLot, PaperResult};
 use evaluation::slices::Slice;
 use evaluation::statistics::bootstrap::DRAWS;
 use evaluation::statistics::poisson::DISPERSION_MAX;
-use evaluation::summary::Summary;
+use evaluation::summary::{Judged, Summary};
+use evaluation::totals::Totals;
 use experiment::lots::Lot;
 use experiment::run_dir::RunDir;
 use experiment::settings::{EvaluationSettings, NoiseChoice};
 use sim::scenario::Direction;
 use std::fmt::Write as _;
 
-/// Writes `summary.md`; returns its text.
+/// Groups of lots up to which a terminal shows a row of each.
+const GROUPS_SHOWN: usize = 16;
+
+/// Which rows the tables have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Rows {
+    /// All.
+    All,
+    /// Those of many lots together.
+    Pooled,
+}
+
+impl Rows {
+    fn has(self, slice: &Slice) -> bool {
+        self == Self::All || slice.is_pooled()
+    }
+}
+
+/// Writes `summary.md`; returns what of its text is to be printed.
 ///
 /// # Errors
 /// If the file cannot be written.
 pub fn write(summary: &Summary<'_>, run: &RunDir) -> anyhow::Result<String> {
-    let text = to_markdown(summary);
+    let text = to_markdown(summary, Rows::All);
     run.write("summary.md", format!("{text}\n").as_bytes())?;
-    Ok(text)
+    let groups = summary.results.groups().len();
+    if groups <= GROUPS_SHOWN {
+        return Ok(text);
+    }
+    let pooled = to_markdown(summary, Rows::Pooled);
+    Ok(format!(
+        "{pooled}\n\nThe rows of the {groups} lots or kinds of lots are in {}/summary.md.",
+        run.path().display()
+    ))
 }
 
-/// All tables.
-pub fn to_markdown(summary: &Summary<'_>) -> String {
+fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
     let mut text = String::new();
     for (level, noise) in summary.levels().iter().enumerate() {
-        let has_paper = *noise == NoiseChoice::Paper;
-        let _ = write!(text, "Near-collisions, noise {noise}\n\n{}\n\n", rates_table(summary, level, has_paper));
+        let has_paper = *noise == NoiseChoice::Paper && rows == Rows::All;
+        let _ = write!(text, "Near-collisions, noise {noise}\n\n{}\n\n", rates_table(summary, level, rows, has_paper));
         // Only those lots draw new obstacles in every trial.
         let fitted = if summary.plan.lots.iter().any(Lot::is_drawn_per_trial) {
             " (lots a, b and c are as wide as the expert needs for the paper's)"
         } else {
             ""
         };
-        let _ =
-            write!(text, "Safe ratio, noise {noise}{fitted}\n\n{}\n\n", safe_ratio_table(summary, level, has_paper));
-        let _ = write!(text, "How they drove, noise {noise}\n\n{}\n\n", driving_table(summary, level));
+        let _ = write!(
+            text,
+            "Safe ratio, noise {noise}{fitted}\n\n{}\n\n",
+            safe_ratio_table(summary, level, rows, has_paper)
+        );
+        let _ = write!(text, "How they drove, noise {noise}\n\n{}\n\n", driving_table(summary, level, rows));
         if summary.plan.drivers.len() > 1 {
             let with = summary.driver(summary.plan.compare_with);
-            let table = comparison_table(summary, level);
+            let table = comparison_table(summary, level, rows);
             let _ = write!(text, "Compared with {with} (others − {with}), noise {noise}\n\n{table}\n\n");
         }
         if !summary.teams.is_empty() {
             let with = &summary.team_compared_with().name;
-            let table = trainings_table(summary, level);
+            let table = trainings_table(summary, level, rows);
             let _ = write!(
                 text,
                 "Trainings that differ by their seeds, as one; intervals are for other lots and, where there are several, \
                  other seeds (Δ: others − {with}), noise {noise}\n\n{table}\n\n"
             );
         }
-        if let Some(table) = causes_table(summary, level) {
+        if let Some(table) = causes_table(summary, level, rows) {
             let _ = write!(text, "Causes of near-collisions, noise {noise}\n\n{table}\n\n");
         }
     }
     if summary.levels().len() > 1 {
-        let _ = write!(text, "Near-collisions per 100 m against noise\n\n{}\n\n", sweep_table(summary));
+        let _ = write!(text, "Near-collisions per 100 m against noise\n\n{}\n\n", sweep_table(summary, rows));
     }
     let EvaluationSettings { seed, trials, .. } = &summary.plan.settings.evaluation;
     let _ = write!(
         text,
-        "Trials per lot and direction: {trials}, seed: {}. Intervals of 95 %: exact Poisson, or (b) paired bootstrap \
-         ({DRAWS} draws of whole trials, both ways together; of whole lots where these are a sample: generated, or six or more \
-         from files) where the dispersion exceeds {DISPERSION_MAX} and events cannot be \
-         taken for independent; safe ratios and differences: bootstrap; * = excludes zero, by six trials or more; p: exact test of equal \
-         rates, and after Holm. Rates are per length of the route: for runs given up early they are too low.",
+        "Trials per lot and direction: {trials}, seed: {}.\n\n\
+         - (→, ←): forward, reverse. Rates are per length of the route: for runs given up early they are too low.\n\
+         - Intervals of 95 %: exact Poisson, or (b) paired bootstrap ({DRAWS} draws of whole trials, both ways together; of whole \
+         lots where these are a sample: generated, or six or more from files) where the dispersion exceeds {DISPERSION_MAX} and \
+         events cannot be taken for independent. \"< one-sided\": the bound of 95 % where there was none.\n\
+         - Dispersion: variance of the counts of trials over their mean; 1 if each near-collision came by itself.\n\
+         - Safe ratio: free share of the metre around the body; its intervals, and those of differences (Δ), are bootstrap.\n\
+         - *: excludes zero, by six trials or more. p: exact test of equal rates; Holm: adjusted for the drivers compared.",
         seed.0
     );
     text
@@ -85,7 +117,12 @@ fn paper_rows<'a>(
     drivers.flat_map(move |(index, driver)| lots.clone().map(move |lot| (driver, lot, &lot.results[index])))
 }
 
-fn rates_table(summary: &Summary<'_>, level: usize, has_paper: bool) -> Table {
+/// Driver by driver, slice by slice.
+fn shown<'a>(summary: &'a Summary<'_>, level: usize, rows: Rows) -> impl Iterator<Item = (usize, &'a Judged, Totals)> {
+    summary.estimates(level).filter(move |(_, judged, _)| rows.has(&judged.slice))
+}
+
+fn rates_table(summary: &Summary<'_>, level: usize, rows: Rows, has_paper: bool) -> Table {
     let mut table = table_of(&[
         "driver",
         "lots",
@@ -95,7 +132,7 @@ fn rates_table(summary: &Summary<'_>, level: usize, has_paper: bool) -> Table {
         "unweighted",
         "dispersion",
     ]);
-    for (driver, judged, totals) in summary.estimates(level) {
+    for (driver, judged, totals) in shown(summary, level, rows) {
         let way = |direction| {
             let totals = summary.results.totals(level, driver, &judged.slice, Some(direction));
             if totals.runs == 0 { "–".to_owned() } else { totals.near_collisions.to_string() }
@@ -127,9 +164,9 @@ fn rates_table(summary: &Summary<'_>, level: usize, has_paper: bool) -> Table {
     table
 }
 
-fn safe_ratio_table(summary: &Summary<'_>, level: usize, has_paper: bool) -> Table {
+fn safe_ratio_table(summary: &Summary<'_>, level: usize, rows: Rows, has_paper: bool) -> Table {
     let mut table = table_of(&["driver", "lots", "runs", "safe ratio [95 %]", "unweighted"]);
-    for (driver, judged, totals) in summary.estimates(level) {
+    for (driver, judged, totals) in shown(summary, level, rows) {
         let interval = judged.estimates[driver].safe_ratio;
         let interval = interval.map_or_else(String::new, |i| format!(" [{:.3}, {:.3}]", i.lower, i.upper));
         table.add_row([
@@ -163,7 +200,7 @@ fn unweighted(
     }
 }
 
-fn driving_table(summary: &Summary<'_>, level: usize) -> Table {
+fn driving_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
     let mut table = table_of(&[
         "driver",
         "lots",
@@ -176,7 +213,7 @@ fn driving_table(summary: &Summary<'_>, level: usize) -> Table {
         "reversals /100 m",
         "steering rad/100 m",
     ]);
-    for (driver, judged, totals) in summary.estimates(level) {
+    for (driver, judged, totals) in shown(summary, level, rows) {
         table.add_row([
             summary.driver(driver).to_owned(),
             judged.slice.label.clone(),
@@ -193,11 +230,11 @@ fn driving_table(summary: &Summary<'_>, level: usize) -> Table {
     table
 }
 
-fn comparison_table(summary: &Summary<'_>, level: usize) -> Table {
+fn comparison_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
     let mut table =
         table_of(&["driver", "lots", "Δ per 100 m [95 %]", "rate ratio [95 %]", "p", "p Holm", "Δ safe ratio [95 %]"]);
     for driver in 0..summary.plan.drivers.len() {
-        for judged in summary.at_level(level) {
+        for judged in summary.at_level(level).filter(|judged| rows.has(&judged.slice)) {
             for comparison in judged.comparisons.iter().filter(|comparison| comparison.driver == driver) {
                 let ratio = &comparison.ratio;
                 let number = |value: Option<f64>| value.map_or_else(|| "∞".to_owned(), |value| format!("{value:.2}"));
@@ -219,9 +256,9 @@ fn comparison_table(summary: &Summary<'_>, level: usize) -> Table {
     table
 }
 
-fn trainings_table(summary: &Summary<'_>, level: usize) -> Table {
+fn trainings_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
     let mut table = table_of(&HEADER);
-    for (team, judged, estimate) in summary.team_estimates(level) {
+    for (team, judged, estimate) in summary.team_estimates(level).filter(|(_, judged, _)| rows.has(&judged.slice)) {
         let is_other = *team != *summary.team_compared_with();
         let each = summary.of_team(team, judged);
         table.add_row(trainings::row(team, &judged.slice.label, &each, estimate, is_other));
@@ -229,12 +266,12 @@ fn trainings_table(summary: &Summary<'_>, level: usize) -> Table {
     table
 }
 
-fn causes_table(summary: &Summary<'_>, level: usize) -> Option<Table> {
+fn causes_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Option<Table> {
     let mut header = vec!["driver", "lots"];
     header.extend(Cause::ALL.map(Cause::name));
     header.extend(["again at the same place", "places per 100 m"]);
     let mut table = table_of(&header);
-    for (driver, judged, totals) in summary.estimates(level).filter(|(.., totals)| totals.near_collisions > 0) {
+    for (driver, judged, totals) in shown(summary, level, rows).filter(|(.., totals)| totals.near_collisions > 0) {
         let count = |cause| summary.results.count_of_cause(level, driver, &judged.slice, cause);
         let share = |cause| format!("{:.0} %", 100.0 * f64::from(count(cause)) / f64::from(totals.near_collisions));
         let mut row = vec![summary.driver(driver).to_owned(), judged.slice.label.clone()];
@@ -247,12 +284,12 @@ fn causes_table(summary: &Summary<'_>, level: usize) -> Option<Table> {
     (table.row_count() > 0).then_some(table)
 }
 
-fn sweep_table(summary: &Summary<'_>) -> Table {
+fn sweep_table(summary: &Summary<'_>, rows: Rows) -> Table {
     let mut header = vec!["driver".to_owned(), "lots".to_owned()];
     header.extend(summary.levels().iter().map(|noise| format!("noise {noise}")));
     let mut table = with_header(header);
     for driver in 0..summary.plan.drivers.len() {
-        for slice in summary.results.slices() {
+        for slice in summary.results.slices().into_iter().filter(|slice| rows.has(slice)) {
             let rate = |level| {
                 let totals = summary.results.totals(level, driver, &slice, None);
                 let judged = summary.at_level(level).find(|judged| judged.slice == slice);
