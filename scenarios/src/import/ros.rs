@@ -320,17 +320,19 @@ fn decode(file: &[u8]) -> Result<DynamicImage, (String, String)> {
         let remedy = "save it with LF in place of CRLF".to_owned();
         return Err(("its header ends with CRLF, which shifts every pixel by one".to_owned(), remedy));
     }
-    let reader = || ImageReader::new(Cursor::new(file)).with_guessed_format();
-    let (width, height) =
-        reader().and_then(|reader| reader.into_dimensions().map_err(io::Error::other)).unwrap_or((0, 0));
-    let mut reader = reader().map_err(|error| no_image(&error))?;
-    let mut limits = image::Limits::default();
-    // No more than the pixels need: what else a file holds, such as colour profiles, may unpack to gigabytes.
-    let pixels_bytes = u64::from(width) * u64::from(height) * PIXEL_BYTES_MAX;
-    limits.max_alloc = Some(pixels_bytes + OTHER_BYTES_MAX);
-    (limits.max_image_width, limits.max_image_height) = (Some(IMAGE_SIDE_MAX_PX), Some(IMAGE_SIDE_MAX_PX));
-    reader.limits(limits);
-    let image = reader.decode().map_err(|error| match error {
+    // No more than the pixels need: what else a file holds, such as colour profiles, may unpack to gigabytes. Already
+    // the size is read behind it.
+    let reader = |pixels: u64| {
+        let mut reader = ImageReader::new(Cursor::new(file)).with_guessed_format()?;
+        let mut limits = image::Limits::default();
+        limits.max_alloc = Some(pixels * PIXEL_BYTES_MAX + OTHER_BYTES_MAX);
+        (limits.max_image_width, limits.max_image_height) = (Some(IMAGE_SIDE_MAX_PX), Some(IMAGE_SIDE_MAX_PX));
+        reader.limits(limits);
+        Ok(reader)
+    };
+    let size = reader(0).and_then(|reader| reader.into_dimensions().map_err(io::Error::other));
+    let pixels = size.map_or(0, |(width, height)| u64::from(width) * u64::from(height));
+    let image = reader(pixels).map_err(|error: io::Error| no_image(&error))?.decode().map_err(|error| match error {
         ImageError::Limits(_) => {
             let remedy = format!("crop it, or halve its resolution, to at most {IMAGE_SIDE_MAX_PX} pixels a side");
             ("it is too large".to_owned(), remedy)
