@@ -127,10 +127,11 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Lines of at most `width`; a word that is longer is broken.
+/// Lines of at most `width`. What is longer is broken, if it can be at a space within its brackets or behind a `/`.
 fn wrap(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
-    for word in words(text) {
+    let within = |text| if length(text) <= width { vec![text] } else { text.split(' ').collect() };
+    for word in words(text).flat_map(within) {
         let line = lines.last_mut().expect("there is one from the start");
         if line.is_empty() {
             line.push_str(word);
@@ -144,7 +145,8 @@ fn wrap(text: &str, width: usize) -> Vec<String> {
             && length(line) > width
             && let Some((end, _)) = line.char_indices().nth(width.max(1))
         {
-            let rest = line.split_off(end);
+            let folder = line[..end].rfind('/').map(|at| at + 1).filter(|&at| 2 * at > end);
+            let rest = line.split_off(folder.unwrap_or(end));
             lines.push(rest);
         }
     }
@@ -206,8 +208,9 @@ Title
 A sentence of a few more words than fit
 here.";
         assert_eq!(fit(&text, 39), expected);
-        let broken = fit("| header |\n|--------|\n| run:runs/a-long-name |", 12);
-        assert_eq!(broken, "| header   |\n|----------|\n| run:runs |\n| /a-long- |\n| name     |");
+        let broken = fit("| header |\n|--------|\n| run:runs/a-long-name |", 13);
+        assert_eq!(broken, "| header    |\n|-----------|\n| run:runs/ |\n| a-long-na |\n| me        |");
+        assert_eq!(fit("more (than one line has room for) of it", 20), "more (than one line\nhas room for) of it");
     }
 
     #[test]
