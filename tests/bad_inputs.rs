@@ -794,10 +794,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["evaluate", "--driver", "expert", "--threads", "0"], "--threads"),
         (&["evaluate", "--driver", "expert", "--noise", "nan"], "nan"),
         (&["generate", "--lots", "bomb.yaml", route[0], route[1], route[2], route[3]], "it is too large"),
-        (
-            &["generate", "--lots", "profile.yaml", "--start", "-500,12,0", "--loop"],
-            "what it holds beside its pixels is too large",
-        ),
+        (&["generate", "--lots", "profile.yaml", "--start", "-500,12,0", "--loop"], "without colour profile"),
         (&["generate", "--lots", "zero.yaml", route[0], route[1], route[2], route[3]], "neither next to the YAML file"),
         (
             &["generate", "--lots", "zero.yaml", "--image-anywhere", route[0], route[1], route[2], route[3]],

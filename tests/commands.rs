@@ -430,7 +430,7 @@ fn pictures_are_drawn_and_never_replaced_unasked() {
     refuses(&["render", "samples", &out, "--out", &out], &["not a round", "round-01"]);
     refuses(&["render", "report", &out], &["this is not a run"]);
     refuses(&["render", "trajectories", "--run", "no/such/run"], &["no/such/run"]);
-    refuses(&["visualise", "lot", "--lots", "test:2"], &["this names 2 lots"]);
+    refuses(&["visualise", "lot", "--lots", "test:2"], &["stands for 2 lots"]);
     refuses(&["visualise", "run", &out], &["this is not a run"]);
 }
 

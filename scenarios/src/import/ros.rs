@@ -7,7 +7,6 @@
 use super::contour::Mask;
 use crate::error::{LoadError, read_text, shortened};
 use crate::note::Note;
-use image::error::LimitErrorKind;
 use image::{DynamicImage, ImageError, ImageReader};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -334,12 +333,11 @@ fn decode(file: &[u8]) -> Result<DynamicImage, (String, String)> {
     let size = reader(0).and_then(|reader| reader.into_dimensions().map_err(io::Error::other));
     let pixels = size.map_or(0, |(width, height)| u64::from(width) * u64::from(height));
     let image = reader(pixels).map_err(|error: io::Error| no_image(&error))?.decode().map_err(|error| match error {
-        ImageError::Limits(error) if error.kind() == LimitErrorKind::InsufficientMemory => {
-            let remedy = "save it without colour profile and texts".to_owned();
-            ("what it holds beside its pixels is too large".to_owned(), remedy)
-        }
         ImageError::Limits(_) => {
-            let remedy = format!("crop it, or halve its resolution, to at most {IMAGE_SIDE_MAX_PX} pixels a side");
+            let remedy = format!(
+                "crop it, or halve its resolution, to at most {IMAGE_SIDE_MAX_PX} pixels a side, and save it without colour \
+                 profile and texts"
+            );
             ("it is too large".to_owned(), remedy)
         }
         error => no_image(&error),
