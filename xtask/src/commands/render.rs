@@ -382,14 +382,10 @@ fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<(
     let trial = Trial::new(RootSeed(args.seed), Purpose::Pictures, &lot, Direction::Forward, 0);
     let map = trial.map(&settings.episode)?;
     let inspect = |level: NoiseChoice, at_m: f32| noise::inspect(&settings.episode, &trial, &map, level, at_m);
-    let at_m = match args.at {
-        Some(at_m) => at_m,
-        // One is named at least.
-        None => {
-            let last = args.noise[args.noise.len() - 1];
-            noise::richest_place(map.path().length_m(), |at_m| inspect(last, at_m))
-        }
-    };
+    // One is named at least.
+    let last = args.noise[args.noise.len() - 1];
+    let richest = || noise::richest_place(map.path().length_m(), |at_m| inspect(last, at_m));
+    let at_m = args.at.unwrap_or_else(richest);
     ensure!(
         (0.0..=map.path().length_m()).contains(&at_m),
         "--at {at_m}: the route is {:.1} m long",
