@@ -83,15 +83,16 @@ fn with_short_paths(cells: &[&str]) -> Vec<String> {
     short(folders.unwrap_or(longest)).collect()
 }
 
-/// A path with no more than its last parts; other text as it is.
+/// A driver's path with no more than its last parts; other text, such as a replay key or a file, as it is: it is copied.
 fn with_short_path(cell: &str, parts: usize) -> String {
-    let (kind, path) = cell.split_once(':').unwrap_or(("", cell));
+    let Some((kind, path)) = cell.split_once(':').filter(|_| !cell.contains([' ', ',', '@'])) else {
+        return cell.to_owned();
+    };
     let names: Vec<&str> = path.split('/').collect();
-    if names.len() <= parts || cell.contains([' ', ',']) {
+    if names.len() <= parts {
         return cell.to_owned();
     }
-    let separator = if kind.is_empty() { "" } else { ":" };
-    format!("{kind}{separator}…/{}", names[names.len() - parts..].join("/"))
+    format!("{kind}:…/{}", names[names.len() - parts..].join("/"))
 }
 
 /// Widths of the columns that make a table `width` wide: the widest become narrower first, none narrower than its longest
@@ -221,7 +222,9 @@ here.";
             "run:…/runs/a run:…/a/bc dwa:…/tuned/dwa.toml dwa/fox run:runs/b"
         );
         assert_eq!(short(&["run:/x/1/runs/a", "run:/x/2/runs/a"]), "run:…/1/runs/a run:…/2/runs/a");
-        assert_eq!(short(&["steering rad/100 m of a/b/c", "a/b,c/d/e"]), "steering rad/100 m of a/b/c a/b,c/d/e");
+        for copied in ["steering rad/100 m of a/b/c", "lots/of/mine.toml", "run:runs/a/b@lot-b@forward@0@paper@1@0"] {
+            assert_eq!(short(&[copied]), copied);
+        }
     }
 
     #[test]
