@@ -693,7 +693,7 @@ fn png_with_profile(zeros: u32) -> Vec<u8> {
         let checked = [name, content].concat();
         [&(content.len() as u32).to_be_bytes()[..], &checked, &crc(&checked).to_be_bytes()].concat()
     };
-    // Deflated with fixed codes: a zero, copies of 258 bytes from one byte before, 257 copies of one byte less, the end.
+    // Deflated with fixed codes: a zero, copies of the 258 bytes from one byte before on, a last one of 257, the end.
     let bits = |text: &str| text.bytes().map(|bit| bit == b'1').collect::<Vec<_>>();
     let copies = bits("1100010100000").repeat((zeros / 258 - 1) as usize);
     let stream = [bits("11000110000"), copies, bits("110001000111100000"), bits("0000000")].concat();

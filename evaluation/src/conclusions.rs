@@ -312,7 +312,7 @@ impl Against<'_> {
             Verdict::CannotBeTold
         };
         let figures = format!(
-            "DAgger {} of {}, {name} {} of {}; rate ratio {}, if each came by itself; the first training",
+            "DAgger {} of {}, {name} {} of {}; rate ratio {}, if each came by itself",
             ours.0,
             ours.1.near_collisions,
             theirs.0,

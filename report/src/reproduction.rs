@@ -16,14 +16,14 @@ use evaluation::format::{difference, exact_rate, quoted_interval, quoted_rate};
 use evaluation::names::{BC, DAGGER, UNWEIGHTED};
 use evaluation::on_policy::{Calibration, Effect, OnPolicy, States};
 use evaluation::paper::{self, PaperLot};
-use evaluation::slices::Slice;
+use evaluation::slices::{Slice, SliceKind};
 use evaluation::stages::{self, Chain, Extent, Stage};
 use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
 use evaluation::totals::Totals;
 use evaluation::trainings::TRAININGS_MIN;
 use experiment::drivers::NamedDriver;
-use experiment::lots::{ALL, UNSEEN};
+use experiment::lots::UNSEEN;
 use experiment::manifest::Manifest;
 use experiment::run_dir::RunDir;
 use experiment::settings::{Settings, with_points_of_paper};
@@ -375,7 +375,7 @@ fn table_1(page: &mut Page, eta: f64, weighted: &[IterationRow], unweighted: &[I
 fn by_lot(
     driven: &Driven<'_>,
     cell: &dyn Fn(usize, &Slice) -> String,
-    paper: &dyn Fn(usize, &str) -> String,
+    paper: &dyn Fn(usize, &Slice) -> String,
 ) -> String {
     let slices = driven.results.slices();
     let header: Vec<&str> = std::iter::once("driver").chain(slices.iter().map(|slice| slice.label.as_str())).collect();
@@ -384,7 +384,7 @@ fn by_lot(
         let name = &entry.name;
         table.add_row(std::iter::once(name.clone()).chain(slices.iter().map(|slice| cell(driver, slice))));
         if let Some(of_paper) = paper::DRIVERS.iter().position(|known| known == name) {
-            let cells: Vec<String> = slices.iter().map(|slice| paper(of_paper, &slice.label)).collect();
+            let cells: Vec<String> = slices.iter().map(|slice| paper(of_paper, slice)).collect();
             if cells.iter().any(|cell| !cell.is_empty()) {
                 table.add_row(std::iter::once(format!("  paper: {name}")).chain(cells));
             }
@@ -394,11 +394,11 @@ fn by_lot(
 }
 
 /// Near-collisions and metres of a driver of the paper on a lot, or on those that a pooled slice stands for.
-fn count_of_paper(driver: usize, label: &str) -> Option<(u32, f64)> {
-    let count = paper::count(driver, |lot| match label {
-        ALL => true,
-        UNSEEN => !lot.is_trained_on,
-        label => lot.lot == label,
+fn count_of_paper(driver: usize, slice: &Slice) -> Option<(u32, f64)> {
+    let count = paper::count(driver, |lot| match slice.kind {
+        SliceKind::All => true,
+        SliceKind::Unseen => !lot.is_trained_on,
+        SliceKind::Group => lot.lot == slice.label,
     });
     (count.1 > 0.0).then_some(count)
 }
@@ -412,8 +412,8 @@ fn rates_table(driven: &Driven<'_>, with_paper: bool) -> String {
         let Totals { near_collisions, contacts, .. } = totals;
         format!("{near_collisions} ({contacts}): {}", quoted_rate(&totals, &estimates[index][driver]))
     };
-    let of_paper = |driver: usize, label: &str| {
-        let count = count_of_paper(driver, label).filter(|_| with_paper);
+    let of_paper = |driver: usize, slice: &Slice| {
+        let count = count_of_paper(driver, slice).filter(|_| with_paper);
         count.map_or_else(String::new, |(events, metres)| format!("{events}: {}", exact_rate(events, metres)))
     };
     by_lot(driven, &cell, &of_paper)
@@ -499,8 +499,8 @@ fn safe_ratios(page: &mut Page, driven: &Driven<'_>) {
         let interval = interval.map_or_else(String::new, |i| format!(" [{:.3}, {:.3}]", i.lower, i.upper));
         format!("{:.3}{interval}", driven.results.totals(0, driver, slice, None).safe_ratio())
     };
-    let of_paper = |driver: usize, label: &str| {
-        let lot = paper::LOTS.iter().find(|lot| lot.lot == label);
+    let of_paper = |driver: usize, slice: &Slice| {
+        let lot = paper::LOTS.iter().find(|lot| lot.lot == slice.label);
         lot.map_or_else(String::new, |lot| format!("{:.2}", lot.results[driver].safe_ratio))
     };
     let text = "Drivable share of the metre around the body, mean over runs [95 %]. The widths of these lots were chosen so that \

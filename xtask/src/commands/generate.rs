@@ -175,9 +175,8 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
         lot.start = lot.start.filter(|_| centre_line.is_none());
     }
     lot.start = start.or(lot.start);
-    // An error names the file, which may say something else.
-    let lot = Lot::of_map(path, &lot, vehicle).context("with the flags of the command line instead of MAP.lot.toml")?;
-    Ok(vec![lot])
+    // An error names the file, in which something else may stand.
+    Ok(vec![Lot::of_map(path, &lot, vehicle).context("with the flags that are given")?])
 }
 
 /// Name of the files of a lot, without an extension.
