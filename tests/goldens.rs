@@ -9,7 +9,7 @@
 
 use crate::bench::{root, scratch, succeed, xtask};
 use digests::{Case, Goldens, drive_all, lot_c};
-use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Predictor, Weights};
+use policy::network::{InferenceSettings, NetworkArchitecture, Predictor, Weights};
 use sim::driver::{Decision, Policy, SensorsOnly, Source};
 use sim::seed::RootSeed;
 use sim::sensing::{GridGeometry, Observation};
@@ -32,7 +32,7 @@ fn goldens_of_every_layer_are_kept() {
     let mut driven = drive_all();
     for scene in lot_c() {
         let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
-        let predictor = Predictor::new(&weights, InferenceSettings::plain(), DeviceChoice::Cpu);
+        let predictor = Predictor::new(&weights, InferenceSettings::plain());
         let untrained = SensorsOnly(Untrained(predictor, scene.settings.sensing.geometry));
         driven.episodes.extend([Case::new("network", &scene, Box::new(untrained)).drive()]);
     }

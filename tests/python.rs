@@ -8,7 +8,7 @@ use ndarray::{Array2, Array3};
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
 use policy::dataset::store::Store;
-use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Prediction, Weights};
+use policy::network::{InferenceSettings, NetworkArchitecture, Prediction, Weights};
 use sim::episode::EpisodeSettings;
 use sim::seed::RootSeed;
 use sim::sensing::OccupancyGrid;
@@ -81,7 +81,7 @@ fn numpy_answers_as_rust_does() {
     }
     let (grids, folder) = (grids(40), scratch("numpy"));
     for checkpoint in checkpoints() {
-        let expected = checkpoint.predictor(DeviceChoice::Cpu).predict(&grids.iter().collect::<Vec<_>>());
+        let expected = checkpoint.predictor().predict(&grids.iter().collect::<Vec<_>>());
         let expected: Vec<_> =
             expected.iter().map(|Prediction { mean, sigma }| [mean[0], mean[1], sigma[0], sigma[1]]).collect();
         assert_near(&answers("numpy_forward.py", &checkpoint, &grids, &folder), &expected, "numpy");
@@ -98,7 +98,7 @@ fn torch_answers_as_rust_does() {
     for checkpoint in checkpoints() {
         // The module gives raw outputs: no mirror averaging, which is a property of its use.
         let plain = Checkpoint { inference: InferenceSettings::plain(), ..checkpoint };
-        let expected = plain.predictor(DeviceChoice::Cpu).raw(&grids.iter().collect::<Vec<_>>());
+        let expected = plain.predictor().raw(&grids.iter().collect::<Vec<_>>());
         assert_near(&answers("torch_module.py", &plain, &grids, &folder), &expected, "torch");
     }
 }
@@ -113,7 +113,7 @@ fn onnxruntime_answers_as_rust_does() {
     let (grids, folder) = (grids(40), scratch("onnxruntime"));
     for checkpoint in checkpoints() {
         let plain = Checkpoint { inference: InferenceSettings::plain(), ..checkpoint };
-        let expected = plain.predictor(DeviceChoice::Cpu).raw(&grids.iter().collect::<Vec<_>>());
+        let expected = plain.predictor().raw(&grids.iter().collect::<Vec<_>>());
         std::fs::write(folder.join("policy.onnx"), onnx::export::export(&plain).unwrap()).unwrap();
         assert_near(&answers("onnx_answers.py", &plain, &grids, &folder), &expected, "onnxruntime");
     }

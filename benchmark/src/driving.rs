@@ -9,7 +9,7 @@ use experiment::trials::{self, Purpose, Trial};
 use expert::{ExpertSettings, ScriptedExpert};
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
-use policy::network::{DeviceChoice, Weights};
+use policy::network::Weights;
 use rayon::prelude::*;
 use sim::batch::{SeatedFleet, run_fleets, run_lockstep};
 use sim::driver::{Decision, Driver, Fleet, LookAheadPoint, OneDriverEach, Situation, Source};
@@ -113,7 +113,7 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
         inference: settings.dagger.inference,
     };
     let spec = DriverSpec::Checkpoint { folder: "untrained".into() };
-    let network = NamedDriver::network("network", spec, checkpoint, DeviceChoice::Cpu);
+    let network = NamedDriver::network("network", spec, checkpoint);
     report(steps("one car with the network", 1, Some(Goal::AtLeast(15_000.0)), &mut || {
         let episodes = course.episodes().into_iter().take(1).collect();
         let mut steps = 0_u64;

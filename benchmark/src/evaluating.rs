@@ -31,8 +31,7 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
 fn measure(effort: Effort, report: Report<'_>, folder: &Path) -> anyhow::Result<()> {
     let settings = Settings::preset("default")?;
     let spec = DriverSpec::Run { folder: folder.join("trained") };
-    let network =
-        NamedDriver::network("network", spec, trained(&settings, &folder.join("trained"))?, settings.dagger.device);
+    let network = NamedDriver::network("network", spec, trained(&settings, &folder.join("trained"))?);
     let lots = Lot::parse_all(&["lot-a", "lot-b", "lot-c"], &settings.episode.vehicle)?;
     let plan = Plan { settings: &settings, drivers: &[network], lots: &lots, compare_with: 0, shard: None };
     let once = || {

@@ -2,8 +2,8 @@
 
 use crate::{Effort, Figure, Report, figure, on_threads, time};
 use policy::dataset::{Dataset, Round, Sample, ValidationSplit};
-use policy::fit::{FitContext, FitProgress, FitSettings, KeepWeights, fit};
-use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Predictor, Weights};
+use policy::fit::{DeviceChoice, FitContext, FitProgress, FitSettings, KeepWeights, fit};
+use policy::network::{InferenceSettings, NetworkArchitecture, Predictor, Weights};
 use scenarios::reference::{ReferenceLot, lot};
 use sim::episode::EpisodeSettings;
 use sim::geometry::Pose;
@@ -49,7 +49,7 @@ pub fn answers(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     let grids = grids(ANSWERED[2])?;
     for (name, architecture) in networks() {
         let weights = Weights::init(architecture, RootSeed(1), 0);
-        let mut predictor = Predictor::new(&weights, InferenceSettings::plain(), DeviceChoice::Cpu);
+        let mut predictor = Predictor::new(&weights, InferenceSettings::plain());
         for batch in ANSWERED {
             let asked: Vec<&OccupancyGrid> = grids[..batch].iter().collect();
             let what = format!("answers, {name} network, batch {batch}, one thread");
@@ -63,11 +63,11 @@ pub fn answers(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Measures whole trainings on two threads: samples per second, by fifths of the training.
+/// Measures whole trainings, on two threads if on CPUs: samples per second, by fifths of the training.
 ///
 /// # Errors
 /// If the reference lot cannot be built.
-pub fn training(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
+pub fn training(effort: Effort, device: DeviceChoice, report: Report<'_>) -> anyhow::Result<()> {
     let samples: Vec<Sample> = grids(20_000)?
         .into_iter()
         .map(|grid| {
@@ -81,13 +81,19 @@ pub fn training(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     dataset.push(Round::from(samples));
     for (name, architecture) in networks() {
         for batch in TRAINED {
-            report(on_threads(2, || trained(effort, name, architecture, batch, &dataset)));
+            report(on_threads(2, || trained(effort, device, (name, architecture), batch, &dataset)));
         }
     }
     Ok(())
 }
 
-fn trained(effort: Effort, name: &str, architecture: NetworkArchitecture, batch: usize, dataset: &Dataset) -> Figure {
+fn trained(
+    effort: Effort,
+    device: DeviceChoice,
+    (name, architecture): (&str, NetworkArchitecture),
+    batch: usize,
+    dataset: &Dataset,
+) -> Figure {
     let steps = effort.training_steps;
     let settings = FitSettings {
         batch,
@@ -97,7 +103,7 @@ fn trained(effort: Effort, name: &str, architecture: NetworkArchitecture, batch:
         ..FitSettings::quick(steps)
     };
     let (geometry, inference, seed) = (GridGeometry::paper(), InferenceSettings::plain(), RootSeed(1));
-    let context = FitContext { geometry, inference, device: DeviceChoice::Cpu, seed };
+    let context = FitContext { geometry, inference, device, seed };
     let part = (steps / 5).max(1);
     let (mut rates, mut began) = (Vec::new(), crate::now());
     let mut progress = |now: &FitProgress| {
@@ -109,5 +115,6 @@ fn trained(effort: Effort, name: &str, architecture: NetworkArchitecture, batch:
     };
     fit(&Weights::init(architecture, RootSeed(1), 0), dataset, &settings, context, None, &mut progress)
         .expect("there are samples to train on");
-    figure(&format!("training, {name} network, batch {batch}, {steps} steps, two threads"), "samples/s", None, rates)
+    let place = if device == DeviceChoice::Cpu { "two threads".to_owned() } else { format!("device {device:?}") };
+    figure(&format!("training, {name} network, batch {batch}, {steps} steps, {place}"), "samples/s", None, rates)
 }

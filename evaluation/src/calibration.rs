@@ -2,7 +2,6 @@
 
 use policy::checkpoint::Checkpoint;
 use policy::dataset::Sample;
-use policy::network::DeviceChoice;
 
 /// Bins of an axis, each with the same number of samples.
 const BINS: usize = 10;
@@ -43,9 +42,9 @@ impl AxisCalibration {
 }
 
 /// Both axes of a policy on labelled samples: across and along the car, metres.
-pub fn of_policy(policy: &Checkpoint, samples: &[&Sample], device: DeviceChoice) -> [AxisCalibration; 2] {
+pub fn of_policy(policy: &Checkpoint, samples: &[&Sample]) -> [AxisCalibration; 2] {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
-    let predictions = policy.predictor(device).predict(&grids);
+    let predictions = policy.predictor().predict(&grids);
     let side_m = f64::from(policy.geometry().side_m);
     [("across", 0), ("along", 1)].map(|(name, axis)| {
         let errors = samples.iter().zip(&predictions).map(|(sample, prediction)| {

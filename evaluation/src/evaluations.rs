@@ -65,7 +65,6 @@ impl EvaluationRun {
                 "use of what networks answer ([dagger.inference])",
                 any(&has_onnx) && own.dagger.inference != others.dagger.inference,
             ),
-            ("device of networks (dagger.device)", own.dagger.device != others.dagger.device),
         ];
         if let Some((what, _)) = differs.into_iter().find(|(_, differs)| *differs) {
             anyhow::bail!(

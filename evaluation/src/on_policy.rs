@@ -145,12 +145,12 @@ impl Pair {
     }
 
     /// τ̂ of both policies of an iteration on the held-back samples of both data sets so far.
-    fn tau_hats(&self, iteration: u32, settings: &Settings) -> anyhow::Result<[Vec<f64>; 2]> {
+    fn tau_hats(&self, iteration: u32) -> anyhow::Result<[Vec<f64>; 2]> {
         let samples: Vec<&Sample> =
             self.weighted.held_back(0, iteration).chain(self.unweighted.held_back(1, iteration)).collect();
         let of = |trained: &Trained| {
             let policy = Checkpoint::load(&trained.store.round_folder(iteration))?;
-            Ok::<_, anyhow::Error>(tau_hats(settings, &policy, &samples))
+            Ok::<_, anyhow::Error>(tau_hats(&policy, &samples))
         };
         Ok([of(&self.weighted)?, of(&self.unweighted)?])
     }
@@ -182,7 +182,7 @@ pub fn run(
             return Ok(false);
         }
         let other = Pair::open(root, seed, by)?;
-        let ratio = |iteration| Ok(ratio_of_sums(&other.tau_hats(iteration, settings)?));
+        let ratio = |iteration| Ok(ratio_of_sums(&other.tau_hats(iteration)?));
         ratios_of_others.push((1..=other.iterations()).map(ratio).collect::<anyhow::Result<_>>()?);
     }
     let mut calibration = Vec::new();
@@ -194,9 +194,9 @@ pub fn run(
         let Some(driven) = drives.of(&path)? else { return Ok(false) };
         let policy = Checkpoint::load(&path)?;
         let held_back: Vec<&Sample> = chain.held_back(0, rounds).collect();
-        calibration.extend(calibrations(name, States::HeldBack, settings, &policy, &held_back));
+        calibration.extend(calibrations(name, States::HeldBack, &policy, &held_back));
         let driven: Vec<&Sample> = driven.round.samples.iter().collect();
-        calibration.extend(calibrations(name, States::OnPolicy, settings, &policy, &driven));
+        calibration.extend(calibrations(name, States::OnPolicy, &policy, &driven));
     }
     let mut effect = Vec::new();
     for iteration in 1..=iterations {
@@ -205,7 +205,7 @@ pub fn run(
             let Some(driven) = drives.of(&chain.store.round_folder(iteration))? else { return Ok(false) };
             driving_per_s[index] = tau_hat_per_s(driven);
         }
-        let sums = pair.tau_hats(iteration, settings)?;
+        let sums = pair.tau_hats(iteration)?;
         let held_back = ratio(&sums, by.block, settings.evaluation.seed);
         let of_others = ratios_of_others.iter().filter_map(|ratios| ratios.get(iteration as usize - 1));
         let held_back_by_seed = std::iter::once(ratio_of_sums(&sums)).chain(of_others.copied()).collect();
@@ -276,7 +276,7 @@ fn rollout(settings: &Settings, lots: &[Lot], policy: &Checkpoint) -> anyhow::Re
         RoundEpisode { index, direction: trial.direction, episode, expert }
     };
     let episodes = EpisodeIndex::of_round(0, trials.len()).zip(&trials).zip(episodes).map(seated).collect();
-    Ok(Rollouts::on_policy(policy, settings.dagger.device, episodes).drive(&mut |_, _| {})?)
+    Ok(Rollouts::on_policy(policy, episodes).drive(&mut |_, _| {})?)
 }
 
 fn tau_hat_per_s(collected: &Collected) -> f64 {
@@ -284,9 +284,9 @@ fn tau_hat_per_s(collected: &Collected) -> f64 {
 }
 
 /// τ̂ of a policy on samples.
-fn tau_hats(settings: &Settings, policy: &Checkpoint, samples: &[&Sample]) -> Vec<f64> {
+fn tau_hats(policy: &Checkpoint, samples: &[&Sample]) -> Vec<f64> {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
-    let predictions = policy.predictor(settings.dagger.device).predict(&grids);
+    let predictions = policy.predictor().predict(&grids);
     let of = |(sample, prediction): (&&Sample, _)| f64::from(Evidence::new(prediction, sample.label).discrepancy);
     samples.iter().zip(&predictions).map(of).collect()
 }
@@ -316,11 +316,10 @@ fn ratio([first, second]: &[Vec<f64>; 2], stretch: usize, seed: RootSeed) -> Opt
 fn calibrations(
     name: &str,
     states: States,
-    settings: &Settings,
     policy: &Checkpoint,
     samples: &[&Sample],
 ) -> impl Iterator<Item = Calibration> {
-    let axes = calibration::of_policy(policy, samples, settings.dagger.device);
+    let axes = calibration::of_policy(policy, samples);
     axes.into_iter().map(move |AxisCalibration { name: axis, samples, coverage, bins }| Calibration {
         policy: name.to_owned(),
         states,

@@ -17,7 +17,7 @@ use planners::{Planner, PlannerContext, PlannerSpec};
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
 use policy::drivers::NetFleet;
-use policy::network::{DeviceChoice, InferenceSettings};
+use policy::network::InferenceSettings;
 use sim::action_smoothing::SmoothedFleet;
 use sim::driver::{Fleet, OneDriverEach, SensorsOnly, Source};
 use sim::episode::EpisodeSettings;
@@ -87,7 +87,7 @@ impl DriverSpec {
             Self::Expert => Model::Expert(settings.expert.clone()),
             Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. } => {
                 let networks = self.checkpoints().with_context(|| format!("driver {name:?}"))?;
-                Model::Network(networks, settings.dagger.device)
+                Model::Network(networks)
             }
             Self::Onnx { file } => {
                 let network = OnnxNetwork::load(file).with_context(|| format!("driver {name:?}"))?;
@@ -157,7 +157,7 @@ pub trait Callback: Send + Sync {
 enum Model {
     Expert(ExpertSettings),
     /// One network, or the members of an ensemble, which share geometry and settings of inference.
-    Network(Vec<Checkpoint>, DeviceChoice),
+    Network(Vec<Checkpoint>),
     /// A network from an ONNX file, and how its answers are used.
     Onnx(OnnxNetwork, InferenceSettings),
     Planner(PlannerSpec),
@@ -195,8 +195,8 @@ impl NamedDriver {
     }
 
     /// A network that is loaded already.
-    pub fn network(name: &str, spec: DriverSpec, checkpoint: Checkpoint, device: DeviceChoice) -> Self {
-        let model = Model::Network(vec![checkpoint], device);
+    pub fn network(name: &str, spec: DriverSpec, checkpoint: Checkpoint) -> Self {
+        let model = Model::Network(vec![checkpoint]);
         Self::new(name.to_owned(), spec, model)
     }
 
@@ -224,7 +224,7 @@ impl NamedDriver {
         if let Smoothing::Ticks(ticks) = smoothing {
             self.digest_of_files = self.digest();
             match &mut self.model {
-                Model::Network(networks, _) => {
+                Model::Network(networks) => {
                     for network in networks {
                         network.inference.smoothing_ticks = ticks;
                     }
@@ -248,7 +248,7 @@ impl NamedDriver {
             return self.digest_of_files.clone();
         }
         match (&self.model, &self.spec) {
-            (Model::Network(networks, _), _) => {
+            (Model::Network(networks), _) => {
                 let mut bytes = Vec::new();
                 for network in networks {
                     bytes.extend(format!("{:?} {:?}", network.conditions, network.inference).into_bytes());
@@ -282,7 +282,7 @@ impl NamedDriver {
     /// `evaluation.untrained_conditions` allows that.
     pub fn check(&self, settings: &Settings) -> anyhow::Result<()> {
         let trained = match &self.model {
-            Model::Network(networks, _) => Some(&networks[0].conditions),
+            Model::Network(networks) => Some(&networks[0].conditions),
             // Of a network from elsewhere nobody knows.
             Model::Onnx(network, _) => network.about().map(|about| &about.conditions),
             Model::Expert(_) | Model::Planner(_) | Model::Callback(_) => None,
@@ -314,11 +314,10 @@ impl NamedDriver {
         }
     }
 
-    /// How many of some cars, which are driven in lock-step, one fleet drives best: on CPUs a network answers for a thread's
-    /// share of them in one call, on a GPU for all; others answer for each car alone.
+    /// How many of some cars, which are driven in lock-step, one fleet drives best: a network answers for a thread's
+    /// share of them in one call; others answer for each car alone.
     pub fn cars_per_fleet(&self, cars: usize) -> usize {
         match &self.model {
-            Model::Network(_, device) if *device != DeviceChoice::default() => cars.max(1),
             Model::Network(..) | Model::Onnx(..) => cars.div_ceil(rayon::current_num_threads()).max(1),
             Model::Callback(_) => cars.max(1),
             Model::Expert(_) | Model::Planner(_) => 1,
@@ -336,7 +335,7 @@ impl NamedDriver {
                     let drivers = seeds.iter().map(|&seed| expert(settings, episode, seed)).collect();
                     smoothed(OneDriverEach(drivers), ticks)
                 }
-                Model::Network(networks, device) => Box::new(NetFleet::ensemble(&networks[0], &networks[1..], *device)),
+                Model::Network(networks) => Box::new(NetFleet::ensemble(&networks[0], &networks[1..])),
                 Model::Onnx(network, inference) => {
                     Box::new(OnnxFleet::new(network, *inference, episode.sensing.geometry))
                 }
@@ -405,9 +404,9 @@ mod tests {
         let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
         let inference = settings.dagger.inference;
         let checkpoint = Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference };
-        let network = NamedDriver::network("network", DriverSpec::Expert, checkpoint, DeviceChoice::Cpu);
+        let network = NamedDriver::network("network", DriverSpec::Expert, checkpoint);
         let ticks = |driver: &NamedDriver| match &driver.model {
-            Model::Network(networks, _) => networks[0].inference.smoothing_ticks,
+            Model::Network(networks) => networks[0].inference.smoothing_ticks,
             Model::Onnx(_, inference) => inference.smoothing_ticks,
             Model::Expert(_) | Model::Planner(_) | Model::Callback(_) => driver.smoothing_ticks,
         };

@@ -6,8 +6,7 @@
 use crate::conditions::Conditions;
 use crate::files::{self, FileError, Format, SCHEMA_REMEDY, write_atomically};
 use crate::network::{
-    ConvLayer, DeviceChoice, InferenceSettings, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture, POOLED_2,
-    Predictor, Weights,
+    ConvLayer, InferenceSettings, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture, POOLED_2, Predictor, Weights,
 };
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -196,8 +195,8 @@ impl Checkpoint {
     }
 
     /// The network ready to answer, without action smoothing.
-    pub fn predictor(&self, device: DeviceChoice) -> Predictor {
-        Predictor::new(&self.weights, self.inference, device)
+    pub fn predictor(&self) -> Predictor {
+        Predictor::new(&self.weights, self.inference)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::action_smoothing;
 use crate::checkpoint::Checkpoint;
-use crate::network::{DeviceChoice, Ensemble, Prediction, Predictor};
+use crate::network::{Ensemble, Prediction, Predictor};
 use sim::action_smoothing::{ActionSmoothing, FleetSmoothing};
 use sim::driver::{Decision, Fleet, Policy, Seat, Source};
 use sim::sensing::{GridGeometry, Observation};
@@ -16,14 +16,14 @@ pub struct NetFleet {
 
 impl NetFleet {
     /// Seats a network.
-    pub fn new(checkpoint: &Checkpoint, device: DeviceChoice) -> Self {
-        Self::ensemble(checkpoint, &[], device)
+    pub fn new(checkpoint: &Checkpoint) -> Self {
+        Self::ensemble(checkpoint, &[])
     }
 
     /// Seats several networks that answer as one. They should have been trained for the same patch of ground; the first
     /// one's action smoothing counts.
-    pub fn ensemble(first: &Checkpoint, others: &[Checkpoint], device: DeviceChoice) -> Self {
-        Self { novice: Novice::new(first, others, device), geometry: first.geometry() }
+    pub fn ensemble(first: &Checkpoint, others: &[Checkpoint]) -> Self {
+        Self { novice: Novice::new(first, others), geometry: first.geometry() }
     }
 }
 
@@ -43,10 +43,10 @@ pub(crate) struct Novice {
 }
 
 impl Novice {
-    pub(crate) fn new(first: &Checkpoint, others: &[Checkpoint], device: DeviceChoice) -> Self {
+    pub(crate) fn new(first: &Checkpoint, others: &[Checkpoint]) -> Self {
         let smoothing = FleetSmoothing::new(first.inference.smoothing_ticks);
-        let others = others.iter().map(|checkpoint| checkpoint.predictor(device)).collect();
-        Self { ensemble: Ensemble::new(first.predictor(device), others), geometry: first.geometry(), smoothing }
+        let others = others.iter().map(Checkpoint::predictor).collect();
+        Self { ensemble: Ensemble::new(first.predictor(), others), geometry: first.geometry(), smoothing }
     }
 
     /// What it answers at every seat, smoothed, and how far the members of an ensemble disagree.
@@ -68,9 +68,9 @@ pub struct NetPolicy {
 
 impl NetPolicy {
     /// Seats a network.
-    pub fn new(checkpoint: &Checkpoint, device: DeviceChoice) -> Self {
+    pub fn new(checkpoint: &Checkpoint) -> Self {
         let smoothing = ActionSmoothing::new(checkpoint.inference.smoothing_ticks);
-        Self { predictor: checkpoint.predictor(device), geometry: checkpoint.geometry(), smoothing }
+        Self { predictor: checkpoint.predictor(), geometry: checkpoint.geometry(), smoothing }
     }
 }
 
@@ -112,9 +112,9 @@ mod tests {
         let geometry = conditions.geometry();
         let grid = lots(1)[0];
         let checkpoint = Checkpoint { weights, conditions, inference: InferenceSettings::smoothed() };
-        let mut policy = NetPolicy::new(&checkpoint, DeviceChoice::Cpu);
+        let mut policy = NetPolicy::new(&checkpoint);
         let decision = policy.act(&Observation { grid });
-        let prediction = checkpoint.predictor(DeviceChoice::Cpu).predict(&[&grid])[0];
+        let prediction = checkpoint.predictor().predict(&[&grid])[0];
         assert_eq!(decision.source, Source::Novice);
         assert_eq!(decision.look_ahead.to_image_fraction(&geometry).map(round), prediction.clipped_mean().map(round));
         assert_eq!(decision.spread.unwrap().ahead_m, prediction.sigma[1] * geometry.side_m);

@@ -4,6 +4,7 @@
 //! On CPUs the result is the same bits for any number of threads.
 
 mod batch_sampler;
+mod device;
 pub mod learning;
 mod optimizer;
 mod report;
@@ -12,6 +13,7 @@ mod settings;
 mod training;
 mod unfinished;
 
+pub use device::DeviceChoice;
 pub use optimizer::AdamSettings;
 pub use report::{CurvePoint, FitProgress, FitReport, Step, Validation};
 pub use schedule::{LearningRate, ScheduleShape};

@@ -1,10 +1,9 @@
 //! The driving policy network: a module of burn, its weights on the host, and how it answers.
 //!
 //! [`LookAheadNet`] is the network. Its two convolutions and its dense layers are custom [`operations`]: fast on CPUs,
-//! plain burn on GPUs. The same module is trained (with autodiff) and drives (without, in [`Predictor`]).
+//! plain burn on GPUs, where it can be trained. The same module is trained (with autodiff) and drives (without, in [`Predictor`]).
 
 mod architecture;
-mod device;
 mod dropout;
 mod ensemble;
 mod error;
@@ -16,7 +15,6 @@ mod predictor;
 mod weights;
 
 pub use architecture::{ConvLayer, LANES, NetworkArchitecture, OUTPUTS, POOLED_1, POOLED_2};
-pub use device::DeviceChoice;
 pub use dropout::DropoutFactors;
 pub use ensemble::Ensemble;
 pub use error::NetworkError;

@@ -291,7 +291,7 @@ fn held_back_calibration(
     }
     let policy = Checkpoint::load(&network)?;
     let held_back: Vec<_> = held_back.iter().collect();
-    Ok(Some(calibration::of_policy(&policy, &held_back, settings.dagger.device)))
+    Ok(Some(calibration::of_policy(&policy, &held_back)))
 }
 
 fn calibration_caption(axes: &[AxisCalibration]) -> String {

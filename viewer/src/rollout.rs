@@ -62,7 +62,7 @@ impl Round<'_> {
         let recordings = episodes.iter().map(begin).collect::<anyhow::Result<Vec<Recording>>>()?;
         let watched = |(recording, start): (_, &RoundEpisode)| {
             let learned = self.learned.as_ref();
-            let novice = learned.map(|learned| NetPolicy::new(learned.policy(), self.settings.dagger.device));
+            let novice = learned.map(|learned| NetPolicy::new(learned.policy()));
             let drive =
                 Drive::new(recording, ROOT, &start.episode, self.settings, hand(self.settings.seed, start.index))
                     .with_novice(novice);

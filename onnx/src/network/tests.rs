@@ -2,7 +2,7 @@ use super::*;
 use crate::export::{self, export};
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
-use policy::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Weights};
+use policy::network::{InferenceSettings, NetworkArchitecture, Weights};
 use sim::episode::EpisodeSettings;
 use sim::seed::RootSeed;
 use std::path::PathBuf;
@@ -58,7 +58,7 @@ fn what_is_exported_answers_as_the_network_itself() {
     for checkpoint in checkpoints() {
         let network = load("exported", &export(&checkpoint).unwrap()).unwrap();
         assert_eq!(network.about(), Some(&About::new(checkpoint.inference, checkpoint.conditions.clone())));
-        let expected = checkpoint.predictor(DeviceChoice::Cpu).predict(&grids);
+        let expected = checkpoint.predictor().predict(&grids);
         let found = network.predict(&grids, checkpoint.inference.mirror_averaging, &pool());
         let mut farthest = 0.0_f32;
         for (found, expected) in found.into_iter().zip(&expected) {

@@ -180,7 +180,7 @@ impl Run<'_, '_> {
         let Some(target) = settings.rule.critic() else { return Ok(true) };
         let novice = Learned::uncritical(settings, store, round, self.checkpoint(policy.clone()))?;
         let control_period_s = 1e-3 * self.conditions.control_period_ms as f32;
-        let d = critic::dataset(target, d, &mut novice.ensemble(settings.device), control_period_s);
+        let d = critic::dataset(target, d, &mut novice.ensemble(), control_period_s);
         let start = Weights::init(settings.network, self.seed, index_of(Some(round), CRITIC));
         let folder = learned::critic_folder(store, round);
         Ok(self.trained_in(&folder, &start, &d, &critic::fit_settings(&fit), Some(round), CRITIC)?.is_some())

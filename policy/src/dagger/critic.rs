@@ -76,7 +76,7 @@ fn risks(ticks: &[Tick], discount: f32, control_period_s: f32) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Predictor, Weights};
+    use crate::network::{InferenceSettings, NetworkArchitecture, Predictor, Weights};
     use crate::test_data::collected;
     use sim::seed::RootSeed;
 
@@ -102,7 +102,7 @@ mod tests {
     #[test]
     fn a_critic_learns_where_its_network_is_off() {
         let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
-        let predictor = Predictor::new(&weights, InferenceSettings::plain(), DeviceChoice::Cpu);
+        let predictor = Predictor::new(&weights, InferenceSettings::plain());
         let mut network = Ensemble::new(predictor, Vec::new());
         let (round, _) = collected(30, 1);
         let off = discrepancies(&round.samples, &mut network);

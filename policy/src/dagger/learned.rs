@@ -8,7 +8,7 @@ use crate::dataset::store::Store;
 use crate::decision_rule::{DecisionRule, Thresholds};
 use crate::drivers::Novice;
 use crate::files::FileError;
-use crate::network::{DeviceChoice, Ensemble, Predictor};
+use crate::network::{Ensemble, Predictor};
 use sim::sensing::OccupancyGrid;
 use std::path::PathBuf;
 
@@ -62,7 +62,7 @@ impl Learned {
         let critic = settings.rule.critic().map(|_| Checkpoint::load(&critic_folder(store, round))).transpose()?;
         let mut learned = Self { members, critic, ..Self::alone(policy) };
         if let DecisionRule::ThriftyDagger(thrifty) = settings.rule {
-            learned.thresholds = learned.thresholds(thrifty.rate, d, settings.device);
+            learned.thresholds = learned.thresholds(thrifty.rate, d);
         }
         Ok(learned)
     }
@@ -78,8 +78,8 @@ impl Learned {
     }
 
     /// The thresholds, from the answers to everything that was trained on.
-    fn thresholds(&self, rate: f32, d: &Dataset, device: DeviceChoice) -> Thresholds {
-        let (mut ensemble, mut critic) = (self.ensemble(device), self.critic(device));
+    fn thresholds(&self, rate: f32, d: &Dataset) -> Thresholds {
+        let (mut ensemble, mut critic) = (self.ensemble(), self.critic());
         let (mut disagreement, mut risk, mut discrepancy) = (Vec::new(), Vec::new(), Vec::new());
         for round in d.rounds() {
             let grids: Vec<&OccupancyGrid> = round.samples.iter().map(|sample| &sample.grid).collect();
@@ -92,18 +92,18 @@ impl Learned {
         Thresholds::new(rate, disagreement, risk, &discrepancy)
     }
 
-    pub(crate) fn novice(&self, device: DeviceChoice) -> Novice {
-        Novice::new(&self.policy, &self.members, device)
+    pub(crate) fn novice(&self) -> Novice {
+        Novice::new(&self.policy, &self.members)
     }
 
-    pub(crate) fn critic(&self, device: DeviceChoice) -> Option<Predictor> {
-        self.critic.as_ref().map(|critic| critic.predictor(device))
+    pub(crate) fn critic(&self) -> Option<Predictor> {
+        self.critic.as_ref().map(Checkpoint::predictor)
     }
 
     /// The networks as they answer single grids, unsmoothed.
-    pub(crate) fn ensemble(&self, device: DeviceChoice) -> Ensemble {
-        let others = self.members.iter().map(|member| member.predictor(device)).collect();
-        Ensemble::new(self.policy.predictor(device), others)
+    pub(crate) fn ensemble(&self) -> Ensemble {
+        let others = self.members.iter().map(Checkpoint::predictor).collect();
+        Ensemble::new(self.policy.predictor(), others)
     }
 }
 

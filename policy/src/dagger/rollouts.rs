@@ -9,7 +9,6 @@ use crate::dagger::settings::DaggerSettings;
 use crate::dataset::{Collection, Effort, EpisodeRecord, Round, Tick};
 use crate::decision_rule::PAPER_TAU;
 use crate::decision_rule::{DecisionRule, GateContext};
-use crate::network::DeviceChoice;
 use rayon::prelude::*;
 use sim::batch::{NotFinite, run_lockstep};
 use sim::controller::bumper_to_patch_m;
@@ -84,21 +83,20 @@ impl Rollouts {
                 Disturbance::new(settings.disturbance, &episode.settings().vehicle, rng)
             })
         };
-        let DaggerSettings { rule, keep, device, .. } = *settings;
-        Self::new(novice, device, seed, (rule, keep), episodes, &augmenting_sensors, &disturbance)
+        let DaggerSettings { rule, keep, .. } = *settings;
+        Self::new(novice, seed, (rule, keep), episodes, &augmenting_sensors, &disturbance)
     }
 
     /// On-policy labelled rollouts: the network alone drives, undisturbed, and the expert labels every tick.
-    pub fn on_policy(novice: &Checkpoint, device: DeviceChoice, episodes: Vec<RoundEpisode>) -> Self {
+    pub fn on_policy(novice: &Checkpoint, episodes: Vec<RoundEpisode>) -> Self {
         // Every discrepancy is below infinity: the network always drives. Nothing is drawn at random.
         let how = (DecisionRule::TauOnly { tau: f32::INFINITY }, Keep::EveryTick);
         let novice = Learned::alone(novice.clone());
-        Self::new(Some(&novice), device, RootSeed(0), how, episodes, &|_, _| Vec::new(), &|_, _| None)
+        Self::new(Some(&novice), RootSeed(0), how, episodes, &|_, _| Vec::new(), &|_, _| None)
     }
 
     fn new(
         novice: Option<&Learned>,
-        device: DeviceChoice,
         seed: RootSeed,
         (rule, keep): (DecisionRule, Keep),
         episodes: Vec<RoundEpisode>,
@@ -130,8 +128,8 @@ impl Rollouts {
             })
             .collect();
         let geometry = starts.first().map_or_else(GridGeometry::paper, |start| start.settings().sensing.geometry);
-        let critic = novice.and_then(|novice| novice.critic(device));
-        let novice = novice.map(|novice| novice.novice(device));
+        let critic = novice.and_then(Learned::critic);
+        let novice = novice.map(Learned::novice);
         let collector = GatedCollector::new(novice, critic, keep, geometry, seats);
         Self { collector, rule, episodes: starts, origins }
     }

@@ -3,8 +3,8 @@
 use crate::dagger::disturbance::DisturbanceSettings;
 use crate::dagger::gated_collector::Keep;
 use crate::decision_rule::DecisionRule;
-use crate::fit::{Budget, FitSettings};
-use crate::network::{DeviceChoice, InferenceSettings, NetworkArchitecture};
+use crate::fit::{Budget, DeviceChoice, FitSettings};
+use crate::network::{InferenceSettings, NetworkArchitecture};
 use crate::string_or_table::string_or_table;
 use serde::{Deserialize, Serialize};
 
@@ -29,7 +29,7 @@ pub struct DaggerSettings {
     pub samples_per_round: u32,
     /// Where each iteration's training starts.
     pub start: StartFrom,
-    /// Where the network is computed.
+    /// Where the network is trained; it drives on CPUs.
     pub device: DeviceChoice,
     /// When the network may drive.
     #[serde(deserialize_with = "string_or_table")]

@@ -8,7 +8,7 @@ use crate::dataset::store::Store;
 use crate::decision_rule::DecisionRule;
 use crate::drivers::{NetFleet, NetPolicy};
 use crate::fit::{Budget, FitSettings};
-use crate::network::{ConvLayer, DeviceChoice, InferenceSettings, NetworkArchitecture, Weights};
+use crate::network::{ConvLayer, InferenceSettings, NetworkArchitecture, Weights};
 use crate::test_data::scratch;
 use sim::batch::{NotFinite, run_lockstep};
 use sim::driver::{Decision, Driver, Fleet, LookAheadPoint, OneDriverEach, SensorsOnly, Situation, Source};
@@ -247,18 +247,17 @@ fn the_network_drives_the_same_whoever_seats_it() {
         let reports = reports.unwrap();
         (driven, reports)
     };
-    let device = DeviceChoice::Cpu;
-    let (in_fleet, reports) = drive(&mut NetFleet::new(&checkpoint, device));
+    let (in_fleet, reports) = drive(&mut NetFleet::new(&checkpoint));
     let put_back = reports.iter().map(|report| report.metrics.near_collisions).sum::<u32>();
     assert!(put_back > 0, "nothing was reset: {reports:?}");
-    let alone = |_| SensorsOnly(NetPolicy::new(&checkpoint, device));
+    let alone = |_| SensorsOnly(NetPolicy::new(&checkpoint));
     assert_eq!(drive(&mut OneDriverEach((0..2).map(alone).collect())).0, in_fleet);
     let mut overflowing = checkpoint.clone();
     overflowing.weights.parts_mut().fc2_weight.fill(f32::MAX);
-    let refused = Rollouts::on_policy(&overflowing, device, of_round(0, 2)).drive(&mut |_, _| {}).err();
+    let refused = Rollouts::on_policy(&overflowing, of_round(0, 2)).drive(&mut |_, _| {}).err();
     assert_eq!(refused, Some(NotFinite { episode: 0, tick: 0, what: "the driver's answer" }));
     let mut driven = Vec::new();
-    let rollouts = Rollouts::on_policy(&checkpoint, device, of_round(0, 2));
+    let rollouts = Rollouts::on_policy(&checkpoint, of_round(0, 2));
     let collected = rollouts.drive(&mut |episode, frame| driven.push((episode, frame.decision))).unwrap();
     assert_eq!(driven, in_fleet);
     assert_eq!(
@@ -267,7 +266,7 @@ fn the_network_drives_the_same_whoever_seats_it() {
         "every tick is labelled"
     );
     let plain = Checkpoint { inference: InferenceSettings { smoothing_ticks: 0.0, ..inference }, ..checkpoint };
-    assert_ne!(drive(&mut NetFleet::new(&plain, device)).0, in_fleet, "smoothing matters");
+    assert_ne!(drive(&mut NetFleet::new(&plain)).0, in_fleet, "smoothing matters");
 }
 
 /// Whoever drives an episode of a round again gets its samples: noise, disturbances, augmentations and all.

@@ -4,7 +4,7 @@ use super::*;
 use crate::dataset::{Dataset, Sample, ValidationSplit};
 use crate::fit::batch_sampler::BatchSampler;
 use crate::loss::LossSettings;
-use crate::network::{ConvLayer, DeviceChoice, InferenceSettings, NetworkArchitecture, Predictor, Weights};
+use crate::network::{ConvLayer, InferenceSettings, NetworkArchitecture, Predictor, Weights};
 use crate::test_data::{round, scratch};
 use sim::seed::RootSeed;
 use sim::sensing::GridGeometry;
@@ -73,7 +73,7 @@ fn two_modes_learn_two_ways() {
         let start = Weights::init(NetworkArchitecture { modes, ..tiny() }, RootSeed(1), 0);
         let mut progress = |_: &FitProgress| ControlFlow::Continue(());
         let fitted = fit(&start, &dataset, &settings(200), context(DeviceChoice::Cpu), None, &mut progress).unwrap();
-        let mut predictor = Predictor::new(&fitted.weights, InferenceSettings::plain(), DeviceChoice::Cpu);
+        let mut predictor = Predictor::new(&fitted.weights, InferenceSettings::plain());
         let answers = predictor.predict(&grids.iter().collect::<Vec<_>>());
         answers.iter().map(|answer| (answer.mean[0] - 0.5).abs()).sum::<f32>() / answers.len() as f32
     };

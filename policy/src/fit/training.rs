@@ -3,13 +3,13 @@
 use crate::dataset::{Dataset, Sample};
 use crate::files::FileError;
 use crate::fit::batch_sampler::BatchSampler;
+use crate::fit::device::DeviceChoice;
 use crate::fit::report::{CurvePoint, FitProgress, FitReport, Step, Validation};
 use crate::fit::settings::{FitSettings, KeepWeights};
 use crate::fit::unfinished::Unfinished;
 use crate::loss::{self, BatchLoss, LossParts, LossSettings};
 use crate::network::{
-    DeviceChoice, DropoutFactors, InferenceSettings, LookAheadNet, NetworkArchitecture, Predictor, Weights,
-    occupied_tensor,
+    DropoutFactors, InferenceSettings, LookAheadNet, NetworkArchitecture, Predictor, Weights, occupied_tensor,
 };
 use burn::lr_scheduler::module_lr_scheduler::ModuleLrScheduler;
 use burn::optim::{GradientsParams, ModuleOptimizer};
@@ -72,7 +72,7 @@ pub struct FitContext {
     pub geometry: GridGeometry,
     /// How the network will be used: validation does the same.
     pub inference: InferenceSettings,
-    /// Where the network is computed.
+    /// Where the network is trained.
     pub device: DeviceChoice,
     /// Root of the order of samples, mirroring and dropout.
     pub seed: RootSeed,
@@ -260,7 +260,7 @@ fn thinned(samples: &[Sample], at_most: usize) -> Cow<'_, [Sample]> {
 }
 
 fn occupied(samples: &[Sample], device: &Device) -> Tensor<3, burn::tensor::Bool> {
-    occupied_tensor(samples.iter().map(|sample| &sample.grid), samples.len(), device)
+    occupied_tensor(samples.iter().map(|sample| &sample.grid), device)
 }
 
 fn batch_loss(settings: &LossSettings, outputs: Tensor<2>, samples: &[Sample], device: &Device) -> BatchLoss {
@@ -274,7 +274,7 @@ fn batch_loss(settings: &LossSettings, outputs: Tensor<2>, samples: &[Sample], d
 /// Compares the answers to samples with their labels.
 pub fn evaluate(weights: &Weights, samples: &[Sample], loss: &LossSettings, context: FitContext) -> Validation {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
-    let mut predictor = Predictor::new(weights, context.inference, context.device);
+    let mut predictor = Predictor::new(weights, context.inference);
     let answers = predictor.raw(&grids);
     let outputs = predictor.for_loss(&grids, &answers);
     let squared_error: f64 = answers
@@ -283,7 +283,7 @@ pub fn evaluate(weights: &Weights, samples: &[Sample], loss: &LossSettings, cont
         .flat_map(|(raw, sample)| (0..2).map(|axis| f64::from(sample.label[axis] - raw[axis])))
         .map(|error| error * error)
         .sum();
-    let device = DeviceChoice::Cpu.device();
+    let device = Device::flex();
     let mean_loss = |settings: &LossSettings| {
         let raw = TensorData::new(outputs.clone(), [samples.len(), weights.architecture().outputs()]);
         let loss = batch_loss(settings, Tensor::from_data(raw, &device), samples, &device);

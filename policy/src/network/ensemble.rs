@@ -68,14 +68,14 @@ fn mixture<I: Iterator<Item = Prediction>>(first: Prediction, others: impl Fn() 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::{DeviceChoice, InferenceSettings, NetworkArchitecture, Weights};
+    use crate::network::{InferenceSettings, NetworkArchitecture, Weights};
     use crate::test_data::lots;
     use sim::maths;
     use sim::seed::RootSeed;
 
     fn member(index: u64) -> Predictor {
         let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(index), 0);
-        Predictor::new(&weights, InferenceSettings::plain(), DeviceChoice::Cpu)
+        Predictor::new(&weights, InferenceSettings::plain())
     }
 
     #[test]

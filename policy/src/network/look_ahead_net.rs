@@ -97,17 +97,14 @@ fn read<const D: usize>(tensor: Tensor<D>, into: &mut [f32]) {
     into.copy_from_slice(&values);
 }
 
-/// Grids as a tensor `[batch, 25, 25]`, true = non-drivable; rows beyond `grids` are free.
-pub(crate) fn occupied_tensor<'a>(
-    grids: impl Iterator<Item = &'a OccupancyGrid>,
-    batch: usize,
-    device: &Device,
-) -> Tensor<3, Bool> {
-    let mut cells = Vec::with_capacity(batch * GRID_CELLS * GRID_CELLS);
+/// Grids as a tensor `[batch, 25, 25]`, true = non-drivable.
+pub(crate) fn occupied_tensor<'a>(grids: impl Iterator<Item = &'a OccupancyGrid>, device: &Device) -> Tensor<3, Bool> {
+    const CELLS: usize = GRID_CELLS * GRID_CELLS;
+    let mut cells = Vec::with_capacity(grids.size_hint().0 * CELLS);
     for grid in grids {
         cells.extend(grid.cells().map(|cell| cell == 1));
     }
-    cells.resize(batch * GRID_CELLS * GRID_CELLS, false);
+    let batch = cells.len() / CELLS;
     Tensor::from_data(TensorData::new(cells, [batch, GRID_CELLS, GRID_CELLS]), device)
 }
 

@@ -1,7 +1,6 @@
 //! A trained network that answers grids.
 
 use crate::network::architecture::OUTPUTS;
-use crate::network::device::DeviceChoice;
 use crate::network::inference::InferenceSettings;
 use crate::network::log_variance::soft_clamp_log_variance;
 use crate::network::look_ahead_net::{LookAheadNet, occupied_tensor};
@@ -47,28 +46,24 @@ impl Prediction {
     }
 }
 
-/// Most rows computed in one call: bounds the memory. On CPUs an answer does not depend on the other rows.
+/// Most rows computed in one call: bounds the memory. An answer does not depend on the other rows.
 const ROWS_MAX: usize = 1024;
-/// Rows computed in every call on a GPU, where kernels are chosen by the number of rows.
-#[cfg(any(feature = "cuda", feature = "vulkan", feature = "wgpu"))]
-const GPU_ROWS: usize = 64;
 
-/// A network ready to answer.
+/// A network ready to answer: on CPUs, wherever it was trained.
 #[derive(Debug, Clone)]
 pub struct Predictor {
     mirror_averaging: bool,
     modes: usize,
     net: LookAheadNet,
-    choice: DeviceChoice,
     device: Device,
 }
 
 impl Predictor {
-    /// Makes a network ready on a device. Action smoothing is not done here: it has a memory per car.
-    pub fn new(weights: &Weights, inference: InferenceSettings, choice: DeviceChoice) -> Self {
-        let device = choice.device();
+    /// Makes a network ready. Action smoothing is not done here: it has a memory per car.
+    pub fn new(weights: &Weights, inference: InferenceSettings) -> Self {
+        let device = Device::flex();
         let net = LookAheadNet::from_weights(weights, &device);
-        Self { mirror_averaging: inference.mirror_averaging, modes: weights.architecture().modes, net, choice, device }
+        Self { mirror_averaging: inference.mirror_averaging, modes: weights.architecture().modes, net, device }
     }
 
     /// Answers every grid, in order.
@@ -113,15 +108,9 @@ impl Predictor {
         let width = self.width();
         let mut outputs = Vec::with_capacity(count * width);
         while outputs.len() < count * width {
-            let left = count - outputs.len() / width;
-            let (taken, rows) = match self.choice {
-                DeviceChoice::Cpu => (left.min(ROWS_MAX), left.min(ROWS_MAX)),
-                #[cfg(any(feature = "cuda", feature = "vulkan", feature = "wgpu"))]
-                _ => (left.min(GPU_ROWS), GPU_ROWS),
-            };
-            let occupied = occupied_tensor(grids.by_ref().take(taken), rows, &self.device);
-            let answers: Vec<f32> = self.net.forward(occupied, None).into_data().try_into_vec().expect("f32");
-            outputs.extend_from_slice(&answers[..taken * width]);
+            let rows = (count - outputs.len() / width).min(ROWS_MAX);
+            let occupied = occupied_tensor(grids.by_ref().take(rows), &self.device);
+            outputs.extend(self.net.forward(occupied, None).into_data().try_into_vec::<f32>().expect("f32"));
         }
         outputs
     }
@@ -196,7 +185,7 @@ mod tests {
             (NetworkArchitecture { modes: 3, ..NetworkArchitecture::compact() }, InferenceSettings::smoothed()),
         ] {
             let weights = Weights::init(architecture, RootSeed(1), 0);
-            let mut predictor = Predictor::new(&weights, inference, DeviceChoice::Cpu);
+            let mut predictor = Predictor::new(&weights, inference);
             let all: Vec<&OccupancyGrid> = grids.iter().collect();
             let together = predictor.raw(&all);
             for (index, grid) in grids.iter().enumerate() {
@@ -217,7 +206,7 @@ mod tests {
         for modes in [1, 2] {
             let architecture = NetworkArchitecture { modes, ..NetworkArchitecture::compact() };
             let weights = Weights::init(architecture, RootSeed(1), 0);
-            let mut predictor = Predictor::new(&weights, InferenceSettings::smoothed(), DeviceChoice::Cpu);
+            let mut predictor = Predictor::new(&weights, InferenceSettings::smoothed());
             let answers = predictor.predict(&grids.iter().collect::<Vec<_>>());
             let images = predictor.predict(&mirrored.iter().collect::<Vec<_>>());
             for (answer, image) in answers.iter().zip(&images) {
@@ -246,7 +235,7 @@ mod tests {
         let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
         let with_threads = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| Predictor::new(&weights, InferenceSettings::smoothed(), DeviceChoice::Cpu).raw(&grids))
+            pool.install(|| Predictor::new(&weights, InferenceSettings::smoothed()).raw(&grids))
         };
         assert_eq!(with_threads(1), with_threads(2));
     }

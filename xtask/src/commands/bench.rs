@@ -6,6 +6,9 @@ use anyhow::Context as _;
 use benchmark::peers::{self, PEERS};
 use benchmark::{Effort, Figure, Goal, driving, evaluating, maps, network};
 use clap::{Args, ValueEnum};
+use policy::fit::DeviceChoice;
+use serde::Deserialize as _;
+use serde::de::value::{Error as ValueError, StrDeserializer};
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -31,6 +34,9 @@ pub(crate) struct BenchArgs {
     /// Folder of the environment that most of them share; the others have theirs next to it.
     #[arg(long, value_name = "DIR", default_value = "target/tools/peers", requires = "peers")]
     environment: PathBuf,
+    /// Where networks are trained: cpu, or the GPU backend of burn that this program was built with (CONTRIBUTING.md).
+    #[arg(long, value_name = "DEVICE", default_value = "cpu", value_parser = device)]
+    device: DeviceChoice,
     /// Writes the table into this Markdown file, between its lines `<!-- bench -->` and `<!-- /bench -->`.
     #[arg(long, value_name = "FILE")]
     write: Option<PathBuf>,
@@ -65,7 +71,7 @@ pub(crate) fn run(args: &BenchArgs, output: &Output) -> anyhow::Result<()> {
             Area::Evaluating => evaluating::figures(effort, &mut report)?,
             Area::Maps => maps::figures(effort, &mut report)?,
             Area::Answers => network::answers(effort, &mut report)?,
-            Area::Training => network::training(effort, &mut report)?,
+            Area::Training => network::training(effort, args.device, &mut report)?,
         }
     }
     if args.peers {
@@ -82,6 +88,11 @@ pub(crate) fn run(args: &BenchArgs, output: &Output) -> anyhow::Result<()> {
         }
     }
     page.map_or(Ok(()), |page| page.write(&text))
+}
+
+/// A device by its name in settings.
+fn device(name: &str) -> Result<DeviceChoice, ValueError> {
+    DeviceChoice::deserialize(StrDeserializer::new(name))
 }
 
 /// Which machine and code: a line above the table.

@@ -362,7 +362,7 @@ fn render_samples(args: &SamplesArgs, folder: &Folder<'_>) -> anyhow::Result<()>
     let count = args.count.min(kept.len());
     let chosen: Vec<usize> = (0..count).map(|i| (2 * i + 1) * kept.len() / (2 * count)).collect();
     let grids: Vec<_> = chosen.iter().map(|&i| &kept[i].grid).collect();
-    let answers = checkpoint.map(|checkpoint| checkpoint.predictor(settings.dagger.device).predict(&grids));
+    let answers = checkpoint.map(|checkpoint| checkpoint.predictor().predict(&grids));
     let samples: Vec<_> = chosen
         .iter()
         .enumerate()

@@ -6,9 +6,15 @@ use burn::backend::tensor::{BoolTensor, FloatTensor};
 use burn::backend::{Backend, backend_extension};
 
 /// The differentiable operations.
-#[backend_extension(Flex, Cube: cfg(any(feature = "cuda", feature = "vulkan", feature = "wgpu")), Autodiff)]
+#[backend_extension(
+    Flex,
+    Cube: cfg(any(feature = "cuda", feature = "vulkan", feature = "wgpu")),
+    Fusion: cfg(any(feature = "cuda", feature = "vulkan", feature = "wgpu")),
+    Autodiff
+)]
 pub trait NetworkOps: Backend {
     /// See [`encode`](super::encode).
+    #[fusion(default)]
     fn encode(
         occupied: BoolTensor<Self>,
         weight_1: FloatTensor<Self>,
@@ -20,25 +26,33 @@ pub trait NetworkOps: Backend {
     }
 
     /// See [`dense`](super::dense).
+    #[fusion(default)]
     fn dense(x: FloatTensor<Self>, weight: FloatTensor<Self>, bias: FloatTensor<Self>) -> FloatTensor<Self> {
         plain::dense::<Self>(x, weight, bias)
     }
 
     /// See [`tanh`](super::tanh).
+    #[fusion(default)]
     fn tanh(x: FloatTensor<Self>) -> FloatTensor<Self> {
         Self::float_tanh(x)
     }
 
     /// See [`exp`](super::exp).
+    #[fusion(default)]
     fn exp(x: FloatTensor<Self>) -> FloatTensor<Self> {
         Self::float_exp(x)
     }
 }
 
 /// The operation of the optimiser.
-#[backend_extension(Flex, Cube: cfg(any(feature = "cuda", feature = "vulkan", feature = "wgpu")))]
+#[backend_extension(
+    Flex,
+    Cube: cfg(any(feature = "cuda", feature = "vulkan", feature = "wgpu")),
+    Fusion: cfg(any(feature = "cuda", feature = "vulkan", feature = "wgpu"))
+)]
 pub trait OptimizerOps: Backend {
     /// See [`adam_step`](super::adam_step).
+    #[fusion(default)]
     fn adam_step(
         step: AdamStep,
         gradient: FloatTensor<Self>,

@@ -93,7 +93,7 @@ fn encoding_and_its_gradients_equal_those_of_plain_operations() {
     let device = Device::flex().autodiff();
     for architecture in shapes() {
         let leaves = Leaves::new(architecture);
-        let occupied = occupied_tensor(lots(batch).iter(), batch, &device);
+        let occupied = occupied_tensor(lots(batch).iter(), &device);
         let (ours, expected) = (leaves.encoded(occupied.clone()), leaves.plainly_encoded(occupied));
         assert_close("features", &vector(ours.clone()), &vector(expected.clone()));
         let names = ["conv1.weight", "conv1.bias", "conv2.weight", "conv2.bias"];
@@ -107,7 +107,7 @@ fn encoding_and_its_gradients_equal_those_of_plain_operations() {
 #[test]
 fn gradients_of_the_encoder_equal_finite_differences() {
     let device = Device::flex().autodiff();
-    let occupied = occupied_tensor(lots(3).iter(), 3, &device);
+    let occupied = occupied_tensor(lots(3).iter(), &device);
     let leaves = Leaves::new(NetworkArchitecture::compact());
     let [of_weight_1, of_bias_1, of_weight_2, of_bias_2] = leaves.gradients(leaves.encoded(occupied.clone()));
     let total = |leaves: &Leaves| -> f64 {

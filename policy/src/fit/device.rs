@@ -1,9 +1,9 @@
-//! Where a network is computed.
+//! Where a network is trained.
 
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 
-/// Where the network is computed.
+/// Where the network is trained. Wherever that is, trained networks answer on CPUs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DeviceChoice {
