@@ -49,7 +49,7 @@ pub struct Manifest {
     /// Revision of the repository that the program was built from, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub git_revision: Option<String>,
-    /// Whether files of the repository differed from that revision.
+    /// Whether sources of the program differed from that revision when it was built.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub git_dirty: Option<bool>,
     /// The compiler that built the program.
@@ -126,9 +126,9 @@ pub struct Build {
     pub program: String,
     /// The command line, without the name of the program.
     pub command_line: Vec<String>,
-    /// Revision of the repository, if known.
+    /// Revision of the repository that it was built from, if known.
     pub git_revision: Option<String>,
-    /// Whether files of the repository differ from that revision.
+    /// Whether its sources differed from that revision.
     pub git_dirty: Option<bool>,
     /// The compiler.
     pub rustc_version: String,

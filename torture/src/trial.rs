@@ -223,8 +223,6 @@ impl Workplace {
             named.map_or_else(|| word.to_owned(), |(name, rest)| format!("{}{rest}", self.place(name).display()))
         };
         let mut command = Command::new(&self.program);
-        // Somebody may work on the sources meanwhile; manifests then say nothing of them, instead of one thing and another.
-        command.env("GIT_DIR", self.place(EMPTY));
         command.current_dir(&self.folder).args(words.split_whitespace().map(with_folder));
         command
     }

@@ -5,7 +5,6 @@ use anyhow::ensure;
 use experiment::manifest::{Build, Manifest};
 use serde::Deserialize;
 use std::path::Path;
-use std::process::Command;
 use std::sync::OnceLock;
 
 /// Name and version, as in `--version` and manifests.
@@ -14,18 +13,19 @@ pub(crate) const PROGRAM: &str = concat!("lotpilot ", env!("CARGO_PKG_VERSION"))
 /// What made this program, and how it was called.
 pub(crate) fn get() -> &'static Build {
     static BUILD: OnceLock<Build> = OnceLock::new();
-    BUILD.get_or_init(|| {
-        let status = git(&["status", "--porcelain", "--untracked-files=no"]);
-        Build {
-            program: PROGRAM.to_owned(),
-            command_line: std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect(),
-            git_revision: git(&["rev-parse", "HEAD"]),
-            git_dirty: status.map(|changes| !changes.is_empty()),
-            rustc_version: env!("XTASK_RUSTC").to_owned(),
-            processor: processor(),
-            processor_features: processor_features(),
-            libraries: libraries(),
-        }
+    BUILD.get_or_init(|| Build {
+        program: PROGRAM.to_owned(),
+        command_line: std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect(),
+        git_revision: Some(env!("XTASK_GIT_REVISION").to_owned()).filter(|revision| !revision.is_empty()),
+        git_dirty: match env!("XTASK_GIT_CHANGES") {
+            "yes" => Some(true),
+            "no" => Some(false),
+            _ => None,
+        },
+        rustc_version: env!("XTASK_RUSTC").to_owned(),
+        processor: processor(),
+        processor_features: processor_features(),
+        libraries: libraries(),
     })
 }
 
@@ -47,7 +47,7 @@ pub(crate) fn check_can_go_on(run: &Path, manifest: &Manifest, output: &Output) 
         && begun != now
     {
         output.note(format_args!(
-            "{}: begun at commit {begun}, which its manifest names; this program lies at commit {now}",
+            "{}: begun at commit {begun}, which its manifest names; this program is of commit {now}",
             run.display()
         ));
     }
@@ -83,19 +83,6 @@ fn libraries() -> Vec<String> {
     let lock: Lock = toml::from_str(include_str!("../../Cargo.lock")).expect("cargo wrote it");
     let computing = lock.package.into_iter().filter(|package| COMPUTING.contains(&package.name.as_str()));
     computing.map(|Package { name, version }| format!("{name} {version}")).collect()
-}
-
-/// What git says about the checkout that this program lies in; `None` without git or checkout.
-fn git(args: &[&str]) -> Option<String> {
-    let program = std::env::current_exe().ok()?;
-    let folder = program.parent().unwrap_or(Path::new("."));
-    let mut git = Command::new("git");
-    // Set where git runs a hook: they name another checkout.
-    for name in ["GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_COMMON_DIR", "GIT_OBJECT_DIRECTORY"] {
-        git.env_remove(name);
-    }
-    let output = git.arg("--no-optional-locks").arg("-C").arg(folder).args(args).output().ok()?;
-    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }
 
 /// The name of the processor, where the system tells (Linux).
