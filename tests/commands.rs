@@ -434,17 +434,41 @@ fn pictures_are_drawn_and_never_replaced_unasked() {
     refuses(&["visualise", "run", &out], &["this is not a run"]);
 }
 
-/// The remedy, `--overwrite`, destroyed the map.
+/// A picture of a map took the place of the map's image; of two lots named after each other each took the other's.
 #[test]
-fn a_lot_is_not_generated_over_what_it_is_made_of() {
-    let folder = scratch("over-itself");
-    for name in ["car-park.yaml", "car-park.pgm", "car-park.lot.toml"] {
-        std::fs::copy(Path::new("../scenarios/examples").join(name), folder.join(name)).unwrap();
+fn nothing_is_written_over_what_it_is_made_of() {
+    let folder = scratch("over-another");
+    let at = |name: &str| folder.join(name).display().to_string();
+    for extension in ["yaml", "png", "lot.toml"] {
+        std::fs::copy(format!("../scenarios/examples/maps/alley.{extension}"), at(&format!("alley.{extension}")))
+            .unwrap();
     }
-    let [map, out] = [folder.join("car-park.yaml"), folder.clone()].map(|path| path.display().to_string());
-    let before = std::fs::read(folder.join("car-park.pgm")).unwrap();
-    refuses(&["generate", "--lots", &map, "--out", &out, "--overwrite"], &["what the lot is made of", "another --out"]);
-    assert_eq!(std::fs::read(folder.join("car-park.pgm")).unwrap(), before);
+    let text = std::fs::read_to_string("../scenarios/examples/slalom.toml").unwrap();
+    for (file, name) in [("a.toml", "b"), ("b.toml", "a")] {
+        std::fs::write(at(file), text.replace("\"slalom\"", &format!("{name:?}"))).unwrap();
+    }
+    let image = std::fs::read(at("alley.png")).unwrap();
+    let (map, beside, out) = (at("alley.yaml"), at("alley.lot.toml"), folder.display().to_string());
+    let [a, b] = ["a.toml", "b.toml"].map(at);
+    for command in [
+        vec!["render", "lot", "--lots", &map, "--out", &out, "--overwrite"],
+        vec!["generate", "--lots", &beside, "--out", &out, "--overwrite"],
+        vec!["generate", "--lots", &a, &b, "--out", &out, "--overwrite"],
+    ] {
+        refuses(&command, &["what the lot is made of", "another --out"]);
+    }
+    assert_eq!(std::fs::read(at("alley.png")).unwrap(), image);
+}
+
+/// It was the default of clap, which exits by itself.
+#[cfg(target_os = "linux")]
+#[test]
+fn help_that_nobody_gets_is_no_success() {
+    for words in [&["--help"][..], &["evaluate", "--help"], &["--version"]] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = xtask().args(words).stdout(full).output().unwrap();
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {}", text(&output).1);
+    }
 }
 
 #[test]
@@ -474,6 +498,7 @@ fn old_keys_and_wrong_units_are_refused_with_a_remedy() {
         ("episode.vehicle.steering_max_rad=35.5", &["35.5 is out of range", "at most 1.5 rad"]),
         ("episode.vehicle.wheelbase_m=nan", &["NaN is out of range", "at most 20 m"]),
         ("dagger.eta=90", &["dagger.eta = 90 is out of range: 0 to 1 share of ticks"]),
+        ("dagger.rule={}", &["an empty table changes nothing"]),
     ] {
         refuses(&["evaluate", "--driver", "expert", "--out", &out, "--set", change], expected);
         assert!(!Path::new(&out).exists(), "{change} leaves {out}");

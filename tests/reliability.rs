@@ -355,6 +355,7 @@ fn every_damage_of_every_file_is_noticed_by_who_reads_it_and_by_verify() {
         ("round-00/model.safetensors", &evaluate[..]),
         ("round-00/sha256sums", &evaluate),
         ("settings.toml", &evaluate),
+        ("manifest.toml", &evaluate),
         ("table1.json", &report),
         ("summary.json", &report),
         ("runs.jsonl", &report),

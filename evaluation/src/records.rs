@@ -153,3 +153,15 @@ fn parse<T: DeserializeOwned>(line: &[u8]) -> anyhow::Result<T> {
     ensure!(schema == SCHEMA, "written by another version of lotpilot (schema {schema}, this one reads {SCHEMA})");
     Ok(serde_json::from_slice(line)?)
 }
+
+#[cfg(test)]
+mod tests {
+    /// One level of noise in seven came back with another last bit, and a begun evaluation at it was refused.
+    #[test]
+    fn numbers_are_read_back_as_they_were_written() {
+        for level in (1..60).flat_map(|n| (1..60).map(move |of| f64::from(n) / f64::from(of))) {
+            let read: f64 = serde_json::from_str(&serde_json::to_string(&level).unwrap()).unwrap();
+            assert_eq!(read.to_bits(), level.to_bits(), "{level}");
+        }
+    }
+}

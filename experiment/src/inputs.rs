@@ -15,6 +15,6 @@ pub fn of(lots: &[Lot], drivers: &[NamedDriver]) -> Inputs {
 
 /// The files and folders that they are read from.
 pub fn places(lots: &[Lot], drivers: &[NamedDriver]) -> Vec<PathBuf> {
-    let lots = lots.iter().filter_map(Lot::file);
-    lots.chain(drivers.iter().flat_map(|driver| driver.spec.places())).map(PathBuf::from).collect()
+    let lots = lots.iter().flat_map(Lot::files).cloned();
+    lots.chain(drivers.iter().flat_map(|driver| driver.spec.places()).map(PathBuf::from)).collect()
 }

@@ -12,7 +12,7 @@ use sim::seed::RootSeed;
 use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A lot, before a trial has drawn its obstacles.
@@ -72,7 +72,9 @@ fn name_of_file(scenario: &Scenario) -> String {
     // (No row has the name of a suite, which may stand for a million lots.)
     let is_one = !name.contains([':', ',']);
     let is_taken = |name: &str| is_one && scenarios::suite(name).is_ok_and(|lots| !lots.iter().any(LotSpec::is_file));
-    if [ALL, UNSEEN].contains(&name.as_str()) || is_taken(name) || is_taken(&format!("{name}-0")) {
+    // `test-easy (3 lots)`, the label of a row.
+    let is_label = name.ends_with(" lots)");
+    if [ALL, UNSEEN].contains(&name.as_str()) || is_label || is_taken(name) || is_taken(&format!("{name}-0")) {
         return format!("{name} (file)");
     }
     name.clone()
@@ -85,7 +87,10 @@ impl Lot {
     /// If nothing is named so, a file does not describe a lot, or two lots have the same name.
     pub fn parse_all<S: AsRef<str>>(specs: &[S], vehicle: &VehicleSettings) -> anyhow::Result<Vec<Self>> {
         let mut lots: Vec<Self> = Vec::new();
-        for spec in specs {
+        for (at, spec) in specs.iter().enumerate() {
+            // Before a million lots are made twice.
+            let is_new = specs[..at].iter().all(|other| other.as_ref() != spec.as_ref());
+            ensure!(is_new, "lot {:?} is named twice; name it once", spec.as_ref());
             for spec in scenarios::suite(spec.as_ref())? {
                 lots.push(Self::new(spec, vehicle)?);
             }
@@ -156,6 +161,11 @@ impl Lot {
         }
     }
 
+    /// Every file that it is made of: of a map its image and its route as well.
+    pub fn files(&self) -> &[PathBuf] {
+        self.from_file.as_ref().map_or(&[], |loaded| &loaded.files)
+    }
+
     /// Name in tables.
     pub fn name(&self) -> &str {
         &self.name
@@ -210,6 +220,23 @@ impl Lot {
     /// Whether trials draw their own obstacles; other lots are the same in every trial.
     pub fn is_drawn_per_trial(&self) -> bool {
         matches!(self.spec, LotSpec::Reference(_))
+    }
+
+    /// Whether there are enough lots of its kind for so many rounds of training, of `count` each; see [`Self::in_round`].
+    ///
+    /// # Errors
+    /// If there are not.
+    pub fn check_rounds(&self, rounds: u32, count: u64, different: u32) -> anyhow::Result<()> {
+        let LotSpec::Generated { split, index, .. } = &self.spec else { return Ok(()) };
+        let last = index.saturating_add(u64::from(rounds.saturating_sub(1)).saturating_mul(count));
+        ensure!(
+            different > 0 || last < split.size(),
+            "training.lots: {}: {rounds} rounds of {count} lots each come to number {last}, and there are {}; name \
+             fewer, or earlier ones",
+            self.name,
+            split.size()
+        );
+        Ok(())
     }
 
     /// The lot that takes its place in a round of training: of `count` generated lots of a kind, round after round the
@@ -283,7 +310,16 @@ mod tests {
             std::fs::write(&file, text.replace("name = \"slalom\"", &format!("name = {name:?}"))).unwrap();
             Lot::parse_all(&[file.display().to_string()], &VehicleSettings::hyundai_hg300()).unwrap().remove(0)
         };
-        for name in ["lot-b", "reference", "all", "unseen", "test-medium", "test-medium-3", "sealed-spring-lane"] {
+        for name in [
+            "lot-b",
+            "reference",
+            "all",
+            "unseen",
+            "test-medium",
+            "test-medium-3",
+            "sealed-spring-lane",
+            "test-easy (3 lots)",
+        ] {
             assert_eq!(named(name).group(), format!("{name} (file)"));
             assert_eq!(named(name).digest(), named("mine").digest());
         }
@@ -311,6 +347,13 @@ mod tests {
         };
         assert_eq!(names(0, 0), ["lot-a", "train-medium-0", "train-medium-1", "train-hard-0"]);
         assert_eq!(names(1, 0), ["lot-a", "train-medium-2", "train-medium-3", "train-hard-1"]);
+        let last = Lot::parse_one("sealed-x-easy-1048575", &VehicleSettings::hyundai_hg300()).unwrap();
+        assert!(
+            last.check_rounds(1, 1, 0).is_ok() && last.check_rounds(2, 1, 5).is_ok(),
+            "the last, and the same again"
+        );
+        let error = last.check_rounds(2, 1, 0).unwrap_err().to_string();
+        assert!(error.contains("there are 1048576"), "{error}");
         assert_eq!(names(1, 3), ["lot-a", "train-medium-2", "train-medium-0", "train-hard-1"], "three, then again");
     }
 }

@@ -19,6 +19,7 @@ use crate::manifest::{
 };
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
+use sim::limits::RUN_TOML_BYTES_MAX;
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -71,12 +72,18 @@ impl RunDir {
 
     /// Like [`create`](Self::create), within a run as well.
     fn create_anywhere(place: &Place<'_>, settings: &Settings, request: &Request) -> anyhow::Result<Self> {
+        let manifest = toml::to_string(&Manifest::new(place.build, [place.command, place.preset], settings, request))
+            .expect("a manifest is plain values");
+        ensure!(
+            manifest.len() as u64 <= RUN_TOML_BYTES_MAX,
+            "the manifest of this run would have {} bytes, and at most {RUN_TOML_BYTES_MAX} are read; drive fewer runs, or in \
+             more shards",
+            manifest.len()
+        );
         let run = match place.out {
             Some(out) => Self::claim_named(out, place)?,
             None => Self::claim_next_free(place)?,
         };
-        let manifest = toml::to_string(&Manifest::new(place.build, [place.command, place.preset], settings, request))
-            .expect("a manifest is plain values");
         whole::write(&run.path.join(SETTINGS), settings.to_toml().as_bytes())?;
         whole::write(&run.path.join(MANIFEST), manifest.as_bytes())?;
         sums::list(&run.path, &[SETTINGS, MANIFEST])?;

@@ -1,9 +1,9 @@
 //! The networks that runs have trained, as `run:DIR` and `run:DIR/bc` name them.
 
-use crate::manifest::{Finished, Manifest, Outcome, SETTINGS, finished};
+use crate::manifest::{Finished, MANIFEST, Manifest, Outcome, SETTINGS, finished};
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
-use sim::limits::SETTINGS_BYTES_MAX;
+use sim::limits::{RUN_TOML_BYTES_MAX, SETTINGS_BYTES_MAX};
 use sim::seed::RootSeed;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -86,6 +86,8 @@ pub fn driving_folders(spec: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let (run, is_bc) = run_of(spec)?;
     // Damage is an error. Settings that are whole may be of another version: the network alone can be used then.
     sums::read(&run.join(SETTINGS), SETTINGS_BYTES_MAX)?;
+    // It says which files the network was trained on.
+    sums::read(&run.join(MANIFEST), RUN_TOML_BYTES_MAX)?;
     let members = settings_of(spec).map_or(1, |settings| settings.dagger.rule.members());
     let round = policy.file_name().and_then(|name| name.to_str()).filter(|name| !is_bc && name.starts_with("round-"));
     let others = round.into_iter().flat_map(|round| (1..members).map(move |member| format!("{round}-member-{member}")));

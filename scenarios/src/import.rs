@@ -190,10 +190,13 @@ impl MapLot {
         self.check()?;
         let is_case = self.map.extension().is_some_and(|extension| extension == "csv");
         let mut notes = Vec::new();
+        let mut files = vec![self.file.clone(), self.map.clone()];
+        files.extend(self.centre_line.clone());
         let source = if is_case {
             Source::Case(tpcap::Case::read(&self.map)?)
         } else {
-            let (map, unused) = ros::Map::read(&self.map, self.is_image_anywhere)?;
+            let (map, image, unused) = ros::Map::read(&self.map, self.is_image_anywhere)?;
+            files.push(image);
             notes.extend(unused);
             Source::Map(map)
         };
@@ -236,7 +239,7 @@ impl MapLot {
         let map = Map::build(scenario.clone(), vehicle).map_err(|error| self.in_lot(error))?;
         let mouths = in_map(branches::find(&map, vehicle).into_iter().map(|branch| branch.mouth).collect());
         notes.extend((!mouths.is_empty()).then_some(Note::Open { mouths }));
-        Ok(Loaded { scenario, notes })
+        Ok(Loaded { scenario, files, notes })
     }
 
     fn check(&self) -> Result<(), LoadError> {

@@ -39,7 +39,7 @@ pub fn load_with_notes(path: &Path, vehicle: &VehicleSettings) -> Result<Loaded,
         return MapLot::read(path)?.scenario(vehicle);
     }
     let scenario = scenario_of(&document, &text, &file, vehicle)?;
-    Ok(Loaded { scenario, notes: Vec::new() })
+    Ok(Loaded { scenario, files: vec![path.to_owned()], notes: Vec::new() })
 }
 
 fn names_a_map(document: &Document<&str>) -> bool {
@@ -288,7 +288,7 @@ mod tests {
         files.sort();
         assert!(files.len() >= 29, "{files:?}");
         for file in files {
-            let Loaded { scenario, notes } = load_with_notes(&file, &car).unwrap_or_else(|error| panic!("{error}"));
+            let Loaded { scenario, notes, .. } = load_with_notes(&file, &car).unwrap_or_else(|error| panic!("{error}"));
             let is_open = |note: &Note| matches!(note, Note::Open { .. });
             assert!(!notes.iter().any(is_open), "{}: {notes:?}", file.display());
             let length_m = sim::path::Path::new(&scenario.reference_path).length_m();

@@ -1,12 +1,15 @@
 //! What a person should know about a lot that was imported, though nothing is wrong with it.
 
 use sim::scenario::Scenario;
+use std::path::PathBuf;
 
-/// A lot from a file, and notes about it.
+/// A lot from a file, what it was made of, and notes about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loaded {
     /// The lot.
     pub scenario: Scenario,
+    /// Every file that was read: the lot's own, the map's, its image, its route.
+    pub files: Vec<PathBuf>,
     /// Notes in order of the work; none for a lot written by hand.
     pub notes: Vec<Note>,
 }

@@ -25,6 +25,8 @@ pub const OBSTACLES_MAX: usize = 10_000;
 pub const SPEED_BUMPS_MAX: usize = 1_000;
 /// Characters of a name: files are named after it.
 pub const NAME_CHARS_MAX: usize = 100;
+/// Bytes of a name in UTF-8: file systems take 255, of which endings take some.
+pub const NAME_BYTES_MAX: usize = 200;
 
 /// File of a lot, bytes.
 pub const LOT_BYTES_MAX: u64 = 1_000_000;

@@ -4,8 +4,8 @@
 
 use crate::geometry::{Pose, Vec2, bounds, distance_to_segment, edges, polygon_contains};
 use crate::limits::{
-    COORDINATE_MAX_M, ISLANDS_MAX, LOT_EXTENT_MAX_M, NAME_CHARS_MAX, OBSTACLES_MAX, ROUTE_MAX_M, ROUTE_POINTS_MAX,
-    SPEED_BUMPS_MAX, VERTICES_MAX,
+    COORDINATE_MAX_M, ISLANDS_MAX, LOT_EXTENT_MAX_M, NAME_BYTES_MAX, NAME_CHARS_MAX, OBSTACLES_MAX, ROUTE_MAX_M,
+    ROUTE_POINTS_MAX, SPEED_BUMPS_MAX, VERTICES_MAX,
 };
 use crate::maths;
 use crate::path::Path;
@@ -89,6 +89,15 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
         let start: String = name.chars().take(20).collect();
         let problem = format!("the name {start:?} … has {length} characters");
         return fault(Place::Name, problem, format!("shorten it to at most {NAME_CHARS_MAX}"));
+    }
+    if name.len() > NAME_BYTES_MAX {
+        let start: String = name.chars().take(20).collect();
+        let problem = format!("the name {start:?} … has {} bytes", name.len());
+        return fault(
+            Place::Name,
+            problem,
+            format!("shorten it to at most {NAME_BYTES_MAX}; files are named after it"),
+        );
     }
     if let Some(bad) = name.chars().find(|&c| c.is_control() || matches!(c, '/' | '\\') || is_invisible(c)) {
         let problem = format!("the name {name:?} contains {bad:?}");

@@ -17,6 +17,7 @@ use anyhow::ensure;
 use clap::{Arg, Command, CommandFactory as _, FromArgMatches as _};
 use experiment::progress::Interrupted;
 use sim::limits::THREADS_MAX;
+use std::io::ErrorKind;
 use std::process::ExitCode;
 
 /// Stack size of every thread of the pool: as much as the main thread has on Linux.
@@ -32,9 +33,9 @@ pub fn main() -> ExitCode {
         return ExitCode::from(EXIT_REFUSED);
     }
     let command = with_negative_numbers(cli::Cli::command()).color(output::Color::from_args().of_clap());
-    let cli = match cli::Cli::from_arg_matches(&command.get_matches()) {
+    let cli = match command.try_get_matches().and_then(|matches| cli::Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
-        Err(error) => error.exit(),
+        Err(said) => return say(&said),
     };
     match run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
@@ -48,6 +49,18 @@ pub fn main() -> ExitCode {
             output::error(format_args!("{error:#}"));
             ExitCode::from(EXIT_REFUSED)
         }
+    }
+}
+
+/// Prints help, the version, or what is wrong with the command line. What nobody got on a full disk is no success; whoever
+/// closes stdout has had enough.
+fn say(said: &clap::Error) -> ExitCode {
+    match said.print() {
+        Err(error) if !said.use_stderr() && error.kind() != ErrorKind::BrokenPipe => {
+            output::error(format_args!("stdout: {error}"));
+            ExitCode::from(EXIT_REFUSED)
+        }
+        _ => ExitCode::from(u8::try_from(said.exit_code()).unwrap_or(EXIT_REFUSED)),
     }
 }
 

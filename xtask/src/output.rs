@@ -149,8 +149,12 @@ impl Output {
     }
 }
 
-/// A line on stderr.
+/// A line on stderr, which may quote files.
 pub(crate) fn note(text: impl Display) {
+    line(format_args!("{}", printable(&text.to_string())));
+}
+
+fn line(text: impl Display) {
     // Nobody to tell if stderr is closed.
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
@@ -180,9 +184,9 @@ fn printable(text: &str) -> String {
 pub(crate) fn error(text: impl Display) {
     let text = printable(&text.to_string());
     if Color::from_args().on_stderr() {
-        note(format_args!("\x1b[1;31merror:\x1b[0m {text}"));
+        line(format_args!("\x1b[1;31merror:\x1b[0m {text}"));
     } else {
-        note(format_args!("error: {text}"));
+        line(format_args!("error: {text}"));
     }
 }
 

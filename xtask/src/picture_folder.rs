@@ -2,9 +2,29 @@
 
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
+use experiment::lots::Lot;
 use report::pictures::drawing::Drawing;
 use report::pictures::file_name;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+
+/// Where the files lie that lots are made of.
+pub(crate) fn made_of(lots: &[Lot]) -> anyhow::Result<BTreeSet<PathBuf>> {
+    let files = lots.iter().flat_map(Lot::files);
+    files.map(|file| storage::place_of(file).with_context(|| file.display().to_string())).collect()
+}
+
+/// Refuses to write over one of these, however it is named.
+pub(crate) fn ensure_apart_from(places: &BTreeSet<PathBuf>, files: &[PathBuf]) -> anyhow::Result<()> {
+    for file in files {
+        ensure!(
+            !places.contains(&storage::place_of(file).with_context(|| file.display().to_string())?),
+            "{}: what the lot is made of lies there under that name; choose another --out",
+            file.display()
+        );
+    }
+    Ok(())
+}
 
 /// Where pictures go.
 pub(crate) struct Folder<'a> {
@@ -30,6 +50,11 @@ impl Folder<'_> {
     pub(crate) fn files(&self, name: &str, is_vector: bool) -> Vec<PathBuf> {
         let extensions: &[&str] = if is_vector { &["png", "svg"] } else { &["png"] };
         extensions.iter().map(|extension| self.path.join(format!("{}.{extension}", file_name(name)))).collect()
+    }
+
+    /// Refuses to draw over what a lot is made of.
+    pub(crate) fn check_apart_from(&self, lots: &[Lot], name: &str, is_vector: bool) -> anyhow::Result<()> {
+        ensure_apart_from(&made_of(lots)?, &self.files(name, is_vector))
     }
 
     /// Refuses to replace files unasked: before anything is driven or drawn.

@@ -162,6 +162,9 @@ impl DriverSpec {
                 Self::Planner { name, parameters: Parameters::File(a) },
                 Self::Planner { name: other_name, parameters: Parameters::File(b) },
             ) => self == other || name == other_name && is_one(a, b),
+            (Self::Ensemble { members }, Self::Ensemble { members: others }) => {
+                members.len() == others.len() && members.iter().zip(others).all(|(a, b)| a.is_same_as(b))
+            }
             _ => self == other,
         }
     }
@@ -203,7 +206,10 @@ impl DriverSpec {
                 matches!(member, Self::Run { .. } | Self::Checkpoint { .. }),
                 "{member} cannot be part of an ensemble; its members are networks, as in ensemble:run:A,net:B/round-03"
             );
-            ensure!(!members[..at].contains(member), "{member} is named twice in an ensemble");
+            ensure!(
+                !members[..at].iter().any(|other| other.is_same_as(member)),
+                "{member} is named twice in an ensemble"
+            );
         }
         Ok(Self::Ensemble { members })
     }
@@ -238,6 +244,7 @@ mod tests {
             ("runs/mine", "there are expert, run:DIR"),
             ("ensemble:run:runs/a,expert", "expert cannot be part of an ensemble"),
             ("ensemble:run:runs/a,run:runs/a", "named twice"),
+            ("ensemble:run:runs/a,run:./runs/a", "named twice"),
             ("ensemble:", "there are expert, run:DIR"),
             ("python:mine", "lotpilot.evaluate"),
             ("tuned:tentacles", "there are tuned:tentacle, tuned:vvf"),

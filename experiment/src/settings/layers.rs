@@ -51,8 +51,16 @@ impl Settings {
         if let Some(seed) = seed {
             settings.seed = RootSeed(seed);
         }
+        settings.name_lots_one_by_one();
         settings.check()?;
         Ok(settings)
+    }
+
+    /// `"a,b"` as `"a", "b"`: what a network was trained on is known by single names.
+    pub fn name_lots_one_by_one(&mut self) {
+        for lots in [&mut self.training.lots, &mut self.evaluation.lots, &mut self.evaluation.elsewhere] {
+            *lots = lots.iter().flat_map(|names| names.split(',').map(|name| name.trim().to_owned())).collect();
+        }
     }
 
     /// Reads complete settings, as written into a run.
@@ -189,6 +197,9 @@ fn parse_override(text: &str) -> anyhow::Result<(Vec<String>, Value)> {
         .and_then(|mut table| table.remove("value").filter(|_| table.is_empty()));
     let is_word = !value.is_empty() && value.chars().all(|c| c.is_alphanumeric() || "-_".contains(c));
     match parsed {
+        Some(Value::Table(table)) if table.is_empty() => {
+            bail!("--set {said}: an empty table changes nothing; name a key and its value")
+        }
         Some(value) => Ok((key, value)),
         // A bare word can only be meant as a string.
         None if is_word => Ok((key, Value::String(value.to_owned()))),

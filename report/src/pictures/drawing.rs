@@ -12,7 +12,7 @@ use tiny_skia::{
 pub type Rgb = [u8; 3];
 
 /// Longest side that is drawn, pixels: 16384² pixels are a gigabyte.
-const SIDE_MAX_PX: f32 = 16_384.0;
+pub(crate) const SIDE_MAX_PX: f32 = 16_384.0;
 
 /// Sizes of letters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -101,7 +101,7 @@ impl Map {
     ///
     /// # Errors
     /// What is wrong with either, with file, place and remedy.
-    pub(super) fn read(path: &Path, is_image_anywhere: bool) -> Result<(Self, Vec<Note>), LoadError> {
+    pub(super) fn read(path: &Path, is_image_anywhere: bool) -> Result<(Self, PathBuf, Vec<Note>), LoadError> {
         let text = read_text(path, MAP_YAML_BYTES_MAX)?;
         let header = Header::parse(&text, path)?;
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -121,7 +121,8 @@ impl Map {
             return Err(fault(problem, remedy));
         }
         let image = read::bytes(&file, IMAGE_BYTES_MAX).map_err(unreadable)?;
-        header.map_of(&text, &image).map_err(|(problem, remedy)| fault(problem, &remedy))
+        let (map, notes) = header.map_of(&text, &image).map_err(|(problem, remedy)| fault(problem, &remedy))?;
+        Ok((map, file, notes))
     }
 
     /// [`read`](Self::read), of the text of a YAML file and the bytes of its image.

@@ -54,7 +54,7 @@ fn small_map(name: &str, origin: &str) -> MapLot {
 
 /// `seed`: in the map's frame.
 fn ground(lot: &MapLot, seed: [f64; 2]) -> Ground {
-    let (map, _) = ros::Map::read(&lot.map, false).unwrap();
+    let (map, ..) = ros::Map::read(&lot.map, false).unwrap();
     lot.ros_ground(&map, Frame::around(seed, lot.scale), seed, None, &car(), &mut Vec::new()).unwrap()
 }
 
@@ -418,7 +418,7 @@ fn a_speck_becomes_the_smallest_island_or_is_left_out_as_asked() {
 fn a_speck_beside_a_wall_grows_into_it() {
     // At 2 cm per pixel it grows by two pixels to either side.
     let lot = MapLot { scale: 0.2, ..fine_lane("speck-at-wall", |x, y| (x, y) == (300, 2)) };
-    let (map, _) = ros::Map::read(&lot.map, false).unwrap();
+    let (map, ..) = ros::Map::read(&lot.map, false).unwrap();
     let (seed, mut notes) = ([8.0, 2.6], Vec::new());
     let ground = lot.ros_ground(&map, Frame::around(seed, 0.2), seed, None, &car(), &mut notes).unwrap();
     assert_eq!(notes, [Note::Padded { specks: 1 }]);
@@ -510,7 +510,7 @@ fn blocked_ground_stays_blocked_to_a_fifth_of_a_metre() {
         let folder =
             folder("coarse", &[("map.yaml", &yaml(&pixel_m.to_string(), "[0, 0, 0]")), ("map.pgm", &pgm(&rows))]);
         let lot = MapLot::of_map(&folder.join("map.yaml"));
-        let (map, _) = ros::Map::read(&lot.map, false).unwrap();
+        let (map, ..) = ros::Map::read(&lot.map, false).unwrap();
         let ground = ground(&lot, [30.0 * pixel_m, 12.0 * pixel_m]);
         let polygon = |outline: &[Vec2]| -> Polygon<f64> {
             let ring = outline.iter().map(|p| (f64::from(p.x), f64::from(p.y))).collect::<LineString<f64>>();
@@ -609,7 +609,7 @@ fn keys_that_mean_nothing_are_named_in_a_note() {
     let text = yaml("0.5", "[0, 0, 0]") + "negat: 1\nZ: [2]\n";
     std::fs::write(&lot.map, text).unwrap();
     lot.scale = 10.0;
-    let (_, notes) = ros::Map::read(&lot.map, false).unwrap();
+    let (.., notes) = ros::Map::read(&lot.map, false).unwrap();
     assert_eq!(notes, [Note::Unused { keys: vec!["Z".to_owned(), "negat".to_owned()] }]);
     assert!(notes[0].to_string().contains("\"negat\""), "{}", notes[0]);
 }
@@ -618,7 +618,7 @@ fn keys_that_mean_nothing_are_named_in_a_note() {
 #[test]
 fn unknown_ground_that_counts_as_free_is_named_in_a_note() {
     let lot = small_map("unknown-free", "[0, 0, 0]");
-    let notes = || ros::Map::read(&lot.map, false).unwrap().1;
+    let notes = || ros::Map::read(&lot.map, false).unwrap().2;
     assert_eq!(notes(), []);
     let text = yaml("0.5", "[0, 0, 0]").replace("free_thresh: 0.196", "free_thresh: 0.25");
     std::fs::write(&lot.map, &text).unwrap();

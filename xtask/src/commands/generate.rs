@@ -4,6 +4,7 @@ use super::render::check_scale;
 use crate::args::lot_name;
 use crate::console::Console;
 use crate::output::Output;
+use crate::picture_folder;
 use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 use experiment::lots::Lot;
@@ -122,7 +123,7 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
             .filter(|(index, _)| args.shard.is_none_or(|shard| shard.takes(*index)))
             .map(|(_, trial)| trial)
             .collect();
-    ensure_free(args, &trials)?;
+    ensure_free(args, &lots, &trials)?;
     let console = Console::new(output);
     console.begin("generating", "generating");
     let mut made = Vec::new();
@@ -194,8 +195,9 @@ fn files(args: &GenerateArgs, name: &str) -> [PathBuf; 2] {
 }
 
 /// Refuses lots whose files are there, or would be those of another one, before the first is written.
-fn ensure_free(args: &GenerateArgs, trials: &[Trial<'_>]) -> anyhow::Result<()> {
+fn ensure_free(args: &GenerateArgs, lots: &[Lot], trials: &[Trial<'_>]) -> anyhow::Result<()> {
     let mut taken = BTreeMap::new();
+    let made_of = picture_folder::made_of(lots)?;
     for trial in trials {
         let name = file_name(args, trial);
         // Some file systems take no notice of capitals.
@@ -205,14 +207,8 @@ fn ensure_free(args: &GenerateArgs, trials: &[Trial<'_>]) -> anyhow::Result<()> 
                 trial.lot.name()
             );
         }
+        picture_folder::ensure_apart_from(&made_of, &files(args, &name))?;
         for path in files(args, &name) {
-            // Beside a map lie its image and its route under the same name.
-            let source = trial.lot.file().map(|file| file.with_extension("")).map(|stem| storage::place_of(&stem));
-            ensure!(
-                source.transpose()? != Some(storage::place_of(&path.with_extension(""))?),
-                "{}: what the lot is made of lies there under that name; choose another --out",
-                path.display()
-            );
             ensure!(
                 args.overwrite || !path.exists(),
                 "{}: exists already; choose another --out or --seed, or replace it with --overwrite",

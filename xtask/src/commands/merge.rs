@@ -19,7 +19,7 @@ use evaluation::stages::{self, Step};
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
-use experiment::manifest::{Build, Request};
+use experiment::manifest::{Build, Manifest, Request};
 use experiment::run_dir::{Place, RunDir};
 use std::path::{Path, PathBuf};
 use storage::sums;
@@ -120,17 +120,22 @@ fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> 
         libraries: made.libraries.clone(),
         ..build_info::get().clone()
     };
-    if made.git_dirty == Some(true) {
-        output.note("note: made with uncommitted changes, which merge cannot compare");
-    }
     let place = args.out.place(evaluate::COMMAND, &made.preset, settings.evaluation.seed.0);
     let run = RunDir::create(&Place { build: &build, ..place }, settings, &request)?;
     put_together(&plan, &rows, &run, output)
 }
 
+/// Says that sameness of the version is not known.
+fn note_changes(made: &Manifest, output: &Output) {
+    if made.git_dirty == Some(true) {
+        output.note("note: made with uncommitted changes, which merge cannot compare");
+    }
+}
+
 /// Finishes an evaluation whose rows are known. From here on it is one like any other, which `evaluate --resume` finishes if
 /// this is interrupted.
 fn put_together(plan: &Plan<'_>, rows: &Rows, run: &RunDir, output: &Output) -> anyhow::Result<()> {
+    note_changes(&Manifest::read(run.path())?, output);
     interrupt::can_resume(evaluate::COMMAND, run.path());
     rows.write(run)?;
     evaluate::finish(plan, run, &Console::new(output), output)
@@ -164,6 +169,7 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
             sums::copy_folder(path, run.path(), folder)?;
         }
     }
+    note_changes(manifest, output);
     let name = run.path().display();
     output.note(format_args!(
         "written: {name}: {} trainings; continue with cargo xtask reproduce --resume {name}, or on several machines \
@@ -190,6 +196,7 @@ fn drives(shards: &Shards, networks: &Path, output: &Output) -> anyhow::Result<(
             merged.push((stage, parts.rows(&DriveStage::load(stage)?.plan())?));
         }
     }
+    note_changes(shards.manifest(), output);
     interrupt::can_resume(reproduce::COMMAND, run.path());
     for (stage, rows) in merged {
         let place = perform::place_of(reproduce::COMMAND, &stage.settings);

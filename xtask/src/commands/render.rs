@@ -7,7 +7,7 @@ use crate::args::{LayerArgs, lot_name};
 use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
-use crate::picture_folder::Folder;
+use crate::picture_folder::{self, Folder};
 use anyhow::{Context as _, ensure};
 use clap::{ArgGroup, Args, Subcommand, ValueEnum};
 use experiment::drive::Replay;
@@ -228,7 +228,11 @@ fn render_lots(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> 
     check_scale(args.pixels_per_metre)?;
     let episode = Settings::preset("default")?.episode;
     let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
-    lots.iter().try_for_each(|lot| folder.check(lot.name(), true))?;
+    let made_of = picture_folder::made_of(&lots)?;
+    for lot in &lots {
+        folder.check(lot.name(), true)?;
+        picture_folder::ensure_apart_from(&made_of, &folder.files(lot.name(), true))?;
+    }
     let console = Console::new(folder.output);
     console.begin("lots", "drawing lots");
     let mut drawn = 0_usize;
@@ -252,6 +256,8 @@ fn contact_sheet(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()
     folder.check(NAME, true)?;
     let episode = Settings::preset("default")?.episode;
     let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
+    folder.check_apart_from(&lots, NAME, true)?;
+    contact_sheet::check(lots.len())?;
     let console = Console::new(folder.output);
     console.begin("lots", "drawing lots");
     let maps = maps(&lots, args.seed, &episode)?;

@@ -171,6 +171,9 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
         settings.seed.0,
         extent.seeds
     );
+    for stage in stages::all(&settings, &extent, Path::new("")) {
+        stage.settings.check().with_context(|| stage.folder.clone())?;
+    }
     let preset = format!("{}{}", if args.full { "full-" } else { "" }, layers.preset_name());
     // Only the names of the folders are asked for: the run has no place yet.
     let record =

@@ -76,6 +76,7 @@ pub(crate) fn run(args: &SampleSizeArgs, output: &Output) -> anyhow::Result<()> 
         ensure!(a != b, "--between {a},{b}: equal rates cannot be told apart");
         let question = Question { per_100m: [a, b], power: args.power, alpha: 1.0 - args.confidence, dispersion };
         let metres = question.metres_each();
+        ensure!(metres.is_finite(), "--between {a},{b}: no distance tells rates apart that are so near to each other");
         output.remark(format_args!(
             "{metres:.0} m per driver tell {a} from {b} per 100 m in {} % of all evaluations (exact test, {percent} %, \
              dispersion {dispersion})",
@@ -87,8 +88,12 @@ pub(crate) fn run(args: &SampleSizeArgs, output: &Output) -> anyhow::Result<()> 
     if args.json.json { output.table(String::new, &answers) } else { Ok(()) }
 }
 
+/// Below it a distance is longer than anybody drives.
+const RATE_MIN: f64 = 1e-9;
+
 fn check(rates: &[f64], flag: &str) -> anyhow::Result<()> {
     for &rate in rates {
+        ensure!(rate == 0.0 || rate.abs() >= RATE_MIN, "{flag} {rate}: a rate is 0 or at least {RATE_MIN} per 100 m");
         ensure!((0.0..=1e3).contains(&rate), "{flag} {rate}: a rate is a number of events per 100 m within 0 … 1000");
     }
     Ok(())

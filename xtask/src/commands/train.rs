@@ -25,7 +25,7 @@ use experiment::training;
 use experiment::view_request::Show;
 use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 pub(crate) const DAGGER_EXAMPLES: &str = "\
@@ -97,6 +97,8 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         let mut settings = Settings::resolve(&layers, args.seed)?;
         settings.training.lots.extend_from_slice(&args.also);
         adjust(&mut settings);
+        settings.name_lots_one_by_one();
+        settings.check()?;
         // Before the folder is claimed: a misspelt lot should not leave one behind.
         let places = check_lots(&settings, output)?;
         args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
@@ -219,6 +221,14 @@ pub(crate) fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result
         ("evaluation", &evaluation.elsewhere, &evaluation.directions, &evaluation.noise),
     ] {
         let lots = Lot::parse_all(lots, &episode.vehicle)?;
+        if section == "training" {
+            let of_a_kind = |lot: &Lot| lots.iter().filter(|other| other.group() == lot.group()).count() as u64;
+            let kinds: BTreeMap<String, &Lot> = lots.iter().map(|lot| (lot.group(), lot)).collect();
+            let rounds = settings.dagger.iterations_max.saturating_add(1);
+            for lot in kinds.into_values() {
+                lot.check_rounds(rounds, of_a_kind(lot), training.different_lots)?;
+            }
+        }
         output.notes(&notes::of(&lots, noise));
         places.extend(inputs::places(&lots, &[]));
         for lot in lots {
