@@ -39,7 +39,7 @@ class Evaluation:
     causes: Table
     """Near-collisions by cause."""
     noise_sweep: Table
-    """Drivers against noise; empty for one level."""
+    """Drivers against noise."""
     runs: Table
     """Every run."""
     failures: Table
