@@ -88,6 +88,7 @@ fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Res
     let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
     let seed = settings.evaluation.seed.0;
     let run = RunDir::create(&args.out.place(evaluate::COMMAND, &manifest.preset, seed), settings, &request)?;
+    note_changes(manifest, output);
     put_together(&plan, &rows, &run, output)
 }
 
@@ -122,6 +123,7 @@ fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> 
     };
     let place = args.out.place(evaluate::COMMAND, &made.preset, settings.evaluation.seed.0);
     let run = RunDir::create(&Place { build: &build, ..place }, settings, &request)?;
+    note_changes(made, output);
     put_together(&plan, &rows, &run, output)
 }
 
@@ -135,7 +137,6 @@ fn note_changes(made: &Manifest, output: &Output) {
 /// Finishes an evaluation whose rows are known. From here on it is one like any other, which `evaluate --resume` finishes if
 /// this is interrupted.
 fn put_together(plan: &Plan<'_>, rows: &Rows, run: &RunDir, output: &Output) -> anyhow::Result<()> {
-    note_changes(&Manifest::read(run.path())?, output);
     interrupt::can_resume(evaluate::COMMAND, run.path());
     rows.write(run)?;
     evaluate::finish(plan, run, &Console::new(output), output)
