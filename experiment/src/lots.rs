@@ -11,7 +11,7 @@ use sim::scenario::{Direction, NoiseLevel, Scenario};
 use sim::seed::RootSeed;
 use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -222,23 +222,6 @@ impl Lot {
         matches!(self.spec, LotSpec::Reference(_))
     }
 
-    /// Whether there are enough lots of its kind for so many rounds of training, of `count` each; see [`Self::in_round`].
-    ///
-    /// # Errors
-    /// If there are not.
-    pub fn check_rounds(&self, rounds: u32, count: u64, different: u32) -> anyhow::Result<()> {
-        let LotSpec::Generated { split, index, .. } = &self.spec else { return Ok(()) };
-        let last = index.saturating_add(u64::from(rounds.saturating_sub(1)).saturating_mul(count));
-        ensure!(
-            different > 0 || last < split.size(),
-            "training.lots: {}: {rounds} rounds of {count} lots each come to number {last}, and there are {}; name \
-             fewer, or earlier ones",
-            self.name,
-            split.size()
-        );
-        Ok(())
-    }
-
     /// The lot that takes its place in a round of training: of `count` generated lots of a kind, round after round the
     /// next `count`, from the beginning again after `different` of them (0: never). Other lots stay: they draw new
     /// obstacles, or are files.
@@ -267,6 +250,30 @@ impl Lot {
             }
         }
     }
+}
+
+/// Checks that there are enough generated lots for so many rounds of training; see [`Lot::in_round`].
+///
+/// # Errors
+/// If one would have a number that no lot has.
+pub fn check_rounds(lots: &[Lot], rounds: u32, different: u32) -> anyhow::Result<()> {
+    let mut of_a_kind: BTreeMap<String, u64> = BTreeMap::new();
+    for lot in lots {
+        *of_a_kind.entry(lot.group()).or_default() += 1;
+    }
+    for lot in lots {
+        let LotSpec::Generated { split, index, .. } = &lot.spec else { continue };
+        let count = of_a_kind[&lot.group()];
+        let last = index.saturating_add(u64::from(rounds.saturating_sub(1)).saturating_mul(count));
+        ensure!(
+            different > 0 || last < split.size(),
+            "training.lots: {}: {rounds} rounds of {count} lots each come to number {last}, and there are {}; name \
+             fewer, or earlier ones",
+            lot.name,
+            split.size()
+        );
+    }
+    Ok(())
 }
 
 /// Refuses another car than ours that does not fit where it starts, before anything is driven: of each kind of lot one is
@@ -347,13 +354,12 @@ mod tests {
         };
         assert_eq!(names(0, 0), ["lot-a", "train-medium-0", "train-medium-1", "train-hard-0"]);
         assert_eq!(names(1, 0), ["lot-a", "train-medium-2", "train-medium-3", "train-hard-1"]);
-        let last = Lot::parse_one("sealed-x-easy-1048575", &VehicleSettings::hyundai_hg300()).unwrap();
-        assert!(
-            last.check_rounds(1, 1, 0).is_ok() && last.check_rounds(2, 1, 5).is_ok(),
-            "the last, and the same again"
-        );
-        let error = last.check_rounds(2, 1, 0).unwrap_err().to_string();
-        assert!(error.contains("there are 1048576"), "{error}");
+        // Whichever of its kind is named last.
+        let last = ["sealed-x-easy-1048574", "sealed-x-easy-0"];
+        let last = Lot::parse_all(&last, &VehicleSettings::hyundai_hg300()).unwrap();
+        assert!(check_rounds(&last, 1, 0).is_ok() && check_rounds(&last, 2, 5).is_ok(), "once, and the same again");
+        let error = check_rounds(&last, 2, 0).unwrap_err().to_string();
+        assert!(error.contains("come to number 1048576, and there are 1048576"), "{error}");
         assert_eq!(names(1, 3), ["lot-a", "train-medium-2", "train-medium-0", "train-hard-1"], "three, then again");
     }
 }

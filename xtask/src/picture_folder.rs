@@ -16,7 +16,8 @@ pub(crate) fn made_of(lots: &[Lot]) -> anyhow::Result<BTreeSet<PathBuf>> {
 
 /// Refuses to write over one of these, however it is named.
 pub(crate) fn ensure_apart_from(places: &BTreeSet<PathBuf>, files: &[PathBuf]) -> anyhow::Result<()> {
-    for file in files {
+    // Of generated lots nothing is looked up, of which there may be a million.
+    for file in files.iter().filter(|_| !places.is_empty()) {
         ensure!(
             !places.contains(&storage::place_of(file).with_context(|| file.display().to_string())?),
             "{}: what the lot is made of lies there under that name; choose another --out",
@@ -50,11 +51,6 @@ impl Folder<'_> {
     pub(crate) fn files(&self, name: &str, is_vector: bool) -> Vec<PathBuf> {
         let extensions: &[&str] = if is_vector { &["png", "svg"] } else { &["png"] };
         extensions.iter().map(|extension| self.path.join(format!("{}.{extension}", file_name(name)))).collect()
-    }
-
-    /// Refuses to draw over what a lot is made of.
-    pub(crate) fn check_apart_from(&self, lots: &[Lot], name: &str, is_vector: bool) -> anyhow::Result<()> {
-        ensure_apart_from(&made_of(lots)?, &self.files(name, is_vector))
     }
 
     /// Refuses to replace files unasked: before anything is driven or drawn.

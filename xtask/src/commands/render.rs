@@ -256,7 +256,7 @@ fn contact_sheet(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()
     folder.check(NAME, true)?;
     let episode = Settings::preset("default")?.episode;
     let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
-    folder.check_apart_from(&lots, NAME, true)?;
+    picture_folder::ensure_apart_from(&picture_folder::made_of(&lots)?, &folder.files(NAME, true))?;
     contact_sheet::check(lots.len())?;
     let console = Console::new(folder.output);
     console.begin("lots", "drawing lots");

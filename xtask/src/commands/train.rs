@@ -15,7 +15,7 @@ use evaluation::plan::Plan;
 use evaluation::table1::Table1;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs::{self, Inputs};
-use experiment::lots::Lot;
+use experiment::lots::{self, Lot};
 use experiment::manifest::{Outcome, Request};
 use experiment::notes;
 use experiment::progress::{Interrupted, Progress};
@@ -25,7 +25,7 @@ use experiment::training;
 use experiment::view_request::Show;
 use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 pub(crate) const DAGGER_EXAMPLES: &str = "\
@@ -222,12 +222,8 @@ pub(crate) fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result
     ] {
         let lots = Lot::parse_all(lots, &episode.vehicle)?;
         if section == "training" {
-            let of_a_kind = |lot: &Lot| lots.iter().filter(|other| other.group() == lot.group()).count() as u64;
-            let kinds: BTreeMap<String, &Lot> = lots.iter().map(|lot| (lot.group(), lot)).collect();
             let rounds = settings.dagger.iterations_max.saturating_add(1);
-            for lot in kinds.into_values() {
-                lot.check_rounds(rounds, of_a_kind(lot), training.different_lots)?;
-            }
+            lots::check_rounds(&lots, rounds, training.different_lots)?;
         }
         output.notes(&notes::of(&lots, noise));
         places.extend(inputs::places(&lots, &[]));
