@@ -131,6 +131,10 @@ fn what_is_read_is_never_deleted_or_written_into_however_it_is_named() {
     let of_run = [&evaluate[..2], &["run:run"], &evaluate[3..]].concat();
     std::fs::create_dir(folder.join("other")).unwrap();
     std::fs::copy(folder.join("mine.toml"), folder.join("other/mine.toml")).unwrap();
+    std::fs::create_dir(folder.join("network")).unwrap();
+    for file in std::fs::read_dir(folder.join("run/round-00")).unwrap().map(Result::unwrap) {
+        std::fs::copy(file.path(), folder.join("network").join(file.file_name())).unwrap();
+    }
     let before = files(&folder);
     let refuses = |arguments: &[&str], part: &str| {
         let error = refuse(xtask().current_dir(&folder).args(arguments));
@@ -150,6 +154,10 @@ fn what_is_read_is_never_deleted_or_written_into_however_it_is_named() {
     for file in ["run/sha256sums", "run/round-00/model.safetensors", "run/new.onnx"] {
         refuses(&["export", "onnx", "run", "--out", file, "--overwrite"], "lies within the run");
     }
+    refuses(
+        &["export", "onnx", "network", "--out", "network/model.safetensors", "--overwrite"],
+        "the network is read from that folder",
+    );
     refuses(&["render", "results", "run", "--to", "mine.toml"], "is not a page of results");
     #[cfg(unix)]
     {

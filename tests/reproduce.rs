@@ -192,11 +192,11 @@ fn shards_of_trainings_and_of_drives_come_to_the_bytes_of_one_machine() {
     std::fs::write(&damaged, content).unwrap();
     succeed(xtask().arg("merge").args(&trained).arg("--out").arg(&run));
     // A merge that died continues, and does nothing twice.
-    std::fs::rename(run.join("chains/s1-alpha-15"), run.join("chains/s1-alpha-15.partial")).unwrap();
-    std::fs::remove_file(run.join("chains/s1-alpha-15.partial/sha256sums")).unwrap();
+    std::fs::rename(run.join("chains/s1-alpha-15"), run.join("chains/s1-alpha-15.lotpilot-partial")).unwrap();
+    std::fs::remove_file(run.join("chains/s1-alpha-15.lotpilot-partial/sha256sums")).unwrap();
     sums::unlist(&run, &["chains/s1-alpha-15/sha256sums"]).unwrap();
     succeed(xtask().arg("merge").args(&trained).arg("--out").arg(&run));
-    assert!(sums::verify(&run).faults.is_empty() && !run.join("chains/s1-alpha-15.partial").exists());
+    assert!(sums::verify(&run).faults.is_empty() && !run.join("chains/s1-alpha-15.lotpilot-partial").exists());
     let manifest = std::fs::read_to_string(run.join("manifest.toml")).unwrap();
     assert!(manifest.contains(r#"command_line = ["reproduce", "--preset", "smoke"]"#), "{manifest}");
     assert!(!run.join("drives").exists() && run.join("chains/s1-alpha-15/finished.toml").is_file());

@@ -2,8 +2,9 @@
 //! elsewhere knows what it was made of.
 #![allow(clippy::print_stdout, reason = "how a build script speaks to cargo")]
 
+use std::io::Write as _;
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output, Stdio};
 
 /// What the program is made of, beside this folder: the crates it links and the files of the workspace.
 const SOURCES: [&str; 16] = [
@@ -30,11 +31,7 @@ fn main() {
     let version = output(Command::new(rustc).arg("--version")).unwrap_or_default();
     println!("cargo::rustc-env=XTASK_RUSTC={version}");
     println!("cargo::rustc-env=XTASK_GIT_REVISION={}", git(&["rev-parse", "HEAD"]).unwrap_or_default());
-    let status = git(&[&["status", "--porcelain", "--untracked-files=no", "--"][..], &SOURCES[..]].concat());
-    println!(
-        "cargo::rustc-env=XTASK_GIT_CHANGES={}",
-        status.map_or("unknown", |found| if found.is_empty() { "no" } else { "yes" })
-    );
+    println!("cargo::rustc-env=XTASK_GIT_CHANGES={}", changes().unwrap_or_else(|| "unknown".to_owned()));
     for source in SOURCES {
         println!("cargo::rerun-if-changed=../{source}");
     }
@@ -48,17 +45,43 @@ fn main() {
     }
 }
 
+/// How the sources differ from the commit: git's hash of the differences and of the files that it does not track; empty if
+/// they do not, `None` without git or checkout.
+fn changes() -> Option<String> {
+    let of_sources = |args: &[&str]| git(&[args, &["--"], &SOURCES].concat());
+    let mut differences = of_sources(&["diff", "--binary", "--no-ext-diff", "HEAD"])?;
+    let untracked = of_sources(&["ls-files", "--others", "--exclude-standard"])?;
+    for file in untracked.lines() {
+        differences += &format!("\n{file} {}", git(&["hash-object", "--", file])?);
+    }
+    if differences.is_empty() {
+        return Some(differences);
+    }
+    let mut hash =
+        git_command(&["hash-object", "--stdin"]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().ok()?;
+    hash.stdin.take()?.write_all(differences.as_bytes()).ok()?;
+    text_of(&hash.wait_with_output().ok()?)
+}
+
 /// What git says about the checkout that is built; `None` without git or checkout.
 fn git(args: &[&str]) -> Option<String> {
+    output(&mut git_command(args))
+}
+
+fn git_command(args: &[&str]) -> Command {
     let mut git = Command::new("git");
     // Set where git runs a hook: they name another checkout.
     for name in ["GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_COMMON_DIR", "GIT_OBJECT_DIRECTORY"] {
         git.env_remove(name);
     }
-    output(git.arg("--no-optional-locks").current_dir("..").args(args))
+    git.arg("--no-optional-locks").current_dir("..").args(args);
+    git
 }
 
 fn output(command: &mut Command) -> Option<String> {
-    let output = command.output().ok().filter(|output| output.status.success())?;
-    Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    text_of(&command.output().ok()?)
+}
+
+fn text_of(output: &Output) -> Option<String> {
+    output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
 }

@@ -9,6 +9,7 @@ use experiment::settings::Settings;
 use experiment::shard::Shard;
 use experiment::trained;
 use serde::{Deserialize, Serialize};
+use sim::limits::RUN_TOML_BYTES_MAX;
 use std::path::{Path, PathBuf};
 use storage::sums;
 
@@ -33,10 +34,24 @@ pub struct ShardRecord {
 
 impl ShardRecord {
     /// The record of a plan; `None` if it is to be driven whole.
-    pub fn of(plan: &Plan<'_>) -> Option<Self> {
-        let keys = || plan.trials().map(|trial| parts::key(&trial)).collect();
-        let settings_sha256 = || digest(plan.settings);
-        plan.shard.map(|number| Self { number, settings_sha256: settings_sha256(), keys: keys(), networks: None })
+    ///
+    /// # Errors
+    /// If a manifest has no room for the keys of so many trials.
+    pub fn of(plan: &Plan<'_>) -> anyhow::Result<Option<Self>> {
+        let Some(number) = plan.shard else { return Ok(None) };
+        let mut keys = Vec::new();
+        let mut bytes = 0;
+        for trial in plan.trials() {
+            let key = parts::key(&trial);
+            bytes += key.len() as u64;
+            ensure!(
+                bytes <= RUN_TOML_BYTES_MAX,
+                "the keys of the trials of shard {number} take more than {RUN_TOML_BYTES_MAX} bytes; drive fewer runs, or \
+                 in more shards"
+            );
+            keys.push(key);
+        }
+        Ok(Some(Self { number, settings_sha256: digest(plan.settings), keys, networks: None }))
     }
 
     /// The record of a reproduction: of its trainings, or of what the networks in a folder drive.

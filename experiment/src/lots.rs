@@ -7,6 +7,7 @@ use scenarios::import::MapLot;
 use scenarios::note::{Loaded, Note};
 use scenarios::reference::{self, ReferenceLot};
 use scenarios::split::{Family, Split};
+use sim::limits::LOTS_MAX;
 use sim::scenario::{Direction, NoiseLevel, Scenario};
 use sim::seed::RootSeed;
 use sim::validate::validate;
@@ -86,15 +87,19 @@ impl Lot {
     /// # Errors
     /// If nothing is named so, a file does not describe a lot, or two lots have the same name.
     pub fn parse_all<S: AsRef<str>>(specs: &[S], vehicle: &VehicleSettings) -> anyhow::Result<Vec<Self>> {
-        let mut lots: Vec<Self> = Vec::new();
+        let mut suites = Vec::new();
+        let mut count = 0;
         for (at, spec) in specs.iter().enumerate() {
             // Before a million lots are made twice.
             let is_new = specs[..at].iter().all(|other| other.as_ref() != spec.as_ref());
             ensure!(is_new, "lot {:?} is named twice; name it once", spec.as_ref());
-            for spec in scenarios::suite(spec.as_ref())? {
-                lots.push(Self::new(spec, vehicle)?);
-            }
+            let suite = scenarios::suite(spec.as_ref())?;
+            count += suite.len();
+            ensure!(count <= LOTS_MAX, "{count} lots; at most {LOTS_MAX} are possible");
+            suites.push(suite);
         }
+        let lots = suites.into_iter().flatten().map(|spec| Self::new(spec, vehicle));
+        let lots = lots.collect::<anyhow::Result<Vec<Self>>>()?;
         let mut names: Vec<&str> = lots.iter().map(Self::name).collect();
         names.sort_unstable();
         let twice = names.windows(2).find(|pair| pair[0] == pair[1]);

@@ -52,6 +52,9 @@ pub struct Manifest {
     /// Whether sources of the program differed from that revision when it was built.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub git_dirty: Option<bool>,
+    /// Git's hash of how they differed, where they did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub git_changes: Option<String>,
     /// The compiler that built the program.
     pub rustc_version: String,
     /// Threads it computed with; results do not depend on it.
@@ -130,6 +133,8 @@ pub struct Build {
     pub git_revision: Option<String>,
     /// Whether its sources differed from that revision.
     pub git_dirty: Option<bool>,
+    /// Git's hash of how they differ, where they do.
+    pub git_changes: Option<String>,
     /// The compiler.
     pub rustc_version: String,
     /// The processor that it runs on, if known.
@@ -158,6 +163,7 @@ impl Manifest {
             evaluation_seed: settings.evaluation.seed.0,
             git_revision: build.git_revision.clone(),
             git_dirty: build.git_dirty,
+            git_changes: build.git_changes.clone(),
             rustc_version: build.rustc_version.clone(),
             threads: rayon::current_num_threads(),
             target: target(),
@@ -188,9 +194,18 @@ impl Manifest {
         self.target == target()
     }
 
-    /// Whether the same program made another run: by name, version and revision.
+    /// Whether the same program made another run: by name, version, revision and changes to it.
     pub fn is_of_version_of(&self, other: &Self) -> bool {
-        (&self.program, &self.git_revision, self.git_dirty) == (&other.program, &other.git_revision, other.git_dirty)
+        self.version() == other.version()
+    }
+
+    /// Whether a program made this run: by name, version, revision and changes to it.
+    pub fn is_of(&self, build: &Build) -> bool {
+        self.version() == (&build.program, &build.git_revision, build.git_dirty, &build.git_changes)
+    }
+
+    fn version(&self) -> (&String, &Option<String>, Option<bool>, &Option<String>) {
+        (&self.program, &self.git_revision, self.git_dirty, &self.git_changes)
     }
 
     /// Whether a folder holds a manifest, of whatever version: the folder is a run then, and not something else with files

@@ -340,7 +340,7 @@ fn is_free(path: &Path) -> anyhow::Result<bool> {
     let names = fs::read_dir(path).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
     let names: Vec<_> = names.with_context(|| path.display().to_string())?;
     let is_of_claim =
-        |name: &OsString| name == SETTINGS || name == MANIFEST || name.to_string_lossy().ends_with(".partial");
+        |name: &OsString| name == SETTINGS || name == MANIFEST || name.to_string_lossy().ends_with(whole::PARTIAL);
     let is_locked = names.iter().any(|name| name == lock::FILE);
     Ok(names.iter().all(|name| name == lock::FILE || is_of_claim(name)) && (names.is_empty() || is_locked))
 }
@@ -470,7 +470,7 @@ mod tests {
                 fs::create_dir(&path).unwrap();
                 fs::write(path.join(lock::FILE), "train-dagger, process 1\n").unwrap();
                 whole[..written].iter().for_each(|(name, content)| fs::write(path.join(name), content).unwrap());
-                fs::write(path.join(whole[written].0).with_added_extension("partial"), "half").unwrap();
+                fs::write(path.join(whole[written].0).with_added_extension(whole::PARTIAL), "half").unwrap();
                 let refused = message(RunDir::resume(&path, "train-dagger"));
                 assert!(refused.contains("nothing was begun there") && refused.contains("--out"), "{refused}");
                 drop(create(&path, overwrite).unwrap());

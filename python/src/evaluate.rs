@@ -183,7 +183,7 @@ impl Asked {
             preset: "python",
             seed: self.settings.evaluation.seed.0,
         };
-        let arguments = self.arguments(ShardRecord::of(plan))?;
+        let arguments = self.arguments(ShardRecord::of(plan)?)?;
         RunDir::create(&place, &self.settings, &Request { arguments, inputs: inputs::of(&self.lots, &self.drivers) })
     }
 

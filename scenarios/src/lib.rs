@@ -30,6 +30,7 @@ pub mod split;
 pub use error::{LoadError, Location};
 
 use reference::ReferenceLot;
+use sim::limits::LOTS_MAX;
 use sim::scenario::Scenario;
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
@@ -207,8 +208,8 @@ fn generated_suite(name: &str) -> Result<Vec<LotSpec>, SpecError> {
     let count: u64 = count
         .parse()
         .ok()
-        .filter(|count| (1..=1_000_000).contains(count))
-        .ok_or_else(|| fault(format!("asks for {count:?} lots, not for a number from 1 to 1000000")))?;
+        .filter(|count| (1..=LOTS_MAX as u64).contains(count))
+        .ok_or_else(|| fault(format!("asks for {count:?} lots, not for a number from 1 to {LOTS_MAX}")))?;
     let families = match (parts.next(), &split) {
         (Some("all"), _) => Family::ALL.to_vec(),
         (Some(called), _) => vec![family_called(called).ok_or_else(|| fault(format!("has no family {called:?}")))?],

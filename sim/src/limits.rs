@@ -28,6 +28,9 @@ pub const NAME_CHARS_MAX: usize = 100;
 /// Bytes of a name in UTF-8: file systems take 255, of which endings take some.
 pub const NAME_BYTES_MAX: usize = 200;
 
+/// Lots that are named at once.
+pub const LOTS_MAX: usize = 1_000_000;
+
 /// File of a lot, bytes.
 pub const LOT_BYTES_MAX: u64 = 1_000_000;
 /// Centre line or TPCAP case, bytes.

@@ -185,10 +185,10 @@ mod tests {
         let folder = std::env::temp_dir().join(format!("storage-test-{}-growing-partial", std::process::id()));
         let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).unwrap();
-        fs::write(folder.join("runs.partial"), "1\n").unwrap();
+        fs::write(folder.join("runs.lotpilot-partial"), "1\n").unwrap();
         Growing::open(&folder, "driving", &["runs"]).unwrap().finish().unwrap();
         assert_eq!(sums::verify(&folder).files, 1);
-        assert!(!folder.join("runs.partial").exists());
+        assert!(!folder.join("runs.lotpilot-partial").exists());
         fs::remove_dir_all(folder).unwrap();
     }
 

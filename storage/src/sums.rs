@@ -217,7 +217,7 @@ fn replace_folder(
     fill: impl FnOnce(&Path) -> Result<(), FileError>,
 ) -> Result<(), FileError> {
     let (path, partial, list_name) =
-        (folder.join(name), folder.join(format!("{name}.partial")), format!("{name}/{FILE}"));
+        (folder.join(name), folder.join(format!("{name}.{}", whole::PARTIAL)), format!("{name}/{FILE}"));
     let failed =
         |error: std::io::Error| FileError::new(&path, format_args!("cannot be written: {error}"), whole::WRITE_REMEDY);
     let remove = |old: &Path| if old.exists() { fs::remove_dir_all(old).map_err(failed) } else { Ok(()) };
@@ -455,7 +455,7 @@ fn is_content(name: &str) -> bool {
 
 /// Whether a name is that of something half-written.
 fn is_partial(name: &str) -> bool {
-    Path::new(name).extension().is_some_and(|extension| extension == "partial")
+    Path::new(name).extension().is_some_and(|extension| extension == whole::PARTIAL)
 }
 
 #[cfg(test)]
@@ -552,7 +552,7 @@ mod tests {
         let verified = verify(&to);
         assert_eq!((verified.files, verified.faults.len()), (5, 0), "the old copy is left as it was");
         copy_folder(&from, &to, "runs/other").unwrap_err();
-        assert!(!to.join("runs/other").exists() && !to.join("runs/other.partial").exists());
+        assert!(!to.join("runs/other").exists() && !to.join("runs/other.lotpilot-partial").exists());
         fs::remove_dir_all(folder).unwrap();
     }
 

@@ -6,6 +6,9 @@ use std::fs::{self, File};
 use std::io::{self, Cursor, ErrorKind, Write as _};
 use std::path::Path;
 
+/// Ending of a file or folder that is being written: it is deleted where a process has died, and nobody else names one so.
+pub const PARTIAL: &str = "lotpilot-partial";
+
 /// What helps against most errors of writing.
 pub const WRITE_REMEDY: &str = "check that the folder exists, is writable and has space";
 
@@ -15,7 +18,7 @@ pub const WRITE_REMEDY: &str = "check that the folder exists, is writable and ha
 /// # Errors
 /// If it cannot be written.
 pub fn write(path: &Path, content: &[u8]) -> Result<(), FileError> {
-    let partial = path.with_added_extension("partial");
+    let partial = path.with_added_extension(PARTIAL);
     let write = || {
         let mut file = create_own(&partial)?;
         // The name must not be on disk before the content is.
@@ -133,7 +136,7 @@ pub fn remove(path: &Path) -> Result<(), FileError> {
 /// # Errors
 /// If it cannot be deleted.
 pub fn remove_partial(path: &Path) -> Result<(), FileError> {
-    let partial = path.with_added_extension("partial");
+    let partial = path.with_added_extension(PARTIAL);
     make_way(&partial).map_err(|error| not_deleted(&partial, &error))
 }
 
@@ -159,7 +162,7 @@ mod tests {
                 assert!(contents.contains(&found), "{} bytes", found.len());
             }
         });
-        assert!(!path.with_added_extension("partial").exists());
+        assert!(!path.with_added_extension(PARTIAL).exists());
         fs::remove_file(path).unwrap();
     }
 
@@ -170,7 +173,7 @@ mod tests {
         fs::create_dir_all(&folder).unwrap();
         let (diary, path) = (folder.join("diary"), folder.join("report"));
         fs::write(&diary, "dear").unwrap();
-        let partial = path.with_added_extension("partial");
+        let partial = path.with_added_extension(PARTIAL);
         std::os::unix::fs::symlink(&diary, &partial).unwrap();
         write(&path, b"first").unwrap();
         fs::hard_link(&diary, &partial).unwrap();
@@ -183,7 +186,7 @@ mod tests {
     fn what_a_dead_process_was_writing_goes_with_the_file() {
         let path = std::env::temp_dir().join(format!("storage-test-{}-whole", std::process::id()));
         write(&path, b"whole").unwrap();
-        let partial = path.with_added_extension("partial");
+        let partial = path.with_added_extension(PARTIAL);
         fs::write(&partial, "ha").unwrap();
         remove(&path).unwrap();
         remove(&path).unwrap();

@@ -87,7 +87,7 @@ mod tests {
         for (files, expected) in [
             (&[("a", "1"), ("b", "2")][..], None),
             (&[("a", "1")], Some("b is missing")),
-            (&[("a", "1"), ("b", "2"), ("c.partial", "")], Some("c.partial is left over")),
+            (&[("a", "1"), ("b", "2"), ("c.lotpilot-partial", "")], Some("c.lotpilot-partial is left over")),
             (&[("a", "1"), ("b", "3")], Some("b differs")),
         ] {
             assert_eq!(content(files).difference(&right).as_deref(), expected);

@@ -72,7 +72,7 @@ impl Library {
         Ok(())
     }
 
-    /// The operations that the last command performed, as in `rename round-00.partial`.
+    /// The operations that the last command performed, as in `rename round-00.lotpilot-partial`.
     ///
     /// # Errors
     /// If the list cannot be read.

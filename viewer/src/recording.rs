@@ -63,7 +63,7 @@ struct Partial {
 
 impl Partial {
     fn of(whole: PathBuf) -> Self {
-        Self { partial: whole.with_added_extension("partial"), whole }
+        Self { partial: whole.with_added_extension(storage::whole::PARTIAL), whole }
     }
 }
 

@@ -17,11 +17,8 @@ pub(crate) fn get() -> &'static Build {
         program: PROGRAM.to_owned(),
         command_line: std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned()).collect(),
         git_revision: Some(env!("XTASK_GIT_REVISION").to_owned()).filter(|revision| !revision.is_empty()),
-        git_dirty: match env!("XTASK_GIT_CHANGES") {
-            "yes" => Some(true),
-            "no" => Some(false),
-            _ => None,
-        },
+        git_dirty: changes().map(|changes| !changes.is_empty()),
+        git_changes: changes().filter(|changes| !changes.is_empty()).map(str::to_owned),
         rustc_version: env!("XTASK_RUSTC").to_owned(),
         processor: processor(),
         processor_features: processor_features(),
@@ -29,13 +26,18 @@ pub(crate) fn get() -> &'static Build {
     })
 }
 
+/// Git's hash of what the sources that this was built from have beside the commit: empty if nothing, `None` if unknown.
+fn changes() -> Option<&'static str> {
+    Some(env!("XTASK_GIT_CHANGES")).filter(|changes| *changes != "unknown")
+}
+
 /// Checks that this program may continue a run: otherwise results of two versions would stand under the name of one.
-/// Another commit of the same version, which may differ only in its documents, is reported.
+/// Another commit of the same version, which may differ only in its documents, and other changes to it are reported.
 ///
 /// # Errors
 /// If the run was begun by another version, or with other libraries.
 pub(crate) fn check_can_go_on(run: &Path, manifest: &Manifest, output: &Output) -> anyhow::Result<()> {
-    let Build { program, libraries, git_revision, .. } = get();
+    let Build { program, libraries, git_revision, git_changes, .. } = get();
     ensure!(
         manifest.program == *program && manifest.libraries == *libraries,
         "{0}: begun with another version of lotpilot ({1}; {0}/manifest.toml lists its libraries); use that one, or \
@@ -48,6 +50,11 @@ pub(crate) fn check_can_go_on(run: &Path, manifest: &Manifest, output: &Output) 
     {
         output.note(format_args!(
             "{}: begun at commit {begun}, which its manifest names; this program is of commit {now}",
+            run.display()
+        ));
+    } else if manifest.git_changes != *git_changes {
+        output.note(format_args!(
+            "{}: begun by a program with other changes to its sources than this one has (`git_changes` in its manifest)",
             run.display()
         ));
     }

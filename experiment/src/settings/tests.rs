@@ -106,6 +106,13 @@ fn printed_settings_show_what_is_switched_off() {
     }
 }
 
+/// Whoever drove `"lot-a,train:2"` was told that it had not been trained on them.
+#[test]
+fn lots_between_commas_are_named_one_by_one() {
+    let settings = resolved(&[r#"training.lots=["lot-a, train:2", "lot-b"]"#]);
+    assert_eq!(settings.training.lots, ["lot-a", "train:2", "lot-b"]);
+}
+
 #[test]
 fn errors_name_the_key_and_what_there_is() {
     for (overrides, parts) in [

@@ -23,13 +23,14 @@ use crate::dataset::packed;
 use crate::dataset::round::Round;
 use crate::dataset::sample::Sample;
 use crate::dataset::tick::Tick;
-use crate::files::{self, FileError, RESTORE_REMEDY, WRITE_REMEDY, write_atomically};
+use crate::files::{self, FileError, Format as _, RESTORE_REMEDY, WRITE_REMEDY, write_atomically};
 use ndarray::{Array2, Array3, ArrayView1};
 use ndarray_npy::{NpzWriter, WriteNpyExt as _};
+use sim::limits::RUN_TOML_BYTES_MAX;
 use sim::sensing::OccupancyGrid;
 use std::fs;
 use std::path::{Path, PathBuf};
-use storage::sums;
+use storage::{sums, whole};
 
 const AUGMENTATIONS: &str = "noise_augmentations.npz";
 const AUGMENTATIONS_ARRAY: &str = "noise_augmentations";
@@ -70,13 +71,24 @@ impl Store {
         self.folder.join("final")
     }
 
-    /// Whether a round's data are there.
+    /// Whether a round's data are there: collected by this run.
     ///
     /// # Errors
-    /// See [`Self::is_finished`].
+    /// See [`Self::is_finished`]; or if the folder was put there by somebody else.
     pub fn has_round(&self, round: u32) -> Result<bool, FileError> {
         let folder = self.round_folder(round);
-        Ok(self.is_finished(&folder)? || folder.is_dir())
+        if self.is_finished(&folder)? {
+            return Ok(true);
+        }
+        let is_there = folder.is_dir();
+        if is_there && !sums::is_listed(&self.folder, &record_of(&folder))? {
+            return Err(FileError::new(
+                &folder,
+                "this run did not collect it",
+                "move the folder away: the run goes on with a round of its own",
+            ));
+        }
+        Ok(is_there)
     }
 
     /// Whether a folder of the run is finished: its data and its network.
@@ -120,7 +132,7 @@ impl Store {
                 "rounds are never overwritten: use another folder",
             ));
         }
-        let partial = self.folder.join(format!(".round-{index:02}.partial"));
+        let partial = self.folder.join(format!(".round-{index:02}.{}", whole::PARTIAL));
         if partial.exists() {
             fs::remove_dir_all(&partial).map_err(|error| FileError::new(&partial, error, WRITE_REMEDY))?;
         }
@@ -147,6 +159,9 @@ impl Store {
         }
         collection.write(&partial)?;
         sums::list_all(&partial)?;
+        // Before the round is there: one that is there and not listed is none of this run's.
+        let record = sums::read(&partial.join(Collection::NAME), RUN_TOML_BYTES_MAX)?;
+        sums::list_as(&self.folder, [(record_of(&folder), sums::digest(&record))])?;
         fs::rename(&partial, &folder).map_err(|error| FileError::new(&folder, error, WRITE_REMEDY))
     }
 
@@ -156,7 +171,7 @@ impl Store {
     /// If a file is missing, damaged, from an older version, or does not fit the others.
     pub fn read_round(&self, index: u32) -> Result<(Round, Collection), FileError> {
         let folder = self.round_folder(index);
-        let collection: Collection = files::read(&folder)?;
+        let collection = self.read_collection(&folder)?;
         let samples = read_samples(&folder, collection.samples)?;
         let ticks = Tick::read_all(&folder, samples.len())?;
         let noise_augmentations =
@@ -170,9 +185,23 @@ impl Store {
     /// If a file is missing, from an older version, or is not what it should be.
     pub fn read_samples(&self, index: u32) -> Result<Vec<Sample>, FileError> {
         let folder = self.round_folder(index);
-        let collection: Collection = files::read(&folder)?;
+        let collection = self.read_collection(&folder)?;
         read_samples(&folder, collection.samples)
     }
+
+    /// Reads the record of how a round was collected, which is this run's if the run lists it.
+    fn read_collection(&self, folder: &Path) -> Result<Collection, FileError> {
+        let record = record_of(folder);
+        if sums::is_listed(&self.folder, &record)? {
+            sums::read_listed(&self.folder, &record, RUN_TOML_BYTES_MAX)?;
+        }
+        files::read(folder)
+    }
+}
+
+/// The record of how a round was collected, as the run lists it.
+fn record_of(folder: &Path) -> String {
+    format!("{}/{}", folder.file_name().unwrap_or_default().to_string_lossy(), Collection::NAME)
 }
 
 /// The list of a folder, as the run lists it.
@@ -221,6 +250,13 @@ mod tests {
         (store, round, collection)
     }
 
+    /// The files of the round are whole, but others.
+    fn listed_anew(store: &Store) {
+        let folder = store.round_folder(0);
+        sums::list_all(&folder).unwrap();
+        sums::list(store.folder(), &[&record_of(&folder)]).unwrap();
+    }
+
     #[test]
     fn a_round_reads_back_as_written_and_is_never_overwritten() {
         let (store, round, collection) = written("round", 33, 2);
@@ -229,6 +265,28 @@ mod tests {
         let again = store.write_round(&round, &collection);
         assert!(again.unwrap_err().to_string().contains("exists already"));
         fs::remove_dir_all(store.folder()).unwrap();
+    }
+
+    /// It would be learned from as this run's own.
+    #[test]
+    fn a_round_that_was_copied_from_another_run_is_refused() {
+        let (store, ..) = written("copied-to", 5, 0);
+        let (other, ..) = written("copied-from", 6, 0);
+        let copy = |to: &Path| {
+            fs::create_dir(to).unwrap();
+            for file in fs::read_dir(other.round_folder(0)).unwrap().map(Result::unwrap) {
+                fs::copy(file.path(), to.join(file.file_name())).unwrap();
+            }
+        };
+        copy(&store.round_folder(1));
+        assert!(store.has_round(1).unwrap_err().to_string().contains("this run did not collect it"));
+        fs::remove_dir_all(store.round_folder(0)).unwrap();
+        assert!(!store.has_round(0).unwrap(), "a run that died before the folder had its name collects it again");
+        copy(&store.round_folder(0));
+        assert!(store.read_round(0).unwrap_err().to_string().contains("SHA-256"));
+        for store in [store, other] {
+            fs::remove_dir_all(store.folder()).unwrap();
+        }
     }
 
     #[test]
@@ -246,7 +304,7 @@ mod tests {
         let whole = fs::read(path("labels.npy")).unwrap();
         ndarray_npy::write_npy(path("labels.npy"), &Array2::<f32>::zeros([4, 3])).unwrap();
         assert!(error().contains("labels.npy") && error().contains("SHA-256"), "{}", error());
-        let listed = || sums::list_all(&store.round_folder(0)).unwrap();
+        let listed = || listed_anew(&store);
         listed();
         assert!(error().contains("labels.npy") && error().contains("[5, 3]"), "{}", error());
         fs::write(path("labels.npy"), whole).unwrap();
@@ -277,7 +335,7 @@ mod tests {
         ndarray_npy::write_npy(path("grids.npy"), &Array3::<u8>::zeros([5, 25, 25])).unwrap();
         let record = fs::read_to_string(path("round.toml")).unwrap();
         fs::write(path("round.toml"), record.replace("schema = 2", "schema = 1")).unwrap();
-        sums::list_all(&store.round_folder(0)).unwrap();
+        listed_anew(&store);
         for error in [store.read_round(0).unwrap_err(), store.read_samples(0).unwrap_err()] {
             let error = error.to_string();
             assert!(error.contains("round.toml") && error.contains("schema 1"), "{error}");

@@ -61,6 +61,7 @@ fn commands_can_be_pasted_into_a_shell() {
         evaluation_seed: 1,
         git_revision: None,
         git_dirty: None,
+        git_changes: None,
         rustc_version: String::new(),
         threads: 1,
         target: String::new(),

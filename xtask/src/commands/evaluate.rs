@@ -134,7 +134,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
             run
         }
         Err(preset) => {
-            asked.shard = ShardRecord::of(&plan);
+            asked.shard = ShardRecord::of(&plan)?;
             let request = Request { arguments: toml::Table::try_from(&asked)?, inputs };
             RunDir::create(&args.out.place(COMMAND, &preset, settings.evaluation.seed.0), &settings, &request)?
         }

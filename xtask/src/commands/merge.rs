@@ -19,7 +19,7 @@ use evaluation::stages::{self, Step};
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
-use experiment::manifest::{Build, Manifest, Request};
+use experiment::manifest::{Build, Request};
 use experiment::run_dir::{Place, RunDir};
 use std::path::{Path, PathBuf};
 use storage::sums;
@@ -88,7 +88,6 @@ fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Res
     let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
     let seed = settings.evaluation.seed.0;
     let run = RunDir::create(&args.out.place(evaluate::COMMAND, &manifest.preset, seed), settings, &request)?;
-    note_changes(manifest, output);
     put_together(&plan, &rows, &run, output)
 }
 
@@ -117,21 +116,14 @@ fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> 
         program: made.program.clone(),
         git_revision: made.git_revision.clone(),
         git_dirty: made.git_dirty,
+        git_changes: made.git_changes.clone(),
         rustc_version: made.rustc_version.clone(),
         libraries: made.libraries.clone(),
         ..build_info::get().clone()
     };
     let place = args.out.place(evaluate::COMMAND, &made.preset, settings.evaluation.seed.0);
     let run = RunDir::create(&Place { build: &build, ..place }, settings, &request)?;
-    note_changes(made, output);
     put_together(&plan, &rows, &run, output)
-}
-
-/// Says that sameness of the version is not known.
-fn note_changes(made: &Manifest, output: &Output) {
-    if made.git_dirty == Some(true) {
-        output.note("note: made with uncommitted changes, which merge cannot compare");
-    }
 }
 
 /// Finishes an evaluation whose rows are known. From here on it is one like any other, which `evaluate --resume` finishes if
@@ -170,7 +162,6 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
             sums::copy_folder(path, run.path(), folder)?;
         }
     }
-    note_changes(manifest, output);
     let name = run.path().display();
     output.note(format_args!(
         "written: {name}: {} trainings; continue with cargo xtask reproduce --resume {name}, or on several machines \
@@ -197,7 +188,6 @@ fn drives(shards: &Shards, networks: &Path, output: &Output) -> anyhow::Result<(
             merged.push((stage, parts.rows(&DriveStage::load(stage)?.plan())?));
         }
     }
-    note_changes(shards.manifest(), output);
     interrupt::can_resume(reproduce::COMMAND, run.path());
     for (stage, rows) in merged {
         let place = perform::place_of(reproduce::COMMAND, &stage.settings);

@@ -158,7 +158,7 @@ fn request_of(stage: &Stage) -> anyhow::Result<Request> {
     let is_training = matches!(stage.step, Step::Train { .. });
     let inputs = if is_training { train::inputs(&stage.settings)? } else { Inputs::default() };
     if matches!(stage.step, Step::DriveShard { .. })
-        && let Some(record) = ShardRecord::of(&DriveStage::load(stage)?.plan())
+        && let Some(record) = ShardRecord::of(&DriveStage::load(stage)?.plan())?
     {
         record.add_to(&mut arguments);
     }

@@ -13,7 +13,7 @@ use evaluation::stages::{self, Extent, Stage, Step};
 use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
-use experiment::manifest::{self, Build, Manifest, Outcome, Request};
+use experiment::manifest::{self, Manifest, Outcome, Request};
 use experiment::run_dir::RunDir;
 use experiment::settings::{Layers, Settings};
 use experiment::shard::Shard;
@@ -246,12 +246,9 @@ fn resume(path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, Arg
     build_info::check_can_go_on(path, &manifest, output)?;
     let arguments = Arguments::read(path, manifest.clone())?;
     let Arguments { extent, shard } = &arguments;
-    let Build { program, git_revision, git_dirty, .. } = build_info::get();
-    let is_same =
-        (&manifest.program, &manifest.git_revision, &manifest.git_dirty) == (program, git_revision, git_dirty);
     // Its stages would be of two versions, and `merge` would refuse them after all the work.
     ensure!(
-        shard.is_none() || is_same,
+        shard.is_none() || manifest.is_of(build_info::get()),
         "{}: this shard was begun with another version of lotpilot; use that one, or make the shard again",
         path.display()
     );
