@@ -791,6 +791,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
             &["evaluate", "--driver", "expert", "--lots", "test:600000,train:600000", "--trials", "1"],
             "lots; at most 1000000",
         ),
+        (&["render", "noise", "--lots", "test:600000,train:600000"], "1200000 lots are named"),
         (
             &["evaluate", "--driver", "expert", "--lots", "test:300000", "--shard", "1/1"],
             "take more than 16000000 bytes",

@@ -2,6 +2,7 @@
 //! elsewhere knows what it was made of.
 #![allow(clippy::print_stdout, reason = "how a build script speaks to cargo")]
 
+use std::collections::BTreeSet;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -45,21 +46,22 @@ fn main() {
     }
 }
 
-/// How the sources differ from the commit: git's hash of the differences and of the files that it does not track; empty if
-/// they do not, `None` without git or checkout.
+/// How the sources differ from the commit: git's hash of the names and contents that do; empty if none does, `None` without
+/// git or checkout. Of names and contents, because what git prints depends on the settings of its user.
 fn changes() -> Option<String> {
-    let of_sources = |args: &[&str]| git(&[args, &["--"], &SOURCES].concat());
-    let mut differences = of_sources(&["diff", "--binary", "--no-ext-diff", "HEAD"])?;
-    let untracked = of_sources(&["ls-files", "--others", "--exclude-standard"])?;
-    for file in untracked.lines() {
-        differences += &format!("\n{file} {}", git(&["hash-object", "--", file])?);
+    let names_of = |args: &[&str]| git(&[args, &["-z", "--"], &SOURCES].concat());
+    let changed = names_of(&["diff", "HEAD", "--name-only", "--no-renames", "--relative"])?;
+    let untracked = names_of(&["ls-files", "--others", "--exclude-standard"])?;
+    let names: BTreeSet<&str> =
+        changed.split('\0').chain(untracked.split('\0')).filter(|name| !name.is_empty()).collect();
+    if names.is_empty() {
+        return Some(String::new());
     }
-    if differences.is_empty() {
-        return Some(differences);
-    }
+    let content = |name: &str| git(&["hash-object", "--no-filters", "--", name]).unwrap_or_else(|| "gone".to_owned());
+    let differences: Vec<String> = names.into_iter().map(|name| format!("{}  {name}\n", content(name))).collect();
     let mut hash =
         git_command(&["hash-object", "--stdin"]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().ok()?;
-    hash.stdin.take()?.write_all(differences.as_bytes()).ok()?;
+    hash.stdin.take()?.write_all(differences.concat().as_bytes()).ok()?;
     text_of(&hash.wait_with_output().ok()?)
 }
 

@@ -196,7 +196,9 @@ impl Manifest {
 
     /// Whether the same program made another run: by name, version, revision and changes to it.
     pub fn is_of_version_of(&self, other: &Self) -> bool {
-        self.version() == other.version()
+        // Of changes without a hash, as earlier versions noted them, nobody knows whether they are the same.
+        let is_known = self.git_dirty != Some(true) || self.git_changes.is_some();
+        is_known && self.version() == other.version()
     }
 
     /// Whether a program made this run: by name, version, revision and changes to it.

@@ -401,7 +401,7 @@ def _is_claimed(folder: Path) -> bool:
 
 
 def _keep(shard: Path, files: Files) -> None:
-    partial = shard.with_name(f"{shard.name}.partial")
+    partial = shard.with_name(f"{shard.name}.lotpilot-partial")
     shutil.rmtree(partial, ignore_errors=True)
     _write(partial, files)
     # A folder under its own name is whole.

@@ -53,11 +53,17 @@ use std::path::PathBuf;
 /// ```
 ///
 /// # Errors
-/// A name that means no lot; the message lists the names there are.
+/// A name that means no lot, and the message lists the names there are; or more than [`LOTS_MAX`] lots.
 pub fn suite(names: &str) -> Result<Vec<LotSpec>, SpecError> {
     let mut lots = Vec::new();
     for name in names.split(',').map(str::trim) {
         lots.extend(lots_of(name)?);
+        if lots.len() > LOTS_MAX {
+            return Err(SpecError::new(
+                name,
+                format!("is too much: {} lots are named, of at most {LOTS_MAX}", lots.len()),
+            ));
+        }
     }
     Ok(lots)
 }

@@ -151,6 +151,21 @@ pub fn list_all(folder: &Path) -> Result<(), FileError> {
     list(folder, &names.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
+/// Lists a folder within another by its own list, which vouches for all of its files: those that were listed one by one are
+/// taken off, in one step.
+///
+/// # Errors
+/// If the folder has no list, or the other's cannot be written.
+pub fn list_folder(folder: &Path, name: &str) -> Result<(), FileError> {
+    let within = format!("{name}/");
+    let (path, list_name) = (folder.join(name).join(FILE), format!("{name}/{FILE}"));
+    let list = read::bytes(&path, LIST_BYTES_MAX).map_err(|error| unreadable(&path, &error))?;
+    let mut sums = list_of(folder)?.unwrap_or_default();
+    sums.retain(|name, _| !name.starts_with(&within));
+    sums.insert(list_name, digest(&list));
+    write_list(folder, &sums)
+}
+
 /// Takes files off the list of a folder, before they are written again.
 ///
 /// # Errors
@@ -235,7 +250,7 @@ fn replace_folder(
         return fs::remove_dir(&partial).map_err(failed);
     }
     fs::rename(&partial, &path).map_err(failed)?;
-    list(folder, &[&list_name])
+    list_folder(folder, name)
 }
 
 fn copy_files(from: &Path, to: &Path) -> Result<(), FileError> {

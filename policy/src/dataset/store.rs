@@ -15,6 +15,9 @@
 //! final/                    an optional longer fit on everything
 //! ```
 //!
+//! The run lists `round-NN/round.toml` as soon as the data are there, and the round's `sha256sums` in its place when the
+//! network is.
+//!
 //! Every file and folder appears under its name only when it is complete: it is written beside, then renamed.
 
 use crate::dataset::collection::Collection;
@@ -28,6 +31,7 @@ use ndarray::{Array2, Array3, ArrayView1};
 use ndarray_npy::{NpzWriter, WriteNpyExt as _};
 use sim::limits::RUN_TOML_BYTES_MAX;
 use sim::sensing::OccupancyGrid;
+use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 use storage::{sums, whole};
@@ -109,7 +113,7 @@ impl Store {
     /// # Errors
     /// If the list cannot be written.
     pub(crate) fn finish(&self, folder: &Path) -> Result<(), FileError> {
-        if self.is_finished(folder)? { Ok(()) } else { sums::list(&self.folder, &[&list_of(folder)]) }
+        if self.is_finished(folder)? { Ok(()) } else { sums::list_folder(&self.folder, &name_of(folder)) }
     }
 
     /// Writes the data of a round with a record of how it was collected.
@@ -201,12 +205,16 @@ impl Store {
 
 /// The record of how a round was collected, as the run lists it.
 fn record_of(folder: &Path) -> String {
-    format!("{}/{}", folder.file_name().unwrap_or_default().to_string_lossy(), Collection::NAME)
+    format!("{}/{}", name_of(folder), Collection::NAME)
+}
+
+fn name_of(folder: &Path) -> Cow<'_, str> {
+    folder.file_name().unwrap_or_default().to_string_lossy()
 }
 
 /// The list of a folder, as the run lists it.
 fn list_of(folder: &Path) -> String {
-    format!("{}/{}", folder.file_name().unwrap_or_default().to_string_lossy(), sums::FILE)
+    format!("{}/{}", name_of(folder), sums::FILE)
 }
 
 fn read_samples(folder: &Path, samples: usize) -> Result<Vec<Sample>, FileError> {
