@@ -3,6 +3,7 @@
 use crate::bench::{scratch, succeed, text, xtask};
 use crate::determinism::files;
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use std::time::Duration;
@@ -59,7 +60,14 @@ fn assert_same_as_whole(run: &Path, when: &str) {
         let [expected, found] = [&*WHOLE.0, run].map(|run| std::fs::read(run.join(name)).unwrap());
         assert!(expected == found, "{name} differs {when}");
     }
+    assert_eq!(listed(&WHOLE.0), listed(run), "{when}");
     assert!(sums::verify(run).faults.is_empty());
+}
+
+/// What each training lists: the digest of a run is made of it.
+fn listed(run: &Path) -> BTreeMap<OsString, Vec<String>> {
+    let trainings = std::fs::read_dir(run.join("chains")).unwrap().map(Result::unwrap);
+    trainings.map(|training| (training.file_name(), sums::names(&training.path()).unwrap())).collect()
 }
 
 /// Near-collisions (contacts) of a driver, summed over the runs of a stage.
