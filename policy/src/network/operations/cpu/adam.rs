@@ -16,7 +16,7 @@ pub(crate) const SQUARE_MIN: f32 = 1e-36;
 
 /// Updates weights and both means in place.
 pub(crate) fn step(step: AdamStep, weights: &mut [f32], gradient: &[f32], mean: &mut [f32], mean_square: &mut [f32]) {
-    let scale = step.gradient_scale(norm(gradient));
+    let factors = Factors::of(step, norm(gradient));
     (
         weights.par_chunks_mut(CHUNK),
         gradient.par_chunks(CHUNK),
@@ -25,7 +25,7 @@ pub(crate) fn step(step: AdamStep, weights: &mut [f32], gradient: &[f32], mean: 
     )
         .into_par_iter()
         .for_each(|(weights, gradient, mean, mean_square)| {
-            vectors::run(Kernel { step, scale, weights, gradient, mean, mean_square });
+            vectors::run(Kernel { factors, weights, gradient, mean, mean_square });
         });
 }
 
@@ -63,10 +63,39 @@ impl WithSimd for SumOfSquares<'_> {
 /// Values whose squares are summed side by side.
 const LINE: usize = 64;
 
+/// What every value of a step is computed with. Two powers are among it: computed once, not once a vector.
+#[derive(Debug, Clone, Copy)]
+struct Factors {
+    /// Factor of the gradient, which clips it.
+    gradient: f32,
+    beta_1: f32,
+    beta_2: f32,
+    epsilon: f32,
+    /// See [`AdamStep::step_size`].
+    step_size: f32,
+    /// See [`AdamStep::root_correction`].
+    root_correction: f32,
+    /// See [`AdamStep::keep`].
+    keep: f32,
+}
+
+impl Factors {
+    /// `norm`: that of the gradient.
+    fn of(step: AdamStep, norm: f32) -> Self {
+        Self {
+            gradient: step.gradient_scale(norm),
+            beta_1: step.beta_1,
+            beta_2: step.beta_2,
+            epsilon: step.epsilon,
+            step_size: step.step_size(),
+            root_correction: step.root_correction(),
+            keep: step.keep(),
+        }
+    }
+}
+
 struct Kernel<'a> {
-    step: AdamStep,
-    /// Factor of the gradient.
-    scale: f32,
+    factors: Factors,
     weights: &'a mut [f32],
     gradient: &'a [f32],
     mean: &'a mut [f32],
@@ -78,19 +107,18 @@ impl WithSimd for Kernel<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { step, scale, weights, gradient, mean, mean_square } = self;
+        let Self { factors, weights, gradient, mean, mean_square } = self;
         let (weights, weights_rest) = S::as_mut_simd_f32s(weights);
         let (gradient, gradient_rest) = S::as_simd_f32s(gradient);
         let (mean, mean_rest) = S::as_mut_simd_f32s(mean);
         let (mean_square, mean_square_rest) = S::as_mut_simd_f32s(mean_square);
         for (((weights, gradient), mean), mean_square) in weights.iter_mut().zip(gradient).zip(mean).zip(mean_square) {
-            [*weights, *mean, *mean_square] = update(simd, step, scale, *weights, *gradient, *mean, *mean_square);
+            [*weights, *mean, *mean_square] = update(simd, factors, *weights, *gradient, *mean, *mean_square);
         }
         if !gradient_rest.is_empty() {
             let [new, new_mean, new_square] = update(
                 simd,
-                step,
-                scale,
+                factors,
                 simd.partial_load_f32s(weights_rest),
                 simd.partial_load_f32s(gradient_rest),
                 simd.partial_load_f32s(mean_rest),
@@ -107,8 +135,7 @@ impl WithSimd for Kernel<'_> {
 #[inline(always)]
 fn update<S: Simd>(
     simd: S,
-    step: AdamStep,
-    scale: f32,
+    factors: Factors,
     weights: S::f32s,
     gradient: S::f32s,
     mean: S::f32s,
@@ -119,12 +146,13 @@ fn update<S: Simd>(
         let is_above = simd.greater_than_f32s(simd.abs_f32s(vector), simd.splat_f32s(least));
         simd.select_f32s(is_above, vector, simd.splat_f32s(0.0))
     };
-    let gradient = times(gradient, scale);
-    let mean = simd.add_f32s(times(mean, step.beta_1), times(gradient, 1.0 - step.beta_1));
+    let gradient = times(gradient, factors.gradient);
+    let mean = simd.add_f32s(times(mean, factors.beta_1), times(gradient, 1.0 - factors.beta_1));
     let mean = above(mean, MEAN_MIN);
-    let square = simd.mul_f32s(times(gradient, 1.0 - step.beta_2), gradient);
-    let mean_square = above(simd.add_f32s(times(mean_square, step.beta_2), square), SQUARE_MIN);
-    let root = simd.add_f32s(times(simd.sqrt_f32s(mean_square), step.root_correction()), simd.splat_f32s(step.epsilon));
-    let change = simd.div_f32s(times(mean, step.step_size()), root);
-    [simd.sub_f32s(times(weights, step.keep()), change), mean, mean_square]
+    let square = simd.mul_f32s(times(gradient, 1.0 - factors.beta_2), gradient);
+    let mean_square = above(simd.add_f32s(times(mean_square, factors.beta_2), square), SQUARE_MIN);
+    let root =
+        simd.add_f32s(times(simd.sqrt_f32s(mean_square), factors.root_correction), simd.splat_f32s(factors.epsilon));
+    let change = simd.div_f32s(times(mean, factors.step_size), root);
+    [simd.sub_f32s(times(weights, factors.keep), change), mean, mean_square]
 }
