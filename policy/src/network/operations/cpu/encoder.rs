@@ -35,9 +35,16 @@ pub(crate) struct EncoderGradients {
     pub(crate) bias_2: Vec<f32>,
 }
 
-/// What the forward pass leaves for the backward pass, by sample.
+/// What the forward pass leaves for the backward pass, by chunk: each is allocated and cleared by the thread that fills
+/// it.
 #[derive(Debug, Clone)]
 pub(crate) struct EncoderTrace {
+    chunks: Vec<ChunkTrace>,
+}
+
+/// The trace of one chunk, by sample.
+#[derive(Debug, Clone)]
+struct ChunkTrace {
     rows: Vec<PaddedRows>,
     /// `[batch, padded row, padded column, conv1]`.
     pooled: Vec<f32>,
@@ -71,15 +78,9 @@ impl EncoderWeights<'_> {
         let mut features = vec![0.0; occupied.len() / CELLS * self.features_len()];
         let chunks = occupied.chunks(CHUNK * CELLS).zip(features.chunks_mut(CHUNK * self.features_len()));
         for_each_chunk(chunks, |(occupied, features)| {
-            let mut trace = EncoderTrace::new(self, 1);
-            vectors::run(Forward {
-                weights: self,
-                first: &first,
-                occupied,
-                features,
-                trace: trace.of_one(),
-                keep: false,
-            });
+            // Nobody reads it: one place serves every sample.
+            let trace = &mut ChunkTrace::new(self, 1);
+            vectors::run(Forward { weights: self, first: &first, occupied, features, trace });
         });
         features
     }
@@ -87,15 +88,14 @@ impl EncoderWeights<'_> {
     /// The same, with what [`Self::backward`] needs.
     pub(crate) fn forward_traced(&self, occupied: &[u8]) -> (Vec<f32>, EncoderTrace) {
         let first = FirstLayer::new(self.conv1, self.weight_1, self.bias_1);
-        let batch = occupied.len() / CELLS;
-        let mut features = vec![0.0; batch * self.features_len()];
-        let mut trace = EncoderTrace::new(self, batch);
-        let of_chunks = trace.chunks_mut(self, CHUNK);
-        let chunks =
-            occupied.chunks(CHUNK * CELLS).zip(features.chunks_mut(CHUNK * self.features_len())).zip(of_chunks);
-        for_each_chunk(chunks, |((occupied, features), trace)| {
-            vectors::run(Forward { weights: self, first: &first, occupied, features, trace, keep: true });
-        });
+        let mut features = vec![0.0; occupied.len() / CELLS * self.features_len()];
+        let chunks = occupied.par_chunks(CHUNK * CELLS).zip(features.par_chunks_mut(CHUNK * self.features_len()));
+        let traced = |(occupied, features): (&[u8], &mut [f32])| {
+            let mut trace = ChunkTrace::new(self, occupied.len() / CELLS);
+            vectors::run(Forward { weights: self, first: &first, occupied, features, trace: &mut trace });
+            trace
+        };
+        let trace = EncoderTrace { chunks: chunks.map(traced).collect() };
         (features, trace)
     }
 
@@ -103,22 +103,12 @@ impl EncoderWeights<'_> {
     pub(crate) fn backward(&self, trace: &EncoderTrace, d_features: &[f32]) -> EncoderGradients {
         let first = FirstLayer::new(self.conv1, self.weight_1, self.bias_1);
         let by_output = self.second_layer().by_output(self.weight_2);
-        let batch = trace.rows.len();
         // A chunk's share is summed by one thread, the shares in order: the same bits for any number of threads.
-        let shares: Vec<Share> = (0..batch.div_ceil(CHUNK))
-            .into_par_iter()
-            .map(|chunk| {
-                let samples = chunk * CHUNK..batch.min((chunk + 1) * CHUNK);
-                vectors::run(Backward {
-                    weights: self,
-                    first: &first,
-                    by_output: &by_output,
-                    trace,
-                    d_features,
-                    samples,
-                })
-            })
-            .collect();
+        let d_features = d_features.par_chunks(CHUNK * self.features_len());
+        let share = |(trace, d_features)| {
+            vectors::run(Backward { weights: self, first: &first, by_output: &by_output, trace, d_features })
+        };
+        let shares: Vec<Share> = trace.chunks.par_iter().zip(d_features).map(share).collect();
         let mut sum = Share::new(self);
         for share in &shares {
             for (sum, share) in [
@@ -144,7 +134,8 @@ impl EncoderWeights<'_> {
     }
 }
 
-impl EncoderTrace {
+impl ChunkTrace {
+    /// With places for so many samples.
     fn new(weights: &EncoderWeights<'_>, samples: usize) -> Self {
         Self {
             rows: vec![PaddedRows::default(); samples],
@@ -154,32 +145,6 @@ impl EncoderTrace {
             winners_2: vec![0; samples * weights.features_len()],
         }
     }
-
-    fn of_one(&mut self) -> TraceChunk<'_> {
-        TraceChunk {
-            rows: &mut self.rows,
-            pooled: &mut self.pooled,
-            winners_1: &mut self.winners_1,
-            winners_2: &mut self.winners_2,
-        }
-    }
-
-    fn chunks_mut(&mut self, weights: &EncoderWeights<'_>, samples: usize) -> impl Iterator<Item = TraceChunk<'_>> {
-        self.rows
-            .chunks_mut(samples)
-            .zip(self.pooled.chunks_mut(samples * weights.second_layer().map_len()))
-            .zip(self.winners_1.chunks_mut(samples * weights.winners_1_len()))
-            .zip(self.winners_2.chunks_mut(samples * weights.features_len()))
-            .map(|(((rows, pooled), winners_1), winners_2)| TraceChunk { rows, pooled, winners_1, winners_2 })
-    }
-}
-
-/// A part of an [`EncoderTrace`].
-struct TraceChunk<'a> {
-    rows: &'a mut [PaddedRows],
-    pooled: &'a mut [f32],
-    winners_1: &'a mut [u32],
-    winners_2: &'a mut [u32],
 }
 
 /// Forward pass of one chunk.
@@ -188,9 +153,8 @@ struct Forward<'a> {
     first: &'a FirstLayer<'a>,
     occupied: &'a [u8],
     features: &'a mut [f32],
-    trace: TraceChunk<'a>,
-    /// Whether every sample has a place of its own in the trace, or all share one.
-    keep: bool,
+    /// With a place for every sample, or one that all share.
+    trace: &'a mut ChunkTrace,
 }
 
 impl WithSimd for Forward<'_> {
@@ -198,7 +162,7 @@ impl WithSimd for Forward<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { weights, first, occupied, features, trace, keep } = self;
+        let Self { weights, first, occupied, features, trace } = self;
         let second = weights.second_layer();
         let by_window = second.by_window::<S>(weights.weight_2);
         let (map_len, winners_1_len, features_len) =
@@ -206,7 +170,7 @@ impl WithSimd for Forward<'_> {
         for (sample, (occupied, features)) in
             occupied.chunks_exact(CELLS).zip(features.chunks_exact_mut(features_len)).enumerate()
         {
-            let place = if keep { sample } else { 0 };
+            let place = sample.min(trace.rows.len() - 1);
             let rows = &mut trace.rows[place];
             let pooled = &mut trace.pooled[place * map_len..][..map_len];
             let winners_1 = &mut trace.winners_1[place * winners_1_len..][..winners_1_len];
@@ -243,9 +207,8 @@ struct Backward<'a> {
     weights: &'a EncoderWeights<'a>,
     first: &'a FirstLayer<'a>,
     by_output: &'a [f32],
-    trace: &'a EncoderTrace,
+    trace: &'a ChunkTrace,
     d_features: &'a [f32],
-    samples: std::ops::Range<usize>,
 }
 
 impl WithSimd for Backward<'_> {
@@ -253,19 +216,19 @@ impl WithSimd for Backward<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Share {
-        let Self { weights, first, by_output, trace, d_features, samples } = self;
+        let Self { weights, first, by_output, trace, d_features } = self;
         let second = weights.second_layer();
         let (map_len, winners_1_len, features_len) =
             (second.map_len(), weights.winners_1_len(), weights.features_len());
         let mut share = Share::new(weights);
         let mut d_pooled = vec![0.0; map_len];
         let mut sparse = Sparse::new(second);
-        for sample in samples {
+        for (sample, d_features) in d_features.chunks_exact(features_len).enumerate() {
             second.backward(
                 simd,
                 &trace.pooled[sample * map_len..][..map_len],
                 by_output,
-                &d_features[sample * features_len..][..features_len],
+                d_features,
                 &trace.winners_2[sample * features_len..][..features_len],
                 &mut sparse,
                 &mut d_pooled,
