@@ -151,6 +151,35 @@ pub fn list_all(folder: &Path) -> Result<(), FileError> {
     list(folder, &names.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
+/// Lists the files of a folder within another one by one, with the digests of its own list, before it has its name: until
+/// then it lies at `path`. It is known by them, and not finished.
+///
+/// # Errors
+/// If the folder has no list, or the other's cannot be written.
+pub fn list_files_of(folder: &Path, name: &str, path: &Path) -> Result<(), FileError> {
+    let files = list_of(path)?.ok_or_else(|| FileError::new(&path.join(FILE), "is missing", LIST_REMEDY))?;
+    list_as(folder, files.into_iter().map(|(file, sum)| (format!("{name}/{file}"), sum)))
+}
+
+/// Compares the list of a folder within another with what the other lists of its files one by one: whether it is the one
+/// that was listed. The files themselves are compared when they are read.
+///
+/// # Errors
+/// If a file is another one or missing from its list, or a list cannot be read.
+pub fn check_files_of(folder: &Path, name: &str) -> Result<(), FileError> {
+    let (within, path) = (format!("{name}/"), folder.join(name));
+    let found = list_of(&path)?.unwrap_or_default();
+    for (listed, sum) in list_of(folder)?.unwrap_or_default() {
+        if let Some(file) = listed.strip_prefix(&within)
+            && file != FILE
+            && found.get(file) != Some(&sum)
+        {
+            return Err(FileError::new(&path.join(file), ANOTHER, RESTORE));
+        }
+    }
+    Ok(())
+}
+
 /// Lists a folder within another by its own list, which vouches for all of its files: those that were listed one by one are
 /// taken off, in one step.
 ///
@@ -422,10 +451,21 @@ fn verify_into(folder: &Path, verified: &mut Verified) {
                 verified.bytes += bytes;
             }
             Ok(_) => verified.faults.push(FileError::new(&path, DAMAGED, RESTORE)),
+            Err(error) if is_of_begun(folder, name, &sums) => {
+                verified.faults.push(FileError::unreadable(&path, &error, BEGUN_REMEDY));
+            }
             Err(error) => verified.faults.push(unreadable(&path, &error)),
         }
     }
     look_for_others(folder, "", &sums, verified);
+}
+
+/// Whether a listed file is of a folder that is not there and was never finished: a command died before the folder had its
+/// name, or somebody deleted it. It is written again then.
+fn is_of_begun(folder: &Path, name: &str, sums: &Sums) -> bool {
+    name.rsplit_once('/').is_some_and(|(within, file)| {
+        file != FILE && !sums.contains_key(&format!("{within}/{FILE}")) && !folder.join(within).exists()
+    })
 }
 
 /// What is there and not listed, in a folder or in folders within it that have no list of their own.
@@ -456,6 +496,8 @@ fn look_for_others(folder: &Path, prefix: &str, sums: &Sums, verified: &mut Veri
 }
 
 const DAMAGED: &str = "is damaged: its SHA-256 is not that in sha256sums";
+const ANOTHER: &str = "is not the file that the run wrote: the sha256sums of the folder above has another SHA-256";
+const BEGUN_REMEDY: &str = "continue the run, which writes its folder again, or restore it from a copy";
 const UNLISTED: &str = "is not listed in sha256sums: it was never finished, or the list is damaged";
 const UNLISTED_REMEDY: &str = "continue the run, or restore the list; delete what does not belong there";
 
@@ -617,6 +659,36 @@ mod tests {
         write_folder(&folder, "figures", [("b.svg".to_owned(), b"B".to_vec())]).unwrap();
         assert_eq!(names(&folder.join("figures")).unwrap(), ["b.svg"]);
         assert!(faults(&folder).is_empty());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_folder_whose_files_are_listed_one_by_one_is_known_by_them_and_not_finished() {
+        let folder = scratch("begun");
+        let (partial, round) = (folder.join("round.lotpilot-partial"), folder.join("round"));
+        fs::create_dir_all(&partial).unwrap();
+        for name in ["data", "record"] {
+            write(&partial, name, b"1").unwrap();
+        }
+        list_files_of(&folder, "round", &partial).unwrap();
+        let died = faults(&folder);
+        assert_eq!(died.len(), 2);
+        assert!(died.iter().all(|fault| fault.contains("continue the run")), "{died:?}");
+        fs::rename(&partial, &round).unwrap();
+        check_files_of(&folder, "round").unwrap();
+        assert!(faults(&folder).iter().all(|fault| fault.contains("never finished")));
+        write(&round, "network", b"trained on them").unwrap();
+        check_files_of(&folder, "round").unwrap();
+        write(&round, "data", b"2").unwrap();
+        assert!(check_files_of(&folder, "round").unwrap_err().to_string().contains("round/data"));
+        unlist(&round, &["data"]).unwrap();
+        assert!(check_files_of(&folder, "round").is_err());
+        write(&round, "data", b"1").unwrap();
+        list_folder(&folder, "round").unwrap();
+        assert_eq!((names(&folder).unwrap(), faults(&folder)), (vec!["round/sha256sums".to_owned()], Vec::new()));
+        // Finished, it is not written again.
+        fs::remove_dir_all(&round).unwrap();
+        assert!(!faults(&folder).iter().any(|fault| fault.contains("continue the run")));
         fs::remove_dir_all(folder).unwrap();
     }
 

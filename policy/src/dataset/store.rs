@@ -15,8 +15,8 @@
 //! final/                    an optional longer fit on everything
 //! ```
 //!
-//! The run lists `round-NN/round.toml` as soon as the data are there, and the round's `sha256sums` in its place when the
-//! network is.
+//! The run lists the data of a round file by file as soon as they are there, and the round's `sha256sums` in their place
+//! when the network is.
 //!
 //! Every file and folder appears under its name only when it is complete: it is written beside, then renamed.
 
@@ -29,7 +29,6 @@ use crate::dataset::tick::Tick;
 use crate::files::{self, FileError, Format as _, RESTORE_REMEDY, WRITE_REMEDY, write_atomically};
 use ndarray::{Array2, Array3, ArrayView1};
 use ndarray_npy::{NpzWriter, WriteNpyExt as _};
-use sim::limits::RUN_TOML_BYTES_MAX;
 use sim::sensing::OccupancyGrid;
 use std::borrow::Cow;
 use std::fs;
@@ -164,8 +163,7 @@ impl Store {
         collection.write(&partial)?;
         sums::list_all(&partial)?;
         // Before the round is there: one that is there and not listed is none of this run's.
-        let record = sums::read(&partial.join(Collection::NAME), RUN_TOML_BYTES_MAX)?;
-        sums::list_as(&self.folder, [(record_of(&folder), sums::digest(&record))])?;
+        sums::list_files_of(&self.folder, &name_of(&folder), &partial)?;
         fs::rename(&partial, &folder).map_err(|error| FileError::new(&folder, error, WRITE_REMEDY))
     }
 
@@ -193,12 +191,9 @@ impl Store {
         read_samples(&folder, collection.samples)
     }
 
-    /// Reads the record of how a round was collected, which is this run's if the run lists it.
+    /// Reads the record of how a round was collected; the round is the one that this run lists.
     fn read_collection(&self, folder: &Path) -> Result<Collection, FileError> {
-        let record = record_of(folder);
-        if sums::is_listed(&self.folder, &record)? {
-            sums::read_listed(&self.folder, &record, RUN_TOML_BYTES_MAX)?;
-        }
+        sums::check_files_of(&self.folder, &name_of(folder))?;
         files::read(folder)
     }
 }
@@ -262,7 +257,7 @@ mod tests {
     fn listed_anew(store: &Store) {
         let folder = store.round_folder(0);
         sums::list_all(&folder).unwrap();
-        sums::list(store.folder(), &[&record_of(&folder)]).unwrap();
+        sums::list_files_of(store.folder(), "round-00", &folder).unwrap();
     }
 
     #[test]
@@ -278,8 +273,11 @@ mod tests {
     /// It would be learned from as this run's own.
     #[test]
     fn a_round_that_was_copied_from_another_run_is_refused() {
-        let (store, ..) = written("copied-to", 5, 0);
-        let (other, ..) = written("copied-from", 6, 0);
+        let (store, mut round, collection) = written("copied-to", 5, 0);
+        // Collected alike, to the record, but with another label.
+        let other = Store::open(&scratch("copied-from")).unwrap();
+        round.samples[2].label[0] += 0.1;
+        other.write_round(&round, &collection).unwrap();
         let copy = |to: &Path| {
             fs::create_dir(to).unwrap();
             for file in fs::read_dir(other.round_folder(0)).unwrap().map(Result::unwrap) {
@@ -291,7 +289,10 @@ mod tests {
         fs::remove_dir_all(store.round_folder(0)).unwrap();
         assert!(!store.has_round(0).unwrap(), "a run that died before the folder had its name collects it again");
         copy(&store.round_folder(0));
-        assert!(store.read_round(0).unwrap_err().to_string().contains("SHA-256"));
+        for error in [store.read_round(0).unwrap_err(), store.read_samples(0).unwrap_err()] {
+            let error = error.to_string();
+            assert!(error.contains("labels.npy") && error.contains("another SHA-256"), "{error}");
+        }
         for store in [store, other] {
             fs::remove_dir_all(store.folder()).unwrap();
         }
