@@ -111,3 +111,71 @@ fn processor_features() -> Vec<String> {
     let features: [(&str, bool); 0] = [];
     features.into_iter().filter(|(_, has)| *has).map(|(name, _)| name.to_owned()).collect()
 }
+
+#[cfg(test)]
+#[path = "../build/git.rs"]
+mod git;
+
+#[cfg(test)]
+mod tests {
+    use super::git;
+    use std::fs;
+
+    /// Two programs with other changes to one commit were taken for one.
+    #[test]
+    fn programs_with_other_changes_to_their_sources_differ_and_nothing_else_counts() {
+        let folder = std::env::temp_dir().join(format!("xtask-test-{}-git", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(folder.join("src")).unwrap();
+        let git = |args: &[&str]| git::answer(&folder, args).unwrap_or_else(|| panic!("git {args:?}"));
+        let write = |name: &str, text: &str| fs::write(folder.join(name), text).unwrap();
+        let changes = || git::changes(&folder, &["src", "Cargo.toml"]).unwrap();
+        git(&["init", "--quiet"]);
+        write("src/main.rs", "fn main() {}\n");
+        write("Cargo.toml", "");
+        write("README.md", "");
+        git(&["add", "."]);
+        git(&[
+            "-c",
+            "user.name=a",
+            "-c",
+            "user.email=a@b",
+            "-c",
+            "commit.gpgsign=false",
+            "commit",
+            "--quiet",
+            "-m",
+            "a",
+        ]);
+        assert_eq!(changes(), "");
+        write("README.md", "It is no source.");
+        write("notes.txt", "Nor is this.");
+        assert_eq!(changes(), "");
+        let mut seen = vec![changes()];
+        let mut is_new = |what: &str| {
+            assert!(!seen.contains(&changes()), "{what}");
+            seen.push(changes());
+        };
+        write("src/main.rs", "fn main() { one() }\n");
+        is_new("a change");
+        write("src/main.rs", "fn main() { two() }\n");
+        is_new("another one in the same file");
+        write("src/new.rs", "");
+        is_new("a file that git does not know");
+        fs::rename(folder.join("src/new.rs"), folder.join("src/other.rs")).unwrap();
+        is_new("its name");
+        fs::remove_file(folder.join("Cargo.toml")).unwrap();
+        is_new("a file that is gone");
+        git(&["checkout", "--quiet", "."]);
+        fs::remove_file(folder.join("src/other.rs")).unwrap();
+        assert_eq!(changes(), "");
+        // How its user likes git to print changes nothing.
+        write("src/main.rs", "fn main() { one() }\n");
+        for setting in ["diff.noprefix", "diff.mnemonicPrefix", "core.quotePath"] {
+            git(&["config", setting, "true"]);
+        }
+        assert_eq!(changes(), seen[1]);
+        fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(git::changes(&folder, &["src"]), None);
+    }
+}
