@@ -766,6 +766,10 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
     let route = ["--start", "8,12,0", "--goal", "40,12,0"];
     let deep_key = format!("{}b=1", "a.".repeat(20_000));
     let cases: &[(&[&str], &str)] = &[
+        (&["evaluate", "--driver", "expert", "--method", "mine"], "write a name and its drivers"),
+        (&["evaluate", "--driver", "expert", "--method", "mine=net:*"], "no driver is named so; there are expert"),
+        (&["evaluate", "--driver", "expert", "--method", "mine=e***"], "mine=e***"),
+        (&["evaluate", "--driver", "expert", "vvf", "cvm", "--method", "mine=*"], "is no training"),
         (&["evaluate", "--driver", "expert", "--lots", "cones.toml"], "there are 20001 obstacles"),
         (&["evaluate", "--driver", "expert", "--lots", "comb.toml"], "100007 vertices"),
         (&["evaluate", "--driver", "expert", "--lots", "keys.toml"], "unknown field `a0`"),

@@ -139,6 +139,52 @@ fn evaluations_of_two_drivers_merge_to_the_bytes_of_one_and_others_do_not() {
     refused(&[&tentacle, &other], "not finished; continue with: cargo xtask evaluate --resume");
 }
 
+/// Of networks whose seeds nobody knows, too: in one evaluation, in shards, and in evaluations that are merged.
+#[test]
+fn trainings_of_a_method_are_judged_together_wherever_they_drove() {
+    let folder = scratch("method");
+    let out = |name: &str| folder.join(name).to_string_lossy().into_owned();
+    let networks = [1, 2, 3].map(|seed| {
+        let run = out(&format!("seed-{seed}"));
+        succeed(xtask().args([
+            "train-bc",
+            "--preset",
+            "smoke",
+            "--no-eval",
+            "--seed",
+            &seed.to_string(),
+            "--out",
+            &run,
+        ]));
+        format!("net:{run}/round-00")
+    });
+    let method = format!("mine=net:{}/round-*", out("*"));
+    let evaluate = |drivers: &[&str], words: &[&str], name: &str| {
+        let lots = ["--preset", "smoke", "--lots", "test:8:easy", "--trials", "1", "--directions", "forward"];
+        succeed(xtask().args(["evaluate", "--driver"]).args(drivers).args(lots).args(words).args(["--out", &out(name)]))
+    };
+    let all: Vec<&str> = networks.iter().map(String::as_str).chain(["vvf"]).collect();
+    let printed = evaluate(&all, &["--method", &method], "run");
+    assert!(printed.contains("Trainings that differ by their seeds, as one"), "{printed}");
+    let whole = files(&folder.join("run"));
+    let rows = String::from_utf8(whole["trainings.csv"].clone()).unwrap();
+    assert_eq!(rows.lines().filter(|row| row.starts_with("mine,3,")).count(), rows.lines().count() / 2, "{rows}");
+    let merged = |folders: [&str; 2], words: &[&str]| {
+        std::fs::remove_dir_all(folder.join("run")).unwrap();
+        let printed = succeed(xtask().arg("merge").args(folders.map(out)).args(words).args(["--out", &out("run")]));
+        (printed, files(&folder.join("run")))
+    };
+    for shard in ["1", "2"] {
+        evaluate(&all, &["--method", &method, "--shard", &format!("{shard}/2")], shard);
+    }
+    assert!(merged(["1", "2"], &[]) == (printed.clone(), whole.clone()), "shards");
+    evaluate(&all[..2], &[], "two");
+    evaluate(&all[2..], &[], "others");
+    assert!(merged(["two", "others"], &["--method", &method]) == (printed, whole), "evaluations");
+    let refused = xtask().arg("merge").args(["1", "2"].map(out)).args(["--method", &method]).output().unwrap();
+    assert!(text(&refused).1.contains("--method: shards are judged as they were driven"), "{}", text(&refused).1);
+}
+
 #[test]
 fn what_was_merged_merges_again_and_is_compared_with_whom_one_likes() {
     let folder = scratch("merged-again");

@@ -1,4 +1,4 @@
-//! Several trainings of one recipe, judged together: what another training would do, on other lots (docs/methods.md 8.3).
+//! Several trainings of one method, judged together: what another training would do, on other lots (docs/methods.md 8.3).
 //!
 //! An interval of one network says how sure the rate of that network is. Here it is for other lots *and* other seeds.
 
@@ -8,47 +8,145 @@ use crate::slices::Slice;
 use crate::statistics::bootstrap::{DRAWS, Interval, Units};
 use crate::statistics::poisson::Rate;
 use crate::statistics::student::{half_width_of_mean, together, widened};
-use experiment::drivers::NamedDriver;
+use anyhow::{Context as _, ensure};
+use experiment::drivers::{DriverSpec, NamedDriver};
+use glob::{MatchOptions, Pattern};
+use sim::limits::NAME_CHARS_MAX;
 use sim::seed::RootSeed;
+use std::collections::BTreeMap;
 
 /// Fewer trainings say nothing about others (chosen).
 pub const TRAININGS_MIN: usize = 3;
 
-/// Drivers that were trained alike except for the seed, or a single other one.
+/// Methods by name, and the names of the drivers that are trainings of each.
+pub type Methods = BTreeMap<String, Vec<String>>;
+
+/// Finds the drivers that each `METHOD=PATTERN` means. In a pattern of their names `?` stands for one character and `*` for
+/// any that are not slashes. What one method is given several times is all meant.
+///
+/// # Errors
+/// If a text is not of this form, or no driver has such a name.
+pub fn methods(texts: &[String], drivers: &[NamedDriver]) -> anyhow::Result<Methods> {
+    let options = MatchOptions { require_literal_separator: true, ..MatchOptions::new() };
+    let mut methods = Methods::new();
+    for text in texts {
+        let (method, pattern) = text
+            .split_once('=')
+            .with_context(|| format!("method {text:?}: write a name and its drivers, as in mine=run:runs/mine-s*"))?;
+        let found = Pattern::new(pattern).with_context(|| format!("method {text:?}"))?;
+        let named = drivers.iter().map(|driver| &driver.name).filter(|name| found.matches_with(name, options));
+        let names = methods.entry(method.to_owned()).or_default();
+        let before = names.len();
+        names.extend(named.cloned());
+        ensure!(
+            names.len() > before,
+            "method {text:?}: no driver is named so; there are {}",
+            drivers.iter().map(|driver| driver.name.as_str()).collect::<Vec<_>>().join(", ")
+        );
+    }
+    Ok(methods)
+}
+
+/// Says which drivers are trainings of which method.
+///
+/// # Errors
+/// If a method has no name, a very long one or that of a driver, fewer than [`TRAININGS_MIN`] drivers, one that is not there or was never
+/// trained, or two trainings from one seed; if a driver is of two methods.
+pub fn assign(methods: &Methods, drivers: &mut [NamedDriver]) -> anyhow::Result<()> {
+    for (method, names) in methods {
+        ensure!(!method.trim().is_empty(), "method {method:?}: has no name");
+        ensure!(
+            method.chars().count() <= NAME_CHARS_MAX && !method.contains(char::is_control),
+            "method {:?}: shorten its name to at most {NAME_CHARS_MAX} characters, on one line",
+            method.chars().take(NAME_CHARS_MAX).collect::<String>()
+        );
+        ensure!(drivers.iter().all(|driver| driver.name != *method), "method {method:?}: is the name of a driver");
+        ensure!(
+            names.len() >= TRAININGS_MIN,
+            "method {method:?}: {} trainings say nothing about others; at least {TRAININGS_MIN} are needed",
+            names.len()
+        );
+        let mut seeds = BTreeMap::new();
+        for name in names {
+            let driver = drivers.iter_mut().find(|driver| driver.name == *name);
+            let driver = driver.with_context(|| format!("method {method:?}: no driver is named {name:?}"))?;
+            let is_trained = driver.spec.is_network() || matches!(driver.spec, DriverSpec::Callback { .. });
+            ensure!(is_trained, "method {method:?}: {name:?} is no training, so it is by itself");
+            if let Some(other) = driver.method.replace(method.clone()) {
+                ensure!(other != *method, "method {method:?}: {name:?} is named twice");
+                anyhow::bail!("methods {other:?} and {method:?}: {name:?} is of both");
+            }
+            if let Some(training) = &driver.training
+                && let Some(other) = seeds.insert(training.seed.0, name)
+            {
+                anyhow::bail!(
+                    "method {method:?}: {other:?} and {name:?} were both trained from seed {}, so they are not two \
+                     trainings of one method",
+                    training.seed.0
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Trainings of one method, which differ by their seed, or a single other driver.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Team {
-    /// The name of the first.
+    /// That of the method, else of the first driver.
     pub name: String,
     /// Indices of the plan's drivers, by seed.
     pub drivers: Vec<usize>,
-    /// The root seed of each; none of a driver that was not trained.
+    /// The root seed of each; none where it is not known of all of them.
     pub seeds: Vec<u64>,
+}
+
+/// What trainings have in common.
+#[derive(PartialEq)]
+enum InCommon<'a> {
+    /// The method that somebody said they are of.
+    Method(&'a str),
+    /// Everything but the seed.
+    Recipe(&'a str),
+}
+
+impl<'a> InCommon<'a> {
+    /// `None`: it is by itself.
+    fn of(driver: &'a NamedDriver) -> Option<Self> {
+        let recipe = || driver.training.as_ref().map(|training| Self::Recipe(&training.recipe));
+        driver.method.as_deref().map(Self::Method).or_else(recipe)
+    }
 }
 
 /// Every driver in a team, in the order of the first of each; none if no team has [`TRAININGS_MIN`] members. The same seed
 /// again is the same network, and counts once.
 pub fn teams(drivers: &[NamedDriver]) -> Vec<Team> {
-    let mut teams: Vec<Team> = Vec::new();
-    let recipe = |index: usize| drivers[index].training.as_ref().map(|training| &training.recipe);
+    let mut groups: Vec<Vec<usize>> = Vec::new();
     for (index, driver) in drivers.iter().enumerate() {
-        let alone = |seeds| Team { name: driver.name.clone(), drivers: vec![index], seeds };
-        let Some(training) = &driver.training else {
-            teams.push(alone(Vec::new()));
-            continue;
-        };
-        let seed = training.seed.0;
-        match teams.iter_mut().find(|team| recipe(team.drivers[0]) == Some(&training.recipe)) {
-            Some(team) => {
-                if let Err(place) = team.seeds.binary_search(&seed) {
-                    team.seeds.insert(place, seed);
-                    team.drivers.insert(place, index);
-                }
-            }
-            None => teams.push(alone(vec![seed])),
+        let own = InCommon::of(driver);
+        let like = |group: &&mut Vec<usize>| own.is_some() && InCommon::of(&drivers[group[0]]) == own;
+        match groups.iter_mut().find(like) {
+            Some(group) => group.push(index),
+            None => groups.push(vec![index]),
         }
     }
+    let mut teams: Vec<Team> = groups.into_iter().map(|group| Team::of(group, drivers)).collect();
     teams.retain(|team| team.drivers.len() == 1 || team.drivers.len() >= TRAININGS_MIN);
     if teams.iter().any(|team| team.drivers.len() > 1) { teams } else { Vec::new() }
+}
+
+impl Team {
+    fn of(mut group: Vec<usize>, drivers: &[NamedDriver]) -> Self {
+        let first = &drivers[group[0]];
+        let name = first.method.as_ref().unwrap_or(&first.name).clone();
+        let seed_of = |index: &usize| drivers[*index].training.as_ref().map(|training| training.seed.0);
+        if !group.iter().all(|index| seed_of(index).is_some()) {
+            return Self { name, drivers: group, seeds: Vec::new() };
+        }
+        group.sort_by_key(seed_of);
+        group.dedup_by_key(|index| seed_of(index));
+        Self { name, seeds: group.iter().filter_map(seed_of).collect(), drivers: group }
+    }
 }
 
 /// A team in a slice.
@@ -76,7 +174,7 @@ impl JudgedTeams {
 
 impl EvaluationResults {
     /// How drivers stand in a slice at a noise level, and how they differ from one of them, where they were trained often
-    /// enough; `None` if no recipe was, or nothing varies.
+    /// enough; `None` if nothing was, or nothing varies.
     pub fn judge_trainings(
         &self,
         level: usize,
@@ -130,10 +228,11 @@ impl EvaluationResults {
         // No draw of lots without events has any. Trainings that drove the same lots add no metres.
         let supported = Rate::new(0, all[drivers]).upper;
         let estimate = |(team, (&rate, &difference)): (&Team, (&Interval, &Interval))| {
+            let is_paired = !team.seeds.is_empty() && team.seeds == teams[with].seeds || team == &teams[with];
             let own = by_seed(team);
             let half_width = half_width_of_mean(&own);
             let per_100m = widened(rate, half_width);
-            let half_width = if team.seeds == teams[with].seeds {
+            let half_width = if is_paired {
                 half_width_of_mean(&own.iter().zip(&of_with).map(|(own, with)| own - with).collect::<Vec<_>>())
             } else {
                 together(half_width, half_width_of_mean(&of_with))
@@ -180,6 +279,7 @@ mod tests {
     fn trained(recipe: &str, seed: u64) -> NamedDriver {
         let mut driver =
             NamedDriver::expert(&expert::ExpertSettings::half_points()).renamed(&format!("{recipe}{seed}"));
+        driver.spec = DriverSpec::Checkpoint { folder: driver.name.clone().into() };
         driver.training = Some(Training {
             recipe: recipe.to_owned(),
             seed: RootSeed(seed),
@@ -197,6 +297,60 @@ mod tests {
         let found: Vec<(&str, &[usize])> = found.iter().map(|team| (team.name.as_str(), &*team.drivers)).collect();
         assert_eq!(found, [("a2", &[3, 0, 4][..]), ("expert", &[2])], "two of bc say nothing about others");
         assert_eq!(teams(&drivers[..4]), [], "nothing was trained often enough");
+    }
+
+    /// Trainings whose settings follow from others', or of another program.
+    #[test]
+    fn trainings_of_a_named_method_are_a_team_however_they_were_made() {
+        let onnx = |name: &str| {
+            let mut driver = trained(name, 0);
+            driver.training = None;
+            driver
+        };
+        let named = |texts: &[&str], drivers: &mut [NamedDriver]| {
+            let texts: Vec<String> = texts.iter().map(|&text| text.to_owned()).collect();
+            assign(&methods(&texts, drivers)?, drivers)
+        };
+        let renamed = |name: &str, seed| trained(&format!("recipe of {name}"), seed).renamed(name);
+        let mut drivers = vec![
+            renamed("run:c/3", 3),
+            renamed("run:c/1", 1),
+            onnx("onnx:a"),
+            renamed("run:c/2", 2),
+            renamed("run:c/2/bc", 2),
+            onnx("onnx:b"),
+            onnx("onnx:c"),
+            NamedDriver::expert(&expert::ExpertSettings::half_points()),
+        ];
+        named(&["control=run:c/*", "mine=onnx:a0", "mine=onnx:[bc]0"], &mut drivers).unwrap();
+        let found = teams(&drivers);
+        let of = |team: &Team| (team.name.clone(), team.drivers.clone(), team.seeds.clone());
+        let mine = ("mine".to_owned(), vec![2, 5, 6], Vec::new());
+        let control = ("control".to_owned(), vec![1, 3, 0], vec![1, 2, 3]);
+        assert_eq!(
+            found.iter().map(of).collect::<Vec<_>>(),
+            [control, mine, ("run:c/2/bc".to_owned(), vec![4], vec![2]), ("expert".to_owned(), vec![7], Vec::new())]
+        );
+
+        let mut refused = |texts: &[&str]| {
+            drivers.iter_mut().for_each(|driver| driver.method = None);
+            named(texts, &mut drivers).unwrap_err().to_string()
+        };
+        for (texts, problem) in [
+            (&["control"][..], "write a name and its drivers"),
+            (&["control=run:d/*"], "no driver is named so"),
+            (&["control=run:c/[12]"], "at least 3"),
+            (&["control=run:c/***"], "method"),
+            (&["control=run:c/*", "other=run:c/*"], "is of both"),
+            (&["control=run:c/*", "control=run:c/1"], "named twice"),
+            (&["control=run:c/[12]", "control=run:c/2/*"], "both trained from seed 2"),
+            (&["run:c/1=run:c/*"], "the name of a driver"),
+            (&["=run:c/*"], "has no name"),
+            (&[&format!("{}=run:c/*", "m".repeat(101))], "shorten"),
+            (&["others=onnx:?0", "others=expert"], "is no training"),
+        ] {
+            assert!(refused(texts).contains(problem), "{texts:?}: {}", refused(texts));
+        }
     }
 
     /// Three runs with `--seed 1` were three trainings that agree to the last digit.

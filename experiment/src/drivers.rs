@@ -140,6 +140,9 @@ pub struct NamedDriver {
     pub spec: DriverSpec,
     /// The training of a whole run that it comes from; `None` for any other driver.
     pub training: Option<Training>,
+    /// The method that it is a training of, where whoever asks says so; otherwise what [`Self::training`] has in common with
+    /// others counts.
+    pub method: Option<String>,
     model: Model,
     /// Time constant of the action smoothing of drivers that do not smooth by themselves, control ticks; 0 = off.
     smoothing_ticks: f32,
@@ -215,7 +218,7 @@ impl NamedDriver {
 
     /// As its files have it, of no training.
     fn new(name: String, spec: DriverSpec, model: Model) -> Self {
-        Self { name, spec, training: None, model, smoothing_ticks: 0.0, digest_of_files: None }
+        Self { name, spec, training: None, method: None, model, smoothing_ticks: 0.0, digest_of_files: None }
     }
 
     /// The same with other action smoothing. Networks smooth by themselves, as they were trained to.

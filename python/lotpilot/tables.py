@@ -56,6 +56,7 @@ def evaluate(
     seed: int | None = None,
     smoothing: str | float | None = None,
     compare_with: str | None = None,
+    methods: Mapping[str, Sequence[str]] | None = None,
     preset: str | None = None,
     config: str | os.PathLike[str] | None = None,
     overrides: Sequence[str] = (),
@@ -74,6 +75,9 @@ def evaluate(
         seed: Root of obstacles and noise.
         smoothing: ``"own"``, or a time constant in control ticks for every driver.
         compare_with: Name of the driver that the others are compared with; the first if None.
+        methods: Names of drivers that are trainings of one method, three or more, by the name of the method: table
+            ``trainings`` judges them together, for other trainings and other lots. Runs that differ by nothing but their
+            seed are found without it.
         preset: Settings to start from; those of the first ``run:DIR`` if there is one and neither this nor ``config``
             names others.
         config: TOML file with settings to change.
@@ -94,6 +98,7 @@ def evaluate(
         seed=seed,
         smoothing=smoothing,
         compare_with=compare_with,
+        methods=methods,
         preset=preset,
         config=config,
         overrides=overrides,
@@ -123,6 +128,7 @@ class Request:
         seed: int | None = None,
         smoothing: str | float | None = None,
         compare_with: str | None = None,
+        methods: Mapping[str, Sequence[str]] | None = None,
         preset: str | None = None,
         config: str | os.PathLike[str] | None = None,
         overrides: Sequence[str] = (),
@@ -137,6 +143,7 @@ class Request:
             "seed": seed,
             "smoothing": None if smoothing is None else str(smoothing),
             "compare_with": compare_with,
+            "methods": None if methods is None else [(name, list(drivers)) for name, drivers in methods.items()],
         }
         return Request(_named(drivers), which, settings_from(preset, config, overrides))
 

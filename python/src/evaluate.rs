@@ -7,6 +7,7 @@ use anyhow::{Context as _, bail, ensure};
 use evaluation::plan::Plan;
 use evaluation::shards::{ShardRecord, Shards};
 use evaluation::summary::Summary;
+use evaluation::trainings::{self, Methods};
 use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
@@ -32,6 +33,7 @@ pub(crate) struct Trials {
     seed: Option<u64>,
     smoothing: Option<String>,
     compare_with: Option<String>,
+    methods: Option<Vec<(String, Vec<String>)>>,
 }
 
 /// A driver as on the command line, or a function.
@@ -105,6 +107,7 @@ struct Asked {
     drivers: Vec<NamedDriver>,
     lots: Vec<Lot>,
     compare_with: usize,
+    methods: Methods,
 }
 
 impl Asked {
@@ -125,14 +128,16 @@ impl Asked {
                 Ok(NamedDriver::callback(&name, Arc::new(Function { function, failure: failure.clone() })))
             }
         });
-        let drivers = loaded.collect::<anyhow::Result<Vec<NamedDriver>>>()?;
+        let mut drivers = loaded.collect::<anyhow::Result<Vec<NamedDriver>>>()?;
+        let methods: Methods = trials.methods.iter().flatten().cloned().collect();
+        trainings::assign(&methods, &mut drivers)?;
         let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
         let compare_with = match &trials.compare_with {
             Some(name) => drivers.iter().position(|driver| driver.name == *name),
             None => Some(0),
         };
         let compare_with = compare_with.context("compare_with: name one of the drivers")?;
-        Ok(Self { settings, drivers, lots, compare_with })
+        Ok(Self { settings, drivers, lots, compare_with, methods })
     }
 
     /// Warns with the notes about the lots.
@@ -146,22 +151,25 @@ impl Asked {
     }
 
     fn plan(&self, shard: Option<Shard>) -> Plan<'_> {
-        let Self { settings, drivers, lots, compare_with } = self;
+        let Self { settings, drivers, lots, compare_with, .. } = self;
         Plan { settings, drivers, lots, compare_with: *compare_with, shard }
     }
 
     /// What the manifest says besides the settings.
     fn arguments(&self, shard: Option<ShardRecord>) -> anyhow::Result<toml::Table> {
         #[derive(Serialize)]
-        struct Arguments {
+        struct Arguments<'a> {
             drivers: Vec<String>,
             names: Vec<String>,
             compare_with: usize,
+            #[serde(skip_serializing_if = "Methods::is_empty")]
+            methods: &'a Methods,
             #[serde(skip_serializing_if = "Option::is_none")]
             shard: Option<ShardRecord>,
         }
         let names = self.drivers.iter().map(|driver| driver.name.clone()).collect();
-        let arguments = Arguments { drivers: self.specs(), names, compare_with: self.compare_with, shard };
+        let (drivers, compare_with, methods) = (self.specs(), self.compare_with, &self.methods);
+        let arguments = Arguments { drivers, names, compare_with, methods, shard };
         Ok(toml::Table::try_from(arguments)?)
     }
 

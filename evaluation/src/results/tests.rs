@@ -207,6 +207,10 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     let apart = results.judge_teams(0, &slice, &others, 0, RootSeed(1)).unwrap()[1].difference_per_100m;
     let half_width = together(4.302_652_73, 4.302_652_73);
     assert!((apart.upper - 1.0 - half_width).abs() < 1e-7, "{apart:?}");
+    // Nor are trainings whose seeds nobody knows, but with themselves.
+    let unknown = [of_seeds(&[0, 1, 2], &[]), of_seeds(&[3, 4, 5], &[])];
+    let found = results.judge_teams(0, &slice, &unknown, 0, RootSeed(1)).unwrap();
+    assert_eq!((found[1].difference_per_100m, rounded(found[0].difference_per_100m)), (apart, [0.0; 3]));
     // No draw of lots without events has any; the metres say what that supports.
     let none = results.judge_teams(0, &slice, &[team(&[0, 1])], 0, RootSeed(1)).unwrap()[0].per_100m;
     let metres = results.totals(0, 0, &slice, None).reference_m;

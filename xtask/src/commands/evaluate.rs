@@ -13,6 +13,7 @@ use evaluation::plan::Plan;
 use evaluation::results::EvaluationResults;
 use evaluation::shards::ShardRecord;
 use evaluation::summary::Summary;
+use evaluation::trainings::{self, Methods};
 use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
@@ -36,6 +37,7 @@ Examples:
   cargo xtask evaluate --driver net:runs/train-dagger-default-s1/round-03 --lots lot-b --noise hard --out runs/hard
   cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1 --noise sweep --lots test:100
   cargo xtask evaluate --driver run:runs/train-dagger-default-s1 --lots sealed:mine:1000 --shard 2/16 --out shards/2
+  cargo xtask evaluate --driver onnx:mine-{1,2,3}.onnx run:runs/s{1,2,3} --method 'mine=onnx:mine-*' --lots test:100
   cargo xtask evaluate --resume runs/hard";
 
 #[derive(Debug, Clone, Args)]
@@ -64,6 +66,8 @@ pub(crate) struct EvaluateArgs {
     /// Driver to compare the others with [default: the last network, else the first driver].
     #[arg(long, value_name = "SPEC")]
     compare_with: Option<String>,
+    #[command(flatten)]
+    methods: MethodArgs,
     /// Seed of obstacles and noise of the trials, not of a training [default: the setting evaluation.seed].
     #[arg(long)]
     seed: Option<u64>,
@@ -82,13 +86,39 @@ pub(crate) struct EvaluateArgs {
         long,
         value_name = "RUN", value_parser = run_folder(),
         conflicts_with_all = [
-            "drivers", "lots", "trials", "directions", "noise", "compare_with", "seed", "shard", "preset", "config", "overrides", "out",
-            "smoothing"
+            "drivers", "lots", "trials", "directions", "noise", "compare_with", "methods", "seed", "shard", "preset", "config",
+            "overrides", "out", "smoothing"
         ]
     )]
     resume: Option<PathBuf>,
     #[command(flatten)]
     record: RecordArgs,
+}
+
+/// Which drivers are trainings of one method.
+#[derive(Debug, Clone, Args)]
+pub(crate) struct MethodArgs {
+    /// Drivers that are trainings of one method, three or more, to be judged together as well: its name, and a pattern of
+    /// theirs (`*` stands for anything but a slash); may be repeated. Trainings that differ by nothing but their seed are
+    /// found without it.
+    #[arg(long = "method", value_name = "NAME=DRIVERS")]
+    methods: Vec<String>,
+}
+
+impl MethodArgs {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.methods.is_empty()
+    }
+
+    /// Finds the drivers that are meant, and says so to them.
+    ///
+    /// # Errors
+    /// See [`trainings::methods`] and [`trainings::assign`].
+    pub(crate) fn assign(&self, drivers: &mut [NamedDriver]) -> anyhow::Result<Methods> {
+        let methods = trainings::methods(&self.methods, drivers).context("--method")?;
+        trainings::assign(&methods, drivers).context("--method")?;
+        Ok(methods)
+    }
 }
 
 /// What an evaluation was asked for besides its settings.
@@ -98,6 +128,8 @@ pub(crate) struct Asked {
     pub(crate) drivers: Vec<String>,
     /// An index of the drivers.
     pub(crate) compare_with: usize,
+    #[serde(default, skip_serializing_if = "Methods::is_empty")]
+    pub(crate) methods: Methods,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) shard: Option<ShardRecord>,
 }
@@ -113,13 +145,19 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
         let asked = Asked {
             drivers: args.drivers.clone(),
             compare_with: compare_with(args.compare_with.as_deref(), &specs)?,
+            methods: Methods::new(),
             shard: None,
         };
         let (mut settings, preset) = settings_for(&specs, &Layers::from(&args.layers), output)?;
         override_trials(&mut settings, args)?;
         (settings, asked, Err(preset))
     };
-    let drivers = NamedDriver::load_all(&asked.drivers, &settings)?;
+    let mut drivers = NamedDriver::load_all(&asked.drivers, &settings)?;
+    if begun.is_ok() {
+        trainings::assign(&asked.methods, &mut drivers)?;
+    } else {
+        asked.methods = args.methods.assign(&mut drivers)?;
+    }
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     output.notes(&notes::of(&lots, &settings.evaluation.noise));
     let shard = args.shard.or(asked.shard.as_ref().map(|record| record.number));

@@ -3,7 +3,7 @@
 
 use crate::args::{JsonArgs, OutArgs};
 use crate::build_info;
-use crate::commands::evaluate::{self, Asked};
+use crate::commands::evaluate::{self, Asked, MethodArgs};
 use crate::commands::{perform, reproduce};
 use crate::console::Console;
 use crate::interrupt;
@@ -42,6 +42,8 @@ pub(crate) struct MergeArgs {
     #[arg(long, value_name = "SPEC")]
     compare_with: Option<String>,
     #[command(flatten)]
+    methods: MethodArgs,
+    #[command(flatten)]
     pub(crate) json: JsonArgs,
     #[command(flatten)]
     out: OutArgs,
@@ -54,6 +56,7 @@ pub(crate) fn run(args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     }
     let shards = Shards::read(&args.folders)?;
     ensure!(args.compare_with.is_none(), "--compare-with: shards are compared as they were driven; leave it out");
+    ensure!(args.methods.is_empty(), "--method: shards are judged as they were driven; leave it out");
     if shards.manifest().command != reproduce::COMMAND {
         return evaluation(&shards, args, output);
     }
@@ -80,7 +83,8 @@ pub(crate) fn run(args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
 fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, manifest) = (shards.settings(), shards.manifest());
     let asked: Asked = manifest.arguments.clone().try_into()?;
-    let drivers = NamedDriver::load_all(&asked.drivers, settings)?;
+    let mut drivers = NamedDriver::load_all(&asked.drivers, settings)?;
+    evaluation::trainings::assign(&asked.methods, &mut drivers)?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     manifest.check_inputs(&inputs::of(&lots, &drivers))?;
     let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with: asked.compare_with, shard: None };
@@ -101,14 +105,15 @@ fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> 
         evaluations.manifest().target
     );
     let compare_with = evaluate::compare_with(args.compare_with.as_deref(), &specs)?;
-    let drivers = NamedDriver::load_all(&named, settings)?;
+    let mut drivers = NamedDriver::load_all(&named, settings)?;
+    let methods = args.methods.assign(&mut drivers)?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     let inputs = inputs::of(&lots, &drivers);
     evaluations.check_inputs(&inputs)?;
     let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with, shard: None };
     evaluate::check(&plan)?;
     let rows = evaluations.rows(&plan)?;
-    let asked = Asked { drivers: named, compare_with, shard: None };
+    let asked = Asked { drivers: named, compare_with, methods, shard: None };
     let request = Request { arguments: toml::Table::try_from(&asked)?, inputs };
     let made = evaluations.manifest();
     // The manifest says who drove, not who merged: what comes out is merged with others in its turn.
