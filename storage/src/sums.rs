@@ -9,7 +9,7 @@ use crate::lock;
 use crate::read;
 use crate::whole;
 use sha2::{Digest as _, Sha256};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::{self, Seek as _};
@@ -161,20 +161,31 @@ pub fn list_files_of(folder: &Path, name: &str, path: &Path) -> Result<(), FileE
     list_as(folder, files.into_iter().map(|(file, sum)| (format!("{name}/{file}"), sum)))
 }
 
-/// Compares the list of a folder within another with what the other lists of its files one by one: whether it is the one
-/// that was listed. The files themselves are compared when they are read.
+/// Compares the list of a folder within another with what the other has of it, its files one by one or its list: whether it
+/// is the one that was listed. The files themselves are compared when they are read.
 ///
 /// # Errors
-/// If a file is another one or missing from its list, or a list cannot be read.
-pub fn check_files_of(folder: &Path, name: &str) -> Result<(), FileError> {
+/// If a file is another one or missing from the list, the list is another one, or one cannot be read.
+pub fn check_folder(folder: &Path, name: &str) -> Result<(), FileError> {
     let (within, path) = (format!("{name}/"), folder.join(name));
-    let found = list_of(&path)?.unwrap_or_default();
+    let found = list_of(&path)?;
     for (listed, sum) in list_of(folder)?.unwrap_or_default() {
-        if let Some(file) = listed.strip_prefix(&within)
-            && file != FILE
-            && found.get(file) != Some(&sum)
-        {
-            return Err(FileError::new(&path.join(file), ANOTHER, RESTORE));
+        let Some(file) = listed.strip_prefix(&within) else { continue };
+        if file == FILE {
+            read_listed(folder, &listed, LIST_BYTES_MAX)?;
+            continue;
+        }
+        let Some(found) = &found else {
+            return Err(FileError::new(
+                &path.join(FILE),
+                "is missing, so nothing says whether its files are whole",
+                BEGUN_REMEDY,
+            ));
+        };
+        match found.get(file) {
+            Some(found) if *found == sum => {}
+            Some(_) => return Err(FileError::new(&path.join(file), ANOTHER, BEGUN_REMEDY)),
+            None => return Err(FileError::new(&path.join(file), UNLISTED, BEGUN_REMEDY)),
         }
     }
     Ok(())
@@ -441,8 +452,15 @@ fn verify_into(folder: &Path, verified: &mut Verified) {
         Ok(None) => return verified.faults.push(FileError::new(&list, "is missing", LIST_REMEDY)),
         Err(error) => return verified.faults.push(error),
     };
+    let mut gone = BTreeSet::new();
     for (name, sum) in &sums {
         let path = folder.join(name);
+        if let Some(within) = begun_and_gone(folder, name, &sums) {
+            if gone.insert(within) {
+                verified.faults.push(FileError::new(&folder.join(within), GONE, GONE_REMEDY));
+            }
+            continue;
+        }
         let found =
             read::open(&path, u64::MAX).and_then(|mut file| Ok((file.metadata()?.len(), digest_of(&mut file)?)));
         match found {
@@ -451,21 +469,17 @@ fn verify_into(folder: &Path, verified: &mut Verified) {
                 verified.bytes += bytes;
             }
             Ok(_) => verified.faults.push(FileError::new(&path, DAMAGED, RESTORE)),
-            Err(error) if is_of_begun(folder, name, &sums) => {
-                verified.faults.push(FileError::unreadable(&path, &error, BEGUN_REMEDY));
-            }
             Err(error) => verified.faults.push(unreadable(&path, &error)),
         }
     }
     look_for_others(folder, "", &sums, verified);
 }
 
-/// Whether a listed file is of a folder that is not there and was never finished: a command died before the folder had its
-/// name, or somebody deleted it. It is written again then.
-fn is_of_begun(folder: &Path, name: &str, sums: &Sums) -> bool {
-    name.rsplit_once('/').is_some_and(|(within, file)| {
-        file != FILE && !sums.contains_key(&format!("{within}/{FILE}")) && !folder.join(within).exists()
-    })
+/// The folder of a listed file, if it is not there and was never finished: it is written again then.
+fn begun_and_gone<'a>(folder: &Path, name: &'a str, sums: &Sums) -> Option<&'a str> {
+    let (within, file) = name.rsplit_once('/')?;
+    let is_finished = file == FILE || sums.contains_key(&format!("{within}/{FILE}"));
+    (!is_finished && !folder.join(within).exists()).then_some(within)
 }
 
 /// What is there and not listed, in a folder or in folders within it that have no list of their own.
@@ -497,7 +511,9 @@ fn look_for_others(folder: &Path, prefix: &str, sums: &Sums, verified: &mut Veri
 
 const DAMAGED: &str = "is damaged: its SHA-256 is not that in sha256sums";
 const ANOTHER: &str = "is not the file that the run wrote: the sha256sums of the folder above has another SHA-256";
-const BEGUN_REMEDY: &str = "continue the run, which writes its folder again, or restore it from a copy";
+const BEGUN_REMEDY: &str = "restore its folder from a copy, or move it away: the run goes on with one of its own";
+const GONE: &str = "is not there: a command died before it had its name, or somebody took it away";
+const GONE_REMEDY: &str = "continue the run, which writes it again";
 const UNLISTED: &str = "is not listed in sha256sums: it was never finished, or the list is damaged";
 const UNLISTED_REMEDY: &str = "continue the run, or restore the list; delete what does not belong there";
 
@@ -672,20 +688,30 @@ mod tests {
         }
         list_files_of(&folder, "round", &partial).unwrap();
         let died = faults(&folder);
-        assert_eq!(died.len(), 2);
-        assert!(died.iter().all(|fault| fault.contains("continue the run")), "{died:?}");
+        assert!(died.len() == 1 && died[0].contains("continue the run, which writes it again"), "{died:?}");
         fs::rename(&partial, &round).unwrap();
-        check_files_of(&folder, "round").unwrap();
+        check_folder(&folder, "round").unwrap();
         assert!(faults(&folder).iter().all(|fault| fault.contains("never finished")));
         write(&round, "network", b"trained on them").unwrap();
-        check_files_of(&folder, "round").unwrap();
+        check_folder(&folder, "round").unwrap();
+        let refused = |part: &str| {
+            let error = check_folder(&folder, "round").unwrap_err().to_string();
+            assert!(error.contains(part) && error.contains("move it away"), "{error}");
+        };
         write(&round, "data", b"2").unwrap();
-        assert!(check_files_of(&folder, "round").unwrap_err().to_string().contains("round/data"));
+        refused("round/data: is not the file that the run wrote");
         unlist(&round, &["data"]).unwrap();
-        assert!(check_files_of(&folder, "round").is_err());
+        refused("round/data: is not listed");
+        let list = fs::read(round.join(FILE)).unwrap();
+        fs::remove_file(round.join(FILE)).unwrap();
+        refused("round/sha256sums: is missing");
+        fs::write(round.join(FILE), list).unwrap();
         write(&round, "data", b"1").unwrap();
         list_folder(&folder, "round").unwrap();
         assert_eq!((names(&folder).unwrap(), faults(&folder)), (vec!["round/sha256sums".to_owned()], Vec::new()));
+        check_folder(&folder, "round").unwrap();
+        write(&round, "data", b"3").unwrap();
+        assert!(check_folder(&folder, "round").unwrap_err().to_string().contains("round/sha256sums: is damaged"));
         // Finished, it is not written again.
         fs::remove_dir_all(&round).unwrap();
         assert!(!faults(&folder).iter().any(|fault| fault.contains("continue the run")));

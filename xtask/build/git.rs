@@ -5,8 +5,8 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-/// How sources differ from the commit: git's hash of the names and contents that do; empty if none does, `None` without git or
-/// checkout. Of names and contents, because what git prints depends on the settings of its user.
+/// How sources differ from the commit: git's hash of the names and contents that do; empty if none does, `None` without
+/// git or checkout. Of names and contents, because what git prints depends on the settings of its user.
 pub(crate) fn changes(workspace: impl AsRef<Path>, sources: &[&str]) -> Option<String> {
     let workspace = workspace.as_ref();
     let names_of = |args: &[&str]| answer(workspace, &[args, &["-z", "--"], sources].concat());

@@ -160,9 +160,9 @@ mod tests {
         is_new("a change");
         write("src/main.rs", "fn main() { two() }\n");
         is_new("another one in the same file");
-        write("src/new.rs", "");
+        write("src/Näheres.rs", "");
         is_new("a file that git does not know");
-        fs::rename(folder.join("src/new.rs"), folder.join("src/other.rs")).unwrap();
+        fs::rename(folder.join("src/Näheres.rs"), folder.join("src/other.rs")).unwrap();
         is_new("its name");
         fs::remove_file(folder.join("Cargo.toml")).unwrap();
         is_new("a file that is gone");
@@ -170,12 +170,16 @@ mod tests {
         fs::remove_file(folder.join("src/other.rs")).unwrap();
         assert_eq!(changes(), "");
         // How its user likes git to print changes nothing.
-        write("src/main.rs", "fn main() { one() }\n");
-        for setting in ["diff.noprefix", "diff.mnemonicPrefix", "core.quotePath"] {
-            git(&["config", setting, "true"]);
+        write("src/Näheres.rs", "");
+        let as_usual = changes();
+        for (setting, value) in
+            [("diff.noprefix", "true"), ("diff.mnemonicPrefix", "true"), ("core.quotePath", "false")]
+        {
+            git(&["config", setting, value]);
         }
-        assert_eq!(changes(), seen[1]);
+        assert_eq!(changes(), as_usual);
+        fs::remove_dir_all(folder.join(".git")).unwrap();
+        assert_eq!(git::changes(&folder, &["src"]), None, "no checkout");
         fs::remove_dir_all(&folder).unwrap();
-        assert_eq!(git::changes(&folder, &["src"]), None);
     }
 }

@@ -191,9 +191,9 @@ impl Store {
         read_samples(&folder, collection.samples)
     }
 
-    /// Reads the record of how a round was collected; the round is the one that this run lists.
+    /// Reads the record of how a round was collected; the round is the one that this run lists, if it lists any.
     fn read_collection(&self, folder: &Path) -> Result<Collection, FileError> {
-        sums::check_files_of(&self.folder, &name_of(folder))?;
+        sums::check_folder(&self.folder, &name_of(folder))?;
         files::read(folder)
     }
 }
@@ -293,6 +293,14 @@ mod tests {
             let error = error.to_string();
             assert!(error.contains("labels.npy") && error.contains("another SHA-256"), "{error}");
         }
+        fs::remove_dir_all(store.round_folder(0)).unwrap();
+        fs::rename(store.round_folder(1), store.round_folder(0)).unwrap();
+        sums::list_all(&store.round_folder(0)).unwrap();
+        store.finish(&store.round_folder(0)).unwrap();
+        store.read_round(0).unwrap();
+        ndarray_npy::write_npy(store.round_folder(0).join("labels.npy"), &Array2::<f32>::zeros([5, 3])).unwrap();
+        sums::list_all(&store.round_folder(0)).unwrap();
+        assert!(store.read_round(0).unwrap_err().to_string().contains("sha256sums"), "finished, and replaced since");
         for store in [store, other] {
             fs::remove_dir_all(store.folder()).unwrap();
         }

@@ -103,6 +103,8 @@ impl EncoderWeights<'_> {
     pub(crate) fn backward(&self, trace: &EncoderTrace, d_features: &[f32]) -> EncoderGradients {
         let first = FirstLayer::new(self.conv1, self.weight_1, self.bias_1);
         let by_output = self.second_layer().by_output(self.weight_2);
+        let samples: usize = trace.chunks.iter().map(|chunk| chunk.rows.len()).sum();
+        assert_eq!(d_features.len(), samples * self.features_len(), "gradients of another batch than was traced");
         // A chunk's share is summed by one thread, the shares in order: the same bits for any number of threads.
         let d_features = d_features.par_chunks(CHUNK * self.features_len());
         let share = |(trace, d_features)| {
@@ -170,7 +172,7 @@ impl WithSimd for Forward<'_> {
         for (sample, (occupied, features)) in
             occupied.chunks_exact(CELLS).zip(features.chunks_exact_mut(features_len)).enumerate()
         {
-            let place = sample.min(trace.rows.len() - 1);
+            let place = if trace.rows.len() == 1 { 0 } else { sample };
             let rows = &mut trace.rows[place];
             let pooled = &mut trace.pooled[place * map_len..][..map_len];
             let winners_1 = &mut trace.winners_1[place * winners_1_len..][..winners_1_len];
