@@ -100,6 +100,7 @@ fn lots_that_are_refused() {
         ("\"lane\"", "\"\"", "name is empty"),
         ("\"lane\"", "\" \\t\"", "name is empty"),
         ("\"lane\"", "\"a/b\"", "contains '/'"),
+        ("\"lane\"", "\"a|b\"", "contains '|'"),
         ("\"lane\"", "\"..\\\\b\"", "contains '\\\\'"),
         ("\"lane\"", "\"a\\nb\"", "contains '\\n'"),
         ("\"lane\"", "\"a\\u0000\"", "contains '\\0'"),
@@ -756,7 +757,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
     write("small.yaml", sound.yaml.as_bytes());
     write("map.pgm", &sound.image);
     write("back.lot.toml", b"map = \"small.yaml\"\ncentre_line = \"back.csv\"\n");
-    for (name, lot) in [("stars.toml", "a*b"), ("bars.toml", "a|b")] {
+    for (name, lot) in [("stars.toml", "a*b"), ("bars.toml", "a+b")] {
         write(name, LOT.replace("\"lane\"", &format!("{lot:?}")).as_bytes());
     }
     write("deep.toml", "[".repeat(250_000).as_bytes());
@@ -768,7 +769,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
     let cases: &[(&[&str], &str)] = &[
         (&["evaluate", "--driver", "expert", "--method", "mine"], "write a name and its drivers"),
         (&["evaluate", "--driver", "expert", "--method", "mine=net:*"], "no driver is named so; there are expert"),
-        (&["evaluate", "--driver", "expert", "--method", "mine=e***"], "mine=e***"),
+        (&["evaluate", "--driver", "expert", "--method", "mine=[*"], "no driver is named so"),
         (&["evaluate", "--driver", "expert", "vvf", "cvm", "--method", "mine=*"], "is no training"),
         (&["evaluate", "--driver", "expert", "--lots", "cones.toml"], "there are 20001 obstacles"),
         (&["evaluate", "--driver", "expert", "--lots", "comb.toml"], "100007 vertices"),
@@ -791,6 +792,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
             "episode.vehicle.emergency_brake_mps2",
         ),
         (&["generate", "--lots", "stars.toml", "bars.toml", "--out", "."], "would both be a-b.toml"),
+        (&["render", "lot", "--lots", "stars.toml", "bars.toml", "--out", "p", "--overwrite"], "have one file name"),
         (
             &["evaluate", "--driver", "expert", "--lots", "test:600000,train:600000", "--trials", "1"],
             "lots; at most 1000000",

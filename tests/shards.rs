@@ -165,10 +165,15 @@ fn trainings_of_a_method_are_judged_together_wherever_they_drove() {
     };
     let all: Vec<&str> = networks.iter().map(String::as_str).chain(["vvf"]).collect();
     let printed = evaluate(&all, &["--method", &method], "run");
-    assert!(printed.contains("Trainings that differ by their seeds, as one"), "{printed}");
+    assert!(printed.contains("Several trainings, as one"), "{printed}");
     let whole = files(&folder.join("run"));
     let rows = String::from_utf8(whole["trainings.csv"].clone()).unwrap();
     assert_eq!(rows.lines().filter(|row| row.starts_with("mine,3,")).count(), rows.lines().count() / 2, "{rows}");
+    // As it is when a process dies before its tables are written.
+    std::fs::remove_file(folder.join("run/trainings.csv")).unwrap();
+    sums::unlist(&folder.join("run"), &["finished.toml", "trainings.csv"]).unwrap();
+    succeed(xtask().args(["evaluate", "--resume", &out("run")]));
+    assert!(files(&folder.join("run")) == whole, "resumed");
     let merged = |folders: [&str; 2], words: &[&str]| {
         std::fs::remove_dir_all(folder.join("run")).unwrap();
         let printed = succeed(xtask().arg("merge").args(folders.map(out)).args(words).args(["--out", &out("run")]));
@@ -180,7 +185,10 @@ fn trainings_of_a_method_are_judged_together_wherever_they_drove() {
     assert!(merged(["1", "2"], &[]) == (printed.clone(), whole.clone()), "shards");
     evaluate(&all[..2], &[], "two");
     evaluate(&all[2..], &[], "others");
-    assert!(merged(["two", "others"], &["--method", &method]) == (printed, whole), "evaluations");
+    assert!(merged(["two", "others"], &["--method", &method]) == (printed.clone(), whole.clone()), "evaluations");
+    evaluate(&all[..3], &["--method", &method], "three");
+    evaluate(&all[3..], &[], "vvf");
+    assert!(merged(["three", "vvf"], &[]) == (printed, whole), "what was named before holds");
     let refused = xtask().arg("merge").args(["1", "2"].map(out)).args(["--method", &method]).output().unwrap();
     assert!(text(&refused).1.contains("--method: shards are judged as they were driven"), "{}", text(&refused).1);
 }

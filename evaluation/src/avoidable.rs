@@ -8,7 +8,9 @@ use crate::what_if::{Substitutes, Substitution};
 use anyhow::{Context as _, ensure};
 use experiment::drive::TrialBatch;
 use experiment::drivers::DriverSpec;
+use experiment::inputs;
 use experiment::lots::Lot;
+use experiment::manifest::Manifest;
 use experiment::progress::Progress;
 use experiment::replay_key::ReplayKey;
 use experiment::settings::{NoiseChoice, Settings};
@@ -52,7 +54,7 @@ struct Failing {
 /// drivers named, or of all. Rows are in the order of the evaluation. `None` if cancelled.
 ///
 /// # Errors
-/// If the folder holds no finished evaluation, or a run is not what was recorded.
+/// If the folder holds no finished evaluation, a lot or a driver has changed since, or a run is not what was recorded.
 pub fn of_evaluation(
     folder: &Path,
     settings: &Settings,
@@ -60,6 +62,7 @@ pub fn of_evaluation(
     progress: &dyn Progress,
 ) -> anyhow::Result<Option<Vec<Row>>> {
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
+    let manifest = Manifest::read(folder)?;
     let failing = read(folder, &lots, drivers)?;
     let all: usize = failing.iter().map(|failing| failing.runs.len()).sum();
     progress.begin("what-if", "driving again");
@@ -68,10 +71,12 @@ pub fn of_evaluation(
     for Failing { driver: name, noise, spec, runs } in &failing {
         let driver = spec.clone().load(settings)?;
         driver.check(settings)?;
+        manifest.check_some_inputs(&inputs::of(&lots, std::slice::from_ref(&driver)))?;
         let substitutes = Substitutes::new(&driver, settings);
         let seed = settings.evaluation.seed;
         let runs: Vec<_> = runs.iter().collect();
         let mut tally = Tally::new(name, *noise);
+        progress.at(done as f64 / all as f64, &mut |_| format!("{done} of {all} runs, driver: {name}"));
         for runs in runs.chunks(BATCH) {
             let trial =
                 |&(&(lot, direction, trial), _): &(&RunOf, _)| Trial::of_evaluation(seed, &lots[lot], direction, trial);

@@ -3,6 +3,7 @@
 use crate::parts::{Part, Rows};
 use crate::plan::Plan;
 use crate::shards::{self, ShardRecord};
+use crate::trainings::Methods;
 use anyhow::{Context as _, ensure};
 use experiment::drivers::DriverSpec;
 use experiment::manifest::{self, Inputs, Manifest};
@@ -21,6 +22,7 @@ struct EvaluationRun {
     manifest: Manifest,
     settings: Settings,
     drivers: Vec<DriverSpec>,
+    methods: Methods,
 }
 
 impl EvaluationRun {
@@ -45,7 +47,9 @@ impl EvaluationRun {
         let drivers = drivers.with_context(|| format!("{name}/manifest.toml: names no drivers"))?;
         let drivers = Vec::<String>::deserialize(drivers).with_context(|| format!("{name}/manifest.toml: drivers"))?;
         let drivers = DriverSpec::parse_all(&drivers).with_context(|| format!("{name}/manifest.toml"))?;
-        Ok(Self { folder: folder.to_owned(), settings: trained::settings_of(folder)?, manifest, drivers })
+        let methods = manifest.arguments.get("methods").cloned().map(Methods::deserialize).transpose();
+        let methods = methods.with_context(|| format!("{name}/manifest.toml: methods"))?.unwrap_or_default();
+        Ok(Self { folder: folder.to_owned(), settings: trained::settings_of(folder)?, manifest, drivers, methods })
     }
 
     /// Refuses what was driven differently.
@@ -125,6 +129,15 @@ impl Evaluations {
     /// The drivers of all, those of the first folder first.
     pub fn drivers(&self) -> Vec<DriverSpec> {
         self.runs.iter().flat_map(|run| run.drivers.iter().cloned()).collect()
+    }
+
+    /// The methods of all; what two call by one name adds up.
+    pub fn methods(&self) -> Methods {
+        let mut methods = Methods::new();
+        for (name, drivers) in self.runs.iter().flat_map(|run| &run.methods) {
+            methods.entry(name.clone()).or_default().extend(drivers.iter().cloned());
+        }
+        methods
     }
 
     /// Refuses files of lots or drivers that have changed since.

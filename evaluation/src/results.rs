@@ -82,8 +82,7 @@ impl EvaluationResults {
     /// Nothing driven yet.
     pub fn new(plan: &Plan<'_>) -> Self {
         // Every driver's, and those of the settings. A lot from a file is known by its digest, wherever the file is now.
-        let trainings = || plan.drivers.iter().filter_map(|driver| driver.training.as_ref());
-        let of_drivers = trainings().flat_map(|training| &training.lots);
+        let of_drivers = plan.drivers.iter().flat_map(|driver| &driver.trained_on.lots);
         let named: BTreeSet<&String> = plan.settings.training.lots.iter().chain(of_drivers).collect();
         let known: Vec<Lot> = named
             .into_iter()
@@ -92,7 +91,7 @@ impl EvaluationResults {
             .collect();
         // Two files may give one name to different ground, and two names to the same.
         let trained_on: BTreeSet<String> = known.iter().filter(|lot| !lot.is_from_file()).map(Lot::group).collect();
-        let of_trainings = trainings().flat_map(|training| training.digests.iter().cloned());
+        let of_trainings = plan.drivers.iter().flat_map(|driver| driver.trained_on.digests.iter().cloned());
         let digests: BTreeSet<String> = of_trainings.chain(known.iter().filter_map(Lot::digest)).collect();
         let mut results = Self {
             groups: Vec::new(),

@@ -151,23 +151,23 @@ pub struct ComparisonRow {
     pub difference_safe_ratio_upper: Option<f64>,
 }
 
-/// A row of `trainings.csv`: several trainings that differ by their seeds, as one, or another driver beside them. Intervals
+/// A row of `trainings.csv`: several trainings of one method, as one, or another driver beside them. Intervals
 /// of 95 % are for other lots and, where there are several, other trainings. Differences are team − `compared_with`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TrainingsRow {
-    /// The first of the team.
+    /// The method, else the first of the trainings.
     pub driver: String,
     /// How many trainings it has; 1: no training, or one of its own kind.
     pub trainings: usize,
-    /// The first of the team it is compared with.
+    /// The same of those it is compared with.
     pub compared_with: String,
     /// Sensor noise.
     pub noise: NoiseChoice,
     /// Where: the label of a slice.
     pub lots: String,
-    /// Near-collisions of each, by seed, with spaces between them.
+    /// Near-collisions of each, with spaces between them: by seed, or in the order of the drivers where one's is not known.
     pub near_collisions: String,
-    /// Contacts of each, by seed, with spaces between them.
+    /// Contacts of each, in the same order.
     pub contacts: String,
     /// Near-collisions per 100 m of route, mean.
     pub per_100m: f64,

@@ -5,10 +5,10 @@
 use crate::judge::{Stratum, strata};
 use crate::results::{EvaluationResults, RunSummary};
 use crate::slices::Slice;
-use crate::statistics::bootstrap::{DRAWS, Interval, Units};
+use crate::statistics::bootstrap::{DRAWS, Interval, UNITS_MIN, Units};
 use crate::statistics::poisson::Rate;
 use crate::statistics::student::{half_width_of_mean, together, widened};
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use experiment::drivers::{DriverSpec, NamedDriver};
 use glob::{MatchOptions, Pattern};
 use sim::limits::NAME_CHARS_MAX;
@@ -22,7 +22,7 @@ pub const TRAININGS_MIN: usize = 3;
 pub type Methods = BTreeMap<String, Vec<String>>;
 
 /// Finds the drivers that each `METHOD=PATTERN` means. In a pattern of their names `?` stands for one character and `*` for
-/// any that are not slashes. What one method is given several times is all meant.
+/// any that are not slashes; everything else stands for itself. Patterns of one method add up.
 ///
 /// # Errors
 /// If a text is not of this form, or no driver has such a name.
@@ -33,7 +33,7 @@ pub fn methods(texts: &[String], drivers: &[NamedDriver]) -> anyhow::Result<Meth
         let (method, pattern) = text
             .split_once('=')
             .with_context(|| format!("method {text:?}: write a name and its drivers, as in mine=run:runs/mine-s*"))?;
-        let found = Pattern::new(pattern).with_context(|| format!("method {text:?}"))?;
+        let found = Pattern::new(&plain(pattern)).with_context(|| format!("method {text:?}"))?;
         let named = drivers.iter().map(|driver| &driver.name).filter(|name| found.matches_with(name, options));
         let names = methods.entry(method.to_owned()).or_default();
         let before = names.len();
@@ -47,46 +47,71 @@ pub fn methods(texts: &[String], drivers: &[NamedDriver]) -> anyhow::Result<Meth
     Ok(methods)
 }
 
+/// A pattern in which nothing but `?` and `*` is special.
+fn plain(pattern: &str) -> String {
+    let mut pattern = pattern.replace('[', "[[]");
+    // Two would stand for slashes as well.
+    while pattern.contains("**") {
+        pattern = pattern.replace("**", "*");
+    }
+    pattern
+}
+
 /// Says which drivers are trainings of which method.
 ///
 /// # Errors
-/// If a method has no name, a very long one or that of a driver, fewer than [`TRAININGS_MIN`] drivers, one that is not there or was never
-/// trained, or two trainings from one seed; if a driver is of two methods.
+/// If the name of a method is none, or that of a driver; if it has fewer than [`TRAININGS_MIN`] drivers, one that is not
+/// there or was never trained, one network twice, or two trainings from one seed; if a driver is of two methods.
 pub fn assign(methods: &Methods, drivers: &mut [NamedDriver]) -> anyhow::Result<()> {
     for (method, names) in methods {
-        ensure!(!method.trim().is_empty(), "method {method:?}: has no name");
+        let name_of_method = || format!("method {method:?}");
+        check_name(method).with_context(name_of_method)?;
         ensure!(
-            method.chars().count() <= NAME_CHARS_MAX && !method.contains(char::is_control),
-            "method {:?}: shorten its name to at most {NAME_CHARS_MAX} characters, on one line",
-            method.chars().take(NAME_CHARS_MAX).collect::<String>()
+            drivers.iter().all(|driver| driver.name != *method),
+            "method {method:?}: a driver has this name; choose another"
         );
-        ensure!(drivers.iter().all(|driver| driver.name != *method), "method {method:?}: is the name of a driver");
         ensure!(
             names.len() >= TRAININGS_MIN,
-            "method {method:?}: {} trainings say nothing about others; at least {TRAININGS_MIN} are needed",
+            "method {method:?}: name at least {TRAININGS_MIN} drivers, not {}: fewer say nothing about others",
             names.len()
         );
-        let mut seeds = BTreeMap::new();
+        let (mut seeds, mut digests) = (BTreeMap::new(), BTreeMap::new());
         for name in names {
             let driver = drivers.iter_mut().find(|driver| driver.name == *name);
             let driver = driver.with_context(|| format!("method {method:?}: no driver is named {name:?}"))?;
             let is_trained = driver.spec.is_network() || matches!(driver.spec, DriverSpec::Callback { .. });
-            ensure!(is_trained, "method {method:?}: {name:?} is no training, so it is by itself");
-            if let Some(other) = driver.method.replace(method.clone()) {
-                ensure!(other != *method, "method {method:?}: {name:?} is named twice");
-                anyhow::bail!("methods {other:?} and {method:?}: {name:?} is of both");
+            ensure!(is_trained, "method {method:?}: {name:?} is no training; leave it out");
+            match &driver.method {
+                Some(other) if other == method => bail!("method {method:?}: {name:?} is named twice"),
+                Some(other) => bail!("methods {other:?} and {method:?}: {name:?} is of both"),
+                None => driver.method = Some(method.clone()),
             }
-            if let Some(training) = &driver.training
-                && let Some(other) = seeds.insert(training.seed.0, name)
-            {
-                anyhow::bail!(
-                    "method {method:?}: {other:?} and {name:?} were both trained from seed {}, so they are not two \
-                     trainings of one method",
-                    training.seed.0
+            if let Some(other) = driver.digest().and_then(|digest| digests.insert(digest, name)) {
+                bail!("method {method:?}: {other:?} and {name:?} are the same network; leave one out");
+            }
+            let seed = driver.training.as_ref().map(|training| training.seed.0);
+            if let Some((seed, other)) = seed.and_then(|seed| Some((seed, seeds.insert(seed, name)?))) {
+                bail!(
+                    "method {method:?}: {other:?} and {name:?} were both trained from seed {seed}, so they are not two \
+                     trainings of one method"
                 );
             }
         }
     }
+    Ok(())
+}
+
+/// Checks what stands in tables of Markdown as a name.
+fn check_name(method: &str) -> anyhow::Result<()> {
+    ensure!(!method.trim().is_empty(), "write a name before the =, as in mine=run:runs/mine-s*");
+    ensure!(method.chars().count() <= NAME_CHARS_MAX, "shorten its name to at most {NAME_CHARS_MAX} characters");
+    let is_plain = |char: char| char.is_alphanumeric() || " -_.,:()+/".contains(char);
+    let other = method.chars().find(|&char| !is_plain(char));
+    ensure!(
+        other.is_none(),
+        "{:?} cannot be in its name; use letters, digits, spaces and -_.,:()+/",
+        other.unwrap_or_default()
+    );
     Ok(())
 }
 
@@ -95,9 +120,9 @@ pub fn assign(methods: &Methods, drivers: &mut [NamedDriver]) -> anyhow::Result<
 pub struct Team {
     /// That of the method, else of the first driver.
     pub name: String,
-    /// Indices of the plan's drivers, by seed.
+    /// Indices of the plan's drivers: by seed, or in their order where the seed of one is not known.
     pub drivers: Vec<usize>,
-    /// The root seed of each; none where it is not known of all of them.
+    /// The root seed of each; none where that of one is not known.
     pub seeds: Vec<u64>,
 }
 
@@ -174,7 +199,7 @@ impl JudgedTeams {
 
 impl EvaluationResults {
     /// How drivers stand in a slice at a noise level, and how they differ from one of them, where they were trained often
-    /// enough; `None` if nothing was, or nothing varies.
+    /// enough; `None` if none was, or too little was driven.
     pub fn judge_trainings(
         &self,
         level: usize,
@@ -191,7 +216,8 @@ impl EvaluationResults {
 
     /// How teams stand in a slice at a noise level, and how they differ from one of them, `with`. Lots are drawn as in
     /// [`judge`](Self::judge), for the means over trainings; Student's interval of these means adds what other seeds bring.
-    /// Trainings of one seed begin alike, so teams of the same seeds differ by pairs. `None` if nothing varies.
+    /// Trainings of one seed begin alike, so teams of the same seeds differ by pairs. `None` of fewer than [`UNITS_MIN`]
+    /// trials or lots that are drawn, or if nothing varies.
     pub fn judge_teams(
         &self,
         level: usize,
@@ -202,7 +228,9 @@ impl EvaluationResults {
     ) -> Option<Vec<TeamEstimate>> {
         let pairs = self.common_runs(level, slice);
         let strata = strata(&pairs, slice.is_pooled());
-        if strata.iter().all(|clusters| clusters.len() < 2) {
+        // Of fewer, all may be alike by chance: their interval would have no width.
+        let drawn: usize = strata.iter().map(Vec::len).sum();
+        if drawn < UNITS_MIN as usize || strata.iter().all(|clusters| clusters.len() < 2) {
             return None;
         }
         let drivers = pairs[0].len();
@@ -274,18 +302,12 @@ fn add(sums: &mut [f64], row: &[RunSummary]) {
 mod tests {
     use super::*;
     use experiment::trained::Training;
-    use std::collections::BTreeSet;
 
     fn trained(recipe: &str, seed: u64) -> NamedDriver {
         let mut driver =
             NamedDriver::expert(&expert::ExpertSettings::half_points()).renamed(&format!("{recipe}{seed}"));
         driver.spec = DriverSpec::Checkpoint { folder: driver.name.clone().into() };
-        driver.training = Some(Training {
-            recipe: recipe.to_owned(),
-            seed: RootSeed(seed),
-            lots: Vec::new(),
-            digests: BTreeSet::new(),
-        });
+        driver.training = Some(Training { recipe: recipe.to_owned(), seed: RootSeed(seed) });
         driver
     }
 
@@ -322,7 +344,7 @@ mod tests {
             onnx("onnx:c"),
             NamedDriver::expert(&expert::ExpertSettings::half_points()),
         ];
-        named(&["control=run:c/*", "mine=onnx:a0", "mine=onnx:[bc]0"], &mut drivers).unwrap();
+        named(&["control=run:c/**", "mine=onnx:a?", "mine=onnx:b0", "mine=onnx:c*"], &mut drivers).unwrap();
         let found = teams(&drivers);
         let of = |team: &Team| (team.name.clone(), team.drivers.clone(), team.seeds.clone());
         let mine = ("mine".to_owned(), vec![2, 5, 6], Vec::new());
@@ -333,19 +355,22 @@ mod tests {
         );
 
         let mut refused = |texts: &[&str]| {
-            drivers.iter_mut().for_each(|driver| driver.method = None);
-            named(texts, &mut drivers).unwrap_err().to_string()
+            for driver in &mut drivers {
+                driver.method = None;
+            }
+            format!("{:#}", named(texts, &mut drivers).unwrap_err())
         };
         for (texts, problem) in [
             (&["control"][..], "write a name and its drivers"),
             (&["control=run:d/*"], "no driver is named so"),
-            (&["control=run:c/[12]"], "at least 3"),
-            (&["control=run:c/***"], "method"),
+            (&["control=run:c/[12]"], "no driver is named so"),
+            (&["control=run:c/1", "control=run:c/2"], "at least 3 drivers, not 2"),
             (&["control=run:c/*", "other=run:c/*"], "is of both"),
             (&["control=run:c/*", "control=run:c/1"], "named twice"),
-            (&["control=run:c/[12]", "control=run:c/2/*"], "both trained from seed 2"),
-            (&["run:c/1=run:c/*"], "the name of a driver"),
-            (&["=run:c/*"], "has no name"),
+            (&["control=run:c/1", "control=run:c/2", "control=run:c/2/*"], "both trained from seed 2"),
+            (&["run:c/1=run:c/*"], "a driver has this name"),
+            (&["=run:c/*"], "write a name before the ="),
+            (&["a|b=run:c/*"], "'|' cannot be in its name"),
             (&[&format!("{}=run:c/*", "m".repeat(101))], "shorten"),
             (&["others=onnx:?0", "others=expert"], "is no training"),
         ] {

@@ -7,7 +7,7 @@ pub use planner_file::{Parameters, PlannerFile, tuned_specs};
 pub use spec::{DriverSpec, specs};
 
 use crate::settings::{Layers, Settings, Smoothing};
-use crate::trained::{self, Training};
+use crate::trained::{self, TrainedOn, Training};
 use anyhow::{Context as _, bail, ensure};
 use expert::{ExpertSettings, ScriptedExpert, Sees};
 use onnx::fleet::OnnxFleet;
@@ -77,6 +77,22 @@ impl DriverSpec {
         }
     }
 
+    /// The lots that its networks were trained on, as far as the runs that they lie in say.
+    fn trained_on(&self) -> anyhow::Result<TrainedOn> {
+        match self {
+            Self::Run { folder } => trained::trained_on(folder),
+            Self::Checkpoint { folder } => trained::network_trained_on(folder),
+            Self::Ensemble { members } => {
+                let mut all = TrainedOn::default();
+                for member in members {
+                    all.extend(member.trained_on()?);
+                }
+                Ok(all)
+            }
+            Self::Expert | Self::Onnx { .. } | Self::Planner { .. } | Self::Callback { .. } => Ok(TrainedOn::default()),
+        }
+    }
+
     /// Reads the files it names. It drives with the action smoothing that `evaluation.smoothing` asks for.
     ///
     /// # Errors
@@ -106,7 +122,12 @@ impl DriverSpec {
             },
             _ => None,
         };
-        let driver = NamedDriver { training, ..NamedDriver::new(name, self, model) };
+        let trained_on = match self.trained_on() {
+            Ok(lots) => lots,
+            Err(error) if storage::is_of_disk(error.as_ref()) => return Err(error),
+            Err(_) => TrainedOn::default(),
+        };
+        let driver = NamedDriver { training, trained_on, ..NamedDriver::new(name, self, model) };
         Ok(driver.smoothed(settings.evaluation.smoothing))
     }
 }
@@ -140,6 +161,8 @@ pub struct NamedDriver {
     pub spec: DriverSpec,
     /// The training of a whole run that it comes from; `None` for any other driver.
     pub training: Option<Training>,
+    /// The lots that its networks were trained on; none where nobody knows.
+    pub trained_on: TrainedOn,
     /// The method that it is a training of, where whoever asks says so; otherwise what [`Self::training`] has in common with
     /// others counts.
     pub method: Option<String>,
@@ -218,7 +241,16 @@ impl NamedDriver {
 
     /// As its files have it, of no training.
     fn new(name: String, spec: DriverSpec, model: Model) -> Self {
-        Self { name, spec, training: None, method: None, model, smoothing_ticks: 0.0, digest_of_files: None }
+        Self {
+            name,
+            spec,
+            training: None,
+            trained_on: TrainedOn::default(),
+            method: None,
+            model,
+            smoothing_ticks: 0.0,
+            digest_of_files: None,
+        }
     }
 
     /// The same with other action smoothing. Networks smooth by themselves, as they were trained to.

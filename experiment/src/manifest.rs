@@ -189,6 +189,16 @@ impl Manifest {
         Ok(())
     }
 
+    /// Whether some of what is read from elsewhere is what the run was begun with, as far as it says.
+    ///
+    /// # Errors
+    /// Naming what differs.
+    pub fn check_some_inputs(&self, found: &Inputs) -> anyhow::Result<()> {
+        let differs =
+            |(name, digest): &(&String, &String)| self.inputs.get(*name).is_some_and(|known| known != *digest);
+        found.iter().find(differs).map_or(Ok(()), |(name, _)| Err(has_changed(name)))
+    }
+
     /// Whether the run was made on this architecture and system.
     pub fn is_of_this_target(&self) -> bool {
         self.target == target()

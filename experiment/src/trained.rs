@@ -3,6 +3,7 @@
 use crate::manifest::{Finished, MANIFEST, Manifest, Outcome, SETTINGS, finished};
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
+use policy::checkpoint::Checkpoint;
 use sim::limits::{RUN_TOML_BYTES_MAX, SETTINGS_BYTES_MAX};
 use sim::seed::RootSeed;
 use std::collections::BTreeSet;
@@ -17,10 +18,23 @@ pub struct Training {
     pub recipe: String,
     /// Its root seed.
     pub seed: RootSeed,
-    /// Lots that it was trained on, as in its settings.
-    pub lots: Vec<String>,
+}
+
+/// Lots that networks were trained on.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct TrainedOn {
+    /// As in the settings of their trainings.
+    pub lots: BTreeSet<String>,
     /// SHA-256 of those from files: they are known by it wherever they lie now.
     pub digests: BTreeSet<String>,
+}
+
+impl TrainedOn {
+    /// Adds those of other networks.
+    pub fn extend(&mut self, other: Self) {
+        self.lots.extend(other.lots);
+        self.digests.extend(other.digests);
+    }
 }
 
 /// The folder with the checkpoint that `run:DIR` or `run:DIR/bc` names.
@@ -47,7 +61,9 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
     let folder = if is_bc { folders.first() } else { folders.last() };
     let folder = folder.with_context(|| {
         let command = Manifest::read(run).map_or_else(|_| "another command".to_owned(), |manifest| manifest.command);
-        if command.starts_with("train-") {
+        if Checkpoint::exists(run).is_ok_and(|exists| exists) {
+            format!("{}: this is the folder of one network; name it as net:{0}", run.display())
+        } else if command.starts_with("train-") {
             format!("{}: no network is trained there yet; finish it with --resume {0}", run.display())
         } else {
             format!("{}: this is a run of {command}, which has no network of its own; name a training", run.display())
@@ -120,8 +136,30 @@ pub fn training_of(spec: &Path) -> anyhow::Result<Training> {
     let Manifest { program, inputs, .. } = Manifest::read(run_of(spec)?.0)?;
     let digests: Vec<_> = settings.training.lots.iter().map(|lots| inputs.get(lots)).collect();
     let recipe = sums::digest(format!("{policy}\n{program}\n{digests:?}\n{}", settings.to_toml()).as_bytes());
-    let digests = digests.into_iter().flatten().cloned().collect();
-    Ok(Training { recipe, seed, lots: settings.training.lots, digests })
+    Ok(Training { recipe, seed })
+}
+
+/// The lots that a policy `DIR` or `DIR/bc` was trained on.
+///
+/// # Errors
+/// See [`settings_of`].
+pub fn trained_on(spec: &Path) -> anyhow::Result<TrainedOn> {
+    let lots = settings_of(spec)?.training.lots;
+    let Manifest { inputs, .. } = Manifest::read(run_of(spec)?.0)?;
+    let digests = lots.iter().filter_map(|lots| inputs.get(lots)).cloned().collect();
+    Ok(TrainedOn { lots: lots.into_iter().collect(), digests })
+}
+
+/// The same of a network by the folder of its checkpoint: those of the run that it lies in, none outside of one.
+///
+/// # Errors
+/// If the settings or the manifest of that run cannot be read.
+pub fn network_trained_on(checkpoint: &Path) -> anyhow::Result<TrainedOn> {
+    let place = storage::place_of(checkpoint)?;
+    match place.parent() {
+        Some(run) if sums::is_listed(run, SETTINGS)? && sums::is_listed(run, MANIFEST)? => trained_on(run),
+        _ => Ok(TrainedOn::default()),
+    }
 }
 
 /// A hint at the run of that name, if there is one.
@@ -155,14 +193,49 @@ fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::drivers::DriverSpec;
     use crate::manifest::Request;
     use crate::run_dir::RunDir;
     use crate::test_runs::{create, message, place, scratch};
-    use policy::checkpoint::Checkpoint;
     use policy::conditions::Conditions;
     use policy::decision_rule::DecisionRule;
     use policy::network::Weights;
     use std::fs;
+
+    /// Lots that a network was trained on counted as unseen where it was named by its folder.
+    #[test]
+    fn the_lots_of_a_training_are_those_of_its_networks_however_they_are_named() {
+        let path = scratch("trained-on");
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.training.lots = vec!["lot-b".to_owned()];
+        RunDir::create(&place(&path, false), &settings, &Request::default()).unwrap();
+        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
+        let checkpoint =
+            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
+        for folder in ["round-00", "round-01"] {
+            checkpoint.save(&path.join(folder)).unwrap();
+            sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
+        }
+        let lots_of = |spec: String| {
+            let spec: DriverSpec = spec.parse().unwrap();
+            spec.load(&settings).unwrap().trained_on.lots.into_iter().collect::<Vec<_>>()
+        };
+        let run = path.display();
+        for spec in [
+            format!("run:{run}/bc"),
+            format!("net:{run}/round-01"),
+            format!("net:{run}/round-00/../round-01/"),
+            format!("ensemble:net:{run}/round-00,run:{run}"),
+        ] {
+            assert_eq!(lots_of(spec.clone()), ["lot-b"], "{spec}");
+        }
+        let alone = scratch("trained-on-alone");
+        checkpoint.save(&alone).unwrap();
+        assert!(lots_of(format!("net:{}", alone.display())).is_empty(), "nobody knows");
+        for path in [path, alone] {
+            fs::remove_dir_all(path).unwrap();
+        }
+    }
 
     /// `evaluate` drove with the first network of an ensemble alone.
     #[test]

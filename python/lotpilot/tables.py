@@ -35,7 +35,7 @@ class Evaluation:
     comparisons: Table
     """Every other driver against one."""
     trainings: Table
-    """Trainings that differ by their seeds, as one; empty if none do."""
+    """Several trainings of one method, as one; empty if there are none."""
     causes: Table
     """Near-collisions by cause."""
     noise_sweep: Table
@@ -143,7 +143,7 @@ class Request:
             "seed": seed,
             "smoothing": None if smoothing is None else str(smoothing),
             "compare_with": compare_with,
-            "methods": None if methods is None else [(name, list(drivers)) for name, drivers in methods.items()],
+            "methods": None if methods is None else [(name, names(of, "methods")) for name, of in methods.items()],
         }
         return Request(_named(drivers), which, settings_from(preset, config, overrides))
 

@@ -243,6 +243,8 @@ def test_settings_are_those_of_the_command_line():
         (lambda: lotpilot.Lot("no/such.toml"), ValueError, "no/such.toml"),
         (lambda: lotpilot.evaluate("exprt", "lot-b"), ValueError, "there are expert"),
         (lambda: lotpilot.evaluate(["expert", "expert"], "lot-b"), ValueError, "named twice"),
+        (lambda: lotpilot.evaluate("expert", "lot-b", methods={"mine": ["a", "b", "c"]}), ValueError, "no driver is named"),
+        (lambda: lotpilot.evaluate("expert", "lot-b", methods={"mine": "expert"}), ValueError, "at least 3 drivers"),
         (lambda: lotpilot.evaluate({"odd": 3}, "lot-b"), TypeError, "neither a name nor a function"),
         (lambda: lotpilot.load_round("no/such/run"), ValueError, "no such run"),
         (lambda: lotpilot.Dataset("no/such/run"), ValueError, "no round"),

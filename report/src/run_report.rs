@@ -4,7 +4,7 @@
 //! A file that cannot be read or written is an error. A near-collision that cannot be replayed (its network has moved)
 //! is not: the page says so in place of the picture.
 
-use crate::command_line::command_line;
+use crate::command_line::{command_line, quoted};
 use crate::glossary;
 use crate::markdown::escaped;
 use crate::moments;
@@ -20,7 +20,6 @@ use evaluation::table1::Table1;
 use experiment::lots::ALL;
 use experiment::manifest::Manifest;
 use experiment::progress::{Interrupted, Progress};
-use experiment::replay_key::ReplayKey;
 use experiment::settings::{NoiseChoice, Settings};
 use experiment::trained;
 use policy::checkpoint::Checkpoint;
@@ -503,13 +502,11 @@ fn add_moments(
     Ok(())
 }
 
-/// The command that shows a near-collision again. Drivers that are not runs do not bring their settings along.
+/// The command that shows a near-collision again. A driver that is a run has settings of its own, those of its training; what
+/// was driven is in the evaluation's.
 fn visualise(key: &str, folder: &Path) -> String {
-    let brings_settings = key.parse::<ReplayKey>().is_ok_and(|key| key.driver.run().is_some());
-    if brings_settings {
-        return format!("cargo xtask visualise replay {key}");
-    }
-    format!("cargo xtask visualise replay {key} --config {}/settings.toml", folder.display())
+    let settings = folder.join("settings.toml");
+    format!("cargo xtask visualise replay {} --config {}", quoted(key), quoted(&settings.display().to_string()))
 }
 
 fn configuration(sources: &Sources) -> String {

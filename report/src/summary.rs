@@ -78,10 +78,16 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
         if !summary.teams.is_empty() {
             let with = &summary.team_compared_with().name;
             let table = trainings_table(summary, level, rows);
+            let varies = summary.team_estimates(level).next().is_some();
+            let table = if varies {
+                table.to_string()
+            } else {
+                "Fewer than six trials or lots are too few to judge by.".to_owned()
+            };
             let _ = write!(
                 text,
-                "Trainings that differ by their seeds, as one; intervals are for other lots and, where there are several, \
-                 other seeds (Δ: others − {with}), noise {noise}\n\n{table}\n\n"
+                "Several trainings, as one; intervals are for other lots and, where there are several, other trainings \
+                 (Δ: others − {with}), noise {noise}\n\n{table}\n\n"
             );
         }
         if let Some(table) = causes_table(summary, level, rows) {

@@ -1,4 +1,4 @@
-//! Several trainings that differ by their seed: the result of each, and the mean over them.
+//! Several trainings of one method: the result of each, and the mean over them.
 
 use crate::drive::rows_of;
 use crate::markdown::table_of;
@@ -17,7 +17,7 @@ use std::path::Path;
 
 /// Heads of [`row`].
 pub(crate) const HEADER: [&str; 7] =
-    ["driver", "trainings", "lots", "near-collisions, by seed", "contacts", "per 100 m [95 %]", "Δ per 100 m [95 %]"];
+    ["driver", "trainings", "lots", "near-collisions of each", "contacts", "per 100 m [95 %]", "Δ per 100 m [95 %]"];
 
 /// A team on some lots: the result of each of its trainings, their mean and, unless it is the team that all are
 /// compared with, the difference.
@@ -153,7 +153,6 @@ mod tests {
     use sim::metrics::EpisodeMetrics;
     use sim::scenario::Direction;
     use sim::seed::RootSeed;
-    use std::collections::BTreeSet;
 
     /// "In short" had the first training alone.
     #[test]
@@ -162,12 +161,7 @@ mod tests {
         let driver = |name: &str| NamedDriver::expert(&settings.expert).renamed(name);
         let trained = |seed: u64| {
             let mut driver = driver(&named(DAGGER, RootSeed(seed), &settings));
-            driver.training = Some(Training {
-                recipe: DAGGER.to_owned(),
-                seed: RootSeed(seed),
-                lots: Vec::new(),
-                digests: BTreeSet::new(),
-            });
+            driver.training = Some(Training { recipe: DAGGER.to_owned(), seed: RootSeed(seed) });
             driver
         };
         let drivers = [driver("expert"), trained(1), trained(2), trained(3)];

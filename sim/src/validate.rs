@@ -99,9 +99,13 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
             format!("shorten it to at most {NAME_BYTES_MAX}; files are named after it"),
         );
     }
-    if let Some(bad) = name.chars().find(|&c| c.is_control() || matches!(c, '/' | '\\') || is_invisible(c)) {
+    if let Some(bad) = name.chars().find(|&c| c.is_control() || matches!(c, '/' | '\\' | '|') || is_invisible(c)) {
         let problem = format!("the name {name:?} contains {bad:?}");
-        return fault(Place::Name, problem, "use letters, digits, '-' and '_'; files are named after it");
+        return fault(
+            Place::Name,
+            problem,
+            "use letters, digits, '-' and '_'; files are named after it, and tables hold it",
+        );
     }
     Ok(())
 }
@@ -506,6 +510,7 @@ mod tests {
         let table: &[(Break, &str)] = &[
             (|s| s.name.clear(), "name: the name is empty"),
             (|s| s.name = "a/b".to_owned(), "name: the name \"a/b\" contains '/'"),
+            (|s| s.name = "a|b".to_owned(), "name: the name \"a|b\" contains '|'"),
             (|s| s.boundary[2].x = f32::NAN, "boundary, vertex 3: x is NaN"),
             (|s| s.boundary.truncate(2), "boundary: 2 vertices enclose no ground; give at least 3"),
             (

@@ -9,7 +9,6 @@ use sim::frame::Ending;
 use sim::metrics::EpisodeMetrics;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
-use std::collections::BTreeSet;
 
 fn driver(name: &str) -> NamedDriver {
     NamedDriver::expert(&expert::ExpertSettings::half_points()).renamed(name)
@@ -134,12 +133,7 @@ fn where_events_come_in_clusters_no_exact_interval_is_quoted() {
 fn several_trainings_are_compared_by_their_mean() {
     let trained = |seed: u64| {
         let mut driver = driver(&if seed == 1 { DAGGER.to_owned() } else { format!("{DAGGER} (seed {seed})") });
-        driver.training = Some(Training {
-            recipe: DAGGER.to_owned(),
-            seed: RootSeed(seed),
-            lots: Vec::new(),
-            digests: BTreeSet::new(),
-        });
+        driver.training = Some(Training { recipe: DAGGER.to_owned(), seed: RootSeed(seed) });
         driver
     };
     let of_dagger = |events_by_seed: [u32; 3]| {

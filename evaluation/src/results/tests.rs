@@ -5,7 +5,7 @@ use crate::statistics::student::{half_width_of_mean, together};
 use crate::trainings::Team;
 use experiment::drivers::NamedDriver;
 use experiment::settings::Settings;
-use experiment::trained::Training;
+use experiment::trained::TrainedOn;
 use experiment::trials::Purpose;
 use sim::frame::Ending;
 use sim::metrics::EpisodeMetrics;
@@ -52,9 +52,9 @@ fn what_any_driver_was_trained_on_is_not_unseen() {
     let lots = Lot::parse_all(&["reference", car_park], &settings.episode.vehicle).unwrap();
     let mut named = drivers_named(2);
     // The car park was trained on where it lay before.
-    let lots_of_second = vec!["lot-b".to_owned(), "no/such/lot.toml".to_owned()];
+    let lots_of_second = ["lot-b", "no/such/lot.toml"].map(str::to_owned).into();
     let digests = lots.iter().filter_map(Lot::digest).collect();
-    named[1].training = Some(Training { recipe: String::new(), seed: RootSeed(1), lots: lots_of_second, digests });
+    named[1].trained_on = TrainedOn { lots: lots_of_second, digests };
     let plan = Plan { settings: &settings, drivers: &named, lots: &lots, compare_with: 0, shard: None };
     let results = EvaluationResults::new(&plan);
     let unseen = results.groups().iter().filter(|group| !group.is_trained_on).map(|group| group.name.as_str());
@@ -211,6 +211,9 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     let unknown = [of_seeds(&[0, 1, 2], &[]), of_seeds(&[3, 4, 5], &[])];
     let found = results.judge_teams(0, &slice, &unknown, 0, RootSeed(1)).unwrap();
     assert_eq!((found[1].difference_per_100m, rounded(found[0].difference_per_100m)), (apart, [0.0; 3]));
+    // Of few trials all may be alike by chance.
+    let of_one_lot = self::slice(&results, "lot-a");
+    assert_eq!(results.judge_teams(0, &of_one_lot, &teams, 0, RootSeed(1)), None);
     // No draw of lots without events has any; the metres say what that supports.
     let none = results.judge_teams(0, &slice, &[team(&[0, 1])], 0, RootSeed(1)).unwrap()[0].per_100m;
     let metres = results.totals(0, 0, &slice, None).reference_m;

@@ -151,7 +151,7 @@ impl DriverSpec {
     }
 
     /// Whether two name the same, whatever they call the folder.
-    fn is_same_as(&self, other: &Self) -> bool {
+    pub fn is_same_as(&self, other: &Self) -> bool {
         let is_one =
             |a: &Path, b: &Path| storage::place_of(a).is_ok_and(|a| storage::place_of(b).is_ok_and(|b| a == b));
         match (self, other) {

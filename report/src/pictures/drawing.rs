@@ -70,7 +70,7 @@ impl Drawing {
         let (width_px, height_px) = (size_px.x.floor(), size_px.y.floor());
         anyhow::ensure!(
             width_px >= 1.0 && height_px >= 1.0 && width_px.max(height_px) <= SIDE_MAX_PX,
-            "{width_px:.0}×{height_px:.0} pixels are too many or too few; choose another --pixels-per-metre"
+            "{width_px:.0}×{height_px:.0} pixels are too many or too few; choose another --pixels-per-metre, or less to draw"
         );
         Ok(Self { width_px, height_px, ground: Some(ground), shapes: Vec::new() })
     }

@@ -2,6 +2,7 @@ use super::*;
 use evaluation::incidents::{Cause, Findings};
 use experiment::drive::Replay;
 use experiment::manifest::MANIFEST_SCHEMA;
+use experiment::replay_key::ReplayKey;
 use sim::frame::Event;
 use sim::scenario::Direction;
 use std::ops::ControlFlow;
@@ -76,9 +77,11 @@ fn commands_can_be_pasted_into_a_shell() {
     let runs = Path::new("runs/x");
     assert_eq!(
         visualise("run:runs/y@lot-a@forward@0@paper@1@5", runs),
-        "cargo xtask visualise replay run:runs/y@lot-a@forward@0@paper@1@5"
+        "cargo xtask visualise replay run:runs/y@lot-a@forward@0@paper@1@5 --config runs/x/settings.toml",
+        "not the settings of its training"
     );
-    assert!(visualise("vvf@lot-a@forward@0@paper@1@5", runs).ends_with("--config runs/x/settings.toml"));
+    let spaced = visualise("vvf@my lot@forward@0@paper@1@5", Path::new("my runs"));
+    assert!(spaced.ends_with("'vvf@my lot@forward@0@paper@1@5' --config 'my runs/settings.toml'"), "{spaced}");
 }
 
 /// A near-collision of a planner that has many, found by driving, and replayed for its pictures.

@@ -45,7 +45,11 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
                 }
             }
             // A first line of words is a header; one that begins like a number is a point that is written wrongly.
-            [None] | [None, None] if i == 0 && !record[0].starts_with(is_of_number) => {}
+            [None] | [None, None] if i == 0 && !record[0].starts_with(is_of_number) => {
+                if let Some(problem) = misplaced(&record) {
+                    return Err(faulty(line, problem));
+                }
+            }
             _ => {
                 let cells = record.iter().collect::<Vec<_>>().join(",");
                 return Err(faulty(line, format!("{:?} is not a point", shortened(&cells))));
@@ -61,6 +65,31 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
         });
     }
     Ok(points)
+}
+
+/// What is wrong with a header whose columns are others than x and y, in this order: read as they are, they would be another
+/// line.
+fn misplaced(header: &csv::StringRecord) -> Option<String> {
+    for (column, name) in header.iter().take(2).enumerate() {
+        let word = name.to_lowercase();
+        let word = word.split(|char: char| !char.is_alphanumeric()).next().unwrap_or_default();
+        let belongs = match word {
+            "x" => 0,
+            "y" => 1,
+            "lat" | "lon" | "lng" | "latitude" | "longitude" => {
+                return Some(format!("the header has {:?}, which is in degrees", shortened(name)));
+            }
+            _ => continue,
+        };
+        if column != belongs {
+            let (is, should) = (column + 1, belongs + 1);
+            return Some(format!(
+                "the header has {:?} in column {is}; {word} is read from column {should}",
+                shortened(name)
+            ));
+        }
+    }
+    None
 }
 
 /// Whether numbers begin with it.

@@ -99,8 +99,8 @@ pub(crate) struct EvaluateArgs {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct MethodArgs {
     /// Drivers that are trainings of one method, three or more, to be judged together as well: its name, and a pattern of
-    /// theirs (`*` stands for anything but a slash); may be repeated. Trainings that differ by nothing but their seed are
-    /// found without it.
+    /// theirs (`*` stands for anything but a slash, `?` for one character); may be repeated. Trainings (`run:DIR`) that differ by
+    /// nothing but their seed are found without it, three or more that are of no method.
     #[arg(long = "method", value_name = "NAME=DRIVERS")]
     methods: Vec<String>,
 }
@@ -110,12 +110,13 @@ impl MethodArgs {
         self.methods.is_empty()
     }
 
-    /// Finds the drivers that are meant, and says so to them.
+    /// Finds the drivers that are meant, else those of `others`, and says so to them.
     ///
     /// # Errors
     /// See [`trainings::methods`] and [`trainings::assign`].
-    pub(crate) fn assign(&self, drivers: &mut [NamedDriver]) -> anyhow::Result<Methods> {
-        let methods = trainings::methods(&self.methods, drivers).context("--method")?;
+    pub(crate) fn or(&self, others: Methods, drivers: &mut [NamedDriver]) -> anyhow::Result<Methods> {
+        let named = trainings::methods(&self.methods, drivers).context("--method")?;
+        let methods = if named.is_empty() { others } else { named };
         trainings::assign(&methods, drivers).context("--method")?;
         Ok(methods)
     }
@@ -153,11 +154,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
         (settings, asked, Err(preset))
     };
     let mut drivers = NamedDriver::load_all(&asked.drivers, &settings)?;
-    if begun.is_ok() {
-        trainings::assign(&asked.methods, &mut drivers)?;
-    } else {
-        asked.methods = args.methods.assign(&mut drivers)?;
-    }
+    asked.methods = args.methods.or(asked.methods, &mut drivers)?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     output.notes(&notes::of(&lots, &settings.evaluation.noise));
     let shard = args.shard.or(asked.shard.as_ref().map(|record| record.number));
@@ -179,7 +176,10 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     };
     interrupt::can_resume(COMMAND, run.path());
     let console = Console::new(output);
-    console.plan(tasks(&settings, drivers.len()));
+    let mut tasks = tasks(&settings, drivers.len());
+    // A shard has no report.
+    tasks.truncate(if shard.is_some() { 1 } else { tasks.len() });
+    console.plan(tasks);
     if let Some(shard) = shard {
         drive(&plan, &run, &console)?;
         run.finish(Outcome::Evaluation { drivers: asked.drivers })?;
@@ -254,7 +254,7 @@ pub(crate) fn compare_with(wanted: Option<&str>, specs: &[DriverSpec]) -> anyhow
         return Ok(specs.iter().rposition(DriverSpec::is_network).unwrap_or(0));
     };
     let spec = wanted.parse::<DriverSpec>().ok();
-    let found = specs.iter().position(|given| Some(given) == spec.as_ref());
+    let found = specs.iter().position(|given| spec.as_ref().is_some_and(|spec| given.is_same_as(spec)));
     found.with_context(|| {
         let named: Vec<String> = specs.iter().map(DriverSpec::to_string).collect();
         format!("--compare-with {wanted}: is not one of the drivers; name one of {}", named.join(", "))

@@ -106,7 +106,7 @@ fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> 
     );
     let compare_with = evaluate::compare_with(args.compare_with.as_deref(), &specs)?;
     let mut drivers = NamedDriver::load_all(&named, settings)?;
-    let methods = args.methods.assign(&mut drivers)?;
+    let methods = args.methods.or(evaluations.methods(), &mut drivers)?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     let inputs = inputs::of(&lots, &drivers);
     evaluations.check_inputs(&inputs)?;

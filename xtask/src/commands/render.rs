@@ -8,7 +8,7 @@ use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
 use crate::picture_folder::{self, Folder};
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use clap::{ArgGroup, Args, Subcommand, ValueEnum};
 use experiment::drive::Replay;
 use experiment::drivers::{DriverSpec, NamedDriver};
@@ -25,6 +25,7 @@ use policy::checkpoint::Checkpoint;
 use policy::dataset::store::Store;
 use rayon::prelude::*;
 use report::other_run::OtherRun;
+use report::pictures::file_name;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
 use report::pictures::{contact_sheet, lot, noise, samples};
 use report::{docs_page, reproduction, run_report};
@@ -34,6 +35,7 @@ use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use sim::sensing::Inspection;
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -229,7 +231,11 @@ fn render_lots(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> 
     let episode = Settings::preset("default")?.episode;
     let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
     let made_of = picture_folder::made_of(&lots)?;
+    let mut named = BTreeMap::new();
     for lot in &lots {
+        if let Some(other) = named.insert(file_name(lot.name()), lot.name()) {
+            bail!("lots {other:?} and {:?} have one file name; draw them into different folders", lot.name());
+        }
         folder.check(lot.name(), true)?;
         picture_folder::ensure_apart_from(&made_of, &folder.files(lot.name(), true))?;
     }
