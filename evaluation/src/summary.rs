@@ -261,7 +261,7 @@ impl<'a> Summary<'a> {
         let with = team_of(&teams, plan.compare_with);
         let judge = |(level, slice)| {
             let (estimates, comparisons) = results.judge(level, &slice, plan.compare_with, evaluation.seed);
-            let of_teams = (!teams.is_empty())
+            let of_teams = (!teams.is_empty() && results.are_enough_to_judge_by(level, &slice))
                 .then(|| results.judge_teams(level, &slice, &teams, with, evaluation.seed))
                 .flatten()
                 .unwrap_or_default();

@@ -105,13 +105,8 @@ pub fn assign(methods: &Methods, drivers: &mut [NamedDriver]) -> anyhow::Result<
 fn check_name(method: &str) -> anyhow::Result<()> {
     ensure!(!method.trim().is_empty(), "write a name before the =, as in mine=run:runs/mine-s*");
     ensure!(method.chars().count() <= NAME_CHARS_MAX, "shorten its name to at most {NAME_CHARS_MAX} characters");
-    let is_plain = |char: char| char.is_alphanumeric() || " -_.,:()+/".contains(char);
-    let other = method.chars().find(|&char| !is_plain(char));
-    ensure!(
-        other.is_none(),
-        "{:?} cannot be in its name; use letters, digits, spaces and -_.,:()+/",
-        other.unwrap_or_default()
-    );
+    let other = method.chars().find(|&char| char.is_control() || "|`*<>[]\\".contains(char));
+    ensure!(other.is_none(), "{:?} cannot be in its name, which stands in tables", other.unwrap_or_default());
     Ok(())
 }
 
@@ -214,10 +209,18 @@ impl EvaluationResults {
         Some(JudgedTeams { teams: teams.into_iter().zip(estimates).collect() })
     }
 
+    /// Whether enough is drawn in a slice that not all of it may be alike by chance: [`UNITS_MIN`] trials, or lots of a sample.
+    pub fn are_enough_to_judge_by(&self, level: usize, slice: &Slice) -> bool {
+        let pairs = self.common_runs(level, slice);
+        // What a stratum has one of is never drawn.
+        let drawn = strata(&pairs, slice.is_pooled()).iter().map(Vec::len).filter(|&units| units > 1).sum::<usize>();
+        drawn >= UNITS_MIN as usize
+    }
+
     /// How teams stand in a slice at a noise level, and how they differ from one of them, `with`. Lots are drawn as in
     /// [`judge`](Self::judge), for the means over trainings; Student's interval of these means adds what other seeds bring.
-    /// Trainings of one seed begin alike, so teams of the same seeds differ by pairs. `None` of fewer than [`UNITS_MIN`]
-    /// trials or lots that are drawn, or if nothing varies.
+    /// Trainings of one seed begin alike, so teams of the same seeds differ by pairs. `None` if nothing varies.
+    /// Of few units all may be alike by chance; see [`Self::are_enough_to_judge_by`].
     pub fn judge_teams(
         &self,
         level: usize,
@@ -228,9 +231,7 @@ impl EvaluationResults {
     ) -> Option<Vec<TeamEstimate>> {
         let pairs = self.common_runs(level, slice);
         let strata = strata(&pairs, slice.is_pooled());
-        // Of fewer, all may be alike by chance: their interval would have no width.
-        let drawn: usize = strata.iter().map(Vec::len).sum();
-        if drawn < UNITS_MIN as usize || strata.iter().all(|clusters| clusters.len() < 2) {
+        if strata.iter().all(|clusters| clusters.len() < 2) {
             return None;
         }
         let drivers = pairs[0].len();
@@ -370,6 +371,7 @@ mod tests {
             (&["control=run:c/1", "control=run:c/2", "control=run:c/2/*"], "both trained from seed 2"),
             (&["run:c/1=run:c/*"], "a driver has this name"),
             (&["=run:c/*"], "write a name before the ="),
+            (&["a\nb=run:c/*"], "'\\n' cannot be in its name"),
             (&["a|b=run:c/*"], "'|' cannot be in its name"),
             (&[&format!("{}=run:c/*", "m".repeat(101))], "shorten"),
             (&["others=onnx:?0", "others=expert"], "is no training"),

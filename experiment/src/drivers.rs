@@ -58,6 +58,7 @@ impl DriverSpec {
                      net:runs/NAME/round-03",
                     folder.display()
                 );
+                trained::ensure_run_of_network(folder)?;
                 Ok(vec![Checkpoint::load(folder)?])
             }
             Self::Ensemble { members } => {

@@ -155,11 +155,26 @@ pub fn trained_on(spec: &Path) -> anyhow::Result<TrainedOn> {
 /// # Errors
 /// If the settings or the manifest of that run cannot be read.
 pub fn network_trained_on(checkpoint: &Path) -> anyhow::Result<TrainedOn> {
-    let place = storage::place_of(checkpoint)?;
-    match place.parent() {
-        Some(run) if sums::is_listed(run, SETTINGS)? && sums::is_listed(run, MANIFEST)? => trained_on(run),
-        _ => Ok(TrainedOn::default()),
+    run_of_network(checkpoint)?.map_or_else(|| Ok(TrainedOn::default()), |run| trained_on(&run))
+}
+
+/// Refuses a network from a run whose settings or manifest are damaged: what it was trained on would be unknown.
+///
+/// # Errors
+/// If they are.
+pub fn ensure_run_of_network(checkpoint: &Path) -> anyhow::Result<()> {
+    if let Some(run) = run_of_network(checkpoint)? {
+        sums::read(&run.join(SETTINGS), SETTINGS_BYTES_MAX)?;
+        sums::read(&run.join(MANIFEST), RUN_TOML_BYTES_MAX)?;
     }
+    Ok(())
+}
+
+/// The run that a checkpoint lies in, if it does.
+fn run_of_network(checkpoint: &Path) -> anyhow::Result<Option<PathBuf>> {
+    let place = storage::place_of(checkpoint)?;
+    let is_run = |folder: &&Path| folder.join(SETTINGS).is_file() && folder.join(MANIFEST).is_file();
+    Ok(place.parent().filter(is_run).map(Path::to_owned))
 }
 
 /// A hint at the run of that name, if there is one.
@@ -229,6 +244,10 @@ mod tests {
         ] {
             assert_eq!(lots_of(spec.clone()), ["lot-b"], "{spec}");
         }
+        let whole = fs::read(path.join(MANIFEST)).unwrap();
+        fs::write(path.join(MANIFEST), &whole[1..]).unwrap();
+        let damaged: DriverSpec = format!("net:{run}/round-01").parse().unwrap();
+        assert!(message(damaged.load(&settings).map(drop)).contains("manifest.toml: is damaged"));
         let alone = scratch("trained-on-alone");
         checkpoint.save(&alone).unwrap();
         assert!(lots_of(format!("net:{}", alone.display())).is_empty(), "nobody knows");

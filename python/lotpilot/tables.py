@@ -35,7 +35,7 @@ class Evaluation:
     comparisons: Table
     """Every other driver against one."""
     trainings: Table
-    """Several trainings of one method, as one; empty if there are none."""
+    """Several trainings of one method, as one; empty if there are none, or too few trials to judge them by."""
     causes: Table
     """Near-collisions by cause."""
     noise_sweep: Table

@@ -78,12 +78,8 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
         if !summary.teams.is_empty() {
             let with = &summary.team_compared_with().name;
             let table = trainings_table(summary, level, rows);
-            let varies = summary.team_estimates(level).next().is_some();
-            let table = if varies {
-                table.to_string()
-            } else {
-                "Fewer than six trials or lots are too few to judge by.".to_owned()
-            };
+            let is_judged = table.row_count() > 0;
+            let table = if is_judged { table.to_string() } else { TOO_FEW.to_owned() };
             let _ = write!(
                 text,
                 "Several trainings, as one; intervals are for other lots and, where there are several, other trainings \
@@ -261,6 +257,9 @@ fn comparison_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
     }
     table
 }
+
+/// In place of a table of trainings.
+const TOO_FEW: &str = "Too little to judge by: at least six lots of a sample, or six trials of other lots, are needed.";
 
 fn trainings_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
     let mut table = table_of(&HEADER);

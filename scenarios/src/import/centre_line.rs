@@ -71,14 +71,14 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
 /// line.
 fn misplaced(header: &csv::StringRecord) -> Option<String> {
     for (column, name) in header.iter().take(2).enumerate() {
-        let word = name.to_lowercase();
-        let word = word.split(|char: char| !char.is_alphanumeric()).next().unwrap_or_default();
-        let belongs = match word {
-            "x" => 0,
-            "y" => 1,
-            "lat" | "lon" | "lng" | "latitude" | "longitude" => {
-                return Some(format!("the header has {:?}, which is in degrees", shortened(name)));
-            }
+        let lower = name.to_lowercase();
+        let has = |known: &[&str]| lower.split(|char: char| !char.is_alphanumeric()).any(|word| known.contains(&word));
+        if has(&["lat", "lon", "lng", "latitude", "longitude"]) {
+            return Some(format!("the header has {:?}, which is in degrees", shortened(name)));
+        }
+        let (word, belongs) = match (has(&["x", "easting"]), has(&["y", "northing"])) {
+            (true, false) => ("x", 0),
+            (false, true) => ("y", 1),
             _ => continue,
         };
         if column != belongs {

@@ -115,8 +115,11 @@ impl MethodArgs {
     /// # Errors
     /// See [`trainings::methods`] and [`trainings::assign`].
     pub(crate) fn or(&self, others: Methods, drivers: &mut [NamedDriver]) -> anyhow::Result<Methods> {
-        let named = trainings::methods(&self.methods, drivers).context("--method")?;
-        let methods = if named.is_empty() { others } else { named };
+        if self.is_empty() {
+            trainings::assign(&others, drivers).context("what was named before; name methods anew with --method")?;
+            return Ok(others);
+        }
+        let methods = trainings::methods(&self.methods, drivers).context("--method")?;
         trainings::assign(&methods, drivers).context("--method")?;
         Ok(methods)
     }
