@@ -11,6 +11,8 @@ const BEARINGS: usize = 128;
 /// A thing that hides the ground up to this many times its range or farther hides all ground behind it within the
 /// patch (docs/methods.md 1.7): from 1.2 m on for a camera at 1.55 m. Lower things hide little more than themselves.
 const OCCLUSION_FACTOR_MIN: f32 = 4.4;
+/// What is not this far ahead of the camera hides nothing, metres.
+const AHEAD_MIN_M: f32 = 0.1;
 
 /// Which ground is known at one decision: all of it, or what the patch shows.
 #[derive(Debug, Clone)]
@@ -90,9 +92,12 @@ impl VisiblePatch {
         let from_camera = |in_world: Vec2| world_from_ego.inverse_point(in_world) - camera;
         for (a, b) in sim::geometry::edges(&occluder.outline) {
             let (a, b) = (from_camera(a), from_camera(b));
-            if a.x < 0.1 || b.x < 0.1 {
+            if a.x < AHEAD_MIN_M && b.x < AHEAD_MIN_M {
                 continue;
             }
+            // Of what reaches back beside the camera, the part ahead.
+            let cut = |from: Vec2, to: Vec2| from.lerp(to, ((AHEAD_MIN_M - from.x) / (to.x - from.x)).max(0.0));
+            let (a, b) = (if a.x < AHEAD_MIN_M { cut(a, b) } else { a }, if b.x < AHEAD_MIN_M { cut(b, a) } else { b });
             let (a, b) = if bearing_bin(a) <= bearing_bin(b) { (a, b) } else { (b, a) };
             for bin in bearing_bin(a)..=bearing_bin(b) {
                 let ray = bin_centre(bin);

@@ -26,7 +26,7 @@ pub struct Params {
     /// Half the side of the active window around the front bumper, metres: 3.0 (*chosen*; the original's 33×33 cells of
     /// 0.1 m, *recalled*, scaled up from its 0.8 m robot to a car would be 3.8).
     pub window_m: f32,
-    /// F_cr in m^n, F_ct being 1: 0.1 (*chosen*: a row of cells at 1 m then balances the target).
+    /// F_cr in m^n, F_ct being 1: 0.1 (*chosen*: a row of cells at 1 m then takes 0.4 of the target).
     pub repulsion_gain: f32,
     /// n: 2 (*recalled*).
     pub distance_power: f32,

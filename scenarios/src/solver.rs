@@ -280,16 +280,15 @@ impl Footprint {
 
     fn is_free(&self, scene: &Scene, pose: Pose) -> bool {
         let (origin, ahead) = (pose.position(), pose.ahead());
-        let clearance_m = self
-            .disc_centres_m
-            .iter()
-            .map(|&x_m| scene.clearance_m(origin + ahead * x_m))
-            .fold(f32::INFINITY, f32::min);
+        let clearances_m = self.disc_centres_m.map(|x_m| scene.clearance_m(origin + ahead * x_m));
         // The raster is within its slack of the truth: most poses are decided without looking at an edge.
-        if clearance_m > self.disc_radius_m + Scene::SLACK_M {
+        if clearances_m.iter().all(|&clearance_m| clearance_m > self.disc_radius_m + Scene::SLACK_M) {
             return true;
         }
-        if clearance_m < self.half_width_m - Scene::SLACK_M {
+        // How far the rectangle reaches around each centre on all sides: the first and last are near its ends.
+        let within_m = |x_m: f32| self.half_width_m.min(x_m - self.rear_m).min(self.front_m - x_m);
+        let mut discs = self.disc_centres_m.iter().zip(&clearances_m);
+        if discs.any(|(&x_m, &clearance_m)| clearance_m < within_m(x_m) - Scene::SLACK_M) {
             return false;
         }
         let ego = pose.world_from_ego();

@@ -206,12 +206,14 @@ impl Episode {
         progress_m: f32,
     ) -> Self {
         let command = VehicleCommand { steering_rad: vehicle.steering_rad, speed_mps: vehicle.speed_mps };
+        let new = Self::new(settings, map, seed);
         Self {
             vehicle,
             command,
             progress_m,
             advance: Advance { progress_m, physics_step: 0 },
-            ..Self::new(settings, map, seed)
+            metrics: new.metrics.with_wheels_at(vehicle.steering_rad),
+            ..new
         }
     }
 

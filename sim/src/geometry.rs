@@ -51,11 +51,17 @@ impl Pose {
     /// that it stays accurate as κ → 0.
     #[must_use]
     pub fn advanced_along_arc(self, curvature_per_m: f32, travel_m: f32) -> Self {
+        let (chord, heading_rad) = self.chord_of_arc(curvature_per_m, travel_m);
+        Self::new(self.position() + chord, heading_rad)
+    }
+
+    /// How far [`Self::advanced_along_arc`] goes, world metres, and the heading at its end.
+    pub(crate) fn chord_of_arc(self, curvature_per_m: f32, travel_m: f32) -> (Vec2, f32) {
         let half_turn = 0.5 * curvature_per_m * travel_m;
         // chord = travel · sin(Δθ/2)/(Δθ/2), along the mean heading.
         let chord_m = if half_turn.abs() < 1e-4 { travel_m } else { travel_m * maths::sin(half_turn) / half_turn };
         let direction = maths::unit(self.heading_rad + half_turn);
-        Self::new(self.position() + direction * chord_m, wrap_angle(self.heading_rad + 2.0 * half_turn))
+        (direction * chord_m, wrap_angle(self.heading_rad + 2.0 * half_turn))
     }
 }
 
@@ -105,10 +111,10 @@ impl WorldFromEgo {
     }
 }
 
-/// Corners an [`Outline`] may have.
-const CORNERS: usize = 8;
+/// Corners an [`Outline`] may have: an octagon that a line cuts has nine.
+const CORNERS: usize = 12;
 
-/// A polygon of 1 to 8 corners, in vectors.
+/// A polygon of 1 to 12 corners, in vectors.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Outline {
     /// Unused corners repeat the last one.
@@ -139,22 +145,26 @@ impl Outline {
     /// Smallest axis-aligned box around it: lowest and highest coordinates.
     #[inline]
     pub(crate) fn bounds(&self) -> (Vec2, Vec2) {
-        let [a, b] = self.corners;
-        (
-            Vec2::new(lowest(a.x.fast_min(b.x)), lowest(a.y.fast_min(b.y))),
-            Vec2::new(highest(a.x.fast_max(b.x)), highest(a.y.fast_max(b.y))),
-        )
+        let [a, b, c] = self.corners;
+        let low = |a: f32x4, b: f32x4, c: f32x4| lowest(a.fast_min(b).fast_min(c));
+        let high = |a: f32x4, b: f32x4, c: f32x4| highest(a.fast_max(b).fast_max(c));
+        (Vec2::new(low(a.x, b.x, c.x), low(a.y, b.y, c.y)), Vec2::new(high(a.x, b.x, c.x), high(a.y, b.y, c.y)))
     }
 }
 
 impl FromIterator<Vec2> for Outline {
     /// # Panics
-    /// If there are no corners or more than 8.
+    /// If there are no corners or more than 12.
     fn from_iter<T: IntoIterator<Item = Vec2>>(corners: T) -> Self {
-        let corners: Vec<Vec2> = corners.into_iter().collect();
-        assert!((1..=CORNERS).contains(&corners.len()), "an outline of {} corners", corners.len());
-        let four = |first: usize| FourPoints::up_to_four(&corners[first.min(corners.len() - 1)..]);
-        Self { corners: [four(0), four(LANES)], n_corners: corners.len() }
+        let (mut all, mut n_corners) = ([Vec2::ZERO; CORNERS], 0);
+        for corner in corners {
+            assert!(n_corners < CORNERS, "an outline of more than {CORNERS} corners");
+            all[n_corners] = corner;
+            n_corners += 1;
+        }
+        assert!(n_corners > 0, "an outline without corners");
+        let four = |i: usize| FourPoints::up_to_four(&all[(i * LANES).min(n_corners - 1)..n_corners]);
+        Self { corners: std::array::from_fn(four), n_corners }
     }
 }
 
@@ -236,6 +246,13 @@ pub fn wrap_angle(angle_rad: f32) -> f32 {
     use std::f32::consts::{PI, TAU};
     let wrapped = angle_rad.rem_euclid(TAU);
     if wrapped > PI { wrapped - TAU } else { wrapped }
+}
+
+/// Area of a closed polygon without crossings, m²: positive if its vertices go round it counter-clockwise.
+pub fn signed_area_m2(polygon: &[Vec2]) -> f32 {
+    // Seen from its first vertex: far from the origin the products would leave nothing of a small area.
+    let from = polygon.first().copied().unwrap_or_default();
+    0.5 * edges(polygon).map(|(a, b)| (a - from).perp_dot(b - from)).sum::<f32>()
 }
 
 /// Even-odd test of a point against a closed polygon (the last vertex joins the first).

@@ -4,7 +4,7 @@
 
 use crate::collision::CollisionWorld;
 use crate::distance_field::DistanceField;
-use crate::geometry::{Circles, Outline, Pose, Vec2, edges};
+use crate::geometry::{Circles, Outline, Pose, Vec2, edges, signed_area_m2};
 use crate::maths;
 use crate::path::Path;
 use crate::scenario::{KERB_MAX_M, Obstacle, Scenario, ScenarioError};
@@ -48,6 +48,11 @@ impl Occluder {
         self.height_m >= camera_height_m && (from - camera).perp_dot(to - camera) >= 0.0
     }
 
+    /// Whether it is a piece of the outline of something solid, not a thing by itself.
+    pub(crate) fn is_wall(&self) -> bool {
+        self.outline.len() == 2
+    }
+
     fn of_obstacle(obstacle: &Obstacle) -> Self {
         let [length_m, width_m, height_m] = obstacle.size_m();
         let centre = obstacle.centre().position();
@@ -70,7 +75,7 @@ fn walls(scenario: &Scenario) -> impl Iterator<Item = Occluder> {
     let islands = scenario.islands.iter().map(|island| (&island.polygon, island.height_m, false));
     let high = boundary.chain(islands).filter(|&(_, height_m, _)| height_m > KERB_MAX_M);
     high.flat_map(|(outline, height_m, is_free_inside)| {
-        let is_counter_clockwise = edges(outline).map(|(a, b)| a.perp_dot(b)).sum::<f32>() > 0.0;
+        let is_counter_clockwise = signed_area_m2(outline) > 0.0;
         edges(outline).flat_map(move |(a, b)| {
             let (from, to) = if is_counter_clockwise == is_free_inside { (b, a) } else { (a, b) };
             let n_pieces = (from.distance(to) / WALL_PIECE_M).ceil().max(1.0) as usize;

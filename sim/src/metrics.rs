@@ -215,7 +215,7 @@ pub struct EpisodeMetrics {
     pub stuck: u32,
     /// Mean over ticks of the drivable share of the safe range, 0…1.
     pub safe_ratio: f32,
-    /// Smallest distance between body and non-drivable space, metres, negative on contact. Sampled at every
+    /// Smallest distance between body and non-drivable space, metres, negative where they overlap. Sampled at every
     /// observation and where an emergency stop ends.
     pub clearance_min_m: f32,
     /// Changes of the steering direction by more than 2° of road-wheel angle: the steering reversals of SAE J2944, with
@@ -260,6 +260,12 @@ impl MetricsAccumulator {
     pub fn new(reference_m: f32) -> Self {
         let metrics = EpisodeMetrics { reference_m, clearance_min_m: f32::INFINITY, ..EpisodeMetrics::default() };
         Self { metrics, ..Self::default() }
+    }
+
+    /// Of a drive that begins with the wheels at an angle, radians.
+    #[must_use]
+    pub(crate) fn with_wheels_at(self, steering_rad: f32) -> Self {
+        Self { steering: Steering { last_rad: steering_rad, turning: 0.0, extreme_rad: steering_rad }, ..self }
     }
 
     /// Takes one frame into account.
@@ -313,10 +319,7 @@ impl MetricsAccumulator {
 /// [`EpisodeMetrics::steering_reversals`].
 pub fn steering_reversals(angles_rad: impl IntoIterator<Item = f32>) -> u32 {
     let mut angles_rad = angles_rad.into_iter();
-    let mut accumulator = MetricsAccumulator::default();
-    if let Some(first) = angles_rad.next() {
-        accumulator.steering = Steering { last_rad: first, turning: 0.0, extreme_rad: first };
-    }
+    let mut accumulator = MetricsAccumulator::default().with_wheels_at(angles_rad.next().unwrap_or_default());
     angles_rad.for_each(|angle| accumulator.steer(angle));
     accumulator.metrics.steering_reversals
 }

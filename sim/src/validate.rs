@@ -2,7 +2,7 @@
 //!
 //! The order is from plain numbers to relations between things: later checks rely on earlier ones.
 
-use crate::geometry::{Pose, Vec2, bounds, distance_to_segment, edges, polygon_contains};
+use crate::geometry::{Pose, Vec2, bounds, distance_to_segment, edges, polygon_contains, signed_area_m2};
 use crate::limits::{
     COORDINATE_MAX_M, ISLANDS_MAX, LOT_EXTENT_MAX_M, NAME_BYTES_MAX, NAME_CHARS_MAX, OBSTACLES_MAX, ROUTE_MAX_M,
     ROUTE_POINTS_MAX, SPEED_BUMPS_MAX, VERTICES_MAX,
@@ -196,7 +196,7 @@ fn check_polygon(polygon: &[Vec2], place: impl Fn(Option<usize>) -> Place) -> Re
         );
         return fault(place(Some(i)), problem, "reorder or move the vertices so that no edges cross");
     }
-    let area_m2 = 0.5 * edges(polygon).map(|(a, b)| a.perp_dot(b)).sum::<f32>().abs();
+    let area_m2 = signed_area_m2(polygon).abs();
     if area_m2 < 0.01 {
         let problem = format!("the outline encloses {area_m2:.4} m²");
         return fault(place(None), problem, "spread the vertices out; coordinates are in metres");
@@ -297,7 +297,9 @@ fn check_start(scenario: &Scenario, vehicle: &VehicleSettings, start: Pose) -> R
         !polygon_contains(&scenario.boundary, corner)
             || scenario.islands.iter().any(|island| polygon_contains(&island.polygon, corner))
     });
-    if crosses_line || stands_outside {
+    // Where no lines cross, one vertex tells whether an island lies beneath the car.
+    let stands_over_island = scenario.islands.iter().any(|island| polygon_contains(&body, island.polygon[0]));
+    if crosses_line || stands_outside || stands_over_island {
         let (length_m, width_m) = (vehicle.length_m, vehicle.width_m);
         let problem =
             format!("the car ({length_m:.2} m × {width_m:.2} m) does not fit at the start, {}", at(start.position()));

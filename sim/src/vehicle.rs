@@ -88,6 +88,9 @@ impl VehicleSettings {
 pub struct VehicleState {
     /// Rear-axle pose in the world.
     pub pose: Pose,
+    /// What the position lacks, metres: far from the origin single precision cannot hold what a step adds to it.
+    #[serde(skip)]
+    pub position_rest_m: Vec2,
     /// Forward speed, m/s.
     pub speed_mps: f32,
     /// Road-wheel angle, radians, positive to the left.
@@ -105,6 +108,7 @@ impl VehicleState {
     pub fn at_rest(pose: Pose) -> Self {
         Self {
             pose,
+            position_rest_m: Vec2::ZERO,
             speed_mps: 0.0,
             steering_rad: 0.0,
             accel_mps2: 0.0,
@@ -161,6 +165,9 @@ fn roll(
     let speed_mps = (state.speed_mps + accel_mps2 * dt_s).max(0.0);
     let travel_m = 0.5 * (state.speed_mps + speed_mps) * dt_s;
     let curvature_per_m = maths::tan(steering_rad) / settings.wheelbase_m;
-    let pose = state.pose.advanced_along_arc(curvature_per_m, travel_m);
-    VehicleState { pose, speed_mps, steering_rad, accel_mps2, ..state }
+    let (chord, heading_rad) = state.pose.chord_of_arc(curvature_per_m, travel_m);
+    let moved = state.position_rest_m + chord;
+    let pose = Pose::new(state.pose.position() + moved, heading_rad);
+    let position_rest_m = moved - (pose.position() - state.pose.position());
+    VehicleState { pose, position_rest_m, speed_mps, steering_rad, accel_mps2, ..state }
 }

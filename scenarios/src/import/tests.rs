@@ -327,7 +327,7 @@ fn a_loop_leads_back_to_its_start() {
     assert!(end.ahead().dot(start.ahead()) > 0.86, "{end:?}");
     // The middle of the aisle is a rectangle of 46 m × 28 m, and corners are cut.
     assert!((115.0..150.0).contains(&path.length_m()), "{} m", path.length_m());
-    let area_m2 = 0.5 * sim::geometry::edges(&scenario.reference_path.points).map(|(a, b)| a.perp_dot(b)).sum::<f32>();
+    let area_m2 = sim::geometry::signed_area_m2(&scenario.reference_path.points);
     assert!(area_m2 > 900.0, "counter-clockwise round the block: {area_m2} m²");
 }
 
@@ -397,9 +397,8 @@ fn a_speck_becomes_the_smallest_island_or_is_left_out_as_asked() {
     lot.scale = 2.0;
     (lot.start, lot.goal) = (Some([4.0, 1.3, 0.0]), Some([21.0, 1.3, 0.0]));
     let areas = |scenario: &Scenario| -> Vec<f32> {
-        let area =
-            |island: &Island| 0.5 * sim::geometry::edges(&island.polygon).map(|(a, b)| a.perp_dot(b)).sum::<f32>();
-        scenario.islands.iter().map(|island| area(island).abs()).collect()
+        let area = |island: &Island| sim::geometry::signed_area_m2(&island.polygon).abs();
+        scenario.islands.iter().map(area).collect()
     };
     // 10 cm squares in the lot are just as large as islands must be, and a little more is asked for.
     let loaded = lot.scenario(&car()).unwrap();
@@ -478,7 +477,7 @@ fn junctions_of_a_map_are_named_and_closed_when_asked() {
     let mut lot = fine_lane("junction", |_, _| false);
     std::fs::write(lot.map.with_file_name("map.pgm"), pgm(&rows)).unwrap();
     let loaded = lot.scenario(&car()).unwrap();
-    let [Note::Open { mouths }] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
+    let [Note::Open { mouths, is_asked_to_close: false }] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
     assert!(mouths.len() == 1 && (mouths[0][0] - 25.0).abs() < 2.5, "{mouths:?}");
     assert!(loaded.notes[0].to_string().starts_with("the route has 1 junction, near (2"), "{}", loaded.notes[0]);
     lot.close_branches = true;

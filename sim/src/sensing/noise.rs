@@ -13,10 +13,10 @@ mod value;
 
 pub use layer::Layer;
 
-use crate::geometry::{Pose, Vec2};
+use crate::geometry::{Pose, Vec2, polygon_contains};
 use crate::map::Map;
 use crate::maths;
-use crate::scenario::NoiseLevel;
+use crate::scenario::{KERB_MAX_M, NoiseLevel};
 use crate::seed::{Rng, RootSeed, Stream};
 use crate::vectors::{FourPoints, f32x4};
 use patch::{Patch, Patches, Reads, Region};
@@ -294,20 +294,29 @@ impl NoiseField {
     }
 }
 
-/// Whether nothing solid stands on a convex quadrilateral.
+/// Whether nothing solid stands on a convex quadrilateral: no obstacle, and no island or ground outside of the boundary
+/// that is higher than a kerb.
 fn is_empty_ground(map: &Map, polygon: &[Vec2]) -> bool {
     const SAMPLES: usize = 12;
     let region = Region::new(polygon.to_vec());
     let near = |occluder: &&crate::map::Occluder| {
         occluder.centre.distance(region.centre) < occluder.radius_m + region.radius_m
     };
-    map.occluders().iter().filter(near).all(|occluder| {
-        (0..SAMPLES * SAMPLES).all(|i| {
-            let (a, b) = ((i % SAMPLES) as f32, (i / SAMPLES) as f32);
-            let (a, b) = (a / (SAMPLES - 1) as f32, b / (SAMPLES - 1) as f32);
-            let sample = polygon[0].lerp(polygon[1], a).lerp(polygon[3].lerp(polygon[2], a), b);
-            !crate::geometry::polygon_contains(&occluder.outline, sample)
-        })
+    let obstacles: Vec<_> = map.occluders().iter().filter(|occluder| !occluder.is_wall()).filter(near).collect();
+    let scenario = map.scenario();
+    let is_solid = |sample: Vec2| {
+        obstacles.iter().any(|obstacle| polygon_contains(&obstacle.outline, sample))
+            || scenario.boundary_height_m > KERB_MAX_M && !polygon_contains(&scenario.boundary, sample)
+            || map.signed_distance_m(sample) <= 0.0
+                && scenario
+                    .islands
+                    .iter()
+                    .any(|island| island.height_m > KERB_MAX_M && polygon_contains(&island.polygon, sample))
+    };
+    (0..SAMPLES * SAMPLES).all(|i| {
+        let (a, b) = ((i % SAMPLES) as f32, (i / SAMPLES) as f32);
+        let (a, b) = (a / (SAMPLES - 1) as f32, b / (SAMPLES - 1) as f32);
+        !is_solid(polygon[0].lerp(polygon[1], a).lerp(polygon[3].lerp(polygon[2], a), b))
     })
 }
 

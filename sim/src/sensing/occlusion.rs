@@ -13,8 +13,11 @@ use std::ops::Range;
 const FACTOR_MAX: f32 = 12.0;
 /// Corners a polygon may have; an octagon's shadow has ten.
 const CORNERS_MAX: usize = 12;
-/// Objects nearer to the camera than this hide nothing, metres ahead.
+/// What is not this far ahead of the camera hides nothing, metres.
 const AHEAD_MIN_M: f32 = 0.05;
+/// Where what is left of an outline begins that reaches back beside the camera, metres ahead of it: a little more than
+/// the above, so that the part counts as ahead.
+const PART_FROM_M: f32 = 2.0 * AHEAD_MIN_M;
 
 /// A convex polygon in the ego frame, without allocation.
 #[derive(Debug, Clone, Copy)]
@@ -309,13 +312,11 @@ impl TallObject {
             FACTOR_MAX
         };
         let camera = Vec2::new(camera.ahead_m, 0.0);
-        let outline = outline_in_ego.moved(-camera);
-        let outline = if outline.n_corners() == 2 { part_ahead(&outline) } else { outline };
-        Self { outline, factor, camera }
+        Self { outline: part_ahead(&outline_in_ego.moved(-camera)), factor, camera }
     }
 
-    /// A box in the ego frame around the thing and the ground hidden behind it; `None` if it is beside or behind the
-    /// camera.
+    /// A box in the ego frame around the thing, as far as it is ahead of the camera, and the ground hidden behind it;
+    /// `None` if nothing of it is ahead.
     #[inline]
     pub(super) fn hidden_box(&self) -> Option<(Vec2, Vec2)> {
         let (low, high) = self.outline.bounds();
@@ -323,7 +324,7 @@ impl TallObject {
         is_ahead.then(|| (self.camera + low.min(low * self.factor), self.camera + high.max(high * self.factor)))
     }
 
-    /// The ground hidden behind it, without the thing itself; `None` if it is beside or behind the camera.
+    /// The ground hidden behind it, without the thing itself; `None` if nothing of it is ahead of the camera.
     pub(super) fn hidden_ground(&self) -> Option<ConvexInEgo> {
         let n = self.outline.n_corners();
         let from_camera = |i: usize| self.outline.corner(i % n);
@@ -341,20 +342,24 @@ impl TallObject {
     }
 }
 
-/// The part of a piece of a wall, relative to the camera, that is ahead of it: walls run on beside the camera, and what
-/// they hide begins there. A piece that is not ahead at all stays as it is.
-fn part_ahead(wall: &Outline) -> Outline {
-    let ends = [wall.corner(0), wall.corner(1)];
-    let [is_first_ahead, is_second_ahead] = ends.map(|end| end.x > AHEAD_MIN_M);
-    if is_first_ahead == is_second_ahead {
-        return *wall;
+/// The part of a convex outline, or of a piece of a wall, relative to the camera, that is ahead of it: what the car passes
+/// reaches back beside the camera, and hides from there on. An outline that is not ahead at all stays as it is.
+fn part_ahead(outline: &Outline) -> Outline {
+    let (low, high) = outline.bounds();
+    if low.x > AHEAD_MIN_M || high.x <= PART_FROM_M {
+        return *outline;
     }
-    let [first, second] = ends;
-    // Just ahead, so that the part counts as ahead.
-    let level_m = 2.0 * AHEAD_MIN_M;
-    let meets = first.lerp(second, ((level_m - first.x) / (second.x - first.x)).clamp(0.0, 1.0));
-    let meets = Vec2::new(level_m, meets.y);
-    (if is_first_ahead { [first, meets] } else { [meets, second] }).into_iter().collect()
+    let n = outline.n_corners();
+    // A wall of two ends has one side, whose way back is the same line.
+    let sides = if n == 2 { 1 } else { n };
+    let first = (n == 2).then(|| outline.corner(0)).filter(|first| first.x > PART_FROM_M);
+    let of_side = |i: usize| {
+        let (a, b) = (outline.corner(i), outline.corner((i + 1) % n));
+        let is_crossing = (a.x > PART_FROM_M) != (b.x > PART_FROM_M);
+        let meets = || Vec2::new(PART_FROM_M, a.y + (PART_FROM_M - a.x) / (b.x - a.x) * (b.y - a.y));
+        is_crossing.then(meets).into_iter().chain(Some(b).filter(|b| b.x > PART_FROM_M))
+    };
+    first.into_iter().chain((0..sides).flat_map(of_side)).collect()
 }
 
 #[cfg(test)]
@@ -428,9 +433,47 @@ mod tests {
         }
     }
 
+    /// Passing a long wall, a parked car or a round thing as high as the camera, which reach back beside it: what is hidden
+    /// is what lines of sight that meet the part ahead would reach, pixel by pixel. They hid nothing once a corner was level
+    /// with the camera.
     #[test]
-    fn things_beside_or_behind_the_camera_hide_nothing() {
-        let beside = crate::geometry::rectangle(crate::geometry::Pose::new(Vec2::new(1.0, 3.0), 0.0), 2.0, 2.0);
+    fn what_reaches_back_beside_the_camera_hides_what_is_behind_its_part_ahead() {
+        use crate::geometry::{Pose, polygon_contains, rectangle};
+        let geometry = GridGeometry::paper();
+        let camera = Vec2::new(CAMERA.ahead_m, 0.0);
+        let wall = rectangle(Pose::new(Vec2::new(2.0, 1.8), 0.02), 25.0, 0.2).to_vec();
+        let car = rectangle(Pose::new(Vec2::new(2.5, -2.6), -0.05), 4.7, 1.9).to_vec();
+        let octagon = |centre: Vec2| (0..8).map(move |k| centre + 0.4 * crate::maths::unit(0.3 + k as f32 * 0.7854));
+        let round = octagon(Vec2::new(CAMERA.ahead_m + 0.33, 1.4)).collect::<Vec<_>>();
+        for outline in [wall, car, round] {
+            assert!(crate::geometry::bounds(&outline).0.x < camera.x, "it reaches back");
+            let polygon = hidden_ground(&outline, 3.0, CAMERA).unwrap();
+            let mut view = vec![[false; BEV_PIXELS]; BEV_PIXELS];
+            polygon.for_each_row(&geometry, |row, first, last| view[row][first..=last].fill(true));
+            let mut n_hidden = 0;
+            for (row, pixels) in view.iter().enumerate() {
+                for (col, &is_hidden) in pixels.iter().enumerate() {
+                    let pixel = geometry.pixel_in_ego(row, col);
+                    // Beside an edge of what is hidden either answer is right.
+                    let near = [Vec2::ZERO, Vec2::X, -Vec2::X, Vec2::Y, -Vec2::Y].map(|by| pixel + 0.1 * by);
+                    let is_met = |point: Vec2| {
+                        let on_line = |i: u16| camera.lerp(point, f32::from(i) / 800.0);
+                        (0..800).map(on_line).any(|at| at.x > camera.x + 0.1 && polygon_contains(&outline, at))
+                    };
+                    if polygon_contains(&outline, pixel) || near.iter().any(|&point| is_met(point) != is_met(pixel)) {
+                        continue;
+                    }
+                    n_hidden += usize::from(is_hidden);
+                    assert_eq!(is_hidden, is_met(pixel), "{pixel} behind {outline:?}");
+                }
+            }
+            assert!(n_hidden > 50, "{n_hidden} of {outline:?}");
+        }
+    }
+
+    #[test]
+    fn things_that_end_beside_or_behind_the_camera_hide_nothing() {
+        let beside = crate::geometry::rectangle(crate::geometry::Pose::new(Vec2::new(0.6, 3.0), 0.0), 2.0, 2.0);
         assert!(hidden_ground(&beside, 1.5, CAMERA).is_none());
     }
 }

@@ -322,10 +322,12 @@ impl Sensor {
         self.occluders(map, ego).filter_map(|thing| thing.hidden_ground())
     }
 
-    /// Tall things around the patch as seen by the camera; none if ground is not hidden.
+    /// Tall things around the patch and on the way to it, as seen by the camera; none if ground is not hidden.
     fn occluders<'a>(&'a self, map: &'a Map, ego: &'a EgoView) -> impl Iterator<Item = TallObject> + 'a {
         let camera = Camera { ahead_m: self.settings.camera_ahead_m, height_m: self.settings.camera_height_m };
-        let near = self.settings.occlusion.then(|| map.occluders_near(ego.patch_centre, ego.patch_radius_m));
+        let (centre, radius_m) = circle_of_sight(&self.settings.geometry, camera.ahead_m);
+        let centre = ego.world_from_ego.point(centre);
+        let near = self.settings.occlusion.then(|| map.occluders_near(centre, radius_m));
         let camera_in_world = ego.world_from_ego.point(Vec2::new(camera.ahead_m, 0.0));
         let near_sides = move |occluder: &&Occluder| !occluder.is_far_side(camera_in_world, camera.height_m);
         near.into_iter().flatten().filter(near_sides).map(move |occluder| {
@@ -438,6 +440,16 @@ impl Undecided {
             grid.occupy_row(row, u32::from(lattice.any_below(field, row, col, threshold_m)) << col);
         }
     }
+}
+
+/// A circle around all lines of sight from the camera into the patch: its centre in the ego frame, and its radius, metres.
+fn circle_of_sight(geometry: &GridGeometry, camera_ahead_m: f32) -> (Vec2, f32) {
+    let [near, far] = [geometry.near_edge_ahead_m, geometry.far_edge_ahead_m()]
+        .map(|ahead_m| Vec2::new(ahead_m, 0.5 * geometry.side_m));
+    let camera = Vec2::new(camera_ahead_m, 0.0);
+    // As far from the camera as from the far corners.
+    let centre = Vec2::new(0.5 * (far.length_squared() - camera.length_squared()) / (far.x - camera.x), 0.0);
+    (centre, [near, far, camera].map(|point| centre.distance(point)).into_iter().fold(0.0, f32::max))
 }
 
 /// One pose, prepared for sensing.
