@@ -792,7 +792,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
             "episode.vehicle.emergency_brake_mps2",
         ),
         (&["generate", "--lots", "stars.toml", "bars.toml", "--out", "."], "would both be a-b.toml"),
-        (&["render", "lot", "--lots", "stars.toml", "bars.toml", "--out", "p", "--overwrite"], "have one file name"),
+        (&["render", "lot", "--lots", "stars.toml", "bars.toml", "--out", "p", "--overwrite"], "would both be a-b.png"),
         (
             &["evaluate", "--driver", "expert", "--lots", "test:600000,train:600000", "--trials", "1"],
             "lots; at most 1000000",

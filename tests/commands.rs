@@ -252,6 +252,10 @@ fn a_run_can_be_evaluated_later_and_generated_lots_can_be_driven() {
     let folder = scratch("later");
     let (run, lots, results) = (folder.join("run"), folder.join("lots"), folder.join("results"));
     succeed(xtask().args(["train-bc", "--preset", "smoke", "--no-eval", "--out"]).arg(&run));
+    let error = refuse(xtask().args(["replay", "--of"]).arg(&run));
+    assert!(error.contains("holds no finished evaluation"), "{error}");
+    let error = refuse(xtask().args(["render", "samples", "--count", "300"]).arg(run.join("round-00")));
+    assert!(error.contains("room for 1 to 256 samples"), "{error}");
     succeed(xtask().args(["generate", "--lots", "train:1", "--out"]).arg(&lots));
     let mut written: Vec<_> = std::fs::read_dir(&lots).unwrap().map(|entry| entry.unwrap().path()).collect();
     written.sort();
@@ -362,6 +366,21 @@ fn what_would_have_avoided_near_collisions_is_counted_by_lot() {
     let passed =
         |replaced: &str| of_lot_b.iter().find(|row| row["replaced"] == replaced).unwrap()["passed"].as_u64().unwrap();
     assert!(passed("expert, 6 s") > passed("nothing"), "the expert gets by where the planner does not: {rows:?}");
+
+    let lots = folder.join("lots");
+    succeed(xtask().args(["generate", "--lots", "lot-b", "--out"]).arg(&lots));
+    let (lot, of_file) = (lots.join("lot-b-s1.toml"), folder.join("of-file"));
+    succeed(
+        xtask()
+            .args(["evaluate", "--driver", "tentacle", "--trials", "1", "--lots"])
+            .arg(&lot)
+            .arg("--out")
+            .arg(&of_file),
+    );
+    let text = std::fs::read_to_string(&lot).unwrap();
+    std::fs::write(&lot, format!("# Edited.\n{text}")).unwrap();
+    let error = refuse(xtask().arg("what-if").arg(&of_file));
+    assert!(error.contains("lot-b-s1.toml: changed since this run was begun"), "{error}");
 
     let error = refuse(xtask().args(["what-if", "--driver", "expert", "--"]).arg(&run));
     assert!(error.contains("no near-collision of a driver \"expert\""), "{error}");

@@ -191,6 +191,13 @@ fn trainings_of_a_method_are_judged_together_wherever_they_drove() {
     assert!(merged(["three", "vvf"], &[]) == (printed, whole), "what was named before holds");
     let refused = xtask().arg("merge").args(["1", "2"].map(out)).args(["--method", &method]).output().unwrap();
     assert!(text(&refused).1.contains("--method: shards are judged as they were driven"), "{}", text(&refused).1);
+    let copy_of_first = out("copy/round-00");
+    let twice: Vec<String> = networks[..2].iter().cloned().chain([format!("net:{copy_of_first}")]).collect();
+    copy(&folder.join("seed-1"), &folder.join("copy"));
+    copy(&folder.join("seed-1/round-00"), Path::new(&copy_of_first));
+    let lots = ["--preset", "smoke", "--lots", "test:8:easy", "--method", &method, "--out"];
+    let refused = xtask().args(["evaluate", "--driver"]).args(&twice).args(lots).arg(out("twice")).output().unwrap();
+    assert!(text(&refused).1.contains("are the same network; leave one out"), "{}", text(&refused).1);
 }
 
 #[test]

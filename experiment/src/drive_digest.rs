@@ -1,4 +1,4 @@
-//! SHA-256 of a drive: two drives with the same digest are the same, bit by bit.
+//! SHA-256 of a drive: two drives with the same digest are the same, bit for bit.
 
 use sha2::{Digest as _, Sha256};
 use sim::frame::{Event, Frame};

@@ -8,7 +8,7 @@
 //! | [`trials`] | seeds of trials: their obstacles and their noise |
 //! | [`shard`] | a machine's share of the trials |
 //! | [`drive`] | the one loop: a driver on a batch of trials, with an observer of every frame |
-//! | [`drive_digest`] | SHA-256 of a drive: whether two are the same, bit by bit |
+//! | [`drive_digest`] | SHA-256 of a drive: whether two are the same, bit for bit |
 //! | [`replay_key`] | a short text that identifies one run and a tick in it |
 //! | [`training`] | behaviour cloning and DAgger into a run folder |
 //! | [`inputs`] | digests of the files that a run reads, so that it continues with the same |

@@ -1,4 +1,4 @@
-//! Networks in ONNX files: any framework's at the wheel, and ours for any framework.
+//! Networks as ONNX files: import as drivers, and export of ours.
 //!
 //! | module | what |
 //! |---|---|

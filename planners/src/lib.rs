@@ -1,4 +1,4 @@
-//! The paper's opponents: planners that answer the same noisy grid with a formula (docs/methods.md 6 and 7).
+//! The paper's baselines and their kin: planners that answer the same noisy grid with a formula (docs/methods.md 6 and 7).
 //!
 //! | module | family | method | run by the paper? |
 //! |---|---|---|---|

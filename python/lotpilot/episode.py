@@ -118,7 +118,7 @@ class Episode:
         return dict(zip(Cars.INFO, np.stack(self._rows).T, strict=True))
 
     def digest(self) -> str:
-        """SHA-256 of everything seen, decided and driven: two runs with one digest are the same bit by bit."""
+        """SHA-256 of everything seen, decided and driven: two runs with one digest are the same bit for bit."""
         digest = self._core.cars.digest(0)
         assert digest is not None
         return digest

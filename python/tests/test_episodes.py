@@ -88,6 +88,12 @@ def test_a_driver_that_remembers_is_told_which_car_it_drives():
     assert driver.cars == {0, 1} and driver.resets >= 2
 
 
+def test_functions_are_judged_together_as_trainings_of_one_method():
+    mine = {f"mine-{left}": (lambda grids, left=left: np.tile([8.0, left], (len(grids), 1))) for left in (-1.0, 0.0, 1.0)}
+    tables = lotpilot.evaluate(mine, "test:8", trials=1, overrides=SHORT, methods={"mine": list(mine)})
+    assert set(tables.trainings["driver"]) == {"mine"} and set(tables.trainings["trainings"]) == {3}
+
+
 def test_an_evaluation_leaves_the_files_of_the_command_line(tmp_path):
     folder = tmp_path / "straight"
     tables = lotpilot.evaluate("expert", "lot-b", trials=1, directions="forward", overrides=SHORT, out=folder)

@@ -238,7 +238,8 @@ impl MapLot {
         }
         let map = Map::build(scenario.clone(), vehicle).map_err(|error| self.in_lot(error))?;
         let mouths = in_map(branches::find(&map, vehicle).into_iter().map(|branch| branch.mouth).collect());
-        notes.extend((!mouths.is_empty()).then_some(Note::Open { mouths }));
+        let is_asked_to_close = self.close_branches;
+        notes.extend((!mouths.is_empty()).then_some(Note::Open { mouths, is_asked_to_close }));
         Ok(Loaded { scenario, files, notes })
     }
 

@@ -53,6 +53,8 @@ pub enum Note {
     Open {
         /// Where they leave it.
         mouths: Vec<[f64; 2]>,
+        /// Whether the lot asks for them to be closed: no kerb could be laid across these.
+        is_asked_to_close: bool,
     },
 }
 
@@ -92,12 +94,16 @@ impl std::fmt::Display for Note {
             Self::Closed { mouths } => {
                 write!(f, "{} closed with kerbs, near {}", are(mouths.len(), "branch", "branches"), listed(mouths))
             }
-            Self::Open { mouths } => write!(
+            Self::Open { mouths, is_asked_to_close } => write!(
                 f,
-                "the route has {}, near {}: drivers do not see the route and may turn off there; close_branches = true \
-                 (--close-branches of cargo xtask generate) closes branches with kerbs",
+                "the route has {}, near {}: drivers do not see the route and may turn off there; {}",
                 are(mouths.len(), "junction", "junctions"),
-                listed(mouths)
+                listed(mouths),
+                if *is_asked_to_close {
+                    "no kerb closes what is left, which is too wide or too near to the route: draw walls into the map there"
+                } else {
+                    "close_branches = true (--close-branches of cargo xtask generate) closes branches with kerbs"
+                }
             ),
         }
     }

@@ -65,7 +65,7 @@ enum Command {
     /// truth.
     #[command(after_help = what_if::EXAMPLES)]
     WhatIf(what_if::WhatIfArgs),
-    /// Draws lots, drives, samples and noise as PNG and SVG.
+    /// Draws lots, drives, samples and noise; writes reports and pages of results.
     #[command(after_help = render::EXAMPLES)]
     Render(render::RenderArgs),
     /// Records lots, drives and near-collisions for Rerun's viewer.
@@ -107,7 +107,7 @@ enum Command {
     /// Checks that every file of a run is what was written, by its SHA-256.
     #[command(after_help = verify::EXAMPLES)]
     Verify(verify::VerifyArgs),
-    /// Drives runs again by their replay keys, and says whether they are the same as recorded, bit by bit.
+    /// Drives runs again by their replay keys, and says whether they are the same as recorded, bit for bit.
     #[command(after_help = replay::EXAMPLES)]
     Replay(replay::ReplayArgs),
     /// Computes how far to drive to see a difference in near-collisions, or to bound their rate.

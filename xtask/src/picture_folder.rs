@@ -1,11 +1,11 @@
 //! The folder that pictures are written into.
 
 use crate::output::Output;
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use experiment::lots::Lot;
 use report::pictures::drawing::Drawing;
 use report::pictures::file_name;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Where the files lie that lots are made of.
@@ -23,6 +23,21 @@ pub(crate) fn ensure_apart_from(places: &BTreeSet<PathBuf>, files: &[PathBuf]) -
             "{}: what the lot is made of lies there under that name; choose another --out",
             file.display()
         );
+    }
+    Ok(())
+}
+
+/// Refuses lots of which two would be one file: each with the name of its file, without the extension that all share.
+pub(crate) fn ensure_files_differ<'a>(
+    files: impl IntoIterator<Item = (String, &'a str)>,
+    extension: &str,
+) -> anyhow::Result<()> {
+    let mut taken = BTreeMap::new();
+    for (file, lot) in files {
+        // Some file systems take no notice of capitals.
+        if let Some(other) = taken.insert(file.to_lowercase(), lot) {
+            bail!("lots {other:?} and {lot:?} would both be {file}.{extension}; write them into two folders");
+        }
     }
     Ok(())
 }

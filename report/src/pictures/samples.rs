@@ -10,11 +10,14 @@ use sim::geometry::Vec2;
 use sim::maths;
 use sim::sensing::{GRID_CELLS, GridGeometry};
 
+/// Samples for which a picture has room.
+pub const COUNT_MAX: usize = 256;
+
 const CELL_PX: f32 = 9.0;
 const GAP_PX: f32 = 16.0;
 const FONT: Font = Font::Small;
 
-/// Samples with their index and what a network answers, four in a row.
+/// At most [`COUNT_MAX`] samples with their index and what a network answers, four in a row.
 ///
 /// # Errors
 /// If the picture would be too large.

@@ -21,7 +21,6 @@ use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -196,19 +195,12 @@ fn files(args: &GenerateArgs, name: &str) -> [PathBuf; 2] {
 
 /// Refuses lots whose files are there, or would be those of another one, before the first is written.
 fn ensure_free(args: &GenerateArgs, lots: &[Lot], trials: &[Trial<'_>]) -> anyhow::Result<()> {
-    let mut taken = BTreeMap::new();
     let made_of = picture_folder::made_of(lots)?;
+    picture_folder::ensure_files_differ(trials.iter().map(|trial| (file_name(args, trial), trial.lot.name())), "toml")?;
     for trial in trials {
-        let name = file_name(args, trial);
-        // Some file systems take no notice of capitals.
-        if let Some(other) = taken.insert(name.to_lowercase(), trial.lot.name()) {
-            bail!(
-                "lots {other:?} and {:?} would both be {name}.toml; generate them into two folders",
-                trial.lot.name()
-            );
-        }
-        picture_folder::ensure_apart_from(&made_of, &files(args, &name))?;
-        for path in files(args, &name) {
+        let files = files(args, &file_name(args, trial));
+        picture_folder::ensure_apart_from(&made_of, &files)?;
+        for path in files {
             ensure!(
                 args.overwrite || !path.exists(),
                 "{}: exists already; choose another --out or --seed, or replace it with --overwrite",

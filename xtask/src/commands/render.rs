@@ -8,7 +8,7 @@ use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
 use crate::picture_folder::{self, Folder};
-use anyhow::{Context as _, bail, ensure};
+use anyhow::{Context as _, ensure};
 use clap::{ArgGroup, Args, Subcommand, ValueEnum};
 use experiment::drive::Replay;
 use experiment::drivers::{DriverSpec, NamedDriver};
@@ -35,7 +35,6 @@ use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use sim::sensing::Inspection;
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -231,11 +230,8 @@ fn render_lots(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> 
     let episode = Settings::preset("default")?.episode;
     let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
     let made_of = picture_folder::made_of(&lots)?;
-    let mut named = BTreeMap::new();
+    picture_folder::ensure_files_differ(lots.iter().map(|lot| (file_name(lot.name()), lot.name())), "png")?;
     for lot in &lots {
-        if let Some(other) = named.insert(file_name(lot.name()), lot.name()) {
-            bail!("lots {other:?} and {:?} have one file name; draw them into different folders", lot.name());
-        }
         folder.check(lot.name(), true)?;
         picture_folder::ensure_apart_from(&made_of, &folder.files(lot.name(), true))?;
     }
@@ -359,7 +355,12 @@ fn driven_in_training(run: &Path, args: &TrajectoriesArgs, folder: &Folder<'_>) 
 }
 
 fn render_samples(args: &SamplesArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
-    ensure!(args.count > 0, "--count is 0; at least one is needed");
+    ensure!(
+        (1..=samples::COUNT_MAX).contains(&args.count),
+        "--count {}: a picture has room for 1 to {} samples",
+        args.count,
+        samples::COUNT_MAX
+    );
     let name = args.round.file_name().unwrap_or_default().to_string_lossy();
     let index = name.strip_prefix("round-").and_then(|index| index.parse().ok());
     let (Some(index), Some(run)) = (index, args.round.parent()) else {

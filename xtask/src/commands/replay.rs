@@ -17,11 +17,12 @@ use report::replays::{self, Row};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask replay expert@lot-b@reverse@3@paper@1@0                the result of a run, and its digest
-  cargo xtask replay --of runs/evaluate-default-s1                   16 of its runs: whether each is the same here, bit by bit
+  cargo xtask replay --of runs/evaluate-default-s1                   16 of its runs: whether each is the same here, bit for bit
   cargo xtask replay --of runs/evaluate-default-s1 expert@lot-b@reverse@3@paper@1@842
 
 To look at a run: cargo xtask visualise replay KEY, or cargo xtask render animation KEY";
@@ -113,6 +114,11 @@ fn of_evaluation(
 ) -> anyhow::Result<(Settings, Vec<ReplayKey>, BTreeMap<String, Recorded>)> {
     let settings = trained::settings_of(folder)?;
     let file = folder.join(records::RUNS);
+    ensure!(
+        sums::is_listed(folder, records::RUNS)?,
+        "{}: holds no finished evaluation; name the folder of one, or of a training that ended with its check",
+        folder.display()
+    );
     // Twice through the file: it may be longer than memory is large.
     let mut runs = 0;
     if args.keys.is_empty() {
