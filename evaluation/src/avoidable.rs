@@ -5,7 +5,7 @@ use crate::evaluate::BATCH;
 use crate::monitor::{Incident, IncidentMonitor};
 use crate::records::{self, Driven, FailureRecord};
 use crate::what_if::{Substitutes, Substitution};
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use experiment::drive::TrialBatch;
 use experiment::drivers::DriverSpec;
 use experiment::inputs;
@@ -54,7 +54,7 @@ struct Failing {
 /// drivers named, or of all. Rows are in the order of the evaluation. `None` if cancelled.
 ///
 /// # Errors
-/// If the folder holds no finished evaluation, a lot or a driver has changed since, or a run is not what was recorded.
+/// If the folder holds no finished evaluation, or no near-collision of a driver named; if a lot or a driver has changed since, or a run is not what was recorded.
 pub fn of_evaluation(
     folder: &Path,
     settings: &Settings,
@@ -64,6 +64,9 @@ pub fn of_evaluation(
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     let manifest = Manifest::read(folder)?;
     let failing = read(folder, &lots, drivers)?;
+    if let Some(driver) = drivers.iter().find(|&driver| failing.iter().all(|failing| failing.driver != *driver)) {
+        bail!("{}: no near-collision of a driver {driver:?} is in it; its tables name them", folder.display());
+    }
     let all: usize = failing.iter().map(|failing| failing.runs.len()).sum();
     progress.begin("what-if", "driving again");
     let mut rows = Vec::new();
@@ -112,25 +115,31 @@ pub fn of_evaluation(
 /// What failed, by driver and level of noise, in the order of the file.
 fn read(folder: &Path, lots: &[Lot], drivers: &[String]) -> anyhow::Result<Vec<Failing>> {
     let index: BTreeMap<&str, usize> = lots.iter().enumerate().map(|(index, lot)| (lot.name(), index)).collect();
-    let mut all: Vec<Failing> = Vec::new();
+    let mut all: Vec<(String, NoiseChoice, BTreeMap<RunOf, Vec<u32>>)> = Vec::new();
+    let mut keys = Vec::new();
     records::each_line(&folder.join(records::FAILURES), |failure: FailureRecord| {
         let Driven { driver, lot, direction, trial, noise, .. } = failure.driven;
         if !drivers.is_empty() && !drivers.contains(&driver) {
             return Ok(());
         }
         let &lot = index.get(lot.as_str()).with_context(|| format!("lot {lot:?} is not in evaluation.lots"))?;
-        let known = all.iter().position(|failing| failing.driver == driver && failing.noise == noise);
+        let known = all.iter().position(|failing| failing.0 == driver && failing.1 == noise);
         let at = if let Some(at) = known {
             at
         } else {
-            let spec = failure.replay.parse::<ReplayKey>()?.driver;
-            all.push(Failing { driver, noise, spec, runs: BTreeMap::new() });
+            keys.push(failure.replay);
+            all.push((driver, noise, BTreeMap::new()));
             all.len() - 1
         };
-        all[at].runs.entry((lot, direction, trial)).or_default().push(failure.tick);
+        all[at].2.entry((lot, direction, trial)).or_default().push(failure.tick);
         Ok(())
     })?;
-    Ok(all)
+    // Not while reading: a row is no worse for naming a driver that only Python can call.
+    let with_spec = |((driver, noise, runs), key): ((String, NoiseChoice, _), String)| {
+        let key = key.parse::<ReplayKey>().with_context(|| format!("{driver}: cannot be driven from here"))?;
+        Ok(Failing { driver, noise, spec: key.driver, runs })
+    };
+    all.into_iter().zip(keys).map(with_spec).collect()
 }
 
 /// Whether the near-collisions of a batch are at the ticks that were recorded of each run.

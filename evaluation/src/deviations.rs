@@ -47,7 +47,8 @@ pub const DEVIATIONS: [Deviation; 12] = [
         name: "disturbances",
         of_paper: "no disturbances while collecting",
         keys: &["dagger.disturbance"],
-        changes_cloning: true,
+        // Only rounds of DAgger are disturbed.
+        changes_cloning: false,
     },
     Deviation { name: "network", of_paper: "the paper's network", keys: &["dagger.network"], changes_cloning: true },
     Deviation {

@@ -134,6 +134,10 @@ impl<'a> Driving<'a> {
             let batch = TrialBatch { episode, driver, trials, maps: &maps, noise, seed: evaluation.seed };
             let Some(driven) = drive(&batch, &mut self.track)? else { return Ok(false) };
             let failures = failures(&batch, &driven)?;
+            // A driver that failed meanwhile has answered with anything.
+            if self.track.progress.is_cancelled() {
+                return Ok(false);
+            }
             self.lines.add(&lines(&batch, &driven, &failures)?)?;
             for (i, (trial, report)) in trials.iter().zip(&driven.reports).enumerate() {
                 self.results.add(level, index, first_trial + i, trial, report);

@@ -7,6 +7,7 @@ use crate::judge::{Comparison, DriverEstimate};
 use crate::plan::Plan;
 use crate::results::EvaluationResults;
 use crate::slices::Slice;
+use crate::statistics::poisson::DISPERSION_MAX;
 use crate::totals::Totals;
 use crate::trainings::{self, Team, TeamEstimate};
 use experiment::run_dir::RunDir;
@@ -149,6 +150,18 @@ pub struct ComparisonRow {
     pub difference_safe_ratio_lower: Option<f64>,
     /// See `difference_safe_ratio_lower`.
     pub difference_safe_ratio_upper: Option<f64>,
+}
+
+impl Row {
+    /// The interval that may be quoted (docs/methods.md 8.3), near-collisions per 100 m: the exact one, or the bootstrap's
+    /// where events cluster.
+    pub fn quoted_interval(&self) -> [f64; 2] {
+        let is_clustered = self.dispersion.is_some_and(|index| index > DISPERSION_MAX);
+        match (self.bootstrap_lower, self.bootstrap_upper) {
+            (Some(lower), Some(upper)) if is_clustered => [lower, upper],
+            _ => [self.garwood_lower, self.garwood_upper],
+        }
+    }
 }
 
 /// A row of `trainings.csv`: several trainings of one method, as one, or another driver beside them. Intervals

@@ -3,6 +3,7 @@
 use crate::drive;
 use crate::inputs;
 use crate::lots::Lot;
+use crate::manifest::Manifest;
 use crate::progress::{Elapsed, Progress};
 use crate::run_dir::RunDir;
 use crate::settings::Settings;
@@ -102,7 +103,7 @@ pub fn hand(seed: RootSeed, index: EpisodeIndex) -> Rng {
 /// the network of the round before. `drive` counts from 0.
 ///
 /// # Errors
-/// If there is no such run, round or drive, or a file of it cannot be read.
+/// If there is no such run, round or drive, a file of it cannot be read, or a lot has changed since.
 pub fn drive_again(run: &Path, round: u32, drive: u32) -> anyhow::Result<(Arc<Map>, Rollouts)> {
     let settings = trained::settings_of(run)?;
     ensure!(round <= TRIAL_MAX, "round {round}: there are 0 to {TRIAL_MAX}");
@@ -113,6 +114,7 @@ pub fn drive_again(run: &Path, round: u32, drive: u32) -> anyhow::Result<(Arc<Ma
     ensure!(is_there, "round {round}: {} has no such round", run.display());
     let novice = (round > 0).then(|| Learned::of_round(&settings.dagger, &store, round)).transpose()?;
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
+    Manifest::read(run)?.check_some_inputs(&inputs::of(&lots, &[]))?;
     let mut episodes = episodes_of(&settings, &lots, round)?;
     let count = episodes.len();
     ensure!((drive as usize) < count, "drive {drive} of round {round}: it has {count} drives, counted from 0");
@@ -231,6 +233,8 @@ impl<'a> Monitor<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::manifest::Request;
+    use crate::test_runs;
     use policy::fit::Budget;
     use sim::driver::Source;
     use sim::vehicle::VehicleCommand;
@@ -284,8 +288,8 @@ mod tests {
         settings.dagger.cloning_budget = Budget::Steps(30);
         assert!(settings.dagger.disturbance.enabled);
         let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle).unwrap();
+        drop(RunDir::create(&test_runs::place(&run, false), &settings, &Request::default()).unwrap());
         let store = Store::open(&run).unwrap();
-        storage::sums::write(&run, "settings.toml", settings.to_toml().as_bytes()).unwrap();
         let mut hooks = Hooks {
             episodes: &mut |round| Ok(episodes_of(&settings, &lots, round)?),
             on_frame: &mut |_, _, _| {},

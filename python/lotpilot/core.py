@@ -143,7 +143,8 @@ class Arrays:
         self.states: Floats | None = np.zeros((count, 2), np.float32) if options.state else None
         """Speed and road-wheel angle."""
         self.views: Grids | None = np.zeros((count, VIEW_PIXELS, VIEW_PIXELS), np.uint8) if options.view else None
-        """The view that the grid is made of."""
+        """The view that the grid is made of, but where the sensor drops a frame: the grid of the tick before is repeated
+        then, and the view is that of the tick."""
         self.info: npt.NDArray[np.float64] = np.zeros((count, len(Cars.INFO)))
         """Columns ``Cars.INFO``."""
 
@@ -293,6 +294,13 @@ class Core:
         last = Arrays(self.count, self.options) if self.autoreset == "same_step" else None
         seen = Arrays(self.count, self.options)
         return seen, np.zeros(self.count), np.zeros(self.count, bool), np.zeros(self.count, bool), last
+
+
+def row(observation: Any, index: int) -> Any:
+    """What one car saw, copied out of what all of them did."""
+    if isinstance(observation, dict):
+        return {name: part[index].copy() for name, part in observation.items()}
+    return observation[index].copy()
 
 
 def _check(what: str, numbers: Sequence[int]) -> None:

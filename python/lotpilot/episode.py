@@ -56,6 +56,8 @@ class Episode:
             raise ValueError(f"no direction {direction!r}; there are forward and reverse")
         if len(lots([lot])) != 1:
             raise ValueError(f"{lot!r} stands for several lots; lotpilot.lots names them")
+        if not 0 <= trial < 2**20:
+            raise ValueError(f"trial {trial}: there are 0 to {2**20 - 1}")
         options = EnvOptions(
             lots=[lot],
             directions=direction,

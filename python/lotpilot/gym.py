@@ -15,7 +15,7 @@ from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from .core import Arrays, Core, EnvOptions, Floats, Grids
+from .core import Arrays, Core, EnvOptions, Floats, Grids, row
 
 PICTURE_PX = 500
 """Height of a picture, pixels; it is twice as wide."""
@@ -178,7 +178,7 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
             if ended.any():
                 final = np.full(self.num_envs, None, object)
                 for index in np.flatnonzero(ended):
-                    final[index] = _row(last.observation(), int(index))
+                    final[index] = row(last.observation(), int(index))
                 infos.update(final_obs=final, _final_obs=ended, final_info=self._infos(last, ended), _final_info=ended)
         return seen.observation(), rewards, terminated, truncated, infos
 
@@ -208,12 +208,6 @@ _AUTORESET = {
     AutoresetMode.SAME_STEP: "same_step",
     AutoresetMode.DISABLED: "disabled",
 }
-
-
-def _row(observation: Any, index: int) -> Any:
-    if isinstance(observation, dict):
-        return {name: part[index].copy() for name, part in observation.items()}
-    return observation[index].copy()
 
 
 def _first(observation: Any) -> Any:

@@ -178,12 +178,13 @@ def generate(
         Columns ``name``, ``path``, ``route_m`` and ``obstacles``, in the order of ``lotpilot.generate``.
 
     Raises:
-        ValueError: If nothing is named so, or a number is out of range.
+        ValueError: If nothing is named so, a number is out of range, or a lot would replace another one or what it is made of.
         ShardError: As ``evaluate``.
     """
     _check(shards, cpus, retries)
     out = Path(out)
     single = _native.lots(names(lots, "lots"))
+    _native.check_generate(single, seed, count, out)
     jobs = {f"{number}/{shards}": (single[number - 1 :: shards], seed, count) for number in range(1, shards + 1)}
     jobs = {number: job for number, job in jobs.items() if job[0]}
     drawn: dict[str, list[dict[str, Any]]] = {}
@@ -372,11 +373,13 @@ def _warn_of_other_functions(folder: Path, request: tables.Request) -> None:
             "choose another out",
             stacklevel=3,
         )
-    file.write_text(content.hexdigest(), encoding="utf-8")
+    # What the first shards were driven by: so shards of two functions are warned of each time.
+    if not (_is_claimed(folder) and file.exists()):
+        file.write_text(content.hexdigest(), encoding="utf-8")
 
 
 _FUNCTIONS = "functions.sha256"
-"""File with the digest of the functions that shards were last driven by."""
+"""File with the digest of the functions that the first shards were driven by."""
 
 
 def _claim(folder: Path, about: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from stable_baselines3.common.vec_env import VecEnv
 
-from .core import Core, EnvOptions, Floats, Grids
+from .core import Core, EnvOptions, Floats, Grids, row
 
 
 class LotVecEnv(VecEnv):
@@ -67,7 +67,7 @@ class LotVecEnv(VecEnv):
         dones = terminated | truncated
         infos = [self.core.info(last if dones[index] else seen, index) for index in range(self.num_envs)]
         for index in np.flatnonzero(dones):
-            infos[index]["terminal_observation"] = _row(last.observation(), int(index))
+            infos[index]["terminal_observation"] = row(last.observation(), int(index))
             infos[index]["TimeLimit.truncated"] = bool(truncated[index])
         return seen.observation(), rewards.astype(np.float32), dones, infos
 
@@ -104,9 +104,3 @@ class LotVecEnv(VecEnv):
         """None is."""
         chosen: Iterable[int] = self._get_indices(indices)
         return [False for _ in chosen]
-
-
-def _row(observation: Any, index: int) -> Any:
-    if isinstance(observation, dict):
-        return {name: part[index].copy() for name, part in observation.items()}
-    return observation[index].copy()

@@ -114,8 +114,9 @@ impl Course {
     /// The trial of an episode.
     pub(crate) fn trial(&self, seed: RootSeed, number: u64) -> Trial<'_> {
         let (lot, direction) = self.row(number);
-        let trials = self.trials.unwrap_or(TRIAL_MAX).min(TRIAL_MAX);
-        let index = (number / self.rows() % u64::from(trials)) as u32;
+        let all = u64::from(TRIAL_MAX) + 1; // counted from 0
+        let trials = self.trials.map_or(all, u64::from).min(all);
+        let index = (number / self.rows() % trials) as u32;
         Trial::of_evaluation(seed, &self.lots[lot], self.directions[direction], index)
     }
 

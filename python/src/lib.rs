@@ -44,7 +44,7 @@ mod _native {
     #[pymodule_export]
     use crate::guard::EpisodeEnded;
     #[pymodule_export]
-    use crate::lot::{Lot, drivers, generate, lots, settings};
+    use crate::lot::{Lot, check_generate, drivers, generate, lots, settings};
     #[pymodule_export]
     use crate::rate::{RustLoop, drive_digest};
 }

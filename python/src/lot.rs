@@ -9,13 +9,15 @@ use experiment::trials::{Purpose, Trial};
 use numpy::{Ix2, PyArray, PyArray1, PyArray3, PyArrayMethods as _, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use report::pictures::{self, lot};
+use report::drawn_lots::DrawnLots;
+use report::pictures::lot;
 use sim::geometry::Vec2;
+use sim::limits::TRIAL_MAX;
 use sim::map::Map;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A lot with the obstacles of one trial, in one direction.
 ///
@@ -49,6 +51,9 @@ impl Lot {
                 let problem = format!("{name:?} stands for {} lots; lotpilot.lots names them", lots.len());
                 return Err(PyValueError::new_err(problem));
             };
+            if trial > TRIAL_MAX {
+                return Err(PyValueError::new_err(format!("trial {trial}: there are 0 to {TRIAL_MAX}")));
+            }
             let direction = directions(direction).map_err(input)?[0];
             lot.check_direction(direction, &vehicle).map_err(input)?;
             let trial = Trial::of_evaluation(RootSeed(seed), lot, direction, trial);
@@ -170,6 +175,18 @@ pub(crate) fn settings(from: SettingsFrom) -> PyResult<String> {
     Ok(Settings::resolve(&from.into(), None).map_err(input)?.to_toml())
 }
 
+/// Refuses lots of which two would be one file of a folder, or that would replace what one is made of.
+#[pyfunction]
+pub(crate) fn check_generate(py: Python<'_>, names: Vec<String>, seed: u64, count: u32, out: PathBuf) -> PyResult<()> {
+    let settings = Settings::preset("default").map_err(input)?;
+    alone(py, || {
+        let lots = experiment::lots::Lot::parse_all(&names, &settings.episode.vehicle).map_err(input)?;
+        let trials = Trial::all(RootSeed(seed), Purpose::Pictures, &lots, count, &[Direction::Forward]);
+        let to = DrawnLots { out: &out, seed, count, overwrite: true };
+        to.ensure_free(&lots, &trials.collect::<Vec<_>>()).map_err(input)
+    })
+}
+
 /// Draws lots: name, TOML and PNG of each, route in metres and number of obstacles. With `out`, TOML and PNG are files
 /// there, and what is returned instead of their content are their paths.
 #[pyfunction]
@@ -184,24 +201,17 @@ pub(crate) fn generate(
 ) -> PyResult<Vec<(String, String, String, f32, usize)>> {
     let settings = Settings::preset("default").map_err(input)?;
     let vehicle = &settings.episode.vehicle;
+    let to = DrawnLots { out: out.as_deref().unwrap_or(Path::new("")), seed, count, overwrite };
     let draw = |trial: &Trial<'_>| {
-        let name = match (trial.lot.is_drawn_per_trial(), count) {
-            (false, _) => trial.lot.name().to_owned(),
-            (true, 1) => format!("{}-s{seed}", trial.lot.name()),
-            (true, _) => format!("{}-s{seed}-{}", trial.lot.name(), trial.index + 1),
-        };
-        let name = pictures::file_name(&name);
+        let name = to.name(trial);
         let mut scenario = trial.lot.draw(trial.seed).scenario;
         scenario.name.clone_from(&name);
         let text = scenarios::load::to_toml(&scenario);
         let map = Map::build(scenario, vehicle)?;
         let (length_m, obstacles) = (map.path().length_m(), map.scenario().obstacles.len());
         let place = match &out {
-            Some(out) => {
-                let [toml, png] = ["toml", "png"].map(|extension| out.join(format!("{name}.{extension}")));
-                for path in [&toml, &png] {
-                    anyhow::ensure!(overwrite || !path.exists(), "{}: exists already", path.display());
-                }
+            Some(_) => {
+                let [toml, png] = to.files(&name);
                 storage::whole::write(&png, &lot::top_view(&map, vehicle, None)?.to_png()?)?;
                 storage::whole::write(&toml, text.as_bytes())?;
                 toml.display().to_string()
@@ -217,10 +227,12 @@ pub(crate) fn generate(
             let problem = format!("count: {:?} has the same obstacles in every drawing", fixed.name());
             return Err(PyValueError::new_err(problem));
         }
+        let trials = Trial::all(RootSeed(seed), Purpose::Pictures, &lots, count, &[Direction::Forward]);
+        let trials: Vec<_> = trials.collect();
         if let Some(out) = &out {
+            to.ensure_free(&lots, &trials).map_err(input)?;
             std::fs::create_dir_all(out)?;
         }
-        let trials = Trial::all(RootSeed(seed), Purpose::Pictures, &lots, count, &[Direction::Forward]);
-        trials.map(|trial| draw(&trial).map_err(input)).collect()
+        trials.iter().map(|trial| draw(trial).map_err(input)).collect()
     })
 }

@@ -88,6 +88,34 @@ def test_a_driver_that_remembers_is_told_which_car_it_drives():
     assert driver.cars == {0, 1} and driver.resets >= 2
 
 
+def test_a_function_that_raises_while_causes_are_explained_leaves_no_finished_evaluation(tmp_path):
+    calls = {"all": 0, "allowed": 10**9}
+
+    def straight(grids):
+        calls["all"] += 1
+        if calls["all"] > calls["allowed"]:
+            raise RuntimeError("out of luck")
+        return np.tile([8.0, 0.0], (len(grids), 1))
+
+    where = {"trials": 1, "directions": "forward", "overrides": SHORT}
+    assert lotpilot.evaluate({"straight": straight}, "lot-b", out=tmp_path / "whole", **where).runs["near_collisions"][0] > 0
+    # The drive alone takes a call per tick; what follows explains its near-collisions.
+    calls["all"], calls["allowed"] = 0, int(4.0 / 0.05) + 1
+    with pytest.raises(RuntimeError, match="out of luck"):
+        lotpilot.evaluate({"straight": straight}, "lot-b", out=tmp_path / "cut", **where)
+    assert (tmp_path / "whole" / "finished.toml").exists() and not (tmp_path / "cut" / "finished.toml").exists()
+
+
+def test_a_lot_is_never_drawn_over_the_file_that_it_is_made_of(tmp_path):
+    (path,) = lotpilot.generate("lot-b", out=tmp_path)["path"]
+    mine = Path(path)
+    text = mine.read_text()
+    for overwrite in (False, True):
+        with pytest.raises(ValueError, match="what the lot is made of|exists already"):
+            lotpilot.generate(str(mine), out=tmp_path, overwrite=overwrite)
+    assert mine.read_text() == text
+
+
 def test_functions_are_judged_together_as_trainings_of_one_method():
     mine = {f"mine-{left}": (lambda grids, left=left: np.tile([8.0, left], (len(grids), 1))) for left in (-1.0, 0.0, 1.0)}
     tables = lotpilot.evaluate(mine, "test:8", trials=1, overrides=SHORT, methods={"mine": list(mine)})
@@ -247,6 +275,8 @@ def test_settings_are_those_of_the_command_line():
         (lambda: lotpilot.Episode(action="gas"), ValueError, "look_ahead and steering"),
         (lambda: lotpilot.Episode(overrides=["episode.nothing=1"]), ValueError, "no key"),
         (lambda: lotpilot.Lot("no/such.toml"), ValueError, "no/such.toml"),
+        (lambda: lotpilot.Lot("lot-b", trial=2**20), ValueError, "0 to 1048575"),
+        (lambda: lotpilot.Episode("lot-b", trial=2**20), ValueError, "0 to 1048575"),
         (lambda: lotpilot.evaluate("exprt", "lot-b"), ValueError, "there are expert"),
         (lambda: lotpilot.evaluate(["expert", "expert"], "lot-b"), ValueError, "named twice"),
         (lambda: lotpilot.evaluate("expert", "lot-b", methods={"mine": ["a", "b", "c"]}), ValueError, "no driver is named"),

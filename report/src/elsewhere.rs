@@ -16,6 +16,8 @@ use sim::seed::RootSeed;
 pub struct Row {
     /// Kind of lot, or `all`.
     pub lots: String,
+    /// Whether a driver was trained on lots of this kind and name.
+    pub trained_on: bool,
     /// Who drove.
     pub driver: String,
     /// Sum of the routes, metres.
@@ -35,11 +37,13 @@ pub struct Row {
 
 /// The rows of an evaluation at its first noise level, kind by kind, driver by driver; `seed` is that of its trials.
 pub fn rows(results: &EvaluationResults, drivers: &[&str], seed: RootSeed) -> Vec<Row> {
+    let is_trained_on = |label: &str| results.groups().iter().any(|lots| lots.is_trained_on && lots.name == label);
     let row = |slice: &Slice, driver: usize, estimate: &DriverEstimate| {
         let totals = results.totals(0, driver, slice, None);
         let Totals { reference_m, near_collisions, contacts, stuck, clearance_min_m, .. } = totals;
         Row {
             lots: slice.label.clone(),
+            trained_on: is_trained_on(&slice.label),
             driver: drivers[driver].to_owned(),
             route_m: reference_m,
             near_collisions,
@@ -73,7 +77,8 @@ fn table(rows: &[Row], drivers: &[&str]) -> Table {
     header.extend(drivers.last().map(|driver| format!("{driver} per 100 m [95 %]")));
     let mut table = with_header(header);
     for of_lots in rows.chunks(drivers.len()) {
-        let mut cells = vec![of_lots[0].lots.clone(), format!("{:.0} m", of_lots[0].route_m)];
+        let mark = if of_lots[0].trained_on { " (trained on)" } else { "" };
+        let mut cells = vec![format!("{}{mark}", of_lots[0].lots), format!("{:.0} m", of_lots[0].route_m)];
         cells.extend(of_lots.iter().map(|row| {
             let least = row.least_clearance_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2}"));
             format!("{} ({}; {least})", row.near_collisions, row.contacts)

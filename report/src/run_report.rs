@@ -14,7 +14,6 @@ use anyhow::Context as _;
 use evaluation::calibration::{self, AxisCalibration};
 use evaluation::names::BC;
 use evaluation::records::{self, Driven, FailureRecord, RunRecord};
-use evaluation::statistics::poisson::DISPERSION_MAX;
 use evaluation::summary::{Row, SweepRow, Tables};
 use evaluation::table1::Table1;
 use experiment::lots::ALL;
@@ -226,7 +225,7 @@ fn headline(evaluation: &Evaluation, noise: NoiseChoice) -> String {
         glossary::SAFE_RATIO.link("safe ratio"),
     );
     for row in evaluation.pooled_rows(noise) {
-        let [lower, upper] = interval(row);
+        let [lower, upper] = row.quoted_interval();
         let clearance = row.clearance_min_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2}"));
         let _ = writeln!(
             text,
@@ -305,15 +304,6 @@ fn calibration_caption(axes: &[AxisCalibration]) -> String {
     text
 }
 
-/// The interval that may be quoted, as in the tables.
-fn interval(row: &Row) -> [f64; 2] {
-    let is_clustered = row.dispersion.is_some_and(|index| index > DISPERSION_MAX);
-    match (row.bootstrap_lower, row.bootstrap_upper) {
-        (Some(lower), Some(upper)) if is_clustered => [lower, upper],
-        _ => [row.garwood_lower, row.garwood_upper],
-    }
-}
-
 fn add_evaluation(page: &mut Page, evaluation: &Evaluation) {
     page.section("Evaluation", "");
     let (drivers, levels) = (evaluation.drivers(), evaluation.levels());
@@ -389,7 +379,7 @@ fn pooled_rates(evaluation: &Evaluation, noise: NoiseChoice, drivers: &[&str]) -
 
 fn rate_row(row: &Row, name: String, drivers: &[&str]) -> RateRow {
     let group = drivers.iter().position(|driver| *driver == row.driver).unwrap_or(0);
-    RateRow { name, per_100m: row.per_100m, interval: interval(row), group }
+    RateRow { name, per_100m: row.per_100m, interval: row.quoted_interval(), group }
 }
 
 fn noise_series(evaluation: &Evaluation, drivers: &[&str]) -> Vec<RateSeries> {

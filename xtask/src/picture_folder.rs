@@ -1,46 +1,10 @@
 //! The folder that pictures are written into.
 
 use crate::output::Output;
-use anyhow::{Context as _, bail, ensure};
-use experiment::lots::Lot;
+use anyhow::{Context as _, ensure};
 use report::pictures::drawing::Drawing;
 use report::pictures::file_name;
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-
-/// Where the files lie that lots are made of.
-pub(crate) fn made_of(lots: &[Lot]) -> anyhow::Result<BTreeSet<PathBuf>> {
-    let files = lots.iter().flat_map(Lot::files);
-    files.map(|file| storage::place_of(file).with_context(|| file.display().to_string())).collect()
-}
-
-/// Refuses to write over one of these, however it is named.
-pub(crate) fn ensure_apart_from(places: &BTreeSet<PathBuf>, files: &[PathBuf]) -> anyhow::Result<()> {
-    // Of generated lots nothing is looked up, of which there may be a million.
-    for file in files.iter().filter(|_| !places.is_empty()) {
-        ensure!(
-            !places.contains(&storage::place_of(file).with_context(|| file.display().to_string())?),
-            "{}: what the lot is made of lies there under that name; choose another --out",
-            file.display()
-        );
-    }
-    Ok(())
-}
-
-/// Refuses lots of which two would be one file: each with the name of its file, without the extension that all share.
-pub(crate) fn ensure_files_differ<'a>(
-    files: impl IntoIterator<Item = (String, &'a str)>,
-    extension: &str,
-) -> anyhow::Result<()> {
-    let mut taken = BTreeMap::new();
-    for (file, lot) in files {
-        // Some file systems take no notice of capitals.
-        if let Some(other) = taken.insert(file.to_lowercase(), lot) {
-            bail!("lots {other:?} and {lot:?} would both be {file}.{extension}; write them into two folders");
-        }
-    }
-    Ok(())
-}
 
 /// Where pictures go.
 pub(crate) struct Folder<'a> {

@@ -51,7 +51,8 @@ pub(crate) fn discrepancies(samples: &[Sample], network: &mut Ensemble) -> Vec<f
 }
 
 /// `discount` to the power of the ticks until the next near-collision of the episode; 0 if none follows. Between ticks that
-/// follow each other more time passes than a control period exactly where the car was stopped and put back.
+/// follow each other more time passes than a control period exactly where the car was stopped and put back. A near-collision
+/// that ends a drive has no tick after it, and is not seen.
 fn risks(ticks: &[Tick], discount: f32, control_period_s: f32) -> Vec<f32> {
     let mut risks = vec![0.0; ticks.len()];
     let mut next_stop: Option<(u32, u32)> = None;

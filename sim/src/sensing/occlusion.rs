@@ -443,7 +443,9 @@ mod tests {
         let camera = Vec2::new(CAMERA.ahead_m, 0.0);
         let wall = rectangle(Pose::new(Vec2::new(2.0, 1.8), 0.02), 25.0, 0.2).to_vec();
         let car = rectangle(Pose::new(Vec2::new(2.5, -2.6), -0.05), 4.7, 1.9).to_vec();
-        let octagon = |centre: Vec2| (0..8).map(move |k| centre + 0.4 * crate::maths::unit(0.3 + k as f32 * 0.7854));
+        let octagon = |centre: Vec2| {
+            (0..8).map(move |k| centre + 0.4 * crate::maths::unit(0.3 + k as f32 * std::f32::consts::FRAC_PI_4))
+        };
         let round = octagon(Vec2::new(CAMERA.ahead_m + 0.33, 1.4)).collect::<Vec<_>>();
         for outline in [wall, car, round] {
             assert!(crate::geometry::bounds(&outline).0.x < camera.x, "it reaches back");

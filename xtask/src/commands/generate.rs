@@ -4,7 +4,6 @@ use super::render::check_scale;
 use crate::args::lot_name;
 use crate::console::Console;
 use crate::output::Output;
-use crate::picture_folder;
 use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 use experiment::lots::Lot;
@@ -14,7 +13,8 @@ use experiment::settings::NoiseChoice;
 use experiment::shard::Shard;
 use experiment::trials::{Purpose, Trial};
 use rayon::prelude::*;
-use report::pictures::{self, lot};
+use report::drawn_lots::DrawnLots;
+use report::pictures::lot;
 use scenarios::import::{self, MapLot};
 use sim::limits::TRIAL_MAX;
 use sim::map::Map;
@@ -122,7 +122,7 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
             .filter(|(index, _)| args.shard.is_none_or(|shard| shard.takes(*index)))
             .map(|(_, trial)| trial)
             .collect();
-    ensure_free(args, &lots, &trials)?;
+    drawn_lots(args).ensure_free(&lots, &trials)?;
     let console = Console::new(output);
     console.begin("generating", "generating");
     let mut made = Vec::new();
@@ -179,36 +179,8 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
     Ok(vec![Lot::of_map(path, &lot, vehicle).context("with the flags that are given")?])
 }
 
-/// Name of the files of a lot, without an extension.
-fn file_name(args: &GenerateArgs, trial: &Trial<'_>) -> String {
-    let name = match (trial.lot.is_drawn_per_trial(), args.count) {
-        (false, _) => trial.lot.name().to_owned(),
-        (true, 1) => format!("{}-s{}", trial.lot.name(), args.seed),
-        (true, _) => format!("{}-s{}-{}", trial.lot.name(), args.seed, trial.index + 1),
-    };
-    pictures::file_name(&name)
-}
-
-fn files(args: &GenerateArgs, name: &str) -> [PathBuf; 2] {
-    ["toml", "png"].map(|extension| args.out.join(format!("{name}.{extension}")))
-}
-
-/// Refuses lots whose files are there, or would be those of another one, before the first is written.
-fn ensure_free(args: &GenerateArgs, lots: &[Lot], trials: &[Trial<'_>]) -> anyhow::Result<()> {
-    let made_of = picture_folder::made_of(lots)?;
-    picture_folder::ensure_files_differ(trials.iter().map(|trial| (file_name(args, trial), trial.lot.name())), "toml")?;
-    for trial in trials {
-        let files = files(args, &file_name(args, trial));
-        picture_folder::ensure_apart_from(&made_of, &files)?;
-        for path in files {
-            ensure!(
-                args.overwrite || !path.exists(),
-                "{}: exists already; choose another --out or --seed, or replace it with --overwrite",
-                path.display()
-            );
-        }
-    }
-    Ok(())
+fn drawn_lots(args: &GenerateArgs) -> DrawnLots<'_> {
+    DrawnLots { out: &args.out, seed: args.seed, count: args.count, overwrite: args.overwrite }
 }
 
 struct Made {
@@ -217,8 +189,8 @@ struct Made {
 }
 
 fn write(args: &GenerateArgs, trial: &Trial<'_>) -> anyhow::Result<Made> {
-    let name = file_name(args, trial);
-    let [toml, png] = files(args, &name);
+    let name = drawn_lots(args).name(trial);
+    let [toml, png] = drawn_lots(args).files(&name);
     let mut drawn = trial.lot.draw(trial.seed);
     // The file is a lot of its own, told apart from its siblings in tables.
     drawn.scenario.name.clone_from(&name);

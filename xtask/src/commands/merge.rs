@@ -77,7 +77,7 @@ pub(crate) fn run(args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
         args.folders[0].display(),
         networks.display()
     );
-    drives(&shards, networks, output)
+    drives(&shards, networks, args, output)
 }
 
 fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
@@ -92,7 +92,7 @@ fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Res
     let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
     let seed = settings.evaluation.seed.0;
     let run = RunDir::create(&args.out.place(evaluate::COMMAND, &manifest.preset, seed), settings, &request)?;
-    put_together(&plan, &rows, &run, output)
+    put_together(&plan, &rows, &run, args, output)
 }
 
 fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
@@ -128,14 +128,15 @@ fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> 
     };
     let place = args.out.place(evaluate::COMMAND, &made.preset, settings.evaluation.seed.0);
     let run = RunDir::create(&Place { build: &build, ..place }, settings, &request)?;
-    put_together(&plan, &rows, &run, output)
+    put_together(&plan, &rows, &run, args, output)
 }
 
-/// Finishes an evaluation whose rows are known. From here on it is one like any other, which `evaluate --resume` finishes if
-/// this is interrupted.
-fn put_together(plan: &Plan<'_>, rows: &Rows, run: &RunDir, output: &Output) -> anyhow::Result<()> {
-    interrupt::can_resume(evaluate::COMMAND, run.path());
+/// Finishes an evaluation whose rows are known. Once they are written it is one like any other, which `evaluate --resume`
+/// finishes if this is interrupted; before, that would drive them all again.
+fn put_together(plan: &Plan<'_>, rows: &Rows, run: &RunDir, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
+    interrupt::goes_on_with(&format!("{} --overwrite", again(args, run)));
     rows.write(run)?;
+    interrupt::can_resume(evaluate::COMMAND, run.path());
     evaluate::finish(plan, run, &Console::new(output), output)
 }
 
@@ -160,8 +161,7 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
             RunDir::create(&Place { build: &build, ..place }, settings, &request)?
         }
     };
-    let named: Vec<String> = args.folders.iter().map(|shard| shard.display().to_string()).collect();
-    interrupt::goes_on_with(&format!("merge {} --out {}", named.join(" "), run.path().display()));
+    interrupt::goes_on_with(&again(args, &run));
     for (folder, path) in &trained {
         if !sums::is_listed(run.path(), &format!("{folder}/{}", sums::FILE))? {
             sums::copy_folder(path, run.path(), folder)?;
@@ -177,7 +177,7 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
 }
 
 /// Adds what the shards drove to the run whose networks drove, and finishes it.
-fn drives(shards: &Shards, networks: &Path, output: &Output) -> anyhow::Result<()> {
+fn drives(shards: &Shards, networks: &Path, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let (run, settings, manifest) = RunDir::resume(networks, reproduce::COMMAND)?;
     let remedy = format!("make them again with --networks {}", networks.display());
     shards.check_are_of(networks, &settings, &manifest, &remedy)?;
@@ -193,15 +193,27 @@ fn drives(shards: &Shards, networks: &Path, output: &Output) -> anyhow::Result<(
             merged.push((stage, parts.rows(&DriveStage::load(stage)?.plan())?));
         }
     }
-    interrupt::can_resume(reproduce::COMMAND, run.path());
+    // Resumed before all of it is written, the run would drive the rest itself.
+    interrupt::goes_on_with(&format!("merge {}", named(args)));
     for (stage, rows) in merged {
         let place = perform::place_of(reproduce::COMMAND, &stage.settings);
         if let Some(driven) = run.stage(&stage.folder, &place, &stage.settings)? {
             rows.write(&driven)?;
         }
     }
+    interrupt::can_resume(reproduce::COMMAND, run.path());
     // They count as driven now; tables and the rest of the run are made as on one machine.
     reproduce::finish(&run, settings, extent, output)
+}
+
+/// The shards as they were named.
+fn named(args: &MergeArgs) -> String {
+    args.folders.iter().map(|shard| shard.display().to_string()).collect::<Vec<_>>().join(" ")
+}
+
+/// The command that puts them together again.
+fn again(args: &MergeArgs, run: &RunDir) -> String {
+    format!("merge {} --out {}", named(args), run.path().display())
 }
 
 /// The command line of a shard without what concerns the shard alone.

@@ -17,7 +17,7 @@ use experiment::progress::{Interrupted, Progress as _};
 use experiment::run_dir::{Place, RunDir};
 use experiment::settings::Settings;
 use policy::dataset::store::Store;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use storage::sums;
 
 /// Does every stage of a run that is not done yet.
@@ -117,13 +117,7 @@ fn ensure_driven_by(stage: &Stage, root: &RunDir) -> anyhow::Result<()> {
     let Some(Outcome::Evaluation { drivers: found }) = found else {
         bail!("{}: this is not an evaluation", stage.folder)
     };
-    // The run may have been moved since: its own networks are known by where they lie in it.
-    let is_same = |(found, (_, wanted)): (&String, &(String, String))| {
-        let path_of = |spec: &str| spec.strip_prefix("run:").map(PathBuf::from);
-        let own = path_of(wanted).and_then(|path| path.strip_prefix(root.path()).ok().map(Path::to_path_buf));
-        let own = own.filter(|own| !own.as_os_str().is_empty());
-        found == wanted || own.zip(path_of(found)).is_some_and(|(own, found)| found.ends_with(own))
-    };
+    let is_same = |(found, (_, wanted)): (&String, &(String, String))| is_same_driver(found, wanted, root.path());
     ensure!(
         found.len() == drivers.len() && found.iter().zip(drivers).all(is_same),
         "{}: another version of lotpilot drove other drivers there; finish the run with the one that began it, or begin again \
@@ -131,6 +125,17 @@ fn ensure_driven_by(stage: &Stage, root: &RunDir) -> anyhow::Result<()> {
         stage.folder
     );
     Ok(())
+}
+
+/// Whether a driver is the one that is wanted. The run may have been moved since: its own networks are known by where they
+/// lie in it.
+fn is_same_driver(found: &str, wanted: &str, root: &Path) -> bool {
+    let lies_alike = |kind: &str| {
+        let [found, wanted] = [found, wanted].map(|spec| spec.strip_prefix(kind).map(Path::new));
+        let own = wanted.and_then(|wanted| wanted.strip_prefix(root).ok()).filter(|own| !own.as_os_str().is_empty());
+        found.zip(own).is_some_and(|(found, own)| found.ends_with(own))
+    };
+    found == wanted || lies_alike("run:") || lies_alike("net:")
 }
 
 /// The settings of a stage, with what other stages decide of them.
@@ -175,4 +180,27 @@ fn take_over_cloning(from: &Path, run: &RunDir) -> anyhow::Result<()> {
     }
     ensure!(from.is_finished(&source)?, "{}: behaviour cloning is not finished there", source.display());
     Ok(sums::copy_folder(&source, run.path(), ROUND)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A network of a round of a run that was moved was taken for another driver.
+    #[test]
+    fn the_networks_of_a_run_that_was_moved_are_the_same_drivers() {
+        let is_same = |found: &str, wanted: &str| is_same_driver(found, wanted, Path::new("runs/b"));
+        assert!(is_same("run:runs/a/chains/s1", "run:runs/b/chains/s1"));
+        assert!(is_same("net:/old/runs/a/chains/s1/round-01", "net:runs/b/chains/s1/round-01"));
+        assert!(is_same("expert", "expert"));
+        for (found, wanted) in [
+            ("net:runs/a/chains/s1/round-02", "net:runs/b/chains/s1/round-01"),
+            ("run:runs/a/chains/s1", "net:runs/b/chains/s1"),
+            ("run:runs/a/chains/s2", "run:runs/b/chains/s1"),
+            ("run:runs/a", "run:runs/b"),
+            ("tentacle", "expert"),
+        ] {
+            assert!(!is_same(found, wanted), "{found} {wanted}");
+        }
+    }
 }

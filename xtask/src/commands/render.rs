@@ -7,7 +7,7 @@ use crate::args::{LayerArgs, lot_name};
 use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
-use crate::picture_folder::{self, Folder};
+use crate::picture_folder::Folder;
 use anyhow::{Context as _, ensure};
 use clap::{ArgGroup, Args, Subcommand, ValueEnum};
 use experiment::drive::Replay;
@@ -24,6 +24,7 @@ use experiment::trials::{Purpose, Trial};
 use policy::checkpoint::Checkpoint;
 use policy::dataset::store::Store;
 use rayon::prelude::*;
+use report::drawn_lots;
 use report::other_run::OtherRun;
 use report::pictures::file_name;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
@@ -229,11 +230,11 @@ fn render_lots(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> 
     check_scale(args.pixels_per_metre)?;
     let episode = Settings::preset("default")?.episode;
     let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
-    let made_of = picture_folder::made_of(&lots)?;
-    picture_folder::ensure_files_differ(lots.iter().map(|lot| (file_name(lot.name()), lot.name())), "png")?;
+    let made_of = drawn_lots::made_of(&lots)?;
+    drawn_lots::ensure_files_differ(lots.iter().map(|lot| (file_name(lot.name()), lot.name())), "png")?;
     for lot in &lots {
         folder.check(lot.name(), true)?;
-        picture_folder::ensure_apart_from(&made_of, &folder.files(lot.name(), true))?;
+        drawn_lots::ensure_apart_from(&made_of, &folder.files(lot.name(), true))?;
     }
     let console = Console::new(folder.output);
     console.begin("lots", "drawing lots");
@@ -258,7 +259,7 @@ fn contact_sheet(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()
     folder.check(NAME, true)?;
     let episode = Settings::preset("default")?.episode;
     let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
-    picture_folder::ensure_apart_from(&picture_folder::made_of(&lots)?, &folder.files(NAME, true))?;
+    drawn_lots::ensure_apart_from(&drawn_lots::made_of(&lots)?, &folder.files(NAME, true))?;
     contact_sheet::check(lots.len())?;
     let console = Console::new(folder.output);
     console.begin("lots", "drawing lots");

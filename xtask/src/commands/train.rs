@@ -169,7 +169,9 @@ fn check_elsewhere(
     let rows = report::elsewhere::rows(&results, &names, settings.evaluation.seed);
     let table = report::elsewhere::write(&rows, &names, run)?;
     let noise = &settings.evaluation.noise[0];
-    let text = || format!("\nElsewhere: lots that nobody trained on, noise {noise}\n\n{table}");
+    let which =
+        if rows.iter().any(|row| row.trained_on) { "not all of them unseen" } else { "lots that nobody trained on" };
+    let text = || format!("\nElsewhere: {which}, noise {noise}\n\n{table}");
     output.table(text, &rows)
 }
 

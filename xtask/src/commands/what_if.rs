@@ -3,7 +3,7 @@
 use crate::args::JsonArgs;
 use crate::console::Console;
 use crate::output::Output;
-use anyhow::{bail, ensure};
+use anyhow::ensure;
 use clap::Args;
 use evaluation::{avoidable, records};
 use experiment::progress::Interrupted;
@@ -44,10 +44,6 @@ pub(crate) fn run(args: &WhatIfArgs, output: &Output) -> anyhow::Result<()> {
     let Some(rows) = avoidable::of_evaluation(&args.folder, &settings, &args.drivers, &console)? else {
         return Err(Interrupted { kept: "nothing is written".to_owned() }.into());
     };
-    let fails_nowhere = |driver: &&String| !rows.iter().any(|row| row.driver == **driver);
-    if let Some(driver) = args.drivers.iter().find(fails_nowhere) {
-        bail!("{}: no near-collision of a driver {driver:?} is in it; its tables name them", args.folder.display());
-    }
     let text = || if rows.is_empty() { "no near-collisions".to_owned() } else { what_if::table(&rows).to_string() };
     output.table(text, &rows)
 }

@@ -1,0 +1,103 @@
+//! The files that drawn lots and their pictures are written to, and what they must not replace.
+
+use crate::pictures::file_name;
+use anyhow::{Context as _, bail, ensure};
+use experiment::lots::Lot;
+use experiment::trials::Trial;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Where lots are written to, one TOML and one PNG file each.
+#[derive(Debug, Clone, Copy)]
+pub struct DrawnLots<'a> {
+    /// The folder.
+    pub out: &'a Path,
+    /// Seed of their obstacles.
+    pub seed: u64,
+    /// Drawings of each lot.
+    pub count: u32,
+    /// Whether files of the same name are replaced.
+    pub overwrite: bool,
+}
+
+impl DrawnLots<'_> {
+    /// Name of the files of a lot, without an extension.
+    pub fn name(&self, trial: &Trial<'_>) -> String {
+        let name = match (trial.lot.is_drawn_per_trial(), self.count) {
+            (false, _) => trial.lot.name().to_owned(),
+            (true, 1) => format!("{}-s{}", trial.lot.name(), self.seed),
+            (true, _) => format!("{}-s{}-{}", trial.lot.name(), self.seed, trial.index + 1),
+        };
+        file_name(&name)
+    }
+
+    /// The TOML and the PNG file of a name.
+    pub fn files(&self, name: &str) -> [PathBuf; 2] {
+        ["toml", "png"].map(|extension| self.out.join(format!("{name}.{extension}")))
+    }
+
+    /// Refuses lots whose files are there, or would be those of another one or what a lot is made of: before the first is
+    /// written.
+    ///
+    /// # Errors
+    /// Naming the first such file.
+    pub fn ensure_free(&self, lots: &[Lot], trials: &[Trial<'_>]) -> anyhow::Result<()> {
+        let made_of = made_of(lots)?;
+        ensure_files_differ(trials.iter().map(|trial| (self.name(trial), trial.lot.name())), "toml")?;
+        for trial in trials {
+            let files = self.files(&self.name(trial));
+            ensure_apart_from(&made_of, &files)?;
+            for path in files {
+                ensure!(
+                    self.overwrite || !path.exists(),
+                    "{}: exists already; write into another folder, draw from another seed, or overwrite it",
+                    path.display()
+                );
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where the files lie that lots are made of.
+///
+/// # Errors
+/// If a path leads nowhere.
+pub fn made_of(lots: &[Lot]) -> anyhow::Result<BTreeSet<PathBuf>> {
+    let files = lots.iter().flat_map(Lot::files);
+    files.map(|file| storage::place_of(file).with_context(|| file.display().to_string())).collect()
+}
+
+/// Refuses to write over one of these, however it is named.
+///
+/// # Errors
+/// Naming the file.
+pub fn ensure_apart_from(places: &BTreeSet<PathBuf>, files: &[PathBuf]) -> anyhow::Result<()> {
+    // Of generated lots nothing is looked up, of which there may be a million.
+    for file in files.iter().filter(|_| !places.is_empty()) {
+        ensure!(
+            !places.contains(&storage::place_of(file).with_context(|| file.display().to_string())?),
+            "{}: what the lot is made of lies there under that name; write into another folder",
+            file.display()
+        );
+    }
+    Ok(())
+}
+
+/// Refuses lots of which two would be one file: each with the name of its file, without the extension that all share.
+///
+/// # Errors
+/// Naming both lots and the file.
+pub fn ensure_files_differ<'a>(
+    files: impl IntoIterator<Item = (String, &'a str)>,
+    extension: &str,
+) -> anyhow::Result<()> {
+    let mut taken = BTreeMap::new();
+    for (file, lot) in files {
+        // Some file systems take no notice of capitals.
+        if let Some(other) = taken.insert(file.to_lowercase(), lot) {
+            bail!("lots {other:?} and {lot:?} would both be {file}.{extension}; write them into two folders");
+        }
+    }
+    Ok(())
+}
