@@ -54,7 +54,8 @@ struct Failing {
 /// drivers named, or of all. Rows are in the order of the evaluation. `None` if cancelled.
 ///
 /// # Errors
-/// If the folder holds no finished evaluation, or no near-collision of a driver named; if a lot or a driver has changed since, or a run is not what was recorded.
+/// If the folder holds no finished evaluation, or no near-collision of a driver named; if a lot or a driver has changed
+/// since, or a run is not what was recorded.
 pub fn of_evaluation(
     folder: &Path,
     settings: &Settings,

@@ -147,6 +147,22 @@ mod tests {
         assert!(!knows(14.0, 4.0) && !knows(14.0, 2.1) && knows(14.0, 1.5), "behind the car and past it");
     }
 
+    /// A wall that reaches back beside the camera hid nothing, though the sensor shows what is behind it as hidden.
+    #[test]
+    fn a_wall_beside_the_camera_hides_what_is_behind_it() {
+        let wall = Obstacle {
+            length_m: Some(25.0),
+            width_m: Some(0.2),
+            height_m: Some(3.0),
+            ..Obstacle::new(ObstacleClass::Wall, Pose::new(Vec2::new(2.0, 1.8), 0.0))
+        };
+        let scenario = Scenario::lane(-40.0..=40.0, 40.0, -20.0..=20.0).with_obstacles([wall]);
+        let map = Map::build(scenario, &sim::vehicle::VehicleSettings::hyundai_hg300()).unwrap();
+        let sight = LineOfSight::new(Sees::PatchOnly, &map, Pose::default(), &SensingSettings::paper());
+        assert!(!sight.knows(Vec2::new(6.0, 4.0)) && !sight.knows(Vec2::new(12.0, 3.0)), "behind the wall");
+        assert!(sight.knows(Vec2::new(6.0, 1.0)) && sight.knows(Vec2::new(12.0, -4.0)), "before it");
+    }
+
     #[test]
     fn ground_is_hidden_from_the_camera_of_the_sensor() {
         let paper = SensingSettings::paper();

@@ -36,7 +36,7 @@ pub const LEAST_CLEARANCE: Term = term(
     "least-clearance",
     "Least clearance",
     "The smallest distance between the body of the car and ground it cannot drive on, over all runs. Negative: how deep the \
-     body was in it.",
+     body was in it. Right to some 5 cm beside corners.",
 );
 /// How much room a driver keeps.
 pub const SAFE_RATIO: Term = term(

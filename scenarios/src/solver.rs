@@ -543,6 +543,20 @@ mod tests {
         VehicleSettings::hyundai_hg300()
     }
 
+    /// A wall square behind the rear bumper counted as a collision up to 0.46 m away.
+    #[test]
+    fn a_car_may_stand_with_its_tail_near_a_wall() {
+        let scene = Scene::new(&lane(6.0, &[]));
+        let footprint = Footprint::new(&car(), 0.25);
+        let with_tail_at = |metres: f32| Pose::new(Vec2::new(car().rear_overhang_m + metres, 0.0), 0.0);
+        for metres in [0.27, 0.3, 0.4, 0.5, 0.7, 1.0, 2.0] {
+            assert!(footprint.is_free(&scene, with_tail_at(metres)), "{metres} m behind the bumper");
+        }
+        for metres in [-0.1, 0.1, 0.23] {
+            assert!(!footprint.is_free(&scene, with_tail_at(metres)), "{metres} m behind the bumper");
+        }
+    }
+
     /// A straight lane of a width, 70 m long, driven from x = 10 to x = 50.
     fn lane(width_m: f32, obstacles: &[(ObstacleClass, f32, f32)]) -> Scenario {
         let things =

@@ -505,6 +505,22 @@ mod tests {
         assert_eq!(validate(&lane(), &VehicleSettings::hyundai_hg300()), Ok(()));
     }
 
+    /// In products of such coordinates nothing is left of half a square metre.
+    #[test]
+    fn a_pillar_far_from_the_origin_is_accepted() {
+        let mut far = lane();
+        far.islands.push(island(&[(24.0, 2.0), (24.7, 2.0), (24.7, 2.7), (24.0, 2.7)]));
+        far.speed_bumps.clear();
+        far.obstacles.clear();
+        let by = Vec2::new(4500.3, 4000.7);
+        let outlines =
+            std::iter::once(&mut far.boundary).chain(far.islands.iter_mut().map(|island| &mut island.polygon));
+        outlines.flatten().chain(&mut far.reference_path.points).for_each(|point| *point += by);
+        assert_eq!(validate(&far, &VehicleSettings::hyundai_hg300()), Ok(()));
+        let area_m2 = signed_area_m2(&far.islands[0].polygon);
+        assert!((area_m2 - 0.49).abs() < 0.01, "{area_m2}");
+    }
+
     #[test]
     fn every_fault_is_named_with_its_place_value_and_remedy() {
         type Break = fn(&mut Scenario);
@@ -533,6 +549,10 @@ mod tests {
                 "boundary: the outline encloses 0.0002 m²; spread the vertices out",
             ),
             (|s| s.islands.push(island(&[(8.0, 1.0), (9.0, 1.0)])), "island 1: 2 vertices"),
+            (
+                |s| s.islands.push(island(&[(6.9, 0.4), (7.1, 0.4), (7.1, 0.6), (6.9, 0.6)])),
+                "reference_path, point 1: the car (4.91 m × 1.86 m) does not fit at the start",
+            ),
             (
                 |s| s.islands.push(island(&[(8.0, 2.0), (9.0, 2.0), (9.0, 4.0)])),
                 "island 1: its vertex 3, (9.00, 4.00), lies outside",

@@ -37,6 +37,24 @@ fn constant_steering_drives_a_circle_of_radius_l_over_tan_delta() {
     }
 }
 
+/// At 4500 m a step of 5 mm is 20 units in the last place along the way, and across it less than one: the car went straight on.
+#[test]
+fn far_from_the_origin_a_car_drives_the_same_way() {
+    let drive_from = |origin: Vec2, heading_rad: f32, speed_mps: f32| {
+        let start = VehicleState { speed_mps, ..VehicleState::at_rest(Pose::new(origin, heading_rad)) };
+        let command = VehicleCommand { steering_rad: 0.0, speed_mps };
+        drive(start, command, 20.0 / speed_mps).pose.position() - origin
+    };
+    for (heading_deg, speed_mps) in [(2.5_f32, 0.5), (0.5, 2.0), (1.0, 0.5)] {
+        let heading_rad = heading_deg.to_radians();
+        let exact = 20.0 * maths::unit(heading_rad);
+        for origin in [Vec2::ZERO, Vec2::new(250.0, 40.0), Vec2::new(3000.0, -2000.0), Vec2::new(4500.0, 8000.0)] {
+            let driven = drive_from(origin, heading_rad, speed_mps);
+            assert!(driven.distance(exact) < 5e-3, "{driven} instead of {exact} from {origin}");
+        }
+    }
+}
+
 #[test]
 fn the_wheels_turn_no_faster_than_their_rate() {
     let command = VehicleCommand { steering_rad: 0.5, speed_mps: 0.0 };

@@ -192,6 +192,57 @@ fn high_walls_hide_what_no_line_of_sight_reaches_and_low_ones_nothing() {
     assert!(wrong < 20, "{wrong} pixels are judged otherwise, of {hidden} hidden ones");
 }
 
+/// Openings in walls as high as a house, whose outlines are lines and no ground.
+#[test]
+fn noise_opens_kerbs_and_no_walls() {
+    let only_openings = NoiseSettings {
+        boundary: 0.0,
+        shadow: 0.0,
+        speed_bump: 0.0,
+        false_free: 8.0,
+        blob: 0.0,
+        stain: 0.0,
+        flicker: 0.0,
+        dropout: 0.0,
+        ..NoiseSettings::of(NoiseLevel::Paper)
+    };
+    let n_opened = |boundary_height_m: f32, island_height_m: f32| {
+        let mut scenario = Scenario::lane(-10.0..=90.0, 12.0, 0.0..=60.0);
+        scenario.boundary_height_m = boundary_height_m;
+        let polygon = sim::geometry::rectangle(Pose::new(Vec2::new(30.0, 3.0), 0.0), 50.0, 2.0).to_vec();
+        scenario.islands = vec![Island { polygon, height_m: island_height_m }];
+        let map = Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap();
+        let settings = SensingSettings { occlusion: false, ..SensingSettings::paper() };
+        let sensor = Sensor::new(&map, settings, &only_openings, RootSeed(7));
+        let n_opened_at = |x_m: f32| {
+            let pose = Pose::new(Vec2::new(x_m, 0.0), 0.0);
+            let [noisy, clean] = [sensor.perceived_view(&map, pose, 3), sensor.clean_view(&map, pose)]
+                .map(|view| view.to_grid().count_occupied());
+            clean - noisy
+        };
+        [0.0, 10.0, 20.0, 30.0, 40.0].map(n_opened_at).into_iter().sum::<u32>()
+    };
+    assert!(n_opened(0.0, 0.15) > 8, "kerbs are opened: {}", n_opened(0.0, 0.15));
+    assert_eq!(n_opened(2.0, 2.0), 0, "walls are not");
+    assert!((1..n_opened(0.0, 0.15)).contains(&n_opened(0.0, 2.0)), "the boundary beside a high island is");
+}
+
+/// Between the camera and a patch that is small and far ahead nothing was looked at.
+#[test]
+fn what_stands_before_the_patch_hides_ground_in_it() {
+    let geometry = GridGeometry { side_m: 4.0, near_edge_ahead_m: 10.0 };
+    let n_occupied = |things: Vec<Obstacle>| {
+        let scenario = Scenario::lane(-40.0..=60.0, 30.0, -20.0..=40.0).with_obstacles(things);
+        let map = Map::build(scenario, &VehicleSettings::hyundai_hg300()).unwrap();
+        let settings = SensingSettings { geometry, ..SensingSettings::paper() };
+        let sensor = Sensor::new(&map, settings, &NoiseSettings::of(NoiseLevel::Clean), RootSeed(0));
+        sensor.clean_view(&map, Pose::default()).to_grid().count_occupied()
+    };
+    // Lines of sight at a slope of 0.12 to 0.2 meet it, and the patch at 1.0 to 2.0 m to the left.
+    let pillar = Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(6.0, 0.8), 0.0));
+    assert!(n_occupied(Vec::new()) == 0 && n_occupied(vec![pillar]) > 10);
+}
+
 /// Errors belong to places: the misread ground stays where it is while the car drives by.
 #[test]
 fn a_shadow_stays_where_it_is_while_the_car_drives_by() {

@@ -11,7 +11,7 @@ use std::ops::Range;
 
 /// Longest occlusion, as a multiple of the range: from 2 m on it leaves the patch.
 const FACTOR_MAX: f32 = 12.0;
-/// Corners a polygon may have; an octagon's shadow has ten.
+/// Corners a polygon may have; the shadow of an octagon that is cut has eleven.
 const CORNERS_MAX: usize = 12;
 /// What is not this far ahead of the camera hides nothing, metres.
 const AHEAD_MIN_M: f32 = 0.05;

@@ -102,7 +102,7 @@ pub(crate) struct MethodArgs {
     /// theirs (`*` stands for anything but a slash, `?` for one character); may be repeated. Trainings (`run:DIR`) that differ by
     /// nothing but their seed are found without it, three or more that are of no method.
     #[arg(long = "method", value_name = "NAME=DRIVERS")]
-    methods: Vec<String>,
+    pub(crate) methods: Vec<String>,
 }
 
 impl MethodArgs {

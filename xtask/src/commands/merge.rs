@@ -213,7 +213,10 @@ fn named(args: &MergeArgs) -> String {
 
 /// The command that puts them together again.
 fn again(args: &MergeArgs, run: &RunDir) -> String {
-    format!("merge {} --out {}", named(args), run.path().display())
+    let compared = args.compare_with.iter().map(|spec| format!(" --compare-with '{spec}'"));
+    let methods = args.methods.methods.iter().map(|method| format!(" --method '{method}'"));
+    let asked: String = compared.chain(methods).collect();
+    format!("merge {}{asked} --out {}", named(args), run.path().display())
 }
 
 /// The command line of a shard without what concerns the shard alone.

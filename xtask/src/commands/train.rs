@@ -169,8 +169,11 @@ fn check_elsewhere(
     let rows = report::elsewhere::rows(&results, &names, settings.evaluation.seed);
     let table = report::elsewhere::write(&rows, &names, run)?;
     let noise = &settings.evaluation.noise[0];
-    let which =
-        if rows.iter().any(|row| row.trained_on) { "not all of them unseen" } else { "lots that nobody trained on" };
+    let which = if rows.iter().any(|row| row.trained_on) {
+        "lots of which some were trained on"
+    } else {
+        "lots that nobody trained on"
+    };
     let text = || format!("\nElsewhere: {which}, noise {noise}\n\n{table}");
     output.table(text, &rows)
 }
