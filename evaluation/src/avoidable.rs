@@ -64,6 +64,8 @@ pub fn of_evaluation(
 ) -> anyhow::Result<Option<Vec<Row>>> {
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     let manifest = Manifest::read(folder)?;
+    // First: a lot of another name would seem to be none of the evaluation's.
+    manifest.check_some_inputs(&inputs::of(&lots, &[]))?;
     let failing = read(folder, &lots, drivers)?;
     if let Some(driver) = drivers.iter().find(|&driver| failing.iter().all(|failing| failing.driver != *driver)) {
         bail!("{}: no near-collision of a driver {driver:?} is in it; its tables name them", folder.display());
@@ -75,7 +77,7 @@ pub fn of_evaluation(
     for Failing { driver: name, noise, spec, runs } in &failing {
         let driver = spec.clone().load(settings)?;
         driver.check(settings)?;
-        manifest.check_some_inputs(&inputs::of(&lots, std::slice::from_ref(&driver)))?;
+        manifest.check_some_inputs(&inputs::of(&[], std::slice::from_ref(&driver)))?;
         let substitutes = Substitutes::new(&driver, settings);
         let seed = settings.evaluation.seed;
         let runs: Vec<_> = runs.iter().collect();
