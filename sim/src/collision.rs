@@ -197,7 +197,7 @@ impl BodyBox {
 
     /// Distance from the body outline to the nearest non-drivable point, metres; negative when they overlap, capped
     /// at 3 m. Measured at outline points, hence too large where a corner points between two of them: by 10 cm at most,
-    /// and by 2.5 cm below [`FINE_BELOW_M`]; beside corners the raster adds up to 3 cm.
+    /// and by 2.5 cm where it is below 0.3 m; beside corners the raster adds up to 3 cm.
     pub fn clearance_m(&self, distance: &DistanceField, pose: Pose) -> f32 {
         let world_from_ego = pose.world_from_ego();
         let lowest_of = |outline: &[FourPoints]| {
