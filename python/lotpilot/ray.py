@@ -178,7 +178,8 @@ def generate(
         Columns ``name``, ``path``, ``route_m`` and ``obstacles``, in the order of ``lotpilot.generate``.
 
     Raises:
-        ValueError: If nothing is named so, a number is out of range, or a lot would replace another one or what it is made of.
+        ValueError: If nothing is named so, a number is out of range, or a lot would replace another one or what it is
+            made of.
         ShardError: As ``evaluate``.
     """
     _check(shards, cpus, retries)
