@@ -53,8 +53,9 @@ impl PlannerContext {
     }
 }
 
-/// Travel along an arc at which it is answered with a point, metres. Pure pursuit drives the same arc for any value;
-/// here the point is ahead of the axle at every curvature a car can drive.
+/// Travel along an arc at which it is answered with a point, metres. Pure pursuit about the rear axle drives the same arc for
+/// any value; here the point is ahead of the axle at every curvature a car can drive. (With `pursuit = "authors_code"` the
+/// car drives another arc than was chosen, a tighter one.)
 pub(crate) const POINT_ON_ARC_M: f32 = 6.0;
 
 /// Answers with an arc of the rear axle, to be driven at no more than a speed if one is given, m/s.
