@@ -484,6 +484,9 @@ fn junctions_of_a_map_are_named_and_closed_when_asked() {
     let loaded = lot.scenario(&car()).unwrap();
     let [Note::Closed { mouths }] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
     assert_eq!((mouths.len(), loaded.scenario.islands.len()), (1, 1));
+    // What no kerb closes is not answered with the advice to close it.
+    let left = Note::Open { mouths: mouths.clone(), is_asked_to_close: true }.to_string();
+    assert!(left.contains("no kerb closes what is left") && !left.contains("--close-branches"), "{left}");
 }
 
 #[test]
