@@ -16,6 +16,7 @@ use sim::geometry::Vec2;
 use sim::maths;
 use sim::seed::{RootSeed, Stream};
 use sim::sensing::Observation;
+use sim::vectors::{FourPoints, f32x4};
 use std::sync::Arc;
 
 /// Between two steps of a rollout, seconds (*chosen*: twice nav2's 0.05, with half as many steps).
@@ -172,8 +173,9 @@ impl Method for Params {
                 circles_m: std::array::from_fn(circle),
                 law_mps: std::array::from_fn(law_mps),
             }),
-            field: WayField::new(context),
+            field: Box::new(WayField::new(context)),
             controls: vec![Control::REST; steps],
+            asked: vec![Control::REST; samples(self) * steps],
             costs: vec![0.0; samples(self)],
             wheel: WheelEstimate::new(context),
             speed_mps: 0.0,
@@ -190,6 +192,33 @@ struct Control {
 
 impl Control {
     const REST: Self = Self { steering_rad: 0.0, speed_mps: 0.0 };
+}
+
+/// Those of four samples.
+#[derive(Debug, Clone, Copy)]
+struct FourControls {
+    steering_rad: f32x4,
+    speed_mps: f32x4,
+}
+
+impl FourControls {
+    fn splat(control: Control) -> Self {
+        [control; 4].into()
+    }
+}
+
+impl From<[Control; 4]> for FourControls {
+    fn from(controls: [Control; 4]) -> Self {
+        Self {
+            steering_rad: controls.map(|control| control.steering_rad).into(),
+            speed_mps: controls.map(|control| control.speed_mps).into(),
+        }
+    }
+}
+
+/// A function that knows no vectors, of each lane.
+fn of_each(values: f32x4, function: impl Fn(f32) -> f32) -> f32x4 {
+    values.to_array().map(function).into()
 }
 
 /// Sequences per decision.
@@ -249,58 +278,82 @@ impl Tables {
         Control { steering_rad, speed_mps: control.speed_mps.clamp(slowest_mps, law_mps) }
     }
 
-    /// What a sample asks for at a step.
-    fn sampled(&self, controls: &[Control], sample: usize, step: usize) -> Control {
-        let (mean, noise) = (controls[step], self.noise[sample * self.steps + step]);
-        self.clamped(Control {
-            steering_rad: mean.steering_rad + noise.steering_rad,
-            speed_mps: mean.speed_mps + noise.speed_mps,
-        })
+    /// What every sample asks for at every step, sample by sample.
+    fn sample(&self, controls: &[Control], asked: &mut [Control]) {
+        for (of_sample, noise) in asked.chunks_exact_mut(self.steps).zip(self.noise.chunks_exact(self.steps)) {
+            for ((asked, mean), noise) in of_sample.iter_mut().zip(controls).zip(noise) {
+                *asked = self.clamped(Control {
+                    steering_rad: mean.steering_rad + noise.steering_rad,
+                    speed_mps: mean.speed_mps + noise.speed_mps,
+                });
+            }
+        }
     }
 
-    /// S, the cost of a sample from where the wheels and the speed are.
-    fn cost(&self, field: &WayField, controls: &[Control], sample: usize, start: Control) -> f32 {
+    /// S, the costs of four samples from where the wheels and the speed are.
+    fn costs(
+        &self,
+        field: &WayField,
+        controls: &[Control],
+        asked: &[Control],
+        samples: [usize; 4],
+        start: Control,
+    ) -> f32x4 {
         let Self { params, context: PlannerContext { vehicle, .. }, .. } = self;
-        let turn_max_rad = vehicle.steering_rate_max_radps * STEP_S;
-        let (faster_mps, slower_mps) = (vehicle.accel_max_mps2 * STEP_S, vehicle.brake_max_mps2 * STEP_S);
-        let half_m = 0.5 * vehicle.width_m + params.margin_m;
-        let (mut position, mut ahead) = (Vec2::ZERO, Vec2::X);
-        let (mut now, mut last_rad, mut cost) = (start, start.steering_rad, 0.0);
-        for step in 0..self.steps {
-            let asked = self.sampled(controls, sample, step);
-            now.steering_rad += (asked.steering_rad - now.steering_rad).clamp(-turn_max_rad, turn_max_rad);
-            now.speed_mps += (asked.speed_mps - now.speed_mps).clamp(-slower_mps, faster_mps);
-            let travel_m = now.speed_mps * STEP_S;
-            let turn_rad = travel_m * maths::tan(now.steering_rad) / vehicle.wheelbase_m;
+        let turn_max_rad = f32x4::splat(vehicle.steering_rate_max_radps * STEP_S);
+        let faster_mps = f32x4::splat(vehicle.accel_max_mps2 * STEP_S);
+        let slower_mps = f32x4::splat(vehicle.brake_max_mps2 * STEP_S);
+        let half_m = f32x4::splat(0.5 * vehicle.width_m + params.margin_m);
+        let of_samples =
+            |values: &[Control], step| FourControls::from(samples.map(|sample| values[sample * self.steps + step]));
+        let (mut position, mut ahead) = (FourPoints::splat(Vec2::ZERO), FourPoints::splat(Vec2::X));
+        let mut now = FourControls::splat(start);
+        let (mut last_rad, mut cost) = (now.steering_rad, f32x4::ZERO);
+        // Samples without a collision; the others stay where they are, and cost no more.
+        let mut running = cost.simd_eq(cost);
+        for (step, &mean) in controls.iter().enumerate() {
+            let asked = of_samples(asked, step);
+            now.steering_rad += (asked.steering_rad - now.steering_rad).fast_max(-turn_max_rad).fast_min(turn_max_rad);
+            now.speed_mps += (asked.speed_mps - now.speed_mps).fast_max(-slower_mps).fast_min(faster_mps);
+            let travel_m = running & (now.speed_mps * f32x4::splat(STEP_S));
+            let turn_rad = travel_m * of_each(now.steering_rad, maths::tan) / f32x4::splat(vehicle.wheelbase_m);
             // Of a turn of a few degrees; |ahead| stays 1 to 1e-6 over a rollout.
-            let turned = Vec2::new(1.0 - 0.5 * turn_rad * turn_rad, turn_rad - turn_rad * turn_rad * turn_rad / 6.0);
+            let cos = f32x4::splat(1.0) - f32x4::splat(0.5) * turn_rad * turn_rad;
+            let sin = turn_rad - turn_rad * turn_rad * turn_rad / f32x4::splat(6.0);
             let before = ahead;
-            ahead = turned.rotate(ahead);
-            position += 0.5 * travel_m * (before + ahead);
+            ahead = FourPoints { x: cos * before.x - sin * before.y, y: sin * before.x + cos * before.y };
+            position = position + (before + ahead) * (f32x4::splat(0.5) * travel_m);
 
-            let of_circle = |ahead_m: &f32| field.distance_m(position + *ahead_m * ahead);
-            let clearance_m = self.circles_m.iter().map(of_circle).fold(f32::INFINITY, f32::min) - half_m;
-            let scales = (-clearance_m / params.clearance_scale_m).min(SCALES_MAX);
+            let of_circle = |&ahead_m: &f32| field.distance_m(position + ahead * f32x4::splat(ahead_m));
+            let nearest_m = self.circles_m.iter().map(of_circle).fold(f32x4::splat(f32::INFINITY), f32x4::fast_min);
+            let clearance_m = nearest_m - half_m;
+            let scales = (-clearance_m / f32x4::splat(params.clearance_scale_m)).fast_min(f32x4::splat(SCALES_MAX));
             let change_rad = asked.steering_rad - last_rad;
             last_rad = asked.steering_rad;
-            cost +=
-                params.obstacle_weight * STEP_S * maths::exp(scales) + params.change_weight * change_rad * change_rad;
-            cost += self.departure(controls[step], self.noise[sample * self.steps + step]);
-            if clearance_m < params.collision_from_m {
-                cost += params.collision_weight * (self.steps - step) as f32 / self.steps as f32;
+            let near = f32x4::splat(params.obstacle_weight * STEP_S) * of_each(scales, maths::exp);
+            cost += running & (near + f32x4::splat(params.change_weight) * change_rad * change_rad);
+            cost += running & self.departures(mean, of_samples(&self.noise, step));
+            let collides = running & clearance_m.simd_lt(f32x4::splat(params.collision_from_m));
+            let share_left = (self.steps - step) as f32 / self.steps as f32;
+            cost += collides & f32x4::splat(params.collision_weight * share_left);
+            running &= !collides;
+            if running.none() {
                 break;
             }
         }
-        cost + params.way_weight * field.way_left_m(position + vehicle.front_m() * ahead)
+        let bumper = position + ahead * f32x4::splat(vehicle.front_m());
+        cost + f32x4::splat(params.way_weight) * field.way_left_m(bumper)
     }
 
-    /// γ·u·ε/σ² of a step: what keeps the mean from running away with the draws.
-    fn departure(&self, mean: Control, noise: Control) -> f32 {
+    /// γ·u·ε/σ² of a step, of four samples: what keeps the mean from running away with the draws.
+    fn departures(&self, mean: Control, noise: FourControls) -> f32x4 {
         let Params { gamma, steering_std_rad, speed_std_mps, .. } = self.params;
-        let steering = mean.steering_rad * noise.steering_rad / (steering_std_rad * steering_std_rad);
+        let steering_var = f32x4::splat(steering_std_rad * steering_std_rad);
+        let speed_var = f32x4::splat(speed_std_mps * speed_std_mps);
         // The speed that the controller would drive costs nothing.
-        let slower_mps = mean.speed_mps - self.law_mps[0];
-        gamma * (steering + slower_mps * noise.speed_mps / (speed_std_mps * speed_std_mps))
+        let slower_mps = f32x4::splat(mean.speed_mps - self.law_mps[0]);
+        let steering = f32x4::splat(mean.steering_rad) * noise.steering_rad / steering_var;
+        f32x4::splat(gamma) * (steering + slower_mps * noise.speed_mps / speed_var)
     }
 }
 
@@ -308,9 +361,11 @@ impl Tables {
 #[derive(Debug, Clone)]
 pub struct PathIntegral {
     tables: Arc<Tables>,
-    field: WayField,
+    field: Box<WayField>,
     /// The last answer, by step: where the next draws begin.
     controls: Vec<Control>,
+    /// What every sample asks for, by sample and step.
+    asked: Vec<Control>,
     /// The cost of every sample.
     costs: Vec<f32>,
     wheel: WheelEstimate,
@@ -338,21 +393,22 @@ impl PathIntegral {
 
     /// The mean of the samples, weighted by exp(−S/λ).
     fn average(&mut self) {
-        let Self { tables, controls, costs, .. } = self;
+        let Self { tables, controls, asked, costs, .. } = self;
         let least = costs.iter().copied().fold(f32::INFINITY, f32::min);
         let mut sum = 0.0;
         for cost in costs.iter_mut() {
             *cost = maths::exp((least - *cost) / tables.params.temperature);
             sum += *cost;
         }
-        for step in 0..tables.steps {
-            let mut mean = Control::REST;
-            for (sample, weight) in costs.iter().enumerate() {
-                let sampled = tables.sampled(controls, sample, step);
-                mean.steering_rad += weight * sampled.steering_rad;
-                mean.speed_mps += weight * sampled.speed_mps;
+        controls.fill(Control::REST);
+        for (of_sample, weight) in asked.chunks_exact(tables.steps).zip(costs) {
+            for (mean, asked) in controls.iter_mut().zip(of_sample) {
+                mean.steering_rad += *weight * asked.steering_rad;
+                mean.speed_mps += *weight * asked.speed_mps;
             }
-            controls[step] = Control { steering_rad: mean.steering_rad / sum, speed_mps: mean.speed_mps / sum };
+        }
+        for mean in controls {
+            *mean = Control { steering_rad: mean.steering_rad / sum, speed_mps: mean.speed_mps / sum };
         }
     }
 }
@@ -362,8 +418,13 @@ impl Policy for PathIntegral {
         self.field.read(&observation.grid, self.tables.params.passable_from_m);
         self.shift();
         let start = Control { steering_rad: self.wheel.advance(), speed_mps: self.speed_mps };
-        for (sample, cost) in self.costs.iter_mut().enumerate() {
-            *cost = self.tables.cost(&self.field, &self.controls, sample, start);
+        let Self { tables, field, controls, asked, costs, .. } = self;
+        tables.sample(controls, asked);
+        let last = costs.len() - 1;
+        for (four, costs) in costs.chunks_mut(4).enumerate() {
+            let samples = std::array::from_fn(|lane| (4 * four + lane).min(last));
+            let of_four = tables.costs(field, controls, asked, samples, start).to_array();
+            costs.copy_from_slice(&of_four[..costs.len()]);
         }
         self.average();
         let Control { steering_rad, speed_mps } = self.controls[0];
@@ -445,10 +506,35 @@ mod tests {
         let fast = vec![Control { steering_rad: 0.0, speed_mps: 9.0 }; 28];
         let params = Params { obstacle_weight: 0.0, gamma: 0.0, ..Params::paper() };
         let tables = params.planner(&context()).tables;
-        let cost = tables.cost(&planner.field, &fast, 0, Control::REST);
+        tables.sample(&fast, &mut planner.asked);
+        let costs = tables.costs(&planner.field, &fast, &planner.asked, [0; 4], Control::REST);
+        let cost = costs.to_array()[0];
         let travel_m: f32 = (1..=28).map(|step| (0.1 * step as f32).min(2.2) * 0.1).sum();
-        let expected = planner.field.way_left_m(Vec2::new(3.8 + travel_m, 0.0));
+        let at_end = FourPoints::splat(Vec2::new(3.8 + travel_m, 0.0));
+        let expected = planner.field.way_left_m(at_end).to_array()[0];
         assert!((cost - expected).abs() < 1e-3, "{cost} and {expected}");
+    }
+
+    /// Also of those that hit something sooner or later than their neighbours.
+    #[test]
+    fn a_sample_costs_the_same_whatever_is_rolled_out_beside_it() {
+        let mut planner = Params { collision_weight: 1e3, ..Params::paper() }.planner(&context());
+        let mut grid = OccupancyGrid::free();
+        (14..18).for_each(|row| grid.occupy_row(row, !0 << 11));
+        planner.field.read(&grid, 0.7);
+        let ahead = vec![Control { steering_rad: 0.0, speed_mps: 1.2 }; 28];
+        let PathIntegral { tables, field, asked, .. } = &mut planner;
+        tables.sample(&ahead, asked);
+        let start = Control { steering_rad: 0.1, speed_mps: 1.2 };
+        let costs = |samples| tables.costs(field, &ahead, asked, samples, start).to_array();
+        let all = (0..200).step_by(4).flat_map(|first| {
+            let samples = std::array::from_fn(|lane| first + lane);
+            let beside = costs(samples);
+            assert_eq!(beside, samples.map(|sample| costs([sample; 4])[0]));
+            beside
+        });
+        let n_hit = all.filter(|cost| *cost > 30.0).count();
+        assert!((20..180).contains(&n_hit), "{n_hit} of 200 hit the block");
     }
 
     #[test]

@@ -7,6 +7,7 @@
 use crate::context::PlannerContext;
 use sim::geometry::Vec2;
 use sim::sensing::{GRID_CELLS, OccupancyGrid};
+use sim::vectors::{FourPoints, f32x4};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -129,24 +130,35 @@ impl WayField {
         }
     }
 
-    /// Distance to the nearest occupied square, metres, bilinear between centres of cells.
-    pub(crate) fn distance_m(&self, in_ego: Vec2) -> f32 {
+    /// Distances of four points to the nearest occupied square, metres, bilinear between centres of cells.
+    #[inline]
+    pub(crate) fn distance_m(&self, in_ego: FourPoints) -> f32x4 {
         self.between(&self.distance_m, in_ego)
     }
 
-    /// How far the way still goes from a point, metres; up to a constant.
-    pub(crate) fn way_left_m(&self, in_ego: Vec2) -> f32 {
+    /// How far the way still goes from four points, metres; up to a constant.
+    #[inline]
+    pub(crate) fn way_left_m(&self, in_ego: FourPoints) -> f32x4 {
         self.between(&self.way_left_m, in_ego)
     }
 
-    fn between(&self, values: &[f32], in_ego: Vec2) -> f32 {
-        let row = ((self.first.x - in_ego.x) / self.cell_m).clamp(0.0, (self.rows - 1) as f32);
-        let col = ((self.first.y - in_ego.y) / self.cell_m).clamp(0.0, (GRID_CELLS - 1) as f32);
-        let (above, left) = ((row as usize).min(self.rows - 2), (col as usize).min(GRID_CELLS - 2));
-        let (down, right) = (row - above as f32, col - left as f32);
-        let cell = above * GRID_CELLS + left;
-        let across = |cell: usize| values[cell] + right * (values[cell + 1] - values[cell]);
-        let (upper, lower) = (across(cell), across(cell + GRID_CELLS));
+    #[inline]
+    fn between(&self, values: &[f32], in_ego: FourPoints) -> f32x4 {
+        // The centre before each point, and how far it lies beyond it; the last centre belongs to the pair before it.
+        let place = |first_m: f32, at_m: f32x4, cells: usize| {
+            let (last, place) = ((cells - 1) as f32, (f32x4::splat(first_m) - at_m) / f32x4::splat(self.cell_m));
+            let place = place.fast_max(f32x4::ZERO).fast_min(f32x4::splat(last));
+            let before = f32x4::from_i32x4(place.fast_trunc_int()).fast_min(f32x4::splat(last - 1.0));
+            (before, place - before)
+        };
+        let (above, down) = place(self.first.x, in_ego.x, self.rows);
+        let (left, right) = place(self.first.y, in_ego.y, GRID_CELLS);
+        let cells = (above * f32x4::splat(GRID_CELLS as f32) + left).fast_trunc_int().to_array();
+        // From the first corner of each square to the last.
+        let squares = cells.map(|cell| &values[cell as usize..][..GRID_CELLS + 2]);
+        let corner = |offset: usize| f32x4::from(squares.map(|square| square[offset]));
+        let across = |offset: usize| corner(offset) + right * (corner(offset + 1) - corner(offset));
+        let (upper, lower) = (across(0), across(GRID_CELLS));
         upper + down * (lower - upper)
     }
 }
@@ -189,7 +201,7 @@ mod tests {
         // Cell (20, 12) is the square X 6.22…6.70, |Y| ≤ 0.24.
         field.read(&grid_with(&[(20, 12)]), 0.7);
         for (x_m, y_m, expected_m) in [(5.02, 0.0, 1.2), (6.46, 1.44, 1.2), (2.14, 0.0, 3.0), (6.46, 0.0, -0.24)] {
-            let found_m = field.distance_m(Vec2::new(x_m, y_m));
+            let found_m = field.distance_m(FourPoints::splat(Vec2::new(x_m, y_m))).to_array()[0];
             assert!((found_m - expected_m).abs() < 0.02, "({x_m}, {y_m}): {found_m}");
         }
     }
@@ -204,7 +216,7 @@ mod tests {
         let cells: Vec<u8> = open.iter().flatten().map(|open| u8::from(!open)).collect();
         let mut field = WayField::new(&context());
         field.read(&OccupancyGrid::from_cells(&cells), 0.7);
-        let left_m = |x_m, y_m| field.way_left_m(Vec2::new(x_m, y_m));
+        let left_m = |x_m, y_m| field.way_left_m(FourPoints::splat(Vec2::new(x_m, y_m))).to_array()[0];
         let (here_m, corner_m, on_m) = (left_m(4.5, 0.0), left_m(8.2, 1.5), left_m(8.2, 5.0));
         assert!(on_m < corner_m && corner_m < here_m, "{here_m}, {corner_m}, {on_m}");
         assert!(left_m(6.5, -3.5) > left_m(6.5, 0.0), "the pocket");
@@ -215,7 +227,7 @@ mod tests {
     fn open_ground_is_crossed_straight_ahead() {
         let mut field = WayField::new(&context());
         field.read(&OccupancyGrid::free(), 0.7);
-        let left_m = |y_m| field.way_left_m(Vec2::new(11.0, y_m));
+        let left_m = |y_m| field.way_left_m(FourPoints::splat(Vec2::new(11.0, y_m))).to_array()[0];
         assert!(left_m(0.0) < left_m(2.0) && left_m(0.0) < left_m(-2.0));
         assert!((left_m(3.0) - left_m(-3.0)).abs() < 1e-4);
     }
