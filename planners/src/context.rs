@@ -1,6 +1,6 @@
 //! The car a planner is installed in, and how a planner answers.
 
-use sim::controller::{self, ControllerSettings};
+use sim::controller::{self, ControllerSettings, PursuitLaw};
 use sim::driver::{Decision, LookAheadPoint, Source};
 use sim::episode::EpisodeSettings;
 use sim::geometry::{Pose, Vec2};
@@ -49,24 +49,38 @@ impl PlannerContext {
 
     /// What the controller would drive an arc with, m/s.
     pub(crate) fn speed_mps(&self, curvature_per_m: f32) -> f32 {
-        controller::pursue(&self.controller, &self.vehicle, &self.geometry, &steer_along(curvature_per_m)).speed_mps
+        let decision = self.steer_along(curvature_per_m);
+        controller::pursue(&self.controller, &self.vehicle, &self.geometry, &decision).speed_mps
+    }
+
+    /// Answers with an arc of the rear axle: a point that the controller's form of pure pursuit turns back into it.
+    pub(crate) fn steer_along(&self, curvature_per_m: f32) -> Decision {
+        head_for(match self.controller.pursuit {
+            // The circle through the point is the arc, wherever on it the point lies.
+            PursuitLaw::Paper => Pose::default().advanced_along_arc(curvature_per_m, POINT_ON_ARC_M).position(),
+            // tan δ (0.75 L_f + 0.3 cos η) = L sin η, solved for the bearing η from the bumper.
+            PursuitLaw::AuthorsCode => {
+                let tan = self.vehicle.wheelbase_m * curvature_per_m;
+                let (across, along) = (self.vehicle.wheelbase_m, 0.3 * tan);
+                let length = maths::hypot(across, along);
+                let range_m = POINT_FROM_BUMPER_M.min(length / tan.abs());
+                let bearing_rad = maths::atan2(along, across) + maths::asin(0.75 * tan * range_m / length);
+                self.bumper() + range_m * maths::unit(bearing_rad)
+            }
+        })
+    }
+
+    /// The same, to be driven at no more than a speed, m/s.
+    pub(crate) fn steer_along_at(&self, curvature_per_m: f32, speed_limit_mps: f32) -> Decision {
+        Decision { speed_limit_mps: Some(speed_limit_mps), ..self.steer_along(curvature_per_m) }
     }
 }
 
-/// Travel along an arc at which it is answered with a point, metres. Pure pursuit about the rear axle drives the same arc for
-/// any value; here the point is ahead of the axle at every curvature a car can drive. (With `pursuit = "authors_code"` the
-/// car drives another arc than was chosen, a tighter one.)
-pub(crate) const POINT_ON_ARC_M: f32 = 6.0;
-
-/// Answers with an arc of the rear axle, to be driven at no more than a speed if one is given, m/s.
-pub(crate) fn steer_along_at(curvature_per_m: f32, speed_limit_mps: Option<f32>) -> Decision {
-    Decision { speed_limit_mps, ..steer_along(curvature_per_m) }
-}
-
-/// Answers with an arc of the rear axle.
-pub(crate) fn steer_along(curvature_per_m: f32) -> Decision {
-    head_for(Pose::default().advanced_along_arc(curvature_per_m, POINT_ON_ARC_M).position())
-}
+/// Travel along an arc at which it is answered with a point, metres: that is ahead of the axle at every curvature that a car
+/// can drive.
+const POINT_ON_ARC_M: f32 = 6.0;
+/// The same for the authors' form of pursuit, from the front bumper, metres.
+const POINT_FROM_BUMPER_M: f32 = 3.0;
 
 /// Answers with a point, ego frame.
 pub(crate) fn head_for(point: Vec2) -> Decision {
@@ -82,18 +96,19 @@ pub(crate) struct WheelEstimate {
     /// Asked for last; the wheels are on their way to it.
     pub(crate) command_rad: f32,
     rate_rad_per_tick: f32,
+    lock_rad: f32,
 }
 
 impl WheelEstimate {
     pub(crate) fn new(context: &PlannerContext) -> Self {
         let rate_rad_per_tick = context.vehicle.steering_rate_max_radps * context.control_period_s;
-        Self { steering_rad: 0.0, command_rad: 0.0, rate_rad_per_tick }
+        Self { steering_rad: 0.0, command_rad: 0.0, rate_rad_per_tick, lock_rad: context.vehicle.steering_max_rad }
     }
 
     /// The angle one control period after the last command, radians.
     pub(crate) fn advance(&mut self) -> f32 {
         let (low, high) = (self.steering_rad - self.rate_rad_per_tick, self.steering_rad + self.rate_rad_per_tick);
-        self.steering_rad = self.command_rad.clamp(low, high);
+        self.steering_rad = self.command_rad.clamp(-self.lock_rad, self.lock_rad).clamp(low, high);
         self.steering_rad
     }
 
@@ -110,11 +125,17 @@ mod tests {
 
     #[test]
     fn arcs_are_answered_with_points_that_pure_pursuit_drives_back() {
-        for curvature in [-0.25, -0.1, 0.0, 0.03, 0.25] {
-            let decision = steer_along(curvature);
-            assert!((decision.look_ahead.curvature_per_m() - curvature).abs() < 1e-5);
-            assert!(decision.look_ahead.ahead_m > 3.0);
-            assert_eq!(decision.source, Source::Planner);
+        for pursuit in [PursuitLaw::Paper, PursuitLaw::AuthorsCode] {
+            let mut context = context();
+            context.controller.pursuit = pursuit;
+            let (vehicle, geometry) = (&context.vehicle, &context.geometry);
+            for curvature in [-0.25, -0.1, 0.0, 0.001, 0.03, 0.25] {
+                let decision = context.steer_along(curvature);
+                let steering_rad = controller::steering(pursuit, vehicle, geometry, decision.look_ahead);
+                assert!((context.curvature_per_m(steering_rad) - curvature).abs() < 1e-5, "{pursuit:?}: {curvature}");
+                assert!(decision.look_ahead.ahead_m > 3.0);
+                assert_eq!(decision.source, Source::Planner);
+            }
         }
         assert!((context().speed_mps(0.0) - 2.2).abs() < 1e-6 && (context().speed_mps(0.2507) - 0.5).abs() < 1e-3);
     }
@@ -125,6 +146,9 @@ mod tests {
         wheel.command_rad = 0.03;
         assert!((wheel.advance() - 0.0172).abs() < 1e-6); // 0.344 rad/s · 50 ms
         assert!((wheel.advance() - 0.03).abs() < 1e-6);
+        wheel.command_rad = 9.0;
+        let angles_rad = (0..100).map(|_| wheel.advance());
+        assert_eq!(angles_rad.last(), Some(context().vehicle.steering_max_rad), "they stop at the lock");
         wheel.reset();
         assert_eq!(wheel.advance(), 0.0);
     }

@@ -8,7 +8,7 @@
 //! Two readings ([`Speeds`]): the controller slows down with steering (paper), so that a curvature fixes its speed; or speeds
 //! are searched together with the curvatures, as in 1996, none faster than d/T_impact.
 
-use crate::context::{PlannerContext, WheelEstimate, steer_along, steer_along_at};
+use crate::context::{PlannerContext, WheelEstimate};
 use crate::method::{Method, Reading, within};
 use crate::search::{Dimension, Span};
 use crate::speeds;
@@ -270,9 +270,9 @@ impl Policy for CurvatureVelocity {
         let curvature_per_m = self.candidates[best].curvature_per_m;
         self.wheel.command_rad = self.context.steering_rad(curvature_per_m);
         match self.params.speeds {
-            Speeds::ByLaw => steer_along(curvature_per_m),
+            Speeds::ByLaw => self.context.steer_along(curvature_per_m),
             Speeds::Searched { .. } => {
-                steer_along_at(curvature_per_m, Some(self.best_speed(best, distances_m[best]).0))
+                self.context.steer_along_at(curvature_per_m, self.best_speed(best, distances_m[best]).0)
             }
         }
     }

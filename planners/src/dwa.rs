@@ -8,7 +8,7 @@
 //! Two readings ([`Speeds`]): the controller slows down with steering (paper), so that an angle fixes its speed and the
 //! window has one dimension; or speeds are searched together with the angles, as in 1997.
 
-use crate::context::{PlannerContext, WheelEstimate, steer_along, steer_along_at};
+use crate::context::{PlannerContext, WheelEstimate};
 use crate::method::{Method, Reading, within};
 use crate::search::{Dimension, Span};
 use crate::speeds;
@@ -248,8 +248,8 @@ impl Policy for DynamicWindow {
         let curvature_per_m = self.arcs[best].curvature_per_m;
         self.wheel.command_rad = self.context.steering_rad(curvature_per_m);
         match self.params.speeds {
-            Speeds::ByLaw => steer_along(curvature_per_m),
-            Speeds::Searched => steer_along_at(curvature_per_m, Some(self.best_speed(best, free_m[best]).0)),
+            Speeds::ByLaw => self.context.steer_along(curvature_per_m),
+            Speeds::Searched => self.context.steer_along_at(curvature_per_m, self.best_speed(best, free_m[best]).0),
         }
     }
 

@@ -35,8 +35,9 @@ pub(crate) struct LinesOfSight {
 
 #[derive(Debug, Clone)]
 struct Ray {
-    /// Points every [`RAY_STEP_M`] and the row and column they lie in; those before the patch are left out.
-    points: Vec<(Vec2, usize, usize)>,
+    /// Steps of [`RAY_STEP_M`] from the bumper, the point there, and the row and column it lies in; what lies before the
+    /// patch counts as free and is left out.
+    points: Vec<(usize, Vec2, usize, usize)>,
 }
 
 /// Between two points of a line of sight, metres: half a cell.
@@ -50,9 +51,9 @@ impl LinesOfSight {
         let ray = |bearing_rad: f32| {
             let direction = maths::unit(bearing_rad);
             let points = (1..)
-                .map(|step| context.bumper() + step as f32 * RAY_STEP_M * direction)
-                .skip_while(|point| point.x < geometry.near_edge_ahead_m && point.y.abs() <= 0.5 * geometry.side_m)
-                .map_while(|point| cell_of(geometry, point).map(|(row, col)| (point, row, col)))
+                .map(|step| (step, context.bumper() + step as f32 * RAY_STEP_M * direction))
+                .skip_while(|(_, point)| point.x < geometry.near_edge_ahead_m && point.y.abs() <= 0.5 * geometry.side_m)
+                .map_while(|(step, point)| cell_of(geometry, point).map(|(row, col)| (step, point, row, col)))
                 .collect();
             Ray { points }
         };
@@ -69,10 +70,11 @@ impl LinesOfSight {
             Goal::FarthestVisible => {
                 let (mut longest, mut end) = (0, self.ahead);
                 for ray in &self.rays {
-                    let free = ray.points.iter().take_while(|(_, row, col)| !grid.is_occupied(*row, *col));
-                    if let Some((steps, (point, ..))) = free.enumerate().last().filter(|(steps, _)| steps + 1 > longest)
+                    let free = ray.points.iter().take_while(|&&(.., row, col)| !grid.is_occupied(row, col));
+                    if let Some(&(steps, point, ..)) = free.last()
+                        && steps > longest
                     {
-                        (longest, end) = (steps + 1, *point);
+                        (longest, end) = (steps, point);
                     }
                 }
                 end
@@ -93,6 +95,18 @@ fn cell_of(geometry: &GridGeometry, point: Vec2) -> Option<(usize, usize)> {
 mod tests {
     use super::*;
     use crate::test_scenes::context;
+
+    /// The longest line was the one with most points in the patch, so that lines aside seemed up to 4 m shorter.
+    #[test]
+    fn lines_of_sight_are_as_long_as_they_are_from_the_bumper() {
+        let sight = LinesOfSight::new(&context());
+        let mut junction = OccupancyGrid::free();
+        (0..16).for_each(|row| junction.occupy_row(row, u32::MAX));
+        (16..22).for_each(|row| junction.occupy_row(row, !(0b11111 << 10)));
+        // Straight ahead 4.8 m are free, to X 8.62; between the bumper and X 5.74 the left edge of the patch is 6.2 m away.
+        let goal = sight.goal(Goal::FarthestVisible, &junction);
+        assert!(goal.y > 5.5 && goal.x < 5.74, "{goal}");
+    }
 
     #[test]
     fn the_farthest_visible_point_is_the_end_of_the_longest_free_line() {

@@ -6,17 +6,18 @@
 //! rated, and the next answer is their mean, weighted by exp(−cost/λ). Steering and speed are chosen together, so it can slow
 //! down. nav2 follows a global path; here is none, and how far the way still goes (`WayField`) takes its place.
 
-use crate::context::{PlannerContext, WheelEstimate, steer_along_at};
+use crate::context::PlannerContext;
 use crate::method::{Method, within};
 use crate::search::{Dimension, Span, normal};
 use crate::way_field::WayField;
 use serde::{Deserialize, Serialize};
 use sim::driver::{Decision, Policy};
-use sim::geometry::Vec2;
+use sim::geometry::{Pose, Vec2};
 use sim::maths;
 use sim::seed::{RootSeed, Stream};
 use sim::sensing::Observation;
 use sim::vectors::{FourPoints, f32x4};
+use sim::vehicle::{self, VehicleCommand, VehicleSettings, VehicleState};
 use std::sync::Arc;
 
 /// Between two steps of a rollout, seconds (*chosen*: twice nav2's 0.05, with half as many steps).
@@ -42,7 +43,7 @@ pub struct Params {
     pub horizon_s: f32,
     /// λ, how much cost makes a sequence count e times less: 0.3 (*cited*: nav2).
     pub temperature: f32,
-    /// γ, price of departing from the last answer: 0.015 (*cited*: nav2).
+    /// γ, price of steering and of being slower than the controller's law, by which the mean does not run away with the draws: 0.015 (*cited*: nav2).
     pub gamma: f32,
     /// Standard deviation of the steering angles drawn, radians: 0.15 (*chosen*; nav2 draws yaw rates).
     pub steering_std_rad: f32,
@@ -109,7 +110,7 @@ impl Method for Params {
         },
         Dimension {
             name: "change_weight",
-            span: Span::Log(0.01, 30.0),
+            span: Span::Log(0.01, 300.0),
             get: |p| p.change_weight,
             set: |p, value| p.change_weight = value,
         },
@@ -177,8 +178,8 @@ impl Method for Params {
             controls: vec![Control::REST; steps],
             asked: vec![Control::REST; samples(self) * steps],
             costs: vec![0.0; samples(self)],
-            wheel: WheelEstimate::new(context),
-            speed_mps: 0.0,
+            car: VehicleState::at_rest(Pose::default()),
+            command: Control::REST.into(),
         }
     }
 }
@@ -194,17 +195,17 @@ impl Control {
     const REST: Self = Self { steering_rad: 0.0, speed_mps: 0.0 };
 }
 
+impl From<Control> for VehicleCommand {
+    fn from(Control { steering_rad, speed_mps }: Control) -> Self {
+        Self { steering_rad, speed_mps }
+    }
+}
+
 /// Those of four samples.
 #[derive(Debug, Clone, Copy)]
 struct FourControls {
     steering_rad: f32x4,
     speed_mps: f32x4,
-}
-
-impl FourControls {
-    fn splat(control: Control) -> Self {
-        [control; 4].into()
-    }
 }
 
 impl From<[Control; 4]> for FourControls {
@@ -214,6 +215,55 @@ impl From<[Control; 4]> for FourControls {
             speed_mps: controls.map(|control| control.speed_mps).into(),
         }
     }
+}
+
+/// Four cars as far as they differ: [`VehicleState`] without a pose.
+#[derive(Debug, Clone, Copy)]
+struct FourCars {
+    speed_mps: f32x4,
+    steering_rad: f32x4,
+    accel_mps2: f32x4,
+    accel_demand_mps2: f32x4,
+    speed_integral_mps2: f32x4,
+}
+
+impl FourCars {
+    fn splat(car: &VehicleState) -> Self {
+        Self {
+            speed_mps: f32x4::splat(car.speed_mps),
+            steering_rad: f32x4::splat(car.steering_rad),
+            accel_mps2: f32x4::splat(car.accel_mps2),
+            accel_demand_mps2: f32x4::splat(car.accel_demand_mps2),
+            speed_integral_mps2: f32x4::splat(car.speed_integral_mps2),
+        }
+    }
+
+    /// [`vehicle::step`] of [`STEP_S`], and how far each car comes, metres.
+    #[inline]
+    fn step(&mut self, vehicle: &VehicleSettings, asked: FourControls) -> f32x4 {
+        let step_s = f32x4::splat(STEP_S);
+        let error_mps = asked.speed_mps - self.speed_mps;
+        let integral = self.speed_integral_mps2 + f32x4::splat(vehicle.speed_gain_i_per_s2) * error_mps * step_s;
+        self.speed_integral_mps2 = within_four(integral, f32x4::ZERO, vehicle.integral_max_mps2);
+        let wanted = f32x4::splat(vehicle.speed_gain_p_per_s) * error_mps + self.speed_integral_mps2;
+        let wanted = wanted.fast_max(f32x4::splat(-vehicle.brake_max_mps2));
+        let wanted = wanted.fast_min(f32x4::splat(vehicle.accel_max_mps2));
+        self.accel_demand_mps2 = within_four(wanted, self.accel_demand_mps2, vehicle.jerk_max_mps3 * STEP_S);
+        let share = f32x4::splat((STEP_S / vehicle.drivetrain_lag_s).min(1.0));
+        self.accel_mps2 += (self.accel_demand_mps2 - self.accel_mps2) * share;
+        let before_mps = self.speed_mps;
+        self.speed_mps = (before_mps + self.accel_mps2 * step_s).fast_max(f32x4::ZERO);
+        let turn_max_rad = vehicle.steering_rate_max_radps * STEP_S;
+        self.steering_rad = within_four(asked.steering_rad, self.steering_rad, turn_max_rad);
+        f32x4::splat(0.5) * (before_mps + self.speed_mps) * step_s
+    }
+}
+
+/// Values no farther than a distance from others.
+#[inline]
+fn within_four(values: f32x4, others: f32x4, distance: f32) -> f32x4 {
+    let distance = f32x4::splat(distance);
+    values.fast_max(others - distance).fast_min(others + distance)
 }
 
 /// A function that knows no vectors, of each lane.
@@ -297,26 +347,21 @@ impl Tables {
         controls: &[Control],
         asked: &[Control],
         samples: [usize; 4],
-        start: Control,
+        start: &VehicleState,
     ) -> f32x4 {
         let Self { params, context: PlannerContext { vehicle, .. }, .. } = self;
-        let turn_max_rad = f32x4::splat(vehicle.steering_rate_max_radps * STEP_S);
-        let faster_mps = f32x4::splat(vehicle.accel_max_mps2 * STEP_S);
-        let slower_mps = f32x4::splat(vehicle.brake_max_mps2 * STEP_S);
         let half_m = f32x4::splat(0.5 * vehicle.width_m + params.margin_m);
         let of_samples =
             |values: &[Control], step| FourControls::from(samples.map(|sample| values[sample * self.steps + step]));
         let (mut position, mut ahead) = (FourPoints::splat(Vec2::ZERO), FourPoints::splat(Vec2::X));
-        let mut now = FourControls::splat(start);
-        let (mut last_rad, mut cost) = (now.steering_rad, f32x4::ZERO);
+        let mut cars = FourCars::splat(start);
+        let (mut last_rad, mut cost) = (cars.steering_rad, f32x4::ZERO);
         // Samples without a collision; the others stay where they are, and cost no more.
         let mut running = cost.simd_eq(cost);
         for (step, &mean) in controls.iter().enumerate() {
             let asked = of_samples(asked, step);
-            now.steering_rad += (asked.steering_rad - now.steering_rad).fast_max(-turn_max_rad).fast_min(turn_max_rad);
-            now.speed_mps += (asked.speed_mps - now.speed_mps).fast_max(-slower_mps).fast_min(faster_mps);
-            let travel_m = running & (now.speed_mps * f32x4::splat(STEP_S));
-            let turn_rad = travel_m * of_each(now.steering_rad, maths::tan) / f32x4::splat(vehicle.wheelbase_m);
+            let travel_m = running & cars.step(vehicle, asked);
+            let turn_rad = travel_m * of_each(cars.steering_rad, maths::tan) / f32x4::splat(vehicle.wheelbase_m);
             // Of a turn of a few degrees; |ahead| stays 1 to 1e-6 over a rollout.
             let cos = f32x4::splat(1.0) - f32x4::splat(0.5) * turn_rad * turn_rad;
             let sin = turn_rad - turn_rad * turn_rad * turn_rad / f32x4::splat(6.0);
@@ -332,7 +377,7 @@ impl Tables {
             last_rad = asked.steering_rad;
             let near = f32x4::splat(params.obstacle_weight * STEP_S) * of_each(scales, maths::exp);
             cost += running & (near + f32x4::splat(params.change_weight) * change_rad * change_rad);
-            cost += running & self.departures(mean, of_samples(&self.noise, step));
+            cost += running & self.departures(mean, asked);
             let collides = running & clearance_m.simd_lt(f32x4::splat(params.collision_from_m));
             let share_left = (self.steps - step) as f32 / self.steps as f32;
             cost += collides & f32x4::splat(params.collision_weight * share_left);
@@ -345,15 +390,17 @@ impl Tables {
         cost + f32x4::splat(params.way_weight) * field.way_left_m(bumper)
     }
 
-    /// γ·u·ε/σ² of a step, of four samples: what keeps the mean from running away with the draws.
-    fn departures(&self, mean: Control, noise: FourControls) -> f32x4 {
+    /// γ·u·ε/σ² of a step, of four samples: what keeps the mean from running away with the draws. ε is what is left of a draw
+    /// within what the car can be asked for; the steps from one draw to the next share it.
+    fn departures(&self, mean: Control, asked: FourControls) -> f32x4 {
         let Params { gamma, steering_std_rad, speed_std_mps, .. } = self.params;
-        let steering_var = f32x4::splat(steering_std_rad * steering_std_rad);
-        let speed_var = f32x4::splat(speed_std_mps * speed_std_mps);
+        let left = |asked: f32x4, mean: f32, std: f32| (asked - f32x4::splat(mean)) / f32x4::splat(std * std);
+        let steering = left(asked.steering_rad, mean.steering_rad, steering_std_rad);
+        let speed = left(asked.speed_mps, mean.speed_mps, speed_std_mps);
         // The speed that the controller would drive costs nothing.
-        let slower_mps = f32x4::splat(mean.speed_mps - self.law_mps[0]);
-        let steering = f32x4::splat(mean.steering_rad) * noise.steering_rad / steering_var;
-        f32x4::splat(gamma) * (steering + slower_mps * noise.speed_mps / speed_var)
+        let slower_mps = mean.speed_mps - self.law_mps[0];
+        f32x4::splat(gamma * STEP_S / KNOT_S)
+            * (f32x4::splat(mean.steering_rad) * steering + f32x4::splat(slower_mps) * speed)
     }
 }
 
@@ -368,9 +415,10 @@ pub struct PathIntegral {
     asked: Vec<Control>,
     /// The cost of every sample.
     costs: Vec<f32>,
-    wheel: WheelEstimate,
-    /// Where the speed probably is; like the wheel angle, it is not shown.
-    speed_mps: f32,
+    /// How the car probably moves, which is not shown: as if what was asked for came without a dead time.
+    car: VehicleState,
+    /// What was asked for last.
+    command: VehicleCommand,
 }
 
 impl PathIntegral {
@@ -417,29 +465,29 @@ impl Policy for PathIntegral {
     fn act(&mut self, observation: &Observation) -> Decision {
         self.field.read(&observation.grid, self.tables.params.passable_from_m);
         self.shift();
-        let start = Control { steering_rad: self.wheel.advance(), speed_mps: self.speed_mps };
-        let Self { tables, field, controls, asked, costs, .. } = self;
+        let PlannerContext { vehicle, control_period_s, .. } = &self.tables.context;
+        let moved = vehicle::step(vehicle, self.car, self.command, *control_period_s);
+        // Where it is does not matter.
+        self.car = VehicleState { pose: Pose::default(), position_rest_m: Vec2::ZERO, ..moved };
+        let Self { tables, field, controls, asked, costs, car, .. } = self;
         tables.sample(controls, asked);
         let last = costs.len() - 1;
         for (four, costs) in costs.chunks_mut(4).enumerate() {
             let samples = std::array::from_fn(|lane| (4 * four + lane).min(last));
-            let of_four = tables.costs(field, controls, asked, samples, start).to_array();
+            let of_four = tables.costs(field, controls, asked, samples, car).to_array();
             costs.copy_from_slice(&of_four[..costs.len()]);
         }
         self.average();
         let Control { steering_rad, speed_mps } = self.controls[0];
-        let PlannerContext { vehicle, control_period_s, .. } = &self.tables.context;
-        let change_mps = speed_mps - self.speed_mps;
-        self.speed_mps +=
-            change_mps.clamp(-vehicle.brake_max_mps2 * control_period_s, vehicle.accel_max_mps2 * control_period_s);
-        self.wheel.command_rad = steering_rad;
-        steer_along_at(self.tables.context.curvature_per_m(steering_rad), Some(speed_mps))
+        self.command = VehicleCommand { steering_rad, speed_mps };
+        let context = &self.tables.context;
+        context.steer_along_at(context.curvature_per_m(steering_rad), speed_mps)
     }
 
     fn reset(&mut self) {
         self.controls.fill(Control::REST);
-        self.wheel.reset();
-        self.speed_mps = 0.0;
+        self.car = VehicleState::at_rest(Pose::default());
+        self.command = Control::REST.into();
     }
 }
 
@@ -498,21 +546,44 @@ mod tests {
         assert!(decision.speed_limit_mps.unwrap() < open.speed_limit_mps.unwrap() - 0.1, "{decision:?} {open:?}");
     }
 
-    /// At rest on free ground with nothing drawn: 28 steps, from 0 to 2.2 m/s at 1 m/s² (2.42 m) and 0.6 s more (1.32 m).
+    /// On free ground with nothing drawn.
     #[test]
     fn a_rollout_is_the_car_that_asks_for_what_the_sample_says() {
         let mut planner = planner();
         planner.field.read(&OccupancyGrid::free(), 0.7);
         let fast = vec![Control { steering_rad: 0.0, speed_mps: 9.0 }; 28];
         let params = Params { obstacle_weight: 0.0, gamma: 0.0, ..Params::paper() };
+        let PlannerContext { vehicle, .. } = context();
         let tables = params.planner(&context()).tables;
         tables.sample(&fast, &mut planner.asked);
-        let costs = tables.costs(&planner.field, &fast, &planner.asked, [0; 4], Control::REST);
-        let cost = costs.to_array()[0];
-        let travel_m: f32 = (1..=28).map(|step| (0.1 * step as f32).min(2.2) * 0.1).sum();
-        let at_end = FourPoints::splat(Vec2::new(3.8 + travel_m, 0.0));
-        let expected = planner.field.way_left_m(at_end).to_array()[0];
+        let at_rest = VehicleState::at_rest(Pose::default());
+        let cost = tables.costs(&planner.field, &fast, &planner.asked, [0; 4], &at_rest).to_array()[0];
+        // No faster than the controller's law.
+        let asked = VehicleCommand { steering_rad: 0.0, speed_mps: 2.2 };
+        let at_end = (0..28).fold(at_rest, |car, _| vehicle::step(&vehicle, car, asked, STEP_S)).pose.position();
+        let expected = planner.field.way_left_m(FourPoints::splat(at_end + Vec2::new(3.8, 0.0))).to_array()[0];
         assert!((cost - expected).abs() < 1e-3, "{cost} and {expected}");
+    }
+
+    /// It stopped at once, and so the planner thought that it need not brake yet.
+    #[test]
+    fn four_cars_speed_up_brake_and_steer_as_the_car_does() {
+        let PlannerContext { vehicle, .. } = context();
+        let mut car = VehicleState { speed_mps: 1.0, ..VehicleState::at_rest(Pose::default()) };
+        let mut four = FourCars::splat(&car);
+        for (steering_rad, speed_mps) in [(0.2, 2.2), (-0.3, 0.5), (0.0, 2.0), (0.5, 0.0)] {
+            let asked = Control { steering_rad, speed_mps };
+            for _ in 0..12 {
+                let before = car;
+                car = vehicle::step(&vehicle, car, asked.into(), STEP_S);
+                let travel_m = four.step(&vehicle, [asked; 4].into()).to_array()[3];
+                let found = [four.speed_mps, four.steering_rad, four.accel_mps2].map(|lanes| lanes.to_array()[3]);
+                let expected = [car.speed_mps, car.steering_rad, car.accel_mps2];
+                assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?} {expected:?}");
+                assert!((travel_m - 0.5 * (before.speed_mps + car.speed_mps) * STEP_S).abs() < 1e-6);
+            }
+        }
+        assert!(car.accel_mps2 < -1.0, "it brakes: {car:?}");
     }
 
     /// Also of those that hit something sooner or later than their neighbours.
@@ -525,8 +596,8 @@ mod tests {
         let ahead = vec![Control { steering_rad: 0.0, speed_mps: 1.2 }; 28];
         let PathIntegral { tables, field, asked, .. } = &mut planner;
         tables.sample(&ahead, asked);
-        let start = Control { steering_rad: 0.1, speed_mps: 1.2 };
-        let costs = |samples| tables.costs(field, &ahead, asked, samples, start).to_array();
+        let start = VehicleState { steering_rad: 0.1, speed_mps: 1.2, ..VehicleState::at_rest(Pose::default()) };
+        let costs = |samples| tables.costs(field, &ahead, asked, samples, &start).to_array();
         let all = (0..200).step_by(4).flat_map(|first| {
             let samples = std::array::from_fn(|lane| first + lane);
             let beside = costs(samples);

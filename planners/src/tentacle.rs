@@ -11,7 +11,7 @@
 //! For every steering angle to start from, the cells around each path are tabulated once; a decision is 81 masked
 //! popcounts.
 
-use crate::context::{PlannerContext, WheelEstimate, steer_along};
+use crate::context::{PlannerContext, WheelEstimate};
 use crate::explanation::CandidatePath;
 use crate::method::{Method, Reading, within};
 use crate::search::{Dimension, Span};
@@ -318,7 +318,7 @@ impl Policy for Tentacles {
         self.previous = self.choose(&observation.grid, steering_rad);
         let curvature_per_m = self.candidates[self.previous].0;
         self.wheel.command_rad = self.context.steering_rad(curvature_per_m);
-        steer_along(curvature_per_m)
+        self.context.steer_along(curvature_per_m)
     }
 
     fn reset(&mut self) {
