@@ -216,7 +216,8 @@ impl Manifest {
         self.version() == (&build.program, &build.git_revision, build.git_dirty, &build.git_changes)
     }
 
-    fn version(&self) -> (&String, &Option<String>, Option<bool>, &Option<String>) {
+    /// What tells programs apart.
+    pub(crate) fn version(&self) -> (&String, &Option<String>, Option<bool>, &Option<String>) {
         (&self.program, &self.git_revision, self.git_dirty, &self.git_changes)
     }
 

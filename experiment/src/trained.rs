@@ -104,16 +104,17 @@ pub fn driving_folders(spec: &Path) -> anyhow::Result<Vec<PathBuf>> {
     sums::read(&run.join(SETTINGS), SETTINGS_BYTES_MAX)?;
     // It says which files the network was trained on.
     sums::read(&run.join(MANIFEST), RUN_TOML_BYTES_MAX)?;
-    let members = settings_of(spec).map_or(1, |settings| settings.dagger.rule.members());
     let round = policy.file_name().and_then(|name| name.to_str()).filter(|name| !is_bc && name.starts_with("round-"));
-    let others = round.into_iter().flat_map(|round| (1..members).map(move |member| format!("{round}-member-{member}")));
-    let others: Vec<PathBuf> = others
-        .map(|member| {
-            sums::read_listed(run, &format!("{member}/{}", sums::FILE), sums::LIST_BYTES_MAX)?;
-            Ok(run.join(member))
-        })
-        .collect::<anyhow::Result<_>>()?;
-    Ok(std::iter::once(policy).chain(others).collect())
+    let mut folders = vec![policy.clone()];
+    for member in (1..).map_while(|member| Some(format!("{}-member-{member}", round?))) {
+        let list = format!("{member}/{}", sums::FILE);
+        if !sums::is_listed(run, &list)? {
+            break;
+        }
+        sums::read_listed(run, &list, sums::LIST_BYTES_MAX)?;
+        folders.push(run.join(member));
+    }
+    Ok(folders)
 }
 
 /// The settings of the run that `run:DIR` or `run:DIR/bc` names.
@@ -133,9 +134,10 @@ pub fn training_of(spec: &Path) -> anyhow::Result<Training> {
     let seed = std::mem::replace(&mut settings.seed, RootSeed(0));
     settings.evaluation = Settings::preset("default")?.evaluation;
     let policy = if run_of(spec)?.1 { "bc" } else { "final" };
-    let Manifest { program, inputs, .. } = Manifest::read(run_of(spec)?.0)?;
-    let digests: Vec<_> = settings.training.lots.iter().map(|lots| inputs.get(lots)).collect();
-    let recipe = sums::digest(format!("{policy}\n{program}\n{digests:?}\n{}", settings.to_toml()).as_bytes());
+    let manifest = Manifest::read(run_of(spec)?.0)?;
+    let digests: Vec<_> = settings.training.lots.iter().map(|lots| manifest.inputs.get(lots)).collect();
+    let recipe = format!("{policy}\n{:?}\n{digests:?}\n{}", manifest.version(), settings.to_toml());
+    let recipe = sums::digest(recipe.as_bytes());
     Ok(Training { recipe, seed })
 }
 
@@ -216,6 +218,24 @@ mod tests {
     use policy::decision_rule::DecisionRule;
     use policy::network::Weights;
     use std::fs;
+
+    /// Three trainings before a change of the code and three after it were one method, and three of them vanished.
+    #[test]
+    fn trainings_of_two_versions_of_the_program_are_not_of_one_recipe() {
+        let path = scratch("recipe-of-version");
+        let settings = Settings::preset("smoke").unwrap();
+        RunDir::create(&place(&path, false), &settings, &Request::default()).unwrap();
+        let manifest = path.join(MANIFEST);
+        let written = fs::read_to_string(&manifest).unwrap();
+        let kept: Vec<&str> = written.lines().filter(|line| !line.starts_with("git_revision")).collect();
+        let recipe_at = |revision: &str| {
+            fs::write(&manifest, format!("git_revision = \"{revision}\"\n{}\n", kept.join("\n"))).unwrap();
+            sums::list(&path, &[MANIFEST]).unwrap();
+            training_of(&path).unwrap().recipe
+        };
+        assert_eq!(recipe_at("0123"), recipe_at("0123"));
+        assert_ne!(recipe_at("0123"), recipe_at("4567"));
+    }
 
     /// Lots that a network was trained on counted as unseen where it was named by its folder.
     #[test]

@@ -204,6 +204,8 @@ impl<'a> Monitor<'a> {
             self.begin(Task::Fitting, &label);
             self.samples_before = fit.samples_done;
         }
+        // A critic or a member of an ensemble begins anew.
+        self.samples_before = self.samples_before.min(fit.samples_done);
         let samples_before = self.samples_before;
         self.progress.at(f64::from(fit.step) / f64::from(fit.steps), &mut |Elapsed { seconds }| {
             let per_s = (fit.samples_done - samples_before) as f64 / seconds;

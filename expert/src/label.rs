@@ -3,6 +3,7 @@
 use crate::context::ExpertContext;
 use crate::elastic_band::{self, ElasticBand};
 use crate::line_of_sight::LineOfSight;
+use crate::search::FIRST_EXPONENT;
 use crate::settings::ExpertSettings;
 use sim::driver::{GroundTruth, LookAheadPoint};
 use sim::geometry::{Pose, Vec2};
@@ -41,7 +42,7 @@ impl Label {
     /// Curvature index of the label, −1…1, on the scale of the first arcs.
     pub(crate) fn index(self, settings: &ExpertSettings) -> f32 {
         let share = (self.curvature_per_m / settings.curvature_max_per_m).clamp(-1.0, 1.0);
-        maths::pow(share.abs(), 1.0 / 1.5).copysign(share)
+        maths::pow(share.abs(), 1.0 / FIRST_EXPONENT).copysign(share)
     }
 
     /// Moves from the last label towards this one, within the limits of a tick. The steering rate limits the car anyway;
@@ -248,7 +249,8 @@ mod tests {
     fn the_index_undoes_the_spacing_of_the_arcs() {
         let settings = ExpertSettings::half_points();
         for index in [-1.0_f32, -0.3, 0.0, 0.5] {
-            let curvature_per_m = settings.curvature_max_per_m * maths::pow(index.abs(), 1.5).copysign(index);
+            let curvature_per_m =
+                settings.curvature_max_per_m * maths::pow(index.abs(), FIRST_EXPONENT).copysign(index);
             assert!((Label { curvature_per_m, arc_length_m: 5.0 }.index(&settings) - index).abs() < 1e-5);
         }
     }

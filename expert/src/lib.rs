@@ -152,12 +152,15 @@ impl ScriptedExpert {
         // Rule two: a point from which avoidance is possible — with the comfortable clearance, or with less.
         let mut best: Option<(usize, Plan)> = None;
         for (level, &clearance_m) in self.settings.clearances_m.iter().enumerate() {
-            let candidates = inspection.as_mut().map(|inspection| &mut inspection.candidates);
-            let plan = search.best_plan(clearance_m, candidates);
-            if let Some(plan) = plan
-                && best.is_none_or(|(_, best)| plan.free_m > best.free_m)
-            {
+            let mut candidates = Vec::new();
+            let plan = search.best_plan(clearance_m, inspection.is_some().then_some(&mut candidates));
+            let is_better = plan.is_some_and(|plan| best.is_none_or(|(_, best)| plan.free_m > best.free_m));
+            if let Some(plan) = plan.filter(|_| is_better) {
                 best = Some((level, plan));
+            }
+            // Those of the plan that is driven; where there is none, of the last level.
+            if let Some(inspection) = inspection.as_mut().filter(|_| is_better || best.is_none()) {
+                inspection.candidates = candidates;
             }
             if best.is_some_and(|(_, best)| best.free_m >= self.settings.avoidable_m) {
                 break;
@@ -165,7 +168,7 @@ impl ScriptedExpert {
         }
 
         let (chosen, clearance_m, wish) = if let Some((level, plan)) = best {
-            // Rule three: half as far as possible.
+            // Rule three: as far as possible, or a share of that (`reach_share`).
             let label = self.smoothed(&search, &ground, &plan);
             let rule = match level {
                 0 if plan.first_free_m >= self.settings.obstacle_ahead_m => Rule::Far,

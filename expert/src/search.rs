@@ -25,7 +25,7 @@ const FIRST_ARCS: usize = 33;
 /// Second arcs: 7 to either side of straight on.
 const SECOND_ARCS: usize = 15;
 /// First arcs are densest where a small change of curvature moves a far point most (docs/methods.md 3.2).
-const FIRST_EXPONENT: f32 = 1.5;
+pub(crate) const FIRST_EXPONENT: f32 = 1.5;
 /// Second arcs (docs/methods.md E5.1).
 const SECOND_EXPONENT: f32 = 1.4;
 /// Travels at which second arcs branch off.

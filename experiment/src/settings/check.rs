@@ -3,6 +3,7 @@
 use super::reference;
 use super::schema::Settings;
 use anyhow::{Context as _, bail, ensure};
+use scenarios::LotSpec;
 use sim::limits::{DRIVES_PER_ROUND_MAX, RUNS_MAX};
 
 impl Settings {
@@ -96,17 +97,20 @@ impl Settings {
     /// Checks names of lots, and counts the drives they make. Files are not looked at.
     fn check_lots(&self) -> anyhow::Result<()> {
         let Self { training, evaluation, .. } = self;
-        let count = |key: &str, names: &[String]| {
-            let lots = names.iter().map(|name| Ok(scenarios::suite(name)?.len()));
+        let of_lots = |key: &str, names: &[String], times: &dyn Fn(&LotSpec) -> usize| {
+            let lots = names.iter().map(|name| Ok(scenarios::suite(name)?.iter().map(times).sum::<usize>()));
             lots.sum::<anyhow::Result<usize>>().with_context(|| key.to_owned())
         };
-        let drives = count("training.lots", &training.lots)? * training.trials as usize * training.directions.len();
+        // A generated lot is another one in every round, and driven once.
+        let trials =
+            |lot: &LotSpec| if matches!(lot, LotSpec::Generated { .. }) { 1 } else { training.trials as usize };
+        let drives = of_lots("training.lots", &training.lots, &trials)? * training.directions.len();
         ensure!(
             drives <= DRIVES_PER_ROUND_MAX,
             "training.lots, trials and directions: {drives} drives a round; at most {DRIVES_PER_ROUND_MAX} are possible"
         );
         for (key, names) in [("evaluation.lots", &evaluation.lots), ("evaluation.elsewhere", &evaluation.elsewhere)] {
-            let lots = count(key, names)?;
+            let lots = of_lots(key, names, &|_| 1)?;
             let runs = lots * evaluation.trials as usize * evaluation.directions.len() * evaluation.noise.len();
             ensure!(
                 runs <= RUNS_MAX,

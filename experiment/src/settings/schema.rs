@@ -70,6 +70,11 @@ pub struct EvaluationSettings {
 }
 
 impl Settings {
+    /// Root seeds of so many trainings: the settings' own, and those that follow it.
+    pub fn training_seeds(&self, trainings: u64) -> Vec<RootSeed> {
+        (0..trainings).map(|index| RootSeed(self.seed.0 + index)).collect()
+    }
+
     /// As written into a run.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("settings are plain values")

@@ -13,7 +13,7 @@ use crate::dataset::store::Store;
 use crate::dataset::{Collection, Dataset, Round};
 use crate::files::{self, Format as _};
 use crate::fit::learning;
-use crate::fit::{self, FitContext, FitOutcome, FitProgress, FitReport, FitSettings};
+use crate::fit::{self, FitContext, FitError, FitOutcome, FitProgress, FitReport, FitSettings};
 use crate::network::Weights;
 use sim::seed::{RootSeed, Stream};
 use std::ops::ControlFlow;
@@ -223,8 +223,11 @@ impl Run<'_, '_> {
         let DaggerSettings { inference, device, .. } = *self.settings;
         let context = FitContext { geometry: self.conditions.geometry(), inference, device, seed };
         let FitOutcome { weights, report, steps } =
-            fit::fit(start, d, settings, context, Some(&unfinished), &mut on_step)
-                .map_err(|source| DaggerError::Fit { round, source })?;
+            fit::fit(start, d, settings, context, Some(&unfinished), &mut on_step).map_err(|source| match source {
+                // Where there is space again, it goes on.
+                FitError::File(error) => DaggerError::File(error),
+                source => DaggerError::Fit { round, source },
+            })?;
         if report.stopped {
             return Ok(None);
         }

@@ -90,7 +90,7 @@ pub enum DaggerError {
     #[error(transparent)]
     File(#[from] FileError),
     /// A training that cannot start or continue.
-    #[error("{}: {source}; resumed unchanged, the run ends in the same error", training_of(*round))]
+    #[error("{}: resumed unchanged, the run ends in the same error", training_of(*round))]
     Fit {
         /// Which round; `None`: the final training.
         round: Option<u32>,
@@ -106,10 +106,7 @@ pub enum DaggerError {
         source: EpisodesError,
     },
     /// A network whose answer is not finite.
-    #[error(
-        "round {round}: {source}; see it with cargo xtask render trajectories --run RUN --round {round} --trial {}",
-        source.episode
-    )]
+    #[error("round {round}, drive {}", source.episode)]
     Driving {
         /// Which round.
         round: u32,
@@ -117,10 +114,7 @@ pub enum DaggerError {
         source: NotFinite,
     },
     /// Driving that left the finite numbers.
-    #[error(
-        "round {round}, drive {drive}, tick {tick}: {what} is not a finite number; see it with cargo xtask render \
-         trajectories --run RUN --round {round} --trial {drive}"
-    )]
+    #[error("round {round}, drive {drive}, tick {tick}: {what} is not a finite number")]
     NotFinite {
         /// Which round.
         round: u32,

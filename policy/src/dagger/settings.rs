@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 pub struct DaggerSettings {
     /// η: iterations stop when the network drives more than this share of the ticks.
     pub eta: f64,
-    /// Iterations made even if η is passed earlier.
+    /// Iterations made even if η is passed earlier; never more than `iterations_max`.
     pub iterations_min: u32,
     /// Iterations made at most.
     pub iterations_max: u32,

@@ -3,7 +3,8 @@
 //!
 //! Novelty is the disagreement of an ensemble. Risk is what a critic predicts: γ to the power of the ticks until the next
 //! near-collision, 0 if none follows; where the authors' Q function is the discounted chance of success. Both thresholds
-//! are quantiles over the data so far, as in the authors' code.
+//! are quantiles over the data so far; the authors' code takes them from held-back data, then from what the robot drove in the
+//! present iteration (docs/methods.md 5).
 
 use crate::decision_rule::gate::{Gate, GateTick, Wheel};
 use serde::{Deserialize, Serialize};

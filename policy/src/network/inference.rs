@@ -1,4 +1,5 @@
-//! How a trained network is used at the wheel. Training does not depend on it, validation does.
+//! How a trained network is used at the wheel. The steps of a fit do not depend on it; which weights are kept, and what is
+//! collected with them, do.
 
 use crate::network::error::NetworkError;
 use serde::{Deserialize, Serialize};

@@ -13,7 +13,7 @@ use serde::de::IgnoredAny;
 use sim::limits::{IMAGE_BYTES_MAX, IMAGE_SIDE_MAX_PX, MAP_COORDINATE_MAX_M, MAP_RESOLUTION_M, MAP_YAML_BYTES_MAX};
 use std::collections::BTreeMap;
 use std::fmt::Display;
-use std::io::{self, Cursor};
+use std::io::{self, Cursor, ErrorKind};
 use std::path::{Path, PathBuf};
 use storage::read;
 
@@ -113,7 +113,11 @@ impl Map {
             remedy: remedy.to_owned(),
         };
         let unreadable = |error: std::io::Error| {
-            fault(format!("cannot be read: {error}"), "check the key image; paths start at the YAML file")
+            let remedy = match error.kind() {
+                ErrorKind::FileTooLarge => "crop it, or halve its resolution",
+                _ => "check the key image; paths start at the YAML file",
+            };
+            fault(format!("cannot be read: {error}"), remedy)
         };
         if !read::is_below(folder, &file).map_err(unreadable)? && !is_image_anywhere {
             let problem = "it is neither next to the YAML file nor in a folder below".to_owned();
