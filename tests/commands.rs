@@ -601,13 +601,17 @@ fn tables_are_printed_as_json_and_nothing_else_is() {
     assert_eq!(sizes[0]["metres"].as_f64().unwrap().round(), 2996.0);
     let out = scratch("json").join("run").to_string_lossy().into_owned();
     // Lots of the check elsewhere that are trained on are not passed off as unseen.
-    let also = "validation:1:lane";
-    let tables = json(&["train-bc", "--preset", "smoke", "--also", also, "--quiet", "--out", &out]);
+    let also = "validation:2:lane";
+    let elsewhere = "evaluation.elsewhere=[\"validation:2:lane\"]";
+    let tables = json(&["train-bc", "--preset", "smoke", "--also", also, "--set", elsewhere, "--quiet", "--out", &out]);
     assert_eq!(tables.len(), 3, "iterations, evaluation and the check elsewhere");
-    assert!(tables[2][0]["lots"] == "validation-lane" && tables[2][0]["trained_on"] == true, "{}", tables[2]);
+    assert!(tables[2][0]["lots"] == "validation-lane (2 lots)" && tables[2][0]["trained_on"] == true, "{}", tables[2]);
     assert!(tables[2].as_array().unwrap().iter().all(|row| row["contacts"].is_number()), "{}", tables[2]);
     let elsewhere = std::fs::read_to_string(Path::new(&out).join("elsewhere.md")).unwrap();
-    assert!(elsewhere.contains("validation-lane (trained on)") && elsewhere.contains("BC per 100 m"), "{elsewhere}");
+    assert!(
+        elsewhere.contains("validation-lane (2 lots) (trained on)") && elsewhere.contains("BC per 100 m"),
+        "{elsewhere}"
+    );
     assert!(tables[0]["rows"][0]["samples"].is_number() && tables[1]["rows"][0]["near_collisions"].is_number());
 }
 

@@ -45,9 +45,20 @@ type RunOf = (usize, Direction, u32);
 struct Failing {
     driver: String,
     noise: NoiseChoice,
-    spec: DriverSpec,
+    /// A replay key that names the driver.
+    replay: String,
     /// The ticks at which there is a near-collision.
     runs: BTreeMap<RunOf, Vec<u32>>,
+}
+
+impl Failing {
+    /// # Errors
+    /// If only Python can call the driver.
+    fn spec(&self) -> anyhow::Result<DriverSpec> {
+        let key: ReplayKey =
+            self.replay.parse().with_context(|| format!("{}: cannot be driven from here", self.driver))?;
+        Ok(key.driver)
+    }
 }
 
 /// Drives again what failed in the evaluation in `folder`, and tries every substitution at each near-collision; of the
@@ -70,12 +81,14 @@ pub fn of_evaluation(
     if let Some(driver) = drivers.iter().find(|&driver| failing.iter().all(|failing| failing.driver != *driver)) {
         bail!("{}: no near-collision of a driver {driver:?} is in it; its tables name them", folder.display());
     }
+    // Only those of the drivers that were asked for: a row is no worse for naming one that only Python can call.
+    let specs = failing.iter().map(Failing::spec).collect::<anyhow::Result<Vec<_>>>()?;
     let all: usize = failing.iter().map(|failing| failing.runs.len()).sum();
     progress.begin("what-if", "driving again");
     let mut rows = Vec::new();
     let mut done = 0;
-    for Failing { driver: name, noise, spec, runs } in &failing {
-        let driver = spec.clone().load(settings)?;
+    for (Failing { driver: name, noise, runs, .. }, spec) in failing.iter().zip(specs) {
+        let driver = spec.load(settings)?;
         driver.check(settings)?;
         manifest.check_some_inputs(&inputs::of(&[], std::slice::from_ref(&driver)))?;
         let substitutes = Substitutes::new(&driver, settings);
@@ -118,31 +131,22 @@ pub fn of_evaluation(
 /// What failed, by driver and level of noise, in the order of the file.
 fn read(folder: &Path, lots: &[Lot], drivers: &[String]) -> anyhow::Result<Vec<Failing>> {
     let index: BTreeMap<&str, usize> = lots.iter().enumerate().map(|(index, lot)| (lot.name(), index)).collect();
-    let mut all: Vec<(String, NoiseChoice, BTreeMap<RunOf, Vec<u32>>)> = Vec::new();
-    let mut keys = Vec::new();
+    let mut all: Vec<Failing> = Vec::new();
     records::each_line(&folder.join(records::FAILURES), |failure: FailureRecord| {
         let Driven { driver, lot, direction, trial, noise, .. } = failure.driven;
         if !drivers.is_empty() && !drivers.contains(&driver) {
             return Ok(());
         }
         let &lot = index.get(lot.as_str()).with_context(|| format!("lot {lot:?} is not in evaluation.lots"))?;
-        let known = all.iter().position(|failing| failing.0 == driver && failing.1 == noise);
-        let at = if let Some(at) = known {
-            at
-        } else {
-            keys.push(failure.replay);
-            all.push((driver, noise, BTreeMap::new()));
+        let known = all.iter().position(|failing| failing.driver == driver && failing.noise == noise);
+        let at = known.unwrap_or_else(|| {
+            all.push(Failing { driver, noise, replay: failure.replay, runs: BTreeMap::new() });
             all.len() - 1
-        };
-        all[at].2.entry((lot, direction, trial)).or_default().push(failure.tick);
+        });
+        all[at].runs.entry((lot, direction, trial)).or_default().push(failure.tick);
         Ok(())
     })?;
-    // Not while reading: a row is no worse for naming a driver that only Python can call.
-    let with_spec = |((driver, noise, runs), key): ((String, NoiseChoice, _), String)| {
-        let key = key.parse::<ReplayKey>().with_context(|| format!("{driver}: cannot be driven from here"))?;
-        Ok(Failing { driver, noise, spec: key.driver, runs })
-    };
-    all.into_iter().zip(keys).map(with_spec).collect()
+    Ok(all)
 }
 
 /// Whether the near-collisions of a batch are at the ticks that were recorded of each run.

@@ -28,7 +28,7 @@ impl AxisCalibration {
         let within = |k: f64| samples.iter().filter(|(error, sigma)| error.abs() <= k * sigma).count() as f64 / n;
         let rms =
             |values: &mut dyn Iterator<Item = f64>, n: usize| (values.map(|v| v * v).sum::<f64>() / n as f64).sqrt();
-        let size = samples.len().div_ceil(BINS).max(1);
+        let bins = BINS.min(samples.len());
         let bin = |bin: &[(f64, f64)]| {
             [rms(&mut bin.iter().map(|s| s.1), bin.len()), rms(&mut bin.iter().map(|s| s.0), bin.len())]
         };
@@ -36,7 +36,7 @@ impl AxisCalibration {
             name: name.to_owned(),
             samples: samples.len(),
             coverage: [within(1.0), within(2.0)],
-            bins: samples.chunks(size).map(bin).collect(),
+            bins: (0..bins).map(|i| bin(&samples[i * samples.len() / bins..(i + 1) * samples.len() / bins])).collect(),
         }
     }
 }
@@ -67,5 +67,7 @@ mod tests {
         // The surest first: σ 0.1 with error 0.2, then σ 2 with error 1.
         let of = AxisCalibration::of("along", [(1.0, 2.0), (-0.2, 0.1)]);
         assert_eq!(of.bins, [[0.1, 0.2], [2.0, 1.0]]);
+        let of = AxisCalibration::of("along", (0..12).map(|i| (1.0, f64::from(i))));
+        assert_eq!(of.bins.len(), BINS, "twelve in ten groups of one or two");
     }
 }

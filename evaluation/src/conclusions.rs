@@ -384,7 +384,7 @@ fn ratio_text(ratio: &RateRatio) -> String {
 pub fn share_of_the_network(rows: &[IterationRow], eta: f64) -> Statement {
     let shares: Vec<f64> = rows.iter().filter_map(|row| row.eta_hat).collect();
     let verdict = match shares[..] {
-        [first, .., last] if last > eta && last > first => Verdict::Holds,
+        [_, .., last] if last > eta && shares.is_sorted_by(|before, after| before < after) => Verdict::Holds,
         [only] if only > eta => Verdict::CannotBeTold,
         [] => Verdict::CannotBeTold,
         _ => Verdict::DoesNotHold,

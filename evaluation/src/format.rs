@@ -5,8 +5,8 @@ use crate::statistics::bootstrap::Interval;
 use crate::statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
 use crate::totals::Totals;
 
-/// The bootstrap's interval of a rate, where events cluster and no other may be quoted (docs/methods.md 8.3).
-pub(crate) fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
+/// The bootstrap's interval of a rate where events cluster, so that what takes them for independent may not be quoted (docs/methods.md 8.3).
+pub fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
     let is_clustered = estimate.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
     estimate.per_100m.filter(|_| is_clustered)
 }
@@ -15,7 +15,14 @@ pub(crate) fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
 /// events cluster.
 pub fn quoted_interval(totals: &Totals, estimate: &DriverEstimate) -> [f64; 2] {
     let rate = totals.rate();
-    clustered(estimate).map_or([rate.lower, rate.upper], |interval| [interval.lower, interval.upper])
+    let exact = [rate.lower, rate.upper];
+    clustered(estimate).map_or(exact, |interval| at_least_exact([interval.lower, interval.upper], exact))
+}
+
+/// The bootstrap's interval where events cluster, which makes it wider than the exact one; of few events it may be narrower
+/// by chance.
+pub(crate) fn at_least_exact(bootstrap: [f64; 2], exact: [f64; 2]) -> [f64; 2] {
+    [bootstrap[0].min(exact[0]), bootstrap[1].max(exact[1])]
 }
 
 /// The rate with the interval that may be quoted (docs/methods.md 8.3).
@@ -85,6 +92,13 @@ mod tests {
         assert_eq!(quoted_rate(&totals, &estimate(1.6)), "1.37 [0.90, 2.00] (b)");
         assert_eq!(difference(Some(interval), 1), "+1.4 [+0.9, +2.0] *");
         assert_eq!(quoted_interval(&totals, &estimate(1.6)), [0.9, 2.0]);
+        let narrow =
+            DriverEstimate { per_100m: Some(Interval { lower: 1.2, upper: 1.5, ..interval }), ..estimate(1.6) };
+        assert_eq!(
+            quoted_rate(&totals, &narrow),
+            "1.37 [1.07, 1.73] (b)",
+            "never narrower than of events that come alone"
+        );
         let around_zero = Interval { lower: -0.1, ..interval };
         assert_eq!(difference(Some(around_zero), 1), "+1.4 [-0.1, +2.0]");
     }

@@ -1,13 +1,13 @@
 //! How drivers compare in a slice of the lots, judged by resampling (docs/methods.md 8.3).
 
-use crate::results::{EvaluationResults, RunSummary};
+use crate::results::{EvaluationResults, RunSummary, SAMPLE_MIN};
 use crate::slices::Slice;
 use crate::statistics::bootstrap::{DRAWS, Interval, Units};
 use crate::statistics::comparison::{RateRatio, holm};
 use crate::statistics::poisson::Dispersion;
 use serde::Serialize;
 use sim::seed::RootSeed;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A driver in a slice, judged by resampling.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -45,7 +45,8 @@ impl EvaluationResults {
     /// How the drivers stand in a slice at a noise level, and how they compare with one of them. What is independent is
     /// resampled (docs/methods.md 8.3): whole trials of fixed lots, both ways, because they share their obstacles;
     /// whole lots within their kind of generated lots, which are a sample themselves, and also of six or more lots from
-    /// files where they are pooled (chosen). Only runs that all drivers have driven count.
+    /// files where they are pooled (chosen). What is alone of its kind is drawn with the others that are. Only runs that all
+    /// drivers have driven count.
     pub fn judge(
         &self,
         level: usize,
@@ -127,14 +128,31 @@ pub(crate) type Stratum<'a> = Vec<&'a [Vec<RunSummary>]>;
 
 /// Trials are ordered lot by lot, so clusters lie together; the lots of a stratum need not.
 pub(crate) fn strata(pairs: &[Vec<RunSummary>], is_pooled: bool) -> Vec<Stratum<'_>> {
-    let is_of_sample = |row: &[RunSummary]| is_pooled && row[0].is_of_sample;
+    let of_sample = pairs.iter().filter(|row| row[0].is_of_sample).map(|row| row[0].group);
+    let are_sample = is_pooled && of_sample.collect::<BTreeSet<_>>().len() >= SAMPLE_MIN;
+    let is_of_sample = |row: &[RunSummary]| are_sample && row[0].is_of_sample;
     let cluster = |row: &[RunSummary]| if is_of_sample(row) { (true, row[0].group) } else { (false, row[0].cluster) };
     let mut strata: BTreeMap<Option<u32>, Stratum<'_>> = BTreeMap::new();
     for rows in pairs.chunk_by(|a, b| cluster(a) == cluster(b)) {
         let group = (!is_of_sample(&rows[0])).then_some(rows[0][0].group);
         strata.entry(group).or_default().push(rows);
     }
-    strata.into_values().collect()
+    collapsed(strata.into_values().collect())
+}
+
+/// Strata of one cluster, which every draw would have alike as if its rate were known, as one stratum; a single such one goes to
+/// the smallest other. What differs between them counts as chance then: intervals are rather too wide.
+///
+/// Source: collapsed strata, Cochran, Sampling Techniques, 3rd edition, 5A.12 (1977).
+fn collapsed(strata: Vec<Stratum<'_>>) -> Vec<Stratum<'_>> {
+    let (single, mut strata): (Vec<_>, Vec<_>) = strata.into_iter().partition(|clusters| clusters.len() == 1);
+    let joined: Stratum<'_> = single.into_iter().flatten().collect();
+    match strata.iter_mut().min_by_key(|clusters| clusters.len()) {
+        Some(smallest) if joined.len() == 1 => smallest.extend(joined),
+        _ if joined.is_empty() => {}
+        _ => strata.push(joined),
+    }
+    strata
 }
 
 /// Statistics that are resampled for every driver: near-collisions per 100 m, safe ratio, steering reversals per 100 m

@@ -50,7 +50,7 @@ pub struct EvaluationResults {
 }
 
 /// So many lots from files are a sample of their kind (chosen: as many units as an interval needs to exclude zero).
-const SAMPLE_MIN: usize = 6;
+pub(crate) const SAMPLE_MIN: usize = 6;
 
 /// How the runs of a lot are counted.
 #[derive(Debug, Clone, Copy)]
@@ -98,7 +98,6 @@ impl EvaluationResults {
             lots: BTreeMap::new(),
             drivers: vec![vec![DriverResults::default(); plan.drivers.len()]; plan.settings.evaluation.noise.len()],
         };
-        let are_sample = plan.lots.iter().filter(|lot| lot.is_from_file()).count() >= SAMPLE_MIN;
         let mut free_cluster = 0;
         for lot in plan.lots {
             let name = lot.group();
@@ -115,7 +114,7 @@ impl EvaluationResults {
                 (Clusters::Trials(free_cluster), plan.settings.evaluation.trials)
             };
             free_cluster += count;
-            let is_of_sample = are_sample && lot.is_from_file();
+            let is_of_sample = lot.is_from_file();
             results.lots.insert(lot.name().to_owned(), Place { group: group as u32, clusters, is_of_sample });
         }
         results

@@ -55,11 +55,6 @@ pub fn title(rule: &str) -> &str {
     all().into_iter().find(|(name, _)| *name == rule).map_or(rule, |(_, title)| title)
 }
 
-/// Root seeds of the trainings.
-pub fn seeds(settings: &Settings, extent: &Extent) -> Vec<RootSeed> {
-    (0..extent.seeds).map(|index| RootSeed(settings.seed.0 + index)).collect()
-}
-
 /// Folder of a training.
 pub fn folder(rule: &str, seed: RootSeed) -> String {
     format!("s{}-{rule}", seed.0)
@@ -71,13 +66,13 @@ pub fn policies<'e>(settings: &Settings, extent: &'e Extent) -> Vec<(RootSeed, O
         let rules = extent.rules.iter().map(move |rule| (seed, Some(rule.as_str())));
         std::iter::once((seed, None)).chain(rules)
     };
-    seeds(settings, extent).into_iter().flat_map(of_seed).collect()
+    settings.training_seeds(extent.seeds).into_iter().flat_map(of_seed).collect()
 }
 
 /// The trainings, then the evaluation. `root`: the folder of the whole run.
 pub fn stages(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     let mut stages = Vec::new();
-    for seed in seeds(settings, extent) {
+    for seed in settings.training_seeds(extent.seeds) {
         for rule in &extent.rules {
             stages.push(Stage {
                 folder: folder(rule, seed),

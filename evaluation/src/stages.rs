@@ -187,11 +187,6 @@ const TAU: f32 = 0.07;
 /// See [`TAU`].
 const CHI: f32 = 0.1;
 
-/// Root seeds of the trainings.
-pub fn seeds(settings: &Settings, extent: &Extent) -> Vec<RootSeed> {
-    (0..extent.seeds).map(|index| RootSeed(settings.seed.0 + index)).collect()
-}
-
 /// Name of what was trained from a seed: the first one's is that of the paper's driver.
 pub fn named(base: &str, seed: RootSeed, settings: &Settings) -> String {
     if seed == settings.seed { base.to_owned() } else { format!("{base} (seed {})", seed.0) }
@@ -229,7 +224,7 @@ pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
         folder: ON_POLICY.to_owned(),
         about: "on-policy labelled rollouts: networks drive, the expert labels".to_owned(),
         settings: settings.clone(),
-        step: Step::OnPolicy { seeds: seeds(settings, extent) },
+        step: Step::OnPolicy { seeds: settings.training_seeds(extent.seeds) },
     });
     stages
 }
@@ -296,7 +291,7 @@ pub fn share(stages: Vec<Stage>, part: Part, shard: Shard) -> Vec<Stage> {
 
 fn trainings(settings: &Settings, extent: &Extent) -> Vec<Stage> {
     let mut stages = Vec::new();
-    for seed in seeds(settings, extent) {
+    for seed in settings.training_seeds(extent.seeds) {
         let of_seed = Settings { seed, ..settings.clone() };
         stages.extend([Chain::Weighted, Chain::Unweighted].map(|chain| chain.stage(&of_seed, extent)));
     }
@@ -322,7 +317,7 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
         [(BC, Chain::Weighted, "/bc"), (DAGGER, Chain::Weighted, ""), (UNWEIGHTED, Chain::Unweighted, "")]
             .map(|(name, chain, rest)| (named(name, seed, settings), spec(chain, seed, rest)))
     };
-    let networks: Drivers = seeds(settings, extent).into_iter().flat_map(of_seed).collect();
+    let networks: Drivers = settings.training_seeds(extent.seeds).into_iter().flat_map(of_seed).collect();
     let of_first_seed = |name: &str, chain| (name.to_owned(), spec(chain, settings.seed, ""));
 
     let own = |name: &str| (name.to_owned(), name.to_owned());

@@ -163,8 +163,9 @@ impl Team {
         if !group.iter().all(|index| seed_of(index).is_some()) {
             return Self { name, drivers: group, seeds: Vec::new() };
         }
-        group.sort_by_key(seed_of);
-        group.dedup_by_key(|index| seed_of(index));
+        let network_of = |index: &usize| (seed_of(index), drivers[*index].digest());
+        group.sort_by_cached_key(network_of);
+        group.dedup_by_key(|index| network_of(index));
         Self { name, seeds: group.iter().filter_map(seed_of).collect(), drivers: group }
     }
 }
@@ -211,16 +212,13 @@ impl EvaluationResults {
 
     /// Whether enough is drawn in a slice that not all of it may be alike by chance: [`UNITS_MIN`] trials, or lots of a sample.
     pub fn are_enough_to_judge_by(&self, level: usize, slice: &Slice) -> bool {
-        let pairs = self.common_runs(level, slice);
-        // What a stratum has one of is never drawn.
-        let drawn = strata(&pairs, slice.is_pooled()).iter().map(Vec::len).filter(|&units| units > 1).sum::<usize>();
-        drawn >= UNITS_MIN as usize
+        are_enough(&strata(&self.common_runs(level, slice), slice.is_pooled()))
     }
 
     /// How teams stand in a slice at a noise level, and how they differ from one of them, `with`. Lots are drawn as in
     /// [`judge`](Self::judge), for the means over trainings; Student's interval of these means adds what other seeds bring.
-    /// Trainings of one seed begin alike, so teams of the same seeds differ by pairs. `None` if nothing varies.
-    /// Of few units all may be alike by chance; see [`Self::are_enough_to_judge_by`].
+    /// Trainings of one seed begin alike, so teams of the same seeds differ by pairs. What fewer than [`TRAININGS_MIN`] say about
+    /// other seeds does not count. `None` of too little ([`Self::are_enough_to_judge_by`]).
     pub fn judge_teams(
         &self,
         level: usize,
@@ -231,7 +229,7 @@ impl EvaluationResults {
     ) -> Option<Vec<TeamEstimate>> {
         let pairs = self.common_runs(level, slice);
         let strata = strata(&pairs, slice.is_pooled());
-        if strata.iter().all(|clusters| clusters.len() < 2) {
+        if !are_enough(&strata) {
             return None;
         }
         let drivers = pairs[0].len();
@@ -254,17 +252,18 @@ impl EvaluationResults {
         }
         let by_seed = |team: &Team| -> Vec<f64> { team.drivers.iter().map(|&driver| per_100m(&all, driver)).collect() };
         let of_with = by_seed(&teams[with]);
+        let of_seeds = |rates: &[f64]| if rates.len() < TRAININGS_MIN { 0.0 } else { half_width_of_mean(rates) };
         // No draw of lots without events has any. Trainings that drove the same lots add no metres.
         let supported = Rate::new(0, all[drivers]).upper;
         let estimate = |(team, (&rate, &difference)): (&Team, (&Interval, &Interval))| {
             let is_paired = !team.seeds.is_empty() && team.seeds == teams[with].seeds || team == &teams[with];
             let own = by_seed(team);
-            let half_width = half_width_of_mean(&own);
+            let half_width = of_seeds(&own);
             let per_100m = widened(rate, half_width);
             let half_width = if is_paired {
-                half_width_of_mean(&own.iter().zip(&of_with).map(|(own, with)| own - with).collect::<Vec<_>>())
+                of_seeds(&own.iter().zip(&of_with).map(|(own, with)| own - with).collect::<Vec<_>>())
             } else {
-                together(half_width, half_width_of_mean(&of_with))
+                together(half_width, of_seeds(&of_with))
             };
             TeamEstimate {
                 per_100m: Interval { lower: per_100m.lower.max(0.0), upper: per_100m.upper.max(supported), ..per_100m },
@@ -273,6 +272,12 @@ impl EvaluationResults {
         };
         Some(teams.iter().zip(rates.iter().zip(differences)).map(estimate).collect())
     }
+}
+
+/// Whether so much is drawn that not all of it may be alike by chance.
+fn are_enough(strata: &[Stratum<'_>]) -> bool {
+    // What a stratum has one of is never drawn.
+    strata.iter().map(Vec::len).filter(|&units| units > 1).sum::<usize>() >= UNITS_MIN as usize
 }
 
 /// The near-collisions of each driver in every cluster, and the hundreds of metres that all share.

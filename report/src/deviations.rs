@@ -78,11 +78,15 @@ pub fn write(_: &Settings, _: &Extent, stages: &[Stage], run: &RunDir) -> anyhow
             difference(row.difference, 2),
         ]);
     }
-    run.write("deviations.md", format!("{table}\n").as_bytes())?;
+    let text = format!("{table}\n\n{LEGEND}");
+    run.write("deviations.md", format!("{text}\n").as_bytes())?;
     run.write("deviations.csv", &csv_of(&rows)?)?;
     run.write("deviations.svg", plot(&rows).as_bytes())?;
-    Ok(table.to_string())
+    Ok(text)
 }
+
+const LEGEND: &str = "Of one training of each: intervals of 95 % are for other lots, not for other seeds; (b): bootstrap, where \
+    near-collisions come in clusters. A difference that excludes zero (*) is one of many, and no adjustment is made for their number.";
 
 fn rows_of(stage: &Stage, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<Row>> {
     let drive = DriveStage::load(stage)?;

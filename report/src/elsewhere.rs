@@ -5,7 +5,7 @@ use comfy_table::Table;
 use evaluation::format::quoted_rate;
 use evaluation::judge::DriverEstimate;
 use evaluation::results::EvaluationResults;
-use evaluation::slices::Slice;
+use evaluation::slices::{Slice, SliceKind};
 use evaluation::totals::Totals;
 use experiment::run_dir::RunDir;
 use serde::Serialize;
@@ -37,13 +37,16 @@ pub struct Row {
 
 /// The rows of an evaluation at its first noise level, kind by kind, driver by driver; `seed` is that of its trials.
 pub fn rows(results: &EvaluationResults, drivers: &[&str], seed: RootSeed) -> Vec<Row> {
-    let is_trained_on = |label: &str| results.groups().iter().any(|lots| lots.is_trained_on && lots.name == label);
+    let is_trained_on = |slice: &Slice| {
+        let mut groups = (0..).zip(results.groups());
+        slice.kind == SliceKind::Group && groups.any(|(group, lots)| lots.is_trained_on && slice.contains(group))
+    };
     let row = |slice: &Slice, driver: usize, estimate: &DriverEstimate| {
         let totals = results.totals(0, driver, slice, None);
         let Totals { reference_m, near_collisions, contacts, stuck, clearance_min_m, .. } = totals;
         Row {
             lots: slice.label.clone(),
-            trained_on: is_trained_on(&slice.label),
+            trained_on: is_trained_on(slice),
             driver: drivers[driver].to_owned(),
             route_m: reference_m,
             near_collisions,

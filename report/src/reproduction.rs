@@ -27,7 +27,7 @@ use experiment::lots::UNSEEN;
 use experiment::manifest::Manifest;
 use experiment::run_dir::RunDir;
 use experiment::settings::{Settings, with_points_of_paper};
-use policy::dagger::IterationRow;
+use policy::dagger::{DaggerSettings, IterationRow};
 use policy::decision_rule::DecisionRule;
 use sim::seed::RootSeed;
 use std::fmt::Write as _;
@@ -71,7 +71,7 @@ pub fn write_docs(
     to: &Path,
     revision: Option<&str>,
 ) -> anyhow::Result<()> {
-    let seeds = stages::seeds(&recipe.settings, &recipe.extent);
+    let seeds = recipe.settings.training_seeds(recipe.extent.seeds);
     let seeds = seeds.iter().map(|seed| seed.0.to_string()).collect::<Vec<_>>().join(", ");
     let named: Vec<String> = others.iter().map(OtherRun::to_string).collect();
     let manifest = Manifest::read(run)?;
@@ -141,7 +141,7 @@ impl Found {
         with_drives(&recipe.stages, root, [stages::REFERENCE, stages::UNSEEN], |[reference, unseen]| {
             headline(page, &reference, &unseen);
             page.section("What holds here", verdicts(&self.statements, &recipe.extent));
-            table_1(page, settings.dagger.eta, &self.weighted, &self.unweighted, &self.on_policy.effect);
+            table_1(page, &settings.dagger, &self.weighted, &self.unweighted, &self.on_policy.effect);
             collision_rates(page, &reference);
             safe_ratios(page, &reference);
             unseen_lots(page, &unseen);
@@ -322,7 +322,14 @@ fn verdicts(statements: &[Statement], extent: &Extent) -> String {
     text
 }
 
-fn table_1(page: &mut Page, eta: f64, weighted: &[IterationRow], unweighted: &[IterationRow], effect: &[Effect]) {
+fn table_1(
+    page: &mut Page,
+    dagger: &DaggerSettings,
+    weighted: &[IterationRow],
+    unweighted: &[IterationRow],
+    effect: &[Effect],
+) {
+    let alpha = dagger.fit.loss.alpha;
     let columns = weighted.len().max(unweighted.len()).max(paper::TABLE_1.dataset.len());
     let header: Vec<String> = (0..columns).map(|i| if i == 0 { BC.to_owned() } else { format!("i = {i}") }).collect();
     let mut table = with_header(std::iter::once(String::new()).chain(header).collect());
@@ -356,7 +363,7 @@ fn table_1(page: &mut Page, eta: f64, weighted: &[IterationRow], unweighted: &[I
         "Table 1: DAgger iterations",
         format!(
             "{table}\n\nη̂ of a column is of the policy trained in the column before. The effect compares the two policies \
-             trained in a column, with α = 1.5 and with α = 0 on the same data seeds: Σ τ̂ with the weight over Σ τ̂ \
+             trained in a column, with α = {alpha} and with α = 0 on the same data seeds: Σ τ̂ with the weight over Σ τ̂ \
              without, smaller is better. *Held-back samples*: of both data sets so far, resampled in stretches. \
              *Driving*: per second at the wheel of one trial of every lot, the expert watching. {READ_ETA_HAT}"
         ),
@@ -364,11 +371,11 @@ fn table_1(page: &mut Page, eta: f64, weighted: &[IterationRow], unweighted: &[I
     let points = |rows: &[IterationRow]| {
         rows.iter().filter_map(|row| Some((row.round, row.eta_hat?))).collect::<Vec<(u32, f64)>>()
     };
-    let ours = [("α = 1.5", weighted), ("α = 0", unweighted)]
-        .map(|(name, rows)| EtaSeries { name: name.to_owned(), points: points(rows) });
+    let ours = [(format!("α = {alpha}"), weighted), ("α = 0".to_owned(), unweighted)]
+        .map(|(name, rows)| EtaSeries { name, points: points(rows) });
     let of_paper: Vec<(u32, f64)> =
         (0..).zip(paper::TABLE_1.eta_hat).filter_map(|(round, eta)| Some((round, eta?))).collect();
-    page.figure("eta", "Share of the network by iteration.", Image::Svg(plots::eta(&ours, &of_paper, eta)));
+    page.figure("eta", "Share of the network by iteration.", Image::Svg(plots::eta(&ours, &of_paper, dagger.eta)));
 }
 
 /// Lots as columns, as in the paper: groups, then what is pooled.

@@ -61,11 +61,15 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
             row.quoted.clone(),
         ]);
     }
-    run.write("scaling.md", format!("{table}\n").as_bytes())?;
+    let text = format!("{table}\n\n{LEGEND}");
+    run.write("scaling.md", format!("{text}\n").as_bytes())?;
     run.write("scaling.csv", &csv_of(&rows)?)?;
     run.write("scaling.svg", plot(&totals).as_bytes())?;
-    Ok(table.to_string())
+    Ok(text)
 }
+
+const LEGEND: &str = "Of one training of each: intervals of 95 % are for other lots, not for other seeds; (b): bootstrap, where \
+    near-collisions come in clusters.";
 
 fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<Row>> {
     let drive = DriveStage::load(stages.last().context("the last stage drives")?)?;
@@ -89,7 +93,7 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
             [1, table1.rows.len()].map(|rounds| scaling::lots_met(of_kind.values().copied(), different, rounds));
         for (part, method) in [BC, DAGGER].into_iter().enumerate() {
             // Behaviour cloning has one round: it may be the same network again.
-            let is_known = |row: &Row| row.method == method && row.different_lots == lots_met[part];
+            let is_known = |row: &Row| method == BC && row.method == BC && row.different_lots == lots_met[part];
             if rows.iter().any(is_known) {
                 continue;
             }

@@ -7,7 +7,7 @@ use evaluation::format::{interval, quoted_rate};
 use evaluation::judge::DriverEstimate;
 use evaluation::names::{BC, DAGGER, UNWEIGHTED};
 use evaluation::slices::Slice;
-use evaluation::stages::{self, Chain, Extent, named};
+use evaluation::stages::{Chain, Extent, named};
 use evaluation::statistics::bootstrap::Interval;
 use evaluation::totals::Totals;
 use evaluation::trainings::{JudgedTeams, Team, TeamEstimate};
@@ -100,7 +100,7 @@ pub(crate) fn by_seed(
     let mut table =
         table_of(&["policy", "seed", "η̂", "the paper's lots", "of them not trained on", "unseen generated lots"]);
     for (base, chain) in [(BC, None), (DAGGER, Some(Chain::Weighted)), (UNWEIGHTED, Some(Chain::Unweighted))] {
-        for seed in stages::seeds(settings, extent) {
+        for seed in settings.training_seeds(extent.seeds) {
             let name = named(base, seed, settings);
             let cell = |place: &Option<Place<'_>>| {
                 let found = place.as_ref().and_then(|place| Some((place, place.driven.driver(&name)?)));

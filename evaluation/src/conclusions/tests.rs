@@ -240,6 +240,7 @@ fn shares_and_effects() {
     for (shares, expected) in [
         (&[0.44, 0.64, 0.91] as &[f64], Verdict::Holds),
         (&[0.87, 0.84, 0.85], Verdict::DoesNotHold),
+        (&[0.85, 0.60, 0.95], Verdict::DoesNotHold),
         (&[0.95], Verdict::CannotBeTold),
         (&[0.80], Verdict::DoesNotHold),
         (&[], Verdict::CannotBeTold),

@@ -179,6 +179,28 @@ fn pooled_lots_from_files_are_a_sample_of_their_kind_from_six_on() {
     assert_eq!(judged(&MAPS[..5], "all"), (0.4, 0.4, 0.4), "five are too few to speak for others");
 }
 
+/// What is alone of its kind was the same in every draw, as if its rate were known.
+#[test]
+fn lots_that_are_alone_of_their_kind_are_drawn_with_each_other() {
+    let settings = Settings::preset("default").unwrap();
+    let judged = |spec: &str| {
+        let lots = Lot::parse_all(&[spec], &settings.episode.vehicle).unwrap();
+        let drivers = drivers_named(1);
+        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0, shard: None };
+        let mut results = EvaluationResults::new(&plan);
+        for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 1, &Direction::BOTH).enumerate() {
+            let near_collisions = u32::from(trial.lot.name().contains("hard"));
+            results.add(0, 0, index, &trial, &report(near_collisions, 100.0, 0.9));
+        }
+        results.judge(0, &slice(&results, "all"), 0, RootSeed(1)).0[0].per_100m.unwrap()
+    };
+    // One of twelve kinds, with one lot each, has all near-collisions.
+    let found = judged("test:12:all");
+    assert!(found.units == 12 && found.lower == 0.0 && found.upper > 2.0 * found.estimate, "{found:?}");
+    // Eleven kinds of two lots, and one of one, which goes to another.
+    assert_eq!(judged("test:23:all").units, 23);
+}
+
 /// The intervals of five networks said how sure each was; that of "the default" came from a script beside the program.
 #[test]
 fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
@@ -221,6 +243,9 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     let first =
         |trial: &Trial<'_>| (trial.lot.name(), trial.index, trial.direction) == ("lot-a", 0, Direction::Forward);
     let one = self::results(5, |driver, trial| Some(report(u32::from(driver == 4 && first(trial)), 100.0, 0.5)));
+    let of_two = results.judge_teams(0, &slice, &[team(&[1, 2])], 0, RootSeed(1)).unwrap()[0].per_100m;
+    assert_eq!(rounded(of_two), [1.5; 3], "two trainings say nothing about other seeds");
+    assert!(results.judge_teams(0, &of_one_lot, &teams, 0, RootSeed(1)).is_none(), "nor do few trials about others");
     let one = one.judge_teams(0, &slice, &[team(&[0, 1, 2, 3, 4])], 0, RootSeed(1)).unwrap()[0].per_100m;
     assert!(one.estimate > 0.0 && one.upper == none.upper, "one event is not surer than none: {one:?}");
     // Lots and seeds that both vary: the first team's trainings are alike, the other's have 0, 1 and 2 events more.

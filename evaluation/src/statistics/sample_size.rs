@@ -63,7 +63,8 @@ impl Question {
     fn hundred_metres_by_square_roots(&self) -> f64 {
         let z = |probability| Normal::standard().inverse_cdf(probability);
         let [a, b] = self.per_100m;
-        let (sum, gap) = (z(1.0 - 0.5 * self.alpha) + z(self.power), a.sqrt() - b.sqrt());
+        // Less power than α/2 is there without any.
+        let (sum, gap) = ((z(1.0 - 0.5 * self.alpha) + z(self.power)).max(0.0), a.sqrt() - b.sqrt());
         sum * sum / (2.0 * gap * gap)
     }
 }
@@ -129,6 +130,8 @@ mod tests {
     fn less_power_than_chance_is_answered() {
         let question = Question { per_100m: [1.0, 2.0], power: 0.25, alpha: 0.5, dispersion: 1.0 };
         assert!((0.0..1000.0).contains(&question.metres_each()), "{}", question.metres_each());
+        let question = Question { per_100m: [1.4, 1.39], power: 0.01, alpha: 0.05, dispersion: 1.0 };
+        assert!(question.metres_each() < 1000.0, "chance alone has nearly as much: {}", question.metres_each());
     }
 
     #[test]
