@@ -56,8 +56,13 @@ class LotEnv(gymnasium.Env[Any, Floats]):
         self._is_started = False
 
     def reset(self, *, seed: int | None = None, options: Mapping[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Starts the next episode, or the first one of a seed."""
+        """Starts the next episode, or the first one of a seed, or that of ``options={"episode": 7}``.
+
+        Raises:
+            ValueError: If the options are those of several cars.
+        """
         super().reset(seed=seed)
+        _refuse(options, "episodes", "episode")
         episode = (options or {}).get("episode")
         seen = self.core.reset(seeds=None if seed is None else [seed], episodes=None if episode is None else [episode])
         self._is_started = True
@@ -155,7 +160,12 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Starts the next episodes, or the first ones of a seed."""
+        """Starts the next episodes, or the first ones of a seed, or those of ``options={"episodes": [7, …]}``.
+
+        Raises:
+            ValueError: If the options are those of a single car.
+        """
+        _refuse(options, "episode", "episodes")
         super().reset(seed=seed if isinstance(seed, int) else None)
         mask = (options or {}).get("reset_mask")
         seeds = [seed] * self.num_envs if isinstance(seed, (int, np.integer)) else seed
@@ -208,6 +218,12 @@ _AUTORESET = {
     AutoresetMode.SAME_STEP: "same_step",
     AutoresetMode.DISABLED: "disabled",
 }
+
+
+def _refuse(options: Mapping[str, Any] | None, name: str, right: str) -> None:
+    """Refuses a reset option of the other environment, which would be ignored."""
+    if name in (options or {}):
+        raise ValueError(f"there is no reset option {name!r} here; it is {right!r}")
 
 
 def _first(observation: Any) -> Any:

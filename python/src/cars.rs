@@ -61,16 +61,17 @@ enum Threads {
 }
 
 impl Threads {
-    fn new(count: usize, threads: Option<usize>) -> PyResult<Self> {
+    fn new(py: Python<'_>, count: usize, threads: Option<usize>) -> PyResult<Self> {
         match threads {
             Some(threads) if threads == 0 || threads > usize::from(THREADS_MAX) => {
                 let problem = format!("threads: {threads} is not within 1 … {THREADS_MAX}");
                 Err(PyValueError::new_err(problem))
             }
-            Some(threads) if threads > 1 && count > 1 => {
+            // These threads are of this process, and in none that is forked from it.
+            Some(threads) if threads > 1 && count > 1 => detached(py, || {
                 let pool = ThreadPoolBuilder::new().num_threads(threads).build();
                 Ok(Self::Own(pool.map_err(|error| PyRuntimeError::new_err(error.to_string()))?))
-            }
+            }),
             None if count > 1 => Ok(Self::AllCores),
             _ => Ok(Self::Caller),
         }
@@ -136,7 +137,7 @@ impl Cars {
             kind,
             autoreset,
             reward: Reward::of(reward).map_err(input)?,
-            threads: Threads::new(count, threads)?,
+            threads: Threads::new(py, count, threads)?,
         })
     }
 

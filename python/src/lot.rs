@@ -54,7 +54,9 @@ impl Lot {
             if trial > TRIAL_MAX {
                 return Err(PyValueError::new_err(format!("trial {trial}: there are 0 to {TRIAL_MAX}")));
             }
-            let direction = directions(direction).map_err(input)?[0];
+            let [direction] = directions(direction).map_err(input)?[..] else {
+                return Err(PyValueError::new_err(format!("direction {direction:?}: name one, forward or reverse")));
+            };
             lot.check_direction(direction, &vehicle).map_err(input)?;
             let trial = Trial::of_evaluation(RootSeed(seed), lot, direction, trial);
             let notes = notes::of(&lots, &[NoiseChoice::Lot]);

@@ -53,6 +53,8 @@ def test_a_seed_names_the_episode_and_the_command_line_knows_it():
     }
     _, info = env.reset()
     assert (info["lot"], info["direction"], info["episode_number"]) == ("lot-a", "reverse", 1)
+    with pytest.raises(ValueError, match="it is 'episode'"):
+        env.reset(options={"episodes": [11]})
     _, info = env.reset(options={"episode": 11})
     assert (info["lot"], info["direction"], info["trial"]) == ("lot-b", "reverse", 2)
     again, _ = env.reset(seed=5)
@@ -151,6 +153,8 @@ def test_the_next_episode_begins_when_the_mode_says():
     envs = LotVectorEnv(2, autoreset_mode="Disabled", **SHORT)
     envs.reset(seed=1)
     envs.step(np.tile(STRAIGHT, (2, 1)))
+    with pytest.raises(ValueError, match="it is 'episodes'"):
+        envs.reset(options={"episode": 3})
     _, infos = envs.reset(options={"reset_mask": np.array([False, True])})
     assert infos["episode_number"].tolist() == [0, 3] and infos["time_s"].tolist() == [pytest.approx(0.05), 0.0]
 

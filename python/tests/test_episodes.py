@@ -3,6 +3,8 @@
 import hashlib
 import multiprocessing
 import shutil
+import subprocess
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -378,6 +380,25 @@ def test_a_forked_process_is_told_so_instead_of_waiting_forever():
         child.start()
         assert part in queue.get(timeout=60)
         child.join()
+
+
+def test_threads_that_started_before_a_fork_are_not_waited_for():
+    # Another process than this one, in which lotpilot has driven before.
+    script = """
+import os
+from lotpilot.core import Core, EnvOptions
+
+cars = Core(6, EnvOptions(lots=["lot-b"], threads=2), "next_step")
+if os.fork() == 0:
+    try:
+        cars.reset()
+    except RuntimeError as error:
+        print(error, flush=True)
+    os._exit(0)
+os.wait()
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60)
+    assert "was forked" in done.stdout, done.stderr
 
 
 def write_sums(folder):

@@ -92,7 +92,7 @@ def test_a_node_dies_and_the_tables_are_those_of_one_process(cluster, tmp_path):
     def straight(grids):
         return np.tile([7.0, 0.0], (len(grids), 1))
 
-    with pytest.warns(UserWarning, match="pickled otherwise"):
+    with pytest.warns(UserWarning, match="pickled differently"):
         lotpilot.ray.evaluate({**drivers, "straight": straight}, LOTS, shards=SHARDS, out=out, **options)
 
 
