@@ -74,8 +74,10 @@ fn tuned_planners_ship_with_what_found_them() {
     budgets.pop();
     assert!(budgets.windows(2).all(|two| two[0] == two[1]), "every planner drives as much: {budgets:?}");
     for name in ["tentacle", "vvf", "dwa", "cvm", "apf", "vff"] {
-        let spec = format!("{name}:{}", root().join(format!("planners/tuned/corridors/{name}.toml")).display());
-        spec.parse::<DriverSpec>().unwrap().load(&Settings::preset("default").unwrap()).unwrap();
+        for tuning in ["corridors", "earlier"] {
+            let spec = format!("{name}:{}", root().join(format!("planners/tuned/{tuning}/{name}.toml")).display());
+            spec.parse::<DriverSpec>().unwrap().load(&Settings::preset("default").unwrap()).unwrap();
+        }
     }
     let out = scratch("tuned").join("out");
     let drive = ["evaluate", "--lots", "lot-a", "--trials", "1", "--directions", "forward", "--noise", "clean"];
