@@ -350,7 +350,10 @@ fn every_command_and_flag_exists() {
     for page in of_today(&pages) {
         for code in page.inline.iter().chain(&page.blocks) {
             for words in command_lines(&code.text) {
-                let Some(&command) = words.first().filter(|word| !is_placeholder(word)) else { continue };
+                // Flags of every command may stand before its name, as in `--threads 1 evaluate`.
+                let is_name = |word: &&str| !word.starts_with('-') && word.parse::<u32>().is_err();
+                let at = words.iter().position(is_name).unwrap_or(0);
+                let Some(&command) = words.get(at).filter(|word| !is_placeholder(word)) else { continue };
                 let mut called: Vec<&str> = Vec::new();
                 if !command.starts_with('-') {
                     let is_there = helps.commands(&[]).contains(command);
@@ -360,7 +363,7 @@ fn every_command_and_flag_exists() {
                     }
                     called.push(command);
                     let below = helps.commands(&called);
-                    if let Some(&sub) = words.get(1).filter(|word| !below.is_empty() && !is_placeholder(word)) {
+                    if let Some(&sub) = words.get(at + 1).filter(|word| !below.is_empty() && !is_placeholder(word)) {
                         let is_there = below.contains(sub) || sub.starts_with('-');
                         faults.check(is_there, &page.name, code.line, || format!("there is no {command} {sub}"));
                         called.extend(below.contains(sub).then_some(sub));
