@@ -5,7 +5,8 @@ use crate::statistics::bootstrap::Interval;
 use crate::statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
 use crate::totals::Totals;
 
-/// The bootstrap's interval of a rate where events cluster, so that what takes them for independent may not be quoted (docs/methods.md 8.3).
+/// The bootstrap's interval of a rate where events cluster, so that what takes them for independent may not be quoted
+/// (docs/methods.md 8.3).
 pub fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
     let is_clustered = estimate.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
     estimate.per_100m.filter(|_| is_clustered)

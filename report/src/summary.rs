@@ -100,10 +100,11 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
          - (→, ←): forward, reverse. Rates are per length of the route: for runs given up early they are too low.\n\
          - Intervals of 95 %: exact Poisson, or (b) paired bootstrap ({DRAWS} draws of whole trials, both ways together; of whole \
          lots where these are a sample: generated, or six or more from files) where the dispersion exceeds {DISPERSION_MAX} and \
-         events cannot be taken for independent. \"< one-sided\": the bound of 95 % where there was none.\n\
+         events cannot be taken for independent; (b) is no narrower than the exact one. \"< one-sided\": the bound of 95 % where there was none.\n\
          - Dispersion: variance of the counts of trials over their mean; 1 if each near-collision came by itself.\n\
          - Safe ratio: free share of the metre around the body; its intervals, and those of differences (Δ), are bootstrap.\n\
-         - *: excludes zero, by six trials or more. p: exact test of equal rates; Holm: adjusted for the drivers compared.",
+         - *: excludes zero, by six trials or more. Rate ratio and p: exact test of equal rates; – where events of \
+         either driver cluster, as for (b). Holm: adjusted for the drivers compared.",
         seed.0
     );
     text

@@ -183,6 +183,18 @@ fn errors_in_files_name_the_line() {
     assert!(error.contains("nowhere/at-all.toml"), "{error}");
 }
 
+/// Each of them was counted once per trial, and 160 016 drives were too many.
+#[test]
+fn a_generated_lot_is_driven_once_a_round_whatever_the_trials() {
+    let mut settings = Settings::preset("default").unwrap();
+    settings.training.trials = 8;
+    settings.training.lots = vec!["lot-a".to_owned(), "train:10000".to_owned()];
+    settings.check().unwrap();
+    settings.training.lots.push("train:40000:hard".to_owned());
+    let error = format!("{:#}", settings.check().unwrap_err());
+    assert!(error.contains("100016 drives a round"), "{error}");
+}
+
 #[test]
 fn unknown_presets_list_the_known() {
     let error = Settings::preset("papper").unwrap_err().to_string();
