@@ -16,14 +16,13 @@ pub fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
 /// events cluster.
 pub fn quoted_interval(totals: &Totals, estimate: &DriverEstimate) -> [f64; 2] {
     let rate = totals.rate();
-    let exact = [rate.lower, rate.upper];
-    clustered(estimate).map_or(exact, |interval| at_least_exact([interval.lower, interval.upper], exact))
+    wider([rate.lower, rate.upper], clustered(estimate).map(|interval| [interval.lower, interval.upper]))
 }
 
-/// The bootstrap's interval where events cluster, which makes it wider than the exact one; of few events it may be narrower
-/// by chance.
-pub(crate) fn at_least_exact(bootstrap: [f64; 2], exact: [f64; 2]) -> [f64; 2] {
-    [bootstrap[0].min(exact[0]), bootstrap[1].max(exact[1])]
+/// The exact interval, or the bootstrap's where events cluster: clusters make it wider, and of few events it may be
+/// narrower by chance.
+pub(crate) fn wider(exact: [f64; 2], clustered: Option<[f64; 2]>) -> [f64; 2] {
+    clustered.map_or(exact, |[lower, upper]| [lower.min(exact[0]), upper.max(exact[1])])
 }
 
 /// The rate with the interval that may be quoted (docs/methods.md 8.3).

@@ -22,7 +22,7 @@
 use crate::estimate::{self, Task};
 use crate::names::{ALPHA_15, BC, DAGGER, EXPERT_EQUAL, EXPERT_ONLY, UNWEIGHTED};
 use experiment::drivers::{DriverSpec, NamedDriver};
-use experiment::settings::{Settings, Smoothing, with_points_of_paper};
+use experiment::settings::{Settings, Smoothing, has_points_of_paper, with_points_of_paper};
 use experiment::shard::Shard;
 use planners::PlannerSpec;
 use policy::dagger::IterationRow;
@@ -301,11 +301,6 @@ fn trainings(settings: &Settings, extent: &Extent) -> Vec<Stage> {
         stages.push(Chain::FarPoints.stage(settings, extent));
     }
     stages
-}
-
-/// Whether the expert's points lie as far as the way is open anyway.
-fn has_points_of_paper(settings: &Settings) -> bool {
-    with_points_of_paper(settings) == *settings
 }
 
 /// Drivers by their names in tables.

@@ -1,6 +1,6 @@
 //! An evaluation, counted and judged: the tables as data.
 
-use crate::format::{at_least_exact, bound_per_100m};
+use crate::format::{bound_per_100m, wider};
 use crate::incidents::Cause;
 use crate::json;
 use crate::judge::{Comparison, DriverEstimate};
@@ -157,11 +157,8 @@ impl Row {
     /// where events cluster.
     pub fn quoted_interval(&self) -> [f64; 2] {
         let is_clustered = self.dispersion.is_some_and(|index| index > DISPERSION_MAX);
-        let exact = [self.garwood_lower, self.garwood_upper];
-        match (self.bootstrap_lower, self.bootstrap_upper) {
-            (Some(lower), Some(upper)) if is_clustered => at_least_exact([lower, upper], exact),
-            _ => exact,
-        }
+        let bootstrap = self.bootstrap_lower.zip(self.bootstrap_upper).filter(|_| is_clustered);
+        wider([self.garwood_lower, self.garwood_upper], bootstrap.map(<[f64; 2]>::from))
     }
 }
 

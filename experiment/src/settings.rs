@@ -15,7 +15,7 @@ mod smoothing;
 
 pub use layers::Layers;
 pub use noise::{NOISE_MAX, NoiseChoice};
-pub use presets::{PRESETS, with_points_of_paper};
+pub use presets::{PRESETS, has_points_of_paper, with_points_of_paper};
 pub use schema::{EvaluationSettings, Settings, TrainingSettings};
 pub use smoothing::Smoothing;
 

@@ -16,7 +16,7 @@ use evaluation::format::{difference, exact_rate, quoted_interval, quoted_rate};
 use evaluation::names::{BC, DAGGER, UNWEIGHTED};
 use evaluation::on_policy::{Calibration, Effect, OnPolicy, States};
 use evaluation::paper::{self, PaperLot};
-use evaluation::slices::{Slice, SliceKind};
+use evaluation::slices::{LotGroup, Slice};
 use evaluation::stages::{self, Chain, Extent, Stage};
 use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
@@ -26,7 +26,7 @@ use experiment::drivers::NamedDriver;
 use experiment::lots::UNSEEN;
 use experiment::manifest::Manifest;
 use experiment::run_dir::RunDir;
-use experiment::settings::{Settings, with_points_of_paper};
+use experiment::settings::{Settings, has_points_of_paper};
 use policy::dagger::{DaggerSettings, IterationRow};
 use policy::decision_rule::DecisionRule;
 use sim::seed::RootSeed;
@@ -108,11 +108,6 @@ fn cautions(settings: &Settings) -> anyhow::Result<String> {
          training is one sample: its interval says how sure the rate of *this* network is, not what another training would \
          give; an interval over several trainings is for other seeds, too."
     ))
-}
-
-/// Whether the expert's points are the paper's.
-fn has_points_of_paper(settings: &Settings) -> bool {
-    with_points_of_paper(settings) == *settings
 }
 
 /// What the stages found.
@@ -400,14 +395,12 @@ fn by_lot(
     table.to_string()
 }
 
-/// Near-collisions and metres of a driver of the paper on a lot, or on those that a pooled slice stands for.
-fn count_of_paper(driver: usize, slice: &Slice) -> Option<(u32, f64)> {
-    let count = paper::count(driver, |lot| match slice.kind {
-        SliceKind::All => true,
-        SliceKind::Unseen => !lot.is_trained_on,
-        SliceKind::Group => lot.lot == slice.label,
-    });
-    (count.1 > 0.0).then_some(count)
+/// Near-collisions and metres of a driver of the paper on the lots of a slice; `None` if the paper drove elsewhere.
+fn count_of_paper(driver: usize, slice: &Slice, groups: &[LotGroup]) -> Option<(u32, f64)> {
+    let names: Vec<&str> =
+        (0..).zip(groups).filter(|&(index, _)| slice.contains(index)).map(|(_, group)| group.name.as_str()).collect();
+    let are_papers = names.iter().all(|name| paper::LOTS.iter().any(|lot| lot.lot == *name));
+    are_papers.then(|| paper::count(driver, |lot| names.contains(&lot.lot)))
 }
 
 fn rates_table(driven: &Driven<'_>, with_paper: bool) -> String {
@@ -420,7 +413,7 @@ fn rates_table(driven: &Driven<'_>, with_paper: bool) -> String {
         format!("{near_collisions} ({contacts}): {}", quoted_rate(&totals, &estimates[index][driver]))
     };
     let of_paper = |driver: usize, slice: &Slice| {
-        let count = count_of_paper(driver, slice).filter(|_| with_paper);
+        let count = count_of_paper(driver, slice, driven.results.groups()).filter(|_| with_paper);
         count.map_or_else(String::new, |(events, metres)| format!("{events}: {}", exact_rate(events, metres)))
     };
     by_lot(driven, &cell, &of_paper)
@@ -652,4 +645,28 @@ fn further() -> String {
      cause and the key that replays it; `cargo xtask render report FOLDER` shows them.\n- `chains/*`: data, networks and Table 1 of each training.\n- \
      `on-policy/on_policy.json`, `conclusions.csv`: the figures of this report.\n"
         .to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn groups(names: &[&str]) -> Vec<LotGroup> {
+        names.iter().map(|&name| LotGroup { name: name.to_owned(), lots: 1, is_trained_on: name == "lot-a" }).collect()
+    }
+
+    fn counts(names: &[&str]) -> Vec<Option<u32>> {
+        let groups = groups(names);
+        let tentacle = 1;
+        let count = |slice: &Slice| count_of_paper(tentacle, slice, &groups).map(|(events, _)| events);
+        Slice::all_of(&groups).iter().map(count).collect()
+    }
+
+    #[test]
+    fn the_papers_counts_are_of_the_lots_they_stand_beside() {
+        let unseen_and_all = [Some(27 + 20), Some(24 + 27 + 20)];
+        assert_eq!(counts(&["lot-a", "lot-b", "lot-c"])[3..], unseen_and_all);
+        assert_eq!(counts(&["lot-a", "lot-b"]), [Some(24), Some(27), Some(24 + 27)]);
+        assert_eq!(counts(&["lot-a", "lot-b", "my-map"]), [Some(24), Some(27), None, None, None]);
+    }
 }

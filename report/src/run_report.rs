@@ -10,6 +10,7 @@ use crate::markdown::escaped;
 use crate::moments;
 use crate::page::{Image, Page};
 use crate::plots::{self, Distribution, EtaSeries, RatePoint, RateRow, RateSeries};
+use crate::what_if::distinct;
 use anyhow::Context as _;
 use evaluation::calibration::{self, AxisCalibration};
 use evaluation::names::BC;
@@ -132,7 +133,7 @@ impl Evaluation {
 
     /// The drivers in the order of the tables.
     fn drivers(&self) -> Vec<&str> {
-        first_seen(self.tables.rows.iter().map(|row| row.driver.as_str()))
+        distinct(self.tables.rows.iter().map(|row| row.driver.as_str()))
     }
 
     /// The noise levels in the order of the tables.
@@ -346,7 +347,7 @@ fn add_evaluation(page: &mut Page, evaluation: &Evaluation) {
 fn single_lots(evaluation: &Evaluation) -> Vec<&str> {
     let driven: BTreeSet<&String> = evaluation.safe_ratios.values().flat_map(BTreeMap::keys).collect();
     let is_of = |lots: &str| driven.iter().any(|lot| is_in(lot, lots));
-    first_seen(evaluation.tables.rows.iter().map(|row| row.lots.as_str()).filter(|lots| is_of(lots)))
+    distinct(evaluation.tables.rows.iter().map(|row| row.lots.as_str()).filter(|lots| is_of(lots)))
 }
 
 /// Whether a lot belongs to a row: `lot-b`, or `test-hard (8 lots)` for `test-hard-3`.
@@ -356,18 +357,9 @@ fn is_in(lot: &str, lots: &str) -> bool {
     lot == lots || index.is_some_and(|index| index.parse::<u32>().is_ok())
 }
 
-fn first_seen<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
-    names.fold(Vec::new(), |mut seen, name| {
-        if !seen.contains(&name) {
-            seen.push(name);
-        }
-        seen
-    })
-}
-
 /// Lot by lot, driver by driver.
 fn rates_by_lot(evaluation: &Evaluation, noise: NoiseChoice, drivers: &[&str]) -> Vec<RateRow> {
-    let lots = first_seen(evaluation.rows(noise).map(|row| row.lots.as_str()));
+    let lots = distinct(evaluation.rows(noise).map(|row| row.lots.as_str()));
     let rows = lots.iter().flat_map(|lots| evaluation.rows(noise).filter(move |row| row.lots == **lots));
     rows.map(|row| rate_row(row, format!("{}, {}", row.driver, row.lots), drivers)).collect()
 }

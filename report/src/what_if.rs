@@ -44,7 +44,7 @@ pub fn table(rows: &[Row]) -> Table {
 }
 
 /// Each once, in the order of their first.
-fn distinct<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
+pub(crate) fn distinct<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
     let mut distinct = Vec::new();
     for one in all {
         if !distinct.contains(&one) {

@@ -151,6 +151,11 @@ pub fn with_points_of_paper(settings: &Settings) -> Settings {
     changed
 }
 
+/// Whether the expert's points lie as far as the way is open anyway.
+pub fn has_points_of_paper(settings: &Settings) -> bool {
+    with_points_of_paper(settings) == *settings
+}
+
 /// The paper's experiment in the reading of every preset but `paper`: points at half of the open way, driven at by
 /// v = a_y/2.24 (docs/paper.md, "Points at half of the open way").
 fn with_half_points() -> Settings {
