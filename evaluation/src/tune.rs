@@ -224,9 +224,10 @@ pub struct Found {
     pub before: Score,
     /// See `before`.
     pub after: Score,
-    /// Over fresh trials alone: what the choice did not profit from as much.
-    before_fresh: Score,
-    after_fresh: Score,
+    /// The starting point over fresh trials alone: what the choice did not profit from as much.
+    pub before_fresh: Score,
+    /// The found parameters over the same.
+    pub after_fresh: Score,
 }
 
 /// Sums as they are written down.
@@ -238,6 +239,8 @@ pub struct Score {
     pub near_collisions: u32,
     /// Near-collisions per 100 m of route.
     pub near_collisions_per_100m: f64,
+    /// Contacts.
+    pub contacts: u32,
     /// Stuck events.
     pub stuck: u32,
     /// Runs that did not reach the end.
@@ -255,6 +258,7 @@ impl Score {
             failures_per_100m: per_100m(totals.near_collisions + totals.stuck),
             near_collisions: totals.near_collisions,
             near_collisions_per_100m: per_100m(totals.near_collisions),
+            contacts: totals.contacts,
             stuck: totals.stuck,
             unfinished_runs: totals.timed_out + totals.given_up,
             safe_ratio: round(totals.safe_ratio()),

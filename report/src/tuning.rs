@@ -1,15 +1,18 @@
 //! What tuning changed, as Markdown.
 
 use crate::markdown::table_of;
-use evaluation::tune::Found;
+use evaluation::tune::{Found, Score};
 
-/// Before and after, one row per planner.
+/// Before and after, one row per planner. A choice profits from the trials of its search; what the fresh ones alone say,
+/// which only the finalists drive, stands beside.
 pub fn table(tuned: &[Found]) -> String {
     let header = [
         "planner",
-        "near-collisions before",
+        "near-collisions (contacts) before",
         "after",
         "per 100 m before",
+        "after",
+        "on fresh trials before",
         "after",
         "stuck before",
         "after",
@@ -18,6 +21,8 @@ pub fn table(tuned: &[Found]) -> String {
         "found",
     ];
     let mut table = table_of(&header);
+    let counts = |score: &Score| format!("{} ({})", score.near_collisions, score.contacts);
+    let rate = |score: &Score| format!("{:.2}", score.near_collisions_per_100m);
     for found in tuned {
         let (before, after) = (&found.before, &found.after);
         let parameters = found.planner.parameters();
@@ -32,10 +37,12 @@ pub fn table(tuned: &[Found]) -> String {
             .collect();
         table.add_row(vec![
             found.name.clone(),
-            before.near_collisions.to_string(),
-            after.near_collisions.to_string(),
-            format!("{:.2}", before.near_collisions_per_100m),
-            format!("{:.2}", after.near_collisions_per_100m),
+            counts(before),
+            counts(after),
+            rate(before),
+            rate(after),
+            rate(&found.before_fresh),
+            rate(&found.after_fresh),
             before.stuck.to_string(),
             after.stuck.to_string(),
             format!("{:.3}", before.safe_ratio),
