@@ -143,6 +143,11 @@ fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
     }
     assert!(html.matches("<svg").count() >= 5, "figures are in the page");
 
+    // Once it was replaced by an empty page.
+    refused(&["render", "report"], &[whole], "neither a training nor an evaluation");
+    refused(&["render", "results", "--out", "pictures"], &[whole], "name it with --to");
+    assert_eq!(std::fs::read_to_string(whole.join("report.html")).unwrap(), html);
+
     // Killed in the middle of the third chain.
     let mut killed = xtask().args(["reproduce", "--preset", "smoke", "--out"]).arg(&resumed).spawn().unwrap();
     while !resumed.join("chains/s1-any-below/round-01").exists() {

@@ -21,9 +21,6 @@ pub const FILE: &str = "sha256sums";
 pub const LIST_BYTES_MAX: u64 = 32 << 20;
 
 const RESTORE: &str = "restore it from a copy, or begin the run again";
-const LIST_REMEDY: &str =
-    "restore it from a copy; if every file of the folder is known to be whole: sha256sum * > sha256sums";
-
 /// The SHA-256 of some bytes in hexadecimal digits.
 pub fn digest(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
@@ -46,9 +43,9 @@ fn list_of(folder: &Path) -> Result<Option<Sums>, FileError> {
     let text = match read::bytes(&path, LIST_BYTES_MAX) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(FileError::unreadable(&path, &error, LIST_REMEDY)),
+        Err(error) => return Err(FileError::unreadable(&path, &error, RESTORE)),
     };
-    let damaged = |line: usize| FileError::new(&path, format_args!("line {line} is damaged"), LIST_REMEDY);
+    let damaged = |line: usize| FileError::new(&path, format_args!("line {line} is damaged"), RESTORE);
     let text = String::from_utf8(text).map_err(|_| damaged(1))?;
     // The last line is whole only with its end.
     let lines = text.strip_suffix('\n').ok_or_else(|| damaged(text.lines().count().max(1)))?;
@@ -91,7 +88,7 @@ fn write_list(folder: &Path, sums: &Sums) -> Result<(), FileError> {
 /// If the system does not say: a folder that seems to hold no work would be deleted.
 pub fn exists(folder: &Path) -> Result<bool, FileError> {
     let path = folder.join(FILE);
-    path.try_exists().map_err(|error| FileError::unreadable(&path, &error, LIST_REMEDY))
+    path.try_exists().map_err(|error| FileError::unreadable(&path, &error, RESTORE))
 }
 
 /// Whether a file of a folder is finished.
@@ -157,7 +154,7 @@ pub fn list_all(folder: &Path) -> Result<(), FileError> {
 /// # Errors
 /// If the folder has no list, or the other's cannot be written.
 pub fn list_files_of(folder: &Path, name: &str, path: &Path) -> Result<(), FileError> {
-    let files = list_of(path)?.ok_or_else(|| FileError::new(&path.join(FILE), "is missing", LIST_REMEDY))?;
+    let files = list_of(path)?.ok_or_else(|| FileError::new(&path.join(FILE), "is missing", RESTORE))?;
     list_as(folder, files.into_iter().map(|(file, sum)| (format!("{name}/{file}"), sum)))
 }
 
@@ -294,7 +291,7 @@ fn replace_folder(
 }
 
 fn copy_files(from: &Path, to: &Path) -> Result<(), FileError> {
-    let sums = list_of(from)?.ok_or_else(|| FileError::new(&from.join(FILE), "is missing", LIST_REMEDY))?;
+    let sums = list_of(from)?.ok_or_else(|| FileError::new(&from.join(FILE), "is missing", RESTORE))?;
     for name in sums.keys() {
         let path = to.join(name);
         let folder = path.parent().unwrap_or(to);
@@ -362,7 +359,7 @@ fn compare(folder: &Path, name: &str, found: &str) -> Result<(), FileError> {
         return Err(FileError::new(
             &folder.join(FILE),
             format_args!("is missing, so nothing says whether {} is whole", path.display()),
-            LIST_REMEDY,
+            RESTORE,
         ));
     };
     match sums.get(name) {
@@ -414,7 +411,7 @@ pub fn digest_of_all(folder: &Path, but: &[&str]) -> Result<String, FileError> {
 }
 
 fn add_all(folder: &Path, prefix: &str, but: &[&str], sha256: &mut Sha256) -> Result<(), FileError> {
-    let sums = list_of(folder)?.ok_or_else(|| FileError::new(&folder.join(FILE), "is missing", LIST_REMEDY))?;
+    let sums = list_of(folder)?.ok_or_else(|| FileError::new(&folder.join(FILE), "is missing", RESTORE))?;
     for (path, sum) in sums {
         let name = path.rsplit('/').next().unwrap_or(&path);
         if let Some(inner) = listed_folder(&path) {
@@ -449,7 +446,7 @@ fn verify_into(folder: &Path, verified: &mut Verified) {
     let list = folder.join(FILE);
     let sums = match list_of(folder) {
         Ok(Some(sums)) => sums,
-        Ok(None) => return verified.faults.push(FileError::new(&list, "is missing", LIST_REMEDY)),
+        Ok(None) => return verified.faults.push(FileError::new(&list, "is missing", RESTORE)),
         Err(error) => return verified.faults.push(error),
     };
     let mut gone = BTreeSet::new();

@@ -90,6 +90,13 @@ pub(crate) fn goes_on_with(arguments: &str) {
     }
 }
 
+/// Notes that the run is finished, and that nothing has to be continued.
+pub(crate) fn is_finished() {
+    if let Ok(mut way_on) = WAY_ON.lock() {
+        *way_on = None;
+    }
+}
+
 /// The last line of an interrupted command.
 pub(crate) fn said(kept: &str) -> String {
     let way_on = WAY_ON.lock().ok().and_then(|way_on| way_on.clone()).unwrap_or_default();

@@ -1,5 +1,6 @@
 //! `--record` of commands that drive: what they drove, replayed by the viewer program into the folder of the run.
 
+use crate::interrupt;
 use crate::output::Output;
 use crate::viewer;
 use clap::Args;
@@ -50,6 +51,7 @@ pub(crate) fn first_runs(plan: &Plan<'_>, runs: usize) -> Show {
 /// # Errors
 /// On Ctrl-C.
 pub(crate) fn record(run: &Path, show: Vec<Show>, output: &Output) -> anyhow::Result<()> {
+    interrupt::is_finished();
     match viewer::ask(&ViewRequest { sink: Sink::Folder(recordings_of(run)), show }, output) {
         Err(error) if !error.is::<Interrupted>() => {
             output.note(format_args!("warning: {error:#}"));

@@ -19,7 +19,7 @@ use evaluation::stages::{self, Step};
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
-use experiment::manifest::{Build, Request};
+use experiment::manifest::{Build, Manifest, Request};
 use experiment::run_dir::{Place, RunDir};
 use std::path::{Path, PathBuf};
 use storage::sums;
@@ -82,6 +82,7 @@ pub(crate) fn run(args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
 
 fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, manifest) = (shards.settings(), shards.manifest());
+    check_target(args, manifest)?;
     let asked: Asked = manifest.arguments.clone().try_into()?;
     let mut drivers = NamedDriver::load_all(&asked.drivers, settings)?;
     evaluation::trainings::assign(&asked.methods, &mut drivers)?;
@@ -91,19 +92,15 @@ fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Res
     let rows = shards.rows(&plan)?;
     let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
     let seed = settings.evaluation.seed.0;
-    let run = RunDir::create(&args.out.place(evaluate::COMMAND, &manifest.preset, seed), settings, &request)?;
+    let (build, place) = (made_by(manifest), args.out.place(evaluate::COMMAND, &manifest.preset, seed));
+    let run = RunDir::create(&Place { build: &build, ..place }, settings, &request)?;
     put_together(&plan, &rows, &run, args, output)
 }
 
 fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, specs) = (evaluations.settings(), evaluations.drivers());
     let named: Vec<String> = specs.iter().map(DriverSpec::to_string).collect();
-    ensure!(
-        evaluations.manifest().is_of_this_target(),
-        "{}: made on {}; merge on such a machine",
-        args.folders[0].display(),
-        evaluations.manifest().target
-    );
+    check_target(args, evaluations.manifest())?;
     let compare_with = evaluate::compare_with(args.compare_with.as_deref(), &specs)?;
     let mut drivers = NamedDriver::load_all(&named, settings)?;
     let methods = args.methods.or(evaluations.methods(), &mut drivers)?;
@@ -116,19 +113,30 @@ fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> 
     let asked = Asked { drivers: named, compare_with, methods, shard: None };
     let request = Request { arguments: toml::Table::try_from(&asked)?, inputs };
     let made = evaluations.manifest();
-    // The manifest says who drove, not who merged: what comes out is merged with others in its turn.
-    let build = Build {
-        program: made.program.clone(),
-        git_revision: made.git_revision.clone(),
-        git_dirty: made.git_dirty,
-        git_changes: made.git_changes.clone(),
-        rustc_version: made.rustc_version.clone(),
-        libraries: made.libraries.clone(),
-        ..build_info::get().clone()
-    };
+    let build = made_by(made);
     let place = args.out.place(evaluate::COMMAND, &made.preset, settings.evaluation.seed.0);
     let run = RunDir::create(&Place { build: &build, ..place }, settings, &request)?;
     put_together(&plan, &rows, &run, args, output)
+}
+
+/// The program that drove, for the manifest of what is merged: it says who drove, not who merged, because what comes out is
+/// merged with others in its turn.
+fn made_by(manifest: &Manifest) -> Build {
+    Build {
+        program: manifest.program.clone(),
+        git_revision: manifest.git_revision.clone(),
+        git_dirty: manifest.git_dirty,
+        git_changes: manifest.git_changes.clone(),
+        rustc_version: manifest.rustc_version.clone(),
+        libraries: manifest.libraries.clone(),
+        ..build_info::get().clone()
+    }
+}
+
+fn check_target(args: &MergeArgs, manifest: &Manifest) -> anyhow::Result<()> {
+    let folder = args.folders[0].display();
+    ensure!(manifest.is_of_this_target(), "{folder}: made on {}; merge on such a machine", manifest.target);
+    Ok(())
 }
 
 /// Finishes an evaluation whose rows are known. Once they are written it is one like any other, which `evaluate --resume`
@@ -156,7 +164,7 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
         _ => {
             let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
             // It is made as its shards are, except for the share: so a report says what was asked for.
-            let build = Build { command_line: whole_command(&manifest.command_line), ..build_info::get().clone() };
+            let build = Build { command_line: whole_command(&manifest.command_line), ..made_by(manifest) };
             let place = args.out.place(reproduce::COMMAND, &manifest.preset, settings.seed.0);
             RunDir::create(&Place { build: &build, ..place }, settings, &request)?
         }
@@ -179,6 +187,7 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
 /// Adds what the shards drove to the run whose networks drove, and finishes it.
 fn drives(shards: &Shards, networks: &Path, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let (run, settings, manifest) = RunDir::resume(networks, reproduce::COMMAND)?;
+    build_info::check_can_go_on(networks, &manifest, output)?;
     let remedy = format!("make them again with --networks {}", networks.display());
     shards.check_are_of(networks, &settings, &manifest, &remedy)?;
     let extent = reproduce::extent_of(networks, &manifest)?;

@@ -39,6 +39,7 @@ use sim::sensing::Inspection;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -209,7 +210,10 @@ pub(crate) fn run(args: &RenderArgs, output: &Output) -> anyhow::Result<()> {
         RenderWhat::Samples(what) => render_samples(what, &folder),
         RenderWhat::Noise(what) => render_noise(what, &folder),
         RenderWhat::Report(what) => render_report(&what.run, args.out.is_some().then_some(&folder), output),
-        RenderWhat::Results(what) => render_results(what, args.overwrite, output),
+        RenderWhat::Results(what) => {
+            ensure!(args.out.is_none(), "--out: a page of results is one file; name it with --to");
+            render_results(what, args.overwrite, output)
+        }
     }
 }
 
@@ -442,6 +446,13 @@ fn render_results(args: &RenderResultsArgs, overwrite: bool, output: &Output) ->
 
 fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyhow::Result<()> {
     let owned = RunDir::reopen(run, "render report")?;
+    // What else has a report wrote it itself, of its stages, and would lose it.
+    let is_listed = |name| sums::is_listed(run, name);
+    ensure!(
+        is_listed("dagger.toml")? || is_listed("runs.jsonl")?,
+        "{}: this is neither a training nor an evaluation; name one of its folders, or see render results --help",
+        run.display()
+    );
     let report = owned.path().join(run_report::FILE);
     let copy = copy.map(|folder| (folder, folder.path.join(run_report::FILE)));
     if let Some((folder, path)) = &copy {

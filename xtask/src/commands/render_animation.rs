@@ -110,7 +110,9 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
     let from_s = args.from.or(earliest_s.map(|at_s| at_s - AROUND_S[0])).unwrap_or(0.0).max(0.0);
     let to_s = to_s.unwrap_or(end_s).min(end_s);
     ensure!(from_s < to_s, "from {from_s:.1} s to {to_s:.1} s there is nothing to show; choose other --from and --to");
-    let fps = f32::from(args.fps);
+    // The formats count hundredths of a second.
+    let shown_cs = 100 / args.fps;
+    let fps = 100.0 / f32::from(shown_cs);
     let whole = ((to_s - from_s) * fps / FRAMES_WANTED).ceil().max(1.0);
     let speed = args.speed.unwrap_or(if ticks.is_empty() { whole } else { 1.0 });
     let step_s = speed / fps;
@@ -132,12 +134,12 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
         (Some(ViewChoice::Lot), _) | (None, None) => Camera::Lot,
     };
     let layout = if camera == Camera::Lot { Layout::fitting(&replay.map) } else { Layout::Beside };
-    let title = format!("{trial}, noise {}, {speed:.0}x", first.noise);
+    let title = format!("{trial}, noise {}, {speed}x", first.noise);
     let console = Console::new(folder.output);
     console.begin("animation", "drawing");
     let scene = Scene::new(&replay, &settings.episode, takes, &times, (camera, layout), title);
     let reel = scene.reel()?;
-    let (bytes, stride) = reel.encode_within(LIMIT_BYTES, 100 / args.fps, format)?;
+    let (bytes, stride) = reel.encode_within(LIMIT_BYTES, shown_cs, format)?;
     let fewer = if stride == 1 { String::new() } else { format!(", one of {stride} kept for size") };
     console.end(&format!("{} frames{fewer}", reel.len()));
     folder.put(&path, &bytes)

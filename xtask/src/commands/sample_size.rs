@@ -23,7 +23,7 @@ pub(crate) struct SampleSizeArgs {
     /// Two rates per 100 m to tell apart.
     #[arg(long, value_name = "RATE,RATE", value_parser = two_rates)]
     between: Option<[f64; 2]>,
-    /// Probability of seeing a difference that is there.
+    /// Of `--between`: probability of seeing a difference that is there.
     #[arg(long, default_value_t = 0.8)]
     power: f64,
     /// Confidence: one-sided for `--below`, two-sided for `--between`.
@@ -65,9 +65,11 @@ pub(crate) fn run(args: &SampleSizeArgs, output: &Output) -> anyhow::Result<()> 
     if let Some(rate) = args.below {
         check(&[rate], "--below")?;
         ensure!(rate > 0.0, "--below 0: no distance shows that a rate is zero; name a rate that would be good enough");
-        let metres = to_bound(rate, args.confidence);
+        // Of events that come in clusters there are as many fewer that say something by themselves.
+        let metres = dispersion * to_bound(rate, args.confidence);
         output.remark(format_args!(
-            "{metres:.0} m without a near-collision show a rate below {rate} per 100 m ({percent} %, one-sided)"
+            "{metres:.0} m without a near-collision show a rate below {rate} per 100 m ({percent} %, one-sided, dispersion \
+             {dispersion})"
         ));
         answers.push(Answer { rates: vec![rate], metres, confidence: args.confidence, power: None });
     }

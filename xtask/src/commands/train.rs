@@ -147,6 +147,8 @@ fn elsewhere(settings: &Settings) -> Settings {
         lots: settings.evaluation.elsewhere.clone(),
         elsewhere: Vec::new(),
         trials: 1,
+        // One table is shown, of the first level.
+        noise: settings.evaluation.noise[..1].to_vec(),
         ..settings.evaluation.clone()
     };
     Settings { evaluation, ..settings.clone() }
