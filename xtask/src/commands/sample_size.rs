@@ -42,6 +42,7 @@ struct Answer {
     rates: Vec<f64>,
     metres: f64,
     confidence: f64,
+    dispersion: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     power: Option<f64>,
 }
@@ -71,7 +72,7 @@ pub(crate) fn run(args: &SampleSizeArgs, output: &Output) -> anyhow::Result<()> 
             "{metres:.0} m without a near-collision show a rate below {rate} per 100 m ({percent} %, one-sided, dispersion \
              {dispersion})"
         ));
-        answers.push(Answer { rates: vec![rate], metres, confidence: args.confidence, power: None });
+        answers.push(Answer { rates: vec![rate], metres, confidence: args.confidence, dispersion, power: None });
     }
     if let Some([a, b]) = args.between {
         check(&[a, b], "--between")?;
@@ -85,7 +86,7 @@ pub(crate) fn run(args: &SampleSizeArgs, output: &Output) -> anyhow::Result<()> 
             100.0 * args.power
         ));
         let (confidence, power) = (args.confidence, Some(args.power));
-        answers.push(Answer { rates: vec![a, b], metres, confidence, power });
+        answers.push(Answer { rates: vec![a, b], metres, confidence, dispersion, power });
     }
     if args.json.json { output.table(String::new, &answers) } else { Ok(()) }
 }
