@@ -5,6 +5,7 @@ use crate::determinism::files;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use std::process::Output;
 use std::sync::LazyLock;
 use std::time::Duration;
 use storage::sums;
@@ -40,6 +41,28 @@ fn contents(run: &Path) -> BTreeMap<String, Vec<u8>> {
     };
     let is_kept = |name: &str| ["manifest.toml", "wall_time.jsonl", ".lock"].iter().all(|other| !name.ends_with(other));
     files(run).into_iter().filter(|(name, _)| is_kept(name)).map(|(name, bytes)| (name, normal(bytes))).collect()
+}
+
+/// Makes what `whole` holds on two machines, and holds it against that, byte for byte.
+fn assert_same_from_shards(command: &str, whole: &Path, run: &impl Fn(&[&str]) -> Output, arguments: &[&str]) {
+    let shards = ["1", "2"].map(|number| whole.with_file_name(format!("shard-{number}")));
+    for (number, shard) in (1..).zip(&shards) {
+        let share = format!("--shard={number}/2");
+        let made = run(&[arguments, &[&share, "--out", &shard.to_string_lossy()]].concat());
+        assert!(made.status.success(), "{}", text(&made).1);
+    }
+    let merged = whole.with_file_name("merged");
+    refused(&["render", "results"], &[&shards[0]], "this is a shard");
+    refused(&["merge", "--out", &merged.to_string_lossy()], &[&shards[0]], "missing: shard 2/2");
+    succeed(xtask().arg("merge").args(&shards).arg("--out").arg(&merged));
+    succeed(xtask().args([command, "--resume"]).arg(&merged));
+    assert!(sums::verify(&merged).faults.is_empty());
+    let (expected, found) = (contents(whole), contents(&merged));
+    assert_eq!(expected.keys().collect::<Vec<_>>(), found.keys().collect::<Vec<_>>(), "{command}");
+    for (name, bytes) in &expected {
+        // Lists have the digests of manifests, which name other command lines.
+        assert!(name.ends_with("sha256sums") || *bytes == found[name], "{name} differs between one machine and two");
+    }
 }
 
 /// A run on one machine, and what it printed.
@@ -280,8 +303,10 @@ fn each_deviation_from_the_paper_is_trained_and_driven() {
         command.args(["deviations", "--preset", "smoke"]).args(short.iter().flat_map(|change| ["--set", change]));
         command.args(arguments).output().unwrap()
     };
-    let made = run(&["--of", "points,network", "--unseen", "validation:1:lane", "--out", &out]);
+    let arguments = ["--of", "points,network", "--unseen", "validation:1:lane"];
+    let made = run(&[&arguments[..], &["--out", &out]].concat());
     assert!(made.status.success(), "{}", text(&made).1);
+    assert_same_from_shards("deviations", Path::new(&out), &run, &arguments);
     let csv = std::fs::read_to_string(folder.join("out/deviations.csv")).unwrap();
     let count = |part: &str| csv.lines().filter(|line| line.contains(part)).count();
     assert_eq!((count("as-it-is"), count("points"), count("network,")), (2, 2, 2), "{csv}");
@@ -308,10 +333,13 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
             .args(few)
             .args(arguments)
             .output()
+            .unwrap()
     };
     let out_name = out.to_string_lossy().into_owned();
-    let first = run(&["--different", "2,1", "--unseen", "validation:1:lane", "--out", &out_name]).unwrap();
+    let arguments = ["--different", "2,1", "--unseen", "validation:1:lane"];
+    let first = run(&[&arguments[..], &["--out", &out_name]].concat());
     assert!(first.status.success(), "{}", text(&first).1);
+    assert_same_from_shards("scaling", &out, &run, &arguments);
     let table = std::fs::read_to_string(out.join("scaling.md")).unwrap();
     let rows: Vec<&str> = table.lines().filter(|line| line.contains("BC") || line.contains("DAgger")).collect();
     assert_eq!(rows.len(), 4, "two trainings, two policies of each:\n{table}");
@@ -348,7 +376,7 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
         (["--different", "4,4"], "named twice"),
         (["--unseen", "train:2"], "trained or tuned on it"),
     ] {
-        let refused = run(&arguments).unwrap();
+        let refused = run(&arguments);
         assert_eq!(refused.status.code(), Some(2));
         assert!(text(&refused).1.contains(part), "{arguments:?}: {}", text(&refused).1);
     }
@@ -384,15 +412,13 @@ fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
             .unwrap()
     };
     let out_name = out.to_string_lossy().into_owned();
-    let first = run(&[
-        "--rule",
-        "expert_only,ensemble_dagger,lazy_dagger",
+    let arguments = [
+        "--rule=expert_only,ensemble_dagger,lazy_dagger",
         "--iterations=1",
         "--samples=200",
         "--unseen=validation:1:lane",
-        "--out",
-        &out_name,
-    ]);
+    ];
+    let first = run(&[&arguments[..], &["--out", &out_name]].concat());
     assert!(first.status.success(), "{}", text(&first).1);
     let table = std::fs::read_to_string(out.join("rules.md")).unwrap();
     let rows: Vec<&str> = table.lines().filter(|line| line.starts_with("| ")).skip(1).collect();
@@ -404,6 +430,7 @@ fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
     assert!(rows[2].starts_with("| EnsembleDAgger") && rows[2].contains("| 400 "), "{table}");
     assert!(std::fs::read_to_string(out.join("rules.csv")).unwrap().contains("LazyDAgger"));
     assert!(std::fs::read_to_string(out.join("rules.svg")).unwrap().contains("expert is asked"));
+    assert_same_from_shards("rules", &out, &run, &arguments);
     // A run that was moved before its end: its networks are known by where they lie in it.
     let moved = folder.join("moved");
     std::fs::rename(&out, &moved).unwrap();

@@ -6,6 +6,7 @@ use crate::docs_page;
 use crate::page::{Image, Page};
 use crate::{deviations, rules, scaling};
 use anyhow::{bail, ensure};
+use evaluation::shards;
 use experiment::manifest::{self, Manifest};
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::convert::Infallible;
@@ -78,6 +79,7 @@ impl OtherRun {
         let folder = &self.folder;
         let name = folder.display();
         ensure!(folder.is_dir() && manifest::is_finished(folder)?, "{name}: this is not a finished run");
+        ensure!(!shards::is_shard(folder)?, "{name}: this is a shard, which has no table; put all together with merge");
         let manifest = Manifest::read(folder)?;
         let (title, table) = match manifest.command.as_str() {
             "deviations" => (deviations::TITLE, "deviations.md"),

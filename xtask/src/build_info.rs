@@ -61,6 +61,20 @@ pub(crate) fn check_can_go_on(run: &Path, manifest: &Manifest, output: &Output) 
     Ok(())
 }
 
+/// Checks that this program is the one that began a shard: its stages would be of two versions, and `merge` would refuse
+/// them after all the work.
+///
+/// # Errors
+/// If it is another.
+pub(crate) fn check_began_shard(run: &Path, manifest: &Manifest) -> anyhow::Result<()> {
+    ensure!(
+        manifest.is_of(get()),
+        "{}: this shard was begun with another version of lotpilot; use that one, or make the shard again",
+        run.display()
+    );
+    Ok(())
+}
+
 /// The libraries whose arithmetic results depend on, in every version that was linked.
 fn libraries() -> Vec<String> {
     const COMPUTING: [&str; 12] = [

@@ -101,7 +101,7 @@ enum Command {
     /// Trains on few and on many different lots, and shows how near-collisions fall.
     #[command(after_help = scaling::EXAMPLES)]
     Scaling(scaling::ScalingArgs),
-    /// Puts the shards of an evaluation or a reproduction together, as if one machine had done all of it.
+    /// Puts the shards of an evaluation, a reproduction or other trainings together, as if one machine had done all of it.
     #[command(after_help = merge::EXAMPLES)]
     Merge(merge::MergeArgs),
     /// Checks that every file of a run is what was written, by its SHA-256.

@@ -30,8 +30,10 @@ pub(crate) struct DeviationsArgs {
     unseen: Vec<String>,
 }
 
-const RUN: Trainings<Extent> = Trainings {
-    command: "deviations",
+pub(crate) const COMMAND: &str = "deviations";
+
+pub(crate) const RUN: Trainings<Extent> = Trainings {
+    command: COMMAND,
     title: report::deviations::TITLE,
     stages: deviations::stages,
     write: report::deviations::write,

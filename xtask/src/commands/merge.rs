@@ -1,23 +1,23 @@
-//! `merge`: the shards of an evaluation or a reproduction, made on several machines, as if one had done all of it; or
-//! evaluations by different drivers, as if one had named all of them.
+//! `merge`: the shards of an evaluation, a reproduction or other trainings, made on several machines, as if one had done
+//! all of it; or evaluations by different drivers, as if one had named all of them.
 
 use crate::args::{JsonArgs, OutArgs};
 use crate::build_info;
 use crate::commands::evaluate::{self, Asked, MethodArgs};
-use crate::commands::{perform, reproduce};
+use crate::commands::{deviations, perform, reproduce, rules, scaling};
 use crate::console::Console;
 use crate::interrupt;
 use crate::output::Output;
-use anyhow::ensure;
+use anyhow::{bail, ensure};
 use clap::Args;
 use evaluation::drive_stage::DriveStage;
 use evaluation::evaluations::Evaluations;
 use evaluation::parts::Rows;
 use evaluation::plan::Plan;
 use evaluation::shards::{self, Shards};
-use evaluation::stages::{self, Step};
+use evaluation::stages::{self, Stage, Step};
 use experiment::drivers::{DriverSpec, NamedDriver};
-use experiment::inputs;
+use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
 use experiment::manifest::{Build, Manifest, Request};
 use experiment::run_dir::{Place, RunDir};
@@ -30,12 +30,13 @@ Examples:
   cargo xtask merge shards/* --out runs/merged
   cargo xtask merge trained/* --out runs/full         the networks of a reproduction; then --networks runs/full
   cargo xtask merge driven/*                          what they drove, into runs/full, and its report
+  cargo xtask merge shards/* --out runs/rules         the trainings of rules; then rules --resume runs/rules
   cargo xtask merge runs/mine runs/planners --out runs/all     other drivers of the same trials, in one table";
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct MergeArgs {
-    /// Folders that `evaluate --shard` or `reproduce --shard` wrote: every shard once, in any order. Or whole evaluations of
-    /// the same trials by different drivers.
+    /// Folders that a command with `--shard` wrote: every shard once, in any order. Or whole evaluations of the same trials
+    /// by different drivers.
     #[arg(value_name = "RUN", required = true)]
     folders: Vec<PathBuf>,
     /// Driver to compare the others with, for whole evaluations [default: the last network, else the first driver].
@@ -57,7 +58,7 @@ pub(crate) fn run(args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let shards = Shards::read(&args.folders)?;
     ensure!(args.compare_with.is_none(), "--compare-with: shards are compared as they were driven; leave it out");
     ensure!(args.methods.is_empty(), "--method: shards are judged as they were driven; leave it out");
-    if shards.manifest().command != reproduce::COMMAND {
+    if shards.manifest().command == evaluate::COMMAND {
         return evaluation(&shards, args, output);
     }
     ensure!(
@@ -148,16 +149,29 @@ fn put_together(plan: &Plan<'_>, rows: &Rows, run: &RunDir, args: &MergeArgs, ou
     evaluate::finish(plan, run, &Console::new(output), output)
 }
 
-/// Begins a reproduction with the trainings that the shards did.
+/// What the shards are shares of: all stages, and the files that they read.
+fn asked_for(shards: &Shards) -> anyhow::Result<(Vec<Stage>, Inputs)> {
+    let (settings, manifest) = (shards.settings(), shards.manifest());
+    match manifest.command.as_str() {
+        reproduce::COMMAND => reproduce::asked_for(settings, manifest),
+        rules::COMMAND => rules::RULES.asked_for(settings, manifest),
+        deviations::COMMAND => deviations::RUN.asked_for(settings, manifest),
+        scaling::COMMAND => scaling::SCALING.asked_for(settings, manifest),
+        other => bail!("a shard of {other}: it is of another version of lotpilot"),
+    }
+}
+
+/// Begins a run with the trainings that the shards did.
 fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, manifest) = (shards.settings(), shards.manifest());
-    let extent = reproduce::extent_of(&args.folders[0], manifest)?;
-    manifest.check_inputs(&reproduce::inputs(settings, &extent)?)?;
-    let trained = shards.stages(&stages::all(settings, &extent, Path::new("")))?;
+    let command = manifest.command.as_str();
+    let (stages, inputs) = asked_for(shards)?;
+    manifest.check_inputs(&inputs)?;
+    let trained = shards.stages(&stages)?;
     let run = match &args.out.out {
         // An earlier merge of them was interrupted.
         Some(out) if !args.out.overwrite && sums::exists(out)? => {
-            let (run, found, made) = RunDir::resume(out, reproduce::COMMAND)?;
+            let (run, found, made) = RunDir::resume(out, command)?;
             shards.check_are_of(out, &found, &made, "choose another --out, or delete it with --overwrite")?;
             run
         }
@@ -165,7 +179,7 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
             let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
             // It is made as its shards are, except for the share: so a report says what was asked for.
             let build = Build { command_line: whole_command(&manifest.command_line), ..made_by(manifest) };
-            let place = args.out.place(reproduce::COMMAND, &manifest.preset, settings.seed.0);
+            let place = args.out.place(command, &manifest.preset, settings.seed.0);
             RunDir::create(&Place { build: &build, ..place }, settings, &request)?
         }
     };
@@ -176,9 +190,14 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
         }
     }
     let name = run.path().display();
+    let elsewhere = match command {
+        reproduce::COMMAND => {
+            format!(", or on several machines with cargo xtask {command} --networks {name} --shard NUMBER/OF")
+        }
+        _ => String::new(),
+    };
     output.note(format_args!(
-        "written: {name}: {} trainings; continue with cargo xtask reproduce --resume {name}, or on several machines \
-         with cargo xtask reproduce --networks {name} --shard NUMBER/OF",
+        "written: {name}: {} trainings; continue with cargo xtask {command} --resume {name}{elsewhere}",
         trained.len()
     ));
     Ok(())
@@ -190,7 +209,7 @@ fn drives(shards: &Shards, networks: &Path, args: &MergeArgs, output: &Output) -
     build_info::check_can_go_on(networks, &manifest, output)?;
     let remedy = format!("make them again with --networks {}", networks.display());
     shards.check_are_of(networks, &settings, &manifest, &remedy)?;
-    let extent = reproduce::extent_of(networks, &manifest)?;
+    let extent = reproduce::extent_of(&manifest)?;
     let all = stages::all(&settings, &extent, networks);
     shards.manifest().check_inputs(&reproduce::inputs_of_drives(&settings, &extent, &all)?)?;
     // Nothing is written before all of it is known to be whole.

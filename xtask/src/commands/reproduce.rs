@@ -128,7 +128,7 @@ struct Arguments {
 impl Arguments {
     fn read(path: &Path, mut manifest: Manifest) -> anyhow::Result<Self> {
         let shard = ShardRecord::take_from(&mut manifest).with_context(|| path.display().to_string())?;
-        Ok(Self { extent: extent_of(path, &manifest)?, shard })
+        Ok(Self { extent: extent_of(&manifest).with_context(|| path.display().to_string())?, shard })
     }
 
     fn to_table(&self) -> anyhow::Result<toml::Table> {
@@ -236,9 +236,8 @@ pub(crate) fn recipe_of(path: &Path) -> anyhow::Result<Recipe> {
 }
 
 /// How much a run does, by a manifest without the record of a shard.
-pub(crate) fn extent_of(path: &Path, manifest: &Manifest) -> anyhow::Result<Extent> {
-    let arguments = manifest.arguments.clone();
-    arguments.try_into().with_context(|| format!("{}: this is not a folder of cargo xtask reproduce", path.display()))
+pub(crate) fn extent_of(manifest: &Manifest) -> anyhow::Result<Extent> {
+    manifest.arguments.clone().try_into().context("this is not a folder of cargo xtask reproduce")
 }
 
 fn resume(path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, Arguments)> {
@@ -246,18 +245,21 @@ fn resume(path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, Arg
     build_info::check_can_go_on(path, &manifest, output)?;
     let arguments = Arguments::read(path, manifest.clone())?;
     let Arguments { extent, shard } = &arguments;
-    // Its stages would be of two versions, and `merge` would refuse them after all the work.
-    ensure!(
-        shard.is_none() || manifest.is_of(build_info::get()),
-        "{}: this shard was begun with another version of lotpilot; use that one, or make the shard again",
-        path.display()
-    );
+    if shard.is_some() {
+        build_info::check_began_shard(path, &manifest)?;
+    }
     let found = match shard.as_ref().and_then(|shard| shard.networks.as_deref()) {
         Some(networks) => inputs_of_drives(&settings, extent, &stages::all(&settings, extent, networks))?,
         None => inputs(&settings, extent)?,
     };
     manifest.check_inputs(&found)?;
     Ok((run, settings, arguments))
+}
+
+/// All stages of what a manifest, without the record of a shard, asks for, and the files that its trainings read.
+pub(crate) fn asked_for(settings: &Settings, manifest: &Manifest) -> anyhow::Result<(Vec<Stage>, Inputs)> {
+    let extent = extent_of(manifest)?;
+    Ok((stages::all(settings, &extent, Path::new("")), inputs(settings, &extent)?))
 }
 
 /// The lots, parameters and networks from files that a share of the drives reads.
@@ -272,7 +274,7 @@ pub(crate) fn inputs_of_drives(settings: &Settings, extent: &Extent, stages: &[S
 }
 
 /// The lots and parameters from files that are read.
-pub(crate) fn inputs(settings: &Settings, extent: &Extent) -> anyhow::Result<Inputs> {
+fn inputs(settings: &Settings, extent: &Extent) -> anyhow::Result<Inputs> {
     let mut found = train::inputs(settings)?;
     let unseen = Lot::parse_all(&extent.unseen, &settings.episode.vehicle)?;
     let tuned = NamedDriver::load_all(&extent.tuned, settings)?;

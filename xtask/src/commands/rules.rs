@@ -12,7 +12,9 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask rules                                   every rule, one seed, few lots
   cargo xtask rules --rule expert_only,all_below,hg_dagger --seeds 5 --unseen sealed:my-phrase:90:all
-  cargo xtask rules --resume runs/rules-default-s1";
+  cargo xtask rules --resume runs/rules-default-s1
+  cargo xtask rules --seeds 5 --shard 2/50 --out shards/2
+  cargo xtask merge shards/* --out runs/rules         then --resume runs/rules, which drives";
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RulesArgs {
@@ -52,8 +54,10 @@ pub(crate) struct RulesArgs {
 const DEFAULTS: [&str; 3] = [r#"training.lots=["lot-a", "train:18:all"]"#, "training.trials=1", EVERY_TICK];
 const EVERY_TICK: &str = r#"dagger.keep="every_tick""#;
 
-const RULES: Trainings<Extent> = Trainings {
-    command: "rules",
+pub(crate) const COMMAND: &str = "rules";
+
+pub(crate) const RULES: Trainings<Extent> = Trainings {
+    command: COMMAND,
     title: report::rules::TITLE,
     stages: |settings, extent, root| Ok(rules::stages(settings, extent, root)),
     write: report::rules::write,

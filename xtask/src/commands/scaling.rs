@@ -38,8 +38,10 @@ pub(crate) struct ScalingArgs {
 /// Lots of each family in every round: about as much as the default trains on; no lot that is there in every training.
 const LOTS_OF_A_FAMILY: usize = 16;
 
-const SCALING: Trainings<Extent> = Trainings {
-    command: "scaling",
+pub(crate) const COMMAND: &str = "scaling";
+
+pub(crate) const SCALING: Trainings<Extent> = Trainings {
+    command: COMMAND,
     title: report::scaling::TITLE,
     stages: |settings, extent, root| Ok(scaling::stages(settings, extent, root)),
     write: report::scaling::write,

@@ -1,5 +1,5 @@
-//! What commands of several trainings and one drive of all their policies have in common: they are begun, resumed, done
-//! and reported in the same way.
+//! What commands of several trainings and one drive of all their policies have in common: they are begun, resumed, shared
+//! out, done and reported in the same way.
 
 use super::{perform, train};
 use crate::args::{LayerArgs, OutArgs, run_folder};
@@ -8,12 +8,14 @@ use crate::console::Console;
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::Args;
+use evaluation::shards::ShardRecord;
 use evaluation::stages::Stage;
 use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
-use experiment::manifest::{Outcome, Request};
+use experiment::manifest::{Manifest, Outcome, Request};
 use experiment::run_dir::RunDir;
 use experiment::settings::{Layers, Settings};
+use experiment::shard::Shard;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
@@ -29,8 +31,16 @@ pub(crate) struct TrainingsArgs {
     pub(crate) seed: Option<u64>,
     #[command(flatten)]
     out: OutArgs,
+    /// Does only a share of the trainings, for one of several machines (docs/cluster.md); `merge` puts the shares
+    /// together.
+    #[arg(long, value_name = "NUMBER/OF")]
+    shard: Option<Shard>,
     /// Continues an interrupted run with its own settings, to the same result; finished trainings are skipped.
-    #[arg(long, value_name = "RUN", value_parser = run_folder(), conflicts_with_all = ["preset", "config", "overrides", "seed", "out"])]
+    #[arg(
+        long,
+        value_name = "RUN", value_parser = run_folder(),
+        conflicts_with_all = ["preset", "config", "overrides", "seed", "out", "shard"]
+    )]
     resume: Option<PathBuf>,
 }
 
@@ -75,35 +85,73 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
         begin: impl FnOnce() -> anyhow::Result<Begun<E>>,
         output: &Output,
     ) -> anyhow::Result<()> {
-        let (run, settings, extent) = if let Some(path) = &args.resume {
-            let (run, settings, manifest) = RunDir::resume(path, self.command)?;
-            build_info::check_can_go_on(path, &manifest, output)?;
-            let extent: E = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
-            manifest.check_inputs(&self.inputs(&settings, &extent)?)?;
-            (run, settings, extent)
-        } else {
-            let Begun { preset, settings, extent } = begin()?;
-            let mut places = train::check_lots(&settings, output)?;
-            places.extend(train::check_unseen(&settings, (self.unseen)(&extent))?);
-            args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
-            for stage in (self.stages)(&settings, &extent, Path::new(""))? {
-                stage.settings.check().with_context(|| stage.folder.clone())?;
-            }
-            let arguments = toml::Table::try_from(&extent)?;
-            let request = Request { arguments, inputs: self.inputs(&settings, &extent)? };
-            let run = RunDir::create(&args.out.place(self.command, &preset, settings.seed.0), &settings, &request)?;
-            (run, settings, extent)
+        let (run, settings, extent, shard) = match &args.resume {
+            Some(path) => self.resume(path, output)?,
+            None => self.begin(args, begin()?, output)?,
         };
-        let stages = (self.stages)(&settings, &extent, run.path())?;
         let console = Console::new(output);
+        let mut stages = (self.stages)(&settings, &extent, run.path())?;
+        if let Some(record) = &shard {
+            stages = record.share_of(stages);
+        }
         perform::all(self.command, &stages, &run, &console, output)?;
-        let table = (self.write)(&settings, &extent, &stages, &run)?;
-        output.table(|| format!("\n{}\n\n{table}", self.title), &())?;
-        run.finish(Outcome::Reproduction { stages: stages.len() })?;
-        let name = self.command;
-        output.note(format_args!("written: {}/{name}.md, {name}.csv and {name}.svg", run.path().display()));
+        let (name, folder) = (self.command, run.path().display());
+        if let Some(ShardRecord { number, .. }) = shard {
+            run.finish(Outcome::Reproduction { stages: stages.len() })?;
+            output.note(format_args!(
+                "written: {folder}: shard {number}; put all together with cargo xtask merge RUN..."
+            ));
+        } else {
+            let table = (self.write)(&settings, &extent, &stages, &run)?;
+            output.table(|| format!("\n{}\n\n{table}", self.title), &())?;
+            run.finish(Outcome::Reproduction { stages: stages.len() })?;
+            output.note(format_args!("written: {folder}/{name}.md, {name}.csv and {name}.svg"));
+        }
         console.report_time();
         Ok(())
+    }
+
+    fn begin(
+        &self,
+        args: &TrainingsArgs,
+        begun: Begun<E>,
+        output: &Output,
+    ) -> anyhow::Result<(RunDir, Settings, E, Option<ShardRecord>)> {
+        let Begun { preset, settings, extent } = begun;
+        let mut places = train::check_lots(&settings, output)?;
+        places.extend(train::check_unseen(&settings, (self.unseen)(&extent))?);
+        args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
+        // Only names and settings are asked for: the run has no place yet.
+        let stages = (self.stages)(&settings, &extent, Path::new(""))?;
+        for stage in &stages {
+            stage.settings.check().with_context(|| stage.folder.clone())?;
+        }
+        let shard = args.shard.map(|number| ShardRecord::of_stages(number, None, &settings, stages));
+        let mut arguments = toml::Table::try_from(&extent)?;
+        if let Some(record) = &shard {
+            record.add_to(&mut arguments);
+        }
+        let request = Request { arguments, inputs: self.inputs(&settings, &extent)? };
+        let run = RunDir::create(&args.out.place(self.command, &preset, settings.seed.0), &settings, &request)?;
+        Ok((run, settings, extent, shard))
+    }
+
+    fn resume(&self, path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, E, Option<ShardRecord>)> {
+        let (run, settings, mut manifest) = RunDir::resume(path, self.command)?;
+        build_info::check_can_go_on(path, &manifest, output)?;
+        let shard = ShardRecord::take_from(&mut manifest).with_context(|| path.display().to_string())?;
+        if shard.is_some() {
+            build_info::check_began_shard(path, &manifest)?;
+        }
+        let extent: E = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
+        manifest.check_inputs(&self.inputs(&settings, &extent)?)?;
+        Ok((run, settings, extent, shard))
+    }
+
+    /// All stages of what a manifest, without the record of a shard, asks for, and the lots from files that they read.
+    pub(crate) fn asked_for(&self, settings: &Settings, manifest: &Manifest) -> anyhow::Result<(Vec<Stage>, Inputs)> {
+        let extent: E = manifest.arguments.clone().try_into()?;
+        Ok(((self.stages)(settings, &extent, Path::new(""))?, self.inputs(settings, &extent)?))
     }
 
     /// The lots from files that are read.
