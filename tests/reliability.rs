@@ -80,6 +80,11 @@ fn a_killed_training_goes_on_to_the_same_bytes() {
                 assert!(refusal.contains("not finished") && refusal.contains("net:"), "{command:?}: {refusal}");
             }
         }
+        if file == "summary.json" {
+            // What it had driven stayed, and was listed nowhere.
+            let refusal = refuse(xtask().args([arguments[0], "--no-eval", "--resume"]).arg(&run));
+            assert!(refusal.contains("drives already; leave it out"), "{refusal}");
+        }
         resume(arguments[0], &run);
         let resumed = files(&run);
         assert_eq!(whole.keys().collect::<Vec<_>>(), resumed.keys().collect::<Vec<_>>(), "killed at {file}");

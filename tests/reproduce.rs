@@ -14,10 +14,10 @@ use storage::sums;
 const STAGES: [&str; 18] = [
     "chains/s1-weighted",
     "chains/s1-unweighted",
+    "chains/s1-expert-equal",
     "chains/s1-any-below",
     "chains/s1-tau-only",
     "chains/s1-expert-only",
-    "chains/s1-expert-equal",
     "chains/s1-alpha-15",
     "chains/s1-far-points",
     "drives/reference",
@@ -370,6 +370,7 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
     let own = std::fs::read_to_string(own).unwrap();
     assert!(own.starts_with("# Near-collisions against different lots\n") && own.contains(&table), "{own}");
     assert!(own.contains("| command | `cargo xtask scaling --preset smoke"), "{own}");
+    assert!(own.contains(&format!("`cargo xtask render results {out_name} --to ")), "{own}");
     assert!(own.contains("](pictures/results-scaling/scaling.svg)"), "{own}");
     for (arguments, part) in [
         (["--different", "0"], "name at least one lot"),

@@ -67,6 +67,13 @@ fn three_shards_merge_to_the_bytes_of_one_machine_and_nothing_else_merges() {
     }
     assert_eq!(printed, merged);
     assert!(sums::verify(&run).faults.is_empty());
+    // It says who drove, not who merged.
+    for shard in &shards {
+        forge(shard, "manifest.toml", |text| text.replacen("rustc_version = \"", "rustc_version = \"old ", 1));
+    }
+    succeed(xtask().arg("merge").args(&shards).arg("--overwrite").arg("--out").arg(&run));
+    let manifest = std::fs::read_to_string(run.join("manifest.toml")).unwrap();
+    assert!(manifest.contains("rustc_version = \"old "), "{manifest}");
 
     refused(&[one, three], "missing: shard 2/3");
     refused(&[one, two, two, three], "are both shard 2/3");
@@ -183,6 +190,15 @@ fn trainings_of_a_method_are_judged_together_wherever_they_drove() {
         evaluate(&all, &["--method", &method, "--shard", &format!("{shard}/2")], shard);
     }
     assert!(merged(["1", "2"], &[]) == (printed.clone(), whole.clone()), "shards");
+    // A machine whose products round twice drove networks otherwise, and its shard was merged.
+    let [first, second] = ["1", "2"].map(|shard| PathBuf::from(out(shard)));
+    let rounds_otherwise = folder.join("rounds-otherwise");
+    copy(&second, &rounds_otherwise);
+    forge(&rounds_otherwise, "manifest.toml", |text| match text.contains("\"fma\"") {
+        true => text.replacen("\"fma\"", "\"none\"", 1),
+        false => text.replacen("processor_features = [", "processor_features = [\"avx2\", \"fma\", ", 1),
+    });
+    refused(&[&first, &rounds_otherwise], "use of AVX2 and FMA");
     evaluate(&all[..2], &[], "two");
     evaluate(&all[2..], &[], "others");
     assert!(merged(["two", "others"], &["--method", &method]) == (printed.clone(), whole.clone()), "evaluations");
@@ -307,7 +323,7 @@ fn the_scripts_for_slurm_and_kubernetes_drive_their_shards_and_go_on() {
     std::fs::create_dir_all(folder.join("target/debug")).unwrap();
     std::fs::create_dir_all(folder.join("bin")).unwrap();
     std::os::unix::fs::symlink(xtask().get_program(), folder.join("target/debug/xtask")).unwrap();
-    std::fs::write(folder.join("bin/srun"), "#!/bin/sh\nexec \"$@\"\n").unwrap();
+    std::fs::write(folder.join("bin/srun"), "#!/bin/sh\nshift\nexec \"$@\"\n").unwrap();
     std::fs::set_permissions(folder.join("bin/srun"), std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
 
     let slurm = documented("```bash\n", "```");

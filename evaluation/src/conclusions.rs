@@ -4,7 +4,7 @@
 //! where it lies on the other, and cannot be told where it contains zero. Where there are several trainings of a recipe, the
 //! difference in near-collisions is that of their means, and its interval is for other lots and other seeds.
 
-use crate::format::{clustered, difference, exact_rate, interval, quoted_rate};
+use crate::format::{clustered, difference, exact_rate, interval, quoted_interval, quoted_rate};
 use crate::incidents::Cause;
 use crate::judge::{Comparison, DriverEstimate};
 use crate::names::{BC, DAGGER};
@@ -216,18 +216,20 @@ impl Against<'_> {
         let Totals { near_collisions, contacts, reference_m, .. } = totals;
         let name = self.name(driver);
         let all = self.trainings_of(&driver);
+        let each: Vec<Totals> = all.iter().map(|&driver| self.totals(driver)).collect();
+        let count = |totals: &Totals| format!("{} ({})", totals.near_collisions, totals.contacts);
+        let counts = || each.iter().map(count).collect::<Vec<_>>().join(", ");
         let judged = self.trainings.as_ref().and_then(|trainings| trainings.of(driver));
         if let Some((_, TeamEstimate { per_100m, .. })) = judged.filter(|_| all.len() > 1) {
-            let each: Vec<Totals> = all.iter().map(|&driver| self.totals(driver)).collect();
             let has_none = each.iter().all(|totals| totals.near_collisions == 0);
             let rate = if has_none { exact_rate(0, reference_m) } else { interval(*per_100m, 2) };
-            let counts = each.iter().map(|totals| format!("{} ({})", totals.near_collisions, totals.contacts));
-            let counts = counts.collect::<Vec<_>>().join(", ");
-            return format!("{name} {counts} in {reference_m:.0} m each, {rate} per 100 m");
+            return format!("{name} {} in {reference_m:.0} m each, {rate} per 100 m", counts());
         }
-        let which = if all.len() > 1 { format!(" (first of {})", all.len()) } else { String::new() };
         let rate = quoted_rate(&totals, &self.estimates[driver]);
-        format!("{name}{which} {near_collisions} ({contacts}) in {reference_m:.0} m, {rate} per 100 m")
+        if all.len() > 1 {
+            return format!("{name} {} in {reference_m:.0} m each, of the first {rate} per 100 m", counts());
+        }
+        format!("{name} {near_collisions} ({contacts}) in {reference_m:.0} m, {rate} per 100 m")
     }
 
     fn no_near_collision(&self) -> Statement {
@@ -304,7 +306,10 @@ impl Against<'_> {
         let [ours, theirs] = [self.dagger, other].map(|driver| (noisy(driver), self.totals(driver)));
         let of = |(noisy, totals): &(u32, Totals)| (*noisy, totals.reference_m / 100.0);
         let ratio = RateRatio::new(of(&theirs), of(&ours));
-        let verdict = if ratio.lower > 1.0 {
+        let is_clustered = [self.dagger, other].into_iter().any(|driver| clustered(&self.estimates[driver]).is_some());
+        let verdict = if is_clustered || self.comparison(other).is_none() {
+            Verdict::CannotBeTold
+        } else if ratio.lower > 1.0 {
             Verdict::Holds
         } else if ratio.upper.is_some_and(|upper| upper < 1.0) {
             Verdict::DoesNotHold
@@ -331,11 +336,14 @@ impl Against<'_> {
         let has_all = paper::LOTS.iter().all(|lot| groups.iter().any(|group| group.name == lot.lot));
         let ours = (has_all && groups.len() == paper::LOTS.len()).then(|| self.totals(planner))?;
         let exact = RateRatio::new((ours.near_collisions, ours.reference_m / 100.0), (events, metres / 100.0));
-        let ratio = match clustered(&self.estimates[planner]) {
+        let estimate = &self.estimates[planner];
+        let ratio = match clustered(estimate) {
             // Of the paper's events nothing is known but their number.
             Some(of_ours) => {
+                let [lower, upper] = quoted_interval(&ours, estimate);
                 let of_paper = Rate::new(events, metres / 100.0);
-                let [lower, upper] = ratio_of_intervals(of_ours, (of_paper.per_unit, [of_paper.lower, of_paper.upper]));
+                let of_paper = (of_paper.per_unit, [of_paper.lower, of_paper.upper]);
+                let [lower, upper] = ratio_of_intervals(Interval { lower, upper, ..of_ours }, of_paper);
                 RateRatio { lower, upper: Some(upper), ..exact }
             }
             None => exact,
@@ -343,7 +351,7 @@ impl Against<'_> {
         let upper = ratio.upper.unwrap_or(f64::INFINITY);
         let verdict = if 1.0 / AS_IN_THE_PAPER <= ratio.lower && upper <= AS_IN_THE_PAPER {
             Verdict::Holds
-        } else if ratio.lower > 1.0 || upper < 1.0 {
+        } else if ratio.lower > AS_IN_THE_PAPER || upper < 1.0 / AS_IN_THE_PAPER {
             Verdict::DoesNotHold
         } else {
             Verdict::CannotBeTold

@@ -1,4 +1,4 @@
-//! How near-collisions fall with the number of different lots that are trained on, at equal samples and optimiser steps:
+//! How near-collisions fall with the number of different lots that are trained on, at as many drives and optimiser steps:
 //! one training per number, then one evaluation of all of them on lots that none was trained on.
 //!
 //! A training of few lots meets each more often, with other noise every time.

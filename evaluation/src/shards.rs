@@ -4,6 +4,7 @@ use crate::parts::{self, Part, Rows};
 use crate::plan::Plan;
 use crate::stages::{self, Stage};
 use anyhow::{Context as _, ensure};
+use experiment::drivers::DriverSpec;
 use experiment::manifest::{self, Manifest};
 use experiment::settings::Settings;
 use experiment::shard::Shard;
@@ -136,6 +137,16 @@ impl ShardRun {
         Ok(Self { folder: folder.to_owned(), record, manifest, settings })
     }
 
+    /// Whether networks drive in it, or are trained.
+    fn has_networks(&self) -> bool {
+        let Some(drivers) = self.manifest.arguments.get("drivers").and_then(toml::Value::as_array) else { return true };
+        let is_network = |driver: &toml::Value| {
+            let spec = driver.as_str().and_then(|driver| driver.parse::<DriverSpec>().ok());
+            spec.is_none_or(|spec| spec.is_network())
+        };
+        drivers.iter().any(is_network)
+    }
+
     /// Refuses what does not belong to the same whole.
     fn check_belongs_to(&self, first: &Self) -> anyhow::Result<()> {
         let differs = [
@@ -143,6 +154,7 @@ impl ShardRun {
             ("number of shards", self.record.number.of() != first.record.number.of()),
             ("version of lotpilot", !self.manifest.is_of_version_of(&first.manifest)),
             ("architecture or system", self.manifest.target != first.manifest.target),
+            ("use of AVX2 and FMA", self.has_networks() && !self.manifest.rounds_like(&first.manifest)),
             ("folder of networks", self.record.networks != first.record.networks),
             ("choice of drivers or lots", self.manifest.arguments != first.manifest.arguments),
             ("set of settings", self.settings != first.settings),

@@ -5,7 +5,8 @@
 //! | `chains/sN-weighted` | behaviour cloning and `DAgger` with the paper's weight α on τ̂: Table 1, the driver of every table |
 //! | `chains/sN-unweighted` | the same with α = 0: Table 1's effect of the weight |
 //! | `chains/s1-any-below`, `-tau-only` | the other two readings of Algorithm 2, line 9, for a few iterations |
-//! | `chains/s1-expert-only`, `-expert-equal` | controls: as many rounds that the expert alone drove, with all of its samples and with as many as `DAgger` has |
+//! | `chains/sN-expert-equal` | control: as many rounds that the expert alone drove, with as many samples as `DAgger` has |
+//! | `chains/s1-expert-only` | control: the same with all of the expert's samples |
 //! | `chains/s1-alpha-15` | control: ten times the weight |
 //! | `chains/s1-far-points` | control: points as far as the way is open, as in the paper; none where they are so anyway |
 //! | `drives/reference` | the paper's tables: every driver on its lots |
@@ -293,9 +294,10 @@ fn trainings(settings: &Settings, extent: &Extent) -> Vec<Stage> {
     let mut stages = Vec::new();
     for seed in settings.training_seeds(extent.seeds) {
         let of_seed = Settings { seed, ..settings.clone() };
-        stages.extend([Chain::Weighted, Chain::Unweighted].map(|chain| chain.stage(&of_seed, extent)));
+        let chains = [Chain::Weighted, Chain::Unweighted, Chain::ExpertEqual];
+        stages.extend(chains.map(|chain| chain.stage(&of_seed, extent)));
     }
-    let of_first_seed = [Chain::AnyBelow, Chain::TauOnly, Chain::ExpertOnly, Chain::ExpertEqual, Chain::Alpha15];
+    let of_first_seed = [Chain::AnyBelow, Chain::TauOnly, Chain::ExpertOnly, Chain::Alpha15];
     stages.extend(of_first_seed.map(|chain| chain.stage(settings, extent)));
     if !has_points_of_paper(settings) {
         stages.push(Chain::FarPoints.stage(settings, extent));
@@ -349,9 +351,14 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     let rules = vec![all_below, of_first_seed("any below", Chain::AnyBelow), of_first_seed("τ̂ alone", Chain::TauOnly)];
     stages.push(drive(RULES, "policies under each decision rule", of_paper, rules));
 
-    let mut controls = networks[..3].to_vec();
+    let mut controls = networks.clone();
     controls.push(of_first_seed(EXPERT_ONLY, Chain::ExpertOnly));
-    controls.push(of_first_seed(EXPERT_EQUAL, Chain::ExpertEqual));
+    controls.extend(
+        settings
+            .training_seeds(extent.seeds)
+            .into_iter()
+            .map(|seed| (named(EXPERT_EQUAL, seed, settings), spec(Chain::ExpertEqual, seed, ""))),
+    );
     controls.push(of_first_seed(ALPHA_15, Chain::Alpha15));
     stages.push(drive(CONTROLS, "controls on generated lots", unseen, controls));
 
@@ -388,7 +395,12 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
 /// # Errors
 /// If something named does not exist.
 pub fn load(drivers: &[(String, String)], settings: &Settings) -> anyhow::Result<Vec<NamedDriver>> {
-    let load = |(name, spec): &(String, String)| Ok(spec.parse::<DriverSpec>()?.load(settings)?.renamed(name));
+    let load = |(name, spec): &(String, String)| {
+        let mut driver = spec.parse::<DriverSpec>()?.load(settings)?.renamed(name);
+        // Each has as many samples as the DAgger of its seed, so that their settings differ in more than the seed.
+        driver.method = name.starts_with(EXPERT_EQUAL).then(|| EXPERT_EQUAL.to_owned());
+        Ok(driver)
+    };
     drivers.iter().map(load).collect()
 }
 
@@ -515,7 +527,7 @@ mod tests {
         assert_eq!(folders, expected);
         // The first shard has the chain whose behaviour cloning the fifth takes over; the second has not.
         let weighted = Chain::Weighted.folder(settings.seed);
-        assert_eq!(trained[0][1].step, Step::Train { cloning_of: Some(weighted.clone()), samples_of: None });
+        assert_eq!(trained[0][2].step, Step::Train { cloning_of: Some(weighted.clone()), samples_of: None });
         assert_eq!(trained[1][0].step, Step::Train { cloning_of: None, samples_of: None });
         // What needs the samples of another is trained where that one is.
         let equal = Step::Train { cloning_of: Some(weighted.clone()), samples_of: Some(weighted.clone()) };
@@ -549,7 +561,10 @@ mod tests {
             assert!(!names(UNSEEN).contains(&name.to_owned()), "its tuned variant stands for {name}");
         }
         assert!(names(UNSEEN).contains(&"vvf".to_owned()) && names(UNSEEN).contains(&"cvm".to_owned()));
-        assert_eq!(names(CONTROLS), ["BC", "DAgger", "DAgger, α = 0", EXPERT_ONLY, EXPERT_EQUAL, ALPHA_15]);
+        let controls = names(CONTROLS);
+        assert_eq!(controls[..3], ["BC", "DAgger", "DAgger, α = 0"]);
+        let second = format!("{EXPERT_EQUAL} (seed 2)");
+        assert_eq!(controls[6..], [EXPERT_ONLY, EXPERT_EQUAL, &second, ALPHA_15], "{controls:?}");
         assert_eq!(names(SMOOTHED), names(UNSMOOTHED));
         assert_eq!(names(READINGS), names(READINGS_UNSEEN));
         for name in ["DAgger", "dwa", "dwa/fox", "cvm/simmons", "tentacle/short", "vff"] {

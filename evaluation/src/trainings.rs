@@ -2,6 +2,7 @@
 //!
 //! An interval of one network says how sure the rate of that network is. Here it is for other lots *and* other seeds.
 
+use crate::format::quoted_interval;
 use crate::judge::{Stratum, strata};
 use crate::results::{EvaluationResults, RunSummary};
 use crate::slices::Slice;
@@ -139,7 +140,7 @@ impl<'a> InCommon<'a> {
 }
 
 /// Every driver in a team, in the order of the first of each; none if no team has [`TRAININGS_MIN`] members. The same seed
-/// again is the same network, and counts once.
+/// again is not another training, also where another machine made another network of it, and counts once.
 pub fn teams(drivers: &[NamedDriver]) -> Vec<Team> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (index, driver) in drivers.iter().enumerate() {
@@ -165,7 +166,7 @@ impl Team {
         }
         let network_of = |index: &usize| (seed_of(index), drivers[*index].digest());
         group.sort_by_cached_key(network_of);
-        group.dedup_by_key(|index| network_of(index));
+        group.dedup_by_key(|index| seed_of(index));
         Self { name, seeds: group.iter().filter_map(seed_of).collect(), drivers: group }
     }
 }
@@ -206,7 +207,15 @@ impl EvaluationResults {
     ) -> Option<JudgedTeams> {
         let teams = teams(drivers);
         let with = teams.iter().position(|team| team.drivers.contains(&with))?;
-        let estimates = self.judge_teams(level, slice, &teams, with, seed)?;
+        let mut estimates = self.judge_teams(level, slice, &teams, with, seed)?;
+        let (of_drivers, _) = self.judge(level, slice, 0, seed);
+        for (team, estimate) in teams.iter().zip(&mut estimates) {
+            // What stands by itself has one interval, here as elsewhere.
+            if let [driver] = team.drivers[..] {
+                let totals = self.totals(level, driver, slice, None);
+                [estimate.per_100m.lower, estimate.per_100m.upper] = quoted_interval(&totals, &of_drivers[driver]);
+            }
+        }
         Some(JudgedTeams { teams: teams.into_iter().zip(estimates).collect() })
     }
 

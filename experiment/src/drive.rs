@@ -121,18 +121,19 @@ impl Replay {
         Trial::of_evaluation(self.key.seed, &self.lot, self.key.direction, self.key.trial)
     }
 
-    /// Refuses a key whose moment is after the end of the run. Drives up to it.
+    /// When the moment of its key was observed, seconds of simulated time: after an earlier near-collision a tick lasts until
+    /// the car stands. Drives up to it.
     ///
     /// # Errors
-    /// Naming the last tick; as [`TrialBatch::drive`].
-    pub fn check_tick(&self, episode: &EpisodeSettings, driver: &NamedDriver) -> anyhow::Result<()> {
-        let (wanted, mut last) = (self.key.tick, 0);
+    /// If the run ends before, naming the last tick; as [`TrialBatch::drive`].
+    pub fn observed_at_s(&self, episode: &EpisodeSettings, driver: &NamedDriver) -> anyhow::Result<f32> {
+        let (wanted, mut last, mut observed_s, mut end_s) = (self.key.tick, 0, 0.0, 0.0);
         self.drive(episode, driver, |frame| {
-            last = frame.tick;
+            (last, observed_s, end_s) = (frame.tick, end_s, frame.time_s);
             if last < wanted { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         })?;
         ensure!(last >= wanted, "{}: this run ends with tick {last}; name one up to that", self.key);
-        Ok(())
+        Ok(observed_s)
     }
 
     /// The settings of its episode.

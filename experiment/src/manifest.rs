@@ -211,6 +211,15 @@ impl Manifest {
         is_known && self.version() == other.version()
     }
 
+    /// Whether networks compute the same bits where this run and another were made: their products round once with AVX2 and
+    /// FMA, and twice without.
+    pub fn rounds_like(&self, other: &Self) -> bool {
+        let has = |manifest: &Self| {
+            ["avx2", "fma"].iter().all(|&name| manifest.processor_features.iter().any(|it| it == name))
+        };
+        has(self) == has(other)
+    }
+
     /// Whether a program made this run: by name, version, revision and changes to it.
     pub fn is_of(&self, build: &Build) -> bool {
         self.version() == (&build.program, &build.git_revision, build.git_dirty, &build.git_changes)

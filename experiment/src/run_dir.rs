@@ -93,9 +93,23 @@ impl RunDir {
     /// Reopens the folder of an interrupted run.
     ///
     /// # Errors
-    /// If there is none, another command made it, it is finished, its settings were changed, or another process is
-    /// using it.
+    /// If there is none, it is part of another run, another command made it, it is finished, its settings were changed, or
+    /// another process is using it.
     pub fn resume(path: &Path, command: &str) -> anyhow::Result<(Self, Settings, Manifest)> {
+        if sums::exists(path)?
+            && let Some(whole) = run_that_holds(path)?
+        {
+            let (whole, command) = (whole.display(), Manifest::read(&whole)?.command);
+            bail!(
+                "{}: this is a part of {whole}; continue with: cargo xtask {command} --resume {whole}",
+                path.display()
+            );
+        }
+        Self::resume_anywhere(path, command)
+    }
+
+    /// [`resume`](Self::resume), also within another run.
+    fn resume_anywhere(path: &Path, command: &str) -> anyhow::Result<(Self, Settings, Manifest)> {
         ensure!(path.is_dir(), "{}: there is no such run to resume", path.display());
         // Before the lock, which would leave its file in a folder that is not a run.
         ensure!(
@@ -170,7 +184,7 @@ impl RunDir {
             return Ok(None);
         }
         let stage = if sums::exists(&path)? {
-            let (stage, found, _) = Self::resume(&path, place.command)?;
+            let (stage, found, _) = Self::resume_anywhere(&path, place.command)?;
             ensure!(
                 found == *settings,
                 "{}: this stage was begun with other settings; delete the folder, or choose another --out",
@@ -179,6 +193,11 @@ impl RunDir {
             stage
         } else {
             if path.exists() {
+                ensure!(
+                    is_free(&path)? || Manifest::is_in(&path),
+                    "{}: holds files that are not of this run; move them elsewhere, and continue with --resume",
+                    path.display()
+                );
                 Self::locked(path.clone(), place.command)?.clear()?;
             }
             // Whoever continues the run gets the same from it as the command that began it.
@@ -343,6 +362,12 @@ fn is_free(path: &Path) -> anyhow::Result<bool> {
         |name: &OsString| name == SETTINGS || name == MANIFEST || name.to_string_lossy().ends_with(whole::PARTIAL);
     let is_locked = names.iter().any(|name| name == lock::FILE);
     Ok(names.iter().all(|name| name == lock::FILE || is_of_claim(name)) && (names.is_empty() || is_locked))
+}
+
+/// The run that a folder lies in, whether it is listed there yet or not.
+fn run_that_holds(folder: &Path) -> anyhow::Result<Option<PathBuf>> {
+    let folder = folder.canonicalize().with_context(|| folder.display().to_string())?;
+    Ok(folder.ancestors().skip(1).find(|around| Manifest::is_in(around)).map(Path::to_path_buf))
 }
 
 /// The run that lists a folder within it, and the name of the folder's list there.
@@ -556,11 +581,19 @@ mod tests {
         let stage = || run.stage("chains/one", &place(&path, false), &settings);
         drop(stage().unwrap().unwrap());
         let again = stage().unwrap().unwrap();
+        // It was told to be continued by a command that refuses it.
+        let refused = message(RunDir::resume(&path.join("chains/one"), "train-dagger"));
+        assert!(refused.contains("this is a part of") && refused.contains("train-dagger --resume"), "{refused}");
         again.finish(Outcome::Evaluation { drivers: Vec::new() }).unwrap();
         drop(again);
         assert!(stage().unwrap().is_none());
         fs::remove_file(path.join("chains/one/sha256sums")).unwrap();
         assert!(message(stage()).contains("chains/one/sha256sums"), "listed as finished, but incomplete");
+        // What somebody put where a stage was to come was deleted.
+        fs::create_dir(path.join("notes")).unwrap();
+        fs::write(path.join("notes/mine.txt"), "mine").unwrap();
+        assert!(message(run.stage("notes", &place(&path, false), &settings)).contains("move them elsewhere"));
+        assert!(path.join("notes/mine.txt").is_file());
         let resumed = Build { command_line: vec!["--resume".to_owned()], ..build().clone() };
         run.stage("chains/two", &Place { build: &resumed, ..place(&path, false) }, &settings).unwrap().unwrap();
         assert_eq!(Manifest::read(&path.join("chains/two")).unwrap().command_line, build().command_line);

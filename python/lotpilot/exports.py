@@ -79,17 +79,21 @@ def to_lerobot(dataset: Dataset, folder: str | os.PathLike[str]) -> None:
 
     Raises:
         FileExistsError: If the folder exists.
+        ValueError: If a second is no whole number of control periods: the format knows whole frames per second only.
         ImportError: If pandas or pyarrow is not installed: ``pip install "lotpilot[lerobot]"``.
     """
     import pandas as pd
     import pyarrow as pa
     from pyarrow import parquet
 
+    exact = 1.0 / dataset.rounds[0]["control_period_s"]
+    frames_per_s = round(exact)
+    if abs(exact - frames_per_s) > 1e-3:
+        raise ValueError(f"{exact:.3f} frames per second: LeRobot knows whole numbers only; collect with another control period")
     root = Path(folder)
     root.mkdir(parents=True)
     (root / "meta/episodes/chunk-000").mkdir(parents=True)
     (root / "data/chunk-000").mkdir(parents=True)
-    frames_per_s = round(1.0 / dataset.rounds[0]["control_period_s"])
     features = {
         "observation.environment_state": _feature("float32", [f"{row},{col}" for row, col in np.ndindex(25, 25)]),
         "observation.state": _feature("float32", ["speed_mps", "steering_rad"]),

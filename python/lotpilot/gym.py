@@ -20,7 +20,7 @@ from .core import Arrays, Core, EnvOptions, Floats, Grids, row
 PICTURE_PX = 500
 """Height of a picture, pixels; it is twice as wide."""
 FRAMES_PER_S = 20
-"""One picture per control tick of 50 ms."""
+"""One picture per control tick, which lasts 50 ms by default."""
 
 
 class LotEnv(gymnasium.Env[Any, Floats]):
@@ -49,6 +49,7 @@ class LotEnv(gymnasium.Env[Any, Floats]):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"no render mode {render_mode!r}; there are {self.metadata['render_modes']}")
         self.core = Core(1, EnvOptions.of({"threads": 1, **options}), "disabled")
+        self.metadata = {**self.metadata, "render_fps": _frames_per_s(self.core)}
         self.action_space = cast(gymnasium.Space[Floats], self.core.action_space())
         self.observation_space = self.core.observation_space()
         self.render_mode = render_mode
@@ -99,7 +100,7 @@ class LotEnv(gymnasium.Env[Any, Floats]):
             return None
         picture = self.core.cars.picture(0, PICTURE_PX)
         if self.render_mode == "human":
-            self._window = self._window or _Window(picture)
+            self._window = self._window or _Window(picture, self.metadata["render_fps"])
             self._window.show(picture)
             return None
         return picture
@@ -149,6 +150,7 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"no render mode {render_mode!r}; there is rgb_array")
         self.core = Core(num_envs, EnvOptions.of(options), _AUTORESET[mode])
+        self.metadata = {**self.metadata, "render_fps": _frames_per_s(self.core)}
         self.num_envs = num_envs
         self.render_mode = render_mode
         self.single_action_space = self.core.action_space()
@@ -226,6 +228,10 @@ def _refuse(options: Mapping[str, Any] | None, name: str, right: str) -> None:
         raise ValueError(f"there is no reset option {name!r} here; it is {right!r}")
 
 
+def _frames_per_s(core: Core) -> int:
+    return max(1, round(1.0 / core.control_period_s))
+
+
 def _first(observation: Any) -> Any:
     if isinstance(observation, dict):
         return {name: part[0] for name, part in observation.items()}
@@ -235,7 +241,8 @@ def _first(observation: Any) -> Any:
 class _Window:
     """Pictures as they come, at the speed of a real car."""
 
-    def __init__(self, picture: Grids) -> None:
+    def __init__(self, picture: Grids, frames_per_s: int) -> None:
+        self._frames_per_s = frames_per_s
         try:
             import pygame
         except ImportError as error:
@@ -250,7 +257,7 @@ class _Window:
         self._pygame.event.pump()
         self._screen.blit(self._pygame.surfarray.make_surface(picture.swapaxes(0, 1)), (0, 0))
         self._pygame.display.flip()
-        self._clock.tick(FRAMES_PER_S)
+        self._clock.tick(self._frames_per_s)
 
     def close(self) -> None:
         self._pygame.display.quit()

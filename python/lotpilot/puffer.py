@@ -46,6 +46,8 @@ class LotPufferEnv(PufferEnv):  # type: ignore[misc]
         """Starts the next episode of every car, or the first ones of a seed."""
         seen = self.core.reset(seeds=None if seed is None else [seed] * self.num_agents)
         self.observations[:] = seen.grids
+        # Of the last step of other episodes.
+        self.rewards[:], self.terminals[:], self.truncations[:] = 0.0, False, False
         return self.observations, []
 
     def step(self, actions: npt.ArrayLike) -> Step:

@@ -216,6 +216,8 @@ def _drive(
     """Does each job as a task, its last arguments what all of them share, and keeps the answers as they come."""
     if not ray.is_initialized():
         ray.init(address=address, log_to_driver=False)
+    # Of an earlier call.
+    (folder / "failures.txt").unlink(missing_ok=True)
     task = ray.remote(_guarded(work.__name__, _digest())).options(
         num_cpus=cpus, max_retries=retries, runtime_env={"env_vars": _environment(cpus)}
     )
@@ -226,23 +228,28 @@ def _drive(
         task.remote(os.getcwd(), cloudpickle.dumps(arguments), *references): job for job, arguments in jobs.items()
     }
     pending, failed = list(job_of), []
-    while pending:
-        (ready,), pending = ray.wait(pending)
-        job = job_of[ready]
-        try:
-            answer = ray.get(ready)
-        except ray.exceptions.RayError as error:
-            answer = str(error).strip().splitlines()[-1]
-        if isinstance(answer, str):
-            failed.append(f"shard {getattr(job, 'name', job)}: {answer}")
-            folder.mkdir(parents=True, exist_ok=True)
-            with open(folder / "failures.txt", "a", encoding="utf-8") as file:
-                file.write(failed[-1] + "\n")
-        else:
-            keep(job, answer)
-        if progress:
-            done = of - len(pending) - len(failed)
-            print(f"\r{done} of {of} shards, {len(failed)} failed", end="" if pending else "\n", file=sys.stderr)
+    try:
+        while pending:
+            (ready,), pending = ray.wait(pending)
+            job = job_of[ready]
+            try:
+                answer = ray.get(ready)
+            except ray.exceptions.RayError as error:
+                answer = str(error).strip().splitlines()[-1]
+            if isinstance(answer, str):
+                failed.append(f"shard {getattr(job, 'name', job)}: {answer}")
+                folder.mkdir(parents=True, exist_ok=True)
+                with open(folder / "failures.txt", "a", encoding="utf-8") as file:
+                    file.write(failed[-1] + "\n")
+            else:
+                keep(job, answer)
+            if progress:
+                done = of - len(pending) - len(failed)
+                print(f"\r{done} of {of} shards, {len(failed)} failed", end="" if pending else "\n", file=sys.stderr)
+    finally:
+        # After Ctrl-C, or an answer that could not be kept: nobody waits for the others.
+        for task_left in pending:
+            ray.cancel(task_left)
     if failed:
         raise ShardError(f"{len(failed)} of {of} shards failed, the others are kept; {failed[0]}")
 

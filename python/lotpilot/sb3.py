@@ -30,6 +30,8 @@ class LotVecEnv(VecEnv):
     """
 
     def __init__(self, num_envs: int, *, render_mode: str | None = None, **options: Any) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"no render mode {render_mode!r}; there is rgb_array")
         self.core = Core(num_envs, EnvOptions.of({"normalise": True, **options}), "same_step")
         self.render_mode = render_mode
         self._actions: npt.NDArray[Any] | None = None

@@ -125,7 +125,8 @@ impl Asked {
                 Ok(spec.load(&settings)?.renamed(&name))
             }
             Named::Function(function) => {
-                Ok(NamedDriver::callback(&name, Arc::new(Function { function, failure: failure.clone() })))
+                let driver = NamedDriver::callback(&name, Arc::new(Function { function, failure: failure.clone() }));
+                Ok(driver.smoothed(settings.evaluation.smoothing))
             }
         });
         let mut drivers = loaded.collect::<anyhow::Result<Vec<NamedDriver>>>()?;
@@ -179,6 +180,12 @@ impl Asked {
 
     /// Claims the folder.
     fn begin(&self, plan: &Plan<'_>, out: &Path, overwrite: bool) -> anyhow::Result<RunDir> {
+        let is_free = out.read_dir().map_or(true, |mut entries| entries.next().is_none());
+        ensure!(
+            overwrite || is_free,
+            "{}: holds files already, and an evaluation from Python cannot be continued; choose another out, or overwrite=True",
+            out.display()
+        );
         let build = Build {
             program: concat!("lotpilot ", env!("CARGO_PKG_VERSION"), ", Python").to_owned(),
             ..Build::default()

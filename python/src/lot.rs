@@ -235,6 +235,11 @@ pub(crate) fn generate(
             to.ensure_free(&lots, &trials).map_err(input)?;
             std::fs::create_dir_all(out)?;
         }
-        trials.iter().map(|trial| draw(trial).map_err(input)).collect()
+        let draw = |trial| {
+            // Between any two, so that Ctrl-C is heeded.
+            Python::attach(|py| py.check_signals())?;
+            draw(trial).map_err(input)
+        };
+        trials.iter().map(draw).collect()
     })
 }

@@ -2,15 +2,28 @@
 
 use crate::drive::rows_of;
 use crate::markdown::table_of;
+use crate::trainings::{Place, over_seeds};
 use evaluation::conclusions::Driven;
 use evaluation::format::{difference, quoted_rate};
 use evaluation::names::{ALPHA_15, BC, DAGGER, EXPERT_EQUAL, EXPERT_ONLY, UNWEIGHTED};
 use evaluation::stages::Chain;
 use experiment::lots::UNSEEN;
 use sim::seed::RootSeed;
+use std::fmt::Write as _;
 use std::path::Path;
 
-/// Policies that differ from `DAgger` in one thing, on unseen lots.
+/// Policies that differ from `DAgger` in one thing, and the chain that trained each.
+const CONTROLS: [(&str, Chain); 6] = [
+    (BC, Chain::Weighted),
+    (DAGGER, Chain::Weighted),
+    (UNWEIGHTED, Chain::Unweighted),
+    (EXPERT_ONLY, Chain::ExpertOnly),
+    (EXPERT_EQUAL, Chain::ExpertEqual),
+    (ALPHA_15, Chain::Alpha15),
+];
+
+/// Policies that differ from `DAgger` in one thing, on unseen lots: the first training of each, then the means of those that
+/// were trained several times.
 pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::Result<String> {
     let mut table = table_of(&[
         "policy",
@@ -24,17 +37,11 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
     let everywhere = driven.all();
     let with = driven.driver(DAGGER).unwrap_or(0);
     let (estimates, comparisons) = driven.results.judge(0, &everywhere, with, driven.plan.settings.evaluation.seed);
-    for (driver, named) in driven.plan.drivers.iter().enumerate() {
-        let chain = match named.name.as_str() {
-            EXPERT_ONLY => Chain::ExpertOnly,
-            EXPERT_EQUAL => Chain::ExpertEqual,
-            ALPHA_15 => Chain::Alpha15,
-            BC | DAGGER => Chain::Weighted,
-            UNWEIGHTED => Chain::Unweighted,
-            other => anyhow::bail!("{other}: no training of this report"),
-        };
+    for (name, chain) in CONTROLS {
+        // An earlier version did not train all of them.
+        let Some(driver) = driven.driver(name) else { continue };
         let mut rows = rows_of(root, chain, seed)?;
-        if named.name == BC {
+        if name == BC {
             rows.truncate(1);
         }
         let last = rows.last();
@@ -42,7 +49,7 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
         let found = comparisons.iter().find(|comparison| comparison.driver == driver);
         let weight = last.and_then(|row| row.mean_weight);
         table.add_row([
-            named.name.clone(),
+            name.to_owned(),
             rows.len().to_string(),
             last.map_or(0, |row| row.dataset).to_string(),
             weight.map_or_else(|| "–".to_owned(), |weight| format!("{weight:.2}")),
@@ -51,12 +58,21 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
             found.map_or_else(|| "–".to_owned(), |found| difference(found.difference_per_100m, 2)),
         ]);
     }
-    Ok(format!(
-        "### Controls\n\nOn the unseen lots. *{EXPERT_ONLY}*: as many rounds on the same lots as DAgger with as many \
-         optimiser steps, but the expert drives throughout, so that every tick is the expert's and there are more samples. *{EXPERT_EQUAL}*: \
+    let mut text = format!(
+        "### Controls\n\nOn the unseen lots. *{EXPERT_ONLY}*: rounds on the same lots as DAgger's with as many \
+         optimiser steps each, but the expert drives throughout, so that every tick is the expert's and there are more samples. *{EXPERT_EQUAL}*: \
          the same, each iteration thinned evenly to DAgger's mean number of samples. If the first is no worse than DAgger, more of \
          the expert's data does as well; if the second is not, either, it does not matter who drove. α is the weight on τ̂; its mean weight is 1 where nothing is weighted.\n\n{table}"
-    ))
+    );
+    let over_seeds = over_seeds([&Place::new(UNSEEN, driven, everywhere)]);
+    if over_seeds.row_count() > 0 {
+        let _ = write!(
+            text,
+            "\n\nThe means of what was trained with several seeds, with intervals for other lots and other seeds; the \
+             difference is to DAgger (others − DAgger).\n\n{over_seeds}"
+        );
+    }
+    Ok(text)
 }
 
 /// Points at half of the open way beside points as far as it is open, on unseen lots.

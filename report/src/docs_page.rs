@@ -1,7 +1,7 @@
 //! What the pages of the documentation that a command makes of runs have in common.
 
 use crate::command_line::{command_line, quoted};
-use experiment::manifest::Manifest;
+use experiment::manifest::{Build, Manifest};
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -14,21 +14,34 @@ pub fn is_page_of_results(path: &Path) -> bool {
     storage::read::text(path, RUN_TEXT_BYTES_MAX).is_ok_and(|text| text.contains(WRITTEN))
 }
 
-/// The head of a page: which command made the run, and which one made the page, at which `revision` of the repository.
+/// What a page is made with.
+#[derive(Debug, Clone, Copy)]
+pub struct MadeBy<'a> {
+    /// The program that judges and writes.
+    pub build: &'a Build,
+    /// `--to`, where it was named.
+    pub to: Option<&'a Path>,
+}
+
+/// The head of a page: which command made the run, and which one made the page.
 pub(crate) fn head(
     run: &str,
     others: &[String],
     manifest: &Manifest,
-    revision: Option<&str>,
+    made_by: MadeBy<'_>,
     more: &[(&str, String)],
 ) -> String {
     let unknown = || "unknown".to_owned();
-    let changes = if manifest.git_dirty == Some(true) { ", with changes that are not committed" } else { "" };
+    let commit = |revision: &Option<String>, is_dirty: Option<bool>| {
+        let changes = if is_dirty == Some(true) { ", with changes that are not committed" } else { "" };
+        format!("`{}`{changes}", revision.clone().unwrap_or_else(unknown))
+    };
+    let MadeBy { build, to } = made_by;
     let rows = [
         ("command", format!("`{}`", command_line(manifest))),
-        ("commit", format!("`{}`{changes}", manifest.git_revision.clone().unwrap_or_else(unknown))),
-        ("judged and written by", format!("`{}`", written_by(run, others))),
-        ("at commit", format!("`{}`", revision.unwrap_or("unknown"))),
+        ("commit", commit(&manifest.git_revision, manifest.git_dirty)),
+        ("judged and written by", format!("`{}`", written_by(run, others, to))),
+        ("at commit", commit(&build.git_revision, build.git_dirty)),
         ("program", manifest.program.clone()),
         ("machine", format!("{}, {} threads", manifest.processor.clone().unwrap_or_else(unknown), manifest.threads)),
         ("system", manifest.target.clone()),
@@ -43,9 +56,14 @@ pub(crate) fn head(
     head
 }
 
-fn written_by(run: &str, others: &[String]) -> String {
-    let words = others.iter().map(|other| quoted(other));
-    let with = (!others.is_empty()).then(|| "--with".to_owned());
-    let command = ["cargo xtask render results".to_owned(), quoted(run)];
-    command.into_iter().chain(with).chain(words).collect::<Vec<_>>().join(" ")
+fn written_by(run: &str, others: &[String], to: Option<&Path>) -> String {
+    let mut words = vec!["cargo xtask render results".to_owned(), quoted(run)];
+    if !others.is_empty() {
+        words.push("--with".to_owned());
+        words.extend(others.iter().map(|other| quoted(other)));
+    }
+    if let Some(to) = to {
+        words.extend(["--to".to_owned(), quoted(&to.to_string_lossy())]);
+    }
+    words.join(" ")
 }

@@ -2,7 +2,7 @@
 //! training.
 
 use crate::command_line::command_line;
-use crate::docs_page;
+use crate::docs_page::{self, MadeBy};
 use crate::page::{Image, Page};
 use crate::{deviations, rules, scaling};
 use anyhow::{bail, ensure};
@@ -63,12 +63,12 @@ impl OtherRun {
     ///
     /// # Errors
     /// If it is not finished or has no table, what it wrote cannot be read, or a file cannot be written.
-    pub fn write_docs(&self, others: &[Self], to: &Path, revision: Option<&str>) -> anyhow::Result<()> {
+    pub fn write_docs(&self, others: &[Self], to: &Path, made_by: MadeBy<'_>) -> anyhow::Result<()> {
         let Found { manifest, title, table, plot } = self.read()?;
         let named: Vec<String> = others.iter().map(Self::to_string).collect();
         let mut page = Page::new(title);
         let seed = [("root seed", manifest.root_seed.to_string())];
-        page.text(docs_page::head(&self.to_string(), &named, &manifest, revision, &seed));
+        page.text(docs_page::head(&self.to_string(), &named, &manifest, made_by, &seed));
         page.text(table);
         add_plot(&mut page, &manifest.command, plot);
         others.iter().try_for_each(|other| other.add_to(&mut page))?;

@@ -1,7 +1,7 @@
 //! The one report: what holds, the paper's tables beside ours, ablations. Made from what the stages wrote.
 
 use crate::controls;
-use crate::docs_page;
+use crate::docs_page::{self, MadeBy};
 use crate::drive::{rows_of, with_drives};
 use crate::markdown::{table_of, with_header};
 use crate::other_run::OtherRun;
@@ -21,7 +21,7 @@ use evaluation::stages::{self, Chain, Extent, Stage};
 use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
 use evaluation::totals::Totals;
-use evaluation::trainings::TRAININGS_MIN;
+use evaluation::trainings::{TRAININGS_MIN, teams};
 use experiment::drivers::NamedDriver;
 use experiment::lots::UNSEEN;
 use experiment::manifest::Manifest;
@@ -29,7 +29,6 @@ use experiment::run_dir::RunDir;
 use experiment::settings::{Settings, has_points_of_paper};
 use policy::dagger::{DaggerSettings, IterationRow};
 use policy::decision_rule::DecisionRule;
-use sim::seed::RootSeed;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -59,8 +58,8 @@ pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
     Ok(verdicts(&found.statements, &recipe.extent))
 }
 
-/// Writes the same as a page of the documentation, with what made it in its head (this program lies at `revision`), and the
-/// tables of other runs at its end; figures go to `pictures` beside it.
+/// Writes the same as a page of the documentation, with what made it in its head, and the tables of other runs at its end;
+/// figures go to `pictures` beside it.
 ///
 /// # Errors
 /// If what a stage wrote cannot be read, or a file cannot be written.
@@ -69,7 +68,7 @@ pub fn write_docs(
     run: &Path,
     others: &[OtherRun],
     to: &Path,
-    revision: Option<&str>,
+    made_by: MadeBy<'_>,
 ) -> anyhow::Result<()> {
     let seeds = recipe.settings.training_seeds(recipe.extent.seeds);
     let seeds = seeds.iter().map(|seed| seed.0.to_string()).collect::<Vec<_>>().join(", ");
@@ -79,7 +78,7 @@ pub fn write_docs(
     let of_preset = if preset == "default" { String::new() } else { format!(", preset {preset}") };
     let mut page = Page::new(format!("Results{of_preset}"));
     let more = [("training seeds", seeds)];
-    page.text(docs_page::head(&run.display().to_string(), &named, &manifest, revision, &more));
+    page.text(docs_page::head(&run.display().to_string(), &named, &manifest, made_by, &more));
     page.text(introduction(recipe));
     page.text(cautions(&recipe.settings)?);
     Found::read(recipe, run)?.add_to(&mut page, recipe, run)?;
@@ -163,7 +162,7 @@ impl Found {
         let seed = recipe.settings.seed;
         let folders = [stages::RULES, stages::CONTROLS];
         with_drives(&recipe.stages, root, folders, |[rules, controls]| {
-            page.text(decision_rules(root, seed, &rules)?);
+            page.text(decision_rules(root, recipe, &rules)?);
             page.text(weight_and_cloning(reference));
             page.text(controls::controls(root, seed, &controls)?);
             Ok(())
@@ -297,7 +296,8 @@ fn verdicts(statements: &[Statement], extent: &Extent) -> String {
                     paper's side of zero, *does not hold* where it lies on the other, and *cannot be told* where it contains \
                     zero (differences are the other driver's − DAgger's in near-collisions and reversals, DAgger's − the \
                     other driver's in safe ratios; * = excludes zero, by six trials or more). Beside near-collisions, contacts \
-                    in brackets. Nothing is adjusted for the number of statements.\n"
+                    in brackets. Statements on none at all, on noise, on the paper's rates, on η̂ and on the weight are decided by the \
+                    figures beside them. Nothing is adjusted for the number of statements.\n"
         .to_owned();
     if extent.seeds >= TRAININGS_MIN as u64 {
         text += "\nWhere several counts are named, they are of trainings that differ by their seed: their means are compared, \
@@ -534,9 +534,11 @@ fn unseen_lots(page: &mut Page, driven: &Driven<'_>) {
     page.figure("rates-unseen", "Every driver on generated lots.", Image::Svg(rates_of_all(driven)));
 }
 
-fn decision_rules(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::Result<String> {
+fn decision_rules(root: &Path, recipe: &Recipe, driven: &Driven<'_>) -> anyhow::Result<String> {
+    let seed = recipe.settings.seed;
     let mut table = table_of(&[
         "network drives if",
+        "iterations",
         "samples, i = 1",
         "η̂, i = 1",
         "near-collisions while collecting, i = 1",
@@ -553,6 +555,7 @@ fn decision_rules(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::R
         let totals = driven.results.totals(0, driver, &slice, None);
         table.add_row([
             driven.plan.drivers[driver].name.clone(),
+            rows.len().saturating_sub(1).min(recipe.extent.rule_iterations as usize).to_string(),
             cell(|row| Some(row.samples.to_string())),
             cell(|row| row.eta_hat.map(|eta| format!("{eta:.3}"))),
             cell(|row| Some(row.near_collisions.to_string())),
@@ -562,8 +565,8 @@ fn decision_rules(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::R
     }
     Ok(format!(
         "### Decision rule\n\nAlgorithm 2, line 9, three ways: all of τ̂ < τ, χ̂ < χ (the text and the figures), any of \
-         them (the listing as printed), τ̂ < τ alone. All start from the same behaviour cloning and are driven after the \
-         same number of iterations.\n\n{table}"
+         them (the listing as printed), τ̂ < τ alone. All start from the same behaviour cloning; each ends when η̂ > η, and so \
+         they may differ in iterations and samples.\n\n{table}"
     ))
 }
 
@@ -572,6 +575,7 @@ fn weight_and_cloning(driven: &Driven<'_>) -> String {
     let mut table = table_of(&["", "lots", "Δ near-collisions per 100 m [95 %]", "Δ safe ratio [95 %]"]);
     let seed = driven.plan.settings.evaluation.seed;
     let pairs = [(BC, DAGGER), (UNWEIGHTED, DAGGER)];
+    let has_teams = !teams(driven.plan.drivers).is_empty();
     let slices: Vec<_> =
         driven.results.slices().into_iter().map(|slice| (driven.judge_trainings(&slice), slice)).collect();
     for (name, with) in pairs {
@@ -580,8 +584,9 @@ fn weight_and_cloning(driven: &Driven<'_>) -> String {
             let (_, comparisons) = driven.results.judge(0, slice, with_index, seed);
             let Some(found) = comparisons.into_iter().find(|comparison| comparison.driver == driver) else { continue };
             let of_team = trainings.as_ref().and_then(|trainings| trainings.of(driver));
-            let near_collisions =
-                of_team.map_or(found.difference_per_100m, |(_, estimate)| Some(estimate.difference_per_100m));
+            // The first of several does not stand for all where there is too little to judge them by.
+            let of_one = found.difference_per_100m.filter(|_| !has_teams);
+            let near_collisions = of_team.map_or(of_one, |(_, estimate)| Some(estimate.difference_per_100m));
             table.add_row([
                 format!("{name} − {with}"),
                 slice.label.clone(),

@@ -9,9 +9,8 @@ use evaluation::results::EvaluationResults;
 use evaluation::rules::{self, Extent};
 use evaluation::stages::Stage;
 use evaluation::statistics::bootstrap::Interval;
-use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
-use evaluation::trainings::Team;
+use evaluation::trainings::{TRAININGS_MIN, Team};
 use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
 use policy::dagger::Keep;
@@ -49,8 +48,9 @@ struct Row {
     near_collisions: u32,
     contacts: u32,
     per_100m: f64,
-    lower: f64,
-    upper: f64,
+    /// Empty of several seeds that have too few lots to be judged by.
+    lower: Option<f64>,
+    upper: Option<f64>,
     /// Near-collisions per 100 m, of all seeds together less those of the paper's rule; empty of one seed, and where the
     /// paper's rule was not trained.
     difference_per_100m: Option<f64>,
@@ -86,7 +86,8 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
         let totals = results.totals(0, driver, &everywhere, None);
         (row.route_m, row.near_collisions, row.contacts) =
             (totals.reference_m, totals.near_collisions, totals.contacts);
-        (row.per_100m, [row.lower, row.upper]) = (totals.rate().per_unit, quoted_interval(&totals, &estimates[driver]));
+        row.per_100m = totals.rate().per_unit;
+        [row.lower, row.upper] = quoted_interval(&totals, &estimates[driver]).map(Some);
         rows.push(row);
     }
     let titles = std::iter::once(rules::CLONED).chain(extent.rules.iter().map(|rule| rules::title(rule)));
@@ -109,10 +110,11 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
             row.difference.map(|interval| interval.lower),
             row.difference.map(|interval| interval.upper),
         );
-        let seeds = teams[at].drivers.len() as f64;
-        let of_one = (f64::from(row.near_collisions) / seeds).round() as u32;
-        let rate = Rate::new(of_one, row.route_m / seeds / 100.0);
-        [row.lower, row.upper] = judged.map_or([rate.lower, rate.upper], |interval| [interval.lower, interval.upper]);
+        (row.lower, row.upper) = match teams[at].drivers[..] {
+            // What stands by itself has one interval.
+            [driver] => (rows[driver].lower, rows[driver].upper),
+            _ => judged.map(|interval| (interval.lower, interval.upper)).unzip(),
+        };
         row.per_100m = f64::from(row.near_collisions) / (row.route_m / 100.0);
     }
     for row in rows.iter_mut().chain(&mut pooled) {
@@ -176,10 +178,11 @@ fn percent(part: u64, ticks: u64) -> f64 {
 
 /// How the table is read.
 fn legend(settings: &Settings, extent: &Extent) -> String {
-    let (trainings, intervals) = match extent.seeds {
-        1 => ("one training of each rule".to_owned(), "other lots"),
-        seeds => (format!("{seeds} trainings of each rule, summed up; rates are means"), "other lots and other seeds"),
+    let trainings = match extent.seeds {
+        1 => "one training of each rule".to_owned(),
+        seeds => format!("{seeds} trainings of each rule, summed up; rates are means"),
     };
+    let of_seeds = if extent.seeds < TRAININGS_MIN as u64 { "other lots" } else { "other lots and other seeds" };
     // What a method would ask for is not what it learned from then.
     let learned = match settings.dagger.keep {
         Keep::EveryTick => {
@@ -191,7 +194,7 @@ fn legend(settings: &Settings, extent: &Extent) -> String {
     format!(
         "Of {trainings}; behaviour cloning has the samples of the first round alone. EnsembleDAgger and ThriftyDAgger train three \
          networks and drive with their mean.{learned} Intervals of 95 % are for \
-         {intervals}; a difference that excludes zero (*) is one of several comparisons, and no adjustment is made for their \
+         {of_seeds}; a difference that excludes zero (*) is one of several comparisons, and no adjustment is made for their \
          number."
     )
 }
@@ -216,7 +219,11 @@ fn to_markdown(rows: &[Row]) -> String {
             row.networks.to_string(),
             format!("{:.1} %", percent(row.queries, row.ticks)),
             format!("{:.1} %", percent(row.ticks - row.novice_ticks, row.ticks)),
-            format!("{} ({:.1} s)", row.interventions, row.intervention_s),
+            match row.interventions {
+                // There was nobody to take the wheel from.
+                0 if row.novice_ticks == 0 => "–".to_owned(),
+                times => format!("{times} ({:.1} s)", row.intervention_s),
+            },
             format!(
                 "{} ({}) in {:.1} km",
                 row.near_collisions_collecting,
@@ -224,7 +231,10 @@ fn to_markdown(rows: &[Row]) -> String {
                 row.collected_m / 1000.0
             ),
             format!("{} ({}) in {:.1} km", row.near_collisions, row.contacts, row.route_m / 1000.0),
-            format!("{:.2} [{:.2}, {:.2}]", row.per_100m, row.lower, row.upper),
+            match row.lower.zip(row.upper) {
+                Some((lower, upper)) => format!("{:.2} [{lower:.2}, {upper:.2}]", row.per_100m),
+                None => format!("{:.2}", row.per_100m),
+            },
             difference(row.difference, 2),
         ]);
     }
@@ -237,7 +247,8 @@ fn plot(rows: &[Row]) -> String {
         .iter()
         .map(|row| {
             let x = percent(row.queries, row.ticks);
-            let point = RatePoint { x, per_100m: row.per_100m, interval: [row.lower, row.upper] };
+            let interval = [row.lower, row.upper].map(|end| end.unwrap_or(row.per_100m));
+            let point = RatePoint { x, per_100m: row.per_100m, interval };
             RateSeries { name: row.rule.clone(), points: vec![point] }
         })
         .collect();
@@ -270,5 +281,8 @@ mod tests {
         let table = to_markdown(std::slice::from_ref(&pooled));
         assert!(table.contains("| 10.0 %") && table.contains("5 (0) in 1.0 km"), "{table}");
         assert!(plot(&[pooled]).contains("SafeDAgger"));
+        // Behaviour cloning had interventions of 0.0 s.
+        let alone = Row { interventions: 0, novice_ticks: 0, ..row(1, 2) };
+        assert!(to_markdown(&[alone]).contains("| –"), "nobody had the wheel before");
     }
 }

@@ -25,6 +25,7 @@ use experiment::trained;
 use policy::checkpoint::Checkpoint;
 use policy::dataset::Dataset;
 use policy::dataset::store::Store;
+use policy::decision_rule::DecisionRule;
 use policy::fit::learning::{self, LearningCurve};
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::collections::{BTreeMap, BTreeSet};
@@ -247,17 +248,23 @@ const LEARNING_CAPTION: &str = "Top: the error of the look-ahead point on held-b
     round has more data than the one before, so curves of different rounds do not compare.";
 
 fn add_training(page: &mut Page, settings: &Settings, training: &Training) {
+    let who_drives = match settings.dagger.rule {
+        DecisionRule::AllBelow { .. } => format!(
+            "The expert drives where the discrepancy exceeds {} or the {} is too large.",
+            glossary::TAU.link("τ"),
+            glossary::DOUBT.link("doubt")
+        ),
+        _ => "Who drives when, the setting `dagger.rule` says.".to_owned(),
+    };
     page.section(
         "Training",
         format!(
             "One column per round: {}, then the iterations of {}. {} is the share of ticks in which the network drove, {} \
-             its distance from the expert. The expert drives where the discrepancy exceeds {} or the {} is too large.",
+             its distance from the expert. {who_drives}",
             glossary::BC.link("BC"),
             glossary::DAGGER.link("DAgger"),
             glossary::ETA_HAT.link("η̂"),
             glossary::DISCREPANCY.link("τ̂"),
-            glossary::TAU.link("τ"),
-            glossary::DOUBT.link("doubt"),
         ),
     );
     page.text(training.table.as_str());

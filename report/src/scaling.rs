@@ -68,7 +68,8 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
     Ok(text)
 }
 
-const LEGEND: &str = "Of one training of each: intervals of 95 % are for other lots, not for other seeds; (b): bootstrap, where \
+const LEGEND: &str = "Of one training of each, with as many drives and optimiser steps; DAgger keeps the expert's ticks, so that its samples \
+    differ. Intervals of 95 % are for other lots, not for other seeds; (b): bootstrap, where \
     near-collisions come in clusters.";
 
 fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<Row>> {
@@ -92,8 +93,8 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
         let lots_met =
             [1, table1.rows.len()].map(|rounds| scaling::lots_met(of_kind.values().copied(), different, rounds));
         for (part, method) in [BC, DAGGER].into_iter().enumerate() {
-            // Behaviour cloning has one round: it may be the same network again.
-            let is_known = |row: &Row| method == BC && row.method == BC && row.different_lots == lots_met[part];
+            // A training meets no more lots than its rounds list: it may be the same network again.
+            let is_known = |row: &Row| row.method == method && row.different_lots == lots_met[part];
             if rows.iter().any(is_known) {
                 continue;
             }

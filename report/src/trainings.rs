@@ -2,6 +2,7 @@
 
 use crate::drive::rows_of;
 use crate::markdown::table_of;
+use comfy_table::Table;
 use evaluation::conclusions::Driven;
 use evaluation::format::{interval, quoted_rate};
 use evaluation::judge::DriverEstimate;
@@ -83,6 +84,18 @@ pub(crate) fn headline_row(place: &Place<'_>, driver: usize) -> [String; 7] {
     ]
 }
 
+/// Every team and single driver at some places, where there are teams.
+pub(crate) fn over_seeds<'p, 'a: 'p>(places: impl IntoIterator<Item = &'p Place<'a>>) -> Table {
+    let mut table = table_of(&HEADER);
+    for place in places {
+        for (team, estimate) in place.trainings.iter().flat_map(|judged| &judged.teams) {
+            let each: Vec<Totals> = team.drivers.iter().map(|&driver| place.totals(driver)).collect();
+            table.add_row(row(team, place.lots, &each, estimate, team.name != DAGGER));
+        }
+    }
+    table
+}
+
 /// Every training by itself, then the means over the seeds.
 pub(crate) fn by_seed(
     settings: &Settings,
@@ -118,13 +131,7 @@ pub(crate) fn by_seed(
             );
         }
     }
-    let mut over_seeds = table_of(&HEADER);
-    for place in places.iter().flatten() {
-        for (team, estimate) in place.trainings.iter().flat_map(|judged| &judged.teams) {
-            let each: Vec<Totals> = team.drivers.iter().map(|&driver| place.totals(driver)).collect();
-            over_seeds.add_row(row(team, place.lots, &each, estimate, team.name != DAGGER));
-        }
-    }
+    let over_seeds = over_seeds(places.iter().flatten());
     let mut text = format!(
         "Trainings that differ in nothing but their root seed; η̂ of each iteration. Intervals here are of one network each \
          and do not cover what another training would have given.\n\n{table}"
@@ -132,8 +139,8 @@ pub(crate) fn by_seed(
     if over_seeds.row_count() > 0 {
         let _ = write!(
             text,
-            "\n\nTheir means beside the other drivers, with intervals for other trials or lots and other seeds; the difference is \
-             to DAgger (others − DAgger).\n\n{over_seeds}"
+            "\n\nTheir means beside the other drivers, with intervals for other trials or lots and, of several trainings, other seeds; \
+             the difference is to DAgger (others − DAgger).\n\n{over_seeds}"
         );
     }
     Ok(text)

@@ -24,6 +24,7 @@ use sim::distance_field::DistanceField;
 use sim::geometry::{Pose, Vec2};
 use sim::limits::{
     ISLANDS_MAX, LOT_BYTES_MAX, MAP_COORDINATE_MAX_M, MAP_PIXEL_M, MAP_SCALE, OUTLINE_CORNERS_MAX, ROUTE_MAX_M,
+    VERTICES_MAX,
 };
 use sim::map::Map;
 use sim::scenario::{Island, LotNoise, Place, ReferencePath, Scenario, ScenarioError};
@@ -107,6 +108,11 @@ fn clearance_m() -> f32 {
     solver::CLEARANCE_M
 }
 
+/// Whether a map is a TPCAP case, by its extension.
+fn is_case(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension == "csv")
+}
+
 /// Whether a path is that of a map this module reads, by its extension.
 pub fn is_map(path: &Path) -> bool {
     path.extension().is_some_and(|extension| ["yaml", "yml", "csv"].iter().any(|known| extension == *known))
@@ -188,7 +194,7 @@ impl MapLot {
     /// The first thing wrong with it, with file, place and remedy.
     pub fn scenario(&self, vehicle: &VehicleSettings) -> Result<Loaded, LoadError> {
         self.check()?;
-        let is_case = self.map.extension().is_some_and(|extension| extension == "csv");
+        let is_case = is_case(&self.map);
         let mut notes = Vec::new();
         let mut files = vec![self.file.clone(), self.map.clone()];
         files.extend(self.centre_line.clone());
@@ -263,6 +269,10 @@ impl MapLot {
         if !(0.0..=5.0).contains(&self.wall_height_m) {
             let remedy = "write a number of metres from 0 to 5";
             return Err(self.fault("wall_height_m", format!("it is {}", self.wall_height_m), remedy));
+        }
+        if self.drop_specks_m2 > 0.0 && is_case(&self.map) {
+            let remedy = "leave it out";
+            return Err(self.fault("drop_specks_m2", "a TPCAP case has no pixels".to_owned(), remedy));
         }
         if !(0.0..=100.0).contains(&self.drop_specks_m2) {
             let remedy = "write a number of m² from 0 to 100";
@@ -361,10 +371,18 @@ impl MapLot {
             let boundary = outline(outer, step);
             let ground = Ground { boundary, is_walled: true, islands: Vec::new(), obstacles: Vec::new() };
             let islands = validate_ground(&self.outlines(&ground), vehicle).and_then(|()| {
-                let rings = inner.iter().zip(&mut steps).enumerate();
-                rings
-                    .map(|(i, (ring, step))| self.sound_island(i, &ground.boundary, step, |step| outline(ring, step)))
-                    .collect()
+                let mut vertices = ground.boundary.len();
+                let mut islands = Vec::new();
+                for (i, (ring, step)) in inner.iter().zip(&mut steps).enumerate() {
+                    let island = self.sound_island(i, &ground.boundary, step, |step| outline(ring, step))?;
+                    vertices += island.len();
+                    islands.push(island);
+                    // The others need not be simplified any more: the lot is refused.
+                    if vertices > VERTICES_MAX {
+                        break;
+                    }
+                }
+                Ok(islands)
             });
             match islands {
                 Ok(islands) => return Ok(Ground { islands, ..ground }),

@@ -337,6 +337,8 @@ impl Scene {
     const SLACK_M: f32 = Self::NODE_M * std::f32::consts::FRAC_1_SQRT_2;
     const CAP_M: f32 = 2.2;
     const BUCKET_M: f32 = 2.0;
+    /// More than the ends of a piece of an edge are off the edge.
+    const ROUNDED_M: f32 = 0.01;
 
     fn new(scenario: &Scenario) -> Self {
         let (low, high) = sim::geometry::bounds(&scenario.boundary);
@@ -372,15 +374,24 @@ impl Scene {
         for (a, b) in edges(outline) {
             let index = self.edges.len() as u32;
             self.edges.push((a, b));
-            let (low, high) = (a.min(b), a.max(b));
-            self.clearance_m.for_each_within(low, high, Self::CAP_M, |centre, value| {
-                let distance_m = distance_to_segment(centre, a, b);
-                // What is outside the boundary stays negative.
-                if distance_m < value.abs() {
-                    *value = distance_m.copysign(*value);
-                }
-            });
-            self.buckets.for_each_within(low, high, 0.0, |_, bucket| bucket.push(index));
+            // Piece by piece: the box around a long slanted edge is mostly far from it.
+            let pieces = ((b - a).abs().min_element() / Self::BUCKET_M).ceil().max(1.0) as u32;
+            let end = |piece: u32| if piece == pieces { b } else { a.lerp(b, piece as f32 / pieces as f32) };
+            for piece in 0..pieces {
+                let (low, high) = (end(piece).min(end(piece + 1)), end(piece).max(end(piece + 1)));
+                self.clearance_m.for_each_within(low, high, Self::CAP_M + Self::ROUNDED_M, |centre, value| {
+                    let distance_m = distance_to_segment(centre, a, b);
+                    // What is outside the boundary stays negative.
+                    if distance_m < value.abs() {
+                        *value = distance_m.copysign(*value);
+                    }
+                });
+                self.buckets.for_each_within(low, high, Self::ROUNDED_M, |_, bucket| {
+                    if bucket.last() != Some(&index) {
+                        bucket.push(index);
+                    }
+                });
+            }
         }
     }
 

@@ -44,12 +44,12 @@ impl Growing {
             let failed = |error: std::io::Error| FileError::new(&path, error, whole::WRITE_REMEDY);
             // Who puts shards together writes the file at once, and may have died meanwhile.
             whole::remove_partial(&path)?;
-            let (bytes, sha256) =
-                left.as_ref().map_or_else(|| Ok((0, Sha256::new())), |left| left.check(index, &path))?;
-            // Never through a link that somebody put there.
+            // Never through a link that somebody put there, and a pipe would be waited for.
             if std::fs::symlink_metadata(&path).is_ok_and(|found| !found.is_file()) {
                 return Err(FileError::new(&path, "is not a regular file", "remove it"));
             }
+            let (bytes, sha256) =
+                left.as_ref().map_or_else(|| Ok((0, Sha256::new())), |left| left.check(index, &path))?;
             let mut file = File::options().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
             file.set_len(bytes).map_err(failed)?;
             file.seek(SeekFrom::End(0)).map_err(failed)?;

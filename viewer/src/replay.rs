@@ -54,18 +54,15 @@ impl<'a> Replay<'a> {
         let map = &self.run.map;
         let names: Vec<&str> = self.drivers.iter().map(|driver| driver.name.as_str()).collect();
         let roots = roots_of(&names);
-        if self.focus_tick.is_some() {
-            self.run.check_tick(&self.settings.episode, &self.drivers[0])?;
-        }
+        let observed_at_s = || self.run.observed_at_s(&self.settings.episode, &self.drivers[0]);
+        let event_s = self.focus_tick.map(|_| observed_at_s()).transpose()?.map(f64::from);
         let header = Header {
             application: "drive",
             title: self.title.to_owned(),
             layout: layout::of_drives(map, &roots),
             timeline: if self.focus_tick.is_some() { EVENT_TIME } else { "sim_time" },
-            event: self.focus_tick.map(|tick| {
-                let at_s = f64::from(tick) * f64::from(self.settings.episode.control_period_s());
-                Moment { played_s: PLAYED_S.map(|from_event_s| (at_s + from_event_s).max(0.0)) }
-            }),
+            event: event_s
+                .map(|event_s| Moment { played_s: PLAYED_S.map(|from_event_s| (event_s + from_event_s).max(0.0)) }),
         };
         let recording = context.begin(file, &header)?;
         show_map(map, legend::DRIVE, &recording);

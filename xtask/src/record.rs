@@ -51,7 +51,7 @@ pub(crate) fn first_runs(plan: &Plan<'_>, runs: usize) -> Show {
 /// # Errors
 /// On Ctrl-C.
 pub(crate) fn record(run: &Path, show: Vec<Show>, output: &Output) -> anyhow::Result<()> {
-    interrupt::is_finished();
+    interrupt::nothing_to_continue();
     match viewer::ask(&ViewRequest { sink: Sink::Folder(recordings_of(run)), show }, output) {
         Err(error) if !error.is::<Interrupted>() => {
             output.note(format_args!("warning: {error:#}"));

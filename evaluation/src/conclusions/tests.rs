@@ -128,6 +128,20 @@ fn where_events_come_in_clusters_no_exact_interval_is_quoted() {
     assert_eq!(as_often.verdict, Verdict::CannotBeTold, "Poisson's interval was within the factor: {as_often:?}");
 }
 
+/// Somewhat more often than in the paper, perhaps less than twice, was the opposite of "within a factor of two".
+#[test]
+fn a_rate_that_may_be_within_the_factor_is_not_the_opposite_of_it() {
+    let drivers = ["expert", DAGGER, "tentacle"].map(driver);
+    let of_tentacle = |near_collisions: u32| {
+        let found = statements_of(&drivers, |name, trial| {
+            let near_collisions = if name == "tentacle" { near_collisions + trial.index % 3 } else { 0 };
+            Run { near_collisions, safe_ratio: 0.8, steering_reversals: 10 }
+        });
+        verdict(&found, "tentacle fails about as often")
+    };
+    assert_eq!([13, 23, 43].map(of_tentacle), [Verdict::Holds, Verdict::CannotBeTold, Verdict::DoesNotHold]);
+}
+
 /// The verdicts of five trainings were those of the first.
 #[test]
 fn several_trainings_are_compared_by_their_mean() {

@@ -70,18 +70,24 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
 /// What is wrong with a header whose columns are others than x and y, in this order: read as they are, they would be another
 /// line.
 fn misplaced(header: &csv::StringRecord) -> Option<String> {
-    for (column, name) in header.iter().take(2).enumerate() {
-        let lower = name.to_lowercase();
-        let has = |known: &[&str]| lower.split(|char: char| !char.is_alphanumeric()).any(|word| known.contains(&word));
-        if has(&["lat", "lon", "lng", "latitude", "longitude"]) {
+    let has = |column: usize, known: &[&str]| {
+        let lower = header.get(column).unwrap_or_default().to_lowercase();
+        lower.split(|char: char| !char.is_alphanumeric()).any(|word| known.contains(&word))
+    };
+    let known = [("x", ["x", "easting"]), ("y", ["y", "northing"])];
+    let are_named = (0..).zip(known).all(|(column, (_, names))| has(column, &names));
+    for (column, name) in header.iter().enumerate() {
+        // Beside x and y, degrees do no harm.
+        if !are_named && has(column, &["lat", "lon", "lng", "latitude", "longitude"]) {
             return Some(format!("the header has {:?}, which is in degrees", shortened(name)));
         }
-        let (word, belongs) = match (has(&["x", "easting"]), has(&["y", "northing"])) {
-            (true, false) => ("x", 0),
-            (false, true) => ("y", 1),
+        let (word, belongs) = match known.map(|(_, names)| has(column, &names)) {
+            [true, false] => ("x", 0),
+            [false, true] => ("y", 1),
             _ => continue,
         };
-        if column != belongs {
+        // A second one does none, either, behind one that is where it belongs.
+        if column != belongs && !has(belongs, &known[belongs].1) {
             let (is, should) = (column + 1, belongs + 1);
             return Some(format!(
                 "the header has {:?} in column {is}; {word} is read from column {should}",

@@ -215,6 +215,9 @@ fn a_centre_line_must_have_room_for_the_car() {
         ("5.0,3.5\n45.0;3.5\n", "line.csv:2: \"45.0;3.5\" is not a point; write one point per line"),
         ("5.0,3.5\n45.0,nan\n", "line.csv:2: \"45.0,nan\" is not a point"),
         ("y,x\n3.5,5.0\n3.5,45.0\n", "line.csv:1: the header has \"y\" in column 1; y is read from column 2"),
+        // Time and speed were taken for the route.
+        ("t,v,x,y\n0.0,1.2,5.0,3.5\n", "line.csv:1: the header has \"x\" in column 3; x is read from column 1"),
+        ("id,name,lat,lon\n1,2,5.0,3.5\n", "line.csv:1: the header has \"lat\", which is in degrees"),
         ("heading,X [m],Y [m]\n0,5.0,3.5\n0,45.0,3.5\n", "\"X [m]\" in column 2; x is read from column 1"),
         ("pos_y,pos_x\n3.5,5.0\n3.5,45.0\n", "\"pos_y\" in column 1; y is read from column 2"),
         ("lat,lon\n5.0,3.5\n45.0,3.5\n", "\"lat\", which is in degrees"),

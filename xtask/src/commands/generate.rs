@@ -77,7 +77,7 @@ pub(crate) struct MapArgs {
     #[arg(long = "loop", conflicts_with = "goal")]
     is_loop: bool,
     /// CSV file with the route of the rear axle, x and y in metres, instead of all three.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["start", "goal", "is_loop"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["start", "goal", "is_loop", "clearance"])]
     centre_line: Option<PathBuf>,
     /// Clearance that a route found automatically keeps around the body, metres in the lot [default: 0.25].
     #[arg(long, value_name = "METRES", allow_negative_numbers = true)]

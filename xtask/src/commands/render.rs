@@ -24,12 +24,13 @@ use experiment::trials::{Purpose, Trial};
 use policy::checkpoint::Checkpoint;
 use policy::dataset::store::Store;
 use rayon::prelude::*;
+use report::docs_page::{self, MadeBy};
 use report::drawn_lots;
 use report::other_run::OtherRun;
 use report::pictures::file_name;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
 use report::pictures::{contact_sheet, lot, noise, samples};
-use report::{docs_page, reproduction, run_report};
+use report::{reproduction, run_report};
 use sim::episode::EpisodeSettings;
 use sim::limits::{PIXELS_PER_METRE_MAX, RUN_TEXT_BYTES_MAX, TRIAL_MAX};
 use sim::map::Map;
@@ -434,11 +435,11 @@ fn render_results(args: &RenderResultsArgs, overwrite: bool, output: &Output) ->
         "{}: exists already, and is not a page of results; choose another --to, or replace it with --overwrite",
         to.display()
     );
-    let revision = build_info::get().git_revision.as_deref();
+    let made_by = MadeBy { build: build_info::get(), to: args.to.as_deref() };
     if command == reproduce::COMMAND {
-        reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.with, &to, revision)?;
+        reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.with, &to, made_by)?;
     } else {
-        OtherRun::from(args.run.clone()).write_docs(&args.with, &to, revision)?;
+        OtherRun::from(args.run.clone()).write_docs(&args.with, &to, made_by)?;
     }
     output.print(to.display());
     Ok(())
@@ -458,8 +459,10 @@ fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyh
     if let Some((folder, path)) = &copy {
         folder.check_file(path)?;
     }
-    run_report::write(run, &Console::new(output))?;
+    let written = run_report::write(run, &Console::new(output));
+    // Its own list has changed, also where the report was cut short.
     owned.list_again()?;
+    written?;
     output.print(report.display());
     if let Some((folder, path)) = copy {
         let content = storage::read::bytes(&report, RUN_TEXT_BYTES_MAX)

@@ -110,12 +110,10 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
     let from_s = args.from.or(earliest_s.map(|at_s| at_s - AROUND_S[0])).unwrap_or(0.0).max(0.0);
     let to_s = to_s.unwrap_or(end_s).min(end_s);
     ensure!(from_s < to_s, "from {from_s:.1} s to {to_s:.1} s there is nothing to show; choose other --from and --to");
-    // The formats count hundredths of a second.
-    let shown_cs = 100 / args.fps;
-    let fps = 100.0 / f32::from(shown_cs);
-    let whole = ((to_s - from_s) * fps / FRAMES_WANTED).ceil().max(1.0);
+    let shown_cs = shown_cs(args.fps);
+    let whole = ((to_s - from_s) / step_s(1.0, shown_cs) / FRAMES_WANTED).ceil().max(1.0);
     let speed = args.speed.unwrap_or(if ticks.is_empty() { whole } else { 1.0 });
-    let step_s = speed / fps;
+    let step_s = step_s(speed, shown_cs);
     let count = ((to_s - from_s) / step_s) as u32;
     ensure!(
         count < PICTURES_MAX,
@@ -146,6 +144,16 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
 }
 
 /// What is to be driven: a key per driver.
+/// How long a picture is shown, in hundredths of a second, which the formats count in.
+fn shown_cs(fps: u16) -> u16 {
+    100 / fps
+}
+
+/// What passes from one picture to the next, s.
+fn step_s(speed: f32, shown_cs: u16) -> f32 {
+    speed * f32::from(shown_cs) / 100.0
+}
+
 fn resolve(args: &AnimationArgs, output: &Output) -> anyhow::Result<(Settings, Vec<ReplayKey>)> {
     let keys: Vec<ReplayKey> = args.keys.iter().map(|key| key.parse()).collect::<anyhow::Result<_>>()?;
     let Some(first) = keys.first() else {
@@ -188,4 +196,19 @@ fn drive(
         takes.push(take);
     }
     Ok(takes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Thirty pictures a second, of which a GIF shows 33, played 1.1 times too fast.
+    #[test]
+    fn a_drive_is_shown_as_fast_as_asked_whatever_the_pictures_per_second() {
+        for (fps, speed) in [(10, 1.0), (30, 1.0), (30, 0.5), (50, 4.0)] {
+            let shown_s = f32::from(shown_cs(fps)) / 100.0;
+            assert!((step_s(speed, shown_cs(fps)) / shown_s - speed).abs() < 1e-6, "{fps} {speed}");
+            assert!(1.0 / shown_s >= f32::from(fps), "no fewer than asked for");
+        }
+    }
 }

@@ -12,6 +12,7 @@ use clap::Args;
 use evaluation::estimate;
 use evaluation::names::{BC, DAGGER};
 use evaluation::plan::Plan;
+use evaluation::records;
 use evaluation::table1::Table1;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs::{self, Inputs};
@@ -91,6 +92,8 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         build_info::check_can_go_on(path, &manifest, output)?;
         manifest.check_inputs(&inputs(&settings)?)?;
         let asked: Asked = manifest.arguments.try_into().with_context(|| path.display().to_string())?;
+        let drives = path.join(records::RUNS).try_exists().with_context(|| path.display().to_string())?;
+        ensure!(!(args.no_eval && drives), "--no-eval: {} drives already; leave it out", path.display());
         (run, settings, Asked { no_eval: asked.no_eval || args.no_eval })
     } else {
         let layers = Layers::from(&args.layers);
@@ -279,4 +282,20 @@ fn print_next_steps(path: &Path, output: &Output) {
     let path = path.display();
     output.remark(format_args!("\nPolicy: {path} (the last round; model.safetensors opens in PyTorch)"));
     output.remark(format_args!("Next:   cargo xtask evaluate --driver run:{path} --seed 2"));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use experiment::settings::NoiseChoice;
+
+    /// Every level was driven, and one of them shown.
+    #[test]
+    fn the_check_elsewhere_drives_the_noise_that_it_shows() {
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.evaluation.noise = vec![NoiseChoice::Hard, NoiseChoice::Clean];
+        let elsewhere = elsewhere(&settings).evaluation;
+        assert_eq!(elsewhere.noise, settings.evaluation.noise[..1]);
+        assert_eq!((elsewhere.lots, elsewhere.trials), (settings.evaluation.elsewhere, 1));
+    }
 }
