@@ -341,7 +341,7 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
     assert!(first.status.success(), "{}", text(&first).1);
     assert_same_from_shards("scaling", &out, &run, &arguments);
     let table = std::fs::read_to_string(out.join("scaling.md")).unwrap();
-    let rows: Vec<&str> = table.lines().filter(|line| line.contains("BC") || line.contains("DAgger")).collect();
+    let rows: Vec<&str> = table.lines().filter(|line| line.contains("| BC ") || line.contains("| DAgger ")).collect();
     assert_eq!(rows.len(), 4, "two trainings, two policies of each:\n{table}");
     assert!(rows[0].starts_with("| 2 ") && rows[3].starts_with("| 1 "), "{table}");
     assert!(std::fs::read_to_string(out.join("scaling.svg")).unwrap().contains("different lots"));

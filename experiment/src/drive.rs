@@ -180,3 +180,34 @@ impl Replay {
         Ok(batch.drive(&mut |_, frame| observer(frame))?.remove(0))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+    use sim::frame::Event;
+
+    /// The moment of a sixth near-collision was shown seconds before it: braking takes longer than a tick.
+    #[test]
+    fn a_moment_after_near_collisions_is_later_than_its_ticks_say() {
+        let settings = Settings::preset("default").unwrap();
+        let key = |tick: u32| format!("tentacle@lot-b@forward@0@hard@1@{tick}").parse::<ReplayKey>().unwrap();
+        let driver = key(0).driver.load(&settings).unwrap();
+        let mut seen = Vec::new();
+        let replay = Replay::new(&key(0), &settings.episode).unwrap();
+        let mut events = 0;
+        let collect = |frame: &Frame| {
+            seen.push((frame.tick, frame.time_s));
+            events += usize::from(matches!(frame.event, Event::NearCollision { .. }));
+            if events < 3 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        };
+        replay.drive(&settings.episode, &driver, collect).unwrap();
+        assert_eq!(events, 3, "this lot has fewer; choose another");
+        let [.., (_, before_s), (last, _)] = seen[..] else { panic!("{seen:?}") };
+        let observed_at_s =
+            |tick| Replay::new(&key(tick), &settings.episode)?.observed_at_s(&settings.episode, &driver);
+        assert_eq!(observed_at_s(last).unwrap(), before_s);
+        assert!(before_s > last as f32 * settings.episode.control_period_s() + 0.5, "{before_s} s at tick {last}");
+        assert!(observed_at_s(1_000_000).unwrap_err().to_string().contains("this run ends with tick"));
+    }
+}

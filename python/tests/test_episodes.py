@@ -90,6 +90,20 @@ def test_a_driver_that_remembers_is_told_which_car_it_drives():
     assert driver.cars == {0, 1} and driver.resets >= 2
 
 
+def test_functions_are_smoothed_like_every_driver():
+    """``smoothing=`` had no effect on them, and they were compared with drivers that it smoothed."""
+
+    def aside(grids):
+        return np.stack([np.full(len(grids), 8.0), grids.sum((1, 2)) % 3 - 1.0], 1)
+
+    def digests(smoothing):
+        tables = lotpilot.evaluate({"aside": aside}, "lot-b", trials=1, smoothing=smoothing, overrides=SHORT)
+        return tables.runs["sha256"]
+
+    assert digests(8.0) != digests(0.0) == digests(None)
+
+
+
 def test_a_function_that_raises_while_causes_are_explained_leaves_no_finished_evaluation(tmp_path):
     calls = {"all": 0, "allowed": 10**9}
 
