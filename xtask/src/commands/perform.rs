@@ -127,6 +127,18 @@ fn ensure_driven_by(stage: &Stage, root: &RunDir) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// The stages with those of their drivers alone that drove: an earlier version let others drive.
+pub(crate) fn with_those_who_drove(mut stages: Vec<Stage>, root: &Path) -> anyhow::Result<Vec<Stage>> {
+    for stage in &mut stages {
+        let Step::Drive { drivers } = &mut stage.step else { continue };
+        let finished = manifest::finished(&root.join(&stage.folder))?;
+        if let Some(Outcome::Evaluation { drivers: found }) = finished.map(|finished| finished.outcome) {
+            drivers.retain(|(_, wanted)| found.iter().any(|found| is_same_driver(found, wanted, root)));
+        }
+    }
+    Ok(stages)
+}
+
 /// Whether a driver is the one that is wanted. The run may have been moved since: its own networks are known by where they
 /// lie in it.
 fn is_same_driver(found: &str, wanted: &str, root: &Path) -> bool {
@@ -185,6 +197,24 @@ fn take_over_cloning(from: &Path, run: &RunDir) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Drivers that an earlier version had not let drive there took the intervals from those that it had.
+    #[test]
+    fn a_stage_has_the_drivers_that_drove_in_it() {
+        let root = std::env::temp_dir().join(format!("lotpilot-who-drove-{}", std::process::id()));
+        let settings = Settings::preset("smoke").unwrap();
+        let run =
+            RunDir::create(&Place { out: Some(&root), ..place_of("rules", &settings) }, &settings, &Request::default());
+        let run = run.unwrap();
+        let stage = run.stage("drives", &place_of("rules", &settings), &settings).unwrap().unwrap();
+        stage.finish(Outcome::Evaluation { drivers: vec!["expert".to_owned()] }).unwrap();
+        let drivers = ["expert", "vvf"].map(|name| (name.to_owned(), name.to_owned())).to_vec();
+        let (folder, about) = ("drives".to_owned(), String::new());
+        let planned = Stage { folder, about, settings, step: Step::Drive { drivers: drivers.clone() } };
+        let found = with_those_who_drove(vec![planned], run.path()).unwrap();
+        assert_eq!(found[0].step, Step::Drive { drivers: drivers[..1].to_vec() });
+        std::fs::remove_dir_all(root).unwrap();
+    }
 
     /// A network of a round of a run that was moved was taken for another driver.
     #[test]

@@ -232,6 +232,7 @@ pub(crate) fn recipe_of(path: &Path) -> anyhow::Result<Recipe> {
     let trained: BTreeSet<String> = sums::names(path)?.into_iter().collect();
     let is_there = |folder: &str| trained.contains(&format!("{folder}/{}", sums::FILE));
     let stages = stages::without_trainings(stages::all(&settings, &extent, path), is_there);
+    let stages = perform::with_those_who_drove(stages, path)?;
     Ok(Recipe { settings, extent, stages })
 }
 
