@@ -194,9 +194,12 @@ fn trainings_of_a_method_are_judged_together_wherever_they_drove() {
     let [first, second] = ["1", "2"].map(|shard| PathBuf::from(out(shard)));
     let rounds_otherwise = folder.join("rounds-otherwise");
     copy(&second, &rounds_otherwise);
-    forge(&rounds_otherwise, "manifest.toml", |text| match text.contains("\"fma\"") {
-        true => text.replacen("\"fma\"", "\"none\"", 1),
-        false => text.replacen("processor_features = [", "processor_features = [\"avx2\", \"fma\", ", 1),
+    forge(&rounds_otherwise, "manifest.toml", |text| {
+        if text.contains("\"fma\"") {
+            text.replacen("\"fma\"", "\"none\"", 1)
+        } else {
+            text.replacen("processor_features = [", "processor_features = [\"avx2\", \"fma\", ", 1)
+        }
     });
     refused(&[&first, &rounds_otherwise], "use of AVX2 and FMA");
     evaluate(&all[..2], &[], "two");
