@@ -299,7 +299,7 @@ impl Against<'_> {
     }
 
     /// Near-collisions that the same driver avoids on the clean grid. They are few: compared exactly, without pairs, as if each
-    /// came by itself.
+    /// came by itself; not at all where near-collisions of either driver come in clusters, or of too few trials.
     fn minds_noise_less(&self, other: usize) -> Statement {
         let noisy = |driver| self.driven.results.count_of_cause(0, driver, &self.slice, Cause::NoiseInduced);
         let name = self.name(other);
@@ -316,8 +316,13 @@ impl Against<'_> {
         } else {
             Verdict::CannotBeTold
         };
+        let why_not = match (is_clustered, self.comparison(other)) {
+            (true, _) => "; they come in clusters",
+            (false, None) => "; too few trials",
+            (false, Some(_)) => "",
+        };
         let figures = format!(
-            "DAgger {} of {}, {name} {} of {}; rate ratio {}, if each came by itself",
+            "DAgger {} of {}, {name} {} of {}; rate ratio {}, if each came by itself{why_not}",
             ours.0,
             ours.1.near_collisions,
             theirs.0,

@@ -26,7 +26,7 @@ pub struct ShardRecord {
     /// SHA-256 of the settings.
     pub settings_sha256: String,
     /// The trials of an evaluation, `LOT@DIRECTION@TRIAL`: every driver drives each of them at every noise level. The
-    /// folders of the stages of a reproduction.
+    /// folders of the stages of a run of trainings.
     pub keys: Vec<String>,
     /// The folder of a reproduction whose networks are trained.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -55,14 +55,14 @@ impl ShardRecord {
         Ok(Some(Self { number, settings_sha256: digest(plan.settings), keys, networks: None }))
     }
 
-    /// The record of a reproduction: of its trainings, or of what the networks in a folder drive.
+    /// The record of a run of trainings: of these, or of what the networks in a folder drive.
     pub fn of_stages(number: Shard, networks: Option<PathBuf>, settings: &Settings, stages: Vec<Stage>) -> Self {
         let mut record = Self { number, settings_sha256: digest(settings), keys: Vec::new(), networks };
         record.keys = record.share_of(stages).into_iter().map(|stage| stage.folder).collect();
         record
     }
 
-    /// The stages of a reproduction that the shard does.
+    /// The stages of a run of trainings that the shard does.
     pub fn share_of(&self, stages: Vec<Stage>) -> Vec<Stage> {
         let part = if self.networks.is_some() { stages::Part::Drives } else { stages::Part::Trainings };
         stages::share(stages, part, self.number)
@@ -261,7 +261,7 @@ impl Shards {
         self.runs.iter().map(|run| run.folder.join(stage)).collect()
     }
 
-    /// The stages of a reproduction that they did, each with the folder that it is in.
+    /// The stages of a run of trainings that they did, each with the folder that it is in.
     ///
     /// # Errors
     /// If a manifest lists others than the shard was to do, or a file in one of them is missing or damaged.

@@ -103,7 +103,6 @@ def test_functions_are_smoothed_like_every_driver():
     assert digests(8.0) != digests(0.0) == digests(None)
 
 
-
 def test_a_function_that_raises_while_causes_are_explained_leaves_no_finished_evaluation(tmp_path):
     calls = {"all": 0, "allowed": 10**9}
 

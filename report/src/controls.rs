@@ -68,8 +68,8 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
     if over_seeds.row_count() > 0 {
         let _ = write!(
             text,
-            "\n\nThe means of what was trained with several seeds, with intervals for other lots and other seeds; the \
-             difference is to DAgger (others − DAgger).\n\n{over_seeds}"
+            "\n\nMeans over seeds beside the controls that were trained once, with intervals for other lots and, of several \
+             trainings, other seeds; the difference is to DAgger (others − DAgger).\n\n{over_seeds}"
         );
     }
     Ok(text)

@@ -93,8 +93,9 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
         let lots_met =
             [1, table1.rows.len()].map(|rounds| scaling::lots_met(of_kind.values().copied(), different, rounds));
         for (part, method) in [BC, DAGGER].into_iter().enumerate() {
-            // A training meets no more lots than its rounds list: it may be the same network again.
-            let is_known = |row: &Row| row.method == method && row.different_lots == lots_met[part];
+            // A training meets no more lots than its rounds list: of as many samples it is the same network again.
+            let is_known =
+                |row: &Row| (row.method, row.different_lots, row.samples) == (method, lots_met[part], samples[part]);
             if rows.iter().any(is_known) {
                 continue;
             }

@@ -90,7 +90,7 @@ pub(crate) fn goes_on_with(arguments: &str) {
     }
 }
 
-/// Notes that the run is finished, and that nothing has to be continued.
+/// Notes that nothing has to be continued.
 pub(crate) fn nothing_to_continue() {
     if let Ok(mut way_on) = WAY_ON.lock() {
         *way_on = None;

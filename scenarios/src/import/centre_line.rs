@@ -67,6 +67,9 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
     Ok(points)
 }
 
+/// Names of columns in degrees: of latitudes, and of longitudes.
+const DEGREES: [&[&str]; 2] = [&["lat", "latitude"], &["lon", "lng", "longitude"]];
+
 /// What is wrong with a header whose columns are others than x and y, in this order: read as they are, they would be another
 /// line.
 fn misplaced(header: &csv::StringRecord) -> Option<String> {
@@ -75,10 +78,11 @@ fn misplaced(header: &csv::StringRecord) -> Option<String> {
         lower.split(|char: char| !char.is_alphanumeric()).any(|word| known.contains(&word))
     };
     let known = [("x", ["x", "easting"]), ("y", ["y", "northing"])];
+    let has_both = DEGREES.iter().all(|names| (0..header.len()).any(|column| has(column, names)));
     let are_named = (0..).zip(known).all(|(column, (_, names))| has(column, &names));
     for (column, name) in header.iter().enumerate() {
-        // Beside x and y, degrees do no harm.
-        if !are_named && has(column, &["lat", "lon", "lng", "latitude", "longitude"]) {
+        // Beside x and y, degrees do no harm, and farther on `a_lat` may be an acceleration.
+        if !are_named && has(column, &DEGREES.concat()) && (column < 2 || has_both) {
             return Some(format!("the header has {:?}, which is in degrees", shortened(name)));
         }
         let (word, belongs) = match known.map(|(_, names)| has(column, &names)) {

@@ -8,7 +8,7 @@ use crate::commands::{deviations, perform, reproduce, rules, scaling};
 use crate::console::Console;
 use crate::interrupt;
 use crate::output::Output;
-use anyhow::{bail, ensure};
+use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 use evaluation::drive_stage::DriveStage;
 use evaluation::evaluations::Evaluations;
@@ -165,7 +165,7 @@ fn asked_for(shards: &Shards) -> anyhow::Result<(Vec<Stage>, Inputs)> {
 fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, manifest) = (shards.settings(), shards.manifest());
     let command = manifest.command.as_str();
-    let (stages, inputs) = asked_for(shards)?;
+    let (stages, inputs) = asked_for(shards).with_context(|| args.folders[0].display().to_string())?;
     manifest.check_inputs(&inputs)?;
     let trained = shards.stages(&stages)?;
     let run = match &args.out.out {
@@ -209,7 +209,7 @@ fn drives(shards: &Shards, networks: &Path, args: &MergeArgs, output: &Output) -
     build_info::check_can_go_on(networks, &manifest, output)?;
     let remedy = format!("make them again with --networks {}", networks.display());
     shards.check_are_of(networks, &settings, &manifest, &remedy)?;
-    let extent = reproduce::extent_of(&manifest)?;
+    let extent = reproduce::extent_of(&manifest).with_context(|| networks.display().to_string())?;
     let all = stages::all(&settings, &extent, networks);
     shards.manifest().check_inputs(&reproduce::inputs_of_drives(&settings, &extent, &all)?)?;
     // Nothing is written before all of it is known to be whole.

@@ -143,7 +143,6 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
     folder.put(&path, &bytes)
 }
 
-/// What is to be driven: a key per driver.
 /// How long a picture is shown, in hundredths of a second, which the formats count in.
 fn shown_cs(fps: u16) -> u16 {
     100 / fps
@@ -154,6 +153,7 @@ fn step_s(speed: f32, shown_cs: u16) -> f32 {
     speed * f32::from(shown_cs) / 100.0
 }
 
+/// What is to be driven: a key per driver.
 fn resolve(args: &AnimationArgs, output: &Output) -> anyhow::Result<(Settings, Vec<ReplayKey>)> {
     let keys: Vec<ReplayKey> = args.keys.iter().map(|key| key.parse()).collect::<anyhow::Result<_>>()?;
     let Some(first) = keys.first() else {
