@@ -83,7 +83,9 @@ impl Context<'_> {
     fn end(&mut self, recording: Recording) -> anyhow::Result<()> {
         self.files.extend(recording.end()?);
         if self.progress.is_cancelled() {
-            return Err(Interrupted { kept: "the last recording ends there, those before it are complete".to_owned() }.into());
+            return Err(
+                Interrupted { kept: "the last recording ends there, those before it are complete".to_owned() }.into()
+            );
         }
         Ok(())
     }
