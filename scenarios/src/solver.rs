@@ -23,7 +23,7 @@ const SWEEP_CLEARANCE_SHARE: f32 = 0.4;
 const STEP_M: f32 = 1.0;
 /// Steering positions to either side.
 const STEERING_LEVELS: i8 = 4;
-/// Largest change per step. Two of four levels are 0.27 rad: the car's 0.344 rad/s allows that at 1.25 m/s.
+/// Largest change per step. Two of four levels are 0.29 rad: the car's 0.344 rad/s allows that at 1.18 m/s.
 const STEERING_CHANGE_MAX: i8 = 2;
 /// Share of the car's tightest curvature that is used; policies cannot ask for more than 0.215 /m either.
 const CURVATURE_SHARE: f32 = 0.92;
@@ -360,10 +360,9 @@ impl Scene {
             let [length_m, width_m, _] = obstacle.size_m();
             // The circumscribed octagon of a round thing reaches 8 % farther than its radius.
             let reach_m = 0.55 * maths::hypot(length_m, width_m) + Self::SLACK_M;
-            let centre = obstacle.centre().position();
-            let is_within = centre.cmpge(low).all() && centre.cmple(high).all();
-            // Wholly behind the boundary: the boundary's edges come first.
-            if is_within && scene.clearance_m.at(centre) > -reach_m {
+            // Else it is wholly behind the boundary, whose edges come first. Off the raster, the nearest point of it is looked
+            // at, which is no farther from the boundary.
+            if scene.clearance_m.at(obstacle.centre().position()) > -reach_m {
                 scene.add_outline(&obstacle.outline());
             }
         }
@@ -593,6 +592,10 @@ mod tests {
     fn solvable_and_unsolvable_lots_are_told_apart() {
         use ObstacleClass::{Cone, Sedan};
         let row = [(Cone, 25.0, -1.2), (Cone, 25.0, 0.0), (Cone, 25.0, 1.2)];
+        let across = |y_m| Obstacle {
+            length_m: Some(12.0),
+            ..Obstacle::new(ObstacleClass::Wall, Pose { x_m: 25.0, y_m, heading_rad: std::f32::consts::FRAC_PI_2 })
+        };
         // The car is 1.86 m wide and keeps 0.25 m to either side: 2.36 m.
         let table = [
             ("an empty lane", lane(3.0, &[]), true),
@@ -605,6 +608,8 @@ mod tests {
             ("a slalom with 10 m between the cars", lane(5.5, &[(Sedan, 22.65, 1.8), (Sedan, 37.35, -1.8)]), true),
             ("two cars side by side", lane(5.0, &[(Sedan, 25.0, 1.5), (Sedan, 27.0, -1.5)]), false),
             // docs/methods.md 11: a sharp right angle needs at least 4.1–4.2 m, 4.6–4.7 m with 0.3 m clearance.
+            ("a wall across it whose middle is far outside", lane(5.0, &[]).with_obstacles([across(6.0)]), false),
+            ("a wall that ends at its edge", lane(5.0, &[]).with_obstacles([across(8.55)]), true),
             ("a sharp corner of two 5 m aisles", sharp_corner(5.0), true),
             ("a sharp corner of two 4 m aisles", sharp_corner(4.0), false),
         ];
