@@ -48,7 +48,7 @@ impl Totals {
         self.contacts += metrics.contacts;
         self.stuck += metrics.stuck;
         self.timed_out += u32::from(report.ending == Ending::TimedOut);
-        self.given_up += u32::from(report.ending == Ending::TooManyEvents);
+        self.given_up += u32::from(matches!(report.ending, Ending::TooManyEvents | Ending::Blocked));
         self.safe_ratio_sum += f64::from(metrics.safe_ratio);
         self.clearance_min_m = smaller(self.clearance_min_m, Some(metrics.clearance_min_m));
         self.steering_reversals += metrics.steering_reversals;

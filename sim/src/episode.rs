@@ -92,8 +92,11 @@ struct Advance {
     physics_step: u32,
 }
 
-/// How far back and ahead of its progress a car is looked for along the route, metres: it cannot be farther from there.
+/// How far back and ahead of its progress a car is looked for along the route, metres; farther ahead only where it drove so
+/// far since, as in a long emergency stop.
 const PROJECTED_M: f32 = 5.0;
+/// How much farther along the route than it drove a car may be, metres: it cuts bends.
+const CUT_M: f32 = 1.0;
 
 /// State of stop–count–resume.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,6 +105,8 @@ enum Phase {
     Driving,
     /// Counted; emergency braking until the car rests.
     Braking,
+    /// At rest where it stopped: nothing that is left of the route is free.
+    Blocked,
 }
 
 /// One run that can be stepped.
@@ -347,8 +352,7 @@ impl Episode {
             steps += 1;
         }
         self.tick += 1;
-        self.progress_m =
-            self.map.path().project_near(self.vehicle.pose.position(), self.progress_m, PROJECTED_M, PROJECTED_M);
+        self.progress_m = self.projected_m(if self.was_reset { 0.0 } else { frame.driven_m });
         self.judge_progress(&mut frame);
         frame.time_s = self.physics_step as f32 * settings.physics_step_s();
         self.metrics.frame(&frame);
@@ -387,6 +391,7 @@ impl Episode {
                 self.vehicle = vehicle::step(&settings.vehicle, before, self.command, dt_s);
             }
             Phase::Braking => self.vehicle = vehicle::step_emergency_stop(&settings.vehicle, before, dt_s),
+            Phase::Blocked => {}
         }
         self.physics_step += 1;
         frame.driven_m += 0.5 * (before.speed_mps + self.vehicle.speed_mps) * dt_s;
@@ -407,26 +412,34 @@ impl Episode {
         let counts = self.physics_step >= self.counts_from_step;
         match self.phase {
             Phase::Driving if sweeps_into_something && self.vehicle.speed_mps > 0.05 && counts => {
-                let at_m = self.map.path().project_near(pose.position(), self.progress_m, PROJECTED_M, PROJECTED_M);
-                frame.event = Event::NearCollision { at: pose, progress_m: at_m };
+                frame.event = Event::NearCollision { at: pose, progress_m: self.projected_m(frame.driven_m) };
                 self.phase = Phase::Braking;
             }
             Phase::Braking if self.vehicle.speed_mps == 0.0 => {
                 frame.clearance_m = frame.clearance_m.min(self.body.clearance_m(self.map.distance_field(), pose));
-                self.resume_on_path();
+                self.resume_on_path(frame.driven_m);
             }
             _ => {}
         }
     }
 
-    /// Puts the car at rest on the nearest point of the path from which it can drive.
-    fn resume_on_path(&mut self) {
+    /// Where the car is along the route, metres, after it drove so far since its progress was determined.
+    fn projected_m(&self, driven_m: f32) -> f32 {
+        let ahead_m = PROJECTED_M.max(driven_m + CUT_M);
+        self.map.path().project_near(self.vehicle.pose.position(), self.progress_m, PROJECTED_M, ahead_m)
+    }
+
+    /// Puts the car at rest on the nearest point of what is left of the path from which it can drive, if there is one.
+    fn resume_on_path(&mut self, driven_m: f32) {
         let path = self.map.path();
-        let mut s_m = path.project_near(self.vehicle.pose.position(), self.progress_m, PROJECTED_M, PROJECTED_M);
-        while s_m < path.length_m() && !self.is_free_from(s_m) {
-            s_m += 0.5;
+        let mut s_m = self.projected_m(driven_m);
+        while !self.is_free_from(s_m) {
+            if s_m >= path.length_m() {
+                self.phase = Phase::Blocked;
+                return;
+            }
+            s_m = (s_m + 0.5).min(path.length_m());
         }
-        let s_m = s_m.min(path.length_m());
         self.vehicle = VehicleState::at_rest(path.pose_at(s_m));
         self.in_flight.clear();
         self.command = VehicleCommand::default();
@@ -457,7 +470,7 @@ impl Episode {
             self.advance = Advance { progress_m: self.progress_m, physics_step: self.physics_step };
         } else if self.physics_step - since_step >= self.settings.physics_steps(metrics.stuck_after_s) {
             frame.event = Event::Stuck { at: self.vehicle.pose, progress_m: self.progress_m };
-            self.resume_on_path();
+            self.resume_on_path(0.0);
         }
         // The projection saturates at the end of the path.
         if self.progress_m >= self.map.path().length_m() - 1e-3 && frame.event == Event::Drove {
@@ -467,7 +480,9 @@ impl Episode {
 
     fn judge_ending(&self, frame: &Frame) -> Option<Ending> {
         let metrics = &self.settings.metrics;
-        if self.progress_m >= self.map.path().length_m() - 1e-3 {
+        if self.phase == Phase::Blocked {
+            Some(Ending::Blocked)
+        } else if self.progress_m >= self.map.path().length_m() - 1e-3 {
             Some(Ending::ReachedEnd)
         } else if self.events.len() >= metrics.events_max as usize {
             Some(Ending::TooManyEvents)

@@ -34,8 +34,10 @@ pub enum Event {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Ending {
-    /// The car reached the finish.
+    /// The car reached the finish, or was put back there.
     ReachedEnd,
+    /// Given up because there is no place ahead on the route from which the car could drive on.
+    Blocked,
     /// Given up after too many near-collisions and stuck events.
     TooManyEvents,
     /// Given up after too long a time.

@@ -218,6 +218,32 @@ fn a_car_that_does_not_advance_is_stuck_and_put_back() {
     assert_eq!((report.metrics.stuck, report.metrics.near_collisions), (3, 0), "{report:?}");
 }
 
+/// It was put at the finish, wherever that was, and had reached it.
+#[test]
+fn a_car_that_cannot_be_put_back_anywhere_ahead_has_not_reached_the_end() {
+    let in_the_way = |x_m| Obstacle::new(ObstacleClass::Sedan, Pose::new(Vec2::new(x_m, 1.2), 0.0));
+    // Nose to tail from 30 m to beyond the finish.
+    let cars: Vec<_> = (0..10).map(|i| in_the_way(32.0 + 4.0 * i as f32)).collect();
+    let (report, _) = run(lane(60.0, cars), (16.3, 0.0), settings());
+    assert_eq!((report.ending, report.metrics.near_collisions), (Ending::Blocked, 1), "{report:?}");
+    let (report, _) = run(lane(60.0, vec![in_the_way(32.0)]), (16.3, 0.0), settings());
+    assert_eq!((report.ending, report.metrics.near_collisions), (Ending::ReachedEnd, 1), "{report:?}");
+}
+
+/// It was put back where the search ended, 5 m ahead of where the tick began.
+#[test]
+fn a_car_that_brakes_for_long_is_put_back_where_it_came_to_rest() {
+    let mut slow = (*settings()).clone();
+    slow.vehicle.emergency_brake_mps2 = 0.2;
+    let cone = Obstacle::new(ObstacleClass::Cone, Pose::new(Vec2::new(30.0, 0.9), 0.0));
+    let (report, frames) = run(lane(60.0, vec![cone]), (16.3, 0.0), Arc::new(slow));
+    assert_eq!(report.metrics.near_collisions, 1, "{report:?}");
+    let braked = frames.iter().position(|frame| matches!(frame.event, Event::NearCollision { .. })).unwrap();
+    let (before, after) = (&frames[braked], &frames[braked + 1]);
+    assert!(before.driven_m > 6.0, "{} m", before.driven_m);
+    assert!((after.progress_m - before.progress_m - before.driven_m).abs() < 0.6, "{before:?} {after:?}");
+}
+
 #[test]
 fn a_run_times_out() {
     let mut short = (*settings()).clone();
