@@ -426,8 +426,7 @@ impl MapFiles {
                 .to_owned(),
             image: [&b"P5\n60 30\n255\n"[..], &pixels.collect::<Vec<u8>>()].concat(),
             lot:
-                "map = \"map.yaml\"\nscale = 1.0\ncentre_line = \"line.csv\"\nclearance_m = 0.2\nwall_height_m = 1.0\n\
-                  drop_specks_m2 = 0\n"
+                "map = \"map.yaml\"\nscale = 1.0\ncentre_line = \"line.csv\"\nwall_height_m = 1.0\ndrop_specks_m2 = 0\n"
                     .to_owned(),
             line: "x,y\n8,12\n40,12\n".to_owned(),
         }
@@ -515,8 +514,9 @@ fn maps_that_are_refused() {
         ("centre_line = \"line.csv\"", "start = [8, 12, 0]\ngoal = [0, 0, 0]", "goal: (0.00, 0.00) is not drivable"),
         ("centre_line = \"line.csv\"", "start = [8, 12, 0]\ngoal = [9, 9, 0]\nloop = true", "goal is given too"),
         ("centre_line", "loop = true\ncentre_line", "loop is given too"),
-        ("clearance_m = 0.2", "clearance_m = 3", "clearance_m: it is 3"),
-        ("clearance_m = 0.2", "clearance_m = nan", "clearance_m: it is NaN"),
+        ("drop_specks_m2 = 0", "clearance_m = 3", "clearance_m: it is 3"),
+        ("drop_specks_m2 = 0", "clearance_m = nan", "clearance_m: it is NaN"),
+        ("drop_specks_m2 = 0", "clearance_m = 0.2", "clearance_m: centre_line is given too"),
         ("wall_height_m = 1.0", "wall_height_m = -1", "wall_height_m: it is -1"),
         ("drop_specks_m2 = 0", "drop_specks_m2 = 1e9", "drop_specks_m2: it is 1000000000"),
         ("drop_specks_m2 = 0", "name = \"a/b\"", "contains '/'"),

@@ -3,7 +3,7 @@
 use crate::bench::scratch;
 use expert::{ExpertSettings, ScriptedExpert};
 use scenarios::LoadError;
-use scenarios::load::{check_direction, load, parse, to_toml};
+use scenarios::load::{check_direction, load_with_notes, parse, to_toml};
 use sim::controller::{ControllerSettings, SpeedLaw, pursue};
 use sim::driver::{Decision, Driver as _, GroundTruth, LookAheadPoint, Situation, Source};
 use sim::episode::EpisodeSettings;
@@ -63,7 +63,7 @@ fn a_lot_that_cannot_be_driven_in_reverse_is_refused_with_file_and_line() {
     let text = to_toml(&Scenario::lane(0.0..=40.0, 4.0, 5.0..=39.5));
     let file = scratch("reverse").join("lane.toml");
     std::fs::write(&file, &text).unwrap();
-    let lot = load(&file, &car()).unwrap();
+    let lot = load_with_notes(&file, &car()).unwrap();
     assert_eq!(check_direction(&file, &lot, Direction::Forward, &car()), Ok(()));
     let error = check_direction(&file, &lot, Direction::Reverse, &car()).unwrap_err();
     let line = 1 + text.lines().position(|line| line.contains("[39.5, 0.0]")).unwrap();

@@ -1,12 +1,12 @@
 //! Lots that can be named on the command line: [`scenarios::suite`], checked before anything is driven.
 
 use anyhow::{Context as _, ensure};
-use scenarios::LotSpec;
 use scenarios::generator;
 use scenarios::import::MapLot;
 use scenarios::note::{Loaded, Note};
 use scenarios::reference::{self, ReferenceLot};
 use scenarios::split::{Family, Split};
+use scenarios::{LoadError, LotSpec};
 use sim::limits::LOTS_MAX;
 use sim::scenario::{Direction, NoiseLevel, Scenario};
 use sim::seed::RootSeed;
@@ -65,6 +65,14 @@ pub const ALL: &str = "all";
 /// Row of a table for the lots that no driver was trained on.
 pub const UNSEEN: &str = "unseen";
 
+/// The error of a file that cannot be read by itself: [`storage::is_of_disk`] knows it.
+fn not_loaded(error: LoadError) -> anyhow::Error {
+    match error {
+        LoadError::Unreadable(file) => file.into(),
+        other => other.into(),
+    }
+}
+
 /// The name of a lot from a file. One that is the name of other lots, or of another row of a table, is marked: it would be
 /// counted among those, or be compared with the paper's.
 fn name_of_file(scenario: &Scenario) -> String {
@@ -122,7 +130,7 @@ impl Lot {
 
     fn new(spec: LotSpec, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
         let from_file = match &spec {
-            LotSpec::File(path) => Some(Arc::new(scenarios::load::load_with_notes(path, vehicle)?)),
+            LotSpec::File(path) => Some(Arc::new(scenarios::load::load_with_notes(path, vehicle).map_err(not_loaded)?)),
             LotSpec::Reference(_) | LotSpec::Generated { .. } => None,
         };
         let name = from_file.as_ref().map_or_else(|| spec.to_string(), |loaded| name_of_file(&loaded.scenario));
@@ -134,7 +142,7 @@ impl Lot {
     /// # Errors
     /// If no lot can be made of it.
     pub fn of_map(path: &Path, lot: &MapLot, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
-        let loaded = lot.scenario(vehicle)?;
+        let loaded = lot.scenario(vehicle).map_err(not_loaded)?;
         Ok(Self {
             name: name_of_file(&loaded.scenario),
             spec: LotSpec::File(path.to_owned()),
@@ -207,7 +215,7 @@ impl Lot {
     pub fn check_direction(&self, direction: Direction, vehicle: &VehicleSettings) -> anyhow::Result<()> {
         match (&self.spec, &self.from_file) {
             (LotSpec::File(path), Some(loaded)) => {
-                Ok(scenarios::load::check_direction(path, &loaded.scenario, direction, vehicle)?)
+                Ok(scenarios::load::check_direction(path, loaded, direction, vehicle)?)
             }
             _ => Ok(()),
         }

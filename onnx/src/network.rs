@@ -50,7 +50,7 @@ impl OnnxNetwork {
     /// know, or its input or output is not what docs/formats.md says.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let bytes = read::bytes(path, ONNX_BYTES_MAX)
-            .map_err(|error| FileError::new(path, format_args!("cannot be read: {error}"), "name an ONNX file"))?;
+            .map_err(|error| FileError::unreadable(path, &error, "name an ONNX file"))?;
         let refused = |problem: String| FileError::new(path, problem, EXPORT);
         // The runtime refuses what it knows to be wrong and panics at some of the rest.
         let loaded = catch_unwind(AssertUnwindSafe(|| Self::from_bytes(bytes)));

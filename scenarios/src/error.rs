@@ -2,20 +2,14 @@
 
 use std::io::ErrorKind;
 use std::path::Path;
+use storage::FileError;
 
 /// Why a lot cannot be loaded.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LoadError {
     /// The file cannot be read.
-    #[error("{file}: cannot be read: {problem}; {remedy}")]
-    Unreadable {
-        /// As given.
-        file: String,
-        /// What the operating system says.
-        problem: String,
-        /// What would make it readable.
-        remedy: &'static str,
-    },
+    #[error(transparent)]
+    Unreadable(#[from] FileError),
     /// The file is not a scenario, or a scenario that cannot be driven.
     #[error("{file}:{line}: {problem}; {remedy}")]
     Faulty {
@@ -95,13 +89,12 @@ pub(crate) fn line_at(text: &str, offset: usize) -> usize {
 
 /// The text of a file of at most this many bytes.
 pub(crate) fn read_text(path: &Path, bytes_max: u64) -> Result<String, LoadError> {
-    storage::read::text(path, bytes_max).map_err(|error| LoadError::Unreadable {
-        file: path.display().to_string(),
-        problem: error.to_string(),
-        remedy: match error.kind() {
+    storage::read::text(path, bytes_max).map_err(|error| {
+        let remedy = match error.kind() {
             ErrorKind::FileTooLarge => "name a smaller file",
             ErrorKind::InvalidData => "save it as UTF-8",
             _ => "check the path",
-        },
+        };
+        FileError::unreadable(path, &error, remedy).into()
     })
 }

@@ -72,9 +72,10 @@ pub struct MapLot {
     /// beside or below it.
     #[serde(default)]
     pub centre_line: Option<PathBuf>,
-    /// Clearance that a route found automatically keeps around the body, metres in the lot.
-    #[serde(default = "clearance_m")]
-    pub clearance_m: f32,
+    /// Clearance that a route found automatically keeps around the body, metres in the lot; by default
+    /// [`solver::CLEARANCE_M`]. A centre line is as near as it is drawn.
+    #[serde(default)]
+    pub clearance_m: Option<f32>,
     /// Height of what is not drivable, metres in the lot: above 0.15 it hides the ground behind it.
     #[serde(default = "wall_height_m")]
     pub wall_height_m: f32,
@@ -102,10 +103,6 @@ fn one() -> f64 {
 
 fn wall_height_m() -> f32 {
     WALL_HEIGHT_M
-}
-
-fn clearance_m() -> f32 {
-    solver::CLEARANCE_M
 }
 
 /// Whether a map is a TPCAP case, by its extension.
@@ -156,7 +153,7 @@ impl MapLot {
             goal: None,
             is_loop: false,
             centre_line: None,
-            clearance_m: clearance_m(),
+            clearance_m: None,
             wall_height_m: wall_height_m(),
             drop_specks_m2: 0.0,
             close_branches: false,
@@ -225,28 +222,28 @@ impl MapLot {
         };
         let mut scenario = self.outlines(&ground).with_obstacles(ground.obstacles);
         scenario.noise = self.noise.clone();
-        validate_ground(&scenario, vehicle).map_err(|error| self.in_lot(error))?;
+        validate_ground(&scenario, vehicle).map_err(|error| self.in_lot(error, frame))?;
         scenario.reference_path = match (centre_line, start) {
             (Some(points), _) => self.checked_centre_line(&points, frame, &scenario, vehicle)?,
             (None, Some(start)) => {
                 let start = frame.pose_in_lot(start);
                 let finish = goal.map_or(Finish::Start, |goal| Finish::At(frame.pose_in_lot(goal)));
-                route::find(&scenario, start, finish, vehicle, self.clearance_m)
+                route::find(&scenario, start, finish, vehicle, self.clearance_m())
                     .map_err(|reason| self.no_route(reason, frame, start, finish, vehicle))?
             }
             (None, None) => return Err(self.nothing_to_drive()),
         };
-        validate(&scenario, vehicle).map_err(|error| self.in_lot(error))?;
+        validate(&scenario, vehicle).map_err(|error| self.in_lot(error, frame))?;
         let in_map = |mouths: Vec<Vec2>| mouths.into_iter().map(|mouth| frame.in_map(mouth)).collect::<Vec<_>>();
         if self.close_branches {
             let mouths = in_map(branches::close(&mut scenario, vehicle));
             notes.extend((!mouths.is_empty()).then_some(Note::Closed { mouths }));
         }
-        let map = Map::build(scenario.clone(), vehicle).map_err(|error| self.in_lot(error))?;
+        let map = Map::build(scenario.clone(), vehicle).map_err(|error| self.in_lot(error, frame))?;
         let mouths = in_map(branches::find(&map, vehicle).into_iter().map(|branch| branch.mouth).collect());
         let is_asked_to_close = self.close_branches;
         notes.extend((!mouths.is_empty()).then_some(Note::Open { mouths, is_asked_to_close }));
-        Ok(Loaded { scenario, files, notes })
+        Ok(Loaded { scenario, files, notes, frame: frame.explained() })
     }
 
     fn check(&self) -> Result<(), LoadError> {
@@ -262,9 +259,9 @@ impl MapLot {
             );
             return Err(self.fault("scale", format!("it is {}", self.scale), &remedy));
         }
-        if !(0.0..=2.0).contains(&self.clearance_m) {
+        if let Some(clearance_m) = self.clearance_m.filter(|clearance_m| !(0.0..=2.0).contains(clearance_m)) {
             let remedy = "write a number of metres from 0 to 2";
-            return Err(self.fault("clearance_m", format!("it is {}", self.clearance_m), remedy));
+            return Err(self.fault("clearance_m", format!("it is {clearance_m}"), remedy));
         }
         if !(0.0..=5.0).contains(&self.wall_height_m) {
             let remedy = "write a number of metres from 0 to 5";
@@ -293,7 +290,15 @@ impl MapLot {
             let remedy = "leave it out: the route starts at the first point of the centre line";
             return Err(self.fault("start", "centre_line is given too".to_owned(), remedy));
         }
+        if self.centre_line.is_some() && self.clearance_m.is_some() {
+            let remedy = "leave it out: it is for routes that are found, and a centre line is driven as it is";
+            return Err(self.fault("clearance_m", "centre_line is given too".to_owned(), remedy));
+        }
         Ok(())
+    }
+
+    fn clearance_m(&self) -> f32 {
+        self.clearance_m.unwrap_or(solver::CLEARANCE_M)
     }
 
     fn name(&self) -> String {
@@ -374,7 +379,8 @@ impl MapLot {
                 let mut vertices = ground.boundary.len();
                 let mut islands = Vec::new();
                 for (i, (ring, step)) in inner.iter().zip(&mut steps).enumerate() {
-                    let island = self.sound_island(i, &ground.boundary, step, |step| outline(ring, step))?;
+                    let room = VERTICES_MAX.saturating_sub(vertices);
+                    let island = self.sound_island(i, room, &ground.boundary, step, |step| outline(ring, step))?;
                     vertices += island.len();
                     islands.push(island);
                     // The others need not be simplified any more: the lot is refused.
@@ -389,19 +395,24 @@ impl MapLot {
                 Err(error) => fault = Some(error),
             }
         }
-        Err(self.in_lot(fault.expect("there is a tolerance")))
+        Err(self.in_lot(fault.expect("there is a tolerance"), frame))
     }
 
-    /// An island with an outline as simple as it can be. `step`: how closely it is followed, and has to be.
+    /// An island with an outline as simple as it can be. `step`: how closely it is followed, and has to be. One that has more
+    /// vertices than there is `room` for is not checked: the lot is refused.
     fn sound_island(
         &self,
         index: usize,
+        room: usize,
         boundary: &[Vec2],
         step: &mut usize,
         outline: impl Fn(usize) -> Vec<Vec2>,
     ) -> Result<Vec<Vec2>, ScenarioError> {
         loop {
             let island = self.island(outline(*step));
+            if island.polygon.len() > room {
+                return Ok(island.polygon);
+            }
             match check_island(index, &island, boundary) {
                 Ok(()) => return Ok(island.polygon),
                 Err(error) if *step + 1 == contour::TOLERANCES_PX.len() => return Err(error),
@@ -494,12 +505,8 @@ impl MapLot {
     }
 
     /// An error of the lot made from the map.
-    fn in_lot(&self, ScenarioError { place, problem, remedy }: ScenarioError) -> LoadError {
-        let frame = if (self.scale - 1.0).abs() < f64::EPSILON {
-            String::new()
-        } else {
-            format!(" (coordinates are the map's times {})", self.scale)
-        };
+    fn in_lot(&self, ScenarioError { place, problem, remedy }: ScenarioError, frame: Frame) -> LoadError {
+        let frame = frame.explained().map_or_else(String::new, |frame| format!(" ({frame})"));
         self.fault(&place.to_string(), problem + &frame, &remedy)
     }
 
@@ -518,7 +525,7 @@ impl MapLot {
     }
 
     fn no_route(&self, reason: NoRoute, frame: Frame, start: Pose, finish: Finish, car: &VehicleSettings) -> LoadError {
-        let clearance_m = self.clearance_m;
+        let clearance_m = self.clearance_m();
         let blocked = |place: &str, pose: Pose| {
             let problem = format!(
                 "the car ({:.2} m × {:.2} m, and {clearance_m} m around it) does not stand free at {}",

@@ -39,7 +39,7 @@ pub fn load_with_notes(path: &Path, vehicle: &VehicleSettings) -> Result<Loaded,
         return MapLot::read(path)?.scenario(vehicle);
     }
     let scenario = scenario_of(&document, &text, &file, vehicle)?;
-    Ok(Loaded { scenario, files: vec![path.to_owned()], notes: Vec::new() })
+    Ok(Loaded { scenario, files: vec![path.to_owned()], notes: Vec::new(), frame: None })
 }
 
 fn names_a_map(document: &Document<&str>) -> bool {
@@ -53,7 +53,7 @@ fn names_a_map(document: &Document<&str>) -> bool {
 /// line of the key that says where the route ends.
 pub fn check_direction(
     path: &Path,
-    scenario: &Scenario,
+    Loaded { scenario, frame, .. }: &Loaded,
     direction: Direction,
     vehicle: &VehicleSettings,
 ) -> Result<(), LoadError> {
@@ -71,11 +71,12 @@ pub fn check_direction(
         let offset = if names_a_map(&document) { offset_of_finish(&document) } else { offset_of(&document, place) };
         offset.map(|offset| line_at(&text, offset))
     });
+    let frame = frame.as_ref().map_or_else(String::new, |frame| format!(" ({frame})"));
     // A map without a file beside it is itself the place.
     let file = if line.is_some() { &file } else { path };
     Err(LoadError::ForwardOnly {
         location: Location { file: file.display().to_string(), line },
-        problem: format!("{place}: {}", error.problem),
+        problem: format!("{place}: {}{frame}", error.problem),
         remedy: error.remedy,
     })
 }
@@ -288,13 +289,13 @@ mod tests {
         files.sort();
         assert!(files.len() >= 29, "{files:?}");
         for file in files {
-            let Loaded { scenario, notes, .. } = load_with_notes(&file, &car).unwrap_or_else(|error| panic!("{error}"));
+            let loaded = load_with_notes(&file, &car).unwrap_or_else(|error| panic!("{error}"));
             let is_open = |note: &Note| matches!(note, Note::Open { .. });
-            assert!(!notes.iter().any(is_open), "{}: {notes:?}", file.display());
-            let length_m = sim::path::Path::new(&scenario.reference_path).length_m();
+            assert!(!loaded.notes.iter().any(is_open), "{}: {:?}", file.display(), loaded.notes);
+            let length_m = sim::path::Path::new(&loaded.scenario.reference_path).length_m();
             assert!((80.0..=300.0).contains(&length_m), "{}: {length_m} m", file.display());
             for direction in Direction::BOTH {
-                assert_eq!(check_direction(&file, &scenario, direction, &car), Ok(()));
+                assert_eq!(check_direction(&file, &loaded, direction, &car), Ok(()));
             }
         }
     }

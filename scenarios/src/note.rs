@@ -12,6 +12,8 @@ pub struct Loaded {
     pub files: Vec<PathBuf>,
     /// Notes in order of the work; none for a lot written by hand.
     pub notes: Vec<Note>,
+    /// How its coordinates come from those of its map, in words; `None` if they are the same.
+    pub frame: Option<String>,
 }
 
 /// Something an import did, or found. Places are metres in the map's own frame.

@@ -35,7 +35,10 @@ impl FileError {
 /// be treated as missing.
 pub fn is_of_disk(error: &(dyn Error + 'static)) -> bool {
     let is_itself = error.downcast_ref::<FileError>().is_some_and(|error| error.is_of_disk)
-        || error.downcast_ref::<io::Error>().is_some_and(fails_by_disk);
+        || error.downcast_ref::<io::Error>().is_some_and(|error| {
+            // What it wraps is not its source.
+            fails_by_disk(error) || error.get_ref().is_some_and(|wrapped| is_of_disk(wrapped))
+        });
     is_itself || error.source().is_some_and(is_of_disk)
 }
 
@@ -61,6 +64,8 @@ mod tests {
         let unreadable = |code| FileError::unreadable(Path::new("a"), &io::Error::from_raw_os_error(code), "try again");
         assert!(is_of_disk(&unreadable(eio)) && !is_of_disk(&unreadable(enoent)));
         assert!(is_of_disk(&Caused(unreadable(eio))) && !is_of_disk(&Caused(unreadable(enoent))));
+        let wrapped = |code| io::Error::other(unreadable(code));
+        assert!(is_of_disk(&wrapped(eio)) && !is_of_disk(&wrapped(enoent)));
         assert!(!is_of_disk(&io::Error::other("it is a folder")));
         assert!(!is_of_disk(&FileError::new(Path::new("a"), "is damaged", "restore it")));
     }

@@ -24,6 +24,7 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
     let mut points: Vec<[f64; 2]> = Vec::new();
+    let commented = header_in_comment(text);
     for (i, record) in reader.records().enumerate() {
         let faulty = |line: usize, problem: String| LoadError::Faulty {
             file: file.to_owned(),
@@ -33,6 +34,12 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
         };
         let record = record.map_err(|error| faulty(i + 1, format!("not CSV: {error}")))?;
         let line = record.position().map_or(i + 1, |position| position.line() as usize);
+        if let (0, Some((line, header))) = (i, &commented)
+            && header.len() == record.len()
+            && let Some(problem) = misplaced(header)
+        {
+            return Err(faulty(*line, problem));
+        }
         let numbers: Vec<Option<f64>> = record.iter().take(2).map(|cell| cell.parse().ok()).collect();
         match numbers[..] {
             [Some(x), Some(y)] if x.abs() <= MAP_COORDINATE_MAX_M && y.abs() <= MAP_COORDINATE_MAX_M => {
@@ -67,6 +74,17 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
     Ok(points)
 }
 
+/// The last comment before the first point, and its line, if it can be a header: `numpy.savetxt` writes them so.
+fn header_in_comment(text: &str) -> Option<(usize, csv::StringRecord)> {
+    let before =
+        text.lines().map(str::trim).enumerate().take_while(|(_, line)| line.is_empty() || line.starts_with('#'));
+    let (i, comment) = before.filter(|(_, line)| !line.is_empty()).last()?;
+    let cells: csv::StringRecord = comment.trim_start_matches('#').split(',').map(str::trim).collect::<Vec<_>>().into();
+    // `x [m]`, but no sentence.
+    let is_header = cells.iter().all(|cell| (1..=2).contains(&cell.split_whitespace().count()));
+    is_header.then_some((i + 1, cells))
+}
+
 /// Names of columns in degrees: of latitudes, and of longitudes.
 const DEGREES: [&[&str]; 2] = [&["lat", "latitude"], &["lon", "lng", "longitude"]];
 
@@ -77,7 +95,7 @@ fn misplaced(header: &csv::StringRecord) -> Option<String> {
         let lower = header.get(column).unwrap_or_default().to_lowercase();
         lower.split(|char: char| !char.is_alphanumeric()).any(|word| known.contains(&word))
     };
-    let known = [("x", ["x", "easting"]), ("y", ["y", "northing"])];
+    let known = [("x", ["x", "easting", "east"]), ("y", ["y", "northing", "north"])];
     let has_both = DEGREES.iter().all(|names| (0..header.len()).any(|column| has(column, names)));
     let are_named = (0..).zip(known).all(|(column, (_, names))| has(column, &names));
     for (column, name) in header.iter().enumerate() {

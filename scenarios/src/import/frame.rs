@@ -43,6 +43,18 @@ impl Frame {
         [f64::from(x) / self.scale + self.origin[0], f64::from(y) / self.scale + self.origin[1]]
     }
 
+    /// What coordinates of the lot are to somebody who knows the map; `None` if they are the same.
+    pub(super) fn explained(&self) -> Option<String> {
+        let [x, y] = self.origin;
+        let is_scaled = (self.scale - 1.0).abs() >= f64::EPSILON;
+        match (self.is_recentred(), is_scaled) {
+            (false, false) => None,
+            (false, true) => Some(format!("coordinates are the map's times {}", self.scale)),
+            (true, false) => Some(format!("coordinates are the map's less ({x}, {y})")),
+            (true, true) => Some(format!("coordinates are the map's less ({x}, {y}), times {}", self.scale)),
+        }
+    }
+
     /// A point of the lot in the map, in words.
     pub(super) fn said(&self, point: Vec2) -> String {
         let [x, y] = self.in_map(point);

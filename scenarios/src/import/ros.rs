@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::io::{self, Cursor, ErrorKind};
 use std::path::{Path, PathBuf};
-use storage::read;
+use storage::{FileError, read};
 
 /// Modes `scale` and `raw`: drivable below this occupancy, per cent.
 const DRIVABLE_BELOW_PERCENT: f64 = 50.0;
@@ -117,6 +117,9 @@ impl Map {
                 ErrorKind::FileTooLarge => "crop it, or halve its resolution",
                 _ => "check the key image; paths start at the YAML file",
             };
+            if storage::is_of_disk(&error) {
+                return FileError::unreadable(&file, &error, remedy).into();
+            }
             fault(format!("cannot be read: {error}"), remedy)
         };
         if !read::is_below(folder, &file).map_err(unreadable)? && !is_image_anywhere {
@@ -290,16 +293,18 @@ const PIXEL_BYTES_MAX: u64 = 8;
 /// Bytes that an image may unpack to beside its pixels.
 const OTHER_BYTES_MAX: u64 = 4 << 20;
 
-/// Whether the header of a binary PGM or PPM ends with CRLF, of which a reader takes LF for the first byte of the raster.
+/// Whether the header of a binary PBM, PGM or PPM ends with CRLF, of which a reader takes LF for the first byte of the raster.
+/// Whatever lies behind the raster is not read.
 fn has_shifted_raster(file: &[u8]) -> bool {
-    let channels = match file {
-        [b'P', b'5', ..] => 1,
-        [b'P', b'6', ..] => 3,
+    let (numbers_in_header, channels) = match file {
+        [b'P', b'4', ..] => (2, 1),
+        [b'P', b'5', ..] => (3, 1),
+        [b'P', b'6', ..] => (3, 3),
         _ => return false,
     };
     let mut at = 2;
     let mut numbers = [0_usize; 3];
-    for number in &mut numbers {
+    for number in &mut numbers[..numbers_in_header] {
         loop {
             match file.get(at) {
                 Some(b'#') => at += file[at..].iter().take_while(|byte| **byte != b'\n').count(),
@@ -313,8 +318,8 @@ fn has_shifted_raster(file: &[u8]) -> bool {
     }
     let [width, height, brightest] = numbers;
     let bytes = if brightest > 255 { 2 } else { 1 };
-    let raster = width.saturating_mul(height).saturating_mul(bytes * channels);
-    file[at.min(file.len())..].starts_with(b"\r\n") && file.len() - at == raster.saturating_add(2)
+    let row = if numbers_in_header == 2 { width.div_ceil(8) } else { width.saturating_mul(bytes * channels) };
+    file[at.min(file.len())..].starts_with(b"\r\n") && file.len() - at >= row.saturating_mul(height).saturating_add(2)
 }
 
 /// The image in the bytes of a file, or what is wrong with it, and the remedy.
@@ -418,8 +423,12 @@ mod tests {
         assert_eq!(decode(&image("P5\n# by hand\n2 2\n255\n")).unwrap().to_luma8().into_raw(), [0, 255, 255, 0]);
         // As a single white space, CR is as good as LF.
         assert_eq!(decode(&image("P5 2 2 255\r")).unwrap().to_luma8().into_raw(), [0, 255, 255, 0]);
-        let (problem, _) = decode(&image("P5\r\n# by hand\r\n2 2\r\n255\r\n")).unwrap_err();
-        assert!(problem.contains("CRLF"), "{problem}");
+        let shifted = image("P5\r\n# by hand\r\n2 2\r\n255\r\n");
+        // What lies behind the raster changes nothing; of a bitmap, four rows of a byte each.
+        for file in [&shifted, &[&shifted[..], b"\n"].concat(), &image("P4\r\n8 4\r\n")] {
+            let (problem, _) = decode(file).unwrap_err();
+            assert!(problem.contains("CRLF"), "{problem}");
+        }
     }
 
     /// Rows run down in the image and up in the mask; pixels and points are each other's inverse.

@@ -1,7 +1,7 @@
 //! Maps small enough to know their outlines by heart, and every way in which a map can be wrong.
 
 use super::*;
-use crate::load::{check_direction, load};
+use crate::load::{check_direction, load, load_with_notes};
 use sim::scenario::Direction;
 use std::f64::consts::FRAC_PI_2;
 
@@ -221,6 +221,10 @@ fn a_centre_line_must_have_room_for_the_car() {
         ("heading,X [m],Y [m]\n0,5.0,3.5\n0,45.0,3.5\n", "\"X [m]\" in column 2; x is read from column 1"),
         ("pos_y,pos_x\n3.5,5.0\n3.5,45.0\n", "\"pos_y\" in column 1; y is read from column 2"),
         ("lat,lon\n5.0,3.5\n45.0,3.5\n", "\"lat\", which is in degrees"),
+        ("north_m,east_m\n3.5,5.0\n3.5,45.0\n", "\"north_m\" in column 1; y is read from column 2"),
+        // As numpy.savetxt writes a header; what it says was not looked at.
+        ("# by hand, twice\n# y,x\n3.5,5.0\n3.5,45.0\n", "line.csv:2: the header has \"y\" in column 1"),
+        ("# s_m,x_m,y_m\n0.0,5.0,3.5\n40.0,45.0,3.5\n", "line.csv:1: the header has \"x_m\" in column 2"),
         ("x,y\n5.0,3.5\n", "line.csv: centre line: the line has 1 points; give at least"),
     ] {
         let message = refusal(&with_line("line-faulty", 5, line));
@@ -273,14 +277,16 @@ fn a_map_that_cannot_be_driven_in_reverse_is_refused_with_the_line_of_its_route(
     let lot = lane("reverse", 5);
     let file = lot.map.with_file_name("map.lot.toml");
     std::fs::write(lot.map.with_file_name("line.csv"), "5, 3.5\n58, 3.5\n").unwrap();
-    std::fs::write(&file, "map = 'map.yaml'\n\ncentre_line = 'line.csv'\n").unwrap();
-    for named in [&file, &lot.map] {
-        let scenario = load(named, &car()).unwrap();
-        assert_eq!(check_direction(named, &scenario, Direction::Forward, &car()), Ok(()));
-        let error = check_direction(named, &scenario, Direction::Reverse, &car()).unwrap_err().to_string();
-        let expected =
-            format!("{}:3: the lot cannot be driven in reverse: reference_path, point 2: the car", file.display());
-        assert!(error.starts_with(&expected), "{error}");
+    for (scale, frame) in [("1", ""), ("1.1", "(coordinates are the map's times 1.1)")] {
+        std::fs::write(&file, format!("map = 'map.yaml'\nscale = {scale}\ncentre_line = 'line.csv'\n")).unwrap();
+        for named in [&file, &lot.map] {
+            let loaded = load_with_notes(named, &car()).unwrap();
+            assert_eq!(check_direction(named, &loaded, Direction::Forward, &car()), Ok(()));
+            let error = check_direction(named, &loaded, Direction::Reverse, &car()).unwrap_err().to_string();
+            let expected =
+                format!("{}:3: the lot cannot be driven in reverse: reference_path, point 2: the car", file.display());
+            assert!(error.starts_with(&expected) && error.contains(frame), "{error}");
+        }
     }
 }
 
@@ -453,6 +459,7 @@ fn a_map_far_from_its_origin_is_the_same_lot_about_its_start() {
     let mut far = fine_lane("far", |x, y| (300..310).contains(&x) && y < 12);
     std::fs::write(&far.map, yaml("0.1", "[4431992.0, 5412997.4, 0.0]")).unwrap();
     (far.start, far.goal) = (Some([4_432_000.0, 5_413_000.0, 0.0]), Some([4_432_034.0, 5_413_000.0, 0.0]));
+    let mut far_file = far.clone();
     let (near, far) = (near.scenario(&car()).unwrap(), far.scenario(&car()).unwrap());
     assert_eq!(near.notes, []);
     assert_eq!(far.notes, [Note::Recentred { origin: [4_432_000.0, 5_413_000.0] }]);
@@ -463,6 +470,12 @@ fn a_map_far_from_its_origin_is_the_same_lot_about_its_start() {
     }
     let said = far.notes[0].to_string();
     assert_eq!(said, "the map is far from its origin; (0, 0) of the lot is (4432000, 5413000) of the map");
+    // An error named a place that nobody could find on the map.
+    let line = far_file.map.with_file_name("line.csv");
+    std::fs::write(&line, "4431993.1,5413000\n4432034,5413000\n").unwrap();
+    (far_file.start, far_file.goal, far_file.centre_line) = (None, None, Some(line));
+    let error = far_file.scenario(&car()).unwrap_err().to_string();
+    assert!(error.contains("(coordinates are the map's less (4431993, 5413000))"), "{error}");
 }
 
 #[test]
@@ -643,6 +656,9 @@ fn unknown_ground_that_counts_as_free_is_named_in_a_note() {
 fn a_first_line_with_a_number_in_it_is_no_header() {
     let points_of = |text: &str| centre_line::parse(text, "line.csv", 1.0).map(|points| points.len());
     assert_eq!(points_of("x,y\n1,2\n3,4\n").unwrap(), 2);
+    for comment in ["# x [m], y [m]", "# along the y-axis of the yard, then along x", "# y,x,v", "# y\n#"] {
+        assert_eq!(points_of(&format!("{comment}\n1,2\n3,4\n")).unwrap(), 2, "{comment}");
+    }
     for text in ["-15.O,-13.2\n1,2\n3,4\n", "1,y\n1,2\n3,4\n", "8;12\n20,12\n40,12\n", "8 12\n1,2\n3,4\n"] {
         assert!(points_of(text).unwrap_err().to_string().contains("is not a point"), "{text}");
     }

@@ -167,14 +167,15 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
     let mut lot = MapLot::read(path)?;
     lot.scale = scale.unwrap_or(lot.scale);
     lot.is_image_anywhere = *image_anywhere;
-    lot.clearance_m = clearance.unwrap_or(lot.clearance_m);
     lot.close_branches |= close_branches;
     // Where it goes, by the flags, or by the file.
     if goal.is_some() || *is_loop || centre_line.is_some() {
         (lot.goal, lot.is_loop, lot.centre_line) = (*goal, *is_loop, centre_line.clone());
         lot.start = lot.start.filter(|_| centre_line.is_none());
+        lot.clearance_m = lot.clearance_m.filter(|_| centre_line.is_none());
     }
     lot.start = start.or(lot.start);
+    lot.clearance_m = clearance.or(lot.clearance_m);
     // An error names the file, in which something else may stand.
     Ok(vec![Lot::of_map(path, &lot, vehicle).context("with the flags that are given")?])
 }
