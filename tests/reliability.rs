@@ -140,6 +140,13 @@ fn what_is_read_is_never_deleted_or_written_into_however_it_is_named() {
     for file in std::fs::read_dir(folder.join("run/round-00")).unwrap().map(Result::unwrap) {
         std::fs::copy(file.path(), folder.join("network").join(file.file_name())).unwrap();
     }
+    for (arguments, out) in [(&of_run[..], "by-run"), (&evaluate[..], "by-expert")] {
+        succeed(xtask().current_dir(&folder).args(arguments).args(["--out", out]));
+    }
+    for shard in ["1/2", "2/2"] {
+        let out = format!("shard-{}", &shard[..1]);
+        succeed(xtask().current_dir(&folder).args(&of_run).args(["--shard", shard, "--out", &out]));
+    }
     let before = files(&folder);
     let refuses = |arguments: &[&str], part: &str| {
         let error = refuse(xtask().current_dir(&folder).args(arguments));
@@ -149,6 +156,12 @@ fn what_is_read_is_never_deleted_or_written_into_however_it_is_named() {
     };
     refuses(&[&of_run[..], &["--out", "none/../run", "--overwrite"]].concat(), "leads back up");
     refuses(&[&of_run[..], &["--out", "run", "--overwrite"]].concat(), "what is read lies there");
+    for merged in [["shard-1", "shard-2"], ["by-run", "by-expert"]] {
+        for out in ["run", merged[1]] {
+            refuses(&["merge", merged[0], merged[1], "--out", out, "--overwrite"], "what is read lies there");
+        }
+    }
+    refuses(&["render", "report", "by-run", "--out", "run", "--overwrite"], "lies within the run");
     refuses(&[&evaluate[..], &["--out", "run/elsewhere"]].concat(), "lies within the run");
     let within = refuse(xtask().current_dir(folder.join("run")).args(evaluate));
     assert!(within.contains("lies within the run"), "its next free folder would be run/runs/…: {within}");

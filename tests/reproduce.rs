@@ -221,11 +221,11 @@ fn shards_of_trainings_and_of_drives_come_to_the_bytes_of_one_machine() {
     let content = std::fs::read(&damaged).unwrap();
     std::fs::write(&damaged, &content[1..]).unwrap();
     let out = run.to_string_lossy();
-    refused(&["merge", "--overwrite", "--out", &one.to_string_lossy()], &[one, &trained[1]], "what is read lies there");
     refused(&["merge", "--out", &out], &[&one.join("chains/s1-weighted")], "this is not a shard");
     refused(&["merge", "--out", &out], &[one, &trained[1]], "model.safetensors: is damaged");
     assert!(!run.exists());
     std::fs::write(&damaged, content).unwrap();
+    refused(&["merge", "--overwrite", "--out", &one.to_string_lossy()], &[one, &trained[1]], "what is read lies there");
     succeed(xtask().arg("merge").args(&trained).arg("--out").arg(&run));
     // A merge that died continues, and does nothing twice.
     std::fs::rename(run.join("chains/s1-alpha-15"), run.join("chains/s1-alpha-15.lotpilot-partial")).unwrap();

@@ -4,7 +4,7 @@ use crate::incidents;
 use crate::plan::Plan;
 use crate::records::{self, Driven, FailureRecord, RunRecord};
 use crate::results::EvaluationResults;
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use experiment::trials::Trial;
 use sim::scenario::Direction;
 use std::collections::BTreeMap;
@@ -14,11 +14,21 @@ impl EvaluationResults {
     /// Reads `runs.jsonl` and `failures.jsonl` of a folder: the same results as after driving the plan.
     ///
     /// # Errors
-    /// If a file is missing or damaged, or was not written by this plan.
+    /// If a file is missing or damaged, or was not written by this plan, by all of it.
     pub fn read(plan: &Plan<'_>, folder: &Path) -> anyhow::Result<Self> {
         let mut results = Self::new(plan);
         let places = Places::new(plan);
-        records::each_line(&folder.join(records::RUNS), |run| results.take_run(&places, &run))?;
+        let mut runs = 0;
+        records::each_line(&folder.join(records::RUNS), |run| {
+            runs += 1;
+            results.take_run(&places, &run)
+        })?;
+        let asked_for = places.trials.len() * plan.drivers.len() * plan.settings.evaluation.noise.len();
+        ensure!(
+            runs == asked_for,
+            "{}: {runs} runs of the {asked_for} that belong there: it is another evaluation; move it elsewhere, and drive again",
+            folder.display()
+        );
         records::each_line(&folder.join(records::FAILURES), |failure| results.take_failure(&places, &failure))?;
         Ok(results)
     }

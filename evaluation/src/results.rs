@@ -169,7 +169,7 @@ impl EvaluationResults {
     }
 
     /// Mean over (lot, direction) of the rate per 100 m and of the safe ratio, all with the same weight whatever their
-    /// length: the paper's "mean".
+    /// length: the paper's "mean". All generated lots of a kind count as one.
     pub fn unweighted(&self, level: usize, driver: usize, slice: &Slice) -> [f64; 2] {
         let cells = self.drivers[level][driver].totals.iter().filter(|((group, _), _)| slice.contains(*group));
         let (mut n, mut rate, mut safe_ratio) = (0, 0.0, 0.0);

@@ -232,7 +232,7 @@ impl Shards {
     /// Refuses another run than theirs: what they did would not be part of it. `remedy`: what to do then.
     ///
     /// # Errors
-    /// If settings, lots or the version of lotpilot are others.
+    /// If settings, lots, other files that are read, or the version of lotpilot are others.
     pub fn check_are_of(
         &self,
         run: &Path,
@@ -245,11 +245,13 @@ impl Shards {
             && manifest.arguments == own.arguments
             && manifest.target == own.target
             && manifest.program == own.program
+            // Shards of drives read networks besides.
+            && manifest.inputs.iter().all(|(name, digest)| own.inputs.get(name) == Some(digest))
             // A program outside of its checkout, as nodes of a cluster are sent it, does not know its revision.
             && manifest.git_revision.iter().all(|revision| own.git_revision.iter().all(|other| revision == other));
         ensure!(
             is_theirs,
-            "{}: its settings, lots or version of lotpilot are not those of the shards, so they are not part of it; \
+            "{}: its settings, lots, files or version of lotpilot are not those of the shards, so they are not part of it; \
              {remedy}",
             run.display()
         );

@@ -6,7 +6,7 @@ use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
 use sim::limits::RUN_TOML_BYTES_MAX;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use storage::sums;
 
 /// The file of a [`Manifest`].
@@ -26,6 +26,8 @@ pub struct Request {
     pub arguments: toml::Table,
     /// Lots, parameters and networks from files.
     pub inputs: Inputs,
+    /// Every file and folder that is read: no run may take their place.
+    pub reads: Vec<PathBuf>,
 }
 
 /// What made a run: `manifest.toml`.
@@ -145,6 +147,11 @@ pub struct Build {
     pub libraries: Vec<String>,
 }
 
+/// Whether products of networks are added without being rounded before.
+fn rounds_once(processor_features: &[String]) -> bool {
+    ["avx2", "fma"].iter().all(|&name| processor_features.iter().any(|it| it == name))
+}
+
 /// Architecture and operating system.
 fn target() -> String {
     format!("{}-{}", std::env::consts::ARCH, std::env::consts::OS)
@@ -214,10 +221,12 @@ impl Manifest {
     /// Whether networks compute the same bits where this run and another were made: their products round once with AVX2 and
     /// FMA, and twice without.
     pub fn rounds_like(&self, other: &Self) -> bool {
-        let has = |manifest: &Self| {
-            ["avx2", "fma"].iter().all(|&name| manifest.processor_features.iter().any(|it| it == name))
-        };
-        has(self) == has(other)
+        rounds_once(&self.processor_features) == rounds_once(&other.processor_features)
+    }
+
+    /// [`rounds_like`](Self::rounds_like), here and now.
+    pub fn rounds_like_here(&self, build: &Build) -> bool {
+        rounds_once(&self.processor_features) == rounds_once(&build.processor_features)
     }
 
     /// Whether a program made this run: by name, version, revision and changes to it.

@@ -64,13 +64,14 @@ impl RunDir {
     /// Claims a folder with settings and manifest: it is a run from the moment in which both are listed.
     ///
     /// # Errors
-    /// If the folder is taken, in use by another process, or cannot be written.
+    /// If the folder is taken, in use by another process, cannot be written, or is, holds or lies within what is read.
     pub fn create(place: &Place<'_>, settings: &Settings, request: &Request) -> anyhow::Result<Self> {
         ensure_outside_of_runs(place.out.unwrap_or(Path::new(RUNS)))?;
+        place.out.map_or(Ok(()), |out| ensure_apart(out, &request.reads))?;
         Self::create_anywhere(place, settings, request)
     }
 
-    /// Like [`create`](Self::create), within a run as well.
+    /// Like [`create`](Self::create), within a run, or around what is read, as well.
     fn create_anywhere(place: &Place<'_>, settings: &Settings, request: &Request) -> anyhow::Result<Self> {
         let manifest = toml::to_string(&Manifest::new(place.build, [place.command, place.preset], settings, request))
             .expect("a manifest is plain values");
@@ -330,6 +331,22 @@ impl RunDir {
         }
         Ok(())
     }
+}
+
+/// Refuses a folder that is, holds or lies within what is read: to overwrite it would delete what is needed.
+fn ensure_apart(out: &Path, reads: &[PathBuf]) -> anyhow::Result<()> {
+    let place_of = |path: &Path| storage::place_of(path).with_context(|| path.display().to_string());
+    let place = place_of(out)?;
+    for read in reads {
+        let other = place_of(read)?;
+        ensure!(
+            !place.starts_with(&other) && !other.starts_with(&place),
+            "--out {}: what is read lies there, or around it: {}; choose another --out",
+            out.display(),
+            read.display()
+        );
+    }
+    Ok(())
 }
 
 /// Refuses a folder or file within a run: the run would no longer hold only its own files.

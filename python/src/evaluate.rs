@@ -84,7 +84,8 @@ pub(crate) fn merge(
     let failure = Failure::default();
     let watch = Watch { failure: failure.clone() };
     let work = || {
-        let asked = Asked::new(drivers, &trials, settings, &failure)?;
+        let mut asked = Asked::new(drivers, &trials, settings, &failure)?;
+        asked.reads.extend_from_slice(&shards);
         let shards = Shards::read(&shards)?;
         let is_asked_for =
             *shards.settings() == asked.settings && shards.manifest().arguments == asked.arguments(None)?;
@@ -108,6 +109,8 @@ struct Asked {
     lots: Vec<Lot>,
     compare_with: usize,
     methods: Methods,
+    /// Files and folders that are read.
+    reads: Vec<PathBuf>,
 }
 
 impl Asked {
@@ -117,7 +120,9 @@ impl Asked {
         settings: SettingsFrom,
         failure: &Failure,
     ) -> anyhow::Result<Self> {
-        let settings = settings_of(&drivers, settings.into(), trials)?;
+        let layers = Layers::from(settings);
+        let config = layers.file.clone();
+        let settings = settings_of(&drivers, layers, trials)?;
         let loaded = drivers.into_iter().map(|(name, driver)| match driver {
             Named::Spec(spec) => {
                 let spec: DriverSpec = spec.parse()?;
@@ -138,7 +143,8 @@ impl Asked {
             None => Some(0),
         };
         let compare_with = compare_with.context("compare_with: name one of the drivers")?;
-        Ok(Self { settings, drivers, lots, compare_with, methods })
+        let reads = inputs::places(&lots, &drivers).into_iter().chain(config).collect();
+        Ok(Self { settings, drivers, lots, compare_with, methods, reads })
     }
 
     /// Warns with the notes about the lots.
@@ -199,7 +205,8 @@ impl Asked {
             seed: self.settings.evaluation.seed.0,
         };
         let arguments = self.arguments(ShardRecord::of(plan)?)?;
-        RunDir::create(&place, &self.settings, &Request { arguments, inputs: inputs::of(&self.lots, &self.drivers) })
+        let (inputs, reads) = (inputs::of(&self.lots, &self.drivers), self.reads.clone());
+        RunDir::create(&place, &self.settings, &Request { arguments, inputs, reads })
     }
 
     /// Drives what is not driven yet, and writes the tables unless it is a shard.

@@ -1,6 +1,5 @@
 //! Arguments that several commands share.
 
-use anyhow::{Context as _, ensure};
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use experiment::run_dir::Place;
@@ -84,25 +83,6 @@ pub(crate) struct OutArgs {
 }
 
 impl OutArgs {
-    /// Refuses an `--out` that is, holds or lies within a folder or file that is read: `--overwrite` would delete what is
-    /// needed.
-    pub(crate) fn ensure_apart_from<P: AsRef<Path>>(&self, read: impl IntoIterator<Item = P>) -> anyhow::Result<()> {
-        let Some(out) = &self.out else { return Ok(()) };
-        let place_of = |path: &Path| storage::place_of(path).with_context(|| path.display().to_string());
-        let place = place_of(out).context("--out")?;
-        for folder in read {
-            let folder = folder.as_ref();
-            let other = place_of(folder)?;
-            ensure!(
-                !place.starts_with(&other) && !other.starts_with(&place),
-                "--out {}: what is read lies there, or around it: {}; choose another --out",
-                out.display(),
-                folder.display()
-            );
-        }
-        Ok(())
-    }
-
     /// The folder that is asked for.
     pub(crate) fn place<'a>(&'a self, command: &'a str, preset: &'a str, seed: u64) -> Place<'a> {
         Place {

@@ -35,7 +35,7 @@ fn changes() -> Option<&'static str> {
 /// Another commit of the same version, which may differ only in its documents, and other changes to it are reported.
 ///
 /// # Errors
-/// If the run was begun by another version, or with other libraries.
+/// If the run was begun by another version, with other libraries, or where networks round otherwise.
 pub(crate) fn check_can_go_on(run: &Path, manifest: &Manifest, output: &Output) -> anyhow::Result<()> {
     let Build { program, libraries, git_revision, git_changes, .. } = get();
     ensure!(
@@ -44,6 +44,12 @@ pub(crate) fn check_can_go_on(run: &Path, manifest: &Manifest, output: &Output) 
          begin again into another folder",
         run.display(),
         manifest.program
+    );
+    ensure!(
+        manifest.is_of_this_target() && manifest.rounds_like_here(get()),
+        "{0}: begun on a machine that rounds otherwise ({0}/manifest.toml has its target and processor_features), and a run is of \
+         one kind; continue it there, or begin again into another folder",
+        run.display()
     );
     if let (Some(begun), Some(now)) = (&manifest.git_revision, git_revision)
         && begun != now

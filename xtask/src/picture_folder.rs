@@ -2,6 +2,7 @@
 
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
+use experiment::run_dir;
 use report::pictures::drawing::Drawing;
 use report::pictures::file_name;
 use std::path::{Path, PathBuf};
@@ -38,6 +39,7 @@ impl Folder<'_> {
     }
 
     pub(crate) fn check_file(&self, path: &Path) -> anyhow::Result<()> {
+        run_dir::ensure_outside_of_runs(path).context("--out")?;
         ensure!(
             self.overwrite || !path.exists(),
             "{}: exists already; choose another --out, or replace it with --overwrite",

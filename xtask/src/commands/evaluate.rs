@@ -26,7 +26,7 @@ use experiment::shard::Shard;
 use scenarios::LoadError;
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub(crate) const COMMAND: &str = "evaluate";
 
@@ -164,8 +164,6 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: asked.compare_with, shard };
     check(&plan)?;
     let inputs = inputs::of(&lots, &drivers);
-    let places = inputs::places(&lots, &drivers);
-    args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
     let run = match begun {
         Ok((run, manifest)) => {
             manifest.check_inputs(&inputs)?;
@@ -173,7 +171,9 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
         }
         Err(preset) => {
             asked.shard = ShardRecord::of(&plan)?;
-            let request = Request { arguments: toml::Table::try_from(&asked)?, inputs };
+            let mut reads = inputs::places(&lots, &drivers);
+            reads.extend(args.layers.file().map(Path::to_owned));
+            let request = Request { arguments: toml::Table::try_from(&asked)?, inputs, reads };
             RunDir::create(&args.out.place(COMMAND, &preset, settings.evaluation.seed.0), &settings, &request)?
         }
     };

@@ -4,6 +4,7 @@
 use crate::args::{JsonArgs, OutArgs};
 use crate::build_info;
 use crate::commands::evaluate::{self, Asked, MethodArgs};
+use crate::commands::trainings::AskedFor;
 use crate::commands::{deviations, perform, reproduce, rules, scaling};
 use crate::console::Console;
 use crate::interrupt;
@@ -15,9 +16,9 @@ use evaluation::evaluations::Evaluations;
 use evaluation::parts::Rows;
 use evaluation::plan::Plan;
 use evaluation::shards::{self, Shards};
-use evaluation::stages::{self, Stage, Step};
+use evaluation::stages::{self, Step};
 use experiment::drivers::{DriverSpec, NamedDriver};
-use experiment::inputs::{self, Inputs};
+use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::manifest::{Build, Manifest, Request};
 use experiment::run_dir::{Place, RunDir};
@@ -50,8 +51,15 @@ pub(crate) struct MergeArgs {
     out: OutArgs,
 }
 
+impl MergeArgs {
+    /// Everything that is read: the folders that are merged, and these places.
+    fn with_folders(&self, mut places: Vec<PathBuf>) -> Vec<PathBuf> {
+        places.extend_from_slice(&self.folders);
+        places
+    }
+}
+
 pub(crate) fn run(args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
-    args.out.ensure_apart_from(&args.folders)?;
     if !shards::is_shard(&args.folders[0])? {
         return evaluations(&Evaluations::read(&args.folders)?, args, output);
     }
@@ -91,7 +99,11 @@ fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Res
     manifest.check_inputs(&inputs::of(&lots, &drivers))?;
     let plan = Plan { settings, drivers: &drivers, lots: &lots, compare_with: asked.compare_with, shard: None };
     let rows = shards.rows(&plan)?;
-    let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
+    let request = Request {
+        arguments: manifest.arguments.clone(),
+        inputs: manifest.inputs.clone(),
+        reads: args.with_folders(inputs::places(&lots, &drivers)),
+    };
     let seed = settings.evaluation.seed.0;
     let (build, place) = (made_by(manifest), args.out.place(evaluate::COMMAND, &manifest.preset, seed));
     let run = RunDir::create(&Place { build: &build, ..place }, settings, &request)?;
@@ -112,7 +124,8 @@ fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> 
     evaluate::check(&plan)?;
     let rows = evaluations.rows(&plan)?;
     let asked = Asked { drivers: named, compare_with, methods, shard: None };
-    let request = Request { arguments: toml::Table::try_from(&asked)?, inputs };
+    let reads = args.with_folders(inputs::places(&lots, &drivers));
+    let request = Request { arguments: toml::Table::try_from(&asked)?, inputs, reads };
     let made = evaluations.manifest();
     let build = made_by(made);
     let place = args.out.place(evaluate::COMMAND, &made.preset, settings.evaluation.seed.0);
@@ -149,8 +162,8 @@ fn put_together(plan: &Plan<'_>, rows: &Rows, run: &RunDir, args: &MergeArgs, ou
     evaluate::finish(plan, run, &Console::new(output), output)
 }
 
-/// What the shards are shares of: all stages, and the files that they read.
-fn asked_for(shards: &Shards) -> anyhow::Result<(Vec<Stage>, Inputs)> {
+/// What the shards are shares of, whole.
+fn asked_for(shards: &Shards) -> anyhow::Result<AskedFor> {
     let (settings, manifest) = (shards.settings(), shards.manifest());
     match manifest.command.as_str() {
         reproduce::COMMAND => reproduce::asked_for(settings, manifest),
@@ -165,7 +178,8 @@ fn asked_for(shards: &Shards) -> anyhow::Result<(Vec<Stage>, Inputs)> {
 fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, manifest) = (shards.settings(), shards.manifest());
     let command = manifest.command.as_str();
-    let (stages, inputs) = asked_for(shards).with_context(|| args.folders[0].display().to_string())?;
+    let AskedFor { stages, inputs, reads } =
+        asked_for(shards).with_context(|| args.folders[0].display().to_string())?;
     manifest.check_inputs(&inputs)?;
     let trained = shards.stages(&stages)?;
     let run = match &args.out.out {
@@ -176,7 +190,11 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
             run
         }
         _ => {
-            let request = Request { arguments: manifest.arguments.clone(), inputs: manifest.inputs.clone() };
+            let request = Request {
+                arguments: manifest.arguments.clone(),
+                inputs: manifest.inputs.clone(),
+                reads: args.with_folders(reads),
+            };
             // It is made as its shards are, except for the share: so a report says what was asked for.
             let build = Build { command_line: whole_command(&manifest.command_line), ..made_by(manifest) };
             let place = args.out.place(command, &manifest.preset, settings.seed.0);

@@ -179,7 +179,8 @@ fn request_of(stage: &Stage) -> anyhow::Result<Request> {
     {
         record.add_to(&mut arguments);
     }
-    Ok(Request { arguments, inputs })
+    // It lies within its run, which was kept apart from what is read.
+    Ok(Request { arguments, inputs, reads: Vec::new() })
 }
 
 /// Copies behaviour cloning from a finished chain: complete or not at all.

@@ -1,6 +1,7 @@
 //! `reproduce`: the paper in a box. Trains, drives and writes one report; every stage has a folder of its own and is
 //! skipped where it is finished already.
 
+use super::trainings::AskedFor;
 use super::{perform, train};
 use crate::args::{LayerArgs, OutArgs, lot_name, run_folder};
 use crate::build_info;
@@ -161,10 +162,10 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
         tuned: tuned(args.tuned.as_deref())?,
     };
     // Before the folder is claimed: a misspelt lot should not leave one behind.
-    let mut places = train::check_lots(&settings, output)?;
-    places.extend(train::check_unseen(&settings, &extent.unseen)?);
-    places.extend(args.tuned.clone());
-    args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
+    train::check_lots(&settings, output)?;
+    train::check_unseen(&settings, &extent.unseen)?;
+    let mut reads = places(&settings, &extent)?;
+    reads.extend(args.layers.file().map(Path::to_owned));
     ensure!(
         settings.seed.0.checked_add(extent.seeds).is_some_and(|last| i64::try_from(last).is_ok()),
         "seed {} leaves no room for {} trainings; choose a smaller one",
@@ -180,7 +181,7 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
         |number| ShardRecord::of_stages(number, None, &settings, stages::all(&settings, &extent, Path::new("")));
     let shard = args.shard.map(record);
     let inputs = inputs(&settings, &extent)?;
-    create(args, &preset, settings, Arguments { extent, shard }, inputs)
+    create(args, &preset, settings, Arguments { extent, shard }, (inputs, reads))
 }
 
 /// Begins a share of what the networks of a run drive.
@@ -189,11 +190,10 @@ fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir
     let networks: PathBuf = networks.components().collect();
     let name = networks.display();
     ensure!(sums::exists(&networks)?, "--networks {name}: this is not a run; cargo xtask reproduce makes one");
-    args.out.ensure_apart_from([&networks])?;
     let manifest = Manifest::read(&networks)?;
     let (settings, preset) = (trained::settings_of(&networks)?, manifest.preset.clone());
     ensure!(manifest.command == COMMAND, "--networks {name}: this is a run of {}", manifest.command);
-    let Arguments { extent, shard } = Arguments::read(&networks, manifest)?;
+    let Arguments { extent, shard } = Arguments::read(&networks, manifest.clone())?;
     ensure!(
         shard.is_none(),
         "--networks {name}: this is a shard; put all of them together first with cargo xtask merge RUN..."
@@ -207,9 +207,13 @@ fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir
             stage.folder
         );
     }
+    // What its networks were trained with.
+    manifest.check_inputs(&inputs(&settings, &extent)?)?;
     let inputs = inputs_of_drives(&settings, &extent, &stages)?;
+    let mut reads = places(&settings, &extent)?;
+    reads.push(networks.clone());
     let shard = args.shard.map(|number| ShardRecord::of_stages(number, Some(networks), &settings, stages));
-    create(args, &preset, settings, Arguments { extent, shard }, inputs)
+    create(args, &preset, settings, Arguments { extent, shard }, (inputs, reads))
 }
 
 fn create(
@@ -217,10 +221,10 @@ fn create(
     preset: &str,
     settings: Settings,
     arguments: Arguments,
-    inputs: Inputs,
+    (inputs, reads): (Inputs, Vec<PathBuf>),
 ) -> anyhow::Result<(RunDir, Settings, Arguments)> {
     let place = args.out.place(COMMAND, preset, settings.seed.0);
-    let run = RunDir::create(&place, &settings, &Request { arguments: arguments.to_table()?, inputs })?;
+    let run = RunDir::create(&place, &settings, &Request { arguments: arguments.to_table()?, inputs, reads })?;
     Ok((run, settings, arguments))
 }
 
@@ -257,10 +261,14 @@ fn resume(path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, Arg
     Ok((run, settings, arguments))
 }
 
-/// All stages of what a manifest, without the record of a shard, asks for, and the files that its trainings read.
-pub(crate) fn asked_for(settings: &Settings, manifest: &Manifest) -> anyhow::Result<(Vec<Stage>, Inputs)> {
+/// What a manifest, without the record of a shard, asks for: of the files, those that its trainings read.
+pub(crate) fn asked_for(settings: &Settings, manifest: &Manifest) -> anyhow::Result<AskedFor> {
     let extent = extent_of(manifest)?;
-    Ok((stages::all(settings, &extent, Path::new("")), inputs(settings, &extent)?))
+    Ok(AskedFor {
+        stages: stages::all(settings, &extent, Path::new("")),
+        inputs: inputs(settings, &extent)?,
+        reads: places(settings, &extent)?,
+    })
 }
 
 /// The lots, parameters and networks from files that a share of the drives reads.
@@ -280,6 +288,13 @@ fn inputs(settings: &Settings, extent: &Extent) -> anyhow::Result<Inputs> {
     let unseen = Lot::parse_all(&extent.unseen, &settings.episode.vehicle)?;
     let tuned = NamedDriver::load_all(&extent.tuned, settings)?;
     found.extend(inputs::of(&unseen, &tuned));
+    Ok(found)
+}
+
+/// The files that [`inputs`] are of.
+fn places(settings: &Settings, extent: &Extent) -> anyhow::Result<Vec<PathBuf>> {
+    let mut found = train::places(settings, &extent.unseen)?;
+    found.extend(DriverSpec::parse_all(&extent.tuned)?.iter().flat_map(DriverSpec::places).map(PathBuf::from));
     Ok(found)
 }
 

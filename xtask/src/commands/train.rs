@@ -103,11 +103,12 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         settings.name_lots_one_by_one();
         settings.check()?;
         // Before the folder is claimed: a misspelt lot should not leave one behind.
-        let places = check_lots(&settings, output)?;
-        args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
+        check_lots(&settings, output)?;
+        let mut reads = places(&settings, &[])?;
+        reads.extend(args.layers.file().map(Path::to_owned));
         let place = args.out.place(command, layers.preset_name(), settings.seed.0);
         let asked = Asked { no_eval: args.no_eval };
-        let request = Request { arguments: toml::Table::try_from(&asked)?, inputs: inputs(&settings)? };
+        let request = Request { arguments: toml::Table::try_from(&asked)?, inputs: inputs(&settings)?, reads };
         (RunDir::create(&place, &settings, &request)?, settings, asked)
     };
     interrupt::can_resume(command, run.path());
@@ -195,9 +196,18 @@ pub(crate) fn inputs(settings: &Settings) -> anyhow::Result<Inputs> {
     Ok(found)
 }
 
-/// Lots to judge by that policies were or may be trained or tuned on, or that cannot be driven as the settings ask; the
-/// files and folders of all lots that are read.
-pub(crate) fn check_unseen(settings: &Settings, unseen: &[String]) -> anyhow::Result<Vec<PathBuf>> {
+/// The files of the lots that a training reads, and of those that it is judged by.
+pub(crate) fn places(settings: &Settings, unseen: &[String]) -> anyhow::Result<Vec<PathBuf>> {
+    let Settings { training, evaluation, episode, .. } = settings;
+    let mut found = Vec::new();
+    for lots in [&training.lots[..], &evaluation.lots, &evaluation.elsewhere, unseen] {
+        found.extend(inputs::places(&Lot::parse_all(lots, &episode.vehicle)?, &[]));
+    }
+    Ok(found)
+}
+
+/// Refuses lots to judge by that policies were or may be trained or tuned on, or that cannot be driven as the settings ask.
+pub(crate) fn check_unseen(settings: &Settings, unseen: &[String]) -> anyhow::Result<()> {
     let Settings { training, evaluation, episode, .. } = settings;
     let trained_on = Lot::parse_all(&training.lots, &episode.vehicle)?;
     let unseen = Lot::parse_all(unseen, &episode.vehicle)?;
@@ -217,12 +227,11 @@ pub(crate) fn check_unseen(settings: &Settings, unseen: &[String]) -> anyhow::Re
         let flag = "--set evaluation.directions='[\"forward\"]'";
         evaluation.directions.iter().try_for_each(check).map_err(|error| evaluate::or_forward(error, flag))?;
     }
-    Ok(inputs::places(&[trained_on, unseen].concat(), &[]))
+    Ok(())
 }
 
-/// Refuses lots that do not exist, or cannot be driven as the settings ask; the files that lots are read from.
-pub(crate) fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result<Vec<PathBuf>> {
-    let mut places = Vec::new();
+/// Refuses lots that do not exist, or cannot be driven as the settings ask.
+pub(crate) fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result<()> {
     let Settings { training, evaluation, episode, .. } = settings;
     let noise = std::slice::from_ref(&training.noise);
     for (section, lots, directions, noise) in [
@@ -236,14 +245,13 @@ pub(crate) fn check_lots(settings: &Settings, output: &Output) -> anyhow::Result
             lots::check_rounds(&lots, rounds, training.different_lots)?;
         }
         output.notes(&notes::of(&lots, noise));
-        places.extend(inputs::places(&lots, &[]));
         for lot in lots {
             let flag = format!("--set {section}.directions='[\"forward\"]'");
             let check = |&direction| lot.check_direction(direction, &episode.vehicle);
             directions.iter().try_for_each(check).map_err(|error| evaluate::or_forward(error, &flag))?;
         }
     }
-    Ok(places)
+    Ok(())
 }
 
 /// Trains, prints and writes the paper's table. The inner error of a training cut short is the number of rounds that

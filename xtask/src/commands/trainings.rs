@@ -58,6 +58,15 @@ pub(crate) fn ensure_distinct<T: PartialEq + Display>(option: &str, named: &[T])
     Ok(())
 }
 
+/// What a manifest, without the record of a shard, asks for.
+pub(crate) struct AskedFor {
+    pub(crate) stages: Vec<Stage>,
+    /// The lots, parameters and networks from files that are read.
+    pub(crate) inputs: Inputs,
+    /// Where they lie.
+    pub(crate) reads: Vec<PathBuf>,
+}
+
 /// A command of this kind; `E`: how much is done, besides what the settings say.
 pub(crate) struct Trainings<E> {
     pub(crate) command: &'static str,
@@ -118,9 +127,10 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
         output: &Output,
     ) -> anyhow::Result<(RunDir, Settings, E, Option<ShardRecord>)> {
         let Begun { preset, settings, extent } = begun;
-        let mut places = train::check_lots(&settings, output)?;
-        places.extend(train::check_unseen(&settings, (self.unseen)(&extent))?);
-        args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
+        train::check_lots(&settings, output)?;
+        train::check_unseen(&settings, (self.unseen)(&extent))?;
+        let mut reads = train::places(&settings, (self.unseen)(&extent))?;
+        reads.extend(args.layers.file().map(Path::to_owned));
         // Only names and settings are asked for: the run has no place yet.
         let stages = (self.stages)(&settings, &extent, Path::new(""))?;
         for stage in &stages {
@@ -131,7 +141,7 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
         if let Some(record) = &shard {
             record.add_to(&mut arguments);
         }
-        let request = Request { arguments, inputs: self.inputs(&settings, &extent)? };
+        let request = Request { arguments, inputs: self.inputs(&settings, &extent)?, reads };
         let run = RunDir::create(&args.out.place(self.command, &preset, settings.seed.0), &settings, &request)?;
         Ok((run, settings, extent, shard))
     }
@@ -148,10 +158,14 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
         Ok((run, settings, extent, shard))
     }
 
-    /// All stages of what a manifest, without the record of a shard, asks for, and the lots from files that they read.
-    pub(crate) fn asked_for(&self, settings: &Settings, manifest: &Manifest) -> anyhow::Result<(Vec<Stage>, Inputs)> {
+    /// What a manifest, without the record of a shard, asks for.
+    pub(crate) fn asked_for(&self, settings: &Settings, manifest: &Manifest) -> anyhow::Result<AskedFor> {
         let extent: E = manifest.arguments.clone().try_into()?;
-        Ok(((self.stages)(settings, &extent, Path::new(""))?, self.inputs(settings, &extent)?))
+        Ok(AskedFor {
+            stages: (self.stages)(settings, &extent, Path::new(""))?,
+            inputs: self.inputs(settings, &extent)?,
+            reads: train::places(settings, (self.unseen)(&extent))?,
+        })
     }
 
     /// The lots from files that are read.

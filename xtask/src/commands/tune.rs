@@ -8,7 +8,7 @@ use crate::output::Output;
 use anyhow::Context as _;
 use clap::Args;
 use evaluation::tune;
-use experiment::inputs;
+use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
 use experiment::manifest::{Outcome, Request};
 use experiment::progress::Interrupted;
@@ -17,7 +17,7 @@ use experiment::settings::{Layers, NoiseChoice, Settings, Smoothing};
 use serde::{Deserialize, Serialize};
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const COMMAND: &str = "tune";
 
@@ -113,10 +113,10 @@ fn begin(args: &TuneArgs) -> anyhow::Result<(RunDir, Settings, Asked)> {
     tune::planners_named(&args.planners)?;
     let lots = Lot::parse_all(&args.lots, &settings.episode.vehicle)?;
     tune::check(&lots)?;
-    let places = inputs::places(&lots, &[]);
-    args.out.ensure_apart_from(places.iter().map(PathBuf::as_path).chain(args.layers.file()))?;
+    let mut reads = inputs::places(&lots, &[]);
+    reads.extend(args.layers.file().map(Path::to_owned));
     let asked = Asked { planners: args.planners.clone(), budget: args.budget };
-    let request = Request { arguments: toml::Table::try_from(&asked)?, ..Request::default() };
+    let request = Request { arguments: toml::Table::try_from(&asked)?, inputs: Inputs::default(), reads };
     let run = RunDir::create(&args.out.place(COMMAND, layers.preset_name(), args.seed), &settings, &request)?;
     Ok((run, settings, asked))
 }
