@@ -66,30 +66,48 @@ pub(crate) fn find(map: &Map, vehicle: &VehicleSettings) -> Vec<Branch> {
 /// Closes the branches of a valid lot with kerbs, as far as walls on both sides are near enough. Returns where.
 pub(crate) fn close(lot: &mut Scenario, vehicle: &VehicleSettings) -> Vec<Vec2> {
     let mut closed = Vec::new();
+    // Branches that no kerb closes, and how many were closed when they were last tried.
+    let (mut open, mut closed_before) = (Vec::<Vec2>::new(), 0);
     while closed.len() < KERBS_MAX
         && let Ok(map) = Map::build(lot.clone(), vehicle)
     {
-        // A kerb may close several ways: look again after each.
+        // A kerb may close several ways: look again after each. Every kerb that is tried costs a map.
         let closing = find(&map, vehicle).into_iter().find_map(|branch| {
-            let with_kerb = kerbs(&map, &branch).into_iter().find(|lot| closes(lot, &branch, vehicle))?;
-            Some((branch.mouth, with_kerb))
+            if open.iter().any(|mouth| is_same_mouth(*mouth, branch.mouth)) {
+                return None;
+            }
+            let with_kerb = kerbs(&map, &branch).find(|lot| closes(lot, &branch, vehicle));
+            if with_kerb.is_none() {
+                open.push(branch.mouth);
+            }
+            Some((branch.mouth, with_kerb?))
         });
-        let Some((mouth, with_kerb)) = closing else { break };
-        *lot = with_kerb;
-        closed.push(mouth);
+        if let Some((mouth, with_kerb)) = closing {
+            *lot = with_kerb;
+            closed.push(mouth);
+        } else if closed.len() > closed_before {
+            // A kerb may end at another one that was not there before.
+            closed_before = closed.len();
+            open.clear();
+        } else {
+            break;
+        }
     }
     closed
 }
 
+fn is_same_mouth(a: Vec2, b: Vec2) -> bool {
+    a.distance(b) <= 0.5 * SAME_MOUTH_M
+}
+
 /// Whether a branch is none of a lot's any more.
 fn closes(with_kerb: &Scenario, branch: &Branch, vehicle: &VehicleSettings) -> bool {
-    Map::build(with_kerb.clone(), vehicle).is_ok_and(|map| {
-        find(&map, vehicle).iter().all(|other| other.mouth.distance(branch.mouth) > 0.5 * SAME_MOUTH_M)
-    })
+    Map::build(with_kerb.clone(), vehicle)
+        .is_ok_and(|map| find(&map, vehicle).iter().all(|other| !is_same_mouth(other.mouth, branch.mouth)))
 }
 
 /// The lot with a kerb across a branch, for each place along it, shortest kerb first.
-fn kerbs(map: &Map, branch: &Branch) -> Vec<Scenario> {
+fn kerbs<'a>(map: &'a Map, branch: &Branch) -> impl Iterator<Item = Scenario> + use<'a> {
     let route: Vec<Vec2> = map.path().poses().iter().map(|pose| pose.position()).collect();
     let is_beside_route =
         |&(a, b): &(Vec2, Vec2)| route.iter().all(|&point| distance_to_segment(point, a, b) > KERB_BESIDE_M);
@@ -113,7 +131,7 @@ fn kerbs(map: &Map, branch: &Branch) -> Vec<Scenario> {
         lot.islands.push(Island { polygon, height_m: KERB_MAX_M });
         lot
     };
-    chords.into_iter().map(with_kerb).collect()
+    chords.into_iter().map(with_kerb)
 }
 
 /// The chord from wall to wall through a point.

@@ -56,7 +56,7 @@ pub struct MapLot {
     /// Name of the lot; by default that of the file.
     #[serde(default)]
     pub name: Option<String>,
-    /// The lot is this many times as large as the map.
+    /// The lot is this many times as large as the map, within [`MAP_SCALE`].
     #[serde(default = "one")]
     pub scale: f64,
     /// Where the rear axle starts: x and y in metres, heading in degrees counter-clockwise from x.
@@ -72,14 +72,14 @@ pub struct MapLot {
     /// beside or below it.
     #[serde(default)]
     pub centre_line: Option<PathBuf>,
-    /// Clearance that a route found automatically keeps around the body, metres in the lot; by default
+    /// Clearance that a route found automatically keeps around the body, 0…2 m in the lot; by default
     /// [`solver::CLEARANCE_M`]. A centre line is as near as it is drawn.
     #[serde(default)]
     pub clearance_m: Option<f32>,
-    /// Height of what is not drivable, metres in the lot: above 0.15 it hides the ground behind it.
+    /// Height of what is not drivable, 0…5 m in the lot: above 0.15 it hides the ground behind it.
     #[serde(default = "wall_height_m")]
     pub wall_height_m: f32,
-    /// Occupied specks up to this size are taken for free ground, m² in the lot.
+    /// Occupied specks up to this size are taken for free ground, 0…100 m² in the lot; of a TPCAP case 0.
     #[serde(default)]
     pub drop_specks_m2: f64,
     /// Whether ways that leave the route are closed with kerbs.

@@ -27,6 +27,9 @@ pub struct NotFinite {
 ///
 /// # Errors
 /// If an answer of the fleet is not finite.
+///
+/// # Panics
+/// If the fleet answers for more or fewer cars than it is asked for.
 pub fn run_lockstep(
     episodes: Vec<Episode>,
     fleet: &mut dyn Fleet,
@@ -107,6 +110,9 @@ impl SeatedFleet {
     /// Seats fleets in all cars, each in up to `cars_each` of them. `fleet` is called with the indices of its cars.
     ///
     /// Cars are dealt out one by one: neighbours are often of the same lot, and so the fleets end at about the same time.
+    ///
+    /// # Panics
+    /// If `cars_each` is 0.
     pub fn in_all(
         episodes: Vec<Episode>,
         cars_each: usize,

@@ -58,6 +58,9 @@ const SPARE_NODES: usize = LANES;
 
 impl DistanceField {
     /// Distances inside a boundary polygon: its outside is non-drivable.
+    ///
+    /// # Panics
+    /// If the polygon is more than 3.2 km across.
     pub fn of_boundary(boundary: &[Vec2]) -> Self {
         let margin = Vec2::splat(CAP_M + 2.0 * NODE_M);
         let (low, high) = bounds(boundary);

@@ -141,6 +141,9 @@ pub struct Episode {
 
 impl Episode {
     /// A car at rest at the start of a map's route; all noise is drawn from `seed`.
+    ///
+    /// # Panics
+    /// If the control period is no multiple of the physics step.
     pub fn new(settings: Arc<EpisodeSettings>, map: Arc<Map>, seed: RootSeed) -> Self {
         assert!(
             settings.physics_step_ms > 0 && settings.control_period_ms.is_multiple_of(settings.physics_step_ms),
