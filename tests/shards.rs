@@ -304,7 +304,9 @@ fn documented(after: &str, until: &str) -> String {
     let (_, rest) = docs.split_once(after).unwrap_or_else(|| panic!("docs/cluster.md has no {after:?}"));
     let (text, _) = rest.split_once(until).unwrap_or_else(|| panic!("docs/cluster.md has no {until:?}"));
     let mut text = text.to_owned();
-    for (users, ours) in [("run:runs/NAME", "tentacle"), ("sealed:mine:1000", "test:2:easy"), ("/16", "/2")] {
+    for (users, ours) in
+        [("run:runs/NAME", "tentacle"), ("sealed:mine:4800:all --trials 1", "test:2:easy"), ("/16", "/2")]
+    {
         assert!(text.contains(users), "{users} is missing in {text}");
         text = text.replace(users, ours);
     }
