@@ -436,13 +436,15 @@ impl Episode {
     fn resume_on_path(&mut self, driven_m: f32) {
         let path = self.map.path();
         let mut s_m = self.projected_m(driven_m);
-        while !self.is_free_from(s_m) {
-            if s_m >= path.length_m() {
+        // At the finish it has arrived, whatever is there.
+        while s_m < path.length_m() && !self.is_free_from(s_m) {
+            s_m += 0.5;
+            if s_m >= path.length_m() && !self.is_free_from(path.length_m()) {
                 self.phase = Phase::Blocked;
                 return;
             }
-            s_m = (s_m + 0.5).min(path.length_m());
         }
+        let s_m = s_m.min(path.length_m());
         self.vehicle = VehicleState::at_rest(path.pose_at(s_m));
         self.in_flight.clear();
         self.command = VehicleCommand::default();
@@ -471,7 +473,9 @@ impl Episode {
         let metrics = &self.settings.metrics;
         if self.progress_m >= best_m + metrics.stuck_progress_m {
             self.advance = Advance { progress_m: self.progress_m, physics_step: self.physics_step };
-        } else if self.physics_step - since_step >= self.settings.physics_steps(metrics.stuck_after_s) {
+        } else if self.phase == Phase::Driving
+            && self.physics_step - since_step >= self.settings.physics_steps(metrics.stuck_after_s)
+        {
             frame.event = Event::Stuck { at: self.vehicle.pose, progress_m: self.progress_m };
             self.resume_on_path(0.0);
         }

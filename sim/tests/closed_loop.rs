@@ -226,8 +226,11 @@ fn a_car_that_cannot_be_put_back_anywhere_ahead_has_not_reached_the_end() {
     let cars: Vec<_> = (0..10).map(|i| in_the_way(32.0 + 4.0 * i as f32)).collect();
     let (report, _) = run(lane(60.0, cars), (16.3, 0.0), settings());
     assert_eq!((report.ending, report.metrics.near_collisions), (Ending::Blocked, 1), "{report:?}");
-    let (report, _) = run(lane(60.0, vec![in_the_way(32.0)]), (16.3, 0.0), settings());
-    assert_eq!((report.ending, report.metrics.near_collisions), (Ending::ReachedEnd, 1), "{report:?}");
+    // Past the one car, or over the line while it brakes for one behind the finish.
+    for x_m in [32.0, 66.4] {
+        let (report, _) = run(lane(60.0, vec![in_the_way(x_m)]), (16.3, 0.0), settings());
+        assert_eq!((report.ending, report.metrics.near_collisions), (Ending::ReachedEnd, 1), "{x_m} m: {report:?}");
+    }
 }
 
 /// It was put back where the search ended, 5 m ahead of where the tick began.
