@@ -137,16 +137,6 @@ impl ShardRun {
         Ok(Self { folder: folder.to_owned(), record, manifest, settings })
     }
 
-    /// Whether networks drive in it, or are trained.
-    fn has_networks(&self) -> bool {
-        let Some(drivers) = self.manifest.arguments.get("drivers").and_then(toml::Value::as_array) else { return true };
-        let is_network = |driver: &toml::Value| {
-            let spec = driver.as_str().and_then(|driver| driver.parse::<DriverSpec>().ok());
-            spec.is_none_or(|spec| spec.is_network())
-        };
-        drivers.iter().any(is_network)
-    }
-
     /// Refuses what does not belong to the same whole.
     fn check_belongs_to(&self, first: &Self) -> anyhow::Result<()> {
         let differs = [
@@ -154,7 +144,7 @@ impl ShardRun {
             ("number of shards", self.record.number.of() != first.record.number.of()),
             ("version of lotpilot", !self.manifest.is_of_version_of(&first.manifest)),
             ("architecture or system", self.manifest.target != first.manifest.target),
-            ("use of AVX2 and FMA", self.has_networks() && !self.manifest.rounds_like(&first.manifest)),
+            ("use of AVX2 and FMA", has_networks(&self.manifest) && !self.manifest.rounds_like(&first.manifest)),
             ("folder of networks", self.record.networks != first.record.networks),
             ("choice of drivers or lots", self.manifest.arguments != first.manifest.arguments),
             ("set of settings", self.settings != first.settings),
@@ -178,6 +168,18 @@ const MISSING_NAMED_MAX: usize = 10;
 #[derive(Debug)]
 pub struct Shards {
     runs: Vec<ShardRun>,
+}
+
+/// Whether networks drive in a run, or are trained: only then does it matter how a machine rounds. Where planners are tuned or
+/// are the only ones that drive, with the expert, it does not.
+pub fn has_networks(manifest: &Manifest) -> bool {
+    let named = |key| manifest.arguments.get(key).and_then(toml::Value::as_array);
+    let Some(drivers) = named("drivers") else { return named("planners").is_none() };
+    let is_network = |driver: &toml::Value| {
+        let spec = driver.as_str().and_then(|driver| driver.parse::<DriverSpec>().ok());
+        spec.is_none_or(|spec| spec.is_network())
+    };
+    drivers.iter().any(is_network)
 }
 
 impl Shards {
@@ -244,6 +246,7 @@ impl Shards {
         let is_theirs = *settings == *self.settings()
             && manifest.arguments == own.arguments
             && manifest.target == own.target
+            && manifest.rounds_like(own)
             && manifest.program == own.program
             // Shards of drives read networks besides.
             && manifest.inputs.iter().all(|(name, digest)| own.inputs.get(name) == Some(digest))

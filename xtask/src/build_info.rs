@@ -2,6 +2,7 @@
 
 use crate::output::Output;
 use anyhow::ensure;
+use evaluation::shards::has_networks;
 use experiment::manifest::{Build, Manifest};
 use serde::Deserialize;
 use std::path::Path;
@@ -46,7 +47,7 @@ pub(crate) fn check_can_go_on(run: &Path, manifest: &Manifest, output: &Output) 
         manifest.program
     );
     ensure!(
-        manifest.is_of_this_target() && manifest.rounds_like_here(get()),
+        manifest.is_of_this_target() && (!has_networks(manifest) || manifest.rounds_like_here(get())),
         "{0}: begun on a machine that rounds otherwise ({0}/manifest.toml has its target and processor_features), and a run is of \
          one kind; continue it there, or begin again into another folder",
         run.display()

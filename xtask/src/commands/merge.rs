@@ -142,6 +142,8 @@ fn made_by(manifest: &Manifest) -> Build {
         git_dirty: manifest.git_dirty,
         git_changes: manifest.git_changes.clone(),
         rustc_version: manifest.rustc_version.clone(),
+        processor: manifest.processor.clone(),
+        processor_features: manifest.processor_features.clone(),
         libraries: manifest.libraries.clone(),
         ..build_info::get().clone()
     }

@@ -207,6 +207,10 @@ fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir
             stage.folder
         );
     }
+    ensure!(
+        manifest.is_of_this_target() && manifest.rounds_like_here(build_info::get()),
+        "--networks {name}: trained on a machine that rounds otherwise; drive on one of that kind"
+    );
     // What its networks were trained with.
     manifest.check_inputs(&inputs(&settings, &extent)?)?;
     let inputs = inputs_of_drives(&settings, &extent, &stages)?;
