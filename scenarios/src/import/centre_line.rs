@@ -34,13 +34,13 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
         };
         let record = record.map_err(|error| faulty(i + 1, format!("not CSV: {error}")))?;
         let line = record.position().map_or(i + 1, |position| position.line() as usize);
-        if let (0, Some((line, header))) = (i, &commented)
+        let numbers: Vec<Option<f64>> = record.iter().take(2).map(|cell| cell.parse().ok()).collect();
+        if let (0, [Some(_), Some(_)], Some((line, header))) = (i, &numbers[..], &commented)
             && header.len() == record.len()
             && let Some(problem) = misplaced(header)
         {
-            return Err(faulty(*line, problem));
+            return Err(faulty(*line, format!("{problem} (if this comment is no header, change it)")));
         }
-        let numbers: Vec<Option<f64>> = record.iter().take(2).map(|cell| cell.parse().ok()).collect();
         match numbers[..] {
             [Some(x), Some(y)] if x.abs() <= MAP_COORDINATE_MAX_M && y.abs() <= MAP_COORDINATE_MAX_M => {
                 if points.len() == ROUTE_POINTS_MAX {
@@ -80,9 +80,12 @@ fn header_in_comment(text: &str) -> Option<(usize, csv::StringRecord)> {
         text.lines().map(str::trim).enumerate().take_while(|(_, line)| line.is_empty() || line.starts_with('#'));
     let (i, comment) = before.filter(|(_, line)| !line.is_empty()).last()?;
     let cells: csv::StringRecord = comment.trim_start_matches('#').split(',').map(str::trim).collect::<Vec<_>>().into();
-    // `x [m]`, but no sentence.
-    let is_header = cells.iter().all(|cell| (1..=2).contains(&cell.split_whitespace().count()));
-    is_header.then_some((i + 1, cells))
+    // `x` or `x [m]`, but no words.
+    let is_name = |cell: &str| {
+        let mut words = cell.split_whitespace();
+        words.next().is_some() && words.next().is_none_or(|unit| unit.starts_with(['[', '('])) && words.next().is_none()
+    };
+    cells.iter().all(is_name).then_some((i + 1, cells))
 }
 
 /// Names of columns in degrees: of latitudes, and of longitudes.

@@ -656,8 +656,10 @@ fn unknown_ground_that_counts_as_free_is_named_in_a_note() {
 fn a_first_line_with_a_number_in_it_is_no_header() {
     let points_of = |text: &str| centre_line::parse(text, "line.csv", 1.0).map(|points| points.len());
     assert_eq!(points_of("x,y\n1,2\n3,4\n").unwrap(), 2);
-    for comment in ["# x [m], y [m]", "# along the y-axis of the yard, then along x", "# y,x,v", "# y\n#"] {
-        assert_eq!(points_of(&format!("{comment}\n1,2\n3,4\n")).unwrap(), 2, "{comment}");
+    for before in
+        ["# x [m], y [m]", "# from lat/lon, by hand", "# north up, x right", "# y,x,v", "# y\n#", "# y,x\nx,y"]
+    {
+        assert_eq!(points_of(&format!("{before}\n1,2\n3,4\n")).unwrap(), 2, "{before}");
     }
     for text in ["-15.O,-13.2\n1,2\n3,4\n", "1,y\n1,2\n3,4\n", "8;12\n20,12\n40,12\n", "8 12\n1,2\n3,4\n"] {
         assert!(points_of(text).unwrap_err().to_string().contains("is not a point"), "{text}");
