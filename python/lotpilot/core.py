@@ -171,6 +171,10 @@ class Core:
         self.options = options
         self.count = count
         self.autoreset = autoreset
+        check_whole("seed", options.seed)
+        check_whole("trials", *given(options.trials), below=2**32)
+        check_whole("threads", *given(options.threads))
+        check_whole("environments", count)
         self.cars = Cars(
             count,
             lots=names(options.lots, "lots"),
@@ -224,10 +228,10 @@ class Core:
         chosen = np.ones(self.count, bool) if mask is None else np.asarray(mask, bool)
         seen = self._arrays()[0]
         if seeds is not None:
-            _check("seed", [seed for seed in seeds if seed is not None])
+            check_whole("seed", *given(*seeds))
             seeds = [None if seed is None else int(seed) for seed in seeds]
         if episodes is not None:
-            _check("episode", episodes)
+            check_whole("episode", *episodes)
             episodes = [int(episode) for episode in episodes]
         self.cars.reset(chosen.tolist(), seeds, episodes, seen)
         return seen
@@ -303,7 +307,17 @@ def row(observation: Any, index: int) -> Any:
     return observation[index].copy()
 
 
-def _check(what: str, numbers: Sequence[int]) -> None:
+def given(*numbers: int | None) -> list[int]:
+    """Those that are not None, which is in the settings or by default."""
+    return [number for number in numbers if number is not None]
+
+
+def check_whole(what: str, *numbers: int, below: int = 2**63) -> None:
+    """Refuses what is no whole number or out of range.
+
+    Raises:
+        ValueError: Naming what it is.
+    """
     for number in numbers:
-        if not isinstance(number, (int, np.integer)) or not 0 <= number < 2**63:
-            raise ValueError(f"{what}: {number!r} is not within 0 … 2**63 - 1")
+        if not isinstance(number, (int, np.integer)) or not 0 <= number < below:
+            raise ValueError(f"{what}: {number!r} is not a whole number within 0 … {below - 1}")

@@ -31,7 +31,7 @@ import ray
 from ray import cloudpickle
 
 from . import _native, tables
-from .core import names
+from .core import check_whole, names
 from .tables import Driver, Evaluation, Table
 
 __all__ = ["ShardError", "evaluate", "generate", "reproduce"]
@@ -183,6 +183,8 @@ def generate(
         ShardError: As ``evaluate``.
     """
     _check(shards, cpus, retries)
+    check_whole("seed", seed)
+    check_whole("count", count, below=2**32)
     out = Path(out)
     single = _native.lots(names(lots, "lots"))
     _native.check_generate(single, seed, count, out)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from .core import Floats, Grids, names, settings_from
+from .core import Floats, Grids, check_whole, given, names, settings_from
 
 Table = dict[str, list[Any]]
 """Columns of one length: what ``pandas.DataFrame`` and ``pyarrow.table`` take."""
@@ -134,6 +134,8 @@ class Request:
         overrides: Sequence[str] = (),
     ) -> Request:
         """See ``evaluate``."""
+        check_whole("trials", *given(trials), below=2**32)
+        check_whole("seed", *given(seed))
         levels = None if noise is None else [noise] if isinstance(noise, (str, int, float)) else list(noise)
         which = {
             "lots": None if lots is None else names(lots, "lots"),
@@ -199,8 +201,10 @@ def generate(
         Columns ``name``, ``toml`` (the text), ``path`` (empty without ``out``), ``route_m`` and ``obstacles`` (number).
 
     Raises:
-        ValueError: If nothing is named so, or a file exists already.
+        ValueError: If nothing is named so, a number is out of range, or a file exists already.
     """
+    check_whole("seed", seed)
+    check_whole("count", count, below=2**32)
     folder = None if out is None else Path(out)
     drawn = _native.generate(names(lots, "lots"), seed, count, folder, overwrite)
     columns = ("name", "toml", "path", "route_m", "obstacles")

@@ -42,7 +42,10 @@ pub(crate) struct Lot {
 impl Lot {
     #[new]
     #[pyo3(signature = (name, *, direction="forward", trial=0, seed=1))]
-    fn new(py: Python<'_>, name: &str, direction: &str, trial: u32, seed: u64) -> PyResult<Self> {
+    fn new(py: Python<'_>, name: &str, direction: &str, trial: i64, seed: i64) -> PyResult<Self> {
+        let trial = u32::try_from(trial).ok().filter(|trial| *trial <= TRIAL_MAX);
+        let trial = trial.ok_or_else(|| PyValueError::new_err(format!("trial: there are 0 to {TRIAL_MAX}")))?;
+        let seed = u64::try_from(seed).map_err(|_| PyValueError::new_err("seed: it is negative"))?;
         let settings = Settings::preset("default").map_err(input)?;
         alone(py, || {
             let vehicle = settings.episode.vehicle.clone();
@@ -51,9 +54,6 @@ impl Lot {
                 let problem = format!("{name:?} stands for {} lots; lotpilot.lots names them", lots.len());
                 return Err(PyValueError::new_err(problem));
             };
-            if trial > TRIAL_MAX {
-                return Err(PyValueError::new_err(format!("trial {trial}: there are 0 to {TRIAL_MAX}")));
-            }
             let [direction] = directions(direction).map_err(input)?[..] else {
                 return Err(PyValueError::new_err(format!("direction {direction:?}: name one, forward or reverse")));
             };

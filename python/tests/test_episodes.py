@@ -133,6 +133,17 @@ def test_a_lot_is_never_drawn_over_the_file_that_it_is_made_of(tmp_path):
     assert mine.read_text() == text
 
 
+def test_an_evaluation_never_takes_the_place_of_what_it_reads(tmp_path):
+    (path,) = lotpilot.generate("lot-b", out=tmp_path)["path"]
+    mine = tmp_path / "mine"
+    lotpilot.evaluate("expert", "lot-b", trials=1, directions="forward", out=mine)
+    lot = mine / "lot.toml"
+    lot.write_text(Path(path).read_text())
+    with pytest.raises(ValueError, match="what is read lies there"):
+        lotpilot.evaluate("expert", str(lot), trials=1, directions="forward", out=mine, overwrite=True)
+    assert lot.exists() and (mine / "finished.toml").exists()
+
+
 def test_functions_are_judged_together_as_trainings_of_one_method():
     def towards(left):
         return lambda grids: np.tile([8.0, left], (len(grids), 1))
@@ -297,6 +308,12 @@ def test_settings_are_those_of_the_command_line():
         (lambda: lotpilot.Lot("no/such.toml"), ValueError, "no/such.toml"),
         (lambda: lotpilot.Lot("lot-b", trial=2**20), ValueError, "0 to 1048575"),
         (lambda: lotpilot.Episode("lot-b", trial=2**20), ValueError, "0 to 1048575"),
+        (lambda: lotpilot.Lot("lot-b", trial=-1), ValueError, "0 to 1048575"),
+        (lambda: lotpilot.Lot("lot-b", seed=-1), ValueError, "seed: it is negative"),
+        (lambda: lotpilot.Episode("lot-b", seed=-1), ValueError, "seed: -1 is not"),
+        (lambda: lotpilot.generate("lot-b", count=-1), ValueError, "count: -1 is not"),
+        (lambda: lotpilot.evaluate("expert", "lot-b", trials=-1), ValueError, "trials: -1 is not"),
+        (lambda: lotpilot.evaluate("expert", "lot-b", seed=2.5), ValueError, r"seed: 2\.5 is not"),
         (lambda: lotpilot.evaluate("exprt", "lot-b"), ValueError, "there are expert"),
         (lambda: lotpilot.evaluate(["expert", "expert"], "lot-b"), ValueError, "named twice"),
         (lambda: lotpilot.evaluate("expert", "lot-b", methods={"mine": ["a", "b", "c"]}), ValueError, "no driver is named"),
@@ -311,6 +328,8 @@ def test_settings_are_those_of_the_command_line():
         (lambda: Core(1, EnvOptions(trials=0), "disabled"), ValueError, "trials"),
         (lambda: Core(1, EnvOptions(lots=[]), "disabled"), ValueError, "no lots"),
         (lambda: Core(1, EnvOptions(threads=0), "disabled"), ValueError, "threads"),
+        (lambda: Core(-1, EnvOptions(), "disabled"), ValueError, "environments: -1 is not"),
+        (lambda: Core(1, EnvOptions(threads=-1), "disabled"), ValueError, "threads: -1 is not"),
     ],
 )
 def test_bad_input_is_one_clear_exception(make, error, part):
