@@ -186,24 +186,21 @@ fn check_elsewhere(
 
 /// The lots from files that a training reads.
 pub(crate) fn inputs(settings: &Settings) -> anyhow::Result<Inputs> {
-    let Settings { training, evaluation, .. } = settings;
-    let specs: BTreeSet<&String> =
-        [&training.lots, &evaluation.lots, &evaluation.elsewhere].into_iter().flatten().collect();
-    let mut found = Inputs::new();
-    for spec in specs {
-        found.extend(inputs::of(&Lot::parse_all(&[spec], &settings.episode.vehicle)?, &[]));
-    }
-    Ok(found)
+    Ok(inputs::of(&lots_read(settings, &[])?, &[]))
 }
 
 /// The files of the lots that a training reads, and of those that it is judged by.
 pub(crate) fn places(settings: &Settings, unseen: &[String]) -> anyhow::Result<Vec<PathBuf>> {
+    Ok(inputs::places(&lots_read(settings, unseen)?, &[]))
+}
+
+/// The lots of a training, and those that it is judged by; a lot may be both.
+fn lots_read(settings: &Settings, unseen: &[String]) -> anyhow::Result<Vec<Lot>> {
     let Settings { training, evaluation, episode, .. } = settings;
-    let mut found = Vec::new();
-    for lots in [&training.lots[..], &evaluation.lots, &evaluation.elsewhere, unseen] {
-        found.extend(inputs::places(&Lot::parse_all(lots, &episode.vehicle)?, &[]));
-    }
-    Ok(found)
+    let named = [&training.lots[..], &evaluation.lots, &evaluation.elsewhere, unseen];
+    let specs: BTreeSet<&String> = named.into_iter().flatten().collect();
+    let lots = specs.into_iter().map(|spec| Lot::parse_all(&[spec], &episode.vehicle));
+    Ok(lots.collect::<anyhow::Result<Vec<_>>>()?.concat())
 }
 
 /// Refuses lots to judge by that policies were or may be trained or tuned on, or that cannot be driven as the settings ask.
