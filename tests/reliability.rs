@@ -190,6 +190,21 @@ fn what_is_read_is_never_deleted_or_written_into_however_it_is_named() {
     assert!(faults.is_empty(), "{faults:?}");
 }
 
+/// Runs of an evaluation that another plan would have driven were taken for those of this one.
+#[test]
+fn results_that_lack_runs_are_not_those_of_an_evaluation() {
+    let run = scratch("lacks-runs").join("run");
+    let evaluate = "evaluate --driver expert --lots lot-b --trials 2 --directions forward --out";
+    succeed(xtask().args(evaluate.split(' ')).arg(&run));
+    let runs = std::fs::read_to_string(run.join("runs.jsonl")).unwrap();
+    let first = format!("{}\n", runs.lines().next().unwrap());
+    sums::write(&run, "runs.jsonl", first.as_bytes()).unwrap();
+    sums::unlist(&run, &["finished.toml"]).unwrap();
+    std::fs::remove_file(run.join("finished.toml")).unwrap();
+    let error = refuse(xtask().args(["evaluate", "--resume"]).arg(&run));
+    assert!(error.contains("1 runs of the 2 that belong there"), "{error}");
+}
+
 /// A report that was written again under another name of its folder was not listed in its run, which was then damaged.
 #[test]
 fn a_report_of_a_stage_is_listed_in_its_run_by_whatever_name() {

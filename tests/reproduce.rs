@@ -253,6 +253,12 @@ fn shards_of_trainings_and_of_drives_come_to_the_bytes_of_one_machine() {
     let manifest = std::fs::read_to_string(second.join("manifest.toml")).unwrap();
     sums::write(second, "manifest.toml", manifest.replacen("\"lotpilot", "\"old lotpilot", 1).as_bytes()).unwrap();
     refused(&["reproduce", "--resume"], &[second], "begun with another version of lotpilot");
+    // Not every processor has FMA.
+    let differ = [("target = \"", "target = \"other-"), ("\"fma\"", "\"sse\"")];
+    for (here, elsewhere) in differ.into_iter().filter(|(here, _)| manifest.contains(here)) {
+        sums::write(second, "manifest.toml", manifest.replacen(here, elsewhere, 1).as_bytes()).unwrap();
+        refused(&["reproduce", "--resume"], &[second], "begun on a machine that rounds otherwise");
+    }
     sums::write(second, "manifest.toml", manifest.as_bytes()).unwrap();
     succeed(xtask().args(["reproduce", "--resume"]).arg(second));
     // One machine began to drive; what the shards drove takes its place.

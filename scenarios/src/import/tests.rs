@@ -286,6 +286,7 @@ fn a_map_that_cannot_be_driven_in_reverse_is_refused_with_the_line_of_its_route(
             let expected =
                 format!("{}:3: the lot cannot be driven in reverse: reference_path, point 2: the car", file.display());
             assert!(error.starts_with(&expected) && error.contains(frame), "{error}");
+            assert_eq!(error.contains("coordinates are"), !frame.is_empty(), "{error}");
         }
     }
 }
