@@ -4,7 +4,7 @@
 use experiment::lots::Lot;
 use experiment::settings::Settings;
 use policy::fit::FitSettings;
-use policy::network::NetworkArchitecture;
+use policy::network::{NetworkArchitecture, RESIDUAL_KERNEL};
 
 /// A stage of [`Progress::begin`](experiment::progress::Progress::begin) and how long it takes, seconds.
 pub type Task = (&'static str, f64);
@@ -71,9 +71,11 @@ fn lots(specs: &[String], settings: &Settings) -> Vec<Lot> {
 }
 
 fn multiply_adds(network: &NetworkArchitecture) -> f64 {
-    let NetworkArchitecture { conv1, conv2, hidden, .. } = network;
+    let NetworkArchitecture { conv1, conv2, residual1, residual2, hidden, .. } = network;
     let first = 25 * 25 * conv1.kernel.pow(2) * conv1.channels;
     let second = 12 * 12 * conv2.kernel.pow(2) * conv1.channels * conv2.channels;
+    let residual = RESIDUAL_KERNEL.pow(2)
+        * (12 * 12 * residual1 * conv1.channels.pow(2) + 6 * 6 * residual2 * conv2.channels.pow(2));
     let dense = 6 * 6 * conv2.channels * hidden;
-    (first + second + dense) as f64
+    (first + second + residual + dense) as f64
 }

@@ -3,7 +3,7 @@
 use crate::about::{self, About};
 use crate::{INPUT, OUTPUT};
 use policy::checkpoint::Checkpoint;
-use policy::network::{ConvLayer, NetworkArchitecture, OUTPUTS};
+use policy::network::{ConvLayer, NetworkArchitecture, OUTPUTS, RESIDUAL_KERNEL};
 use rten_onnx::onnx::{
     AttributeProto, AttributeType, DataType, Dimension, NodeProto, OperatorSetIdProto, StringStringEntryProto,
     TensorProto, TensorShapeProto, TypeProto, TypeProtoTensor, ValueInfoProto,
@@ -37,18 +37,40 @@ pub fn export(checkpoint: &Checkpoint) -> Result<Vec<u8>, SeveralModes> {
 
 /// The network's layers.
 pub(crate) fn layers(architecture: NetworkArchitecture) -> Vec<NodeProto> {
-    vec![
+    let mut nodes = vec![
         convolution("conv1", INPUT, architecture.conv1),
         max_pool("conv1", "pool1"),
         node("Relu", &["pool1"], "features1", Vec::new()),
-        convolution("conv2", "features1", architecture.conv2),
+    ];
+    let map = residual(&mut nodes, "residual1", "features1", architecture.residual1, architecture.conv1.channels);
+    nodes.extend([
+        convolution("conv2", &map, architecture.conv2),
         max_pool("conv2", "pool2"),
         node("Relu", &["pool2"], "features2", Vec::new()),
-        node("Flatten", &["features2"], "features", vec![integer("axis", 1)]),
+    ]);
+    let map = residual(&mut nodes, "residual2", "features2", architecture.residual2, architecture.conv2.channels);
+    nodes.extend([
+        node("Flatten", &[&map], "features", vec![integer("axis", 1)]),
         dense("fc1", "features", "fc1"),
         node("Relu", &["fc1"], "hidden", Vec::new()),
         dense("fc2", "hidden", OUTPUT),
-    ]
+    ]);
+    nodes
+}
+
+/// Residual layers after `input`; the name of what the last of them answers.
+fn residual(nodes: &mut Vec<NodeProto>, stage: &str, input: &str, layers: usize, channels: usize) -> String {
+    let shape = ConvLayer { channels, kernel: RESIDUAL_KERNEL };
+    (1..=layers).fold(input.to_owned(), |input, layer| {
+        let name = format!("{stage}_{layer}");
+        let [sum, output] = ["sum", "features"].map(|what| format!("{name}_{what}"));
+        nodes.extend([
+            convolution(&name, &input, shape),
+            node("Add", &[&name, &input], &sum, Vec::new()),
+            node("Relu", &[&sum], &output, Vec::new()),
+        ]);
+        output
+    })
 }
 
 /// The file with these layers and the network's weights.
@@ -57,7 +79,7 @@ pub(crate) fn file(checkpoint: &Checkpoint, nodes: Vec<NodeProto>) -> Vec<u8> {
         dims: tensor.shape.iter().map(|&length| length as i64).collect(),
         data_type: Some(DataType::FLOAT),
         raw_data: Some(RefCell::new(tensor.bytes)),
-        name: Some(tensor.name.to_owned()),
+        name: Some(tensor.name),
         ..TensorProto::default()
     });
     let about = About::new(checkpoint.inference, checkpoint.conditions.clone());

@@ -6,7 +6,8 @@
 use crate::conditions::Conditions;
 use crate::files::{self, FileError, Format, SCHEMA_REMEDY, write_atomically};
 use crate::network::{
-    ConvLayer, InferenceSettings, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture, POOLED_2, Predictor, Weights,
+    ConvLayer, InferenceSettings, LANES, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture, POOLED_2, Predictor,
+    RESIDUAL_KERNEL, Weights,
 };
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
@@ -55,6 +56,9 @@ struct Layer {
     /// Zeros around the input: cells at the top and at the left, then at the bottom and at the right. Convolutions only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     padding: Option<[usize; 2]>,
+    /// Whether what the layer sees is added to its answer, before the activation. Convolutions only.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    residual: bool,
     /// Side and stride of the max-pool that follows. Convolutions only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     max_pool: Option<usize>,
@@ -131,7 +135,7 @@ impl Checkpoint {
         let tensors = self.tensors();
         let views = tensors.iter().map(|tensor| {
             let view = TensorView::new(Dtype::F32, tensor.shape.clone(), &tensor.bytes).expect("bytes fit the shape");
-            (tensor.name, view)
+            (tensor.name.as_str(), view)
         });
         let bytes = safetensors::serialize(views, None)
             .map_err(|error| FileError::new(&path, error, "report this: the weights cannot be serialised"))?;
@@ -207,17 +211,22 @@ fn layers(architecture: &NetworkArchitecture) -> Vec<Layer> {
         let (before, after) = conv.padding();
         Some([before, after])
     };
-    let weights =
-        shapes(architecture).into_iter().filter_map(|(name, shape)| Some((name.strip_suffix(".weight")?, shape)));
+    let residual = ConvLayer { channels: LANES, kernel: RESIDUAL_KERNEL };
+    let weights = shapes(architecture)
+        .into_iter()
+        .filter_map(|(name, shape)| Some((name.strip_suffix(".weight")?.to_owned(), shape)));
     weights
         .map(|(name, weight_shape)| {
-            let (kind, padding, activation) = match name {
+            let is_residual = name.starts_with("residual");
+            let (kind, padding, activation) = match name.as_str() {
                 "conv1" => (LayerKind::Conv2d, of_conv(architecture.conv1), Activation::Relu),
                 "conv2" => (LayerKind::Conv2d, of_conv(architecture.conv2), Activation::Relu),
                 "fc1" => (LayerKind::Linear, None, Activation::Relu),
-                _ => (LayerKind::Linear, None, Activation::Identity),
+                "fc2" => (LayerKind::Linear, None, Activation::Identity),
+                _ => (LayerKind::Conv2d, of_conv(residual), Activation::Relu),
             };
-            Layer { name: name.to_owned(), kind, weight_shape, padding, max_pool: padding.map(|_| 2), activation }
+            let max_pool = padding.filter(|_| !is_residual).map(|_| 2);
+            Layer { name, kind, weight_shape, padding, residual: is_residual, max_pool, activation }
         })
         .collect()
 }
@@ -226,49 +235,78 @@ fn layers(architecture: &NetworkArchitecture) -> Vec<Layer> {
 #[derive(Debug, Clone)]
 pub struct Tensor {
     /// `LAYER.weight` or `LAYER.bias`.
-    pub name: &'static str,
+    pub name: String,
     /// Its lengths.
     pub shape: Vec<usize>,
     /// float32, little-endian.
     pub bytes: Vec<u8>,
 }
 
-/// Names and shapes in the order of [`crate::network::Parts`].
-fn shapes(architecture: &NetworkArchitecture) -> [(&'static str, Vec<usize>); 8] {
-    let (conv1, conv2, hidden) = (architecture.conv1, architecture.conv2, architecture.hidden);
-    [
-        ("conv1.weight", vec![conv1.channels, 1, conv1.kernel, conv1.kernel]),
-        ("conv1.bias", vec![conv1.channels]),
-        ("conv2.weight", vec![conv2.channels, conv1.channels, conv2.kernel, conv2.kernel]),
-        ("conv2.bias", vec![conv2.channels]),
-        ("fc1.weight", vec![hidden, architecture.features()]),
-        ("fc1.bias", vec![hidden]),
-        ("fc2.weight", vec![architecture.outputs(), hidden]),
-        ("fc2.bias", vec![architecture.outputs()]),
-    ]
+/// Names and shapes in the order of [`crate::network::Parts`], residual layers one by one.
+fn shapes(architecture: &NetworkArchitecture) -> Vec<(String, Vec<usize>)> {
+    let NetworkArchitecture { conv1, conv2, residual1, residual2, hidden, .. } = *architecture;
+    let convolution = |name: &str, inputs: usize, conv: ConvLayer| {
+        let weight = vec![conv.channels, inputs, conv.kernel, conv.kernel];
+        [(format!("{name}.weight"), weight), (format!("{name}.bias"), vec![conv.channels])]
+    };
+    let dense = |name: &str, inputs: usize, outputs: usize| {
+        [(format!("{name}.weight"), vec![outputs, inputs]), (format!("{name}.bias"), vec![outputs])]
+    };
+    let residual = |stage: &str, layers: usize, channels: usize| -> Vec<_> {
+        let conv = ConvLayer { channels, kernel: RESIDUAL_KERNEL };
+        (1..=layers).flat_map(|layer| convolution(&format!("{stage}_{layer}"), channels, conv)).collect()
+    };
+    let mut shapes = Vec::new();
+    shapes.extend(convolution("conv1", 1, conv1));
+    shapes.extend(residual("residual1", residual1, conv1.channels));
+    shapes.extend(convolution("conv2", conv1.channels, conv2));
+    shapes.extend(residual("residual2", residual2, conv2.channels));
+    shapes.extend(dense("fc1", architecture.features(), hidden));
+    shapes.extend(dense("fc2", hidden, architecture.outputs()));
+    shapes
+}
+
+/// Where a tensor begins among the values of [`Weights`], in the order of [`shapes`]: of residual layers first the weights of all,
+/// then their biases.
+fn starts(architecture: &NetworkArchitecture) -> Vec<usize> {
+    let [conv1, bias1, residual1, residual_bias1, conv2, bias2, residual2, residual_bias2, fc1, fc1_bias, fc2, _] =
+        architecture.lengths();
+    let mut starts = Vec::new();
+    let mut next = 0;
+    let mut layers = |count: usize, weights: usize, biases: usize| {
+        for layer in 0..count {
+            starts.extend([next + layer * weights / count, next + weights + layer * biases / count]);
+        }
+        next += weights + biases;
+    };
+    layers(1, conv1, bias1);
+    layers(architecture.residual1, residual1, residual_bias1);
+    layers(1, conv2, bias2);
+    layers(architecture.residual2, residual2, residual_bias2);
+    layers(1, fc1, fc1_bias);
+    layers(1, fc2, architecture.outputs());
+    starts
+}
+
+/// Which of the values of a tensor of ours is stored in this place.
+fn index_of(architecture: &NetworkArchitecture, name: &str, stored: usize) -> usize {
+    match name {
+        "fc1.weight" => fc1_index(architecture, stored),
+        "fc2.weight" => fc2_index(architecture, stored),
+        _ => stored,
+    }
 }
 
 fn to_pytorch(weights: &Weights) -> Vec<Tensor> {
     let architecture = weights.architecture();
-    let parts = weights.parts();
-    let values: [Vec<f32>; 8] = [
-        parts.conv1_weight.to_vec(),
-        parts.conv1_bias.to_vec(),
-        parts.conv2_weight.to_vec(),
-        parts.conv2_bias.to_vec(),
-        (0..parts.fc1_weight.len()).map(|stored| parts.fc1_weight[fc1_index(&architecture, stored)]).collect(),
-        parts.fc1_bias.to_vec(),
-        (0..parts.fc2_weight.len()).map(|stored| parts.fc2_weight[fc2_index(&architecture, stored)]).collect(),
-        parts.fc2_bias.to_vec(),
-    ];
-    shapes(&architecture)
-        .into_iter()
-        .zip(values)
-        .map(|((name, shape), values)| {
-            let bytes = values.into_iter().flat_map(f32::to_le_bytes).collect();
-            Tensor { name, shape, bytes }
-        })
-        .collect()
+    let shapes = shapes(&architecture).into_iter().zip(starts(&architecture));
+    let tensor = |((name, shape), start): ((String, Vec<usize>), usize)| {
+        let len: usize = shape.iter().product();
+        let values = &weights.values()[start..][..len];
+        let bytes = (0..len).flat_map(|stored| values[index_of(&architecture, &name, stored)].to_le_bytes()).collect();
+        Tensor { name, shape, bytes }
+    };
+    shapes.map(tensor).collect()
 }
 
 fn from_pytorch<E>(
@@ -276,25 +314,10 @@ fn from_pytorch<E>(
     mut tensor: impl FnMut(&str, &[usize]) -> Result<Vec<f32>, E>,
 ) -> Result<(), E> {
     let architecture = weights.architecture();
-    let parts = weights.parts_mut();
-    let into = [
-        parts.conv1_weight,
-        parts.conv1_bias,
-        parts.conv2_weight,
-        parts.conv2_bias,
-        parts.fc1_weight,
-        parts.fc1_bias,
-        parts.fc2_weight,
-        parts.fc2_bias,
-    ];
-    for ((name, shape), into) in shapes(&architecture).into_iter().zip(into) {
-        for (stored, value) in tensor(name, &shape)?.into_iter().enumerate() {
-            let index = match name {
-                "fc1.weight" => fc1_index(&architecture, stored),
-                "fc2.weight" => fc2_index(&architecture, stored),
-                _ => stored,
-            };
-            into[index] = value;
+    for ((name, shape), start) in shapes(&architecture).into_iter().zip(starts(&architecture)) {
+        let into = &mut weights.values_mut()[start..];
+        for (stored, value) in tensor(&name, &shape)?.into_iter().enumerate() {
+            into[index_of(&architecture, &name, stored)] = value;
         }
     }
     Ok(())
@@ -349,12 +372,42 @@ mod tests {
         let tensors = to_pytorch(&weights);
         let value =
             |tensor: &Tensor, index: usize| f32::from_le_bytes(*tensor.bytes[4 * index..].first_chunk::<4>().unwrap());
+        let named = |name: &str| tensors.iter().find(|tensor| tensor.name == name).unwrap();
         let (unit, channel, row, col) = (2, 17, 4, 1);
         assert_eq!(
-            value(&tensors[4], unit * 1152 + channel * 36 + row * 6 + col),
+            value(named("fc1.weight"), unit * 1152 + channel * 36 + row * 6 + col),
             weights.parts().fc1_weight[((row * 6 + col) * 32 + channel) * 3 + unit]
         );
-        assert_eq!(value(&tensors[6], 3 + 2), weights.parts().fc2_weight[2 * OUTPUTS + 1]);
+        assert_eq!(value(named("fc2.weight"), 3 + 2), weights.parts().fc2_weight[2 * OUTPUTS + 1]);
+    }
+
+    /// In memory the weights of all layers of a stage come before their biases.
+    #[test]
+    fn residual_layers_are_stored_one_by_one() {
+        let architecture =
+            NetworkArchitecture { residual1: 2, residual2: 3, hidden: 3, ..NetworkArchitecture::compact() };
+        let mut weights = Weights::init(architecture, RootSeed(2), 0);
+        weights.values_mut().iter_mut().zip(1_u16..).for_each(|(value, index)| *value = f32::from(index));
+        let tensors = to_pytorch(&weights);
+        let first = |name: &str| {
+            let tensor = tensors.iter().find(|tensor| tensor.name == name).unwrap();
+            f32::from_le_bytes(*tensor.bytes.first_chunk::<4>().unwrap())
+        };
+        let parts = weights.parts();
+        assert_eq!(first("residual1_2.weight"), parts.residual1_weight[16 * 16 * 9]);
+        assert_eq!(first("residual1_2.bias"), parts.residual1_bias[16]);
+        assert_eq!(first("residual2_3.weight"), parts.residual2_weight[2 * 32 * 32 * 9]);
+        assert_eq!(first("residual2_3.bias"), parts.residual2_bias[2 * 32]);
+        let names: Vec<String> = layers(&architecture).into_iter().map(|layer| layer.name).collect();
+        assert_eq!(names[..4], ["conv1", "residual1_1", "residual1_2", "conv2"]);
+        assert_eq!(names[4..], ["residual2_1", "residual2_2", "residual2_3", "fc1", "fc2"]);
+        let mut read = Weights::zeros(architecture);
+        from_pytorch(&mut read, |name, _| {
+            let tensor = tensors.iter().find(|tensor| tensor.name == name).unwrap();
+            Ok::<_, ()>(tensor.bytes.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect())
+        })
+        .unwrap();
+        assert_eq!(read, weights);
     }
 
     #[test]

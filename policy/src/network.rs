@@ -1,6 +1,6 @@
 //! The driving policy network: a module of burn, its weights on the host, and how it answers.
 //!
-//! [`LookAheadNet`] is the network. Its two convolutions and its dense layers are custom [`operations`]: fast on CPUs,
+//! [`LookAheadNet`] is the network. Its convolutions and its dense layers are custom [`operations`]: fast on CPUs,
 //! plain burn on GPUs, where it can be trained. The same module is trained (with autodiff) and drives (without, in [`Predictor`]).
 
 mod architecture;
@@ -14,7 +14,7 @@ pub mod operations;
 mod predictor;
 mod weights;
 
-pub use architecture::{ConvLayer, LANES, NetworkArchitecture, OUTPUTS, POOLED_1, POOLED_2};
+pub use architecture::{ConvLayer, LANES, NetworkArchitecture, OUTPUTS, POOLED_1, POOLED_2, RESIDUAL_KERNEL};
 pub use dropout::DropoutFactors;
 pub use ensemble::Ensemble;
 pub use error::NetworkError;

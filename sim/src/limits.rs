@@ -70,6 +70,8 @@ pub const VIEW_REQUEST_BYTES_MAX: u64 = 1_000_000;
 
 /// Channels of a convolution.
 pub const CHANNELS_MAX: usize = 1024;
+/// Residual layers after a pool.
+pub const RESIDUAL_LAYERS_MAX: usize = 8;
 /// Units of the fully connected layer.
 pub const HIDDEN_MAX: usize = 65_536;
 /// Components of the mixture that a network answers with.

@@ -42,7 +42,8 @@ def forward(model, tensors, grids):
     for layer in model["layers"]:
         weight, bias = tensors[layer["name"] + ".weight"], tensors[layer["name"] + ".bias"]
         if layer["kind"] == "conv2d":
-            x = max_pool(conv2d(x, weight, bias, tuple(layer["padding"])))
+            y = conv2d(x, weight, bias, tuple(layer["padding"]))
+            x = y + x if layer.get("residual") else max_pool(y)
         else:
             x = x.reshape(len(x), -1) @ weight.T + bias
         if layer["activation"] == "relu":

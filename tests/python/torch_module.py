@@ -22,7 +22,8 @@ class LookAheadNet(nn.Module):
     def forward(self, x):  # [batch, 1, 25, 25], 1 = non-drivable
         for layer in self.layers:
             if layer["kind"] == "conv2d":
-                x = F.max_pool2d(self.get_submodule(layer["name"])(F.pad(x, layer["padding"] * 2)), 2)
+                y = self.get_submodule(layer["name"])(F.pad(x, layer["padding"] * 2))
+                x = y + x if layer.get("residual") else F.max_pool2d(y, layer["max_pool"])
             else:
                 x = self.get_submodule(layer["name"])(x.flatten(1))
             x = F.relu(x) if layer["activation"] == "relu" else x

@@ -92,6 +92,8 @@ fn strong() -> Settings {
             network: NetworkArchitecture {
                 conv1: ConvLayer { channels: 32, kernel: 5 },
                 conv2: ConvLayer { channels: 64, kernel: 3 },
+                residual1: 0,
+                residual2: 0,
                 hidden: 512,
                 modes: 1,
                 ..base.dagger.network
@@ -191,6 +193,8 @@ fn smoke() -> Settings {
             network: NetworkArchitecture {
                 conv1: ConvLayer { channels: 16, kernel: 3 },
                 conv2: ConvLayer { channels: 16, kernel: 2 },
+                residual1: 1,
+                residual2: 1,
                 hidden: 64,
                 modes: 1,
                 dropout_features: 0.0,

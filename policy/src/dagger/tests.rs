@@ -80,6 +80,8 @@ fn settings() -> DaggerSettings {
         network: NetworkArchitecture {
             conv1: ConvLayer { channels: 16, kernel: 3 },
             conv2: ConvLayer { channels: 16, kernel: 2 },
+            residual1: 1,
+            residual2: 1,
             hidden: 32,
             modes: 1,
             dropout_features: 0.0,

@@ -14,6 +14,8 @@ fn tiny() -> NetworkArchitecture {
     NetworkArchitecture {
         conv1: ConvLayer { channels: 16, kernel: 3 },
         conv2: ConvLayer { channels: 16, kernel: 2 },
+        residual1: 1,
+        residual2: 1,
         hidden: 40,
         modes: 1,
         dropout_features: 0.1,

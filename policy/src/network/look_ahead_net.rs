@@ -1,8 +1,8 @@
 //! The network as a module of burn.
 
-use crate::network::architecture::{ConvLayer, NetworkArchitecture};
+use crate::network::architecture::{ConvLayer, NetworkArchitecture, RESIDUAL_KERNEL};
 use crate::network::dropout::DropoutFactors;
-use crate::network::operations::{dense, encode};
+use crate::network::operations::{dense, first_layer, residual_layer, second_layer};
 use crate::network::weights::Weights;
 use burn::module::{Module, Param, ParamId};
 use burn::nn::conv::{Conv2d, Conv2dConfig};
@@ -15,7 +15,9 @@ use sim::sensing::{GRID_CELLS, OccupancyGrid};
 #[derive(Module, Debug)]
 pub struct LookAheadNet {
     conv1: Conv2d,
+    residual1: Vec<Conv2d>,
     conv2: Conv2d,
+    residual2: Vec<Conv2d>,
     fc1: Linear,
     fc2: Linear,
 }
@@ -34,6 +36,13 @@ impl LookAheadNet {
             layer.bias = Some(param(id + 1, bias, [conv.channels], device));
             layer
         };
+        let residual = |id: u64, channels: usize, weights: &[f32], biases: &[f32]| {
+            let layers = weights.chunks_exact(channels * channels * RESIDUAL_KERNEL.pow(2));
+            let layers = (id..).step_by(2).zip(layers.zip(biases.chunks_exact(channels)));
+            let shape = ConvLayer { channels, kernel: RESIDUAL_KERNEL };
+            layers.map(|(id, (weight, bias))| conv(id, channels, shape, weight, bias)).collect()
+        };
+        let (channels1, channels2) = (architecture.conv1.channels, architecture.conv2.channels);
         let linear = |id: u64, inputs: usize, outputs: usize, weight: &[f32], bias: &[f32]| {
             let mut layer = LinearConfig::new(inputs, outputs).init(device);
             layer.weight = param(id, weight, [inputs, outputs], device);
@@ -42,7 +51,9 @@ impl LookAheadNet {
         };
         Self {
             conv1: conv(0, 1, architecture.conv1, parts.conv1_weight, parts.conv1_bias),
-            conv2: conv(2, architecture.conv1.channels, architecture.conv2, parts.conv2_weight, parts.conv2_bias),
+            residual1: residual(RESIDUAL1, channels1, parts.residual1_weight, parts.residual1_bias),
+            conv2: conv(2, channels1, architecture.conv2, parts.conv2_weight, parts.conv2_bias),
+            residual2: residual(RESIDUAL2, channels2, parts.residual2_weight, parts.residual2_bias),
             fc1: linear(4, architecture.features(), architecture.hidden, parts.fc1_weight, parts.fc1_bias),
             fc2: linear(6, architecture.hidden, architecture.outputs(), parts.fc2_weight, parts.fc2_bias),
         }
@@ -53,23 +64,14 @@ impl LookAheadNet {
     /// of every mode, then their logits.
     pub fn forward(&self, occupied: Tensor<3, Bool>, dropout: Option<DropoutFactors>) -> Tensor<2> {
         let (on_features, on_hidden) = dropout.map(|factors| (factors.features, factors.hidden)).unzip();
-        let features = encode(
-            occupied,
-            self.conv1.weight.val(),
-            bias(self.conv1.bias.as_ref()),
-            self.conv2.weight.val(),
-            bias(self.conv2.bias.as_ref()),
-        ); // [batch, features]
+        let map = first_layer(occupied, self.conv1.weight.val(), bias(self.conv1.bias.as_ref()));
+        let map = self.residual1.iter().fold(map, residual);
+        let features = second_layer(map, self.conv2.weight.val(), bias(self.conv2.bias.as_ref()));
+        let features = self.residual2.iter().fold(features, residual); // [batch, features]
         let features = times(features, on_features.flatten());
         let hidden = relu(dense(features, self.fc1.weight.val(), bias(self.fc1.bias.as_ref())));
         let hidden = times(hidden, on_hidden.flatten()); // [batch, hidden]
         dense(hidden, self.fc2.weight.val(), bias(self.fc2.bias.as_ref()))
-    }
-
-    /// The weights of both convolutions.
-    #[cfg(test)]
-    pub(crate) fn convolutions(&self) -> (&Param<Tensor<4>>, &Param<Tensor<4>>) {
-        (&self.conv1.weight, &self.conv2.weight)
     }
 
     /// The parameters on the host.
@@ -78,13 +80,34 @@ impl LookAheadNet {
         let parts = weights.parts_mut();
         read(self.conv1.weight.val(), parts.conv1_weight);
         read(bias(self.conv1.bias.as_ref()), parts.conv1_bias);
+        read_all(&self.residual1, parts.residual1_weight, parts.residual1_bias);
         read(self.conv2.weight.val(), parts.conv2_weight);
         read(bias(self.conv2.bias.as_ref()), parts.conv2_bias);
+        read_all(&self.residual2, parts.residual2_weight, parts.residual2_bias);
         read(self.fc1.weight.val(), parts.fc1_weight);
         read(bias(self.fc1.bias.as_ref()), parts.fc1_bias);
         read(self.fc2.weight.val(), parts.fc2_weight);
         read(bias(self.fc2.bias.as_ref()), parts.fc2_bias);
         weights
+    }
+}
+
+/// Numbers of the first parameters of both kinds of residual layers; see [`param`].
+const RESIDUAL1: u64 = 0x100;
+const RESIDUAL2: u64 = 0x200;
+
+fn residual(map: Tensor<2>, layer: &Conv2d) -> Tensor<2> {
+    residual_layer(map, layer.weight.val(), bias(layer.bias.as_ref()))
+}
+
+/// Weights and biases of several layers, one after the other.
+fn read_all(layers: &[Conv2d], weights: &mut [f32], biases: &mut [f32]) {
+    let each = layers.len().max(1);
+    let (weight_len, bias_len) = ((weights.len() / each).max(1), (biases.len() / each).max(1));
+    let into = weights.chunks_exact_mut(weight_len).zip(biases.chunks_exact_mut(bias_len));
+    for (layer, (into_weight, into_bias)) in layers.iter().zip(into) {
+        read(layer.weight.val(), into_weight);
+        read(bias(layer.bias.as_ref()), into_bias);
     }
 }
 

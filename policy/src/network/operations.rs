@@ -2,7 +2,7 @@
 //!
 //! | operation | on CPUs (`cpu`) | why not burn-flex's |
 //! |---|---|---|
-//! | [`encode`]: both convolutions with pools and `ReLU`s | table look-up, sparse backward pass | a fraction of the speed |
+//! | [`first_layer`], [`residual_layer`], [`second_layer`]: convolutions with pools and `ReLU`s | table look-up, sparse backward pass | a fraction of the speed |
 //! | [`dense`]: x · weight + bias | one chain of multiply-adds per output | its sums depend on the machine's caches |
 //! | [`tanh`], [`exp`] | one value after the other | they are the platform's, which rounds as it likes |
 //! | [`adam_step`]: Adam and the clipping of its gradient | two passes over the values | a dozen, and denormal numbers |
@@ -23,25 +23,32 @@ use burn::backend::Dispatch;
 use burn::tensor::{Bool, Tensor};
 pub use ops::{NetworkOps, OptimizerOps};
 
-/// Occupied cells `[batch, 25, 25]` to features `[batch, 6 · 6 · conv2]`, row by row, channels last: twice a
-/// convolution with "same" padding, a max-pool of 2 and a `ReLU`.
+/// Occupied cells `[batch, 25, 25]` to `[batch, 12 · 12 · channels]`, row by row, channels last: a convolution with "same"
+/// padding, a max-pool of 2 and a `ReLU`.
 ///
-/// `weight_1` `[conv1, 1, kernel, kernel]`, `bias_1` `[conv1]`, `weight_2` `[conv2, conv1, kernel, kernel]`, `bias_2`
-/// `[conv2]`; channels are multiples of [`LANES`](crate::network::LANES), the first kernel is 7 at most.
-pub fn encode(
-    occupied: Tensor<3, Bool>,
-    weight_1: Tensor<4>,
-    bias_1: Tensor<1>,
-    weight_2: Tensor<4>,
-    bias_2: Tensor<1>,
-) -> Tensor<2> {
-    Tensor::from_dispatch(<Dispatch as NetworkOps>::encode(
-        occupied.into_dispatch(),
-        weight_1.into_dispatch(),
-        bias_1.into_dispatch(),
-        weight_2.into_dispatch(),
-        bias_2.into_dispatch(),
-    ))
+/// `weight` `[channels, 1, kernel, kernel]`, `bias` `[channels]`; channels are a multiple of [`LANES`](crate::network::LANES),
+/// the kernel is 7 at most.
+pub fn first_layer(occupied: Tensor<3, Bool>, weight: Tensor<4>, bias: Tensor<1>) -> Tensor<2> {
+    let (weight, bias) = (weight.into_dispatch(), bias.into_dispatch());
+    Tensor::from_dispatch(<Dispatch as NetworkOps>::first_layer(occupied.into_dispatch(), weight, bias))
+}
+
+/// A pooled map `[batch, cells · channels]`, of 12 or 6 cells per side, to one of the same shape: what a 3×3 convolution with
+/// "same" padding answers is added to it, then a `ReLU`.
+///
+/// `weight` `[channels, channels, 3, 3]`, `bias` `[channels]`.
+pub fn residual_layer(x: Tensor<2>, weight: Tensor<4>, bias: Tensor<1>) -> Tensor<2> {
+    let (x, weight, bias) = (x.into_dispatch(), weight.into_dispatch(), bias.into_dispatch());
+    Tensor::from_dispatch(<Dispatch as NetworkOps>::residual_layer(x, weight, bias))
+}
+
+/// A map `[batch, 12 · 12 · inputs]` to features `[batch, 6 · 6 · channels]`: a convolution with "same" padding, a max-pool of 2
+/// and a `ReLU`.
+///
+/// `weight` `[channels, inputs, kernel, kernel]`, `bias` `[channels]`.
+pub fn second_layer(x: Tensor<2>, weight: Tensor<4>, bias: Tensor<1>) -> Tensor<2> {
+    let (x, weight, bias) = (x.into_dispatch(), weight.into_dispatch(), bias.into_dispatch());
+    Tensor::from_dispatch(<Dispatch as NetworkOps>::second_layer(x, weight, bias))
 }
 
 /// `x` `[batch, inputs]` · `weight` `[inputs, outputs]` + `bias` `[outputs]`: `[batch, outputs]`.

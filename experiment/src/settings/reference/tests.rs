@@ -166,7 +166,7 @@ fn every_old_key_leads_to_a_new_one() {
 
 /// Key, value in preset `paper`, where it is from. "Silent": the paper does not mention such a thing, so it is off.
 #[rustfmt::skip]
-const OF_THE_PAPER: [(&str, &str, &str); 49] = [
+const OF_THE_PAPER: [(&str, &str, &str); 51] = [
     ("training.lots", "[\"lot-a\"]", "Driving Policy Network Training: one parking lot"),
     ("training.directions", "[\"forward\", \"reverse\"]", "… there and back, 460 m"),
     ("training.trials", "1", "… once"),
@@ -193,6 +193,8 @@ const OF_THE_PAPER: [(&str, &str, &str); 49] = [
     ("dagger.network.conv1.kernel", "5", "authors' code"),
     ("dagger.network.conv2.channels", "64", "authors' code"),
     ("dagger.network.conv2.kernel", "2", "authors' code"),
+    ("dagger.network.residual1", "0", "Driving Policy Network"),
+    ("dagger.network.residual2", "0", "Driving Policy Network"),
     ("dagger.network.hidden", "1000", "Driving Policy Network"),
     ("dagger.network.modes", "1", "Driving Policy Network"),
     ("dagger.network.dropout_features", "0.25", "authors' code"),

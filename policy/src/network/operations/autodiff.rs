@@ -1,9 +1,9 @@
 //! Gradients on CPUs, written by hand.
 
-use super::cpu::dense;
-use super::cpu::encoder::EncoderTrace;
-use super::flex::{EncoderParameters, contiguous, from_vec, values};
+use super::cpu::{Answers, dense};
+use super::flex::{self, contiguous, from_vec, values};
 use super::ops::NetworkOps;
+use burn::backend::autodiff::NodeId;
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
@@ -14,26 +14,46 @@ use burn::backend::{Autodiff, Flex, TensorMetadata as _};
 use std::sync::Arc;
 
 impl<C: CheckpointStrategy> NetworkOps for Autodiff<Flex, C> {
-    fn encode(
+    fn first_layer(
         occupied: BoolTensor<Self>,
-        weight_1: FloatTensor<Self>,
-        bias_1: FloatTensor<Self>,
-        weight_2: FloatTensor<Self>,
-        bias_2: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
     ) -> FloatTensor<Self> {
-        let nodes = [&weight_1, &bias_1, &weight_2, &bias_2].map(FloatTensor::<Self>::node);
-        let parameters = [weight_1, bias_1, weight_2, bias_2].map(FloatTensor::<Self>::into_primitive);
-        match Encode.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::UnTracked(prepared) => {
-                let [weight_1, bias_1, weight_2, bias_2] = parameters;
-                prepared.finish(Flex::encode(occupied, weight_1, bias_1, weight_2, bias_2))
-            }
+        let nodes = [&weight, &bias].map(FloatTensor::<Self>::node);
+        let [weight, bias] = [weight, bias].map(|tensor| contiguous(tensor.into_primitive()));
+        match First.prepare::<C>(nodes).compute_bound().stateful() {
+            OpsKind::UnTracked(prepared) => prepared.finish(Flex::first_layer(occupied, weight, bias)),
             OpsKind::Tracked(prepared) => {
-                let parameters = EncoderParameters::new(parameters);
                 let occupied = contiguous(occupied);
-                let (features, trace) = parameters.weights().forward_traced(occupied.bytes());
-                let features = from_vec(features, [occupied.shape()[0], parameters.weights().features_len()]);
-                prepared.finish(Arc::new(EncodeState { parameters, trace }), features)
+                let Answers { y, chosen } = flex::first(&weight, &bias).forward(occupied.bytes(), true);
+                let y = flex::batch_of(y, &occupied);
+                prepared.finish(Trace { x: occupied, weight, bias, chosen: chosen.into() }, y)
+            }
+        }
+    }
+
+    fn residual_layer(x: FloatTensor<Self>, weight: FloatTensor<Self>, bias: FloatTensor<Self>) -> FloatTensor<Self> {
+        let nodes = [&x, &weight, &bias].map(FloatTensor::<Self>::node);
+        let [x, weight, bias] = [x, weight, bias].map(|tensor| contiguous(tensor.into_primitive()));
+        match Residual.prepare::<C>(nodes).compute_bound().stateful() {
+            OpsKind::UnTracked(prepared) => prepared.finish(Flex::residual_layer(x, weight, bias)),
+            OpsKind::Tracked(prepared) => {
+                let Answers { y, chosen } = flex::residual(&x, &weight, &bias).forward(values(&x), true);
+                let y = flex::batch_of(y, &x);
+                prepared.finish(Trace { x, weight, bias, chosen: chosen.into() }, y)
+            }
+        }
+    }
+
+    fn second_layer(x: FloatTensor<Self>, weight: FloatTensor<Self>, bias: FloatTensor<Self>) -> FloatTensor<Self> {
+        let nodes = [&x, &weight, &bias].map(FloatTensor::<Self>::node);
+        let [x, weight, bias] = [x, weight, bias].map(|tensor| contiguous(tensor.into_primitive()));
+        match Second.prepare::<C>(nodes).compute_bound().stateful() {
+            OpsKind::UnTracked(prepared) => prepared.finish(Flex::second_layer(x, weight, bias)),
+            OpsKind::Tracked(prepared) => {
+                let Answers { y, chosen } = flex::second(&weight, &bias).forward(values(&x), true);
+                let y = flex::batch_of(y, &x);
+                prepared.finish(Trace { x, weight, bias, chosen: chosen.into() }, y)
             }
         }
     }
@@ -69,28 +89,68 @@ impl<C: CheckpointStrategy> NetworkOps for Autodiff<Flex, C> {
     }
 }
 
-/// Backward pass of the encoder. Its parents are the weights; cells have no gradient.
-#[derive(Debug)]
-struct Encode;
-
-#[derive(Debug)]
-struct EncodeState {
-    parameters: EncoderParameters,
-    trace: EncoderTrace,
+/// What the forward pass of a convolution leaves for the backward pass.
+#[derive(Debug, Clone)]
+struct Trace {
+    x: FlexTensor,
+    weight: FlexTensor,
+    bias: FlexTensor,
+    chosen: Arc<[u32]>,
 }
 
-impl Backward<Flex, 4> for Encode {
-    type State = Arc<EncodeState>;
+/// Backward pass of the first layer. Its parents are the weights; cells have no gradient.
+#[derive(Debug)]
+struct First;
 
-    fn backward(self, ops: Ops<Self::State, 4>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let d_features = contiguous(grads.consume::<Flex>(&ops.node));
-        let EncodeState { parameters, trace } = &*ops.state;
-        let found = parameters.weights().backward(trace, values(&d_features));
-        let found = parameters.tensors([found.weight_1, found.bias_1, found.weight_2, found.bias_2]);
-        for (parent, gradient) in ops.parents.into_iter().zip(found) {
-            if let Some(node) = parent {
-                grads.register::<Flex>(node.id, gradient);
-            }
+impl Backward<Flex, 2> for First {
+    type State = Trace;
+
+    fn backward(self, ops: Ops<Self::State, 2>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let d_y = contiguous(grads.consume::<Flex>(&ops.node));
+        let Trace { x, weight, bias, chosen } = &ops.state;
+        let found = flex::first(weight, bias).backward(x.bytes(), chosen, values(&d_y));
+        let [of_weight, of_bias] = ops.parents.map(|parent| parent.map(|node| node.id));
+        register(grads, [(of_weight, found.weight, weight), (of_bias, found.bias, bias)]);
+    }
+}
+
+/// Backward pass of a residual layer. Its parents are x, weight and bias.
+#[derive(Debug)]
+struct Residual;
+
+impl Backward<Flex, 3> for Residual {
+    type State = Trace;
+
+    fn backward(self, ops: Ops<Self::State, 3>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let d_y = contiguous(grads.consume::<Flex>(&ops.node));
+        let Trace { x, weight, bias, chosen } = &ops.state;
+        let found = flex::residual(x, weight, bias).backward(values(x), chosen, values(&d_y));
+        let [of_x, of_weight, of_bias] = ops.parents.map(|parent| parent.map(|node| node.id));
+        register(grads, [(of_x, found.x, x), (of_weight, found.weight, weight), (of_bias, found.bias, bias)]);
+    }
+}
+
+/// Backward pass of the second layer. Its parents are x, weight and bias.
+#[derive(Debug)]
+struct Second;
+
+impl Backward<Flex, 3> for Second {
+    type State = Trace;
+
+    fn backward(self, ops: Ops<Self::State, 3>, grads: &mut Gradients, _: &mut Checkpointer) {
+        let d_y = contiguous(grads.consume::<Flex>(&ops.node));
+        let Trace { x, weight, bias, chosen } = &ops.state;
+        let found = flex::second(weight, bias).backward(values(x), chosen, values(&d_y));
+        let [of_x, of_weight, of_bias] = ops.parents.map(|parent| parent.map(|node| node.id));
+        register(grads, [(of_x, found.x, x), (of_weight, found.weight, weight), (of_bias, found.bias, bias)]);
+    }
+}
+
+/// Registers gradients with the nodes that ask for them.
+fn register<const N: usize>(grads: &mut Gradients, found: [(Option<NodeId>, Vec<f32>, &FlexTensor); N]) {
+    for (parent, gradient, like) in found {
+        if let Some(id) = parent {
+            grads.register::<Flex>(id, from_vec(gradient, like.shape()));
         }
     }
 }

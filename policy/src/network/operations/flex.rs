@@ -1,7 +1,9 @@
 //! The operations on burn's CPU backend: tensors to slices and back.
 
 use super::adam::{AdamMoments, AdamStep};
-use super::cpu::encoder::EncoderWeights;
+use super::cpu::first_layer::FirstLayer;
+use super::cpu::residual_layer::ResidualLayer;
+use super::cpu::second_layer::SecondLayer;
 use super::cpu::{adam, dense};
 use super::ops::{NetworkOps, OptimizerOps};
 use crate::network::architecture::ConvLayer;
@@ -11,18 +13,19 @@ use burn::tensor::TensorData;
 use sim::maths;
 
 impl NetworkOps for Flex {
-    fn encode(
-        occupied: FlexTensor,
-        weight_1: FlexTensor,
-        bias_1: FlexTensor,
-        weight_2: FlexTensor,
-        bias_2: FlexTensor,
-    ) -> FlexTensor {
-        let occupied = contiguous(occupied);
-        let batch = occupied.shape()[0];
-        let parameters = EncoderParameters::new([weight_1, bias_1, weight_2, bias_2]);
-        let features = parameters.weights().forward(occupied.bytes());
-        from_vec(features, [batch, parameters.weights().features_len()])
+    fn first_layer(occupied: FlexTensor, weight: FlexTensor, bias: FlexTensor) -> FlexTensor {
+        let [occupied, weight, bias] = [occupied, weight, bias].map(contiguous);
+        batch_of(first(&weight, &bias).forward(occupied.bytes(), false).y, &occupied)
+    }
+
+    fn residual_layer(x: FlexTensor, weight: FlexTensor, bias: FlexTensor) -> FlexTensor {
+        let [x, weight, bias] = [x, weight, bias].map(contiguous);
+        batch_of(residual(&x, &weight, &bias).forward(values(&x), false).y, &x)
+    }
+
+    fn second_layer(x: FlexTensor, weight: FlexTensor, bias: FlexTensor) -> FlexTensor {
+        let [x, weight, bias] = [x, weight, bias].map(contiguous);
+        batch_of(second(&weight, &bias).forward(values(&x), false).y, &x)
     }
 
     fn dense(x: FlexTensor, weight: FlexTensor, bias: FlexTensor) -> FlexTensor {
@@ -50,45 +53,31 @@ impl OptimizerOps for Flex {
     }
 }
 
-/// The parameters of the encoder, contiguous.
-#[derive(Debug, Clone)]
-pub(super) struct EncoderParameters {
-    conv1: ConvLayer,
-    conv2: ConvLayer,
-    weight_1: FlexTensor,
-    bias_1: FlexTensor,
-    weight_2: FlexTensor,
-    bias_2: FlexTensor,
+/// The first layer, of contiguous weights.
+pub(super) fn first<'a>(weight: &'a FlexTensor, bias: &'a FlexTensor) -> FirstLayer<'a> {
+    FirstLayer::new(layer(weight), values(weight), values(bias))
 }
 
-impl EncoderParameters {
-    /// Weight and bias of the first convolution, then of the second.
-    pub(super) fn new(parameters: [FlexTensor; 4]) -> Self {
-        let [weight_1, bias_1, weight_2, bias_2] = parameters.map(contiguous);
-        let layer = |weight: &FlexTensor| ConvLayer { channels: weight.shape()[0], kernel: weight.shape()[2] };
-        Self { conv1: layer(&weight_1), conv2: layer(&weight_2), weight_1, bias_1, weight_2, bias_2 }
-    }
+/// A residual layer for maps like `x`, of contiguous weights.
+pub(super) fn residual<'a>(x: &FlexTensor, weight: &'a FlexTensor, bias: &'a FlexTensor) -> ResidualLayer<'a> {
+    let cells = ResidualLayer::cells(x.shape()[1], bias.shape()[0]);
+    ResidualLayer::new(cells, values(weight), values(bias))
+}
 
-    pub(super) fn weights(&self) -> EncoderWeights<'_> {
-        EncoderWeights {
-            conv1: self.conv1,
-            conv2: self.conv2,
-            weight_1: values(&self.weight_1),
-            bias_1: values(&self.bias_1),
-            weight_2: values(&self.weight_2),
-            bias_2: values(&self.bias_2),
-        }
-    }
+/// The second layer, of contiguous weights.
+pub(super) fn second<'a>(weight: &'a FlexTensor, bias: &'a FlexTensor) -> SecondLayer<'a> {
+    SecondLayer::new(layer(weight), values(weight), values(bias))
+}
 
-    /// Gradients as tensors: weight and bias of the first convolution, then of the second.
-    pub(super) fn tensors(&self, [weight_1, bias_1, weight_2, bias_2]: [Vec<f32>; 4]) -> [FlexTensor; 4] {
-        [
-            from_vec(weight_1, self.weight_1.shape()),
-            from_vec(bias_1, self.bias_1.shape()),
-            from_vec(weight_2, self.weight_2.shape()),
-            from_vec(bias_2, self.bias_2.shape()),
-        ]
-    }
+fn layer(weight: &FlexTensor) -> ConvLayer {
+    ConvLayer { channels: weight.shape()[0], kernel: weight.shape()[2] }
+}
+
+/// `[batch, values]`, as many rows as `x` has.
+pub(super) fn batch_of(y: Vec<f32>, x: &FlexTensor) -> FlexTensor {
+    let batch = x.shape()[0];
+    let len = y.len() / batch.max(1);
+    from_vec(y, [batch, len])
 }
 
 /// The tensor with its values in order, and no others, in memory.

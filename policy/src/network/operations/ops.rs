@@ -13,16 +13,26 @@ use burn::backend::{Backend, backend_extension};
     Autodiff
 )]
 pub trait NetworkOps: Backend {
-    /// See [`encode`](super::encode).
+    /// See [`first_layer`](super::first_layer).
     #[fusion(default)]
-    fn encode(
+    fn first_layer(
         occupied: BoolTensor<Self>,
-        weight_1: FloatTensor<Self>,
-        bias_1: FloatTensor<Self>,
-        weight_2: FloatTensor<Self>,
-        bias_2: FloatTensor<Self>,
+        weight: FloatTensor<Self>,
+        bias: FloatTensor<Self>,
     ) -> FloatTensor<Self> {
-        plain::encode::<Self>(occupied, weight_1, bias_1, weight_2, bias_2)
+        plain::first_layer::<Self>(occupied, weight, bias)
+    }
+
+    /// See [`residual_layer`](super::residual_layer).
+    #[fusion(default)]
+    fn residual_layer(x: FloatTensor<Self>, weight: FloatTensor<Self>, bias: FloatTensor<Self>) -> FloatTensor<Self> {
+        plain::residual_layer::<Self>(x, weight, bias)
+    }
+
+    /// See [`second_layer`](super::second_layer).
+    #[fusion(default)]
+    fn second_layer(x: FloatTensor<Self>, weight: FloatTensor<Self>, bias: FloatTensor<Self>) -> FloatTensor<Self> {
+        plain::second_layer::<Self>(x, weight, bias)
     }
 
     /// See [`dense`](super::dense).

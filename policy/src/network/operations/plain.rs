@@ -7,29 +7,60 @@ use burn::backend::{Backend, FloatDType, Scalar, TensorMetadata as _};
 use burn::tensor::Shape;
 use burn::tensor::ops::ConvOptions;
 
-pub(crate) fn encode<B: Backend>(
+pub(crate) fn first_layer<B: Backend>(
     occupied: BoolTensor<B>,
-    weight_1: FloatTensor<B>,
-    bias_1: FloatTensor<B>,
-    weight_2: FloatTensor<B>,
-    bias_2: FloatTensor<B>,
+    weight: FloatTensor<B>,
+    bias: FloatTensor<B>,
 ) -> FloatTensor<B> {
     let [batch, rows, cols] = occupied.shape().dims();
     let cells = B::float_reshape(B::bool_into_float(occupied, FloatDType::F32), Shape::new([batch, 1, rows, cols]));
-    let pooled = layer::<B>(cells, weight_1, bias_1);
-    let pooled = layer::<B>(pooled, weight_2, bias_2); // [batch, channel, 6, 6]
-    let [batch, channels, rows, cols] = pooled.shape().dims();
-    let channels_last = B::float_permute(pooled, &[0, 2, 3, 1]);
+    flat::<B>(pooled::<B>(convolved::<B>(cells, weight, bias)))
+}
+
+pub(crate) fn residual_layer<B: Backend>(
+    x: FloatTensor<B>,
+    weight: FloatTensor<B>,
+    bias: FloatTensor<B>,
+) -> FloatTensor<B> {
+    let [channels] = bias.shape().dims();
+    let map = map::<B>(x, channels);
+    flat::<B>(B::relu(B::float_add(map.clone(), convolved::<B>(map, weight, bias))))
+}
+
+pub(crate) fn second_layer<B: Backend>(
+    x: FloatTensor<B>,
+    weight: FloatTensor<B>,
+    bias: FloatTensor<B>,
+) -> FloatTensor<B> {
+    let [_, inputs, ..] = weight.shape().dims::<4>();
+    flat::<B>(pooled::<B>(convolved::<B>(map::<B>(x, inputs), weight, bias)))
+}
+
+/// `[batch, cells · channels]`, channels last, to `[batch, channel, row, column]`.
+fn map<B: Backend>(x: FloatTensor<B>, channels: usize) -> FloatTensor<B> {
+    let [batch, values] = x.shape().dims();
+    let side = (values / channels).isqrt();
+    B::float_permute(B::float_reshape(x, Shape::new([batch, side, side, channels])), &[0, 3, 1, 2])
+}
+
+/// The inverse of [`map`].
+fn flat<B: Backend>(map: FloatTensor<B>) -> FloatTensor<B> {
+    let [batch, channels, rows, cols] = map.shape().dims();
+    let channels_last = B::float_permute(map, &[0, 2, 3, 1]);
     B::float_reshape(channels_last, Shape::new([batch, rows * cols * channels]))
 }
 
-/// Convolution with "same" padding, max-pool of 2, `ReLU`.
-fn layer<B: Backend>(x: FloatTensor<B>, weight: FloatTensor<B>, bias: FloatTensor<B>) -> FloatTensor<B> {
+/// Convolution with "same" padding.
+fn convolved<B: Backend>(x: FloatTensor<B>, weight: FloatTensor<B>, bias: FloatTensor<B>) -> FloatTensor<B> {
     let [channels, _, kernel, _] = weight.shape().dims();
     let mut options = ConvOptions::new([1, 1], [0, 0], [1, 1], 1);
     options.padding = [ConvLayer { channels, kernel }.padding(); 2];
-    let convolved = B::conv2d(x, weight, Some(bias), options);
-    B::relu(B::max_pool2d(convolved, [2, 2], [2, 2], [0, 0], [1, 1], false))
+    B::conv2d(x, weight, Some(bias), options)
+}
+
+/// Max-pool of 2, `ReLU`.
+fn pooled<B: Backend>(x: FloatTensor<B>) -> FloatTensor<B> {
+    B::relu(B::max_pool2d(x, [2, 2], [2, 2], [0, 0], [1, 1], false))
 }
 
 pub(crate) fn dense<B: Backend>(x: FloatTensor<B>, weight: FloatTensor<B>, bias: FloatTensor<B>) -> FloatTensor<B> {

@@ -1,27 +1,16 @@
 //! The operations on CPUs against what they mean in plain operations of burn, and against finite differences.
 
 use super::*;
-use crate::network::architecture::{ConvLayer, NetworkArchitecture};
-use crate::network::{LookAheadNet, Weights, occupied_tensor};
+use crate::network::architecture::ConvLayer;
+use crate::network::occupied_tensor;
 use crate::test_data::lots;
+use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Flex};
-use burn::module::Param;
 use burn::tensor::{Device, Float, TensorData};
 use rand::RngExt as _;
 use sim::seed::{RootSeed, Stream};
 
 type Reference = Autodiff<Flex>;
-
-fn shapes() -> [NetworkArchitecture; 3] {
-    let odd = NetworkArchitecture {
-        conv1: ConvLayer { channels: 16, kernel: 4 },
-        conv2: ConvLayer { channels: 48, kernel: 5 },
-        hidden: 70,
-        modes: 1,
-        ..NetworkArchitecture::paper()
-    };
-    [NetworkArchitecture::paper(), NetworkArchitecture::compact(), odd]
-}
 
 /// Values between −0.5 and 0.5.
 fn random(shape: impl Into<burn::tensor::Shape>, index: u64) -> TensorData {
@@ -44,103 +33,166 @@ fn assert_close(name: &str, ours: &[f32], expected: &[f32]) {
     }
 }
 
-/// The parameters of the encoder, as leaves of a graph.
-struct Leaves(Tensor<4>, Tensor<1>, Tensor<4>, Tensor<1>);
+/// What a layer sees, as after a `ReLU` half of it 0, and its parameters, as leaves of a graph.
+struct Leaves {
+    x: Tensor<2>,
+    weight: Tensor<4>,
+    bias: Tensor<1>,
+}
 
 impl Leaves {
-    fn new(architecture: NetworkArchitecture) -> Self {
+    /// `cells`: per side of the map.
+    fn new(batch: usize, cells: usize, inputs: usize, conv: ConvLayer) -> Self {
         let device = Device::flex().autodiff();
-        let leaf = |param: &Param<Tensor<4>>| param.val().detach().require_grad();
-        let net = LookAheadNet::from_weights(&Weights::init(architecture, RootSeed(5), 0), &device);
-        // Biases start at 0; here they must matter.
-        let bias = |conv: ConvLayer, index| {
-            (Tensor::<1>::from_data(random([conv.channels], index), &device) * 0.2).detach().require_grad()
-        };
-        let (conv1, conv2) = net.convolutions();
-        Self(leaf(conv1), bias(architecture.conv1, 1), leaf(conv2), bias(architecture.conv2, 2))
+        let x = Tensor::<2>::from_data(random([batch, cells * cells * inputs], 1), &device).clamp_min(0.0);
+        let weight = random([conv.channels, inputs, conv.kernel, conv.kernel], 2);
+        Self {
+            x: x.detach().require_grad(),
+            weight: Tensor::from_data(weight, &device).require_grad(),
+            bias: Tensor::from_data(random([conv.channels], 3), &device).require_grad(),
+        }
     }
 
-    fn gradients(&self, features: Tensor<2>) -> [Vec<f32>; 4] {
-        // Every feature with a weight of its own.
-        let weights = Tensor::from_data(random(features.shape(), 3), &features.device());
-        let gradients = (features * weights).sum().backward();
+    /// Primitives of the plain operations.
+    fn primitives(&self) -> [FloatTensor<Reference>; 3] {
         [
-            vector(self.0.grad(&gradients).unwrap()),
-            vector(self.1.grad(&gradients).unwrap()),
-            vector(self.2.grad(&gradients).unwrap()),
-            vector(self.3.grad(&gradients).unwrap()),
+            self.x.clone().try_into_primitive::<Reference>().unwrap(),
+            self.weight.clone().try_into_primitive::<Reference>().unwrap(),
+            self.bias.clone().try_into_primitive::<Reference>().unwrap(),
         ]
     }
 
-    fn encoded(&self, occupied: Tensor<3, Bool>) -> Tensor<2> {
-        encode(occupied, self.0.clone(), self.1.clone(), self.2.clone(), self.3.clone())
+    /// Of the sum of the answers, each with a weight of its own; that of x only if it is part of the graph.
+    fn gradients(&self, y: Tensor<2>) -> Vec<(&'static str, Vec<f32>)> {
+        let weights = Tensor::from_data(random(y.shape(), 4), &y.device());
+        let found = (y * weights).sum().backward();
+        let of_x = self.x.grad(&found).map(|gradient| ("x", vector(gradient)));
+        let of_weights =
+            [("weight", vector(self.weight.grad(&found).unwrap())), ("bias", vector(self.bias.grad(&found).unwrap()))];
+        of_x.into_iter().chain(of_weights).collect()
     }
 
-    fn plainly_encoded(&self, occupied: Tensor<3, Bool>) -> Tensor<2> {
-        Tensor::from_primitive::<Reference>(plain::encode::<Reference>(
-            occupied.try_into_primitive::<Reference>().unwrap(),
-            self.0.clone().try_into_primitive::<Reference>().unwrap(),
-            self.1.clone().try_into_primitive::<Reference>().unwrap(),
-            self.2.clone().try_into_primitive::<Reference>().unwrap(),
-            self.3.clone().try_into_primitive::<Reference>().unwrap(),
-        ))
-    }
-}
-
-#[test]
-fn encoding_and_its_gradients_equal_those_of_plain_operations() {
-    let batch = 19; // a whole chunk and a part of one
-    let device = Device::flex().autodiff();
-    for architecture in shapes() {
-        let leaves = Leaves::new(architecture);
-        let occupied = occupied_tensor(lots(batch).iter(), &device);
-        let (ours, expected) = (leaves.encoded(occupied.clone()), leaves.plainly_encoded(occupied));
-        assert_close("features", &vector(ours.clone()), &vector(expected.clone()));
-        let names = ["conv1.weight", "conv1.bias", "conv2.weight", "conv2.bias"];
-        for ((name, ours), expected) in names.into_iter().zip(leaves.gradients(ours)).zip(leaves.gradients(expected)) {
-            assert_close(name, &ours, &expected);
+    fn assert_alike(&self, name: &str, ours: Tensor<2>, expected: FloatTensor<Reference>) {
+        let expected = Tensor::<2>::from_primitive::<Reference>(expected);
+        assert_close(name, &vector(ours.clone()), &vector(expected.clone()));
+        let (ours, expected) = (self.gradients(ours), self.gradients(expected));
+        assert_eq!(ours.len(), expected.len(), "{name}");
+        for ((part, ours), (_, expected)) in ours.iter().zip(&expected) {
+            assert_close(&format!("{part} of {name}"), ours, expected);
         }
     }
 }
 
-/// For a smooth function of one weight at a time, where no pool changes its winner.
+/// A whole chunk and a part of one.
+const BATCH: usize = 19;
+
 #[test]
-fn gradients_of_the_encoder_equal_finite_differences() {
+fn the_first_layer_and_its_gradients_equal_those_of_plain_operations() {
+    let occupied = occupied_tensor(lots(BATCH).iter(), &Device::flex().autodiff());
+    for (channels, kernel) in [(16, 3), (32, 5), (16, 4), (48, 7), (16, 1)] {
+        let leaves = Leaves::new(1, 1, 1, ConvLayer { channels, kernel });
+        let ours = first_layer(occupied.clone(), leaves.weight.clone(), leaves.bias.clone());
+        let [_, weight, bias] = leaves.primitives();
+        let cells = occupied.clone().try_into_primitive::<Reference>().unwrap();
+        let expected = plain::first_layer::<Reference>(cells, weight, bias);
+        leaves.assert_alike(&format!("{channels} channels, kernel {kernel}"), ours, expected);
+    }
+}
+
+#[test]
+fn the_second_layer_and_its_gradients_equal_those_of_plain_operations() {
+    for (inputs, channels, kernel) in [(16, 32, 3), (32, 64, 2), (16, 48, 5), (16, 16, 1)] {
+        let leaves = Leaves::new(BATCH, 12, inputs, ConvLayer { channels, kernel });
+        let ours = second_layer(leaves.x.clone(), leaves.weight.clone(), leaves.bias.clone());
+        let [x, weight, bias] = leaves.primitives();
+        let expected = plain::second_layer::<Reference>(x, weight, bias);
+        leaves.assert_alike(&format!("{inputs} to {channels} channels, kernel {kernel}"), ours, expected);
+    }
+}
+
+#[test]
+fn a_residual_layer_and_its_gradients_equal_those_of_plain_operations() {
+    for (cells, channels) in [(12, 16), (6, 32), (12, 48), (6, 16), (6, 64)] {
+        let leaves = Leaves::new(BATCH, cells, channels, ConvLayer { channels, kernel: 3 });
+        let ours = residual_layer(leaves.x.clone(), leaves.weight.clone(), leaves.bias.clone());
+        let [x, weight, bias] = leaves.primitives();
+        let expected = plain::residual_layer::<Reference>(x, weight, bias);
+        leaves.assert_alike(&format!("{channels} channels on {cells} cells"), ours, expected);
+    }
+}
+
+/// With weights of 0 only the input is left.
+#[test]
+fn a_residual_layer_without_weights_passes_on_what_it_sees() {
+    let leaves = Leaves::new(2, 6, 16, ConvLayer { channels: 16, kernel: 3 });
+    let y = residual_layer(leaves.x.clone(), leaves.weight.clone().zeros_like(), leaves.bias.clone().zeros_like());
+    assert_eq!(vector(y), vector(leaves.x));
+}
+
+/// All convolutions one after the other.
+#[derive(Clone)]
+struct Chain {
+    weights: [Tensor<4>; 4],
+    biases: [Tensor<1>; 4],
+}
+
+impl Chain {
+    fn new(device: &Device) -> Self {
+        let shapes = [[16, 1, 3, 3], [16, 16, 3, 3], [32, 16, 3, 3], [32, 32, 3, 3]];
+        let leaf = |index: usize| Tensor::<4>::from_data(random(shapes[index], index as u64), device) * 0.4;
+        let bias = |index: usize| Tensor::<1>::from_data(random([shapes[index][0]], 9 + index as u64), device) * 0.2;
+        Self {
+            weights: std::array::from_fn(|index| leaf(index).detach().require_grad()),
+            biases: std::array::from_fn(|index| bias(index).detach().require_grad()),
+        }
+    }
+
+    /// The sum of the features, each with a weight of its own.
+    fn total(&self, occupied: &Tensor<3, Bool>) -> Tensor<1> {
+        let ([w1, w2, w3, w4], [b1, b2, b3, b4]) = (self.weights.clone(), self.biases.clone());
+        let map = residual_layer(first_layer(occupied.clone(), w1, b1), w2, b2);
+        let features = residual_layer(second_layer(map, w3, b3), w4, b4);
+        let weights = Tensor::from_data(random(features.shape(), 3), &features.device());
+        (features * weights).sum()
+    }
+}
+
+/// Along random directions, one parameter at a time: where no pool changes its winner and no `ReLU` its mind.
+#[test]
+fn gradients_of_all_convolutions_equal_finite_differences() {
     let device = Device::flex().autodiff();
     let occupied = occupied_tensor(lots(3).iter(), &device);
-    let leaves = Leaves::new(NetworkArchitecture::compact());
-    let [of_weight_1, of_bias_1, of_weight_2, of_bias_2] = leaves.gradients(leaves.encoded(occupied.clone()));
-    let total = |leaves: &Leaves| -> f64 {
-        let features = leaves.encoded(occupied.clone());
-        let weights: Vec<f32> = random(features.shape(), 3).try_into_vec().unwrap();
-        vector(features).iter().zip(weights).map(|(a, b)| f64::from(*a) * f64::from(b)).sum()
-    };
-    let moved = |part: usize, index: usize, by: f32| {
-        let shift = |tensor: Tensor<1>| {
-            let mut values = vector(tensor.clone());
-            values[index] += by;
-            Tensor::<1>::from_data(TensorData::from(values.as_slice()), &device)
-        };
-        let at = |this: usize, tensor: &Tensor<4>| {
-            let flat = tensor.clone().flatten::<1>(0, 3);
-            (if this == part { shift(flat) } else { flat }).reshape(tensor.shape())
-        };
-        let at_1 = |this: usize, tensor: &Tensor<1>| if this == part { shift(tensor.clone()) } else { tensor.clone() };
-        Leaves(at(0, &leaves.0), at_1(1, &leaves.1), at(2, &leaves.2), at_1(3, &leaves.3))
-    };
-    let step = 3e-4;
-    for (part, gradient) in [of_weight_1, of_bias_1, of_weight_2, of_bias_2].into_iter().enumerate() {
-        let mut agreeing = 0;
-        let tried: Vec<usize> = (0..gradient.len()).step_by(gradient.len().div_ceil(12)).collect();
-        for &index in &tried {
-            let difference =
-                (total(&moved(part, index, step)) - total(&moved(part, index, -step))) / f64::from(2.0 * step);
-            let slope = f64::from(gradient[index]);
-            agreeing += usize::from((difference - slope).abs() < 0.05 * (1.0 + slope.abs()));
+    let chain = Chain::new(&device);
+    let found = chain.total(&occupied).backward();
+    let total = |chain: &Chain| f64::from(chain.total(&occupied).into_scalar::<f32>());
+    let step = 2e-4;
+    let (mut agreeing, mut tried) = (0, 0);
+    for part in 0..4 {
+        for direction in 20..28 {
+            let along = Tensor::<4>::from_data(random(chain.weights[part].shape(), direction), &device);
+            let slope = (chain.weights[part].grad(&found).unwrap() * along.clone().inner()).sum();
+            let at = |by: f32| {
+                let mut moved = chain.clone();
+                moved.weights[part] = moved.weights[part].clone() + along.clone() * by;
+                total(&moved)
+            };
+            let of_weights = ((at(step) - at(-step)) / f64::from(2.0 * step), slope.into_scalar::<f32>());
+            let along = Tensor::<1>::from_data(random(chain.biases[part].shape(), direction), &device);
+            let slope = (chain.biases[part].grad(&found).unwrap() * along.clone().inner()).sum();
+            let at = |by: f32| {
+                let mut moved = chain.clone();
+                moved.biases[part] = moved.biases[part].clone() + along.clone() * by;
+                total(&moved)
+            };
+            let of_biases = ((at(step) - at(-step)) / f64::from(2.0 * step), slope.into_scalar::<f32>());
+            for (difference, slope) in [of_weights, of_biases] {
+                let slope = f64::from(slope);
+                agreeing += usize::from((difference - slope).abs() < 0.05 * (1.0 + slope.abs()));
+                tried += 1;
+            }
         }
-        // At a kink of a ReLU or a pool the two differ; that is rare.
-        assert!(agreeing * 10 >= tried.len() * 9, "part {part}: {agreeing} of {} agree", tried.len());
     }
+    assert!(agreeing * 10 >= tried * 9, "{agreeing} of {tried} agree");
 }
 
 #[test]

@@ -1,12 +1,10 @@
 //! Max-pool of 2, bias and `ReLU`, with who won. The largest of four is found before the bias is added, which changes neither.
 
+use super::SILENT;
 use pulp::Simd;
 
 /// The four cells of a pool, row by row; the first of equals wins.
 pub(super) const POOL: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];
-
-/// The winner of a pool whose value is cut off by `ReLU`.
-pub(super) const SILENT: u32 = 4;
 
 /// The largest value so far and whose it is, after that of `cell`.
 #[inline(always)]

@@ -1,48 +1,289 @@
 //! Second convolution, max-pool and `ReLU`.
 //!
-//! Forward, a window is read where it lies: a row of the kernel's window is one contiguous run of the padded map. The
-//! four convolutions of a pool are computed together, so that each weight is loaded once for four products.
+//! Forward, the four convolutions of a pool are computed together.
 //!
 //! Backward, a pool sends its gradient to one of its four cells and a silent one sends none, so that at most a quarter
 //! of the products of a dense implementation remain. They are listed first and then computed without a branch.
 
-use super::first_layer::PaddedMap;
-use super::pool::{POOL, SILENT, better, with_relu};
-use super::vectors::{int_vectors_mut, vectors, vectors_mut};
-use crate::network::architecture::{ConvLayer, LANES, POOLED_2};
-use pulp::Simd;
+use super::convolution::{Convolution, Gradients, blocks};
+use super::pool::{POOL, better, with_relu};
+use super::vectors::{self, int_vectors_mut, vectors_mut};
+use super::{Answers, CHUNK, SILENT, add_in_order, by_chunks};
+use crate::network::architecture::{ConvLayer, LANES, POOLED_1, POOLED_2};
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
 
-/// Sizes of the layer.
+/// Outputs per channel.
+const POOLS: usize = POOLED_2 * POOLED_2;
+
+/// The layer with its weights, in burn's shapes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct SecondLayer {
-    /// Channels of the input.
-    pub(super) inputs: usize,
-    pub(super) conv: ConvLayer,
-    pub(super) map: PaddedMap,
-}
-
-/// The outputs of a block: some vectors from channel `first` on.
-struct Block<'a> {
-    /// `[window value, output]`.
-    weights: &'a [f32],
+pub(crate) struct SecondLayer<'a> {
+    convolution: Convolution,
+    /// `[channel, input, kernel, kernel]`.
+    weight: &'a [f32],
+    /// `[channel]`.
     bias: &'a [f32],
+}
+
+impl<'a> SecondLayer<'a> {
+    pub(crate) fn new(conv: ConvLayer, weight: &'a [f32], bias: &'a [f32]) -> Self {
+        let inputs = weight.len() / (conv.channels * conv.kernel * conv.kernel);
+        Self { convolution: Convolution { inputs, conv, cells: POOLED_1 }, weight, bias }
+    }
+
+    /// `[batch, 6 · 6, channel]` of `x` `[batch, 12 · 12, input]`, and who won each pool.
+    pub(crate) fn forward(&self, x: &[f32], is_traced: bool) -> Answers {
+        let windows = self.windows();
+        by_chunks(x, self.convolution.input_len(), POOLS * self.bias.len(), is_traced, |x, y, winners| {
+            vectors::run(Forward { layer: *self, windows: &windows, x, y, winners });
+        })
+    }
+
+    /// The gradients, given that of the answers and who won each pool.
+    pub(crate) fn backward(&self, x: &[f32], winners: &[u32], d_y: &[f32]) -> Gradients {
+        assert_eq!(d_y.len(), winners.len(), "gradients of another batch than was traced");
+        let (layer, windows, by_output) = (*self, self.windows(), self.by_output());
+        let (input_len, output_len) = (self.convolution.input_len(), POOLS * self.bias.len());
+        let mut d_x = vec![0.0; x.len()];
+        // A chunk's share is summed by one thread, the shares in order: the same bits for any number of threads.
+        let shares: Vec<Share> = (
+            x.par_chunks(CHUNK * input_len),
+            d_x.par_chunks_mut(CHUNK * input_len),
+            winners.par_chunks(CHUNK * output_len),
+            d_y.par_chunks(CHUNK * output_len),
+        )
+            .into_par_iter()
+            .map(|(x, d_x, winners, d_y)| {
+                vectors::run(Backward { layer, windows: &windows, by_output: &by_output, x, d_x, winners, d_y })
+            })
+            .collect();
+        let mut sum = Share::new(self);
+        for share in &shares {
+            add_in_order(&mut sum.by_output, &share.by_output);
+            add_in_order(&mut sum.bias, &share.bias);
+        }
+        Gradients { x: d_x, weight: self.d_weight(&sum.by_output), bias: sum.bias }
+    }
+
+    /// Where the windows of the four cells of every pool start in the padded map.
+    fn windows(&self) -> Vec<usize> {
+        let of_pool = |pool: usize| {
+            let (row, col) = (2 * (pool / POOLED_2), 2 * (pool % POOLED_2));
+            POOL.map(|(down, right)| self.convolution.window(row + down, col + right))
+        };
+        (0..POOLS).flat_map(of_pool).collect()
+    }
+
+    /// The weights as `[output, window value]`.
+    fn by_output(&self) -> Vec<f32> {
+        let window_len = self.convolution.window_len();
+        let order: Vec<usize> = (0..window_len).map(|at| self.convolution.weight_index(at)).collect();
+        self.weight.chunks_exact(window_len).flat_map(|of_output| order.iter().map(|from| of_output[*from])).collect()
+    }
+
+    /// The inverse of [`Self::by_output`].
+    fn d_weight(&self, by_output: &[f32]) -> Vec<f32> {
+        let window_len = self.convolution.window_len();
+        let mut d_weight = vec![0.0; by_output.len()];
+        for (from, into) in by_output.chunks_exact(window_len).zip(d_weight.chunks_exact_mut(window_len)) {
+            for (at, value) in from.iter().enumerate() {
+                into[self.convolution.weight_index(at)] = *value;
+            }
+        }
+        d_weight
+    }
+
+    /// `into` `[window value]` += Σ gradient · window.
+    #[inline(always)]
+    fn add_windows<S: Simd>(&self, simd: S, map: &[f32], list: &[(usize, f32)], into: &mut [f32]) {
+        for_each_group(self.convolution.window_len() / S::F32_LANES, |first, group| {
+            let (read, written) = (|v| self.vector_of_window::<S>(first + v), |v| first + v);
+            match group {
+                Group::Nine => accumulate::<S, 9>(simd, map, list, read, into, written),
+                Group::Eight => accumulate::<S, 8>(simd, map, list, read, into, written),
+                Group::One => accumulate::<S, 1>(simd, map, list, read, into, written),
+            }
+        });
+    }
+
+    /// The window that begins at `d_map` += Σ gradient · weights of the output.
+    #[inline(always)]
+    fn add_outputs<S: Simd>(&self, simd: S, by_output: &[f32], list: &[(usize, f32)], d_map: &mut [f32]) {
+        if list.is_empty() {
+            return;
+        }
+        for_each_group(self.convolution.window_len() / S::F32_LANES, |first, group| {
+            let (read, written) = (|v| first + v, |v| self.vector_of_window::<S>(first + v));
+            match group {
+                Group::Nine => accumulate::<S, 9>(simd, by_output, list, read, d_map, written),
+                Group::Eight => accumulate::<S, 8>(simd, by_output, list, read, d_map, written),
+                Group::One => accumulate::<S, 1>(simd, by_output, list, read, d_map, written),
+            }
+        });
+    }
+
+    /// Where vector `at` of a window lies in the padded map, in vectors from the start of the window.
+    #[inline(always)]
+    fn vector_of_window<S: Simd>(&self, at: usize) -> usize {
+        let (stride, span) = (self.convolution.window(1, 0) / S::F32_LANES, self.convolution.span() / S::F32_LANES);
+        at / span * stride + at % span
+    }
+}
+
+/// Forward pass of one chunk.
+struct Forward<'a> {
+    layer: SecondLayer<'a>,
+    windows: &'a [usize],
+    x: &'a [f32],
+    y: &'a mut [f32],
+    /// With a place for every sample, or one that all share.
+    winners: &'a mut [u32],
+}
+
+impl WithSimd for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Self { layer: SecondLayer { convolution, weight, bias }, windows, x, y, winners } = self;
+        let by_window = convolution.by_window::<S>(weight);
+        // The border stays zero: it is never written.
+        let mut map = vec![0.0; convolution.map_len()];
+        let output_len = POOLS * bias.len();
+        let places = winners.len() / output_len;
+        for (sample, (x, y)) in x.chunks_exact(convolution.input_len()).zip(y.chunks_exact_mut(output_len)).enumerate()
+        {
+            convolution.pad(x, &mut map);
+            let winners = &mut winners[sample % places * output_len..][..output_len];
+            for (first, len) in blocks::<S>(bias.len()) {
+                let block = Block { convolution, first, by_window: &by_window, bias };
+                // As many sums as fit the registers: with AVX-512 those of two pools.
+                match (len == 2 * S::F32_LANES, S::F32_LANES == LANES) {
+                    (true, true) => block.forward::<S, 2, 8>(simd, &map, windows, y, winners),
+                    (true, false) => block.forward::<S, 2, 4>(simd, &map, windows, y, winners),
+                    (false, _) => block.forward::<S, 1, 8>(simd, &map, windows, y, winners),
+                }
+            }
+        }
+    }
+}
+
+/// Some vectors of outputs, from channel `first` on.
+struct Block<'a> {
+    convolution: Convolution,
     first: usize,
+    by_window: &'a [f32],
+    bias: &'a [f32],
 }
 
-/// Memory for the products that a backward pass has to compute, by what they share.
-#[derive(Debug, Clone)]
-pub(super) struct Sparse {
-    /// Products of one output channel: (start of the window, gradient).
-    of_channel: Vec<(usize, f32)>,
-    /// Products of one cell of the convolution: (start of the output's weights, gradient).
-    of_cell: Vec<(usize, f32)>,
+impl Block<'_> {
+    /// `WIDTH` vectors of outputs, `CELLS` cells of the convolution at a time: one pool or two.
+    #[inline(always)]
+    fn forward<S: Simd, const WIDTH: usize, const CELLS: usize>(
+        &self,
+        simd: S,
+        map: &[f32],
+        windows: &[usize],
+        y: &mut [f32],
+        winners: &mut [u32],
+    ) {
+        let (channels, len) = (self.bias.len(), WIDTH * S::F32_LANES);
+        let weights = self.convolution.block(self.by_window, self.first, len);
+        let bias = vectors::vectors::<S>(&self.bias[self.first..][..len]);
+        for (index, starts) in windows.as_chunks::<CELLS>().0.iter().enumerate() {
+            let sums = self.convolution.sums::<S, WIDTH, CELLS>(simd, map, *starts, weights);
+            let first_pool = index * CELLS / POOL.len();
+            for (pool, sums) in (first_pool..).zip(sums.as_chunks::<4>().0) {
+                let at = pool * channels + self.first;
+                let y = vectors_mut::<S>(&mut y[at..at + len]);
+                let winners = int_vectors_mut::<S>(&mut winners[at..at + len]);
+                for v in 0..WIDTH {
+                    let first = (sums[0][v], simd.splat_u32s(0));
+                    let best =
+                        (1..).zip(&sums[1..]).fold(first, |best, (cell, sums)| better(simd, best, sums[v], cell));
+                    (y[v], winners[v]) = with_relu(simd, best, bias[v]);
+                }
+            }
+        }
+    }
 }
 
-impl Sparse {
-    pub(super) fn new(layer: SecondLayer) -> Self {
+/// One chunk's share of the gradients: of the weights `[output, window value]` and of the bias.
+struct Share {
+    by_output: Vec<f32>,
+    bias: Vec<f32>,
+}
+
+impl Share {
+    fn new(layer: &SecondLayer<'_>) -> Self {
+        Self { by_output: vec![0.0; layer.weight.len()], bias: vec![0.0; layer.bias.len()] }
+    }
+}
+
+/// Backward pass of one chunk.
+struct Backward<'a> {
+    layer: SecondLayer<'a>,
+    windows: &'a [usize],
+    by_output: &'a [f32],
+    x: &'a [f32],
+    d_x: &'a mut [f32],
+    winners: &'a [u32],
+    d_y: &'a [f32],
+}
+
+impl WithSimd for Backward<'_> {
+    type Output = Share;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Share {
+        let Self { layer, windows, by_output, x, d_x, winners, d_y } = self;
+        let (convolution, channels) = (layer.convolution, layer.bias.len());
+        let (input_len, output_len, window_len) = (convolution.input_len(), POOLS * channels, convolution.window_len());
+        let windows = windows.as_chunks::<4>().0;
+        let mut share = Share::new(&layer);
+        // The border stays zero: it is never written.
+        let mut map = vec![0.0; convolution.map_len()];
+        let mut d_map = vec![0.0; convolution.map_len()];
         // One more than fits: what is not kept is written there.
-        let of_channel = vec![(0, 0.0); POOLED_2 * POOLED_2 + 1];
-        Self { of_channel, of_cell: vec![(0, 0.0); layer.conv.channels + 1] }
+        let mut of_channel = vec![(0, 0.0); POOLS + 1];
+        let mut of_cell = vec![(0, 0.0); channels + 1];
+        for (sample, x) in x.chunks_exact(input_len).enumerate() {
+            let winners = &winners[sample * output_len..][..output_len];
+            let d_y = &d_y[sample * output_len..][..output_len];
+            convolution.pad(x, &mut map);
+            // Gradients of the weights: per output channel, its windows.
+            for channel in 0..channels {
+                let mut list = List::new(&mut of_channel);
+                let mut sum = 0.0;
+                for (pool, windows) in windows.iter().enumerate() {
+                    let at = pool * channels + channel;
+                    let is_alive = winners[at] != SILENT;
+                    // A silent pool has no window; whichever is listed is overwritten by the next.
+                    list.push((windows[(winners[at] % SILENT) as usize], d_y[at]), is_alive);
+                    sum += if is_alive { d_y[at] } else { 0.0 };
+                }
+                share.bias[channel] += sum;
+                let into = &mut share.by_output[channel * window_len..][..window_len];
+                layer.add_windows(simd, &map, list.pushed(), into);
+            }
+            // Gradient of the map: per cell of the convolution, its output channels.
+            d_map.fill(0.0);
+            for (pool, windows) in windows.iter().enumerate() {
+                let of_pool = pool * channels..(pool + 1) * channels;
+                for (cell, start) in windows.iter().enumerate() {
+                    let mut list = List::new(&mut of_cell);
+                    for (channel, (gradient, winner)) in
+                        d_y[of_pool.clone()].iter().zip(&winners[of_pool.clone()]).enumerate()
+                    {
+                        list.push((channel * window_len, *gradient), *winner == cell as u32);
+                    }
+                    layer.add_outputs(simd, by_output, list.pushed(), &mut d_map[*start..]);
+                }
+            }
+            convolution.unpad(&d_map, &mut d_x[sample * input_len..][..input_len]);
+        }
+        share
     }
 }
 
@@ -68,218 +309,6 @@ impl<'a> List<'a> {
     }
 }
 
-impl SecondLayer {
-    /// Values of one row of a window: they lie side by side in the padded map.
-    fn span(self) -> usize {
-        self.conv.kernel * self.inputs
-    }
-
-    /// Values of a window.
-    pub(super) fn window_len(self) -> usize {
-        self.conv.kernel * self.span()
-    }
-
-    /// Values of the padded map.
-    pub(super) fn map_len(self) -> usize {
-        self.map.side * self.map.side * self.inputs
-    }
-
-    /// Where the windows of the four cells of a pool start in the padded map.
-    #[inline(always)]
-    fn windows_of_pool(self, pool: usize) -> [usize; 4] {
-        let (row, col) = (2 * (pool / POOLED_2), 2 * (pool % POOLED_2));
-        POOL.map(|(down, right)| ((row + down) * self.map.side + col + right) * self.inputs)
-    }
-
-    /// Weights `[output, input, row, column]` as `[window value, output]`, cut into blocks of two vectors of outputs
-    /// (the last may be of one): block by block, so that a block is read in one run.
-    #[inline(always)]
-    pub(super) fn by_window<S: Simd>(self, weight: &[f32]) -> Vec<f32> {
-        let mut packed = Vec::with_capacity(weight.len());
-        for (first, len) in blocks::<S>(self.conv.channels) {
-            for at in 0..self.window_len() {
-                let from = self.weight_index(at);
-                packed.extend((first..first + len).map(|output| weight[output * self.window_len() + from]));
-            }
-        }
-        packed
-    }
-
-    /// Weights `[output, input, row, column]` as `[output, window value]`.
-    pub(super) fn by_output(self, weight: &[f32]) -> Vec<f32> {
-        let order: Vec<usize> = (0..self.window_len()).map(|at| self.weight_index(at)).collect();
-        weight.chunks_exact(self.window_len()).flat_map(|of_output| order.iter().map(|from| of_output[*from])).collect()
-    }
-
-    /// The transpose of [`Self::by_output`].
-    pub(super) fn d_weight(self, by_output: &[f32], d_weight: &mut [f32]) {
-        for (from, into) in by_output.chunks_exact(self.window_len()).zip(d_weight.chunks_exact_mut(self.window_len()))
-        {
-            for (at, value) in from.iter().enumerate() {
-                into[self.weight_index(at)] = *value;
-            }
-        }
-    }
-
-    /// Which weight of an output `[input, row, column]` meets value `at` of a window `[row, column, input]`.
-    fn weight_index(self, at: usize) -> usize {
-        let (cell, input) = (at / self.inputs, at % self.inputs);
-        input * self.conv.kernel * self.conv.kernel + cell
-    }
-
-    /// One padded map to features `[6 · 6, channel]`, and who won each pool.
-    #[inline(always)]
-    pub(super) fn forward<S: Simd>(
-        self,
-        simd: S,
-        pooled: &[f32],
-        by_window: &[f32],
-        bias: &[f32],
-        features: &mut [f32],
-        winners: &mut [u32],
-    ) {
-        for (first, len) in blocks::<S>(self.conv.channels) {
-            let weights = &by_window[first * self.window_len()..][..len * self.window_len()];
-            let block = Block { weights, bias: &bias[first..first + len], first };
-            // As many sums as fit the registers: with AVX-512 those of two pools.
-            match (len == 2 * S::F32_LANES, S::F32_LANES == LANES) {
-                (true, true) => self.forward_block::<S, 2, 8>(simd, pooled, &block, features, winners),
-                (true, false) => self.forward_block::<S, 2, 4>(simd, pooled, &block, features, winners),
-                (false, _) => self.forward_block::<S, 1, 8>(simd, pooled, &block, features, winners),
-            }
-        }
-    }
-
-    /// `WIDTH` vectors of outputs, `CELLS` cells of the convolution at a time: one pool or two.
-    #[inline(always)]
-    fn forward_block<S: Simd, const WIDTH: usize, const CELLS: usize>(
-        self,
-        simd: S,
-        pooled: &[f32],
-        block: &Block<'_>,
-        features: &mut [f32],
-        winners: &mut [u32],
-    ) {
-        let zero = simd.splat_f32s(0.0);
-        let bias = vectors::<S>(block.bias);
-        let span = self.span();
-        for first_pool in (0..POOLED_2 * POOLED_2).step_by(CELLS / POOL.len()) {
-            let mut sums = [[zero; WIDTH]; CELLS];
-            let starts: [usize; CELLS] =
-                std::array::from_fn(|cell| self.windows_of_pool(first_pool + cell / POOL.len())[cell % POOL.len()]);
-            for kernel_row in 0..self.conv.kernel {
-                let offset = kernel_row * self.map.side * self.inputs;
-                let values = starts.map(|start| &pooled[start + offset..][..span]);
-                let weights = vectors::<S>(&block.weights[kernel_row * span * WIDTH * S::F32_LANES..]);
-                let weights = &weights.as_chunks::<WIDTH>().0[..span];
-                for at in 0..span {
-                    for cell in 0..CELLS {
-                        let value = simd.splat_f32s(values[cell][at]);
-                        for v in 0..WIDTH {
-                            sums[cell][v] = simd.mul_add_f32s(value, weights[at][v], sums[cell][v]);
-                        }
-                    }
-                }
-            }
-            for (pool, sums) in (first_pool..).zip(sums.as_chunks::<4>().0) {
-                let at = pool * self.conv.channels + block.first;
-                let features = vectors_mut::<S>(&mut features[at..at + WIDTH * S::F32_LANES]);
-                let winners = int_vectors_mut::<S>(&mut winners[at..at + WIDTH * S::F32_LANES]);
-                for v in 0..WIDTH {
-                    let first = (sums[0][v], simd.splat_u32s(0));
-                    let best =
-                        (1..).zip(&sums[1..]).fold(first, |best, (cell, sums)| better(simd, best, sums[v], cell));
-                    (features[v], winners[v]) = with_relu(simd, best, bias[v]);
-                }
-            }
-        }
-    }
-
-    /// One sample's share: adds to the gradients of the weights (`[output, window value]`) and the bias, and writes
-    /// that of the padded map.
-    #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "three inputs, the trace, and three gradients, each by its name")]
-    pub(super) fn backward<S: Simd>(
-        self,
-        simd: S,
-        pooled: &[f32],
-        by_output: &[f32],
-        d_features: &[f32],
-        winners: &[u32],
-        sparse: &mut Sparse,
-        d_pooled: &mut [f32],
-        d_by_output: &mut [f32],
-        d_bias: &mut [f32],
-    ) {
-        let channels = self.conv.channels;
-        // Gradients of the weights: per output channel, its windows.
-        for channel in 0..channels {
-            let mut list = List::new(&mut sparse.of_channel);
-            let mut sum = 0.0;
-            for pool in 0..POOLED_2 * POOLED_2 {
-                let at = pool * channels + channel;
-                let is_alive = winners[at] != SILENT;
-                // A silent pool has no window; whichever is listed is overwritten by the next.
-                list.push((self.windows_of_pool(pool)[(winners[at] % SILENT) as usize], d_features[at]), is_alive);
-                sum += if is_alive { d_features[at] } else { 0.0 };
-            }
-            d_bias[channel] += sum;
-            let into = &mut d_by_output[channel * self.window_len()..][..self.window_len()];
-            self.add_windows(simd, pooled, list.pushed(), into);
-        }
-        // Gradient of the map: per cell of the convolution, its output channels.
-        d_pooled.fill(0.0);
-        for pool in 0..POOLED_2 * POOLED_2 {
-            let of_pool = pool * channels..(pool + 1) * channels;
-            for (cell, start) in self.windows_of_pool(pool).into_iter().enumerate() {
-                let mut list = List::new(&mut sparse.of_cell);
-                for (channel, (gradient, winner)) in
-                    d_features[of_pool.clone()].iter().zip(&winners[of_pool.clone()]).enumerate()
-                {
-                    list.push((channel * self.window_len(), *gradient), *winner == cell as u32);
-                }
-                self.add_outputs(simd, by_output, list.pushed(), &mut d_pooled[start..]);
-            }
-        }
-    }
-
-    /// `into` `[window value]` += Σ gradient · window.
-    #[inline(always)]
-    fn add_windows<S: Simd>(self, simd: S, pooled: &[f32], list: &[(usize, f32)], into: &mut [f32]) {
-        for_each_group(self.window_len() / S::F32_LANES, |first, group| {
-            let (read, written) = (|v| self.vector_of_window::<S>(first + v), |v| first + v);
-            match group {
-                Group::Nine => accumulate::<S, 9>(simd, pooled, list, read, into, written),
-                Group::Eight => accumulate::<S, 8>(simd, pooled, list, read, into, written),
-                Group::One => accumulate::<S, 1>(simd, pooled, list, read, into, written),
-            }
-        });
-    }
-
-    /// The window that begins at `d_pooled` += Σ gradient · weights of the output.
-    #[inline(always)]
-    fn add_outputs<S: Simd>(self, simd: S, by_output: &[f32], list: &[(usize, f32)], d_pooled: &mut [f32]) {
-        if list.is_empty() {
-            return;
-        }
-        for_each_group(self.window_len() / S::F32_LANES, |first, group| {
-            let (read, written) = (|v| first + v, |v| self.vector_of_window::<S>(first + v));
-            match group {
-                Group::Nine => accumulate::<S, 9>(simd, by_output, list, read, d_pooled, written),
-                Group::Eight => accumulate::<S, 8>(simd, by_output, list, read, d_pooled, written),
-                Group::One => accumulate::<S, 1>(simd, by_output, list, read, d_pooled, written),
-            }
-        });
-    }
-
-    /// Where vector `at` of a window lies in the padded map, in vectors from the start of the window.
-    #[inline(always)]
-    fn vector_of_window<S: Simd>(self, at: usize) -> usize {
-        let (stride, span) = (self.map.side * self.inputs / S::F32_LANES, self.span() / S::F32_LANES);
-        at / span * stride + at % span
-    }
-}
-
 /// The `N` vectors of `into` at `written` += Σ gradient · the `N` vectors of `values` at `read` from each start.
 #[inline(always)]
 fn accumulate<S: Simd, const N: usize>(
@@ -291,7 +320,7 @@ fn accumulate<S: Simd, const N: usize>(
     written: impl Fn(usize) -> usize,
 ) {
     let read: [usize; N] = std::array::from_fn(read);
-    let (values, into) = (vectors::<S>(values), vectors_mut::<S>(into));
+    let (values, into) = (vectors::vectors::<S>(values), vectors_mut::<S>(into));
     let mut sums = [simd.splat_f32s(0.0); N];
     for (start, gradient) in list {
         let (values, gradient) = (&values[start / S::F32_LANES..], simd.splat_f32s(*gradient));
@@ -324,10 +353,4 @@ fn for_each_group(len: usize, mut visit: impl FnMut(usize, Group)) {
         visit(first, group);
         first += step;
     }
-}
-
-/// Blocks of outputs: (first, number), two vectors each, then one if the number of vectors is odd.
-fn blocks<S: Simd>(channels: usize) -> impl Iterator<Item = (usize, usize)> {
-    let block = 2 * S::F32_LANES;
-    (0..channels).step_by(block).map(move |first| (first, block.min(channels - first)))
 }
