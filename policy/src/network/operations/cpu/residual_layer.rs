@@ -275,4 +275,43 @@ impl WithSimd for Backward<'_> {
     }
 }
 
-const _: () = assert!(POOLED_1 * POOLED_1 % 12 == 0 && POOLED_2 * POOLED_2 % 12 == 0, "no cell is left over");
+const _: () = assert!(
+    (POOLED_1 * POOLED_1).is_multiple_of(12) && (POOLED_2 * POOLED_2).is_multiple_of(12),
+    "no cell is left over"
+);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What `vectors` promises, on the scalar path and with the widest vectors of this processor.
+    #[test]
+    fn every_instruction_set_computes_the_same_bits() {
+        let values = |n: usize, prime: usize| -> Vec<f32> {
+            (0..n).map(|i| ((i * prime % 1000) as f32 - 400.0) / 613.0).collect()
+        };
+        for (cells, channels) in [(12, 16), (6, 48)] {
+            let (weight, bias) = (values(channels * channels * 9, 7919), values(channels, 31));
+            let layer = ResidualLayer::new(cells, &weight, &bias);
+            let (windows, transposed) = (layer.windows(), layer.transposed());
+            let len = 3 * cells * cells * channels;
+            let (x, d_y) = (values(len, 101), values(len, 211));
+            let answered = |run: &dyn Fn(Forward<'_>)| {
+                let (mut y, mut alive) = (vec![0.0; len], vec![0; len]);
+                run(Forward { layer, windows: &windows, x: &x, y: &mut y, alive: &mut alive });
+                (y, alive)
+            };
+            let (y, alive) = answered(&|kernel| vectors::run(kernel));
+            assert_eq!((&y, &alive), (&answered(&|kernel| kernel.with_simd(pulp::Scalar)).0, &alive));
+            let gradients = |run: &dyn Fn(Backward<'_>) -> Share| {
+                let mut d_x = vec![0.0; len];
+                let (windows, transposed) = (windows.as_slice(), transposed.as_slice());
+                let share =
+                    run(Backward { layer, windows, transposed, x: &x, d_x: &mut d_x, alive: &alive, d_y: &d_y });
+                (d_x, share.by_window, share.bias)
+            };
+            let scalar = gradients(&|kernel| kernel.with_simd(pulp::Scalar));
+            assert_eq!(gradients(&|kernel| vectors::run(kernel)), scalar);
+        }
+    }
+}
