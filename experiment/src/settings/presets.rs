@@ -92,8 +92,6 @@ fn strong() -> Settings {
             network: NetworkArchitecture {
                 conv1: ConvLayer { channels: 32, kernel: 5 },
                 conv2: ConvLayer { channels: 64, kernel: 3 },
-                residual1: 0,
-                residual2: 0,
                 hidden: 512,
                 modes: 1,
                 ..base.dagger.network

@@ -20,8 +20,8 @@ fn grids(count: usize) -> Vec<OccupancyGrid> {
     (0..count).map(grid).collect()
 }
 
-/// Both presets' networks, one with an even kernel, with and without mirror averaging.
-fn checkpoints() -> [Checkpoint; 2] {
+/// Both presets' networks, one with an even kernel, with and without mirror averaging; and one with residual layers.
+fn checkpoints() -> [Checkpoint; 3] {
     let of = |architecture, inference| Checkpoint {
         weights: Weights::init(architecture, RootSeed(8), 0),
         conditions: Conditions::of(&EpisodeSettings::paper()),
@@ -30,6 +30,10 @@ fn checkpoints() -> [Checkpoint; 2] {
     [
         of(NetworkArchitecture::paper(), InferenceSettings::plain()),
         of(NetworkArchitecture::compact(), InferenceSettings::smoothed()),
+        of(
+            NetworkArchitecture { residual1: 1, residual2: 2, ..NetworkArchitecture::compact() },
+            InferenceSettings::plain(),
+        ),
     ]
 }
 
@@ -92,7 +96,7 @@ fn an_answer_does_not_depend_on_the_other_grids() {
 /// Which cars shared a call depended on the number of threads, and with it what was driven.
 #[test]
 fn a_network_that_mixes_the_grids_of_a_batch_is_refused() {
-    let [checkpoint, _] = checkpoints();
+    let [checkpoint, ..] = checkpoints();
     let mut nodes = export::layers(checkpoint.weights.architecture());
     let answer = nodes.last_mut().unwrap();
     answer.output = vec!["alone".to_owned()];

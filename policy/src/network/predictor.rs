@@ -182,7 +182,10 @@ mod tests {
         for (architecture, inference) in [
             (NetworkArchitecture::paper(), InferenceSettings::plain()),
             (NetworkArchitecture::compact(), InferenceSettings::smoothed()),
-            (NetworkArchitecture { modes: 3, ..NetworkArchitecture::compact() }, InferenceSettings::smoothed()),
+            (
+                NetworkArchitecture { modes: 3, residual1: 1, residual2: 1, ..NetworkArchitecture::compact() },
+                InferenceSettings::smoothed(),
+            ),
         ] {
             let weights = Weights::init(architecture, RootSeed(1), 0);
             let mut predictor = Predictor::new(&weights, inference);
