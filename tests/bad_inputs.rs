@@ -235,6 +235,7 @@ fn settings_that_are_refused() {
         ("dagger.fit.batch=0", "dagger.fit.batch = 0 is out of range: 1 to"),
         ("dagger.fit.validation.every=1", "nothing is left to train on"),
         ("dagger.network.hidden=1000000000000", "dagger.network.hidden = 1000000000000 is out of range"),
+        ("dagger.network.residual1=9", "dagger.network.residual1 = 9 is out of range"),
         (
             "dagger.network={conv1={channels=1024,kernel=7},conv2={channels=1024,kernel=7},hidden=65536,modes=1,dropout_features=0.0,dropout_hidden=0.0}",
             "parameters; at most 64000000 are possible",

@@ -49,8 +49,8 @@ fn answers(script: &str, checkpoint: &Checkpoint, grids: &[OccupancyGrid], folde
     ndarray_npy::read_npy(output).unwrap()
 }
 
-/// Both presets' networks, one with an even kernel, with and without mirror averaging.
-fn checkpoints() -> [Checkpoint; 2] {
+/// Both presets' networks, one with an even kernel, with and without mirror averaging; and one with residual layers.
+fn checkpoints() -> [Checkpoint; 3] {
     let of = |architecture, inference| Checkpoint {
         weights: Weights::init(architecture, RootSeed(8), 0),
         conditions: Conditions::of(&EpisodeSettings::paper()),
@@ -59,6 +59,10 @@ fn checkpoints() -> [Checkpoint; 2] {
     [
         of(NetworkArchitecture::paper(), InferenceSettings::plain()),
         of(NetworkArchitecture::compact(), InferenceSettings::smoothed()),
+        of(
+            NetworkArchitecture { residual1: 1, residual2: 2, ..NetworkArchitecture::compact() },
+            InferenceSettings::plain(),
+        ),
     ]
 }
 

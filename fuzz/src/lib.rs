@@ -103,7 +103,8 @@ pub type Files = Vec<(String, Vec<u8>)>;
 /// A small network, untrained.
 pub fn checkpoint() -> Checkpoint {
     let conv = ConvLayer { channels: 16, kernel: 3 };
-    let network = NetworkArchitecture { conv1: conv, conv2: conv, hidden: 3, ..NetworkArchitecture::compact() };
+    let small = NetworkArchitecture { conv1: conv, conv2: conv, hidden: 3, ..NetworkArchitecture::compact() };
+    let network = NetworkArchitecture { residual1: 1, residual2: 2, ..small };
     Checkpoint {
         weights: Weights::init(network, RootSeed(1), 0),
         conditions: Conditions::of(&EpisodeSettings::paper()),

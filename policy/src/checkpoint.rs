@@ -6,7 +6,7 @@
 use crate::conditions::Conditions;
 use crate::files::{self, FileError, Format, SCHEMA_REMEDY, write_atomically};
 use crate::network::{
-    ConvLayer, InferenceSettings, LANES, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture, POOLED_2, Predictor,
+    ConvLayer, InferenceSettings, LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, NetworkArchitecture, POOLED_2, Predictor,
     RESIDUAL_KERNEL, Weights,
 };
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -59,7 +59,7 @@ struct Layer {
     /// Whether what the layer sees is added to its answer, before the activation. Convolutions only.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     residual: bool,
-    /// Side and stride of the max-pool that follows. Convolutions only.
+    /// Side and stride of the max-pool that follows. Convolutions only, and of them not the residual ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     max_pool: Option<usize>,
     /// Applied last.
@@ -211,7 +211,6 @@ fn layers(architecture: &NetworkArchitecture) -> Vec<Layer> {
         let (before, after) = conv.padding();
         Some([before, after])
     };
-    let residual = ConvLayer { channels: LANES, kernel: RESIDUAL_KERNEL };
     let weights = shapes(architecture)
         .into_iter()
         .filter_map(|(name, shape)| Some((name.strip_suffix(".weight")?.to_owned(), shape)));
@@ -219,11 +218,11 @@ fn layers(architecture: &NetworkArchitecture) -> Vec<Layer> {
         .map(|(name, weight_shape)| {
             let is_residual = name.starts_with("residual");
             let (kind, padding, activation) = match name.as_str() {
+                _ if is_residual => (LayerKind::Conv2d, Some([RESIDUAL_KERNEL / 2; 2]), Activation::Relu),
                 "conv1" => (LayerKind::Conv2d, of_conv(architecture.conv1), Activation::Relu),
                 "conv2" => (LayerKind::Conv2d, of_conv(architecture.conv2), Activation::Relu),
                 "fc1" => (LayerKind::Linear, None, Activation::Relu),
-                "fc2" => (LayerKind::Linear, None, Activation::Identity),
-                _ => (LayerKind::Conv2d, of_conv(residual), Activation::Relu),
+                _ => (LayerKind::Linear, None, Activation::Identity),
             };
             let max_pool = padding.filter(|_| !is_residual).map(|_| 2);
             Layer { name, kind, weight_shape, padding, residual: is_residual, max_pool, activation }

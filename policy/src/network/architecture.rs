@@ -18,7 +18,7 @@ pub const LANES: usize = 16;
 /// Cells per side of the kernel of a residual layer.
 pub const RESIDUAL_KERNEL: usize = 3;
 
-/// One convolution with "same" padding, followed by a max-pool of 2 and a `ReLU`.
+/// One convolution with "same" padding. `conv1` and `conv2` are followed by a max-pool of 2 and a `ReLU`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConvLayer {

@@ -2,7 +2,7 @@
 //!
 //! | operation | on CPUs (`cpu`) | why not burn-flex's |
 //! |---|---|---|
-//! | [`first_layer`], [`residual_layer`], [`second_layer`]: convolutions with pools and `ReLU`s | table look-up, sparse backward pass | a fraction of the speed |
+//! | [`first_layer`], [`residual_layer`], [`second_layer`]: convolutions with pools and `ReLU`s | table look-up, windows read where they lie, a sparse backward pass behind pools | a fraction of the speed |
 //! | [`dense`]: x · weight + bias | one chain of multiply-adds per output | its sums depend on the machine's caches |
 //! | [`tanh`], [`exp`] | one value after the other | they are the platform's, which rounds as it likes |
 //! | [`adam_step`]: Adam and the clipping of its gradient | two passes over the values | a dozen, and denormal numbers |

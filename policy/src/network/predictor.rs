@@ -1,6 +1,6 @@
 //! A trained network that answers grids.
 
-use crate::network::architecture::OUTPUTS;
+use crate::network::architecture::{NetworkArchitecture, OUTPUTS, POOLED_1};
 use crate::network::inference::InferenceSettings;
 use crate::network::log_variance::soft_clamp_log_variance;
 use crate::network::look_ahead_net::{LookAheadNet, occupied_tensor};
@@ -46,14 +46,18 @@ impl Prediction {
     }
 }
 
-/// Most rows computed in one call: bounds the memory. An answer does not depend on the other rows.
+/// Most rows computed in one call. An answer does not depend on the other rows.
 const ROWS_MAX: usize = 1024;
+/// Most values of the largest map of a call, 64 MB: wide networks compute fewer rows.
+const MAP_VALUES_MAX: usize = 1 << 24;
 
 /// A network ready to answer: on CPUs, wherever it was trained.
 #[derive(Debug, Clone)]
 pub struct Predictor {
     mirror_averaging: bool,
     modes: usize,
+    /// Most rows computed in one call: bounds the memory.
+    rows_max: usize,
     net: LookAheadNet,
     device: Device,
 }
@@ -63,7 +67,9 @@ impl Predictor {
     pub fn new(weights: &Weights, inference: InferenceSettings) -> Self {
         let device = Device::flex();
         let net = LookAheadNet::from_weights(weights, &device);
-        Self { mirror_averaging: inference.mirror_averaging, modes: weights.architecture().modes, net, device }
+        let NetworkArchitecture { modes, conv1, .. } = weights.architecture();
+        let rows_max = (MAP_VALUES_MAX / (POOLED_1 * POOLED_1 * conv1.channels)).min(ROWS_MAX);
+        Self { mirror_averaging: inference.mirror_averaging, modes, rows_max, net, device }
     }
 
     /// Answers every grid, in order.
@@ -108,7 +114,7 @@ impl Predictor {
         let width = self.width();
         let mut outputs = Vec::with_capacity(count * width);
         while outputs.len() < count * width {
-            let rows = (count - outputs.len() / width).min(ROWS_MAX);
+            let rows = (count - outputs.len() / width).min(self.rows_max);
             let occupied = occupied_tensor(grids.by_ref().take(rows), &self.device);
             outputs.extend(self.net.forward(occupied, None).into_data().try_into_vec::<f32>().expect("f32"));
         }
@@ -171,7 +177,6 @@ fn mean(one: Mode, other: Mode) -> [f32; OUTPUTS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::architecture::NetworkArchitecture;
     use crate::test_data::lots;
     use sim::seed::RootSeed;
 

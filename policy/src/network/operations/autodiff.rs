@@ -27,7 +27,7 @@ impl<C: CheckpointStrategy> NetworkOps for Autodiff<Flex, C> {
                 let occupied = contiguous(occupied);
                 let Answers { y, chosen } = flex::first(&weight, &bias).forward(occupied.bytes(), true);
                 let y = flex::batch_of(y, &occupied);
-                prepared.finish(Trace { x: occupied, weight, bias, chosen: chosen.into() }, y)
+                prepared.finish(Trace { x: occupied, weight, bias, chosen: Arc::new(chosen) }, y)
             }
         }
     }
@@ -40,7 +40,7 @@ impl<C: CheckpointStrategy> NetworkOps for Autodiff<Flex, C> {
             OpsKind::Tracked(prepared) => {
                 let Answers { y, chosen } = flex::residual(&x, &weight, &bias).forward(values(&x), true);
                 let y = flex::batch_of(y, &x);
-                prepared.finish(Trace { x, weight, bias, chosen: chosen.into() }, y)
+                prepared.finish(Trace { x, weight, bias, chosen: Arc::new(chosen) }, y)
             }
         }
     }
@@ -53,7 +53,7 @@ impl<C: CheckpointStrategy> NetworkOps for Autodiff<Flex, C> {
             OpsKind::Tracked(prepared) => {
                 let Answers { y, chosen } = flex::second(&weight, &bias).forward(values(&x), true);
                 let y = flex::batch_of(y, &x);
-                prepared.finish(Trace { x, weight, bias, chosen: chosen.into() }, y)
+                prepared.finish(Trace { x, weight, bias, chosen: Arc::new(chosen) }, y)
             }
         }
     }
@@ -95,7 +95,7 @@ struct Trace {
     x: FlexTensor,
     weight: FlexTensor,
     bias: FlexTensor,
-    chosen: Arc<[u32]>,
+    chosen: Arc<Vec<u32>>,
 }
 
 /// Backward pass of the first layer. Its parents are the weights; cells have no gradient.

@@ -26,7 +26,8 @@ const SILENT: u32 = 4;
 #[derive(Debug, Clone)]
 pub(crate) struct Answers {
     pub(crate) y: Vec<f32>,
-    /// Which cell each answer comes from, for the backward pass; empty if nothing was traced.
+    /// Which cell of its pool each answer comes from, or [`SILENT`], for the backward pass; without a pool 0 or [`SILENT`]. Empty if
+    /// nothing was traced.
     pub(crate) chosen: Vec<u32>,
 }
 
@@ -50,8 +51,9 @@ fn by_chunks<T: Sync>(
     Answers { y, chosen }
 }
 
-/// Adds one chunk's share to the sum of those before it.
-fn add_in_order(sum: &mut [f32], share: &[f32]) {
+/// `sum` += `share`, value by value.
+#[inline(always)]
+fn add(sum: &mut [f32], share: &[f32]) {
     for (sum, value) in sum.iter_mut().zip(share) {
         *sum += value;
     }

@@ -73,10 +73,10 @@ fn layer(weight: &FlexTensor) -> ConvLayer {
     ConvLayer { channels: weight.shape()[0], kernel: weight.shape()[2] }
 }
 
-/// `[batch, values]`, as many rows as `x` has.
+/// `[batch, values]`, as many rows as `x` has: at least one.
 pub(super) fn batch_of(y: Vec<f32>, x: &FlexTensor) -> FlexTensor {
     let batch = x.shape()[0];
-    let len = y.len() / batch.max(1);
+    let len = y.len() / batch;
     from_vec(y, [batch, len])
 }
 

@@ -81,7 +81,7 @@ impl Convolution {
     /// Weights `[output, input, row, column]` as `[window value, output]`, cut into the blocks of [`blocks`]: block by block,
     /// so that a block is read in one run.
     #[inline(always)]
-    pub(super) fn by_window<S: Simd>(self, weight: &[f32]) -> Vec<f32> {
+    pub(super) fn packed<S: Simd>(self, weight: &[f32]) -> Vec<f32> {
         let mut packed = Vec::with_capacity(weight.len());
         for (first, len) in blocks::<S>(self.conv.channels) {
             for at in 0..self.window_len() {
@@ -94,8 +94,8 @@ impl Convolution {
 
     /// The weights of a block from channel `first` on.
     #[inline(always)]
-    pub(super) fn block(self, by_window: &[f32], first: usize, len: usize) -> &[f32] {
-        &by_window[first * self.window_len()..][..len * self.window_len()]
+    pub(super) fn weights_of_block(self, packed: &[f32], first: usize, len: usize) -> &[f32] {
+        &packed[first * self.window_len()..][..len * self.window_len()]
     }
 
     /// Which weight of an output `[input, row, column]` meets value `at` of a window `[row, column, input]`.

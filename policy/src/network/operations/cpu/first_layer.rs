@@ -5,7 +5,7 @@
 
 use super::pool::{POOL, better, with_relu};
 use super::vectors::{self, int_vectors, int_vectors_mut, vectors, vectors_mut};
-use super::{Answers, CHUNK, SILENT, add_in_order, by_chunks};
+use super::{Answers, CHUNK, SILENT, add, by_chunks};
 use crate::network::architecture::{ConvLayer, LANES, POOLED_1};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -84,8 +84,8 @@ impl<'a> FirstLayer<'a> {
             .collect();
         let mut sum = Share::new(self);
         for share in &shares {
-            add_in_order(&mut sum.table, &share.table);
-            add_in_order(&mut sum.bias, &share.bias);
+            add(&mut sum.table, &share.table);
+            add(&mut sum.bias, &share.bias);
         }
         FirstGradients { weight: self.d_weight(&sum.table), bias: sum.bias }
     }

@@ -5,7 +5,7 @@
 
 use super::convolution::{Convolution, Gradients, blocks};
 use super::vectors::{self, int_vectors_mut, vectors_mut};
-use super::{Answers, CHUNK, SILENT, add_in_order, by_chunks};
+use super::{Answers, CHUNK, SILENT, add, by_chunks};
 use crate::network::architecture::{ConvLayer, POOLED_1, POOLED_2, RESIDUAL_KERNEL};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -24,6 +24,11 @@ impl<'a> ResidualLayer<'a> {
     /// `cells`: per side of the map.
     pub(crate) fn new(cells: usize, weight: &'a [f32], bias: &'a [f32]) -> Self {
         let conv = ConvLayer { channels: bias.len(), kernel: RESIDUAL_KERNEL };
+        assert_eq!(
+            weight.len(),
+            bias.len() * bias.len() * RESIDUAL_KERNEL * RESIDUAL_KERNEL,
+            "weights of a residual layer"
+        );
         Self { convolution: Convolution { inputs: bias.len(), conv, cells }, weight, bias }
     }
 
@@ -36,30 +41,30 @@ impl<'a> ResidualLayer<'a> {
     pub(crate) fn forward(&self, x: &[f32], is_traced: bool) -> Answers {
         let (layer, windows) = (*self, self.windows());
         let len = self.convolution.input_len();
-        by_chunks(x, len, len, is_traced, |x, y, alive| {
-            vectors::run(Forward { layer, windows: &windows, x, y, alive });
+        by_chunks(x, len, len, is_traced, |x, y, cut_off| {
+            vectors::run(Forward { layer, windows: &windows, x, y, cut_off });
         })
     }
 
     /// The gradients, given that of the answers and which of them were cut off.
-    pub(crate) fn backward(&self, x: &[f32], alive: &[u32], d_y: &[f32]) -> Gradients {
-        assert_eq!(d_y.len(), alive.len(), "gradients of another batch than was traced");
+    pub(crate) fn backward(&self, x: &[f32], cut_off: &[u32], d_y: &[f32]) -> Gradients {
+        assert_eq!(d_y.len(), cut_off.len(), "gradients of another batch than was traced");
         let (layer, windows, transposed) = (*self, self.windows(), self.transposed());
         let mut d_x = vec![0.0; x.len()];
         let chunk = CHUNK * self.convolution.input_len();
         // A chunk's share is summed by one thread, the shares in order: the same bits for any number of threads.
         let shares: Vec<Share> =
-            (x.par_chunks(chunk), d_x.par_chunks_mut(chunk), alive.par_chunks(chunk), d_y.par_chunks(chunk))
+            (x.par_chunks(chunk), d_x.par_chunks_mut(chunk), cut_off.par_chunks(chunk), d_y.par_chunks(chunk))
                 .into_par_iter()
-                .map(|(x, d_x, alive, d_y)| {
+                .map(|(x, d_x, cut_off, d_y)| {
                     let (windows, transposed) = (windows.as_slice(), transposed.as_slice());
-                    vectors::run(Backward { layer, windows, transposed, x, d_x, alive, d_y })
+                    vectors::run(Backward { layer, windows, transposed, x, d_x, cut_off, d_y })
                 })
                 .collect();
         let mut sum = Share::new(self);
         for share in &shares {
-            add_in_order(&mut sum.by_window, &share.by_window);
-            add_in_order(&mut sum.bias, &share.bias);
+            add(&mut sum.by_window, &share.by_window);
+            add(&mut sum.bias, &share.bias);
         }
         Gradients { x: d_x, weight: self.d_weight(&sum.by_window), bias: sum.bias }
     }
@@ -96,21 +101,21 @@ impl<'a> ResidualLayer<'a> {
 
     /// What the convolution alone answers, `[cells, channel]`.
     #[inline(always)]
-    fn convolve<S: Simd>(&self, simd: S, windows: &[usize], by_window: &[f32], map: &[f32], into: &mut [f32]) {
+    fn convolve<S: Simd>(&self, simd: S, windows: &[usize], packed: &[f32], map: &[f32], into: &mut [f32]) {
         for (first, len) in blocks::<S>(self.bias.len()) {
-            let weights = self.convolution.block(by_window, first, len);
+            let weights = self.convolution.weights_of_block(packed, first, len);
             // Twelve sums: enough for the processor to have something to do, and they fit the registers.
             if len == 2 * S::F32_LANES {
-                self.block::<S, 2, 6>(simd, first, windows, weights, map, into);
+                self.convolve_block::<S, 2, 6>(simd, first, windows, weights, map, into);
             } else {
-                self.block::<S, 1, 12>(simd, first, windows, weights, map, into);
+                self.convolve_block::<S, 1, 12>(simd, first, windows, weights, map, into);
             }
         }
     }
 
     /// `WIDTH` vectors of outputs from channel `first` on, `CELLS` cells of the map at a time.
     #[inline(always)]
-    fn block<S: Simd, const WIDTH: usize, const CELLS: usize>(
+    fn convolve_block<S: Simd, const WIDTH: usize, const CELLS: usize>(
         &self,
         simd: S,
         first: usize,
@@ -186,7 +191,7 @@ struct Forward<'a> {
     x: &'a [f32],
     y: &'a mut [f32],
     /// 0, or [`SILENT`] where the answer is cut off. With a place for every sample, or one that all share.
-    alive: &'a mut [u32],
+    cut_off: &'a mut [u32],
 }
 
 impl WithSimd for Forward<'_> {
@@ -194,25 +199,25 @@ impl WithSimd for Forward<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { layer, windows, x, y, alive } = self;
+        let Self { layer, windows, x, y, cut_off } = self;
         let convolution = layer.convolution;
-        let by_window = convolution.by_window::<S>(layer.weight);
+        let packed = convolution.packed::<S>(layer.weight);
         // The border stays zero: it is never written.
         let mut map = vec![0.0; convolution.map_len()];
         let len = convolution.input_len();
-        let places = alive.len() / len;
+        let places = cut_off.len() / len;
         let bias = vectors::vectors::<S>(layer.bias);
         let zero = simd.splat_f32s(0.0);
         for (sample, (x, y)) in x.chunks_exact(len).zip(y.chunks_exact_mut(len)).enumerate() {
             convolution.pad(x, &mut map);
-            layer.convolve(simd, windows, &by_window, &map, y);
-            let alive = int_vectors_mut::<S>(&mut alive[sample % places * len..][..len]);
+            layer.convolve(simd, windows, &packed, &map, y);
+            let cut_off = int_vectors_mut::<S>(&mut cut_off[sample % places * len..][..len]);
             let (x, y) = (vectors::vectors::<S>(x), vectors_mut::<S>(y));
-            for (((y, x), alive), bias) in y.iter_mut().zip(x).zip(alive).zip(bias.iter().cycle()) {
+            for (((y, x), cut_off), bias) in y.iter_mut().zip(x).zip(cut_off).zip(bias.iter().cycle()) {
                 let value = simd.add_f32s(*x, simd.add_f32s(*y, *bias));
                 let is_alive = simd.greater_than_f32s(value, zero);
                 *y = simd.select_f32s(is_alive, value, zero);
-                *alive = simd.select_u32s(is_alive, simd.splat_u32s(0), simd.splat_u32s(SILENT));
+                *cut_off = simd.select_u32s(is_alive, simd.splat_u32s(0), simd.splat_u32s(SILENT));
             }
         }
     }
@@ -237,7 +242,7 @@ struct Backward<'a> {
     transposed: &'a [f32],
     x: &'a [f32],
     d_x: &'a mut [f32],
-    alive: &'a [u32],
+    cut_off: &'a [u32],
     d_y: &'a [f32],
 }
 
@@ -246,9 +251,9 @@ impl WithSimd for Backward<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Share {
-        let Self { layer, windows, transposed, x, d_x, alive, d_y } = self;
+        let Self { layer, windows, transposed, x, d_x, cut_off, d_y } = self;
         let convolution = layer.convolution;
-        let transposed = convolution.by_window::<S>(transposed);
+        let transposed = convolution.packed::<S>(transposed);
         let mut share = Share::new(&layer);
         // The borders stay zero: they are never written.
         let mut map = vec![0.0; convolution.map_len()];
@@ -258,18 +263,20 @@ impl WithSimd for Backward<'_> {
         let mut d_sums = vec![0.0; len];
         for sample in 0..x.len() / len {
             let of_sample = sample * len..(sample + 1) * len;
-            for ((d_sum, d_y), alive) in d_sums.iter_mut().zip(&d_y[of_sample.clone()]).zip(&alive[of_sample.clone()]) {
-                *d_sum = if *alive == SILENT { 0.0 } else { *d_y };
+            for ((d_sum, d_y), cut_off) in
+                d_sums.iter_mut().zip(&d_y[of_sample.clone()]).zip(&cut_off[of_sample.clone()])
+            {
+                *d_sum = if *cut_off == SILENT { 0.0 } else { *d_y };
             }
             for d_sums in d_sums.chunks_exact(share.bias.len()) {
-                add_in_order(&mut share.bias, d_sums);
+                add(&mut share.bias, d_sums);
             }
             convolution.pad(&x[of_sample.clone()], &mut map);
             layer.add_products(simd, &map, &d_sums, &mut share.by_window);
             convolution.pad(&d_sums, &mut d_map);
             let d_x = &mut d_x[of_sample];
             layer.convolve(simd, windows, &transposed, &d_map, d_x);
-            add_in_order(d_x, &d_sums);
+            add(d_x, &d_sums);
         }
         share
     }
@@ -297,21 +304,26 @@ mod tests {
             let len = 3 * cells * cells * channels;
             let (x, d_y) = (values(len, 101), values(len, 211));
             let answered = |run: &dyn Fn(Forward<'_>)| {
-                let (mut y, mut alive) = (vec![0.0; len], vec![0; len]);
-                run(Forward { layer, windows: &windows, x: &x, y: &mut y, alive: &mut alive });
-                (y, alive)
+                let (mut y, mut cut_off) = (vec![0.0; len], vec![0; len]);
+                run(Forward { layer, windows: &windows, x: &x, y: &mut y, cut_off: &mut cut_off });
+                (y, cut_off)
             };
-            let (y, alive) = answered(&|kernel| vectors::run(kernel));
-            assert_eq!((&y, &alive), (&answered(&|kernel| kernel.with_simd(pulp::Scalar)).0, &alive));
+            let (y, cut_off) = answered(&|kernel| kernel.with_simd(pulp::Scalar));
+            assert_eq!((y.clone(), cut_off.clone()), answered(&|kernel| vectors::run(kernel)));
             let gradients = |run: &dyn Fn(Backward<'_>) -> Share| {
                 let mut d_x = vec![0.0; len];
                 let (windows, transposed) = (windows.as_slice(), transposed.as_slice());
                 let share =
-                    run(Backward { layer, windows, transposed, x: &x, d_x: &mut d_x, alive: &alive, d_y: &d_y });
+                    run(Backward { layer, windows, transposed, x: &x, d_x: &mut d_x, cut_off: &cut_off, d_y: &d_y });
                 (d_x, share.by_window, share.bias)
             };
             let scalar = gradients(&|kernel| kernel.with_simd(pulp::Scalar));
-            assert_eq!(gradients(&|kernel| vectors::run(kernel)), scalar);
+            assert_eq!(scalar, gradients(&|kernel| vectors::run(kernel)));
+            #[cfg(target_arch = "x86_64")]
+            if let Some(avx2) = pulp::x86::V3::try_new() {
+                assert_eq!((y, cut_off.clone()), answered(&|kernel| Simd::vectorize(avx2, kernel)), "AVX2");
+                assert_eq!(scalar, gradients(&|kernel| Simd::vectorize(avx2, kernel)), "AVX2");
+            }
         }
     }
 }

@@ -8,7 +8,7 @@
 use super::convolution::{Convolution, Gradients, blocks};
 use super::pool::{POOL, better, with_relu};
 use super::vectors::{self, int_vectors_mut, vectors_mut};
-use super::{Answers, CHUNK, SILENT, add_in_order, by_chunks};
+use super::{Answers, CHUNK, SILENT, add, by_chunks};
 use crate::network::architecture::{ConvLayer, LANES, POOLED_1, POOLED_2};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
@@ -60,8 +60,8 @@ impl<'a> SecondLayer<'a> {
             .collect();
         let mut sum = Share::new(self);
         for share in &shares {
-            add_in_order(&mut sum.by_output, &share.by_output);
-            add_in_order(&mut sum.bias, &share.bias);
+            add(&mut sum.by_output, &share.by_output);
+            add(&mut sum.bias, &share.bias);
         }
         Gradients { x: d_x, weight: self.d_weight(&sum.by_output), bias: sum.bias }
     }
@@ -147,7 +147,7 @@ impl WithSimd for Forward<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let Self { layer: SecondLayer { convolution, weight, bias }, windows, x, y, winners } = self;
-        let by_window = convolution.by_window::<S>(weight);
+        let packed = convolution.packed::<S>(weight);
         // The border stays zero: it is never written.
         let mut map = vec![0.0; convolution.map_len()];
         let output_len = POOLS * bias.len();
@@ -157,7 +157,7 @@ impl WithSimd for Forward<'_> {
             convolution.pad(x, &mut map);
             let winners = &mut winners[sample % places * output_len..][..output_len];
             for (first, len) in blocks::<S>(bias.len()) {
-                let block = Block { convolution, first, by_window: &by_window, bias };
+                let block = Block { convolution, first, packed: &packed, bias };
                 // As many sums as fit the registers: with AVX-512 those of two pools.
                 match (len == 2 * S::F32_LANES, S::F32_LANES == LANES) {
                     (true, true) => block.forward::<S, 2, 8>(simd, &map, windows, y, winners),
@@ -173,7 +173,7 @@ impl WithSimd for Forward<'_> {
 struct Block<'a> {
     convolution: Convolution,
     first: usize,
-    by_window: &'a [f32],
+    packed: &'a [f32],
     bias: &'a [f32],
 }
 
@@ -189,7 +189,7 @@ impl Block<'_> {
         winners: &mut [u32],
     ) {
         let (channels, len) = (self.bias.len(), WIDTH * S::F32_LANES);
-        let weights = self.convolution.block(self.by_window, self.first, len);
+        let weights = self.convolution.weights_of_block(self.packed, self.first, len);
         let bias = vectors::vectors::<S>(&self.bias[self.first..][..len]);
         for (index, starts) in windows.as_chunks::<CELLS>().0.iter().enumerate() {
             let sums = self.convolution.sums::<S, WIDTH, CELLS>(simd, map, *starts, weights);
