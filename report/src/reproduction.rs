@@ -7,7 +7,7 @@ use crate::markdown::{table_of, with_header};
 use crate::other_run::OtherRun;
 use crate::page::{Image, Page};
 use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
-use crate::table1::{AGREEMENT, READ_ETA_HAT};
+use crate::table1::{self, AGREEMENT, READ_ETA_HAT};
 use crate::trainings::{self, Place};
 use evaluation::calibration::AxisCalibration;
 use evaluation::conclusions::{self, Against, Driven, Statement, Verdict};
@@ -27,8 +27,7 @@ use experiment::lots::UNSEEN;
 use experiment::manifest::Manifest;
 use experiment::run_dir::RunDir;
 use experiment::settings::{Settings, has_points_of_paper};
-use policy::dagger::{DaggerSettings, IterationRow};
-use policy::decision_rule::DecisionRule;
+use policy::dagger::IterationRow;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -135,7 +134,7 @@ impl Found {
         with_drives(&recipe.stages, root, [stages::REFERENCE, stages::UNSEEN], |[reference, unseen]| {
             headline(page, &reference, &unseen);
             page.section("What holds here", verdicts(&self.statements, &recipe.extent));
-            table_1(page, &settings.dagger, &self.weighted, &self.unweighted, &self.on_policy.effect);
+            table_1(page, settings, &self.weighted, &self.unweighted, &self.on_policy.effect);
             collision_rates(page, &reference);
             safe_ratios(page, &reference);
             unseen_lots(page, &unseen);
@@ -247,7 +246,7 @@ fn statements(
 ) -> Vec<Statement> {
     let mut statements = conclusions::on_reference_lots(reference);
     // With nearer labels η̂ is another quantity, and is not held against the paper's.
-    if has_points_of_paper(settings) && settings.dagger.rule.tau() == DecisionRule::paper().tau() {
+    if table1::has_eta_hat_of_paper(settings) {
         statements.push(conclusions::share_of_the_network(weighted, settings.dagger.eta));
     }
     statements.extend(effect.iter().map(|Effect { iteration, held_back, held_back_by_seed, .. }| {
@@ -319,12 +318,12 @@ fn verdicts(statements: &[Statement], extent: &Extent) -> String {
 
 fn table_1(
     page: &mut Page,
-    dagger: &DaggerSettings,
+    settings: &Settings,
     weighted: &[IterationRow],
     unweighted: &[IterationRow],
     effect: &[Effect],
 ) {
-    let alpha = dagger.fit.loss.alpha;
+    let alpha = settings.dagger.fit.loss.alpha;
     let columns = weighted.len().max(unweighted.len()).max(paper::TABLE_1.dataset.len());
     let header: Vec<String> = (0..columns).map(|i| if i == 0 { BC.to_owned() } else { format!("i = {i}") }).collect();
     let mut table = with_header(std::iter::once(String::new()).chain(header).collect());
@@ -368,9 +367,8 @@ fn table_1(
     };
     let ours = [(format!("α = {alpha}"), weighted), ("α = 0".to_owned(), unweighted)]
         .map(|(name, rows)| EtaSeries { name, points: points(rows) });
-    let of_paper: Vec<(u32, f64)> =
-        (0..).zip(paper::TABLE_1.eta_hat).filter_map(|(round, eta)| Some((round, eta?))).collect();
-    page.figure("eta", "Share of the network by iteration.", Image::Svg(plots::eta(&ours, &of_paper, dagger.eta)));
+    let figure = plots::eta(&ours, &table1::eta_hat_of_paper(settings), settings.dagger.eta);
+    page.figure("eta", "Share of the network by iteration.", Image::Svg(figure));
 }
 
 /// Lots as columns, as in the paper: groups, then what is pooled.
@@ -541,7 +539,7 @@ fn decision_rules(root: &Path, recipe: &Recipe, driven: &Driven<'_>) -> anyhow::
         "iterations",
         "samples, i = 1",
         "η̂, i = 1",
-        "near-collisions while collecting, i = 1",
+        "near-collisions (contacts) while collecting, i = 1",
         "then driving: near-collisions (contacts)",
         "safe ratio",
     ]);
@@ -558,7 +556,10 @@ fn decision_rules(root: &Path, recipe: &Recipe, driven: &Driven<'_>) -> anyhow::
             rows.len().saturating_sub(1).min(recipe.extent.rule_iterations as usize).to_string(),
             cell(|row| Some(row.samples.to_string())),
             cell(|row| row.eta_hat.map(|eta| format!("{eta:.3}"))),
-            cell(|row| Some(row.near_collisions.to_string())),
+            cell(|row| {
+                let contacts = row.effort.map(|effort| format!(" ({})", effort.contacts)).unwrap_or_default();
+                Some(format!("{}{contacts}", row.near_collisions))
+            }),
             format!("{} ({}): {}", totals.near_collisions, totals.contacts, quoted_rate(&totals, &estimates[driver])),
             format!("{:.3}", totals.safe_ratio()),
         ]);

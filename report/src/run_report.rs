@@ -10,6 +10,7 @@ use crate::markdown::escaped;
 use crate::moments;
 use crate::page::{Image, Page};
 use crate::plots::{self, Distribution, EtaSeries, RatePoint, RateRow, RateSeries};
+use crate::table1;
 use crate::what_if::distinct;
 use anyhow::Context as _;
 use evaluation::calibration::{self, AxisCalibration};
@@ -271,10 +272,9 @@ fn add_training(page: &mut Page, settings: &Settings, training: &Training) {
     let rows = &training.table1.rows;
     let ours: Vec<(u32, f64)> = rows.iter().filter_map(|row| Some((row.round, row.eta_hat?))).collect();
     if !ours.is_empty() {
-        let paper = (0..).zip(&training.table1.paper.eta_hat).filter_map(|(i, eta)| Some((i, (*eta)?)));
         let series = EtaSeries { name: "this run".to_owned(), points: ours };
-        let svg = plots::eta(&[series], &paper.collect::<Vec<_>>(), settings.dagger.eta);
-        page.figure("eta", "How much the network drove in each iteration, here and in the paper.", Image::Svg(svg));
+        let svg = plots::eta(&[series], &table1::eta_hat_of_paper(settings), settings.dagger.eta);
+        page.figure("eta", "How much the network drove in each iteration.", Image::Svg(svg));
     }
     page.figure("learning", LEARNING_CAPTION, Image::Svg(plots::learning(&training.rounds)));
 }

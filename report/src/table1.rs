@@ -2,9 +2,12 @@
 
 use crate::markdown::with_header;
 use evaluation::names::BC;
+use evaluation::paper;
 use evaluation::table1::Table1;
 use experiment::run_dir::RunDir;
+use experiment::settings::{Settings, has_points_of_paper};
 use policy::dagger::{IterationRow, Stop};
+use policy::decision_rule::DecisionRule;
 
 /// Writes `table1.md`; returns its text.
 ///
@@ -41,6 +44,17 @@ pub(crate) const READ_ETA_HAT: &str = "The best constant answer is the point tha
     learned is what lies above it. Nearer labels have smaller errors at the same τ; scaled as the labels, τ · mean range of \
     the labels / 6.4 m, the range of the paper's points (460 m in 6425 samples of 0.05 s, v = a_y/4.48). Shares compare \
     with the paper's η̂ only where labels and τ are the paper's.";
+
+/// Whether η̂ is the quantity that the paper has: its labels, its τ.
+pub(crate) fn has_eta_hat_of_paper(settings: &Settings) -> bool {
+    has_points_of_paper(settings) && settings.dagger.rule.tau() == DecisionRule::paper().tau()
+}
+
+/// The paper's η̂ by iteration, to be drawn beside ours: none where ours is another quantity.
+pub(crate) fn eta_hat_of_paper(settings: &Settings) -> Vec<(u32, f64)> {
+    let of_paper = (0..).zip(paper::TABLE_1.eta_hat).filter_map(|(round, eta)| Some((round, eta?)));
+    if has_eta_hat_of_paper(settings) { of_paper.collect() } else { Vec::new() }
+}
 
 /// A column per round.
 pub fn to_markdown(table1: &Table1) -> String {

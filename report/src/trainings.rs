@@ -119,7 +119,8 @@ pub(crate) fn by_seed(
                 let found = place.as_ref().and_then(|place| Some((place, place.driven.driver(&name)?)));
                 found.map_or_else(String::new, |(place, driver)| {
                     let totals = place.totals(driver);
-                    format!("{}: {}", totals.near_collisions, quoted_rate(&totals, &place.estimates[driver]))
+                    let rate = quoted_rate(&totals, &place.estimates[driver]);
+                    format!("{} ({}): {rate}", totals.near_collisions, totals.contacts)
                 })
             };
             let rows = chain.map_or_else(|| Ok(Vec::new()), |chain| rows_of(root, chain, seed))?;
@@ -133,7 +134,7 @@ pub(crate) fn by_seed(
     }
     let over_seeds = over_seeds(places.iter().flatten());
     let mut text = format!(
-        "Trainings that differ in nothing but their root seed; η̂ of each iteration. Intervals here are of one network each \
+        "Trainings that differ in nothing but their root seed: η̂ of each iteration, near-collisions (contacts). Intervals here are of one network each \
          and do not cover what another training would have given.\n\n{table}"
     );
     if over_seeds.row_count() > 0 {

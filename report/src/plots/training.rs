@@ -106,7 +106,8 @@ pub struct EtaSeries {
     pub points: Vec<(u32, f64)>,
 }
 
-/// η̂ per iteration of one or more trainings beside the paper's; `threshold` is η, above which iterations end.
+/// η̂ per iteration of one or more trainings beside the paper's, if there is any of it; `threshold` is η, above which
+/// iterations end.
 pub fn eta(ours: &[EtaSeries], paper: &[(u32, f64)], threshold: f64) -> String {
     let points = ours.iter().flat_map(|series| &series.points).chain(paper);
     let last = points.map(|&(iteration, _)| iteration).max().unwrap_or(1).max(2);
@@ -115,7 +116,9 @@ pub fn eta(ours: &[EtaSeries], paper: &[(u32, f64)], threshold: f64) -> String {
         .enumerate()
         .map(|(i, series)| Key { name: series.name.clone(), colour: colour(i), look: Look::Marked(i) })
         .collect();
-    legend.push(Key { name: "paper".to_owned(), colour: style::FAINT, look: Look::Marked(2) });
+    if !paper.is_empty() {
+        legend.push(Key { name: "paper".to_owned(), colour: style::FAINT, look: Look::Marked(2) });
+    }
     legend.push(Key { name: format!("η = {threshold}: stop"), colour: style::INK, look: Look::Dashes });
     let figure = Figure {
         title: "Share of ticks driven by the network",

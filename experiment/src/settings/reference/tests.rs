@@ -221,7 +221,7 @@ const OF_THE_PAPER: [(&str, &str, &str); 51] = [
 ];
 
 #[test]
-fn the_paper_preset_is_the_paper_and_nothing_else() {
+fn the_paper_preset_has_what_the_paper_states() {
     let settings = Value::try_from(Settings::preset("paper").unwrap()).unwrap();
     for (key, expected, place) in OF_THE_PAPER {
         let found = key.split('.').try_fold(&settings, |value, part| value.get(part)).cloned();
