@@ -101,8 +101,8 @@ fn a_killed_training_goes_on_to_the_same_bytes() {
 #[test]
 fn deaths_full_disks_and_errors_of_the_disk_lose_nothing() {
     let printed =
-        succeed(xtask().args(["torture", "--only", "evaluate,tune,generate", "--strikes", "2", "--kills", "1"]));
-    assert_eq!(printed.lines().filter(|line| line.ends_with("| 0 |")).count(), 3, "{printed}");
+        succeed(xtask().args(["torture", "--only", "evaluate,merge,tune,generate", "--strikes", "2", "--kills", "1"]));
+    assert_eq!(printed.lines().filter(|line| line.ends_with("| 0 |")).count(), 4, "{printed}");
     // Three of four operations for two of the faults, and of eight for the third.
     let of_three = ["torture", "--only", "export", "--strikes", "3", "--kills", "1"];
     let parts =

@@ -4,13 +4,17 @@ use crate::evaluate::{BATCH, DRIVING, FILES};
 use crate::plan::Plan;
 use crate::read::{Place, Places};
 use crate::records::{self, Driven};
-use anyhow::ensure;
+use anyhow::{Context as _, ensure};
 use experiment::run_dir::RunDir;
 use experiment::trials::Trial;
-use sim::limits::RUN_TEXT_BYTES_MAX;
+use sim::limits::RUN_LINES_BYTES_MAX;
 use std::collections::BTreeSet;
-use std::path::Path;
-use storage::{growing, sums};
+use std::fs::File;
+use std::io::{Read as _, Seek as _, SeekFrom};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use storage::growing::{self, Growing};
+use storage::sums;
 
 /// A trial in words: `LOT@DIRECTION@TRIAL`.
 pub(crate) fn key(trial: &Trial<'_>) -> String {
@@ -24,18 +28,17 @@ pub(crate) struct Part<'a> {
 }
 
 impl Part<'_> {
-    /// The lines of a file with their places in the whole plan.
-    fn rows(&self, name: &str, places: &Places<'_>) -> anyhow::Result<Vec<(Place, String)>> {
+    /// Where the lines of a file are, with their places in the whole plan.
+    fn rows(&self, name: &str, places: &Places<'_>) -> anyhow::Result<Vec<(Place, Range<u64>)>> {
         let path = self.folder.join(name);
-        let text = sums::read_to_string(&path, RUN_TEXT_BYTES_MAX)?;
         let own = Places::new(&self.plan);
-        let mut lines = text.lines();
         let mut rows = Vec::new();
         let mut seen = BTreeSet::new();
-        records::each_line_of(&path, text.as_bytes(), |driven: Driven| {
+        let lines = sums::open(&path, RUN_LINES_BYTES_MAX)?;
+        records::each_line_at(&path, lines, |bytes, driven: Driven| {
             let is_new = seen.insert(own.of(&driven)?);
             ensure!(is_new || name == records::FAILURES, "there twice");
-            rows.push((places.of(&driven)?, lines.next().unwrap_or_default().to_owned()));
+            rows.push((places.of(&driven)?, bytes));
             Ok(())
         })?;
         if name != records::FAILURES {
@@ -58,9 +61,33 @@ impl Part<'_> {
     }
 }
 
-/// The lines of an evaluation, as one command would have written them.
+/// The lines of an evaluation, as one command would have written them: where they are, so that no more than a batch of them
+/// is ever held.
 #[derive(Debug)]
-pub struct Rows([Vec<u8>; FILES.len()]);
+pub struct Rows([RowsOfFile; FILES.len()]);
+
+/// Those of one file.
+#[derive(Debug)]
+struct RowsOfFile {
+    /// The file of each part.
+    files: Vec<PathBuf>,
+    /// In the order of the whole.
+    rows: Vec<Row>,
+}
+
+#[derive(Debug, Clone)]
+struct Row {
+    place: Place,
+    part: usize,
+    bytes: Range<u64>,
+}
+
+impl Row {
+    /// What an evaluation drives, and writes, at once: a batch of trials, by one driver at one noise level.
+    fn drive(&self) -> (usize, usize, usize) {
+        (self.place.trial / BATCH, self.place.level, self.place.driver)
+    }
+}
 
 impl Rows {
     /// Those of the parts of a plan, which are all of it.
@@ -69,30 +96,78 @@ impl Rows {
     /// If a file is missing or damaged, or a row is missing, there twice, or of another part or plan.
     pub(crate) fn of(parts: &[Part<'_>], plan: &Plan<'_>) -> anyhow::Result<Self> {
         let places = Places::new(plan);
-        let mut files = FILES.map(|_| Vec::new());
-        for (name, file) in FILES.into_iter().zip(&mut files) {
+        let of_file = |name: &str| -> anyhow::Result<RowsOfFile> {
             let mut rows = Vec::new();
-            for part in parts {
-                rows.extend(part.rows(name, &places)?);
+            for (index, part) in parts.iter().enumerate() {
+                let found = part.rows(name, &places)?.into_iter();
+                rows.extend(found.map(|(place, bytes)| Row { place, part: index, bytes }));
             }
             // Stable: the near-collisions of a run stay in their order.
-            rows.sort_by_key(|(place, _)| (place.trial / BATCH, *place));
-            for (_, line) in rows {
-                file.extend(line.into_bytes());
-                file.push(b'\n');
-            }
-        }
-        Ok(Self(files))
+            rows.sort_by_key(|row| (row.drive(), row.place));
+            Ok(RowsOfFile { files: parts.iter().map(|part| part.folder.join(name)).collect(), rows })
+        };
+        let [runs, failures, wall_time] = FILES.map(of_file);
+        Ok(Self([runs?, failures?, wall_time?]))
     }
 
-    /// Writes them into the folder of a run.
+    /// Writes them into the folder of a run, as an evaluation would, which could go on where this was stopped.
     ///
     /// # Errors
-    /// If a file cannot be written.
+    /// If a file cannot be read or written.
     pub fn write(&self, run: &RunDir) -> anyhow::Result<()> {
-        // An evaluation under way would be continued, in files that have been replaced.
-        growing::clear(run.path(), DRIVING)?;
-        // That of the runs is listed last: with it, the evaluation counts as driven.
-        FILES.into_iter().zip(&self.0).rev().try_for_each(|(name, lines)| run.write(name, lines))
+        if sums::is_listed(run.path(), records::RUNS)? {
+            growing::clear(run.path(), DRIVING)?;
+            return Ok(());
+        }
+        let mut lines = Growing::open(run.path(), DRIVING, &FILES)?;
+        let mut readers = self.0.each_ref().map(Reader::new);
+        let [runs, ..] = &self.0;
+        for (index, of_drive) in runs.rows.chunk_by(|row, next| row.drive() == next.drive()).enumerate() {
+            let drive = of_drive[0].drive();
+            let mut texts = Vec::with_capacity(FILES.len());
+            for reader in &mut readers {
+                texts.push(reader.next(drive)?);
+            }
+            if index >= lines.parts() {
+                run.ensure_held()?;
+                lines.add(&texts)?;
+            }
+        }
+        Ok(lines.finish()?)
+    }
+}
+
+/// Reads the rows of a file in their order.
+struct Reader<'a> {
+    of: &'a RowsOfFile,
+    at: usize,
+    /// The last part's file: most rows have several of one part beside each other.
+    open: Option<(usize, File)>,
+}
+
+impl<'a> Reader<'a> {
+    fn new(of: &'a RowsOfFile) -> Self {
+        Self { of, at: 0, open: None }
+    }
+
+    /// The rows of a drive, which is the next one.
+    fn next(&mut self, drive: (usize, usize, usize)) -> anyhow::Result<Vec<u8>> {
+        let RowsOfFile { files, rows } = self.of;
+        let mut text = Vec::new();
+        while let Some(row) = rows.get(self.at).filter(|row| row.drive() == drive) {
+            let path = &files[row.part];
+            let file = match &mut self.open {
+                Some((part, file)) if *part == row.part => file,
+                open => &mut open.insert((row.part, File::open(path).with_context(|| path.display().to_string())?)).1,
+            };
+            let count = row.bytes.end - row.bytes.start;
+            let read = file.seek(SeekFrom::Start(row.bytes.start));
+            let read = read
+                .and_then(|_| file.take(count).read_to_end(&mut text))
+                .with_context(|| path.display().to_string())?;
+            ensure!(read as u64 == count, "{}: became shorter while it was read; begin again", path.display());
+            self.at += 1;
+        }
+        Ok(text)
     }
 }

@@ -11,6 +11,7 @@ use sim::frame::Ending;
 use sim::limits::{RECORD_BYTES_MAX, RUN_LINES_BYTES_MAX};
 use sim::scenario::Direction;
 use std::io::{BufRead as _, BufReader, Read};
+use std::ops::Range;
 use std::path::Path;
 use storage::sums;
 
@@ -127,17 +128,32 @@ pub fn each_line_of<T: DeserializeOwned>(
     lines: impl Read,
     mut take: impl FnMut(T) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
+    each_line_at(path, lines, |_, line| take(line))
+}
+
+/// [`each_line_of`], with the bytes of the file that the line takes, its end included.
+///
+/// # Errors
+/// If it is of another version, or `take` refuses a line.
+pub fn each_line_at<T: DeserializeOwned>(
+    path: &Path,
+    lines: impl Read,
+    mut take: impl FnMut(Range<u64>, T) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
     let mut lines = BufReader::new(lines);
     let mut line = Vec::new();
+    let mut from = 0;
     for number in 1.. {
         line.clear();
         let read = lines.by_ref().take(RECORD_BYTES_MAX + 1).read_until(b'\n', &mut line);
         if read.with_context(|| path.display().to_string())? == 0 {
             break;
         }
-        parse(&line).and_then(&mut take).with_context(|| {
+        let to = from + line.len() as u64;
+        parse(&line).and_then(|found| take(from..to, found)).with_context(|| {
             format!("{}:{number}: not of this evaluation; drive it again into another folder", path.display())
         })?;
+        from = to;
     }
     Ok(())
 }

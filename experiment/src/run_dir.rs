@@ -75,17 +75,20 @@ impl RunDir {
     fn create_anywhere(place: &Place<'_>, settings: &Settings, request: &Request) -> anyhow::Result<Self> {
         let manifest = toml::to_string(&Manifest::new(place.build, [place.command, place.preset], settings, request))
             .expect("a manifest is plain values");
-        ensure!(
-            manifest.len() as u64 <= RUN_TOML_BYTES_MAX,
-            "the manifest of this run would have {} bytes, and at most {RUN_TOML_BYTES_MAX} are read; drive fewer runs, or in \
-             more shards",
-            manifest.len()
-        );
+        let settings = settings.to_toml();
+        for (what, text) in [("manifest", &manifest), ("settings", &settings)] {
+            ensure!(
+                text.len() as u64 <= RUN_TOML_BYTES_MAX,
+                "the {what} of this run would have {} bytes, and at most {RUN_TOML_BYTES_MAX} are read; name fewer lots, drive \
+                 fewer runs, or in more shards",
+                text.len()
+            );
+        }
         let run = match place.out {
             Some(out) => Self::claim_named(out, place)?,
             None => Self::claim_next_free(place)?,
         };
-        whole::write(&run.path.join(SETTINGS), settings.to_toml().as_bytes())?;
+        whole::write(&run.path.join(SETTINGS), settings.as_bytes())?;
         whole::write(&run.path.join(MANIFEST), manifest.as_bytes())?;
         sums::list(&run.path, &[SETTINGS, MANIFEST])?;
         Ok(Self { inputs: Arc::new(request.inputs.clone()), ..run })
@@ -420,6 +423,21 @@ mod tests {
     use super::*;
     use crate::test_runs::{build, create, message, place, scratch};
     use sim::seed::RootSeed;
+
+    /// The settings of a run were read to 256 kB, however many lots they named: it drove for hours, and had no report.
+    #[test]
+    fn settings_that_are_written_are_read_back_and_longer_ones_are_refused_before_there_is_a_folder() {
+        let path = scratch("many-lots");
+        let mut settings = Settings::preset("smoke").unwrap();
+        let name = |number| format!("lots/{}-{number}.toml", "x".repeat(100));
+        settings.evaluation.lots = (0..10_000).map(name).collect();
+        drop(RunDir::create(&place(&path, false), &settings, &Request::default()).unwrap());
+        assert_eq!(RunDir::resume(&path, "train-dagger").unwrap().1, settings);
+        fs::remove_dir_all(&path).unwrap();
+        settings.evaluation.lots = (0..200_000).map(name).collect();
+        let refused = message(RunDir::create(&place(&path, false), &settings, &Request::default()));
+        assert!(refused.contains("the settings of this run") && !path.exists(), "{refused}");
+    }
 
     #[test]
     fn a_run_is_resumed_until_finished_and_overwritten_only_when_told() {

@@ -4,7 +4,7 @@ use crate::manifest::{Finished, MANIFEST, Manifest, Outcome, SETTINGS, finished}
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
 use policy::checkpoint::Checkpoint;
-use sim::limits::{RUN_TOML_BYTES_MAX, SETTINGS_BYTES_MAX};
+use sim::limits::RUN_TOML_BYTES_MAX;
 use sim::seed::RootSeed;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -101,7 +101,7 @@ pub fn driving_folders(spec: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let policy = policy_folder(spec)?;
     let (run, is_bc) = run_of(spec)?;
     // Damage is an error. Settings that are whole may be of another version: the network alone can be used then.
-    sums::read(&run.join(SETTINGS), SETTINGS_BYTES_MAX)?;
+    sums::read(&run.join(SETTINGS), RUN_TOML_BYTES_MAX)?;
     // It says which files the network was trained on.
     sums::read(&run.join(MANIFEST), RUN_TOML_BYTES_MAX)?;
     let round = policy.file_name().and_then(|name| name.to_str()).filter(|name| !is_bc && name.starts_with("round-"));
@@ -166,7 +166,7 @@ pub fn network_trained_on(checkpoint: &Path) -> anyhow::Result<TrainedOn> {
 /// If they are.
 pub fn ensure_run_of_network(checkpoint: &Path) -> anyhow::Result<()> {
     if let Some(run) = run_of_network(checkpoint)? {
-        sums::read(&run.join(SETTINGS), SETTINGS_BYTES_MAX)?;
+        sums::read(&run.join(SETTINGS), RUN_TOML_BYTES_MAX)?;
         sums::read(&run.join(MANIFEST), RUN_TOML_BYTES_MAX)?;
     }
     Ok(())
@@ -175,8 +175,11 @@ pub fn ensure_run_of_network(checkpoint: &Path) -> anyhow::Result<()> {
 /// The run that a checkpoint lies in, if it does.
 fn run_of_network(checkpoint: &Path) -> anyhow::Result<Option<PathBuf>> {
     let place = storage::place_of(checkpoint)?;
-    let is_run = |folder: &&Path| folder.join(SETTINGS).is_file() && folder.join(MANIFEST).is_file();
-    Ok(place.parent().filter(is_run).map(Path::to_owned))
+    let Some(folder) = place.parent() else { return Ok(None) };
+    let is_there = [SETTINGS, MANIFEST].iter().all(|name| folder.join(name).is_file());
+    // What is listed and gone is damage, not the absence of a run.
+    let is_run = is_there || sums::is_listed(folder, SETTINGS)? || sums::is_listed(folder, MANIFEST)?;
+    Ok(is_run.then(|| folder.to_owned()))
 }
 
 /// A hint at the run of that name, if there is one.
@@ -267,7 +270,15 @@ mod tests {
         let whole = fs::read(path.join(MANIFEST)).unwrap();
         fs::write(path.join(MANIFEST), &whole[1..]).unwrap();
         let damaged: DriverSpec = format!("net:{run}/round-01").parse().unwrap();
-        assert!(message(damaged.load(&settings).map(drop)).contains("manifest.toml: is damaged"));
+        assert!(message(damaged.clone().load(&settings).map(drop)).contains("manifest.toml: is damaged"));
+        fs::write(path.join(MANIFEST), &whole).unwrap();
+        // Without one of them the folder was none of a run's, and lots that it was trained on were unseen ones.
+        for name in [SETTINGS, MANIFEST] {
+            fs::rename(path.join(name), path.join("away")).unwrap();
+            let refused = message(damaged.clone().load(&settings).map(drop));
+            assert!(refused.contains(&format!("{name}: cannot be read")), "{refused}");
+            fs::rename(path.join("away"), path.join(name)).unwrap();
+        }
         let alone = scratch("trained-on-alone");
         checkpoint.save(&alone).unwrap();
         assert!(lots_of(format!("net:{}", alone.display())).is_empty(), "nobody knows");

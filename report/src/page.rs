@@ -16,6 +16,7 @@ use crate::pictures::file_name;
 use anyhow::Context as _;
 use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
+use experiment::run_dir::RunDir;
 use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd, html};
 use sha2::{Digest as _, Sha256};
 use std::borrow::Cow;
@@ -138,15 +139,16 @@ impl Page {
     /// Writes `STEM.md`, `STEM.html` and `figures/` into the folder of a run, and lists them.
     ///
     /// # Errors
-    /// If a file cannot be written.
-    pub fn write(&self, folder: &Path, stem: &str) -> anyhow::Result<()> {
+    /// If a file cannot be written, or the folder was deleted or moved meanwhile.
+    pub fn write(&self, run: &RunDir, stem: &str) -> anyhow::Result<()> {
         let figures = self.parts.iter().filter_map(|part| match part {
             Part::Figure { name, image, .. } => Some((image.file(name), image.bytes().into_owned())),
             _ => None,
         });
-        sums::write_folder(folder, FIGURES, figures)?;
-        sums::write(folder, &format!("{stem}.md"), self.to_markdown().as_bytes())?;
-        Ok(sums::write(folder, &format!("{stem}.html"), self.to_html().as_bytes())?)
+        run.ensure_held()?;
+        sums::write_folder(run.path(), FIGURES, figures)?;
+        run.write(&format!("{stem}.md"), self.to_markdown().as_bytes())?;
+        run.write(&format!("{stem}.html"), self.to_html().as_bytes())
     }
 
     /// Writes Markdown alone, as a file of a repository; figures go to `pictures` beside it, into a folder called as the page.
@@ -511,13 +513,21 @@ mod tests {
     fn markdown_names_its_figures_and_files_are_written() {
         let folder = std::env::temp_dir().join(format!("xtask-test-{}-page", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
-        page().write(&folder, "report").unwrap();
+        // A folder with a list is a run.
+        sums::write(&folder, "settings.toml", b"").unwrap();
+        let run = RunDir::reopen(&folder, "render").unwrap();
+        page().write(&run, "report").unwrap();
         let markdown = std::fs::read_to_string(folder.join("report.md")).unwrap();
         assert!(markdown.starts_with("# Drivers \\<\\&> lots\n\nAll of *it*.\n\n## Rates\n"), "{markdown}");
         assert!(markdown.contains("\n![bars](figures/bars.svg)\n\nBars **with** intervals.\n"), "{markdown}");
         assert!(folder.join("figures/bars.svg").is_file() && folder.join("figures/view.png").is_file());
         assert_eq!(std::fs::read_to_string(folder.join("report.html")).unwrap(), page().to_html());
-        std::fs::remove_dir_all(folder).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        let refused = page().write(&run, "report").unwrap_err().to_string();
+        assert!(
+            refused.contains("was deleted or moved") && !folder.exists(),
+            "a deleted run came back half: {refused}"
+        );
     }
 
     #[test]

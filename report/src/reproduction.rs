@@ -52,7 +52,7 @@ pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
     page.text(introduction(recipe));
     found.add_to(&mut page, recipe, run.path())?;
     page.section("Where to look further", further());
-    page.write(run.path(), "report")?;
+    page.write(run, "report")?;
     run.write("conclusions.csv", &csv_of(&found.statements)?)?;
     Ok(verdicts(&found.statements, &recipe.extent))
 }

@@ -21,6 +21,7 @@ use evaluation::table1::Table1;
 use experiment::lots::ALL;
 use experiment::manifest::Manifest;
 use experiment::progress::{Interrupted, Progress};
+use experiment::run_dir::RunDir;
 use experiment::settings::{NoiseChoice, Settings};
 use experiment::trained;
 use policy::checkpoint::Checkpoint;
@@ -157,10 +158,11 @@ fn text(path: &Path) -> anyhow::Result<String> {
 ///
 /// # Errors
 /// If what the run left cannot be read, or the report cannot be written.
-pub fn write(folder: &Path, progress: &dyn Progress) -> anyhow::Result<()> {
+pub fn write(run: &RunDir, progress: &dyn Progress) -> anyhow::Result<()> {
     progress.begin("report", "report");
+    let folder = run.path();
     let page = page(folder, progress).with_context(|| format!("report of {}", folder.display()))?;
-    page.write(folder, STEM)?;
+    page.write(run, STEM)?;
     progress.end(&folder.join(FILE).display().to_string());
     Ok(())
 }

@@ -60,7 +60,7 @@ pub const PLANNER_BYTES_MAX: u64 = 65_536;
 pub const RUN_TOML_BYTES_MAX: u64 = 16_000_000;
 /// JSON, CSV or Markdown file of a run, bytes.
 pub const RUN_TEXT_BYTES_MAX: u64 = 256_000_000;
-/// JSONL file of a run, bytes; where `merge` reads it, that of a text file holds.
+/// JSONL file of a run, bytes.
 pub const RUN_LINES_BYTES_MAX: u64 = 100_000_000_000;
 /// Line of a JSONL file of a run, bytes.
 pub const RECORD_BYTES_MAX: u64 = 4_000_000;
@@ -93,7 +93,7 @@ pub const ONNX_NESTING_MAX: usize = 100;
 pub const TRIAL_MAX: u32 = 1_048_575;
 /// Runs of an evaluation, for each driver.
 pub const RUNS_MAX: usize = 10_000_000;
-/// Drives of a round of training.
-pub const DRIVES_PER_ROUND_MAX: usize = 100_000;
+/// Drives whose maps are held at once, 1 to 2 MB each: those of a round of training, those of a planner that is tuned.
+pub const DRIVES_AT_ONCE_MAX: usize = 10_000;
 /// Threads to compute with.
 pub const THREADS_MAX: u16 = 1024;

@@ -273,6 +273,10 @@ fn replace_folder(
     let failed =
         |error: std::io::Error| FileError::new(&path, format_args!("cannot be written: {error}"), whole::WRITE_REMEDY);
     let remove = |old: &Path| if old.exists() { fs::remove_dir_all(old).map_err(failed) } else { Ok(()) };
+    // A folder that was deleted meanwhile does not come back half.
+    if !folder.is_dir() {
+        return Err(FileError::new(folder, "was deleted or moved while it was being written", "begin again"));
+    }
     remove(&partial)?;
     fs::create_dir_all(&partial).map_err(failed)?;
     // The old one stays, and stays listed, until the new one is whole.

@@ -5,6 +5,8 @@ use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use experiment::progress::Interrupted;
 use experiment::view_request::ViewRequest;
+use sim::limits::VIEW_REQUEST_BYTES_MAX;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -31,6 +33,13 @@ const BACKENDS: &[&str] = &[
 /// If it cannot be built, it failed (it has said why), or on Ctrl-C.
 pub(crate) fn ask(request: &ViewRequest, output: &Output) -> anyhow::Result<()> {
     let manifest = manifest()?;
+    let request = serde_json::to_vec(request)?;
+    ensure!(
+        request.len() as u64 <= VIEW_REQUEST_BYTES_MAX,
+        "this asks the viewer program for too much at once, in {} bytes, and at most {VIEW_REQUEST_BYTES_MAX} are read; record \
+         fewer, with a smaller --limit or fewer keys",
+        request.len()
+    );
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
     command.args(["run", "--locked", "--manifest-path"]).arg(&manifest);
@@ -51,7 +60,7 @@ pub(crate) fn ask(request: &ViewRequest, output: &Output) -> anyhow::Result<()> 
     command.env("RAYON_NUM_THREADS", rayon::current_num_threads().to_string()).stdin(Stdio::piped());
     let mut child = command.spawn().context("cargo, which builds the viewer program, cannot be started")?;
     // If it ends before it has read everything, its status says why.
-    let _ = serde_json::to_writer(child.stdin.take().context("the pipe to the viewer program")?, request);
+    let _ = child.stdin.take().context("the pipe to the viewer program")?.write_all(&request);
     let mut looks = 0;
     let status = loop {
         if let Some(status) = child.try_wait().context("the viewer program")? {

@@ -4,7 +4,7 @@ use super::reference;
 use super::schema::Settings;
 use anyhow::{Context as _, bail, ensure};
 use scenarios::LotSpec;
-use sim::limits::{DRIVES_PER_ROUND_MAX, RUNS_MAX};
+use sim::limits::{DRIVES_AT_ONCE_MAX, RUNS_MAX};
 
 impl Settings {
     /// Checks ranges, and what no single section can know.
@@ -106,8 +106,8 @@ impl Settings {
             |lot: &LotSpec| if matches!(lot, LotSpec::Generated { .. }) { 1 } else { training.trials as usize };
         let drives = of_lots("training.lots", &training.lots, &trials)? * training.directions.len();
         ensure!(
-            drives <= DRIVES_PER_ROUND_MAX,
-            "training.lots, trials and directions: {drives} drives a round; at most {DRIVES_PER_ROUND_MAX} are possible"
+            drives <= DRIVES_AT_ONCE_MAX,
+            "training.lots, trials and directions: {drives} drives a round; at most {DRIVES_AT_ONCE_MAX} are possible"
         );
         for (key, names) in [("evaluation.lots", &evaluation.lots), ("evaluation.elsewhere", &evaluation.elsewhere)] {
             let lots = of_lots(key, names, &|_| 1)?;

@@ -4,7 +4,7 @@ use super::reference;
 use super::renamed;
 use super::schema::Settings;
 use anyhow::{Context as _, anyhow, bail, ensure};
-use sim::limits::SETTINGS_BYTES_MAX;
+use sim::limits::{RUN_TOML_BYTES_MAX, SETTINGS_BYTES_MAX};
 use sim::seed::RootSeed;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -68,7 +68,7 @@ impl Settings {
     /// # Errors
     /// If the file is missing, damaged or not complete.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
-        let text = storage::sums::read_to_string(path, SETTINGS_BYTES_MAX)?;
+        let text = storage::sums::read_to_string(path, RUN_TOML_BYTES_MAX)?;
         let tree = parse(path, &text)?;
         let settings = settings_from(&tree).map_err(|fault| fault.in_file(path, &text))?;
         settings.check()?;

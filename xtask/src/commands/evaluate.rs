@@ -202,7 +202,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
 /// See [`measure`].
 pub(crate) fn finish(plan: &Plan<'_>, run: &RunDir, console: &Console, output: &Output) -> anyhow::Result<()> {
     measure(plan, run, console, output)?;
-    report::run_report::write(run.path(), console)?;
+    report::run_report::write(run, console)?;
     run.finish(Outcome::Evaluation { drivers: plan.drivers.iter().map(|driver| driver.spec.to_string()).collect() })?;
     output.note(format_args!(
         "written: {}/report.html, summary.md, .json, .csv, runs.jsonl and failures.md, .jsonl",

@@ -205,6 +205,7 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
     };
     interrupt::goes_on_with(&again(args, &run));
     for (folder, path) in &trained {
+        run.ensure_held()?;
         if !sums::is_listed(run.path(), &format!("{folder}/{}", sums::FILE))? {
             sums::copy_folder(path, run.path(), folder)?;
         }

@@ -459,7 +459,7 @@ fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyh
     if let Some((folder, path)) = &copy {
         folder.check_file(path)?;
     }
-    let written = run_report::write(run, &Console::new(output));
+    let written = run_report::write(&owned, &Console::new(output));
     // Its own list has changed, also where the report was cut short.
     owned.list_again()?;
     written?;

@@ -138,7 +138,7 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
         check_elsewhere(&settings, &run, &drivers, &console, output)?;
         to_record.extend(args.record.record.map(|runs| record::first_runs(&plan, runs)));
     }
-    report::run_report::write(run.path(), &console)?;
+    report::run_report::write(&run, &console)?;
     run.finish(outcome)?;
     print_next_steps(run.path(), output);
     console.report_time();

@@ -5,7 +5,7 @@ use crate::build_info;
 use crate::console::Console;
 use crate::interrupt;
 use crate::output::Output;
-use anyhow::Context as _;
+use anyhow::{Context as _, ensure};
 use clap::Args;
 use evaluation::tune;
 use experiment::inputs::{self, Inputs};
@@ -15,6 +15,7 @@ use experiment::progress::Interrupted;
 use experiment::run_dir::RunDir;
 use experiment::settings::{Layers, NoiseChoice, Settings, Smoothing};
 use serde::{Deserialize, Serialize};
+use sim::limits::DRIVES_AT_ONCE_MAX;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
 use std::path::{Path, PathBuf};
@@ -113,6 +114,11 @@ fn begin(args: &TuneArgs) -> anyhow::Result<(RunDir, Settings, Asked)> {
     tune::planners_named(&args.planners)?;
     let lots = Lot::parse_all(&args.lots, &settings.episode.vehicle)?;
     tune::check(&lots)?;
+    let drives = 2 * lots.len() * Direction::BOTH.len() * args.trials as usize;
+    ensure!(
+        drives <= DRIVES_AT_ONCE_MAX,
+        "--lots, --trials: {drives} drives for each planner, both ways and again for the finalists; at most {DRIVES_AT_ONCE_MAX} are possible"
+    );
     let mut reads = inputs::places(&lots, &[]);
     reads.extend(args.layers.file().map(Path::to_owned));
     let asked = Asked { planners: args.planners.clone(), budget: args.budget };
