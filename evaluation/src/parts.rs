@@ -8,7 +8,8 @@ use anyhow::{Context as _, ensure};
 use experiment::run_dir::RunDir;
 use experiment::trials::Trial;
 use sim::limits::RUN_LINES_BYTES_MAX;
-use std::collections::BTreeSet;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::ops::Range;
@@ -75,7 +76,7 @@ struct RowsOfFile {
     rows: Vec<Row>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 struct Row {
     place: Place,
     part: usize,
@@ -106,32 +107,28 @@ impl Rows {
             rows.sort_by_key(|row| (row.drive(), row.place));
             Ok(RowsOfFile { files: parts.iter().map(|part| part.folder.join(name)).collect(), rows })
         };
-        let [runs, failures, wall_time] = FILES.map(of_file);
-        Ok(Self([runs?, failures?, wall_time?]))
+        let [runs, failures, wall_time] = FILES;
+        Ok(Self([of_file(runs)?, of_file(failures)?, of_file(wall_time)?]))
     }
 
-    /// Writes them into the folder of a run, as an evaluation would, which could go on where this was stopped.
+    /// Writes them into the folder of a run as an evaluation would, which can go on where this was stopped.
     ///
     /// # Errors
     /// If a file cannot be read or written.
     pub fn write(&self, run: &RunDir) -> anyhow::Result<()> {
+        // What was begun there may be of another commit.
+        growing::clear(run.path(), DRIVING)?;
         if sums::is_listed(run.path(), records::RUNS)? {
-            growing::clear(run.path(), DRIVING)?;
             return Ok(());
         }
         let mut lines = Growing::open(run.path(), DRIVING, &FILES)?;
         let mut readers = self.0.each_ref().map(Reader::new);
         let [runs, ..] = &self.0;
-        for (index, of_drive) in runs.rows.chunk_by(|row, next| row.drive() == next.drive()).enumerate() {
+        for of_drive in runs.rows.chunk_by(|row, next| row.drive() == next.drive()) {
             let drive = of_drive[0].drive();
-            let mut texts = Vec::with_capacity(FILES.len());
-            for reader in &mut readers {
-                texts.push(reader.next(drive)?);
-            }
-            if index >= lines.parts() {
-                run.ensure_held()?;
-                lines.add(&texts)?;
-            }
+            let texts = readers.iter_mut().map(|reader| reader.next(drive)).collect::<anyhow::Result<Vec<_>>>()?;
+            run.ensure_held()?;
+            lines.add(&texts)?;
         }
         Ok(lines.finish()?)
     }
@@ -141,13 +138,16 @@ impl Rows {
 struct Reader<'a> {
     of: &'a RowsOfFile,
     at: usize,
-    /// The last part's file: most rows have several of one part beside each other.
-    open: Option<(usize, File)>,
+    /// Files that are open, by part: there may be more parts than a process may have files.
+    open: BTreeMap<usize, File>,
 }
+
+/// Files that a [`Reader`] has open at most.
+const OPEN_MAX: usize = 64;
 
 impl<'a> Reader<'a> {
     fn new(of: &'a RowsOfFile) -> Self {
-        Self { of, at: 0, open: None }
+        Self { of, at: 0, open: BTreeMap::new() }
     }
 
     /// The rows of a drive, which is the next one.
@@ -156,9 +156,12 @@ impl<'a> Reader<'a> {
         let mut text = Vec::new();
         while let Some(row) = rows.get(self.at).filter(|row| row.drive() == drive) {
             let path = &files[row.part];
-            let file = match &mut self.open {
-                Some((part, file)) if *part == row.part => file,
-                open => &mut open.insert((row.part, File::open(path).with_context(|| path.display().to_string())?)).1,
+            if !self.open.contains_key(&row.part) && self.open.len() == OPEN_MAX {
+                self.open.clear();
+            }
+            let file = match self.open.entry(row.part) {
+                Entry::Occupied(open) => open.into_mut(),
+                Entry::Vacant(place) => place.insert(File::open(path).with_context(|| path.display().to_string())?),
             };
             let count = row.bytes.end - row.bytes.start;
             let read = file.seek(SeekFrom::Start(row.bytes.start));

@@ -177,8 +177,12 @@ fn run_of_network(checkpoint: &Path) -> anyhow::Result<Option<PathBuf>> {
     let place = storage::place_of(checkpoint)?;
     let Some(folder) = place.parent() else { return Ok(None) };
     let is_there = [SETTINGS, MANIFEST].iter().all(|name| folder.join(name).is_file());
-    // What is listed and gone is damage, not the absence of a run.
-    let is_run = is_there || sums::is_listed(folder, SETTINGS)? || sums::is_listed(folder, MANIFEST)?;
+    // What is listed and gone is damage, not the absence of a run. A list of another program is none.
+    let is_listed = |name| match sums::is_listed(folder, name) {
+        Err(error) if !storage::is_of_disk(&error) => Ok(false),
+        found => found,
+    };
+    let is_run = is_there || is_listed(SETTINGS)? || is_listed(MANIFEST)?;
     Ok(is_run.then(|| folder.to_owned()))
 }
 
@@ -279,10 +283,14 @@ mod tests {
             assert!(refused.contains(&format!("{name}: cannot be read")), "{refused}");
             fs::rename(path.join("away"), path.join(name)).unwrap();
         }
-        let alone = scratch("trained-on-alone");
+        let around = scratch("trained-on-alone");
+        let alone = around.join("network");
+        fs::create_dir_all(&around).unwrap();
         checkpoint.save(&alone).unwrap();
         assert!(lots_of(format!("net:{}", alone.display())).is_empty(), "nobody knows");
-        for path in [path, alone] {
+        fs::write(alone.with_file_name("sha256sums"), "of another program").unwrap();
+        assert!(lots_of(format!("net:{}", alone.display())).is_empty(), "nobody knows still");
+        for path in [path, around] {
             fs::remove_dir_all(path).unwrap();
         }
     }

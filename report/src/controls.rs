@@ -155,7 +155,7 @@ pub(crate) fn action_smoothing(without: &Driven<'_>, with: &Driven<'_>) -> Strin
         table.add_row(std::iter::once(named.name.clone()).chain(cells));
     }
     format!(
-        "### Action smoothing\n\nNear-collisions (contacts) on the unseen lots; of the tuned planners, only the paper's take part \
-         as published, too. Elsewhere in this report networks are smoothed as they were trained to be, and nobody else is.\n\n{table}"
+        "### Action smoothing\n\nNear-collisions (contacts) on the unseen lots. Of the planners that were tuned, only the paper's two are here as \
+         published, too. Elsewhere in this report networks are smoothed as they were trained to be, and nobody else is.\n\n{table}"
     )
 }

@@ -43,7 +43,7 @@ pub const SAFE_RATIO: Term = term(
     "safe-ratio",
     "Safe ratio",
     "The share of the ground within 1 m of the body that is drivable, averaged over a run. 1 means that nothing came \
-     closer than 1 m. The widths of lots a, b and c were fitted to the expert's, so that there it is no finding.",
+     closer than 1 m. The widths of lots a, b and c were chosen so that the expert came near the paper's: there it is no finding.",
 );
 /// Where the driver wants to go.
 pub const LOOK_AHEAD_POINT: Term = term(

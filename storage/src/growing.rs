@@ -42,8 +42,6 @@ impl Growing {
         for (index, &name) in files.iter().enumerate() {
             let path = folder.join(name);
             let failed = |error: std::io::Error| FileError::new(&path, error, whole::WRITE_REMEDY);
-            // Who puts shards together writes the file at once, and may have died meanwhile.
-            whole::remove_partial(&path)?;
             // Never through a link that somebody put there, and a pipe would be waited for.
             if std::fs::symlink_metadata(&path).is_ok_and(|found| !found.is_file()) {
                 return Err(FileError::new(&path, "is not a regular file", "remove it"));
@@ -111,7 +109,8 @@ impl Growing {
     }
 }
 
-/// Deletes what a process that died in [`Growing::finish`] left beside files that are listed.
+/// Deletes what says how far files are whole: they are begun anew, unless they are listed, and a process died in
+/// [`Growing::finish`].
 ///
 /// # Errors
 /// If it cannot be deleted.
@@ -176,19 +175,6 @@ mod tests {
         fs::write(folder.join("runs"), "2\n").unwrap();
         growing.finish().unwrap();
         assert_eq!(sums::verify(&folder).faults.len(), 1);
-        fs::remove_dir_all(folder).unwrap();
-    }
-
-    /// A merge that died left it, and the evaluation that went on left it there for good.
-    #[test]
-    fn what_was_being_written_in_the_place_of_a_file_is_gone() {
-        let folder = std::env::temp_dir().join(format!("storage-test-{}-growing-partial", std::process::id()));
-        let _ = fs::remove_dir_all(&folder);
-        fs::create_dir_all(&folder).unwrap();
-        fs::write(folder.join("runs.lotpilot-partial"), "1\n").unwrap();
-        Growing::open(&folder, "driving", &["runs"]).unwrap().finish().unwrap();
-        assert_eq!(sums::verify(&folder).files, 1);
-        assert!(!folder.join("runs.lotpilot-partial").exists());
         fs::remove_dir_all(folder).unwrap();
     }
 

@@ -3,14 +3,14 @@
 use crate::error::FileError;
 use crate::whole::{WRITE_REMEDY, is_at};
 use std::fs::{self, File, TryLockError};
-use std::io::{ErrorKind, Write as _};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// The file in the folder that is locked. It says who holds it, and is empty when nobody does.
 pub const FILE: &str = ".lock";
 
-/// Two processes could write into one folder.
-const ELSEWHERE: &str = "choose a folder on another one, of a local disk if in doubt";
+/// Some network file systems have no locks.
+const ELSEWHERE: &str = "choose a folder on a file system with locks, such as a local disk's";
 const REMEDY: &str = "wait until it has ended, stop it, or choose another folder";
 
 /// The right to write into a folder, until it is dropped or the process ends, however it ends.
@@ -41,10 +41,9 @@ impl Lock {
                 // Not one that was deleted between both.
                 Ok(()) if !is_at(&file, &path).map_err(failed)? => {}
                 Ok(()) => break file,
-                Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => {
-                    return Err(FileError::new(&path, "this file system has no locks", ELSEWHERE));
+                Err(TryLockError::Error(error)) => {
+                    return Err(FileError::new(&path, format_args!("cannot be locked: {error}"), ELSEWHERE));
                 }
-                Err(TryLockError::Error(error)) => return Err(failed(error)),
                 Err(TryLockError::WouldBlock) => {
                     let holder = fs::read_to_string(&path).unwrap_or_default();
                     let holder = holder.lines().next().unwrap_or("another process").to_owned();

@@ -135,7 +135,7 @@ pub fn remove(path: &Path) -> Result<(), FileError> {
 ///
 /// # Errors
 /// If it cannot be deleted.
-pub fn remove_partial(path: &Path) -> Result<(), FileError> {
+fn remove_partial(path: &Path) -> Result<(), FileError> {
     let partial = path.with_added_extension(PARTIAL);
     make_way(&partial).map_err(|error| not_deleted(&partial, &error))
 }

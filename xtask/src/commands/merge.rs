@@ -156,7 +156,7 @@ fn check_target(args: &MergeArgs, manifest: &Manifest) -> anyhow::Result<()> {
 }
 
 /// Finishes an evaluation whose rows are known. Once they are written it is one like any other, which `evaluate --resume`
-/// finishes if this is interrupted; before, that would drive them all again.
+/// finishes if this is interrupted; before, that would drive those that are missing.
 fn put_together(plan: &Plan<'_>, rows: &Rows, run: &RunDir, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     interrupt::goes_on_with(&format!("{} --overwrite", again(args, run)));
     rows.write(run)?;
