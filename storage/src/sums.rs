@@ -548,6 +548,15 @@ mod tests {
         verify(folder).faults.iter().map(ToString::to_string).collect()
     }
 
+    /// Figures were written into a run that had been deleted, which came back with nothing else.
+    #[test]
+    fn a_folder_is_not_written_into_one_that_is_gone() {
+        let folder = scratch("gone");
+        fs::remove_dir(&folder).unwrap();
+        let refused = write_folder(&folder, "figures", [("a.svg".to_owned(), b"a".to_vec())]).unwrap_err().to_string();
+        assert!(refused.contains("was deleted or moved") && !folder.exists(), "{refused}");
+    }
+
     #[test]
     fn what_is_written_is_listed_as_sha256sum_lists_it_and_read_back() {
         let folder = scratch("written");
