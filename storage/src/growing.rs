@@ -109,8 +109,8 @@ impl Growing {
     }
 }
 
-/// Deletes what says how far files are whole: they are begun anew, unless they are listed, and a process died in
-/// [`Growing::finish`].
+/// Deletes what says how far files are whole. Those that are not listed are begun anew then; beside those that are, it is what
+/// a process that died in [`Growing::finish`] left.
 ///
 /// # Errors
 /// If it cannot be deleted.
