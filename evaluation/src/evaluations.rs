@@ -55,7 +55,8 @@ impl EvaluationRun {
     /// Refuses what was driven differently.
     fn check_is_comparable_with(&self, first: &Self) -> anyhow::Result<()> {
         let (own, others) = (&self.settings, &first.settings);
-        let has_expert = |run: &Self| run.drivers.contains(&DriverSpec::Expert);
+        let has_expert =
+            |run: &Self| run.drivers.iter().any(|it| matches!(it, DriverSpec::Expert | DriverSpec::GridExpert));
         let has_onnx = |run: &Self| run.drivers.iter().any(|driver| matches!(driver, DriverSpec::Onnx { .. }));
         let any = |has: &dyn Fn(&Self) -> bool| has(self) || has(first);
         let trials = |of: &Settings| EvaluationSettings { elsewhere: Vec::new(), ..of.evaluation.clone() };

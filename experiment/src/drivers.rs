@@ -9,7 +9,7 @@ pub use spec::{DriverSpec, specs};
 use crate::settings::{Layers, Settings, Smoothing};
 use crate::trained::{self, TrainedOn, Training};
 use anyhow::{Context as _, bail, ensure};
-use expert::{ExpertSettings, ScriptedExpert, Sees};
+use expert::{ExpertSettings, GridExpert, ScriptedExpert, Sees};
 use onnx::fleet::OnnxFleet;
 use onnx::network::OnnxNetwork;
 use planner_file::planner;
@@ -38,6 +38,7 @@ impl DriverSpec {
             Self::Run { folder } => trained::ensure_whole(folder).with_context(|| format!("driver {self}")),
             Self::Ensemble { members } => members.iter().try_for_each(Self::ensure_whole),
             Self::Expert
+            | Self::GridExpert
             | Self::Checkpoint { .. }
             | Self::Onnx { .. }
             | Self::Planner { .. }
@@ -74,7 +75,9 @@ impl DriverSpec {
                 }
                 Ok(networks.concat())
             }
-            Self::Expert | Self::Onnx { .. } | Self::Planner { .. } | Self::Callback { .. } => Ok(Vec::new()),
+            Self::Expert | Self::GridExpert | Self::Onnx { .. } | Self::Planner { .. } | Self::Callback { .. } => {
+                Ok(Vec::new())
+            }
         }
     }
 
@@ -90,7 +93,9 @@ impl DriverSpec {
                 }
                 Ok(all)
             }
-            Self::Expert | Self::Onnx { .. } | Self::Planner { .. } | Self::Callback { .. } => Ok(TrainedOn::default()),
+            Self::Expert | Self::GridExpert | Self::Onnx { .. } | Self::Planner { .. } | Self::Callback { .. } => {
+                Ok(TrainedOn::default())
+            }
         }
     }
 
@@ -102,6 +107,7 @@ impl DriverSpec {
         let name = self.to_string();
         let model = match &self {
             Self::Expert => Model::Expert(settings.expert.clone()),
+            Self::GridExpert => Model::GridExpert(settings.expert.clone()),
             Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. } => {
                 let networks = self.checkpoints().with_context(|| format!("driver {name:?}"))?;
                 Model::Network(networks)
@@ -183,6 +189,7 @@ pub trait Callback: Send + Sync {
 #[derive(Clone)]
 enum Model {
     Expert(ExpertSettings),
+    GridExpert(ExpertSettings),
     /// One network, or the members of an ensemble, which share geometry and settings of inference.
     Network(Vec<Checkpoint>),
     /// A network from an ONNX file, and how its answers are used.
@@ -266,7 +273,9 @@ impl NamedDriver {
                     }
                 }
                 Model::Onnx(_, inference) => inference.smoothing_ticks = ticks,
-                Model::Expert(_) | Model::Planner(_) | Model::Callback(_) => self.smoothing_ticks = ticks,
+                Model::Expert(_) | Model::GridExpert(_) | Model::Planner(_) | Model::Callback(_) => {
+                    self.smoothing_ticks = ticks
+                }
             }
         }
         self
@@ -298,7 +307,7 @@ impl NamedDriver {
             (Model::Planner(planner), DriverSpec::Planner { parameters: Parameters::File(_), .. }) => {
                 Some(sums::digest(planner.parameters().to_string().as_bytes()))
             }
-            (Model::Expert(_) | Model::Planner(_) | Model::Callback(_), _) => None,
+            (Model::Expert(_) | Model::GridExpert(_) | Model::Planner(_) | Model::Callback(_), _) => None,
         }
     }
 
@@ -307,7 +316,7 @@ impl NamedDriver {
         match &self.model {
             Model::Expert(_) => Source::Expert,
             Model::Network(..) | Model::Onnx(..) | Model::Callback(_) => Source::Novice,
-            Model::Planner(_) => Source::Planner,
+            Model::GridExpert(_) | Model::Planner(_) => Source::Planner,
         }
     }
 
@@ -321,7 +330,7 @@ impl NamedDriver {
             Model::Network(networks) => Some(&networks[0].conditions),
             // Of a network from elsewhere nobody knows.
             Model::Onnx(network, _) => network.about().map(|about| &about.conditions),
-            Model::Expert(_) | Model::Planner(_) | Model::Callback(_) => None,
+            Model::Expert(_) | Model::GridExpert(_) | Model::Planner(_) | Model::Callback(_) => None,
         };
         let Some(trained) = trained else { return Ok(()) };
         let here = Conditions::of(&settings.episode);
@@ -346,7 +355,7 @@ impl NamedDriver {
     pub fn to_planner(&self, episode: &EpisodeSettings) -> Option<Planner> {
         match &self.model {
             Model::Planner(planner) => Some(planner.planner(&PlannerContext::of(episode))),
-            Model::Expert(_) | Model::Network(..) | Model::Onnx(..) | Model::Callback(_) => None,
+            Model::Expert(_) | Model::GridExpert(_) | Model::Network(..) | Model::Onnx(..) | Model::Callback(_) => None,
         }
     }
 
@@ -356,7 +365,7 @@ impl NamedDriver {
         match &self.model {
             Model::Network(..) | Model::Onnx(..) => cars.div_ceil(rayon::current_num_threads()).max(1),
             Model::Callback(_) => cars.max(1),
-            Model::Expert(_) | Model::Planner(_) => 1,
+            Model::Expert(_) | Model::GridExpert(_) | Model::Planner(_) => 1,
         }
     }
 
@@ -370,6 +379,10 @@ impl NamedDriver {
                 Model::Expert(settings) => {
                     let drivers = seeds.iter().map(|&seed| expert(settings, episode, seed)).collect();
                     smoothed(OneDriverEach(drivers), ticks)
+                }
+                Model::GridExpert(settings) => {
+                    let on_grid = |&seed: &RootSeed| GridExpert::new(settings.clone(), episode, hand(seed));
+                    smoothed(OneDriverEach(seeds.iter().map(on_grid).map(SensorsOnly).collect()), ticks)
                 }
                 Model::Network(networks) => Box::new(NetFleet::ensemble(&networks[0], &networks[1..])),
                 Model::Onnx(network, inference) => {
@@ -444,7 +457,7 @@ mod tests {
         let ticks = |driver: &NamedDriver| match &driver.model {
             Model::Network(networks) => networks[0].inference.smoothing_ticks,
             Model::Onnx(_, inference) => inference.smoothing_ticks,
-            Model::Expert(_) | Model::Planner(_) | Model::Callback(_) => driver.smoothing_ticks,
+            Model::Expert(_) | Model::GridExpert(_) | Model::Planner(_) | Model::Callback(_) => driver.smoothing_ticks,
         };
         for (smoothing, of_planner, of_network) in [
             (Smoothing::Own, 0.0, inference.smoothing_ticks),

@@ -5,8 +5,8 @@
 //! from the winner; no network could learn that from a grid of half-metre cells. The relaxed band hardly depends on the
 //! plan it came from: it lies where a person would drive, and stays in place while the car moves.
 
+use crate::line_of_sight::KnownGround;
 use crate::settings::ElasticBandSettings;
-use sim::distance_field::DistanceField;
 use sim::geometry::Vec2;
 use sim::vectors::{FourPoints, f32x4};
 
@@ -58,7 +58,7 @@ impl ElasticBand {
     /// Each round goes from the first point to the last, and a point looks `stiff` points back, where this round has
     /// been, and as many ahead, where only the round before has. So while this round is at one point, the next can be
     /// `stiff + 1` points behind it, and so on: those are moved side by side, four at a time.
-    pub(crate) fn relax(&mut self, field: &DistanceField, settings: &ElasticBandSettings) {
+    pub(crate) fn relax(&mut self, ground: KnownGround<'_>, settings: &ElasticBandSettings) {
         let stiff = ((settings.stiffness_m / SPACING_M).round() as usize).max(1);
         let (apart, last) = (stiff + 1, POINTS - 1);
         let rounds = settings.iterations as usize;
@@ -68,14 +68,14 @@ impl ElasticBand {
             let to = rounds.min((tick - 1) / apart + 1);
             for first in (from..to).step_by(4) {
                 let four = std::array::from_fn(|lane| tick - (first + lane).min(to - 1) * apart);
-                self.move_four(four, stiff, field, settings);
+                self.move_four(four, stiff, ground, settings);
             }
         }
         self.measure();
     }
 
     /// One step of four points towards the middle of the free space and straightness.
-    fn move_four(&mut self, four: [usize; 4], stiff: usize, field: &DistanceField, settings: &ElasticBandSettings) {
+    fn move_four(&mut self, four: [usize; 4], stiff: usize, ground: KnownGround<'_>, settings: &ElasticBandSettings) {
         let here = four.map(|i| self.points[i]);
         let (mut straight, mut along) = ([Vec2::ZERO; 4], [Vec2::ZERO; 4]);
         for (lane, i) in four.into_iter().enumerate() {
@@ -92,7 +92,7 @@ impl ElasticBand {
         let (here, straight) = (FourPoints::from(here), FourPoints::from(straight));
         let left = left_of(along.into());
         let push = |side: f32| {
-            let at_m = field.at_four(here + left * f32x4::splat(side * PROBE_M));
+            let at_m = ground.at_four(here + left * f32x4::splat(side * PROBE_M));
             let missing_m = (f32x4::splat(settings.comfort_m) - at_m).fast_max(f32x4::ZERO);
             missing_m * missing_m
         };
@@ -153,6 +153,8 @@ fn shortened(vectors: FourPoints, length_max_m: f32) -> FourPoints {
 mod tests {
     use super::*;
     use crate::ExpertSettings;
+    use crate::line_of_sight::LineOfSight;
+    use sim::distance_field::DistanceField;
 
     /// One point after the other, one round after the other: what moving points side by side must equal to the bit.
     fn relax_in_order(band: &mut ElasticBand, field: &DistanceField, settings: &ElasticBandSettings) {
@@ -192,7 +194,8 @@ mod tests {
                 ElasticBandSettings { iterations: rounds, stiffness_m, ..ExpertSettings::half_points().elastic_band };
             let way = (0..20).map(|i| Vec2::new(0.6 * i as f32, 0.02 * (i * i % 17) as f32));
             let (mut band, mut expected) = (ElasticBand::along(way.clone(), Vec2::X), ElasticBand::along(way, Vec2::X));
-            band.relax(&field, &settings);
+            let sight = LineOfSight::of_everything();
+            band.relax(KnownGround { field: &field, sight: &sight }, &settings);
             relax_in_order(&mut expected, &field, &settings);
             assert_eq!(band.points, expected.points, "{rounds} rounds, stiffness {stiffness_m} m");
             assert_eq!(band.travels_m, expected.travels_m);

@@ -1,11 +1,11 @@
 //! From an arc to a look-ahead point: how far along (which decides the speed), and how fast it may move.
 
-use crate::context::ExpertContext;
+use crate::context::{ExpertContext, Scene};
 use crate::elastic_band::{self, ElasticBand};
 use crate::line_of_sight::LineOfSight;
 use crate::search::FIRST_EXPONENT;
 use crate::settings::ExpertSettings;
-use sim::driver::{GroundTruth, LookAheadPoint};
+use sim::driver::LookAheadPoint;
 use sim::geometry::{Pose, Vec2};
 use sim::maths;
 
@@ -65,7 +65,7 @@ impl Label {
 pub(crate) struct Ground<'a> {
     pub(crate) settings: &'a ExpertSettings,
     pub(crate) context: &'a ExpertContext,
-    pub(crate) truth: &'a GroundTruth<'a>,
+    pub(crate) scene: &'a Scene<'a>,
     pub(crate) sight: &'a LineOfSight,
 }
 
@@ -79,7 +79,7 @@ impl Ground<'_> {
         let mut travel_m = near_m + elastic_band::SPACING_M;
         let settings = &self.settings.elastic_band;
         let (mut low, mut high) = (0.0_f32, 0.0_f32);
-        let reference = self.truth.vehicle.pose.ahead();
+        let reference = self.scene.vehicle.pose.ahead();
         while travel_m <= band.length_m() && open > 0.0 {
             let turn_rad = reference.angle_to(band.heading_at(travel_m));
             (low, high) = (low.min(turn_rad), high.max(turn_rad));
@@ -93,7 +93,7 @@ impl Ground<'_> {
 
     /// The label through a world point.
     pub(crate) fn label_at(&self, in_world: Vec2) -> Label {
-        Label::through(self.truth.vehicle.pose.world_from_ego().inverse_point(in_world))
+        Label::through(self.scene.vehicle.pose.world_from_ego().inverse_point(in_world))
     }
 
     /// Whether the point after some travel lies in the open and the arc to it follows the band, 0…1.
@@ -106,12 +106,12 @@ impl Ground<'_> {
             return 0.0;
         }
         let curvature_per_m = self.label_at(target).curvature_per_m;
-        let world_from_ego = self.truth.vehicle.pose.world_from_ego();
+        let world_from_ego = self.scene.vehicle.pose.world_from_ego();
         let aside_m = band
             .until(travel_m)
             .map(|point| distance_to_arc_m(curvature_per_m, world_from_ego.inverse_point(point)))
             .fold(0.0, f32::max);
-        let gap_m = self.truth.map.distance_field().at(target);
+        let gap_m = self.scene.field.at(target);
         let settings = &self.settings.elastic_band;
         let follows = (settings.aside_to_m - aside_m) / (settings.aside_to_m - settings.aside_from_m);
         let is_open = (gap_m - settings.gap_from_m) / (settings.gap_to_m - settings.gap_from_m);
@@ -163,8 +163,8 @@ impl Ground<'_> {
 
     /// Whether the point at an arc length keeps its clearance and can be known.
     fn is_drivable(&self, curvature_per_m: f32, arc_length_m: f32) -> bool {
-        let in_world = self.truth.vehicle.pose.world_from_ego().point(on_arc(curvature_per_m, arc_length_m));
-        self.truth.map.distance_field().at(in_world) >= self.settings.point_clearance_m && self.sight.knows(in_world)
+        let in_world = self.scene.vehicle.pose.world_from_ego().point(on_arc(curvature_per_m, arc_length_m));
+        self.scene.field.at(in_world) >= self.settings.point_clearance_m && self.sight.knows(in_world)
     }
 
     /// Arc lengths at which an arc enters the patch, and at which it leaves it or has turned as far as a label may.
@@ -224,9 +224,9 @@ mod tests {
         let context = ExpertContext::of(&episode);
         let map = Map::build(Scenario::lane(-20.0..=60.0, 6.0, -5.0..=50.0), &episode.vehicle).unwrap();
         let pose = Pose::new(Vec2::new(0.0, 1.0), 0.5);
-        let truth = GroundTruth { map: &map, vehicle: VehicleState::at_rest(pose), progress_m: 5.0 };
+        let scene = Scene { field: map.distance_field(), vehicle: VehicleState::at_rest(pose), route: None };
         let sight = LineOfSight::new(settings.sees, &map, pose, &context.sensing);
-        let ground = Ground { settings: &settings, context: &context, truth: &truth, sight: &sight };
+        let ground = Ground { settings: &settings, context: &context, scene: &scene, sight: &sight };
         let clearance_m = |label: Label| {
             let LookAheadPoint { ahead_m, left_m } = label.point();
             map.distance_field().at(pose.world_from_ego().point(Vec2::new(ahead_m, left_m)))
@@ -240,8 +240,8 @@ mod tests {
         assert!(clearance_m(ground.nearest_label_on(turned_less.curvature_per_m)) < settings.point_clearance_m);
         // Nothing that can be reached is drivable: the label stays on its arc.
         let outside = Pose::new(Vec2::new(0.0, 9.0), 1.5);
-        let truth = GroundTruth { vehicle: VehicleState::at_rest(outside), ..truth };
-        let kept = Ground { truth: &truth, ..ground }.kept_drivable(straight);
+        let scene = Scene { vehicle: VehicleState::at_rest(outside), ..scene };
+        let kept = Ground { scene: &scene, ..ground }.kept_drivable(straight);
         assert_eq!(kept.curvature_per_m, 0.0);
     }
 

@@ -24,28 +24,31 @@ mod elastic_band;
 mod fan;
 mod label;
 mod line_of_sight;
+mod on_grid;
 mod rollout;
 mod search;
 mod settings;
 mod stats;
 
 pub use elastic_band::SPACING_M as WAY_SPACING_M;
+pub use on_grid::GridExpert;
 pub use search::Candidate;
 pub use settings::{ExpertSettings, PlanWeights, Sees};
 use sim::maths;
 pub use stats::{ExpertStats, Rule};
 
-use context::ExpertContext;
+use context::{ExpertContext, Scene};
 use elastic_band::ElasticBand;
 use label::{Ground, Label};
 use line_of_sight::LineOfSight;
 use rand::Rng as _;
 use rollout::{Footprint, Motion};
 use search::{Arcs, Plan, Search};
-use sim::driver::{Decision, Driver, GroundTruth, LookAheadPoint, Situation, Source};
+use sim::driver::{Decision, Driver, LookAheadPoint, Situation, Source};
 use sim::episode::EpisodeSettings;
 use sim::geometry::Vec2;
 use sim::seed::Rng;
+use sim::vehicle::VehicleState;
 use std::cell::OnceCell;
 use std::collections::VecDeque;
 
@@ -134,20 +137,19 @@ impl ScriptedExpert {
     }
 
     /// The three rules.
-    fn wish(&self, truth: &GroundTruth<'_>, sight: &LineOfSight, mut inspection: Option<&mut Inspection>) -> Wish {
+    fn wish(&self, scene: &Scene<'_>, sight: &LineOfSight, mut inspection: Option<&mut Inspection>) -> Wish {
         let search = Search {
             settings: &self.settings,
             context: &self.context,
             footprint: &self.footprint,
             arcs: &self.arcs,
-            truth,
+            scene,
             sight,
-            start: self.when_obeyed(truth),
+            start: self.when_obeyed(scene.vehicle),
             start_progress_m: OnceCell::new(),
-            horizon_m: sight.horizon_m(self.settings.horizon_m, self.footprint.nose_m()),
             last_index: self.last.map(|last| last.index(&self.settings)),
         };
-        let ground = self.ground(truth, sight);
+        let ground = self.ground(scene, sight);
 
         // Rule two: a point from which avoidance is possible — with the comfortable clearance, or with less.
         let mut best: Option<(usize, Plan)> = None;
@@ -197,12 +199,12 @@ impl ScriptedExpert {
     /// Every share fades to 0 gradually, so a small change of the scene moves the label little.
     fn smoothed(&self, search: &Search<'_>, ground: &Ground<'_>, plan: &Plan) -> Label {
         let mut band = ElasticBand::along(search.way(plan, elastic_band::SPACING_M), search.start.ahead);
-        band.relax(search.truth.map.distance_field(), &self.settings.elastic_band);
+        band.relax(search.ground(), &self.settings.elastic_band);
         let open_m = ground.open_way_m(&band);
         let settings = &self.settings.elastic_band;
         // From the preferred range to the nearest, each takes the share it deserves of what is left.
         let near_m = settings.steer_near_m;
-        let turn_rad = search.truth.vehicle.pose.ahead().angle_to(band.heading_at(settings.steer_m)).abs();
+        let turn_rad = search.scene.vehicle.pose.ahead().angle_to(band.heading_at(settings.steer_m)).abs();
         let bent = (turn_rad / settings.steer_bend_rad).min(1.0);
         let steer_m = (settings.steer_m + bent * (near_m - settings.steer_m)).min(open_m);
         let (mut rest, mut curvature_per_m) = (1.0, 0.0);
@@ -222,8 +224,7 @@ impl ScriptedExpert {
     }
 
     /// The car when it begins to obey: the dead time further on, steering at the last label meanwhile.
-    fn when_obeyed(&self, truth: &GroundTruth<'_>) -> Motion {
-        let state = truth.vehicle;
+    fn when_obeyed(&self, state: VehicleState) -> Motion {
         let vehicle = &self.context.vehicle;
         let curvature_per_m = state.curvature_per_m(vehicle);
         let motion = Motion::new(state.pose, curvature_per_m);
@@ -233,8 +234,8 @@ impl ScriptedExpert {
         motion.step(pending_per_m, change_per_m, state.speed_mps * dead_time_s)
     }
 
-    fn ground<'a>(&'a self, truth: &'a GroundTruth<'a>, sight: &'a LineOfSight) -> Ground<'a> {
-        Ground { settings: &self.settings, context: &self.context, truth, sight }
+    fn ground<'a>(&'a self, scene: &'a Scene<'a>, sight: &'a LineOfSight) -> Ground<'a> {
+        Ground { settings: &self.settings, context: &self.context, scene, sight }
     }
 
     /// Adds the reaction delay and the jitter of a human hand; both are off by default.
@@ -258,11 +259,23 @@ impl Driver for ScriptedExpert {
     fn decide(&mut self, situation: &Situation<'_>) -> Decision {
         let truth = &situation.truth;
         let sight = LineOfSight::new(self.settings.sees, truth.map, truth.vehicle.pose, &self.context.sensing);
+        self.decide_in(&Scene::from(truth), &sight)
+    }
+
+    fn reset(&mut self) {
+        self.last = None;
+        self.delayed.clear();
+    }
+}
+
+impl ScriptedExpert {
+    /// The decision in a scene of which `sight` says what is known.
+    fn decide_in(&mut self, scene: &Scene<'_>, sight: &LineOfSight) -> Decision {
         let mut inspection = self.inspection.take();
-        let wish = self.wish(truth, &sight, inspection.as_mut());
+        let wish = self.wish(scene, sight, inspection.as_mut());
         // Rule one has the last word: the point lies inside drivable space.
         let smoothed = self.last.map_or(wish.label, |last| wish.label.smoothed(last, &self.settings));
-        let label = self.ground(truth, &sight).kept_drivable(smoothed);
+        let label = self.ground(scene, sight).kept_drivable(smoothed);
 
         let moved_m = self.last.map_or(0.0, |last| distance_m(last.point(), label.point()));
         self.stats.count(wish.rule, wish.has_failed, moved_m > JUMP_M);
@@ -277,11 +290,6 @@ impl Driver for ScriptedExpert {
             spread: None,
             speed_limit_mps: None,
         }
-    }
-
-    fn reset(&mut self) {
-        self.last = None;
-        self.delayed.clear();
     }
 }
 

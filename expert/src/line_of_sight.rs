@@ -1,10 +1,16 @@
 //! Which ground the expert knows.
+//!
+//! What it does not know it takes for free, as planners of unknown terrain do (the free-space assumption: Zelinsky 1992;
+//! Koenig & Likhachev 2002). A way that leaves the patch then goes on; one that is seen to end does not, though it may be
+//! longer within the patch.
 
 use crate::settings::Sees;
+use sim::distance_field::{self, DistanceField};
 use sim::geometry::{Pose, Vec2, WorldFromEgo};
 use sim::map::{Map, Occluder};
 use sim::maths;
 use sim::sensing::{GridGeometry, SensingSettings};
+use sim::vectors::{FourPoints, f32x4};
 
 /// Bearings into which the half plane ahead of the camera is divided.
 const BEARINGS: usize = 128;
@@ -21,24 +27,62 @@ pub(crate) struct LineOfSight(Option<VisiblePatch>);
 impl LineOfSight {
     pub(crate) fn new(sees: Sees, map: &Map, pose: Pose, sensing: &SensingSettings) -> Self {
         match sees {
-            Sees::WholeMap => Self(None),
+            Sees::WholeMap => Self::of_everything(),
             Sees::PatchOnly => Self(Some(VisiblePatch::new(map, pose, sensing))),
         }
     }
 
-    /// How far a forecast can go on known ground when nothing is in the way, metres. `nose_m` is ahead of the axle.
-    pub(crate) fn horizon_m(&self, horizon_m: f32, nose_m: f32) -> f32 {
-        match &self.0 {
-            None => horizon_m,
-            // Within the dead time the car drives on by 0.14 m at most, and so does where forecasts begin.
-            Some(patch) => horizon_m.min(patch.geometry.far_edge_ahead_m() - nose_m - 0.2),
-        }
+    /// All ground is known.
+    pub(crate) fn of_everything() -> Self {
+        Self(None)
+    }
+
+    /// The patch as it lies before a car at the origin, with nothing hidden.
+    pub(crate) fn of_patch(geometry: GridGeometry) -> Self {
+        Self(Some(VisiblePatch {
+            geometry,
+            camera: Vec2::ZERO,
+            world_from_ego: Pose::default().world_from_ego(),
+            range_squared: [f32::INFINITY; BEARINGS],
+        }))
     }
 
     /// Whether a world point is known ground.
     #[inline]
     pub(crate) fn knows(&self, in_world: Vec2) -> bool {
         self.0.as_ref().is_none_or(|patch| patch.knows(in_world))
+    }
+}
+
+/// Distances to what is not drivable, as far as is known: on unknown ground, none is near.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct KnownGround<'a> {
+    pub(crate) field: &'a DistanceField,
+    pub(crate) sight: &'a LineOfSight,
+}
+
+impl KnownGround<'_> {
+    /// As [`DistanceField::at_four`], metres.
+    #[inline]
+    pub(crate) fn at_four(self, points: FourPoints) -> f32x4 {
+        self.where_known(points, self.field.at_four(points))
+    }
+
+    /// As [`DistanceField::at_four_nearest_nodes`], metres.
+    #[inline]
+    pub(crate) fn at_four_nearest_nodes(self, points: FourPoints) -> f32x4 {
+        self.where_known(points, self.field.at_four_nearest_nodes(points))
+    }
+
+    #[inline]
+    fn where_known(self, points: FourPoints, distances_m: f32x4) -> f32x4 {
+        let Some(patch) = &self.sight.0 else { return distances_m };
+        let (x, y, distances_m) = (points.x.to_array(), points.y.to_array(), distances_m.to_array());
+        let known_m = |lane: usize| {
+            let is_known = patch.knows(Vec2::new(x[lane], y[lane]));
+            if is_known { distances_m[lane] } else { distance_field::CAP_M }
+        };
+        std::array::from_fn(known_m).into()
     }
 }
 

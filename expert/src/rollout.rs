@@ -1,6 +1,6 @@
 //! Forecast of the body along an arc, with the steering-rate limit.
 
-use sim::distance_field::DistanceField;
+use crate::line_of_sight::KnownGround;
 use sim::geometry::{Pose, Vec2};
 use sim::maths;
 use sim::vectors::{FourPoints, f32x4};
@@ -128,8 +128,8 @@ impl Footprint {
 
     /// Clearance of the whole body, metres.
     #[inline]
-    pub(crate) fn clearance_m(&self, field: &DistanceField, motion: Motion) -> f32 {
-        let [rear, front] = self.disc_centres_m.map(|ahead_m| field.at_four(motion.four_on_axis(ahead_m)));
+    pub(crate) fn clearance_m(&self, ground: KnownGround<'_>, motion: Motion) -> f32 {
+        let [rear, front] = self.disc_centres_m.map(|ahead_m| ground.at_four(motion.four_on_axis(ahead_m)));
         lowest(rear.fast_min(front)) - self.keep_m
     }
 
@@ -142,8 +142,8 @@ impl Footprint {
         reason = "called, it takes motions through memory: numbers that are stored, and loaded as vectors"
     )]
     #[inline(always)]
-    pub(crate) fn coarse_clearance_m(&self, field: &DistanceField, motion: Motion) -> f32 {
-        lowest(field.at_four_nearest_nodes(motion.four_on_axis(self.coarse_disc_centres_m))) - self.keep_m
+    pub(crate) fn coarse_clearance_m(&self, ground: KnownGround<'_>, motion: Motion) -> f32 {
+        lowest(ground.at_four_nearest_nodes(motion.four_on_axis(self.coarse_disc_centres_m))) - self.keep_m
     }
 }
 

@@ -8,14 +8,13 @@
 //! in common (`fan`); and probes far along an arc find most of those that are blocked. The best plan is that of a search
 //! without all this, to the bit (`tests`).
 
-use crate::context::ExpertContext;
+use crate::context::{ExpertContext, Scene};
 use crate::elastic_band::ElasticBand;
 use crate::fan::{Arc, Entry, Fan, Forecast};
-use crate::line_of_sight::LineOfSight;
+use crate::line_of_sight::{KnownGround, LineOfSight};
 use crate::rollout::{Footprint, Motion};
 use crate::settings::ExpertSettings;
-use sim::distance_field::{DistanceField, NODE_M};
-use sim::driver::GroundTruth;
+use sim::distance_field::NODE_M;
 use sim::geometry::Vec2;
 use sim::vectors::f32x4;
 use std::cell::OnceCell;
@@ -63,7 +62,7 @@ pub(crate) struct Search<'a> {
     pub(crate) context: &'a ExpertContext,
     pub(crate) footprint: &'a Footprint,
     pub(crate) arcs: &'a Arcs,
-    pub(crate) truth: &'a GroundTruth<'a>,
+    pub(crate) scene: &'a Scene<'a>,
     pub(crate) sight: &'a LineOfSight,
     /// The car when it begins to obey this decision.
     pub(crate) start: Motion,
@@ -71,8 +70,6 @@ pub(crate) struct Search<'a> {
     pub(crate) start_progress_m: OnceCell<f32>,
     /// Curvature index of the last label, −1…1.
     pub(crate) last_index: Option<f32>,
-    /// Length of a forecast, metres.
-    pub(crate) horizon_m: f32,
 }
 
 /// A first arc and what follows it.
@@ -184,14 +181,14 @@ impl Search<'_> {
 
     /// The first arc with the largest smallest clearance over the next metres, and that clearance.
     pub(crate) fn widest_gap(&self) -> (usize, f32) {
-        let field = self.truth.map.distance_field();
+        let ground = self.ground();
         let steps = (self.settings.tight_start_m / self.settings.first_step_m).ceil() as usize;
         let change_per_m = self.change_per_step(self.settings.first_step_m);
         let gap_m = |first: usize| {
             let mut motion = self.start;
             (0..steps).fold(f32::INFINITY, |gap_m, _| {
                 motion = motion.step(self.arcs.curvature_per_m(first), change_per_m, self.settings.first_step_m);
-                gap_m.min(self.footprint.clearance_m(field, motion))
+                gap_m.min(self.footprint.clearance_m(ground, motion))
             })
         };
         let mut widest = (0, gap_m(0));
@@ -228,7 +225,7 @@ impl Search<'_> {
 
     /// How safe it is to pursue a band, always steering at the point `ahead_m` along it, 0…1 by the least clearance.
     pub(crate) fn trust(&self, band: &ElasticBand, ahead_m: f32) -> f32 {
-        let (settings, field) = (self.settings, self.field());
+        let (settings, ground) = (self.settings, self.ground());
         let step_m = settings.second_step_m;
         let change_per_m = self.change_per_step(step_m);
         let of_band = &settings.elastic_band;
@@ -242,7 +239,7 @@ impl Search<'_> {
             let target_per_m = (2.0 * left_m / target.length_squared())
                 .clamp(-settings.curvature_max_per_m, settings.curvature_max_per_m);
             motion = motion.step(target_per_m, change_per_m, step_m);
-            let clearance_m = self.footprint.clearance_m(field, motion);
+            let clearance_m = self.footprint.clearance_m(ground, motion);
             trust = trust.min((clearance_m - of_band.trust_from_m) * per_m);
             if trust <= 0.0 {
                 return 0.0;
@@ -255,13 +252,13 @@ impl Search<'_> {
     /// straight wheels, at which the curvature changes slowest.
     fn change_per_step(&self, step_m: f32) -> f32 {
         // Standing still, the wheels would turn on the spot.
-        let speed_mps = self.truth.vehicle.speed_mps.max(self.context.speed_min_mps);
+        let speed_mps = self.scene.vehicle.speed_mps.max(self.context.speed_min_mps);
         let vehicle = &self.context.vehicle;
         vehicle.steering_rate_max_radps / (vehicle.wheelbase_m * speed_mps) * step_m
     }
 
     fn thresholds(&self, clearance_m: f32) -> Thresholds {
-        let present_m = self.footprint.clearance_m(self.field(), self.start);
+        let present_m = self.footprint.clearance_m(self.ground(), self.start);
         Thresholds { near_m: clearance_m.min(present_m - START_SLACK_M), far_m: clearance_m }
     }
 
@@ -283,10 +280,10 @@ impl Search<'_> {
             let free_max_m = if first.entry.is_free {
                 let mut probes = fan.probes(i, fan.enter(i, motion));
                 let blocked = probes.find_map(|(travels_m, noses)| {
-                    let blocked = self.field().at_four_nearest_nodes(noses).simd_lt(blocked_m).to_bitmask();
+                    let blocked = self.ground().at_four_nearest_nodes(noses).simd_lt(blocked_m).to_bitmask();
                     (blocked != 0).then(|| travels_m.to_array()[blocked.trailing_zeros() as usize])
                 });
-                blocked.map_or(self.horizon_m, |probed_m| travel_m + probed_m)
+                blocked.map_or(self.settings.horizon_m, |probed_m| travel_m + probed_m)
             } else {
                 travel_m
             };
@@ -305,7 +302,7 @@ impl Search<'_> {
     #[inline]
     fn drive_on_first(&self, first: &mut FirstRollout, next: Motion, thresholds: Thresholds) -> bool {
         let step_m = self.settings.first_step_m;
-        let clearance_m = self.footprint.clearance_m(self.field(), next);
+        let clearance_m = self.footprint.clearance_m(self.ground(), next);
         if !self.drive_on(&mut first.rollout, next, step_m, clearance_m, thresholds) {
             return false;
         }
@@ -321,7 +318,7 @@ impl Search<'_> {
     fn rate_first(&self, i: usize, first: &mut FirstArc, free_m: f32) {
         let (weights, index) = (&self.settings.weights, self.arcs.first.arcs[i].index);
         let change = self.last_index.map_or(0.0, |last_index| (index - last_index).abs());
-        first.offset = weights.first_free * free_m.min(self.horizon_m) / weights.unit_m
+        first.offset = weights.first_free * free_m.min(self.settings.horizon_m) / weights.unit_m
             - weights.first_curvature * index.abs()
             - weights.change * change;
         let FirstRollout { branches, n_branches, .. } = &first.entry.forecast;
@@ -329,7 +326,7 @@ impl Search<'_> {
         first.bound = first.offset + self.bound(load_m);
     }
 
-    /// Moves a forecast to its next step, unless it ends before: at the horizon, at an obstacle or on unknown ground.
+    /// Moves a forecast to its next step, unless it ends before: at the horizon or at an obstacle.
     #[expect(
         clippy::inline_always,
         reason = "called, it takes motions through memory: numbers that are stored, and loaded as vectors"
@@ -344,10 +341,7 @@ impl Search<'_> {
         thresholds: Thresholds,
     ) -> bool {
         let travel_m = rollout.travel_m + step_m;
-        if rollout.travel_m >= self.horizon_m
-            || clearance_m < thresholds.at(travel_m, self.settings)
-            || !self.sight.knows(next.on_axis(self.footprint.nose_m()))
-        {
+        if rollout.travel_m >= self.settings.horizon_m || clearance_m < thresholds.at(travel_m, self.settings) {
             return false;
         }
         let load_m = rollout.load_m + self.load(clearance_m) * step_m;
@@ -358,7 +352,7 @@ impl Search<'_> {
     /// Best of travel and load once `load_m` has been collected: free to the horizon without any more.
     #[inline]
     fn bound(&self, load_m: f32) -> f32 {
-        self.worth(self.horizon_m, load_m)
+        self.worth(self.settings.horizon_m, load_m)
     }
 
     /// Travel and load of a plan. Grows with the travel at a given load.
@@ -387,7 +381,7 @@ impl Search<'_> {
         if first_free_m == 0.0 {
             return;
         }
-        let horizon_m = self.horizon_m;
+        let horizon_m = self.settings.horizon_m;
         let mut offer = |second, free_m: f32, load_m: f32, penalty: f32, end: Motion| {
             let free_m = free_m.min(horizon_m);
             let score = self.worth(free_m, load_m) + first.offset - penalty;
@@ -438,7 +432,7 @@ impl Search<'_> {
     /// The load above which [`Self::bound`] falls below a worth.
     fn load_at_bound(&self, worth: f32) -> f32 {
         let weights = &self.settings.weights;
-        (self.horizon_m / weights.unit_m - worth) * self.horizon_m / weights.load
+        (self.settings.horizon_m / weights.unit_m - worth) * self.settings.horizon_m / weights.load
     }
 
     /// Whether a second arc from the ramp must be blocked before it is worth more than `worth_min`.
@@ -447,7 +441,7 @@ impl Search<'_> {
         let to_probe_m = f32x4::splat(self.travel_at_worth(worth_min, ramp.load_m) - ramp.travel_m);
         for (travels_m, noses) in fan.probes(second, fan.enter(second, ramp.motion)) {
             let counts = travels_m.simd_lt(to_probe_m);
-            if (counts & self.field().at_four_nearest_nodes(noses).simd_lt(blocked_m)).any() {
+            if (counts & self.ground().at_four_nearest_nodes(noses).simd_lt(blocked_m)).any() {
                 return true;
             }
             if !counts.all() {
@@ -467,7 +461,7 @@ impl Search<'_> {
         if rollout.load_m > load_max_m {
             return false;
         }
-        let clearance_m = self.footprint.coarse_clearance_m(self.field(), next);
+        let clearance_m = self.footprint.coarse_clearance_m(self.ground(), next);
         self.drive_on(rollout, next, self.settings.second_step_m, clearance_m, thresholds)
     }
 
@@ -476,8 +470,8 @@ impl Search<'_> {
         f32x4::splat(self.footprint.distance_m(thresholds.near_m) - PROBE_SLACK_M)
     }
 
-    fn field(&self) -> &DistanceField {
-        self.truth.map.distance_field()
+    pub(crate) fn ground(&self) -> KnownGround<'_> {
+        KnownGround { field: self.scene.field, sight: self.sight }
     }
 
     /// How much something at a clearance weighs, 0…1: "fewest obstacles around the trajectory" (paper), and what
@@ -490,11 +484,11 @@ impl Search<'_> {
 
     /// No turning back: the bumper gains on the route. This only filters plans, so labels remain functions of the scene.
     fn makes_progress(&self, end: Motion, travel_m: f32) -> bool {
-        let path = self.truth.map.path();
-        let reach_m = self.horizon_m + self.context.vehicle.front_m();
+        let Some((path, progress_m)) = self.scene.route else { return true };
+        let reach_m = self.settings.horizon_m + self.context.vehicle.front_m();
         let progress_of = |motion: Motion| {
             let bumper = motion.on_axis(self.context.vehicle.front_m());
-            path.project_near(bumper, self.truth.progress_m, self.context.vehicle.front_m(), reach_m + 4.0)
+            path.project_near(bumper, progress_m, self.context.vehicle.front_m(), reach_m + 4.0)
         };
         let reached_m = progress_of(end);
         let start_m = *self.start_progress_m.get_or_init(|| progress_of(self.start));

@@ -9,8 +9,8 @@ pub enum Sees {
     /// All of the clean map.
     #[default]
     WholeMap,
-    /// Ground outside the bird's-eye patch, or hidden behind tall things, is unknown: forecasts end where the nose
-    /// gets there. Ground beside and behind the car counts as known.
+    /// Ground outside the bird's-eye patch, or hidden behind tall things, is unknown, and taken for free. Ground beside
+    /// and behind the car counts as known.
     PatchOnly,
 }
 

@@ -28,6 +28,14 @@ fn corner() -> Scenario {
     Scenario::new("corner", boundary, [(-5.0, 0.0), (30.0, 0.0), (30.0, 35.0)]).with_corner_radius_m(5.0)
 }
 
+/// A corner of a parking deck, to the left when driven forward: straight on, and to the right, lie pockets.
+fn corner_with_pockets() -> Scenario {
+    let (outside, pocket_right) = ([(-25.0, -3.4), (27.0, -3.4)], [(27.0, -8.4), (33.0, -8.4), (33.0, -2.4)]);
+    let (pocket_ahead, inside) = ([(39.0, -2.4), (39.0, 2.6), (34.0, 2.6)], [(34.0, 55.0), (27.0, 55.0), (27.0, 3.6)]);
+    let boundary = [&outside[..], &pocket_right, &pocket_ahead, &inside, &[(-25.0, 3.6)]].concat();
+    Scenario::new("deck", boundary, [(-5.0, 0.0), (30.5, 0.0), (30.5, 35.0)]).with_corner_radius_m(5.0)
+}
+
 fn map(scenario: Scenario) -> Map {
     Map::build(scenario, &VehicleSettings::hyundai_hg300()).expect("the scenes of these tests are valid")
 }
@@ -113,6 +121,16 @@ fn a_right_angle_is_driven_both_ways_without_a_near_collision() {
             assert_eq!(stats.decisions, points.len() as u64);
             assert_eq!(stats.far + stats.avoid + stats.relaxed + stats.last_resort, stats.decisions);
         }
+    }
+}
+
+/// Of ways within the patch the longest was taken, and that was the pocket ahead: the way on leaves the patch after fewer metres.
+#[test]
+fn a_pocket_that_is_seen_to_end_is_not_taken_for_the_way() {
+    for sees in [Sees::WholeMap, Sees::PatchOnly] {
+        let (report, ..) = drive(corner_with_pockets(), sees);
+        assert_eq!(report.ending, Ending::ReachedEnd, "{sees:?}");
+        assert_eq!(report.metrics.near_collisions, 0, "{sees:?}: {:?}", report.events);
     }
 }
 

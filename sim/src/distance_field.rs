@@ -80,6 +80,12 @@ impl DistanceField {
         self
     }
 
+    /// Makes this a copy of another field, in the memory that it has.
+    pub fn copy_from(&mut self, other: &Self) {
+        (self.origin, self.cols, self.rows) = (other.origin, other.cols, other.rows);
+        self.nodes.clone_from(&other.nodes);
+    }
+
     /// Carves a non-drivable polygon (any winding, need not be convex).
     pub fn carve_polygon(&mut self, polygon: &[Vec2]) {
         if polygon.len() <= FEW_EDGES { self.carve_by_every_edge(polygon) } else { self.carve_by_near_edges(polygon) }

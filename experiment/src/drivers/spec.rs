@@ -13,6 +13,8 @@ use std::str::FromStr;
 pub enum DriverSpec {
     /// `expert`: the scripted expert, which sees the truth.
     Expert,
+    /// `grid-expert`: its rules on the noisy grid.
+    GridExpert,
     /// `run:DIR` and `run:DIR/bc`: a policy of a training run.
     Run {
         /// The folder as written, `/bc` included.
@@ -51,6 +53,7 @@ pub enum DriverSpec {
 pub fn specs() -> Vec<(String, String)> {
     let own = [
         ("expert", "the scripted expert; sees the truth"),
+        ("grid-expert", "the expert's rules on the noisy grid, as the networks see it"),
         ("run:DIR", "the final policy of a training run; if an ensemble was trained, all of its networks"),
         ("run:DIR/bc", "its policy after behaviour cloning, one network"),
         ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
@@ -81,6 +84,7 @@ impl FromStr for DriverSpec {
                 bail!("driver {text:?} names no folder or file; write it behind the colon, as in run:runs/NAME")
             }
             None if text == "expert" => Ok(Self::Expert),
+            None if text == "grid-expert" => Ok(Self::GridExpert),
             None if is_planner(text) => planner(text, Parameters::Published),
             Some(("run", folder)) => Ok(Self::Run { folder: folder.into() }),
             Some(("net", folder)) => Ok(Self::Checkpoint { folder: folder.into() }),
@@ -119,6 +123,7 @@ impl fmt::Display for DriverSpec {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Expert => f.write_str("expert"),
+            Self::GridExpert => f.write_str("grid-expert"),
             Self::Run { folder } => write!(f, "run:{}", folder.display()),
             Self::Checkpoint { folder } => write!(f, "net:{}", folder.display()),
             Self::Ensemble { members } => {
@@ -180,6 +185,7 @@ impl DriverSpec {
             Self::Run { folder } => Some(folder),
             Self::Ensemble { members } => members.iter().find_map(Self::run),
             Self::Expert
+            | Self::GridExpert
             | Self::Checkpoint { .. }
             | Self::Onnx { .. }
             | Self::Planner { .. }
@@ -195,7 +201,7 @@ impl DriverSpec {
             Self::Run { folder } | Self::Checkpoint { folder } => vec![folder],
             Self::Ensemble { members } => members.iter().flat_map(Self::places).collect(),
             Self::Onnx { file } | Self::Planner { parameters: Parameters::File(file), .. } => vec![file],
-            Self::Expert | Self::Planner { .. } | Self::Callback { .. } => Vec::new(),
+            Self::Expert | Self::GridExpert | Self::Planner { .. } | Self::Callback { .. } => Vec::new(),
         }
     }
 
@@ -223,6 +229,7 @@ mod tests {
     fn every_spec_is_read_back() {
         for text in [
             "expert",
+            "grid-expert",
             "run:runs/mine/bc",
             "net:runs/mine/round-03",
             "ensemble:run:runs/a,net:runs/b/round-02",
@@ -235,17 +242,17 @@ mod tests {
             assert_eq!(text.parse::<DriverSpec>().unwrap().to_string(), text);
         }
         for (wrong, known) in [
-            ("exprt", "did you mean expert?; there are expert, run:DIR"),
+            ("exprt", "did you mean expert?; there are expert, grid-expert, run:DIR"),
             ("Tentacle", "did you mean tentacle?"),
             ("expert,tentacle", "with spaces between them"),
             ("run:", "names no folder or file"),
             ("dwa:", "names no folder or file"),
-            ("", "there are expert, run:DIR"),
-            ("runs/mine", "there are expert, run:DIR"),
+            ("", "there are expert, grid-expert, run:DIR"),
+            ("runs/mine", "there are expert, grid-expert, run:DIR"),
             ("ensemble:run:runs/a,expert", "expert cannot be part of an ensemble"),
             ("ensemble:run:runs/a,run:runs/a", "named twice"),
             ("ensemble:run:runs/a,run:./runs/a", "named twice"),
-            ("ensemble:", "there are expert, run:DIR"),
+            ("ensemble:", "there are expert, grid-expert, run:DIR"),
             ("python:mine", "lotpilot.evaluate"),
             ("tuned:tentacles", "there are tuned:tentacle, tuned:vvf"),
         ] {

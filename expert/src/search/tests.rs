@@ -25,12 +25,10 @@ fn follow(
 ) -> Vec<Rollout> {
     let mut rollouts = vec![start];
     let mut rollout = start;
-    while rollout.travel_m < search.horizon_m {
+    while rollout.travel_m < search.settings.horizon_m {
         let motion = rollout.motion.step(curvature_per_m, search.change_per_step(step_m), step_m);
         let (travel_m, clearance_m) = (rollout.travel_m + step_m, clearance_m(motion));
-        if clearance_m < thresholds.at(travel_m, search.settings)
-            || !search.sight.knows(motion.on_axis(search.footprint.nose_m()))
-        {
+        if clearance_m < thresholds.at(travel_m, search.settings) {
             break;
         }
         rollout = Rollout { motion, travel_m, load_m: rollout.load_m + search.load(clearance_m) * step_m };
@@ -41,14 +39,14 @@ fn follow(
 
 /// [`Search::best_plan`] without pruning, sharing or probing.
 fn best_plan_of_all(search: &Search<'_>, clearance_m: f32) -> Option<Plan> {
-    let (settings, field) = (search.settings, search.field());
+    let (settings, ground) = (search.settings, search.ground());
     let weights = &settings.weights;
     let thresholds = search.thresholds(clearance_m);
     let start = Rollout { motion: search.start, travel_m: 0.0, load_m: 0.0 };
     let firsts = search.arcs.first.arcs.each_ref().map(|arc| {
-        let clearance_m = |motion| search.footprint.clearance_m(field, motion);
+        let clearance_m = |motion| search.footprint.clearance_m(ground, motion);
         let rollouts = follow(search, start, arc.curvature_per_m, settings.first_step_m, clearance_m, thresholds);
-        let free_m = rollouts[rollouts.len() - 1].travel_m.min(search.horizon_m);
+        let free_m = rollouts[rollouts.len() - 1].travel_m.min(search.settings.horizon_m);
         let change = search.last_index.map_or(0.0, |last_index| (arc.index - last_index).abs());
         let offset = weights.first_free * free_m / weights.unit_m
             - weights.first_curvature * arc.index.abs()
@@ -71,7 +69,7 @@ fn best_plan_of_all(search: &Search<'_>, clearance_m: f32) -> Option<Plan> {
             continue;
         }
         let mut offer = |second, end: Rollout, penalty: f32| {
-            let free_m = end.travel_m.min(search.horizon_m);
+            let free_m = end.travel_m.min(search.settings.horizon_m);
             let score = search.worth(free_m, end.load_m) + firsts[i].offset - penalty;
             if best.is_none_or(|best| score > best.score) && search.makes_progress(end.motion, free_m) {
                 best = Some(Plan { first: i, second, first_free_m: whole.travel_m, free_m, score });
@@ -80,7 +78,7 @@ fn best_plan_of_all(search: &Search<'_>, clearance_m: f32) -> Option<Plan> {
         offer(None, whole, 0.0);
         for branch in branches(&firsts[i]).into_iter().rev() {
             for arc in &search.arcs.second.arcs {
-                let clearance_m = |motion| search.footprint.coarse_clearance_m(field, motion);
+                let clearance_m = |motion| search.footprint.coarse_clearance_m(ground, motion);
                 let step_m = settings.second_step_m;
                 let rollouts = follow(search, branch, arc.curvature_per_m, step_m, clearance_m, thresholds);
                 let second = Some((branch.travel_m, arc.curvature_per_m));
@@ -121,19 +119,19 @@ proptest! {
         let arcs = Arcs::new(&settings, footprint.nose_m());
         let pose = Pose::new(Vec2::new(0.0, left_m), heading_rad);
         let vehicle = VehicleState { speed_mps, steering_rad, ..VehicleState::at_rest(pose) };
-        let truth = GroundTruth { map: &map, vehicle, progress_m: map.path().project(pose.position()) };
+        let route = Some((map.path(), map.path().project(pose.position())));
+        let scene = Scene { field: map.distance_field(), vehicle, route };
         let sight = LineOfSight::new(sees, &map, pose, &context.sensing);
         let search = Search {
             settings: &settings,
             context: &context,
             footprint: &footprint,
             arcs: &arcs,
-            truth: &truth,
+            scene: &scene,
             sight: &sight,
             start: Motion::new(pose, vehicle.curvature_per_m(&episode.vehicle)),
             start_progress_m: OnceCell::new(),
             last_index,
-            horizon_m: sight.horizon_m(settings.horizon_m, footprint.nose_m()),
         };
         for clearance_m in settings.clearances_m {
             prop_assert_eq!(search.best_plan(clearance_m, None), best_plan_of_all(&search, clearance_m));
