@@ -67,13 +67,17 @@ pub struct Workplace {
 }
 
 impl Workplace {
-    /// An empty one.
+    /// An empty one with a copy of the program, so that a build meanwhile does not exchange it halfway: manifests name its
+    /// version, and would differ.
     ///
     /// # Errors
-    /// If something cannot be compiled or written.
-    pub fn new(program: PathBuf, folder: &Path) -> anyhow::Result<Self> {
+    /// If something cannot be compiled, copied or written.
+    pub fn new(program: &Path, folder: &Path) -> anyhow::Result<Self> {
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         let (folder, library) = (folder.to_owned(), Library::compile(folder)?);
+        let copy = folder.join("program");
+        fs::copy(program, &copy).with_context(|| program.display().to_string())?;
+        let program = copy;
         Ok(Self { program, run: folder.join("run"), folder, library })
     }
 

@@ -46,7 +46,7 @@ const HEAD: &str = "\
 pub(crate) fn run(args: &TortureArgs, output: &Output) -> anyhow::Result<()> {
     let cases = cases(&args.only)?;
     let folder = std::env::temp_dir().join(format!("lotpilot-torture-{}", std::process::id()));
-    let workplace = Workplace::new(std::env::current_exe()?, &folder)?;
+    let workplace = Workplace::new(&std::env::current_exe()?, &folder)?;
     let console = Console::new(output);
     output.print(HEAD);
     let mut failures = 0;
