@@ -10,8 +10,8 @@
 //! | `corner` | the route turns by [`CORNER_DEG`] or more within [`NEAR_M`] of the place |
 //! | `other` | none of these |
 //!
-//! Apart from its cause, a near-collision within [`NEAR_M`] of route after a resume is marked as one more at the same
-//! place: the car was put back where it had failed, and failed again.
+//! Apart from its cause, a near-collision within [`NEAR_M`] of route after the car was put back for one is marked as one more
+//! at the same place: it was put back where it had failed, and failed again.
 
 use crate::monitor::{Incident, LOOK_BACK};
 use crate::what_if;
@@ -79,12 +79,13 @@ pub struct Findings {
     pub free_width_m: f32,
     /// Largest change of the route's heading nearby, degrees.
     pub turn_deg: f32,
-    /// Route since the car was last put back on it, metres; `None` before the first time.
+    /// Route since the car was last put back on it after a near-collision, metres; `None` before the first one. In files of
+    /// earlier versions also after it was stuck.
     pub since_resume_m: Option<f32>,
 }
 
-/// Whether a near-collision happened where the car had just been put back, so much route before: one more at the same
-/// place.
+/// Whether a near-collision happened where the car had just been put back after another, so much route before: one more at
+/// the same place.
 pub fn is_again(since_resume_m: Option<f32>) -> bool {
     since_resume_m.is_some_and(|since_m| since_m < NEAR_M)
 }

@@ -41,10 +41,22 @@ pub struct Incident {
     pub speed_mps: f32,
     /// Steering reversals in the last [`OSCILLATION_S`], but not before the last resume.
     pub reversals_before: u32,
-    /// Route since the car was last put back on it, metres; `None` before the first time.
+    /// Route since the car was last put back on it after a near-collision, metres; `None` before the first one.
     pub since_resume_m: Option<f32>,
     /// The state at each of [`LOOK_BACKS_S`], but no earlier than the last resume or the start.
     pub before: [Before; LOOK_BACKS_S.len()],
+}
+
+/// Where along the route an episode was put back after a near-collision. That it is also put back where it was stuck does not
+/// make what follows one more failure at a place where it had failed before.
+#[derive(Debug, Clone, Copy)]
+enum Resume {
+    /// It never was.
+    Never,
+    /// The next frame shows where.
+    Due,
+    /// The last time, metres.
+    At(f32),
 }
 
 /// Remembers the last seconds of every episode of a group; its size does not depend on how long they last.
@@ -52,8 +64,7 @@ pub struct Incident {
 pub struct IncidentMonitor {
     control_period_s: f32,
     recent: Vec<VecDeque<(VehicleState, f32)>>,
-    /// Where along the route the car was last put back, metres.
-    resumed_at_m: Vec<Option<f32>>,
+    resumes: Vec<Resume>,
     incidents: Vec<Incident>,
 }
 
@@ -65,16 +76,16 @@ impl IncidentMonitor {
         Self {
             control_period_s,
             recent: vec![VecDeque::with_capacity(kept); episodes],
-            resumed_at_m: vec![None; episodes],
+            resumes: vec![Resume::Never; episodes],
             incidents: Vec::new(),
         }
     }
 
     /// Adds one frame.
     pub fn frame(&mut self, episode: usize, frame: &Frame) {
-        let recent = &mut self.recent[episode];
-        if recent.is_empty() && frame.tick > 0 {
-            self.resumed_at_m[episode] = Some(frame.progress_m);
+        let (recent, resume) = (&mut self.recent[episode], &mut self.resumes[episode]);
+        if matches!(resume, Resume::Due) {
+            *resume = Resume::At(frame.progress_m);
         }
         if recent.len() > ticks(LOOK_BACKS_S[0], self.control_period_s) {
             recent.pop_front();
@@ -89,9 +100,13 @@ impl IncidentMonitor {
                 route_m: progress_m,
                 speed_mps: frame.vehicle.speed_mps,
                 reversals_before: steering_reversals(last.map(|(vehicle, _)| vehicle.steering_rad)),
-                since_resume_m: self.resumed_at_m[episode].map(|resumed_at_m| progress_m - resumed_at_m),
+                since_resume_m: match *resume {
+                    Resume::At(resumed_at_m) => Some(progress_m - resumed_at_m),
+                    Resume::Never | Resume::Due => None,
+                },
                 before: LOOK_BACKS_S.map(|look_back_s| before(recent, look_back_s, self.control_period_s)),
             });
+            *resume = Resume::Due;
         }
         if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
             recent.clear();

@@ -48,3 +48,31 @@ fn the_monitor_looks_back_six_seconds_and_not_beyond_a_resume() {
     // Put back at 20.0 m of route, the second one happens at 1.0 m (as written above).
     assert_eq!((incidents[0].since_resume_m, incidents[1].since_resume_m), (None, Some(-19.0)));
 }
+
+/// A near-collision soon after the car had been stuck was one more at the place of another that had never been.
+#[test]
+fn only_a_resume_after_a_near_collision_makes_one_more_at_the_same_place() {
+    let at = |tick: u32| (Pose::default(), 0.1 * tick as f32);
+    let near = |tick| {
+        let (at, progress_m) = at(tick);
+        Event::NearCollision { at, progress_m }
+    };
+    let stuck = |tick| {
+        let (at, progress_m) = at(tick);
+        Event::Stuck { at, progress_m }
+    };
+    let since_resume_m = |events: &[(u32, Event)]| -> Vec<Option<f32>> {
+        let mut monitor = IncidentMonitor::new(1, &EpisodeSettings::paper());
+        for tick in 0..40 {
+            let event = events.iter().find(|(of, _)| *of == tick).map_or(Event::Drove, |(_, event)| *event);
+            monitor.frame(0, &frame(tick, 0.0, event));
+        }
+        monitor.into_incidents().iter().map(|incident| incident.since_resume_m).collect()
+    };
+    assert_eq!(since_resume_m(&[(9, stuck(9)), (30, near(30))]), [None]);
+    // Put back in tick 10, at 1 m; that it gets stuck on its way to the next one changes nothing.
+    let expected = 0.1 * 30.0 - 0.1 * 10.0;
+    for events in [vec![(9, near(9)), (30, near(30))], vec![(9, near(9)), (20, stuck(20)), (30, near(30))]] {
+        assert_eq!(since_resume_m(&events), [None, Some(expected)]);
+    }
+}
