@@ -1,7 +1,8 @@
 //! How near-collisions fall with the number of different lots that are trained on, at as many drives and optimiser steps:
 //! one training per number, then one evaluation of all of them on lots that none was trained on.
 //!
-//! A training of few lots meets each more often, with other noise every time.
+//! A training of few lots meets each more often, with other noise every time. All make as many iterations as there can be,
+//! whatever η says.
 
 use crate::names::{BC, DAGGER};
 use crate::stages::{Stage, Step};
@@ -42,6 +43,8 @@ pub fn stages(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     let training = |&different_lots: &u32| {
         let mut settings = settings.clone();
         settings.training.different_lots = different_lots;
+        // Where η ended one of them earlier, it would have driven less than the others.
+        settings.dagger.iterations_min = settings.dagger.iterations_max;
         Stage {
             folder: folder(different_lots),
             about: format!("training on {different_lots} different lots of a kind"),
@@ -87,6 +90,10 @@ mod tests {
         let mut alike = few.settings.clone();
         alike.training.different_lots = 16;
         assert_eq!(alike, many.settings);
+        // A training whose network passed η ended before the others, with fewer drives.
+        let (of_few, asked) = (&few.settings.dagger, &settings.dagger);
+        assert!(asked.iterations_min < asked.iterations_max);
+        assert_eq!((of_few.iterations_min, of_few.iterations_max), (asked.iterations_max, asked.iterations_max));
         let Step::Drive { drivers } = &drives.step else { panic!("{drives:?}") };
         assert_eq!(drivers.len(), 4);
         assert_eq!(drivers[3], ("DAgger, 16 of a kind".to_owned(), "run:R/lots-0016".to_owned()));
