@@ -1,6 +1,6 @@
 //! An evaluation, counted and judged: the tables as data.
 
-use crate::format::{bound_per_100m, wider};
+use crate::format::{bound_per_100m, quoted_interval, wider};
 use crate::incidents::Cause;
 use crate::json;
 use crate::judge::{Comparison, DriverEstimate};
@@ -211,7 +211,8 @@ pub struct SweepRow {
     pub near_collisions: u32,
     /// Near-collisions per 100 m of route.
     pub per_100m: f64,
-    /// Exact Poisson interval, per 100 m.
+    /// The interval that may be quoted (docs/methods.md 8.3), per 100 m: the exact one, or the bootstrap's where events
+    /// cluster.
     pub lower: f64,
     /// See `lower`.
     pub upper: f64,
@@ -469,7 +470,7 @@ impl<'a> Summary<'a> {
         let mut rows = Vec::new();
         for (level, &noise) in self.levels().iter().enumerate() {
             for (driver, judged, totals) in self.estimates(level) {
-                let rate = totals.rate();
+                let [lower, upper] = quoted_interval(&totals, &judged.estimates[driver]);
                 rows.push(SweepRow {
                     driver: self.driver(driver).to_owned(),
                     lots: judged.slice.label.clone(),
@@ -477,9 +478,9 @@ impl<'a> Summary<'a> {
                     times_paper: noise.times_paper(),
                     reference_m: totals.reference_m,
                     near_collisions: totals.near_collisions,
-                    per_100m: rate.per_unit,
-                    lower: rate.lower,
-                    upper: rate.upper,
+                    per_100m: totals.rate().per_unit,
+                    lower,
+                    upper,
                     safe_ratio: totals.safe_ratio(),
                 });
             }
@@ -519,4 +520,44 @@ pub fn csv_of(rows: &[impl Serialize]) -> anyhow::Result<Vec<u8>> {
         csv.serialize(row)?;
     }
     Ok(csv.into_inner()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use experiment::drivers::NamedDriver;
+    use experiment::lots::Lot;
+    use experiment::settings::Settings;
+    use experiment::trials::{Purpose, Trial};
+    use sim::episode::EpisodeReport;
+    use sim::frame::Ending;
+    use sim::metrics::EpisodeMetrics;
+    use sim::seed::RootSeed;
+
+    /// `noise_sweep.csv`, and the plot of it, had exact intervals where the tables had those of the bootstrap.
+    #[test]
+    fn the_noise_sweep_has_the_intervals_of_the_tables() {
+        let mut settings = Settings::preset("default").unwrap();
+        settings.evaluation.noise = vec![NoiseChoice::Clean, NoiseChoice::Paper];
+        let drivers = [NamedDriver::expert(&settings.expert)];
+        let lots = Lot::parse_all(&["lot-b"], &settings.episode.vehicle).unwrap();
+        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0, shard: None };
+        let mut results = EvaluationResults::new(&plan);
+        for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 6, &Direction::BOTH).enumerate() {
+            // One in every trial on the clean grid; with noise, as many and more in a single one.
+            let of_levels = [u32::from(trial.direction == Direction::Forward), if trial.index == 0 { 9 } else { 0 }];
+            for (level, near_collisions) in of_levels.into_iter().enumerate() {
+                let metrics = EpisodeMetrics { near_collisions, reference_m: 100.0, ..EpisodeMetrics::default() };
+                let report = EpisodeReport { ending: Ending::ReachedEnd, metrics, events: Vec::new() };
+                results.add(level, 0, index, &trial, &report);
+            }
+        }
+        let tables = Summary::new(&plan, &results).tables();
+        let both: Vec<&Row> = tables.rows.iter().filter(|row| row.direction == "both").collect();
+        let of_tables: Vec<[f64; 2]> = both.iter().map(|row| row.quoted_interval()).collect();
+        let of_sweep: Vec<[f64; 2]> = tables.noise_sweep.iter().map(|row| [row.lower, row.upper]).collect();
+        assert_eq!(of_sweep, of_tables);
+        let exact: Vec<[f64; 2]> = both.iter().map(|row| [row.garwood_lower, row.garwood_upper]).collect();
+        assert!(of_sweep[0] == exact[0] && of_sweep[1][1] > 1.5 * exact[1][1], "{of_sweep:?} {exact:?}");
+    }
 }

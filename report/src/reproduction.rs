@@ -426,14 +426,29 @@ fn collision_rates(page: &mut Page, driven: &Driven<'_>) {
             rates_table(driven, true)
         ),
     );
-    let rates = bars_beside_paper(
+    let rates = rates_beside_paper(driven);
+    page.figure(
+        "rates-beside-paper",
+        "The paper's comparison beside ours, with intervals of 95 %: of the paper's counts exact ones, of ours as in the table.",
+        Image::Svg(plots::bars("Collision rate", "near-collisions per 100 m", &paper::DRIVERS, &rates)),
+    );
+    page.figure("rates", "Every driver, all lots of the paper together.", Image::Svg(rates_of_all(driven)));
+}
+
+/// Near-collisions per 100 m, the paper's and ours.
+fn rates_beside_paper(driven: &Driven<'_>) -> Vec<BarGroup> {
+    let slices = driven.results.slices();
+    let estimates: Vec<_> = slices.iter().map(|slice| driven.estimates(slice)).collect();
+    bars_beside_paper(
         driven,
         &|driver, slice| {
-            let rate = driven.results.totals(0, driver, slice, None).rate();
-            (rate.per_unit, Some([rate.lower, rate.upper]))
+            let totals = driven.results.totals(0, driver, slice, None);
+            let index = slices.iter().position(|known| known == slice).expect("one of them");
+            (totals.rate().per_unit, Some(quoted_interval(&totals, &estimates[index][driver])))
         },
         &|driver, lot| {
             let (events, metres) = paper::count(driver, |known| known.lot == lot.lot);
+            // Of its events nothing is known but their number.
             let rate = Rate::new(events, metres / 100.0);
             (rate.per_unit, Some([rate.lower, rate.upper]))
         },
@@ -656,6 +671,15 @@ fn further() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use evaluation::plan::Plan;
+    use evaluation::results::EvaluationResults;
+    use experiment::lots::Lot;
+    use experiment::trials::{Purpose, Trial};
+    use sim::episode::EpisodeReport;
+    use sim::frame::Ending;
+    use sim::metrics::EpisodeMetrics;
+    use sim::scenario::Direction;
+    use sim::seed::RootSeed;
 
     fn groups(names: &[&str]) -> Vec<LotGroup> {
         names.iter().map(|&name| LotGroup { name: name.to_owned(), lots: 1, is_trained_on: name == "lot-a" }).collect()
@@ -666,6 +690,29 @@ mod tests {
         let tentacle = 1;
         let count = |slice: &Slice| count_of_paper(tentacle, slice, &groups).map(|(events, _)| events);
         Slice::all_of(&groups).iter().map(count).collect()
+    }
+
+    /// The bars had exact intervals, and the table above them those of the bootstrap.
+    #[test]
+    fn bars_have_the_intervals_of_the_table_where_near_collisions_cluster() {
+        let settings = Settings::preset("default").unwrap();
+        let drivers = [NamedDriver::expert(&settings.expert).renamed(DAGGER)];
+        let lots = Lot::parse_all(&["lot-a"], &settings.episode.vehicle).unwrap();
+        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0, shard: None };
+        let mut results = EvaluationResults::new(&plan);
+        for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 6, &Direction::BOTH).enumerate() {
+            // All in one trial of six.
+            let near_collisions = if trial.index == 0 { 9 } else { 0 };
+            let metrics = EpisodeMetrics { near_collisions, reference_m: 100.0, ..EpisodeMetrics::default() };
+            results.add(0, 0, index, &trial, &EpisodeReport { ending: Ending::ReachedEnd, metrics, events: vec![] });
+        }
+        let driven = Driven { plan: &plan, results: &results };
+        let groups = rates_beside_paper(&driven);
+        let ours = groups[0].bars.iter().find(|bar| !bar.is_papers && bar.driver == 0).unwrap();
+        let [lower, upper] = ours.interval.unwrap();
+        let quoted = format!("{:.2} [{lower:.2}, {upper:.2}] (b)", ours.value);
+        assert!(rates_table(&driven, false).contains(&quoted), "{quoted}: {}", rates_table(&driven, false));
+        assert!(upper > 1.5 * Rate::new(18, 12.0).upper, "wider than if each came by itself: {quoted}");
     }
 
     #[test]

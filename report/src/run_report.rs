@@ -332,7 +332,8 @@ fn add_evaluation(page: &mut Page, evaluation: &Evaluation) {
         let series = noise_series(evaluation, &drivers);
         let title = format!("Near-collisions against noise, lots: {}", evaluation.pooled());
         let svg = plots::rates_against_noise(&title, &series);
-        page.figure("noise", "Near-collisions at each noise level. Whiskers: exact 95 % intervals.", Image::Svg(svg));
+        let caption = "Near-collisions at each noise level. Whiskers: 95 % intervals, as in the tables.";
+        page.figure("noise", caption, Image::Svg(svg));
     }
     for (index, &noise) in levels.iter().enumerate() {
         for (place, lots) in single_lots(evaluation).into_iter().enumerate() {
