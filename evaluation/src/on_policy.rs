@@ -37,7 +37,7 @@ pub struct OnPolicy {
     pub schema: u32,
     /// Per policy, kind of states and axis.
     pub calibration: Vec<Calibration>,
-    /// Per iteration.
+    /// Per iteration; empty where nothing is weighted.
     pub effect: Vec<Effect>,
 }
 
@@ -68,7 +68,7 @@ pub enum States {
     OnPolicy,
 }
 
-/// Σ τ̂ of two policies of the same iteration, trained with and without the weight α τ̂.
+/// Σ τ̂ of two policies of the same iteration, trained with and without the weight on τ̂.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Effect {
     /// The iteration.
@@ -128,31 +128,50 @@ impl Trained {
     }
 }
 
-/// A training with the weight α τ̂ and one without, from one seed.
+/// A training with the weight on τ̂ and one without, from one seed.
 struct Pair {
     weighted: Trained,
-    unweighted: Trained,
+    /// None where the other has no weight, either.
+    unweighted: Option<Trained>,
 }
 
 impl Pair {
-    fn open(root: &Path, seed: RootSeed, by: ValidationSplit) -> anyhow::Result<Self> {
-        let open = |chain: Chain| Trained::open(&root.join(chain.folder(seed)), by);
-        Ok(Self { weighted: open(Chain::Weighted)?, unweighted: open(Chain::Unweighted)? })
+    fn open(root: &Path, settings: &Settings, seed: RootSeed) -> anyhow::Result<Self> {
+        let open = |chain: Chain| Trained::open(&root.join(chain.folder(seed)), settings.dagger.fit.validation);
+        let unweighted = Chain::Unweighted.is_trained(settings).then(|| open(Chain::Unweighted)).transpose()?;
+        Ok(Self { weighted: open(Chain::Weighted)?, unweighted })
     }
 
-    fn iterations(&self) -> u32 {
-        self.weighted.iterations().min(self.unweighted.iterations())
+    /// The iterations that both have, with both.
+    fn iterations(&self) -> impl Iterator<Item = Iteration<'_>> {
+        let Self { weighted, unweighted } = self;
+        unweighted.iter().flat_map(move |unweighted| {
+            let last = weighted.iterations().min(unweighted.iterations());
+            (1..=last).map(move |number| Iteration { number, both: [weighted, unweighted] })
+        })
+    }
+}
+
+/// An iteration of a training with the weight on τ̂ and of one without.
+struct Iteration<'a> {
+    number: u32,
+    both: [&'a Trained; 2],
+}
+
+impl Iteration<'_> {
+    /// The folder of the network of each.
+    fn folders(&self) -> [PathBuf; 2] {
+        self.both.map(|trained| trained.store.round_folder(self.number))
     }
 
-    /// τ̂ of both policies of an iteration on the held-back samples of both data sets so far.
-    fn tau_hats(&self, iteration: u32) -> anyhow::Result<[Vec<f64>; 2]> {
+    /// τ̂ of both policies on the held-back samples of both data sets so far.
+    fn tau_hats(&self) -> anyhow::Result<[Vec<f64>; 2]> {
+        let [weighted, unweighted] = self.both;
         let samples: Vec<&Sample> =
-            self.weighted.held_back(0, iteration).chain(self.unweighted.held_back(1, iteration)).collect();
-        let of = |trained: &Trained| {
-            let policy = Checkpoint::load(&trained.store.round_folder(iteration))?;
-            Ok::<_, anyhow::Error>(tau_hats(&policy, &samples))
-        };
-        Ok([of(&self.weighted)?, of(&self.unweighted)?])
+            weighted.held_back(0, self.number).chain(unweighted.held_back(1, self.number)).collect();
+        let [weighted, unweighted] = self.folders();
+        let of = |folder: &Path| Ok::<_, anyhow::Error>(tau_hats(&Checkpoint::load(folder)?, &samples));
+        Ok([of(&weighted)?, of(&unweighted)?])
     }
 }
 
@@ -168,29 +187,32 @@ pub fn run(
     progress: &dyn Progress,
 ) -> anyhow::Result<bool> {
     let folder = |chain: Chain| root.join(chain.folder(settings.seed));
-    let by = settings.dagger.fit.validation;
-    let pair = Pair::open(root, settings.seed, by)?;
-    let iterations = pair.iterations();
+    let pair = Pair::open(root, settings, settings.seed)?;
     let Pair { weighted, unweighted } = &pair;
     let others: Vec<RootSeed> = seeds.iter().copied().filter(|&seed| seed != settings.seed).collect();
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
     run.ensure_unchanged(&inputs::of(&lots, &[]))?;
-    let mut drives = Drives::new(settings, &lots, 3 + 2 * iterations, others.len() as u32, progress);
+    let policies = 3 + 2 * pair.iterations().count() as u32;
+    let mut drives = Drives::new(settings, &lots, policies, others.len() as u32, progress);
     let mut ratios_of_others: Vec<Vec<f64>> = Vec::new();
     for seed in others {
         if !drives.begin_other(&format!("seed {}", seed.0)) {
             return Ok(false);
         }
-        let other = Pair::open(root, seed, by)?;
-        let ratio = |iteration| Ok(ratio_of_sums(&other.tau_hats(iteration)?));
-        ratios_of_others.push((1..=other.iterations()).map(ratio).collect::<anyhow::Result<_>>()?);
+        let other = Pair::open(root, settings, seed)?;
+        let ratio = |iteration: Iteration<'_>| Ok(ratio_of_sums(&iteration.tau_hats()?));
+        ratios_of_others.push(other.iterations().map(ratio).collect::<anyhow::Result<_>>()?);
     }
-    let mut calibration = Vec::new();
-    for (name, path, chain, rounds) in [
+    let mut policies = vec![
         (BC, weighted.store.round_folder(0), weighted, 0),
         (DAGGER, trained::policy_folder(&folder(Chain::Weighted))?, weighted, weighted.iterations()),
-        (UNWEIGHTED, trained::policy_folder(&folder(Chain::Unweighted))?, unweighted, unweighted.iterations()),
-    ] {
+    ];
+    if let Some(unweighted) = unweighted {
+        let path = trained::policy_folder(&folder(Chain::Unweighted))?;
+        policies.push((UNWEIGHTED, path, unweighted, unweighted.iterations()));
+    }
+    let mut calibration = Vec::new();
+    for (name, path, chain, rounds) in policies {
         let Some(driven) = drives.of(&path)? else { return Ok(false) };
         let policy = Checkpoint::load(&path)?;
         let held_back: Vec<&Sample> = chain.held_back(0, rounds).collect();
@@ -199,17 +221,17 @@ pub fn run(
         calibration.extend(calibrations(name, States::OnPolicy, &policy, &driven));
     }
     let mut effect = Vec::new();
-    for iteration in 1..=iterations {
+    for (at, iteration) in pair.iterations().enumerate() {
         let mut driving_per_s = [0.0; 2];
-        for (index, chain) in [weighted, unweighted].into_iter().enumerate() {
-            let Some(driven) = drives.of(&chain.store.round_folder(iteration))? else { return Ok(false) };
-            driving_per_s[index] = tau_hat_per_s(driven);
+        for (sum, folder) in driving_per_s.iter_mut().zip(iteration.folders()) {
+            let Some(driven) = drives.of(&folder)? else { return Ok(false) };
+            *sum = tau_hat_per_s(driven);
         }
-        let sums = pair.tau_hats(iteration)?;
-        let held_back = ratio(&sums, by.block, settings.evaluation.seed);
-        let of_others = ratios_of_others.iter().filter_map(|ratios| ratios.get(iteration as usize - 1));
+        let sums = iteration.tau_hats()?;
+        let held_back = ratio(&sums, settings.dagger.fit.validation.block, settings.evaluation.seed);
+        let of_others = ratios_of_others.iter().filter_map(|ratios| ratios.get(at));
         let held_back_by_seed = std::iter::once(ratio_of_sums(&sums)).chain(of_others.copied()).collect();
-        effect.push(Effect { iteration, held_back, held_back_by_seed, driving_per_s });
+        effect.push(Effect { iteration: iteration.number, held_back, held_back_by_seed, driving_per_s });
     }
     drives.end();
     run.write(FILE, json::to_text(&OnPolicy { schema: SCHEMA, calibration, effect })?.as_bytes())?;

@@ -3,11 +3,11 @@
 //! | stage | what the report needs it for |
 //! |---|---|
 //! | `chains/sN-weighted` | behaviour cloning and `DAgger` with the paper's weight α on τ̂: Table 1, the driver of every table |
-//! | `chains/sN-unweighted` | the same with α = 0: Table 1's effect of the weight |
+//! | `chains/sN-unweighted` | the same with α = 0: Table 1's effect of the weight; none where nothing is weighted anyway |
 //! | `chains/s1-any-below`, `-tau-only` | the other two readings of Algorithm 2, line 9, for a few iterations |
 //! | `chains/sN-expert-equal` | control: as many rounds that the expert alone drove, with as many samples as `DAgger` has |
 //! | `chains/s1-expert-only` | control: the same with all of the expert's samples |
-//! | `chains/s1-alpha-15` | control: ten times the weight |
+//! | `chains/s1-alpha-15` | control: ten times the paper's weight; none where it is that anyway |
 //! | `chains/s1-far-points` | control: points as far as the way is open, as in the paper; none where they are so anyway |
 //! | `drives/reference` | the paper's tables: every driver on its lots |
 //! | `drives/unseen` | generated lots that nothing was trained or tuned on |
@@ -127,7 +127,7 @@ impl Chain {
 
     fn about(self) -> &'static str {
         match self {
-            Self::Weighted => "behaviour cloning, DAgger with the weight α on τ̂",
+            Self::Weighted => "behaviour cloning, DAgger with the weight on τ̂",
             Self::Unweighted => "DAgger with α = 0",
             Self::AnyBelow => "DAgger under \"any below\", Algorithm 2 as printed",
             Self::TauOnly => "DAgger under \"τ̂ alone\"",
@@ -138,6 +138,17 @@ impl Chain {
         }
     }
 
+    /// Whether it is trained: not where it would be the paper's once more.
+    pub fn is_trained(self, settings: &Settings) -> bool {
+        let loss = &settings.dagger.fit.loss;
+        match self {
+            Self::Unweighted => !loss.is_like(&loss.with_alpha(UNWEIGHTED_ALPHA)),
+            Self::Alpha15 => !loss.is_like(&loss.with_alpha(HEAVY_ALPHA)),
+            Self::FarPoints => !has_points_of_paper(settings),
+            Self::Weighted | Self::AnyBelow | Self::TauOnly | Self::ExpertOnly | Self::ExpertEqual => true,
+        }
+    }
+
     fn stage(self, settings: &Settings, extent: &Extent) -> Stage {
         let mut settings = if self == Self::FarPoints { with_points_of_paper(settings) } else { settings.clone() };
         let dagger = &mut settings.dagger;
@@ -145,13 +156,11 @@ impl Chain {
         let (chi, chi_on) = dagger.rule.chi().unwrap_or((CHI, ChiOn::default()));
         match self {
             Self::Weighted | Self::FarPoints => {}
-            Self::Unweighted => {
-                dagger.fit.loss.alpha = 0.0;
-            }
+            Self::Unweighted => dagger.fit.loss = dagger.fit.loss.with_alpha(UNWEIGHTED_ALPHA),
             Self::AnyBelow => dagger.rule = DecisionRule::AnyBelowLiteral { tau, chi, chi_on },
             Self::TauOnly => dagger.rule = DecisionRule::TauOnly { tau },
             Self::ExpertOnly | Self::ExpertEqual => dagger.rule = DecisionRule::ExpertOnly,
-            Self::Alpha15 => dagger.fit.loss.alpha = 15.0,
+            Self::Alpha15 => dagger.fit.loss = dagger.fit.loss.with_alpha(HEAVY_ALPHA),
         }
         if matches!(self, Self::AnyBelow | Self::TauOnly) {
             dagger.iterations_max = dagger.iterations_max.min(extent.rule_iterations);
@@ -170,6 +179,11 @@ impl Chain {
         }
     }
 }
+
+/// α of [`Chain::Unweighted`].
+const UNWEIGHTED_ALPHA: f32 = 0.0;
+/// α of [`Chain::Alpha15`].
+const HEAVY_ALPHA: f32 = 15.0;
 
 /// Settings of a training with as many iterations as another, of as many samples on average: `rows` are those of the other.
 pub fn with_as_many_samples(settings: &Settings, rows: &[IterationRow]) -> Settings {
@@ -295,14 +309,16 @@ fn trainings(settings: &Settings, extent: &Extent) -> Vec<Stage> {
     for seed in settings.training_seeds(extent.seeds) {
         let of_seed = Settings { seed, ..settings.clone() };
         let chains = [Chain::Weighted, Chain::Unweighted, Chain::ExpertEqual];
-        stages.extend(chains.map(|chain| chain.stage(&of_seed, extent)));
+        stages.extend(stages_of(&chains, &of_seed, extent));
     }
-    let of_first_seed = [Chain::AnyBelow, Chain::TauOnly, Chain::ExpertOnly, Chain::Alpha15];
-    stages.extend(of_first_seed.map(|chain| chain.stage(settings, extent)));
-    if !has_points_of_paper(settings) {
-        stages.push(Chain::FarPoints.stage(settings, extent));
-    }
+    let of_first_seed = [Chain::AnyBelow, Chain::TauOnly, Chain::ExpertOnly, Chain::Alpha15, Chain::FarPoints];
+    stages.extend(stages_of(&of_first_seed, settings, extent));
     stages
+}
+
+/// Those of some chains that are trained.
+fn stages_of(chains: &[Chain], settings: &Settings, extent: &Extent) -> impl Iterator<Item = Stage> {
+    chains.iter().filter(|chain| chain.is_trained(settings)).map(|chain| chain.stage(settings, extent))
 }
 
 /// Drivers by their names in tables.
@@ -312,7 +328,9 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     let spec = |chain: Chain, seed, rest: &str| format!("run:{}/{}{rest}", root.display(), chain.folder(seed));
     let of_seed = |seed| {
         [(BC, Chain::Weighted, "/bc"), (DAGGER, Chain::Weighted, ""), (UNWEIGHTED, Chain::Unweighted, "")]
-            .map(|(name, chain, rest)| (named(name, seed, settings), spec(chain, seed, rest)))
+            .into_iter()
+            .filter(|(_, chain, _)| chain.is_trained(settings))
+            .map(move |(name, chain, rest)| (named(name, seed, settings), spec(chain, seed, rest)))
     };
     let networks: Drivers = settings.training_seeds(extent.seeds).into_iter().flat_map(of_seed).collect();
     let of_first_seed = |name: &str, chain| (name.to_owned(), spec(chain, settings.seed, ""));
@@ -359,10 +377,12 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
             .into_iter()
             .map(|seed| (named(EXPERT_EQUAL, seed, settings), spec(Chain::ExpertEqual, seed, ""))),
     );
-    controls.push(of_first_seed(ALPHA_15, Chain::Alpha15));
+    if Chain::Alpha15.is_trained(settings) {
+        controls.push(of_first_seed(ALPHA_15, Chain::Alpha15));
+    }
     stages.push(drive(CONTROLS, "controls on generated lots", unseen, controls));
 
-    if !has_points_of_paper(settings) {
+    if Chain::FarPoints.is_trained(settings) {
         let far = Chain::FarPoints.stage(settings, extent).settings;
         let policies = [(BC, "/bc"), (DAGGER, "")]
             .map(|(name, rest)| (name.to_owned(), spec(Chain::FarPoints, settings.seed, rest)))
@@ -433,6 +453,7 @@ impl Stage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use policy::loss::{LossSettings, WeightForm};
 
     fn extent() -> Extent {
         Extent { seeds: 1, unseen: vec!["test:20".to_owned()], rule_iterations: 1, tuned: Vec::new() }
@@ -466,6 +487,54 @@ mod tests {
         assert_eq!(far.settings, with_points_of_paper(&settings));
         let of_paper = all(&Settings::preset("paper").unwrap(), &extent(), Path::new("R"));
         assert!(of_paper.iter().all(|stage| !stage.folder.contains("far-points")), "its points are far anyway");
+    }
+
+    /// With the authors' linear weight, which does not use α, a network was trained three times; and twice where α was 0 or 15.
+    #[test]
+    fn no_network_is_trained_twice_whatever_is_weighted() {
+        let default = Settings::preset("default").unwrap();
+        let of_paper = default.dagger.fit.loss;
+        let linear = |gain| LossSettings { weight: WeightForm::Linear { gain }, ..of_paper };
+        let samples_of = |stage: &Stage| match &stage.step {
+            Step::Train { samples_of, .. } => samples_of.clone(),
+            _ => None,
+        };
+        let (both, unweighted, heavy) = (vec![], vec!["chains/s1-unweighted"], vec!["chains/s1-alpha-15"]);
+        for (loss, missing) in [
+            (of_paper, both.clone()),
+            (linear(10.0), both),
+            (of_paper.with_alpha(0.0), unweighted.clone()),
+            (linear(0.0), unweighted),
+            (of_paper.with_alpha(15.0), heavy),
+        ] {
+            let mut settings = default.clone();
+            settings.dagger.fit.loss = loss;
+            let stages = all(&settings, &extent(), Path::new("R"));
+            let trained: Vec<&Stage> = stages.iter().filter(|stage| matches!(stage.step, Step::Train { .. })).collect();
+            let folders: Vec<&str> = trained.iter().map(|stage| stage.folder.as_str()).collect();
+            assert_eq!(folders.len() + missing.len(), 8, "{loss:?}: {folders:?}");
+            assert!(missing.iter().all(|folder| !folders.contains(folder)), "{loss:?}: {folders:?}");
+            for (at, one) in trained.iter().enumerate() {
+                for other in &trained[..at] {
+                    let (mut alike, losses) =
+                        (one.settings.clone(), [one, other].map(|it| it.settings.dagger.fit.loss));
+                    alike.dagger.fit.loss = losses[1];
+                    let has_like_loss = losses[0].is_like(&losses[1]);
+                    let is_same = alike == other.settings && has_like_loss && samples_of(one) == samples_of(other);
+                    assert!(!is_same, "{loss:?}: {} and {}", one.folder, other.folder);
+                }
+            }
+            // Nobody drives what is not trained.
+            let left = without_trainings(stages.clone(), |folder| folders.contains(&folder));
+            assert_eq!(left, stages);
+            let specs = stages.iter().filter_map(|stage| match &stage.step {
+                Step::Drive { drivers } => Some(drivers.iter().map(|(_, spec)| spec)),
+                _ => None,
+            });
+            for spec in specs.flatten().filter(|spec| spec.contains("R/chains/")) {
+                assert!(folders.iter().any(|folder| spec.contains(folder)), "{loss:?}: {spec}");
+            }
+        }
     }
 
     /// `render results` of a run that an earlier version finished said that one of its chains is not a run.

@@ -55,6 +55,26 @@ impl LossSettings {
         Self { alpha: 0.0, ..Self::paper() }
     }
 
+    /// The same with the paper's weight and this α.
+    #[must_use]
+    pub fn with_alpha(self, alpha: f32) -> Self {
+        Self { alpha, weight: WeightForm::ResidualSq, ..self }
+    }
+
+    /// Whether another trains the same networks: what it does not use may differ.
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.as_used() == other.as_used()
+    }
+
+    /// The same, as all are written that have its effect.
+    fn as_used(self) -> Self {
+        match self.weight {
+            WeightForm::Linear { gain } if gain == 0.0 => self.with_alpha(0.0),
+            WeightForm::Linear { .. } => Self { alpha: 0.0, ..self },
+            WeightForm::ResidualSq => self,
+        }
+    }
+
     /// Weight of the squared error of a sample with discrepancy `tau_hat`.
     pub fn weight_of_squared_error(&self, tau_hat: f32) -> f32 {
         match self.weight {
@@ -207,6 +227,24 @@ mod tests {
             LossSettings { beta: 0.5, ..LossSettings::paper() },
             LossSettings { weight: WeightForm::Linear { gain: 10.0 }, ..LossSettings::paper() },
         ]
+    }
+
+    #[test]
+    fn losses_are_alike_where_they_weigh_alike() {
+        let linear = |gain, alpha| LossSettings { weight: WeightForm::Linear { gain }, alpha, ..LossSettings::paper() };
+        let of_paper = LossSettings::paper();
+        for (one, other) in [
+            (linear(10.0, 1.5), linear(10.0, 0.0)),
+            (linear(0.0, 1.5), LossSettings::unweighted()),
+            (linear(10.0, 1.5).with_alpha(1.5), of_paper),
+        ] {
+            assert!(one.is_like(&other), "{one:?} {other:?}");
+            assert_eq!(one.weight_of_squared_error(TAU_HAT), other.weight_of_squared_error(TAU_HAT));
+        }
+        let others = [linear(10.0, 1.5), linear(5.0, 1.5), of_paper.with_alpha(0.0), of_paper.with_alpha(15.0)];
+        assert!(others.iter().all(|other| !other.is_like(&of_paper)));
+        assert!(!linear(10.0, 1.5).is_like(&linear(5.0, 1.5)));
+        assert!(!LossSettings { beta: 0.5, ..of_paper }.is_like(&of_paper));
     }
 
     #[test]

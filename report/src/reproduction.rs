@@ -28,6 +28,7 @@ use experiment::manifest::Manifest;
 use experiment::run_dir::RunDir;
 use experiment::settings::{Settings, has_points_of_paper};
 use policy::dagger::IterationRow;
+use policy::loss::{LossSettings, WeightForm};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -119,7 +120,10 @@ struct Found {
 impl Found {
     fn read(recipe: &Recipe, root: &Path) -> anyhow::Result<Self> {
         let settings = &recipe.settings;
-        let rows = |chain| rows_of(root, chain, settings.seed);
+        let rows = |chain: Chain| {
+            let is_trained = chain.is_trained(settings);
+            is_trained.then(|| rows_of(root, chain, settings.seed)).transpose().map(Option::unwrap_or_default)
+        };
         let (weighted, unweighted) = (rows(Chain::Weighted)?, rows(Chain::Unweighted)?);
         let on_policy = OnPolicy::read(&root.join(stages::ON_POLICY))?;
         let folders = [stages::REFERENCE, stages::UNSEEN];
@@ -323,7 +327,7 @@ fn table_1(
     unweighted: &[IterationRow],
     effect: &[Effect],
 ) {
-    let alpha = settings.dagger.fit.loss.alpha;
+    let weight = weight_of(&settings.dagger.fit.loss);
     let columns = weighted.len().max(unweighted.len()).max(paper::TABLE_1.dataset.len());
     let header: Vec<String> = (0..columns).map(|i| if i == 0 { BC.to_owned() } else { format!("i = {i}") }).collect();
     let mut table = with_header(std::iter::once(String::new()).chain(header).collect());
@@ -338,37 +342,56 @@ fn table_1(
     add("samples", &|i| weighted.get(i).map(|row| row.samples.to_string()));
     add("  paper", &|i| paper::TABLE_1.dataset.get(i).map(ToString::to_string));
     add("η̂ = network / total", &|i| eta_of(weighted, i));
-    add("  with α = 0", &|i| eta_of(unweighted, i));
+    if !unweighted.is_empty() {
+        add("  with α = 0", &|i| eta_of(unweighted, i));
+    }
     add("  paper", &|i| of_paper(&paper::TABLE_1.eta_hat, i));
     for (name, value) in AGREEMENT {
         add(name, &|i| weighted.get(i).and_then(value));
     }
     add("mean weight of τ̂", &|i| weighted.get(i)?.mean_weight.map(|weight| format!("{weight:.3}")));
-    add("effect of the weight, held-back samples", &|i| {
-        let interval = effect_of(i)?.held_back?;
-        Some(format!("{:.2} [{:.2}, {:.2}]", interval.estimate, interval.lower, interval.upper))
-    });
-    add("effect of the weight, driving", &|i| {
-        let [with, without] = effect_of(i)?.driving_per_s;
-        Some(format!("{:.2}", with / without.max(f64::MIN_POSITIVE)))
-    });
-    add("  paper", &|i| of_paper(&paper::TABLE_1.effect, i));
+    if !unweighted.is_empty() {
+        add("effect of the weight, held-back samples", &|i| {
+            let interval = effect_of(i)?.held_back?;
+            Some(format!("{:.2} [{:.2}, {:.2}]", interval.estimate, interval.lower, interval.upper))
+        });
+        add("effect of the weight, driving", &|i| {
+            let [with, without] = effect_of(i)?.driving_per_s;
+            Some(format!("{:.2}", with / without.max(f64::MIN_POSITIVE)))
+        });
+        add("  paper", &|i| of_paper(&paper::TABLE_1.effect, i));
+    }
+    let of_effect = if unweighted.is_empty() {
+        "There is no effect of the weight: nothing is weighted.".to_owned()
+    } else {
+        format!(
+            "The effect compares the two policies trained in a column, with {weight} and with α = 0 on the same data seeds: Σ τ̂ \
+             with the weight over Σ τ̂ without, smaller is better. *Held-back samples*: of both data sets so far, resampled in \
+             stretches. *Driving*: per second at the wheel of one trial of every lot, the expert watching."
+        )
+    };
     page.section(
         "Table 1: DAgger iterations",
-        format!(
-            "{table}\n\nη̂ of a column is of the policy trained in the column before. The effect compares the two policies \
-             trained in a column, with α = {alpha} and with α = 0 on the same data seeds: Σ τ̂ with the weight over Σ τ̂ \
-             without, smaller is better. *Held-back samples*: of both data sets so far, resampled in stretches. \
-             *Driving*: per second at the wheel of one trial of every lot, the expert watching. {READ_ETA_HAT}"
-        ),
+        format!("{table}\n\nη̂ of a column is of the policy trained in the column before. {of_effect} {READ_ETA_HAT}"),
     );
     let points = |rows: &[IterationRow]| {
         rows.iter().filter_map(|row| Some((row.round, row.eta_hat?))).collect::<Vec<(u32, f64)>>()
     };
-    let ours = [(format!("α = {alpha}"), weighted), ("α = 0".to_owned(), unweighted)]
-        .map(|(name, rows)| EtaSeries { name, points: points(rows) });
+    let ours: Vec<EtaSeries> = [(weight, weighted), ("α = 0".to_owned(), unweighted)]
+        .into_iter()
+        .filter(|(_, rows)| !rows.is_empty())
+        .map(|(name, rows)| EtaSeries { name, points: points(rows) })
+        .collect();
     let figure = plots::eta(&ours, &table1::eta_hat_of_paper(settings), settings.dagger.eta);
     page.figure("eta", "Share of the network by iteration.", Image::Svg(figure));
+}
+
+/// The weight on τ̂, in words.
+fn weight_of(loss: &LossSettings) -> String {
+    match loss.weight {
+        WeightForm::ResidualSq => format!("α = {}", loss.alpha),
+        WeightForm::Linear { gain } => format!("the weight 1 + {gain} τ̂"),
+    }
 }
 
 /// Lots as columns, as in the paper: groups, then what is pooled.
@@ -452,13 +475,7 @@ fn rates_beside_paper(driven: &Driven<'_>) -> Vec<BarGroup> {
             let rate = Rate::new(events, metres / 100.0);
             (rate.per_unit, Some([rate.lower, rate.upper]))
         },
-    );
-    page.figure(
-        "rates-beside-paper",
-        "The paper's comparison beside ours, with exact intervals of 95 %.",
-        Image::Svg(plots::bars("Collision rate", "near-collisions per 100 m", &paper::DRIVERS, &rates)),
-    );
-    page.figure("rates", "Every driver, all lots of the paper together.", Image::Svg(rates_of_all(driven)));
+    )
 }
 
 /// A height and its interval.

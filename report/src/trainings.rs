@@ -113,6 +113,9 @@ pub(crate) fn by_seed(
     let mut table =
         table_of(&["policy", "seed", "η̂", "the paper's lots", "of them not trained on", "unseen generated lots"]);
     for (base, chain) in [(BC, None), (DAGGER, Some(Chain::Weighted)), (UNWEIGHTED, Some(Chain::Unweighted))] {
+        if chain.is_some_and(|chain| !chain.is_trained(settings)) {
+            continue;
+        }
         for seed in settings.training_seeds(extent.seeds) {
             let name = named(base, seed, settings);
             let cell = |place: &Option<Place<'_>>| {
