@@ -35,10 +35,10 @@ struct Row {
     novice_ticks: u64,
     /// Ticks at which the method asks the expert.
     queries: u64,
-    /// Times the expert took the wheel.
-    interventions: u64,
+    /// Times the expert took the wheel; empty where nobody else ever had it.
+    interventions: Option<u64>,
     /// Mean length of an intervention, seconds.
-    intervention_s: f64,
+    intervention_s: Option<f64>,
     /// Sum of the ways driven while collecting, metres.
     collected_m: f64,
     near_collisions_collecting: u32,
@@ -118,14 +118,23 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
         row.per_100m = f64::from(row.near_collisions) / (row.route_m / 100.0);
     }
     for row in rows.iter_mut().chain(&mut pooled) {
-        let expert_s = (row.ticks - row.novice_ticks) as f64 * control_period_s;
-        row.intervention_s = if row.interventions > 0 { expert_s / row.interventions as f64 } else { 0.0 };
+        row.judge_interventions(control_period_s);
     }
     let text = format!("{}\n\n{}", to_markdown(&pooled), legend(settings, extent));
     run.write("rules.md", format!("{text}\n").as_bytes())?;
     run.write("rules.csv", &csv_of(&[pooled.clone(), rows].concat())?)?;
     run.write("rules.svg", plot(&pooled).as_bytes())?;
     Ok(text)
+}
+
+impl Row {
+    /// Says how long interventions lasted, and leaves them out where there was nobody to take the wheel from: the expert takes
+    /// it at the beginning of a drive, too.
+    fn judge_interventions(&mut self, control_period_s: f64) {
+        self.interventions = self.interventions.filter(|_| self.novice_ticks > 0);
+        let expert_s = (self.ticks - self.novice_ticks) as f64 * control_period_s;
+        self.intervention_s = self.interventions.filter(|&times| times > 0).map(|times| expert_s / times as f64);
+    }
 }
 
 /// Adds what collecting gave and cost. Behaviour cloning (`rule` = `None`) is round 0, a rule's are the rounds after it.
@@ -143,7 +152,7 @@ fn add_rounds(row: &mut Row, folder: &Path, rule: Option<&str>, extent: &Extent)
         row.ticks += collection.ticks;
         row.novice_ticks += collection.novice_ticks;
         row.queries += effort.queries;
-        row.interventions += effort.interventions;
+        *row.interventions.get_or_insert(0) += effort.interventions;
         row.collected_m += collection.driven_m;
         row.near_collisions_collecting += collection.near_collisions;
         row.contacts_collecting += effort.contacts;
@@ -160,7 +169,7 @@ fn pool(rows: &[Row], title: &str) -> Row {
         all.ticks += row.ticks;
         all.novice_ticks += row.novice_ticks;
         all.queries += row.queries;
-        all.interventions += row.interventions;
+        *all.interventions.get_or_insert(0) += row.interventions.unwrap_or(0);
         all.collected_m += row.collected_m;
         all.near_collisions_collecting += row.near_collisions_collecting;
         all.contacts_collecting += row.contacts_collecting;
@@ -219,10 +228,10 @@ fn to_markdown(rows: &[Row]) -> String {
             row.networks.to_string(),
             format!("{:.1} %", percent(row.queries, row.ticks)),
             format!("{:.1} %", percent(row.ticks - row.novice_ticks, row.ticks)),
-            match row.interventions {
-                // There was nobody to take the wheel from.
-                0 if row.novice_ticks == 0 => "–".to_owned(),
-                times => format!("{times} ({:.1} s)", row.intervention_s),
+            match (row.interventions, row.intervention_s) {
+                (Some(times), Some(seconds)) => format!("{times} ({seconds:.1} s)"),
+                (Some(times), None) => times.to_string(),
+                (None, _) => "–".to_owned(),
             },
             format!(
                 "{} ({}) in {:.1} km",
@@ -266,7 +275,7 @@ mod tests {
             ticks: 1000,
             novice_ticks: 900,
             queries: 100,
-            interventions: 4,
+            interventions: Some(4),
             route_m: 500.0,
             near_collisions,
             ..Row::default()
@@ -281,8 +290,23 @@ mod tests {
         let table = to_markdown(std::slice::from_ref(&pooled));
         assert!(table.contains("| 10.0 %") && table.contains("5 (0) in 1.0 km"), "{table}");
         assert!(plot(&[pooled]).contains("SafeDAgger"));
-        // Behaviour cloning had interventions of 0.0 s.
-        let alone = Row { interventions: 0, novice_ticks: 0, ..row(1, 2) };
-        assert!(!to_markdown(&[alone]).contains("(0.0 s)"), "nobody had the wheel before");
+    }
+
+    /// Behaviour cloning had interventions of 0.0 s, and "expert only" one in every drive.
+    #[test]
+    fn nobody_intervenes_where_the_expert_alone_drives() {
+        let interventions = |novice_ticks, interventions| {
+            let mut row = Row { novice_ticks, interventions: Some(interventions), ..row(1, 2) };
+            row.judge_interventions(0.05);
+            let table = to_markdown(std::slice::from_ref(&row));
+            let cells = table.lines().last().unwrap().split('|').map(str::trim).collect::<Vec<_>>();
+            (cells[6].to_owned(), row.interventions, row.intervention_s)
+        };
+        // The expert drives 100 ticks of 1000, 5 s in all.
+        assert_eq!(interventions(900, 4), ("4 (1.2 s)".to_owned(), Some(4), Some(1.25)));
+        assert_eq!(interventions(1000, 0), ("0".to_owned(), Some(0), None));
+        for times in [0, 2] {
+            assert_eq!(interventions(0, times), ("–".to_owned(), None, None));
+        }
     }
 }
