@@ -421,6 +421,7 @@ fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
     let out_name = out.to_string_lossy().into_owned();
     let arguments = [
         "--rule=expert_only,ensemble_dagger,lazy_dagger",
+        "--set=dagger.rule.ensemble_dagger.members=2",
         "--iterations=1",
         "--samples=200",
         "--unseen=validation:1:lane",
@@ -430,11 +431,15 @@ fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
     let table = std::fs::read_to_string(out.join("rules.md")).unwrap();
     let rows: Vec<&str> = table.lines().filter(|line| line.starts_with("| ")).skip(1).collect();
     assert_eq!(rows.len(), 4, "behaviour cloning and three rules:\n{table}");
-    for part in ["Of one training of each rule;", "Intervals of 95 % are for other lots;"] {
+    let thresholds = "EnsembleDAgger has the thresholds of the settings";
+    for part in ["Of one training of each rule;", thresholds, "Intervals of 95 % are for other lots;"] {
         assert!(table.contains(part), "{part} is missing in {table}");
     }
     assert!(rows[1].starts_with("| expert only") && rows[1].contains("100.0 %"), "{table}");
-    assert!(rows[2].starts_with("| EnsembleDAgger") && rows[2].contains("| 400 "), "{table}");
+    let cells = |row: &str| row.split('|').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>();
+    // Two members, as the settings say; a network is what they train three of otherwise.
+    assert_eq!(cells(rows[2])[1..4], ["EnsembleDAgger", "400", "2"], "{table}");
+    assert_eq!(cells(rows[1])[6], "–", "nobody had the wheel but the expert: {table}");
     assert!(std::fs::read_to_string(out.join("rules.csv")).unwrap().contains("LazyDAgger"));
     assert!(std::fs::read_to_string(out.join("rules.svg")).unwrap().contains("expert is asked"));
     assert_same_from_shards("rules", &out, &run, &arguments);
@@ -450,6 +455,7 @@ fn rules_of_the_family_end_in_one_table_of_effort_and_safety() {
     for (arguments, part) in [
         (["--rule", "anybody"], "there are expert_only"),
         (["--rule", "vanilla,vanilla"], "named twice"),
+        (["--rule=vanilla", "--set=dagger.rule.safe_dagger.tau=0.02"], "thresholds of safe_dagger, which is not among"),
         (["--samples", "2000000000"], "out of range"),
         (["--unseen", "train:2"], "trained or tuned on it"),
     ] {

@@ -55,6 +55,22 @@ pub fn title(rule: &str) -> &str {
     all().into_iter().find(|(name, _)| *name == rule).map_or(rule, |(_, title)| title)
 }
 
+/// The rule of a name, with its own thresholds; with those of the settings if that is the rule which they name.
+pub fn rule_of(settings: &Settings, name: &str) -> Option<DecisionRule> {
+    let of_settings = settings.dagger.rule;
+    let rule = DecisionRule::named(name)?;
+    Some(if rule.is_like(&of_settings) { of_settings } else { rule })
+}
+
+/// The rule of the settings, where it has thresholds that are not its own.
+pub fn with_other_thresholds(settings: &Settings) -> Option<&'static str> {
+    let (name, _) = all().into_iter().find(|(name, _)| {
+        DecisionRule::named(name)
+            .is_some_and(|rule| rule.is_like(&settings.dagger.rule) && rule != settings.dagger.rule)
+    })?;
+    Some(name)
+}
+
 /// Folder of a training.
 pub fn folder(rule: &str, seed: RootSeed) -> String {
     format!("s{}-{rule}", seed.0)
@@ -104,11 +120,12 @@ pub fn stages(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     stages
 }
 
-/// The settings of a training: all rules make as many iterations and learn from as many samples.
+/// The settings of a training: rules make as many iterations and learn from as many samples.
 fn of_rule(settings: &Settings, extent: &Extent, rule: &str, seed: RootSeed) -> Settings {
+    let rule = rule_of(settings, rule);
     let mut settings = Settings { seed, ..settings.clone() };
     let dagger = &mut settings.dagger;
-    dagger.rule = DecisionRule::named(rule).unwrap_or(dagger.rule);
+    dagger.rule = rule.unwrap_or(dagger.rule);
     (dagger.iterations_min, dagger.iterations_max) = (extent.iterations, extent.iterations);
     dagger.samples_per_round = extent.samples;
     settings
@@ -117,6 +134,7 @@ fn of_rule(settings: &Settings, extent: &Extent, rule: &str, seed: RootSeed) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use policy::decision_rule::SafeDaggerSettings;
 
     #[test]
     fn trainings_differ_in_rule_and_seed_alone_and_all_are_driven() {
@@ -136,6 +154,22 @@ mod tests {
         let Step::Drive { drivers } = &stages[4].step else { panic!("the last stage drives") };
         assert_eq!(drivers[0], ("behaviour cloning (seed 1)".to_owned(), "run:R/s1-expert_only/bc".to_owned()));
         assert_eq!(drivers[5], ("EnsembleDAgger (seed 2)".to_owned(), "run:R/s2-ensemble_dagger".to_owned()));
+    }
+
+    /// `--set dagger.rule.safe_dagger.tau=0.02` changed nothing.
+    #[test]
+    fn a_rule_that_the_settings_name_has_their_thresholds_and_others_have_their_own() {
+        let thresholds = SafeDaggerSettings { tau: 0.02 };
+        let mut settings = Settings::preset("default").unwrap();
+        assert_eq!(with_other_thresholds(&settings), None);
+        settings.dagger.rule = DecisionRule::SafeDagger(thresholds);
+        assert_ne!(thresholds, SafeDaggerSettings::default());
+        assert_eq!(with_other_thresholds(&settings), Some("safe_dagger"));
+        let rules = ["all_below", "safe_dagger"].map(str::to_owned).to_vec();
+        let extent = Extent { rules, seeds: 1, iterations: 1, samples: 500, unseen: Vec::new() };
+        let trained = stages(&settings, &extent, Path::new("R"));
+        let rules: Vec<DecisionRule> = trained[..2].iter().map(|stage| stage.settings.dagger.rule).collect();
+        assert_eq!(rules, [DecisionRule::paper(), DecisionRule::SafeDagger(thresholds)]);
     }
 
     #[test]

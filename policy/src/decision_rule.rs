@@ -126,6 +126,11 @@ impl DecisionRule {
         string_or_table(by_name).ok()
     }
 
+    /// Whether another is the same rule, whatever its thresholds are.
+    pub fn is_like(&self, other: &Self) -> bool {
+        std::mem::discriminant(self) == std::mem::discriminant(other)
+    }
+
     /// Networks trained per round: those that drive together, and a critic.
     pub fn networks(&self) -> usize {
         self.members() + usize::from(self.critic().is_some())

@@ -15,7 +15,6 @@ use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
 use policy::dagger::Keep;
 use policy::dataset::Collection;
-use policy::decision_rule::DecisionRule;
 use serde::Serialize;
 use std::path::Path;
 
@@ -82,6 +81,8 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
         let mut row = Row { rule: rule.map_or(rules::CLONED, rules::title).to_owned(), ..Row::default() };
         row.seed = Some(seed.0);
         let first = extent.rules.first().context("there is a rule")?;
+        // Behaviour cloning is a single network, whatever it is done for.
+        row.networks = rule.and_then(|rule| rules::rule_of(settings, rule)).map_or(1, |rule| rule.networks());
         add_rounds(&mut row, &run.path().join(rules::folder(rule.unwrap_or(first), seed)), rule, extent)?;
         let totals = results.totals(0, driver, &everywhere, None);
         (row.route_m, row.near_collisions, row.contacts) =
@@ -140,7 +141,6 @@ impl Row {
 /// Adds what collecting gave and cost. Behaviour cloning (`rule` = `None`) is round 0, a rule's are the rounds after it.
 fn add_rounds(row: &mut Row, folder: &Path, rule: Option<&str>, extent: &Extent) -> anyhow::Result<()> {
     let last = if rule.is_some() { extent.iterations } else { 0 };
-    row.networks = rule.and_then(DecisionRule::named).map_or(1, |rule| rule.networks());
     for round in 0..=last {
         let folder = folder.join(format!("round-{round:02}"));
         let collection = Collection::read(&folder)?.with_context(|| format!("{}: no round.toml", folder.display()))?;
@@ -200,9 +200,12 @@ fn legend(settings: &Settings, extent: &Extent) -> String {
         }
         Keep::ExpertTicks => "",
     };
+    let thresholds = rules::with_other_thresholds(settings).map_or_else(String::new, |rule| {
+        format!(" {} has the thresholds of the settings (`dagger.rule`), every other rule its own.", rules::title(rule))
+    });
     format!(
-        "Of {trainings}; behaviour cloning has the samples of the first round alone. EnsembleDAgger and ThriftyDAgger train three \
-         networks and drive with their mean.{learned} Intervals of 95 % are for \
+        "Of {trainings}; behaviour cloning has the samples of the first round alone. EnsembleDAgger and ThriftyDAgger train \
+         several networks and drive with their mean.{thresholds}{learned} Intervals of 95 % are for \
          {of_seeds}; a difference that excludes zero (*) is one of several comparisons, and no adjustment is made for their \
          number."
     )

@@ -26,7 +26,8 @@ pub(crate) struct RulesArgs {
         conflicts_with = "resume"
     )]
     seeds: u64,
-    /// Rules by the name of their setting (dagger.rule); all of them if none is named.
+    /// Rules by the name of their setting (dagger.rule); all of them if none is named. The rule that the settings name has
+    /// their thresholds, every other its own.
     #[arg(long, value_name = "NAME", num_args = 1.., value_delimiter = ',', conflicts_with = "resume")]
     rule: Vec<String>,
     /// Iterations of every training, after behaviour cloning.
@@ -84,6 +85,13 @@ fn begin(args: &RulesArgs) -> anyhow::Result<Begun<Extent>> {
         ensure!(known.contains(rule), "--rule {rule}: no rule has this name; there are {}", known.join(", "));
     }
     ensure_distinct("--rule", &named)?;
+    if let Some(rule) = rules::with_other_thresholds(&settings) {
+        ensure!(
+            named.iter().any(|name| name == rule),
+            "dagger.rule: has thresholds of {rule}, which is not among the rules that are compared; name it with --rule, or leave \
+             the thresholds out"
+        );
+    }
     let RulesArgs { seeds, iterations, samples, .. } = *args;
     let extent = Extent { rules: named, seeds, iterations, samples, unseen: args.unseen.clone() };
     ensure!(
