@@ -290,6 +290,7 @@ fn what_cannot_be_reproduced_is_refused_before_anything_is_written() {
         (vec!["--tuned", "no/such/folder"], "no/such/folder"),
         (vec!["--preset", "papier"], "papier"),
         (vec!["--set", "dagger.etta=0.8"], "etta"),
+        (vec!["--set", "dagger.rule=safe_dagger"], "by the paper's rule, all_below"),
     ] {
         let output = xtask().args(["reproduce", "--out", &out]).args(&arguments).output().unwrap();
         let (stdout, stderr) = text(&output);

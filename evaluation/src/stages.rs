@@ -22,6 +22,7 @@
 
 use crate::estimate::{self, Task};
 use crate::names::{ALPHA_15, BC, DAGGER, EXPERT_EQUAL, EXPERT_ONLY, UNWEIGHTED};
+use anyhow::ensure;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::settings::{Settings, Smoothing, has_points_of_paper, with_points_of_paper};
 use experiment::shard::Shard;
@@ -230,6 +231,19 @@ pub const ON_POLICY: &str = "on-policy";
 
 /// Action smoothing of [`SMOOTHED`] where the settings' networks have none, control ticks.
 const SMOOTHING_TICKS: f32 = 8.0;
+
+/// Refuses settings that the report would name wrong.
+///
+/// # Errors
+/// If the decision rule is another than the one that its readings are compared with.
+pub fn check(settings: &Settings) -> anyhow::Result<()> {
+    ensure!(
+        settings.dagger.rule.is_like(&DecisionRule::paper()),
+        "dagger.rule: a reproduction trains by the paper's rule, all_below, and compares its other readings with it; leave the rule \
+         out (thresholds may be set, as in dagger.rule.all_below.tau=0.05), or compare rules with cargo xtask rules"
+    );
+    Ok(())
+}
 
 /// Everything, in the order in which it is done. `root`: the folder of the whole run.
 pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
@@ -535,6 +549,17 @@ mod tests {
                 assert!(folders.iter().any(|folder| spec.contains(folder)), "{loss:?}: {spec}");
             }
         }
+    }
+
+    /// It was called "all below".
+    #[test]
+    fn another_decision_rule_than_the_papers_is_refused_and_other_thresholds_are_not() {
+        let mut settings = Settings::preset("default").unwrap();
+        settings.dagger.rule = DecisionRule::AllBelow { tau: 0.05, chi: 0.2, chi_on: ChiOn::StdNorm };
+        check(&settings).unwrap();
+        settings.dagger.rule = DecisionRule::named("safe_dagger").unwrap();
+        let error = check(&settings).unwrap_err().to_string();
+        assert!(error.contains("dagger.rule") && error.contains("cargo xtask rules"), "{error}");
     }
 
     /// `render results` of a run that an earlier version finished said that one of its chains is not a run.

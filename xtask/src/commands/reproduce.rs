@@ -144,6 +144,7 @@ impl Arguments {
 fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Settings, Arguments)> {
     let layers = Layers::from(&args.layers);
     let mut settings = Settings::resolve(&layers, args.seed)?;
+    stages::check(&settings)?;
     let is_smoke = layers.preset_name() == "smoke";
     if args.full {
         settings.evaluation.trials *= 2;
