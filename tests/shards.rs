@@ -191,23 +191,38 @@ fn trainings_of_a_method_are_judged_together_wherever_they_drove() {
     }
     assert!(merged(["1", "2"], &[]) == (printed.clone(), whole.clone()), "shards");
     // A machine whose products round twice drove networks otherwise, and its shard was merged.
-    let [first, second] = ["1", "2"].map(|shard| PathBuf::from(out(shard)));
-    let rounds_otherwise = folder.join("rounds-otherwise");
-    copy(&second, &rounds_otherwise);
-    forge(&rounds_otherwise, "manifest.toml", |text| {
-        if text.contains("\"fma\"") {
-            text.replacen("\"fma\"", "\"none\"", 1)
-        } else {
-            text.replacen("processor_features = [", "processor_features = [\"avx2\", \"fma\", ", 1)
-        }
-    });
-    refused(&[&first, &rounds_otherwise], "use of AVX2 and FMA");
+    let rounding_otherwise = |name: &str| {
+        let run = folder.join(format!("{name}-rounds-otherwise"));
+        copy(&folder.join(name), &run);
+        forge(&run, "manifest.toml", |text| {
+            if text.contains("\"fma\"") {
+                text.replacen("\"fma\"", "\"none\"", 1)
+            } else {
+                text.replacen("processor_features = [", "processor_features = [\"avx2\", \"fma\", ", 1)
+            }
+        });
+        run
+    };
+    refused(&[&folder.join("1"), &rounding_otherwise("2")], "use of AVX2 and FMA");
     evaluate(&all[..2], &[], "two");
     evaluate(&all[2..], &[], "others");
     assert!(merged(["two", "others"], &["--method", &method]) == (printed.clone(), whole.clone()), "evaluations");
+    // So was its evaluation with those of other networks.
+    refused(&[&folder.join("two"), &rounding_otherwise("others")], "use of AVX2 and FMA");
     evaluate(&all[..3], &["--method", &method], "three");
     evaluate(&all[3..], &[], "vvf");
     assert!(merged(["three", "vvf"], &[]) == (printed, whole), "what was named before holds");
+    // A planner drives alike on both, and what comes out is of the machine of the networks, whoever is named first.
+    let planner = rounding_otherwise("vvf");
+    let mixed = folder.join("mixed");
+    succeed(xtask().arg("merge").arg(&planner).arg(folder.join("three")).arg("--out").arg(&mixed));
+    let features = |run: &Path| {
+        let manifest = std::fs::read_to_string(run.join("manifest.toml")).unwrap();
+        let manifest = manifest.parse::<toml::Table>().unwrap();
+        manifest.get("processor_features").cloned()
+    };
+    assert_eq!(features(&mixed), features(&folder.join("three")));
+    assert_ne!(features(&mixed), features(&planner));
     let refused = xtask().arg("merge").args(["1", "2"].map(out)).args(["--method", &method]).output().unwrap();
     assert!(text(&refused).1.contains("--method: shards are judged as they were driven"), "{}", text(&refused).1);
     let copy_of_first = out("copy/round-00");

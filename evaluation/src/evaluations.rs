@@ -52,6 +52,11 @@ impl EvaluationRun {
         Ok(Self { folder: folder.to_owned(), settings: trained::settings_of(folder)?, manifest, drivers, methods })
     }
 
+    /// Whether a network drove: only then does it matter how the machine rounds.
+    fn has_networks(&self) -> bool {
+        self.drivers.iter().any(DriverSpec::is_network)
+    }
+
     /// Refuses what was driven differently.
     fn check_is_comparable_with(&self, first: &Self) -> anyhow::Result<()> {
         let (own, others) = (&self.settings, &first.settings);
@@ -59,10 +64,12 @@ impl EvaluationRun {
             |run: &Self| run.drivers.iter().any(|it| matches!(it, DriverSpec::Expert | DriverSpec::GridExpert));
         let has_onnx = |run: &Self| run.drivers.iter().any(|driver| matches!(driver, DriverSpec::Onnx { .. }));
         let any = |has: &dyn Fn(&Self) -> bool| has(self) || has(first);
+        let both_have_networks = self.has_networks() && first.has_networks();
         let trials = |of: &Settings| EvaluationSettings { elsewhere: Vec::new(), ..of.evaluation.clone() };
         let differs = [
             ("version of lotpilot", !self.manifest.is_of_version_of(&first.manifest)),
             ("architecture or system", self.manifest.target != first.manifest.target),
+            ("use of AVX2 and FMA", both_have_networks && !self.manifest.rounds_like(&first.manifest)),
             ("choice of lots, trials, noise or smoothing ([evaluation])", trials(own) != trials(others)),
             ("car, sensor or metrics ([episode])", own.episode != others.episode),
             ("expert ([expert])", any(&has_expert) && own.expert != others.expert),
@@ -122,9 +129,16 @@ impl Evaluations {
         &self.leading().settings
     }
 
-    /// The manifest of the same, and so the version that drove all of them.
-    pub fn manifest(&self) -> &Manifest {
-        &self.leading().manifest
+    /// What the settings of the same started from.
+    pub fn preset(&self) -> &str {
+        &self.leading().manifest.preset
+    }
+
+    /// What made them: the version that drove all of them, and the machine, that of the networks if there are any. How it
+    /// rounds is what others that are merged later are held against.
+    pub fn made_by(&self) -> &Manifest {
+        let of_networks = self.runs.iter().find(|run| run.has_networks());
+        &of_networks.unwrap_or_else(|| self.leading()).manifest
     }
 
     /// The drivers of all, those of the first folder first.

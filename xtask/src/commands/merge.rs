@@ -113,7 +113,7 @@ fn evaluation(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Res
 fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, specs) = (evaluations.settings(), evaluations.drivers());
     let named: Vec<String> = specs.iter().map(DriverSpec::to_string).collect();
-    check_target(args, evaluations.manifest())?;
+    check_target(args, evaluations.made_by())?;
     let compare_with = evaluate::compare_with(args.compare_with.as_deref(), &specs)?;
     let mut drivers = NamedDriver::load_all(&named, settings)?;
     let methods = args.methods.or(evaluations.methods(), &mut drivers)?;
@@ -126,9 +126,8 @@ fn evaluations(evaluations: &Evaluations, args: &MergeArgs, output: &Output) -> 
     let asked = Asked { drivers: named, compare_with, methods, shard: None };
     let reads = args.with_folders(inputs::places(&lots, &drivers));
     let request = Request { arguments: toml::Table::try_from(&asked)?, inputs, reads };
-    let made = evaluations.manifest();
-    let build = made_by(made);
-    let place = args.out.place(evaluate::COMMAND, &made.preset, settings.evaluation.seed.0);
+    let build = made_by(evaluations.made_by());
+    let place = args.out.place(evaluate::COMMAND, evaluations.preset(), settings.evaluation.seed.0);
     let run = RunDir::create(&Place { build: &build, ..place }, settings, &request)?;
     put_together(&plan, &rows, &run, args, output)
 }
