@@ -36,7 +36,11 @@ pub fn training(settings: &Settings, has_cloning: bool) -> Vec<Task> {
     };
     let rounds = u32::from(!has_cloning)..=dagger.iterations_max;
     let mut tasks: Vec<Task> = rounds
-        .flat_map(|round| [("collecting", collecting_s), ("training", fitting_s(&dagger.fit_of_round(round)))])
+        .flat_map(|round| {
+            // Members of an ensemble and a critic are part of the same task.
+            let training_s = dagger.fits_of_round(round).iter().map(fitting_s).sum();
+            [("collecting", collecting_s), ("training", training_s)]
+        })
         .collect();
     tasks.extend(dagger.final_fit().map(|fit| ("training", fitting_s(&fit))));
     tasks
@@ -78,4 +82,39 @@ fn multiply_adds(network: &NetworkArchitecture) -> f64 {
         * (12 * 12 * residual1 * conv1.channels.pow(2) + 6 * 6 * residual2 * conv2.channels.pow(2));
     let dense = 6 * 6 * conv2.channels * hidden;
     (first + second + residual + dense) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use policy::decision_rule::DecisionRule;
+    use policy::fit::Budget;
+
+    /// The networks of an ensemble were taken for one, and a critic for none.
+    #[test]
+    fn a_round_takes_as_long_as_all_of_its_networks() {
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.dagger.final_budget = Budget::Steps(0);
+        let mut training_s = |rule: &str| -> Vec<f64> {
+            settings.dagger.rule = DecisionRule::named(rule).unwrap();
+            let tasks = training(&settings, true);
+            tasks.into_iter().filter(|(stage, _)| *stage == "training").map(|(_, seconds)| seconds).collect()
+        };
+        let alone = training_s("all_below");
+        assert!(alone.len() > 1 && alone.iter().all(|&seconds| seconds > 0.0), "{alone:?}");
+        // Three members; a critic, trained for a quarter of the time; both.
+        for (rule, times) in [
+            ("vanilla", 1.0),
+            ("ensemble_dagger", 3.0),
+            ("safe_dagger", 1.25),
+            ("lazy_dagger", 1.25),
+            ("thrifty_dagger", 3.25),
+        ] {
+            let found = training_s(rule);
+            assert_eq!(found.len(), alone.len(), "a task for each round, as they are begun");
+            for (seconds, alone) in found.iter().zip(&alone) {
+                assert!((seconds / alone - times).abs() < 0.01, "{rule}: {seconds} s, {alone} s without");
+            }
+        }
+    }
 }

@@ -190,7 +190,7 @@ impl<'a> Monitor<'a> {
                 let eta = if round > 0 { network() } else { String::new() };
                 self.end(&format!("{} samples, {dataset} in all{eta}", collection.samples));
             }
-            DaggerProgress::Fitting { round, fit } => self.fitting(round, fit),
+            DaggerProgress::Fitting { round, share, fit } => self.fitting(round, share, fit),
             DaggerProgress::Finished { row, .. } => {
                 let error_m = row.validation_rmse_m.map_or_else(String::new, |error| format!("{error:.3} m off"));
                 self.end(&format!("validation {error_m}"));
@@ -198,7 +198,7 @@ impl<'a> Monitor<'a> {
         }
     }
 
-    fn fitting(&mut self, round: Option<u32>, fit: &FitProgress) {
+    fn fitting(&mut self, round: Option<u32>, share: f64, fit: &FitProgress) {
         if self.task.is_none() {
             let label = round.map_or_else(|| "final training".to_owned(), |round| format!("round {round}: training"));
             self.begin(Task::Fitting, &label);
@@ -207,7 +207,7 @@ impl<'a> Monitor<'a> {
         // A critic or a member of an ensemble begins anew.
         self.samples_before = self.samples_before.min(fit.samples_done);
         let samples_before = self.samples_before;
-        self.progress.at(f64::from(fit.step) / f64::from(fit.steps), &mut |Elapsed { seconds }| {
+        self.progress.at(share, &mut |Elapsed { seconds }| {
             let per_s = (fit.samples_done - samples_before) as f64 / seconds;
             let validation = fit.validation.map_or_else(String::new, |at| format!(", validation {:.3} m", at.rmse_m));
             let (loss, learning_rate) = (fit.loss.total, fit.learning_rate);

@@ -219,7 +219,11 @@ impl Run<'_, '_> {
         files::create_folder(folder)?;
         let seed = self.seed.child(Stream::Shuffle, index_of(round, part));
         let progress = &mut *self.hooks.progress;
-        let mut on_step = |fit: &FitProgress| progress(&Progress::Fitting { round, fit });
+        let [from, to] = self.settings.part_of_round(round, part, d.len());
+        let mut on_step = |fit: &FitProgress| {
+            let share = from + (to - from) * f64::from(fit.step) / f64::from(fit.steps);
+            progress(&Progress::Fitting { round, share, fit })
+        };
         let DaggerSettings { inference, device, .. } = *self.settings;
         let context = FitContext { geometry: self.conditions.geometry(), inference, device, seed };
         let FitOutcome { weights, report, steps } =
@@ -252,6 +256,19 @@ impl Run<'_, '_> {
             ControlFlow::Continue(()) => Ok(()),
             ControlFlow::Break(()) => Err(Halt::Interrupted(policy.cloned())),
         }
+    }
+}
+
+impl DaggerSettings {
+    /// The shares of the steps of a round, 0…1, at which the training of a part begins and ends.
+    fn part_of_round(&self, round: Option<u32>, part: usize, samples: usize) -> [f64; 2] {
+        // The final training is of one network.
+        let Some(round) = round else { return [0.0, 1.0] };
+        let steps: Vec<f64> = self.fits_of_round(round).iter().map(|fit| f64::from(fit.steps(samples))).collect();
+        // A critic, whose number is beyond all members, is the last.
+        let index = part.min(steps.len() - 1);
+        let share = |steps_done: &[f64]| steps_done.iter().sum::<f64>() / steps.iter().sum::<f64>();
+        [share(&steps[..index]), share(&steps[..=index])]
     }
 }
 

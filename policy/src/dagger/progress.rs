@@ -48,6 +48,9 @@ pub enum Progress<'a> {
     Fitting {
         /// The round whose data were added last; `None` = the final training.
         round: Option<u32>,
+        /// How much of the training of all networks of the round is done, 0…1, by steps: members of an ensemble and a critic
+        /// come after the first one.
+        share: f64,
         /// The step.
         fit: &'a FitProgress,
     },

@@ -1,5 +1,6 @@
 //! Settings of a run.
 
+use crate::dagger::critic;
 use crate::dagger::disturbance::DisturbanceSettings;
 use crate::dagger::gated_collector::Keep;
 use crate::decision_rule::DecisionRule;
@@ -106,6 +107,15 @@ impl DaggerSettings {
     /// How round `round` is trained: behaviour cloning is round 0.
     pub fn fit_of_round(&self, round: u32) -> FitSettings {
         if round == 0 { self.cloning_fit() } else { self.fit.clone() }
+    }
+
+    /// How every network of a round is trained: the one that drives alone or first, an ensemble's other members, then a critic.
+    pub fn fits_of_round(&self, round: u32) -> Vec<FitSettings> {
+        let fit = self.fit_of_round(round);
+        let critic = self.rule.critic().map(|_| critic::fit_settings(&fit));
+        let mut fits = vec![fit; self.rule.members()];
+        fits.extend(critic);
+        fits
     }
 
     /// How the last network is trained; `None` if the last iteration's is the result.

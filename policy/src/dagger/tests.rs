@@ -7,7 +7,7 @@ use crate::dataset::ValidationSplit;
 use crate::dataset::store::Store;
 use crate::decision_rule::DecisionRule;
 use crate::drivers::{NetFleet, NetPolicy};
-use crate::fit::{Budget, FitSettings};
+use crate::fit::{Budget, FitReport, FitSettings};
 use crate::network::{ConvLayer, InferenceSettings, NetworkArchitecture, Weights};
 use crate::test_data::scratch;
 use sim::batch::{NotFinite, run_lockstep};
@@ -18,8 +18,9 @@ use sim::geometry::Vec2;
 use sim::map::Map;
 use sim::scenario::{Direction, LotNoise, ReferencePath, Scenario};
 use sim::seed::{EpisodeIndex, RootSeed};
+use std::cmp::Reverse;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Drives to the point of the route ten metres ahead.
@@ -169,7 +170,7 @@ fn an_interrupted_run_continues_to_the_same_end() {
     let at_once = run_in(&whole, &settings(), &mut go_on).unwrap();
     // Interrupted in the middle of the training of round 1, after its collection.
     let mut interrupt = |progress: &Progress<'_>| match progress {
-        Progress::Fitting { round: Some(1), fit } if fit.step == 5 => ControlFlow::Break(()),
+        Progress::Fitting { round: Some(1), fit, .. } if fit.step == 5 => ControlFlow::Break(()),
         _ => ControlFlow::Continue(()),
     };
     let first = run_in(&parts, &settings(), &mut interrupt).unwrap();
@@ -331,7 +332,8 @@ fn ticks_say_where_and_when_samples_were_taken() {
     }
 }
 
-/// Whatever a rule needs besides the network is trained, written and read back; rounds are thinned to equal samples.
+/// Whatever a rule needs besides the network is trained, written and read back; rounds are thinned to equal samples. How long
+/// it takes was estimated, and reported, as if the network were all.
 #[test]
 fn every_rule_of_the_family_trains_and_its_round_is_driven_again_as_it_was() {
     for name in ["vanilla", "safe_dagger", "ensemble_dagger", "hg_dagger", "lazy_dagger", "thrifty_dagger"] {
@@ -339,7 +341,16 @@ fn every_rule_of_the_family_trains_and_its_round_is_driven_again_as_it_was() {
         let rule = DecisionRule::named(name).unwrap();
         let keep = Keep::EveryTick;
         let settings = DaggerSettings { rule, keep, iterations_max: 1, samples_per_round: 150, ..settings() };
-        let outcome = run_in(&folder, &settings, &mut go_on).unwrap();
+        let mut shares = Vec::new();
+        let mut watch = |progress: &Progress<'_>| {
+            if let Progress::Fitting { round: Some(1), share, .. } = progress {
+                shares.push(*share);
+            }
+            ControlFlow::Continue(())
+        };
+        let outcome = run_in(&folder, &settings, &mut watch).unwrap();
+        let is_done = shares.last().is_some_and(|last| (last - 1.0).abs() < 1e-9);
+        assert!(is_done && shares.is_sorted(), "{name}: {shares:?}");
         let store = Store::open(&folder).unwrap();
         let (stored, about) = store.read_round(1).unwrap();
         let in_episodes: usize = about.episodes.iter().map(|episode| episode.samples).sum();
@@ -348,9 +359,13 @@ fn every_rule_of_the_family_trains_and_its_round_is_driven_again_as_it_was() {
         assert_eq!(effort.expert_ticks, about.ticks - about.novice_ticks, "{name}");
         assert!(effort.interventions <= effort.expert_ticks && effort.queries <= about.ticks, "{name}: {effort:?}");
         assert!(about.agreement.unwrap().within_tau <= 1.0);
-        let parts = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name());
-        let parts = parts.filter(|part| part.to_string_lossy().starts_with("round-01-")).count();
-        assert_eq!(parts + 1, rule.networks(), "{name}");
+        let parts = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+        let is_of_round = |part: &PathBuf| part.file_name().unwrap().to_string_lossy().starts_with("round-01");
+        let mut trained: Vec<u32> =
+            parts.filter(is_of_round).map(|part| FitReport::read(&part).unwrap().unwrap().steps).collect();
+        trained.sort_unstable_by_key(|&steps| Reverse(steps));
+        let planned: Vec<u32> = settings.fits_of_round(1).iter().map(|fit| fit.steps(0)).collect();
+        assert_eq!((trained, planned.len()), (planned.clone(), rule.networks()), "{name}");
         let novice = Learned::of_round(&settings, &store, 1).unwrap();
         let again =
             Rollouts::of_round(&settings, RootSeed(6), Some(&novice), of_round(1, 2)).drive(&mut |_, _| {}).unwrap();
