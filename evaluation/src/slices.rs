@@ -9,7 +9,7 @@ pub struct LotGroup {
     pub name: String,
     /// Lots in it.
     pub lots: usize,
-    /// Whether drivers were trained on it.
+    /// Whether drivers were trained or tuned on it.
     pub is_trained_on: bool,
 }
 
@@ -25,7 +25,7 @@ impl LotGroup {
 pub enum SliceKind {
     /// One group.
     Group,
-    /// Several groups that no driver was trained on, and not all groups.
+    /// Several groups that no driver was trained or tuned on, and not all groups.
     Unseen,
     /// All groups, of several.
     All,
@@ -42,8 +42,8 @@ pub struct Slice {
 }
 
 impl Slice {
-    /// Every group by itself; then all groups that no driver was trained on, and all groups, unless a slice has them
-    /// already.
+    /// Every group by itself; then all groups that no driver was trained or tuned on, and all groups, unless a slice has
+    /// them already.
     pub fn all_of(groups: &[LotGroup]) -> Vec<Self> {
         let of = |kind: SliceKind, label: &str, wanted: &dyn Fn(usize) -> bool| Self {
             kind,

@@ -105,6 +105,7 @@ impl DriverSpec {
     /// If they are not what they should be.
     pub fn load(self, settings: &Settings) -> anyhow::Result<NamedDriver> {
         let name = self.to_string();
+        let mut tuned_on = Vec::new();
         let model = match &self {
             Self::Expert => Model::Expert(settings.expert.clone()),
             Self::GridExpert => Model::GridExpert(settings.expert.clone()),
@@ -117,7 +118,11 @@ impl DriverSpec {
                 let inference = network.about().map_or(settings.dagger.inference, |about| about.inference);
                 Model::Onnx(network, inference)
             }
-            Self::Planner { name, parameters } => Model::Planner(planner(name, parameters)?),
+            Self::Planner { name, parameters } => {
+                let (planner, lots) = planner(name, parameters)?;
+                tuned_on = lots;
+                Model::Planner(planner)
+            }
             Self::Callback { .. } => bail!("driver {name:?} is a function of another program"),
         };
         let training = match &self {
@@ -129,11 +134,12 @@ impl DriverSpec {
             },
             _ => None,
         };
-        let trained_on = match self.trained_on() {
+        let mut trained_on = match self.trained_on() {
             Ok(lots) => lots,
             Err(error) if storage::is_of_disk(error.as_ref()) => return Err(error),
             Err(_) => TrainedOn::default(),
         };
+        trained_on.lots.extend(tuned_on);
         let driver = NamedDriver { training, trained_on, ..NamedDriver::new(name, self, model) };
         Ok(driver.smoothed(settings.evaluation.smoothing))
     }
@@ -168,7 +174,7 @@ pub struct NamedDriver {
     pub spec: DriverSpec,
     /// The training of a whole run that it comes from; `None` for any other driver.
     pub training: Option<Training>,
-    /// The lots that its networks were trained on; none where nobody knows.
+    /// The lots that its networks were trained on, or its parameters tuned; none where nobody knows.
     pub trained_on: TrainedOn,
     /// The method that it is a training of, where whoever asks says so; otherwise what [`Self::training`] has in common with
     /// others counts.

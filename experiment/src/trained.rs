@@ -20,10 +20,10 @@ pub struct Training {
     pub seed: RootSeed,
 }
 
-/// Lots that networks were trained on.
+/// Lots that networks were trained on, or that parameters of a planner were tuned on: no driver is new to them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct TrainedOn {
-    /// As in the settings of their trainings.
+    /// As in the settings of their trainings, or in the file of the parameters.
     pub lots: BTreeSet<String>,
     /// SHA-256 of those from files: they are known by it wherever they lie now.
     pub digests: BTreeSet<String>,

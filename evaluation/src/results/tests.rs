@@ -61,6 +61,24 @@ fn what_any_driver_was_trained_on_is_not_unseen() {
     assert_eq!(unseen.collect::<Vec<_>>(), ["lot-c"]);
 }
 
+/// So were the lots on which the parameters of a planner were searched for.
+#[test]
+fn what_a_planner_was_tuned_on_is_not_unseen() {
+    let mut settings = Settings::preset("default").unwrap();
+    settings.training.lots = vec!["lot-b".to_owned()];
+    let lots = Lot::parse_all(&["reference", "train:1:lane", "test:1:lane"], &settings.episode.vehicle).unwrap();
+    let unseen_with = |driver: &str| {
+        let named = NamedDriver::load_all(&[driver], &settings).unwrap();
+        let plan = Plan { settings: &settings, drivers: &named, lots: &lots, compare_with: 0, shard: None };
+        let results = EvaluationResults::new(&plan);
+        let unseen = results.groups().iter().filter(|group| !group.is_trained_on);
+        unseen.map(|group| group.name.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(unseen_with("tentacle"), ["lot-a", "lot-c", "train-lane", "test-lane"]);
+    assert_eq!(unseen_with("tuned:tentacle"), ["lot-c", "test-lane"]);
+    assert_eq!(unseen_with("tentacle:../planners/tuned/corridors/tentacle.toml"), ["lot-c", "train-lane", "test-lane"]);
+}
+
 #[test]
 fn pooled_and_unweighted_means_differ_where_lots_differ_in_length() {
     // 2 events in every run of lot a over 200 m, 1 in every run of lot b over 50 m: 1 and 2 per 100 m.

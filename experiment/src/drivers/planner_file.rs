@@ -43,7 +43,7 @@ pub struct PlannerFile {
     pub planner: String,
     /// All of its parameters.
     pub parameters: toml::Table,
-    /// How they were found; not read.
+    /// How they were found; of it, only the `lots` are read.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub search: Option<toml::Table>,
 }
@@ -74,14 +74,14 @@ fn published(name: &str) -> anyhow::Result<PlannerSpec> {
     })
 }
 
-/// The planner of a name and reading, with these parameters.
+/// The planner of a name and reading, with these parameters, and the lots on which they were found: none where nobody says.
 ///
 /// # Errors
 /// If nothing is named so, or the parameters are not its own.
-pub(super) fn planner(name: &str, parameters: &Parameters) -> anyhow::Result<PlannerSpec> {
+pub(super) fn planner(name: &str, parameters: &Parameters) -> anyhow::Result<(PlannerSpec, Vec<String>)> {
     let planner = published(name)?;
     match parameters {
-        Parameters::Published => Ok(planner),
+        Parameters::Published => Ok((planner, Vec::new())),
         Parameters::Tuned => {
             let text = TUNED.iter().find(|(of, _)| *of == name).map(|(_, text)| *text);
             let text = text.with_context(|| format!("no tuned parameters ship for {name:?}"))?;
@@ -97,14 +97,17 @@ pub(super) fn planner(name: &str, parameters: &Parameters) -> anyhow::Result<Pla
     }
 }
 
-/// A planner with the parameters in the text of a [`PlannerFile`].
-fn with_parameters(planner: &PlannerSpec, text: &str) -> anyhow::Result<PlannerSpec> {
+/// A planner with the parameters in the text of a [`PlannerFile`], and the lots on which they were found.
+fn with_parameters(planner: &PlannerSpec, text: &str) -> anyhow::Result<(PlannerSpec, Vec<String>)> {
     let file: PlannerFile = toml::from_str(text)?;
     let name = planner.name();
     ensure!(file.planner == name, "these are parameters of {:?}, but {name:?} is asked for", file.planner);
     let changed = planner.with_parameters(file.parameters).context("parameters")?;
     changed.check().map_err(anyhow::Error::msg).context("parameters")?;
-    Ok(changed)
+    // Whoever writes such a file by hand may note there what he likes.
+    let lots = file.search.as_ref().and_then(|search| search.get("lots")?.as_array());
+    let lots = lots.into_iter().flatten().filter_map(|lot| lot.as_str().map(str::to_owned));
+    Ok((changed, lots.collect()))
 }
 
 #[cfg(test)]
@@ -114,7 +117,22 @@ mod tests {
     #[test]
     fn parameters_that_ship_fit_their_planners() {
         for (name, _) in TUNED {
-            planner(name, &Parameters::Tuned).unwrap();
+            let (_, lots) = planner(name, &Parameters::Tuned).unwrap();
+            assert_eq!(lots, ["lot-a", "train:24:all"], "{name}");
+        }
+    }
+
+    #[test]
+    fn what_is_noted_of_a_search_by_hand_is_no_error() {
+        let apf = PlannerSpec::named("apf").unwrap();
+        let text = PlannerFile::text_of("apf").unwrap();
+        for (search, expected) in [
+            ("", vec![]),
+            ("[search]\nby = \"eye\"", vec![]),
+            ("[search]\nlots = 7", vec![]),
+            ("[search]\nlots = [\"lot-b\", 3]", vec!["lot-b"]),
+        ] {
+            assert_eq!(with_parameters(&apf, &format!("{text}\n{search}\n")).unwrap().1, expected, "{search}");
         }
     }
 }
