@@ -63,11 +63,11 @@ impl LossSettings {
 
     /// Whether another trains the same networks: what it does not use may differ.
     pub fn is_like(&self, other: &Self) -> bool {
-        self.as_used() == other.as_used()
+        self.in_effect() == other.in_effect()
     }
 
     /// The same, as all are written that have its effect.
-    fn as_used(self) -> Self {
+    fn in_effect(self) -> Self {
         match self.weight {
             WeightForm::Linear { gain } if gain == 0.0 => self.with_alpha(0.0),
             WeightForm::Linear { .. } => Self { alpha: 0.0, ..self },
