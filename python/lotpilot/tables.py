@@ -168,7 +168,7 @@ class Request:
 
 
 def _read(folder: Path) -> Evaluation:
-    tables = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    tables = json.loads(_native.read_finished(folder / "summary.json"))
     return Evaluation(
         summary=_table(tables["rows"]),
         comparisons=_table(tables["comparisons"]),
@@ -262,7 +262,8 @@ def _function(name: str, driver: Any) -> Callable[..., Floats]:
 
 
 def _lines(path: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    # Not splitlines(), which also parts at characters that JSON does not escape, such as U+2028 in a name.
+    return [json.loads(line) for line in _native.read_finished(path).split("\n") if line]
 
 
 def _flat(run: dict[str, Any]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 use crate::callback::{Failure, Function, Watch};
 use crate::course::{SettingsFrom, directions, noise};
-use crate::guard::{detached, input, warn};
+use crate::guard::{alone, detached, input, warn};
 use anyhow::{Context as _, bail, ensure};
 use evaluation::plan::Plan;
 use evaluation::shards::{ShardRecord, Shards};
@@ -18,9 +18,11 @@ use experiment::settings::{Layers, Settings};
 use experiment::shard::Shard;
 use pyo3::prelude::*;
 use serde::Serialize;
+use sim::limits::RUN_LINES_BYTES_MAX;
 use sim::seed::RootSeed;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use storage::sums;
 
 /// Which trials; what is `None` is as in the settings.
 #[derive(Debug, FromPyObject)]
@@ -100,6 +102,12 @@ pub(crate) fn merge(
     };
     let done = detached(py, || work().map_err(input));
     failure.take().map_or(done, Err)
+}
+
+/// The text of a finished file of a run, held against its digest.
+#[pyfunction]
+pub(crate) fn read_finished(py: Python<'_>, file: PathBuf) -> PyResult<String> {
+    alone(py, || sums::read_to_string(&file, RUN_LINES_BYTES_MAX).map_err(input))
 }
 
 /// What is to be driven, loaded.

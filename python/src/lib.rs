@@ -8,7 +8,7 @@
 //! | [`arrays`] | numpy arrays as what cars write into |
 //! | [`reward`] | the terms of the reward and their weights |
 //! | [`lot`] | a lot with the obstacles of a trial, for looking at |
-//! | [`evaluate`], [`callback`] | evaluations, with functions in Python as drivers |
+//! | [`evaluate`], [`callback`] | evaluations, with functions in Python as drivers, and their files |
 //! | [`data`] | rounds of training data |
 //! | [`rate`] | how fast the same episodes are in Rust alone |
 //! | [`digest`] | SHA-256 of a drive |
@@ -40,7 +40,7 @@ mod _native {
     #[pymodule_export]
     use crate::data::read_round;
     #[pymodule_export]
-    use crate::evaluate::{evaluate, merge};
+    use crate::evaluate::{evaluate, merge, read_finished};
     #[pymodule_export]
     use crate::guard::EpisodeEnded;
     #[pymodule_export]

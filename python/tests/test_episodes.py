@@ -15,7 +15,7 @@ import tomllib
 import lotpilot
 from lotpilot import _native
 from lotpilot.core import Core, EnvOptions, settings_from
-from lotpilot.tables import Request
+from lotpilot.tables import Request, _read
 
 ROOT = Path(__file__).resolve().parents[2]
 SHORT = ("episode.metrics.timeout_s=4.0",)
@@ -274,6 +274,20 @@ def test_the_reward_is_the_sum_of_its_terms():
     near, infos = total(clearance=1.0)
     assert steered < 0
     assert near == pytest.approx(-sum(max(0.0, 0.5 - info["clearance_m"]) for info in infos), rel=1e-5)
+
+
+def test_tables_are_read_from_files_that_are_whole(tmp_path):
+    folder = tmp_path / "run"
+    # A separator of lines within a name, which JSON need not escape.
+    where = {"trials": 1, "directions": "forward", "overrides": SHORT}
+    whole = lotpilot.evaluate({"the\u2028expert": "expert"}, "lot-b", out=folder, **where)
+    assert whole.runs["driver"] == ["the\u2028expert"] and _read(folder) == whole
+    for name in ("runs.jsonl", "failures.jsonl", "summary.json", "sha256sums"):
+        content = (folder / name).read_bytes()
+        (folder / name).write_bytes(content + b"\n")
+        with pytest.raises(ValueError, match=name):
+            _read(folder)
+        (folder / name).write_bytes(content)
 
 
 def test_lots_are_drawn_as_on_the_command_line(tmp_path):
