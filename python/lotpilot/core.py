@@ -38,9 +38,10 @@ class Reward:
     contact: float = 5.0
     """Cost of a contact: the body began to touch something."""
     clearance: float = 0.1
-    """Cost per metre by which the distance of the body to anything is below 0.5 m, in every tick."""
+    """Cost per metre by which the distance of the body to anything is below 0.5 m at the end of every tick; where the car
+    was put back in it, before that."""
     smoothness: float = 0.2
-    """Cost per radian by which the road wheels turned since the last tick."""
+    """Cost per radian by which the road wheels turned in the tick; none in one in which the car was put back."""
 
 
 @dataclass(frozen=True)

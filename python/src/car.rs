@@ -5,6 +5,7 @@ use crate::reward::Reward;
 use experiment::drive_digest::DriveDigest;
 use experiment::drivers;
 use expert::ScriptedExpert;
+use sim::collision::BodyBox;
 use sim::controller;
 use sim::driver::{Decision, Driver as _, LookAheadPoint, Source};
 use sim::episode::Episode;
@@ -68,6 +69,11 @@ pub(crate) struct Outcome {
     pub(crate) truncated: bool,
 }
 
+/// Distance between body and non-drivable space now, metres.
+fn clearance_m(episode: &Episode, body: &BodyBox) -> f32 {
+    body.clearance_m(episode.map().distance_field(), episode.vehicle().pose)
+}
+
 /// One environment.
 #[derive(Debug, Clone)]
 pub(crate) struct Car {
@@ -90,6 +96,8 @@ struct Drive {
     /// The expert's answer, and the tick that it is for.
     label: Option<(u32, LookAheadPoint)>,
     last: Option<Frame>,
+    /// Distance between body and non-drivable space, metres: after the last tick, or where the car was put back from in it.
+    clearance_m: f32,
     digest: Option<DriveDigest>,
 }
 
@@ -107,12 +115,14 @@ impl Car {
         let number = self.next;
         let mut episode = course.start(self.seed, number)?;
         episode.observe();
+        let clearance_m = clearance_m(&episode, &course.body);
         self.next += self.stride;
         self.drive = Some(Drive {
             number,
             expert: None,
             label: None,
             last: None,
+            clearance_m,
             digest: self.digests.then(DriveDigest::default),
             episode,
         });
@@ -148,9 +158,16 @@ impl Car {
     ///
     /// # Panics
     /// If no episode is under way, or the action is not finite.
-    pub(crate) fn step(&mut self, kind: ActionKind, action: [f32; ACTION], reward: &Reward) -> Outcome {
-        let Drive { episode, expert, last, digest, .. } = self.drive.as_mut().expect("an episode is under way");
-        let (before, from_m) = (episode.metrics(), episode.progress_m());
+    pub(crate) fn step(
+        &mut self,
+        kind: ActionKind,
+        action: [f32; ACTION],
+        reward: &Reward,
+        course: &Course,
+    ) -> Outcome {
+        let drive = self.drive.as_mut().expect("an episode is under way");
+        let Drive { episode, expert, last, clearance_m, digest, .. } = drive;
+        let from_m = episode.progress_m();
         let frame = match kind {
             ActionKind::LookAhead => {
                 let [ahead_m, left_m] = action;
@@ -173,7 +190,9 @@ impl Car {
             digest.frame(&frame);
         }
         let gained_m = episode.progress_m() - from_m;
-        let reward = reward.of_tick(&frame, gained_m, [&before, &episode.metrics()]);
+        // A car that was put back is free again; the frame tells how near it had come.
+        *clearance_m = if episode.was_reset() { frame.clearance_m } else { self::clearance_m(episode, &course.body) };
+        let reward = reward.of_tick(&frame, gained_m, *clearance_m, &episode.vehicle());
         let ending = episode.ending();
         let truncated = ending == Some(Ending::TimedOut);
         *last = Some(frame);
@@ -221,7 +240,7 @@ impl Car {
 
     /// Writes down what is observed now.
     pub(crate) fn write(&self, seen: &mut Seen<'_>) {
-        let Some(Drive { number, episode, last, .. }) = &self.drive else { return };
+        let Some(Drive { number, episode, last, clearance_m, .. }) = &self.drive else { return };
         let (grid, vehicle) = (&episode.situation().observation.grid, episode.vehicle());
         for (row, cells) in seen.grid.chunks_exact_mut(GRID_CELLS).enumerate() {
             let bits = grid.row(row);
@@ -253,7 +272,7 @@ impl Car {
             episode.progress_m() / metrics.reference_m,
             episode.progress_m(),
             metrics.driven_m,
-            last.as_ref().map_or(f32::NAN, |frame| frame.clearance_m),
+            *clearance_m,
             if last.is_some() { metrics.clearance_min_m } else { f32::NAN },
             metrics.duration_s,
             vehicle.pose.x_m,

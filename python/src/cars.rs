@@ -259,7 +259,7 @@ impl Cars {
         let step = |(((car, action), mut seen), last): (((&mut Car, [f32; ACTION]), Seen<'_>), Option<Seen<'_>>)| {
             let mut outcome = Outcome::default();
             if car.is_driving() {
-                outcome = car.step(kind, action, &reward);
+                outcome = car.step(kind, action, &reward, course);
                 if autoreset == Autoreset::SameStep && !car.is_driving() {
                     if let Some(mut last) = last {
                         car.write(&mut last);

@@ -6,6 +6,7 @@ use experiment::notes;
 use experiment::settings::{Layers, NoiseChoice, Settings};
 use experiment::trials::{self, Trial};
 use pyo3::prelude::*;
+use sim::collision::BodyBox;
 use sim::episode::Episode;
 use sim::limits::TRIAL_MAX;
 use sim::map::Map;
@@ -59,6 +60,8 @@ type MapKey = (usize, usize, Option<(RootSeed, u32)>);
 #[derive(Debug)]
 pub(crate) struct Course {
     pub(crate) settings: Settings,
+    /// The outline of every car.
+    pub(crate) body: BodyBox,
     lots: Vec<Lot>,
     directions: Vec<Direction>,
     /// Trials of each lot and direction before they come again.
@@ -91,6 +94,7 @@ impl Course {
             directions.iter().try_for_each(|&direction| lot.check_direction(direction, vehicle))?;
         }
         Ok(Self {
+            body: BodyBox::new(vehicle),
             lots,
             directions,
             trials,

@@ -1,7 +1,7 @@
 //! What an environment is rewarded for: terms of the metrics (docs/methods.md 8), each with a weight.
 
 use sim::frame::{Event, Frame};
-use sim::metrics::EpisodeMetrics;
+use sim::vehicle::VehicleState;
 use std::collections::BTreeMap;
 
 /// A near-collision is something within half a metre: nearer than that, clearance costs.
@@ -18,9 +18,9 @@ pub(crate) struct Reward {
     stuck: f64,
     /// Per contact.
     contact: f64,
-    /// Per metre that the clearance is below half a metre.
+    /// Per metre that the clearance is below half a metre at the end of the tick, or where the car was put back from.
     clearance: f64,
-    /// Per radian by which the road wheels turned since the last tick.
+    /// Per radian by which the road wheels turned in the tick; none in one in which the car was put back.
     smoothness: f64,
 }
 
@@ -50,17 +50,20 @@ impl Reward {
         }
     }
 
-    /// The reward of a tick. `gained_m`: progress; `metrics`: before and after.
-    pub(crate) fn of_tick(&self, frame: &Frame, gained_m: f32, metrics: [&EpisodeMetrics; 2]) -> f64 {
+    /// The reward of a tick: of what its action did. A frame tells what was there before it, so what was there after it
+    /// comes beside it: `gained_m`, progress; `clearance_m`; `after`, the car.
+    pub(crate) fn of_tick(&self, frame: &Frame, gained_m: f32, clearance_m: f32, after: &VehicleState) -> f64 {
         let (near_collision, stuck) = match frame.event {
             Event::NearCollision { .. } => (1.0, 0.0),
             Event::Stuck { .. } => (0.0, 1.0),
             Event::Drove | Event::ReachedEnd => (0.0, 0.0),
         };
-        let progress_m = if near_collision + stuck > 0.0 { 0.0 } else { f64::from(gained_m) };
-        let missing_m = f64::from((CLEARANCE_WANTED_M - frame.clearance_m).max(0.0));
-        let [before, after] = metrics;
-        let turned_rad = f64::from(after.steering_effort_rad - before.steering_effort_rad);
+        // Nobody drove back onto the route, nor straightened the wheels there.
+        let was_put_back = near_collision + stuck > 0.0;
+        let progress_m = if was_put_back { 0.0 } else { f64::from(gained_m) };
+        let turned_rad =
+            if was_put_back { 0.0 } else { f64::from((after.steering_rad - frame.vehicle.steering_rad).abs()) };
+        let missing_m = f64::from((CLEARANCE_WANTED_M - clearance_m).max(0.0));
         self.progress * progress_m
             - self.near_collision * near_collision
             - self.stuck * stuck

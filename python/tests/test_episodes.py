@@ -276,6 +276,33 @@ def test_the_reward_is_the_sum_of_its_terms():
     assert near == pytest.approx(-sum(max(0.0, 0.5 - info["clearance_m"]) for info in infos), rel=1e-5)
 
 
+def test_a_step_is_rewarded_for_what_its_own_action_did():
+    """Clearance and turned wheels were those before the action: each action was charged for the one before it."""
+
+    def driven(term):
+        reward = {**dict.fromkeys(EnvOptions().weights(), 0.0), term: 1.0}
+        core = Core(1, EnvOptions(lots=["lot-b"], directions="forward", reward=reward), "disabled")
+        infos, rewards = [core.info(core.reset(), 0)], []
+        while infos[-1]["event"] == 0:
+            seen, reward, *_ = core.step([[8.0, 1.0 + len(infos) % 2]])
+            rewards.append(reward[0])
+            infos.append(core.info(seen, 0))
+        return rewards, infos
+
+    rewards, infos = driven("smoothness")
+    turned = [abs(after["steering_rad"] - before["steering_rad"]) for before, after in pairwise(infos)]
+    # In the last tick the car was put back with straight wheels, which nobody steered.
+    assert rewards == pytest.approx([-angle for angle in turned[:-1]] + [0.0], abs=1e-6) and max(turned[:-1]) > 0.001
+    rewards, infos = driven("clearance")
+    assert rewards == pytest.approx([-max(0.0, 0.5 - info["clearance_m"]) for info in infos[1:]], abs=1e-6)
+    # The metric is measured before each action: at its n-th tick it is the least of what n steps before had left.
+    clearances = [info["clearance_m"] for info in infos]
+    least = [min(clearances[:tick]) for tick in range(1, len(infos) - 1)]
+    assert [info["clearance_min_m"] for info in infos[1:-1]] == pytest.approx(least, abs=1e-6)
+    assert any(now < before for now, before in zip(clearances[1:-1], least, strict=True)), "it comes nearer"
+    assert clearances[-1] == infos[-1]["clearance_min_m"], "where it had stopped, not where it was put back"
+
+
 def test_tables_are_read_from_files_that_are_whole(tmp_path):
     folder = tmp_path / "run"
     # A separator of lines within a name, which JSON need not escape.
