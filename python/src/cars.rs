@@ -9,7 +9,7 @@ use numpy::{Ix2, PyArray, PyArray3, PyArrayMethods as _};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::prelude::*;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
 use report::pictures::drawing::Drawing;
 use report::pictures::grids;
 use report::pictures::lot::{self, View};
@@ -22,6 +22,9 @@ use sim::metrics::EpisodeMetrics;
 use sim::seed::RootSeed;
 use sim::sensing::GRID_CELLS;
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
 
 /// Environments that step together at most; a car takes some kilobytes, and its lot more.
 const COUNT_MAX: usize = 65_536;
@@ -91,6 +94,63 @@ impl Threads {
             Self::Own(pool) => detached(py, || pool.install(|| all.into_par_iter().map(work).collect())),
         }
     }
+
+    /// Does something to each that may take seconds, as [`Self::each`]. After Ctrl-C the rest is left as it was.
+    fn each_unless_interrupted<T: Send>(
+        &self,
+        py: Python<'_>,
+        all: impl Iterator<Item = T>,
+        work: impl Fn(T) -> PyResult<()> + Sync + Send,
+    ) -> PyResult<()> {
+        let is_interrupted = AtomicBool::new(false);
+        let work = |one| if is_interrupted.load(Ordering::Relaxed) { Ok(()) } else { work(one) };
+        let all: Vec<T> = all.collect();
+        match self {
+            Self::Caller => alone(py, || all.into_iter().try_for_each(|one| signals().and_then(|()| work(one)))),
+            // One of the threads would wait for itself, and is told of no signal anyway.
+            Self::AllCores if rayon::current_thread_index().is_some() => {
+                detached(py, || all.into_par_iter().try_for_each(work))
+            }
+            Self::AllCores => {
+                detached(py, || rayon::in_place_scope(|scope| watched(scope, all, &work, &is_interrupted)))
+            }
+            Self::Own(pool) => {
+                detached(py, || pool.in_place_scope(|scope| watched(scope, all, &work, &is_interrupted)))
+            }
+        }
+    }
+}
+
+/// Lets the threads of a scope work while the caller asks for signals, of which Python tells its main thread alone.
+fn watched<'scope, T: Send + 'scope>(
+    scope: &Scope<'scope>,
+    all: Vec<T>,
+    work: &'scope (impl Fn(T) -> PyResult<()> + Sync),
+    is_interrupted: &AtomicBool,
+) -> PyResult<()> {
+    let (done, results) = mpsc::channel();
+    scope.spawn(move |_| drop(done.send(all.into_par_iter().try_for_each(work))));
+    let mut interrupted = Ok(());
+    loop {
+        match results.recv_timeout(SIGNALS_EVERY) {
+            Ok(result) => return interrupted.and(result),
+            // A panic: the scope passes it on.
+            Err(RecvTimeoutError::Disconnected) => return interrupted,
+            Err(RecvTimeoutError::Timeout) if interrupted.is_ok() => {
+                interrupted = signals();
+                is_interrupted.store(interrupted.is_err(), Ordering::Relaxed);
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+    }
+}
+
+/// How long work goes on after Ctrl-C before it is noticed.
+const SIGNALS_EVERY: Duration = Duration::from_millis(50);
+
+/// What the interpreter's handlers of signals raise: after Ctrl-C, `KeyboardInterrupt`.
+fn signals() -> PyResult<()> {
+    Python::attach(|py| py.check_signals())
 }
 
 #[pymethods]
@@ -178,7 +238,7 @@ impl Cars {
     }
 
     /// Starts the next episodes of the cars in `mask` and writes what they see into `seen`. `seeds` and `numbers` say
-    /// which episodes come first; cars without one continue.
+    /// which episodes come first; cars without one continue. After Ctrl-C some may have started and others not.
     fn reset(
         &mut self,
         py: Python<'_>,
@@ -215,8 +275,7 @@ impl Cars {
             car.write(&mut seen);
             Ok(())
         };
-        threads.each(py, cars.iter_mut().zip(rows).zip(mask), reset)?;
-        Ok(())
+        threads.each_unless_interrupted(py, cars.iter_mut().zip(rows).zip(mask), reset)
     }
 
     /// Drives one control tick with every car. Writes what they see then into `seen`; under `same_step`, what ended

@@ -3,6 +3,7 @@
 import hashlib
 import multiprocessing
 import shutil
+import signal
 import subprocess
 import sys
 from itertools import pairwise
@@ -301,6 +302,31 @@ def test_a_step_is_rewarded_for_what_its_own_action_did():
     assert [info["clearance_min_m"] for info in infos[1:-1]] == pytest.approx(least, abs=1e-6)
     assert any(now < before for now, before in zip(clearances[1:-1], least, strict=True)), "it comes nearer"
     assert clearances[-1] == infos[-1]["clearance_min_m"], "where it had stopped, not where it was put back"
+
+
+class Rang(Exception):
+    """An alarm clock."""
+
+
+@pytest.mark.parametrize("threads", [1, 2, None])
+def test_a_reset_of_many_cars_heeds_signals(threads):
+    """Ctrl-C while thousands of lots were drawn had no effect before the last of them."""
+    core = Core(4000, EnvOptions(lots=["train:4000:all"], threads=threads), "next_step")
+
+    def ring(*_):
+        raise Rang
+
+    before = signal.signal(signal.SIGALRM, ring)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        with pytest.raises(Rang):
+            core.reset()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    # Not all of them were reset before the alarm was heard; cars are taken in halves, so it may be any.
+    with pytest.raises(lotpilot.EpisodeEnded, match="never reset"):
+        core.step(np.full((4000, 2), [8.0, 0.0]))
 
 
 def test_tables_are_read_from_files_that_are_whole(tmp_path):
