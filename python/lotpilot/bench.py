@@ -19,6 +19,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TypeVar
 
 import gymnasium
 import numpy as np
@@ -30,6 +31,8 @@ from .gym import LotVectorEnv
 LOTS = ("lot-a", "lot-b", "lot-c")
 TRIALS = 8
 AHEAD_M = 6.0
+
+Number = TypeVar("Number", int, float)
 
 Drive = Callable[[float], int]
 """Drives for this many seconds and returns the number of steps."""
@@ -170,14 +173,33 @@ def processor() -> str:
     return names[0] if names else platform.processor() or "unknown processor"
 
 
+def _within(number: type[Number], least: Number, most: Number) -> Callable[[str], Number]:
+    """A number of an argument, refused by argparse if it is out of range."""
+
+    def read(text: str) -> Number:
+        value = number(text)
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"{text} is not within {least} … {most}")
+        return value
+
+    read.__name__ = number.__name__
+    return read
+
+
 def main() -> None:
     """Prints the table."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     parser = argparse.ArgumentParser(prog="python -m lotpilot.bench", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--cars", type=int, default=128, help="environments stepped together [default: 128]")
-    parser.add_argument("--threads", type=int, default=cores, help="threads to step with [default: all cores]")
-    parser.add_argument("--seconds", type=float, default=1.0, help="of each measurement [default: 1]")
-    parser.add_argument("--rounds", type=int, default=5, help="measurements of each row [default: 5]")
+    parser.add_argument(
+        "--cars", type=_within(int, 1, 65_536), default=128, help="environments stepped together [default: 128]"
+    )
+    parser.add_argument(
+        "--threads", type=_within(int, 1, 1024), default=cores, help="threads to step with [default: all cores]"
+    )
+    parser.add_argument(
+        "--seconds", type=_within(float, 0.01, 3600.0), default=1.0, help="of each measurement [default: 1]"
+    )
+    parser.add_argument("--rounds", type=_within(int, 1, 1000), default=5, help="measurements of each row [default: 5]")
     asked = parser.parse_args()
     table = rows(asked.cars, asked.threads)
     measured: dict[str, list[tuple[float, float]]] = {name: [] for name, _ in table}

@@ -313,12 +313,22 @@ def given(*numbers: int | None) -> list[int]:
     return [number for number in numbers if number is not None]
 
 
-def check_whole(what: str, *numbers: int, below: int = 2**63) -> None:
+def check_whole(what: str, *numbers: int, least: int = 0, below: int = 2**63) -> None:
     """Refuses what is no whole number or out of range.
 
     Raises:
         ValueError: Naming what it is.
     """
     for number in numbers:
-        if not isinstance(number, (int, np.integer)) or not 0 <= number < below:
-            raise ValueError(f"{what}: {number!r} is not a whole number within 0 … {below - 1}")
+        if not isinstance(number, (int, np.integer)) or not least <= number < below:
+            raise ValueError(f"{what}: {number!r} is not a whole number within {least} … {below - 1}")
+
+
+def refuse_option(options: Mapping[str, Any] | None, name: str, right: str) -> None:
+    """Refuses an option of ``reset`` that other environments have, and that would be ignored.
+
+    Raises:
+        ValueError: Naming the right one.
+    """
+    if name in (options or {}):
+        raise ValueError(f"there is no reset option {name!r} here; it is {right!r}")

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._native import read_round
-from .core import Floats, Grids
+from .core import Floats, Grids, check_whole
 
 
 def load_round(run: str | os.PathLike[str], round: int = 0) -> dict[str, Any]:
@@ -31,6 +31,7 @@ def load_round(run: str | os.PathLike[str], round: int = 0) -> dict[str, Any]:
     Raises:
         ValueError: If there is no such round, or one of its files is damaged.
     """
+    check_whole("round", round, below=2**20)
     return read_round(Path(run), round)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._native import Cars, lots
-from .core import Arrays, Core, EnvOptions, Floats, Grids
+from .core import GRID_CELLS, Arrays, Core, EnvOptions, Floats, Grids, check_whole
 
 
 class Episode:
@@ -56,8 +56,7 @@ class Episode:
             raise ValueError(f"no direction {direction!r}; there are forward and reverse")
         if len(lots([lot])) != 1:
             raise ValueError(f"{lot!r} stands for several lots; lotpilot.lots names them")
-        if not 0 <= trial < 2**20:
-            raise ValueError(f"trial {trial}: there are 0 to {2**20 - 1}")
+        check_whole("trial", trial, below=2**20)
         options = EnvOptions(
             lots=[lot],
             directions=direction,
@@ -126,5 +125,10 @@ class Episode:
         return digest
 
     def picture(self, side_px: int = 500) -> Grids:
-        """The lot around the car, and beside it the grid that it sees: uint8 [side_px, 2 * side_px, 3]."""
+        """The lot around the car, and beside it the grid that it sees: uint8 [side_px, 2 * side_px, 3].
+
+        Raises:
+            ValueError: If ``side_px`` is not within 25 … 8192.
+        """
+        check_whole("side_px", side_px, least=GRID_CELLS, below=8193)
         return self._core.cars.picture(0, side_px)

@@ -15,7 +15,7 @@ from gymnasium.error import DependencyNotInstalled, ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from .core import Arrays, Core, EnvOptions, Floats, Grids, row
+from .core import Arrays, Core, EnvOptions, Floats, Grids, check_whole, given, refuse_option, row
 
 PICTURE_PX = 500
 """Height of a picture, pixels; it is twice as wide."""
@@ -62,8 +62,9 @@ class LotEnv(gymnasium.Env[Any, Floats]):
         Raises:
             ValueError: If the options are those of several cars.
         """
+        refuse_option(options, "episodes", "episode")
+        check_whole("seed", *given(seed))
         super().reset(seed=seed)
-        _refuse(options, "episodes", "episode")
         episode = (options or {}).get("episode")
         seen = self.core.reset(seeds=None if seed is None else [seed], episodes=None if episode is None else [episode])
         self._is_started = True
@@ -78,10 +79,10 @@ class LotEnv(gymnasium.Env[Any, Floats]):
             ValueError: If the action is not two finite numbers.
             EpisodeEnded: If the episode has ended.
         """
-        given = np.asarray(action, np.float32)
-        if given.shape != (2,):
-            raise ValueError(f"action: the shape is {given.shape}, (2,) is needed")
-        seen, rewards, terminated, truncated, _ = self.core.step(given[np.newaxis])
+        pair = np.asarray(action, np.float32)
+        if pair.shape != (2,):
+            raise ValueError(f"action: the shape is {pair.shape}, (2,) is needed")
+        seen, rewards, terminated, truncated, _ = self.core.step(pair[np.newaxis])
         if self.render_mode == "human":
             self.render()
         info = self.core.info(seen, 0)
@@ -167,10 +168,11 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
         Raises:
             ValueError: If the options are those of a single car.
         """
-        _refuse(options, "episode", "episodes")
+        refuse_option(options, "episode", "episodes")
+        seeds = [seed] * self.num_envs if isinstance(seed, (int, np.integer)) else seed
+        check_whole("seed", *given(*(seeds or ())))
         super().reset(seed=seed if isinstance(seed, int) else None)
         mask = (options or {}).get("reset_mask")
-        seeds = [seed] * self.num_envs if isinstance(seed, (int, np.integer)) else seed
         seen = self.core.reset(mask, seeds=seeds, episodes=(options or {}).get("episodes"))
         return seen.observation(), self._infos(seen)
 
@@ -220,12 +222,6 @@ _AUTORESET = {
     AutoresetMode.SAME_STEP: "same_step",
     AutoresetMode.DISABLED: "disabled",
 }
-
-
-def _refuse(options: Mapping[str, Any] | None, name: str, right: str) -> None:
-    """Refuses a reset option of the other environment, which would be ignored."""
-    if name in (options or {}):
-        raise ValueError(f"there is no reset option {name!r} here; it is {right!r}")
 
 
 def _frames_per_s(core: Core) -> int:

@@ -184,7 +184,7 @@ def generate(
     """
     _check(shards, cpus, retries)
     check_whole("seed", seed)
-    check_whole("count", count, below=2**32)
+    check_whole("count", count, least=1, below=2**20)
     out = Path(out)
     single = _native.lots(names(lots, "lots"))
     _native.check_generate(single, seed, count, out)
@@ -323,8 +323,13 @@ def _call(program: Path, *arguments: object, folder: Path | None = None) -> str:
 
 
 def _check(shards: int, cpus: int, retries: int) -> None:
-    if shards < 1 or cpus < 1 or retries < 0:
-        raise ValueError("shards and cpus are 1 or more, retries 0 or more")
+    check_whole("shards", shards, least=1, below=10**6)
+    check_whole("cpus", cpus, least=1, below=1025)
+    check_whole("retries", retries, below=10**6)
+
+
+def _shards(out: Path) -> Path:
+    return out.with_name(f"{out.name}.shards")
 
 
 def _trained(out: Path) -> Path:

@@ -204,7 +204,7 @@ def generate(
         ValueError: If nothing is named so, a number is out of range, or a file exists already.
     """
     check_whole("seed", seed)
-    check_whole("count", count, below=2**32)
+    check_whole("count", count, least=1, below=2**20)
     folder = None if out is None else Path(out)
     drawn = _native.generate(names(lots, "lots"), seed, count, folder, overwrite)
     columns = ("name", "toml", "path", "route_m", "obstacles")

@@ -65,11 +65,8 @@ enum Threads {
 
 impl Threads {
     fn new(py: Python<'_>, count: usize, threads: Option<usize>) -> PyResult<Self> {
+        threads.map_or(Ok(()), check_threads)?;
         match threads {
-            Some(threads) if threads == 0 || threads > usize::from(THREADS_MAX) => {
-                let problem = format!("threads: {threads} is not within 1 … {THREADS_MAX}");
-                Err(PyValueError::new_err(problem))
-            }
             // These threads are of this process, and in none that is forked from it.
             Some(threads) if threads > 1 && count > 1 => detached(py, || {
                 let pool = ThreadPoolBuilder::new().num_threads(threads).build();
@@ -143,6 +140,14 @@ fn watched<'scope, T: Send + 'scope>(
             Err(RecvTimeoutError::Timeout) => {}
         }
     }
+}
+
+/// Refuses so many threads.
+pub(crate) fn check_threads(threads: usize) -> PyResult<()> {
+    if (1..=usize::from(THREADS_MAX)).contains(&threads) {
+        return Ok(());
+    }
+    Err(PyValueError::new_err(format!("threads: {threads} is not within 1 … {THREADS_MAX}")))
 }
 
 /// How long work goes on after Ctrl-C before it is noticed.
@@ -350,6 +355,9 @@ impl Cars {
 
     /// Where the route is `ahead_m` further on, in the frame of the rear axle, float32 [n, 2]: ahead and left, metres.
     fn route_points<'py>(&self, py: Python<'py>, ahead_m: f32) -> PyResult<Bound<'py, PyArray<f32, Ix2>>> {
+        if !ahead_m.is_finite() {
+            return Err(PyValueError::new_err(format!("ahead_m: {ahead_m} is not a finite number")));
+        }
         points(py, self.cars.iter().map(|car| car.route_point(ahead_m).unwrap_or([f32::NAN; 2])))
     }
 

@@ -4,6 +4,7 @@ use pyo3::exceptions::{PyRuntimeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use std::any::Any;
 use std::ffi::CString;
+use std::ops::RangeInclusive;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::OnceLock;
 
@@ -17,6 +18,19 @@ pyo3::create_exception!(
 /// Bad input.
 pub(crate) fn input(error: impl Into<anyhow::Error>) -> PyErr {
     PyValueError::new_err(format!("{:#}", error.into()))
+}
+
+/// A whole number, as `check_whole` in Python takes it: pyo3 refuses those that do not fit their type with an `OverflowError`.
+///
+/// # Errors
+/// If it is none, or out of range.
+pub(crate) fn whole(what: &str, given: &Bound<'_, PyAny>, within: RangeInclusive<u64>) -> PyResult<u64> {
+    let number = given.extract::<u64>().ok().filter(|number| within.contains(number));
+    number.ok_or_else(|| {
+        let (given, least, most) =
+            (given.repr().map_or_else(|_| "it".to_owned(), |repr| repr.to_string()), within.start(), within.end());
+        PyValueError::new_err(format!("{what}: {given} is not a whole number within {least} … {most}"))
+    })
 }
 
 /// Says notes as warnings of the caller in Python.

@@ -2,7 +2,7 @@
 
 use crate::arrays::points;
 use crate::course::{SettingsFrom, directions};
-use crate::guard::{alone, input, warn};
+use crate::guard::{alone, input, warn, whole};
 use experiment::notes;
 use experiment::settings::{NoiseChoice, Settings};
 use experiment::trials::{Purpose, Trial};
@@ -41,11 +41,19 @@ pub(crate) struct Lot {
 #[pymethods]
 impl Lot {
     #[new]
-    #[pyo3(signature = (name, *, direction="forward", trial=0, seed=1))]
-    fn new(py: Python<'_>, name: &str, direction: &str, trial: i64, seed: i64) -> PyResult<Self> {
-        let trial = u32::try_from(trial).ok().filter(|trial| *trial <= TRIAL_MAX);
-        let trial = trial.ok_or_else(|| PyValueError::new_err(format!("trial: there are 0 to {TRIAL_MAX}")))?;
-        let seed = u64::try_from(seed).map_err(|_| PyValueError::new_err("seed: it is negative"))?;
+    #[pyo3(
+        signature = (name, *, direction="forward", trial=None, seed=None),
+        text_signature = "(name, *, direction='forward', trial=0, seed=1)"
+    )]
+    fn new(
+        py: Python<'_>,
+        name: &str,
+        direction: &str,
+        trial: Option<&Bound<'_, PyAny>>,
+        seed: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let trial = trial.map_or(Ok(0), |trial| whole("trial", trial, 0..=u64::from(TRIAL_MAX)))? as u32;
+        let seed = seed.map_or(Ok(1), |seed| whole("seed", seed, 0..=i64::MAX as u64))?;
         let settings = Settings::preset("default").map_err(input)?;
         alone(py, || {
             let vehicle = settings.episode.vehicle.clone();

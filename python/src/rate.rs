@@ -1,5 +1,6 @@
 //! The same episodes in Rust alone: how fast they are, and their results.
 
+use crate::cars::check_threads;
 use crate::course::{Course, SettingsFrom};
 use crate::guard::{detached, input};
 use experiment::drive::TrialBatch;
@@ -59,6 +60,7 @@ impl RustLoop {
         threads: usize,
         tick_by_tick: bool,
     ) -> PyResult<Self> {
+        check_threads(threads)?;
         let course = Course::new(settings, &lots, "both", Some(trials), noise).map_err(input)?;
         let pool = ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|error| PyRuntimeError::new_err(error.to_string()))?;

@@ -197,3 +197,15 @@ def test_stable_baselines_finds_nothing_wrong():
     assert len(ended) == 4
     assert all(info["TimeLimit.truncated"] and info["terminal_observation"].shape == (25, 25) for info in ended)
     PPO("MlpPolicy", VecMonitor(envs), n_steps=64, batch_size=64, n_epochs=1).learn(256)
+
+
+@pytest.mark.parametrize("seed", [-1, 2**70, 2.5])
+def test_a_seed_out_of_range_is_a_value_error_everywhere(seed):
+    with pytest.raises(ValueError, match=r"seed: .* is not a whole number"):
+        gymnasium.make("lotpilot/Lot-v0", **SHORT).unwrapped.reset(seed=seed)
+    envs = LotVectorEnv(2, **SHORT)
+    with pytest.raises(ValueError, match=r"seed: .* is not a whole number"):
+        envs.reset(seed=[1, seed])
+    if isinstance(seed, int):
+        with pytest.raises(ValueError, match=r"seed: .* is not a whole number"):
+            envs.reset(seed=seed)

@@ -363,6 +363,10 @@ def test_settings_are_those_of_the_command_line():
         lotpilot.settings(overrides=["dagger.etta=0.8"])
 
 
+def rust_loop(threads):
+    return _native.RustLoop(1, ["lot-b"], 1, "paper", settings_from(None, None, ()), 6.0, threads, True)
+
+
 @pytest.mark.parametrize(
     ("make", "error", "part"),
     [
@@ -373,10 +377,28 @@ def test_settings_are_those_of_the_command_line():
         (lambda: lotpilot.Episode(action="gas"), ValueError, "look_ahead and steering"),
         (lambda: lotpilot.Episode(overrides=["episode.nothing=1"]), ValueError, "no key"),
         (lambda: lotpilot.Lot("no/such.toml"), ValueError, "no/such.toml"),
-        (lambda: lotpilot.Lot("lot-b", trial=2**20), ValueError, "0 to 1048575"),
-        (lambda: lotpilot.Episode("lot-b", trial=2**20), ValueError, "0 to 1048575"),
-        (lambda: lotpilot.Lot("lot-b", trial=-1), ValueError, "0 to 1048575"),
-        (lambda: lotpilot.Lot("lot-b", seed=-1), ValueError, "seed: it is negative"),
+        (lambda: lotpilot.Lot("lot-b", trial=2**20), ValueError, "trial: 1048576 is not"),
+        (lambda: lotpilot.Episode("lot-b", trial=2**20), ValueError, "trial: 1048576 is not"),
+        (lambda: lotpilot.Lot("lot-b", trial=-1), ValueError, "trial: -1 is not"),
+        (lambda: lotpilot.Lot("lot-b", trial=2**70), ValueError, "within 0 … 1048575"),
+        (lambda: lotpilot.Lot("lot-b", seed=-1), ValueError, "seed: -1 is not"),
+        (lambda: lotpilot.Lot("lot-b", seed=2**70), ValueError, "seed: 1180591620717411303424 is not"),
+        (lambda: lotpilot.Episode("lot-b").picture(-1), ValueError, "side_px: -1 is not"),
+        (lambda: lotpilot.Episode("lot-b").picture(10**6), ValueError, "within 25 … 8192"),
+        (lambda: lotpilot.load_round("no/such/run", -1), ValueError, "round: -1 is not"),
+        (lambda: lotpilot.load_round("no/such/run", 2**70), ValueError, "within 0 … 1048575"),
+        (lambda: lotpilot.generate("lot-b", count=0), ValueError, "count: 0 is not"),
+        (lambda: lotpilot.generate("lot-b", count=2**31), ValueError, "within 1 … 1048575"),
+        (lambda: lotpilot.evaluate("expert", "lot-b", trials=2**31), ValueError, "trials"),
+        (lambda: lotpilot.evaluate("expert", "lot-b", trials=2**70), ValueError, "trials"),
+        (lambda: Core(1, EnvOptions(threads=2**70), "disabled"), ValueError, "threads"),
+        (lambda: Core(2, EnvOptions(threads=2**40), "disabled"), ValueError, "within 1 … 1024"),
+        (lambda: Core(2**70, EnvOptions(), "disabled"), ValueError, "environments"),
+        (lambda: Core(1, EnvOptions(), "disabled").reset(seeds=[2**70]), ValueError, "seed"),
+        (lambda: Core(1, EnvOptions(), "disabled").reset(episodes=[-1]), ValueError, "episode: -1 is not"),
+        (lambda: Core(1, EnvOptions(), "disabled").cars.route_points(np.nan), ValueError, "ahead_m: NaN"),
+        (lambda: rust_loop(threads=0), ValueError, "within 1 … 1024"),
+        (lambda: rust_loop(threads=10**6), ValueError, "within 1 … 1024"),
         (lambda: lotpilot.Episode("lot-b", seed=-1), ValueError, "seed: -1 is not"),
         (lambda: lotpilot.generate("lot-b", count=-1), ValueError, "count: -1 is not"),
         (lambda: lotpilot.evaluate("expert", "lot-b", trials=-1), ValueError, "trials: -1 is not"),

@@ -108,8 +108,13 @@ def test_what_cannot_be_driven_is_one_clear_error(cluster, tmp_path, monkeypatch
     assert '"lot-z" is not a lot' in (tmp_path / "a.shards/failures.txt").read_text(encoding="utf-8")
     with pytest.raises(lotpilot.ray.ShardError, match="KeyError: 'weights'"):
         drive({"broken": broken}, "b")
-    with pytest.raises(ValueError, match="1 or more"):
-        drive("expert", "c", cpus=0)
+    for wrong, part in [
+        ({"cpus": 0}, "cpus: 0 is not"),
+        ({"retries": 2**70}, "retries"),
+        ({"cpus": 2.5}, "cpus: 2.5 is not"),
+    ]:
+        with pytest.raises(ValueError, match=part):
+            drive("expert", "c", **wrong)
     with pytest.raises(TypeError, match="overwrite"):
         drive("expert", "d", overwrite=True)
     # A node without the wheel, and one with another.
