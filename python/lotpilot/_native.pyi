@@ -31,7 +31,11 @@ class Cars:
     def state_bounds(self) -> list[list[float]]: ...
     def control_period_s(self) -> float: ...
     def reset(
-        self, mask: Sequence[bool], seeds: Sequence[int | None] | None, numbers: Sequence[int] | None, seen: Arrays
+        self,
+        mask: Sequence[bool],
+        seeds: Sequence[int | None] | None,
+        numbers: Sequence[int | None] | None,
+        seen: Arrays,
     ) -> None: ...
     def step(
         self,

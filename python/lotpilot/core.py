@@ -222,18 +222,20 @@ class Core:
         mask: npt.NDArray[np.bool_] | None = None,
         *,
         seeds: Sequence[int | None] | None = None,
-        episodes: Sequence[int] | None = None,
+        episodes: Sequence[int | None] | None = None,
     ) -> Arrays:
-        """Starts the next episodes of the environments in ``mask``, of all if it is None: where ``seeds`` has one, the first
-        episode of that seed."""
+        """Starts the next episodes of the environments in ``mask``, of all if it is None.
+
+        Where ``seeds`` has one, it is the first episode of that seed; where ``episodes`` has one, that one.
+        """
         chosen = np.ones(self.count, bool) if mask is None else np.asarray(mask, bool)
         seen = self._arrays()[0]
         if seeds is not None:
             check_whole("seed", *given(*seeds))
             seeds = [None if seed is None else int(seed) for seed in seeds]
         if episodes is not None:
-            check_whole("episode", *episodes)
-            episodes = [int(episode) for episode in episodes]
+            check_whole("episode", *given(*episodes))
+            episodes = [None if episode is None else int(episode) for episode in episodes]
         self.cars.reset(chosen.tolist(), seeds, episodes, seen)
         return seen
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from stable_baselines3.common.vec_env import VecEnv
 
-from .core import Core, EnvOptions, Floats, Grids, row
+from .core import Core, EnvOptions, Floats, Grids, refuse_option, row
 
 
 class LotVecEnv(VecEnv):
@@ -26,13 +26,17 @@ class LotVecEnv(VecEnv):
 
     Raises:
         TypeError: If there is no such option.
-        ValueError: If something is not known by its name, or a lot cannot be driven.
+        ValueError: If something is not known by its name, a lot cannot be driven, or ``copy=False`` is asked for: SB3
+            stores what a step returned after the next one, which would have overwritten it.
     """
 
     def __init__(self, num_envs: int, *, render_mode: str | None = None, **options: Any) -> None:
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"no render mode {render_mode!r}; there is rgb_array")
-        self.core = Core(num_envs, EnvOptions.of({"normalise": True, **options}), "same_step")
+        asked = EnvOptions.of({"normalise": True, **options})
+        if not asked.copy:
+            raise ValueError("copy: SB3 stores what a step returned after the next one, which would overwrite it; leave it out")
+        self.core = Core(num_envs, asked, "same_step")
         self.render_mode = render_mode
         self._actions: npt.NDArray[Any] | None = None
         self._attributes: list[dict[str, Any]] = [{} for _ in range(num_envs)]
@@ -44,8 +48,16 @@ class LotVecEnv(VecEnv):
         return self._seeds
 
     def reset(self) -> Any:
-        """Starts the next episode of every car."""
-        seen = self.core.reset(seeds=self._seeds)
+        """Starts the next episode of every car, or the first one of a seed, or those that ``set_options`` has named:
+        ``{"episode": 7}``, or such a dict for each.
+
+        Raises:
+            ValueError: If the options are those of ``LotVectorEnv``.
+        """
+        for options in self._options:
+            refuse_option(options, "episodes", "episode")
+        episodes = [options.get("episode") for options in self._options]
+        seen = self.core.reset(seeds=self._seeds, episodes=episodes)
         self._reset_seeds()
         self._reset_options()
         self.reset_infos = [self.core.info(seen, index) for index in range(self.num_envs)]

@@ -249,7 +249,7 @@ impl Cars {
         py: Python<'_>,
         mask: Vec<bool>,
         seeds: Option<Vec<Option<u64>>>,
-        numbers: Option<Vec<u64>>,
+        numbers: Option<Vec<Option<u64>>>,
         seen: &Bound<'_, PyAny>,
     ) -> PyResult<()> {
         let n = self.cars.len();
@@ -268,8 +268,8 @@ impl Cars {
             if let Some(seed) = seeds.as_ref().and_then(|seeds| seeds[index]) {
                 (car.seed, car.next) = (RootSeed(seed), index as u64);
             }
-            if let Some(numbers) = &numbers {
-                car.next = numbers[index];
+            if let Some(number) = numbers.as_ref().and_then(|numbers| numbers[index]) {
+                car.next = number;
             }
         }
         let Self { course, cars, threads, .. } = self;

@@ -199,6 +199,41 @@ def test_stable_baselines_finds_nothing_wrong():
     PPO("MlpPolicy", VecMonitor(envs), n_steps=64, batch_size=64, n_epochs=1).learn(256)
 
 
+def test_stable_baselines_starts_the_episodes_that_options_name():
+    pytest.importorskip("stable_baselines3")
+    from lotpilot.sb3 import LotVecEnv
+
+    envs = LotVecEnv(3, **SHORT)
+    envs.seed(5)
+    envs.set_options({"episode": 11})
+    envs.reset()
+    assert [info["episode_number"] for info in envs.reset_infos] == [11, 11, 11]
+    # Those of one reset; whoever is named none goes on.
+    envs.set_options([{"episode": 7}, {}, {"episode": 2}])
+    envs.reset()
+    assert [info["episode_number"] for info in envs.reset_infos] == [7, 14, 2]
+    envs.reset()
+    assert [info["episode_number"] for info in envs.reset_infos] == [10, 17, 5]
+    envs.set_options({"episodes": [1, 2, 3]})
+    with pytest.raises(ValueError, match="it is 'episode'"):
+        envs.reset()
+
+
+def test_stable_baselines_is_given_no_arrays_that_are_overwritten():
+    # Its algorithms store an observation after the next step, as off a tape that had been recorded over.
+    pytest.importorskip("stable_baselines3")
+    from lotpilot.sb3 import LotVecEnv
+
+    envs = LotVecEnv(2, **SHORT)
+    first = envs.reset()
+    kept = first.copy()
+    for _ in range(20):
+        envs.step(np.zeros((2, 2)))
+    np.testing.assert_array_equal(first, kept)
+    with pytest.raises(ValueError, match="copy: SB3 stores"):
+        LotVecEnv(2, copy=False, **SHORT)
+
+
 @pytest.mark.parametrize("seed", [-1, 2**70, 2.5])
 def test_a_seed_out_of_range_is_a_value_error_everywhere(seed):
     with pytest.raises(ValueError, match=r"seed: .* is not a whole number"):
