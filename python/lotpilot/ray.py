@@ -77,7 +77,7 @@ def evaluate(
     _check(shards, cpus, retries)
     request = tables.Request.of(drivers, lots, **options)
     out = Path(out)
-    folder = out.with_name(out.name + ".shards")
+    folder = _shards(out)
     if out.exists():
         raise FileExistsError(f"{out}: exists already; choose another folder, or delete it")
     _claim(folder, {"evaluate": request.described(), "shards": shards, "lotpilot": _digest()})
@@ -161,7 +161,7 @@ def generate(
     retries: int = 3,
     progress: bool = True,
 ) -> Table:
-    """Draws lots as ``lotpilot.generate`` does, on a Ray cluster. Files of the same name in ``out`` are replaced.
+    """Draws lots as ``lotpilot.generate`` does, on a Ray cluster. Lots of the same name in ``out`` are replaced.
 
     Args:
         lots: As there.
@@ -198,7 +198,8 @@ def generate(
         for row in rows:
             drawn.setdefault(row.pop("lot"), []).append({**row, "path": str(out / row["path"])})
 
-    _drive(_generate, jobs, keep, out, len(jobs), address, cpus, retries, progress)
+    # Beside ``out``, which is the caller's and may hold a file of any name.
+    _drive(_generate, jobs, keep, _shards(out), len(jobs), address, cpus, retries, progress)
     rows = [row for lot in single for row in drawn[lot]]
     return {column: [row[column] for row in rows] for column in ("name", "path", "route_m", "obstacles")}
 

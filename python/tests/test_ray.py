@@ -128,6 +128,21 @@ def test_what_cannot_be_driven_is_one_clear_error(cluster, tmp_path, monkeypatch
         drive("expert", "f")
 
 
+def test_generate_leaves_what_else_is_in_its_folder(cluster, tmp_path, monkeypatch):
+    """It took a ``failures.txt`` for its own: deleted it, and added to it."""
+    out = tmp_path / "lots"
+    out.mkdir()
+    (out / "failures.txt").write_text("of the caller")
+    with monkeypatch.context() as other:
+        other.setattr(lotpilot.ray, "_digest", lambda: "another")
+        with pytest.raises(lotpilot.ray.ShardError, match="another lotpilot"):
+            lotpilot.ray.generate("train:2:easy", shards=2, out=out)
+    reasons = tmp_path / "lots.shards" / "failures.txt"
+    assert "another lotpilot" in reasons.read_text(encoding="utf-8")
+    lotpilot.ray.generate("train:2:easy", shards=2, out=out)
+    assert (out / "failures.txt").read_text() == "of the caller" and not reasons.exists()
+
+
 def test_generate_writes_the_files_of_one_process(cluster, tmp_path):
     one = lotpilot.generate("train:6:easy", out=tmp_path / "one")
     found = lotpilot.ray.generate("train:6:easy", shards=4, out=tmp_path / "ray")
