@@ -23,6 +23,7 @@ class LotPufferEnv(PufferEnv):  # type: ignore[misc]
         num_envs: How many cars.
         buf: PufferLib's buffers; None makes own ones.
         seed: Root of obstacles and noise, until ``reset`` is given another one.
+        render_mode: None or ``"rgb_array"``: whether PufferLib's ``eval`` shows what ``render`` returns.
         **options: Fields of ``lotpilot.EnvOptions``. Actions are normalised to -1 … 1 unless ``normalise=False``, and
             one thread steps unless ``threads=`` says otherwise: PufferLib has processes for more.
 
@@ -32,7 +33,11 @@ class LotPufferEnv(PufferEnv):  # type: ignore[misc]
             native environments have one array of observations.
     """
 
-    def __init__(self, num_envs: int = 1, buf: Any = None, seed: int = 1, **options: Any) -> None:
+    def __init__(
+        self, num_envs: int = 1, buf: Any = None, seed: int = 1, *, render_mode: str | None = None, **options: Any
+    ) -> None:
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"no render mode {render_mode!r}; there is rgb_array")
         asked = EnvOptions.of({"normalise": True, "threads": 1, "seed": seed, "copy": False, **options})
         if asked.state or asked.view:
             raise ValueError("state, view: PufferLib's native environments observe one array; leave them out")
@@ -40,6 +45,8 @@ class LotPufferEnv(PufferEnv):  # type: ignore[misc]
         self.single_observation_space = self.core.observation_space()
         self.single_action_space = self.core.action_space()
         self.num_agents = num_envs
+        # PufferEnv has none of its own, and pufferl's eval asks every environment for it.
+        self.render_mode = render_mode
         super().__init__(buf)
 
     def reset(self, seed: int | None = None) -> tuple[Grids, list[dict[str, Any]]]:

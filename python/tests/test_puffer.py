@@ -84,6 +84,16 @@ def test_a_puffer_environment_drives_as_any_other(puffer):
         np.testing.assert_array_equal([terminals, truncations], [terminated, truncated])
 
 
+def test_pufferlib_can_ask_how_to_show_what_is_rendered(puffer):
+    """Its ``eval`` reads ``render_mode``, which its environments set themselves."""
+    assert puffer.LotPufferEnv(1, **SHORT).render_mode is None
+    envs = puffer.LotPufferEnv(2, render_mode="rgb_array", **SHORT)
+    envs.reset(seed=1)
+    assert envs.render_mode == "rgb_array" and envs.render().shape == (500, 1000, 3)
+    with pytest.raises(ValueError, match="no render mode 'human'"):
+        puffer.LotPufferEnv(1, render_mode="human", **SHORT)
+
+
 def test_more_than_one_array_is_refused(puffer):
     with pytest.raises(ValueError, match="observe one array"):
         puffer.LotPufferEnv(2, state=True, **SHORT)
