@@ -59,7 +59,7 @@ pub struct Waypoint {
 ///
 /// `None` when there is none, or none was found within the budget. The scenario must be valid.
 pub fn solve(scenario: &Scenario, vehicle: &VehicleSettings, clearance_m: f32) -> Option<Solution> {
-    let scene = Scene::new(scenario);
+    let scene = Scene::for_clearance(scenario, vehicle, clearance_m);
     let goal = Goal::new(scenario);
     let to_go = DistanceToGo::new(&scene, &goal, vehicle, &BTreeSet::new());
     Search::new(&scene, &goal, &to_go, vehicle, clearance_m).run(start_pose(scenario), EXPANSIONS_MAX)
@@ -327,7 +327,9 @@ struct Scene {
     low: Vec2,
     high: Vec2,
     edges: Vec<(Vec2, Vec2)>,
+    /// Distances, up to [`Self::cap_m`].
     clearance_m: Raster<f32>,
+    cap_m: f32,
     buckets: Raster<Vec<u32>>,
 }
 
@@ -335,12 +337,20 @@ impl Scene {
     const NODE_M: f32 = 0.25;
     /// A look-up returns the value of the nearest node.
     const SLACK_M: f32 = Self::NODE_M * std::f32::consts::FRAC_1_SQRT_2;
-    const CAP_M: f32 = 2.2;
+    /// Distances are measured at least up to here: where there is more room, no way costs less.
+    const CAP_MIN_M: f32 = 2.2;
     const BUCKET_M: f32 = 2.0;
     /// More than the ends of a piece of an edge are off the edge.
     const ROUNDED_M: f32 = 0.01;
 
-    fn new(scenario: &Scenario) -> Self {
+    /// The scene for a body that keeps a clearance: distances reach as far as its discs. What is farther away than a raster
+    /// can say would count as near.
+    fn for_clearance(scenario: &Scenario, vehicle: &VehicleSettings, clearance_m: f32) -> Self {
+        let reach_m = Footprint::new(vehicle, clearance_m).disc_radius_m + Self::SLACK_M + Self::NODE_M;
+        Self::new(scenario, reach_m.max(Self::CAP_MIN_M))
+    }
+
+    fn new(scenario: &Scenario, cap_m: f32) -> Self {
         let (low, high) = sim::geometry::bounds(&scenario.boundary);
         let margin = Vec2::splat(1.0);
         let (low, high) = (low - margin, high + margin);
@@ -348,7 +358,8 @@ impl Scene {
             low,
             high,
             edges: Vec::new(),
-            clearance_m: Raster::covering(low, high, Self::NODE_M, Self::CAP_M),
+            clearance_m: Raster::covering(low, high, Self::NODE_M, cap_m),
+            cap_m,
             buckets: Raster::covering(low, high, Self::BUCKET_M, Vec::new()),
         };
         scene.add_outline(&scenario.boundary);
@@ -378,7 +389,7 @@ impl Scene {
             let end = |piece: u32| if piece == pieces { b } else { a.lerp(b, piece as f32 / pieces as f32) };
             for piece in 0..pieces {
                 let (low, high) = (end(piece).min(end(piece + 1)), end(piece).max(end(piece + 1)));
-                self.clearance_m.for_each_within(low, high, Self::CAP_M + Self::ROUNDED_M, |centre, value| {
+                self.clearance_m.for_each_within(low, high, self.cap_m + Self::ROUNDED_M, |centre, value| {
                     let distance_m = distance_to_segment(centre, a, b);
                     // What is outside the boundary stays negative.
                     if distance_m < value.abs() {
@@ -556,7 +567,7 @@ mod tests {
     /// A wall square behind the rear bumper counted as a collision up to 0.46 m away.
     #[test]
     fn a_car_may_stand_with_its_tail_near_a_wall() {
-        let scene = Scene::new(&lane(6.0, &[]));
+        let scene = Scene::for_clearance(&lane(6.0, &[]), &car(), 0.25);
         let footprint = Footprint::new(&car(), 0.25);
         let with_tail_at = |metres: f32| Pose::new(Vec2::new(car().rear_overhang_m + metres, 0.0), 0.0);
         for metres in [0.27, 0.3, 0.4, 0.5, 0.7, 1.0, 2.0] {
@@ -617,6 +628,19 @@ mod tests {
             for direction in Direction::BOTH {
                 let solution = solve(&direction.of(scenario.clone()), &car(), CLEARANCE_M);
                 assert_eq!(solution.is_some(), is_solvable, "{what}, {direction:?}");
+            }
+        }
+    }
+
+    /// From 1.45 m on every place counted as blocked: distances were measured up to 2.2 m, and half of the car with its
+    /// clearance reaches farther.
+    #[test]
+    fn a_clearance_of_up_to_two_metres_is_kept_where_there_is_room_for_it() {
+        for clearance_m in [0.6, 1.2, 1.45, 1.5, 2.0] {
+            let need_m = 1.86 + 2.0 * clearance_m;
+            for (room_m, is_solvable) in [(0.1, true), (-0.1, false)] {
+                let solution = solve(&lane(need_m + room_m, &[]), &car(), clearance_m);
+                assert_eq!(solution.is_some(), is_solvable, "{clearance_m} m in {:.2} m", need_m + room_m);
             }
         }
     }

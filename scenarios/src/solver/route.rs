@@ -86,7 +86,7 @@ pub fn find(
     vehicle: &VehicleSettings,
     clearance_m: f32,
 ) -> Result<ReferencePath, NoRoute> {
-    let scene = Scene::new(ground);
+    let scene = Scene::for_clearance(ground, vehicle, clearance_m);
     let goal_pose = match finish {
         Finish::At(pose) => pose,
         Finish::Start => Pose::new(start.position() - LOOP_GAP_M * start.ahead(), start.heading_rad),
