@@ -79,6 +79,18 @@ length_m = 0.5
 width_m = 6
 ";
 
+/// The lot with teeth of a length on one side, 4998 in 480 m, which makes 20 000 vertices with the rest.
+fn with_comb(is_upright: bool, tooth_m: f64) -> String {
+    let (root_m, step_m) = (if is_upright { 30.0 } else { 60.0 }, 480.0 / 4998.0);
+    let tooth = |i: u16| {
+        let (from, to) = (f64::from(i) * step_m, (f64::from(i) + 0.5) * step_m);
+        [(root_m, from), (root_m + tooth_m, from), (root_m + tooth_m, to), (root_m, to)]
+    };
+    let teeth = (0..4998).flat_map(tooth).chain([(root_m, 480.0), (0.0, 480.0), (0.0, 0.0)]);
+    let vertex = |(x, y): (f64, f64)| if is_upright { format!("[{y:.3}, {x}],") } else { format!("[{x}, {y:.3}],") };
+    LOT.replacen("[[0, 0], [60, 0], [60, 30], [0, 30]]", &format!("[{}]", teeth.map(vertex).collect::<String>()), 1)
+}
+
 #[test]
 fn lots_that_are_refused() {
     let parse = |text: &str| scenarios::load::parse(text, "lot.toml", &VehicleSettings::hyundai_hg300());
@@ -201,6 +213,11 @@ fn lots_that_are_refused() {
         .replace("[60, 0], [60, 30], [0, 30]", "[500, 0], [500, 500], [0, 500]")
         .replace("[[5, 12], [40, 12]]", &format!("[{winding}]"));
     cases.refuse("a route of 25 km", parse(&large), "the route is 25 km long; end it within 20000 m");
+    for is_upright in [false, true] {
+        let expected = "the outlines of boundary and islands are 4299 km long; leave some out: at most 200 km fit";
+        cases.refuse("a comb of 430 m", parse(&with_comb(is_upright, 430.0)), expected);
+    }
+    parse(&with_comb(true, 19.5)).unwrap();
     cases.finish(90);
 }
 
@@ -728,6 +745,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (LOT.to_owned() + &"[[obstacle]]\nclass = \"cone\"\nx_m = 9\ny_m = 28\n".repeat(20_000)).as_bytes(),
     );
     write("comb.toml", LOT.replacen("[0, 30]]", &format!("[0, 30], {}]", "[1, 2],".repeat(100_000)), 1).as_bytes());
+    write("long-comb.toml", with_comb(true, 430.0).as_bytes());
     write("keys.toml", (0..60_000).map(|i| format!("[a{i}.b]\n")).collect::<String>().as_bytes());
     write("name.toml", LOT.replace("lane", &"n".repeat(900_000)).as_bytes());
     std::fs::File::create(folder.join("huge.toml")).unwrap().set_len(200_000_000_000).unwrap();
@@ -774,6 +792,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["evaluate", "--driver", "expert", "vvf", "cvm", "--method", "mine=*"], "is no training"),
         (&["evaluate", "--driver", "expert", "--lots", "cones.toml"], "there are 20001 obstacles"),
         (&["evaluate", "--driver", "expert", "--lots", "comb.toml"], "100007 vertices"),
+        (&["evaluate", "--driver", "expert", "--lots", "long-comb.toml"], "4299 km long"),
         (&["evaluate", "--driver", "expert", "--lots", "keys.toml"], "unknown field `a0`"),
         (&["evaluate", "--driver", "expert", "--lots", "name.toml"], "900000 characters"),
         (&["evaluate", "--driver", "expert", "--lots", "huge.toml"], "are read; name a smaller file"),

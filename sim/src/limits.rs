@@ -17,6 +17,8 @@ pub const ROUTE_MAX_M: f32 = 20_000.0;
 pub const ROUTE_POINTS_MAX: usize = 10_000;
 /// Vertices of the boundary and all islands of a lot.
 pub const VERTICES_MAX: usize = 20_000;
+/// Length of the boundary and all islands of a lot, metres: walls are held in pieces of 8 m.
+pub const OUTLINES_MAX_M: f64 = 200_000.0;
 /// Islands of a lot.
 pub const ISLANDS_MAX: usize = 5_000;
 /// Obstacles of a lot.

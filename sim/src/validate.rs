@@ -4,8 +4,8 @@
 
 use crate::geometry::{Pose, Vec2, bounds, distance_to_segment, edges, polygon_contains, signed_area_m2};
 use crate::limits::{
-    COORDINATE_MAX_M, ISLANDS_MAX, LOT_EXTENT_MAX_M, NAME_BYTES_MAX, NAME_CHARS_MAX, OBSTACLES_MAX, ROUTE_MAX_M,
-    ROUTE_POINTS_MAX, SPEED_BUMPS_MAX, VERTICES_MAX,
+    COORDINATE_MAX_M, ISLANDS_MAX, LOT_EXTENT_MAX_M, NAME_BYTES_MAX, NAME_CHARS_MAX, OBSTACLES_MAX, OUTLINES_MAX_M,
+    ROUTE_MAX_M, ROUTE_POINTS_MAX, SPEED_BUMPS_MAX, VERTICES_MAX,
 };
 use crate::maths;
 use crate::path::Path;
@@ -40,6 +40,7 @@ pub fn validate(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), Sc
     for (i, island) in scenario.islands.iter().enumerate() {
         check_island(i, island, &scenario.boundary)?;
     }
+    check_lengths(scenario)?;
     for (i, obstacle) in scenario.obstacles.iter().enumerate() {
         check_obstacle(Place::Obstacle(i), obstacle)?;
         check_near(Place::Obstacle(i), obstacle.centre().position(), lot)?;
@@ -215,6 +216,18 @@ fn check_extent(boundary: &[Vec2]) -> Result<(), ScenarioError> {
     Ok(())
 }
 
+/// A comb of few vertices may be thousands of kilometres long, and what is made of its walls takes gigabytes.
+fn check_lengths(Scenario { boundary, islands, .. }: &Scenario) -> Result<(), ScenarioError> {
+    let outlines = std::iter::once(boundary).chain(islands.iter().map(|island| &island.polygon));
+    let length_m: f64 = outlines.flat_map(|outline| edges(outline)).map(|(a, b)| f64::from(a.distance(b))).sum();
+    if length_m > OUTLINES_MAX_M {
+        let problem = format!("the outlines of boundary and islands are {:.0} km long", length_m / 1000.0);
+        let remedy = format!("leave some out: at most {:.0} km fit", OUTLINES_MAX_M / 1000.0);
+        return fault(Place::Boundary(None), problem, remedy);
+    }
+    Ok(())
+}
+
 /// Before anything else: far away, different points become the same.
 fn check_near_origin(boundary: &[Vec2]) -> Result<(), ScenarioError> {
     let (low, high) = bounds(boundary);
@@ -330,10 +343,11 @@ fn check_route(scenario: &Scenario, route: &Route) -> Result<(), ScenarioError> 
         }
     }
     for (i, island) in scenario.islands.iter().enumerate() {
-        let meets_island = |c: Vec2, d: Vec2| {
-            polygon_contains(&island.polygon, d) || edges(&island.polygon).any(|(a, b)| segments_meet(a, b, c, d))
-        };
-        if let Some(chord) = route.first_chord_near(bounds(&island.polygon), meets_island) {
+        // The car starts beside it, so that the route meets an edge where it first gets there. Edge by edge: a route of 20 km
+        // may wind through the box around an island of 20 000 vertices.
+        let meets_edge =
+            |(a, b): (Vec2, Vec2)| route.first_chord_near((a.min(b), a.max(b)), |c, d| segments_meet(a, b, c, d));
+        if let Some(chord) = edges(&island.polygon).filter_map(meets_edge).min() {
             let problem = format!("the route runs into island {} {}", i + 1, route.place_of(chord));
             return fault(route.vertex_near(chord, &scenario.reference_path), problem, "lead it around the island");
         }
@@ -399,8 +413,11 @@ impl Route {
 fn first_crossing(polygon: &[Vec2]) -> Option<(usize, usize)> {
     let count = polygon.len();
     let edge = |i: usize| (polygon[i], polygon[(i + 1) % count]);
-    let span = |i: usize| (edge(i).0.x.min(edge(i).1.x), edge(i).0.x.max(edge(i).1.x));
-    // Edges sorted by their left end: only those that share a range of x are compared.
+    // Along the axis along which the edges are shorter: the teeth of a comb would all overlap along the other.
+    let along = edges(polygon).map(|(a, b)| (b - a).abs()).sum::<Vec2>();
+    let axis = usize::from(along.y < along.x);
+    let span = |i: usize| (edge(i).0[axis].min(edge(i).1[axis]), edge(i).0[axis].max(edge(i).1[axis]));
+    // Edges sorted by their lower end: only those that share a range are compared.
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|&i, &j| span(i).0.total_cmp(&span(j).0));
     let mut first: Option<(usize, usize)> = None;
