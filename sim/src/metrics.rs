@@ -216,7 +216,7 @@ pub struct EpisodeMetrics {
     /// Mean over ticks of the drivable share of the safe range, 0…1.
     pub safe_ratio: f32,
     /// Smallest distance between body and non-drivable space, metres, negative where they overlap. Sampled at every
-    /// observation and where an emergency stop ends.
+    /// observation and where an emergency stop ends; at most 0 once there was a contact, wherever that fell.
     pub clearance_min_m: f32,
     /// Changes of the steering direction by more than 2° of road-wheel angle: the steering reversals of SAE J2944, with
     /// a gap (chosen) that ignores the response to noise. Wheels straightened by a resume do not count.
@@ -274,7 +274,9 @@ impl MetricsAccumulator {
         metrics.ticks += 1;
         metrics.novice_ticks += u32::from(frame.decision.source == Source::Novice);
         metrics.duration_s = frame.time_s;
-        metrics.clearance_min_m = metrics.clearance_min_m.min(frame.clearance_m);
+        // A contact may fall between two samples, and the raster that they are read from is rounded at corners.
+        let clearance_m = if frame.contacts > 0 { frame.clearance_m.min(0.0) } else { frame.clearance_m };
+        metrics.clearance_min_m = metrics.clearance_min_m.min(clearance_m);
         metrics.contacts += frame.contacts;
         match frame.event {
             Event::NearCollision { .. } => metrics.near_collisions += 1,
@@ -440,6 +442,21 @@ mod tests {
             contacts: u32::from(tick == 2),
             event,
         }
+    }
+
+    /// Between two samples the body touched a corner and left it: with a contact counted, a few centimetres were said to be
+    /// left.
+    #[test]
+    fn where_something_was_touched_no_clearance_was_left() {
+        let least_m = |contacts_at: u32| {
+            let mut accumulator = MetricsAccumulator::new(200.0);
+            for tick in 0..3 {
+                let contacts = u32::from(tick == contacts_at);
+                accumulator.frame(&Frame { clearance_m: 0.03, contacts, ..frame(tick, 0.0, Event::Drove) });
+            }
+            accumulator.metrics().clearance_min_m
+        };
+        assert_eq!((least_m(1), least_m(9)), (0.0, 0.03));
     }
 
     /// Five frames added up by hand: 10° and back are 20° and one reversal; a near-collision; what the resume
