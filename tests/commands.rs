@@ -443,6 +443,15 @@ fn pictures_are_drawn_and_never_replaced_unasked() {
     refuses(&["render", "animation", key, other, "--name", "two", "--out", &out], &["another trial"]);
     let late = ["render", "animation", key, "--from", "9", "--to", "8", "--name", "late", "--out", &out];
     refuses(&late, &["nothing to show", "--from"]);
+    // The place around its moment was shown without it; the last tick that can be written was a panic in a report.
+    let early = ["render", "animation", key, "--to", "1", "--name", "early", "--out", &out];
+    refuses(&early, &["--to 1: the moment of expert@lot-b@forward@0@paper@1@40 comes later, at 2.0 s"]);
+    let second = "vvf@lot-b@forward@0@paper@1@70";
+    let early = ["render", "animation", key, second, "--to", "3", "--name", "early", "--out", &out];
+    refuses(&early, &["--to 3: the moment of vvf@lot-b@forward@0@paper@1@70 comes later, at 3.5 s"]);
+    let beyond = "expert@lot-b@forward@0@paper@1@4294967295";
+    let beyond = ["render", "animation", beyond, "--name", "beyond", "--out", &out];
+    refuses(&beyond, &["1@4294967295: this run ends with tick", "name one up to that"]);
     refuses(&["render", "lot", "--lots", "lot-b", "--out", &out], &["lot-b.png", "--overwrite"]);
     refuses(&["render", "noise", "--lots", "lot-b", "--at", "1000", "--out", &out], &["--at 1000", "139"]);
     refuses(&["render", "noise", "--lots", "test:2", "--out", &out], &["test:2", "2 lots"]);

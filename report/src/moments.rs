@@ -7,6 +7,7 @@ use experiment::drive::Replay;
 use experiment::replay_key::ReplayKey;
 use experiment::settings::Settings;
 use sim::frame::Event;
+use std::ops::ControlFlow;
 
 /// What is shown before and after the near-collision, seconds.
 const BEFORE_S: f32 = 8.0;
@@ -22,9 +23,14 @@ pub fn player(key: &str, settings: &Settings) -> anyhow::Result<Player> {
     let key: ReplayKey = key.parse()?;
     let replay = Replay::new(&key, &settings.episode)?;
     let driver = key.driver.clone().load(settings)?;
-    let period_s = replay.episode_settings(&settings.episode).control_period_s();
-    let last_tick = key.tick + (AFTER_S / period_s).ceil() as u32;
-    let take = Take::of(&replay, &settings.episode, &driver, Some(last_tick), |_| {})?;
+    let (mut now_s, mut until_s) = (0.0, f32::INFINITY);
+    let take = Take::of(&replay, &settings.episode, &driver, |frame| {
+        if frame.tick == key.tick {
+            until_s = now_s + AFTER_S;
+        }
+        now_s = frame.time_s;
+        if now_s > until_s { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
     let found = take.frames.get(key.tick as usize).and_then(|frame| match frame.event {
         Event::NearCollision { at, .. } => Some(at),
         Event::Drove | Event::Stuck { .. } | Event::ReachedEnd => None,
@@ -32,8 +38,8 @@ pub fn player(key: &str, settings: &Settings) -> anyhow::Result<Player> {
     let at = found.context("driven again, it does not happen: has the network been trained again since?")?;
 
     // Counted from the tick, so that one picture shows it.
-    let at_s = key.tick as f32 * period_s;
-    let end_s = (take.frames.len() - 1) as f32 * period_s;
+    let at_s = take.observed_at_s(key.tick as usize);
+    let end_s = take.observed_at_s(take.frames.len() - 1);
     let before = (at_s.min(BEFORE_S) * RATE_PER_S) as i32;
     let after = ((end_s - at_s).min(AFTER_S) * RATE_PER_S) as i32;
     let times: Vec<f32> = (-before..=after).map(|i| at_s + i as f32 / RATE_PER_S).collect();

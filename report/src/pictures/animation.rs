@@ -93,7 +93,7 @@ struct Shown {
 }
 
 impl Take {
-    /// Drives the trial again, up to and including a tick; `seen` is told of every frame.
+    /// Drives the trial again, as long as `seen`, which is told of every frame, does not break.
     ///
     /// # Errors
     /// See [`Replay::drive`].
@@ -101,16 +101,28 @@ impl Take {
         replay: &Replay,
         episode: &EpisodeSettings,
         driver: &NamedDriver,
-        last_tick: Option<u32>,
-        mut seen: impl FnMut(&Frame),
+        mut seen: impl FnMut(&Frame) -> ControlFlow<()>,
     ) -> anyhow::Result<Self> {
         let mut frames = Vec::new();
         replay.drive(episode, driver, |frame| {
             frames.push(*frame);
-            seen(frame);
-            if last_tick == Some(frame.tick) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            seen(frame)
         })?;
         Ok(Self { name: driver.name.clone(), frames })
+    }
+
+    /// When a tick was observed, seconds of simulated time: not a number of periods, for the tick of a near-collision lasts
+    /// until the car stands on the path again.
+    pub fn observed_at_s(&self, index: usize) -> f32 {
+        index.checked_sub(1).map_or(0.0, |before| self.frames[before].time_s)
+    }
+
+    /// The tick under way at a time; the last one after the end.
+    pub fn index_at(&self, time_s: f32) -> usize {
+        /// More than times are rounded by, and less than a tick, seconds.
+        const ROUNDED_S: f32 = 1e-3;
+        let over = self.frames.partition_point(|frame| frame.time_s <= time_s + ROUNDED_S);
+        over.min(self.frames.len() - 1)
     }
 }
 
@@ -126,9 +138,8 @@ impl Scene {
     ) -> Self {
         let episode = replay.episode_settings(episode);
         let sensor = Sensor::new(&replay.map, episode.sensing.clone(), &episode.noise, replay.trial().episode_seed());
-        let period_s = episode.control_period_s();
         let shown = |take: &Take, time_s: f32| {
-            let frame = &take.frames[index_at(take, time_s, period_s)];
+            let frame = &take.frames[take.index_at(time_s)];
             let inspection = sensor.inspect(&replay.map, frame.vehicle.pose, frame.tick, &frame.observation);
             let grid = &inspection.shown_grid;
             let cells = || (0..GRID_CELLS * GRID_CELLS).map(|i| (i / GRID_CELLS, i % GRID_CELLS));
@@ -236,16 +247,17 @@ impl Scene {
         let view = self.view(moment);
         let mut sheet = Drawing::new(places.size_px, [0xFF; 3])?.overlay();
         let mut top = Drawing::new(view.size_px(), lot::GROUND)?.overlay();
-        let indices: Vec<usize> = self.takes.iter().map(|take| self.index_at(take, *time_s)).collect();
+        let indices_at = |time_s: f32| self.takes.iter().map(move |take| take.index_at(time_s));
+        let indices: Vec<usize> = indices_at(*time_s).collect();
         // What was driven before the first picture would only hide the ground.
-        let first = (self.moments[0].0 / self.episode.control_period_s()) as usize;
+        let shown_from = indices_at(self.moments[0].0);
         let driven: Vec<Trajectory> = self
             .trajectories
             .iter()
-            .zip(&indices)
-            .map(|(all, &index)| Trajectory {
+            .zip(shown_from.zip(&indices))
+            .map(|(all, (first, &index))| Trajectory {
                 name: String::new(),
-                points: all.points[first.min(index)..=index].to_vec(),
+                points: all.points[first..=index].to_vec(),
             })
             .collect();
         if let [only] = driven.as_slice() {
@@ -277,7 +289,7 @@ impl Scene {
             Camera::Place(place) => View::around(place, SIDE_M, SIDE_PX),
             Camera::Follow => {
                 let take = &self.takes[0];
-                let pose = take.frames[self.index_at(take, self.moments[moment].0)].vehicle.pose;
+                let pose = take.frames[take.index_at(self.moments[moment].0)].vehicle.pose;
                 View::around(pose.position() + 4.0 * pose.ahead(), SIDE_M, SIDE_PX)
             }
         }
@@ -293,10 +305,6 @@ impl Scene {
             Layout::Below => Vec2::new(880.0, 540.0),
         };
         (size_m * (largest_px / size_m).min_element().min(LOT_PX_PER_M_MAX)).floor()
-    }
-
-    fn index_at(&self, take: &Take, time_s: f32) -> usize {
-        index_at(take, time_s, self.episode.control_period_s())
     }
 
     fn grid(&self, frame: &Frame, shown: &Shown, cell_px: f32) -> anyhow::Result<Drawing> {
@@ -452,11 +460,6 @@ fn draw_cells(grid: &mut Drawing, cells: impl Iterator<Item = (usize, usize)>, r
     let cell_px = grid.size_px().x / GRID_CELLS as f32;
     let corners = cells.map(|(row, col)| Vec2::new(col as f32, row as f32) * cell_px).collect();
     grid.squares(corners, [cell_px - 1.0, cell_px], rgb);
-}
-
-/// The tick at a time; the last one after the end.
-fn index_at(take: &Take, time_s: f32, period_s: f32) -> usize {
-    ((time_s / period_s).round().max(0.0) as usize).min(take.frames.len() - 1)
 }
 
 fn of_speed(point: &Point) -> Rgb {

@@ -11,6 +11,7 @@ use experiment::replay_key::ReplayKey;
 use experiment::settings::{NoiseChoice, Settings};
 use experiment::trials::{Purpose, Trial};
 use sim::driver::{LookAheadPoint, Source, Spread};
+use sim::frame::{Event, Frame};
 use sim::geometry::Vec2;
 use sim::map::Map;
 use sim::scenario::Direction;
@@ -18,6 +19,7 @@ use sim::seed::RootSeed;
 use sim::sensing::noise::Layer;
 use sim::sensing::{GRID_CELLS, GridGeometry, OccupancyGrid};
 use sim::vehicle::VehicleSettings;
+use std::ops::ControlFlow;
 use tiny_skia::Pixmap;
 
 fn at(pixmap: &Pixmap, place: Vec2) -> Rgb {
@@ -187,7 +189,8 @@ fn an_animation_shows_every_driver_and_has_the_same_bytes_twice() {
     let replay = Replay::new(&key, &settings.episode).unwrap();
     let take = |spec: &str| {
         let driver = spec.parse::<DriverSpec>().unwrap().load(&settings).unwrap();
-        Take::of(&replay, &settings.episode, &driver, Some(100), |_| {}).unwrap()
+        let until = |frame: &Frame| if frame.tick < 100 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+        Take::of(&replay, &settings.episode, &driver, until).unwrap()
     };
     let takes = [take("expert"), take("vvf")];
     assert_eq!(takes[0].frames.len(), 101);
@@ -221,6 +224,39 @@ fn an_animation_shows_every_driver_and_has_the_same_bytes_twice() {
     }
     assert_eq!(frames, times.len());
     assert!(bytes.len() < 100_000, "{} bytes for 8 frames: 320 must fit into 3 MB", bytes.len());
+}
+
+/// A picture was taken for as many ticks old as it had periods: seconds after a few near-collisions it showed what came
+/// seconds later.
+#[test]
+fn pictures_after_a_near_collision_show_what_happens_at_their_time() {
+    let settings = Settings::preset("default").unwrap();
+    let key: ReplayKey = "tentacle@lot-b@forward@0@hard@1@0".parse().unwrap();
+    let replay = Replay::new(&key, &settings.episode).unwrap();
+    let driver = key.driver.load(&settings).unwrap();
+    let is_near = |frame: &Frame| matches!(frame.event, Event::NearCollision { .. });
+    let mut ticks_left = u32::MAX;
+    let take = Take::of(&replay, &settings.episode, &driver, |frame| {
+        ticks_left = if is_near(frame) { ticks_left.min(20) } else { ticks_left };
+        ticks_left -= 1;
+        if ticks_left > 0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    let take = take.unwrap();
+    let near = take.frames.iter().position(is_near).expect("this lot has one; choose another");
+    let [begun_s, stands_s] = [near, near + 1].map(|index| take.observed_at_s(index));
+    let period_s = settings.episode.control_period_s();
+    assert!(stands_s - begun_s > 2.0 * period_s, "braking takes {begun_s} s to {stands_s} s");
+    for (time_s, index) in [
+        (0.0, 0),
+        (begun_s - period_s, near - 1),
+        (begun_s, near),
+        (stands_s - 0.02, near),
+        (stands_s, near + 1),
+        (stands_s + 3.0 * period_s, near + 4),
+        (1e6, take.frames.len() - 1),
+    ] {
+        assert_eq!(take.index_at(time_s), index, "at {time_s} s");
+    }
 }
 
 #[test]

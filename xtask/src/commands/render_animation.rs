@@ -9,13 +9,13 @@ use crate::picture_folder::Folder;
 use anyhow::{Context as _, ensure};
 use clap::{ArgGroup, Args, ValueEnum};
 use experiment::drive::Replay;
-use experiment::drivers::DriverSpec;
+use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::replay_key::ReplayKey;
 use experiment::settings::{Layers, Settings};
 use report::pictures::animation::{Camera, Layout, Scene, Take};
 use report::pictures::encode::Format;
-use std::ops::RangeInclusive;
+use std::ops::{ControlFlow, RangeInclusive};
 
 /// Before and after the tick of a replay key, seconds.
 const AROUND_S: [f32; 2] = [8.0, 3.0];
@@ -100,19 +100,19 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
     let path = folder.file(args.name.as_ref().unwrap_or(&format!("drive-{trial}")), format.extension())?;
 
     let replay = Replay::new(first, &settings.episode)?;
-    let period_s = replay.episode_settings(&settings.episode).control_period_s();
-    let ticks: Vec<f32> = keys.iter().filter(|key| key.tick > 0).map(|key| key.tick as f32 * period_s).collect();
-    let earliest_s = ticks.iter().copied().reduce(f32::min);
-    let to_s = args.to.or(ticks.iter().copied().reduce(f32::max).map(|latest_s| latest_s + AROUND_S[1]));
-    let takes = drive(&replay, &settings, &keys, to_s.map(|to_s| (to_s / period_s).ceil() as u32), folder.output)?;
+    let drivers = load(&keys, &settings)?;
+    let moments_s = moments_s(&keys, &drivers, &settings, args.to)?;
+    let earliest_s = moments_s.iter().copied().reduce(f32::min);
+    let to_s = args.to.or(moments_s.iter().copied().reduce(f32::max).map(|latest_s| latest_s + AROUND_S[1]));
+    let takes = drive(&replay, &settings, &drivers, to_s.unwrap_or(f32::INFINITY), folder.output)?;
 
-    let end_s = takes.iter().map(|take| take.frames.len() - 1).max().unwrap_or(0) as f32 * period_s;
+    let end_s = takes.iter().map(|take| take.observed_at_s(take.frames.len() - 1)).fold(0.0, f32::max);
     let from_s = args.from.or(earliest_s.map(|at_s| at_s - AROUND_S[0])).unwrap_or(0.0).max(0.0);
     let to_s = to_s.unwrap_or(end_s).min(end_s);
     ensure!(from_s < to_s, "from {from_s:.1} s to {to_s:.1} s there is nothing to show; choose other --from and --to");
     let shown_cs = shown_cs(args.fps);
     let whole = ((to_s - from_s) / step_s(1.0, shown_cs) / FRAMES_WANTED).ceil().max(1.0);
-    let speed = args.speed.unwrap_or(if ticks.is_empty() { whole } else { 1.0 });
+    let speed = args.speed.unwrap_or(if moments_s.is_empty() { whole } else { 1.0 });
     let step_s = step_s(speed, shown_cs);
     let count = ((to_s - from_s) / step_s) as u32;
     ensure!(
@@ -125,8 +125,7 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
     let camera = match (args.view, earliest_s) {
         (Some(ViewChoice::Follow), _) => Camera::Follow,
         (None, Some(at_s)) => {
-            let frames = &takes[0].frames;
-            let pose = frames[((at_s / period_s).round() as usize).min(frames.len() - 1)].vehicle.pose;
+            let pose = takes[0].frames[takes[0].index_at(at_s)].vehicle.pose;
             Camera::Place(pose.position() + 3.0 * pose.ahead())
         }
         (Some(ViewChoice::Lot), _) | (None, None) => Camera::Lot,
@@ -172,22 +171,50 @@ fn resolve(args: &AnimationArgs, output: &Output) -> anyhow::Result<(Settings, V
     Ok((settings, keys))
 }
 
+/// The drivers of keys, in their order.
+fn load(keys: &[ReplayKey], settings: &Settings) -> anyhow::Result<Vec<NamedDriver>> {
+    let load = |key: &ReplayKey| {
+        let driver = key.driver.clone().load(settings)?;
+        driver.check(settings).with_context(|| key.to_string())?;
+        Ok(driver)
+    };
+    keys.iter().map(load).collect()
+}
+
+/// When the moments of keys that have one were observed, seconds. `to_s`: where the pictures end, if that was said.
+fn moments_s(
+    keys: &[ReplayKey],
+    drivers: &[NamedDriver],
+    settings: &Settings,
+    to_s: Option<f32>,
+) -> anyhow::Result<Vec<f32>> {
+    let mut moments_s = Vec::new();
+    for (key, driver) in keys.iter().zip(drivers).filter(|(key, _)| key.tick > 0) {
+        let at_s = Replay::new(key, &settings.episode)?.observed_at_s(&settings.episode, driver)?;
+        if let Some(to_s) = to_s {
+            ensure!(to_s >= at_s, "--to {to_s}: the moment of {key} comes later, at {at_s:.1} s; choose a later one");
+        }
+        moments_s.push(at_s);
+    }
+    Ok(moments_s)
+}
+
+/// Drives the trial with each of the drivers, up to a time.
 fn drive(
     replay: &Replay,
     settings: &Settings,
-    keys: &[ReplayKey],
-    last_tick: Option<u32>,
+    drivers: &[NamedDriver],
+    to_s: f32,
     output: &Output,
 ) -> anyhow::Result<Vec<Take>> {
     let console = Console::new(output);
     let length_m = replay.map.path().length_m();
     let mut takes = Vec::new();
-    for key in keys {
-        let driver = key.driver.clone().load(settings)?;
-        driver.check(settings).with_context(|| key.to_string())?;
+    for driver in drivers {
         console.begin("driving", &driver.name);
-        let take = Take::of(replay, &settings.episode, &driver, last_tick, |frame| {
+        let take = Take::of(replay, &settings.episode, driver, |frame| {
             console.at(f64::from(frame.progress_m / length_m), &mut |_| format!("{} ticks", frame.tick));
+            if frame.time_s > to_s { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })?;
         if console.is_cancelled() {
             return Err(Interrupted { kept: "nothing was written".to_owned() }.into());
