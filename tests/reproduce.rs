@@ -364,6 +364,16 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
     let unknown = render(&[&WHOLE.0.to_string_lossy()]);
     assert_eq!(unknown.status.code(), Some(2));
     assert!(text(&unknown).1.contains("a run of reproduce has no table of its own"), "{}", text(&unknown).1);
+    // The page was looked at first, and said to be in the way of a run that has none.
+    let diary = folder.join("diary.md");
+    std::fs::write(&diary, "dear").unwrap();
+    let whole = WHOLE.0.display().to_string();
+    let mut onto_diary = xtask();
+    onto_diary.args(["render", "results", &out_name, "--with", &whole, "--to"]).arg(&diary);
+    let said = text(&onto_diary.output().unwrap()).1;
+    assert!(said.contains("a run of reproduce has no table of its own") && !said.contains("diary"), "{said}");
+    refused(&["render", "results", &out_name, "--to"], &[&diary], "is not a page of results");
+    assert_eq!(std::fs::read_to_string(&diary).unwrap(), "dear");
     assert!(render(&[&out_name, &format!("Few lots={out_name}")]).status.success());
     let results = std::fs::read_to_string(&page).unwrap();
     let (_, last) = results.split_once("\n## Few lots\n").unwrap();

@@ -11,7 +11,7 @@ use experiment::manifest::{self, Manifest};
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::convert::Infallible;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 use storage::sums;
 
@@ -58,12 +58,11 @@ impl OtherRun {
         Ok(())
     }
 
-    /// Writes its table as a page of the documentation, with what made it in its head and the tables of other runs at its
-    /// end; figures go to `pictures` beside it.
+    /// Its table as a page of the documentation, with what made it in its head and the tables of other runs at its end.
     ///
     /// # Errors
-    /// If it is not finished or has no table, what it wrote cannot be read, or a file cannot be written.
-    pub fn write_docs(&self, others: &[Self], to: &Path, made_by: MadeBy<'_>) -> anyhow::Result<()> {
+    /// If it, or one of the others, is not finished or has no table, or what it wrote cannot be read.
+    pub fn docs_page(&self, others: &[Self], made_by: MadeBy<'_>) -> anyhow::Result<Page> {
         let Found { manifest, title, table, plot } = self.read()?;
         let named: Vec<String> = others.iter().map(Self::to_string).collect();
         let mut page = Page::new(title);
@@ -72,7 +71,7 @@ impl OtherRun {
         page.text(table);
         add_plot(&mut page, &manifest.command, plot);
         others.iter().try_for_each(|other| other.add_to(&mut page))?;
-        page.write_markdown(to)
+        Ok(page)
     }
 
     fn read(&self) -> anyhow::Result<Found> {

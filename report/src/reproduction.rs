@@ -58,18 +58,11 @@ pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
     Ok(verdicts(&found.statements, &recipe.extent))
 }
 
-/// Writes the same as a page of the documentation, with what made it in its head, and the tables of other runs at its end;
-/// figures go to `pictures` beside it.
+/// The same as a page of the documentation, with what made it in its head, and the tables of other runs at its end.
 ///
 /// # Errors
-/// If what a stage wrote cannot be read, or a file cannot be written.
-pub fn write_docs(
-    recipe: &Recipe,
-    run: &Path,
-    others: &[OtherRun],
-    to: &Path,
-    made_by: MadeBy<'_>,
-) -> anyhow::Result<()> {
+/// If what a stage wrote, or another run, cannot be read.
+pub fn docs_page(recipe: &Recipe, run: &Path, others: &[OtherRun], made_by: MadeBy<'_>) -> anyhow::Result<Page> {
     let seeds = recipe.settings.training_seeds(recipe.extent.seeds);
     let seeds = seeds.iter().map(|seed| seed.0.to_string()).collect::<Vec<_>>().join(", ");
     let named: Vec<String> = others.iter().map(OtherRun::to_string).collect();
@@ -83,7 +76,7 @@ pub fn write_docs(
     page.text(cautions(&recipe.settings)?);
     Found::read(recipe, run)?.add_to(&mut page, recipe, run)?;
     others.iter().try_for_each(|other| other.add_to(&mut page))?;
-    page.write_markdown(to)
+    Ok(page)
 }
 
 /// What a reader must know before quoting a figure.

@@ -33,13 +33,7 @@ const BACKENDS: &[&str] = &[
 /// If it cannot be built, it failed (it has said why), or on Ctrl-C.
 pub(crate) fn ask(request: &ViewRequest, output: &Output) -> anyhow::Result<()> {
     let manifest = manifest()?;
-    let request = serde_json::to_vec(request)?;
-    ensure!(
-        request.len() as u64 <= VIEW_REQUEST_BYTES_MAX,
-        "this asks the viewer program for too much at once, in {} bytes, and at most {VIEW_REQUEST_BYTES_MAX} are read; record \
-         fewer, with a smaller --limit or fewer keys",
-        request.len()
-    );
+    let request = encoded(request)?;
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
     command.args(["run", "--locked", "--manifest-path"]).arg(&manifest);
@@ -82,6 +76,18 @@ pub(crate) fn ask(request: &ViewRequest, output: &Output) -> anyhow::Result<()> 
     Ok(())
 }
 
+/// A request as it is passed on.
+fn encoded(request: &ViewRequest) -> anyhow::Result<Vec<u8>> {
+    let request = serde_json::to_vec(request)?;
+    ensure!(
+        request.len() as u64 <= VIEW_REQUEST_BYTES_MAX,
+        "this asks the viewer program for too much at once, in {} bytes, and at most {VIEW_REQUEST_BYTES_MAX} are read; record \
+         fewer, with a smaller --limit or fewer keys",
+        request.len()
+    );
+    Ok(request)
+}
+
 /// The manifest of the viewer program in this checkout, wherever that was moved to.
 fn manifest() -> anyhow::Result<PathBuf> {
     let starts = [std::env::current_exe(), std::env::current_dir()];
@@ -104,6 +110,19 @@ fn target_folder() -> Option<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use experiment::view_request::{Show, Sink};
+    use sim::seed::RootSeed;
+
+    /// The viewer program would read the first million bytes, and say that the request breaks off.
+    #[test]
+    fn a_request_of_more_than_a_million_bytes_is_refused_and_no_shorter_one() {
+        let request = |lot: String| ViewRequest { sink: Sink::Spawn, show: vec![Show::Lot { lot, seed: RootSeed(1) }] };
+        let around = encoded(&request(String::new())).unwrap().len();
+        let of_length = |bytes: usize| encoded(&request("x".repeat(bytes - around)));
+        assert_eq!(of_length(1_000_000).unwrap().len(), 1_000_000);
+        let refusal = of_length(1_000_001).unwrap_err().to_string();
+        assert!(refusal.contains("in 1000001 bytes, and at most 1000000 are read; record fewer"), "{refusal}");
+    }
 
     #[test]
     fn the_viewer_program_of_this_checkout_is_found() {

@@ -423,24 +423,26 @@ fn render_results(args: &RenderResultsArgs, overwrite: bool, output: &Output) ->
         args.run.display()
     );
     let Manifest { command, preset, .. } = Manifest::read(&args.run)?;
-    let page = match (command.as_str(), preset.strip_prefix("full-").unwrap_or(&preset)) {
+    let suffix = match (command.as_str(), preset.strip_prefix("full-").unwrap_or(&preset)) {
         (reproduce::COMMAND, "default") => String::new(),
         (reproduce::COMMAND, preset) => format!("-{preset}"),
         (command, _) => format!("-{command}"),
     };
-    let to = args.to.clone().unwrap_or_else(|| format!("docs/results{page}.md").into());
+    let to = args.to.clone().unwrap_or_else(|| format!("docs/results{suffix}.md").into());
+    let made_by = MadeBy { build: build_info::get(), to: args.to.as_deref() };
+    // What is wrong with a run is said before anything about the page: with another run it may be another page.
+    let page = if command == reproduce::COMMAND {
+        reproduction::docs_page(&reproduce::recipe_of(&args.run)?, &args.run, &args.with, made_by)?
+    } else {
+        OtherRun::from(args.run.clone()).docs_page(&args.with, made_by)?
+    };
     run_dir::ensure_outside_of_runs(&to).context("--to")?;
     ensure!(
         overwrite || !to.exists() || docs_page::is_page_of_results(&to),
         "{}: exists already, and is not a page of results; choose another --to, or replace it with --overwrite",
         to.display()
     );
-    let made_by = MadeBy { build: build_info::get(), to: args.to.as_deref() };
-    if command == reproduce::COMMAND {
-        reproduction::write_docs(&reproduce::recipe_of(&args.run)?, &args.run, &args.with, &to, made_by)?;
-    } else {
-        OtherRun::from(args.run.clone()).write_docs(&args.with, &to, made_by)?;
-    }
+    page.write_markdown(&to)?;
     output.print(to.display());
     Ok(())
 }
