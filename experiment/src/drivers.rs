@@ -280,7 +280,7 @@ impl NamedDriver {
                 }
                 Model::Onnx(_, inference) => inference.smoothing_ticks = ticks,
                 Model::Expert(_) | Model::GridExpert(_) | Model::Planner(_) | Model::Callback(_) => {
-                    self.smoothing_ticks = ticks
+                    self.smoothing_ticks = ticks;
                 }
             }
         }

@@ -69,7 +69,7 @@ impl LossSettings {
     /// The same, as all are written that have its effect.
     fn in_effect(self) -> Self {
         match self.weight {
-            WeightForm::Linear { gain } if gain == 0.0 => self.with_alpha(0.0),
+            WeightForm::Linear { gain: 0.0 } => self.with_alpha(0.0),
             WeightForm::Linear { .. } => Self { alpha: 0.0, ..self },
             WeightForm::ResidualSq => self,
         }
