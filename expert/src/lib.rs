@@ -18,6 +18,8 @@
 //!
 //! Where the numbers come from is in docs/methods.md 3 and E5. The expert decides from the clean scene around the car.
 //! The route has one purpose: a plan that turns back is refused. The same situation and memory give the same bytes.
+//!
+//! [`GridExpert`] decides by the same steps from the noisy grid alone, as a policy.
 
 mod context;
 mod elastic_band;

@@ -156,15 +156,18 @@ mod tests {
         assert!(expert.field.at(centre) > 2.9, "the grid before is forgotten");
     }
 
-    /// A wall ahead with one way on, to the left.
+    /// Before a corner: straight on lies a pocket of ten metres, to the left a way that leaves the grid after six.
     #[test]
     fn a_way_that_leaves_the_grid_is_taken_rather_than_one_that_ends() {
+        let cols = |cols: std::ops::Range<u32>| cols.map(|col| 1 << col).sum::<u32>();
         let mut grid = OccupancyGrid::free();
-        for row in 0..12 {
-            grid.occupy_row(row, OccupancyGrid::ROW_MASK);
-        }
-        for row in 12..GRID_CELLS {
-            grid.occupy_row(row, OccupancyGrid::ROW_MASK << 18);
+        for row in 0..GRID_CELLS {
+            let free = match row {
+                0..3 => 0,
+                3..14 => cols(7..17),
+                _ => cols(0..17),
+            };
+            grid.occupy_row(row, !free);
         }
         let curvature_per_m = |grid: &OccupancyGrid| {
             let mut expert = expert();
