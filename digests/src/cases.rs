@@ -1,7 +1,7 @@
 //! What is driven: the expert and every planner, lots of every family, with and without noise, both ways.
 
 use crate::{Golden, Goldens, drive};
-use expert::{ExpertSettings, ScriptedExpert};
+use expert::{ExpertSettings, GridExpert, ScriptedExpert};
 use planners::{PlannerContext, PlannerSpec};
 use rayon::prelude::*;
 use scenarios::reference::{ReferenceLot, lot};
@@ -90,6 +90,7 @@ fn on_lot_c() -> Vec<Case> {
         let mut add = |name: &str, driver: Box<dyn Driver + Send>| cases.push(Case::new(name, &scene, driver));
         add("middle of the row", Box::new(SensorsOnly(MiddleOfTheRow(scene.settings.sensing.geometry))));
         add("expert", Box::new(expert(&scene.settings)));
+        add("grid-expert", Box::new(SensorsOnly(grid_expert(&scene.settings))));
         // One planner shows what noise changes; the others differ in what they compute alone.
         for spec in PlannerSpec::all().iter().filter(|spec| scene.is_noisy() || spec.name() == "tentacle") {
             add(spec.name(), Box::new(SensorsOnly(spec.planner(&context))));
@@ -110,6 +111,10 @@ fn on_generated(lot: &Scenario) -> [Case; 2] {
 
 fn expert(settings: &EpisodeSettings) -> ScriptedExpert {
     ScriptedExpert::new(ExpertSettings::half_points(), settings, RootSeed(1).rng(Stream::Expert, 0))
+}
+
+fn grid_expert(settings: &EpisodeSettings) -> GridExpert {
+    GridExpert::new(ExpertSettings::half_points(), settings, RootSeed(1).rng(Stream::Expert, 0))
 }
 
 fn digest(text: &str) -> String {
