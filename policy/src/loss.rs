@@ -4,7 +4,10 @@
 //!
 //! `L = ½ · mean_j[ W · e_j² · exp(−s_j) + s_j ]`, `W = (1 + α τ̂)²`
 //!
-//! For a network with several modes k of weight π_k, with `L_k` the loss of each: `−½ log Σ_k π_k exp(−2 L_k)`.
+//! For a network with several modes k of weight π_k, with `L_kj` the loss of each on axis j, before the mean:
+//! `½ [ −log Σ_k π_k exp(−L_ku) + Σ_k r_k L_kw ]`. A mode's share in a sample, `r_k = π_k exp(−L_ku) / Σ π exp(−L_u)`, is a matter
+//! of u alone: modes are ways, and ways differ in their side. If w counted as well, one mode would take all labels of full
+//! range, whose w is nearly always the same, and none would stand for a way.
 
 use crate::dataset::Sample;
 use crate::network::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, OUTPUTS, operations};
@@ -132,7 +135,7 @@ pub fn of_batch(settings: &LossSettings, outputs: Tensor<2>, labels: Tensor<2>, 
 }
 
 /// Expectation and maximisation: with the share that each mode has in a sample held constant, the sum of their losses by
-/// these shares has the value and the gradient of the mixture's.
+/// these shares has the value of the loss above and its gradient.
 fn of_mixture(
     settings: &LossSettings,
     outputs: &Tensor<2>,
@@ -147,7 +150,7 @@ fn of_mixture(
     let plain = LossSettings { beta: 0.0, ..*settings };
     let energies = (0..modes).map(|mode| {
         let BatchLoss { misfit, log_variance } = of_mode(&plain, mode);
-        (misfit + log_variance).sum_dim(1)
+        (misfit + log_variance).narrow(1, 0, 1) // that of u
     });
     let energies = Tensor::cat(energies.collect(), 1); // [batch, modes]
     let log_shares = log_softmax(log_weights.clone() - energies, 1).detach();
@@ -277,28 +280,38 @@ mod tests {
         }
     }
 
-    /// Two modes in closed form; the gradient by finite differences.
+    /// Two modes in closed form; the gradient by finite differences, with the shares held.
     #[test]
-    fn a_mixture_is_the_likelihood_of_all_its_modes() {
+    fn modes_share_a_sample_by_its_side() {
         let settings = LossSettings::paper();
         let other = [0.48, 0.33, -4.4, -2.9];
-        let mixture = |raw: &[f32]| {
-            let (modes, logits) = raw.split_at(2 * OUTPUTS);
-            let of_mode = |mode: usize| {
-                let raw: [f32; OUTPUTS] = modes[mode * OUTPUTS..][..OUTPUTS].try_into().unwrap();
-                libm::exp(f64::from(logits[mode]) - 2.0 * formula(&settings, raw, raw))
-            };
-            let weights: f64 = logits.iter().map(|&logit| libm::exp(f64::from(logit))).sum();
-            -0.5 * libm::log((of_mode(0) + of_mode(1)) / weights)
-        };
         let raw: Vec<f32> = RAW.into_iter().chain(other).chain([0.3, -0.8]).collect();
+        let of_axis = |raw: &[f32], mode: usize, axis: usize| {
+            let (mean, raw_log_variance) = (raw[mode * OUTPUTS + axis], raw[mode * OUTPUTS + 2 + axis]);
+            let error = f64::from(LABEL[axis] - mean);
+            let log_variance = f64::from(soft_clamp_log_variance(raw_log_variance));
+            let weight = f64::from(settings.weight_of_squared_error(TAU_HAT));
+            0.5 * (weight * error * error * libm::exp(-log_variance) + log_variance)
+        };
+        // The likelihood of each mode by its side.
+        let by_side = |raw: &[f32]| {
+            let logits = &raw[2 * OUTPUTS..];
+            let weights: f64 = logits.iter().map(|&logit| libm::exp(f64::from(logit))).sum();
+            [0, 1].map(|mode| libm::exp(f64::from(logits[mode]) - of_axis(raw, mode, 0)) / weights)
+        };
+        let held = by_side(&raw);
+        let value = |raw: &[f32]| {
+            let sides = by_side(raw);
+            let ranges: f64 = (0..2).map(|mode| held[mode] / (held[0] + held[1]) * of_axis(raw, mode, 1)).sum();
+            0.5 * (ranges - libm::log(sides[0] + sides[1]))
+        };
         let (loss, gradient) = loss_and_gradient(&settings, &raw);
-        assert!((f64::from(loss) - mixture(&raw)).abs() < 1e-5, "{loss} against {}", mixture(&raw));
+        assert!((f64::from(loss) - value(&raw)).abs() < 1e-5, "{loss} against {}", value(&raw));
         for (index, slope) in gradient.into_iter().enumerate() {
             let at = |delta: f32| {
                 let mut raw = raw.clone();
                 raw[index] += delta;
-                mixture(&raw)
+                value(&raw)
             };
             let difference = (at(1e-3) - at(-1e-3)) / 2e-3;
             assert!(
@@ -306,6 +319,17 @@ mod tests {
                 "[{index}]: {difference} {slope}"
             );
         }
+    }
+
+    /// A label of the usual range, to the left or to the right: no mode may claim it for its range.
+    #[test]
+    fn the_range_of_a_label_does_not_choose_the_mode() {
+        let settings = LossSettings { alpha: 0.0, ..LossSettings::paper() };
+        let wide = -2.0;
+        // The first has the label's side, the second its range to a centimetre.
+        let raw = [LABEL[0], 0.6, wide, wide, 0.9, LABEL[1], wide, -9.0, 0.0, 0.0];
+        let (_, gradient) = loss_and_gradient(&settings, &raw);
+        assert!(gradient[8] < 0.0 && gradient[9] > 0.0, "the first becomes likelier: {gradient:?}");
     }
 
     #[test]
