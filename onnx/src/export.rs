@@ -3,7 +3,7 @@
 use crate::about::{self, About};
 use crate::{INPUT, OUTPUT};
 use policy::checkpoint::Checkpoint;
-use policy::network::{ConvLayer, NetworkArchitecture, OUTPUTS, RESIDUAL_KERNEL};
+use policy::network::{ConvLayer, NetworkArchitecture, RESIDUAL_KERNEL};
 use rten_onnx::onnx::{
     AttributeProto, AttributeType, DataType, Dimension, NodeProto, OperatorSetIdProto, StringStringEntryProto,
     TensorProto, TensorShapeProto, TypeProto, TypeProtoTensor, ValueInfoProto,
@@ -17,22 +17,10 @@ const OPERATORS: i64 = 17;
 /// Version of the format that came with them.
 const FORMAT: i64 = 8;
 
-/// What cannot be written as ONNX.
-#[derive(Debug, Clone, Copy, thiserror::Error)]
-#[error("the network answers with {0} modes; only networks with one (dagger.network.modes = 1) can be written as ONNX")]
-pub struct SeveralModes(usize);
-
 /// The file: the network's own outputs for `[batch, 1, 25, 25]`. How they are used is written beside the graph ([`About`]) and
 /// is not part of it.
-///
-/// # Errors
-/// If the network answers with several modes: none of the drivers that read such files weighs them.
-pub fn export(checkpoint: &Checkpoint) -> Result<Vec<u8>, SeveralModes> {
-    let architecture = checkpoint.weights.architecture();
-    if architecture.modes != 1 {
-        return Err(SeveralModes(architecture.modes));
-    }
-    Ok(file(checkpoint, layers(architecture)))
+pub fn export(checkpoint: &Checkpoint) -> Vec<u8> {
+    file(checkpoint, layers(checkpoint.weights.architecture()))
 }
 
 /// The network's layers.
@@ -88,7 +76,7 @@ pub(crate) fn file(checkpoint: &Checkpoint, nodes: Vec<NodeProto>) -> Vec<u8> {
             nodes,
             tensors: tensors.collect(),
             input: values(INPUT, &[1, GRID_CELLS as i64, GRID_CELLS as i64]),
-            output: values(OUTPUT, &[OUTPUTS as i64]),
+            output: values(OUTPUT, &[checkpoint.weights.architecture().outputs() as i64]),
         },
         operators: OperatorSetIdProto { domain: Some(String::new()), version: Some(OPERATORS) },
         about: StringStringEntryProto { key: Some(about::KEY.to_owned()), value: Some(about.to_toml()) },

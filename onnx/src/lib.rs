@@ -19,5 +19,5 @@ pub use about::About;
 
 /// Name of the only input: occupied cells, float32 `[batch, 1, 25, 25]`.
 pub const INPUT: &str = "grid";
-/// Name of the output: float32 `[batch, 4]` or `[batch, 2]`.
+/// Name of the output: float32 `[batch, 2]`, `[batch, 4]`, or `[batch, 5 m]` of m modes.
 pub const OUTPUT: &str = "point";

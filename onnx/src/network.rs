@@ -2,9 +2,10 @@
 
 use crate::about::{self, About};
 use crate::{INPUT, OUTPUT, wire};
+use policy::network::modes::{likeliest_of, mirror_averaged, row_width};
 use policy::network::{OUTPUTS, Prediction};
 use rten::{DataType, Dimension, Model, NodeId, RunOptions, ThreadPool, Value, ValueType};
-use sim::limits::{ONNX_BATCH_MAX, ONNX_BYTES_MAX};
+use sim::limits::{MODES_MAX, ONNX_BATCH_MAX, ONNX_BYTES_MAX};
 use sim::sensing::{GRID_CELLS, OccupancyGrid};
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -29,16 +30,50 @@ pub struct OnnxNetwork {
     input: NodeId,
     output: NodeId,
     batch: usize,
-    /// Numbers of an answer: (u, w), or these and both raw log-variances.
-    numbers: usize,
+    /// What it answers to one grid.
+    answer: Answer,
     about: Option<About>,
     sha256: String,
 }
 
 impl fmt::Debug for OnnxNetwork {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { batch, numbers, sha256, .. } = self;
-        write!(f, "OnnxNetwork {{ batch: {batch}, numbers: {numbers}, sha256: {sha256:?} }}")
+        let Self { batch, answer, sha256, .. } = self;
+        write!(f, "OnnxNetwork {{ batch: {batch}, answer: {answer:?}, sha256: {sha256:?} }}")
+    }
+}
+
+/// Meaning of the numbers that answer one grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Answer {
+    /// u and w.
+    Point,
+    /// This many modes, each u, w and both raw log-variances; if there are several, then their logits.
+    Modes(usize),
+}
+
+impl Answer {
+    /// What so many numbers mean.
+    fn of(numbers: usize) -> Option<Self> {
+        if numbers == 2 {
+            return Some(Self::Point);
+        }
+        (1..=MODES_MAX).find(|&modes| row_width(modes) == numbers).map(Self::Modes)
+    }
+
+    fn numbers(self) -> usize {
+        match self {
+            Self::Point => 2,
+            Self::Modes(modes) => row_width(modes),
+        }
+    }
+
+    /// Modes of a row of [`OnnxNetwork::rows`].
+    fn modes(self) -> usize {
+        match self {
+            Self::Point => 1,
+            Self::Modes(modes) => modes,
+        }
     }
 }
 
@@ -89,13 +124,15 @@ impl OnnxNetwork {
         }
         let about = model.metadata().get(about::KEY).map(About::parse).transpose();
         let about = about.map_err(|error| format!("has metadata {:?} that cannot be read: {error}", about::KEY))?;
-        let mut network = Self { model: Arc::new(model), input, output, batch, numbers: 0, about, sha256 };
+        let mut network = Self { model: Arc::new(model), input, output, batch, answer: Answer::Point, about, sha256 };
         let pool = Arc::new(ThreadPool::with_num_threads(1));
         let (numbers, _) = network.run(&[&OccupancyGrid::free()], &pool)?;
-        if numbers != 2 && numbers != OUTPUTS {
-            return Err(format!("answers {numbers} numbers per grid, not (u, w) or (u, w, raw_u, raw_w)"));
-        }
-        network.numbers = numbers;
+        network.answer = Answer::of(numbers).ok_or_else(|| {
+            format!(
+                "answers {numbers} numbers per grid, not (u, w), or (u, w, raw_u, raw_w), or these four for each of 2 to \
+                 {MODES_MAX} modes and then their logits"
+            )
+        })?;
         network.check_independence(&pool)?;
         Ok(network)
     }
@@ -131,7 +168,7 @@ impl OnnxNetwork {
 
     /// Whether it answers standard deviations as well.
     pub fn has_spread(&self) -> bool {
-        self.numbers == OUTPUTS
+        self.answer != Answer::Point
     }
 
     /// Answers every grid, in order; with NaN where the network fails.
@@ -141,30 +178,37 @@ impl OnnxNetwork {
         mirror_averaging: bool,
         pool: &Arc<ThreadPool>,
     ) -> Vec<Prediction> {
-        let answers = if mirror_averaging {
+        let modes = self.answer.modes();
+        let width = row_width(modes);
+        let raw: Vec<[f32; OUTPUTS]> = if mirror_averaging {
             let mirrored: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
             let both: Vec<_> = grids.iter().copied().chain(&mirrored).collect();
-            let mut answers = self.raw(&both, pool);
-            let of_images = answers.split_off(grids.len());
-            for (answer, [u, w, raw_u, raw_w]) in answers.iter_mut().zip(of_images) {
-                let image = [1.0 - u, w, raw_u, raw_w];
-                *answer = std::array::from_fn(|i| 0.5 * (answer[i] + image[i]));
-            }
-            answers
+            let rows = self.rows(&both, pool);
+            let (of_grids, of_images) = rows.split_at(grids.len() * width);
+            let rows = of_grids.chunks_exact(width).zip(of_images.chunks_exact(width));
+            rows.map(|(of_grid, of_image)| mirror_averaged(of_grid, of_image, modes)).collect()
         } else {
-            self.raw(grids, pool)
+            self.rows(grids, pool).chunks_exact(width).map(|row| likeliest_of(row, modes)).collect()
         };
-        answers.into_iter().map(Prediction::from_raw).collect()
+        raw.into_iter().map(Prediction::from_raw).collect()
     }
 
-    /// Raw outputs per grid; those that the network does not have are 0, and all are NaN if it fails.
-    fn raw(&self, grids: &[&OccupancyGrid], pool: &Arc<ThreadPool>) -> Vec<[f32; OUTPUTS]> {
-        let answer = |grids: &[&OccupancyGrid]| match self.run(grids, pool) {
-            Ok((numbers, values)) if numbers == self.numbers => {
-                let raw = |row: &[f32]| std::array::from_fn(|i| row.get(i).copied().unwrap_or(0.0));
-                values.chunks_exact(numbers).take(grids.len()).map(raw).collect()
+    /// Rows of raw outputs, one per grid, as those of a network of ours. Log-variances that the network does not answer are 0,
+    /// and all is NaN if it fails.
+    fn rows(&self, grids: &[&OccupancyGrid], pool: &Arc<ThreadPool>) -> Vec<f32> {
+        let width = row_width(self.answer.modes());
+        let answer = |grids: &[&OccupancyGrid]| {
+            let mut rows = Vec::with_capacity(grids.len() * width);
+            match self.run(grids, pool) {
+                Ok((numbers, values)) if numbers == self.answer.numbers() => {
+                    for (index, row) in values.chunks_exact(numbers).take(grids.len()).enumerate() {
+                        rows.extend_from_slice(row);
+                        rows.resize((index + 1) * width, 0.0);
+                    }
+                }
+                _ => rows.resize(grids.len() * width, f32::NAN),
             }
-            _ => vec![[f32::NAN; OUTPUTS]; grids.len()],
+            rows
         };
         // Within the pool, its thread is not woken for every batch.
         pool.run(|| grids.chunks(self.batch).flat_map(answer).collect())
@@ -184,7 +228,7 @@ impl OnnxNetwork {
             .map_err(|error| format!("cannot be run: {error}"))?;
         let (shape, values) = output
             .into_shape_vec::<f32, 2>()
-            .map_err(|error| format!("answers {OUTPUT} in another form than float32 [batch, 4]: {error}"))?;
+            .map_err(|error| format!("answers {OUTPUT} in another form than float32 [batch, numbers]: {error}"))?;
         match shape {
             [rows, numbers] if rows == self.batch => Ok((numbers, values)),
             [rows, _] => Err(format!("answers {rows} rows to {} grids", self.batch)),

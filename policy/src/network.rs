@@ -10,6 +10,7 @@ mod error;
 mod inference;
 mod log_variance;
 mod look_ahead_net;
+pub mod modes;
 pub mod operations;
 mod predictor;
 mod weights;

@@ -37,7 +37,7 @@ def max_pool(x):
 
 
 def forward(model, tensors, grids):
-    """Grids [batch, 25, 25] to raw outputs [batch, 4]: u, w and their raw log-variances."""
+    """Grids [batch, 25, 25] to the m answers of each [batch, m, 4], and the logarithms of their weights [batch, m]."""
     x = grids[:, None].astype(np.float32)
     for layer in model["layers"]:
         weight, bias = tensors[layer["name"] + ".weight"], tensors[layer["name"] + ".bias"]
@@ -48,15 +48,26 @@ def forward(model, tensors, grids):
             x = x.reshape(len(x), -1) @ weight.T + bias
         if layer["activation"] == "relu":
             x = np.maximum(x, 0)
-    return x
+    modes = model["network"]["modes"]
+    logits = x[:, 4 * modes :] if modes > 1 else np.zeros((len(x), 1))
+    logits = logits - logits.max(axis=1, keepdims=True)
+    return x[:, : 4 * modes].reshape(-1, modes, 4), logits - np.log(np.exp(logits).sum(axis=1, keepdims=True))
 
 
 def answer(model, tensors, grids):
     """Grids [batch, 25, 25] to [batch, 4]: mean u, w and standard deviations of u, w, in image fractions."""
-    raw = forward(model, tensors, grids)
+    of_grid, log_weights = forward(model, tensors, grids)
+    each = np.arange(len(grids))
+    raw = of_grid[each, log_weights.argmax(axis=1)]
     if model["inference"]["mirror_averaging"]:
-        u, w, raw_u, raw_w = forward(model, tensors, grids[:, :, ::-1]).T
-        raw = (raw + np.stack([1 - u, w, raw_u, raw_w], axis=1)) / 2
+        of_image, image_log_weights = forward(model, tensors, grids[:, :, ::-1])
+        of_image = of_image * [-1, 1, 1, 1] + [1, 0, 0, 0]
+        # The likelier of both, and the other's nearest to it.
+        image_first = image_log_weights.max(axis=1) > log_weights.max(axis=1)
+        raw = np.where(image_first[:, None], of_image[each, image_log_weights.argmax(axis=1)], raw)
+        others = np.where(image_first[:, None, None], of_grid, of_image)
+        nearest = np.linalg.norm(others[:, :, :2] - raw[:, None, :2], axis=2).argmin(axis=1)
+        raw = (raw + others[each, nearest]) / 2
     low, high = model["log_variance_min"], model["log_variance_max"]
     mid, half = (low + high) / 2, (high - low) / 2
     log_variance = mid + half * np.tanh((raw[:, 2:] - mid) / half)

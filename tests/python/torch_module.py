@@ -27,7 +27,7 @@ class LookAheadNet(nn.Module):
             else:
                 x = self.get_submodule(layer["name"])(x.flatten(1))
             x = F.relu(x) if layer["activation"] == "relu" else x
-        return x  # [batch, 4]: u, w, raw log-variances of u and w
+        return x  # [batch, 4]: u, w, raw log-variances of both; of m modes [batch, 5 m]: m times these, then m logits
 
 
 if __name__ == "__main__":

@@ -20,8 +20,9 @@ fn grids(count: usize) -> Vec<OccupancyGrid> {
     (0..count).map(grid).collect()
 }
 
-/// Both presets' networks, one with an even kernel, with and without mirror averaging; and one with residual layers.
-fn checkpoints() -> [Checkpoint; 3] {
+/// Both presets' networks, one with an even kernel, with and without mirror averaging; one with residual layers; and others of
+/// two and three modes.
+fn checkpoints() -> [Checkpoint; 5] {
     let of = |architecture, inference| Checkpoint {
         weights: Weights::init(architecture, RootSeed(8), 0),
         conditions: Conditions::of(&EpisodeSettings::paper()),
@@ -34,6 +35,8 @@ fn checkpoints() -> [Checkpoint; 3] {
             NetworkArchitecture { residual1: 1, residual2: 2, ..NetworkArchitecture::compact() },
             InferenceSettings::plain(),
         ),
+        of(NetworkArchitecture { modes: 2, ..NetworkArchitecture::compact() }, InferenceSettings::smoothed()),
+        of(NetworkArchitecture { modes: 3, ..NetworkArchitecture::compact() }, InferenceSettings::plain()),
     ]
 }
 
@@ -60,7 +63,7 @@ fn what_is_exported_answers_as_the_network_itself() {
     let grids = grids(40);
     let grids: Vec<_> = grids.iter().collect();
     for checkpoint in checkpoints() {
-        let network = load("exported", &export(&checkpoint).unwrap()).unwrap();
+        let network = load("exported", &export(&checkpoint)).unwrap();
         assert_eq!(network.about(), Some(&About::new(checkpoint.inference, checkpoint.conditions.clone())));
         let expected = checkpoint.predictor().predict(&grids);
         let found = network.predict(&grids, checkpoint.inference.mirror_averaging, &pool());
@@ -82,13 +85,17 @@ fn what_is_exported_answers_as_the_network_itself() {
 fn an_answer_does_not_depend_on_the_other_grids() {
     let grids = grids(37);
     let grids: Vec<_> = grids.iter().collect();
-    let mut network = load("alone", &export(&checkpoints()[0]).unwrap()).unwrap();
+    let mut network = load("alone", &export(&checkpoints()[0])).unwrap();
     // As the file leaves it open, and as if it asked for as many.
     for batch in [BATCH, 16] {
         network.batch = batch;
-        let together = network.raw(&grids, &pool());
+        let together = network.rows(&grids, &pool());
         for start in [1, 7, 15, 36] {
-            assert_eq!(network.raw(&grids[start..], &pool())[..], together[start..], "from {start}, {batch} at once");
+            assert_eq!(
+                network.rows(&grids[start..], &pool())[..],
+                together[OUTPUTS * start..],
+                "from {start}, {batch} at once"
+            );
         }
     }
 }
@@ -111,7 +118,7 @@ fn a_network_that_mixes_the_grids_of_a_batch_is_refused() {
 
 #[test]
 fn what_is_no_such_network_is_refused_with_what_it_is_instead() {
-    let exported = export(&checkpoints()[1]).unwrap();
+    let exported = export(&checkpoints()[1]);
     // Names and numbers of the same length, so that the file stays well-formed.
     let with = |from: &[u8], to: &[u8]| {
         assert_eq!(from.len(), to.len());
@@ -144,7 +151,7 @@ fn what_is_no_such_network_is_refused_with_what_it_is_instead() {
 /// A file from elsewhere ends in an error or in a network, never in a panic.
 #[test]
 fn a_damaged_file_is_refused_or_answers() {
-    let exported = export(&checkpoints()[1]).unwrap();
+    let exported = export(&checkpoints()[1]);
     // The graph is before and after the tensors; they alone are large.
     let places = (0..600).chain((exported.len() - 1500)..exported.len()).step_by(19);
     for at in places {

@@ -14,7 +14,7 @@ use crate::dataset::{Collection, Dataset, Round};
 use crate::files::{self, Format as _};
 use crate::fit::learning;
 use crate::fit::{self, FitContext, FitError, FitOutcome, FitProgress, FitReport, FitSettings};
-use crate::network::Weights;
+use crate::network::{NetworkArchitecture, Weights};
 use sim::seed::{RootSeed, Stream};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -181,7 +181,9 @@ impl Run<'_, '_> {
         let novice = Learned::uncritical(settings, store, round, self.checkpoint(policy.clone()))?;
         let control_period_s = 1e-3 * self.conditions.control_period_ms as f32;
         let d = critic::dataset(target, d, &mut novice.ensemble(), control_period_s);
-        let start = Weights::init(settings.network, self.seed, index_of(Some(round), CRITIC));
+        // It answers one number, of which there are no ways to choose between.
+        let architecture = NetworkArchitecture { modes: 1, ..settings.network };
+        let start = Weights::init(architecture, self.seed, index_of(Some(round), CRITIC));
         let folder = learned::critic_folder(store, round);
         Ok(self.trained_in(&folder, &start, &d, &critic::fit_settings(&fit), Some(round), CRITIC)?.is_some())
     }

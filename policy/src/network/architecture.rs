@@ -1,6 +1,7 @@
 //! The shape of the network.
 
 use crate::network::error::NetworkError;
+use crate::network::modes::row_width;
 use serde::{Deserialize, Serialize};
 use sim::limits::{CHANNELS_MAX, HIDDEN_MAX, MODES_MAX, PARAMETERS_MAX, RESIDUAL_LAYERS_MAX};
 use sim::sensing::GRID_CELLS;
@@ -99,10 +100,7 @@ impl NetworkArchitecture {
 
     /// Values that leave the network: one answer per mode, then, if there are several, the logit of each.
     pub fn outputs(&self) -> usize {
-        match self.modes {
-            1 => OUTPUTS,
-            modes => modes * (OUTPUTS + 1),
-        }
+        row_width(self.modes)
     }
 
     /// Number of trainable values.

@@ -4,6 +4,7 @@ use crate::network::architecture::{NetworkArchitecture, OUTPUTS, POOLED_1};
 use crate::network::inference::InferenceSettings;
 use crate::network::log_variance::soft_clamp_log_variance;
 use crate::network::look_ahead_net::{LookAheadNet, occupied_tensor};
+use crate::network::modes::{likeliest_of, mirror_averaged, row_width};
 use crate::network::weights::Weights;
 use burn::tensor::Device;
 use sim::driver::{LookAheadPoint, Spread};
@@ -79,25 +80,17 @@ impl Predictor {
 
     /// One answer per grid: means of u and w, raw log-variances of both. Of several modes, the one that is likeliest.
     pub fn raw(&mut self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
-        let width = self.width();
+        let width = row_width(self.modes);
         if !self.mirror_averaging {
             let outputs = self.outputs(grids.iter().copied(), grids.len());
-            return outputs.chunks_exact(width).map(|row| likeliest(modes(row, self.modes)).raw).collect();
+            return outputs.chunks_exact(width).map(|row| likeliest_of(row, self.modes)).collect();
         }
         // The images in the same call: two small calls cost more than one of twice the size.
         let images: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
         let outputs = self.outputs(grids.iter().copied().chain(&images), 2 * grids.len());
         let (of_grids, of_images) = outputs.split_at(grids.len() * width);
         let rows = of_grids.chunks_exact(width).zip(of_images.chunks_exact(width));
-        rows.map(|(of_grid, of_image)| {
-            averaged(modes(of_grid, self.modes), modes(of_image, self.modes).map(|mode| mode.mirrored()))
-        })
-        .collect()
-    }
-
-    /// Values that leave the network for one grid.
-    fn width(&self) -> usize {
-        if self.modes == 1 { OUTPUTS } else { self.modes * (OUTPUTS + 1) }
+        rows.map(|(of_grid, of_image)| mirror_averaged(of_grid, of_image, self.modes)).collect()
     }
 
     /// What the loss of grids is computed from, `[grids, width]`: of one Gaussian its answers, else all modes as they leave the
@@ -111,7 +104,7 @@ impl Predictor {
 
     /// The outputs of the network itself, one row per grid.
     fn outputs<'a>(&self, mut grids: impl Iterator<Item = &'a OccupancyGrid>, count: usize) -> Vec<f32> {
-        let width = self.width();
+        let width = row_width(self.modes);
         let mut outputs = Vec::with_capacity(count * width);
         while outputs.len() < count * width {
             let rows = (count - outputs.len() / width).min(self.rows_max);
@@ -120,58 +113,6 @@ impl Predictor {
         }
         outputs
     }
-}
-
-/// One answer among several.
-#[derive(Debug, Clone, Copy)]
-struct Mode {
-    raw: [f32; OUTPUTS],
-    /// Larger is likelier; comparable between a grid and its mirror image.
-    log_weight: f32,
-}
-
-impl Mode {
-    fn mirrored(&self) -> Self {
-        let [u, w, raw_u, raw_w] = self.raw;
-        Self { raw: [1.0 - u, w, raw_u, raw_w], ..*self }
-    }
-}
-
-/// The modes of one row of outputs.
-fn modes(row: &[f32], count: usize) -> impl Iterator<Item = Mode> + Clone {
-    let (raws, logits) = row.split_at(count * OUTPUTS);
-    let highest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    let log_sum = maths::ln(logits.iter().map(|logit| maths::exp(logit - highest)).sum());
-    let log_weight = move |mode: usize| logits.get(mode).map_or(0.0, |logit| logit - highest - log_sum);
-    let raws = raws.as_chunks::<OUTPUTS>().0.iter();
-    raws.enumerate().map(move |(mode, &raw)| Mode { raw, log_weight: log_weight(mode) })
-}
-
-fn likeliest(modes: impl Iterator<Item = Mode>) -> Mode {
-    modes.max_by(|a, b| a.log_weight.total_cmp(&b.log_weight)).expect("at least one mode")
-}
-
-/// The mean of the likeliest mode of a grid or of its mirror image, whichever is likelier, and the other's that is nearest
-/// to it.
-fn averaged(
-    of_grid: impl Iterator<Item = Mode> + Clone,
-    of_image: impl Iterator<Item = Mode> + Clone,
-) -> [f32; OUTPUTS] {
-    let (one, other) = (likeliest(of_grid.clone()), likeliest(of_image.clone()));
-    if one.log_weight >= other.log_weight {
-        mean(one, nearest(one, of_image))
-    } else {
-        mean(other, nearest(other, of_grid))
-    }
-}
-
-fn nearest(to: Mode, modes: impl Iterator<Item = Mode>) -> Mode {
-    let apart = |mode: &Mode| maths::hypot(mode.raw[0] - to.raw[0], mode.raw[1] - to.raw[1]);
-    modes.min_by(|a, b| apart(a).total_cmp(&apart(b))).expect("at least one mode")
-}
-
-fn mean(one: Mode, other: Mode) -> [f32; OUTPUTS] {
-    std::array::from_fn(|i| 0.5 * (one.raw[i] + other.raw[i]))
 }
 
 #[cfg(test)]
@@ -222,18 +163,6 @@ mod tests {
                 assert_eq!((answer.mean[1], answer.sigma), (image.mean[1], image.sigma));
             }
         }
-    }
-
-    /// Two ways past a tree: the answer is one of them, not their mean.
-    #[test]
-    fn of_several_modes_the_likeliest_drives() {
-        let [left, right] = [[0.3, 0.4, -3.0, -3.0], [0.7, 0.4, -3.0, -3.0]];
-        let row: Vec<f32> = left.into_iter().chain(right).chain([0.2, 0.1]).collect();
-        assert_eq!(likeliest(modes(&row, 2)).raw, left);
-        // Its mirror image prefers the same side, so both agree on one.
-        let image: Vec<f32> = left.into_iter().chain(right).chain([0.1, 0.5]).collect();
-        let answer = averaged(modes(&row, 2), modes(&image, 2).map(|mode| mode.mirrored()));
-        assert!((answer[0] - 0.3).abs() < 1e-6, "{answer:?}");
     }
 
     #[test]

@@ -61,7 +61,7 @@ pub(crate) fn run(args: &ExportArgs, output: &Output) -> anyhow::Result<()> {
         "{}: exists already; choose another --out, or replace it with --overwrite",
         out.display()
     );
-    let bytes = onnx::export::export(&checkpoint)?;
+    let bytes = onnx::export::export(&checkpoint);
     storage::whole::write(out, &bytes).with_context(|| format!("--out {}", out.display()))?;
     output.print(format_args!("{}: {}, {} bytes", out.display(), folder.display(), bytes.len()));
     Ok(())
