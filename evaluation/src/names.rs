@@ -12,3 +12,7 @@ pub const EXPERT_ONLY: &str = "expert's data alone";
 pub const EXPERT_EQUAL: &str = "expert's data alone, as many samples";
 /// [`Chain::Alpha15`](crate::stages::Chain::Alpha15).
 pub const ALPHA_15: &str = "DAgger, α = 15";
+/// [`Chain::Person`](crate::stages::Chain::Person): behaviour cloning, then `DAgger`.
+pub const OF_PERSON: [&str; 2] = ["BC from a person's hand", "DAgger from a person's hand"];
+/// The expert's rules on the noisy grid.
+pub const GRID_EXPERT: &str = "the expert's rules on the grid";

@@ -9,10 +9,11 @@
 //! | `chains/s1-expert-only` | control: the same with all of the expert's samples |
 //! | `chains/s1-alpha-15` | control: ten times the paper's weight; none where it is that anyway |
 //! | `chains/s1-far-points` | control: points as far as the way is open, as in the paper; none where they are so anyway |
+//! | `chains/s1-person` | control: the expert points with the delay and the unsteadiness of a person; none where it does anyway |
 //! | `drives/reference` | the paper's tables: every driver on its lots |
 //! | `drives/unseen` | generated lots that nothing was trained or tuned on |
 //! | `drives/rules` | the policies after the first iterations under each decision rule |
-//! | `drives/controls` | the controls beside what they are compared with, on the unseen lots |
+//! | `drives/controls` | the controls beside what they are compared with, and the expert's rules on the noisy grid, on the unseen lots |
 //! | `drives/far-points` | the control with far points, which has another speed law, on the same lots |
 //! | `drives/readings`, `drives/readings-unseen` | every planner in every reading of what its publication leaves open |
 //! | `drives/unsmoothed`, `drives/smoothed` | the same lots, every driver without and with action smoothing |
@@ -21,7 +22,7 @@
 //! Behaviour cloning has no τ̂, so that neither α nor the rule changes a bit of it: it is trained once per seed.
 
 use crate::estimate::{self, Task};
-use crate::names::{ALPHA_15, BC, DAGGER, EXPERT_EQUAL, EXPERT_ONLY, UNWEIGHTED};
+use crate::names::{ALPHA_15, BC, DAGGER, EXPERT_EQUAL, EXPERT_ONLY, GRID_EXPERT, OF_PERSON, UNWEIGHTED};
 use anyhow::ensure;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::settings::{Settings, Smoothing, has_points_of_paper, with_points_of_paper};
@@ -108,6 +109,8 @@ pub enum Chain {
     Alpha15,
     /// Points as far as the way is open, as the paper has them.
     FarPoints,
+    /// Labels with the delay and the unsteadiness of a person.
+    Person,
 }
 
 impl Chain {
@@ -122,6 +125,7 @@ impl Chain {
             Self::ExpertEqual => "expert-equal",
             Self::Alpha15 => "alpha-15",
             Self::FarPoints => "far-points",
+            Self::Person => "person",
         };
         format!("chains/s{}-{name}", seed.0)
     }
@@ -136,6 +140,7 @@ impl Chain {
             Self::ExpertEqual => "the same with as many samples as DAgger",
             Self::Alpha15 => "DAgger with α = 15",
             Self::FarPoints => "behaviour cloning, DAgger with points as far as the way is open",
+            Self::Person => "behaviour cloning, DAgger with the hand of a person",
         }
     }
 
@@ -146,17 +151,21 @@ impl Chain {
             Self::Unweighted => !loss.is_like(&loss.with_alpha(UNWEIGHTED_ALPHA)),
             Self::Alpha15 => !loss.is_like(&loss.with_alpha(HEAVY_ALPHA)),
             Self::FarPoints => !has_points_of_paper(settings),
+            Self::Person => settings.expert != settings.expert.clone().with_hand_of_a_person(),
             Self::Weighted | Self::AnyBelow | Self::TauOnly | Self::ExpertOnly | Self::ExpertEqual => true,
         }
     }
 
     fn stage(self, settings: &Settings, extent: &Extent) -> Stage {
         let mut settings = if self == Self::FarPoints { with_points_of_paper(settings) } else { settings.clone() };
+        if self == Self::Person {
+            settings.expert = settings.expert.with_hand_of_a_person();
+        }
         let dagger = &mut settings.dagger;
         let tau = dagger.rule.tau().unwrap_or(TAU);
         let (chi, chi_on) = dagger.rule.chi().unwrap_or((CHI, ChiOn::default()));
         match self {
-            Self::Weighted | Self::FarPoints => {}
+            Self::Weighted | Self::FarPoints | Self::Person => {}
             Self::Unweighted => dagger.fit.loss = dagger.fit.loss.with_alpha(UNWEIGHTED_ALPHA),
             Self::AnyBelow => dagger.rule = DecisionRule::AnyBelowLiteral { tau, chi, chi_on },
             Self::TauOnly => dagger.rule = DecisionRule::TauOnly { tau },
@@ -168,7 +177,7 @@ impl Chain {
             dagger.iterations_min = dagger.iterations_min.min(extent.rule_iterations);
         }
         // Other points are other labels.
-        let has_cloning = matches!(self, Self::Weighted | Self::FarPoints);
+        let has_cloning = matches!(self, Self::Weighted | Self::FarPoints | Self::Person);
         let weighted = || Self::Weighted.folder(settings.seed);
         let cloning_of = (!has_cloning).then(weighted);
         let samples_of = (self == Self::ExpertEqual).then(weighted);
@@ -325,7 +334,8 @@ fn trainings(settings: &Settings, extent: &Extent) -> Vec<Stage> {
         let chains = [Chain::Weighted, Chain::Unweighted, Chain::ExpertEqual];
         stages.extend(stages_of(&chains, &of_seed, extent));
     }
-    let of_first_seed = [Chain::AnyBelow, Chain::TauOnly, Chain::ExpertOnly, Chain::Alpha15, Chain::FarPoints];
+    let of_first_seed =
+        [Chain::AnyBelow, Chain::TauOnly, Chain::ExpertOnly, Chain::Alpha15, Chain::FarPoints, Chain::Person];
     stages.extend(stages_of(&of_first_seed, settings, extent));
     stages
 }
@@ -394,6 +404,11 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     if Chain::Alpha15.is_trained(settings) {
         controls.push(of_first_seed(ALPHA_15, Chain::Alpha15));
     }
+    if Chain::Person.is_trained(settings) {
+        let of_person = OF_PERSON.into_iter().zip(["/bc", ""]);
+        controls.extend(of_person.map(|(name, rest)| (name.to_owned(), spec(Chain::Person, settings.seed, rest))));
+    }
+    controls.push((GRID_EXPERT.to_owned(), "grid-expert".to_owned()));
     stages.push(drive(CONTROLS, "controls on generated lots", unseen, controls));
 
     if Chain::FarPoints.is_trained(settings) {
@@ -499,6 +514,10 @@ mod tests {
         let far = stages.iter().find(|stage| stage.folder == "chains/s1-far-points").unwrap();
         assert_eq!(far.step, Step::Train { cloning_of: None, samples_of: None });
         assert_eq!(far.settings, with_points_of_paper(&settings));
+        let person = stages.iter().find(|stage| stage.folder == "chains/s1-person").unwrap();
+        assert_eq!(person.step, Step::Train { cloning_of: None, samples_of: None });
+        let expert = settings.expert.clone().with_hand_of_a_person();
+        assert_eq!(person.settings, Settings { expert, ..settings.clone() });
         let of_paper = all(&Settings::preset("paper").unwrap(), &extent(), Path::new("R"));
         assert!(of_paper.iter().all(|stage| !stage.folder.contains("far-points")), "its points are far anyway");
     }
@@ -526,7 +545,7 @@ mod tests {
             let stages = all(&settings, &extent(), Path::new("R"));
             let trained: Vec<&Stage> = stages.iter().filter(|stage| matches!(stage.step, Step::Train { .. })).collect();
             let folders: Vec<&str> = trained.iter().map(|stage| stage.folder.as_str()).collect();
-            assert_eq!(folders.len() + missing.len(), 8, "{loss:?}: {folders:?}");
+            assert_eq!(folders.len() + missing.len(), 9, "{loss:?}: {folders:?}");
             assert!(missing.iter().all(|folder| !folders.contains(folder)), "{loss:?}: {folders:?}");
             for (at, one) in trained.iter().enumerate() {
                 for other in &trained[..at] {
@@ -575,7 +594,8 @@ mod tests {
         let controls = left.iter().find(|stage| stage.folder == CONTROLS).unwrap();
         let Step::Drive { drivers } = &controls.step else { panic!("{controls:?}") };
         let names: Vec<&str> = drivers.iter().map(|(name, _)| name.as_str()).collect();
-        assert_eq!(names, ["BC", "DAgger", "DAgger, α = 0", EXPERT_ONLY, ALPHA_15]);
+        let [bc, dagger] = OF_PERSON;
+        assert_eq!(names, ["BC", "DAgger", "DAgger, α = 0", EXPERT_ONLY, ALPHA_15, bc, dagger, GRID_EXPERT]);
         assert_eq!(without_trainings(stages.clone(), |_| true), stages);
     }
 
@@ -658,7 +678,9 @@ mod tests {
         let controls = names(CONTROLS);
         assert_eq!(controls[..3], ["BC", "DAgger", "DAgger, α = 0"]);
         let second = format!("{EXPERT_EQUAL} (seed 2)");
-        assert_eq!(controls[6..], [EXPERT_ONLY, EXPERT_EQUAL, &second, ALPHA_15], "{controls:?}");
+        let [bc, dagger] = OF_PERSON;
+        let expected = [EXPERT_ONLY, EXPERT_EQUAL, &second, ALPHA_15, bc, dagger, GRID_EXPERT];
+        assert_eq!(controls[6..], expected, "{controls:?}");
         assert_eq!(names(SMOOTHED), names(UNSMOOTHED));
         assert_eq!(names(READINGS), names(READINGS_UNSEEN));
         for name in ["DAgger", "dwa", "dwa/fox", "cvm/simmons", "tentacle/short", "vff"] {

@@ -147,6 +147,12 @@ pub struct ExpertSettings {
 }
 
 impl ExpertSettings {
+    /// With the delay and the unsteadiness of a person who points (docs/methods.md 3.3).
+    #[must_use]
+    pub fn with_hand_of_a_person(self) -> Self {
+        Self { reaction_delay_s: 0.3, label_jitter: 0.0097, ..self }
+    }
+
     /// The paper's three rules as printed, points "as far as possible" (rule three), with the measured recipe of
     /// docs/methods.md E5: the paper itself gives no number. What the paper halves is the speed
     /// (`sim::controller::SpeedLaw::Halved`).

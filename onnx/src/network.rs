@@ -2,8 +2,8 @@
 
 use crate::about::{self, About};
 use crate::{INPUT, OUTPUT, wire};
-use policy::network::modes::{likeliest_of, mirror_averaged, row_width};
-use policy::network::{OUTPUTS, Prediction};
+use policy::network::modes::{likeliest_of, mirror_averaged};
+use policy::network::{OUTPUTS, Prediction, row_width};
 use rten::{DataType, Dimension, Model, NodeId, RunOptions, ThreadPool, Value, ValueType};
 use sim::limits::{MODES_MAX, ONNX_BATCH_MAX, ONNX_BYTES_MAX};
 use sim::sensing::{GRID_CELLS, OccupancyGrid};

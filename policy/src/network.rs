@@ -15,7 +15,9 @@ pub mod operations;
 mod predictor;
 mod weights;
 
-pub use architecture::{ConvLayer, LANES, NetworkArchitecture, OUTPUTS, POOLED_1, POOLED_2, RESIDUAL_KERNEL};
+pub use architecture::{
+    ConvLayer, LANES, NetworkArchitecture, OUTPUTS, POOLED_1, POOLED_2, RESIDUAL_KERNEL, row_width,
+};
 pub use dropout::DropoutFactors;
 pub use ensemble::Ensemble;
 pub use error::NetworkError;

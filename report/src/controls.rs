@@ -5,21 +5,24 @@ use crate::markdown::table_of;
 use crate::trainings::{Place, over_seeds};
 use evaluation::conclusions::Driven;
 use evaluation::format::{difference, quoted_rate};
-use evaluation::names::{ALPHA_15, BC, DAGGER, EXPERT_EQUAL, EXPERT_ONLY, UNWEIGHTED};
+use evaluation::names::{ALPHA_15, BC, DAGGER, EXPERT_EQUAL, EXPERT_ONLY, GRID_EXPERT, OF_PERSON, UNWEIGHTED};
 use evaluation::stages::Chain;
 use experiment::lots::UNSEEN;
 use sim::seed::RootSeed;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Policies that differ from `DAgger` in one thing, and the chain that trained each.
-const CONTROLS: [(&str, Chain); 6] = [
-    (BC, Chain::Weighted),
-    (DAGGER, Chain::Weighted),
-    (UNWEIGHTED, Chain::Unweighted),
-    (EXPERT_ONLY, Chain::ExpertOnly),
-    (EXPERT_EQUAL, Chain::ExpertEqual),
-    (ALPHA_15, Chain::Alpha15),
+/// Policies that differ from `DAgger` in one thing, and the chain that trained each; then what was not trained.
+const CONTROLS: [(&str, Option<Chain>); 9] = [
+    (BC, Some(Chain::Weighted)),
+    (DAGGER, Some(Chain::Weighted)),
+    (UNWEIGHTED, Some(Chain::Unweighted)),
+    (EXPERT_ONLY, Some(Chain::ExpertOnly)),
+    (EXPERT_EQUAL, Some(Chain::ExpertEqual)),
+    (ALPHA_15, Some(Chain::Alpha15)),
+    (OF_PERSON[0], Some(Chain::Person)),
+    (OF_PERSON[1], Some(Chain::Person)),
+    (GRID_EXPERT, None),
 ];
 
 /// Policies that differ from `DAgger` in one thing, on unseen lots: the first training of each, then the means of those that
@@ -40,18 +43,19 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
     for (name, chain) in CONTROLS {
         // An earlier version did not train all of them.
         let Some(driver) = driven.driver(name) else { continue };
-        let mut rows = rows_of(root, chain, seed)?;
-        if name == BC {
+        let mut rows = chain.map_or_else(|| Ok(Vec::new()), |chain| rows_of(root, chain, seed))?;
+        if name == BC || name == OF_PERSON[0] {
             rows.truncate(1);
         }
         let last = rows.last();
+        let or_dash = |number: Option<usize>| number.map_or_else(|| "–".to_owned(), |number| number.to_string());
         let totals = driven.results.totals(0, driver, &everywhere, None);
         let found = comparisons.iter().find(|comparison| comparison.driver == driver);
         let weight = last.and_then(|row| row.mean_weight);
         table.add_row([
             name.to_owned(),
-            rows.len().to_string(),
-            last.map_or(0, |row| row.dataset).to_string(),
+            or_dash(last.map(|_| rows.len())),
+            or_dash(last.map(|row| row.dataset)),
             weight.map_or_else(|| "–".to_owned(), |weight| format!("{weight:.2}")),
             format!("{} ({})", totals.near_collisions, totals.contacts),
             quoted_rate(&totals, &estimates[driver]),
@@ -62,7 +66,9 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
         "### Controls\n\nOn the unseen lots. *{EXPERT_ONLY}*: rounds on the same lots as DAgger's with as many \
          optimiser steps each, but the expert drives throughout, so that every tick is the expert's and there are more samples. *{EXPERT_EQUAL}*: \
          the same, each iteration thinned evenly to DAgger's mean number of samples. If the first is no worse than DAgger, more of \
-         the expert's data does as well; if the second is not, either, it does not matter who drove. α is the weight on τ̂; its mean weight is 1 where nothing is weighted.\n\n{table}"
+         the expert's data does as well; if the second is not, either, it does not matter who drove. α is the weight on τ̂; its mean weight is 1 where nothing is weighted. \
+         *A person's hand*: the expert's labels come 0.3 s late and tremble, as a person's would; the paper's expert was one. *{GRID_EXPERT}*: \
+         nothing is learned; what the network is ahead of it is what learning brings.\n\n{table}"
     );
     let over_seeds = over_seeds([&Place::new(UNSEEN, driven, everywhere)]);
     if over_seeds.row_count() > 0 {

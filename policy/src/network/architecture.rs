@@ -1,7 +1,6 @@
 //! The shape of the network.
 
 use crate::network::error::NetworkError;
-use crate::network::modes::row_width;
 use serde::{Deserialize, Serialize};
 use sim::limits::{CHANNELS_MAX, HIDDEN_MAX, MODES_MAX, PARAMETERS_MAX, RESIDUAL_LAYERS_MAX};
 use sim::sensing::GRID_CELLS;
@@ -12,6 +11,11 @@ pub const POOLED_1: usize = GRID_CELLS / 2;
 pub const POOLED_2: usize = POOLED_1 / 2;
 /// Values of one answer: means of u and w, then the raw log-variances of both.
 pub const OUTPUTS: usize = 4;
+
+/// Values in a row of `modes` answers: [`OUTPUTS`], of several each with a logit.
+pub fn row_width(modes: usize) -> usize {
+    if modes == 1 { OUTPUTS } else { modes * (OUTPUTS + 1) }
+}
 
 /// Channels are computed in groups of this many.
 pub const LANES: usize = 16;

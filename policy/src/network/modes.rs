@@ -2,7 +2,7 @@
 //!
 //! A row of m > 1 modes is m times an answer, then the logit of each; a row of one mode is its answer.
 
-use crate::network::architecture::OUTPUTS;
+use crate::network::architecture::{OUTPUTS, row_width};
 use sim::maths;
 
 /// One answer among several.
@@ -18,11 +18,6 @@ impl Mode {
         let [u, w, raw_u, raw_w] = self.raw;
         Self { raw: [1.0 - u, w, raw_u, raw_w], ..*self }
     }
-}
-
-/// Values in a row of `modes` answers: [`OUTPUTS`], of several each with a logit.
-pub fn row_width(modes: usize) -> usize {
-    if modes == 1 { OUTPUTS } else { modes * (OUTPUTS + 1) }
 }
 
 /// The likeliest answer of a row of `modes`.

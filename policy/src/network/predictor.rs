@@ -1,10 +1,10 @@
 //! A trained network that answers grids.
 
-use crate::network::architecture::{NetworkArchitecture, OUTPUTS, POOLED_1};
+use crate::network::architecture::{NetworkArchitecture, OUTPUTS, POOLED_1, row_width};
 use crate::network::inference::InferenceSettings;
 use crate::network::log_variance::soft_clamp_log_variance;
 use crate::network::look_ahead_net::{LookAheadNet, occupied_tensor};
-use crate::network::modes::{likeliest_of, mirror_averaged, row_width};
+use crate::network::modes::{likeliest_of, mirror_averaged};
 use crate::network::weights::Weights;
 use burn::tensor::Device;
 use sim::driver::{LookAheadPoint, Spread};

@@ -26,14 +26,14 @@ use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask reproduce                               an hour on two cores
+  cargo xtask reproduce                               70 minutes on two cores
   cargo xtask reproduce --preset smoke --out runs/try   every stage within a minute
   cargo xtask reproduce --full --unseen sealed:my-phrase:120:all
   cargo xtask reproduce --preset paper --seeds 3        the paper's own regime: days
   cargo xtask reproduce --resume runs/reproduce-default-s1
-  cargo xtask reproduce --full --shard 3/15 --out trained/3
+  cargo xtask reproduce --full --shard 3/16 --out trained/3
   cargo xtask merge trained/* --out runs/full
-  cargo xtask reproduce --networks runs/full --shard 3/15 --out driven/3
+  cargo xtask reproduce --networks runs/full --shard 3/16 --out driven/3
   cargo xtask merge driven/*";
 
 #[derive(Debug, Clone, Args)]
