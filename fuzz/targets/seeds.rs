@@ -54,7 +54,7 @@ fn write() -> std::io::Result<()> {
         ("checkpoint", one_of(network)),
         ("round", one_of(fuzz::round_files())),
         ("list", vec![list.into_bytes()]),
-        ("onnx", vec![onnx::export::export(&fuzz::checkpoint()).expect("one mode")]),
+        ("onnx", vec![onnx::export::export(&fuzz::checkpoint())]),
     ];
     for (target, seeds) in targets {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus").join(target);
