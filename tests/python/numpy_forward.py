@@ -57,7 +57,7 @@ def forward(model, tensors, grids):
 def answer(model, tensors, grids):
     """Grids [batch, 25, 25] to [batch, 4]: mean u, w and standard deviations of u, w, in image fractions."""
     of_grid, log_weights = forward(model, tensors, grids)
-    each = np.arange(len(grids))
+    each = range(len(grids))
     raw = of_grid[each, log_weights.argmax(axis=1)]
     if model["inference"]["mirror_averaging"]:
         of_image, image_log_weights = forward(model, tensors, grids[:, :, ::-1])
