@@ -157,10 +157,11 @@ impl Chain {
     }
 
     fn stage(self, settings: &Settings, extent: &Extent) -> Stage {
-        let mut settings = if self == Self::FarPoints { with_points_of_paper(settings) } else { settings.clone() };
-        if self == Self::Person {
-            settings.expert = settings.expert.with_hand_of_a_person();
-        }
+        let mut settings = match self {
+            Self::FarPoints => with_points_of_paper(settings),
+            Self::Person => Settings { expert: settings.expert.clone().with_hand_of_a_person(), ..settings.clone() },
+            _ => settings.clone(),
+        };
         let dagger = &mut settings.dagger;
         let tau = dagger.rule.tau().unwrap_or(TAU);
         let (chi, chi_on) = dagger.rule.chi().unwrap_or((CHI, ChiOn::default()));
@@ -516,7 +517,7 @@ mod tests {
         assert_eq!(far.settings, with_points_of_paper(&settings));
         let person = stages.iter().find(|stage| stage.folder == "chains/s1-person").unwrap();
         assert_eq!(person.step, Step::Train { cloning_of: None, samples_of: None });
-        let expert = settings.expert.clone().with_hand_of_a_person();
+        let expert = expert::ExpertSettings { reaction_delay_s: 0.3, label_jitter: 0.0097, ..settings.expert.clone() };
         assert_eq!(person.settings, Settings { expert, ..settings.clone() });
         let of_paper = all(&Settings::preset("paper").unwrap(), &extent(), Path::new("R"));
         assert!(of_paper.iter().all(|stage| !stage.folder.contains("far-points")), "its points are far anyway");

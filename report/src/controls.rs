@@ -62,12 +62,13 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
             found.map_or_else(|| "–".to_owned(), |found| difference(found.difference_per_100m, 2)),
         ]);
     }
+    let delay_s = driven.plan.settings.expert.clone().with_hand_of_a_person().reaction_delay_s;
     let mut text = format!(
         "### Controls\n\nOn the unseen lots. *{EXPERT_ONLY}*: rounds on the same lots as DAgger's with as many \
          optimiser steps each, but the expert drives throughout, so that every tick is the expert's and there are more samples. *{EXPERT_EQUAL}*: \
          the same, each iteration thinned evenly to DAgger's mean number of samples. If the first is no worse than DAgger, more of \
          the expert's data does as well; if the second is not, either, it does not matter who drove. α is the weight on τ̂; its mean weight is 1 where nothing is weighted. \
-         *A person's hand*: the expert's labels come 0.3 s late and tremble, as a person's would; the paper's expert was one. *{GRID_EXPERT}*: \
+         *A person's hand*: the expert's labels come {delay_s} s late and tremble, as a person's would; the paper's expert was one. *{GRID_EXPERT}*: \
          nothing is learned; what the network is ahead of it is what learning brings.\n\n{table}"
     );
     let over_seeds = over_seeds([&Place::new(UNSEEN, driven, everywhere)]);
