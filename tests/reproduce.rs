@@ -279,6 +279,38 @@ fn shards_of_trainings_and_of_drives_come_to_the_bytes_of_one_machine() {
     refused(&["reproduce", "--shard", "1/3", "--networks"], &[&run], "this run is finished");
 }
 
+/// They could be had from their own commands alone.
+#[test]
+fn a_table_with_trainings_of_its_own_is_that_of_its_command() {
+    let folder = scratch("reproduce-tables");
+    let settings = [
+        "training.lots=[\"train:1:easy\"]",
+        "dagger.fit.budget.steps=20",
+        "dagger.cloning_budget.steps=20",
+        "dagger.fit.mirror=\"off\"",
+        "dagger.fit.loss.beta=0",
+        "dagger.disturbance.enabled=false",
+        "dagger.inference.mirror_averaging=false",
+        "dagger.inference.smoothing_ticks=0",
+    ];
+    let run = |words: &[&str], out: &str| {
+        let settings = settings.iter().flat_map(|setting| ["--set", setting]);
+        let named = ["--preset", "smoke", "--unseen", "test:1:easy", "--out"];
+        succeed(xtask().args(words).args(settings).args(named).arg(folder.join(out)));
+    };
+    run(&["reproduce", "--tables", "deviations"], "whole");
+    run(&["deviations"], "alone");
+    let read = |name: &str| std::fs::read(folder.join(name)).unwrap();
+    for name in ["deviations.md", "deviations.csv", "deviations.svg"] {
+        assert!(read(&format!("whole/{name}")) == read(&format!("alone/{name}")), "{name} differs");
+    }
+    let table = String::from_utf8(read("alone/deviations.md")).unwrap();
+    let report = String::from_utf8(read("whole/report.md")).unwrap();
+    assert!(report.contains(table.trim_end()) && report.contains("](figures/deviations.svg)"), "{report}");
+    assert!(!report.contains("Decision rules at equal samples"), "nobody asked for it");
+    assert!(sums::verify(&folder.join("whole")).faults.is_empty());
+}
+
 #[test]
 fn what_cannot_be_reproduced_is_refused_before_anything_is_written() {
     let folder = scratch("reproduce-refused");
@@ -291,6 +323,7 @@ fn what_cannot_be_reproduced_is_refused_before_anything_is_written() {
         (vec!["--preset", "papier"], "papier"),
         (vec!["--set", "dagger.etta=0.8"], "etta"),
         (vec!["--set", "dagger.rule=safe_dagger"], "by the paper's rule, all_below"),
+        (vec!["--preset", "paper", "--tables", "deviations"], "these settings are as in the paper in all of that"),
     ] {
         let output = xtask().args(["reproduce", "--out", &out]).args(&arguments).output().unwrap();
         let (stdout, stderr) = text(&output);

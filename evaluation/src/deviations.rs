@@ -4,7 +4,7 @@
 //! The test `every_deviation_of_the_default_is_listed` holds [`DEVIATIONS`] against both presets.
 
 use crate::names::{BC, DAGGER};
-use crate::stages::{Stage, Step};
+use crate::stage::{Stage, Step};
 use experiment::settings::{Layers, Settings};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -124,6 +124,25 @@ pub struct Extent {
     /// Lots that all are driven on, once each way.
     pub unseen: Vec<String>,
 }
+
+impl Extent {
+    /// Everything that the settings have otherwise, but what is [too long](TOO_LONG).
+    ///
+    /// # Errors
+    /// See [`as_in_the_paper`].
+    pub fn of_all(settings: &Settings, unseen: &[String]) -> anyhow::Result<Self> {
+        let mut names = Vec::new();
+        for deviation in DEVIATIONS.iter().filter(|deviation| deviation.name != TOO_LONG) {
+            if as_in_the_paper(settings, deviation)? != *settings {
+                names.push(deviation.name.to_owned());
+            }
+        }
+        Ok(Self { deviations: names, unseen: unseen.to_vec() })
+    }
+}
+
+/// Not done unless it is asked for by name.
+pub const TOO_LONG: &str = "steps";
 
 /// Folder, and name, of the training that deviates in everything.
 pub const BASE: &str = "as-it-is";

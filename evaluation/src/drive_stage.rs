@@ -2,7 +2,7 @@
 
 use crate::conclusions;
 use crate::plan::Plan;
-use crate::stages::{self, Stage, Step};
+use crate::stage::{self, Stage, Step};
 use experiment::drivers::NamedDriver;
 use experiment::lots::Lot;
 use experiment::settings::Settings;
@@ -29,7 +29,7 @@ impl<'a> DriveStage<'a> {
             Step::Train { .. } | Step::OnPolicy { .. } => anyhow::bail!("{} does not drive", stage.folder),
         };
         let settings = &stage.settings;
-        let drivers = stages::load(drivers, settings)?;
+        let drivers = stage::load(drivers, settings)?;
         let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
         Ok(Self { settings, drivers, lots, shard })
     }

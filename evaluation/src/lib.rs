@@ -10,7 +10,7 @@
 //! | [`statistics`] | exact intervals, comparisons, paired bootstrap, sample sizes |
 //! | [`summary`], [`table1`] | the tables as data |
 //! | [`calibration`], [`on_policy`] | whether the predicted variance is right, on held-back and on driven states |
-//! | [`paper`], [`conclusions`], [`stages`], [`drive_stage`], [`rules`], [`scaling`], [`deviations`], [`estimate`] | the paper's figures, which of its conclusions hold here, and what is done to find out, in what time |
+//! | [`paper`], [`conclusions`], [`stage`], [`stages`], [`drive_stage`], [`rules`], [`scaling`], [`deviations`], [`estimate`] | the paper's figures, which of its conclusions hold here, and what is done to find out, in what time |
 //! | [`tune`] | parameters of planners, searched alike for each |
 //! | [`pixel_accuracy`] | how wrong the noisy view is |
 
@@ -40,6 +40,7 @@ pub mod rules;
 pub mod scaling;
 pub mod shards;
 pub mod slices;
+pub mod stage;
 pub mod stages;
 pub mod statistics;
 pub mod summary;

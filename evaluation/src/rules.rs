@@ -5,8 +5,8 @@
 //! trains three networks and drives with their mean. Behaviour cloning is the same for all rules of a seed and is
 //! trained once.
 
-use crate::stages::{Stage, Step};
-use experiment::settings::Settings;
+use crate::stage::{Stage, Step};
+use experiment::settings::{Layers, Settings};
 use policy::decision_rule::DecisionRule;
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
@@ -28,8 +28,45 @@ pub struct Extent {
     pub unseen: Vec<String>,
 }
 
+impl Extent {
+    /// Every rule, as the command compares them unless something else is said.
+    pub fn of_all(seeds: u64, unseen: &[String]) -> Self {
+        let rules = all().map(|(name, _)| name.to_owned()).to_vec();
+        Self { rules, seeds, iterations: ITERATIONS, samples: SAMPLES, unseen: unseen.to_vec() }
+    }
+}
+
+/// Iterations that tell rules apart (chosen).
+pub const ITERATIONS: u32 = 2;
+/// Samples of a round: about a third of the ticks that [`FEW_LOTS`] give (chosen).
+pub const SAMPLES: u32 = 20_000;
+
 /// Folder of the stage that drives.
 pub const DRIVES: &str = "drives";
+
+/// What is set before the user sets anything: three lots of each family and one round trip of lot a in every round, and fits of as many
+/// steps as so few samples are worth; rules and seeds make for many trainings.
+pub const FEW_LOTS: [&str; 5] = [
+    r#"training.lots=["lot-a", "train:36:all"]"#,
+    "training.trials=1",
+    "dagger.cloning_budget.steps=2000",
+    "dagger.fit.budget.steps=2000",
+    EVERY_TICK,
+];
+/// Every tick is learned from: rules that let the network drive on would leave the expert's ticks of its worst moments alone, and
+/// too few of them for equal samples.
+pub const EVERY_TICK: &str = r#"dagger.keep="every_tick""#;
+
+/// Settings of a comparison beside other trainings: of few lots where those of the others are the default's, else of their own.
+///
+/// # Errors
+/// If they contradict what is set so.
+pub fn in_short(settings: &Settings) -> anyhow::Result<Settings> {
+    let has_many_lots = settings.training == Settings::preset("default")?.training;
+    let changes = if has_many_lots { &FEW_LOTS[..] } else { &[EVERY_TICK] };
+    let overrides = changes.iter().map(|&change| change.to_owned()).collect();
+    Settings::resolve_over(settings, &Layers { overrides, ..Layers::default() }, None)
+}
 
 /// Name in tables of what every training begins with.
 pub const CLONED: &str = "behaviour cloning";

@@ -5,7 +5,7 @@
 //! whatever η says.
 
 use crate::names::{BC, DAGGER};
-use crate::stages::{Stage, Step};
+use crate::stage::{Stage, Step};
 use experiment::settings::Settings;
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -2,7 +2,8 @@
 
 use crate::parts::{self, Part, Rows};
 use crate::plan::Plan;
-use crate::stages::{self, Stage};
+use crate::stage::Stage;
+use crate::stages;
 use anyhow::{Context as _, ensure};
 use experiment::drivers::DriverSpec;
 use experiment::manifest::{self, Manifest};

@@ -18,13 +18,16 @@
 //! | `drives/readings`, `drives/readings-unseen` | every planner in every reading of what its publication leaves open |
 //! | `drives/unsmoothed`, `drives/smoothed` | the same lots, every driver without and with action smoothing |
 //! | `on-policy` | on-policy labelled rollouts: calibration of the variance, Σ τ̂ with and without the weight |
+//! | `family/…` | if asked for: the stages of [`rules`], the decision rules of the `DAgger` family at equal samples |
+//! | `deviations/…` | if asked for: the stages of [`deviations`], trainings with one thing at a time as in the paper |
 //!
 //! Behaviour cloning has no τ̂, so that neither α nor the rule changes a bit of it: it is trained once per seed.
 
-use crate::estimate::{self, Task};
+use crate::deviations;
 use crate::names::{ALPHA_15, BC, DAGGER, EXPERT_EQUAL, EXPERT_ONLY, GRID_EXPERT, OF_PERSON, UNWEIGHTED};
+use crate::rules;
+use crate::stage::{Stage, Step};
 use anyhow::ensure;
-use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::settings::{Settings, Smoothing, has_points_of_paper, with_points_of_paper};
 use experiment::shard::Shard;
 use planners::PlannerSpec;
@@ -46,48 +49,12 @@ pub struct Extent {
     pub rule_iterations: u32,
     /// Tuned planners, as named on the command line.
     pub tuned: Vec<String>,
-}
-
-/// One step, with a folder of its own within the run.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Stage {
-    /// Its folder.
-    pub folder: String,
-    /// What it does, for people.
-    pub about: String,
-    /// Its settings.
-    pub settings: Settings,
-    /// The step itself.
-    pub step: Step,
-}
-
-/// What can be done in a stage.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Step {
-    /// Trains a chain.
-    Train {
-        /// Folder of the chain whose behaviour cloning is taken over.
-        cloning_of: Option<String>,
-        /// Folder of the chain that decides how many samples an iteration keeps: as many as it has, on average.
-        samples_of: Option<String>,
-    },
-    /// Drives `(name, spec)`, all compared with the driver of this name.
-    Drive {
-        /// Names in tables, specs of the command line.
-        drivers: Vec<(String, String)>,
-    },
-    /// Drives a share of the trials of such a step.
-    DriveShard {
-        /// Names in tables, specs of the command line.
-        drivers: Vec<(String, String)>,
-        /// Which share.
-        shard: Shard,
-    },
-    /// Networks drive, the expert labels every tick.
-    OnPolicy {
-        /// Whose trainings with and without the weight are compared; the first drives.
-        seeds: Vec<RootSeed>,
-    },
+    /// The comparison of decision rules; none: it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rules: Option<rules::Extent>,
+    /// The trainings with one thing at a time as in the paper; none: they are left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deviations: Option<deviations::Extent>,
 }
 
 /// A training chain.
@@ -238,6 +205,10 @@ pub const UNSMOOTHED: &str = "drives/unsmoothed";
 pub const SMOOTHED: &str = "drives/smoothed";
 /// See [`REFERENCE`].
 pub const ON_POLICY: &str = "on-policy";
+/// Folder of the comparison of decision rules.
+pub const FAMILY: &str = "family";
+/// Folder of the trainings with one thing at a time as in the paper.
+pub const DEVIATIONS: &str = "deviations";
 
 /// Action smoothing of [`SMOOTHED`] where the settings' networks have none, control ticks.
 const SMOOTHING_TICKS: f32 = 8.0;
@@ -256,7 +227,10 @@ pub fn check(settings: &Settings) -> anyhow::Result<()> {
 }
 
 /// Everything, in the order in which it is done. `root`: the folder of the whole run.
-pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
+///
+/// # Errors
+/// See [`of_rules`] and [`of_deviations`].
+pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> anyhow::Result<Vec<Stage>> {
     let mut stages = trainings(settings, extent);
     stages.extend(drives(settings, extent, root));
     stages.push(Stage {
@@ -265,7 +239,49 @@ pub fn all(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
         settings: settings.clone(),
         step: Step::OnPolicy { seeds: settings.training_seeds(extent.seeds) },
     });
-    stages
+    if let Some(compared) = of_rules(settings, extent, root)? {
+        stages.extend(compared.stages.into_iter().map(|stage| stage.within(FAMILY)));
+    }
+    for stage in of_deviations(settings, extent, root)?.into_iter().flatten() {
+        let is_base = stage.folder == deviations::BASE;
+        let mut stage = stage.within(DEVIATIONS);
+        if let Step::Train { cloning_of, .. } = &mut stage.step
+            && is_base
+        {
+            *cloning_of = Some(Chain::Weighted.folder(settings.seed));
+        }
+        stages.push(stage);
+    }
+    Ok(stages)
+}
+
+/// The comparison of decision rules.
+#[derive(Debug)]
+pub struct ComparedRules {
+    /// Its settings: few lots and short fits, because there are so many trainings.
+    pub settings: Settings,
+    /// Its stages; their folders lie in [`FAMILY`].
+    pub stages: Vec<Stage>,
+}
+
+/// The comparison of decision rules, if it is asked for.
+///
+/// # Errors
+/// If the settings contradict those of the comparison.
+pub fn of_rules(settings: &Settings, extent: &Extent, root: &Path) -> anyhow::Result<Option<ComparedRules>> {
+    let Some(compared) = &extent.rules else { return Ok(None) };
+    let settings = rules::in_short(settings)?;
+    let stages = rules::stages(&settings, compared, &root.join(FAMILY));
+    Ok(Some(ComparedRules { settings, stages }))
+}
+
+/// The trainings with one thing at a time as in the paper, if they are asked for; their folders lie in [`DEVIATIONS`].
+///
+/// # Errors
+/// If the settings contradict each other with one thing as in the paper.
+pub fn of_deviations(settings: &Settings, extent: &Extent, root: &Path) -> anyhow::Result<Option<Vec<Stage>>> {
+    let deviations = extent.deviations.as_ref();
+    deviations.map(|deviations| deviations::stages(settings, deviations, &root.join(DEVIATIONS))).transpose()
 }
 
 /// The stages without the trainings whose folders are missing, and without the drivers that depend on them: an earlier
@@ -440,44 +456,10 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     stages
 }
 
-/// Loads drivers under their names in tables.
-///
-/// # Errors
-/// If something named does not exist.
-pub fn load(drivers: &[(String, String)], settings: &Settings) -> anyhow::Result<Vec<NamedDriver>> {
-    let load = |(name, spec): &(String, String)| {
-        let mut driver = spec.parse::<DriverSpec>()?.load(settings)?.renamed(name);
-        // Each has as many samples as the DAgger of its seed, so that their settings differ in more than the seed.
-        driver.method = name.starts_with(EXPERT_EQUAL).then(|| EXPERT_EQUAL.to_owned());
-        Ok(driver)
-    };
-    drivers.iter().map(load).collect()
-}
-
 /// `tuned:vvf` and `vvf:FILE` → `vvf, tuned`.
 fn tuned_name(spec: &str) -> String {
     let name = spec.strip_prefix("tuned:").or_else(|| spec.split(':').next()).unwrap_or(spec);
     format!("{name}, tuned")
-}
-
-impl Stage {
-    /// What it does, with estimated seconds.
-    pub fn tasks(&self) -> Vec<Task> {
-        match &self.step {
-            Step::Train { cloning_of, .. } => estimate::training(&self.settings, cloning_of.is_none()),
-            Step::Drive { drivers } => vec![estimate::evaluation(&self.settings, drivers.len())],
-            Step::DriveShard { drivers, shard } => {
-                let (name, all_s) = estimate::evaluation(&self.settings, drivers.len());
-                vec![(name, all_s / f64::from(shard.of()))]
-            }
-            Step::OnPolicy { .. } => vec![estimate::on_policy(&self.settings)],
-        }
-    }
-
-    /// About how long it takes, seconds.
-    pub fn estimate_s(&self) -> f64 {
-        self.tasks().iter().map(|(_, seconds)| seconds).sum()
-    }
 }
 
 #[cfg(test)]
@@ -486,13 +468,20 @@ mod tests {
     use policy::loss::{LossSettings, WeightForm};
 
     fn extent() -> Extent {
-        Extent { seeds: 1, unseen: vec!["test:20".to_owned()], rule_iterations: 1, tuned: Vec::new() }
+        Extent {
+            seeds: 1,
+            unseen: vec!["test:20".to_owned()],
+            rule_iterations: 1,
+            tuned: Vec::new(),
+            rules: None,
+            deviations: None,
+        }
     }
 
     #[test]
     fn chains_differ_from_the_papers_in_one_thing_each() {
         let settings = Settings::preset("default").unwrap();
-        let stages = all(&settings, &extent(), Path::new("R"));
+        let stages = all(&settings, &extent(), Path::new("R")).unwrap();
         let of = |folder: &str| stages.iter().find(|stage| stage.folder == folder).unwrap().settings.dagger.clone();
         assert_eq!(of("chains/s1-weighted"), settings.dagger);
         let mut unweighted = of("chains/s1-unweighted");
@@ -519,7 +508,7 @@ mod tests {
         assert_eq!(person.step, Step::Train { cloning_of: None, samples_of: None });
         let expert = expert::ExpertSettings { reaction_delay_s: 0.3, label_jitter: 0.0097, ..settings.expert.clone() };
         assert_eq!(person.settings, Settings { expert, ..settings.clone() });
-        let of_paper = all(&Settings::preset("paper").unwrap(), &extent(), Path::new("R"));
+        let of_paper = all(&Settings::preset("paper").unwrap(), &extent(), Path::new("R")).unwrap();
         assert!(of_paper.iter().all(|stage| !stage.folder.contains("far-points")), "its points are far anyway");
     }
 
@@ -543,7 +532,7 @@ mod tests {
         ] {
             let mut settings = default.clone();
             settings.dagger.fit.loss = loss;
-            let stages = all(&settings, &extent(), Path::new("R"));
+            let stages = all(&settings, &extent(), Path::new("R")).unwrap();
             let trained: Vec<&Stage> = stages.iter().filter(|stage| matches!(stage.step, Step::Train { .. })).collect();
             let folders: Vec<&str> = trained.iter().map(|stage| stage.folder.as_str()).collect();
             assert_eq!(folders.len() + missing.len(), 9, "{loss:?}: {folders:?}");
@@ -586,7 +575,7 @@ mod tests {
     #[test]
     fn what_an_earlier_version_did_not_train_is_left_out() {
         let settings = Settings::preset("default").unwrap();
-        let stages = all(&settings, &extent(), Path::new("R"));
+        let stages = all(&settings, &extent(), Path::new("R")).unwrap();
         let missing = ["chains/s1-expert-equal", "chains/s1-far-points"];
         let left = without_trainings(stages.clone(), |folder| !missing.contains(&folder));
         let gone = ["chains/s1-expert-equal", "chains/s1-far-points", FAR_POINTS];
@@ -630,7 +619,7 @@ mod tests {
     #[test]
     fn shards_have_every_training_once_and_all_of_them_drive() {
         let (settings, extent) = (Settings::preset("default").unwrap(), extent());
-        let stages = all(&settings, &extent, Path::new("R"));
+        let stages = all(&settings, &extent, Path::new("R")).unwrap();
         let of = |part| "1/4".parse::<Shard>().unwrap().all().map(move |shard| (part, shard));
         let shares = |part| of(part).map(|(part, shard)| share(stages.clone(), part, shard)).collect::<Vec<_>>();
         let trained = shares(Part::Trainings);
@@ -657,11 +646,65 @@ mod tests {
     }
 
     #[test]
+    fn tables_with_trainings_of_their_own_lie_in_folders_and_drive_what_lies_there() {
+        let settings = Settings::preset("default").unwrap();
+        let unseen = ["validation:9:all".to_owned()];
+        let rules = ["expert_only", "all_below"].map(str::to_owned).to_vec();
+        let rules = rules::Extent { rules, ..rules::Extent::of_all(1, &unseen) };
+        let deviations =
+            deviations::Extent { deviations: vec!["start".to_owned(), "points".to_owned()], unseen: unseen.to_vec() };
+        let plain = all(&settings, &extent(), Path::new("R")).unwrap();
+        let extent = Extent { rules: Some(rules), deviations: Some(deviations), ..extent() };
+        let stages = all(&settings, &extent, Path::new("R")).unwrap();
+        assert_eq!(stages[..plain.len()], plain);
+        let further = &stages[plain.len()..];
+        let folders: Vec<&str> = further.iter().map(|stage| stage.folder.as_str()).collect();
+        assert_eq!(
+            folders,
+            [
+                "family/s1-expert_only",
+                "family/s1-all_below",
+                "family/drives",
+                "deviations/as-it-is",
+                "deviations/start",
+                "deviations/points",
+                "deviations/drives",
+                "deviations/drives-points"
+            ]
+        );
+        let train =
+            |cloning_of: Option<&str>| Step::Train { cloning_of: cloning_of.map(str::to_owned), samples_of: None };
+        assert_eq!(further[1].step, train(Some("family/s1-expert_only")));
+        assert_eq!(further[3].step, train(Some("chains/s1-weighted")), "it is the same behaviour cloning");
+        assert_eq!(further[4].step, train(Some("deviations/as-it-is")));
+        assert_eq!(further[5].step, train(None), "other points are other labels");
+        // Few lots, many trainings.
+        assert_eq!(further[1].settings.training.lots, ["lot-a", "train:36:all"]);
+        assert!(further[4].settings.training == settings.training && further[4].settings.dagger != settings.dagger);
+        // Everybody who drives there was trained there.
+        for stage in further {
+            let Step::Drive { drivers } = &stage.step else { continue };
+            for (name, spec) in drivers {
+                let run = spec.strip_prefix("run:R/").unwrap().trim_end_matches("/bc");
+                assert!(folders.contains(&run), "{name}: {spec}");
+            }
+        }
+        // Shards have each once; a training of few lots brings its own behaviour cloning.
+        let shards = "1/3".parse::<Shard>().unwrap().all().map(|shard| share(stages.clone(), Part::Trainings, shard));
+        let mut shared: Vec<String> = shards.flatten().map(|stage| stage.folder).collect();
+        shared.sort_unstable();
+        let is_training = |stage: &&Stage| matches!(stage.step, Step::Train { .. });
+        let mut trained: Vec<String> = stages.iter().filter(is_training).map(|stage| stage.folder.clone()).collect();
+        trained.sort_unstable();
+        assert_eq!(shared, trained);
+    }
+
+    #[test]
     fn drivers_are_named_and_more_seeds_add_theirs() {
         let settings = Settings::preset("default").unwrap();
         let tuned = ["dwa:t/dwa.toml", "tuned:vff"].map(str::to_owned).to_vec();
         let extent = Extent { seeds: 2, tuned, ..extent() };
-        let stages = all(&settings, &extent, Path::new("R"));
+        let stages = all(&settings, &extent, Path::new("R")).unwrap();
         let names = |folder: &str| -> Vec<String> {
             let stage = stages.iter().find(|stage| stage.folder == folder).unwrap();
             let Step::Drive { drivers } = &stage.step else { panic!("{folder} drives") };
@@ -693,7 +736,7 @@ mod tests {
     #[test]
     fn smoothing_is_that_of_the_networks_or_that_of_the_default() {
         let smoothing = |preset: &str, folder: &str| {
-            let stages = all(&Settings::preset(preset).unwrap(), &extent(), Path::new("R"));
+            let stages = all(&Settings::preset(preset).unwrap(), &extent(), Path::new("R")).unwrap();
             stages.into_iter().find(|stage| stage.folder == folder).unwrap().settings.evaluation.smoothing
         };
         let own = Settings::preset("default").unwrap().dagger.inference.smoothing_ticks;

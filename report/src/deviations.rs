@@ -1,20 +1,21 @@
-//! What each deviation from the paper does: `deviations.md`, `.csv` and `.svg`.
+//! What each deviation from the paper does.
 
 use crate::markdown::table_of;
 use crate::plots::{self, RateRow};
+use crate::trainings_table::TrainingsTable;
 use anyhow::Context as _;
 use evaluation::deviations::{self, BASE, Extent};
 use evaluation::drive_stage::DriveStage;
 use evaluation::format::{difference, quoted_interval, quoted_rate};
 use evaluation::names::{BC, DAGGER};
 use evaluation::results::EvaluationResults;
-use evaluation::stages::{Stage, Step};
+use evaluation::stage::{Stage, Step};
 use evaluation::statistics::bootstrap::Interval;
 use evaluation::summary::csv_of;
 use evaluation::table1::Table1;
-use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
 use serde::Serialize;
+use std::path::Path;
 
 /// A policy of a training.
 #[derive(Debug, Clone, Serialize)]
@@ -49,14 +50,14 @@ struct Row {
 /// Above the table.
 pub const TITLE: &str = "One thing at a time as in the paper";
 
-/// Writes the table, its rows as CSV and the plot; returns the table.
+/// The table, by what the stages left in the folder `root`.
 ///
 /// # Errors
-/// If what a stage wrote cannot be read, or a file cannot be written.
-pub fn write(_: &Settings, _: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<String> {
+/// If what a stage wrote cannot be read.
+pub fn table(_: &Settings, _: &Extent, stages: &[Stage], root: &Path) -> anyhow::Result<TrainingsTable> {
     let mut rows = Vec::new();
     for stage in stages.iter().filter(|stage| matches!(stage.step, Step::Drive { .. })) {
-        rows.extend(rows_of(stage, stages, run)?);
+        rows.extend(rows_of(stage, stages, root)?);
     }
     let mut table = table_of(&[
         "as in the paper",
@@ -79,19 +80,16 @@ pub fn write(_: &Settings, _: &Extent, stages: &[Stage], run: &RunDir) -> anyhow
         ]);
     }
     let text = format!("{table}\n\n{LEGEND}");
-    run.write("deviations.md", format!("{text}\n").as_bytes())?;
-    run.write("deviations.csv", &csv_of(&rows)?)?;
-    run.write("deviations.svg", plot(&rows).as_bytes())?;
-    Ok(text)
+    Ok(TrainingsTable { csv: csv_of(&rows)?, svg: plot(&rows), text })
 }
 
 const LEGEND: &str = "Of one training of each: intervals of 95 % are for other lots, not for other seeds; (b): bootstrap, where \
     near-collisions come in clusters. A difference that excludes zero (*) is one of many, and no adjustment is made for their number.";
 
-fn rows_of(stage: &Stage, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<Row>> {
+fn rows_of(stage: &Stage, stages: &[Stage], root: &Path) -> anyhow::Result<Vec<Row>> {
     let drive = DriveStage::load(stage)?;
     let plan = drive.plan();
-    let results = EvaluationResults::read(&plan, &run.path().join(&stage.folder))?;
+    let results = EvaluationResults::read(&plan, &root.join(&stage.folder))?;
     let everywhere = results.slices().pop().context("lots were driven on")?;
     let index_of = |name: &str| plan.drivers.iter().position(|driver| driver.name == name);
     let mut rows = Vec::new();
@@ -101,7 +99,7 @@ fn rows_of(stage: &Stage, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<
             results.judge(0, &everywhere, base.unwrap_or(0), drive.settings().evaluation.seed);
         for training in stages {
             let Some(driver) = index_of(&deviations::names(&training.folder)[which]) else { continue };
-            let folder = run.path().join(&training.folder);
+            let folder = root.join(&training.folder);
             let table1 = Table1::read(&folder)?.with_context(|| format!("{}: no table1.json", folder.display()))?;
             let round = if which == 0 { table1.rows.first() } else { table1.rows.last() };
             let totals = results.totals(0, driver, &everywhere, None);

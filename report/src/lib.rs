@@ -10,7 +10,7 @@
 //! | [`run_report`], [`moments`] | `report.html` of a run, with its worst near-collisions |
 //! | [`reproduction`] | the report of `reproduce` |
 //! | [`other_run`] | the table of another run in that report, or on a page of its own |
-//! | [`rules`], [`scaling`], [`deviations`] | those of the commands of these names: many trainings, one table, one plot |
+//! | [`rules`], [`scaling`], [`deviations`], [`trainings_table`] | those of the commands of these names: many trainings, one table, one plot |
 
 mod command_line;
 mod controls;
@@ -36,5 +36,6 @@ pub mod scaling;
 pub mod summary;
 pub mod table1;
 mod trainings;
+pub mod trainings_table;
 pub mod tuning;
 pub mod what_if;

@@ -1,23 +1,26 @@
 //! The one report: what holds, the paper's tables beside ours, ablations. Made from what the stages wrote.
 
 use crate::controls;
+use crate::deviations;
 use crate::docs_page::{self, MadeBy};
 use crate::drive::{rows_of, with_drives};
 use crate::markdown::{table_of, with_header};
 use crate::other_run::OtherRun;
 use crate::page::{Image, Page};
 use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
+use crate::rules;
 use crate::table1::{self, AGREEMENT, READ_ETA_HAT};
 use crate::trainings::{self, Place};
+use crate::trainings_table::TrainingsTable;
 use evaluation::calibration::AxisCalibration;
 use evaluation::conclusions::{self, Against, Driven, Statement, Verdict};
-use evaluation::deviations;
 use evaluation::format::{difference, exact_rate, quoted_interval, quoted_rate};
 use evaluation::names::{BC, DAGGER, UNWEIGHTED};
 use evaluation::on_policy::{Calibration, Effect, OnPolicy, States};
 use evaluation::paper::{self, PaperLot};
 use evaluation::slices::{LotGroup, Slice};
-use evaluation::stages::{self, Chain, Extent, Stage};
+use evaluation::stage::Stage;
+use evaluation::stages::{self, Chain, Extent};
 use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
 use evaluation::totals::Totals;
@@ -55,6 +58,9 @@ pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
     page.section("Where to look further", further());
     page.write(run, "report")?;
     run.write("conclusions.csv", &csv_of(&found.statements)?)?;
+    for FurtherTable { name, table, .. } in further_tables(recipe, run.path())? {
+        table.write(run, name)?;
+    }
     Ok(verdicts(&found.statements, &recipe.extent))
 }
 
@@ -79,10 +85,33 @@ pub fn docs_page(recipe: &Recipe, run: &Path, others: &[OtherRun], made_by: Made
     Ok(page)
 }
 
+/// A table with trainings of its own.
+struct FurtherTable {
+    /// Of its files.
+    name: &'static str,
+    title: &'static str,
+    table: TrainingsTable,
+}
+
+/// Those that were asked for.
+fn further_tables(recipe: &Recipe, root: &Path) -> anyhow::Result<Vec<FurtherTable>> {
+    let Recipe { settings, extent, .. } = recipe;
+    let mut tables = Vec::new();
+    if let (Some(compared), Some(of)) = (stages::of_rules(settings, extent, root)?, &extent.rules) {
+        let table = rules::table(&compared.settings, of, &compared.stages, &root.join(stages::FAMILY))?;
+        tables.push(FurtherTable { name: "rules", title: rules::TITLE, table });
+    }
+    if let (Some(stages), Some(of)) = (stages::of_deviations(settings, extent, root)?, &extent.deviations) {
+        let table = deviations::table(settings, of, &stages, &root.join(stages::DEVIATIONS))?;
+        tables.push(FurtherTable { name: "deviations", title: deviations::TITLE, table });
+    }
+    Ok(tables)
+}
+
 /// What a reader must know before quoting a figure.
 fn cautions(settings: &Settings) -> anyhow::Result<String> {
     let points = if has_points_of_paper(settings) {
-        let unlike = deviations::unlike_the_paper(settings)?;
+        let unlike = evaluation::deviations::unlike_the_paper(settings)?;
         let unlike = if unlike.is_empty() {
             "Otherwise, too, the trainings are those of the preset `paper`.".to_owned()
         } else {
@@ -145,7 +174,12 @@ impl Found {
                 );
             }
             Ok(())
-        })
+        })?;
+        for FurtherTable { name, title, table } in further_tables(recipe, root)? {
+            page.section(title, table.text);
+            page.figure(name, "The same as a plot.", Image::Svg(table.svg));
+        }
+        Ok(())
     }
 
     fn add_ablations_to(

@@ -1,17 +1,17 @@
-//! The `DAgger` family at equal samples: what collecting cost, and how the policies drive: `rules.md`, `.csv` and `.svg`.
+//! The `DAgger` family at equal samples: what collecting cost, and how the policies drive.
 
 use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
+use crate::trainings_table::TrainingsTable;
 use anyhow::Context as _;
 use evaluation::drive_stage::DriveStage;
 use evaluation::format::{difference, quoted_interval};
 use evaluation::results::EvaluationResults;
 use evaluation::rules::{self, Extent};
-use evaluation::stages::Stage;
+use evaluation::stage::Stage;
 use evaluation::statistics::bootstrap::Interval;
 use evaluation::summary::csv_of;
 use evaluation::trainings::{TRAININGS_MIN, Team};
-use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
 use policy::dagger::Keep;
 use policy::dataset::Collection;
@@ -65,13 +65,13 @@ const OF_PAPER: &str = "all_below";
 /// Above the table.
 pub const TITLE: &str = "Decision rules at equal samples";
 
-/// Writes the table, its rows as CSV and the plot; returns the table.
+/// The table, by what the stages left in the folder `root`.
 ///
 /// # Errors
-/// If what a stage wrote cannot be read, or a file cannot be written.
-pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<String> {
+/// If what a stage wrote cannot be read.
+pub fn table(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path) -> anyhow::Result<TrainingsTable> {
     let drive = DriveStage::load(stages.last().context("the last stage drives")?)?;
-    let results = EvaluationResults::read(&drive.plan(), &run.path().join(rules::DRIVES))?;
+    let results = EvaluationResults::read(&drive.plan(), &root.join(rules::DRIVES))?;
     let everywhere = results.slices().pop().context("lots were driven on")?;
     let control_period_s = f64::from(settings.episode.control_period_s());
     let seed_of_trials = drive.settings().evaluation.seed;
@@ -83,7 +83,7 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
         let first = extent.rules.first().context("there is a rule")?;
         // Behaviour cloning is a single network, whatever it is done for.
         row.networks = rule.and_then(|rule| rules::rule_of(settings, rule)).map_or(1, |rule| rule.networks());
-        add_rounds(&mut row, &run.path().join(rules::folder(rule.unwrap_or(first), seed)), rule, extent)?;
+        add_rounds(&mut row, &root.join(rules::folder(rule.unwrap_or(first), seed)), rule, extent)?;
         let totals = results.totals(0, driver, &everywhere, None);
         (row.route_m, row.near_collisions, row.contacts) =
             (totals.reference_m, totals.near_collisions, totals.contacts);
@@ -122,10 +122,7 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
         row.judge_interventions(control_period_s);
     }
     let text = format!("{}\n\n{}", to_markdown(&pooled), legend(settings, extent));
-    run.write("rules.md", format!("{text}\n").as_bytes())?;
-    run.write("rules.csv", &csv_of(&[pooled.clone(), rows].concat())?)?;
-    run.write("rules.svg", plot(&pooled).as_bytes())?;
-    Ok(text)
+    Ok(TrainingsTable { csv: csv_of(&[pooled.clone(), rows].concat())?, svg: plot(&pooled), text })
 }
 
 impl Row {

@@ -1,21 +1,22 @@
-//! Near-collisions against the number of different lots that were trained on: `scaling.md`, `.csv` and `.svg`.
+//! Near-collisions against the number of different lots that were trained on.
 
 use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
+use crate::trainings_table::TrainingsTable;
 use anyhow::Context as _;
 use evaluation::drive_stage::DriveStage;
 use evaluation::format::{quoted_interval, quoted_rate};
 use evaluation::names::{BC, DAGGER};
 use evaluation::results::EvaluationResults;
 use evaluation::scaling::{self, Extent};
-use evaluation::stages::Stage;
+use evaluation::stage::Stage;
 use evaluation::summary::csv_of;
 use evaluation::table1::Table1;
 use experiment::lots::Lot;
-use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 
 /// What was trained on so many lots, on lots of one kind or on all of them.
 #[derive(Debug, Clone, Serialize)]
@@ -42,12 +43,12 @@ struct Row {
 /// Above the table.
 pub const TITLE: &str = "Near-collisions against different lots";
 
-/// Writes the table, its rows as CSV and the plot; returns the table.
+/// The table, by what the stages left in the folder `root`.
 ///
 /// # Errors
-/// If what a stage wrote cannot be read, or a file cannot be written.
-pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<String> {
-    let rows = rows(settings, extent, stages, run)?;
+/// If what a stage wrote cannot be read.
+pub fn table(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path) -> anyhow::Result<TrainingsTable> {
+    let rows = rows(settings, extent, stages, root)?;
     let totals: Vec<&Row> = rows.iter().filter(|row| row.lots == rows[rows.len() - 1].lots).collect();
     let mut table =
         table_of(&["different lots", "method", "samples", "route", "near-collisions (contacts)", "per 100 m [95 %]"]);
@@ -62,19 +63,16 @@ pub fn write(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDi
         ]);
     }
     let text = format!("{table}\n\n{LEGEND}");
-    run.write("scaling.md", format!("{text}\n").as_bytes())?;
-    run.write("scaling.csv", &csv_of(&rows)?)?;
-    run.write("scaling.svg", plot(&totals).as_bytes())?;
-    Ok(text)
+    Ok(TrainingsTable { csv: csv_of(&rows)?, svg: plot(&totals), text })
 }
 
 const LEGEND: &str = "Of one training of each, with as many drives and optimiser steps; DAgger keeps the expert's ticks, so that its samples \
     differ. Intervals of 95 % are for other lots, not for other seeds; (b): bootstrap, where \
     near-collisions come in clusters.";
 
-fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) -> anyhow::Result<Vec<Row>> {
+fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path) -> anyhow::Result<Vec<Row>> {
     let drive = DriveStage::load(stages.last().context("the last stage drives")?)?;
-    let results = EvaluationResults::read(&drive.plan(), &run.path().join(scaling::DRIVES))?;
+    let results = EvaluationResults::read(&drive.plan(), &root.join(scaling::DRIVES))?;
     let kinds = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     let mut of_kind: BTreeMap<String, usize> = BTreeMap::new();
     for lot in kinds.iter().filter(|lot| lot.is_generated()) {
@@ -87,7 +85,7 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], run: &RunDir) ->
     let judged: Vec<_> = results.slices().into_iter().map(judge).collect();
     let mut rows = Vec::new();
     for (at, &different) in extent.different_lots.iter().enumerate() {
-        let folder = run.path().join(scaling::folder(different));
+        let folder = root.join(scaling::folder(different));
         let table1 = Table1::read(&folder)?.with_context(|| format!("{}: no table1.json", folder.display()))?;
         let samples = [table1.rows.first(), table1.rows.last()].map(|row| row.map_or(0, |row| row.dataset));
         let lots_met =

@@ -36,12 +36,9 @@ pub(crate) const RUN: Trainings<Extent> = Trainings {
     command: COMMAND,
     title: report::deviations::TITLE,
     stages: deviations::stages,
-    write: report::deviations::write,
+    table: report::deviations::table,
     unseen: |extent| &extent.unseen,
 };
-
-/// Not done unless it is asked for.
-const TOO_LONG: &str = "steps";
 
 pub(crate) fn run(args: &DeviationsArgs, output: &Output) -> anyhow::Result<()> {
     RUN.run(&args.common, || begin(args), output)
@@ -59,21 +56,21 @@ fn begin(args: &DeviationsArgs) -> anyhow::Result<Begun<Extent>> {
         );
     }
     ensure_distinct("--only", &args.only)?;
-    let is_asked_for =
-        |name: &str| if args.only.is_empty() { name != TOO_LONG } else { args.only.iter().any(|only| only == name) };
-    let mut names = Vec::new();
-    for deviation in DEVIATIONS.iter().filter(|deviation| is_asked_for(deviation.name)) {
-        let is_other = deviations::as_in_the_paper(&settings, deviation)? != settings;
-        ensure!(
-            is_other || args.only.is_empty(),
-            "--only {}: these settings are as in the paper there",
-            deviation.name
-        );
-        if is_other {
-            names.push(deviation.name.to_owned());
+    let extent = if args.only.is_empty() {
+        Extent::of_all(&settings, &args.unseen)?
+    } else {
+        for name in &args.only {
+            let changed = deviations::called(name).map(|deviation| deviations::as_in_the_paper(&settings, deviation));
+            let is_other = changed.transpose()?.is_some_and(|changed| changed != settings);
+            ensure!(is_other, "--only {name}: these settings are as in the paper there");
         }
-    }
-    ensure!(!names.is_empty(), "these settings are as in the paper in all of that, so there is nothing to compare");
-    let extent = Extent { deviations: names, unseen: args.unseen.clone() };
+        let is_named = |name: &&str| args.only.iter().any(|only| only == name);
+        let deviations = known.into_iter().filter(is_named).map(str::to_owned).collect();
+        Extent { deviations, unseen: args.unseen.clone() }
+    };
+    ensure!(
+        !extent.deviations.is_empty(),
+        "these settings are as in the paper in all of that, so there is nothing to compare"
+    );
     Ok(Begun { preset: layers.preset_name().to_owned(), settings, extent })
 }

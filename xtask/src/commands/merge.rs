@@ -16,7 +16,8 @@ use evaluation::evaluations::Evaluations;
 use evaluation::parts::Rows;
 use evaluation::plan::Plan;
 use evaluation::shards::{self, Shards};
-use evaluation::stages::{self, Step};
+use evaluation::stage::Step;
+use evaluation::stages;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
@@ -230,7 +231,7 @@ fn drives(shards: &Shards, networks: &Path, args: &MergeArgs, output: &Output) -
     let remedy = format!("make them again with --networks {}", networks.display());
     shards.check_are_of(networks, &settings, &manifest, &remedy)?;
     let extent = reproduce::extent_of(&manifest).with_context(|| networks.display().to_string())?;
-    let all = stages::all(&settings, &extent, networks);
+    let all = stages::all(&settings, &extent, networks)?;
     shards.manifest().check_inputs(&reproduce::inputs_of_drives(&settings, &extent, &all)?)?;
     // Nothing is written before all of it is known to be whole.
     shards.stages(&all)?;

@@ -8,9 +8,11 @@ use crate::build_info;
 use crate::console::Console;
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use evaluation::shards::ShardRecord;
-use evaluation::stages::{self, Extent, Stage, Step};
+use evaluation::stage::{self, Stage, Step};
+use evaluation::stages::{self, Extent};
+use evaluation::{deviations, rules};
 use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
@@ -29,6 +31,7 @@ Examples:
   cargo xtask reproduce                               70 minutes on two cores
   cargo xtask reproduce --preset smoke --out runs/try   every stage within a minute
   cargo xtask reproduce --full --unseen sealed:my-phrase:120:all
+  cargo xtask reproduce --full --tables rules,deviations      every table in one run: a night
   cargo xtask reproduce --preset paper --seeds 3        the paper's own regime: days
   cargo xtask reproduce --resume runs/reproduce-default-s1
   cargo xtask reproduce --full --shard 3/16 --out trained/3
@@ -54,6 +57,9 @@ pub(crate) struct ReproduceArgs {
     /// sealed:reproduce:24:all; sealed:reproduce:120:all with --full].
     #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name)]
     unseen: Vec<String>,
+    /// Further tables, as the commands of these names make them, with trainings of their own: hours each.
+    #[arg(long, value_name = "TABLE", num_args = 1.., value_delimiter = ',')]
+    tables: Vec<FurtherTable>,
     /// Folder of `cargo xtask tune`: planners also drive with the parameters found there [default: those in planners/tuned].
     #[arg(long, value_name = "DIR")]
     tuned: Option<PathBuf>,
@@ -67,7 +73,7 @@ pub(crate) struct ReproduceArgs {
         long,
         value_name = "RUN",
         requires = "shard",
-        conflicts_with_all = ["preset", "config", "overrides", "seed", "full", "seeds", "unseen", "tuned"]
+        conflicts_with_all = ["preset", "config", "overrides", "seed", "full", "seeds", "unseen", "tables", "tuned"]
     )]
     networks: Option<PathBuf>,
     #[command(flatten)]
@@ -77,10 +83,17 @@ pub(crate) struct ReproduceArgs {
         long,
         value_name = "RUN", value_parser = run_folder(),
         conflicts_with_all = [
-            "preset", "config", "overrides", "seed", "out", "full", "seeds", "unseen", "tuned", "shard", "networks"
+            "preset", "config", "overrides", "seed", "out", "full", "seeds", "unseen", "tables", "tuned", "shard", "networks"
         ]
     )]
     resume: Option<PathBuf>,
+}
+
+/// A table with trainings of its own, as a command of the same name makes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum FurtherTable {
+    Rules,
+    Deviations,
 }
 
 pub(crate) const COMMAND: &str = "reproduce";
@@ -95,7 +108,7 @@ pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
     };
     let Some(record) = shard else { return finish(&run, settings, extent, output) };
     let root = record.networks.as_deref().unwrap_or(run.path());
-    let stages = record.share_of(stages::all(&settings, &extent, root));
+    let stages = record.share_of(stages::all(&settings, &extent, root)?);
     let console = Console::new(output);
     perform::all(COMMAND, &stages, &run, &console, output)?;
     run.finish(Outcome::Reproduction { stages: stages.len() })?;
@@ -107,7 +120,7 @@ pub(crate) fn run(args: &ReproduceArgs, output: &Output) -> anyhow::Result<()> {
 
 /// Does what is left of a run, and writes its report.
 pub(crate) fn finish(run: &RunDir, settings: Settings, extent: Extent, output: &Output) -> anyhow::Result<()> {
-    let stages = stages::all(&settings, &extent, run.path());
+    let stages = stages::all(&settings, &extent, run.path())?;
     let recipe = Recipe { settings, extent, stages };
     let console = Console::new(output);
     perform::all(COMMAND, &recipe.stages, run, &console, output)?;
@@ -156,11 +169,22 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
         [] => vec!["sealed:reproduce:24:all".to_owned()],
         named => named.to_vec(),
     };
+    let seeds = args.seeds.unwrap_or(if args.full { SEEDS_FULL } else { 1 });
+    let is_asked_for = |table| args.tables.contains(&table);
+    let rules = is_asked_for(FurtherTable::Rules).then(|| rules::Extent::of_all(seeds, &unseen));
+    let deviations = is_asked_for(FurtherTable::Deviations).then(|| deviations::Extent::of_all(&settings, &unseen));
+    let deviations = deviations.transpose()?;
+    ensure!(
+        deviations.as_ref().is_none_or(|extent| !extent.deviations.is_empty()),
+        "--tables deviations: these settings are as in the paper in all of that, so there is nothing to compare"
+    );
     let extent = Extent {
-        seeds: args.seeds.unwrap_or(if args.full { SEEDS_FULL } else { 1 }),
+        seeds,
         unseen,
         rule_iterations: if args.full { settings.dagger.iterations_max } else { 1 },
         tuned: tuned(args.tuned.as_deref())?,
+        rules,
+        deviations,
     };
     // Before the folder is claimed: a misspelt lot should not leave one behind.
     train::check_lots(&settings, output)?;
@@ -173,14 +197,13 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
         settings.seed.0,
         extent.seeds
     );
-    for stage in stages::all(&settings, &extent, Path::new("")) {
+    // Only the names of the folders are asked for: the run has no place yet.
+    let stages = stages::all(&settings, &extent, Path::new(""))?;
+    for stage in &stages {
         stage.settings.check().with_context(|| stage.folder.clone())?;
     }
     let preset = format!("{}{}", if args.full { "full-" } else { "" }, layers.preset_name());
-    // Only the names of the folders are asked for: the run has no place yet.
-    let record =
-        |number| ShardRecord::of_stages(number, None, &settings, stages::all(&settings, &extent, Path::new("")));
-    let shard = args.shard.map(record);
+    let shard = args.shard.map(|number| ShardRecord::of_stages(number, None, &settings, stages));
     let inputs = inputs(&settings, &extent)?;
     create(args, &preset, settings, Arguments { extent, shard }, (inputs, reads))
 }
@@ -200,7 +223,7 @@ fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir
         "--networks {name}: this is a shard; put all of them together first with cargo xtask merge RUN..."
     );
     ensure!(!manifest::is_finished(&networks)?, "--networks {name}: this run is finished; nothing is left to drive");
-    let stages = stages::all(&settings, &extent, &networks);
+    let stages = stages::all(&settings, &extent, &networks)?;
     for stage in stages.iter().filter(|stage| matches!(stage.step, Step::Train { .. })) {
         ensure!(
             manifest::is_finished(&networks.join(&stage.folder))?,
@@ -240,7 +263,7 @@ pub(crate) fn recipe_of(path: &Path) -> anyhow::Result<Recipe> {
     ensure!(shard.is_none(), "{}: this is a shard, which has no report; put all together with merge", path.display());
     let trained: BTreeSet<String> = sums::names(path)?.into_iter().collect();
     let is_there = |folder: &str| trained.contains(&format!("{folder}/{}", sums::FILE));
-    let stages = stages::without_trainings(stages::all(&settings, &extent, path), is_there);
+    let stages = stages::without_trainings(stages::all(&settings, &extent, path)?, is_there);
     let stages = perform::with_those_who_drove(stages, path)?;
     Ok(Recipe { settings, extent, stages })
 }
@@ -259,7 +282,7 @@ fn resume(path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, Arg
         build_info::check_began_shard(path, &manifest)?;
     }
     let found = match shard.as_ref().and_then(|shard| shard.networks.as_deref()) {
-        Some(networks) => inputs_of_drives(&settings, extent, &stages::all(&settings, extent, networks))?,
+        Some(networks) => inputs_of_drives(&settings, extent, &stages::all(&settings, extent, networks)?)?,
         None => inputs(&settings, extent)?,
     };
     manifest.check_inputs(&found)?;
@@ -270,7 +293,7 @@ fn resume(path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, Arg
 pub(crate) fn asked_for(settings: &Settings, manifest: &Manifest) -> anyhow::Result<AskedFor> {
     let extent = extent_of(manifest)?;
     Ok(AskedFor {
-        stages: stages::all(settings, &extent, Path::new("")),
+        stages: stages::all(settings, &extent, Path::new(""))?,
         inputs: inputs(settings, &extent)?,
         reads: places(settings, &extent)?,
     })
@@ -281,7 +304,7 @@ pub(crate) fn inputs_of_drives(settings: &Settings, extent: &Extent, stages: &[S
     let mut found = inputs(settings, extent)?;
     for stage in stages {
         if let Step::Drive { drivers } = &stage.step {
-            found.extend(inputs::of(&[], &stages::load(drivers, settings)?));
+            found.extend(inputs::of(&[], &stage::load(drivers, settings)?));
         }
     }
     Ok(found)

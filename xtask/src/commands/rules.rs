@@ -32,13 +32,13 @@ pub(crate) struct RulesArgs {
     rule: Vec<String>,
     /// Iterations of every training, after behaviour cloning.
     #[arg(
-        long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=50),
+        long, value_name = "N", default_value_t = rules::ITERATIONS, value_parser = clap::value_parser!(u32).range(1..=50),
         conflicts_with = "resume"
     )]
     iterations: u32,
     /// Samples that a round adds to the data set, for every rule.
     #[arg(
-        long, value_name = "N", default_value_t = 6000, value_parser = clap::value_parser!(u32).range(1..),
+        long, value_name = "N", default_value_t = rules::SAMPLES, value_parser = clap::value_parser!(u32).range(1..),
         conflicts_with = "resume"
     )]
     samples: u32,
@@ -50,18 +50,13 @@ pub(crate) struct RulesArgs {
     unseen: Vec<String>,
 }
 
-/// Few lots: two of each family and one round trip of lot a in every round. Every tick is learned from: rules that let the
-/// network drive on would leave the expert's ticks of its worst moments alone, and too few of them for equal samples.
-const DEFAULTS: [&str; 3] = [r#"training.lots=["lot-a", "train:18:all"]"#, "training.trials=1", EVERY_TICK];
-const EVERY_TICK: &str = r#"dagger.keep="every_tick""#;
-
 pub(crate) const COMMAND: &str = "rules";
 
 pub(crate) const RULES: Trainings<Extent> = Trainings {
     command: COMMAND,
     title: report::rules::TITLE,
     stages: |settings, extent, root| Ok(rules::stages(settings, extent, root)),
-    write: report::rules::write,
+    table: report::rules::table,
     unseen: |extent| &extent.unseen,
 };
 
@@ -73,8 +68,8 @@ fn begin(args: &RulesArgs) -> anyhow::Result<Begun<Extent>> {
     let mut layers = args.common.layers();
     // What the user sets comes later and counts.
     let defaults: &[&str] = match layers.preset_name() {
-        "default" => &DEFAULTS,
-        "strong" => &[EVERY_TICK],
+        "default" => &rules::FEW_LOTS,
+        "strong" => &[rules::EVERY_TICK],
         _ => &[],
     };
     layers.overrides.splice(0..0, defaults.iter().map(|&text| text.to_owned()));

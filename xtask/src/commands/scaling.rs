@@ -44,7 +44,7 @@ pub(crate) const SCALING: Trainings<Extent> = Trainings {
     command: COMMAND,
     title: report::scaling::TITLE,
     stages: |settings, extent, root| Ok(scaling::stages(settings, extent, root)),
-    write: report::scaling::write,
+    table: report::scaling::table,
     unseen: |extent| &extent.unseen,
 };
 

@@ -9,13 +9,14 @@ use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::Args;
 use evaluation::shards::ShardRecord;
-use evaluation::stages::Stage;
+use evaluation::stage::Stage;
 use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
 use experiment::manifest::{Manifest, Outcome, Request};
 use experiment::run_dir::RunDir;
 use experiment::settings::{Layers, Settings};
 use experiment::shard::Shard;
+use report::trainings_table::TrainingsTable;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fmt::Display;
@@ -73,8 +74,8 @@ pub(crate) struct Trainings<E> {
     /// Above its table.
     pub(crate) title: &'static str,
     pub(crate) stages: fn(&Settings, &E, &Path) -> anyhow::Result<Vec<Stage>>,
-    /// Writes `COMMAND.md`, `.csv` and `.svg`; returns the table.
-    pub(crate) write: fn(&Settings, &E, &[Stage], &RunDir) -> anyhow::Result<String>,
+    /// What is written as `COMMAND.md`, `.csv` and `.svg`, by what the stages left in a folder.
+    pub(crate) table: fn(&Settings, &E, &[Stage], &Path) -> anyhow::Result<TrainingsTable>,
     /// Lots that nothing is trained on.
     pub(crate) unseen: fn(&E) -> &[String],
 }
@@ -111,8 +112,9 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
                 "written: {folder}: shard {number}; put all together with cargo xtask merge RUN..."
             ));
         } else {
-            let table = (self.write)(&settings, &extent, &stages, &run)?;
-            output.table(|| format!("\n{}\n\n{table}", self.title), &())?;
+            let table = (self.table)(&settings, &extent, &stages, run.path())?;
+            table.write(&run, name)?;
+            output.table(|| format!("\n{}\n\n{}", self.title, table.text), &())?;
             run.finish(Outcome::Reproduction { stages: stages.len() })?;
             output.note(format_args!("written: {folder}/{name}.md, {name}.csv and {name}.svg"));
         }

@@ -1,0 +1,95 @@
+//! A step of a run of several trainings: what it does, with which settings, and in which folder.
+
+use crate::estimate::{self, Task};
+use crate::names::EXPERT_EQUAL;
+use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::settings::Settings;
+use experiment::shard::Shard;
+use sim::seed::RootSeed;
+
+/// One step, with a folder of its own within the run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stage {
+    /// Its folder.
+    pub folder: String,
+    /// What it does, for people.
+    pub about: String,
+    /// Its settings.
+    pub settings: Settings,
+    /// The step itself.
+    pub step: Step,
+}
+
+/// What can be done in a stage.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Step {
+    /// Trains a chain.
+    Train {
+        /// Folder of the chain whose behaviour cloning is taken over.
+        cloning_of: Option<String>,
+        /// Folder of the chain that decides how many samples an iteration keeps: as many as it has, on average.
+        samples_of: Option<String>,
+    },
+    /// Drives `(name, spec)`, all compared with the driver of this name.
+    Drive {
+        /// Names in tables, specs of the command line.
+        drivers: Vec<(String, String)>,
+    },
+    /// Drives a share of the trials of such a step.
+    DriveShard {
+        /// Names in tables, specs of the command line.
+        drivers: Vec<(String, String)>,
+        /// Which share.
+        shard: Shard,
+    },
+    /// Networks drive, the expert labels every tick.
+    OnPolicy {
+        /// Whose trainings with and without the weight are compared; the first drives.
+        seeds: Vec<RootSeed>,
+    },
+}
+
+impl Stage {
+    /// The same in a folder of the run: what it takes over from other stages lies there, too.
+    pub(crate) fn within(mut self, folder: &str) -> Self {
+        let within = |name: &str| format!("{folder}/{name}");
+        self.folder = within(&self.folder);
+        if let Step::Train { cloning_of, samples_of } = &mut self.step {
+            *cloning_of = cloning_of.as_deref().map(within);
+            *samples_of = samples_of.as_deref().map(within);
+        }
+        self
+    }
+
+    /// What it does, with estimated seconds.
+    pub fn tasks(&self) -> Vec<Task> {
+        match &self.step {
+            Step::Train { cloning_of, .. } => estimate::training(&self.settings, cloning_of.is_none()),
+            Step::Drive { drivers } => vec![estimate::evaluation(&self.settings, drivers.len())],
+            Step::DriveShard { drivers, shard } => {
+                let (name, all_s) = estimate::evaluation(&self.settings, drivers.len());
+                vec![(name, all_s / f64::from(shard.of()))]
+            }
+            Step::OnPolicy { .. } => vec![estimate::on_policy(&self.settings)],
+        }
+    }
+
+    /// About how long it takes, seconds.
+    pub fn estimate_s(&self) -> f64 {
+        self.tasks().iter().map(|(_, seconds)| seconds).sum()
+    }
+}
+
+/// Loads drivers under their names in tables.
+///
+/// # Errors
+/// If something named does not exist.
+pub fn load(drivers: &[(String, String)], settings: &Settings) -> anyhow::Result<Vec<NamedDriver>> {
+    let load = |(name, spec): &(String, String)| {
+        let mut driver = spec.parse::<DriverSpec>()?.load(settings)?.renamed(name);
+        // Each has as many samples as the DAgger of its seed, so that their settings differ in more than the seed.
+        driver.method = name.starts_with(EXPERT_EQUAL).then(|| EXPERT_EQUAL.to_owned());
+        Ok(driver)
+    };
+    drivers.iter().map(load).collect()
+}
