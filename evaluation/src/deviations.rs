@@ -24,7 +24,7 @@ pub struct Deviation {
 }
 
 /// Every one, in the order of a training.
-pub const DEVIATIONS: [Deviation; 12] = [
+pub const DEVIATIONS: [Deviation; 13] = [
     Deviation {
         name: "points",
         of_paper: "points as far as the way is open, at v = a_y/4.48",
@@ -50,7 +50,21 @@ pub const DEVIATIONS: [Deviation; 12] = [
         // Only rounds of DAgger are disturbed.
         changes_cloning: false,
     },
-    Deviation { name: "network", of_paper: "the paper's network", keys: &["dagger.network"], changes_cloning: true },
+    Deviation {
+        name: "network",
+        of_paper: "the paper's layers and dropout",
+        keys: &[
+            "dagger.network.conv1",
+            "dagger.network.conv2",
+            "dagger.network.residual1",
+            "dagger.network.residual2",
+            "dagger.network.hidden",
+            "dagger.network.dropout_features",
+            "dagger.network.dropout_hidden",
+        ],
+        changes_cloning: true,
+    },
+    Deviation { name: "modes", of_paper: "one Gaussian", keys: &["dagger.network.modes"], changes_cloning: true },
     Deviation {
         name: "loss",
         of_paper: "plain likelihood, β = 0",

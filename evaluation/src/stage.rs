@@ -52,11 +52,10 @@ pub enum Step {
 impl Stage {
     /// The same in a folder of the run: what it takes over from other stages lies there, too.
     pub(crate) fn within(mut self, folder: &str) -> Self {
-        let within = |name: &str| format!("{folder}/{name}");
-        self.folder = within(&self.folder);
+        let within = |name: &mut String| name.insert_str(0, &format!("{folder}/"));
+        within(&mut self.folder);
         if let Step::Train { cloning_of, samples_of } = &mut self.step {
-            *cloning_of = cloning_of.as_deref().map(within);
-            *samples_of = samples_of.as_deref().map(within);
+            cloning_of.iter_mut().chain(samples_of).for_each(within);
         }
         self
     }

@@ -17,7 +17,7 @@ const NETS: [&str; 2] = ["compact", "paper"];
 
 fn net(name: &str) -> NetworkArchitecture {
     match name {
-        "compact" => NetworkArchitecture::compact(),
+        "compact" => NetworkArchitecture { modes: 1, ..NetworkArchitecture::compact() },
         _ => NetworkArchitecture::paper(),
     }
 }

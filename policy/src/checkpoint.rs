@@ -94,6 +94,17 @@ const OUTPUT: &str = "[u, w, raw_u, raw_w]: (u, w) look-ahead point in image fra
                       mean over inference.smoothing_ticks of the point's curvature 2 Y / (X^2 + Y^2) and range \
                       (X^2 + Y^2)^0.5";
 
+/// What a row of the network's output is.
+fn output_of(modes: usize) -> String {
+    if modes == 1 {
+        return OUTPUT.to_owned();
+    }
+    format!(
+        "{modes} answers one after another, then the logit of each: the likeliest drives; if inference.mirror_averaging, the \
+         likeliest to the grid or to grid.flip(-1), averaged with the nearest to the other. An answer: {OUTPUT}"
+    )
+}
+
 impl Checkpoint {
     /// Whether a folder holds a finished checkpoint.
     ///
@@ -121,7 +132,7 @@ impl Checkpoint {
         let network = self.weights.architecture();
         let about = ModelFile {
             input: INPUT.to_string(),
-            output: OUTPUT.to_string(),
+            output: output_of(network.modes),
             log_variance_min: LOG_VARIANCE_MIN,
             log_variance_max: LOG_VARIANCE_MAX,
             conditions: self.conditions.clone(),
@@ -338,7 +349,6 @@ fn fc2_index(architecture: &NetworkArchitecture, stored: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::network::OUTPUTS;
     use crate::test_data::scratch;
     use sim::episode::EpisodeSettings;
     use sim::seed::RootSeed;
@@ -377,7 +387,7 @@ mod tests {
             value(named("fc1.weight"), unit * 1152 + channel * 36 + row * 6 + col),
             weights.parts().fc1_weight[((row * 6 + col) * 32 + channel) * 3 + unit]
         );
-        assert_eq!(value(named("fc2.weight"), 3 + 2), weights.parts().fc2_weight[2 * OUTPUTS + 1]);
+        assert_eq!(value(named("fc2.weight"), 3 + 2), weights.parts().fc2_weight[2 * architecture.outputs() + 1]);
     }
 
     /// In memory the weights of all layers of a stage come before their biases.

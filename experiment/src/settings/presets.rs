@@ -93,6 +93,7 @@ fn strong() -> Settings {
                 conv1: ConvLayer { channels: 32, kernel: 5 },
                 conv2: ConvLayer { channels: 64, kernel: 3 },
                 hidden: 512,
+                // Two are the default's; with so large a network they were not tried.
                 modes: 1,
                 ..base.dagger.network
             },
@@ -195,7 +196,7 @@ fn smoke() -> Settings {
                 residual1: 1,
                 residual2: 1,
                 hidden: 64,
-                modes: 1,
+                modes: 2,
                 dropout_features: 0.0,
                 dropout_hidden: 0.1,
             },

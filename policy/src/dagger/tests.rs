@@ -3,6 +3,7 @@
 use super::*;
 use crate::checkpoint::Checkpoint;
 use crate::conditions::Conditions;
+use crate::dagger::learned::critic_folder;
 use crate::dataset::ValidationSplit;
 use crate::dataset::store::Store;
 use crate::decision_rule::DecisionRule;
@@ -340,7 +341,8 @@ fn every_rule_of_the_family_trains_and_its_round_is_driven_again_as_it_was() {
         let folder = scratch(name);
         let rule = DecisionRule::named(name).unwrap();
         let keep = Keep::EveryTick;
-        let settings = DaggerSettings { rule, keep, iterations_max: 1, samples_per_round: 150, ..settings() };
+        let mut settings = DaggerSettings { rule, keep, iterations_max: 1, samples_per_round: 150, ..settings() };
+        settings.network.modes = 2;
         let mut shares = Vec::new();
         let mut watch = |progress: &Progress<'_>| {
             if let Progress::Fitting { round: Some(1), share, .. } = progress {
@@ -366,6 +368,12 @@ fn every_rule_of_the_family_trains_and_its_round_is_driven_again_as_it_was() {
         trained.sort_unstable_by_key(|&steps| Reverse(steps));
         let planned: Vec<u32> = settings.fits_of_round(1).iter().map(|fit| fit.steps(0)).collect();
         assert_eq!((trained, planned.len()), (planned.clone(), rule.networks()), "{name}");
+        // What a critic predicts has no sides.
+        let modes_of = |part: &Path| Checkpoint::load(part).unwrap().weights.architecture().modes;
+        assert_eq!(modes_of(&store.round_folder(1)), 2, "{name}");
+        let critic = critic_folder(&store, 1);
+        assert_eq!(Checkpoint::exists(&critic).unwrap(), rule.critic().is_some(), "{name}");
+        assert!(rule.critic().is_none() || modes_of(&critic) == 1, "{name}");
         let novice = Learned::of_round(&settings, &store, 1).unwrap();
         let again =
             Rollouts::of_round(&settings, RootSeed(6), Some(&novice), of_round(1, 2)).drive(&mut |_, _| {}).unwrap();

@@ -6,6 +6,9 @@ use sim::sensing::OccupancyGrid;
 
 /// Networks whose answers are taken together: a mixture of normal distributions with equal weights, of which mean and
 /// standard deviation are reported. Where the members disagree, the standard deviation says so.
+///
+/// The mean of two ways past an obstacle leads into it. So members that choose among several modes are taken together by
+/// majority: the member that is nearest to all others, and those nearest to it, more than half of them in all (chosen).
 #[derive(Debug, Clone)]
 pub struct Ensemble {
     first: Predictor,
@@ -32,11 +35,14 @@ impl Ensemble {
             return (answers, disagreement);
         }
         let others: Vec<Vec<Prediction>> = self.others.iter_mut().map(|member| member.predict(grids)).collect();
+        let mut members = Vec::with_capacity(1 + others.len());
         for (at, (answer, disagreement)) in answers.iter_mut().zip(&mut disagreement).enumerate() {
-            let first = *answer;
-            *answer = mixture(first, || others.iter().map(|answers| answers[at]));
-            let members = std::iter::once(first).chain(others.iter().map(|answers| answers[at]));
-            *disagreement = spread(answer.mean, members);
+            members.clear();
+            members.push(*answer);
+            members.extend(others.iter().map(|answers| answers[at]));
+            let all = mixture(&members);
+            *disagreement = spread(all.mean, &members);
+            *answer = if self.first.chooses() { mixture(majority(&mut members)) } else { all };
         }
         (answers, disagreement)
     }
@@ -46,23 +52,36 @@ fn squared(value: f32) -> f32 {
     value * value
 }
 
+/// Squared distance of two points.
+fn apart_sq(one: [f32; 2], other: [f32; 2]) -> f32 {
+    squared(one[0] - other[0]) + squared(one[1] - other[1])
+}
+
 /// Root mean square distance of the members' means from `mean`.
-fn spread(mean: [f32; 2], members: impl Iterator<Item = Prediction> + Clone) -> f32 {
-    let count = members.clone().count() as f32;
-    let apart = |answer: Prediction| squared(answer.mean[0] - mean[0]) + squared(answer.mean[1] - mean[1]);
-    (members.map(apart).sum::<f32>() / count).sqrt()
+fn spread(mean: [f32; 2], members: &[Prediction]) -> f32 {
+    (members.iter().map(|answer| apart_sq(answer.mean, mean)).sum::<f32>() / members.len() as f32).sqrt()
 }
 
 /// Mean and standard deviation of a mixture with equal weights.
-fn mixture<I: Iterator<Item = Prediction>>(first: Prediction, others: impl Fn() -> I) -> Prediction {
-    let members = || std::iter::once(first).chain(others());
-    let count = members().count() as f32;
-    let mean: [f32; 2] = std::array::from_fn(|axis| members().map(|answer| answer.mean[axis]).sum::<f32>() / count);
+fn mixture(members: &[Prediction]) -> Prediction {
+    let count = members.len() as f32;
+    let mean: [f32; 2] =
+        std::array::from_fn(|axis| members.iter().map(|answer| answer.mean[axis]).sum::<f32>() / count);
     let sigma = std::array::from_fn(|axis| {
-        let spread_sq = |answer: Prediction| squared(answer.sigma[axis]) + squared(answer.mean[axis] - mean[axis]);
-        (members().map(spread_sq).sum::<f32>() / count).sqrt()
+        let spread_sq = |answer: &Prediction| squared(answer.sigma[axis]) + squared(answer.mean[axis] - mean[axis]);
+        (members.iter().map(spread_sq).sum::<f32>() / count).sqrt()
     });
     Prediction { mean, sigma }
+}
+
+/// The member that is nearest to all others, and those nearest to it: more than half of them. Of equals, the earlier.
+fn majority(members: &mut [Prediction]) -> &[Prediction] {
+    let to_all =
+        |member: &Prediction| -> f32 { members.iter().map(|other| apart_sq(member.mean, other.mean).sqrt()).sum() };
+    let middle = members.iter().min_by(|a, b| to_all(a).total_cmp(&to_all(b))).map(|member| member.mean);
+    let Some(middle) = middle else { return members };
+    members.sort_by(|a, b| apart_sq(a.mean, middle).total_cmp(&apart_sq(b.mean, middle)));
+    &members[..=members.len() / 2]
 }
 
 #[cfg(test)]
@@ -74,7 +93,8 @@ mod tests {
     use sim::seed::RootSeed;
 
     fn member(index: u64) -> Predictor {
-        let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(index), 0);
+        let architecture = NetworkArchitecture { modes: 1, ..NetworkArchitecture::compact() };
+        let weights = Weights::init(architecture, RootSeed(index), 0);
         Predictor::new(&weights, InferenceSettings::plain())
     }
 
@@ -102,9 +122,31 @@ mod tests {
         // Two members 0.2 apart on either axis are 0.1 · √2 from their mean, however sure each is.
         let apart = |mean, sigma| Prediction { mean: [mean; 2], sigma: [sigma; 2] };
         let members = [apart(0.4, 0.01), apart(0.6, 0.3)];
-        assert!((spread([0.5; 2], members.into_iter()) - 0.02f32.sqrt()).abs() < 1e-6);
+        assert!((spread([0.5; 2], &members) - 0.02f32.sqrt()).abs() < 1e-6);
         let narrow = |mean| Prediction { mean: [mean; 2], sigma: [0.01; 2] };
-        let apart = mixture(narrow(0.4), || std::iter::once(narrow(0.6)));
+        let apart = mixture(&[narrow(0.4), narrow(0.6)]);
         assert!((apart.sigma[0] - maths::hypot(0.1, 0.01)).abs() < 1e-6 && (apart.mean[0] - 0.5).abs() < 1e-6);
+    }
+
+    /// Their mean led into the island that they meant to pass.
+    #[test]
+    fn members_that_chose_two_ways_go_by_majority() {
+        let to = |u| Prediction { mean: [u, 0.4], sigma: [0.02; 2] };
+        let answer = |members: &mut [Prediction]| mixture(majority(members)).mean[0];
+        assert!((answer(&mut [to(0.3), to(0.7), to(0.68)]) - 0.69).abs() < 1e-6);
+        assert!((answer(&mut [to(0.29), to(0.7), to(0.31), to(0.68), to(0.3)]) - 0.3).abs() < 1e-6);
+        // Two have no majority but themselves.
+        assert!((answer(&mut [to(0.3), to(0.7)]) - 0.5).abs() < 1e-6);
+        let choosing = |index| {
+            let architecture = NetworkArchitecture { modes: 2, ..NetworkArchitecture::compact() };
+            Predictor::new(&Weights::init(architecture, RootSeed(index), 0), InferenceSettings::plain())
+        };
+        let grids = lots(2);
+        let grids: Vec<_> = grids.iter().collect();
+        let [mut one, mut two, mut three] = [1, 2, 3].map(choosing);
+        let members = [&mut one, &mut two, &mut three].map(|member| member.predict(&grids)[0]);
+        let (answers, disagreement) = Ensemble::new(one, vec![two, three]).predict_with_disagreement(&grids);
+        assert_eq!(answers[0], mixture(majority(&mut members.clone())));
+        assert_eq!(disagreement[0], spread(mixture(&members).mean, &members), "it is about the mean of all");
     }
 }

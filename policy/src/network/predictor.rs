@@ -78,6 +78,11 @@ impl Predictor {
         self.raw(grids).into_iter().map(Prediction::from_raw).collect()
     }
 
+    /// Whether an answer is one of several ways.
+    pub(crate) fn chooses(&self) -> bool {
+        self.modes > 1
+    }
+
     /// One answer per grid: means of u and w, raw log-variances of both. Of several modes, the one that is likeliest.
     pub fn raw(&mut self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
         let width = row_width(self.modes);

@@ -180,7 +180,7 @@ mod tests {
     #[test]
     fn the_networks_have_the_parameters_that_are_said() {
         assert_eq!(NetworkArchitecture::paper().parameter_count(), 2_318_092);
-        assert_eq!(NetworkArchitecture::compact().parameter_count(), 300_996);
+        assert_eq!(NetworkArchitecture::compact().parameter_count(), 302_538);
     }
 
     #[test]
