@@ -689,7 +689,7 @@ mod tests {
                 assert!(folders.contains(&run), "{name}: {spec}");
             }
         }
-        // Shards have each once; a training of few lots brings its own behaviour cloning.
+        // Shards have each once.
         let shards = "1/3".parse::<Shard>().unwrap().all().map(|shard| share(stages.clone(), Part::Trainings, shard));
         let mut shared: Vec<String> = shards.flatten().map(|stage| stage.folder).collect();
         shared.sort_unstable();

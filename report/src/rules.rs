@@ -202,7 +202,7 @@ fn legend(settings: &Settings, extent: &Extent) -> String {
     });
     format!(
         "Of {trainings}; behaviour cloning has the samples of the first round alone. EnsembleDAgger and ThriftyDAgger train \
-         several networks and drive with their mean.{thresholds}{learned} Intervals of 95 % are for \
+         several networks and drive with their mean, or that of a majority where each chooses among several modes.{thresholds}{learned} Intervals of 95 % are for \
          {of_seeds}; a difference that excludes zero (*) is one of several comparisons, and no adjustment is made for their \
          number."
     )
