@@ -4,7 +4,9 @@
 
 #![expect(clippy::too_many_lines, clippy::format_collect, reason = "tables of cases, and files made up for them")]
 
-use crate::bench::{scratch, text, xtask};
+use crate::bench::scratch;
+#[cfg(unix)]
+use crate::bench::{text, xtask};
 use experiment::drivers::DriverSpec;
 use experiment::replay_key::ReplayKey;
 use experiment::settings::{Layers, Settings, reference};
@@ -18,7 +20,10 @@ use sim::map::Map;
 use sim::scenario::Scenario;
 use sim::seed::{RootSeed, Stream};
 use sim::vehicle::VehicleSettings;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+#[cfg(unix)]
+use std::path::PathBuf;
+#[cfg(unix)]
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 use storage::sums;

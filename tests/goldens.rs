@@ -51,11 +51,15 @@ fn goldens_of_every_layer_are_kept() {
     );
 }
 
-/// Data, and what is fitted to them: the same on every processor with AVX2 and FMA, whatever else it has.
-#[cfg(target_arch = "x86_64")]
+/// Data, and what is fitted to them: the same on every processor with AVX2 and FMA, whatever else it has, and on
+/// ARM64.
 #[test]
 fn weights_of_a_short_training_are_kept() {
-    if !(is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")) {
+    #[cfg(target_arch = "x86_64")]
+    let rounds_once = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+    #[cfg(not(target_arch = "x86_64"))]
+    let rounds_once = cfg!(target_arch = "aarch64");
+    if !rounds_once {
         return;
     }
     let run = scratch("golden-weights").join("run");

@@ -5,7 +5,6 @@ use crate::determinism::files;
 use policy::checkpoint::Checkpoint;
 use policy::dataset::store::Store;
 use policy::fit::{FitReport, learning};
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -315,7 +314,7 @@ fn a_signal_ends_a_command_that_nobody_listens_to() {
     let run = scratch("nobody-listens").join("run");
     let (reader, mut writer) = std::io::pipe().unwrap();
     // As much as a pipe holds.
-    writer.write_all(&vec![b'\n'; 1 << 16]).unwrap();
+    std::io::Write::write_all(&mut writer, &vec![b'\n'; 1 << 16]).unwrap();
     let mut command = xtask();
     command.args(["train-dagger", "--preset", "smoke", "--no-eval", "--out"]).arg(&run);
     let mut running = Running(command.stdout(Stdio::null()).stderr(writer).spawn().unwrap());

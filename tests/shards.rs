@@ -3,6 +3,7 @@
 use crate::bench::{root, scratch, succeed, text, xtask};
 use crate::determinism::files;
 use std::path::{Path, PathBuf};
+#[cfg(unix)]
 use std::process::Command;
 use storage::sums;
 
@@ -314,6 +315,7 @@ fn what_was_merged_merges_again_and_is_compared_with_whom_one_likes() {
 }
 
 /// The text between two marks of docs/cluster.md, with what users fill in filled in, small.
+#[cfg(unix)]
 fn documented(after: &str, until: &str) -> String {
     let docs = std::fs::read_to_string(root().join("docs/cluster.md")).unwrap();
     let (_, rest) = docs.split_once(after).unwrap_or_else(|| panic!("docs/cluster.md has no {after:?}"));
@@ -329,6 +331,7 @@ fn documented(after: &str, until: &str) -> String {
 }
 
 /// Runs a script of bash in a folder where the program and what starts jobs are as on a cluster.
+#[cfg(unix)]
 fn job(folder: &Path, script: &str, variables: &[(&str, &str)]) {
     let mut bash = Command::new("bash");
     bash.args(["-ec", script]).current_dir(folder).envs(variables.iter().copied());

@@ -49,7 +49,7 @@ fn fails_by_disk(error: &io::Error) -> bool {
     error.raw_os_error().is_some() && !is_answer
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
 
@@ -57,7 +57,6 @@ mod tests {
     #[error("driver")]
     struct Caused(#[source] FileError);
 
-    #[cfg(unix)]
     #[test]
     fn a_disk_that_fails_is_told_from_a_file_that_is_not_there() {
         let [eio, enoent] = [5, 2];

@@ -99,20 +99,12 @@ fn device(name: &str) -> Result<DeviceChoice, ValueError> {
 fn machine() -> String {
     let build = build_info::get();
     let unknown = || "unknown".to_owned();
-    let mut features = Vec::new();
-    #[cfg(target_arch = "x86_64")]
-    for (name, is_there) in [
-        ("AVX2", std::arch::is_x86_feature_detected!("avx2")),
-        ("FMA", std::arch::is_x86_feature_detected!("fma")),
-        ("AVX-512", std::arch::is_x86_feature_detected!("avx512f")),
-    ] {
-        features.extend(is_there.then_some(name));
-    }
+    let features = build.processor_features.join(", ").to_uppercase();
     format!(
         "{}, {} threads, {}; commit {}{}; `cargo xtask {}`",
         build.processor.clone().unwrap_or_else(unknown),
         std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-        if features.is_empty() { "no vectors known".to_owned() } else { features.join(", ") },
+        if features.is_empty() { "no vectors known" } else { &features },
         build.git_revision.as_deref().map_or_else(unknown, |revision| revision.chars().take(9).collect()),
         if build.git_dirty == Some(true) { " and changes" } else { "" },
         build.command_line.join(" "),
