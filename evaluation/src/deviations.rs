@@ -207,7 +207,7 @@ fn is_within(key: &str, of: &str) -> bool {
 }
 
 /// Every single setting by its key.
-fn leaves(settings: &Settings) -> Vec<(String, Value)> {
+pub(crate) fn leaves(settings: &Settings) -> Vec<(String, Value)> {
     fn add(table: &Table, prefix: &str, found: &mut Vec<(String, Value)>) {
         for (key, value) in table {
             match value {

@@ -5,11 +5,13 @@
 //! trains three networks and drives with their mean. Behaviour cloning is the same for all rules of a seed and is
 //! trained once.
 
+use crate::deviations::leaves;
 use crate::stage::{Stage, Step};
 use experiment::settings::{Layers, Settings};
 use policy::decision_rule::DecisionRule;
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// How much is done, besides what the settings say: the arguments in the manifest.
@@ -58,13 +60,20 @@ pub const FEW_LOTS: [&str; 5] = [
 pub const EVERY_TICK: &str = r#"dagger.keep="every_tick""#;
 
 /// Settings of a comparison beside other trainings: of few lots where those of the others are the default's, else of their own.
+/// What is set and not the default's stays.
 ///
 /// # Errors
 /// If they contradict what is set so.
 pub fn in_short(settings: &Settings) -> anyhow::Result<Settings> {
-    let has_many_lots = settings.training == Settings::preset("default")?.training;
-    let changes = if has_many_lots { &FEW_LOTS[..] } else { &[EVERY_TICK] };
-    let overrides = changes.iter().map(|&change| change.to_owned()).collect();
+    let default = Settings::preset("default")?;
+    let changes = if settings.training == default.training { &FEW_LOTS[..] } else { &[EVERY_TICK] };
+    let values = [settings, &default].map(|settings| BTreeMap::from_iter(leaves(settings)));
+    let is_the_defaults = |change: &&&str| {
+        let key = change.split_once('=').map_or(**change, |(key, _)| key);
+        let [value, of_default] = values.each_ref().map(|values| values.get(key));
+        value == of_default
+    };
+    let overrides = changes.iter().filter(is_the_defaults).map(|&change| change.to_owned()).collect();
     Settings::resolve_over(settings, &Layers { overrides, ..Layers::default() }, None)
 }
 
@@ -171,7 +180,9 @@ fn of_rule(settings: &Settings, extent: &Extent, rule: &str, seed: RootSeed) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use policy::dagger::Keep;
     use policy::decision_rule::SafeDaggerSettings;
+    use policy::fit::Budget;
 
     #[test]
     fn trainings_differ_in_rule_and_seed_alone_and_all_are_driven() {
@@ -191,6 +202,22 @@ mod tests {
         let Step::Drive { drivers } = &stages[4].step else { panic!("the last stage drives") };
         assert_eq!(drivers[0], ("behaviour cloning (seed 1)".to_owned(), "run:R/s1-expert_only/bc".to_owned()));
         assert_eq!(drivers[5], ("EnsembleDAgger (seed 2)".to_owned(), "run:R/s2-ensemble_dagger".to_owned()));
+    }
+
+    /// `reproduce --tables rules --set dagger.fit.budget.steps=3000` compared rules with fits of 2000 steps.
+    #[test]
+    fn a_comparison_in_short_keeps_what_is_set() {
+        let mut settings = Settings::preset("default").unwrap();
+        settings.dagger.fit.budget = Budget::Steps(3000);
+        let short = in_short(&settings).unwrap();
+        assert_eq!(short.dagger.fit.budget, Budget::Steps(3000));
+        assert_eq!(short.dagger.cloning_budget, Budget::Steps(2000));
+        assert_eq!(short.dagger.keep, Keep::EveryTick);
+        assert_eq!(short.training.lots, ["lot-a", "train:36:all"]);
+        // Lots of one's own: those, and fits of their length.
+        settings.training.lots = vec!["lot-b".to_owned()];
+        settings.dagger.keep = Keep::EveryTick;
+        assert_eq!(in_short(&settings).unwrap(), settings);
     }
 
     /// `--set dagger.rule.safe_dagger.tau=0.02` changed nothing.
