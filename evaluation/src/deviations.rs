@@ -8,7 +8,7 @@ use crate::stage::{Stage, Step};
 use experiment::settings::{Layers, Settings};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use toml::{Table, Value};
+use toml::Value;
 
 /// One thing that is not as in the paper.
 #[derive(Debug, Clone, Copy)]
@@ -179,7 +179,7 @@ pub fn names(name: &str) -> [String; 2] {
 /// # Errors
 /// If they contradict each other then.
 pub fn as_in_the_paper(settings: &Settings, deviation: &Deviation) -> anyhow::Result<Settings> {
-    let paper = leaves(&Settings::preset("paper")?);
+    let paper = Settings::preset("paper")?.leaves();
     let is_of = |key: &str| deviation.keys.iter().any(|of| is_within(key, of));
     let overrides = paper.iter().filter(|(key, _)| is_of(key)).map(|(key, value)| format!("{key}={value}")).collect();
     Settings::resolve_over(settings, &Layers { overrides, ..Layers::default() }, None)
@@ -190,11 +190,11 @@ pub fn as_in_the_paper(settings: &Settings, deviation: &Deviation) -> anyhow::Re
 /// # Errors
 /// If the preset cannot be read.
 pub fn unlike_the_paper(settings: &Settings) -> anyhow::Result<Vec<String>> {
-    let paper = leaves(&Settings::preset("paper")?);
+    let paper = Settings::preset("paper")?.leaves();
     let of_paper = |key: &str| paper.iter().find(|(known, _)| known == key).map(|(_, value)| value);
     let is_of_training = |key: &str| !is_within(key, "evaluation") && key != "seed";
     let unlike =
-        leaves(settings).into_iter().filter(|(key, value)| is_of_training(key) && of_paper(key) != Some(value));
+        settings.leaves().into_iter().filter(|(key, value)| is_of_training(key) && of_paper(key) != Some(value));
     let said = |(key, value): (String, Value)| {
         let of_paper = of_paper(&key).map_or_else(|| "none".to_owned(), Value::to_string);
         format!("{key} = {value} (paper: {of_paper})")
@@ -204,22 +204,6 @@ pub fn unlike_the_paper(settings: &Settings) -> anyhow::Result<Vec<String>> {
 
 fn is_within(key: &str, of: &str) -> bool {
     key.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
-}
-
-/// Every single setting by its key.
-pub(crate) fn leaves(settings: &Settings) -> Vec<(String, Value)> {
-    fn add(table: &Table, prefix: &str, found: &mut Vec<(String, Value)>) {
-        for (key, value) in table {
-            match value {
-                Value::Table(inner) => add(inner, &format!("{prefix}{key}."), found),
-                _ => found.push((format!("{prefix}{key}"), value.clone())),
-            }
-        }
-    }
-    let mut found = Vec::new();
-    // As they are written: what is .4 of single precision is longer as a double.
-    add(&settings.to_toml().parse().expect("settings are plain values"), "", &mut found);
-    found
 }
 
 /// The trainings, then the evaluations. `root`: the folder of the whole run.
@@ -270,7 +254,7 @@ mod tests {
 
     #[test]
     fn every_deviation_of_the_default_is_listed() {
-        let [default, paper] = ["default", "paper"].map(|name| leaves(&Settings::preset(name).unwrap()));
+        let [default, paper] = ["default", "paper"].map(|name| Settings::preset(name).unwrap().leaves());
         let listed = |key: &str| {
             let keys = DEVIATIONS.iter().flat_map(|deviation| deviation.keys);
             keys.filter(|of| is_within(key, of)).count() + WITHOUT_EFFECT.iter().filter(|of| **of == key).count()

@@ -5,7 +5,6 @@
 //! trains three networks and drives with their mean. Behaviour cloning is the same for all rules of a seed and is
 //! trained once.
 
-use crate::deviations::leaves;
 use crate::stage::{Stage, Step};
 use experiment::settings::{Layers, Settings};
 use policy::decision_rule::DecisionRule;
@@ -67,7 +66,7 @@ pub const EVERY_TICK: &str = r#"dagger.keep="every_tick""#;
 pub fn in_short(settings: &Settings) -> anyhow::Result<Settings> {
     let default = Settings::preset("default")?;
     let changes = if settings.training == default.training { &FEW_LOTS[..] } else { &[EVERY_TICK] };
-    let values = [settings, &default].map(|settings| BTreeMap::from_iter(leaves(settings)));
+    let values = [settings, &default].map(|settings| BTreeMap::from_iter(settings.leaves()));
     let is_the_defaults = |change: &&&str| {
         let key = change.split_once('=').map_or(**change, |(key, _)| key);
         let [value, of_default] = values.each_ref().map(|values| values.get(key));

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use sim::episode::EpisodeSettings;
 use sim::scenario::Direction;
 use sim::seed::RootSeed;
+use toml::{Table, Value};
 
 /// Everything that decides the outcome of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -78,5 +79,21 @@ impl Settings {
     /// As written into a run.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("settings are plain values")
+    }
+
+    /// Every single value with its dotted key, as in `dagger.eta`.
+    pub fn leaves(&self) -> Vec<(String, Value)> {
+        fn add(table: &Table, prefix: &str, found: &mut Vec<(String, Value)>) {
+            for (key, value) in table {
+                match value {
+                    Value::Table(section) => add(section, &format!("{prefix}{key}."), found),
+                    _ => found.push((format!("{prefix}{key}"), value.clone())),
+                }
+            }
+        }
+        let mut found = Vec::new();
+        // As they are written: what is 0.4 of single precision is longer as a double.
+        add(&self.to_toml().parse().expect("settings are plain values"), "", &mut found);
+        found
     }
 }

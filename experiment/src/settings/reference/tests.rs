@@ -8,24 +8,6 @@ fn resolve(change: &str) -> anyhow::Result<Settings> {
     Settings::resolve(&Layers { overrides: vec![change.to_owned()], ..Layers::default() }, None)
 }
 
-/// Dotted keys of all values.
-fn leaves(settings: &Settings) -> BTreeSet<String> {
-    fn collect(table: &Table, prefix: &str, found: &mut BTreeSet<String>) {
-        for (key, value) in table {
-            let key = format!("{prefix}{key}");
-            match value {
-                Value::Table(section) => collect(section, &format!("{key}."), found),
-                _ => {
-                    found.insert(key);
-                }
-            }
-        }
-    }
-    let mut found = BTreeSet::new();
-    collect(&Table::try_from(settings).unwrap(), "", &mut found);
-    found
-}
-
 /// Every key of every preset and of every variant has an entry, and every entry is such a key.
 #[test]
 fn every_setting_is_described_and_every_description_has_a_setting() {
@@ -46,7 +28,7 @@ fn every_setting_is_described_and_every_description_has_a_setting() {
         "dagger.final_budget.epochs=1",
     ];
     let settings = presets.chain(variants.map(|change| resolve(change).unwrap()));
-    let keys: BTreeSet<String> = settings.flat_map(|settings| leaves(&settings)).collect();
+    let keys: BTreeSet<String> = settings.flat_map(|settings| settings.leaves()).map(|(key, _)| key).collect();
     let described: BTreeSet<String> = entries().iter().map(|entry| entry.key.clone()).collect();
     assert_eq!(described.len(), entries().len(), "no entry twice");
     assert_eq!(described.difference(&keys).collect::<Vec<_>>(), Vec::<&String>::new(), "entries without a setting");
@@ -66,15 +48,11 @@ fn every_number_has_a_range_and_is_refused_outside_of_it() {
             assert!(error.contains(&entry.key), "{change}: {error}");
         }
     }
-    let numbers = |settings: &Settings| {
-        let table = Table::try_from(settings).unwrap();
-        leaves(settings).into_iter().filter(move |key| {
-            let value = key.split('.').try_fold(&Value::Table(table.clone()), |value, part| value.get(part)).cloned();
-            matches!(value, Some(Value::Float(_) | Value::Integer(_)))
-        })
-    };
+    let is_number = |value: &Value| matches!(value, Value::Float(_) | Value::Integer(_));
     for preset in PRESETS {
-        for key in numbers(&Settings::preset(preset.name).unwrap()) {
+        for (key, _) in
+            Settings::preset(preset.name).unwrap().leaves().into_iter().filter(|(_, value)| is_number(value))
+        {
             assert!(entry(&key).unwrap().range.is_some() || key.ends_with("seed"), "{key} has a range");
         }
     }
