@@ -218,6 +218,35 @@ fn a_report_of_a_stage_is_listed_in_its_run_by_whatever_name() {
     assert!(faults.is_empty(), "{faults:?}");
 }
 
+/// It lost its pictures, and the run was another by its digest, without a word. Lots were written into the run.
+#[test]
+fn a_report_is_not_replaced_by_one_that_can_replay_nothing() {
+    let folder = scratch("report-from-elsewhere");
+    let run = folder.join("run");
+    let train = ["train-bc", "--preset", "smoke", "--set", "evaluation.elsewhere=[]", "--out", "run"];
+    succeed(xtask().current_dir(&folder).args(train));
+    let report = || std::fs::read(run.join("report.html")).unwrap();
+    let whole = report();
+    let again = || {
+        let mut command = xtask();
+        command.current_dir(&run).args(["render", "report", "."]);
+        command
+    };
+    let error = refuse(&mut again());
+    assert!(error.contains("cannot be replayed from here") && error.contains("--overwrite"), "{error}");
+    assert!(report() == whole, "it is as it was");
+    succeed(again().arg("--overwrite"));
+    assert!(report().len() < whole.len() / 2, "there is no picture of a near-collision in it");
+    succeed(xtask().current_dir(&folder).args(["render", "report", "run"]));
+    assert!(report() == whole, "and back");
+
+    let error = refuse(xtask().current_dir(&folder).args(["generate", "--lots", "lot-a", "--out", "run"]));
+    assert!(error.contains("lies within the run"), "{error}");
+    let error = refuse(xtask().current_dir(&folder).args(["visualise", "lot", "--out", "run/lot.rrd"]));
+    assert!(error.contains("lies within the run"), "{error}");
+    assert!(sums::verify(&run).faults.is_empty());
+}
+
 /// Keys in files named the run as whoever resumed it did.
 #[test]
 fn a_run_is_resumed_by_whatever_name_to_the_same_bytes() {

@@ -2,7 +2,7 @@
 //! `report.md`, with its pictures in `figures/`.
 //!
 //! A file that cannot be read or written is an error. A near-collision that cannot be replayed (its network has moved)
-//! is not: the page says so in place of the picture.
+//! is not: the page says so in place of the picture, and the report in [`Report::not_replayed`].
 
 use crate::command_line::{command_line, quoted};
 use crate::glossary;
@@ -159,18 +159,44 @@ fn text(path: &Path) -> anyhow::Result<String> {
 /// # Errors
 /// If what the run left cannot be read, or the report cannot be written.
 pub fn write(run: &RunDir, progress: &dyn Progress) -> anyhow::Result<()> {
-    progress.begin("report", "report");
-    let folder = run.path();
-    let page = page(folder, progress).with_context(|| format!("report of {}", folder.display()))?;
-    page.write(run, STEM)?;
-    progress.end(&folder.join(FILE).display().to_string());
-    Ok(())
+    Report::of(run, progress)?.write(run, progress)
 }
 
-fn page(folder: &Path, progress: &dyn Progress) -> anyhow::Result<Page> {
+/// The report of a run, not written yet.
+#[derive(Debug)]
+pub struct Report {
+    page: Page,
+    /// Why near-collisions that the page shows could not be replayed, one reason for each.
+    pub not_replayed: Vec<String>,
+}
+
+impl Report {
+    /// That of the run in a folder.
+    ///
+    /// # Errors
+    /// If what the run left cannot be read.
+    pub fn of(run: &RunDir, progress: &dyn Progress) -> anyhow::Result<Self> {
+        progress.begin("report", "report");
+        let folder = run.path();
+        report(folder, progress).with_context(|| format!("report of {}", folder.display()))
+    }
+
+    /// Writes it into the folder of the run.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn write(self, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<()> {
+        self.page.write(run, STEM)?;
+        progress.end(&run.path().join(FILE).display().to_string());
+        Ok(())
+    }
+}
+
+fn report(folder: &Path, progress: &dyn Progress) -> anyhow::Result<Report> {
     let sources = Sources::read(folder)?;
     let name = folder.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into());
     let mut page = Page::new(name);
+    let mut not_replayed = Vec::new();
     overview(&mut page, &sources);
     if let Some(training) = &sources.training {
         add_training(&mut page, &sources.settings, training);
@@ -182,11 +208,11 @@ fn page(folder: &Path, progress: &dyn Progress) -> anyhow::Result<Page> {
     }
     if let Some(evaluation) = &sources.evaluation {
         add_evaluation(&mut page, evaluation);
-        add_moments(&mut page, folder, &sources.settings, evaluation, progress)?;
+        not_replayed = add_moments(&mut page, folder, &sources.settings, evaluation, progress)?;
     }
     glossary::add(&mut page);
     page.section("Configuration", configuration(&sources));
-    Ok(page)
+    Ok(Report { page, not_replayed })
 }
 
 fn overview(page: &mut Page, sources: &Sources) {
@@ -441,11 +467,12 @@ fn add_moments(
     settings: &Settings,
     evaluation: &Evaluation,
     progress: &dyn Progress,
-) -> anyhow::Result<()> {
+) -> anyhow::Result<Vec<String>> {
+    let mut not_replayed = Vec::new();
     let count = evaluation.near_collisions;
     if count == 0 {
         page.section("Near-collisions", "There were none.");
-        return Ok(());
+        return Ok(not_replayed);
     }
     let worst = &evaluation.worst.0;
     let (listed, shown) = match (count, worst.len()) {
@@ -484,14 +511,20 @@ fn add_moments(
             return Err(Interrupted { kept: format!("{} holds everything but its report", folder.display()) }.into());
         }
         match moments::player(&failure.replay, settings) {
-            Ok(player) => page.figure(format!("near-collision-{index}"), caption, Image::Player(player)),
+            Ok(player) => {
+                page.figure(format!("near-collision-{index}"), caption, Image::Player(player));
+            }
             // The report can be made again; with a remark in place of the picture it would count as finished.
             Err(error) if storage::is_of_disk(error.as_ref()) => return Err(error),
-            Err(error) => page.text(format!("{caption} It could not be replayed: {}.", escaped(&format!("{error:#}")))),
-        };
+            Err(error) => {
+                let reason = format!("{error:#}");
+                page.text(format!("{caption} It could not be replayed: {}.", escaped(&reason)));
+                not_replayed.push(reason);
+            }
+        }
         page.text(format!("```\n{}\n```", visualise(&failure.replay, folder)));
     }
-    Ok(())
+    Ok(not_replayed)
 }
 
 /// The command that shows a near-collision again. A driver that is a run has settings of its own, those of its training; what

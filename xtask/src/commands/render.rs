@@ -10,6 +10,7 @@ use crate::output::Output;
 use crate::picture_folder::Folder;
 use anyhow::{Context as _, ensure};
 use clap::{ArgGroup, Args, Subcommand, ValueEnum};
+use evaluation::shards;
 use experiment::drive::Replay;
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::lots::Lot;
@@ -30,7 +31,8 @@ use report::other_run::OtherRun;
 use report::pictures::file_name;
 use report::pictures::trajectories::{self, ColourBy, Point, Trajectory};
 use report::pictures::{contact_sheet, lot, noise, samples};
-use report::{reproduction, run_report};
+use report::reproduction;
+use report::run_report::{self, Report};
 use sim::episode::EpisodeSettings;
 use sim::limits::{PIXELS_PER_METRE_MAX, RUN_TEXT_BYTES_MAX, TRIAL_MAX};
 use sim::map::Map;
@@ -157,7 +159,13 @@ pub(crate) struct TrajectoriesArgs {
     #[arg(long, value_name = "RUN", conflicts_with_all = ["lot", "direction", "noise", "seed", "preset", "config", "overrides"])]
     run: Option<PathBuf>,
     /// Round of the training run; 0 = behaviour cloning.
-    #[arg(long, default_value_t = 1, requires = "run", value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX)))]
+    #[arg(
+        long,
+        default_value_t = 1,
+        requires = "run",
+        conflicts_with = "drivers",
+        value_parser = clap::value_parser!(u32).range(..=i64::from(TRIAL_MAX))
+    )]
     round: u32,
     #[command(flatten)]
     trial: TrialArgs,
@@ -210,7 +218,9 @@ pub(crate) fn run(args: &RenderArgs, output: &Output) -> anyhow::Result<()> {
         RenderWhat::Animation(what) => render_animation::run(what, &folder),
         RenderWhat::Samples(what) => render_samples(what, &folder),
         RenderWhat::Noise(what) => render_noise(what, &folder),
-        RenderWhat::Report(what) => render_report(&what.run, args.out.is_some().then_some(&folder), output),
+        RenderWhat::Report(what) => {
+            render_report(&what.run, args.overwrite, args.out.is_some().then_some(&folder), output)
+        }
         RenderWhat::Results(what) => {
             ensure!(args.out.is_none(), "--out: a page of results is one file; name it with --to");
             render_results(what, args.overwrite, output)
@@ -261,6 +271,10 @@ fn render_lots(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> 
 
 fn contact_sheet(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
     const NAME: &str = "contact-sheet";
+    ensure!(
+        args.pixels_per_metre.is_none(),
+        "--pixels-per-metre: a contact sheet has a scale of its own; leave it out"
+    );
     folder.check(NAME, true)?;
     let episode = Settings::preset("default")?.episode;
     let lots = Lot::parse_all(&args.lots, &episode.vehicle)?;
@@ -341,6 +355,7 @@ fn driven_anew(args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<D
 
 /// A drive of a training round: the network of the round before and the expert, as in the training itself.
 fn driven_in_training(run: &Path, args: &TrajectoriesArgs, folder: &Folder<'_>) -> anyhow::Result<Drives> {
+    trained::policy_folder(run)?;
     let (map, rollouts) = training::drive_again(run, args.round, args.trial.trial)?;
     let title = format!("{} round {} drive {}", map.scenario().name, args.round, args.trial.trial);
     let name = run.file_name().unwrap_or_default().to_string_lossy();
@@ -447,7 +462,12 @@ fn render_results(args: &RenderResultsArgs, overwrite: bool, output: &Output) ->
     Ok(())
 }
 
-fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyhow::Result<()> {
+fn render_report(run: &Path, overwrite: bool, copy: Option<&Folder<'_>>, output: &Output) -> anyhow::Result<()> {
+    ensure!(
+        !shards::is_shard(run)?,
+        "{}: this is a shard, which has no report; put all together with cargo xtask merge RUN...",
+        run.display()
+    );
     let owned = RunDir::reopen(run, "render report")?;
     // What else has a report wrote it itself, of its stages, and would lose it.
     let is_listed = |name| sums::is_listed(run, name);
@@ -461,7 +481,18 @@ fn render_report(run: &Path, copy: Option<&Folder<'_>>, output: &Output) -> anyh
     if let Some((folder, path)) = &copy {
         folder.check_file(path)?;
     }
-    let written = run_report::write(&owned, &Console::new(output));
+    let console = Console::new(output);
+    let made = Report::of(&owned, &console)?;
+    if let Some(reason) = made.not_replayed.first() {
+        ensure!(
+            overwrite,
+            "{}: of the near-collisions that its report shows {} cannot be replayed from here ({reason}); run this in the folder in \
+             which the run was made, or write the report without their pictures with --overwrite",
+            run.display(),
+            made.not_replayed.len()
+        );
+    }
+    let written = made.write(&owned, &console);
     // Its own list has changed, also where the report was cut short.
     owned.list_again()?;
     written?;
