@@ -13,6 +13,7 @@ use experiment::lots::Lot;
 use experiment::manifest::Manifest;
 use experiment::progress::Progress;
 use experiment::replay_key::ReplayKey;
+use experiment::run_dir;
 use experiment::settings::{NoiseChoice, Settings};
 use experiment::trials::{self, Trial};
 use serde::Serialize;
@@ -73,7 +74,8 @@ pub fn of_evaluation(
     drivers: &[String],
     progress: &dyn Progress,
 ) -> anyhow::Result<Option<Vec<Row>>> {
-    let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)?;
+    let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)
+        .with_context(|| run_dir::paths_are_as_made(folder))?;
     let manifest = Manifest::read(folder)?;
     // First: a lot of another name would seem to be none of the evaluation's.
     manifest.check_some_inputs(&inputs::of(&lots, &[]))?;
@@ -88,7 +90,7 @@ pub fn of_evaluation(
     let mut rows = Vec::new();
     let mut done = 0;
     for (Failing { driver: name, noise, runs, .. }, spec) in failing.iter().zip(specs) {
-        let driver = spec.load(settings)?;
+        let driver = spec.load(settings).with_context(|| run_dir::paths_are_as_made(folder))?;
         driver.check(settings)?;
         manifest.check_some_inputs(&inputs::of(&[], std::slice::from_ref(&driver)))?;
         let substitutes = Substitutes::new(&driver, settings);

@@ -95,20 +95,21 @@ pub struct Start {
 /// The planners of these names; if none is named, all as the paper or the literature has them.
 ///
 /// # Errors
-/// If nothing is named so.
+/// If nothing is named so, or one is named twice.
 pub fn planners_named(names: &[String]) -> anyhow::Result<Vec<Start>> {
     let all = PlannerSpec::all();
     if names.is_empty() {
         return Ok(all.into_iter().map(|planner| Start { name: planner.name().to_owned(), planner }).collect());
     }
-    let start = |name: &String| {
+    let start = |(index, name): (usize, &String)| {
+        ensure!(!names[..index].contains(name), "planner {name:?} is named twice; name it once");
         let planner = PlannerSpec::named(name).with_context(|| {
             let known: Vec<&str> = all.iter().map(PlannerSpec::name).collect();
             format!("no planner {name:?}; there are {}", known.join(", "))
         })?;
         Ok(Start { name: name.clone(), planner })
     };
-    names.iter().map(start).collect()
+    names.iter().enumerate().map(start).collect()
 }
 
 /// Trials with their maps.

@@ -75,7 +75,9 @@ impl FromStr for ReplayKey {
         let index = small("trial", trial)?;
         ensure!(index <= TRIAL_MAX, "replay key {text:?}: trial {index} is too large; there are 0 to {TRIAL_MAX}");
         Ok(Self {
-            driver: unescaped(driver).parse().with_context(|| format!("replay key {text:?}"))?,
+            driver: unescaped(driver)
+                .parse()
+                .map_err(|error: anyhow::Error| anyhow::anyhow!("replay key {text:?}: {error:#}"))?,
             lot: unescaped(lot),
             direction,
             trial: index,

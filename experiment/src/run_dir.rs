@@ -116,11 +116,15 @@ impl RunDir {
     fn resume_anywhere(path: &Path, command: &str) -> anyhow::Result<(Self, Settings, Manifest)> {
         ensure!(path.is_dir(), "{}: there is no such run to resume", path.display());
         // Before the lock, which would leave its file in a folder that is not a run.
-        ensure!(
-            sums::exists(path)?,
-            "{0}: nothing was begun there; begin it with --out {0}, and with --overwrite if it is not empty",
-            path.display()
-        );
+        if !sums::exists(path)? {
+            let name = path.display();
+            ensure!(
+                is_free(path)? || !Manifest::is_in(path),
+                "{name}: its list of files, sha256sums, is lost; restore it from a copy"
+            );
+            ensure!(is_free(path)?, "{name}: this is not a run; name the folder of one, as in runs/NAME");
+            bail!("{name}: nothing was begun there; begin it with --out {name}");
+        }
         let run = Self::locked(path.to_path_buf(), command)?;
         let manifest = Manifest::read(path)?;
         ensure!(
@@ -364,6 +368,15 @@ pub fn ensure_outside_of_runs(folder: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What is said where something that a run names cannot be read.
+pub fn paths_are_as_made(run: &Path) -> String {
+    format!(
+        "{}: it names drivers and lots as they lay when it was made; use it in the folder in which it was made, with what it names \
+         where it was",
+        run.display()
+    )
+}
+
 /// Refuses a folder with anything in it but a run.
 fn ensure_free_or_run(path: &Path, overwrite: bool) -> anyhow::Result<()> {
     if !is_free(path)? && !Manifest::is_in(path) {
@@ -547,6 +560,21 @@ mod tests {
         fs::create_dir_all(&path).unwrap();
         assert!(message(RunDir::resume(&path, "train-dagger")).contains("nothing was begun there"));
         assert_eq!(fs::read_dir(&path).unwrap().count(), 0);
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// `--overwrite` was advised, which deletes what is finished.
+    #[test]
+    fn a_run_that_lost_its_list_alone_is_to_be_restored() {
+        let path = scratch("lost-list");
+        drop(create(&path, false).unwrap());
+        fs::write(path.join("runs.jsonl"), "").unwrap();
+        fs::remove_file(path.join(sums::FILE)).unwrap();
+        let refused = message(RunDir::resume(&path, "train-dagger"));
+        assert!(refused.contains("restore it from a copy") && !refused.contains("--overwrite"), "{refused}");
+        fs::remove_file(path.join(MANIFEST)).unwrap();
+        let refused = message(RunDir::resume(&path, "train-dagger"));
+        assert!(refused.contains("this is not a run"), "{refused}");
         fs::remove_dir_all(path).unwrap();
     }
 

@@ -1,14 +1,14 @@
-//! The command that made a run, as text.
+//! Commands as text that a shell can be given.
 
 use experiment::manifest::Manifest;
 
-/// A word of a command line.
-pub(crate) fn quoted(word: &str) -> String {
+/// A word of a command line, as a shell needs it.
+pub fn quoted(word: &str) -> String {
     let is_plain = word.chars().all(|c| c.is_alphanumeric() || "-_./:=,@%+".contains(c));
     if is_plain { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }
 
-/// The command line, quoted as a shell needs it.
+/// The command that made a run.
 pub(crate) fn command_line(manifest: &Manifest) -> String {
     let words = manifest.command_line.iter().map(|word| quoted(word));
     std::iter::once("cargo xtask".to_owned()).chain(words).collect::<Vec<_>>().join(" ")

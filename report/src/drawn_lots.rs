@@ -3,6 +3,7 @@
 use crate::pictures::file_name;
 use anyhow::{Context as _, bail, ensure};
 use experiment::lots::Lot;
+use experiment::run_dir;
 use experiment::trials::Trial;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -36,12 +37,14 @@ impl DrawnLots<'_> {
         ["toml", "png"].map(|extension| self.out.join(format!("{name}.{extension}")))
     }
 
-    /// Refuses lots whose files are there, or would be those of another one or what a lot is made of: before the first is
-    /// written.
+    /// Refuses lots whose files are there, would be those of another one or what a lot is made of, or would lie within a
+    /// run: before the first is written.
     ///
     /// # Errors
-    /// Naming the first such file.
+    /// Naming the first such file, or the run.
     pub fn ensure_free(&self, lots: &[Lot], trials: &[Trial<'_>]) -> anyhow::Result<()> {
+        // Whatever their names: also in the run's own folder, not only below it.
+        run_dir::ensure_outside_of_runs(&self.out.join("lot.toml"))?;
         let made_of = made_of(lots)?;
         ensure_files_differ(trials.iter().map(|trial| (self.name(trial), trial.lot.name())), "toml")?;
         for trial in trials {
@@ -50,7 +53,7 @@ impl DrawnLots<'_> {
             for path in files {
                 ensure!(
                     self.overwrite || !path.exists(),
-                    "{}: exists already; write into another folder, draw from another seed, or overwrite it",
+                    "{}: exists already; choose another --out or --seed, or replace it with --overwrite",
                     path.display()
                 );
             }

@@ -42,7 +42,7 @@ fn list_of(folder: &Path) -> Result<Option<Sums>, FileError> {
     let path = folder.join(FILE);
     let text = match read::bytes(&path, LIST_BYTES_MAX) {
         Ok(bytes) => bytes,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(error) if is_absent(&error) => return Ok(None),
         Err(error) => return Err(FileError::unreadable(&path, &error, RESTORE)),
     };
     let damaged = |line: usize| FileError::new(&path, format_args!("line {line} is damaged"), RESTORE);
@@ -88,7 +88,15 @@ fn write_list(folder: &Path, sums: &Sums) -> Result<(), FileError> {
 /// If the system does not say: a folder that seems to hold no work would be deleted.
 pub fn exists(folder: &Path) -> Result<bool, FileError> {
     let path = folder.join(FILE);
-    path.try_exists().map_err(|error| FileError::unreadable(&path, &error, RESTORE))
+    match path.try_exists() {
+        Err(error) if !is_absent(&error) => Err(FileError::unreadable(&path, &error, RESTORE)),
+        found => Ok(found.unwrap_or(false)),
+    }
+}
+
+/// Whether there is no such file: a file has none in it, either.
+fn is_absent(error: &io::Error) -> bool {
+    matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory)
 }
 
 /// Whether a file of a folder is finished.

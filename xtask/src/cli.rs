@@ -128,9 +128,6 @@ enum Command {
     /// Prints a script that completes commands and flags in a shell.
     #[command(after_help = completions::EXAMPLES)]
     Completions(completions::CompletionsArgs),
-    /// Old name of `sample-size`.
-    #[command(hide = true)]
-    Metres,
 }
 
 impl Cli {
@@ -171,7 +168,6 @@ impl Cli {
             Command::Guard(args) => guard::run(args, output),
             Command::Torture(args) => torture::run(args, output),
             Command::Completions(args) => completions::run(args, Self::command(), output),
-            Command::Metres => anyhow::bail!("the command metres is named sample-size now"),
         }?;
         output.finish()
     }
@@ -205,8 +201,7 @@ impl Command {
             | Self::Torture(_)
             | Self::Render(_)
             | Self::Visualise(_)
-            | Self::Completions(_)
-            | Self::Metres => false,
+            | Self::Completions(_) => false,
         }
     }
 }

@@ -16,17 +16,17 @@ use std::path::{Path, PathBuf};
 pub(crate) struct RecordArgs {
     /// Records the first N runs of every driver and noise level for Rerun when all is done; for a training, also its
     /// learning curves and the first N episodes of every round. Builds the recorder the first time (8 minutes).
-    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1")]
-    pub(crate) record: Option<usize>,
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) record: Option<u32>,
 }
 
 /// The first runs of every driver at every noise level, as in the evaluation.
-pub(crate) fn first_runs(plan: &Plan<'_>, runs: usize) -> Show {
+pub(crate) fn first_runs(plan: &Plan<'_>, runs: u32) -> Show {
     let evaluation = &plan.settings.evaluation;
     let mut drives = Vec::new();
     for &noise in &evaluation.noise {
         for driver in plan.drivers {
-            for trial in plan.trials().take(runs) {
+            for trial in plan.trials().take(runs as usize) {
                 let (lot, way, index) = (trial.lot.name(), trial.direction.name(), trial.index);
                 let title = format!("{}, {noise}, {lot}, {way}, trial {index}", driver.name);
                 let key = ReplayKey {

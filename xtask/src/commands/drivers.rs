@@ -14,7 +14,7 @@ Examples:
 #[derive(Debug, Clone, Args)]
 pub(crate) struct DriversArgs {
     /// A planner, whose parameters are printed as the file that `NAME:FILE` reads.
-    #[arg(value_name = "PLANNER")]
+    #[arg(value_name = "PLANNER", conflicts_with = "json")]
     planner: Option<String>,
     #[command(flatten)]
     pub(crate) json: JsonArgs,

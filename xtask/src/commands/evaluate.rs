@@ -87,7 +87,7 @@ pub(crate) struct EvaluateArgs {
         value_name = "RUN", value_parser = run_folder(),
         conflicts_with_all = [
             "drivers", "lots", "trials", "directions", "noise", "compare_with", "methods", "seed", "shard", "preset", "config",
-            "overrides", "out", "smoothing"
+            "overrides", "out", "overwrite", "smoothing"
         ]
     )]
     resume: Option<PathBuf>,

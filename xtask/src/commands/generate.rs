@@ -114,8 +114,6 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
         args.count,
         fixed.map_or("", Lot::name)
     );
-    std::fs::create_dir_all(&args.out)
-        .with_context(|| format!("{}: cannot be created; choose another --out", args.out.display()))?;
     let trials: Vec<Trial<'_>> =
         Trial::all(RootSeed(args.seed), Purpose::Pictures, &lots, args.count, &[Direction::Forward])
             .enumerate()
@@ -123,6 +121,8 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
             .map(|(_, trial)| trial)
             .collect();
     drawn_lots(args).ensure_free(&lots, &trials)?;
+    std::fs::create_dir_all(&args.out)
+        .with_context(|| format!("{}: cannot be created; choose another --out", args.out.display()))?;
     let console = Console::new(output);
     console.begin("generating", "generating");
     let mut made = Vec::new();

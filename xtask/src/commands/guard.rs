@@ -35,7 +35,7 @@ pub(crate) struct GuardArgs {
     #[command(flatten)]
     out: OutArgs,
     /// Continues an interrupted run.
-    #[arg(long, value_name = "RUN", value_parser = run_folder(), conflicts_with = "out")]
+    #[arg(long, value_name = "RUN", value_parser = run_folder(), conflicts_with_all = ["out", "overwrite"])]
     resume: Option<PathBuf>,
 }
 

@@ -23,6 +23,7 @@ use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::manifest::{Build, Manifest, Request};
 use experiment::run_dir::{Place, RunDir};
+use report::command_line::quoted;
 use std::path::{Path, PathBuf};
 use storage::sums;
 
@@ -257,15 +258,15 @@ fn drives(shards: &Shards, networks: &Path, args: &MergeArgs, output: &Output) -
 
 /// The shards as they were named.
 fn named(args: &MergeArgs) -> String {
-    args.folders.iter().map(|shard| shard.display().to_string()).collect::<Vec<_>>().join(" ")
+    args.folders.iter().map(|shard| quoted(&shard.display().to_string())).collect::<Vec<_>>().join(" ")
 }
 
 /// The command that puts them together again.
 fn again(args: &MergeArgs, run: &RunDir) -> String {
-    let compared = args.compare_with.iter().map(|spec| format!(" --compare-with '{spec}'"));
-    let methods = args.methods.methods.iter().map(|method| format!(" --method '{method}'"));
+    let compared = args.compare_with.iter().map(|spec| format!(" --compare-with {}", quoted(spec)));
+    let methods = args.methods.methods.iter().map(|method| format!(" --method {}", quoted(&method.to_string())));
     let asked: String = compared.chain(methods).collect();
-    format!("merge {}{asked} --out {}", named(args), run.path().display())
+    format!("merge {}{asked} --out {}", named(args), quoted(&run.path().display().to_string()))
 }
 
 /// The command line of a shard without what concerns the shard alone.

@@ -11,6 +11,7 @@ use experiment::drive::Replay;
 use experiment::drivers::NamedDriver;
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::replay_key::ReplayKey;
+use experiment::run_dir;
 use experiment::settings::{Layers, Settings};
 use experiment::trained;
 use report::replays::{self, Row};
@@ -71,7 +72,11 @@ pub(crate) fn run(args: &ReplayArgs, output: &Output) -> anyhow::Result<()> {
     let mut drivers: BTreeMap<String, NamedDriver> = BTreeMap::new();
     for key in &keys {
         if let Entry::Vacant(entry) = drivers.entry(key.driver.to_string()) {
-            entry.insert(key.driver.clone().load(&settings)?).check(&settings)?;
+            let driver = key.driver.clone().load(&settings);
+            // Keys of a folder are as it was made.
+            let driver = driver
+                .with_context(|| args.of.as_deref().map_or_else(|| key.to_string(), run_dir::paths_are_as_made))?;
+            entry.insert(driver).check(&settings)?;
         }
     }
     let console = Console::new(output);

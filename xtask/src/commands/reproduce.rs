@@ -83,7 +83,8 @@ pub(crate) struct ReproduceArgs {
         long,
         value_name = "RUN", value_parser = run_folder(),
         conflicts_with_all = [
-            "preset", "config", "overrides", "seed", "out", "full", "seeds", "unseen", "tables", "tuned", "shard", "networks"
+            "preset", "config", "overrides", "seed", "out", "overwrite", "full", "seeds", "unseen", "tables", "tuned", "shard",
+            "networks"
         ]
     )]
     resume: Option<PathBuf>,

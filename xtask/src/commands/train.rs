@@ -25,6 +25,7 @@ use experiment::settings::{EvaluationSettings, Layers, Settings};
 use experiment::training;
 use experiment::view_request::Show;
 use policy::dagger::Stop;
+use report::command_line::quoted;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -56,7 +57,7 @@ pub(crate) struct TrainArgs {
     #[command(flatten)]
     out: OutArgs,
     /// Continues an interrupted run with its own settings, to the same result.
-    #[arg(long, value_name = "RUN", value_parser = run_folder(), conflicts_with_all = ["preset", "config", "overrides", "seed", "also", "out"])]
+    #[arg(long, value_name = "RUN", value_parser = run_folder(), conflicts_with_all = ["preset", "config", "overrides", "seed", "also", "out", "overwrite"])]
     resume: Option<PathBuf>,
     /// Trains only: no closed-loop check at the end.
     #[arg(long)]
@@ -126,7 +127,7 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
     let outcome = tabulated(&settings, &run, &console, output)?.map_err(|rounds| cut_short(run.path(), rounds))?;
     let mut to_record = args.record.record.map_or_else(Vec::new, |episodes| {
         let folder = || run.path().to_owned();
-        vec![Show::Training { run: folder() }, Show::Rollouts { run: folder(), episodes }]
+        vec![Show::Training { run: folder() }, Show::Rollouts { run: folder(), episodes: episodes as usize }]
     });
     if !asked.no_eval {
         let drivers = drivers(&settings, run.path())?;
@@ -284,9 +285,9 @@ fn drivers(settings: &Settings, run: &Path) -> anyhow::Result<Vec<NamedDriver>> 
 }
 
 fn print_next_steps(path: &Path, output: &Output) {
-    let path = path.display();
-    output.remark(format_args!("\nPolicy: {path} (the last round; model.safetensors opens in PyTorch)"));
-    output.remark(format_args!("Next:   cargo xtask evaluate --driver run:{path} --seed 2"));
+    let driver = quoted(&format!("run:{}", path.display()));
+    output.remark(format_args!("\nPolicy: {} (the last round; model.safetensors opens in PyTorch)", path.display()));
+    output.remark(format_args!("Next:   cargo xtask evaluate --driver {driver} --seed 2"));
 }
 
 #[cfg(test)]

@@ -40,7 +40,7 @@ pub(crate) struct TrainingsArgs {
     #[arg(
         long,
         value_name = "RUN", value_parser = run_folder(),
-        conflicts_with_all = ["preset", "config", "overrides", "seed", "out", "shard"]
+        conflicts_with_all = ["preset", "config", "overrides", "seed", "out", "overwrite", "shard"]
     )]
     resume: Option<PathBuf>,
 }

@@ -59,7 +59,7 @@ pub(crate) struct TuneArgs {
         long,
         value_name = "RUN", value_parser = run_folder(),
         conflicts_with_all = [
-            "planners", "lots", "budget", "trials", "seed", "noise", "preset", "config", "overrides", "out"
+            "planners", "lots", "budget", "trials", "seed", "noise", "preset", "config", "overrides", "out", "overwrite"
         ]
     )]
     resume: Option<PathBuf>,

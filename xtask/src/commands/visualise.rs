@@ -9,16 +9,19 @@ use crate::viewer;
 use anyhow::{Context as _, ensure};
 use clap::{Args, Subcommand};
 use evaluation::records::{self, FailureRecord};
+use experiment::drive::Replay;
 use experiment::drivers::DriverSpec;
 use experiment::lots::Lot;
 use experiment::replay_key::ReplayKey;
-use experiment::settings::Layers;
+use experiment::run_dir;
+use experiment::settings::{Layers, Settings};
 use experiment::trained;
 use experiment::view_request::{DriveRequest, Show, Sink, ViewRequest};
 use report::pictures::file_name;
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
+use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -126,6 +129,14 @@ struct FailuresArgs {
 }
 
 pub(crate) fn run(args: &VisualiseArgs, output: &Output) -> anyhow::Result<()> {
+    if let Some(file) = &args.sink.out {
+        run_dir::ensure_outside_of_runs(file).context("--out")?;
+        ensure!(
+            !file.exists() || file.extension().is_some_and(|extension| extension == "rrd"),
+            "--out {}: exists already, and is not a recording; choose another",
+            file.display()
+        );
+    }
     let (show, file) = match &args.what {
         What::Lot(lot) => {
             // Before the program that records is built.
@@ -165,9 +176,10 @@ fn sink_of(args: &SinkArgs, otherwise: Sink) -> Sink {
 fn episode_of(args: &EpisodeArgs, output: &Output) -> anyhow::Result<(Show, String)> {
     let drivers = DriverSpec::parse_all(&args.drivers)?;
     let (settings, lot, keys) = args.trial.keys(&drivers, &args.layers, output)?;
-    let ReplayKey { direction, trial, noise, .. } = keys[0];
+    let ReplayKey { direction, trial, noise, seed, .. } = keys[0];
+    check(&keys, &settings)?;
     let way = direction.name();
-    let file = format!("{}-{way}-t{trial}", lot.name());
+    let file = file_name(&format!("{}-{way}-t{trial}-{noise}-s{}-{}", lot.name(), seed.0, args.drivers.join("-")));
     let title = format!("{}, {way}, trial {trial}, {noise}: {}", lot.name(), args.drivers.join(", "));
     let drive = DriveRequest { file: file.clone(), title, keys };
     Ok((Show::Drives { settings: Box::new(settings), drives: vec![drive] }, file))
@@ -176,14 +188,29 @@ fn episode_of(args: &EpisodeArgs, output: &Output) -> anyhow::Result<(Show, Stri
 /// The run of a key, and the name of its file.
 fn replay_of(key: &ReplayKey, layers: &LayerArgs, output: &Output) -> anyhow::Result<(Show, String)> {
     let (settings, _) = evaluate::settings_for(std::slice::from_ref(&key.driver), &Layers::from(layers), output)?;
-    let file = format!("replay-{}-{}-t{}-{}", file_name(&key.lot), key.direction.name(), key.trial, key.tick);
+    check(std::slice::from_ref(key), &settings)?;
+    let file = file_name(&format!("replay-{key}"));
     let drive = DriveRequest { file: file.clone(), title: key.to_string(), keys: vec![key.clone()] };
     Ok((Show::Drives { settings: Box::new(settings), drives: vec![drive] }, file))
 }
 
+/// Refuses what cannot be driven, before the program that records is built.
+fn check(keys: &[ReplayKey], settings: &Settings) -> anyhow::Result<()> {
+    for key in keys {
+        Replay::new(key, &settings.episode)?;
+        key.driver.clone().load(settings)?.check(settings)?;
+    }
+    Ok(())
+}
+
 /// Near-collisions of an evaluation, a recording each, of the seconds around it.
 fn failures_of(args: &FailuresArgs, output: &Output) -> anyhow::Result<Show> {
-    let list = args.run.join("failures.jsonl");
+    ensure!(
+        sums::is_listed(&args.run, records::FAILURES)?,
+        "{}: holds no finished evaluation; name the folder of one, or of a training that ended with its check",
+        args.run.display()
+    );
+    let list = args.run.join(records::FAILURES);
     let (mut drives, mut all) = (Vec::new(), 0);
     records::each_line(&list, |failure: FailureRecord| {
         all += 1;
