@@ -134,11 +134,7 @@ impl DriverSpec {
             },
             _ => None,
         };
-        let mut trained_on = match self.trained_on() {
-            Ok(lots) => lots,
-            Err(error) if storage::is_of_disk(error.as_ref()) => return Err(error),
-            Err(_) => TrainedOn::default(),
-        };
+        let mut trained_on = self.trained_on().with_context(|| format!("driver {name:?}"))?;
         trained_on.lots.extend(tuned_on);
         let driver = NamedDriver { training, trained_on, ..NamedDriver::new(name, self, model) };
         Ok(driver.smoothed(settings.evaluation.smoothing))

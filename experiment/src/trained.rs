@@ -1,9 +1,10 @@
 //! The networks that runs have trained, as `run:DIR` and `run:DIR/bc` name them.
 
-use crate::manifest::{Finished, MANIFEST, Manifest, Outcome, SETTINGS, finished};
+use crate::manifest::{Finished, Inputs, MANIFEST, Manifest, Outcome, SETTINGS, finished};
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
 use policy::checkpoint::Checkpoint;
+use serde::Deserialize as _;
 use sim::limits::RUN_TOML_BYTES_MAX;
 use sim::seed::RootSeed;
 use std::collections::BTreeSet;
@@ -60,13 +61,21 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
     folders.sort_by_key(|folder| (*folder == "final", round_of(folder)));
     let folder = if is_bc { folders.first() } else { folders.last() };
     let folder = folder.with_context(|| {
-        let command = Manifest::read(run).map_or_else(|_| "another command".to_owned(), |manifest| manifest.command);
-        if Checkpoint::exists(run).is_ok_and(|exists| exists) {
-            format!("{}: this is the folder of one network; name it as net:{0}", run.display())
-        } else if command.starts_with("train-") {
-            format!("{}: no network is trained there yet; finish it with --resume {0}", run.display())
-        } else {
-            format!("{}: this is a run of {command}, which has no network of its own; name a training", run.display())
+        let command = Manifest::read(run).map(|manifest| manifest.command);
+        match command {
+            _ if Checkpoint::exists(run).is_ok_and(|exists| exists) => {
+                format!("{}: this is the folder of one network; name it as net:{0}", run.display())
+            }
+            Ok(command) if command.starts_with("train-") => {
+                format!("{}: no network is trained there yet; finish it with --resume {0}", run.display())
+            }
+            Ok(command) => format!(
+                "{}: this is a run of {command}, which has no network of its own; name a training",
+                run.display()
+            ),
+            Err(_) => {
+                format!("{}: this folder holds no finished network; name a training or a round of it", run.display())
+            }
         }
     })?;
     sums::read_listed(run, &format!("{folder}/{}", sums::FILE), sums::LIST_BYTES_MAX)?;
@@ -141,13 +150,24 @@ pub fn training_of(spec: &Path) -> anyhow::Result<Training> {
     Ok(Training { recipe, seed })
 }
 
-/// The lots that a policy `DIR` or `DIR/bc` was trained on.
+/// The lots that a policy `DIR` or `DIR/bc` was trained on. The two keys that say so are read of any version: whoever
+/// forgets them takes lots for unseen that are not.
 ///
 /// # Errors
-/// See [`settings_of`].
+/// If there is no run, a file is missing or damaged, or it does not say so.
 pub fn trained_on(spec: &Path) -> anyhow::Result<TrainedOn> {
-    let lots = settings_of(spec)?.training.lots;
-    let Manifest { inputs, .. } = Manifest::read(run_of(spec)?.0)?;
+    let (run, _) = run_of(spec)?;
+    let table = |name: &str| -> anyhow::Result<toml::Table> {
+        let path = run.join(name);
+        sums::read_to_string(&path, RUN_TOML_BYTES_MAX)?.parse().with_context(|| path.display().to_string())
+    };
+    let lots = table(SETTINGS)?.get("training").and_then(|training| training.get("lots")).cloned();
+    let lots: Vec<String> = lots.and_then(|lots| lots.try_into().ok()).with_context(|| {
+        let path = run.join(SETTINGS);
+        format!("{}: training.lots names no lots, so nobody knows what it was trained on; train again", path.display())
+    })?;
+    let inputs = table(MANIFEST)?.remove("inputs").map(Inputs::deserialize);
+    let inputs = inputs.transpose().with_context(|| run.join(MANIFEST).display().to_string())?.unwrap_or_default();
     let digests = lots.iter().filter_map(|lots| inputs.get(lots)).cloned().collect();
     Ok(TrainedOn { lots: lots.into_iter().collect(), digests })
 }
@@ -155,7 +175,7 @@ pub fn trained_on(spec: &Path) -> anyhow::Result<TrainedOn> {
 /// The same of a network by the folder of its checkpoint: those of the run that it lies in, none outside of one.
 ///
 /// # Errors
-/// If the settings or the manifest of that run cannot be read.
+/// See [`trained_on`].
 pub fn network_trained_on(checkpoint: &Path) -> anyhow::Result<TrainedOn> {
     run_of_network(checkpoint)?.map_or_else(|| Ok(TrainedOn::default()), |run| trained_on(&run))
 }
@@ -295,6 +315,43 @@ mod tests {
         }
     }
 
+    /// The lots of a run whose settings another version wrote were forgotten, and unseen ones in tables.
+    #[test]
+    fn a_run_with_a_setting_that_is_gone_still_knows_its_lots() {
+        let path = scratch("trained-on-before");
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.training.lots = vec!["lot-b".to_owned()];
+        let inputs = [("lot-b".to_owned(), "of a file".to_owned())].into();
+        RunDir::create(&place(&path, false), &settings, &Request { inputs, ..Request::default() }).unwrap();
+        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
+        let checkpoint =
+            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
+        for folder in ["round-00", "round-01"] {
+            checkpoint.save(&path.join(folder)).unwrap();
+            sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
+        }
+        let mut written: toml::Table = fs::read_to_string(path.join(SETTINGS)).unwrap().parse().unwrap();
+        written.insert("of_another_version".to_owned(), toml::Value::Integer(1));
+        let write = |written: &toml::Table| sums::write(&path, SETTINGS, written.to_string().as_bytes()).unwrap();
+        write(&written);
+        assert!(message(settings_of(&path)).contains("of_another_version"));
+        let load = |spec: &str| spec.parse::<DriverSpec>().unwrap().load(&settings);
+        let run = path.display();
+        let specs =
+            [format!("run:{run}"), format!("net:{run}/round-01"), format!("ensemble:net:{run}/round-00,run:{run}")];
+        for spec in &specs {
+            let TrainedOn { lots, digests } = load(spec).unwrap().trained_on;
+            assert_eq!((lots, digests), (["lot-b".to_owned()].into(), ["of a file".to_owned()].into()), "{spec}");
+        }
+        written["training"].as_table_mut().unwrap().remove("lots");
+        write(&written);
+        for spec in &specs {
+            let refused = message(load(spec).map(drop));
+            assert!(refused.contains("nobody knows what it was trained on"), "{spec}: {refused}");
+        }
+        fs::remove_dir_all(path).unwrap();
+    }
+
     /// `evaluate` drove with the first network of an ensemble alone.
     #[test]
     fn a_run_whose_rule_has_an_ensemble_drives_with_all_of_it() {
@@ -340,6 +397,10 @@ mod tests {
         assert!(message(policy_folder(&path)).contains("this is not a run"));
         create(&path, false).unwrap();
         assert!(message(policy_folder(&path)).contains("no network"));
+        // What was collected of a round, without a network.
+        sums::write_folder(&path, "round-00", [("round.toml".to_owned(), Vec::new())]).unwrap();
+        let refused = message(policy_folder(&path.join("round-00")));
+        assert!(refused.contains("holds no finished network") && !refused.contains("another command"), "{refused}");
         let settings = Settings::preset("smoke").unwrap();
         let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
         let checkpoint =
