@@ -273,7 +273,7 @@ impl<'a> Summary<'a> {
         let with = team_of(&teams, plan.compare_with);
         let judge = |(level, slice)| {
             let (estimates, comparisons) = results.judge(level, &slice, plan.compare_with, evaluation.seed);
-            let of_teams = (!teams.is_empty() && results.are_enough_to_judge_by(level, &slice))
+            let of_teams = (!teams.is_empty())
                 .then(|| results.judge_teams(level, &slice, &teams, with, evaluation.seed))
                 .flatten()
                 .unwrap_or_default();
@@ -559,5 +559,37 @@ mod tests {
         assert_eq!(of_sweep, of_tables);
         let exact: Vec<[f64; 2]> = both.iter().map(|row| [row.garwood_lower, row.garwood_upper]).collect();
         assert!(of_sweep[0] == exact[0] && of_sweep[1][1] > 1.5 * exact[1][1], "{of_sweep:?} {exact:?}");
+    }
+
+    /// Beside several trainings, `trainings.csv` had the bootstrap's interval of the expert where the first table had the exact one.
+    #[test]
+    fn a_driver_by_itself_has_one_interval_in_all_tables() {
+        let settings = Settings::preset("default").unwrap();
+        let expert = NamedDriver::expert(&settings.expert);
+        let mut drivers: Vec<NamedDriver> = (0..3).map(|i| expert.clone().renamed(&format!("mine {i}"))).collect();
+        for driver in &mut drivers {
+            driver.method = Some("mine".to_owned());
+        }
+        drivers.push(expert);
+        let lots = Lot::parse_all(&["lot-b"], &settings.episode.vehicle).unwrap();
+        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 0, shard: None };
+        // Spread over the trials, and all in one of them.
+        let of_trials: [fn(u32) -> u32; 2] = [|trial| trial % 2, |trial| if trial == 0 { 12 } else { 0 }];
+        for of_trial in of_trials {
+            let mut results = EvaluationResults::new(&plan);
+            for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 12, &Direction::BOTH).enumerate()
+            {
+                let near_collisions = of_trial(trial.index);
+                let metrics = EpisodeMetrics { near_collisions, reference_m: 100.0, ..EpisodeMetrics::default() };
+                let report = EpisodeReport { ending: Ending::ReachedEnd, metrics, events: Vec::new() };
+                for driver in 0..drivers.len() {
+                    results.add(0, driver, index, &trial, &report);
+                }
+            }
+            let tables = Summary::new(&plan, &results).tables();
+            let alone = tables.trainings.iter().find(|row| row.trainings == 1).unwrap();
+            let row = tables.rows.iter().find(|row| (&*row.driver, &*row.direction) == ("expert", "both")).unwrap();
+            assert_eq!([alone.per_100m_lower, alone.per_100m_upper], row.quoted_interval());
+        }
     }
 }

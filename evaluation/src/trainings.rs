@@ -207,27 +207,15 @@ impl EvaluationResults {
     ) -> Option<JudgedTeams> {
         let teams = teams(drivers);
         let with = teams.iter().position(|team| team.drivers.contains(&with))?;
-        let mut estimates = self.judge_teams(level, slice, &teams, with, seed)?;
-        let (of_drivers, _) = self.judge(level, slice, 0, seed);
-        for (team, estimate) in teams.iter().zip(&mut estimates) {
-            // What stands by itself has one interval, here as elsewhere.
-            if let [driver] = team.drivers[..] {
-                let totals = self.totals(level, driver, slice, None);
-                [estimate.per_100m.lower, estimate.per_100m.upper] = quoted_interval(&totals, &of_drivers[driver]);
-            }
-        }
+        let estimates = self.judge_teams(level, slice, &teams, with, seed)?;
         Some(JudgedTeams { teams: teams.into_iter().zip(estimates).collect() })
-    }
-
-    /// Whether enough is drawn in a slice that not all of it may be alike by chance: [`UNITS_MIN`] trials, or lots of a sample.
-    pub fn are_enough_to_judge_by(&self, level: usize, slice: &Slice) -> bool {
-        are_enough(&strata(&self.common_runs(level, slice), slice.is_pooled()))
     }
 
     /// How teams stand in a slice at a noise level, and how they differ from one of them, `with`. Lots are drawn as in
     /// [`judge`](Self::judge), for the means over trainings; Student's interval of these means adds what other seeds bring.
     /// Trainings of one seed begin alike, so teams of the same seeds differ by pairs. What fewer than [`TRAININGS_MIN`] say about
-    /// other seeds does not count. `None` of too little ([`Self::are_enough_to_judge_by`]).
+    /// other seeds does not count. A driver by itself has the interval that it has elsewhere. `None` of fewer trials, or lots of a
+    /// sample, than [`UNITS_MIN`]: all of them may be alike by chance.
     pub fn judge_teams(
         &self,
         level: usize,
@@ -279,7 +267,17 @@ impl EvaluationResults {
                 difference_per_100m: widened(difference, half_width),
             }
         };
-        Some(teams.iter().zip(rates.iter().zip(differences)).map(estimate).collect())
+        let mut estimates: Vec<TeamEstimate> = teams.iter().zip(rates.iter().zip(differences)).map(estimate).collect();
+        if teams.iter().any(|team| team.drivers.len() == 1) {
+            let (of_drivers, _) = self.judge(level, slice, 0, seed);
+            for (team, estimate) in teams.iter().zip(&mut estimates) {
+                if let [driver] = team.drivers[..] {
+                    let totals = self.totals(level, driver, slice, None);
+                    [estimate.per_100m.lower, estimate.per_100m.upper] = quoted_interval(&totals, &of_drivers[driver]);
+                }
+            }
+        }
+        Some(estimates)
     }
 }
 

@@ -112,7 +112,7 @@ pub fn table(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path
             row.difference.map(|interval| interval.upper),
         );
         (row.lower, row.upper) = match teams[at].drivers[..] {
-            // What stands by itself has one interval.
+            // What stands by itself has its interval of few lots, too.
             [driver] => (rows[driver].lower, rows[driver].upper),
             _ => judged.map(|interval| (interval.lower, interval.upper)).unzip(),
         };

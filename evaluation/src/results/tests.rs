@@ -1,4 +1,5 @@
 use super::*;
+use crate::format::quoted_interval;
 use crate::statistics::bootstrap::Interval;
 use crate::statistics::poisson::Rate;
 use crate::statistics::student::{half_width_of_mean, together};
@@ -240,7 +241,10 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     assert_eq!(rounded(found[0].per_100m), [0.0, 1.0, 5.302_652_73]);
     assert_eq!(rounded(found[1].per_100m), [0.0, 2.0, 6.302_652_73]);
     assert_eq!(rounded(found[1].difference_per_100m), [1.0, 1.0, 1.0], "trainings of a seed are compared");
-    assert_eq!(rounded(found[2].per_100m), [2.0, 2.0, 2.0]);
+    let alone = results.judge(0, &slice, 0, RootSeed(1)).0.swap_remove(6);
+    let quoted = quoted_interval(&results.totals(0, 6, &slice, None), &alone);
+    assert_eq!([found[2].per_100m.lower, found[2].per_100m.upper], quoted, "a driver by itself, as elsewhere");
+    assert_eq!(rounded(alone.per_100m.unwrap()), [2.0; 3], "varies with the lots alone");
     assert_eq!(rounded(found[2].difference_per_100m), [-3.302_652_73, 1.0, 5.302_652_73], "the other's seeds vary");
     // Seeds 2 to 4 are not paired with seeds 1 to 3: both means are uncertain by 3 · 4.3027 · 1/√3 / √3.
     let others = [team(&[0, 1, 2]), of_seeds(&[3, 4, 5], &[2, 3, 4])];
@@ -251,9 +255,6 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     let unknown = [of_seeds(&[0, 1, 2], &[]), of_seeds(&[3, 4, 5], &[])];
     let found = results.judge_teams(0, &slice, &unknown, 0, RootSeed(1)).unwrap();
     assert_eq!((found[1].difference_per_100m, rounded(found[0].difference_per_100m)), (apart, [0.0; 3]));
-    // Of few trials all may be alike by chance.
-    let of_one_lot = self::slice(&results, "lot-a");
-    assert!(results.are_enough_to_judge_by(0, &slice) && !results.are_enough_to_judge_by(0, &of_one_lot));
     // No draw of lots without events has any; the metres say what that supports.
     let none = results.judge_teams(0, &slice, &[team(&[0, 1])], 0, RootSeed(1)).unwrap()[0].per_100m;
     let metres = results.totals(0, 0, &slice, None).reference_m;
@@ -263,7 +264,11 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     let one = self::results(5, |driver, trial| Some(report(u32::from(driver == 4 && first(trial)), 100.0, 0.5)));
     let of_two = results.judge_teams(0, &slice, &[team(&[1, 2])], 0, RootSeed(1)).unwrap()[0].per_100m;
     assert_eq!(rounded(of_two), [1.5; 3], "two trainings say nothing about other seeds");
-    assert!(results.judge_teams(0, &of_one_lot, &teams, 0, RootSeed(1)).is_none(), "nor do few trials about others");
+    let of_one_lot = self::slice(&results, "lot-a");
+    assert!(
+        results.judge_teams(0, &of_one_lot, &teams, 0, RootSeed(1)).is_none(),
+        "of few trials all may be alike by chance"
+    );
     let one = one.judge_teams(0, &slice, &[team(&[0, 1, 2, 3, 4])], 0, RootSeed(1)).unwrap()[0].per_100m;
     assert!(one.estimate > 0.0 && one.upper == none.upper, "one event is not surer than none: {one:?}");
     // Lots and seeds that both vary: the first team's trainings are alike, the other's have 0, 1 and 2 events more.
@@ -277,6 +282,4 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     let half_width = half_width_of_mean(&[0.0, 1.0, 2.0]);
     let expected = both.estimate - together(lots.estimate - lots.lower, half_width);
     assert!((both.lower - expected).abs() < 1e-9, "{both:?} {expected}");
-    let alone = results.judge(0, &slice, 0, RootSeed(1)).0[2].per_100m.unwrap();
-    assert_eq!(rounded(alone), [3.0, 3.0, 3.0], "one network by itself varies with the lots alone");
 }
