@@ -168,7 +168,7 @@ impl Run<'_, '_> {
         for member in 1..settings.rule.members() {
             let start = match (settings.start, round.checked_sub(1)) {
                 (StartFrom::Previous, Some(before)) => {
-                    Checkpoint::load(&learned::member_folder(store, before, member))?.weights
+                    store.checkpoint(&learned::member_folder(store, before, member))?.weights
                 }
                 _ => Weights::init(settings.network, self.seed, index_of(Some(round), member)),
             };
@@ -214,9 +214,10 @@ impl Run<'_, '_> {
     ) -> Result<Option<(Weights, FitReport)>, Halt> {
         let unfinished = folder.join(fit::UNFINISHED);
         if Checkpoint::exists(folder)? {
+            self.store.check_trained(folder)?;
             self.store.finish(folder)?;
             whole::remove(&unfinished)?;
-            return Ok(Some((Checkpoint::load(folder)?.weights, files::read(folder)?)));
+            return Ok(Some((self.store.checkpoint(folder)?.weights, files::read(folder)?)));
         }
         files::create_folder(folder)?;
         let seed = self.seed.child(Stream::Shuffle, index_of(round, part));
@@ -243,7 +244,9 @@ impl Run<'_, '_> {
         let checkpoint = self.checkpoint(weights);
         checkpoint.write(folder)?;
         let [model, numbers] = Checkpoint::FILES;
-        sums::list(folder, &[FitReport::NAME, learning::FILE, model, numbers])?;
+        let files = [FitReport::NAME, learning::FILE, model, numbers];
+        self.store.claim(folder, &files)?;
+        sums::list(folder, &files)?;
         self.store.finish(folder)?;
         whole::remove(&unfinished)?;
         Ok(Some((checkpoint.weights, report)))

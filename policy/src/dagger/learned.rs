@@ -36,10 +36,10 @@ impl Learned {
     /// What collected a round after behaviour cloning, read from the folder of its run.
     ///
     /// # Errors
-    /// If a file is missing or not what it should be.
+    /// If a file is missing or not what it should be, or a network is not the one that the run has there.
     pub fn of_round(settings: &DaggerSettings, store: &Store, round: u32) -> Result<Self, FileError> {
         let before = round.saturating_sub(1);
-        let policy = Checkpoint::load(&store.round_folder(before))?;
+        let policy = store.checkpoint(&store.round_folder(before))?;
         let mut d = Dataset::default();
         // What was trained on sets the thresholds of one rule.
         if matches!(settings.rule, DecisionRule::ThriftyDagger(_)) {
@@ -59,7 +59,7 @@ impl Learned {
         d: &Dataset,
     ) -> Result<Self, FileError> {
         let members = members_of(settings, store, round)?;
-        let critic = settings.rule.critic().map(|_| Checkpoint::load(&critic_folder(store, round))).transpose()?;
+        let critic = settings.rule.critic().map(|_| store.checkpoint(&critic_folder(store, round))).transpose()?;
         let mut learned = Self { members, critic, ..Self::alone(policy) };
         if let DecisionRule::ThriftyDagger(thrifty) = settings.rule {
             learned.thresholds = learned.thresholds(thrifty.rate, d);
@@ -108,7 +108,7 @@ impl Learned {
 }
 
 fn members_of(settings: &DaggerSettings, store: &Store, round: u32) -> Result<Vec<Checkpoint>, FileError> {
-    (1..settings.rule.members()).map(|member| Checkpoint::load(&member_folder(store, round, member))).collect()
+    (1..settings.rule.members()).map(|member| store.checkpoint(&member_folder(store, round, member))).collect()
 }
 
 /// Where another member of the ensemble of a round is; the first one is in the folder of the round.

@@ -23,6 +23,7 @@ use std::cmp::Reverse;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use storage::sums;
 
 /// Drives to the point of the route ten metres ahead.
 struct RouteFollower;
@@ -103,9 +104,28 @@ fn run_in(
     settings: &DaggerSettings,
     progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Outcome, DaggerError> {
+    run_of_seed(RootSeed(6), folder, settings, progress)
+}
+
+fn run_of_seed(
+    seed: RootSeed,
+    folder: &Path,
+    settings: &DaggerSettings,
+    progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Outcome, DaggerError> {
     let store = Store::open(folder).unwrap();
     let mut hooks = Hooks { episodes: &mut |round| Ok(of_round(round, 2)), on_frame: &mut |_, _, _| {}, progress };
-    run(settings, &conditions(), &store, RootSeed(6), &mut hooks)
+    run(settings, &conditions(), &store, seed, &mut hooks)
+}
+
+/// Copies a folder of another run into a run, in place of its own.
+fn replace(run: &Path, name: &str, other: &Path) {
+    let (from, to) = (other.join(name), run.join(name));
+    std::fs::remove_dir_all(&to).unwrap();
+    std::fs::create_dir(&to).unwrap();
+    for file in std::fs::read_dir(from).unwrap().map(Result::unwrap) {
+        std::fs::copy(file.path(), to.join(file.file_name())).unwrap();
+    }
 }
 
 fn conditions() -> Conditions {
@@ -229,6 +249,68 @@ fn eta_ends_the_iterations_and_a_final_fit_follows() {
     assert!(outcome.rows[1].samples > 0, "every tick is kept");
     assert_eq!(outcome.policy, Some(Checkpoint::load(&folder.join("final")).unwrap()));
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// `final/` of another run was taken for the last network of this one, and never trained.
+#[test]
+fn a_network_of_another_run_is_not_taken_for_a_finished_training() {
+    let (own, other) = (scratch("final"), scratch("final-of-another"));
+    let settings = DaggerSettings { iterations_max: 0, final_budget: Budget::Steps(3), ..settings() };
+    let again = || run_in(&own, &settings, &mut go_on).map(|outcome| outcome.policy).map_err(|error| error.to_string());
+    let policy = again().unwrap();
+    run_of_seed(RootSeed(7), &other, &settings, &mut go_on).unwrap();
+    let files = ["final/fit.toml", "final/learning.csv", "final/model.toml", "final/model.safetensors"];
+    // Its files are listed, the folder is not.
+    let die_at_the_end = || {
+        sums::unlist(&own, &["final/sha256sums"]).unwrap();
+        sums::list(&own, &files).unwrap();
+    };
+    die_at_the_end();
+    assert_eq!(again().unwrap(), policy);
+    assert!(sums::verify(&own).faults.is_empty());
+    die_at_the_end();
+    std::fs::remove_file(own.join("final/sha256sums")).unwrap();
+    assert_eq!(again().unwrap(), policy, "trained again, to the same");
+    die_at_the_end();
+    replace(&own, "final", &other);
+    let refused = again().unwrap_err();
+    assert!(refused.contains("is not the file that the run wrote"), "{refused}");
+    sums::unlist(&own, &files).unwrap();
+    let refused = again().unwrap_err();
+    assert!(refused.contains("final") && refused.contains("this run did not train the network there"), "{refused}");
+    std::fs::remove_dir_all(own.join("final")).unwrap();
+    assert_eq!(again().unwrap(), policy);
+    for folder in [own, other] {
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}
+
+/// A round was driven again with the networks of another run, each whole by its own list.
+#[test]
+fn a_round_is_not_driven_again_with_networks_of_another_run() {
+    let (own, other) = (scratch("networks"), scratch("networks-of-another"));
+    let rule = DecisionRule::named("thrifty_dagger").unwrap();
+    let settings = DaggerSettings { rule, iterations_max: 0, samples_per_round: 150, ..settings() };
+    run_in(&own, &settings, &mut go_on).unwrap();
+    run_of_seed(RootSeed(7), &other, &settings, &mut go_on).unwrap();
+    let store = Store::open(&own).unwrap();
+    Learned::of_round(&settings, &store, 1).unwrap();
+    let kept = scratch("networks-kept");
+    for name in ["round-00", "round-00-member-1", "round-00-critic"] {
+        std::fs::create_dir_all(kept.join(name)).unwrap();
+        replace(&kept, name, &own);
+        replace(&own, name, &other);
+        let refused = Learned::of_round(&settings, &store, 1).unwrap_err().to_string();
+        assert!(refused.contains(&format!("{name}/sha256sums: is damaged")), "{name}: {refused}");
+        replace(&own, name, &kept);
+    }
+    Learned::of_round(&settings, &store, 1).unwrap();
+    sums::unlist(&own, &["round-00-critic/sha256sums"]).unwrap();
+    let refused = Learned::of_round(&settings, &store, 1).unwrap_err().to_string();
+    assert!(refused.contains("this run did not train the network there"), "{refused}");
+    for folder in [own, other, kept] {
+        std::fs::remove_dir_all(folder).unwrap();
+    }
 }
 
 #[test]

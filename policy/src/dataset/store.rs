@@ -16,10 +16,11 @@
 //! ```
 //!
 //! The run lists the data of a round file by file as soon as they are there, and the round's `sha256sums` in their place
-//! when the network is.
+//! when the network is. Of a folder without data, it lists the network file by file before the folder does.
 //!
 //! Every file and folder appears under its name only when it is complete: it is written beside, then renamed.
 
+use crate::checkpoint::Checkpoint;
 use crate::dataset::collection::Collection;
 use crate::dataset::npy::{self, Archive};
 use crate::dataset::packed;
@@ -105,6 +106,38 @@ impl Store {
             sums::read_listed(&self.folder, &list, sums::LIST_BYTES_MAX)?;
         }
         Ok(is_listed)
+    }
+
+    /// The network in a finished folder of the run: the one that the run has there.
+    ///
+    /// # Errors
+    /// If the run does not list the folder as it is, or see [`Checkpoint::load`].
+    pub(crate) fn checkpoint(&self, folder: &Path) -> Result<Checkpoint, FileError> {
+        if self.is_finished(folder)? { Checkpoint::load(folder) } else { Err(not_trained_here(folder)) }
+    }
+
+    /// Lists files of a folder without data before its own list does: with that, [`Self::check_trained`] knows them.
+    ///
+    /// # Errors
+    /// If one cannot be read, or the list cannot be written.
+    pub(crate) fn claim(&self, folder: &Path, files: &[&str]) -> Result<(), FileError> {
+        if sums::is_listed(&self.folder, &record_of(folder))? {
+            return Ok(());
+        }
+        let files: Vec<String> = files.iter().map(|file| format!("{}/{file}", name_of(folder))).collect();
+        sums::list(&self.folder, &files.iter().map(String::as_str).collect::<Vec<_>>())
+    }
+
+    /// Refuses a trained network that this run did not train: it lists the folder, its data or all of its files.
+    ///
+    /// # Errors
+    /// If it does not, or lists others.
+    pub(crate) fn check_trained(&self, folder: &Path) -> Result<(), FileError> {
+        let within = format!("{}/", name_of(folder));
+        if !sums::names(&self.folder)?.iter().any(|name| name.starts_with(&within)) {
+            return Err(not_trained_here(folder));
+        }
+        sums::check_folder(&self.folder, &name_of(folder))
     }
 
     /// Lists a folder of the run, all of whose files are listed there: nothing is added to it any more.
@@ -196,6 +229,14 @@ impl Store {
         sums::check_folder(&self.folder, &name_of(folder))?;
         files::read(folder)
     }
+}
+
+fn not_trained_here(folder: &Path) -> FileError {
+    FileError::new(
+        folder,
+        "this run did not train the network there, or not to the end",
+        "move the folder away, and continue the run: it trains its own",
+    )
 }
 
 /// The record of how a round was collected, as the run lists it.
