@@ -21,6 +21,8 @@ pub(crate) trait Format: Serialize + DeserializeOwned {
     const NAME: &'static str;
     /// The version of the format: raise it whenever an older reader would misread the file.
     const SCHEMA: u32;
+    /// Its most bytes.
+    const BYTES_MAX: u64 = RUN_TOML_BYTES_MAX;
 }
 
 /// Writes a file into its folder; it is finished when it is listed.
@@ -34,7 +36,7 @@ pub(crate) fn write<T: Format>(folder: &Path, content: &T) -> Result<(), FileErr
 /// Reads a file from its folder.
 pub(crate) fn read<T: Format>(folder: &Path) -> Result<T, FileError> {
     let path = folder.join(T::NAME);
-    let text = sums::read_to_string(&path, RUN_TOML_BYTES_MAX)?;
+    let text = sums::read_to_string(&path, T::BYTES_MAX)?;
     let mut table: Table = text.parse().map_err(|error| FileError::new(&path, error, RESTORE_REMEDY))?;
     match table.remove("schema") {
         Some(Value::Integer(schema)) if schema == i64::from(T::SCHEMA) => {}

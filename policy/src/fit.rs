@@ -17,7 +17,7 @@ pub use device::DeviceChoice;
 pub use optimizer::AdamSettings;
 pub use report::{CurvePoint, FitProgress, FitReport, Step, Validation};
 pub use schedule::{LearningRate, ScheduleShape};
-pub use settings::{Budget, FitSettings, KeepWeights, Mirror};
+pub use settings::{Budget, FitSettings, KeepWeights, Mirror, STEPS_MAX, TooLong, VALIDATIONS_MAX};
 pub use training::{FitContext, FitError, FitOutcome, evaluate, fit};
 pub use unfinished::FILE as UNFINISHED;
 

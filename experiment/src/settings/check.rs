@@ -3,6 +3,7 @@
 use super::reference;
 use super::schema::Settings;
 use anyhow::{Context as _, bail, ensure};
+use policy::fit::Budget;
 use scenarios::LotSpec;
 use sim::limits::{DRIVES_AT_ONCE_MAX, RUNS_MAX};
 
@@ -68,6 +69,16 @@ impl Settings {
             self.dagger.fit.validation.every != 1,
             "dagger.fit.validation.every = 1 holds every block back; nothing is left to train on"
         );
+        for (key, budget) in [
+            ("dagger.fit.budget", self.dagger.fit.budget),
+            ("dagger.cloning_budget", self.dagger.cloning_budget),
+            ("dagger.final_budget", self.dagger.final_budget),
+        ] {
+            // Of epochs, the samples decide.
+            if let Budget::Steps(steps) = budget {
+                self.dagger.fit.check_length(steps).with_context(|| format!("{key}.steps = {steps}"))?;
+            }
+        }
         let travels = &self.expert.branch_travels_m;
         ensure!(travels.is_sorted_by(|a, b| a < b), "expert.branch_travels_m = {travels:?} is not increasing");
         let clearances = &self.expert.clearances_m;

@@ -1,6 +1,7 @@
 //! Layers and the sentences that errors are made of.
 
 use super::*;
+use policy::fit::STEPS_MAX;
 use scenarios::LotSpec;
 use scenarios::split::Family;
 use sim::seed::RootSeed;
@@ -193,6 +194,25 @@ fn a_generated_lot_is_driven_once_a_round_whatever_the_trials() {
     settings.training.lots.push("train:4000:hard".to_owned());
     let error = format!("{:#}", settings.check().unwrap_err());
     assert!(error.contains("10016 drives a round"), "{error}");
+}
+
+/// Such a training could neither end nor go on: its files were longer than what is read.
+#[test]
+fn a_training_whose_files_cannot_be_read_again_is_refused() {
+    let check = |budget: &str, steps: u32, validate_every: u32| {
+        let steps = format!("{budget}.steps={steps}");
+        let changes = layers(&[&steps, &format!("dagger.fit.validate_every={validate_every}")]);
+        Settings::resolve(&changes, None).map(drop).map_err(|error| format!("{error:#}"))
+    };
+    for budget in ["dagger.fit.budget", "dagger.cloning_budget", "dagger.final_budget"] {
+        assert_eq!(check(budget, STEPS_MAX, 250), Ok(()));
+        assert_eq!(check(budget, STEPS_MAX, 0), Ok(()));
+        let error = check(budget, STEPS_MAX + 1, 0).unwrap_err();
+        assert!(error.contains(&format!("{budget}.steps = 50000001 is out of range")), "{error}");
+        let error = check(budget, STEPS_MAX, 249).unwrap_err();
+        assert!(error.contains(budget) && error.contains("validate_every = 249"), "{error}");
+        assert!(error.contains("200803 validations; at most 200000"), "{error}");
+    }
 }
 
 #[test]

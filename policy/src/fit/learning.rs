@@ -1,9 +1,9 @@
 //! `learning.csv` in the folder of a round: its learning curve, step by step.
 
-use crate::files::{FileError, RESTORE_REMEDY, WRITE_REMEDY, open, write_atomically};
+use crate::files::{FileError, RESTORE_REMEDY, write_atomically};
 use crate::fit::report::{FitReport, Step};
 use serde::{Deserialize, Serialize};
-use sim::limits::RUN_TEXT_BYTES_MAX;
+use sim::limits::RUN_LINES_BYTES_MAX;
 use std::path::Path;
 use storage::sums;
 
@@ -28,7 +28,8 @@ struct Row {
 pub struct LearningCurve {
     /// Short: `BC`, `i = 1`.
     pub name: String,
-    /// Optimiser step (counted from 1 in every round) and training loss, nats per sample.
+    /// Optimiser step (counted from 1 in every round) and training loss, nats per sample. Of more than a million steps, means of
+    /// 2, 4, 8 … of them, each at its last step.
     pub training: Vec<(u32, f64)>,
     /// The same of held-back samples.
     pub validation: Vec<(u32, f64)>,
@@ -39,25 +40,24 @@ pub struct LearningCurve {
 /// Writes `learning.csv`; it is finished when it is listed.
 pub(crate) fn write(folder: &Path, steps: &[Step], report: &FitReport) -> Result<(), FileError> {
     let mut validations = report.curve.iter().peekable();
-    let mut rows = csv::Writer::from_writer(Vec::new());
-    let path = folder.join(FILE);
-    let failed = |error: &dyn std::fmt::Display| FileError::new(&path, error, WRITE_REMEDY);
-    for (step, &Step { learning_rate, loss }) in (1..).zip(steps) {
-        let validation = validations.next_if(|point| point.step == step).and_then(|point| point.validation);
-        let row = Row {
-            step,
-            learning_rate,
-            loss: loss.total,
-            misfit: loss.misfit,
-            log_variance: loss.log_variance,
-            validation_loss: validation.map(|validation| validation.loss),
-            validation_nll: validation.map(|validation| validation.nll),
-            validation_rmse_m: validation.map(|validation| validation.rmse_m),
-        };
-        rows.serialize(row).map_err(|error| failed(&error))?;
-    }
-    let rows = rows.into_inner().map_err(|error| failed(&error))?;
-    write_atomically(&path, |file| std::io::Write::write_all(file, &rows).map_err(|error| error.to_string()))
+    write_atomically(&folder.join(FILE), |file| {
+        let mut rows = csv::Writer::from_writer(file);
+        for (step, &Step { learning_rate, loss }) in (1..).zip(steps) {
+            let validation = validations.next_if(|point| point.step == step).and_then(|point| point.validation);
+            let row = Row {
+                step,
+                learning_rate,
+                loss: loss.total,
+                misfit: loss.misfit,
+                log_variance: loss.log_variance,
+                validation_loss: validation.map(|validation| validation.loss),
+                validation_nll: validation.map(|validation| validation.nll),
+                validation_rmse_m: validation.map(|validation| validation.rmse_m),
+            };
+            rows.serialize(row).map_err(|error| error.to_string())?;
+        }
+        rows.flush().map_err(|error| error.to_string())
+    })
 }
 
 /// The learning curve of the fit in a folder; `None` if none is finished there.
@@ -70,13 +70,60 @@ pub fn read(folder: &Path, name: &str) -> Result<Option<LearningCurve>, FileErro
     }
     let path = folder.join(FILE);
     let mut curve = LearningCurve { name: name.to_owned(), ..LearningCurve::default() };
-    for row in csv::Reader::from_reader(open(&path, RUN_TEXT_BYTES_MAX)?).deserialize() {
+    let mut training = Thinned::new(POINTS_MAX);
+    for row in csv::Reader::from_reader(sums::open(&path, RUN_LINES_BYTES_MAX)?).deserialize() {
         let row: Row = row.map_err(|error| FileError::new(&path, error, RESTORE_REMEDY))?;
-        curve.training.push((row.step, f64::from(row.loss)));
+        training.push(row.step, f64::from(row.loss));
         curve.validation.extend(row.validation_loss.map(|loss| (row.step, f64::from(loss))));
         curve.validation_rmse_m.extend(row.validation_rmse_m.map(|error_m| (row.step, f64::from(error_m))));
     }
+    curve.training = training.finish();
     Ok(Some(curve))
+}
+
+/// Points of a curve that are held, an even number: no picture shows as many.
+const POINTS_MAX: usize = 1 << 20;
+
+/// Means of as few steps as leave at most so many points.
+struct Thinned {
+    points_max: usize,
+    points: Vec<(u32, f64)>,
+    /// Steps of a point.
+    stretch: u32,
+    /// Of the point to come: its steps so far, the sum of their values, and the last of them.
+    begun: (u32, f64, u32),
+}
+
+impl Thinned {
+    fn new(points_max: usize) -> Self {
+        Self { points_max, points: Vec::new(), stretch: 1, begun: (0, 0.0, 0) }
+    }
+
+    fn push(&mut self, step: u32, value: f64) {
+        let (count, sum, _) = self.begun;
+        self.begun = (count + 1, sum + value, step);
+        if self.begun.0 < self.stretch {
+            return;
+        }
+        self.end_point();
+        if self.points.len() == self.points_max {
+            let pairs = self.points.as_chunks().0.iter();
+            self.points = pairs.map(|&[(_, first), (step, second)]| (step, f64::midpoint(first, second))).collect();
+            self.stretch *= 2;
+        }
+    }
+
+    fn end_point(&mut self) {
+        let (count, sum, step) = std::mem::take(&mut self.begun);
+        self.points.push((step, sum / f64::from(count)));
+    }
+
+    fn finish(mut self) -> Vec<(u32, f64)> {
+        if self.begun.0 > 0 {
+            self.end_point();
+        }
+        self.points
+    }
 }
 
 #[cfg(test)]
@@ -85,6 +132,20 @@ mod tests {
     use crate::fit::{CurvePoint, Validation};
     use crate::loss::LossParts;
     use crate::test_data::scratch;
+
+    /// Longer curves than can be read back stopped a training at its end.
+    #[test]
+    fn a_long_curve_is_read_as_means_over_stretches_that_fit() {
+        let thinned = |steps: u32| {
+            let mut points = Thinned::new(8);
+            (1..=steps).for_each(|step| points.push(step, f64::from(step)));
+            points.finish()
+        };
+        assert_eq!(thinned(7), (1..=7).map(|step| (step, f64::from(step))).collect::<Vec<_>>(), "as they are");
+        assert_eq!(thinned(8), [(2, 1.5), (4, 3.5), (6, 5.5), (8, 7.5)]);
+        assert_eq!(thinned(18), [(4, 2.5), (8, 6.5), (12, 10.5), (16, 14.5), (18, 17.5)]);
+        assert_eq!(thinned(1000).len(), 8, "the last stretch of 128 is shorter");
+    }
 
     #[test]
     fn a_curve_reads_back_with_validations_at_their_steps() {

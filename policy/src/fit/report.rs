@@ -3,6 +3,7 @@
 use crate::files::{self, FileError, Format};
 use crate::loss::LossParts;
 use serde::{Deserialize, Serialize};
+use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::path::Path;
 
 /// The state after a step, for progress bars and logs.
@@ -91,6 +92,8 @@ impl Format for FitReport {
     const SCHEMA: u32 = 2;
 }
 
+    /// [`VALIDATIONS_MAX`](crate::fit::VALIDATIONS_MAX) points of its curve have 70 MB.
+    const BYTES_MAX: u64 = RUN_TEXT_BYTES_MAX;
 impl FitReport {
     /// Reads `fit.toml` of a folder; `None` if no training is finished there.
     ///

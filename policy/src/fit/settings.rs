@@ -6,6 +6,32 @@ use crate::fit::schedule::{LearningRate, ScheduleShape};
 use crate::loss::LossSettings;
 use serde::{Deserialize, Serialize};
 
+/// Steps of a training: its state, `fit.unfinished`, then stays within the 2 GB that are read again.
+pub const STEPS_MAX: u32 = 50_000_000;
+/// Validations of a training: its report, `fit.toml`, has some 300 bytes of each.
+pub const VALIDATIONS_MAX: u32 = 200_000;
+
+/// A training whose files would be longer than what is read again.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum TooLong {
+    /// Too many steps.
+    #[error("{steps} steps; at most {STEPS_MAX} are possible")]
+    Steps {
+        /// Steps of the training.
+        steps: u32,
+    },
+    /// Too many validations.
+    #[error(
+        "validate_every = {validate_every} makes {validations} validations; at most {VALIDATIONS_MAX} are possible"
+    )]
+    Validations {
+        /// Steps between them.
+        validate_every: u32,
+        /// How many.
+        validations: u32,
+    },
+}
+
 /// Settings of one training.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -120,6 +146,23 @@ impl FitSettings {
         match self.budget {
             Budget::Steps(steps) => steps,
             Budget::Epochs(epochs) => (epochs * training_samples as f32 / self.batch as f32).ceil() as u32,
+        }
+    }
+
+    /// Checks that what a training of so many steps writes can be read again.
+    ///
+    /// # Errors
+    /// If it has too many steps or validations.
+    pub fn check_length(&self, steps: u32) -> Result<(), TooLong> {
+        if steps > STEPS_MAX {
+            return Err(TooLong::Steps { steps });
+        }
+        let validate_every = self.validate_every;
+        match steps.checked_div(validate_every) {
+            Some(validations) if validations > VALIDATIONS_MAX => {
+                Err(TooLong::Validations { validate_every, validations })
+            }
+            _ => Ok(()),
         }
     }
 }

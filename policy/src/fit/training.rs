@@ -5,7 +5,7 @@ use crate::files::FileError;
 use crate::fit::batch_sampler::BatchSampler;
 use crate::fit::device::DeviceChoice;
 use crate::fit::report::{CurvePoint, FitProgress, FitReport, Step, Validation};
-use crate::fit::settings::{FitSettings, KeepWeights};
+use crate::fit::settings::{FitSettings, KeepWeights, TooLong};
 use crate::fit::unfinished::Unfinished;
 use crate::loss::{self, BatchLoss, LossParts, LossSettings};
 use crate::network::{
@@ -46,6 +46,9 @@ pub enum FitError {
     /// A batch without samples.
     #[error("a batch of 0 samples: it must be positive")]
     EmptyBatch,
+    /// More than can be read again.
+    #[error(transparent)]
+    TooLong(#[from] TooLong),
     /// Arithmetic that left the finite numbers.
     #[error("step {step}: {what} is not a finite number; lower the learning rate or the gains of the loss")]
     NotFinite {
@@ -86,8 +89,8 @@ const KEEP_EVERY_S: u64 = 60;
 /// when it is no longer needed.
 ///
 /// # Errors
-/// If there is nothing to train on, the learning rate is impossible, the loss or a weight is not a finite number, or
-/// `unfinished` cannot be read or written.
+/// If there is nothing to train on or too much, the learning rate is impossible, the loss or a weight is not a finite number,
+/// or `unfinished` cannot be read or written.
 #[expect(clippy::disallowed_methods, reason = "when the state is copied to disk changes no result")]
 pub fn fit(
     start: &Weights,
@@ -105,6 +108,7 @@ pub fn fit(
         return Err(FitError::NoTrainingSamples { samples: dataset.len(), every: settings.validation.every });
     }
     let steps = settings.steps(split.training.len());
+    settings.check_length(steps)?;
     let validated = thinned(&split.validation, settings.validate_on_max);
     let validate = |weights: &Weights, samples: &[Sample]| {
         (!samples.is_empty()).then(|| evaluate(weights, samples, &settings.loss, context))
