@@ -29,11 +29,13 @@ pub struct FitProgress {
 pub struct Validation {
     /// Number of samples.
     pub samples: usize,
-    /// The loss as trained, with β = 0: "best" means the lowest of these.
+    /// The loss as trained, with β = 0: "best" means the lowest of these. With one mode it is of the answer that is used,
+    /// mirror averaging included; with several, of all modes as they leave the network, without it.
     pub loss: f32,
-    /// Plain negative log-likelihood: comparable between weighted and unweighted training.
+    /// Plain negative log-likelihood of the same: comparable between weighted and unweighted training, and not between networks
+    /// of one mode and of several.
     pub nll: f32,
-    /// Root mean square distance between answer and label, metres.
+    /// Root mean square distance between label and the answer that is used, mirror averaging included, metres.
     pub rmse_m: f32,
 }
 
@@ -90,10 +92,10 @@ impl Format for FitReport {
     const NAME: &'static str = "fit.toml";
     /// 1 had no learning rates.
     const SCHEMA: u32 = 2;
-}
-
     /// [`VALIDATIONS_MAX`](crate::fit::VALIDATIONS_MAX) points of its curve have 70 MB.
     const BYTES_MAX: u64 = RUN_TEXT_BYTES_MAX;
+}
+
 impl FitReport {
     /// Reads `fit.toml` of a folder; `None` if no training is finished there.
     ///

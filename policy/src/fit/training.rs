@@ -73,7 +73,7 @@ pub enum FitError {
 pub struct FitContext {
     /// Patch of ground of the grids; errors in metres depend on it.
     pub geometry: GridGeometry,
-    /// How the network will be used: validation does the same.
+    /// How the network will be used: validation does the same, but for the loss of several modes ([`Validation`]).
     pub inference: InferenceSettings,
     /// Where the network is trained.
     pub device: DeviceChoice,

@@ -1,5 +1,5 @@
-//! How a trained network is used at the wheel. The steps of a fit do not depend on it; which weights are kept, and what is
-//! collected with them, do.
+//! How a trained network is used at the wheel. The steps of a fit do not depend on it; what is collected with its networks does,
+//! and of networks with one mode which weights are kept: the validation loss of several is of the network itself.
 
 use crate::network::error::NetworkError;
 use serde::{Deserialize, Serialize};

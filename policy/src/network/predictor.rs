@@ -98,8 +98,8 @@ impl Predictor {
         rows.map(|(of_grid, of_image)| mirror_averaged(of_grid, of_image, self.modes)).collect()
     }
 
-    /// What the loss of grids is computed from, `[grids, width]`: of one Gaussian its answers, else all modes as they leave the
-    /// network.
+    /// What the loss of grids is computed from, `[grids, width]`: of one Gaussian its answers, averaged with those to mirror
+    /// images if that is how it drives; else all modes as they leave the network, which nothing is averaged with.
     pub(crate) fn for_loss(&self, grids: &[&OccupancyGrid], answers: &[[f32; OUTPUTS]]) -> Vec<f32> {
         match self.modes {
             1 => answers.as_flattened().to_vec(),
