@@ -8,6 +8,8 @@
 //! `½ [ −log Σ_k π_k exp(−L_ku) + Σ_k r_k L_kw ]`. A mode's share in a sample, `r_k = π_k exp(−L_ku) / Σ π exp(−L_u)`, is a matter
 //! of u alone: modes are ways, and ways differ in their side. If w counted as well, one mode would take all labels of full
 //! range, whose w is nearly always the same, and none would stand for a way.
+//!
+//! This is β = 0. β-NLL multiplies the loss of each axis and mode by `σ^2β`, but for the shares ([`LossSettings::beta`]).
 
 use crate::dataset::Sample;
 use crate::network::{LOG_VARIANCE_MAX, LOG_VARIANCE_MIN, OUTPUTS, operations};
@@ -135,7 +137,8 @@ pub fn of_batch(settings: &LossSettings, outputs: Tensor<2>, labels: Tensor<2>, 
 }
 
 /// Expectation and maximisation: with the share that each mode has in a sample held constant, the sum of their losses by
-/// these shares has the value of the loss above and its gradient.
+/// these shares has the value of the loss above and its gradient. With β > 0 these losses are times σ^2β; the shares, and the
+/// price of choosing, `½ Σ_k r_k log(r_k / π_k)`, are those of β = 0.
 fn of_mixture(
     settings: &LossSettings,
     outputs: &Tensor<2>,
@@ -280,10 +283,16 @@ mod tests {
         }
     }
 
-    /// Two modes in closed form; the gradient by finite differences, with the shares held.
+    /// Two modes in closed form; the gradient by finite differences, with the shares held. With β, of the sum by shares: it is no
+    /// likelihood of a mixture then.
     #[test]
     fn modes_share_a_sample_by_its_side() {
-        let settings = LossSettings::paper();
+        for beta in [0.0, 0.5] {
+            check_two_modes(&LossSettings { beta, ..LossSettings::paper() });
+        }
+    }
+
+    fn check_two_modes(settings: &LossSettings) {
         let other = [0.48, 0.33, -4.4, -2.9];
         let raw: Vec<f32> = RAW.into_iter().chain(other).chain([0.3, -0.8]).collect();
         let of_axis = |raw: &[f32], mode: usize, axis: usize| {
@@ -293,6 +302,11 @@ mod tests {
             let weight = f64::from(settings.weight_of_squared_error(TAU_HAT));
             0.5 * (weight * error * error * libm::exp(-log_variance) + log_variance)
         };
+        // σ^2β, a constant at the outputs themselves.
+        let factor = |mode: usize, axis: usize| {
+            let log_variance = f64::from(soft_clamp_log_variance(raw[mode * OUTPUTS + 2 + axis]));
+            libm::exp(f64::from(settings.beta) * log_variance)
+        };
         // The likelihood of each mode by its side.
         let by_side = |raw: &[f32]| {
             let logits = &raw[2 * OUTPUTS..];
@@ -300,13 +314,20 @@ mod tests {
             [0, 1].map(|mode| libm::exp(f64::from(logits[mode]) - of_axis(raw, mode, 0)) / weights)
         };
         let held = by_side(&raw);
+        let shares = held.map(|side| side / (held[0] + held[1]));
         let value = |raw: &[f32]| {
             let sides = by_side(raw);
-            let ranges: f64 = (0..2).map(|mode| held[mode] / (held[0] + held[1]) * of_axis(raw, mode, 1)).sum();
-            0.5 * (ranges - libm::log(sides[0] + sides[1]))
+            // What β adds to the losses of the sides, and the losses of the ranges.
+            let of_modes: f64 = (0..2)
+                .map(|mode| {
+                    let more = (factor(mode, 0) - 1.0) * of_axis(raw, mode, 0);
+                    shares[mode] * (more + factor(mode, 1) * of_axis(raw, mode, 1))
+                })
+                .sum();
+            0.5 * (of_modes - libm::log(sides[0] + sides[1]))
         };
-        let (loss, gradient) = loss_and_gradient(&settings, &raw);
-        assert!((f64::from(loss) - value(&raw)).abs() < 1e-5, "{loss} against {}", value(&raw));
+        let (loss, gradient) = loss_and_gradient(settings, &raw);
+        assert!((f64::from(loss) - value(&raw)).abs() < 1e-5, "{settings:?}: {loss} against {}", value(&raw));
         for (index, slope) in gradient.into_iter().enumerate() {
             let at = |delta: f32| {
                 let mut raw = raw.clone();
@@ -316,7 +337,7 @@ mod tests {
             let difference = (at(1e-3) - at(-1e-3)) / 2e-3;
             assert!(
                 (difference - f64::from(slope)).abs() < 2e-3 * (1.0 + f64::from(slope.abs())),
-                "[{index}]: {difference} {slope}"
+                "{settings:?} [{index}]: {difference} {slope}"
             );
         }
     }
