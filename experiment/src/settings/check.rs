@@ -120,13 +120,14 @@ impl Settings {
             drives <= DRIVES_AT_ONCE_MAX,
             "training.lots, trials and directions: {drives} drives a round; at most {DRIVES_AT_ONCE_MAX} are possible"
         );
-        for (key, names) in [("evaluation.lots", &evaluation.lots), ("evaluation.elsewhere", &evaluation.elsewhere)] {
-            let lots = of_lots(key, names, &|_| 1)?;
-            let runs = lots * evaluation.trials as usize * evaluation.directions.len() * evaluation.noise.len();
-            ensure!(
-                runs <= RUNS_MAX,
-                "{key}, trials, directions and noise: {runs} runs; at most {RUNS_MAX} are possible"
-            );
+        let trials_and_levels = evaluation.trials as usize * evaluation.noise.len();
+        for (key, names, others, times) in [
+            ("evaluation.lots", &evaluation.lots, ", trials, directions and noise", trials_and_levels),
+            // Once each way, at the first level.
+            ("evaluation.elsewhere", &evaluation.elsewhere, " and directions", 1),
+        ] {
+            let runs = of_lots(key, names, &|_| times)? * evaluation.directions.len();
+            ensure!(runs <= RUNS_MAX, "{key}{others}: {runs} runs; at most {RUNS_MAX} are possible");
         }
         Ok(())
     }

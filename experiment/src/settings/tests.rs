@@ -196,6 +196,22 @@ fn a_generated_lot_is_driven_once_a_round_whatever_the_trials() {
     assert!(error.contains("10016 drives a round"), "{error}");
 }
 
+/// It is driven once, at the first level: a million drives were too many, and a few thousand were counted.
+#[test]
+fn the_check_elsewhere_is_counted_as_it_is_driven() {
+    let mut settings = Settings::preset("default").unwrap();
+    settings.evaluation.trials = 60_000;
+    settings.evaluation.noise = vec![NoiseChoice::Paper, NoiseChoice::Hard];
+    settings.check().unwrap();
+    settings.evaluation.elsewhere = vec!["validation:1000000:all".to_owned(); 6];
+    let error = format!("{:#}", settings.check().unwrap_err());
+    assert!(error.contains("evaluation.elsewhere and directions: 12000000 runs"), "{error}");
+    settings.evaluation.trials = 100_000;
+    settings.evaluation.lots = vec!["test:100".to_owned()];
+    let error = format!("{:#}", settings.check().unwrap_err());
+    assert!(error.contains("evaluation.lots, trials, directions and noise: 40000000 runs"), "{error}");
+}
+
 /// Such a training could neither end nor go on: its files were longer than what is read.
 #[test]
 fn a_training_whose_files_cannot_be_read_again_is_refused() {
