@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct DriverEstimate {
     /// How clustered its near-collisions are; `None` where that cannot be said.
     pub dispersion: Option<Dispersion>,
-    /// Near-collisions per 100 m; `None` with a single trial per lot.
+    /// Near-collisions per 100 m; `None` where a single trial or lot is all there is.
     pub per_100m: Option<Interval>,
     /// Safe ratio, mean over runs.
     pub safe_ratio: Option<Interval>,
@@ -29,7 +29,7 @@ pub struct Comparison {
     pub driver: usize,
     /// Runs both have driven.
     pub pairs: usize,
-    /// Near-collisions per 100 m, paired bootstrap; `None` with a single trial per lot.
+    /// Near-collisions per 100 m, paired bootstrap; `None` where a single trial or lot is all there is.
     pub difference_per_100m: Option<Interval>,
     /// Safe ratio, paired bootstrap.
     pub difference_safe_ratio: Option<Interval>,
@@ -163,7 +163,7 @@ const COLUMNS: usize = 4;
 const SHARED: usize = 2;
 
 /// The statistics of every driver, then the differences of every other driver from `with`. `None` if nothing varies
-/// because every stratum has a single cluster.
+/// because there is a single cluster.
 fn bootstrap(strata: &[Stratum<'_>], others: &[usize], with: usize, seed: RootSeed) -> Option<Vec<Interval>> {
     let drivers = strata[0][0][0].len();
     let columns = SHARED + COLUMNS * drivers;
