@@ -18,7 +18,7 @@ use experiment::{drive, drivers};
 use policy::checkpoint::Checkpoint;
 use policy::dagger::{Collected, Rollouts, RoundEpisode};
 use policy::dataset::store::Store;
-use policy::dataset::{Dataset, Sample, Split, ValidationSplit};
+use policy::dataset::{Dataset, Sample, ValidationSplit};
 use policy::decision_rule::Evidence;
 use serde::{Deserialize, Serialize};
 use sim::episode::Episode;
@@ -105,16 +105,12 @@ impl Trained {
     fn open(folder: &Path, by: ValidationSplit) -> anyhow::Result<Self> {
         let store = Store::open(folder)?;
         let mut dataset = Dataset::default();
-        let mut held_back = Vec::new();
-        let mut known = 0;
-        while store.is_finished(&store.round_folder(held_back.len() as u32))? {
-            dataset.push(store.read_samples(held_back.len() as u32)?.into());
-            // What is held back of a round does not depend on the rounds after it.
-            let Split { mut validation, .. } = dataset.split(by);
-            let of_round = validation.split_off(known);
-            known += of_round.len();
-            held_back.push(of_round);
+        let mut rounds = 0;
+        while store.is_finished(&store.round_folder(rounds))? {
+            dataset.push(store.read_samples(rounds)?.into());
+            rounds += 1;
         }
+        let held_back = dataset.split_by_round(by).into_iter().map(|split| split.validation).collect();
         Ok(Self { store, held_back })
     }
 

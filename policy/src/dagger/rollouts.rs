@@ -56,7 +56,7 @@ pub struct Collected {
     pub tau_hat_sum: f64,
     /// What it cost.
     pub effort: Effort,
-    /// How network and expert agree; `None` in behaviour cloning.
+    /// How network and expert agree; `None` in behaviour cloning and [on policy](Rollouts::on_policy).
     pub agreement: Option<Agreement>,
     /// Executed actions in seconds.
     pub driven_s: f64,
@@ -157,8 +157,10 @@ impl Rollouts {
         let GatedCollector { seats, n_tot, n_net, tau_hat_sum, interventions, geometry, .. } = collector;
         let (tau_hats, labels): (Vec<f32>, Vec<[f32; 2]>) =
             seats.iter().flat_map(|seat| seat.answers.iter().copied()).unzip();
+        let tau = rule.tau().unwrap_or(PAPER_TAU);
+        // Where the network always drives, nobody asks how often the two agree.
         let agreement =
-            Agreement::new(rule.tau().unwrap_or(PAPER_TAU), &tau_hats, &labels, &geometry, bumper_to_patch_m);
+            if tau.is_finite() { Agreement::new(tau, &tau_hats, &labels, &geometry, bumper_to_patch_m) } else { None };
         let expert_ticks = n_tot - n_net;
         let effort = Effort {
             // Behaviour cloning labels everything.

@@ -351,6 +351,7 @@ fn the_network_drives_the_same_whoever_seats_it() {
         (collected.n_tot, driven.len()),
         "every tick is labelled"
     );
+    assert_eq!(collected.agreement, None, "at no τ");
     let plain = Checkpoint { inference: InferenceSettings { smoothing_ticks: 0.0, ..inference }, ..checkpoint };
     assert_ne!(drive(&mut NetFleet::new(&plain)).0, in_fleet, "smoothing matters");
 }

@@ -64,20 +64,37 @@ impl Dataset {
 
     /// Splits by blocks that never cross a round: a further round leaves the split of the earlier ones as it is.
     pub fn split(&self, by: ValidationSplit) -> Split {
-        let mut split = Split::default();
-        let mut blocks = 0;
+        let (mut split, mut blocks) = (Split::default(), 0);
         for round in &self.rounds {
-            for (index, &sample) in round.samples.iter().enumerate() {
-                blocks += usize::from(index % by.block.max(1) == 0);
-                if by.every > 0 && blocks % by.every == 0 {
-                    split.validation.push(sample);
-                } else {
-                    split.training.push(sample);
-                    split.training.extend(round.augmentations_of(index).iter().map(|&grid| Sample { grid, ..sample }));
-                }
-            }
+            split.add(round, by, &mut blocks);
         }
         split
+    }
+
+    /// The same, round by round.
+    pub fn split_by_round(&self, by: ValidationSplit) -> Vec<Split> {
+        let mut blocks = 0;
+        let split = |round| {
+            let mut split = Split::default();
+            split.add(round, by, &mut blocks);
+            split
+        };
+        self.rounds.iter().map(split).collect()
+    }
+}
+
+impl Split {
+    /// Adds a round, after `blocks` blocks of the rounds before it.
+    fn add(&mut self, round: &Round, by: ValidationSplit, blocks: &mut usize) {
+        for (index, &sample) in round.samples.iter().enumerate() {
+            *blocks += usize::from(index % by.block.max(1) == 0);
+            if by.every > 0 && blocks.is_multiple_of(by.every) {
+                self.validation.push(sample);
+            } else {
+                self.training.push(sample);
+                self.training.extend(round.augmentations_of(index).iter().map(|&grid| Sample { grid, ..sample }));
+            }
+        }
     }
 }
 
@@ -101,6 +118,10 @@ mod tests {
         assert_eq!(after.training[..103], before.training[..]);
         assert_eq!(after.validation[..20], before.validation[..]);
         assert_eq!(after.training.len() + after.validation.len(), dataset.len());
+        let by_round = dataset.split_by_round(by);
+        assert_eq!(by_round[0].validation, before.validation);
+        assert_eq!(by_round[1].validation, after.validation[20..]);
+        assert_eq!(by_round[1].training, after.training[103..]);
     }
 
     #[test]

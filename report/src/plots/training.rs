@@ -24,7 +24,7 @@ pub fn learning(rounds: &[LearningCurve]) -> String {
     style::stacked("Learning curves", panels.len(), PANEL_PX, |areas| {
         for (series, (area, (title, y_label, x_label, curves))) in areas.iter().zip(&panels).enumerate() {
             panel(title, [x_label, y_label], steps, curves)
-                .draw(area, |chart| draw_rounds(chart, rounds, curves, series))?;
+                .draw(area, |chart| draw_rounds(chart, rounds, curves, steps, series))?;
         }
         Ok(())
     })
@@ -49,6 +49,7 @@ fn draw_rounds(
     chart: &mut style::Chart<'_, '_>,
     rounds: &[LearningCurve],
     curves: &[Vec<(u32, f64)>],
+    steps_of_all: u32,
     series: usize,
 ) -> style::Drawn {
     let (low, high) = range(curves);
@@ -66,8 +67,7 @@ fn draw_rounds(
         first += steps(round);
         if rounds.len() > 1 {
             // Where a round ends its curve is low.
-            let all: u32 = rounds.iter().map(steps).sum();
-            let at = (f64::from(first) - 0.012 * f64::from(all), high);
+            let at = (f64::from(first) - 0.012 * f64::from(steps_of_all), high);
             style::label(chart, &round.name, at, style::INK, Pos::new(HPos::Right, VPos::Top))?;
         }
     }
