@@ -6,7 +6,7 @@ use crate::conditions::Conditions;
 use crate::dagger::learned::critic_folder;
 use crate::dataset::ValidationSplit;
 use crate::dataset::store::Store;
-use crate::decision_rule::DecisionRule;
+use crate::decision_rule::{DecisionRule, PAPER_TAU};
 use crate::drivers::{NetFleet, NetPolicy};
 use crate::fit::{Budget, FitReport, FitSettings};
 use crate::network::{ConvLayer, InferenceSettings, NetworkArchitecture, Weights};
@@ -443,7 +443,11 @@ fn every_rule_of_the_family_trains_and_its_round_is_driven_again_as_it_was() {
         let effort = about.effort.unwrap();
         assert_eq!(effort.expert_ticks, about.ticks - about.novice_ticks, "{name}");
         assert!(effort.interventions <= effort.expert_ticks && effort.queries <= about.ticks, "{name}: {effort:?}");
-        assert!(about.agreement.unwrap().within_tau <= 1.0);
+        let agreement = about.agreement.unwrap();
+        assert_eq!(agreement.tau, f64::from(rule.tau().unwrap_or(PAPER_TAU)), "{name}");
+        // A quarter of the ticks is at or below the first of the quantiles.
+        let [first_quarter, ..] = agreement.tau_hat_quantiles;
+        assert_eq!(agreement.within_tau >= 0.25, first_quarter < agreement.tau, "{name}: {agreement:?}");
         let parts = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
         let is_of_round = |part: &PathBuf| part.file_name().unwrap().to_string_lossy().starts_with("round-01");
         let mut trained: Vec<u32> =
@@ -460,7 +464,11 @@ fn every_rule_of_the_family_trains_and_its_round_is_driven_again_as_it_was() {
         let novice = Learned::of_round(&settings, &store, 1).unwrap();
         let again =
             Rollouts::of_round(&settings, RootSeed(6), Some(&novice), of_round(1, 2)).drive(&mut |_, _| {}).unwrap();
-        assert_eq!((again.n_net, again.effort), (about.novice_ticks, effort), "{name}");
+        assert_eq!(
+            (again.n_net, again.effort, again.agreement),
+            (about.novice_ticks, effort, Some(agreement)),
+            "{name}"
+        );
         std::fs::remove_dir_all(folder).unwrap();
     }
 }
