@@ -20,7 +20,7 @@ use crate::solver::route::{self, Finish, NoRoute};
 use frame::Frame;
 use ground::Ground;
 use serde::Deserialize;
-use sim::distance_field::DistanceField;
+use sim::distance_field::{DistanceField, NODE_M};
 use sim::geometry::{Pose, Vec2};
 use sim::limits::{
     ISLANDS_MAX, LOT_BYTES_MAX, MAP_COORDINATE_MAX_M, MAP_PIXEL_M, MAP_SCALE, OUTLINE_CORNERS_MAX, ROUTE_MAX_M,
@@ -44,6 +44,9 @@ const WALL_HEIGHT_M: f32 = 2.0;
 const PAINT_M: f32 = 0.01;
 /// Smallest island, m² in the lot: a little more than [`validate`] asks for. Smaller specks are made as large.
 const ISLAND_MIN_M2: f64 = 0.0105;
+/// Things that are thinner than the spacing of [`DistanceField`]'s nodes, which may miss them, are made this thick, metres in
+/// the lot: a little more than it, for outlines are rounded to whole millimetres.
+const THICKNESS_M: f64 = 0.102;
 /// How far simplification may move an outline, metres in the lot: less than the clearance that routes keep.
 const SIMPLIFIED_M: f64 = 0.2;
 
@@ -354,6 +357,13 @@ impl MapLot {
         let up_to_m2 = self.drop_specks_m2;
         notes.extend((dropped > 0).then_some(Note::Dropped { specks: dropped, up_to_m2 }));
         notes.extend((padded > 0).then_some(Note::Padded { specks: padded }));
+        let (region, thickened) = if (pixel_m as f32) < NODE_M {
+            // Slanted outlines may lose half a pixel when they are simplified: steps of one, cut on both sides by three quarters.
+            region.with_thick_walls(pixel, (THICKNESS_M / pixel_m + 0.5).ceil() as usize)
+        } else {
+            (region, 0)
+        };
+        notes.extend((thickened > 0).then_some(Note::Thickened { pixels: thickened }));
         drivable_pixel(place, seed, &region)?;
         let rings = region.outlines();
         let in_lot = |point: [f64; 2]| {

@@ -29,6 +29,11 @@ pub enum Note {
         /// How many.
         specks: usize,
     },
+    /// Things thinner than the sensor is sure to see were made thicker.
+    Thickened {
+        /// By how many pixels in all.
+        pixels: usize,
+    },
     /// Occupied specks were taken for free ground, because the lot asks for it.
     Dropped {
         /// How many.
@@ -76,6 +81,11 @@ impl std::fmt::Display for Note {
                 f,
                 "{} of occupied pixels, too small for an island, made 10 cm large; drop_specks_m2 leaves out such specks",
                 are(*specks, "speck", "specks")
+            ),
+            Self::Thickened { pixels } => write!(
+                f,
+                "what is thinner than 10 cm made thicker, by {} in all: the sensor would see it only in part",
+                are(*pixels, "pixel", "pixels")
             ),
             Self::Dropped { specks, up_to_m2 } => write!(
                 f,

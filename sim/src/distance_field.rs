@@ -1,7 +1,8 @@
 //! The drivable space as a raster of exact signed distances.
 //!
 //! Node values are distances to the exact polygons; between nodes they are interpolated bilinearly. That is exact
-//! beside straight edges, within 3 cm beside corners, and up to 5 cm too small half-way between two things.
+//! beside straight edges, within 3 cm beside corners, up to 5 cm too small half-way between two things, and up to 5 cm too large
+//! within things thinner than 0.1 m: one of less may lie between two rows of nodes, and nothing shows that it is there.
 
 use crate::geometry::{Vec2, bounds, edges};
 use crate::maths;

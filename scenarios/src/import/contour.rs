@@ -118,6 +118,54 @@ impl Mask {
     fn specks(&self, counts: impl Fn(f64) -> bool) -> Vec<Ring> {
         let is_speck = |ring: &Ring| {
             let area_px2 = signed_area_px2(ring);
+    /// A region with what is thinner made as many pixels thick, and how many pixels that took; the region is what is still
+    /// joined to the seed. Bumps of something thick, which reach no farther out of it than that, stay as they are.
+    pub(super) fn with_thick_walls(self, seed: [i32; 2], thickness_px: usize) -> (Self, usize) {
+        let is_thin = self.thin_pixels(thickness_px);
+        if !is_thin.contains(&true) {
+            return (self, 0);
+        }
+        let mut thick = self.clone();
+        let (cols, rows) = (self.cols, self.is_free.len() / self.cols);
+        let lines = (0..rows).map(|row| (row * cols, 1, cols)).chain((0..cols).map(|col| (col, cols, rows)));
+        for (first, apart, pixels) in lines {
+            let index = |pixel: usize| first + pixel * apart;
+            let mut last_free = None;
+            for free in (0..pixels).filter(|&pixel| self.is_free[index(pixel)]) {
+                // Blocked pixels between two free ones.
+                let Some(last_free) = last_free.replace(free) else { continue };
+                let missing = thickness_px.saturating_sub(free - last_free - 1);
+                if missing > 0 && (last_free + 1..free).any(|pixel| is_thin[index(pixel)]) {
+                    let before = (last_free + 1).saturating_sub(missing / 2);
+                    let end = (free + missing.div_ceil(2)).min(pixels);
+                    (before..end).for_each(|pixel| thick.is_free[index(pixel)] = false);
+                }
+            }
+        }
+        let free = |mask: &Self| mask.is_free.iter().filter(|&&is_free| is_free).count();
+        let added = free(&self) - free(&thick);
+        (thick.region_of(seed), added)
+    }
+
+    /// The blocked pixels that belong to nothing thick: a square of as many pixels a side has no room in what is blocked
+    /// around them, nor as near as that.
+    fn thin_pixels(&self, thickness_px: usize) -> Vec<bool> {
+        // With what lies around the map, which is blocked. Squares are at their upper right pixel.
+        let (before, around) = (thickness_px, 3 * thickness_px - 1);
+        let cols = self.cols + around;
+        let mut values = vec![false; cols * (self.is_free.len() / self.cols + around)];
+        for (row, of_map) in values.chunks_exact_mut(cols).skip(before).zip(self.is_free.chunks_exact(self.cols)) {
+            row[before..before + self.cols].copy_from_slice(of_map);
+        }
+        spread(&mut values, cols, thickness_px);
+        for holds_free in &mut values {
+            *holds_free = !*holds_free;
+        }
+        spread(&mut values, cols, 3 * thickness_px);
+        let is_near = |index: usize| values[(index / self.cols + around) * cols + index % self.cols + around];
+        self.is_free.iter().enumerate().map(|(index, is_free)| !is_free && !is_near(index)).collect()
+    }
+
             area_px2 < 0.0 && counts(-area_px2)
         };
         self.outlines().into_iter().filter(is_speck).collect()
@@ -204,6 +252,19 @@ impl Mask {
 fn box_around(ring: &Ring) -> ((i32, i32), (i32, i32)) {
     let side = |axis: usize| {
         let along = ring.iter().map(|corner| corner[axis]);
+/// Sets every value of a raster that has one which is set in the square of so many pixels a side below and to the left of it.
+fn spread(values: &mut [bool], cols: usize, side_px: usize) {
+    let mut rows_since = vec![side_px; cols];
+    for row in values.chunks_exact_mut(cols) {
+        let mut cols_since = side_px;
+        for (value, rows_since) in row.iter_mut().zip(&mut rows_since) {
+            cols_since = if *value { 0 } else { cols_since + 1 };
+            *rows_since = if cols_since < side_px { 0 } else { *rows_since + 1 };
+            *value = *rows_since < side_px;
+        }
+    }
+}
+
         let low = along.clone().fold(f64::INFINITY, f64::min).floor() as i32;
         (low, along.fold(f64::NEG_INFINITY, f64::max).ceil() as i32)
     };
@@ -352,6 +413,69 @@ mod tests {
         assert_eq!(rings[0].len(), 26, "12 steps of two corners, and two more");
         let line = simplified(&rings[0], TOLERANCES_PX[0]);
         assert!(line.len() <= 5, "{line:?}");
+    /// A line of one pixel, a block with a bump, a wall of three pixels; and a fin, which is thick but for its root.
+    #[test]
+    fn thin_walls_become_thick_and_what_is_thick_stays() {
+        // With free ground around what is drawn.
+        let framed = |rows: &[&str]| {
+            let margin = ".".repeat(rows[0].len());
+            let rows: Vec<String> = [&[&margin[..]; 4], rows, &[&margin[..]; 4]]
+                .concat()
+                .iter()
+                .map(|row| format!("....{row}...."))
+                .collect();
+            mask(&rows.iter().map(String::as_str).collect::<Vec<_>>())
+        };
+        let drawn = framed(&[
+            "...............###",
+            ".#......####...###",
+            ".#......####...###",
+            ".#.....#####...###",
+            ".#......####...###",
+            "...............###",
+        ]);
+        let expected = framed(&[
+            "...............###",
+            "###.....####...###",
+            "###.....####...###",
+            "###....#####...###",
+            "###.....####...###",
+            "...............###",
+        ]);
+        let (thick, added) = drawn.with_thick_walls([0, 0], 3);
+        assert_eq!((thick.is_free, added), (expected.is_free, 8));
+        let (thick, added) = framed(&["####.......", "###########", "####......."]).with_thick_walls([0, 0], 3);
+        let expected = framed(&["####...####", "###########", "####...####"]);
+        assert_eq!((thick.is_free, added), (expected.is_free, 8));
+    }
+
+    /// By every square of pixels, one after the other.
+    #[test]
+    fn thin_pixels_are_those_that_no_blocked_square_is_near() {
+        let (cols, rows) = (23, 17);
+        for seed in 1..40_u64 {
+            let noise = |pixel: i32| (pixel as u64 + 7).wrapping_mul(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)) >> 40;
+            // Patches of four pixels, and what is missing in them.
+            let is_free = |pixel: i32| {
+                let patch = pixel / cols / 4 * cols + pixel % cols / 4;
+                noise(patch) % 5 < 3 || noise(1000 + pixel) % 9 == 0
+            };
+            let drawn = Mask { cols: cols as usize, is_free: (0..cols * rows).map(is_free).collect() };
+            for side_px in [2, 3, 5] {
+                let thin = drawn.thin_pixels(side_px as usize);
+                for pixel in 0..cols * rows {
+                    let [x, y] = [pixel % cols, pixel / cols];
+                    let is_blocked = |[left, low]: [i32; 2]| {
+                        (low..low + side_px).all(|y| (left..left + side_px).all(|x| !drawn.at([x, y])))
+                    };
+                    let near = |at: i32| at - 2 * side_px + 1..=at + side_px;
+                    let has_square = near(y).any(|low| near(x).any(|left| is_blocked([left, low])));
+                    assert_eq!(thin[pixel as usize], !drawn.at([x, y]) && !has_square, "{seed}, {side_px}: {x}, {y}");
+                }
+            }
+        }
+    }
+
         let rectangle = mask(&["...", "..."]).outlines().remove(0);
         assert_eq!(simplified(&rectangle, TOLERANCES_PX[0]), rectangle);
     }

@@ -2,7 +2,11 @@
 
 use super::*;
 use crate::load::{check_direction, load, load_with_notes};
-use sim::scenario::Direction;
+use sim::scenario::{Direction, NoiseLevel};
+use sim::seed::RootSeed;
+use sim::sensing::noise::NoiseSettings;
+use sim::sensing::{SensingSettings, Sensor};
+use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 
 fn car() -> VehicleSettings {
@@ -434,6 +438,58 @@ fn a_speck_beside_a_wall_grows_into_it() {
     let (map, ..) = ros::Map::read(&lot.map, false).unwrap();
     let (seed, mut notes) = ([8.0, 2.6], Vec::new());
     let ground = lot.ros_ground(&map, Frame::around(seed, 0.2), seed, None, &car(), &mut notes).unwrap();
+/// Kerbs of one pixel lay between two rows of the sensor's distances at half of the places that they could have: no cell showed
+/// them, and they were driven over.
+#[test]
+fn a_thin_kerb_is_seen_in_every_cell_that_it_crosses() {
+    // At 5 cm per pixel, on ground of 20 m × 12 m.
+    let kerbs: [fn(usize, usize) -> bool; 5] = [
+        |x, _| x == 250,
+        |x, y| x == 230 + y / 7,
+        |x, y| x == 160 + y,
+        |x, y| x == 160 + 3 * y / 2,
+        |x, y| y == 121 && (150..380).contains(&x),
+    ];
+    for (kerb, is_drawn) in kerbs.into_iter().enumerate() {
+        for offset in 0..4 {
+            let is_kerb =
+                |x: usize, y: usize| (40..200).contains(&y) && x >= offset && is_drawn(x - offset, y + offset);
+            let is_occupied = |x, y| !(1..399).contains(&x) || !(1..239).contains(&y) || is_kerb(x, y);
+            let row = |y| (0..400).map(|x| if is_occupied(x, y) { '#' } else { '.' }).collect();
+            let rows: Vec<String> = (0..240).rev().map(row).collect();
+            let folder = folder("thin", &[("map.yaml", &yaml("0.05", "[0.012, 0, 0]")), ("map.pgm", &pgm(&rows))]);
+            let lot = MapLot { wall_height_m: 0.15, ..MapLot::of_map(&folder.join("map.yaml")) };
+            let (map, ..) = ros::Map::read(&lot.map, false).unwrap();
+            let (seed, mut notes) = ([3.0, 1.0], Vec::new());
+            let ground = lot.ros_ground(&map, Frame::around(seed, 1.0), seed, None, &car(), &mut notes).unwrap();
+            assert!(matches!(notes[..], [.., Note::Thickened { pixels: 100.. }]), "{notes:?}");
+
+            let reference_path = ReferencePath { points: vertices(&[(3.0, 1.0), (17.0, 1.0)]), corner_radius_m: 0.0 };
+            let built = Map::build(Scenario { reference_path, ..lot.outlines(&ground) }, &car()).unwrap();
+            let (settings, pose) = (SensingSettings::paper(), Pose::new(Vec2::new(2.0, 6.0), 0.0));
+            let geometry = settings.geometry;
+            let sensor = Sensor::new(&built, settings, &NoiseSettings::of(NoiseLevel::Clean), RootSeed(0));
+            let grid = sensor.clean_view(&built, pose).to_grid();
+            let mut crossed = BTreeMap::new();
+            for (x, y) in (40..200).flat_map(|y| (0..400).map(move |x| (x, y))).filter(|&(x, y)| is_kerb(x, y)) {
+                let [x_m, y_m] = map.point_at([x, y].map(|pixel| pixel as f64 + 0.5)).map(|metres| metres as f32);
+                let in_ego = Vec2::new(x_m, y_m) - pose.position();
+                if geometry.contains(in_ego) {
+                    let row = ((geometry.far_edge_ahead_m() - in_ego.x) / geometry.cell_m()) as usize;
+                    let col = ((0.5 * geometry.side_m - in_ego.y) / geometry.cell_m()) as usize;
+                    *crossed.entry((row, col)).or_insert(0) += 1;
+                }
+            }
+            // Of the corner of a cell, and the end of a kerb, less is there than a pixel of the sensor.
+            crossed.retain(|_, pixels| *pixels > 2);
+            assert!(crossed.len() > 9, "kerb {kerb} crosses {crossed:?}");
+            for (row, col) in crossed.into_keys() {
+                assert!(grid.is_occupied(row, col), "kerb {kerb}, {offset} pixels on: cell {row}, {col} is free");
+            }
+        }
+    }
+}
+
     assert_eq!(notes, [Note::Padded { specks: 1 }]);
     assert!(ground.islands.is_empty() && ground.boundary.len() > 4, "{:?}", ground.boundary);
 }
