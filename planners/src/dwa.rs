@@ -152,10 +152,15 @@ impl Method for Params {
                 Candidate { curvature_per_m, speeds }
             })
             .collect();
+        // As far as any speed can be braked away, too: what is met there makes it inadmissible.
+        let reach_m = arcs
+            .iter()
+            .flat_map(|arc| &arc.speeds)
+            .fold(self.distance_max_m, |reach_m, rated| reach_m.max(rated.stop_m));
         DynamicWindow {
             params: self.clone(),
             context: Arc::new(context.clone()),
-            contact_m: Arc::new(contacts(context, &arcs, self.margin_m, self.distance_max_m)),
+            contact_m: Arc::new(contacts(context, &arcs, self.margin_m, reach_m)),
             arcs: Arc::new(arcs),
             wheel: WheelEstimate::new(context),
         }
@@ -194,15 +199,15 @@ pub struct DynamicWindow {
     params: Params,
     context: Arc<PlannerContext>,
     arcs: Arc<Vec<Candidate>>,
-    /// Travel until the body meets a cell (row-major), by arc, metres; at most the largest distance that counts.
+    /// Travel until the body meets a cell (row-major), by arc, metres; infinite where that is farther than matters.
     contact_m: Arc<Vec<[f32; 2 * SIDE + 1]>>,
     wheel: WheelEstimate,
 }
 
 impl DynamicWindow {
-    /// dist: free travel along each arc, metres.
+    /// dist: free travel along each arc, metres; infinite where nothing is met.
     fn free_m(&self, grid: &OccupancyGrid) -> [f32; 2 * SIDE + 1] {
-        let mut free_m = [self.params.distance_max_m; 2 * SIDE + 1];
+        let mut free_m = [f32::INFINITY; 2 * SIDE + 1];
         for row in 0..GRID_CELLS {
             let mut cells = grid.row(row);
             while cells != 0 {
@@ -219,7 +224,8 @@ impl DynamicWindow {
         if free_m <= rated.stop_m {
             return free_m - 1e3;
         }
-        rated.score + self.params.distance_weight * free_m / self.params.distance_max_m
+        let distance_max_m = self.params.distance_max_m;
+        rated.score + self.params.distance_weight * free_m.min(distance_max_m) / distance_max_m
     }
 
     /// The best speed of an arc, m/s, and its G.
@@ -258,20 +264,15 @@ impl Policy for DynamicWindow {
     }
 }
 
-/// Travel until the body, widened by a margin, meets the centre of each cell, by arc. The right arcs are the mirror image
-/// of the left ones, to the bit.
-fn contacts(
-    context: &PlannerContext,
-    arcs: &[Candidate],
-    margin_m: f32,
-    distance_max_m: f32,
-) -> Vec<[f32; 2 * SIDE + 1]> {
+/// Travel until the body, widened by a margin, meets the centre of each cell, by arc; infinite beyond `reach_m`. The right
+/// arcs are the mirror image of the left ones, to the bit.
+fn contacts(context: &PlannerContext, arcs: &[Candidate], margin_m: f32, reach_m: f32) -> Vec<[f32; 2 * SIDE + 1]> {
     let (front_m, rear_m) = (context.vehicle.front_m() + margin_m, context.vehicle.rear_overhang_m + margin_m);
     let side_m = 0.5 * context.vehicle.width_m + margin_m;
-    let mut contact_m = vec![[distance_max_m; 2 * SIDE + 1]; GRID_CELLS * GRID_CELLS];
+    let mut contact_m = vec![[f32::INFINITY; 2 * SIDE + 1]; GRID_CELLS * GRID_CELLS];
     for k in SIDE..=2 * SIDE {
         // From far to near, so that the first contact is written last.
-        for step in (0..=(distance_max_m / STEP_M) as u32).rev() {
+        for step in (0..=(reach_m / STEP_M) as u32).rev() {
             let travel_m = step as f32 * STEP_M;
             let world_from_body =
                 Pose::default().advanced_along_arc(arcs[k].curvature_per_m, travel_m).world_from_ego();
@@ -309,11 +310,31 @@ mod tests {
     fn distance_is_the_free_travel_of_the_body() {
         let planner = planner();
         let straight = |cells: &[(usize, usize)]| planner.free_m(&grid_with(cells))[SIDE];
-        assert_eq!(straight(&[]), 8.0);
+        assert_eq!(straight(&[]), f32::INFINITY);
         assert!((straight(&[(20, 12)]) - 2.6).abs() < 1e-4);
         assert!((straight(&[(20, 10)]) - 2.6).abs() < 1e-4);
-        assert_eq!(straight(&[(20, 9)]), 8.0);
+        assert_eq!(straight(&[(20, 9)]), f32::INFINITY);
         assert!((straight(&[(10, 12), (20, 12)]) - 2.6).abs() < 1e-4);
+    }
+
+    /// It took the end of what it rates for an obstacle: with 1 m, and 1.21 m to stop, no arc of an empty hall was admissible,
+    /// and it drove at full lock, or as slowly as it can. What is met beyond that end still makes a speed inadmissible.
+    #[test]
+    fn where_nothing_is_met_it_drives_straight_and_fast_however_short_the_distances_that_count() {
+        let free = Observation { grid: OccupancyGrid::free() };
+        for params in [Params::paper(), Params::fox()] {
+            let act = |distance_max_m: f32| {
+                let mut planner = Params { distance_max_m, ..params.clone() }.planner(&context());
+                // For longer than the wheels need to any angle.
+                (0..60).map(|_| planner.act(&free)).last().unwrap()
+            };
+            assert_eq!(act(1.0).look_ahead.left_m, 0.0, "{:?}", params.speeds);
+            assert_eq!(act(1.0), act(8.0), "{:?}", params.speeds);
+        }
+        let near_sighted = Params { distance_max_m: 0.5, ..Params::paper() }.planner(&context());
+        let free_m = near_sighted.free_m(&grid_with(&[(23, 12)]))[SIDE];
+        assert!((free_m - 1.1).abs() < 1e-4, "{free_m}");
+        assert!(near_sighted.best_speed(SIDE, free_m).1 < -900.0, "it takes 1.21 m to stop");
     }
 
     /// At k = 0: 2.2 m/s, heading 1, so G = .33 + .67·dist/8 + .0001, and it takes 1.21 m to stop. At full lock: 0.5 m/s,
