@@ -114,10 +114,6 @@ impl Mask {
         }
     }
 
-    /// Outlines of what a region encloses, of areas that count, square pixels.
-    fn specks(&self, counts: impl Fn(f64) -> bool) -> Vec<Ring> {
-        let is_speck = |ring: &Ring| {
-            let area_px2 = signed_area_px2(ring);
     /// A region with what is thinner made as many pixels thick, and how many pixels that took; the region is what is still
     /// joined to the seed. Bumps of something thick, which reach no farther out of it than that, stay as they are.
     pub(super) fn with_thick_walls(self, seed: [i32; 2], thickness_px: usize) -> (Self, usize) {
@@ -166,6 +162,10 @@ impl Mask {
         self.is_free.iter().enumerate().map(|(index, is_free)| !is_free && !is_near(index)).collect()
     }
 
+    /// Outlines of what a region encloses, of areas that count, square pixels.
+    fn specks(&self, counts: impl Fn(f64) -> bool) -> Vec<Ring> {
+        let is_speck = |ring: &Ring| {
+            let area_px2 = signed_area_px2(ring);
             area_px2 < 0.0 && counts(-area_px2)
         };
         self.outlines().into_iter().filter(is_speck).collect()
@@ -248,10 +248,6 @@ impl Mask {
     }
 }
 
-/// The columns and rows of pixels, ends excluded, of a box around a ring.
-fn box_around(ring: &Ring) -> ((i32, i32), (i32, i32)) {
-    let side = |axis: usize| {
-        let along = ring.iter().map(|corner| corner[axis]);
 /// Sets every value of a raster that has one which is set in the square of so many pixels a side below and to the left of it.
 fn spread(values: &mut [bool], cols: usize, side_px: usize) {
     let mut rows_since = vec![side_px; cols];
@@ -265,6 +261,10 @@ fn spread(values: &mut [bool], cols: usize, side_px: usize) {
     }
 }
 
+/// The columns and rows of pixels, ends excluded, of a box around a ring.
+fn box_around(ring: &Ring) -> ((i32, i32), (i32, i32)) {
+    let side = |axis: usize| {
+        let along = ring.iter().map(|corner| corner[axis]);
         let low = along.clone().fold(f64::INFINITY, f64::min).floor() as i32;
         (low, along.fold(f64::NEG_INFINITY, f64::max).ceil() as i32)
     };
@@ -402,17 +402,6 @@ mod tests {
         assert!((signed_area_px2(&rings[1]) + 3.0).abs() < 0.1, "{:?}", rings[1]);
     }
 
-    #[test]
-    fn a_staircase_becomes_a_line_and_a_rectangle_stays() {
-        let size = 12;
-        let rows: Vec<String> =
-            (0..size).map(|row| (0..size).map(|col| if col <= row { '.' } else { '#' }).collect()).collect();
-        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
-        let rings = mask(&rows).outlines();
-        assert_eq!(rings.len(), 1);
-        assert_eq!(rings[0].len(), 26, "12 steps of two corners, and two more");
-        let line = simplified(&rings[0], TOLERANCES_PX[0]);
-        assert!(line.len() <= 5, "{line:?}");
     /// A line of one pixel, a block with a bump, a wall of three pixels; and a fin, which is thick but for its root.
     #[test]
     fn thin_walls_become_thick_and_what_is_thick_stays() {
@@ -476,6 +465,17 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_staircase_becomes_a_line_and_a_rectangle_stays() {
+        let size = 12;
+        let rows: Vec<String> =
+            (0..size).map(|row| (0..size).map(|col| if col <= row { '.' } else { '#' }).collect()).collect();
+        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+        let rings = mask(&rows).outlines();
+        assert_eq!(rings.len(), 1);
+        assert_eq!(rings[0].len(), 26, "12 steps of two corners, and two more");
+        let line = simplified(&rings[0], TOLERANCES_PX[0]);
+        assert!(line.len() <= 5, "{line:?}");
         let rectangle = mask(&["...", "..."]).outlines().remove(0);
         assert_eq!(simplified(&rectangle, TOLERANCES_PX[0]), rectangle);
     }

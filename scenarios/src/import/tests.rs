@@ -430,14 +430,6 @@ fn a_speck_becomes_the_smallest_island_or_is_left_out_as_asked() {
     assert_eq!(areas(&loaded.scenario).len(), 1, "what is larger stays");
 }
 
-/// A speck in the corner between wall and lane becomes part of the wall, not an island across the boundary.
-#[test]
-fn a_speck_beside_a_wall_grows_into_it() {
-    // At 2 cm per pixel it grows by two pixels to either side.
-    let lot = MapLot { scale: 0.2, ..fine_lane("speck-at-wall", |x, y| (x, y) == (300, 2)) };
-    let (map, ..) = ros::Map::read(&lot.map, false).unwrap();
-    let (seed, mut notes) = ([8.0, 2.6], Vec::new());
-    let ground = lot.ros_ground(&map, Frame::around(seed, 0.2), seed, None, &car(), &mut notes).unwrap();
 /// Kerbs of one pixel lay between two rows of the sensor's distances at half of the places that they could have: no cell showed
 /// them, and they were driven over.
 #[test]
@@ -490,6 +482,14 @@ fn a_thin_kerb_is_seen_in_every_cell_that_it_crosses() {
     }
 }
 
+/// A speck in the corner between wall and lane becomes part of the wall, not an island across the boundary.
+#[test]
+fn a_speck_beside_a_wall_grows_into_it() {
+    // At 2 cm per pixel it grows by two pixels to either side.
+    let lot = MapLot { scale: 0.2, ..fine_lane("speck-at-wall", |x, y| (x, y) == (300, 2)) };
+    let (map, ..) = ros::Map::read(&lot.map, false).unwrap();
+    let (seed, mut notes) = ([8.0, 2.6], Vec::new());
+    let ground = lot.ros_ground(&map, Frame::around(seed, 0.2), seed, None, &car(), &mut notes).unwrap();
     assert_eq!(notes, [Note::Padded { specks: 1 }]);
     assert!(ground.islands.is_empty() && ground.boundary.len() > 4, "{:?}", ground.boundary);
 }
