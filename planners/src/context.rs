@@ -7,6 +7,7 @@ use sim::geometry::{Pose, Vec2};
 use sim::maths;
 use sim::sensing::GridGeometry;
 use sim::vehicle::VehicleSettings;
+use std::f32::consts::FRAC_PI_2;
 
 /// The car a planner is installed in: what it may know besides the grid.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,7 +58,10 @@ impl PlannerContext {
     pub(crate) fn steer_along(&self, curvature_per_m: f32) -> Decision {
         head_for(match self.controller.pursuit {
             // The circle through the point is the arc, wherever on it the point lies.
-            PursuitLaw::Paper => Pose::default().advanced_along_arc(curvature_per_m, POINT_ON_ARC_M).position(),
+            PursuitLaw::Paper => {
+                let travel_m = POINT_ON_ARC_M.min(FRAC_PI_2 / curvature_per_m.abs());
+                Pose::default().advanced_along_arc(curvature_per_m, travel_m).position()
+            }
             // tan δ (0.75 L_f + 0.3 cos η) = L sin η, solved for the bearing η from the bumper.
             PursuitLaw::AuthorsCode => {
                 let tan = self.vehicle.wheelbase_m * curvature_per_m;
@@ -76,8 +80,8 @@ impl PlannerContext {
     }
 }
 
-/// Travel along an arc at which it is answered with a point, metres: that is ahead of the axle at every curvature that a car
-/// can drive.
+/// Travel along an arc at which it is answered with a point, metres; a quarter of a circle where that is shorter, for no
+/// circle that is driven forwards reaches a point behind the axle. The paper's car drives none so tight.
 const POINT_ON_ARC_M: f32 = 6.0;
 /// The same for the authors' form of pursuit, from the front bumper, metres.
 const POINT_FROM_BUMPER_M: f32 = 3.0;
@@ -123,18 +127,26 @@ mod tests {
     use super::*;
     use crate::test_scenes::context;
 
+    /// The points of a short car's tighter arcs lay behind the axle, and it drove them at full lock.
     #[test]
     fn arcs_are_answered_with_points_that_pure_pursuit_drives_back() {
-        for pursuit in [PursuitLaw::Paper, PursuitLaw::AuthorsCode] {
-            let mut context = context();
-            context.controller.pursuit = pursuit;
-            let (vehicle, geometry) = (&context.vehicle, &context.geometry);
-            for curvature in [-0.25, -0.1, 0.0, 0.001, 0.03, 0.25] {
-                let decision = context.steer_along(curvature);
-                let steering_rad = controller::steering(pursuit, vehicle, geometry, decision.look_ahead);
-                assert!((context.curvature_per_m(steering_rad) - curvature).abs() < 1e-5, "{pursuit:?}: {curvature}");
-                assert!(decision.look_ahead.ahead_m > 3.0);
-                assert_eq!(decision.source, Source::Planner);
+        let paper = context();
+        let mut short = context();
+        (short.vehicle.wheelbase_m, short.vehicle.steering_max_rad) = (1.0, 1.0);
+        let cases: [(_, &[f32], f32); 2] =
+            [(paper, &[-0.25, -0.1, 0.0, 0.001, 0.03, 0.25], 3.0), (short, &[-0.6, 0.0, 0.3, 0.6, 0.9], 1.0)];
+        for (mut context, curvatures, ahead_min_m) in cases {
+            for pursuit in [PursuitLaw::Paper, PursuitLaw::AuthorsCode] {
+                context.controller.pursuit = pursuit;
+                let (vehicle, geometry) = (&context.vehicle, &context.geometry);
+                for &curvature in curvatures {
+                    let decision = context.steer_along(curvature);
+                    let steering_rad = controller::steering(pursuit, vehicle, geometry, decision.look_ahead);
+                    let driven = context.curvature_per_m(steering_rad);
+                    assert!((driven - curvature).abs() < 1e-5, "{pursuit:?}: {curvature}, driven {driven}");
+                    assert!(decision.look_ahead.ahead_m > ahead_min_m);
+                    assert_eq!(decision.source, Source::Planner);
+                }
             }
         }
         assert!((context().speed_mps(0.0) - 2.2).abs() < 1e-6 && (context().speed_mps(0.2507) - 0.5).abs() < 1e-3);
