@@ -29,6 +29,9 @@ const KNOT_S: f32 = 0.4;
 const CIRCLES: usize = 6;
 /// Speeds of the controller's law are tabulated at so many angles from 0 to full lock.
 const LAW_ANGLES: usize = 33;
+/// Largest product of pairs and horizon, seconds: draws and samples then take 1.6 MB each, as much as a map, and every car
+/// that drives has its own samples.
+const PAIR_SECONDS_MAX: f32 = 10_000.0;
 /// A clearance costs no more than one of minus this many scales.
 const SCALES_MAX: f32 = 3.0;
 
@@ -141,6 +144,7 @@ impl Method for Params {
     fn check(&self) -> Result<(), String> {
         within("pairs", self.pairs as f32, 1.0, 1e5)?;
         within("horizon_s", self.horizon_s, 0.2, 20.0)?;
+        within("pairs * horizon_s", self.pairs as f32 * self.horizon_s, 0.0, PAIR_SECONDS_MAX)?;
         within("temperature", self.temperature, 1e-3, 1e3)?;
         within("gamma", self.gamma, 0.0, 10.0)?;
         within("steering_std_rad", self.steering_std_rad, 1e-3, 1.0)?;
@@ -520,6 +524,16 @@ mod tests {
         assert!(((squared / 2000.0).sqrt() - 0.15).abs() < 0.01, "{}", (squared / 2000.0).sqrt());
         assert_ne!(draw_noise(&Params { seed: 2, ..params.clone() }, 28), noise);
         assert_eq!(draw_noise(&params, 28), noise);
+    }
+
+    /// Each within its range, they were let through, and the samples of a few cars filled the memory.
+    #[test]
+    fn pairs_and_horizon_that_fill_the_memory_together_are_refused() {
+        let check = |pairs, horizon_s| Params { pairs, horizon_s, ..Params::paper() }.check();
+        let refusal = check(100_000, 20.0).unwrap_err();
+        assert_eq!(refusal, "pairs * horizon_s = 2000000: choose 0 to 10000");
+        assert_eq!((check(500, 20.0), check(3571, 2.8)), (Ok(()), Ok(())), "seven times what nav2 rolls out");
+        assert!(check(501, 20.0).is_err());
     }
 
     #[test]
