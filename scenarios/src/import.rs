@@ -552,6 +552,9 @@ impl MapLot {
                 blocked(&format!("end of the loop, {} m behind its start", route::LOOP_GAP_M), end)
             }
             (NoRoute::StartBlocked, _) => blocked("start", start),
+            (NoRoute::Arrived, _) => {
+                self.fault("goal", "the car stands there at the start".to_owned(), "move it farther ahead")
+            }
             (NoRoute::Walled { at }, Finish::At(_)) => {
                 let problem = format!("the goal cannot be reached: a wall is in the way near {}", frame.said(at));
                 self.fault("route", problem, "open the map there, or put start and goal on the same side of it")

@@ -188,6 +188,14 @@ fn no_route_is_explained_with_its_place_and_a_remedy() {
     lot.start = Some([-8.0, 0.5, 0.0]);
     assert!(refusal(&lot).contains("the map spans x 0.00 to 60.00 and y 0.00 to 7.00"), "{}", refusal(&lot));
 
+    // Where the car stands already, and a metre behind it: the route of one point was called too short.
+    for x in [5.0, 4.0] {
+        let mut lot = lane("arrived", 5);
+        lot.goal = Some([x, 3.5, 0.0]);
+        let arrived = refusal(&lot);
+        assert!(arrived.ends_with("goal: the car stands there at the start; move it farther ahead"), "{arrived}");
+    }
+
     let mut lot = lane("no-loop", 5);
     // The loop would end 3 m behind the start: far enough from the wall for the car to stand there.
     lot.start = Some([12.0, 3.5, 0.0]);

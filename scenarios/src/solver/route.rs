@@ -44,6 +44,8 @@ pub enum NoRoute {
     StartBlocked,
     /// Nor at the goal.
     GoalBlocked,
+    /// The goal is reached at the start.
+    Arrived,
     /// No free ground joins start and goal; the way would break through here.
     Walled {
         /// Where.
@@ -105,6 +107,9 @@ pub fn find(
     let mut search = Search::new(&scene, &goal, &to_go, vehicle, clearance_m);
     if !search.is_free(start, 0.0) {
         return Err(NoRoute::StartBlocked);
+    }
+    if goal.is_reached(start) {
+        return Err(NoRoute::Arrived);
     }
     if let Some(solution) = search.run(start, EXPANSIONS_MAX) {
         return Ok(reference_path(&solution.waypoints, &goal));
