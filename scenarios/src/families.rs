@@ -101,6 +101,7 @@ mod tests {
     #[test]
     fn only_one_way_is_open() {
         for (family, draw) in DRAWS {
+            let mut looked_at = 0;
             for index in 0..10 {
                 let seed = Split::Test.seed(family, index);
                 let drawn = draw(&mut seed.rng(Stream::Layout, 0), &mut seed.rng(Stream::Obstacles, 0));
@@ -122,7 +123,9 @@ mod tests {
                     let cell = (at_its_end / CELL_M).round().as_ivec2().into();
                     assert!(!reached.contains(&cell), "{family:?} {index}: the way at {mouth:?} is open");
                 }
+                looked_at += 1;
             }
+            assert!(looked_at > 5, "{family:?}: only {looked_at} of 10 lots were drawn");
         }
     }
 
