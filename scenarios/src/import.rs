@@ -375,14 +375,17 @@ impl MapLot {
         let Some(outer) = outer.first() else {
             unreachable!("a region has an outline");
         };
-        let tolerances_px = contour::TOLERANCES_PX.map(|tolerance_px| tolerance_px.min(SIMPLIFIED_M / pixel_m));
+        let mut tolerances_px =
+            contour::TOLERANCES_PX.map(|tolerance_px| tolerance_px.min(SIMPLIFIED_M / pixel_m)).to_vec();
+        tolerances_px.dedup();
+        let closest = tolerances_px.len() - 1;
         let outline = |ring: &contour::Ring, step: usize| -> Vec<Vec2> {
             contour::simplified(ring, tolerances_px[step]).into_iter().map(in_lot).collect()
         };
         // An outline at fault is followed more closely; if an island's is exact already, so is the boundary.
         let mut steps = vec![0; inner.len()];
         let mut fault = None;
-        for step in 0..tolerances_px.len() {
+        for step in 0..=closest {
             let boundary = outline(outer, step);
             let ground = Ground { boundary, is_walled: true, islands: Vec::new(), obstacles: Vec::new() };
             let islands = validate_ground(&self.outlines(&ground), vehicle).and_then(|()| {
@@ -390,7 +393,8 @@ impl MapLot {
                 let mut islands = Vec::new();
                 for (i, (ring, step)) in inner.iter().zip(&mut steps).enumerate() {
                     let room = VERTICES_MAX.saturating_sub(vertices);
-                    let island = self.sound_island(i, room, &ground.boundary, step, |step| outline(ring, step))?;
+                    let island =
+                        self.sound_island(i, room, &ground.boundary, step, closest, |step| outline(ring, step))?;
                     vertices += island.len();
                     islands.push(island);
                     // The others need not be simplified any more: the lot is refused.
@@ -402,20 +406,23 @@ impl MapLot {
             });
             match islands {
                 Ok(islands) => return Ok(Ground { islands, ..ground }),
+                // A closer outline has no fewer vertices.
+                Err(error) if ground.boundary.len() > VERTICES_MAX => return Err(self.in_lot(error, frame)),
                 Err(error) => fault = Some(error),
             }
         }
         Err(self.in_lot(fault.expect("there is a tolerance"), frame))
     }
 
-    /// An island with an outline as simple as it can be. `step`: how closely it is followed, and has to be. One that has more
-    /// vertices than there is `room` for is not checked: the lot is refused.
+    /// An island with an outline as simple as it can be. `step`: how closely it is followed, and has to be, `closest` at last.
+    /// One that has more vertices than there is `room` for is not checked: the lot is refused.
     fn sound_island(
         &self,
         index: usize,
         room: usize,
         boundary: &[Vec2],
         step: &mut usize,
+        closest: usize,
         outline: impl Fn(usize) -> Vec<Vec2>,
     ) -> Result<Vec<Vec2>, ScenarioError> {
         loop {
@@ -425,7 +432,7 @@ impl MapLot {
             }
             match check_island(index, &island, boundary) {
                 Ok(()) => return Ok(island.polygon),
-                Err(error) if *step + 1 == contour::TOLERANCES_PX.len() => return Err(error),
+                Err(error) if *step == closest => return Err(error),
                 Err(_) => *step += 1,
             }
         }

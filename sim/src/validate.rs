@@ -20,6 +20,8 @@ const COINCIDENT_M: f32 = 1e-3;
 const PATH_MIN_M: f32 = 5.0;
 /// The route is tested in chords of about this length, metres: a chord of a 5 m corner strays by 6 mm.
 const CHORD_M: f32 = 0.5;
+/// The longest edge that fits into a lot, metres: its diagonal.
+const EDGE_MAX_M: f32 = std::f32::consts::SQRT_2 * LOT_EXTENT_MAX_M;
 /// Chords tested together against one bounding box.
 const CHORDS_PER_BLOCK: usize = 16;
 
@@ -31,6 +33,7 @@ pub fn validate(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), Sc
     check_name(&scenario.name)?;
     check_counts(scenario)?;
     check_near_origin(&scenario.boundary)?;
+    check_lengths(scenario)?;
     check_polygon(&scenario.boundary, Place::Boundary)?;
     check_extent(&scenario.boundary)?;
     if scenario.boundary_height_m != 0.0 {
@@ -40,7 +43,6 @@ pub fn validate(scenario: &Scenario, vehicle: &VehicleSettings) -> Result<(), Sc
     for (i, island) in scenario.islands.iter().enumerate() {
         check_island(i, island, &scenario.boundary)?;
     }
-    check_lengths(scenario)?;
     for (i, obstacle) in scenario.obstacles.iter().enumerate() {
         check_obstacle(Place::Obstacle(i), obstacle)?;
         check_near(Place::Obstacle(i), obstacle.centre().position(), lot)?;
@@ -216,10 +218,12 @@ fn check_extent(boundary: &[Vec2]) -> Result<(), ScenarioError> {
     Ok(())
 }
 
-/// A comb of few vertices may be thousands of kilometres long, and what is made of its walls takes gigabytes.
+/// A comb of few vertices may be thousands of kilometres long: to compare its edges takes seconds, and what is made of its
+/// walls gigabytes. Edges longer than a lot, or without a length, have errors of their own.
 fn check_lengths(Scenario { boundary, islands, .. }: &Scenario) -> Result<(), ScenarioError> {
     let outlines = std::iter::once(boundary).chain(islands.iter().map(|island| &island.polygon));
-    let length_m: f64 = outlines.flat_map(|outline| edges(outline)).map(|(a, b)| f64::from(a.distance(b))).sum();
+    let length_m: f64 =
+        outlines.flat_map(|outline| edges(outline)).map(|(a, b)| f64::from(a.distance(b).min(EDGE_MAX_M))).sum();
     if length_m > OUTLINES_MAX_M {
         let problem = format!("the outlines of boundary and islands are {:.0} km long", length_m / 1000.0);
         let remedy = format!("leave some out: at most {:.0} km fit", OUTLINES_MAX_M / 1000.0);
@@ -575,6 +579,10 @@ mod tests {
                 "island 1: its vertex 3, (9.00, 4.00), lies outside",
             ),
             (
+                |s| s.islands.push(island(&[(8e6, 2.0), (9e6, 2.0), (9e6, 4.0)])),
+                "island 1: its vertex 1, (8000000.00, 2.00), lies outside",
+            ),
+            (
                 |s| s.islands.push(island(&[(24.0, -1.0), (26.0, -1.0), (26.0, 1.0), (24.0, 1.0)])),
                 "reference_path, point 2: the route runs into island 1 at",
             ),
@@ -634,6 +642,16 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Its edges were compared first, each with all that it crosses.
+    #[test]
+    fn a_comb_whose_teeth_cross_each_other_is_refused_for_its_length() {
+        let mut scenario = lane();
+        let tooth = |i: u16| [(0.25 * f32::from(i), 0.0), (125.0 - 0.1 * f32::from(i), 400.0)];
+        scenario.boundary = (0..500).flat_map(tooth).map(Vec2::from).collect();
+        let error = validate(&scenario, &VehicleSettings::hyundai_hg300()).expect_err("crosses").to_string();
+        assert!(error.starts_with("boundary: the outlines of boundary and islands are 40"), "{error}");
     }
 
     /// A car beside the path or behind the boundary is not a fault: lots are full of them.

@@ -13,6 +13,10 @@ use geo::{LineString, Polygon, Simplify as _};
 pub(super) const TOLERANCES_PX: [f64; 3] = [0.75, 0.25, 0.0];
 /// Outlines of no more corners than this are kept as they are: single pixels would lose half of their area.
 const SMALL_CORNERS: usize = 8;
+/// Outlines of more corners are simplified in pieces: what is simplified may take as many steps as the square of its corners.
+const LARGE_CORNERS: usize = 20_000;
+/// Corners of such a piece.
+const PIECE_CORNERS: usize = 1_000;
 /// Cut where outlines would touch, pixels.
 const CUT_PX: f64 = 0.25;
 /// Directions of travel along the bottom, right, top and left side of a pixel, which then lies to the left.
@@ -324,10 +328,17 @@ pub(super) fn simplified(ring: &[[f64; 2]], tolerance_px: f64) -> Ring {
     let lowest = (0..ring.len()).min_by(|&a, &b| ring[a].partial_cmp(&ring[b]).unwrap_or(std::cmp::Ordering::Equal));
     let mut points = ring.to_vec();
     points.rotate_left(lowest.unwrap_or(0));
-    let outline = Polygon::new(LineString::from(points), Vec::new()).simplify(tolerance_px);
-    // Without the repetition of the first point.
-    let closed = &outline.exterior().0;
-    closed[..closed.len() - 1].iter().map(|point| [point.x, point.y]).collect()
+    // Without the last point, which repeats the first, or begins the next piece.
+    let without_last = |line: &LineString<f64>| -> Ring {
+        line.0[..line.0.len() - 1].iter().map(|point| [point.x, point.y]).collect()
+    };
+    if ring.len() > LARGE_CORNERS {
+        points.push(points[0]);
+        let piece = |first: usize| LineString::from(points[first..=(first + PIECE_CORNERS).min(ring.len())].to_vec());
+        let firsts = (0..ring.len()).step_by(PIECE_CORNERS);
+        return firsts.flat_map(|first| without_last(&piece(first).simplify(tolerance_px))).collect();
+    }
+    without_last(Polygon::new(LineString::from(points), Vec::new()).simplify(tolerance_px).exterior())
 }
 
 #[cfg(test)]
@@ -463,6 +474,19 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// In one piece, a few hundred thousand corners took seconds.
+    #[test]
+    fn an_outline_of_very_many_corners_is_simplified_in_pieces() {
+        let steps = 12_000;
+        let stairs = (0..steps).flat_map(|i| [[i, i], [i + 1, i]]).chain([[steps, steps], [0, steps]]);
+        let ring: Ring = stairs.map(|corner| corner.map(f64::from)).collect();
+        let line = simplified(&ring, TOLERANCES_PX[0]);
+        assert!((24..60).contains(&line.len()), "{} corners", line.len());
+        let mut rest = ring.iter();
+        assert!(line.iter().all(|corner| rest.any(|of_ring| of_ring == corner)), "corners of the ring, in its order");
+        assert!(line.iter().all(|[x, y]| y >= x || x - y <= 1.0), "{line:?}");
     }
 
     #[test]
