@@ -264,7 +264,7 @@ fn named(args: &MergeArgs) -> String {
 /// The command that puts them together again.
 fn again(args: &MergeArgs, run: &RunDir) -> String {
     let compared = args.compare_with.iter().map(|spec| format!(" --compare-with {}", quoted(spec)));
-    let methods = args.methods.methods.iter().map(|method| format!(" --method {}", quoted(&method.to_string())));
+    let methods = args.methods.methods.iter().map(|method| format!(" --method {}", quoted(method)));
     let asked: String = compared.chain(methods).collect();
     format!("merge {}{asked} --out {}", named(args), quoted(&run.path().display().to_string()))
 }
