@@ -264,6 +264,18 @@ mod tests {
         assert_ne!(recipe_at("0123"), recipe_at("4567"));
     }
 
+    /// Puts a network into two rounds of a run.
+    fn two_rounds(run: &Path, settings: &Settings) -> Checkpoint {
+        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
+        let checkpoint =
+            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
+        for folder in ["round-00", "round-01"] {
+            checkpoint.save(&run.join(folder)).unwrap();
+            sums::list(run, &[&format!("{folder}/sha256sums")]).unwrap();
+        }
+        checkpoint
+    }
+
     /// Lots that a network was trained on counted as unseen where it was named by its folder.
     #[test]
     fn the_lots_of_a_training_are_those_of_its_networks_however_they_are_named() {
@@ -271,13 +283,7 @@ mod tests {
         let mut settings = Settings::preset("smoke").unwrap();
         settings.training.lots = vec!["lot-b".to_owned()];
         RunDir::create(&place(&path, false), &settings, &Request::default()).unwrap();
-        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
-        let checkpoint =
-            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
-        for folder in ["round-00", "round-01"] {
-            checkpoint.save(&path.join(folder)).unwrap();
-            sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
-        }
+        let checkpoint = two_rounds(&path, &settings);
         let lots_of = |spec: String| {
             let spec: DriverSpec = spec.parse().unwrap();
             spec.load(&settings).unwrap().trained_on.lots.into_iter().collect::<Vec<_>>()
@@ -323,13 +329,7 @@ mod tests {
         settings.training.lots = vec!["lot-b".to_owned()];
         let inputs = [("lot-b".to_owned(), "of a file".to_owned())].into();
         RunDir::create(&place(&path, false), &settings, &Request { inputs, ..Request::default() }).unwrap();
-        let weights = Weights::init(settings.dagger.network, RootSeed(1), 0);
-        let checkpoint =
-            Checkpoint { weights, conditions: Conditions::of(&settings.episode), inference: settings.dagger.inference };
-        for folder in ["round-00", "round-01"] {
-            checkpoint.save(&path.join(folder)).unwrap();
-            sums::list(&path, &[&format!("{folder}/sha256sums")]).unwrap();
-        }
+        two_rounds(&path, &settings);
         let mut written: toml::Table = fs::read_to_string(path.join(SETTINGS)).unwrap().parse().unwrap();
         written.insert("of_another_version".to_owned(), toml::Value::Integer(1));
         let write = |written: &toml::Table| sums::write(&path, SETTINGS, written.to_string().as_bytes()).unwrap();
