@@ -168,6 +168,26 @@ fn a_damaged_state_of_a_training_is_refused() {
     std::fs::remove_file(path).unwrap();
 }
 
+/// It was continued: a network of two trainings under the name of one.
+#[test]
+fn a_state_that_another_training_left_is_refused() {
+    let path = scratch("state-of-another");
+    let mut stop = |_: &FitProgress| ControlFlow::Break(());
+    let mut train = |samples: usize, seed: u64, settings: &FitSettings| {
+        let start = Weights::init(tiny(), RootSeed(1), 0);
+        let context = FitContext { seed: RootSeed(seed), ..context(DeviceChoice::Cpu) };
+        fit(&start, &dataset(samples), settings, context, Some(&path), &mut stop).map(|outcome| outcome.report.steps)
+    };
+    let other = FitSettings { gradient_norm_max: 0.5, ..settings(9) };
+    assert_eq!(train(200, 1, &settings(9)), Ok(1));
+    for refused in [train(200, 2, &settings(9)), train(200, 1, &other), train(240, 1, &settings(9))] {
+        let error = refused.unwrap_err().to_string();
+        assert!(error.contains("of another training") && error.contains("delete it"), "{error}");
+    }
+    assert_eq!(train(200, 1, &settings(9)), Ok(2), "its own goes on");
+    std::fs::remove_file(path).unwrap();
+}
+
 /// While training, a few samples are validated on; the report is on all of them.
 #[test]
 fn the_weights_returned_are_validated_on_everything_held_back() {

@@ -6,7 +6,7 @@ use crate::fit::batch_sampler::BatchSampler;
 use crate::fit::device::DeviceChoice;
 use crate::fit::report::{CurvePoint, FitProgress, FitReport, Step, Validation};
 use crate::fit::settings::{FitSettings, KeepWeights, TooLong};
-use crate::fit::unfinished::Unfinished;
+use crate::fit::unfinished::{self, Unfinished};
 use crate::loss::{self, BatchLoss, LossParts, LossSettings};
 use crate::network::{
     DropoutFactors, InferenceSettings, LookAheadNet, NetworkArchitecture, Predictor, Weights, occupied_tensor,
@@ -90,7 +90,7 @@ const KEEP_EVERY_S: u64 = 60;
 ///
 /// # Errors
 /// If there is nothing to train on or too much, the learning rate is impossible, the loss or a weight is not a finite number,
-/// or `unfinished` cannot be read or written.
+/// or `unfinished` cannot be read or written, or is of another training.
 #[expect(clippy::disallowed_methods, reason = "when the state is copied to disk changes no result")]
 pub fn fit(
     start: &Weights,
@@ -115,8 +115,9 @@ pub fn fit(
     };
     let mut learner = Learner::new(start, &split.training, settings, context, steps)?;
     let mut course = Course::new(start);
+    let origin = unfinished::origin(start, &split.training, context.seed, settings);
     if let Some(path) = unfinished
-        && let Some(left) = Unfinished::read(path, start.architecture())?
+        && let Some(left) = Unfinished::read(path, &origin, start.architecture())?
     {
         learner.restore(&left, path)?;
         course.replay(left, settings.keep);
@@ -149,7 +150,7 @@ pub fn fit(
         if let Some(path) = unfinished
             && (stopped || done < steps && kept_at.elapsed() >= Duration::from_secs(KEEP_EVERY_S))
         {
-            course.keep(learner.weights(), learner.optimizer_state()).write(path)?;
+            course.keep(&origin, learner.weights(), learner.optimizer_state()).write(path)?;
             kept_at = Instant::now();
         }
     }
@@ -345,9 +346,9 @@ impl Course {
     }
 
     /// Everything so far, to be written.
-    fn keep(&self, weights: Weights, optimizer: Vec<u8>) -> Unfinished {
-        let Self { steps, curve, best, .. } = self;
-        Unfinished { weights, best: best.weights.clone(), optimizer, steps: steps.clone(), curve: curve.clone() }
+    fn keep(&self, origin: &str, weights: Weights, optimizer: Vec<u8>) -> Unfinished {
+        let (origin, best) = (origin.to_owned(), self.best.weights.clone());
+        Unfinished { origin, weights, best, optimizer, steps: self.steps.clone(), curve: self.curve.clone() }
     }
 
     /// Goes through everything that was kept once more.

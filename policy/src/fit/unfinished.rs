@@ -3,14 +3,17 @@
 //! Learning rate, order of samples and dropout are functions of the number of the step; the mean loss since the last
 //! validation and the bookkeeping of the best weights follow from the steps and the curve. The rest is here.
 
+use crate::dataset::Sample;
 use crate::files::FileError;
 use crate::fit::report::{CurvePoint, Step};
+use crate::fit::settings::FitSettings;
 use crate::loss::LossParts;
 use crate::network::{NetworkArchitecture, Weights};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
+use sim::seed::RootSeed;
 use std::path::Path;
-use storage::sealed;
+use storage::{sealed, sums};
 
 /// Name of the file in the folder of the round: safetensors after a line with its SHA-256.
 pub const FILE: &str = "fit.unfinished";
@@ -19,6 +22,8 @@ const REMEDY: &str = "delete it to begin this training again";
 
 /// A training after some steps.
 pub(crate) struct Unfinished {
+    /// [`origin()`] of the training.
+    pub(crate) origin: String,
     /// The network.
     pub(crate) weights: Weights,
     /// The best network so far.
@@ -34,14 +39,28 @@ pub(crate) struct Unfinished {
 /// What is not an array.
 #[derive(Serialize, Deserialize)]
 struct About {
+    origin: String,
     curve: Vec<CurvePoint>,
+}
+
+/// SHA-256 of what a training follows from: its first weights, the labels of its samples, its seed and its settings. A file
+/// that another training left, copied beside this one, has another.
+pub(crate) fn origin(start: &Weights, samples: &[Sample], seed: RootSeed, settings: &FitSettings) -> String {
+    let mut bytes = bytes_of(start.values());
+    for &Sample { label: [u, w], tau_hat, .. } in samples {
+        bytes.extend(bytes_of(&[u, w, tau_hat]));
+    }
+    bytes.extend(seed.0.to_le_bytes());
+    bytes.extend(toml::to_string(settings).expect("settings are serialised wherever they are kept").into_bytes());
+    sums::digest(&bytes)
 }
 
 impl Unfinished {
     pub(crate) fn write(&self, path: &Path) -> Result<(), FileError> {
         let failed =
             |error: &dyn std::fmt::Display| FileError::new(path, error, "report this: it cannot be serialised");
-        let about = toml::to_string(&About { curve: self.curve.clone() }).map_err(|error| failed(&error))?;
+        let about = About { origin: self.origin.clone(), curve: self.curve.clone() };
+        let about = toml::to_string(&about).map_err(|error| failed(&error))?;
         let steps: Vec<f32> =
             self.steps.iter().flat_map(|step| [step.learning_rate, step.loss.misfit, step.loss.log_variance]).collect();
         let [weights, best, steps] = [self.weights.values(), self.best.values(), &steps].map(bytes_of);
@@ -59,8 +78,12 @@ impl Unfinished {
         sealed::write(path, &safetensors::serialize(tensors, None).map_err(|error| failed(&error))?)
     }
 
-    /// Reads what an interrupted training left; `None` if there is nothing.
-    pub(crate) fn read(path: &Path, architecture: NetworkArchitecture) -> Result<Option<Self>, FileError> {
+    /// Reads what an interrupted training of this origin left; `None` if there is nothing.
+    pub(crate) fn read(
+        path: &Path,
+        origin: &str,
+        architecture: NetworkArchitecture,
+    ) -> Result<Option<Self>, FileError> {
         let Some(bytes) = sealed::read(path)? else { return Ok(None) };
         let failed = |error: &dyn std::fmt::Display| FileError::new(path, error, REMEDY);
         let tensors = SafeTensors::deserialize(&bytes).map_err(|error| failed(&error))?;
@@ -76,12 +99,16 @@ impl Unfinished {
         };
         let about = String::from_utf8(tensor("about")?).map_err(|error| failed(&error))?;
         let about: About = toml::from_str(&about).map_err(|error| failed(&error))?;
+        if about.origin != origin {
+            return Err(failed(&"it is of another training"));
+        }
         let steps = floats("steps")?;
         let steps = steps.as_chunks().0.iter().map(|&[learning_rate, misfit, log_variance]| Step {
             learning_rate,
             loss: LossParts::new(misfit, log_variance),
         });
         Ok(Some(Self {
+            origin: about.origin,
             weights: weights("weights")?,
             best: weights("best")?,
             optimizer: tensor("optimizer")?,
