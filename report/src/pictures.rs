@@ -20,9 +20,20 @@ pub mod noise;
 pub mod samples;
 pub mod trajectories;
 
-/// Names of lots and drivers are free text; names of files are not.
+use storage::sums;
+
+/// Bytes of a [`file_name`]. File systems allow 255, an extension included.
+const FILE_NAME_BYTES_MAX: usize = 200;
+
+/// Names of lots and drivers are free text; names of files are not. The end of a long one becomes a digest of the whole.
 pub fn file_name(name: &str) -> String {
-    name.replace(|c: char| !c.is_alphanumeric() && !"-_.".contains(c), "-")
+    let plain = name.replace(|c: char| !c.is_alphanumeric() && !"-_.".contains(c), "-");
+    if plain.len() <= FILE_NAME_BYTES_MAX {
+        return plain;
+    }
+    let digest = &sums::digest(plain.as_bytes())[..8];
+    let end = plain.floor_char_boundary(FILE_NAME_BYTES_MAX - digest.len() - 1);
+    format!("{}-{digest}", &plain[..end])
 }
 
 #[cfg(test)]

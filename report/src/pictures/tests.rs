@@ -3,7 +3,7 @@ use super::drawing::{Drawing, Font, Rgb};
 use super::encode::Format;
 use super::lot::{ASPHALT, GROUND, View};
 use super::trajectories::{ColourBy, Point, Trajectory};
-use super::{contact_sheet, grids, lot, noise, trajectories};
+use super::{contact_sheet, file_name, grids, lot, noise, trajectories};
 use experiment::drive::Replay;
 use experiment::drivers::DriverSpec;
 use experiment::lots::Lot;
@@ -25,6 +25,15 @@ use tiny_skia::Pixmap;
 fn at(pixmap: &Pixmap, place: Vec2) -> Rgb {
     let pixel = pixmap.pixel(place.x as u32, place.y as u32).unwrap();
     [pixel.red(), pixel.green(), pixel.blue()]
+}
+
+/// A recording of a dozen drivers could not be written: the name of its file was longer than file systems allow.
+#[test]
+fn names_of_files_are_short_and_differ() {
+    let name_of = |last: &str| file_name(&format!("lot b/{}{last}", "run:runs/é-".repeat(40)));
+    let (one, other) = (name_of("1"), name_of("2"));
+    assert!(one.len() <= 200 && one.starts_with("lot-b-run-runs-é-") && one != other, "{one}, {other}");
+    assert_eq!(file_name("lot-b"), "lot-b");
 }
 
 fn map_of(spec: &str) -> Map {
