@@ -74,12 +74,13 @@ pub fn of_evaluation(
     drivers: &[String],
     progress: &dyn Progress,
 ) -> anyhow::Result<Option<Vec<Row>>> {
+    let failures = records::of_finished(folder, records::FAILURES)?;
     let lots = Lot::parse_all(&settings.evaluation.lots, &settings.episode.vehicle)
         .with_context(|| run_dir::paths_are_as_made(folder))?;
     let manifest = Manifest::read(folder)?;
     // First: a lot of another name would seem to be none of the evaluation's.
     manifest.check_some_inputs(&inputs::of(&lots, &[]))?;
-    let failing = read(folder, &lots, drivers)?;
+    let failing = read(&failures, &lots, drivers)?;
     if let Some(driver) = drivers.iter().find(|&driver| failing.iter().all(|failing| failing.driver != *driver)) {
         bail!("{}: no near-collision of a driver {driver:?} is in it; its tables name them", folder.display());
     }
@@ -131,10 +132,10 @@ pub fn of_evaluation(
 }
 
 /// What failed, by driver and level of noise, in the order of the file.
-fn read(folder: &Path, lots: &[Lot], drivers: &[String]) -> anyhow::Result<Vec<Failing>> {
+fn read(file: &Path, lots: &[Lot], drivers: &[String]) -> anyhow::Result<Vec<Failing>> {
     let index: BTreeMap<&str, usize> = lots.iter().enumerate().map(|(index, lot)| (lot.name(), index)).collect();
     let mut all: Vec<Failing> = Vec::new();
-    records::each_line(&folder.join(records::FAILURES), |failure: FailureRecord| {
+    records::each_line(file, |failure: FailureRecord| {
         let Driven { driver, lot, direction, trial, noise, .. } = failure.driven;
         if !drivers.is_empty() && !drivers.contains(&driver) {
             return Ok(());

@@ -12,7 +12,7 @@ use sim::limits::{RECORD_BYTES_MAX, RUN_LINES_BYTES_MAX};
 use sim::scenario::Direction;
 use std::io::{BufRead as _, BufReader, Read};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use storage::sums;
 
 /// The version of `runs.jsonl`, `failures.jsonl` and `wall_time.jsonl` that this program writes.
@@ -23,6 +23,20 @@ pub const RUNS: &str = "runs.jsonl";
 pub const FAILURES: &str = "failures.jsonl";
 /// See [`RUNS`].
 pub const WALL_TIME: &str = "wall_time.jsonl";
+
+/// The path of a file of a finished evaluation, or of what a training ended with.
+///
+/// # Errors
+/// If the folder holds none.
+pub fn of_finished(folder: &Path, file: &str) -> anyhow::Result<PathBuf> {
+    ensure!(
+        sums::is_listed(folder, file)?,
+        "{}: holds no finished evaluation; name the folder of one (cargo xtask evaluate), or of a training that ended with \
+         its check",
+        folder.display()
+    );
+    Ok(folder.join(file))
+}
 
 /// Who drove where: what all lines begin with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

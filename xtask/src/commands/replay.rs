@@ -18,7 +18,6 @@ use report::replays::{self, Row};
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -118,12 +117,7 @@ fn of_evaluation(
     args: &ReplayArgs,
 ) -> anyhow::Result<(Settings, Vec<ReplayKey>, BTreeMap<String, Recorded>)> {
     let settings = trained::settings_of(folder)?;
-    let file = folder.join(records::RUNS);
-    ensure!(
-        sums::is_listed(folder, records::RUNS)?,
-        "{}: holds no finished evaluation; name the folder of one, or of a training that ended with its check",
-        folder.display()
-    );
+    let file = records::of_finished(folder, records::RUNS)?;
     // Twice through the file: it may be longer than memory is large.
     let mut runs = 0;
     if args.keys.is_empty() {

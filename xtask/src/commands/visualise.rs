@@ -21,7 +21,6 @@ use report::pictures::file_name;
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
-use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -205,12 +204,7 @@ fn check(keys: &[ReplayKey], settings: &Settings) -> anyhow::Result<()> {
 
 /// Near-collisions of an evaluation, a recording each, of the seconds around it.
 fn failures_of(args: &FailuresArgs, output: &Output) -> anyhow::Result<Show> {
-    ensure!(
-        sums::is_listed(&args.run, records::FAILURES)?,
-        "{}: holds no finished evaluation; name the folder of one, or of a training that ended with its check",
-        args.run.display()
-    );
-    let list = args.run.join(records::FAILURES);
+    let list = records::of_finished(&args.run, records::FAILURES)?;
     let (mut drives, mut all) = (Vec::new(), 0);
     records::each_line(&list, |failure: FailureRecord| {
         all += 1;

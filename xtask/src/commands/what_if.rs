@@ -3,14 +3,12 @@
 use crate::args::JsonArgs;
 use crate::console::Console;
 use crate::output::Output;
-use anyhow::ensure;
 use clap::Args;
-use evaluation::{avoidable, records};
+use evaluation::avoidable;
 use experiment::progress::Interrupted;
 use experiment::trained;
 use report::what_if;
 use std::path::PathBuf;
-use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -35,11 +33,6 @@ pub(crate) struct WhatIfArgs {
 
 pub(crate) fn run(args: &WhatIfArgs, output: &Output) -> anyhow::Result<()> {
     let settings = trained::settings_of(&args.folder)?;
-    ensure!(
-        sums::is_listed(&args.folder, records::FAILURES)?,
-        "{}: holds no finished evaluation; name the folder of one (cargo xtask evaluate)",
-        args.folder.display()
-    );
     let console = Console::new(output);
     let Some(rows) = avoidable::of_evaluation(&args.folder, &settings, &args.drivers, &console)? else {
         return Err(Interrupted { kept: "nothing is written".to_owned() }.into());
