@@ -5,6 +5,7 @@ use crate::plan::Plan;
 use crate::shards::{self, ShardRecord};
 use crate::trainings::Methods;
 use anyhow::{Context as _, ensure};
+use experiment::command_line::quoted_path;
 use experiment::drivers::DriverSpec;
 use experiment::manifest::{self, Inputs, Manifest};
 use experiment::settings::{EvaluationSettings, Settings};
@@ -41,7 +42,8 @@ impl EvaluationRun {
         );
         ensure!(
             manifest::is_finished(folder)?,
-            "{name}: not finished; continue with: cargo xtask {COMMAND} --resume {name}"
+            "{name}: not finished; continue with: cargo xtask {COMMAND} --resume {}",
+            quoted_path(folder)
         );
         let drivers = manifest.arguments.get("drivers").cloned();
         let drivers = drivers.with_context(|| format!("{name}/manifest.toml: names no drivers"))?;

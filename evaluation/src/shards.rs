@@ -5,6 +5,7 @@ use crate::plan::Plan;
 use crate::stage::Stage;
 use crate::stages;
 use anyhow::{Context as _, ensure};
+use experiment::command_line::quoted_path;
 use experiment::drivers::DriverSpec;
 use experiment::manifest::{self, Manifest};
 use experiment::settings::Settings;
@@ -126,9 +127,10 @@ impl ShardRun {
             .with_context(|| format!("{name}: this is not a shard; name folders that a command with --shard wrote"))?;
         ensure!(
             manifest::is_finished(folder)?,
-            "{name}: shard {} is not finished; continue with: cargo xtask {} --resume {name}",
+            "{name}: shard {} is not finished; continue with: cargo xtask {} --resume {}",
             record.number,
-            manifest.command
+            manifest.command,
+            quoted_path(folder)
         );
         let settings = trained::settings_of(folder)?;
         ensure!(

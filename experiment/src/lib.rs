@@ -14,12 +14,14 @@
 //! | [`inputs`] | digests of the files that a run reads, so that it continues with the same |
 //! | [`run_dir`] | the run folder, and how it is claimed |
 //! | [`manifest`] | what a run says of itself: what made it, from which inputs, and its outcome |
+//! | [`command_line`] | commands, as a shell can be given them |
 //! | [`trained`] | the networks that runs have trained |
 //! | [`view_request`] | what the viewer program is asked to record |
 //! | [`progress`] | how long tasks report progress and are cancelled |
 //!
 //! Nothing here prints or parses command lines.
 
+pub mod command_line;
 pub mod drive;
 pub mod drive_digest;
 pub mod drivers;

@@ -13,6 +13,7 @@
 //!   .lock              who writes here
 //! ```
 
+use crate::command_line::quoted_path;
 use crate::manifest::{
     Build, FINISHED, FINISHED_SCHEMA, Finished, Inputs, MANIFEST, Manifest, Outcome, Request, SETTINGS, has_changed,
     is_finished,
@@ -103,10 +104,12 @@ impl RunDir {
         if sums::exists(path)?
             && let Some(whole) = run_that_holds(path)?
         {
-            let (whole, command) = (whole.display(), Manifest::read(&whole)?.command);
             bail!(
-                "{}: this is a part of {whole}; continue with: cargo xtask {command} --resume {whole}",
-                path.display()
+                "{}: this is a part of {}; continue with: cargo xtask {} --resume {}",
+                path.display(),
+                whole.display(),
+                Manifest::read(&whole)?.command,
+                quoted_path(&whole)
             );
         }
         Self::resume_anywhere(path, command)
@@ -123,15 +126,16 @@ impl RunDir {
                 "{name}: its list of files, sha256sums, is lost; restore it from a copy"
             );
             ensure!(is_free(path)?, "{name}: this is not a run; name the folder of one, as in runs/NAME");
-            bail!("{name}: nothing was begun there; begin it with --out {name}");
+            bail!("{name}: nothing was begun there; begin it with --out {}", quoted_path(path));
         }
         let run = Self::locked(path.to_path_buf(), command)?;
         let manifest = Manifest::read(path)?;
         ensure!(
             manifest.command == command,
-            "{}: this is a run of {}; continue with: cargo xtask {1} --resume {0}",
+            "{}: this is a run of {}; continue with: cargo xtask {1} --resume {}",
             path.display(),
-            manifest.command
+            manifest.command,
+            quoted_path(path)
         );
         ensure!(!is_finished(path)?, "{}: this run is finished; nothing is left to resume", path.display());
         let run = Self { inputs: Arc::new(manifest.inputs.clone()), ..run };
@@ -255,8 +259,9 @@ impl RunDir {
             let name = path.display();
             ensure!(
                 place.overwrite || path.join(FINISHED).is_file(),
-                "{name}: this folder is not empty; continue it with --resume {name}, choose another --out, or delete it \
-                 with --overwrite"
+                "{name}: this folder is not empty; continue it with --resume {}, choose another --out, or delete it \
+                 with --overwrite",
+                quoted_path(path)
             );
             ensure!(
                 place.overwrite,
@@ -581,9 +586,10 @@ mod tests {
     /// Another command went on with it, and settings outside the section `dagger` could be edited.
     #[test]
     fn a_run_is_continued_only_by_its_command_with_its_settings_and_inputs() {
-        let path = scratch("continued");
+        let path = scratch("to be continued");
         drop(create(&path, false).unwrap());
-        assert!(message(RunDir::resume(&path, "evaluate")).contains("cargo xtask train-dagger --resume"));
+        let refused = message(RunDir::resume(&path, "evaluate"));
+        assert!(refused.ends_with(&format!("cargo xtask train-dagger --resume '{}'", path.display())), "{refused}");
         let settings = fs::read_to_string(path.join(SETTINGS)).unwrap();
         fs::write(path.join(SETTINGS), settings.replacen("trials = 1", "trials = 2", 1)).unwrap();
         let refused = message(RunDir::resume(&path, "train-dagger"));

@@ -1,5 +1,6 @@
 //! The networks that runs have trained, as `run:DIR` and `run:DIR/bc` name them.
 
+use crate::command_line::quoted_path;
 use crate::manifest::{Finished, Inputs, MANIFEST, Manifest, Outcome, SETTINGS, finished};
 use crate::settings::Settings;
 use anyhow::{Context as _, bail, ensure};
@@ -67,7 +68,11 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
                 format!("{}: this is the folder of one network; name it as net:{0}", run.display())
             }
             Ok(command) if command.starts_with("train-") => {
-                format!("{}: no network is trained there yet; finish it with --resume {0}", run.display())
+                format!(
+                    "{}: no network is trained there yet; finish it with --resume {}",
+                    run.display(),
+                    quoted_path(run)
+                )
             }
             Ok(command) => format!(
                 "{}: this is a run of {command}, which has no network of its own; name a training",
@@ -94,9 +99,10 @@ pub fn ensure_whole(spec: &Path) -> anyhow::Result<()> {
     }
     let round = policy_folder(spec)?;
     bail!(
-        "{}: this training is not finished; continue it with --resume {0}, or take the network that it has now, {} \
-         (as a driver: net:{1})",
+        "{}: this training is not finished; continue it with --resume {}, or take the network that it has now, {} \
+         (as a driver: net:{2})",
         run.display(),
+        quoted_path(run),
         round.display()
     )
 }

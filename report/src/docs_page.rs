@@ -1,6 +1,6 @@
 //! What the pages of the documentation that a command makes of runs have in common.
 
-use crate::command_line::{command_line, quoted};
+use experiment::command_line::{command_line, quoted, quoted_path};
 use experiment::manifest::{Build, Manifest};
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::fmt::Write as _;
@@ -63,7 +63,7 @@ fn written_by(run: &str, others: &[String], to: Option<&Path>) -> String {
         words.extend(others.iter().map(|other| quoted(other)));
     }
     if let Some(to) = to {
-        words.extend(["--to".to_owned(), quoted(&to.to_string_lossy())]);
+        words.extend(["--to".to_owned(), quoted_path(to)]);
     }
     words.join(" ")
 }

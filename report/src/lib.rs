@@ -5,7 +5,6 @@
 //! | [`markdown`], [`summary`], [`table1`], [`failures`], [`tuning`], [`pixel_accuracy`], [`replays`], [`what_if`] | tables as Markdown |
 //! | [`plots`] | plots as SVG |
 //! | [`pictures`] | lots, drives, samples and noise as PNG and SVG |
-//! | [`command_line`] | commands, as a shell can be given them |
 //! | [`drawn_lots`] | the files that lots are written to, and what they must not replace |
 //! | [`page`], [`glossary`] | one HTML page that loads nothing, and what its words mean |
 //! | [`run_report`], [`moments`] | `report.html` of a run, with its worst near-collisions |
@@ -13,7 +12,6 @@
 //! | [`other_run`] | the table of another run in that report, or on a page of its own |
 //! | [`rules`], [`scaling`], [`deviations`], [`trainings_table`] | those of the commands of these names: many trainings, one table, one plot |
 
-pub mod command_line;
 mod controls;
 pub mod deviations;
 pub mod docs_page;

@@ -1,12 +1,12 @@
 //! The table of another run in a page, or on a page of its own: of one that trained several times, of an evaluation or of a
 //! training.
 
-use crate::command_line::command_line;
 use crate::docs_page::{self, MadeBy};
 use crate::page::{Image, Page};
 use crate::{deviations, rules, scaling};
 use anyhow::{bail, ensure};
 use evaluation::shards;
+use experiment::command_line::command_line;
 use experiment::manifest::{self, Manifest};
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::convert::Infallible;

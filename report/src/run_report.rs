@@ -4,7 +4,6 @@
 //! A file that cannot be read or written is an error. A near-collision that cannot be replayed (its network has moved)
 //! is not: the page says so in place of the picture, and the report in [`Report::not_replayed`].
 
-use crate::command_line::{command_line, quoted};
 use crate::glossary;
 use crate::markdown::escaped;
 use crate::moments;
@@ -18,6 +17,7 @@ use evaluation::names::BC;
 use evaluation::records::{self, Driven, FailureRecord, RunRecord};
 use evaluation::summary::{Row, SweepRow, Tables};
 use evaluation::table1::Table1;
+use experiment::command_line::{command_line, quoted, quoted_path};
 use experiment::lots::ALL;
 use experiment::manifest::Manifest;
 use experiment::progress::{Interrupted, Progress};
@@ -531,7 +531,7 @@ fn add_moments(
 /// was driven is in the evaluation's.
 fn visualise(key: &str, folder: &Path) -> String {
     let settings = folder.join("settings.toml");
-    format!("cargo xtask visualise replay {} --config {}", quoted(key), quoted(&settings.display().to_string()))
+    format!("cargo xtask visualise replay {} --config {}", quoted(key), quoted_path(&settings))
 }
 
 fn configuration(sources: &Sources) -> String {

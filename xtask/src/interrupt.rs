@@ -2,7 +2,7 @@
 //! Every file is whole at any moment and unfinished work is on disk, so that ending anywhere loses next to nothing.
 
 use crate::output::note;
-use report::command_line::quoted;
+use experiment::command_line::quoted_path;
 #[cfg(unix)]
 use signal_hook::{
     consts::{SIGHUP, SIGTERM, SIGXFSZ},
@@ -81,7 +81,7 @@ fn watch() {
 
 /// Notes which command continues which run.
 pub(crate) fn can_resume(command: &str, run: &Path) {
-    goes_on_with(&format!("{command} --resume {}", quoted(&run.display().to_string())));
+    goes_on_with(&format!("{command} --resume {}", quoted_path(run)));
 }
 
 /// Notes the arguments of the command that continues what is under way.

@@ -18,12 +18,12 @@ use evaluation::plan::Plan;
 use evaluation::shards::{self, Shards};
 use evaluation::stage::Step;
 use evaluation::stages;
+use experiment::command_line::{quoted, quoted_path};
 use experiment::drivers::{DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
 use experiment::manifest::{Build, Manifest, Request};
 use experiment::run_dir::{Place, RunDir};
-use report::command_line::quoted;
 use std::path::{Path, PathBuf};
 use storage::sums;
 
@@ -258,7 +258,7 @@ fn drives(shards: &Shards, networks: &Path, args: &MergeArgs, output: &Output) -
 
 /// The shards as they were named.
 fn named(args: &MergeArgs) -> String {
-    args.folders.iter().map(|shard| quoted(&shard.display().to_string())).collect::<Vec<_>>().join(" ")
+    args.folders.iter().map(|shard| quoted_path(shard)).collect::<Vec<_>>().join(" ")
 }
 
 /// The command that puts them together again.
@@ -266,7 +266,7 @@ fn again(args: &MergeArgs, run: &RunDir) -> String {
     let compared = args.compare_with.iter().map(|spec| format!(" --compare-with {}", quoted(spec)));
     let methods = args.methods.methods.iter().map(|method| format!(" --method {}", quoted(method)));
     let asked: String = compared.chain(methods).collect();
-    format!("merge {}{asked} --out {}", named(args), quoted(&run.path().display().to_string()))
+    format!("merge {}{asked} --out {}", named(args), quoted_path(run.path()))
 }
 
 /// The command line of a shard without what concerns the shard alone.

@@ -1,6 +1,7 @@
 //! Commands as text that a shell can be given.
 
-use experiment::manifest::Manifest;
+use crate::manifest::Manifest;
+use std::path::Path;
 
 /// A word of a command line, as a shell needs it.
 pub fn quoted(word: &str) -> String {
@@ -8,8 +9,13 @@ pub fn quoted(word: &str) -> String {
     if is_plain { word.to_owned() } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }
 
+/// A path as a word of a command line.
+pub fn quoted_path(path: &Path) -> String {
+    quoted(&path.to_string_lossy())
+}
+
 /// The command that made a run.
-pub(crate) fn command_line(manifest: &Manifest) -> String {
+pub fn command_line(manifest: &Manifest) -> String {
     let words = manifest.command_line.iter().map(|word| quoted(word));
     std::iter::once("cargo xtask".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
 }
