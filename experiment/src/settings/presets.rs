@@ -93,8 +93,6 @@ fn strong() -> Settings {
                 conv1: ConvLayer { channels: 32, kernel: 5 },
                 conv2: ConvLayer { channels: 64, kernel: 3 },
                 hidden: 512,
-                // Two are the default's; with so large a network they were not tried.
-                modes: 1,
                 ..base.dagger.network
             },
             fit: FitSettings { budget: Budget::Steps(20_000), validate_every: 1000, ..base.dagger.fit },
