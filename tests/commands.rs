@@ -309,6 +309,23 @@ fn a_run_can_be_evaluated_later_and_generated_lots_can_be_driven() {
     assert!(run.join("round-00/learning.csv").is_file());
 }
 
+/// Whoever had not trained for a quarter of an hour had no network to drive with.
+#[test]
+fn the_network_that_ships_drives_at_once() {
+    let out = scratch("ships").join("run");
+    let driver = ["evaluate", "--driver", "trained:default"];
+    let lots = ["--lots", "lot-a", "lot-b", "lot-c", "--trials", "1"];
+    let error = refuse(xtask().args(driver).args(["--preset", "paper"]));
+    assert!(error.contains("speed_law = \"full\"") && error.contains("(--preset default)"), "{error}");
+    succeed(xtask().args(driver).args(lots).arg("--out").arg(&out));
+    let lines = std::fs::read_to_string(out.join("runs.jsonl")).unwrap();
+    let runs: Vec<serde_json::Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let sum = |key: &str| runs.iter().map(|run| run["metrics"][key].as_f64().unwrap()).sum::<f64>();
+    assert_eq!(runs.len(), 6, "three lots, both ways");
+    // Of the five trainings in the README each has 8 to 11 in ten times as many trials.
+    assert!(sum("reference_m") > 1000.0 && sum("near_collisions") < 6.0, "{lines}");
+}
+
 /// 29 maps and four drivers filled 3000 lines of a terminal.
 #[test]
 fn of_many_lots_a_terminal_shows_those_of_all_and_the_file_has_each() {

@@ -49,7 +49,8 @@ pub fn evaluate(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyho
         return EvaluationResults::read(plan, run.path()).map(Some);
     }
     run.ensure_unchanged(&inputs::of(plan.lots, plan.drivers))?;
-    let mut driving = Driving::open(plan, run.path(), progress)?;
+    let lines = Growing::open(run.path(), DRIVING, &run.identity()?, &FILES)?;
+    let mut driving = Driving::open(plan, run.path(), lines, progress)?;
     let mut trials = plan.trials();
     loop {
         let batch: Vec<Trial<'_>> = trials.by_ref().take(BATCH).collect();
@@ -87,8 +88,7 @@ struct Driving<'a> {
 }
 
 impl<'a> Driving<'a> {
-    fn open(plan: &'a Plan<'a>, folder: &Path, progress: &'a dyn Progress) -> anyhow::Result<Self> {
-        let lines = Growing::open(folder, DRIVING, &FILES)?;
+    fn open(plan: &'a Plan<'a>, folder: &Path, lines: Growing, progress: &'a dyn Progress) -> anyhow::Result<Self> {
         let mut results = EvaluationResults::new(plan);
         let (mut done, mut near_collisions) = (0, 0);
         if lines.parts() > 0 {
@@ -305,9 +305,9 @@ mod tests {
 
         let folder = std::env::temp_dir().join(format!("evaluation-test-{}-parts", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
-        let mut lines = Growing::open(&folder, DRIVING, &FILES).unwrap();
+        let mut lines = Growing::open(&folder, DRIVING, "this", &FILES).unwrap();
         lines.add(&[const { Vec::new() }; 3]).unwrap();
-        let error = Driving::open(&plan, &folder, &Silent).err().unwrap().to_string();
+        let error = Driving::open(&plan, &folder, lines, &Silent).err().unwrap().to_string();
         std::fs::remove_dir_all(&folder).unwrap();
         assert!(error.contains("runs.jsonl: 0 runs in 1 parts"), "{error}");
     }

@@ -121,7 +121,7 @@ impl Rows {
         if sums::is_listed(run.path(), records::RUNS)? {
             return Ok(());
         }
-        let mut lines = Growing::open(run.path(), DRIVING, &FILES)?;
+        let mut lines = Growing::open(run.path(), DRIVING, &run.identity()?, &FILES)?;
         let mut readers = self.0.each_ref().map(Reader::new);
         let [runs, ..] = &self.0;
         for of_drive in runs.rows.chunk_by(|row, next| row.drive() == next.drive()) {

@@ -1,6 +1,7 @@
 //! Drivers: how they are named, and how they get to the wheel.
 
 mod planner_file;
+mod shipped;
 mod spec;
 
 pub use planner_file::{Parameters, PlannerFile, tuned_specs};
@@ -40,6 +41,7 @@ impl DriverSpec {
             Self::Expert
             | Self::GridExpert
             | Self::Checkpoint { .. }
+            | Self::Shipped { .. }
             | Self::Onnx { .. }
             | Self::Planner { .. }
             | Self::Callback { .. } => Ok(()),
@@ -62,6 +64,7 @@ impl DriverSpec {
                 trained::ensure_run_of_network(folder)?;
                 Ok(vec![Checkpoint::load(folder)?])
             }
+            Self::Shipped { name } => Ok(vec![shipped::network(name)?.0]),
             Self::Ensemble { members } => {
                 let networks = members.iter().map(Self::checkpoints).collect::<anyhow::Result<Vec<_>>>()?;
                 let first = &networks[0][0];
@@ -86,6 +89,7 @@ impl DriverSpec {
         match self {
             Self::Run { folder } => trained::trained_on(folder),
             Self::Checkpoint { folder } => trained::network_trained_on(folder),
+            Self::Shipped { name } => Ok(shipped::network(name)?.1),
             Self::Ensemble { members } => {
                 let mut all = TrainedOn::default();
                 for member in members {
@@ -109,7 +113,7 @@ impl DriverSpec {
         let model = match &self {
             Self::Expert => Model::Expert(settings.expert.clone()),
             Self::GridExpert => Model::GridExpert(settings.expert.clone()),
-            Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. } => {
+            Self::Run { .. } | Self::Checkpoint { .. } | Self::Shipped { .. } | Self::Ensemble { .. } => {
                 let networks = self.checkpoints().with_context(|| format!("driver {name:?}"))?;
                 Model::Network(networks)
             }
@@ -344,9 +348,13 @@ impl NamedDriver {
         let listed: Vec<String> =
             differences.iter().map(|(trained, here)| format!("{trained} (here {here})")).collect();
         let allow = if is_same_patch { ", or allow it with --set evaluation.untrained_conditions=true" } else { "" };
+        let settings = match &self.spec {
+            DriverSpec::Shipped { name } => format!("--preset {name}"),
+            _ => "--config RUN/settings.toml".to_owned(),
+        };
         ensure!(
             differences.is_empty(),
-            "driver {:?} was trained with {}; use the settings it was trained with (--config RUN/settings.toml){allow}",
+            "driver {:?} was trained with {}; use the settings it was trained with ({settings}){allow}",
             self.name,
             listed.join(", ")
         );

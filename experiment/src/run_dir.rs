@@ -322,6 +322,16 @@ impl RunDir {
         &self.path
     }
 
+    /// SHA-256 of its settings and its manifest: what is left unfinished of another run has another.
+    ///
+    /// # Errors
+    /// If one is missing or damaged.
+    pub fn identity(&self) -> anyhow::Result<String> {
+        let contents = [SETTINGS, MANIFEST].map(|name| sums::read(&self.path.join(name), RUN_TOML_BYTES_MAX));
+        let [settings, manifest] = contents;
+        Ok(sums::digest(&[settings?, manifest?].concat()))
+    }
+
     /// Writes a file and lists it: it is there whole or not at all.
     ///
     /// # Errors

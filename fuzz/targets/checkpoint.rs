@@ -1,19 +1,27 @@
 //! A trained network: model.toml or model.safetensors.
 #![no_main]
 
-use fuzz::Sound;
+use fuzz::Files;
 use libfuzzer_sys::fuzz_target;
 use policy::checkpoint::Checkpoint;
-use std::sync::{LazyLock, Mutex};
+use std::path::Path;
+use std::sync::LazyLock;
 
-static NETWORK: LazyLock<Mutex<Sound>> = LazyLock::new(|| {
-    let network = Sound::new("network", fuzz::network_files());
-    Checkpoint::load(network.path()).expect("it is sound");
-    Mutex::new(network)
+/// model.safetensors, then model.toml.
+static SOUND: LazyLock<Files> = LazyLock::new(|| {
+    let files = fuzz::network_files();
+    assert!(files.is_sorted() && files.len() == 2);
+    read(&files[0].1, &files[1].1).expect("it is sound");
+    files
 });
 
+fn read(numbers: &[u8], model: &[u8]) -> Option<Checkpoint> {
+    Checkpoint::from_contents(std::str::from_utf8(model).ok()?, numbers, Path::new("network")).ok()
+}
+
+/// The first byte says which file is made up, the rest is its content.
 fuzz_target!(|data: &[u8]| {
-    let mut network = NETWORK.lock().expect("one thread");
-    network.make_up(data);
-    drop(Checkpoint::load(network.path()));
+    let (which, content) = data.split_first().unwrap_or((&0, &[]));
+    let [(_, numbers), (_, model)] = &SOUND[..] else { unreachable!("two files") };
+    drop(if which % 2 == 0 { read(content, model) } else { read(numbers, content) });
 });

@@ -80,6 +80,54 @@ enum Activation {
     Identity,
 }
 
+impl ModelFile {
+    /// Refuses what this program would misread.
+    fn check(&self, path: &Path) -> Result<(), FileError> {
+        if (self.log_variance_min, self.log_variance_max) != (LOG_VARIANCE_MIN, LOG_VARIANCE_MAX) {
+            let problem = format!("log-variance bounds [{}, {}]", self.log_variance_min, self.log_variance_max);
+            return Err(FileError::new(path, problem, SCHEMA_REMEDY));
+        }
+        let sound = self.network.validate().and_then(|()| self.inference.validate());
+        sound.map_err(|error| FileError::new(path, error, RESTORE))?;
+        let expected = layers(&self.network);
+        if self.layers.len() != expected.len() {
+            let problem = format!("{} layers instead of {}", self.layers.len(), expected.len());
+            return Err(FileError::new(path, problem, RESTORE));
+        }
+        if let Some((found, expected)) = self.layers.iter().zip(&expected).find(|(found, expected)| found != expected) {
+            let problem = format!("layer {found:?} is not what its network has: {expected:?}");
+            return Err(FileError::new(path, problem, RESTORE));
+        }
+        Ok(())
+    }
+
+    /// The most bytes that the file of the numbers can have.
+    fn numbers_bytes_max(&self) -> u64 {
+        4 * self.network.parameter_count() as u64 + HEADER_BYTES_MAX
+    }
+
+    /// The network with the numbers of a safetensors file.
+    fn with_numbers(self, bytes: &[u8], path: &Path) -> Result<Checkpoint, FileError> {
+        let tensors = SafeTensors::deserialize(bytes).map_err(|error| FileError::new(path, error, RESTORE))?;
+        let mut weights = Weights::zeros(self.network);
+        from_pytorch(&mut weights, |name, shape| {
+            let tensor = tensors.tensor(name).map_err(|error| {
+                FileError::new(path, format!("tensor {name} of shape {shape:?} expected: {error}"), RESTORE)
+            })?;
+            if tensor.shape() != shape || tensor.dtype() != Dtype::F32 {
+                let found = (tensor.dtype(), tensor.shape());
+                let problem = format!("tensor {name}: expected F32 {shape:?}, found {:?} {:?}", found.0, found.1);
+                return Err(FileError::new(path, problem, RESTORE));
+            }
+            Ok(tensor.data().as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect())
+        })?;
+        if let Some(index) = weights.values().iter().position(|value| !value.is_finite()) {
+            return Err(FileError::new(path, format!("value {index} is not finite"), RESTORE));
+        }
+        Ok(Checkpoint { weights, conditions: self.conditions, inference: self.inference })
+    }
+}
+
 impl Format for ModelFile {
     const NAME: &'static str = "model.toml";
     /// 1 had `format_version`, and the settings of inference under `network`; 2 had of the conditions only the geometry.
@@ -159,44 +207,22 @@ impl Checkpoint {
     /// If a file is missing, damaged or of another schema, or its tensors are those of another network.
     pub fn load(folder: &Path) -> Result<Self, FileError> {
         let about: ModelFile = files::read(folder)?;
-        let path = folder.join(ModelFile::NAME);
-        if (about.log_variance_min, about.log_variance_max) != (LOG_VARIANCE_MIN, LOG_VARIANCE_MAX) {
-            let problem = format!("log-variance bounds [{}, {}]", about.log_variance_min, about.log_variance_max);
-            return Err(FileError::new(&path, problem, SCHEMA_REMEDY));
-        }
-        let sound = about.network.validate().and_then(|()| about.inference.validate());
-        sound.map_err(|error| FileError::new(&path, error, RESTORE))?;
-        let expected = layers(&about.network);
-        if about.layers.len() != expected.len() {
-            let problem = format!("{} layers instead of {}", about.layers.len(), expected.len());
-            return Err(FileError::new(&path, problem, RESTORE));
-        }
-        if let Some((found, expected)) = about.layers.iter().zip(&expected).find(|(found, expected)| found != expected)
-        {
-            let problem = format!("layer {found:?} is not what its network has: {expected:?}");
-            return Err(FileError::new(&path, problem, RESTORE));
-        }
-
+        about.check(&folder.join(ModelFile::NAME))?;
         let path = folder.join(NUMBERS);
-        let bytes_max = 4 * about.network.parameter_count() as u64 + HEADER_BYTES_MAX;
-        let bytes = sums::read(&path, bytes_max)?;
-        let tensors = SafeTensors::deserialize(&bytes).map_err(|error| FileError::new(&path, error, RESTORE))?;
-        let mut weights = Weights::zeros(about.network);
-        from_pytorch(&mut weights, |name, shape| {
-            let tensor = tensors.tensor(name).map_err(|error| {
-                FileError::new(&path, format!("tensor {name} of shape {shape:?} expected: {error}"), RESTORE)
-            })?;
-            if tensor.shape() != shape || tensor.dtype() != Dtype::F32 {
-                let found = (tensor.dtype(), tensor.shape());
-                let problem = format!("tensor {name}: expected F32 {shape:?}, found {:?} {:?}", found.0, found.1);
-                return Err(FileError::new(&path, problem, RESTORE));
-            }
-            Ok(tensor.data().as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect())
-        })?;
-        if let Some(index) = weights.values().iter().position(|value| !value.is_finite()) {
-            return Err(FileError::new(&path, format!("value {index} is not finite"), RESTORE));
-        }
-        Ok(Self { weights, conditions: about.conditions, inference: about.inference })
+        let numbers = sums::read(&path, about.numbers_bytes_max())?;
+        about.with_numbers(&numbers, &path)
+    }
+
+    /// The same of the contents of both files, for a network that is part of a program. `folder` is what errors call the place
+    /// that they come from.
+    ///
+    /// # Errors
+    /// See [`Self::load`].
+    pub fn from_contents(model: &str, numbers: &[u8], folder: &Path) -> Result<Self, FileError> {
+        let path = folder.join(ModelFile::NAME);
+        let about: ModelFile = files::parse(model, &path)?;
+        about.check(&path)?;
+        about.with_numbers(numbers, &folder.join(NUMBERS))
     }
 
     /// The patch of ground its grids show and its answers are fractions of.

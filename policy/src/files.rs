@@ -37,19 +37,24 @@ pub(crate) fn write<T: Format>(folder: &Path, content: &T) -> Result<(), FileErr
 pub(crate) fn read<T: Format>(folder: &Path) -> Result<T, FileError> {
     let path = folder.join(T::NAME);
     let text = sums::read_to_string(&path, T::BYTES_MAX)?;
-    let mut table: Table = text.parse().map_err(|error| FileError::new(&path, error, RESTORE_REMEDY))?;
+    parse(&text, &path)
+}
+
+/// What the text of a file says; errors name the file.
+pub(crate) fn parse<T: Format>(text: &str, path: &Path) -> Result<T, FileError> {
+    let mut table: Table = text.parse().map_err(|error| FileError::new(path, error, RESTORE_REMEDY))?;
     match table.remove("schema") {
         Some(Value::Integer(schema)) if schema == i64::from(T::SCHEMA) => {}
         Some(schema) => {
             let problem = format!("schema {schema}; this program reads schema {}", T::SCHEMA);
-            return Err(FileError::new(&path, problem, SCHEMA_REMEDY));
+            return Err(FileError::new(path, problem, SCHEMA_REMEDY));
         }
         None => {
             let problem = format!("no schema number, so it is from an older version; this one reads {}", T::SCHEMA);
-            return Err(FileError::new(&path, problem, SCHEMA_REMEDY));
+            return Err(FileError::new(path, problem, SCHEMA_REMEDY));
         }
     }
-    T::deserialize(Value::Table(table)).map_err(|error| FileError::new(&path, error, RESTORE_REMEDY))
+    T::deserialize(Value::Table(table)).map_err(|error| FileError::new(path, error, RESTORE_REMEDY))
 }
 
 /// Reads a file from its folder; `None` if it is not finished.

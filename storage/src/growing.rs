@@ -12,11 +12,12 @@ use std::path::{Path, PathBuf};
 const REMEDY: &str = "restore it from a copy; or delete it and the file that ends in .unfinished to begin this again";
 
 /// Files that grow part by part: a part is added to all of them, or to none. The file `NAME.unfinished` says how far they
-/// are whole.
+/// are whole, and of what they are.
 #[derive(Debug)]
 pub struct Growing {
     folder: PathBuf,
     mark: PathBuf,
+    origin: String,
     files: Vec<GrowingFile>,
     parts: usize,
 }
@@ -31,14 +32,16 @@ struct GrowingFile {
 
 impl Growing {
     /// Opens files of a folder as an interrupted process left them, without what it was adding, or creates them. `name`:
-    /// what is done there.
+    /// what is done there. `origin`: a digest of what the files follow from, so that those of another run, copied beside
+    /// this one, are not continued.
     ///
     /// # Errors
-    /// If a file cannot be read or written, or is not what was written into it.
-    pub fn open(folder: &Path, name: &str, files: &[&str]) -> Result<Self, FileError> {
+    /// If a file cannot be read or written, is not what was written into it, or is of another origin.
+    pub fn open(folder: &Path, name: &str, origin: &str, files: &[&str]) -> Result<Self, FileError> {
         let mark = mark_of(folder, name);
-        let left = sealed::read(&mark)?.map(|text| Mark::parse(&mark, &text, files)).transpose()?;
-        let mut growing = Self { folder: folder.to_owned(), mark, files: Vec::new(), parts: 0 };
+        let left = sealed::read(&mark)?.map(|text| Mark::parse(&mark, &text, origin, files)).transpose()?;
+        let origin = origin.to_owned();
+        let mut growing = Self { folder: folder.to_owned(), mark, origin, files: Vec::new(), parts: 0 };
         for (index, &name) in files.iter().enumerate() {
             let path = folder.join(name);
             let failed = |error: std::io::Error| FileError::new(&path, error, whole::WRITE_REMEDY);
@@ -91,7 +94,7 @@ impl Growing {
             file.sha256.update(text);
         }
         self.parts += 1;
-        let mut mark = format!("{}\n", self.parts);
+        let mut mark = format!("{} {}\n", self.parts, self.origin);
         for GrowingFile { name, bytes, sha256, .. } in &self.files {
             let _ = writeln!(mark, "{bytes} {} {name}", sums::hex(&sha256.clone().finalize()));
         }
@@ -130,11 +133,15 @@ struct Mark {
 }
 
 impl Mark {
-    fn parse(path: &Path, text: &[u8], names: &[&str]) -> Result<Self, FileError> {
+    fn parse(path: &Path, text: &[u8], origin: &str, names: &[&str]) -> Result<Self, FileError> {
         let text = String::from_utf8_lossy(text);
         let mut lines = text.lines();
+        let (parts, of) = lines.next().and_then(|line| line.split_once(' ')).unwrap_or_default();
+        if of != origin {
+            return Err(FileError::new(path, "was left by another run", REMEDY));
+        }
         let mut mark = || {
-            let parts = lines.next()?.parse().ok()?;
+            let parts = parts.parse().ok()?;
             let files = names.iter().map(|&name| {
                 let (bytes, rest) = lines.next()?.split_once(' ')?;
                 let (sum, of) = rest.split_once(' ')?;
@@ -170,7 +177,7 @@ mod tests {
         let folder = std::env::temp_dir().join(format!("storage-test-{}-growing-damage", std::process::id()));
         let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).unwrap();
-        let mut growing = Growing::open(&folder, "driving", &["runs"]).unwrap();
+        let mut growing = Growing::open(&folder, "driving", "this", &["runs"]).unwrap();
         growing.add(&[b"1\n".to_vec()]).unwrap();
         fs::write(folder.join("runs"), "2\n").unwrap();
         growing.finish().unwrap();
@@ -188,7 +195,8 @@ mod tests {
         fs::write(&diary, "dear").unwrap();
         std::os::unix::fs::symlink(&diary, folder.join("runs")).unwrap();
         assert!(
-            Growing::open(&folder, "driving", &["runs"]).is_err_and(|error| error.to_string().contains("a regular"))
+            Growing::open(&folder, "driving", "this", &["runs"])
+                .is_err_and(|error| error.to_string().contains("a regular"))
         );
         assert_eq!(fs::read(&diary).unwrap(), b"dear");
         fs::remove_dir_all(folder).unwrap();
@@ -200,7 +208,7 @@ mod tests {
         let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).unwrap();
         let names = ["runs", "failures"];
-        let open = || Growing::open(&folder, "driving", &names);
+        let open = || Growing::open(&folder, "driving", "this", &names);
         let contents =
             |growing: &Growing| [0, 1].map(|index| io::read_to_string(growing.reader(index).unwrap()).unwrap());
         let part = |n: u8| [vec![n, b'\n'], vec![]];
@@ -215,6 +223,8 @@ mod tests {
         assert_eq!((growing.parts(), contents(&growing)), (2, ["1\n2\n".to_owned(), String::new()]));
         growing.add(&part(b'3')).unwrap();
         drop(growing);
+        let of_other = Growing::open(&folder, "driving", "another", &names).unwrap_err().to_string();
+        assert!(of_other.contains("driving.unfinished: was left by another run"), "{of_other}");
         let whole = fs::read(folder.join("runs")).unwrap();
         for damaged in ["1\n2\n4\n", "1\n2\n", ""] {
             fs::write(folder.join("runs"), damaged).unwrap();

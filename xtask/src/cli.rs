@@ -45,7 +45,7 @@ const EXAMPLES: &str = "\
 Examples:
   cargo xtask train-dagger                       train, print the paper's table, drive three lots and others
   cargo xtask train-dagger --preset smoke        every step of it in seconds
-  cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1
+  cargo xtask evaluate --driver expert trained:default
   cargo xtask settings --explain dagger.eta      what a setting means
   cargo xtask generate --lots lot-a --out lots   TOML and a picture";
 

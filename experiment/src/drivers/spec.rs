@@ -1,6 +1,7 @@
 //! How drivers are named.
 
 use super::planner_file::{self, Parameters};
+use super::shipped;
 use anyhow::{bail, ensure};
 use planners::PlannerSpec;
 use policy::checkpoint::Checkpoint;
@@ -25,9 +26,14 @@ pub enum DriverSpec {
         /// The folder.
         folder: PathBuf,
     },
+    /// `trained:NAME`: a network that ships.
+    Shipped {
+        /// Its name.
+        name: String,
+    },
     /// `ensemble:DRIVER,DRIVER`: networks whose answers are taken together.
     Ensemble {
-        /// `run:` and `net:` drivers, at least one.
+        /// `trained:`, `run:` and `net:` drivers, at least one.
         members: Vec<DriverSpec>,
     },
     /// `onnx:FILE`: a network from an ONNX file, trained anywhere.
@@ -54,10 +60,11 @@ pub fn specs() -> Vec<(String, String)> {
     let own = [
         ("expert", "the scripted expert; sees the truth"),
         ("grid-expert", "the expert's rules on the noisy grid, as the networks see it"),
+        ("trained:default", "the network that cargo xtask train-dagger trains, as it ships (policy/trained/)"),
         ("run:DIR", "the final policy of a training run; if an ensemble was trained, all of its networks"),
         ("run:DIR/bc", "its policy after behaviour cloning, one network"),
         ("net:DIR", "a network by the folder of its checkpoint, e.g. a run's round-03"),
-        ("ensemble:DRIVER,DRIVER", "run: and net: drivers whose answers are taken together"),
+        ("ensemble:DRIVER,DRIVER", "run:, net: and trained: drivers whose answers are taken together"),
         ("onnx:FILE", "a network from an ONNX file, trained anywhere (docs/formats.md)"),
     ];
     let of_files = [
@@ -86,6 +93,9 @@ impl FromStr for DriverSpec {
             None if text == "expert" => Ok(Self::Expert),
             None if text == "grid-expert" => Ok(Self::GridExpert),
             None if is_planner(text) => planner(text, Parameters::Published),
+            Some(("trained", name)) if shipped::names().any(|known| known == name) => {
+                Ok(Self::Shipped { name: name.to_owned() })
+            }
             Some(("run", folder)) => Ok(Self::Run { folder: folder.into() }),
             Some(("net", folder)) => Ok(Self::Checkpoint { folder: folder.into() }),
             Some(("ensemble", members)) => Self::ensemble(members),
@@ -126,6 +136,7 @@ impl fmt::Display for DriverSpec {
             Self::GridExpert => f.write_str("grid-expert"),
             Self::Run { folder } => write!(f, "run:{}", folder.display()),
             Self::Checkpoint { folder } => write!(f, "net:{}", folder.display()),
+            Self::Shipped { name } => write!(f, "trained:{name}"),
             Self::Ensemble { members } => {
                 let members: Vec<String> = members.iter().map(Self::to_string).collect();
                 write!(f, "ensemble:{}", members.join(","))
@@ -176,7 +187,14 @@ impl DriverSpec {
 
     /// Whether it is a learned policy.
     pub fn is_network(&self) -> bool {
-        matches!(self, Self::Run { .. } | Self::Checkpoint { .. } | Self::Ensemble { .. } | Self::Onnx { .. })
+        match self {
+            Self::Run { .. }
+            | Self::Checkpoint { .. }
+            | Self::Shipped { .. }
+            | Self::Ensemble { .. }
+            | Self::Onnx { .. } => true,
+            Self::Expert | Self::GridExpert | Self::Planner { .. } | Self::Callback { .. } => false,
+        }
     }
 
     /// The training run it comes from, of an ensemble the first one; `/bc` is part of it.
@@ -187,6 +205,7 @@ impl DriverSpec {
             Self::Expert
             | Self::GridExpert
             | Self::Checkpoint { .. }
+            | Self::Shipped { .. }
             | Self::Onnx { .. }
             | Self::Planner { .. }
             | Self::Callback { .. } => None,
@@ -201,7 +220,9 @@ impl DriverSpec {
             Self::Run { folder } | Self::Checkpoint { folder } => vec![folder],
             Self::Ensemble { members } => members.iter().flat_map(Self::places).collect(),
             Self::Onnx { file } | Self::Planner { parameters: Parameters::File(file), .. } => vec![file],
-            Self::Expert | Self::GridExpert | Self::Planner { .. } | Self::Callback { .. } => Vec::new(),
+            Self::Expert | Self::GridExpert | Self::Shipped { .. } | Self::Planner { .. } | Self::Callback { .. } => {
+                Vec::new()
+            }
         }
     }
 
@@ -209,7 +230,7 @@ impl DriverSpec {
         let members: Vec<Self> = members.split(',').map(str::parse).collect::<anyhow::Result<_>>()?;
         for (at, member) in members.iter().enumerate() {
             ensure!(
-                matches!(member, Self::Run { .. } | Self::Checkpoint { .. }),
+                matches!(member, Self::Run { .. } | Self::Checkpoint { .. } | Self::Shipped { .. }),
                 "{member} cannot be part of an ensemble; its members are networks, as in ensemble:run:A,net:B/round-03"
             );
             ensure!(
@@ -232,6 +253,8 @@ mod tests {
             "grid-expert",
             "run:runs/mine/bc",
             "net:runs/mine/round-03",
+            "trained:default",
+            "ensemble:trained:default,run:runs/a",
             "ensemble:run:runs/a,net:runs/b/round-02",
             "onnx:policies/mine.onnx",
             "tentacle",
@@ -242,17 +265,18 @@ mod tests {
             assert_eq!(text.parse::<DriverSpec>().unwrap().to_string(), text);
         }
         for (wrong, known) in [
-            ("exprt", "did you mean expert?; there are expert, grid-expert, run:DIR"),
+            ("exprt", "did you mean expert?; there are expert, grid-expert, trained:default, run:DIR"),
             ("Tentacle", "did you mean tentacle?"),
             ("expert,tentacle", "with spaces between them"),
             ("run:", "names no folder or file"),
+            ("trained:Default", "did you mean trained:default?"),
             ("dwa:", "names no folder or file"),
-            ("", "there are expert, grid-expert, run:DIR"),
-            ("runs/mine", "there are expert, grid-expert, run:DIR"),
+            ("", "there are expert, grid-expert, trained:default, run:DIR"),
+            ("runs/mine", "there are expert, grid-expert, trained:default, run:DIR"),
             ("ensemble:run:runs/a,expert", "expert cannot be part of an ensemble"),
             ("ensemble:run:runs/a,run:runs/a", "named twice"),
             ("ensemble:run:runs/a,run:./runs/a", "named twice"),
-            ("ensemble:", "there are expert, grid-expert, run:DIR"),
+            ("ensemble:", "there are expert, grid-expert, trained:default, run:DIR"),
             ("python:mine", "lotpilot.evaluate"),
             ("tuned:tentacles", "there are tuned:tentacle, tuned:vvf"),
         ] {

@@ -35,7 +35,7 @@ Examples:
   cargo xtask evaluate --driver expert --lots lot-a --trials 2
   cargo xtask evaluate --driver run:runs/train-dagger-default-s1/bc --driver run:runs/train-dagger-default-s1
   cargo xtask evaluate --driver net:runs/train-dagger-default-s1/round-03 --lots lot-b --noise hard --out runs/hard
-  cargo xtask evaluate --driver expert --driver run:runs/train-dagger-default-s1 --noise sweep --lots test:100
+  cargo xtask evaluate --driver expert trained:default --noise sweep --lots test:100
   cargo xtask evaluate --driver run:runs/s1 --lots sealed:mine:4800:all --trials 1 --shard 2/16 --out shards/2
   cargo xtask evaluate --driver onnx:mine-{1,2,3}.onnx run:runs/s{1,2,3} --method 'mine=onnx:mine-*' --lots test:100
   cargo xtask evaluate --resume runs/hard";

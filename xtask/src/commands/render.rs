@@ -48,10 +48,10 @@ pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask render lot --lots lot-a,test:2
   cargo xtask render contact-sheet --lots train:6:easy,train:6,train:6:hard
-  cargo xtask render trajectories --driver expert --driver run:runs/NAME --lots lot-b
+  cargo xtask render trajectories --driver expert trained:default --lots lot-b
   cargo xtask render trajectories --driver expert --lots lot-a --by speed
   cargo xtask render trajectories --run runs/NAME --round 1
-  cargo xtask render animation --driver expert --driver run:runs/NAME --lots lot-b
+  cargo xtask render animation --driver expert trained:default --lots lot-b
   cargo xtask render animation 'tentacle@lot-b@forward@0@paper@1@842'
   cargo xtask render samples runs/NAME/round-01 --count 8
   cargo xtask render noise --lots lot-a --noise paper,hard
@@ -78,12 +78,12 @@ pub(crate) enum RenderWhat {
     Lot(RenderLotArgs),
     /// The lines drivers drove over a lot, PNG and SVG.
     #[command(
-        after_help = "Examples:\n  cargo xtask render trajectories --driver expert --driver run:runs/NAME --lots lot-b\n  cargo xtask render trajectories --run runs/NAME --round 1"
+        after_help = "Examples:\n  cargo xtask render trajectories --driver expert trained:default --lots lot-b\n  cargo xtask render trajectories --run runs/NAME --round 1"
     )]
     Trajectories(TrajectoriesArgs),
     /// Drives that move: lot and grids side by side, GIF or APNG.
     #[command(
-        after_help = "Examples:\n  cargo xtask render animation --driver expert --driver run:runs/NAME --lots lot-b\n  cargo xtask render animation 'tentacle@lot-b@forward@0@paper@1@842'"
+        after_help = "Examples:\n  cargo xtask render animation --driver expert trained:default --lots lot-b\n  cargo xtask render animation 'tentacle@lot-b@forward@0@paper@1@842'"
     )]
     Animation(AnimationArgs),
     /// Many lots on one page, PNG and SVG.

@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 pub(crate) const EXAMPLES: &str = "\
 Examples:
   cargo xtask visualise lot --lots lot-b
-  cargo xtask visualise episode --driver expert --driver run:runs/train-dagger-default-s1 --lots lot-b
+  cargo xtask visualise episode --driver expert trained:default --lots lot-b
   cargo xtask visualise replay run:runs/train-dagger-default-s1@lot-b@reverse@3@paper@1@842
   cargo xtask visualise run runs/train-dagger-default-s1
   cargo xtask visualise failures runs/evaluate-default-s1 --limit 5
@@ -63,9 +63,7 @@ enum What {
     #[command(after_help = "Example: cargo xtask visualise lot --lots lot-b")]
     Lot(LotArgs),
     /// An episode of an evaluation, driven by one driver, or by several side by side.
-    #[command(
-        after_help = "Example: cargo xtask visualise episode --driver expert --driver run:runs/NAME --lots lot-b"
-    )]
+    #[command(after_help = "Example: cargo xtask visualise episode --driver expert trained:default --lots lot-b")]
     Episode(EpisodeArgs),
     /// The run of a replay key, around its moment.
     #[command(after_help = "Example: cargo xtask visualise replay run:runs/NAME@lot-b@reverse@3@paper@1@842")]
