@@ -145,6 +145,13 @@ def test_an_evaluation_never_takes_the_place_of_what_it_reads(tmp_path):
     assert lot.exists() and (mine / "finished.toml").exists()
 
 
+def test_the_network_that_ships_needs_no_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    runs = lotpilot.evaluate("trained:default", "lot-b", trials=1).runs
+    assert runs["driver"] == ["trained:default"] * 2
+    assert sum(runs["near_collisions"]) < 4 and sum(runs["driven_m"]) > 200
+
+
 def test_functions_are_judged_together_as_trainings_of_one_method():
     def towards(left):
         return lambda grids: np.tile([8.0, left], (len(grids), 1))
