@@ -19,7 +19,7 @@ fn read(numbers: &[u8], model: &[u8]) -> Option<Checkpoint> {
     Checkpoint::from_contents(std::str::from_utf8(model).ok()?, numbers, Path::new("network")).ok()
 }
 
-/// The first byte says which file is made up, the rest is its content.
+// The first byte says which file is made up, the rest is its content.
 fuzz_target!(|data: &[u8]| {
     let (which, content) = data.split_first().unwrap_or((&0, &[]));
     let [(_, numbers), (_, model)] = &SOUND[..] else { unreachable!("two files") };
