@@ -35,6 +35,7 @@ use policy::dagger::IterationRow;
 use policy::decision_rule::{ChiOn, DecisionRule};
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
+use std::collections::HashMap;
 use std::path::Path;
 
 /// How much is done, besides what the settings say: the arguments in the manifest.
@@ -312,18 +313,10 @@ pub enum Part {
 pub fn share(stages: Vec<Stage>, part: Part, shard: Shard) -> Vec<Stage> {
     match part {
         Part::Trainings => {
-            // What is dealt out, by folder: a training that needs the samples of another goes with it.
-            let mut units: Vec<String> = Vec::new();
-            let mut is_taken = |stage: &Stage| {
-                let Step::Train { samples_of, .. } = &stage.step else { return false };
-                let unit = samples_of.as_ref().unwrap_or(&stage.folder);
-                let index = units.iter().position(|known| known == unit).unwrap_or_else(|| {
-                    units.push(unit.clone());
-                    units.len() - 1
-                });
-                shard.takes(index)
-            };
-            let taken: Vec<Stage> = stages.into_iter().filter(|stage| is_taken(stage)).collect();
+            let dealt = dealt_out(&stages, shard.of());
+            let is_taken = |place: &Option<usize>| place.is_some_and(|place| shard.takes(place));
+            let taken: Vec<Stage> =
+                stages.into_iter().zip(dealt).filter_map(|(stage, place)| is_taken(&place).then_some(stage)).collect();
             let folders: Vec<String> = taken.iter().map(|stage| stage.folder.clone()).collect();
             let with_its_cloning = |mut stage: Stage| {
                 if let Step::Train { cloning_of, .. } = &mut stage.step {
@@ -342,6 +335,40 @@ pub fn share(stages: Vec<Stage>, part: Part, shard: Shard) -> Vec<Stage> {
             stages.into_iter().filter_map(shared_out).collect()
         }
     }
+}
+
+/// The place of each training in the order in which they are dealt out; `None` for what trains nothing. A training that needs
+/// the samples of another goes with it. So do all that begin with one behaviour cloning, which is trained once that way,
+/// unless there are more shards than clonings.
+fn dealt_out(stages: &[Stage], shards: u32) -> Vec<Option<usize>> {
+    let steps: HashMap<&str, &Step> = stages.iter().map(|stage| (stage.folder.as_str(), &stage.step)).collect();
+    let with_samples = |folder: &str| match steps.get(folder) {
+        Some(Step::Train { samples_of: Some(other), .. }) => other.clone(),
+        _ => folder.to_owned(),
+    };
+    let with_cloning = |folder: &str| {
+        let mut first = folder;
+        while let Some(Step::Train { cloning_of: Some(other), .. }) = steps.get(first) {
+            first = other;
+        }
+        first.to_owned()
+    };
+    let places = |unit: &dyn Fn(&str) -> String| {
+        let mut units: Vec<String> = Vec::new();
+        let mut place = |stage: &Stage| {
+            let Step::Train { .. } = stage.step else { return None };
+            let unit = unit(&stage.folder);
+            let known = units.iter().position(|known| *known == unit);
+            Some(known.unwrap_or_else(|| {
+                units.push(unit);
+                units.len() - 1
+            }))
+        };
+        let places: Vec<Option<usize>> = stages.iter().map(&mut place).collect();
+        (places, units.len())
+    };
+    let (by_cloning, clonings) = places(&with_cloning);
+    if clonings >= shards as usize { by_cloning } else { places(&with_samples).0 }
 }
 
 fn trainings(settings: &Settings, extent: &Extent) -> Vec<Stage> {
@@ -620,26 +647,35 @@ mod tests {
     fn shards_have_every_training_once_and_all_of_them_drive() {
         let (settings, extent) = (Settings::preset("default").unwrap(), extent());
         let stages = all(&settings, &extent, Path::new("R")).unwrap();
-        let of = |part| "1/4".parse::<Shard>().unwrap().all().map(move |shard| (part, shard));
-        let shares = |part| of(part).map(|(part, shard)| share(stages.clone(), part, shard)).collect::<Vec<_>>();
-        let trained = shares(Part::Trainings);
-        let mut folders: Vec<&str> = trained.iter().flatten().map(|stage| stage.folder.as_str()).collect();
-        folders.sort_unstable();
+        let shares = |part, of: &str| {
+            let shards = of.parse::<Shard>().unwrap().all();
+            shards.map(|shard| share(stages.clone(), part, shard)).collect::<Vec<_>>()
+        };
         let mut expected: Vec<&str> =
             stages.iter().map(|stage| stage.folder.as_str()).filter(|folder| folder.starts_with("chains")).collect();
         expected.sort_unstable();
-        assert_eq!(folders, expected);
-        // The first shard has the chain whose behaviour cloning the fifth takes over; the second has not.
         let weighted = Chain::Weighted.folder(settings.seed);
-        assert_eq!(trained[0][2].step, Step::Train { cloning_of: Some(weighted.clone()), samples_of: None });
-        assert_eq!(trained[1][0].step, Step::Train { cloning_of: None, samples_of: None });
-        // What needs the samples of another is trained where that one is.
         let equal = Step::Train { cloning_of: Some(weighted.clone()), samples_of: Some(weighted.clone()) };
-        for shard in trained {
-            let has = |folder: &str| shard.iter().any(|stage| stage.folder == folder);
-            assert_eq!(has(&weighted), shard.iter().any(|stage| stage.step == equal));
+        for of in ["1/1", "1/2", "1/3", "1/4", "1/8", "1/16"] {
+            let trained = shares(Part::Trainings, of);
+            let mut folders: Vec<&str> = trained.iter().flatten().map(|stage| stage.folder.as_str()).collect();
+            folders.sort_unstable();
+            assert_eq!(folders, expected, "{of}");
+            // What needs the samples of another is trained where that one is.
+            for shard in trained {
+                let has = |folder: &str| shard.iter().any(|stage| stage.folder == folder);
+                assert_eq!(has(&weighted), shard.iter().any(|stage| stage.step == equal), "{of}");
+            }
         }
-        for driven in shares(Part::Drives) {
+        // Three behaviour clonings, of the seed, of far points and of a person: three machines train each of them once, in the
+        // steps of one machine.
+        let few = shares(Part::Trainings, "1/3");
+        assert!(few.iter().flatten().all(|stage| stages.contains(stage)));
+        // More of them would have nothing to do that way: the second has the chain with α = 0, and trains its cloning itself.
+        let many = shares(Part::Trainings, "1/8");
+        assert_eq!(many[1].len(), 1);
+        assert_eq!(many[1][0].step, Step::Train { cloning_of: None, samples_of: None });
+        for driven in shares(Part::Drives, "1/4") {
             assert_eq!(driven.len(), 9);
             assert!(driven.iter().all(|stage| stage.folder.starts_with("drives") && stage.estimate_s() > 0.0));
         }
