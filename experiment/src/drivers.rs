@@ -64,7 +64,7 @@ impl DriverSpec {
                 trained::ensure_run_of_network(folder)?;
                 Ok(vec![Checkpoint::load(folder)?])
             }
-            Self::Shipped { name } => Ok(vec![shipped::network(name)?.0]),
+            Self::Shipped { name } => Ok(vec![shipped::network(name)?]),
             Self::Ensemble { members } => {
                 let networks = members.iter().map(Self::checkpoints).collect::<anyhow::Result<Vec<_>>>()?;
                 let first = &networks[0][0];
@@ -89,7 +89,7 @@ impl DriverSpec {
         match self {
             Self::Run { folder } => trained::trained_on(folder),
             Self::Checkpoint { folder } => trained::network_trained_on(folder),
-            Self::Shipped { name } => Ok(shipped::network(name)?.1),
+            Self::Shipped { name } => shipped::trained_on(name),
             Self::Ensemble { members } => {
                 let mut all = TrainedOn::default();
                 for member in members {

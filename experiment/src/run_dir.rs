@@ -516,6 +516,24 @@ mod tests {
         fs::remove_dir_all(path).unwrap();
     }
 
+    /// What an evaluation left unfinished is continued by the same alone.
+    #[test]
+    fn runs_of_other_settings_or_arguments_have_another_identity_and_one_that_is_resumed_keeps_its_own() {
+        let path = scratch("identity");
+        let settings = Settings::preset("smoke").unwrap();
+        let identity = |settings: &Settings, key: &str| {
+            let arguments = [(key.to_owned(), 1.into())].into_iter().collect();
+            let request = Request { arguments, ..Request::default() };
+            RunDir::create(&place(&path, true), settings, &request).unwrap().identity().unwrap()
+        };
+        let one = identity(&settings, "a");
+        assert_eq!(RunDir::resume(&path, "train-dagger").unwrap().0.identity().unwrap(), one);
+        assert_eq!(identity(&settings, "a"), one, "it depends on nothing else");
+        assert_ne!(identity(&settings, "b"), one);
+        assert_ne!(identity(&Settings { seed: RootSeed(2), ..settings }, "a"), one);
+        fs::remove_dir_all(path).unwrap();
+    }
+
     /// A finished run that somebody put in the place of a stage was taken for it, whatever its seed.
     #[test]
     fn another_run_in_the_place_of_a_stage_is_refused() {

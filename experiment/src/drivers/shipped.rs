@@ -31,17 +31,28 @@ pub(super) fn names() -> impl Iterator<Item = &'static str> {
     SHIPPED.iter().map(|shipped| shipped.name)
 }
 
-/// One of them, and the lots that it was trained on.
+fn find(name: &str) -> anyhow::Result<&'static Shipped> {
+    let shipped = SHIPPED.iter().find(|shipped| shipped.name == name);
+    shipped.with_context(|| format!("no network {name:?} ships"))
+}
+
+/// One of them.
 ///
 /// # Errors
 /// If none is named so.
-pub(super) fn network(name: &str) -> anyhow::Result<(Checkpoint, TrainedOn)> {
-    let shipped = SHIPPED.iter().find(|shipped| shipped.name == name);
-    let shipped = shipped.with_context(|| format!("no network {name:?} ships"))?;
+pub(super) fn network(name: &str) -> anyhow::Result<Checkpoint> {
+    let shipped = find(name)?;
     let folder = Path::new("policy/trained").join(name);
-    let network = Checkpoint::from_contents(shipped.model, shipped.numbers, &folder)?;
-    let settings: Settings = toml::from_str(shipped.settings)?;
-    Ok((network, TrainedOn { lots: settings.training.lots.into_iter().collect(), ..TrainedOn::default() }))
+    Ok(Checkpoint::from_contents(shipped.model, shipped.numbers, &folder)?)
+}
+
+/// What one of them was trained on.
+///
+/// # Errors
+/// If none is named so.
+pub(super) fn trained_on(name: &str) -> anyhow::Result<TrainedOn> {
+    let settings: Settings = toml::from_str(find(name)?.settings)?;
+    Ok(TrainedOn { lots: settings.training.lots.into_iter().collect(), ..TrainedOn::default() })
 }
 
 #[cfg(test)]
@@ -57,13 +68,16 @@ mod tests {
             let trained: Settings = toml::from_str(shipped.settings).unwrap();
             let remedy = "train it again, as CONTRIBUTING.md says";
             assert_eq!(trained, Settings { evaluation: trained.evaluation.clone(), ..preset.clone() }, "{remedy}");
-            let (network, trained_on) = network(shipped.name).unwrap();
+            let network = network(shipped.name).unwrap();
             assert_eq!(network.weights.architecture(), preset.dagger.network, "{remedy}");
             assert_eq!(
                 (network.conditions, network.inference),
                 (Conditions::of(&preset.episode), preset.dagger.inference)
             );
-            assert_eq!(trained_on.lots, preset.training.lots.into_iter().collect());
+            assert_eq!(trained_on(shipped.name).unwrap().lots, preset.training.lots.into_iter().collect());
+            // Verified by the sums beside it.
+            let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../policy/trained").join(shipped.name);
+            assert!(network == Checkpoint::load(&folder).unwrap(), "{remedy}");
         }
     }
 }
