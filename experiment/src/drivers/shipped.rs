@@ -71,8 +71,8 @@ mod tests {
             let network = network(shipped.name).unwrap();
             assert_eq!(network.weights.architecture(), preset.dagger.network, "{remedy}");
             assert_eq!(
-                (network.conditions, network.inference),
-                (Conditions::of(&preset.episode), preset.dagger.inference)
+                (&network.conditions, &network.inference),
+                (&Conditions::of(&preset.episode), &preset.dagger.inference)
             );
             assert_eq!(trained_on(shipped.name).unwrap().lots, preset.training.lots.into_iter().collect());
             // Verified by the sums beside it.
