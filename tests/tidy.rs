@@ -3,7 +3,7 @@
 use crate::bench::{cargo, root, succeed};
 use crate::import_graph::Crate;
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Normal dependencies (no dev, no build) of every workspace member.
@@ -53,6 +53,21 @@ const LAYERS: [(&str, &[&str]); 13] = [
         ],
     ),
 ];
+
+/// `cargo test` compiled burn, and all that uses it, a second time: two crates that only tests use asked for one feature more of
+/// what burn depends on. `cargo tree -e features -i CRATE` says who asks for what.
+#[test]
+fn tests_compile_no_library_again() {
+    let with_features = |edges: &str| -> BTreeSet<String> {
+        let tree = ["tree", "--workspace", "--offline", "--prefix", "none", "--format", "{p} {f}", "--edges", edges];
+        let tree = succeed(cargo().args(tree));
+        tree.lines().map(|line| line.trim_end_matches(" (*)").to_owned()).collect()
+    };
+    let of_command = with_features("normal,build");
+    assert!(of_command.iter().any(|line| line.starts_with("burn-core v")), "{of_command:?}");
+    let twice: Vec<String> = of_command.difference(&with_features("normal,build,dev")).cloned().collect();
+    assert_eq!(twice, [""; 0], "tests use these with more features: ask for them in Cargo.toml, too");
+}
 
 #[test]
 fn dependencies_point_one_way() {
