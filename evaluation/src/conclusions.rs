@@ -2,7 +2,7 @@
 //!
 //! A comparison holds where the interval of 95 % of the paired difference lies on the paper's side of zero, does not hold
 //! where it lies on the other, and cannot be told where it contains zero. Where there are several trainings of a recipe, the
-//! difference in near-collisions is that of their means, and its interval is for other lots and other seeds.
+//! difference is that of their means, and its interval is for other lots and other seeds.
 
 use crate::format::{clustered, difference, exact_rate, interval, quoted_interval, quoted_rate};
 use crate::incidents::Cause;
@@ -20,6 +20,7 @@ use crate::statistics::student::half_width_of_mean;
 use crate::totals::Totals;
 use crate::trainings::{self, JudgedTeams, TRAININGS_MIN, Team, TeamEstimate};
 use experiment::drivers::NamedDriver;
+use experiment::settings::Smoothing;
 use policy::dagger::IterationRow;
 use serde::Serialize;
 use statrs::statistics::Statistics as _;
@@ -250,17 +251,35 @@ impl Against<'_> {
         }
     }
 
+    /// The difference of another driver's mean from DAgger's, over all trainings where they can be judged together.
+    fn difference(
+        &self,
+        other: usize,
+        of_trainings: impl Fn(&TeamEstimate) -> Interval,
+        of_pair: impl Fn(&Comparison) -> Option<Interval>,
+    ) -> Option<Interval> {
+        let comparison = self.comparison(other)?;
+        match self.trainings.as_ref().and_then(|trainings| trainings.of(other)) {
+            Some((_, estimate)) => Some(of_trainings(estimate)),
+            None => of_pair(comparison),
+        }
+    }
+
+    /// A figure of a driver, of each of its trainings.
+    fn each(&self, driver: usize, digits: usize, of: impl Fn(&Totals) -> f64) -> String {
+        let all = self.trainings_of(&driver).iter();
+        let each: Vec<String> = all.map(|&driver| format!("{:.digits$}", of(&self.totals(driver)))).collect();
+        format!("{} {}", self.name(driver), each.join(", "))
+    }
+
     fn fails_less(&self, other: usize) -> Statement {
-        let comparison = self.comparison(other);
-        let trainings = self.trainings.as_ref().filter(|_| comparison.is_some());
-        let found = match trainings.and_then(|trainings| trainings.of(other)) {
-            Some((_, estimate)) => Some(estimate.difference_per_100m),
-            None => comparison.and_then(|comparison| comparison.difference_per_100m),
-        };
+        let found =
+            self.difference(other, |estimate| estimate.difference_per_100m, |comparison| comparison.difference_per_100m);
         let verdict = Verdict::of(found);
         let (ours, theirs) = (self.rate(self.dagger), self.rate(other));
         let mut figures = format!("{ours}; {theirs}; difference {}", difference(found, 2));
-        if verdict == Verdict::CannotBeTold && trainings.is_none() {
+        let is_of_single = self.trainings.is_none() || self.comparison(other).is_none();
+        if verdict == Verdict::CannotBeTold && is_of_single {
             let both = [other, self.dagger];
             let clustered = both.map(|driver| self.estimates[driver].dispersion.map_or(1.0, |found| found.index));
             let rates = both.map(|driver| self.totals(driver).rate().per_unit);
@@ -271,47 +290,58 @@ impl Against<'_> {
     }
 
     fn keeps_further_away(&self, other: usize) -> Statement {
-        let found = self.comparison(other).and_then(|comparison| comparison.difference_safe_ratio).map(negated);
-        let name = self.name(other);
-        let [ours, theirs] = [self.dagger, other].map(|driver| self.totals(driver).safe_ratio());
+        let of_pair = |comparison: &Comparison| comparison.difference_safe_ratio;
+        let found = self.difference(other, |estimate| estimate.difference_safe_ratio, of_pair).map(negated);
+        let [ours, theirs] = [self.dagger, other].map(|driver| self.each(driver, 3, Totals::safe_ratio));
         Statement {
-            claim: format!("DAgger has a larger safe ratio than {name}"),
+            claim: format!("DAgger has a larger safe ratio than {}", self.name(other)),
             verdict: Verdict::of(found),
             figures: format!(
-                "DAgger {ours:.3}, {name} {theirs:.3}; difference {}; on lots whose widths were fitted to the expert's",
+                "{ours}; {theirs}; difference {}; on lots whose widths were fitted to the expert's",
                 difference(found, 3)
             ),
         }
     }
 
     fn steers_calmer(&self, other: usize) -> Statement {
-        let found = self.comparison(other).and_then(|comparison| comparison.difference_reversals_per_100m);
-        let name = self.name(other);
-        let [ours, theirs] = [self.dagger, other].map(|driver| self.totals(driver).reversals_per_100m());
+        let of_pair = |comparison: &Comparison| comparison.difference_reversals_per_100m;
+        let found = self.difference(other, |estimate| estimate.difference_reversals_per_100m, of_pair);
+        let [ours, theirs] = [self.dagger, other].map(|driver| self.each(driver, 1, Totals::reversals_per_100m));
+        // Two things are compared then: the drivers, and what follows them.
+        let settings = self.driven.plan.settings;
+        let is_smoothed = settings.evaluation.smoothing == Smoothing::Own && settings.dagger.inference.smoothing_ticks > 0.0;
+        let smoothed = if is_smoothed { "; networks' actions are smoothed, those of planners are not" } else { "" };
         Statement {
-            claim: format!("DAgger oscillates less than {name}"),
+            claim: format!("DAgger oscillates less than {}", self.name(other)),
             verdict: Verdict::of(found),
             figures: format!(
-                "steering reversals per 100 m: DAgger {ours:.1}, {name} {theirs:.1}; difference {}",
+                "steering reversals per 100 m: {ours}; {theirs}; difference {}{smoothed}",
                 difference(found, 1)
             ),
         }
     }
 
     /// Near-collisions that the same driver avoids on the clean grid. They are few: compared exactly, without pairs, as if each
-    /// came by itself; not at all where near-collisions of either driver come in clusters, or of too few trials.
+    /// came by itself; not at all where near-collisions of either driver come in clusters, or of too few trials. Several
+    /// trainings drove the same lots and are not counted together: each has to be told from the other driver.
     fn minds_noise_less(&self, other: usize) -> Statement {
-        let noisy = |driver| self.driven.results.count_of_cause(0, driver, &self.slice, Cause::NoiseInduced);
-        let name = self.name(other);
-        let [ours, theirs] = [self.dagger, other].map(|driver| (noisy(driver), self.totals(driver)));
+        let noisy = |driver: usize| {
+            let count = self.driven.results.count_of_cause(0, driver, &self.slice, Cause::NoiseInduced);
+            (count, self.totals(driver))
+        };
         let of = |(noisy, totals): &(u32, Totals)| (*noisy, totals.reference_m / 100.0);
-        let ratio = RateRatio::new(of(&theirs), of(&ours));
-        let is_clustered = [self.dagger, other].into_iter().any(|driver| clustered(&self.estimates[driver]).is_some());
+        let name = self.name(other);
+        let trainings = self.trainings_of(&self.dagger);
+        let ours: Vec<(u32, Totals)> = trainings.iter().map(|&driver| noisy(driver)).collect();
+        let theirs = noisy(other);
+        let ratios: Vec<RateRatio> = ours.iter().map(|ours| RateRatio::new(of(&theirs), of(ours))).collect();
+        let is_clustered =
+            trainings.iter().chain([&other]).any(|&driver| clustered(&self.estimates[driver]).is_some());
         let verdict = if is_clustered || self.comparison(other).is_none() {
             Verdict::CannotBeTold
-        } else if ratio.lower > 1.0 {
+        } else if ratios.iter().all(|ratio| ratio.lower > 1.0) {
             Verdict::Holds
-        } else if ratio.upper.is_some_and(|upper| upper < 1.0) {
+        } else if ratios.iter().all(|ratio| ratio.upper.is_some_and(|upper| upper < 1.0)) {
             Verdict::DoesNotHold
         } else {
             Verdict::CannotBeTold
@@ -321,13 +351,13 @@ impl Against<'_> {
             (false, None) => "; too few trials",
             (false, Some(_)) => "",
         };
+        let counts = ours.iter().map(|(noisy, totals)| format!("{noisy} of {}", totals.near_collisions));
         let figures = format!(
-            "DAgger {} of {}, {name} {} of {}; rate ratio {}, if each came by itself{why_not}",
-            ours.0,
-            ours.1.near_collisions,
+            "DAgger {}, {name} {} of {}; rate ratio {}, if each came by itself{why_not}",
+            counts.collect::<Vec<_>>().join(", "),
             theirs.0,
             theirs.1.near_collisions,
-            ratio_text(&ratio)
+            ratios.iter().map(ratio_text).collect::<Vec<_>>().join(", ")
         );
         Statement { claim: format!("DAgger has fewer noise-induced near-collisions than {name}"), verdict, figures }
     }

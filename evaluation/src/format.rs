@@ -19,6 +19,21 @@ pub fn quoted_interval(totals: &Totals, estimate: &DriverEstimate) -> [f64; 2] {
     wider([rate.lower, rate.upper], clustered(estimate).map(|interval| [interval.lower, interval.upper]))
 }
 
+/// The interval of contacts that may be quoted, per 100 m. They come in clusters (one drive along a wall has many), so it is the
+/// bootstrap's wherever that is wider than the exact one.
+pub fn contacts_interval(totals: &Totals, estimate: &DriverEstimate) -> [f64; 2] {
+    let rate = Rate::new(totals.contacts, totals.reference_m / 100.0);
+    let bootstrap = estimate.contacts_per_100m.map(|interval| [interval.lower, interval.upper]);
+    wider([rate.lower, rate.upper], bootstrap)
+}
+
+/// Contacts, and their rate with the interval that may be quoted.
+pub fn quoted_contacts(totals: &Totals, estimate: &DriverEstimate) -> String {
+    let [lower, upper] = contacts_interval(totals, estimate);
+    let per_100m = Rate::new(totals.contacts, totals.reference_m / 100.0).per_unit;
+    format!("{}: {per_100m:.2} [{lower:.2}, {upper:.2}]", totals.contacts)
+}
+
 /// The exact interval, or the bootstrap's where events cluster: clusters make it wider, and of few events it may be
 /// narrower by chance.
 pub(crate) fn wider(exact: [f64; 2], clustered: Option<[f64; 2]>) -> [f64; 2] {
@@ -86,7 +101,7 @@ mod tests {
         let estimate = |index| DriverEstimate {
             dispersion: Some(Dispersion { index, freedom: 9, p_value: 0.1 }),
             per_100m: Some(interval),
-            safe_ratio: None,
+            ..DriverEstimate::default()
         };
         assert_eq!(quoted_rate(&totals, &estimate(1.5)), "1.37 [1.07, 1.73]");
         assert_eq!(quoted_rate(&totals, &estimate(1.6)), "1.37 [0.90, 2.00] (b)");
@@ -99,6 +114,14 @@ mod tests {
             "1.37 [1.07, 1.73] (b)",
             "never narrower than of events that come alone"
         );
+        let totals = Totals { contacts: 4, ..totals };
+        let contacts = |lower, upper| {
+            let contacts_per_100m = Some(Interval { estimate: 0.077, lower, upper, units: 15 });
+            quoted_contacts(&totals, &DriverEstimate { contacts_per_100m, ..DriverEstimate::default() })
+        };
+        // Garwood's interval of 4 is [1.09, 10.24].
+        assert_eq!(contacts(0.0, 0.3), "4: 0.08 [0.00, 0.30]", "all of them in one drive");
+        assert_eq!(contacts(0.05, 0.1), "4: 0.08 [0.02, 0.20]");
         let around_zero = Interval { lower: -0.1, ..interval };
         assert_eq!(difference(Some(around_zero), 1), "+1.4 [-0.1, +2.0]");
     }

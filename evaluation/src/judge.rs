@@ -18,6 +18,8 @@ pub struct DriverEstimate {
     pub per_100m: Option<Interval>,
     /// Safe ratio, mean over runs.
     pub safe_ratio: Option<Interval>,
+    /// Contacts per 100 m.
+    pub contacts_per_100m: Option<Interval>,
 }
 
 /// A driver against the reference driver. Differences are driver − reference, so that a positive one of
@@ -66,10 +68,11 @@ impl EvaluationResults {
         }
         let others: Vec<usize> = (0..drivers).filter(|&driver| driver != with).collect();
         let intervals = bootstrap(&strata, &others, with, seed);
-        let interval = |index: usize| intervals.as_ref().map(|intervals| intervals[index]);
+        let interval = |place: usize, which: Statistic| Some(intervals.as_ref()?[STATISTICS * place + which as usize]);
         for (driver, estimate) in estimates.iter_mut().enumerate() {
-            estimate.per_100m = interval(STATISTICS * driver);
-            estimate.safe_ratio = interval(STATISTICS * driver + 1);
+            estimate.per_100m = interval(driver, Statistic::NearCollisions);
+            estimate.safe_ratio = interval(driver, Statistic::SafeRatio);
+            estimate.contacts_per_100m = interval(driver, Statistic::Contacts);
         }
         let counts = |driver: usize| {
             let units = pairs.iter().map(|row| row[driver]);
@@ -81,13 +84,13 @@ impl EvaluationResults {
         let ratios: Vec<RateRatio> = others.iter().map(|&other| RateRatio::new(counts(other), counts(with))).collect();
         let p_holm = holm(&ratios.iter().map(|ratio| ratio.p_value).collect::<Vec<_>>());
         let comparisons = others.iter().zip(ratios).zip(p_holm).enumerate().map(|(i, ((&driver, ratio), p_holm))| {
-            let first = STATISTICS * (drivers + i);
+            let place = drivers + i;
             Comparison {
                 driver,
                 pairs: pairs.len(),
-                difference_per_100m: interval(first),
-                difference_safe_ratio: interval(first + 1),
-                difference_reversals_per_100m: interval(first + 2),
+                difference_per_100m: interval(place, Statistic::NearCollisions),
+                difference_safe_ratio: interval(place, Statistic::SafeRatio),
+                difference_reversals_per_100m: interval(place, Statistic::Reversals),
                 ratio,
                 p_holm,
             }
@@ -155,51 +158,93 @@ fn collapsed(strata: Vec<Stratum<'_>>) -> Vec<Stratum<'_>> {
     strata
 }
 
-/// Statistics that are resampled for every driver: near-collisions per 100 m, safe ratio, steering reversals per 100 m
-/// driven.
-const STATISTICS: usize = 3;
+/// What is resampled of every driver, by its place among them.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Statistic {
+    /// Near-collisions per 100 m of route.
+    NearCollisions,
+    /// Safe ratio, mean over runs.
+    SafeRatio,
+    /// Steering reversals per 100 m driven.
+    Reversals,
+    /// Contacts per 100 m of route.
+    Contacts,
+}
+
+/// How many there are.
+pub(crate) const STATISTICS: usize = 4;
 /// Sums per driver that they are made of, behind the runs and the hundreds of metres that all share.
-const COLUMNS: usize = 4;
+const COLUMNS: usize = 5;
 const SHARED: usize = 2;
+
+/// How many sums some drivers have.
+pub(crate) fn columns(drivers: usize) -> usize {
+    SHARED + COLUMNS * drivers
+}
+
+/// Adds a trial, of all drivers, to the sums.
+pub(crate) fn add(sums: &mut [f64], row: &[RunSummary]) {
+    sums[0] += 1.0;
+    sums[1] += f64::from(row[0].reference_m) / 100.0;
+    for (sums, unit) in sums[SHARED..].chunks_exact_mut(COLUMNS).zip(row) {
+        sums[0] += f64::from(unit.near_collisions);
+        sums[1] += f64::from(unit.safe_ratio);
+        sums[2] += f64::from(unit.steering_reversals);
+        sums[3] += f64::from(unit.driven_m) / 100.0;
+        sums[4] += f64::from(unit.contacts);
+    }
+}
+
+/// The statistics of a driver: by [`Statistic`].
+pub(crate) fn statistics(sums: &[f64], driver: usize) -> [f64; STATISTICS] {
+    let [near_collisions, safe_ratio, reversals, driven_100m, contacts] = sums[SHARED..].as_chunks::<COLUMNS>().0[driver];
+    let [runs, reference_100m] = sums.as_chunks::<SHARED>().0[0];
+    [
+        near_collisions / reference_100m,
+        safe_ratio / runs,
+        reversals / driven_100m.max(f64::MIN_POSITIVE),
+        contacts / reference_100m,
+    ]
+}
+
+/// The hundreds of metres of route in the sums.
+pub(crate) fn reference_100m(sums: &[f64]) -> f64 {
+    sums[1]
+}
+
+/// The sums of each cluster.
+pub(crate) fn units(strata: &[Stratum<'_>], drivers: usize) -> Units {
+    let mut units = Units::new(columns(drivers));
+    let mut sums = vec![0.0; columns(drivers)];
+    for clusters in strata {
+        units.begin_stratum();
+        for rows in clusters {
+            sums.fill(0.0);
+            for row in *rows {
+                add(&mut sums, row);
+            }
+            units.push(&sums);
+        }
+    }
+    units
+}
 
 /// The statistics of every driver, then the differences of every other driver from `with`. `None` if nothing varies
 /// because there is a single cluster.
 fn bootstrap(strata: &[Stratum<'_>], others: &[usize], with: usize, seed: RootSeed) -> Option<Vec<Interval>> {
     let drivers = strata[0][0][0].len();
-    let columns = SHARED + COLUMNS * drivers;
-    let mut units = Units::new(columns);
-    let mut largest = 0;
-    for clusters in strata {
-        units.begin_stratum();
-        largest = largest.max(clusters.len());
-        for &rows in clusters {
-            let mut sums = vec![0.0; columns];
-            for row in rows {
-                sums[0] += 1.0;
-                sums[1] += f64::from(row[0].reference_m) / 100.0;
-                for (sums, unit) in sums[SHARED..].chunks_exact_mut(COLUMNS).zip(row) {
-                    sums[0] += f64::from(unit.near_collisions);
-                    sums[1] += f64::from(unit.safe_ratio);
-                    sums[2] += f64::from(unit.steering_reversals);
-                    sums[3] += f64::from(unit.driven_m) / 100.0;
-                }
-            }
-            units.push(&sums);
-        }
-    }
     let of_sums = |sums: &[f64], out: &mut [f64]| {
-        let of_drivers = sums[SHARED..].chunks_exact(COLUMNS);
-        for (of_driver, out) in of_drivers.zip(out.chunks_exact_mut(STATISTICS)) {
-            out[0] = of_driver[0] / sums[1];
-            out[1] = of_driver[1] / sums[0];
-            out[2] = of_driver[2] / of_driver[3].max(f64::MIN_POSITIVE);
+        let (of_drivers, differences) = out.split_at_mut(STATISTICS * drivers);
+        for (driver, out) in of_drivers.chunks_exact_mut(STATISTICS).enumerate() {
+            out.copy_from_slice(&statistics(sums, driver));
         }
-        for (i, &other) in others.iter().enumerate() {
-            for which in 0..STATISTICS {
-                let of = |driver: usize| out[STATISTICS * driver + which];
-                out[STATISTICS * (drivers + i) + which] = of(other) - of(with);
+        for (&other, out) in others.iter().zip(differences.chunks_exact_mut(STATISTICS)) {
+            for (which, difference) in out.iter_mut().enumerate() {
+                *difference = of_drivers[STATISTICS * other + which] - of_drivers[STATISTICS * with + which];
             }
         }
     };
-    (largest > 1).then(|| units.percentile_intervals(seed, DRAWS, STATISTICS * (drivers + others.len()), &of_sums))
+    let varies = strata.iter().any(|clusters| clusters.len() > 1);
+    let outputs = STATISTICS * (drivers + others.len());
+    varies.then(|| units(strata, drivers).percentile_intervals(seed, DRAWS, outputs, &of_sums))
 }

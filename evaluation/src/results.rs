@@ -24,6 +24,7 @@ pub(crate) struct RunSummary {
     pub(crate) safe_ratio: f32,
     pub(crate) driven_m: f32,
     pub(crate) steering_reversals: u32,
+    pub(crate) contacts: u32,
 }
 
 /// One driver at one noise level.
@@ -39,7 +40,7 @@ pub(crate) struct DriverResults {
     again: BTreeMap<u32, u32>,
 }
 
-/// Everything that is kept of an evaluation: sums, and 36 bytes per run.
+/// Everything that is kept of an evaluation: sums, and 40 bytes per run.
 #[derive(Debug)]
 pub struct EvaluationResults {
     groups: Vec<LotGroup>,
@@ -136,6 +137,7 @@ impl EvaluationResults {
             safe_ratio: metrics.safe_ratio,
             driven_m: metrics.driven_m,
             steering_reversals: metrics.steering_reversals,
+            contacts: metrics.contacts,
         });
     }
 

@@ -1,6 +1,6 @@
 //! An evaluation, counted and judged: the tables as data.
 
-use crate::format::{bound_per_100m, quoted_interval, wider};
+use crate::format::{bound_per_100m, contacts_interval, quoted_interval, wider};
 use crate::incidents::Cause;
 use crate::json;
 use crate::judge::{Comparison, DriverEstimate};
@@ -97,6 +97,13 @@ pub struct Row {
     pub safe_ratio_unweighted: Option<f64>,
     /// Times the body touched something.
     pub contacts: u32,
+    /// Interval of contacts per 100 m of route: the wider of the exact one and the bootstrap's. `None` in files of earlier
+    /// versions.
+    #[serde(default)]
+    pub contacts_per_100m_lower: Option<f64>,
+    /// See `contacts_per_100m_lower`.
+    #[serde(default)]
+    pub contacts_per_100m_upper: Option<f64>,
     /// Times the car got stuck.
     pub stuck: u32,
     /// Runs ended by the time limit.
@@ -192,6 +199,15 @@ pub struct TrainingsRow {
     pub difference_lower: f64,
     /// See `difference_per_100m`.
     pub difference_upper: f64,
+    /// Contacts per 100 m of route, mean. `None` in files of earlier versions.
+    #[serde(default)]
+    pub contacts_per_100m: Option<f64>,
+    /// See `contacts_per_100m`.
+    #[serde(default)]
+    pub contacts_per_100m_lower: Option<f64>,
+    /// See `contacts_per_100m`.
+    #[serde(default)]
+    pub contacts_per_100m_upper: Option<f64>,
 }
 
 /// A row of `noise_sweep.csv`.
@@ -381,6 +397,7 @@ impl<'a> Summary<'a> {
         // Only the whole is resampled and weighed.
         let is_whole = direction == "both";
         let estimate = if is_whole { judged.estimates[driver].clone() } else { DriverEstimate::default() };
+        let [contacts_lower, contacts_upper] = contacts_interval(totals, &estimate);
         let unweighted = (is_whole && judged.slice.is_pooled())
             .then(|| self.results.unweighted(judged.level, driver, &judged.slice));
         Row {
@@ -406,6 +423,8 @@ impl<'a> Summary<'a> {
             safe_ratio_upper: estimate.safe_ratio.map(|interval| interval.upper),
             safe_ratio_unweighted: unweighted.map(|[_, safe_ratio]| safe_ratio),
             contacts: totals.contacts,
+            contacts_per_100m_lower: Some(contacts_lower),
+            contacts_per_100m_upper: Some(contacts_upper),
             stuck: totals.stuck,
             timed_out: totals.timed_out,
             given_up: totals.given_up,
@@ -460,6 +479,9 @@ impl<'a> Summary<'a> {
                 difference_per_100m: estimate.difference_per_100m.estimate,
                 difference_lower: estimate.difference_per_100m.lower,
                 difference_upper: estimate.difference_per_100m.upper,
+                contacts_per_100m: Some(estimate.contacts_per_100m.estimate),
+                contacts_per_100m_lower: Some(estimate.contacts_per_100m.lower),
+                contacts_per_100m_upper: Some(estimate.contacts_per_100m.upper),
             }
         };
         let levels = 0..self.levels().len();

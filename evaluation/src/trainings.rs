@@ -2,11 +2,11 @@
 //!
 //! An interval of one network says how sure the rate of that network is. Here it is for other lots *and* other seeds.
 
-use crate::format::quoted_interval;
-use crate::judge::{Stratum, strata};
-use crate::results::{EvaluationResults, RunSummary};
+use crate::format::{contacts_interval, quoted_interval};
+use crate::judge::{STATISTICS, Statistic, Stratum, add, columns, reference_100m, statistics, strata, units};
+use crate::results::EvaluationResults;
 use crate::slices::Slice;
-use crate::statistics::bootstrap::{DRAWS, Interval, UNITS_MIN, Units};
+use crate::statistics::bootstrap::{DRAWS, Interval, UNITS_MIN};
 use crate::statistics::poisson::Rate;
 use crate::statistics::student::{half_width_of_mean, together, widened};
 use anyhow::{Context as _, bail, ensure};
@@ -171,13 +171,21 @@ impl Team {
     }
 }
 
-/// A team in a slice.
+/// A team in a slice: means over its trainings. Differences are its mean less that of the team it is compared with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TeamEstimate {
-    /// Near-collisions per 100 m, mean over its trainings.
+    /// Near-collisions per 100 m of route.
     pub per_100m: Interval,
-    /// The same less that of the team it is compared with.
+    /// The same, difference.
     pub difference_per_100m: Interval,
+    /// Contacts per 100 m of route.
+    pub contacts_per_100m: Interval,
+    /// Safe ratio, difference.
+    pub difference_safe_ratio: Interval,
+    /// Steering reversals per 100 m driven.
+    pub reversals_per_100m: Interval,
+    /// The same, difference.
+    pub difference_reversals_per_100m: Interval,
 }
 
 /// Every team of an evaluation in a slice.
@@ -230,50 +238,75 @@ impl EvaluationResults {
             return None;
         }
         let drivers = pairs[0].len();
-        let per_100m = |sums: &[f64], driver: usize| sums[driver] / sums[drivers];
+        let mean = |sums: &[f64], team: &Team| -> [f64; STATISTICS] {
+            let each = team.drivers.iter().map(|&driver| statistics(sums, driver));
+            let sum = each.fold([0.0; STATISTICS], |sum, of| std::array::from_fn(|which| sum[which] + of[which]));
+            sum.map(|sum| sum / team.drivers.len() as f64)
+        };
         let of_sums = |sums: &[f64], out: &mut [f64]| {
-            let (rates, differences) = out.split_at_mut(teams.len());
-            for (rate, Team { drivers, .. }) in rates.iter_mut().zip(teams) {
-                *rate = drivers.iter().map(|&driver| per_100m(sums, driver)).sum::<f64>() / drivers.len() as f64;
+            let (means, differences) = out.split_at_mut(STATISTICS * teams.len());
+            for (out, team) in means.chunks_exact_mut(STATISTICS).zip(teams) {
+                out.copy_from_slice(&mean(sums, team));
             }
-            for (difference, rate) in differences.iter_mut().zip(&*rates) {
-                *difference = rate - rates[with];
+            let of_with = &means[STATISTICS * with..][..STATISTICS];
+            for (out, means) in differences.chunks_exact_mut(STATISTICS).zip(means.chunks_exact(STATISTICS)) {
+                for ((difference, mean), of_with) in out.iter_mut().zip(means).zip(of_with) {
+                    *difference = mean - of_with;
+                }
             }
         };
-        let intervals = units(&strata, drivers).percentile_intervals(seed, DRAWS, 2 * teams.len(), &of_sums);
-        let (rates, differences) = intervals.split_at(teams.len());
+        let outputs = 2 * STATISTICS * teams.len();
+        let intervals = units(&strata, drivers).percentile_intervals(seed, DRAWS, outputs, &of_sums);
+        let (means, differences) = intervals.split_at(STATISTICS * teams.len());
 
-        let mut all = vec![0.0; drivers + 1];
+        let mut all = vec![0.0; columns(drivers)];
         for row in &pairs {
             add(&mut all, row);
         }
-        let by_seed = |team: &Team| -> Vec<f64> { team.drivers.iter().map(|&driver| per_100m(&all, driver)).collect() };
-        let of_with = by_seed(&teams[with]);
-        let of_seeds = |rates: &[f64]| if rates.len() < TRAININGS_MIN { 0.0 } else { half_width_of_mean(rates) };
+        let by_seed = |team: &Team, which: usize| -> Vec<f64> {
+            team.drivers.iter().map(|&driver| statistics(&all, driver)[which]).collect()
+        };
+        let of_seeds = |values: &[f64]| if values.len() < TRAININGS_MIN { 0.0 } else { half_width_of_mean(values) };
         // No draw of lots without events has any. Trainings that drove the same lots add no metres.
-        let supported = Rate::new(0, all[drivers]).upper;
-        let estimate = |(team, (&rate, &difference)): (&Team, (&Interval, &Interval))| {
+        let supported = Rate::new(0, reference_100m(&all)).upper;
+        let estimate = |(place, team): (usize, &Team)| {
             let is_paired = !team.seeds.is_empty() && team.seeds == teams[with].seeds || team == &teams[with];
-            let own = by_seed(team);
-            let half_width = of_seeds(&own);
-            let per_100m = widened(rate, half_width);
-            let half_width = if is_paired {
-                of_seeds(&own.iter().zip(&of_with).map(|(own, with)| own - with).collect::<Vec<_>>())
-            } else {
-                together(half_width, of_seeds(&of_with))
+            let mean = |which: Statistic| {
+                let half_width = of_seeds(&by_seed(team, which as usize));
+                widened(means[STATISTICS * place + which as usize], half_width)
+            };
+            let difference = |which: Statistic| {
+                let (own, of_with) = (by_seed(team, which as usize), by_seed(&teams[with], which as usize));
+                let half_width = if is_paired {
+                    of_seeds(&own.iter().zip(&of_with).map(|(own, with)| own - with).collect::<Vec<_>>())
+                } else {
+                    together(of_seeds(&own), of_seeds(&of_with))
+                };
+                widened(differences[STATISTICS * place + which as usize], half_width)
+            };
+            let of_events = |which: Statistic| {
+                let found = mean(which);
+                Interval { lower: found.lower.max(0.0), upper: found.upper.max(supported), ..found }
             };
             TeamEstimate {
-                per_100m: Interval { lower: per_100m.lower.max(0.0), upper: per_100m.upper.max(supported), ..per_100m },
-                difference_per_100m: widened(difference, half_width),
+                per_100m: of_events(Statistic::NearCollisions),
+                difference_per_100m: difference(Statistic::NearCollisions),
+                contacts_per_100m: of_events(Statistic::Contacts),
+                difference_safe_ratio: difference(Statistic::SafeRatio),
+                reversals_per_100m: mean(Statistic::Reversals),
+                difference_reversals_per_100m: difference(Statistic::Reversals),
             }
         };
-        let mut estimates: Vec<TeamEstimate> = teams.iter().zip(rates.iter().zip(differences)).map(estimate).collect();
+        let mut estimates: Vec<TeamEstimate> = teams.iter().enumerate().map(estimate).collect();
         if teams.iter().any(|team| team.drivers.len() == 1) {
             let (of_drivers, _) = self.judge(level, slice, 0, seed);
             for (team, estimate) in teams.iter().zip(&mut estimates) {
                 if let [driver] = team.drivers[..] {
                     let totals = self.totals(level, driver, slice, None);
-                    [estimate.per_100m.lower, estimate.per_100m.upper] = quoted_interval(&totals, &of_drivers[driver]);
+                    let of_driver = &of_drivers[driver];
+                    [estimate.per_100m.lower, estimate.per_100m.upper] = quoted_interval(&totals, of_driver);
+                    [estimate.contacts_per_100m.lower, estimate.contacts_per_100m.upper] =
+                        contacts_interval(&totals, of_driver);
                 }
             }
         }
@@ -285,30 +318,6 @@ impl EvaluationResults {
 fn are_enough(strata: &[Stratum<'_>]) -> bool {
     // What a stratum has one of is never drawn.
     strata.iter().map(Vec::len).filter(|&units| units > 1).sum::<usize>() >= UNITS_MIN as usize
-}
-
-/// The near-collisions of each driver in every cluster, and the hundreds of metres that all share.
-fn units(strata: &[Stratum<'_>], drivers: usize) -> Units {
-    let mut units = Units::new(drivers + 1);
-    let mut sums = vec![0.0; drivers + 1];
-    for clusters in strata {
-        units.begin_stratum();
-        for rows in clusters {
-            sums.fill(0.0);
-            for row in *rows {
-                add(&mut sums, row);
-            }
-            units.push(&sums);
-        }
-    }
-    units
-}
-
-fn add(sums: &mut [f64], row: &[RunSummary]) {
-    for (sum, unit) in sums.iter_mut().zip(row) {
-        *sum += f64::from(unit.near_collisions);
-    }
-    sums[row.len()] += f64::from(row[0].reference_m) / 100.0;
 }
 
 #[cfg(test)]

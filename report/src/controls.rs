@@ -147,7 +147,8 @@ pub(crate) fn readings(reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
 
 /// Every driver without action smoothing and with it, on unseen lots.
 pub(crate) fn action_smoothing(without: &Driven<'_>, with: &Driven<'_>) -> String {
-    let mut table = table_of(&["driver", "without", "per 100 m [95 %]", "with", "per 100 m [95 %]"]);
+    let header = ["driver", "without", "per 100 m [95 %]", "reversals", "with", "per 100 m [95 %]", "reversals"];
+    let mut table = table_of(&header);
     let judged = [without, with].map(|driven| {
         let everywhere = driven.all();
         let (estimates, _) = driven.results.judge(0, &everywhere, 0, driven.plan.settings.evaluation.seed);
@@ -157,12 +158,12 @@ pub(crate) fn action_smoothing(without: &Driven<'_>, with: &Driven<'_>) -> Strin
         let cells = judged.iter().flat_map(|(driven, everywhere, estimates)| {
             let totals = driven.results.totals(0, driver, everywhere, None);
             let count = format!("{} ({})", totals.near_collisions, totals.contacts);
-            [count, quoted_rate(&totals, &estimates[driver])]
+            [count, quoted_rate(&totals, &estimates[driver]), format!("{:.1}", totals.reversals_per_100m())]
         });
         table.add_row(std::iter::once(named.name.clone()).chain(cells));
     }
     format!(
-        "### Action smoothing\n\nNear-collisions (contacts) on the unseen lots. Of the planners that were tuned, only the paper's two are here as \
+        "### Action smoothing\n\nNear-collisions (contacts), and steering reversals per 100 m driven, on the unseen lots. Of the planners that were tuned, only the paper's two are here as \
          published, too. Elsewhere in this report networks are smoothed as they were trained to be, and nobody else is.\n\n{table}"
     )
 }

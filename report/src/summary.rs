@@ -3,7 +3,7 @@
 use crate::markdown::{table_of, with_header};
 use crate::trainings::{self, HEADER};
 use comfy_table::Table;
-use evaluation::format::{clustered, difference, exact_rate, p_value, quoted_rate};
+use evaluation::format::{clustered, difference, exact_rate, p_value, quoted_contacts, quoted_rate};
 use evaluation::incidents::Cause;
 use evaluation::paper::{self, PaperLot, PaperResult};
 use evaluation::slices::Slice;
@@ -91,7 +91,7 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
         }
     }
     if summary.levels().len() > 1 {
-        let _ = write!(text, "Near-collisions per 100 m against noise\n\n{}\n\n", sweep_table(summary, rows));
+        let _ = write!(text, "Near-collisions per 100 m; contacts: against noise\n\n{}\n\n", sweep_table(summary, rows));
     }
     let EvaluationSettings { seed, trials, .. } = &summary.plan.settings.evaluation;
     let _ = write!(
@@ -102,6 +102,10 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
          lots where these are a sample: generated, or six or more from files) where the dispersion exceeds {DISPERSION_MAX} and \
          events cannot be taken for independent; (b) is no narrower than the exact one. \"< one-sided\": the bound of 95 % where there was none.\n\
          - Dispersion: variance of the counts of trials over their mean; 1 if each near-collision came by itself.\n\
+         - Contacts: times the body touched something, with the wider of both intervals, since one drive may have many.\n\
+         - Unweighted: every lot and direction counts the same, however long its route.\n\
+         - Stuck: no headway for a while. Given up: too many near-collisions in one run. Timed out: the time limit. Reversals: changes of \
+         the steering's direction. Steering: how far the wheels were turned in all.\n\
          - Safe ratio: free share of the metre around the body; its intervals, and those of differences (Δ), are bootstrap.\n\
          - *: excludes zero, by six trials or more. Rate ratio and p: exact test of equal rates; – where events of \
          either driver cluster, as for (b). Holm: adjusted for the drivers compared.",
@@ -132,6 +136,7 @@ fn rates_table(summary: &Summary<'_>, level: usize, rows: Rows, has_paper: bool)
         "route",
         "near-collisions (→, ←)",
         "per 100 m [95 %]",
+        "contacts: per 100 m [95 %]",
         "unweighted",
         "dispersion",
     ]);
@@ -148,6 +153,7 @@ fn rates_table(summary: &Summary<'_>, level: usize, rows: Rows, has_paper: bool)
             format!("{:.0} m", totals.reference_m),
             format!("{} ({forward}, {reverse})", totals.near_collisions),
             quoted_rate(&totals, estimate),
+            quoted_contacts(&totals, estimate),
             unweighted(summary, level, driver, &judged.slice, 0, 2),
             estimate.dispersion.map_or_else(|| "–".to_owned(), |dispersion| format!("{:.1}", dispersion.index)),
         ]);
@@ -160,6 +166,7 @@ fn rates_table(summary: &Summary<'_>, level: usize, rows: Rows, has_paper: bool)
             format!("{:.0} m", lot.driven_m()),
             format!("{} ({forward}, {reverse})", forward + reverse),
             exact_rate(forward + reverse, lot.driven_m()),
+            "–".to_owned(),
             String::new(),
             "–".to_owned(),
         ]);
@@ -207,7 +214,6 @@ fn driving_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
     let mut table = table_of(&[
         "driver",
         "lots",
-        "contacts",
         "stuck",
         "timed out",
         "given up",
@@ -220,7 +226,6 @@ fn driving_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
         table.add_row([
             summary.driver(driver).to_owned(),
             judged.slice.label.clone(),
-            totals.contacts.to_string(),
             totals.stuck.to_string(),
             totals.timed_out.to_string(),
             totals.given_up.to_string(),
@@ -305,7 +310,10 @@ fn sweep_table(summary: &Summary<'_>, rows: Rows) -> Table {
                 let totals = summary.results.totals(level, driver, &slice, None);
                 let judged = summary.at_level(level).find(|judged| judged.slice == slice);
                 let of_driven = judged.filter(|_| totals.runs > 0);
-                of_driven.map_or_else(|| "–".to_owned(), |judged| quoted_rate(&totals, &judged.estimates[driver]))
+                of_driven.map_or_else(
+                    || "–".to_owned(),
+                    |judged| format!("{}; {}", quoted_rate(&totals, &judged.estimates[driver]), totals.contacts),
+                )
             };
             let mut row = vec![summary.driver(driver).to_owned(), slice.label.clone()];
             row.extend((0..summary.levels().len()).map(rate));

@@ -17,21 +17,30 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 /// Heads of [`row`].
-pub(crate) const HEADER: [&str; 7] =
-    ["driver", "trainings", "lots", "near-collisions of each", "contacts", "per 100 m [95 %]", "Δ per 100 m [95 %]"];
+pub(crate) const HEADER: [&str; 8] = [
+    "driver",
+    "trainings",
+    "lots",
+    "near-collisions of each",
+    "per 100 m [95 %]",
+    "Δ per 100 m [95 %]",
+    "contacts of each",
+    "per 100 m [95 %]",
+];
 
 /// A team on some lots: the result of each of its trainings, their mean and, unless it is the team that all are
 /// compared with, the difference.
-pub(crate) fn row(team: &Team, lots: &str, each: &[Totals], estimate: &TeamEstimate, is_other: bool) -> [String; 7] {
+pub(crate) fn row(team: &Team, lots: &str, each: &[Totals], estimate: &TeamEstimate, is_other: bool) -> [String; 8] {
     let Interval { estimate: difference, lower, upper, .. } = estimate.difference_per_100m;
     [
         team.name.clone(),
         team.drivers.len().to_string(),
         lots.to_owned(),
         list(each, |totals| totals.near_collisions),
-        list(each, |totals| totals.contacts),
         interval(estimate.per_100m, 3),
         if is_other { format!("{difference:+.3} [{lower:+.3}, {upper:+.3}]") } else { "–".to_owned() },
+        list(each, |totals| totals.contacts),
+        interval(estimate.contacts_per_100m, 3),
     ]
 }
 
@@ -205,6 +214,6 @@ mod tests {
     }
 
     fn row_of_others(team: &Team, totals: Totals, estimate: &TeamEstimate) -> String {
-        super::row(team, "lots", &[totals], estimate, true)[6].clone()
+        super::row(team, "lots", &[totals], estimate, true)[5].clone()
     }
 }

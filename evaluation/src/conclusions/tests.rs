@@ -176,8 +176,40 @@ fn several_trainings_are_compared_by_their_mean() {
 
     let found = of_dagger([0, 1, 2]);
     assert_eq!(verdict(&found, fewer), Verdict::Holds, "{found:#?}");
+    // What each has as many of as the other: the seeds differ in nothing, nor do the trials.
+    let figures = &found.iter().find(|statement| statement.claim.contains("oscillates less")).unwrap().figures;
+    assert!(figures.contains("DAgger 1.0, 1.0, 1.0; vvf 1.0; difference +0.0"), "{figures}");
     let none = of_dagger([0, 0, 0]);
     assert_eq!(verdict(&none, "paper's lots without a near-collision"), Verdict::Holds);
+}
+
+/// A training that happened to weave little spoke for four that weave more than the planner.
+#[test]
+fn reversals_and_safe_ratios_are_of_all_trainings() {
+    let trained = |seed: u64| {
+        let mut driver = driver(&if seed == 1 { DAGGER.to_owned() } else { format!("{DAGGER} (seed {seed})") });
+        driver.training = Some(Training { recipe: DAGGER.to_owned(), seed: RootSeed(seed) });
+        driver
+    };
+    let found = |of_seeds: [(u32, f32); 3]| {
+        statements_of(&[trained(1), trained(2), trained(3), driver("vvf")], |name, trial| {
+            let (steering_reversals, safe_ratio) = match name {
+                DAGGER => of_seeds[0],
+                "DAgger (seed 2)" => of_seeds[1],
+                "DAgger (seed 3)" => of_seeds[2],
+                _ => (100 + trial.index, 0.8),
+            };
+            Run { near_collisions: 0, safe_ratio, steering_reversals }
+        })
+    };
+    let by_chance = found([(50, 0.9), (150, 0.7), (150, 0.7)]);
+    let all = found([(50, 0.9), (52, 0.9), (54, 0.91)]);
+    for claim in ["oscillates less than vvf", "larger safe ratio than vvf"] {
+        assert_eq!(verdict(&by_chance, claim), Verdict::CannotBeTold, "{by_chance:#?}");
+        assert_eq!(verdict(&all, claim), Verdict::Holds, "{all:#?}");
+    }
+    let figures = &all.iter().find(|statement| statement.claim.contains("oscillates less")).unwrap().figures;
+    assert!(figures.contains("DAgger 5.0, 5.2, 5.4; vvf 10."), "{figures}");
 }
 
 #[test]
