@@ -51,7 +51,7 @@ pub fn answers(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     let grids = grids(ANSWERED[2])?;
     for (name, architecture) in networks() {
         let weights = Weights::init(architecture, RootSeed(1), 0);
-        let mut predictor = Predictor::new(&weights, InferenceSettings::plain());
+        let predictor = Predictor::new(&weights, InferenceSettings::plain());
         for batch in ANSWERED {
             let asked: Vec<&OccupancyGrid> = grids[..batch].iter().collect();
             let what = format!("answers, {name} network, batch {batch}, one thread");

@@ -4,8 +4,9 @@
 //! went, what was measured. `tests/goldens.toml` keeps the digests by stretches of ticks (0, 1, 2–3, 4–7, …), so that a
 //! difference can be told by when runs part and which layer does so first.
 //!
-//! Nothing here needs a network, a file or a thread, so that it compiles for whatever Rust compiles for; the program of
-//! this crate drives [all of them](drive_all) and compares. `tests/goldens.rs` drives networks too.
+//! Nothing here needs a network, a file or threads (where there are none, rayon drives everything on the one there is), so that
+//! it compiles for whatever Rust compiles for; the program of this crate drives [all of them](drive_all) and compares.
+//! `tests/goldens.rs` drives networks too.
 
 mod cases;
 mod episode;

@@ -191,10 +191,7 @@ impl<'a> Monitor<'a> {
                 self.end(&format!("{} samples, {dataset} in all{eta}", collection.samples));
             }
             DaggerProgress::Fitting { round, share, fit } => self.fitting(round, share, fit),
-            DaggerProgress::Finished { row, .. } => {
-                let error_m = row.validation_rmse_m.map_or_else(String::new, |error| format!("{error:.3} m off"));
-                self.end(&format!("validation {error_m}"));
-            }
+            DaggerProgress::Finished { row, .. } => self.end(&validation(row.validation_rmse_m)),
         }
     }
 
@@ -230,6 +227,11 @@ impl<'a> Monitor<'a> {
             self.progress.end(result);
         }
     }
+}
+
+/// How far off a network is from the labels of the samples that were held back, if there are any.
+fn validation(rmse_m: Option<f32>) -> String {
+    rmse_m.map_or_else(|| "not validated".to_owned(), |error_m| format!("validation {error_m:.3} m off"))
 }
 
 #[cfg(test)]
@@ -276,6 +278,13 @@ mod tests {
         for (at, drive) in seen.iter().enumerate() {
             assert!(!seen[..at].contains(drive), "drive {at} of {names:?}");
         }
+    }
+
+    /// With `dagger.fit.validation.every = 0` its line ended in "validation" and nothing.
+    #[test]
+    fn a_training_that_holds_nothing_back_says_so() {
+        assert_eq!(validation(None), "not validated");
+        assert_eq!(validation(Some(0.25)), "validation 0.250 m off");
     }
 
     /// A drive of a training that is driven again is the drive that was trained on: its expert, noise, disturbances and

@@ -130,7 +130,7 @@ impl Footprint {
     #[inline]
     pub(crate) fn clearance_m(&self, ground: KnownGround<'_>, motion: Motion) -> f32 {
         let [rear, front] = self.disc_centres_m.map(|ahead_m| ground.at_four(motion.four_on_axis(ahead_m)));
-        lowest(rear.fast_min(front)) - self.keep_m
+        lowest_number(rear.fast_min(front)) - self.keep_m
     }
 
     /// Clearance of nose, middle and rear axle, metres, to within the raster's node spacing.
@@ -143,14 +143,13 @@ impl Footprint {
     )]
     #[inline(always)]
     pub(crate) fn coarse_clearance_m(&self, ground: KnownGround<'_>, motion: Motion) -> f32 {
-        lowest(ground.at_four_nearest_nodes(motion.four_on_axis(self.coarse_disc_centres_m))) - self.keep_m
+        lowest_number(ground.at_four_nearest_nodes(motion.four_on_axis(self.coarse_disc_centres_m))) - self.keep_m
     }
 }
 
-/// The lowest lane.
+/// The lowest lane, if all are numbers. A comparison is one instruction, and `f32::min` several.
 #[inline]
-fn lowest(values: f32x4) -> f32 {
-    // Unlike `f32::min`, one instruction: no lane is ever not a number.
+fn lowest_number(values: f32x4) -> f32 {
     let lower = |a: f32, b: f32| if b < a { b } else { a };
     let [a, b, c, d] = values.to_array();
     lower(lower(a, b), lower(c, d))

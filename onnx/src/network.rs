@@ -2,8 +2,7 @@
 
 use crate::about::{self, About};
 use crate::{INPUT, OUTPUT, wire};
-use policy::network::modes::{likeliest_of, mirror_averaged};
-use policy::network::{OUTPUTS, Prediction, row_width};
+use policy::network::{Prediction, modes, row_width};
 use rten::{DataType, Dimension, Model, NodeId, RunOptions, ThreadPool, Value, ValueType};
 use sim::limits::{MODES_MAX, ONNX_BATCH_MAX, ONNX_BYTES_MAX};
 use sim::sensing::{GRID_CELLS, OccupancyGrid};
@@ -178,18 +177,7 @@ impl OnnxNetwork {
         mirror_averaging: bool,
         pool: &Arc<ThreadPool>,
     ) -> Vec<Prediction> {
-        let modes = self.answer.modes();
-        let width = row_width(modes);
-        let raw: Vec<[f32; OUTPUTS]> = if mirror_averaging {
-            let mirrored: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
-            let both: Vec<_> = grids.iter().copied().chain(&mirrored).collect();
-            let rows = self.rows(&both, pool);
-            let (of_grids, of_images) = rows.split_at(grids.len() * width);
-            let rows = of_grids.chunks_exact(width).zip(of_images.chunks_exact(width));
-            rows.map(|(of_grid, of_image)| mirror_averaged(of_grid, of_image, modes)).collect()
-        } else {
-            self.rows(grids, pool).chunks_exact(width).map(|row| likeliest_of(row, modes)).collect()
-        };
+        let raw = modes::answers(grids, self.answer.modes(), mirror_averaging, |grids| self.rows(grids, pool));
         raw.into_iter().map(Prediction::from_raw).collect()
     }
 

@@ -47,7 +47,7 @@ fn infer<const NET: usize>(bencher: Bencher<'_, '_>, batch: usize) {
     let grids: Vec<_> = grids.iter().collect();
     let inference = if NETS[NET] == "paper" { InferenceSettings::plain() } else { InferenceSettings::smoothed() };
     let weights = Weights::init(net(NETS[NET]), RootSeed(1), 0);
-    let mut predictor = Predictor::new(&weights, inference);
+    let predictor = Predictor::new(&weights, inference);
     predictor.predict(&grids);
     bencher.counter(ItemsCount::new(batch)).bench_local(|| predictor.predict(&grids));
 }

@@ -1,4 +1,4 @@
-"""DAgger in thirty lines: a network drives, the expert labels what it meets, the network learns.
+"""DAgger in one file: a network drives, the expert labels what it meets, the network learns.
 
     pip install ./python torch
     python python/examples/dagger.py

@@ -3,14 +3,15 @@
 ================================  ==============================================================
 ``Lot``, ``lots``, ``generate``   lots to look at, and to write down
 ``Episode``                       one run, step by step, for notebooks
-``evaluate``                      drivers, also functions in Python, on the same trials: tables
+``evaluate``, ``drivers``         drivers, also functions in Python, on the same trials: tables
+``settings``                      what all of it is done with, as the command line prints it
 ``Dataset``, ``load_round``       what a training collected, as arrays
 ``EnvOptions``, ``Reward``        what the environments are made of
 ``lotpilot.gym``                  ``gymnasium.make("lotpilot/Lot-v0")`` and a native ``VectorEnv``
 ``lotpilot.sb3``                  a ``VecEnv`` for Stable-Baselines3 and imitation
 ``lotpilot.puffer``               a ``PufferEnv`` for PufferLib
 ``lotpilot.exports``              what a training collected, for imitation and LeRobot
-``lotpilot.ray``                  evaluations and lots on a Ray cluster
+``lotpilot.ray``                  evaluations, reproductions and lots on a Ray cluster
 ``python -m lotpilot.bench``      how fast it is on this machine
 ================================  ==============================================================
 

@@ -75,7 +75,11 @@ def one_by_one(name: str, action: Callable[[gymnasium.Env[object, object]], obje
 
 
 def highway_env() -> Drive:
-    """The racetrack of HighwayEnv, observed as an occupancy grid of as many cells of the same size."""
+    """The racetrack of HighwayEnv, observed as an occupancy grid of as many cells of the same size.
+
+    Cells of road are looked up as well, because our grid shows them. ``cargo xtask bench --peers`` has cells of cars
+    alone, on ``racetrack-v1``, and another rate.
+    """
     import highway_env
 
     with warnings.catch_warnings():
@@ -114,7 +118,7 @@ obstacle:
 
 
 def ir_sim() -> Drive:
-    """A car that heads for a goal between two rows of parked cars in IR-SIM."""
+    """A car that heads for a goal between two rows of parked cars in IR-SIM, as ``cargo xtask bench --peers`` does."""
     with tempfile.TemporaryDirectory(prefix="lotpilot-") as scratch, contextlib.redirect_stdout(io.StringIO()):
         # It lists the windows that it cannot open and the packages that it does without.
         os.environ.setdefault("MPLBACKEND", "Agg")

@@ -77,6 +77,7 @@ fn clearance_m(episode: &Episode, body: &BodyBox) -> f32 {
 /// One environment.
 #[derive(Debug, Clone)]
 pub(crate) struct Car {
+    /// Seed of the episode that is next. The one under way may have another: a reset was interrupted.
     pub(crate) seed: RootSeed,
     /// Number of the episode that is next.
     pub(crate) next: u64,
@@ -89,6 +90,7 @@ pub(crate) struct Car {
 /// An episode under way.
 #[derive(Debug, Clone)]
 struct Drive {
+    seed: RootSeed,
     number: u64,
     episode: Episode,
     /// Made when it is first asked.
@@ -118,6 +120,7 @@ impl Car {
         let clearance_m = clearance_m(&episode, &course.body);
         self.next += self.stride;
         self.drive = Some(Drive {
+            seed: self.seed,
             number,
             expert: None,
             label: None,
@@ -139,9 +142,9 @@ impl Car {
         self.drive.as_ref().map(|drive| &drive.episode)
     }
 
-    /// The number of [`Self::episode`].
-    pub(crate) fn number(&self) -> Option<u64> {
-        self.drive.as_ref().map(|drive| drive.number)
+    /// Seed and number of [`Self::episode`]; before the first one, of the next.
+    pub(crate) fn place(&self) -> (RootSeed, u64) {
+        self.drive.as_ref().map_or((self.seed, self.next), |drive| (drive.seed, drive.number))
     }
 
     /// The last tick.
@@ -202,7 +205,7 @@ impl Car {
     /// The expert's answer to what is observed now, as an action. Asked at every tick, it is what the driver `expert`
     /// would answer. `None` after the end.
     pub(crate) fn label(&mut self, kind: ActionKind, course: &Course) -> Option<[f32; ACTION]> {
-        let Drive { number, episode, expert, label, .. } = self.drive.as_mut()?;
+        let Drive { seed, number, episode, expert, label, .. } = self.drive.as_mut()?;
         if episode.ending().is_some() {
             return None;
         }
@@ -211,7 +214,7 @@ impl Car {
             Some((of, point)) if of == tick => point,
             _ => {
                 let settings = &course.settings;
-                let seed = || course.trial(self.seed, *number).episode_seed();
+                let seed = || course.trial(*seed, *number).episode_seed();
                 let expert = expert.get_or_insert_with(|| drivers::expert(&settings.expert, &settings.episode, seed()));
                 expert.decide(&episode.situation()).look_ahead
             }

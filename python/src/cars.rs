@@ -364,8 +364,9 @@ impl Cars {
     /// Lot, direction, trial and seed of every car's episode: what the command line names it by.
     fn places(&self) -> Vec<(String, &'static str, u32, u64)> {
         let place = |car: &Car| {
-            let trial = self.course.trial(car.seed, car.number().unwrap_or(car.next));
-            (trial.lot.spec(), trial.direction.name(), trial.index, car.seed.0)
+            let (seed, number) = car.place();
+            let trial = self.course.trial(seed, number);
+            (trial.lot.spec(), trial.direction.name(), trial.index, seed.0)
         };
         self.cars.iter().map(place).collect()
     }

@@ -16,8 +16,11 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Maps that are kept; a map takes up to a few megabytes.
+/// Maps that are kept at most.
 const MAPS_KEPT: usize = 512;
+/// Memory of the maps that are kept, bytes: most take up to a few megabytes, that of a large lot 100 MB. One is kept whatever
+/// it takes.
+const KEPT_BYTES: usize = 1 << 30;
 
 /// Where settings come from, as on the command line: preset, then file, then single changes.
 #[derive(Debug, Clone, Default, FromPyObject)]
@@ -56,6 +59,33 @@ pub(crate) fn noise(name: &str) -> anyhow::Result<NoiseChoice> {
 /// Lot and direction by index; of a lot whose obstacles are drawn for every trial, also root seed and trial.
 type MapKey = (usize, usize, Option<(RootSeed, u32)>);
 
+/// Maps of episodes that come again.
+#[derive(Debug, Default)]
+struct KeptMaps {
+    maps: BTreeMap<MapKey, Arc<Map>>,
+    /// State of the generator that draws which map goes. No result depends on it.
+    draws: u64,
+}
+
+impl KeptMaps {
+    /// Keeps a map. Where there is no room, others go at random. Episodes take turns: if the oldest went, none would be left
+    /// when it comes again. If some always stayed, they would even when their seed is driven no more.
+    fn keep(&mut self, key: MapKey, map: &Arc<Map>) {
+        let bytes = |map: &Arc<Map>| map.distance_field().size_bytes();
+        let is_full = |maps: &BTreeMap<MapKey, Arc<Map>>| {
+            maps.len() >= MAPS_KEPT || bytes(map) + maps.values().map(bytes).sum::<usize>() > KEPT_BYTES
+        };
+        while !self.maps.is_empty() && is_full(&self.maps) {
+            // Knuth's linear congruential generator: its upper bits are as good as needed here.
+            self.draws = self.draws.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let index = (self.draws >> 33) as usize % self.maps.len();
+            let goes = *self.maps.keys().nth(index).expect("it is one of them");
+            self.maps.remove(&goes);
+        }
+        self.maps.insert(key, Arc::clone(map));
+    }
+}
+
 /// Episodes by number: trial by trial, lot by lot, direction by direction.
 #[derive(Debug)]
 pub(crate) struct Course {
@@ -67,7 +97,7 @@ pub(crate) struct Course {
     /// Trials of each lot and direction before they come again.
     trials: Option<u32>,
     noise: NoiseChoice,
-    maps: Mutex<BTreeMap<MapKey, Arc<Map>>>,
+    maps: Mutex<KeptMaps>,
     /// An episode that others share their car with.
     first: OnceLock<Episode>,
 }
@@ -148,7 +178,7 @@ impl Course {
         let trial = self.trial(seed, number);
         let ((lot, way), drawn) = (self.row(number), trial.lot.is_drawn_per_trial());
         let key = |way: usize| (lot, way, drawn.then_some((seed, trial.index)));
-        if let Some(map) = self.kept().get(&key(way)) {
+        if let Some(map) = self.kept().maps.get(&key(way)) {
             return Ok(Arc::clone(map));
         }
         if drawn && self.trials.is_none() {
@@ -164,15 +194,12 @@ impl Course {
         let maps = self.directions.iter().map(map_of).collect::<anyhow::Result<Vec<Arc<Map>>>>()?;
         let mut kept = self.kept();
         for (way, map) in maps.iter().enumerate() {
-            kept.insert(key(way), Arc::clone(map));
-        }
-        while kept.len() > MAPS_KEPT {
-            kept.pop_first();
+            kept.keep(key(way), map);
         }
         Ok(Arc::clone(&maps[way]))
     }
 
-    fn kept(&self) -> std::sync::MutexGuard<'_, BTreeMap<MapKey, Arc<Map>>> {
+    fn kept(&self) -> std::sync::MutexGuard<'_, KeptMaps> {
         self.maps.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

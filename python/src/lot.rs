@@ -78,7 +78,8 @@ impl Lot {
         &self.map.scenario().name
     }
 
-    /// What the import of a map did and found, as ``cargo xtask generate`` says it; nothing for other lots.
+    /// What the import of a map did and found, as ``cargo xtask generate`` says it; of a lot written by hand its
+    /// junctions; nothing for other lots.
     #[getter]
     fn notes(&self) -> &[String] {
         &self.notes

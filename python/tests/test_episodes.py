@@ -315,25 +315,41 @@ class Rang(Exception):
     """An alarm clock."""
 
 
-@pytest.mark.parametrize("threads", [1, 2, None])
-def test_a_reset_of_many_cars_heeds_signals(threads):
-    """Ctrl-C while thousands of lots were drawn had no effect before the last of them."""
-    core = Core(4000, EnvOptions(lots=["train:4000:all"], threads=threads), "next_step")
+def interrupted_after(seconds, work):
+    """Lets an alarm end some work."""
 
     def ring(*_):
         raise Rang
 
     before = signal.signal(signal.SIGALRM, ring)
     try:
-        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        signal.setitimer(signal.ITIMER_REAL, seconds)
         with pytest.raises(Rang):
-            core.reset()
+            work()
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.parametrize("threads", [1, 2, None])
+def test_a_reset_of_many_cars_heeds_signals(threads):
+    """Ctrl-C while thousands of lots were drawn had no effect before the last of them."""
+    core = Core(4000, EnvOptions(lots=["train:4000:all"], threads=threads), "next_step")
+    interrupted_after(0.2, core.reset)
     # Not all of them were reset before the alarm was heard; cars are taken in halves, so it may be any.
     with pytest.raises(lotpilot.EpisodeEnded, match="never reset"):
         core.step(np.full((4000, 2), [8.0, 0.0]))
+
+
+def test_a_car_that_an_interrupted_reset_did_not_reach_drives_the_episode_that_it_names():
+    """It named one of the new seed, and its expert drew from that, while it drove on in one of the old seed."""
+    options = EnvOptions(lots=["lot-b"], threads=1, overrides=["expert.label_jitter=0.01"])
+    core, twin = (Core(500, options, "next_step") for _ in range(2))
+    last = np.arange(500) == 499
+    core.reset(last), twin.reset(last)
+    interrupted_after(0.05, lambda: core.reset(seeds=[7] * 500))
+    assert core.place(0)["seed"] == 7 and core.place(499) == twin.place(499)
+    np.testing.assert_array_equal(core.expert_actions()[499], twin.expert_actions()[499])
 
 
 def test_tables_are_read_from_files_that_are_whole(tmp_path):

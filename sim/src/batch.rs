@@ -6,6 +6,7 @@
 use crate::driver::{Decision, Fleet};
 use crate::episode::{Episode, EpisodeReport};
 use crate::frame::Frame;
+use crate::vehicle::VehicleState;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
@@ -17,7 +18,7 @@ pub struct NotFinite {
     pub episode: usize,
     /// Its control tick, from 0.
     pub tick: u32,
-    /// The driver's answer, or the state of the car.
+    /// The driver's answer, or the state of the car after the tick.
     pub what: &'static str,
 }
 
@@ -26,7 +27,7 @@ pub struct NotFinite {
 /// Reports come in the order of the episodes. `on_frame(episode, frame)` is called in that order within a tick.
 ///
 /// # Errors
-/// If an answer of the fleet is not finite.
+/// If an answer of the fleet is not finite, or the state of a car after a tick.
 ///
 /// # Panics
 /// If the fleet answers for more or fewer cars than it is asked for.
@@ -74,7 +75,9 @@ pub fn run_lockstep_until(
                 (*index, frame)
             })
             .collect_into_vec(&mut frames);
-        frames.iter().try_for_each(|(index, frame)| check_state(*index, frame))?;
+        for ((index, episode), (_, frame)) in running.iter().zip(&frames) {
+            check_state(*index, frame.tick, episode.vehicle())?;
+        }
         // Every frame of the tick is passed on, even after a break: callers never see half a tick.
         if frames.iter().filter(|(index, frame)| on_frame(*index, frame).is_break()).count() > 0 {
             break;
@@ -151,7 +154,7 @@ impl SeatedFleet {
             }
             for ((car, episode), &decision) in running.iter_mut().zip(&decisions) {
                 let frame = episode.apply(decision);
-                if let Err(found) = check_state(indices[*car], &frame) {
+                if let Err(found) = check_state(indices[*car], frame.tick, episode.vehicle()) {
                     *refused = Some((place, found));
                     return;
                 }
@@ -246,12 +249,11 @@ fn decide(
     }
 }
 
-/// Refuses a frame after which the car is nowhere.
-fn check_state(episode: usize, frame: &Frame) -> Result<(), NotFinite> {
-    let at = frame.vehicle;
+/// Refuses a tick after which the car is nowhere.
+fn check_state(episode: usize, tick: u32, at: VehicleState) -> Result<(), NotFinite> {
     let state = [at.pose.x_m, at.pose.y_m, at.pose.heading_rad, at.speed_mps, at.steering_rad];
     if state.iter().all(|value| value.is_finite()) {
         return Ok(());
     }
-    Err(NotFinite { episode, tick: frame.tick, what: "the state of the car" })
+    Err(NotFinite { episode, tick, what: "the state of the car" })
 }

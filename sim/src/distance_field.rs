@@ -255,6 +255,11 @@ impl DistanceField {
         (self.origin, self.origin + Vec2::new((self.cols - 1) as f32, (self.rows - 1) as f32) * NODE_M)
     }
 
+    /// Memory of the raster, bytes. Of a lot that fills little of its bounding box, most of it is never touched.
+    pub fn size_bytes(&self) -> usize {
+        size_of_val(self.nodes.as_slice())
+    }
+
     /// Even-odd scan conversion: nodes inside the polygon are as far from its boundary as can be.
     fn fill(&mut self, polygon: &[Vec2]) {
         let mut crossings: Vec<(usize, f32)> = Vec::new();

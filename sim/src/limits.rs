@@ -93,6 +93,8 @@ pub const ONNX_NESTING_MAX: usize = 100;
 
 /// Number of a trial, a drive or a round, from 0: each has random streams of its own.
 pub const TRIAL_MAX: u32 = 1_048_575;
+/// Levels of noise of an evaluation: each has rows of its own in every table.
+pub const NOISE_LEVELS_MAX: usize = 100;
 /// Runs of an evaluation, for each driver.
 pub const RUNS_MAX: usize = 10_000_000;
 /// Drives whose maps are held at once, 1 to 2 MB each: those of a round of training, those of a planner that is tuned.

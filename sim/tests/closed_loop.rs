@@ -385,6 +385,24 @@ fn an_answer_that_is_no_number_is_refused_where_it_is_given_first() {
     }
 }
 
+/// The state was looked at before a tick, and so never after the last one: the drive ended like any other.
+#[test]
+fn a_car_that_is_nowhere_after_its_last_tick_is_refused() {
+    let mut settings = EpisodeSettings::clone(&settings());
+    settings.metrics.timeout_s = 0.01;
+    let (settings, map) = (Arc::new(settings), lane(40.0, vec![]));
+    // Its position is a number until the first step adds the rest to it; the drive has one tick.
+    let start = VehicleState { position_rest_m: Vec2::NAN, ..VehicleState::at_rest(map.start()) };
+    let episode = Episode::under_way(settings, map, RootSeed(1), start, 0.0);
+    let fleet = || OneDriverEach(vec![Fixed(LookAheadPoint { ahead_m: 16.3, left_m: 0.0 })]);
+    let mut on_frame = |_: usize, _: &Frame| ControlFlow::Continue(());
+    let expected = NotFinite { episode: 0, tick: 0, what: "the state of the car" };
+    let in_lock_step = run_lockstep_until(vec![episode.clone()], &mut fleet(), &mut on_frame);
+    assert_eq!(in_lock_step.unwrap_err(), expected);
+    let seated = SeatedFleet::new(Box::new(fleet()), vec![(0, episode)]);
+    assert_eq!(run_fleets_until(vec![seated], &mut on_frame).unwrap_err(), expected);
+}
+
 /// From a state met at 20 m the rest is driven as by the car that was met.
 #[test]
 fn an_episode_under_way_goes_on_from_its_state() {

@@ -2,7 +2,7 @@ use super::*;
 use crate::export::{self, export};
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
-use policy::network::{InferenceSettings, NetworkArchitecture, Weights};
+use policy::network::{InferenceSettings, NetworkArchitecture, OUTPUTS, Weights};
 use sim::episode::EpisodeSettings;
 use sim::seed::RootSeed;
 use std::path::PathBuf;

@@ -10,7 +10,7 @@ use crate::dagger::rollouts::Rollouts;
 use crate::dagger::run_file::RunFile;
 use crate::dagger::settings::{DaggerSettings, StartFrom};
 use crate::dataset::store::Store;
-use crate::dataset::{Collection, Dataset, Round};
+use crate::dataset::{Collection, Dataset, Round, Tick};
 use crate::files::{self, Format as _};
 use crate::fit::learning;
 use crate::fit::{self, FitContext, FitError, FitOutcome, FitProgress, FitReport, FitSettings};
@@ -77,7 +77,7 @@ impl Run<'_, '_> {
         let mut policy = self.train(None, &d, 0, &collected)?; // line 2: π_net,1 ← π_BC
         let mut eta_hat = 0.0; // line 4
         let mut i = 1;
-        // Line 5: while η̂ ≤ η. Unrounded: the paper's last row prints 0.90 and stops (docs/methods.md 12, item 15).
+        // Line 5: while η̂ ≤ η. Unrounded, where the paper prints 0.90 (docs/methods.md 12, item 15).
         while eta_hat <= self.settings.eta || i <= self.settings.iterations_min {
             if i > self.settings.iterations_max {
                 return Ok((self.finish(policy, &d)?, Stop::IterationCap));
@@ -180,7 +180,7 @@ impl Run<'_, '_> {
         let Some(target) = settings.rule.critic() else { return Ok(true) };
         let novice = Learned::uncritical(settings, store, round, self.checkpoint(policy.clone()))?;
         let control_period_s = 1e-3 * self.conditions.control_period_ms as f32;
-        let d = critic::dataset(target, d, &mut novice.ensemble(), control_period_s);
+        let d = critic::dataset(target, d, &novice.ensemble(), control_period_s);
         // It answers one number, of which there are no ways to choose between.
         let architecture = NetworkArchitecture { modes: 1, ..settings.network };
         let start = Weights::init(architecture, self.seed, index_of(Some(round), CRITIC));
@@ -281,9 +281,11 @@ impl DaggerSettings {
 fn check_finite(round: u32, collected: &Round) -> Result<(), DaggerError> {
     for (sample, at) in collected.samples.iter().zip(&collected.ticks) {
         let label = [sample.label[0], sample.label[1], sample.tau_hat];
-        let state = [at.time_s, at.x_m, at.y_m, at.heading_rad, at.speed_mps, at.steering_rad, at.command_steering_rad];
-        for (what, values) in [("the label", &label[..]), ("the state of the car", &state)] {
-            if !values.iter().all(|value| value.is_finite()) {
+        let is_label_finite = label.iter().all(|value| value.is_finite());
+        // All that is refused when it is read again.
+        let is_state_finite = Tick::FLOATS.iter().all(|(_, value_of)| value_of(at).is_finite());
+        for (what, is_finite) in [("the label", is_label_finite), ("the state of the car", is_state_finite)] {
+            if !is_finite {
                 return Err(DaggerError::NotFinite { round, drive: at.episode, tick: at.tick, what });
             }
         }
@@ -301,4 +303,36 @@ fn index_of(round: Option<u32>, part: usize) -> u64 {
     let round = round.map_or(FINAL, u64::from);
     assert!(round <= FINAL, "a training has fewer than {FINAL} rounds");
     ((part as u64) << 16) | round
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_data::collected;
+
+    /// A commanded speed was not looked at: the round was written, and refused as damaged when it was read again.
+    #[test]
+    fn a_round_that_could_not_be_read_again_is_never_written() {
+        check_finite(1, &collected(3, 0).0).unwrap();
+        let changes: [fn(&mut Round); 11] = [
+            |round| round.samples[2].label[0] = f32::NAN,
+            |round| round.samples[2].label[1] = f32::NAN,
+            |round| round.samples[2].tau_hat = f32::NAN,
+            |round| round.ticks[2].time_s = f32::NAN,
+            |round| round.ticks[2].x_m = f32::NAN,
+            |round| round.ticks[2].y_m = f32::NAN,
+            |round| round.ticks[2].heading_rad = f32::NAN,
+            |round| round.ticks[2].speed_mps = f32::NAN,
+            |round| round.ticks[2].steering_rad = f32::NAN,
+            |round| round.ticks[2].command_steering_rad = f32::NAN,
+            |round| round.ticks[2].command_speed_mps = f32::INFINITY,
+        ];
+        for (index, change) in changes.iter().enumerate() {
+            let (mut round, _) = collected(3, 0);
+            change(&mut round);
+            let error = check_finite(1, &round).unwrap_err();
+            let is_of_tick = matches!(error, DaggerError::NotFinite { round: 1, drive: 0, tick: 2, .. });
+            assert!(is_of_tick, "change {index}: {error}");
+        }
+    }
 }

@@ -18,12 +18,14 @@ pub(crate) fn alarm(answer: &Prediction) -> f32 {
 }
 
 /// What the critic of a trained network learns from the data that the network was trained on.
-pub(crate) fn dataset(target: CriticTarget, d: &Dataset, network: &mut Ensemble, control_period_s: f32) -> Dataset {
+pub(crate) fn dataset(target: CriticTarget, d: &Dataset, network: &Ensemble, control_period_s: f32) -> Dataset {
     let mut labelled = Dataset::default();
     for round in d.rounds() {
         let targets = match target {
             CriticTarget::IsOff { tau } => {
-                discrepancies(&round.samples, network).iter().map(|&off| f32::from(u8::from(off > tau))).collect()
+                let grids: Vec<&OccupancyGrid> = round.samples.iter().map(|sample| &sample.grid).collect();
+                let off = discrepancies(&round.samples, &network.predict(&grids));
+                off.iter().map(|&off| f32::from(u8::from(off > tau))).collect()
             }
             CriticTarget::Risk { discount } => risks(&round.ticks, discount, control_period_s),
         };
@@ -43,10 +45,8 @@ pub(crate) fn fit_settings(fit: &FitSettings) -> FitSettings {
     FitSettings { budget, loss: LossSettings::unweighted(), ..fit.clone() }
 }
 
-/// τ̂ of a network on samples, unsmoothed.
-pub(crate) fn discrepancies(samples: &[Sample], network: &mut Ensemble) -> Vec<f32> {
-    let grids: Vec<&OccupancyGrid> = samples.iter().map(|sample| &sample.grid).collect();
-    let answers = network.predict(&grids);
+/// τ̂ of a network's answers to samples.
+pub(crate) fn discrepancies(samples: &[Sample], answers: &[Prediction]) -> Vec<f32> {
     answers.iter().zip(samples).map(|(answer, sample)| Evidence::new(answer, sample.label).discrepancy).collect()
 }
 
@@ -104,13 +104,14 @@ mod tests {
     fn a_critic_learns_where_its_network_is_off() {
         let weights = Weights::init(NetworkArchitecture::compact(), RootSeed(1), 0);
         let predictor = Predictor::new(&weights, InferenceSettings::plain());
-        let mut network = Ensemble::new(predictor, Vec::new());
+        let network = Ensemble::new(predictor, Vec::new());
         let (round, _) = collected(30, 1);
-        let off = discrepancies(&round.samples, &mut network);
+        let grids: Vec<&OccupancyGrid> = round.samples.iter().map(|sample| &sample.grid).collect();
+        let off = discrepancies(&round.samples, &network.predict(&grids));
         let tau = off.iter().sum::<f32>() / 30.0;
         let mut d = Dataset::default();
         d.push(round);
-        let labelled = dataset(CriticTarget::IsOff { tau }, &d, &mut network, 0.05);
+        let labelled = dataset(CriticTarget::IsOff { tau }, &d, &network, 0.05);
         let found: Vec<f32> = labelled.rounds()[0].samples.iter().map(|sample| sample.label[1]).collect();
         assert_eq!(found, off.iter().map(|&off| if off > tau { 1.0 } else { 0.0 }).collect::<Vec<_>>());
         assert_eq!(labelled.rounds()[0].noise_augmentations, d.rounds()[0].noise_augmentations);

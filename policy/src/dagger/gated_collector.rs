@@ -118,9 +118,9 @@ impl GatedCollector {
     }
 
     /// What a critic warns of at every seat, 0…1: the ahead axis of its answers, which mirror images share.
-    fn alarms(&mut self, seats: &[Seat<'_>]) -> Vec<f32> {
+    fn alarms(&self, seats: &[Seat<'_>]) -> Vec<f32> {
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
-        let answers = self.critic.as_mut().map(|critic| critic.predict(&grids));
+        let answers = self.critic.as_ref().map(|critic| critic.predict(&grids));
         answers.map_or_else(|| vec![0.0; seats.len()], |answers| answers.iter().map(critic::alarm).collect())
     }
 

@@ -79,15 +79,14 @@ impl Learned {
 
     /// The thresholds, from the answers to everything that was trained on.
     fn thresholds(&self, rate: f32, d: &Dataset) -> Thresholds {
-        let (mut ensemble, mut critic) = (self.ensemble(), self.critic());
+        let (ensemble, critic) = (self.ensemble(), self.critic());
         let (mut disagreement, mut risk, mut discrepancy) = (Vec::new(), Vec::new(), Vec::new());
         for round in d.rounds() {
             let grids: Vec<&OccupancyGrid> = round.samples.iter().map(|sample| &sample.grid).collect();
-            disagreement.extend(ensemble.predict_with_disagreement(&grids).1);
-            discrepancy.extend(critic::discrepancies(&round.samples, &mut ensemble));
-            risk.extend(
-                critic.iter_mut().flat_map(|critic| critic.predict(&grids)).map(|answer| critic::alarm(&answer)),
-            );
+            let (answers, spreads) = ensemble.predict_with_disagreement(&grids);
+            disagreement.extend(spreads);
+            discrepancy.extend(critic::discrepancies(&round.samples, &answers));
+            risk.extend(critic.iter().flat_map(|critic| critic.predict(&grids)).map(|answer| critic::alarm(&answer)));
         }
         Thresholds::new(rate, disagreement, risk, &discrepancy)
     }

@@ -7,9 +7,9 @@
 //!          ticks.npz        [n] per column    episode, time, pose, command and driver of each sample
 //!          noise_augmentations.npz   u8 [n, k, 79]   the same scenes with other noise, if k > 0
 //!          model.safetensors, model.toml, fit.toml       the network trained after it
-//! round-01/…
-//!          learning.csv    how it was trained, step by step
+//!          learning.csv     how it was trained, step by step
 //!          sha256sums       what of this is finished
+//! round-01/…
 //! round-01-member-1/…       another member of an ensemble, for rules that drive with one
 //! round-01-critic/…         what warns of states that the network does not master, for rules that need it
 //! final/                    an optional longer fit on everything

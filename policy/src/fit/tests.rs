@@ -75,7 +75,7 @@ fn two_modes_learn_two_ways() {
         let start = Weights::init(NetworkArchitecture { modes, ..tiny() }, RootSeed(1), 0);
         let mut progress = |_: &FitProgress| ControlFlow::Continue(());
         let fitted = fit(&start, &dataset, &settings(200), context(DeviceChoice::Cpu), None, &mut progress).unwrap();
-        let mut predictor = Predictor::new(&fitted.weights, InferenceSettings::plain());
+        let predictor = Predictor::new(&fitted.weights, InferenceSettings::plain());
         let answers = predictor.predict(&grids.iter().collect::<Vec<_>>());
         answers.iter().map(|answer| (answer.mean[0] - 0.5).abs()).sum::<f32>() / answers.len() as f32
     };
@@ -168,23 +168,42 @@ fn a_damaged_state_of_a_training_is_refused() {
     std::fs::remove_file(path).unwrap();
 }
 
-/// It was continued: a network of two trainings under the name of one.
+/// It was continued: a network of two trainings under the name of one. Of other grids with the same labels, and for a network
+/// that is used otherwise, it still was when settings and labels were compared.
 #[test]
 fn a_state_that_another_training_left_is_refused() {
     let path = scratch("state-of-another");
     let mut stop = |_: &FitProgress| ControlFlow::Break(());
-    let mut train = |samples: usize, seed: u64, settings: &FitSettings| {
+    let mut train = |dataset: &Dataset, settings: &FitSettings, context: FitContext| {
         let start = Weights::init(tiny(), RootSeed(1), 0);
-        let context = FitContext { seed: RootSeed(seed), ..context(DeviceChoice::Cpu) };
-        fit(&start, &dataset(samples), settings, context, Some(&path), &mut stop).map(|outcome| outcome.report.steps)
+        fit(&start, dataset, settings, context, Some(&path), &mut stop).map(|outcome| outcome.report.steps)
     };
-    let other = FitSettings { gradient_norm_max: 0.5, ..settings(9) };
-    assert_eq!(train(200, 1, &settings(9)), Ok(1));
-    for refused in [train(200, 2, &settings(9)), train(200, 1, &other), train(240, 1, &settings(9))] {
+    let (own, own_settings, own_context) = (dataset(200), settings(9), context(DeviceChoice::Cpu));
+    // The same labels, and another grid of one sample, as another noise gives it.
+    let with_another_grid = |sample: usize| {
+        let mut round = round(200);
+        round.samples[sample].grid = round.samples[sample].grid.mirrored();
+        let mut dataset = Dataset::default();
+        dataset.push(round);
+        dataset
+    };
+    let other_settings = FitSettings { gradient_norm_max: 0.5, ..settings(9) };
+    let other_seed = FitContext { seed: RootSeed(3), ..own_context };
+    let other_inference = FitContext { inference: InferenceSettings::smoothed(), ..own_context };
+    assert_eq!(train(&own, &own_settings, own_context), Ok(1));
+    for refused in [
+        train(&own, &own_settings, other_seed),
+        train(&own, &own_settings, other_inference),
+        train(&own, &other_settings, own_context),
+        train(&dataset(240), &own_settings, own_context),
+        train(&with_another_grid(0), &own_settings, own_context),
+        // Held back: validated on.
+        train(&with_another_grid(199), &own_settings, own_context),
+    ] {
         let error = refused.unwrap_err().to_string();
         assert!(error.contains("of another training") && error.contains("delete it"), "{error}");
     }
-    assert_eq!(train(200, 1, &settings(9)), Ok(2), "its own goes on");
+    assert_eq!(train(&own, &own_settings, own_context), Ok(2), "its own goes on");
     std::fs::remove_file(path).unwrap();
 }
 

@@ -115,7 +115,7 @@ pub fn fit(
     };
     let mut learner = Learner::new(start, &split.training, settings, context, steps)?;
     let mut course = Course::new(start);
-    let origin = unfinished::origin(start, &split.training, context.seed, settings);
+    let origin = unfinished::origin(start, &split, context.inference, context.seed, settings);
     if let Some(path) = unfinished
         && let Some(left) = Unfinished::read(path, &origin, start.architecture())?
     {
@@ -279,7 +279,7 @@ fn batch_loss(settings: &LossSettings, outputs: Tensor<2>, samples: &[Sample], d
 /// Compares the answers to samples with their labels.
 pub fn evaluate(weights: &Weights, samples: &[Sample], loss: &LossSettings, context: FitContext) -> Validation {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
-    let mut predictor = Predictor::new(weights, context.inference);
+    let predictor = Predictor::new(weights, context.inference);
     let answers = predictor.raw(&grids);
     let outputs = predictor.for_loss(&grids, &answers);
     let squared_error: f64 = answers

@@ -3,15 +3,16 @@
 //! Learning rate, order of samples and dropout are functions of the number of the step; the mean loss since the last
 //! validation and the bookkeeping of the best weights follow from the steps and the curve. The rest is here.
 
-use crate::dataset::Sample;
+use crate::dataset::{Sample, Split};
 use crate::files::FileError;
 use crate::fit::report::{CurvePoint, Step};
 use crate::fit::settings::FitSettings;
 use crate::loss::LossParts;
-use crate::network::{NetworkArchitecture, Weights};
+use crate::network::{InferenceSettings, NetworkArchitecture, Weights};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
+use sim::sensing::GRID_CELLS;
 use std::path::Path;
 use storage::{sealed, sums};
 
@@ -43,15 +44,24 @@ struct About {
     curve: Vec<CurvePoint>,
 }
 
-/// SHA-256 of what a training follows from: its first weights, the labels of its samples, its seed and its settings. A file
-/// that another training left, copied beside this one, has another.
-pub(crate) fn origin(start: &Weights, samples: &[Sample], seed: RootSeed, settings: &FitSettings) -> String {
+/// SHA-256 of what a training follows from: its first weights, the samples that it learns from and is validated on, how its
+/// network is used, its seed and its settings. A file that another training left, copied beside this one, has another.
+pub(crate) fn origin(
+    start: &Weights,
+    split: &Split,
+    inference: InferenceSettings,
+    seed: RootSeed,
+    settings: &FitSettings,
+) -> String {
     let mut bytes = bytes_of(start.values());
-    for &Sample { label: [u, w], tau_hat, .. } in samples {
-        bytes.extend(bytes_of(&[u, w, tau_hat]));
+    for Sample { grid, label: [u, w], tau_hat } in split.training.iter().chain(&split.validation) {
+        bytes.extend((0..GRID_CELLS).flat_map(|row| grid.row(row).to_le_bytes()));
+        bytes.extend(bytes_of(&[*u, *w, *tau_hat]));
     }
     bytes.extend(seed.0.to_le_bytes());
-    bytes.extend(toml::to_string(settings).expect("settings are serialised wherever they are kept").into_bytes());
+    for settings in [toml::to_string(&inference), toml::to_string(settings)] {
+        bytes.extend(settings.expect("settings are serialised wherever they are kept").into_bytes());
+    }
     sums::digest(&bytes)
 }
 

@@ -22,19 +22,19 @@ impl Ensemble {
     }
 
     /// Answers every grid, in order.
-    pub fn predict(&mut self, grids: &[&OccupancyGrid]) -> Vec<Prediction> {
+    pub fn predict(&self, grids: &[&OccupancyGrid]) -> Vec<Prediction> {
         self.predict_with_disagreement(grids).0
     }
 
     /// The same, and how far the members' means are spread about their mean, root mean square, image fractions: 0 of a
     /// single network.
-    pub fn predict_with_disagreement(&mut self, grids: &[&OccupancyGrid]) -> (Vec<Prediction>, Vec<f32>) {
+    pub fn predict_with_disagreement(&self, grids: &[&OccupancyGrid]) -> (Vec<Prediction>, Vec<f32>) {
         let mut answers = self.first.predict(grids);
         let mut disagreement = vec![0.0; answers.len()];
         if self.others.is_empty() {
             return (answers, disagreement);
         }
-        let others: Vec<Vec<Prediction>> = self.others.iter_mut().map(|member| member.predict(grids)).collect();
+        let others: Vec<Vec<Prediction>> = self.others.iter().map(|member| member.predict(grids)).collect();
         let mut members = Vec::with_capacity(1 + others.len());
         for (at, (answer, disagreement)) in answers.iter_mut().zip(&mut disagreement).enumerate() {
             members.clear();
@@ -143,8 +143,8 @@ mod tests {
         };
         let grids = lots(2);
         let grids: Vec<_> = grids.iter().collect();
-        let [mut one, mut two, mut three] = [1, 2, 3].map(choosing);
-        let members = [&mut one, &mut two, &mut three].map(|member| member.predict(&grids)[0]);
+        let [one, two, three] = [1, 2, 3].map(choosing);
+        let members = [&one, &two, &three].map(|member| member.predict(&grids)[0]);
         let (answers, disagreement) = Ensemble::new(one, vec![two, three]).predict_with_disagreement(&grids);
         assert_eq!(answers[0], mixture(majority(&mut members.clone())));
         assert_eq!(disagreement[0], spread(mixture(&members).mean, &members), "it is about the mean of all");

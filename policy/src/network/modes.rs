@@ -4,6 +4,7 @@
 
 use crate::network::architecture::{OUTPUTS, row_width};
 use sim::maths;
+use sim::sensing::OccupancyGrid;
 
 /// One answer among several.
 #[derive(Debug, Clone, Copy)]
@@ -20,6 +21,30 @@ impl Mode {
     }
 }
 
+/// The answer of a network to every grid, in order, of which `rows` gives the rows: the likeliest mode of a row. With mirror
+/// averaging, that of the rows of the grid and of its mirror image together.
+///
+/// # Panics
+/// If a row has not [`row_width`] values.
+pub fn answers(
+    grids: &[&OccupancyGrid],
+    modes: usize,
+    mirror_averaging: bool,
+    rows: impl FnOnce(&[&OccupancyGrid]) -> Vec<f32>,
+) -> Vec<[f32; OUTPUTS]> {
+    let width = row_width(modes);
+    if !mirror_averaging {
+        return rows(grids).chunks_exact(width).map(|row| likeliest_of(row, modes)).collect();
+    }
+    // The images in the same call: two small calls cost more than one of twice the size.
+    let images: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
+    let both: Vec<&OccupancyGrid> = grids.iter().copied().chain(&images).collect();
+    let rows = rows(&both);
+    let (of_grids, of_images) = rows.split_at(grids.len() * width);
+    let rows = of_grids.chunks_exact(width).zip(of_images.chunks_exact(width));
+    rows.map(|(of_grid, of_image)| mirror_averaged(of_grid, of_image, modes)).collect()
+}
+
 /// The likeliest answer of a row of `modes`.
 ///
 /// # Panics
@@ -30,10 +55,7 @@ pub fn likeliest_of(row: &[f32], modes: usize) -> [f32; OUTPUTS] {
 
 /// The likeliest answer to a grid or to its mirror image, whichever is likelier, averaged with the other's that is nearest to
 /// it. The rows are what the network answers to the grid and to the image.
-///
-/// # Panics
-/// If the rows have not [`row_width`] values.
-pub fn mirror_averaged(of_grid: &[f32], of_image: &[f32], modes: usize) -> [f32; OUTPUTS] {
+fn mirror_averaged(of_grid: &[f32], of_image: &[f32], modes: usize) -> [f32; OUTPUTS] {
     let (of_grid, of_image) = (of_row(of_grid, modes), of_row(of_image, modes).map(|mode| mode.mirrored()));
     let (one, other) = (likeliest(of_grid.clone()), likeliest(of_image.clone()));
     if one.log_weight >= other.log_weight {

@@ -4,7 +4,7 @@ use crate::network::architecture::{NetworkArchitecture, OUTPUTS, POOLED_1, row_w
 use crate::network::inference::InferenceSettings;
 use crate::network::log_variance::soft_clamp_log_variance;
 use crate::network::look_ahead_net::{LookAheadNet, occupied_tensor};
-use crate::network::modes::{likeliest_of, mirror_averaged};
+use crate::network::modes;
 use crate::network::weights::Weights;
 use burn::tensor::Device;
 use sim::driver::{LookAheadPoint, Spread};
@@ -74,7 +74,7 @@ impl Predictor {
     }
 
     /// Answers every grid, in order.
-    pub fn predict(&mut self, grids: &[&OccupancyGrid]) -> Vec<Prediction> {
+    pub fn predict(&self, grids: &[&OccupancyGrid]) -> Vec<Prediction> {
         self.raw(grids).into_iter().map(Prediction::from_raw).collect()
     }
 
@@ -84,18 +84,8 @@ impl Predictor {
     }
 
     /// One answer per grid: means of u and w, raw log-variances of both. Of several modes, the one that is likeliest.
-    pub fn raw(&mut self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
-        let width = row_width(self.modes);
-        if !self.mirror_averaging {
-            let outputs = self.outputs(grids.iter().copied(), grids.len());
-            return outputs.chunks_exact(width).map(|row| likeliest_of(row, self.modes)).collect();
-        }
-        // The images in the same call: two small calls cost more than one of twice the size.
-        let images: Vec<OccupancyGrid> = grids.iter().map(|grid| grid.mirrored()).collect();
-        let outputs = self.outputs(grids.iter().copied().chain(&images), 2 * grids.len());
-        let (of_grids, of_images) = outputs.split_at(grids.len() * width);
-        let rows = of_grids.chunks_exact(width).zip(of_images.chunks_exact(width));
-        rows.map(|(of_grid, of_image)| mirror_averaged(of_grid, of_image, self.modes)).collect()
+    pub fn raw(&self, grids: &[&OccupancyGrid]) -> Vec<[f32; OUTPUTS]> {
+        modes::answers(grids, self.modes, self.mirror_averaging, |grids| self.outputs(grids))
     }
 
     /// What the loss of grids is computed from, `[grids, width]`: of one Gaussian its answers, averaged with those to mirror
@@ -103,17 +93,15 @@ impl Predictor {
     pub(crate) fn for_loss(&self, grids: &[&OccupancyGrid], answers: &[[f32; OUTPUTS]]) -> Vec<f32> {
         match self.modes {
             1 => answers.as_flattened().to_vec(),
-            _ => self.outputs(grids.iter().copied(), grids.len()),
+            _ => self.outputs(grids),
         }
     }
 
     /// The outputs of the network itself, one row per grid.
-    fn outputs<'a>(&self, mut grids: impl Iterator<Item = &'a OccupancyGrid>, count: usize) -> Vec<f32> {
-        let width = row_width(self.modes);
-        let mut outputs = Vec::with_capacity(count * width);
-        while outputs.len() < count * width {
-            let rows = (count - outputs.len() / width).min(self.rows_max);
-            let occupied = occupied_tensor(grids.by_ref().take(rows), &self.device);
+    fn outputs(&self, grids: &[&OccupancyGrid]) -> Vec<f32> {
+        let mut outputs = Vec::with_capacity(grids.len() * row_width(self.modes));
+        for grids in grids.chunks(self.rows_max) {
+            let occupied = occupied_tensor(grids.iter().copied(), &self.device);
             outputs.extend(self.net.forward(occupied, None).into_data().try_into_vec::<f32>().expect("f32"));
         }
         outputs
@@ -139,7 +127,7 @@ mod tests {
             ),
         ] {
             let weights = Weights::init(architecture, RootSeed(1), 0);
-            let mut predictor = Predictor::new(&weights, inference);
+            let predictor = Predictor::new(&weights, inference);
             let all: Vec<&OccupancyGrid> = grids.iter().collect();
             let together = predictor.raw(&all);
             for (index, grid) in grids.iter().enumerate() {
@@ -160,7 +148,7 @@ mod tests {
         for modes in [1, 2] {
             let architecture = NetworkArchitecture { modes, ..NetworkArchitecture::compact() };
             let weights = Weights::init(architecture, RootSeed(1), 0);
-            let mut predictor = Predictor::new(&weights, InferenceSettings::smoothed());
+            let predictor = Predictor::new(&weights, InferenceSettings::smoothed());
             let answers = predictor.predict(&grids.iter().collect::<Vec<_>>());
             let images = predictor.predict(&mirrored.iter().collect::<Vec<_>>());
             for (answer, image) in answers.iter().zip(&images) {

@@ -3,7 +3,8 @@
 //! A kernel is a struct that implements [`WithSimd`]; [`run`] calls it with AVX-512, AVX2 or scalar instructions. The
 //! results are the same bits on each: lanes never mix, sums run in a fixed order, and multiply-add is fused everywhere
 //! (a processor without the instruction computes it in software). Lengths along channels are multiples of
-//! [`LANES`](crate::network::LANES), the widest vector there is, so that no kernel has a remainder.
+//! [`LANES`](crate::network::LANES), the widest vector there is, so that kernels of convolutions have no remainder; those of
+//! dense layers and of Adam load and store a part of a vector.
 
 use pulp::{Arch, Simd, WithSimd};
 
