@@ -197,6 +197,62 @@ fn a_map_is_driven_in_two_commands() {
     assert!(results.join("summary.md").is_file());
 }
 
+/// A lane of 5 m and a street that leads off it, a pixel a metre, with a route and noise of its own.
+fn map_with_a_side_street(folder: &Path) -> String {
+    let mut pixels = String::new();
+    for y in (0..32).rev() {
+        for x in 0..60 {
+            let is_lane = (1..59).contains(&x) && (1..6).contains(&y);
+            let is_street = (25..30).contains(&x) && (6..31).contains(&y);
+            pixels.push_str(if is_lane || is_street { "254 " } else { "0 " });
+        }
+        pixels.push('\n');
+    }
+    std::fs::write(folder.join("side.pgm"), format!("P2\n60 32\n255\n{pixels}")).unwrap();
+    std::fs::write(folder.join("side.yaml"), "image: side.pgm\nresolution: 1.0\norigin: [0.0, 0.0, 0.0]\n").unwrap();
+    let route = "map = 'side.yaml'\nstart = [5.0, 3.5, 0.0]\ngoal = [40.0, 3.5, 0.0]\nnoise = { level = 'hard' }\n";
+    std::fs::write(folder.join("side.lot.toml"), route).unwrap();
+    folder.join("side.yaml").display().to_string()
+}
+
+/// Only `evaluate`, `generate` and trainings said that a route has junctions, and that a lot's own noise is ignored; of a
+/// lot that `generate` wrote of a map nobody said the first.
+#[test]
+fn junctions_and_noise_that_is_ignored_are_said_before_anything_is_driven() {
+    let folder = scratch("notes");
+    let map = map_with_a_side_street(&folder);
+    let place = |name: &str| folder.join(name).display().to_string();
+    let said = |arguments: &[&str]| {
+        let output = xtask().args(arguments).output().unwrap();
+        let (stdout, stderr) = text(&output);
+        assert!(output.status.success(), "{arguments:?} failed:\n{stdout}\n{stderr}");
+        stderr
+    };
+    let junction = "side: the route has 1 junction, near (2";
+    let noise = "side: the lot asks for noise hard, but is driven with paper";
+    let (lots, out, written) = (place("lots"), place("out"), place("lots/side.toml"));
+    let generated = said(&["generate", "--lots", &map, "--out", &lots]);
+    assert!(generated.contains(junction) && generated.contains("--close-branches"), "{generated}");
+    assert!(!generated.contains("noise"), "the lot keeps its noise: {generated}");
+    assert!(generated.contains("generating: 1 lot ("), "{generated}");
+    let once = ["--trials", "1", "--directions", "forward", "--out", &out];
+    for arguments in [
+        &[&["evaluate", "--driver", "expert", "--lots", &map], &once[..]].concat()[..],
+        &["pixel-accuracy", "--lots", &written, "--trials", "1"],
+        &["render", "noise", "--lots", &written, "--noise", "paper", "--at", "10", "--out", &lots],
+        &["render", "trajectories", "--driver", "expert", "--lots", &written, "--out", &lots],
+    ] {
+        let said = said(arguments);
+        assert!(said.contains(junction) && said.contains(noise), "{arguments:?}: {said}");
+    }
+    // Refused after the notes, because the map lies there.
+    let here = folder.display().to_string();
+    let around = ["--preset", "smoke", "--unseen", &map, "--overwrite", "--out", &here];
+    for command in ["reproduce", "rules", "deviations"] {
+        refuses(&[&[command], &around[..]].concat(), &[junction, noise, "choose another --out"]);
+    }
+}
+
 #[test]
 fn a_map_that_cannot_be_driven_is_refused_and_leaves_nothing() {
     let folder = scratch("bad-map");
@@ -324,6 +380,34 @@ fn the_network_that_ships_drives_at_once() {
     assert_eq!(runs.len(), 6, "three lots, both ways");
     // Of the five trainings in the README each has 8 to 11 in ten times as many trials.
     assert!(sum("reference_m") > 1000.0 && sum("near_collisions") < 6.0, "{lines}");
+}
+
+/// It was called no run, though it drives as any other network.
+#[test]
+fn the_network_that_ships_is_exported_by_its_name() {
+    let folder = scratch("exported");
+    let [by_name, by_folder] = ["name.onnx", "folder.onnx"].map(|name| folder.join(name).display().to_string());
+    succeed(xtask().args(["export", "onnx", "trained:default", "--out", &by_name]));
+    succeed(xtask().args(["export", "onnx", "policy/trained/default", "--out", &by_folder]));
+    assert!(std::fs::read(&by_name).unwrap() == std::fs::read(&by_folder).unwrap(), "it is the same network");
+    refuses(&["export", "onnx", "trained:Default", "--out", &by_name], &["did you mean trained:default?"]);
+}
+
+/// The page that a newcomer reads first had the three lots alone.
+#[test]
+fn the_report_of_a_training_shows_its_check_on_other_lots() {
+    let run = scratch("report-of-other-lots").join("run");
+    succeed(xtask().args(["train-bc", "--preset", "smoke", "--out"]).arg(&run));
+    let read = |name: &str| std::fs::read_to_string(run.join(name)).unwrap();
+    let (table, markdown, html) = (read("elsewhere.md"), read("report.md"), read("report.html"));
+    assert!(markdown.contains("\n## Other lots\n\nThe same drivers on validation:1:lane, "), "{markdown}");
+    assert!(markdown.contains(table.trim_end()), "{markdown}");
+    is_a_report(&html, &[">Other lots</h2>", ">validation-lane"]);
+    succeed(xtask().args(["render", "report"]).arg(&run));
+    assert!(read("report.html") == html, "and when it is written again");
+    std::fs::write(run.join("elsewhere.md"), table.replacen('0', "1", 1)).unwrap();
+    let error = refuse(xtask().args(["render", "report"]).arg(&run));
+    assert!(error.contains("elsewhere.md"), "{error}");
 }
 
 /// 29 maps and four drivers filled 3000 lines of a terminal.

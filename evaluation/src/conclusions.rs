@@ -273,8 +273,11 @@ impl Against<'_> {
     }
 
     fn fails_less(&self, other: usize) -> Statement {
-        let found =
-            self.difference(other, |estimate| estimate.difference_per_100m, |comparison| comparison.difference_per_100m);
+        let found = self.difference(
+            other,
+            |estimate| estimate.difference_per_100m,
+            |comparison| comparison.difference_per_100m,
+        );
         let verdict = Verdict::of(found);
         let (ours, theirs) = (self.rate(self.dagger), self.rate(other));
         let mut figures = format!("{ours}; {theirs}; difference {}", difference(found, 2));
@@ -309,7 +312,8 @@ impl Against<'_> {
         let [ours, theirs] = [self.dagger, other].map(|driver| self.each(driver, 1, Totals::reversals_per_100m));
         // Two things are compared then: the drivers, and what follows them.
         let settings = self.driven.plan.settings;
-        let is_smoothed = settings.evaluation.smoothing == Smoothing::Own && settings.dagger.inference.smoothing_ticks > 0.0;
+        let is_smoothed =
+            settings.evaluation.smoothing == Smoothing::Own && settings.dagger.inference.smoothing_ticks > 0.0;
         let smoothed = if is_smoothed { "; networks' actions are smoothed, those of planners are not" } else { "" };
         Statement {
             claim: format!("DAgger oscillates less than {}", self.name(other)),
@@ -335,8 +339,7 @@ impl Against<'_> {
         let ours: Vec<(u32, Totals)> = trainings.iter().map(|&driver| noisy(driver)).collect();
         let theirs = noisy(other);
         let ratios: Vec<RateRatio> = ours.iter().map(|ours| RateRatio::new(of(&theirs), of(ours))).collect();
-        let is_clustered =
-            trainings.iter().chain([&other]).any(|&driver| clustered(&self.estimates[driver]).is_some());
+        let is_clustered = trainings.iter().chain([&other]).any(|&driver| clustered(&self.estimates[driver]).is_some());
         let verdict = if is_clustered || self.comparison(other).is_none() {
             Verdict::CannotBeTold
         } else if ratios.iter().all(|ratio| ratio.lower > 1.0) {

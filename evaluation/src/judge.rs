@@ -197,7 +197,8 @@ pub(crate) fn add(sums: &mut [f64], row: &[RunSummary]) {
 
 /// The statistics of a driver: by [`Statistic`].
 pub(crate) fn statistics(sums: &[f64], driver: usize) -> [f64; STATISTICS] {
-    let [near_collisions, safe_ratio, reversals, driven_100m, contacts] = sums[SHARED..].as_chunks::<COLUMNS>().0[driver];
+    let [near_collisions, safe_ratio, reversals, driven_100m, contacts] =
+        sums[SHARED..].as_chunks::<COLUMNS>().0[driver];
     let [runs, reference_100m] = sums.as_chunks::<SHARED>().0[0];
     [
         near_collisions / reference_100m,

@@ -116,12 +116,11 @@ impl Rows {
     /// # Errors
     /// If a file cannot be read or written.
     pub fn write(&self, run: &RunDir) -> anyhow::Result<()> {
-        // What was begun there may be of another commit.
-        growing::clear(run.path(), DRIVING)?;
         if sums::is_listed(run.path(), records::RUNS)? {
-            return Ok(());
+            return Ok(growing::clear(run.path(), DRIVING)?);
         }
-        let mut lines = Growing::open(run.path(), DRIVING, &run.identity()?, &FILES)?;
+        // What was begun there may be of another commit.
+        let mut lines = Growing::begin(run.path(), DRIVING, &run.identity()?, &FILES)?;
         let mut readers = self.0.each_ref().map(Reader::new);
         let [runs, ..] = &self.0;
         for of_drive in runs.rows.chunk_by(|row, next| row.drive() == next.drive()) {

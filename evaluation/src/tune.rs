@@ -29,6 +29,8 @@ use storage::{sealed, sums};
 
 /// Candidates that drive fresh trials besides the starting point.
 const FINALISTS: usize = 4;
+/// Bytes of what candidates did: a million, the most of a search, of at most 400 bytes each.
+const CANDIDATES_BYTES_MAX: u64 = 400_000_000;
 
 /// Tunes planners one after another and writes `NAME.toml` for each as it is found. Lots, trials, directions, noise and
 /// seed are those of the section `evaluation`. Ends early if cancelled: what is returned is what was found by then. What
@@ -36,7 +38,7 @@ const FINALISTS: usize = 4;
 /// result.
 ///
 /// # Errors
-/// If a lot is not for training or cannot be driven, or a file cannot be written.
+/// If a lot is not for training or cannot be driven, a file cannot be read or written, or candidates are of another search.
 pub fn tune(
     settings: &Settings,
     planners: &[Start],
@@ -55,7 +57,7 @@ pub fn tune(
         progress.begin("tuning", &format!("tuning {}", start.name));
         let name = start.name.replace('/', "-");
         let candidates = format!("{name}.candidates.toml");
-        let mut driven = Driven::read(run.path().join(&candidates))?;
+        let mut driven = Driven::read(run.path().join(&candidates), origin(settings, start, budget))?;
         let Some(found) = search(&course, start, budget, evaluation.seed, &mut driven, progress)? else { break };
         sums::list(run.path(), &[&candidates])?;
         progress.end(&format!(
@@ -168,6 +170,8 @@ impl<'a> Course<'a> {
 /// What candidates did, in the order in which they were driven: on disk after every generation.
 struct Driven {
     path: PathBuf,
+    /// The [`origin()`] of the search.
+    origin: String,
     totals: Vec<Totals>,
     /// How many of them the search has been told.
     told: usize,
@@ -175,15 +179,32 @@ struct Driven {
 
 #[derive(Serialize, Deserialize)]
 struct Candidates {
+    /// Files of earlier versions lack it: nobody knows what they are of.
+    #[serde(default)]
+    origin: String,
     candidate: Vec<Totals>,
 }
 
+/// SHA-256 of what candidates follow from: those of another search, copied beside this one, have another. Not of the manifest,
+/// which differs between machines that find the same.
+fn origin(settings: &Settings, Start { name, planner }: &Start, budget: usize) -> String {
+    let start = format!("{}\n{budget} {name}\n{}", settings.to_toml(), planner.parameters());
+    sums::digest(start.as_bytes())
+}
+
 impl Driven {
-    /// What an interrupted search left.
-    fn read(path: PathBuf) -> anyhow::Result<Self> {
-        let text = sealed::read(&path)?.unwrap_or_else(|| b"candidate = []".to_vec());
-        let Candidates { candidate } = toml::from_slice(&text).with_context(|| path.display().to_string())?;
-        Ok(Self { path, totals: candidate, told: 0 })
+    /// What an interrupted search of this origin left.
+    fn read(path: PathBuf, origin: String) -> anyhow::Result<Self> {
+        let Some(text) = sealed::read_up_to(&path, CANDIDATES_BYTES_MAX)? else {
+            return Ok(Self { path, origin, totals: Vec::new(), told: 0 });
+        };
+        let found: Candidates = toml::from_slice(&text).with_context(|| path.display().to_string())?;
+        ensure!(
+            found.origin == origin,
+            "{}: was left by another search; restore it from a copy, or delete it to begin this planner's search again",
+            path.display()
+        );
+        Ok(Self { path, origin, totals: found.candidate, told: 0 })
     }
 
     /// What the next candidates did, driven unless they were before.
@@ -195,7 +216,7 @@ impl Driven {
         if self.told + count > self.totals.len() {
             self.totals.truncate(self.told);
             self.totals.extend(drive()?);
-            let candidates = Candidates { candidate: self.totals.clone() };
+            let candidates = Candidates { origin: self.origin.clone(), candidate: self.totals.clone() };
             sealed::write(&self.path, toml::to_string(&candidates)?.as_bytes())?;
         }
         self.told += count;
@@ -382,5 +403,36 @@ impl Found {
             search: Some(toml::Table::try_from(&record).context("a record is plain values")?),
         };
         Ok(toml::to_string(&file)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `tune --resume` went on with the candidates of any search that somebody had copied there.
+    #[test]
+    fn candidates_of_another_search_are_refused() {
+        let path = std::env::temp_dir().join(format!("evaluation-test-{}-cvm.candidates.toml", std::process::id()));
+        let settings = Settings::preset("default").unwrap();
+        let starts = planners_named(&["cvm".to_owned(), "vvf".to_owned()]).unwrap();
+        let own = || origin(&settings, &starts[0], 8);
+        let mut driven = Driven::read(path.clone(), own()).unwrap();
+        driven.next(1, || Ok(vec![Totals::default()])).unwrap();
+        assert_eq!(Driven::read(path.clone(), own()).unwrap().totals, [Totals::default()]);
+        let mut of_another_seed = settings.clone();
+        of_another_seed.evaluation.seed = RootSeed(2);
+        for other in [
+            origin(&of_another_seed, &starts[0], 8),
+            origin(&settings, &starts[1], 8),
+            origin(&settings, &starts[0], 9),
+        ] {
+            let refused = Driven::read(path.clone(), other).err().unwrap().to_string();
+            assert!(refused.contains("candidates.toml: was left by another search"), "{refused}");
+        }
+        // As earlier versions wrote it.
+        sealed::write(&path, b"candidate = []").unwrap();
+        assert!(Driven::read(path.clone(), own()).is_err());
+        std::fs::remove_file(path).unwrap();
     }
 }

@@ -145,6 +145,18 @@ impl DriverSpec {
     }
 }
 
+/// The network that ships, by its name as a driver, `trained:NAME`; `None` of a text that does not begin so.
+///
+/// # Errors
+/// If none ships under this name.
+pub fn shipped_network(text: &str) -> anyhow::Result<Option<Checkpoint>> {
+    if !text.starts_with("trained:") {
+        return Ok(None);
+    }
+    let spec: DriverSpec = text.parse()?;
+    Ok(spec.checkpoints()?.pop())
+}
+
 /// The settings that a comparison of drivers begins with, unless the layers name others: those of the first training run
 /// among them, with its folder. `None` if there is no run.
 ///

@@ -22,7 +22,14 @@ pub struct Lot {
     name: String,
     spec: LotSpec,
     /// The content of a file, read once so that its errors come before any work.
-    from_file: Option<Arc<Loaded>>,
+    from_file: Option<Arc<FromFile>>,
+}
+
+/// What a file holds, and for which car it was read.
+#[derive(Debug)]
+struct FromFile {
+    loaded: Loaded,
+    vehicle: VehicleSettings,
 }
 
 /// A lot as it stands in one trial.
@@ -48,7 +55,7 @@ pub fn specs() -> Vec<(&'static str, String)> {
             "sealed:PHRASE:N",
             "N lots that nobody has tuned on, drawn from a phrase of a-z, 0-9 and -: easy, medium, hard in turn, or a family",
         ),
-        ("test-hard-7", "one of these: SPLIT-FAMILY-NUMBER, from 0; or sealed-PHRASE-hard-7"),
+        ("test-hard-7", "a single generated lot: SPLIT-FAMILY-NUMBER, counted from 0; or sealed-PHRASE-hard-7"),
         (
             "PATH.toml",
             "a lot written by hand (cargo xtask generate writes examples), or the route on a map, PATH.lot.toml",
@@ -129,12 +136,16 @@ impl Lot {
     }
 
     fn new(spec: LotSpec, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
-        let from_file = match &spec {
-            LotSpec::File(path) => Some(Arc::new(scenarios::load::load_with_notes(path, vehicle).map_err(not_loaded)?)),
-            LotSpec::Reference(_) | LotSpec::Generated { .. } => None,
-        };
-        let name = from_file.as_ref().map_or_else(|| spec.to_string(), |loaded| name_of_file(&loaded.scenario));
-        Ok(Self { name, spec, from_file })
+        if let LotSpec::File(path) = &spec {
+            let loaded = scenarios::load::load_with_notes(path, vehicle).map_err(not_loaded)?;
+            return Ok(Self::of_file(spec, loaded, vehicle));
+        }
+        Ok(Self { name: spec.to_string(), spec, from_file: None })
+    }
+
+    fn of_file(spec: LotSpec, loaded: Loaded, vehicle: &VehicleSettings) -> Self {
+        let name = name_of_file(&loaded.scenario);
+        Self { name, spec, from_file: Some(Arc::new(FromFile { loaded, vehicle: vehicle.clone() })) }
     }
 
     /// A map with a route that may differ from what is written beside it.
@@ -143,26 +154,32 @@ impl Lot {
     /// If no lot can be made of it.
     pub fn of_map(path: &Path, lot: &MapLot, vehicle: &VehicleSettings) -> anyhow::Result<Self> {
         let loaded = lot.scenario(vehicle).map_err(not_loaded)?;
-        Ok(Self {
-            name: name_of_file(&loaded.scenario),
-            spec: LotSpec::File(path.to_owned()),
-            from_file: Some(Arc::new(loaded)),
-        })
+        Ok(Self::of_file(LotSpec::File(path.to_owned()), loaded, vehicle))
     }
 
-    /// Notes about a lot from a file.
-    pub fn notes(&self) -> &[Note] {
-        self.from_file.as_ref().map_or(&[], |loaded| &loaded.notes)
+    fn loaded(&self) -> Option<&Loaded> {
+        self.from_file.as_ref().map(|file| &file.loaded)
+    }
+
+    /// Notes about a lot from a file. Those about one written by hand are found anew, which takes longer than its map.
+    pub fn notes(&self) -> Vec<Note> {
+        match self.from_file.as_deref() {
+            Some(FromFile { loaded, vehicle }) if loaded.is_by_hand => {
+                scenarios::load::junctions(&loaded.scenario, vehicle).into_iter().collect()
+            }
+            Some(FromFile { loaded, .. }) => loaded.notes.clone(),
+            None => Vec::new(),
+        }
     }
 
     /// The noise level that a lot from a file asks for.
     pub fn asks_for_noise(&self) -> Option<NoiseLevel> {
-        self.from_file.as_ref().map(|loaded| loaded.scenario.noise.level)
+        self.loaded().map(|loaded| loaded.scenario.noise.level)
     }
 
     /// SHA-256 of a lot from a file, as it was read, whatever its name; `None` for one that ships or is generated.
     pub fn digest(&self) -> Option<String> {
-        let nameless = Scenario { name: String::new(), ..self.from_file.as_ref()?.scenario.clone() };
+        let nameless = Scenario { name: String::new(), ..self.loaded()?.scenario.clone() };
         Some(storage::sums::digest(scenarios::load::to_toml(&nameless).as_bytes()))
     }
 
@@ -176,7 +193,7 @@ impl Lot {
 
     /// Every file that it is made of: of a map its image and its route as well.
     pub fn files(&self) -> &[PathBuf] {
-        self.from_file.as_ref().map_or(&[], |loaded| &loaded.files)
+        self.loaded().map_or(&[], |loaded| &loaded.files)
     }
 
     /// Name in tables.
@@ -213,7 +230,7 @@ impl Lot {
     /// # Errors
     /// [`scenarios::LoadError::ForwardOnly`], with file and line.
     pub fn check_direction(&self, direction: Direction, vehicle: &VehicleSettings) -> anyhow::Result<()> {
-        match (&self.spec, &self.from_file) {
+        match (&self.spec, self.loaded()) {
             (LotSpec::File(path), Some(loaded)) => {
                 Ok(scenarios::load::check_direction(path, loaded, direction, vehicle)?)
             }
@@ -258,7 +275,7 @@ impl Lot {
                 Drawn { scenario: generated.scenario, attempts: Some(generated.attempts) }
             }
             LotSpec::File(_) => {
-                let loaded = self.from_file.as_ref().expect("files are read when they are named");
+                let loaded = self.loaded().expect("files are read when they are named");
                 Drawn { scenario: loaded.scenario.clone(), attempts: None }
             }
         }

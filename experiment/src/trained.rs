@@ -231,6 +231,13 @@ fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
          or restore the list from a copy",
         run.display()
     );
+    // An empty path is the present folder, and does not exist.
+    ensure!(
+        sums::exists(run)? || run.exists(),
+        "{}: there is no such folder, so this is not a run; list those in runs/{}",
+        run.display(),
+        in_runs(run)
+    );
     ensure!(
         sums::exists(run)?,
         "{}: this is not a run{}; cargo xtask train-dagger and evaluate make them, in runs/ unless --out says otherwise",
@@ -383,6 +390,22 @@ mod tests {
         fs::write(path.join(SETTINGS), whole).unwrap();
         fs::remove_dir_all(&of_last[2]).unwrap();
         assert!(message(driving_folders(&path)).contains("round-01-member-2/sha256sums"));
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// A misspelt folder was advised how runs are made, not that there is none.
+    #[test]
+    fn a_folder_that_does_not_exist_is_said_not_to() {
+        let path = scratch("no-folder");
+        for spec in [path.clone(), path.join("bc")] {
+            let refused = message(policy_folder(&spec));
+            assert!(refused.starts_with(&path.display().to_string()), "{refused}");
+            assert!(refused.contains("there is no such folder, so"), "{refused}");
+            assert!(refused.ends_with("list those in runs/"), "{refused}");
+        }
+        fs::create_dir_all(&path).unwrap();
+        let refused = message(policy_folder(&path));
+        assert!(refused.contains("this is not a run") && !refused.contains("no such folder"), "{refused}");
         fs::remove_dir_all(path).unwrap();
     }
 

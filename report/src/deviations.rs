@@ -4,7 +4,7 @@ use crate::markdown::table_of;
 use crate::plots::{self, RateRow};
 use crate::trainings_table::TrainingsTable;
 use anyhow::Context as _;
-use evaluation::deviations::{self, BASE, Extent};
+use evaluation::deviations::{self, BASE};
 use evaluation::drive_stage::DriveStage;
 use evaluation::format::{difference, quoted_interval, quoted_rate};
 use evaluation::names::{BC, DAGGER};
@@ -13,7 +13,6 @@ use evaluation::stage::{Stage, Step};
 use evaluation::statistics::bootstrap::Interval;
 use evaluation::summary::csv_of;
 use evaluation::table1::Table1;
-use experiment::settings::Settings;
 use serde::Serialize;
 use std::path::Path;
 
@@ -54,7 +53,7 @@ pub const TITLE: &str = "One thing at a time as in the paper";
 ///
 /// # Errors
 /// If what a stage wrote cannot be read.
-pub fn table(_: &Settings, _: &Extent, stages: &[Stage], root: &Path) -> anyhow::Result<TrainingsTable> {
+pub fn table(stages: &[Stage], root: &Path) -> anyhow::Result<TrainingsTable> {
     let mut rows = Vec::new();
     for stage in stages.iter().filter(|stage| matches!(stage.step, Step::Drive { .. })) {
         rows.extend(rows_of(stage, stages, root)?);

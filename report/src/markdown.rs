@@ -96,20 +96,24 @@ fn with_short_path(cell: &str, parts: usize) -> String {
 }
 
 /// Widths of the columns that make a table `width` wide: the widest become narrower first, none narrower than its longest
-/// word as long as another one can.
+/// word as long as another one can, and then none narrower than its longest piece.
 fn widths(rows: &[Vec<String>], width: usize) -> Vec<usize> {
     const BROKEN: usize = 8;
     let of = |measure: &dyn Fn(&str) -> usize| -> Vec<usize> {
         (0..rows[0].len()).map(|column| rows.iter().map(|row| measure(&row[column])).max().unwrap_or(0)).collect()
     };
     let mut widths = of(&length);
-    let longest_words = of(&|cell| words(cell).map(length).max().unwrap_or(0));
+    let least = [
+        of(&|cell| words(cell).map(length).max().unwrap_or(0)),
+        of(&|cell| pieces(cell).map(length).max().unwrap_or(0)),
+        vec![BROKEN; widths.len()],
+    ];
     let room = width.saturating_sub(3 * widths.len() + 1);
     while widths.iter().sum::<usize>() > room {
-        let widest = |least: &dyn Fn(usize) -> usize| {
-            (0..widths.len()).filter(|&column| widths[column] > least(column)).max_by_key(|&column| widths[column])
+        let widest = |least: &Vec<usize>| {
+            (0..widths.len()).filter(|&column| widths[column] > least[column]).max_by_key(|&column| widths[column])
         };
-        let Some(column) = widest(&|column| longest_words[column]).or_else(|| widest(&|_| BROKEN)) else { break };
+        let Some(column) = least.iter().find_map(widest) else { break };
         widths[column] -= 1;
     }
     widths
@@ -128,7 +132,15 @@ fn words(text: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// Lines of at most `width`. What is longer is broken, if it can be at a space within its brackets or behind a `/`.
+/// What a line of a word that is too long may end with.
+const BREAKS: [char; 3] = ['/', ':', '-'];
+
+/// Parts of a text between which a line may end where words are too long: at any space, and behind [`BREAKS`].
+fn pieces(text: &str) -> impl Iterator<Item = &str> {
+    text.split(' ').flat_map(|word| word.split_inclusive(BREAKS))
+}
+
+/// Lines of at most `width`. What is longer is broken, if it can be between its pieces.
 fn wrap(text: &str, width: usize) -> Vec<String> {
     let mut lines = vec![String::new()];
     let within = |text| if length(text) <= width { vec![text] } else { text.split(' ').collect() };
@@ -146,8 +158,12 @@ fn wrap(text: &str, width: usize) -> Vec<String> {
             && length(line) > width
             && let Some((end, _)) = line.char_indices().nth(width.max(1))
         {
-            let folder = line[..end].rfind('/').map(|at| at + 1).filter(|&at| 2 * at > end);
-            let rest = line.split_off(folder.unwrap_or(end));
+            let is_next_whole = |at: usize| pieces(&line[at..]).next().is_some_and(|next| length(next) <= width);
+            // What is broken anyway leaves no short line behind.
+            let between = line[..end].rfind(BREAKS).map(|at| at + 1);
+            let between = between.filter(|&at| 2 * at > end || is_next_whole(at));
+            let end = between.unwrap_or(end);
+            let rest = line.split_off(end);
             lines.push(rest);
         }
     }
@@ -210,8 +226,25 @@ A sentence of a few more words than fit
 here.";
         assert_eq!(fit(&text, 39), expected);
         let broken = fit("| header |\n|--------|\n| run:runs/a-long-name |", 13);
-        assert_eq!(broken, "| header    |\n|-----------|\n| run:runs/ |\n| a-long-na |\n| me        |");
+        assert_eq!(broken, "| header    |\n|-----------|\n| run:runs/ |\n| a-long-   |\n| name      |");
         assert_eq!(fit("more (than one line has room for) of it", 20), "more (than one line\nhas room for) of it");
+    }
+
+    /// `trained:default` was broken behind its `d`, and `reversals` before its last letter, where the pieces had room.
+    #[test]
+    fn words_are_not_torn_apart_where_the_table_fits_otherwise() {
+        let mut table = table_of(&["driver", "least clearance m", "reversals /100 m"]);
+        table.add_row(["trained:default", "0.20", "31.6"]);
+        let expected = "\
+| driver   | least     | reversals |
+|          | clearance | /100 m    |
+|          | m         |           |
+|----------|-----------|-----------|
+| trained: | 0.20      | 31.6      |
+| default  |           |           |";
+        assert_eq!(fit(&table.to_string(), 36), expected);
+        assert_eq!(wrap("run:train-dagger-default-s1", 14), ["run:train-", "dagger-", "default-s1"]);
+        assert_eq!(wrap("a:bbbbbbbbbbbb", 6), ["a:bbbb", "bbbbbb", "bb"], "no line for a letter");
     }
 
     #[test]

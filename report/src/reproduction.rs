@@ -4,12 +4,12 @@ use crate::controls;
 use crate::deviations;
 use crate::docs_page::{self, MadeBy};
 use crate::drive::{rows_of, with_drives};
-use crate::markdown::{table_of, with_header};
+use crate::markdown::table_of;
 use crate::other_run::OtherRun;
 use crate::page::{Image, Page};
 use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
 use crate::rules;
-use crate::table1::{self, AGREEMENT, READ_ETA_HAT};
+use crate::table1::{self, ByRound, READ_ETA_HAT};
 use crate::trainings::{self, Place};
 use crate::trainings_table::TrainingsTable;
 use evaluation::calibration::AxisCalibration;
@@ -54,14 +54,14 @@ pub fn write(recipe: &Recipe, run: &RunDir) -> anyhow::Result<String> {
     let found = Found::read(recipe, run.path())?;
     let mut page = Page::new("The paper in a box");
     page.text(introduction(recipe));
-    found.add_to(&mut page, recipe, run.path())?;
+    let statements = found.add_to(&mut page, recipe, run.path())?;
     page.section("Where to look further", further());
     page.write(run, "report")?;
-    run.write("conclusions.csv", &csv_of(&found.statements)?)?;
-    for FurtherTable { name, table, .. } in further_tables(recipe, run.path())? {
+    run.write("conclusions.csv", &csv_of(&statements)?)?;
+    for FurtherTable { name, table, .. } in &found.further_tables {
         table.write(run, name)?;
     }
-    Ok(verdicts(&found.statements, &recipe.extent))
+    Ok(verdicts(&statements, &recipe.extent))
 }
 
 /// The same as a page of the documentation, with what made it in its head, and the tables of other runs at its end.
@@ -101,8 +101,8 @@ fn further_tables(recipe: &Recipe, root: &Path) -> anyhow::Result<Vec<FurtherTab
         let table = rules::table(&compared.settings, of, &compared.stages, &root.join(stages::FAMILY))?;
         tables.push(FurtherTable { name: "rules", title: rules::TITLE, table });
     }
-    if let (Some(stages), Some(of)) = (stages::of_deviations(settings, extent, root)?, &extent.deviations) {
-        let table = deviations::table(settings, of, &stages, &root.join(stages::DEVIATIONS))?;
+    if let Some(stages) = stages::of_deviations(settings, extent, root)? {
+        let table = deviations::table(&stages, &root.join(stages::DEVIATIONS))?;
         tables.push(FurtherTable { name: "deviations", title: deviations::TITLE, table });
     }
     Ok(tables)
@@ -131,12 +131,12 @@ fn cautions(settings: &Settings) -> anyhow::Result<String> {
     ))
 }
 
-/// What the stages found.
+/// What the stages found, but their drives.
 struct Found {
-    statements: Vec<Statement>,
     weighted: Vec<IterationRow>,
     unweighted: Vec<IterationRow>,
     on_policy: OnPolicy,
+    further_tables: Vec<FurtherTable>,
 }
 
 impl Found {
@@ -148,18 +148,17 @@ impl Found {
         };
         let (weighted, unweighted) = (rows(Chain::Weighted)?, rows(Chain::Unweighted)?);
         let on_policy = OnPolicy::read(&root.join(stages::ON_POLICY))?;
-        let folders = [stages::REFERENCE, stages::UNSEEN];
-        let statements = with_drives(&recipe.stages, root, folders, |[reference, unseen]| {
-            Ok(statements(settings, &reference, &unseen, &weighted, &on_policy.effect))
-        })?;
-        Ok(Self { statements, weighted, unweighted, on_policy })
+        Ok(Self { weighted, unweighted, on_policy, further_tables: further_tables(recipe, root)? })
     }
 
-    fn add_to(&self, page: &mut Page, recipe: &Recipe, root: &Path) -> anyhow::Result<()> {
+    /// Adds all of it to a page; returns what is concluded.
+    fn add_to(&self, page: &mut Page, recipe: &Recipe, root: &Path) -> anyhow::Result<Vec<Statement>> {
         let settings = &recipe.settings;
-        with_drives(&recipe.stages, root, [stages::REFERENCE, stages::UNSEEN], |[reference, unseen]| {
+        let folders = [stages::REFERENCE, stages::UNSEEN];
+        let statements = with_drives(&recipe.stages, root, folders, |[reference, unseen]| {
+            let statements = statements(settings, &reference, &unseen, &self.weighted, &self.on_policy.effect);
             headline(page, &reference, &unseen);
-            page.section("What holds here", verdicts(&self.statements, &recipe.extent));
+            page.section("What holds here", verdicts(&statements, &recipe.extent));
             table_1(page, settings, &self.weighted, &self.unweighted, &self.on_policy.effect);
             collision_rates(page, &reference);
             safe_ratios(page, &reference);
@@ -173,13 +172,13 @@ impl Found {
                     trainings::by_seed(settings, &recipe.extent, root, &reference, &unseen)?,
                 );
             }
-            Ok(())
+            Ok(statements)
         })?;
-        for FurtherTable { name, title, table } in further_tables(recipe, root)? {
-            page.section(title, table.text);
-            page.figure(name, "The same as a plot.", Image::Svg(table.svg));
+        for FurtherTable { name, title, table } in &self.further_tables {
+            page.section(*title, table.text.as_str());
+            page.figure(*name, "The same as a plot.", Image::Svg(table.svg.clone()));
         }
-        Ok(())
+        Ok(statements)
     }
 
     fn add_ablations_to(
@@ -355,38 +354,19 @@ fn table_1(
     effect: &[Effect],
 ) {
     let weight = weight_of(&settings.dagger.fit.loss);
-    let columns = weighted.len().max(unweighted.len()).max(paper::TABLE_1.dataset.len());
-    let header: Vec<String> = (0..columns).map(|i| if i == 0 { BC.to_owned() } else { format!("i = {i}") }).collect();
-    let mut table = with_header(std::iter::once(String::new()).chain(header).collect());
-    let mut add = |name: &str, value: &dyn Fn(usize) -> Option<String>| {
-        let cells = (0..columns).map(|i| value(i).unwrap_or_else(|| "–".to_owned()));
-        table.add_row(std::iter::once(name.to_owned()).chain(cells).collect::<Vec<_>>());
-    };
-    let eta_of =
-        |rows: &[IterationRow], i: usize| rows.get(i).and_then(|row| row.eta_hat).map(|eta| format!("{eta:.3}"));
-    let of_paper = |values: &[Option<f64>; 6], i: usize| values.get(i).copied().flatten().map(|v| format!("{v:.2}"));
-    let effect_of = |i: usize| effect.iter().find(|effect| effect.iteration as usize == i);
-    add("samples", &|i| weighted.get(i).map(|row| row.samples.to_string()));
-    add("  paper", &|i| paper::TABLE_1.dataset.get(i).map(ToString::to_string));
-    add("η̂ = network / total", &|i| eta_of(weighted, i));
+    let mut table = ByRound::new(weighted, unweighted, &paper::TABLE_1);
+    table.add_of("mean weight of τ̂", weighted, |row| row.mean_weight.map(|weight| format!("{weight:.3}")));
     if !unweighted.is_empty() {
-        add("  with α = 0", &|i| eta_of(unweighted, i));
-    }
-    add("  paper", &|i| of_paper(&paper::TABLE_1.eta_hat, i));
-    for (name, value) in AGREEMENT {
-        add(name, &|i| weighted.get(i).and_then(value));
-    }
-    add("mean weight of τ̂", &|i| weighted.get(i)?.mean_weight.map(|weight| format!("{weight:.3}")));
-    if !unweighted.is_empty() {
-        add("effect of the weight, held-back samples", &|i| {
+        let effect_of = |i: usize| effect.iter().find(|effect| effect.iteration as usize == i);
+        table.add("effect of the weight, held-back samples", &|i| {
             let interval = effect_of(i)?.held_back?;
             Some(format!("{:.2} [{:.2}, {:.2}]", interval.estimate, interval.lower, interval.upper))
         });
-        add("effect of the weight, driving", &|i| {
+        table.add("effect of the weight, driving", &|i| {
             let [with, without] = effect_of(i)?.driving_per_s;
             Some(format!("{:.2}", with / without.max(f64::MIN_POSITIVE)))
         });
-        add("  paper", &|i| of_paper(&paper::TABLE_1.effect, i));
+        table.add("  paper", &|i| table1::of_paper(&paper::TABLE_1.effect, i));
     }
     let of_effect = if unweighted.is_empty() {
         "There is no effect of the weight: nothing is weighted.".to_owned()

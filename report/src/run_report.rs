@@ -38,6 +38,8 @@ use storage::sums;
 /// Name of the file.
 pub const FILE: &str = "report.html";
 const STEM: &str = "report";
+/// The table of a training's check on other lots.
+const ELSEWHERE: &str = "elsewhere.md";
 /// Near-collisions that are shown.
 const MOMENTS: usize = 6;
 /// At most this many of them are of one driver on one lot.
@@ -54,6 +56,8 @@ struct Sources {
     training: Option<Training>,
     /// The evaluation, if anything was driven.
     evaluation: Option<Evaluation>,
+    /// The table of the check on other lots, if a training ended with one.
+    elsewhere: Option<String>,
 }
 
 #[derive(Debug)]
@@ -82,6 +86,7 @@ impl Sources {
             manifest: Manifest::read(folder)?,
             training: Training::read(folder)?,
             evaluation: Evaluation::read(folder)?,
+            elsewhere: sums::is_listed(folder, ELSEWHERE)?.then(|| text(&folder.join(ELSEWHERE))).transpose()?,
         })
     }
 }
@@ -208,6 +213,9 @@ fn report(folder: &Path, progress: &dyn Progress) -> anyhow::Result<Report> {
     }
     if let Some(evaluation) = &sources.evaluation {
         add_evaluation(&mut page, evaluation);
+        if let Some(table) = &sources.elsewhere {
+            add_elsewhere(&mut page, &sources.settings, table);
+        }
         not_replayed = add_moments(&mut page, folder, &sources.settings, evaluation, progress)?;
     }
     glossary::add(&mut page);
@@ -376,6 +384,21 @@ fn add_evaluation(page: &mut Page, evaluation: &Evaluation) {
         }
     }
     page.section("Tables", evaluation.text.as_str());
+}
+
+/// What the same drivers did on other lots than those of the evaluation.
+fn add_elsewhere(page: &mut Page, settings: &Settings, table: &str) {
+    let evaluation = &settings.evaluation;
+    page.section(
+        "Other lots",
+        format!(
+            "The same drivers on {}, one trial per lot and direction, noise {}. Nobody trained on these lots, unless it \
+             says so.\n\n{table}",
+            escaped(&evaluation.elsewhere.join(", ")),
+            // Of several levels the first was driven.
+            evaluation.noise[0]
+        ),
+    );
 }
 
 /// Lots, or generated lots of one kind, that have rows of their own: safe ratios of different lots do not compare,

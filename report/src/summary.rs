@@ -91,7 +91,8 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
         }
     }
     if summary.levels().len() > 1 {
-        let _ = write!(text, "Near-collisions per 100 m; contacts: against noise\n\n{}\n\n", sweep_table(summary, rows));
+        let _ =
+            write!(text, "Near-collisions per 100 m; contacts: against noise\n\n{}\n\n", sweep_table(summary, rows));
     }
     let EvaluationSettings { seed, trials, .. } = &summary.plan.settings.evaluation;
     let _ = write!(
@@ -136,7 +137,7 @@ fn rates_table(summary: &Summary<'_>, level: usize, rows: Rows, has_paper: bool)
         "route",
         "near-collisions (→, ←)",
         "per 100 m [95 %]",
-        "contacts: per 100 m [95 %]",
+        "contacts",
         "unweighted",
         "dispersion",
     ]);
@@ -153,7 +154,7 @@ fn rates_table(summary: &Summary<'_>, level: usize, rows: Rows, has_paper: bool)
             format!("{:.0} m", totals.reference_m),
             format!("{} ({forward}, {reverse})", totals.near_collisions),
             quoted_rate(&totals, estimate),
-            quoted_contacts(&totals, estimate),
+            totals.contacts.to_string(),
             unweighted(summary, level, driver, &judged.slice, 0, 2),
             estimate.dispersion.map_or_else(|| "–".to_owned(), |dispersion| format!("{:.1}", dispersion.index)),
         ]);
@@ -214,6 +215,7 @@ fn driving_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
     let mut table = table_of(&[
         "driver",
         "lots",
+        "contacts: per 100 m [95 %]",
         "stuck",
         "timed out",
         "given up",
@@ -226,6 +228,7 @@ fn driving_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
         table.add_row([
             summary.driver(driver).to_owned(),
             judged.slice.label.clone(),
+            quoted_contacts(&totals, &judged.estimates[driver]),
             totals.stuck.to_string(),
             totals.timed_out.to_string(),
             totals.given_up.to_string(),

@@ -1,13 +1,15 @@
 //! The paper's table of DAgger iterations, from a run beside the paper's, as Markdown.
 
 use crate::markdown::with_header;
+use comfy_table::Table;
 use evaluation::names::BC;
-use evaluation::paper;
+use evaluation::paper::{self, IterationsOfPaper};
 use evaluation::table1::Table1;
 use experiment::run_dir::RunDir;
 use experiment::settings::{Settings, has_points_of_paper};
 use policy::dagger::{IterationRow, Stop};
 use policy::decision_rule::DecisionRule;
+use std::fmt;
 
 /// Writes `table1.md`; returns its text.
 ///
@@ -23,7 +25,7 @@ pub fn write(table1: &Table1, run: &RunDir) -> anyhow::Result<String> {
 type Cell = fn(&IterationRow) -> Option<String>;
 
 /// What η̂ is to be read with, per round: name of the row, its cells.
-pub(crate) const AGREEMENT: [(&str, Cell); 5] = [
+const AGREEMENT: [(&str, Cell); 5] = [
     ("τ̂ < τ, whoever drove", |row| row.agreement.map(|found| format!("{:.3}", found.within_tau))),
     ("  best constant answer", |row| row.agreement.map(|found| format!("{:.3}", found.constant_within_tau))),
     ("τ̂ < τ scaled as the labels", |row| {
@@ -56,32 +58,68 @@ pub(crate) fn eta_hat_of_paper(settings: &Settings) -> Vec<(u32, f64)> {
     if has_eta_hat_of_paper(settings) { of_paper.collect() } else { Vec::new() }
 }
 
+/// A table of iterations beside the paper's, a column per round.
+pub(crate) struct ByRound {
+    table: Table,
+    columns: usize,
+}
+
+impl ByRound {
+    /// With the rows that every such table begins with. `unweighted`: rounds of the same training with α = 0, or none.
+    pub(crate) fn new(rows: &[IterationRow], unweighted: &[IterationRow], paper: &IterationsOfPaper) -> Self {
+        let columns = rows.len().max(unweighted.len()).max(paper.dataset.len());
+        let header = std::iter::once(String::new())
+            .chain((0..columns).map(|i| if i == 0 { BC.to_owned() } else { format!("i = {i}") }));
+        let mut table = Self { table: with_header(header.collect()), columns };
+        let eta_hat: Cell = |row| row.eta_hat.map(|eta| format!("{eta:.3}"));
+        table.add_of("samples", rows, |row| Some(row.samples.to_string()));
+        table.add("  paper", &|i| paper.dataset.get(i).map(ToString::to_string));
+        table.add_of("η̂ = network / total", rows, eta_hat);
+        if !unweighted.is_empty() {
+            table.add_of("  with α = 0", unweighted, eta_hat);
+        }
+        table.add("  paper", &|i| of_paper(&paper.eta_hat, i));
+        for (name, cell) in AGREEMENT {
+            table.add_of(name, rows, cell);
+        }
+        table
+    }
+
+    /// Adds a row, whose cells are told by round.
+    pub(crate) fn add(&mut self, name: &str, cell: &dyn Fn(usize) -> Option<String>) {
+        let cells = (0..self.columns).map(|i| cell(i).unwrap_or_else(|| "–".to_owned()));
+        self.table.add_row(std::iter::once(name.to_owned()).chain(cells).collect::<Vec<_>>());
+    }
+
+    /// Adds a row of what the rounds of a training have.
+    pub(crate) fn add_of(&mut self, name: &str, rows: &[IterationRow], cell: Cell) {
+        self.add(name, &|i| rows.get(i).and_then(cell));
+    }
+}
+
+impl fmt::Display for ByRound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.table, f)
+    }
+}
+
+/// A figure of the paper's table as it is printed there.
+pub(crate) fn of_paper(values: &[Option<f64>; 6], round: usize) -> Option<String> {
+    values.get(round).copied().flatten().map(|value| format!("{value:.2}"))
+}
+
 /// A column per round.
 pub fn to_markdown(table1: &Table1) -> String {
-    let columns = table1.rows.len().max(table1.paper.dataset.len());
-    let header = std::iter::once(String::new())
-        .chain((0..columns).map(|i| if i == 0 { BC.to_owned() } else { format!("i = {i}") }));
-    let mut table = with_header(header.collect());
-    let mut add = |name: &str, value: &dyn Fn(usize) -> Option<String>| {
-        let values = (0..columns).map(|i| value(i).unwrap_or_else(|| "–".to_owned()));
-        table.add_row(std::iter::once(name.to_owned()).chain(values).collect::<Vec<_>>());
-    };
-    let ours = |of: fn(&IterationRow) -> Option<String>| move |i: usize| table1.rows.get(i).and_then(of);
-    add("samples", &ours(|row| Some(row.samples.to_string())));
-    add("  paper", &|i| table1.paper.dataset.get(i).map(ToString::to_string));
-    add("η̂ = network / total", &ours(|row| row.eta_hat.map(|eta| format!("{eta:.3}"))));
-    add("  paper", &|i| table1.paper.eta_hat.get(i).copied().flatten().map(|eta| format!("{eta:.2}")));
-    for (name, value) in AGREEMENT {
-        add(name, &ours(value));
-    }
-    add("samples in all", &ours(|row| Some(row.dataset.to_string())));
-    add("mean weight of τ̂", &ours(|row| row.mean_weight.map(|weight| format!("{weight:.3}"))));
-    add("validation NLL", &ours(|row| row.validation_nll.map(|nll| format!("{nll:.3}"))));
-    add("validation error, m", &ours(|row| row.validation_rmse_m.map(|error| format!("{error:.3}"))));
-    add("Σ τ̂ per second", &ours(|row| row.tau_hat_per_s.map(|sum| format!("{sum:.3}"))));
-    add("near-collisions", &ours(|row| Some(row.near_collisions.to_string())));
-    add("contacts", &ours(|row| row.effort.map(|effort| effort.contacts.to_string())));
-    add("interventions", &ours(|row| row.effort.map(|effort| effort.interventions.to_string())));
+    let mut table = ByRound::new(&table1.rows, &[], &table1.paper);
+    let mut add = |name: &str, cell: Cell| table.add_of(name, &table1.rows, cell);
+    add("samples in all", |row| Some(row.dataset.to_string()));
+    add("mean weight of τ̂", |row| row.mean_weight.map(|weight| format!("{weight:.3}")));
+    add("validation NLL", |row| row.validation_nll.map(|nll| format!("{nll:.3}")));
+    add("validation error, m", |row| row.validation_rmse_m.map(|error| format!("{error:.3}")));
+    add("Σ τ̂ per second", |row| row.tau_hat_per_s.map(|sum| format!("{sum:.3}")));
+    add("near-collisions", |row| Some(row.near_collisions.to_string()));
+    add("contacts", |row| row.effort.map(|effort| effort.contacts.to_string()));
+    add("interventions", |row| row.effort.map(|effort| effort.interventions.to_string()));
     let why = match table1.stop {
         Stop::EtaReached => "η̂ passed the threshold η",
         Stop::IterationCap => "the cap on iterations was reached",

@@ -30,6 +30,7 @@ use sim::map::Map;
 use sim::scenario::{Island, LotNoise, Place, ReferencePath, Scenario, ScenarioError};
 use sim::validate::{check_island, validate};
 use sim::vehicle::VehicleSettings;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use storage::read;
 
@@ -134,7 +135,12 @@ impl MapLot {
             return Self::parse(&read_text(path, LOT_BYTES_MAX)?, path);
         }
         let beside = path.with_extension("lot.toml");
-        if !beside.is_file() {
+        // Whatever else is in its place is an error when it is read: without it the map would be another lot. (Its name
+        // is longer than the map's, perhaps too long for a file.)
+        let is_not_there = |kind: ErrorKind| {
+            matches!(kind, ErrorKind::NotFound | ErrorKind::NotADirectory | ErrorKind::InvalidFilename)
+        };
+        if beside.symlink_metadata().is_err_and(|error| is_not_there(error.kind())) {
             return Ok(Self::of_map(path));
         }
         let lot = Self::read(&beside)?;
@@ -246,7 +252,7 @@ impl MapLot {
         let mouths = in_map(branches::find(&map, vehicle).into_iter().map(|branch| branch.mouth).collect());
         let is_asked_to_close = self.close_branches;
         notes.extend((!mouths.is_empty()).then_some(Note::Open { mouths, is_asked_to_close }));
-        Ok(Loaded { scenario, files, notes, frame: frame.explained() })
+        Ok(Loaded { scenario, files, notes, frame: frame.explained(), is_by_hand: false })
     }
 
     fn check(&self) -> Result<(), LoadError> {
@@ -322,16 +328,16 @@ impl MapLot {
         notes: &mut Vec<Note>,
     ) -> Result<Ground, LoadError> {
         let place = if self.centre_line.is_some() { "centre_line, point 1" } else { "start" };
-        let drivable_pixel = |place: &str, [x, y]: [f64; 2], drivable: &contour::Mask| {
+        let drivable_pixel = |place: &str, [x, y]: [f64; 2]| {
             let pixel = map.pixel_at([x, y]);
-            if drivable.at(pixel) {
+            if map.drivable.at(pixel) {
                 return Ok(pixel);
             }
             let problem = format!("({x:.2}, {y:.2}) is not drivable: {}", map.pixel_said(pixel));
             Err(self.fault(place, problem, "move it onto free pixels; x and y are metres in the map's frame"))
         };
-        let pixel = drivable_pixel(place, seed, &map.drivable)?;
-        goal.map(|goal| drivable_pixel("goal", goal, &map.drivable)).transpose()?;
+        let pixel = drivable_pixel(place, seed)?;
+        goal.map(|goal| drivable_pixel("goal", goal)).transpose()?;
         let pixel_m = map.resolution_m * self.scale;
         if !MAP_PIXEL_M.contains(&pixel_m) {
             let problem = format!("a pixel of the map is {pixel_m} m in the lot");
@@ -364,7 +370,12 @@ impl MapLot {
             (region, 0)
         };
         notes.extend((thickened > 0).then_some(Note::Thickened { pixels: thickened }));
-        drivable_pixel(place, seed, &region)?;
+        if !region.at(pixel) {
+            let [x, y] = seed;
+            let problem = format!("({x:.2}, {y:.2}) lies within a speck or wall that was made larger");
+            let remedy = "move it away from what is not drivable; drop_specks_m2 leaves specks out";
+            return Err(self.fault(place, problem, remedy));
+        }
         let rings = region.outlines();
         let in_lot = |point: [f64; 2]| {
             let point = frame.in_lot(map.point_at(point));

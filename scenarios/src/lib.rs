@@ -42,8 +42,8 @@ use std::path::PathBuf;
 /// `lot-a`, `lot-b`, `lot-c` · `reference` (all three) · `train:N`, `validation:N`, `test:N` (the first N generated lots
 /// of a split, medium unless `:hard` or another [`Family`] follows; `:all` takes all families in turn) ·
 /// `sealed:PHRASE:N` (lots that nobody has seen before the phrase was chosen: easy, medium and hard in turn unless a
-/// family or `:all` follows) · `test-hard-7` (one of them) · a path ending in `.toml`, or in `.yaml` or `.csv` for a map
-/// with its route beside it (see [`import`]).
+/// family or `:all` follows) · `test-hard-7` (a single one, counted from 0) · a path ending in `.toml`, or in `.yaml`
+/// or `.csv` for a map with its route beside it (see [`import`]).
 ///
 /// ```
 /// let lots = scenarios::suite("lot-a,test:2:hard")?;
@@ -133,10 +133,10 @@ impl std::str::FromStr for LotSpec {
 /// A name that means no lot.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{name:?} {problem}{hint}; there are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N, test:N and \
+    "{name:?} {problem}; {there} are lot-a, lot-b, lot-c, reference (all three), train:N, validation:N, test:N and \
      sealed:PHRASE:N (N generated lots; add :all, {families}), single ones such as test-hard-7, and paths ending in .toml, \
      .yaml (ROS map) or .csv (TPCAP case)",
-    hint = meant(name).map(|meant| format!("; did you mean {meant}?")).unwrap_or_default(),
+    there = meant(name).map_or_else(|| "there".to_owned(), |meant| format!("did you mean {meant}? There")),
     families = Family::list(":")
 )]
 pub struct SpecError {
@@ -295,9 +295,9 @@ mod tests {
             ("test:5:brutal", "\"test:5:brutal\" has no family \"brutal\"; there are"),
             ("test:5:hard:1", "\"test:5:hard:1\" has \"1\" too much"),
             ("test-hard-x", "\"test-hard-x\" is not a lot; there are"),
-            ("lotb", "\"lotb\" is not a lot; did you mean lot-b?; there are"),
-            ("Lot-B", "\"Lot-B\" is not a lot; did you mean lot-b?; there are"),
-            ("test-20", "\"test-20\" is not a lot; did you mean test:20?; there are"),
+            ("lotb", "\"lotb\" is not a lot; did you mean lot-b? There are lot-a, "),
+            ("Lot-B", "\"Lot-B\" is not a lot; did you mean lot-b? There are"),
+            ("test-20", "\"test-20\" is not a lot; did you mean test:20? There are"),
             ("sealed", "\"sealed\" does not say which phrase; there are"),
             ("sealed:spring", "\"sealed:spring\" does not say how many lots; there are"),
             (

@@ -3,11 +3,13 @@
 //!
 //! Whatever is wrong with a file is one error that names file, line and remedy.
 
+use crate::branches::{self, Branch};
 use crate::error::{LoadError, Location, line_at, read_text};
 use crate::import::{self, MapLot};
-use crate::note::Loaded;
+use crate::note::{Loaded, Note};
 use serde::Deserialize as _;
 use sim::limits::LOT_BYTES_MAX;
+use sim::map::Map;
 use sim::scenario::{Direction, Place, Scenario, ScenarioError};
 use sim::validate::validate;
 use sim::vehicle::VehicleSettings;
@@ -39,7 +41,17 @@ pub fn load_with_notes(path: &Path, vehicle: &VehicleSettings) -> Result<Loaded,
         return MapLot::read(path)?.scenario(vehicle);
     }
     let scenario = scenario_of(&document, &text, &file, vehicle)?;
-    Ok(Loaded { scenario, files: vec![path.to_owned()], notes: Vec::new(), frame: None })
+    Ok(Loaded { scenario, files: vec![path.to_owned()], notes: Vec::new(), frame: None, is_by_hand: true })
+}
+
+/// The junctions of a lot written by hand, in a note; `None` if there are none, or the vehicle does not fit.
+///
+/// That takes as long as building its map, and longer: [`load_with_notes`] leaves it to whoever shows notes.
+pub fn junctions(scenario: &Scenario, vehicle: &VehicleSettings) -> Option<Note> {
+    let map = Map::build(scenario.clone(), vehicle).ok()?;
+    let mouth_of = |branch: Branch| [branch.mouth.x, branch.mouth.y].map(f64::from);
+    let mouths: Vec<_> = branches::find(&map, vehicle).into_iter().map(mouth_of).collect();
+    (!mouths.is_empty()).then_some(Note::OpenByHand { mouths })
 }
 
 fn names_a_map(document: &Document<&str>) -> bool {
@@ -251,7 +263,6 @@ impl VisitMut for Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::note::Note;
     use crate::reference::{self, ReferenceLot};
     use sim::seed::RootSeed;
 
@@ -298,6 +309,34 @@ mod tests {
                 assert_eq!(check_direction(&file, &loaded, direction, &car), Ok(()));
             }
         }
+    }
+
+    /// A map's junctions were named, but not those of the lot that `generate` writes of it.
+    #[test]
+    fn junctions_of_a_lot_written_by_hand_are_named() {
+        let car = VehicleSettings::hyundai_hg300();
+        let lane = parse(EXAMPLE, "slalom.toml", &car).expect("the example is sound");
+        assert_eq!(junctions(&lane, &car), None);
+        // A side street of 5 m, 27 m long.
+        let lot = Scenario::new(
+            "two streets",
+            [
+                (-18.0, -3.0),
+                (90.0, -3.0),
+                (90.0, 3.0),
+                (32.5, 3.0),
+                (32.5, 30.0),
+                (27.5, 30.0),
+                (27.5, 3.0),
+                (-18.0, 3.0),
+            ],
+            [(0.0, 0.0), (70.0, 0.0)],
+        );
+        let note = junctions(&lot, &car).expect("a junction");
+        let Note::OpenByHand { mouths } = &note else { panic!("{note:?}") };
+        assert!(mouths.len() == 1 && (mouths[0][0] - 30.0).abs() < 2.5, "{mouths:?}");
+        assert!(note.to_string().starts_with("the route has 1 junction, near ("), "{note}");
+        assert!(note.to_string().contains("islands or obstacles"), "{note}");
     }
 
     #[test]

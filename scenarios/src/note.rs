@@ -10,13 +10,15 @@ pub struct Loaded {
     pub scenario: Scenario,
     /// Every file that was read: the lot's own, the map's, its image, its route.
     pub files: Vec<PathBuf>,
-    /// Notes in order of the work; none for a lot written by hand.
+    /// Notes in order of the work; none for a lot written by hand, whose junctions [`crate::load::junctions`] finds.
     pub notes: Vec<Note>,
     /// How its coordinates come from those of its map, in words; `None` if they are the same.
     pub frame: Option<String>,
+    /// Whether it was written by hand, or by `cargo xtask generate`, and not made of a map.
+    pub is_by_hand: bool,
 }
 
-/// Something an import did, or found. Places are metres in the map's own frame.
+/// Something an import did, or found. Places are metres in the map's own frame, or that of a lot written by hand.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Note {
     /// The map is far from its origin, where single precision is too coarse: the lot's origin is this place.
@@ -51,6 +53,8 @@ pub enum Note {
         /// The map's threshold.
         free_thresh: f64,
     },
+    /// The same in mode `scale`, whatever the threshold.
+    UnknownIsScaled,
     /// Ways that leave the route were closed, because the lot asks for it.
     Closed {
         /// Where they leave it.
@@ -62,6 +66,11 @@ pub enum Note {
         mouths: Vec<[f64; 2]>,
         /// Whether the lot asks for them to be closed: no kerb could be laid across these.
         is_asked_to_close: bool,
+    },
+    /// Ways leave the route of a lot written by hand and go on.
+    OpenByHand {
+        /// Where they leave it.
+        mouths: Vec<[f64; 2]>,
     },
 }
 
@@ -79,7 +88,8 @@ impl std::fmt::Display for Note {
             }
             Self::Padded { specks } => write!(
                 f,
-                "{} of occupied pixels, too small for an island, made 10 cm large; drop_specks_m2 leaves out such specks",
+                "{} of occupied pixels, too small for an island, made 10 cm large; drop_specks_m2 in NAME.lot.toml \
+                 leaves out such specks",
                 are(*specks, "speck", "specks")
             ),
             Self::Thickened { pixels } => write!(
@@ -103,22 +113,36 @@ impl std::fmt::Display for Note {
                 "pixels of grey 205, which map savers write for unknown ground, count as free under free_thresh {free_thresh}, \
                  as in map_server; write free_thresh: 0.196 into the YAML file if they are unknown"
             ),
+            Self::UnknownIsScaled => f.write_str(
+                "pixels of grey 205, which map savers write for unknown ground, count as free in mode scale, where \
+                 only transparent pixels are unknown; write mode: trinary and free_thresh: 0.196 into the YAML file if \
+                 they are unknown",
+            ),
             Self::Closed { mouths } => {
                 write!(f, "{} closed with kerbs, near {}", are(mouths.len(), "branch", "branches"), listed(mouths))
             }
-            Self::Open { mouths, is_asked_to_close } => write!(
-                f,
-                "the route has {}, near {}: drivers do not see the route and may turn off there; {}",
-                are(mouths.len(), "junction", "junctions"),
-                listed(mouths),
-                if *is_asked_to_close {
-                    "no kerb closes what is left, which is too wide or too near to the route: draw walls into the map there"
-                } else {
-                    "close_branches = true (--close-branches of cargo xtask generate) closes branches with kerbs"
-                }
-            ),
+            Self::Open { mouths, is_asked_to_close: true } => f.write_str(&open(
+                mouths,
+                "no kerb closes what is left, which is too wide or too near to the route: draw walls into the map \
+                 there",
+            )),
+            Self::Open { mouths, is_asked_to_close: false } => f.write_str(&open(
+                mouths,
+                "close_branches = true (--close-branches of cargo xtask generate) closes branches with kerbs",
+            )),
+            Self::OpenByHand { mouths } => f.write_str(&open(
+                mouths,
+                "close them with islands or obstacles; of a map, cargo xtask generate --close-branches writes a lot \
+                 with kerbs there",
+            )),
         }
     }
+}
+
+fn open(mouths: &[[f64; 2]], remedy: &str) -> String {
+    let junctions = if mouths.len() == 1 { "1 junction".to_owned() } else { format!("{} junctions", mouths.len()) };
+    let places = listed(mouths);
+    format!("the route has {junctions}, near {places}: drivers do not see the route and may turn off there; {remedy}")
 }
 
 fn listed(places: &[[f64; 2]]) -> String {

@@ -10,7 +10,8 @@ use sim::limits::THREADS_MAX;
 
 /// lotpilot: learns to drive through parking lots in simulation, and measures how well.
 #[derive(Debug, Parser)]
-#[command(name = "lotpilot", bin_name = "cargo xtask", version, after_help = EXAMPLES)]
+// A line of help is one line, however wide the terminal: whoever searches or pipes it finds whole sentences.
+#[command(name = "lotpilot", bin_name = "cargo xtask", version, after_help = EXAMPLES, term_width = 0)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,

@@ -190,6 +190,11 @@ impl Progress for Console {
     }
 }
 
+/// `1 lot`, `2 lots`.
+pub(crate) fn counted_lots(count: usize) -> String {
+    format!("{count} lot{}", if count == 1 { "" } else { "s" })
+}
+
 /// `40 s`, `3 min`, `2 h 5 min`.
 fn duration(seconds: f64) -> String {
     let minutes = (seconds / 60.0).round() as u64;

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct RecordArgs {
     /// Records the first N runs of every driver and noise level for Rerun when all is done; for a training, also its
-    /// learning curves and the first N episodes of every round. Builds the recorder the first time (8 minutes).
+    /// learning curves and the first N episodes of every round. Builds the viewer program the first time (8 minutes).
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "1", value_parser = clap::value_parser!(u32).range(1..))]
     pub(crate) record: Option<u32>,
 }

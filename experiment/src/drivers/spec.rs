@@ -122,8 +122,8 @@ impl FromStr for DriverSpec {
                 let likeness = |name: &String| strsim::jaro_winkler(&text.to_lowercase(), name);
                 let nearest = known.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
                 let nearest = nearest.filter(|name| likeness(name) > 0.85);
-                let hint = nearest.map(|name| format!("; did you mean {name}?")).unwrap_or_default();
-                bail!("no driver {text:?}{hint}; there are {}", known.join(", "))
+                let there = nearest.map_or_else(|| "there".to_owned(), |name| format!("did you mean {name}? There"));
+                bail!("no driver {text:?}; {there} are {}", known.join(", "))
             }
         }
     }
@@ -265,7 +265,7 @@ mod tests {
             assert_eq!(text.parse::<DriverSpec>().unwrap().to_string(), text);
         }
         for (wrong, known) in [
-            ("exprt", "did you mean expert?; there are expert, grid-expert, trained:default, run:DIR"),
+            ("exprt", "did you mean expert? There are expert, grid-expert, trained:default, run:DIR"),
             ("Tentacle", "did you mean tentacle?"),
             ("expert,tentacle", "with spaces between them"),
             ("run:", "names no folder or file"),
@@ -278,7 +278,7 @@ mod tests {
             ("ensemble:run:runs/a,run:./runs/a", "named twice"),
             ("ensemble:", "there are expert, grid-expert, trained:default, run:DIR"),
             ("python:mine", "lotpilot.evaluate"),
-            ("tuned:tentacles", "there are tuned:tentacle, tuned:vvf"),
+            ("tuned:tentacles", "did you mean tuned:tentacle? There are tuned:tentacle, tuned:vvf"),
         ] {
             let error = wrong.parse::<DriverSpec>().unwrap_err().to_string();
             assert!(error.contains(known), "{wrong:?}: {error}");

@@ -5,7 +5,7 @@ use super::schema::Settings;
 use anyhow::{Context as _, bail, ensure};
 use policy::fit::Budget;
 use scenarios::LotSpec;
-use sim::limits::{DRIVES_AT_ONCE_MAX, RUNS_MAX};
+use sim::limits::{DRIVES_AT_ONCE_MAX, NOISE_LEVELS_MAX, RUNS_MAX};
 
 impl Settings {
     /// Checks ranges, and what no single section can know.
@@ -40,6 +40,11 @@ impl Settings {
         ensure!(
             !noise.is_empty(),
             "evaluation.noise is empty; name at least one level (clean, paper, hard, lot, 0.5 …)"
+        );
+        ensure!(
+            noise.len() <= NOISE_LEVELS_MAX,
+            "evaluation.noise names {} levels; at most {NOISE_LEVELS_MAX} are possible",
+            noise.len()
         );
         for (i, level) in noise.iter().enumerate() {
             if let Some(same) = noise[..i].iter().find(|other| level.is_same_as(**other)) {
@@ -103,6 +108,20 @@ impl Settings {
             expert::WAY_SPACING_M
         );
         self.check_lots()
+    }
+
+    /// Checks that each of [`Self::training_seeds`] can be written down as its root seed.
+    ///
+    /// # Errors
+    /// If one cannot.
+    pub fn check_training_seeds(&self, trainings: u64) -> anyhow::Result<()> {
+        let last = self.seed.0.checked_add(trainings.saturating_sub(1));
+        ensure!(
+            last.is_some_and(|last| i64::try_from(last).is_ok()),
+            "seed {} leaves no room for {trainings} trainings; choose a smaller one",
+            self.seed.0
+        );
+        Ok(())
     }
 
     /// Checks names of lots, and counts the drives they make. Files are not looked at.

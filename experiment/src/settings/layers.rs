@@ -142,9 +142,13 @@ fn explain(key: &str, message: &str) -> String {
         .filter(|(likeness, _)| *likeness > 0.8)
         .max_by(|(a, _), (b, _)| a.total_cmp(b));
     let hint = nearest.map(|(_, candidate)| format!("; did you mean {candidate:?}?")).unwrap_or_default();
-    let section = key.rsplit_once('.').map_or_else(|| "at the top".to_owned(), |(section, _)| format!("in {section}"));
-    let what = if message.contains("unknown variant") { "value" } else { "key" };
-    format!("no {what} {wrong:?}{hint}; {section} there are {}", valid.join(", "))
+    let (what, place) = if message.contains("unknown variant") {
+        ("value", format!("{key} takes"))
+    } else {
+        let section = key.rsplit_once('.').map(|(section, _)| format!("in {section}"));
+        ("key", format!("{} there are", section.as_deref().unwrap_or("at the top")))
+    };
+    format!("no {what} {wrong:?}{hint}; {place} {}", valid.join(", "))
 }
 
 /// Lays `changes` over `tree`.
@@ -234,4 +238,18 @@ fn span_of(text: &str, key: &str) -> Option<std::ops::Range<usize>> {
         table = inner;
     }
     span
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The values that a setting takes were listed as if they were keys of its section.
+    #[test]
+    fn an_unknown_value_is_told_what_its_setting_takes() {
+        let layers = Layers { overrides: vec!["dagger.rule=hgdagger".to_owned()], ..Layers::default() };
+        let refused = Settings::resolve(&layers, None).unwrap_err().to_string();
+        assert!(refused.contains("no value \"hgdagger\"; did you mean \"hg_dagger\"?"), "{refused}");
+        assert!(refused.contains("; dagger.rule takes all_below, ") && !refused.contains("there are"), "{refused}");
+    }
 }

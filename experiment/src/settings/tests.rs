@@ -231,6 +231,21 @@ fn a_training_whose_files_cannot_be_read_again_is_refused() {
     }
 }
 
+/// One training with the greatest seed was refused for want of a seed that nobody uses.
+#[test]
+fn the_greatest_seed_has_room_for_one_training() {
+    let mut settings = Settings::preset("default").unwrap();
+    settings.seed = RootSeed(i64::MAX as u64);
+    settings.check().unwrap();
+    settings.check_training_seeds(1).unwrap();
+    assert_eq!(settings.training_seeds(1), [settings.seed]);
+    let error = settings.check_training_seeds(2).unwrap_err().to_string();
+    assert!(error.contains("leaves no room for 2 trainings"), "{error}");
+    settings.seed = RootSeed(i64::MAX as u64 - 4);
+    settings.check_training_seeds(5).unwrap();
+    assert!(settings.check_training_seeds(6).is_err());
+}
+
 #[test]
 fn unknown_presets_list_the_known() {
     let error = Settings::preset("papper").unwrap_err().to_string();

@@ -52,7 +52,7 @@ fn free_thresh() -> f64 {
 
 /// ROS 1 writes 0 and 1, ROS 2 also false and true.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "negate: write 0, 1, false or true")]
 enum Flag {
     Word(bool),
     Number(i64),
@@ -205,6 +205,10 @@ impl Header {
         {
             return Err(fault("negate", format!("{number} is neither 0 nor 1"), "write 0, or 1 where dark is free"));
         }
+        if header.mode == Mode::Raw && negate.is_set() {
+            let problem = "it is set, and mode is raw: map_server of ROS 1 negates raw values, that of ROS 2 does not";
+            return Err(fault("negate", problem.to_owned(), "write 0, with values that are the occupancy in per cent"));
+        }
         if !MAP_RESOLUTION_M.contains(&resolution) {
             let remedy = format!("write metres per pixel, {} to {}", MAP_RESOLUTION_M.start(), MAP_RESOLUTION_M.end());
             return Err(fault("resolution", format!("it is {resolution}"), &remedy));
@@ -229,7 +233,10 @@ impl Header {
     fn map_of(&self, text: &str, image: &[u8]) -> Result<(Map, Vec<Note>), (String, String)> {
         let image = decode(image)?;
         let mut notes = unknown_keys(text);
-        notes.extend(self.is_unknown_free(&image).then_some(Note::UnknownIsFree { free_thresh: self.free_thresh }));
+        notes.extend(self.is_unknown_free(&image).then_some(match self.mode {
+            Mode::Scale => Note::UnknownIsScaled,
+            Mode::Trinary | Mode::Raw => Note::UnknownIsFree { free_thresh: self.free_thresh },
+        }));
         Ok((self.map(&image), notes))
     }
 
@@ -256,14 +263,14 @@ impl Header {
     }
 
     /// Whether the image has pixels of the grey that savers of ROS 1 and 2 write for unknown, and they count as free: with
-    /// the thresholds that the saver of ROS 2 writes they do.
+    /// the thresholds that the saver of ROS 2 writes they do, and in mode `scale` with nearly any.
     fn is_unknown_free(&self, image: &DynamicImage) -> bool {
         let grey = [UNKNOWN_GREY, UNKNOWN_GREY, UNKNOWN_GREY, u8::MAX];
         let is_there = || match image {
             DynamicImage::ImageLuma8(pixels) => pixels.as_raw().contains(&UNKNOWN_GREY),
             other => other.to_rgba8().pixels().any(|pixel| pixel.0 == grey),
         };
-        self.mode == Mode::Trinary && !self.negate.is_set() && self.is_drivable(grey) && is_there()
+        !self.negate.is_set() && self.is_drivable(grey) && is_there()
     }
 
     /// Red, green, blue, alpha.
@@ -282,7 +289,7 @@ impl Header {
                 let share = (occupancy - self.free_thresh) / (self.occupied_thresh - self.free_thresh);
                 100.0 * share < DRIVABLE_BELOW_PERCENT
             }
-            // The value is the occupancy in per cent, and above 100 unknown; negate does not count.
+            // The value is the occupancy in per cent, and above 100 unknown.
             Mode::Raw => value < DRIVABLE_BELOW_PERCENT,
         }
     }
@@ -367,10 +374,11 @@ fn unknown_keys(text: &str) -> Vec<Note> {
     if keys.is_empty() { Vec::new() } else { vec![Note::Unused { keys }] }
 }
 
-/// A message of the YAML reader on one line, without the place, which is given apart.
+/// A message of the YAML reader on one line, without the place, which is given apart, and advice for programmers.
 fn first_line(text: &str) -> String {
     let line = text.lines().next().unwrap_or_default();
-    line.split(" at line ").next().unwrap_or_default().trim().to_owned()
+    let before = |line: &str, what: &str| line.split(what).next().unwrap_or_default().to_owned();
+    before(&before(line, " at line "), ", set DuplicateKeyPolicy").trim().to_owned()
 }
 
 #[cfg(test)]
@@ -414,6 +422,61 @@ mod tests {
         assert!(header.is_drivable([255, 255, 108, 255]));
         assert!(!header.is_drivable([255, 255, 105, 255]));
         assert!(!header.is_drivable([255, 255, 255, 254]));
+    }
+
+    /// A PNG of one row that is not compressed: bits per sample, kind of colour, width, chunks before the pixels.
+    fn png(bits: u8, colour: u8, width: u8, before: &[(&[u8], &[u8])], row: &[u8]) -> Vec<u8> {
+        let crc = |bytes: &[u8]| {
+            let of_bit = |crc: u32, _| (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 };
+            !bytes.iter().fold(u32::MAX, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), of_bit))
+        };
+        let chunk = |name: &[u8], data: &[u8]| {
+            let named = [name, data].concat();
+            [&(data.len() as u32).to_be_bytes()[..], &named[..], &crc(&named).to_be_bytes()[..]].concat()
+        };
+        // No filter.
+        let data = [&[0][..], row].concat();
+        let (a, b) = data.iter().fold((1_u32, 0_u32), |(a, b), &byte| (a + u32::from(byte), b + a + u32::from(byte)));
+        let (adler, length) = (((b % 65_521) << 16) | (a % 65_521), data.len() as u16);
+        let stored = [&length.to_le_bytes()[..], &(!length).to_le_bytes()[..], &data[..]].concat();
+        let pixels = [&[0x78, 0x01, 1][..], &stored[..], &adler.to_be_bytes()[..]].concat();
+        let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+        file.extend(chunk(&b"IHDR"[..], &[0, 0, 0, width, 0, 0, 0, 1, bits, colour, 0, 0, 0]));
+        for &(name, data) in before {
+            file.extend(chunk(name, data));
+        }
+        file.extend(chunk(&b"IDAT"[..], &pixels));
+        file.extend(chunk(&b"IEND"[..], &[]));
+        file
+    }
+
+    /// Only images of 8 bits were tested.
+    #[test]
+    fn images_of_every_kind_are_read() {
+        let deep = [0xff, 0xff, 0xce, 0xce, 0xcd, 0xcd, 0, 0];
+        let palette: [(&[u8], &[u8]); 2] = [(b"PLTE", &[255, 255, 255, 255, 255, 255, 0, 0, 0]), (b"tRNS", &[255, 0])];
+        let header = |keys: &str| {
+            let text = format!("image: x.png\nresolution: 1\norigin: [0, 0, 0]\n{keys}");
+            Header::parse(&text, Path::new("map.yaml")).unwrap()
+        };
+        // White, the darkest grey that is free, the lightest that is not, and black; of two values each twice.
+        for (kind, file, expected) in [
+            ("PGM, 16 bits", [&b"P5 4 1 65535\n"[..], &deep[..]].concat(), [true, true, false, false]),
+            ("PGM up to 100", b"P2 4 1 100\n100 81 80 0\n".to_vec(), [true, true, false, false]),
+            ("PBM, plain", b"P1 4 1\n0 0 1 1\n".to_vec(), [true, true, false, false]),
+            ("PBM", b"P4\n4 1\n\x30".to_vec(), [true, true, false, false]),
+            ("PNG, 16 bits", png(16, 0, 4, &[], &deep), [true, true, false, false]),
+            ("PNG, 1 bit", png(1, 0, 4, &[], &[0xc0]), [true, true, false, false]),
+            // White, transparent white, black, and white; with alpha a little transparent, and the darkest that is free.
+            ("PNG, palette", png(8, 3, 4, &palette, &[0, 1, 2, 0]), [true, false, false, true]),
+            ("PNG, alpha", png(8, 4, 4, &[], &[255, 255, 255, 254, 0, 255, 206, 255]), [true, false, false, true]),
+        ] {
+            let image = decode(&file).unwrap_or_else(|(problem, _)| panic!("{kind}: {problem}"));
+            assert_eq!(header("").map(&image).drivable.is_free, expected, "{kind}");
+        }
+        // Values are brought to 0…255 first, raw ones too: 19 is read as 48, 20 as 51.
+        let image = decode(b"P2 4 1 100\n0 19 20 100\n").unwrap();
+        assert_eq!(header("mode: raw").map(&image).drivable.is_free, [true, true, false, false]);
     }
 
     /// LF of a header that ends with CRLF was read as the first pixel, and every other one lay one further on.

@@ -338,6 +338,26 @@ fn faults_of_the_lot_file_are_named() {
     assert!(message.contains("map.lot.toml: map: it names the map"), "{message}");
 }
 
+/// A pipe, a folder or a dangling link in the place of the lot file was passed over, and the map was read without it.
+#[test]
+fn a_lot_file_that_cannot_be_read_is_an_error_and_not_passed_over() {
+    let lot = lane("lot-unreadable", 5);
+    assert_eq!(MapLot::read(&lot.map), Ok(MapLot::of_map(&lot.map)), "there is none");
+    let file = lot.map.with_file_name("map.lot.toml");
+    std::fs::create_dir(&file).unwrap();
+    let refused = || MapLot::read(&lot.map).expect_err("it cannot be read").to_string();
+    assert!(refused().contains("map.lot.toml: cannot be read: it is a folder"), "{}", refused());
+    std::fs::remove_dir(&file).unwrap();
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("nowhere.toml", &file).unwrap();
+        assert!(refused().contains("map.lot.toml: cannot be read: No such file"), "{}", refused());
+    }
+    // The name of a lot file that is too long for the disk is that of none.
+    let long = lot.map.with_file_name("m".repeat(250) + ".yaml");
+    assert_eq!(MapLot::read(&long), Ok(MapLot::of_map(&long)));
+}
+
 /// One way round the example, in the direction of the start.
 #[test]
 fn a_loop_leads_back_to_its_start() {
@@ -385,6 +405,28 @@ fn a_case_is_read_in_one_row_or_one_column() {
     }
 }
 
+/// Nothing tested that a case in UTM coordinates is the lot that it is beside the origin.
+#[test]
+fn a_case_far_from_its_origin_is_the_same_lot_about_its_start() {
+    // A car of 4.5 m and a triangle. Eighths of a metre are exact, however far away.
+    let case = |x: f64, y: f64| {
+        let mut numbers = vec![x, y, 0.0, x + 30.0, y, 0.0, 2.0, 4.0, 3.0];
+        for (ahead, left) in
+            [(8.0, -4.0), (12.5, -4.0), (12.5, -2.25), (8.0, -2.25), (10.0, 3.125), (14.0, 3.125), (12.0, 6.0)]
+        {
+            numbers.extend([x + ahead, y + left]);
+        }
+        let text: Vec<String> = numbers.iter().map(ToString::to_string).collect();
+        let folder = folder("tpcap-far", &[("case.csv", &text.join(","))]);
+        MapLot::of_map(&folder.join("case.csv")).scenario(&car()).unwrap()
+    };
+    let (near, far) = (case(0.0, 0.0), case(4_432_000.0, 5_413_000.0));
+    assert_eq!((near.scenario.islands.len(), near.scenario.obstacles.len()), (1, 1));
+    assert_eq!(near.scenario, far.scenario);
+    assert_eq!(far.notes[0], Note::Recentred { origin: [4_432_000.0, 5_413_000.0] });
+    assert_eq!(far.frame.as_deref(), Some("coordinates are the map's less (4432000, 5413000)"));
+}
+
 #[test]
 fn the_example_case_becomes_a_lot() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/open-lot.csv");
@@ -425,6 +467,8 @@ fn a_speck_becomes_the_smallest_island_or_is_left_out_as_asked() {
     // 10 cm squares in the lot are just as large as islands must be, and a little more is asked for.
     let loaded = lot.scenario(&car()).unwrap();
     assert_eq!(loaded.notes, [Note::Padded { specks: 3 }]);
+    let said = loaded.notes[0].to_string();
+    assert!(said.contains("drop_specks_m2 in NAME.lot.toml leaves out such specks"), "{said}");
     let sizes = areas(&loaded.scenario);
     assert_eq!(sizes.len(), 4);
     assert!(sizes.iter().all(|&area_m2| (0.0105..0.031).contains(&area_m2)), "{sizes:?}");
@@ -436,6 +480,19 @@ fn a_speck_becomes_the_smallest_island_or_is_left_out_as_asked() {
     let loaded = lot.scenario(&car()).unwrap();
     assert_eq!(loaded.notes, [Note::Dropped { specks: 3, up_to_m2: 0.02 }]);
     assert_eq!(areas(&loaded.scenario).len(), 1, "what is larger stays");
+}
+
+/// A start beside a speck, on a pixel that is free, was said to be "occupied or unknown".
+#[test]
+fn a_start_that_a_larger_speck_covers_is_said_to_lie_within_it() {
+    // At 10 cm per pixel of the lot a speck grows by the pixel to its right.
+    let mut lot = fine_lane("covered", |x, y| (x, y) == (420, 26));
+    std::fs::write(&lot.map, yaml("0.05", "[0, 0, 0]")).unwrap();
+    lot.scale = 2.0;
+    (lot.start, lot.goal) = (Some([21.07, 1.32, 0.0]), Some([28.0, 1.3, 0.0]));
+    let refusal = refusal(&lot);
+    let expected = "start: (21.07, 1.32) lies within a speck or wall that was made larger; move it";
+    assert!(refusal.contains(expected), "{refusal}");
 }
 
 /// Kerbs of one pixel lay between two rows of the sensor's distances at half of the places that they could have: no cell showed
@@ -714,6 +771,50 @@ fn unknown_ground_that_counts_as_free_is_named_in_a_note() {
     // Nothing is unknown in a map without that grey.
     std::fs::write(lot.map.with_extension("pgm"), pgm(&["....", "....", "...."].map(str::to_owned))).unwrap();
     assert_eq!(notes(), []);
+}
+
+/// With `mode: scale` the same grey is free at every threshold that savers write, and no note said so.
+#[test]
+fn unknown_ground_that_counts_as_free_in_mode_scale_is_named_in_a_note() {
+    let lot = small_map("unknown-scaled", "[0, 0, 0]");
+    for free_thresh in ["0.196", "0.25"] {
+        let text = yaml("0.5", "[0, 0, 0]").replace("mode: trinary", "mode: scale");
+        std::fs::write(&lot.map, text.replace("free_thresh: 0.196", &format!("free_thresh: {free_thresh}"))).unwrap();
+        let notes = ros::Map::read(&lot.map, false).unwrap().2;
+        assert_eq!(notes, [Note::UnknownIsScaled]);
+        // A lower threshold alone would not help.
+        assert!(notes[0].to_string().contains("write mode: trinary and free_thresh: 0.196"), "{}", notes[0]);
+    }
+}
+
+/// In mode `raw` map_server of ROS 1 negates and that of ROS 2 does not; here `negate` had no effect, without a word.
+#[test]
+fn a_raw_map_that_is_negated_is_refused() {
+    let lot = small_map("raw-negated", "[0, 0, 0]");
+    let raw = yaml("0.5", "[0, 0, 0]").replace("mode: trinary", "mode: raw");
+    for negate in ["1", "true"] {
+        std::fs::write(&lot.map, raw.replace("negate: 0", &format!("negate: {negate}"))).unwrap();
+        let refusal = ros::Map::read(&lot.map, false).unwrap_err().to_string();
+        assert!(refusal.contains("map.yaml:5: negate: it is set, and mode is raw"), "{refusal}");
+        assert!(refusal.contains("write 0"), "{refusal}");
+    }
+    std::fs::write(&lot.map, &raw).unwrap();
+    assert!(ros::Map::read(&lot.map, false).is_ok());
+}
+
+/// The YAML reader's own words were shown: "untagged enum Flag", and "set DuplicateKeyPolicy in Options".
+#[test]
+fn errors_of_the_yaml_file_do_not_speak_of_the_program() {
+    let lot = small_map("yaml-words", "[0, 0, 0]");
+    let sound = yaml("0.5", "[0, 0, 0]");
+    for (text, expected) in [
+        (sound.replace("negate: 0", "negate: maybe"), "negate: write 0, 1, false or true; a map needs image"),
+        (sound.clone() + "negate: 1\n", "duplicate mapping key: negate; a map needs image"),
+    ] {
+        std::fs::write(&lot.map, text).unwrap();
+        let refusal = ros::Map::read(&lot.map, false).unwrap_err().to_string();
+        assert!(refusal.contains(expected), "{refusal}");
+    }
 }
 
 /// A first point with a letter in it was taken for a header, and the route began at the second.

@@ -36,7 +36,7 @@ pub(crate) const RUN: Trainings<Extent> = Trainings {
     command: COMMAND,
     title: report::deviations::TITLE,
     stages: deviations::stages,
-    table: report::deviations::table,
+    table: |_, _, stages, root| report::deviations::table(stages, root),
     unseen: |extent| &extent.unseen,
 };
 

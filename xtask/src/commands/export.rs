@@ -3,13 +3,15 @@
 use crate::output::Output;
 use anyhow::{Context as _, ensure};
 use clap::{Args, Subcommand};
+use experiment::drivers;
 use experiment::run_dir;
 use experiment::trained;
 use policy::checkpoint::Checkpoint;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
+  cargo xtask export onnx trained:default --out policy.onnx
   cargo xtask export onnx runs/train-dagger-default-s1 --out policy.onnx
   cargo xtask export onnx runs/train-dagger-default-s1/round-03 --out round-03.onnx
   cargo xtask evaluate --driver onnx:policy.onnx --lots lot-b";
@@ -30,7 +32,7 @@ enum Format {
 #[derive(Debug, Clone, Args)]
 struct OnnxArgs {
     /// Folder of a training run (its final policy, of an ensemble the first network), `RUN/bc` (after behaviour cloning),
-    /// or the folder of a network.
+    /// or the folder of a network; `trained:default` is the network that ships.
     #[arg(value_name = "RUN")]
     run: PathBuf,
     /// File to write.
@@ -43,19 +45,21 @@ struct OnnxArgs {
 
 pub(crate) fn run(args: &ExportArgs, output: &Output) -> anyhow::Result<()> {
     let Format::Onnx(OnnxArgs { run, out, overwrite }) = &args.format;
-    let folder = if Checkpoint::exists(run)? {
-        run.clone()
+    let shipped = run.to_str().map(drivers::shipped_network).transpose()?.flatten();
+    let (checkpoint, folder) = if let Some(network) = shipped {
+        (network, None)
     } else {
-        trained::ensure_whole(run)?;
-        trained::policy_folder(run)?
+        let folder = folder_of(run)?;
+        (Checkpoint::load(&folder)?, Some(folder))
     };
-    let checkpoint = Checkpoint::load(&folder)?;
     run_dir::ensure_outside_of_runs(out).context("--out")?;
-    ensure!(
-        !storage::place_of(out).context("--out")?.starts_with(storage::place_of(&folder)?),
-        "--out {}: the network is read from that folder; choose another --out",
-        out.display()
-    );
+    if let Some(folder) = &folder {
+        ensure!(
+            !storage::place_of(out).context("--out")?.starts_with(storage::place_of(folder)?),
+            "--out {}: the network is read from that folder; choose another --out",
+            out.display()
+        );
+    }
     ensure!(
         *overwrite || !out.exists(),
         "{}: exists already; choose another --out, or replace it with --overwrite",
@@ -63,6 +67,16 @@ pub(crate) fn run(args: &ExportArgs, output: &Output) -> anyhow::Result<()> {
     );
     let bytes = onnx::export::export(&checkpoint);
     storage::whole::write(out, &bytes).with_context(|| format!("--out {}", out.display()))?;
-    output.print(format_args!("{}: {}, {} bytes", out.display(), folder.display(), bytes.len()));
+    let from = folder.as_ref().unwrap_or(run);
+    output.print(format_args!("{}: {}, {} bytes", out.display(), from.display(), bytes.len()));
     Ok(())
+}
+
+/// The folder of the network that the folder of a training, or of a network, stands for.
+fn folder_of(run: &Path) -> anyhow::Result<PathBuf> {
+    if Checkpoint::exists(run)? {
+        return Ok(run.to_owned());
+    }
+    trained::ensure_whole(run)?;
+    trained::policy_folder(run)
 }

@@ -2,13 +2,13 @@
 
 use super::render::check_scale;
 use crate::args::lot_name;
-use crate::console::Console;
+use crate::console::{Console, counted_lots};
 use crate::output::Output;
 use anyhow::{Context as _, bail, ensure};
 use clap::Args;
 use experiment::lots::Lot;
 use experiment::notes;
-use experiment::progress::{Interrupted, Progress as _};
+use experiment::progress::{Interrupted, Progress};
 use experiment::settings::NoiseChoice;
 use experiment::shard::Shard;
 use experiment::trials::{Purpose, Trial};
@@ -123,30 +123,47 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
     drawn_lots(args).ensure_free(&lots, &trials)?;
     std::fs::create_dir_all(&args.out)
         .with_context(|| format!("{}: cannot be created; choose another --out", args.out.display()))?;
-    let console = Console::new(output);
-    console.begin("generating", "generating");
+    let made = write_all(args, &trials, &Console::new(output), &|made: &Made| output.print(&made.line))?;
+    let rejected: u32 = made.iter().filter_map(|made| made.attempts).map(|attempts| attempts - 1).sum();
+    if rejected > 0 {
+        output.print(rejected_said(rejected));
+    }
+    Ok(())
+}
+
+/// Writes the lots of all trials, and says of each that it is written.
+fn write_all(
+    args: &GenerateArgs,
+    trials: &[Trial<'_>],
+    progress: &dyn Progress,
+    say: &dyn Fn(&Made),
+) -> anyhow::Result<Vec<Made>> {
+    progress.begin("generating", "generating");
+    // What is done at the first report counts as done before.
+    progress.at(0.0, &mut |_| String::new());
     let mut made = Vec::new();
     for batch in trials.chunks(BATCH) {
-        if console.is_cancelled() {
+        if progress.is_cancelled() {
             let kept = format!("{} of {} lots are in {}", made.len(), trials.len(), args.out.display());
             return Err(Interrupted { kept }.into());
         }
         let written = batch.par_iter().map(|trial| write(args, trial)).collect::<anyhow::Result<Vec<Made>>>()?;
         for lot in &written {
-            output.print(&lot.line);
+            say(lot);
         }
         made.extend(written);
-        console.at(made.len() as f64 / trials.len() as f64, &mut |_| format!("{} lots", made.len()));
+        progress.at(made.len() as f64 / trials.len() as f64, &mut |_| counted_lots(made.len()));
     }
-    console.end(&format!("{} lots", made.len()));
-    let attempts: Vec<u32> = made.iter().filter_map(|made| made.attempts).collect();
-    if !attempts.is_empty() {
-        let drawn: u32 = attempts.iter().sum();
-        let rejected = drawn - attempts.len() as u32;
-        let percent = 100.0 * f64::from(rejected) / f64::from(drawn);
-        output.print(format_args!("generator: {rejected} of {drawn} draws rejected ({percent:.1} %)"));
+    progress.end(&counted_lots(made.len()));
+    Ok(made)
+}
+
+fn rejected_said(draws: u32) -> String {
+    if draws == 1 {
+        "generator: 1 draw had no drivable route and was drawn again".to_owned()
+    } else {
+        format!("generator: {draws} draws had no drivable route and were drawn again")
     }
-    Ok(())
 }
 
 /// The lots named; of a map with the route the command line asks for.
@@ -207,4 +224,61 @@ fn write(args: &GenerateArgs, trial: &Trial<'_>) -> anyhow::Result<Made> {
         back.err().map_or(String::new(), |error| format!("; --directions forward only: on the way back, {error}"));
     let line = format!("{} and .png: route {length_m:.1} m, {obstacles} obstacles{ways}", toml.display());
     Ok(Made { attempts: drawn.attempts, line })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use experiment::progress::Elapsed;
+    use std::cell::RefCell;
+
+    /// Remembers which shares were reported.
+    #[derive(Default)]
+    struct Shares(RefCell<Vec<f64>>);
+
+    impl Progress for Shares {
+        fn begin(&self, _: &'static str, _: &str) {}
+
+        fn at(&self, share: f64, _: &mut dyn FnMut(Elapsed) -> String) {
+            self.0.borrow_mut().push(share);
+        }
+
+        fn end(&self, _: &str) {}
+
+        fn is_cancelled(&self) -> bool {
+            false
+        }
+    }
+
+    /// The first report came with the first lots, which counted as done before the command: a second before its end it
+    /// had "about 16 min left".
+    #[test]
+    fn the_time_left_is_measured_from_the_first_lot_on() {
+        let out = std::env::temp_dir().join(format!("lotpilot-generate-{}", std::process::id()));
+        std::fs::create_dir_all(&out).unwrap();
+        let args = GenerateArgs {
+            lots: vec!["lot-b".to_owned()],
+            seed: 1,
+            count: 1,
+            out: out.clone(),
+            pixels_per_metre: None,
+            overwrite: true,
+            shard: None,
+            map: MapArgs::default(),
+        };
+        let lots = lots(&args, &VehicleSettings::hyundai_hg300()).unwrap();
+        let trials: Vec<Trial<'_>> =
+            Trial::all(RootSeed(1), Purpose::Pictures, &lots, 1, &[Direction::Forward]).collect();
+        let shares = Shares::default();
+        let made = write_all(&args, &trials, &shares, &|_: &Made| {}).unwrap();
+        assert_eq!((made.len(), shares.0.into_inner()), (1, vec![0.0, 1.0]));
+        std::fs::remove_dir_all(out).unwrap();
+    }
+
+    /// It said "0 of 9 draws rejected (0.0 %)", of which nobody knew what it means.
+    #[test]
+    fn draws_that_were_drawn_again_are_said_in_words() {
+        assert_eq!(rejected_said(1), "generator: 1 draw had no drivable route and was drawn again");
+        assert_eq!(rejected_said(3), "generator: 3 draws had no drivable route and were drawn again");
+    }
 }

@@ -7,6 +7,7 @@ use anyhow::Context as _;
 use clap::Args;
 use experiment::drivers::DriverSpec;
 use experiment::lots::Lot;
+use experiment::notes;
 use experiment::replay_key::ReplayKey;
 use experiment::settings::{Layers, NoiseChoice, Settings};
 use sim::limits::TRIAL_MAX;
@@ -41,7 +42,7 @@ impl TrialArgs {
     /// The names of the flags, which conflict with a drive that is named in another way.
     pub(crate) const FLAGS: [&str; 5] = ["lot", "direction", "trial", "noise", "seed"];
 
-    /// The settings, and a key for each of the drivers.
+    /// The settings, and a key for each of the drivers; notes about the lot are said.
     ///
     /// # Errors
     /// If something named does not exist, or the name of the lot stands for several.
@@ -54,12 +55,14 @@ impl TrialArgs {
         let (settings, _) = evaluate::settings_for(drivers, &Layers::from(layers), output)?;
         let lot = Lot::parse_one(&self.lot, &settings.episode.vehicle).context("--lots")?;
         let evaluation = &settings.evaluation;
+        let noise = self.noise.unwrap_or(evaluation.noise[0]);
+        output.notes(&notes::of(std::slice::from_ref(&lot), &[noise]));
         let key = |driver: &DriverSpec| ReplayKey {
             driver: driver.clone(),
             lot: lot.spec(),
             direction: self.direction.into(),
             trial: self.trial,
-            noise: self.noise.unwrap_or(evaluation.noise[0]),
+            noise,
             seed: self.seed.map_or(evaluation.seed, RootSeed),
             tick: 0,
         };

@@ -1,11 +1,12 @@
 //! `pixel-accuracy`: how many pixels of the noisy bird's-eye view are right.
 
 use crate::args::{JsonArgs, LayerArgs, lot_name};
-use crate::console::Console;
+use crate::console::{Console, counted_lots};
 use crate::output::Output;
 use clap::Args;
 use evaluation::pixel_accuracy::{Pixels, SPACING_M, look};
 use experiment::lots::Lot;
+use experiment::notes;
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::settings::{Layers, NoiseChoice, Settings};
 use serde::Serialize;
@@ -48,6 +49,7 @@ struct Row<'a> {
 pub(crate) fn run(args: &PixelAccuracyArgs, output: &Output) -> anyhow::Result<()> {
     let settings = Settings::resolve(&Layers::from(&args.layers), args.seed)?;
     let lots = Lot::parse_all(&args.lots, &settings.episode.vehicle)?;
+    output.notes(&notes::of(&lots, &args.noise));
     let mut table = report::pixel_accuracy::table();
     let mut rows = Vec::new();
     let console = Console::new(output);
@@ -67,7 +69,7 @@ pub(crate) fn run(args: &PixelAccuracyArgs, output: &Output) -> anyhow::Result<(
             done += 1.0;
         }
     }
-    console.end(&format!("{} lots", lots.len()));
+    console.end(&counted_lots(lots.len()));
     let (trials, seed) = (args.trials, settings.seed.0);
     let note = format!("Poses every {SPACING_M} m along the routes, both directions, trials: {trials}, seed: {seed}.");
     output.table(|| format!("{table}\n\n{note}"), &rows)

@@ -5,7 +5,7 @@ use super::render_animation::{self, AnimationArgs};
 use super::reproduce;
 use crate::args::{LayerArgs, lot_name};
 use crate::build_info;
-use crate::console::Console;
+use crate::console::{Console, counted_lots};
 use crate::output::Output;
 use crate::picture_folder::Folder;
 use anyhow::{Context as _, ensure};
@@ -122,6 +122,9 @@ pub(crate) struct RenderResultsArgs {
     /// docs/results-COMMAND.md, of another preset its name instead].
     #[arg(long, value_name = "FILE.md")]
     to: Option<PathBuf>,
+    /// That of all `render`, hidden: whoever names it is told what to name instead.
+    #[arg(long, hide = true)]
+    out: Option<PathBuf>,
 }
 
 #[derive(Debug, Clone, Args)]
@@ -222,7 +225,7 @@ pub(crate) fn run(args: &RenderArgs, output: &Output) -> anyhow::Result<()> {
             render_report(&what.run, args.overwrite, args.out.is_some().then_some(&folder), output)
         }
         RenderWhat::Results(what) => {
-            ensure!(args.out.is_none(), "--out: a page of results is one file; name it with --to");
+            ensure!(what.out.is_none(), "--out: a page of results is one file; name it with --to");
             render_results(what, args.overwrite, output)
         }
     }
@@ -265,7 +268,7 @@ fn render_lots(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()> 
             drawn += 1;
         }
     }
-    console.end(&format!("{drawn} lots"));
+    console.end(&counted_lots(drawn));
     Ok(())
 }
 
@@ -283,7 +286,7 @@ fn contact_sheet(args: &RenderLotArgs, folder: &Folder<'_>) -> anyhow::Result<()
     let console = Console::new(folder.output);
     console.begin("lots", "drawing lots");
     let maps = maps(&lots, args.seed, &episode)?;
-    console.end(&format!("{} lots", maps.len()));
+    console.end(&counted_lots(maps.len()));
     folder.write(NAME, &contact_sheet::picture(&maps)?, true)
 }
 
@@ -384,7 +387,9 @@ fn render_samples(args: &SamplesArgs, folder: &Folder<'_>) -> anyhow::Result<()>
     );
     let name = args.round.file_name().unwrap_or_default().to_string_lossy();
     let index = name.strip_prefix("round-").and_then(|index| index.parse().ok());
-    let (Some(index), Some(run)) = (index, args.round.parent()) else {
+    // The run of `round-01`, named from within, is the present folder.
+    let run = args.round.parent().map(|run| if run.as_os_str().is_empty() { Path::new(".") } else { run });
+    let (Some(index), Some(run)) = (index, run) else {
         anyhow::bail!("{}: this is not a round; name one, as in runs/NAME/round-01", args.round.display());
     };
     // Opening a store creates its folder.
@@ -413,6 +418,7 @@ fn render_samples(args: &SamplesArgs, folder: &Folder<'_>) -> anyhow::Result<()>
 fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
     let settings = Settings::preset("default")?;
     let lot = Lot::parse_one(&args.lot, &settings.episode.vehicle).context("--lots")?;
+    folder.output.notes(&experiment::notes::of(std::slice::from_ref(&lot), &args.noise));
     let trial = Trial::new(RootSeed(args.seed), Purpose::Pictures, &lot, Direction::Forward, 0);
     let map = trial.map(&settings.episode)?;
     let inspect = |level: NoiseChoice, at_m: f32| noise::inspect(&settings.episode, &trial, &map, level, at_m);
@@ -492,6 +498,7 @@ fn render_report(run: &Path, overwrite: bool, copy: Option<&Folder<'_>>, output:
             made.not_replayed.len()
         );
     }
+    owned.list_without_report()?;
     let written = made.write(&owned, &console);
     // Its own list has changed, also where the report was cut short.
     owned.list_again()?;

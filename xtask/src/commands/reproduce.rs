@@ -53,7 +53,8 @@ pub(crate) struct ReproduceArgs {
     /// [default: 1; 5 with --full].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: Option<u64>,
-    /// Lots that no driver has met; see `cargo xtask lots`. A phrase of your own draws lots that nobody has seen [default:
+    /// Lots that no driver was trained or tuned on; see `cargo xtask lots`. Those of the default are for development, as all
+    /// runs share their phrase; final figures take a phrase of your own, whose lots nobody has seen [default:
     /// sealed:reproduce:24:all; sealed:reproduce:120:all with --full].
     #[arg(long, value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name)]
     unseen: Vec<String>,
@@ -189,15 +190,10 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
     };
     // Before the folder is claimed: a misspelt lot should not leave one behind.
     train::check_lots(&settings, output)?;
-    train::check_unseen(&settings, &extent.unseen)?;
+    train::check_unseen(&settings, &extent.unseen, output)?;
     let mut reads = places(&settings, &extent)?;
     reads.extend(args.layers.file().map(Path::to_owned));
-    ensure!(
-        settings.seed.0.checked_add(extent.seeds).is_some_and(|last| i64::try_from(last).is_ok()),
-        "seed {} leaves no room for {} trainings; choose a smaller one",
-        settings.seed.0,
-        extent.seeds
-    );
+    settings.check_training_seeds(extent.seeds)?;
     // Only the names of the folders are asked for: the run has no place yet.
     let stages = stages::all(&settings, &extent, Path::new(""))?;
     for stage in &stages {

@@ -10,7 +10,7 @@ use experiment::settings::Settings;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask rules                                   every rule, one seed, few lots
+  cargo xtask rules                                   every rule, one seed, few lots: hours
   cargo xtask rules --rule expert_only,all_below,hg_dagger --seeds 5 --unseen sealed:my-phrase:90:all
   cargo xtask rules --resume runs/rules-default-s1
   cargo xtask rules --seeds 5 --shard 2/50 --out shards/2
@@ -88,11 +88,7 @@ fn begin(args: &RulesArgs) -> anyhow::Result<Begun<Extent>> {
         );
     }
     let RulesArgs { seeds, iterations, samples, .. } = *args;
+    settings.check_training_seeds(seeds)?;
     let extent = Extent { rules: named, seeds, iterations, samples, unseen: args.unseen.clone() };
-    ensure!(
-        settings.seed.0.checked_add(seeds).is_some_and(|last| i64::try_from(last).is_ok()),
-        "seed {} leaves no room for {seeds} trainings; choose a smaller one",
-        settings.seed.0
-    );
     Ok(Begun { preset: layers.preset_name().to_owned(), settings, extent })
 }

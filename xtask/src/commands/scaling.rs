@@ -12,7 +12,7 @@ use scenarios::split::Family;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask scaling                                 1, 4, 16 and 64 lots of each family
+  cargo xtask scaling                                 1, 4, 16 and 64 lots of each family: hours
   cargo xtask scaling --different 2,8 --unseen sealed:my-phrase:90:all
   cargo xtask scaling --resume runs/scaling-default-s1";
 

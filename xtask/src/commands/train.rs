@@ -204,11 +204,13 @@ fn lots_read(settings: &Settings, unseen: &[String]) -> anyhow::Result<Vec<Lot>>
     Ok(lots.collect::<anyhow::Result<Vec<_>>>()?.concat())
 }
 
-/// Refuses lots to judge by that policies were or may be trained or tuned on, or that cannot be driven as the settings ask.
-pub(crate) fn check_unseen(settings: &Settings, unseen: &[String]) -> anyhow::Result<()> {
+/// Refuses lots to judge by that policies were or may be trained or tuned on, or that cannot be driven as the settings ask;
+/// says notes about them.
+pub(crate) fn check_unseen(settings: &Settings, unseen: &[String], output: &Output) -> anyhow::Result<()> {
     let Settings { training, evaluation, episode, .. } = settings;
     let trained_on = Lot::parse_all(&training.lots, &episode.vehicle)?;
     let unseen = Lot::parse_all(unseen, &episode.vehicle)?;
+    output.notes(&notes::of(&unseen, &evaluation.noise));
     for lot in &unseen {
         // Every round takes the next ones of a kind.
         let is_same = |known: &Lot| match (known.digest(), lot.digest()) {

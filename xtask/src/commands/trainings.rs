@@ -130,7 +130,7 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
     ) -> anyhow::Result<(RunDir, Settings, E, Option<ShardRecord>)> {
         let Begun { preset, settings, extent } = begun;
         train::check_lots(&settings, output)?;
-        train::check_unseen(&settings, (self.unseen)(&extent))?;
+        train::check_unseen(&settings, (self.unseen)(&extent), output)?;
         let mut reads = train::places(&settings, (self.unseen)(&extent))?;
         reads.extend(args.layers.file().map(Path::to_owned));
         // Only names and settings are asked for: the run has no place yet.

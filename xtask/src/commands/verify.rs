@@ -2,10 +2,11 @@
 
 use crate::args::JsonArgs;
 use crate::output::{Output, note};
-use anyhow::ensure;
+use anyhow::{bail, ensure};
 use clap::Args;
 use experiment::run_dir;
 use std::path::PathBuf;
+use storage::FileError;
 use storage::sums::{self, Verified};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -30,8 +31,18 @@ pub(crate) fn run(args: &VerifyArgs, output: &Output) -> anyhow::Result<()> {
         args.run.display()
     );
     let Verified { files, bytes, faults } = sums::verify(&args.run);
+    // What cannot be read of the run itself is among the faults.
+    let way_on = run_dir::way_on(&args.run).ok().flatten();
     for fault in &faults {
-        note(fault);
+        note(advised(fault, way_on.is_some()));
+    }
+    if let Some(way_on) = way_on.filter(|_| !faults.is_empty() && faults.iter().all(sums::is_unfinished)) {
+        bail!(
+            "{}: this run is not finished: what it lists is as it was written, and {} files or folders are not listed yet; continue \
+             with: {way_on}",
+            args.run.display(),
+            faults.len()
+        );
     }
     ensure!(faults.is_empty(), "{}: {} of its files are not what was written", args.run.display(), faults.len());
     let sha256 = run_dir::digest(&args.run)?;
@@ -43,4 +54,16 @@ pub(crate) fn run(args: &VerifyArgs, output: &Output) -> anyhow::Result<()> {
         )
     };
     output.table(text, &serde_json::json!({ "files": files, "bytes": bytes, "sha256": sha256 }))
+}
+
+/// A fault with what helps: nothing that a run goes on with may be deleted, and a report can be written again.
+fn advised(fault: &FileError, is_unfinished: bool) -> String {
+    if is_unfinished && sums::is_unfinished(fault) {
+        let (path, problem) = (fault.path.display(), &fault.problem);
+        return format!("{path}: {problem}; the run is not finished, and continues with --resume");
+    }
+    match run_dir::way_to_report(&fault.path).filter(|_| !is_unfinished) {
+        Some(way) => format!("{}: {}; write it again with: {way}", fault.path.display(), fault.problem),
+        None => fault.to_string(),
+    }
 }

@@ -21,7 +21,7 @@ places that are passed.";
 
 #[derive(Debug, Clone, Args)]
 pub(crate) struct WhatIfArgs {
-    /// Folder of a finished evaluation; its settings are used.
+    /// Folder of an evaluation, or of a training that ended with one; its settings are used.
     #[arg(value_name = "RUN")]
     folder: PathBuf,
     /// Its drivers, as named in its tables [default: all].

@@ -71,7 +71,7 @@ fn choices_are_those_that_are_read() {
             assert!(result.is_ok(), "{}={value}: {:#}", entry.key, result.unwrap_err());
         }
         let error = format!("{:#}", resolve(&format!("{}=no-such-word", entry.key)).unwrap_err());
-        if let Some((_, known)) = error.split_once("there are ") {
+        if let Some((_, known)) = error.split_once(&format!("{} takes ", entry.key)) {
             let known: BTreeSet<&str> = known.split(';').next().unwrap().split(", ").map(str::trim).collect();
             let named: BTreeSet<&str> =
                 entry.choices.iter().filter(|choice| !is_gpu(choice)).map(String::as_str).collect();
