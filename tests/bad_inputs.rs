@@ -20,12 +20,16 @@ use sim::map::Map;
 use sim::scenario::Scenario;
 use sim::seed::{RootSeed, Stream};
 use sim::vehicle::VehicleSettings;
+#[cfg(unix)]
+use std::collections::BTreeMap;
 use std::path::Path;
 #[cfg(unix)]
 use std::path::PathBuf;
 #[cfg(unix)]
 use std::process::{Command, Stdio};
 use std::sync::Arc;
+#[cfg(unix)]
+use std::time::SystemTime;
 use storage::sums;
 
 /// Longest error, bytes: no file is quoted at length.
@@ -275,6 +279,10 @@ fn settings_that_are_refused() {
         ("evaluation.lots=[\"test:1000000:all\", \"train:1000000\"]", "runs; at most 10000000 are possible"),
         ("evaluation.elsewhere=[\"\"]", "evaluation.elsewhere: \"\" is not a lot"),
         ("evaluation.noise=[]", "evaluation.noise is empty"),
+        (
+            &format!("evaluation.noise=[{}]", (0..101).map(|i| format!("{i}e-2,")).collect::<String>()),
+            "evaluation.noise names 101 levels; at most 100 are possible",
+        ),
         ("evaluation.noise=[1, 1.0]", "evaluation.noise names 1 twice"),
         ("evaluation.noise=[\"paper\", 0.5, 1]", "evaluation.noise names paper and 1, which are the same"),
         ("evaluation.noise=[2, \"hard\"]", "evaluation.noise names 2 and hard, which are the same"),
@@ -297,12 +305,13 @@ fn settings_that_are_refused() {
     cases.finish(1000);
 }
 
-/// Whatever a range holds can be driven with: no panic, nothing that is not finite.
+/// Whatever a range holds can be driven with: no panic, nothing that is not finite. Settings that were refused, and cars that
+/// did not fit, counted as driven: nothing would have been said had all been.
 #[test]
 fn every_setting_drives_at_either_end_of_its_range() {
     let whole = ["episode.physics_step_ms", "episode.control_period_ms"];
     let of_drives = |key: &str| key.starts_with("episode.") || key.starts_with("expert.");
-    let mut failed = Vec::new();
+    let (mut failed, mut driven, mut ends) = (Vec::new(), 0, 0);
     for entry in reference::entries().iter().filter(|entry| of_drives(&entry.key) && !whole.contains(&&*entry.key)) {
         let Some(range) = entry.range else { continue };
         for end in range.ends() {
@@ -314,20 +323,25 @@ fn every_setting_drives_at_either_end_of_its_range() {
                 _ => format!("{}={end:?}", entry.key),
             };
             let layers = Layers { overrides: vec![change.clone()], ..Layers::default() };
+            ends += 1;
             // What several settings decide together may refuse an end.
             let Ok(settings) = Settings::resolve(&layers, None) else { continue };
-            let driven = std::panic::catch_unwind(|| drive(&settings));
-            failed.extend((!driven.unwrap_or(false)).then_some(change));
+            match std::panic::catch_unwind(|| drive(&settings)) {
+                Ok(Some(true)) => driven += 1,
+                Ok(None) => {}
+                Ok(Some(false)) | Err(_) => failed.push(change),
+            }
         }
     }
     assert!(failed.is_empty(), "these do not drive: {failed:#?}");
+    assert!(ends > 150 && 4 * driven > 3 * ends, "only {driven} of {ends} ends are driven");
 }
 
-/// Whether a second of driving by the expert stays finite; a lot that the car does not fit does not matter.
-fn drive(settings: &Settings) -> bool {
+/// Whether a second of driving by the expert stays finite; `None` if the car does not fit the lot.
+fn drive(settings: &Settings) -> Option<bool> {
     let lane = Scenario::lane(-100.0..=200.0, 60.0, 0.0..=100.0);
     let episode = Arc::new(settings.episode.clone());
-    let Ok(map) = Map::build(lane, &episode.vehicle) else { return true };
+    let map = Map::build(lane, &episode.vehicle).ok()?;
     let mut expert = ScriptedExpert::new(settings.expert.clone(), &episode, RootSeed(1).rng(Stream::Expert, 0));
     let mut episode = Episode::new(episode, Arc::new(map), RootSeed(1));
     for _ in 0..20 {
@@ -342,10 +356,10 @@ fn drive(settings: &Settings) -> bool {
         let numbers =
             [at.pose.x_m, at.pose.y_m, at.pose.heading_rad, at.speed_mps, at.steering_rad, label.ahead_m, label.left_m];
         if !numbers.iter().all(|number| number.is_finite()) {
-            return false;
+            return Some(false);
         }
     }
-    true
+    Some(true)
 }
 
 #[test]
@@ -372,7 +386,7 @@ fn names_of_lots_drivers_and_moments_that_are_refused() {
         (&format!("sealed:{}:3", "a".repeat(41)), "write 1 to 40 of a-z"),
         ("test:١", "asks for \"١\" lots"),
     ];
-    let lots = no_lot.iter().map(|&name| (name, "there are lot-a, lot-b")).chain(lots);
+    let lots = no_lot.iter().map(|&name| (name, "here are lot-a, lot-b")).chain(lots);
     let mut cases = Table::default();
     for (name, expected) in lots {
         cases.refuse(name, scenarios::suite(name), expected);
@@ -382,9 +396,9 @@ fn names_of_lots_drivers_and_moments_that_are_refused() {
         ("nobody", "no driver \"nobody\""),
         ("Expert", "no driver \"Expert\""),
         ("expert:x", "no driver \"expert:x\""),
-        ("tuned:", "there are tuned:tentacle"),
-        ("tuned:expert", "there are tuned:tentacle"),
-        ("tuned:vvf:x", "there are tuned:tentacle"),
+        ("tuned:", "here are tuned:tentacle"),
+        ("tuned:expert", "here are tuned:tentacle"),
+        ("tuned:vvf:x", "here are tuned:tentacle"),
         ("vvf ", "no driver \"vvf \""),
         (":", "no driver \":\""),
     ] {
@@ -700,11 +714,24 @@ fn within_means(folder: &Path, arguments: &[&str]) -> Command {
     command
 }
 
+/// What lies in a folder and below it: of each file its length, when it was written and, unless it is large or no file,
+/// its content.
 #[cfg(unix)]
-fn names_in(folder: &Path) -> Vec<PathBuf> {
-    let mut names: Vec<PathBuf> = folder.read_dir().unwrap().map(|entry| entry.unwrap().path()).collect();
-    names.sort();
-    names
+fn content_in(folder: &Path) -> BTreeMap<PathBuf, (u64, SystemTime, Vec<u8>)> {
+    let mut found = BTreeMap::new();
+    for entry in folder.read_dir().unwrap() {
+        let entry = entry.unwrap();
+        let (path, about) = (entry.path(), entry.metadata().unwrap());
+        if about.is_dir() {
+            found.extend(content_in(&path));
+            found.insert(path, (0, SystemTime::UNIX_EPOCH, Vec::new()));
+        } else {
+            let is_read = about.is_file() && about.len() < 1_000_000;
+            let content = if is_read { std::fs::read(&path).unwrap() } else { Vec::new() };
+            found.insert(path, (about.len(), about.modified().unwrap(), content));
+        }
+    }
+    found
 }
 
 /// A white PNG of 60 × 30 pixels whose colour profile unpacks to so many zeros, 258 times a whole number.
@@ -787,7 +814,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
     write("deep.toml", "[".repeat(250_000).as_bytes());
     write("eta.toml", b"[dagger]\neta = 7\n");
     assert!(Command::new("mkfifo").arg(folder.join("pipe.toml")).status().unwrap().success());
-    let before = names_in(&folder);
+    let before = content_in(&folder);
     let route = ["--start", "8,12,0", "--goal", "40,12,0"];
     let deep_key = format!("{}b=1", "a.".repeat(20_000));
     let cases: &[(&[&str], &str)] = &[
@@ -907,7 +934,9 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         assert_eq!(output.status.code(), Some(2), "{shown:?}: {}\n{stderr}", output.status);
         assert!(stderr.to_lowercase().contains(&expected.to_lowercase()), "{shown:?} lacks {expected:?}:\n{stderr}");
         assert!(!stderr.contains("panicked") && stderr.len() < ERROR_MAX, "{shown:?}:\n{stderr}");
-        assert_eq!(names_in(&folder), before, "{shown:?} leaves something");
+        let after = content_in(&folder);
+        assert!(after.keys().eq(before.keys()), "{shown:?} leaves something: {:?}", after.keys());
+        assert!(after == before, "{shown:?} changes a file");
     }
 }
 

@@ -35,6 +35,18 @@ impl Running {
         self.0.kill().unwrap();
         self.0.wait().unwrap();
     }
+
+    /// Sends a signal, and waits for the exit code: a second, as is promised, and nine more, since machines are busy.
+    #[cfg(unix)]
+    fn ended_by(&mut self, signal: &str) -> Option<i32> {
+        let sent = Command::new("kill").args(["-s", signal, &self.0.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        let ended = (0..1000).find_map(|_| {
+            std::thread::sleep(Duration::from_millis(10));
+            self.0.try_wait().unwrap()
+        });
+        ended.and_then(|status| status.code())
+    }
 }
 
 impl Drop for Running {
@@ -102,7 +114,7 @@ fn deaths_full_disks_and_errors_of_the_disk_lose_nothing() {
     let printed =
         succeed(xtask().args(["torture", "--only", "evaluate,merge,tune,generate", "--strikes", "2", "--kills", "1"]));
     assert_eq!(printed.lines().filter(|line| line.ends_with("| 0 |")).count(), 4, "{printed}");
-    // Three of four operations for two of the faults, and of eight for the third.
+    // Three of four operations for two of the faults, and of more for the third.
     let of_three = ["torture", "--only", "export", "--strikes", "3", "--kills", "1"];
     let parts =
         [(["--shard", "1/2"], "| 2 of", 3), (["--shard", "2/2"], "| 1 of", 3), (["--from", "4"], "| 1 of 4", 2)];
@@ -218,6 +230,44 @@ fn a_report_of_a_stage_is_listed_in_its_run_by_whatever_name() {
     assert!(faults.is_empty(), "{faults:?}");
 }
 
+/// Samples of `round-01`, named from within its run, were refused by an error that named nothing.
+#[test]
+fn samples_of_a_round_are_drawn_from_within_its_run() {
+    let run = scratch("samples-from-within").join("run");
+    succeed(xtask().args(["train-bc", "--preset", "smoke", "--no-eval", "--out"]).arg(&run));
+    succeed(xtask().current_dir(&run).args(["render", "samples", "round-00", "--count", "2", "--out", "../samples"]));
+    assert!(run.with_file_name("samples").join("samples-round-00.png").is_file());
+}
+
+/// What an interrupted run was to go on with was called damage, to be deleted; and where a finished one had lost its report,
+/// `--resume` was advised, which refuses.
+#[test]
+fn what_is_advised_of_a_run_that_is_not_whole_helps() {
+    let run = scratch("advice").join("run");
+    let mut running = Running::start(&["evaluate", "--driver", "expert", "--lots", "lot-b", "--trials", "2"], &run);
+    assert!(running.wait_for(&run.join("driving.unfinished")));
+    running.kill();
+    let verify = || refuse(xtask().arg("verify").arg(&run));
+    let said = verify();
+    for part in ["driving.unfinished: ", "runs.jsonl: ", "this run is not finished", "cargo xtask evaluate --resume"] {
+        assert!(said.contains(part), "no {part}: {said}");
+    }
+    for part in ["delete", "move away", "not what was written"] {
+        assert!(!said.contains(part), "{part}: {said}");
+    }
+    resume("evaluate", &run);
+    succeed(xtask().arg("verify").arg(&run));
+    sums::unlist(&run, &["figures/sha256sums", "report.md"]).unwrap();
+    damage(&run.join("report.html"), "truncated");
+    let (said, advice) = (verify(), format!("cargo xtask render report {}", run.display()));
+    assert!(said.matches(&advice).count() == 3 && !said.contains("--resume"), "{said}");
+    succeed(xtask().args(["render", "report"]).arg(&run));
+    succeed(xtask().arg("verify").arg(&run));
+    std::fs::write(run.join("notes.txt"), "mine").unwrap();
+    let said = verify();
+    assert!(said.contains("notes.txt") && !said.contains("delete"), "{said}");
+}
+
 /// It lost its pictures, and the run was another by its digest, without a word. Lots were written into the run.
 #[test]
 fn a_report_is_not_replaced_by_one_that_can_replay_nothing() {
@@ -320,23 +370,28 @@ fn a_run_under_way_is_refused_by_name_and_process() {
     resume("train-dagger", &run);
 }
 
-/// Whatever signal comes, and whenever: 130, nothing half-done is called finished, and the run can be continued.
+/// Whatever signal comes, and whenever: 130, soon, nothing half-done is called finished, and the run can be continued.
 #[cfg(unix)]
 #[test]
 fn signals_end_a_command_with_130_and_lose_nothing() {
-    for (signal, file) in [("INT", "sha256sums"), ("TERM", "dagger.toml"), ("HUP", "round-00/fit.toml")] {
+    let train: &[&str] = &["train-dagger", "--preset", "smoke", "--no-eval"];
+    let evaluate: &[&str] = &["evaluate", "--driver", "expert", "--lots", "lot-b", "--trials", "16"];
+    for (signal, arguments, file) in [
+        ("INT", train, "sha256sums"),
+        ("TERM", train, "dagger.toml"),
+        ("HUP", train, "round-00/fit.toml"),
+        ("INT", evaluate, "driving.unfinished"),
+    ] {
         // Under nohup commands ignore hang-ups, as they should.
         if signal == "HUP" && ignores_hang_ups() {
             continue;
         }
-        let run = scratch("signals").join(signal);
-        let mut running = Running::start(&["train-dagger", "--preset", "smoke", "--no-eval"], &run);
-        assert!(running.wait_for(&run.join(file)), "{file} never appears");
-        let sent = Command::new("kill").args(["-s", signal, &running.0.id().to_string()]).status().unwrap();
-        assert!(sent.success());
-        assert_eq!(running.0.wait().unwrap().code(), Some(130), "after {signal}");
-        assert!(!run.join("finished.toml").exists(), "after {signal}");
-        resume("train-dagger", &run);
+        let (command, run) = (arguments[0], scratch("signals").join(signal));
+        let mut running = Running::start(arguments, &run);
+        assert!(running.wait_for(&run.join(file)), "{command}: {file} never appears");
+        assert_eq!(running.ended_by(signal), Some(130), "{command} after {signal}");
+        assert!(!run.join("finished.toml").exists(), "{command} after {signal}");
+        resume(command, &run);
     }
 }
 
@@ -359,13 +414,7 @@ fn a_signal_ends_a_command_that_nobody_listens_to() {
     command.args(["train-dagger", "--preset", "smoke", "--no-eval", "--out"]).arg(&run);
     let mut running = Running(command.stdout(Stdio::null()).stderr(writer).spawn().unwrap());
     assert!(running.wait_for(&run.join("sha256sums")));
-    let sent = Command::new("kill").args(["-s", "INT", &running.0.id().to_string()]).status().unwrap();
-    assert!(sent.success());
-    let ended = (0..3000).find_map(|_| {
-        std::thread::sleep(Duration::from_millis(10));
-        running.0.try_wait().unwrap()
-    });
-    assert_eq!(ended.and_then(|status| status.code()), Some(130));
+    assert_eq!(running.ended_by("INT"), Some(130));
     drop(reader);
     resume("train-dagger", &run);
 }

@@ -58,6 +58,9 @@ pub struct Place<'a> {
     pub seed: u64,
 }
 
+/// What is written with a report, as the folder lists it.
+const OF_REPORT: [&str; 3] = ["report.html", "report.md", "figures/sha256sums"];
+
 /// Where runs go that are not told where.
 const RUNS: &str = "runs";
 
@@ -142,16 +145,19 @@ impl RunDir {
         Ok((run, Settings::read(&path.join(SETTINGS))?, manifest))
     }
 
-    /// Reopens the folder of a run, or of a finished stage of one, to write into it, whether it is finished or not.
+    /// Reopens the folder of a run, or of a finished stage of one, to write its report into it, whether it is finished or
+    /// not.
     ///
     /// # Errors
-    /// If there is none, or another process is using it.
+    /// If there is none, another process is using it, or it is not the stage that its run lists.
     pub fn reopen(path: &Path, command: &str) -> anyhow::Result<Self> {
         ensure!(sums::exists(path)?, "{}: this is not a run; list the folders in runs/", path.display());
         let own = Self::locked(path.to_path_buf(), command)?;
-        let Some((run, list)) = run_around(path)? else { return Ok(own) };
+        let Some((run, name)) = run_around(path)? else { return Ok(own) };
         let lock = Arc::new(Lock::take(&run, command)?);
-        Ok(Self { within: Some((run, list)), _lock_of_run: Some(lock), ..own })
+        // What is listed again is the run's own.
+        sums::check_folder(&run, &name)?;
+        Ok(Self { within: Some((run, name)), _lock_of_run: Some(lock), ..own })
     }
 
     /// Claims a folder within this run: `None` if it is finished, else as an interrupted command left it or new. It
@@ -192,7 +198,9 @@ impl RunDir {
             let now = request()?.inputs;
             let changed = inputs.iter().find(|(name, digest)| now.get(*name) != Some(*digest));
             changed.map_or(Ok(()), |(name, _)| Err(has_changed(name)))?;
-            sums::list(&self.path, &[&list])?;
+            // Of a stage whose report was being written, the run knows the other files.
+            sums::check_folder(&self.path, folder)?;
+            sums::list_folder(&self.path, folder)?;
             return Ok(None);
         }
         let stage = if sums::exists(&path)? {
@@ -205,10 +213,15 @@ impl RunDir {
             stage
         } else {
             if path.exists() {
+                let (is_free, name) = (is_free(&path)?, path.display());
                 ensure!(
-                    is_free(&path)? || Manifest::is_in(&path),
-                    "{}: holds files that are not of this run; move them elsewhere, and continue with --resume",
-                    path.display()
+                    is_free || !Manifest::is_in(&path),
+                    "{name}: its list of files, sha256sums, is lost; restore it from a copy, or move the folder elsewhere to begin \
+                     this stage again, and continue with --resume"
+                );
+                ensure!(
+                    is_free,
+                    "{name}: holds files that are not of this run; move them elsewhere, and continue with --resume"
                 );
                 Self::locked(path.clone(), place.command)?.clear()?;
             }
@@ -220,7 +233,8 @@ impl RunDir {
         };
         // What the run was begun with counts.
         let inputs = stage.inputs.iter().chain(self.inputs.iter()).map(|(name, of)| (name.clone(), of.clone()));
-        Ok(Some(Self { inputs: Arc::new(inputs.collect()), within: Some((self.path.clone(), list)), ..stage }))
+        let within = Some((self.path.clone(), folder.to_owned()));
+        Ok(Some(Self { inputs: Arc::new(inputs.collect()), within, ..stage }))
     }
 
     /// Refuses to continue writing if the folder has been replaced.
@@ -307,13 +321,25 @@ impl RunDir {
         delete().with_context(|| format!("{}: cannot be deleted", self.path.display()))
     }
 
-    /// Updates the digest of this finished folder in its run, after something was written into it.
+    /// Notes in its run that the report of this finished folder is being written: the run lists its other files, until
+    /// [`list_again`](Self::list_again). A process that dies in between leaves a folder that is reopened if these are the
+    /// run's.
     ///
     /// # Errors
-    /// If a list cannot be read or written.
+    /// If a list cannot be read or written, or the folder was deleted or moved meanwhile.
+    pub fn list_without_report(&self) -> anyhow::Result<()> {
+        self.ensure_held()?;
+        let listed = self.within.as_ref().map(|(run, name)| sums::list_but(run, name, &OF_REPORT));
+        Ok(listed.unwrap_or(Ok(()))?)
+    }
+
+    /// Updates the digest of this finished folder in its run, after its report was written.
+    ///
+    /// # Errors
+    /// If a list cannot be read or written, or the folder was deleted or moved meanwhile.
     pub fn list_again(&self) -> anyhow::Result<()> {
         self.ensure_held()?;
-        let listed = self.within.as_ref().map(|(run, list)| sums::list(run, &[list]));
+        let listed = self.within.as_ref().map(|(run, name)| sums::list_folder(run, name));
         Ok(listed.unwrap_or(Ok(()))?)
     }
 
@@ -348,8 +374,8 @@ impl RunDir {
     pub fn finish(&self, outcome: Outcome) -> anyhow::Result<()> {
         let finished = Finished { schema: FINISHED_SCHEMA, outcome };
         self.write(FINISHED, toml::to_string(&finished)?.as_bytes())?;
-        if let Some((run, list)) = &self.within {
-            sums::list(run, &[list])?;
+        if let Some((run, name)) = &self.within {
+            sums::list_folder(run, name)?;
         }
         Ok(())
     }
@@ -418,22 +444,49 @@ fn run_that_holds(folder: &Path) -> anyhow::Result<Option<PathBuf>> {
     Ok(folder.ancestors().skip(1).find(|around| Manifest::is_in(around)).map(Path::to_path_buf))
 }
 
-/// The run that lists a folder within it, and the name of the folder's list there.
+/// The run that lists a folder within it, or files of it, and the folder's path there.
 fn run_around(folder: &Path) -> anyhow::Result<Option<(PathBuf, String)>> {
-    let mut list = PathBuf::from(sums::FILE);
     // It may be named by a link, or as `.`.
     let folder = folder.canonicalize().with_context(|| folder.display().to_string())?;
-    let mut folder = folder.as_path();
-    while let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) {
-        list = Path::new(name).join(list);
-        let listed = list.to_string_lossy();
-        // Lists that other programs left are not read.
-        if Manifest::is_in(parent) && sums::is_listed(parent, &listed)? {
-            return Ok(Some((parent.to_owned(), listed.into_owned())));
+    // Lists that other programs left are not read.
+    for run in folder.ancestors().skip(1).filter(|around| Manifest::is_in(around)) {
+        let name = folder.strip_prefix(run).unwrap_or(&folder).to_string_lossy();
+        let within = format!("{name}/");
+        if sums::names(run)?.iter().any(|listed| listed.starts_with(&within)) {
+            return Ok(Some((run.to_owned(), name.into_owned())));
         }
-        folder = parent;
     }
     Ok(None)
+}
+
+/// The command that continues the run which a folder is, or lies in; `None` if that is finished, or there is none.
+///
+/// # Errors
+/// If what the run says of itself is missing or damaged.
+pub fn way_on(folder: &Path) -> anyhow::Result<Option<String>> {
+    let folder = folder.canonicalize().with_context(|| folder.display().to_string())?;
+    let mut runs = folder.ancestors().filter(|around| Manifest::is_in(around));
+    let Some(run) = runs.next() else { return Ok(None) };
+    if is_finished(run)? {
+        return Ok(None);
+    }
+    // A stage is continued with its run.
+    let whole = runs.last().unwrap_or(run);
+    Ok(Some(format!("cargo xtask {} --resume {}", Manifest::read(whole)?.command, quoted_path(whole))))
+}
+
+/// The command that writes a file or folder of a run again, if it is of a report that the run has of its own, or a stage whose
+/// report was being written when a command died.
+pub fn way_to_report(path: &Path) -> Option<String> {
+    let is_of_report = |run: &&Path| {
+        let name = path.strip_prefix(run).unwrap_or(path);
+        let is_named = name.starts_with("figures") || OF_REPORT.iter().any(|of| name == Path::new(of));
+        let is_stage = || name.as_os_str().is_empty() && run_around(path).is_ok_and(|run| run.is_some());
+        let has_one = || ["dagger.toml", "runs.jsonl"].iter().any(|of| sums::is_listed(run, of).unwrap_or(false));
+        (is_named || is_stage()) && has_one()
+    };
+    let run = path.ancestors().find(is_of_report)?;
+    Some(format!("cargo xtask render report {}", quoted_path(run)))
 }
 
 /// One SHA-256 of all that a run wrote, except for what differs from one repetition to the next: wall times, the
@@ -513,6 +566,77 @@ mod tests {
         assert_eq!(sums::verify(&path).faults, []);
         drop(stage);
         create(&path, true).unwrap();
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// Whatever lay in the place of a stage became the run's own as soon as its report was written again.
+    #[test]
+    fn a_report_makes_no_foreign_or_changed_stage_the_runs_own() {
+        let path = scratch("foreign-stage");
+        let elsewhere = path.join("elsewhere");
+        let settings = Settings::preset("smoke").unwrap();
+        let run = create(&path, false).unwrap();
+        let stage = run.stage("elsewhere", &place(&path, false), &settings).unwrap().unwrap();
+        stage.write("runs.jsonl", b"mine").unwrap();
+        stage.write("report.html", b"of mine").unwrap();
+        stage.finish(Outcome::Reproduction { stages: 1 }).unwrap();
+        drop((stage, run));
+        let finished = fs::read(path.join(sums::FILE)).unwrap();
+        let refused = |part: &str| {
+            sums::write(&elsewhere, "runs.jsonl", b"another's").unwrap();
+            let before = fs::read(path.join(sums::FILE)).unwrap();
+            let refused = message(RunDir::reopen(&elsewhere, "render"));
+            assert!(refused.contains(part), "{refused}");
+            assert_eq!(fs::read(path.join(sums::FILE)).unwrap(), before);
+            sums::write(&elsewhere, "runs.jsonl", b"mine").unwrap();
+        };
+        refused("elsewhere/sha256sums: is damaged");
+        let reopen = || {
+            let stage = RunDir::reopen(&elsewhere, "render").unwrap();
+            stage.list_without_report().unwrap();
+            stage
+        };
+        // Killed when half of the report is there.
+        reopen().write("report.html", b"of mine, anew").unwrap();
+        let faults = sums::verify(&path).faults;
+        assert!(faults.len() == 1 && sums::is_unfinished(&faults[0]), "{faults:?}");
+        let way = way_to_report(&faults[0].path).unwrap();
+        assert!(way.ends_with(&format!("render report {}", quoted_path(&elsewhere))), "{way}");
+        refused("elsewhere/runs.jsonl: is not the file that the run wrote");
+        let stage = reopen();
+        stage.write("report.html", b"of mine").unwrap();
+        stage.list_again().unwrap();
+        assert_eq!((sums::verify(&path).faults, fs::read(path.join(sums::FILE)).unwrap()), (Vec::new(), finished));
+        drop(stage);
+        // The run itself knows what a death left of it as well.
+        drop(reopen());
+        let (run, ..) = RunDir::resume(&path, "train-dagger").unwrap();
+        assert!(run.stage("elsewhere", &place(&path, false), &settings).unwrap().is_none());
+        assert_eq!(sums::verify(&path).faults, []);
+        drop(run);
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// It was told to delete what it was to go on with, and where figures were lost, to go on though it was finished.
+    #[test]
+    fn what_helps_a_run_that_is_not_whole_is_said_by_name() {
+        let path = scratch("way-on");
+        let run = create(&path, false).unwrap();
+        let settings = Settings::preset("smoke").unwrap();
+        let stage = run.stage("drives", &place(&path, false), &settings).unwrap().unwrap();
+        let whole = path.canonicalize().unwrap();
+        let on = Some(format!("cargo xtask train-dagger --resume {}", quoted_path(&whole)));
+        assert_eq!([way_on(&path).unwrap(), way_on(&path.join("drives")).unwrap()], [on.clone(), on.clone()]);
+        stage.write("runs.jsonl", b"").unwrap();
+        stage.finish(Outcome::Reproduction { stages: 1 }).unwrap();
+        assert_eq!([way_on(&path).unwrap(), way_on(&path.join("drives")).unwrap()], [on, None]);
+        run.finish(Outcome::Reproduction { stages: 1 }).unwrap();
+        assert_eq!([way_on(&path).unwrap(), way_on(&std::env::temp_dir()).unwrap()], [None, None]);
+        let report = |name: &str| way_to_report(&path.join(name));
+        let of_drives = Some(format!("cargo xtask render report {}", quoted_path(&path.join("drives"))));
+        assert_eq!(["drives/figures/a.svg", "drives/report.md"].map(report), [of_drives.clone(), of_drives]);
+        assert_eq!(["drives/runs.jsonl", "figures", "report.md"].map(report), [None, None, None]);
+        drop((stage, run));
         fs::remove_dir_all(path).unwrap();
     }
 
@@ -608,6 +732,29 @@ mod tests {
         fs::remove_file(path.join(MANIFEST)).unwrap();
         let refused = message(RunDir::resume(&path, "train-dagger"));
         assert!(refused.contains("this is not a run"), "{refused}");
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// Hours of drives were deleted without a word, where a run in the same state is refused.
+    #[test]
+    fn a_stage_that_lost_its_list_alone_is_to_be_restored() {
+        let path = scratch("lost-list-of-stage");
+        let settings = Settings::preset("smoke").unwrap();
+        let run = create(&path, false).unwrap();
+        let begin = || run.stage("drives", &place(&path, false), &settings);
+        drop(begin().unwrap().unwrap());
+        let (list, runs) = (path.join("drives").join(sums::FILE), path.join("drives/runs.jsonl"));
+        fs::remove_file(&list).unwrap();
+        drop(begin().unwrap().unwrap());
+        fs::write(&runs, "hours of drives").unwrap();
+        let kept = fs::read(&list).unwrap();
+        fs::remove_file(&list).unwrap();
+        let refused = message(begin());
+        assert!(refused.contains("drives: its list of files, sha256sums, is lost; restore it"), "{refused}");
+        assert_eq!(fs::read(&runs).unwrap(), b"hours of drives");
+        fs::write(&list, kept).unwrap();
+        drop(begin().unwrap().unwrap());
+        drop(run);
         fs::remove_dir_all(path).unwrap();
     }
 

@@ -10,9 +10,13 @@ use std::io::{self, Read, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 
 const REMEDY: &str = "restore it from a copy; or delete it and the file that ends in .unfinished to begin this again";
+const LOST_REMEDY: &str =
+    "restore the file that ends in .unfinished from a copy; or delete this one to begin this again";
+/// Bytes of what says how far files are whole: a line for each.
+const MARK_BYTES_MAX: u64 = 65_536;
 
 /// Files that grow part by part: a part is added to all of them, or to none. The file `NAME.unfinished` says how far they
-/// are whole, and of what they are.
+/// are whole, and of what they are; it is there before anything is in them.
 #[derive(Debug)]
 pub struct Growing {
     folder: PathBuf,
@@ -36,28 +40,52 @@ impl Growing {
     /// this one, are not continued.
     ///
     /// # Errors
-    /// If a file cannot be read or written, is not what was written into it, or is of another origin.
+    /// If a file cannot be read or written, is not what was written into it, is of another origin, or has another name
+    /// elsewhere; if one is not empty, and nothing says how much of it is whole.
     pub fn open(folder: &Path, name: &str, origin: &str, files: &[&str]) -> Result<Self, FileError> {
         let mark = mark_of(folder, name);
-        let left = sealed::read(&mark)?.map(|text| Mark::parse(&mark, &text, origin, files)).transpose()?;
+        let left = sealed::read_up_to(&mark, MARK_BYTES_MAX)?;
+        let left = left.map(|text| Mark::parse(&mark, &text, origin, files)).transpose()?;
         let origin = origin.to_owned();
         let mut growing = Self { folder: folder.to_owned(), mark, origin, files: Vec::new(), parts: 0 };
         for (index, &name) in files.iter().enumerate() {
             let path = folder.join(name);
             let failed = |error: std::io::Error| FileError::new(&path, error, whole::WRITE_REMEDY);
-            // Never through a link that somebody put there, and a pipe would be waited for.
-            if std::fs::symlink_metadata(&path).is_ok_and(|found| !found.is_file()) {
-                return Err(FileError::new(&path, "is not a regular file", "remove it"));
+            match std::fs::symlink_metadata(&path) {
+                // Never through a link that somebody put there, and a pipe would be waited for.
+                Ok(found) if !found.is_file() => {
+                    return Err(FileError::new(&path, "is not a regular file", "remove it"));
+                }
+                Ok(found) if left.is_none() && found.len() > 0 => {
+                    let mark = growing.mark.display();
+                    let problem = format!("is not empty, but {mark}, which says how much of it is whole, is missing");
+                    return Err(FileError::new(&path, problem, LOST_REMEDY));
+                }
+                _ => {}
             }
             let (bytes, sha256) =
                 left.as_ref().map_or_else(|| Ok((0, Sha256::new())), |left| left.check(index, &path))?;
             let mut file = File::options().write(true).create(true).truncate(false).open(&path).map_err(failed)?;
+            whole::ensure_one_name(&file, &path)?;
             file.set_len(bytes).map_err(failed)?;
             file.seek(SeekFrom::End(0)).map_err(failed)?;
             growing.files.push(GrowingFile { name: name.to_owned(), file, bytes, sha256 });
         }
-        growing.parts = left.map_or(0, |left| left.parts);
+        match left {
+            Some(left) => growing.parts = left.parts,
+            None => growing.write_mark()?,
+        }
         Ok(growing)
+    }
+
+    /// Like [`open`](Self::open), but begins the files anew: whatever was left in them, even by another run, is deleted.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    pub fn begin(folder: &Path, name: &str, origin: &str, files: &[&str]) -> Result<Self, FileError> {
+        let nothing = Mark { parts: 0, files: vec![(0, sums::digest(&[])); files.len()] };
+        nothing.write(&mark_of(folder, name), origin, files.iter().copied())?;
+        Self::open(folder, name, origin, files)
     }
 
     /// What is whole of a file, by its index, to be read from its beginning.
@@ -94,11 +122,13 @@ impl Growing {
             file.sha256.update(text);
         }
         self.parts += 1;
-        let mut mark = format!("{} {}\n", self.parts, self.origin);
-        for GrowingFile { name, bytes, sha256, .. } in &self.files {
-            let _ = writeln!(mark, "{bytes} {} {name}", sums::hex(&sha256.clone().finalize()));
-        }
-        sealed::write(&self.mark, mark.as_bytes())
+        self.write_mark()
+    }
+
+    fn write_mark(&self) -> Result<(), FileError> {
+        let files = self.files.iter().map(|file| (file.bytes, sums::hex(&file.sha256.clone().finalize()))).collect();
+        let names = self.files.iter().map(|file| file.name.as_str());
+        Mark { parts: self.parts, files }.write(&self.mark, &self.origin, names)
     }
 
     /// Lists the files as finished. A process that dies meanwhile leaves the list, and what [`clear()`] deletes.
@@ -112,8 +142,8 @@ impl Growing {
     }
 }
 
-/// Deletes what says how far files are whole. Those that are not listed are begun anew then; beside those that are, it is what
-/// a process that died in [`Growing::finish`] left.
+/// Deletes what says how far files are whole, which a process that died in [`Growing::finish`] left beside them: they are
+/// listed.
 ///
 /// # Errors
 /// If it cannot be deleted.
@@ -133,6 +163,14 @@ struct Mark {
 }
 
 impl Mark {
+    fn write<'a>(&self, path: &Path, origin: &str, names: impl Iterator<Item = &'a str>) -> Result<(), FileError> {
+        let mut text = format!("{} {origin}\n", self.parts);
+        for ((bytes, sum), name) in self.files.iter().zip(names) {
+            let _ = writeln!(text, "{bytes} {sum} {name}");
+        }
+        sealed::write(path, text.as_bytes())
+    }
+
     fn parse(path: &Path, text: &[u8], origin: &str, names: &[&str]) -> Result<Self, FileError> {
         let text = String::from_utf8_lossy(text);
         let mut lines = text.lines();
@@ -155,6 +193,10 @@ impl Mark {
     /// How much of a file is whole, and the digest of that part, to continue from.
     fn check(&self, index: usize, path: &Path) -> Result<(u64, Sha256), FileError> {
         let (bytes, sum) = &self.files[index];
+        // It may not be there yet.
+        if *bytes == 0 {
+            return Ok((0, Sha256::new()));
+        }
         let unreadable = |error: io::Error| FileError::unreadable(path, &error, REMEDY);
         let mut sha256 = Sha256::new();
         let mut whole = File::open(path).map_err(unreadable)?.take(*bytes);
@@ -199,6 +241,53 @@ mod tests {
                 .is_err_and(|error| error.to_string().contains("a regular"))
         );
         assert_eq!(fs::read(&diary).unwrap(), b"dear");
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// `ln diary RUN/runs.jsonl` emptied the diary: symbolic links alone were refused.
+    #[cfg(unix)]
+    #[test]
+    fn a_second_name_of_a_file_in_place_of_one_is_not_written_through() {
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-growing-hard-link", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        let diary = folder.join("diary");
+        fs::write(&diary, "dear").unwrap();
+        fs::hard_link(&diary, folder.join("runs")).unwrap();
+        let refused = Growing::begin(&folder, "driving", "this", &["runs"]).unwrap_err().to_string();
+        assert!(refused.contains("a hard link"), "{refused}");
+        assert_eq!(fs::read(&diary).unwrap(), b"dear");
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// An evaluation whose `driving.unfinished` somebody had deleted lost hours of drives without a word.
+    #[test]
+    fn files_whose_mark_is_lost_are_not_emptied() {
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-growing-lost", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        let (runs, mark) = (folder.join("runs"), folder.join("driving.unfinished"));
+        let open = || Growing::open(&folder, "driving", "this", &["runs", "failures"]);
+        // A death in the first moments: one file is there, and nothing in it.
+        fs::write(&runs, "").unwrap();
+        assert_eq!(open().unwrap().parts(), 0);
+        // A death in the middle of the first part.
+        fs::write(&runs, "1").unwrap();
+        let mut growing = open().unwrap();
+        assert_eq!((growing.parts(), fs::read(&runs).unwrap()), (0, Vec::new()));
+        growing.add(&[b"1\n".to_vec(), Vec::new()]).unwrap();
+        drop(growing);
+        fs::remove_file(&mark).unwrap();
+        let refused = open().unwrap_err().to_string();
+        assert!(refused.contains("runs: is not empty") && refused.contains("or delete this one"), "{refused}");
+        assert_eq!(fs::read(&runs).unwrap(), b"1\n");
+        // Whoever knows that they are to be begun anew is not asked, even if they are of another run.
+        let begin = |origin| Growing::begin(&folder, "driving", origin, &["runs", "failures"]).unwrap();
+        begin("another").add(&[b"2\n".to_vec(), Vec::new()]).unwrap();
+        let growing = begin("this");
+        assert_eq!((growing.parts(), fs::read(&runs).unwrap()), (0, Vec::new()));
+        growing.finish().unwrap();
+        assert!(sums::verify(&folder).faults.is_empty() && !mark.exists());
         fs::remove_dir_all(folder).unwrap();
     }
 

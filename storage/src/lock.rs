@@ -1,13 +1,17 @@
 //! One owner per folder.
 
 use crate::error::FileError;
-use crate::whole::{WRITE_REMEDY, is_at};
+use crate::read;
+use crate::whole::{WRITE_REMEDY, ensure_one_name, is_at};
 use std::fs::{self, File, TryLockError};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 /// The file in the folder that is locked. It says who holds it, and is empty when nobody does.
 pub const FILE: &str = ".lock";
+
+/// What is read of who holds it, bytes: a command and a number.
+const HOLDER_BYTES_MAX: u64 = 4096;
 
 /// Some network file systems have no locks.
 const ELSEWHERE: &str = "choose a folder on a file system with locks, such as a local disk's";
@@ -24,8 +28,8 @@ impl Lock {
     /// Takes the lock of a folder. `owner`: who asks, for whoever comes second.
     ///
     /// # Errors
-    /// If a living process holds it, which is named, or the file cannot be written. The system gives back the lock of a
-    /// process that has died.
+    /// If a living process holds it, which is named, or the file cannot be written or has another name elsewhere. The system
+    /// gives back the lock of a process that has died.
     pub fn take(folder: &Path, owner: &str) -> Result<Self, FileError> {
         let path = folder.join(FILE);
         let failed =
@@ -45,12 +49,14 @@ impl Lock {
                     return Err(FileError::new(&path, format_args!("cannot be locked: {error}"), ELSEWHERE));
                 }
                 Err(TryLockError::WouldBlock) => {
-                    let holder = fs::read_to_string(&path).unwrap_or_default();
+                    let holder = read::text(&path, HOLDER_BYTES_MAX).unwrap_or_default();
                     let holder = holder.lines().next().unwrap_or("another process").to_owned();
                     return Err(FileError::new(folder, format_args!("in use by {holder}"), REMEDY));
                 }
             }
         };
+        // Before there is a lock, which empties its file when it is given back.
+        ensure_one_name(&file, &path)?;
         let lock = Self { path, file };
         lock.file
             .set_len(0)
@@ -132,6 +138,25 @@ mod tests {
         fs::write(&diary, "dear").unwrap();
         std::os::unix::fs::symlink(&diary, folder.join(FILE)).unwrap();
         assert!(Lock::take(&folder, "evaluate").is_err());
+        assert_eq!(fs::read(&diary).unwrap(), b"dear");
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// `ln diary RUN/.lock` emptied the diary: symbolic links alone were refused.
+    #[cfg(unix)]
+    #[test]
+    fn a_second_name_of_a_file_in_place_of_the_lock_empties_nothing() {
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-hard-link", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let diary = folder.join("diary");
+        fs::write(&diary, "dear").unwrap();
+        fs::hard_link(&diary, folder.join(FILE)).unwrap();
+        assert!(Lock::take(&folder, "evaluate").is_err_and(|error| error.to_string().contains("a hard link")));
+        assert_eq!(fs::read(&diary).unwrap(), b"dear");
+        // What was advised.
+        fs::copy(&diary, folder.join("copy")).unwrap();
+        fs::rename(folder.join("copy"), folder.join(FILE)).unwrap();
+        Lock::take(&folder, "evaluate").unwrap();
         assert_eq!(fs::read(&diary).unwrap(), b"dear");
         fs::remove_dir_all(folder).unwrap();
     }

@@ -211,6 +211,22 @@ pub fn list_folder(folder: &Path, name: &str) -> Result<(), FileError> {
     write_list(folder, &sums)
 }
 
+/// Lists a finished folder within another by its files, but those of some names, instead of by its list, in one step: while
+/// these are written again, the folder is known by the others, which [`check_folder`] compares. [`list_folder`] is the way
+/// back.
+///
+/// # Errors
+/// If the folder has no list, or the other's cannot be written.
+pub fn list_but(folder: &Path, name: &str, but: &[&str]) -> Result<(), FileError> {
+    let path = folder.join(name).join(FILE);
+    let files = list_of(&folder.join(name))?.ok_or_else(|| FileError::new(&path, "is missing", RESTORE))?;
+    let mut sums = list_of(folder)?.unwrap_or_default();
+    sums.remove(&format!("{name}/{FILE}"));
+    let kept = files.into_iter().filter(|(file, _)| !but.contains(&file.as_str()));
+    sums.extend(kept.map(|(file, sum)| (format!("{name}/{file}"), sum)));
+    write_list(folder, &sums)
+}
+
 /// Takes files off the list of a folder, before they are written again.
 ///
 /// # Errors
@@ -230,9 +246,8 @@ pub fn write(folder: &Path, name: &str, content: &[u8]) -> Result<(), FileError>
     let sum = digest(content);
     let mut sums = list_of(folder)?.unwrap_or_default();
     match sums.get(name) {
-        Some(listed) if *listed == sum && fs::read(folder.join(name)).is_ok_and(|found| found == content) => {
-            return Ok(());
-        }
+        // Whatever lies there now: only as much of it is read as would be the same.
+        Some(listed) if *listed == sum && is_content_of(&folder.join(name), content) => return Ok(()),
         // Never listed with a digest that is not its own, whenever the process dies.
         Some(_) => unlist(folder, &[name])?,
         None => {}
@@ -240,6 +255,10 @@ pub fn write(folder: &Path, name: &str, content: &[u8]) -> Result<(), FileError>
     whole::write(&folder.join(name), content)?;
     sums.insert(name.to_owned(), sum);
     write_list(folder, &sums)
+}
+
+fn is_content_of(path: &Path, content: &[u8]) -> bool {
+    read::bytes(path, content.len() as u64).is_ok_and(|found| found == content)
 }
 
 /// Writes a folder with its list within another, in place of one that is there, and lists it; without files, there is no
@@ -287,15 +306,16 @@ fn replace_folder(
     }
     remove(&partial)?;
     fs::create_dir_all(&partial).map_err(failed)?;
-    // The old one stays, and stays listed, until the new one is whole.
+    // The old one stays until the new one is whole. It is listed until the new one is: where a process dies in between, a
+    // listed folder is missing or another one, which is noticed.
     if let Err(error) = fill(&partial) {
         remove(&partial)?;
         return Err(error);
     }
     let is_empty = !exists(&partial)?;
-    unlist(folder, &[&list_name])?;
     remove(&path)?;
     if is_empty {
+        unlist(folder, &[&list_name])?;
         return fs::remove_dir(&partial).map_err(failed);
     }
     fs::rename(&partial, &path).map_err(failed)?;
@@ -446,6 +466,19 @@ pub struct Verified {
     pub faults: Vec<FileError>,
 }
 
+impl Verified {
+    /// What the system says of the entries of a folder; what it cannot say is a fault.
+    fn known<T>(&mut self, folder: &Path, entries: impl Iterator<Item = io::Result<T>>) -> Vec<T> {
+        let known = entries.map(|entry| entry.map_err(|error| self.faults.push(unreadable(folder, &error))));
+        known.flatten().collect()
+    }
+}
+
+/// Whether a fault is what an interrupted command leaves: it is not listed yet, or not there yet.
+pub fn is_unfinished(fault: &FileError) -> bool {
+    [UNLISTED, GONE].contains(&fault.problem.as_str())
+}
+
 /// Compares every file below a folder with the lists: nothing may be missing, changed or additional. Recordings are not
 /// looked at: another program adds them.
 pub fn verify(folder: &Path) -> Verified {
@@ -497,7 +530,7 @@ fn look_for_others(folder: &Path, prefix: &str, sums: &Sums, verified: &mut Veri
         Ok(entries) => entries,
         Err(error) => return verified.faults.push(unreadable(folder, &error)),
     };
-    let mut entries: Vec<_> = entries.flatten().collect();
+    let mut entries = verified.known(folder, entries);
     entries.sort_by_key(fs::DirEntry::file_name);
     for entry in entries {
         let (path, name) = (entry.path(), format!("{prefix}{}", entry.file_name().to_string_lossy()));
@@ -524,7 +557,8 @@ const BEGUN_REMEDY: &str = "restore its folder from a copy, or move it away: the
 const GONE: &str = "is not there: a command died before it had its name, or somebody took it away";
 const GONE_REMEDY: &str = "continue the run, which writes it again";
 const UNLISTED: &str = "is not listed in sha256sums: it was never finished, or the list is damaged";
-const UNLISTED_REMEDY: &str = "continue the run, or restore the list; delete what does not belong there";
+const UNLISTED_REMEDY: &str =
+    "continue the run with --resume if it is not finished; else restore the list, or move away what is not of the run";
 
 /// The folder that the viewer program adds to a run.
 const RECORDINGS: &str = "recordings";
@@ -693,6 +727,73 @@ mod tests {
         write_folder(&folder, "figures", [("b.svg".to_owned(), b"B".to_vec())]).unwrap();
         assert_eq!(names(&folder.join("figures")).unwrap(), ["b.svg"]);
         assert!(faults(&folder).is_empty());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// A process that died between taking the old folder away and putting the new one in its place left neither, and
+    /// nothing was said of it.
+    #[test]
+    fn a_folder_that_is_lost_while_it_is_replaced_is_missed() {
+        let folder = scratch("replaced");
+        let old = folder.join("figures");
+        write_folder(&folder, "figures", [("a.svg".to_owned(), b"a".to_vec())]).unwrap();
+        // What cannot be deleted ends it there.
+        let stopped = replace_folder(&folder, "figures", |partial| {
+            write(partial, "a.svg", b"A")?;
+            fs::remove_dir_all(&old).unwrap();
+            fs::write(&old, "in the way").unwrap();
+            Ok(())
+        });
+        assert!(stopped.unwrap_err().to_string().contains("figures: cannot be written"));
+        fs::remove_file(&old).unwrap();
+        let missed = faults(&folder);
+        assert!(missed.len() == 1 && missed[0].contains("figures/sha256sums: cannot be read"), "{missed:?}");
+        write_folder(&folder, "figures", [("a.svg".to_owned(), b"A".to_vec())]).unwrap();
+        assert_eq!(faults(&folder), [""; 0]);
+        write_folder(&folder, "figures", []).unwrap();
+        assert!(!old.exists() && !exists(&folder).unwrap());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// It was waited for whoever would write into the pipe.
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_in_place_of_a_listed_file_is_replaced_and_not_read() {
+        let folder = scratch("pipe");
+        write(&folder, "a", b"a").unwrap();
+        fs::remove_file(folder.join("a")).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(folder.join("a")).status().unwrap().success());
+        assert!(faults(&folder)[0].contains("not a regular file"), "{:?}", faults(&folder));
+        write(&folder, "a", b"a").unwrap();
+        assert_eq!((read(&folder.join("a"), 1).unwrap(), faults(&folder)), (b"a".to_vec(), Vec::new()));
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// What the system could not say of a folder was taken for nothing being there.
+    #[test]
+    fn entries_of_a_folder_that_cannot_be_read_are_faults() {
+        let mut verified = Verified::default();
+        let entries = [Ok("a"), Err(io::Error::from_raw_os_error(5)), Ok("b")];
+        assert_eq!(verified.known(Path::new("run"), entries.into_iter()), ["a", "b"]);
+        let faults: Vec<String> = verified.faults.iter().map(ToString::to_string).collect();
+        assert!(faults.len() == 1 && faults[0].starts_with("run: cannot be read"), "{faults:?}");
+    }
+
+    #[test]
+    fn a_folder_that_is_listed_by_some_of_its_files_is_known_by_them_until_it_is_listed_again() {
+        let folder = scratch("listed-but");
+        write_folder(&folder, "stage", ["runs", "report"].map(|name| (name.to_owned(), b"1".to_vec()))).unwrap();
+        let stage = folder.join("stage");
+        list_but(&folder, "stage", &["report"]).unwrap();
+        assert_eq!(names(&folder).unwrap(), ["stage/runs"]);
+        write(&stage, "report", b"2").unwrap();
+        check_folder(&folder, "stage").unwrap();
+        list_but(&folder, "stage", &["report"]).unwrap();
+        write(&stage, "runs", b"2").unwrap();
+        assert!(check_folder(&folder, "stage").unwrap_err().to_string().contains("stage/runs: is not the file"));
+        write(&stage, "runs", b"1").unwrap();
+        list_folder(&folder, "stage").unwrap();
+        assert_eq!((names(&folder).unwrap(), faults(&folder)), (vec!["stage/sha256sums".to_owned()], Vec::new()));
         fs::remove_dir_all(folder).unwrap();
     }
 

@@ -11,6 +11,8 @@ pub const PARTIAL: &str = "lotpilot-partial";
 
 /// What helps against most errors of writing.
 pub const WRITE_REMEDY: &str = "check that the folder exists, is writable and has space";
+#[cfg(unix)]
+const ONE_NAME_REMEDY: &str = "put a copy of it in its place: copy it, and rename the copy to its name";
 
 /// Writes a file beside its place, then renames it. Of several that write the same file at once, each waits for the one
 /// before it: what is under the name was written by one of them.
@@ -18,11 +20,20 @@ pub const WRITE_REMEDY: &str = "check that the folder exists, is writable and ha
 /// # Errors
 /// If it cannot be written.
 pub fn write(path: &Path, content: &[u8]) -> Result<(), FileError> {
+    write_parts(path, &[content])
+}
+
+/// Like [`write()`], with a content in parts: they need not be put together in memory.
+///
+/// # Errors
+/// If it cannot be written.
+pub(crate) fn write_parts(path: &Path, parts: &[&[u8]]) -> Result<(), FileError> {
     let partial = path.with_added_extension(PARTIAL);
     let write = || {
         let mut file = create_own(&partial)?;
         // The name must not be on disk before the content is.
-        let written = file.write_all(content).and_then(|()| file.sync_all()).and_then(|()| fs::rename(&partial, path));
+        let written = parts.iter().try_for_each(|part| file.write_all(part));
+        let written = written.and_then(|()| file.sync_all()).and_then(|()| fs::rename(&partial, path));
         if written.is_err() {
             // It is this process's still, which has its lock. Where that fails as well, whoever writes next deletes it.
             let _ = fs::remove_file(&partial);
@@ -100,6 +111,28 @@ pub(crate) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
 #[cfg(not(unix))]
 pub(crate) fn is_at(_: &File, path: &Path) -> io::Result<bool> {
     path.try_exists()
+}
+
+/// Refuses an open file that is known by another name as well (a hard link): what is written into it, or emptied, changes
+/// there, too.
+///
+/// # Errors
+/// If it is, or the system does not say.
+#[cfg(unix)]
+pub(crate) fn ensure_one_name(file: &File, path: &Path) -> Result<(), FileError> {
+    use std::os::unix::fs::MetadataExt as _;
+    let about = file.metadata().map_err(|error| FileError::unreadable(path, &error, WRITE_REMEDY))?;
+    if about.nlink() > 1 {
+        let problem = "has another name elsewhere (a hard link), where it would change as well";
+        return Err(FileError::new(path, problem, ONE_NAME_REMEDY));
+    }
+    Ok(())
+}
+
+/// Whether it is known by another name is not told here.
+#[cfg(not(unix))]
+pub(crate) fn ensure_one_name(_: &File, _: &Path) -> Result<(), FileError> {
+    Ok(())
 }
 
 /// Like [`write()`], with a function that writes, into memory at first.

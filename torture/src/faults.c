@@ -20,6 +20,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -106,6 +107,7 @@ OF_PATH(CHANGES, unlink, (const char *path), (path))
 OF_FILE(GROWS, ftruncate64, (int file, off64_t size), (file, size))
 OF_FILE(GROWS, fdatasync, (int file), (file))
 OF_FILE(GROWS, fsync, (int file), (file))
+OF_FILE(READS, flock, (int file, int how), (file, how))
 
 int unlinkat(int folder, const char *name, int flags) {
     REAL(unlinkat);
@@ -135,6 +137,27 @@ int openat64(int folder, const char *name, int flags, ...) {
     REAL(openat64);
     char path[PATH_MAX];
     return is_struck(READS, "open", path_in(folder, name, path)) ? strike() : real(folder, name, flags);
+}
+
+off64_t lseek64(int file, off64_t offset, int from) {
+    REAL(lseek64);
+    char path[PATH_MAX];
+    return is_struck(READS, "seek", path_of(file, path)) ? strike() : real(file, offset, from);
+}
+
+char *realpath(const char *path, char *place) {
+    REAL(realpath);
+    if (!is_struck(READS, "resolve", path)) return real(path, place);
+    strike();
+    return NULL;
+}
+
+struct dirent64 *readdir64(DIR *folder) {
+    REAL(readdir64);
+    char path[PATH_MAX];
+    if (!is_struck(READS, "next in", path_of(dirfd(folder), path))) return real(folder);
+    strike();
+    return NULL;
 }
 
 DIR *opendir(const char *path) {
