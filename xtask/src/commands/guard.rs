@@ -27,8 +27,7 @@ Examples:
   cargo xtask guard                       train, drive, compare: a quarter of an hour on two cores
   cargo xtask guard --out runs/nightly --overwrite
 
-The limits in xtask/src/commands/guard.toml were recorded at 634c7c9 (22 November 2026), of an earlier default. Today's
-may be above them without having become worse. How they are recorded anew stands there.";
+The limits stand in xtask/src/commands/guard.toml, with the commit that they were recorded at, and how.";
 
 /// What the policy did when it was last recorded.
 const RECORD: &str = include_str!("guard.toml");
