@@ -35,7 +35,7 @@ use policy::dagger::IterationRow;
 use policy::decision_rule::{ChiOn, DecisionRule};
 use serde::{Deserialize, Serialize};
 use sim::seed::RootSeed;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// How much is done, besides what the settings say: the arguments in the manifest.
@@ -341,7 +341,7 @@ pub fn share(stages: Vec<Stage>, part: Part, shard: Shard) -> Vec<Stage> {
 /// the samples of another goes with it. So do all that begin with one behaviour cloning, which is trained once that way,
 /// unless there are more shards than clonings.
 fn dealt_out(stages: &[Stage], shards: u32) -> Vec<Option<usize>> {
-    let steps: HashMap<&str, &Step> = stages.iter().map(|stage| (stage.folder.as_str(), &stage.step)).collect();
+    let steps: BTreeMap<&str, &Step> = stages.iter().map(|stage| (stage.folder.as_str(), &stage.step)).collect();
     let with_samples = |folder: &str| match steps.get(folder) {
         Some(Step::Train { samples_of: Some(other), .. }) => other.clone(),
         _ => folder.to_owned(),
