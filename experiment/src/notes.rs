@@ -2,14 +2,12 @@
 
 use crate::lots::Lot;
 use crate::settings::NoiseChoice;
-use rayon::prelude::*;
 use sim::scenario::NoiseLevel;
 
 /// What imports did and found, junctions of lots written by hand, and which lots ask for noise that they are not driven
 /// with. A note begins with the name of its lot.
 pub fn of(lots: &[Lot], noise: &[NoiseChoice]) -> Vec<String> {
-    // Junctions take long to find in hundreds of lots.
-    lots.par_iter().flat_map_iter(|lot| of_lot(lot, noise)).collect()
+    lots.iter().flat_map(|lot| of_lot(lot, noise)).collect()
 }
 
 fn of_lot(lot: &Lot, noise: &[NoiseChoice]) -> Vec<String> {

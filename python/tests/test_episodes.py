@@ -426,7 +426,7 @@ def rust_loop(threads):
         (lambda: lotpilot.generate("lot-b", count=-1), ValueError, "count: -1 is not"),
         (lambda: lotpilot.evaluate("expert", "lot-b", trials=-1), ValueError, "trials: -1 is not"),
         (lambda: lotpilot.evaluate("expert", "lot-b", seed=2.5), ValueError, r"seed: 2\.5 is not"),
-        (lambda: lotpilot.evaluate("exprt", "lot-b"), ValueError, "there are expert"),
+        (lambda: lotpilot.evaluate("exprt", "lot-b"), ValueError, "There are expert"),
         (lambda: lotpilot.evaluate(["expert", "expert"], "lot-b"), ValueError, "named twice"),
         (lambda: lotpilot.evaluate("expert", "lot-b", methods={"mine": ["a", "b", "c"]}), ValueError, "no driver is named"),
         (lambda: lotpilot.evaluate("expert", "lot-b", methods={"mine": "expert"}), ValueError, "at least 3 drivers"),
