@@ -182,9 +182,7 @@ pub struct TeamEstimate {
     pub contacts_per_100m: Interval,
     /// Safe ratio, difference.
     pub difference_safe_ratio: Interval,
-    /// Steering reversals per 100 m driven.
-    pub reversals_per_100m: Interval,
-    /// The same, difference.
+    /// Steering reversals per 100 m driven, difference.
     pub difference_reversals_per_100m: Interval,
 }
 
@@ -293,7 +291,6 @@ impl EvaluationResults {
                 difference_per_100m: difference(Statistic::NearCollisions),
                 contacts_per_100m: of_events(Statistic::Contacts),
                 difference_safe_ratio: difference(Statistic::SafeRatio),
-                reversals_per_100m: mean(Statistic::Reversals),
                 difference_reversals_per_100m: difference(Statistic::Reversals),
             }
         };

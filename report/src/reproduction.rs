@@ -329,9 +329,9 @@ fn verdicts(statements: &[Statement], extent: &Extent) -> String {
                     figures beside them. Nothing is adjusted for the number of statements.\n"
         .to_owned();
     if extent.seeds >= TRAININGS_MIN as u64 {
-        text += "\nWhere several counts are named, they are of trainings that differ by their seed: their means are compared, \
+        text += "\nWhere several figures are named, they are of trainings that differ by their seed: their means are compared, \
                  with an interval for other trials or lots and other seeds, and none of them may have a near-collision where \
-                 there should be none. So is the weight on τ̂, by pairs of trainings. Everything else is of the first training.\n";
+                 there should be none; of noise-induced ones each has to have fewer. So is the weight on τ̂, by pairs of trainings. Everything else is of the first training.\n";
     }
     for verdict in [Verdict::Holds, Verdict::DoesNotHold, Verdict::CannotBeTold] {
         let found: Vec<&Statement> = statements.iter().filter(|statement| statement.verdict == verdict).collect();
