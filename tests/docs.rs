@@ -138,8 +138,10 @@ fn unused_slug(title: &str, used: &BTreeSet<String>) -> String {
 
 /// Every page, by its name.
 fn pages() -> BTreeMap<String, Page> {
-    let docs = std::fs::read_dir(root().join("docs")).unwrap().map(|entry| entry.unwrap().file_name());
-    let docs = docs.filter_map(|name| Some(format!("docs/{}", name.to_str()?)));
+    let docs = ["docs", "docs/notebook"].into_iter().flat_map(|folder| {
+        let entries = std::fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().file_name());
+        entries.filter_map(move |name| Some(format!("{folder}/{}", name.to_str()?)))
+    });
     let names = ["README.md", "CONTRIBUTING.md", HISTORY].map(str::to_owned).into_iter().chain(docs);
     let names = names.filter(|name| Path::new(name).extension().is_some_and(|extension| extension == "md"));
     names.map(|name| (name.clone(), Page::read(&name))).collect()

@@ -50,7 +50,7 @@ impl Settings {
 /// seconds, not hours of a person's day. What is learned on lot a alone does not carry over to corridors, and what is
 /// learned on corridors (easy, medium, hard) does not carry over to other kinds of lots: on validation lots of all
 /// families the policy had 3.6 near-collisions per 100 m trained on corridors, .3 trained on all
-/// (docs/elsewhere-attempts.md). Most corridors are hard, because most of what fails among them fails there.
+/// (docs/notebook/attempts.md). Most corridors are hard, because most of what fails among them fails there.
 fn default() -> Settings {
     let base = with_half_points();
     Settings {
@@ -83,7 +83,7 @@ fn lots_of_every_family(times: u32) -> Vec<String> {
 
 /// The default with more of both things that it is short of, lots and channels: on development lots either alone takes
 /// off a third of the near-collisions of behaviour cloning, an ensemble of three default networks nothing
-/// (docs/elsewhere-attempts.md).
+/// (docs/notebook/attempts.md).
 fn strong() -> Settings {
     let base = default();
     Settings {

@@ -46,7 +46,7 @@ impl DisturbanceSettings {
         Self { enabled: false, ..Self::quick() }
     }
 
-    /// As [`Self::quick`], towards danger: 706 near-collisions on development lots became 649 (docs/earlier.md).
+    /// As [`Self::quick`], towards danger: 706 near-collisions on development lots became 649 (docs/notebook/earlier.md).
     pub fn aimed() -> Self {
         Self { aim: Aim::Danger, ..Self::quick() }
     }

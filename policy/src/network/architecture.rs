@@ -83,7 +83,7 @@ impl NetworkArchitecture {
     /// Half the channels, 3×3 kernels, a quarter of the head and two modes: 302 538 parameters. With one mode it is trained twice
     /// as fast as with the paper's head and as well (55 000 samples of lot a: 1.01 against 1.02 m). With that much data dropout
     /// costs more than it gives (1.00 against 1.02 m), and residual layers more time than what they take off is worth; two modes
-    /// take off a quarter of the near-collisions, because two ways past an obstacle have no mean (docs/elsewhere-attempts.md).
+    /// take off a quarter of the near-collisions, because two ways past an obstacle have no mean (docs/notebook/attempts.md).
     pub fn compact() -> Self {
         Self {
             conv1: ConvLayer { channels: 16, kernel: 3 },
