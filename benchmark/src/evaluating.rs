@@ -42,7 +42,12 @@ fn measure(effort: Effort, report: Report<'_>, folder: &Path) -> anyhow::Result<
     let on = |threads: usize, what: &str| {
         on_threads(threads, || {
             let mut outcome = Ok(());
-            let figure = time(effort, what, ("s", 1.0), None, || outcome = once());
+            let figure = time(effort, what, ("s", 1.0), None, || {
+                // The first error counts, whatever comes after it.
+                if outcome.is_ok() {
+                    outcome = once();
+                }
+            });
             outcome.map(|()| figure)
         })
     };

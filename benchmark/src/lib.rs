@@ -132,3 +132,19 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
     pool.install(work)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_is_a_median_and_a_ratio_reaches_as_far_as_both_figures_do() {
+        let of = |measured: [f64; 3]| figure("x", "s", None, measured.to_vec());
+        let (above, below) = (of([4.0, 2.0, 3.0]), of([1.5, 1.0, 2.0]));
+        assert_eq!((above.median, above.range), (3.0, (2.0, 4.0)));
+        let gain = ratio("gain", &above, &below, Goal::AtLeast(2.0));
+        assert_eq!((gain.median, gain.range, gain.unit), (2.0, (1.0, 4.0), "×"));
+        assert!(Goal::AtLeast(2.0).is_met(gain.median) && !Goal::AtLeast(2.1).is_met(gain.median));
+        assert!(Goal::AtMost(2.0).is_met(gain.median) && !Goal::AtMost(1.9).is_met(gain.median));
+    }
+}

@@ -13,7 +13,7 @@ use anyhow::ensure;
 use expert::ScriptedExpert;
 use policy::agreement::Agreement;
 use policy::conditions::Conditions;
-use policy::dagger::{Hooks, Learned, Outcome, Progress as DaggerProgress, Rollouts, RoundEpisode};
+use policy::dagger::{Hooks, Learned, Outcome, Progress as DaggerProgress, Rollouts, RoundEpisode, Stop};
 use policy::dataset::store::Store;
 use policy::fit::FitProgress;
 use sim::driver::Source;
@@ -56,7 +56,8 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
     };
     let outcome = policy::dagger::run(&settings.dagger, &conditions, &store, settings.seed, &mut hooks)?;
     if monitor.into_inner().task.is_some() {
-        progress.end("stopped");
+        // The final training has no row that ends it.
+        progress.end(if outcome.stop == Stop::Interrupted { "stopped" } else { "done" });
     }
     Ok(outcome)
 }
@@ -128,8 +129,10 @@ struct Monitor<'a> {
     progress: &'a dyn Progress,
     task: Option<Task>,
     collection: Collection,
-    /// Samples that the running training had trained on when it was begun or continued here.
-    samples_before: u64,
+    /// Samples that the running task has trained on here, after its first step.
+    samples: u64,
+    /// Samples that the network in training had been trained on at its last step.
+    samples_of_network: u64,
 }
 
 /// What is being done at present.
@@ -161,7 +164,7 @@ impl Collection {
 
 impl<'a> Monitor<'a> {
     fn new(progress: &'a dyn Progress) -> Self {
-        Self { progress, task: None, collection: Collection::default(), samples_before: 0 }
+        Self { progress, task: None, collection: Collection::default(), samples: 0, samples_of_network: 0 }
     }
 
     fn frame(&mut self, episode: usize, frame: &Frame) {
@@ -199,13 +202,16 @@ impl<'a> Monitor<'a> {
         if self.task.is_none() {
             let label = round.map_or_else(|| "final training".to_owned(), |round| format!("round {round}: training"));
             self.begin(Task::Fitting, &label);
-            self.samples_before = fit.samples_done;
+            // What was trained on before an interruption took none of its time.
+            (self.samples, self.samples_of_network) = (0, fit.samples_done);
         }
         // A critic or a member of an ensemble begins anew.
-        self.samples_before = self.samples_before.min(fit.samples_done);
-        let samples_before = self.samples_before;
+        let since = fit.samples_done.checked_sub(self.samples_of_network);
+        self.samples += since.unwrap_or(fit.samples_done);
+        self.samples_of_network = fit.samples_done;
+        let samples = self.samples;
         self.progress.at(share, &mut |Elapsed { seconds }| {
-            let per_s = (fit.samples_done - samples_before) as f64 / seconds;
+            let per_s = samples as f64 / seconds;
             let validation = fit.validation.map_or_else(String::new, |at| format!(", validation {:.3} m", at.rmse_m));
             let (loss, learning_rate) = (fit.loss.total, fit.learning_rate);
             format!("loss {loss:.3}{validation}, learning rate {learning_rate:.1e}, {per_s:.0} samples/s")
@@ -240,8 +246,70 @@ mod tests {
     use crate::manifest::Request;
     use crate::test_runs;
     use policy::fit::Budget;
+    use policy::loss::LossParts;
     use sim::driver::Source;
     use sim::vehicle::VehicleCommand;
+
+    /// Remembers what was said last, as if a second had passed, and how tasks ended.
+    #[derive(Default)]
+    struct Said {
+        status: RefCell<String>,
+        ends: RefCell<Vec<String>>,
+    }
+
+    impl Progress for Said {
+        fn begin(&self, _: &'static str, _: &str) {}
+
+        fn at(&self, _: f64, status: &mut dyn FnMut(Elapsed) -> String) {
+            *self.status.borrow_mut() = status(Elapsed { seconds: 1.0 });
+        }
+
+        fn end(&self, result: &str) {
+            self.ends.borrow_mut().push(result.to_owned());
+        }
+
+        fn is_cancelled(&self) -> bool {
+            false
+        }
+    }
+
+    /// From the second network on, samples since its begin were divided by the time since that of the first.
+    #[test]
+    fn the_speed_of_a_training_counts_all_networks_of_the_round() {
+        let said = Said::default();
+        let mut monitor = Monitor::new(&said);
+        // The first goes on after an interruption.
+        for samples_done in [50, 60, 70, 10, 20, 30] {
+            let fit = FitProgress {
+                step: 1,
+                steps: 9,
+                samples_done,
+                learning_rate: 1e-3,
+                loss: LossParts::default(),
+                validation: None,
+            };
+            monitor.report(&DaggerProgress::Fitting { round: Some(1), share: 0.5, fit: &fit });
+        }
+        assert!(said.status.borrow().ends_with(" 50 samples/s"), "{}", said.status.borrow());
+    }
+
+    /// It was trained to its end, and "stopped".
+    #[test]
+    fn a_final_training_that_is_done_is_not_said_to_have_stopped() {
+        let path = test_runs::scratch("final-training");
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.training.lots = vec!["train:1:easy".to_owned()];
+        (settings.dagger.iterations_min, settings.dagger.iterations_max) = (0, 0);
+        settings.dagger.cloning_budget = Budget::Steps(10);
+        settings.dagger.final_budget = Budget::Steps(10);
+        let run = RunDir::create(&test_runs::place(&path, false), &settings, &Request::default()).unwrap();
+        let said = Said::default();
+        train(&settings, &run, &said).unwrap();
+        let ends = said.ends.into_inner();
+        assert_eq!(ends.last().map(String::as_str), Some("done"), "{ends:?}");
+        drop(run);
+        std::fs::remove_dir_all(path).unwrap();
+    }
 
     /// Lots that came back within a round were driven with the same noise to the bit: copies, of which some were held back
     /// from the training and others not.

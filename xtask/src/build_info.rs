@@ -4,6 +4,8 @@ use crate::output::Output;
 use anyhow::ensure;
 use evaluation::shards::has_networks;
 use experiment::manifest::{Build, Manifest};
+use experiment::run_dir::RunDir;
+use experiment::settings::Settings;
 use serde::Deserialize;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -32,12 +34,19 @@ fn changes() -> Option<&'static str> {
     Some(env!("XTASK_GIT_CHANGES")).filter(|changes| *changes != "unknown")
 }
 
-/// Checks that this program may continue a run: otherwise results of two versions would stand under the name of one.
-/// Another commit of the same version, which may differ only in its documents, and other changes to it are reported.
+/// Reopens the folder of an interrupted run of a command, if this program may continue it.
 ///
 /// # Errors
-/// If the run was begun by another version, with other libraries, or where networks round otherwise.
-pub(crate) fn check_can_go_on(run: &Path, manifest: &Manifest, output: &Output) -> anyhow::Result<()> {
+/// See [`RunDir::resume`]; or if the run was begun by another version, with other libraries, or where networks round otherwise.
+pub(crate) fn resume(run: &Path, command: &str, output: &Output) -> anyhow::Result<(RunDir, Settings, Manifest)> {
+    let (folder, settings, manifest) = RunDir::resume(run, command)?;
+    check_can_go_on(run, &manifest, output)?;
+    Ok((folder, settings, manifest))
+}
+
+/// Checks that this program may continue a run: otherwise results of two versions would stand under the name of one.
+/// Another commit of the same version, which may differ only in its documents, and other changes to it are reported.
+fn check_can_go_on(run: &Path, manifest: &Manifest, output: &Output) -> anyhow::Result<()> {
     let Build { program, libraries, git_revision, git_changes, .. } = get();
     ensure!(
         manifest.program == *program && manifest.libraries == *libraries,

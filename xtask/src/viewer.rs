@@ -82,7 +82,7 @@ fn encoded(request: &ViewRequest) -> anyhow::Result<Vec<u8>> {
     ensure!(
         request.len() as u64 <= VIEW_REQUEST_BYTES_MAX,
         "this asks the viewer program for too much at once, in {} bytes, and at most {VIEW_REQUEST_BYTES_MAX} are read; record \
-         fewer, with a smaller --limit or fewer keys",
+         fewer, with a smaller --limit or --record, or fewer keys",
         request.len()
     );
     Ok(request)

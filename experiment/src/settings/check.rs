@@ -22,6 +22,16 @@ impl Settings {
             );
         }
         reference::check(&toml::Table::try_from(self).context("settings are plain values")?, "")?;
+        self.check_ways()?;
+        self.check_noise()?;
+        self.check_episode()?;
+        self.check_dagger()?;
+        self.check_expert()?;
+        self.check_lots()
+    }
+
+    /// Checks that something is driven, each way once.
+    fn check_ways(&self) -> anyhow::Result<()> {
         for (section, lots, directions) in [
             ("training", &self.training.lots, &self.training.directions),
             ("evaluation", &self.evaluation.lots, &self.evaluation.directions),
@@ -36,6 +46,11 @@ impl Settings {
                 );
             }
         }
+        Ok(())
+    }
+
+    /// Checks the levels of noise that are compared.
+    fn check_noise(&self) -> anyhow::Result<()> {
         let noise = &self.evaluation.noise;
         ensure!(
             !noise.is_empty(),
@@ -52,6 +67,11 @@ impl Settings {
                 bail!("evaluation.noise names {same} and {level}, which are the same; name one of them");
             }
         }
+        Ok(())
+    }
+
+    /// Checks steps of time and speeds.
+    fn check_episode(&self) -> anyhow::Result<()> {
         let (physics, control) = (self.episode.physics_step_ms, self.episode.control_period_ms);
         ensure!(
             control.is_multiple_of(physics),
@@ -62,6 +82,11 @@ impl Settings {
             low <= high,
             "episode.controller.speed_min_mps = {low} is more than episode.controller.speed_max_mps = {high}"
         );
+        Ok(())
+    }
+
+    /// Checks the network and how it is trained.
+    fn check_dagger(&self) -> anyhow::Result<()> {
         self.dagger.network.validate().context("dagger.network")?;
         let rate = &self.dagger.fit.learning_rate;
         ensure!(
@@ -84,6 +109,11 @@ impl Settings {
                 self.dagger.fit.check_length(steps).with_context(|| format!("{key}.steps = {steps}"))?;
             }
         }
+        Ok(())
+    }
+
+    /// Checks orders and steps of the expert's plans.
+    fn check_expert(&self) -> anyhow::Result<()> {
         let travels = &self.expert.branch_travels_m;
         ensure!(travels.is_sorted_by(|a, b| a < b), "expert.branch_travels_m = {travels:?} is not increasing");
         let clearances = &self.expert.clearances_m;
@@ -107,7 +137,7 @@ impl Settings {
             "expert.first_step_m = {step_m} does not divide {} m, at which a plan's way is sampled",
             expert::WAY_SPACING_M
         );
-        self.check_lots()
+        Ok(())
     }
 
     /// Checks that each of [`Self::training_seeds`] can be written down as its root seed.

@@ -21,7 +21,7 @@ fn grids(count: usize) -> Vec<OccupancyGrid> {
 }
 
 /// Both presets' networks, one with an even kernel, with and without mirror averaging; one with residual layers; and others of
-/// two and three modes.
+/// one mode and of three.
 fn checkpoints() -> [Checkpoint; 5] {
     let of = |architecture, inference| Checkpoint {
         weights: Weights::init(architecture, RootSeed(8), 0),
@@ -35,7 +35,7 @@ fn checkpoints() -> [Checkpoint; 5] {
             NetworkArchitecture { residual1: 1, residual2: 2, ..NetworkArchitecture::compact() },
             InferenceSettings::plain(),
         ),
-        of(NetworkArchitecture { modes: 2, ..NetworkArchitecture::compact() }, InferenceSettings::smoothed()),
+        of(NetworkArchitecture { modes: 1, ..NetworkArchitecture::compact() }, InferenceSettings::smoothed()),
         of(NetworkArchitecture { modes: 3, ..NetworkArchitecture::compact() }, InferenceSettings::plain()),
     ]
 }

@@ -99,14 +99,10 @@ impl DaggerSettings {
         }
     }
 
-    /// How behaviour cloning is trained.
-    pub fn cloning_fit(&self) -> FitSettings {
-        FitSettings { budget: self.cloning_budget, ..self.fit.clone() }
-    }
-
     /// How round `round` is trained: behaviour cloning is round 0.
-    pub fn fit_of_round(&self, round: u32) -> FitSettings {
-        if round == 0 { self.cloning_fit() } else { self.fit.clone() }
+    pub(crate) fn fit_of_round(&self, round: u32) -> FitSettings {
+        let budget = if round == 0 { self.cloning_budget } else { self.fit.budget };
+        FitSettings { budget, ..self.fit.clone() }
     }
 
     /// How every network of a round is trained: the one that drives alone or first, an ensemble's other members, then a critic.

@@ -215,12 +215,11 @@ impl<'a> Learner<'a> {
 
     /// Puts it where an interrupted training stopped: its weights, its optimiser, and as many draws and rates passed by.
     fn restore(&mut self, left: &Unfinished, path: &Path) -> Result<(), FitError> {
-        let remedy = "delete it to begin this training again";
         self.net = LookAheadNet::from_weights(&left.weights, &self.device);
         let optimizer = self.settings.adam.optimizer(self.settings.gradient_norm_max);
         self.optimizer = optimizer
             .from_bytes(Bytes::from_bytes_vec(left.optimizer.clone()))
-            .map_err(|error| FileError::new(path, error, remedy))?;
+            .map_err(|error| FileError::new(path, error, unfinished::REMEDY))?;
         for _ in &left.steps {
             self.scheduler.step();
             self.sampler.draw(self.settings.batch, &mut self.batch);
@@ -280,8 +279,7 @@ fn batch_loss(settings: &LossSettings, outputs: Tensor<2>, samples: &[Sample], d
 pub fn evaluate(weights: &Weights, samples: &[Sample], loss: &LossSettings, context: FitContext) -> Validation {
     let grids: Vec<_> = samples.iter().map(|sample| &sample.grid).collect();
     let predictor = Predictor::new(weights, context.inference);
-    let answers = predictor.raw(&grids);
-    let outputs = predictor.for_loss(&grids, &answers);
+    let (answers, outputs) = predictor.raw_and_for_loss(&grids);
     let squared_error: f64 = answers
         .iter()
         .zip(samples)

@@ -19,7 +19,8 @@ use storage::{sealed, sums};
 /// Name of the file in the folder of the round: safetensors after a line with its SHA-256.
 pub const FILE: &str = "fit.unfinished";
 
-const REMEDY: &str = "delete it to begin this training again";
+/// What helps against a file that no training goes on with.
+pub(crate) const REMEDY: &str = "delete it to begin this training again";
 
 /// A training after some steps.
 pub(crate) struct Unfinished {

@@ -34,6 +34,7 @@ impl Ensemble {
         if self.others.is_empty() {
             return (answers, disagreement);
         }
+        let is_choice = std::iter::once(&self.first).chain(&self.others).any(Predictor::chooses);
         let others: Vec<Vec<Prediction>> = self.others.iter().map(|member| member.predict(grids)).collect();
         let mut members = Vec::with_capacity(1 + others.len());
         for (at, (answer, disagreement)) in answers.iter_mut().zip(&mut disagreement).enumerate() {
@@ -42,7 +43,7 @@ impl Ensemble {
             members.extend(others.iter().map(|answers| answers[at]));
             let all = mixture(&members);
             *disagreement = spread(all.mean, &members);
-            *answer = if self.first.chooses() { mixture(majority(&mut members)) } else { all };
+            *answer = if is_choice { mixture(majority(&mut members)) } else { all };
         }
         (answers, disagreement)
     }
@@ -148,5 +149,23 @@ mod tests {
         let (answers, disagreement) = Ensemble::new(one, vec![two, three]).predict_with_disagreement(&grids);
         assert_eq!(answers[0], mixture(majority(&mut members.clone())));
         assert_eq!(disagreement[0], spread(mixture(&members).mean, &members), "it is about the mean of all");
+    }
+
+    /// Where the first that was named has one mode, the mean of two ways was driven at.
+    #[test]
+    fn one_member_that_chooses_makes_a_choice_of_it_wherever_it_is_named() {
+        let grids = lots(5);
+        let grids: Vec<_> = grids.iter().collect();
+        let weights = Weights::init(NetworkArchitecture { modes: 2, ..NetworkArchitecture::compact() }, RootSeed(3), 0);
+        let choosing = Predictor::new(&weights, InferenceSettings::plain());
+        let all = [member(1), member(2), choosing];
+        let answers = all.each_ref().map(|member| member.predict(&grids));
+        let [one, two, choosing] = all;
+        let found = Ensemble::new(one, vec![two, choosing]).predict(&grids);
+        for (at, found) in found.into_iter().enumerate() {
+            let mut members = answers.each_ref().map(|answers| answers[at]);
+            assert_ne!(found, mixture(&members));
+            assert_eq!(found, mixture(majority(&mut members)));
+        }
     }
 }

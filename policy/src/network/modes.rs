@@ -22,7 +22,7 @@ impl Mode {
 }
 
 /// The answer of a network to every grid, in order, of which `rows` gives the rows: the likeliest mode of a row. With mirror
-/// averaging, that of the rows of the grid and of its mirror image together.
+/// averaging, that of the rows of the grid and of its mirror image together: `rows` is asked for the grids, then for all images.
 ///
 /// # Panics
 /// If a row has not [`row_width`] values.

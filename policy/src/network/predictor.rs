@@ -88,13 +88,19 @@ impl Predictor {
         modes::answers(grids, self.modes, self.mirror_averaging, |grids| self.outputs(grids))
     }
 
-    /// What the loss of grids is computed from, `[grids, width]`: of one Gaussian its answers, averaged with those to mirror
-    /// images if that is how it drives; else all modes as they leave the network, which nothing is averaged with.
-    pub(crate) fn for_loss(&self, grids: &[&OccupancyGrid], answers: &[[f32; OUTPUTS]]) -> Vec<f32> {
-        match self.modes {
-            1 => answers.as_flattened().to_vec(),
-            _ => self.outputs(grids),
-        }
+    /// The same, and what the loss of the grids is computed from, `[grids, width]`: of one Gaussian its answers, averaged with
+    /// those to mirror images if that is how it drives; else all modes as they leave the network, which nothing is averaged with.
+    pub(crate) fn raw_and_for_loss(&self, grids: &[&OccupancyGrid]) -> (Vec<[f32; OUTPUTS]>, Vec<f32>) {
+        let mut of_modes = Vec::new();
+        let answers = modes::answers(grids, self.modes, self.mirror_averaging, |asked| {
+            let rows = self.outputs(asked);
+            if self.chooses() {
+                of_modes.extend_from_slice(&rows[..grids.len() * row_width(self.modes)]);
+            }
+            rows
+        });
+        let for_loss = if self.chooses() { of_modes } else { answers.as_flattened().to_vec() };
+        (answers, for_loss)
     }
 
     /// The outputs of the network itself, one row per grid.
@@ -136,6 +142,23 @@ mod tests {
             // Other neighbours, other positions, other sizes.
             for start in [1, 7, 18] {
                 assert_eq!(predictor.raw(&all[start..])[..], together[start..], "from {start}");
+            }
+        }
+    }
+
+    /// Of several modes it is that of the network itself, whose rows were computed a second time for it.
+    #[test]
+    fn the_loss_is_of_the_answers_of_one_mode_and_of_all_rows_of_several() {
+        let grids = lots(20);
+        let grids: Vec<&OccupancyGrid> = grids.iter().collect();
+        for inference in [InferenceSettings::plain(), InferenceSettings::smoothed()] {
+            for modes in [1, 2] {
+                let architecture = NetworkArchitecture { modes, ..NetworkArchitecture::compact() };
+                let predictor = Predictor::new(&Weights::init(architecture, RootSeed(1), 0), inference);
+                let (answers, for_loss) = predictor.raw_and_for_loss(&grids);
+                assert_eq!(answers, predictor.raw(&grids));
+                let expected = if modes == 1 { answers.as_flattened().to_vec() } else { predictor.outputs(&grids) };
+                assert_eq!(for_loss, expected, "{modes} modes, {inference:?}");
             }
         }
     }

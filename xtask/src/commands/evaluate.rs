@@ -140,8 +140,7 @@ pub(crate) struct Asked {
 
 pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, mut asked, begun) = if let Some(path) = &args.resume {
-        let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
-        build_info::check_can_go_on(path, &manifest, output)?;
+        let (run, settings, manifest) = build_info::resume(path, COMMAND, output)?;
         let asked: Asked = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
         (settings, asked, Ok((run, manifest)))
     } else {

@@ -79,8 +79,7 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     let driving = record.place.iter().map(|place| estimate::evaluation(&place.settings(&settings), 1));
     console.plan(estimate::training(&settings, true).into_iter().chain(driving).collect());
     let run = if let Some(path) = &args.resume {
-        let (run, begun_with, manifest) = RunDir::resume(path, COMMAND)?;
-        build_info::check_can_go_on(path, &manifest, output)?;
+        let (run, begun_with, _) = build_info::resume(path, COMMAND, output)?;
         ensure!(begun_with == settings, "{}: the default settings have changed since; begin again", path.display());
         run
     } else {

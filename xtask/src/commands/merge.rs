@@ -211,7 +211,7 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
             sums::copy_folder(path, run.path(), folder)?;
         }
     }
-    let name = run.path().display();
+    let name = quoted_path(run.path());
     let elsewhere = match command {
         reproduce::COMMAND => {
             format!(", or on several machines with cargo xtask {command} --networks {name} --shard NUMBER/OF")
@@ -219,7 +219,8 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
         _ => String::new(),
     };
     output.note(format_args!(
-        "written: {name}: {} trainings; continue with cargo xtask {command} --resume {name}{elsewhere}",
+        "written: {}: {} trainings; continue with cargo xtask {command} --resume {name}{elsewhere}",
+        run.path().display(),
         trained.len()
     ));
     Ok(())
@@ -227,8 +228,7 @@ fn trainings(shards: &Shards, args: &MergeArgs, output: &Output) -> anyhow::Resu
 
 /// Adds what the shards drove to the run whose networks drove, and finishes it.
 fn drives(shards: &Shards, networks: &Path, args: &MergeArgs, output: &Output) -> anyhow::Result<()> {
-    let (run, settings, manifest) = RunDir::resume(networks, reproduce::COMMAND)?;
-    build_info::check_can_go_on(networks, &manifest, output)?;
+    let (run, settings, manifest) = build_info::resume(networks, reproduce::COMMAND, output)?;
     let remedy = format!("make them again with --networks {}", networks.display());
     shards.check_are_of(networks, &settings, &manifest, &remedy)?;
     let extent = reproduce::extent_of(&manifest).with_context(|| networks.display().to_string())?;

@@ -13,6 +13,7 @@ use evaluation::shards::ShardRecord;
 use evaluation::stage::{self, Stage, Step};
 use evaluation::stages::{self, Extent};
 use evaluation::{deviations, rules};
+use experiment::command_line::quoted_path;
 use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs::{self, Inputs};
 use experiment::lots::Lot;
@@ -224,8 +225,9 @@ fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir
     for stage in stages.iter().filter(|stage| matches!(stage.step, Step::Train { .. })) {
         ensure!(
             manifest::is_finished(&networks.join(&stage.folder))?,
-            "--networks {name}: {} is not trained yet; train it with --shard and merge, or with --resume {name}",
-            stage.folder
+            "--networks {name}: {} is not trained yet; train it with --shard and merge, or with --resume {}",
+            stage.folder,
+            quoted_path(&networks)
         );
     }
     ensure!(
@@ -271,8 +273,7 @@ pub(crate) fn extent_of(manifest: &Manifest) -> anyhow::Result<Extent> {
 }
 
 fn resume(path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, Arguments)> {
-    let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
-    build_info::check_can_go_on(path, &manifest, output)?;
+    let (run, settings, manifest) = build_info::resume(path, COMMAND, output)?;
     let arguments = Arguments::read(path, manifest.clone())?;
     let Arguments { extent, shard } = &arguments;
     if shard.is_some() {

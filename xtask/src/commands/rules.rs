@@ -6,7 +6,6 @@ use crate::output::Output;
 use anyhow::ensure;
 use clap::Args;
 use evaluation::rules::{self, Extent};
-use experiment::settings::Settings;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -65,15 +64,13 @@ pub(crate) fn run(args: &RulesArgs, output: &Output) -> anyhow::Result<()> {
 }
 
 fn begin(args: &RulesArgs) -> anyhow::Result<Begun<Extent>> {
-    let mut layers = args.common.layers();
-    // What the user sets comes later and counts.
-    let defaults: &[&str] = match layers.preset_name() {
+    let layers = args.common.layers();
+    let changes: &[&str] = match layers.preset_name() {
         "default" => &rules::FEW_LOTS,
         "strong" => &[rules::EVERY_TICK],
         _ => &[],
     };
-    layers.overrides.splice(0..0, defaults.iter().map(|&text| text.to_owned()));
-    let settings = Settings::resolve(&layers, args.common.seed)?;
+    let settings = args.common.settings(changes.iter().map(|&text| text.to_owned()))?;
     let known = rules::all().map(|(name, _)| name.to_owned());
     let named = if args.rule.is_empty() { known.to_vec() } else { args.rule.clone() };
     for rule in &named {
@@ -91,4 +88,34 @@ fn begin(args: &RulesArgs) -> anyhow::Result<Begun<Extent>> {
     settings.check_training_seeds(seeds)?;
     let extent = Extent { rules: named, seeds, iterations, samples, unseen: args.unseen.clone() };
     Ok(Begun { preset: layers.preset_name().to_owned(), settings, extent })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use policy::dagger::Keep;
+    use policy::fit::Budget;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: RulesArgs,
+    }
+
+    /// Lots, trials and steps of the command took the place of those in a file, without a word.
+    #[test]
+    fn what_a_file_sets_counts_and_the_rest_is_in_short() {
+        let file = std::env::temp_dir().join(format!("xtask-test-{}-rules.toml", std::process::id()));
+        let text =
+            "training.lots = [\"train:2:rooms\"]\ndagger.keep = \"expert_ticks\"\ndagger.fit.budget.steps = 300\n";
+        std::fs::write(&file, text).unwrap();
+        let line = ["rules", "--config", file.to_str().unwrap(), "--set", "training.trials=3"];
+        let settings = begin(&Line::try_parse_from(line).unwrap().args).unwrap().settings;
+        assert_eq!(settings.training.lots, ["train:2:rooms"]);
+        assert_eq!((settings.training.trials, settings.dagger.keep), (3, Keep::ExpertTicks));
+        assert_eq!(settings.dagger.fit.budget, Budget::Steps(300));
+        assert_eq!(settings.dagger.cloning_budget, Budget::Steps(2000), "that of the command");
+        std::fs::remove_file(file).unwrap();
+    }
 }

@@ -7,7 +7,6 @@ use anyhow::ensure;
 use clap::Args;
 use evaluation::scaling::{self, Extent};
 use experiment::lots::Lot;
-use experiment::settings::Settings;
 use scenarios::split::Family;
 
 pub(crate) const EXAMPLES: &str = "\
@@ -53,18 +52,43 @@ pub(crate) fn run(args: &ScalingArgs, output: &Output) -> anyhow::Result<()> {
 }
 
 fn begin(args: &ScalingArgs) -> anyhow::Result<Begun<Extent>> {
-    let mut layers = args.common.layers();
+    let layers = args.common.layers();
+    let lots = LOTS_OF_A_FAMILY * Family::ALL.len();
     let is_default = layers.preset_name() == "default";
-    // What the user sets comes later and counts.
-    if is_default {
-        let lots = LOTS_OF_A_FAMILY * Family::ALL.len();
-        layers.overrides.insert(0, format!("training.lots=[\"train:{lots}:all\"]"));
-    }
-    let settings = Settings::resolve(&layers, args.common.seed)?;
+    let settings = args.common.settings(is_default.then(|| format!("training.lots=[\"train:{lots}:all\"]")))?;
     let extent = Extent { different_lots: args.different.clone(), unseen: args.unseen.clone() };
     ensure!(!extent.different_lots.contains(&0), "--different 0: name at least one lot");
     ensure_distinct("--different", &extent.different_lots)?;
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     ensure!(lots.iter().any(Lot::is_generated), "training.lots names no generated lots, of which there could be more");
     Ok(Begun { preset: layers.preset_name().to_owned(), settings, extent })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: ScalingArgs,
+    }
+
+    /// The lots of the command took the place of those in a file, without a word.
+    #[test]
+    fn lots_that_a_file_names_are_trained_on() {
+        let file = std::env::temp_dir().join(format!("xtask-test-{}-scaling.toml", std::process::id()));
+        std::fs::write(&file, "training.lots = [\"train:2:rooms\"]\n").unwrap();
+        let file = file.to_str().unwrap();
+        let lots = |arguments: &[&str]| {
+            let line = Line::try_parse_from([&["scaling"][..], arguments].concat()).unwrap();
+            begin(&line.args).unwrap().settings.training.lots
+        };
+        assert_eq!(lots(&[]), ["train:192:all"]);
+        assert_eq!(lots(&["--config", file]), ["train:2:rooms"]);
+        let named = ["--config", file, "--set", "training.lots=[\"train:3:lane\"]"];
+        assert_eq!(lots(&named), ["train:3:lane"]);
+        std::fs::remove_file(file).unwrap();
+    }
 }

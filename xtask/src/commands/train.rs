@@ -89,8 +89,7 @@ pub(crate) fn dagger(args: &TrainArgs, output: &Output) -> anyhow::Result<()> {
 
 fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&mut Settings)) -> anyhow::Result<()> {
     let (run, settings, asked) = if let Some(path) = &args.resume {
-        let (run, settings, manifest) = RunDir::resume(path, command)?;
-        build_info::check_can_go_on(path, &manifest, output)?;
+        let (run, settings, manifest) = build_info::resume(path, command, output)?;
         manifest.check_inputs(&inputs(&settings)?)?;
         let asked: Asked = manifest.arguments.try_into().with_context(|| path.display().to_string())?;
         let drives = path.join(records::RUNS).try_exists().with_context(|| path.display().to_string())?;

@@ -49,6 +49,17 @@ impl TrainingsArgs {
     pub(crate) fn layers(&self) -> Layers {
         Layers::from(&self.layers)
     }
+
+    /// The settings: the preset with what the command changes of it, and over that what the user asks for, in a file or by flags.
+    ///
+    /// # Errors
+    /// Naming what is wrong in which layer.
+    pub(crate) fn settings(&self, changes: impl IntoIterator<Item = String>) -> anyhow::Result<Settings> {
+        let layers = self.layers();
+        let of_command =
+            Layers { preset: layers.preset.clone(), overrides: changes.into_iter().collect(), ..Layers::default() };
+        Settings::resolve_over(&Settings::resolve(&of_command, None)?, &layers, self.seed)
+    }
 }
 
 /// Refuses what `option` names a second time: folders and rows are called so.
@@ -149,8 +160,7 @@ impl<E: Serialize + DeserializeOwned> Trainings<E> {
     }
 
     fn resume(&self, path: &Path, output: &Output) -> anyhow::Result<(RunDir, Settings, E, Option<ShardRecord>)> {
-        let (run, settings, mut manifest) = RunDir::resume(path, self.command)?;
-        build_info::check_can_go_on(path, &manifest, output)?;
+        let (run, settings, mut manifest) = build_info::resume(path, self.command, output)?;
         let shard = ShardRecord::take_from(&mut manifest).with_context(|| path.display().to_string())?;
         if shard.is_some() {
             build_info::check_began_shard(path, &manifest)?;

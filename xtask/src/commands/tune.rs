@@ -74,8 +74,7 @@ struct Asked {
 
 pub(crate) fn run(args: &TuneArgs, output: &Output) -> anyhow::Result<()> {
     let (run, settings, asked) = if let Some(path) = &args.resume {
-        let (run, settings, manifest) = RunDir::resume(path, COMMAND)?;
-        build_info::check_can_go_on(path, &manifest, output)?;
+        let (run, settings, manifest) = build_info::resume(path, COMMAND, output)?;
         let asked: Asked = manifest.arguments.try_into().with_context(|| path.display().to_string())?;
         (run, settings, asked)
     } else {
