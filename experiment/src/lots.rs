@@ -41,6 +41,13 @@ pub struct Drawn {
     pub attempts: Option<u32>,
 }
 
+impl Drawn {
+    /// As a lot file says it.
+    pub fn to_toml(&self) -> String {
+        scenarios::load::to_toml(&self.scenario)
+    }
+}
+
 /// Ways to name lots: how it is written, what it means.
 pub fn specs() -> Vec<(&'static str, String)> {
     let families = format!("{}; all: one of each in turn", Family::list(""));
@@ -282,15 +289,21 @@ impl Lot {
     }
 }
 
+/// How many generated lots of each kind there are, by [`Lot::group`].
+pub fn generated_by_kind(lots: &[Lot]) -> BTreeMap<String, u64> {
+    let mut of_a_kind: BTreeMap<String, u64> = BTreeMap::new();
+    for lot in lots.iter().filter(|lot| lot.is_generated()) {
+        *of_a_kind.entry(lot.group()).or_default() += 1;
+    }
+    of_a_kind
+}
+
 /// Checks that there are enough generated lots for so many rounds of training; see [`Lot::in_round`].
 ///
 /// # Errors
 /// If one would have a number that no lot has.
 pub fn check_rounds(lots: &[Lot], rounds: u32, different: u32) -> anyhow::Result<()> {
-    let mut of_a_kind: BTreeMap<String, u64> = BTreeMap::new();
-    for lot in lots {
-        *of_a_kind.entry(lot.group()).or_default() += 1;
-    }
+    let of_a_kind = generated_by_kind(lots);
     for lot in lots {
         let LotSpec::Generated { split, index, .. } = &lot.spec else { continue };
         let count = of_a_kind[&lot.group()];

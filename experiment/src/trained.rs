@@ -240,7 +240,7 @@ fn run_of(spec: &Path) -> anyhow::Result<(&Path, bool)> {
     );
     ensure!(
         sums::exists(run)?,
-        "{}: this is not a run{}; cargo xtask train-dagger and evaluate make them, in runs/ unless --out says otherwise",
+        "{}: this is not a run; cargo xtask train-dagger and evaluate make them, in runs/ unless --out says otherwise{}",
         run.display(),
         in_runs(run)
     );

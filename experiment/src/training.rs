@@ -2,7 +2,7 @@
 
 use crate::drive;
 use crate::inputs;
-use crate::lots::Lot;
+use crate::lots::{self, Lot};
 use crate::manifest::Manifest;
 use crate::progress::{Elapsed, Progress};
 use crate::run_dir::RunDir;
@@ -71,10 +71,7 @@ pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyh
 pub fn episodes_of(settings: &Settings, lots: &[Lot], round: u32) -> anyhow::Result<Vec<RoundEpisode>> {
     let training = &settings.training;
     let (generated, others): (Vec<Lot>, Vec<Lot>) = lots.iter().cloned().partition(Lot::is_generated);
-    let mut of_a_kind: BTreeMap<String, u64> = BTreeMap::new();
-    for lot in &generated {
-        *of_a_kind.entry(lot.group()).or_default() += 1;
-    }
+    let of_a_kind = lots::generated_by_kind(&generated);
     let generated: Vec<Lot> =
         generated.iter().map(|lot| lot.in_round(round, of_a_kind[&lot.group()], training.different_lots)).collect();
     let purpose = Purpose::Training { round };

@@ -116,8 +116,8 @@ pub struct ExpertSettings {
     pub tight_start_m: f32,
     /// The body is lengthened by this at the nose, metres: mirrors the near-collision rule (docs/methods.md E5.4).
     pub nose_margin_m: f32,
-    /// A little less than half of what the covering discs overstate the half-width by is given back, metres (docs/methods.md E5.4:
-    /// radius 1.034 m, clearance = distance − 0.987 m).
+    /// A little less than half of what the covering discs overstate the half-width by is given back, metres
+    /// (docs/methods.md E5.4: radius 1.034 m, clearance = distance − 0.987 m).
     pub disc_relief_m: f32,
     /// Something nearer than this is an obstacle load, metres (docs/methods.md 3.2).
     pub load_range_m: f32,

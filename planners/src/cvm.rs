@@ -261,19 +261,13 @@ impl Policy for CurvatureVelocity {
             let share = (curvature_per_m / self.context.vehicle.curvature_max_per_m()).clamp(-1.0, 1.0);
             (SIDE as f32 * (1.0 + share)).round() as usize
         };
-        // Among equals the straightest.
-        let best = (index(steering_rad - reach_rad)..=index(steering_rad + reach_rad)).max_by(|&a, &b| {
-            let [(_, of_a), (_, of_b)] = [a, b].map(|k| self.best_speed(k, distances_m[k]));
-            of_a.total_cmp(&of_b).then(b.abs_diff(SIDE).cmp(&a.abs_diff(SIDE)))
-        });
-        let best = best.unwrap_or(SIDE);
+        let window = index(steering_rad - reach_rad)..=index(steering_rad + reach_rad);
+        let (best, speed_mps) = speeds::best_arc(window, SIDE, |k| self.best_speed(k, distances_m[k]));
         let curvature_per_m = self.candidates[best].curvature_per_m;
         self.wheel.command_rad = self.context.steering_rad(curvature_per_m);
         match self.params.speeds {
             Speeds::ByLaw => self.context.steer_along(curvature_per_m),
-            Speeds::Searched { .. } => {
-                self.context.steer_along_at(curvature_per_m, self.best_speed(best, distances_m[best]).0)
-            }
+            Speeds::Searched { .. } => self.context.steer_along_at(curvature_per_m, speed_mps),
         }
     }
 

@@ -245,17 +245,12 @@ impl Policy for DynamicWindow {
             (SIDE as f32 * (1.0 + share)).round() as usize
         };
         let window = index(steering_rad - reach_rad)..=index(steering_rad + reach_rad);
-        // Among equals the straightest.
-        let best = window.max_by(|&a, &b| {
-            let [(_, of_a), (_, of_b)] = [a, b].map(|k| self.best_speed(k, free_m[k]));
-            of_a.total_cmp(&of_b).then(b.abs_diff(SIDE).cmp(&a.abs_diff(SIDE)))
-        });
-        let best = best.unwrap_or(SIDE);
+        let (best, speed_mps) = speeds::best_arc(window, SIDE, |k| self.best_speed(k, free_m[k]));
         let curvature_per_m = self.arcs[best].curvature_per_m;
         self.wheel.command_rad = self.context.steering_rad(curvature_per_m);
         match self.params.speeds {
             Speeds::ByLaw => self.context.steer_along(curvature_per_m),
-            Speeds::Searched => self.context.steer_along_at(curvature_per_m, self.best_speed(best, free_m[best]).0),
+            Speeds::Searched => self.context.steer_along_at(curvature_per_m, speed_mps),
         }
     }
 

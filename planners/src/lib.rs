@@ -11,16 +11,16 @@
 //! | [`mppi`] | sampling | model predictive path integral control, as in nav2 (Williams 2017) | no |
 //!
 //! Each method chooses a steering angle; the controller follows it with the paper's speed law for planners, slower when
-//! it steers more. Methods that search speeds ask for less than that where they want to. There is no global path: a method that needs a goal gets "straight ahead" or a point that the grid
-//! suggests ([`Goal`]).
+//! it steers more. Methods that search speeds ask for less than that where they want to. There is no global path: a method
+//! that needs a goal gets "straight ahead" or a point that the grid suggests ([`Goal`]).
 //!
 //! Tags in the documentation of parameters, as in docs/methods.md: *paper* = stated there, *cited* = read in the cited
 //! work or the authors' code, *derived* = arithmetic from those, *recalled* = from memory of the cited work, *chosen* =
 //! stated nowhere.
 //!
 //! Shared by the methods: `context` (the car, and how to answer), `nearest` (distances on the grid), `field` (repulsion
-//! and the walk along a field), [`Goal`], [`Method`]. The registry ([`PlannerSpec`], [`Planner`]) uses the methods, never
-//! the other way round.
+//! and the walk along a field), `speeds` (the arcs and speeds of a window), [`Goal`], [`Method`]. The registry
+//! ([`PlannerSpec`], [`Planner`]) uses the methods, never the other way round.
 
 pub mod apf;
 mod context;

@@ -46,7 +46,8 @@ pub struct Params {
     pub horizon_s: f32,
     /// λ, how much cost makes a sequence count e times less: 0.3 (*cited*: nav2).
     pub temperature: f32,
-    /// γ, price of steering and of being slower than the controller's law, by which the mean does not run away with the draws: 0.015 (*cited*: nav2).
+    /// γ, price of steering and of being slower than the controller's law, by which the mean does not run away with the
+    /// draws: 0.015 (*cited*: nav2).
     pub gamma: f32,
     /// Standard deviation of the steering angles drawn, radians: 0.15 (*chosen*; nav2 draws yaw rates).
     pub steering_std_rad: f32,

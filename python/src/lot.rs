@@ -9,7 +9,7 @@ use experiment::trials::{Purpose, Trial};
 use numpy::{Ix2, PyArray, PyArray1, PyArray3, PyArrayMethods as _, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use report::drawn_lots::DrawnLots;
+use report::drawn_lots::{DrawnLot, DrawnLots};
 use report::pictures::lot;
 use sim::geometry::Vec2;
 use sim::limits::TRIAL_MAX;
@@ -214,22 +214,13 @@ pub(crate) fn generate(
     let vehicle = &settings.episode.vehicle;
     let to = DrawnLots { out: out.as_deref().unwrap_or(Path::new("")), seed, count, overwrite };
     let draw = |trial: &Trial<'_>| {
-        let name = to.name(trial);
-        let mut scenario = trial.lot.draw(trial.seed).scenario;
-        scenario.name.clone_from(&name);
-        let text = scenarios::load::to_toml(&scenario);
-        let map = Map::build(scenario, vehicle)?;
-        let (length_m, obstacles) = (map.path().length_m(), map.scenario().obstacles.len());
+        let drawn = to.draw(trial, vehicle)?;
         let place = match &out {
-            Some(_) => {
-                let [toml, png] = to.files(&name);
-                storage::whole::write(&png, &lot::top_view(&map, vehicle, None)?.to_png()?)?;
-                storage::whole::write(&toml, text.as_bytes())?;
-                toml.display().to_string()
-            }
+            Some(_) => to.write(&drawn, vehicle, None)?.display().to_string(),
             None => String::new(),
         };
-        Ok::<_, anyhow::Error>((name, text, place, length_m, obstacles))
+        let DrawnLot { name, toml, map, .. } = drawn;
+        Ok::<_, anyhow::Error>((name, toml, place, map.path().length_m(), map.scenario().obstacles.len()))
     };
     let lots = alone(py, || experiment::lots::Lot::parse_all(&names, vehicle).map_err(input))?;
     warn(py, &notes::of(&lots, &[NoiseChoice::Lot]))?;

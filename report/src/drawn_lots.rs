@@ -1,10 +1,12 @@
-//! The files that drawn lots and their pictures are written to, and what they must not replace.
+//! Drawn lots and their pictures as files, and what they must not replace.
 
-use crate::pictures::file_name;
+use crate::pictures::{file_name, lot};
 use anyhow::{Context as _, bail, ensure};
 use experiment::lots::Lot;
 use experiment::run_dir;
 use experiment::trials::Trial;
+use sim::map::Map;
+use sim::vehicle::VehicleSettings;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -21,9 +23,22 @@ pub struct DrawnLots<'a> {
     pub overwrite: bool,
 }
 
+/// A lot of a trial, under the name of its files.
+#[derive(Debug)]
+pub struct DrawnLot {
+    /// Without an extension.
+    pub name: String,
+    /// What its TOML file says.
+    pub toml: String,
+    /// The same, to be driven on.
+    pub map: Map,
+    /// Draws the generator needed, this one included; `None` if it was not generated.
+    pub attempts: Option<u32>,
+}
+
 impl DrawnLots<'_> {
     /// Name of the files of a lot, without an extension.
-    pub fn name(&self, trial: &Trial<'_>) -> String {
+    fn name(&self, trial: &Trial<'_>) -> String {
         let name = match (trial.lot.is_drawn_per_trial(), self.count) {
             (false, _) => trial.lot.name().to_owned(),
             (true, 1) => format!("{}-s{}", trial.lot.name(), self.seed),
@@ -33,8 +48,33 @@ impl DrawnLots<'_> {
     }
 
     /// The TOML and the PNG file of a name.
-    pub fn files(&self, name: &str) -> [PathBuf; 2] {
+    fn files(&self, name: &str) -> [PathBuf; 2] {
         ["toml", "png"].map(|extension| self.out.join(format!("{name}.{extension}")))
+    }
+
+    /// Draws the lot of a trial.
+    ///
+    /// # Errors
+    /// If the car cannot drive there.
+    pub fn draw(&self, trial: &Trial<'_>, vehicle: &VehicleSettings) -> anyhow::Result<DrawnLot> {
+        let name = self.name(trial);
+        let mut drawn = trial.lot.draw(trial.seed);
+        // The file is a lot of its own, told apart from its siblings in tables.
+        drawn.scenario.name.clone_from(&name);
+        let toml = drawn.to_toml();
+        let map = Map::build(drawn.scenario, vehicle).with_context(|| name.clone())?;
+        Ok(DrawnLot { name, toml, map, attempts: drawn.attempts })
+    }
+
+    /// Writes the two files of a lot, and returns the TOML file. `px_per_m`: of the picture, by default as fits 1600 pixels.
+    ///
+    /// # Errors
+    /// If the picture would be too large, or a file cannot be written.
+    pub fn write(&self, drawn: &DrawnLot, vehicle: &VehicleSettings, px_per_m: Option<f32>) -> anyhow::Result<PathBuf> {
+        let [toml, png] = self.files(&drawn.name);
+        storage::whole::write(&png, &lot::top_view(&drawn.map, vehicle, px_per_m)?.to_png()?)?;
+        storage::whole::write(&toml, drawn.toml.as_bytes())?;
+        Ok(toml)
     }
 
     /// Refuses lots whose files are there, would be those of another one or what a lot is made of, or would lie within a

@@ -5,7 +5,7 @@
 //! | [`markdown`], [`summary`], [`table1`], [`failures`], [`tuning`], [`pixel_accuracy`], [`replays`], [`what_if`] | tables as Markdown |
 //! | [`plots`] | plots as SVG |
 //! | [`pictures`] | lots, drives, samples and noise as PNG and SVG |
-//! | [`drawn_lots`] | the files that lots are written to, and what they must not replace |
+//! | [`drawn_lots`] | lots drawn and written to files, and what they must not replace |
 //! | [`page`], [`glossary`] | one HTML page that loads nothing, and what its words mean |
 //! | [`run_report`], [`moments`] | `report.html` of a run, with its worst near-collisions |
 //! | [`reproduction`] | the report of `reproduce` |

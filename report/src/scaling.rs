@@ -12,10 +12,10 @@ use evaluation::scaling::{self, Extent};
 use evaluation::stage::Stage;
 use evaluation::summary::csv_of;
 use evaluation::table1::Table1;
-use experiment::lots::Lot;
+use experiment::lots::{self, Lot};
 use experiment::settings::Settings;
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// What was trained on so many lots, on lots of one kind or on all of them.
@@ -73,11 +73,8 @@ const LEGEND: &str = "Of one training of each, with as many drives and optimiser
 fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path) -> anyhow::Result<Vec<Row>> {
     let drive = DriveStage::load(stages.last().context("the last stage drives")?)?;
     let results = EvaluationResults::read(&drive.plan(), &root.join(scaling::DRIVES))?;
-    let kinds = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
-    let mut of_kind: BTreeMap<String, usize> = BTreeMap::new();
-    for lot in kinds.iter().filter(|lot| lot.is_generated()) {
-        *of_kind.entry(lot.group()).or_default() += 1;
-    }
+    let listed = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
+    let of_a_kind = lots::generated_by_kind(&listed);
     let judge = |slice| {
         let (estimates, _) = results.judge(0, &slice, 0, drive.settings().evaluation.seed);
         (slice, estimates)
@@ -88,8 +85,8 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path) -> 
         let folder = root.join(scaling::folder(different));
         let table1 = Table1::read(&folder)?.with_context(|| format!("{}: no table1.json", folder.display()))?;
         let samples = [table1.rows.first(), table1.rows.last()].map(|row| row.map_or(0, |row| row.dataset));
-        let lots_met =
-            [1, table1.rows.len()].map(|rounds| scaling::lots_met(of_kind.values().copied(), different, rounds));
+        let lots_met = [1, table1.rows.len()]
+            .map(|rounds| scaling::lots_met(of_a_kind.values().map(|&listed| listed as usize), different, rounds));
         for (part, method) in [BC, DAGGER].into_iter().enumerate() {
             // A training meets no more lots than its rounds list: of as many samples it is the same network again.
             let is_known =

@@ -4,6 +4,7 @@
 //! The ground on which the middle of the car has room is measured from the route on, around walls. What lies far enough
 //! from it is on a branch, whose mouth is where the shortest way back comes near the route.
 
+use crate::neighbours;
 use crate::open_list::Open;
 use sim::geometry::{Vec2, distance_to_segment};
 use sim::map::Map;
@@ -109,11 +110,11 @@ fn closes(with_kerb: &Scenario, branch: &Branch, vehicle: &VehicleSettings) -> b
 /// The lot with a kerb across a branch, for each place along it, shortest kerb first.
 fn kerbs<'a>(map: &'a Map, branch: &Branch) -> impl Iterator<Item = Scenario> + use<'a> {
     let route: Vec<Vec2> = map.path().poses().iter().map(|pose| pose.position()).collect();
-    let is_beside_route =
+    let keeps_off_route =
         |&(a, b): &(Vec2, Vec2)| route.iter().all(|&point| distance_to_segment(point, a, b) > KERB_BESIDE_M);
     let by_length = |a: &(Vec2, Vec2), b: &(Vec2, Vec2)| a.0.distance(a.1).total_cmp(&b.0.distance(b.1));
     let shortest_at = |&point: &Vec2| {
-        (0..KERB_DIRECTIONS).filter_map(|k| chord(map, point, k)).filter(is_beside_route).min_by(by_length)
+        (0..KERB_DIRECTIONS).filter_map(|k| chord(map, point, k)).filter(keeps_off_route).min_by(by_length)
     };
     let mut sorted: Vec<_> = branch.way.iter().filter_map(shortest_at).collect();
     sorted.sort_by(by_length);
@@ -195,14 +196,8 @@ impl GroundFromRoute {
             if from_route_m > ground.cells[cell].from_route_m {
                 continue;
             }
-            let (col, row) = ((cell % cols) as i32, (cell / cols) as i32);
-            for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)] {
-                let (x, y) = (col + dx, row + dy);
-                if x < 0 || y < 0 || x >= cols as i32 || y >= rows as i32 {
-                    continue;
-                }
-                let next = y as usize * cols + x as usize;
-                let total_m = from_route_m + CELL_M * ((dx * dx + dy * dy) as f32).sqrt();
+            for (next, cells) in neighbours::around(cell, cols, rows) {
+                let total_m = from_route_m + CELL_M * cells;
                 if total_m < ground.cells[next].from_route_m && map.signed_distance_m(ground.centre(next)) >= room_m {
                     ground.cells[next] =
                         Cell { from_route_m: total_m, parent: cell, station: ground.cells[cell].station };

@@ -522,5 +522,37 @@ fn contains_convex(outline: &[Vec2], point: Vec2) -> bool {
 /// Whether two segments share a point.
 pub(crate) fn segments_cross(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> bool {
     let side = |p: Vec2, q: Vec2, r: Vec2| (q - p).perp_dot(r - p);
-    side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) <= 0.0
+    let (of_c, of_d, of_a, of_b) = (side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b));
+    if [of_c, of_d, of_a, of_b] == [0.0; 4] {
+        // On one line, no side tells: they share a point where the boxes around them do.
+        return a.min(b).cmple(c.max(d)).all() && c.min(d).cmple(a.max(b)).all();
+    }
+    of_c * of_d <= 0.0 && of_a * of_b <= 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two on one line counted as crossing however far apart they are.
+    #[test]
+    fn segments_cross_where_they_share_a_point() {
+        let table = [
+            ("in the middle", [(0.0, 0.0), (2.0, 2.0), (0.0, 2.0), (2.0, 0.0)], true),
+            ("an end on the other", [(0.0, 0.0), (2.0, 0.0), (1.0, 0.0), (1.0, 3.0)], true),
+            ("parallel", [(0.0, 0.0), (2.0, 0.0), (0.0, 1.0), (2.0, 1.0)], false),
+            ("beyond the end of one", [(0.0, 0.0), (2.0, 0.0), (3.0, -1.0), (3.0, 1.0)], false),
+            ("on one line, apart", [(0.0, 0.0), (2.0, 1.0), (4.0, 2.0), (6.0, 3.0)], false),
+            ("on one line, end to end", [(0.0, 0.0), (2.0, 1.0), (2.0, 1.0), (6.0, 3.0)], true),
+            ("one within the other", [(0.0, 0.0), (6.0, 0.0), (2.0, 0.0), (4.0, 0.0)], true),
+            ("a point on it", [(1.0, 0.0), (1.0, 0.0), (0.0, 0.0), (2.0, 0.0)], true),
+            ("a point before it", [(-1.0, 0.0), (-1.0, 0.0), (0.0, 0.0), (2.0, 0.0)], false),
+        ];
+        for (what, points, expected) in table {
+            let [a, b, c, d] = points.map(Vec2::from);
+            for (a, b, c, d) in [(a, b, c, d), (b, a, c, d), (a, b, d, c), (c, d, a, b)] {
+                assert_eq!(segments_cross(a, b, c, d), expected, "{what}");
+            }
+        }
+    }
 }

@@ -14,6 +14,7 @@
 //! | [`chicanes`] | roads with barriers from either side in turn |
 //! | [`strip`] | the ground: a centre line of straight pieces, arcs and corners, its edges and their notches |
 //! | [`course`] | how centre lines are drawn |
+//! | [`winding`] | what yards and chicanes have in common: ground of one width that winds, and its edge |
 //! | [`walls`] | walls and kerbs along outlines, with free ground behind |
 //! | [`things`] | what stands in the way and what it leaves free |
 //! | [`route`] | the reference path through that |
@@ -34,6 +35,7 @@ mod strip;
 mod things;
 mod track;
 mod walls;
+mod winding;
 mod yards;
 
 use crate::split::Family;

@@ -21,6 +21,7 @@ mod families;
 pub mod generator;
 pub mod import;
 pub mod load;
+mod neighbours;
 pub mod note;
 mod open_list;
 pub mod reference;

@@ -4,6 +4,7 @@
 //! has its own exact footprint test. A waypoint is free when the body, larger by a clearance all round, stands free there,
 //! and the body 0.5 m farther along the present arc too (with a margin): the near-collision rule looks that far ahead.
 
+use crate::neighbours;
 use crate::open_list::Open;
 use sim::geometry::{Pose, Vec2, distance_to_segment, edges};
 use sim::maths;
@@ -433,7 +434,6 @@ impl DistanceToGo {
         // The front axle is at the source when the rear axle reaches the finish.
         let beyond = goal.point + goal.direction * vehicle.wheelbase_m;
         let source = if scene.clearance_m(beyond) > half_width_m { beyond } else { goal.point };
-        let cols = to_go.cols as i32;
         let mut open = BinaryHeap::new();
         let first = to_go.index(source);
         to_go.values[first] = 0.0;
@@ -443,18 +443,12 @@ impl DistanceToGo {
             if estimate > to_go.values[node] {
                 continue;
             }
-            for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)] {
-                let (x, y) = (node as i32 % cols + dx, node as i32 / cols + dy);
-                if x < 0 || y < 0 || x >= cols || y >= to_go.rows as i32 {
-                    continue;
-                }
-                let next = (y * cols + x) as usize;
+            for (next, cells) in neighbours::around(node, to_go.cols, to_go.rows) {
                 let clearance_m = scene.clearance_m.values[next];
                 if clearance_m < half_width_m - Scene::SLACK_M || closed.contains(&next) {
                     continue;
                 }
-                let length_m = Scene::NODE_M * ((dx * dx + dy * dy) as f32).sqrt();
-                let total = estimate + length_m * (1.0 + 0.4 * (1.8 - clearance_m).max(0.0));
+                let total = estimate + Scene::NODE_M * cells * (1.0 + 0.4 * (1.8 - clearance_m).max(0.0));
                 if total < to_go.values[next] {
                     to_go.values[next] = total;
                     open.push(Open { estimate: total, node: next as u32 });

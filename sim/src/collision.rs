@@ -195,8 +195,8 @@ impl BodyBox {
         self.discs_in_ego.iter().all(|&discs| distance.at_four(world_from_ego.four_points(discs)).simd_gt(keep_m).all())
     }
 
-    /// Distance from the body outline to the nearest non-drivable point, metres; negative when they overlap, capped
-    /// at 3 m. Measured at outline points, hence too large where a corner points between two of them: by 10 cm at most,
+    /// Distance from the body outline to the nearest non-drivable point, metres, capped at 3 m; negative where something
+    /// reaches across the outline, but not for what is wholly beneath the body. Measured at outline points, hence too large where a corner points between two of them: by 10 cm at most,
     /// and by 2.5 cm where it is below 0.3 m; beside corners the raster adds up to 3 cm.
     pub fn clearance_m(&self, distance: &DistanceField, pose: Pose) -> f32 {
         let world_from_ego = pose.world_from_ego();

@@ -17,7 +17,7 @@ use crate::driver::{Decision, Driver, GroundTruth, Seat, Situation, Source};
 use crate::frame::{Ending, Event, Frame, FrameSink};
 use crate::geometry::Pose;
 use crate::map::Map;
-use crate::metrics::{EpisodeMetrics, MetricsAccumulator, MetricsSettings, SafeRing};
+use crate::metrics::{EpisodeMetrics, MetricsAccumulator, MetricsSettings, SafeRing, Undecided};
 use crate::seed::RootSeed;
 use crate::sensing::noise::NoiseSettings;
 use crate::sensing::{Observation, SensingSettings, Sensor};
@@ -116,6 +116,7 @@ pub struct Episode {
     map: Arc<Map>,
     body: Arc<BodyBox>,
     ring: Arc<SafeRing>,
+    undecided: Undecided,
     sensor: Sensor,
     vehicle: VehicleState,
     phase: Phase,
@@ -175,6 +176,7 @@ impl Episode {
         let sensor = Sensor::new(&map, settings.sensing.clone(), &settings.noise, seed);
         Self {
             body,
+            undecided: ring.undecided(),
             ring,
             sensor,
             vehicle: VehicleState::at_rest(map.start()),
@@ -334,7 +336,7 @@ impl Episode {
             decision,
             command,
             progress_m: self.progress_m,
-            safe_ratio: self.ring.safe_ratio(distance, seen_from.pose),
+            safe_ratio: self.ring.safe_ratio(distance, seen_from.pose, &mut self.undecided),
             clearance_m: self.body.clearance_m(distance, seen_from.pose),
             driven_m: 0.0,
             contacts: 0,

@@ -6,6 +6,19 @@
 //! recordings read frames only; nothing flows backwards.
 //!
 //! This crate knows no sibling, no burn, no rerun, no clap and no files.
+//!
+//! | module | |
+//! |---|---|
+//! | [`scenario`], [`validate`] | what a lot consists of, and what is refused |
+//! | [`map`], [`path`], [`distance_field`], [`collision`] | a lot as it is driven on: its route, distances, exact collisions |
+//! | [`sensing`] | what the car sees: view, occlusion, noise, grid |
+//! | [`driver`], [`action_smoothing`] | who drives, and the mean over a driver's answers |
+//! | [`controller`], [`vehicle`] | from the answer to the command, and from the command to the motion |
+//! | [`episode`], [`batch`], [`frame`] | the closed loop of one car or many, and what it puts out |
+//! | [`metrics`] | what is measured |
+//! | [`seed`] | named random streams |
+//! | [`limits`] | the largest inputs |
+//! | [`geometry`], [`maths`], [`vectors`] | points and poses, functions that round alike everywhere, four numbers at a time |
 
 pub mod action_smoothing;
 pub mod batch;

@@ -80,6 +80,14 @@ pub struct SafeRing {
     pixel_m: f32,
 }
 
+/// The squares of a [`SafeRing`] whose centre does not tell whether they are drivable. A car keeps it from tick to tick: it
+/// has room for all of them.
+#[derive(Debug, Clone)]
+pub struct Undecided {
+    blocks: Picked,
+    quarters: Picked,
+}
+
 /// Four squares of pixels, of which only those in the range count.
 #[derive(Debug, Clone, Copy)]
 struct FourSquares {
@@ -162,22 +170,29 @@ impl SafeRing {
         self.n_pixels
     }
 
-    /// Share of the range that is drivable, 0…1: N_dri / N_ran; 1 of a range that holds no pixel.
-    pub fn safe_ratio(&self, distance: &DistanceField, pose: Pose) -> f32 {
+    /// Room for any of its squares to be left undecided.
+    pub fn undecided(&self) -> Undecided {
+        Undecided { blocks: Picked::up_to(self.quarters.len()), quarters: Picked::up_to(self.pixels.len()) }
+    }
+
+    /// Share of the range that is drivable, 0…1: N_dri / N_ran; 1 of a range that holds no pixel. What `undecided` held
+    /// before does not count.
+    pub fn safe_ratio(&self, distance: &DistanceField, pose: Pose, undecided: &mut Undecided) -> f32 {
         let (world_from_ego, pixel_m) = (pose.world_from_ego(), self.pixel_m);
         // Where the centre is farther from a boundary than the pixels are from it, one look-up decides.
         let to_corner_m = |side: u8| std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (f32::from(side) - 1.0);
         let block_m = f32x4::splat(change_max_m(to_corner_m(BLOCK)));
         let quarter_m = f32x4::splat(interpolated_change_max_m(to_corner_m(QUARTER)));
         let mut n_drivable = f32x4::ZERO;
-        let mut unsure_blocks = Picked::up_to(self.quarters.len());
+        let Undecided { blocks: unsure_blocks, quarters: unsure_quarters } = undecided;
+        unsure_blocks.clear();
+        unsure_quarters.clear();
         for (i, blocks) in self.blocks.iter().enumerate() {
             let centres_m = distance.at_four_nearest_nodes(world_from_ego.four_points(blocks.centres));
             let (n_pixels, unsure) = blocks.surely_drivable(centres_m, block_m);
             n_drivable += n_pixels;
             unsure_blocks.pick(i * LANES, unsure);
         }
-        let mut unsure_quarters = Picked::up_to(unsure_blocks.iter().len() * LANES);
         for block in unsure_blocks.iter() {
             let quarters = &self.quarters[block];
             let centres_m = distance.at_four(world_from_ego.four_points(quarters.centres));
@@ -376,7 +391,7 @@ mod tests {
             let half = 0.5 * width_m;
             let lane = [Vec2::new(-30.0, -half), Vec2::new(30.0, -half), Vec2::new(30.0, half), Vec2::new(-30.0, half)];
             let distance = DistanceField::of_boundary(&lane);
-            let ratio = ring().safe_ratio(&distance, Pose::default());
+            let ratio = ring().safe_ratio(&distance, Pose::default(), &mut ring().undecided());
             assert!((ratio - expected).abs() < 0.02, "{width_m} m: {ratio}, expected {expected}");
         }
     }
@@ -387,9 +402,14 @@ mod tests {
         let distance = DistanceField::of_boundary(&lane);
         // Small pixels make more than ten thousand blocks; from 8192 on others were looked at.
         let of_pixels = |pixel_m| SafeRing::new(&VehicleSettings::hyundai_hg300(), &MetricsSettings::paper(), pixel_m);
-        let rings = [of_pixels(0.06), of_pixels(0.01)];
-        assert!(rings[1].quarters.len() > 8192, "{} blocks", rings[1].quarters.len());
-        for (i, ring) in (0..40).zip(rings.iter().cycle()) {
+        let mut rings = [0.06, 0.01].map(|pixel_m| {
+            let ring = of_pixels(pixel_m);
+            let undecided = ring.undecided();
+            (ring, undecided)
+        });
+        assert!(rings[1].0.quarters.len() > 8192, "{} blocks", rings[1].0.quarters.len());
+        for i in 0..40 {
+            let (ring, undecided) = &mut rings[i % 2];
             let pose = Pose::new(Vec2::new(-4.0 + 0.2 * i as f32, 0.1), 0.02 * i as f32);
             let world_from_ego = pose.world_from_ego();
             let pixels = ring.pixels.iter().flat_map(|FourSquares { centres, n_pixels }| {
@@ -397,7 +417,7 @@ mod tests {
                 (0..LANES).filter(move |&i| n_pixels[i] == 1.0).map(move |i| Vec2::new(xs[i], ys[i]))
             });
             let brute = pixels.filter(|&pixel| distance.at(world_from_ego.point(pixel)) > 0.0).count();
-            assert_eq!(ring.safe_ratio(&distance, pose), brute as f32 / ring.n_pixels() as f32);
+            assert_eq!(ring.safe_ratio(&distance, pose, undecided), brute as f32 / ring.n_pixels() as f32);
         }
     }
 
@@ -407,7 +427,8 @@ mod tests {
         let ring = SafeRing::new(&VehicleSettings::hyundai_hg300(), &settings, 0.06);
         let lane = [Vec2::new(-9.0, -1.3), Vec2::new(9.0, -1.3), Vec2::new(9.0, 1.3), Vec2::new(-9.0, 1.3)];
         assert_eq!(ring.n_pixels(), 0);
-        assert_eq!(ring.safe_ratio(&DistanceField::of_boundary(&lane), Pose::default()), 1.0);
+        let distance = DistanceField::of_boundary(&lane);
+        assert_eq!(ring.safe_ratio(&distance, Pose::default(), &mut ring.undecided()), 1.0);
     }
 
     #[test]

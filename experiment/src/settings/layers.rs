@@ -141,14 +141,16 @@ fn explain(key: &str, message: &str) -> String {
         .map(|candidate| (strsim::jaro_winkler(wrong, candidate), candidate))
         .filter(|(likeness, _)| *likeness > 0.8)
         .max_by(|(a, _), (b, _)| a.total_cmp(b));
-    let hint = nearest.map(|(_, candidate)| format!("; did you mean {candidate:?}?")).unwrap_or_default();
-    let (what, place) = if message.contains("unknown variant") {
-        ("value", format!("{key} takes"))
-    } else {
-        let section = key.rsplit_once('.').map(|(section, _)| format!("in {section}"));
-        ("key", format!("{} there are", section.as_deref().unwrap_or("at the top")))
-    };
-    format!("no {what} {wrong:?}{hint}; {place} {}", valid.join(", "))
+    let hint = nearest.map(|(_, candidate)| format!("did you mean {candidate:?}?"));
+    let valid = valid.join(", ");
+    if message.contains("unknown variant") {
+        let hint = hint.map(|hint| format!("{hint} ")).unwrap_or_default();
+        return format!("no value {wrong:?}; {hint}{key} takes {valid}");
+    }
+    let place = key.rsplit_once('.').map_or_else(|| "at the top".to_owned(), |(section, _)| format!("in {section}"));
+    // A question ends its sentence.
+    let there = hint.map_or_else(|| "there".to_owned(), |hint| format!("{hint} There"));
+    format!("no key {wrong:?} {place}; {there} are {valid}")
 }
 
 /// Lays `changes` over `tree`.
@@ -249,7 +251,21 @@ mod tests {
     fn an_unknown_value_is_told_what_its_setting_takes() {
         let layers = Layers { overrides: vec!["dagger.rule=hgdagger".to_owned()], ..Layers::default() };
         let refused = Settings::resolve(&layers, None).unwrap_err().to_string();
-        assert!(refused.contains("no value \"hgdagger\"; did you mean \"hg_dagger\"?"), "{refused}");
-        assert!(refused.contains("; dagger.rule takes all_below, ") && !refused.contains("there are"), "{refused}");
+        let told = "no value \"hgdagger\"; did you mean \"hg_dagger\"? dagger.rule takes all_below, ";
+        assert!(refused.contains(told) && !refused.contains("ere are"), "{refused}");
+    }
+
+    /// "did you mean "eta"?; in dagger there are" was one sentence with a question in its middle.
+    #[test]
+    fn an_unknown_key_is_told_what_there_is_after_the_question_which_one_is_meant() {
+        for (key, told) in [
+            ("dagger.etta", "no key \"etta\" in dagger; did you mean \"eta\"? There are "),
+            ("dager.eta", "no key \"dager\" at the top; did you mean \"dagger\"? There are "),
+            ("dagger.xyz", "no key \"xyz\" in dagger; there are "),
+        ] {
+            let layers = Layers { overrides: vec![format!("{key}=0.8")], ..Layers::default() };
+            let refused = Settings::resolve(&layers, None).unwrap_err().to_string();
+            assert!(refused.contains(told), "{refused}");
+        }
     }
 }

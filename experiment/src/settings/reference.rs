@@ -200,7 +200,7 @@ pub fn explain(key: &str) -> anyhow::Result<String> {
     let order = |a: &&Entry, b: &&Entry| likeness(a).total_cmp(&likeness(b)).then_with(|| is_used(a).cmp(&is_used(b)));
     let nearest = entries().iter().max_by(order).filter(|entry| likeness(entry) > 0.8);
     let hint = nearest.map(|entry| format!("; did you mean {:?}?", entry.key)).unwrap_or_default();
-    bail!("no setting {key:?}{hint}; cargo xtask settings --all lists them")
+    bail!("no setting {key:?}; cargo xtask settings --all lists them{hint}")
 }
 
 fn explain_entry(entry: &Entry) -> String {

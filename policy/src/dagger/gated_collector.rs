@@ -117,11 +117,12 @@ impl GatedCollector {
             .collect()
     }
 
-    /// What a critic warns of at every seat, 0…1: the ahead axis of its answers, which mirror images share.
-    fn alarms(&self, seats: &[Seat<'_>]) -> Vec<f32> {
+    /// What a critic warns of at every seat, 0…1: the ahead axis of its answers, which mirror images share. `None` without
+    /// one.
+    fn alarms(&self, seats: &[Seat<'_>]) -> Option<Vec<f32>> {
+        let predictor = self.critic.as_ref()?;
         let grids: Vec<_> = seats.iter().map(|seat| &seat.situation.observation.grid).collect();
-        let answers = self.critic.as_ref().map(|critic| critic.predict(&grids));
-        answers.map_or_else(|| vec![0.0; seats.len()], |answers| answers.iter().map(critic::alarm).collect())
+        Some(predictor.predict(&grids).iter().map(critic::alarm).collect())
     }
 
     /// Lines 7 to 9: who drives a seat, and with which τ̂.
@@ -179,7 +180,8 @@ impl Fleet for GatedCollector {
                 continue;
             };
             // Lines 7 and 8.
-            let evidence = Evidence { disagreement, alarm: alarms[index], ..Evidence::new(&predicted, a_exp) };
+            let alarm = alarms.as_ref().map_or(0.0, |alarms| alarms[index]);
+            let evidence = Evidence { disagreement, alarm, ..Evidence::new(&predicted, a_exp) };
             self.tau_hat_sum += f64::from(evidence.discrepancy);
             self.seats[seat.episode].answers.push((evidence.discrepancy, a_exp));
             let novice = novice_decision(&predicted, self.geometry);

@@ -1,11 +1,10 @@
 //! Roads on which barriers from either side in turn make traffic wind: pieces of wall, containers, parked lorries, rows of
 //! cones, planters; at check points, on building sites, in streets where traffic is calmed.
 
-use super::course::{Course, first_apart};
-use super::parts::{RUN_OUT_M, driven_m, enclosed, things_on};
+use super::parts::driven_m;
 use super::strip::Strip;
 use super::things::{self, Rules, Things, side, yaw_rad};
-use super::walls::Wall;
+use super::winding::Winding;
 use crate::clutter::draw_car;
 use crate::corridor::{Side, to_millimetres};
 use rand::RngExt as _;
@@ -15,11 +14,15 @@ use sim::seed::Rng;
 use std::f32::consts::FRAC_PI_2;
 use std::ops::Range;
 
-const LENGTH_M: Range<f32> = 85.0..170.0;
-const WIDTH_M: Range<f32> = 5.5..12.0;
-/// Ground is free so far behind a wall, metres.
-const BEHIND_WALL_M: Range<f32> = 2.0..10.0;
-const RADIUS_M: Range<f32> = 25.0..80.0;
+const ROAD: Winding = Winding {
+    width_m: 5.5..12.0,
+    first_m: 20.0..60.0,
+    straight_m: 20.0..60.0,
+    bend_share: 0.5,
+    turn_deg: 10.0..60.0,
+    radius_m: 25.0..80.0,
+    solid_of_ten: 4,
+};
 /// What barriers leave free on a road of barriers that leave little, and of others, metres.
 const NARROW_M: Range<f32> = 3.0..3.8;
 const WIDE_M: Range<f32> = 3.8..5.5;
@@ -39,32 +42,7 @@ enum Barrier {
 }
 
 pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
-    let strip = first_apart(layout, 1.0, course)?;
-    let mut things = things_on(&strip);
-    barriers(&mut things, &strip, obstacles);
-    let wall = match layout.random_range(0..10) {
-        0..4 => None,
-        4..6 => Some(Wall::kerb()),
-        6..8 => Some(Wall::tall(layout)),
-        _ => Some(Wall::low(layout)),
-    };
-    let lot = enclosed(&strip, things, wall, BEHIND_WALL_M, layout);
-    Some((lot, strip))
-}
-
-fn course(rng: &mut Rng) -> Course {
-    let mut course = Course::new(rng.random_range(WIDTH_M));
-    let until_m = RUN_OUT_M + rng.random_range(LENGTH_M);
-    course.straight(RUN_OUT_M + rng.random_range(20.0..60.0));
-    while course.length_m() < until_m {
-        if rng.random_bool(0.5) {
-            let turn_rad = course.turn_rad(rng, 10.0..60.0, 100.0);
-            course.bend(rng.random_range(RADIUS_M), turn_rad);
-        }
-        course.straight(rng.random_range(20.0..60.0));
-    }
-    course.straight(RUN_OUT_M);
-    course
+    ROAD.draw(layout, obstacles, barriers)
 }
 
 /// One behind the other, mostly from the other side than the one before.

@@ -1,11 +1,9 @@
 //! Yards and squares: wide ground on which trees, fountains, benches, huts and cars stand apart, so that there is a choice of
 //! ways past them; no gap leaves it open whether the car fits.
 
-use super::course::{Course, first_apart};
-use super::parts::{RUN_OUT_M, enclosed, things_on};
 use super::strip::Strip;
 use super::things::{self, Rules, Things, side};
-use super::walls::Wall;
+use super::winding::Winding;
 use crate::clutter::draw_car;
 use crate::corridor::to_millimetres;
 use rand::RngExt as _;
@@ -16,11 +14,15 @@ use sim::seed::Rng;
 use std::f32::consts::{PI, TAU};
 use std::ops::Range;
 
-const LENGTH_M: Range<f32> = 85.0..170.0;
-const WIDTH_M: Range<f32> = 11.0..22.0;
-/// Ground is free so far behind a wall, metres.
-const BEHIND_WALL_M: Range<f32> = 2.0..10.0;
-const RADIUS_M: Range<f32> = 18.0..40.0;
+const GROUND: Winding = Winding {
+    width_m: 11.0..22.0,
+    first_m: 10.0..40.0,
+    straight_m: 15.0..60.0,
+    bend_share: 0.6,
+    turn_deg: 15.0..90.0,
+    radius_m: 18.0..40.0,
+    solid_of_ten: 5,
+};
 /// No two things are so far from each other, or from the edge, metres: the car is 1.86 m wide, and anything within 0.5 m
 /// of it is a near-collision.
 const DOUBTFUL_M: Range<f32> = 1.4..3.0;
@@ -34,32 +36,7 @@ enum Thing {
 }
 
 pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
-    let strip = first_apart(layout, 1.0, course)?;
-    let mut things = things_on(&strip);
-    scatter(&mut things, &strip, obstacles);
-    let wall = match layout.random_range(0..10) {
-        0..5 => None,
-        5..7 => Some(Wall::kerb()),
-        7..9 => Some(Wall::tall(layout)),
-        _ => Some(Wall::low(layout)),
-    };
-    let lot = enclosed(&strip, things, wall, BEHIND_WALL_M, layout);
-    Some((lot, strip))
-}
-
-fn course(rng: &mut Rng) -> Course {
-    let mut course = Course::new(rng.random_range(WIDTH_M));
-    let until_m = RUN_OUT_M + rng.random_range(LENGTH_M);
-    course.straight(RUN_OUT_M + rng.random_range(10.0..40.0));
-    while course.length_m() < until_m {
-        if rng.random_bool(0.6) {
-            let turn_rad = course.turn_rad(rng, 15.0..90.0, 100.0);
-            course.bend(rng.random_range(RADIUS_M), turn_rad);
-        }
-        course.straight(rng.random_range(15.0..60.0));
-    }
-    course.straight(RUN_OUT_M);
-    course
+    GROUND.draw(layout, obstacles, scatter)
 }
 
 /// Things anywhere, as many as stand clear of each other.

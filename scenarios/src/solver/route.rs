@@ -3,6 +3,7 @@
 //! The search of [`super::solve`] with a tight goal. If it fails, the error gives the reason and its place.
 
 use super::{CURVATURE_SHARE, DistanceToGo, Goal, NONE, Scene, Search, Waypoint};
+use crate::neighbours;
 use crate::open_list::Open;
 use geo::{Coord, LineString, Simplify as _};
 use sim::geometry::{Pose, Vec2};
@@ -179,18 +180,12 @@ fn bottleneck(scene: &Scene, from: Vec2, to: Vec2, closed: &BTreeSet<usize>) -> 
     // The queue gives the smallest estimate first: the widest way is the one with the smallest negative room.
     let mut open = BinaryHeap::from([Open { estimate: -room.values[first], node: first as u32 }]);
     parent[first] = first as u32;
-    let cols = room.cols as i32;
     while let Some(Open { estimate, node }) = open.pop() {
         let node = node as usize;
         if node == last {
             break;
         }
-        for (dx, dy) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-            let (x, y) = (node as i32 % cols + dx, node as i32 / cols + dy);
-            if x < 0 || y < 0 || x >= cols || y >= room.rows as i32 {
-                continue;
-            }
-            let next = (y * cols + x) as usize;
+        for next in neighbours::beside(node, room.cols, room.rows) {
             if parent[next] == NONE && !closed.contains(&next) {
                 parent[next] = node as u32;
                 open.push(Open { estimate: estimate.max(-room.values[next]), node: next as u32 });

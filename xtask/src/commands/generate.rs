@@ -13,8 +13,7 @@ use experiment::settings::NoiseChoice;
 use experiment::shard::Shard;
 use experiment::trials::{Purpose, Trial};
 use rayon::prelude::*;
-use report::drawn_lots::DrawnLots;
-use report::pictures::lot;
+use report::drawn_lots::{DrawnLot, DrawnLots};
 use scenarios::import::{self, MapLot};
 use sim::limits::TRIAL_MAX;
 use sim::map::Map;
@@ -207,23 +206,17 @@ struct Made {
 }
 
 fn write(args: &GenerateArgs, trial: &Trial<'_>) -> anyhow::Result<Made> {
-    let name = drawn_lots(args).name(trial);
-    let [toml, png] = drawn_lots(args).files(&name);
-    let mut drawn = trial.lot.draw(trial.seed);
-    // The file is a lot of its own, told apart from its siblings in tables.
-    drawn.scenario.name.clone_from(&name);
     let vehicle = VehicleSettings::hyundai_hg300();
-    let text = scenarios::load::to_toml(&drawn.scenario);
-    let map = Map::build(drawn.scenario, &vehicle).with_context(|| name.clone())?;
-    storage::whole::write(&png, &lot::top_view(&map, &vehicle, args.pixels_per_metre)?.to_png()?)?;
-    storage::whole::write(&toml, text.as_bytes())?;
+    let drawn = drawn_lots(args).draw(trial, &vehicle)?;
+    let toml = drawn_lots(args).write(&drawn, &vehicle, args.pixels_per_metre)?;
+    let DrawnLot { map, attempts, .. } = drawn;
     let (length_m, obstacles) = (map.path().length_m(), map.scenario().obstacles.len());
     // A route found for one way need not leave room at its finish to start back from there.
     let back = Map::build(map.scenario().clone().reversed(), &vehicle);
     let ways =
         back.err().map_or(String::new(), |error| format!("; --directions forward only: on the way back, {error}"));
     let line = format!("{} and .png: route {length_m:.1} m, {obstacles} obstacles{ways}", toml.display());
-    Ok(Made { attempts: drawn.attempts, line })
+    Ok(Made { attempts, line })
 }
 
 #[cfg(test)]
