@@ -172,7 +172,7 @@ impl Lot {
     pub fn notes(&self) -> Vec<Note> {
         match self.from_file.as_deref() {
             Some(FromFile { loaded, vehicle }) if loaded.is_by_hand => {
-                scenarios::load::junctions(&loaded.scenario, vehicle).into_iter().collect()
+                scenarios::load::junctions(&loaded.scenario, vehicle)
             }
             Some(FromFile { loaded, .. }) => loaded.notes.clone(),
             None => Vec::new(),

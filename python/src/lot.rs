@@ -79,7 +79,7 @@ impl Lot {
     }
 
     /// What the import of a map did and found, as ``cargo xtask generate`` says it; of a lot written by hand its
-    /// junctions; nothing for other lots.
+    /// junctions and short cuts; nothing for other lots.
     #[getter]
     fn notes(&self) -> &[String] {
         &self.notes

@@ -2,16 +2,18 @@
 //! it is not wrong, but the lot then measures luck.
 //!
 //! The ground on which the middle of the car has room is measured from the route on, around walls. What lies far enough
-//! from it is on a branch, whose mouth is where the shortest way back comes near the route.
+//! from it is on a branch, whose mouth is where the shortest way back comes near the route. Where ground that was reached
+//! from one place of the route meets ground reached from another, a way joins the two; one that is much shorter than the
+//! route between them is a short cut.
 
 use crate::neighbours;
 use crate::open_list::Open;
-use sim::geometry::{Vec2, distance_to_segment};
+use sim::geometry::{Pose, Vec2, distance_to_segment};
 use sim::map::Map;
 use sim::maths;
 use sim::scenario::{Island, KERB_MAX_M, Scenario};
 use sim::vehicle::VehicleSettings;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 
 /// Spacing of the raster, metres.
 const CELL_M: f32 = 0.25;
@@ -21,7 +23,17 @@ const ROOM_M: f32 = 0.05;
 const BESIDE_M: f32 = 4.0;
 /// A way that goes on for more than this is a branch, metres: longer than a stall, or the other half of a wide hall.
 const GOES_ON_M: f32 = 12.0;
-/// Ways that leave within this distance of the start or finish only go on where the route does not, metres.
+/// Ground farther than this from the route is on a branch, metres.
+const FAR_M: f32 = BESIDE_M + GOES_ON_M;
+/// A way back to the route is a short cut if it saves more than this, metres: as much as a branch goes on. The two ways past
+/// an obstacle, and a bend and its open inside, differ by less: where a route turns by a right angle, ways across that stay
+/// within [`FAR_M`] of it save less than 10 m.
+const SAVES_M: f32 = FAR_M;
+/// Lengths in the raster jump from cell to cell: a short cut is all ground that touches and on which ways save this share of
+/// [`SAVES_M`].
+const SAVES_SHARE: f32 = 0.5;
+/// Ways that leave within this distance of the start or finish only go on where the route does not, metres. One that leads
+/// from the finish on to the start is no short cut.
 const AT_END_M: f32 = 2.0;
 /// Mouths nearer to each other than this are one, metres.
 const SAME_MOUTH_M: f32 = 8.0;
@@ -51,8 +63,26 @@ pub(crate) struct Branch {
     way: Vec<Vec2>,
 }
 
-/// The ways that leave the route of a valid lot and go on, in order of the route.
-pub(crate) fn find(map: &Map, vehicle: &VehicleSettings) -> Vec<Branch> {
+/// A way that leads from the route back to it and is much shorter than the route between.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ShortCut {
+    /// Its middle, world metres.
+    pub(crate) middle: Vec2,
+    /// The places of the route that it joins, metres from the start, the nearer one first.
+    pub(crate) joins_m: [f32; 2],
+    /// The way from beside the route to beside the route, world metres.
+    way: Vec<Vec2>,
+}
+
+/// What a driver may take for the route, in order of the route.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Ways {
+    pub(crate) branches: Vec<Branch>,
+    pub(crate) short_cuts: Vec<ShortCut>,
+}
+
+/// The ways that leave the route of a valid lot and go on, or lead back to it soon.
+pub(crate) fn find(map: &Map, vehicle: &VehicleSettings) -> Ways {
     let ground = GroundFromRoute::measure(map, vehicle);
     let mut branches: Vec<Branch> = Vec::new();
     for branch in ground.ends().into_iter().map(|cell| ground.branch_to(cell)) {
@@ -61,31 +91,43 @@ pub(crate) fn find(map: &Map, vehicle: &VehicleSettings) -> Vec<Branch> {
         }
     }
     branches.sort_by(|a, b| a.arc_length_m.total_cmp(&b.arc_length_m));
-    branches
+    let mut short_cuts = ground.short_cuts();
+    short_cuts.sort_by(|a, b| a.joins_m[0].total_cmp(&b.joins_m[0]));
+    Ways { branches, short_cuts }
 }
 
-/// Closes the branches of a valid lot with kerbs, as far as walls on both sides are near enough. Returns where.
+/// Closes the branches of a valid lot, and then its short cuts, with kerbs, as far as walls on both sides are near enough.
+/// Returns where.
 pub(crate) fn close(lot: &mut Scenario, vehicle: &VehicleSettings) -> Vec<Vec2> {
     let mut closed = Vec::new();
-    // Branches that no kerb closes, and how many were closed when they were last tried.
-    let (mut open, mut closed_before) = (Vec::<Vec2>::new(), 0);
+    // Ways that no kerb closes, whether they are branches, and how many were closed when they were last tried.
+    let (mut open, mut closed_before) = (Vec::<(Vec2, bool)>::new(), 0);
     while closed.len() < KERBS_MAX
         && let Ok(map) = Map::build(lot.clone(), vehicle)
     {
         // A kerb may close several ways: look again after each. Every kerb that is tried costs a map.
-        let closing = find(&map, vehicle).into_iter().find_map(|branch| {
-            if open.iter().any(|mouth| is_same_mouth(*mouth, branch.mouth)) {
+        let ways = find(&map, vehicle);
+        let branches = ways.branches.iter().map(|branch| (branch.mouth, &branch.way, true));
+        let short_cuts = ways.short_cuts.iter().map(|short_cut| (short_cut.middle, &short_cut.way, false));
+        let closing = branches.chain(short_cuts).find_map(|(place, way, is_branch)| {
+            let is_this =
+                |&(other, is_other_branch): &(Vec2, bool)| is_other_branch == is_branch && is_same_mouth(other, place);
+            if open.iter().any(is_this) {
                 return None;
             }
-            let with_kerb = kerbs(&map, &branch).find(|lot| closes(lot, &branch, vehicle));
+            let is_closed = |left: &Ways| {
+                if is_branch { is_branch_closed(place, left) } else { is_short_cut_closed(&ways, left) }
+            };
+            let with_kerb = kerbs(&map, way)
+                .find(|lot| Map::build(lot.clone(), vehicle).is_ok_and(|map| is_closed(&find(&map, vehicle))));
             if with_kerb.is_none() {
-                open.push(branch.mouth);
+                open.push((place, is_branch));
             }
-            Some((branch.mouth, with_kerb?))
+            Some((place, with_kerb?))
         });
-        if let Some((mouth, with_kerb)) = closing {
+        if let Some((place, with_kerb)) = closing {
             *lot = with_kerb;
-            closed.push(mouth);
+            closed.push(place);
         } else if closed.len() > closed_before {
             // A kerb may end at another one that was not there before.
             closed_before = closed.len();
@@ -101,14 +143,19 @@ fn is_same_mouth(a: Vec2, b: Vec2) -> bool {
     a.distance(b) <= 0.5 * SAME_MOUTH_M
 }
 
-/// Whether a branch is none of a lot's any more.
-fn closes(with_kerb: &Scenario, branch: &Branch, vehicle: &VehicleSettings) -> bool {
-    Map::build(with_kerb.clone(), vehicle)
-        .is_ok_and(|map| find(&map, vehicle).iter().all(|other| !is_same_mouth(other.mouth, branch.mouth)))
+/// Whether no branch is left at a mouth.
+fn is_branch_closed(mouth: Vec2, left: &Ways) -> bool {
+    left.branches.iter().all(|other| !is_same_mouth(other.mouth, mouth))
 }
 
-/// The lot with a kerb across a branch, for each place along it, shortest kerb first.
-fn kerbs<'a>(map: &'a Map, branch: &Branch) -> impl Iterator<Item = Scenario> + use<'a> {
+/// Whether a kerb closed a short cut: across wide ground it only moves the way, and across a long way it may leave a dead end
+/// that is a branch.
+fn is_short_cut_closed(before: &Ways, left: &Ways) -> bool {
+    left.short_cuts.len() < before.short_cuts.len() && left.branches.len() <= before.branches.len()
+}
+
+/// The lot with a kerb across a way, for each place along it, shortest kerb first.
+fn kerbs<'a>(map: &'a Map, way: &[Vec2]) -> impl Iterator<Item = Scenario> + use<'a> {
     let route: Vec<Vec2> = map.path().poses().iter().map(|pose| pose.position()).collect();
     let keeps_off_route =
         |&(a, b): &(Vec2, Vec2)| route.iter().all(|&point| distance_to_segment(point, a, b) > KERB_BESIDE_M);
@@ -116,7 +163,7 @@ fn kerbs<'a>(map: &'a Map, branch: &Branch) -> impl Iterator<Item = Scenario> + 
     let shortest_at = |&point: &Vec2| {
         (0..KERB_DIRECTIONS).filter_map(|k| chord(map, point, k)).filter(keeps_off_route).min_by(by_length)
     };
-    let mut sorted: Vec<_> = branch.way.iter().filter_map(shortest_at).collect();
+    let mut sorted: Vec<_> = way.iter().filter_map(shortest_at).collect();
     sorted.sort_by(by_length);
     let mut chords: Vec<(Vec2, Vec2)> = Vec::new();
     for (a, b) in sorted {
@@ -155,6 +202,8 @@ struct GroundFromRoute {
     cells: Vec<Cell>,
     spacing_m: f32,
     n_stations: usize,
+    /// From the finish of a loop on to its start, metres; infinite if the route is none.
+    finish_to_start_m: f32,
 }
 
 #[derive(Clone, Copy)]
@@ -165,6 +214,14 @@ struct Cell {
     parent: usize,
     /// Index of the nearest pose of the route.
     station: usize,
+}
+
+/// Two neighbouring cells that were reached from different places of the route.
+#[derive(Clone, Copy)]
+struct Link {
+    cells: [usize; 2],
+    /// How much longer the route between the two places is than the way through the cells, metres.
+    saves_m: f32,
 }
 
 impl GroundFromRoute {
@@ -180,6 +237,7 @@ impl GroundFromRoute {
             cells: vec![nowhere; cols * rows],
             spacing_m: path.spacing_m(),
             n_stations: path.poses().len(),
+            finish_to_start_m: finish_to_start_m(path.poses()),
         };
         let mut open = BinaryHeap::new();
         for (station, pose) in path.poses().iter().enumerate() {
@@ -212,38 +270,118 @@ impl GroundFromRoute {
         self.low + (Vec2::new((cell % self.cols) as f32, (cell / self.cols) as f32) + 0.5) * CELL_M
     }
 
+    /// The cells around one, and how far each is from it, metres.
+    fn neighbours(&self, cell: usize) -> impl Iterator<Item = (usize, f32)> {
+        let around = neighbours::around(cell, self.cols, self.cells.len() / self.cols);
+        around.map(|(next, cells)| (next, CELL_M * cells))
+    }
+
     fn arc_length_m(&self, cell: usize) -> f32 {
         self.cells[cell].station as f32 * self.spacing_m
     }
 
+    fn length_m(&self) -> f32 {
+        (self.n_stations - 1) as f32 * self.spacing_m
+    }
+
+    /// Whether a cell was reached from one of the route's ends.
+    fn is_at_end(&self, cell: usize) -> bool {
+        !(AT_END_M..=self.length_m() - AT_END_M).contains(&self.arc_length_m(cell))
+    }
+
     /// The first cells that are far from the route and do not go on from one of its ends.
     fn ends(&self) -> Vec<usize> {
-        let far_m = BESIDE_M + GOES_ON_M;
-        let length_m = (self.n_stations - 1) as f32 * self.spacing_m;
         let is_end = |&cell: &usize| {
             let Cell { from_route_m, parent, .. } = self.cells[cell];
-            let between = AT_END_M..=length_m - AT_END_M;
             from_route_m.is_finite()
-                && from_route_m > far_m
-                && self.cells[parent].from_route_m <= far_m
-                && between.contains(&self.arc_length_m(cell))
+                && from_route_m > FAR_M
+                && self.cells[parent].from_route_m <= FAR_M
+                && !self.is_at_end(cell)
         };
         (0..self.cells.len()).filter(is_end).collect()
     }
 
     fn branch_to(&self, end: usize) -> Branch {
-        let (mut way, mut mouth) = (vec![end], end);
-        while let Some(&cell) = way.last()
-            && self.cells[cell].from_route_m > KERB_BESIDE_M
-        {
-            if self.cells[cell].from_route_m > BESIDE_M {
-                mouth = cell;
-            }
-            way.push(self.cells[cell].parent);
-        }
-        let way: Vec<Vec2> = way.into_iter().rev().map(|cell| self.centre(cell)).collect();
+        let way = self.way_to(end);
+        let mouth = way.iter().copied().find(|&cell| self.cells[cell].from_route_m > BESIDE_M).unwrap_or(end);
+        let way = way.into_iter().map(|cell| self.centre(cell)).collect();
         Branch { mouth: self.centre(mouth), arc_length_m: self.arc_length_m(end), way }
     }
+
+    /// The shortest way from beside the route to a cell.
+    fn way_to(&self, cell: usize) -> Vec<usize> {
+        let mut way = vec![cell];
+        while let Some(&last) = way.last()
+            && self.cells[last].from_route_m > KERB_BESIDE_M
+        {
+            way.push(self.cells[last].parent);
+        }
+        way.reverse();
+        way
+    }
+
+    /// The ways back to the route that save much and that no branch is part of, each where it saves most.
+    fn short_cuts(&self) -> Vec<ShortCut> {
+        let link_of = |cell: usize| Some((cell, self.link(cell)?));
+        let mut links: BTreeMap<usize, Link> = (0..self.cells.len()).filter_map(link_of).collect();
+        let mut short_cuts = Vec::new();
+        while let Some((first, mut best)) = links.pop_first() {
+            let mut touching = vec![first];
+            while let Some(cell) = touching.pop() {
+                for (next, _) in self.neighbours(cell) {
+                    if let Some(link) = links.remove(&next) {
+                        touching.push(next);
+                        best = if link.saves_m > best.saves_m { link } else { best };
+                    }
+                }
+            }
+            if best.saves_m > SAVES_M {
+                short_cuts.push(self.short_cut(best));
+            }
+        }
+        short_cuts
+    }
+
+    /// Where a cell meets one that was reached from another place of the route, if that may be part of a short cut.
+    fn link(&self, cell: usize) -> Option<Link> {
+        let from_route_m = self.cells[cell].from_route_m;
+        if from_route_m > FAR_M {
+            return None;
+        }
+        let links = self.neighbours(cell).filter_map(|(next, step_m)| {
+            let back_m = self.cells[next].from_route_m;
+            let saves_m = self.along_route_m(cell, next) - (from_route_m + step_m + back_m);
+            let is_link =
+                back_m <= FAR_M && saves_m > SAVES_SHARE * SAVES_M && !(self.is_at_end(cell) && self.is_at_end(next));
+            is_link.then_some(Link { cells: [cell, next], saves_m })
+        });
+        links.max_by(|a, b| a.saves_m.total_cmp(&b.saves_m))
+    }
+
+    /// How long the route is between the places that two cells were reached from, metres: of a loop, the shorter way round.
+    fn along_route_m(&self, a: usize, b: usize) -> f32 {
+        let between_m = (self.arc_length_m(a) - self.arc_length_m(b)).abs();
+        between_m.min(self.length_m() - between_m + self.finish_to_start_m)
+    }
+
+    fn short_cut(&self, Link { cells: [a, b], .. }: Link) -> ShortCut {
+        let mut joins_m = [a, b].map(|cell| self.arc_length_m(cell));
+        joins_m.sort_by(f32::total_cmp);
+        let across = self.way_to(a).into_iter().chain(self.way_to(b).into_iter().rev());
+        let cells: Vec<Vec2> = across.map(|cell| self.centre(cell)).collect();
+        // Half-way between cells as well: the walls beside a gap may be thinner than a cell.
+        let way = cells.windows(2).flat_map(|pair| [pair[0], pair[0].midpoint(pair[1])]).collect();
+        ShortCut { middle: self.centre(a).midpoint(self.centre(b)), joins_m, way }
+    }
+}
+
+/// From the finish of a loop on to its start, metres: not farther than ground belongs to a route, and in about the same
+/// direction. Infinite if the route is none.
+fn finish_to_start_m(poses: &[Pose]) -> f32 {
+    let (start, finish) = (poses[0], poses[poses.len() - 1]);
+    let apart_m = finish.position().distance(start.position());
+    let is_loop = apart_m <= BESIDE_M && finish.ahead().dot(start.ahead()) > 0.0;
+    if is_loop { apart_m } else { f32::INFINITY }
 }
 
 #[cfg(test)]
@@ -276,7 +414,7 @@ mod tests {
 
     fn mouths(lot: &Scenario) -> Vec<Vec2> {
         let map = Map::build(lot.clone(), &car()).unwrap();
-        find(&map, &car()).into_iter().map(|branch| branch.mouth).collect()
+        find(&map, &car()).branches.into_iter().map(|branch| branch.mouth).collect()
     }
 
     #[test]
@@ -317,5 +455,118 @@ mod tests {
             assert!((27.5..=32.5).contains(&corner.x) && (2.8..16.0).contains(&corner.y), "{corner}");
         }
         assert_eq!(close(&mut lot, &car()), [], "once is enough");
+    }
+
+    fn short_cuts(lot: &Scenario) -> Vec<ShortCut> {
+        let map = Map::build(lot.clone(), &car()).unwrap();
+        find(&map, &car()).short_cuts
+    }
+
+    fn block(low: (f32, f32), high: (f32, f32)) -> Island {
+        let polygon = [low, (high.0, low.1), high, (low.0, high.1)].map(Vec2::from).to_vec();
+        Island { polygon, height_m: KERB_MAX_M }
+    }
+
+    /// A route through a rectangle of ground, with corners of 5 m.
+    fn in_rectangle<const N: usize>(low: (f32, f32), high: (f32, f32), route: [(f32, f32); N]) -> Scenario {
+        let boundary = [low, (high.0, low.1), high, (low.0, high.1)];
+        Scenario::new("rectangle", boundary, route).with_corner_radius_m(5.0)
+    }
+
+    /// Two legs 12 m apart, joined at x = 60, and walls between them.
+    fn two_legs(walls: &[(f32, f32)]) -> Scenario {
+        let route = [(0.0, 0.0), (60.0, 0.0), (60.0, 12.0), (0.0, 12.0)];
+        let mut lot = in_rectangle((-10.0, -4.0), (66.0, 16.0), route);
+        lot.islands = walls.iter().map(|&(from, to)| block((from, 5.8), (to, 6.2))).collect();
+        lot
+    }
+
+    /// It leads back to the route, so that nothing on it is far away: it was not found.
+    #[test]
+    fn a_gap_between_two_legs_is_a_short_cut_and_a_wall_without_one_is_none() {
+        assert_eq!(short_cuts(&two_legs(&[(-9.7, 55.0)])), []);
+        let lot = two_legs(&[(-9.7, 25.0), (30.0, 55.0)]);
+        assert_eq!(mouths(&lot), [], "it is no branch");
+        let found = short_cuts(&lot);
+        let [short_cut] = &found[..] else { panic!("{found:?}") };
+        assert!(short_cut.middle.distance(Vec2::new(27.5, 6.0)) < 2.0, "{}", short_cut.middle);
+        // The route has 55 m, a bend of 17.7 m and 55 m.
+        let [from_m, to_m] = short_cut.joins_m;
+        assert!((from_m - 27.5).abs() < 2.5 && (to_m - (127.7 - 27.5)).abs() < 2.5, "{from_m} {to_m}");
+    }
+
+    #[test]
+    fn every_gap_is_a_short_cut_of_its_own() {
+        let lot = two_legs(&[(-9.7, 10.0), (15.0, 30.0), (35.0, 55.0)]);
+        let found = short_cuts(&lot);
+        let [a, b] = &found[..] else { panic!("{found:?}") };
+        assert!((a.middle.x - 12.5).abs() < 2.0 && (b.middle.x - 32.5).abs() < 2.0, "{found:?}");
+    }
+
+    /// The inside of a bend is none until it is long enough that turning early saves 16 m; then it is one, not many.
+    #[test]
+    fn the_open_inside_of_a_hairpin_is_one_short_cut() {
+        assert_eq!(short_cuts(&two_legs(&[(-9.7, 51.0)])), []);
+        assert_eq!(short_cuts(&two_legs(&[])).len(), 1);
+    }
+
+    #[test]
+    fn an_island_in_a_wide_road_is_no_short_cut_on_either_side() {
+        for end in [40.0, 60.0] {
+            let route = [(0.0, 0.0), (22.0, 0.0), (30.0, 4.5), (end, 4.5), (end + 8.0, 0.0), (80.0, 0.0)];
+            let mut lot = in_rectangle((-10.0, -7.0), (100.0, 7.0), route);
+            lot.islands = vec![block((30.0, -2.0), (end, 2.0))];
+            assert_eq!(short_cuts(&lot), [], "{end}");
+        }
+    }
+
+    /// A way of more than 32 m is two branches, and is named once.
+    #[test]
+    fn a_long_way_between_two_legs_is_two_branches_and_no_short_cut() {
+        let mut lot = in_rectangle((-10.0, -4.0), (86.0, 54.0), [(0.0, 0.0), (80.0, 0.0), (80.0, 50.0), (0.0, 50.0)]);
+        lot.islands = vec![block((-9.7, 5.0), (25.0, 45.0)), block((30.0, 5.0), (75.0, 45.0))];
+        assert_eq!(mouths(&lot).len(), 2);
+        assert_eq!(short_cuts(&lot), []);
+    }
+
+    /// The finish of a loop is beside its start, and a long route between them.
+    #[test]
+    fn a_loop_is_no_short_cut_from_its_finish_to_its_start() {
+        let around = [(25.0, 0.0), (50.0, 0.0), (50.0, 30.0), (0.0, 30.0), (0.0, 0.0), (22.5, 0.0)];
+        let mut lot = in_rectangle((-6.0, -6.0), (56.0, 36.0), around);
+        lot.islands = vec![block((6.0, 6.0), (44.0, 24.0))];
+        assert_eq!(short_cuts(&lot), []);
+        // It starts in the middle of a bend, whose open inside joins what comes soon after the start and before the finish.
+        let from_bend = [(0.0, 7.0), (0.0, 0.0), (50.0, 0.0), (50.0, 14.0), (0.0, 14.0), (0.0, 9.5)];
+        let mut lot = in_rectangle((-4.0, -4.0), (54.0, 18.0), from_bend);
+        lot.islands = vec![block((8.0, 4.0), (46.0, 10.0))];
+        assert_eq!(short_cuts(&lot), []);
+        // A gap across the middle is one.
+        lot.islands = vec![block((8.0, 4.0), (24.0, 10.0)), block((29.0, 4.0), (46.0, 10.0))];
+        assert_eq!(short_cuts(&lot).len(), 1);
+    }
+
+    /// Beyond the finish nothing is driven, so that a ring road may go on there to the start.
+    #[test]
+    fn what_joins_finish_and_start_is_no_short_cut() {
+        let route = [(10.0, 0.0), (40.0, 0.0), (40.0, 14.0), (0.0, 14.0), (0.0, 5.0)];
+        let mut lot = in_rectangle((-4.0, -4.0), (44.0, 18.0), route);
+        lot.islands = vec![block((4.0, 4.0), (36.0, 10.0))];
+        assert_eq!(short_cuts(&lot), []);
+    }
+
+    #[test]
+    fn a_gap_is_closed_by_a_kerb_and_open_ground_by_none() {
+        let mut lot = two_legs(&[(-9.7, 25.0), (30.0, 55.0)]);
+        let walls = lot.islands.len();
+        assert_eq!(close(&mut lot, &car()).len(), 1);
+        assert_eq!((short_cuts(&lot), mouths(&lot)), (vec![], vec![]));
+        let [kerb] = &lot.islands[walls..] else { panic!("{:?}", lot.islands) };
+        for corner in &kerb.polygon {
+            assert!((25.0..=30.0).contains(&corner.x) && (5.0..=7.0).contains(&corner.y), "{corner}");
+        }
+        let mut lot = two_legs(&[]);
+        assert_eq!(close(&mut lot, &car()), []);
+        assert_eq!((short_cuts(&lot).len(), lot.islands.len()), (1, 0));
     }
 }

@@ -14,7 +14,7 @@ mod tpcap;
 
 use crate::branches;
 use crate::error::{LoadError, read_text};
-use crate::note::{Loaded, Note};
+use crate::note::{Loaded, Note, ShortCut};
 use crate::solver;
 use crate::solver::route::{self, Finish, NoRoute};
 use frame::Frame;
@@ -86,7 +86,7 @@ pub struct MapLot {
     /// Occupied specks up to this size are taken for free ground, 0…100 m² in the lot; of a TPCAP case 0.
     #[serde(default)]
     pub drop_specks_m2: f64,
-    /// Whether ways that leave the route are closed with kerbs.
+    /// Whether ways that leave the route, and short cuts back to it, are closed with kerbs.
     #[serde(default)]
     pub close_branches: bool,
     /// Sensor noise of the lot.
@@ -249,9 +249,13 @@ impl MapLot {
             notes.extend((!mouths.is_empty()).then_some(Note::Closed { mouths }));
         }
         let map = Map::build(scenario.clone(), vehicle).map_err(|error| self.in_lot(error, frame))?;
-        let mouths = in_map(branches::find(&map, vehicle).into_iter().map(|branch| branch.mouth).collect());
+        let ways = branches::find(&map, vehicle);
+        let mouths = in_map(ways.branches.into_iter().map(|branch| branch.mouth).collect());
         let is_asked_to_close = self.close_branches;
         notes.extend((!mouths.is_empty()).then_some(Note::Open { mouths, is_asked_to_close }));
+        let noted = |way: branches::ShortCut| ShortCut { middle: frame.in_map(way.middle), joins_m: way.joins_m };
+        let short_cuts: Vec<_> = ways.short_cuts.into_iter().map(noted).collect();
+        notes.extend((!short_cuts.is_empty()).then_some(Note::ShortCuts { short_cuts, is_asked_to_close }));
         Ok(Loaded { scenario, files, notes, frame: frame.explained(), is_by_hand: false })
     }
 

@@ -3,11 +3,12 @@
 //!
 //! Whatever is wrong with a file is one error that names file, line and remedy.
 
-use crate::branches::{self, Branch};
+use crate::branches;
 use crate::error::{LoadError, Location, line_at, read_text};
 use crate::import::{self, MapLot};
-use crate::note::{Loaded, Note};
+use crate::note::{Loaded, Note, ShortCut};
 use serde::Deserialize as _;
+use sim::geometry::Vec2;
 use sim::limits::LOT_BYTES_MAX;
 use sim::map::Map;
 use sim::scenario::{Direction, Place, Scenario, ScenarioError};
@@ -44,14 +45,22 @@ pub fn load_with_notes(path: &Path, vehicle: &VehicleSettings) -> Result<Loaded,
     Ok(Loaded { scenario, files: vec![path.to_owned()], notes: Vec::new(), frame: None, is_by_hand: true })
 }
 
-/// The junctions of a lot written by hand, in a note; `None` if there are none, or the vehicle does not fit.
+/// The junctions and the short cuts of a lot written by hand, each in a note; none if there are none, or the vehicle does
+/// not fit.
 ///
 /// That takes as long as building its map, and longer: [`load_with_notes`] leaves it to whoever shows notes.
-pub fn junctions(scenario: &Scenario, vehicle: &VehicleSettings) -> Option<Note> {
-    let map = Map::build(scenario.clone(), vehicle).ok()?;
-    let mouth_of = |branch: Branch| [branch.mouth.x, branch.mouth.y].map(f64::from);
-    let mouths: Vec<_> = branches::find(&map, vehicle).into_iter().map(mouth_of).collect();
-    (!mouths.is_empty()).then_some(Note::OpenByHand { mouths })
+pub fn junctions(scenario: &Scenario, vehicle: &VehicleSettings) -> Vec<Note> {
+    let Ok(map) = Map::build(scenario.clone(), vehicle) else {
+        return Vec::new();
+    };
+    let ways = branches::find(&map, vehicle);
+    let place = |at: Vec2| [at.x, at.y].map(f64::from);
+    let mouths: Vec<_> = ways.branches.into_iter().map(|branch| place(branch.mouth)).collect();
+    let noted = |way: branches::ShortCut| ShortCut { middle: place(way.middle), joins_m: way.joins_m };
+    let short_cuts: Vec<_> = ways.short_cuts.into_iter().map(noted).collect();
+    let open = (!mouths.is_empty()).then_some(Note::OpenByHand { mouths });
+    let shorter = (!short_cuts.is_empty()).then_some(Note::ShortCutsByHand { short_cuts });
+    open.into_iter().chain(shorter).collect()
 }
 
 fn names_a_map(document: &Document<&str>) -> bool {
@@ -301,7 +310,7 @@ mod tests {
         assert!(files.len() >= 29, "{files:?}");
         for file in files {
             let loaded = load_with_notes(&file, &car).unwrap_or_else(|error| panic!("{error}"));
-            let is_open = |note: &Note| matches!(note, Note::Open { .. });
+            let is_open = |note: &Note| matches!(note, Note::Open { .. } | Note::ShortCuts { .. });
             assert!(!loaded.notes.iter().any(is_open), "{}: {:?}", file.display(), loaded.notes);
             let length_m = sim::path::Path::new(&loaded.scenario.reference_path).length_m();
             assert!((80.0..=300.0).contains(&length_m), "{}: {length_m} m", file.display());
@@ -316,7 +325,7 @@ mod tests {
     fn junctions_of_a_lot_written_by_hand_are_named() {
         let car = VehicleSettings::hyundai_hg300();
         let lane = parse(EXAMPLE, "slalom.toml", &car).expect("the example is sound");
-        assert_eq!(junctions(&lane, &car), None);
+        assert_eq!(junctions(&lane, &car), []);
         // A side street of 5 m, 27 m long.
         let lot = Scenario::new(
             "two streets",
@@ -332,11 +341,34 @@ mod tests {
             ],
             [(0.0, 0.0), (70.0, 0.0)],
         );
-        let note = junctions(&lot, &car).expect("a junction");
-        let Note::OpenByHand { mouths } = &note else { panic!("{note:?}") };
+        let notes = junctions(&lot, &car);
+        let [note @ Note::OpenByHand { mouths }] = &notes[..] else { panic!("{notes:?}") };
         assert!(mouths.len() == 1 && (mouths[0][0] - 30.0).abs() < 2.5, "{mouths:?}");
         assert!(note.to_string().starts_with("the route has 1 junction, near ("), "{note}");
         assert!(note.to_string().contains("islands or obstacles"), "{note}");
+    }
+
+    /// Nothing on such a way is far from the route: it was said of no lot.
+    #[test]
+    fn a_short_cut_of_a_lot_written_by_hand_is_named_with_what_it_leaves_out() {
+        let car = VehicleSettings::hyundai_hg300();
+        // Two legs 12 m apart, and walls between them.
+        let boundary = [(-10.0, -4.0), (66.0, -4.0), (66.0, 16.0), (-10.0, 16.0)];
+        let mut lot = Scenario::new("hairpin", boundary, [(0.0, 0.0), (60.0, 0.0), (60.0, 12.0), (0.0, 12.0)])
+            .with_corner_radius_m(5.0);
+        let wall = |from: f32, to: f32| sim::scenario::Island {
+            polygon: [(from, 5.8), (to, 5.8), (to, 6.2), (from, 6.2)].map(Vec2::from).to_vec(),
+            height_m: 0.15,
+        };
+        lot.islands = vec![wall(-9.7, 25.0), wall(30.0, 55.0)];
+        let notes = junctions(&lot, &car);
+        let [note @ Note::ShortCutsByHand { short_cuts }] = &notes[..] else { panic!("{notes:?}") };
+        assert_eq!(short_cuts.len(), 1);
+        let said = note.to_string();
+        assert!(said.starts_with("the route has 1 short cut, near (2") && said.contains(") from metre 2"), "{said}");
+        assert!(said.contains("may take the shorter way; close them with islands or obstacles"), "{said}");
+        lot.islands = vec![wall(-9.7, 55.0)];
+        assert_eq!(junctions(&lot, &car), []);
     }
 
     #[test]

@@ -10,12 +10,22 @@ pub struct Loaded {
     pub scenario: Scenario,
     /// Every file that was read: the lot's own, the map's, its image, its route.
     pub files: Vec<PathBuf>,
-    /// Notes in order of the work; none for a lot written by hand, whose junctions [`crate::load::junctions`] finds.
+    /// Notes in order of the work; none for a lot written by hand, whose junctions and short cuts
+    /// [`crate::load::junctions`] finds.
     pub notes: Vec<Note>,
     /// How its coordinates come from those of its map, in words; `None` if they are the same.
     pub frame: Option<String>,
     /// Whether it was written by hand, or by `cargo xtask generate`, and not made of a map.
     pub is_by_hand: bool,
+}
+
+/// A way that leads from a route back to it and is much shorter than the route between.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShortCut {
+    /// Its middle, as the places of the note.
+    pub middle: [f64; 2],
+    /// The places of the route that it joins, metres of the lot from the start, the nearer one first.
+    pub joins_m: [f32; 2],
 }
 
 /// Something an import did, or found. Places are metres in the map's own frame, or that of a lot written by hand.
@@ -72,10 +82,30 @@ pub enum Note {
         /// Where they leave it.
         mouths: Vec<[f64; 2]>,
     },
+    /// Ways lead from the route back to it and are much shorter than the route between.
+    ShortCuts {
+        /// Where, and from where to where.
+        short_cuts: Vec<ShortCut>,
+        /// Whether the lot asks for them to be closed: no kerb could be laid across these.
+        is_asked_to_close: bool,
+    },
+    /// The same in a lot written by hand.
+    ShortCutsByHand {
+        /// Where, and from where to where.
+        short_cuts: Vec<ShortCut>,
+    },
 }
 
 /// Places named in a note, at most.
 const PLACES_MAX: usize = 6;
+/// What helps against ways that no kerb closes.
+const DRAW_WALLS: &str =
+    "no kerb closes what is left, which is too wide or too near to the route: draw walls into the map there";
+/// What helps against ways on a map.
+const LAY_KERBS: &str = "close_branches = true (--close-branches of cargo xtask generate) closes such ways with kerbs";
+/// What helps against ways in a lot written by hand.
+const CLOSE_BY_HAND: &str = "close them with islands or obstacles; of a map, cargo xtask generate --close-branches \
+                             writes a lot with kerbs there";
 
 impl std::fmt::Display for Note {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -121,22 +151,18 @@ impl std::fmt::Display for Note {
             Self::Closed { mouths } => {
                 write!(f, "{} closed with kerbs, near {}", are(mouths.len(), "branch", "branches"), listed(mouths))
             }
-            Self::Open { mouths, is_asked_to_close: true } => f.write_str(&open(
-                mouths,
-                "no kerb closes what is left, which is too wide or too near to the route: draw walls into the map \
-                 there",
-            )),
-            Self::Open { mouths, is_asked_to_close: false } => f.write_str(&open(
-                mouths,
-                "close_branches = true (--close-branches of cargo xtask generate) closes branches with kerbs",
-            )),
-            Self::OpenByHand { mouths } => f.write_str(&open(
-                mouths,
-                "close them with islands or obstacles; of a map, cargo xtask generate --close-branches writes a lot \
-                 with kerbs there",
-            )),
+            Self::Open { mouths, is_asked_to_close } => f.write_str(&open(mouths, on_a_map(*is_asked_to_close))),
+            Self::OpenByHand { mouths } => f.write_str(&open(mouths, CLOSE_BY_HAND)),
+            Self::ShortCuts { short_cuts, is_asked_to_close } => {
+                f.write_str(&shorter(short_cuts, on_a_map(*is_asked_to_close)))
+            }
+            Self::ShortCutsByHand { short_cuts } => f.write_str(&shorter(short_cuts, CLOSE_BY_HAND)),
         }
     }
+}
+
+fn on_a_map(is_asked_to_close: bool) -> &'static str {
+    if is_asked_to_close { DRAW_WALLS } else { LAY_KERBS }
 }
 
 fn open(mouths: &[[f64; 2]], remedy: &str) -> String {
@@ -145,8 +171,23 @@ fn open(mouths: &[[f64; 2]], remedy: &str) -> String {
     format!("the route has {junctions}, near {places}: drivers do not see the route and may turn off there; {remedy}")
 }
 
+fn shorter(short_cuts: &[ShortCut], remedy: &str) -> String {
+    let count =
+        if short_cuts.len() == 1 { "1 short cut".to_owned() } else { format!("{} short cuts", short_cuts.len()) };
+    let said = |ShortCut { middle: [x, y], joins_m: [from_m, to_m] }: &ShortCut| {
+        format!("near ({x:.1}, {y:.1}) from metre {from_m:.0} to metre {to_m:.0}")
+    };
+    let places = first_of(short_cuts, said);
+    format!("the route has {count}, {places}: drivers do not see the route and may take the shorter way; {remedy}")
+}
+
 fn listed(places: &[[f64; 2]]) -> String {
-    let named: Vec<_> = places.iter().take(PLACES_MAX).map(|[x, y]| format!("({x:.1}, {y:.1})")).collect();
-    let more = places.len().saturating_sub(PLACES_MAX);
+    first_of(places, |[x, y]| format!("({x:.1}, {y:.1})"))
+}
+
+/// As many of a list as are named in a note, and how many are not.
+fn first_of<T>(list: &[T], said: impl Fn(&T) -> String) -> String {
+    let named: Vec<_> = list.iter().take(PLACES_MAX).map(said).collect();
+    let more = list.len().saturating_sub(PLACES_MAX);
     named.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }

@@ -627,6 +627,37 @@ fn junctions_of_a_map_are_named_and_closed_when_asked() {
     assert!(left.contains("no kerb closes what is left") && !left.contains("--close-branches"), "{left}");
 }
 
+/// Nothing on such a way is far from the route: it was neither named nor closed.
+#[test]
+fn a_gap_between_two_legs_on_a_map_is_named_and_closed_when_asked() {
+    // Ground of 76 m by 20 m with a wall along its middle, which leaves 10 m free at its end, and a gap of 5 m.
+    let is_wall = |x: usize, y: usize| {
+        let is_middle = (98..102).contains(&y) && x < 650 && !(350..400).contains(&x);
+        !(1..759).contains(&x) || !(1..201).contains(&y) || is_middle
+    };
+    let rows: Vec<String> =
+        (0..202).rev().map(|y| (0..760).map(|x| if is_wall(x, y) { '#' } else { '.' }).collect()).collect();
+    let line = "10,5\n70,5\n70,15\n10,15\n";
+    let folder =
+        folder("short-cut", &[("map.yaml", &yaml("0.1", "[0, 0, 0]")), ("map.pgm", &pgm(&rows)), ("line.csv", line)]);
+    let mut lot = MapLot::of_map(&folder.join("map.yaml"));
+    lot.centre_line = Some(folder.join("line.csv"));
+    let loaded = lot.scenario(&car()).unwrap();
+    let [note @ Note::ShortCuts { short_cuts, is_asked_to_close: false }] = &loaded.notes[..] else {
+        panic!("{:?}", loaded.notes)
+    };
+    let [ShortCut { middle: [x, y], joins_m: [from_m, to_m] }] = short_cuts[..] else { panic!("{short_cuts:?}") };
+    assert!((x - 37.5).abs() < 2.0 && (y - 10.0).abs() < 0.5, "({x}, {y})");
+    // The route has 55 m, a bend of 15.7 m and 55 m.
+    assert!((from_m - 27.5).abs() < 2.5 && (to_m - 98.2).abs() < 2.5, "{from_m} {to_m}");
+    assert!(note.to_string().contains("the shorter way; close_branches = true (--close-branches"), "{note}");
+    let walls = loaded.scenario.islands.len();
+    lot.close_branches = true;
+    let loaded = lot.scenario(&car()).unwrap();
+    let [Note::Closed { mouths }] = &loaded.notes[..] else { panic!("{:?}", loaded.notes) };
+    assert_eq!((mouths.len(), loaded.scenario.islands.len()), (1, walls + 1));
+}
+
 #[test]
 fn an_image_without_pixels_is_refused() {
     let lot = lane("no-pixels", 5);
