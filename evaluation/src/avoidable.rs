@@ -3,7 +3,7 @@
 
 use crate::evaluate::BATCH;
 use crate::monitor::{Incident, IncidentMonitor};
-use crate::records::{self, Driven, FailureRecord};
+use crate::records::{self, FailureRecord, RecordHeader};
 use crate::what_if::{Substitutes, Substitution};
 use anyhow::{Context as _, bail, ensure};
 use experiment::drive::TrialBatch;
@@ -136,7 +136,7 @@ fn read(file: &Path, lots: &[Lot], drivers: &[String]) -> anyhow::Result<Vec<Fai
     let index: BTreeMap<&str, usize> = lots.iter().enumerate().map(|(index, lot)| (lot.name(), index)).collect();
     let mut all: Vec<Failing> = Vec::new();
     records::each_line(file, |failure: FailureRecord| {
-        let Driven { driver, lot, direction, trial, noise, .. } = failure.driven;
+        let RecordHeader { driver, lot, direction, trial, noise, .. } = failure.header;
         if !drivers.is_empty() && !drivers.contains(&driver) {
             return Ok(());
         }

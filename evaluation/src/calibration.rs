@@ -5,6 +5,7 @@ use policy::dataset::Sample;
 
 /// Bins of an axis, each with the same number of samples.
 const BINS: usize = 10;
+
 /// Errors of one axis of the look-ahead point against the σ predicted for them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AxisCalibration {

@@ -4,7 +4,7 @@
 //! where it lies on the other, and cannot be told where it contains zero. Where there are several trainings of a recipe, the
 //! difference is that of their means, and its interval is for other lots and other seeds.
 
-use crate::format::{clustered, difference, exact_rate, interval, quoted_interval, quoted_rate};
+use crate::format::{clustered, difference, exact_rate, interval, quoted_interval, quoted_rate, rate_ratio};
 use crate::incidents::Cause;
 use crate::judge::{Comparison, DriverEstimate};
 use crate::names::{BC, DAGGER};
@@ -18,7 +18,7 @@ use crate::statistics::poisson::{CONFIDENCE, Rate, upper_bound};
 use crate::statistics::sample_size::Question;
 use crate::statistics::student::half_width_of_mean;
 use crate::totals::Totals;
-use crate::trainings::{self, JudgedTeams, TRAININGS_MIN, Team, TeamEstimate};
+use crate::trainings::{self, JudgedTeams, TRAININGS_MIN, TeamEstimate};
 use experiment::drivers::NamedDriver;
 use experiment::settings::Smoothing;
 use policy::dagger::IterationRow;
@@ -83,14 +83,14 @@ pub struct Statement {
 
 /// An evaluation that has been driven.
 #[derive(Debug, Clone, Copy)]
-pub struct Driven<'a> {
+pub struct DrivenPlan<'a> {
     /// The plan.
     pub plan: &'a Plan<'a>,
     /// Its results.
     pub results: &'a EvaluationResults,
 }
 
-impl Driven<'_> {
+impl DrivenPlan<'_> {
     /// Index of a driver.
     pub fn driver(&self, name: &str) -> Option<usize> {
         self.plan.drivers.iter().position(|driver| driver.name == name)
@@ -110,7 +110,7 @@ impl Driven<'_> {
         let slices = self.results.slices();
         match unseen[..] {
             [] => None,
-            [_] => (0..).zip(groups).find(|(_, f)| !f.is_trained_on).and_then(|(i, _)| slices.get(i as usize).cloned()),
+            [_] => groups.iter().position(|group| !group.is_trained_on).and_then(|at| slices.get(at).cloned()),
             _ => slices.into_iter().find(|slice| slice.kind == SliceKind::Unseen),
         }
     }
@@ -118,37 +118,37 @@ impl Driven<'_> {
     /// How all drivers compare with DAgger in a slice; `None` where it did not drive.
     pub fn against_dagger(&self, slice: Slice, place: &str) -> Option<Against<'_>> {
         let dagger = self.driver(DAGGER)?;
-        let (estimates, comparisons) = self.results.judge(0, &slice, dagger, self.plan.settings.evaluation.seed);
-        let trainings = self.judge_trainings(&slice);
-        let teams = trainings::teams(self.plan.drivers);
-        Some(Against {
-            driven: *self,
-            dagger,
-            slice,
-            place: place.to_owned(),
-            estimates,
-            comparisons,
-            teams,
-            trainings,
-        })
+        let (estimates, comparisons) = self.judge(&slice);
+        let teams = self.judge_teams(&slice, &estimates);
+        Some(Against { driven: *self, dagger, slice, place: place.to_owned(), estimates, comparisons, teams })
+    }
+
+    /// How every driver stands in a slice, and how the others compare with DAgger; with the first where that did not drive.
+    pub fn judge(&self, slice: &Slice) -> (Vec<DriverEstimate>, Vec<Comparison>) {
+        self.results.judge(0, slice, compare_with(self.plan.drivers), self.plan.settings.evaluation.seed)
     }
 
     /// How every driver stands in a slice.
     pub fn estimates(&self, slice: &Slice) -> Vec<DriverEstimate> {
-        self.results.judge(0, slice, 0, self.plan.settings.evaluation.seed).0
+        self.judge(slice).0
     }
 
-    /// How the drivers compare with DAgger over all their trainings; `None` if there are too few of them.
-    pub fn judge_trainings(&self, slice: &Slice) -> Option<JudgedTeams> {
-        let Plan { settings, drivers, .. } = self.plan;
-        self.results.judge_trainings(0, slice, drivers, self.driver(DAGGER)?, settings.evaluation.seed)
+    /// How the drivers compare with DAgger over all their trainings; `estimates` are those of [`judge`](Self::judge). Where
+    /// DAgger was trained too seldom, or did not drive, they are not judged.
+    pub fn judge_teams(&self, slice: &Slice, estimates: &[DriverEstimate]) -> JudgedTeams {
+        let teams = trainings::teams(self.plan.drivers);
+        let dagger = self.driver(DAGGER);
+        let with = dagger.and_then(|dagger| teams.iter().position(|team| team.drivers.contains(&dagger)));
+        let seed = self.plan.settings.evaluation.seed;
+        let judged = with.and_then(|with| self.results.judge_teams(0, slice, &teams, with, estimates, seed));
+        JudgedTeams { teams, estimates: judged }
     }
 }
 
 /// The other drivers against DAgger on some lots.
 #[derive(Debug)]
 pub struct Against<'a> {
-    driven: Driven<'a>,
+    driven: DrivenPlan<'a>,
     dagger: usize,
     slice: Slice,
     /// The lots, as in "on the paper's lots".
@@ -157,14 +157,12 @@ pub struct Against<'a> {
     estimates: Vec<DriverEstimate>,
     /// Differences are theirs − DAgger's.
     comparisons: Vec<Comparison>,
-    /// Trainings that differ by their seed; none if nothing was trained often enough.
-    teams: Vec<Team>,
-    /// The same over all of them; `None` also if nothing varies.
-    trainings: Option<JudgedTeams>,
+    /// The same over trainings that differ by their seed.
+    teams: JudgedTeams,
 }
 
 /// What the paper concludes from its drives on its lots.
-pub fn on_reference_lots(driven: &Driven<'_>) -> Vec<Statement> {
+pub fn on_reference_lots(driven: &DrivenPlan<'_>) -> Vec<Statement> {
     let Some(all) = driven.against_dagger(driven.all(), "on the paper's lots") else { return Vec::new() };
     let unseen = driven.unseen().and_then(|unseen| driven.against_dagger(unseen, "on the lots it was not trained on"));
     let mut statements = vec![all.no_near_collision()];
@@ -205,37 +203,35 @@ impl Against<'_> {
         found.filter(|comparison| comparison.pairs >= PAIRS_MIN)
     }
 
-    /// Every training of a driver's recipe.
-    fn trainings_of<'a>(&'a self, driver: &'a usize) -> &'a [usize] {
-        let team = self.teams.iter().find(|team| team.drivers.contains(driver));
-        team.map_or(std::slice::from_ref(driver), |team| &team.drivers)
+    /// Every training of a driver's recipe, and how they stand together where they can be judged.
+    fn trainings_of<'a>(&'a self, driver: &'a usize) -> (&'a [usize], Option<&'a TeamEstimate>) {
+        match self.teams.of(*driver) {
+            Some((team, estimate)) => (team.drivers.as_slice(), estimate),
+            None => (std::slice::from_ref(driver), None),
+        }
     }
 
     /// Near-collisions (contacts) of a driver and their rate; of all its trainings where they can be judged together.
     fn rate(&self, driver: usize) -> String {
         let totals = self.totals(driver);
-        let Totals { near_collisions, contacts, reference_m, .. } = totals;
-        let name = self.name(driver);
-        let all = self.trainings_of(&driver);
+        let reference_m = totals.reference_m;
+        let (all, estimate) = self.trainings_of(&driver);
         let each: Vec<Totals> = all.iter().map(|&driver| self.totals(driver)).collect();
         let count = |totals: &Totals| format!("{} ({})", totals.near_collisions, totals.contacts);
-        let counts = || each.iter().map(count).collect::<Vec<_>>().join(", ");
-        let judged = self.trainings.as_ref().and_then(|trainings| trainings.of(driver));
-        if let Some((_, TeamEstimate { per_100m, .. })) = judged.filter(|_| all.len() > 1) {
-            let has_none = each.iter().all(|totals| totals.near_collisions == 0);
-            let rate = if has_none { exact_rate(0, reference_m) } else { interval(*per_100m, 2) };
-            return format!("{name} {} in {reference_m:.0} m each, {rate} per 100 m", counts());
-        }
-        let rate = quoted_rate(&totals, &self.estimates[driver]);
-        if all.len() > 1 {
-            return format!("{name} {} in {reference_m:.0} m each, of the first {rate} per 100 m", counts());
-        }
-        format!("{name} {near_collisions} ({contacts}) in {reference_m:.0} m, {rate} per 100 m")
+        let counts = each.iter().map(count).collect::<Vec<_>>().join(", ");
+        let of_one = || quoted_rate(&totals, &self.estimates[driver]);
+        let (route, rate) = match estimate {
+            _ if each.len() == 1 => ("m", of_one()),
+            Some(_) if each.iter().all(|totals| totals.near_collisions == 0) => ("m each", exact_rate(0, reference_m)),
+            Some(TeamEstimate { per_100m, .. }) => ("m each", interval(*per_100m, 2)),
+            None => ("m each", format!("of the first {}", of_one())),
+        };
+        format!("{} {counts} in {reference_m:.0} {route}, {rate} per 100 m", self.name(driver))
     }
 
     fn no_near_collision(&self) -> Statement {
         let Totals { reference_m, .. } = self.totals(self.dagger);
-        let all = self.trainings_of(&self.dagger);
+        let (all, _) = self.trainings_of(&self.dagger);
         let near_collisions: u32 = all.iter().map(|&driver| self.totals(driver).near_collisions).sum();
         // Trainings that drove the same lots add no metres.
         let bound = 100.0 * upper_bound(near_collisions, CONFIDENCE) / reference_m.max(f64::MIN_POSITIVE);
@@ -259,16 +255,16 @@ impl Against<'_> {
         of_pair: impl Fn(&Comparison) -> Option<Interval>,
     ) -> Option<Interval> {
         let comparison = self.comparison(other)?;
-        match self.trainings.as_ref().and_then(|trainings| trainings.of(other)) {
-            Some((_, estimate)) => Some(of_trainings(estimate)),
-            None => of_pair(comparison),
+        match self.trainings_of(&other) {
+            (_, Some(estimate)) => Some(of_trainings(estimate)),
+            (_, None) => of_pair(comparison),
         }
     }
 
     /// A figure of a driver, of each of its trainings.
     fn each(&self, driver: usize, digits: usize, of: impl Fn(&Totals) -> f64) -> String {
-        let all = self.trainings_of(&driver).iter();
-        let each: Vec<String> = all.map(|&driver| format!("{:.digits$}", of(&self.totals(driver)))).collect();
+        let (all, _) = self.trainings_of(&driver);
+        let each: Vec<String> = all.iter().map(|&driver| format!("{:.digits$}", of(&self.totals(driver)))).collect();
         format!("{} {}", self.name(driver), each.join(", "))
     }
 
@@ -281,7 +277,7 @@ impl Against<'_> {
         let verdict = Verdict::of(found);
         let (ours, theirs) = (self.rate(self.dagger), self.rate(other));
         let mut figures = format!("{ours}; {theirs}; difference {}", difference(found, 2));
-        let is_of_single = self.trainings.is_none() || self.comparison(other).is_none();
+        let is_of_single = !self.teams.are_judged() || self.comparison(other).is_none();
         if verdict == Verdict::CannotBeTold && is_of_single {
             let both = [other, self.dagger];
             let clustered = both.map(|driver| self.estimates[driver].dispersion.map_or(1.0, |found| found.index));
@@ -335,7 +331,7 @@ impl Against<'_> {
         };
         let of = |(noisy, totals): &(u32, Totals)| (*noisy, totals.reference_m / 100.0);
         let name = self.name(other);
-        let trainings = self.trainings_of(&self.dagger);
+        let (trainings, _) = self.trainings_of(&self.dagger);
         let ours: Vec<(u32, Totals)> = trainings.iter().map(|&driver| noisy(driver)).collect();
         let theirs = noisy(other);
         let ratios: Vec<RateRatio> = ours.iter().map(|ours| RateRatio::new(of(&theirs), of(ours))).collect();
@@ -360,7 +356,7 @@ impl Against<'_> {
             counts.collect::<Vec<_>>().join(", "),
             theirs.0,
             theirs.1.near_collisions,
-            ratios.iter().map(ratio_text).collect::<Vec<_>>().join(", ")
+            ratios.iter().map(rate_ratio).collect::<Vec<_>>().join(", ")
         );
         Statement { claim: format!("DAgger has fewer noise-induced near-collisions than {name}"), verdict, figures }
     }
@@ -401,7 +397,7 @@ impl Against<'_> {
                 "{}; paper {events} in {metres:.0} m, {} per 100 m; rate ratio {}",
                 self.rate(planner),
                 exact_rate(events, metres),
-                ratio_text(&ratio)
+                rate_ratio(&ratio)
             ),
         })
     }
@@ -418,12 +414,6 @@ fn metres_needed(per_100m: [f64; 2], dispersion: f64) -> String {
     }
     let question = Question { per_100m, power: 0.8, alpha: 1.0 - CONFIDENCE, dispersion };
     format!("; if these are the rates, about {:.0} km each would tell", (question.metres_each() / 1000.0).ceil())
-}
-
-fn ratio_text(ratio: &RateRatio) -> String {
-    let number = |value: Option<f64>| value.map_or_else(|| "∞".to_owned(), |value| format!("{value:.2}"));
-    let estimate = ratio.ratio.map_or_else(|| "–".to_owned(), |value| format!("{value:.2}"));
-    format!("{estimate} [{:.2}, {}]", ratio.lower, number(ratio.upper))
 }
 
 /// The network's share rises from iteration to iteration until it passes η. One training decides; there is no interval.

@@ -9,7 +9,7 @@ use crate::incidents;
 use crate::monitor::{Incident, IncidentMonitor};
 use crate::plan::Plan;
 use crate::read::Places;
-use crate::records::{self, Driven, FailureRecord, RunRecord, WallTimeRecord};
+use crate::records::{self, FailureRecord, RecordHeader, RunRecord, WallTimeRecord};
 use crate::results::EvaluationResults;
 use anyhow::ensure;
 use experiment::drive::TrialBatch;
@@ -162,8 +162,8 @@ impl<'a> Driving<'a> {
     }
 }
 
-/// What one driver drove of a batch at one noise level.
-struct DrivenBatch {
+/// A part of an evaluation: what one driver drove of a batch at one noise level.
+struct DrivenPart {
     reports: Vec<EpisodeReport>,
     /// The digest of each run, as in `runs.jsonl`.
     sha256: Vec<String>,
@@ -171,8 +171,8 @@ struct DrivenBatch {
     wall_s: f64,
 }
 
-fn driven_by(batch: &TrialBatch<'_>, trial: &Trial<'_>) -> Driven {
-    Driven {
+fn header_of(batch: &TrialBatch<'_>, trial: &Trial<'_>) -> RecordHeader {
+    RecordHeader {
         schema: records::SCHEMA,
         driver: batch.driver.name.clone(),
         lot: trial.lot.name().to_owned(),
@@ -183,12 +183,12 @@ fn driven_by(batch: &TrialBatch<'_>, trial: &Trial<'_>) -> Driven {
 }
 
 /// The near-collisions, each with the index of its run within the batch.
-fn failures(batch: &TrialBatch<'_>, driven: &DrivenBatch) -> anyhow::Result<Vec<(usize, FailureRecord)>> {
+fn failures(batch: &TrialBatch<'_>, driven: &DrivenPart) -> anyhow::Result<Vec<(usize, FailureRecord)>> {
     let explained = incidents::explain(batch, &driven.incidents)?;
     let failure = |(incident, (cause, findings)): (&Incident, _)| {
         let trial = &batch.trials[incident.episode];
         let failure = FailureRecord {
-            driven: driven_by(batch, trial),
+            header: header_of(batch, trial),
             tick: incident.tick,
             route_m: incident.route_m,
             x_m: incident.at.x_m,
@@ -204,9 +204,9 @@ fn failures(batch: &TrialBatch<'_>, driven: &DrivenBatch) -> anyhow::Result<Vec<
     Ok(driven.incidents.iter().zip(explained).map(failure).collect())
 }
 
+/// Drives a batch by one driver and watches for near-collisions; `None` if cancelled.
 #[expect(clippy::disallowed_methods, reason = "wall_time.jsonl is for people; nothing computed depends on it")]
-/// `None` if cancelled.
-fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> anyhow::Result<Option<DrivenBatch>> {
+fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> anyhow::Result<Option<DrivenPart>> {
     let started = Instant::now();
     let mut monitor = IncidentMonitor::new(batch.trials.len(), batch.episode);
     let mut digests = vec![DriveDigest::default(); batch.trials.len()];
@@ -233,7 +233,7 @@ fn drive(batch: &TrialBatch<'_>, track: &mut Track<'_>) -> anyhow::Result<Option
         return Ok(None);
     }
     track.done += reports.len();
-    Ok(Some(DrivenBatch {
+    Ok(Some(DrivenPart {
         reports,
         sha256: digests.iter().map(DriveDigest::hex).collect(),
         incidents: monitor.into_incidents(),
@@ -261,17 +261,17 @@ impl Track<'_> {
 /// The text of a part for each of the [`FILES`].
 fn lines(
     batch: &TrialBatch<'_>,
-    driven: &DrivenBatch,
+    driven: &DrivenPart,
     failures: &[(usize, FailureRecord)],
 ) -> anyhow::Result<[Vec<u8>; 3]> {
     let [mut runs, mut failed, mut wall_time] = [const { Vec::new() }; 3];
     let ticks: u32 = driven.reports.iter().map(|report| report.metrics.ticks).sum();
     for ((trial, report), sha256) in batch.trials.iter().zip(&driven.reports).zip(&driven.sha256) {
         let key = batch.replay_key(trial, 0);
-        line(&mut runs, &RunRecord::new(driven_by(batch, trial), &key, sha256, report))?;
+        line(&mut runs, &RunRecord::new(header_of(batch, trial), &key, sha256, report))?;
         // Runs of a batch are driven at once; each has its share by the number of its decisions.
         let wall_s = driven.wall_s * f64::from(report.metrics.ticks) / f64::from(ticks.max(1));
-        line(&mut wall_time, &WallTimeRecord { driven: driven_by(batch, trial), wall_s })?;
+        line(&mut wall_time, &WallTimeRecord { header: header_of(batch, trial), wall_s })?;
     }
     failures.iter().try_for_each(|(_, failure)| line(&mut failed, failure))?;
     Ok([runs, failed, wall_time])

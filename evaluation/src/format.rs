@@ -2,6 +2,7 @@
 
 use crate::judge::DriverEstimate;
 use crate::statistics::bootstrap::Interval;
+use crate::statistics::comparison::RateRatio;
 use crate::statistics::poisson::{CONFIDENCE, DISPERSION_MAX, Rate, upper_bound};
 use crate::totals::Totals;
 
@@ -12,17 +13,17 @@ pub fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
     estimate.per_100m.filter(|_| is_clustered)
 }
 
-/// The interval that may be quoted (docs/methods.md 8.3), near-collisions per 100 m: the exact one, or the bootstrap's where
-/// events cluster.
+/// The interval that may be quoted (docs/methods.md 8.3), near-collisions per 100 m: the exact one or, where events cluster,
+/// the farther ends of the exact one and the bootstrap's.
 pub fn quoted_interval(totals: &Totals, estimate: &DriverEstimate) -> [f64; 2] {
     let rate = totals.rate();
     wider([rate.lower, rate.upper], clustered(estimate).map(|interval| [interval.lower, interval.upper]))
 }
 
-/// The interval of contacts that may be quoted, per 100 m. They come in clusters (one drive along a wall has many), so it is the
-/// bootstrap's wherever that is wider than the exact one.
+/// The interval of contacts that may be quoted, per 100 m: the farther ends of the exact one and the bootstrap's, whatever their
+/// dispersion, because one drive along a wall has many.
 pub fn contacts_interval(totals: &Totals, estimate: &DriverEstimate) -> [f64; 2] {
-    let rate = Rate::new(totals.contacts, totals.reference_m / 100.0);
+    let rate = totals.contact_rate();
     let bootstrap = estimate.contacts_per_100m.map(|interval| [interval.lower, interval.upper]);
     wider([rate.lower, rate.upper], bootstrap)
 }
@@ -30,14 +31,13 @@ pub fn contacts_interval(totals: &Totals, estimate: &DriverEstimate) -> [f64; 2]
 /// Contacts, and their rate with the interval that may be quoted.
 pub fn quoted_contacts(totals: &Totals, estimate: &DriverEstimate) -> String {
     let [lower, upper] = contacts_interval(totals, estimate);
-    let per_100m = Rate::new(totals.contacts, totals.reference_m / 100.0).per_unit;
-    format!("{}: {per_100m:.2} [{lower:.2}, {upper:.2}]", totals.contacts)
+    format!("{}: {:.2} [{lower:.2}, {upper:.2}]", totals.contacts, totals.contact_rate().per_unit)
 }
 
-/// The exact interval, or the bootstrap's where events cluster: clusters make it wider, and of few events it may be
-/// narrower by chance.
-pub(crate) fn wider(exact: [f64; 2], clustered: Option<[f64; 2]>) -> [f64; 2] {
-    clustered.map_or(exact, |[lower, upper]| [lower.min(exact[0]), upper.max(exact[1])])
+/// The farther ends of the exact interval and, if it counts, the bootstrap's: clusters make that wider, and of few events it may
+/// be narrower by chance.
+pub(crate) fn wider(exact: [f64; 2], bootstrap: Option<[f64; 2]>) -> [f64; 2] {
+    bootstrap.map_or(exact, |[lower, upper]| [lower.min(exact[0]), upper.max(exact[1])])
 }
 
 /// The rate with the interval that may be quoted (docs/methods.md 8.3).
@@ -82,6 +82,12 @@ pub fn difference(interval: Option<Interval>, digits: usize) -> String {
     )
 }
 
+/// A ratio of rates with its interval.
+pub fn rate_ratio(ratio: &RateRatio) -> String {
+    let or = |none: &str, end: Option<f64>| end.map_or_else(|| none.to_owned(), |end| format!("{end:.2}"));
+    format!("{} [{:.2}, {}]", or("–", ratio.ratio), ratio.lower, or("∞", ratio.upper))
+}
+
 /// A p-value to four decimals.
 pub fn p_value(p: f64) -> String {
     if p < 1e-4 { "< .0001".to_owned() } else { format!("{p:.4}") }
@@ -124,5 +130,8 @@ mod tests {
         assert_eq!(contacts(0.05, 0.1), "4: 0.08 [0.02, 0.20]");
         let around_zero = Interval { lower: -0.1, ..interval };
         assert_eq!(difference(Some(around_zero), 1), "+1.4 [-0.1, +2.0]");
+        let ratio = RateRatio { ratio: Some(1.97), lower: 0.86, upper: Some(4.28), p_value: 0.08 };
+        assert_eq!(rate_ratio(&ratio), "1.97 [0.86, 4.28]");
+        assert_eq!(rate_ratio(&RateRatio { ratio: None, upper: None, ..ratio }), "– [0.86, ∞]");
     }
 }

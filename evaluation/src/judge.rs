@@ -75,9 +75,9 @@ impl EvaluationResults {
             estimate.contacts_per_100m = interval(driver, Statistic::Contacts);
         }
         let counts = |driver: usize| {
-            let units = pairs.iter().map(|row| row[driver]);
-            let (events, metres) = units.fold((0, 0.0), |(events, metres), unit| {
-                (events + unit.near_collisions, metres + f64::from(unit.reference_m))
+            let runs = pairs.iter().map(|row| row[driver]);
+            let (events, metres) = runs.fold((0, 0.0), |(events, metres), run| {
+                (events + run.near_collisions, metres + f64::from(run.reference_m))
             });
             (events, metres / 100.0)
         };
@@ -98,17 +98,17 @@ impl EvaluationResults {
         (estimates, comparisons.collect())
     }
 
-    /// Per trial of the slice that every driver has finished, the units of all drivers.
+    /// Per trial of the slice that every driver has finished, the runs of all drivers.
     pub(crate) fn common_runs(&self, level: usize, slice: &Slice) -> Vec<Vec<RunSummary>> {
         let Some((first, rest)) = self.drivers[level].split_first() else { return Vec::new() };
-        let of_trial = |units: &[RunSummary], trial: u32| {
-            units.binary_search_by_key(&trial, |unit| unit.trial).ok().map(|index| units[index])
+        let of_trial = |runs: &[RunSummary], trial: u32| {
+            runs.binary_search_by_key(&trial, |run| run.trial).ok().map(|index| runs[index])
         };
-        let row = |unit: &RunSummary| {
-            let rest = rest.iter().map(|results| of_trial(&results.runs, unit.trial));
-            std::iter::once(Some(*unit)).chain(rest).collect()
+        let row = |run: &RunSummary| {
+            let rest = rest.iter().map(|results| of_trial(&results.runs, run.trial));
+            std::iter::once(Some(*run)).chain(rest).collect()
         };
-        first.runs.iter().filter(|unit| slice.contains(unit.group)).filter_map(row).collect()
+        first.runs.iter().filter(|run| slice.contains(run.group)).filter_map(row).collect()
     }
 }
 
@@ -117,8 +117,8 @@ fn dispersion(strata: &[Stratum<'_>], driver: usize) -> Option<Dispersion> {
         .iter()
         .map(|clusters| {
             let cluster = |rows: &[Vec<RunSummary>]| {
-                let units = rows.iter().map(|row| row[driver]);
-                units.fold((0, 0.0), |(n, m), unit| (n + unit.near_collisions, m + f64::from(unit.reference_m)))
+                let runs = rows.iter().map(|row| row[driver]);
+                runs.fold((0, 0.0), |(n, m), run| (n + run.near_collisions, m + f64::from(run.reference_m)))
             };
             clusters.iter().map(|rows| cluster(rows)).collect()
         })
@@ -186,12 +186,12 @@ pub(crate) fn columns(drivers: usize) -> usize {
 pub(crate) fn add(sums: &mut [f64], row: &[RunSummary]) {
     sums[0] += 1.0;
     sums[1] += f64::from(row[0].reference_m) / 100.0;
-    for (sums, unit) in sums[SHARED..].chunks_exact_mut(COLUMNS).zip(row) {
-        sums[0] += f64::from(unit.near_collisions);
-        sums[1] += f64::from(unit.safe_ratio);
-        sums[2] += f64::from(unit.steering_reversals);
-        sums[3] += f64::from(unit.driven_m) / 100.0;
-        sums[4] += f64::from(unit.contacts);
+    for (sums, run) in sums[SHARED..].chunks_exact_mut(COLUMNS).zip(row) {
+        sums[0] += f64::from(run.near_collisions);
+        sums[1] += f64::from(run.safe_ratio);
+        sums[2] += f64::from(run.steering_reversals);
+        sums[3] += f64::from(run.driven_m) / 100.0;
+        sums[4] += f64::from(run.contacts);
     }
 }
 

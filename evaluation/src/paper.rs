@@ -10,8 +10,6 @@ pub struct PaperLot {
     pub lot: &'static str,
     /// Length of its reference path, metres.
     pub length_m: f64,
-    /// Whether the paper trained on it.
-    pub is_trained_on: bool,
     /// What its drivers did there, in the order of [`DRIVERS`].
     pub results: [PaperResult; 3],
 }
@@ -53,7 +51,6 @@ pub const LOTS: [PaperLot; 3] = [
     PaperLot {
         lot: "lot-a",
         length_m: 231.0,
-        is_trained_on: true,
         results: [
             result([0.0, 0.0], [0, 0], 0.83),
             result([1.12, 0.95], [13, 11], 0.69),
@@ -63,7 +60,6 @@ pub const LOTS: [PaperLot; 3] = [
     PaperLot {
         lot: "lot-b",
         length_m: 139.0,
-        is_trained_on: false,
         results: [
             result([0.0, 0.0], [0, 0], 0.72),
             result([1.87, 2.01], [13, 14], 0.63),
@@ -73,7 +69,6 @@ pub const LOTS: [PaperLot; 3] = [
     PaperLot {
         lot: "lot-c",
         length_m: 149.0,
-        is_trained_on: false,
         results: [
             result([0.0, 0.0], [0, 0], 0.91),
             // 1.15 is not a multiple of 1/7.45: 8 or 9.

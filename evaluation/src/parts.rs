@@ -3,7 +3,7 @@
 use crate::evaluate::{BATCH, DRIVING, FILES};
 use crate::plan::Plan;
 use crate::read::{Place, Places};
-use crate::records::{self, Driven};
+use crate::records::{self, RecordHeader};
 use anyhow::{Context as _, ensure};
 use experiment::run_dir::RunDir;
 use experiment::trials::Trial;
@@ -36,10 +36,10 @@ impl Part<'_> {
         let mut rows = Vec::new();
         let mut seen = BTreeSet::new();
         let lines = sums::open(&path, RUN_LINES_BYTES_MAX)?;
-        records::each_line_at(&path, lines, |bytes, driven: Driven| {
-            let is_new = seen.insert(own.of(&driven)?);
+        records::each_line_at(&path, lines, |bytes, header: RecordHeader| {
+            let is_new = seen.insert(own.of(&header)?);
             ensure!(is_new || name == records::FAILURES, "there twice");
-            rows.push((places.of(&driven)?, bytes));
+            rows.push((places.of(&header)?, bytes));
             Ok(())
         })?;
         if name != records::FAILURES {

@@ -2,7 +2,7 @@
 
 use crate::incidents;
 use crate::plan::Plan;
-use crate::records::{self, Driven, FailureRecord, RunRecord};
+use crate::records::{self, FailureRecord, RecordHeader, RunRecord};
 use crate::results::EvaluationResults;
 use anyhow::{Context as _, ensure};
 use experiment::trials::Trial;
@@ -38,7 +38,7 @@ impl EvaluationResults {
     /// # Errors
     /// If it was not written by this plan.
     pub(crate) fn take_run(&mut self, places: &Places<'_>, run: &RunRecord) -> anyhow::Result<()> {
-        let Place { level, driver, trial } = places.of(&run.driven)?;
+        let Place { level, driver, trial } = places.of(&run.header)?;
         self.add(level, driver, trial, &places.trials[trial], &run.report);
         Ok(())
     }
@@ -48,7 +48,7 @@ impl EvaluationResults {
     /// # Errors
     /// If it was not written by this plan.
     pub(crate) fn take_failure(&mut self, places: &Places<'_>, failure: &FailureRecord) -> anyhow::Result<()> {
-        let Place { level, driver, trial } = places.of(&failure.driven)?;
+        let Place { level, driver, trial } = places.of(&failure.header)?;
         let is_again = incidents::is_again(failure.findings.since_resume_m);
         self.add_cause(level, driver, places.trials[trial].lot, failure.cause, is_again);
         Ok(())
@@ -83,15 +83,15 @@ impl<'a> Places<'a> {
     ///
     /// # Errors
     /// If it is of another plan.
-    pub(crate) fn of(&self, driven: &Driven) -> anyhow::Result<Place> {
-        let key = (driven.lot.clone(), driven.direction, driven.trial);
+    pub(crate) fn of(&self, header: &RecordHeader) -> anyhow::Result<Place> {
+        let key = (header.lot.clone(), header.direction, header.trial);
         let levels = &self.plan.settings.evaluation.noise;
         let mut names = self.plan.drivers.iter().map(|driver| &driver.name);
         Ok(Place {
-            level: levels.iter().position(|&level| level == driven.noise).context("another noise level")?,
+            level: levels.iter().position(|&level| level == header.noise).context("another noise level")?,
             driver: names
-                .position(|name| *name == driven.driver)
-                .with_context(|| format!("another driver, {:?}", driven.driver))?,
+                .position(|name| *name == header.driver)
+                .with_context(|| format!("another driver, {:?}", header.driver))?,
             trial: self.index_of.get(&key).copied().context("another run")?,
         })
     }

@@ -40,7 +40,7 @@ pub fn of_finished(folder: &Path, file: &str) -> anyhow::Result<PathBuf> {
 
 /// Who drove where: what all lines begin with.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Driven {
+pub struct RecordHeader {
     /// Version of the format: [`SCHEMA`].
     pub schema: u32,
     /// Who drove, as named in tables.
@@ -60,7 +60,7 @@ pub struct Driven {
 pub struct RunRecord {
     /// Who drove where.
     #[serde(flatten)]
-    pub driven: Driven,
+    pub header: RecordHeader,
     /// Whether it was ended by the time limit.
     pub timed_out: bool,
     /// Driven way per simulated time, m/s.
@@ -76,9 +76,9 @@ pub struct RunRecord {
 
 impl RunRecord {
     /// The line of a finished run.
-    pub fn new(driven: Driven, replay: &ReplayKey, sha256: &str, report: &EpisodeReport) -> Self {
+    pub fn new(header: RecordHeader, replay: &ReplayKey, sha256: &str, report: &EpisodeReport) -> Self {
         Self {
-            driven,
+            header,
             timed_out: report.ending == Ending::TimedOut,
             mean_speed_mps: report.metrics.mean_speed_mps(),
             replay: replay.to_string(),
@@ -93,7 +93,7 @@ impl RunRecord {
 pub struct FailureRecord {
     /// Who drove where.
     #[serde(flatten)]
-    pub driven: Driven,
+    pub header: RecordHeader,
     /// The control tick, from 0.
     pub tick: u32,
     /// Where along the route, metres.
@@ -120,7 +120,7 @@ pub struct FailureRecord {
 pub struct WallTimeRecord {
     /// Who drove where.
     #[serde(flatten)]
-    pub driven: Driven,
+    pub header: RecordHeader,
     /// Seconds: the run's share, by decisions, of what its batch took in lock-step.
     pub wall_s: f64,
 }

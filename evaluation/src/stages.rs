@@ -392,17 +392,56 @@ fn stages_of(chains: &[Chain], settings: &Settings, extent: &Extent) -> impl Ite
 /// Drivers by their names in tables.
 type Drivers = Vec<(String, String)>;
 
-fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
-    let spec = |chain: Chain, seed, rest: &str| format!("run:{}/{}{rest}", root.display(), chain.folder(seed));
+/// What a chain ended with, as a driver of the command line; `/bc` behind it: what it began with.
+fn spec(root: &Path, chain: Chain, seed: RootSeed, rest: &str) -> String {
+    format!("run:{}/{}{rest}", root.display(), chain.folder(seed))
+}
+
+/// Behaviour cloning, then `DAgger` with the weight and without, of every seed.
+fn networks(settings: &Settings, extent: &Extent, root: &Path) -> Drivers {
     let of_seed = |seed| {
         [(BC, Chain::Weighted, "/bc"), (DAGGER, Chain::Weighted, ""), (UNWEIGHTED, Chain::Unweighted, "")]
             .into_iter()
             .filter(|(_, chain, _)| chain.is_trained(settings))
-            .map(move |(name, chain, rest)| (named(name, seed, settings), spec(chain, seed, rest)))
+            .map(move |(name, chain, rest)| (named(name, seed, settings), spec(root, chain, seed, rest)))
     };
-    let networks: Drivers = settings.training_seeds(extent.seeds).into_iter().flat_map(of_seed).collect();
-    let of_first_seed = |name: &str, chain| (name.to_owned(), spec(chain, settings.seed, ""));
+    settings.training_seeds(extent.seeds).into_iter().flat_map(of_seed).collect()
+}
 
+/// The policies after the first iterations under each decision rule.
+fn under_each_rule(settings: &Settings, extent: &Extent, root: &Path) -> Drivers {
+    let of_first_seed = |name: &str, chain| (name.to_owned(), spec(root, chain, settings.seed, ""));
+    let rule_iterations = extent.rule_iterations.min(settings.dagger.iterations_max);
+    // The other chains end there, or earlier: their last network is meant.
+    let all_below = if rule_iterations < settings.dagger.iterations_max {
+        let folder = Chain::Weighted.folder(settings.seed);
+        ("all below".to_owned(), format!("net:{}/{folder}/round-{rule_iterations:02}", root.display()))
+    } else {
+        of_first_seed("all below", Chain::Weighted)
+    };
+    vec![all_below, of_first_seed("any below", Chain::AnyBelow), of_first_seed("τ̂ alone", Chain::TauOnly)]
+}
+
+/// The controls behind the networks that they are compared with.
+fn controls(networks: &[(String, String)], settings: &Settings, extent: &Extent, root: &Path) -> Drivers {
+    let of_first_seed = |name: &str, chain, rest: &str| (name.to_owned(), spec(root, chain, settings.seed, rest));
+    let mut controls = networks.to_vec();
+    controls.push(of_first_seed(EXPERT_ONLY, Chain::ExpertOnly, ""));
+    let equal = |seed| (named(EXPERT_EQUAL, seed, settings), spec(root, Chain::ExpertEqual, seed, ""));
+    controls.extend(settings.training_seeds(extent.seeds).into_iter().map(equal));
+    if Chain::Alpha15.is_trained(settings) {
+        controls.push(of_first_seed(ALPHA_15, Chain::Alpha15, ""));
+    }
+    if Chain::Person.is_trained(settings) {
+        let of_person = OF_PERSON.into_iter().zip(["/bc", ""]);
+        controls.extend(of_person.map(|(name, rest)| of_first_seed(name, Chain::Person, rest)));
+    }
+    controls.push((GRID_EXPERT.to_owned(), "grid-expert".to_owned()));
+    controls
+}
+
+fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
+    let networks = networks(settings, extent, root);
     let own = |name: &str| (name.to_owned(), name.to_owned());
     let expert = vec![own("expert")];
     let tuned: Drivers = extent.tuned.iter().map(|spec| (tuned_name(spec), spec.clone())).collect();
@@ -424,41 +463,14 @@ fn drives(settings: &Settings, extent: &Extent, root: &Path) -> Vec<Stage> {
     let mut stages = vec![
         drive(REFERENCE, "every driver on the paper's lots", of_paper, everyone(&planners)),
         drive(UNSEEN, "drivers on generated lots", unseen, everyone(&enough)),
+        drive(RULES, "policies under each decision rule", of_paper, under_each_rule(settings, extent, root)),
+        drive(CONTROLS, "controls on generated lots", unseen, controls(&networks, settings, extent, root)),
     ];
-
-    let rule_iterations = extent.rule_iterations.min(settings.dagger.iterations_max);
-    // The other chains end there, or earlier: their last network is meant.
-    let all_below = if rule_iterations < settings.dagger.iterations_max {
-        let folder = Chain::Weighted.folder(settings.seed);
-        ("all below".to_owned(), format!("net:{}/{folder}/round-{rule_iterations:02}", root.display()))
-    } else {
-        of_first_seed("all below", Chain::Weighted)
-    };
-    let rules = vec![all_below, of_first_seed("any below", Chain::AnyBelow), of_first_seed("τ̂ alone", Chain::TauOnly)];
-    stages.push(drive(RULES, "policies under each decision rule", of_paper, rules));
-
-    let mut controls = networks.clone();
-    controls.push(of_first_seed(EXPERT_ONLY, Chain::ExpertOnly));
-    controls.extend(
-        settings
-            .training_seeds(extent.seeds)
-            .into_iter()
-            .map(|seed| (named(EXPERT_EQUAL, seed, settings), spec(Chain::ExpertEqual, seed, ""))),
-    );
-    if Chain::Alpha15.is_trained(settings) {
-        controls.push(of_first_seed(ALPHA_15, Chain::Alpha15));
-    }
-    if Chain::Person.is_trained(settings) {
-        let of_person = OF_PERSON.into_iter().zip(["/bc", ""]);
-        controls.extend(of_person.map(|(name, rest)| (name.to_owned(), spec(Chain::Person, settings.seed, rest))));
-    }
-    controls.push((GRID_EXPERT.to_owned(), "grid-expert".to_owned()));
-    stages.push(drive(CONTROLS, "controls on generated lots", unseen, controls));
 
     if Chain::FarPoints.is_trained(settings) {
         let far = Chain::FarPoints.stage(settings, extent).settings;
         let policies = [(BC, "/bc"), (DAGGER, "")]
-            .map(|(name, rest)| (name.to_owned(), spec(Chain::FarPoints, settings.seed, rest)))
+            .map(|(name, rest)| (name.to_owned(), spec(root, Chain::FarPoints, settings.seed, rest)))
             .to_vec();
         let mut stage = drive(FAR_POINTS, "policies with far points on generated lots", unseen, policies);
         (stage.settings.episode, stage.settings.expert) = (far.episode, far.expert);

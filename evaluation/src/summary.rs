@@ -160,8 +160,7 @@ pub struct ComparisonRow {
 }
 
 impl Row {
-    /// The interval that may be quoted (docs/methods.md 8.3), near-collisions per 100 m: the exact one, or the bootstrap's
-    /// where events cluster.
+    /// The interval that may be quoted, near-collisions per 100 m: that of [`quoted_interval`], by what the row holds.
     pub fn quoted_interval(&self) -> [f64; 2] {
         let is_clustered = self.dispersion.is_some_and(|index| index > DISPERSION_MAX);
         let bootstrap = self.bootstrap_lower.zip(self.bootstrap_upper).filter(|_| is_clustered);
@@ -227,8 +226,7 @@ pub struct SweepRow {
     pub near_collisions: u32,
     /// Near-collisions per 100 m of route.
     pub per_100m: f64,
-    /// The interval that may be quoted (docs/methods.md 8.3), per 100 m: the exact one, or the bootstrap's where events
-    /// cluster.
+    /// The interval that may be quoted, per 100 m: that of [`quoted_interval`].
     pub lower: f64,
     /// See `lower`.
     pub upper: f64,
@@ -290,7 +288,7 @@ impl<'a> Summary<'a> {
         let judge = |(level, slice)| {
             let (estimates, comparisons) = results.judge(level, &slice, plan.compare_with, evaluation.seed);
             let of_teams = (!teams.is_empty())
-                .then(|| results.judge_teams(level, &slice, &teams, with, evaluation.seed))
+                .then(|| results.judge_teams(level, &slice, &teams, with, &estimates, evaluation.seed))
                 .flatten()
                 .unwrap_or_default();
             Judged { level, slice, estimates, comparisons, teams: of_teams }

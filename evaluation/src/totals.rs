@@ -77,6 +77,11 @@ impl Totals {
         Rate::new(self.near_collisions, self.reference_m / 100.0)
     }
 
+    /// Contacts per 100 m of route with their interval.
+    pub fn contact_rate(&self) -> Rate {
+        Rate::new(self.contacts, self.reference_m / 100.0)
+    }
+
     /// Mean over runs.
     pub fn safe_ratio(&self) -> f64 {
         self.safe_ratio_sum / f64::from(self.runs.max(1))

@@ -3,12 +3,15 @@
 //! An interval of one network says how sure the rate of that network is. Here it is for other lots *and* other seeds.
 
 use crate::format::{contacts_interval, quoted_interval};
-use crate::judge::{STATISTICS, Statistic, Stratum, add, columns, reference_100m, statistics, strata, units};
+use crate::judge::{
+    DriverEstimate, STATISTICS, Statistic, Stratum, add, columns, reference_100m, statistics, strata, units,
+};
 use crate::results::EvaluationResults;
 use crate::slices::Slice;
 use crate::statistics::bootstrap::{DRAWS, Interval, UNITS_MIN};
 use crate::statistics::poisson::Rate;
 use crate::statistics::student::{half_width_of_mean, together, widened};
+use crate::totals::Totals;
 use anyhow::{Context as _, bail, ensure};
 use experiment::drivers::{DriverSpec, NamedDriver};
 use glob::{MatchOptions, Pattern};
@@ -189,45 +192,43 @@ pub struct TeamEstimate {
 /// Every team of an evaluation in a slice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JudgedTeams {
-    /// The teams, and how each stands.
-    pub teams: Vec<(Team, TeamEstimate)>,
+    /// The teams; none if nothing was trained often enough.
+    pub teams: Vec<Team>,
+    /// How each stands; `None` if they cannot be judged.
+    pub(crate) estimates: Option<Vec<TeamEstimate>>,
 }
 
 impl JudgedTeams {
-    /// The team of a driver; `None` if it was trained too seldom to speak for others.
-    pub fn of(&self, driver: usize) -> Option<&(Team, TeamEstimate)> {
-        self.teams.iter().find(|(team, _)| team.drivers.contains(&driver))
+    /// Whether there are teams, and enough was driven to judge them by.
+    pub fn are_judged(&self) -> bool {
+        self.estimates.is_some()
+    }
+
+    /// The team of a driver, and how it stands; `None` if it was trained too seldom to speak for others.
+    pub fn of(&self, driver: usize) -> Option<(&Team, Option<&TeamEstimate>)> {
+        let index = self.teams.iter().position(|team| team.drivers.contains(&driver))?;
+        Some((&self.teams[index], self.estimates.as_ref().map(|estimates| &estimates[index])))
+    }
+
+    /// The teams, and how each stands; none if they cannot be judged.
+    pub fn judged(&self) -> impl Iterator<Item = (&Team, &TeamEstimate)> {
+        self.teams.iter().zip(self.estimates.iter().flatten())
     }
 }
 
 impl EvaluationResults {
-    /// How drivers stand in a slice at a noise level, and how they differ from one of them, where they were trained often
-    /// enough; `None` if none was, or too little was driven.
-    pub fn judge_trainings(
-        &self,
-        level: usize,
-        slice: &Slice,
-        drivers: &[NamedDriver],
-        with: usize,
-        seed: RootSeed,
-    ) -> Option<JudgedTeams> {
-        let teams = teams(drivers);
-        let with = teams.iter().position(|team| team.drivers.contains(&with))?;
-        let estimates = self.judge_teams(level, slice, &teams, with, seed)?;
-        Some(JudgedTeams { teams: teams.into_iter().zip(estimates).collect() })
-    }
-
     /// How teams stand in a slice at a noise level, and how they differ from one of them, `with`. Lots are drawn as in
     /// [`judge`](Self::judge), for the means over trainings; Student's interval of these means adds what other seeds bring.
     /// Trainings of one seed begin alike, so teams of the same seeds differ by pairs. What fewer than [`TRAININGS_MIN`] say about
-    /// other seeds does not count. A driver by itself has the interval that it has elsewhere. `None` of fewer trials, or lots of a
-    /// sample, than [`UNITS_MIN`]: all of them may be alike by chance.
+    /// other seeds does not count. A driver by itself has the interval that it has elsewhere: `of_drivers` are the estimates of
+    /// [`judge`](Self::judge). `None` of fewer trials, or lots of a sample, than [`UNITS_MIN`]: all of them may be alike by chance.
     pub fn judge_teams(
         &self,
         level: usize,
         slice: &Slice,
         teams: &[Team],
         with: usize,
+        of_drivers: &[DriverEstimate],
         seed: RootSeed,
     ) -> Option<Vec<TeamEstimate>> {
         let pairs = self.common_runs(level, slice);
@@ -236,23 +237,7 @@ impl EvaluationResults {
             return None;
         }
         let drivers = pairs[0].len();
-        let mean = |sums: &[f64], team: &Team| -> [f64; STATISTICS] {
-            let each = team.drivers.iter().map(|&driver| statistics(sums, driver));
-            let sum = each.fold([0.0; STATISTICS], |sum, of| std::array::from_fn(|which| sum[which] + of[which]));
-            sum.map(|sum| sum / team.drivers.len() as f64)
-        };
-        let of_sums = |sums: &[f64], out: &mut [f64]| {
-            let (means, differences) = out.split_at_mut(STATISTICS * teams.len());
-            for (out, team) in means.chunks_exact_mut(STATISTICS).zip(teams) {
-                out.copy_from_slice(&mean(sums, team));
-            }
-            let of_with = &means[STATISTICS * with..][..STATISTICS];
-            for (out, means) in differences.chunks_exact_mut(STATISTICS).zip(means.chunks_exact(STATISTICS)) {
-                for ((difference, mean), of_with) in out.iter_mut().zip(means).zip(of_with) {
-                    *difference = mean - of_with;
-                }
-            }
-        };
+        let of_sums = |sums: &[f64], out: &mut [f64]| means_and_differences(sums, teams, with, out);
         let outputs = 2 * STATISTICS * teams.len();
         let intervals = units(&strata, drivers).percentile_intervals(seed, DRAWS, outputs, &of_sums);
         let (means, differences) = intervals.split_at(STATISTICS * teams.len());
@@ -286,28 +271,43 @@ impl EvaluationResults {
                 let found = mean(which);
                 Interval { lower: found.lower.max(0.0), upper: found.upper.max(supported), ..found }
             };
-            TeamEstimate {
+            let mut estimate = TeamEstimate {
                 per_100m: of_events(Statistic::NearCollisions),
                 difference_per_100m: difference(Statistic::NearCollisions),
                 contacts_per_100m: of_events(Statistic::Contacts),
                 difference_safe_ratio: difference(Statistic::SafeRatio),
                 difference_reversals_per_100m: difference(Statistic::Reversals),
+            };
+            if let [driver] = team.drivers[..] {
+                estimate.take_intervals_of(&self.totals(level, driver, slice, None), &of_drivers[driver]);
             }
+            estimate
         };
-        let mut estimates: Vec<TeamEstimate> = teams.iter().enumerate().map(estimate).collect();
-        if teams.iter().any(|team| team.drivers.len() == 1) {
-            let (of_drivers, _) = self.judge(level, slice, 0, seed);
-            for (team, estimate) in teams.iter().zip(&mut estimates) {
-                if let [driver] = team.drivers[..] {
-                    let totals = self.totals(level, driver, slice, None);
-                    let of_driver = &of_drivers[driver];
-                    [estimate.per_100m.lower, estimate.per_100m.upper] = quoted_interval(&totals, of_driver);
-                    [estimate.contacts_per_100m.lower, estimate.contacts_per_100m.upper] =
-                        contacts_interval(&totals, of_driver);
-                }
-            }
+        Some(teams.iter().enumerate().map(estimate).collect())
+    }
+}
+
+impl TeamEstimate {
+    /// Takes over the intervals of a driver's rates: a team of one is that driver.
+    fn take_intervals_of(&mut self, totals: &Totals, of_driver: &DriverEstimate) {
+        [self.per_100m.lower, self.per_100m.upper] = quoted_interval(totals, of_driver);
+        [self.contacts_per_100m.lower, self.contacts_per_100m.upper] = contacts_interval(totals, of_driver);
+    }
+}
+
+/// The means over its trainings of each team, by [`Statistic`], then their differences from those of the team `with`.
+fn means_and_differences(sums: &[f64], teams: &[Team], with: usize, out: &mut [f64]) {
+    let (means, differences) = out.split_at_mut(STATISTICS * teams.len());
+    for (out, team) in means.chunks_exact_mut(STATISTICS).zip(teams) {
+        let each = team.drivers.iter().map(|&driver| statistics(sums, driver));
+        let sum = each.fold([0.0; STATISTICS], |sum, of| std::array::from_fn(|which| sum[which] + of[which]));
+        out.copy_from_slice(&sum.map(|sum| sum / team.drivers.len() as f64));
+    }
+    let of_with = &means[STATISTICS * with..][..STATISTICS];
+    for (out, means) in differences.chunks_exact_mut(STATISTICS).zip(means.chunks_exact(STATISTICS)) {
+        for ((difference, mean), of_with) in out.iter_mut().zip(means).zip(of_with) {
+            *difference = mean - of_with;
         }
-        Some(estimates)
     }
 }
 

@@ -57,8 +57,8 @@ pub fn tune(
         progress.begin("tuning", &format!("tuning {}", start.name));
         let name = start.name.replace('/', "-");
         let candidates = format!("{name}.candidates.toml");
-        let mut driven = Driven::read(run.path().join(&candidates), origin(settings, start, budget))?;
-        let Some(found) = search(&course, start, budget, evaluation.seed, &mut driven, progress)? else { break };
+        let mut log = CandidateLog::read(run.path().join(&candidates), origin(settings, start, budget))?;
+        let Some(found) = search(&course, start, budget, evaluation.seed, &mut log, progress)? else { break };
         sums::list(run.path(), &[&candidates])?;
         progress.end(&format!(
             "{:.2} → {:.2} failures per 100 m",
@@ -168,7 +168,7 @@ impl<'a> Course<'a> {
 }
 
 /// What candidates did, in the order in which they were driven: on disk after every generation.
-struct Driven {
+struct CandidateLog {
     path: PathBuf,
     /// The [`origin()`] of the search.
     origin: String,
@@ -192,7 +192,7 @@ fn origin(settings: &Settings, Start { name, planner }: &Start, budget: usize) -
     sums::digest(start.as_bytes())
 }
 
-impl Driven {
+impl CandidateLog {
     /// What an interrupted search of this origin left.
     fn read(path: PathBuf, origin: String) -> anyhow::Result<Self> {
         let Some(text) = sealed::read_up_to(&path, CANDIDATES_BYTES_MAX)? else {
@@ -300,7 +300,7 @@ fn search(
     Start { name, planner: start }: &Start,
     budget: usize,
     seed: RootSeed,
-    driven: &mut Driven,
+    log: &mut CandidateLog,
     progress: &dyn Progress,
 ) -> anyhow::Result<Option<Found>> {
     let finalists_max = FINALISTS.min(budget - 1) + 1;
@@ -326,7 +326,7 @@ fn search(
         if tried.is_empty() {
             candidates[0] = start.clone();
         }
-        let totals = driven.next(candidates.len(), || course.drive(&candidates, &course.search))?;
+        let totals = log.next(candidates.len(), || course.drive(&candidates, &course.search))?;
         tried.extend(
             generation.into_iter().zip(candidates).zip(totals).map(|((point, of), totals)| (point, of, totals)),
         );
@@ -336,7 +336,7 @@ fn search(
     order.truncate(finalists_max - 1);
     order.insert(0, 0);
     let finalists: Vec<PlannerSpec> = order.iter().map(|&index| tried[index].1.clone()).collect();
-    let fresh = driven.next(finalists.len(), || course.drive(&finalists, &course.fresh))?;
+    let fresh = log.next(finalists.len(), || course.drive(&finalists, &course.fresh))?;
     let together: Vec<Totals> = order
         .iter()
         .zip(&fresh)
@@ -417,9 +417,9 @@ mod tests {
         let settings = Settings::preset("default").unwrap();
         let starts = planners_named(&["cvm".to_owned(), "vvf".to_owned()]).unwrap();
         let own = || origin(&settings, &starts[0], 8);
-        let mut driven = Driven::read(path.clone(), own()).unwrap();
-        driven.next(1, || Ok(vec![Totals::default()])).unwrap();
-        assert_eq!(Driven::read(path.clone(), own()).unwrap().totals, [Totals::default()]);
+        let mut log = CandidateLog::read(path.clone(), own()).unwrap();
+        log.next(1, || Ok(vec![Totals::default()])).unwrap();
+        assert_eq!(CandidateLog::read(path.clone(), own()).unwrap().totals, [Totals::default()]);
         let mut of_another_seed = settings.clone();
         of_another_seed.evaluation.seed = RootSeed(2);
         for other in [
@@ -427,12 +427,12 @@ mod tests {
             origin(&settings, &starts[1], 8),
             origin(&settings, &starts[0], 9),
         ] {
-            let refused = Driven::read(path.clone(), other).err().unwrap().to_string();
+            let refused = CandidateLog::read(path.clone(), other).err().unwrap().to_string();
             assert!(refused.contains("candidates.toml: was left by another search"), "{refused}");
         }
         // As earlier versions wrote it.
         sealed::write(&path, b"candidate = []").unwrap();
-        assert!(Driven::read(path.clone(), own()).is_err());
+        assert!(CandidateLog::read(path.clone(), own()).is_err());
         std::fs::remove_file(path).unwrap();
     }
 }

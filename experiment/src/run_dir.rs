@@ -617,6 +617,62 @@ mod tests {
         fs::remove_dir_all(path).unwrap();
     }
 
+    /// While reports are written anew, a stage is known by its other files: none of a report is held against it, nor anything
+    /// against another stage.
+    #[test]
+    fn reports_of_two_stages_that_were_cut_off_are_found_and_written_again_each_by_itself() {
+        let path = scratch("two-reports");
+        let settings = Settings::preset("smoke").unwrap();
+        let run = create(&path, false).unwrap();
+        let stages = ["drives", "elsewhere"];
+        let write_report = |stage: &RunDir| {
+            for name in ["report.html", "report.md"] {
+                stage.write(name, b"a report").unwrap();
+            }
+            sums::write_folder(stage.path(), "figures", [("a.svg".to_owned(), b"a figure".to_vec())]).unwrap();
+        };
+        for name in stages {
+            let stage = run.stage(name, &place(&path, false), &settings).unwrap().unwrap();
+            stage.write("runs.jsonl", name.as_bytes()).unwrap();
+            write_report(&stage);
+            stage.finish(Outcome::Reproduction { stages: 1 }).unwrap();
+        }
+        drop(run);
+        let finished = fs::read(path.join(sums::FILE)).unwrap();
+        let reopen = |name: &str| {
+            let stage = RunDir::reopen(&path.join(name), "render").unwrap();
+            stage.list_without_report().unwrap();
+            stage
+        };
+        // Killed when the page of one, then of the other, is there, and its figures are those of before.
+        for name in stages {
+            reopen(name).write("report.html", b"another report").unwrap();
+        }
+        let listed = sums::names(&path).unwrap();
+        for name in stages {
+            let is_listed = |file: &str| listed.contains(&format!("{name}/{file}"));
+            assert!(is_listed("runs.jsonl") && !OF_REPORT.iter().any(|file| is_listed(file)), "{listed:?}");
+        }
+        let cut_off = |stages: &[&str]| {
+            let faults = sums::verify(&path).faults;
+            assert!(faults.iter().all(sums::is_unfinished), "{faults:?}");
+            let ways: Vec<String> = faults.iter().filter_map(|fault| way_to_report(&fault.path)).collect();
+            let way = |name: &&str| format!("cargo xtask render report {}", quoted_path(&path.join(name)));
+            let expected: Vec<String> = stages.iter().map(way).collect();
+            assert_eq!((faults.len(), ways), (stages.len(), expected));
+        };
+        cut_off(&stages[..]);
+        for (at, name) in stages.iter().enumerate() {
+            let stage = reopen(name);
+            write_report(&stage);
+            stage.list_again().unwrap();
+            drop(stage);
+            cut_off(&stages[at + 1..]);
+        }
+        assert_eq!(fs::read(path.join(sums::FILE)).unwrap(), finished);
+        fs::remove_dir_all(path).unwrap();
+    }
+
     /// It was told to delete what it was to go on with, and where figures were lost, to go on though it was finished.
     #[test]
     fn what_helps_a_run_that_is_not_whole_is_said_by_name() {

@@ -3,7 +3,7 @@
 use crate::drive::rows_of;
 use crate::markdown::table_of;
 use crate::trainings::{Place, over_seeds};
-use evaluation::conclusions::Driven;
+use evaluation::conclusions::DrivenPlan;
 use evaluation::format::{difference, quoted_rate};
 use evaluation::names::{ALPHA_15, BC, DAGGER, EXPERT_EQUAL, EXPERT_ONLY, GRID_EXPERT, OF_PERSON, UNWEIGHTED};
 use evaluation::stages::Chain;
@@ -27,7 +27,7 @@ const CONTROLS: [(&str, Option<Chain>); 9] = [
 
 /// Policies that differ from `DAgger` in one thing, on unseen lots: the first training of each, then the means of those that
 /// were trained several times.
-pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyhow::Result<String> {
+pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &DrivenPlan<'_>) -> anyhow::Result<String> {
     let mut table = table_of(&[
         "policy",
         "rounds",
@@ -37,9 +37,7 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
         "per 100 m [95 %]",
         "− DAgger's [95 %]",
     ]);
-    let everywhere = driven.all();
-    let with = driven.driver(DAGGER).unwrap_or(0);
-    let (estimates, comparisons) = driven.results.judge(0, &everywhere, with, driven.plan.settings.evaluation.seed);
+    let place = Place::new(UNSEEN, driven, driven.all());
     for (name, chain) in CONTROLS {
         // An earlier version did not train all of them.
         let Some(driver) = driven.driver(name) else { continue };
@@ -49,8 +47,8 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
         }
         let last = rows.last();
         let or_dash = |number: Option<usize>| number.map_or_else(|| "–".to_owned(), |number| number.to_string());
-        let totals = driven.results.totals(0, driver, &everywhere, None);
-        let found = comparisons.iter().find(|comparison| comparison.driver == driver);
+        let totals = place.totals(driver);
+        let found = place.comparisons.iter().find(|comparison| comparison.driver == driver);
         let weight = last.and_then(|row| row.mean_weight);
         table.add_row([
             name.to_owned(),
@@ -58,7 +56,7 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
             or_dash(last.map(|row| row.dataset)),
             weight.map_or_else(|| "–".to_owned(), |weight| format!("{weight:.2}")),
             format!("{} ({})", totals.near_collisions, totals.contacts),
-            quoted_rate(&totals, &estimates[driver]),
+            quoted_rate(&totals, &place.estimates[driver]),
             found.map_or_else(|| "–".to_owned(), |found| difference(found.difference_per_100m, 2)),
         ]);
     }
@@ -71,7 +69,7 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
          *A person's hand*: the expert's labels come {delay_s} s late and tremble, as a person's would; the paper's expert was one. *{GRID_EXPERT}*: \
          nothing is learned; what the network is ahead of it is what learning brings.\n\n{table}"
     );
-    let over_seeds = over_seeds([&Place::new(UNSEEN, driven, everywhere)]);
+    let over_seeds = over_seeds([&place]);
     if over_seeds.row_count() > 0 {
         let _ = write!(
             text,
@@ -83,11 +81,16 @@ pub(crate) fn controls(root: &Path, seed: RootSeed, driven: &Driven<'_>) -> anyh
 }
 
 /// Points at half of the open way beside points as far as it is open, on unseen lots.
-pub(crate) fn points(root: &Path, seed: RootSeed, half: &Driven<'_>, far: &Driven<'_>) -> anyhow::Result<String> {
+pub(crate) fn points(
+    root: &Path,
+    seed: RootSeed,
+    half: &DrivenPlan<'_>,
+    far: &DrivenPlan<'_>,
+) -> anyhow::Result<String> {
     let mut table = table_of(&["points", "policy", "last η̂", "near-collisions (contacts)", "per 100 m [95 %]", "m/s"]);
     for (name, driven, chain) in [("half", half, Chain::Weighted), ("far", far, Chain::FarPoints)] {
         let everywhere = driven.all();
-        let (estimates, _) = driven.results.judge(0, &everywhere, 0, driven.plan.settings.evaluation.seed);
+        let estimates = driven.estimates(&everywhere);
         let rows = rows_of(root, chain, seed)?;
         for policy in [BC, DAGGER] {
             let Some(driver) = driven.driver(policy) else { continue };
@@ -111,7 +114,7 @@ pub(crate) fn points(root: &Path, seed: RootSeed, half: &Driven<'_>, far: &Drive
 }
 
 /// Planners in every reading, beside `DAgger`: on the paper's lots and on unseen ones.
-pub(crate) fn readings(reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
+pub(crate) fn readings(reference: &DrivenPlan<'_>, unseen: &DrivenPlan<'_>) -> String {
     let mut table = table_of(&[
         "driver",
         "the paper's lots",
@@ -123,7 +126,7 @@ pub(crate) fn readings(reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
     ]);
     let judged = [reference, unseen].map(|driven| {
         let everywhere = driven.all();
-        let judged = driven.results.judge(0, &everywhere, 0, driven.plan.settings.evaluation.seed);
+        let judged = driven.judge(&everywhere);
         (driven, everywhere, judged)
     });
     for (driver, named) in reference.plan.drivers.iter().enumerate() {
@@ -146,12 +149,12 @@ pub(crate) fn readings(reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
 }
 
 /// Every driver without action smoothing and with it, on unseen lots.
-pub(crate) fn action_smoothing(without: &Driven<'_>, with: &Driven<'_>) -> String {
+pub(crate) fn action_smoothing(without: &DrivenPlan<'_>, with: &DrivenPlan<'_>) -> String {
     let header = ["driver", "without", "per 100 m [95 %]", "reversals", "with", "per 100 m [95 %]", "reversals"];
     let mut table = table_of(&header);
     let judged = [without, with].map(|driven| {
         let everywhere = driven.all();
-        let (estimates, _) = driven.results.judge(0, &everywhere, 0, driven.plan.settings.evaluation.seed);
+        let estimates = driven.estimates(&everywhere);
         (driven, everywhere, estimates)
     });
     for (driver, named) in without.plan.drivers.iter().enumerate() {

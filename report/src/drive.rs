@@ -1,7 +1,7 @@
 //! What stages wrote, read back.
 
 use anyhow::Context as _;
-use evaluation::conclusions::Driven;
+use evaluation::conclusions::DrivenPlan;
 use evaluation::drive_stage::DriveStage;
 use evaluation::plan::Plan;
 use evaluation::results::EvaluationResults;
@@ -17,7 +17,7 @@ pub(crate) fn with_drives<const N: usize, T>(
     stages: &[Stage],
     root: &Path,
     folders: [&str; N],
-    then: impl FnOnce([Driven<'_>; N]) -> anyhow::Result<T>,
+    then: impl FnOnce([DrivenPlan<'_>; N]) -> anyhow::Result<T>,
 ) -> anyhow::Result<T> {
     let open = |folder: &str| {
         DriveStage::load(stages.iter().find(|stage| stage.folder == folder).context("every report has this stage")?)
@@ -26,7 +26,7 @@ pub(crate) fn with_drives<const N: usize, T>(
     let plans: Vec<Plan<'_>> = drives.iter().map(DriveStage::plan).collect();
     let read = |(plan, folder): (&Plan<'_>, &str)| EvaluationResults::read(plan, &root.join(folder));
     let results = plans.iter().zip(folders).map(read).collect::<anyhow::Result<Vec<_>>>()?;
-    then(std::array::from_fn(|i| Driven { plan: &plans[i], results: &results[i] }))
+    then(std::array::from_fn(|i| DrivenPlan { plan: &plans[i], results: &results[i] }))
 }
 
 /// Table 1 of a training of the run at `root`.

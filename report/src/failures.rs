@@ -22,16 +22,16 @@ One row each. The rules behind the causes are in `docs/methods.md` and at the to
 pub fn write(run: &RunDir) -> anyhow::Result<()> {
     let mut text = HEAD.to_owned();
     records::each_line(&run.path().join(records::FAILURES), |failure: FailureRecord| {
-        let FailureRecord { driven, tick, route_m, x_m, y_m, speed_mps, replay, .. } = &failure;
-        let (way, cause) = (driven.direction.name(), failure.cause.name());
+        let FailureRecord { header, tick, route_m, x_m, y_m, speed_mps, replay, .. } = &failure;
+        let (way, cause) = (header.direction.name(), failure.cause.name());
         let _ = writeln!(
             text,
             "| {} | {} | {way} | {} | {} | {tick} | {route_m:.1} | {x_m:.2} | {y_m:.2} | {speed_mps:.2} | {cause} | \
              `{replay}` |",
-            escaped(&driven.driver),
-            escaped(&driven.lot),
-            driven.trial,
-            driven.noise
+            escaped(&header.driver),
+            escaped(&header.lot),
+            header.trial,
+            header.noise
         );
         Ok(())
     })?;

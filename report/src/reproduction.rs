@@ -13,8 +13,9 @@ use crate::table1::{self, ByRound, READ_ETA_HAT};
 use crate::trainings::{self, Place};
 use crate::trainings_table::TrainingsTable;
 use evaluation::calibration::AxisCalibration;
-use evaluation::conclusions::{self, Against, Driven, Statement, Verdict};
+use evaluation::conclusions::{self, Against, DrivenPlan, Statement, Verdict};
 use evaluation::format::{difference, exact_rate, quoted_interval, quoted_rate};
+use evaluation::judge::DriverEstimate;
 use evaluation::names::{BC, DAGGER, UNWEIGHTED};
 use evaluation::on_policy::{Calibration, Effect, OnPolicy, States};
 use evaluation::paper::{self, PaperLot};
@@ -24,7 +25,7 @@ use evaluation::stages::{self, Chain, Extent};
 use evaluation::statistics::poisson::Rate;
 use evaluation::summary::csv_of;
 use evaluation::totals::Totals;
-use evaluation::trainings::{TRAININGS_MIN, teams};
+use evaluation::trainings::TRAININGS_MIN;
 use experiment::drivers::NamedDriver;
 use experiment::lots::UNSEEN;
 use experiment::manifest::Manifest;
@@ -160,12 +161,13 @@ impl Found {
             headline(page, &reference, &unseen);
             page.section("What holds here", verdicts(&statements, &recipe.extent));
             table_1(page, settings, &self.weighted, &self.unweighted, &self.on_policy.effect);
-            collision_rates(page, &reference);
-            safe_ratios(page, &reference);
-            unseen_lots(page, &unseen);
+            let judged = JudgedSlices::of(&reference);
+            collision_rates(page, &judged);
+            safe_ratios(page, &judged);
+            unseen_lots(page, &JudgedSlices::of(&unseen));
             page.section("How they drove", how_they_drove(&reference, &unseen));
             page.section("Ablations", "");
-            self.add_ablations_to(page, recipe, root, &reference)?;
+            self.add_ablations_to(page, recipe, root, &reference, &unseen)?;
             if recipe.extent.seeds > 1 {
                 page.section(
                     "Training seeds",
@@ -186,7 +188,8 @@ impl Found {
         page: &mut Page,
         recipe: &Recipe,
         root: &Path,
-        reference: &Driven<'_>,
+        reference: &DrivenPlan<'_>,
+        unseen: &DrivenPlan<'_>,
     ) -> anyhow::Result<()> {
         let seed = recipe.settings.seed;
         let folders = [stages::RULES, stages::CONTROLS];
@@ -197,8 +200,8 @@ impl Found {
             Ok(())
         })?;
         if recipe.stages.iter().any(|stage| stage.folder == stages::FAR_POINTS) {
-            with_drives(&recipe.stages, root, [stages::UNSEEN, stages::FAR_POINTS], |[half, far]| {
-                page.text(controls::points(root, seed, &half, &far)?);
+            with_drives(&recipe.stages, root, [stages::FAR_POINTS], |[far]| {
+                page.text(controls::points(root, seed, unseen, &far)?);
                 Ok(())
             })?;
         }
@@ -214,7 +217,7 @@ impl Found {
 }
 
 /// The learned drivers and the best of the others: near-collisions, contacts and least clearance side by side.
-fn headline(page: &mut Page, reference: &Driven<'_>, unseen: &Driven<'_>) {
+fn headline(page: &mut Page, reference: &DrivenPlan<'_>, unseen: &DrivenPlan<'_>) {
     let mut table =
         table_of(&["driver", "lots", "route", "near-collisions", "per 100 m [95 %]", "contacts", "least clearance"]);
     for (driven, label) in [(reference, "the paper's three"), (unseen, "unseen, generated")] {
@@ -237,7 +240,7 @@ fn headline(page: &mut Page, reference: &Driven<'_>, unseen: &Driven<'_>) {
 }
 
 /// Contacts, clearance, speed and steering of every driver.
-fn how_they_drove(reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
+fn how_they_drove(reference: &DrivenPlan<'_>, unseen: &DrivenPlan<'_>) -> String {
     let mut table = table_of(&[
         "driver",
         "lots",
@@ -269,8 +272,8 @@ fn how_they_drove(reference: &Driven<'_>, unseen: &Driven<'_>) -> String {
 
 fn statements(
     settings: &Settings,
-    reference: &Driven<'_>,
-    unseen: &Driven<'_>,
+    reference: &DrivenPlan<'_>,
+    unseen: &DrivenPlan<'_>,
     weighted: &[IterationRow],
     effect: &[Effect],
 ) -> Vec<Statement> {
@@ -401,20 +404,42 @@ fn weight_of(loss: &LossSettings) -> String {
     }
 }
 
+/// An evaluation, and how every driver stands in each of its slices.
+struct JudgedSlices<'a> {
+    driven: &'a DrivenPlan<'a>,
+    slices: Vec<(Slice, Vec<DriverEstimate>)>,
+}
+
+impl<'a> JudgedSlices<'a> {
+    fn of(driven: &'a DrivenPlan<'a>) -> Self {
+        let judged = |slice: Slice| {
+            let estimates = driven.estimates(&slice);
+            (slice, estimates)
+        };
+        Self { driven, slices: driven.results.slices().into_iter().map(judged).collect() }
+    }
+
+    fn totals(&self, driver: usize, slice: &Slice) -> Totals {
+        self.driven.results.totals(0, driver, slice, None)
+    }
+}
+
 /// Lots as columns, as in the paper: groups, then what is pooled.
 fn by_lot(
-    driven: &Driven<'_>,
-    cell: &dyn Fn(usize, &Slice) -> String,
+    judged: &JudgedSlices<'_>,
+    cell: &dyn Fn(&Totals, &DriverEstimate) -> String,
     paper: &dyn Fn(usize, &Slice) -> String,
 ) -> String {
-    let slices = driven.results.slices();
-    let header: Vec<&str> = std::iter::once("driver").chain(slices.iter().map(|slice| slice.label.as_str())).collect();
+    let slices = &judged.slices;
+    let labels = slices.iter().map(|(slice, _)| slice.label.as_str());
+    let header: Vec<&str> = std::iter::once("driver").chain(labels).collect();
     let mut table = table_of(&header);
-    for (driver, entry) in driven.plan.drivers.iter().enumerate() {
+    for (driver, entry) in judged.driven.plan.drivers.iter().enumerate() {
         let name = &entry.name;
-        table.add_row(std::iter::once(name.clone()).chain(slices.iter().map(|slice| cell(driver, slice))));
+        let cells = slices.iter().map(|(slice, estimates)| cell(&judged.totals(driver, slice), &estimates[driver]));
+        table.add_row(std::iter::once(name.clone()).chain(cells));
         if let Some(of_paper) = paper::DRIVERS.iter().position(|known| known == name) {
-            let cells: Vec<String> = slices.iter().map(|slice| paper(of_paper, slice)).collect();
+            let cells: Vec<String> = slices.iter().map(|(slice, _)| paper(of_paper, slice)).collect();
             if cells.iter().any(|cell| !cell.is_empty()) {
                 table.add_row(std::iter::once(format!("  paper: {name}")).chain(cells));
             }
@@ -431,51 +456,40 @@ fn count_of_paper(driver: usize, slice: &Slice, groups: &[LotGroup]) -> Option<(
     are_papers.then(|| paper::count(driver, |lot| names.contains(&lot.lot)))
 }
 
-fn rates_table(driven: &Driven<'_>, with_paper: bool) -> String {
-    let slices = driven.results.slices();
-    let estimates: Vec<_> = slices.iter().map(|slice| driven.estimates(slice)).collect();
-    let cell = |driver: usize, slice: &Slice| {
-        let totals = driven.results.totals(0, driver, slice, None);
-        let index = slices.iter().position(|known| known == slice).expect("one of them");
-        let Totals { near_collisions, contacts, .. } = totals;
-        format!("{near_collisions} ({contacts}): {}", quoted_rate(&totals, &estimates[index][driver]))
+fn rates_table(judged: &JudgedSlices<'_>, with_paper: bool) -> String {
+    let cell = |totals: &Totals, estimate: &DriverEstimate| {
+        format!("{} ({}): {}", totals.near_collisions, totals.contacts, quoted_rate(totals, estimate))
     };
     let of_paper = |driver: usize, slice: &Slice| {
-        let count = count_of_paper(driver, slice, driven.results.groups()).filter(|_| with_paper);
+        let count = count_of_paper(driver, slice, judged.driven.results.groups()).filter(|_| with_paper);
         count.map_or_else(String::new, |(events, metres)| format!("{events}: {}", exact_rate(events, metres)))
     };
-    by_lot(driven, &cell, &of_paper)
+    by_lot(judged, &cell, &of_paper)
 }
 
-fn collision_rates(page: &mut Page, driven: &Driven<'_>) {
+fn collision_rates(page: &mut Page, judged: &JudgedSlices<'_>) {
     page.section(
         "Collision rates on the paper's lots",
         format!(
             "Near-collisions (contacts), and near-collisions per 100 m of the route [95 %]. The paper's counts are recovered from \
              its rates.\n\n{}",
-            rates_table(driven, true)
+            rates_table(judged, true)
         ),
     );
-    let rates = rates_beside_paper(driven);
+    let rates = rates_beside_paper(judged);
     page.figure(
         "rates-beside-paper",
         "The paper's comparison beside ours, with intervals of 95 %: of the paper's counts exact ones, of ours as in the table.",
         Image::Svg(plots::bars("Collision rate", "near-collisions per 100 m", &paper::DRIVERS, &rates)),
     );
-    page.figure("rates", "Every driver, all lots of the paper together.", Image::Svg(rates_of_all(driven)));
+    page.figure("rates", "Every driver, all lots of the paper together.", Image::Svg(rates_of_all(judged)));
 }
 
 /// Near-collisions per 100 m, the paper's and ours.
-fn rates_beside_paper(driven: &Driven<'_>) -> Vec<BarGroup> {
-    let slices = driven.results.slices();
-    let estimates: Vec<_> = slices.iter().map(|slice| driven.estimates(slice)).collect();
+fn rates_beside_paper(judged: &JudgedSlices<'_>) -> Vec<BarGroup> {
     bars_beside_paper(
-        driven,
-        &|driver, slice| {
-            let totals = driven.results.totals(0, driver, slice, None);
-            let index = slices.iter().position(|known| known == slice).expect("one of them");
-            (totals.rate().per_unit, Some(quoted_interval(&totals, &estimates[index][driver])))
-        },
+        judged,
+        &|totals, estimate| (totals.rate().per_unit, Some(quoted_interval(totals, estimate))),
         &|driver, lot| {
             let (events, metres) = paper::count(driver, |known| known.lot == lot.lot);
             // Of its events nothing is known but their number.
@@ -490,29 +504,28 @@ type Height = (f64, Option<[f64; 2]>);
 
 /// The paper's drivers on its lots, as far as they were driven: its bar, then ours.
 fn bars_beside_paper(
-    driven: &Driven<'_>,
-    ours: &dyn Fn(usize, &Slice) -> Height,
+    judged: &JudgedSlices<'_>,
+    ours: &dyn Fn(&Totals, &DriverEstimate) -> Height,
     theirs: &dyn Fn(usize, &PaperLot) -> Height,
 ) -> Vec<BarGroup> {
-    let slices = driven.results.slices();
-    let lots = paper::LOTS.iter().filter_map(|lot| Some((lot, slices.iter().find(|slice| slice.label == lot.lot)?)));
-    let group = |(lot, slice): (&PaperLot, &Slice)| {
+    let group = |lot: &PaperLot| {
+        let (slice, estimates) = judged.slices.iter().find(|(slice, _)| slice.label == lot.lot)?;
         let bars = paper::DRIVERS.into_iter().enumerate().flat_map(|(driver, name)| {
             let bar = |(value, interval): Height, is_papers| Bar { driver, value, interval, is_papers };
-            let ours = driven.driver(name).map(|index| bar(ours(index, slice), false));
+            let own = judged.driven.driver(name);
+            let ours = own.map(|own| bar(ours(&judged.totals(own, slice), &estimates[own]), false));
             std::iter::once(bar(theirs(driver, lot), true)).chain(ours)
         });
-        BarGroup { name: lot.lot.to_owned(), bars: bars.collect() }
+        Some(BarGroup { name: lot.lot.to_owned(), bars: bars.collect() })
     };
-    lots.map(group).collect()
+    paper::LOTS.iter().filter_map(group).collect()
 }
 
 /// A row per driver, its lots together.
-fn rates_of_all(driven: &Driven<'_>) -> String {
-    let slice = driven.all();
-    let estimates = driven.estimates(&slice);
+fn rates_of_all(judged: &JudgedSlices<'_>) -> String {
+    let (slice, estimates) = judged.slices.last().expect("at least one lot is driven");
     let row = |(driver, entry): (usize, &NamedDriver)| {
-        let totals = driven.results.totals(0, driver, &slice, None);
+        let totals = judged.totals(driver, slice);
         let name = entry.name.clone();
         let group = match name.as_str() {
             "expert" => 0,
@@ -523,18 +536,14 @@ fn rates_of_all(driven: &Driven<'_>) -> String {
         let interval = quoted_interval(&totals, &estimates[driver]);
         RateRow { name, per_100m: totals.rate().per_unit, interval, group }
     };
-    let rows: Vec<RateRow> = driven.plan.drivers.iter().enumerate().map(row).collect();
+    let rows: Vec<RateRow> = judged.driven.plan.drivers.iter().enumerate().map(row).collect();
     plots::rates(&format!("Near-collisions, {}", slice.label), &rows)
 }
 
-fn safe_ratios(page: &mut Page, driven: &Driven<'_>) {
-    let slices = driven.results.slices();
-    let estimates: Vec<_> = slices.iter().map(|slice| driven.estimates(slice)).collect();
-    let cell = |driver: usize, slice: &Slice| {
-        let index = slices.iter().position(|known| known == slice).expect("one of them");
-        let interval = estimates[index][driver].safe_ratio;
-        let interval = interval.map_or_else(String::new, |i| format!(" [{:.3}, {:.3}]", i.lower, i.upper));
-        format!("{:.3}{interval}", driven.results.totals(0, driver, slice, None).safe_ratio())
+fn safe_ratios(page: &mut Page, judged: &JudgedSlices<'_>) {
+    let cell = |totals: &Totals, estimate: &DriverEstimate| {
+        let interval = estimate.safe_ratio.map_or_else(String::new, |i| format!(" [{:.3}, {:.3}]", i.lower, i.upper));
+        format!("{:.3}{interval}", totals.safe_ratio())
     };
     let of_paper = |driver: usize, slice: &Slice| {
         let lot = paper::LOTS.iter().find(|lot| lot.lot == slice.label);
@@ -542,14 +551,10 @@ fn safe_ratios(page: &mut Page, driven: &Driven<'_>) {
     };
     let text = "Drivable share of the metre around the body, mean over runs [95 %]. The widths of these lots were chosen so that \
                 a prototype's expert came near the paper's safe ratios: the expert's, and those of who imitates it well, are fitted, not found.";
-    page.section("Safe ratios on the paper's lots", format!("{text}\n\n{}", by_lot(driven, &cell, &of_paper)));
+    page.section("Safe ratios on the paper's lots", format!("{text}\n\n{}", by_lot(judged, &cell, &of_paper)));
     let ratios = bars_beside_paper(
-        driven,
-        &|driver, slice| {
-            let index = slices.iter().position(|known| known == slice).expect("one of them");
-            let interval = estimates[index][driver].safe_ratio.map(|interval| [interval.lower, interval.upper]);
-            (driven.results.totals(0, driver, slice, None).safe_ratio(), interval)
-        },
+        judged,
+        &|totals, estimate| (totals.safe_ratio(), estimate.safe_ratio.map(|interval| [interval.lower, interval.upper])),
         &|driver, lot| (lot.results[driver].safe_ratio, None),
     );
     page.figure(
@@ -559,19 +564,19 @@ fn safe_ratios(page: &mut Page, driven: &Driven<'_>) {
     );
 }
 
-fn unseen_lots(page: &mut Page, driven: &Driven<'_>) {
+fn unseen_lots(page: &mut Page, judged: &JudgedSlices<'_>) {
     page.section(
         "Unseen generated lots",
         format!(
             "Near-collisions (contacts), and near-collisions per 100 m of the route [95 %]; nothing was trained or tuned on these \
              lots.\n\n{}",
-            rates_table(driven, false)
+            rates_table(judged, false)
         ),
     );
-    page.figure("rates-unseen", "Every driver on generated lots.", Image::Svg(rates_of_all(driven)));
+    page.figure("rates-unseen", "Every driver on generated lots.", Image::Svg(rates_of_all(judged)));
 }
 
-fn decision_rules(root: &Path, recipe: &Recipe, driven: &Driven<'_>) -> anyhow::Result<String> {
+fn decision_rules(root: &Path, recipe: &Recipe, driven: &DrivenPlan<'_>) -> anyhow::Result<String> {
     let seed = recipe.settings.seed;
     let mut table = table_of(&[
         "network drives if",
@@ -611,24 +616,24 @@ fn decision_rules(root: &Path, recipe: &Recipe, driven: &Driven<'_>) -> anyhow::
 }
 
 /// Pairs of drivers that differ in one thing.
-fn weight_and_cloning(driven: &Driven<'_>) -> String {
+fn weight_and_cloning(driven: &DrivenPlan<'_>) -> String {
     let mut table = table_of(&["", "lots", "Δ near-collisions per 100 m [95 %]", "Δ safe ratio [95 %]"]);
-    let seed = driven.plan.settings.evaluation.seed;
-    let pairs = [(BC, DAGGER), (UNWEIGHTED, DAGGER)];
-    let has_teams = !teams(driven.plan.drivers).is_empty();
-    let slices: Vec<_> =
-        driven.results.slices().into_iter().map(|slice| (driven.judge_trainings(&slice), slice)).collect();
-    for (name, with) in pairs {
-        let (Some(driver), Some(with_index)) = (driven.driver(name), driven.driver(with)) else { continue };
-        for (trainings, slice) in &slices {
-            let (_, comparisons) = driven.results.judge(0, slice, with_index, seed);
-            let Some(found) = comparisons.into_iter().find(|comparison| comparison.driver == driver) else { continue };
-            let of_team = trainings.as_ref().and_then(|trainings| trainings.of(driver));
+    let judged = |slice: Slice| {
+        let (estimates, comparisons) = driven.judge(&slice);
+        let teams = driven.judge_teams(&slice, &estimates);
+        (slice, comparisons, teams)
+    };
+    let slices: Vec<_> = driven.results.slices().into_iter().map(judged).collect();
+    for name in [BC, UNWEIGHTED] {
+        let (Some(driver), Some(_)) = (driven.driver(name), driven.driver(DAGGER)) else { continue };
+        for (slice, comparisons, teams) in &slices {
+            let Some(found) = comparisons.iter().find(|comparison| comparison.driver == driver) else { continue };
+            let of_team = teams.of(driver).and_then(|(_, estimate)| estimate);
             // The first of several does not stand for all where there is too little to judge them by.
-            let of_one = found.difference_per_100m.filter(|_| !has_teams);
-            let near_collisions = of_team.map_or(of_one, |(_, estimate)| Some(estimate.difference_per_100m));
+            let of_one = found.difference_per_100m.filter(|_| teams.teams.is_empty());
+            let near_collisions = of_team.map_or(of_one, |estimate| Some(estimate.difference_per_100m));
             table.add_row([
-                format!("{name} − {with}"),
+                format!("{name} − {DAGGER}"),
                 slice.label.clone(),
                 difference(near_collisions, 2),
                 difference(found.difference_safe_ratio, 3),
@@ -730,12 +735,13 @@ mod tests {
             let metrics = EpisodeMetrics { near_collisions, reference_m: 100.0, ..EpisodeMetrics::default() };
             results.add(0, 0, index, &trial, &EpisodeReport { ending: Ending::ReachedEnd, metrics, events: vec![] });
         }
-        let driven = Driven { plan: &plan, results: &results };
-        let groups = rates_beside_paper(&driven);
+        let driven = DrivenPlan { plan: &plan, results: &results };
+        let judged = JudgedSlices::of(&driven);
+        let groups = rates_beside_paper(&judged);
         let ours = groups[0].bars.iter().find(|bar| !bar.is_papers && bar.driver == 0).unwrap();
         let [lower, upper] = ours.interval.unwrap();
         let quoted = format!("{:.2} [{lower:.2}, {upper:.2}] (b)", ours.value);
-        assert!(rates_table(&driven, false).contains(&quoted), "{quoted}: {}", rates_table(&driven, false));
+        assert!(rates_table(&judged, false).contains(&quoted), "{quoted}: {}", rates_table(&judged, false));
         assert!(upper > 1.5 * Rate::new(18, 12.0).upper, "wider than if each came by itself: {quoted}");
     }
 

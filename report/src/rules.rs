@@ -101,7 +101,7 @@ pub fn table(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path
     };
     let teams: Vec<Team> = pooled.iter().map(|row| team(&row.rule)).collect();
     let of_paper = teams.iter().position(|team| team.name == rules::title(OF_PAPER));
-    let of_teams = results.judge_teams(0, &everywhere, &teams, of_paper.unwrap_or(0), seed_of_trials);
+    let of_teams = results.judge_teams(0, &everywhere, &teams, of_paper.unwrap_or(0), &estimates, seed_of_trials);
     for (at, row) in pooled.iter_mut().enumerate() {
         let judged = of_teams.as_ref().map(|estimates| estimates[at].per_100m);
         let is_other = of_paper.is_some_and(|of_paper| of_paper != at);

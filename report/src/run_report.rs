@@ -14,7 +14,7 @@ use crate::what_if::distinct;
 use anyhow::Context as _;
 use evaluation::calibration::{self, AxisCalibration};
 use evaluation::names::BC;
-use evaluation::records::{self, Driven, FailureRecord, RunRecord};
+use evaluation::records::{self, FailureRecord, RecordHeader, RunRecord};
 use evaluation::summary::{Row, SweepRow, Tables};
 use evaluation::table1::Table1;
 use experiment::command_line::{command_line, quoted, quoted_path};
@@ -111,7 +111,7 @@ impl Evaluation {
         let mut evaluation =
             Self { text, tables, safe_ratios: BTreeMap::new(), near_collisions: 0, worst: Worst::default() };
         records::each_line(&folder.join(records::RUNS), |run: RunRecord| {
-            let Driven { driver, lot, noise, .. } = run.driven;
+            let RecordHeader { driver, lot, noise, .. } = run.header;
             let by_lot = evaluation.safe_ratios.entry((noise.to_string(), driver)).or_default();
             by_lot.entry(lot).or_default().push(run.report.metrics.safe_ratio);
             Ok(())
@@ -474,7 +474,7 @@ impl Worst {
         let mut chosen: Vec<FailureRecord> = Vec::new();
         for failure in self.0.drain(..) {
             let is_alike = |other: &&FailureRecord| {
-                (&other.driven.driver, &other.driven.lot) == (&failure.driven.driver, &failure.driven.lot)
+                (&other.header.driver, &other.header.lot) == (&failure.header.driver, &failure.header.lot)
             };
             if chosen.len() < MOMENTS && chosen.iter().filter(is_alike).count() < MOMENTS_OF_A_KIND {
                 chosen.push(failure);
@@ -521,9 +521,9 @@ fn add_moments(
         progress.at(0.2 + 0.8 * index as f64 / worst.len() as f64, &mut |_| {
             format!("near-collision {} of {}", index + 1, worst.len())
         });
-        let FailureRecord { driven, tick, route_m, speed_mps, .. } = failure;
-        let Driven { driver, lot, trial, noise, .. } = driven;
-        let way = driven.direction.name();
+        let FailureRecord { header, tick, route_m, speed_mps, .. } = failure;
+        let RecordHeader { driver, lot, trial, noise, .. } = header;
+        let way = header.direction.name();
         page.text(format!("### {} on {}, {way}\n", escaped(driver), escaped(lot)));
         let cause = failure.cause.name();
         let caption = format!(

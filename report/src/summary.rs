@@ -3,7 +3,7 @@
 use crate::markdown::{table_of, with_header};
 use crate::trainings::{self, HEADER};
 use comfy_table::Table;
-use evaluation::format::{clustered, difference, exact_rate, p_value, quoted_contacts, quoted_rate};
+use evaluation::format::{clustered, difference, exact_rate, p_value, quoted_contacts, quoted_rate, rate_ratio};
 use evaluation::incidents::Cause;
 use evaluation::paper::{self, PaperLot, PaperResult};
 use evaluation::slices::Slice;
@@ -253,15 +253,11 @@ fn comparison_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
                     .iter()
                     .all(|&driver| clustered(&judged.estimates[driver]).is_none());
                 let exact = |text: String| if is_exact { text } else { "–".to_owned() };
-                let number = |value: Option<f64>| value.map_or_else(|| "∞".to_owned(), |value| format!("{value:.2}"));
                 table.add_row([
                     summary.driver(driver).to_owned(),
                     judged.slice.label.clone(),
                     difference(comparison.difference_per_100m, 2),
-                    exact(match ratio.ratio {
-                        Some(value) => format!("{value:.2} [{:.2}, {}]", ratio.lower, number(ratio.upper)),
-                        None => format!("– [{:.2}, {}]", ratio.lower, number(ratio.upper)),
-                    }),
+                    exact(rate_ratio(ratio)),
                     exact(p_value(ratio.p_value)),
                     exact(p_value(comparison.p_holm)),
                     difference(comparison.difference_safe_ratio, 3),

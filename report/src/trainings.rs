@@ -3,9 +3,9 @@
 use crate::drive::rows_of;
 use crate::markdown::table_of;
 use comfy_table::Table;
-use evaluation::conclusions::Driven;
+use evaluation::conclusions::DrivenPlan;
 use evaluation::format::{interval, quoted_rate};
-use evaluation::judge::DriverEstimate;
+use evaluation::judge::{Comparison, DriverEstimate};
 use evaluation::names::{BC, DAGGER, UNWEIGHTED};
 use evaluation::slices::Slice;
 use evaluation::stages::{Chain, Extent, named};
@@ -48,30 +48,32 @@ fn list(each: &[Totals], count: fn(&Totals) -> u32) -> String {
     each.iter().map(|totals| count(totals).to_string()).collect::<Vec<_>>().join(", ")
 }
 
-/// Lots that were driven, and how all drivers and teams of trainings stand there.
+/// Lots that were driven, how all drivers and teams of trainings stand there, and how the others compare with DAgger.
 pub(crate) struct Place<'a> {
     lots: &'static str,
-    driven: &'a Driven<'a>,
+    driven: &'a DrivenPlan<'a>,
     slice: Slice,
-    estimates: Vec<DriverEstimate>,
-    trainings: Option<JudgedTeams>,
+    pub(crate) estimates: Vec<DriverEstimate>,
+    pub(crate) comparisons: Vec<Comparison>,
+    teams: JudgedTeams,
 }
 
 impl<'a> Place<'a> {
-    pub(crate) fn new(lots: &'static str, driven: &'a Driven<'a>, slice: Slice) -> Self {
-        let (estimates, trainings) = (driven.estimates(&slice), driven.judge_trainings(&slice));
-        Self { lots, driven, slice, estimates, trainings }
+    pub(crate) fn new(lots: &'static str, driven: &'a DrivenPlan<'a>, slice: Slice) -> Self {
+        let (estimates, comparisons) = driven.judge(&slice);
+        let teams = driven.judge_teams(&slice, &estimates);
+        Self { lots, driven, slice, estimates, comparisons, teams }
     }
 
-    fn totals(&self, driver: usize) -> Totals {
+    pub(crate) fn totals(&self, driver: usize) -> Totals {
         self.driven.results.totals(0, driver, &self.slice, None)
     }
 }
 
 /// Near-collisions, contacts and least clearance of a driver, of all its trainings where there are several.
 pub(crate) fn headline_row(place: &Place<'_>, driver: usize) -> [String; 7] {
-    let judged = place.trainings.as_ref();
-    let of_team = judged.and_then(|judged| judged.of(driver)).filter(|(team, _)| team.drivers.len() > 1);
+    let of_team = place.teams.of(driver).and_then(|(team, estimate)| Some((team, estimate?)));
+    let of_team = of_team.filter(|(team, _)| team.drivers.len() > 1);
     let drivers = of_team.map_or(std::slice::from_ref(&driver), |(team, _)| &team.drivers);
     let each: Vec<Totals> = drivers.iter().map(|&driver| place.totals(driver)).collect();
     let name = &place.driven.plan.drivers[driver].name;
@@ -97,7 +99,7 @@ pub(crate) fn headline_row(place: &Place<'_>, driver: usize) -> [String; 7] {
 pub(crate) fn over_seeds<'p, 'a: 'p>(places: impl IntoIterator<Item = &'p Place<'a>>) -> Table {
     let mut table = table_of(&HEADER);
     for place in places {
-        for (team, estimate) in place.trainings.iter().flat_map(|judged| &judged.teams) {
+        for (team, estimate) in place.teams.judged() {
             let each: Vec<Totals> = team.drivers.iter().map(|&driver| place.totals(driver)).collect();
             table.add_row(row(team, place.lots, &each, estimate, team.name != DAGGER));
         }
@@ -110,8 +112,8 @@ pub(crate) fn by_seed(
     settings: &Settings,
     extent: &Extent,
     root: &Path,
-    reference: &Driven<'_>,
-    unseen: &Driven<'_>,
+    reference: &DrivenPlan<'_>,
+    unseen: &DrivenPlan<'_>,
 ) -> anyhow::Result<String> {
     let place = |lots, driven, slice: Option<Slice>| slice.map(|slice| Place::new(lots, driven, slice));
     let places = [
@@ -201,7 +203,7 @@ mod tests {
                 results.add(0, driver, index, &trial, &report);
             }
         }
-        let driven = Driven { plan: &plan, results: &results };
+        let driven = DrivenPlan { plan: &plan, results: &results };
         let place = Place::new("lots", &driven, driven.all());
         let row = |driver| headline_row(&place, driver);
         let expected =
@@ -209,8 +211,8 @@ mod tests {
         assert_eq!(row(1), expected);
         assert_eq!(row(0)[..4], ["expert", "lots", "3000 m", "0"]);
         assert!(row(0)[4].contains("one-sided"), "{:?}", row(0));
-        let (team, estimate) = place.trainings.as_ref().unwrap().of(0).unwrap();
-        assert_eq!(row_of_others(team, place.totals(0), estimate), "-2.000 [-4.484, +0.484]");
+        let (team, estimate) = place.teams.of(0).unwrap();
+        assert_eq!(row_of_others(team, place.totals(0), estimate.unwrap()), "-2.000 [-4.484, +0.484]");
     }
 
     fn row_of_others(team: &Team, totals: Totals, estimate: &TeamEstimate) -> String {

@@ -3,7 +3,7 @@ use crate::format::quoted_interval;
 use crate::statistics::bootstrap::Interval;
 use crate::statistics::poisson::Rate;
 use crate::statistics::student::{half_width_of_mean, together};
-use crate::trainings::Team;
+use crate::trainings::{Team, TeamEstimate};
 use experiment::drivers::NamedDriver;
 use experiment::settings::Settings;
 use experiment::trained::TrainedOn;
@@ -43,6 +43,12 @@ fn results(drivers: usize, of: impl Fn(usize, &Trial<'_>) -> Option<EpisodeRepor
 
 fn slice(results: &EvaluationResults, label: &str) -> Slice {
     results.slices().into_iter().find(|slice| slice.label == label).unwrap()
+}
+
+/// How teams stand, compared with the first.
+fn judge_teams(results: &EvaluationResults, slice: &Slice, teams: &[Team]) -> Option<Vec<TeamEstimate>> {
+    let (of_drivers, _) = results.judge(0, slice, 0, RootSeed(1));
+    results.judge_teams(0, slice, teams, 0, &of_drivers, RootSeed(1))
 }
 
 /// The second of two networks was trained on lot b, and lot b was "unseen" all the same.
@@ -234,7 +240,7 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     let team = |drivers: &[usize]| of_seeds(drivers, &[1, 2, 3, 4, 5][..drivers.len()]);
     let teams = [team(&[0, 1, 2]), team(&[3, 4, 5]), team(&[6])];
     let slice = slice(&results, "all");
-    let found = results.judge_teams(0, &slice, &teams, 0, RootSeed(1)).unwrap();
+    let found = judge_teams(&results, &slice, &teams).unwrap();
     let rounded =
         |interval: Interval| [interval.lower, interval.estimate, interval.upper].map(|x| (x * 1e9).round() / 1e9);
     // Every lot is alike, so only the seeds vary: 1 ± t·s/√n = 1 ± 4.3027 · √3/√3, and never below none.
@@ -248,38 +254,67 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
     assert_eq!(rounded(found[2].difference_per_100m), [-3.302_652_73, 1.0, 5.302_652_73], "the other's seeds vary");
     // Seeds 2 to 4 are not paired with seeds 1 to 3: both means are uncertain by 3 · 4.3027 · 1/√3 / √3.
     let others = [team(&[0, 1, 2]), of_seeds(&[3, 4, 5], &[2, 3, 4])];
-    let apart = results.judge_teams(0, &slice, &others, 0, RootSeed(1)).unwrap()[1].difference_per_100m;
+    let apart = judge_teams(&results, &slice, &others).unwrap()[1].difference_per_100m;
     let half_width = together(4.302_652_73, 4.302_652_73);
     assert!((apart.upper - 1.0 - half_width).abs() < 1e-7, "{apart:?}");
     // Nor are trainings whose seeds nobody knows, but with themselves.
     let unknown = [of_seeds(&[0, 1, 2], &[]), of_seeds(&[3, 4, 5], &[])];
-    let found = results.judge_teams(0, &slice, &unknown, 0, RootSeed(1)).unwrap();
+    let found = judge_teams(&results, &slice, &unknown).unwrap();
     assert_eq!((found[1].difference_per_100m, rounded(found[0].difference_per_100m)), (apart, [0.0; 3]));
     // No draw of lots without events has any; the metres say what that supports.
-    let none = results.judge_teams(0, &slice, &[team(&[0, 1])], 0, RootSeed(1)).unwrap()[0].per_100m;
+    let none = judge_teams(&results, &slice, &[team(&[0, 1])]).unwrap()[0].per_100m;
     let metres = results.totals(0, 0, &slice, None).reference_m;
     assert_eq!([none.estimate, none.lower, none.upper], [0.0, 0.0, Rate::new(0, metres / 100.0).upper]);
     let first =
         |trial: &Trial<'_>| (trial.lot.name(), trial.index, trial.direction) == ("lot-a", 0, Direction::Forward);
     let one = self::results(5, |driver, trial| Some(report(u32::from(driver == 4 && first(trial)), 100.0, 0.5)));
-    let of_two = results.judge_teams(0, &slice, &[team(&[1, 2])], 0, RootSeed(1)).unwrap()[0].per_100m;
+    let of_two = judge_teams(&results, &slice, &[team(&[1, 2])]).unwrap()[0].per_100m;
     assert_eq!(rounded(of_two), [1.5; 3], "two trainings say nothing about other seeds");
     let of_one_lot = self::slice(&results, "lot-a");
-    assert!(
-        results.judge_teams(0, &of_one_lot, &teams, 0, RootSeed(1)).is_none(),
-        "of few trials all may be alike by chance"
-    );
-    let one = one.judge_teams(0, &slice, &[team(&[0, 1, 2, 3, 4])], 0, RootSeed(1)).unwrap()[0].per_100m;
+    assert!(judge_teams(&results, &of_one_lot, &teams).is_none(), "of few trials all may be alike by chance");
+    let one = judge_teams(&one, &slice, &[team(&[0, 1, 2, 3, 4])]).unwrap()[0].per_100m;
     assert!(one.estimate > 0.0 && one.upper == none.upper, "one event is not surer than none: {one:?}");
     // Lots and seeds that both vary: the first team's trainings are alike, the other's have 0, 1 and 2 events more.
     let both = self::results(6, |driver, trial| {
         let of_seed = if driver < 3 { 0 } else { driver as u32 - 3 };
         Some(report(3 + trial.index + of_seed, 100.0, 0.5))
     });
-    let both = both.judge_teams(0, &slice, &teams[..2], 0, RootSeed(1)).unwrap();
+    let both = judge_teams(&both, &slice, &teams[..2]).unwrap();
     let [lots, both] = [both[0].per_100m, both[1].per_100m];
     assert!(lots.lower < lots.estimate && (both.estimate - lots.estimate - 1.0).abs() < 1e-9, "{lots:?} {both:?}");
     let half_width = half_width_of_mean(&[0.0, 1.0, 2.0]);
     let expected = both.estimate - together(lots.estimate - lots.lower, half_width);
     assert!((both.lower - expected).abs() < 1e-9, "{both:?} {expected}");
+}
+
+/// Contacts of several trainings stood without an interval, beside near-collisions that had one.
+#[test]
+fn the_interval_of_contacts_of_a_team_is_for_other_lots_and_other_seeds() {
+    let touching = |near_collisions, contacts| {
+        let mut report = report(near_collisions, 100.0, 0.5);
+        report.metrics.contacts = contacts;
+        Some(report)
+    };
+    let team = |drivers: [usize; 3]| Team { name: String::new(), drivers: drivers.to_vec(), seeds: vec![1, 2, 3] };
+    let teams = [team([0, 1, 2]), team([3, 4, 5])];
+    let contacts = |results: &EvaluationResults| {
+        let found = judge_teams(results, &slice(results, "all"), &teams).unwrap();
+        found.into_iter().map(|estimate| estimate.contacts_per_100m).collect::<Vec<Interval>>()
+    };
+    let is_near = |found: Interval, [lower, estimate, upper]: [f64; 3]| {
+        let off = [found.lower - lower, found.estimate - estimate, found.upper - upper];
+        assert!(off.iter().all(|off| off.abs() < 1e-7), "{found:?} is not [{lower}, {estimate}, {upper}]");
+    };
+    // Everywhere: 0, 0 and 3 contacts by seed, two near-collisions of each; the others touch nothing.
+    let seeds_vary = results(6, |driver, _| touching(2, if driver == 2 { 3 } else { 0 }));
+    let [some, none] = contacts(&seeds_vary)[..] else { panic!("two teams") };
+    // 1 ± t·s/√n = 1 ± 4.3027 · √3/√3, and never below none.
+    is_near(some, [0.0, 1.0, 5.302_652_73]);
+    let metres = seeds_vary.totals(0, 3, &slice(&seeds_vary, "all"), None).reference_m;
+    is_near(none, [0.0, 0.0, Rate::new(0, metres / 100.0).upper]);
+    // Seeds alike: the interval of each of them, by the lots that are drawn.
+    let lots_vary = results(6, |_, trial| touching(0, 4 * trial.index));
+    let alone = lots_vary.judge(0, &slice(&lots_vary, "all"), 0, RootSeed(1)).0[0].contacts_per_100m.unwrap();
+    assert!(alone.lower < alone.estimate && alone.estimate < alone.upper, "{alone:?}");
+    is_near(contacts(&lots_vary)[0], [alone.lower, alone.estimate, alone.upper]);
 }

@@ -6,7 +6,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 /// Two-sided confidence of every interval that is printed.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// From this dispersion on the events cannot be taken for independent: quote the bootstrap only (docs/methods.md 8.3).
+/// Above this dispersion the events cannot be taken for independent: the exact interval alone is too narrow to be quoted
+/// (docs/methods.md 8.3).
 pub const DISPERSION_MAX: f64 = 1.5;
 
 /// Quantile of the χ² distribution with `2·half_freedom` degrees of freedom, halved.

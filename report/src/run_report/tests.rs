@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 
 fn failure(driver: &str, lot: &str, speed_mps: f32) -> FailureRecord {
     FailureRecord {
-        driven: Driven {
+        header: RecordHeader {
             schema: records::SCHEMA,
             driver: driver.to_owned(),
             lot: lot.to_owned(),
