@@ -41,6 +41,26 @@ pub(super) enum Shape {
     },
 }
 
+/// Nothing drawn yet: pixels of 10 cm, all of them occupied.
+pub(super) fn plain(name: &'static str, about: &'static str, size_m: (f32, f32)) -> Drawing {
+    Drawing {
+        name,
+        about,
+        size_m,
+        pixel_m: 0.1,
+        origin: "[0.0, 0.0, 0.0]",
+        background: OCCUPIED,
+        shapes: Vec::new(),
+        lot: "",
+        centre_line: None,
+    }
+}
+
+/// Numbers from 0 to 1 that look drawn.
+pub(super) fn scatter(i: usize, k: usize) -> f32 {
+    ((i * 7919 + k * 104_729 + 13) % 1000) as f32 / 1000.0
+}
+
 pub(super) fn band(points: &[(f32, f32)], radius_m: f32, width_m: f32) -> Shape {
     let points = points.iter().map(|&point| Vec2::from(point)).collect();
     let path = sim::path::Path::new(&ReferencePath { points, corner_radius_m: radius_m });
@@ -65,29 +85,49 @@ pub(super) fn disc(x: f32, y: f32, radius_m: f32) -> Shape {
 }
 
 impl Shape {
-    fn holds(&self, point: Vec2) -> bool {
+    /// Gives `paint` its parts: what each lies within, from its lowest to its highest x and y, and whether a point is in it.
+    fn parts(&self, mut paint: impl FnMut(Vec2, Vec2, &dyn Fn(Vec2) -> bool)) {
         match self {
             Self::Band { line, width_m } => {
-                line.windows(2).any(|ends| distance_to_segment(point, ends[0], ends[1]) < 0.5 * width_m)
+                for ends in line.windows(2) {
+                    let (low, high) = sim::geometry::bounds(ends);
+                    let holds = |point| distance_to_segment(point, ends[0], ends[1]) < 0.5 * width_m;
+                    paint(low - 0.5 * width_m, high + 0.5 * width_m, &holds);
+                }
             }
             Self::Box { pose, length_m, width_m } => {
-                let within = pose.world_from_ego().inverse_point(point).abs();
-                within.x < 0.5 * length_m && within.y < 0.5 * width_m
+                let (centre, reach_m) = (pose.position(), 0.5 * (length_m + width_m));
+                paint(centre - reach_m, centre + reach_m, &|point| {
+                    let within = pose.world_from_ego().inverse_point(point).abs();
+                    within.x < 0.5 * length_m && within.y < 0.5 * width_m
+                });
             }
-            Self::Disc { centre, radius_m } => centre.distance(point) < *radius_m,
+            Self::Disc { centre, radius_m } => {
+                paint(*centre - *radius_m, *centre + *radius_m, &|point| centre.distance(point) < *radius_m);
+            }
         }
     }
 }
 
 impl Drawing {
     pub(super) fn image(&self) -> GrayImage {
-        let (cols, rows) = (self.size_m.0 / self.pixel_m, self.size_m.1 / self.pixel_m);
-        GrayImage::from_fn(cols as u32, rows as u32, |col, row| {
-            let up = rows as u32 - 1 - row;
-            let point = Vec2::new(col as f32 + 0.5, up as f32 + 0.5) * self.pixel_m;
-            let last = self.shapes.iter().rev().find(|(shape, _)| shape.holds(point));
-            Luma([last.map_or(self.background, |&(_, value)| value)])
-        })
+        let (cols, rows) = ((self.size_m.0 / self.pixel_m) as u32, (self.size_m.1 / self.pixel_m) as u32);
+        let mut image = GrayImage::from_pixel(cols, rows, Luma([self.background]));
+        let pixels = |low_m: f32, high_m: f32, count: u32| {
+            (low_m / self.pixel_m) as u32..((high_m / self.pixel_m + 1.0) as u32).min(count)
+        };
+        for (shape, value) in &self.shapes {
+            shape.parts(|low, high, holds| {
+                for up in pixels(low.y, high.y, rows) {
+                    for col in pixels(low.x, high.x, cols) {
+                        if holds(Vec2::new(col as f32 + 0.5, up as f32 + 0.5) * self.pixel_m) {
+                            image.put_pixel(col, rows - 1 - up, Luma([*value]));
+                        }
+                    }
+                }
+            });
+        }
+        image
     }
 
     /// Names and texts of its files but the image.

@@ -1,28 +1,9 @@
 //! Eight more, drawn when families and presets were as they are, to see what carries over to maps nobody had in mind.
 
-use crate::drawing::{Drawing, FREE, OCCUPIED, Shape, UNKNOWN, area, band, car, disc, turned};
+use crate::drawing::{Drawing, FREE, OCCUPIED, Shape, UNKNOWN, area, band, car, disc, plain, scatter, turned};
 
 pub(super) fn drawings() -> Vec<Drawing> {
     vec![ferry_deck(), construction_site(), old_town(), drive_through(), toll_plaza(), farm_track(), quay(), ramps()]
-}
-
-fn plain(name: &'static str, about: &'static str, size_m: (f32, f32)) -> Drawing {
-    Drawing {
-        name,
-        about,
-        size_m,
-        pixel_m: 0.1,
-        origin: "[0.0, 0.0, 0.0]",
-        background: OCCUPIED,
-        shapes: Vec::new(),
-        lot: "",
-        centre_line: None,
-    }
-}
-
-/// Numbers from 0 to 1 that look drawn.
-fn scatter(i: usize, k: usize) -> f32 {
-    ((i * 7919 + k * 104_729 + 13) % 1000) as f32 / 1000.0
 }
 
 /// The car deck of a ferry: lorries on both sides of a casing, the way between them.

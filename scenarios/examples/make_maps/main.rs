@@ -1,7 +1,10 @@
-//! Draws the maps in `examples/maps`: `cargo run -p scenarios --example make_maps`. Kinds of ground that the generator
-//! does not make, as image files, scaled to the car. The same bytes every time.
+//! Draws the maps in `examples/maps` and `examples/maps-blind`: `cargo run -p scenarios --example make_maps`. Kinds of
+//! ground that the generator does not make, as image files, scaled to the car. The same bytes every time.
 #![allow(clippy::unwrap_used, missing_docs, reason = "an example that a person runs")]
 
+mod blind_indoors;
+mod blind_outdoors;
+mod blind_parking;
 mod drawing;
 mod first_twelve;
 mod last_eight;
@@ -10,22 +13,29 @@ mod later_nine;
 use drawing::Drawing;
 use std::path::{Path, PathBuf};
 
-fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/maps")
+fn folder(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name)
 }
 
 fn main() {
-    std::fs::create_dir_all(folder()).unwrap();
-    for drawing in drawings() {
-        drawing.image().save(folder().join(format!("{}.png", drawing.name))).unwrap();
-        for (file, text) in drawing.texts() {
-            std::fs::write(folder().join(file), text).unwrap();
+    for (name, drawings) in folders() {
+        let folder = folder(name);
+        std::fs::create_dir_all(&folder).unwrap();
+        for drawing in drawings {
+            drawing.image().save(folder.join(format!("{}.png", drawing.name))).unwrap();
+            for (file, text) in drawing.texts() {
+                std::fs::write(folder.join(file), text).unwrap();
+            }
         }
     }
 }
 
-fn drawings() -> Vec<Drawing> {
-    first_twelve::drawings().into_iter().chain(later_nine::drawings()).chain(last_eight::drawings()).collect()
+/// Maps that have been looked at while families and settings were made, and those whose makers knew nothing of how any
+/// driver fares.
+fn folders() -> [(&'static str, Vec<Drawing>); 2] {
+    let seen = [first_twelve::drawings(), later_nine::drawings(), last_eight::drawings()];
+    let blind = [blind_indoors::drawings(), blind_outdoors::drawings(), blind_parking::drawings()];
+    [("maps", seen.into_iter().flatten().collect()), ("maps-blind", blind.into_iter().flatten().collect())]
 }
 
 #[cfg(test)]
@@ -33,12 +43,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_maps_in_the_folder_are_those_that_are_drawn() {
-        for drawing in drawings() {
-            let kept = image::open(folder().join(format!("{}.png", drawing.name))).unwrap();
-            assert!(kept.into_luma8() == drawing.image(), "{}: draw the maps again", drawing.name);
-            for (file, text) in drawing.texts() {
-                assert_eq!(std::fs::read_to_string(folder().join(&file)).unwrap(), text, "{file}: draw the maps again");
+    fn the_maps_in_the_folders_are_those_that_are_drawn() {
+        for (name, drawings) in folders() {
+            let folder = folder(name);
+            for drawing in drawings {
+                let kept = image::open(folder.join(format!("{}.png", drawing.name))).unwrap();
+                assert!(kept.into_luma8() == drawing.image(), "{}: draw the maps again", drawing.name);
+                for (file, text) in drawing.texts() {
+                    let kept = std::fs::read_to_string(folder.join(&file)).unwrap();
+                    assert_eq!(kept, text, "{file}: draw the maps again");
+                }
             }
         }
     }
