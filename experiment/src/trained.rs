@@ -120,10 +120,17 @@ pub fn driving_folders(spec: &Path) -> anyhow::Result<Vec<PathBuf>> {
     // It says which files the network was trained on.
     sums::read(&run.join(MANIFEST), RUN_TOML_BYTES_MAX)?;
     let round = policy.file_name().and_then(|name| name.to_str()).filter(|name| !is_bc && name.starts_with("round-"));
+    // A lost line in the list would leave fewer networks than the rule has drive.
+    let members = settings_of(spec).map_or(1, |settings| settings.dagger.rule.members());
     let mut folders = vec![policy.clone()];
     for member in (1..).map_while(|member| Some(format!("{}-member-{member}", round?))) {
         let list = format!("{member}/{}", sums::FILE);
         if !sums::is_listed(run, &list)? {
+            ensure!(
+                folders.len() >= members,
+                "{}: does not list {list}, one of the {members} networks that drive; restore the file, or train again",
+                run.join(sums::FILE).display()
+            );
             break;
         }
         sums::read_listed(run, &list, sums::LIST_BYTES_MAX)?;
@@ -388,6 +395,11 @@ mod tests {
         fs::write(path.join(SETTINGS), &whole[1..]).unwrap();
         assert!(message(driving_folders(&path)).contains("settings.toml"), "damage does not make one network of it");
         fs::write(path.join(SETTINGS), whole).unwrap();
+        let list = fs::read_to_string(path.join(sums::FILE)).unwrap();
+        let without_last: Vec<&str> = list.lines().filter(|line| !line.contains("round-01-member-2")).collect();
+        fs::write(path.join(sums::FILE), without_last.join("\n") + "\n").unwrap();
+        assert!(message(driving_folders(&path)).contains("one of the 3 networks that drive"), "two of three drove");
+        fs::write(path.join(sums::FILE), list).unwrap();
         fs::remove_dir_all(&of_last[2]).unwrap();
         assert!(message(driving_folders(&path)).contains("round-01-member-2/sha256sums"));
         fs::remove_dir_all(path).unwrap();

@@ -38,12 +38,19 @@ pub(crate) fn first_runs(plan: &Plan<'_>, runs: u32) -> Show {
                     seed: evaluation.seed,
                     tick: 0,
                 };
-                let file = file_name(&title.replace(", ", "-").replace(' ', "-"));
+                let file = unlike_others(&file_name(&title.replace(", ", "-").replace(' ', "-")), &drives);
                 drives.push(DriveRequest { file, title, keys: vec![key] });
             }
         }
     }
     Show::Drives { settings: Box::new(plan.settings.clone()), drives }
+}
+
+/// A name of a file that no other drive has: what tells two drivers apart may not be told by names of files.
+fn unlike_others(file: &str, drives: &[DriveRequest]) -> String {
+    let numbered = (2..).map(|k| format!("{file}-{k}"));
+    let mut names = std::iter::once(file.to_owned()).chain(numbered);
+    names.find(|name| drives.iter().all(|drive| drive.file != *name)).unwrap_or_else(|| file.to_owned())
 }
 
 /// Records into the folder of a run that is finished. Errors are reported and do the run no harm.
@@ -64,4 +71,21 @@ pub(crate) fn record(run: &Path, show: Vec<Show>, output: &Output) -> anyhow::Re
 /// Where the recordings of a run are kept.
 pub(crate) fn recordings_of(run: &Path) -> PathBuf {
     run.join("recordings")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The recording of `run:a-b` replaced that of `run:a/b`.
+    #[test]
+    fn drivers_whose_names_differ_by_a_slash_have_recordings_of_their_own() {
+        let mut drives: Vec<DriveRequest> = Vec::new();
+        for title in ["run:a/b, lot-b", "run:a-b, lot-b", "run:a b, lot-b"] {
+            let file = unlike_others(&file_name(title), &drives);
+            drives.push(DriveRequest { file, title: title.to_owned(), keys: Vec::new() });
+        }
+        let files: Vec<&str> = drives.iter().map(|drive| &*drive.file).collect();
+        assert_eq!(files, ["run-a-b--lot-b", "run-a-b--lot-b-2", "run-a-b--lot-b-3"]);
+    }
 }
