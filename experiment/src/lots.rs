@@ -50,7 +50,7 @@ impl Drawn {
 
 /// Ways to name lots: how it is written, what it means.
 pub fn specs() -> Vec<(&'static str, String)> {
-    let families = format!("{}; all: one of each in turn", Family::list(""));
+    let families = format!("{}; all: one of each of the first {} in turn", Family::list(""), Family::ALL.len());
     [
         ("lot-a", "the paper's training lot rebuilt: 231 m; new obstacles in every trial"),
         ("lot-b", "139 m, the narrowest, never trained on"),

@@ -12,6 +12,8 @@
 //! | [`halls`] | aisles between racks, other aisles closed |
 //! | [`yards`] | wide ground on which things stand apart |
 //! | [`chicanes`] | roads with barriers from either side in turn |
+//! | [`cones`] | ways between rows of cones or bollards on open ground |
+//! | [`slanted`] | aisles of a car park whose stalls are at a slant |
 //! | [`strip`] | the ground: a centre line of straight pieces, arcs and corners, its edges and their notches |
 //! | [`course`] | how centre lines are drawn |
 //! | [`winding`] | what yards and chicanes have in common: ground of one width that winds, and its edge |
@@ -22,6 +24,7 @@
 
 mod aisles;
 mod chicanes;
+mod cones;
 mod corridor;
 mod course;
 mod halls;
@@ -30,6 +33,7 @@ mod open;
 mod parts;
 mod rooms;
 mod route;
+mod slanted;
 mod street;
 mod strip;
 mod things;
@@ -58,6 +62,8 @@ pub(crate) fn draw(family: Family, layout: &mut Rng, obstacles: &mut Rng) -> Opt
         Family::Halls => halls::draw(layout, obstacles),
         Family::Yards => yards::draw(layout, obstacles),
         Family::Chicanes => chicanes::draw(layout, obstacles),
+        Family::Cones => cones::draw(layout, obstacles),
+        Family::Slanted => slanted::draw(layout, obstacles),
     };
     on_strip.map(|(scenario, _)| scenario)
 }
@@ -86,7 +92,7 @@ mod tests {
 
     type Is<'a> = dyn Fn(&Scenario, &Strip) -> bool + 'a;
     type Draw = fn(&mut Rng, &mut Rng) -> Option<(Scenario, Strip)>;
-    const DRAWS: [(Family, Draw); 9] = [
+    const DRAWS: [(Family, Draw); 11] = [
         (Family::Lane, lane::draw),
         (Family::Rooms, rooms::draw),
         (Family::Street, street::draw),
@@ -96,6 +102,8 @@ mod tests {
         (Family::Halls, halls::draw),
         (Family::Yards, yards::draw),
         (Family::Chicanes, chicanes::draw),
+        (Family::Cones, cones::draw),
+        (Family::Slanted, slanted::draw),
     ];
 
     /// A car that does not know the route must not find another way. Ground that a disc a little wider than the car can
@@ -111,9 +119,9 @@ mod tests {
                 let scenario = Scenario { name: family.name().to_owned(), ..scenario };
                 let outline = strip.outline(0.0);
                 // Anything no deeper than a stall is not a way.
+                let stall_m = if family == Family::Slanted { slanted::DEPTH_MAX_M } else { STALL_DEPTH_M };
                 let sides = strip.notches.iter().map(|notch| strip.mouth(notch));
-                let mouths: Vec<_> =
-                    sides.chain(strip.stub_mouths()).filter(|mouth| mouth.depth_m > STALL_DEPTH_M).collect();
+                let mouths: Vec<_> = sides.chain(strip.stub_mouths()).filter(|mouth| mouth.depth_m > stall_m).collect();
                 let Ok(map) = Map::build(scenario, &VehicleSettings::hyundai_hg300()) else { continue };
                 let reached = flooded(&map);
                 if family != Family::Track {
@@ -129,6 +137,31 @@ mod tests {
             }
             assert!(looked_at > 5, "{family:?}: only {looked_at} of 10 lots were drawn");
         }
+    }
+
+    /// Where stalls are at a slant, ground is left beside the first and the last one.
+    #[test]
+    fn nothing_gets_in_beside_the_ends_of_slanted_rows() {
+        let mut looked_at = 0;
+        for index in 0..12 {
+            let seed = Split::Test.seed(Family::Slanted, index);
+            let drawn = slanted::draw(&mut seed.rng(Stream::Layout, 0), &mut seed.rng(Stream::Obstacles, 0));
+            let Some((scenario, strip)) = drawn else { continue };
+            let scenario = Scenario { name: Family::Slanted.name().to_owned(), ..scenario };
+            let Ok(map) = Map::build(scenario, &VehicleSettings::hyundai_hg300()) else { continue };
+            let reached = flooded(&map);
+            for notch in &strip.notches {
+                for s_m in [notch.from_m + 1.2, notch.to_m - 1.2] {
+                    for away_m in [1.5, 2.5, 3.5] {
+                        let at = strip.point(s_m, notch.side.sign() * (strip.half_width_m(s_m) + away_m));
+                        let cell = (at / CELL_M).round().as_ivec2().into();
+                        assert!(!reached.contains(&cell), "{index}: beside the row at {at}");
+                    }
+                }
+            }
+            looked_at += 1;
+        }
+        assert!(looked_at > 5, "only {looked_at} of 12 lots were drawn");
     }
 
     /// Families are what the docs say (docs/maps.md).
@@ -152,8 +185,16 @@ mod tests {
             };
             scenario.obstacles.iter().filter(is_such).count() > 20
         };
+        let is_obstructed = |scenario: &Scenario, strip: &Strip| {
+            let (outline, ends) = (strip.outline(-0.2), [0.0, strip.length_m()].map(|s_m| strip.point(s_m, 0.0)));
+            scenario
+                .obstacles
+                .iter()
+                .map(|obstacle| obstacle.centre().position())
+                .any(|at| polygon_contains(&outline, at) && ends.iter().all(|end| end.distance(at) > 10.0))
+        };
         // Family, what, share of its lots: at least and at most.
-        let all: [(Family, &str, &Is<'_>, f32, f32); 21] = [
+        let all: [(Family, &str, &Is<'_>, f32, f32); 28] = [
             (Family::Lane, "narrower than 3.8 m", &|_, strip| strip.half_width_m(0.0) < 1.9, 0.35, 0.65),
             (Family::Lane, "narrower than 3.0 m", &|_, strip| strip.half_width_m(0.0) < 1.5, 0.03, 0.3),
             (Family::Lane, "wider than 6 m", &|_, strip| strip.half_width_m(0.0) > 3.0, 0.05, 0.4),
@@ -175,6 +216,13 @@ mod tests {
             (Family::Chicanes, "with planters", &|lot, _| !lot.islands.is_empty(), 0.2, 0.6),
             (Family::Chicanes, "narrower than 8 m", &|_, strip| strip.half_width_m(0.0) < 4.0, 0.2, 0.6),
             (Family::Yards, "with fountains", &|lot, _| !lot.islands.is_empty(), 0.6, 1.0),
+            (Family::Cones, "narrower than 4.4 m", &|_, strip| strip.half_width_m(0.0) < 2.2, 0.3, 0.7),
+            (Family::Cones, "without bollards", &|lot, _| !has(lot, ObstacleClass::Bollard), 0.3, 0.7),
+            (Family::Cones, "with kerbs", &|lot, _| has(lot, ObstacleClass::Curb), 0.03, 0.25),
+            (Family::Cones, "with something in the lane", &is_obstructed, 0.3, 0.7),
+            (Family::Slanted, "with rows of stalls", &|_, strip| strip.notches.len() > 3, 0.9, 1.0),
+            (Family::Slanted, "with three aisles", &|_, strip| strip.straights().len() > 3, 0.2, 0.8),
+            (Family::Slanted, "with islands", &|lot, _| !lot.islands.is_empty(), 0.2, 0.6),
         ];
         for (family, what, is, least, most) in all {
             let share = share(&lots(family), is);

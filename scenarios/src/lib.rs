@@ -41,7 +41,7 @@ use std::path::PathBuf;
 /// The lots that a name means; several names are separated by commas.
 ///
 /// `lot-a`, `lot-b`, `lot-c` · `reference` (all three) · `train:N`, `validation:N`, `test:N` (the first N generated lots
-/// of a split, medium unless `:hard` or another [`Family`] follows; `:all` takes all families in turn) ·
+/// of a split, medium unless `:hard` or another [`Family`] follows; `:all` takes [`Family::ALL`] in turn) ·
 /// `sealed:PHRASE:N` (lots that nobody has seen before the phrase was chosen: easy, medium and hard in turn unless a
 /// family or `:all` follows) · `test-hard-7` (a single one, counted from 0) · a path ending in `.toml`, or in `.yaml`
 /// or `.csv` for a map with its route beside it (see [`import`]).
@@ -238,7 +238,7 @@ fn split_called(name: &str) -> Option<Split> {
 }
 
 fn family_called(name: &str) -> Option<Family> {
-    Family::ALL.into_iter().find(|family| family.name() == name)
+    Family::EVERY.into_iter().find(|family| family.name() == name)
 }
 
 /// FNV-1a: pins text in tests.
@@ -265,6 +265,7 @@ mod tests {
             ("test:3:hard", &["test-hard-0", "test-hard-1", "test-hard-2"]),
             ("test-hard-41", &["test-hard-41"]),
             ("train:2:rooms", &["train-rooms-0", "train-rooms-1"]),
+            ("train:1:cones,test-slanted-7", &["train-cones-0", "test-slanted-7"]),
             ("sealed:spring:2:lane", &["sealed-spring-lane-0", "sealed-spring-lane-1"]),
             (
                 "sealed:a-b-hard-3:4",
@@ -282,6 +283,13 @@ mod tests {
             let expected: Vec<String> = expected.iter().map(ToString::to_string).collect();
             assert_eq!(names(name), Ok(expected), "{name}");
         }
+    }
+
+    /// Figures and trainings name `all`: families made since do not change what it means.
+    #[test]
+    fn all_stands_for_twelve_families() {
+        let names = names("validation:13:all").expect("names of lots");
+        assert_eq!(names[11..], ["validation-chicanes-0", "validation-easy-1"]);
     }
 
     #[test]
@@ -316,7 +324,7 @@ mod tests {
         let several = "reference".parse::<LotSpec>().expect_err("three lots").to_string();
         assert!(several.starts_with("\"reference\" stands for 3 lots where one is wanted"), "{several}");
         let listed = suite("lot-d").unwrap_err().to_string();
-        assert!(listed.contains(":all, :easy, ") && listed.contains(", :yards or :chicanes)"), "{listed}");
+        assert!(listed.contains(":all, :easy, ") && listed.contains(", :cones or :slanted)"), "{listed}");
     }
 
     /// Reference lots change with the trial, others do not; every lot carries the name it was asked for by.

@@ -36,32 +36,59 @@ pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, S
     let mut strip = first_apart(layout, 0.2, course)?;
     let (rows, side_aisles) = rows(&strip, stall_m, layout);
     strip.notches = rows.iter().chain(&side_aisles).copied().collect();
-    if !strip.keeps_apart(0.2) {
-        return None;
-    }
-    let mut things = things_on(&strip);
-    let occupancy = obstacles.random_range(0.25..0.9);
-    let side_mouths = side_aisles.iter().map(|aisle| (strip.mouth(aisle), false));
-    let is_row = |mouth: &Mouth| mouth.depth_m <= STALL_DEPTH_M;
-    let end_mouths = strip.stub_mouths().into_iter().map(|mouth| (mouth, is_row(&mouth)));
-    for (mouth, has_stalls) in side_mouths.chain(end_mouths) {
-        if has_stalls {
-            park_across(&mut things, &mouth, stall_m, occupancy, obstacles);
-        } else {
-            close(&mut things, &mouth, obstacles);
+    let lot = CarPark { stall_m, occupancy: 0.25..0.9, side_aisles: &side_aisles };
+    lot.draw(strip, layout, obstacles, |things, strip, occupancy, rng| {
+        for row in &rows {
+            park(things, strip, row, stall_m, occupancy, rng);
         }
+    })
+}
+
+/// What car parks have in common, however cars stand in their rows.
+pub(super) struct CarPark<'a> {
+    /// Width of stalls across the end of an aisle, metres.
+    pub(super) stall_m: f32,
+    /// Share of the stalls in which a car stands.
+    pub(super) occupancy: Range<f64>,
+    /// Of the notches of the strip, those that are to be closed.
+    pub(super) side_aisles: &'a [Notch],
+}
+
+impl CarPark<'_> {
+    /// Closes ends of aisles and side aisles or fills them with stalls, lets rows be filled to an occupancy, and encloses all
+    /// of it; `None` if the strip meets itself.
+    pub(super) fn draw(
+        &self,
+        strip: Strip,
+        layout: &mut Rng,
+        obstacles: &mut Rng,
+        fill_rows: impl FnOnce(&mut Things<'_>, &Strip, f64, &mut Rng),
+    ) -> Option<(Scenario, Strip)> {
+        if !strip.keeps_apart(0.2) {
+            return None;
+        }
+        let mut things = things_on(&strip);
+        let occupancy = obstacles.random_range(self.occupancy.clone());
+        let side_mouths = self.side_aisles.iter().map(|aisle| (strip.mouth(aisle), false));
+        let is_row = |mouth: &Mouth| mouth.depth_m <= STALL_DEPTH_M;
+        let end_mouths = strip.stub_mouths().into_iter().map(|mouth| (mouth, is_row(&mouth)));
+        for (mouth, has_stalls) in side_mouths.chain(end_mouths) {
+            if has_stalls {
+                park_across(&mut things, &mouth, self.stall_m, occupancy, obstacles);
+            } else {
+                close(&mut things, &mouth, obstacles);
+            }
+        }
+        fill_rows(&mut things, &strip, occupancy, obstacles);
+        in_the_aisle(&mut things, &strip, obstacles);
+        let wall = match layout.random_range(0..10) {
+            0..5 => None,
+            5..8 => Some(Wall::kerb()),
+            _ => Some(Wall::low(layout)),
+        };
+        let lot = enclosed(&strip, things, wall, BEHIND_WALL_M, layout);
+        Some((lot, strip))
     }
-    for row in &rows {
-        park(&mut things, &strip, row, stall_m, occupancy, obstacles);
-    }
-    in_the_aisle(&mut things, &strip, obstacles);
-    let wall = match layout.random_range(0..10) {
-        0..5 => None,
-        5..8 => Some(Wall::kerb()),
-        _ => Some(Wall::low(layout)),
-    };
-    let lot = enclosed(&strip, things, wall, BEHIND_WALL_M, layout);
-    Some((lot, strip))
 }
 
 /// Up and down, from aisle to aisle.
@@ -70,7 +97,7 @@ fn course(rng: &mut Rng) -> Course {
     let cross_m = rng.random_range(AISLE_M);
     let pitch_m = aisle_m + 2.0 * STALL_DEPTH_M + rng.random_range(MEDIAN_M);
     let leg_m = rng.random_range(LEG_M);
-    let aisles = Aisles { aisle_m, cross_m, leg_m, length_max_m: LENGTH_MAX_M };
+    let aisles = Aisles { count: 2..=4, aisle_m, cross_m, leg_m, length_max_m: LENGTH_MAX_M };
     aisles.up_and_down(rng, |_| pitch_m, |rng| rng.random_range(0.0..1.0), row_or_dead_end)
 }
 

@@ -5,7 +5,7 @@ use super::strip::{Corner, Piece, Strip, Stub};
 use rand::RngExt as _;
 use sim::geometry::Pose;
 use sim::seed::Rng;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 /// A centre line while it is drawn, along world +x at first.
 pub(super) struct Course {
@@ -66,6 +66,8 @@ impl Course {
 /// Parallel aisles, joined by cross aisles at their ends.
 #[allow(clippy::struct_field_names, reason = "the postfix is the unit")]
 pub(super) struct Aisles {
+    /// How many at least and at most.
+    pub(super) count: RangeInclusive<i32>,
     pub(super) aisle_m: f32,
     pub(super) cross_m: f32,
     /// The piece of an aisle that is driven, corner to corner, metres.
@@ -75,7 +77,7 @@ pub(super) struct Aisles {
 }
 
 impl Aisles {
-    /// Up and down two to four of them. To each next one: how far it is, what is cut off the corners there, metres, and what
+    /// Up and down all of them. To each next one: how far it is, what is cut off the corners there, metres, and what
     /// is beside the way at either corner.
     pub(super) fn up_and_down(
         &self,
@@ -84,11 +86,11 @@ impl Aisles {
         mut chamfer_m: impl FnMut(&mut Rng) -> f32,
         beside: fn(&mut Rng) -> Option<Stub>,
     ) -> Course {
-        let Self { aisle_m, cross_m, leg_m, length_max_m } = *self;
+        let Self { ref count, aisle_m, cross_m, leg_m, length_max_m } = *self;
         let mut turn_rad = if rng.random_bool(0.5) { 1.0 } else { -1.0 } * std::f32::consts::FRAC_PI_2;
         let mut course = Course::new(aisle_m);
         course.straight(RUN_OUT_M + leg_m * rng.random_range(0.4..1.0));
-        let aisles = rng.random_range(2..=4);
+        let aisles = rng.random_range(count.clone());
         for k in 1..aisles {
             let pitch_m = pitch_m(rng);
             let needs_m = pitch_m + if k == aisles - 1 { 0.0 } else { leg_m };

@@ -55,7 +55,7 @@ fn course(rng: &mut Rng) -> Course {
         let rows = rng.random_range(1..=2) as f32;
         (rows * (aisle_m + rng.random_range(RACK_M))).max(10.5)
     };
-    let aisles = Aisles { aisle_m, cross_m, leg_m, length_max_m: LENGTH_MAX_M };
+    let aisles = Aisles { count: 2..=4, aisle_m, cross_m, leg_m, length_max_m: LENGTH_MAX_M };
     aisles.up_and_down(rng, pitch_m, |_| chamfer_m, goes_on)
 }
 

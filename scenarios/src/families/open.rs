@@ -3,13 +3,13 @@
 
 use super::course::{Course, first_apart};
 use super::parts::{RUN_OUT_M, lot, things_on};
-use super::strip::Strip;
+use super::strip::{Strip, is_on, line_length_m, point_at};
 use super::things::{self, Rules, Things, facing, side, yaw_rad};
 use super::walls::{Wall, yard};
 use crate::clutter::draw_car;
 use crate::corridor::to_millimetres;
 use rand::RngExt as _;
-use sim::geometry::{Pose, Vec2, edges, polygon_contains, rectangle};
+use sim::geometry::{Pose, Vec2, polygon_contains, rectangle};
 use sim::maths;
 use sim::scenario::{Island, Obstacle, ObstacleClass, Scenario};
 use sim::seed::Rng;
@@ -127,19 +127,6 @@ fn stretches(outline: &[Vec2]) -> Vec<Vec<Vec2>> {
     stretches
 }
 
-/// A point of a polyline by its distance from the beginning, clamped.
-fn point_at(line: &[Vec2], at_m: f32) -> Vec2 {
-    let mut left_m = at_m.max(0.0);
-    for pair in line.windows(2) {
-        let length_m = pair[0].distance(pair[1]);
-        if left_m <= length_m {
-            return pair[0].lerp(pair[1], left_m / length_m);
-        }
-        left_m -= length_m;
-    }
-    line[line.len() - 1]
-}
-
 impl Ground<'_> {
     /// Things one behind the other along a stretch of the outline.
     fn line(&mut self, stretch: &[Vec2], rng: &mut Rng) {
@@ -152,7 +139,7 @@ impl Ground<'_> {
             4 => &[Pillar, Cone],
             _ => &[ParkedAlong, ParkedAcross, Planter, Wall, Pillar, Cone],
         };
-        let length_m: f32 = stretch.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+        let length_m = line_length_m(stretch);
         let mut at_m = rng.random_range(0.0..0.5);
         while length_m - at_m > 0.5 {
             let mut item = Item::draw(palette[rng.random_range(0..palette.len())], rng);
@@ -222,11 +209,8 @@ impl Ground<'_> {
             // A little larger than the thing.
             let centre = at - along.perp() * 0.5 * item.depth_m;
             let reach = rectangle(Pose::new(centre, maths::angle_rad(along)), item.length_m + 1.0, item.depth_m + 1.0);
-            let is_on_way = edges(outline)
-                .any(|(c, d)| edges(&reach).any(|(e, f)| crate::corridor::segments_cross(c, d, e, f)))
-                || polygon_contains(outline, at);
             let is_inside = reach.iter().all(|&corner| polygon_contains(boundary, corner));
-            if is_inside && !is_on_way {
+            if is_inside && !is_on(outline, &reach) {
                 self.put(&item, a, b, 0.0, rng);
             }
         }

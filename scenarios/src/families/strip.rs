@@ -4,7 +4,7 @@
 //! to the left of it. Edges are those of the centre line as it is, sharp corners included.
 
 use crate::corridor::{Side, segments_cross, to_millimetres};
-use sim::geometry::{Pose, Vec2, bounds, edges, wrap_angle};
+use sim::geometry::{Pose, Vec2, bounds, edges, polygon_contains, wrap_angle};
 use sim::maths;
 
 /// Radius with which the axis rounds a sharp corner, metres.
@@ -365,6 +365,30 @@ fn without_doubles(mut points: Vec<Vec2>) -> Vec<Vec2> {
         points.pop();
     }
     points
+}
+
+/// A point of a polyline by its distance from the beginning, clamped.
+pub(super) fn point_at(line: &[Vec2], at_m: f32) -> Vec2 {
+    let mut left_m = at_m.max(0.0);
+    for pair in line.windows(2) {
+        let length_m = pair[0].distance(pair[1]);
+        if left_m <= length_m {
+            return pair[0].lerp(pair[1], left_m / length_m);
+        }
+        left_m -= length_m;
+    }
+    line[line.len() - 1]
+}
+
+/// Length of a polyline, metres.
+pub(super) fn line_length_m(line: &[Vec2]) -> f32 {
+    line.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
+}
+
+/// Whether a thing is on ground with an outline, wholly or in part.
+pub(super) fn is_on(ground: &[Vec2], thing: &[Vec2]) -> bool {
+    edges(ground).any(|(c, d)| edges(thing).any(|(e, f)| segments_cross(c, d, e, f)))
+        || polygon_contains(ground, thing[0])
 }
 
 /// Whether no two edges of a closed polygon cross.
