@@ -82,8 +82,8 @@ pub fn table(stages: &[Stage], root: &Path) -> anyhow::Result<TrainingsTable> {
     Ok(TrainingsTable { csv: csv_of(&rows)?, svg: plot(&rows), text })
 }
 
-const LEGEND: &str = "Of one training of each: intervals of 95 % are for other lots, not for other seeds; (b): bootstrap, where \
-    near-collisions come in clusters. A difference that excludes zero (*) is one of many, and no adjustment is made for their number.";
+const LEGEND: &str = "Of one training of each: intervals of 95 % are for other lots, not for other seeds; (b): where near-collisions \
+    come in clusters, the farther ends of the exact interval and a bootstrap. A difference that excludes zero (*) is one of many, and no adjustment is made for their number.";
 
 fn rows_of(stage: &Stage, stages: &[Stage], root: &Path) -> anyhow::Result<Vec<Row>> {
     let drive = DriveStage::load(stage)?;

@@ -303,8 +303,8 @@ fn introduction(recipe: &Recipe) -> String {
          rebuilt in simulation: trained on {}, driven on {} in {} trials, and on {}. Root seed {}{}, seed of the \
          evaluation {}. Everything that made this is in `manifest.toml` and `settings.toml` beside \
          this report; the same command gives the same bytes.\n\n\
-         Intervals are of 95 %: exact Poisson intervals (Garwood) for rates, or (b) a paired bootstrap of \
-         whole trials, both ways together, where events come in clusters; bootstrap for safe ratios and differences. All drivers met \
+         Intervals are of 95 %: exact Poisson intervals (Garwood) for rates, or (b), where events come in clusters, the farther \
+         ends of these and a paired bootstrap of whole trials, both ways together; bootstrap for safe ratios and differences. All drivers met \
          the same obstacles and the same noise.{}",
         settings.training.lots.join(", "),
         evaluation.lots.join(", "),

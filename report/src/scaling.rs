@@ -67,8 +67,8 @@ pub fn table(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path
 }
 
 const LEGEND: &str = "Of one training of each, with as many drives and optimiser steps; DAgger keeps the expert's ticks, so that its samples \
-    differ. Intervals of 95 % are for other lots, not for other seeds; (b): bootstrap, where \
-    near-collisions come in clusters.";
+    differ. Intervals of 95 % are for other lots, not for other seeds; (b): where near-collisions come \
+    in clusters, the farther ends of the exact interval and a bootstrap.";
 
 fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path) -> anyhow::Result<Vec<Row>> {
     let drive = DriveStage::load(stages.last().context("the last stage drives")?)?;
