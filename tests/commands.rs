@@ -724,6 +724,19 @@ fn tables_are_printed_as_json_and_nothing_else_is() {
     assert!(tables[0]["rows"][0]["samples"].is_number() && tables[1]["rows"][0]["near_collisions"].is_number());
 }
 
+/// It was trained, named as the policy, and behaviour cloning alone was driven.
+#[test]
+fn a_cloning_with_a_final_training_is_judged_by_that() {
+    let out = scratch("bc-final").join("run").to_string_lossy().into_owned();
+    let run = ["train-bc", "--preset", "smoke", "--set", "dagger.final_budget.steps=10", "--out", &out];
+    let output = xtask().args(run).output().unwrap();
+    let (printed, said) = text(&output);
+    assert!(output.status.success(), "{said}");
+    let summary = std::fs::read_to_string(Path::new(&out).join("summary.md")).unwrap();
+    assert!(summary.contains("| BC, final training "), "{summary}");
+    assert!(format!("{printed}{said}").contains("(the final training; model.safetensors"), "{printed}{said}");
+}
+
 #[test]
 fn quiet_commands_say_nothing_and_colours_are_asked_for() {
     let output = xtask().args(["pixel-accuracy", "--lots", "lot-b", "--trials", "1", "-q"]).output().unwrap();

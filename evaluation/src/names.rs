@@ -4,6 +4,8 @@
 pub const DAGGER: &str = "DAgger";
 /// Behaviour cloning.
 pub const BC: &str = "BC";
+/// Behaviour cloning after a [final training](policy::dagger::DaggerSettings::final_budget).
+pub const BC_FINAL: &str = "BC, final training";
 /// [`Chain::Unweighted`](crate::stages::Chain::Unweighted).
 pub const UNWEIGHTED: &str = "DAgger, α = 0";
 /// [`Chain::ExpertOnly`](crate::stages::Chain::ExpertOnly).

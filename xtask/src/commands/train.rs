@@ -10,7 +10,7 @@ use crate::record::{self, RecordArgs};
 use anyhow::{Context as _, ensure};
 use clap::Args;
 use evaluation::estimate;
-use evaluation::names::{BC, DAGGER};
+use evaluation::names::{BC, BC_FINAL, DAGGER};
 use evaluation::plan::Plan;
 use evaluation::records;
 use evaluation::table1::Table1;
@@ -278,16 +278,20 @@ fn cut_short(path: &Path, rounds: usize) -> anyhow::Error {
 /// The expert, the behaviour-cloned policy and the final one.
 fn drivers(settings: &Settings, run: &Path) -> anyhow::Result<Vec<NamedDriver>> {
     let of_run = |folder: PathBuf| DriverSpec::Run { folder }.load(settings);
+    let has = |folder: &str| run.join(folder).try_exists().with_context(|| run.display().to_string());
     let mut drivers = vec![DriverSpec::Expert.load(settings)?, of_run(run.join("bc"))?.renamed(BC)];
-    if run.join("round-01").try_exists().with_context(|| run.display().to_string())? {
+    if has("round-01")? {
         drivers.push(of_run(run.to_owned())?.renamed(DAGGER));
+    } else if has("final")? {
+        drivers.push(of_run(run.to_owned())?.renamed(BC_FINAL));
     }
     Ok(drivers)
 }
 
 fn print_next_steps(path: &Path, output: &Output) {
     let driver = quoted(&format!("run:{}", path.display()));
-    output.remark(format_args!("\nPolicy: {} (the last round; model.safetensors opens in PyTorch)", path.display()));
+    let of = if path.join("final").exists() { "the final training" } else { "the last round" };
+    output.remark(format_args!("\nPolicy: {} ({of}; model.safetensors opens in PyTorch)", path.display()));
     output.remark(format_args!("Next:   cargo xtask evaluate --driver {driver} --seed 2"));
 }
 
