@@ -1,4 +1,4 @@
-//! Ten maps of halls, works and cellars, scaled to a car, drawn by somebody who knew nothing of how any driver fares.
+//! Ten maps of halls, works and cellars, scaled to a car, drawn by somebody who did not know how any driver fares.
 
 use crate::drawing::{Drawing, FREE, OCCUPIED, Shape, area, band, disc, plain, scatter, turned};
 

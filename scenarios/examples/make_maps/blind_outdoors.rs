@@ -1,4 +1,5 @@
-//! Ten maps of streets, villages and land, drawn by somebody who knew nothing of how any driver fares.
+//! Ten maps of streets, villages and land, drawn by somebody who did not know how any driver fares, but had read that
+//! some families were made after failures.
 
 use crate::drawing::{Drawing, FREE, OCCUPIED, UNKNOWN, area, band, car, disc, plain, scatter, turned};
 use sim::geometry::Vec2;

@@ -1,4 +1,4 @@
-//! Ten maps of places where people park, load and practise, drawn by somebody who knew nothing of how any driver fares.
+//! Ten maps of places where people park, load and practise, drawn by somebody who did not know how any driver fares.
 
 use crate::drawing::{Drawing, FREE, OCCUPIED, Shape, UNKNOWN, area, band, car, disc, plain, scatter, turned};
 use sim::geometry::{Pose, Vec2};

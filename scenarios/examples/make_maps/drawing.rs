@@ -85,7 +85,8 @@ pub(super) fn disc(x: f32, y: f32, radius_m: f32) -> Shape {
 }
 
 impl Shape {
-    /// Gives `paint` its parts: what each lies within, from its lowest to its highest x and y, and whether a point is in it.
+    /// Gives `paint` its parts: what each lies within, from its lowest to its highest x and y, and whether a point is in
+    /// it.
     fn parts(&self, mut paint: impl FnMut(Vec2, Vec2, &dyn Fn(Vec2) -> bool)) {
         match self {
             Self::Band { line, width_m } => {

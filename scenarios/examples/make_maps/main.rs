@@ -30,7 +30,7 @@ fn main() {
     }
 }
 
-/// Maps that have been looked at while families and settings were made, and those whose makers knew nothing of how any
+/// Maps that have been looked at while families and settings were made, and those whose makers did not know how any
 /// driver fares.
 fn folders() -> [(&'static str, Vec<Drawing>); 2] {
     let seen = [first_twelve::drawings(), later_nine::drawings(), last_eight::drawings()];
