@@ -454,6 +454,7 @@ impl Episode {
         self.advance = Advance { progress_m: s_m, physics_step: self.physics_step };
         self.counts_from_step = self.physics_step + self.settings.physics_steps(self.settings.metrics.refractory_s);
         self.touches = false;
+        self.sensor.forget();
         self.was_reset = true;
         self.phase = Phase::Driving;
     }

@@ -10,6 +10,7 @@ use sim::map::Map;
 use sim::maths;
 use sim::scenario::{NoiseLevel, Obstacle, ObstacleClass, Scenario};
 use sim::seed::RootSeed;
+use sim::sensing::Observation;
 use sim::sensing::noise::NoiseSettings;
 use sim::vehicle::{VehicleCommand, VehicleSettings, VehicleState, step, step_emergency_stop};
 use std::ops::ControlFlow;
@@ -193,6 +194,39 @@ fn nothing_is_counted_in_the_first_second_after_a_resume() {
     assert!((4..16).contains(&ticks_to_second_event(0.0)), "{} ticks", ticks_to_second_event(0.0));
     // 100 physics steps are 20 ticks; the first of them follows the tick in which the car was put back.
     assert!((20..=21).contains(&ticks_to_second_event(1.0)), "{} ticks", ticks_to_second_event(1.0));
+}
+
+/// Straight on; remembers what it was shown, from reset to reset.
+#[derive(Default)]
+struct Watching(Vec<Vec<Observation>>);
+
+impl Driver for Watching {
+    fn decide(&mut self, situation: &Situation<'_>) -> Decision {
+        self.0.last_mut().unwrap().push(*situation.observation);
+        Decision {
+            look_ahead: LookAheadPoint { ahead_m: 6.0, left_m: 0.0 },
+            source: Source::Expert,
+            spread: None,
+            speed_limit_mps: None,
+        }
+    }
+
+    fn reset(&mut self) {
+        self.0.push(Vec::new());
+    }
+}
+
+/// Even if its first frame there is dropped.
+#[test]
+fn a_car_that_was_put_back_does_not_see_the_place_from_before() {
+    let mut settings = (*settings()).clone();
+    settings.noise = NoiseSettings { dropout: 1000.0, ..NoiseSettings::of(NoiseLevel::Paper) };
+    let map = lane(60.0, vec![Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(30.35, 1.1), 0.0))]);
+    let mut watching = Watching::default();
+    episode::run(Episode::new(Arc::new(settings), map, RootSeed(1)), &mut watching, &mut |_: &Frame| ());
+    let [before, after] = &watching.0[..] else { panic!("{} stretches", watching.0.len()) };
+    assert!(before.iter().all(|seen| *seen == before[0]), "every frame is dropped");
+    assert_ne!(after[0], before[0], "the pillar is behind the car");
 }
 
 #[test]

@@ -130,6 +130,7 @@ impl GatedCollector {
         let collector = &mut self.seats[seat.episode];
         if seat.was_reset {
             collector.gate.reset();
+            collector.is_experts = false;
         }
         let novice = predicted.look_ahead(self.geometry);
         let trusts_novice = collector.gate.trusts_novice(&GateTick { evidence, novice, situation: &seat.situation });

@@ -14,10 +14,10 @@ use crate::test_data::scratch;
 use sim::batch::{NotFinite, run_lockstep};
 use sim::driver::{Decision, Driver, Fleet, LookAheadPoint, OneDriverEach, SensorsOnly, Situation, Source};
 use sim::episode::{Episode, EpisodeSettings};
-use sim::frame::Frame;
-use sim::geometry::Vec2;
+use sim::frame::{Event, Frame};
+use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
-use sim::scenario::{Direction, LotNoise, ReferencePath, Scenario};
+use sim::scenario::{Direction, LotNoise, Obstacle, ObstacleClass, ReferencePath, Scenario};
 use sim::seed::{EpisodeIndex, RootSeed};
 use std::cmp::Reverse;
 use std::ops::ControlFlow;
@@ -40,6 +40,10 @@ impl Driver for RouteFollower {
 
 /// A lane 7 m wide: 25 m straight on, then 30° to the left.
 fn episodes(count: usize) -> Vec<Episode> {
+    episodes_among(count, Vec::new())
+}
+
+fn episodes_among(count: usize, obstacles: Vec<Obstacle>) -> Vec<Episode> {
     let v = Vec2::new;
     let settings = EpisodeSettings::paper();
     let scenario = Scenario {
@@ -49,7 +53,7 @@ fn episodes(count: usize) -> Vec<Episode> {
         reference_path: ReferencePath { points: vec![v(0.0, 0.0), v(25.0, 0.0), v(42.0, 9.8)], corner_radius_m: 12.0 },
         noise: LotNoise::default(),
         islands: Vec::new(),
-        obstacles: Vec::new(),
+        obstacles,
         speed_bumps: Vec::new(),
     };
     let map = Arc::new(Map::build(scenario, &settings.vehicle).unwrap());
@@ -58,13 +62,17 @@ fn episodes(count: usize) -> Vec<Episode> {
 }
 
 fn of_round(round: u32, count: usize) -> Vec<RoundEpisode> {
+    seated(round, episodes(count))
+}
+
+fn seated(round: u32, episodes: Vec<Episode>) -> Vec<RoundEpisode> {
     let seated = |(index, episode)| RoundEpisode {
         index,
         direction: Direction::Forward,
         episode,
         expert: Box::new(RouteFollower),
     };
-    EpisodeIndex::of_round(round, count).zip(episodes(count)).map(seated).collect()
+    EpisodeIndex::of_round(round, episodes.len()).zip(episodes).map(seated).collect()
 }
 
 fn settings() -> DaggerSettings {
@@ -485,4 +493,21 @@ fn without_control_by_the_network_the_expert_is_never_interrupted() {
     assert_eq!((effort.queries, effort.expert_ticks), (row.samples as u64, row.samples as u64));
     assert!(row.agreement.is_some(), "the network answers, though nobody follows it");
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// Put back onto the route, the car begins anew: whoever drives then has taken the wheel.
+#[test]
+fn an_expert_that_drives_on_after_a_reset_has_taken_the_wheel_again() {
+    let settings = DaggerSettings { rule: DecisionRule::ExpertOnly, ..settings() };
+    let pillar = Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(18.0, 1.0), 0.0));
+    let weights = Weights::init(settings.network, RootSeed(3), 0);
+    let checkpoint = Checkpoint { weights, conditions: conditions(), inference: settings.inference };
+    let episodes = seated(1, episodes_among(2, vec![pillar]));
+    let rollouts = Rollouts::of_round(&settings, RootSeed(6), Some(&Learned::alone(checkpoint)), episodes);
+    let mut resets = 0;
+    let collected = rollouts
+        .drive(&mut |_, frame| resets += u64::from(matches!(frame.event, Event::NearCollision { .. })))
+        .unwrap();
+    assert!(resets > 0, "the route leads past the pillar");
+    assert_eq!(collected.effort.interventions, 2 + resets);
 }

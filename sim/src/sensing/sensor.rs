@@ -86,6 +86,11 @@ impl Sensor {
         observation
     }
 
+    /// Does not repeat what was seen so far: the car is put somewhere else.
+    pub fn forget(&mut self) {
+        self.last = None;
+    }
+
     /// The perceived grid, without ever computing all 40 000 pixels.
     fn perceive_grid(&mut self, map: &Map, pose: Pose, tick: u32) -> OccupancyGrid {
         let ego = EgoView::new(&self.settings.geometry, pose);
