@@ -13,6 +13,7 @@
 //! | [`yards`] | wide ground on which things stand apart |
 //! | [`chicanes`] | roads with barriers from either side in turn |
 //! | [`cones`] | ways between rows of cones or bollards on open ground |
+//! | [`mixed`] | ways whose edges, width and furniture change as they go |
 //! | [`slanted`] | aisles of a car park whose stalls are at a slant |
 //! | [`strip`] | the ground: a centre line of straight pieces, arcs and corners, its edges and their notches |
 //! | [`course`] | how centre lines are drawn |
@@ -29,6 +30,7 @@ mod corridor;
 mod course;
 mod halls;
 mod lane;
+mod mixed;
 mod open;
 mod parts;
 mod rooms;
@@ -64,6 +66,7 @@ pub(crate) fn draw(family: Family, layout: &mut Rng, obstacles: &mut Rng) -> Opt
         Family::Chicanes => chicanes::draw(layout, obstacles),
         Family::Cones => cones::draw(layout, obstacles),
         Family::Slanted => slanted::draw(layout, obstacles),
+        Family::Mixed => mixed::draw(layout, obstacles),
     };
     on_strip.map(|(scenario, _)| scenario)
 }
@@ -92,7 +95,7 @@ mod tests {
 
     type Is<'a> = dyn Fn(&Scenario, &Strip) -> bool + 'a;
     type Draw = fn(&mut Rng, &mut Rng) -> Option<(Scenario, Strip)>;
-    const DRAWS: [(Family, Draw); 11] = [
+    const DRAWS: [(Family, Draw); 12] = [
         (Family::Lane, lane::draw),
         (Family::Rooms, rooms::draw),
         (Family::Street, street::draw),
@@ -104,6 +107,7 @@ mod tests {
         (Family::Chicanes, chicanes::draw),
         (Family::Cones, cones::draw),
         (Family::Slanted, slanted::draw),
+        (Family::Mixed, mixed::draw),
     ];
 
     /// A car that does not know the route must not find another way. Ground that a disc a little wider than the car can
@@ -123,7 +127,7 @@ mod tests {
                 let sides = strip.notches.iter().map(|notch| strip.mouth(notch));
                 let mouths: Vec<_> = sides.chain(strip.stub_mouths()).filter(|mouth| mouth.depth_m > stall_m).collect();
                 let Ok(map) = Map::build(scenario, &VehicleSettings::hyundai_hg300()) else { continue };
-                let reached = flooded(&map);
+                let reached = flooded(&map, 1.05);
                 if family != Family::Track {
                     let stray = reached.iter().find(|&&cell| !polygon_contains(&outline, place(cell)));
                     assert!(stray.is_none(), "{family:?} {index}: a way out at {:?}", stray.map(|&cell| place(cell)));
@@ -149,7 +153,7 @@ mod tests {
             let Some((scenario, strip)) = drawn else { continue };
             let scenario = Scenario { name: Family::Slanted.name().to_owned(), ..scenario };
             let Ok(map) = Map::build(scenario, &VehicleSettings::hyundai_hg300()) else { continue };
-            let reached = flooded(&map);
+            let reached = flooded(&map, 1.05);
             for notch in &strip.notches {
                 for s_m in [notch.from_m + 1.2, notch.to_m - 1.2] {
                     for away_m in [1.5, 2.5, 3.5] {
@@ -162,6 +166,24 @@ mod tests {
             looked_at += 1;
         }
         assert!(looked_at > 5, "only {looked_at} of 12 lots were drawn");
+    }
+
+    /// Rows of anything let nothing through that is as wide as the car.
+    #[test]
+    fn nothing_gets_out_between_the_things_of_a_row() {
+        let mut looked_at = 0;
+        for index in 0..60 {
+            let seed = Split::Test.seed(Family::Mixed, index);
+            let drawn = mixed::draw(&mut seed.rng(Stream::Layout, 0), &mut seed.rng(Stream::Obstacles, 0));
+            let Some((scenario, strip)) = drawn else { continue };
+            let scenario = Scenario { name: Family::Mixed.name().to_owned(), ..scenario };
+            let Ok(map) = Map::build(scenario, &VehicleSettings::hyundai_hg300()) else { continue };
+            let outline = strip.outline(0.0);
+            let stray = flooded(&map, 0.95).into_iter().find(|&cell| !polygon_contains(&outline, place(cell)));
+            assert!(stray.is_none(), "{index}: a way out at {:?}", stray.map(place));
+            looked_at += 1;
+        }
+        assert!(looked_at > 30, "only {looked_at} of 60 lots were drawn");
     }
 
     /// Families are what the docs say (docs/maps.md).
@@ -193,8 +215,16 @@ mod tests {
                 .map(|obstacle| obstacle.centre().position())
                 .any(|at| polygon_contains(&outline, at) && ends.iter().all(|end| end.distance(at) > 10.0))
         };
+        let is_of_several_widths = |strip: &Strip| {
+            let widths_m = strip.straights().into_iter().map(|(from_m, _)| strip.half_width_m(from_m + 0.01));
+            widths_m.clone().fold(0.0, f32::max) > widths_m.fold(f32::INFINITY, f32::min) + 0.5
+        };
+        // Walls around a way are as many as its outline has edges.
+        let is_on_open_ground = |scenario: &Scenario, strip: &Strip| {
+            scenario.boundary.len() == 4 && strip.notches.is_empty() && scenario.obstacles.len() > 60
+        };
         // Family, what, share of its lots: at least and at most.
-        let all: [(Family, &str, &Is<'_>, f32, f32); 28] = [
+        let all: [(Family, &str, &Is<'_>, f32, f32); 32] = [
             (Family::Lane, "narrower than 3.8 m", &|_, strip| strip.half_width_m(0.0) < 1.9, 0.35, 0.65),
             (Family::Lane, "narrower than 3.0 m", &|_, strip| strip.half_width_m(0.0) < 1.5, 0.03, 0.3),
             (Family::Lane, "wider than 6 m", &|_, strip| strip.half_width_m(0.0) > 3.0, 0.05, 0.4),
@@ -223,6 +253,10 @@ mod tests {
             (Family::Slanted, "with rows of stalls", &|_, strip| strip.notches.len() > 3, 0.9, 1.0),
             (Family::Slanted, "with three aisles", &|_, strip| strip.straights().len() > 3, 0.2, 0.8),
             (Family::Slanted, "with islands", &|lot, _| !lot.islands.is_empty(), 0.2, 0.6),
+            (Family::Mixed, "of several widths", &|_, strip| is_of_several_widths(strip), 0.7, 1.0),
+            (Family::Mixed, "marked by rows alone", &|lot, strip| is_on_open_ground(lot, strip), 0.15, 0.45),
+            (Family::Mixed, "with recesses", &|_, strip| strip.notches.len() > 3, 0.4, 0.8),
+            (Family::Mixed, "with something in the lane", &is_obstructed, 0.6, 1.0),
         ];
         for (family, what, is, least, most) in all {
             let share = share(&lots(family), is);
@@ -236,14 +270,14 @@ mod tests {
         Vec2::new(x as f32, y as f32) * CELL_M
     }
 
-    /// Cells of the ground around the start that are joined to it by a passage of 2.1 m.
-    fn flooded(map: &Map) -> BTreeSet<(i32, i32)> {
+    /// Cells of the ground around the start that are joined to it by a passage of twice so much.
+    fn flooded(map: &Map, clear_m: f32) -> BTreeSet<(i32, i32)> {
         let start: (i32, i32) = (map.start().position() / CELL_M).round().as_ivec2().into();
         let mut reached = BTreeSet::from([start]);
         let mut open = vec![start];
         while let Some((x, y)) = open.pop() {
             for next in [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)] {
-                if map.signed_distance_m(place(next)) > 1.05 && reached.insert(next) {
+                if map.signed_distance_m(place(next)) > clear_m && reached.insert(next) {
                     open.push(next);
                 }
             }

@@ -52,6 +52,8 @@ pub enum Family {
     Cones,
     /// Aisles between cars that are parked at a slant.
     Slanted,
+    /// Edges, width and furniture change along the way.
+    Mixed,
 }
 
 /// The seed's top byte holds split and family, the rest the index.
@@ -128,7 +130,7 @@ impl Phrase {
 
 impl Family {
     /// Every family in the order of their numbers, which are part of the seeds: append, never renumber.
-    pub const EVERY: [Self; 14] = [
+    pub const EVERY: [Self; 15] = [
         Self::Easy,
         Self::Medium,
         Self::Hard,
@@ -143,10 +145,10 @@ impl Family {
         Self::Chicanes,
         Self::Cones,
         Self::Slanted,
+        Self::Mixed,
     ];
 
-    /// What `all` goes through: the families of which the default learns and that published figures are of. Families made
-    /// since are known by name only.
+    /// What `all` goes through: the families that published figures are of. Those made since are asked for by name.
     pub const ALL: &[Self] = Self::EVERY.split_at(12).0;
 
     /// The corridor between parked cars in its three difficulties, easiest first.
@@ -176,6 +178,7 @@ impl Family {
             Self::Chicanes => "chicanes",
             Self::Cones => "cones",
             Self::Slanted => "slanted",
+            Self::Mixed => "mixed",
         }
     }
 }

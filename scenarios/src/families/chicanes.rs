@@ -42,11 +42,14 @@ enum Barrier {
 }
 
 pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
-    ROAD.draw(layout, obstacles, barriers)
+    ROAD.draw(layout, obstacles, |things, strip, rng| {
+        let (from_m, to_m) = driven_m(strip);
+        barriers(things, strip, from_m..to_m, rng);
+    })
 }
 
-/// One behind the other, mostly from the other side than the one before.
-fn barriers(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
+/// On a stretch of one width, one behind the other, mostly from the other side than the one before.
+pub(super) fn barriers(things: &mut Things<'_>, strip: &Strip, stretch_m: Range<f32>, rng: &mut Rng) {
     use Barrier::{Cones, Container, Parked, Planter, Wall};
     let palette: &[Barrier] = match rng.random_range(0..5) {
         0 | 1 => &[Wall],
@@ -55,11 +58,10 @@ fn barriers(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
         _ => &[Wall, Container, Parked, Cones, Planter],
     };
     let gap_m = if rng.random_bool(0.6) { NARROW_M } else { WIDE_M };
-    let width_m = 2.0 * strip.half_width_m(0.0);
-    let (from_m, to_m) = driven_m(strip);
+    let width_m = 2.0 * strip.half_width_m(stretch_m.start);
     let mut side = side(rng);
-    let mut at_m = from_m + rng.random_range(9.0..20.0);
-    while at_m < to_m {
+    let mut at_m = stretch_m.start + rng.random_range(9.0..20.0);
+    while at_m < stretch_m.end {
         let gap_m = rng.random_range(gap_m.clone());
         let kind = palette[rng.random_range(0..palette.len())];
         let along_m = match kind {
@@ -139,7 +141,7 @@ fn stand(things: &mut Things<'_>, strip: &Strip, stand: &Stand, rng: &mut Rng) {
         Barrier::Planter => {
             let polygon = rectangle(pose, along_m, across_m).map(to_millimetres).to_vec();
             let height_m = if rng.random_bool(0.6) { 0.15 } else { 0.8 };
-            things.narrow_by_island(Island { polygon, height_m }, side, at_m, &rules);
+            things.narrow(Island { polygon, height_m }, side, at_m, &rules);
         }
     }
 }

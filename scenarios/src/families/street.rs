@@ -118,7 +118,7 @@ fn built_out(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
             .iter()
             .any(|notch| notch.side == side && notch.from_m < from_m + length_m + 1.0 && from_m < notch.to_m + 1.0);
         if is_on_one_width && !meets_notch {
-            things.narrow_by_island(Island { polygon, height_m }, side, from_m + 0.5 * length_m, &rules);
+            things.narrow(Island { polygon, height_m }, side, from_m + 0.5 * length_m, &rules);
         }
     }
 }

@@ -4,8 +4,10 @@ use super::strip::Strip;
 use crate::corridor::{Side, overlap, to_millimetres};
 use rand::RngExt as _;
 use sim::geometry::{Pose, Vec2, wrap_angle};
+use sim::maths;
 use sim::scenario::{Island, Obstacle, ObstacleClass};
 use sim::seed::Rng;
+use std::f32::consts::TAU;
 
 /// A stretch of the strip that is narrowed from one side.
 #[derive(Debug, Clone, Copy)]
@@ -29,6 +31,33 @@ pub(super) struct Rules {
     pub(super) apart_m: f32,
     /// Distance from sharp corners, metres.
     pub(super) corner_clear_m: f32,
+}
+
+/// Something with the ground that it takes.
+pub(super) enum Thing {
+    Obstacle(Obstacle),
+    Island(Island),
+}
+
+impl Thing {
+    pub(super) fn outline(&self) -> Vec<Vec2> {
+        match self {
+            Self::Obstacle(obstacle) => obstacle.outline(),
+            Self::Island(island) => island.polygon.clone(),
+        }
+    }
+}
+
+impl From<Obstacle> for Thing {
+    fn from(obstacle: Obstacle) -> Self {
+        Self::Obstacle(obstacle)
+    }
+}
+
+impl From<Island> for Thing {
+    fn from(island: Island) -> Self {
+        Self::Island(island)
+    }
 }
 
 /// Obstacles of a lot while it is drawn.
@@ -56,10 +85,14 @@ impl<'a> Things<'a> {
     }
 
     /// Puts something where nothing else stands, without checking whether it is in the way.
-    pub(super) fn stand(&mut self, obstacle: Obstacle) -> bool {
-        let is_free = self.reserve(obstacle.outline());
+    pub(super) fn stand(&mut self, thing: impl Into<Thing>) -> bool {
+        let thing = thing.into();
+        let is_free = self.reserve(thing.outline());
         if is_free {
-            self.obstacles.push(obstacle);
+            match thing {
+                Thing::Obstacle(obstacle) => self.obstacles.push(obstacle),
+                Thing::Island(island) => self.islands.push(island),
+            }
         }
         is_free
     }
@@ -73,20 +106,12 @@ impl<'a> Things<'a> {
         is_free
     }
 
-    /// Puts something into the strip on one side, if rules and other things allow.
-    pub(super) fn narrow(&mut self, obstacle: Obstacle, side: Side, near_m: f32, rules: &Rules) -> bool {
-        let narrowing = self.narrowing_by(&obstacle.outline(), side, near_m);
-        self.allows(&narrowing, rules) && self.stand(obstacle) && {
-            self.narrowings.push(narrowing);
-            true
-        }
-    }
-
-    /// The same for an island. On its way around the island the route keeps to the other side.
-    pub(super) fn narrow_by_island(&mut self, island: Island, side: Side, near_m: f32, rules: &Rules) -> bool {
-        let narrowing = self.narrowing_by(&island.polygon, side, near_m);
-        self.allows(&narrowing, rules) && self.reserve(island.polygon.clone()) && {
-            self.islands.push(island);
+    /// Puts something into the strip on one side, if rules and other things allow. On its way around the thing the route
+    /// keeps to the other side.
+    pub(super) fn narrow(&mut self, thing: impl Into<Thing>, side: Side, near_m: f32, rules: &Rules) -> bool {
+        let thing = thing.into();
+        let narrowing = self.narrowing_by(&thing.outline(), side, near_m);
+        self.allows(&narrowing, rules) && self.stand(thing) && {
             self.narrowings.push(narrowing);
             true
         }
@@ -142,6 +167,19 @@ impl<'a> Things<'a> {
 pub(super) fn obstacle(class: ObstacleClass, at: Vec2, heading_rad: f32) -> Obstacle {
     let heading_deg = (wrap_angle(heading_rad).to_degrees() * 10.0).round() / 10.0;
     Obstacle { heading_deg, ..Obstacle::new(class, Pose::new(to_millimetres(at), 0.0)) }
+}
+
+/// The same of another size, `[length, width, height]` in metres, rounded to centimetres.
+pub(super) fn sized(class: ObstacleClass, at: Vec2, heading_rad: f32, size_m: [f32; 3]) -> Obstacle {
+    let [length_m, width_m, height_m] = size_m.map(|value| Some((value * 100.0).round() / 100.0));
+    Obstacle { length_m, width_m, height_m, ..obstacle(class, at, heading_rad) }
+}
+
+/// A round bed or basin.
+pub(super) fn round_bed(at: Vec2, radius_m: f32, height_m: f32) -> Island {
+    const CORNERS: u8 = 12;
+    let corner = |k: u8| at + radius_m * maths::unit(TAU * f32::from(k) / f32::from(CORNERS));
+    Island { polygon: (0..CORNERS).map(|k| to_millimetres(corner(k))).collect(), height_m }
 }
 
 /// Either way a parked car may face.

@@ -2,16 +2,14 @@
 //! ways past them; no gap leaves it open whether the car fits.
 
 use super::strip::Strip;
-use super::things::{self, Rules, Things, side};
+use super::things::{self, Rules, Thing, Things, side};
 use super::winding::Winding;
 use crate::clutter::draw_car;
-use crate::corridor::to_millimetres;
 use rand::RngExt as _;
 use sim::geometry::{Vec2, distance_to_segment, edges};
-use sim::maths;
-use sim::scenario::{Island, Obstacle, ObstacleClass, Scenario};
+use sim::scenario::{ObstacleClass, Scenario};
 use sim::seed::Rng;
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::PI;
 use std::ops::Range;
 
 const GROUND: Winding = Winding {
@@ -29,39 +27,27 @@ const DOUBTFUL_M: Range<f32> = 1.4..3.0;
 /// One thing is tried per so much ground, m².
 const GROUND_M2: Range<f32> = 15.0..70.0;
 
-/// Something with the ground that it takes.
-enum Thing {
-    Obstacle(Obstacle),
-    Island(Island),
-}
-
 pub(super) fn draw(layout: &mut Rng, obstacles: &mut Rng) -> Option<(Scenario, Strip)> {
-    GROUND.draw(layout, obstacles, scatter)
+    GROUND.draw(layout, obstacles, |things, strip, rng| scatter(things, strip, 0.0..strip.length_m(), rng))
 }
 
-/// Things anywhere, as many as stand clear of each other.
-fn scatter(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
+/// Things anywhere on a stretch of one width, as many as stand clear of each other.
+pub(super) fn scatter(things: &mut Things<'_>, strip: &Strip, stretch_m: Range<f32>, rng: &mut Rng) {
     let rules = Rules { gap_m: rng.random_range(3.0..4.5), apart_m: 7.0, corner_clear_m: 0.0 };
-    let width_m = 2.0 * strip.half_width_m(0.0);
-    let tries = strip.length_m() * width_m / rng.random_range(GROUND_M2);
+    let width_m = 2.0 * strip.half_width_m(stretch_m.start);
+    let tries = (stretch_m.end - stretch_m.start) * width_m / rng.random_range(GROUND_M2);
     for _ in 0..tries as usize {
-        let (s_m, side) = (rng.random_range(0.0..strip.length_m()), side(rng));
+        let (s_m, side) = (rng.random_range(stretch_m.clone()), side(rng));
         let d_m = side.sign() * rng.random_range(0.0..0.5 * width_m);
         let thing = thing_at(strip.point(s_m, d_m), rng);
-        let outline = match &thing {
-            Thing::Obstacle(obstacle) => obstacle.outline().clone(),
-            Thing::Island(island) => island.polygon.clone(),
-        };
+        let outline = thing.outline();
         let to_edge_m = outline
             .iter()
             .map(|&corner| 0.5 * width_m - side.sign() * strip.local(corner, s_m).y)
             .fold(f32::INFINITY, f32::min);
         let is_clear = things.outlines.iter().all(|other| !DOUBTFUL_M.contains(&apart_m(other, &outline)));
         if to_edge_m > 0.1 && !DOUBTFUL_M.contains(&to_edge_m) && is_clear {
-            match thing {
-                Thing::Obstacle(obstacle) => things.narrow(obstacle, side, s_m, &rules),
-                Thing::Island(island) => things.narrow_by_island(island, side, s_m, &rules),
-            };
+            things.narrow(thing, side, s_m, &rules);
         }
     }
 }
@@ -69,14 +55,7 @@ fn scatter(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
 fn thing_at(at: Vec2, rng: &mut Rng) -> Thing {
     let heading_rad = rng.random_range(-PI..PI);
     let sized = |class, length_m: f32, width_m: f32, height_m: f32| {
-        let round = |value: f32| Some((value * 100.0).round() / 100.0);
-        let plain = things::obstacle(class, at, heading_rad);
-        Thing::Obstacle(Obstacle {
-            length_m: round(length_m),
-            width_m: round(width_m),
-            height_m: round(height_m),
-            ..plain
-        })
+        Thing::from(things::sized(class, at, heading_rad, [length_m, width_m, height_m]))
     };
     match rng.random_range(0..10) {
         // Trees.
@@ -93,14 +72,11 @@ fn thing_at(at: Vec2, rng: &mut Rng) -> Thing {
         ),
         // A hut.
         6 => sized(ObstacleClass::Wall, rng.random_range(2.0..5.0), rng.random_range(2.0..4.0), 2.5),
-        7 => Thing::Obstacle(things::obstacle(draw_car(rng), at, heading_rad)),
+        7 => things::obstacle(draw_car(rng), at, heading_rad).into(),
         // A fountain, a flower bed.
         _ => {
-            const CORNERS: u8 = 12;
             let radius_m = rng.random_range(0.8..3.0);
-            let corner = |k: u8| at + radius_m * maths::unit(TAU * f32::from(k) / f32::from(CORNERS));
-            let height_m = if rng.random_bool(0.7) { 0.15 } else { 0.8 };
-            Thing::Island(Island { polygon: (0..CORNERS).map(|k| to_millimetres(corner(k))).collect(), height_m })
+            things::round_bed(at, radius_m, if rng.random_bool(0.7) { 0.15 } else { 0.8 }).into()
         }
     }
 }
