@@ -17,15 +17,18 @@ pub(super) struct Drawing {
     /// Pose of the lower left corner: x, y, yaw.
     pub(super) origin: &'static str,
     pub(super) background: u8,
-    pub(super) shapes: Vec<(Shape, u8)>,
+    pub(super) shapes: Shapes,
     /// Where to drive: the keys of the lot file, in the map's frame.
     pub(super) lot: &'static str,
     /// The route, in the map's frame.
     pub(super) centre_line: Option<Vec<Vec2>>,
 }
 
+/// Each with its grey value, the later ones over the earlier.
+pub(super) type Shapes = Vec<(Shape, u8)>;
+
 pub(super) enum Shape {
-    /// Along a line with rounded corners.
+    /// Along a line.
     Band {
         line: Vec<Vec2>,
         width_m: f32,
@@ -61,10 +64,35 @@ pub(super) fn scatter(i: usize, k: usize) -> f32 {
     ((i * 7919 + k * 104_729 + 13) % 1000) as f32 / 1000.0
 }
 
-pub(super) fn band(points: &[(f32, f32)], radius_m: f32, width_m: f32) -> Shape {
+/// Numbers from -1 to 1 that look drawn.
+pub(super) fn shake(i: usize, k: usize) -> f32 {
+    2.0 * scatter(i, k) - 1.0
+}
+
+/// The point so far from another, at an angle counter-clockwise from x.
+pub(super) fn polar(x: f32, y: f32, radius_m: f32, angle_deg: f32) -> Vec2 {
+    Vec2::new(x, y) + radius_m * sim::maths::unit(angle_deg.to_radians())
+}
+
+/// From a point to the nearest of a line.
+pub(super) fn distance_m(line: &[Vec2], point: Vec2) -> f32 {
+    line.windows(2).map(|ends| distance_to_segment(point, ends[0], ends[1])).fold(f32::INFINITY, f32::min)
+}
+
+/// The middle of a way with rounded corners.
+pub(super) fn way(points: &[(f32, f32)], radius_m: f32) -> Vec<Vec2> {
     let points = points.iter().map(|&point| Vec2::from(point)).collect();
     let path = sim::path::Path::new(&ReferencePath { points, corner_radius_m: radius_m });
-    Shape::Band { line: path.poses().iter().step_by(4).map(|pose| pose.position()).collect(), width_m }
+    path.poses().iter().step_by(4).map(|pose| pose.position()).collect()
+}
+
+pub(super) fn band(points: &[(f32, f32)], radius_m: f32, width_m: f32) -> Shape {
+    Shape::Band { line: way(points, radius_m), width_m }
+}
+
+/// Along a line with sharp corners: a wall, a fence, a hedge.
+pub(super) fn stroke(points: impl IntoIterator<Item = impl Into<Vec2>>, width_m: f32) -> Shape {
+    Shape::Band { line: points.into_iter().map(Into::into).collect(), width_m }
 }
 
 /// A rectangle from its lower left to its upper right corner.
@@ -82,6 +110,16 @@ pub(super) fn car(x: f32, y: f32, heading_deg: f32) -> (Shape, u8) {
 
 pub(super) fn disc(x: f32, y: f32, radius_m: f32) -> Shape {
     Shape::Disc { centre: Vec2::new(x, y), radius_m }
+}
+
+/// Discs of one size, all of them occupied.
+pub(super) fn discs(centres: impl IntoIterator<Item = impl Into<Vec2>>, radius_m: f32) -> Shapes {
+    solid(centres.into_iter().map(|centre| Shape::Disc { centre: centre.into(), radius_m }))
+}
+
+/// Shapes, all of them occupied.
+pub(super) fn solid(shapes: impl IntoIterator<Item = Shape>) -> Shapes {
+    shapes.into_iter().map(|shape| (shape, OCCUPIED)).collect()
 }
 
 impl Shape {

@@ -1,4 +1,4 @@
-//! Draws the maps in `examples/maps` and `examples/maps-blind`: `cargo run -p scenarios --example make_maps`. Kinds of
+//! Draws the maps in `examples/maps`, `examples/maps-blind` and `examples/maps-blind-2`: `cargo run -p scenarios --example make_maps`. Kinds of
 //! ground that the generator does not make, as image files, scaled to the car. The same bytes every time.
 #![allow(clippy::unwrap_used, missing_docs, reason = "an example that a person runs")]
 
@@ -9,6 +9,9 @@ mod drawing;
 mod first_twelve;
 mod last_eight;
 mod later_nine;
+mod second_indoors;
+mod second_outdoors;
+mod second_parking;
 
 use drawing::Drawing;
 use std::path::{Path, PathBuf};
@@ -30,12 +33,14 @@ fn main() {
     }
 }
 
-/// Maps that have been looked at while families and settings were made, and those whose makers did not know how any
-/// driver fares.
-fn folders() -> [(&'static str, Vec<Drawing>); 2] {
+/// Maps that have been looked at while families and settings were made, and twice those whose makers did not know how any
+/// driver fares: the second time when failures on the first had led to families.
+fn folders() -> [(&'static str, Vec<Drawing>); 3] {
     let seen = [first_twelve::drawings(), later_nine::drawings(), last_eight::drawings()];
     let blind = [blind_indoors::drawings(), blind_outdoors::drawings(), blind_parking::drawings()];
-    [("maps", seen.into_iter().flatten().collect()), ("maps-blind", blind.into_iter().flatten().collect())]
+    let second = [second_indoors::drawings(), second_outdoors::drawings(), second_parking::drawings()];
+    [("maps", seen), ("maps-blind", blind), ("maps-blind-2", second)]
+        .map(|(name, drawn)| (name, drawn.into_iter().flatten().collect()))
 }
 
 #[cfg(test)]
