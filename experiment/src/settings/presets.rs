@@ -55,11 +55,14 @@ fn default() -> Settings {
     let base = with_half_points();
     Settings {
         training: TrainingSettings { lots: lots_of_every_family(1), trials: 8, ..base.training },
-        evaluation: EvaluationSettings { elsewhere: vec!["validation:48:all".to_owned()], ..base.evaluation },
+        evaluation: EvaluationSettings { elsewhere: ELSEWHERE.map(str::to_owned).to_vec(), ..base.evaluation },
         dagger: DaggerSettings::quick(),
         ..base
     }
 }
+
+/// Four lots of every family that the default trains on, none of them trained on.
+const ELSEWHERE: [&str; 4] = ["validation:48:all", "validation:4:cones", "validation:4:slanted", "validation:4:mixed"];
 
 /// Lot a, and this many times the generated lots of every family that the default trains on.
 fn lots_of_every_family(times: u32) -> Vec<String> {
@@ -76,6 +79,9 @@ fn lots_of_every_family(times: u32) -> Vec<String> {
         ("halls", 12),
         ("yards", 10),
         ("chicanes", 12),
+        ("cones", 12),
+        ("slanted", 8),
+        ("mixed", 40),
     ];
     let of_family = |(family, count)| format!("train:{}:{family}", times * count);
     std::iter::once("lot-a".to_owned()).chain(generated.map(of_family)).collect()
