@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn lots_are_pinned_by_their_names() {
-        const GOLDENS: [(Family, u64); 12] = [
+        const GOLDENS: [(Family, u64); 13] = [
             (Family::Hard, 0x3fd6_8fa8_99fe_f9dd),
             (Family::Lane, 0xec3e_f3d8_87c7_1aca),
             (Family::Rooms, 0x1e96_069f_81a6_9e3e),
@@ -143,6 +143,7 @@ mod tests {
             (Family::Chicanes, 0x2cdc_d994_bef8_ed39),
             (Family::Cones, 0xb8ff_47d9_d34f_bef9),
             (Family::Slanted, 0x1ded_a7bc_6274_af42),
+            (Family::Mixed, 0x385f_0fee_e3d3_bfc7),
         ];
         let hashed = GOLDENS.map(|(family, _)| {
             let lot = generate(&Split::Test, 7, family).scenario;
