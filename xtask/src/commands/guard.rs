@@ -24,7 +24,7 @@ const COMMAND: &str = "guard";
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask guard                       train, drive, compare: a quarter of an hour on two cores
+  cargo xtask guard                       train, drive, compare: some twenty minutes on two cores
   cargo xtask guard --out runs/nightly --overwrite
 
 The limits stand in xtask/src/commands/guard.toml, with the commit that they were recorded at, and how.";
