@@ -142,6 +142,9 @@ impl GatedCollector {
     /// Line 15 for all seats at once.
     fn store(&mut self, seats: &[Seat<'_>], kept: &[Option<Sample>]) {
         at_seats(&mut self.seats, seats).par_iter_mut().zip(kept).for_each(|((collector, seat), kept)| {
+            if seat.was_reset {
+                collector.augmenting_sensors.iter_mut().for_each(Sensor::forget);
+            }
             if let Some(sample) = *kept {
                 collector.keep(sample, &seat.situation.truth);
             }

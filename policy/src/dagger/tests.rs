@@ -17,8 +17,9 @@ use sim::episode::{Episode, EpisodeSettings};
 use sim::frame::{Event, Frame};
 use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
-use sim::scenario::{Direction, LotNoise, Obstacle, ObstacleClass, ReferencePath, Scenario};
+use sim::scenario::{Direction, LotNoise, NoiseLevel, Obstacle, ObstacleClass, ReferencePath, Scenario};
 use sim::seed::{EpisodeIndex, RootSeed};
+use sim::sensing::noise::NoiseSettings;
 use std::cmp::Reverse;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -44,8 +45,11 @@ fn episodes(count: usize) -> Vec<Episode> {
 }
 
 fn episodes_among(count: usize, obstacles: Vec<Obstacle>) -> Vec<Episode> {
+    episodes_with(EpisodeSettings::paper(), count, obstacles)
+}
+
+fn episodes_with(settings: EpisodeSettings, count: usize, obstacles: Vec<Obstacle>) -> Vec<Episode> {
     let v = Vec2::new;
-    let settings = EpisodeSettings::paper();
     let scenario = Scenario {
         name: "bent lane".to_string(),
         boundary: vec![v(-4.0, -3.5), v(26.0, -3.5), v(52.0, 11.5), v(48.5, 17.6), v(24.0, 3.5), v(-4.0, 3.5)],
@@ -510,4 +514,27 @@ fn an_expert_that_drives_on_after_a_reset_has_taken_the_wheel_again() {
         .unwrap();
     assert!(resets > 0, "the route leads past the pillar");
     assert_eq!(collected.effort.interventions, 2 + resets);
+}
+
+/// Nor do the sensors of noise augmentations repeat what was seen before the car was put back.
+#[test]
+fn augmented_grids_after_a_reset_show_the_new_place() {
+    let settings = DaggerSettings { noise_augmentations: 1, ..settings() };
+    let noise = NoiseSettings { dropout: 1000.0, ..NoiseSettings::of(NoiseLevel::Paper) };
+    let pillar = Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(18.0, 1.0), 0.0));
+    let episodes = episodes_with(EpisodeSettings { noise, ..EpisodeSettings::paper() }, 1, vec![pillar]);
+    let mut resets = Vec::new();
+    let mut tick = 0;
+    let mut watch = |_: usize, frame: &Frame| {
+        tick += 1;
+        if matches!(frame.event, Event::NearCollision { .. }) {
+            resets.push(tick);
+        }
+    };
+    // Behaviour cloning: every tick is kept.
+    let collected = Rollouts::of_round(&settings, RootSeed(6), None, seated(0, episodes)).drive(&mut watch).unwrap();
+    let grids = &collected.round.noise_augmentations;
+    let first = resets[0];
+    assert!(grids[..first].iter().all(|grid| *grid == grids[0]), "every frame is dropped");
+    assert_ne!(grids[first], grids[0], "the pillar is behind the car");
 }

@@ -1,5 +1,6 @@
-//! Draws the maps in `examples/maps`, `examples/maps-blind` and `examples/maps-blind-2`: `cargo run -p scenarios --example make_maps`. Kinds of
-//! ground that the generator does not make, as image files, scaled to the car. The same bytes every time.
+//! Draws the maps in `examples/maps`, `examples/maps-blind` and `examples/maps-blind-2`:
+//! `cargo run -p scenarios --example make_maps`. Kinds of ground that the generator does not make, as image files, scaled to
+//! the car. The same bytes every time.
 #![allow(clippy::unwrap_used, missing_docs, reason = "an example that a person runs")]
 
 mod blind_indoors;
