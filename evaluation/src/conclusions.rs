@@ -138,7 +138,7 @@ impl DrivenPlan<'_> {
     pub fn judge_teams(&self, slice: &Slice, estimates: &[DriverEstimate]) -> JudgedTeams {
         let teams = trainings::teams(self.plan.drivers);
         let dagger = self.driver(DAGGER);
-        let with = dagger.and_then(|dagger| teams.iter().position(|team| team.drivers.contains(&dagger)));
+        let with = dagger.and_then(|dagger| teams.iter().position(|team| team.has(dagger)));
         let seed = self.plan.settings.evaluation.seed;
         let judged = with.and_then(|with| self.results.judge_teams(0, slice, &teams, with, estimates, seed));
         JudgedTeams { teams, estimates: judged }

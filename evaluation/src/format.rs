@@ -9,15 +9,25 @@ use crate::totals::Totals;
 /// The bootstrap's interval of a rate where events cluster, so that what takes them for independent may not be quoted
 /// (docs/methods.md 8.3).
 pub fn clustered(estimate: &DriverEstimate) -> Option<Interval> {
-    let is_clustered = estimate.dispersion.is_some_and(|dispersion| dispersion.index > DISPERSION_MAX);
-    estimate.per_100m.filter(|_| is_clustered)
+    estimate.per_100m.filter(|_| is_clustered(estimate.dispersion.map(|dispersion| dispersion.index)))
+}
+
+/// Whether events of an index of dispersion cluster.
+fn is_clustered(dispersion: Option<f64>) -> bool {
+    dispersion.is_some_and(|index| index > DISPERSION_MAX)
 }
 
 /// The interval that may be quoted (docs/methods.md 8.3), near-collisions per 100 m: the exact one or, where events cluster,
 /// the farther ends of the exact one and the bootstrap's.
 pub fn quoted_interval(totals: &Totals, estimate: &DriverEstimate) -> [f64; 2] {
     let rate = totals.rate();
-    wider([rate.lower, rate.upper], clustered(estimate).map(|interval| [interval.lower, interval.upper]))
+    let bootstrap = estimate.per_100m.map(|interval| [interval.lower, interval.upper]);
+    quotable([rate.lower, rate.upper], bootstrap, estimate.dispersion.map(|dispersion| dispersion.index))
+}
+
+/// The same from the exact interval, the bootstrap's and the index of dispersion.
+pub(crate) fn quotable(exact: [f64; 2], bootstrap: Option<[f64; 2]>, dispersion: Option<f64>) -> [f64; 2] {
+    wider(exact, bootstrap.filter(|_| is_clustered(dispersion)))
 }
 
 /// The interval of contacts that may be quoted, per 100 m: the farther ends of the exact one and the bootstrap's, whatever their
@@ -36,7 +46,7 @@ pub fn quoted_contacts(totals: &Totals, estimate: &DriverEstimate) -> String {
 
 /// The farther ends of the exact interval and, if it counts, the bootstrap's: clusters make that wider, and of few events it may
 /// be narrower by chance.
-pub(crate) fn wider(exact: [f64; 2], bootstrap: Option<[f64; 2]>) -> [f64; 2] {
+fn wider(exact: [f64; 2], bootstrap: Option<[f64; 2]>) -> [f64; 2] {
     bootstrap.map_or(exact, |[lower, upper]| [lower.min(exact[0]), upper.max(exact[1])])
 }
 

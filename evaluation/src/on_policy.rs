@@ -209,19 +209,19 @@ pub fn run(
     }
     let mut calibration = Vec::new();
     for (name, path, chain, rounds) in policies {
-        let Some(driven) = drives.of(&path)? else { return Ok(false) };
+        let Some(driven) = drives.samples(&path)? else { return Ok(false) };
+        let driven: Vec<&Sample> = driven.iter().collect();
         let policy = Checkpoint::load(&path)?;
         let held_back: Vec<&Sample> = chain.held_back(0, rounds).collect();
         calibration.extend(calibrations(name, States::HeldBack, &policy, &held_back));
-        let driven: Vec<&Sample> = driven.round.samples.iter().collect();
         calibration.extend(calibrations(name, States::OnPolicy, &policy, &driven));
     }
     let mut effect = Vec::new();
     for (at, iteration) in pair.iterations().enumerate() {
         let mut driving_per_s = [0.0; 2];
-        for (sum, folder) in driving_per_s.iter_mut().zip(iteration.folders()) {
-            let Some(driven) = drives.of(&folder)? else { return Ok(false) };
-            *sum = tau_hat_per_s(driven);
+        for (per_s, folder) in driving_per_s.iter_mut().zip(iteration.folders()) {
+            let Some(driven_per_s) = drives.tau_hat_per_s(&folder)? else { return Ok(false) };
+            *per_s = driven_per_s;
         }
         let sums = iteration.tau_hats()?;
         let held_back = ratio(&sums, settings.dagger.fit.validation.block, settings.evaluation.seed);
@@ -234,11 +234,14 @@ pub fn run(
     Ok(true)
 }
 
-/// What policies collected at the wheel; each drives once, however often it is asked for.
+/// What policies met at the wheel; each drives once, if its samples are asked for first.
 struct Drives<'a> {
     settings: &'a Settings,
     lots: &'a [Lot],
-    by_folder: BTreeMap<PathBuf, Collected>,
+    /// Σ τ̂ per second of every policy that drove, by its folder.
+    tau_hats_per_s: BTreeMap<PathBuf, f64>,
+    /// What those saw whose samples were asked for.
+    samples: BTreeMap<PathBuf, Vec<Sample>>,
     progress: &'a dyn Progress,
     /// Policies that drive at most, and pairs of trainings that are compared without driving: they take about as long.
     at_most: u32,
@@ -248,12 +251,13 @@ struct Drives<'a> {
 impl<'a> Drives<'a> {
     fn new(settings: &'a Settings, lots: &'a [Lot], policies: u32, others: u32, progress: &'a dyn Progress) -> Self {
         progress.begin("on-policy rollouts", "on-policy rollouts");
-        Self { settings, lots, by_folder: BTreeMap::new(), progress, at_most: policies + others, others_begun: 0 }
+        let (tau_hats_per_s, samples) = (BTreeMap::new(), BTreeMap::new());
+        Self { settings, lots, tau_hats_per_s, samples, progress, at_most: policies + others, others_begun: 0 }
     }
 
     /// Says what is done next; `false` if cancelled.
     fn says(&self, what: &str) -> bool {
-        let done = self.by_folder.len() as f64 + f64::from(self.others_begun);
+        let done = self.tau_hats_per_s.len() as f64 + f64::from(self.others_begun);
         self.progress.at(done / f64::from(self.at_most), &mut |_| what.to_owned());
         !self.progress.is_cancelled()
     }
@@ -265,24 +269,44 @@ impl<'a> Drives<'a> {
         goes_on
     }
 
-    /// What the policy in a folder collected; `None` if cancelled.
-    fn of(&mut self, folder: &Path) -> anyhow::Result<Option<&Collected>> {
+    /// What the policy in a folder saw, labelled, which is kept; `None` if cancelled.
+    fn samples(&mut self, folder: &Path) -> anyhow::Result<Option<&[Sample]>> {
         if !self.says(&folder.display().to_string()) {
             return Ok(None);
         }
-        if !self.by_folder.contains_key(folder) {
-            let collected = rollout(self.settings, self.lots, &Checkpoint::load(folder)?)?;
-            self.by_folder.insert(folder.to_owned(), collected);
+        if !self.samples.contains_key(folder) {
+            let samples = self.drive(folder)?;
+            self.samples.insert(folder.to_owned(), samples);
         }
-        Ok(self.by_folder.get(folder))
+        Ok(self.samples.get(folder).map(Vec::as_slice))
+    }
+
+    /// Σ τ̂ per second that the policy in a folder drove; `None` if cancelled.
+    fn tau_hat_per_s(&mut self, folder: &Path) -> anyhow::Result<Option<f64>> {
+        if !self.says(&folder.display().to_string()) {
+            return Ok(None);
+        }
+        if !self.tau_hats_per_s.contains_key(folder) {
+            self.drive(folder)?;
+        }
+        Ok(self.tau_hats_per_s.get(folder).copied())
+    }
+
+    /// Lets the policy in a folder drive: what it saw, labelled.
+    fn drive(&mut self, folder: &Path) -> anyhow::Result<Vec<Sample>> {
+        let Collected { round, tau_hat_sum, driven_s, .. } =
+            rollout(self.settings, self.lots, &Checkpoint::load(folder)?)?;
+        self.tau_hats_per_s.insert(folder.to_owned(), tau_hat_sum / driven_s.max(f64::MIN_POSITIVE));
+        Ok(round.samples)
     }
 
     fn end(self) {
-        self.progress.end(&format!("{} policies", self.by_folder.len()));
+        self.progress.end(&format!("{} policies", self.tau_hats_per_s.len()));
     }
 }
 
-/// The network alone drives one trial of every lot of the evaluation; the expert labels every tick.
+/// The network alone drives one trial of every lot of the evaluation, at the noise of the training (`training.noise`), whatever
+/// levels the evaluation has; the expert labels every tick. All drives are held at once: see [`Settings::check_rollouts`].
 fn rollout(settings: &Settings, lots: &[Lot], policy: &Checkpoint) -> anyhow::Result<Collected> {
     let evaluation = &settings.evaluation;
     let trials: Vec<Trial<'_>> =
@@ -295,10 +319,6 @@ fn rollout(settings: &Settings, lots: &[Lot], policy: &Checkpoint) -> anyhow::Re
     };
     let episodes = EpisodeIndex::of_round(0, trials.len()).zip(&trials).zip(episodes).map(seated).collect();
     Ok(Rollouts::on_policy(policy, episodes).drive(&mut |_, _| {})?)
-}
-
-fn tau_hat_per_s(collected: &Collected) -> f64 {
-    collected.tau_hat_sum / collected.driven_s.max(f64::MIN_POSITIVE)
 }
 
 /// τ̂ of a policy on samples.

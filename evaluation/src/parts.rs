@@ -29,10 +29,9 @@ pub(crate) struct Part<'a> {
 }
 
 impl Part<'_> {
-    /// Where the lines of a file are, with their places in the whole plan.
-    fn rows(&self, name: &str, places: &Places<'_>) -> anyhow::Result<Vec<(Place, Range<u64>)>> {
+    /// Where the lines of a file are, with their places in the whole plan; `own`: the places in that of the part.
+    fn rows(&self, name: &str, own: &Places<'_>, places: &Places<'_>) -> anyhow::Result<Vec<(Place, Range<u64>)>> {
         let path = self.folder.join(name);
-        let own = Places::new(&self.plan);
         let mut rows = Vec::new();
         let mut seen = BTreeSet::new();
         let lines = sums::open(&path, RUN_LINES_BYTES_MAX)?;
@@ -97,18 +96,23 @@ impl Rows {
     /// If a file is missing or damaged, or a row is missing, there twice, or of another part or plan.
     pub(crate) fn of(parts: &[Part<'_>], plan: &Plan<'_>) -> anyhow::Result<Self> {
         let places = Places::new(plan);
-        let of_file = |name: &str| -> anyhow::Result<RowsOfFile> {
-            let mut rows = Vec::new();
-            for (index, part) in parts.iter().enumerate() {
-                let found = part.rows(name, &places)?.into_iter();
-                rows.extend(found.map(|(place, bytes)| Row { place, part: index, bytes }));
+        let mut of_files = FILES.map(|name| {
+            let files = parts.iter().map(|part| part.folder.join(name)).collect();
+            RowsOfFile { files, rows: Vec::new() }
+        });
+        for (index, part) in parts.iter().enumerate() {
+            // Of many trials it is large: no two parts have one at once.
+            let own = Places::new(&part.plan);
+            for (name, of_file) in FILES.into_iter().zip(&mut of_files) {
+                let found = part.rows(name, &own, &places)?.into_iter();
+                of_file.rows.extend(found.map(|(place, bytes)| Row { place, part: index, bytes }));
             }
+        }
+        for RowsOfFile { rows, .. } in &mut of_files {
             // Stable: the near-collisions of a run stay in their order.
             rows.sort_by_key(|row| (row.drive(), row.place));
-            Ok(RowsOfFile { files: parts.iter().map(|part| part.folder.join(name)).collect(), rows })
-        };
-        let [runs, failures, wall_time] = FILES;
-        Ok(Self([of_file(runs)?, of_file(failures)?, of_file(wall_time)?]))
+        }
+        Ok(Self(of_files))
     }
 
     /// Writes them into the folder of a run as an evaluation would, which can go on where this was stopped.

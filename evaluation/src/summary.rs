@@ -1,13 +1,12 @@
 //! An evaluation, counted and judged: the tables as data.
 
-use crate::format::{bound_per_100m, contacts_interval, quoted_interval, wider};
+use crate::format::{bound_per_100m, contacts_interval, quotable, quoted_interval};
 use crate::incidents::Cause;
 use crate::json;
 use crate::judge::{Comparison, DriverEstimate};
 use crate::plan::Plan;
 use crate::results::EvaluationResults;
 use crate::slices::Slice;
-use crate::statistics::poisson::DISPERSION_MAX;
 use crate::totals::Totals;
 use crate::trainings::{self, Team, TeamEstimate};
 use experiment::run_dir::RunDir;
@@ -162,9 +161,8 @@ pub struct ComparisonRow {
 impl Row {
     /// The interval that may be quoted, near-collisions per 100 m: that of [`quoted_interval`], by what the row holds.
     pub fn quoted_interval(&self) -> [f64; 2] {
-        let is_clustered = self.dispersion.is_some_and(|index| index > DISPERSION_MAX);
-        let bootstrap = self.bootstrap_lower.zip(self.bootstrap_upper).filter(|_| is_clustered);
-        wider([self.garwood_lower, self.garwood_upper], bootstrap.map(<[f64; 2]>::from))
+        let bootstrap = self.bootstrap_lower.zip(self.bootstrap_upper).map(<[f64; 2]>::from);
+        quotable([self.garwood_lower, self.garwood_upper], bootstrap, self.dispersion)
     }
 }
 
@@ -176,7 +174,8 @@ pub struct TrainingsRow {
     pub driver: String,
     /// How many trainings it has; 1: no training, or one of its own kind.
     pub trainings: usize,
-    /// The same of those it is compared with.
+    /// The same of those it is compared with: of the driver that others are compared with, or of the first team where that one
+    /// is of too few trainings to be in any.
     pub compared_with: String,
     /// Sensor noise.
     pub noise: NoiseChoice,
@@ -297,7 +296,7 @@ impl<'a> Summary<'a> {
         Self { plan, results, teams, judged }
     }
 
-    /// The team that the others are compared with: that of `compare_with`, else the first.
+    /// The team that the others are compared with: that of `compare_with`, else the first, as where that one is of two trainings.
     pub fn team_compared_with(&self) -> &Team {
         &self.teams[team_of(&self.teams, self.plan.compare_with)]
     }
@@ -525,9 +524,9 @@ impl<'a> Summary<'a> {
     }
 }
 
-/// The index of the team of a driver, else the first.
+/// The index of the team of a driver, else of the first: two trainings of one recipe are no team.
 fn team_of(teams: &[Team], driver: usize) -> usize {
-    teams.iter().position(|team| team.drivers.contains(&driver)).unwrap_or(0)
+    teams.iter().position(|team| team.has(driver)).unwrap_or(0)
 }
 
 /// Rows as CSV with a header.
@@ -548,6 +547,7 @@ mod tests {
     use experiment::drivers::NamedDriver;
     use experiment::lots::Lot;
     use experiment::settings::Settings;
+    use experiment::trained::Training;
     use experiment::trials::{Purpose, Trial};
     use sim::episode::EpisodeReport;
     use sim::frame::Ending;
@@ -610,6 +610,37 @@ mod tests {
             let alone = tables.trainings.iter().find(|row| row.trainings == 1).unwrap();
             let row = tables.rows.iter().find(|row| (&*row.driver, &*row.direction) == ("expert", "both")).unwrap();
             assert_eq!([alone.per_100m_lower, alone.per_100m_upper], row.quoted_interval());
+        }
+    }
+
+    /// It was compared with whoever stood first, because it is not counted.
+    #[test]
+    fn a_training_of_a_seed_that_is_there_already_is_compared_with_its_own_team() {
+        let settings = Settings::preset("default").unwrap();
+        let expert = NamedDriver::expert(&settings.expert);
+        let trained = |name: &str, seed| {
+            let mut driver = expert.clone().renamed(name);
+            driver.training = Some(Training { recipe: "mine".to_owned(), seed: RootSeed(seed) });
+            driver
+        };
+        let mine = [trained("mine 1", 1), trained("mine 2", 2), trained("mine 3", 3), trained("mine 1 again", 1)];
+        let drivers: Vec<NamedDriver> = std::iter::once(expert).chain(mine).collect();
+        let lots = Lot::parse_all(&["lot-b"], &settings.episode.vehicle).unwrap();
+        let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: 4, shard: None };
+        let mut results = EvaluationResults::new(&plan);
+        for (index, trial) in Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 12, &Direction::BOTH).enumerate() {
+            for driver in 0..drivers.len() {
+                let near_collisions = u32::from(driver > 0);
+                let metrics = EpisodeMetrics { near_collisions, reference_m: 100.0, ..EpisodeMetrics::default() };
+                let report = EpisodeReport { ending: Ending::ReachedEnd, metrics, events: Vec::new() };
+                results.add(0, driver, index, &trial, &report);
+            }
+        }
+        let tables = Summary::new(&plan, &results).tables();
+        let [of_expert, of_mine] = &tables.trainings[..] else { panic!("two rows: {:?}", tables.trainings) };
+        for (row, name, difference) in [(of_expert, "expert", -1.0), (of_mine, "mine 1", 0.0)] {
+            assert_eq!((&*row.driver, &*row.compared_with), (name, "mine 1"));
+            assert!((row.difference_per_100m - difference).abs() < 1e-9, "{row:?}");
         }
     }
 }

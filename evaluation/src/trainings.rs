@@ -123,6 +123,8 @@ pub struct Team {
     pub drivers: Vec<usize>,
     /// The root seed of each; none where that of one is not known.
     pub seeds: Vec<u64>,
+    /// Indices of those that were trained from one of these seeds once more: they belong to it, and do not count.
+    pub duplicates: Vec<usize>,
 }
 
 /// What trainings have in common.
@@ -165,12 +167,24 @@ impl Team {
         let name = first.method.as_ref().unwrap_or(&first.name).clone();
         let seed_of = |index: &usize| drivers[*index].training.as_ref().map(|training| training.seed.0);
         if !group.iter().all(|index| seed_of(index).is_some()) {
-            return Self { name, drivers: group, seeds: Vec::new() };
+            return Self { name, drivers: group, seeds: Vec::new(), duplicates: Vec::new() };
         }
         let network_of = |index: &usize| (seed_of(index), drivers[*index].digest());
         group.sort_by_cached_key(network_of);
-        group.dedup_by_key(|index| seed_of(index));
-        Self { name, seeds: group.iter().filter_map(seed_of).collect(), drivers: group }
+        let mut duplicates = Vec::new();
+        group.dedup_by(|index, before| {
+            let is_duplicate = seed_of(index) == seed_of(before);
+            if is_duplicate {
+                duplicates.push(*index);
+            }
+            is_duplicate
+        });
+        Self { name, seeds: group.iter().filter_map(seed_of).collect(), drivers: group, duplicates }
+    }
+
+    /// Whether a driver belongs to it.
+    pub fn has(&self, driver: usize) -> bool {
+        self.drivers.contains(&driver) || self.duplicates.contains(&driver)
     }
 }
 
@@ -206,7 +220,7 @@ impl JudgedTeams {
 
     /// The team of a driver, and how it stands; `None` if it was trained too seldom to speak for others.
     pub fn of(&self, driver: usize) -> Option<(&Team, Option<&TeamEstimate>)> {
-        let index = self.teams.iter().position(|team| team.drivers.contains(&driver))?;
+        let index = self.teams.iter().position(|team| team.has(driver))?;
         Some((&self.teams[index], self.estimates.as_ref().map(|estimates| &estimates[index])))
     }
 
@@ -404,6 +418,8 @@ mod tests {
         let twice = [trained("a", 1), trained("a", 2), trained("a", 1), trained("a", 3), trained("a", 3)];
         let found = teams(&twice);
         assert_eq!((&*found[0].drivers, &*found[0].seeds), (&[0, 1, 3][..], &[1, 2, 3][..]));
+        assert_eq!(found[0].duplicates, [2, 4]);
+        assert!((0..5).all(|driver| found[0].has(driver)));
         assert_eq!(teams(&[trained("a", 1), trained("a", 1), trained("a", 1)]), []);
     }
 }

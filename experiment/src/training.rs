@@ -35,15 +35,16 @@ use std::sync::Arc;
 pub fn train(settings: &Settings, run: &RunDir, progress: &dyn Progress) -> anyhow::Result<Outcome> {
     let lots = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     run.ensure_unchanged(&inputs::of(&lots, &[]))?;
-    // A lot that cannot be driven is found here, with its error, not in the middle of a round.
-    episodes_of(settings, &lots, 0)?;
     let store = Store::open(run.path())?;
+    // A lot that cannot be driven is found here, with its error, not in the middle of a round.
+    let mut first_episodes = (!store.has_round(0)?).then(|| episodes_of(settings, &lots, 0)).transpose()?;
     let monitor = RefCell::new(Monitor::new(progress));
     let conditions = Conditions::of(&settings.episode);
     let mut hooks = Hooks {
         episodes: &mut |round| {
             run.ensure_held()?;
-            let episodes = episodes_of(settings, &lots, round)?;
+            let first_episodes = first_episodes.take_if(|_| round == 0);
+            let episodes = first_episodes.map_or_else(|| episodes_of(settings, &lots, round), Ok)?;
             monitor.borrow_mut().collection = Collection::of(&episodes);
             Ok(episodes)
         },

@@ -34,6 +34,7 @@ mod stats;
 
 pub use elastic_band::SPACING_M as WAY_SPACING_M;
 pub use on_grid::GridExpert;
+pub use rollout::STEP_TURN_MAX_RAD;
 pub use search::Candidate;
 pub use settings::{ExpertSettings, PlanWeights, Sees};
 use sim::maths;

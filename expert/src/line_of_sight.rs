@@ -111,11 +111,9 @@ impl VisiblePatch {
         }
         let tall_m = sensing.camera_height_m * (1.0 - 1.0 / OCCLUSION_FACTOR_MIN);
         let reach_m = maths::hypot(geometry.far_edge_ahead_m(), 0.5 * geometry.side_m);
-        for occluder in map.occluders() {
-            let is_near = occluder.centre.distance(pose.position()) < reach_m + occluder.radius_m;
-            if is_near && occluder.height_m >= tall_m {
-                patch.cast_shadow(occluder);
-            }
+        let near = map.occluders_near(pose.position(), reach_m);
+        for occluder in near.filter(|occluder| occluder.height_m >= tall_m) {
+            patch.cast_shadow(occluder);
         }
         patch
     }

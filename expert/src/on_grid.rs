@@ -15,8 +15,6 @@ use sim::seed::Rng;
 use sim::sensing::{GRID_CELLS, Observation, OccupancyGrid};
 use sim::vehicle::{VehicleCommand, VehicleState};
 
-/// Ground that counts as free around the patch, metres: more than a plan reaches beyond it.
-const AROUND_M: f32 = 8.0;
 /// Obstacles are taken to be smaller than their cells on every side, metres (*chosen*: half of what a cell adds on average,
 /// docs/methods.md 1.1).
 const INSET_M: f32 = 0.12;
@@ -26,13 +24,13 @@ const INSET_M: f32 = 0.12;
 pub struct GridExpert {
     expert: ScriptedExpert,
     controller: ControllerSettings,
-    /// Everything but outside of the patch and of what is around it.
+    /// An empty grid: plans go on beyond it.
     open: DistanceField,
     /// The grid of this tick.
     field: DistanceField,
     /// What a grid can show, whatever is in it.
     sight: LineOfSight,
-    /// The last command.
+    /// The last command that was driven.
     last: VehicleCommand,
 }
 
@@ -41,9 +39,8 @@ impl GridExpert {
     /// [`ScriptedExpert::new`].
     pub fn new(settings: ExpertSettings, episode: &EpisodeSettings, hand: Rng) -> Self {
         let geometry = episode.sensing.geometry;
-        let (half_m, far_m) = (0.5 * geometry.side_m + AROUND_M, geometry.far_edge_ahead_m() + AROUND_M);
-        let around = [(-AROUND_M, -half_m), (far_m, -half_m), (far_m, half_m), (-AROUND_M, half_m)];
-        let open = DistanceField::of_boundary(&around.map(Vec2::from));
+        let low = Vec2::new(geometry.near_edge_ahead_m, -0.5 * geometry.side_m);
+        let open = DistanceField::of_open_ground(low, low + geometry.side_m);
         Self {
             expert: ScriptedExpert::new(settings, episode, hand),
             controller: episode.controller.clone(),
@@ -76,9 +73,13 @@ impl Policy for GridExpert {
         let scene = Scene { field: &self.field, vehicle, route: None };
         let decision = self.expert.decide_in(&scene, &self.sight);
         let context = &self.expert.context;
-        self.last = controller::pursue(&self.controller, &context.vehicle, context.geometry(), &decision);
+        let command =
+            |decision: &Decision| controller::pursue(&self.controller, &context.vehicle, context.geometry(), decision);
         // As fast as the expert, who is slow where its point is near.
-        Decision { source: Source::Planner, speed_limit_mps: Some(self.last.speed_mps), ..decision }
+        let speed_limit_mps = Some(command(&decision).speed_mps);
+        let decision = Decision { source: Source::Planner, speed_limit_mps, ..decision };
+        self.last = command(&decision);
+        decision
     }
 
     fn reset(&mut self) {
@@ -154,6 +155,27 @@ mod tests {
         }
         expert.look(&OccupancyGrid::free());
         assert!(expert.field.at(centre) > 2.9, "the grid before is forgotten");
+    }
+
+    /// Fourteen metres beside the car it ended, and plans with it.
+    #[test]
+    fn ground_beyond_the_grid_is_free_however_far_plans_reach() {
+        let mut expert = expert();
+        expert.look(&OccupancyGrid::occupied());
+        for (ahead_m, left_m) in [(0.0, 14.0), (0.0, -30.0), (-9.0, 0.0), (-90.0, 90.0), (40.0, 0.0)] {
+            assert_eq!(expert.field.at(Vec2::new(ahead_m, left_m)), sim::distance_field::CAP_M, "{ahead_m}, {left_m}");
+        }
+    }
+
+    /// It took the speed of the expert's law for what is driven by the planners', and forecast another ramp.
+    #[test]
+    fn the_command_remembered_is_the_one_that_is_driven() {
+        use sim::controller::SpeedLaw;
+        let controller = ControllerSettings { planner_speed_law: SpeedLaw::Halved, ..ControllerSettings::paper() };
+        let mut expert = GridExpert { controller: controller.clone(), ..expert() };
+        let decision = expert.act(&Observation { grid: OccupancyGrid::free() });
+        let context = &expert.expert.context;
+        assert_eq!(expert.last, controller::pursue(&controller, &context.vehicle, context.geometry(), &decision));
     }
 
     /// Before a corner: straight on lies a pocket of ten metres, to the left a way that leaves the grid after six.

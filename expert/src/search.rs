@@ -488,7 +488,7 @@ impl Search<'_> {
         let reach_m = self.settings.horizon_m + self.context.vehicle.front_m();
         let progress_of = |motion: Motion| {
             let bumper = motion.on_axis(self.context.vehicle.front_m());
-            path.project_near(bumper, progress_m, self.context.vehicle.front_m(), reach_m + 4.0)
+            path.project_near_m(bumper, progress_m, self.context.vehicle.front_m(), reach_m + 4.0)
         };
         let reached_m = progress_of(end);
         let start_m = *self.start_progress_m.get_or_init(|| progress_of(self.start));

@@ -48,7 +48,7 @@ fn expert(sees: Sees) -> ScriptedExpert {
 /// First answer of an expert without a past.
 fn answer(map: &Map, pose: Pose, speed_mps: f32) -> LookAheadPoint {
     let vehicle = VehicleState { speed_mps, ..VehicleState::at_rest(pose) };
-    let progress_m = map.path().project(pose.position());
+    let progress_m = map.path().project_m(pose.position());
     let truth = GroundTruth { map, vehicle, progress_m };
     expert(Sees::WholeMap).decide(&Situation { observation: &Observation::default(), truth }).look_ahead
 }

@@ -20,7 +20,7 @@ const FORMAT: i64 = 8;
 /// The file: the network's own outputs for `[batch, 1, 25, 25]`. How they are used is written beside the graph ([`About`]) and
 /// is not part of it.
 pub fn export(checkpoint: &Checkpoint) -> Vec<u8> {
-    file(checkpoint, layers(checkpoint.weights.architecture()))
+    file(checkpoint, None, layers(checkpoint.weights.architecture()))
 }
 
 /// The network's layers.
@@ -61,8 +61,8 @@ fn residual(nodes: &mut Vec<NodeProto>, stage: &str, input: &str, layers: usize,
     })
 }
 
-/// The file with these layers and the network's weights.
-pub(crate) fn file(checkpoint: &Checkpoint, nodes: Vec<NodeProto>) -> Vec<u8> {
+/// The file with these layers and the network's weights. `batch`: as many grids as are answered at once; free if `None`.
+pub(crate) fn file(checkpoint: &Checkpoint, batch: Option<i64>, nodes: Vec<NodeProto>) -> Vec<u8> {
     let tensors = checkpoint.tensors().into_iter().map(|tensor| TensorProto {
         dims: tensor.shape.iter().map(|&length| length as i64).collect(),
         data_type: Some(DataType::FLOAT),
@@ -75,8 +75,8 @@ pub(crate) fn file(checkpoint: &Checkpoint, nodes: Vec<NodeProto>) -> Vec<u8> {
         graph: Graph {
             nodes,
             tensors: tensors.collect(),
-            input: values(INPUT, &[1, GRID_CELLS as i64, GRID_CELLS as i64]),
-            output: values(OUTPUT, &[checkpoint.weights.architecture().outputs() as i64]),
+            input: values(INPUT, batch, &[1, GRID_CELLS as i64, GRID_CELLS as i64]),
+            output: values(OUTPUT, batch, &[checkpoint.weights.architecture().outputs() as i64]),
         },
         operators: OperatorSetIdProto { domain: Some(String::new()), version: Some(OPERATORS) },
         about: StringStringEntryProto { key: Some(about::KEY.to_owned()), value: Some(about.to_toml()) },
@@ -133,8 +133,8 @@ fn integers(name: &str, ints: &[i64]) -> AttributeProto {
 }
 
 /// Float32 `[batch, …]`.
-fn values(name: &str, lengths: &[i64]) -> ValueInfoProto {
-    let batch = Dimension { dim_param: Some("batch".to_owned()), ..Dimension::default() };
+fn values(name: &str, batch: Option<i64>, lengths: &[i64]) -> ValueInfoProto {
+    let batch = Dimension { dim_value: batch, dim_param: batch.is_none().then(|| "batch".to_owned()) };
     let lengths = lengths.iter().map(|&length| Dimension { dim_value: Some(length), ..Dimension::default() });
     let shape = TensorShapeProto { dim: std::iter::once(batch).chain(lengths).collect() };
     let tensor_type = Some(TypeProtoTensor { elem_type: Some(DataType::FLOAT), shape: Some(shape) });

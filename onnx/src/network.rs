@@ -136,23 +136,30 @@ impl OnnxNetwork {
         Ok(network)
     }
 
-    /// Refuses a network whose answer to a grid depends on the other grids of its batch: which cars share a batch depends on
-    /// the number of threads.
+    /// Refuses a network whose answer to a grid depends on the other grids of its batch, or on its place there: which cars
+    /// share a batch, and in which order, depends on the number of threads.
     fn check_independence(&self, pool: &Arc<ThreadPool>) -> Result<(), String> {
         let (free, mut striped) = (OccupancyGrid::free(), OccupancyGrid::free());
         (0..GRID_CELLS).step_by(2).for_each(|row| striped.occupy_row(row, u32::MAX >> (32 - GRID_CELLS)));
-        let first = |others: &OccupancyGrid| {
+        let answers_beside = |others: &OccupancyGrid| {
             let grids: Vec<&OccupancyGrid> =
                 std::iter::once(&free).chain(std::iter::repeat_n(others, self.batch - 1)).collect();
-            let (numbers, values) = self.run(&grids, pool)?;
-            Ok::<_, String>(values[..numbers].iter().map(|value| value.to_bits()).collect::<Vec<_>>())
+            let (_, values) = self.run(&grids, pool)?;
+            let bits: Vec<u32> = values.into_iter().map(f32::to_bits).collect();
+            Ok::<_, String>(bits.chunks_exact(self.answer.numbers()).map(<[u32]>::to_vec).collect::<Vec<_>>())
         };
-        if first(&free)? == first(&striped)? {
-            return Ok(());
+        let (alike, beside_others) = (answers_beside(&free)?, answers_beside(&striped)?);
+        if alike.windows(2).any(|neighbours| neighbours[0] != neighbours[1]) {
+            return Err(
+                "answers one grid differently in another place of the batch; export it with a free batch".to_owned()
+            );
         }
-        Err("answers one grid differently when others stand beside it in the batch, as batch normalisation does in training \
-             mode; export it in evaluation mode"
-            .to_owned())
+        if alike.first() != beside_others.first() {
+            return Err("answers one grid differently when others stand beside it in the batch, as batch normalisation does in \
+                        training mode; export it in evaluation mode"
+                .to_owned());
+        }
+        Ok(())
     }
 
     /// What lotpilot wrote into the file; `None` if another program made it.

@@ -141,7 +141,7 @@ mod tests {
                 let (vehicle, geometry) = (&context.vehicle, &context.geometry);
                 for &curvature in curvatures {
                     let decision = context.steer_along(curvature);
-                    let steering_rad = controller::steering(pursuit, vehicle, geometry, decision.look_ahead);
+                    let steering_rad = controller::steering_rad(pursuit, vehicle, geometry, decision.look_ahead);
                     let driven = context.curvature_per_m(steering_rad);
                     assert!((driven - curvature).abs() < 1e-5, "{pursuit:?}: {curvature}, driven {driven}");
                     assert!(decision.look_ahead.ahead_m > ahead_min_m);

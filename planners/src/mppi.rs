@@ -25,7 +25,7 @@ const STEP_S: f32 = 0.1;
 /// Between two draws of a sequence, seconds; what lies between is interpolated (*chosen*, instead of the filter that nav2
 /// smooths its answer with).
 const KNOT_S: f32 = 0.4;
-/// Circles that cover the body in a row.
+/// Circles as wide as the body in a row along it: of the paper's car, corners stick out by 0.1 m at most.
 const CIRCLES: usize = 6;
 /// Speeds of the controller's law are tabulated at so many angles from 0 to full lock.
 const LAW_ANGLES: usize = 33;
@@ -55,7 +55,8 @@ pub struct Params {
     pub speed_std_mps: f32,
     /// Price of a metre that the way still goes from the bumper at the end (*chosen*).
     pub way_weight: f32,
-    /// Price of a second with clearance 0 (*chosen*).
+    /// Price of a second with clearance 0 (*chosen*): the distance of the body's circles to the discs inscribed in occupied
+    /// cells.
     pub obstacle_weight: f32,
     /// Clearance that lowers this price e times, metres (*chosen*).
     pub clearance_scale_m: f32,
@@ -314,7 +315,7 @@ struct Tables {
     context: PlannerContext,
     steps: usize,
     noise: Vec<Control>,
-    /// Centres of the circles that cover the body, ahead of the rear axle, metres.
+    /// Centres of the circles along the body, ahead of the rear axle, metres.
     circles_m: [f32; CIRCLES],
     /// What the controller drives at most, m/s, by angle.
     law_mps: [f32; LAW_ANGLES],

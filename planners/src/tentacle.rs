@@ -31,8 +31,6 @@ const STARTS: usize = 40;
 const SAMPLE_M: f32 = 0.2;
 /// Samples from one point of a path in pictures to the next.
 const SAMPLES_PER_M: usize = 5;
-/// Rows of unseen cells below the patch that a path may touch.
-const UNSEEN_ROWS: usize = 24;
 
 /// Half the body width (0.93 m) plus the paper's safety distance of 0.15 m. The paper says "0.35 m, which is the width of
 /// the vehicle (0.2 m) plus the safety distance (0.15 m)"; 0.2 m is no car's width (docs/methods.md 6.4).
@@ -365,16 +363,17 @@ fn points(
     })
 }
 
-/// Marks cells near points; rows beyond the grid's are the unseen ones before the patch.
+/// Marks cells near points.
 struct Marks<'a> {
     geometry: &'a GridGeometry,
     range_m: f32,
-    rows: [u32; GRID_CELLS + UNSEEN_ROWS],
+    /// Rows beyond the grid's are the unseen ones before the patch, as many as are needed.
+    rows: Vec<u32>,
 }
 
 impl<'a> Marks<'a> {
     fn new(geometry: &'a GridGeometry, range_m: f32) -> Self {
-        Self { geometry, range_m, rows: [0; GRID_CELLS + UNSEEN_ROWS] }
+        Self { geometry, range_m, rows: vec![0; GRID_CELLS] }
     }
 
     /// Marks all cells whose centres are within range of a point, unless the point has left the patch sideways or ahead.
@@ -384,7 +383,11 @@ impl<'a> Marks<'a> {
         if point.x > far_m || point.y.abs() > half_m {
             return;
         }
-        for (row, cells) in self.rows.iter_mut().enumerate() {
+        // How many rows of cells lie between the far edge and a place.
+        let rows_to = |ahead_m: f32| ((far_m - ahead_m) / cell_m) as usize;
+        let (first, end) = (rows_to(point.x + self.range_m).saturating_sub(1), rows_to(point.x - self.range_m) + 1);
+        self.rows.resize(self.rows.len().max(end), 0);
+        for (row, cells) in self.rows.iter_mut().enumerate().take(end).skip(first) {
             let ahead_m = far_m - (row as f32 + 0.5) * cell_m - point.x;
             let left_sq = self.range_m * self.range_m - ahead_m * ahead_m;
             if left_sq < 0.0 {
@@ -446,6 +449,23 @@ mod tests {
         for _ in 0..200 {
             assert!(tight.act(&observation).look_ahead.ahead_m.is_finite());
         }
+    }
+
+    /// Of small cells, those behind the twenty-fourth row before the patch did not count.
+    #[test]
+    fn unseen_cells_count_however_small_they_are() {
+        let mut context = context();
+        context.geometry.side_m = 3.0;
+        let params = Params { path_origin: PathOrigin::RearAxle, detection_range_m: 1.01, ..Params::paper() };
+        let (cell_m, far_m) = (context.geometry.cell_m(), context.geometry.far_edge_ahead_m());
+        let path: Vec<Vec2> =
+            points(&params, &context, 0.0, params.paths()[SIDE]).filter(|point| point.x <= far_m).collect();
+        let is_near = |&(row, col): &(u8, u8)| {
+            let centre = Vec2::new(far_m - (f32::from(row) + 0.5) * cell_m, (12.0 - f32::from(col)) * cell_m);
+            path.iter().any(|point| point.distance(centre) <= params.detection_range_m)
+        };
+        let n_near = (0..100).flat_map(|row| (0..GRID_CELLS as u8).map(move |col| (row, col))).filter(is_near).count();
+        assert_eq!(params.planner(&context).around[STARTS][SIDE].count as usize, n_near);
     }
 
     #[test]

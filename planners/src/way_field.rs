@@ -32,7 +32,7 @@ pub(crate) struct WayField {
     start: usize,
     /// Whether a cell is ground that the car covers or sees; waves do not go round beside it.
     is_known: Vec<bool>,
-    /// Distance to the nearest occupied square, metres, by cell; negative inside.
+    /// Distance of a cell's centre to the disc inscribed in the nearest occupied cell, metres; negative inside.
     distance_m: Vec<f32>,
     /// How far the way still goes, metres, by cell; up to a constant.
     way_left_m: Vec<f32>,
@@ -130,7 +130,8 @@ impl WayField {
         }
     }
 
-    /// Distances of four points to the nearest occupied square, metres, bilinear between centres of cells.
+    /// Distances of four points to the disc inscribed in the nearest occupied cell, metres, bilinear between centres of cells:
+    /// too large beside the corners of a cell, by up to 0.21 of its side.
     #[inline]
     pub(crate) fn distance_m(&self, in_ego: FourPoints) -> f32x4 {
         self.between(&self.distance_m, in_ego)
@@ -196,9 +197,9 @@ mod tests {
     use crate::test_scenes::{context, grid_with};
 
     #[test]
-    fn distances_are_those_to_the_nearest_square() {
+    fn distances_are_those_to_the_disc_in_the_nearest_cell() {
         let mut field = WayField::new(&context());
-        // Cell (20, 12) is the square X 6.22…6.70, |Y| ≤ 0.24.
+        // In cell (20, 12), X 6.22…6.70, |Y| ≤ 0.24, it has a radius of 0.24 m.
         field.read(&grid_with(&[(20, 12)]), 0.7);
         for (x_m, y_m, expected_m) in [(5.02, 0.0, 1.2), (6.46, 1.44, 1.2), (2.14, 0.0, 3.0), (6.46, 0.0, -0.24)] {
             let found_m = field.distance_m(FourPoints::splat(Vec2::new(x_m, y_m))).to_array()[0];

@@ -4,6 +4,7 @@
 //! at the same τ. Hence the share of the ticks with τ̂ < τ stands beside that of the best constant answer, and beside the
 //! share at a τ that is scaled as the labels are.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim::maths;
 use sim::sensing::GridGeometry;
@@ -93,7 +94,7 @@ fn best_constant(labels: &[[f32; 2]], radius: f32) -> f64 {
         let point = centre(cell);
         filled.iter().filter(|&&(of, _)| is_within(point, centre(of))).map(|(_, count)| count).sum()
     };
-    let mut points: Vec<(u32, usize)> = (0..CELLS * CELLS).map(|cell| (about(cell), cell)).collect();
+    let mut points: Vec<(u32, usize)> = (0..CELLS * CELLS).into_par_iter().map(|cell| (about(cell), cell)).collect();
     points.sort_unstable_by_key(|&(count, cell)| (Reverse(count), cell));
     let exactly = |&(_, cell): &(u32, usize)| labels.iter().filter(|&&label| is_within(centre(cell), label)).count();
     let best = points[..FINALISTS].iter().map(exactly).max().unwrap_or(0);

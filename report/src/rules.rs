@@ -97,7 +97,7 @@ pub fn table(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path
     let team = |title: &str| {
         let drivers: Vec<usize> = (0..rows.len()).filter(|&driver| rows[driver].rule == title).collect();
         let seeds = drivers.iter().filter_map(|&driver| rows[driver].seed).collect();
-        Team { name: title.to_owned(), drivers, seeds }
+        Team { name: title.to_owned(), drivers, seeds, duplicates: Vec::new() }
     };
     let teams: Vec<Team> = pooled.iter().map(|row| team(&row.rule)).collect();
     let of_paper = teams.iter().position(|team| team.name == rules::title(OF_PAPER));

@@ -8,7 +8,7 @@
 
 use crate::neighbours;
 use crate::open_list::Open;
-use sim::geometry::{Pose, Vec2, distance_to_segment};
+use sim::geometry::{Pose, Vec2, distance_to_segment_m};
 use sim::map::Map;
 use sim::maths;
 use sim::scenario::{Island, KERB_MAX_M, Scenario};
@@ -100,30 +100,26 @@ pub(crate) fn find(map: &Map, vehicle: &VehicleSettings) -> Ways {
 /// Returns where.
 pub(crate) fn close(lot: &mut Scenario, vehicle: &VehicleSettings) -> Vec<Vec2> {
     let mut closed = Vec::new();
-    // Ways that no kerb closes, whether they are branches, and how many were closed when they were last tried.
-    let (mut open, mut closed_before) = (Vec::<(Vec2, bool)>::new(), 0);
+    // What no kerb closes, and how many were closed when that was last tried.
+    let (mut open, mut closed_before) = (Vec::<Opening>::new(), 0);
     while closed.len() < KERBS_MAX
         && let Ok(map) = Map::build(lot.clone(), vehicle)
     {
         // A kerb may close several ways: look again after each. Every kerb that is tried costs a map.
         let ways = find(&map, vehicle);
-        let branches = ways.branches.iter().map(|branch| (branch.mouth, &branch.way, true));
-        let short_cuts = ways.short_cuts.iter().map(|short_cut| (short_cut.middle, &short_cut.way, false));
-        let closing = branches.chain(short_cuts).find_map(|(place, way, is_branch)| {
-            let is_this =
-                |&(other, is_other_branch): &(Vec2, bool)| is_other_branch == is_branch && is_same_mouth(other, place);
-            if open.iter().any(is_this) {
+        let branches = ways.branches.iter().map(|branch| (Opening::Branch(branch.mouth), &branch.way));
+        let short_cuts = ways.short_cuts.iter().map(|short_cut| (Opening::ShortCut(short_cut.middle), &short_cut.way));
+        let closing = branches.chain(short_cuts).find_map(|(opening, way)| {
+            if open.iter().any(|other| other.is_same_as(opening)) {
                 return None;
             }
-            let is_closed = |left: &Ways| {
-                if is_branch { is_branch_closed(place, left) } else { is_short_cut_closed(&ways, left) }
-            };
-            let with_kerb = kerbs(&map, way)
-                .find(|lot| Map::build(lot.clone(), vehicle).is_ok_and(|map| is_closed(&find(&map, vehicle))));
+            let is_closed = |map: &Map| opening.is_closed(&ways, &find(map, vehicle));
+            let with_kerb =
+                kerbs(&map, way).find(|lot| Map::build(lot.clone(), vehicle).is_ok_and(|map| is_closed(&map)));
             if with_kerb.is_none() {
-                open.push((place, is_branch));
+                open.push(opening);
             }
-            Some((place, with_kerb?))
+            Some((opening.place(), with_kerb?))
         });
         if let Some((place, with_kerb)) = closing {
             *lot = with_kerb;
@@ -139,26 +135,49 @@ pub(crate) fn close(lot: &mut Scenario, vehicle: &VehicleSettings) -> Vec<Vec2> 
     closed
 }
 
-fn is_same_mouth(a: Vec2, b: Vec2) -> bool {
+/// What a kerb is to close, and where.
+#[derive(Clone, Copy)]
+enum Opening {
+    /// A branch, at its mouth.
+    Branch(Vec2),
+    /// A short cut, at its middle.
+    ShortCut(Vec2),
+}
+
+impl Opening {
+    fn place(self) -> Vec2 {
+        let (Self::Branch(place) | Self::ShortCut(place)) = self;
+        place
+    }
+
+    fn is_same_as(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Branch(a), Self::Branch(b)) | (Self::ShortCut(a), Self::ShortCut(b)) => is_same_place(a, b),
+            _ => false,
+        }
+    }
+
+    /// Whether a kerb closed it, by the ways before and those that are left.
+    fn is_closed(self, before: &Ways, left: &Ways) -> bool {
+        match self {
+            Self::Branch(mouth) => left.branches.iter().all(|other| !is_same_place(other.mouth, mouth)),
+            // Across wide ground a kerb only moves the way, and across a long way it may leave a dead end that is a branch.
+            Self::ShortCut(_) => {
+                left.short_cuts.len() < before.short_cuts.len() && left.branches.len() <= before.branches.len()
+            }
+        }
+    }
+}
+
+fn is_same_place(a: Vec2, b: Vec2) -> bool {
     a.distance(b) <= 0.5 * SAME_MOUTH_M
-}
-
-/// Whether no branch is left at a mouth.
-fn is_branch_closed(mouth: Vec2, left: &Ways) -> bool {
-    left.branches.iter().all(|other| !is_same_mouth(other.mouth, mouth))
-}
-
-/// Whether a kerb closed a short cut: across wide ground it only moves the way, and across a long way it may leave a dead end
-/// that is a branch.
-fn is_short_cut_closed(before: &Ways, left: &Ways) -> bool {
-    left.short_cuts.len() < before.short_cuts.len() && left.branches.len() <= before.branches.len()
 }
 
 /// The lot with a kerb across a way, for each place along it, shortest kerb first.
 fn kerbs<'a>(map: &'a Map, way: &[Vec2]) -> impl Iterator<Item = Scenario> + use<'a> {
     let route: Vec<Vec2> = map.path().poses().iter().map(|pose| pose.position()).collect();
     let keeps_off_route =
-        |&(a, b): &(Vec2, Vec2)| route.iter().all(|&point| distance_to_segment(point, a, b) > KERB_BESIDE_M);
+        |&(a, b): &(Vec2, Vec2)| route.iter().all(|&point| distance_to_segment_m(point, a, b) > KERB_BESIDE_M);
     let by_length = |a: &(Vec2, Vec2), b: &(Vec2, Vec2)| a.0.distance(a.1).total_cmp(&b.0.distance(b.1));
     let shortest_at = |&point: &Vec2| {
         (0..KERB_DIRECTIONS).filter_map(|k| chord(map, point, k)).filter(keeps_off_route).min_by(by_length)

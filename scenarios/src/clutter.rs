@@ -4,7 +4,7 @@
 //! lane. Each such [`LaneEncroachment`] leaves a free gap to the opposite edge and keeps away from corners and from
 //! encroachments on the other side; the tests of [`mod@crate::reference`] measure that with rays across the route.
 
-use crate::corridor::{Corridor, Leg, STALL_DEPTH_M, Side, Stall, overlap, to_millimetres};
+use crate::corridor::{Corridor, Leg, STALL_DEPTH_M, Side, Stall, hundredths, overlap, tenths, to_millimetres};
 use rand::RngExt as _;
 use sim::geometry::{Pose, Vec2, rectangle};
 use sim::scenario::{Obstacle, ObstacleClass, SpeedBump};
@@ -264,7 +264,7 @@ fn fit_in_lane(leg: &Leg, side: Side, outline: &[Vec2]) -> Fit {
     let at_m = local.iter().map(|p| p.x).chain(bends.filter(|s_m| (from_m..=to_m).contains(s_m)));
     let mut fit = Fit { gap_m: f32::INFINITY, protrusion_m: f32::NEG_INFINITY, from_m, to_m };
     for s_m in at_m {
-        let inner_m = inner_extent(&local, s_m);
+        let inner_m = inner_extent_m(&local, s_m);
         fit.gap_m = fit.gap_m.min(inner_m - side.sign() * leg.edge_m(side.opposite(), s_m));
         fit.protrusion_m = fit.protrusion_m.max(side.sign() * leg.edge_m(side, s_m) - inner_m);
     }
@@ -272,7 +272,7 @@ fn fit_in_lane(leg: &Leg, side: Side, outline: &[Vec2]) -> Fit {
 }
 
 /// The smallest second coordinate of a convex outline at a first coordinate within its range.
-fn inner_extent(outline: &[Vec2], s_m: f32) -> f32 {
+fn inner_extent_m(outline: &[Vec2], s_m: f32) -> f32 {
     sim::geometry::edges(outline)
         .filter(|(a, b)| a.x.min(b.x) <= s_m && s_m <= a.x.max(b.x))
         .map(
@@ -396,8 +396,8 @@ fn place_double_parked_car(
     rng: &mut Rng,
 ) {
     let gap_m = rng.random_range(placement.plan.free_gap_m.clone());
-    let heading_in_leg_rad =
-        yaw(rng, placement.plan.double_parked_yaw_deg) + if rng.random_bool(0.8) { 0.0 } else { std::f32::consts::PI };
+    let heading_in_leg_rad = yaw_rad(rng, placement.plan.double_parked_yaw_deg)
+        + if rng.random_bool(0.8) { 0.0 } else { std::f32::consts::PI };
     let body = Body { class, s_m, heading_in_leg_rad };
     // As far into the lane as the gap allows, but no farther from its own edge than people park.
     let wish = Protrusion { wanted_m: class.default_size_m()[1] + KERB_GAP_M, gap_m };
@@ -428,7 +428,7 @@ fn place_parked(placement: &mut Placement<'_>, stall: &Stall, rng: &mut Rng) {
     let set_back_m = rng.random_range(0.1..0.4);
     let towards_lane_rad = -stall.side.sign() * std::f32::consts::FRAC_PI_2;
     let backed_in = rng.random_bool(0.3);
-    let heading_in_leg_rad = yaw(rng, 4.0) + if backed_in { towards_lane_rad } else { -towards_lane_rad };
+    let heading_in_leg_rad = yaw_rad(rng, 4.0) + if backed_in { towards_lane_rad } else { -towards_lane_rad };
     let s_m = stall.centre_m + rng.random_range(-0.1..0.1);
     if !occupied {
         let leg = placement.leg(stall.leg);
@@ -499,13 +499,14 @@ fn place_group(placement: &mut Placement<'_>, group: &Group, rng: &mut Rng) {
         let intrudes = attempt < TRIES / 2;
         let (from_m, to_m) = if intrudes { placement.usable(index) } else { (0.0, placement.leg(index).length_m) };
         let length_m = (group.members - 1) as f32 * group.spacing_m;
-        if from_m + length_m + 1.0 > to_m {
+        let firsts_m = from_m + 0.5..to_m - length_m - 0.5;
+        if firsts_m.is_empty() {
             continue;
         }
-        let first_m = rng.random_range(from_m + 0.5..to_m - length_m - 0.5);
+        let first_m = rng.random_range(firsts_m);
         let wanted_m = if intrudes { rng.random_range(0.1..group.deepest_m) } else { -rng.random_range(0.1..0.8) };
         let gap_m = rng.random_range(placement.plan.free_gap_m.clone());
-        let turn_rad = if group.class == ObstacleClass::Pillar { 0.0 } else { yaw(rng, 90.0) };
+        let turn_rad = if group.class == ObstacleClass::Pillar { 0.0 } else { yaw_rad(rng, 90.0) };
         let row: Vec<Placed> = (0..group.members)
             .map(|k| {
                 let s_m = first_m + k as f32 * group.spacing_m;
@@ -604,14 +605,7 @@ pub(crate) fn draw_car(rng: &mut Rng) -> ObstacleClass {
     }
 }
 
-fn yaw(rng: &mut Rng, limit_deg: f32) -> f32 {
+/// Up to so many degrees to either side, in radians.
+pub(crate) fn yaw_rad(rng: &mut Rng, limit_deg: f32) -> f32 {
     rng.random_range(-limit_deg..=limit_deg).to_radians()
-}
-
-fn tenths(value: f32) -> f32 {
-    (value * 10.0).round() / 10.0
-}
-
-fn hundredths(value: f32) -> f32 {
-    (value * 100.0).round() / 100.0
 }

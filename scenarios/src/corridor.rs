@@ -183,7 +183,7 @@ impl Leg {
 
     /// `d` of a lane edge, metres.
     pub fn edge_m(&self, side: Side, s_m: f32) -> f32 {
-        interpolate(self.profile(side), s_m)
+        interpolated_m(self.profile(side), s_m)
     }
 
     /// Breakpoints `(s, d)` of a lane edge.
@@ -282,7 +282,7 @@ impl Corridor {
                 let first_m = 0.5 * (from_m + to_m - count as f32 * STALL_WIDTH_M);
                 for k in 0..count {
                     let stall_from_m = first_m + k as f32 * STALL_WIDTH_M;
-                    let front_m = outermost(leg, side, stall_from_m, stall_from_m + STALL_WIDTH_M);
+                    let front_m = outermost_m(leg, side, stall_from_m, stall_from_m + STALL_WIDTH_M);
                     let stall = Stall { leg: index, side, centre_m: stall_from_m + 0.5 * STALL_WIDTH_M, front_m };
                     // A hair smaller than painted: neighbours share a line, and the front line lies on the lane edge.
                     let outline = self.stall_outline(&stall, 0.02);
@@ -306,7 +306,7 @@ impl Corridor {
 }
 
 /// The edge of the lane farthest from its middle within a range, `d` in metres.
-fn outermost(leg: &Leg, side: Side, from_m: f32, to_m: f32) -> f32 {
+fn outermost_m(leg: &Leg, side: Side, from_m: f32, to_m: f32) -> f32 {
     let inside = leg.profile(side).iter().filter(|p| from_m < p.x && p.x < to_m).map(|p| p.y);
     let ends = [leg.edge_m(side, from_m), leg.edge_m(side, to_m)];
     side.sign() * inside.chain(ends).map(|d_m| d_m * side.sign()).fold(f32::NEG_INFINITY, f32::max)
@@ -329,6 +329,16 @@ pub fn rounded_length_m(path: &ReferencePath) -> f32 {
 /// Whole millimetres: what a lot file shows, so that a lot survives the way through a file unchanged.
 pub fn to_millimetres(point: Vec2) -> Vec2 {
     (point * 1000.0).round() / 1000.0
+}
+
+/// A number rounded to tenths.
+pub(crate) fn tenths(value: f32) -> f32 {
+    (value * 10.0).round() / 10.0
+}
+
+/// A number rounded to hundredths.
+pub(crate) fn hundredths(value: f32) -> f32 {
+    (value * 100.0).round() / 100.0
 }
 
 fn draw_leg(
@@ -437,7 +447,7 @@ fn outline_of_side(legs: &[Leg], corners: &[CornerPlan], side: Side) -> Vec<Vec2
 /// Opens the edge towards a side branch.
 fn cut_branch(profile: &mut Vec<Vec2>, leg: &Leg, branch: &Branch) {
     let (from_m, to_m) = (branch.centre_m - 0.5 * branch.width_m, branch.centre_m + 0.5 * branch.width_m);
-    let bottom_m = outermost(leg, branch.side, from_m, to_m) + branch.side.sign() * branch.depth_m;
+    let bottom_m = outermost_m(leg, branch.side, from_m, to_m) + branch.side.sign() * branch.depth_m;
     profile.retain(|p| p.x < from_m - 0.05 || p.x > to_m + 0.05);
     let mouth = [
         Vec2::new(from_m, leg.edge_m(branch.side, from_m)),
@@ -477,7 +487,7 @@ fn route(legs: &[Leg], blueprint: &Blueprint) -> Vec<Vec2> {
     points.into_iter().map(to_millimetres).collect()
 }
 
-fn interpolate(profile: &[Vec2], s_m: f32) -> f32 {
+fn interpolated_m(profile: &[Vec2], s_m: f32) -> f32 {
     let next = profile.partition_point(|p| p.x <= s_m).clamp(1, profile.len() - 1);
     let (a, b) = (profile[next - 1], profile[next]);
     a.y + ((s_m - a.x) / (b.x - a.x)).clamp(0.0, 1.0) * (b.y - a.y)

@@ -37,7 +37,7 @@ pub enum LoadError {
     /// A lot that can be driven forward, but not in reverse. Driving it forward only is always a remedy, too.
     #[error("{location}: the lot cannot be driven in reverse: {problem}; {remedy}")]
     ForwardOnly {
-        /// The file, and the line that says where a drive in reverse starts.
+        /// The file, and the line that says where a drive in reverse starts, or of the obstacle that stands there.
         location: Location,
         /// What is wrong there.
         problem: String,

@@ -70,8 +70,8 @@ fn names_a_map(document: &Document<&str>) -> bool {
 /// Checks that the lot of a file, as [`load`] returned it, can be driven in a direction.
 ///
 /// # Errors
-/// [`LoadError::ForwardOnly`] with the line of the route's last point, where a drive in reverse starts; for a map, the
-/// line of the key that says where the route ends.
+/// [`LoadError::ForwardOnly`] with the line of the route's last point, where a drive in reverse starts, or of the obstacle that
+/// stands there; for a map, the line of the key that says where the route ends.
 pub fn check_direction(
     path: &Path,
     Loaded { scenario, frame, .. }: &Loaded,

@@ -356,7 +356,7 @@ mod tests {
         scenario.obstacles.iter().filter(|obstacle| {
             let centre = obstacle.centre();
             let route = Path::new(&scenario.reference_path);
-            let along = route.pose_at(route.project(centre.position()));
+            let along = route.pose_at(route.project_m(centre.position()));
             obstacle.class.is_vehicle()
                 && centre.ahead().dot(along.ahead()).abs() > 0.8
                 && obstacle.outline().iter().any(|&corner| polygon_contains(&scenario.boundary, corner))

@@ -6,7 +6,7 @@
 
 use crate::neighbours;
 use crate::open_list::Open;
-use sim::geometry::{Pose, Vec2, distance_to_segment, edges};
+use sim::geometry::{Pose, Vec2, distance_to_segment_m, edges};
 use sim::maths;
 use sim::scenario::Scenario;
 use sim::vehicle::VehicleSettings;
@@ -187,14 +187,14 @@ impl<'a> Search<'a> {
 
     /// Poses and curvatures at the middle and end of a step that changes the steering.
     fn halves(&self, pose: Pose, from: i8, to: i8) -> [(Pose, f32); 2] {
-        let first = self.curvature(0.5 * (f32::from(from) + f32::from(to)));
-        let second = self.curvature(f32::from(to));
+        let first = self.curvature_per_m(0.5 * (f32::from(from) + f32::from(to)));
+        let second = self.curvature_per_m(f32::from(to));
         let middle = pose.advanced_along_arc(first, 0.5 * STEP_M);
         [(middle, first), (middle.advanced_along_arc(second, 0.5 * STEP_M), second)]
     }
 
     /// Levels are equally spaced in the steering angle.
-    fn curvature(&self, level: f32) -> f32 {
+    fn curvature_per_m(&self, level: f32) -> f32 {
         let wheelbase_m = self.vehicle.wheelbase_m;
         let largest_rad = maths::atan(CURVATURE_SHARE * self.vehicle.curvature_max_per_m() * wheelbase_m);
         maths::tan(largest_rad * level / f32::from(STEERING_LEVELS)) / wheelbase_m
@@ -391,7 +391,7 @@ impl Scene {
             for piece in 0..pieces {
                 let (low, high) = (end(piece).min(end(piece + 1)), end(piece).max(end(piece + 1)));
                 self.clearance_m.for_each_within(low, high, self.cap_m + Self::ROUNDED_M, |centre, value| {
-                    let distance_m = distance_to_segment(centre, a, b);
+                    let distance_m = distance_to_segment_m(centre, a, b);
                     // What is outside the boundary stays negative.
                     if distance_m < value.abs() {
                         *value = distance_m.copysign(*value);

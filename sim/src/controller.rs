@@ -90,15 +90,20 @@ pub fn pursue(
     geometry: &GridGeometry,
     decision: &Decision,
 ) -> VehicleCommand {
-    let steering_rad = steering(settings.pursuit, vehicle, geometry, decision.look_ahead);
+    let steering_rad = steering_rad(settings.pursuit, vehicle, geometry, decision.look_ahead);
     let law = if decision.source == Source::Planner { settings.planner_speed_law } else { settings.speed_law };
-    let by_law_mps = speed(law, settings, vehicle, geometry, decision.look_ahead, steering_rad);
+    let by_law_mps = speed_mps(law, settings, vehicle, geometry, decision.look_ahead, steering_rad);
     let limited_mps = |limit_mps: f32| by_law_mps.min(limit_mps).max(settings.speed_min_mps);
     VehicleCommand { steering_rad, speed_mps: decision.speed_limit_mps.map_or(by_law_mps, limited_mps) }
 }
 
 /// Road-wheel angle that steers at a point, radians, within the vehicle's limits.
-pub fn steering(law: PursuitLaw, vehicle: &VehicleSettings, geometry: &GridGeometry, target: LookAheadPoint) -> f32 {
+pub fn steering_rad(
+    law: PursuitLaw,
+    vehicle: &VehicleSettings,
+    geometry: &GridGeometry,
+    target: LookAheadPoint,
+) -> f32 {
     let LookAheadPoint { ahead_m, left_m } = target;
     let steering_rad = match law {
         PursuitLaw::Paper => {
@@ -135,7 +140,7 @@ pub fn point_of(vehicle: &VehicleSettings, steering_rad: f32) -> LookAheadPoint 
     LookAheadPoint { ahead_m: chord_m * (1.0 - sine * sine).sqrt(), left_m: chord_m * sine }
 }
 
-fn speed(
+fn speed_mps(
     law: SpeedLaw,
     settings: &ControllerSettings,
     vehicle: &VehicleSettings,
@@ -165,7 +170,8 @@ mod tests {
         let (vehicle, geometry) = (VehicleSettings::hyundai_hg300(), GridGeometry::paper());
         for (ahead_m, left_m) in [(8.0, 1.0), (5.0, -2.0), (12.0, 4.0), (16.0, 0.0)] {
             let target = LookAheadPoint { ahead_m, left_m };
-            let curvature = maths::tan(steering(PursuitLaw::Paper, &vehicle, &geometry, target)) / vehicle.wheelbase_m;
+            let curvature =
+                maths::tan(steering_rad(PursuitLaw::Paper, &vehicle, &geometry, target)) / vehicle.wheelbase_m;
             assert!((curvature - target.curvature_per_m()).abs() < 1e-5);
             // Rolling along that arc arrives at the point.
             let chord_m = maths::hypot(ahead_m, left_m);
@@ -184,7 +190,7 @@ mod tests {
             let point = point_of(&vehicle, degrees.to_radians());
             assert!(point.ahead_m > 2.0, "{point:?}");
             assert!(
-                (steering(PursuitLaw::Paper, &vehicle, &geometry, point) - steering_rad).abs() < 1e-5,
+                (super::steering_rad(PursuitLaw::Paper, &vehicle, &geometry, point) - steering_rad).abs() < 1e-5,
                 "{degrees}°"
             );
         }
@@ -195,7 +201,7 @@ mod tests {
         let (vehicle, geometry, settings) =
             (VehicleSettings::hyundai_hg300(), GridGeometry::paper(), ControllerSettings::paper());
         let at =
-            |law, ahead_m| speed(law, &settings, &vehicle, &geometry, LookAheadPoint { ahead_m, left_m: 0.0 }, 0.0);
+            |law, ahead_m| speed_mps(law, &settings, &vehicle, &geometry, LookAheadPoint { ahead_m, left_m: 0.0 }, 0.0);
         // 0.5 + X_bev = 4.48 m → law B 1.0 m/s, A 2.0 m/s, C capped at 2.2 m/s.
         let ahead_m = 4.3 - 0.5 + 4.48;
         assert!((at(SpeedLaw::Halved, ahead_m) - 1.0).abs() < 1e-5);
@@ -204,7 +210,7 @@ mod tests {
         assert_eq!(at(SpeedLaw::Halved, 4.3), 0.5);
         let planner = |steering_rad| {
             let target = LookAheadPoint { ahead_m: 8.0, left_m: 0.0 };
-            speed(SpeedLaw::FallsWithSteering, &settings, &vehicle, &geometry, target, steering_rad)
+            speed_mps(SpeedLaw::FallsWithSteering, &settings, &vehicle, &geometry, target, steering_rad)
         };
         assert_eq!(planner(0.0), 2.2);
         assert!((planner(vehicle.steering_max_rad) - 0.5).abs() < 1e-5);

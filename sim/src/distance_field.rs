@@ -63,13 +63,25 @@ impl DistanceField {
     /// # Panics
     /// If the polygon is more than 3.2 km across.
     pub fn of_boundary(boundary: &[Vec2]) -> Self {
+        Self::filled(bounds(boundary), 0).with_polygon(boundary)
+    }
+
+    /// Open ground: drivable wherever nothing is carved, also beyond the raster. What is carved must lie within a box.
+    ///
+    /// # Panics
+    /// If the box is more than 3.2 km across.
+    pub fn of_open_ground(low: Vec2, high: Vec2) -> Self {
+        Self::filled((low, high), CAP_M.to_bits() ^ FAR_OUTSIDE)
+    }
+
+    /// The same everywhere: in a box, as far around it as things in it are near, and beyond.
+    fn filled((low, high): (Vec2, Vec2), node: u32) -> Self {
         let margin = Vec2::splat(CAP_M + 2.0 * NODE_M);
-        let (low, high) = bounds(boundary);
         let origin = low - margin;
         let size = (high + margin - origin) / NODE_M;
         let (cols, rows) = (size.x.ceil() as usize + 1, size.y.ceil() as usize + 1);
         assert!(i16::try_from(cols.max(rows)).is_ok(), "a raster of {cols} x {rows} nodes takes gigabytes");
-        Self { origin, cols, rows, nodes: vec![0; cols * rows + SPARE_NODES] }.with_polygon(boundary)
+        Self { origin, cols, rows, nodes: vec![node; cols * rows + SPARE_NODES] }
     }
 
     /// A field that is far outside everywhere with the inside of a polygon.
@@ -124,7 +136,8 @@ impl DistanceField {
         });
     }
 
-    /// Signed distance at a world point, metres, capped at ±[`CAP_M`]; outside the raster −[`CAP_M`].
+    /// Signed distance at a world point, metres, capped at ±[`CAP_M`]; beyond the raster as at its rim: −[`CAP_M`], and
+    /// [`CAP_M`] on open ground.
     #[inline]
     pub fn at(&self, point: Vec2) -> f32 {
         let node = (point - self.origin) * (1.0 / NODE_M);
@@ -381,7 +394,7 @@ fn from_stored(nodes: f32x4) -> f32x4 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Pose, distance_to_segment, polygon_contains};
+    use crate::geometry::{Pose, distance_to_segment_m, polygon_contains};
 
     fn rectangle() -> Vec<Vec2> {
         vec![Vec2::new(0.0, 0.0), Vec2::new(20.0, 0.0), Vec2::new(20.0, 8.0), Vec2::new(0.0, 8.0)]
@@ -399,11 +412,27 @@ mod tests {
         assert!(field.at(Vec2::new(-500.0, 4.0)) <= -CAP_M + 1e-3);
     }
 
+    #[test]
+    fn open_ground_ends_nowhere() {
+        let mut field = DistanceField::of_open_ground(Vec2::new(2.0, -4.0), Vec2::new(9.0, 4.0));
+        field.carve_polygon(&[(2.0, -4.0), (9.0, -4.0), (9.0, -3.0), (2.0, -3.0)].map(Vec2::from));
+        field.carve_disc(Vec2::new(8.0, 3.0), 1.0);
+        for (x, y, expected_m) in [(5.0, -3.5, -0.5), (5.0, -2.0, 1.0), (11.0, 3.0, 2.0), (4.0, 0.5, CAP_M)] {
+            let found_m = field.at(Vec2::new(x, y));
+            assert!((found_m - expected_m).abs() < 0.02, "({x}, {y}): {found_m} m");
+        }
+        for (x, y) in [(12.5, 3.0), (80.0, 3.0), (5.0, -90.0), (-70.0, -3.5), (1e6, 1e6)] {
+            let place = Vec2::new(x, y);
+            assert_eq!([field.at(place), field.at_nearest_node(place)], [CAP_M; 2], "{place}");
+            assert_eq!(field.at_four(FourPoints::splat(place)).to_array(), [CAP_M; 4], "{place}");
+        }
+    }
+
     /// Every node from every edge, one by one.
     fn plain_field(boundary: &[Vec2], islands: &[Vec<Vec2>], disc: (Vec2, f32)) -> DistanceField {
         let mut field = DistanceField::of_boundary(boundary);
         let to_edges_m = |polygon: &[Vec2], point: Vec2| {
-            edges(polygon).map(|(a, b)| distance_to_segment(point, a, b)).fold(f32::INFINITY, f32::min)
+            edges(polygon).map(|(a, b)| distance_to_segment_m(point, a, b)).fold(f32::INFINITY, f32::min)
         };
         for index in 0..field.rows * field.cols {
             let node = Vec2::new((index % field.cols) as f32, (index / field.cols) as f32);
@@ -501,7 +530,8 @@ mod tests {
         field.carve_disc(Vec2::new(15.0, 4.0), 0.25);
         for i in 0..4000 {
             let point = Vec2::new(5.0 + 12.0 * (i % 80) as f32 / 80.0, 1.0 + 6.0 * (i / 80) as f32 / 50.0);
-            let polygon_m = edges(&tilted).map(|(a, b)| distance_to_segment(point, a, b)).fold(f32::INFINITY, f32::min);
+            let polygon_m =
+                edges(&tilted).map(|(a, b)| distance_to_segment_m(point, a, b)).fold(f32::INFINITY, f32::min);
             let polygon_m = if polygon_contains(&tilted, point) { -polygon_m } else { polygon_m };
             let disc_m = point.distance(Vec2::new(15.0, 4.0)) - 0.25;
             let wall_m = point.y.min(8.0 - point.y).min(20.0 - point.x).min(point.x);

@@ -287,13 +287,12 @@ impl Episode {
     /// path again.
     ///
     /// # Panics
-    /// If the episode has ended, or the look-ahead point is not finite.
+    /// If the episode has ended, or the decision is not finite.
     pub fn apply(&mut self, decision: Decision) -> Frame {
         assert!(self.ending.is_none(), "the episode has ended");
-        let point = decision.look_ahead;
         assert!(
-            point.ahead_m.is_finite() && point.left_m.is_finite(),
-            "the look-ahead point is finite, not {point:?} (tick {}, map {:?})",
+            decision.is_finite(),
+            "the decision is finite, not {decision:?} (tick {}, map {:?})",
             self.tick,
             self.map.scenario().name
         );
@@ -431,7 +430,7 @@ impl Episode {
     /// Where the car is along the route, metres, after it drove so far since its progress was determined.
     fn projected_m(&self, driven_m: f32) -> f32 {
         let ahead_m = PROJECTED_M.max(driven_m + CUT_M);
-        self.map.path().project_near(self.vehicle.pose.position(), self.progress_m, PROJECTED_M, ahead_m)
+        self.map.path().project_near_m(self.vehicle.pose.position(), self.progress_m, PROJECTED_M, ahead_m)
     }
 
     /// Puts the car at rest on the nearest point of what is left of the path from which it can drive, if there is one.

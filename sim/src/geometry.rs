@@ -277,20 +277,20 @@ pub fn edges(polygon: &[Vec2]) -> impl Iterator<Item = (Vec2, Vec2)> + '_ {
 }
 
 /// Distance from a point to a segment, metres.
-pub fn distance_to_segment(point: Vec2, a: Vec2, b: Vec2) -> f32 {
+pub fn distance_to_segment_m(point: Vec2, a: Vec2, b: Vec2) -> f32 {
     let ab = b - a;
     let t = ((point - a).dot(ab) / ab.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
     (point - a - ab * t).length()
 }
 
 impl FourPoints {
-    /// [`distance_to_segment`] of each, to the bit, metres.
+    /// [`distance_to_segment_m`] of each, to the bit, metres.
     #[inline]
-    pub(crate) fn distance_to_segment(self, a: Vec2, b: Vec2) -> f32x4 {
+    pub(crate) fn distance_to_segment_m(self, a: Vec2, b: Vec2) -> f32x4 {
         self.squared_distance_to_segment(a, b).sqrt()
     }
 
-    /// Square of [`Self::distance_to_segment`].
+    /// Square of [`Self::distance_to_segment_m`].
     #[inline]
     pub(crate) fn squared_distance_to_segment(self, a: Vec2, b: Vec2) -> f32x4 {
         let ab = b - a;
@@ -377,12 +377,12 @@ mod tests {
             let points: [Vec2; LANES] = std::array::from_fn(point);
             let four = FourPoints::from(points);
             let (there, back) = (frame.four_points(four), frame.inverse_four_points(four));
-            let to_edge_m = four.distance_to_segment(polygon[0], polygon[1]).to_array();
+            let to_edge_m = four.distance_to_segment_m(polygon[0], polygon[1]).to_array();
             let are_inside = four.are_inside(&polygon).to_bitmask();
             for (k, &point) in points.iter().enumerate() {
                 let lane = |four: FourPoints| Vec2::new(four.x.as_array()[k], four.y.as_array()[k]);
                 assert_eq!((lane(there), lane(back)), (frame.point(point), frame.inverse_point(point)));
-                assert_eq!(to_edge_m[k].to_bits(), distance_to_segment(point, polygon[0], polygon[1]).to_bits());
+                assert_eq!(to_edge_m[k].to_bits(), distance_to_segment_m(point, polygon[0], polygon[1]).to_bits());
                 assert_eq!(are_inside >> k & 1 == 1, polygon_contains(&polygon, point), "{point}");
             }
         }

@@ -97,7 +97,7 @@ pub const TRIAL_MAX: u32 = 1_048_575;
 pub const NOISE_LEVELS_MAX: usize = 100;
 /// Runs of an evaluation, for each driver.
 pub const RUNS_MAX: usize = 10_000_000;
-/// Drives whose maps are held at once, 1 to 2 MB each: those of a round of training, those of a planner that is tuned.
+/// Drives whose maps are held at once, 1 to 2 MB each: those of a round of training, of a planner that is tuned, of an on-policy rollout.
 pub const DRIVES_AT_ONCE_MAX: usize = 10_000;
 /// Threads to compute with.
 pub const THREADS_MAX: u16 = 1024;

@@ -150,7 +150,7 @@ impl Map {
     }
 
     /// Those of [`Self::occluders`] whose circle overlaps a circle of the world.
-    pub(crate) fn occluders_near(&self, centre: Vec2, radius_m: f32) -> impl Iterator<Item = &Occluder> {
+    pub fn occluders_near(&self, centre: Vec2, radius_m: f32) -> impl Iterator<Item = &Occluder> {
         self.occluder_circles.overlapping(centre, radius_m).map(|index| &self.occluders[index])
     }
 

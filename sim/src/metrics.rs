@@ -116,7 +116,7 @@ impl SafeRing {
         let body = vehicle.body_in_ego();
         let front_m = if settings.safe_range == SafeRange::Full { f32::NEG_INFINITY } else { vehicle.front_m() };
         let in_range = |points: FourPoints| {
-            let is_near = |(a, b)| points.distance_to_segment(a, b).simd_le(f32x4::splat(settings.safe_range_m));
+            let is_near = |(a, b)| points.distance_to_segment_m(a, b).simd_le(f32x4::splat(settings.safe_range_m));
             let is_near = edges(&body).map(is_near).fold(f32x4::ZERO, |any, near| any | near);
             let is_ahead = points.x.simd_ge(f32x4::splat(front_m));
             is_near & is_ahead & !points.are_inside(&body) & f32x4::ONE

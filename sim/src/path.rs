@@ -66,19 +66,19 @@ impl Path {
     }
 
     /// Arc length of the nearest point of the whole path, metres.
-    pub fn project(&self, point: Vec2) -> f32 {
-        self.project_between(point, 0, self.poses.len() - 1)
+    pub fn project_m(&self, point: Vec2) -> f32 {
+        self.project_between_m(point, 0, self.poses.len() - 1)
     }
 
     /// Arc length of the nearest point within `[near_m − behind_m, near_m + ahead_m]`, metres. A local search, so that
     /// a route that comes close to itself does not make progress jump.
-    pub fn project_near(&self, point: Vec2, near_m: f32, behind_m: f32, ahead_m: f32) -> f32 {
+    pub fn project_near_m(&self, point: Vec2, near_m: f32, behind_m: f32, ahead_m: f32) -> f32 {
         let last = self.poses.len() - 1;
         let index = |s_m: f32| ((s_m / self.spacing_m).max(0.0) as usize).min(last);
-        self.project_between(point, index(near_m - behind_m), (index(near_m + ahead_m) + 1).min(last))
+        self.project_between_m(point, index(near_m - behind_m), (index(near_m + ahead_m) + 1).min(last))
     }
 
-    fn project_between(&self, point: Vec2, first: usize, last: usize) -> f32 {
+    fn project_between_m(&self, point: Vec2, first: usize, last: usize) -> f32 {
         let distances = self.poses[first..=last].iter().map(|pose| pose.position().distance_squared(point));
         let (nearest, _) = (first..)
             .zip(distances)
@@ -152,8 +152,8 @@ mod tests {
         let path = Path::new(&ReferencePath { points, corner_radius_m: 5.0 });
         for s_m in [0.0, 3.3, 17.0, 21.9, 40.0, path.length_m()] {
             let offset = path.pose_at(s_m).world_from_ego().point(Vec2::new(0.0, 0.4));
-            assert!((path.project(offset) - s_m).abs() < 0.02, "at {s_m} m: {}", path.project(offset));
-            assert!((path.project_near(offset, s_m + 1.0, 5.0, 5.0) - s_m).abs() < 0.02);
+            assert!((path.project_m(offset) - s_m).abs() < 0.02, "at {s_m} m: {}", path.project_m(offset));
+            assert!((path.project_near_m(offset, s_m + 1.0, 5.0, 5.0) - s_m).abs() < 0.02);
         }
     }
 }

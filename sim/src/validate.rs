@@ -2,7 +2,7 @@
 //!
 //! The order is from plain numbers to relations between things: later checks rely on earlier ones.
 
-use crate::geometry::{Pose, Vec2, bounds, distance_to_segment, edges, polygon_contains, signed_area_m2};
+use crate::geometry::{Pose, Vec2, bounds, distance_to_segment_m, edges, polygon_contains, signed_area_m2};
 use crate::limits::{
     COORDINATE_MAX_M, ISLANDS_MAX, LOT_EXTENT_MAX_M, NAME_BYTES_MAX, NAME_CHARS_MAX, OBSTACLES_MAX, OUTLINES_MAX_M,
     ROUTE_MAX_M, ROUTE_POINTS_MAX, SPEED_BUMPS_MAX, VERTICES_MAX,
@@ -11,6 +11,7 @@ use crate::maths;
 use crate::path::Path;
 use crate::scenario::{Island, Obstacle, Place, ReferencePath, Scenario, ScenarioError};
 use crate::vehicle::VehicleSettings;
+use glam::DVec2;
 
 /// An object farther than this from the lot is a typing error, metres.
 const STRAY_M: f32 = 50.0;
@@ -340,7 +341,7 @@ fn check_start(scenario: &Scenario, vehicle: &VehicleSettings, start: Pose) -> R
 /// The centre line must be drivable ground: a car is put back onto it after a near-collision.
 fn check_route(scenario: &Scenario, route: &Route) -> Result<(), ScenarioError> {
     for (a, b) in edges(&scenario.boundary) {
-        if let Some(chord) = route.first_chord_near((a.min(b), a.max(b)), |c, d| segments_meet(a, b, c, d)) {
+        if let Some(chord) = route.first_chord_near(&Strip::of_edge(a, b), |c, d| segments_meet(a, b, c, d)) {
             let problem = format!("the route leaves the boundary {}", route.place_of(chord));
             let remedy = "move that point, or the boundary; mind that corner_radius_m rounds corners";
             return fault(route.vertex_near(chord, &scenario.reference_path), problem, remedy);
@@ -349,24 +350,22 @@ fn check_route(scenario: &Scenario, route: &Route) -> Result<(), ScenarioError> 
     for (i, island) in scenario.islands.iter().enumerate() {
         // The car starts beside it, so that the route meets an edge where it first gets there. Edge by edge: a route of 20 km
         // may wind through the box around an island of 20 000 vertices.
-        let meets_edge =
-            |(a, b): (Vec2, Vec2)| route.first_chord_near((a.min(b), a.max(b)), |c, d| segments_meet(a, b, c, d));
+        let meets_edge = |(a, b)| route.first_chord_near(&Strip::of_edge(a, b), |c, d| segments_meet(a, b, c, d));
         if let Some(chord) = edges(&island.polygon).filter_map(meets_edge).min() {
             let problem = format!("the route runs into island {} {}", i + 1, route.place_of(chord));
             return fault(route.vertex_near(chord, &scenario.reference_path), problem, "lead it around the island");
         }
     }
     for (i, obstacle) in scenario.obstacles.iter().enumerate() {
-        let [length_m, width_m, _] = obstacle.size_m();
-        let (centre, reach) = (obstacle.centre().position(), Vec2::splat(0.5 * maths::hypot(length_m, width_m)));
+        let (centre, radius_m) = (obstacle.centre().position(), 0.5 * obstacle.size_m()[0]);
+        let outline = obstacle.outline();
         let meets_obstacle = |c: Vec2, d: Vec2| {
             if obstacle.class.is_round() {
-                return distance_to_segment(centre, c, d) < 0.5 * length_m;
+                return distance_to_segment_m(centre, c, d) < radius_m;
             }
-            let outline = obstacle.outline();
             polygon_contains(&outline, d) || edges(&outline).any(|(a, b)| segments_meet(a, b, c, d))
         };
-        if let Some(chord) = route.first_chord_near((centre - reach, centre + reach), meets_obstacle) {
+        if let Some(chord) = route.first_chord_near(&Strip::of_obstacle(obstacle), meets_obstacle) {
             let problem = format!("the {} stands on the reference path {}", name_of(obstacle), route.place_of(chord));
             return fault(Place::Obstacle(i), problem, "move it aside, or lead the path around it");
         }
@@ -393,13 +392,13 @@ impl Route {
         Self { points, spacing_m, blocks }
     }
 
-    /// The first chord that passes `test` among those whose bounding boxes meet `reach`.
-    fn first_chord_near(&self, reach: (Vec2, Vec2), test: impl Fn(Vec2, Vec2) -> bool) -> Option<usize> {
-        let near_blocks = self.blocks.iter().enumerate().filter(|(_, block)| boxes_meet(**block, reach));
+    /// The first chord that passes `test` among those that may be near something.
+    fn first_chord_near(&self, strip: &Strip, test: impl Fn(Vec2, Vec2) -> bool) -> Option<usize> {
+        let near_blocks = self.blocks.iter().enumerate().filter(|(_, block)| strip.may_meet(**block));
         let chords = self.points.len() - 1;
         near_blocks.flat_map(|(i, _)| i * CHORDS_PER_BLOCK..((i + 1) * CHORDS_PER_BLOCK).min(chords)).find(|&chord| {
             let (a, b) = (self.points[chord], self.points[chord + 1]);
-            boxes_meet((a.min(b), a.max(b)), reach) && test(a, b)
+            strip.may_meet((a.min(b), a.max(b))) && test(a, b)
         })
     }
 
@@ -413,20 +412,63 @@ impl Route {
     }
 }
 
+/// The ground of an edge or an obstacle, for a first look: a rectangle along it, and the box around that. The box alone is
+/// near half a route where a wall stands slantwise.
+struct Strip {
+    bounds: (Vec2, Vec2),
+    middle: Vec2,
+    /// Unit vector.
+    along: Vec2,
+    /// Half its length and width, and a little, metres.
+    half_m: Vec2,
+}
+
+impl Strip {
+    /// More than is lost to rounding, metres: single precision resolves 1 mm at the farthest coordinates.
+    const SLACK_M: f32 = 0.01;
+
+    fn of_edge(a: Vec2, b: Vec2) -> Self {
+        let half_m = Vec2::new(0.5 * a.distance(b), 0.0) + Self::SLACK_M;
+        Self { bounds: (a.min(b), a.max(b)), middle: a.midpoint(b), along: (b - a).normalize_or(Vec2::X), half_m }
+    }
+
+    fn of_obstacle(obstacle: &Obstacle) -> Self {
+        let [length_m, width_m, _] = obstacle.size_m();
+        let (centre, half_m) = (obstacle.centre(), 0.5 * Vec2::new(length_m, width_m));
+        let (middle, reach) = (centre.position(), Vec2::splat(maths::hypot(half_m.x, half_m.y)));
+        let bounds = (middle - reach, middle + reach);
+        Self { bounds, middle, along: centre.ahead(), half_m: half_m + Self::SLACK_M }
+    }
+
+    /// Whether a box may share ground with it: surely if it does.
+    fn may_meet(&self, (low, high): (Vec2, Vec2)) -> bool {
+        if !boxes_meet((low, high), self.bounds) {
+            return false;
+        }
+        // As seen along the strip and across it.
+        let (to_middle, half) = (low.midpoint(high) - self.middle, 0.5 * (high - low));
+        let is_apart = |axis: Vec2, half_m: f32| to_middle.dot(axis).abs() > half.dot(axis.abs()) + half_m;
+        !is_apart(self.along, self.half_m.x) && !is_apart(self.along.perp(), self.half_m.y)
+    }
+}
+
 /// The first two edges of a closed polygon that meet anywhere but at a shared vertex, in order of the first edge.
 fn first_crossing(polygon: &[Vec2]) -> Option<(usize, usize)> {
     let count = polygon.len();
     let edge = |i: usize| (polygon[i], polygon[(i + 1) % count]);
-    // Along the axis along which the edges are shorter: the teeth of a comb would all overlap along the other.
-    let along = edges(polygon).map(|(a, b)| (b - a).abs()).sum::<Vec2>();
-    let axis = usize::from(along.y < along.x);
-    let span = |i: usize| (edge(i).0[axis].min(edge(i).1[axis]), edge(i).0[axis].max(edge(i).1[axis]));
+    let axis = axis_across(polygon);
+    // More than is lost to rounding.
+    let slack = 1e-12 * polygon.iter().map(|vertex| f64::from(vertex.abs().max_element())).fold(0.0, f64::max);
+    let spans: Vec<(f64, f64)> = edges(polygon)
+        .map(|(a, b)| (a.as_dvec2().dot(axis), b.as_dvec2().dot(axis)))
+        .map(|(a, b)| (a.min(b), a.max(b) + slack))
+        .collect();
     // Edges sorted by their lower end: only those that share a range are compared.
     let mut order: Vec<usize> = (0..count).collect();
-    order.sort_by(|&i, &j| span(i).0.total_cmp(&span(j).0));
+    order.sort_by(|&i, &j| spans[i].0.total_cmp(&spans[j].0));
     let mut first: Option<(usize, usize)> = None;
     for (rank, &i) in order.iter().enumerate() {
-        for &j in order[rank + 1..].iter().take_while(|&&j| span(j).0 <= span(i).1) {
+        for &j in order[rank + 1..].iter().take_while(|&&j| spans[j].0 <= spans[i].1) {
             let (low, high) = (i.min(j), i.max(j));
             let ((a, b), (c, d)) = (edge(low), edge(high));
             let meet = if high == low + 1 {
@@ -442,6 +484,25 @@ fn first_crossing(polygon: &[Vec2]) -> Option<(usize, usize)> {
         }
     }
     first
+}
+
+/// The direction along which the edges of a polygon are shortest, all in all: along another one the teeth of a comb would all
+/// overlap. Of Σ e eᵀ over its edges e the eigenvector of the smaller eigenvalue.
+fn axis_across(polygon: &[Vec2]) -> DVec2 {
+    let (mut difference, mut product) = (0.0, 0.0);
+    for (a, b) in edges(polygon) {
+        let edge = b.as_dvec2() - a.as_dvec2();
+        difference += 0.5 * (edge.x * edge.x - edge.y * edge.y);
+        product += edge.x * edge.y;
+    }
+    let root = (difference * difference + product * product).sqrt();
+    // Of the two rows that say the same, the one with less cancellation.
+    let across = if difference > 0.0 {
+        DVec2::new(-product, difference + root)
+    } else {
+        DVec2::new(root - difference, -product)
+    };
+    across.normalize_or(DVec2::X)
 }
 
 /// Where two edges that meet do so.
@@ -481,7 +542,7 @@ fn obstacle_overlaps(obstacle: &Obstacle, body: &[Vec2; 4]) -> bool {
         let centre = obstacle.centre().position();
         let radius_m = 0.5 * obstacle.size_m()[0];
         return polygon_contains(body, centre)
-            || edges(body).any(|(a, b)| distance_to_segment(centre, a, b) < radius_m);
+            || edges(body).any(|(a, b)| distance_to_segment_m(centre, a, b) < radius_m);
     }
     let outline = obstacle.outline();
     !has_separating_edge(&outline, body) && !has_separating_edge(body, &outline)
@@ -652,6 +713,83 @@ mod tests {
         scenario.boundary = (0..500).flat_map(tooth).map(Vec2::from).collect();
         let error = validate(&scenario, &VehicleSettings::hyundai_hg300()).expect_err("crosses").to_string();
         assert!(error.starts_with("boundary: the outlines of boundary and islands are 40"), "{error}");
+    }
+
+    fn turned(points: &[Vec2], by_rad: f32) -> Vec<Vec2> {
+        let rotation = maths::unit(by_rad);
+        points.iter().map(|&point| rotation.rotate(point)).collect()
+    }
+
+    /// The teeth of a comb that lay aslant were compared each with each.
+    #[test]
+    fn a_comb_is_swept_across_its_teeth_however_it_lies() {
+        let tooth = |i: u16| [(0.2 * f32::from(i), 0.0), (0.2 * f32::from(i) + 0.1, 50.0)];
+        let comb: Vec<Vec2> = (0..100).flat_map(tooth).map(Vec2::from).chain([Vec2::new(30.0, -1.0)]).collect();
+        let mut tangled = comb.clone();
+        tangled.swap(101, 151);
+        for eighth in 0..16_u8 {
+            let by_rad = f32::from(eighth) * std::f32::consts::FRAC_PI_8;
+            let (comb, tangled) = (turned(&comb, by_rad), turned(&tangled, by_rad));
+            let axis = axis_across(&comb);
+            let length_m = edges(&comb).map(|(a, b)| (b - a).as_dvec2().dot(axis).abs()).sum::<f64>();
+            assert!(length_m < 200.0, "turned by {eighth} eighths: {length_m} m of 10 km");
+            assert_eq!(first_crossing(&comb), None, "turned by {eighth} eighths");
+            let count = tangled.len();
+            let edge = |i: usize| (tangled[i], tangled[(i + 1) % count]);
+            let meet = |i: usize, j: usize| segments_meet(edge(i).0, edge(i).1, edge(j).0, edge(j).1);
+            let apart = |i: usize| (i + 2..count).filter(move |j| (i, *j) != (0, count - 1)).map(move |j| (i, j));
+            let expected = (0..count).flat_map(apart).find(|&(i, j)| meet(i, j));
+            assert_eq!(first_crossing(&tangled), expected, "turned by {eighth} eighths");
+            assert!(expected.is_some());
+        }
+    }
+
+    fn wall(centre: Pose, length_m: f32) -> Obstacle {
+        Obstacle { length_m: Some(length_m), ..Obstacle::new(ObstacleClass::Wall, centre) }
+    }
+
+    /// Of the route, 30 m lie in the box around it.
+    #[test]
+    fn a_wall_aslant_is_compared_with_the_chords_it_may_meet_alone() {
+        let points = vec![Vec2::ZERO, Vec2::new(100.0, 0.0)];
+        let route = Route::new(&Path::new(&ReferencePath { points, corner_radius_m: 0.0 }));
+        let n_compared = |y_m: f32| {
+            let n = std::cell::Cell::new(0);
+            let wall = wall(Pose::new(Vec2::new(50.0, y_m), std::f32::consts::FRAC_PI_4), 30.0);
+            let none = route.first_chord_near(&Strip::of_obstacle(&wall), |_, _| {
+                n.set(n.get() + 1);
+                false
+            });
+            assert_eq!(none, None);
+            n.get()
+        };
+        // Its lower end is 10.6 m below its middle.
+        assert_eq!([12.0, 9.0].map(n_compared), [0, 2]);
+    }
+
+    #[test]
+    fn no_chord_that_meets_a_wall_is_passed_over() {
+        let lane = |i: u8| {
+            let ends = if i.is_multiple_of(2) { [0.0, 40.0] } else { [40.0, 0.0] };
+            ends.map(|y| Vec2::new(4.0 * f32::from(i), y))
+        };
+        let points = (0..11).flat_map(lane).collect();
+        let route = Route::new(&Path::new(&ReferencePath { points, corner_radius_m: 1.5 }));
+        let mut n_met = 0;
+        for i in 0..600_u16 {
+            let centre = Vec2::new(f32::from(i * 7 % 41), f32::from(i * 11 % 43));
+            let wall = wall(Pose::new(centre, 0.1 * f32::from(i)), 0.5 + f32::from(i % 30));
+            let outline = wall.outline();
+            let meets = |c: Vec2, d: Vec2| edges(&outline).any(|(a, b)| segments_meet(a, b, c, d));
+            let expected = route.points.windows(2).position(|chord| meets(chord[0], chord[1]));
+            assert_eq!(route.first_chord_near(&Strip::of_obstacle(&wall), meets), expected, "{wall:?}");
+            let (a, b) = (outline[0], outline[2]);
+            let meets = |c: Vec2, d: Vec2| segments_meet(a, b, c, d);
+            let expected = route.points.windows(2).position(|chord| meets(chord[0], chord[1]));
+            assert_eq!(route.first_chord_near(&Strip::of_edge(a, b), meets), expected, "{a} {b}");
+            n_met += usize::from(expected.is_some());
+        }
+        assert!((200..600).contains(&n_met), "{n_met}");
     }
 
     /// A car beside the path or behind the boundary is not a fault: lots are full of them.

@@ -316,6 +316,16 @@ fn commands_reach_the_wheels_after_the_dead_time() {
     assert_eq!(moved_after_ticks(0.110), 2);
 }
 
+/// The controller took a limit that is no number for none.
+#[test]
+#[should_panic(expected = "the decision is finite")]
+fn a_speed_limit_that_is_no_number_is_not_driven_by() {
+    let mut episode = Episode::new(settings(), lane(60.0, vec![]), RootSeed(1));
+    episode.observe();
+    let look_ahead = LookAheadPoint { ahead_m: 8.0, left_m: 0.0 };
+    episode.apply(Decision { look_ahead, source: Source::Expert, spread: None, speed_limit_mps: Some(f32::NAN) });
+}
+
 #[test]
 fn the_same_seed_gives_the_same_frames() {
     let noisy = Arc::new(EpisodeSettings::paper());

@@ -159,6 +159,8 @@ mod git;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use experiment::manifest::Request;
+    use experiment::run_dir::Place;
     use std::fs;
 
     /// A run went on with another generator of its noise or with other vectors in its networks: neither was among them.
@@ -169,6 +171,53 @@ mod tests {
         let unnamed: Vec<&str> = COMPUTING.into_iter().filter(|name| !is_named(name)).collect();
         assert!(unnamed.is_empty(), "{unnamed:?} is in no Cargo.lock any more");
         assert!(["pulp", "rand_chacha", "statrs", "wide"].iter().all(is_named), "{named:?}");
+    }
+
+    /// A run is of one version, with its libraries, and of machines that round alike; another commit is only said.
+    #[test]
+    fn a_run_is_resumed_by_its_version_and_where_its_networks_round_alike() {
+        let folder = std::env::temp_dir().join(format!("xtask-test-{}-resume", std::process::id()));
+        let settings = Settings::preset("smoke").unwrap();
+        let resumed = |build: &Build, driver: &str| {
+            let _ = fs::remove_dir_all(&folder);
+            let place =
+                Place { build, out: Some(&folder), overwrite: false, command: "evaluate", preset: "smoke", seed: 1 };
+            let drivers = toml::Value::Array(vec![driver.into()]);
+            let arguments = toml::Table::from_iter([("drivers".to_owned(), drivers)]);
+            drop(RunDir::create(&place, &settings, &Request { arguments, ..Request::default() }).unwrap());
+            loop {
+                let came = resume(&folder, "evaluate", &Output::new(true, false)).map(drop);
+                match came.map_err(|error| error.to_string()) {
+                    // By a child of another test, which has every lock of this process until its program begins.
+                    Err(error) if error.contains("in use by another process") => std::thread::yield_now(),
+                    came => return came,
+                }
+            }
+        };
+        let here = get();
+        for build in [
+            here.clone(),
+            Build { git_revision: Some("another commit".to_owned()), ..here.clone() },
+            Build { git_changes: Some("other changes".to_owned()), ..here.clone() },
+        ] {
+            assert_eq!(resumed(&build, "run:runs/mine"), Ok(()), "{build:?}");
+        }
+        let old = Build { program: "lotpilot 0.0.0".to_owned(), ..here.clone() };
+        let of_other_libraries = Build { libraries: vec!["libm 0.0.0".to_owned()], ..here.clone() };
+        let rounds_once = ["avx2", "fma"].map(str::to_owned).to_vec();
+        let has_fma = rounds_once.iter().all(|name| here.processor_features.contains(name));
+        let processor_features = if has_fma { Vec::new() } else { rounds_once };
+        let rounds_otherwise = Build { processor_features, ..here.clone() };
+        for (build, problem) in [
+            (&old, "begun with another version of lotpilot (lotpilot 0.0.0;"),
+            (&of_other_libraries, "begun with another version of lotpilot"),
+            (&rounds_otherwise, "begun on a machine that rounds otherwise"),
+        ] {
+            let error = resumed(build, "run:runs/mine").unwrap_err();
+            assert!(error.contains(problem), "{error}");
+        }
+        assert_eq!(resumed(&rounds_otherwise, "tentacle"), Ok(()), "no network drives");
+        fs::remove_dir_all(&folder).unwrap();
     }
 
     /// Two programs with other changes to one commit were taken for one.

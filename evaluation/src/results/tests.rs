@@ -236,6 +236,7 @@ fn the_interval_of_a_team_is_for_other_lots_and_other_seeds() {
         name: String::new(),
         drivers: drivers.to_vec(),
         seeds: seeds.to_vec(),
+        duplicates: Vec::new(),
     };
     let team = |drivers: &[usize]| of_seeds(drivers, &[1, 2, 3, 4, 5][..drivers.len()]);
     let teams = [team(&[0, 1, 2]), team(&[3, 4, 5]), team(&[6])];
@@ -295,7 +296,12 @@ fn the_interval_of_contacts_of_a_team_is_for_other_lots_and_other_seeds() {
         report.metrics.contacts = contacts;
         Some(report)
     };
-    let team = |drivers: [usize; 3]| Team { name: String::new(), drivers: drivers.to_vec(), seeds: vec![1, 2, 3] };
+    let team = |drivers: [usize; 3]| Team {
+        name: String::new(),
+        drivers: drivers.to_vec(),
+        seeds: vec![1, 2, 3],
+        duplicates: Vec::new(),
+    };
     let teams = [team([0, 1, 2]), team([3, 4, 5])];
     let contacts = |results: &EvaluationResults| {
         let found = judge_teams(results, &slice(results, "all"), &teams).unwrap();

@@ -3,9 +3,15 @@
 use super::reference;
 use super::schema::Settings;
 use anyhow::{Context as _, bail, ensure};
-use policy::fit::Budget;
+use policy::fit::{Budget, ScheduleShape};
 use scenarios::LotSpec;
 use sim::limits::{DRIVES_AT_ONCE_MAX, NOISE_LEVELS_MAX, RUNS_MAX};
+use sim::sensing::noise::NoiseSettings;
+
+/// Largest strength of a layer of noise times that of all: shadows and blobs are held in memory.
+const NOISE_MAX: f32 = 100.0;
+/// Largest range of the safe ratio, in sides of the patch: it is measured in pixels of the patch.
+const SAFE_RANGE_SIDES_MAX: f32 = 4.0;
 
 impl Settings {
     /// Checks ranges, and what no single section can know.
@@ -70,7 +76,7 @@ impl Settings {
         Ok(())
     }
 
-    /// Checks steps of time and speeds.
+    /// Checks steps of time, speeds, the strength of noise and the pixels of the safe ratio.
     fn check_episode(&self) -> anyhow::Result<()> {
         let (physics, control) = (self.episode.physics_step_ms, self.episode.control_period_ms);
         ensure!(
@@ -82,6 +88,31 @@ impl Settings {
             low <= high,
             "episode.controller.speed_min_mps = {low} is more than episode.controller.speed_max_mps = {high}"
         );
+        let NoiseSettings { intensity, boundary, shadow, speed_bump, false_free, blob, stain, flicker, dropout } =
+            &self.episode.noise;
+        for (key, layer) in [
+            ("boundary", boundary),
+            ("shadow", shadow),
+            ("speed_bump", speed_bump),
+            ("false_free", false_free),
+            ("blob", blob),
+            ("stain", stain),
+            ("flicker", flicker),
+            ("dropout", dropout),
+        ] {
+            let strength = intensity * layer;
+            ensure!(
+                strength <= NOISE_MAX,
+                "episode.noise.intensity = {intensity} times episode.noise.{key} = {layer} is {strength}; at most \
+                 {NOISE_MAX} is possible"
+            );
+        }
+        let (range_m, side_m) = (self.episode.metrics.safe_range_m, self.episode.sensing.geometry.side_m);
+        ensure!(
+            range_m <= SAFE_RANGE_SIDES_MAX * side_m,
+            "episode.metrics.safe_range_m = {range_m} is more than {SAFE_RANGE_SIDES_MAX} times \
+             episode.sensing.geometry.side_m = {side_m}, in whose pixels it is measured"
+        );
         Ok(())
     }
 
@@ -90,7 +121,7 @@ impl Settings {
         self.dagger.network.validate().context("dagger.network")?;
         let rate = &self.dagger.fit.learning_rate;
         ensure!(
-            rate.floor <= rate.peak,
+            rate.floor <= rate.peak || rate.shape == ScheduleShape::Constant,
             "dagger.fit.learning_rate.floor = {} is more than dagger.fit.learning_rate.peak = {}",
             rate.floor,
             rate.peak
@@ -137,6 +168,23 @@ impl Settings {
             "expert.first_step_m = {step_m} does not divide {} m, at which a plan's way is sampled",
             expert::WAY_SPACING_M
         );
+        // Either step is taken along arcs of either stage.
+        let steps = [("first_step_m", self.expert.first_step_m), ("second_step_m", self.expert.second_step_m)];
+        let arcs = [
+            ("curvature_max_per_m", self.expert.curvature_max_per_m),
+            ("second_curvature_max_per_m", self.expert.second_curvature_max_per_m),
+        ];
+        for (step_key, step_m) in steps {
+            for (arc_key, arc_per_m) in arcs {
+                let turn_rad = step_m * arc_per_m;
+                ensure!(
+                    turn_rad <= expert::STEP_TURN_MAX_RAD,
+                    "expert.{step_key} = {step_m} along expert.{arc_key} = {arc_per_m} turns by {turn_rad:.2} rad; \
+                     forecasts hold up to {} rad",
+                    expert::STEP_TURN_MAX_RAD
+                );
+            }
+        }
         Ok(())
     }
 
@@ -154,17 +202,28 @@ impl Settings {
         Ok(())
     }
 
+    /// Checks that on-policy rollouts can be driven, which hold the map of every lot of the evaluation, each way.
+    ///
+    /// # Errors
+    /// If these are too many to be held at once.
+    pub fn check_rollouts(&self) -> anyhow::Result<()> {
+        let Self { evaluation, .. } = self;
+        let drives = drives_of("evaluation.lots", &evaluation.lots, &|_| 1)? * evaluation.directions.len();
+        ensure!(
+            drives <= DRIVES_AT_ONCE_MAX,
+            "evaluation.lots and directions: {drives} drives, all of which on-policy rollouts hold at once; at most \
+             {DRIVES_AT_ONCE_MAX} are possible: name fewer lots there, and the others with --unseen"
+        );
+        Ok(())
+    }
+
     /// Checks names of lots, and counts the drives they make. Files are not looked at.
     fn check_lots(&self) -> anyhow::Result<()> {
         let Self { training, evaluation, .. } = self;
-        let of_lots = |key: &str, names: &[String], times: &dyn Fn(&LotSpec) -> usize| {
-            let lots = names.iter().map(|name| Ok(scenarios::suite(name)?.iter().map(times).sum::<usize>()));
-            lots.sum::<anyhow::Result<usize>>().with_context(|| key.to_owned())
-        };
         // A generated lot is another one in every round, and driven once.
         let trials =
             |lot: &LotSpec| if matches!(lot, LotSpec::Generated { .. }) { 1 } else { training.trials as usize };
-        let drives = of_lots("training.lots", &training.lots, &trials)? * training.directions.len();
+        let drives = drives_of("training.lots", &training.lots, &trials)? * training.directions.len();
         ensure!(
             drives <= DRIVES_AT_ONCE_MAX,
             "training.lots, trials and directions: {drives} drives a round; at most {DRIVES_AT_ONCE_MAX} are possible"
@@ -175,9 +234,15 @@ impl Settings {
             // Once each way, at the first level.
             ("evaluation.elsewhere", &evaluation.elsewhere, " and directions", 1),
         ] {
-            let runs = of_lots(key, names, &|_| times)? * evaluation.directions.len();
+            let runs = drives_of(key, names, &|_| times)? * evaluation.directions.len();
             ensure!(runs <= RUNS_MAX, "{key}{others}: {runs} runs; at most {RUNS_MAX} are possible");
         }
         Ok(())
     }
+}
+
+/// Drives each way of the lots of a setting: as often as `times` says of each lot.
+fn drives_of(key: &str, names: &[String], times: &dyn Fn(&LotSpec) -> usize) -> anyhow::Result<usize> {
+    let lots = names.iter().map(|name| Ok(scenarios::suite(name)?.iter().map(times).sum::<usize>()));
+    lots.sum::<anyhow::Result<usize>>().with_context(|| key.to_owned())
 }

@@ -212,6 +212,31 @@ fn the_check_elsewhere_is_counted_as_it_is_driven() {
     assert!(error.contains("evaluation.lots, trials, directions and noise: 40000000 runs"), "{error}");
 }
 
+/// Nothing bounded them: a reproduction was killed for memory when all of its trainings were done.
+#[test]
+fn on_policy_rollouts_of_more_drives_than_can_be_held_are_refused() {
+    let mut settings = Settings::preset("default").unwrap();
+    settings.evaluation.lots = vec!["test:5000:easy".to_owned()];
+    settings.check_rollouts().unwrap();
+    settings.evaluation.lots.push("lot-b".to_owned());
+    settings.check().unwrap();
+    let error = settings.check_rollouts().unwrap_err().to_string();
+    assert!(error.contains("evaluation.lots and directions: 10002 drives") && error.contains("--unseen"), "{error}");
+}
+
+/// A lower rate than the paper's, which is constant, was refused for a floor that nothing uses.
+#[test]
+fn the_floor_of_the_learning_rate_counts_where_it_is_used() {
+    let lower = |shape: &str| {
+        let shape = format!("dagger.fit.learning_rate.shape={shape}");
+        let changes = layers(&["dagger.fit.learning_rate.peak=5e-6", &shape]);
+        Settings::resolve(&Layers { preset: Some("paper".to_owned()), ..changes }, None)
+    };
+    lower("constant").unwrap();
+    let error = format!("{:#}", lower("cosine").unwrap_err());
+    assert!(error.contains("is more than dagger.fit.learning_rate.peak = 0.000005"), "{error}");
+}
+
 /// Such a training could neither end nor go on: its files were longer than what is read.
 #[test]
 fn a_training_whose_files_cannot_be_read_again_is_refused() {

@@ -119,7 +119,7 @@ proptest! {
         let arcs = Arcs::new(&settings, footprint.nose_m());
         let pose = Pose::new(Vec2::new(0.0, left_m), heading_rad);
         let vehicle = VehicleState { speed_mps, steering_rad, ..VehicleState::at_rest(pose) };
-        let route = Some((map.path(), map.path().project(pose.position())));
+        let route = Some((map.path(), map.path().project_m(pose.position())));
         let scene = Scene { field: map.distance_field(), vehicle, route };
         let sight = LineOfSight::new(sees, &map, pose, &context.sensing);
         let search = Search {

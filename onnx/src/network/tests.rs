@@ -3,6 +3,7 @@ use crate::export::{self, export};
 use policy::checkpoint::Checkpoint;
 use policy::conditions::Conditions;
 use policy::network::{InferenceSettings, NetworkArchitecture, OUTPUTS, Weights};
+use rten_onnx::onnx::{AttributeProto, AttributeType, DataType as ElementType, TensorProto};
 use sim::episode::EpisodeSettings;
 use sim::seed::RootSeed;
 use std::path::PathBuf;
@@ -108,12 +109,41 @@ fn a_network_that_mixes_the_grids_of_a_batch_is_refused() {
     let answer = nodes.last_mut().unwrap();
     answer.output = vec!["alone".to_owned()];
     nodes.push(export::node("Softmax", &["alone"], OUTPUT, vec![export::integer("axis", 0)]));
-    let mut network = load("mixing", &export::file(&checkpoint, nodes)).unwrap();
+    let mut network = load("mixing", &export::file(&checkpoint, None, nodes)).unwrap();
     assert_eq!(network.batch, 1, "alone, a grid has nothing to be mixed with");
     // As if the file asked for as many.
     network.batch = 16;
     let error = network.check_independence(&pool()).unwrap_err();
     assert!(error.contains("when others stand beside it in the batch"), "{error}");
+}
+
+/// Its place in a batch depends on the number of threads as well, and others beside it were all that was looked at.
+#[test]
+fn a_network_that_answers_by_the_place_in_the_batch_is_refused() {
+    let [checkpoint, ..] = checkpoints();
+    // Two grids at once, the second of which has a number added to its answers.
+    let with_second_raised_by = |number: f32| {
+        let mut nodes = export::layers(checkpoint.weights.architecture());
+        nodes.last_mut().unwrap().output = vec!["alike".to_owned()];
+        let tensor = TensorProto {
+            dims: vec![2, 1],
+            data_type: Some(ElementType::FLOAT),
+            float_data: vec![0.0, number],
+            ..TensorProto::default()
+        };
+        let value = AttributeProto {
+            name: Some("value".to_owned()),
+            t: Some(tensor),
+            r#type: Some(AttributeType::TENSOR),
+            ..AttributeProto::default()
+        };
+        nodes.push(export::node("Constant", &[], "by_place", vec![value]));
+        nodes.push(export::node("Add", &["alike", "by_place"], OUTPUT, Vec::new()));
+        load("by place", &export::file(&checkpoint, Some(2), nodes))
+    };
+    assert_eq!(with_second_raised_by(0.0).unwrap().batch, 2);
+    let error = with_second_raised_by(1.0).unwrap_err();
+    assert!(error.contains("in another place of the batch"), "{error}");
 }
 
 #[test]

@@ -31,7 +31,11 @@ pub(crate) fn dataset(target: CriticTarget, d: &Dataset, network: &Ensemble, con
         };
         let samples = round.samples.iter().zip(targets);
         let samples = samples.map(|(sample, target)| Sample { grid: sample.grid, label: [0.5, target], tau_hat: 0.0 });
-        labelled.push(Round { samples: samples.collect(), ..round.clone() });
+        labelled.push(Round {
+            samples: samples.collect(),
+            ticks: round.ticks.clone(),
+            noise_augmentations: round.noise_augmentations.clone(),
+        });
     }
     labelled
 }
@@ -51,8 +55,8 @@ pub(crate) fn discrepancies(samples: &[Sample], answers: &[Prediction]) -> Vec<f
 }
 
 /// `discount` to the power of the ticks until the next near-collision of the episode; 0 if none follows. Between ticks that
-/// follow each other more time passes than a control period exactly where the car was stopped and put back. A near-collision
-/// that ends a drive has no tick after it, and is not seen.
+/// follow each other more time passes than a control period only where the car was stopped and put back. A stop that ends
+/// within half a control period of its tick is not seen; nor is a near-collision that ends a drive, which has no tick after it.
 fn risks(ticks: &[Tick], discount: f32, control_period_s: f32) -> Vec<f32> {
     let mut risks = vec![0.0; ticks.len()];
     let mut next_stop: Option<(u32, u32)> = None;

@@ -1,6 +1,6 @@
 //! One training: steps, validation, and which weights are kept.
 
-use crate::dataset::{Dataset, Sample};
+use crate::dataset::{Dataset, Sample, Split};
 use crate::files::FileError;
 use crate::fit::batch_sampler::BatchSampler;
 use crate::fit::device::DeviceChoice;
@@ -91,7 +91,6 @@ const KEEP_EVERY_S: u64 = 60;
 /// # Errors
 /// If there is nothing to train on or too much, the learning rate is impossible, the loss or a weight is not a finite number,
 /// or `unfinished` cannot be read or written, or is of another training.
-#[expect(clippy::disallowed_methods, reason = "when the state is copied to disk changes no result")]
 pub fn fit(
     start: &Weights,
     dataset: &Dataset,
@@ -109,72 +108,95 @@ pub fn fit(
     }
     let steps = settings.steps(split.training.len());
     settings.check_length(steps)?;
-    let validated = thinned(&split.validation, settings.validate_on_max);
-    let validate = |weights: &Weights, samples: &[Sample]| {
-        (!samples.is_empty()).then(|| evaluate(weights, samples, &settings.loss, context))
-    };
+    let validator = Validator::new(&split.validation, settings, context);
     let mut learner = Learner::new(start, &split.training, settings, context, steps)?;
     let mut course = Course::new(start);
-    let origin = unfinished::origin(start, &split, context.inference, context.seed, settings);
-    if let Some(path) = unfinished
-        && let Some(left) = Unfinished::read(path, &origin, start.architecture())?
+    let origin = || unfinished::origin(start, &split, context.inference, context.seed, settings);
+    let mut keeper = unfinished.map(|path| Keeper::new(path, origin()));
+    if let Some(Keeper { path, origin, .. }) = &keeper
+        && let Some(left) = Unfinished::read(path, origin, start.architecture())?
     {
         learner.restore(&left, path)?;
         course.replay(left, settings.keep);
     }
-    let mut kept_at = Instant::now();
     let mut stopped = false;
     while course.done() < steps && !stopped && !course.is_out_of_patience(settings) {
         let step;
         (learner, step) = learner.step(course.done())?;
         course.step(step);
         let done = course.done();
-        let report = FitProgress {
-            step: done,
-            steps,
-            samples_done: u64::from(done) * settings.batch as u64,
-            learning_rate: step.learning_rate,
-            loss: step.loss,
-            validation: course.latest(),
-        };
         // What was asked for in the last step comes after the training.
-        stopped = progress(&report).is_break() && done < steps;
+        stopped = progress(&course.progress(step, steps, settings.batch)).is_break() && done < steps;
         if done == steps || settings.validate_every > 0 && done.is_multiple_of(settings.validate_every) {
-            let weights = learner.weights();
-            if !weights.values().iter().all(|value| value.is_finite()) {
-                return Err(FitError::NotFinite { step: done, what: "a weight" });
-            }
-            let validation = validate(&weights, &validated);
-            course.validated(weights, validation, settings.keep);
+            course.validate(learner.finite_weights(done)?, &validator, settings.keep);
         }
-        if let Some(path) = unfinished
-            && (stopped || done < steps && kept_at.elapsed() >= Duration::from_secs(KEEP_EVERY_S))
+        if let Some(keeper) = &mut keeper
+            && (stopped || done < steps && keeper.is_due())
         {
-            course.keep(&origin, learner.weights(), learner.optimizer_state()).write(path)?;
-            kept_at = Instant::now();
+            keeper.keep(&course, &learner)?;
         }
     }
     // Stopped between two validations.
     if course.curve.last().map_or(0, |point| point.step) < course.done() {
-        let weights = learner.weights();
-        let validation = validate(&weights, &validated);
-        course.validated(weights, validation, settings.keep);
+        course.validate(learner.weights(), &validator, settings.keep);
     }
-    let Course { steps: taken, curve, best, .. } = course;
-    let done = taken.len() as u32;
-    let is_validated_on_all = validated.len() == split.validation.len();
-    let validation = if is_validated_on_all { best.validation } else { validate(&best.weights, &split.validation) };
-    let report = FitReport {
-        training_samples: split.training.len(),
-        validation_samples: split.validation.len(),
-        mean_weight: Some(settings.loss.mean_weight(&split.training)),
-        steps: done,
-        kept_step: best.step,
-        stopped,
-        validation,
-        curve,
-    };
-    Ok(FitOutcome { weights: best.weights, report, steps: taken })
+    Ok(course.outcome(&split, &validator, stopped))
+}
+
+/// Compares networks with the labels that are held back from the training.
+struct Validator<'a> {
+    held_back: &'a [Sample],
+    /// Those of them that are looked at during the training.
+    looked_at: Cow<'a, [Sample]>,
+    loss: &'a LossSettings,
+    context: FitContext,
+}
+
+impl<'a> Validator<'a> {
+    fn new(held_back: &'a [Sample], settings: &'a FitSettings, context: FitContext) -> Self {
+        let looked_at = thinned(held_back, settings.validate_on_max);
+        Self { held_back, looked_at, loss: &settings.loss, context }
+    }
+
+    /// During the training; `None` if nothing is held back.
+    fn validate(&self, weights: &Weights) -> Option<Validation> {
+        self.on(weights, &self.looked_at)
+    }
+
+    /// Of the weights to return, on all that is held back.
+    fn validate_on_all(&self, best: &Best) -> Option<Validation> {
+        let was_on_all = self.looked_at.len() == self.held_back.len();
+        if was_on_all { best.validation } else { self.on(&best.weights, self.held_back) }
+    }
+
+    fn on(&self, weights: &Weights, samples: &[Sample]) -> Option<Validation> {
+        (!samples.is_empty()).then(|| evaluate(weights, samples, self.loss, self.context))
+    }
+}
+
+/// Keeps the state of a training on disk.
+struct Keeper<'a> {
+    path: &'a Path,
+    /// See [`unfinished::origin`].
+    origin: String,
+    kept_at: Instant,
+}
+
+#[expect(clippy::disallowed_methods, reason = "when the state is copied to disk changes no result")]
+impl<'a> Keeper<'a> {
+    fn new(path: &'a Path, origin: String) -> Self {
+        Self { path, origin, kept_at: Instant::now() }
+    }
+
+    fn is_due(&self) -> bool {
+        self.kept_at.elapsed() >= Duration::from_secs(KEEP_EVERY_S)
+    }
+
+    fn keep(&mut self, course: &Course, learner: &Learner<'_>) -> Result<(), FileError> {
+        course.keep(&self.origin, learner.weights(), learner.optimizer_state()).write(self.path)?;
+        self.kept_at = Instant::now();
+        Ok(())
+    }
 }
 
 /// The network in training, and what trains it.
@@ -248,6 +270,13 @@ impl<'a> Learner<'a> {
 
     fn weights(&self) -> Weights {
         self.net.to_weights(self.architecture)
+    }
+
+    /// The weights after `done` steps, if all of them are finite numbers.
+    fn finite_weights(&self, done: u32) -> Result<Weights, FitError> {
+        let weights = self.weights();
+        let is_finite = weights.values().iter().all(|value| value.is_finite());
+        if is_finite { Ok(weights) } else { Err(FitError::NotFinite { step: done, what: "a weight" }) }
     }
 
     fn optimizer_state(&self) -> Vec<u8> {
@@ -334,7 +363,21 @@ impl Course {
         self.steps.push(step);
     }
 
-    fn validated(&mut self, weights: Weights, validation: Option<Validation>, keep: KeepWeights) {
+    /// What is told of the step that was done last.
+    fn progress(&self, last: Step, steps: u32, batch: usize) -> FitProgress {
+        FitProgress {
+            step: self.done(),
+            steps,
+            samples_done: u64::from(self.done()) * batch as u64,
+            learning_rate: last.learning_rate,
+            loss: last.loss,
+            validation: self.latest(),
+        }
+    }
+
+    /// Looks how good the weights are by now, and whether they are to be kept.
+    fn validate(&mut self, weights: Weights, validator: &Validator<'_>, keep: KeepWeights) {
+        let validation = validator.validate(&weights);
         let step = self.done();
         let learning_rate = self.steps.last().map_or(0.0, |step| step.learning_rate);
         self.curve.push(CurvePoint { step, learning_rate, training: self.since_point.take(), validation });
@@ -358,6 +401,22 @@ impl Course {
         left.steps.iter().skip(last_point as usize).for_each(|step| self.since_point.add(step.loss));
         self.best.weights = left.best;
         (self.steps, self.curve) = (left.steps, left.curve);
+    }
+
+    /// What came of it: the best weights, and how they came about.
+    fn outcome(self, split: &Split, validator: &Validator<'_>, stopped: bool) -> FitOutcome {
+        let Self { steps, curve, best, .. } = self;
+        let report = FitReport {
+            training_samples: split.training.len(),
+            validation_samples: split.validation.len(),
+            mean_weight: Some(validator.loss.mean_weight(&split.training)),
+            steps: steps.len() as u32,
+            kept_step: best.step,
+            stopped,
+            validation: validator.validate_on_all(&best),
+            curve,
+        };
+        FitOutcome { weights: best.weights, report, steps }
     }
 }
 

@@ -49,15 +49,22 @@ impl Prediction {
 
 /// Most rows computed in one call. An answer does not depend on the other rows.
 const ROWS_MAX: usize = 1024;
-/// Most values of the largest map of a call, 64 MB: wide networks compute fewer rows.
-const MAP_VALUES_MAX: usize = 1 << 24;
+/// Most values of the widest layer of a call, 64 MB: wide networks compute fewer rows.
+const LAYER_VALUES_MAX: usize = 1 << 24;
+
+/// Most rows of a network computed in one call: bounds the memory.
+fn rows_max(architecture: NetworkArchitecture) -> usize {
+    let first_map = POOLED_1 * POOLED_1 * architecture.conv1.channels;
+    let widest = first_map.max(architecture.features()).max(architecture.hidden);
+    (LAYER_VALUES_MAX / widest).min(ROWS_MAX)
+}
 
 /// A network ready to answer: on CPUs, wherever it was trained.
 #[derive(Debug, Clone)]
 pub struct Predictor {
     mirror_averaging: bool,
     modes: usize,
-    /// Most rows computed in one call: bounds the memory.
+    /// See [`rows_max`].
     rows_max: usize,
     net: LookAheadNet,
     device: Device,
@@ -68,9 +75,14 @@ impl Predictor {
     pub fn new(weights: &Weights, inference: InferenceSettings) -> Self {
         let device = Device::flex();
         let net = LookAheadNet::from_weights(weights, &device);
-        let NetworkArchitecture { modes, conv1, .. } = weights.architecture();
-        let rows_max = (MAP_VALUES_MAX / (POOLED_1 * POOLED_1 * conv1.channels)).min(ROWS_MAX);
-        Self { mirror_averaging: inference.mirror_averaging, modes, rows_max, net, device }
+        let architecture = weights.architecture();
+        Self {
+            mirror_averaging: inference.mirror_averaging,
+            modes: architecture.modes,
+            rows_max: rows_max(architecture),
+            net,
+            device,
+        }
     }
 
     /// Answers every grid, in order.
@@ -117,6 +129,7 @@ impl Predictor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::network::architecture::ConvLayer;
     use crate::test_data::lots;
     use sim::seed::RootSeed;
 
@@ -160,6 +173,22 @@ mod tests {
                 let expected = if modes == 1 { answers.as_flattened().to_vec() } else { predictor.outputs(&grids) };
                 assert_eq!(for_loss, expected, "{modes} modes, {inference:?}");
             }
+        }
+    }
+
+    /// Only the first map was counted: 1024 rows of 65 536 hidden units took 256 MB.
+    #[test]
+    fn the_widest_layer_bounds_the_rows_of_a_call() {
+        let compact = NetworkArchitecture::compact();
+        assert_eq!(rows_max(NetworkArchitecture::paper()), ROWS_MAX);
+        assert_eq!(rows_max(compact), ROWS_MAX);
+        let wide = |channels| ConvLayer { channels, kernel: 3 };
+        for (architecture, values) in [
+            (NetworkArchitecture { conv1: wide(1024), ..compact }, 144 * 1024),
+            (NetworkArchitecture { conv2: wide(1024), ..compact }, 36 * 1024),
+            (NetworkArchitecture { hidden: 65_536, ..compact }, 65_536),
+        ] {
+            assert_eq!(rows_max(architecture), LAYER_VALUES_MAX / values, "{architecture:?}");
         }
     }
 

@@ -1,7 +1,7 @@
 //! A map as a list of shapes painted one over the other. Metres; x to the right, y up, (0, 0) the lower left corner.
 
 use image::{GrayImage, Luma};
-use sim::geometry::{Pose, Vec2, distance_to_segment};
+use sim::geometry::{Pose, Vec2, distance_to_segment_m};
 use sim::scenario::ReferencePath;
 
 /// Grey values of `map_saver`.
@@ -76,7 +76,7 @@ pub(super) fn polar(x: f32, y: f32, radius_m: f32, angle_deg: f32) -> Vec2 {
 
 /// From a point to the nearest of a line.
 pub(super) fn distance_m(line: &[Vec2], point: Vec2) -> f32 {
-    line.windows(2).map(|ends| distance_to_segment(point, ends[0], ends[1])).fold(f32::INFINITY, f32::min)
+    line.windows(2).map(|ends| distance_to_segment_m(point, ends[0], ends[1])).fold(f32::INFINITY, f32::min)
 }
 
 /// The middle of a way with rounded corners.
@@ -130,7 +130,7 @@ impl Shape {
             Self::Band { line, width_m } => {
                 for ends in line.windows(2) {
                     let (low, high) = sim::geometry::bounds(ends);
-                    let holds = |point| distance_to_segment(point, ends[0], ends[1]) < 0.5 * width_m;
+                    let holds = |point| distance_to_segment_m(point, ends[0], ends[1]) < 0.5 * width_m;
                     paint(low - 0.5 * width_m, high + 0.5 * width_m, &holds);
                 }
             }

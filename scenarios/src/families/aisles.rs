@@ -4,9 +4,9 @@
 use super::course::{Aisles, Course, first_apart};
 use super::parts::{close, enclosed, things_on};
 use super::strip::{Mouth, Notch, Strip, Stub};
-use super::things::{self, Rules, Things, facing, side, yaw_rad};
+use super::things::{self, Rules, Things, facing_rad, side};
 use super::walls::Wall;
-use crate::clutter::draw_car;
+use crate::clutter::{draw_car, yaw_rad};
 use crate::corridor::{STALL_DEPTH_M, Side};
 use rand::RngExt as _;
 use sim::maths;
@@ -154,7 +154,7 @@ fn park(things: &mut Things<'_>, strip: &Strip, row: &Notch, stall_m: f32, occup
         let heading_rad = strip.pose(s_m).heading_rad + std::f32::consts::FRAC_PI_2;
         let class = draw_car(rng);
         let set_back_m = rng.random_range(0.1..0.4);
-        let heading = heading_rad + yaw_rad(rng, 3.0) + facing(rng);
+        let heading = heading_rad + yaw_rad(rng, 3.0) + facing_rad(rng);
         let (class, d_m, heading) = if rng.random_bool(occupancy) {
             (class, edge_m + set_back_m + 0.5 * class.default_size_m()[0], heading)
         } else if rng.random_bool(0.5) {
@@ -174,7 +174,7 @@ fn park_across(things: &mut Things<'_>, mouth: &Mouth, stall_m: f32, occupancy: 
         let into_rad = maths::angle_rad(mouth.outward());
         let (class, depth_m, heading_rad) = if rng.random_bool(occupancy) {
             let depth_m = rng.random_range(0.1..0.4) + 0.5 * class.default_size_m()[0];
-            (class, depth_m, into_rad + yaw_rad(rng, 3.0) + facing(rng))
+            (class, depth_m, into_rad + yaw_rad(rng, 3.0) + facing_rad(rng))
         } else if rng.random_bool(0.5) {
             (ObstacleClass::WheelStop, STALL_DEPTH_M - 0.6, into_rad + std::f32::consts::FRAC_PI_2)
         } else {

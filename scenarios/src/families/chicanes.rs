@@ -3,13 +3,13 @@
 
 use super::parts::driven_m;
 use super::strip::Strip;
-use super::things::{self, Rules, Things, side, yaw_rad};
+use super::things::{self, Rules, Things, side};
 use super::winding::Winding;
-use crate::clutter::draw_car;
+use crate::clutter::{draw_car, yaw_rad};
 use crate::corridor::{Side, to_millimetres};
 use rand::RngExt as _;
 use sim::geometry::{Pose, rectangle};
-use sim::scenario::{Island, Obstacle, ObstacleClass, Scenario};
+use sim::scenario::{Island, ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::f32::consts::FRAC_PI_2;
 use std::ops::Range;
@@ -110,13 +110,12 @@ fn stand(things: &mut Things<'_>, strip: &Strip, stand: &Stand, rng: &mut Rng) {
     }
     let d_m = side.sign() * (strip.half_width_m(at_m) - beside_m - 0.5 * across_m);
     let pose = Pose::new(strip.point(at_m, d_m), strip.pose(at_m).heading_rad + yaw_rad(rng, 12.0));
-    let round = |value: f32| Some((value * 100.0).round() / 100.0);
     match kind {
         Barrier::Wall | Barrier::Container => {
             let height_m = if matches!(kind, Barrier::Wall) { rng.random_range(0.4..2.5) } else { 2.6 };
-            let plain = things::obstacle(ObstacleClass::Wall, pose.position(), pose.heading_rad);
-            let (length_m, width_m, height_m) = (round(along_m), round(across_m), round(height_m));
-            things.narrow(Obstacle { length_m, width_m, height_m, ..plain }, side, at_m, &rules);
+            let size_m = [along_m, across_m, height_m];
+            let block = things::sized(ObstacleClass::Wall, pose.position(), pose.heading_rad, size_m);
+            things.narrow(block, side, at_m, &rules);
         }
         Barrier::Parked => {
             // As many abreast as there is room for, across or along the road.

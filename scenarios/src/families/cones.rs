@@ -7,6 +7,7 @@ use super::strip::{Strip, is_on, line_length_m, point_at};
 use super::things::{self, Rules, Things, side};
 use super::walls::{Wall, yard};
 use crate::clutter::draw_car;
+use crate::corridor::tenths;
 use rand::RngExt as _;
 use sim::geometry::Vec2;
 use sim::maths;
@@ -212,7 +213,7 @@ fn around(things: &mut Things<'_>, way: &[Vec2], boundary: &[Vec2], rng: &mut Rn
         let heading_rad = rng.random_range(-PI..PI);
         let thing = match rng.random_range(0..4) {
             0 => {
-                let mut size = |range: Range<f32>| Some((rng.random_range(range) * 10.0).round() / 10.0);
+                let mut size = |range: Range<f32>| Some(tenths(rng.random_range(range)));
                 let (length_m, width_m, height_m) = (size(2.0..6.0), size(2.0..3.0), size(2.0..3.2));
                 Obstacle { length_m, width_m, height_m, ..things::obstacle(ObstacleClass::Wall, at, heading_rad) }
             }
@@ -232,7 +233,7 @@ fn around(things: &mut Things<'_>, way: &[Vec2], boundary: &[Vec2], rng: &mut Rn
 mod tests {
     use super::*;
     use crate::split::{Family, Split};
-    use sim::geometry::{distance_to_segment, edges};
+    use sim::geometry::{distance_to_segment_m, edges};
     use sim::seed::Stream;
 
     /// Half of the widest gap is as far as the row is from its things.
@@ -250,7 +251,7 @@ mod tests {
                 let is_near = outlines
                     .iter()
                     .filter(|outline| outline[0].distance(point) < 8.0)
-                    .any(|outline| edges(outline).any(|(a, b)| distance_to_segment(point, a, b) < 0.91));
+                    .any(|outline| edges(outline).any(|(a, b)| distance_to_segment_m(point, a, b) < 0.91));
                 assert!(is_near, "test-cones-{index}: a gap at {point}");
             }
         }

@@ -4,7 +4,8 @@
 use super::course::{Aisles, Course, first_apart, lacking_at_corner_m};
 use super::parts::{close, lot, solid_height_m, things_on};
 use super::strip::{Notch, Strip, Stub};
-use super::things::{Rules, Things, side, yaw_rad};
+use super::things::{Rules, Things, side};
+use crate::clutter::yaw_rad;
 use crate::corridor::Side;
 use rand::RngExt as _;
 use sim::scenario::{ObstacleClass, Scenario};

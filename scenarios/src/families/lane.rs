@@ -3,8 +3,9 @@
 use super::course::{Course, first_apart};
 use super::parts::{RUN_OUT_M, enclosed, things_on};
 use super::strip::Strip;
-use super::things::{Rules, Things, facing, side, yaw_rad};
+use super::things::{Rules, Things, facing_rad, side};
 use super::walls::Wall;
+use crate::clutter::yaw_rad;
 use rand::RngExt as _;
 use sim::maths;
 use sim::scenario::{ObstacleClass, Scenario};
@@ -147,7 +148,7 @@ fn double_parked(things: &mut Things<'_>, length_m: f32, width_m: f32, gap_m: f3
     let mut side = side(rng);
     while s_m < length_m {
         let class = [ObstacleClass::Sedan, ObstacleClass::Suv, ObstacleClass::Compact][rng.random_range(0..3)];
-        let yaw_rad = yaw_rad(rng, 2.0) + facing(rng);
+        let yaw_rad = yaw_rad(rng, 2.0) + facing_rad(rng);
         let car = things.beside(class, side, s_m, width_m - gap_m - 0.05, yaw_rad);
         things.narrow(car, side, s_m, &rules);
         s_m += rng.random_range(14.0..24.0);

@@ -4,9 +4,9 @@
 use super::course::{Course, first_apart};
 use super::parts::{RUN_OUT_M, lot, things_on};
 use super::strip::{Strip, is_on, line_length_m, point_at};
-use super::things::{self, Rules, Things, facing, side, yaw_rad};
+use super::things::{self, Rules, Things, facing_rad, side};
 use super::walls::{Wall, yard};
-use crate::clutter::draw_car;
+use crate::clutter::{draw_car, yaw_rad};
 use crate::corridor::to_millimetres;
 use rand::RngExt as _;
 use sim::geometry::{Pose, Vec2, polygon_contains, rectangle};
@@ -166,7 +166,7 @@ impl Ground<'_> {
             Kind::ParkedAlong | Kind::ParkedAcross => {
                 let is_across = matches!(item.kind, Kind::ParkedAcross);
                 let across_rad = if is_across { std::f32::consts::FRAC_PI_2 } else { 0.0 };
-                let heading_rad = heading_rad + across_rad + yaw_rad(rng, 2.0) + facing(rng);
+                let heading_rad = heading_rad + across_rad + yaw_rad(rng, 2.0) + facing_rad(rng);
                 self.things.stand(things::obstacle(item.class, centre, heading_rad))
             }
             Kind::Planter => self.plant(Pose::new(centre, heading_rad), [item.length_m, item.depth_m], rng),
@@ -231,7 +231,7 @@ fn on_the_way(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
             _ => draw_car(rng),
         };
         let protrusion_m = class.default_size_m()[1] + rng.random_range(0.0..0.3);
-        let yaw_rad = yaw_rad(rng, 4.0) + facing(rng);
+        let yaw_rad = yaw_rad(rng, 4.0) + facing_rad(rng);
         let thing = things.beside(class, side, s_m, protrusion_m, yaw_rad);
         things.narrow(thing, side, s_m, &rules);
     }

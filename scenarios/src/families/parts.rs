@@ -4,7 +4,7 @@ use super::route;
 use super::strip::{Mouth, Strip};
 use super::things::{self, Things};
 use super::walls::{Wall, yard};
-use crate::corridor::to_millimetres;
+use crate::corridor::{tenths, to_millimetres};
 use rand::RngExt as _;
 use sim::geometry::Vec2;
 use sim::scenario::{LotNoise, ObstacleClass, Scenario};
@@ -56,7 +56,7 @@ pub(super) fn close(things: &mut Things<'_>, mouth: &Mouth, rng: &mut Rng) {
 
 /// How high solid ground beside the way is, metres: 0 hides nothing, more hides the ground behind corners.
 pub(super) fn solid_height_m(rng: &mut Rng) -> f32 {
-    if rng.random_bool(0.4) { 0.0 } else { (rng.random_range(1.5_f32..4.0) * 10.0).round() / 10.0 }
+    if rng.random_bool(0.4) { 0.0 } else { tenths(rng.random_range(1.5..4.0)) }
 }
 
 /// Puts a lot together whose way ends at a wall with free ground behind, of so many metres, or else at solid ground.

@@ -4,8 +4,8 @@
 use super::aisles::CarPark;
 use super::course::{Aisles, Course, first_apart, lacking_at_corner_m};
 use super::strip::{Notch, Strip, Stub, line_length_m, point_at};
-use super::things::{self, Things, facing, yaw_rad};
-use crate::clutter::draw_car;
+use super::things::{self, Things, facing_rad};
+use crate::clutter::{draw_car, yaw_rad};
 use crate::corridor::{Side, to_millimetres};
 use rand::RngExt as _;
 use sim::geometry::{Vec2, signed_area_m2};
@@ -181,7 +181,7 @@ impl Row<'_> {
                 let class = draw_car(rng);
                 let across_m = across_row_m(class, slant_rad);
                 let from_aisle_m = rng.random_range(0.08..depth_m - across_m - 0.08);
-                (class, from_aisle_m + 0.5 * across_m, heading_rad + yaw_rad(rng, 1.5) + facing(rng))
+                (class, from_aisle_m + 0.5 * across_m, heading_rad + yaw_rad(rng, 1.5) + facing_rad(rng))
             } else if rng.random_bool(0.5) {
                 (ObstacleClass::WheelStop, depth_m - 1.0, heading_rad + FRAC_PI_2)
             } else {

@@ -4,9 +4,9 @@
 use super::course::{Course, first_apart};
 use super::parts::{RUN_OUT_M, close, lot, things_on};
 use super::strip::{Notch, Strip, Stub};
-use super::things::{self, Rules, Things, facing, side, yaw_rad};
+use super::things::{self, Rules, Things, facing_rad, side};
 use super::walls::Wall;
-use crate::clutter::draw_car;
+use crate::clutter::{draw_car, yaw_rad};
 use crate::corridor::{Side, to_millimetres};
 use rand::RngExt as _;
 use sim::geometry::Vec2;
@@ -172,7 +172,7 @@ fn parked_cars(things: &mut Things<'_>, strip: &Strip, rng: &mut Rng) {
             let [length_m, width_m, _] = class.default_size_m();
             let protrusion_m = width_m + rng.random_range(FROM_KERB_M);
             let s_m = (front_m + 0.5 * length_m).min(strip.length_m());
-            let yaw_rad = yaw_rad(rng, 2.0) + facing(rng);
+            let yaw_rad = yaw_rad(rng, 2.0) + facing_rad(rng);
             let car = things.beside(class, side, s_m, protrusion_m, yaw_rad);
             things.narrow(car, side, s_m, &rules);
             front_m += length_m + rng.random_range(BUMPERS_M);

@@ -1,7 +1,7 @@
 //! Things that stand about, in the strip and beside it, and how much they leave of it.
 
 use super::strip::Strip;
-use crate::corridor::{Side, overlap, to_millimetres};
+use crate::corridor::{Side, hundredths, overlap, tenths, to_millimetres};
 use rand::RngExt as _;
 use sim::geometry::{Pose, Vec2, wrap_angle};
 use sim::maths;
@@ -165,13 +165,13 @@ impl<'a> Things<'a> {
 
 /// An obstacle at a place rounded to millimetres and tenths of a degree.
 pub(super) fn obstacle(class: ObstacleClass, at: Vec2, heading_rad: f32) -> Obstacle {
-    let heading_deg = (wrap_angle(heading_rad).to_degrees() * 10.0).round() / 10.0;
+    let heading_deg = tenths(wrap_angle(heading_rad).to_degrees());
     Obstacle { heading_deg, ..Obstacle::new(class, Pose::new(to_millimetres(at), 0.0)) }
 }
 
 /// The same of another size, `[length, width, height]` in metres, rounded to centimetres.
 pub(super) fn sized(class: ObstacleClass, at: Vec2, heading_rad: f32, size_m: [f32; 3]) -> Obstacle {
-    let [length_m, width_m, height_m] = size_m.map(|value| Some((value * 100.0).round() / 100.0));
+    let [length_m, width_m, height_m] = size_m.map(|value| Some(hundredths(value)));
     Obstacle { length_m, width_m, height_m, ..obstacle(class, at, heading_rad) }
 }
 
@@ -183,13 +183,8 @@ pub(super) fn round_bed(at: Vec2, radius_m: f32, height_m: f32) -> Island {
 }
 
 /// Either way a parked car may face.
-pub(super) fn facing(rng: &mut Rng) -> f32 {
+pub(super) fn facing_rad(rng: &mut Rng) -> f32 {
     if rng.random_bool(0.7) { 0.0 } else { std::f32::consts::PI }
-}
-
-/// Up to so many degrees to either side, in radians.
-pub(super) fn yaw_rad(rng: &mut Rng, limit_deg: f32) -> f32 {
-    rng.random_range(-limit_deg..=limit_deg).to_radians()
 }
 
 /// A side of the road.

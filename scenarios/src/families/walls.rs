@@ -1,8 +1,8 @@
 //! Walls and kerbs along outlines, with free ground behind them.
 
-use crate::corridor::to_millimetres;
+use crate::corridor::{hundredths, tenths, to_millimetres};
 use rand::RngExt as _;
-use sim::geometry::{Pose, Vec2, bounds, distance_to_segment, edges};
+use sim::geometry::{Pose, Vec2, bounds, distance_to_segment_m, edges};
 use sim::maths;
 use sim::scenario::{Obstacle, ObstacleClass};
 use sim::seed::Rng;
@@ -36,7 +36,7 @@ impl Wall {
 
     /// Hides little or nothing.
     pub(super) fn low(rng: &mut Rng) -> Self {
-        let height_m = (rng.random_range(0.3_f32..1.0) * 10.0).round() / 10.0;
+        let height_m = tenths(rng.random_range(0.3..1.0));
         Self { class: ObstacleClass::Wall, thickness_m: thickness_m(rng), height_m }
     }
 
@@ -86,7 +86,7 @@ impl Wall {
 }
 
 fn thickness_m(rng: &mut Rng) -> f32 {
-    (rng.random_range(0.1_f32..0.3) * 100.0).round() / 100.0
+    hundredths(rng.random_range(0.1..0.3))
 }
 
 /// What openings leave of an edge, metres from its first point.
@@ -94,7 +94,7 @@ fn closed_stretches(a: Vec2, b: Vec2, (from_m, to_m): (f32, f32), openings: &[Op
     let along = (b - a).normalize();
     let mut gaps: Vec<(f32, f32)> = openings
         .iter()
-        .filter(|opening| distance_to_segment(opening.centre, a, b) < 0.05)
+        .filter(|opening| distance_to_segment_m(opening.centre, a, b) < 0.05)
         .map(|opening| {
             let at_m = (opening.centre - a).dot(along);
             (at_m - 0.5 * opening.width_m, at_m + 0.5 * opening.width_m)
@@ -167,7 +167,7 @@ mod tests {
         }
         for corner in walls.iter().flatten() {
             let nearest_m =
-                edges(&outline).map(|(a, b)| distance_to_segment(*corner, a, b)).fold(f32::INFINITY, f32::min);
+                edges(&outline).map(|(a, b)| distance_to_segment_m(*corner, a, b)).fold(f32::INFINITY, f32::min);
             let reaches_in = polygon_contains(&outline, *corner) && nearest_m > 2e-3;
             assert!(!reaches_in, "a wall reaches {nearest_m} m into the ground at {corner}");
         }

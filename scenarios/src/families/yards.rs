@@ -6,7 +6,7 @@ use super::things::{self, Rules, Thing, Things, side};
 use super::winding::Winding;
 use crate::clutter::draw_car;
 use rand::RngExt as _;
-use sim::geometry::{Vec2, distance_to_segment, edges};
+use sim::geometry::{Vec2, distance_to_segment_m, edges};
 use sim::scenario::{ObstacleClass, Scenario};
 use sim::seed::Rng;
 use std::f32::consts::PI;
@@ -86,7 +86,7 @@ fn apart_m(one: &[Vec2], other: &[Vec2]) -> f32 {
     let from = |points: &[Vec2], outline: &[Vec2]| {
         points
             .iter()
-            .flat_map(|&point| edges(outline).map(move |(a, b)| distance_to_segment(point, a, b)).collect::<Vec<_>>())
+            .flat_map(|&point| edges(outline).map(move |(a, b)| distance_to_segment_m(point, a, b)).collect::<Vec<_>>())
             .fold(f32::INFINITY, f32::min)
     };
     from(one, other).min(from(other, one))

@@ -518,7 +518,7 @@ mod tests {
         let outline: Vec<_> = short.iter().map(|&corner| point(corner)).collect();
         for &corner in &ring {
             let distance_px = sim::geometry::edges(&outline)
-                .map(|(a, b)| sim::geometry::distance_to_segment(point(corner), a, b))
+                .map(|(a, b)| sim::geometry::distance_to_segment_m(point(corner), a, b))
                 .fold(f32::INFINITY, f32::min);
             assert!(distance_px <= 0.7501, "{corner:?} moved by {distance_px} pixels");
         }

@@ -255,7 +255,8 @@ impl NoiseField {
         });
     }
 
-    /// Convex blobs of 0.3–1.0 m (at most 15 % of the lane width at level `paper`) that live 2–4 s and come back later.
+    /// Convex blobs of 0.3–1.0 m (at most 15 % of the lane width at level `paper`) that live 40…80 control ticks (2…4 s at
+    /// 50 ms) and come back later.
     fn scatter_blobs(&mut self, map: &Map, amount: f32, rng: &mut Rng) {
         const LANE_M: f32 = 4.0;
         let spacing_m = 1.0 / (BLOB_PER_M2 * LANE_M * BLOB_PERIODS);
@@ -299,10 +300,8 @@ impl NoiseField {
 fn is_empty_ground(map: &Map, polygon: &[Vec2]) -> bool {
     const SAMPLES: usize = 12;
     let region = Region::new(polygon.to_vec());
-    let near = |occluder: &&crate::map::Occluder| {
-        occluder.centre.distance(region.centre) < occluder.radius_m + region.radius_m
-    };
-    let obstacles: Vec<_> = map.occluders().iter().filter(|occluder| !occluder.is_wall()).filter(near).collect();
+    let near = map.occluders_near(region.centre, region.radius_m);
+    let obstacles: Vec<_> = near.filter(|occluder| !occluder.is_wall()).collect();
     let scenario = map.scenario();
     let is_solid = |sample: Vec2| {
         obstacles.iter().any(|obstacle| polygon_contains(&obstacle.outline, sample))
