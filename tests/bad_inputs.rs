@@ -270,6 +270,10 @@ fn settings_that_are_refused() {
         ("expert.branch_travels_m=[5.0, 4.0, 6.0, 7.0, 8.0]", "is not increasing"),
         ("expert.clearances_m=[0.1, 0.2, 0.03]", "write the comfortable one first"),
         ("expert.first_step_m=0.25", "expert.first_step_m = 0.25 does not divide 0.6 m"),
+        ("expert.second_step_m=5", "expert.second_step_m = 5 along expert.curvature_max_per_m = 0.215 turns by"),
+        ("expert={ first_step_m = 0.6, second_curvature_max_per_m = 0.9 }", "turns by 0.54 rad"),
+        ("episode.noise={ intensity = 50, blob = 3 }", "times episode.noise.blob = 3 is 150; at most 100 is possible"),
+        ("episode={ sensing = { geometry = { side_m = 2 } }, metrics = { safe_range_m = 8.5 } }", "in whose pixels"),
         ("expert.elastic_band.trust_from_m=0.5", "trust_from_m = 0.5 is not less than trust_to_m = 0.4"),
         ("expert.elastic_band.bend_to_rad=0.6", "bend_from_rad = 0.6 is not less than bend_to_rad = 0.6"),
         ("training.lots=[]", "training.lots is empty"),
@@ -401,6 +405,8 @@ fn names_of_lots_drivers_and_moments_that_are_refused() {
         ("tuned:vvf:x", "here are tuned:tentacle"),
         ("vvf ", "no driver \"vvf \""),
         (":", "no driver \":\""),
+        ("run:a|b", "contains '|', and tables hold its name; rename the file or folder"),
+        ("net:a\nb/round-01", "contains '\\n'"),
     ] {
         cases.refuse(driver, driver.parse::<DriverSpec>(), expected);
     }
@@ -856,6 +862,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         ),
         (&["evaluate", "--driver", "expert", "--lots", "test:1000001"], "from 1 to 1000000"),
         (&["evaluate", "--driver", "dwa:pipe.toml"], "it is not a regular file"),
+        (&["evaluate", "--driver", "expert", "--out", "a|b"], "without '|'"),
         (&["evaluate", "--driver", "dwa:huge.toml"], "200000000000 bytes or more"),
         (&["evaluate", "--driver", "dwa:deep.toml"], "at most 65536 are read"),
         (&["evaluate", "--driver", "expert", "--threads", "1000000"], "--threads"),
@@ -896,6 +903,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["visualise", "episode", "--driver", "net:nope"], "net:nope"),
         (&["visualise", "lot", "--out", "map.yaml"], "map.yaml: exists already, and is not a recording"),
         (&["evaluate", "--driver", "expert", "--record", "0"], "--record"),
+        (&["evaluate", "--driver", "expert", "--shard", "1/2", "--json"], "--json"),
         (&["drivers", "vvf", "--json"], "--json"),
         (&["tune", "--planner", "vvf,vvf"], "\"vvf\" is named twice"),
         (&["train-dagger", "--resume", ".", "--overwrite"], "--overwrite"),
@@ -919,6 +927,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["tune", "--trials", "0"], "evaluation.trials = 0"),
         (&["tune", "--trials", "2000"], "40000 drives for each planner"),
         (&["reproduce", "--unseen", "lot-z"], "\"lot-z\" is not a lot"),
+        (&["reproduce", "--set", "evaluation.lots=[\"test:5001:easy\"]"], "10002 drives"),
         (&["pixel-accuracy", "--trials", "0"], "--trials"),
         (&["sample-size", "--between", "nan,1"], "nan"),
         (&["sample-size", "--below", "1e-12"], "a rate is 0 or at least 0.000000001"),

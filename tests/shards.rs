@@ -1,6 +1,6 @@
 //! What docs/cluster.md promises: shards of an evaluation give the same bytes as one machine, or one clear error.
 
-use crate::bench::{root, scratch, succeed, text, xtask};
+use crate::bench::{refuse, root, scratch, succeed, text, xtask};
 use crate::determinism::files;
 use std::path::{Path, PathBuf};
 #[cfg(unix)]
@@ -102,6 +102,11 @@ fn three_shards_merge_to_the_bytes_of_one_machine_and_nothing_else_merges() {
     copy(three, &other);
     sums::unlist(&other, &["finished.toml"]).unwrap();
     refused(&[one, two, &other], "shard 3/3 is not finished");
+    // These were ignored.
+    for (flag, part) in [("--record", "of which nothing is recorded"), ("--json", "which has no tables")] {
+        let error = refuse(xtask().args(["evaluate", flag, "--resume"]).arg(&other));
+        assert!(error.contains(part), "{error}");
+    }
     // It continues as any evaluation does, and what a process that died just before left is gone.
     std::fs::write(other.join("driving.unfinished"), "").unwrap();
     succeed(xtask().args(["evaluate", "--resume"]).arg(&other));

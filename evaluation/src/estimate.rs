@@ -3,8 +3,10 @@
 
 use experiment::lots::Lot;
 use experiment::settings::Settings;
+use policy::dataset::store::Store;
 use policy::fit::FitSettings;
 use policy::network::{NetworkArchitecture, RESIDUAL_KERNEL};
+use std::path::Path;
 
 /// A stage of [`Progress::begin`](experiment::progress::Progress::begin) and how long it takes, seconds.
 pub type Task = (&'static str, f64);
@@ -44,6 +46,31 @@ pub fn training(settings: &Settings, has_cloning: bool) -> Vec<Task> {
         .collect();
     tasks.extend(dagger.final_fit().map(|fit| ("training", fitting_s(&fit))));
     tasks
+}
+
+/// What is left of a training in its folder: rounds that are there are read. All of it where the folder cannot be read, which
+/// the training itself says.
+pub fn rest_of_training(settings: &Settings, has_cloning: bool, folder: &Path) -> Vec<Task> {
+    let mut tasks = training(settings, has_cloning);
+    let done = tasks_done(settings, has_cloning, folder).unwrap_or(0);
+    tasks.split_off(done)
+}
+
+/// How many of the tasks of a training are done in its folder.
+fn tasks_done(settings: &Settings, has_cloning: bool, folder: &Path) -> anyhow::Result<usize> {
+    if !folder.is_dir() {
+        return Ok(0);
+    }
+    let (dagger, store) = (&settings.dagger, Store::open(folder)?);
+    let first = u32::from(!has_cloning);
+    let mut next = first;
+    while next <= dagger.iterations_max && store.has_round(next)? {
+        next += 1;
+    }
+    let Some(last) = next.checked_sub(1).filter(|&last| last >= first) else { return Ok(0) };
+    // What is trained beside a network comes after it, and is done for certain once the next round is there.
+    let is_trained = dagger.fits_of_round(last).len() == 1 && store.is_finished(&store.round_folder(last))?;
+    Ok(2 * (last - first) as usize + 1 + usize::from(is_trained))
 }
 
 /// An evaluation of this many drivers.
@@ -89,6 +116,7 @@ mod tests {
     use super::*;
     use policy::decision_rule::DecisionRule;
     use policy::fit::Budget;
+    use storage::sums;
 
     /// The networks of an ensemble were taken for one, and a critic for none.
     #[test]
@@ -116,5 +144,34 @@ mod tests {
                 assert!((seconds / alone - times).abs() < 0.01, "{rule}: {seconds} s, {alone} s without");
             }
         }
+    }
+
+    /// `--resume` waited once more for every round that was done.
+    #[test]
+    fn what_is_done_of_a_training_is_not_waited_for_again() {
+        let folder = std::env::temp_dir().join(format!("evaluation-test-{}-rest", std::process::id()));
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.dagger.rule = DecisionRule::named("all_below").unwrap();
+        settings.dagger.iterations_max = 2;
+        let whole = training(&settings, true);
+        assert_eq!(rest_of_training(&settings, true, &folder), whole);
+        assert!(!folder.exists(), "nothing is made");
+        let is_there = |file: &str| {
+            let path = folder.join(file);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, "").unwrap();
+            sums::list(&folder, &[file]).unwrap();
+        };
+        let collected_and_trained = ["round-00/round.toml", "round-00/sha256sums", "round-01/round.toml"];
+        for (done, file) in (1..).zip(collected_and_trained) {
+            is_there(file);
+            assert_eq!(rest_of_training(&settings, true, &folder), whole[done..], "{file}");
+        }
+        assert_eq!(rest_of_training(&settings, false, &folder), whole[3..], "cloning was taken over");
+        // Nobody knows whether its other members are trained.
+        is_there("round-01/sha256sums");
+        settings.dagger.rule = DecisionRule::named("ensemble_dagger").unwrap();
+        assert_eq!(rest_of_training(&settings, true, &folder), training(&settings, true)[3..]);
+        std::fs::remove_dir_all(folder).unwrap();
     }
 }

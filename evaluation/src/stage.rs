@@ -3,9 +3,11 @@
 use crate::estimate::{self, Task};
 use crate::names::EXPERT_EQUAL;
 use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::manifest;
 use experiment::settings::Settings;
 use experiment::shard::Shard;
 use sim::seed::RootSeed;
+use std::path::Path;
 
 /// One step, with a folder of its own within the run.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,9 +75,19 @@ impl Stage {
         }
     }
 
-    /// About how long it takes, seconds.
-    pub fn estimate_s(&self) -> f64 {
-        self.tasks().iter().map(|(_, seconds)| seconds).sum()
+    /// The same of what is left of it within its run.
+    ///
+    /// # Errors
+    /// If it cannot be told whether it is finished.
+    pub fn tasks_left(&self, run: &Path) -> anyhow::Result<Vec<Task>> {
+        let folder = run.join(&self.folder);
+        if manifest::is_finished(&folder)? {
+            return Ok(Vec::new());
+        }
+        if let Step::Train { cloning_of, .. } = &self.step {
+            return Ok(estimate::rest_of_training(&self.settings, cloning_of.is_none(), &folder));
+        }
+        Ok(self.tasks())
     }
 }
 

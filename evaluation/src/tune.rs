@@ -207,6 +207,11 @@ impl CandidateLog {
         Ok(Self { path, origin, totals: found.candidate, told: 0 })
     }
 
+    /// Whether the search has been told all that an interrupted one left.
+    fn is_read(&self) -> bool {
+        self.told >= self.totals.len()
+    }
+
     /// What the next candidates did, driven unless they were before.
     fn next(
         &mut self,
@@ -310,9 +315,12 @@ fn search(
     let mut tried: Vec<(Vec<f32>, PlannerSpec, Totals)> = Vec::with_capacity(budget);
     loop {
         let best = tried.iter().min_by_key(|(_, _, totals)| rank(totals));
-        let share = (tried.len() * course.search.trials.len()) as f64 / runs_all as f64;
-        let status = || best.map_or_else(String::new, |(_, _, totals)| format!("{} failures", rank(totals).1));
-        progress.at(share, &mut |_| status());
+        // What is read back took none of the time.
+        if log.is_read() {
+            let share = (tried.len() * course.search.trials.len()) as f64 / runs_all as f64;
+            let status = || best.map_or_else(String::new, |(_, _, totals)| format!("{} failures", rank(totals).1));
+            progress.at(share, &mut |_| status());
+        }
         let generation = search.ask(best.map(|(point, ..)| point.as_slice()));
         if generation.is_empty() {
             break;
@@ -346,6 +354,7 @@ fn search(
             totals
         })
         .collect();
+    progress.at(1.0, &mut |_| String::new());
     let winner = (0..together.len()).min_by_key(|&place| (rank(&together[place]), place)).unwrap_or(0);
     Ok(Some(Found {
         name: name.clone(),
@@ -409,6 +418,8 @@ impl Found {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use experiment::progress::Elapsed;
+    use std::cell::RefCell;
 
     /// `tune --resume` went on with the candidates of any search that somebody had copied there.
     #[test]
@@ -433,6 +444,44 @@ mod tests {
         // As earlier versions wrote it.
         sealed::write(&path, b"candidate = []").unwrap();
         assert!(CandidateLog::read(path.clone(), own()).is_err());
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[derive(Default)]
+    struct Shares(RefCell<Vec<f64>>);
+
+    impl Progress for Shares {
+        fn begin(&self, _: &'static str, _: &str) {}
+
+        fn at(&self, share: f64, _: &mut dyn FnMut(Elapsed) -> String) {
+            self.0.borrow_mut().push(share);
+        }
+
+        fn end(&self, _: &str) {}
+
+        fn is_cancelled(&self) -> bool {
+            false
+        }
+    }
+
+    /// Their share was reported after that of nothing, as if they had been driven in no time.
+    #[test]
+    fn candidates_that_are_read_back_are_done_before_anything_is_reported() {
+        let path = std::env::temp_dir().join(format!("evaluation-test-{}-back.candidates.toml", std::process::id()));
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.evaluation.trials = 1;
+        let lots = Lot::parse_all(&["train:1:easy"], &settings.episode.vehicle).unwrap();
+        let course = Course::new(&settings, &lots, NoiseChoice::Clean).unwrap();
+        let start = &planners_named(&["cvm".to_owned()]).unwrap()[0];
+        let reported = || {
+            let shares = Shares::default();
+            let mut log = CandidateLog::read(path.clone(), origin(&settings, start, 2)).unwrap();
+            search(&course, start, 2, settings.evaluation.seed, &mut log, &shares).unwrap().unwrap();
+            shares.0.into_inner()
+        };
+        let driven = reported();
+        assert!(driven.len() > 2 && driven[0] == 0.0 && driven.is_sorted(), "{driven:?}");
+        assert_eq!(reported(), [1.0]);
         std::fs::remove_file(path).unwrap();
     }
 }

@@ -5,7 +5,7 @@ mod shipped;
 mod spec;
 
 pub use planner_file::{Parameters, PlannerFile, tuned_specs};
-pub use spec::{DriverSpec, specs};
+pub use spec::{DriverSpec, never_in_a_name, specs};
 
 use crate::settings::{Layers, Settings, Smoothing};
 use crate::trained::{self, TrainedOn, Training};

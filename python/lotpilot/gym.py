@@ -64,7 +64,7 @@ class LotEnv(gymnasium.Env[Any, Floats]):
         """
         refuse_option(options, "episodes", "episode")
         check_whole("seed", *given(seed))
-        super().reset(seed=seed)
+        super().reset(seed=None if seed is None else int(seed))
         episode = (options or {}).get("episode")
         seen = self.core.reset(seeds=None if seed is None else [seed], episodes=None if episode is None else [episode])
         self._is_started = True
@@ -161,7 +161,10 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
         self._all = np.ones(num_envs, bool)
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | npt.NDArray[np.integer[Any]] | None = None,
+        options: Mapping[str, Any] | None = None,
     ) -> tuple[Any, dict[str, Any]]:
         """Starts the next episodes, or the first ones of a seed, or those of ``options={"episodes": [7, …]}``.
 
@@ -169,9 +172,8 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
             ValueError: If the options are those of a single car.
         """
         refuse_option(options, "episode", "episodes")
-        seeds = [seed] * self.num_envs if isinstance(seed, (int, np.integer)) else seed
-        check_whole("seed", *given(*(seeds or ())))
-        super().reset(seed=seed if isinstance(seed, int) else None)
+        seeds = _seeds(seed, self.num_envs)
+        super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
         mask = (options or {}).get("reset_mask")
         seen = self.core.reset(mask, seeds=seeds, episodes=(options or {}).get("episodes"))
         return seen.observation(), self._infos(seen)
@@ -222,6 +224,21 @@ _AUTORESET = {
     AutoresetMode.SAME_STEP: "same_step",
     AutoresetMode.DISABLED: "disabled",
 }
+
+
+def _seeds(seed: Any, count: int) -> list[int | None] | None:
+    """The seed of each environment, if one is given for all of them or for each.
+
+    Raises:
+        ValueError: If one is no whole number or out of range.
+    """
+    if isinstance(seed, np.ndarray):
+        seed = seed.tolist()
+    if seed is None:
+        return None
+    seeds = list(seed) if isinstance(seed, Sequence) else [seed] * count
+    check_whole("seed", *given(*seeds))
+    return seeds
 
 
 def _frames_per_s(core: Core) -> int:

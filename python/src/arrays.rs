@@ -100,10 +100,10 @@ pub(crate) fn pairs(object: &Bound<'_, PyAny>, n: usize, counts: impl Fn(usize) 
 }
 
 /// Points as an array `[n, 2]`.
-pub(crate) fn points<'py, const N: usize>(
-    py: Python<'py>,
+pub(crate) fn points<const N: usize>(
+    py: Python<'_>,
     points: impl IntoIterator<Item = [f32; N]>,
-) -> PyResult<Bound<'py, PyArray<f32, numpy::Ix2>>> {
+) -> PyResult<Bound<'_, PyArray<f32, numpy::Ix2>>> {
     let flat: Vec<f32> = points.into_iter().flatten().collect();
     let rows = flat.len() / N;
     PyArray::from_vec(py, flat).reshape([rows, N])

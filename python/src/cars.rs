@@ -44,6 +44,7 @@ enum Autoreset {
 ///
 /// Car i of n drives the episodes i, i + n, i + 2n, … of its seed; episode k is trial k // (lots * directions).
 #[pyclass(module = "lotpilot._native")]
+#[expect(clippy::struct_field_names, reason = "it holds cars")]
 pub(crate) struct Cars {
     course: Course,
     cars: Vec<Car>,
@@ -52,6 +53,9 @@ pub(crate) struct Cars {
     reward: Reward,
     threads: Threads,
 }
+
+/// A car, its action, where it writes what it sees now, and where what it saw last before a new episode.
+type Stepped<'c, 's> = (((&'c mut Car, [f32; ACTION]), Seen<'s>), Option<Seen<'s>>);
 
 /// Who steps the cars.
 enum Threads {
@@ -320,7 +324,7 @@ impl Cars {
 
         let Self { course, cars, kind, autoreset, reward, threads } = self;
         let (kind, autoreset, reward) = (*kind, *autoreset, *reward);
-        let step = |(((car, action), mut seen), last): (((&mut Car, [f32; ACTION]), Seen<'_>), Option<Seen<'_>>)| {
+        let step = |(((car, action), mut seen), last): Stepped<'_, '_>| {
             let mut outcome = Outcome::default();
             if car.is_driving() {
                 outcome = car.step(kind, action, &reward, course);

@@ -27,6 +27,7 @@ use storage::sums;
 /// Which trials; what is `None` is as in the settings.
 #[derive(Debug, FromPyObject)]
 #[pyo3(from_item_all)]
+#[expect(clippy::struct_field_names, reason = "`trials` is the name in Python")]
 pub(crate) struct Trials {
     lots: Option<Vec<String>>,
     trials: Option<u32>,
@@ -131,15 +132,20 @@ impl Asked {
         let layers = Layers::from(settings);
         let config = layers.file.clone();
         let settings = settings_of(&drivers, layers, trials)?;
-        let loaded = drivers.into_iter().map(|(name, driver)| match driver {
-            Named::Spec(spec) => {
-                let spec: DriverSpec = spec.parse()?;
-                spec.ensure_whole()?;
-                Ok(spec.load(&settings)?.renamed(&name))
+        let loaded = drivers.into_iter().map(|(name, driver)| {
+            if let Some(letter) = drivers::never_in_a_name(&name) {
+                bail!("driver {name:?} contains {letter:?}, and tables hold its name; choose another");
             }
-            Named::Function(function) => {
-                let driver = NamedDriver::callback(&name, Arc::new(Function { function, failure: failure.clone() }));
-                Ok(driver.smoothed(settings.evaluation.smoothing))
+            match driver {
+                Named::Spec(spec) => {
+                    let spec: DriverSpec = spec.parse()?;
+                    spec.ensure_whole()?;
+                    Ok(spec.load(&settings)?.renamed(&name))
+                }
+                Named::Function(function) => {
+                    let function = Arc::new(Function { function, failure: failure.clone() });
+                    Ok(NamedDriver::callback(&name, function).smoothed(settings.evaluation.smoothing))
+                }
             }
         });
         let mut drivers = loaded.collect::<anyhow::Result<Vec<NamedDriver>>>()?;

@@ -69,10 +69,10 @@ pub(crate) fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> PyResult<T> 
     py.detach(|| caught(work))
 }
 
-/// Works without threads.
+/// Works; a panic becomes an error.
 ///
 /// # Errors
-/// Those of the work, and a panic, which is a bug of lotpilot.
+/// Those of the work; a panic, which is a bug of lotpilot.
 pub(crate) fn caught<T>(work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(bug(&*panic)))
 }

@@ -10,11 +10,13 @@
 //! | [`lot`] | a lot with the obstacles of a trial, for looking at |
 //! | [`evaluate`], [`callback`] | evaluations, with functions in Python as drivers, and their files |
 //! | [`data`] | rounds of training data |
-//! | [`rate`] | how fast the same episodes are in Rust alone |
-//! | [`digest`] | SHA-256 of a drive |
+//! | [`rate`] | how fast the same episodes are in Rust alone, and the digest of a drive |
 //! | [`guard`] | no panic leaves this library |
 //!
 //! Every episode here is driven by [`sim::episode::Episode`], tick by tick, as everywhere in lotpilot.
+
+#![allow(clippy::needless_pass_by_value, reason = "PyO3 hands arguments over by value")]
+#![allow(clippy::redundant_closure_for_method_calls, reason = "a method of `Python<'py>` is of one lifetime")]
 
 mod arrays;
 mod callback;

@@ -239,8 +239,26 @@ def test_a_seed_out_of_range_is_a_value_error_everywhere(seed):
     with pytest.raises(ValueError, match=r"seed: .* is not a whole number"):
         gymnasium.make("lotpilot/Lot-v0", **SHORT).unwrapped.reset(seed=seed)
     envs = LotVectorEnv(2, **SHORT)
-    with pytest.raises(ValueError, match=r"seed: .* is not a whole number"):
-        envs.reset(seed=[1, seed])
-    if isinstance(seed, int):
+    for given in ([1, seed], seed, np.array([1, seed])):
         with pytest.raises(ValueError, match=r"seed: .* is not a whole number"):
-            envs.reset(seed=seed)
+            envs.reset(seed=given)
+
+
+@pytest.mark.parametrize(
+    ("seed", "expected"),
+    [
+        (np.int64(5), [5, 5]),
+        (np.array(5), [5, 5]),
+        (np.array([5, 7], np.uint32), [5, 7]),
+        ((np.int64(5), None), [5, 1]),
+        (range(5, 7), [5, 6]),
+    ],
+)
+def test_seeds_may_be_numbers_of_numpy(seed, expected):
+    envs = LotVectorEnv(2, **SHORT)
+    envs.reset(seed=1)
+    envs.reset(seed=seed)
+    assert [envs.core.place(index)["seed"] for index in range(2)] == expected
+    if isinstance(seed, np.integer):
+        env = gymnasium.make("lotpilot/Lot-v0", **SHORT).unwrapped
+        assert env.reset(seed=seed)[1]["seed"] == seed and env.np_random_seed == seed

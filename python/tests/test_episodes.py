@@ -431,6 +431,7 @@ def rust_loop(threads):
         (lambda: lotpilot.evaluate("expert", "lot-b", methods={"mine": ["a", "b", "c"]}), ValueError, "no driver is named"),
         (lambda: lotpilot.evaluate("expert", "lot-b", methods={"mine": "expert"}), ValueError, "at least 3 drivers"),
         (lambda: lotpilot.evaluate({"odd": 3}, "lot-b"), TypeError, "neither a name nor a function"),
+        (lambda: lotpilot.evaluate({"a|b": "expert"}, "lot-b"), ValueError, r"contains '\|', and tables hold its name"),
         (lambda: lotpilot.load_round("no/such/run"), ValueError, "no such run"),
         (lambda: lotpilot.Dataset("no/such/run"), ValueError, "no round"),
         (lambda: EnvOptions(reward={"speed": 1.0}).weights(), ValueError, "there are progress"),

@@ -1,6 +1,6 @@
 //! What drivers did on lots unlike those they were trained on, one row per kind of lot.
 
-use crate::markdown::with_header;
+use crate::markdown::{escaped, with_header};
 use comfy_table::Table;
 use evaluation::format::quoted_rate;
 use evaluation::judge::DriverEstimate;
@@ -81,7 +81,7 @@ fn table(rows: &[Row], drivers: &[&str]) -> Table {
     let mut table = with_header(header);
     for of_lots in rows.chunks(drivers.len()) {
         let mark = if of_lots[0].trained_on { " (trained on)" } else { "" };
-        let mut cells = vec![format!("{}{mark}", of_lots[0].lots), format!("{:.0} m", of_lots[0].route_m)];
+        let mut cells = vec![format!("{}{mark}", escaped(&of_lots[0].lots)), format!("{:.0} m", of_lots[0].route_m)];
         cells.extend(of_lots.iter().map(|row| {
             let least = row.least_clearance_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2}"));
             format!("{} ({}; {least})", row.near_collisions, row.contacts)

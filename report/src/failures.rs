@@ -24,6 +24,8 @@ pub fn write(run: &RunDir) -> anyhow::Result<()> {
     records::each_line(&run.path().join(records::FAILURES), |failure: FailureRecord| {
         let FailureRecord { header, tick, route_m, x_m, y_m, speed_mps, replay, .. } = &failure;
         let (way, cause) = (header.direction.name(), failure.cause.name());
+        // Even of code, a bar would end the cell.
+        let replay = replay.replace('|', "\\|");
         let _ = writeln!(
             text,
             "| {} | {} | {way} | {} | {} | {tick} | {route_m:.1} | {x_m:.2} | {y_m:.2} | {speed_mps:.2} | {cause} | \

@@ -35,11 +35,7 @@ pub fn fit(text: &str, width: usize) -> String {
 
 /// A table without its empty columns, with cells of several lines.
 fn fit_table(rows: &[&str], width: usize) -> Vec<String> {
-    let cells = |row: &&str| -> Vec<String> {
-        let row = row.strip_prefix('|').unwrap_or(row);
-        row.strip_suffix('|').unwrap_or(row).split('|').map(|cell| cell.trim().to_owned()).collect()
-    };
-    let mut rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
+    let mut rows: Vec<Vec<String>> = rows.iter().map(|row| cells(row)).collect();
     // The second row of Markdown is the rule below the header.
     rows.remove(1);
     let columns = rows.iter().map(Vec::len).min().unwrap_or(0);
@@ -71,6 +67,15 @@ fn fit_table(rows: &[&str], width: usize) -> Vec<String> {
         }
     }
     lines
+}
+
+/// The cells of a row; what is [`escaped`] in one ends none.
+fn cells(row: &str) -> Vec<String> {
+    let row = row.strip_prefix('|').unwrap_or(row);
+    let row = row.strip_suffix('|').unwrap_or(row);
+    let mut before = ' ';
+    let ends_cell = |letter| std::mem::replace(&mut before, letter) != '\\' && letter == '|';
+    row.split(ends_cell).map(|cell| cell.trim().to_owned()).collect()
 }
 
 /// The cells of a column without the first folders of paths, as in `run:…/mine/bc`; cells that differ still do.
@@ -187,8 +192,8 @@ pub fn escaped(text: &str) -> String {
         let is_special = match letter {
             '\\' | '`' | '*' | '[' | ']' | '<' | '|' | '~' | '&' | '!' | '@' => true,
             '_' => !(is_inner(before) && is_inner(rest.peek().copied())),
-            // What some renderers make links of by themselves.
-            ':' => rest.peek() == Some(&'/'),
+            // What some renderers make links of by themselves; a driver's path has one slash.
+            ':' => rest.clone().take(2).eq(['/', '/']),
             '.' => out.to_lowercase().ends_with("www"),
             _ => false,
         };
@@ -228,6 +233,19 @@ here.";
         let broken = fit("| header |\n|--------|\n| run:runs/a-long-name |", 13);
         assert_eq!(broken, "| header    |\n|-----------|\n| run:runs/ |\n| a-long-   |\n| name      |");
         assert_eq!(fit("more (than one line has room for) of it", 20), "more (than one line\nhas room for) of it");
+    }
+
+    /// Figures of a driver whose path has a bar stood under other headings.
+    #[test]
+    fn a_bar_in_a_name_moves_no_other_cell() {
+        let mut table = table_of(&["driver", "rate"]);
+        table.add_row([escaped("run:a|b"), "0.12".to_owned()]);
+        let expected = "\
+| driver | rate |
+|--------|------|
+| run:   | 0.12 |
+| a\\|b   |      |";
+        assert_eq!(fit(&table.to_string(), 15), expected);
     }
 
     /// `trained:default` was broken behind its `d`, and `reversals` before its last letter, where the pieces had room.
@@ -270,6 +288,7 @@ here.";
             "https://x.y/z",
             "www.x.y",
             "a|b",
+            "a \"b\"",
             "a\\|b",
             "![seen](z.png)",
             "&lt;b&gt;",
@@ -284,6 +303,8 @@ here.";
             assert!(html.contains(&text) && html.contains(&table), "{name}: {html}");
             assert!(!html.contains("<a ") && !html.contains("<img"), "{name}: {html}");
         }
-        assert_eq!(escaped("run:runs/my_lot-2.toml"), "run:runs/my_lot-2.toml", "plain names stay readable");
+        for plain in ["run:runs/my_lot-2.toml", "run:/work/runs/a", "DAgger, α = 0"] {
+            assert_eq!(escaped(plain), plain, "plain names stay readable");
+        }
     }
 }

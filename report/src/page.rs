@@ -80,7 +80,8 @@ impl Player {
         let mut frames = String::new();
         for (index, (label, elements)) in self.frames.iter().enumerate() {
             let display = if index == self.still { "" } else { " display=\"none\"" };
-            let _ = write!(frames, "<g class=\"frame\" data-label=\"{}\"{display}>\n{elements}</g>\n", escaped(label));
+            let _ =
+                write!(frames, "<g class=\"frame\" data-label=\"{}\"{display}>\n{elements}</g>\n", attribute(label));
         }
         format!(
             "<div class=\"player\" data-period-ms=\"{:.0}\">{}<div class=\"controls\" hidden>\
@@ -294,7 +295,7 @@ fn html_of(markdown: &str) -> String {
         Event::Start(Tag::TableCell) => {
             let label = columns.get(column).map_or("", String::as_str);
             column += 1;
-            vec![Event::Html(format!("<td data-label=\"{}\">", escaped(label)).into())]
+            vec![Event::Html(format!("<td data-label=\"{}\">", attribute(label)).into())]
         }
         Event::End(TagEnd::TableCell) if !in_head => vec![Event::Html(CowStr::Borrowed("</td>"))],
         Event::Text(ref text) => {
@@ -335,6 +336,11 @@ fn escaped(text: &str) -> String {
     let mut out = String::new();
     html::push_html(&mut out, std::iter::once(Event::Text(text.into())));
     out
+}
+
+/// Text as the value of an attribute, between double quotes.
+fn attribute(text: &str) -> String {
+    escaped(text).replace('"', "&quot;")
 }
 
 /// Button and slider of every player.
@@ -471,6 +477,19 @@ mod tests {
             "{html}"
         );
         assert!(html.contains("prefers-color-scheme: dark"), "{html}");
+    }
+
+    /// A lot called `" onmouseover="…` was a heading, and wrote attributes of its own.
+    #[test]
+    fn a_quotation_mark_in_a_heading_ends_no_attribute() {
+        let mut page = Page::new("x");
+        page.text("| driver | b\" id=\"c |\n|---|---|\n| expert | 1 |");
+        let mut playing = player();
+        playing.frames[0].0 = "0.0 s\" id=\"c".to_owned();
+        page.figure("moment", "A moment.", Image::Player(playing));
+        let html = page.to_html();
+        assert!(html.contains("<td data-label=\"b&quot; id=&quot;c\">1</td>"), "{html}");
+        assert!(html.contains("data-label=\"0.0 s&quot; id=&quot;c\""), "{html}");
     }
 
     fn player() -> Player {

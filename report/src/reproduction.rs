@@ -4,7 +4,7 @@ use crate::controls;
 use crate::deviations;
 use crate::docs_page::{self, MadeBy};
 use crate::drive::{rows_of, with_drives};
-use crate::markdown::table_of;
+use crate::markdown::{escaped, table_of, with_header};
 use crate::other_run::OtherRun;
 use crate::page::{Image, Page};
 use crate::plots::{self, Bar, BarGroup, EtaSeries, RateRow};
@@ -431,9 +431,8 @@ fn by_lot(
     paper: &dyn Fn(usize, &Slice) -> String,
 ) -> String {
     let slices = &judged.slices;
-    let labels = slices.iter().map(|(slice, _)| slice.label.as_str());
-    let header: Vec<&str> = std::iter::once("driver").chain(labels).collect();
-    let mut table = table_of(&header);
+    let labels = slices.iter().map(|(slice, _)| escaped(&slice.label));
+    let mut table = with_header(std::iter::once("driver".to_owned()).chain(labels).collect());
     for (driver, entry) in judged.driven.plan.drivers.iter().enumerate() {
         let name = &entry.name;
         let cells = slices.iter().map(|(slice, estimates)| cell(&judged.totals(driver, slice), &estimates[driver]));
@@ -634,7 +633,7 @@ fn weight_and_cloning(driven: &DrivenPlan<'_>) -> String {
             let near_collisions = of_team.map_or(of_one, |estimate| Some(estimate.difference_per_100m));
             table.add_row([
                 format!("{name} − {DAGGER}"),
-                slice.label.clone(),
+                escaped(&slice.label),
                 difference(near_collisions, 2),
                 difference(found.difference_safe_ratio, 3),
             ]);

@@ -1,6 +1,6 @@
 //! Tables of an evaluation as Markdown, which is readable in a terminal, too.
 
-use crate::markdown::{table_of, with_header};
+use crate::markdown::{escaped, table_of, with_header};
 use crate::trainings::{self, HEADER};
 use comfy_table::Table;
 use evaluation::format::{clustered, difference, exact_rate, p_value, quoted_contacts, quoted_rate, rate_ratio};
@@ -71,12 +71,12 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
         );
         let _ = write!(text, "How they drove, noise {noise}\n\n{}\n\n", driving_table(summary, level, rows));
         if summary.plan.drivers.len() > 1 {
-            let with = summary.driver(summary.plan.compare_with);
+            let with = escaped(summary.driver(summary.plan.compare_with));
             let table = comparison_table(summary, level, rows);
             let _ = write!(text, "Compared with {with} (others − {with}), noise {noise}\n\n{table}\n\n");
         }
         if !summary.teams.is_empty() {
-            let with = &summary.team_compared_with().name;
+            let with = escaped(&summary.team_compared_with().name);
             let table = trainings_table(summary, level, rows);
             let is_judged = table.row_count() > 0;
             let table = if is_judged { table.to_string() } else { TOO_FEW.to_owned() };
@@ -149,8 +149,8 @@ fn rates_table(summary: &Summary<'_>, level: usize, rows: Rows, has_paper: bool)
         let [forward, reverse] = Direction::BOTH.map(way);
         let estimate = &judged.estimates[driver];
         table.add_row([
-            summary.driver(driver).to_owned(),
-            judged.slice.label.clone(),
+            escaped(summary.driver(driver)),
+            escaped(&judged.slice.label),
             format!("{:.0} m", totals.reference_m),
             format!("{} ({forward}, {reverse})", totals.near_collisions),
             quoted_rate(&totals, estimate),
@@ -181,8 +181,8 @@ fn safe_ratio_table(summary: &Summary<'_>, level: usize, rows: Rows, has_paper: 
         let interval = judged.estimates[driver].safe_ratio;
         let interval = interval.map_or_else(String::new, |i| format!(" [{:.3}, {:.3}]", i.lower, i.upper));
         table.add_row([
-            summary.driver(driver).to_owned(),
-            judged.slice.label.clone(),
+            escaped(summary.driver(driver)),
+            escaped(&judged.slice.label),
             totals.runs.to_string(),
             format!("{:.3}{interval}", totals.safe_ratio()),
             unweighted(summary, level, driver, &judged.slice, 1, 3),
@@ -226,8 +226,8 @@ fn driving_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
     ]);
     for (driver, judged, totals) in shown(summary, level, rows) {
         table.add_row([
-            summary.driver(driver).to_owned(),
-            judged.slice.label.clone(),
+            escaped(summary.driver(driver)),
+            escaped(&judged.slice.label),
             quoted_contacts(&totals, &judged.estimates[driver]),
             totals.stuck.to_string(),
             totals.timed_out.to_string(),
@@ -254,8 +254,8 @@ fn comparison_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Table {
                     .all(|&driver| clustered(&judged.estimates[driver]).is_none());
                 let exact = |text: String| if is_exact { text } else { "–".to_owned() };
                 table.add_row([
-                    summary.driver(driver).to_owned(),
-                    judged.slice.label.clone(),
+                    escaped(summary.driver(driver)),
+                    escaped(&judged.slice.label),
                     difference(comparison.difference_per_100m, 2),
                     exact(rate_ratio(ratio)),
                     exact(p_value(ratio.p_value)),
@@ -289,7 +289,7 @@ fn causes_table(summary: &Summary<'_>, level: usize, rows: Rows) -> Option<Table
     for (driver, judged, totals) in shown(summary, level, rows).filter(|(.., totals)| totals.near_collisions > 0) {
         let count = |cause| summary.results.count_of_cause(level, driver, &judged.slice, cause);
         let share = |cause| format!("{:.0} %", 100.0 * f64::from(count(cause)) / f64::from(totals.near_collisions));
-        let mut row = vec![summary.driver(driver).to_owned(), judged.slice.label.clone()];
+        let mut row = vec![escaped(summary.driver(driver)), escaped(&judged.slice.label)];
         row.extend(Cause::ALL.map(|cause| format!("{} ({})", count(cause), share(cause))));
         let again = summary.results.count_of_again(level, driver, &judged.slice);
         let places = f64::from(totals.near_collisions.saturating_sub(again));
@@ -314,7 +314,7 @@ fn sweep_table(summary: &Summary<'_>, rows: Rows) -> Table {
                     |judged| format!("{}; {}", quoted_rate(&totals, &judged.estimates[driver]), totals.contacts),
                 )
             };
-            let mut row = vec![summary.driver(driver).to_owned(), slice.label.clone()];
+            let mut row = vec![escaped(summary.driver(driver)), escaped(&slice.label)];
             row.extend((0..summary.levels().len()).map(rate));
             table.add_row(row);
         }

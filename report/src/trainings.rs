@@ -1,7 +1,7 @@
 //! Several trainings of one method: the result of each, and the mean over them.
 
 use crate::drive::rows_of;
-use crate::markdown::table_of;
+use crate::markdown::{escaped, table_of};
 use comfy_table::Table;
 use evaluation::conclusions::DrivenPlan;
 use evaluation::format::{interval, quoted_rate};
@@ -33,9 +33,9 @@ pub(crate) const HEADER: [&str; 8] = [
 pub(crate) fn row(team: &Team, lots: &str, each: &[Totals], estimate: &TeamEstimate, is_other: bool) -> [String; 8] {
     let Interval { estimate: difference, lower, upper, .. } = estimate.difference_per_100m;
     [
-        team.name.clone(),
+        escaped(&team.name),
         team.drivers.len().to_string(),
-        lots.to_owned(),
+        escaped(lots),
         list(each, |totals| totals.near_collisions),
         interval(estimate.per_100m, 3),
         if is_other { format!("{difference:+.3} [{lower:+.3}, {upper:+.3}]") } else { "–".to_owned() },

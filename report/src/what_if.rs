@@ -1,6 +1,6 @@
 //! What would have avoided the near-collisions of an evaluation, as a table.
 
-use crate::markdown::with_header;
+use crate::markdown::{escaped, with_header};
 use comfy_table::Table;
 use evaluation::avoidable::Row;
 use experiment::lots::ALL;
@@ -23,7 +23,7 @@ pub fn table(rows: &[Row]) -> Table {
         let near_collisions = sum(replaced[0], |row| row.near_collisions);
         let passed = replaced.iter().map(|replaced| sum(replaced, |row| row.passed));
         let counts = std::iter::once(near_collisions).chain(passed).map(|count| count.to_string());
-        let names = [driver, noise].into_iter().take(who.len()).chain([lots]).map(str::to_owned);
+        let names = [driver, noise].into_iter().take(who.len()).chain([lots]).map(escaped);
         table.add_row(names.chain(counts));
     };
     for &(driver, noise) in &drivers {

@@ -54,7 +54,11 @@ fn create_own(partial: &Path) -> io::Result<File> {
             }
             Err(error) => return Err(error),
         };
-        lock(&file)?;
+        if let Err(error) = lock(&file) {
+            // Nobody else can lock it, to find it left by a dead process and delete it.
+            let _ = fs::remove_file(partial);
+            return Err(error);
+        }
         // Before the lock, others take it for what a dead process left.
         if is_at(&file, partial)? {
             return Ok(file);
@@ -90,9 +94,16 @@ fn make_way(partial: &Path) -> io::Result<()> {
 /// Waits for a lock, where the file system has any.
 fn lock(file: &File) -> io::Result<()> {
     match file.lock() {
-        Err(error) if error.kind() != ErrorKind::Unsupported => Err(error),
+        Err(error) if !is_lack_of_locks(&error) => Err(error),
         _ => Ok(()),
     }
+}
+
+/// Whether the file system has no locks.
+fn is_lack_of_locks(error: &io::Error) -> bool {
+    /// "No locks available": what Linux says of NFS without its service of locks.
+    const ENOLCK: i32 = 37;
+    error.kind() == ErrorKind::Unsupported || cfg!(target_os = "linux") && error.raw_os_error() == Some(ENOLCK)
 }
 
 /// Whether an open file is the one at a path still.
@@ -213,6 +224,15 @@ mod tests {
         write(&path, b"second").unwrap();
         assert_eq!((fs::read(&diary).unwrap(), fs::read(&path).unwrap()), (b"dear".to_vec(), b"second".to_vec()));
         fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// No file could be written on NFS without locks, and one that nobody could delete was left.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_volume_without_locks_is_told_from_a_disk_that_fails() {
+        let is_lack = |code| is_lack_of_locks(&io::Error::from_raw_os_error(code));
+        let [enolck, enosys, eio] = [37, 38, 5];
+        assert!(is_lack(enolck) && is_lack(enosys) && !is_lack(eio));
     }
 
     #[test]

@@ -71,9 +71,11 @@ impl Workplace {
     /// version, and would differ.
     ///
     /// # Errors
-    /// If something cannot be compiled, copied or written.
+    /// If the folder is there already, or something cannot be compiled, copied or written.
     pub fn new(program: &Path, folder: &Path) -> anyhow::Result<Self> {
-        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        // What lies there was prepared by another program.
+        let remedy = || format!("{}: cannot be made; if an earlier torture left it, delete it", folder.display());
+        fs::create_dir(folder).with_context(remedy)?;
         let (folder, library) = (folder.to_owned(), Library::compile(folder)?);
         let copy = folder.join("program");
         fs::copy(program, &copy).with_context(|| program.display().to_string())?;
@@ -261,4 +263,19 @@ fn copy(from: &Path, to: &Path) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What an earlier program had prepared was tested, where a process has the number of one before it.
+    #[test]
+    fn no_data_of_an_earlier_program_are_tested() {
+        let folder = std::env::temp_dir().join(format!("torture-test-{}", std::process::id()));
+        fs::create_dir(&folder).unwrap();
+        let refusal = Workplace::new(Path::new("/nowhere"), &folder).unwrap_err().to_string();
+        assert!(refusal.contains("if an earlier torture left it, delete it"), "{refusal}");
+        fs::remove_dir(folder).unwrap();
+    }
 }

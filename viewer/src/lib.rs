@@ -10,6 +10,7 @@
 //! | [`drive`], [`lot`], [`sensors`], [`training`] | what is shown of each |
 //! | [`layout`], [`legend`], [`colours`] | the first view |
 //! | [`recording`], [`blueprint`], [`shapes`], [`picture`] | Rerun |
+#![allow(clippy::disallowed_methods, reason = "angles are for looking at here; what is driven is computed by `sim`")]
 
 mod blueprint;
 mod colours;

@@ -9,6 +9,7 @@ use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use storage::whole::PARTIAL;
 
 /// The version of the viewer that opens these recordings.
 pub const RERUN_VERSION: &str = "0.36.3";
@@ -62,9 +63,31 @@ struct Partial {
 }
 
 impl Partial {
+    /// The process is part of its name: of two that make the same recording at once, each makes it whole.
     fn of(whole: PathBuf) -> Self {
-        Self { partial: whole.with_added_extension(storage::whole::PARTIAL), whole }
+        Self { partial: whole.with_added_extension(format!("{}.{PARTIAL}", std::process::id())), whole }
     }
+
+    /// Deletes what processes that were killed left of the same recording, where the system says who lives (Linux).
+    fn delete_left(&self) {
+        let name = self.whole.file_name().unwrap_or_default().to_string_lossy();
+        let (start, ending) = (format!("{name}."), format!(".{PARTIAL}"));
+        let processes = Path::new("/proc");
+        if !processes.join("self").exists() {
+            return;
+        }
+        for entry in std::fs::read_dir(folder_of(&self.whole)).into_iter().flatten().flatten() {
+            let file = entry.file_name().to_string_lossy().into_owned();
+            let process = file.strip_prefix(&start).and_then(|rest| rest.strip_suffix(&ending));
+            if process.is_some_and(|id| id.parse::<u32>().is_ok() && !processes.join(id).exists()) {
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+    }
+}
+
+fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 impl Drop for Partial {
@@ -177,12 +200,13 @@ fn application(header: &Header) -> anyhow::Result<ApplicationId> {
 }
 
 fn save(builder: RecordingStreamBuilder, path: PathBuf) -> anyhow::Result<(RecordingStream, Option<Partial>)> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(&path);
     std::fs::create_dir_all(folder)
         .with_context(|| format!("{}: cannot be created; choose a file with --out", folder.display()))?;
     let batches =
         ChunkBatcherConfig { flush_tick: Duration::MAX, flush_num_bytes: BATCH_BYTES, ..ChunkBatcherConfig::DEFAULT };
     let file = Partial::of(path);
+    file.delete_left();
     // Never through a link that somebody put there.
     if std::fs::symlink_metadata(&file.partial).is_ok() {
         std::fs::remove_file(&file.partial).with_context(|| file.partial.display().to_string())?;
@@ -223,13 +247,33 @@ mod tests {
         std::fs::remove_dir_all(folder).unwrap();
     }
 
+    /// Two viewers wrote into one file, and the first that was done gave it its name.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_recording_is_written_into_a_file_of_its_process_and_those_of_the_dead_go() {
+        let folder = std::env::temp_dir().join(format!("lotpilot-processes-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = folder.join("a.rrd");
+        let of_process = |id: u32| folder.join(format!("a.rrd.{id}.{PARTIAL}"));
+        let (living, dead) = (of_process(1), of_process(u32::MAX));
+        for other in [&living, &dead] {
+            std::fs::write(other, "").unwrap();
+        }
+        let recording = Recording::begin(&Sink::File(file.clone()), "a", &crate::tests::header(None)).unwrap();
+        assert!(of_process(std::process::id()).is_file());
+        recording.end().unwrap();
+        assert!(living.is_file() && !dead.exists() && file.is_file());
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
     #[test]
     fn the_viewer_that_is_named_is_the_one_that_opens_these_recordings() {
         let package = include_str!("../Cargo.toml");
         assert!(package.contains(&format!("rerun = {{ version = \"={RERUN_VERSION}\"")), "{package}");
         let help = include_str!("../../xtask/src/commands/visualise.rs");
-        let readme = include_str!("../../README.md");
-        let named: Vec<&str> = [help, readme].iter().flat_map(|text| text.split("rerun-sdk==").skip(1)).collect();
-        assert!(!named.is_empty() && named.iter().all(|version| version.starts_with(RERUN_VERSION)), "{named:?}");
+        for text in [help, include_str!("../../docs/recordings.md")] {
+            let named: Vec<&str> = text.split("rerun-sdk==").skip(1).collect();
+            assert!(!named.is_empty() && named.iter().all(|version| version.starts_with(RERUN_VERSION)), "{named:?}");
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
+use experiment::drivers;
 use experiment::run_dir::Place;
 use experiment::settings::{Layers, NoiseChoice};
 use scenarios::SpecError;
@@ -11,18 +12,20 @@ use std::path::{Component, Path, PathBuf};
 /// What `--noise sweep` stands for, in multiples of the level `paper`: clean to hard.
 const SWEEP: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
 
+/// Above [`LayerArgs`] in `--help`. Not for all that follow them there, as `next_help_heading` is.
+const HEADING: &str = "Settings";
+
 /// Where settings come from, lowest priority first: preset, file, `--set`, then the flags of the command.
 #[derive(Debug, Clone, Default, Args)]
-#[command(next_help_heading = "Settings")]
 pub(crate) struct LayerArgs {
     /// Named set of settings to start from [default: default].
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = HEADING)]
     preset: Option<String>,
     /// TOML file with the settings to change; the rest stays as in the preset.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = HEADING)]
     config: Option<PathBuf>,
     /// Changes one setting, e.g. `dagger.eta=0.8`; may be repeated. `cargo xtask settings --explain KEY` explains it.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
+    #[arg(long = "set", value_name = "KEY=VALUE", help_heading = HEADING)]
     overrides: Vec<String>,
 }
 
@@ -56,19 +59,27 @@ pub(crate) fn lot_name(name: &str) -> Result<String, SpecError> {
 /// However a run is named that is resumed, the same keys are written.
 pub(crate) fn run_folder() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| {
-        if path.to_str().is_none() {
+        let path = from_here(&path).map_err(|error| error.to_string())?;
+        let Some(name) = path.to_str() else {
             return Err("replay keys name it, so its name is UTF-8; choose another".to_owned());
+        };
+        match drivers::never_in_a_name(name) {
+            Some(letter) => Err(format!("tables name it, so its name is without {letter:?}; choose another")),
+            None => Ok(path),
         }
-        // Links stay as they are named, except for those that `..` would leave by another way.
-        let leads_up = path.components().any(|part| part == Component::ParentDir);
-        let full = if leads_up { storage::place_of(&path) } else { std::path::absolute(&path) };
-        let full = full.map_err(|error| error.to_string())?;
-        // A folder that was deleted meanwhile is below no other.
-        let Ok(here) = std::env::current_dir() else { return Ok(full) };
-        let here = if leads_up { storage::place_of(&here).unwrap_or(here) } else { here };
-        let short: PathBuf = full.strip_prefix(here).unwrap_or(&full).components().collect();
-        Ok(if short.as_os_str().is_empty() { ".".into() } else { short })
     })
+}
+
+/// A path relative to the present folder where it leads below that, else the whole path.
+fn from_here(path: &Path) -> std::io::Result<PathBuf> {
+    // Links stay as they are named, except for those that `..` would leave by another way.
+    let leads_up = path.components().any(|part| part == Component::ParentDir);
+    let full = if leads_up { storage::place_of(path) } else { std::path::absolute(path) }?;
+    // A folder that was deleted meanwhile is below no other.
+    let Ok(here) = std::env::current_dir() else { return Ok(full) };
+    let here = if leads_up { storage::place_of(&here).unwrap_or(here) } else { here };
+    let short: PathBuf = full.strip_prefix(here).unwrap_or(&full).components().collect();
+    Ok(if short.as_os_str().is_empty() { ".".into() } else { short })
 }
 
 /// Where a run goes.

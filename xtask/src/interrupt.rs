@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 /// Exit status after a signal, whichever: 128 + SIGINT, as shells have it.
 pub(crate) const EXIT: u8 = 130;
 /// What work has to stop by itself.
-const GRACE: Duration = Duration::from_millis(600);
+pub(crate) const GRACE: Duration = Duration::from_millis(600);
 /// What saying so may take.
 const LAST_WORDS: Duration = Duration::from_millis(200);
 /// Between two looks at the flag.

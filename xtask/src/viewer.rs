@@ -15,8 +15,9 @@ use std::time::Duration;
 const EXIT_INTERRUPTED: i32 = interrupt::EXIT as i32;
 /// Between two looks at whether it has ended.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
-/// Looks that it is given after Ctrl-C to end what it writes.
-const LOOKS_TO_END: u32 = 12;
+/// Looks that it is given after Ctrl-C to end what it writes: so few that this process is still there to end it then.
+const LOOKS_TO_END: u32 = 8;
+const _: () = assert!(LOOK_EVERY.saturating_mul(LOOKS_TO_END + 1).as_millis() < interrupt::GRACE.as_millis());
 /// Backends of the network that this program has: a run may ask for one.
 const BACKENDS: &[&str] = &[
     #[cfg(feature = "cuda")]

@@ -80,10 +80,18 @@ pub fn specs() -> Vec<(String, String)> {
     own.map(owned).into_iter().chain(planners).chain(of_files.map(owned)).collect()
 }
 
+/// A letter that no driver, and no folder of a run, can have in its name: it would end a cell or a row of the tables.
+pub fn never_in_a_name(name: &str) -> Option<char> {
+    name.chars().find(|&letter| letter == '|' || letter.is_control())
+}
+
 impl FromStr for DriverSpec {
     type Err = anyhow::Error;
 
     fn from_str(text: &str) -> anyhow::Result<Self> {
+        if let Some(letter) = never_in_a_name(text) {
+            bail!("driver {text:?} contains {letter:?}, and tables hold its name; rename the file or folder");
+        }
         let is_planner = |name: &str| PlannerSpec::named(name).is_some();
         let planner = |name: &str, parameters| Ok(Self::Planner { name: name.to_owned(), parameters });
         match text.split_once(':') {
@@ -119,10 +127,14 @@ impl FromStr for DriverSpec {
                     specs().into_iter().map(|(spec, _)| spec).collect()
                 };
                 ensure!(!text.contains(','), "no driver {text:?}; name several with spaces between them");
-                let likeness = |name: &String| strsim::jaro_winkler(&text.to_lowercase(), name);
-                let nearest = known.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
-                let nearest = nearest.filter(|name| likeness(name) > 0.85);
-                let there = nearest.map_or_else(|| "there".to_owned(), |name| format!("did you mean {name}? There"));
+                let lower = text.to_lowercase();
+                let nearest = known
+                    .iter()
+                    .map(|name| (strsim::jaro_winkler(&lower, name), name))
+                    .filter(|(likeness, _)| *likeness > 0.85)
+                    .max_by(|(a, _), (b, _)| a.total_cmp(b));
+                let there =
+                    nearest.map_or_else(|| "there".to_owned(), |(_, name)| format!("did you mean {name}? There"));
                 bail!("no driver {text:?}; {there} are {}", known.join(", "))
             }
         }
@@ -278,6 +290,9 @@ mod tests {
             ("ensemble:run:runs/a,run:./runs/a", "named twice"),
             ("ensemble:", "there are expert, grid-expert, trained:default, run:DIR"),
             ("python:mine", "lotpilot.evaluate"),
+            ("run:runs/a|b", "contains '|', and tables hold its name; rename the file or folder"),
+            ("ensemble:run:runs/a,net:b|c", "contains '|'"),
+            ("dwa:my\ndwa.toml", "contains '\\n'"),
             ("tuned:tentacles", "did you mean tuned:tentacle? There are tuned:tentacle, tuned:vvf"),
         ] {
             let error = wrong.parse::<DriverSpec>().unwrap_err().to_string();

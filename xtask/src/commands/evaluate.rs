@@ -6,7 +6,7 @@ use crate::console::Console;
 use crate::interrupt;
 use crate::output::Output;
 use crate::record::{self, RecordArgs};
-use anyhow::{Context as _, anyhow};
+use anyhow::{Context as _, anyhow, ensure};
 use clap::Args;
 use evaluation::estimate;
 use evaluation::plan::Plan;
@@ -73,7 +73,7 @@ pub(crate) struct EvaluateArgs {
     seed: Option<u64>,
     /// Drives only a share of the trials, for one of several machines (docs/cluster.md); `merge` puts the shares
     /// together.
-    #[arg(long, value_name = "NUMBER/OF", conflicts_with = "record")]
+    #[arg(long, value_name = "NUMBER/OF", conflicts_with_all = ["record", "json"])]
     shard: Option<Shard>,
     #[command(flatten)]
     pub(crate) json: JsonArgs,
@@ -93,6 +93,22 @@ pub(crate) struct EvaluateArgs {
     resume: Option<PathBuf>,
     #[command(flatten)]
     record: RecordArgs,
+}
+
+impl EvaluateArgs {
+    /// Refuses what is of whole evaluations, for one that turns out to be a shard.
+    fn check_shard(&self, shard: Shard) -> anyhow::Result<()> {
+        ensure!(
+            self.record.record.is_none(),
+            "--record: this is shard {shard}, of which nothing is recorded; leave it out, and see drives of the merged evaluation \
+             with cargo xtask visualise"
+        );
+        ensure!(
+            !self.json.json,
+            "--json: this is shard {shard}, which has no tables; leave it out, merge --json prints them"
+        );
+        Ok(())
+    }
 }
 
 /// Which drivers are trainings of one method.
@@ -142,6 +158,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     let (settings, mut asked, begun) = if let Some(path) = &args.resume {
         let (run, settings, manifest) = build_info::resume(path, COMMAND, output)?;
         let asked: Asked = manifest.arguments.clone().try_into().with_context(|| path.display().to_string())?;
+        asked.shard.as_ref().map_or(Ok(()), |record| args.check_shard(record.number))?;
         (settings, asked, Ok((run, manifest)))
     } else {
         let specs = DriverSpec::parse_all(&args.drivers)?;
@@ -230,7 +247,7 @@ pub(crate) fn drive(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> a
 }
 
 /// The tasks of an evaluation with their estimated seconds.
-pub(crate) fn tasks(settings: &Settings, drivers: usize) -> Vec<estimate::Task> {
+fn tasks(settings: &Settings, drivers: usize) -> Vec<estimate::Task> {
     vec![estimate::evaluation(settings, drivers), estimate::report()]
 }
 

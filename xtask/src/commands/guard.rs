@@ -13,7 +13,7 @@ use evaluation::format::exact_rate;
 use evaluation::names::DAGGER;
 use evaluation::totals::Totals;
 use experiment::drivers::DriverSpec;
-use experiment::manifest::Request;
+use experiment::manifest::{self, Request};
 use experiment::progress::Interrupted;
 use experiment::run_dir::RunDir;
 use experiment::settings::{EvaluationSettings, Settings};
@@ -75,9 +75,6 @@ impl RecordedPlace {
 pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     let record: Record = toml::from_str(RECORD).context("guard.toml")?;
     let settings = Settings::preset("default")?;
-    let console = Console::new(output);
-    let driving = record.place.iter().map(|place| estimate::evaluation(&place.settings(&settings), 1));
-    console.plan(estimate::training(&settings, true).into_iter().chain(driving).collect());
     let run = if let Some(path) = &args.resume {
         let (run, begun_with, _) = build_info::resume(path, COMMAND, output)?;
         ensure!(begun_with == settings, "{}: the default settings have changed since; begin again", path.display());
@@ -87,6 +84,14 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     };
     interrupt::can_resume(COMMAND, run.path());
     output.note(format_args!("run: {}", run.path().display()));
+    let console = Console::new(output);
+    let mut tasks = estimate::rest_of_training(&settings, true, run.path());
+    for place in &record.place {
+        if !manifest::is_finished(&run.path().join(&place.name))? {
+            tasks.push(estimate::evaluation(&place.settings(&settings), 1));
+        }
+    }
+    console.plan(tasks);
     let interrupted = || Interrupted { kept: format!("what was done is in {}", run.path().display()) };
     let Ok(outcome) = train::tabulated(&settings, &run, &console, output)? else {
         return Err(interrupted().into());

@@ -7,6 +7,7 @@ use crate::interrupt;
 use crate::output::Output;
 use anyhow::{Context as _, bail, ensure};
 use evaluation::drive_stage::DriveStage;
+use evaluation::estimate::Task;
 use evaluation::on_policy;
 use evaluation::shards::ShardRecord;
 use evaluation::stage::{Stage, Step};
@@ -31,14 +32,7 @@ pub(crate) fn all(
 ) -> anyhow::Result<()> {
     output.note(format_args!("run: {}", run.path().display()));
     interrupt::can_resume(command, run.path());
-    announce(stages, run.path(), output)?;
-    let mut tasks = Vec::new();
-    for stage in stages {
-        if !manifest::is_finished(&run.path().join(&stage.folder))? {
-            tasks.extend(stage.tasks());
-        }
-    }
-    console.plan(tasks);
+    console.plan(announce(stages, run.path(), output)?);
     for (index, stage) in stages.iter().enumerate() {
         let (place, of) = (index + 1, stages.len());
         output.note(format_args!("\n{place} of {of}: {} ({})", stage.about, stage.folder));
@@ -57,19 +51,19 @@ fn cut_short(root: &Path, finished: usize) -> anyhow::Error {
     Interrupted { kept: format!("{finished} finished stages are in {}", root.display()) }.into()
 }
 
-/// What will be done, with a guess at how long it takes.
-fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<()> {
-    let mut left_s = 0.0;
+/// Says what will be done, with a guess at how long it takes; returns the tasks.
+fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<Vec<Task>> {
+    let mut all = Vec::new();
+    let minutes_of = |tasks: &[Task]| tasks.iter().map(|(_, seconds)| seconds / 60.0).sum::<f64>();
     output.note("stages, with the minutes they take on two quiet cores:");
     for (index, stage) in stages.iter().enumerate() {
-        let is_finished = manifest::is_finished(&root.join(&stage.folder))?;
-        let estimate_s = if is_finished { 0.0 } else { stage.estimate_s() };
-        left_s += estimate_s;
-        let minutes = if is_finished { "done".to_owned() } else { format!("{:.1}", estimate_s / 60.0) };
+        let tasks = stage.tasks_left(root)?;
+        let minutes = if tasks.is_empty() { "done".to_owned() } else { format!("{:.1}", minutes_of(&tasks)) };
         output.note(format_args!("{:>3}. {minutes:>6}  {} ({})", index + 1, stage.about, stage.folder));
+        all.extend(tasks);
     }
-    output.note(format_args!("about {:.0} minutes in all", (left_s / 60.0).ceil()));
-    Ok(())
+    output.note(format_args!("about {:.0} minutes in all", minutes_of(&all).ceil()));
+    Ok(all)
 }
 
 /// Does a stage unless it is done; `false` if cut short by Ctrl-C.

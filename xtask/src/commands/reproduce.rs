@@ -73,7 +73,7 @@ pub(crate) struct ReproduceArgs {
     /// that run.
     #[arg(
         long,
-        value_name = "RUN",
+        value_name = "RUN", value_parser = run_folder(),
         requires = "shard",
         conflicts_with_all = ["preset", "config", "overrides", "seed", "full", "seeds", "unseen", "tables", "tuned"]
     )]
@@ -161,6 +161,7 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
     let layers = Layers::from(&args.layers);
     let mut settings = Settings::resolve(&layers, args.seed)?;
     stages::check(&settings)?;
+    settings.check_rollouts()?;
     let is_smoke = layers.preset_name() == "smoke";
     if args.full {
         settings.evaluation.trials *= 2;
@@ -208,26 +209,24 @@ fn begin(args: &ReproduceArgs, output: &Output) -> anyhow::Result<(RunDir, Setti
 
 /// Begins a share of what the networks of a run drive.
 fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir, Settings, Arguments)> {
-    // Without a slash at its end: drivers are named after it.
-    let networks: PathBuf = networks.components().collect();
     let name = networks.display();
-    ensure!(sums::exists(&networks)?, "--networks {name}: this is not a run; cargo xtask reproduce makes one");
-    let manifest = Manifest::read(&networks)?;
-    let (settings, preset) = (trained::settings_of(&networks)?, manifest.preset.clone());
+    ensure!(sums::exists(networks)?, "--networks {name}: this is not a run; cargo xtask reproduce makes one");
+    let manifest = Manifest::read(networks)?;
+    let (settings, preset) = (trained::settings_of(networks)?, manifest.preset.clone());
     ensure!(manifest.command == COMMAND, "--networks {name}: this is a run of {}", manifest.command);
-    let Arguments { extent, shard } = Arguments::read(&networks, manifest.clone())?;
+    let Arguments { extent, shard } = Arguments::read(networks, manifest.clone())?;
     ensure!(
         shard.is_none(),
         "--networks {name}: this is a shard; put all of them together first with cargo xtask merge RUN..."
     );
-    ensure!(!manifest::is_finished(&networks)?, "--networks {name}: this run is finished; nothing is left to drive");
-    let stages = stages::all(&settings, &extent, &networks)?;
+    ensure!(!manifest::is_finished(networks)?, "--networks {name}: this run is finished; nothing is left to drive");
+    let stages = stages::all(&settings, &extent, networks)?;
     for stage in stages.iter().filter(|stage| matches!(stage.step, Step::Train { .. })) {
         ensure!(
             manifest::is_finished(&networks.join(&stage.folder))?,
             "--networks {name}: {} is not trained yet; train it with --shard and merge, or with --resume {}",
             stage.folder,
-            quoted_path(&networks)
+            quoted_path(networks)
         );
     }
     ensure!(
@@ -238,8 +237,8 @@ fn begin_drives(args: &ReproduceArgs, networks: &Path) -> anyhow::Result<(RunDir
     manifest.check_inputs(&inputs(&settings, &extent)?)?;
     let inputs = inputs_of_drives(&settings, &extent, &stages)?;
     let mut reads = places(&settings, &extent)?;
-    reads.push(networks.clone());
-    let shard = args.shard.map(|number| ShardRecord::of_stages(number, Some(networks), &settings, stages));
+    reads.push(networks.to_owned());
+    let shard = args.shard.map(|number| ShardRecord::of_stages(number, Some(networks.to_owned()), &settings, stages));
     create(args, &preset, settings, Arguments { extent, shard }, (inputs, reads))
 }
 
@@ -338,4 +337,29 @@ fn tuned(folder: Option<&Path>) -> anyhow::Result<Vec<String>> {
     ensure!(!specs.is_empty(), "--tuned {}: holds no parameters; cargo xtask tune writes them", folder.display());
     DriverSpec::parse_all(&specs)?;
     Ok(specs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Debug, Parser)]
+    struct Alone {
+        #[command(flatten)]
+        args: ReproduceArgs,
+    }
+
+    /// Shards of `--networks full` and of `--networks ./full` were not of one whole.
+    #[test]
+    fn a_run_whose_networks_drive_has_one_name() {
+        let networks = |name: &str| {
+            let words = ["reproduce", "--shard", "1/2", "--networks", name];
+            Alone::try_parse_from(words).unwrap().args.networks.unwrap()
+        };
+        let whole = std::env::current_dir().unwrap().join("full");
+        for name in ["full", "./full", "full/", &whole.display().to_string()] {
+            assert_eq!(networks(name).to_str(), Some("full"), "{name}");
+        }
+    }
 }

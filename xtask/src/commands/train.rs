@@ -29,6 +29,7 @@ use policy::dagger::Stop;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use storage::sums;
 
 pub(crate) const DAGGER_EXAMPLES: &str = "\
 Examples:
@@ -115,12 +116,14 @@ fn train(args: &TrainArgs, command: &str, output: &Output, adjust: impl FnOnce(&
     output.note(format_args!("run: {}", run.path().display()));
 
     let console = Console::new(output);
-    let mut tasks = estimate::training(&settings, true);
+    let mut tasks = estimate::rest_of_training(&settings, true, run.path());
     if !asked.no_eval {
         // The expert, the behaviour-cloned policy and the final one.
         let drivers = if settings.dagger.iterations_max > 0 { 3 } else { 2 };
-        tasks.extend(evaluate::tasks(&settings, drivers));
-        tasks.push(estimate::evaluation(&elsewhere(&settings), drivers));
+        if !sums::is_listed(run.path(), records::RUNS)? {
+            tasks.push(estimate::evaluation(&settings, drivers));
+        }
+        tasks.extend([estimate::evaluation(&elsewhere(&settings), drivers), estimate::report()]);
     }
     console.plan(tasks);
     let outcome = tabulated(&settings, &run, &console, output)?.map_err(|rounds| cut_short(run.path(), rounds))?;

@@ -46,7 +46,7 @@ pub(crate) struct VisualiseArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Recording")]
 struct SinkArgs {
-    /// File to write [default: recordings/NAME.rrd].
+    /// File to write [default: recordings/NAME.rrd]. Near-collisions are a file each, in RUN/recordings.
     #[arg(long, global = true, value_name = "FILE.rrd", conflicts_with_all = ["spawn", "connect"])]
     out: Option<PathBuf>,
     /// Shows it in a viewer of this machine instead, started if none runs.
