@@ -1,14 +1,12 @@
 //! A file with settings.
 #![no_main]
 
-use experiment::settings::{Layers, Settings};
+use experiment::settings::Settings;
 use libfuzzer_sys::fuzz_target;
+use std::path::Path;
 
-fuzz_target!(|text: &[u8]| {
-    let read = |text: &[u8]| {
-        let file = Some(fuzz::write("settings.toml", text));
-        Settings::resolve(&Layers { file, ..Layers::default() }, None)
-    };
+fuzz_target!(|text: &str| {
+    let read = |text: &str| Settings::resolve_text(text, Path::new("settings.toml"));
     let Ok(settings) = read(text) else { return };
-    assert_eq!(read(settings.to_toml().as_bytes()).expect("what is written is read"), settings);
+    assert_eq!(read(&settings.to_toml()).expect("what is written is read"), settings);
 });

@@ -9,7 +9,7 @@ use sim::sensing::{GRID_CELLS, OccupancyGrid};
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use storage::{FileError, read, sums};
 
 const EXPORT: &str = "write it again, as docs/formats.md shows under \"Networks of others: ONNX\"";
@@ -21,6 +21,9 @@ const BATCH: usize = 1;
 
 /// Cells of a grid.
 const CELLS: usize = GRID_CELLS * GRID_CELLS;
+
+/// Where networks answer when they are read: one thread for all of them.
+static POOL: LazyLock<Arc<ThreadPool>> = LazyLock::new(|| Arc::new(ThreadPool::with_num_threads(1)));
 
 /// A network that is checked and answers.
 #[derive(Clone)]
@@ -124,21 +127,24 @@ impl OnnxNetwork {
         let about = model.metadata().get(about::KEY).map(About::parse).transpose();
         let about = about.map_err(|error| format!("has metadata {:?} that cannot be read: {error}", about::KEY))?;
         let mut network = Self { model: Arc::new(model), input, output, batch, answer: Answer::Point, about, sha256 };
-        let pool = Arc::new(ThreadPool::with_num_threads(1));
-        let (numbers, _) = network.run(&[&OccupancyGrid::free()], &pool)?;
+        let (numbers, _) = network.run(&[&OccupancyGrid::free()], &POOL)?;
         network.answer = Answer::of(numbers).ok_or_else(|| {
             format!(
                 "answers {numbers} numbers per grid, not (u, w), or (u, w, raw_u, raw_w), or these four for each of 2 to \
                  {MODES_MAX} modes and then their logits"
             )
         })?;
-        network.check_independence(&pool)?;
+        network.check_independence(&POOL)?;
         Ok(network)
     }
 
     /// Refuses a network whose answer to a grid depends on the other grids of its batch, or on its place there: which cars
     /// share a batch, and in which order, depends on the number of threads.
     fn check_independence(&self, pool: &Arc<ThreadPool>) -> Result<(), String> {
+        // Alone, a grid has nothing to be mixed with.
+        if self.batch == 1 {
+            return Ok(());
+        }
         let (free, mut striped) = (OccupancyGrid::free(), OccupancyGrid::free());
         (0..GRID_CELLS).step_by(2).for_each(|row| striped.occupy_row(row, u32::MAX >> (32 - GRID_CELLS)));
         let answers_beside = |others: &OccupancyGrid| {

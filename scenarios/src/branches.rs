@@ -270,6 +270,10 @@ impl GroundFromRoute {
         let room_m = 0.5 * vehicle.width_m + ROOM_M;
         while let Some(Open { estimate: from_route_m, node }) = open.pop() {
             let cell = node as usize;
+            // Nothing is asked of what lies farther away than where branches end; the cells just beyond must be final.
+            if from_route_m > FAR_M + 2.0 * CELL_M {
+                break;
+            }
             if from_route_m > ground.cells[cell].from_route_m {
                 continue;
             }

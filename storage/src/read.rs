@@ -9,6 +9,11 @@ use std::path::Path;
 /// # Errors
 /// If it cannot be opened, is a device, a pipe or a folder, or is larger.
 pub fn open(path: &Path, bytes_max: u64) -> io::Result<File> {
+    open_with_length(path, bytes_max).map(|(file, _)| file)
+}
+
+/// [`open`], and how many bytes the system says that the file has.
+fn open_with_length(path: &Path, bytes_max: u64) -> io::Result<(File, u64)> {
     // Asked first: to open a pipe is to wait for whoever writes into it.
     let about = std::fs::metadata(path)?;
     if about.is_dir() {
@@ -20,7 +25,7 @@ pub fn open(path: &Path, bytes_max: u64) -> io::Result<File> {
     if about.len() > bytes_max {
         return Err(too_large(about.len(), bytes_max));
     }
-    File::open(path)
+    Ok((File::open(path)?, about.len()))
 }
 
 /// Whether a file is in a folder or in one below, links followed: a file that comes from elsewhere must not make this program
@@ -37,9 +42,11 @@ pub fn is_below(folder: &Path, file: &Path) -> io::Result<bool> {
 /// # Errors
 /// See [`open`]; or if it cannot be read.
 pub fn bytes(path: &Path, bytes_max: u64) -> io::Result<Vec<u8>> {
+    let (file, length) = open_with_length(path, bytes_max)?;
     let mut content = Vec::new();
+    content.try_reserve_exact(usize::try_from(length).map_err(io::Error::other)?)?;
     // A file can grow, and some of the system's say that they are empty.
-    let read = open(path, bytes_max)?.take(bytes_max.saturating_add(1)).read_to_end(&mut content)? as u64;
+    let read = file.take(bytes_max.saturating_add(1)).read_to_end(&mut content)? as u64;
     if read > bytes_max { Err(too_large(read, bytes_max)) } else { Ok(content) }
 }
 

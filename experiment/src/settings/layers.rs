@@ -51,9 +51,21 @@ impl Settings {
         if let Some(seed) = seed {
             settings.seed = RootSeed(seed);
         }
-        settings.name_lots_one_by_one();
-        settings.check()?;
-        Ok(settings)
+        settings.checked()
+    }
+
+    /// The default with the changes of a file that has this text. `path` is what errors call it.
+    ///
+    /// # Errors
+    /// Naming what is wrong, and its line.
+    pub fn resolve_text(text: &str, path: &Path) -> anyhow::Result<Self> {
+        lay(&Self::preset("default")?, Some((path, text)), &[])?.checked()
+    }
+
+    fn checked(mut self) -> anyhow::Result<Self> {
+        self.name_lots_one_by_one();
+        self.check()?;
+        Ok(self)
     }
 
     /// `"a,b"` as `"a", "b"`: what a network was trained on is known by single names.
@@ -78,22 +90,36 @@ impl Settings {
 
 /// Lays a file and then single overrides over a base.
 pub(super) fn apply(base: &Settings, file: Option<&Path>, overrides: &[String]) -> anyhow::Result<Settings> {
+    let read = |path: &Path| {
+        storage::sums::read_text(path, SETTINGS_BYTES_MAX)
+            .with_context(|| format!("{}: cannot be read; name a TOML file with settings", path.display()))
+    };
+    let text = file.map(read).transpose()?;
+    lay(base, file.zip(text.as_deref()), overrides)
+}
+
+/// Lays the text of a file, which has this path, and then single overrides over a base. What is not TOML is refused before
+/// anything is laid over anything.
+fn lay(base: &Settings, file: Option<(&Path, &str)>, overrides: &[String]) -> anyhow::Result<Settings> {
+    let file = file.map(|(path, text)| Ok::<_, anyhow::Error>((path, text, parse(path, text)?))).transpose()?;
+    let overrides: Vec<_> =
+        overrides.iter().map(|text| Ok((text, parse_override(text)?))).collect::<anyhow::Result<_>>()?;
     let mut tree = Table::try_from(base).expect("settings are plain values");
-    if let Some(path) = file {
-        let text = storage::sums::read_text(path, SETTINGS_BYTES_MAX)
-            .with_context(|| format!("{}: cannot be read; name a TOML file with settings", path.display()))?;
-        let of_file = parse(path, &text)?;
+    let mut settings = None;
+    if let Some((path, text, of_file)) = file {
         merge(&mut tree, of_file.clone());
-        settings_from(&tree).map_err(|fault| fault.in_file(path, &text))?;
+        settings = Some(settings_from(&tree).map_err(|fault| fault.in_file(path, text))?);
         reference::check(&of_file, "").with_context(|| path.display().to_string())?;
     }
-    for text in overrides {
-        let (key, value) = parse_override(text)?;
-        let text = shortened(text);
+    for (text, (key, value)) in overrides {
         merge(&mut tree, nested(&key, value));
-        settings_from(&tree).map_err(|Fault { key, problem }| anyhow!("--set {text}: {key}: {problem}"))?;
+        let fault = |Fault { key, problem }| anyhow!("--set {}: {key}: {problem}", shortened(text));
+        settings = Some(settings_from(&tree).map_err(fault)?);
     }
-    settings_from(&tree).map_err(|Fault { key, problem }| anyhow!("{key}: {problem}"))
+    match settings {
+        Some(settings) => Ok(settings),
+        None => settings_from(&tree).map_err(|Fault { key, problem }| anyhow!("{key}: {problem}")),
+    }
 }
 
 fn parse(path: &Path, text: &str) -> anyhow::Result<Table> {

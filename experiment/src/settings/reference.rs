@@ -6,9 +6,10 @@ use super::renamed;
 use super::schema::Settings;
 use anyhow::{bail, ensure};
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};
 use std::str::FromStr;
-use std::sync::OnceLock;
+use std::sync::{LazyLock, OnceLock};
 use toml::{Table, Value};
 
 /// One setting.
@@ -142,7 +143,9 @@ pub fn entries() -> &'static [Entry] {
 
 /// The setting of this key.
 pub fn entry(key: &str) -> Option<&'static Entry> {
-    entries().iter().find(|entry| entry.key == key)
+    static BY_KEY: LazyLock<BTreeMap<&str, &Entry>> =
+        LazyLock::new(|| entries().iter().map(|entry| (entry.key.as_str(), entry)).collect());
+    BY_KEY.get(key).copied()
 }
 
 /// Refuses numbers out of range, wherever in the settings they are.
