@@ -272,7 +272,7 @@ fn settings_that_are_refused() {
         ("expert.first_step_m=0.25", "expert.first_step_m = 0.25 does not divide 0.6 m"),
         ("expert.second_step_m=5", "expert.second_step_m = 5 along expert.curvature_max_per_m = 0.215 turns by"),
         ("expert={ first_step_m = 0.6, second_curvature_max_per_m = 0.9 }", "turns by 0.54 rad"),
-        ("episode.noise={ intensity = 50, blob = 3 }", "times episode.noise.blob = 3 is 150; at most 100 is possible"),
+        ("episode.noise={ intensity = 50, blob = 3 }", "times episode.noise.blob = 3, times 1 for the strongest"),
         ("episode={ sensing = { geometry = { side_m = 2 } }, metrics = { safe_range_m = 8.5 } }", "in whose pixels"),
         ("expert.elastic_band.trust_from_m=0.5", "trust_from_m = 0.5 is not less than trust_to_m = 0.4"),
         ("expert.elastic_band.bend_to_rad=0.6", "bend_from_rad = 0.6 is not less than bend_to_rad = 0.6"),

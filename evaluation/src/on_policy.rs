@@ -234,14 +234,12 @@ pub fn run(
     Ok(true)
 }
 
-/// What policies met at the wheel; each drives once, if its samples are asked for first.
+/// What policies met at the wheel. Only what they saw is not kept: whoever is asked for that again drives again.
 struct Drives<'a> {
     settings: &'a Settings,
     lots: &'a [Lot],
     /// Σ τ̂ per second of every policy that drove, by its folder.
     tau_hats_per_s: BTreeMap<PathBuf, f64>,
-    /// What those saw whose samples were asked for.
-    samples: BTreeMap<PathBuf, Vec<Sample>>,
     progress: &'a dyn Progress,
     /// Policies that drive at most, and pairs of trainings that are compared without driving: they take about as long.
     at_most: u32,
@@ -251,8 +249,8 @@ struct Drives<'a> {
 impl<'a> Drives<'a> {
     fn new(settings: &'a Settings, lots: &'a [Lot], policies: u32, others: u32, progress: &'a dyn Progress) -> Self {
         progress.begin("on-policy rollouts", "on-policy rollouts");
-        let (tau_hats_per_s, samples) = (BTreeMap::new(), BTreeMap::new());
-        Self { settings, lots, tau_hats_per_s, samples, progress, at_most: policies + others, others_begun: 0 }
+        let tau_hats_per_s = BTreeMap::new();
+        Self { settings, lots, tau_hats_per_s, progress, at_most: policies + others, others_begun: 0 }
     }
 
     /// Says what is done next; `false` if cancelled.
@@ -269,16 +267,12 @@ impl<'a> Drives<'a> {
         goes_on
     }
 
-    /// What the policy in a folder saw, labelled, which is kept; `None` if cancelled.
-    fn samples(&mut self, folder: &Path) -> anyhow::Result<Option<&[Sample]>> {
+    /// What the policy in a folder saw, labelled; `None` if cancelled.
+    fn samples(&mut self, folder: &Path) -> anyhow::Result<Option<Vec<Sample>>> {
         if !self.says(&folder.display().to_string()) {
             return Ok(None);
         }
-        if !self.samples.contains_key(folder) {
-            let samples = self.drive(folder)?;
-            self.samples.insert(folder.to_owned(), samples);
-        }
-        Ok(self.samples.get(folder).map(Vec::as_slice))
+        self.drive(folder).map(Some)
     }
 
     /// Σ τ̂ per second that the policy in a folder drove; `None` if cancelled.

@@ -172,6 +172,8 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
             ValueError: If the options are those of a single car.
         """
         refuse_option(options, "episode", "episodes")
+        if isinstance(seed, np.ndarray):
+            seed = seed.tolist()
         seeds = _seeds(seed, self.num_envs)
         super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
         mask = (options or {}).get("reset_mask")
@@ -232,8 +234,6 @@ def _seeds(seed: Any, count: int) -> list[int | None] | None:
     Raises:
         ValueError: If one is no whole number or out of range.
     """
-    if isinstance(seed, np.ndarray):
-        seed = seed.tolist()
     if seed is None:
         return None
     seeds = list(seed) if isinstance(seed, Sequence) else [seed] * count

@@ -487,13 +487,15 @@ fn first_crossing(polygon: &[Vec2]) -> Option<(usize, usize)> {
 }
 
 /// The direction along which the edges of a polygon are shortest, all in all: along another one the teeth of a comb would all
-/// overlap. Of Σ e eᵀ over its edges e the eigenvector of the smaller eigenvalue.
+/// overlap. Of Σ e eᵀ/|e| over its edges e the eigenvector of the smaller eigenvalue: by their squares a few long sides would
+/// outweigh thousands of short teeth.
 fn axis_across(polygon: &[Vec2]) -> DVec2 {
     let (mut difference, mut product) = (0.0, 0.0);
     for (a, b) in edges(polygon) {
         let edge = b.as_dvec2() - a.as_dvec2();
-        difference += 0.5 * (edge.x * edge.x - edge.y * edge.y);
-        product += edge.x * edge.y;
+        let length = edge.length().max(f64::MIN_POSITIVE);
+        difference += 0.5 * (edge.x * edge.x - edge.y * edge.y) / length;
+        product += edge.x * edge.y / length;
     }
     let root = (difference * difference + product * product).sqrt();
     // Of the two rows that say the same, the one with less cancellation.
@@ -742,6 +744,15 @@ mod tests {
             assert_eq!(first_crossing(&tangled), expected, "turned by {eighth} eighths");
             assert!(expected.is_some());
         }
+    }
+
+    #[test]
+    fn a_few_long_sides_outweigh_no_thousands_of_short_teeth() {
+        let tooth = |i: u16| [(500.0 - 0.25 * f32::from(i), 102.0), (499.9 - 0.25 * f32::from(i), 100.0)];
+        let sides = [(0.0, 0.0), (500.0, 0.0), (500.0, 100.0)].into_iter();
+        let lot: Vec<Vec2> = sides.chain((1..1990).flat_map(tooth)).chain([(0.0, 100.0)]).map(Vec2::from).collect();
+        assert!(axis_across(&lot).x.abs() > 0.9, "{}", axis_across(&lot));
+        assert_eq!(first_crossing(&lot), None);
     }
 
     fn wall(centre: Pose, length_m: f32) -> Obstacle {

@@ -7,6 +7,7 @@ use experiment::view_request::Sink;
 use rerun::log::{ChunkBatcherConfig, PendingRow};
 use rerun::{ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder, Scalars, SpawnOptions};
 use std::cell::{Cell, RefCell};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use storage::whole::PARTIAL;
@@ -60,30 +61,41 @@ pub(crate) struct Recording {
 struct Partial {
     whole: PathBuf,
     partial: PathBuf,
+    /// Whose lock says that somebody is at it; none before it is there, and where the file system has no locks.
+    _lock: Option<File>,
 }
 
 impl Partial {
     /// The process is part of its name: of two that make the same recording at once, each makes it whole.
     fn of(whole: PathBuf) -> Self {
-        Self { partial: whole.with_added_extension(format!("{}.{PARTIAL}", std::process::id())), whole }
+        let partial = whole.with_added_extension(format!("{}.{PARTIAL}", std::process::id()));
+        Self { whole, partial, _lock: None }
     }
 
-    /// Deletes what processes that were killed left of the same recording, where the system says who lives (Linux).
+    /// Deletes what processes that were killed left of the same recording.
     fn delete_left(&self) {
         let name = self.whole.file_name().unwrap_or_default().to_string_lossy();
         let (start, ending) = (format!("{name}."), format!(".{PARTIAL}"));
-        let processes = Path::new("/proc");
-        if !processes.join("self").exists() {
-            return;
-        }
         for entry in std::fs::read_dir(folder_of(&self.whole)).into_iter().flatten().flatten() {
             let file = entry.file_name().to_string_lossy().into_owned();
             let process = file.strip_prefix(&start).and_then(|rest| rest.strip_suffix(&ending));
-            if process.is_some_and(|id| id.parse::<u32>().is_ok() && !processes.join(id).exists()) {
+            if process.is_some_and(|id| id.parse::<u32>().is_ok()) && locked(&entry.path()).is_some() {
                 let _ = std::fs::remove_file(entry.path());
             }
         }
     }
+
+    /// Says that somebody is at it.
+    fn lock(&mut self) {
+        self._lock = locked(&self.partial);
+    }
+}
+
+/// A file that nobody else is at, locked; none where that cannot be told.
+fn locked(file: &Path) -> Option<File> {
+    let is_file = std::fs::symlink_metadata(file).ok()?.is_file();
+    let opened = File::options().write(true).open(file).ok().filter(|_| is_file)?;
+    opened.try_lock().ok().map(|()| opened)
 }
 
 fn folder_of(file: &Path) -> &Path {
@@ -205,7 +217,7 @@ fn save(builder: RecordingStreamBuilder, path: PathBuf) -> anyhow::Result<(Recor
         .with_context(|| format!("{}: cannot be created; choose a file with --out", folder.display()))?;
     let batches =
         ChunkBatcherConfig { flush_tick: Duration::MAX, flush_num_bytes: BATCH_BYTES, ..ChunkBatcherConfig::DEFAULT };
-    let file = Partial::of(path);
+    let mut file = Partial::of(path);
     file.delete_left();
     // Never through a link that somebody put there.
     if std::fs::symlink_metadata(&file.partial).is_ok() {
@@ -213,6 +225,7 @@ fn save(builder: RecordingStreamBuilder, path: PathBuf) -> anyhow::Result<(Recor
     }
     let stream =
         builder.batcher_config(batches).save(&file.partial).with_context(|| file.whole.display().to_string())?;
+    file.lock();
     Ok((stream, Some(file)))
 }
 
@@ -248,7 +261,6 @@ mod tests {
     }
 
     /// Two viewers wrote into one file, and the first that was done gave it its name.
-    #[cfg(target_os = "linux")]
     #[test]
     fn a_recording_is_written_into_a_file_of_its_process_and_those_of_the_dead_go() {
         let folder = std::env::temp_dir().join(format!("lotpilot-processes-{}", std::process::id()));
@@ -259,10 +271,12 @@ mod tests {
         for other in [&living, &dead] {
             std::fs::write(other, "").unwrap();
         }
+        let held = locked(&living).unwrap();
         let recording = Recording::begin(&Sink::File(file.clone()), "a", &crate::tests::header(None)).unwrap();
         assert!(of_process(std::process::id()).is_file());
         recording.end().unwrap();
         assert!(living.is_file() && !dead.exists() && file.is_file());
+        drop(held);
         std::fs::remove_dir_all(folder).unwrap();
     }
 

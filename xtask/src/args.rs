@@ -61,10 +61,12 @@ pub(crate) fn run_folder() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| {
         let path = from_here(&path).map_err(|error| error.to_string())?;
         let Some(name) = path.to_str() else {
-            return Err("replay keys name it, so its name is UTF-8; choose another".to_owned());
+            return Err("replay keys name it, so its name is UTF-8; rename it, or choose another".to_owned());
         };
         match drivers::never_in_a_name(name) {
-            Some(letter) => Err(format!("tables name it, so its name is without {letter:?}; choose another")),
+            Some(letter) => {
+                Err(format!("tables name it, so its name is without {letter:?}; rename it, or choose another"))
+            }
             None => Ok(path),
         }
     })

@@ -6,10 +6,11 @@ use anyhow::{Context as _, bail, ensure};
 use policy::fit::{Budget, ScheduleShape};
 use scenarios::LotSpec;
 use sim::limits::{DRIVES_AT_ONCE_MAX, NOISE_LEVELS_MAX, RUNS_MAX};
+use sim::scenario::NoiseLevel;
 use sim::sensing::noise::NoiseSettings;
 
-/// Largest strength of a layer of noise times that of all: shadows and blobs are held in memory.
-const NOISE_MAX: f32 = 100.0;
+/// Largest strength of a layer of noise at the strongest level that is asked for: shadows and blobs are held in memory.
+const STRENGTH_MAX: f32 = 100.0;
 /// Largest range of the safe ratio, in sides of the patch: it is measured in pixels of the patch.
 const SAFE_RANGE_SIDES_MAX: f32 = 4.0;
 
@@ -90,6 +91,9 @@ impl Settings {
         );
         let NoiseSettings { intensity, boundary, shadow, speed_bump, false_free, blob, stain, flicker, dropout } =
             &self.episode.noise;
+        // A lot asks for `hard` at most.
+        let levels = self.evaluation.noise.iter().chain([&self.training.noise]);
+        let strongest = levels.map(|level| level.intensity(NoiseLevel::Hard)).fold(1.0, f32::max);
         for (key, layer) in [
             ("boundary", boundary),
             ("shadow", shadow),
@@ -100,11 +104,11 @@ impl Settings {
             ("flicker", flicker),
             ("dropout", dropout),
         ] {
-            let strength = intensity * layer;
+            let strength = intensity * layer * strongest;
             ensure!(
-                strength <= NOISE_MAX,
-                "episode.noise.intensity = {intensity} times episode.noise.{key} = {layer} is {strength}; at most \
-                 {NOISE_MAX} is possible"
+                strength <= STRENGTH_MAX,
+                "episode.noise.intensity = {intensity} times episode.noise.{key} = {layer}, times {strongest} for the \
+                 strongest of training.noise and evaluation.noise, is {strength}; at most {STRENGTH_MAX} is possible"
             );
         }
         let (range_m, side_m) = (self.episode.metrics.safe_range_m, self.episode.sensing.geometry.side_m);

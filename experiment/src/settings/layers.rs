@@ -54,7 +54,8 @@ impl Settings {
         settings.checked()
     }
 
-    /// The default with the changes of a file that has this text. `path` is what errors call it.
+    /// The default with the changes of a file that has this text: for fuzz targets, which have no file. `path` is what errors
+    /// call it.
     ///
     /// # Errors
     /// Naming what is wrong, and its line.

@@ -58,7 +58,8 @@ fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<Ve
     output.note("stages, with the minutes they take on two quiet cores:");
     for (index, stage) in stages.iter().enumerate() {
         let tasks = stage.tasks_left(root)?;
-        let minutes = if tasks.is_empty() { "done".to_owned() } else { format!("{:.1}", minutes_of(&tasks)) };
+        let is_done = manifest::is_finished(&root.join(&stage.folder))?;
+        let minutes = if is_done { "done".to_owned() } else { format!("{:.1}", minutes_of(&tasks)) };
         output.note(format_args!("{:>3}. {minutes:>6}  {} ({})", index + 1, stage.about, stage.folder));
         all.extend(tasks);
     }
