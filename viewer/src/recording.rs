@@ -60,16 +60,16 @@ pub(crate) struct Recording {
 /// A file under another name until it is whole. What is not, is deleted.
 struct Partial {
     whole: PathBuf,
-    partial: PathBuf,
+    written: PathBuf,
     /// Whose lock says that somebody is at it; none before it is there, and where the file system has no locks.
-    _lock: Option<File>,
+    lock: Option<File>,
 }
 
 impl Partial {
     /// The process is part of its name: of two that make the same recording at once, each makes it whole.
     fn of(whole: PathBuf) -> Self {
-        let partial = whole.with_added_extension(format!("{}.{PARTIAL}", std::process::id()));
-        Self { whole, partial, _lock: None }
+        let written = whole.with_added_extension(format!("{}.{PARTIAL}", std::process::id()));
+        Self { whole, written, lock: None }
     }
 
     /// Deletes what processes that were killed left of the same recording.
@@ -87,7 +87,7 @@ impl Partial {
 
     /// Says that somebody is at it.
     fn lock(&mut self) {
-        self._lock = locked(&self.partial);
+        self.lock = locked(&self.written);
     }
 }
 
@@ -105,7 +105,7 @@ fn folder_of(file: &Path) -> &Path {
 impl Drop for Partial {
     fn drop(&mut self) {
         // Of a whole one nothing is there any more; of another, the error that ended it is what is said.
-        let _ = std::fs::remove_file(&self.partial);
+        let _ = std::fs::remove_file(&self.written);
     }
 }
 
@@ -195,7 +195,7 @@ impl Recording {
             .with_context(|| format!("{place}: cannot be written; is the disk full, or the viewer gone?"))?;
         self.stream.disconnect();
         let Some(file) = self.file else { return Ok(None) };
-        std::fs::rename(&file.partial, &file.whole).with_context(|| format!("{place}: cannot be written"))?;
+        std::fs::rename(&file.written, &file.whole).with_context(|| format!("{place}: cannot be written"))?;
         Ok(Some(file.whole.clone()))
     }
 
@@ -220,11 +220,11 @@ fn save(builder: RecordingStreamBuilder, path: PathBuf) -> anyhow::Result<(Recor
     let mut file = Partial::of(path);
     file.delete_left();
     // Never through a link that somebody put there.
-    if std::fs::symlink_metadata(&file.partial).is_ok() {
-        std::fs::remove_file(&file.partial).with_context(|| file.partial.display().to_string())?;
+    if std::fs::symlink_metadata(&file.written).is_ok() {
+        std::fs::remove_file(&file.written).with_context(|| file.written.display().to_string())?;
     }
     let stream =
-        builder.batcher_config(batches).save(&file.partial).with_context(|| file.whole.display().to_string())?;
+        builder.batcher_config(batches).save(&file.written).with_context(|| file.whole.display().to_string())?;
     file.lock();
     Ok((stream, Some(file)))
 }
