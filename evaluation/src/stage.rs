@@ -75,19 +75,19 @@ impl Stage {
         }
     }
 
-    /// The same of what is left of it within its run.
+    /// The same of what is left of it within its run; `None` if it is finished.
     ///
     /// # Errors
     /// If it cannot be told whether it is finished.
-    pub fn tasks_left(&self, run: &Path) -> anyhow::Result<Vec<Task>> {
+    pub fn tasks_left(&self, run: &Path) -> anyhow::Result<Option<Vec<Task>>> {
         let folder = run.join(&self.folder);
         if manifest::is_finished(&folder)? {
-            return Ok(Vec::new());
+            return Ok(None);
         }
         if let Step::Train { cloning_of, .. } = &self.step {
-            return Ok(estimate::rest_of_training(&self.settings, cloning_of.is_none(), &folder));
+            return Ok(Some(estimate::rest_of_training(&self.settings, cloning_of.is_none(), &folder)));
         }
-        Ok(self.tasks())
+        Ok(Some(self.tasks()))
     }
 }
 

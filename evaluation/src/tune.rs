@@ -418,8 +418,7 @@ impl Found {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use experiment::progress::Elapsed;
-    use std::cell::RefCell;
+    use experiment::progress::Shares;
 
     /// `tune --resume` went on with the candidates of any search that somebody had copied there.
     #[test]
@@ -445,23 +444,6 @@ mod tests {
         sealed::write(&path, b"candidate = []").unwrap();
         assert!(CandidateLog::read(path.clone(), own()).is_err());
         std::fs::remove_file(path).unwrap();
-    }
-
-    #[derive(Default)]
-    struct Shares(RefCell<Vec<f64>>);
-
-    impl Progress for Shares {
-        fn begin(&self, _: &'static str, _: &str) {}
-
-        fn at(&self, share: f64, _: &mut dyn FnMut(Elapsed) -> String) {
-            self.0.borrow_mut().push(share);
-        }
-
-        fn end(&self, _: &str) {}
-
-        fn is_cancelled(&self) -> bool {
-            false
-        }
     }
 
     /// Their share was reported after that of nothing, as if they had been driven in no time.

@@ -1,5 +1,7 @@
 //! How long tasks report progress and are cancelled.
 
+use std::cell::RefCell;
+
 /// Receives progress and says whether to continue. Shared between threads: implementations use interior mutability.
 ///
 /// Work is a sequence of tasks, one at a time: `begin`, any number of `at`, `end`. A task that is begun while another
@@ -31,6 +33,24 @@ pub struct Elapsed {
 pub struct Interrupted {
     /// What is on disk and how to continue, in one sentence.
     pub kept: String,
+}
+
+/// Remembers which shares were reported, for tests of what people wait for; is never cancelled.
+#[derive(Debug, Clone, Default)]
+pub struct Shares(pub RefCell<Vec<f64>>);
+
+impl Progress for Shares {
+    fn begin(&self, _: &'static str, _: &str) {}
+
+    fn at(&self, share: f64, _: &mut dyn FnMut(Elapsed) -> String) {
+        self.0.borrow_mut().push(share);
+    }
+
+    fn end(&self, _: &str) {}
+
+    fn is_cancelled(&self) -> bool {
+        false
+    }
 }
 
 /// Reports to nobody and is never cancelled.

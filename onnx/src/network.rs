@@ -134,13 +134,13 @@ impl OnnxNetwork {
                  {MODES_MAX} modes and then their logits"
             )
         })?;
-        network.check_independence(&POOL)?;
+        network.check_independence()?;
         Ok(network)
     }
 
     /// Refuses a network whose answer to a grid depends on the other grids of its batch, or on its place there: which cars
     /// share a batch, and in which order, depends on the number of threads.
-    fn check_independence(&self, pool: &Arc<ThreadPool>) -> Result<(), String> {
+    fn check_independence(&self) -> Result<(), String> {
         // Alone, a grid has nothing to be mixed with.
         if self.batch == 1 {
             return Ok(());
@@ -150,7 +150,7 @@ impl OnnxNetwork {
         let answers_beside = |others: &OccupancyGrid| {
             let grids: Vec<&OccupancyGrid> =
                 std::iter::once(&free).chain(std::iter::repeat_n(others, self.batch - 1)).collect();
-            let (_, values) = self.run(&grids, pool)?;
+            let (_, values) = self.run(&grids, &POOL)?;
             let bits: Vec<u32> = values.into_iter().map(f32::to_bits).collect();
             Ok::<_, String>(bits.chunks_exact(self.answer.numbers()).map(<[u32]>::to_vec).collect::<Vec<_>>())
         };

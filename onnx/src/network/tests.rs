@@ -113,7 +113,7 @@ fn a_network_that_mixes_the_grids_of_a_batch_is_refused() {
     assert_eq!(network.batch, 1, "alone, a grid has nothing to be mixed with");
     // As if the file asked for as many.
     network.batch = 16;
-    let error = network.check_independence(&pool()).unwrap_err();
+    let error = network.check_independence().unwrap_err();
     assert!(error.contains("when others stand beside it in the batch"), "{error}");
 }
 

@@ -222,26 +222,7 @@ fn write(args: &GenerateArgs, trial: &Trial<'_>) -> anyhow::Result<Made> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use experiment::progress::Elapsed;
-    use std::cell::RefCell;
-
-    /// Remembers which shares were reported.
-    #[derive(Default)]
-    struct Shares(RefCell<Vec<f64>>);
-
-    impl Progress for Shares {
-        fn begin(&self, _: &'static str, _: &str) {}
-
-        fn at(&self, share: f64, _: &mut dyn FnMut(Elapsed) -> String) {
-            self.0.borrow_mut().push(share);
-        }
-
-        fn end(&self, _: &str) {}
-
-        fn is_cancelled(&self) -> bool {
-            false
-        }
-    }
+    use experiment::progress::Shares;
 
     /// The first report came with the first lots, which counted as done before the command: a second before its end it
     /// had "about 16 min left".

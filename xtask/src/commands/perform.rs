@@ -57,11 +57,10 @@ fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<Ve
     let minutes_of = |tasks: &[Task]| tasks.iter().map(|(_, seconds)| seconds / 60.0).sum::<f64>();
     output.note("stages, with the minutes they take on two quiet cores:");
     for (index, stage) in stages.iter().enumerate() {
-        let tasks = stage.tasks_left(root)?;
-        let is_done = manifest::is_finished(&root.join(&stage.folder))?;
-        let minutes = if is_done { "done".to_owned() } else { format!("{:.1}", minutes_of(&tasks)) };
+        let left = stage.tasks_left(root)?;
+        let minutes = left.as_ref().map_or_else(|| "done".to_owned(), |tasks| format!("{:.1}", minutes_of(tasks)));
         output.note(format_args!("{:>3}. {minutes:>6}  {} ({})", index + 1, stage.about, stage.folder));
-        all.extend(tasks);
+        all.extend(left.into_iter().flatten());
     }
     output.note(format_args!("about {:.0} minutes in all", minutes_of(&all).ceil()));
     Ok(all)
