@@ -1,4 +1,4 @@
-//! The table of bad inputs. Each gets one error of one line that says what is wrong and what would be right, before
+//! The table of bad inputs. Each gets one error that says what is wrong and what would be right, before
 //! anything is written and without time or memory worth mentioning. Most are given to the functions that read them;
 //! [`whole_commands_refuse_within_their_means_and_leave_nothing`] gives some to commands.
 
@@ -942,7 +942,8 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         let shown: Vec<&str> = arguments.iter().map(|word| &word[..word.len().min(60)]).collect();
         assert_eq!(output.status.code(), Some(2), "{shown:?}: {}\n{stderr}", output.status);
         assert!(stderr.to_lowercase().contains(&expected.to_lowercase()), "{shown:?} lacks {expected:?}:\n{stderr}");
-        assert!(!stderr.contains("panicked") && stderr.len() < ERROR_MAX, "{shown:?}:\n{stderr}");
+        let errors = stderr.lines().filter(|line| line.starts_with("error: ")).count();
+        assert!(errors == 1 && !stderr.contains("panicked") && stderr.len() < ERROR_MAX, "{shown:?}:\n{stderr}");
         let after = content_in(&folder);
         assert!(after.keys().eq(before.keys()), "{shown:?} leaves something: {:?}", after.keys());
         assert!(after == before, "{shown:?} changes a file");

@@ -563,6 +563,29 @@ fn pictures_are_drawn_and_never_replaced_unasked() {
     refuses(&["visualise", "run", &out], &["this is not a run"]);
 }
 
+/// It was replaced as if nothing were there.
+#[cfg(unix)]
+#[test]
+fn a_link_that_leads_nowhere_is_not_replaced_unasked() {
+    let folder = scratch("leads-nowhere");
+    for name in ["lot-b.png", "lot-b-s1.toml", "net.onnx"] {
+        std::os::unix::fs::symlink("nowhere", folder.join(name)).unwrap();
+    }
+    let (out, file) = (folder.display().to_string(), folder.join("net.onnx").display().to_string());
+    refuses(&["render", "lot", "--lots", "lot-b", "--out", &out], &["lot-b.png: exists already", "--overwrite"]);
+    refuses(&["generate", "--lots", "lot-b", "--out", &out], &["lot-b-s1.toml: exists already", "--overwrite"]);
+    refuses(&["export", "onnx", "trained:default", "--out", &file], &["net.onnx: exists already", "--overwrite"]);
+}
+
+/// A picture that was too large left the empty folder that it would have been in.
+#[test]
+fn a_lot_whose_picture_is_refused_leaves_no_folder() {
+    let out = scratch("too-large").join("lots");
+    let name = out.display().to_string();
+    refuses(&["generate", "--lots", "lot-a", "--pixels-per-metre", "1000", "--out", &name], &["pixels are too many"]);
+    assert!(!out.exists());
+}
+
 /// A picture of a map took the place of the map's image; of two lots named after each other each took the other's.
 #[test]
 fn nothing_is_written_over_what_it_is_made_of() {

@@ -1,5 +1,4 @@
-//! The expert on the reference lots, a few of the hundred seeds of the acceptance run (README, results), on example maps and
-//! in hairpins.
+//! The expert on the reference lots with the obstacles of one seed, on example maps and in hairpins.
 
 use expert::{ExpertSettings, ScriptedExpert};
 use scenarios::reference::{ReferenceLot, lot};
@@ -50,7 +49,8 @@ fn the_expert_drives_the_example_maps_without_a_near_collision() {
         files.into_iter().map(|path| (path, &Direction::BOTH[..]))
     };
     let beside = [
-        ("car-park.yaml", &Direction::BOTH[..]),
+        ("slalom.toml", &Direction::BOTH[..]),
+        ("car-park.yaml", &Direction::BOTH),
         ("car-park-loop.lot.toml", &Direction::BOTH),
         ("car-park-centre.lot.toml", &Direction::BOTH),
         ("open-lot.csv", &[Direction::Forward]),
@@ -58,7 +58,8 @@ fn the_expert_drives_the_example_maps_without_a_near_collision() {
     let beside = beside.into_iter().map(|(file, directions)| (examples.join(file), directions));
     // In a bend of R = 8 m the body sweeps 2.63 m: a hand's breadth less than this lane is wide, on either side.
     let lanes = files("lanes", "toml").filter(|(path, _)| !path.ends_with("lane-r8-w2.8.toml"));
-    for (path, directions) in beside.chain(lanes).chain(files("maps", "yaml")) {
+    let maps = ["maps", "maps-blind", "maps-blind-2"].into_iter().flat_map(|folder| files(folder, "yaml"));
+    for (path, directions) in beside.chain(lanes).chain(maps) {
         let scenario = scenarios::load::load(&path, &settings.vehicle).unwrap_or_else(|error| panic!("{error}"));
         for &direction in directions {
             let map = Arc::new(Map::build(direction.of(scenario.clone()), &settings.vehicle).unwrap());

@@ -3,7 +3,7 @@
 //! | module | what it holds true |
 //! |---|---|
 //! | [`bad_inputs`] | the table of bad inputs: one error each, nothing left, little time and memory |
-//! | [`tidy`] | dependency direction, licence files, what the README names exists |
+//! | [`tidy`] | dependency direction, licence files |
 //! | [`commands`] | whole commands run from outside: results, exit codes, errors |
 //! | [`determinism`] | same seed, same bytes, for 1 and 2 threads |
 //! | [`docs`] | what the docs name exists: links, sections, commands, flags, settings, paths |

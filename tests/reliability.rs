@@ -297,6 +297,65 @@ fn a_report_is_not_replaced_by_one_that_can_replay_nothing() {
     assert!(sums::verify(&run).faults.is_empty());
 }
 
+/// A planner whose file had changed drove in the pictures of near-collisions, if it had one at the same tick, and the report was
+/// listed as the run's own.
+#[test]
+fn a_report_shows_no_drive_with_other_parameters() {
+    let folder = scratch("other-parameters");
+    let (run, file) = (folder.join("run"), folder.join("mine.toml"));
+    let parameters = succeed(xtask().args(["drivers", "tentacle"]));
+    std::fs::write(&file, &parameters).unwrap();
+    let evaluate = "evaluate --driver tentacle:mine.toml --lots lot-b --trials 1 --directions forward --out run";
+    succeed(xtask().current_dir(&folder).args(evaluate.split(' ')));
+    let report = || std::fs::read(run.join("report.html")).unwrap();
+    let whole = report();
+    let again = || {
+        let mut command = xtask();
+        command.current_dir(&folder).args(["render", "report", "run"]);
+        command
+    };
+    let others = parameters.replace("speed_mps = 2.2", "speed_mps = 1.9");
+    assert_ne!(others, parameters);
+    std::fs::write(&file, others).unwrap();
+    let error = refuse(&mut again());
+    assert!(error.contains("tentacle:mine.toml: changed since") && error.contains("--overwrite"), "{error}");
+    assert!(report() == whole, "it is as it was");
+    std::fs::write(&file, format!("{parameters}# the same\n")).unwrap();
+    succeed(&mut again());
+    assert!(report() == whole, "and made again");
+}
+
+/// Half of its keys named a folder that was gone, and nothing could be replayed any more.
+#[test]
+fn a_run_that_is_moved_in_the_middle_of_an_evaluation_is_finished_where_it_was_begun() {
+    let folder = scratch("moved-meanwhile");
+    let (run, moved) = (folder.join("run"), folder.join("moved"));
+    let train = "train-bc --preset smoke --set evaluation.trials=40 --set evaluation.elsewhere=[] --out run";
+    let training =
+        xtask().current_dir(&folder).args(train.split(' ')).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    let mut training = Running(training.unwrap());
+    // 32 by the expert, 32 by the network, then eight by each. When the expert's eight come, the network's part is finished.
+    let driven = || std::fs::read_to_string(run.join("runs.jsonl")).unwrap_or_default().lines().count();
+    while driven() <= 64 {
+        assert!(training.0.try_wait().unwrap().is_none(), "it ended before it was moved");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    training.0.kill().unwrap();
+    training.0.wait().unwrap();
+    assert!(!run.join("finished.toml").exists());
+    let resume = |run: &str| {
+        let mut command = xtask();
+        command.current_dir(&folder).args(["train-bc", "--resume", run]);
+        command
+    };
+    std::fs::rename(&run, &moved).unwrap();
+    let error = refuse(&mut resume("moved"));
+    assert!(error.contains("runs.jsonl: was driven by run:run/bc, which is run:moved/bc from here"), "{error}");
+    std::fs::rename(&moved, &run).unwrap();
+    succeed(&mut resume("run"));
+    assert!(sums::verify(&run).faults.is_empty());
+}
+
 /// Keys in files named the run as whoever resumed it did.
 #[test]
 fn a_run_is_resumed_by_whatever_name_to_the_same_bytes() {
@@ -393,6 +452,22 @@ fn signals_end_a_command_with_130_and_lose_nothing() {
         assert!(!run.join("finished.toml").exists(), "{command} after {signal}");
         resume(command, &run);
     }
+}
+
+/// Under nohup a training goes on when its terminal is closed.
+#[cfg(unix)]
+#[test]
+fn a_hang_up_that_is_ignored_from_the_start_stays_ignored() {
+    let run = scratch("nohup").join("run");
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "trap '' HUP; exec \"$@\"", "sh"]).arg(xtask().get_program());
+    shell.args(["train-dagger", "--preset", "smoke", "--no-eval", "--out"]).arg(&run);
+    let mut running = Running(shell.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    assert!(running.wait_for(&run.join("sha256sums")));
+    let sent = Command::new("kill").args(["-s", "HUP", &running.0.id().to_string()]).status().unwrap();
+    assert!(sent.success());
+    assert_eq!(running.0.wait().unwrap().code(), Some(0));
+    assert!(run.join("finished.toml").exists());
 }
 
 /// Whether hang-ups are ignored from the start, by all that this process starts; said on Linux only.

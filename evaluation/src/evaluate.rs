@@ -11,11 +11,12 @@ use crate::plan::Plan;
 use crate::read::Places;
 use crate::records::{self, FailureRecord, RecordHeader, RunRecord, WallTimeRecord};
 use crate::results::EvaluationResults;
-use anyhow::ensure;
+use anyhow::{bail, ensure};
 use experiment::drive::TrialBatch;
 use experiment::drive_digest::DriveDigest;
 use experiment::inputs;
 use experiment::progress::Progress;
+use experiment::replay_key;
 use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
 use experiment::trials::{self, Trial};
@@ -64,6 +65,13 @@ pub fn evaluate(plan: &Plan<'_>, run: &RunDir, progress: &dyn Progress) -> anyho
     }
 }
 
+/// What its driver was called when a run was driven, and what it is called now, if that differs.
+fn renamed(plan: &Plan<'_>, run: &RunRecord) -> Option<[String; 2]> {
+    let then = replay_key::driver_of(&run.replay);
+    let now = plan.drivers.iter().find(|driver| driver.name == run.header.driver)?.spec.to_string();
+    (then != now).then_some([then, now])
+}
+
 /// Runs in the first parts of a plan.
 fn runs_in(plan: &Plan<'_>, parts: usize) -> usize {
     let trials = plan.trials().count();
@@ -90,17 +98,26 @@ struct Driving<'a> {
 impl<'a> Driving<'a> {
     fn open(plan: &'a Plan<'a>, folder: &Path, lines: Growing, progress: &'a dyn Progress) -> anyhow::Result<Self> {
         let mut results = EvaluationResults::new(plan);
-        let (mut done, mut near_collisions) = (0, 0);
+        let (mut done, mut near_collisions, mut moved) = (0, 0, None);
         if lines.parts() > 0 {
             let places = Places::new(plan);
             records::each_line_of(&folder.join(records::RUNS), lines.reader(0)?, |run| {
                 done += 1;
+                moved = moved.take().or_else(|| renamed(plan, &run));
                 results.take_run(&places, &run)
             })?;
             records::each_line_of(&folder.join(records::FAILURES), lines.reader(1)?, |failure| {
                 near_collisions += 1;
                 results.take_failure(&places, &failure)
             })?;
+        }
+        // Replay keys hold where a network lies, and one of two names would be wrong for ever.
+        if let Some([then, now]) = moved {
+            bail!(
+                "{}: was driven by {then}, which is {now} from here: finish the run where it was begun, under the name that it \
+                 had, and move it then",
+                folder.join(records::RUNS).display()
+            );
         }
         ensure!(
             done == runs_in(plan, lines.parts()),

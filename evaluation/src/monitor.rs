@@ -24,6 +24,8 @@ pub struct Before {
     pub progress_m: f32,
     /// How long before, seconds.
     pub before_s: f32,
+    /// How much longer nothing was counted after a resume, seconds.
+    pub refractory_s: f32,
 }
 
 /// A near-collision when it happened.
@@ -63,7 +65,10 @@ enum Resume {
 #[derive(Debug)]
 pub struct IncidentMonitor {
     control_period_s: f32,
+    refractory_s: f32,
     recent: Vec<VecDeque<(VehicleState, f32)>>,
+    /// Per episode, frames since it was last put back, after whatever; `None` before the first time.
+    since_put_back: Vec<Option<usize>>,
     resumes: Vec<Resume>,
     incidents: Vec<Incident>,
 }
@@ -75,7 +80,9 @@ impl IncidentMonitor {
         let kept = ticks(LOOK_BACKS_S[0], control_period_s) + 1;
         Self {
             control_period_s,
+            refractory_s: episode.metrics.refractory_s,
             recent: vec![VecDeque::with_capacity(kept); episodes],
+            since_put_back: vec![None; episodes],
             resumes: vec![Resume::Never; episodes],
             incidents: Vec::new(),
         }
@@ -84,6 +91,7 @@ impl IncidentMonitor {
     /// Adds one frame.
     pub fn frame(&mut self, episode: usize, frame: &Frame) {
         let (recent, resume) = (&mut self.recent[episode], &mut self.resumes[episode]);
+        let since_put_back = &mut self.since_put_back[episode];
         if matches!(resume, Resume::Due) {
             *resume = Resume::At(frame.progress_m);
         }
@@ -91,7 +99,14 @@ impl IncidentMonitor {
             recent.pop_front();
         }
         recent.push_back((frame.vehicle, frame.progress_m));
+        *since_put_back = since_put_back.map(|frames| frames + 1);
         if let Event::NearCollision { at, progress_m } = frame.event {
+            let before = |look_back_s| {
+                let before = before(recent, look_back_s, self.control_period_s);
+                let after_s = |frames: usize| frames as f32 * self.control_period_s - before.before_s;
+                let refractory_s = since_put_back.map_or(0.0, |frames| (self.refractory_s - after_s(frames)).max(0.0));
+                Before { refractory_s, ..before }
+            };
             let last = recent.iter().skip(recent.len().saturating_sub(ticks(OSCILLATION_S, self.control_period_s)));
             self.incidents.push(Incident {
                 episode,
@@ -104,12 +119,13 @@ impl IncidentMonitor {
                     Resume::At(resumed_at_m) => Some(progress_m - resumed_at_m),
                     Resume::Never | Resume::Due => None,
                 },
-                before: LOOK_BACKS_S.map(|look_back_s| before(recent, look_back_s, self.control_period_s)),
+                before: LOOK_BACKS_S.map(before),
             });
             *resume = Resume::Due;
         }
         if matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. }) {
             recent.clear();
+            *since_put_back = Some(0);
         }
     }
 
@@ -124,11 +140,11 @@ fn ticks(seconds: f32, control_period_s: f32) -> usize {
     (seconds / control_period_s).round() as usize
 }
 
-/// The state so long before the last one, or the first.
+/// The state so long before the last one, or the first; as if the car had never been put back.
 fn before(recent: &VecDeque<(VehicleState, f32)>, look_back_s: f32, control_period_s: f32) -> Before {
     let index = recent.len().saturating_sub(ticks(look_back_s, control_period_s) + 1);
     let (vehicle, progress_m) = recent[index];
-    Before { vehicle, progress_m, before_s: (recent.len() - index) as f32 * control_period_s }
+    Before { vehicle, progress_m, before_s: (recent.len() - index) as f32 * control_period_s, refractory_s: 0.0 }
 }
 
 #[cfg(test)]

@@ -73,8 +73,7 @@ pub enum States {
 pub struct Effect {
     /// The iteration.
     pub iteration: u32,
-    /// Ratio on the held-back samples of both data sets so far; resampled in stretches of a validation block. Of the first
-    /// seed.
+    /// Ratio on the held-back samples of both data sets so far; the validation blocks are resampled. Of the first seed.
     pub held_back: Option<Interval>,
     /// The same ratio of every seed, the first included.
     #[serde(default)]
@@ -118,9 +117,9 @@ impl Trained {
         self.held_back.len().saturating_sub(1) as u32
     }
 
-    /// Samples held back of the rounds from one to another.
-    fn held_back(&self, from: u32, to: u32) -> impl Iterator<Item = &Sample> {
-        self.held_back[from as usize..=to as usize].iter().flatten()
+    /// Samples held back of the rounds from one to another, round by round.
+    fn held_back(&self, from: u32, to: u32) -> &[Vec<Sample>] {
+        &self.held_back[from as usize..=to as usize]
     }
 }
 
@@ -160,11 +159,15 @@ impl Iteration<'_> {
         self.both.map(|trained| trained.store.round_folder(self.number))
     }
 
-    /// τ̂ of both policies on the held-back samples of both data sets so far.
-    fn tau_hats(&self) -> anyhow::Result<[Vec<f64>; 2]> {
+    /// The held-back samples of both data sets so far, round by round.
+    fn held_back(&self) -> impl Iterator<Item = &Vec<Sample>> {
         let [weighted, unweighted] = self.both;
-        let samples: Vec<&Sample> =
-            weighted.held_back(0, self.number).chain(unweighted.held_back(1, self.number)).collect();
+        weighted.held_back(0, self.number).iter().chain(unweighted.held_back(1, self.number))
+    }
+
+    /// τ̂ of both policies on all of them, in their order.
+    fn tau_hats(&self) -> anyhow::Result<[Vec<f64>; 2]> {
+        let samples: Vec<&Sample> = self.held_back().flatten().collect();
         let [weighted, unweighted] = self.folders();
         let of = |folder: &Path| Ok::<_, anyhow::Error>(tau_hats(&Checkpoint::load(folder)?, &samples));
         Ok([of(&weighted)?, of(&unweighted)?])
@@ -212,7 +215,7 @@ pub fn run(
         let Some(driven) = drives.samples(&path)? else { return Ok(false) };
         let driven: Vec<&Sample> = driven.iter().collect();
         let policy = Checkpoint::load(&path)?;
-        let held_back: Vec<&Sample> = chain.held_back(0, rounds).collect();
+        let held_back: Vec<&Sample> = chain.held_back(0, rounds).iter().flatten().collect();
         calibration.extend(calibrations(name, States::HeldBack, &policy, &held_back));
         calibration.extend(calibrations(name, States::OnPolicy, &policy, &driven));
     }
@@ -224,7 +227,8 @@ pub fn run(
             *per_s = driven_per_s;
         }
         let sums = iteration.tau_hats()?;
-        let held_back = ratio(&sums, settings.dagger.fit.validation.block, settings.evaluation.seed);
+        let rounds: Vec<usize> = iteration.held_back().map(Vec::len).collect();
+        let held_back = ratio(&sums, &rounds, settings.dagger.fit.validation.block, settings.evaluation.seed);
         let of_others = ratios_of_others.iter().filter_map(|ratios| ratios.get(at));
         let held_back_by_seed = std::iter::once(ratio_of_sums(&sums)).chain(of_others.copied()).collect();
         effect.push(Effect { iteration: iteration.number, held_back, held_back_by_seed, driving_per_s });
@@ -328,20 +332,22 @@ fn ratio_of_sums([first, second]: &[Vec<f64>; 2]) -> f64 {
     first.iter().sum::<f64>() / second.iter().sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
-/// First sum over second, with its interval; `None` for fewer than two stretches. Neighbouring samples look alike, so
-/// stretches are resampled, both policies' together.
-fn ratio([first, second]: &[Vec<f64>; 2], stretch: usize, seed: RootSeed) -> Option<Interval> {
-    let stretch = stretch.max(1);
-    if first.len() <= stretch {
-        return None;
-    }
+/// First sum over second, with its interval; `None` for fewer than two blocks. Neighbouring samples look alike, so blocks
+/// are resampled, both policies' together. None crosses a round; `rounds` are the lengths of the rounds.
+fn ratio([first, second]: &[Vec<f64>; 2], rounds: &[usize], block: usize, seed: RootSeed) -> Option<Interval> {
+    let block = block.max(1);
     let mut units = Units::new(2);
     units.begin_stratum();
-    for (first, second) in first.chunks(stretch).zip(second.chunks(stretch)) {
-        units.push(&[first.iter().sum(), second.iter().sum()]);
+    let mut begin = 0;
+    for &samples in rounds {
+        let of_round = begin..begin + samples;
+        for (first, second) in first[of_round.clone()].chunks(block).zip(second[of_round].chunks(block)) {
+            units.push(&[first.iter().sum(), second.iter().sum()]);
+        }
+        begin += samples;
     }
     let of_sums = |sums: &[f64], out: &mut [f64]| out[0] = sums[0] / sums[1].max(f64::MIN_POSITIVE);
-    units.percentile_intervals(seed, DRAWS, 1, &of_sums).pop()
+    units.percentile_intervals(seed, DRAWS, 1, &of_sums).pop().filter(|interval| interval.units > 1)
 }
 
 /// Both axes of a policy on labelled states.
@@ -367,17 +373,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_ratio_of_sums_is_resampled_in_stretches() {
+    fn the_ratio_of_sums_is_resampled_in_blocks() {
         let first = vec![0.1; 40];
         let half = vec![0.2; 40];
-        let interval = ratio(&[first.clone(), half], 10, RootSeed(1)).unwrap();
+        let interval = ratio(&[first.clone(), half], &[40], 10, RootSeed(1)).unwrap();
         for value in [interval.lower, interval.estimate, interval.upper] {
             assert!((value - 0.5).abs() < 1e-12, "{interval:?}");
         }
-        // All of the second policy's error lies in one stretch of four: without it, the ratio is very large.
+        // All of the second policy's error lies in one block of four: without it, the ratio is very large.
         let late: Vec<f64> = (0..40).map(|i| if i < 10 { 0.8 } else { 0.0 }).collect();
-        let interval = ratio(&[first.clone(), late], 10, RootSeed(1)).unwrap();
+        let interval = ratio(&[first.clone(), late], &[40], 10, RootSeed(1)).unwrap();
         assert!((interval.estimate - 0.5).abs() < 1e-12 && interval.upper > 1.0, "{interval:?}");
-        assert_eq!(ratio(&[first.clone(), first], 40, RootSeed(1)), None);
+        assert_eq!(ratio(&[first.clone(), first.clone()], &[40], 40, RootSeed(1)), None);
+        assert_eq!(ratio(&[first.clone(), first], &[0, 40, 0], 40, RootSeed(1)), None);
+        assert_eq!(ratio(&[vec![], vec![]], &[], 40, RootSeed(1)), None);
+    }
+
+    #[test]
+    fn no_block_crosses_a_round() {
+        // The first round ends within its only block; every block after it is all 0.1 or all 0.3.
+        let first: Vec<f64> = (0..85).map(|i| if i < 5 || (i - 5) / 10 % 2 == 0 { 0.1 } else { 0.3 }).collect();
+        let ones = vec![1.0; 85];
+        let by_round = ratio(&[first.clone(), ones.clone()], &[5, 80], 10, RootSeed(1)).unwrap();
+        assert_eq!(by_round.units, 9);
+        // Blocks of halves of two neighbours would all be alike: 0.16…0.22.
+        assert!(by_round.lower < 0.15 && by_round.upper > 0.24, "{by_round:?}");
     }
 }

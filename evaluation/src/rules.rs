@@ -45,8 +45,8 @@ pub const SAMPLES: u32 = 20_000;
 /// Folder of the stage that drives.
 pub const DRIVES: &str = "drives";
 
-/// What is set before the user sets anything: three lots of each family and one round trip of lot a in every round, and fits of as many
-/// steps as so few samples are worth; rules and seeds make for many trainings.
+/// What is set before the user sets anything: three lots of each of the first twelve families and one round trip of lot a in every round,
+/// and fits of as many steps as so few samples are worth; rules and seeds make for many trainings.
 pub const FEW_LOTS: [&str; 5] = [
     r#"training.lots=["lot-a", "train:36:all"]"#,
     "training.trials=1",
@@ -179,9 +179,11 @@ fn of_rule(settings: &Settings, extent: &Extent, rule: &str, seed: RootSeed) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use experiment::settings::reference;
     use policy::dagger::Keep;
     use policy::decision_rule::SafeDaggerSettings;
     use policy::fit::Budget;
+    use std::collections::BTreeSet;
 
     #[test]
     fn trainings_differ_in_rule_and_seed_alone_and_all_are_driven() {
@@ -237,7 +239,11 @@ mod tests {
 
     #[test]
     fn every_rule_has_a_title_and_is_a_setting() {
-        for (name, _) in all() {
+        let titled: BTreeSet<&str> = all().into_iter().map(|(name, _)| name).collect();
+        let setting = reference::entries().iter().find(|entry| entry.key == "dagger.rule").unwrap();
+        let named: BTreeSet<&str> = setting.choices.iter().map(String::as_str).collect();
+        assert_eq!(titled, named);
+        for name in named {
             assert!(DecisionRule::named(name).is_some(), "{name}");
         }
         assert!(DecisionRule::named("anybody").is_none());

@@ -5,7 +5,7 @@
 //! is put into the state that it had; commands on their way to the actuators, smoothed answers and noise that comes and
 //! goes are not those of that moment, which is why [`Substitution::Nothing`] is tried as well.
 
-use crate::monitor::{Incident, LOOK_BACK, LOOK_BACKS_S};
+use crate::monitor::{Before, Incident, LOOK_BACK, LOOK_BACKS_S};
 use anyhow::anyhow;
 use experiment::drive::TrialBatch;
 use experiment::drivers::NamedDriver;
@@ -130,8 +130,9 @@ fn passes_at_once(batch: &TrialBatch<'_>, incidents: &[Incident], look_back: usi
         let mut episode = trials::episode_settings(batch.episode, batch.noise, map);
         episode.metrics.events_max = 1;
         episode.metrics.timeout_s = before.before_s + PASS_WITHIN_S;
-        let (vehicle, seed) = (before.vehicle, trial.episode_seed());
-        (incident.episode, Episode::under_way(Arc::new(episode), Arc::clone(map), seed, vehicle, before.progress_m))
+        let (episode, map, seed) = (Arc::new(episode), Arc::clone(map), trial.episode_seed());
+        let Before { vehicle, progress_m, refractory_s, .. } = *before;
+        (incident.episode, Episode::under_way(episode, map, seed, vehicle, progress_m, refractory_s))
     };
     let episodes: Vec<(usize, Episode)> = incidents.iter().map(start).collect();
     let mut verdicts: Vec<Option<bool>> = vec![None; episodes.len()];

@@ -5,9 +5,11 @@
 
 use crate::drive_digest::DriveDigest;
 use crate::drivers::{self, NamedDriver};
+use crate::inputs;
 use crate::lots::Lot;
+use crate::manifest::Manifest;
 use crate::replay_key::ReplayKey;
-use crate::settings::NoiseChoice;
+use crate::settings::{NoiseChoice, Settings};
 use crate::trials::{self, Trial};
 use anyhow::{anyhow, ensure};
 use rayon::prelude::*;
@@ -17,6 +19,7 @@ use sim::frame::Frame;
 use sim::map::Map;
 use sim::seed::{Rng, RootSeed};
 use std::ops::ControlFlow;
+use std::slice;
 use std::sync::Arc;
 
 /// Called with the index of the trial within the batch and its frame; a break ends the batch after this tick.
@@ -114,6 +117,17 @@ impl Replay {
         let lot = Lot::parse_one(&key.lot, &episode.vehicle)?;
         let map = Arc::new(Trial::of_evaluation(key.seed, &lot, key.direction, key.trial).map(episode)?);
         Ok(Self { lot, map, key: key.clone() })
+    }
+
+    /// A drive of an evaluation with its driver: `settings` and `manifest` are those of the evaluation.
+    ///
+    /// # Errors
+    /// If the network, the parameters or the lot have moved away or changed since: another drive would be taken for this one.
+    pub fn of_run(key: &ReplayKey, settings: &Settings, manifest: &Manifest) -> anyhow::Result<(Self, NamedDriver)> {
+        let replay = Self::new(key, &settings.episode)?;
+        let driver = key.driver.clone().load(settings)?;
+        manifest.check_some_inputs(&inputs::of(slice::from_ref(&replay.lot), slice::from_ref(&driver)))?;
+        Ok((replay, driver))
     }
 
     /// The trial.

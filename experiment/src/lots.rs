@@ -1,6 +1,6 @@
 //! Lots that can be named on the command line: [`scenarios::suite`], checked before anything is driven.
 
-use anyhow::{Context as _, ensure};
+use anyhow::{Context as _, bail, ensure};
 use scenarios::generator;
 use scenarios::import::MapLot;
 use scenarios::note::{Loaded, Note};
@@ -109,13 +109,17 @@ impl Lot {
     /// # Errors
     /// If nothing is named so, a file does not describe a lot, or two lots have the same name.
     pub fn parse_all<S: AsRef<str>>(specs: &[S], vehicle: &VehicleSettings) -> anyhow::Result<Vec<Self>> {
-        let mut suites = Vec::new();
+        let (mut named, mut suites) = (BTreeSet::new(), Vec::new());
         let mut count = 0;
-        for (at, spec) in specs.iter().enumerate() {
+        for spec in specs {
+            let spec: &str = spec.as_ref();
             // Before a million lots are made twice.
-            let is_new = specs[..at].iter().all(|other| other.as_ref() != spec.as_ref());
-            ensure!(is_new, "lot {:?} is named twice; name it once", spec.as_ref());
-            let suite = scenarios::suite(spec.as_ref())?;
+            ensure!(named.insert(spec), "lot {spec:?} is named twice; name it once");
+            let suite = scenarios::suite(spec)?;
+            // Replay keys name its file, and rows of tables hold them.
+            if let Some(letter) = spec.chars().find(|letter| letter.is_control()) {
+                bail!("lot {spec:?} contains {letter:?}, and tables hold its name; rename the file or folder");
+            }
             count += suite.len();
             ensure!(count <= LOTS_MAX, "{count} lots; at most {LOTS_MAX} are possible");
             suites.push(suite);
@@ -245,7 +249,7 @@ impl Lot {
         }
     }
 
-    /// Whether drivers may be trained or tuned on it: lot a and the generator's training lots.
+    /// Whether planners may be tuned on it, and it is never unseen: lot a and the generator's training lots.
     pub fn is_for_training(&self) -> bool {
         match &self.spec {
             LotSpec::Generated { split, .. } => *split == Split::Train,
@@ -344,6 +348,8 @@ mod tests {
         for (specs, part) in [
             (&["lot-d"] as &[&str], "there are lot-a, lot-b"),
             (&["lot-a", "reference"], "\"lot-a\" is named twice"),
+            (&["test:2", "lot-a", "test:2"], "\"test:2\" is named twice"),
+            (&["no\nsuch.toml"], "\"no\\nsuch.toml\" contains '\\n'"),
             (&["no/such.toml"], "no/such.toml"),
         ] {
             let error = format!("{:#}", names(specs).unwrap_err());
@@ -377,7 +383,7 @@ mod tests {
         std::fs::remove_file(file).unwrap();
     }
 
-    /// Neither drivers nor planners ever learn from lots that figures are reported on.
+    /// Planners are tuned on no other, and `--unseen` refuses them.
     #[test]
     fn training_lots_are_lot_a_and_those_of_the_split_train() {
         let specs =

@@ -102,6 +102,11 @@ impl From<ReplayKey> for String {
     }
 }
 
+/// The driver of a key that is written down, as it was named.
+pub fn driver_of(key: &str) -> String {
+    unescaped(key.split('@').next().unwrap_or_default())
+}
+
 fn escaped(name: &str) -> String {
     name.replace('%', "%25").replace('@', "%40").replace(' ', "%20")
 }

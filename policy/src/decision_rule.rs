@@ -335,7 +335,21 @@ mod tests {
 
     #[test]
     fn rules_survive_toml() {
-        let text = toml::to_string(&File { rule: DecisionRule::paper() }).unwrap();
-        assert_eq!(toml::from_str::<File>(&text).unwrap().rule, DecisionRule::paper());
+        for name in [
+            "all_below",
+            "any_below_literal",
+            "tau_only",
+            "expert_only",
+            "vanilla",
+            "safe_dagger",
+            "ensemble_dagger",
+            "hg_dagger",
+            "lazy_dagger",
+            "thrifty_dagger",
+        ] {
+            let rule = DecisionRule::named(name).unwrap();
+            let text = toml::to_string(&File { rule }).unwrap();
+            assert_eq!(toml::from_str::<File>(&text).unwrap().rule, rule, "{name}");
+        }
     }
 }

@@ -174,6 +174,10 @@ def test_the_expert_labels_what_anyone_drives():
     envs.reset(seed=1)
     labels = envs.expert_actions()
     assert labels.shape == (3, 2) and (np.abs(labels) <= 1.5).all()
+    # The first car drives the first trial of lot b, forward.
+    low, high = np.array([4.3, -6.0]), np.array([16.3, 6.0])
+    alone = lotpilot.Episode("lot-b").expert_action()
+    np.testing.assert_allclose(low + 0.5 * (labels[0] + 1.0) * (high - low), alone, atol=1e-4)
     assert (envs.route_points(6.0)[:, 0] > 4).all()
 
 

@@ -282,6 +282,12 @@ def test_the_reward_is_the_sum_of_its_terms():
     near, infos = total(clearance=1.0)
     assert steered < 0
     assert near == pytest.approx(-sum(max(0.0, 0.5 - info["clearance_m"]) for info in infos), rel=1e-5)
+    touched, infos = total(contact=1.0)
+    assert touched == -infos[-1]["contacts"]
+    weights = EnvOptions().weights()
+    terms = {term: total(**{term: 1.0})[0] for term in weights}
+    whole, _ = total(**weights)
+    assert whole == pytest.approx(sum(weight * terms[term] for term, weight in weights.items()), abs=1e-6)
 
 
 def test_a_step_is_rewarded_for_what_its_own_action_did():

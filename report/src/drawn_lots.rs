@@ -69,10 +69,14 @@ impl DrawnLots<'_> {
     /// Writes the two files of a lot, and returns the TOML file. `px_per_m`: of the picture, by default as fits 1600 pixels.
     ///
     /// # Errors
-    /// If the picture would be too large, or a file cannot be written.
+    /// If the picture would be too large, or the folder or a file cannot be written.
     pub fn write(&self, drawn: &DrawnLot, vehicle: &VehicleSettings, px_per_m: Option<f32>) -> anyhow::Result<PathBuf> {
         let [toml, png] = self.files(&drawn.name);
-        storage::whole::write(&png, &lot::top_view(&drawn.map, vehicle, px_per_m)?.to_png()?)?;
+        let picture = lot::top_view(&drawn.map, vehicle, px_per_m)?.to_png()?;
+        // A picture that is refused leaves no folder behind.
+        std::fs::create_dir_all(self.out)
+            .with_context(|| format!("{}: cannot be created; choose another --out", self.out.display()))?;
+        storage::whole::write(&png, &picture)?;
         storage::whole::write(&toml, drawn.toml.as_bytes())?;
         Ok(toml)
     }
@@ -92,7 +96,7 @@ impl DrawnLots<'_> {
             ensure_apart_from(&made_of, &files)?;
             for path in files {
                 ensure!(
-                    self.overwrite || !path.exists(),
+                    self.overwrite || !(path.exists() || path.is_symlink()),
                     "{}: exists already; choose another --out or --seed, or replace it with --overwrite",
                     path.display()
                 );

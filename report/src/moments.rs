@@ -4,6 +4,7 @@ use crate::page::Player;
 use crate::pictures::animation::{Camera, Layout, Scene, Take};
 use anyhow::Context as _;
 use experiment::drive::Replay;
+use experiment::manifest::Manifest;
 use experiment::replay_key::ReplayKey;
 use experiment::settings::Settings;
 use sim::frame::Event;
@@ -15,14 +16,14 @@ const AFTER_S: f32 = 2.0;
 /// Pictures per second.
 const RATE_PER_S: f32 = 5.0;
 
-/// The seconds around a near-collision; where no script runs, its moment.
+/// The seconds around a near-collision; where no script runs, its moment. `manifest`: that of the run, which says what drove
+/// and where.
 ///
 /// # Errors
 /// If it cannot be driven again: the network or the lot has moved away or changed.
-pub fn player(key: &str, settings: &Settings) -> anyhow::Result<Player> {
+pub fn player(key: &str, settings: &Settings, manifest: &Manifest) -> anyhow::Result<Player> {
     let key: ReplayKey = key.parse()?;
-    let replay = Replay::new(&key, &settings.episode)?;
-    let driver = key.driver.clone().load(settings)?;
+    let (replay, driver) = Replay::of_run(&key, settings, manifest)?;
     let (mut now_s, mut until_s) = (0.0, f32::INFINITY);
     let take = Take::of(&replay, &settings.episode, &driver, |frame| {
         if frame.tick == key.tick {

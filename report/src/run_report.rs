@@ -216,7 +216,7 @@ fn report(folder: &Path, progress: &dyn Progress) -> anyhow::Result<Report> {
         if let Some(table) = &sources.elsewhere {
             add_elsewhere(&mut page, &sources.settings, table);
         }
-        not_replayed = add_moments(&mut page, folder, &sources.settings, evaluation, progress)?;
+        not_replayed = add_moments(&mut page, folder, &sources, evaluation, progress)?;
     }
     glossary::add(&mut page);
     page.section("Configuration", configuration(&sources));
@@ -487,7 +487,7 @@ impl Worst {
 fn add_moments(
     page: &mut Page,
     folder: &Path,
-    settings: &Settings,
+    sources: &Sources,
     evaluation: &Evaluation,
     progress: &dyn Progress,
 ) -> anyhow::Result<Vec<String>> {
@@ -533,7 +533,7 @@ fn add_moments(
         if progress.is_cancelled() {
             return Err(Interrupted { kept: format!("{} holds everything but its report", folder.display()) }.into());
         }
-        match moments::player(&failure.replay, settings) {
+        match moments::player(&failure.replay, &sources.settings, &sources.manifest) {
             Ok(player) => {
                 page.figure(format!("near-collision-{index}"), caption, Image::Player(player));
             }

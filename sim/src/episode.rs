@@ -207,13 +207,14 @@ impl Episode {
 
     /// An episode that starts from a state met in another one, to ask what would have happened from there. Commands that
     /// were still on their way to the actuators are not known: the car keeps its steering and speed until the first new
-    /// command takes hold.
+    /// command takes hold. `refractory_s` is what is left of the time after a resume in which nothing is counted.
     pub fn under_way(
         settings: Arc<EpisodeSettings>,
         map: Arc<Map>,
         seed: RootSeed,
         vehicle: VehicleState,
         progress_m: f32,
+        refractory_s: f32,
     ) -> Self {
         let command = VehicleCommand { steering_rad: vehicle.steering_rad, speed_mps: vehicle.speed_mps };
         let new = Self::new(settings, map, seed);
@@ -222,6 +223,7 @@ impl Episode {
             command,
             progress_m,
             advance: Advance { progress_m, physics_step: 0 },
+            counts_from_step: new.settings.physics_steps(refractory_s),
             metrics: new.metrics.with_wheels_at(vehicle.steering_rad),
             ..new
         }

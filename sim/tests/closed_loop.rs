@@ -196,6 +196,24 @@ fn nothing_is_counted_in_the_first_second_after_a_resume() {
     assert!((20..=21).contains(&ticks_to_second_event(1.0)), "{} ticks", ticks_to_second_event(1.0));
 }
 
+/// The same scene, driven on from where the car was put back: it has what is left of its second, and no more.
+#[test]
+fn nothing_is_counted_under_way_in_what_is_left_of_the_first_second() {
+    let pillar = |x, y| Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(x, y), 0.0));
+    let map = lane(60.0, vec![pillar(30.35, 1.1), pillar(36.5, 0.93 + 0.06 + 0.35)]);
+    let mut frames = Vec::new();
+    let episode = Episode::new(settings(), Arc::clone(&map), RootSeed(1));
+    let report = episode::run(episode, &mut LeftAfterResume::default(), &mut |frame: &Frame| frames.push(*frame));
+    let met = &frames[report.events[0].0 as usize + 1];
+    let tick_of_event = |refractory_s| {
+        let (map, resumed) = (Arc::clone(&map), met.vehicle);
+        let episode = Episode::under_way(settings(), map, RootSeed(1), resumed, met.progress_m, refractory_s);
+        episode::run(episode, &mut LeftAfterResume { resets: 1 }, &mut |_: &Frame| ()).events[0].0
+    };
+    assert!((3..15).contains(&tick_of_event(0.0)), "tick {}", tick_of_event(0.0));
+    assert!((19..=20).contains(&tick_of_event(1.0)), "tick {}", tick_of_event(1.0));
+}
+
 /// Straight on; remembers what it was shown, from reset to reset.
 #[derive(Default)]
 struct Watching(Vec<Vec<Observation>>);
@@ -293,9 +311,11 @@ fn a_run_times_out() {
 /// A command takes effect 61 ms after the observation: six physics steps of 10 ms.
 #[test]
 fn commands_reach_the_wheels_after_the_dead_time() {
-    let moved_after_ticks = |dead_time_s| {
+    // The tick in which the wheels begin to turn, and for how many physics steps of it: they turn as fast as they can.
+    let moved = |dead_time_s| {
         let mut settings = (*settings()).clone();
         settings.vehicle.dead_time_s = dead_time_s;
+        let step_rad = 0.010 * settings.vehicle.steering_rate_max_radps;
         let mut episode = Episode::new(Arc::new(settings), lane(60.0, vec![]), RootSeed(1));
         let decision = Decision {
             look_ahead: LookAheadPoint { ahead_m: 8.0, left_m: 2.0 },
@@ -304,16 +324,17 @@ fn commands_reach_the_wheels_after_the_dead_time() {
             speed_limit_mps: None,
         };
         (0..10)
-            .find(|_| {
+            .find_map(|tick| {
                 episode.observe();
                 episode.apply(decision);
-                episode.vehicle().steering_rad > 0.0
+                let steering_rad = episode.vehicle().steering_rad;
+                (steering_rad > 0.0).then(|| (tick, (steering_rad / step_rad).round() as u32))
             })
             .unwrap()
     };
-    assert_eq!(moved_after_ticks(0.0), 0);
-    assert_eq!(moved_after_ticks(0.061), 1);
-    assert_eq!(moved_after_ticks(0.110), 2);
+    assert_eq!(moved(0.0), (0, 5));
+    assert_eq!(moved(0.061), (1, 4));
+    assert_eq!(moved(0.110), (2, 4));
 }
 
 /// The controller took a limit that is no number for none.
@@ -437,7 +458,7 @@ fn a_car_that_is_nowhere_after_its_last_tick_is_refused() {
     let (settings, map) = (Arc::new(settings), lane(40.0, vec![]));
     // Its position is a number until the first step adds the rest to it; the drive has one tick.
     let start = VehicleState { position_rest_m: Vec2::NAN, ..VehicleState::at_rest(map.start()) };
-    let episode = Episode::under_way(settings, map, RootSeed(1), start, 0.0);
+    let episode = Episode::under_way(settings, map, RootSeed(1), start, 0.0, 0.0);
     let fleet = || OneDriverEach(vec![Fixed(LookAheadPoint { ahead_m: 16.3, left_m: 0.0 })]);
     let mut on_frame = |_: usize, _: &Frame| ControlFlow::Continue(());
     let expected = NotFinite { episode: 0, tick: 0, what: "the state of the car" };
@@ -453,7 +474,7 @@ fn an_episode_under_way_goes_on_from_its_state() {
     let map = lane(40.0, vec![]);
     let (_, frames) = run(Arc::clone(&map), (16.3, 0.0), settings());
     let met = frames.iter().find(|frame| frame.progress_m > 20.0).unwrap();
-    let episode = Episode::under_way(settings(), map, RootSeed(1), met.vehicle, met.progress_m);
+    let episode = Episode::under_way(settings(), map, RootSeed(1), met.vehicle, met.progress_m, 0.0);
     let mut driver = Fixed(LookAheadPoint { ahead_m: 16.3, left_m: 0.0 });
     let mut positions = Vec::new();
     let report = episode::run(episode, &mut driver, &mut |frame: &Frame| positions.push(frame.vehicle.pose.x_m));

@@ -79,7 +79,7 @@ fn write_list(folder: &Path, sums: &Sums) -> Result<(), FileError> {
     for (name, sum) in sums {
         let _ = writeln!(text, "{sum}  {name}");
     }
-    whole::write(&path, text.as_bytes())
+    whole::write_parts(&path, &[text.as_bytes()])
 }
 
 /// Whether a folder has a list: whether anything is finished there.
@@ -252,7 +252,7 @@ pub fn write(folder: &Path, name: &str, content: &[u8]) -> Result<(), FileError>
         Some(_) => unlist(folder, &[name])?,
         None => {}
     }
-    whole::write(&folder.join(name), content)?;
+    whole::write_parts(&folder.join(name), &[content])?;
     sums.insert(name.to_owned(), sum);
     write_list(folder, &sums)
 }
@@ -273,7 +273,7 @@ pub fn write_folder(
 ) -> Result<(), FileError> {
     replace_folder(folder, name, |partial| {
         for (name, content) in files {
-            whole::write(&partial.join(name), &content)?;
+            whole::write_parts(&partial.join(name), &[&content])?;
         }
         list_all(partial)
     })
@@ -333,7 +333,7 @@ fn copy_files(from: &Path, to: &Path) -> Result<(), FileError> {
         let content = read_listed(from, name, u64::MAX)?;
         match listed_folder(name) {
             Some(inner) => copy_files(&from.join(inner), &to.join(inner))?,
-            None => whole::write(&path, &content)?,
+            None => whole::write_parts(&path, &[&content])?,
         }
     }
     write_list(to, &sums)

@@ -18,12 +18,14 @@ const ONE_NAME_REMEDY: &str = "put a copy of it in its place: copy it, and renam
 /// before it: what is under the name was written by one of them.
 ///
 /// # Errors
-/// If it cannot be written.
+/// If it cannot be written, or a device, a pipe or a folder is in its place.
 pub fn write(path: &Path, content: &[u8]) -> Result<(), FileError> {
+    ensure_no_device(path)?;
     write_parts(path, &[content])
 }
 
-/// Like [`write()`], with a content in parts: they need not be put together in memory.
+/// Like [`write()`], for files of runs, in whose place nothing else belongs: it is replaced. The content is given in parts, which
+/// need not be put together in memory.
 ///
 /// # Errors
 /// If it cannot be written.
@@ -41,6 +43,17 @@ pub(crate) fn write_parts(path: &Path, parts: &[&[u8]]) -> Result<(), FileError>
         written
     };
     write().map_err(|error: io::Error| failed(path, &error))
+}
+
+/// Refuses to put a file in the place of a device, a pipe or a folder: `/dev/null` would be a file then, for every program.
+fn ensure_no_device(path: &Path) -> Result<(), FileError> {
+    match fs::symlink_metadata(path) {
+        Ok(about) if !about.is_file() && !about.is_symlink() => {
+            Err(FileError::new(path, "is a device, a pipe or a folder, which no file replaces", "choose another name"))
+        }
+        // What is wrong with it, writing says.
+        _ => Ok(()),
+    }
 }
 
 /// A new file that this process alone writes; what a dead one left in its place is deleted.
@@ -223,6 +236,24 @@ mod tests {
         fs::hard_link(&diary, &partial).unwrap();
         write(&path, b"second").unwrap();
         assert_eq!((fs::read(&diary).unwrap(), fs::read(&path).unwrap()), (b"dear".to_vec(), b"second".to_vec()));
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// `--out /dev/null --overwrite` made a file of it, where the user might.
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_or_a_folder_is_not_replaced_by_a_file() {
+        use std::os::unix::fs::FileTypeExt as _;
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-device", std::process::id()));
+        fs::create_dir_all(folder.join("folder")).unwrap();
+        let pipe = folder.join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        for path in [&pipe, &folder.join("folder")] {
+            let error = write(path, b"file").unwrap_err().to_string();
+            assert!(error.contains("which no file replaces"), "{error}");
+            assert!(!path.with_added_extension(PARTIAL).exists());
+        }
+        assert!(fs::symlink_metadata(&pipe).unwrap().file_type().is_fifo());
         fs::remove_dir_all(folder).unwrap();
     }
 

@@ -76,6 +76,15 @@ impl Workplace {
         // What lies there was prepared by another program.
         let remedy = || format!("{}: cannot be made; if an earlier torture left it, delete it", folder.display());
         fs::create_dir(folder).with_context(remedy)?;
+        let filled = Self::fill(program, folder);
+        if filled.is_err() {
+            let _ = fs::remove_dir_all(folder);
+        }
+        filled
+    }
+
+    /// Puts the library and the copy of the program into an empty folder.
+    fn fill(program: &Path, folder: &Path) -> anyhow::Result<Self> {
         let (folder, library) = (folder.to_owned(), Library::compile(folder)?);
         let copy = folder.join("program");
         fs::copy(program, &copy).with_context(|| program.display().to_string())?;
@@ -277,5 +286,13 @@ mod tests {
         let refusal = Workplace::new(Path::new("/nowhere"), &folder).unwrap_err().to_string();
         assert!(refusal.contains("if an earlier torture left it, delete it"), "{refusal}");
         fs::remove_dir(folder).unwrap();
+    }
+
+    /// Where there was no C compiler, the folder stayed.
+    #[test]
+    fn what_cannot_be_prepared_leaves_no_folder() {
+        let folder = std::env::temp_dir().join(format!("torture-test-{}-unprepared", std::process::id()));
+        Workplace::new(Path::new("/nowhere"), &folder).unwrap_err();
+        assert!(!folder.exists());
     }
 }

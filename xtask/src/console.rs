@@ -103,6 +103,10 @@ impl Console {
     /// Says where the time went.
     pub(crate) fn report_time(&self) {
         let stages = self.stages.borrow();
+        // A share of nothing took none.
+        if stages.is_empty() {
+            return;
+        }
         let total: f64 = stages.iter().map(|(_, seconds)| seconds).sum();
         let parts: Vec<String> = stages.iter().map(|(stage, seconds)| format!("{stage} {seconds:.1} s")).collect();
         self.note(&format!("time: {}, {total:.1} s in all", parts.join(", ")));

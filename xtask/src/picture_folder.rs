@@ -41,7 +41,7 @@ impl Folder<'_> {
     pub(crate) fn check_file(&self, path: &Path) -> anyhow::Result<()> {
         run_dir::ensure_outside_of_runs(path).context("--out")?;
         ensure!(
-            self.overwrite || !path.exists(),
+            self.overwrite || !(path.exists() || path.is_symlink()),
             "{}: exists already; choose another --out, or replace it with --overwrite",
             path.display()
         );

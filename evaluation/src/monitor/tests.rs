@@ -49,6 +49,28 @@ fn the_monitor_looks_back_six_seconds_and_not_beyond_a_resume() {
     assert_eq!((incidents[0].since_resume_m, incidents[1].since_resume_m), (None, Some(-19.0)));
 }
 
+/// Driven on from just after a resume, a near-collision counted that the drive itself had not counted.
+#[test]
+fn what_is_left_of_the_time_in_which_nothing_counts_is_remembered() {
+    let near = Event::NearCollision { at: Pose::default(), progress_m: 1.0 };
+    let refractory_s = |first: u32, second: u32| {
+        let mut monitor = IncidentMonitor::new(1, &EpisodeSettings::paper());
+        for tick in 0..=second {
+            monitor.frame(0, &frame(tick, 0.0, if [first, second].contains(&tick) { near } else { Event::Drove }));
+        }
+        let incidents = monitor.into_incidents();
+        incidents.iter().map(|incident| incident.before.map(|before| before.refractory_s)).collect::<Vec<_>>()
+    };
+    // In the 30th frame since it was put back: in the first of them all of 1 s is left, in the 10th .55 s, in the 20th .05 s.
+    let [never, soon] = refractory_s(9, 39)[..] else { panic!("two") };
+    assert_eq!(never, [0.0; 7]);
+    for (left_s, expected_s) in soon.into_iter().zip([1.0, 1.0, 1.0, 1.0, 1.0, 0.55, 0.05]) {
+        assert!((left_s - expected_s).abs() < 1e-5, "{soon:?}");
+    }
+    // 30 s after it, and so nowhere.
+    assert_eq!(refractory_s(9, 609)[1], [0.0; 7]);
+}
+
 /// A near-collision soon after the car had been stuck was one more at the place of another that had never been.
 #[test]
 fn only_a_resume_after_a_near_collision_makes_one_more_at_the_same_place() {

@@ -1,6 +1,5 @@
 use super::*;
 use crate::incidents::{self, Cause};
-use crate::monitor::Before;
 use experiment::drivers::Callback;
 use experiment::lots::Lot;
 use experiment::trials::{Purpose, Trial};
@@ -12,7 +11,7 @@ use sim::vehicle::VehicleState;
 
 /// A near-collision 2 m farther on, before which the car was always in this state.
 fn incident(vehicle: VehicleState, progress_m: f32) -> Incident {
-    let before = |before_s| Before { vehicle, progress_m, before_s };
+    let before = |before_s| Before { vehicle, progress_m, before_s, refractory_s: 0.0 };
     Incident {
         episode: 0,
         tick: 500,

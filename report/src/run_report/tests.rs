@@ -36,6 +36,30 @@ fn failure(driver: &str, lot: &str, speed_mps: f32) -> FailureRecord {
     }
 }
 
+/// The manifest of an evaluation that reads nothing from elsewhere.
+fn manifest(words: &[&str]) -> Manifest {
+    Manifest {
+        schema: MANIFEST_SCHEMA,
+        program: "lotpilot".to_owned(),
+        command: "evaluate".to_owned(),
+        command_line: words.iter().copied().map(str::to_owned).collect(),
+        preset: "smoke".to_owned(),
+        root_seed: 1,
+        evaluation_seed: 1,
+        git_revision: None,
+        git_dirty: None,
+        git_changes: None,
+        rustc_version: String::new(),
+        threads: 1,
+        target: String::new(),
+        processor: None,
+        processor_features: Vec::new(),
+        libraries: Vec::new(),
+        arguments: toml::Table::new(),
+        inputs: BTreeMap::new(),
+    }
+}
+
 #[test]
 fn the_fastest_are_the_worst_and_no_driver_fills_the_list() {
     let mut failures: Vec<FailureRecord> = (0..9).map(|i| failure("tentacle", "lot-a", 1.0 + 0.1 * i as f32)).collect();
@@ -52,28 +76,9 @@ fn the_fastest_are_the_worst_and_no_driver_fills_the_list() {
 #[test]
 fn commands_can_be_pasted_into_a_shell() {
     let words = ["evaluate", "--set", "training.lots=[\"lot-a\"]", "--out", "my runs/it's"];
-    let manifest = Manifest {
-        schema: MANIFEST_SCHEMA,
-        program: "lotpilot".to_owned(),
-        command: "evaluate".to_owned(),
-        command_line: words.map(str::to_owned).to_vec(),
-        preset: "smoke".to_owned(),
-        root_seed: 1,
-        evaluation_seed: 1,
-        git_revision: None,
-        git_dirty: None,
-        git_changes: None,
-        rustc_version: String::new(),
-        threads: 1,
-        target: String::new(),
-        processor: None,
-        processor_features: Vec::new(),
-        libraries: Vec::new(),
-        arguments: toml::Table::new(),
-        inputs: BTreeMap::new(),
-    };
+    let written = manifest(&words);
     let expected = r#"cargo xtask evaluate --set 'training.lots=["lot-a"]' --out 'my runs/it'\''s'"#;
-    assert_eq!(command_line(&manifest), expected);
+    assert_eq!(command_line(&written), expected);
     let runs = Path::new("runs/x");
     assert_eq!(
         visualise("run:runs/y@lot-a@forward@0@paper@1@5", runs),
@@ -98,7 +103,8 @@ fn a_near_collision_plays_and_stands_still_at_its_moment() {
     });
     driven.unwrap();
     let key = ReplayKey { tick: tick.unwrap(), ..key }.to_string();
-    let player = moments::player(&key, &settings).unwrap();
+    let nothing_read = manifest(&[]);
+    let player = moments::player(&key, &settings, &nothing_read).unwrap();
     let shows = |frame: &(String, String)| frame.1.contains(">1 near-collision</text>");
     let shown = player.frames.iter().position(shows);
     assert_eq!(shown, Some(player.still), "counted from its moment on");
@@ -106,9 +112,10 @@ fn a_near_collision_plays_and_stands_still_at_its_moment() {
     let bytes: usize = player.frames.iter().map(|(_, elements)| elements.len()).sum();
     assert!(bytes + player.background.len() < 1_000_000, "{bytes} bytes: six must fit into 6 MB");
 
-    let missed = moments::player("tentacle@lot-b@forward@0@paper@1@3", &settings).unwrap_err().to_string();
+    let missed =
+        moments::player("tentacle@lot-b@forward@0@paper@1@3", &settings, &nothing_read).unwrap_err().to_string();
     assert!(missed.contains("it does not happen"), "{missed}");
-    assert!(moments::player("nobody@lot-b@forward@0@paper@1@3", &settings).is_err());
+    assert!(moments::player("nobody@lot-b@forward@0@paper@1@3", &settings, &nothing_read).is_err());
 }
 
 #[test]

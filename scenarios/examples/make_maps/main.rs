@@ -52,14 +52,18 @@ mod tests {
     fn the_maps_in_the_folders_are_those_that_are_drawn() {
         for (name, drawings) in folders() {
             let folder = folder(name);
+            let mut files = 0;
             for drawing in drawings {
                 let kept = image::open(folder.join(format!("{}.png", drawing.name))).unwrap();
                 assert!(kept.into_luma8() == drawing.image(), "{}: draw the maps again", drawing.name);
+                files += 1;
                 for (file, text) in drawing.texts() {
                     let kept = std::fs::read_to_string(folder.join(&file)).unwrap();
                     assert_eq!(kept, text, "{file}: draw the maps again");
+                    files += 1;
                 }
             }
+            assert_eq!(folder.read_dir().unwrap().count(), files, "{name}: something there is not drawn");
         }
     }
 }

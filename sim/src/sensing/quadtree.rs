@@ -34,6 +34,10 @@ pub(super) const BLOCK_CELLS: usize = LANES;
 /// Blocks per side of the view; the last ones reach beyond it.
 pub(super) const BLOCKS: usize = GRID_CELLS.div_ceil(BLOCK_CELLS);
 
+/// A generous bound of rounding in single precision as far from the origin as lots may lie, metres: numbers are half a
+/// millimetre apart there.
+const ROUNDING_M: f32 = 2e-3;
+
 /// Distance from the centre of a block of `side` × `side` pixels to the farthest pixel centre.
 pub(super) fn to_corner_m(pixel_m: f32, side: usize) -> f32 {
     std::f32::consts::FRAC_1_SQRT_2 * pixel_m * (side - 1) as f32
@@ -174,8 +178,6 @@ impl PixelLattice {
     /// False only if no pixel of a block of `SIDE` × `SIDE` pixels can have a signed distance of at most `threshold_m`.
     #[inline]
     fn may_be_below<const SIDE: usize>(&self, field: &DistanceField, row: f32, col: f32, threshold_m: f32) -> bool {
-        /// A generous bound of rounding in single precision, metres.
-        const ROUNDING_M: f32 = 1e-4;
         let (low, high) = self.box_around::<SIDE>(row, col, ROUNDING_M);
         field.lowest_within(low, high) <= threshold_m + ROUNDING_M
     }
@@ -183,8 +185,6 @@ impl PixelLattice {
     /// A box in the world, given by its lowest and highest coordinates, around the pixels of a cell.
     #[inline]
     pub(super) fn box_around_cell(&self, row: usize, col: usize) -> (Vec2, Vec2) {
-        /// A generous bound of rounding in single precision a kilometre from the origin, metres.
-        const ROUNDING_M: f32 = 1e-3;
         self.box_around::<CELL_PIXELS>((row * CELL_PIXELS) as f32, (col * CELL_PIXELS) as f32, ROUNDING_M)
     }
 

@@ -61,7 +61,7 @@ pub(crate) fn run(args: &ExportArgs, output: &Output) -> anyhow::Result<()> {
         );
     }
     ensure!(
-        *overwrite || !out.exists(),
+        *overwrite || !(out.exists() || out.is_symlink()),
         "{}: exists already; choose another --out, or replace it with --overwrite",
         out.display()
     );

@@ -120,8 +120,6 @@ pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
             .map(|(_, trial)| trial)
             .collect();
     drawn_lots(args).ensure_free(&lots, &trials)?;
-    std::fs::create_dir_all(&args.out)
-        .with_context(|| format!("{}: cannot be created; choose another --out", args.out.display()))?;
     let made = write_all(args, &trials, &Console::new(output), &|made: &Made| output.print(&made.line))?;
     let rejected: u32 = made.iter().filter_map(|made| made.attempts).map(|attempts| attempts - 1).sum();
     if rejected > 0 {

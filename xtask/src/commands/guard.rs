@@ -122,3 +122,21 @@ pub(crate) fn run(args: &GuardArgs, output: &Output) -> anyhow::Result<()> {
     output.print("as good as recorded");
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A slip in `guard.toml` was found by the nightly run alone.
+    #[test]
+    fn the_record_can_be_driven_and_names_no_sealed_lot() {
+        let record: Record = toml::from_str(RECORD).unwrap();
+        let default = Settings::preset("default").unwrap();
+        assert!(!record.place.is_empty());
+        for place in &record.place {
+            place.settings(&default).check().unwrap_or_else(|error| panic!("{}: {error:#}", place.name));
+            assert!(place.upper_per_100m > 0.0, "{}", place.name);
+            assert!(place.lots.iter().all(|lot| !lot.starts_with("sealed")), "{}: {:?}", place.name, place.lots);
+        }
+    }
+}

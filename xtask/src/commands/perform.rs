@@ -54,7 +54,8 @@ fn cut_short(root: &Path, finished: usize) -> anyhow::Error {
 /// Says what will be done, with a guess at how long it takes; returns the tasks.
 fn announce(stages: &[Stage], root: &Path, output: &Output) -> anyhow::Result<Vec<Task>> {
     let mut all = Vec::new();
-    let minutes_of = |tasks: &[Task]| tasks.iter().map(|(_, seconds)| seconds / 60.0).sum::<f64>();
+    // The sum of nothing is -0.
+    let minutes_of = |tasks: &[Task]| tasks.iter().map(|(_, seconds)| seconds / 60.0).sum::<f64>() + 0.0;
     output.note("stages, with the minutes they take on two quiet cores:");
     for (index, stage) in stages.iter().enumerate() {
         let left = stage.tasks_left(root)?;

@@ -29,7 +29,7 @@ use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask reproduce                               70 minutes on two cores
+  cargo xtask reproduce                               more than 70 minutes on two cores
   cargo xtask reproduce --preset smoke --out runs/try   every stage within a minute
   cargo xtask reproduce --full --unseen sealed:my-phrase:120:all
   cargo xtask reproduce --full --tables rules,deviations      every table in one run: a night

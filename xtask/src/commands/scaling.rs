@@ -11,7 +11,7 @@ use scenarios::split::Family;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask scaling                                 1, 4, 16 and 64 lots of each family: hours
+  cargo xtask scaling                                 1, 4, 16 and 64 lots of each of twelve families: hours
   cargo xtask scaling --different 2,8 --unseen sealed:my-phrase:90:all
   cargo xtask scaling --resume runs/scaling-default-s1";
 
@@ -34,7 +34,7 @@ pub(crate) struct ScalingArgs {
     unseen: Vec<String>,
 }
 
-/// Lots of each family in every round: about as much as the default trains on; no lot that is there in every training.
+/// Lots of each of the first twelve families in every round: about as much as the default trains on; no lot that is there in every training.
 const LOTS_OF_A_FAMILY: usize = 16;
 
 pub(crate) const COMMAND: &str = "scaling";

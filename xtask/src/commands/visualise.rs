@@ -12,6 +12,7 @@ use evaluation::records::{self, FailureRecord};
 use experiment::drive::Replay;
 use experiment::drivers::DriverSpec;
 use experiment::lots::Lot;
+use experiment::manifest::Manifest;
 use experiment::replay_key::ReplayKey;
 use experiment::run_dir;
 use experiment::settings::{Layers, Settings};
@@ -219,5 +220,9 @@ fn failures_of(args: &FailuresArgs, output: &Output) -> anyhow::Result<Show> {
         let (left, list) = (all - drives.len(), list.display());
         output.note(format_args!("{left} more near-collisions are in {list}; see them with --limit {all}"));
     }
-    Ok(Show::Drives { settings: Box::new(trained::settings_of(&args.run)?), drives })
+    let (settings, manifest) = (trained::settings_of(&args.run)?, Manifest::read(&args.run)?);
+    for key in drives.iter().flat_map(|drive| &drive.keys) {
+        Replay::of_run(key, &settings, &manifest).with_context(|| key.to_string())?;
+    }
+    Ok(Show::Drives { settings: Box::new(settings), drives })
 }

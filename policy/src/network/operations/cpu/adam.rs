@@ -156,3 +156,37 @@ fn update<S: Simd>(
     let change = simd.div_f32s(times(mean, factors.step_size), root);
     [simd.sub_f32s(times(weights, factors.keep), change), mean, mean_square]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_instruction_set_computes_the_same_bits() {
+        let values = |n: usize, prime: usize| -> Vec<f32> {
+            (0..n).map(|i| ((i * prime % 1000) as f32 - 400.0) / 613.0).collect()
+        };
+        let step = AdamStep {
+            learning_rate: 1e-3,
+            beta_1: 0.9,
+            beta_2: 0.999,
+            epsilon: 1e-8,
+            weight_decay: 0.01,
+            gradient_norm_max: 1.0,
+            number: 3,
+        };
+        // Whole lines, and a rest of each kind.
+        for len in [LINE, 3 * LINE + 1, 7 * LINE + 13] {
+            let gradient = values(len, 7919);
+            let sum = vectors::same_on_each(|instructions| instructions.run(SumOfSquares { values: &gradient }));
+            let factors = Factors::of(step, sum.sqrt() as f32);
+            vectors::same_on_each(|instructions| {
+                let (mut weights, mut mean) = (values(len, 31), values(len, 101));
+                let mut mean_square: Vec<f32> = values(len, 211).iter().map(|value| value * value).collect();
+                let (weights, mean, mean_square) = (&mut weights, &mut mean, &mut mean_square);
+                instructions.run(Kernel { factors, weights, gradient: &gradient, mean, mean_square });
+                [weights, mean, mean_square].map(|values| values.clone())
+            });
+        }
+    }
+}

@@ -242,3 +242,32 @@ fn for_each_table_entry(conv: ConvLayer, mut visit: impl FnMut(usize, usize)) {
 }
 
 const _: () = assert!(GRID_CELLS + KERNEL_MAX <= 32 && LANES == 16, "a padded row fits a word");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_instruction_set_computes_the_same_bits() {
+        let values = |n: usize, prime: usize| -> Vec<f32> {
+            (0..n).map(|i| ((i * prime % 1000) as f32 - 400.0) / 613.0).collect()
+        };
+        for (channels, kernel) in [(16, 3), (48, 5)] {
+            let conv = ConvLayer { channels, kernel };
+            let (weight, bias) = (values(channels * kernel * kernel, 7919), values(channels, 31));
+            let layer = &FirstLayer::new(conv, &weight, &bias);
+            let occupied: Vec<u8> = (0..3 * CELLS).map(|i| u8::from(i * i % 7 < 3)).collect();
+            let len = 3 * POOLS * channels;
+            let d_y = values(len, 211);
+            let (_, winners) = vectors::same_on_each(|instructions| {
+                let (mut y, mut winners) = (vec![0.0; len], vec![0; len]);
+                instructions.run(Forward { layer, occupied: &occupied, y: &mut y, winners: &mut winners });
+                (y, winners)
+            });
+            vectors::same_on_each(|instructions| {
+                let share = instructions.run(Backward { layer, occupied: &occupied, winners: &winners, d_y: &d_y });
+                (share.table, share.bias)
+            });
+        }
+    }
+}
