@@ -10,6 +10,8 @@ pub(crate) mod dense;
 pub(crate) mod first_layer;
 mod pool;
 pub(crate) mod residual_layer;
+#[cfg(test)]
+mod same_bits;
 pub(crate) mod second_layer;
 mod vectors;
 

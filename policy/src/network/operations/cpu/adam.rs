@@ -160,12 +160,10 @@ fn update<S: Simd>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::network::operations::cpu::same_bits::{self, values};
 
     #[test]
     fn every_instruction_set_computes_the_same_bits() {
-        let values = |n: usize, prime: usize| -> Vec<f32> {
-            (0..n).map(|i| ((i * prime % 1000) as f32 - 400.0) / 613.0).collect()
-        };
         let step = AdamStep {
             learning_rate: 1e-3,
             beta_1: 0.9,
@@ -178,9 +176,9 @@ mod tests {
         // Whole lines, and a rest of each kind.
         for len in [LINE, 3 * LINE + 1, 7 * LINE + 13] {
             let gradient = values(len, 7919);
-            let sum = vectors::same_on_each(|instructions| instructions.run(SumOfSquares { values: &gradient }));
+            let sum = same_bits::on_each(|instructions| instructions.run(SumOfSquares { values: &gradient }));
             let factors = Factors::of(step, sum.sqrt() as f32);
-            vectors::same_on_each(|instructions| {
+            same_bits::on_each(|instructions| {
                 let (mut weights, mut mean) = (values(len, 31), values(len, 101));
                 let mut mean_square: Vec<f32> = values(len, 211).iter().map(|value| value * value).collect();
                 let (weights, mean, mean_square) = (&mut weights, &mut mean, &mut mean_square);

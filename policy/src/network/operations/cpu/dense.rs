@@ -228,15 +228,17 @@ fn store<S: Simd, const WIDTH: usize>(simd: S, vectors: [S::f32s; WIDTH], into: 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::network::operations::cpu::same_bits::{self, values};
 
     #[test]
     fn every_instruction_set_computes_the_same_bits() {
-        let values = |n: usize| (0..n).map(|i| ((i * 7919 % 1000) as f32 - 400.0).max(0.0) / 613.0).collect::<Vec<_>>();
+        // Zeros are skipped.
+        let values = |n: usize| values(n, 7919).iter().map(|value| value.max(0.0)).collect::<Vec<_>>();
         let (inputs, outputs) = (50, 70);
         let (weight, bias) = (values(inputs * outputs), values(outputs));
         for rows in [1, 5, 130] {
             let x = values(rows * inputs);
-            vectors::same_on_each(|instructions| {
+            same_bits::on_each(|instructions| {
                 let mut y = vec![0.0; rows * outputs];
                 instructions.run(Forward { x: &x, weight: &weight, bias: &bias, y: &mut y });
                 y

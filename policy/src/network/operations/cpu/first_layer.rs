@@ -246,12 +246,10 @@ const _: () = assert!(GRID_CELLS + KERNEL_MAX <= 32 && LANES == 16, "a padded ro
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::network::operations::cpu::same_bits::{self, values};
 
     #[test]
     fn every_instruction_set_computes_the_same_bits() {
-        let values = |n: usize, prime: usize| -> Vec<f32> {
-            (0..n).map(|i| ((i * prime % 1000) as f32 - 400.0) / 613.0).collect()
-        };
         for (channels, kernel) in [(16, 3), (48, 5)] {
             let conv = ConvLayer { channels, kernel };
             let (weight, bias) = (values(channels * kernel * kernel, 7919), values(channels, 31));
@@ -259,12 +257,12 @@ mod tests {
             let occupied: Vec<u8> = (0..3 * CELLS).map(|i| u8::from(i * i % 7 < 3)).collect();
             let len = 3 * POOLS * channels;
             let d_y = values(len, 211);
-            let (_, winners) = vectors::same_on_each(|instructions| {
+            let (_, winners) = same_bits::on_each(|instructions| {
                 let (mut y, mut winners) = (vec![0.0; len], vec![0; len]);
                 instructions.run(Forward { layer, occupied: &occupied, y: &mut y, winners: &mut winners });
                 (y, winners)
             });
-            vectors::same_on_each(|instructions| {
+            same_bits::on_each(|instructions| {
                 let share = instructions.run(Backward { layer, occupied: &occupied, winners: &winners, d_y: &d_y });
                 (share.table, share.bias)
             });

@@ -290,24 +290,22 @@ const _: () = assert!(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::network::operations::cpu::same_bits::{self, values};
 
     #[test]
     fn every_instruction_set_computes_the_same_bits() {
-        let values = |n: usize, prime: usize| -> Vec<f32> {
-            (0..n).map(|i| ((i * prime % 1000) as f32 - 400.0) / 613.0).collect()
-        };
         for (cells, channels) in [(12, 16), (6, 48)] {
             let (weight, bias) = (values(channels * channels * 9, 7919), values(channels, 31));
             let layer = ResidualLayer::new(cells, &weight, &bias);
             let (windows, transposed) = (layer.windows(), layer.transposed());
             let len = 3 * cells * cells * channels;
             let (x, d_y) = (values(len, 101), values(len, 211));
-            let (_, cut_off) = vectors::same_on_each(|instructions| {
+            let (_, cut_off) = same_bits::on_each(|instructions| {
                 let (mut y, mut cut_off) = (vec![0.0; len], vec![0; len]);
                 instructions.run(Forward { layer, windows: &windows, x: &x, y: &mut y, cut_off: &mut cut_off });
                 (y, cut_off)
             });
-            vectors::same_on_each(|instructions| {
+            same_bits::on_each(|instructions| {
                 let mut d_x = vec![0.0; len];
                 let (windows, transposed) = (windows.as_slice(), transposed.as_slice());
                 let kernel =

@@ -358,12 +358,10 @@ fn for_each_group(len: usize, mut visit: impl FnMut(usize, Group)) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::network::operations::cpu::same_bits::{self, values};
 
     #[test]
     fn every_instruction_set_computes_the_same_bits() {
-        let values = |n: usize, prime: usize| -> Vec<f32> {
-            (0..n).map(|i| ((i * prime % 1000) as f32 - 400.0) / 613.0).collect()
-        };
         for (inputs, channels, kernel) in [(16, 32, 3), (32, 48, 2)] {
             let conv = ConvLayer { channels, kernel };
             let (weight, bias) = (values(channels * inputs * kernel * kernel, 7919), values(channels, 31));
@@ -372,12 +370,12 @@ mod tests {
             let len = 3 * POOLS * channels;
             let x: Vec<f32> = values(3 * layer.convolution.input_len(), 101).iter().map(|x| x.max(0.0)).collect();
             let d_y = values(len, 211);
-            let (_, winners) = vectors::same_on_each(|instructions| {
+            let (_, winners) = same_bits::on_each(|instructions| {
                 let (mut y, mut winners) = (vec![0.0; len], vec![0; len]);
                 instructions.run(Forward { layer, windows: &windows, x: &x, y: &mut y, winners: &mut winners });
                 (y, winners)
             });
-            vectors::same_on_each(|instructions| {
+            same_bits::on_each(|instructions| {
                 let mut d_x = vec![0.0; x.len()];
                 let (windows, by_output) = (windows.as_slice(), by_output.as_slice());
                 let kernel = Backward { layer, windows, by_output, x: &x, d_x: &mut d_x, winners: &winners, d_y: &d_y };

@@ -61,37 +61,3 @@ pub(super) fn whole_mut<S: Simd, const WIDTH: usize>(values: &mut [f32]) -> Opti
     let (vectors, rest) = S::as_mut_simd_f32s(values);
     if rest.is_empty() { vectors.try_into().ok() } else { None }
 }
-
-/// An instruction set, for tests that hold what this module promises.
-#[cfg(test)]
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Instructions {
-    Scalar,
-    #[cfg(target_arch = "x86_64")]
-    Avx2(pulp::x86::V3),
-    Widest,
-}
-
-#[cfg(test)]
-impl Instructions {
-    pub(super) fn run<K: WithSimd>(self, kernel: K) -> K::Output {
-        match self {
-            Self::Scalar => kernel.with_simd(pulp::Scalar),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(avx2) => Simd::vectorize(avx2, kernel),
-            Self::Widest => run(kernel),
-        }
-    }
-}
-
-/// Asserts that what is computed with every instruction set of this processor is the same, and gives it.
-#[cfg(test)]
-pub(super) fn same_on_each<T: PartialEq + std::fmt::Debug>(compute: impl Fn(Instructions) -> T) -> T {
-    let scalar = compute(Instructions::Scalar);
-    assert_eq!(compute(Instructions::Widest), scalar, "the widest");
-    #[cfg(target_arch = "x86_64")]
-    if let Some(avx2) = pulp::x86::V3::try_new() {
-        assert_eq!(compute(Instructions::Avx2(avx2)), scalar, "AVX2");
-    }
-    scalar
-}
