@@ -1,7 +1,7 @@
 //! Tests hold what [`vectors`](super::vectors) promises: the same bits with every instruction set.
 
 use super::vectors;
-use pulp::{Simd, WithSimd};
+use pulp::WithSimd;
 use std::fmt::Debug;
 
 /// What a kernel is run with.
@@ -18,7 +18,7 @@ impl Instructions {
         match self {
             Self::Scalar => kernel.with_simd(pulp::Scalar),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2(avx2) => Simd::vectorize(avx2, kernel),
+            Self::Avx2(avx2) => pulp::Simd::vectorize(avx2, kernel),
             Self::Widest => vectors::run(kernel),
         }
     }
