@@ -8,7 +8,7 @@ use crate::format::{clustered, difference, exact_rate, interval, quoted_interval
 use crate::incidents::Cause;
 use crate::judge::{Comparison, DriverEstimate};
 use crate::names::{BC, DAGGER};
-use crate::paper;
+use crate::paper::{self, PaperLot};
 use crate::plan::Plan;
 use crate::results::EvaluationResults;
 use crate::slices::{Slice, SliceKind};
@@ -96,6 +96,13 @@ impl DrivenPlan<'_> {
         self.plan.drivers.iter().position(|driver| driver.name == name)
     }
 
+    /// Whether the paper's three lots were driven, and no others.
+    pub fn is_of_papers_lots(&self) -> bool {
+        let groups = self.results.groups();
+        let is_driven = |lot: &PaperLot| groups.iter().any(|group| group.name == lot.lot);
+        groups.len() == paper::LOTS.len() && paper::LOTS.iter().all(is_driven)
+    }
+
     /// All lots together.
     pub fn all(&self) -> Slice {
         self.results.slices().pop().expect("at least one lot is driven")
@@ -163,7 +170,8 @@ pub struct Against<'a> {
 
 /// What the paper concludes from its drives on its lots.
 pub fn on_reference_lots(driven: &DrivenPlan<'_>) -> Vec<Statement> {
-    let Some(all) = driven.against_dagger(driven.all(), "on the paper's lots") else { return Vec::new() };
+    let place = if driven.is_of_papers_lots() { "on the paper's lots" } else { "on the lots of the evaluation" };
+    let Some(all) = driven.against_dagger(driven.all(), place) else { return Vec::new() };
     let unseen = driven.unseen().and_then(|unseen| driven.against_dagger(unseen, "on the lots it was not trained on"));
     let mut statements = vec![all.no_near_collision()];
     statements.extend(unseen.as_ref().map(Against::no_near_collision));
@@ -366,9 +374,7 @@ impl Against<'_> {
         let name = self.name(planner);
         let of_paper = paper::DRIVERS.iter().position(|known| *known == name)?;
         let (events, metres) = paper::count(of_paper, |_| true);
-        let groups = self.driven.results.groups();
-        let has_all = paper::LOTS.iter().all(|lot| groups.iter().any(|group| group.name == lot.lot));
-        let ours = (has_all && groups.len() == paper::LOTS.len()).then(|| self.totals(planner))?;
+        let ours = self.driven.is_of_papers_lots().then(|| self.totals(planner))?;
         let exact = RateRatio::new((ours.near_collisions, ours.reference_m / 100.0), (events, metres / 100.0));
         let estimate = &self.estimates[planner];
         let ratio = match clustered(estimate) {
@@ -446,7 +452,8 @@ pub fn share_of_the_network(rows: &[IterationRow], eta: f64) -> Statement {
 pub fn effect_of_the_weight(iteration: u32, of_samples: Option<Interval>, by_seed: &[f64]) -> Statement {
     let of_seeds = (by_seed.len() >= TRAININGS_MIN).then(|| {
         let (mean, half_width) = (by_seed.mean(), half_width_of_mean(by_seed));
-        Interval { estimate: mean, lower: mean - half_width, upper: mean + half_width, units: by_seed.len() as u32 }
+        let pairs = by_seed.len() as u32;
+        Interval { estimate: mean, lower: mean - half_width, upper: mean + half_width, units: pairs, apart: pairs }
     });
     // Student's interval holds for few values, other than the bootstrap's.
     let verdict = match of_seeds {

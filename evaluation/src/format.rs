@@ -41,7 +41,14 @@ pub fn contacts_interval(totals: &Totals, estimate: &DriverEstimate) -> [f64; 2]
 /// Contacts, and their rate with the interval that may be quoted.
 pub fn quoted_contacts(totals: &Totals, estimate: &DriverEstimate) -> String {
     let [lower, upper] = contacts_interval(totals, estimate);
-    format!("{}: {:.2} [{lower:.2}, {upper:.2}]", totals.contacts, totals.contact_rate().per_unit)
+    let (rate, digits) = (totals.contact_rate().per_unit, digits_of(upper, 2));
+    format!("{}: {rate:.digits$} [{lower:.digits$}, {upper:.digits$}]", totals.contacts)
+}
+
+/// As many digits as are asked for, or more (four at most) where a value that is not zero would look like zero.
+fn digits_of(value: f64, digits: usize) -> usize {
+    let is_shown = |&digits: &usize| format!("{value:.digits$}").contains(|digit: char| ('1'..='9').contains(&digit));
+    (digits..=4).find(is_shown).unwrap_or(digits)
 }
 
 /// The farther ends of the exact interval and, if it counts, the bootstrap's: clusters make that wider, and of few events it may
@@ -61,8 +68,9 @@ pub fn quoted_rate(totals: &Totals, estimate: &DriverEstimate) -> String {
 
 /// The rate with its exact interval; for a count of zero the bound it really supports.
 pub fn exact_rate(near_collisions: u32, reference_m: f64) -> String {
-    let rate = Rate::new(near_collisions, reference_m / 100.0);
-    let interval = format!("{:.2} [{:.2}, {:.2}]", rate.per_unit, rate.lower, rate.upper);
+    let Rate { per_unit, lower, upper } = Rate::new(near_collisions, reference_m / 100.0);
+    let digits = digits_of(upper, 2);
+    let interval = format!("{per_unit:.digits$} [{lower:.digits$}, {upper:.digits$}]");
     if near_collisions > 0 {
         return interval;
     }
@@ -86,7 +94,10 @@ pub fn difference(interval: Option<Interval>, digits: usize) -> String {
         || "–".to_owned(),
         |interval| {
             let Interval { estimate, lower, upper, .. } = interval;
-            let mark = if interval.excludes_zero() { " *" } else { "" };
+            let is_marked = interval.excludes_zero();
+            // A mark beside an end that looks like zero would contradict it.
+            let digits = if is_marked { digits_of(lower.abs().min(upper.abs()), digits) } else { digits };
+            let mark = if is_marked { " *" } else { "" };
             format!("{estimate:+.digits$} [{lower:+.digits$}, {upper:+.digits$}]{mark}")
         },
     )
@@ -112,8 +123,9 @@ mod tests {
     fn a_zero_says_what_it_supports_and_clusters_are_quoted_by_the_bootstrap() {
         assert_eq!(exact_rate(0, 5180.0), "0.00 [0.00, 0.07], < 0.058 one-sided");
         assert_eq!(exact_rate(71, 5180.0), "1.37 [1.07, 1.73]");
+        assert_eq!(exact_rate(0, 280_306.0), "0.000 [0.000, 0.001], < 0.001 one-sided", "it was [0.00, 0.00]");
         let totals = Totals { near_collisions: 71, reference_m: 5180.0, ..Totals::default() };
-        let interval = Interval { estimate: 1.37, lower: 0.9, upper: 2.0, units: 15 };
+        let interval = Interval { estimate: 1.37, lower: 0.9, upper: 2.0, units: 15, apart: 15 };
         let estimate = |index| DriverEstimate {
             dispersion: Some(Dispersion { index, freedom: 9, p_value: 0.1 }),
             per_100m: Some(interval),
@@ -132,12 +144,16 @@ mod tests {
         );
         let totals = Totals { contacts: 4, ..totals };
         let contacts = |lower, upper| {
-            let contacts_per_100m = Some(Interval { estimate: 0.077, lower, upper, units: 15 });
+            let contacts_per_100m = Some(Interval { estimate: 0.077, lower, upper, units: 15, apart: 15 });
             quoted_contacts(&totals, &DriverEstimate { contacts_per_100m, ..DriverEstimate::default() })
         };
         // Garwood's interval of 4 is [1.09, 10.24].
         assert_eq!(contacts(0.0, 0.3), "4: 0.08 [0.00, 0.30]", "all of them in one drive");
         assert_eq!(contacts(0.05, 0.1), "4: 0.08 [0.02, 0.20]");
+        let none = Totals { reference_m: 93_118.0, ..Totals::default() };
+        assert_eq!(quoted_contacts(&none, &DriverEstimate::default()), "0: 0.000 [0.000, 0.004]");
+        let beside_zero = Interval { estimate: -0.0054, lower: -0.0112, upper: -0.0011, ..interval };
+        assert_eq!(difference(Some(beside_zero), 2), "-0.005 [-0.011, -0.001] *", "it was -0.01 [-0.01, -0.00] *");
         let around_zero = Interval { lower: -0.1, ..interval };
         assert_eq!(difference(Some(around_zero), 1), "+1.4 [-0.1, +2.0]");
         let ratio = RateRatio { ratio: Some(1.97), lower: 0.86, upper: Some(4.28), p_value: 0.08 };

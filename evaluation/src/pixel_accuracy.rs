@@ -16,7 +16,7 @@ const TICKS_PER_POSE: u32 = 14;
 /// The paper's accuracies (docs/methods.md 0).
 pub const PAPER: [(&str, f64); 3] = [("lot-a", 98.14), ("lot-b", 97.75), ("lot-c", 97.85)];
 
-/// Shares of pixels, summed over poses.
+/// Pixels, summed over poses.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Pixels {
     /// Poses looked from.

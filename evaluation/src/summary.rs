@@ -80,11 +80,11 @@ pub struct Row {
     pub bootstrap_lower: Option<f64>,
     /// See `bootstrap_lower`.
     pub bootstrap_upper: Option<f64>,
-    /// Variance over mean of the counts; 1 = independent events.
+    /// Variance of the rate over that of as many independent events.
     pub dispersion: Option<f64>,
-    /// p-value of a dispersion as large, if events were independent.
+    /// p-value of Pearson's X² of the counts, if events were independent.
     pub dispersion_p: Option<f64>,
-    /// Mean over lots and directions, per 100 m.
+    /// Mean over groups of lots and directions, per 100 m.
     pub per_100m_unweighted: Option<f64>,
     /// Mean over runs, 0…1.
     pub safe_ratio: f64,
@@ -92,7 +92,7 @@ pub struct Row {
     pub safe_ratio_lower: Option<f64>,
     /// See `safe_ratio_lower`.
     pub safe_ratio_upper: Option<f64>,
-    /// Mean over lots and directions.
+    /// Mean over groups of lots and directions.
     pub safe_ratio_unweighted: Option<f64>,
     /// Times the body touched something.
     pub contacts: u32,

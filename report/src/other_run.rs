@@ -11,7 +11,7 @@ use experiment::manifest::{self, Manifest};
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::convert::Infallible;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use storage::sums;
 
@@ -26,7 +26,8 @@ impl FromStr for OtherRun {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(match text.split_once('=') {
+        // Folders may be called after what was set: `runs/dead_time_s=0.5`.
+        Ok(match text.split_once('=').filter(|_| !Path::new(text).is_dir()) {
             Some((title, folder)) => Self { title: Some(title.to_owned()), folder: folder.into() },
             None => Self { title: None, folder: text.into() },
         })
@@ -129,6 +130,11 @@ mod tests {
         let titled = OtherRun { title: Some("The paper's regime".to_owned()), folder: "runs/paper".into() };
         assert_eq!(of("The paper's regime=runs/paper"), titled);
         assert_eq!(titled.to_string(), "The paper's regime=runs/paper");
+        // It was taken for the title of a folder `0.5`.
+        let folder = std::env::temp_dir().join(format!("report-test-{}-dead_time_s=0.5", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        assert_eq!(of(folder.to_str().unwrap()), OtherRun { title: None, folder: folder.clone() });
+        std::fs::remove_dir_all(folder).unwrap();
         let error = of("no/such/run").add_to(&mut Page::new("Results")).unwrap_err().to_string();
         assert!(error.contains("no/such/run: this is not a finished run"), "{error}");
     }

@@ -220,7 +220,8 @@ impl Found {
 fn headline(page: &mut Page, reference: &DrivenPlan<'_>, unseen: &DrivenPlan<'_>) {
     let mut table =
         table_of(&["driver", "lots", "route", "near-collisions", "per 100 m [95 %]", "contacts", "least clearance"]);
-    for (driven, label) in [(reference, "the paper's three"), (unseen, "unseen, generated")] {
+    let of_reference = if reference.is_of_papers_lots() { "the paper's three" } else { "of the evaluation" };
+    for (driven, label) in [(reference, of_reference), (unseen, "unseen, generated")] {
         let place = Place::new(label, driven, driven.all());
         for name in ["expert", DAGGER, BC, "tentacle, tuned"] {
             let Some(driver) = driven.driver(name) else { continue };
@@ -251,7 +252,8 @@ fn how_they_drove(reference: &DrivenPlan<'_>, unseen: &DrivenPlan<'_>) -> String
         "m/s",
         "reversals per 100 m",
     ]);
-    for (driven, label) in [(reference, "the paper's"), (unseen, UNSEEN)] {
+    let of_reference = if reference.is_of_papers_lots() { "the paper's" } else { "of the evaluation" };
+    for (driven, label) in [(reference, of_reference), (unseen, UNSEEN)] {
         let slice = driven.all();
         for (driver, named) in driven.plan.drivers.iter().enumerate() {
             let totals = driven.results.totals(0, driver, &slice, None);
@@ -327,7 +329,7 @@ fn verdicts(statements: &[Statement], extent: &Extent) -> String {
     let mut text = "Decided from the runs of this report: a comparison *holds* where the paired interval of 95 % lies on the \
                     paper's side of zero, *does not hold* where it lies on the other, and *cannot be told* where it contains \
                     zero (differences are the other driver's − DAgger's in near-collisions and reversals, DAgger's − the \
-                    other driver's in safe ratios; * = excludes zero, by six trials or more). Beside near-collisions, contacts \
+                    other driver's in safe ratios; * = excludes zero, by six trials or lots that differ, or more). Beside near-collisions, contacts \
                     in brackets. Statements on none at all, on noise, on the paper's rates, on η̂ and on the weight are decided by the \
                     figures beside them. Nothing is adjusted for the number of statements.\n"
         .to_owned();
@@ -466,9 +468,14 @@ fn rates_table(judged: &JudgedSlices<'_>, with_paper: bool) -> String {
     by_lot(judged, &cell, &of_paper)
 }
 
+/// What the lots of the settings are called: `--preset smoke` has lot b alone.
+fn lots_of(driven: &DrivenPlan<'_>) -> &'static str {
+    if driven.is_of_papers_lots() { "the paper's lots" } else { "the lots of the evaluation" }
+}
+
 fn collision_rates(page: &mut Page, judged: &JudgedSlices<'_>) {
     page.section(
-        "Collision rates on the paper's lots",
+        format!("Collision rates on {}", lots_of(judged.driven)),
         format!(
             "Near-collisions (contacts), and near-collisions per 100 m of the route [95 %]. The paper's counts are recovered from \
              its rates.\n\n{}",
@@ -481,7 +488,7 @@ fn collision_rates(page: &mut Page, judged: &JudgedSlices<'_>) {
         "The paper's comparison beside ours, with intervals of 95 %: of the paper's counts exact ones, of ours as in the table.",
         Image::Svg(plots::bars("Collision rate", "near-collisions per 100 m", &paper::DRIVERS, &rates)),
     );
-    page.figure("rates", "Every driver, all lots of the paper together.", Image::Svg(rates_of_all(judged)));
+    page.figure("rates", "Every driver, all of these lots together.", Image::Svg(rates_of_all(judged)));
 }
 
 /// Near-collisions per 100 m, the paper's and ours.
@@ -550,7 +557,10 @@ fn safe_ratios(page: &mut Page, judged: &JudgedSlices<'_>) {
     };
     let text = "Drivable share of the metre around the body, mean over runs [95 %]. The widths of these lots were chosen so that \
                 a prototype's expert came near the paper's safe ratios: the expert's, and those of who imitates it well, are fitted, not found.";
-    page.section("Safe ratios on the paper's lots", format!("{text}\n\n{}", by_lot(judged, &cell, &of_paper)));
+    page.section(
+        format!("Safe ratios on {}", lots_of(judged.driven)),
+        format!("{text}\n\n{}", by_lot(judged, &cell, &of_paper)),
+    );
     let ratios = bars_beside_paper(
         judged,
         &|totals, estimate| (totals.safe_ratio(), estimate.safe_ratio.map(|interval| [interval.lower, interval.upper])),
@@ -640,9 +650,10 @@ fn weight_and_cloning(driven: &DrivenPlan<'_>) -> String {
         }
     }
     format!(
-        "### α, and behaviour cloning against DAgger\n\nPaired differences on the paper's lots; a positive one in \
+        "### α, and behaviour cloning against DAgger\n\nPaired differences on {}; a positive one in \
          near-collisions speaks for DAgger with the weight (*: excludes zero). Of several trainings the means are compared, safe \
-         ratios of the first.\n\n{table}"
+         ratios of the first.\n\n{table}",
+        lots_of(driven)
     )
 }
 
@@ -653,7 +664,7 @@ fn calibration(page: &mut Page, found: &[Calibration]) {
             States::HeldBack => "held-back samples",
             States::OnPolicy => "driving, expert watching",
         };
-        // Bins hold as many samples each, the last one fewer: close enough for a ratio of two digits.
+        // Bins hold as many samples each, or one more: close enough for a ratio of two digits.
         let mean_square = |which: usize| bins.iter().map(|bin| bin[which] * bin[which]).sum::<f64>();
         let ratio = (mean_square(1) / mean_square(0).max(f64::MIN_POSITIVE)).sqrt();
         table.add_row([

@@ -102,13 +102,13 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
          - Intervals of 95 %: exact Poisson, or (b) paired bootstrap ({DRAWS} draws of whole trials, both ways together; of whole \
          lots where these are a sample: generated, or six or more from files) where the dispersion exceeds {DISPERSION_MAX} and \
          events cannot be taken for independent; (b) is no narrower than the exact one. \"< one-sided\": the bound of 95 % where there was none.\n\
-         - Dispersion: variance of the counts of trials over their mean; 1 if each near-collision came by itself.\n\
+         - Dispersion: variance of the rate over what it would be if each near-collision came by itself.\n\
          - Contacts: times the body touched something, with the wider of both intervals, since one drive may have many.\n\
-         - Unweighted: every lot and direction counts the same, however long its route.\n\
+         - Unweighted: every lot, or all generated ones of a kind, and direction counts the same, however long its route.\n\
          - Stuck: no headway for a while. Given up: too many near-collisions in one run. Timed out: the time limit. Reversals: changes of \
          the steering's direction. Steering: how far the wheels were turned in all.\n\
          - Safe ratio: free share of the metre around the body; its intervals, and those of differences (Δ), are bootstrap.\n\
-         - *: excludes zero, by six trials or more. Rate ratio and p: exact test of equal rates; – where events of \
+         - *: excludes zero, by six trials or lots that differ, or more. Rate ratio and p: exact test of equal rates; – where events of \
          either driver cluster, as for (b). Holm: adjusted for the drivers compared.",
         seed.0
     );

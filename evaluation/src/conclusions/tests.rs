@@ -132,6 +132,9 @@ fn behaviour_cloning_and_planners_are_compared_and_other_trainings_are_not() {
         .collect();
     let expected = ["BC", "vvf", "vvf, tuned"].map(|name| format!("DAgger has fewer near-collisions than {name} here"));
     assert_eq!(claims, expected);
+    // With `--preset smoke`, lot b alone was called the paper's three.
+    let claim = &on_reference_lots(&driven)[0].claim;
+    assert_eq!(claim, "DAgger drives on the lots of the evaluation without a near-collision");
 }
 
 /// "In short" and the verdicts had Poisson's interval where the tables beside them had the bootstrap's.
@@ -362,7 +365,7 @@ fn shares_and_effects() {
     ] {
         assert_eq!(share_of_the_network(&rows(shares), 0.9).verdict, expected, "{shares:?}");
     }
-    let of_samples = Some(Interval { estimate: 0.7, lower: 0.69, upper: 0.71, units: 6 });
+    let of_samples = Some(Interval { estimate: 0.7, lower: 0.69, upper: 0.71, units: 6, apart: 6 });
     let effect = |of_samples, by_seed: &[f64]| effect_of_the_weight(1, of_samples, by_seed);
     assert_eq!(effect(of_samples, &[0.7, 0.72, 0.68]).verdict, Verdict::Holds);
     assert_eq!(effect(of_samples, &[0.7, 1.1, 0.9]).verdict, Verdict::CannotBeTold);

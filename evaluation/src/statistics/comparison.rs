@@ -149,7 +149,7 @@ mod tests {
     /// A rate that is known makes the ratio as uncertain as the other is; where both are not, by hand.
     #[test]
     fn intervals_of_two_rates_make_that_of_their_ratio() {
-        let first = Interval { estimate: 4.0, lower: 4.0, upper: 4.0, units: 1 };
+        let first = Interval { estimate: 4.0, lower: 4.0, upper: 4.0, units: 1, apart: 1 };
         let [lower, upper] = ratio_of_intervals(first, (2.0, [1.6, 2.5]));
         assert_near(lower, 4.0 / 2.5, 1e-12);
         assert_near(upper, 4.0 / 1.6, 1e-12);
@@ -160,7 +160,7 @@ mod tests {
         let [lower, upper] = ratio_of_intervals(Interval { lower: 3.0, upper: 6.0, ..first }, (2.0, [1.6, 2.5]));
         assert_near(lower, (8.0 - 7.75_f64.sqrt()) / 3.75, 1e-12);
         assert_near(upper, (8.0 + 17.92_f64.sqrt()) / 3.84, 1e-12);
-        let none = Interval { estimate: 0.0, lower: 0.0, upper: 0.5, units: 1 };
+        let none = Interval { estimate: 0.0, lower: 0.0, upper: 0.5, units: 1, apart: 0 };
         assert_near(ratio_of_intervals(none, (2.0, [1.6, 2.5]))[0], 0.0, 1e-12);
     }
 

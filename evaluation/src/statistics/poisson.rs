@@ -54,11 +54,12 @@ impl Rate {
 /// How much more the counts of units vary than independent events would: 1 for Poisson counts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Dispersion {
-    /// Pearson's X² / degrees of freedom; var / mean where all units have the same exposure.
+    /// Variance of the rate of all, where units are drawn within their strata, over that of as many independent events. Not
+    /// Pearson's X² over its degrees of freedom, to which a quiet stratum adds as much as the one with most events.
     pub index: f64,
-    /// Degrees of freedom: units less strata.
+    /// Degrees of freedom of X²: units less strata.
     pub freedom: u32,
-    /// Probability of a larger index if the events were independent (χ² approximation).
+    /// Probability of a larger X² if the events were independent (χ² approximation).
     pub p_value: f64,
 }
 
@@ -67,23 +68,30 @@ impl Dispersion {
     /// that a hard lot and an easy one are not mistaken for clusters. `None` without two units in a stratum that saw an
     /// event.
     pub fn within<'a>(strata: impl IntoIterator<Item = &'a [(u32, f64)]>) -> Option<Self> {
-        let (mut x_squared, mut freedom) = (0.0, 0);
+        let sums = |units: &[(u32, f64)]| {
+            units.iter().fold((0.0, 0.0), |(n, of), &(events, exposure)| (n + f64::from(events), of + exposure))
+        };
+        let strata: Vec<&[(u32, f64)]> = strata.into_iter().filter(|units| units.len() > 1).collect();
+        let (all_events, all_exposure) = sums(&strata.concat());
+        let rate_of_all = all_events / all_exposure;
+        let (mut variance, mut x_squared, mut freedom) = (0.0, 0.0, 0);
         for units in strata {
-            let events: u32 = units.iter().map(|(events, _)| events).sum();
-            let exposure: f64 = units.iter().map(|(_, exposure)| exposure).sum();
-            if events == 0 || units.len() < 2 {
-                continue;
+            let (n, (events, exposure)) = (units.len() as f64, sums(units));
+            // Drawn once more, a unit adds its exposure as well: what moves the rate of all is what it has beyond that.
+            let mean = (events - rate_of_all * exposure) / n;
+            let off = |&(events, exposure): &(u32, f64)| f64::from(events) - rate_of_all * exposure - mean;
+            variance += n / (n - 1.0) * units.iter().map(off).map(|off| off * off).sum::<f64>();
+            if events > 0.0 {
+                let of_unit = |&(found, of): &(u32, f64)| {
+                    let expected = events / exposure * of;
+                    (f64::from(found) - expected) * (f64::from(found) - expected) / expected
+                };
+                x_squared += units.iter().map(of_unit).sum::<f64>();
+                freedom += units.len() as u32 - 1;
             }
-            let rate = f64::from(events) / exposure;
-            x_squared += units
-                .iter()
-                .map(|&(events, exposure)| (f64::from(events) - rate * exposure, rate * exposure))
-                .map(|(off, expected)| off * off / expected)
-                .sum::<f64>();
-            freedom += units.len() as u32 - 1;
         }
         (freedom > 0).then(|| Self {
-            index: x_squared / f64::from(freedom),
+            index: variance / all_events,
             freedom,
             p_value: ChiSquared::new(f64::from(freedom)).expect("freedom is positive").sf(x_squared),
         })
@@ -156,6 +164,27 @@ mod tests {
         assert_eq!(index(&[&[(1, 10.0), (2, 20.0)]]), Some((0.0, 1)));
         assert_eq!(index(&[&[(1, 1.0), (1, 1.0)], &[(9, 1.0), (9, 1.0)]]), Some((0.0, 2)));
         assert_eq!(index(&[&[(0, 1.0), (0, 1.0)], &[(3, 1.0)]]), None);
+    }
+
+    /// Pearson's X² per degree of freedom is 1.4 here: the exact interval, of half the variance, was quoted.
+    #[test]
+    fn what_varies_where_most_events_are_makes_the_rate_uncertain() {
+        let many = [(11, 1.0), (29, 1.0), (20, 1.0), (20, 1.0), (20, 1.0)];
+        let few = [(0, 1.0), (1, 1.0), (0, 1.0), (1, 1.0), (0, 1.0)];
+        let found = Dispersion::within([&many[..], &few[..]]).unwrap();
+        // 5/4 · 162 and 5/4 · 1.2, over 102; X² = 8.1 + 3.
+        assert!((found.index - 2.0).abs() < 1e-9, "{found:?}");
+        assert!(found.freedom == 8 && (0.15..0.25).contains(&found.p_value), "{found:?}");
+    }
+
+    /// A long lot of a hard kind has more events and more metres, but too few of these for so many: which of them are drawn
+    /// moves the rate of all, though each has its kind's rate. X² is 0.
+    #[test]
+    fn lots_of_other_lengths_make_the_rate_uncertain_where_kinds_differ() {
+        let (hard, easy) = ([(9, 1.0), (27, 3.0)], [(0, 2.0), (0, 2.0)]);
+        let found = Dispersion::within([&hard[..], &easy[..]]).unwrap();
+        // 36 in 8: 4.5 each. Of the hard ones 4.5 and 13.5 are beyond that, 4.5 off their mean: 2 · 2 · 4.5² over 36.
+        assert!((found.index - 2.25).abs() < 1e-9 && found.p_value > 0.999, "{found:?}");
     }
 
     /// Bortkiewicz's horse kicks (1898), 200 corps-years: mean .61, variance .6110 (with n − 1), so nearly Poisson.

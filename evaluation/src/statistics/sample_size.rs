@@ -3,8 +3,8 @@
 use super::poisson;
 use statrs::distribution::{Binomial, ContinuousCDF as _, Discrete as _, DiscreteCDF as _, Normal, Poisson};
 
-/// Expected events of both drivers up to which the power is computed exactly; beyond, the square-root approximation is
-/// within a per cent.
+/// Expected events of both drivers up to which the power is computed exactly; beyond, the square-root approximation is one
+/// or two per cent too short.
 const EXACT_UP_TO: f64 = 3000.0;
 
 /// Where the search for the length of a drive begins, hundreds of metres.

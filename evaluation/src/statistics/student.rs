@@ -23,12 +23,11 @@ pub fn half_width_of_mean(values: &[f64]) -> f64 {
 ///
 /// Source: Zou and Donner, Construction of confidence limits about effect measures, Statistics in Medicine 27 (2008).
 pub fn widened(interval: Interval, half_width: f64) -> Interval {
-    let Interval { estimate, lower, upper, units } = interval;
+    let Interval { estimate, lower, upper, .. } = interval;
     Interval {
-        estimate,
         lower: estimate - together(estimate - lower, half_width),
         upper: estimate + together(upper - estimate, half_width),
-        units,
+        ..interval
     }
 }
 
@@ -53,7 +52,7 @@ mod tests {
 
     #[test]
     fn independent_errors_add_up_as_squares() {
-        let interval = Interval { estimate: 10.0, lower: 7.0, upper: 22.0, units: 9 };
+        let interval = Interval { estimate: 10.0, lower: 7.0, upper: 22.0, units: 9, apart: 9 };
         assert_eq!(widened(interval, 0.0), interval);
         let both = widened(interval, 4.0);
         assert_eq!([both.lower, both.upper], [5.0, 10.0 + 160.0_f64.sqrt()]);
