@@ -50,7 +50,7 @@ const KERB_DIRECTIONS: u8 = 36;
 /// Kerbs that are tried are this far from each other, metres.
 const KERBS_APART_M: f32 = 1.0;
 /// Kerbs that are laid at most; a lot that needs more is open ground.
-const KERBS_MAX: usize = 40;
+pub(crate) const KERBS_MAX: usize = 40;
 
 /// A way that leaves the route.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,27 +102,36 @@ pub(crate) fn close(lot: &mut Scenario, vehicle: &VehicleSettings) -> Vec<Vec2> 
     let mut closed = Vec::new();
     // What no kerb closes, and how many were closed when that was last tried.
     let (mut open, mut closed_before) = (Vec::<Opening>::new(), 0);
-    while closed.len() < KERBS_MAX
-        && let Ok(map) = Map::build(lot.clone(), vehicle)
-    {
-        // A kerb may close several ways: look again after each. Every kerb that is tried costs a map.
+    // Every kerb that is tried costs a map and a look at its ways: those of the kerb that is laid are kept.
+    let seen = |lot: &Scenario| {
+        let map = Map::build(lot.clone(), vehicle).ok()?;
         let ways = find(&map, vehicle);
+        Some((map, ways))
+    };
+    let mut present = seen(lot);
+    while closed.len() < KERBS_MAX
+        && let Some((map, ways)) = &present
+    {
+        // A kerb may close several ways: look again after each.
         let branches = ways.branches.iter().map(|branch| (Opening::Branch(branch.mouth), &branch.way));
         let short_cuts = ways.short_cuts.iter().map(|short_cut| (Opening::ShortCut(short_cut.middle), &short_cut.way));
         let closing = branches.chain(short_cuts).find_map(|(opening, way)| {
             if open.iter().any(|other| other.is_same_as(opening)) {
                 return None;
             }
-            let is_closed = |map: &Map| opening.is_closed(&ways, &find(map, vehicle));
-            let with_kerb =
-                kerbs(&map, way).find(|lot| Map::build(lot.clone(), vehicle).is_ok_and(|map| is_closed(&map)));
-            if with_kerb.is_none() {
+            let closes = |lot: Scenario| {
+                let after = seen(&lot).filter(|(_, after)| opening.is_closed(ways, after))?;
+                Some((lot, after))
+            };
+            let closing = kerbs(map, way).find_map(closes);
+            if closing.is_none() {
                 open.push(opening);
             }
-            Some((opening.place(), with_kerb?))
+            Some((opening.place(), closing?))
         });
-        if let Some((place, with_kerb)) = closing {
+        if let Some((place, (with_kerb, after))) = closing {
             *lot = with_kerb;
+            present = Some(after);
             closed.push(place);
         } else if closed.len() > closed_before {
             // A kerb may end at another one that was not there before.

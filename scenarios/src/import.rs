@@ -18,7 +18,7 @@ use crate::note::{Loaded, Note, ShortCut};
 use crate::solver;
 use crate::solver::route::{self, Finish, NoRoute};
 use frame::Frame;
-use ground::Ground;
+use ground::{Ground, Numbers};
 use serde::Deserialize;
 use sim::distance_field::{DistanceField, NODE_M};
 use sim::geometry::{Pose, Vec2};
@@ -231,7 +231,8 @@ impl MapLot {
         };
         let mut scenario = self.outlines(&ground).with_obstacles(ground.obstacles);
         scenario.noise = self.noise.clone();
-        validate_ground(&scenario, vehicle).map_err(|error| self.in_lot(error, frame))?;
+        let in_lot = |error| self.in_lot(error, frame, &ground.numbers);
+        validate_ground(&scenario, vehicle).map_err(in_lot)?;
         scenario.reference_path = match (centre_line, start) {
             (Some(points), _) => self.checked_centre_line(&points, frame, &scenario, vehicle)?,
             (None, Some(start)) => {
@@ -242,13 +243,13 @@ impl MapLot {
             }
             (None, None) => return Err(self.nothing_to_drive()),
         };
-        validate(&scenario, vehicle).map_err(|error| self.in_lot(error, frame))?;
+        validate(&scenario, vehicle).map_err(in_lot)?;
         let in_map = |mouths: Vec<Vec2>| mouths.into_iter().map(|mouth| frame.in_map(mouth)).collect::<Vec<_>>();
         if self.close_branches {
             let mouths = in_map(branches::close(&mut scenario, vehicle));
             notes.extend((!mouths.is_empty()).then_some(Note::Closed { mouths }));
         }
-        let map = Map::build(scenario.clone(), vehicle).map_err(|error| self.in_lot(error, frame))?;
+        let map = Map::build(scenario.clone(), vehicle).map_err(in_lot)?;
         let ways = branches::find(&map, vehicle);
         let mouths = in_map(ways.branches.into_iter().map(|branch| branch.mouth).collect());
         let is_asked_to_close = self.close_branches;
@@ -356,7 +357,8 @@ impl MapLot {
             let remedy = format!("smooth the image, or crop it, to at most {OUTLINE_CORNERS_MAX}");
             return Err(self.fault("map", problem, &remedy));
         }
-        let (region, dropped) = region.without_specks(in_px2(self.drop_specks_m2));
+        // A little more than is asked for: 0.0025 m² are, by a rounding, less than one pixel of 0.05 m.
+        let (region, dropped) = region.without_specks(in_px2(self.drop_specks_m2) * (1.0 + 1e-9));
         let islands = region.islands();
         if islands > ISLANDS_MAX {
             let problem = format!("what is drivable encloses {islands} islands");
@@ -402,7 +404,8 @@ impl MapLot {
         let mut fault = None;
         for step in 0..=closest {
             let boundary = outline(outer, step);
-            let ground = Ground { boundary, is_walled: true, islands: Vec::new(), obstacles: Vec::new() };
+            let (islands, obstacles, numbers) = (Vec::new(), Vec::new(), Numbers::default());
+            let ground = Ground { boundary, is_walled: true, islands, obstacles, numbers };
             let islands = validate_ground(&self.outlines(&ground), vehicle).and_then(|()| {
                 let mut vertices = ground.boundary.len();
                 let mut islands = Vec::new();
@@ -419,14 +422,22 @@ impl MapLot {
                 }
                 Ok(islands)
             });
+            // Of the boundary alone, if that has too many. A closer outline has no fewer.
+            let in_islands = islands.as_ref().map_or(0, |islands| islands.iter().map(Vec::len).sum::<usize>());
+            let vertices = ground.boundary.len() + in_islands;
+            if vertices > VERTICES_MAX {
+                let problem = format!("the outlines of what is drivable have {vertices} vertices, or more");
+                let remedy = format!(
+                    "smooth the image, crop it, or leave specks out with drop_specks_m2, to at most {VERTICES_MAX}"
+                );
+                return Err(self.fault("map", problem, &remedy));
+            }
             match islands {
                 Ok(islands) => return Ok(Ground { islands, ..ground }),
-                // A closer outline has no fewer vertices.
-                Err(error) if ground.boundary.len() > VERTICES_MAX => return Err(self.in_lot(error, frame)),
                 Err(error) => fault = Some(error),
             }
         }
-        Err(self.in_lot(fault.expect("there is a tolerance"), frame))
+        Err(self.in_lot(fault.expect("there is a tolerance"), frame, &Numbers::default()))
     }
 
     /// An island with an outline as simple as it can be. `step`: how closely it is followed, and has to be, `closest` at last.
@@ -536,10 +547,17 @@ impl MapLot {
         }
     }
 
-    /// An error of the lot made from the map.
-    fn in_lot(&self, ScenarioError { place, problem, remedy }: ScenarioError, frame: Frame) -> LoadError {
+    /// An error of the lot made from the map. Whatever has a number in the file is an obstacle there.
+    fn in_lot(&self, error: ScenarioError, frame: Frame, [of_islands, of_obstacles]: &Numbers) -> LoadError {
+        let ScenarioError { place, problem, remedy } = error;
+        let number = match place {
+            Place::Island(i) => of_islands.get(i),
+            Place::Obstacle(i) => of_obstacles.get(i),
+            Place::Name | Place::Boundary(_) | Place::SpeedBump(_) | Place::ReferencePath(_) => None,
+        };
+        let place = number.map_or_else(|| place.to_string(), |number| format!("obstacle {number}"));
         let frame = frame.explained().map_or_else(String::new, |frame| format!(" ({frame})"));
-        self.fault(&place.to_string(), problem + &frame, &remedy)
+        self.fault(&place, problem + &frame, &remedy)
     }
 
     fn nothing_to_drive(&self) -> LoadError {
@@ -566,6 +584,11 @@ impl MapLot {
                 frame.said(pose.position())
             );
             self.fault(place, problem, "move or turn it away from what is not drivable, or enlarge the lot with scale")
+        };
+        // Where the route ends, by which key, and what can be moved.
+        let (end, given, movable) = match finish {
+            Finish::At(_) => ("goal", "goal", "start and goal"),
+            Finish::Start => ("end of the loop", "start", "the start"),
         };
         match (reason, finish) {
             (NoRoute::GoalBlocked, Finish::At(goal)) => blocked("goal", goal),
@@ -595,23 +618,26 @@ impl MapLot {
             }
             (NoRoute::Askew { at, off_deg }, _) => {
                 let problem = format!(
-                    "the car gets to the goal, but at best turned {off_deg:.0}° away from it, at {}",
+                    "the car gets to the {end}, but at best turned {off_deg:.0}° away from it, at {}",
                     frame.said(at)
                 );
-                let remedy = "turn the goal, or move it to where the car can turn before it; headings are degrees \
-                              counter-clockwise from x";
-                self.fault("goal", problem, remedy)
+                let remedy = format!(
+                    "turn the {given}, or move it to where the car can turn before it; headings are degrees \
+                     counter-clockwise from x"
+                );
+                self.fault(given, problem, &remedy)
             }
             (NoRoute::Tight { reached, to_go_m }, _) => {
                 let problem = format!(
-                    "no drive forwards was found: it got to {}, about {to_go_m:.0} m of the lot before the goal. The car \
+                    "no drive forwards was found: it got to {}, about {to_go_m:.0} m of the lot before the {end}. The car \
                      does not reverse, and turns with a radius of {:.1} m or more",
                     frame.said(reached),
                     route::radius_min_m(car)
                 );
-                let remedy = "widen the map there, turn or move start and goal, enlarge the lot with scale, or lower \
-                              clearance_m";
-                self.fault("route", problem, remedy)
+                let remedy = format!(
+                    "widen the map there, turn or move {movable}, enlarge the lot with scale, or lower clearance_m"
+                );
+                self.fault("route", problem, &remedy)
             }
         }
     }

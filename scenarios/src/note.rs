@@ -1,5 +1,6 @@
 //! What a person should know about a lot that was imported, though nothing is wrong with it.
 
+use crate::branches::KERBS_MAX;
 use sim::scenario::Scenario;
 use std::path::PathBuf;
 
@@ -98,9 +99,6 @@ pub enum Note {
 
 /// Places named in a note, at most.
 const PLACES_MAX: usize = 6;
-/// What helps against ways that no kerb closes.
-const DRAW_WALLS: &str =
-    "no kerb closes what is left, which is too wide or too near to the route: draw walls into the map there";
 /// What helps against ways on a map.
 const LAY_KERBS: &str = "close_branches = true (--close-branches of cargo xtask generate) closes such ways with kerbs";
 /// What helps against ways in a lot written by hand.
@@ -151,18 +149,24 @@ impl std::fmt::Display for Note {
             Self::Closed { mouths } => {
                 write!(f, "{} closed with kerbs, near {}", are(mouths.len(), "branch", "branches"), listed(mouths))
             }
-            Self::Open { mouths, is_asked_to_close } => f.write_str(&open(mouths, on_a_map(*is_asked_to_close))),
+            Self::Open { mouths, is_asked_to_close } => f.write_str(&open(mouths, &on_a_map(*is_asked_to_close))),
             Self::OpenByHand { mouths } => f.write_str(&open(mouths, CLOSE_BY_HAND)),
             Self::ShortCuts { short_cuts, is_asked_to_close } => {
-                f.write_str(&shorter(short_cuts, on_a_map(*is_asked_to_close)))
+                f.write_str(&shorter(short_cuts, &on_a_map(*is_asked_to_close)))
             }
             Self::ShortCutsByHand { short_cuts } => f.write_str(&shorter(short_cuts, CLOSE_BY_HAND)),
         }
     }
 }
 
-fn on_a_map(is_asked_to_close: bool) -> &'static str {
-    if is_asked_to_close { DRAW_WALLS } else { LAY_KERBS }
+fn on_a_map(is_asked_to_close: bool) -> String {
+    if !is_asked_to_close {
+        return LAY_KERBS.to_owned();
+    }
+    format!(
+        "no kerb closes what is left, which is too wide, too near to the route, or beyond {KERBS_MAX} kerbs: draw walls into \
+         the map there"
+    )
 }
 
 fn open(mouths: &[[f64; 2]], remedy: &str) -> String {

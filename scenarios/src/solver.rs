@@ -4,6 +4,7 @@
 //! has its own exact footprint test. A waypoint is free when the body, larger by a clearance all round, stands free there,
 //! and the body 0.5 m farther along the present arc too (with a margin): the near-collision rule looks that far ahead.
 
+use crate::corridor::segments_cross;
 use crate::neighbours;
 use crate::open_list::Open;
 use sim::geometry::{Pose, Vec2, distance_to_segment_m, edges};
@@ -122,6 +123,8 @@ struct Search<'a> {
     goal: &'a Goal,
     to_go: &'a DistanceToGo,
     vehicle: &'a VehicleSettings,
+    /// The right and the left end of a line that the front axle does not drive over backwards, if there is one.
+    gate: Option<[Vec2; 2]>,
     body: Footprint,
     swept_body: Footprint,
     nodes: Vec<Node>,
@@ -142,6 +145,7 @@ impl<'a> Search<'a> {
             goal,
             to_go,
             vehicle,
+            gate: None,
             body: Footprint::new(vehicle, clearance_m),
             swept_body: Footprint::new(vehicle, SWEEP_CLEARANCE_SHARE * clearance_m),
             nodes: Vec::new(),
@@ -176,6 +180,9 @@ impl<'a> Search<'a> {
                 continue;
             }
             let [(middle, first_curvature), (end, curvature)] = self.halves(pose, steering, next);
+            if self.turns_back_at_gate(pose, middle) || self.turns_back_at_gate(middle, end) {
+                continue;
+            }
             if self.is_free(middle, first_curvature) && self.is_free(end, curvature) {
                 // Small costs: prefer few and gentle movements of the wheel, and the middle of the free space.
                 let effort = 0.02 * f32::from((next - steering).abs()) + 0.01 * f32::from(next.abs());
@@ -200,6 +207,20 @@ impl<'a> Search<'a> {
         maths::tan(largest_rad * level / f32::from(STEERING_LEVELS)) / wheelbase_m
     }
 
+    /// Where the front axle is.
+    fn front(&self, pose: Pose) -> Vec2 {
+        pose.position() + pose.ahead() * self.vehicle.wheelbase_m
+    }
+
+    /// Whether the front axle drives over the gate backwards between two poses half a step apart. The cells that are closed for
+    /// [`DistanceToGo`] are passed within a step, which looks at them at its ends only.
+    fn turns_back_at_gate(&self, from: Pose, to: Pose) -> bool {
+        self.gate.is_some_and(|[right, left]| {
+            let (from, to) = (self.front(from), self.front(to));
+            (left - right).perp_dot(to - from) > 0.0 && segments_cross(from, to, right, left)
+        })
+    }
+
     fn is_free(&self, pose: Pose, curvature_per_m: f32) -> bool {
         self.body.is_free(self.scene, pose)
             && self.swept_body.is_free(self.scene, pose.advanced_along_arc(curvature_per_m, SWEEP_AHEAD_M))
@@ -208,8 +229,7 @@ impl<'a> Search<'a> {
     /// Adds a state unless an equal one is known. The first one found is kept: the search is greedy anyway.
     fn push(&mut self, pose: Pose, steering: i8, cost: f32, parent: u32) {
         // Measured at the front axle, which leads the car through a corner as its driver would.
-        let front = pose.position() + pose.ahead() * self.vehicle.wheelbase_m;
-        let to_go_m = self.to_go.at(front);
+        let to_go_m = self.to_go.at(self.front(pose));
         if !to_go_m.is_finite() {
             return;
         }

@@ -17,6 +17,8 @@ pub(super) fn read(path: &Path, scale: f64) -> Result<Vec<[f64; 2]>, LoadError> 
 
 /// [`read`], of the text of a file; `file` is its name in errors.
 pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>, LoadError> {
+    // Some editors begin a file with it.
+    let text = text.trim_start_matches('\u{feff}');
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -33,7 +35,7 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
             remedy: "write one point per line: x,y in metres of the map's frame".to_owned(),
         };
         let record = record.map_err(|error| faulty(i + 1, format!("not CSV: {error}")))?;
-        let line = record.position().map_or(i + 1, |position| position.line() as usize);
+        let line = record.position().map_or(i + 1, |position| line_of(text, position));
         let numbers: Vec<Option<f64>> = record.iter().take(2).map(|cell| cell.parse().ok()).collect();
         if let (0, [Some(_), Some(_)], Some((line, header))) = (i, &numbers[..], &commented)
             && header.len() == record.len()
@@ -72,6 +74,14 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
         });
     }
     Ok(points)
+}
+
+/// The line of a record, counted from 1. To the reader it begins where the record before ends: with the LF of a CRLF, and with
+/// comments and empty lines.
+fn line_of(text: &str, position: &csv::Position) -> usize {
+    let from = usize::try_from(position.byte()).ok().and_then(|byte| text.get(byte..)).unwrap_or_default();
+    let passed_over = from.lines().take_while(|line| line.is_empty() || line.starts_with('#')).count();
+    position.line() as usize + passed_over
 }
 
 /// The last comment before the first point, and its line, if it can be a header: `numpy.savetxt` writes them so.

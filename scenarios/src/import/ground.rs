@@ -3,6 +3,9 @@
 use sim::geometry::Vec2;
 use sim::scenario::Obstacle;
 
+/// Of each island, and of each obstacle, its number in the file, from 1.
+pub(super) type Numbers = [Vec<usize>; 2];
+
 /// Drivable ground without a route, in the lot's frame.
 pub(super) struct Ground {
     /// Outline of the drivable ground, metres.
@@ -13,4 +16,6 @@ pub(super) struct Ground {
     pub(super) islands: Vec<Vec<Vec2>>,
     /// What has the shape of a car.
     pub(super) obstacles: Vec<Obstacle>,
+    /// None of what was drawn with pixels.
+    pub(super) numbers: Numbers,
 }

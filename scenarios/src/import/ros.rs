@@ -223,8 +223,12 @@ impl Header {
             }
         }
         if free_thresh > occupied_thresh {
-            let problem = format!("it is {free_thresh}, above occupied_thresh, {occupied_thresh}");
-            return Err(fault("free_thresh", problem, "lower it"));
+            if text.lines().any(|line| line.trim_start().starts_with("free_thresh")) {
+                let problem = format!("it is {free_thresh}, above occupied_thresh, {occupied_thresh}");
+                return Err(fault("free_thresh", problem, "lower it"));
+            }
+            let problem = format!("it is {occupied_thresh}, below free_thresh, {free_thresh} where it is not given");
+            return Err(fault("occupied_thresh", problem, "raise it, or give free_thresh"));
         }
         Ok(header)
     }

@@ -237,6 +237,12 @@ fn a_centre_line_must_have_room_for_the_car() {
         // As numpy.savetxt writes a header; what it says was not looked at.
         ("# by hand, twice\n# y,x\n3.5,5.0\n3.5,45.0\n", "line.csv:2: the header has \"y\" in column 1"),
         ("# s_m,x_m,y_m\n0.0,5.0,3.5\n40.0,45.0,3.5\n", "line.csv:1: the header has \"x_m\" in column 2"),
+        // Behind a mark of the order of bytes it was not looked at.
+        ("\u{feff}# y,x\n3.5,5.0\n3.5,45.0\n", "line.csv:1: the header has \"y\" in column 1"),
+        // The line of what stands before it was named, be it the LF of a CRLF.
+        ("5.0,3.5\r\n45.0;3.5\r\n", "line.csv:2: \"45.0;3.5\" is not a point"),
+        ("5.0,3.5\n# by hand\n\n45.0;3.5\n", "line.csv:4: \"45.0;3.5\" is not a point"),
+        ("# a lane\r\n\r\ny,x\r\n3.5,5.0\r\n", "line.csv:3: the header has \"y\" in column 1"),
         ("x,y\n5.0,3.5\n", "line.csv: centre line: the line has 1 points; give at least"),
     ] {
         let message = refusal(&with_line("line-faulty", 5, line));
@@ -261,6 +267,12 @@ fn faults_of_the_files_are_named() {
         ("[0.0, 0.0, 0.0]", "[0.0, .inf, 0.0]", "map.yaml:4: origin: a number is inf; write [x, y, yaw]"),
         ("mode: trinary", "mode: binary", "map.yaml:2: "),
         ("free_thresh: 0.196", "free_thresh: 0.7", "map.yaml:7: free_thresh: it is 0.7, above occupied_thresh"),
+        // It is not in the file: line 1 was blamed.
+        (
+            "occupied_thresh: 0.65\nfree_thresh: 0.196\n",
+            "occupied_thresh: 0.1\n",
+            "map.yaml:6: occupied_thresh: it is 0.1, below free_thresh, 0.196",
+        ),
         ("occupied_thresh: 0.65", "occupied_thresh: 65", "map.yaml:6: occupied_thresh: it is 65; write an occupancy"),
         ("image: map.pgm", "image: [", "map.yaml:"),
     ];
@@ -373,6 +385,25 @@ fn a_loop_leads_back_to_its_start() {
     assert!(area_m2 > 900.0, "counter-clockwise round the block: {area_m2} m²");
 }
 
+/// The car turned round twice on the near side of the wall, over the gate ahead of its start in one step; the way round the
+/// wall, 2.5 m wide, was said to be too narrow for 2.36 m where the gate held.
+#[test]
+fn a_loop_that_only_turns_round_on_the_spot_is_none() {
+    let rows: Vec<String> = (0..66)
+        .rev()
+        .map(|y| {
+            let is_wall = |x: usize| !(1..127).contains(&x) || !(1..65).contains(&y);
+            let is_between = |x: usize| (53..55).contains(&y) && (12..116).contains(&x);
+            (0..128).map(|x| if is_wall(x) || is_between(x) { '#' } else { '.' }).collect()
+        })
+        .collect();
+    let folder = folder("no-way-round", &[("map.yaml", &yaml("0.25", "[0, 0, 0]")), ("map.pgm", &pgm(&rows))]);
+    let lot = MapLot { start: Some([12.0, 4.0, 0.0]), is_loop: true, ..MapLot::of_map(&folder.join("map.yaml")) };
+    let refusal = refusal(&lot);
+    assert!(refusal.contains("route: no drive forwards was found: it got to ("), "{refusal}");
+    assert!(refusal.contains(" m of the lot before the end of the loop.") && !refusal.contains("goal"), "{refusal}");
+}
+
 #[test]
 fn a_case_is_read_in_one_row_or_one_column() {
     let numbers = "0,0,0,30,0,3.14159265,2,4,3,8,-4,12.6,-4,12.6,-2.2,8,-2.2,10,3,14,3,12,6";
@@ -403,6 +434,15 @@ fn a_case_is_read_in_one_row_or_one_column() {
         let message = tpcap::Case::read(&folder.join("case.csv")).expect_err(text).to_string();
         assert!(message.contains(expected), "{text}\ngot:      {message}\nexpected: {expected}");
     }
+}
+
+/// It was the number among the islands: a car before it was not counted.
+#[test]
+fn a_fault_of_a_case_is_named_by_the_number_of_the_obstacle_in_the_file() {
+    let case = "0,0,0,30,0,0,2,4,4,8,-5,12.6,-5,12.6,-3.2,8,-3.2,20,5,24,9,24,5,20,9";
+    let folder = folder("tpcap-crossed", &[("case.csv", case)]);
+    let refusal = refusal(&MapLot::of_map(&folder.join("case.csv")));
+    assert!(refusal.contains("case.csv: obstacle 2: the edge from vertex 1 to 2 meets"), "{refusal}");
 }
 
 /// Nothing tested that a case in UTM coordinates is the lot that it is beside the origin.
@@ -480,6 +520,20 @@ fn a_speck_becomes_the_smallest_island_or_is_left_out_as_asked() {
     let loaded = lot.scenario(&car()).unwrap();
     assert_eq!(loaded.notes, [Note::Dropped { specks: 3, up_to_m2: 0.02 }]);
     assert_eq!(areas(&loaded.scenario).len(), 1, "what is larger stays");
+}
+
+/// Of specks as large as one pixel none was left out at 5, 10 and 20 cm per pixel.
+#[test]
+fn a_speck_that_is_just_as_large_as_asked_for_is_left_out() {
+    for (resolution_m, drop_specks_m2) in [(0.05, 0.0025), (0.1, 0.01), (0.2, 0.04), (0.25, 0.0625)] {
+        let lot = MapLot { drop_specks_m2, ..fine_lane("speck-of-a-pixel", |x, y| (x, y) == (300, 26)) };
+        std::fs::write(&lot.map, yaml(&resolution_m.to_string(), "[0, 0, 0]")).unwrap();
+        let (map, ..) = ros::Map::read(&lot.map, false).unwrap();
+        let (seed, mut notes) = ([80.5 * resolution_m, 26.5 * resolution_m], Vec::new());
+        let ground = lot.ros_ground(&map, Frame::around(seed, 1.0), seed, None, &car(), &mut notes).unwrap();
+        assert_eq!(notes, [Note::Dropped { specks: 1, up_to_m2: drop_specks_m2 }]);
+        assert!(ground.islands.is_empty(), "{resolution_m} m: {:?}", ground.islands);
+    }
 }
 
 /// A start beside a speck, on a pixel that is free, was said to be "occupied or unknown".
@@ -574,6 +628,22 @@ fn walls_are_as_high_as_the_lot_says_and_hide_ground_unless_they_are_kerbs() {
     }
 }
 
+/// The advice was to leave vertices out, of a file that nobody has written.
+#[test]
+fn a_map_with_too_many_vertices_is_refused_with_what_helps_for_an_image() {
+    // 52 × 52 stairs of six pixels, of eight corners each.
+    let is_occupied =
+        |x: usize, y: usize| (8..268).contains(&x) && (8..268).contains(&y) && (x - 8) % 5 + (y - 8) % 5 < 3;
+    let rows: Vec<String> =
+        (0..276).rev().map(|y| (0..276).map(|x| if is_occupied(x, y) { '#' } else { '.' }).collect()).collect();
+    let folder = folder("vertices", &[("map.yaml", &yaml("1.0", "[0, 0, 0]")), ("map.pgm", &pgm(&rows))]);
+    let mut lot = MapLot::of_map(&folder.join("map.yaml"));
+    (lot.start, lot.goal) = (Some([4.0, 4.0, 0.0]), Some([272.0, 272.0, 0.0]));
+    let refusal = refusal(&lot);
+    assert!(refusal.contains("map: the outlines of what is drivable have 200"), "{refusal}");
+    assert!(refusal.contains(" vertices, or more; smooth the image, crop it, or leave specks out"), "{refusal}");
+}
+
 /// UTM coordinates of some yard: the same lot as beside the origin.
 #[test]
 fn a_map_far_from_its_origin_is_the_same_lot_about_its_start() {
@@ -625,6 +695,7 @@ fn junctions_of_a_map_are_named_and_closed_when_asked() {
     // What no kerb closes is not answered with the advice to close it.
     let left = Note::Open { mouths: mouths.clone(), is_asked_to_close: true }.to_string();
     assert!(left.contains("no kerb closes what is left") && !left.contains("--close-branches"), "{left}");
+    assert!(left.contains("or beyond 40 kerbs"), "it was said of ways that a 41st would close, too: {left}");
 }
 
 /// Nothing on such a way is far from the route: it was neither named nor closed.

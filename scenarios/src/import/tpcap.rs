@@ -8,7 +8,7 @@
 //! cars here do not: only cases with a drive forwards become lots.
 
 use super::frame::Frame;
-use super::ground::Ground;
+use super::ground::{self, Ground};
 use crate::error::{LoadError, read_text, shortened};
 use sim::geometry::{Pose, Vec2, wrap_angle};
 use sim::limits::{CSV_BYTES_MAX, MAP_COORDINATE_MAX_M};
@@ -79,17 +79,21 @@ impl Case {
         let outlines = self.obstacles.iter().map(in_lot);
         let mut everything = poses.to_vec();
         let (mut islands, mut obstacles) = (Vec::new(), Vec::new());
-        for outline in outlines {
+        let [mut of_islands, mut of_obstacles] = ground::Numbers::default();
+        for (outline, number) in outlines.zip(1..) {
             everything.extend(&outline);
-            match car_of(&outline) {
-                Some(car) => obstacles.push(car),
-                None => islands.push(outline),
+            if let Some(car) = car_of(&outline) {
+                obstacles.push(car);
+                of_obstacles.push(number);
+            } else {
+                islands.push(outline);
+                of_islands.push(number);
             }
         }
         let (low, high) = sim::geometry::bounds(&everything);
         let (low, high) = (low - MARGIN_M, high + MARGIN_M);
         let boundary = vec![low, Vec2::new(high.x, low.y), high, Vec2::new(low.x, high.y)];
-        Ground { boundary, is_walled: false, islands, obstacles }
+        Ground { boundary, is_walled: false, islands, obstacles, numbers: [of_islands, of_obstacles] }
     }
 }
 

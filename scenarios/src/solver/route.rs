@@ -100,12 +100,15 @@ pub fn find(
         reach_m: GOAL_BESIDE_M,
         heading_cos: GOAL_HEADING_COS,
     };
-    let gate = match finish {
-        Finish::At(_) => BTreeSet::new(),
-        Finish::Start => gate(&scene, start),
+    let (closed, gate) = match finish {
+        Finish::At(_) => (BTreeSet::new(), None),
+        Finish::Start => {
+            let (closed, ends) = gate(&scene, start);
+            (closed, Some(ends))
+        }
     };
-    let to_go = DistanceToGo::new(&scene, &goal, vehicle, &gate);
-    let mut search = Search::new(&scene, &goal, &to_go, vehicle, clearance_m);
+    let to_go = DistanceToGo::new(&scene, &goal, vehicle, &closed);
+    let mut search = Search { gate, ..Search::new(&scene, &goal, &to_go, vehicle, clearance_m) };
     if !search.is_free(start, 0.0) {
         return Err(NoRoute::StartBlocked);
     }
@@ -115,8 +118,8 @@ pub fn find(
     if let Some(solution) = search.run(start, EXPANSIONS_MAX) {
         return Ok(reference_path(&solution.waypoints, &goal));
     }
-    let front = |pose: Pose| pose.position() + pose.ahead() * vehicle.wheelbase_m;
-    let (at, room_m) = bottleneck(&scene, front(start), goal_pose.position(), &gate);
+    let front = |pose: Pose| search.front(pose);
+    let (at, room_m) = bottleneck(&scene, front(start), goal_pose.position(), &closed);
     let width_m = 2.0 * room_m;
     if width_m < WALL_M {
         return Err(NoRoute::Walled { at });
@@ -124,7 +127,8 @@ pub fn find(
     if !search.body.is_free(&scene, goal_pose) {
         return Err(NoRoute::GoalBlocked);
     }
-    if width_m < vehicle.width_m + 2.0 * clearance_m {
+    // Measured at the middles of cells: it may be wider by one.
+    if width_m + Scene::NODE_M < vehicle.width_m + 2.0 * clearance_m {
         return Err(NoRoute::Narrow { at, width_m });
     }
     let at_goal = search.nodes.iter().filter(|node| goal.is_in_reach(node.pose));
@@ -147,19 +151,20 @@ pub fn radius_min_m(vehicle: &VehicleSettings) -> f32 {
     1.0 / (CURVATURE_SHARE * vehicle.curvature_max_per_m())
 }
 
-/// Cells of the clearance raster across the free ground just ahead of the start.
-fn gate(scene: &Scene, start: Pose) -> BTreeSet<usize> {
+/// Cells of the clearance raster across the free ground just ahead of the start, and the right and the left end of the line
+/// through them.
+fn gate(scene: &Scene, start: Pose) -> (BTreeSet<usize>, [Vec2; 2]) {
     let centre = start.position() + GATE_AHEAD_M * start.ahead();
     let step_m = 0.5 * Scene::NODE_M;
     let mut cells = BTreeSet::new();
-    for side in [1.0, -1.0] {
+    let ends = [-1.0, 1.0].map(|side| {
         let across = side * start.ahead().perp();
         let mut beside_m = 0.0;
         loop {
             let point = centre + beside_m * across;
             // Up to the edge: a gap beside the gate would be taken for a passage.
             if scene.clearance_m(point) < Scene::SLACK_M {
-                break;
+                break point;
             }
             // Two cells thick, so that no diagonal step passes.
             for ahead_m in [-Scene::NODE_M, 0.0, Scene::NODE_M] {
@@ -167,8 +172,8 @@ fn gate(scene: &Scene, start: Pose) -> BTreeSet<usize> {
             }
             beside_m += step_m;
         }
-    }
-    cells
+    });
+    (cells, ends)
 }
 
 /// The narrowest place of the widest way between two points, and the distance to the nearest edge there, metres. Of a
