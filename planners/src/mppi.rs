@@ -46,8 +46,8 @@ pub struct Params {
     pub horizon_s: f32,
     /// λ, how much cost makes a sequence count e times less: 0.3 (*cited*: nav2).
     pub temperature: f32,
-    /// γ, price of steering and of being slower than the controller's law, by which the mean does not run away with the
-    /// draws: 0.015 (*cited*: nav2).
+    /// γ, price of steering and of being slower than the controller drives straight on, by which the mean does not run away
+    /// with the draws: 0.015 (*cited*: nav2).
     pub gamma: f32,
     /// Standard deviation of the steering angles drawn, radians: 0.15 (*chosen*; nav2 draws yaw rates).
     pub steering_std_rad: f32,
@@ -403,7 +403,7 @@ impl Tables {
         let left = |asked: f32x4, mean: f32, std: f32| (asked - f32x4::splat(mean)) / f32x4::splat(std * std);
         let steering = left(asked.steering_rad, mean.steering_rad, steering_std_rad);
         let speed = left(asked.speed_mps, mean.speed_mps, speed_std_mps);
-        // The speed that the controller would drive costs nothing.
+        // The speed that the controller would drive straight on costs nothing; in a bend its law is slower, and priced.
         let slower_mps = mean.speed_mps - self.law_mps[0];
         f32x4::splat(gamma * STEP_S / KNOT_S)
             * (f32x4::splat(mean.steering_rad) * steering + f32x4::splat(slower_mps) * speed)

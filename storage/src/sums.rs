@@ -26,6 +26,13 @@ pub fn digest(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
+/// The same of parts, one after the other, which need not lie in memory together.
+pub fn digest_of_parts<T: AsRef<[u8]>>(parts: impl IntoIterator<Item = T>) -> String {
+    let mut sha256 = Sha256::new();
+    parts.into_iter().for_each(|part| sha256.update(part));
+    hex(&sha256.finalize())
+}
+
 /// Bytes in hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
@@ -588,6 +595,11 @@ mod tests {
 
     fn faults(folder: &Path) -> Vec<String> {
         verify(folder).faults.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn a_digest_of_parts_is_that_of_the_whole() {
+        assert_eq!(digest_of_parts(["park", "", "ing lot"]), digest(b"parking lot"));
     }
 
     /// Figures were written into a run that had been deleted, which came back with nothing else.

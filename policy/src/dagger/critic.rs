@@ -55,19 +55,20 @@ pub(crate) fn discrepancies(samples: &[Sample], answers: &[Prediction]) -> Vec<f
 }
 
 /// `discount` to the power of the ticks until the next near-collision of the episode; 0 if none follows. Between ticks that
-/// follow each other more time passes than a control period only where the car was stopped and put back. A stop that ends
+/// follow each other more time passes than a control period only where the car was stopped and put back. Where ticks between them
+/// were not kept, in which of them it was is not known: it counts as the last one's, which is the least risk. A stop that ends
 /// within half a control period of its tick is not seen; nor is a near-collision that ends a drive, which has no tick after it.
 fn risks(ticks: &[Tick], discount: f32, control_period_s: f32) -> Vec<f32> {
     let mut risks = vec![0.0; ticks.len()];
     let mut next_stop: Option<(u32, u32)> = None;
     for (at, tick) in ticks.iter().enumerate().rev() {
         let follower = ticks.get(at + 1).filter(|next| next.episode == tick.episode);
-        let is_stopped = follower.is_some_and(|next| {
+        let stop_before = follower.filter(|next| {
             let ticks_between = (next.tick - tick.tick) as f32;
             next.time_s - tick.time_s > (ticks_between + 0.5) * control_period_s
         });
-        if is_stopped {
-            next_stop = Some((tick.episode, tick.tick));
+        if let Some(next) = stop_before {
+            next_stop = Some((tick.episode, next.tick - 1));
         }
         if let Some((episode, stop)) = next_stop
             && episode == tick.episode
@@ -99,9 +100,23 @@ mod tests {
         let found = risks(&ticks, 0.5, 0.05);
         assert_eq!(found[6..12], [0.125, 0.25, 0.5, 1.0, 0.0, 0.0]);
         assert!(found[10..].iter().all(|&risk| risk == 0.0), "the other episode has no stop");
-        // Without every second tick the stop is still there.
+        // Without every second tick the stop is still there, and as far from each of the others.
         let thinned: Vec<Tick> = ticks.iter().step_by(2).copied().collect();
-        assert_eq!(risks(&thinned, 0.5, 0.05)[3..6], [0.25, 1.0, 0.0]);
+        assert_eq!(risks(&thinned, 0.5, 0.05)[3..6], [0.125, 0.5, 0.0]);
+    }
+
+    /// The tick at which the expert had handed over was taken for the near-collision itself, however much later that was.
+    #[test]
+    fn a_stop_while_the_network_drove_is_no_risk_of_the_experts_ticks_long_before() {
+        let (round, _) = collected(20, 0);
+        let mut ticks = round.ticks;
+        for tick in &mut ticks {
+            tick.time_s = 0.05 * tick.tick as f32 + if tick.tick > 14 { 2.0 } else { 0.0 };
+        }
+        // The expert drove the first four ticks and the last two.
+        ticks.retain(|tick| !(4..18).contains(&tick.tick));
+        let after = |ticks: f32| maths::pow(0.5, ticks);
+        assert_eq!(risks(&ticks, 0.5, 0.05)[2..], [after(15.0), after(14.0), 0.0, 0.0]);
     }
 
     #[test]

@@ -219,6 +219,20 @@ fn the_weights_returned_are_validated_on_everything_held_back() {
     assert_eq!(outcome.report.validation, Some(all));
 }
 
+/// It was that of answers outside the image, where nobody drives.
+#[test]
+fn the_error_is_that_of_what_is_driven_at() {
+    let mut weights = Weights::zeros(tiny());
+    // What it answers to every grid: half the image beyond a corner.
+    weights.parts_mut().fc2_bias.copy_from_slice(&[1.5, -0.5, -4.6, -4.6]);
+    let at_the_corner = |sample: &Sample| Sample { label: [1.0, 0.0], tau_hat: 0.0, ..*sample };
+    let samples: Vec<Sample> = round(3).samples.iter().map(at_the_corner).collect();
+    let found = evaluate(&weights, &samples, &LossSettings::paper(), context(DeviceChoice::Cpu));
+    assert_eq!(found.rmse_m, 0.0);
+    // ½ (0.5² / σ² + log σ²), log σ² = −4.6: the loss is of the answer itself.
+    assert!((found.nll - 10.136).abs() < 1e-2, "{found:?}");
+}
+
 #[test]
 fn the_best_weights_are_those_reported() {
     let dataset = dataset(400);

@@ -312,7 +312,8 @@ pub fn evaluate(weights: &Weights, samples: &[Sample], loss: &LossSettings, cont
     let squared_error: f64 = answers
         .iter()
         .zip(samples)
-        .flat_map(|(raw, sample)| (0..2).map(|axis| f64::from(sample.label[axis] - raw[axis])))
+        // What is driven at: within the image.
+        .flat_map(|(raw, sample)| (0..2).map(|axis| f64::from(sample.label[axis] - raw[axis].clamp(0.0, 1.0))))
         .map(|error| error * error)
         .sum();
     let device = Device::flex();

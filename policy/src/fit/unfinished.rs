@@ -54,16 +54,18 @@ pub(crate) fn origin(
     seed: RootSeed,
     settings: &FitSettings,
 ) -> String {
-    let mut bytes = bytes_of(start.values());
-    for Sample { grid, label: [u, w], tau_hat } in split.training.iter().chain(&split.validation) {
-        bytes.extend((0..GRID_CELLS).flat_map(|row| grid.row(row).to_le_bytes()));
+    let of_sample = |sample: &Sample| {
+        let Sample { grid, label: [u, w], tau_hat } = sample;
+        let mut bytes: Vec<u8> = (0..GRID_CELLS).flat_map(|row| grid.row(row).to_le_bytes()).collect();
         bytes.extend(bytes_of(&[*u, *w, *tau_hat]));
-    }
-    bytes.extend(seed.0.to_le_bytes());
-    for settings in [toml::to_string(&inference), toml::to_string(settings)] {
-        bytes.extend(settings.expect("settings are serialised wherever they are kept").into_bytes());
-    }
-    sums::digest(&bytes)
+        bytes
+    };
+    let settings = [toml::to_string(&inference), toml::to_string(settings)]
+        .map(|settings| settings.expect("settings are serialised wherever they are kept").into_bytes());
+    // Sample by sample: as bytes, all of them are as large again as the data set.
+    let samples = split.training.iter().chain(&split.validation).map(of_sample);
+    let parts = std::iter::once(bytes_of(start.values())).chain(samples);
+    sums::digest_of_parts(parts.chain([seed.0.to_le_bytes().to_vec()]).chain(settings))
 }
 
 impl Unfinished {
