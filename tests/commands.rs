@@ -118,6 +118,9 @@ fn settings_and_folders_that_cannot_be_used_leave_nothing() {
         let setting = format!("{twice}.directions=[\"forward\", \"forward\"]");
         refuses(&["train-bc", "--set", &setting, "--out", &out], &["names forward twice"]);
     }
+    // It trained without one, and said nothing.
+    let iterations = ["train-bc", "--set", "dagger.iterations_max=2", "--out", &out];
+    refuses(&iterations, &["--set dagger.iterations_max=2: train-bc has no iterations"]);
     refuses(&["scaling", "--resume", &out, "--different", "2"], &["--resume", "--different", "cannot be used with"]);
     refuses(&["evaluate", "--resume", &out, "--smoothing", "8"], &["--resume", "--smoothing", "cannot be used with"]);
     let mine = "scenarios/examples/slalom.toml";
@@ -560,6 +563,8 @@ fn pictures_are_drawn_and_never_replaced_unasked() {
     refuses(&["render", "report", &out], &["this is not a run"]);
     refuses(&["render", "trajectories", "--run", "no/such/run"], &["no/such/run"]);
     refuses(&["visualise", "lot", "--lots", "test:2"], &["stands for 2 lots"]);
+    // The second was left out of account without a word.
+    refuses(&["visualise", "--out", "lot.rrd", "lot", "--spawn"], &["--out, --spawn, --connect: name one of them"]);
     refuses(&["visualise", "run", &out], &["this is not a run"]);
 }
 

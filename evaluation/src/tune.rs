@@ -55,7 +55,7 @@ pub fn tune(
     let mut tuned = Vec::new();
     for start in planners {
         progress.begin("tuning", &format!("tuning {}", start.name));
-        let name = start.name.replace('/', "-");
+        let name = file_stem(&start.name);
         let candidates = format!("{name}.candidates.toml");
         let mut log = CandidateLog::read(run.path().join(&candidates), origin(settings, start, budget))?;
         let Some(found) = search(&course, start, budget, evaluation.seed, &mut log, progress)? else { break };
@@ -68,6 +68,11 @@ pub fn tune(
         tuned.push(found);
     }
     Ok(tuned)
+}
+
+/// What the files of a planner are named after, e.g. `dwa-fox` for `dwa/fox`.
+pub fn file_stem(planner: &str) -> String {
+    planner.replace('/', "-")
 }
 
 /// Whether parameters may be tuned on these lots.

@@ -147,6 +147,19 @@ pub struct Build {
     pub libraries: Vec<String>,
 }
 
+/// The instructions that products and sums of networks are computed with here, where there is a choice.
+pub fn processor_features() -> Vec<String> {
+    #[cfg(target_arch = "x86_64")]
+    let features = [
+        ("avx2", std::arch::is_x86_feature_detected!("avx2")),
+        ("fma", std::arch::is_x86_feature_detected!("fma")),
+        ("avx512f", std::arch::is_x86_feature_detected!("avx512f")),
+    ];
+    #[cfg(not(target_arch = "x86_64"))]
+    let features: [(&str, bool); 0] = [];
+    features.into_iter().filter(|(_, has)| *has).map(|(name, _)| name.to_owned()).collect()
+}
+
 /// Whether products of networks are added without being rounded before.
 fn rounds_once(processor_features: &[String]) -> bool {
     ["avx2", "fma"].iter().all(|&name| processor_features.iter().any(|it| it == name))

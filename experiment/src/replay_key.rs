@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Obstacles, noise and start follow from these parts ([`crate::trials`]) and the settings: replay with the
-//! `settings.toml` of the folder that the key comes from. Keys need no quoting in a
-//! shell; `@` and `%` within names are written `%40` and `%25`.
+//! `settings.toml` of the folder that the key comes from. `@` and `%` within names are written `%40` and `%25`; what a shell
+//! takes for its own in the name of a folder must be quoted.
 
 use crate::drivers::DriverSpec;
 use crate::settings::NoiseChoice;

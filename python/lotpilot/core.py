@@ -198,6 +198,11 @@ class Core:
         """Simulated time of a step, seconds; longer with a near-collision, which ends at rest on the route."""
         return self.cars.control_period_s()
 
+    @property
+    def frames_per_s(self) -> int:
+        """Pictures per second that show a drive as fast as it is: one of every step."""
+        return max(1, round(1.0 / self.control_period_s))
+
     def action_space(self) -> spaces.Box:
         """The action space of one environment: metres, or radians and m/s, or -1 … 1."""
         if self.options.normalise:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._native import read_round
+from ._native import count_rounds, read_round
 from .core import Floats, Grids, check_whole
 
 
@@ -29,7 +29,7 @@ def load_round(run: str | os.PathLike[str], round: int = 0) -> dict[str, Any]:
         ``control_period_s``, a number: the time from tick to tick.
 
     Raises:
-        ValueError: If there is no such round, or one of its files is damaged.
+        ValueError: If there is no such round, the run did not collect it, or one of its files is damaged.
     """
     check_whole("round", round, below=2**20)
     return read_round(Path(run), round)
@@ -42,14 +42,12 @@ class Dataset:
         run: Folder of the run.
 
     Raises:
-        ValueError: If it is not a run, holds no round, or a file is damaged.
+        ValueError: If it is not a run, holds no round, one is missing or not its own, or a file is damaged.
     """
 
     def __init__(self, run: str | os.PathLike[str]) -> None:
         folder = Path(run)
-        # Not what is trained beside a round's network, as round-01-critic.
-        rounds = [path for path in folder.glob("round-*") if path.name.removeprefix("round-").isdigit()]
-        count = len([path for path in rounds if (path / "round.toml").is_file()])
+        count = count_rounds(folder) if folder.is_dir() else 0
         if count == 0:
             raise ValueError(f"{folder}: there is no round of training data")
         self.rounds: list[dict[str, Any]] = [load_round(folder, index) for index in range(count)]

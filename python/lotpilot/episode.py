@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from ._native import Cars, lots
+from ._native import Cars
 from .core import GRID_CELLS, Arrays, Core, EnvOptions, Floats, Grids, check_whole
 
 
@@ -54,8 +54,6 @@ class Episode:
     ) -> None:
         if direction not in ("forward", "reverse"):
             raise ValueError(f"no direction {direction!r}; there are forward and reverse")
-        if len(lots([lot])) != 1:
-            raise ValueError(f"{lot!r} stands for several lots; lotpilot.lots names them")
         check_whole("trial", trial, below=2**20)
         options = EnvOptions(
             lots=[lot],
@@ -70,6 +68,9 @@ class Episode:
             threads=1,
         )
         self._core = Core(1, options, "disabled", digests=True)
+        # Counted as it is driven: ``lotpilot.lots`` reads a lot for the default car, which may not fit.
+        if self._core.cars.lot_count() != 1:
+            raise ValueError(f"{lot!r} stands for several lots; lotpilot.lots names them")
         self._seen: Arrays = self._core.reset(episodes=[trial])
         self._rows: list[npt.NDArray[np.float64]] = [self._seen.info[0]]
         self.place: dict[str, Any] = self._core.place(0)

@@ -49,7 +49,7 @@ class LotEnv(gymnasium.Env[Any, Floats]):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"no render mode {render_mode!r}; there are {self.metadata['render_modes']}")
         self.core = Core(1, EnvOptions.of({"threads": 1, **options}), "disabled")
-        self.metadata = {**self.metadata, "render_fps": _frames_per_s(self.core)}
+        self.metadata = {**self.metadata, "render_fps": self.core.frames_per_s}
         self.action_space = cast(gymnasium.Space[Floats], self.core.action_space())
         self.observation_space = self.core.observation_space()
         self.render_mode = render_mode
@@ -151,7 +151,7 @@ class LotVectorEnv(VectorEnv[Any, Floats, npt.NDArray[Any]]):
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f"no render mode {render_mode!r}; there is rgb_array")
         self.core = Core(num_envs, EnvOptions.of(options), _AUTORESET[mode])
-        self.metadata = {**self.metadata, "render_fps": _frames_per_s(self.core)}
+        self.metadata = {**self.metadata, "render_fps": self.core.frames_per_s}
         self.num_envs = num_envs
         self.render_mode = render_mode
         self.single_action_space = self.core.action_space()
@@ -239,10 +239,6 @@ def _seeds(seed: Any, count: int) -> list[int | None] | None:
     seeds = list(seed) if isinstance(seed, Sequence) else [seed] * count
     check_whole("seed", *given(*seeds))
     return seeds
-
-
-def _frames_per_s(core: Core) -> int:
-    return max(1, round(1.0 / core.control_period_s))
 
 
 def _first(observation: Any) -> Any:

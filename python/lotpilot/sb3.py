@@ -41,6 +41,8 @@ class LotVecEnv(VecEnv):
         self._actions: npt.NDArray[Any] | None = None
         self._attributes: list[dict[str, Any]] = [{} for _ in range(num_envs)]
         super().__init__(num_envs, self.core.observation_space(), self.core.action_space())
+        # Without it, ``VecVideoRecorder`` plays thirty pictures per second, half as fast again as they were driven.
+        self.metadata = {**self.metadata, "render_fps": self.core.frames_per_s}
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """The seed of the next ``reset``: one for all, who share its trials."""

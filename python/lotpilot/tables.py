@@ -136,7 +136,8 @@ class Request:
         """See ``evaluate``."""
         check_whole("trials", *given(trials), below=2**32)
         check_whole("seed", *given(seed))
-        levels = None if noise is None else [noise] if isinstance(noise, (str, int, float)) else list(noise)
+        is_one = isinstance(noise, (str, int, float, np.number))
+        levels = None if noise is None else [noise] if is_one else list(noise)
         which = {
             "lots": None if lots is None else names(lots, "lots"),
             "trials": trials,

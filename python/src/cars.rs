@@ -375,6 +375,11 @@ impl Cars {
         self.cars.iter().map(place).collect()
     }
 
+    /// Number of lots that are driven.
+    fn lot_count(&self) -> usize {
+        self.course.lot_count()
+    }
+
     /// What was measured on a car's episode so far, as JSON; `ending` is null while it is under way.
     fn report(&self, index: usize) -> PyResult<String> {
         /// As [`EpisodeReport`](sim::episode::EpisodeReport), before the end as well.

@@ -140,6 +140,11 @@ impl Course {
         notes::of(&self.lots, &[self.noise])
     }
 
+    /// Number of lots.
+    pub(crate) fn lot_count(&self) -> usize {
+        self.lots.len()
+    }
+
     /// Number of lots × directions: a trial of each is driven before the next trial.
     fn rows(&self) -> u64 {
         (self.lots.len() * self.directions.len()) as u64

@@ -1,7 +1,7 @@
 //! Rounds of training data as arrays.
 
 use crate::arrays::points;
-use crate::guard::{detached, input};
+use crate::guard::{alone, detached, input};
 use experiment::trained;
 use numpy::{PyArray, PyArrayMethods as _};
 use policy::dataset::Tick;
@@ -11,17 +11,40 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim::driver::{LookAheadPoint, Source};
 use sim::sensing::{GRID_CELLS, OccupancyGrid};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+/// The rounds of a run. Opening them creates its folder, so it has to be there.
+fn store_of(run: &Path) -> PyResult<Store> {
+    if !run.is_dir() {
+        return Err(PyValueError::new_err(format!("{}: there is no such run", run.display())));
+    }
+    Store::open(run).map_err(input)
+}
+
+/// How many rounds a run has collected: one that it lists and that is gone, or that it did not collect, is an error.
+#[pyfunction]
+pub(crate) fn count_rounds(py: Python<'_>, run: PathBuf) -> PyResult<u32> {
+    let store = store_of(&run)?;
+    alone(py, || {
+        let mut count = 0;
+        while store.has_round(count).map_err(input)? {
+            count += 1;
+        }
+        Ok(count)
+    })
+}
 
 /// The columns of a round of a run; see `lotpilot.load_round`.
 #[pyfunction]
 pub(crate) fn read_round(py: Python<'_>, run: PathBuf, round: u32) -> PyResult<Bound<'_, PyDict>> {
-    if !run.is_dir() {
-        return Err(PyValueError::new_err(format!("{}: there is no such run", run.display())));
-    }
+    let store = store_of(&run)?;
     let (data, collection, episode) = detached(py, || {
         let settings = trained::settings_of(&run).map_err(input)?;
-        let (data, collection) = Store::open(&run).and_then(|store| store.read_round(round)).map_err(input)?;
+        // By its own list alone, one that somebody had copied there would be the run's.
+        if !store.has_round(round).map_err(input)? {
+            return Err(PyValueError::new_err(format!("{}: there is no round {round}", run.display())));
+        }
+        let (data, collection) = store.read_round(round).map_err(input)?;
         Ok((data, collection, settings.episode))
     })?;
     let geometry = &episode.sensing.geometry;

@@ -11,7 +11,7 @@ use evaluation::trainings::{self, Methods};
 use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs;
 use experiment::lots::Lot;
-use experiment::manifest::{Build, Outcome, Request};
+use experiment::manifest::{Build, Outcome, Request, processor_features};
 use experiment::notes;
 use experiment::run_dir::{Place, RunDir};
 use experiment::settings::{Layers, Settings};
@@ -208,6 +208,8 @@ impl Asked {
         );
         let build = Build {
             program: concat!("lotpilot ", env!("CARGO_PKG_VERSION"), ", Python").to_owned(),
+            // Shards of networks come together only from machines that round alike.
+            processor_features: processor_features(),
             ..Build::default()
         };
         let place = Place {

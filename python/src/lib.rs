@@ -40,7 +40,7 @@ mod _native {
     #[pymodule_export]
     use crate::cars::Cars;
     #[pymodule_export]
-    use crate::data::read_round;
+    use crate::data::{count_rounds, read_round};
     #[pymodule_export]
     use crate::evaluate::{evaluate, merge, read_finished};
     #[pymodule_export]

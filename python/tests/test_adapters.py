@@ -191,6 +191,7 @@ def test_stable_baselines_finds_nothing_wrong():
 
     check(gymnasium.make("lotpilot/Lot-v0", **SHORT, normalise=True), skip_render_check=True)
     envs = LotVecEnv(4, **SHORT)
+    assert envs.metadata["render_fps"] == 20
     envs.seed(2)
     envs.reset()
     assert envs.env_method("expert_action", indices=[1])[0].shape == (2,)

@@ -152,6 +152,12 @@ def test_the_network_that_ships_needs_no_files(tmp_path, monkeypatch):
     assert sum(runs["near_collisions"]) < 4 and sum(runs["driven_m"]) > 200
 
 
+def test_noise_may_be_a_number_of_numpy():
+    for noise in (np.float32(0.5), np.int64(2)):
+        runs = lotpilot.evaluate("expert", "lot-b", trials=1, directions="forward", noise=noise, overrides=SHORT).runs
+        assert runs["noise"] == [noise]
+
+
 def test_functions_are_judged_together_as_trainings_of_one_method():
     def towards(left):
         return lambda grids: np.tile([8.0, left], (len(grids), 1))
@@ -180,6 +186,9 @@ def test_shards_merge_to_the_bytes_of_one_process(tmp_path):
 
     request = Request.of({"straight": straight, "cvm": "cvm"}, ["lot-b", "test:2:easy"], trials=2, overrides=SHORT)
     request.drive(tmp_path / "one")
+    # Shards of machines that round otherwise were merged: none said how its machine does.
+    features = tomllib.loads((tmp_path / "one" / "manifest.toml").read_text()).get("processor_features", [])
+    assert ("avx2" in features) == ("avx2" in Path("/proc/cpuinfo").read_text().split())
     shards = [tmp_path / str(number) for number in (1, 2, 3)]
     for shard in shards:
         request.drive(shard, shard=f"{shard.name}/3")
@@ -212,6 +221,20 @@ def test_an_expert_asked_now_and_then_forgets_what_it_planned_before_it_was_put_
             ticks_since += 1
     assert ticks_since == 5, "it was put back"
     np.testing.assert_array_equal(asked.expert_action(), anew.expert_action())
+
+
+def test_a_lot_is_checked_for_the_car_that_is_to_drive_there(tmp_path):
+    """Where only a smaller car fits, an episode was refused that evaluations and environments drive."""
+    lane = tmp_path / "lane.toml"
+    lane.write_text(
+        'name = "lane"\nboundary = [[-8.0, -0.9], [34.0, -0.9], [34.0, 0.9], [-8.0, 0.9]]\n'
+        "reference_path.points = [[0.0, 0.0], [12.0, 0.0]]\n"
+    )
+    car = {"width_m": 0.8, "length_m": 2.0, "wheelbase_m": 1.2, "rear_overhang_m": 0.4}
+    small = [f"episode.vehicle.{name}={value}" for name, value in car.items()] + ["episode.metrics.near_collision_m=0.2"]
+    assert lotpilot.Episode(str(lane), overrides=small).place["lot"] == str(lane)
+    with pytest.raises(ValueError, match="does not fit"):
+        lotpilot.Episode(str(lane))
 
 
 def test_what_an_import_found_is_said(tmp_path):
@@ -575,6 +598,28 @@ def write_round(run, number, grids, fractions):
         f'[[episodes]]\nlot = "lot-a"\ndirection = "forward"\nsamples = {n}\nnear_collisions = 0\ndriven_m = 0.1\n'
     )
     write_sums(folder)
+    with open(run / "sha256sums", "a") as sums:
+        list_of_round = hashlib.sha256((folder / "sha256sums").read_bytes()).hexdigest()
+        sums.write(f"{list_of_round}  {folder.name}/sha256sums\n")
+
+
+def test_no_round_of_training_data_is_lost_or_of_another_run(tmp_path):
+    """The last round was left out without a word where it was gone, and one that was copied in was taken for the run's."""
+    (tmp_path / "settings.toml").write_text(lotpilot.settings("smoke"))
+    write_sums(tmp_path)
+    for number in (0, 1):
+        write_round(tmp_path, number, np.zeros((3, 25, 25), np.uint8), np.full((3, 2), 0.5, np.float32))
+    shutil.copytree(tmp_path / "round-01", tmp_path / "round-02")
+    for read in (lotpilot.Dataset, lambda run: lotpilot.load_round(run, 2)):
+        with pytest.raises(ValueError, match="round-02: this run did not collect it"):
+            read(tmp_path)
+    shutil.rmtree(tmp_path / "round-02")
+    assert len(lotpilot.Dataset(tmp_path)) == 6
+    with pytest.raises(ValueError, match="there is no round 2"):
+        lotpilot.load_round(tmp_path, 2)
+    shutil.rmtree(tmp_path / "round-01")
+    with pytest.raises(ValueError, match=r"round-01/sha256sums: cannot be read"):
+        lotpilot.Dataset(tmp_path)
 
 
 def test_rounds_of_training_data_are_read_and_damage_is_noticed(tmp_path):

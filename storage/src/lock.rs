@@ -86,8 +86,10 @@ impl Lock {
 
 impl Drop for Lock {
     fn drop(&mut self) {
-        // What is left of a name would only mislead readers; the lock itself goes with the file handle.
+        // What is left of a name would only mislead readers.
         let _ = self.file.set_len(0);
+        // Not with the file handle alone: a process that was forked from this one has it open as well, for as long as it lives.
+        let _ = self.file.unlock();
     }
 }
 
@@ -107,6 +109,20 @@ mod tests {
         drop(lock);
         assert_eq!(fs::read(folder.join(FILE)).unwrap(), b"");
         Lock::take(&folder, "train-bc").unwrap();
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// After a function in Python had forked a process, the folder of its finished evaluation was "in use by another process".
+    #[test]
+    fn a_lock_is_given_back_though_a_forked_process_has_its_file_open() {
+        let folder = std::env::temp_dir().join(format!("storage-test-{}-forked", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let lock = Lock::take(&folder, "evaluate").unwrap();
+        // What a child has: the same open file.
+        let of_child = lock.file.try_clone().unwrap();
+        drop(lock);
+        Lock::take(&folder, "merge").unwrap();
+        drop(of_child);
         fs::remove_dir_all(folder).unwrap();
     }
 

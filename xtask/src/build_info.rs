@@ -3,7 +3,7 @@
 use crate::output::Output;
 use anyhow::ensure;
 use evaluation::shards::has_networks;
-use experiment::manifest::{Build, Manifest};
+use experiment::manifest::{Build, Manifest, processor_features};
 use experiment::run_dir::RunDir;
 use experiment::settings::Settings;
 use serde::Deserialize;
@@ -137,19 +137,6 @@ fn processor() -> Option<String> {
     let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let name = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'))?.1;
     Some(name.trim().to_owned())
-}
-
-/// The instructions that products and sums of networks are computed with, where there is a choice.
-fn processor_features() -> Vec<String> {
-    #[cfg(target_arch = "x86_64")]
-    let features = [
-        ("avx2", std::arch::is_x86_feature_detected!("avx2")),
-        ("fma", std::arch::is_x86_feature_detected!("fma")),
-        ("avx512f", std::arch::is_x86_feature_detected!("avx512f")),
-    ];
-    #[cfg(not(target_arch = "x86_64"))]
-    let features: [(&str, bool); 0] = [];
-    features.into_iter().filter(|(_, has)| *has).map(|(name, _)| name.to_owned()).collect()
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ use evaluation::drive_stage::DriveStage;
 use evaluation::evaluations::Evaluations;
 use evaluation::parts::Rows;
 use evaluation::plan::Plan;
-use evaluation::shards::{self, Shards};
+use evaluation::shards::{self, Shards, has_networks};
 use evaluation::stage::Step;
 use evaluation::stages;
 use experiment::command_line::{quoted, quoted_path};
@@ -153,6 +153,11 @@ fn made_by(manifest: &Manifest) -> Build {
 fn check_target(args: &MergeArgs, manifest: &Manifest) -> anyhow::Result<()> {
     let folder = args.folders[0].display();
     ensure!(manifest.is_of_this_target(), "{folder}: made on {}; merge on such a machine", manifest.target);
+    // The report replays near-collisions of networks.
+    ensure!(
+        !has_networks(manifest) || manifest.rounds_like_here(build_info::get()),
+        "{folder}: made on a machine that rounds otherwise (processor_features in its manifest.toml); merge on such a machine"
+    );
     Ok(())
 }
 

@@ -497,6 +497,12 @@ fn render_report(run: &Path, overwrite: bool, copy: Option<&Folder<'_>>, output:
             run.display(),
             made.not_replayed.len()
         );
+        // Whoever meant to replace the copy in `--out` alone should know.
+        output.note(format_args!(
+            "warning: {}: its report is written without the pictures of near-collisions that cannot be replayed from here \
+             ({reason}); written again where the run was made, it has them again",
+            run.display()
+        ));
     }
     owned.list_without_report()?;
     let written = made.write(&owned, &console);

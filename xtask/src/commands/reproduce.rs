@@ -12,7 +12,7 @@ use clap::{Args, ValueEnum};
 use evaluation::shards::ShardRecord;
 use evaluation::stage::{self, Stage, Step};
 use evaluation::stages::{self, Extent};
-use evaluation::{deviations, rules};
+use evaluation::{deviations, rules, tune};
 use experiment::command_line::quoted_path;
 use experiment::drivers::{self, DriverSpec, NamedDriver};
 use experiment::inputs::{self, Inputs};
@@ -22,6 +22,7 @@ use experiment::run_dir::RunDir;
 use experiment::settings::{Layers, Settings};
 use experiment::shard::Shard;
 use experiment::trained;
+use planners::PlannerSpec;
 use report::reproduction::{self, Recipe};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -328,11 +329,11 @@ fn tuned(folder: Option<&Path>) -> anyhow::Result<Vec<String>> {
     let Some(folder) = folder else {
         return Ok(drivers::tuned_specs());
     };
-    let specs: Vec<String> = planners::PlannerSpec::all()
+    let specs: Vec<String> = PlannerSpec::in_every_reading()
         .iter()
-        .map(|planner| (planner.name(), folder.join(format!("{}.toml", planner.name()))))
+        .map(|(name, planner)| (planner.name(), folder.join(format!("{}.toml", tune::file_stem(name)))))
         .filter(|(_, file)| file.is_file())
-        .map(|(name, file)| format!("{name}:{}", file.display()))
+        .map(|(method, file)| format!("{method}:{}", file.display()))
         .collect();
     ensure!(!specs.is_empty(), "--tuned {}: holds no parameters; cargo xtask tune writes them", folder.display());
     DriverSpec::parse_all(&specs)?;
@@ -348,6 +349,19 @@ mod tests {
     struct Alone {
         #[command(flatten)]
         args: ReproduceArgs,
+    }
+
+    /// Readings were left out, or "no parameters" where there was nothing else.
+    #[test]
+    fn whatever_was_tuned_drives_readings_too() {
+        let folder = std::env::temp_dir().join(format!("xtask-test-{}-tuned", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        for name in ["cvm.toml", "dwa-fox.toml", "dwa-fox.candidates.toml", "tuning.md"] {
+            std::fs::write(folder.join(name), "").unwrap();
+        }
+        let of = |name: &str| format!("{}:{}", &name[..3], folder.join(name).display());
+        assert_eq!(tuned(Some(&folder)).unwrap(), [of("dwa-fox.toml"), of("cvm.toml")]);
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 
     /// Shards of `--networks full` and of `--networks ./full` were not of one whole.

@@ -78,6 +78,8 @@ struct Asked {
 
 /// Behaviour cloning alone: DAgger without an iteration.
 pub(crate) fn bc(args: &TrainArgs, output: &Output) -> anyhow::Result<()> {
+    let unused = Layers::from(&args.layers).overrides.into_iter().find(|it| it.starts_with("dagger.iterations_"));
+    ensure!(unused.is_none(), "--set {}: train-bc has no iterations; train-dagger has", unused.unwrap_or_default());
     train(args, "train-bc", output, |settings| {
         settings.dagger.iterations_max = 0;
         settings.dagger.iterations_min = 0;

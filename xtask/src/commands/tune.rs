@@ -94,7 +94,11 @@ pub(crate) fn run(args: &TuneArgs, output: &Output) -> anyhow::Result<()> {
     output.table(|| format!("\n{table}"), &())?;
     run.write("tuning.md", format!("{table}\n").as_bytes())?;
     run.finish(Outcome::Tuning { planners: tuned.iter().map(|found| found.name.clone()).collect() })?;
-    output.note(format_args!("written: {}/*.toml; drive one with --driver NAME:{0}/NAME.toml", run.path().display()));
+    if let Some(first) = tuned.first() {
+        let method = first.name.split('/').next().unwrap_or_default();
+        let (folder, stem) = (run.path().display(), tune::file_stem(&first.name));
+        output.note(format_args!("written: {folder}/*.toml; drive one with --driver {method}:{folder}/{stem}.toml"));
+    }
     console.report_time();
     Ok(())
 }

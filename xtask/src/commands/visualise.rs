@@ -127,6 +127,10 @@ struct FailuresArgs {
 }
 
 pub(crate) fn run(args: &VisualiseArgs, output: &Output) -> anyhow::Result<()> {
+    // clap holds flags before the name of what is looked at against each other, and those behind it, but not both.
+    let SinkArgs { out, spawn, connect } = &args.sink;
+    let places = [out.is_some(), *spawn, connect.is_some()].into_iter().filter(|&is_named| is_named).count();
+    ensure!(places <= 1, "--out, --spawn, --connect: name one of them, as a recording goes to one place");
     if let Some(file) = &args.sink.out {
         run_dir::ensure_outside_of_runs(file).context("--out")?;
         ensure!(
