@@ -3,11 +3,13 @@
 
 use crate::docs_page::{self, MadeBy};
 use crate::page::{Image, Page};
+use crate::trainings_table::TrainingsTable;
 use crate::{deviations, rules, scaling};
 use anyhow::{bail, ensure};
 use evaluation::shards;
 use experiment::command_line::command_line;
 use experiment::manifest::{self, Manifest};
+use experiment::trained;
 use sim::limits::RUN_TEXT_BYTES_MAX;
 use std::convert::Infallible;
 use std::fmt;
@@ -81,25 +83,47 @@ impl OtherRun {
         ensure!(folder.is_dir() && manifest::is_finished(folder)?, "{name}: this is not a finished run");
         ensure!(!shards::is_shard(folder)?, "{name}: this is a shard, which has no table; put all together with merge");
         let manifest = Manifest::read(folder)?;
-        let (title, table) = match manifest.command.as_str() {
-            "deviations" => (deviations::TITLE, "deviations.md"),
-            "rules" => (rules::TITLE, "rules.md"),
-            "scaling" => (scaling::TITLE, "scaling.md"),
-            "evaluate" => ("An evaluation", "summary.md"),
-            "train-bc" | "train-dagger" => ("A training", "table1.md"),
+        let (title, table, plot) = match manifest.command.as_str() {
+            command @ ("deviations" | "rules" | "scaling") => {
+                // Judged anew, as the page says, by what was driven.
+                let (title, TrainingsTable { text, svg, .. }) = judged(command, &manifest, folder)?;
+                (title, text, Some(svg))
+            }
+            "evaluate" => ("An evaluation", self.text("summary.md")?, None),
+            "train-bc" | "train-dagger" => ("A training", self.text("table1.md")?, None),
             other => bail!(
                 "{name}: a run of {other} has no table of its own; name runs of deviations, rules, scaling, \
                             evaluate, train-bc or train-dagger"
             ),
         };
-        let plot = sums::read_if_listed(&folder.join(table).with_extension("svg"), RUN_TEXT_BYTES_MAX)?;
-        Ok(Found {
-            title: self.title.clone().unwrap_or_else(|| title.to_owned()),
-            table: sums::read_to_string(&folder.join(table), RUN_TEXT_BYTES_MAX)?,
-            plot: plot.map(String::from_utf8).transpose()?,
-            manifest,
-        })
+        Ok(Found { title: self.title.clone().unwrap_or_else(|| title.to_owned()), table, plot, manifest })
     }
+
+    fn text(&self, file: &str) -> anyhow::Result<String> {
+        Ok(sums::read_to_string(&self.folder.join(file), RUN_TEXT_BYTES_MAX)?)
+    }
+}
+
+/// The table of a run that trained several times, and what stands above it.
+fn judged(command: &str, manifest: &Manifest, root: &Path) -> anyhow::Result<(&'static str, TrainingsTable)> {
+    let settings = trained::settings_of(root)?;
+    let arguments = manifest.arguments.clone();
+    Ok(match command {
+        "deviations" => {
+            let stages = evaluation::deviations::stages(&settings, &arguments.try_into()?, root)?;
+            (deviations::TITLE, deviations::table(&stages, root)?)
+        }
+        "rules" => {
+            let extent = arguments.try_into()?;
+            let stages = evaluation::rules::stages(&settings, &extent, root);
+            (rules::TITLE, rules::table(&settings, &extent, &stages, root)?)
+        }
+        _ => {
+            let extent = arguments.try_into()?;
+            let stages = evaluation::scaling::stages(&settings, &extent, root);
+            (scaling::TITLE, scaling::table(&settings, &extent, &stages, root)?)
+        }
+    })
 }
 
 /// What a run left that a page shows.

@@ -75,7 +75,7 @@ pub fn table(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path
         "route",
         "near-collisions (contacts)",
         "per 100 m [95 %]",
-        "less that of the next more",
+        "less that of more lots",
     ]);
     for row in &totals {
         table.add_row(vec![
