@@ -90,8 +90,10 @@ fn tuning_is_repeatable_and_writes_what_can_be_driven() {
     let tune = |threads: &str| {
         let out = folder.join(threads);
         let settings = ["tune", "--planner", "cvm", "--budget", "3", "--lots", "train:1"];
-        succeed(xtask().args(["--threads", threads]).args(settings).arg("--out").arg(&out));
-        std::fs::read_to_string(out.join("cvm.toml")).unwrap()
+        let output = xtask().args(["--threads", threads]).args(settings).arg("--out").arg(&out).output().unwrap();
+        let (said, file) = (text(&output).1, out.join("cvm.toml"));
+        assert!(said.contains(&format!("drive one with --driver cvm:{}", file.display())), "{said}");
+        std::fs::read_to_string(file).unwrap()
     };
     let written = tune("1");
     assert_eq!(written, tune("2"));

@@ -210,6 +210,8 @@ fn trainings_of_a_method_are_judged_together_wherever_they_drove() {
         run
     };
     refused(&[&folder.join("1"), &rounding_otherwise("2")], "use of AVX2 and FMA");
+    // The report replays what networks did, on the machine that merges.
+    refused(&[&rounding_otherwise("1"), &rounding_otherwise("2")], "merge on such a machine");
     evaluate(&all[..2], &[], "two");
     evaluate(&all[2..], &[], "others");
     assert!(merged(["two", "others"], &["--method", &method]) == (printed.clone(), whole.clone()), "evaluations");

@@ -2,7 +2,7 @@
 
 use crate::markdown::table_of;
 use crate::plots::{self, RateRow};
-use crate::trainings_table::TrainingsTable;
+use crate::trainings_table::{TrainingsTable, columns_of};
 use anyhow::Context as _;
 use evaluation::deviations::{self, BASE};
 use evaluation::drive_stage::DriveStage;
@@ -107,6 +107,7 @@ fn rows_of(stage: &Stage, stages: &[Stage], root: &Path) -> anyhow::Result<Vec<R
             let comparison = comparisons.iter().find(|comparison| comparison.driver == driver);
             let difference = comparison.filter(|_| base.is_some()).and_then(|found| found.difference_per_100m);
             let of_paper = deviations::called(&training.folder).map_or("nothing", |deviation| deviation.of_paper);
+            let [difference_per_100m, difference_lower, difference_upper] = columns_of(difference);
             rows.push(Row {
                 deviation: training.folder.clone(),
                 of_paper: of_paper.to_owned(),
@@ -117,9 +118,9 @@ fn rows_of(stage: &Stage, stages: &[Stage], root: &Path) -> anyhow::Result<Vec<R
                 per_100m: totals.rate().per_unit,
                 lower,
                 upper,
-                difference_per_100m: difference.map(|interval| interval.estimate),
-                difference_lower: difference.map(|interval| interval.lower),
-                difference_upper: difference.map(|interval| interval.upper),
+                difference_per_100m,
+                difference_lower,
+                difference_upper,
                 samples: round.map_or(0, |round| round.dataset),
                 eta_hat: round.and_then(|round| round.eta_hat),
                 quoted: quoted_rate(&totals, estimate),

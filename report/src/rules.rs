@@ -2,7 +2,7 @@
 
 use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
-use crate::trainings_table::TrainingsTable;
+use crate::trainings_table::{TrainingsTable, columns_of};
 use anyhow::Context as _;
 use evaluation::drive_stage::DriveStage;
 use evaluation::format::{difference, quoted_interval};
@@ -106,11 +106,7 @@ pub fn table(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path
         let judged = of_teams.as_ref().map(|estimates| estimates[at].per_100m);
         let is_other = of_paper.is_some_and(|of_paper| of_paper != at);
         row.difference = of_teams.as_ref().map(|estimates| estimates[at].difference_per_100m).filter(|_| is_other);
-        (row.difference_per_100m, row.difference_lower, row.difference_upper) = (
-            row.difference.map(|interval| interval.estimate),
-            row.difference.map(|interval| interval.lower),
-            row.difference.map(|interval| interval.upper),
-        );
+        [row.difference_per_100m, row.difference_lower, row.difference_upper] = columns_of(row.difference);
         (row.lower, row.upper) = match teams[at].drivers[..] {
             // What stands by itself has its interval of few lots, too.
             [driver] => (rows[driver].lower, rows[driver].upper),

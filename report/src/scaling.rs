@@ -2,7 +2,7 @@
 
 use crate::markdown::table_of;
 use crate::plots::{self, RatePoint, RateSeries};
-use crate::trainings_table::TrainingsTable;
+use crate::trainings_table::{TrainingsTable, columns_of};
 use anyhow::Context as _;
 use evaluation::drive_stage::DriveStage;
 use evaluation::format::{difference, quoted_interval, quoted_rate};
@@ -145,6 +145,7 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path) -> 
             let [lower, upper] = quoted_interval(&totals, estimate);
             let compared = comparisons.iter().find(|comparison| comparison.driver == of.driver);
             let difference = compared.and_then(|comparison| comparison.difference_per_100m);
+            let [difference_per_100m, difference_lower, difference_upper] = columns_of(difference);
             rows.push(Row {
                 different_lots: of.different_lots,
                 method: of.method,
@@ -156,9 +157,9 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path) -> 
                 per_100m: totals.rate().per_unit,
                 lower,
                 upper,
-                difference_per_100m: difference.map(|interval| interval.estimate),
-                difference_lower: difference.map(|interval| interval.lower),
-                difference_upper: difference.map(|interval| interval.upper),
+                difference_per_100m,
+                difference_lower,
+                difference_upper,
                 quoted: quoted_rate(&totals, estimate),
                 difference,
             });

@@ -1,5 +1,6 @@
 //! What comes of several trainings whose policies all drove: a table, its rows and a plot.
 
+use evaluation::statistics::bootstrap::Interval;
 use experiment::run_dir::RunDir;
 
 /// A table of several trainings.
@@ -23,4 +24,10 @@ impl TrainingsTable {
         run.write(&format!("{name}.csv"), &self.csv)?;
         run.write(&format!("{name}.svg"), self.svg.as_bytes())
     }
+}
+
+/// A difference as columns of the CSV: itself, its lower and its upper end.
+pub(crate) fn columns_of(difference: Option<Interval>) -> [Option<f64>; 3] {
+    let column = |of: fn(Interval) -> f64| difference.map(of);
+    [column(|interval| interval.estimate), column(|interval| interval.lower), column(|interval| interval.upper)]
 }
