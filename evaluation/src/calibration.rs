@@ -59,6 +59,10 @@ pub fn of_policy(policy: &Checkpoint, samples: &[&Sample]) -> [AxisCalibration; 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use policy::conditions::Conditions;
+    use policy::network::{InferenceSettings, NetworkArchitecture, Weights};
+    use sim::episode::EpisodeSettings;
+    use sim::sensing::OccupancyGrid;
 
     /// Four errors by hand: σ = 1 for all, errors 0.5, −0.9, 1.5 and 3: half within 1 σ, three quarters within 2 σ.
     #[test]
@@ -70,5 +74,23 @@ mod tests {
         assert_eq!(of.bins, [[0.1, 0.2], [2.0, 1.0]]);
         let of = AxisCalibration::of("along", (0..12).map(|i| (1.0, f64::from(i))));
         assert_eq!(of.bins.len(), BINS, "twelve in ten groups of one or two");
+    }
+
+    /// A network that answers one point, and is surer of its side: u is across, w along, a side of the image is 12 m.
+    #[test]
+    fn across_is_u_and_along_is_w_in_metres() {
+        let mut weights = Weights::zeros(NetworkArchitecture { modes: 1, ..NetworkArchitecture::compact() });
+        // log σ²: −4.6 across, the middle of the clamp; −4.6 + 4.6 · ½ along.
+        let along = -4.6 + 4.6 * libm::atanhf(0.5);
+        weights.parts_mut().fc2_bias.copy_from_slice(&[0.5, 0.4, -4.6, along]);
+        let conditions = Conditions::of(&EpisodeSettings::paper());
+        let policy = Checkpoint { weights, conditions, inference: InferenceSettings::plain() };
+        let sample = Sample { grid: OccupancyGrid::free(), label: [0.6, 0.4], tau_hat: 0.0 };
+        let axes = of_policy(&policy, &[&sample]);
+        // 12 m · exp(−2.3) with an error of 1.2 m, and 12 m · exp(−1.15) with none.
+        for (found, (name, expected)) in axes.iter().zip([("across", [1.2031, 1.2]), ("along", [3.7996, 0.0])]) {
+            assert_eq!((found.name.as_str(), found.samples, found.bins.len()), (name, 1, 1));
+            assert!(found.bins[0].iter().zip(expected).all(|(of, expected)| (of - expected).abs() < 1e-3), "{found:?}");
+        }
     }
 }

@@ -371,6 +371,43 @@ fn calibrations(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use policy::conditions::Conditions;
+    use policy::network::{InferenceSettings, NetworkArchitecture, Weights};
+    use sim::episode::EpisodeSettings;
+    use sim::sensing::OccupancyGrid;
+
+    /// A network that answers every grid with one point: all of its weights are 0 but the last biases.
+    fn constant([u, w]: [f32; 2]) -> Checkpoint {
+        let mut weights = Weights::zeros(NetworkArchitecture { modes: 1, ..NetworkArchitecture::compact() });
+        weights.parts_mut().fc2_bias.copy_from_slice(&[u, w, -4.6, -4.6]);
+        let conditions = Conditions::of(&EpisodeSettings::paper());
+        Checkpoint { weights, conditions, inference: InferenceSettings::plain() }
+    }
+
+    /// Turned over, the paper's conclusion on the weight would be the opposite. Behaviour cloning, which both have, counts once.
+    #[test]
+    fn the_effect_is_the_error_with_the_weight_over_that_without_on_the_data_of_both() {
+        let root = std::env::temp_dir().join(format!("evaluation-test-{}-effect", std::process::id()));
+        let _ = std::fs::remove_dir_all(&root);
+        std::fs::create_dir_all(&root).unwrap();
+        let sample = Sample { grid: OccupancyGrid::free(), label: [0.5, 0.4], tau_hat: 0.0 };
+        let trained = |name: &str, answer: [f32; 2], held_back: &[usize]| {
+            let store = Store::open(&root.join(name)).unwrap();
+            constant(answer).save(&store.round_folder(1)).unwrap();
+            Trained { store, held_back: held_back.iter().map(|&count| vec![sample; count]).collect() }
+        };
+        // 0.1 and 0.3 off.
+        let weighted = trained("weighted", [0.5, 0.5], &[2, 3]);
+        let unweighted = Some(trained("unweighted", [0.5, 0.7], &[2, 4, 9]));
+        let pair = Pair { weighted, unweighted };
+        let iterations: Vec<Iteration<'_>> = pair.iterations().collect();
+        let [iteration] = &iterations[..] else { panic!("one of the two has a second iteration") };
+        assert_eq!(iteration.held_back().map(Vec::len).collect::<Vec<_>>(), [2, 3, 4]);
+        let tau_hats = iteration.tau_hats().unwrap();
+        assert_eq!(tau_hats.each_ref().map(Vec::len), [9, 9]);
+        assert!((ratio_of_sums(&tau_hats) - 1.0 / 3.0).abs() < 1e-5, "{tau_hats:?}");
+        std::fs::remove_dir_all(root).unwrap();
+    }
 
     #[test]
     fn the_ratio_of_sums_is_resampled_in_blocks() {

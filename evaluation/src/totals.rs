@@ -106,3 +106,65 @@ impl Totals {
 fn smaller(a: Option<f32>, b: Option<f32>) -> Option<f32> {
     [a, b].into_iter().flatten().filter(|value| value.is_finite()).min_by(f32::total_cmp)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim::metrics::EpisodeMetrics;
+
+    /// What `merge` forgets is missing of all lots together, and of no lot by itself.
+    #[test]
+    fn sums_of_parts_are_those_of_all_runs() {
+        let run = |ending: Ending, times: u8| {
+            let (count, of) = (u32::from(times), f32::from(times));
+            let metrics = EpisodeMetrics {
+                duration_s: 10.0 * of,
+                driven_m: 20.0 * of,
+                reference_m: 30.0 * of,
+                near_collisions: count,
+                contacts: 2 * count,
+                stuck: 3 * count,
+                safe_ratio: 0.125 * of,
+                clearance_min_m: 1.0 / of,
+                steering_reversals: 4 * count,
+                steering_effort_rad: 5.0 * of,
+                ..EpisodeMetrics::default()
+            };
+            EpisodeReport { ending, metrics, events: Vec::new() }
+        };
+        let runs = [
+            run(Ending::TimedOut, 1),
+            run(Ending::Blocked, 2),
+            run(Ending::TooManyEvents, 4),
+            run(Ending::ReachedEnd, 2),
+        ];
+        let sum = |runs: &[EpisodeReport]| {
+            let mut totals = Totals::default();
+            for run in runs {
+                totals.add(run);
+            }
+            totals
+        };
+        // 1 + 2 + 4 + 2 = 9 times each.
+        let expected = Totals {
+            runs: 4,
+            reference_m: 270.0,
+            driven_m: 180.0,
+            duration_s: 90.0,
+            near_collisions: 9,
+            contacts: 18,
+            stuck: 27,
+            timed_out: 1,
+            given_up: 2,
+            safe_ratio_sum: 1.125,
+            clearance_min_m: Some(0.25),
+            steering_reversals: 36,
+            steering_effort_rad: 45.0,
+        };
+        assert_eq!(sum(&runs), expected);
+        let mut parts = sum(&runs[..2]);
+        parts.merge(&sum(&runs[2..]));
+        assert_eq!(parts, expected);
+        assert_eq!(parts.mean_speed_mps(), 2.0, "180 m in 90 s");
+    }
+}

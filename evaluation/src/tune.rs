@@ -471,4 +471,41 @@ mod tests {
         assert_eq!(reported(), [1.0]);
         std::fs::remove_file(path).unwrap();
     }
+
+    /// Neither kind of failure can be traded for the other, nor for giving up.
+    #[test]
+    fn candidates_are_ranked_by_unfinished_runs_then_failures_then_near_collisions_then_room() {
+        let of = |timed_out, given_up, near_collisions, stuck, safe_ratio_sum| Totals {
+            runs: 10,
+            timed_out,
+            given_up,
+            near_collisions,
+            stuck,
+            safe_ratio_sum,
+            ..Totals::default()
+        };
+        // The best first: 4 failures, 4 with less room, 4 of which more are near-collisions, 5; then unfinished runs.
+        let ordered = [
+            of(0, 0, 2, 2, 9.0),
+            of(0, 0, 2, 2, 8.0),
+            of(0, 0, 3, 1, 9.0),
+            of(0, 0, 1, 4, 9.0),
+            of(0, 1, 0, 0, 9.0),
+            of(1, 1, 0, 0, 9.0),
+        ];
+        assert!(ordered.is_sorted_by(|better, worse| rank(better) < rank(worse)), "{:?}", ordered.each_ref().map(rank));
+    }
+
+    /// The luckiest of many candidates would be lucky again.
+    #[test]
+    fn finalists_drive_other_trials_than_they_were_chosen_by() {
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.evaluation.trials = 3;
+        let lots = Lot::parse_all(&["train:1:easy"], &settings.episode.vehicle).unwrap();
+        let course = Course::new(&settings, &lots, NoiseChoice::Clean).unwrap();
+        let seeds = |stretch: &Stretch<'_>| stretch.trials.iter().map(|trial| trial.seed).collect::<Vec<_>>();
+        let (search, fresh) = (seeds(&course.search), seeds(&course.fresh));
+        assert_eq!((search.len(), fresh.len()), (3, 3));
+        assert!(fresh.iter().all(|seed| !search.contains(seed)), "{search:?} {fresh:?}");
+    }
 }

@@ -51,3 +51,68 @@ impl DriveDigest {
         self.floats(&[pose.x_m, pose.y_m, pose.heading_rad]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim::driver::{Decision, LookAheadPoint, Source};
+    use sim::geometry::Vec2;
+    use sim::sensing::Observation;
+    use sim::vehicle::{VehicleCommand, VehicleState};
+    use std::collections::BTreeSet;
+
+    fn digest(change: fn(&mut Frame)) -> String {
+        let look_ahead = LookAheadPoint { ahead_m: 8.0, left_m: 0.5 };
+        let mut frame = Frame {
+            tick: 0,
+            time_s: 0.05,
+            vehicle: VehicleState::at_rest(Pose::default()),
+            observation: Observation::default(),
+            decision: Decision { look_ahead, source: Source::Novice, spread: None, speed_limit_mps: None },
+            command: VehicleCommand::default(),
+            progress_m: 0.0,
+            safe_ratio: 0.5,
+            clearance_m: 0.25,
+            driven_m: 0.0,
+            contacts: 0,
+            event: Event::Drove,
+        };
+        change(&mut frame);
+        let mut digest = DriveDigest::default();
+        digest.frame(&frame);
+        digest.hex()
+    }
+
+    /// What a digest leaves out may differ on another machine, and nobody is told.
+    #[test]
+    fn whatever_differs_between_two_drives_shows_but_who_decided() {
+        let changes: [fn(&mut Frame); 23] = [
+            |_| {},
+            |frame| frame.observation.grid.set_occupied(24, 24),
+            |frame| frame.decision.look_ahead.ahead_m += 1.0,
+            |frame| frame.decision.look_ahead.left_m += 1.0,
+            |frame| frame.command.steering_rad += 1.0,
+            |frame| frame.command.speed_mps += 1.0,
+            |frame| frame.vehicle.pose.x_m += 1.0,
+            |frame| frame.vehicle.pose.y_m += 1.0,
+            |frame| frame.vehicle.pose.heading_rad += 1.0,
+            |frame| frame.vehicle.speed_mps += 1.0,
+            |frame| frame.vehicle.steering_rad += 1.0,
+            |frame| frame.vehicle.accel_mps2 += 1.0,
+            |frame| frame.driven_m += 1.0,
+            |frame| frame.time_s += 1.0,
+            |frame| frame.progress_m += 1.0,
+            |frame| frame.safe_ratio += 1.0,
+            |frame| frame.clearance_m += 1.0,
+            |frame| frame.contacts += 1,
+            |frame| frame.event = Event::ReachedEnd,
+            |frame| frame.event = Event::NearCollision { at: Pose::default(), progress_m: 0.0 },
+            |frame| frame.event = Event::NearCollision { at: Pose::new(Vec2::ONE, 0.0), progress_m: 0.0 },
+            |frame| frame.event = Event::Stuck { at: Pose::default(), progress_m: 0.0 },
+            |frame| frame.event = Event::Stuck { at: Pose::new(Vec2::ONE, 0.0), progress_m: 0.0 },
+        ];
+        assert_eq!(changes.map(digest).into_iter().collect::<BTreeSet<_>>().len(), changes.len());
+        // A network and a function that answers the same drive the same.
+        assert_eq!(digest(|frame| frame.decision.source = Source::Planner), digest(|_| {}));
+    }
+}

@@ -519,4 +519,34 @@ mod tests {
         assert!((plain[0] - smoothed[0]).abs() < 1e-4, "the first answer is taken at once");
         assert!(plain[1] < smoothed[1] && smoothed[1] < smoothed[0], "{plain:?} and {smoothed:?}");
     }
+
+    /// The first one's controller and smoothing would drive the others, which were trained with their own.
+    #[test]
+    fn members_of_an_ensemble_that_were_trained_otherwise_are_refused() {
+        let settings = Settings::preset("smoke").unwrap();
+        let folder = std::env::temp_dir().join(format!("lotpilot-members-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let network = |name: &str, seed: u64, change: fn(&mut Checkpoint)| {
+            let weights = Weights::init(settings.dagger.network, RootSeed(seed), 0);
+            let (conditions, inference) = (Conditions::of(&settings.episode), settings.dagger.inference);
+            let mut checkpoint = Checkpoint { weights, conditions, inference };
+            change(&mut checkpoint);
+            checkpoint.save(&folder.join(name)).unwrap();
+            format!("net:{}", folder.join(name).display())
+        };
+        let first = network("first", 1, |_| {});
+        let load = |other: &str| format!("ensemble:{first},{other}").parse::<DriverSpec>().unwrap().load(&settings);
+        load(&network("second", 2, |_| {})).unwrap();
+        for other in [
+            network("steady", 3, |checkpoint| checkpoint.inference.smoothing_ticks += 1.0),
+            network("slow", 4, |checkpoint| checkpoint.conditions.controller.speed_law = SpeedLaw::Halved),
+        ] {
+            let error = format!("{:#}", load(&other).unwrap_err());
+            assert!(
+                error.contains(&format!("{other} was trained or drives with other settings than {first}")),
+                "{error}"
+            );
+        }
+        std::fs::remove_dir_all(folder).unwrap();
+    }
 }

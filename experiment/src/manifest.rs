@@ -309,3 +309,71 @@ pub fn is_finished(path: &Path) -> anyhow::Result<bool> {
 pub(crate) fn has_changed(name: &str) -> anyhow::Error {
     anyhow!("{name}: changed since this run was begun; restore it, or begin again into another folder")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_runs::message;
+
+    fn manifest(build: &Build, inputs: &[(&str, &str)]) -> Manifest {
+        let request = Request { inputs: of(inputs), ..Request::default() };
+        Manifest::new(build, ["evaluate", "smoke"], &Settings::preset("smoke").unwrap(), &request)
+    }
+
+    fn of(inputs: &[(&str, &str)]) -> Inputs {
+        inputs.iter().map(|&(name, digest)| (name.to_owned(), digest.to_owned())).collect()
+    }
+
+    #[test]
+    fn runs_of_changes_that_nobody_knows_are_of_no_version() {
+        let built = |git_dirty: Option<bool>, git_changes: Option<&str>| {
+            let git_revision = Some("0123".to_owned());
+            let git_changes = git_changes.map(str::to_owned);
+            manifest(&Build { git_revision, git_dirty, git_changes, ..Build::default() }, &[])
+        };
+        let kinds = [
+            built(None, None),
+            built(Some(false), None),
+            built(Some(true), Some("ab")),
+            built(Some(true), Some("cd")),
+            // As earlier versions noted them.
+            built(Some(true), None),
+        ];
+        for (at, one) in kinds.iter().enumerate() {
+            for (of_other, other) in kinds.iter().enumerate() {
+                assert_eq!(one.is_of_version_of(other), at == of_other && at < 4, "{at} and {of_other}");
+            }
+        }
+        let another = Manifest { git_revision: Some("4567".to_owned()), ..kinds[1].clone() };
+        assert!(!another.is_of_version_of(&kinds[1]));
+    }
+
+    #[test]
+    fn inputs_of_a_run_are_those_that_it_was_begun_with_and_no_others() {
+        let run = manifest(&Build::default(), &[("a.toml", "1"), ("b.toml", "2")]);
+        run.check_inputs(&of(&[("b.toml", "2"), ("a.toml", "1")])).unwrap();
+        for (found, part) in [
+            (&[("a.toml", "1"), ("b.toml", "3")][..], "b.toml: changed"),
+            (&[("a.toml", "1")], "b.toml: changed"),
+            (&[("a.toml", "1"), ("b.toml", "2"), ("c.toml", "3")], "other lots or drivers"),
+        ] {
+            let refused = message(run.check_inputs(&of(found)));
+            assert!(refused.contains(part), "{found:?}: {refused}");
+        }
+        // Of what it was not begun with it says nothing.
+        run.check_some_inputs(&of(&[("b.toml", "2"), ("c.toml", "3")])).unwrap();
+        assert!(message(run.check_some_inputs(&of(&[("b.toml", "3")]))).contains("b.toml: changed"));
+    }
+
+    #[test]
+    fn products_round_once_with_both_instructions_and_twice_without_either() {
+        let with = |features: &[&str]| {
+            let processor_features = features.iter().map(|&name| name.to_owned()).collect();
+            manifest(&Build { processor_features, ..Build::default() }, &[])
+        };
+        assert!(with(&["avx2", "fma"]).rounds_like(&with(&["fma", "avx2", "avx512f"])));
+        assert!(with(&["avx2"]).rounds_like(&with(&[])) && with(&["fma"]).rounds_like(&with(&["avx2"])));
+        assert!(!with(&["avx2", "fma"]).rounds_like(&with(&["avx2"])));
+        assert!(!with(&["fma"]).rounds_like(&with(&["avx2", "fma"])));
+    }
+}

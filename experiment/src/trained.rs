@@ -464,4 +464,36 @@ mod tests {
         assert!(message(policy_folder(&path)).contains("final/sha256sums"));
         fs::remove_dir_all(path).unwrap();
     }
+
+    /// What counts more makes one method of none, what counts less a method of two.
+    #[test]
+    fn a_recipe_is_of_everything_but_the_seed_and_the_evaluation() {
+        let path = scratch("recipe-of-settings");
+        let trained = |change: fn(&mut Settings), digest: &str, policy: &str| {
+            let mut settings = Settings::preset("smoke").unwrap();
+            settings.training.lots = vec!["lots/mine.toml".to_owned()];
+            change(&mut settings);
+            let inputs = [("lots/mine.toml".to_owned(), digest.to_owned())].into();
+            let request = Request { inputs, ..Request::default() };
+            drop(RunDir::create(&place(&path, true), &settings, &request).unwrap());
+            training_of(&path.join(policy)).unwrap()
+        };
+        let own = trained(|_| {}, "1", "");
+        assert_eq!(own.seed, Settings::preset("smoke").unwrap().seed);
+        let of_seed = trained(|settings| settings.seed = RootSeed(9), "1", "");
+        assert_eq!(of_seed, Training { seed: RootSeed(9), ..own.clone() });
+        let elsewhere = trained(|settings| settings.evaluation.lots = vec!["lot-c".to_owned()], "1", "");
+        assert_eq!(elsewhere, own);
+        for other in [
+            trained(|settings| settings.dagger.eta = 0.5, "1", ""),
+            trained(|settings| settings.training.trials = 2, "1", ""),
+            // Other ground under the same name.
+            trained(|_| {}, "2", ""),
+            // Behaviour cloning.
+            trained(|_| {}, "1", "bc"),
+        ] {
+            assert_ne!(other.recipe, own.recipe);
+        }
+        fs::remove_dir_all(path).unwrap();
+    }
 }

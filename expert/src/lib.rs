@@ -320,3 +320,47 @@ fn standard_normal(rng: &mut Rng) -> f32 {
     let uniform = |rng: &mut Rng| (rng.next_u32() >> 8) as f32 / (1 << 24) as f32;
     (0..12).map(|_| uniform(rng)).sum::<f32>() - 6.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim::seed::{RootSeed, Stream};
+    use sim::sensing::GridGeometry;
+
+    fn expert(settings: ExpertSettings) -> ScriptedExpert {
+        ScriptedExpert::new(settings, &EpisodeSettings::paper(), RootSeed(1).rng(Stream::Expert, 0))
+    }
+
+    /// 10 000 answers: means, standard deviations and the covariance within four standard errors, .01/√n, .01/√(2n), .01²/√n.
+    #[test]
+    fn a_hand_is_as_unsteady_as_it_is_told_on_either_axis_by_itself() {
+        const ANSWERS: u16 = 10_000;
+        let mut expert = expert(ExpertSettings { label_jitter: 0.01, ..ExpertSettings::half_points() });
+        let geometry = GridGeometry::paper();
+        let steady = LookAheadPoint::from_image_fraction([0.4, 0.6], &geometry);
+        let mut sums = [0.0; 5];
+        for _ in 0..ANSWERS {
+            let [u, w] = expert.as_by_hand(steady).to_image_fraction(&geometry).map(f64::from);
+            let (u, w) = (u - 0.4, w - 0.6);
+            for (sum, value) in sums.iter_mut().zip([u, w, u * u, w * w, u * w]) {
+                *sum += value / f64::from(ANSWERS);
+            }
+        }
+        let [mean_u, mean_w, square_u, square_w, product] = sums;
+        assert!(mean_u.abs() < 4e-4 && mean_w.abs() < 4e-4, "{sums:?}");
+        let is_as_told = |square: f64| (square.sqrt() - 0.01).abs() < 2.9e-4;
+        assert!(is_as_told(square_u) && is_as_told(square_w) && product.abs() < 4e-6, "{sums:?}");
+    }
+
+    /// After a near-collision it would point for 0.3 s at what lay before it there.
+    #[test]
+    fn put_back_onto_the_route_a_hand_points_at_what_it_sees() {
+        let mut expert = expert(ExpertSettings { reaction_delay_s: 0.3, ..ExpertSettings::half_points() });
+        // Six ticks late; until there is an answer so old, the first.
+        let found = [5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0]
+            .map(|ahead_m| expert.as_by_hand(LookAheadPoint { ahead_m, left_m: 0.0 }).ahead_m);
+        assert_eq!(found, [5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 5.0, 6.0]);
+        expert.reset();
+        assert_eq!(expert.as_by_hand(LookAheadPoint { ahead_m: 4.5, left_m: 0.0 }).ahead_m, 4.5);
+    }
+}

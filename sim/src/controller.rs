@@ -240,4 +240,21 @@ mod tests {
         let longer = VehicleSettings { length_m: vehicle.length_m + 0.3, ..vehicle };
         assert!((ahead_of_bumper_m(&longer, &geometry, target) - 4.2).abs() < 1e-5);
     }
+
+    /// 4 m ahead of the bumper and 3 m aside are L_f = 5 m, sin η = .6, cos η = .8: tan δ = 2.845 · .6 / (.75 · 5 + .3 · .8).
+    #[test]
+    fn the_authors_law_steers_as_computed_by_hand() {
+        let (vehicle, geometry) = (VehicleSettings::hyundai_hg300(), GridGeometry::paper());
+        let from_bumper = |ahead_m: f32, left_m: f32| {
+            let target = LookAheadPoint { ahead_m: ahead_m + vehicle.front_m(), left_m };
+            steering_rad(PursuitLaw::AuthorsCode, &vehicle, &geometry, target)
+        };
+        let expected = 1.707 / 3.99;
+        for (left_m, side) in [(3.0, 1.0), (-3.0, -1.0)] {
+            let tan = maths::tan(from_bumper(4.0, left_m));
+            assert!((tan - side * expected).abs() < 1e-5, "{tan} for {left_m} m to the left");
+        }
+        assert_eq!(from_bumper(4.0, 0.0), 0.0);
+        assert_eq!(from_bumper(0.5, -3.0), -vehicle.steering_max_rad, "within the lock");
+    }
 }

@@ -145,4 +145,27 @@ mod tests {
         assert_ne!(draws[0], draws[2]);
         assert_eq!(draws, [11_027_680_626_051_900_178, 18_178_751_841_779_265_898, 11_632_404_386_239_061_520]);
     }
+
+    /// Those that no golden drive draws from would be renumbered without a word.
+    #[test]
+    fn streams_keep_their_numbers() {
+        let streams = [
+            Stream::Obstacles,
+            Stream::Layout,
+            Stream::Sensor,
+            Stream::Weights,
+            Stream::Shuffle,
+            Stream::Dropout,
+            Stream::DecisionRule,
+            Stream::Episode,
+            Stream::Bootstrap,
+            Stream::Expert,
+            Stream::Suite,
+            Stream::Search,
+            Stream::NoiseAugmentation,
+            Stream::Disturbance,
+            Stream::Rollouts,
+        ];
+        assert_eq!(streams.map(|stream| stream as u16), [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15]);
+    }
 }

@@ -324,3 +324,17 @@ fn the_interval_of_contacts_of_a_team_is_for_other_lots_and_other_seeds() {
     assert!(alone.lower < alone.estimate && alone.estimate < alone.upper, "{alone:?}");
     is_near(contacts(&lots_vary)[0], [alone.lower, alone.estimate, alone.upper]);
 }
+
+/// Per route, whoever is put back often, and drives less of it, would weave less.
+#[test]
+fn reversals_are_compared_per_way_driven() {
+    let results = results(2, |driver, _| {
+        let mut report = report(0, 200.0, 0.5);
+        (report.metrics.driven_m, report.metrics.steering_reversals) = if driver == 0 { (50.0, 4) } else { (25.0, 3) };
+        Some(report)
+    });
+    let (_, comparisons) = results.judge(0, &slice(&results, "lot-a"), 0, RootSeed(1));
+    // 3 in 25 m are 12 per 100 m, 4 in 50 m are 8; every trial is alike.
+    let found = comparisons[0].difference_reversals_per_100m.unwrap();
+    assert!([found.lower, found.estimate, found.upper].iter().all(|end| (end - 4.0).abs() < 1e-9), "{found:?}");
+}

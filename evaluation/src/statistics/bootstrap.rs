@@ -264,6 +264,8 @@ mod tests {
     fn an_interval_that_ends_at_zero_gets_no_star() {
         let ends_at = |upper: f64| Interval { estimate: -0.07, lower: -0.14, upper, units: 29, apart: 6 };
         assert!(!ends_at(-2.8e-17).excludes_zero() && ends_at(-1e-4).excludes_zero());
+        let begins_at = |lower: f64| Interval { estimate: 0.07, lower, upper: 0.14, units: 29, apart: 6 };
+        assert!(!begins_at(2.8e-17).excludes_zero() && begins_at(1e-4).excludes_zero());
     }
 
     #[test]

@@ -92,3 +92,24 @@ fn what_is_passed_depends_on_who_drives_on_and_from_where() {
     assert_eq!(found, [(Some(true), Some(true)), (Some(false), None), (Some(true), Some(true))]);
     assert!(explained.iter().all(|(cause, _)| *cause != Cause::NoiseInduced), "{explained:?}");
 }
+
+/// A car that was put back close to something counts nothing for a second; driven on from there, it counted at once.
+#[test]
+fn what_is_left_of_the_time_in_which_nothing_counts_holds_when_driven_on() {
+    let settings = Settings::preset("smoke").unwrap();
+    let lots = Lot::parse_all(&["lot-b"], &settings.episode.vehicle).unwrap();
+    let trials: Vec<Trial<'_>> =
+        Trial::all(RootSeed(1), Purpose::Evaluation, &lots, 1, &[Direction::Forward]).collect();
+    let maps = trials::maps(&trials, &settings.episode).unwrap();
+    let straight = NamedDriver::callback("straight", Arc::new(Straight));
+    let (episode, seed, noise) = (&settings.episode, RootSeed(1), NoiseChoice::Clean);
+    let batch = TrialBatch { episode, driver: &straight, trials: &trials, maps: &maps, noise, seed };
+    // Along the edge of the lane, which is 2.7 to 3 m wide: 2 m off its middle the body reaches across it.
+    let on_route = maps[0].path().pose_at(10.0);
+    let on_edge = Pose::new(on_route.position() + 2.0 * on_route.ahead().perp(), on_route.heading_rad);
+    let counts = incident(VehicleState::at_rest(on_edge), 10.0);
+    let mut counts_nothing = counts;
+    // As long as the drive lasts.
+    counts_nothing.before.iter_mut().for_each(|before| before.refractory_s = 100.0);
+    assert_eq!(passes(&batch, &[counts, counts_nothing], LOOK_BACK).unwrap(), [false, true]);
+}

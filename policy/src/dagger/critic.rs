@@ -135,4 +135,11 @@ mod tests {
         assert_eq!(found, off.iter().map(|&off| if off > tau { 1.0 } else { 0.0 }).collect::<Vec<_>>());
         assert_eq!(labelled.rounds()[0].noise_augmentations, d.rounds()[0].noise_augmentations);
     }
+
+    /// u of a critic's labels is always ½: read there, no state would ever be told from another.
+    #[test]
+    fn a_critic_warns_by_what_it_answers_for_w() {
+        let warns = |mean: [f32; 2]| alarm(&Prediction { mean, sigma: [0.1; 2] });
+        assert_eq!([[0.5, 0.2], [0.9, 1.3], [0.1, -0.4]].map(warns), [0.2, 1.0, 0.0]);
+    }
 }

@@ -3,10 +3,11 @@
 use super::*;
 use crate::checkpoint::Checkpoint;
 use crate::conditions::Conditions;
+use crate::dagger::gated_collector::{CollectorSeat, GatedCollector};
 use crate::dagger::learned::critic_folder;
 use crate::dataset::ValidationSplit;
 use crate::dataset::store::Store;
-use crate::decision_rule::{DecisionRule, PAPER_TAU};
+use crate::decision_rule::{DecisionRule, Gate, GateTick, PAPER_TAU};
 use crate::drivers::{NetFleet, NetPolicy};
 use crate::fit::{Budget, FitReport, FitSettings};
 use crate::network::{ConvLayer, InferenceSettings, NetworkArchitecture, Weights};
@@ -19,11 +20,13 @@ use sim::geometry::{Pose, Vec2};
 use sim::map::Map;
 use sim::scenario::{Direction, LotNoise, NoiseLevel, Obstacle, ObstacleClass, ReferencePath, Scenario};
 use sim::seed::{EpisodeIndex, RootSeed};
+use sim::sensing::GridGeometry;
 use sim::sensing::noise::NoiseSettings;
 use std::cmp::Reverse;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
 use storage::sums;
 
 /// Drives to the point of the route ten metres ahead.
@@ -455,6 +458,11 @@ fn every_rule_of_the_family_trains_and_its_round_is_driven_again_as_it_was() {
         let effort = about.effort.unwrap();
         assert_eq!(effort.expert_ticks, about.ticks - about.novice_ticks, "{name}");
         assert!(effort.interventions <= effort.expert_ticks && effort.queries <= about.ticks, "{name}: {effort:?}");
+        if name == "vanilla" {
+            // In round 1 the expert drives a tick with probability ½; in round 0 it would always.
+            let share = about.novice_ticks as f64 / about.ticks as f64;
+            assert!((0.4..0.6).contains(&share), "{share} of {} ticks", about.ticks);
+        }
         let agreement = about.agreement.unwrap();
         assert_eq!(agreement.tau, f64::from(rule.tau().unwrap_or(PAPER_TAU)), "{name}");
         // A quarter of the ticks is at or below the first of the quantiles.
@@ -537,4 +545,153 @@ fn augmented_grids_after_a_reset_show_the_new_place() {
     let first = resets[0];
     assert!(grids[..first].iter().all(|grid| *grid == grids[0]), "every frame is dropped");
     assert_ne!(grids[first], grids[0], "the pillar is behind the car");
+}
+
+/// A network that answers every grid with one point: all of its weights are 0 but the last biases.
+fn constant(mean: [f32; 2]) -> Learned {
+    let mut weights = Weights::zeros(settings().network);
+    weights.parts_mut().fc2_bias.copy_from_slice(&[mean[0], mean[1], -4.6, -4.6]);
+    Learned::alone(Checkpoint { weights, conditions: conditions(), inference: InferenceSettings::plain() })
+}
+
+/// An episode of two seconds.
+fn short_episode() -> Vec<Episode> {
+    let mut settings = EpisodeSettings::paper();
+    settings.metrics.timeout_s = 2.0;
+    episodes_with(settings, 1, Vec::new())
+}
+
+/// Points at the corner of the patch that is nearest to the right of the car.
+struct AtTheCorner;
+
+impl Driver for AtTheCorner {
+    fn decide(&mut self, _: &Situation<'_>) -> Decision {
+        let look_ahead = LookAheadPoint::from_image_fraction([1.0, 1.0], &GridGeometry::paper());
+        Decision { look_ahead, source: Source::Expert, spread: None, speed_limit_mps: None }
+    }
+}
+
+/// Opposite corners of the image are √2 apart: what is stored, for the weight, is clipped to 1; what is compared with τ, added
+/// up and counted is not.
+#[test]
+fn a_discrepancy_beyond_one_is_stored_as_one_and_counted_as_it_is() {
+    let settings = DaggerSettings { rule: DecisionRule::TauOnly { tau: 1.2 }, noise_augmentations: 0, ..settings() };
+    let mut drives = seated(1, short_episode());
+    drives[0].expert = Box::new(AtTheCorner);
+    let rollouts = Rollouts::of_round(&settings, RootSeed(6), Some(&constant([0.0, 0.0])), drives);
+    let collected = rollouts.drive(&mut |_, _| {}).unwrap();
+    let apart = 2.0_f64.sqrt();
+    assert_eq!((collected.n_tot, collected.n_net), (40, 0), "√2 is not below 1.2");
+    assert_eq!(collected.round.samples.len(), 40);
+    assert!(collected.round.samples.iter().all(|sample| (sample.label, sample.tau_hat) == ([1.0, 1.0], 1.0)));
+    let agreement = collected.agreement.unwrap();
+    assert!(agreement.tau_hat_quantiles.iter().all(|tau_hat| (tau_hat - apart).abs() < 1e-5), "{agreement:?}");
+    // 40 ticks of 50 ms.
+    assert!((collected.driven_s - 2.0).abs() < 1e-6, "{} s", collected.driven_s);
+    let per_s = collected.record(1).tau_hat_per_s();
+    assert!((per_s - apart / 0.05).abs() < 1e-3, "{per_s} per second");
+}
+
+/// HG-DAgger and the rules of critics were counted as if they asked at every tick. Here nothing warns, so that the network
+/// drives under them and nobody is asked.
+#[test]
+fn the_expert_is_asked_while_it_drives_by_those_who_do_not_compare_with_its_answer() {
+    for (name, always) in [
+        ("all_below", true),
+        ("any_below_literal", true),
+        ("tau_only", true),
+        ("expert_only", true),
+        ("vanilla", true),
+        ("ensemble_dagger", true),
+        ("safe_dagger", false),
+        ("hg_dagger", false),
+        ("lazy_dagger", false),
+        ("thrifty_dagger", false),
+    ] {
+        let rule = DecisionRule::named(name).unwrap();
+        let settings = DaggerSettings { rule, noise_augmentations: 0, ..settings() };
+        let straight = constant([0.5, 0.4]);
+        let rollouts = Rollouts::of_round(&settings, RootSeed(6), Some(&straight), seated(1, short_episode()));
+        let collected = rollouts.drive(&mut |_, _| {}).unwrap();
+        assert_eq!(collected.effort.queries, if always { collected.n_tot } else { 0 }, "{name}");
+        assert!(always || collected.n_net == collected.n_tot, "{name}: {} of {}", collected.n_net, collected.n_tot);
+    }
+}
+
+/// Algorithm 1 goes on while η̂ ≤ η; and one network that passes η at once still makes as many iterations as are asked for.
+#[test]
+fn iterations_go_on_until_eta_is_passed_and_there_are_enough() {
+    let of = |name: &str, eta: f64, iterations_min: u32| {
+        let folder = scratch(name);
+        let settings = DaggerSettings {
+            eta,
+            iterations_min,
+            // The network always drives: η̂ = 1.
+            rule: DecisionRule::TauOnly { tau: 2.0 },
+            keep: Keep::EveryTick,
+            noise_augmentations: 0,
+            ..settings()
+        };
+        let outcome = run_in(&folder, &settings, &mut go_on).unwrap();
+        std::fs::remove_dir_all(folder).unwrap();
+        (outcome.stop, outcome.rows.len())
+    };
+    // Behaviour cloning and two iterations.
+    assert_eq!(of("eta-met", 1.0, 1), (Stop::IterationCap, 3), "1 is not more than 1");
+    assert_eq!(of("enough-iterations", 0.999, 2), (Stop::EtaReached, 3));
+}
+
+/// The same stream for all of them would make copies, and the data set no richer.
+#[test]
+fn noise_augmentations_of_a_sample_have_noise_of_their_own() {
+    let settings = DaggerSettings { noise_augmentations: 2, ..settings() };
+    let rollouts = Rollouts::of_round(&settings, RootSeed(6), None, of_round(0, 1));
+    let round = rollouts.drive(&mut |_, _| {}).unwrap().round;
+    let pairs = round.noise_augmentations.as_chunks::<2>().0;
+    assert_eq!(pairs.len(), round.samples.len());
+    let differ = pairs.iter().filter(|[one, other]| one != other).count();
+    assert!(4 * differ > pairs.len(), "{differ} of {} pairs", pairs.len());
+}
+
+/// Has the expert drive, and counts how often it is told to forget.
+struct Forgetting(Arc<AtomicU32>);
+
+impl Gate for Forgetting {
+    fn trusts_novice(&mut self, _: &GateTick<'_>) -> bool {
+        false
+    }
+
+    fn reset(&mut self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// Follows the route, and counts how often it is told to forget.
+struct ForgettingExpert(Arc<AtomicU32>);
+
+impl Driver for ForgettingExpert {
+    fn decide(&mut self, situation: &Situation<'_>) -> Decision {
+        RouteFollower.decide(situation)
+    }
+
+    fn reset(&mut self) {
+        self.0.fetch_add(1, Ordering::Relaxed);
+    }
+}
+
+/// A rule that remembered who had the wheel before would begin there with the expert.
+#[test]
+fn rule_and_expert_forget_the_past_when_the_car_is_put_back() {
+    let pillar = Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(18.0, 1.0), 0.0));
+    let forgot = [(); 2].map(|()| Arc::new(AtomicU32::new(0)));
+    let [of_rule, of_expert] = forgot.each_ref().map(Arc::clone);
+    let seat =
+        CollectorSeat::new(Box::new(ForgettingExpert(of_expert)), Box::new(Forgetting(of_rule)), Vec::new(), None);
+    let novice = constant([0.5, 0.4]).novice();
+    let mut collector = GatedCollector::new(Some(novice), None, Keep::ExpertTicks, conditions().geometry(), vec![seat]);
+    let reports = run_lockstep(episodes_among(1, vec![pillar]), &mut collector, &mut |_, _| {}).unwrap();
+    let put_back = reports[0].metrics.near_collisions;
+    assert!(put_back > 0 && reports[0].metrics.stuck == 0, "the route leads past the pillar: {reports:?}");
+    // An episode begins with a reset as well.
+    assert_eq!(forgot.map(|count| count.load(Ordering::Relaxed)), [1 + put_back; 2]);
 }

@@ -90,7 +90,7 @@ impl Gate for HgDaggerGate {
 mod tests {
     use super::*;
     use crate::decision_rule::evidence::Evidence;
-    use crate::decision_rule::test_ticks::with_situation;
+    use crate::decision_rule::test_ticks::{with_car_at, with_situation};
     use sim::driver::LookAheadPoint;
 
     /// In a straight lane a point straight ahead is safe, one at full lock drives into the kerb.
@@ -108,5 +108,30 @@ mod tests {
         assert_eq!(novice_ticks(40, 0.0), 40, "nothing is wrong");
         assert_eq!(novice_ticks(40, 4.5), 14, "0.75 s are 15 ticks, in the last of which the expert drives");
         assert_eq!(novice_ticks(40, 0.0), 21, "1.0 s are 20 ticks, in the last of which the network drives");
+    }
+
+    /// At 1.4 m/s, with the 0.5 m of a near-collision: 2.6 m in 1.5 s are critical, 3.3 m in 2.0 s are free. In between nothing
+    /// changes hands.
+    #[test]
+    fn what_is_critical_and_what_is_free_lie_apart_and_a_reset_forgets_both() {
+        let episode = EpisodeSettings::paper();
+        let evidence = Evidence { discrepancy: 0.0, doubt: [0.0; 2], disagreement: 0.0, alarm: 0.0 };
+        // The bumper so far from the wall at the end of the lane, the network straight on.
+        let novice_ticks = |gate: &mut HgDaggerGate, ticks: u32, gap_m: f32| {
+            with_car_at(56.0 - gap_m - episode.vehicle.front_m(), &episode, |situation| {
+                let tick = GateTick { evidence, novice: LookAheadPoint { ahead_m: 8.0, left_m: 0.0 }, situation };
+                (0..ticks).filter(|_| gate.trusts_novice(&tick)).count()
+            })
+        };
+        let mut gate = HgDaggerSettings::default().gate(&episode);
+        assert_eq!(novice_ticks(&mut gate, 40, 2.7), 40, "not critical");
+        assert_eq!(novice_ticks(&mut gate, 40, 2.5), 14, "critical: the expert drives from the 15th tick on");
+        assert_eq!(novice_ticks(&mut gate, 40, 3.2), 0, "not critical any more, but not free");
+        assert_eq!(novice_ticks(&mut gate, 40, 3.4), 21, "free: the network drives from the 20th tick on");
+        assert_eq!(novice_ticks(&mut gate, 10, 2.5), 10, "half of the expert's reaction");
+        gate.reset();
+        assert_eq!(novice_ticks(&mut gate, 40, 2.5), 14, "it begins anew");
+        gate.reset();
+        assert_eq!(novice_ticks(&mut gate, 5, 2.7), 5, "put back, the network drives");
     }
 }

@@ -60,4 +60,13 @@ mod tests {
             assert_eq!(with_tick(discrepancy, alarm, |tick| gate.trusts_novice(tick)), is_novices, "{discrepancy}");
         }
     }
+
+    #[test]
+    fn a_car_that_was_put_back_is_the_networks_again() {
+        let mut gate = LazyDaggerSettings::default().gate();
+        assert!(!with_tick(0.05, 0.6, |tick| gate.trusts_novice(tick)));
+        assert!(!with_tick(0.05, 0.0, |tick| gate.trusts_novice(tick)), "not near enough to be handed back to");
+        gate.reset();
+        assert!(with_tick(0.05, 0.0, |tick| gate.trusts_novice(tick)));
+    }
 }

@@ -12,6 +12,11 @@ use sim::vehicle::VehicleState;
 
 /// In the middle of a straight lane 5 m wide, at 1.4 m/s.
 pub(crate) fn with_situation<T>(episode: &EpisodeSettings, then: impl FnOnce(&Situation<'_>) -> T) -> T {
+    with_car_at(20.0, episode, then)
+}
+
+/// The same so far along the lane, which ends at 56 m.
+pub(crate) fn with_car_at<T>(x_m: f32, episode: &EpisodeSettings, then: impl FnOnce(&Situation<'_>) -> T) -> T {
     let v = Vec2::new;
     let scenario = Scenario {
         name: "straight lane".to_string(),
@@ -24,9 +29,9 @@ pub(crate) fn with_situation<T>(episode: &EpisodeSettings, then: impl FnOnce(&Si
         speed_bumps: Vec::new(),
     };
     let map = Map::build(scenario, &episode.vehicle).unwrap();
-    let vehicle = VehicleState { speed_mps: 1.4, ..VehicleState::at_rest(Pose::new(v(20.0, 0.0), 0.0)) };
+    let vehicle = VehicleState { speed_mps: 1.4, ..VehicleState::at_rest(Pose::new(v(x_m, 0.0), 0.0)) };
     let observation = Observation { grid: OccupancyGrid::free() };
-    let truth = GroundTruth { map: &map, vehicle, progress_m: 20.0 };
+    let truth = GroundTruth { map: &map, vehicle, progress_m: x_m };
     then(&Situation { observation: &observation, truth })
 }
 

@@ -92,6 +92,7 @@ impl Gate for ThriftyDaggerGate {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decision_rule::evidence::Evidence;
     use crate::decision_rule::test_ticks::with_tick;
 
     #[test]
@@ -114,5 +115,23 @@ mod tests {
         {
             assert_eq!(with_tick(discrepancy, alarm, |tick| gate.trusts_novice(tick)), is_novices, "{alarm}");
         }
+    }
+
+    /// Neither risky nor near the expert's answer: the disagreement alone takes the wheel, and nothing but a reset gives it back.
+    #[test]
+    fn what_the_members_disagree_about_is_novel_and_a_reset_hands_back() {
+        let limits = Thresholds { novelty: 0.1, risk: 0.4, risk_release: 0.2, discrepancy_release: 0.05 };
+        let mut gate = ThriftyDaggerGate::new(limits);
+        let trusts = |gate: &mut ThriftyDaggerGate, disagreement: f32| {
+            with_tick(0.3, 0.3, |tick| {
+                let evidence = Evidence { disagreement, ..tick.evidence };
+                gate.trusts_novice(&GateTick { evidence, novice: tick.novice, situation: tick.situation })
+            })
+        };
+        assert!(trusts(&mut gate, 0.1), "no more than the threshold");
+        assert!(!trusts(&mut gate, 0.11));
+        assert!(!trusts(&mut gate, 0.0), "far from the expert's answer");
+        gate.reset();
+        assert!(trusts(&mut gate, 0.0));
     }
 }

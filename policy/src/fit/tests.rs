@@ -308,3 +308,30 @@ fn a_loss_that_is_no_number_ends_the_training_with_its_step() {
     let error = fit(&start, &dataset, &settings, context(DeviceChoice::Cpu), None, &mut progress).unwrap_err();
     assert_eq!(error, FitError::NotFinite { step: 1, what: "the loss" });
 }
+
+/// By the loss weights are chosen, by the likelihood trainings with and without the weight are compared; β is of neither.
+#[test]
+fn the_validation_loss_weighs_known_mistakes_and_the_likelihood_does_not() {
+    let mut weights = Weights::zeros(tiny());
+    weights.parts_mut().fc2_bias.copy_from_slice(&[0.5, 0.5, -4.6, -4.6]);
+    let beside = |sample: &Sample| Sample { label: [0.6, 0.5], tau_hat: 1.0, ..*sample };
+    let samples: Vec<Sample> = round(3).samples.iter().map(beside).collect();
+    let loss = LossSettings { beta: 0.5, ..LossSettings::paper() };
+    let found = evaluate(&weights, &samples, &loss, context(DeviceChoice::Cpu));
+    // log σ² = −4.6, the middle of the clamp, on both axes, e²/σ² = 0.01 · e^4.6 = 0.99484 on one, W = (1 + 1.5)² = 6.25:
+    // ¼ (6.25 · 0.99484 − 2 · 4.6) and ¼ (0.99484 − 2 · 4.6).
+    assert!((found.loss + 0.745_56).abs() < 1e-4, "{found:?}");
+    assert!((found.nll + 2.051_29).abs() < 1e-4, "{found:?}");
+    // A tenth of 12 m, on one axis.
+    assert!((found.rmse_m - 1.2).abs() < 1e-4, "{found:?}");
+}
+
+#[test]
+fn epochs_are_passes_over_the_samples_trained_on() {
+    let steps = |epochs: f32, samples: usize| {
+        let settings = FitSettings { budget: Budget::Epochs(epochs), batch: 128, ..FitSettings::quick(1) };
+        settings.steps(samples)
+    };
+    // 2 · 1000 / 128 = 15.6: the last batch is begun.
+    assert_eq!([steps(2.0, 1000), steps(1.0, 128), steps(0.0, 1000)], [16, 1, 0]);
+}
