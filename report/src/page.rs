@@ -50,6 +50,8 @@ pub enum Image {
 /// Pictures over one background, with a button and a slider; a still where no script runs.
 #[derive(Debug, Clone)]
 pub struct Player {
+    /// What it shows, for who does not see it.
+    pub title: String,
     /// Width and height.
     pub size_px: [f32; 2],
     /// SVG elements under every picture.
@@ -66,7 +68,9 @@ impl Player {
     fn svg(&self, frames: &str) -> String {
         let [width, height] = self.size_px;
         format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\">\n{}{frames}</svg>\n",
+            "<svg role=\"img\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\">\n<title>{}</title>\n\
+             {}{frames}</svg>\n",
+            escaped(&self.title),
             self.background
         )
     }
@@ -354,6 +358,7 @@ for (const player of document.querySelectorAll('.player')) {
     frames.forEach((frame, i) => frame.setAttribute('display', i === index ? 'inline' : 'none'));
     slider.value = index;
     label.value = frames[index].dataset.label;
+    slider.setAttribute('aria-valuetext', label.value);
   };
   const stop = () => { clearInterval(timer); timer = null; button.textContent = 'Play'; };
   const step = () => {
@@ -495,6 +500,7 @@ mod tests {
     fn player() -> Player {
         let frame = |i: usize| (format!("{i}.0 s"), format!("<circle cx=\"{i}\" cy=\"1\" r=\"1\"/>\n"));
         Player {
+            title: "lot <b>".to_owned(),
             size_px: [9.0, 4.0],
             background: "<rect width=\"9\" height=\"4\"/>\n".to_owned(),
             frames: (0..5).map(frame).collect(),
@@ -513,6 +519,11 @@ mod tests {
         assert_eq!(hidden, [true, true, true, false, true], "only the still is shown");
         assert!(html.contains("class=\"controls\" hidden") && html.contains("max=\"4\" value=\"3\""), "{html}");
         assert!(html.contains("data-period-ms=\"250\""), "{html}");
+        assert!(html.contains("<svg role=\"img\"") && html.contains("<title>lot &lt;b&gt;</title>"), "{html}");
+        assert!(
+            html.contains("setAttribute('aria-valuetext', label.value)"),
+            "a slider says seconds, not pictures: {html}"
+        );
         let script = html.split("<script>").nth(1).unwrap().split("</script>").next().unwrap();
         let hash = BASE64_STANDARD.encode(Sha256::digest(script));
         assert!(html.contains(&format!("script-src 'sha256-{hash}'\">")), "{html}");

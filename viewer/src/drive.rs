@@ -61,7 +61,7 @@ pub(crate) struct Drive<'a> {
     driver: Option<Source>,
     expert_rule: Option<Rule>,
     has_spread: bool,
-    /// Colour of its signals among those of other drivers; `None` if it is alone.
+    /// Colour of its signals and its trail among those of other drivers; `None` if it is alone.
     colour: Option<Colour>,
     /// Where the last outline of the swept path was drawn, and the path of the rear axle since.
     swept: Option<Vec2>,
@@ -107,7 +107,7 @@ impl<'a> Drive<'a> {
         Self { planner, ..self }
     }
 
-    /// Tells its signals from those of other drivers in the same plot.
+    /// Tells its signals and its trail from those of other drivers in the same view.
     #[must_use]
     pub(crate) fn among_others(self, colour: Colour) -> Self {
         Self { colour: Some(colour), ..self }
@@ -211,7 +211,7 @@ impl<'a> Drive<'a> {
         self.driven.push(position);
         let world_from_ego = frame.vehicle.pose.world_from_ego();
         let body = self.episode.vehicle.body_in_ego().map(|corner| world_from_ego.point(corner));
-        let colour = colours::of_source(frame.decision.source);
+        let colour = self.colour.unwrap_or_else(|| colours::of_source(frame.decision.source));
         let swept = Strip { radius_pt: 0.5, ..outline(&body, LINE_Z_M, colours::faded(colour, 110)) };
         self.log("swept", &shapes::strips(&[swept]));
         let way = self.driven.iter().map(|&point| raised(point, 2.0 * LINE_Z_M)).collect();

@@ -17,7 +17,7 @@ both as fractions of the view; the network drives only below the red lines τ an
 - **Fan of blue arcs**: the expert's candidates, the better the brighter; blue line: the plan it chose.
 - **Green fan or arrows**: a tentacle's paths, the cheaper the brighter, the chosen one white; the field that VVF and APF \
 follow, longer where it is stronger.
-- **Trail**: the swept path, in the colour of whoever drove.
+- **Trail**: the swept path, in the colour of whoever drove; of several drivers each has the colour of its signals.
 - **Red dot**: a near-collision. The car is stopped there and put back on the grey path.
 
 Views and grid: light = drivable, dark = not. Where the sensor is **wrong**, the colour says which layer of noise did it: \

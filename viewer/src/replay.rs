@@ -110,7 +110,7 @@ impl<'a> Replay<'a> {
 }
 
 /// The entities of several drivers: short, because they are titles; the folder of a run where that tells it from the
-/// others.
+/// others; numbers where nothing else does. None is that of the lot or the legend.
 fn roots_of(names: &[&str]) -> Vec<String> {
     let short = |name: &str| {
         let folder = name.strip_prefix("run:").or_else(|| name.strip_prefix("net:"));
@@ -118,7 +118,18 @@ fn roots_of(names: &[&str]) -> Vec<String> {
     };
     let all: Vec<String> = names.iter().map(|name| short(name)).collect();
     let is_alone = |root: &String| all.iter().filter(|other| *other == root).count() == 1;
-    names.iter().zip(&all).map(|(name, root)| if is_alone(root) { root.clone() } else { root_of(name) }).collect()
+    let mut roots: Vec<String> = Vec::new();
+    for (name, short) in names.iter().zip(&all) {
+        let root = if is_alone(short) { short.clone() } else { root_of(name) };
+        let numbered = |k: usize| if k == 1 { root.clone() } else { format!("{root}-{k}") };
+        let is_free = |root: &String| !roots.contains(root) && !["lot", "legend"].contains(&root.as_str());
+        let unlike = (1..names.len() + 3)
+            .map(numbered)
+            .find(is_free)
+            .expect("more numbers than names, and the two that are taken");
+        roots.push(unlike);
+    }
+    roots
 }
 
 /// The entity under which a driver is found: its name without what means something in a path.
@@ -136,5 +147,12 @@ mod tests {
         assert_eq!(root_of("expert"), "expert");
         assert_eq!(roots_of(&["run:runs/a", "tuned:vvf", "net:runs/a/round-01"]), ["a", "tuned_vvf", "round-01"]);
         assert_eq!(roots_of(&["run:runs/a/bc", "run:runs/b/bc"]), ["run_runs_a_bc", "run_runs_b_bc"]);
+    }
+
+    /// Two cars were one, that jumped from place to place.
+    #[test]
+    fn no_driver_shares_its_entity() {
+        assert_eq!(roots_of(&["run:runs/ä", "run:runs/ö"]), ["run_runs__", "run_runs__-2"]);
+        assert_eq!(roots_of(&["run:runs/lot", "run:runs/legend"]), ["lot-2", "legend-2"]);
     }
 }

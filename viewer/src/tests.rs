@@ -440,7 +440,13 @@ fn a_training_is_read_from_its_folder() {
             )
         };
         let head = "schema = 2\ntraining_samples = 90\nvalidation_samples = 9\nsteps = 100\nkept_step = 100\nstopped = false\n";
-        sums::write(&folder, "fit.toml", format!("{head}{}{}", point(50), point(100)).as_bytes()).unwrap();
+        let fit = format!("{head}{}{}", point(50), point(100));
+        sums::write(&folder, "fit.toml", fit.as_bytes()).unwrap();
+        if round == 1 {
+            // The training after the last round.
+            std::fs::create_dir_all(run.join("final")).unwrap();
+            sums::write(&run.join("final"), "fit.toml", fit.as_bytes()).unwrap();
+        }
     }
     sums::write(&run, "settings.toml", settings.to_toml().as_bytes()).unwrap();
     sums::write(&run, "table1.md", b"| the table |").unwrap();
@@ -449,7 +455,8 @@ fn a_training_is_read_from_its_folder() {
     std::fs::remove_dir_all(&run).unwrap();
     assert_eq!(shown.texts("tables/table1", &TextDocument::descriptor_text()), ["| the table |"]);
     let steps = |entity: &str| shown.signal(entity, "step");
-    assert_eq!(steps("training/loss/misfit"), BTreeMap::from([(50, 1.5), (100, 1.5), (150, 1.5), (200, 1.5)]));
+    let points = [50, 100, 150, 200, 250, 300].map(|step| (step, 1.5));
+    assert_eq!(steps("training/loss/misfit"), BTreeMap::from(points), "the final training, too");
     assert_eq!(steps("training/validation_error/rmse")[&200], 0.75);
     assert_eq!(steps("rounds/eta_hat/eta_hat"), BTreeMap::from([(100, 0.6)]), "behaviour cloning has none");
     assert_eq!(steps("rounds/samples/dataset"), BTreeMap::from([(0, 500.0), (100, 900.0)]));
@@ -525,6 +532,28 @@ fn a_planner_shows_what_it_weighed() {
             episode.apply(decision);
         }
     }
+}
+
+/// In the view of the whole lot the trails of two planners were both green.
+#[test]
+fn trails_of_several_drivers_have_colours_of_their_own() {
+    let settings = Settings::preset("smoke").unwrap();
+    let trail_of = |colour| {
+        let mut episode = Episode::new(Arc::new(settings.episode.clone()), Arc::new(map()), RootSeed(2));
+        let shown = Shown::of(|recording| {
+            let mut drive = Drive::new(recording, "me", &episode, &settings, hand()).among_others(colour);
+            for _ in 0..10 {
+                episode.observe();
+                let decision = Leftwards.decide(&episode.situation());
+                drive.frame(&episode.apply(decision));
+            }
+        });
+        let component = rerun::LineStrips3D::descriptor_colors().component;
+        let colours_of = |chunk: &Chunk| chunk.iter_slices::<u32>(component).flatten().copied().collect::<Vec<_>>();
+        shown.chunks_of("me/driven").flat_map(colours_of).collect::<BTreeSet<u32>>()
+    };
+    let [one, other] = [colours::PLANNER, colours::PATCH].map(trail_of);
+    assert!(one.len() == 1 && other.len() == 1 && one != other, "{one:?} {other:?}");
 }
 
 #[test]

@@ -55,6 +55,10 @@ pub(crate) fn show(run: &Path, recording: &Recording) -> anyhow::Result<()> {
         }
         rounds += 1;
     }
+    // The last training, on everything, if there was one.
+    if let Some(fit) = FitReport::read(&run.join("final"))? {
+        fitted(&fit, first_step, i64::from(rounds), recording);
+    }
     ensure!(rounds > 0, "{}: no round is finished there; runs of train-bc and train-dagger have rounds", run.display());
     for (entity, name) in layout::TABLES {
         let table = sums::read_if_listed(&run.join(name), RUN_TEXT_BYTES_MAX)?;

@@ -199,6 +199,7 @@ impl Scene {
             Ok((format!("{time_s:.1} s"), self.overlay(moment)?.svg_elements()))
         };
         Ok(Player {
+            title: self.title.clone(),
             size_px: background.size_px().into(),
             background: background.svg_elements(),
             frames: self.moments.iter().enumerate().map(frame).collect::<anyhow::Result<_>>()?,
@@ -230,8 +231,10 @@ impl Scene {
             draw_cells(&mut grid, all, FREE);
             sheet.inset(grid, *panel);
             let at = places.words(*panel);
-            sheet.rectangle(at + Vec2::new(0.0, 2.0), Vec2::splat(12.0), colour(index));
-            sheet.text(ending(&take.name, LETTERS - 2), at + Vec2::new(18.0, 0.0), FONT, INK);
+            // On the white sheet a white swatch needs an edge.
+            sheet.rectangle(at + Vec2::new(0.0, 2.0), Vec2::splat(12.0), INK);
+            sheet.rectangle(at + Vec2::new(1.0, 3.0), Vec2::splat(10.0), colour(index));
+            sheet.text(lot::ending(&take.name, LETTERS - 2), at + Vec2::new(18.0, 0.0), FONT, INK);
         }
         grids::draw_small_legend(&mut sheet, places.legend, places.size_px.x - 2.0 * GAP_PX, &self.legend());
         Ok(sheet)
@@ -263,8 +266,7 @@ impl Scene {
         if let [only] = driven.as_slice() {
             trajectories::draw_lines(&mut top, &view, std::slice::from_ref(only), |_| 2.5, |_, point| of_speed(point));
         } else {
-            // Later ones are thinner: where all drive the same line, all are seen.
-            let width_px = |index| 2.0 + 2.0 * (driven.len() - 1 - index) as f32;
+            let width_px = |index| trajectories::width_px(index, driven.len(), [2.0, 2.0]);
             trajectories::draw_lines(&mut top, &view, &driven, width_px, |index, _| colour(index));
         }
         for (index, take) in self.takes.iter().enumerate() {
@@ -468,13 +470,4 @@ fn of_speed(point: &Point) -> Rgb {
 
 fn is_near(frame: &Frame) -> bool {
     matches!(frame.event, Event::NearCollision { .. })
-}
-
-/// The end of a name: runs differ there.
-fn ending(name: &str, letters: usize) -> String {
-    let count = name.chars().count();
-    if count <= letters {
-        return name.to_owned();
-    }
-    "..".chars().chain(name.chars().skip(count + 2 - letters)).collect()
 }

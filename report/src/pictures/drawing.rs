@@ -123,7 +123,8 @@ impl Drawing {
         self.shapes.push(Shape::Squares { corners, side_px, pitch_px, rgb });
     }
 
-    /// ASCII text with its upper left corner at a point.
+    /// Text with its upper left corner at a point. In pixels, letters that the font lacks are question marks: it has those of
+    /// Latin scripts.
     pub fn text(&mut self, text: impl Into<String>, at: Vec2, font: Font, rgb: Rgb) {
         self.shapes.push(Shape::Text { text: text.into(), at, font, rgb });
     }
@@ -318,7 +319,8 @@ fn path(points: &[Vec2], closed: bool) -> Option<Path> {
 fn draw_text(pixmap: &mut Pixmap, text: &str, at: Vec2, font: Font, rgb: Rgb) {
     let (width, height) = (pixmap.width() as usize, pixmap.height() as usize);
     for (index, letter) in text.chars().enumerate() {
-        let Some(raster) = get_raster(letter, FontWeight::Regular, font.raster()) else { continue };
+        let raster = |letter| get_raster(letter, FontWeight::Regular, font.raster());
+        let Some(raster) = raster(letter).or_else(|| raster('?')) else { continue };
         let left = at.x.max(0.0) as usize + index * raster.width();
         for (y, row) in raster.rows().enumerate() {
             let line = at.y.max(0.0) as usize + y;

@@ -237,6 +237,15 @@ pub fn shortened(text: &str, letters: usize) -> String {
     text.chars().take(letters.saturating_sub(2)).chain("..".chars()).collect()
 }
 
+/// The same, but of its beginning letters are missing: runs differ at their ends.
+pub fn ending(text: &str, letters: usize) -> String {
+    let count = text.chars().count();
+    if count <= letters {
+        return text.to_owned();
+    }
+    "..".chars().chain(text.chars().skip(count + 2 - letters)).collect()
+}
+
 /// A colour and its meaning.
 pub type LegendEntry = (Rgb, String);
 
@@ -261,7 +270,8 @@ fn legend_of(map: &Map) -> Vec<LegendEntry> {
 
 const SWATCH_PX: f32 = 20.0;
 
-fn entry_px(name: &str) -> f32 {
+/// Width that a legend needs for an entry of this name.
+pub fn entry_px(name: &str) -> f32 {
     SWATCH_PX + 10.0 + FONT.width_px(name) + 26.0
 }
 

@@ -2,7 +2,7 @@
 
 use super::drawing::{Drawing, Font};
 use super::grids::{self, FREE, OCCUPIED, of_layer};
-use super::lot::INK;
+use super::lot::{INK, shortened};
 use experiment::settings::NoiseChoice;
 use experiment::trials::{self, Trial};
 use rayon::prelude::*;
@@ -33,7 +33,8 @@ pub fn picture(title: &str, levels: &[(String, Inspection)]) -> anyhow::Result<D
     let (_, legend_px) = grids::small_legend(width - 2.0 * GAP_PX, &legend);
     let height = GAP_PX + line + legend_px + 6.0 + rows as f32 * (side + line + GAP_PX);
     let mut sheet = Drawing::new(Vec2::new(width, height), [0xFF; 3])?;
-    sheet.text(title, Vec2::splat(GAP_PX), FONT, INK);
+    let letters = ((width - 2.0 * GAP_PX) / FONT.width_px("x")) as usize;
+    sheet.text(shortened(title, letters), Vec2::splat(GAP_PX), FONT, INK);
     let used = grids::draw_small_legend(&mut sheet, Vec2::new(GAP_PX, GAP_PX + line), width - 2.0 * GAP_PX, &legend);
     let mut y = GAP_PX + line + used + 6.0;
     let Some((_, first)) = levels.first() else { return Ok(sheet) };

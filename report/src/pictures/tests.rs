@@ -128,6 +128,55 @@ fn a_drive_has_the_colour_of_who_drove_and_its_near_collisions_are_crossed() {
     assert_ne!(trajectories::of_speed(0.0), trajectories::of_speed(2.0));
 }
 
+/// Texts of a picture that reach beyond its right edge.
+fn clipped(drawing: &Drawing) -> Vec<String> {
+    let svg = drawing.to_svg();
+    let document = roxmltree::Document::parse(&svg).unwrap();
+    let texts = document.root_element().children().filter(|node| node.has_tag_name("text"));
+    let number = |node: roxmltree::Node<'_, '_>, key: &str| node.attribute(key).unwrap().parse::<f32>().unwrap();
+    let is_clipped =
+        |node: &roxmltree::Node<'_, '_>| number(*node, "x") + number(*node, "textLength") > drawing.size_px().x;
+    texts.filter(is_clipped).map(|node| node.text().unwrap_or_default().to_owned()).collect()
+}
+
+/// The legend of a narrow lot ended at `tuned:tentacle: 0 near-collision`.
+#[test]
+fn no_name_of_a_driver_is_clipped_in_a_narrow_picture() {
+    let map = map_of("lot-a");
+    let points = |s_m: f32| Point {
+        at: map.path().pose_at(s_m).position(),
+        speed_mps: 1.0,
+        source: Source::Planner,
+        is_last: false,
+        near_collision: None,
+    };
+    for name in ["tuned:tentacle", "run:/home/somebody/runs/train-dagger-default-with-a-long-name-of-a-folder-s1/bc"] {
+        let driven = [Trajectory { name: name.to_owned(), points: [1.0, 2.0].map(points).to_vec() }];
+        let drawing = trajectories::picture(&map, &driven, ColourBy::Driver, "drive", Some(1.0)).unwrap();
+        assert_eq!(clipped(&drawing), [""; 0]);
+        assert!(drawing.to_svg().contains(&format!("{}: 0 near-collisions</text>", lot::ending(name, 60))));
+    }
+}
+
+/// The lines of sixteen drivers were as wide as their lane.
+#[test]
+fn many_lines_on_one_another_are_no_wider_than_five() {
+    let widths = |drivers: usize| (0..drivers).map(move |driver| trajectories::width_px(driver, drivers, [4.0, 2.5]));
+    assert!(widths(2).eq([6.5, 4.0]) && widths(5).eq([14.0, 11.5, 9.0, 6.5, 4.0]));
+    let many: Vec<f32> = widths(200).collect();
+    assert!(many[0] <= 14.01 && many.windows(2).all(|pair| pair[0] > pair[1]), "{many:?}");
+}
+
+/// `Überland` was ` berland`.
+#[test]
+fn a_letter_that_the_font_lacks_is_no_gap() {
+    for letter in ["Ü", "ż", "日"] {
+        let mut drawing = Drawing::new(Vec2::splat(24.0), [255; 3]).unwrap();
+        drawing.text(letter, Vec2::ZERO, Font::Small, [0; 3]);
+        assert!(drawing.pixmap().data().chunks_exact(4).any(|rgba| rgba[0] < 128), "{letter}");
+    }
+}
+
 #[test]
 fn a_grid_shows_wrong_cells_in_the_colour_of_their_layer() {
     let mut cells = OccupancyGrid::free();
@@ -186,6 +235,7 @@ fn noise_is_shown_per_level() {
     let levels = [inspected(NoiseChoice::Clean), inspected(NoiseChoice::Hard)];
     assert!(Layer::ALL.iter().all(|&layer| levels[0].1.count_cells(layer) == 0), "clean is clean");
     assert!(Layer::ALL.iter().any(|&layer| levels[1].1.count_cells(layer) > 0));
+    assert_eq!(clipped(&noise::picture(&"a long name ".repeat(12), &levels).unwrap()), [""; 0]);
     let sheet = noise::picture("lot-a", &levels).unwrap();
     assert_eq!(sheet.size_px().x, 2.0 * 400.0 + 3.0 * 16.0);
 }
@@ -214,6 +264,7 @@ fn an_animation_shows_every_driver_and_has_the_same_bytes_twice() {
         let scene = scene(count, camera, layout);
         let background = scene.background(0).unwrap();
         let svg = background.to_svg();
+        assert_eq!(clipped(&background), [""; 0]);
         let names: Vec<&str> = takes[..count].iter().map(|take| take.name.as_str()).collect();
         assert!(names.iter().all(|name| svg.contains(&format!(">{name}</text>"))), "{names:?}");
         let overlay = scene.overlay(7).unwrap().to_svg();
@@ -223,6 +274,12 @@ fn an_animation_shows_every_driver_and_has_the_same_bytes_twice() {
             roxmltree::Document::parse(&svg).unwrap();
         }
     }
+    // The fourth driver is white, and so is the sheet: its swatch was not to be seen.
+    let four = vec![takes[0].clone(); 4];
+    let four = Scene::new(&replay, &settings.episode, four, &times[..1], (Camera::Lot, Layout::Below), "lot-b");
+    let svg = four.background(0).unwrap().to_svg();
+    let is_edge = |line: &&str| line.starts_with("<polygon") && line.contains("fill=\"#22252b\"");
+    assert_eq!(svg.lines().filter(is_edge).count(), 4);
     let encoded = || scene(2, Camera::Lot, Layout::Below).reel().unwrap().encode(1, 10, Format::Gif).unwrap();
     let bytes = encoded();
     assert!(bytes == encoded());

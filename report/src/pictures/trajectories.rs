@@ -64,6 +64,8 @@ pub enum ColourBy {
 const SPEED_MAX_MPS: f32 = 2.2;
 /// Shades of speed.
 const SHADES: usize = 12;
+/// Letters of a driver's name in the legend.
+const NAME_LETTERS: usize = 60;
 /// A cross at every near-collision.
 pub const NEAR_COLLISION: Rgb = [0xD0, 0x00, 0x00];
 
@@ -113,7 +115,8 @@ pub fn picture(
     let view = View::of_map(map, px_per_m);
     let legend = legend(trajectories, by);
     let size = view.size_px();
-    let width = size.x.max(400.0);
+    let widest_px = legend.iter().map(|(_, name)| lot::entry_px(name)).fold(0.0, f32::max);
+    let width = size.x.max(400.0).max(16.0 + widest_px);
     let rows = lot::layout(&legend, width);
     let mut drawing = Drawing::new(Vec2::new(width, size.y + LINE_PX * (rows.len() as f32 + 2.0)), lot::GROUND)?;
     lot::draw_ground(&mut drawing, &view, map);
@@ -127,8 +130,7 @@ pub fn picture(
 
 /// The driven lines, and a cross at every near-collision.
 pub fn draw(drawing: &mut Drawing, view: &View, trajectories: &[Trajectory], by: ColourBy) {
-    // Later ones are thinner: where all drive the same line, all are seen.
-    let width_px = |index| 4.0 + 2.5 * (trajectories.len() - 1 - index) as f32;
+    let width_px = |index| width_px(index, trajectories.len(), [4.0, 2.5]);
     let colour = |index, point: &Point| match by {
         ColourBy::Speed => of_speed(point.speed_mps),
         ColourBy::Driver => rgb(index),
@@ -140,6 +142,13 @@ pub fn draw(drawing: &mut Drawing, view: &View, trajectories: &[Trajectory], by:
     }
     draw_lines(drawing, view, trajectories, width_px, colour);
     draw_crosses(drawing, view, trajectories);
+}
+
+/// Width of the line of a driver, pixels: later ones are thinner, so that where all drive the same line, all are seen. `px`: the
+/// thinnest, and by how much one before it is wider; of more than five drivers by less, or their lines would hide the lot.
+pub fn width_px(driver: usize, drivers: usize, [thinnest_px, step_px]: [f32; 2]) -> f32 {
+    let (after, others) = (drivers - 1 - driver, drivers - 1);
+    thinnest_px + step_px * after as f32 * (4.0 / others.max(4) as f32)
 }
 
 /// The driven lines, in widths and colours by the number of the driver.
@@ -190,7 +199,10 @@ fn legend(trajectories: &[Trajectory], by: ColourBy) -> Vec<LegendEntry> {
             let near =
                 |trajectory: &Trajectory| trajectory.points.iter().filter(|p| p.near_collision.is_some()).count();
             let plural = |count| if count == 1 { "" } else { "s" };
-            let name = |t: &Trajectory| format!("{}: {} near-collision{}", t.name, near(t), plural(near(t)));
+            let name = |t: &Trajectory| {
+                let near = near(t);
+                format!("{}: {near} near-collision{}", lot::ending(&t.name, NAME_LETTERS), plural(near))
+            };
             trajectories.iter().enumerate().map(|(i, trajectory)| (rgb(i), name(trajectory))).collect()
         }
         ColourBy::Source => Source::ALL

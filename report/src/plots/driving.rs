@@ -97,7 +97,23 @@ pub fn rates_against_effort(title: &str, rules: &[RateSeries]) -> String {
     rates_against(title, x, rules)
 }
 
-/// A line with whiskers per driver. Drivers are set a little apart, so that whiskers do not hide each other.
+/// Points of different drivers are at one place if they are no farther apart than this share of the axis; they are drawn as
+/// far apart …
+const APART: f64 = 0.007;
+/// … and all that are at one place within this share.
+const APART_ALL: f64 = 0.05;
+
+/// How far beside its value a point of a driver is drawn, in units of the axis. Points at one place are set a little apart,
+/// so that whiskers do not hide each other; a point alone stands where it was measured.
+fn aside(drivers: &[RateSeries], driver: usize, x: f64, span: f64) -> f64 {
+    let is_there = |other: &&RateSeries| other.points.iter().any(|point| (point.x - x).abs() <= APART * span);
+    let before = drivers[..driver].iter().filter(is_there).count();
+    let after = drivers[driver + 1..].iter().filter(is_there).count();
+    let apart = APART.min(APART_ALL / (before + after).max(1) as f64);
+    0.5 * apart * span * (before as f64 - after as f64)
+}
+
+/// A line with whiskers per driver.
 fn rates_against(title: &str, x: Axis<'_>, drivers: &[RateSeries]) -> String {
     let points = || drivers.iter().flat_map(|driver| &driver.points);
     let most = points().map(|point| point.interval[1].max(point.per_100m)).fold(0.0, f64::max);
@@ -107,7 +123,7 @@ fn rates_against(title: &str, x: Axis<'_>, drivers: &[RateSeries]) -> String {
         colour: colour(i),
         look: Look::Marked(i),
     });
-    let apart = 0.007 * (x.range.end - x.range.start);
+    let span = x.range.end - x.range.start;
     let figure = Figure {
         title,
         height_px: style::HEIGHT_PX + 40,
@@ -123,8 +139,7 @@ fn rates_against(title: &str, x: Axis<'_>, drivers: &[RateSeries]) -> String {
     };
     figure.svg(|chart| {
         for (i, driver) in drivers.iter().enumerate() {
-            let shift = apart * (i as f64 - 0.5 * (drivers.len() as f64 - 1.0));
-            let at = |point: &RatePoint| (point.x + shift, point.per_100m);
+            let at = |point: &RatePoint| (point.x + aside(drivers, i, point.x, span), point.per_100m);
             style::line(chart, driver.points.iter().map(at).collect(), colour(i), 2)?;
             for point in &driver.points {
                 let (x, _) = at(point);

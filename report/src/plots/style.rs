@@ -19,6 +19,8 @@ const FONT: &str = "sans-serif";
 const LETTER_EM: f64 = 0.58;
 const EDGE_PX: i32 = 12;
 const LEGEND_LINE_PX: i32 = 22;
+/// Rows of a legend that a height has room for; more make a picture higher.
+const LEGEND_ROWS: usize = 4;
 
 /// Text and axes.
 pub const INK: RGBColor = RGBColor(0x22, 0x25, 0x2B);
@@ -106,7 +108,9 @@ pub(super) struct Figure<'a> {
 impl Figure<'_> {
     /// Draws axes and legend, then what `draw` adds.
     pub(super) fn svg(&self, draw: impl FnOnce(&mut Chart<'_, '_>) -> Drawn) -> String {
-        picture(self.title, self.height_px, |root| self.draw(root, draw))
+        let more_rows = legend_rows(&self.legend, WIDTH_PX as i32).len().saturating_sub(LEGEND_ROWS);
+        let height_px = self.height_px + LEGEND_LINE_PX as u32 * more_rows as u32;
+        picture(self.title, height_px, |root| self.draw(root, draw))
     }
 
     /// The same as one part of a larger picture.
@@ -116,7 +120,8 @@ impl Figure<'_> {
         let rows = legend_rows(&self.legend, width as i32);
         let head_px = EDGE_PX + 26 + LEGEND_LINE_PX * rows.len() as i32 + 8;
         let (head, body) = area.split_vertically(head_px);
-        text(&head, self.title, (EDGE_PX, EDGE_PX), TITLE_PX, INK, Pos::new(HPos::Left, VPos::Top))?;
+        let title = fitting_title(self.title, f64::from(width) - 2.0 * f64::from(EDGE_PX));
+        text(&head, &title, (EDGE_PX, EDGE_PX), TITLE_PX, INK, Pos::new(HPos::Left, VPos::Top))?;
         for (index, row) in rows.iter().enumerate() {
             let y = EDGE_PX + 26 + LEGEND_LINE_PX * index as i32 + LEGEND_LINE_PX / 2;
             for (x, key) in row {
@@ -182,12 +187,17 @@ fn accessible(svg: &str, title: &str) -> String {
 /// A number as on an axis: without a fraction that says nothing, thousands apart.
 pub(super) fn number(value: f64, decimals: usize) -> String {
     let value = if value.abs() < 1e-12 { 0.0 } else { value };
-    let text = format!("{value:.decimals$}");
+    let mut text = format!("{value:.decimals$}");
     if decimals > 0 || value.abs() < 10_000.0 {
         return text;
     }
-    let (head, tail) = text.split_at(text.len() - 3);
-    format!("{head}\u{202f}{tail}")
+    let first_digit = usize::from(value < 0.0);
+    let mut at = text.len();
+    while at > first_digit + 3 {
+        at -= 3;
+        text.insert(at, '\u{202f}');
+    }
+    text
 }
 
 /// Width a text needs, pixels.
@@ -203,6 +213,18 @@ pub(super) fn fitting(name: &str, width_px: f64) -> String {
         return name.to_owned();
     }
     std::iter::once('…').chain(name.chars().skip(count + 1 - letters.max(2))).collect()
+}
+
+/// A title that fits: of a long one, such as that of a lot with a long name, the middle is left out.
+fn fitting_title(title: &str, width_px: f64) -> String {
+    let letters = ((width_px / (LETTER_EM * TITLE_PX)) as usize).max(3);
+    let count = title.chars().count();
+    if count <= letters {
+        return title.to_owned();
+    }
+    let head = letters / 3;
+    let tail = title.chars().skip(count + 1 + head - letters);
+    title.chars().take(head).chain(std::iter::once('…')).chain(tail).collect()
 }
 
 pub(super) fn style(size_px: f64, colour: RGBColor) -> TextStyle<'static> {
@@ -316,6 +338,8 @@ pub(super) fn decimals(span: f64) -> usize {
         span if span > 8.0 => 0,
         span if span > 0.8 => 1,
         span if span > 0.08 => 2,
-        _ => 3,
+        span if span > 0.008 => 3,
+        span if span > 0.0008 => 4,
+        _ => 5,
     }
 }

@@ -36,6 +36,16 @@ fn noise() -> Vec<RateSeries> {
     vec![series("DAgger", 0.4), series("tentacle", 2.0), series("run:runs/a-long-name-of-a-folder/bc", 0.9)]
 }
 
+/// Drivers with long names.
+fn many(count: usize) -> Vec<RateSeries> {
+    let point = |x| RatePoint { x, per_100m: 1.0, interval: [0.9, 1.1] };
+    let series = |i| RateSeries {
+        name: format!("vvf:planners/a-planner-with-a-name-{i}.toml"),
+        points: [0.0, 1.0, 2.0].map(point).to_vec(),
+    };
+    (0..count).map(series).collect()
+}
+
 fn ratios() -> Vec<Distribution> {
     let row = |group: usize, name: &str, middle: f64| Distribution {
         name: name.to_owned(),
@@ -89,8 +99,10 @@ fn all() -> Vec<(&'static str, String)> {
         ("eta", eta(&[ours], &paper, 0.9)),
         ("rates", rates("Near-collisions, noise paper", &rows())),
         ("noise", rates_against_noise("Near-collisions against noise, all lots", &noise())),
+        ("many", rates_against_noise("Near-collisions against noise, all lots", &many(40))),
         ("lots", rates_against_lots("Near-collisions against lots", &["9", "36", "144"].map(str::to_owned), &noise())),
         ("safe-ratios", safe_ratios("Safe ratio, noise paper", &ratios())),
+        ("long-title", safe_ratios(&format!("Safe ratio on {}, noise paper", "a-long-name-".repeat(8)), &ratios())),
         ("bars", bars("Near-collisions", "per 100 m", &["DAgger", "tentacle", "vvf"], &groups())),
         ("calibration", calibration(&axes())),
     ]
@@ -171,6 +183,58 @@ fn dots_stand_at_their_values() {
         .collect();
     let middle = 0.5 * (xs.iter().copied().fold(f64::MAX, f64::min) + xs.iter().copied().fold(f64::MIN, f64::max));
     assert!((middle - (zero + 0.27 / 0.8 * (one - zero))).abs() <= 1.5, "{middle}: 0 at {zero}, 0.8 at {one}");
+}
+
+/// The upper end of a driver without near-collisions in 280 km: 0.0005 and 0.001 both stood there as 0.001.
+#[test]
+fn ticks_of_small_rates_are_told_apart() {
+    for upper in [0.0013, 0.0024, 0.006, 0.00011] {
+        let row = RateRow { name: "expert".to_owned(), per_100m: 0.0, interval: [0.0, upper], group: 0 };
+        let svg = rates("Near-collisions", &[row]);
+        let texts = texts(&Document::parse(&svg).unwrap());
+        let ticks: Vec<f64> = texts.iter().filter_map(|(text, ..)| text.parse().ok()).collect();
+        let steps: Vec<f64> = ticks.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        assert!(steps.len() > 1 && steps.iter().all(|step| *step > 0.0 && (step - steps[0]).abs() < 1e-9), "{ticks:?}");
+    }
+}
+
+/// With forty drivers the legend left no room for what it explains.
+#[test]
+fn a_long_legend_leaves_its_plot_as_high_as_a_short_one() {
+    let height = |count| {
+        let svg = rates_against_effort("Near-collisions", &many(count));
+        let document = Document::parse(&svg).unwrap();
+        let texts = texts(&document);
+        place(&texts, "0.0").1 - place(&texts, "1.0").1
+    };
+    assert!((height(40) - height(4)).abs() <= 1.0, "{} and {} px", height(40), height(4));
+}
+
+/// A rule that asked at 13.7 % of the ticks stood at 14.5 %, and one that asked at all of them at 104 %.
+#[test]
+fn points_are_set_apart_only_where_they_would_hide_each_other() {
+    let point = |x| RatePoint { x, per_100m: 1.0, interval: [0.9, 1.1] };
+    let rule = |x| RateSeries { name: "a rule".to_owned(), points: vec![point(x)] };
+    let rules: Vec<RateSeries> = std::iter::once(30.0).chain([100.0; 30]).map(rule).collect();
+    let svg = rates_against_effort("Rules", &rules);
+    let document = Document::parse(&svg).unwrap();
+    let texts = texts(&document);
+    let [zero, all] = ["0", "100"].map(|percent| place(&texts, percent).0);
+    let circles = document.descendants().filter(|node| node.has_tag_name("circle"));
+    let places: Vec<f64> = circles.map(|circle| circle.attribute("cx").unwrap().parse().unwrap()).collect();
+    // Those of the legend come first.
+    let (_, places) = places.split_at(places.len() / 2);
+    assert!((places[0] - (zero + 0.3 * (all - zero))).abs() <= 1.0, "{places:?}: 0 at {zero}, 100 at {all}");
+    let (first, last) = (places[1], places[places.len() - 1]);
+    assert!(first < all && all < last && last - first < 0.06 * (all - zero), "{places:?}: 100 at {all}");
+}
+
+#[test]
+fn thousands_stand_apart() {
+    for (value, text) in [(9999.0, "9999"), (10_000.0, "10 000"), (1_234_567.0, "1 234 567"), (-123_456.0, "-123 456")]
+    {
+        assert_eq!(style::number(value, 0).replace('\u{202f}', " "), text);
+    }
 }
 
 #[test]

@@ -48,7 +48,7 @@ pub(crate) struct AnimationArgs {
     /// What the top view shows [default: the place around the tick of a key, else the lot].
     #[arg(long)]
     view: Option<ViewChoice>,
-    /// Plays this many times faster than life [default: 1 for keys, else so that it takes about half a minute].
+    /// Plays this many times faster than life [default: 1 for keys, else so that it comes to about 320 pictures].
     #[arg(long, value_name = "FACTOR")]
     speed: Option<f32>,
     /// Frames per second; fewer are kept where the file would be larger than 3 MB.
@@ -101,18 +101,18 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
 
     let replay = Replay::new(first, &settings.episode)?;
     let drivers = load(&keys, &settings)?;
-    let moments_s = moments_s(&keys, &drivers, &settings, args.to)?;
-    let earliest_s = moments_s.iter().copied().reduce(f32::min);
-    let to_s = args.to.or(moments_s.iter().copied().reduce(f32::max).map(|latest_s| latest_s + AROUND_S[1]));
+    let moments = moments(&keys, &drivers, &settings, args.to)?;
+    let (earliest, latest) = (moments.first(), moments.last());
+    let to_s = args.to.or(latest.map(|latest| latest.at_s + AROUND_S[1]));
     let takes = drive(&replay, &settings, &drivers, to_s.unwrap_or(f32::INFINITY), folder.output)?;
 
     let end_s = takes.iter().map(|take| take.observed_at_s(take.frames.len() - 1)).fold(0.0, f32::max);
-    let from_s = args.from.or(earliest_s.map(|at_s| at_s - AROUND_S[0])).unwrap_or(0.0).max(0.0);
+    let from_s = args.from.or(earliest.map(|earliest| earliest.at_s - AROUND_S[0])).unwrap_or(0.0).max(0.0);
     let to_s = to_s.unwrap_or(end_s).min(end_s);
     ensure!(from_s < to_s, "from {from_s:.1} s to {to_s:.1} s there is nothing to show; choose other --from and --to");
     let shown_cs = shown_cs(args.fps);
     let whole = ((to_s - from_s) / step_s(1.0, shown_cs) / FRAMES_WANTED).ceil().max(1.0);
-    let speed = args.speed.unwrap_or(if moments_s.is_empty() { whole } else { 1.0 });
+    let speed = args.speed.unwrap_or(if moments.is_empty() { whole } else { 1.0 });
     let step_s = step_s(speed, shown_cs);
     let count = ((to_s - from_s) / step_s) as u32;
     ensure!(
@@ -120,14 +120,11 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
         "this comes to {count} pictures, and at most {PICTURES_MAX} are drawn; show less with --from and --to, fewer with \
          --fps, or faster with --speed"
     );
-    let times: Vec<f32> = (0..=count).map(|i| from_s + i as f32 * step_s).collect();
+    let times = times_s(from_s, to_s, step_s);
 
-    let camera = match (args.view, earliest_s) {
+    let camera = match (args.view, earliest) {
         (Some(ViewChoice::Follow), _) => Camera::Follow,
-        (None, Some(at_s)) => {
-            let pose = takes[0].frames[takes[0].index_at(at_s)].vehicle.pose;
-            Camera::Place(pose.position() + 3.0 * pose.ahead())
-        }
+        (None, Some(earliest)) => earliest.place(&takes),
         (Some(ViewChoice::Lot), _) | (None, None) => Camera::Lot,
     };
     let layout = if camera == Camera::Lot { Layout::fitting(&replay.map) } else { Layout::Beside };
@@ -150,6 +147,14 @@ fn shown_cs(fps: u16) -> u16 {
 /// What passes from one picture to the next, s.
 fn step_s(speed: f32, shown_cs: u16) -> f32 {
     speed * f32::from(shown_cs) / 100.0
+}
+
+/// From one time to another, the last one included: whoever drives longest arrives there.
+fn times_s(from_s: f32, to_s: f32, step_s: f32) -> Vec<f32> {
+    let count = ((to_s - from_s) / step_s) as u32;
+    let mut times_s: Vec<f32> = (0..=count).map(|i| from_s + i as f32 * step_s).collect();
+    times_s.extend((times_s[count as usize] < to_s).then_some(to_s));
+    times_s
 }
 
 /// What is to be driven: a key per driver.
@@ -181,22 +186,41 @@ fn load(keys: &[ReplayKey], settings: &Settings) -> anyhow::Result<Vec<NamedDriv
     keys.iter().map(load).collect()
 }
 
-/// When the moments of keys that have one were observed, seconds. `to_s`: where the pictures end, if that was said.
-fn moments_s(
+/// The moment of a key.
+#[derive(Debug, Clone, Copy)]
+struct Moment {
+    /// Place of the key, and of its driver's take, in the order of all.
+    index: usize,
+    /// When it was observed, seconds.
+    at_s: f32,
+}
+
+impl Moment {
+    /// Where it happens: where the driver of its key is, not the first one.
+    fn place(self, takes: &[Take]) -> Camera {
+        let take = &takes[self.index];
+        let pose = take.frames[take.index_at(self.at_s)].vehicle.pose;
+        Camera::Place(pose.position() + 3.0 * pose.ahead())
+    }
+}
+
+/// The moments of keys that have one, the earliest first. `to_s`: where the pictures end, if that was said.
+fn moments(
     keys: &[ReplayKey],
     drivers: &[NamedDriver],
     settings: &Settings,
     to_s: Option<f32>,
-) -> anyhow::Result<Vec<f32>> {
-    let mut moments_s = Vec::new();
-    for (key, driver) in keys.iter().zip(drivers).filter(|(key, _)| key.tick > 0) {
+) -> anyhow::Result<Vec<Moment>> {
+    let mut moments = Vec::new();
+    for (index, (key, driver)) in keys.iter().zip(drivers).enumerate().filter(|(_, (key, _))| key.tick > 0) {
         let at_s = Replay::new(key, &settings.episode)?.observed_at_s(&settings.episode, driver)?;
         if let Some(to_s) = to_s {
             ensure!(to_s >= at_s, "--to {to_s}: the moment of {key} comes later, at {at_s:.1} s; choose a later one");
         }
-        moments_s.push(at_s);
+        moments.push(Moment { index, at_s });
     }
-    Ok(moments_s)
+    moments.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    Ok(moments)
 }
 
 /// Drives the trial with each of the drivers, up to a time.
@@ -237,5 +261,29 @@ mod tests {
             assert!((step_s(speed, shown_cs(fps)) / shown_s - speed).abs() < 1e-6, "{fps} {speed}");
             assert!(1.0 / shown_s >= f32::from(fps), "no fewer than asked for");
         }
+    }
+
+    /// The last picture came up to a step before the end: who drove longest was never seen to finish.
+    #[test]
+    fn the_last_picture_is_that_of_the_end() {
+        assert_eq!(times_s(5.0, 6.2, 0.5), [5.0, 5.5, 6.0, 6.2]);
+        assert_eq!(times_s(5.0, 6.0, 0.5), [5.0, 5.5, 6.0]);
+        assert_eq!(times_s(0.0, 90.0, 100.0), [0.0, 90.0]);
+    }
+
+    /// The place was where the first driver was at that moment: what happened to the second was out of the picture.
+    #[test]
+    fn the_camera_stands_where_the_moment_happens() {
+        let settings = Settings::preset("default").unwrap();
+        let keys: [ReplayKey; 2] =
+            ["expert@lot-b@forward@0@paper@1@0", "vvf@lot-b@forward@0@paper@1@200"].map(|key| key.parse().unwrap());
+        let replay = Replay::new(&keys[0], &settings.episode).unwrap();
+        let drivers = load(&keys, &settings).unwrap();
+        let [moment] = moments(&keys, &drivers, &settings, None).unwrap()[..] else { panic!("one key has a moment") };
+        let takes = drive(&replay, &settings, &drivers, moment.at_s, &Output::new(true, false)).unwrap();
+        let [other, pose] = [&takes[0], &takes[1]].map(|take| take.frames[take.index_at(moment.at_s)].vehicle.pose);
+        assert_eq!(moment.index, 1);
+        assert_eq!(moment.place(&takes), Camera::Place(pose.position() + 3.0 * pose.ahead()));
+        assert_ne!(other.position(), pose.position());
     }
 }
