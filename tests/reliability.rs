@@ -124,6 +124,21 @@ fn deaths_full_disks_and_errors_of_the_disk_lose_nothing() {
     }
 }
 
+/// Ctrl-C left the folder that it works in, with a copy of the program, and what it was disturbing went on.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupted_torture_leaves_nothing_behind() {
+    let temporary = scratch("interrupted-torture");
+    let mut command = xtask();
+    command.args(["torture", "--only", "train-bc"]).env("TMPDIR", &temporary);
+    let mut running = Running(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap());
+    let folder = temporary.join(format!("lotpilot-torture-{}", running.0.id()));
+    // What the first command says.
+    assert!(running.wait_for(&folder.join("said")), "nothing was begun");
+    assert_eq!(running.ended_by("INT"), Some(130));
+    assert_eq!(std::fs::read_dir(&temporary).unwrap().count(), 0);
+}
+
 /// `--resume` drove, although `--no-eval` had been asked for.
 #[test]
 fn a_training_without_an_evaluation_goes_on_without_one() {

@@ -33,11 +33,16 @@ impl Ended {
     }
 }
 
-/// Runs a command to its end, or kills it after some time. `said`: a file for what it says.
+/// Runs a command to its end, or kills it after some time. `said`: a file for what it says. `is_cancelled`: whether to give up.
 ///
 /// # Errors
-/// If it cannot be run, or hangs.
-pub fn run(command: &mut Command, said: &Path, kill_after: Option<Duration>) -> anyhow::Result<Ended> {
+/// If it cannot be run, hangs, or all of this is cancelled: it is killed then.
+pub fn run(
+    command: &mut Command,
+    said: &Path,
+    kill_after: Option<Duration>,
+    is_cancelled: fn() -> bool,
+) -> anyhow::Result<Ended> {
     let stderr = File::create(said).with_context(|| said.display().to_string())?;
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr);
     let began = Instant::now();
@@ -45,6 +50,10 @@ pub fn run(command: &mut Command, said: &Path, kill_after: Option<Duration>) -> 
     let status = loop {
         if let Some(status) = process.try_wait()? {
             break status;
+        }
+        if is_cancelled() {
+            process.kill()?;
+            break process.wait()?;
         }
         if began.elapsed() > kill_after.unwrap_or(LIMIT) {
             process.kill()?;
@@ -54,6 +63,8 @@ pub fn run(command: &mut Command, said: &Path, kill_after: Option<Duration>) -> 
         }
         std::thread::sleep(LOOK_EVERY);
     };
+    // The same signal may have ended it by itself.
+    anyhow::ensure!(!is_cancelled(), "what was under way is not compared");
     let stderr = String::from_utf8_lossy(&fs::read(said)?).into_owned();
     Ok(Ended { code: status.code(), stderr, took: began.elapsed() })
 }

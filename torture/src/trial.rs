@@ -17,6 +17,8 @@ use storage::sums;
 const KILLS_IN_A_ROW: usize = 3;
 /// After this many failures, nobody reads on.
 const FAILURES_MAX: usize = 10;
+/// What the names of the folders begin with that are kept of failures.
+const FAILURE: &str = "failure-";
 
 /// How much is done to a command.
 #[derive(Debug, Clone, Copy)]
@@ -64,19 +66,20 @@ pub struct Workplace {
     folder: PathBuf,
     run: PathBuf,
     library: Library,
+    is_cancelled: fn() -> bool,
 }
 
 impl Workplace {
     /// An empty one with a copy of the program, so that a build meanwhile does not exchange it halfway: manifests name its
-    /// version, and would differ.
+    /// version, and would differ. `is_cancelled` is asked all the time whether to give up.
     ///
     /// # Errors
     /// If the folder is there already, or something cannot be compiled, copied or written.
-    pub fn new(program: &Path, folder: &Path) -> anyhow::Result<Self> {
+    pub fn new(program: &Path, folder: &Path, is_cancelled: fn() -> bool) -> anyhow::Result<Self> {
         // What lies there was prepared by another program.
         let remedy = || format!("{}: cannot be made; if an earlier torture left it, delete it", folder.display());
         fs::create_dir(folder).with_context(remedy)?;
-        let filled = Self::fill(program, folder);
+        let filled = Self::fill(program, folder, is_cancelled);
         if filled.is_err() {
             let _ = fs::remove_dir_all(folder);
         }
@@ -84,18 +87,32 @@ impl Workplace {
     }
 
     /// Puts the library and the copy of the program into an empty folder.
-    fn fill(program: &Path, folder: &Path) -> anyhow::Result<Self> {
+    fn fill(program: &Path, folder: &Path, is_cancelled: fn() -> bool) -> anyhow::Result<Self> {
         let (folder, library) = (folder.to_owned(), Library::compile(folder)?);
         let copy = folder.join("program");
         fs::copy(program, &copy).with_context(|| program.display().to_string())?;
         let program = copy;
-        Ok(Self { program, run: folder.join("run"), folder, library })
+        Ok(Self { program, run: folder.join("run"), folder, library, is_cancelled })
+    }
+
+    /// Deletes the folder, but for one that holds a failure, for whoever looks for its cause. Says whether it did.
+    ///
+    /// # Errors
+    /// If it cannot be read or deleted.
+    pub fn leave(self) -> anyhow::Result<bool> {
+        for entry in fs::read_dir(&self.folder)? {
+            if entry?.file_name().to_string_lossy().starts_with(FAILURE) {
+                return Ok(false);
+            }
+        }
+        fs::remove_dir_all(&self.folder)?;
+        Ok(true)
     }
 
     /// Disturbs a command in every way. `progress` is called with the share that is done.
     ///
     /// # Errors
-    /// If a file cannot be read or written here, the command hangs, or fails without being disturbed.
+    /// If a file cannot be read or written here, the command hangs or fails without being disturbed, or this is cancelled.
     pub fn torture(&self, case: &Case, extent: &Extent, progress: &mut dyn FnMut(f64)) -> anyhow::Result<Outcome> {
         self.prepare(case)?;
         let (right, took) = self.undisturbed(case, None)?;
@@ -113,7 +130,7 @@ impl Workplace {
                 let operation = &operations[at];
                 let what = format!("{} at {} of {}, {operation}", fault.name(), at + 1, operations.len());
                 let came = self.strike(case, fault, at + 1).and_then(|()| self.compare(&right));
-                self.note(&mut outcome, &what, came)?;
+                self.note(case, &mut outcome, &what, came)?;
                 outcome.struck[kind].0 += 1;
                 progress((kind as f64 + at as f64 / operations.len() as f64) / (Fault::ALL.len() + 1) as f64);
             }
@@ -127,14 +144,14 @@ impl Workplace {
             while at.len() < KILLS_IN_A_ROW {
                 let after = took.mul_f64(rng.random_range(0.0..1.0));
                 let mut command = self.command(words);
-                if process::run(&mut command, &self.folder.join("said"), Some(after))?.code.is_some() {
+                if self.ended_within(&mut command, Some(after))?.code.is_some() {
                     break;
                 }
                 at.push(after);
                 words = case.go_on;
             }
             let came = self.go_on(case).and_then(|()| self.compare(&right));
-            self.note(&mut outcome, &format!("killed after {at:.3?}"), came)?;
+            self.note(case, &mut outcome, &format!("killed after {at:.3?}"), came)?;
             outcome.kills += at.len();
             let share = outcome.kills as f64 / extent.kills as f64;
             progress((Fault::ALL.len() as f64 + share) / (Fault::ALL.len() + 1) as f64);
@@ -162,7 +179,7 @@ impl Workplace {
         if let Some(fault) = fault {
             self.library.load_into(&mut command, &self.run, fault, 0)?;
         }
-        let ended = process::run(&mut command, &self.folder.join("said"), None)?;
+        let ended = self.ended_within(&mut command, None)?;
         ensure!(ended.is_done(), "{}: {}", case.command, ended.stderr);
         Ok((Content::read(&self.run)?, ended.took))
     }
@@ -172,7 +189,7 @@ impl Workplace {
         self.begin(case)?;
         let mut command = self.command(case.command);
         self.library.load_into(&mut command, &self.run, fault, at)?;
-        let ended = process::run(&mut command, &self.folder.join("said"), None)?;
+        let ended = self.ended_within(&mut command, None)?;
         let is_dead = ended.code.is_none();
         // A death that did not come proves nothing.
         ensure!(is_dead == (fault == Fault::Kill), "{}", said(&ended));
@@ -201,10 +218,14 @@ impl Workplace {
         Ok(())
     }
 
-    /// Keeps the folder of a failure, for whoever looks for its cause.
-    fn note(&self, outcome: &mut Outcome, what: &str, came: anyhow::Result<()>) -> anyhow::Result<()> {
+    /// Keeps the folder of a failure, for whoever looks for its cause. What is given up has not failed.
+    fn note(&self, case: &Case, outcome: &mut Outcome, what: &str, came: anyhow::Result<()>) -> anyhow::Result<()> {
         let Err(error) = came else { return Ok(()) };
-        let kept = self.folder.join(format!("failure-{}", outcome.failures.len() + 1));
+        if (self.is_cancelled)() {
+            return Err(error);
+        }
+        let kept = format!("{FAILURE}{}-{}", case.name.replace(' ', "-"), outcome.failures.len() + 1);
+        let kept = self.folder.join(kept);
         clear(&kept)?;
         if self.run.exists() {
             fs::rename(&self.run, &kept)?;
@@ -227,7 +248,11 @@ impl Workplace {
     }
 
     fn ended(&self, words: &str) -> anyhow::Result<Ended> {
-        process::run(&mut self.command(words), &self.folder.join("said"), None)
+        self.ended_within(&mut self.command(words), None)
+    }
+
+    fn ended_within(&self, command: &mut Command, kill_after: Option<Duration>) -> anyhow::Result<Ended> {
+        process::run(command, &self.folder.join("said"), kill_after, self.is_cancelled)
     }
 
     /// A command in words, with the folders that they name.
@@ -277,13 +302,19 @@ fn copy(from: &Path, to: &Path) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(target_os = "linux")]
+    use crate::cases::CASES;
+
+    fn scratch(name: &str) -> PathBuf {
+        std::env::temp_dir().join(format!("torture-test-{}-{name}", std::process::id()))
+    }
 
     /// What an earlier program had prepared was tested, where a process has the number of one before it.
     #[test]
     fn no_data_of_an_earlier_program_are_tested() {
-        let folder = std::env::temp_dir().join(format!("torture-test-{}", std::process::id()));
+        let folder = scratch("earlier");
         fs::create_dir(&folder).unwrap();
-        let refusal = Workplace::new(Path::new("/nowhere"), &folder).unwrap_err().to_string();
+        let refusal = Workplace::new(Path::new("/nowhere"), &folder, || false).unwrap_err().to_string();
         assert!(refusal.contains("if an earlier torture left it, delete it"), "{refusal}");
         fs::remove_dir(folder).unwrap();
     }
@@ -291,8 +322,49 @@ mod tests {
     /// Where there was no C compiler, the folder stayed.
     #[test]
     fn what_cannot_be_prepared_leaves_no_folder() {
-        let folder = std::env::temp_dir().join(format!("torture-test-{}-unprepared", std::process::id()));
-        Workplace::new(Path::new("/nowhere"), &folder).unwrap_err();
+        let folder = scratch("unprepared");
+        Workplace::new(Path::new("/nowhere"), &folder, || false).unwrap_err();
         assert!(!folder.exists());
+    }
+
+    /// A failure of the second command replaced that of the first, which the table still named.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn every_failure_of_every_command_is_kept_until_somebody_has_looked() {
+        let folder = scratch("kept");
+        let workplace = Workplace::new(&std::env::current_exe().unwrap(), &folder, || false).unwrap();
+        for case in &CASES[..2] {
+            let mut outcome = Outcome::default();
+            for what in ["one", "two"] {
+                fs::create_dir(&workplace.run).unwrap();
+                fs::write(workplace.run.join("of"), format!("{} {what}", case.name)).unwrap();
+                workplace.note(case, &mut outcome, what, Err(anyhow::anyhow!("it differs"))).unwrap();
+            }
+            for (what, failure) in ["one", "two"].iter().zip(&outcome.failures) {
+                let (_, kept) = failure.rsplit_once("see ").unwrap();
+                let found = fs::read_to_string(Path::new(kept).join("of")).unwrap();
+                assert_eq!(found, format!("{} {what}", case.name));
+            }
+        }
+        let first = folder.join(format!("{FAILURE}{}-1", CASES[0].name));
+        assert_eq!(fs::read_to_string(first.join("of")).unwrap(), format!("{} one", CASES[0].name));
+        assert!(!workplace.leave().unwrap());
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// A command that was given up was one more failure, and its process went on.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn what_is_cancelled_ends_with_its_process_and_leaves_no_folder() {
+        let folder = scratch("cancelled");
+        let workplace = Workplace::new(&std::env::current_exe().unwrap(), &folder, || true).unwrap();
+        let began = std::time::Instant::now();
+        let mut sleeping = Command::new("sleep");
+        let refused = workplace.ended_within(sleeping.arg("100"), None).unwrap_err().to_string();
+        assert!(refused.contains("not compared") && began.elapsed() < Duration::from_secs(50), "{refused}");
+        let mut outcome = Outcome::default();
+        workplace.note(&CASES[0], &mut outcome, "struck", Err(anyhow::anyhow!("it ended"))).unwrap_err();
+        assert!(outcome.failures.is_empty());
+        assert!(workplace.leave().unwrap() && !folder.exists());
     }
 }

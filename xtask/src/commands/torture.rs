@@ -1,6 +1,7 @@
 //! `torture`: whether commands survive deaths, full disks and errors of the disk, to the same bytes.
 
 use crate::console::Console;
+use crate::interrupt;
 use crate::output::{Output, note};
 use anyhow::{Context as _, ensure};
 use clap::Args;
@@ -46,7 +47,26 @@ const HEAD: &str = "\
 pub(crate) fn run(args: &TortureArgs, output: &Output) -> anyhow::Result<()> {
     let cases = cases(&args.only)?;
     let folder = std::env::temp_dir().join(format!("lotpilot-torture-{}", std::process::id()));
-    let workplace = Workplace::new(&std::env::current_exe()?, &folder)?;
+    let workplace = Workplace::new(&std::env::current_exe()?, &folder, interrupt::is_requested)?;
+    let failures = match torture_all(args, &cases, &workplace, output) {
+        Err(error) if interrupt::is_requested() => {
+            // Whether it can be deleted or not, it was interrupted.
+            let _ = workplace.leave();
+            return Err(error);
+        }
+        came => came?,
+    };
+    ensure!(
+        failures == 0,
+        "{failures} times something was lost or not the same; what was left is in {}",
+        folder.display()
+    );
+    workplace.leave().with_context(|| folder.display().to_string())?;
+    Ok(())
+}
+
+/// Tortures every command; the number of failures.
+fn torture_all(args: &TortureArgs, cases: &[&Case], workplace: &Workplace, output: &Output) -> anyhow::Result<usize> {
     let console = Console::new(output);
     output.print(HEAD);
     let mut failures = 0;
@@ -66,12 +86,7 @@ pub(crate) fn run(args: &TortureArgs, output: &Output) -> anyhow::Result<()> {
         failures += outcome.failures.len();
         output.print(row(case, &outcome));
     }
-    ensure!(
-        failures == 0,
-        "{failures} times something was lost or not the same; what was left is in {}",
-        folder.display()
-    );
-    std::fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())
+    Ok(failures)
 }
 
 fn cases(only: &[String]) -> anyhow::Result<Vec<&'static Case>> {
