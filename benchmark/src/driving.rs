@@ -1,15 +1,12 @@
 //! The closed loop: control steps per second.
 
-use crate::{Effort, Goal, Report, on_threads, rate, ratio};
+use crate::{Effort, Goal, NETWORK, Report, on_threads, rate, ratio};
 use experiment::drive;
-use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::drivers::DriverSpec;
 use experiment::lots::Lot;
 use experiment::settings::{NoiseChoice, Settings};
 use experiment::trials::{self, Purpose, Trial};
 use expert::{ExpertSettings, ScriptedExpert};
-use policy::checkpoint::Checkpoint;
-use policy::conditions::Conditions;
-use policy::network::Weights;
 use rayon::prelude::*;
 use sim::batch::{SeatedFleet, run_fleets, run_lockstep};
 use sim::driver::{Decision, Driver, Fleet, LookAheadPoint, OneDriverEach, Situation, Source};
@@ -84,7 +81,7 @@ impl Course {
     }
 }
 
-/// Measures all of it. The network is not trained: what it answers costs the same.
+/// Measures all of it.
 ///
 /// # Errors
 /// If a lot cannot be driven.
@@ -107,13 +104,7 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
     report(two);
 
     let settings = &course.settings;
-    let checkpoint = Checkpoint {
-        weights: Weights::init(settings.dagger.network, RootSeed(1), 0),
-        conditions: Conditions::of(&settings.episode),
-        inference: settings.dagger.inference,
-    };
-    let spec = DriverSpec::Checkpoint { folder: "untrained".into() };
-    let network = NamedDriver::network("network", spec, checkpoint);
+    let network = NETWORK.parse::<DriverSpec>()?.load(settings)?;
     report(steps("one car with the network", 1, Some(Goal::AtLeast(15_000.0)), &mut || {
         let episodes = course.episodes().into_iter().take(1).collect();
         let mut steps = 0_u64;

@@ -1,18 +1,16 @@
 //! `evaluate`: trials driven by a network, incidents explained, tables made.
 
-use crate::{Effort, Goal, Report, on_threads, ratio, time};
+use crate::{Effort, Goal, NETWORK, Report, on_threads, ratio, time};
 use anyhow::Context as _;
 use evaluation::evaluate::evaluate;
 use evaluation::plan::Plan;
 use evaluation::summary::Summary;
-use experiment::drivers::{DriverSpec, NamedDriver};
+use experiment::drivers::DriverSpec;
 use experiment::lots::Lot;
 use experiment::manifest::{Build, Request};
 use experiment::progress::Silent;
 use experiment::run_dir::{Place, RunDir};
 use experiment::settings::Settings;
-use experiment::training;
-use policy::checkpoint::Checkpoint;
 use std::path::Path;
 
 /// Measures the default evaluation of a network on the three reference lots, on one thread and on two: everything that
@@ -30,8 +28,7 @@ pub fn figures(effort: Effort, report: Report<'_>) -> anyhow::Result<()> {
 
 fn measure(effort: Effort, report: Report<'_>, folder: &Path) -> anyhow::Result<()> {
     let settings = Settings::preset("default")?;
-    let spec = DriverSpec::Run { folder: folder.join("trained") };
-    let network = NamedDriver::network("network", spec, trained(&settings, &folder.join("trained"))?);
+    let network = NETWORK.parse::<DriverSpec>()?.load(&settings)?;
     let lots = Lot::parse_all(&["lot-a", "lot-b", "lot-c"], &settings.episode.vehicle)?;
     let plan = Plan { settings: &settings, drivers: &[network], lots: &lots, compare_with: 0, shard: None };
     let once = || {
@@ -56,16 +53,6 @@ fn measure(effort: Effort, report: Report<'_>, folder: &Path) -> anyhow::Result<
     let gain = ratio("evaluate, one thread over two", &one, &two, Goal::AtLeast(1.7));
     [one, two, gain].into_iter().for_each(report);
     Ok(())
-}
-
-/// The default network after a short training: an untrained one is given up before it has driven far.
-fn trained(settings: &Settings, folder: &Path) -> anyhow::Result<Checkpoint> {
-    let short = Settings::preset("smoke")?;
-    let mut settings = Settings { training: short.training, ..settings.clone() };
-    settings.dagger.cloning_budget = short.dagger.cloning_budget;
-    (settings.dagger.iterations_min, settings.dagger.iterations_max) = (0, 0);
-    let outcome = training::train(&settings, &create(folder, &settings)?, &Silent)?;
-    outcome.policy.context("the training was not finished")
 }
 
 fn create(folder: &Path, settings: &Settings) -> anyhow::Result<RunDir> {

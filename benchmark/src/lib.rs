@@ -19,6 +19,10 @@ pub mod peers;
 
 use std::time::{Duration, Instant};
 
+/// The network that drives, as drivers are named: the one that ships. One that is not trained is given up before it has driven
+/// far, and has other zeros among its sums.
+const NETWORK: &str = "trained:default";
+
 /// One figure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
