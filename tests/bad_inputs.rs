@@ -19,6 +19,8 @@ use sim::episode::Episode;
 use sim::map::Map;
 use sim::scenario::Scenario;
 use sim::seed::{RootSeed, Stream};
+#[cfg(unix)]
+use sim::validate::is_invisible;
 use sim::vehicle::VehicleSettings;
 #[cfg(unix)]
 use std::collections::BTreeMap;
@@ -407,6 +409,7 @@ fn names_of_lots_drivers_and_moments_that_are_refused() {
         (":", "no driver \":\""),
         ("run:a|b", "contains '|', and tables hold its name; rename the file or folder"),
         ("net:a\nb/round-01", "contains '\\n'"),
+        ("run:a\u{202e}b", "contains '\\u{202e}'"),
     ] {
         cases.refuse(driver, driver.parse::<DriverSpec>(), expected);
     }
@@ -863,6 +866,8 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["evaluate", "--driver", "expert", "--lots", "test:1000001"], "from 1 to 1000000"),
         (&["evaluate", "--driver", "dwa:pipe.toml"], "it is not a regular file"),
         (&["evaluate", "--driver", "expert", "--out", "a|b"], "without '|'"),
+        (&["evaluate", "--driver", "expert", "--out", "a\u{202e}b"], "without '\\u{202e}'"),
+        (&["evaluate", "--driver", "expert", "--lots", "a\u{200b}.toml"], "contains '\\u{200b}'"),
         (&["evaluate", "--driver", "dwa:huge.toml"], "200000000000 bytes or more"),
         (&["evaluate", "--driver", "dwa:deep.toml"], "at most 65536 are read"),
         (&["evaluate", "--driver", "expert", "--threads", "1000000"], "--threads"),
@@ -944,6 +949,7 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         assert!(stderr.to_lowercase().contains(&expected.to_lowercase()), "{shown:?} lacks {expected:?}:\n{stderr}");
         let errors = stderr.lines().filter(|line| line.starts_with("error: ")).count();
         assert!(errors == 1 && !stderr.contains("panicked") && stderr.len() < ERROR_MAX, "{shown:?}:\n{stderr}");
+        assert!(!stderr.contains(is_invisible), "{shown:?} quotes what nobody sees:\n{stderr:?}");
         let after = content_in(&folder);
         assert!(after.keys().eq(before.keys()), "{shown:?} leaves something: {:?}", after.keys());
         assert!(after == before, "{shown:?} changes a file");

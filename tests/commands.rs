@@ -61,6 +61,35 @@ fn a_network_that_answers_with_no_number_ends_the_command_with_the_key_to_replay
     }
 }
 
+/// Of a run by a function in Python it said that the line was of another evaluation.
+#[test]
+fn a_run_that_only_python_can_drive_is_refused_as_one_by_replay() {
+    let out = scratch("replay-python").join("run");
+    let evaluate = ["evaluate", "--driver", "expert", "--lots", "lot-b", "--trials", "1", "--out"];
+    succeed(xtask().args(evaluate).arg(&out));
+    let runs = std::fs::read_to_string(out.join("runs.jsonl")).unwrap();
+    let by_python = runs.replace("\"expert@", "\"python:mine@");
+    assert_ne!(by_python, runs);
+    sums::write(&out, "runs.jsonl", by_python.as_bytes()).unwrap();
+    let said = refuse(xtask().args(["replay", "--of"]).arg(&out));
+    assert!(said.contains("a run cannot be driven from here") && said.contains("function in Python"), "{said}");
+    assert!(!said.contains("not of this evaluation"), "{said}");
+}
+
+/// What the runtime printed of each answer stood before the line of `--json`.
+#[test]
+fn nothing_but_results_is_printed_where_an_onnx_network_drives() {
+    let folder = scratch("onnx-prints");
+    let (file, out) = (folder.join("policy.onnx").display().to_string(), folder.join("run"));
+    succeed(xtask().args(["export", "onnx", "trained:default", "--out", &file]));
+    let driver = format!("onnx:{file}");
+    for name in ["RTEN_TIMING", "RTEN_OPTIMIZER_DEBUG", "RTEN_INFER_SHAPES_DEBUG"] {
+        let evaluate = ["evaluate", "--driver", &driver, "--lots", "lot-b", "--trials", "1", "--json", "--out"];
+        let said = refuse(xtask().args(evaluate).arg(&out).env(name, "1"));
+        assert!(said.contains(name) && said.contains("unset it") && !out.exists(), "{said}");
+    }
+}
+
 #[test]
 fn a_refused_evaluation_writes_nothing() {
     let folder = scratch("refused");
@@ -580,6 +609,20 @@ fn a_link_that_leads_nowhere_is_not_replaced_unasked() {
     refuses(&["render", "lot", "--lots", "lot-b", "--out", &out], &["lot-b.png: exists already", "--overwrite"]);
     refuses(&["generate", "--lots", "lot-b", "--out", &out], &["lot-b-s1.toml: exists already", "--overwrite"]);
     refuses(&["export", "onnx", "trained:default", "--out", &file], &["net.onnx: exists already", "--overwrite"]);
+}
+
+/// Another seed was advised for lots that are the same with any, and was refused in the same words.
+#[test]
+fn another_seed_is_advised_only_where_it_draws_another_lot() {
+    let folder = scratch("another-seed");
+    for name in ["lot-b-s1.toml", "test-easy-0.toml"] {
+        std::fs::write(folder.join(name), "").unwrap();
+    }
+    let out = folder.display().to_string();
+    for (lot, advice) in [("lot-b", "choose another --out or --seed, or"), ("test-easy-0", "choose another --out, or")]
+    {
+        refuses(&["generate", "--lots", lot, "--out", &out], &["exists already", advice]);
+    }
 }
 
 /// A picture that was too large left the empty folder that it would have been in.

@@ -100,6 +100,9 @@ fn three_shards_merge_to_the_bytes_of_one_machine_and_nothing_else_merges() {
     forge(&other, "manifest.toml", |text| text.replacen("program = \"", "program = \"old ", 1));
     refused(&[one, two, &other], "another version of lotpilot");
     copy(three, &other);
+    forge(&other, "manifest.toml", |text| text.replacen("compare_with = 0", "compare_with = 1", 1));
+    refused(&[one, two, &other], "another choice of drivers, lots or comparison");
+    copy(three, &other);
     sums::unlist(&other, &["finished.toml"]).unwrap();
     refused(&[one, two, &other], "shard 3/3 is not finished");
     // These were ignored.

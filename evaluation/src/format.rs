@@ -40,9 +40,8 @@ pub fn contacts_interval(totals: &Totals, estimate: &DriverEstimate) -> [f64; 2]
 
 /// Contacts, and their rate with the interval that may be quoted.
 pub fn quoted_contacts(totals: &Totals, estimate: &DriverEstimate) -> String {
-    let [lower, upper] = contacts_interval(totals, estimate);
-    let (rate, digits) = (totals.contact_rate().per_unit, digits_of(upper, 2));
-    format!("{}: {rate:.digits$} [{lower:.digits$}, {upper:.digits$}]", totals.contacts)
+    let rate = with_interval(totals.contact_rate().per_unit, contacts_interval(totals, estimate), 2);
+    format!("{}: {rate}", totals.contacts)
 }
 
 /// As many digits as are asked for, or more (four at most) where a value that is not zero would look like zero.
@@ -62,15 +61,13 @@ pub fn quoted_rate(totals: &Totals, estimate: &DriverEstimate) -> String {
     if clustered(estimate).is_none() {
         return exact_rate(totals.near_collisions, totals.reference_m);
     }
-    let [lower, upper] = quoted_interval(totals, estimate);
-    format!("{:.2} [{lower:.2}, {upper:.2}] (b)", totals.rate().per_unit)
+    format!("{} (b)", with_interval(totals.rate().per_unit, quoted_interval(totals, estimate), 2))
 }
 
 /// The rate with its exact interval; for a count of zero the bound it really supports.
 pub fn exact_rate(near_collisions: u32, reference_m: f64) -> String {
     let Rate { per_unit, lower, upper } = Rate::new(near_collisions, reference_m / 100.0);
-    let digits = digits_of(upper, 2);
-    let interval = format!("{per_unit:.digits$} [{lower:.digits$}, {upper:.digits$}]");
+    let interval = with_interval(per_unit, [lower, upper], 2);
     if near_collisions > 0 {
         return interval;
     }
@@ -84,8 +81,13 @@ pub fn bound_per_100m(near_collisions: u32, reference_m: f64) -> f64 {
 
 /// An estimate with its interval.
 pub fn interval(of: Interval, digits: usize) -> String {
-    let Interval { estimate, lower, upper, .. } = of;
-    format!("{estimate:.digits$} [{lower:.digits$}, {upper:.digits$}]")
+    with_interval(of.estimate, [of.lower, of.upper], digits)
+}
+
+/// A value with the ends of its interval: with so many digits, or more where the upper end would look like zero.
+pub fn with_interval(value: f64, [lower, upper]: [f64; 2], digits: usize) -> String {
+    let digits = digits_of(upper, digits);
+    format!("{value:.digits$} [{lower:.digits$}, {upper:.digits$}]")
 }
 
 /// A difference with its interval; `*` if that excludes zero, by enough units.
@@ -118,6 +120,19 @@ pub fn p_value(p: f64) -> String {
 mod tests {
     use super::*;
     use crate::statistics::poisson::Dispersion;
+
+    /// Of three near-collisions of one drive in 280 km the tables said "0.00 [0.00, 0.00] (b)".
+    #[test]
+    fn a_small_rate_does_not_look_like_none_where_near_collisions_cluster() {
+        let totals = Totals { near_collisions: 3, reference_m: 280_306.0, ..Totals::default() };
+        let rate = Interval { estimate: 0.00107, lower: 0.0, upper: 0.0036, units: 1000, apart: 1 };
+        let dispersion = Some(Dispersion { index: 3.0, freedom: 999, p_value: 0.0 });
+        let estimate = DriverEstimate { dispersion, per_100m: Some(rate), ..DriverEstimate::default() };
+        assert_eq!(quoted_rate(&totals, &estimate), "0.001 [0.000, 0.004] (b)");
+        assert_eq!(interval(rate, 2), "0.001 [0.000, 0.004]");
+        assert_eq!(interval(rate, 3), "0.001 [0.000, 0.004]");
+        assert_eq!(with_interval(0.1, [0.05, 0.2], 2), "0.10 [0.05, 0.20]");
+    }
 
     #[test]
     fn a_zero_says_what_it_supports_and_clusters_are_quoted_by_the_bootstrap() {

@@ -100,12 +100,12 @@ impl EvaluationResults {
             drivers: vec![vec![DriverResults::default(); plan.drivers.len()]; plan.settings.evaluation.noise.len()],
         };
         let mut free_cluster = 0;
+        let mut index_of: BTreeMap<String, usize> = BTreeMap::new();
         for lot in plan.lots {
-            let name = lot.group();
-            let group = results.groups.iter().position(|group| group.name == name).unwrap_or_else(|| {
+            let group = *index_of.entry(lot.group()).or_insert_with_key(|name| {
                 let is_trained_on =
-                    trained_on.contains(&name) || lot.digest().is_some_and(|digest| digests.contains(&digest));
-                results.groups.push(LotGroup { name, lots: 0, is_trained_on });
+                    trained_on.contains(name) || lot.digest().is_some_and(|digest| digests.contains(&digest));
+                results.groups.push(LotGroup { name: name.clone(), lots: 0, is_trained_on });
                 results.groups.len() - 1
             });
             results.groups[group].lots += 1;
@@ -161,11 +161,12 @@ impl EvaluationResults {
 
     /// Sums over a slice, in one direction or both.
     pub fn totals(&self, level: usize, driver: usize, slice: &Slice, direction: Option<Direction>) -> Totals {
+        let totals = &self.drivers[level][driver].totals;
+        let is_asked_for = |way: &Direction| direction.is_none_or(|direction| direction == *way);
         let mut sum = Totals::default();
-        for (&(group, way), totals) in &self.drivers[level][driver].totals {
-            if slice.contains(group) && direction.is_none_or(|direction| direction == way) {
-                sum.merge(totals);
-            }
+        for &group in slice.groups() {
+            let ways = Direction::BOTH.into_iter().filter(is_asked_for);
+            ways.filter_map(|way| totals.get(&(group, way))).for_each(|of_way| sum.merge(of_way));
         }
         sum
     }
@@ -173,9 +174,10 @@ impl EvaluationResults {
     /// Mean over (lot, direction) of the rate per 100 m and of the safe ratio, all with the same weight whatever their
     /// length: the paper's "mean". All generated lots of a kind count as one.
     pub fn unweighted(&self, level: usize, driver: usize, slice: &Slice) -> [f64; 2] {
-        let cells = self.drivers[level][driver].totals.iter().filter(|((group, _), _)| slice.contains(*group));
+        let totals = &self.drivers[level][driver].totals;
+        let both_ways = |&group: &u32| Direction::BOTH.map(|way| totals.get(&(group, way)));
         let (mut n, mut rate, mut safe_ratio) = (0, 0.0, 0.0);
-        for (_, totals) in cells {
+        for totals in slice.groups().iter().flat_map(both_ways).flatten() {
             n += 1;
             rate += totals.rate().per_unit;
             safe_ratio += totals.safe_ratio();
@@ -186,13 +188,13 @@ impl EvaluationResults {
     /// Near-collisions of a cause within a slice.
     pub fn count_of_cause(&self, level: usize, driver: usize, slice: &Slice, cause: Cause) -> u32 {
         let counts = &self.drivers[level][driver].causes;
-        counts.iter().filter(|((group, of), _)| *of == cause && slice.contains(*group)).map(|(_, n)| n).sum()
+        slice.groups().iter().filter_map(|&group| counts.get(&(group, cause))).sum()
     }
 
     /// Near-collisions at the place of the one before within a slice.
     pub fn count_of_again(&self, level: usize, driver: usize, slice: &Slice) -> u32 {
         let counts = &self.drivers[level][driver].again;
-        counts.iter().filter(|(group, _)| slice.contains(**group)).map(|(_, n)| n).sum()
+        slice.groups().iter().filter_map(|group| counts.get(group)).sum()
     }
 }
 

@@ -149,7 +149,7 @@ impl ShardRun {
             ("architecture or system", self.manifest.target != first.manifest.target),
             ("use of AVX2 and FMA", has_networks(&self.manifest) && !self.manifest.rounds_like(&first.manifest)),
             ("folder of networks", self.record.networks != first.record.networks),
-            ("choice of drivers or lots", self.manifest.arguments != first.manifest.arguments),
+            ("choice of drivers, lots or comparison", self.manifest.arguments != first.manifest.arguments),
             ("set of settings", self.settings != first.settings),
             ("content of files of lots or drivers", self.manifest.inputs != first.manifest.inputs),
         ];

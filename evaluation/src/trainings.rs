@@ -17,6 +17,7 @@ use experiment::drivers::{DriverSpec, NamedDriver};
 use glob::{MatchOptions, Pattern};
 use sim::limits::NAME_CHARS_MAX;
 use sim::seed::RootSeed;
+use sim::validate::is_invisible;
 use std::collections::BTreeMap;
 
 /// Fewer trainings say nothing about others (chosen).
@@ -109,7 +110,8 @@ pub fn assign(methods: &Methods, drivers: &mut [NamedDriver]) -> anyhow::Result<
 fn check_name(method: &str) -> anyhow::Result<()> {
     ensure!(!method.trim().is_empty(), "write a name before the =, as in mine=run:runs/mine-s*");
     ensure!(method.chars().count() <= NAME_CHARS_MAX, "shorten its name to at most {NAME_CHARS_MAX} characters");
-    let other = method.chars().find(|&char| char.is_control() || "|`*<>[]\\".contains(char));
+    let is_other = |&letter: &char| letter.is_control() || is_invisible(letter) || "|`*<>[]\\".contains(letter);
+    let other = method.chars().find(is_other);
     ensure!(other.is_none(), "{:?} cannot be in its name, which stands in tables", other.unwrap_or_default());
     Ok(())
 }
@@ -405,6 +407,7 @@ mod tests {
             (&["=run:c/*"], "write a name before the ="),
             (&["a\nb=run:c/*"], "'\\n' cannot be in its name"),
             (&["a|b=run:c/*"], "'|' cannot be in its name"),
+            (&["a\u{200b}=run:c/*"], "'\\u{200b}' cannot be in its name"),
             (&[&format!("{}=run:c/*", "m".repeat(101))], "shorten"),
             (&["others=onnx:?0", "others=expert"], "is no training"),
         ] {

@@ -119,7 +119,8 @@ impl Substitutes {
 /// If an answer of the driver on the way is not finite; the error names the key of the near-collision.
 pub fn passes(batch: &TrialBatch<'_>, incidents: &[Incident], look_back: usize) -> anyhow::Result<Vec<bool>> {
     // As many at a time as in the evaluation itself: memory does not depend on how often a driver fails.
-    let at_once = incidents.chunks(batch.trials.len()).map(|incidents| passes_at_once(batch, incidents, look_back));
+    let chunks = incidents.chunks(batch.trials.len().max(1));
+    let at_once = chunks.map(|incidents| passes_at_once(batch, incidents, look_back));
     Ok(at_once.collect::<anyhow::Result<Vec<_>>>()?.concat())
 }
 

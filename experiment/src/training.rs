@@ -143,20 +143,30 @@ enum Task {
 /// Where the cars of a collection are.
 #[derive(Default)]
 struct Collection {
-    lengths_m: Vec<f32>,
+    /// Length of all routes together, metres.
+    length_m: f64,
+    /// How far each car is along its route, metres.
     progress_m: Vec<f32>,
+    /// How far all are together, metres.
+    all_progress_m: f64,
     novice_ticks: u64,
     ticks: u64,
 }
 
 impl Collection {
     fn of(episodes: &[RoundEpisode]) -> Self {
-        let lengths_m: Vec<f32> = episodes.iter().map(|item| item.episode.map().path().length_m()).collect();
-        Self { progress_m: vec![0.0; lengths_m.len()], lengths_m, novice_ticks: 0, ticks: 0 }
+        let length_m = episodes.iter().map(|item| f64::from(item.episode.map().path().length_m())).sum();
+        Self { length_m, progress_m: vec![0.0; episodes.len()], ..Self::default() }
+    }
+
+    fn advance(&mut self, episode: usize, progress_m: f32) {
+        let before_m = std::mem::replace(&mut self.progress_m[episode], progress_m);
+        // All of them are not added up anew at every tick of every car: the time for that grows with the square of their number.
+        self.all_progress_m += f64::from(progress_m) - f64::from(before_m);
     }
 
     fn share(&self) -> f64 {
-        f64::from(self.progress_m.iter().sum::<f32>() / self.lengths_m.iter().sum::<f32>().max(f32::MIN_POSITIVE))
+        self.all_progress_m / self.length_m.max(f64::MIN_POSITIVE)
     }
 }
 
@@ -167,7 +177,7 @@ impl<'a> Monitor<'a> {
 
     fn frame(&mut self, episode: usize, frame: &Frame) {
         let collection = &mut self.collection;
-        collection.progress_m[episode] = frame.progress_m;
+        collection.advance(episode, frame.progress_m);
         collection.ticks += 1;
         collection.novice_ticks += u64::from(frame.decision.source == Source::Novice);
         self.progress.at(collection.share(), &mut |Elapsed { seconds }| {
@@ -289,6 +299,17 @@ mod tests {
             monitor.report(&DaggerProgress::Fitting { round: Some(1), share: 0.5, fit: &fit });
         }
         assert!(said.status.borrow().ends_with(" 50 samples/s"), "{}", said.status.borrow());
+    }
+
+    #[test]
+    fn the_share_of_a_collection_is_that_of_all_its_routes() {
+        let mut collection = Collection { length_m: 40.0, progress_m: vec![0.0; 3], ..Collection::default() };
+        // The first car is put back in the end.
+        for (car, progress_m, share) in [(0, 10.0, 0.25), (2, 20.0, 0.75), (0, 4.0, 0.6)] {
+            collection.advance(car, progress_m);
+            assert!((collection.share() - share).abs() < 1e-9, "{}", collection.share());
+        }
+        assert!(Collection::default().share().abs() < 1e-9, "of no routes");
     }
 
     /// It was trained to its end, and "stopped".

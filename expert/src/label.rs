@@ -130,8 +130,7 @@ impl Ground<'_> {
         let label = Label { curvature_per_m: label.curvature_per_m.clamp(-max_per_m, max_per_m), ..label };
         let label = Label { curvature_per_m: self.nearest_open_arc_per_m(label.curvature_per_m), ..label };
         let (near_m, far_m) = self.arc_lengths_in_patch_m(label.curvature_per_m);
-        let drivable_m =
-            if label.arc_length_m <= near_m { near_m } else { self.drivable_arc_length_m(label.curvature_per_m) };
+        let drivable_m = if label.arc_length_m <= near_m { near_m } else { self.drivable_arc_length_m(label) };
         Label { arc_length_m: label.arc_length_m.min(drivable_m).clamp(near_m, far_m), ..label }
     }
 
@@ -147,11 +146,12 @@ impl Ground<'_> {
             .unwrap_or(curvature_per_m)
     }
 
-    /// How far along an arc every point keeps its clearance, metres from the rear axle, within the patch.
-    fn drivable_arc_length_m(&self, curvature_per_m: f32) -> f32 {
+    /// How far along the arc of a label every point keeps its clearance, metres from the rear axle, within the patch: as far
+    /// as the label lies, and up to a step farther.
+    fn drivable_arc_length_m(&self, Label { curvature_per_m, arc_length_m: wanted_m }: Label) -> f32 {
         let (near_m, far_m) = self.arc_lengths_in_patch_m(curvature_per_m);
         let mut arc_length_m = near_m;
-        while arc_length_m < far_m {
+        while arc_length_m < far_m.min(wanted_m) {
             let next_m = (arc_length_m + MARCH_M).min(far_m);
             if !self.is_drivable(curvature_per_m, next_m) {
                 break;
@@ -199,7 +199,7 @@ mod tests {
     use super::*;
     use sim::episode::EpisodeSettings;
     use sim::map::Map;
-    use sim::scenario::Scenario;
+    use sim::scenario::{Obstacle, ObstacleClass, Scenario};
     use sim::vehicle::VehicleState;
 
     #[test]
@@ -243,6 +243,27 @@ mod tests {
         let scene = Scene { vehicle: VehicleState::at_rest(outside), ..scene };
         let kept = Ground { scene: &scene, ..ground }.kept_drivable(straight);
         assert_eq!(kept.curvature_per_m, 0.0);
+    }
+
+    /// A pillar whose near side is 9.65 m ahead: the last step of 0.2 m from the patch's lower edge on that keeps 0.1 m from it
+    /// ends at 9.50 m. Nothing beyond the label counts.
+    #[test]
+    fn a_label_stays_where_its_arc_is_drivable_and_ends_where_it_is_not() {
+        let (episode, settings) = (EpisodeSettings::paper(), ExpertSettings::half_points());
+        let context = ExpertContext::of(&episode);
+        let pillar = Obstacle::new(ObstacleClass::Pillar, Pose::new(Vec2::new(10.0, 0.1), 0.0));
+        let lane = Scenario::lane(-20.0..=60.0, 6.0, -5.0..=5.0).with_obstacles([pillar]);
+        let map = Map::build(lane, &episode.vehicle).unwrap();
+        let scene = Scene { field: map.distance_field(), vehicle: VehicleState::at_rest(Pose::default()), route: None };
+        let sight = LineOfSight::of_everything();
+        let ground = Ground { settings: &settings, context: &context, scene: &scene, sight: &sight };
+        let kept_m = |arc_length_m| ground.kept_drivable(Label { curvature_per_m: 0.0, arc_length_m }).arc_length_m;
+        let last_m = kept_m(16.0);
+        assert!((last_m - 9.5).abs() < 0.01, "{last_m} m");
+        for step in 0..60_u8 {
+            let wanted_m = 4.4 + 0.2 * f32::from(step);
+            assert_eq!(kept_m(wanted_m), wanted_m.min(last_m));
+        }
     }
 
     #[test]

@@ -133,8 +133,9 @@ pub struct ExpertSettings {
     /// Free travel along the first arc below which an obstacle is "ahead", metres (docs/methods.md 3.2.5). For counting.
     pub obstacle_ahead_m: f32,
 
-    /// A label lies at most this far round its circle, radians. Farther round, the point moves by metres when the
-    /// curvature changes a little, and beyond π/2 a farther point would mean a lower speed.
+    /// A label lies at most this far round its circle, radians, or where the circle enters the patch if that is farther
+    /// round. Farther round, the point moves by metres when the curvature changes a little, and beyond π/2 a farther point
+    /// would mean a lower speed.
     pub label_turn_max_rad: f32,
     /// Largest change of a label's curvature per tick, 1/m (docs/methods.md E5.5; the steering manages .006) …
     pub label_curvature_step_per_m: f32,

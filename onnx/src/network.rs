@@ -19,6 +19,9 @@ const EXPORT: &str = "write it again, as docs/formats.md shows under \"Networks 
 /// in vain when few cars are left, and rten takes hardly longer for each grid than in larger batches.
 const BATCH: usize = 1;
 
+/// Environment variables by which the runtime prints on stdout, where results stand.
+const PRINTS: [&str; 3] = ["RTEN_TIMING", "RTEN_OPTIMIZER_DEBUG", "RTEN_INFER_SHAPES_DEBUG"];
+
 /// Cells of a grid.
 const CELLS: usize = GRID_CELLS * GRID_CELLS;
 
@@ -84,8 +87,12 @@ impl OnnxNetwork {
     ///
     /// # Errors
     /// If it cannot be read, is larger than [`ONNX_BYTES_MAX`], is not an ONNX file, uses what the runtime does not
-    /// know, or its input or output is not what docs/formats.md says.
+    /// know, or its input or output is not what docs/formats.md says; or if the environment tells the runtime to print.
     pub fn load(path: &Path) -> Result<Self, FileError> {
+        if let Some(name) = PRINTS.into_iter().find(|name| std::env::var_os(name).is_some()) {
+            let problem = format!("the environment variable {name} makes the runtime print among results");
+            return Err(FileError::new(path, problem, "unset it"));
+        }
         let bytes = read::bytes(path, ONNX_BYTES_MAX)
             .map_err(|error| FileError::unreadable(path, &error, "name an ONNX file"))?;
         let refused = |problem: String| FileError::new(path, problem, EXPORT);

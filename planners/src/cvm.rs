@@ -6,7 +6,7 @@
 //! the curvatures that the wheels can reach.
 //!
 //! Two readings ([`Speeds`]): the controller slows down with steering (paper), so that a curvature fixes its speed; or speeds
-//! are searched together with the curvatures, as in 1996, none faster than d/T_impact.
+//! are searched together with the curvatures, as in 1996, none faster than d/T_impact while there is another.
 
 use crate::context::{PlannerContext, WheelEstimate};
 use crate::method::{Method, Reading, within};

@@ -3,7 +3,7 @@
 //!
 //! G = α·heading + β·dist + γ·velocity is maximised over the steering angles that can be reached within the window, each
 //! term in 0…1. A speed is admissible on an arc if it can be braked away before what the body would meet on it:
-//! v ≤ √(2·dist·v̇_b).
+//! v < √(2·dist·v̇_b) (≤ in 1997).
 //!
 //! Two readings ([`Speeds`]): the controller slows down with steering (paper), so that an angle fixes its speed and the
 //! window has one dimension; or speeds are searched together with the angles, as in 1997.

@@ -5,7 +5,7 @@ use crate::nearest::{Nearest, nearest_occupied};
 use sim::geometry::Vec2;
 use sim::sensing::{GRID_CELLS, OccupancyGrid};
 
-/// What a planner weighed. Points are in the ego frame.
+/// What a planner weighed. Points are in the ego frame, metres.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Explanation {
     /// Candidate ways, of which one was chosen.
@@ -30,7 +30,7 @@ pub struct CandidatePath {
 pub struct FieldSample {
     /// Where.
     pub at: Vec2,
-    /// Strength and direction.
+    /// Strength and direction, (ahead, left): of `apf` the metres of its attraction, of `vvf` a number.
     pub field: Vec2,
 }
 

@@ -234,7 +234,8 @@ def _drive(
     try:
         while pending:
             (ready,), pending = ray.wait(pending)
-            job = job_of[ready]
+            # Whatever is still referred to stays in memory: a finished task's answer is all of its shard's files.
+            job = job_of.pop(ready)
             try:
                 answer = ray.get(ready)
             except ray.exceptions.RayError as error:

@@ -94,10 +94,12 @@ impl DrawnLots<'_> {
         for trial in trials {
             let files = self.files(&self.name(trial));
             ensure_apart_from(&made_of, &files)?;
+            // What no seed draws anew has none in its name.
+            let other = if trial.lot.is_drawn_per_trial() { "--out or --seed" } else { "--out" };
             for path in files {
                 ensure!(
                     self.overwrite || !(path.exists() || path.is_symlink()),
-                    "{}: exists already; choose another --out or --seed, or replace it with --overwrite",
+                    "{}: exists already; choose another {other}, or replace it with --overwrite",
                     path.display()
                 );
             }

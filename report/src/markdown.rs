@@ -15,17 +15,17 @@ pub fn table_of(header: &[&str]) -> Table {
     with_header(header.iter().map(|&title| title.to_owned()).collect())
 }
 
-/// The text for a terminal: cells of tables that are wider than `width` columns, and other lines, are wrapped. Files keep
-/// the text as it is, because a row of Markdown is one line.
+/// The text for a terminal, without the backslashes of [`escaped`]: cells of tables that are wider than `width` columns, and
+/// other lines, are wrapped. Files keep the text as it is, because a row of Markdown is one line.
 pub fn fit(text: &str, width: usize) -> String {
-    let lines: Vec<&str> = text.lines().collect();
+    let lines: Vec<String> = text.lines().map(unescaped).collect();
     let is_row = |line: &str| line.starts_with('|');
     let mut fitted = Vec::new();
     for block in lines.chunk_by(|a, b| is_row(a) == is_row(b)) {
-        if !is_row(block[0]) {
+        if !is_row(&block[0]) {
             fitted.extend(block.iter().flat_map(|line| wrap(line, width)));
         } else if block.iter().all(|line| length(line) <= width) {
-            fitted.extend(block.iter().map(|&line| line.to_owned()));
+            fitted.extend_from_slice(block);
         } else {
             fitted.extend(fit_table(block, width));
         }
@@ -34,7 +34,7 @@ pub fn fit(text: &str, width: usize) -> String {
 }
 
 /// A table without its empty columns, with cells of several lines.
-fn fit_table(rows: &[&str], width: usize) -> Vec<String> {
+fn fit_table(rows: &[String], width: usize) -> Vec<String> {
     let mut rows: Vec<Vec<String>> = rows.iter().map(|row| cells(row)).collect();
     // The second row of Markdown is the rule below the header.
     rows.remove(1);
@@ -180,6 +180,38 @@ fn length(text: &str) -> usize {
     text.chars().filter(|c| !('\u{300}'..='\u{36f}').contains(c)).count()
 }
 
+/// What [`escaped`] puts a backslash before, except for bars.
+const ESCAPED: [char; 13] = ['\\', '`', '*', '[', ']', '<', '~', '&', '!', '@', '_', ':', '.'];
+
+/// A line without the backslashes of [`escaped`]; bars keep theirs, by which they are told from the edges of cells. A cell is
+/// filled up by what it loses, so that columns stay below each other.
+fn unescaped(line: &str) -> String {
+    let is_row = line.starts_with('|');
+    let mut out = String::with_capacity(line.len());
+    let mut lost = 0;
+    let mut rest = line.chars().peekable();
+    while let Some(letter) = rest.next() {
+        match (letter, rest.peek().copied()) {
+            ('\\', Some('|')) => {
+                out.push_str("\\|");
+                rest.next();
+            }
+            ('\\', Some(next)) if ESCAPED.contains(&next) => {
+                out.push(next);
+                lost += 1;
+                rest.next();
+            }
+            ('|', _) if is_row => {
+                out.extend(std::iter::repeat_n(' ', lost));
+                out.push('|');
+                lost = 0;
+            }
+            _ => out.push(letter),
+        }
+    }
+    out
+}
+
 /// Free text, such as the name of a lot or a driver, as Markdown that shows it letter by letter: nothing in it becomes
 /// emphasis, a link or a column.
 pub fn escaped(text: &str) -> String {
@@ -246,6 +278,30 @@ here.";
 | run:   | 0.12 |
 | a\\|b   |      |";
         assert_eq!(fit(&table.to_string(), 15), expected);
+    }
+
+    /// A terminal showed `run:\_mine\_`, and `\*` for a mark.
+    #[test]
+    fn a_terminal_shows_names_without_backslashes() {
+        let mut table = table_of(&["driver", "rate"]);
+        table.add_row([escaped("run:_mine_"), "0.12".to_owned()]);
+        table.add_row(["expert", "0.01"]);
+        let expected = "\
+| driver       | rate |
+|--------------|------|
+| run:_mine_   | 0.12 |
+| expert       | 0.01 |";
+        assert_eq!(fit(&table.to_string(), 100), expected);
+        let narrow = "\
+| driver | rate |
+|--------|------|
+| run:   | 0.12 |
+| _mine_ |      |
+| expert | 0.01 |";
+        assert_eq!(fit(&table.to_string(), 17), narrow);
+        let name = "_x_ *y* `z` <w> a|b c\\d";
+        let sentence = format!("differs \\* from {}", escaped(name));
+        assert_eq!(fit(&sentence, 100), "differs * from _x_ *y* `z` <w> a\\|b c\\d");
     }
 
     /// `trained:default` was broken behind its `d`, and `reversals` before its last letter, where the pieces had room.

@@ -5,7 +5,7 @@ use crate::plots::{self, RatePoint, RateSeries};
 use crate::trainings_table::{TrainingsTable, columns_of};
 use anyhow::Context as _;
 use evaluation::drive_stage::DriveStage;
-use evaluation::format::{difference, quoted_interval};
+use evaluation::format::{difference, quoted_interval, with_interval};
 use evaluation::results::EvaluationResults;
 use evaluation::rules::{self, Extent};
 use evaluation::stage::Stage;
@@ -237,7 +237,7 @@ fn to_markdown(rows: &[Row]) -> String {
             ),
             format!("{} ({}) in {:.1} km", row.near_collisions, row.contacts, row.route_m / 1000.0),
             match row.lower.zip(row.upper) {
-                Some((lower, upper)) => format!("{:.2} [{lower:.2}, {upper:.2}]", row.per_100m),
+                Some((lower, upper)) => with_interval(row.per_100m, [lower, upper], 2),
                 None => format!("{:.2}", row.per_100m),
             },
             difference(row.difference, 2),

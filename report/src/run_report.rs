@@ -13,6 +13,7 @@ use crate::table1;
 use crate::what_if::distinct;
 use anyhow::Context as _;
 use evaluation::calibration::{self, AxisCalibration};
+use evaluation::format::with_interval;
 use evaluation::names::BC;
 use evaluation::records::{self, FailureRecord, RecordHeader, RunRecord};
 use evaluation::summary::{Row, SweepRow, Tables};
@@ -264,14 +265,13 @@ fn headline(evaluation: &Evaluation, noise: NoiseChoice) -> String {
         glossary::SAFE_RATIO.link("safe ratio"),
     );
     for row in evaluation.pooled_rows(noise) {
-        let [lower, upper] = row.quoted_interval();
+        let rate = with_interval(row.per_100m, row.quoted_interval(), 2);
         let clearance = row.clearance_min_m.map_or_else(|| "–".to_owned(), |metres| format!("{metres:.2}"));
         let _ = writeln!(
             text,
-            "| {} | {} | {:.2} [{lower:.2}, {upper:.2}] | {} | {clearance} | {:.2} |",
+            "| {} | {} | {rate} | {} | {clearance} | {:.2} |",
             escaped(&row.driver),
             row.near_collisions,
-            row.per_100m,
             row.contacts,
             row.safe_ratio
         );

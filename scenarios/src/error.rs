@@ -76,10 +76,7 @@ const QUOTED_MAX: usize = 400;
 
 /// As much of a text as an error needs.
 pub(crate) fn shortened(text: &str) -> String {
-    match text.char_indices().nth(QUOTED_MAX) {
-        Some((end, _)) => format!("{} …", &text[..end]),
-        None => text.to_owned(),
-    }
+    storage::shortened(text, QUOTED_MAX)
 }
 
 /// The line of a byte offset, counted from 1.

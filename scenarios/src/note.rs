@@ -132,9 +132,10 @@ impl std::fmt::Display for Note {
             ),
             Self::Unused { keys } => write!(
                 f,
-                "the map's YAML file has {}, which mean nothing here; known are image, resolution, origin, negate, \
+                "the map's YAML file has {}, which {} nothing here; known are image, resolution, origin, negate, \
                  occupied_thresh, free_thresh and mode",
-                keys.iter().take(PLACES_MAX).map(|key| format!("{key:?}")).collect::<Vec<_>>().join(", ")
+                first_of(keys, |key| format!("{key:?}")),
+                if keys.len() == 1 { "means" } else { "mean" }
             ),
             Self::UnknownIsFree { free_thresh } => write!(
                 f,

@@ -34,7 +34,8 @@ impl ActionSmoothing {
         self.gain != 1.0
     }
 
-    /// The exponential mean of curvature and range over the answers so far; the first is taken at once.
+    /// The exponential mean of curvature and range over the answers so far; the first is taken at once. A point behind the
+    /// axle is taken for the one ahead that is as far on the same circle.
     pub fn smoothed(&mut self, answer: LookAheadPoint) -> LookAheadPoint {
         if !self.is_on() {
             return answer;

@@ -193,8 +193,9 @@ impl BodyBox {
     }
 
     /// Distance from the body outline to the nearest non-drivable point, metres, capped at 3 m; negative where something
-    /// reaches across the outline, but not for what is wholly beneath the body. Measured at outline points, hence too large where a corner points between two of them: by 10 cm at most,
-    /// and by 2.5 cm where it is below 0.3 m; beside corners the raster adds up to 3 cm.
+    /// reaches across the outline, but not for what is wholly beneath the body. Measured at outline points, hence too large
+    /// where a corner points between two of them: by 10 cm at most, and by 2.5 cm where it is below 0.3 m; beside corners the
+    /// raster adds up to 3 cm.
     pub fn clearance_m(&self, distance: &DistanceField, pose: Pose) -> f32 {
         let world_from_ego = pose.world_from_ego();
         let lowest_of = |outline: &[FourPoints]| {

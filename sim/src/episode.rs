@@ -10,6 +10,8 @@
 //!  Driving ────────────────────────────▶ Braking ──────────▶ put back on the path ─▶ Driving
 //!     └───────────── no progress (stuck) ───────────────────▶ put back on the path ─▶ Driving
 //! ```
+//!
+//! Where no place is left ahead on the path from which the car could drive on, it is `Blocked` instead, and the run ends.
 
 use crate::collision::BodyBox;
 use crate::controller::{self, ControllerSettings};
@@ -105,7 +107,7 @@ enum Phase {
     Driving,
     /// Counted; emergency braking until the car rests.
     Braking,
-    /// At rest where it stopped: nothing that is left of the route is free.
+    /// Left where it stopped or got stuck: nothing that is left of the route is free.
     Blocked,
 }
 

@@ -12,14 +12,15 @@ use serde::{Deserialize, Serialize};
 pub enum Event {
     /// Nothing.
     Drove,
-    /// The car headed at something within `near_collision_m` of the metrics; it was stopped and put back on the path.
+    /// The car headed at something within `near_collision_m` of the metrics; it was stopped and, unless the run ends
+    /// [`Ending::Blocked`], put back on the path.
     NearCollision {
         /// Rear-axle pose when it was counted.
         at: Pose,
         /// Progress along the reference path then, metres.
         progress_m: f32,
     },
-    /// No progress for `stuck_after_s` of the metrics; the car was put back on the path.
+    /// Too little progress for `stuck_after_s` of the metrics; the car was put back on the path, likewise.
     Stuck {
         /// Rear-axle pose when it was counted.
         at: Pose,

@@ -20,7 +20,7 @@ pub struct Pose {
     pub x_m: f32,
     /// World y, metres.
     pub y_m: f32,
-    /// Heading, counter-clockwise from the world x axis, in (−π, π].
+    /// Heading, counter-clockwise from the world x axis, radians: of cars and routes in (−π, π], of obstacles as written.
     pub heading_rad: f32,
 }
 

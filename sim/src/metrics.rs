@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 pub struct MetricsSettings {
     /// A near-collision is something within this travel along the present arc, metres (paper: 0.5 m).
     pub near_collision_m: f32,
-    /// What counts as something.
+    /// What counts as something. Safe ratio and clearance are of all that is not drivable, whatever this says.
     pub obstacle_set: ObstacleSet,
     /// Width of the safe-distance range around the bumper, metres (paper: 1.0 m).
     pub safe_range_m: f32,
@@ -230,8 +230,9 @@ pub struct EpisodeMetrics {
     pub stuck: u32,
     /// Mean over ticks of the drivable share of the safe range, 0…1.
     pub safe_ratio: f32,
-    /// Smallest distance between body and non-drivable space, metres, negative where they overlap. Sampled at every
-    /// observation and where an emergency stop ends; at most 0 once there was a contact, wherever that fell.
+    /// Smallest distance between body and non-drivable space, metres, capped at 3 m, negative where they overlap; infinite
+    /// before the first tick. Sampled at every observation and where an emergency stop ends; at most 0 once there was a
+    /// contact, wherever that fell.
     pub clearance_min_m: f32,
     /// Changes of the steering direction by more than 2° of road-wheel angle: the steering reversals of SAE J2944, with
     /// a gap (chosen) that ignores the response to noise. Wheels straightened by a resume do not count.
@@ -341,7 +342,7 @@ pub fn steering_reversals(angles_rad: impl IntoIterator<Item = f32>) -> u32 {
     accumulator.metrics.steering_reversals
 }
 
-/// Near-collisions per 100 m of reference path (paper, collision rate): events and metres pooled over runs.
+/// Near-collisions per 100 m of reference path (paper, collision rate): events and metres pooled over runs. NaN of no runs.
 pub fn near_collisions_per_100m<'a>(runs: impl IntoIterator<Item = &'a EpisodeMetrics>) -> f64 {
     let (events, metres) = runs.into_iter().fold((0.0, 0.0), |(events, metres), run| {
         (events + f64::from(run.near_collisions), metres + f64::from(run.reference_m))

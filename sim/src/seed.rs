@@ -51,7 +51,7 @@ pub enum Stream {
 pub struct RootSeed(pub u64);
 
 impl RootSeed {
-    /// The generator of a purpose and an index (episode, round, lot …).
+    /// The generator of a purpose and an index (episode, round, lot …), of which the lowest 48 bits count.
     pub fn rng(self, stream: Stream, index: u64) -> Rng {
         let mut rng = Rng::seed_from_u64(self.0);
         // 16 bits of purpose above 48 bits of index: streams of one key never overlap.

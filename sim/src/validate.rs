@@ -115,8 +115,19 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
 }
 
 /// What shows nothing, or turns the direction of writing: two names that look the same must be the same.
-fn is_invisible(c: char) -> bool {
-    matches!(c, '\u{ad}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+pub fn is_invisible(c: char) -> bool {
+    matches!(
+        c,
+        '\u{ad}'
+            | '\u{61c}'
+            | '\u{180e}'
+            | '\u{200b}'..='\u{200f}'
+            | '\u{2028}'..='\u{202e}'
+            | '\u{2060}'..='\u{206f}'
+            | '\u{feff}'
+            | '\u{fff9}'..='\u{fffb}'
+            | '\u{e0000}'..='\u{e007f}'
+    )
 }
 
 /// Before anything is compared with everything else.
@@ -406,9 +417,18 @@ impl Route {
         format!("at {}, {:.1} m from the start", at(self.points[chord]), chord as f32 * self.spacing_m)
     }
 
+    /// The vertex of the unrounded path that is nearest in the plane and along it: a route may cross itself, or come back beside
+    /// itself.
     fn vertex_near(&self, chord: usize, path: &ReferencePath) -> Place {
-        let distance = |i: &usize| path.points[*i].distance_squared(self.points[chord]);
-        Place::ReferencePath((0..path.points.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))))
+        let mut along_m = vec![0.0];
+        along_m.extend(path.points.windows(2).scan(0.0, |sum_m, pair| {
+            *sum_m += pair[0].distance(pair[1]);
+            Some(*sum_m)
+        }));
+        // The path is longer than the route, which cuts its corners.
+        let chord_along_m = along_m[path.points.len() - 1] * chord as f32 / (self.points.len() - 1) as f32;
+        let apart_m = |i: &usize| path.points[*i].distance(self.points[chord]) + (along_m[*i] - chord_along_m).abs();
+        Place::ReferencePath((0..path.points.len()).min_by(|a, b| apart_m(a).total_cmp(&apart_m(b))))
     }
 }
 
@@ -801,6 +821,25 @@ mod tests {
             n_met += usize::from(expected.is_some());
         }
         assert!((200..600).contains(&n_met), "{n_met}");
+    }
+
+    /// Where a route crosses itself the error named the nearest point of the other leg.
+    #[test]
+    fn a_fault_on_a_route_names_a_point_of_its_own_leg() {
+        let points = [(0.0, 0.0), (10.0, 0.0), (20.0, 0.0), (40.0, 0.0), (40.0, 20.0), (20.0, 20.0), (20.0, -30.0)];
+        let points = points.map(|(x, y)| Vec2::new(x, y)).to_vec();
+        let path = ReferencePath { points, corner_radius_m: 5.0 };
+        let route = Route::new(&Path::new(&path));
+        let vertex_at = |point: Vec2, nth: usize| {
+            let passes = |i: &usize| route.points[*i].distance(point) < 0.6 * route.spacing_m;
+            let chord = (0..route.points.len()).filter(passes).nth(nth).expect("the route passes there");
+            route.vertex_near(chord, &path)
+        };
+        let crossing = Vec2::new(20.0, 0.0);
+        assert_eq!(vertex_at(crossing, 0), Place::ReferencePath(Some(2)));
+        let back = vertex_at(crossing, 1);
+        assert!([5, 6].map(|i| Place::ReferencePath(Some(i))).contains(&back), "{back}");
+        assert_eq!(vertex_at(Vec2::new(20.0, -29.0), 0), Place::ReferencePath(Some(6)));
     }
 
     /// A car beside the path or behind the boundary is not a fault: lots are full of them.

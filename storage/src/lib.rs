@@ -4,6 +4,7 @@ mod error;
 pub mod growing;
 pub mod lock;
 mod place;
+mod quoted;
 pub mod read;
 pub mod sealed;
 pub mod sums;
@@ -11,3 +12,4 @@ pub mod whole;
 
 pub use error::{FileError, is_of_disk};
 pub use place::place_of;
+pub use quoted::shortened;

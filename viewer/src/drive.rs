@@ -318,10 +318,15 @@ impl<'a> Drive<'a> {
         let (learner, expert) = if driven.source == Source::Expert {
             if let Some(said) = said {
                 self.log("car/network_point", &shapes::dots(&[dot(said.look_ahead, 5.0, colours::NOVICE)]));
+                // What was said while the other one drove.
+                self.log("car/expert_point", &shapes::dots(&[]));
             }
             (said, driven.look_ahead)
         } else {
             self.log("car/expert_point", &shapes::dots(&[dot(expert, 5.0, colours::EXPERT)]));
+            if said.is_some() {
+                self.log("car/network_point", &shapes::dots(&[]));
+            }
             (Some(driven), expert)
         };
         let Some(learner) = learner else { return };

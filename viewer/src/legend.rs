@@ -24,8 +24,8 @@ Views and grid: light = drivable, dark = not. Where the sensor is **wrong**, the
 orange a ragged boundary, light blue a shadow, yellow a speed bump, red ground taken for road, pink a patch, green a \
 stain, violet a flicker, brown a repeated frame.
 
-Obstacles: blue tones are cars, violet vans and trucks, orange cones, yellow bollards, grey curbs, brown pillars, teal \
-carts, pink people.
+Obstacles: blue tones are cars, violet vans and trucks, orange cones, yellow bollards, grey curbs and wheel stops, brown \
+pillars, brick-red walls, teal carts, pink people.
 ";
 
 /// Beside a lot.
@@ -38,6 +38,35 @@ Drag to turn, right-drag to shift, scroll to zoom.
 - **Light lines**: edge of the lot and of islands. **Ochre**: speed bumps.
 - **Grey line**: the reference path from start to finish.
 
-Obstacles: blue tones are cars, violet vans and trucks, orange cones, yellow bollards, grey curbs, brown pillars, teal \
-carts, pink people. Each class is an entity of its own under `lot/obstacles` and can be hidden.
+Obstacles: blue tones are cars, violet vans and trucks, orange cones, yellow bollards, grey curbs and wheel stops, brown \
+pillars, brick-red walls, teal carts, pink people. Each class is an entity of its own under `lot/obstacles` and can be hidden.
 ";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim::scenario::ObstacleClass;
+
+    /// Walls and wheel stops were drawn and not explained.
+    #[test]
+    fn every_class_of_obstacle_is_explained() {
+        for class in ObstacleClass::ALL {
+            let name = match class {
+                ObstacleClass::Sedan | ObstacleClass::Suv | ObstacleClass::Compact => "cars",
+                ObstacleClass::Van => "vans",
+                ObstacleClass::Truck => "trucks",
+                ObstacleClass::Cone => "cones",
+                ObstacleClass::Bollard => "bollards",
+                ObstacleClass::Curb => "curbs",
+                ObstacleClass::WheelStop => "wheel stops",
+                ObstacleClass::Pillar => "pillars",
+                ObstacleClass::Cart => "carts",
+                ObstacleClass::Person => "people",
+                ObstacleClass::Wall => "walls",
+            };
+            for legend in [DRIVE, LOT] {
+                assert!(legend.contains(name), "{class:?} in {legend}");
+            }
+        }
+    }
+}

@@ -5,7 +5,7 @@ use crate::layout::{self, Layout, View};
 use crate::recording::{EVENT_TIME, Header, Moment, Recording};
 use crate::{colours, legend, show_map, training};
 use experiment::drive::Replay;
-use experiment::drivers::NamedDriver;
+use experiment::drivers::{NamedDriver, shipped_network};
 use experiment::lots::Lot;
 use experiment::manifest::{Build, Request};
 use experiment::progress::{Elapsed, Interrupted, Progress, Silent};
@@ -16,6 +16,7 @@ use experiment::view_request::{DriveRequest, Show, Sink, ViewRequest};
 use expert::ScriptedExpert;
 use planners::explanation::Explanation;
 use policy::dataset::Collection;
+use policy::drivers::NetPolicy;
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::re_log_types::StoreKind;
 use rerun::log::{Chunk, LogMsg};
@@ -252,6 +253,28 @@ fn a_network_is_compared_with_the_expert_and_its_failures_stay() {
         let shown = near_collisions.get(&tick).map_or(0, Vec::len);
         assert_eq!(shown, if failed.contains(&i) { so_far } else { 0 }, "tick {i}");
     }
+}
+
+/// The point of whoever did not drive stayed beside the car when it took the wheel.
+#[test]
+fn the_point_beside_the_drivers_is_that_of_the_other_one_at_this_tick() {
+    let settings = Settings::preset("smoke").unwrap();
+    let network = shipped_network("trained:default").unwrap().unwrap();
+    let mut episode = Episode::new(Arc::new(settings.episode.clone()), Arc::new(map()), RootSeed(2));
+    let shown = Shown::of(|recording| {
+        let drive = Drive::new(recording, "me", &episode, &settings, hand());
+        let mut drive = drive.with_novice(Some(NetPolicy::new(&network)));
+        for source in [Source::Expert, Source::Novice, Source::Expert] {
+            episode.observe();
+            let decision = Decision { source, ..Leftwards.decide(&episode.situation()) };
+            drive.frame(&episode.apply(decision));
+        }
+    });
+    let counts = |entity: &str| -> Vec<usize> {
+        shown.points(entity, &Points3D::descriptor_positions()).values().map(Vec::len).collect()
+    };
+    assert_eq!(counts("me/car/network_point"), [1, 0, 1]);
+    assert_eq!(counts("me/car/expert_point"), [0, 1, 0]);
 }
 
 /// All views of a layout.

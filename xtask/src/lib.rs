@@ -17,6 +17,7 @@ use anyhow::ensure;
 use clap::{Arg, Command, CommandFactory as _, FromArgMatches as _};
 use experiment::progress::Interrupted;
 use sim::limits::THREADS_MAX;
+use std::ffi::OsString;
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
@@ -52,16 +53,26 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Prints help, the version, or what is wrong with the command line. What nobody got on a full disk is no success; whoever
-/// closes stdout has had enough.
+/// Prints help, the version, or what is wrong with the command line: without letters in it that a terminal obeys or that nobody
+/// sees. What nobody got on a full disk is no success; whoever closes stdout has had enough.
 fn say(said: &clap::Error) -> ExitCode {
+    // What is wrong with the command line quotes it.
+    let is_hidden = |arg: OsString| output::printable(&arg.to_string_lossy()) != arg.to_string_lossy();
+    if said.use_stderr() && std::env::args_os().any(is_hidden) {
+        output::line(output::printable(said.render().to_string().trim_end()));
+        return exit_code_of(said);
+    }
     match said.print() {
         Err(error) if !said.use_stderr() && error.kind() != ErrorKind::BrokenPipe => {
             output::error(format_args!("stdout: {error}"));
             ExitCode::from(EXIT_REFUSED)
         }
-        _ => ExitCode::from(u8::try_from(said.exit_code()).unwrap_or(EXIT_REFUSED)),
+        _ => exit_code_of(said),
     }
+}
+
+fn exit_code_of(said: &clap::Error) -> ExitCode {
+    ExitCode::from(u8::try_from(said.exit_code()).unwrap_or(EXIT_REFUSED))
 }
 
 /// A command whose flags take `-1` for a value, so that their own errors say what they take, and not for another flag.

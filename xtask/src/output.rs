@@ -3,6 +3,7 @@
 
 use clap::{ColorChoice, ValueEnum};
 use serde::Serialize;
+use sim::validate::is_invisible;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, IsTerminal as _, Write as _};
 use std::sync::Mutex;
@@ -154,7 +155,7 @@ pub(crate) fn note(text: impl Display) {
     line(format_args!("{}", printable(&text.to_string())));
 }
 
-fn line(text: impl Display) {
+pub(crate) fn line(text: impl Display) {
     // Nobody to tell if stderr is closed.
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
@@ -162,18 +163,15 @@ fn line(text: impl Display) {
 /// What an error may be long, characters: names and values in it are the user's.
 const ERROR_CHARS_MAX: usize = 3000;
 
-/// Text that may quote a file: without characters that a terminal obeys, on as many lines as it has, and no longer than an
-/// error is read.
-fn printable(text: &str) -> String {
+/// Text that may quote a file: without characters that a terminal obeys or that nobody sees, on as many lines as it has, and no
+/// longer than an error is read.
+pub(crate) fn printable(text: &str) -> String {
+    let text = storage::shortened(text, ERROR_CHARS_MAX);
     let mut printable = String::with_capacity(text.len());
-    for (index, character) in text.chars().enumerate() {
+    for character in text.chars() {
         match character {
-            _ if index == ERROR_CHARS_MAX => {
-                printable.push('…');
-                break;
-            }
             '\n' => printable.push('\n'),
-            _ if character.is_control() => printable.extend(character.escape_default()),
+            _ if character.is_control() || is_invisible(character) => printable.extend(character.escape_default()),
             _ => printable.push(character),
         }
     }
@@ -198,7 +196,9 @@ mod tests {
     #[test]
     fn an_error_quotes_no_character_that_a_terminal_obeys_and_has_an_end() {
         assert_eq!(printable("lot \u{1b}[2J\u{9b}\r:\nτ\t2"), "lot \\u{1b}[2J\\u{9b}\\r:\nτ\\t2");
+        assert_eq!(printable("a\u{202e}b\u{200b}"), "a\\u{202e}b\\u{200b}", "it would be read backwards");
         let long = printable(&"x".repeat(ERROR_CHARS_MAX + 1));
-        assert!(long.ends_with("x…") && long.chars().count() == ERROR_CHARS_MAX + 1, "{}", long.len());
+        assert!(long.ends_with("x …") && long.chars().count() == ERROR_CHARS_MAX + 2, "{}", long.len());
+        assert_eq!(printable(&format!("scale: it is {}", 1e300)), "scale: it is 100000000000… (301 digits)");
     }
 }

@@ -113,3 +113,13 @@ fn what_is_left_of_the_time_in_which_nothing_counts_holds_when_driven_on() {
     counts_nothing.before.iter_mut().for_each(|before| before.refractory_s = 100.0);
     assert_eq!(passes(&batch, &[counts, counts_nothing], LOOK_BACK).unwrap(), [false, true]);
 }
+
+/// It was a panic: incidents are driven on from in chunks of as many as there are trials.
+#[test]
+fn of_no_trials_nothing_is_driven_on() {
+    let settings = Settings::preset("smoke").unwrap();
+    let expert = NamedDriver::expert(&settings.expert);
+    let (episode, seed, noise) = (&settings.episode, RootSeed(1), NoiseChoice::Paper);
+    let batch = TrialBatch { episode, driver: &expert, trials: &[], maps: &[], noise, seed };
+    assert!(passes(&batch, &[], LOOK_BACK).unwrap().is_empty());
+}

@@ -5,6 +5,7 @@ use super::shipped;
 use anyhow::{bail, ensure};
 use planners::PlannerSpec;
 use policy::checkpoint::Checkpoint;
+use sim::validate::is_invisible;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -80,9 +81,10 @@ pub fn specs() -> Vec<(String, String)> {
     own.map(owned).into_iter().chain(planners).chain(of_files.map(owned)).collect()
 }
 
-/// A letter that no driver, and no folder of a run, can have in its name: it would end a cell or a row of the tables.
+/// A letter that no driver, and no folder of a run, can have in its name: it would end a cell or a row of the tables, turn
+/// their direction of writing, or make two names look the same.
 pub fn never_in_a_name(name: &str) -> Option<char> {
-    name.chars().find(|&letter| letter == '|' || letter.is_control())
+    name.chars().find(|&letter| letter == '|' || letter.is_control() || is_invisible(letter))
 }
 
 impl FromStr for DriverSpec {

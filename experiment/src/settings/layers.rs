@@ -6,7 +6,6 @@ use super::schema::Settings;
 use anyhow::{Context as _, anyhow, bail, ensure};
 use sim::limits::{RUN_TOML_BYTES_MAX, SETTINGS_BYTES_MAX};
 use sim::seed::RootSeed;
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -114,7 +113,7 @@ fn lay(base: &Settings, file: Option<(&Path, &str)>, overrides: &[String]) -> an
     }
     for (text, (key, value)) in overrides {
         merge(&mut tree, nested(&key, value));
-        let fault = |Fault { key, problem }| anyhow!("--set {}: {key}: {problem}", shortened(text));
+        let fault = |Fault { key, problem }| anyhow!("--set {}: {key}: {problem}", storage::shortened(text, SAID_MAX));
         settings = Some(settings_from(&tree).map_err(fault)?);
     }
     match settings {
@@ -203,17 +202,9 @@ const KEY_PARTS_MAX: usize = 8;
 /// Characters of a change that an error repeats, at most.
 const SAID_MAX: usize = 200;
 
-/// As much of a change as an error needs.
-fn shortened(text: &str) -> Cow<'_, str> {
-    match text.char_indices().nth(SAID_MAX) {
-        Some((end, _)) => format!("{} …", &text[..end]).into(),
-        None => text.into(),
-    }
-}
-
 /// `a.b.c=VALUE`.
 fn parse_override(text: &str) -> anyhow::Result<(Vec<String>, Value)> {
-    let said = shortened(text);
+    let said = storage::shortened(text, SAID_MAX);
     let (key, value) = text
         .split_once('=')
         .with_context(|| format!("--set {said}: write a key and a value, as in --set dagger.eta=0.8"))?;

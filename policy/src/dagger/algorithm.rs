@@ -309,6 +309,19 @@ fn index_of(round: Option<u32>, part: usize) -> u64 {
 mod tests {
     use super::*;
     use crate::test_data::collected;
+    use std::collections::BTreeSet;
+
+    /// What two trainings share, the order of samples and dropout, they would have in common.
+    #[test]
+    fn every_training_of_a_run_has_a_seed_of_its_own() {
+        // As many rounds and members as there can be, of both the first, some and the last.
+        let rounds = [0, 1, 2, 0xFFFE].map(Some).into_iter();
+        let parts = (0..=usize::from(u8::MAX)).chain([CRITIC]);
+        let of_rounds = rounds.flat_map(|round| parts.clone().map(move |part| index_of(round, part)));
+        let indices: Vec<u64> = of_rounds.chain([index_of(None, 0)]).collect();
+        let different: BTreeSet<u64> = indices.iter().copied().collect();
+        assert_eq!(different.len(), indices.len());
+    }
 
     /// A commanded speed was not looked at: the round was written, and refused as damaged when it was read again.
     #[test]

@@ -197,15 +197,17 @@ impl Collected {
         if at_most == 0 || self.round.samples.len() <= at_most {
             return self;
         }
-        let round = self.round.thinned(at_most);
+        let count = self.round.samples.len();
+        // Of the first so many samples: the i-th that stays is that in place i · count / at_most.
+        let stay_of = |first: usize| (first * at_most).div_ceil(count);
         let mut episodes = self.episodes;
+        let mut end = 0;
         for record in &mut episodes {
-            record.samples = 0;
+            let begin = end;
+            end += record.samples;
+            record.samples = stay_of(end) - stay_of(begin);
         }
-        for tick in &round.ticks {
-            episodes[tick.episode as usize].samples += 1;
-        }
-        Self { round, episodes, ..self }
+        Self { round: self.round.thinned(at_most), episodes, ..self }
     }
 
     /// The record of these drives as those of a round.

@@ -4,7 +4,7 @@ use super::*;
 use crate::checkpoint::Checkpoint;
 use crate::conditions::Conditions;
 use crate::dagger::gated_collector::{CollectorSeat, GatedCollector};
-use crate::dagger::learned::critic_folder;
+use crate::dagger::learned::{critic_folder, member_folder};
 use crate::dataset::ValidationSplit;
 use crate::dataset::store::Store;
 use crate::decision_rule::{DecisionRule, Gate, GateTick, PAPER_TAU};
@@ -390,6 +390,42 @@ fn one_episode_of_a_round_driven_again_is_the_same() {
         assert_eq!(again.ticks, stored.ticks[first..], "round {round}");
         assert_eq!(again.noise_augmentations, stored.noise_augmentations[first..], "round {round}");
     }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// Samples were counted by the number of their drive in the round: of drives that are not all of it, that is beyond their records.
+#[test]
+fn some_drives_of_a_round_are_thinned_by_their_own_records() {
+    let last_two = of_round(0, 3).into_iter().skip(1).collect();
+    let collected = Rollouts::of_round(&settings(), RootSeed(6), None, last_two).drive(&mut |_, _| {}).unwrap();
+    for at_most in [1, 2, 7, 150] {
+        let thinned = collected.clone().thinned(at_most);
+        let counted = [1, 2].map(|drive| thinned.round.ticks.iter().filter(|tick| tick.episode == drive).count());
+        let recorded: Vec<usize> = thinned.episodes.iter().map(|episode| episode.samples).collect();
+        assert_eq!(recorded, counted, "{at_most}");
+        assert_eq!(counted.iter().sum::<usize>(), at_most);
+    }
+}
+
+/// With the index of another, a member would be its copy, and the ensemble would agree with itself. Nothing is trained here:
+/// every network is what its training begins with.
+#[test]
+fn members_of_an_ensemble_begin_with_weights_of_their_own_and_go_on_from_them() {
+    let folder = scratch("members");
+    let rule = DecisionRule::named("ensemble_dagger").unwrap();
+    let mut settings = DaggerSettings { rule, iterations_max: 1, cloning_budget: Budget::Steps(0), ..settings() };
+    settings.fit.budget = Budget::Steps(0);
+    run_in(&folder, &settings, &mut go_on).unwrap();
+    let store = Store::open(&folder).unwrap();
+    let of_round = |round: u32| -> Vec<Weights> {
+        let others = (1..rule.members()).map(|member| member_folder(&store, round, member));
+        let folders = std::iter::once(store.round_folder(round)).chain(others);
+        folders.map(|folder| Checkpoint::load(&folder).unwrap().weights).collect()
+    };
+    let [first, second] = [0, 1].map(of_round);
+    assert_eq!(first.len(), 3);
+    assert!(first[0] != first[1] && first[0] != first[2] && first[1] != first[2]);
+    assert!(first == second, "trained from scratch, or from another's weights");
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -452,10 +452,21 @@ impl Places {
     }
 }
 
-/// Colour of a driver: bright, as nothing that is parked.
+/// Colour of a driver: bright, as nothing that is parked. From the ninth on they come again, darker; after sixteen they repeat.
 fn colour(index: usize) -> Rgb {
-    const BRIGHT: [Rgb; 4] = [[0xFF, 0xC4, 0x00], [0x00, 0xD0, 0xE8], [0xF0, 0x50, 0xF0], [0xFF, 0xFF, 0xFF]];
-    BRIGHT[index % BRIGHT.len()]
+    const BRIGHT: [Rgb; 8] = [
+        [0xFF, 0xC4, 0x00],
+        [0x00, 0xD0, 0xE8],
+        [0xF0, 0x50, 0xF0],
+        [0xFF, 0xFF, 0xFF],
+        [0x80, 0xF0, 0x20],
+        [0x30, 0x60, 0xFF],
+        [0x8A, 0x20, 0xF0],
+        [0xFF, 0xA0, 0x90],
+    ];
+    let bright = BRIGHT[index % BRIGHT.len()];
+    let is_darker = (index / BRIGHT.len()) % 2 == 1;
+    if is_darker { bright.map(|part| part / 5 * 3) } else { bright }
 }
 
 fn draw_cells(grid: &mut Drawing, cells: impl Iterator<Item = (usize, usize)>, rgb: Rgb) {
@@ -470,4 +481,21 @@ fn of_speed(point: &Point) -> Rgb {
 
 fn is_near(frame: &Frame) -> bool {
     matches!(frame.event, Event::NearCollision { .. })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The fifth driver was as yellow as the first.
+    #[test]
+    fn sixteen_drivers_can_be_told_apart_by_their_colours() {
+        let colours: Vec<Rgb> = (0..16).map(colour).collect();
+        for (index, one) in colours.iter().enumerate() {
+            for other in colours[..index].iter().chain([&NEAR_COLLISION]) {
+                let apart: u32 = one.iter().zip(other).map(|(a, b)| u32::from(a.abs_diff(*b))).sum();
+                assert!(apart > 60, "{one:?} {other:?}");
+            }
+        }
+    }
 }

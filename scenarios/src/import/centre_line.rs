@@ -18,7 +18,7 @@ pub(super) fn read(path: &Path, scale: f64) -> Result<Vec<[f64; 2]>, LoadError> 
 /// [`read`], of the text of a file; `file` is its name in errors.
 pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>, LoadError> {
     // Some editors begin a file with it.
-    let text = text.trim_start_matches('\u{feff}');
+    let text = &without_indents(text.trim_start_matches('\u{feff}'));
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -74,6 +74,15 @@ pub(super) fn parse(text: &str, file: &str, scale: f64) -> Result<Vec<[f64; 2]>,
         });
     }
     Ok(points)
+}
+
+/// The text without the blanks before comments and in empty lines: to the reader they would be records.
+fn without_indents(text: &str) -> String {
+    let lines = text.split_inclusive('\n').map(|line| {
+        let unindented = line.trim_start_matches([' ', '\t']);
+        if unindented.starts_with('#') || unindented.trim_end().is_empty() { unindented } else { line }
+    });
+    lines.collect()
 }
 
 /// The line of a record, counted from 1. To the reader it begins where the record before ends: with the LF of a CRLF, and with

@@ -860,6 +860,16 @@ fn keys_that_mean_nothing_are_named_in_a_note() {
     assert!(notes[0].to_string().contains("\"negat\""), "{}", notes[0]);
 }
 
+/// All but the first six were left out without a word.
+#[test]
+fn keys_that_are_not_named_in_a_note_are_counted() {
+    let keys = ["a", "b", "c", "d", "e", "f", "g", "h"].map(str::to_owned).to_vec();
+    let said = Note::Unused { keys }.to_string();
+    assert!(said.contains("\"e\", \"f\" and 2 more, which mean nothing here"), "{said}");
+    let said = Note::Unused { keys: vec!["negat".to_owned()] }.to_string();
+    assert!(said.contains("has \"negat\", which means nothing here"), "{said}");
+}
+
 /// The saver of ROS 2 writes `free_thresh: 0.25`, with which its own grey for unknown ground is free: nothing said so.
 #[test]
 fn unknown_ground_that_counts_as_free_is_named_in_a_note() {
@@ -932,6 +942,30 @@ fn a_first_line_with_a_number_in_it_is_no_header() {
     for text in ["-15.O,-13.2\n1,2\n3,4\n", "1,y\n1,2\n3,4\n", "8;12\n20,12\n40,12\n", "8 12\n1,2\n3,4\n"] {
         assert!(points_of(text).unwrap_err().to_string().contains("is not a point"), "{text}");
     }
+}
+
+/// Behind the first point they were refused, and before it taken for a header, so that the header was refused.
+#[test]
+fn an_indented_comment_and_a_line_of_blanks_are_passed_over() {
+    let points_of = |text: &str| centre_line::parse(text, "line.csv", 1.0);
+    for text in [
+        "1,2\n  # by hand\n3,4\n",
+        "1,2\n\t# \"by hand\n3,4\n",
+        "1,2\n   \n3,4\n \t",
+        "  # by hand\n \r\nx,y\r\n1,2\r\n3,4\r\n",
+    ] {
+        assert_eq!(points_of(text), Ok(vec![[1.0, 2.0], [3.0, 4.0]]), "{text:?}");
+    }
+    let error = points_of("1,2\n  # by hand\n \n3;4\n").unwrap_err().to_string();
+    assert!(error.starts_with("line.csv:4: \"3;4\" is not a point"), "{error}");
+}
+
+/// They were quoted whole.
+#[test]
+fn numbers_of_hundreds_of_digits_are_quoted_in_part() {
+    let text = format!("1,2\n{},4\n", "9".repeat(300));
+    let error = centre_line::parse(&text, "line.csv", 1.0).unwrap_err().to_string();
+    assert!(error.starts_with("line.csv:2: \"999999999999… (300 digits),4\" is not a point"), "{error}");
 }
 
 #[test]

@@ -1,5 +1,6 @@
-//! Perception errors (docs/methods.md 10). Errors belong to places: every layer is anchored in the world and is a pure
-//! function of (seed, place, tick). A shadow stays where it is while the car passes, whoever drives.
+//! Perception errors (docs/methods.md 10). Errors belong to places: every layer but flicker and dropout, which are the
+//! camera's, is anchored in the world and is a pure function of (seed, place, tick). A shadow stays where it is while the
+//! car passes, whoever drives.
 //!
 //! The paper names the types (shadows, ragged boundaries, misrecognition); sizes and rates are chosen, and calibrated
 //! so that about 98 % of the pixels are right (`cargo xtask pixel-accuracy`). In time

@@ -179,6 +179,7 @@ pub(crate) fn run(args: &EvaluateArgs, output: &Output) -> anyhow::Result<()> {
     let shard = args.shard.or(asked.shard.as_ref().map(|record| record.number));
     let plan = Plan { settings: &settings, drivers: &drivers, lots: &lots, compare_with: asked.compare_with, shard };
     check(&plan)?;
+    args.record.record.map_or(Ok(()), |runs| record::check(&plan, runs))?;
     let inputs = inputs::of(&lots, &drivers);
     let run = match begun {
         Ok((run, manifest)) => {

@@ -35,7 +35,7 @@ pub(crate) struct GenerateArgs {
     /// Lots to write; see `cargo xtask lots`.
     #[arg(long, alias = "lot", value_name = "SPEC", num_args = 1.., value_delimiter = ',', value_parser = lot_name, required = true)]
     lots: Vec<String>,
-    /// Seed of the obstacles.
+    /// Seed of the obstacles of lot-a, lot-b and lot-c; other lots are the same with any seed.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Drawings of each lot, each with its own obstacles.
@@ -97,8 +97,8 @@ fn pose(text: &str) -> Result<[f64; 3], String> {
         .ok_or_else(|| "write x,y,degrees, e.g. 3.5,-2,90, without spaces".to_owned())
 }
 
-/// Lots generated at a time; Ctrl-C takes effect between two batches.
-const BATCH: usize = 8;
+/// Lots generated at a time, or one for each thread, if there are more; Ctrl-C takes effect between two batches.
+const BATCH_MIN: usize = 8;
 
 pub(crate) fn run(args: &GenerateArgs, output: &Output) -> anyhow::Result<()> {
     check_scale(args.pixels_per_metre)?;
@@ -139,7 +139,7 @@ fn write_all(
     // What is done at the first report counts as done before.
     progress.at(0.0, &mut |_| String::new());
     let mut made = Vec::new();
-    for batch in trials.chunks(BATCH) {
+    for batch in trials.chunks(BATCH_MIN.max(rayon::current_num_threads())) {
         if progress.is_cancelled() {
             let kept = format!("{} of {} lots are in {}", made.len(), trials.len(), args.out.display());
             return Err(Interrupted { kept }.into());

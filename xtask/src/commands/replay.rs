@@ -133,7 +133,7 @@ fn of_evaluation(
     let (mut index, mut sampled, mut recorded) = (0, Vec::new(), BTreeMap::new());
     records::each_line(&file, |run: RunRecord| {
         if sample.contains(&index) {
-            sampled.push(run.replay.parse()?);
+            sampled.push(run.replay.clone());
         }
         if sample.contains(&index) || names.contains(&run.replay) {
             let metrics = &run.report.metrics;
@@ -144,7 +144,10 @@ fn of_evaluation(
         index += 1;
         Ok(())
     })?;
-    let keys = if named.is_empty() { sampled } else { named };
+    let parsed = |key: &String| {
+        key.parse::<ReplayKey>().with_context(|| format!("{}: a run cannot be driven from here", file.display()))
+    };
+    let keys = if named.is_empty() { sampled.iter().map(parsed).collect::<anyhow::Result<_>>()? } else { named };
     for key in &keys {
         recorded.get(&key.to_string()).with_context(|| format!("{key}: {} has no such run", file.display()))?;
     }

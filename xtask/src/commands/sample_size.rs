@@ -61,7 +61,7 @@ pub(crate) fn run(args: &SampleSizeArgs, output: &Output) -> anyhow::Result<()> 
     }
     let dispersion = args.dispersion;
     ensure!((1.0..=1e3).contains(&dispersion), "--dispersion {dispersion} is not within 1 (independent events) … 1000");
-    let percent = 100.0 * args.confidence;
+    let confidence = percent(args.confidence);
     let mut answers = Vec::new();
     if let Some(rate) = args.below {
         check(&[rate], "--below")?;
@@ -69,7 +69,7 @@ pub(crate) fn run(args: &SampleSizeArgs, output: &Output) -> anyhow::Result<()> 
         // Of events that come in clusters there are as many fewer that say something by themselves.
         let metres = dispersion * to_bound(rate, args.confidence);
         output.remark(format_args!(
-            "{metres:.0} m without a near-collision show a rate below {rate} per 100 m ({percent} %, one-sided, dispersion \
+            "{metres:.0} m without a near-collision show a rate below {rate} per 100 m ({confidence} %, one-sided, dispersion \
              {dispersion})"
         ));
         answers.push(Answer { rates: vec![rate], metres, confidence: args.confidence, dispersion, power: None });
@@ -81,9 +81,9 @@ pub(crate) fn run(args: &SampleSizeArgs, output: &Output) -> anyhow::Result<()> 
         let metres = question.metres_each();
         ensure!(metres.is_finite(), "--between {a},{b}: no distance tells rates apart that are so near to each other");
         output.remark(format_args!(
-            "{metres:.0} m per driver tell {a} from {b} per 100 m in {} % of all evaluations (exact test, {percent} %, \
+            "{metres:.0} m per driver tell {a} from {b} per 100 m in {} % of all evaluations (exact test, {confidence} %, \
              dispersion {dispersion})",
-            100.0 * args.power
+            percent(args.power)
         ));
         let (confidence, power) = (args.confidence, Some(args.power));
         answers.push(Answer { rates: vec![a, b], metres, confidence, dispersion, power });
@@ -100,4 +100,21 @@ fn check(rates: &[f64], flag: &str) -> anyhow::Result<()> {
         ensure!((0.0..=1e3).contains(&rate), "{flag} {rate}: a rate is a number of events per 100 m within 0 … 1000");
     }
     Ok(())
+}
+
+/// A probability in percent, without what the product is rounded by.
+fn percent(probability: f64) -> f64 {
+    (1e9 * probability).round() / 1e7
+}
+
+#[cfg(test)]
+mod tests {
+    use super::percent;
+
+    /// `--power 0.55` was told 55.00000000000001 %.
+    #[test]
+    fn a_probability_is_said_as_it_was_given() {
+        let said = [0.55, 0.29, 0.95, 0.999, 1e-9, 1.0 - 1e-9].map(|probability| percent(probability).to_string());
+        assert_eq!(said, ["55", "29", "95", "99.9", "0.0000001", "99.9999999"]);
+    }
 }

@@ -11,7 +11,7 @@ use scenarios::split::Family;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  cargo xtask scaling                                 1, 4, 16 and 64 lots of each of twelve families: hours
+  cargo xtask scaling                                 1, 4, 16 and 64 lots of each family of `all`, the first twelve of fifteen: hours
   cargo xtask scaling --different 2,8 --unseen sealed:my-phrase:90:all
   cargo xtask scaling --resume runs/scaling-default-s1";
 

@@ -23,7 +23,8 @@ pub(in crate::sensing) struct Shadow {
     ranks: OnceLock<Ranks>,
 }
 
-/// Rank of the local noise within a shadow, 0…255: a threshold is then a share of the area. By raster cells.
+/// Rank of the local noise within the box around a shadow, 0…255: a threshold is then a share of the area of the box. By
+/// raster cells.
 #[derive(Debug, Clone)]
 struct Ranks {
     own: Vec<u8>,

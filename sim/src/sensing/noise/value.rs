@@ -3,8 +3,8 @@
 use crate::geometry::Vec2;
 use crate::vectors::{FourPoints, LANES, f32x4};
 
-/// Scales smoothly interpolated uniform noise to unit variance: 1/3 of a corner's variance times 0.743² kept by the
-/// cubic fade in the plane.
+/// Scales smoothly interpolated uniform noise from −1…1 to unit variance: 1/√(1/3 · 0.743²), the variance of a corner times
+/// what the cubic fade keeps of it along either axis. It is also the largest value.
 pub(super) const VALUE_NOISE_MAX: f32 = 2.33;
 
 /// Smooth noise of about unit variance (averaged over places) on a unit lattice in space and time.
