@@ -239,7 +239,7 @@ def _drive(
             try:
                 answer = ray.get(ready)
             except ray.exceptions.RayError as error:
-                answer = str(error).strip().splitlines()[-1]
+                answer = (str(error).strip() or repr(error)).splitlines()[-1]
             if isinstance(answer, str):
                 failed.append(f"shard {getattr(job, 'name', job)}: {answer}")
                 folder.mkdir(parents=True, exist_ok=True)
