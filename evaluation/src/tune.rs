@@ -61,7 +61,7 @@ pub fn tune(
         let Some(found) = search(&course, start, budget, evaluation.seed, &mut log, progress)? else { break };
         sums::list(run.path(), &[&candidates])?;
         progress.end(&format!(
-            "{:.2} → {:.2} failures per 100 m",
+            "{:.2} → {:.2} near-collisions and times stuck per 100 m",
             found.before.failures_per_100m, found.after.failures_per_100m
         ));
         run.write(&format!("{name}.toml"), found.to_toml(settings)?.as_bytes())?;

@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 const HEAD: &str = "\
 # Near-collisions
 
-One row each. The rules behind the causes are in `docs/methods.md` and at the top of `evaluation/src/incidents.rs`; \
-`failures.jsonl` has what they found.
+One row each. The rules behind the causes are in docs/methods.md 8.4; `failures.jsonl` has what they found. A replay key \
+draws its moment: `cargo xtask render animation 'KEY'`, with `--config RUN/settings.toml` if settings were changed.
 
 | driver | lot | way | trial | noise | tick | route m | x m | y m | m/s | cause | replay key |
 |---|---|---|---|---|---|---|---|---|---|---|---|

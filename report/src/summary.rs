@@ -4,7 +4,7 @@ use crate::markdown::{escaped, table_of, with_header};
 use crate::trainings::{self, HEADER};
 use comfy_table::Table;
 use evaluation::format::{clustered, difference, exact_rate, p_value, quoted_contacts, quoted_rate, rate_ratio};
-use evaluation::incidents::Cause;
+use evaluation::incidents::{Cause, NEAR_M};
 use evaluation::paper::{self, PaperLot, PaperResult};
 use evaluation::slices::Slice;
 use evaluation::statistics::bootstrap::DRAWS;
@@ -55,6 +55,7 @@ pub fn write(summary: &Summary<'_>, run: &RunDir) -> anyhow::Result<String> {
 
 fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
     let mut text = String::new();
+    let mut causes = String::new();
     for (level, noise) in summary.levels().iter().enumerate() {
         let has_paper = *noise == NoiseChoice::Paper && rows == Rows::All;
         let _ = write!(text, "Near-collisions, noise {noise}\n\n{}\n\n", rates_table(summary, level, rows, has_paper));
@@ -88,6 +89,10 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
         }
         if let Some(table) = causes_table(summary, level, rows) {
             let _ = write!(text, "Causes of near-collisions, noise {noise}\n\n{table}\n\n");
+            causes = format!(
+                "- Causes: the first rule of docs/methods.md 8.4 that holds. Again at the same place: within {NEAR_M} m of route \
+                 after the car was put back; places per 100 m: all others.\n"
+            );
         }
     }
     if summary.levels().len() > 1 {
@@ -95,9 +100,12 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
             write!(text, "Near-collisions per 100 m; contacts: against noise\n\n{}\n\n", sweep_table(summary, rows));
     }
     let EvaluationSettings { seed, trials, .. } = &summary.plan.settings.evaluation;
+    let near_m = summary.plan.settings.episode.metrics.near_collision_m;
     let _ = write!(
         text,
         "Trials per lot and direction: {trials}, seed: {}.\n\n\
+         - Near-collision: something lies within {near_m} m in the direction of travel; the car is stopped, put back on the route \
+         and drives on.\n\
          - (→, ←): forward, reverse. Rates are per length of the route: for runs given up early they are too low.\n\
          - Intervals of 95 %: exact Poisson, or (b) paired bootstrap ({DRAWS} draws of whole trials, both ways together; of whole \
          lots where these are a sample: generated, or six or more from files) where the dispersion exceeds {DISPERSION_MAX} and \
@@ -105,11 +113,14 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
          - Dispersion: variance of the rate over what it would be if each near-collision came by itself.\n\
          - Contacts: times the body touched something, with the wider of both intervals, since one drive may have many.\n\
          - Unweighted: every lot, or all generated ones of a kind, and direction counts the same, however long its route.\n\
-         - Stuck: no headway for a while. Given up: too many near-collisions in one run. Timed out: the time limit. Reversals: changes of \
-         the steering's direction. Steering: how far the wheels were turned in all.\n\
+         - Stuck: no headway for a while. Given up: too many near-collisions in one run. Timed out: the time limit. Least clearance: \
+         negative is how deep the body was in something. Reversals: changes of the steering's direction. Steering: how far the \
+         wheels were turned in all.\n\
+         {causes}\
          - Safe ratio: free share of the metre around the body; its intervals, and those of differences (Δ), are bootstrap.\n\
          - *: excludes zero, by six trials or lots that differ, or more. Rate ratio and p: exact test of equal rates; – where events of \
-         either driver cluster, as for (b). Holm: adjusted for the drivers compared.",
+         either driver cluster, as for (b). Holm: adjusted for the drivers compared.\n\
+         - –, elsewhere: too few trials, lots or events to say. More: docs/methods.md 8.",
         seed.0
     );
     text

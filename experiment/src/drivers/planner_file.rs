@@ -92,7 +92,7 @@ pub(super) fn planner(name: &str, parameters: &Parameters) -> anyhow::Result<(Pl
                 format!("{}: cannot be read; cargo xtask drivers {name} prints such a file", path.display())
             })?;
             with_parameters(&planner, &text)
-                .with_context(|| format!("{}: cargo xtask drivers {name} prints a complete file", path.display()))
+                .with_context(|| format!("{} (cargo xtask drivers {name} prints a complete file)", path.display()))
         }
     }
 }

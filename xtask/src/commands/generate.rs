@@ -213,7 +213,8 @@ fn write(args: &GenerateArgs, trial: &Trial<'_>) -> anyhow::Result<Made> {
     let back = Map::build(map.scenario().clone().reversed(), &vehicle);
     let ways =
         back.err().map_or(String::new(), |error| format!("; --directions forward only: on the way back, {error}"));
-    let line = format!("{} and .png: route {length_m:.1} m, {obstacles} obstacles{ways}", toml.display());
+    let obstacles = if obstacles == 1 { "1 obstacle".to_owned() } else { format!("{obstacles} obstacles") };
+    let line = format!("{} and .png: route {length_m:.1} m, {obstacles}{ways}", toml.display());
     Ok(Made { attempts, line })
 }
 

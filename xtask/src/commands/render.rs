@@ -18,7 +18,7 @@ use experiment::manifest::{self, Manifest};
 use experiment::progress::{Interrupted, Progress as _};
 use experiment::replay_key::ReplayKey;
 use experiment::run_dir::{self, RunDir};
-use experiment::settings::{NoiseChoice, Settings};
+use experiment::settings::{Layers, NoiseChoice, Settings};
 use experiment::trained;
 use experiment::training;
 use experiment::trials::{Purpose, Trial};
@@ -93,7 +93,9 @@ pub(crate) enum RenderWhat {
     #[command(after_help = "Example: cargo xtask render samples runs/NAME/round-01 --count 8")]
     Samples(SamplesArgs),
     /// What each noise layer makes wrong in one view, PNG.
-    #[command(after_help = "Example: cargo xtask render noise --lots lot-a --noise paper,hard")]
+    #[command(
+        after_help = "Examples:\n  cargo xtask render noise --lots lot-a --noise paper,hard\n  cargo xtask render noise --lots lot-b --set episode.noise.shadow=0"
+    )]
     Noise(RenderNoiseArgs),
     /// Writes the report of a run again, into its folder and that of `--out`.
     #[command(after_help = "Example: cargo xtask render report runs/NAME")]
@@ -209,6 +211,8 @@ pub(crate) struct RenderNoiseArgs {
     /// Seed of obstacles and noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    layers: LayerArgs,
 }
 
 pub(crate) fn run(args: &RenderArgs, output: &Output) -> anyhow::Result<()> {
@@ -416,7 +420,7 @@ fn render_samples(args: &SamplesArgs, folder: &Folder<'_>) -> anyhow::Result<()>
 }
 
 fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
-    let settings = Settings::preset("default")?;
+    let settings = Settings::resolve(&Layers::from(&args.layers), None)?;
     let lot = Lot::parse_one(&args.lot, &settings.episode.vehicle).context("--lots")?;
     folder.output.notes(&experiment::notes::of(std::slice::from_ref(&lot), &args.noise));
     let trial = Trial::new(RootSeed(args.seed), Purpose::Pictures, &lot, Direction::Forward, 0);
