@@ -866,6 +866,14 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         (&["evaluate", "--driver", "expert", "--lots", "test:1000001"], "from 1 to 1000000"),
         (&["evaluate", "--driver", "dwa:pipe.toml"], "it is not a regular file"),
         (&["evaluate", "--driver", "expert", "--out", "a|b"], "without '|'"),
+        (
+            &["pixel-accuracy", "--lots", "lot-b", "--noise", "10", "--set", "episode.noise.blob=100"],
+            "at most 100 is possible",
+        ),
+        (
+            &["render", "noise", "--lots", "lot-b", "--noise", "10", "--set", "episode.noise.blob=100"],
+            "at most 100 is possible",
+        ),
         (&["evaluate", "--driver", "expert", "--out", "a\u{202e}b"], "without '\\u{202e}'"),
         (&["evaluate", "--driver", "expert", "--lots", "a\u{200b}.toml"], "contains '\\u{200b}'"),
         (&["evaluate", "--driver", "dwa:huge.toml"], "200000000000 bytes or more"),

@@ -128,7 +128,8 @@ fn cautions(settings: &Settings) -> anyhow::Result<String> {
         "Before quoting a figure: the widths of the three reference lots were chosen so that a prototype's expert came near the \
          paper's safe ratios ([methods](methods.md#11-lots)). {points} Forward and reverse drives of a trial share their obstacles. One \
          training is one sample: its interval says how sure the rate of *this* network is, not what another training would \
-         give; an interval over several trainings is for other seeds, too."
+         give; an interval over several trainings is for other seeds, too. *Unseen* are, in tables of the paper's lots, those of \
+         them that nothing was trained or tuned on, and elsewhere the generated lots."
     ))
 }
 

@@ -47,7 +47,9 @@ struct Row<'a> {
 }
 
 pub(crate) fn run(args: &PixelAccuracyArgs, output: &Output) -> anyhow::Result<()> {
-    let settings = Settings::resolve(&Layers::from(&args.layers), args.seed)?;
+    let mut settings = Settings::resolve(&Layers::from(&args.layers), args.seed)?;
+    settings.evaluation.noise.clone_from(&args.noise);
+    settings.check()?;
     let lots = Lot::parse_all(&args.lots, &settings.episode.vehicle)?;
     output.notes(&notes::of(&lots, &args.noise));
     let mut table = report::pixel_accuracy::table();

@@ -420,7 +420,9 @@ fn render_samples(args: &SamplesArgs, folder: &Folder<'_>) -> anyhow::Result<()>
 }
 
 fn render_noise(args: &RenderNoiseArgs, folder: &Folder<'_>) -> anyhow::Result<()> {
-    let settings = Settings::resolve(&Layers::from(&args.layers), None)?;
+    let mut settings = Settings::resolve(&Layers::from(&args.layers), None)?;
+    settings.evaluation.noise.clone_from(&args.noise);
+    settings.check()?;
     let lot = Lot::parse_one(&args.lot, &settings.episode.vehicle).context("--lots")?;
     folder.output.notes(&experiment::notes::of(std::slice::from_ref(&lot), &args.noise));
     let trial = Trial::new(RootSeed(args.seed), Purpose::Pictures, &lot, Direction::Forward, 0);
