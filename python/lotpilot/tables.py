@@ -263,7 +263,7 @@ def _function(name: str, driver: Any) -> Callable[..., Floats]:
 
 
 def _lines(path: Path) -> list[dict[str, Any]]:
-    # Not splitlines(), which also parts at characters that JSON does not escape, such as U+2028 in a name.
+    # Not splitlines(), which also parts at characters that JSON does not escape, such as U+2028.
     return [json.loads(line) for line in _native.read_finished(path).split("\n") if line]
 
 

@@ -383,16 +383,23 @@ def test_a_car_that_an_interrupted_reset_did_not_reach_drives_the_episode_that_i
 
 def test_tables_are_read_from_files_that_are_whole(tmp_path):
     folder = tmp_path / "run"
-    # A separator of lines within a name, which JSON need not escape.
     where = {"trials": 1, "directions": "forward", "overrides": SHORT}
-    whole = lotpilot.evaluate({"the\u2028expert": "expert"}, "lot-b", out=folder, **where)
-    assert whole.runs["driver"] == ["the\u2028expert"] and _read(folder) == whole
+    whole = lotpilot.evaluate({"the éxpert": "expert"}, "lot-b", out=folder, **where)
+    assert whole.runs["driver"] == ["the éxpert"] and _read(folder) == whole
     for name in ("runs.jsonl", "failures.jsonl", "summary.json", "sha256sums"):
         content = (folder / name).read_bytes()
         (folder / name).write_bytes(content + b"\n")
         with pytest.raises(ValueError, match=name):
             _read(folder)
         (folder / name).write_bytes(content)
+
+
+def test_letters_that_nobody_sees_are_refused_in_names():
+    # The first parts lines, the second turns the direction of writing.
+    for letter in ("\u2028", "\u202e"):
+        with pytest.raises(ValueError, match=r"tables hold its name") as error:
+            lotpilot.evaluate({f"the{letter}expert": "expert"}, "lot-b", trials=1, overrides=SHORT)
+        assert letter not in str(error.value)
 
 
 def test_lots_are_drawn_as_on_the_command_line(tmp_path):
